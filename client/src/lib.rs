@@ -1,0 +1,1 @@
+//! What the `penup` command is made of: sending, emulating, previewing, picturing.

@@ -1,0 +1,1 @@
+//! The simulated machine, the exact reference models and the tests of whole jobs.

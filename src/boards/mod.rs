@@ -1,0 +1,1 @@
+//! Pins, timer, serial line and storage of each board.

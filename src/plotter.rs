@@ -1,0 +1,1 @@
+//! Owns the memory and joins the rest.

@@ -1,0 +1,1 @@
+//! Bytes to lines to typed commands, and replies.

@@ -1,0 +1,143 @@
+//! What every stage of a job is lent: working memory, and a moment now and then to answer the line.
+//!
+//! The stages (visibility, drawing, order) never run at once, so one [`Scratch`] serves them all:
+//! each takes typed slices from it and gives everything back by ending. A stage that runs for more
+//! than a millisecond calls [`Attention::check`] as it goes, so that status, hold and abort are
+//! answered while it computes. What is refused: a slice that does not fit, with the figures.
+
+use bytemuck::Pod;
+
+/// A piece of working memory from which a stage takes its slices.
+///
+/// Dropping the slices gives nothing back; the owner of the memory makes a new `Scratch` for the
+/// next stage. Borrow rules keep two stages from holding the same bytes.
+///
+/// ```
+/// use penup::stage::Scratch;
+/// let mut words = [0u64; 4];
+/// let mut scratch = Scratch::new(&mut words);
+/// let corners: &mut [u16] = scratch.take(5)?;
+/// assert_eq!(corners, [0; 5]);
+/// assert_eq!(scratch.available_bytes(), 16);
+/// # Ok::<(), penup::stage::OutOfScratch>(())
+/// ```
+#[derive(Debug)]
+pub struct Scratch<'a> {
+    words: &'a mut [u64],
+}
+
+/// A stage needed more working memory than there is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct OutOfScratch {
+    /// Bytes that the slice needed.
+    pub needed: usize,
+    /// Bytes that were left.
+    pub available: usize,
+}
+
+impl<'a> Scratch<'a> {
+    /// All of `words` as working memory.
+    pub fn new(words: &'a mut [u64]) -> Self {
+        Self { words }
+    }
+
+    /// Bytes not yet taken.
+    pub fn available_bytes(&self) -> usize {
+        size_of_val(self.words)
+    }
+
+    /// The bytes that [`Scratch::take`] uses up for `count` items of `T`.
+    pub const fn bytes_for<T>(count: usize) -> usize {
+        (count * size_of::<T>()).next_multiple_of(8)
+    }
+
+    /// Takes `count` items of `T`, all zero.
+    ///
+    /// # Errors
+    /// [`OutOfScratch`] if they do not fit; nothing is taken then.
+    pub fn take<T: Pod>(&mut self, count: usize) -> Result<&'a mut [T], OutOfScratch> {
+        const { assert!(align_of::<T>() <= align_of::<u64>()) };
+        let out_of_scratch = OutOfScratch {
+            needed: count.saturating_mul(size_of::<T>()),
+            available: self.available_bytes(),
+        };
+        if out_of_scratch.needed > out_of_scratch.available {
+            return Err(out_of_scratch);
+        }
+        let word_count = Self::bytes_for::<T>(count) / size_of::<u64>();
+        let words = core::mem::take(&mut self.words);
+        let (taken, rest) = words
+            .split_at_mut_checked(word_count)
+            .ok_or(out_of_scratch)?;
+        self.words = rest;
+        taken.fill(0);
+        let items = bytemuck::cast_slice_mut(taken);
+        items.get_mut(..count).ok_or(out_of_scratch)
+    }
+
+    /// Lends what is left to a stage within this stage.
+    pub fn reborrow(&mut self) -> Scratch<'_> {
+        Scratch { words: self.words }
+    }
+
+    /// Splits off the first `bytes` (rounded down to words) as one memory, the rest as another.
+    pub fn split(self, bytes: usize) -> (Scratch<'a>, Scratch<'a>) {
+        let word_count = (bytes / size_of::<u64>()).min(self.words.len());
+        let (first, second) = self.words.split_at_mut(word_count);
+        (Scratch { words: first }, Scratch { words: second })
+    }
+}
+
+/// The user asked for the job to be given up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Aborted;
+
+/// The moment that a long computation gives to the serial line.
+pub trait Attention {
+    /// Answers what waits (status, hold, resume).
+    ///
+    /// # Errors
+    /// [`Aborted`] if the user gave the job up; the stage then ends at once.
+    fn check(&mut self) -> Result<(), Aborted>;
+}
+
+/// Nobody to answer: for tests and benchmarks.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Undisturbed;
+
+impl Attention for Undisturbed {
+    fn check(&mut self) -> Result<(), Aborted> {
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slice_that_does_not_fit_takes_nothing() {
+        let mut words = [7u64; 2];
+        let mut scratch = Scratch::new(&mut words);
+        assert_eq!(
+            scratch.take::<u32>(5),
+            Err(OutOfScratch {
+                needed: 20,
+                available: 16
+            })
+        );
+        assert_eq!(scratch.take::<u32>(4).map(|items| items.len()), Ok(4));
+        assert_eq!(scratch.available_bytes(), 0);
+        assert_eq!(scratch.take::<u8>(0).map(|items| items.len()), Ok(0));
+    }
+
+    #[test]
+    fn a_hostile_count_is_refused_and_does_not_wrap() {
+        let mut words = [0u64; 2];
+        let mut scratch = Scratch::new(&mut words);
+        assert!(scratch.take::<u64>(usize::MAX).is_err());
+        assert!(scratch.take::<u64>(usize::MAX / 8 + 1).is_err());
+    }
+}

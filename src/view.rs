@@ -1,0 +1,1 @@
+//! Camera from two points; projection to integers.

@@ -1,0 +1,3 @@
+//! Set-up, build, emulate, flash, size.
+
+fn main() {}
