@@ -295,10 +295,10 @@ impl<'m> Model<'m> {
         let count = self.check_numbers(numbers.clone(), 3)?;
         let first = numbers.clone().next();
         let last = numbers.clone().last();
-        if let (Some(first), Some(last)) = (first, last) {
-            if self.resolve(first) == self.resolve(last) {
-                return Err(ModelError::RepeatedVertex { number: last });
-            }
+        if let (Some(first), Some(last)) = (first, last)
+            && self.resolve(first) == self.resolve(last)
+        {
+            return Err(ModelError::RepeatedVertex { number: last });
         }
         self.check_corners(count)?;
         for (at, number) in numbers.enumerate() {

@@ -285,7 +285,8 @@ pub fn three_quarter_view(model: &Model<'_>, projection: Projection) -> Option<C
         [0, 1, 2].map(|axis| ((f64::from(high[axis]) - f64::from(low[axis])) / 2.0 * unit) as f32);
     // Named in full: with std at hand, `f32::sqrt` would quietly take its place.
     let radius = F32Ext::sqrt(halves.iter().map(|half| half * half).sum::<f32>());
-    let radius = if radius > 0.0 { f64::from(radius) } else { 1.0 };
+    let flat = halves.iter().all(|half| *half == 0.0);
+    let radius = if flat { 1.0 } else { f64::from(radius) };
     const FROM: Direction = [1.5, -2.6, 1.7];
     let eye = [0, 1, 2].map(|axis| centre[axis] + FROM[axis] * radius);
     Some(Camera {
