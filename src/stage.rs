@@ -72,8 +72,7 @@ impl<'a> Scratch<'a> {
             .ok_or(out_of_scratch)?;
         self.words = rest;
         taken.fill(0);
-        let items = bytemuck::cast_slice_mut(taken);
-        items.get_mut(..count).ok_or(out_of_scratch)
+        items_mut(taken, count).ok_or(out_of_scratch)
     }
 
     /// Lends what is left to a stage within this stage.
@@ -87,6 +86,22 @@ impl<'a> Scratch<'a> {
         let (first, second) = self.words.split_at_mut(word_count);
         (Scratch { words: first }, Scratch { words: second })
     }
+}
+
+/// The first `count` items of `T` that lie in `words`; `None` if they do not fit.
+pub fn items_mut<T: Pod>(words: &mut [u64], count: usize) -> Option<&mut [T]> {
+    const { assert!(align_of::<T>() <= align_of::<u64>()) };
+    let bytes: &mut [u8] = bytemuck::cast_slice_mut(words);
+    let exact = bytes.get_mut(..count.checked_mul(size_of::<T>())?)?;
+    bytemuck::try_cast_slice_mut(exact).ok()
+}
+
+/// Like [`items_mut`], to read only.
+pub fn items<T: Pod>(words: &[u64], count: usize) -> Option<&[T]> {
+    const { assert!(align_of::<T>() <= align_of::<u64>()) };
+    let bytes: &[u8] = bytemuck::cast_slice(words);
+    let exact = bytes.get(..count.checked_mul(size_of::<T>())?)?;
+    bytemuck::try_cast_slice(exact).ok()
 }
 
 /// The user asked for the job to be given up.
@@ -131,6 +146,15 @@ mod tests {
         assert_eq!(scratch.take::<u32>(4).map(|items| items.len()), Ok(4));
         assert_eq!(scratch.available_bytes(), 0);
         assert_eq!(scratch.take::<u8>(0).map(|items| items.len()), Ok(0));
+    }
+
+    #[test]
+    fn items_need_not_fill_their_last_word() {
+        let mut words = [0u64; 4];
+        let mut scratch = Scratch::new(&mut words);
+        assert_eq!(scratch.take::<[u32; 3]>(1).map(|items| items.len()), Ok(1));
+        assert_eq!(scratch.take::<[u8; 3]>(5).map(|items| items.len()), Ok(5));
+        assert_eq!(scratch.available_bytes(), 0);
     }
 
     #[test]
