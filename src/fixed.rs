@@ -102,10 +102,8 @@ impl Decimal {
             power_of_ten(self.exponent.unsigned_abs())
                 .map_or(0, |power| (shifted + power / 2) / power)
         };
-        let value = i64::try_from(rounded)
-            .ok()
-            .filter(|value| *value < 1 << 62)
-            .ok_or(OutOfRange)?;
+        let value =
+            i64::try_from(rounded).ok().filter(|value| *value < 1 << 62).ok_or(OutOfRange)?;
         Ok(if self.mantissa < 0 { -value } else { value })
     }
 
@@ -115,9 +113,7 @@ impl Decimal {
     /// [`OutOfRange`] past ±32768 mm.
     pub fn to_millimetres(self) -> Result<Millimetres, OutOfRange> {
         let bits = self.to_binary(16)?;
-        i32::try_from(bits)
-            .map(Millimetres::from_bits)
-            .map_err(|_| OutOfRange)
+        i32::try_from(bits).map(Millimetres::from_bits).map_err(|_| OutOfRange)
     }
 
     /// For the camera, whose angles are the one place for binary floats.
@@ -126,19 +122,11 @@ impl Decimal {
     pub fn to_f64(self) -> f64 {
         let mut value = self.mantissa as f64;
         for _ in 0..self.exponent.unsigned_abs().min(400) / 22 {
-            value = if self.exponent < 0 {
-                value / 1e22
-            } else {
-                value * 1e22
-            };
+            value = if self.exponent < 0 { value / 1e22 } else { value * 1e22 };
         }
         // 10^22 is the largest power of ten that a double holds exactly.
         let rest = power_of_ten(self.exponent.unsigned_abs().min(400) % 22).unwrap_or(1) as f64;
-        if self.exponent < 0 {
-            value / rest
-        } else {
-            value * rest
-        }
+        if self.exponent < 0 { value / rest } else { value * rest }
     }
 
     /// The nearest `i32`, if the text was a whole number.
@@ -159,11 +147,7 @@ impl Decimal {
 
 fn parse_power(text: &str) -> Result<i16, NotANumber> {
     let power: i16 = text.parse().map_err(|_| NotANumber)?;
-    if (-9999..=9999).contains(&power) {
-        Ok(power)
-    } else {
-        Err(NotANumber)
-    }
+    if (-9999..=9999).contains(&power) { Ok(power) } else { Err(NotANumber) }
 }
 
 fn power_of_ten(exponent: u16) -> Option<u128> {
@@ -186,11 +170,7 @@ pub fn shift_right_rounding(value: i32, bits: u32) -> i32 {
 /// Divides, rounding half away from zero. `divisor` > 0.
 pub fn divide_rounding(dividend: i128, divisor: i128) -> i128 {
     let half = divisor / 2;
-    if dividend < 0 {
-        -((half - dividend) / divisor)
-    } else {
-        (dividend + half) / divisor
-    }
+    if dividend < 0 { -((half - dividend) / divisor) } else { (dividend + half) / divisor }
 }
 
 /// Writes `units` × 2^-`fraction_bits` with `places` decimals (at most 9), rounded half away from zero.
@@ -225,12 +205,7 @@ impl fmt::Display for BinaryFraction {
         }
         write!(formatter, "{}", rounded / scale)?;
         if places > 0 {
-            write!(
-                formatter,
-                ".{:0width$}",
-                rounded % scale,
-                width = places as usize
-            )?;
+            write!(formatter, ".{:0width$}", rounded % scale, width = places as usize)?;
         }
         Ok(())
     }
@@ -242,9 +217,7 @@ mod tests {
     use std::format;
 
     fn binary(text: &str, fraction_bits: u32) -> Result<i64, OutOfRange> {
-        Decimal::parse(text)
-            .map_err(|_| OutOfRange)?
-            .to_binary(fraction_bits)
+        Decimal::parse(text).map_err(|_| OutOfRange)?.to_binary(fraction_bits)
     }
 
     #[test]
@@ -284,18 +257,9 @@ mod tests {
         assert_eq!(binary("1e40", 0), Err(OutOfRange));
         assert_eq!(binary("1e18", 3), Err(OutOfRange));
         assert_eq!(binary("9e9999", 0), Err(OutOfRange));
-        assert_eq!(
-            Decimal::parse("32768").map(Decimal::to_millimetres),
-            Ok(Err(OutOfRange))
-        );
-        assert_eq!(
-            Decimal::parse("1.5").map(Decimal::to_whole),
-            Ok(Err(OutOfRange))
-        );
-        assert_eq!(
-            Decimal::parse("15e-1").map(Decimal::to_whole),
-            Ok(Err(OutOfRange))
-        );
+        assert_eq!(Decimal::parse("32768").map(Decimal::to_millimetres), Ok(Err(OutOfRange)));
+        assert_eq!(Decimal::parse("1.5").map(Decimal::to_whole), Ok(Err(OutOfRange)));
+        assert_eq!(Decimal::parse("15e-1").map(Decimal::to_whole), Ok(Err(OutOfRange)));
         assert_eq!(Decimal::parse("150e-1").map(Decimal::to_whole), Ok(Ok(15)));
     }
 
@@ -303,11 +267,7 @@ mod tests {
     fn floats_come_out_exactly_rounded() {
         for text in ["0.1", "-12.75", "3e22", "1e-22", "123456789.125", "0"] {
             let exact: f64 = text.parse().unwrap_or(f64::NAN);
-            assert_eq!(
-                Decimal::parse(text).map(Decimal::to_f64),
-                Ok(exact),
-                "{text}"
-            );
+            assert_eq!(Decimal::parse(text).map(Decimal::to_f64), Ok(exact), "{text}");
         }
     }
 
@@ -319,23 +279,13 @@ mod tests {
         );
         assert_eq!(shift_right_rounding(i32::MIN, 31), -1);
         assert_eq!(shift_right_rounding(i32::MAX, 40), 0);
-        assert_eq!(
-            [7, -7, 6, -6].map(|value| divide_rounding(value, 4)),
-            [2, -2, 2, -2]
-        );
+        assert_eq!([7, -7, 6, -6].map(|value| divide_rounding(value, 4)), [2, -2, 2, -2]);
     }
 
     #[test]
     fn fractions_are_written_rounded_and_without_a_negative_zero() {
         let shown = |units, fraction_bits, places| {
-            format!(
-                "{}",
-                BinaryFraction {
-                    units,
-                    fraction_bits,
-                    places
-                }
-            )
+            format!("{}", BinaryFraction { units, fraction_bits, places })
         };
         assert_eq!(shown(5 << 16, 16, 3), "5.000");
         assert_eq!(shown(-1, 16, 3), "0.000");

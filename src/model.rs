@@ -67,13 +67,8 @@ pub struct Elements<'a> {
 impl<'a> Elements<'a> {
     /// The elements that `corners` encode. Corners after the last mark are left out.
     pub fn new(corners: &'a [Corner]) -> Self {
-        let whole = corners
-            .iter()
-            .rposition(|corner| corner.is_last())
-            .map_or(0, |last| last + 1);
-        Self {
-            corners: &corners[..whole],
-        }
+        let whole = corners.iter().rposition(|corner| corner.is_last()).map_or(0, |last| last + 1);
+        Self { corners: &corners[..whole] }
     }
 
     /// Every corner of every element.
@@ -83,12 +78,10 @@ impl<'a> Elements<'a> {
 
     /// Each element in turn.
     pub fn iter(&self) -> impl Iterator<Item = Element<'a>> + Clone + use<'a> {
-        self.corners
-            .split_inclusive(|corner| corner.is_last())
-            .map(|corners| match corners {
-                [a, b] if a.of_bar() => Element::Bar(a.vertex(), b.vertex()),
-                _ => Element::Face(corners),
-            })
+        self.corners.split_inclusive(|corner| corner.is_last()).map(|corners| match corners {
+            [a, b] if a.of_bar() => Element::Bar(a.vertex(), b.vertex()),
+            _ => Element::Face(corners),
+        })
     }
 }
 
@@ -175,13 +168,7 @@ impl<'m> Model<'m> {
     ) -> Self {
         vertices.clear();
         corners.clear();
-        Self {
-            vertices,
-            corners,
-            fraction_bits: FINEST_FRACTION_BITS,
-            faces: 0,
-            bars: 0,
-        }
+        Self { vertices, corners, fraction_bits: FINEST_FRACTION_BITS, faces: 0, bars: 0 }
     }
 
     /// Forgets everything.
@@ -205,9 +192,7 @@ impl<'m> Model<'m> {
 
     /// The faces and bars.
     pub fn elements(&self) -> Elements<'_> {
-        Elements {
-            corners: self.corners,
-        }
+        Elements { corners: self.corners }
     }
 
     /// How many faces there are.
@@ -263,9 +248,7 @@ impl<'m> Model<'m> {
                 .unwrap_or(0)
         });
         self.coarsen(self.fraction_bits - fraction_bits);
-        self.vertices
-            .push(Position { x, y, z })
-            .map_err(|_| ModelError::TooManyVertices { limit })
+        self.vertices.push(Position { x, y, z }).map_err(|_| ModelError::TooManyVertices { limit })
     }
 
     fn coarsen(&mut self, bits: u32) {
@@ -335,83 +318,54 @@ impl<'m> Model<'m> {
         let mut count = 0;
         let mut previous = None;
         for number in numbers {
-            let vertex = self.resolve(number).ok_or(ModelError::UnknownVertex {
-                number,
-                vertices: self.vertices.len(),
-            })?;
+            let vertex = self
+                .resolve(number)
+                .ok_or(ModelError::UnknownVertex { number, vertices: self.vertices.len() })?;
             if previous == Some(vertex) {
                 return Err(ModelError::RepeatedVertex { number });
             }
             previous = Some(vertex);
             count += 1;
         }
-        if count < needed {
-            Err(ModelError::TooFewCorners { needed })
-        } else {
-            Ok(count)
-        }
+        if count < needed { Err(ModelError::TooFewCorners { needed }) } else { Ok(count) }
     }
 
     fn check_corners(&self, count: usize) -> Result<(), ModelError> {
         let limit = self.corner_limit();
         let needed = self.corners.len().saturating_add(count);
-        if needed > limit {
-            Err(ModelError::TooManyCorners { limit, needed })
-        } else {
-            Ok(())
-        }
+        if needed > limit { Err(ModelError::TooManyCorners { limit, needed }) } else { Ok(()) }
     }
 
     fn push_corner(&mut self, number: i32, of_bar: bool, last: bool) -> Result<(), ModelError> {
         let limit = self.corner_limit();
-        let vertex = self.resolve(number).ok_or(ModelError::UnknownVertex {
-            number,
-            vertices: self.vertices.len(),
-        })?;
+        let vertex = self
+            .resolve(number)
+            .ok_or(ModelError::UnknownVertex { number, vertices: self.vertices.len() })?;
         self.corners
             .push(Corner::new(vertex, of_bar, last))
-            .map_err(|_| ModelError::TooManyCorners {
-                limit,
-                needed: limit + 1,
-            })
+            .map_err(|_| ModelError::TooManyCorners { limit, needed: limit + 1 })
     }
 
     /// The vertex that an OBJ number means.
     fn resolve(&self, number: i32) -> Option<u16> {
         let count = self.vertices.len() as i64; // at most VERTEX_NUMBER_LIMIT
-        let index = if number < 0 {
-            count + i64::from(number)
-        } else {
-            i64::from(number) - 1
-        };
-        if (0..count).contains(&index) {
-            u16::try_from(index).ok()
-        } else {
-            None
-        }
+        let index = if number < 0 { count + i64::from(number) } else { i64::from(number) - 1 };
+        if (0..count).contains(&index) { u16::try_from(index).ok() } else { None }
     }
 
     /// The smallest box around all vertices: least and greatest of each coordinate; `None` if empty.
     pub fn bounds(&self) -> Option<(Position, Position)> {
         let first = *self.vertices.first()?;
-        Some(
-            self.vertices
-                .iter()
-                .fold((first, first), |(low, high), vertex| {
-                    (
-                        Position {
-                            x: low.x.min(vertex.x),
-                            y: low.y.min(vertex.y),
-                            z: low.z.min(vertex.z),
-                        },
-                        Position {
-                            x: high.x.max(vertex.x),
-                            y: high.y.max(vertex.y),
-                            z: high.z.max(vertex.z),
-                        },
-                    )
-                }),
-        )
+        Some(self.vertices.iter().fold((first, first), |(low, high), vertex| {
+            (
+                Position { x: low.x.min(vertex.x), y: low.y.min(vertex.y), z: low.z.min(vertex.z) },
+                Position {
+                    x: high.x.max(vertex.x),
+                    y: high.y.max(vertex.y),
+                    z: high.z.max(vertex.z),
+                },
+            )
+        }))
     }
 
     /// Whether this is a plan: bars only, all at one height.
@@ -446,14 +400,7 @@ mod tests {
             assert_eq!(model.fraction_bits(), 30);
             model.add_vertex(decimals(["100", "0", "0.1"])).unwrap();
             assert_eq!(model.fraction_bits(), 23);
-            assert_eq!(
-                model.vertices()[0],
-                Position {
-                    x: 1 << 21,
-                    y: -(1 << 22),
-                    z: 0
-                }
-            );
+            assert_eq!(model.vertices()[0], Position { x: 1 << 21, y: -(1 << 22), z: 0 });
             assert_eq!(model.vertices()[1].x, 100 << 23);
         });
     }
@@ -478,12 +425,7 @@ mod tests {
     #[test]
     fn refused_elements_change_nothing() {
         with_vertices(4, |model| {
-            let unknown = |number| {
-                Err(ModelError::UnknownVertex {
-                    number,
-                    vertices: 4,
-                })
-            };
+            let unknown = |number| Err(ModelError::UnknownVertex { number, vertices: 4 });
             for number in [0, 5, -5, i32::MIN, i32::MAX] {
                 assert_eq!(model.add_face([1, 2, number].into_iter()), unknown(number));
                 assert_eq!(model.add_polyline([1, number].into_iter()), unknown(number));
@@ -506,15 +448,9 @@ mod tests {
             );
             assert_eq!(
                 model.add_face([1, 2, 3, 1, 2, 3, 1, 2, 3].into_iter()),
-                Err(ModelError::TooManyCorners {
-                    limit: 8,
-                    needed: 9
-                })
+                Err(ModelError::TooManyCorners { limit: 8, needed: 9 })
             );
-            assert_eq!(
-                (model.corner_count(), model.face_count(), model.bar_count()),
-                (0, 0, 0)
-            );
+            assert_eq!((model.corner_count(), model.face_count(), model.bar_count()), (0, 0, 0));
         });
     }
 
@@ -526,9 +462,7 @@ mod tests {
             let mut elements = model.elements().iter();
             assert_eq!(elements.next(), Some(Element::Bar(0, 1)));
             assert_eq!(elements.next(), Some(Element::Bar(1, 3)));
-            let Some(Element::Face(corners)) = elements.next() else {
-                panic!("a face was sent")
-            };
+            let Some(Element::Face(corners)) = elements.next() else { panic!("a face was sent") };
             assert!(corners.iter().map(|corner| corner.vertex()).eq(0..4));
             assert_eq!(elements.next(), None);
             assert_eq!((model.face_count(), model.bar_count()), (1, 2));

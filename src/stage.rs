@@ -67,9 +67,7 @@ impl<'a> Scratch<'a> {
         }
         let word_count = Self::bytes_for::<T>(count) / size_of::<u64>();
         let words = core::mem::take(&mut self.words);
-        let (taken, rest) = words
-            .split_at_mut_checked(word_count)
-            .ok_or(out_of_scratch)?;
+        let (taken, rest) = words.split_at_mut_checked(word_count).ok_or(out_of_scratch)?;
         self.words = rest;
         taken.fill(0);
         items_mut(taken, count).ok_or(out_of_scratch)
@@ -109,6 +107,18 @@ pub fn items<T: Pod>(words: &[u64], count: usize) -> Option<&[T]> {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Aborted;
 
+/// What a job computes before it moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Stage {
+    /// The camera, and every vertex through it.
+    View,
+    /// Which stretches are seen, and the drawing on the page.
+    Visibility,
+    /// In which order the strokes are drawn.
+    Order,
+}
+
 /// The moment that a long computation gives to the serial line.
 pub trait Attention {
     /// Answers what waits (status, hold, resume).
@@ -116,6 +126,9 @@ pub trait Attention {
     /// # Errors
     /// [`Aborted`] if the user gave the job up; the stage then ends at once.
     fn check(&mut self) -> Result<(), Aborted>;
+
+    /// Told when a stage begins.
+    fn enter(&mut self, _stage: Stage) {}
 }
 
 /// Nobody to answer: for tests and benchmarks.
@@ -136,13 +149,7 @@ mod tests {
     fn a_slice_that_does_not_fit_takes_nothing() {
         let mut words = [7u64; 2];
         let mut scratch = Scratch::new(&mut words);
-        assert_eq!(
-            scratch.take::<u32>(5),
-            Err(OutOfScratch {
-                needed: 20,
-                available: 16
-            })
-        );
+        assert_eq!(scratch.take::<u32>(5), Err(OutOfScratch { needed: 20, available: 16 }));
         assert_eq!(scratch.take::<u32>(4).map(|items| items.len()), Ok(4));
         assert_eq!(scratch.available_bytes(), 0);
         assert_eq!(scratch.take::<u8>(0).map(|items| items.len()), Ok(0));

@@ -32,14 +32,8 @@ impl Line {
         let coordinate = |shift: u32| ((packed >> shift) as i32 & 0x1F_FFFF) - PAGE_LIMIT;
         let marks = (packed >> 84) as u32;
         (
-            PagePoint {
-                x: coordinate(0),
-                y: coordinate(21),
-            },
-            PagePoint {
-                x: coordinate(42),
-                y: coordinate(63),
-            },
+            PagePoint { x: coordinate(0), y: coordinate(21) },
+            PagePoint { x: coordinate(42), y: coordinate(63) },
             (marks & 3) as u8,
             (marks >> 2) as u8 % PEN_LIMIT,
         )
@@ -71,13 +65,9 @@ impl Stored {
         &self,
         words: &'a mut [u64],
     ) -> Result<(Drawing<'a>, Scratch<'a>), OutOfScratch> {
-        let missing = OutOfScratch {
-            needed: self.bytes(),
-            available: size_of_val(words),
-        };
-        let (segments, rest) = words
-            .split_at_mut_checked(self.segment_bytes() / 8)
-            .ok_or(missing)?;
+        let missing = OutOfScratch { needed: self.bytes(), available: size_of_val(words) };
+        let (segments, rest) =
+            words.split_at_mut_checked(self.segment_bytes() / 8).ok_or(missing)?;
         let point_words = Scratch::bytes_for::<PagePoint>(self.points) / 8;
         let (points, rest) = rest.split_at_mut_checked(point_words).ok_or(missing)?;
         let drawing = Drawing {
@@ -98,10 +88,7 @@ impl Stored {
 pub fn organise(words: &mut [u64], count: usize) -> Result<Stored, OutOfScratch> {
     let line_words = Scratch::bytes_for::<Line>(count) / 8;
     let available = size_of_val(words);
-    let missing = OutOfScratch {
-        needed: line_words * 8,
-        available,
-    };
+    let missing = OutOfScratch { needed: line_words * 8, available };
     let (line_memory, rest) = words.split_at_mut_checked(line_words).ok_or(missing)?;
     let lines: &mut [Line] = items_mut(line_memory, count).ok_or(missing)?;
 
@@ -143,10 +130,7 @@ pub fn organise(words: &mut [u64], count: usize) -> Result<Stored, OutOfScratch>
 
     let stored = Stored { segments, points };
     let point_words = Scratch::bytes_for::<PagePoint>(points) / 8;
-    words.copy_within(
-        line_words..line_words + point_words,
-        stored.segment_bytes() / 8,
-    );
+    words.copy_within(line_words..line_words + point_words, stored.segment_bytes() / 8);
     Ok(stored)
 }
 
@@ -177,36 +161,17 @@ impl<'a> PointFinder<'a> {
         // A third of the memory at most: a point takes 8 bytes, a full enough table 2 to 4 for each.
         let longest = (available / 3 / size_of::<u16>()).max(1);
         let longest = 1 << (usize::BITS - 1 - longest.leading_zeros());
-        let length = (2 * most)
-            .next_power_of_two()
-            .clamp(8, 1 << 17)
-            .min(longest);
+        let length = (2 * most).next_power_of_two().clamp(8, 1 << 17).min(longest);
         let (mut points, mut table) = scratch.split(available - Scratch::bytes_for::<u16>(length));
         let point_limit = (points.available_bytes() / size_of::<PagePoint>()).min(most);
-        Ok(Self {
-            points: points.take(point_limit)?,
-            count: 0,
-            table: table.take(length)?,
-        })
+        Ok(Self { points: points.take(point_limit)?, count: 0, table: table.take(length)? })
     }
 
     fn number(&mut self, point: PagePoint) -> Result<u16, OutOfScratch> {
-        const SAME_THEN_AROUND: [(i32, i32); 9] = [
-            (0, 0),
-            (-1, 0),
-            (1, 0),
-            (0, -1),
-            (0, 1),
-            (-1, -1),
-            (1, -1),
-            (-1, 1),
-            (1, 1),
-        ];
+        const SAME_THEN_AROUND: [(i32, i32); 9] =
+            [(0, 0), (-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (1, -1), (-1, 1), (1, 1)];
         for (dx, dy) in SAME_THEN_AROUND {
-            if let Some(number) = self.find(PagePoint {
-                x: point.x + dx,
-                y: point.y + dy,
-            }) {
+            if let Some(number) = self.find(PagePoint { x: point.x + dx, y: point.y + dy }) {
                 return Ok(number);
             }
         }
@@ -263,17 +228,11 @@ mod tests {
 
     fn drawn(lines: &[Line], words: usize) -> Result<Vec<[(i32, i32); 2]>, OutOfScratch> {
         let mut memory = vec![0u64; words];
-        items_mut(&mut memory, lines.len())
-            .unwrap()
-            .copy_from_slice(lines);
+        items_mut(&mut memory, lines.len()).unwrap().copy_from_slice(lines);
         let stored = organise(&mut memory, lines.len())?;
         let (drawing, _) = stored.split(&mut memory)?;
         let at = |number: u16| drawing.points[usize::from(number)];
-        Ok(drawing
-            .segments
-            .iter()
-            .map(|s| [at(s.from), at(s.to)].map(|p| (p.x, p.y)))
-            .collect())
+        Ok(drawing.segments.iter().map(|s| [at(s.from), at(s.to)].map(|p| (p.x, p.y))).collect())
     }
 
     fn line(from: (i32, i32), to: (i32, i32)) -> Line {
@@ -288,10 +247,7 @@ mod tests {
             (-1, 77, LineType::Dotted, 5),
         ] {
             let packed = Line::new(point(x, y), point(y, x), line_type, pen);
-            assert_eq!(
-                packed.unpack(),
-                (point(x, y), point(y, x), line_type.code(), pen)
-            );
+            assert_eq!(packed.unpack(), (point(x, y), point(y, x), line_type.code(), pen));
         }
     }
 
@@ -310,10 +266,7 @@ mod tests {
             line((1, 0), (50, 81)),
         ];
         let found = drawn(&lines, 64).unwrap();
-        assert_eq!(
-            found,
-            [[(0, 0), (100, 0)], [(0, 0), (50, 80)], [(100, 0), (50, 80)]]
-        );
+        assert_eq!(found, [[(0, 0), (100, 0)], [(0, 0), (50, 80)], [(100, 0), (50, 80)]]);
     }
 
     #[test]
@@ -335,11 +288,7 @@ mod tests {
         let enough = (121..400).find(|words| drawn(&lines, *words).is_ok());
         assert!(enough.is_some());
         for words in enough.unwrap()..400 {
-            assert_eq!(
-                drawn(&lines, words).map(|found| found.len()),
-                Ok(40),
-                "{words} words"
-            );
+            assert_eq!(drawn(&lines, words).map(|found| found.len()), Ok(40), "{words} words");
         }
     }
 }

@@ -58,10 +58,7 @@ impl Bounds {
                     Projection::Parallel => 1,
                 };
                 let image = [vertex.x, vertex.y].map(|c| (i64::from(c) << Self::FRACTION_BITS) / w);
-                Self {
-                    low: image,
-                    high: image,
-                }
+                Self { low: image, high: image }
             })
             .reduce(Self::union)
     }
@@ -73,10 +70,7 @@ impl Bounds {
         positions
             .map(|position| {
                 let point = [i64::from(position.x), i64::from(position.y)];
-                Self {
-                    low: point,
-                    high: point,
-                }
+                Self { low: point, high: point }
             })
             .reduce(Self::union)
     }
@@ -145,11 +139,7 @@ impl PageMap {
             [width, height] => {
                 let by_width = u128::from(free[0]) * u128::from(height);
                 let by_height = u128::from(free[1]) * u128::from(width);
-                if by_width <= by_height {
-                    (free[0], width)
-                } else {
-                    (free[1], height)
-                }
+                if by_width <= by_height { (free[0], width) } else { (free[1], height) }
             }
         };
         let numerator =
@@ -201,20 +191,13 @@ impl PageMap {
         let to_page = |value: i64| (i128::from(value) << 16) >> fraction_bits;
         let size = [0, 1].map(|axis: usize| to_page(bounds.high[axis] - bounds.low[axis]));
         if size[0] > i128::from(free[0]) || size[1] > i128::from(free[1]) {
-            return Err(PageError::DoesNotFit {
-                width: size[0] as i64,
-                height: size[1] as i64,
-            });
+            return Err(PageError::DoesNotFit { width: size[0] as i64, height: size[1] as i64 });
         }
         let margin = i128::from(page.margin.to_bits());
         let moved = [0, 1].map(|axis: usize| {
             let (low, high) = (to_page(bounds.low[axis]), to_page(bounds.high[axis]));
             let (first, last) = (margin, margin + i128::from(free[axis]));
-            if low < first {
-                first - low
-            } else {
-                (last - high).min(0)
-            }
+            if low < first { first - low } else { (last - high).min(0) }
         });
         let bits = steps.map(|steps| i64::from(steps.to_bits()));
         Ok(Self {
@@ -269,11 +252,7 @@ impl Page {
         let fits = [0, 1]
             .iter()
             .all(|&axis: &usize| side_steps(self, steps, axis) <= i64::from(PAGE_LIMIT));
-        if fits {
-            Ok(())
-        } else {
-            Err(PageError::TooManySteps)
-        }
+        if fits { Ok(()) } else { Err(PageError::TooManySteps) }
     }
 }
 
@@ -289,11 +268,7 @@ mod tests {
 
     fn page(width: i32, height: i32, margin: i32) -> Page {
         let [width, height, margin] = [width, height, margin].map(Millimetres::from_num);
-        Page {
-            width,
-            height,
-            margin,
-        }
+        Page { width, height, margin }
     }
 
     fn steps(x: i32, y: i32) -> StepsPerMillimetre {
@@ -323,48 +298,22 @@ mod tests {
 
     #[test]
     fn perspective_divides_by_the_depth() {
-        let corners = [
-            vertex(-100, -100, 100),
-            vertex(300, 300, 300),
-            vertex(50, 50, 100),
-        ];
+        let corners = [vertex(-100, -100, 100), vertex(300, 300, 300), vertex(50, 50, 100)];
         let bounds = Bounds::around(corners.into_iter(), Projection::Perspective).unwrap();
         let map = PageMap::fit(&bounds, &page(100, 100, 0), steps(10, 20)).unwrap();
         assert_eq!(map.point(-100, -100, 100), PagePoint { x: 0, y: 0 });
         assert_eq!(map.point(300, 300, 300), PagePoint { x: 1000, y: 2000 });
         assert_eq!(map.point(0, 0, 5), PagePoint { x: 500, y: 1000 });
         // Half way in space from z 100 to z 300 is three quarters of the way in the image.
-        let half = Along {
-            numerator: 1 << 60,
-            denominator: 1 << 61,
-        };
+        let half = Along { numerator: 1 << 60, denominator: 1 << 61 };
         let (p, q) = (corners[0], corners[1]);
+        assert_eq!(map.along(p, q, half, Projection::Perspective), PagePoint { x: 750, y: 1500 });
         assert_eq!(
-            map.along(p, q, half, Projection::Perspective),
-            PagePoint { x: 750, y: 1500 }
-        );
-        assert_eq!(
-            map.along(
-                p,
-                q,
-                Along {
-                    numerator: 0,
-                    denominator: 1
-                },
-                Projection::Perspective
-            ),
+            map.along(p, q, Along { numerator: 0, denominator: 1 }, Projection::Perspective),
             map.point(-1, -1, 1)
         );
         assert_eq!(
-            map.along(
-                p,
-                q,
-                Along {
-                    numerator: 3,
-                    denominator: 3
-                },
-                Projection::Perspective
-            ),
+            map.along(p, q, Along { numerator: 3, denominator: 3 }, Projection::Perspective),
             map.point(1, 1, 1)
         );
     }
@@ -372,62 +321,36 @@ mod tests {
     #[test]
     fn points_and_lines_have_a_place_too() {
         for (corners, low, high) in [
-            (
-                [vertex(7, 7, 7), vertex(7, 7, 7)],
-                (8400, 11880),
-                (8400, 11880),
-            ),
-            (
-                [vertex(-5, 0, 7), vertex(5, 0, 7)],
-                (800, 11880),
-                (16000, 11880),
-            ),
-            (
-                [vertex(0, -5, 7), vertex(0, 5, 7)],
-                (8400, 800),
-                (8400, 22960),
-            ),
+            ([vertex(7, 7, 7), vertex(7, 7, 7)], (8400, 11880), (8400, 11880)),
+            ([vertex(-5, 0, 7), vertex(5, 0, 7)], (800, 11880), (16000, 11880)),
+            ([vertex(0, -5, 7), vertex(0, 5, 7)], (8400, 800), (8400, 22960)),
         ] {
             let bounds = Bounds::around(corners.into_iter(), Projection::Parallel).unwrap();
             let map = PageMap::fit(&bounds, &a4(), steps(80, 80)).unwrap();
-            let found = corners
-                .map(|v| map.point(v.x.into(), v.y.into(), 1))
-                .map(|p| (p.x, p.y));
+            let found = corners.map(|v| map.point(v.x.into(), v.y.into(), 1)).map(|p| (p.x, p.y));
             assert_eq!(found, [low, high]);
         }
         assert_eq!(Bounds::around([].into_iter(), Projection::Parallel), None);
     }
 
     fn plan(points: [[i32; 2]; 2]) -> [Position; 2] {
-        points.map(|[x, y]| Position {
-            x: x << 8,
-            y: y << 8,
-            z: 0,
-        })
+        points.map(|[x, y]| Position { x: x << 8, y: y << 8, z: 0 })
     }
 
     fn true_size(points: [[i32; 2]; 2], page: &Page) -> Result<[(i32, i32); 2], PageError> {
         let positions = plan(points);
         let map = PageMap::true_size(positions.into_iter(), 8, page, steps(100, 80))?;
-        Ok(positions
-            .map(|p| map.point(p.x.into(), p.y.into(), 1))
-            .map(|p| (p.x, p.y)))
+        Ok(positions.map(|p| map.point(p.x.into(), p.y.into(), 1)).map(|p| (p.x, p.y)))
     }
 
     #[test]
     fn a_plan_on_the_page_stays_where_it_is() {
-        assert_eq!(
-            true_size([[10, 20], [200, 30]], &a4()),
-            Ok([(1000, 1600), (20000, 2400)])
-        );
+        assert_eq!(true_size([[10, 20], [200, 30]], &a4()), Ok([(1000, 1600), (20000, 2400)]));
     }
 
     #[test]
     fn a_plan_off_the_page_is_moved_just_inside() {
-        assert_eq!(
-            true_size([[-50, 290], [-40, 400]], &a4()),
-            Ok([(1000, 14160), (2000, 22960)])
-        );
+        assert_eq!(true_size([[-50, 290], [-40, 400]], &a4()), Ok([(1000, 14160), (2000, 22960)]));
     }
 
     #[test]
@@ -435,10 +358,7 @@ mod tests {
         let size = |mm: i64| mm << 16;
         assert_eq!(
             true_size([[0, 0], [191, 5]], &a4()),
-            Err(PageError::DoesNotFit {
-                width: size(191),
-                height: size(5)
-            })
+            Err(PageError::DoesNotFit { width: size(191), height: size(5) })
         );
         let positions = plan([[0, 0], [380, 5]]);
         let map = PageMap::fit_plan(positions.into_iter(), 8, &a4(), steps(100, 80)).unwrap();
@@ -449,13 +369,7 @@ mod tests {
 
     #[test]
     fn impossible_pages_are_refused() {
-        assert_eq!(
-            true_size([[0, 0], [1, 1]], &page(20, 50, 10)),
-            Err(PageError::NoRoom)
-        );
-        assert_eq!(
-            true_size([[0, 0], [1, 1]], &page(20000, 50, 10)),
-            Err(PageError::TooManySteps)
-        );
+        assert_eq!(true_size([[0, 0], [1, 1]], &page(20, 50, 10)), Err(PageError::NoRoom));
+        assert_eq!(true_size([[0, 0], [1, 1]], &page(20000, 50, 10)), Err(PageError::TooManySteps));
     }
 }

@@ -96,20 +96,11 @@ pub const HELP: &[(&str, &str)] = &[
     ("$at=X,Y,Z", "what you look at"),
     ("$up=X,Y,Z", "which way is up"),
     ("$view=auto", "forget eye, at and up: a three-quarter view"),
-    (
-        "$projection=perspective|orthographic",
-        "how lines of sight run",
-    ),
-    (
-        "$hidden=erased|dotted|shown",
-        "what becomes of hidden lines",
-    ),
+    ("$projection=perspective|orthographic", "how lines of sight run"),
+    ("$hidden=erased|dotted|shown", "what becomes of hidden lines"),
     ("$page=WIDTHxHEIGHT", "size of the sheet in mm"),
     ("$margin=MM", "what stays free on each side of the sheet"),
-    (
-        "$fit=on|off",
-        "scale a plan to the page, or draw it at true size",
-    ),
+    ("$fit=on|off", "scale a plan to the page, or draw it at true size"),
     ("$model", "size of the model against the limits"),
     ("$clear", "forget the model"),
     ("$plot", "draw it"),
@@ -182,9 +173,7 @@ impl PlotOption {
                 "perspective" => Projection::Perspective,
                 "orthographic" => Projection::Parallel,
                 _ => {
-                    return Err(Refusal::NotAChoice {
-                        choices: "perspective or orthographic",
-                    });
+                    return Err(Refusal::NotAChoice { choices: "perspective or orthographic" });
                 }
             }),
             "hidden" => Self::Hidden(match value {
@@ -192,22 +181,16 @@ impl PlotOption {
                 "dotted" => HiddenLines::Dotted,
                 "shown" => HiddenLines::Shown,
                 _ => {
-                    return Err(Refusal::NotAChoice {
-                        choices: "erased, dotted or shown",
-                    });
+                    return Err(Refusal::NotAChoice { choices: "erased, dotted or shown" });
                 }
             }),
             "page" => {
                 let (width, height) = value.split_once(['x', 'X']).ok_or(Refusal::NotAPage)?;
-                Self::Page {
-                    width: positive(width)?,
-                    height: positive(height)?,
-                }
+                Self::Page { width: positive(width)?, height: positive(height)? }
             }
             "margin" => {
-                let margin = number(value)?
-                    .to_millimetres()
-                    .map_err(|_| Refusal::NumberOutOfRange)?;
+                let margin =
+                    number(value)?.to_millimetres().map_err(|_| Refusal::NumberOutOfRange)?;
                 if margin < 0 {
                     return Err(Refusal::NumberOutOfRange);
                 }
@@ -217,9 +200,7 @@ impl PlotOption {
                 "on" => true,
                 "off" => false,
                 _ => {
-                    return Err(Refusal::NotAChoice {
-                        choices: "on or off",
-                    });
+                    return Err(Refusal::NotAChoice { choices: "on or off" });
                 }
             }),
             _ => return Ok(None),
@@ -233,23 +214,13 @@ fn number(text: &str) -> Result<Decimal, Refusal> {
 }
 
 fn positive(text: &str) -> Result<Millimetres, Refusal> {
-    let length = number(text)?
-        .to_millimetres()
-        .map_err(|_| Refusal::NumberOutOfRange)?;
-    if length > 0 {
-        Ok(length)
-    } else {
-        Err(Refusal::NumberOutOfRange)
-    }
+    let length = number(text)?.to_millimetres().map_err(|_| Refusal::NumberOutOfRange)?;
+    if length > 0 { Ok(length) } else { Err(Refusal::NumberOutOfRange) }
 }
 
 fn direction(text: &str) -> Result<Direction, Refusal> {
     let mut parts = text.split(',').map(number);
-    let mut next = || {
-        parts
-            .next()
-            .unwrap_or(Err(Refusal::WrongNumberCount { needed: 3 }))
-    };
+    let mut next = || parts.next().unwrap_or(Err(Refusal::WrongNumberCount { needed: 3 }));
     let direction = [next()?.to_f64(), next()?.to_f64(), next()?.to_f64()];
     if parts.next().is_some() {
         return Err(Refusal::WrongNumberCount { needed: 3 });
@@ -264,11 +235,7 @@ fn direction(text: &str) -> Result<Direction, Refusal> {
 /// x y z, and then the weight or colour that some modellers write, which must be numbers too.
 fn coordinates(text: &str) -> Result<[Decimal; 3], Refusal> {
     let mut words = text.split_ascii_whitespace().map(number);
-    let mut next = || {
-        words
-            .next()
-            .unwrap_or(Err(Refusal::WrongNumberCount { needed: 3 }))
-    };
+    let mut next = || words.next().unwrap_or(Err(Refusal::WrongNumberCount { needed: 3 }));
     let coordinates = [next()?, next()?, next()?];
     for rest in words {
         rest?;
@@ -333,17 +300,7 @@ mod tests {
         assert_eq!(numbers("f 1 2/5 3//6 -1/7/8"), Ok(std::vec![1, 2, 3, -1]));
         assert_eq!(numbers("l\t4  5 # six"), Ok(std::vec![4, 5]));
         assert_eq!(numbers("f"), Ok(std::vec![]));
-        for word in [
-            "1/",
-            "1//",
-            "/1",
-            "1/2/3/4",
-            "1.5",
-            "x",
-            "1/x",
-            "99999999999",
-            "1/2/",
-        ] {
+        for word in ["1/", "1//", "/1", "1/2/3/4", "1.5", "x", "1/x", "99999999999", "1/2/"] {
             assert_eq!(
                 numbers(&std::format!("f 1 2 {word}")),
                 Err(Refusal::NotAVertexNumber),
@@ -354,27 +311,13 @@ mod tests {
 
     #[test]
     fn vertices_need_three_numbers_and_may_have_more() {
-        for line in [
-            "v 1 2 3",
-            "v  1 2 3 1.0",
-            "v 1 2 3 0.5 0.5 0.5",
-            " v 1 2 3 ",
-        ] {
-            assert!(
-                matches!(Command::parse(line), Ok(Command::Vertex(_))),
-                "{line}"
-            );
+        for line in ["v 1 2 3", "v  1 2 3 1.0", "v 1 2 3 0.5 0.5 0.5", " v 1 2 3 "] {
+            assert!(matches!(Command::parse(line), Ok(Command::Vertex(_))), "{line}");
         }
-        assert_eq!(
-            Command::parse("v 1 2"),
-            Err(Refusal::WrongNumberCount { needed: 3 })
-        );
+        assert_eq!(Command::parse("v 1 2"), Err(Refusal::WrongNumberCount { needed: 3 }));
         assert_eq!(Command::parse("v 1 2 z"), Err(Refusal::NotANumber));
         assert_eq!(Command::parse("v 1 2 3 z"), Err(Refusal::NotANumber));
-        assert_eq!(
-            Command::parse("v"),
-            Err(Refusal::WrongNumberCount { needed: 3 })
-        );
+        assert_eq!(Command::parse("v"), Err(Refusal::WrongNumberCount { needed: 3 }));
     }
 
     #[test]
@@ -383,11 +326,7 @@ mod tests {
             assert_eq!(Command::parse(line), Err(Refusal::UnknownCommand), "{line}");
         }
         for line in ["$nothing", "$plo", "$ plot it"] {
-            assert_eq!(
-                Command::parse(line),
-                Err(Refusal::UnknownSystemCommand),
-                "{line}"
-            );
+            assert_eq!(Command::parse(line), Err(Refusal::UnknownSystemCommand), "{line}");
         }
     }
 
@@ -398,10 +337,7 @@ mod tests {
             Ok(other) => panic!("{other:?}"),
             Err(refusal) => Err(refusal),
         };
-        assert_eq!(
-            option("$eye=-1, 2.5 ,3e1"),
-            Ok(PlotOption::Eye([-1.0, 2.5, 30.0]))
-        );
+        assert_eq!(option("$eye=-1, 2.5 ,3e1"), Ok(PlotOption::Eye([-1.0, 2.5, 30.0])));
         assert_eq!(
             option("$projection = orthographic"),
             Ok(PlotOption::Projection(Projection::Parallel))
@@ -413,14 +349,8 @@ mod tests {
                 height: Millimetres::from_num(297)
             })
         );
-        assert_eq!(
-            option("$eye=1,2"),
-            Err(Refusal::WrongNumberCount { needed: 3 })
-        );
-        assert_eq!(
-            option("$eye=1,2,3,4"),
-            Err(Refusal::WrongNumberCount { needed: 3 })
-        );
+        assert_eq!(option("$eye=1,2"), Err(Refusal::WrongNumberCount { needed: 3 }));
+        assert_eq!(option("$eye=1,2,3,4"), Err(Refusal::WrongNumberCount { needed: 3 }));
         assert_eq!(option("$eye=1,2,"), Err(Refusal::NotANumber));
         assert_eq!(option("$eye=1,2,1e300"), Err(Refusal::NumberOutOfRange));
         assert_eq!(option("$page=210"), Err(Refusal::NotAPage));
@@ -428,17 +358,9 @@ mod tests {
         assert_eq!(option("$margin=-1"), Err(Refusal::NumberOutOfRange));
         assert_eq!(
             option("$hidden=gone"),
-            Err(Refusal::NotAChoice {
-                choices: "erased, dotted or shown"
-            })
+            Err(Refusal::NotAChoice { choices: "erased, dotted or shown" })
         );
-        assert_eq!(
-            Command::parse("$110=5"),
-            Ok(Command::Setting {
-                name: "110",
-                value: "5"
-            })
-        );
+        assert_eq!(Command::parse("$110=5"), Ok(Command::Setting { name: "110", value: "5" }));
     }
 
     #[test]
@@ -450,10 +372,7 @@ mod tests {
             assert!(with_value || parsed.is_ok(), "{usage}");
             if with_value {
                 let set = std::format!("{line}=?");
-                assert!(
-                    !matches!(Command::parse(&set), Ok(Command::Setting { .. })),
-                    "{usage}"
-                );
+                assert!(!matches!(Command::parse(&set), Ok(Command::Setting { .. })), "{usage}");
             }
         }
     }

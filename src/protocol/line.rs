@@ -24,29 +24,12 @@ pub struct RealTime {
 impl RealTime {
     /// What the byte asks for; `None` for a byte of a line.
     pub const fn of_byte(byte: u8) -> Option<Self> {
-        let nothing = Self {
-            status: false,
-            hold: false,
-            resume: false,
-            abort: false,
-        };
+        let nothing = Self { status: false, hold: false, resume: false, abort: false };
         match byte {
-            b'?' => Some(Self {
-                status: true,
-                ..nothing
-            }),
-            b'!' => Some(Self {
-                hold: true,
-                ..nothing
-            }),
-            b'~' => Some(Self {
-                resume: true,
-                ..nothing
-            }),
-            0x18 => Some(Self {
-                abort: true,
-                ..nothing
-            }),
+            b'?' => Some(Self { status: true, ..nothing }),
+            b'!' => Some(Self { hold: true, ..nothing }),
+            b'~' => Some(Self { resume: true, ..nothing }),
+            0x18 => Some(Self { abort: true, ..nothing }),
             _ => None,
         }
     }
@@ -131,10 +114,7 @@ mod tests {
         bytes.extend(b"\r\nok\n");
         assert_eq!(
             lines(&bytes),
-            [
-                Err(Refusal::LineTooLong { limit: LINE_LIMIT }),
-                Ok("ok".to_string())
-            ]
+            [Err(Refusal::LineTooLong { limit: LINE_LIMIT }), Ok("ok".to_string())]
         );
         let mut bytes = std::vec![b'x'; LINE_LIMIT];
         bytes.push(b'\n');
@@ -143,9 +123,6 @@ mod tests {
 
     #[test]
     fn bytes_that_are_no_text_are_refused() {
-        assert_eq!(
-            lines(b"\xff\xfe\nok\n"),
-            [Err(Refusal::NotText), Ok("ok".to_string())]
-        );
+        assert_eq!(lines(b"\xff\xfe\nok\n"), [Err(Refusal::NotText), Ok("ok".to_string())]);
     }
 }

@@ -1,6 +1,5 @@
 //! Why a line was not carried out: a number for programs, a sentence for people.
 
-use super::LINE_LIMIT;
 use crate::drawing::PageError;
 use crate::fixed::BinaryFraction;
 use crate::model::ModelError;
@@ -24,7 +23,7 @@ pub enum Refusal {
     Busy,
     /// The plotter is in alarm.
     Locked,
-    /// More than [`LINE_LIMIT`] bytes.
+    /// More bytes than a line may have.
     LineTooLong {
         /// The longest line.
         limit: usize,
@@ -90,6 +89,7 @@ pub const MEANINGS: &[(u16, &str)] = &[
     (121, "eye at the point looked at"),
     (122, "up is along the line of sight"),
     (123, "vertex not in front of the eye"),
+    (124, "nothing in front of the eye"),
     (130, "margins leave no room on the page"),
     (131, "page has too many steps"),
     (132, "drawing is larger than the page"),
@@ -127,6 +127,7 @@ impl Refusal {
             Self::View(ViewError::EyeAtTarget) => 121,
             Self::View(ViewError::UpAlongSight) => 122,
             Self::View(ViewError::BehindEye { .. }) => 123,
+            Self::View(ViewError::NothingInFront) => 124,
             Self::Page(PageError::NoRoom) => 130,
             Self::Page(PageError::TooManySteps) => 131,
             Self::Page(PageError::DoesNotFit { .. }) => 132,
@@ -170,11 +171,11 @@ impl fmt::Display for Refusal {
             Self::View(ViewError::UpAlongSight) => {
                 formatter.write_str("choose another $up, not along the line of sight")
             }
+            Self::View(ViewError::NothingInFront) => {
+                formatter.write_str("the model is behind the eye: move or turn it")
+            }
             Self::View(ViewError::BehindEye { vertex }) => {
-                write!(
-                    formatter,
-                    "vertex {vertex} is beside or behind the eye: move $eye back"
-                )
+                write!(formatter, "vertex {vertex} is beside or behind the eye: move $eye back")
             }
             Self::Page(PageError::NoRoom) => {
                 formatter.write_str("make $margin smaller or $page larger")
@@ -183,11 +184,7 @@ impl fmt::Display for Refusal {
                 formatter.write_str("the page has more than 1048576 steps: make $page smaller")
             }
             Self::Page(PageError::DoesNotFit { width, height }) => {
-                let mm = |units: i64| BinaryFraction {
-                    units,
-                    fraction_bits: 16,
-                    places: 1,
-                };
+                let mm = |units: i64| BinaryFraction { units, fraction_bits: 16, places: 1 };
                 write!(
                     formatter,
                     "the plan is {}x{} mm: choose a larger $page, or $fit=on",
@@ -220,10 +217,7 @@ fn write_model_error(formatter: &mut fmt::Formatter<'_>, error: &ModelError) -> 
             )
         }
         ModelError::UnknownVertex { number, vertices } => {
-            write!(
-                formatter,
-                "there is no vertex {number}: the model has {vertices}"
-            )
+            write!(formatter, "there is no vertex {number}: the model has {vertices}")
         }
         ModelError::TooFewCorners { needed } => write!(formatter, "it takes {needed} vertices"),
         ModelError::RepeatedVertex { number } => {
@@ -231,8 +225,6 @@ fn write_model_error(formatter: &mut fmt::Formatter<'_>, error: &ModelError) -> 
         }
     }
 }
-
-const _: () = assert!(LINE_LIMIT >= 128, "every refusal's text must fit a line");
 
 #[cfg(test)]
 mod tests {
