@@ -153,10 +153,8 @@ pub fn order(
     attention: &mut dyn Attention,
     tour: &mut [Leg],
 ) -> Result<Report, OrderError> {
-    let drawing = Drawing {
-        points: drawing.points.get(..POINT_LIMIT).unwrap_or(drawing.points),
-        ..drawing
-    };
+    let drawing =
+        Drawing { points: drawing.points.get(..POINT_LIMIT).unwrap_or(drawing.points), ..drawing };
     check(drawing, tour.len())?;
     let mut pace = Pace::new(attention);
     let mut report = Report::default();
@@ -167,15 +165,7 @@ pub fn order(
         let count = pens.clone().filter(|&other| other == pen).count();
         let (legs, others) = rest.split_at_mut(count);
         rest = others;
-        order_pen(
-            drawing,
-            pen,
-            options,
-            scratch.reborrow(),
-            &mut pace,
-            legs,
-            &mut report,
-        )?;
+        order_pen(drawing, pen, options, scratch.reborrow(), &mut pace, legs, &mut report)?;
         next_pen = pens.filter(|&other| other > pen).min();
     }
     measure(drawing, tour, options.shape, &mut report);
@@ -266,11 +256,7 @@ fn pair_odd(
     mate: &mut [u16],
     report: &mut Report,
 ) -> Result<Option<u16>, OrderError> {
-    let odd_stations = || {
-        (0..)
-            .zip(mate.iter())
-            .filter(|&(station, &mark)| station == mark)
-    };
+    let odd_stations = || (0..).zip(mate.iter()).filter(|&(station, &mark)| station == mark);
     let stations: &mut [u16] = scratch.take(odd_stations().count())?;
     for (place, (station, _)) in stations.iter_mut().zip(odd_stations()) {
         *place = station;

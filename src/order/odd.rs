@@ -16,11 +16,7 @@ impl<'a> OddPoints<'a> {
     /// `stations` are the odd ones of `network`.
     pub fn new(network: Network<'a>, stations: &'a [u16], open: bool) -> Self {
         let free_ends = open && !stations.is_empty();
-        Self {
-            network,
-            stations,
-            free_ends,
-        }
+        Self { network, stations, free_ends }
     }
 
     /// How many odd stations there are.

@@ -2,8 +2,7 @@
 
 use super::Refusal;
 use crate::fixed::{Decimal, Millimetres};
-use crate::geometry::Projection;
-use crate::view::Direction;
+use crate::view::{Direction, Lens};
 
 /// What a line asks for.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,10 +53,14 @@ pub enum PlotOption {
     At(Direction),
     /// `$up=x,y,z`
     Up(Direction),
-    /// `$view=auto`: forget eye, at and up.
+    /// `$angles=α,β,γ`: Harrison's rotation, in degrees.
+    Angles(Direction),
+    /// `$view=auto`: forget eye, at, up and angles.
     AutomaticView,
-    /// `$projection=perspective|orthographic`
-    Projection(Projection),
+    /// `$projection=…`
+    Projection(ProjectionChoice),
+    /// `$behind=clip|refuse`: what is behind the eye is cut off (`true`), or an error.
+    ClipBehind(bool),
     /// `$hidden=erased|dotted|shown`
     Hidden(HiddenLines),
     /// `$page=WIDTHxHEIGHT` in mm
@@ -71,6 +74,66 @@ pub enum PlotOption {
     Margin(Millimetres),
     /// `$fit=on|off`
     Fit(bool),
+}
+
+/// How the model comes onto the page.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ProjectionChoice {
+    /// From the eye, through a lens.
+    Lens(Lens),
+    /// Parallel, from a direction in degrees; eye and angles are not used.
+    Axonometric {
+        /// From the x axis towards y: -90 is in front.
+        azimuth: f64,
+        /// Above the xy plane.
+        elevation: f64,
+    },
+}
+
+impl Default for ProjectionChoice {
+    fn default() -> Self {
+        Self::Lens(Lens::Perspective)
+    }
+}
+
+impl ProjectionChoice {
+    const CHOICES: &str = "perspective, orthographic, cavalier, cabinet, oblique,ANGLE,RATIO, isometric, \
+                           dimetric, trimetric or axonometric,AZIMUTH,ELEVATION";
+
+    fn parse(value: &str) -> Result<Self, Refusal> {
+        let (name, numbers) = match value.split_once(',') {
+            Some((name, numbers)) => (name.trim(), Some(numbers)),
+            None => (value, None),
+        };
+        let oblique = |angle, ratio| Self::Lens(Lens::Oblique { angle, ratio });
+        let axonometric = |azimuth, elevation| Self::Axonometric { azimuth, elevation };
+        Ok(match (name, numbers) {
+            ("perspective", None) => Self::Lens(Lens::Perspective),
+            ("orthographic", None) => Self::Lens(Lens::Orthographic),
+            ("cavalier", None) => oblique(45.0, 1.0),
+            ("cabinet", None) => oblique(45.0, 0.5),
+            ("oblique", Some(numbers)) => {
+                let [angle, ratio] = values(numbers)?;
+                if !(0.0..=2.0).contains(&ratio) || libm::fabs(angle) > 360.0 {
+                    return Err(Refusal::NumberOutOfRange);
+                }
+                oblique(angle, ratio)
+            }
+            // All three axes are foreshortened alike: the elevation is atan(1 / sqrt 2).
+            ("isometric", None) => axonometric(-45.0, 35.264_389_682_754_654),
+            // The two axes that are foreshortened alike lie at 7 and 42 degrees: 1, 1 and 1/2.
+            ("dimetric", None) => axonometric(-69.295_188_945_364_57, 19.471_220_634_490_69),
+            ("trimetric", None) => axonometric(-60.0, 25.0),
+            ("dimetric" | "trimetric" | "axonometric", Some(numbers)) => {
+                let [azimuth, elevation] = values(numbers)?;
+                if libm::fabs(azimuth) > 360.0 || libm::fabs(elevation) > 90.0 {
+                    return Err(Refusal::NumberOutOfRange);
+                }
+                axonometric(azimuth, elevation)
+            }
+            _ => return Err(Refusal::NotAChoice { choices: Self::CHOICES }),
+        })
+    }
 }
 
 /// What becomes of the hidden lines.
@@ -95,8 +158,17 @@ pub const HELP: &[(&str, &str)] = &[
     ("$eye=X,Y,Z", "where you look from"),
     ("$at=X,Y,Z", "what you look at"),
     ("$up=X,Y,Z", "which way is up"),
-    ("$view=auto", "forget eye, at and up: a three-quarter view"),
-    ("$projection=perspective|orthographic", "how lines of sight run"),
+    ("$angles=A,B,C", "look along z after turning by C about z, B about y, A about x, in degrees"),
+    ("$view=auto", "forget eye, at, up and angles: a three-quarter view"),
+    (
+        "$projection=perspective|orthographic|cavalier|cabinet|oblique,ANGLE,RATIO",
+        "how lines of sight run",
+    ),
+    (
+        "$projection=isometric|dimetric|trimetric|axonometric,AZIMUTH,ELEVATION",
+        "a parallel view by its direction",
+    ),
+    ("$behind=clip|refuse", "what becomes of what is behind the eye"),
     ("$hidden=erased|dotted|shown", "what becomes of hidden lines"),
     ("$page=WIDTHxHEIGHT", "size of the sheet in mm"),
     ("$margin=MM", "what stays free on each side of the sheet"),
@@ -169,12 +241,12 @@ impl PlotOption {
                 "auto" => Self::AutomaticView,
                 _ => return Err(Refusal::NotAChoice { choices: "auto" }),
             },
-            "projection" => Self::Projection(match value {
-                "perspective" => Projection::Perspective,
-                "orthographic" => Projection::Parallel,
-                _ => {
-                    return Err(Refusal::NotAChoice { choices: "perspective or orthographic" });
-                }
+            "angles" => Self::Angles(direction(value)?),
+            "projection" => Self::Projection(ProjectionChoice::parse(value)?),
+            "behind" => Self::ClipBehind(match value {
+                "clip" => true,
+                "refuse" => false,
+                _ => return Err(Refusal::NotAChoice { choices: "clip or refuse" }),
             }),
             "hidden" => Self::Hidden(match value {
                 "erased" => HiddenLines::Erased,
@@ -219,17 +291,25 @@ fn positive(text: &str) -> Result<Millimetres, Refusal> {
 }
 
 fn direction(text: &str) -> Result<Direction, Refusal> {
+    values(text)
+}
+
+/// Exactly N numbers with commas between, for angles and places only.
+fn values<const N: usize>(text: &str) -> Result<[f64; N], Refusal> {
+    let wrong_count = Refusal::WrongNumberCount { needed: N };
     let mut parts = text.split(',').map(number);
-    let mut next = || parts.next().unwrap_or(Err(Refusal::WrongNumberCount { needed: 3 }));
-    let direction = [next()?.to_f64(), next()?.to_f64(), next()?.to_f64()];
+    let mut values = [0.0; N];
+    for value in &mut values {
+        *value = parts.next().unwrap_or(Err(wrong_count))?.to_f64();
+    }
     if parts.next().is_some() {
-        return Err(Refusal::WrongNumberCount { needed: 3 });
+        return Err(wrong_count);
     }
     // Past this range squares and quotients of lengths would overflow.
-    if direction.iter().any(|d| libm::fabs(*d) > 1e15) {
+    if values.iter().any(|value| libm::fabs(*value) > 1e15) {
         return Err(Refusal::NumberOutOfRange);
     }
-    Ok(direction)
+    Ok(values)
 }
 
 /// x y z, and then the weight or colour that some modellers write, which must be numbers too.
@@ -338,10 +418,26 @@ mod tests {
             Err(refusal) => Err(refusal),
         };
         assert_eq!(option("$eye=-1, 2.5 ,3e1"), Ok(PlotOption::Eye([-1.0, 2.5, 30.0])));
+        let projection = |value| match option(value) {
+            Ok(PlotOption::Projection(choice)) => Ok(choice),
+            Ok(other) => panic!("{other:?}"),
+            Err(refusal) => Err(refusal),
+        };
         assert_eq!(
-            option("$projection = orthographic"),
-            Ok(PlotOption::Projection(Projection::Parallel))
+            projection("$projection = orthographic"),
+            Ok(ProjectionChoice::Lens(Lens::Orthographic))
         );
+        assert_eq!(projection("$projection=cabinet"), projection("$projection=oblique, 45,0.5"));
+        assert_eq!(projection("$projection=oblique,45,3"), Err(Refusal::NumberOutOfRange));
+        assert_eq!(
+            projection("$projection=oblique,45"),
+            Err(Refusal::WrongNumberCount { needed: 2 })
+        );
+        assert_eq!(
+            projection("$projection=trimetric,10,20"),
+            projection("$projection=axonometric,10,20")
+        );
+        assert!(matches!(projection("$projection=isometric,1,2"), Err(Refusal::NotAChoice { .. })));
         assert_eq!(
             option("$page=210x297"),
             Ok(PlotOption::Page {

@@ -17,14 +17,17 @@ pub struct RealTime {
     pub hold: bool,
     /// `~`: go on.
     pub resume: bool,
-    /// ctrl-X: give up the job.
+    /// ctrl-X: give up the job. Bytes received before it are dropped.
     pub abort: bool,
+    /// No byte: bytes were lost because the sender did not wait for replies.
+    pub bytes_lost: bool,
 }
 
 impl RealTime {
     /// What the byte asks for; `None` for a byte of a line.
     pub const fn of_byte(byte: u8) -> Option<Self> {
-        let nothing = Self { status: false, hold: false, resume: false, abort: false };
+        let nothing =
+            Self { status: false, hold: false, resume: false, abort: false, bytes_lost: false };
         match byte {
             b'?' => Some(Self { status: true, ..nothing }),
             b'!' => Some(Self { hold: true, ..nothing }),
@@ -42,6 +45,7 @@ impl RealTime {
             hold: self.hold || other.hold,
             resume: self.resume || other.resume,
             abort: self.abort || other.abort,
+            bytes_lost: self.bytes_lost || other.bytes_lost,
         }
     }
 }
