@@ -2,7 +2,6 @@
 
 use crate::protocol::{RECEIVE_WINDOW, meaning};
 use crate::source::{JobLine, Origin};
-use std::fmt::Write as _;
 use std::io;
 use std::time::Duration;
 
@@ -51,7 +50,7 @@ pub enum Error {
     /// Nothing was heard.
     #[error(
         "the plotter does not answer ({} s without a byte{})\nIs it powered, is it the right port, and does it run \
-         penup at 115200 baud?", patience.as_secs_f32(), waiting_for(line.as_ref())
+         penup at 115200 baud?", patience.as_secs_f32(), waiting_for(line.as_deref())
     )]
     Silent {
         /// How long was waited.
@@ -77,7 +76,7 @@ pub enum Error {
     /// It answers status queries, but a line's answer never came.
     #[error(
         "the plotter is alive but never answered{}: bytes were lost on the line\nCheck the cable, and that nothing \
-         else uses the port; a penup plotter takes {RECEIVE_WINDOW} bytes without a pause", waiting_for(line.as_ref())
+         else uses the port; a penup plotter takes {RECEIVE_WINDOW} bytes without a pause", waiting_for(line.as_deref())
     )]
     LostLine {
         /// The line that was not answered.
@@ -146,7 +145,7 @@ fn said(text: &str) -> String {
     }
 }
 
-fn waiting_for(line: Option<&Box<JobLine>>) -> String {
+fn waiting_for(line: Option<&JobLine>) -> String {
     match line.map(|line| (&line.sent, &line.origin)) {
         None => String::new(),
         Some((_, Some(origin))) => format!(", at line {} of {}", origin.line, origin.file),
@@ -162,18 +161,20 @@ fn remedy(state: &str) -> &'static str {
     }
 }
 
+/// What the plotter said itself is more exact than the number's meaning, so it comes with it.
 fn refusal(line: &JobLine, number: u16, messages: &[String]) -> String {
-    let reason = meaning(number);
-    let mut text = match &line.origin {
-        Some(origin) => format!(
-            "{}:{}: {reason}\n    {}",
-            origin.file, origin.line, origin.text
-        ),
-        None => format!("the plotter refuses {}: {reason}", line.sent),
-    };
+    let mut reason = meaning(number).to_owned();
     for message in messages {
-        // Writing to a string cannot fail.
-        let _ = write!(text, "\n    {message}");
+        reason.push_str(": ");
+        reason.push_str(message);
     }
-    text
+    match &line.origin {
+        Some(Origin { file, line, text }) => {
+            format!("{file}:{line}: {reason} (error {number})\n    {text}")
+        }
+        None => format!(
+            "the plotter refuses {}: {reason} (error {number})",
+            line.sent
+        ),
+    }
 }

@@ -32,7 +32,7 @@ pub struct Picture {
 }
 
 const PEN_WIDTH: f64 = 0.3;
-const TRAVEL_WIDTH: f64 = 0.12;
+const TRAVEL_WIDTH: f64 = 0.15;
 const PAPER: &str = "#ffffff";
 const INK: &str = "#1b1f3b";
 const TRAVEL: &str = "#3d7edb";
@@ -88,7 +88,7 @@ impl Picture {
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{w}mm\" height=\"{h}mm\" viewBox=\"0 0 {w} {h}\">"
         )?;
         writeln!(out, "<rect width=\"{w}\" height=\"{h}\" fill=\"{PAPER}\"/>")?;
-        let faint = format!("stroke=\"{TRAVEL}\" stroke-opacity=\"0.4\"");
+        let faint = format!("stroke=\"{TRAVEL}\" stroke-opacity=\"0.5\"");
         self.write_runs(out, "pen-up", &faint, TRAVEL_WIDTH, false)?;
         let dark = format!("stroke=\"{INK}\"");
         self.write_runs(out, "pen-down", &dark, PEN_WIDTH, true)?;
@@ -272,7 +272,7 @@ mod tests {
         let svg = Picture::of_strokes(PAGE, &strokes).svg();
         let expected = r##"<svg xmlns="http://www.w3.org/2000/svg" width="40mm" height="30mm" viewBox="0 0 40 30">
 <rect width="40" height="30" fill="#ffffff"/>
-<g id="pen-up" fill="none" stroke="#3d7edb" stroke-opacity="0.4" stroke-width="0.12" stroke-linecap="round" stroke-linejoin="round">
+<g id="pen-up" fill="none" stroke="#3d7edb" stroke-opacity="0.5" stroke-width="0.15" stroke-linecap="round" stroke-linejoin="round">
 <path d="M35 5L10 5"/>
 </g>
 <g id="pen-down" fill="none" stroke="#1b1f3b" stroke-width="0.3" stroke-linecap="round" stroke-linejoin="round">

@@ -38,30 +38,23 @@ pub const ABORT: u8 = 0x18;
 /// receive queue of 256 holds, so that a status query always fits.
 pub const RECEIVE_WINDOW: usize = 240;
 
-/// Whether `byte` acts at once wherever it stands, so that it must not stand in a line.
-pub fn acts_at_once(byte: u8) -> bool {
-    matches!(byte, b'?' | b'!' | b'~') || byte >= 0x80 || byte < b' ' && byte != b'\t'
+/// Whether `letter` acts at once wherever it stands, or ends a line, so that no line may hold it.
+pub fn acts_at_once(letter: char) -> bool {
+    matches!(letter, '?' | '!' | '~') || letter.is_ascii_control() && letter != '\t'
 }
 
-/// What each `error:N` means, in the user's words, by N.
-///
-/// Numbers below 20 are Grbl's.
+/// What each `error:N` means, by N.
 const MEANINGS: &[(u16, &str)] = &[];
 
 /// What `error:number` means.
 ///
 /// ```
-/// let text = penup_client::protocol::meaning(9999);
-/// assert_eq!(text, "error 9999, which this client does not know: see docs/protocol.md");
+/// use penup_client::protocol::meaning;
+/// assert_eq!(meaning(9999), "a reason that this client does not know");
 /// ```
-pub fn meaning(number: u16) -> String {
-    MEANINGS
-        .iter()
-        .find(|(known, _)| *known == number)
-        .map_or_else(
-            || format!("error {number}, which this client does not know: see docs/protocol.md"),
-            |(_, text)| (*text).to_owned(),
-        )
+pub fn meaning(number: u16) -> &'static str {
+    let known = MEANINGS.iter().find(|(known, _)| *known == number);
+    known.map_or("a reason that this client does not know", |(_, text)| text)
 }
 
 /// One line from the plotter.

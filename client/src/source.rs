@@ -59,31 +59,31 @@ fn lines(file: &str, bytes: &[u8]) -> Result<Vec<JobLine>, Error> {
     let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
     let mut lines = Vec::new();
     for (index, line) in bytes.split(|&byte| byte == b'\n').enumerate() {
-        let line = line.trim_ascii();
-        if line.is_empty() || line.starts_with(b"#") {
+        let text = String::from_utf8_lossy(line);
+        let content = text.split('#').next().unwrap_or_default().trim();
+        if content.is_empty() {
             continue;
         }
         let origin = Origin {
             file: file.to_owned(),
             line: index + 1,
-            text: String::from_utf8_lossy(line).into_owned(),
+            text: text.trim().to_owned(),
         };
-        if line.starts_with(b"$") {
+        if content.starts_with('$') {
             return Err(Error::CommandInFile { origin });
         }
         lines.push(JobLine {
-            sent: sendable(line),
+            sent: sendable(content),
             origin: Some(origin),
         });
     }
     Ok(lines)
 }
 
-/// A `!` in a name would hold the machine; the plotter reads no names, so another byte serves.
-fn sendable(line: &[u8]) -> String {
-    line.iter()
-        .map(|&byte| if acts_at_once(byte) { '_' } else { byte.into() })
-        .collect()
+/// A `!` in a name would hold the machine; the plotter reads no names, so another letter serves.
+fn sendable(content: &str) -> String {
+    let letter = |letter| if acts_at_once(letter) { '_' } else { letter };
+    content.chars().map(letter).collect()
 }
 
 #[cfg(test)]
@@ -101,23 +101,24 @@ mod tests {
     #[test]
     fn blank_lines_and_comments_stay_at_home_and_numbers_count_them() {
         assert_eq!(
-            sent(b"\xEF\xBB\xBF# cube\r\n\r\nv 0 0 0\r\n  # again\n\tf 1 2 3  \n"),
+            sent(b"\xEF\xBB\xBF# cube\r\n\r\nv 0 0 0\r\n  # again\n\tf 1 2 3  # mine\n"),
             [(3, "v 0 0 0".into()), (5, "f 1 2 3".into())]
         );
+        assert_eq!(sent("o Würfel".as_bytes()), [(1, "o Würfel".into())]);
         assert_eq!(sent(b""), []);
         assert_eq!(sent(b"v 1 2 3"), [(1, "v 1 2 3".into())]);
     }
 
     #[test]
     fn no_byte_of_a_file_acts_at_once() {
-        let all: Vec<u8> = (0..=255).filter(|&byte| byte != b'\n').collect();
-        let line = [b"o ".as_slice(), &all, b" end"].concat();
-        let lines = sent(&line);
+        let other = |byte: &u8| !matches!(byte, b'\n' | b'#');
+        let all: Vec<u8> = (0..=255).filter(other).collect();
+        let lines = sent(&[b"o ".as_slice(), &all, b" end"].concat());
         let [(1, sent)] = lines.as_slice() else {
             panic!("one line expected: {lines:?}");
         };
-        assert!(sent.is_ascii() && sent.bytes().all(|byte| !acts_at_once(byte)));
-        assert_eq!(sent.len(), line.len());
+        assert!(!sent.chars().any(acts_at_once), "{sent}");
+        assert!(sent.starts_with("o _") && sent.ends_with(" end"), "{sent}");
     }
 
     #[test]

@@ -139,7 +139,8 @@ mod at_a_port {
                     let count = plotter
                         .receive(&mut buffer, Duration::from_millis(1))
                         .expect("memory");
-                    wire.write_all(&buffer[..count]).expect("written");
+                    // The program may have left: then nobody listens.
+                    let _ = wire.write_all(&buffer[..count]);
                 }
                 plotter
             });

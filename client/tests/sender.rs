@@ -76,9 +76,11 @@ fn a_line_longer_than_the_window_goes_alone() {
 #[test]
 fn a_refused_line_is_named_with_its_text_and_nothing_is_drawn() {
     let (error, plotter) = failure(Fault::ErrorAt(7, 9999));
-    assert!(error.starts_with("scene.obj:16: error 9999"), "{error}");
-    assert!(error.contains("v 6  18  0.5 # as written"), "{error}");
-    assert!(error.contains("what it thinks of it"), "{error}");
+    assert_eq!(
+        error,
+        "scene.obj:16: a reason that this client does not know: what it thinks of it (error 9999)\n    \
+         v 6  18  0.5 # as written"
+    );
     assert!(!plotter.lines.iter().any(|line| line == "$plot"));
 }
 
