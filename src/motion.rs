@@ -23,3 +23,15 @@ pub trait EventQueue {
     /// Hands the event back if the queue is full.
     fn push(&mut self, event: StepEvent) -> Result<(), StepEvent>;
 }
+
+impl StepEvent {
+    /// From its word.
+    pub const fn from_bits(bits: u32) -> Self {
+        Self(bits)
+    }
+
+    /// Its word.
+    pub const fn bits(self) -> u32 {
+        self.0
+    }
+}
