@@ -55,8 +55,5 @@ pub fn emulate(board: Board) -> Result<Box<dyn WatchedPlotter>, Error> {
 /// # Errors
 /// It cannot start.
 pub fn in_memory() -> Result<Box<dyn PreviewPlotter>, Error> {
-    Err(Error::Board {
-        board: "host".to_owned(),
-        reason: "this build has none".to_owned(),
-    })
+    Err(Error::Board { board: "host".to_owned(), reason: "this build has none".to_owned() })
 }

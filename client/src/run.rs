@@ -31,21 +31,15 @@ fn plot(args: &PlotArgs, interrupt: &AtomicBool) -> Result<String, Error> {
     let lines = job_lines(read_file(&args.file)?, &settings);
     let mut bar = Bar::default();
     if let Some(device) = &args.port {
-        let mut link = SerialLink::open(device).map_err(|source| Error::Port {
-            device: device.clone(),
-            source,
-        })?;
+        let mut link = SerialLink::open(device)
+            .map_err(|source| Error::Port { device: device.clone(), source })?;
         draw(&mut link, &lines, interrupt, &mut bar)?;
         return Ok(format!("{} is drawn", args.file.display()));
     }
     let mut board = machines::emulate(args.board)?;
     draw(board.as_mut(), &lines, interrupt, &mut bar)?;
     let pen = board.pen_runs()?;
-    let picture = Picture {
-        page: settings.page,
-        runs: pen.runs,
-        step: pen.step,
-    };
+    let picture = Picture { page: settings.page, runs: pen.runs, step: pen.step };
     drop(bar);
     let outputs = Outputs::of(&args.pictures, None);
     let files = write_pictures(&picture, &outputs)?;
@@ -72,10 +66,7 @@ fn preview(args: &PreviewArgs, interrupt: &AtomicBool) -> Result<String, Error> 
         output::write(path, format!("{text}\n").as_bytes())?;
         files.push(path);
     }
-    let lengths = Lengths {
-        pen_down_mm: result.pen_down_mm,
-        pen_up_mm: result.pen_up_mm,
-    };
+    let lengths = Lengths { pen_down_mm: result.pen_down_mm, pen_up_mm: result.pen_up_mm };
     Ok(summary(&files, result.strokes.len(), lengths))
 }
 
@@ -126,15 +117,9 @@ impl Outputs {
             json: json.map(Path::to_owned),
         };
         match named {
-            Self {
-                svg: None,
-                png: None,
-                json: None,
-            } => Self {
-                svg: Some("plot.svg".into()),
-                png: Some("plot.png".into()),
-                json: None,
-            },
+            Self { svg: None, png: None, json: None } => {
+                Self { svg: Some("plot.svg".into()), png: Some("plot.png".into()), json: None }
+            }
             named => named,
         }
     }
@@ -160,10 +145,7 @@ fn write_pictures<'a>(picture: &Picture, outputs: &'a Outputs) -> Result<Vec<&'a
 }
 
 fn summary(files: &[&Path], strokes: usize, lengths: Lengths) -> String {
-    let names: Vec<String> = files
-        .iter()
-        .map(|path| path.display().to_string())
-        .collect();
+    let names: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
     format!(
         "{}: {strokes} strokes, {:.1} mm drawn, {:.1} mm between them, efficiency {:.1} %",
         names.join(", "),

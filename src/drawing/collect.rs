@@ -57,6 +57,15 @@ impl Stored {
         Scratch::bytes_for::<Segment>(self.segments)
     }
 
+    /// The drawing, to read only; `None` if this is not the memory in which it was stored.
+    pub fn drawing<'a>(&self, words: &'a [u64]) -> Option<Drawing<'a>> {
+        let points = words.get(self.segment_bytes() / 8..)?;
+        Some(Drawing {
+            segments: items(words, self.segments)?,
+            points: items(points, self.points)?,
+        })
+    }
+
     /// The drawing, and the memory after it.
     ///
     /// # Errors

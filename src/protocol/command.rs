@@ -40,8 +40,6 @@ pub enum Command<'a> {
     Plot,
     /// `$X`
     Unlock,
-    /// `$H`
-    Home,
 }
 
 /// What is drawn, and how.
@@ -177,7 +175,6 @@ pub const HELP: &[(&str, &str)] = &[
     ("$clear", "forget the model"),
     ("$plot", "draw it"),
     ("$X", "unlock after an alarm"),
-    ("$H", "home"),
 ];
 
 impl<'a> Command<'a> {
@@ -220,7 +217,6 @@ impl<'a> Command<'a> {
             "$" => Ok(Self::Settings),
             "I" => Ok(Self::BuildInfo),
             "X" => Ok(Self::Unlock),
-            "H" => Ok(Self::Home),
             "options" => Ok(Self::Options),
             "model" => Ok(Self::Model),
             "clear" => Ok(Self::Clear),

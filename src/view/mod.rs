@@ -149,6 +149,19 @@ impl View {
         Vertex { x, y, z }
     }
 
+    /// Makes sure that every vertex is in front of the eye.
+    ///
+    /// # Errors
+    /// [`ViewError::BehindEye`] with the first that is not.
+    pub fn refuse_behind(&self, model: &Model<'_>) -> Result<(), ViewError> {
+        let near = self.near.unwrap_or(i32::MIN);
+        let is_behind = |position: &Position| self.vertex(*position).z < near;
+        match model.vertices().iter().position(is_behind) {
+            Some(vertex) => Err(ViewError::BehindEye { vertex: vertex + 1 }),
+            None => Ok(()),
+        }
+    }
+
     /// Perspective or parallel.
     pub fn projection(&self) -> Projection {
         self.projection
@@ -266,7 +279,7 @@ mod tests {
     fn a_model_of_any_size_fills_the_range() {
         for size in ["1e-6", "0.001", "1", "12345.678", "1e9"] {
             with_model(&[["0", "0", "0"], [size, "0", "0"], ["0", size, size]], |model| {
-                let camera = Camera::automatic(model, Lens::Perspective).unwrap();
+                let camera = Camera::automatic(model, Lens::Perspective, None, None).unwrap();
                 let view = View::new(&camera, model).unwrap();
                 let seen = model.vertices().iter().map(|p| view.vertex(*p));
                 let widest = seen.map(|v| v.x.abs().max(v.y.abs())).max();
@@ -298,7 +311,7 @@ mod tests {
     #[test]
     fn one_vertex_alone_can_be_seen() {
         with_model(&[["5", "5", "5"]], |model| {
-            let camera = Camera::automatic(model, Lens::Orthographic).unwrap();
+            let camera = Camera::automatic(model, Lens::Orthographic, None, None).unwrap();
             let vertex = View::new(&camera, model).unwrap().vertex(model.vertices()[0]);
             assert!([vertex.x, vertex.y, vertex.z].iter().all(|c| c.abs() <= COORDINATE_LIMIT));
         });
@@ -307,7 +320,8 @@ mod tests {
     #[test]
     fn an_isometric_cube_is_a_regular_hexagon() {
         with_model(&CUBE, |model| {
-            let camera = Camera::axonometric(model, -45.0, 35.264_389_682_754_654).unwrap();
+            let camera =
+                Camera::axonometric(model, -45.0, 35.264_389_682_754_654, None, None).unwrap();
             let view = View::new(&camera, model).unwrap();
             let mut radii = model.vertices().iter().map(|p| view.vertex(*p)).map(|v| {
                 let (x, y) =

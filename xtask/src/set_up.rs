@@ -36,10 +36,7 @@ pub fn toolchain(target: &str) -> Result<Toolchain> {
     }
     if output("rustup", &["--version"]).is_some() {
         println!("penup: installing the Rust target {target} by rustup");
-        match run_within(
-            RUSTUP_LIMIT,
-            Command::new("rustup").args(["target", "add", target]),
-        ) {
+        match run_within(RUSTUP_LIMIT, Command::new("rustup").args(["target", "add", target])) {
             Ok(()) if has_core(target) => return Ok(Toolchain::Rustup),
             Ok(()) => println!("penup: rustup added {target} to another toolchain than cargo's"),
             Err(error) => println!("penup: {error:#}"),
@@ -64,14 +61,8 @@ fn has_core(target: &str) -> bool {
     let Some(directory) = output("rustc", &["--print", "target-libdir", "--target", target]) else {
         return false;
     };
-    let files = Path::new(&directory)
-        .read_dir()
-        .into_iter()
-        .flatten()
-        .flatten();
-    files
-        .map(|file| file.file_name())
-        .any(|name| name.to_string_lossy().starts_with("libcore-"))
+    let files = Path::new(&directory).read_dir().into_iter().flatten().flatten();
+    files.map(|file| file.file_name()).any(|name| name.to_string_lossy().starts_with("libcore-"))
 }
 
 fn debian_is_ready() -> bool {
@@ -84,9 +75,7 @@ impl Toolchain {
     /// A cargo command, as `build`, `check` or `clippy`, that compiles for `target`.
     pub fn cargo(self, command: &str, target: &str) -> Command {
         let mut cargo = cargo();
-        cargo
-            .current_dir(crate::root())
-            .args([command, "--target", target]);
+        cargo.current_dir(crate::root()).args([command, "--target", target]);
         if self == Self::Debian {
             // Debian's std for proc macros and build scripts stays apart from rustup's.
             cargo
@@ -101,10 +90,7 @@ impl Toolchain {
 
 /// The variable by which cargo is told a target's linker.
 fn linker_variable(target: &str) -> String {
-    format!(
-        "CARGO_TARGET_{}_LINKER",
-        target.to_uppercase().replace('-', "_")
-    )
+    format!("CARGO_TARGET_{}_LINKER", target.to_uppercase().replace('-', "_"))
 }
 
 /// QEMU for Arm.
@@ -137,14 +123,8 @@ pub fn checkers() -> Result<()> {
         let mut rustup = Command::new("rustup");
         let installed = run_within(RUSTUP_LIMIT, rustup.args(["component", "add", component]));
         if !found() {
-            let reason = installed
-                .err()
-                .map(|error| format!("{error:#}; "))
-                .unwrap_or_default();
-            bail!(
-                "{reason}run `{}` where the network can be reached",
-                describe(&rustup)
-            );
+            let reason = installed.err().map(|error| format!("{error:#}; ")).unwrap_or_default();
+            bail!("{reason}run `{}` where the network can be reached", describe(&rustup));
         }
     }
     Ok(())
@@ -159,9 +139,7 @@ fn apt_install(packages: &[&str]) -> Result<()> {
     println!("penup: installing {} by apt-get", packages.join(" "));
     let install = || {
         let mut command = as_root("apt-get");
-        command
-            .args(["install", "--yes", "--no-install-recommends"])
-            .args(packages);
+        command.args(["install", "--yes", "--no-install-recommends"]).args(packages);
         command
     };
     if run(&mut install()).is_ok() {

@@ -61,12 +61,7 @@ pub fn take() -> Lm3s6965 {
     let serial = serial::set_up(&mut core.NVIC);
     let steps = steps::set_up(pins.motors, &mut core.NVIC);
     defmt::info!("lm3s6965 at {=u32} Hz", clock::HERTZ);
-    Lm3s6965 {
-        clock,
-        serial,
-        steps,
-        enable: pins.enable,
-    }
+    Lm3s6965 { clock, serial, steps, enable: pins.enable }
 }
 
 impl Board for Lm3s6965 {

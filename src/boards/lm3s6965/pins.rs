@@ -77,10 +77,7 @@ pub fn set_up() -> Pins {
     SYSTEM_CONTROL.set_bits(offset::GPIO_CLOCKS, PORT_B_CLOCK);
     // The port answers three cycles after its clock is on; a read takes longer.
     SYSTEM_CONTROL.read(offset::GPIO_CLOCKS);
-    GPIO_B.write(
-        offset::ALTERNATE_FUNCTION,
-        GPIO_B.read(offset::ALTERNATE_FUNCTION) & !ALL,
-    );
+    GPIO_B.write(offset::ALTERNATE_FUNCTION, GPIO_B.read(offset::ALTERNATE_FUNCTION) & !ALL);
     GPIO_B.set_bits(offset::DIRECTION, ALL);
     release();
     GPIO_B.set_bits(offset::DIGITAL_ENABLE, ALL);

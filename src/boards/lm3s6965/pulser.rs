@@ -14,11 +14,7 @@ pub struct Pulser {
 
 impl Pulser {
     pub fn new(pins: MotorPins) -> Self {
-        Self {
-            pins,
-            before: 0,
-            position: PagePoint::default(),
-        }
+        Self { pins, before: 0, position: PagePoint::default() }
     }
 
     /// Writes the pins; the ticks until the next event.

@@ -97,18 +97,12 @@ pub fn set_up(nvic: &mut NVIC) -> Line {
     UART0.write(offset::INTERRUPT_MASK, RECEIVED | RECEIVE_TIMEOUT);
 
     let (producer, consumer) = QUEUE.init(Queue::new()).split();
-    let receiver = Receiver {
-        bytes: producer,
-        count: 0,
-    };
+    let receiver = Receiver { bytes: producer, count: 0 };
     // SAFETY: the interrupt is masked since reset, and this runs once (the queue's cell sees to it).
     unsafe { RECEIVER.fill(receiver) };
     critical::enable(nvic, Interrupt::UART0, critical::SERIAL_PRIORITY);
     UART0.write(offset::CONTROL, ENABLE_BOTH_WAYS);
-    Line {
-        bytes: consumer,
-        count: 0,
-    }
+    Line { bytes: consumer, count: 0 }
 }
 
 impl Line {
@@ -128,9 +122,7 @@ impl Line {
         let flags = FLAGS.swap(0, Ordering::AcqRel);
         let abort = flags & flag::ABORT != 0;
         if abort {
-            let void = COUNT_AT_ABORT
-                .load(Ordering::Acquire)
-                .wrapping_sub(self.count);
+            let void = COUNT_AT_ABORT.load(Ordering::Acquire).wrapping_sub(self.count);
             for _ in 0..void {
                 self.bytes.dequeue();
                 self.count = self.count.wrapping_add(1);

@@ -74,11 +74,7 @@ pub fn set_up(pins: MotorPins, nvic: &mut NVIC) -> Steps {
     TIMER0.write(offset::INTERRUPT_MASK, TIMED_OUT);
 
     let (producer, consumer) = QUEUE.init(Queue::new()).split();
-    let stepper = Stepper {
-        events: consumer,
-        pulser: Pulser::new(pins),
-        began: 0,
-    };
+    let stepper = Stepper { events: consumer, pulser: Pulser::new(pins), began: 0 };
     // SAFETY: the interrupt is masked since reset, and this runs once (the queue's cell sees to it).
     unsafe { STEPPER.fill(stepper) };
     critical::enable(nvic, Interrupt::TIMER_0A, critical::STEP_PRIORITY);
