@@ -67,9 +67,7 @@ impl<'a> Scratch<'a> {
         }
         let word_count = Self::bytes_for::<T>(count) / size_of::<u64>();
         let words = core::mem::take(&mut self.words);
-        let (taken, rest) = words
-            .split_at_mut_checked(word_count)
-            .ok_or(out_of_scratch)?;
+        let (taken, rest) = words.split_at_mut_checked(word_count).ok_or(out_of_scratch)?;
         self.words = rest;
         taken.fill(0);
         let items = bytemuck::cast_slice_mut(taken);
@@ -121,13 +119,7 @@ mod tests {
     fn a_slice_that_does_not_fit_takes_nothing() {
         let mut words = [7u64; 2];
         let mut scratch = Scratch::new(&mut words);
-        assert_eq!(
-            scratch.take::<u32>(5),
-            Err(OutOfScratch {
-                needed: 20,
-                available: 16
-            })
-        );
+        assert_eq!(scratch.take::<u32>(5), Err(OutOfScratch { needed: 20, available: 16 }));
         assert_eq!(scratch.take::<u32>(4).map(|items| items.len()), Ok(4));
         assert_eq!(scratch.available_bytes(), 0);
         assert_eq!(scratch.take::<u8>(0).map(|items| items.len()), Ok(0));
