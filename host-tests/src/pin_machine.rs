@@ -3,7 +3,7 @@
 use embedded_hal::digital::{ErrorType, OutputPin};
 use heapless::spsc::Queue;
 use penup::drawing::PagePoint;
-use penup::machine::{Machine, Path, Pen, Pins, Pulser, PulserState, Settings};
+use penup::machine::{Machine, MachineError, Path, Pen, Pins, Pulser, PulserState, Settings};
 use penup::motion::{Block, EventQueue, StepEvent};
 use std::cell::{Cell, RefCell};
 use std::convert::Infallible;
@@ -120,14 +120,21 @@ impl EventQueue for Recorder {
 }
 
 /// All events of one job from the page's origin, without pins.
-pub fn record(settings: Settings, path: &mut dyn Path, blocks: usize) -> Vec<StepEvent> {
+///
+/// # Errors
+/// What the machine refuses.
+pub fn record(
+    settings: Settings,
+    path: &mut dyn Path,
+    blocks: usize,
+) -> Result<Vec<StepEvent>, MachineError> {
     let pins = PulserState::new();
     let mut blocks = vec![Block::EMPTY; blocks];
     let mut machine = Machine::new(settings, &mut blocks, &pins, u32::MAX);
     let mut recorder = Recorder::default();
-    machine.start(path).expect("a path within the limits");
+    machine.start(path)?;
     machine.fill(path, &mut recorder);
-    recorder.0
+    Ok(recorder.0)
 }
 
 /// The time of each move of `events` in ticks, and where it leads from the origin.

@@ -25,7 +25,8 @@ pub trait Path {
 /// use penup::drawing::PagePoint;
 /// use penup::machine::{Path, Target, TargetList};
 /// let dot = Target { point: PagePoint { x: 3, y: 4 }, ink: None };
-/// let mut path = TargetList::new(&[dot]);
+/// let targets = [dot];
+/// let mut path = TargetList::new(&targets);
 /// assert_eq!(path.next_target(), Some(dot));
 /// assert_eq!(path.next_target(), None);
 /// path.rewind();
