@@ -1,3 +1,4 @@
 //! The simulated machine, the exact reference models and the tests of whole jobs.
 
 pub mod order_reference;
+pub mod pin_machine;
