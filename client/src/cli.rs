@@ -88,12 +88,7 @@ pub struct ViewArgs {
     #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true, help_heading = "Camera")]
     pub up: Option<[f64; 3]>,
     /// How the model gets onto the page
-    #[arg(
-        long,
-        value_enum,
-        default_value = "perspective",
-        help_heading = "Camera"
-    )]
+    #[arg(long, value_enum, default_value = "perspective", help_heading = "Camera")]
     pub projection: Projection,
     /// What to do with hidden lines
     #[arg(long, value_enum, default_value = "erased", help_heading = "Camera")]
@@ -119,10 +114,7 @@ impl ViewArgs {
     pub fn settings(&self) -> Settings {
         let Page { width, height } = self.page;
         let page = if self.landscape {
-            Page {
-                width: width.max(height),
-                height: width.min(height),
-            }
+            Page { width: width.max(height), height: width.min(height) }
         } else {
             self.page
         };
@@ -176,10 +168,7 @@ fn number(text: &str) -> Result<f64, String> {
 fn triple(text: &str) -> Result<[f64; 3], String> {
     let numbers: Result<Vec<f64>, String> = text.split(',').map(number).collect();
     <[f64; 3]>::try_from(numbers?).map_err(|numbers| {
-        format!(
-            "three numbers with commas between them are needed, not {}",
-            numbers.len()
-        )
+        format!("three numbers with commas between them are needed, not {}", numbers.len())
     })
 }
 
@@ -230,14 +219,7 @@ mod tests {
 
     #[test]
     fn negative_numbers_work_with_a_space_and_with_an_equals_sign() {
-        let spaced = settings(&[
-            "--eye",
-            "-3,-4,2.5",
-            "--at",
-            "-.5,0,-1e-1",
-            "--up",
-            "-1,-2,-3",
-        ]);
+        let spaced = settings(&["--eye", "-3,-4,2.5", "--at", "-.5,0,-1e-1", "--up", "-1,-2,-3"]);
         let joined = settings(&["--eye=-3,-4,2.5", "--at=-.5,0,-1e-1", "--up=-1,-2,-3"]);
         assert_eq!(spaced, joined);
         let settings = spaced.expect("good options");

@@ -138,11 +138,7 @@ impl Error {
 }
 
 fn said(text: &str) -> String {
-    if text.is_empty() {
-        String::new()
-    } else {
-        format!(": it said \"{text}\"")
-    }
+    if text.is_empty() { String::new() } else { format!(": it said \"{text}\"") }
 }
 
 fn waiting_for(line: Option<&JobLine>) -> String {
@@ -172,9 +168,6 @@ fn refusal(line: &JobLine, number: u16, messages: &[String]) -> String {
         Some(Origin { file, line, text }) => {
             format!("{file}:{line}: {reason} (error {number})\n    {text}")
         }
-        None => format!(
-            "the plotter refuses {}: {reason} (error {number})",
-            line.sent
-        ),
+        None => format!("the plotter refuses {}: {reason} (error {number})", line.sent),
     }
 }

@@ -62,11 +62,7 @@ impl FakePlotter {
 
     /// A plotter with `fault` that draws three strokes.
     pub fn new(fault: Fault) -> Self {
-        Self {
-            fault,
-            strokes: 3,
-            ..Self::default()
-        }
+        Self { fault, strokes: 3, ..Self::default() }
     }
 
     fn say(&mut self, line: &str) {
@@ -83,17 +79,10 @@ impl FakePlotter {
 
     fn report(&mut self) {
         let Some(drawn) = self.drawn else {
-            let state = if self.fault == Fault::Busy {
-                "Run"
-            } else {
-                "Idle"
-            };
+            let state = if self.fault == Fault::Busy { "Run" } else { "Idle" };
             return self.say(&format!("<{state}|MPos:0.000,0.000>"));
         };
-        self.say(&format!(
-            "<Run|MPos:1.000,2.000|Strokes:{drawn}/{}>",
-            self.strokes
-        ));
+        self.say(&format!("<Run|MPos:1.000,2.000|Strokes:{drawn}/{}>", self.strokes));
         if let Fault::AlarmWhileDrawing(number) = self.fault {
             self.say(&format!("ALARM:{number}"));
         }

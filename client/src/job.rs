@@ -75,20 +75,14 @@ impl Lengths {
         let up = strokes.windows(2);
         Self {
             pen_down_mm: down.map(|ends| length(&ends[0], &ends[1])).sum(),
-            pen_up_mm: up
-                .filter_map(|pair| Some(length(pair[0].last()?, pair[1].first()?)))
-                .sum(),
+            pen_up_mm: up.filter_map(|pair| Some(length(pair[0].last()?, pair[1].first()?))).sum(),
         }
     }
 
     /// Harrison's drawing efficiency, 0 to 1; 1 if nothing moves.
     pub fn efficiency(self) -> f64 {
         let whole = self.pen_down_mm + self.pen_up_mm;
-        if whole > 0.0 {
-            self.pen_down_mm / whole
-        } else {
-            1.0
-        }
+        if whole > 0.0 { self.pen_down_mm / whole } else { 1.0 }
     }
 }
 
@@ -128,9 +122,7 @@ pub struct Settings {
 pub fn job_lines(file: Vec<JobLine>, settings: &Settings) -> Vec<JobLine> {
     let page = settings.page;
     let points = [(EYE, settings.eye), (AT, settings.at), (UP, settings.up)];
-    let points = points
-        .into_iter()
-        .filter_map(|(name, point)| Some(setting(name, &point?, ',')));
+    let points = points.into_iter().filter_map(|(name, point)| Some(setting(name, &point?, ',')));
     let commands = std::iter::once(VIEW_AUTO.to_owned()).chain(points).chain([
         format!("{PROJECTION}={}", settings.projection),
         format!("{HIDDEN}={}", settings.hidden),
@@ -157,11 +149,7 @@ mod tests {
             pen_up_mm: 0.0,
             efficiency: 1.0,
             steps: 1600,
-            timings_ms: Timings {
-                view: 0.5,
-                visibility: 1.5,
-                order: 2.0,
-            },
+            timings_ms: Timings { view: 0.5, visibility: 1.5, order: 2.0 },
         };
         assert_eq!(
             serde_json::to_string(&result).expect("numbers are finite"),
@@ -186,10 +174,7 @@ mod tests {
             up: Some([0.0, 0.0, 1.0]),
             projection: "perspective",
             hidden: "dotted",
-            page: Page {
-                width: 210.0,
-                height: 297.0,
-            },
+            page: Page { width: 210.0, height: 297.0 },
             margin: 7.5,
             fit: false,
         };

@@ -32,7 +32,8 @@ pub struct PenRuns {
 
 /// The plotter's library on this computer.
 pub trait PreviewPlotter: Link {
-    /// What came of the last plot command.
+    /// What came of the last plot command, with the best time of each stage in all of them
+    /// ([`Timings::best`](crate::job::Timings::best)).
     ///
     /// # Errors
     /// There was none.
@@ -55,8 +56,5 @@ pub fn emulate(board: Board) -> Result<Box<dyn WatchedPlotter>, Error> {
 /// # Errors
 /// It cannot start.
 pub fn in_memory() -> Result<Box<dyn PreviewPlotter>, Error> {
-    Err(Error::Board {
-        board: "host".to_owned(),
-        reason: "this build has none".to_owned(),
-    })
+    Err(Error::Board { board: "host".to_owned(), reason: "this build has none".to_owned() })
 }

@@ -16,10 +16,7 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
         Ok(there) if !there.is_file() => fs::write(path, bytes),
         _ => write_beside(path, bytes),
     };
-    result.map_err(|source| Error::Write {
-        file: path.display().to_string(),
-        source,
-    })
+    result.map_err(|source| Error::Write { file: path.display().to_string(), source })
 }
 
 fn write_beside(path: &Path, bytes: &[u8]) -> io::Result<()> {

@@ -54,22 +54,12 @@ impl Picture {
                 continue;
             };
             if let Some(from) = pen {
-                runs.push(Run {
-                    pen_down: false,
-                    points: vec![from, start],
-                });
+                runs.push(Run { pen_down: false, points: vec![from, start] });
             }
-            runs.push(Run {
-                pen_down: true,
-                points: stroke.clone(),
-            });
+            runs.push(Run { pen_down: true, points: stroke.clone() });
             pen = Some(end);
         }
-        Self {
-            page,
-            runs,
-            step: 0.0,
-        }
+        Self { page, runs, step: 0.0 }
     }
 
     /// As an SVG document.
@@ -257,10 +247,7 @@ fn reach(start: PagePoint, ahead: &[PagePoint], tolerance: f64) -> usize {
 mod tests {
     use super::*;
 
-    const PAGE: Page = Page {
-        width: 40.0,
-        height: 30.0,
-    };
+    const PAGE: Page = Page { width: 40.0, height: 30.0 };
 
     #[test]
     fn a_picture_shows_ink_moves_start_and_end() {
@@ -293,10 +280,7 @@ mod tests {
         let png = png(&svg).expect("a white page");
         assert_eq!(png.get(..8), Some(b"\x89PNG\r\n\x1a\n".as_slice()));
         // Width and height stand in the header.
-        assert_eq!(
-            png.get(16..24),
-            Some([0, 0, 1, 64, 0, 0, 0, 240].as_slice())
-        );
+        assert_eq!(png.get(16..24), Some([0, 0, 1, 64, 0, 0, 0, 240].as_slice()));
     }
 
     #[test]
@@ -312,10 +296,7 @@ mod tests {
     #[test]
     fn a_stroke_that_turns_back_keeps_its_turn() {
         let there_and_back = [[0.0, 0.0], [5.0, 0.0], [10.0, 0.0], [4.0, 0.0]];
-        assert_eq!(
-            straightened(&there_and_back, 0.1),
-            [[0.0, 0.0], [10.0, 0.0], [4.0, 0.0]]
-        );
+        assert_eq!(straightened(&there_and_back, 0.1), [[0.0, 0.0], [10.0, 0.0], [4.0, 0.0]]);
         let closed = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 0.0]];
         assert_eq!(straightened(&closed, 0.1), closed);
         assert_eq!(straightened(&[], 0.1), [[0.0; 2]; 0]);
@@ -329,22 +310,12 @@ mod tests {
         let along = |start: i32, d: i32, i: i32| {
             (f64::from(start) + f64::from(d * i) / f64::from(count)).round()
         };
-        (0..=count)
-            .map(|i| [along(from[0], dx, i), along(from[1], dy, i)])
-            .collect()
+        (0..=count).map(|i| [along(from[0], dx, i), along(from[1], dy, i)]).collect()
     }
 
     #[test]
     fn a_line_of_steps_becomes_one_line_whatever_its_direction() {
-        for to in [
-            [140, 90],
-            [-140, 90],
-            [90, -141],
-            [-7, -200],
-            [300, 0],
-            [0, -9],
-            [-50, -50],
-        ] {
+        for to in [[140, 90], [-140, 90], [90, -141], [-7, -200], [300, 0], [0, -9], [-50, -50]] {
             let line = steps([0, 0], to);
             let ends = [line[0], line[line.len() - 1]];
             assert_eq!(straightened(&line, 0.501), ends);
@@ -367,11 +338,7 @@ mod tests {
         let pairs = corners.windows(2);
         let stroke: Vec<PagePoint> = pairs.flat_map(|pair| steps(pair[0], pair[1])).collect();
         let straight = straightened(&stroke, 0.501);
-        assert!(
-            straight.len() <= 4 * corners.len(),
-            "{} points",
-            straight.len()
-        );
+        assert!(straight.len() <= 4 * corners.len(), "{} points", straight.len());
         let mut spans = straight.windows(2);
         let mut span = spans.next().expect("several lines");
         for &point in &stroke {

@@ -82,9 +82,7 @@ impl<'a> Sender<'a> {
         sender.link.send(&[ABORT])?;
         match sender.await_greeting()? {
             Some(greeting) if greeting.starts_with("penup ") => Ok(sender),
-            greeting => Err(Error::NotPenup {
-                heard: greeting.unwrap_or_default(),
-            }),
+            greeting => Err(Error::NotPenup { heard: greeting.unwrap_or_default() }),
         }
     }
 
@@ -106,9 +104,7 @@ impl<'a> Sender<'a> {
         match heard {
             // Bytes without a line end come from a wrong speed or another device, too.
             None if self.last_heard <= start => Err(self.silent(None)),
-            heard => Err(Error::NotPenup {
-                heard: heard.unwrap_or_default(),
-            }),
+            heard => Err(Error::NotPenup { heard: heard.unwrap_or_default() }),
         }
     }
 
@@ -146,9 +142,7 @@ impl<'a> Sender<'a> {
                 }
             }
             if last_answer.elapsed() > self.patience.lost {
-                return Err(Error::LostLine {
-                    line: Some(Box::new(oldest.clone())),
-                });
+                return Err(Error::LostLine { line: Some(Box::new(oldest.clone())) });
             }
         }
         Ok(())
@@ -178,9 +172,7 @@ impl<'a> Sender<'a> {
                         progress.strokes_drawn(done, all);
                     }
                     if status.state == "Alarm" {
-                        return Err(Error::NotReady {
-                            state: status.state,
-                        });
+                        return Err(Error::NotReady { state: status.state });
                     }
                     match (status.is_idle(), acknowledged) {
                         (true, true) => return Ok(()),
@@ -195,9 +187,7 @@ impl<'a> Sender<'a> {
             }
             self.query_if_due()?;
             if idle_since.is_some_and(|since: Instant| since.elapsed() > self.patience.lost) {
-                return Err(Error::LostLine {
-                    line: Some(Box::new(command)),
-                });
+                return Err(Error::LostLine { line: Some(Box::new(command)) });
             }
         }
     }
@@ -209,10 +199,9 @@ impl<'a> Sender<'a> {
                 number,
                 messages: std::mem::take(&mut self.messages),
             }),
-            Reply::Alarm(number) => Err(Error::Alarm {
-                number,
-                messages: std::mem::take(&mut self.messages),
-            }),
+            Reply::Alarm(number) => {
+                Err(Error::Alarm { number, messages: std::mem::take(&mut self.messages) })
+            }
             Reply::Greeting(_) => Err(Error::Restarted),
             Reply::Message(text) => {
                 self.messages.push(text);
@@ -223,10 +212,7 @@ impl<'a> Sender<'a> {
     }
 
     fn silent(&self, line: Option<&JobLine>) -> Error {
-        Error::Silent {
-            patience: self.patience.silence,
-            line: line.cloned().map(Box::new),
-        }
+        Error::Silent { patience: self.patience.silence, line: line.cloned().map(Box::new) }
     }
 
     fn fail_if_silent(&self, line: Option<&JobLine>) -> Result<(), Error> {
@@ -288,8 +274,7 @@ impl<'a> Sender<'a> {
             }
             let reader = &mut self.reader;
             let bytes = buffer.get(..count).unwrap_or_default();
-            self.replies
-                .extend(bytes.iter().filter_map(|&byte| reader.push(byte)));
+            self.replies.extend(bytes.iter().filter_map(|&byte| reader.push(byte)));
         }
         Ok(self.replies.pop_front())
     }

@@ -31,10 +31,7 @@ pub struct Origin {
 impl JobLine {
     /// A command of the client itself.
     pub fn command(text: impl Into<String>) -> Self {
-        Self {
-            sent: text.into(),
-            origin: None,
-        }
+        Self { sent: text.into(), origin: None }
     }
 }
 
@@ -45,10 +42,7 @@ impl JobLine {
 pub fn read_file(path: &Path) -> Result<Vec<JobLine>, Error> {
     let name = path.display().to_string();
     let extension = path.extension().unwrap_or_default().to_string_lossy();
-    let bytes = fs::read(path).map_err(|source| Error::File {
-        file: name.clone(),
-        source,
-    })?;
+    let bytes = fs::read(path).map_err(|source| Error::File { file: name.clone(), source })?;
     if !extension.eq_ignore_ascii_case("obj") {
         return Err(Error::Extension { file: name });
     }
@@ -64,18 +58,12 @@ fn lines(file: &str, bytes: &[u8]) -> Result<Vec<JobLine>, Error> {
         if content.is_empty() {
             continue;
         }
-        let origin = Origin {
-            file: file.to_owned(),
-            line: index + 1,
-            text: text.trim().to_owned(),
-        };
+        let origin =
+            Origin { file: file.to_owned(), line: index + 1, text: text.trim().to_owned() };
         if content.starts_with('$') {
             return Err(Error::CommandInFile { origin });
         }
-        lines.push(JobLine {
-            sent: sendable(content),
-            origin: Some(origin),
-        });
+        lines.push(JobLine { sent: sendable(content), origin: Some(origin) });
     }
     Ok(lines)
 }

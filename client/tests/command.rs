@@ -1,20 +1,13 @@
 //! The program as a user runs it.
 
-#![allow(
-    clippy::expect_used,
-    reason = "a test fails with the words of what it expected"
-)]
+#![allow(clippy::expect_used, reason = "a test fails with the words of what it expected")]
 
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
 fn penup(folder: &Path, arguments: &[&str]) -> (Option<i32>, String, String) {
-    let Output {
-        status,
-        stdout,
-        stderr,
-    } = Command::new(env!("CARGO_BIN_EXE_penup"))
+    let Output { status, stdout, stderr } = Command::new(env!("CARGO_BIN_EXE_penup"))
         .args(arguments)
         .current_dir(folder)
         .output()
@@ -26,9 +19,8 @@ fn penup(folder: &Path, arguments: &[&str]) -> (Option<i32>, String, String) {
 fn files(folder: &Path) -> Vec<String> {
     let entries = fs::read_dir(folder).expect("a folder");
     let name = |entry: std::io::Result<fs::DirEntry>| entry.expect("an entry").file_name();
-    let mut names: Vec<String> = entries
-        .map(|entry| name(entry).to_string_lossy().into_owned())
-        .collect();
+    let mut names: Vec<String> =
+        entries.map(|entry| name(entry).to_string_lossy().into_owned()).collect();
     names.sort();
     names
 }
@@ -53,10 +45,7 @@ fn help_names_every_option() {
         "--svg",
         "--png",
     ] {
-        assert!(
-            plot.contains(option) && preview.contains(option),
-            "{option}"
-        );
+        assert!(plot.contains(option) && preview.contains(option), "{option}");
     }
     assert!(plot.contains("--board") && plot.contains("--port"));
     assert!(preview.contains("--json") && preview.contains("--repeat"));
@@ -136,20 +125,14 @@ mod at_a_port {
                     }
                     let last = plotter.lines.last().map(String::as_str);
                     draws.store(last == Some("$plot"), Ordering::Relaxed);
-                    let count = plotter
-                        .receive(&mut buffer, Duration::from_millis(1))
-                        .expect("memory");
+                    let count =
+                        plotter.receive(&mut buffer, Duration::from_millis(1)).expect("memory");
                     // The program may have left: then nobody listens.
                     let _ = wire.write_all(&buffer[..count]);
                 }
                 plotter
             });
-            Self {
-                device,
-                unplug,
-                drawing,
-                thread,
-            }
+            Self { device, unplug, drawing, thread }
         }
 
         fn unplug(self) -> FakePlotter {
@@ -165,20 +148,9 @@ mod at_a_port {
         let folder = tempfile::tempdir().expect("a folder");
         fs::write(folder.path().join("cube.obj"), CUBE).expect("written");
         let plotter = Plugged::new(FakePlotter::new(Fault::None));
-        let line = [
-            "plot",
-            "cube.obj",
-            "--eye",
-            "-3,-4,2.5",
-            "--port",
-            &plotter.device,
-        ];
+        let line = ["plot", "cube.obj", "--eye", "-3,-4,2.5", "--port", &plotter.device];
         let (code, stdout, stderr) = penup(folder.path(), &line);
-        assert_eq!(
-            (code, stdout.as_str()),
-            (Some(0), "cube.obj is drawn\n"),
-            "{stderr}"
-        );
+        assert_eq!((code, stdout.as_str()), (Some(0), "cube.obj is drawn\n"), "{stderr}");
         let lines = plotter.unplug().lines;
         let file = CUBE.lines().filter(|line| !line.starts_with('#'));
         let count = file.clone().count();

@@ -1,9 +1,6 @@
 //! A sender and a plotter that misbehaves.
 
-#![allow(
-    clippy::expect_used,
-    reason = "a test fails with the words of what it expected"
-)]
+#![allow(clippy::expect_used, reason = "a test fails with the words of what it expected")]
 
 use penup_client::error::Error;
 use penup_client::fake::{FakePlotter, Fault};
@@ -110,10 +107,7 @@ fn lost_bytes_are_told_from_silence() {
     let (error, _) = failure(Fault::LosesLine(40));
     assert!(error.contains("never answered, at line 49"), "{error}");
     let (error, _) = failure(Fault::LosesLine(41));
-    assert!(
-        error.contains("never answered, at the command $plot"),
-        "{error}"
-    );
+    assert!(error.contains("never answered, at the command $plot"), "{error}");
 }
 
 #[test]
@@ -148,17 +142,14 @@ impl Progress for GivesUp<'_> {
 
 #[test]
 fn giving_up_stops_the_machine_and_waits_until_it_says_so() {
-    for (fault, expected) in [
-        (Fault::None, "the pen is up"),
-        (Fault::IgnoresAbort, "did not confirm"),
-    ] {
+    for (fault, expected) in
+        [(Fault::None, "the pen is up"), (Fault::IgnoresAbort, "did not confirm")]
+    {
         let mut plotter = FakePlotter::new(fault);
         plotter.strokes = 1000;
         let interrupt = AtomicBool::new(false);
         let mut sender = Sender::open(&mut plotter, PATIENCE, &interrupt).expect("a plotter");
-        let error = sender
-            .plot(&mut GivesUp(&interrupt))
-            .expect_err("it was given up");
+        let error = sender.plot(&mut GivesUp(&interrupt)).expect_err("it was given up");
         assert!(error.to_string().contains(expected), "{error}");
         assert_eq!(error.exit_code(), 130);
         assert_eq!(plotter.aborts, 2);
@@ -189,13 +180,6 @@ fn progress_counts_lines_then_strokes() {
     sender.plot(&mut told).expect("drawn");
     assert_eq!(
         told.0,
-        [
-            "line 1/2",
-            "line 2/2",
-            "stroke 0/3",
-            "stroke 1/3",
-            "stroke 2/3",
-            "stroke 3/3"
-        ]
+        ["line 1/2", "line 2/2", "stroke 0/3", "stroke 1/3", "stroke 2/3", "stroke 3/3"]
     );
 }
