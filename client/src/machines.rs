@@ -32,7 +32,8 @@ pub struct PenRuns {
 
 /// The plotter's library on this computer.
 pub trait PreviewPlotter: Link {
-    /// What came of the last plot command.
+    /// What came of the last plot command, with the best time of each stage in all of them
+    /// ([`Timings::best`](crate::job::Timings::best)).
     ///
     /// # Errors
     /// There was none.
