@@ -2,9 +2,9 @@
 
 use crate::cli::{Cli, Command, PictureArgs, PlotArgs, PreviewArgs};
 use crate::error::Error;
-use crate::job::{JobResult, Lengths, job_lines};
+use crate::job::{Lengths, job_lines};
 use crate::link::{Link, SerialLink};
-use crate::machines::{self, PreviewPlotter};
+use crate::machines;
 use crate::output;
 use crate::picture::{self, Picture};
 use crate::progress::{Bar, Progress};
@@ -33,11 +33,11 @@ fn plot(args: &PlotArgs, interrupt: &AtomicBool) -> Result<String, Error> {
     if let Some(device) = &args.port {
         let mut link = SerialLink::open(device)
             .map_err(|source| Error::Port { device: device.clone(), source })?;
-        draw(&mut link, &lines, interrupt, &mut bar)?;
+        draw(&mut link, &lines, 1, interrupt, &mut bar)?;
         return Ok(format!("{} is drawn", args.file.display()));
     }
     let mut board = machines::emulate(args.board)?;
-    draw(board.as_mut(), &lines, interrupt, &mut bar)?;
+    draw(board.as_mut(), &lines, 1, interrupt, &mut bar)?;
     let pen = board.pen_runs()?;
     let picture = Picture { page: settings.page, runs: pen.runs, step: pen.step };
     drop(bar);
@@ -53,7 +53,8 @@ fn preview(args: &PreviewArgs, interrupt: &AtomicBool) -> Result<String, Error> 
     let lines = job_lines(read_file(&args.file)?, &settings);
     let mut bar = Bar::default();
     let mut plotter = machines::in_memory()?;
-    let result = repeat(plotter.as_mut(), &lines, args.repeat, interrupt, &mut bar)?;
+    draw(plotter.as_mut(), &lines, args.repeat, interrupt, &mut bar)?;
+    let result = plotter.result()?;
     drop(bar);
     let outputs = Outputs::of(&args.pictures, args.json.as_deref());
     let picture = Picture::of_strokes(settings.page, &result.strokes);
@@ -70,37 +71,20 @@ fn preview(args: &PreviewArgs, interrupt: &AtomicBool) -> Result<String, Error> 
     Ok(summary(&files, result.strokes.len(), lengths))
 }
 
-/// Sends a whole job over `link` and draws it.
+/// Sends a whole job over `link` and draws it `times` times.
 ///
 /// # Errors
 /// See [`Sender`].
 pub fn draw(
     link: &mut dyn Link,
     lines: &[JobLine],
+    times: u32,
     interrupt: &AtomicBool,
     progress: &mut dyn Progress,
 ) -> Result<(), Error> {
     let mut sender = Sender::open(link, Patience::default(), interrupt)?;
     sender.stream(lines, progress)?;
-    sender.plot(progress)
-}
-
-/// Draws the job `times` times; the result has the best time of each stage.
-fn repeat(
-    plotter: &mut dyn PreviewPlotter,
-    lines: &[JobLine],
-    times: u32,
-    interrupt: &AtomicBool,
-    progress: &mut dyn Progress,
-) -> Result<JobResult, Error> {
-    draw(plotter, lines, interrupt, progress)?;
-    let mut result = plotter.result()?;
-    for _ in 1..times {
-        Sender::open(plotter, Patience::default(), interrupt)?.plot(progress)?;
-        let timings_ms = result.timings_ms.best(plotter.result()?.timings_ms);
-        result.timings_ms = timings_ms;
-    }
-    Ok(result)
+    (0..times).try_for_each(|_| sender.plot(progress))
 }
 
 struct Outputs {
