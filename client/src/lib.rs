@@ -2,9 +2,11 @@
 //!
 //! In the order in which a job passes through: [`cli`] reads the command line, [`source`] the file,
 //! [`job`] joins both into lines, [`sender`] sends them over a [`link`] and follows the plotter's
-//! replies ([`protocol`], [`progress`]), [`picture`] shows what the pen did, [`output`] writes it.
+//! replies ([`protocol`], [`progress`]); behind the link are the plotters of [`machines`], an
+//! [`emulator`] among them; [`picture`] shows what the pen did, [`output`] writes it.
 
 pub mod cli;
+pub mod emulator;
 pub mod error;
 pub mod fake;
 pub mod job;
