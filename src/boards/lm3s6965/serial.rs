@@ -9,7 +9,7 @@ use core::sync::atomic::{AtomicU8, AtomicU32, Ordering};
 use cortex_m::peripheral::NVIC;
 use heapless::spsc::{Consumer, Producer, Queue};
 use lm3s6965::{Interrupt, interrupt};
-use penup::plotter::Realtime;
+use penup::protocol::RealTime;
 use static_cell::StaticCell;
 
 use super::handler::Owned;
@@ -118,7 +118,7 @@ impl Line {
     }
 
     /// What was asked in real time since last taken. An abort drops the bytes received before it.
-    pub fn take_realtime(&mut self) -> Realtime {
+    pub fn take_real_time(&mut self) -> RealTime {
         let flags = FLAGS.swap(0, Ordering::AcqRel);
         let abort = flags & flag::ABORT != 0;
         if abort {
@@ -128,12 +128,12 @@ impl Line {
                 self.count = self.count.wrapping_add(1);
             }
         }
-        Realtime {
+        RealTime {
             status: flags & flag::STATUS != 0,
             hold: flags & flag::HOLD != 0,
             resume: flags & flag::RESUME != 0,
             abort,
-            overrun: flags & flag::OVERRUN != 0,
+            bytes_lost: flags & flag::OVERRUN != 0,
         }
     }
 }
