@@ -72,8 +72,9 @@ impl<'a> Scratch<'a> {
             .ok_or(out_of_scratch)?;
         self.words = rest;
         taken.fill(0);
-        let items = bytemuck::cast_slice_mut(taken);
-        items.get_mut(..count).ok_or(out_of_scratch)
+        let bytes: &mut [u8] = bytemuck::cast_slice_mut(taken);
+        let items = bytes.get_mut(..out_of_scratch.needed);
+        items.map(bytemuck::cast_slice_mut).ok_or(out_of_scratch)
     }
 
     /// Lends what is left to a stage within this stage.
@@ -131,6 +132,14 @@ mod tests {
         assert_eq!(scratch.take::<u32>(4).map(|items| items.len()), Ok(4));
         assert_eq!(scratch.available_bytes(), 0);
         assert_eq!(scratch.take::<u8>(0).map(|items| items.len()), Ok(0));
+    }
+
+    #[test]
+    fn items_that_do_not_fill_a_word_are_taken_whole() {
+        let mut words = [7u64; 3];
+        let mut scratch = Scratch::new(&mut words);
+        assert_eq!(scratch.take::<[u16; 3]>(3).as_deref(), Ok(&[[0; 3]; 3][..]));
+        assert_eq!(scratch.available_bytes(), 0);
     }
 
     #[test]
