@@ -2,3 +2,4 @@
 
 pub mod order_reference;
 pub mod pin_machine;
+pub mod scene_files;
