@@ -8,20 +8,13 @@ use std::time::Instant;
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
-    let effort = arguments
-        .next()
-        .and_then(|word| word.parse().ok())
-        .expect("EFFORT FILE...");
+    let effort = arguments.next().and_then(|word| word.parse().ok()).expect("EFFORT FILE...");
     for file in arguments {
         let text = std::fs::read_to_string(&file).expect("a file that can be read");
         let sheet = Sheet::from_obj(&text);
         for method in [Method::Greedy, Method::Auto] {
             for shape in [Shape::OpenPath, Shape::ClosedCycle] {
-                let options = Options {
-                    method,
-                    shape,
-                    effort,
-                };
+                let options = Options { method, shape, effort };
                 let (_, report) = sheet.order(options).expect("an order");
                 let mut memory = vec![0; 1 << 16];
                 let mut tour = vec![Leg::new(0, false); sheet.segments.len()];
@@ -29,14 +22,8 @@ fn main() {
                     .map(|_| {
                         let begin = Instant::now();
                         let scratch = Scratch::new(&mut memory);
-                        order(
-                            sheet.drawing(),
-                            options,
-                            scratch,
-                            &mut Undisturbed,
-                            &mut tour,
-                        )
-                        .expect("an order");
+                        order(sheet.drawing(), options, scratch, &mut Undisturbed, &mut tour)
+                            .expect("an order");
                         begin.elapsed()
                     })
                     .min()

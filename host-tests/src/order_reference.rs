@@ -36,11 +36,7 @@ impl Sheet {
             for pair in ends.windows(2) {
                 let (from, to) = (pair[0], pair[1]);
                 if from != to && known.insert((from.min(to), from.max(to))) {
-                    let segment = Segment {
-                        from,
-                        to,
-                        ..Segment::default()
-                    };
+                    let segment = Segment { from, to, ..Segment::default() };
                     sheet.segments.push(segment);
                 }
             }
@@ -74,10 +70,7 @@ impl Sheet {
 
     /// As the library takes it.
     pub fn drawing(&self) -> Drawing<'_> {
-        Drawing {
-            points: &self.points,
-            segments: &self.segments,
-        }
+        Drawing { points: &self.points, segments: &self.segments }
     }
 
     /// The tour that the library finds, with plenty of memory, checked.
@@ -85,13 +78,7 @@ impl Sheet {
         let mut memory = vec![0; 1 << 18];
         let mut tour = vec![Leg::new(0, false); self.segments.len()];
         let scratch = Scratch::new(&mut memory);
-        let report = order(
-            self.drawing(),
-            options,
-            scratch,
-            &mut Undisturbed,
-            &mut tour,
-        )?;
+        let report = order(self.drawing(), options, scratch, &mut Undisturbed, &mut tour)?;
         self.check(options.shape, &tour, &report);
         Ok((tour, report))
     }
@@ -99,11 +86,7 @@ impl Sheet {
     /// The point at which a leg begins.
     pub fn start(&self, leg: Leg) -> PagePoint {
         let segment = self.segments[leg.segment()];
-        let point = if leg.reversed() {
-            segment.to
-        } else {
-            segment.from
-        };
+        let point = if leg.reversed() { segment.to } else { segment.from };
         self.points[usize::from(point)]
     }
 
@@ -156,10 +139,8 @@ impl Sheet {
         let drawn: BTreeSet<usize> = tour.iter().map(|leg| leg.segment()).collect();
         assert_eq!(drawn.len(), tour.len(), "a segment is drawn twice");
         assert_eq!(drawn.len(), self.segments.len(), "a segment is missing");
-        let mut moves: Vec<_> = tour
-            .windows(2)
-            .map(|pair| (self.end(pair[0]), self.start(pair[1])))
-            .collect();
+        let mut moves: Vec<_> =
+            tour.windows(2).map(|pair| (self.end(pair[0]), self.start(pair[1]))).collect();
         if shape == Shape::ClosedCycle
             && let (Some(&first), Some(&last)) = (tour.first(), tour.last())
         {
@@ -170,10 +151,7 @@ impl Sheet {
             f64::from(to.x - from.x).hypot(f64::from(to.y - from.y))
         };
         let pen_up: f64 = moves.iter().map(|&(from, to)| steps(from, to)).sum();
-        let pen_down: f64 = tour
-            .iter()
-            .map(|&leg| steps(self.start(leg), self.end(leg)))
-            .sum();
+        let pen_down: f64 = tour.iter().map(|&leg| steps(self.start(leg), self.end(leg))).sum();
         let count = tour.len() as f64 + 1.0;
         assert!((report.pen_up as f64 / 256.0 - pen_up).abs() < count / 256.0);
         assert!((report.pen_down as f64 / 256.0 - pen_down).abs() < count / 256.0);
@@ -182,10 +160,7 @@ impl Sheet {
             assert_eq!(report.odd_points as usize, self.odd_points());
             assert_eq!(report.components as usize, self.components());
             if report.components == 1 {
-                assert!(
-                    moves.len() <= self.odd_points() / 2,
-                    "more lifts than pairs"
-                );
+                assert!(moves.len() <= self.odd_points() / 2, "more lifts than pairs");
             }
         }
         assert!(report.bound <= report.pen_up);

@@ -21,11 +21,7 @@ fn polylines(reach: i32) -> impl Strategy<Value = Vec<Vec<(i32, i32)>>> {
 fn orders_everything(sheet: &Sheet) -> Result<(), OrderError> {
     for (method, shape) in ALL {
         for effort in [0, 1] {
-            sheet.order(Options {
-                method,
-                shape,
-                effort,
-            })?;
+            sheet.order(Options { method, shape, effort })?;
         }
     }
     Ok(())

@@ -39,13 +39,7 @@ impl<'s, 'a> Unused<'s, 'a> {
                 first[start] = leg.code();
             }
         }
-        Ok(Self {
-            network,
-            first,
-            next,
-            used,
-            mate,
-        })
+        Ok(Self { network, first, next, used, mate })
     }
 
     /// The next unused leg from `station`.

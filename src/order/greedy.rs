@@ -43,12 +43,7 @@ fn choose(
     chooser: u16,
     pace: &mut Pace<'_>,
 ) -> Result<Choice, OrderError> {
-    let mut choice = Choice {
-        distance: u32::MAX,
-        regret: u32::MAX,
-        first: NONE,
-        second: NONE,
-    };
+    let mut choice = Choice { distance: u32::MAX, regret: u32::MAX, first: NONE, second: NONE };
     let mut second_distance = u32::MAX;
     for other in 0..odd.real_count() {
         if other == chooser || mate[usize::from(other)] != NONE {

@@ -47,13 +47,7 @@ impl<'a> Network<'a> {
         let outer = scratch.take(chains)?;
         let mut lent = scratch.reborrow();
         Survey::new(drawing, pen, &mut lent)?.lay_chains(&mut lent, at, ends, outer)?;
-        Ok(Self {
-            points: drawing.points,
-            segments: drawing.segments,
-            at,
-            ends,
-            outer,
-        })
+        Ok(Self { points: drawing.points, segments: drawing.segments, at, ends, outer })
     }
 
     /// How many stations there are.
@@ -102,11 +96,8 @@ impl<'a> Network<'a> {
         let mut tour = tour.iter_mut();
         for &chain in route {
             let [first, last] = self.outer[chain.segment()];
-            let (mut leg, last) = if chain.reversed() {
-                (last.flipped(), first.flipped())
-            } else {
-                (first, last)
-            };
+            let (mut leg, last) =
+                if chain.reversed() { (last.flipped(), first.flipped()) } else { (first, last) };
             loop {
                 if let Some(place) = tour.next() {
                     *place = leg;
@@ -123,19 +114,13 @@ impl<'a> Network<'a> {
 
 /// The segments of `pen` with their numbers.
 pub(super) fn pen_segments(segments: &[Segment], pen: u8) -> impl Iterator<Item = (u16, &Segment)> {
-    (0..=u16::MAX)
-        .zip(segments)
-        .filter(move |(_, segment)| segment.pen == pen)
+    (0..=u16::MAX).zip(segments).filter(move |(_, segment)| segment.pen == pen)
 }
 
 /// The point at which the leg of a segment begins.
 pub(super) fn start_point(segments: &[Segment], leg: Leg) -> u16 {
     let segment = &segments[leg.segment()];
-    if leg.reversed() {
-        segment.to
-    } else {
-        segment.from
-    }
+    if leg.reversed() { segment.to } else { segment.from }
 }
 
 /// The leg that goes on where `leg` ends, at a point of two segments. `across` holds for each point
@@ -180,13 +165,7 @@ impl<'s, 'a> Survey<'s, 'a> {
             let lowest = parts.find(point);
             parts.flatten(point, lowest);
         }
-        Ok(Self {
-            segments: drawing.segments,
-            pen,
-            degree,
-            across,
-            part,
-        })
+        Ok(Self { segments: drawing.segments, pen, degree, across, part })
     }
 
     fn degree(&self, point: u16) -> usize {

@@ -57,9 +57,6 @@ mod tests {
         assert!(sets.unite(4, 2));
         assert!(sets.unite(2, 1));
         assert!(!sets.unite(1, 4));
-        assert_eq!(
-            [0, 1, 2, 3, 4].map(|member| sets.find(member)),
-            [0, 1, 1, 3, 1]
-        );
+        assert_eq!([0, 1, 2, 3, 4].map(|member| sets.find(member)), [0, 1, 1, 3, 1]);
     }
 }
