@@ -199,16 +199,22 @@ impl Matching<'_, '_> {
         node
     }
 
-    /// Dissolves an outermost blossom: its ring's nodes become outermost and are matched around the
-    /// ring. Returns the one that holds the base.
+    /// Dissolves an outermost blossom: the nodes of its ring become outermost. Returns the one that
+    /// holds the base.
     fn open(&mut self, blossom: u16) -> u16 {
-        let base = self.nodes[usize::from(blossom)].base;
-        let first = self.within(blossom, base);
         for vertex in 0..self.top.len() as u16 {
             if self.top_of(vertex) == blossom {
                 self.top[usize::from(vertex)] = self.within(blossom, vertex);
             }
         }
+        self.settle(blossom)
+    }
+
+    /// Matches the nodes of an outermost blossom around its ring, from the one that holds the base,
+    /// which is returned. The blossom is no more.
+    fn settle(&mut self, blossom: u16) -> u16 {
+        let base = self.nodes[usize::from(blossom)].base;
+        let first = self.within(blossom, base);
         self.nodes[usize::from(first)].base = base;
         self.nodes[usize::from(first)].parent = NONE;
         let mut node = self.nodes[usize::from(first)].next;
@@ -244,10 +250,11 @@ impl Matching<'_, '_> {
         let mut last = first;
         for index in 0.. {
             let Node { next, link, .. } = self.nodes[usize::from(node)];
+            self.charge(u32::from(self.is_blossom(node)), pace)?;
             self.set_label(node, Label::Outside);
             // The pairs matched are 1 and 2, 3 and 4 and so on, so the way from the entrance by its
             // partner to the base goes back from an even position and forward from an odd one.
-            let back = position % 2 == 0;
+            let back = position.is_multiple_of(2);
             if index == 0
                 || (index % 2 == position % 2 && (index < position) == back)
                 || node == entrance
@@ -285,12 +292,18 @@ impl Matching<'_, '_> {
         position
     }
 
-    /// Opens every blossom, so that every vertex has its mate.
-    pub(super) fn open_all(&mut self) {
-        while let Some(blossom) =
-            (self.top.len()..self.nodes.len()).find(|&blossom| self.nodes[blossom].is_outermost())
-        {
-            self.open(blossom as u16);
+    /// Settles every blossom, so that every vertex has its mate.
+    pub(super) fn settle_all(&mut self, pace: &mut Pace<'_>) -> Result<(), OrderError> {
+        let mut settled = true;
+        while core::mem::take(&mut settled) {
+            for blossom in self.top.len()..self.nodes.len() {
+                if self.nodes[blossom].is_outermost() {
+                    settled = true;
+                    self.charge(1, pace)?;
+                    self.settle(blossom as u16);
+                }
+            }
         }
+        Ok(())
     }
 }

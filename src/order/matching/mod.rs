@@ -21,6 +21,8 @@ use super::pace::Pace;
 use super::{NONE, OrderError};
 use crate::stage::{OutOfScratch, Scratch};
 use blossom::Node;
+use core::cell::Cell;
+use core::ops::Range;
 
 /// Later than anything that happens.
 const NEVER: i32 = 1 << 30;
@@ -66,7 +68,7 @@ pub(super) fn pair<'s>(
             matching.grow_tree(root, pace)?;
         }
     }
-    matching.open_all();
+    matching.settle_all(pace)?;
     Ok(matching.length())
 }
 
@@ -99,6 +101,8 @@ struct Matching<'s, 'a> {
     shortened: u32,
     /// The weight of a pair with a free end: the same for all, so that it does not matter.
     end_weight: i32,
+    /// Square roots not yet charged to the pace.
+    roots: Cell<u32>,
 }
 
 impl<'s, 'a> Matching<'s, 'a> {
@@ -136,6 +140,7 @@ impl<'s, 'a> Matching<'s, 'a> {
             inner_blossoms: 0,
             shortened: 0,
             end_weight: 0,
+            roots: Cell::new(0),
         };
         matching.lay_out_spares();
         while odd.extent() >> matching.shortened >= DISTANCE_LIMIT {
@@ -161,8 +166,16 @@ impl<'s, 'a> Matching<'s, 'a> {
         if bound <= 0 || (self.odd.least_distance(a, b) >> self.shortened) as i32 * 2 >= bound {
             return None;
         }
+        self.roots.set(self.roots.get() + 1);
         let weight = self.weight(a, b);
         (weight < bound).then_some(weight)
+    }
+
+    /// Charges the square roots since the last time, and `looks` at all vertices.
+    fn charge(&self, looks: u32, pace: &mut Pace<'_>) -> Result<(), OrderError> {
+        let all = self.top.len() as u32;
+        pace.work(1 + self.roots.take() + looks * all / 32)?;
+        Ok(())
     }
 
     fn label(&self, vertex: u16) -> Label {
@@ -186,18 +199,17 @@ impl<'s, 'a> Matching<'s, 'a> {
 
     /// Gives all vertices of an outermost node a label; their duals stay what they are.
     fn set_label(&mut self, node: u16, label: Label) {
-        let vertices = if usize::from(node) < self.top.len() {
-            node..node + 1
-        } else {
-            0..self.top.len() as u16
-        };
-        for vertex in vertices {
+        for vertex in self.candidates(node) {
             if self.top[usize::from(vertex)] == node {
                 self.set_vertex_label(vertex, label);
             }
         }
-        let base = self.nodes[usize::from(node)].base;
-        debug_assert_eq!(self.top[usize::from(base)], node);
+    }
+
+    /// The vertices that may be in an outermost node.
+    fn candidates(&self, node: u16) -> Range<u16> {
+        let all = self.top.len() as u16;
+        if node < all { node..node + 1 } else { 0..all }
     }
 
     fn set_vertex_label(&mut self, vertex: u16, label: Label) {
@@ -221,7 +233,7 @@ impl<'s, 'a> Matching<'s, 'a> {
         self.enter(root, Label::Fresh);
         loop {
             self.look_around(pace)?;
-            pace.work(1 + self.top.len() as u32 / 64)?;
+            self.charge(1, pace)?;
             let (time, vertex) = self.next_touch();
             if self.inner_blossoms > 0
                 && let Some((empty, blossom)) = self.next_opening()
@@ -280,7 +292,7 @@ impl<'s, 'a> Matching<'s, 'a> {
     /// Notes at all other vertices when their pair with the outer vertex `from` will touch, if that
     /// is sooner than what they know.
     fn look_from_outer(&mut self, from: u16, pace: &mut Pace<'_>) -> Result<(), OrderError> {
-        pace.work(1 + self.top.len() as u32 / 16)?;
+        self.charge(1, pace)?;
         let (now, own) = (self.now, self.radius_now(from));
         let node = self.top[usize::from(from)];
         for other in 0..self.top.len() as u16 {
@@ -316,7 +328,7 @@ impl<'s, 'a> Matching<'s, 'a> {
     /// Finds anew when the first pair of `vertex`, outside or outer, with an outer vertex of
     /// another node will touch.
     fn look_from(&mut self, vertex: u16, pace: &mut Pace<'_>) -> Result<(), OrderError> {
-        pace.work(1 + self.top.len() as u32 / 16)?;
+        self.charge(1, pace)?;
         let index = usize::from(vertex);
         let (now, own) = (self.now, self.radius_now(vertex));
         let sides = if self.label(vertex) == Label::Outside { 1 } else { 2 };
@@ -338,7 +350,7 @@ impl<'s, 'a> Matching<'s, 'a> {
 
     /// The same for each vertex of a node.
     fn look_from_each(&mut self, node: u16, pace: &mut Pace<'_>) -> Result<(), OrderError> {
-        for vertex in 0..self.top.len() as u16 {
+        for vertex in self.candidates(node) {
             if self.top[usize::from(vertex)] == node {
                 self.look_from(vertex, pace)?;
             }

@@ -10,7 +10,7 @@ impl Matching<'_, '_> {
     pub(super) fn start(&mut self, pace: &mut Pace<'_>) -> Result<(), OrderError> {
         let real = self.odd.real_count();
         for vertex in 0..real {
-            pace.work(1 + u32::from(real) / 16)?;
+            self.charge(1, pace)?;
             let mut nearest = i32::MAX;
             for other in (0..real).filter(|&other| other != vertex) {
                 if let Some(weight) = self.weight_below(vertex, other, nearest) {
@@ -24,7 +24,7 @@ impl Matching<'_, '_> {
         self.end_weight = self.radius.iter().copied().max().unwrap_or(0);
         for vertex in 0..self.odd.count() {
             if self.mate[usize::from(vertex)] == NONE {
-                pace.work(1 + u32::from(real) / 16)?;
+                self.charge(1, pace)?;
                 self.widen(vertex);
             }
         }
