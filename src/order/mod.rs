@@ -5,15 +5,16 @@
 //! (an odd number of segments meet there). Else the odd points are paired, and the pen is lifted
 //! from one of a pair to the other (Harrison 5.6). The way of the data:
 //!
-//! 1. [`network`]: the segments of one pen become stations and chains;
-//! 2. [`greedy`] pairs the odd stations;
-//! 3. [`euler`] traces the strokes, part by part, nearest first.
+//! 1. `network`: the segments of one pen become stations and chains;
+//! 2. `matching` pairs the odd stations at the least length, or `greedy` in less memory;
+//! 3. `euler` traces the strokes, part by part, nearest first.
 //!
 //! Call [`order`] with a [`Drawing`], [`Options`] and memory. Refused: a drawing whose segments name
 //! points that are not there, too many segments, too little memory; the tour is then worth nothing.
 
 mod euler;
 mod greedy;
+mod matching;
 mod metric;
 mod network;
 mod odd;
@@ -264,7 +265,16 @@ fn pair_odd(
     let odd = OddPoints::new(network, stations, options.shape == Shape::OpenPath);
     report.odd_points += u32::from(odd.real_count());
     let partners: &mut [u16] = scratch.take(usize::from(odd.count()))?;
-    greedy::pair(&odd, &mut scratch, pace, partners)?;
+    let exact = match options.method {
+        Method::Greedy => false,
+        Method::Exact => true,
+        Method::Auto => matching::scratch_bytes(partners.len()) <= scratch.available_bytes(),
+    };
+    if exact {
+        report.bound += matching::pair(&odd, scratch, pace, partners)?;
+    } else {
+        greedy::pair(&odd, &mut scratch, pace, partners)?;
+    }
     for (&station, &partner) in stations.iter().zip(partners.iter()) {
         mate[usize::from(station)] = odd.station(partner).unwrap_or(NONE);
     }

@@ -9,9 +9,8 @@ pub(super) struct Pace<'a> {
 }
 
 impl<'a> Pace<'a> {
-    /// Looks of one distance, a few hundred instructions at most on the smallest core, between two
-    /// answers.
-    const UNITS: u32 = 256;
+    /// Distances between two answers: each takes up to 800 instructions on the smallest core.
+    const UNITS: u32 = 200;
 
     pub fn new(attention: &'a mut dyn Attention) -> Self {
         Self { attention, done: 0 }
