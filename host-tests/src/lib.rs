@@ -1,3 +1,5 @@
 //! The simulated machine, the exact reference models and the tests of whole jobs.
 
+pub mod event_checker;
+pub mod motion_optimum;
 pub mod pin_machine;
