@@ -371,7 +371,10 @@ impl<'m> Machine<'m> {
                         self.abort();
                     }
                 }
-                None => self.path_ended = true,
+                None => {
+                    self.path_ended = true;
+                    self.runner.end_path();
+                }
             }
         }
     }

@@ -55,10 +55,14 @@ pub struct Limits {
     pub(super) step_length: [SliceSpeed; 2],
     pub(super) draw_speed: SliceSpeed,
     pub(super) travel_speed: SliceSpeed,
+    /// Stopping distance of the greater speed.
+    pub(super) top: PathLength,
     /// Added to the speed by one slice.
     pub(super) acceleration: SliceSpeed,
     pub(super) junction_deviation: PathLength,
     pub(super) centripetal: bool,
+    /// How far rounding of three points to steps can lift one over the line through the others.
+    pub(super) rounding: PathLength,
     pub(super) pulse_ticks: u32,
     pub(super) setup_ticks: u32,
 }
@@ -72,9 +76,11 @@ impl Default for Limits {
             step_length: [step_length; 2],
             draw_speed: speed,
             travel_speed: speed,
+            top: PathLength::lit("0.5"),
             acceleration: SliceSpeed::from_bits(11_529),
             junction_deviation: PathLength::from_bits(1 << 12),
             centripetal: true,
+            rounding: rounding([step_length; 2]),
             pulse_ticks: 50,
             setup_ticks: 25,
         }
@@ -110,16 +116,19 @@ impl Limits {
         {
             return Err(LimitsError::Pulse);
         }
-        let limits = Self {
+        let mut limits = Self {
             step_length,
             draw_speed,
             travel_speed,
+            top: PathLength::ZERO,
             acceleration: slice_acceleration(settings.acceleration_mm_per_s2),
             junction_deviation: settings.junction_deviation_mm.wrapping_to_num(),
             centripetal: settings.centripetal,
+            rounding: rounding(step_length),
             pulse_ticks: settings.pulse_ticks.max(1),
             setup_ticks: settings.direction_setup_ticks,
         };
+        limits.top = limits.stopping_distance(draw_speed.max(travel_speed));
         limits.check_step_rate()?;
         Ok(limits)
     }
@@ -169,6 +178,12 @@ impl Limits {
         let bits = hypotenuse(x, y);
         u32::try_from((bits + (1 << 13)) >> 14).ok().map(PathLength::from_bits)
     }
+}
+
+/// 23/16 of the longer step. Each of three points is off by up to half a diagonal and the outer two
+/// count half, which is at most √2 steps; a little more, so that no corner is exactly as sharp.
+fn rounding([x, y]: [SliceSpeed; 2]) -> PathLength {
+    PathLength::from_bits(((x.max(y).to_bits() >> 14) * 23).div_ceil(16))
 }
 
 /// √(x² + y²) of numbers below 2^62, to 31 significant bits.

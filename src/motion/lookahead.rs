@@ -3,25 +3,33 @@
 use super::PathLength;
 use crate::drawing::LineType;
 
-/// A straight move that waits: 20 bytes.
+/// A straight move that waits: 24 bytes.
 ///
-/// A small board lends 100 to 128 of them (2 to 2.5 KiB): at 50 mm/s and 200 mm/s² the stopping
+/// A small board lends 100 to 128 of them (2.4 to 3 KiB): at 50 mm/s and 200 mm/s² the stopping
 /// distance is 6.25 mm, which is 125 blocks of 0.05 mm. With fewer blocks the machine is slower on
 /// such paths, never wrong.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Block {
     pub(super) dx: i32,
     pub(super) dy: i32,
     pub(super) length: PathLength,
     /// Stopping distance with which the block may be entered.
     pub(super) entry_limit: PathLength,
+    /// Greatest stopping distance within the block, as it is part of a curve.
+    pub(super) curve_limit: PathLength,
     pub(super) ink: Option<LineType>,
 }
 
 impl Block {
     /// A block that fills the memory lent to a [`Lookahead`].
-    pub const EMPTY: Self =
-        Self { dx: 0, dy: 0, length: PathLength::ZERO, entry_limit: PathLength::ZERO, ink: None };
+    pub const EMPTY: Self = Self {
+        dx: 0,
+        dy: 0,
+        length: PathLength::ZERO,
+        entry_limit: PathLength::ZERO,
+        curve_limit: PathLength::MAX,
+        ink: None,
+    };
 }
 
 /// A ring of blocks, in the order in which they are drawn.
@@ -96,6 +104,20 @@ impl<'m> Lookahead<'m> {
         straight.iter().chain(wrapped).take(self.count)
     }
 
+    /// The last blocks, from the `least`th to the `most`th counted from 1 at the end, are part of a
+    /// curve.
+    pub(super) fn limit_curve(&mut self, least: u32, most: u32, limit: PathLength) {
+        for back in least.max(1)..=most {
+            let Some(index) = self.count.checked_sub(back as usize) else {
+                return;
+            };
+            let at = self.wrapped(index);
+            if let Some(block) = self.blocks.get_mut(at) {
+                block.curve_limit = block.curve_limit.min(limit);
+            }
+        }
+    }
+
     /// The greatest stopping distance with which the first block may be entered, such that every
     /// junction known is passed within its limit and the path known is not overrun. At most `top`.
     ///
@@ -105,7 +127,8 @@ impl<'m> Lookahead<'m> {
         let mut allowed = top;
         let mut distance = PathLength::ZERO;
         for block in self.iter() {
-            allowed = allowed.min(distance.saturating_add(block.entry_limit));
+            let limit = block.entry_limit.min(block.curve_limit);
+            allowed = allowed.min(distance.saturating_add(limit));
             distance = distance.saturating_add(block.length);
             if distance >= allowed {
                 return allowed;

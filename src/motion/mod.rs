@@ -15,6 +15,7 @@
 //!
 //! Not done here: limits of travel, the pen's heights, states. That is `machine`.
 
+mod curvature;
 mod emitter;
 mod event;
 mod junction;

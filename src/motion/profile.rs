@@ -20,7 +20,7 @@ impl Pace {
         Self { stopping_distance: limits.stopping_distance(speed), speed }
     }
 
-    fn of_stopping_distance(limits: &Limits, stopping_distance: PathLength) -> Self {
+    pub(super) fn of_stopping_distance(limits: &Limits, stopping_distance: PathLength) -> Self {
         Self { stopping_distance, speed: limits.speed(stopping_distance) }
     }
 }

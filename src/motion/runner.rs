@@ -1,6 +1,7 @@
 //! Runs the blocks: pen changes at rest, slices, moves, events.
 
-use super::junction::{self, Heading};
+use super::curvature::Curvature;
+use super::junction::{self, Corner, Heading};
 use super::profile::{FRACTION_BITS, Pace, Profile, Slice};
 use super::{Block, Emitter, EventQueue, Limits, Lookahead, PathLength, SliceSpeed, StepEvent};
 use crate::drawing::{LineType, PagePoint};
@@ -62,6 +63,7 @@ struct Course {
     pattern: Pattern,
     piece: u32,
     length: PathLength,
+    curve_limit: PathLength,
     /// mm per move, 2^-32.
     move_length: u64,
     moves: u32,
@@ -83,11 +85,14 @@ pub struct Runner<'m> {
     limits: Limits,
     pen: PenPositions,
     lookahead: Lookahead<'m>,
+    curvature: Curvature,
     emitter: Emitter,
     course: Option<Course>,
     pace: Pace,
     draw: Pace,
     travel: Pace,
+    /// The last pace in a curve: many blocks in a row have the same.
+    curve: Pace,
     /// The plan's time, 1/16 ticks; wraps.
     now: u64,
     pen_is_down: bool,
@@ -113,11 +118,13 @@ impl<'m> Runner<'m> {
             limits,
             pen,
             lookahead: Lookahead::new(blocks),
+            curvature: Curvature::default(),
             emitter: Emitter::new(&limits),
             course: None,
             pace: Pace::REST,
             draw: Pace::REST,
             travel: Pace::REST,
+            curve: Pace::REST,
             now: 0,
             pen_is_down: false,
             stopping: false,
@@ -135,6 +142,7 @@ impl<'m> Runner<'m> {
     /// anything moves.
     pub fn set_limits(&mut self, limits: Limits, pen: PenPositions) {
         self.limits = limits;
+        self.curve = Pace::REST;
         self.pen = pen;
         self.emitter.set_limits(&limits);
         self.set_override(100);
@@ -214,17 +222,29 @@ impl<'m> Runner<'m> {
         }
         let length = self.limits.length(dx, dy).ok_or(PushError::TooLong)?;
         let heading = Heading::new(&self.limits, dx, dy, length);
-        let entry_limit = match self.last {
+        let corner = match self.last {
             Some((before, length_before, ink_before)) if passes(ink_before, ink) => {
-                junction::entry_limit(&self.limits, before, heading, length.min(length_before))
+                junction::corner(&self.limits, before, heading, length.min(length_before))
             }
-            _ => PathLength::ZERO,
+            _ => Corner::STOP,
         };
-        let block = Block { dx, dy, length, entry_limit, ink };
+        if corner.is_sharp {
+            self.curvature.restart(&self.limits, self.end, &mut self.lookahead);
+        }
+        let block = Block { dx, dy, length, entry_limit: corner.limit, ink, ..Block::EMPTY };
         self.lookahead.push(block).map_err(|_| PushError::Full)?;
+        if self.limits.centripetal {
+            self.curvature.follow(&self.limits, point, &mut self.lookahead);
+        }
         self.end = point;
         self.last = Some((heading, length, ink));
         Ok(())
+    }
+
+    /// The path ends with the last block: a curve ends there, too.
+    pub fn end_path(&mut self) {
+        self.curvature.restart(&self.limits, self.end, &mut self.lookahead);
+        self.last = None;
     }
 
     /// Sheds speed on the path, from the next slice on, and stands with the pen raised.
@@ -313,6 +333,10 @@ impl<'m> Runner<'m> {
         self.plan(queue)
     }
 
+    fn top(&self, inked: bool) -> Pace {
+        if inked { self.draw } else { self.travel }
+    }
+
     fn ticks_now(&self) -> u32 {
         (self.now >> FRACTION_BITS) as u32
     }
@@ -339,6 +363,7 @@ impl<'m> Runner<'m> {
             pattern,
             piece: 0,
             length: block.length,
+            curve_limit: block.curve_limit,
             move_length,
             moves,
             moves_done: 0,
@@ -427,7 +452,13 @@ impl<'m> Runner<'m> {
         let profile = if self.stopping {
             Profile::stopping(&self.limits, self.pace, left)
         } else {
-            let top = if inked { self.draw } else { self.travel };
+            let mut top = self.top(inked);
+            if course.curve_limit < top.stopping_distance {
+                if self.curve.stopping_distance != course.curve_limit {
+                    self.curve = Pace::of_stopping_distance(&self.limits, course.curve_limit);
+                }
+                top = self.curve;
+            }
             let exit_allowed = if course.piece_moves == course.moves {
                 self.lookahead.entry_allowed(top.stopping_distance)
             } else {
