@@ -11,7 +11,7 @@ use penup::boards::host::{Change, HostBoard, QUEUE_LENGTH};
 use penup::geometry::{Projection, Vertex};
 use penup::machine::{Path, PulserState, Setting, Target};
 use penup::motion::StepEvent;
-use penup::plotter::{HostMemory, Observer, Plotter};
+use penup::plotter::{HostMemory, NO_MOVES, Observer, Plotter};
 use penup::stage::{Aborted, Attention, Stage};
 use penup::view::View;
 use penup::visibility::{Along, Stretch};
@@ -30,10 +30,11 @@ impl InMemory {
     pub fn new() -> Self {
         // Plotter and board borrow from these for as long as the process lives; there is one a run.
         let memory = Box::leak(Box::new(HostMemory::new()));
+        let blocks = Box::leak(Box::new(NO_MOVES));
         let queue = Box::leak(Box::new(heapless::spsc::Queue::<StepEvent, QUEUE_LENGTH>::new()));
         let pins = Box::leak(Box::new(PulserState::new()));
         let mut board = HostBoard::new(queue, pins);
-        let plotter = Plotter::new(memory.lend(), pins);
+        let plotter = Plotter::new(memory.lend(blocks), pins);
         plotter.greet(&mut board);
         Self { board, plotter, steps: 0 }
     }

@@ -3,15 +3,19 @@
 use crate::model::{Corner, Position};
 use crate::motion::Block;
 
-/// Step-planning blocks that look ahead: see [`crate::motion`].
+/// How many moves are planned ahead: see [`crate::motion`].
 pub const BLOCKS: usize = 64;
 
-/// All memory of a plotter but the stack and the queues of its board.
+/// The moves planned ahead, before any is.
+pub const NO_MOVES: [Block; BLOCKS] = [Block::EMPTY; BLOCKS];
+
+/// The large memory of a plotter: a model, and what its jobs are computed in.
+///
+/// New, it is all zero bits, so that a static one costs no flash and is never built on the stack.
 #[derive(Debug)]
 pub struct Memory<const VERTICES: usize, const CORNERS: usize, const WORDS: usize> {
     vertices: heapless::Vec<Position, VERTICES>,
     corners: heapless::Vec<Corner, CORNERS>,
-    blocks: [Block; BLOCKS],
     words: [u64; WORDS],
 }
 
@@ -29,20 +33,15 @@ impl<const VERTICES: usize, const CORNERS: usize, const WORDS: usize>
 {
     /// Empty.
     pub const fn new() -> Self {
-        Self {
-            vertices: heapless::Vec::new(),
-            corners: heapless::Vec::new(),
-            blocks: [Block::EMPTY; BLOCKS],
-            words: [0; WORDS],
-        }
+        Self { vertices: heapless::Vec::new(), corners: heapless::Vec::new(), words: [0; WORDS] }
     }
 
-    /// Lends it to a plotter.
-    pub fn lend(&mut self) -> Lent<'_> {
+    /// Lends it to a plotter, with memory for the moves planned ahead.
+    pub fn lend<'m>(&'m mut self, blocks: &'m mut [Block]) -> Lent<'m> {
         Lent {
             vertices: &mut self.vertices,
             corners: &mut self.corners,
-            blocks: &mut self.blocks,
+            blocks,
             words: &mut self.words,
         }
     }
