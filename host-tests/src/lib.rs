@@ -1,3 +1,5 @@
 //! The simulated machine, the exact reference models and the tests of whole jobs.
 
+pub mod exact_visibility;
+pub mod random_scenes;
 pub mod scene_files;
