@@ -4,4 +4,6 @@ pub mod order_reference;
 pub mod event_checker;
 pub mod motion_optimum;
 pub mod pin_machine;
+pub mod exact_visibility;
+pub mod random_scenes;
 pub mod scene_files;

@@ -1,0 +1,84 @@
+//! The library against visibility by definition, on random scenes full of ties.
+//!
+//! `PENUP_SCENES` sets how many scenes there are; 2,000 if it is not set.
+
+use num_bigint::BigInt;
+use num_rational::BigRational;
+use penup::model::Elements;
+use penup::stage::{Scratch, Undisturbed};
+use penup::visibility::{Along, Options, Scene, find_stretches, scratch_bytes};
+use penup_host_tests::exact_visibility::{Piece, pieces};
+use penup_host_tests::random_scenes::{RandomScene, random_scene};
+use penup_host_tests::scene_files::Stretches;
+
+fn fraction(along: Along) -> BigRational {
+    BigRational::new(
+        BigInt::from(along.numerator),
+        BigInt::from(along.denominator),
+    )
+}
+
+fn library_pieces(random: &RandomScene, spare_bytes: usize) -> Vec<Piece> {
+    let scene = Scene {
+        vertices: &random.vertices,
+        elements: Elements::new(&random.corners),
+        projection: random.projection,
+    };
+    let mut words = vec![0u64; (scratch_bytes(&scene) + spare_bytes) / 8];
+    let mut stretches = Stretches::default();
+    let result = find_stretches(
+        &scene,
+        Options { with_hidden: true },
+        Scratch::new(&mut words),
+        &mut Undisturbed,
+        &mut stretches,
+    );
+    assert_eq!(result, Ok(()));
+    let piece = |stretch: &penup::visibility::Stretch| {
+        (
+            stretch.edge,
+            fraction(stretch.from),
+            fraction(stretch.to),
+            stretch.visible,
+        )
+    };
+    stretches.0.iter().map(piece).collect()
+}
+
+fn agree(seeds: impl Iterator<Item = u64>) {
+    for seed in seeds {
+        let random = random_scene(seed);
+        let expected = pieces(random.projection, &random.vertices, &random.corners);
+        // Much memory, and the least: few pieces at a time, one cell.
+        for spare_bytes in [1 << 14, 0] {
+            let found = library_pieces(&random, spare_bytes);
+            if found != expected {
+                let differ = |(a, b): (&Piece, &Piece)| a != b;
+                let first = found.iter().zip(&expected).position(differ);
+                let first = first.unwrap_or(found.len().min(expected.len()));
+                panic!(
+                    "seed {seed}, {spare_bytes} spare bytes, {:?}:\n{:?}\nfound    {:?}\nexpected {:?}",
+                    random.projection,
+                    random.vertices,
+                    found.get(first),
+                    expected.get(first),
+                );
+            }
+        }
+    }
+}
+
+fn scene_count() -> u64 {
+    let given = std::env::var("PENUP_SCENES").ok();
+    given.and_then(|count| count.parse().ok()).unwrap_or(2000)
+}
+
+#[test]
+fn the_first_half_of_the_random_scenes_agrees() {
+    agree(0..scene_count() / 2);
+}
+
+#[test]
+fn the_second_half_of_the_random_scenes_agrees() {
+    agree(scene_count() / 2..scene_count());
+}
