@@ -12,10 +12,14 @@
 //! Call [`order`] with a [`Drawing`], [`Options`] and memory. Refused: a drawing whose segments name
 //! points that are not there, too many segments, too little memory; the tour is then worth nothing.
 
+mod cycle;
 mod euler;
 mod greedy;
+mod improve;
+mod incidence;
 mod matching;
 mod metric;
+mod near;
 mod network;
 mod odd;
 mod pace;
@@ -30,7 +34,6 @@ use euler::Unused;
 use network::{Network, start_point};
 use odd::OddPoints;
 use pace::Pace;
-use partition::Partition;
 
 /// Points beyond so many have no number of their own: [`NONE`] is not one.
 const POINT_LIMIT: usize = NONE as usize;
@@ -211,6 +214,10 @@ fn order_pen<'a>(
         let start = pair_odd(network, options, scratch.reborrow(), pace, mate, report)?;
         Unused::new(network, mate, &mut scratch)?.nearest_first(start, route, pace)?;
     }
+    if options.effort > 0 {
+        let open = options.shape == Shape::OpenPath;
+        improve::improve(network, route, open, options.effort, scratch.reborrow(), pace)?;
+    }
     turn(network, options.shape, route);
     network.expand(route, tour, pen, &mut scratch)?;
     Ok(())
@@ -223,27 +230,30 @@ fn mark_parts(
     mut scratch: Scratch<'_>,
     marks: &mut [u16],
 ) -> Result<u32, OutOfScratch> {
-    let stations = network.stations();
-    let degree: &mut [u16] = scratch.take(usize::from(stations))?;
-    let mut parts = Partition::singletons(scratch.take(usize::from(stations))?);
-    for leg in (0..network.chains()).map(|chain| Leg::new(chain, false)) {
-        let (start, end) = (network.start(leg), network.end(leg));
-        degree[usize::from(start)] ^= 1;
-        degree[usize::from(end)] ^= 1;
-        parts.unite(start, end);
+    let odd: &mut [u8] = scratch.take(marks.len())?;
+    for code in 0..2 * network.chains() {
+        odd[usize::from(network.start(Leg::from_code(code)))] ^= 1;
     }
+    let lowest = network.parts(&mut scratch)?;
     marks.fill(EVEN_PART);
-    for station in (0..stations).filter(|&station| degree[usize::from(station)] == 1) {
-        marks[usize::from(parts.find(station))] = NONE;
+    for (&odd, &lowest) in odd.iter().zip(lowest.iter()) {
+        if odd == 1 {
+            marks[usize::from(lowest)] = NONE;
+        }
     }
     let mut count = 0;
-    for station in 0..stations {
-        let lowest = parts.find(station);
+    for (station, (&odd, &lowest)) in (0..).zip(odd.iter().zip(lowest.iter())) {
         count += u32::from(lowest == station);
+        // The lowest comes first, and its mark is asked for until the part's last station.
         marks[usize::from(station)] = marks[usize::from(lowest)];
+        if odd == 1 && lowest != station {
+            marks[usize::from(station)] = station;
+        }
     }
-    for station in (0..stations).filter(|&station| degree[usize::from(station)] == 1) {
-        marks[usize::from(station)] = station;
+    for (station, (&odd, &lowest)) in (0..).zip(odd.iter().zip(lowest.iter())) {
+        if odd == 1 && lowest == station {
+            marks[usize::from(station)] = station;
+        }
     }
     Ok(count)
 }

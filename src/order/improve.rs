@@ -1,0 +1,385 @@
+//! A shorter tour of all parts: Lin and Kernighan's exchanges, then kicks.
+//!
+//! The tour is a cycle of chains; the moves between them cost, staying at a station costs nothing.
+//! An exchange cuts a move, goes to a station nearer than that move was long, cuts the tour there,
+//! and so on while there is still gain in hand, until the ends are joined with some gain left. When
+//! no exchange helps, three moves near each other are changed at random (a double bridge), the
+//! exchanges are tried again around them, and all is taken back unless it came out no longer. So a
+//! tour only ever gets better. The same budget gives the same tour on every machine.
+//! After Lin and Kernighan, "An effective heuristic algorithm for the traveling-salesman problem"
+//! (1973), and Martin, Otto and Felten, "Large-step Markov chains" (1991).
+
+use super::cycle::Cycle;
+use super::incidence::Incidence;
+use super::near::Near;
+use super::network::Network;
+use super::pace::Pace;
+use super::{Leg, NONE, OrderError};
+use crate::stage::Scratch;
+
+/// How many moves an exchange may change in a row.
+const DEPTH: u32 = 4;
+/// How many ways an exchange tries at each depth.
+const BREADTH: [u32; DEPTH as usize] = [6, 4, 2, 1];
+/// Neighbours of each station that are worth the memory, and as few as are of any use.
+const NEIGHBOURS: core::ops::RangeInclusive<usize> = 4..=8;
+/// A kick changes moves that are at most so many moves apart.
+const KICK_REACH: u32 = 12;
+
+/// Improves `route`, which has all chains of `network`, with up to `kicks` kicks. `open` if the way
+/// back from the end to the start does not count. Does nothing where there is too little memory.
+pub(super) fn improve(
+    network: Network<'_>,
+    route: &mut [Leg],
+    open: bool,
+    kicks: u32,
+    mut scratch: Scratch<'_>,
+    pace: &mut Pace<'_>,
+) -> Result<(), OrderError> {
+    let stations = usize::from(network.stations());
+    let legs = route.len() + usize::from(open);
+    let lists = |per_station| Near::bytes(stations, per_station);
+    let fixed = fixed_bytes(stations, route.len(), legs);
+    let fits = |per_station: &usize| fixed + lists(*per_station) <= scratch.available_bytes();
+    let Some(per_station) = NEIGHBOURS.rev().find(fits) else {
+        return Ok(());
+    };
+    let near = Near::new(network, per_station, &mut scratch, pace)?;
+    let incidence = Incidence::new(network, &mut scratch)?;
+    let cycle_legs: &mut [Leg] = scratch.take(legs)?;
+    cycle_legs[..route.len()].copy_from_slice(route);
+    if open {
+        cycle_legs[route.len()] = Leg::new(route.len() as u16, false);
+    }
+    let cycle = Cycle::new(cycle_legs, scratch.take(legs)?, scratch.take(Cycle::MEMORY)?);
+    let mut search = Search {
+        network,
+        incidence,
+        near,
+        cycle,
+        waiting: Waiting::new(scratch.take(stations)?, scratch.take(stations)?),
+        gap: if open { route.len() } else { usize::MAX },
+        random: 1,
+    };
+    for station in 0..network.stations() {
+        search.waiting.add(station);
+    }
+    search.exchange_all(true, pace)?;
+    for _ in 0..kicks {
+        if !search.kick(pace)? {
+            break;
+        }
+    }
+    let start = (0..legs).find(|&index| search.cycle.leg(index).segment() == search.gap);
+    let start = start.map_or(0, |gap| gap + 1);
+    for (index, leg) in route.iter_mut().enumerate() {
+        *leg = search.cycle.leg((start + index) % legs);
+    }
+    Ok(())
+}
+
+/// Bytes of scratch besides the lists of neighbours.
+const fn fixed_bytes(stations: usize, chains: usize, legs: usize) -> usize {
+    Incidence::bytes(stations, chains)
+        + 2 * Scratch::bytes_for::<u16>(legs)
+        + Scratch::bytes_for::<[u16; 2]>(Cycle::MEMORY)
+        + Scratch::bytes_for::<u16>(stations)
+        + Scratch::bytes_for::<u8>(stations)
+}
+
+/// Stations around which an exchange may help, each once, first come first served.
+struct Waiting<'s> {
+    queue: &'s mut [u16],
+    is_waiting: &'s mut [u8],
+    first: usize,
+    count: usize,
+}
+
+impl<'s> Waiting<'s> {
+    fn new(queue: &'s mut [u16], is_waiting: &'s mut [u8]) -> Self {
+        Self { queue, is_waiting, first: 0, count: 0 }
+    }
+
+    fn add(&mut self, station: u16) {
+        // Nowhere, the end of the gap, is no station.
+        let Some(is_waiting) = self.is_waiting.get_mut(usize::from(station)) else {
+            return;
+        };
+        if core::mem::replace(is_waiting, 1) == 0 {
+            let all = self.queue.len();
+            let last = self.first + self.count;
+            self.queue[if last >= all { last - all } else { last }] = station;
+            self.count += 1;
+        }
+    }
+
+    fn next(&mut self) -> Option<u16> {
+        if self.count == 0 {
+            return None;
+        }
+        let station = self.queue[self.first];
+        self.first = if self.first + 1 == self.queue.len() { 0 } else { self.first + 1 };
+        self.count -= 1;
+        self.is_waiting[usize::from(station)] = 0;
+        Some(station)
+    }
+}
+
+struct Search<'s, 'a> {
+    network: Network<'a>,
+    incidence: Incidence<'s>,
+    near: Near<'s>,
+    cycle: Cycle<'s>,
+    waiting: Waiting<'s>,
+    /// The number of the gap among the legs.
+    gap: usize,
+    random: u32,
+}
+
+impl Search<'_, '_> {
+    /// The station where a leg ends; [`NONE`] of the gap.
+    fn end(&self, leg: Leg) -> u16 {
+        if leg.segment() == self.gap { NONE } else { self.network.end(leg) }
+    }
+
+    fn start(&self, leg: Leg) -> u16 {
+        self.end(leg.flipped())
+    }
+
+    fn distance(&self, from: u16, to: u16) -> i64 {
+        if from == NONE || to == NONE || from == to {
+            0
+        } else {
+            i64::from(self.network.distance(from, to))
+        }
+    }
+
+    /// The length of the move after `leg`.
+    fn move_after(&self, leg: Leg) -> i64 {
+        self.distance(self.end(leg), self.start(self.cycle.next(leg)))
+    }
+
+    /// Tries exchanges around all stations that wait, and returns the gain. If `keep`, what was
+    /// gained stays, else it can be taken back.
+    fn exchange_all(&mut self, keep: bool, pace: &mut Pace<'_>) -> Result<i64, OrderError> {
+        let mut gain = 0;
+        while let Some(station) = self.waiting.next() {
+            while let Some(more) = self.exchange_at(station, pace)? {
+                gain += more;
+                if keep {
+                    self.cycle.settle();
+                }
+            }
+        }
+        Ok(gain)
+    }
+
+    /// Makes one exchange that cuts a move at `station`, if one helps.
+    fn exchange_at(
+        &mut self,
+        station: u16,
+        pace: &mut Pace<'_>,
+    ) -> Result<Option<i64>, OrderError> {
+        let mut from = self.incidence.first(station);
+        while let Some(leg) = from {
+            let gain = self.move_after(leg.flipped());
+            if gain > 0
+                && self.cycle.can_turn()
+                && let Some(gain) = self.exchange(leg.flipped(), gain, 0, pace)?
+            {
+                return Ok(Some(gain));
+            }
+            from = self.incidence.next(leg);
+        }
+        Ok(None)
+    }
+
+    /// The move after `a` is cut, with `hand` to spend on another from there: finds one so that
+    /// joining the ends leaves a gain, makes it and returns the gain.
+    fn exchange(
+        &mut self,
+        a: Leg,
+        hand: i64,
+        depth: u32,
+        pace: &mut Pace<'_>,
+    ) -> Result<Option<i64>, OrderError> {
+        let b = self.cycle.next(a);
+        let (end, fixed) = (self.end(a), self.start(b));
+        if end == NONE {
+            return Ok(None);
+        }
+        let near = self.near;
+        let mut tries = BREADTH[depth as usize];
+        for station in [NONE, end].into_iter().chain(near.of(end)) {
+            pace.work(1)?;
+            let rest = hand - self.distance(end, station);
+            if rest <= 0 {
+                break;
+            }
+            let mut from = self.first_from(station);
+            while let Some(leg) = from {
+                from = self.next_from(leg);
+                // One of the two directions goes the way of `a`.
+                if self.cycle.forward(leg) == self.cycle.forward(a) {
+                    if leg == a || leg == b {
+                        continue;
+                    }
+                    if let Some(gain) = self.insert(a, leg, rest, pace)? {
+                        return Ok(Some(gain));
+                    }
+                    continue;
+                }
+                let c = leg.flipped();
+                if c == a {
+                    continue;
+                }
+                let d = self.cycle.next(c);
+                pace.work(2)?;
+                let next_hand = rest + self.move_after(c);
+                let gain = next_hand - self.distance(fixed, self.start(d));
+                if gain <= 0 && (depth + 1 == DEPTH || tries == 0) {
+                    continue;
+                }
+                let turned = self.cycle.turned();
+                let moved = self.cycle.turn(a, c);
+                pace.work(moved as u32 / 32)?;
+                let gain = if gain > 0 {
+                    Some(gain)
+                } else {
+                    tries -= 1;
+                    self.exchange(d.flipped(), next_hand, depth + 1, pace)?
+                };
+                if gain.is_some() {
+                    self.wake(&[a, b.flipped(), c, d.flipped()]);
+                    return Ok(gain);
+                }
+                self.cycle.take_back(turned);
+            }
+        }
+        Ok(None)
+    }
+
+    /// The legs from a station; from nowhere, the gap both ways.
+    fn first_from(&self, station: u16) -> Option<Leg> {
+        if station == NONE {
+            (self.gap != usize::MAX).then(|| Leg::new(self.gap as u16, false))
+        } else {
+            self.incidence.first(station)
+        }
+    }
+
+    fn next_from(&self, leg: Leg) -> Option<Leg> {
+        if leg.segment() == self.gap {
+            (!leg.reversed()).then(|| leg.flipped())
+        } else {
+            self.incidence.next(leg)
+        }
+    }
+
+    /// With the move after `a` cut and `rest` left after the new one to `d`: finds an `e` after `d`
+    /// so that `d` to `e` between `a` and what followed it leaves a gain.
+    fn insert(
+        &mut self,
+        a: Leg,
+        d: Leg,
+        rest: i64,
+        pace: &mut Pace<'_>,
+    ) -> Result<Option<i64>, OrderError> {
+        let b = self.cycle.next(a);
+        let c = self.cycle.previous(d);
+        let (back, before) = (self.start(b), self.end(c));
+        let hand = rest + self.distance(before, self.start(d));
+        if back == NONE {
+            return Ok(None);
+        }
+        let to_d = self.cycle.steps(a, d);
+        let near = self.near;
+        for station in [NONE, back].into_iter().chain(near.of(back)) {
+            pace.work(1)?;
+            let rest = hand - self.distance(back, station);
+            if rest <= 0 {
+                break;
+            }
+            let mut from = self.first_from(station);
+            while let Some(leg) = from {
+                from = self.next_from(leg);
+                let e = leg.flipped();
+                if self.cycle.forward(e) != self.cycle.forward(a)
+                    || e == a
+                    || self.cycle.steps(a, e) < to_d
+                {
+                    continue;
+                }
+                pace.work(2)?;
+                let f = self.cycle.next(e);
+                let gain = rest + self.move_after(e) - self.distance(before, self.start(f));
+                if gain > 0 {
+                    let moved = self.cycle.swap(a, d, e);
+                    pace.work(moved as u32 / 32)?;
+                    self.wake(&[a, b.flipped(), c, d.flipped(), e, f.flipped()]);
+                    return Ok(Some(gain));
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    /// Lets the ends of `legs` wait for exchanges.
+    fn wake(&mut self, legs: &[Leg]) {
+        for &leg in legs {
+            let station = self.end(leg);
+            self.waiting.add(station);
+        }
+    }
+
+    /// Changes three moves near each other at random, and what follows from that; keeps it if the
+    /// tour is no longer for it. Says whether there is anything to kick.
+    fn kick(&mut self, pace: &mut Pace<'_>) -> Result<bool, OrderError> {
+        self.cycle.settle();
+        let begin = self.below(self.cycle.len() as u32) as usize;
+        let mut a = self.cycle.leg(begin);
+        let mut cuts = [a; 3];
+        for cut in &mut cuts {
+            let moves = 1 + self.below(KICK_REACH);
+            for _ in 0..moves {
+                let mut legs = 0;
+                loop {
+                    a = self.cycle.next(a);
+                    legs += 1;
+                    if self.move_after(a) > 0 {
+                        break;
+                    }
+                    if legs > self.cycle.len() {
+                        return Ok(false);
+                    }
+                }
+                pace.work(1 + legs as u32)?;
+            }
+            *cut = a;
+        }
+        let [a, c, e] = cuts;
+        let to_c = self.cycle.steps(a, c);
+        if to_c == 0 || self.cycle.steps(a, e) <= to_c {
+            return Ok(true);
+        }
+        let [b, d, f] = cuts.map(|leg| self.cycle.next(leg));
+        let ends = [(a, b), (c, d), (e, f), (a, d), (e, b), (c, f)];
+        let lengths = ends.map(|(from, to)| self.distance(self.end(from), self.start(to)));
+        let loss = lengths[3..].iter().sum::<i64>() - lengths[..3].iter().sum::<i64>();
+        let moved = self.cycle.swap(a, d, e);
+        pace.work(6 + moved as u32 / 32)?;
+        self.wake(&[a, b.flipped(), c, d.flipped(), e, f.flipped()]);
+        if self.exchange_all(false, pace)? < loss {
+            self.cycle.take_back(0);
+        }
+        Ok(true)
+    }
+
+    /// A number below `limit` (Marsaglia's xorshift).
+    fn below(&mut self, limit: u32) -> u32 {
+        self.random ^= self.random << 13;
+        self.random ^= self.random >> 17;
+        self.random ^= self.random << 5;
+        ((u64::from(self.random) * u64::from(limit)) >> 32) as u32
+    }
+}
