@@ -26,16 +26,26 @@ const NEIGHBOURS: core::ops::RangeInclusive<usize> = 4..=8;
 /// A kick changes moves that are at most so many moves apart.
 const KICK_REACH: u32 = 12;
 
-/// Improves `route`, which has all chains of `network`, with up to `kicks` kicks. `open` if the way
-/// back from the end to the start does not count. Does nothing where there is too little memory.
+/// What a tour can come to.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Goal {
+    /// The way back from the end to the start does not count.
+    pub open: bool,
+    /// No tour is shorter.
+    pub bound: u64,
+}
+
+/// Improves `route`, which has all chains of `network`, with up to `kicks` kicks. It never gets
+/// longer. Does nothing where there is too little memory.
 pub(super) fn improve(
     network: Network<'_>,
     route: &mut [Leg],
-    open: bool,
+    goal: Goal,
     kicks: u32,
     mut scratch: Scratch<'_>,
     pace: &mut Pace<'_>,
 ) -> Result<(), OrderError> {
+    let Goal { open, bound } = goal;
     let stations = usize::from(network.stations());
     let legs = route.len() + usize::from(open);
     let lists = |per_station| Near::bytes(stations, per_station);
@@ -61,6 +71,10 @@ pub(super) fn improve(
         gap: if open { route.len() } else { usize::MAX },
         random: 1,
     };
+    let at_first = search.length();
+    if at_first == bound {
+        return Ok(());
+    }
     for station in 0..network.stations() {
         search.waiting.add(station);
     }
@@ -69,6 +83,9 @@ pub(super) fn improve(
         if !search.kick(pace)? {
             break;
         }
+    }
+    if search.length() > at_first {
+        return Ok(());
     }
     let start = (0..legs).find(|&index| search.cycle.leg(index).segment() == search.gap);
     let start = start.map_or(0, |gap| gap + 1);
@@ -146,15 +163,25 @@ impl Search<'_, '_> {
         self.end(leg.flipped())
     }
 
+    /// What a move costs: its length and a little more, lest two moves be better than one because
+    /// their lengths are rounded down.
     fn distance(&self, from: u16, to: u16) -> i64 {
         if from == NONE || to == NONE || from == to {
             0
         } else {
-            i64::from(self.network.distance(from, to))
+            i64::from(self.network.distance(from, to)) + 1
         }
     }
 
-    /// The length of the move after `leg`.
+    /// The length of all moves.
+    fn length(&self) -> u64 {
+        (0..self.cycle.len())
+            .map(|index| self.move_after(self.cycle.leg(index)))
+            .map(|cost| cost.saturating_sub(1).max(0) as u64)
+            .sum()
+    }
+
+    /// The cost of the move after `leg`.
     fn move_after(&self, leg: Leg) -> i64 {
         self.distance(self.end(leg), self.start(self.cycle.next(leg)))
     }
@@ -224,7 +251,9 @@ impl Search<'_, '_> {
                     if leg == a || leg == b {
                         continue;
                     }
-                    if let Some(gain) = self.insert(a, leg, rest, pace)? {
+                    if depth == 0
+                        && let Some(gain) = self.insert(a, leg, rest, pace)?
+                    {
                         return Ok(Some(gain));
                     }
                     continue;

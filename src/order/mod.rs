@@ -31,6 +31,7 @@ use crate::drawing::{Drawing, PAGE_LIMIT, PagePoint};
 use crate::stage::{Attention, OutOfScratch, Scratch};
 use bytemuck::{Pod, Zeroable};
 use euler::Unused;
+use improve::{Goal, improve};
 use network::{Network, start_point};
 use odd::OddPoints;
 use pace::Pace;
@@ -163,14 +164,17 @@ pub fn order(
     let mut pace = Pace::new(attention);
     let mut report = Report::default();
     let mut rest = &mut *tour;
-    let mut next_pen = drawing.segments.iter().map(|segment| segment.pen).min();
+    let pens = || drawing.segments.iter().map(|segment| segment.pen);
+    // Of several pens none returns to its own beginning.
+    let shape = if pens().min() == pens().max() { options.shape } else { Shape::OpenPath };
+    let mut next_pen = pens().min();
     while let Some(pen) = next_pen {
-        let pens = drawing.segments.iter().map(|segment| segment.pen);
-        let count = pens.clone().filter(|&other| other == pen).count();
+        let count = pens().filter(|&other| other == pen).count();
         let (legs, others) = rest.split_at_mut(count);
         rest = others;
+        let options = Options { shape, ..options };
         order_pen(drawing, pen, options, scratch.reborrow(), &mut pace, legs, &mut report)?;
-        next_pen = pens.filter(|&other| other > pen).min();
+        next_pen = pens().filter(|&other| other > pen).min();
     }
     measure(drawing, tour, options.shape, &mut report);
     Ok(report)
@@ -207,16 +211,19 @@ fn order_pen<'a>(
 ) -> Result<(), OrderError> {
     let network = Network::new(drawing, pen, &mut scratch)?;
     let route: &mut [Leg] = scratch.take(usize::from(network.chains()))?;
-    {
+    let bound = report.bound;
+    let parts = {
         let mut scratch = scratch.reborrow();
         let mate: &mut [u16] = scratch.take(usize::from(network.stations()))?;
-        report.components += mark_parts(network, scratch.reborrow(), mate)?;
+        let parts = mark_parts(network, scratch.reborrow(), mate)?;
         let start = pair_odd(network, options, scratch.reborrow(), pace, mate, report)?;
         Unused::new(network, mate, &mut scratch)?.nearest_first(start, route, pace)?;
-    }
-    if options.effort > 0 {
-        let open = options.shape == Shape::OpenPath;
-        improve::improve(network, route, open, options.effort, scratch.reborrow(), pace)?;
+        parts
+    };
+    report.components += parts;
+    let goal = Goal { open: options.shape == Shape::OpenPath, bound: report.bound - bound };
+    if parts > 1 && options.effort > 0 {
+        improve(network, route, goal, options.effort, scratch.reborrow(), pace)?;
     }
     turn(network, options.shape, route);
     network.expand(route, tour, pen, &mut scratch)?;
