@@ -17,10 +17,6 @@ use super::pace::Pace;
 use super::{Leg, NONE, OrderError};
 use crate::stage::Scratch;
 
-/// How many moves an exchange may change in a row.
-const DEPTH: u32 = 4;
-/// How many ways an exchange tries at each depth.
-const BREADTH: [u32; DEPTH as usize] = [6, 4, 2, 1];
 /// Neighbours of each station that are worth the memory, and as few as are of any use.
 const NEIGHBOURS: core::ops::RangeInclusive<usize> = 4..=8;
 /// A kick changes moves that are at most so many moves apart.
@@ -209,10 +205,9 @@ impl Search<'_, '_> {
     ) -> Result<Option<i64>, OrderError> {
         let mut from = self.incidence.first(station);
         while let Some(leg) = from {
-            let gain = self.move_after(leg.flipped());
-            if gain > 0
+            if self.move_after(leg.flipped()) > 0
                 && self.cycle.can_turn()
-                && let Some(gain) = self.exchange(leg.flipped(), gain, 0, pace)?
+                && let Some(gain) = self.exchange(leg.flipped(), pace)?
             {
                 return Ok(Some(gain));
             }
@@ -221,71 +216,169 @@ impl Search<'_, '_> {
         Ok(None)
     }
 
-    /// The move after `a` is cut, with `hand` to spend on another from there: finds one so that
-    /// joining the ends leaves a gain, makes it and returns the gain.
-    fn exchange(
-        &mut self,
-        a: Leg,
-        hand: i64,
-        depth: u32,
-        pace: &mut Pace<'_>,
-    ) -> Result<Option<i64>, OrderError> {
+    /// Cuts the move from `a` to `b`, goes on to some `c` that is nearer, cuts there, and so once more,
+    /// if joining the ends then leaves a gain; returns it.
+    fn exchange(&mut self, a: Leg, pace: &mut Pace<'_>) -> Result<Option<i64>, OrderError> {
         let b = self.cycle.next(a);
-        let (end, fixed) = (self.end(a), self.start(b));
-        if end == NONE {
-            return Ok(None);
-        }
+        let hand = self.move_after(a);
+        let end = self.end(a);
         let near = self.near;
-        let mut tries = BREADTH[depth as usize];
         for station in [NONE, end].into_iter().chain(near.of(end)) {
             pace.work(1)?;
-            let rest = hand - self.distance(end, station);
-            if rest <= 0 {
+            let hand = hand - self.distance(end, station);
+            if hand <= 0 {
                 break;
             }
             let mut from = self.first_from(station);
             while let Some(leg) = from {
                 from = self.next_from(leg);
-                // One of the two directions goes the way of `a`.
-                if self.cycle.forward(leg) == self.cycle.forward(a) {
-                    if leg == a || leg == b {
-                        continue;
-                    }
-                    if depth == 0
-                        && let Some(gain) = self.insert(a, leg, rest, pace)?
-                    {
-                        return Ok(Some(gain));
-                    }
+                if leg == a || leg == b || leg.flipped() == a {
                     continue;
                 }
-                let c = leg.flipped();
-                if c == a {
-                    continue;
-                }
-                let d = self.cycle.next(c);
-                pace.work(2)?;
-                let next_hand = rest + self.move_after(c);
-                let gain = next_hand - self.distance(fixed, self.start(d));
-                if gain <= 0 && (depth + 1 == DEPTH || tries == 0) {
-                    continue;
-                }
-                let turned = self.cycle.turned();
-                let moved = self.cycle.turn(a, c);
-                pace.work(moved as u32 / 32)?;
-                let gain = if gain > 0 {
-                    Some(gain)
+                // One of the two ways of a leg is the way of `a`.
+                let gain = if self.cycle.forward(leg) == self.cycle.forward(a) {
+                    self.exchange_onward(a, leg, hand, pace)?
                 } else {
-                    tries -= 1;
-                    self.exchange(d.flipped(), next_hand, depth + 1, pace)?
+                    self.exchange_flipped(a, leg.flipped(), hand, pace)?
                 };
                 if gain.is_some() {
-                    self.wake(&[a, b.flipped(), c, d.flipped()]);
                     return Ok(gain);
                 }
-                self.cycle.take_back(turned);
             }
         }
         Ok(None)
+    }
+
+    /// From `… a, b … c, d …` with the move from `a` to `c` already paid for: either closes it with
+    /// `b` to `d`, or goes on from `d` to cut a third move.
+    fn exchange_flipped(
+        &mut self,
+        a: Leg,
+        c: Leg,
+        hand: i64,
+        pace: &mut Pace<'_>,
+    ) -> Result<Option<i64>, OrderError> {
+        let (b, d) = (self.cycle.next(a), self.cycle.next(c));
+        let (first, end) = (self.start(b), self.start(d));
+        let hand = hand + self.move_after(c);
+        pace.work(2)?;
+        let gain = hand - self.distance(end, first);
+        if gain > 0 {
+            self.cycle.turn(a, c);
+            return self.made(&[a, b.flipped(), c, d.flipped()], gain, pace);
+        }
+        if end == NONE {
+            return Ok(None);
+        }
+        let to_c = self.cycle.steps(a, c);
+        let near = self.near;
+        for station in [NONE, end].into_iter().chain(near.of(end)) {
+            pace.work(1)?;
+            let hand = hand - self.distance(end, station);
+            if hand <= 0 {
+                break;
+            }
+            let mut from = self.first_from(station);
+            while let Some(leg) = from {
+                from = self.next_from(leg);
+                let onward = self.cycle.forward(leg) == self.cycle.forward(a);
+                let within = |leg: Leg| (1..=to_c).contains(&self.cycle.steps(a, leg));
+                // The leg before the third cut, and the one after.
+                let (e, f) = if onward {
+                    (self.cycle.previous(leg), leg)
+                } else {
+                    (leg.flipped(), self.cycle.next(leg.flipped()))
+                };
+                if e == a || e == c || within(e) == onward {
+                    continue;
+                }
+                let far = if onward { self.end(e) } else { self.start(f) };
+                pace.work(2)?;
+                let gain = hand + self.move_after(e) - self.distance(far, first);
+                if gain <= 0 {
+                    continue;
+                }
+                self.cycle.turn(a, c);
+                if onward {
+                    // … e, b … c, a … f, d … with `a … f` flipped.
+                    self.cycle.turn(d.flipped(), f.flipped());
+                } else {
+                    // … a, c … f, b … e, d … with `c … f` flipped.
+                    self.cycle.turn(f.flipped(), b.flipped());
+                }
+                let ends = [a, b.flipped(), c, d.flipped(), e, f.flipped()];
+                return self.made(&ends, gain, pace);
+            }
+        }
+        Ok(None)
+    }
+
+    /// From `… a, b … c, d …` with the move from `a` to `d` already paid for, which would make a
+    /// cycle of `d … a`: goes on from `c` to cut a move in that and take it in.
+    fn exchange_onward(
+        &mut self,
+        a: Leg,
+        d: Leg,
+        hand: i64,
+        pace: &mut Pace<'_>,
+    ) -> Result<Option<i64>, OrderError> {
+        let (b, c) = (self.cycle.next(a), self.cycle.previous(d));
+        let (first, end) = (self.start(b), self.end(c));
+        let hand = hand + self.move_after(c);
+        if end == NONE {
+            return Ok(None);
+        }
+        let to_d = self.cycle.steps(a, d);
+        let near = self.near;
+        for station in [NONE, end].into_iter().chain(near.of(end)) {
+            pace.work(1)?;
+            let hand = hand - self.distance(end, station);
+            if hand <= 0 {
+                break;
+            }
+            let mut from = self.first_from(station);
+            while let Some(leg) = from {
+                from = self.next_from(leg);
+                let onward = self.cycle.forward(leg) == self.cycle.forward(a);
+                let (e, f) = if onward {
+                    (self.cycle.previous(leg), leg)
+                } else {
+                    (leg.flipped(), self.cycle.next(leg.flipped()))
+                };
+                if e == a || self.cycle.steps(a, e) < to_d {
+                    continue;
+                }
+                let far = if onward { self.end(e) } else { self.start(f) };
+                pace.work(2)?;
+                let gain = hand + self.move_after(e) - self.distance(far, first);
+                if gain <= 0 {
+                    continue;
+                }
+                if onward {
+                    // … a, d … e, b … c, f …
+                    self.cycle.swap(a, d, e);
+                } else {
+                    // … a, d … e, c … b, f … with `c … b` flipped.
+                    self.cycle.turn(a, e);
+                    self.cycle.turn(a, d.flipped());
+                }
+                let ends = [a, b.flipped(), c, d.flipped(), e, f.flipped()];
+                return self.made(&ends, gain, pace);
+            }
+        }
+        Ok(None)
+    }
+
+    /// Lets the ends of `legs` wait again, now that an exchange between them has been made.
+    fn made(
+        &mut self,
+        legs: &[Leg],
+        gain: i64,
+        pace: &mut Pace<'_>,
+    ) -> Result<Option<i64>, OrderError> {
+        self.wake(legs);
+        pace.work(1 + self.cycle.len() as u32 / 32)?;
+        Ok(Some(gain))
     }
 
     /// The legs from a station; from nowhere, the gap both ways.
@@ -303,54 +396,6 @@ impl Search<'_, '_> {
         } else {
             self.incidence.next(leg)
         }
-    }
-
-    /// With the move after `a` cut and `rest` left after the new one to `d`: finds an `e` after `d`
-    /// so that `d` to `e` between `a` and what followed it leaves a gain.
-    fn insert(
-        &mut self,
-        a: Leg,
-        d: Leg,
-        rest: i64,
-        pace: &mut Pace<'_>,
-    ) -> Result<Option<i64>, OrderError> {
-        let b = self.cycle.next(a);
-        let c = self.cycle.previous(d);
-        let (back, before) = (self.start(b), self.end(c));
-        let hand = rest + self.distance(before, self.start(d));
-        if back == NONE {
-            return Ok(None);
-        }
-        let to_d = self.cycle.steps(a, d);
-        let near = self.near;
-        for station in [NONE, back].into_iter().chain(near.of(back)) {
-            pace.work(1)?;
-            let rest = hand - self.distance(back, station);
-            if rest <= 0 {
-                break;
-            }
-            let mut from = self.first_from(station);
-            while let Some(leg) = from {
-                from = self.next_from(leg);
-                let e = leg.flipped();
-                if self.cycle.forward(e) != self.cycle.forward(a)
-                    || e == a
-                    || self.cycle.steps(a, e) < to_d
-                {
-                    continue;
-                }
-                pace.work(2)?;
-                let f = self.cycle.next(e);
-                let gain = rest + self.move_after(e) - self.distance(before, self.start(f));
-                if gain > 0 {
-                    let moved = self.cycle.swap(a, d, e);
-                    pace.work(moved as u32 / 32)?;
-                    self.wake(&[a, b.flipped(), c, d.flipped(), e, f.flipped()]);
-                    return Ok(Some(gain));
-                }
-            }
-        }
-        Ok(None)
     }
 
     /// Lets the ends of `legs` wait for exchanges.
