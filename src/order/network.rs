@@ -80,6 +80,17 @@ impl<'a> Network<'a> {
         self.start(leg.flipped())
     }
 
+    /// For each station the lowest of its part.
+    pub fn parts<'s>(&self, scratch: &mut Scratch<'s>) -> Result<&'s mut [u16], OutOfScratch> {
+        let lowest = scratch.take(usize::from(self.stations()))?;
+        let mut parts = Partition::singletons(lowest);
+        for &[start, end] in self.ends {
+            parts.unite(start, end);
+        }
+        parts.flatten();
+        Ok(lowest)
+    }
+
     /// Puts the segments of the chains of `route`, in turn, into `tour`.
     pub fn expand(
         &self,
@@ -155,15 +166,11 @@ impl<'s, 'a> Survey<'s, 'a> {
             }
             parts.unite(segment.from, segment.to);
         }
-        for point in 0..count as u16 {
-            let lowest = parts.find(point);
-            if degree[usize::from(point)] % 2 == 1 {
+        parts.flatten();
+        for (point, &lowest) in part.iter().enumerate() {
+            if degree[point] % 2 == 1 {
                 degree[usize::from(lowest)] |= HAS_ODD;
             }
-        }
-        for point in 0..count as u16 {
-            let lowest = parts.find(point);
-            parts.flatten(point, lowest);
         }
         Ok(Self { segments: drawing.segments, pen, degree, across, part })
     }
