@@ -1,12 +1,16 @@
 //! Jobs through the interrupt's own code: hold, resume, abort, alarm, sleep.
 
+#![allow(clippy::expect_used, reason = "a test fails by panicking")]
+
 use penup::drawing::{LineType, PagePoint};
 use penup::machine::{
     Alarm, Machine, MachineError, PulserState, Setting, Settings, State, Target, TargetList, Value,
 };
 use penup::motion::Block;
-use penup_host_tests::pin_machine::{self, Change, Stamped};
-use std::collections::BTreeSet;
+use penup_host_tests::event_checker::{self, Drawn};
+use penup_host_tests::pin_machine::{self, Turn};
+use proptest::prelude::*;
+use std::sync::LazyLock;
 
 fn point(x: i32, y: i32) -> PagePoint {
     PagePoint { x, y }
@@ -39,152 +43,155 @@ fn job() -> Vec<Target> {
     ]
 }
 
-/// Moves made with the pen down, and where the pins ended.
-fn drawn(trace: &[Stamped]) -> (BTreeSet<(PagePoint, PagePoint)>, PagePoint) {
-    let (mut at, mut up_x, mut up_y, mut pen) = (point(0, 0), true, true, 0);
-    let mut inked = BTreeSet::new();
-    let mut index = 0;
-    while let Some(stamped) = trace.get(index) {
-        let mut next = at;
-        match stamped.change {
-            Change::UpX(up) => up_x = up,
-            Change::UpY(up) => up_y = up,
-            Change::Pen(height) => pen = height,
-            Change::StepX(true) => {
-                next.x += if up_x { 1 } else { -1 };
-                // A diagonal move raises both pins in one interrupt.
-                if let Some(Stamped { time, change: Change::StepY(true) }) = trace.get(index + 1)
-                    && *time == stamped.time
-                {
-                    next.y += if up_y { 1 } else { -1 };
-                    index += 1;
-                }
-            }
-            Change::StepY(true) => next.y += if up_y { 1 } else { -1 },
-            _ => {}
+/// Draws the job in a pin machine; `visit` is called at each turn of the main loop, which takes
+/// `turn_ticks`, and ends the run by returning `false`.
+fn run_job(turn_ticks: u64, visit: &mut dyn FnMut(Turn<'_, '_>) -> bool) -> Drawn {
+    let targets = job();
+    let settings = Settings::default();
+    let mut path = TargetList::new(&targets);
+    let trace = pin_machine::run(settings, &mut path, turn_ticks, &mut |turn| {
+        if turn.now == 0 {
+            turn.machine.start(&mut TargetList::new(&job())).expect("valid");
         }
-        if pen >= 64 && next != at {
-            inked.insert((at.min(next), at.max(next)));
-        }
-        at = next;
-        index += 1;
-    }
-    (inked, at)
+        assert_eq!(turn.machine.position(), turn.pins);
+        visit(turn)
+    });
+    event_checker::check_pins(&trace, &settings)
+}
+
+fn is_ready(machine: &Machine<'_>) -> bool {
+    machine.state() == State::Idle && machine.stands()
+}
+
+fn undisturbed() -> Drawn {
+    run_job(25_000, &mut |turn| !is_ready(turn.machine))
 }
 
 #[test]
 fn a_job_is_drawn_and_the_pins_end_where_the_path_does() {
-    let targets = job();
-    let trace = pin_machine::run(
-        Settings::default(),
-        &mut TargetList::new(&targets),
-        25_000,
-        &mut |turn| {
-            if turn.now == 0 {
-                turn.machine.start(&mut TargetList::new(&job())).expect("valid");
-            }
-            assert_eq!(turn.machine.position(), turn.pins);
-            turn.now == 0 || turn.machine.state() == State::Run || !turn.machine.stands()
-        },
-    );
-    let (inked, end) = drawn(&trace);
-    assert_eq!(end, point(0, 0));
+    let drawn = undisturbed();
+    assert_eq!(drawn.end, point(0, 0));
     // 800 + 600 + 10 + 790 moves, the line from (900, 333) to (20, 1000), and about half the dots.
-    assert!(inked.len() > 800 + 600 + 10 + 790 + 880);
-    let last_pen = trace.iter().rev().find_map(|stamped| match stamped.change {
-        Change::Pen(height) => Some(height),
-        _ => None,
-    });
-    assert_eq!(last_pen, Some(0));
+    assert!(drawn.inked.len() > 800 + 600 + 10 + 790 + 880);
+    assert_eq!(drawn.pen, 0);
 }
 
-#[test]
-fn hold_and_resume_leave_the_same_ink() {
-    let targets = job();
-    let mut undisturbed = None;
-    for held_at in [0u64, 1, 40, 333, 700, 1500, 2222, 3000, 4400] {
-        let mut stood = false;
-        let trace = pin_machine::run(
-            Settings::default(),
-            &mut TargetList::new(&targets),
-            25_000,
-            &mut |turn| {
-                if turn.now == 0 {
-                    turn.machine.start(&mut TargetList::new(&job())).expect("valid");
-                }
-                if held_at > 0 && turn.now == held_at * 25_000 {
-                    turn.machine.hold();
-                }
-                let standing = turn.machine.state() == State::Hold { standing: true };
-                if standing && turn.machine.stands() {
-                    assert_eq!(turn.machine.planned_position(), turn.pins);
-                    stood = true;
-                    turn.machine.resume();
-                }
-                turn.machine.state() != State::Idle || !turn.machine.stands()
-            },
-        );
-        let drawn = drawn(&trace);
-        assert!(held_at == 0 || stood, "held at {held_at} ms");
-        assert_eq!(&drawn, undisturbed.get_or_insert(drawn.clone()));
-    }
+/// An instant of the job and the length of a main loop turn, in ticks.
+fn instants() -> impl Strategy<Value = (u64, u64)> {
+    (1u64..100_000_000, 5_000u64..200_000)
 }
 
-#[test]
-fn abort_keeps_the_position_and_leaves_the_machine_ready() {
-    let targets = job();
-    for aborted_at in [1u64, 333, 1500, 2222] {
-        pin_machine::run(
-            Settings::default(),
-            &mut TargetList::new(&targets),
-            25_000,
-            &mut |turn| {
-                if turn.now == 0 {
-                    turn.machine.start(&mut TargetList::new(&job())).expect("valid");
-                }
-                if turn.now == aborted_at * 25_000 {
-                    turn.machine.abort();
-                }
-                assert_eq!(turn.machine.position(), turn.pins);
-                let ready = turn.machine.state() == State::Idle && turn.machine.stands();
-                if ready {
-                    assert_eq!(turn.machine.planned_position(), turn.pins);
-                    assert_ne!(turn.pins, point(0, 0));
-                }
-                !ready
-            },
-        );
-    }
-}
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 350, ..ProptestConfig::default() })]
 
-#[test]
-fn an_emergency_stops_the_pins_at_once_and_the_position_is_theirs() {
-    let targets = job();
-    let mut at_stop = None;
-    let trace =
-        pin_machine::run(Settings::default(), &mut TargetList::new(&targets), 2_500, &mut |turn| {
-            if turn.now == 0 {
-                turn.machine.start(&mut TargetList::new(&job())).expect("valid");
+    #[test]
+    fn hold_and_resume_leave_the_same_ink((instant, turn_ticks) in instants(), again in 0u64..9_000_000) {
+        static UNDISTURBED: LazyLock<Drawn> = LazyLock::new(undisturbed);
+        let mut holds = vec![instant + again, instant];
+        let drawn = run_job(turn_ticks, &mut |turn| {
+            if holds.last().is_some_and(|&due| turn.now >= due) {
+                holds.pop();
+                turn.machine.hold();
             }
-            if turn.now == 25_000_000 {
-                turn.machine.alarm(Alarm::EmergencyStop);
-                at_stop = Some(turn.pins);
+            if turn.machine.state() == (State::Hold { standing: true }) && turn.machine.stands() {
+                assert_eq!(turn.machine.planned_position(), turn.pins);
+                turn.machine.resume();
             }
-            if turn.now < 26_000_000 {
+            !is_ready(turn.machine)
+        });
+        prop_assert_eq!(&drawn.inked, &UNDISTURBED.inked);
+        prop_assert_eq!((drawn.end, drawn.pen), (UNDISTURBED.end, 0));
+    }
+
+    #[test]
+    fn abort_keeps_the_position_and_leaves_the_machine_ready((instant, turn_ticks) in instants()) {
+        let mut stood_at = None;
+        let drawn = run_job(turn_ticks, &mut |turn| {
+            if turn.now >= instant {
+                turn.machine.abort();
+            }
+            if turn.now > instant && is_ready(turn.machine) {
+                assert_eq!(turn.machine.planned_position(), turn.pins);
+                stood_at = Some(turn.pins);
+            }
+            stood_at.is_none()
+        });
+        prop_assert_eq!((Some(drawn.end), drawn.pen), (stood_at, 0));
+        // The next job begins where this one was given up.
+        prop_assert!(drawn.last_step < instant + turn_ticks + 10_000_000);
+    }
+
+    #[test]
+    fn an_alarm_stops_the_pins_at_once((instant, turn_ticks) in instants(), switch: bool) {
+        let alarm = if switch { Alarm::HardLimit } else { Alarm::EmergencyStop };
+        let mut alarm_at = None;
+        let drawn = run_job(turn_ticks, &mut |turn| {
+            let Some((time, pins)) = alarm_at else {
+                if turn.now >= instant {
+                    turn.machine.alarm(alarm);
+                    alarm_at = Some((turn.now, turn.pins));
+                }
+                return true;
+            };
+            assert_eq!(turn.pins, pins);
+            assert_eq!(turn.machine.state(), State::Alarm(alarm));
+            if turn.machine.unlock().is_err() {
+                // The event in work may be a dwell.
+                assert!(turn.now < time + 5_000_000);
                 return true;
             }
-            assert_eq!(Some(turn.pins), at_stop);
-            assert_eq!(turn.machine.state(), State::Alarm(Alarm::EmergencyStop));
-            turn.machine.unlock().expect("the queue is empty");
-            assert_eq!(turn.machine.planned_position(), turn.pins);
-            assert_eq!(turn.machine.state(), State::Idle);
+            assert_eq!(turn.machine.planned_position(), pins);
+            assert!(turn.machine.stands());
             false
         });
-    let late = trace.iter().filter(|stamped| {
-        stamped.time > 25_000_000
-            && matches!(stamped.change, Change::StepX(true) | Change::StepY(true))
-    });
-    assert_eq!(late.count(), 0);
+        let (time, pins) = alarm_at.expect("given");
+        prop_assert!(drawn.last_step < time);
+        prop_assert_eq!((drawn.end, drawn.pen), (pins, 0));
+    }
+}
+
+#[test]
+fn after_abort_and_alarm_the_next_job_starts_from_there() {
+    for alarm in [false, true] {
+        let home = [ink(5, 6), to(0, 0)];
+        let mut stage = 0;
+        let targets = job();
+        let mut first = TargetList::new(&targets);
+        let mut second = TargetList::new(&home);
+        let settings = Settings::default();
+        let trace = pin_machine::run_with(settings, 25_000, &mut |turn, queue| {
+            match stage {
+                0 => {
+                    turn.machine.start(&mut first).expect("valid");
+                    stage = 1;
+                }
+                1 if turn.now >= 30_000_000 => {
+                    if alarm {
+                        turn.machine.alarm(Alarm::EmergencyStop);
+                    } else {
+                        turn.machine.abort();
+                    }
+                    stage = 2;
+                }
+                2 if turn.now >= 60_000_000 => {
+                    assert_eq!(turn.machine.unlock().is_ok(), alarm);
+                    turn.machine.start(&mut second).expect("idle");
+                    stage = 3;
+                }
+                3 if is_ready(turn.machine) => return false,
+                _ => {}
+            }
+            if stage < 3 {
+                turn.machine.fill(&mut first, queue);
+            } else {
+                turn.machine.fill(&mut second, queue);
+            }
+            true
+        });
+        let drawn = event_checker::check_pins(&trace, &settings);
+        assert_eq!((drawn.end, drawn.pen), (point(0, 0), 0));
+        assert!(drawn.inked.iter().any(|ends| ends.0 == point(5, 6) || ends.1 == point(5, 6)));
+    }
 }
 
 #[test]

@@ -1,5 +1,7 @@
 //! Speed, measured from the events: against the optimum, the table of known plotters, the limits.
 
+#![allow(clippy::expect_used, reason = "a test fails by panicking")]
+
 use penup::drawing::{LineType, PagePoint};
 use penup::machine::{Setting, Settings, Target, TargetList, Value};
 use penup::step::Line;
