@@ -4,9 +4,11 @@
 
 use penup::drawing::{LineType, PagePoint};
 use penup::machine::{
-    Alarm, Machine, MachineError, PulserState, Setting, Settings, State, Target, TargetList, Value,
+    Alarm, Machine, MachineError, Path, PulserState, Setting, Settings, State, TapePath, Target,
+    TargetList, Value,
 };
 use penup::motion::Block;
+use penup::step::tape;
 use penup_host_tests::event_checker::{self, Drawn};
 use penup_host_tests::pin_machine::{self, Turn};
 use proptest::prelude::*;
@@ -192,6 +194,21 @@ fn after_abort_and_alarm_the_next_job_starts_from_there() {
         assert_eq!((drawn.end, drawn.pen), (point(0, 0), 0));
         assert!(drawn.inked.iter().any(|ends| ends.0 == point(5, 6) || ends.1 == point(5, 6)));
     }
+}
+
+#[test]
+fn a_recorded_tape_replays_to_the_same_moves_and_pen() {
+    let targets = job();
+    let settings = Settings::default();
+    let record = |path: &mut dyn Path| {
+        let events = pin_machine::record(settings, path, 64).expect("within the travel");
+        events.iter().filter_map(|event| event.instruction()).collect::<Vec<_>>()
+    };
+    let original = record(&mut TargetList::new(&targets));
+    let tape: Vec<u8> = tape::encode(original.iter().copied()).collect();
+    assert!(tape.len() <= original.len() / 2 + 100);
+    let replayed = record(&mut TapePath::new(point(0, 0), tape.into_iter()));
+    assert_eq!(replayed, original);
 }
 
 #[test]

@@ -200,7 +200,7 @@ fn a_short_look_ahead_is_enough_for_dense_points() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 300, ..ProptestConfig::default() })]
     #[test]
     fn random_paths_take_the_time_of_the_optimum(
         turns in prop::collection::vec((-300i32..300, -300i32..300), 1..60),

@@ -12,7 +12,7 @@ mod path;
 mod pulser;
 mod settings;
 
-pub use path::{JobSize, Path, Target, TargetList};
+pub use path::{JobSize, Path, TapePath, Target, TargetList};
 pub use pulser::{Pen, Pins, Pulser, PulserState, Solenoid};
 pub use settings::{SETTING_COUNT, SETTINGS, Setting, SettingError, SettingInfo, Settings, Value};
 

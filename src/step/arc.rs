@@ -173,7 +173,7 @@ const CHORD_MOVES: usize = 64;
 /// ```
 #[derive(Debug, Clone)]
 pub struct Chords<I> {
-    points: I,
+    pub(super) points: I,
     /// Where the next line begins.
     from: PagePoint,
     /// The moves read ahead, and where they lead.

@@ -12,6 +12,7 @@
 mod arc;
 mod line;
 mod pattern;
+pub mod tape;
 
 pub use arc::{Arc, ArcError, Chords, Turn};
 pub use line::Line;
