@@ -4,10 +4,10 @@
 
 use penup::drawing::{LineType, PagePoint};
 use penup::machine::{
-    Alarm, Machine, MachineError, Path, PulserState, Setting, Settings, State, TapePath, Target,
-    TargetList, Value,
+    Alarm, Axis, Machine, MachineError, Path, PulserState, Setting, Settings, State, Switches,
+    TapePath, Target, TargetList, Value,
 };
-use penup::motion::Block;
+use penup::motion::{Block, EventKind};
 use penup::step::tape;
 use penup_host_tests::event_checker::{self, Drawn};
 use penup_host_tests::pin_machine::{self, Turn};
@@ -234,4 +234,143 @@ fn what_leads_beyond_the_travel_is_refused_before_anything_moves() {
     assert!(machine.sleep().is_err());
     assert!(machine.check(true).is_err());
     assert!(machine.unlock().is_err());
+}
+
+/// Homes a machine that stands `start` steps from its switches; `press` says what they do.
+/// Returns the final state and where the machine then is, in steps from the switches.
+fn home(
+    start: PagePoint,
+    kinematics: i32,
+    press: &mut dyn FnMut(PagePoint, u64) -> Switches,
+) -> (State, PagePoint) {
+    let mut settings = Settings::default();
+    settings.set(Setting::Homing, Value::ONE).expect("valid");
+    settings.set(Setting::Kinematics, Value::from_num(kinematics)).expect("valid");
+    settings.set(Setting::TravelX, Value::from_num(60)).expect("valid");
+    settings.set(Setting::TravelY, Value::from_num(60)).expect("valid");
+    let build = settings.kinematics();
+    let mut result = (State::Idle, start);
+    let trace = pin_machine::run_with(settings, 25_000, &mut |turn, queue| {
+        let moved = build.page(turn.pins);
+        let place = point(start.x + moved.x, start.y + moved.y);
+        let switches = press(place, turn.now);
+        if turn.now == 0 {
+            assert_eq!(turn.machine.state(), State::Alarm(Alarm::NotHomed));
+            turn.machine.home(switches).expect("ready");
+        }
+        turn.machine.watch(switches);
+        turn.machine.fill(&mut TargetList::new(&[]), queue);
+        if turn.machine.state() == State::Idle {
+            assert_eq!(turn.machine.position(), point(0, 0));
+        }
+        result = (turn.machine.state(), place);
+        assert!(turn.now < 25_000_000 * 60, "homing takes more than a minute");
+        turn.machine.state() == State::Home
+    });
+    event_checker::check_pins(&trace, &settings);
+    result
+}
+
+fn corner(place: PagePoint, _now: u64) -> Switches {
+    Switches { x: place.x <= 0, y: place.y <= 0 }
+}
+
+#[test]
+fn homing_ends_a_pull_off_from_each_switch() {
+    for kinematics in [0, 1] {
+        for start in [point(2000, 900), point(1, 1), point(4000, -100), point(-80, -80)] {
+            let (state, place) = home(start, kinematics, &mut corner);
+            assert_eq!(state, State::Idle);
+            // 2 mm of 80 steps; the second approach makes 80 steps a second.
+            assert!(place.x.abs_diff(160) <= 1 && place.y.abs_diff(160) <= 1, "{place:?}");
+        }
+    }
+}
+
+#[test]
+fn a_bouncing_switch_is_found_as_well() {
+    let mut pressed_since = [None; 2];
+    let mut bounce = |place: PagePoint, now: u64| {
+        let mut bounced = |axis: usize, at: i32| {
+            if at > 0 {
+                pressed_since[axis] = None;
+                return false;
+            }
+            let since = *pressed_since[axis].get_or_insert(now);
+            now - since > 125_000 || (now / 25_000).is_multiple_of(2)
+        };
+        Switches { x: bounced(0, place.x), y: bounced(1, place.y) }
+    };
+    let (state, place) = home(point(1500, 700), 0, &mut bounce);
+    assert_eq!(state, State::Idle);
+    assert!(place.x.abs_diff(160) <= 1 && place.y.abs_diff(160) <= 1, "{place:?}");
+}
+
+#[test]
+fn a_switch_that_is_stuck_or_missing_is_an_alarm() {
+    let stuck = |_: PagePoint, _: u64| Switches { x: true, y: false };
+    let (state, _) = home(point(500, 500), 0, &mut { stuck });
+    assert_eq!(state, State::Alarm(Alarm::HomingFailed(Axis::X)));
+    let missing = |place: PagePoint, _: u64| Switches { x: place.x <= 0, y: false };
+    let (state, _) = home(point(500, 500), 0, &mut { missing });
+    assert_eq!(state, State::Alarm(Alarm::HomingFailed(Axis::Y)));
+}
+
+#[test]
+fn a_limit_switch_is_an_alarm_only_if_asked_for() {
+    for hard in [false, true] {
+        let mut settings = Settings::default();
+        settings.set(Setting::HardLimits, Value::from_num(hard)).expect("valid");
+        let targets = [to(8000, 0)];
+        let mut path = TargetList::new(&targets);
+        let trace = pin_machine::run(settings, &mut path, 25_000, &mut |turn| {
+            if turn.now == 0 {
+                turn.machine.start(&mut TargetList::new(&targets)).expect("valid");
+            }
+            turn.machine.watch(Switches { x: turn.pins.x >= 3000, y: false });
+            turn.machine.state() == State::Run || !turn.machine.stands()
+        });
+        let end = event_checker::check_pins(&trace, &settings).end.x;
+        // 8 steps a millisecond: at most two turns after the switch.
+        assert!(if hard { (3000..3020).contains(&end) } else { end == 8000 }, "{end}");
+    }
+}
+
+#[test]
+fn a_core_xy_machine_draws_the_same_page() {
+    let targets = job();
+    let mut settings = Settings::default();
+    settings.set(Setting::Kinematics, Value::ONE).expect("valid");
+    let events = pin_machine::record(settings, &mut TargetList::new(&targets), 64).expect("fits");
+    let corners: Vec<_> = pin_machine::moves(&events)
+        .iter()
+        .map(|&(_, motors)| settings.kinematics().page(motors))
+        .collect();
+    for target in &targets {
+        assert!(corners.contains(&target.point));
+    }
+    assert_eq!(corners.last(), Some(&point(0, 0)));
+    // As fast as the other build: the same lengths, but for rounding.
+    let cartesian =
+        pin_machine::record(Settings::default(), &mut TargetList::new(&targets), 64).expect("fits");
+    let (a, b) = (pin_machine::duration(&events), pin_machine::duration(&cartesian));
+    assert!(a.abs_diff(b) < b / 100, "{a} {b}");
+}
+
+#[test]
+fn a_ramp_takes_the_pen_down_step_by_step() {
+    let mut settings = Settings::default();
+    settings.set(Setting::PenRamp, Value::from_num(254)).expect("valid");
+    let targets = [to(10, 0), ink(20, 0), to(0, 0)];
+    let events = pin_machine::record(settings, &mut TargetList::new(&targets), 8).expect("fits");
+    event_checker::check(&events, &settings);
+    let heights: Vec<_> = events
+        .iter()
+        .filter_map(|event| match event.kind() {
+            EventKind::Pen { height } => Some(height),
+            EventKind::Levels(_) => None,
+        })
+        .collect();
+    let expected: Vec<_> = (1..=127).chain((0..127).rev()).collect();
+    assert_eq!(heights, expected);
 }

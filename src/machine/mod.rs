@@ -8,10 +8,15 @@
 //! Refused: orders that the state does not allow, settings that conflict, moves beyond the limits;
 //! each leaves everything as it was.
 
+mod homing;
+mod kinematics;
 mod path;
 mod pulser;
 mod settings;
 
+use homing::Homing;
+pub use homing::{Axis, Switches};
+pub use kinematics::Kinematics;
 pub use path::{JobSize, Path, TapePath, Target, TargetList};
 pub use pulser::{Pen, Pins, Pulser, PulserState, Solenoid};
 pub use settings::{SETTING_COUNT, SETTINGS, Setting, SettingError, SettingInfo, Settings, Value};
@@ -36,6 +41,8 @@ pub enum State {
     Abort,
     /// Moves by hand.
     Jog,
+    /// Looks for the switches.
+    Home,
     /// Jobs are measured, not drawn.
     Check,
     /// Stopped; needs [`Machine::unlock`].
@@ -52,6 +59,10 @@ pub enum Alarm {
     EmergencyStop,
     /// A limit switch.
     HardLimit,
+    /// The machine starts without knowing where it is; [`Machine::home`] finds out.
+    NotHomed,
+    /// A switch was not found, or stayed pressed.
+    HomingFailed(Axis),
     /// The queue refused an event although it had room: a fault of the program.
     Queue,
 }
@@ -99,7 +110,7 @@ pub struct Machine<'m> {
     state: State,
     runner: Runner<'m>,
     pins: &'m PulserState,
-    /// The machine's position where the pins' count is 0.
+    /// The motors' position where the pins' count is 0.
     origin: PagePoint,
     ahead_ticks: u32,
     job: JobSize,
@@ -109,12 +120,13 @@ pub struct Machine<'m> {
     path_ended: bool,
     /// Whether the drivers are to be switched off once.
     sleep_due: bool,
+    homing: Option<Homing>,
 }
 
 impl<'m> Machine<'m> {
-    /// A machine at rest at the page's origin, pen raised.
+    /// A machine at rest at the page's origin, pen raised; in alarm if it must be homed first.
     ///
-    /// `blocks` is the look-ahead (20 bytes each; 100 or more serve well). `ahead_ticks` is how far
+    /// `blocks` is the look-ahead (24 bytes each; 100 or more serve well). `ahead_ticks` is how far
     /// the queue may be planned ahead of the pins, and so how late a hold takes effect;
     /// `u32::MAX` for no bound but the queue's.
     pub fn new(
@@ -125,7 +137,11 @@ impl<'m> Machine<'m> {
     ) -> Self {
         let machine = Self {
             settings,
-            state: State::Idle,
+            state: if settings.is_on(Setting::Homing) {
+                State::Alarm(Alarm::NotHomed)
+            } else {
+                State::Idle
+            },
             runner: Runner::new(settings.limits(), settings.pen_positions(), blocks),
             pins,
             origin: PagePoint::default(),
@@ -134,6 +150,7 @@ impl<'m> Machine<'m> {
             before: RunLengths::default(),
             path_ended: true,
             sleep_due: false,
+            homing: None,
         };
         machine.configure_pulser();
         machine
@@ -178,15 +195,29 @@ impl<'m> Machine<'m> {
         }
     }
 
-    /// Where the pins are, in steps.
+    /// Where the pins are, in steps of the page.
     pub fn position(&self) -> PagePoint {
         let (x, y) = self.pins.steps();
-        PagePoint { x: self.origin.x.wrapping_add(x), y: self.origin.y.wrapping_add(y) }
+        let motors =
+            PagePoint { x: self.origin.x.wrapping_add(x), y: self.origin.y.wrapping_add(y) };
+        self.settings.kinematics().page(motors)
     }
 
-    /// Where the events planned so far lead, in steps.
+    /// Where the events planned so far lead, in steps of the page.
     pub fn planned_position(&self) -> PagePoint {
-        self.runner.position()
+        self.settings.kinematics().page(self.runner.position())
+    }
+
+    /// The machine stands at `page`, whatever it thought: the pins' count starts from there.
+    fn set_position(&mut self, page: PagePoint) {
+        let motors = self.settings.kinematics().motors(page);
+        let (x, y) = self.pins.steps();
+        self.origin = PagePoint { x: motors.x.wrapping_sub(x), y: motors.y.wrapping_sub(y) };
+        self.runner.set_position(motors, self.pins.ticks());
+    }
+
+    fn push(&mut self, target: Target) -> Result<(), PushError> {
+        self.runner.push(self.settings.kinematics().motors(target.point), target.ink)
     }
 
     /// The length of a step of x and of y is its setting; this is the position in millimetres.
@@ -197,7 +228,7 @@ impl<'m> Machine<'m> {
             let bits = (i64::from(steps) << (2 * Value::FRAC_NBITS)) / steps_per_mm.max(1);
             Value::from_bits(bits.clamp(i32::MIN.into(), i32::MAX.into()) as i32)
         };
-        [mm(point.x, Setting::StepsPerMmX), mm(point.y, Setting::StepsPerMmY)]
+        [mm(point.x, Setting::StepsPerMmX), mm(point.y, self.settings.steps_per_mm_y())]
     }
 
     /// Measures the path from where the machine stands, and begins to draw it if all of it can be
@@ -228,7 +259,7 @@ impl<'m> Machine<'m> {
             return Err(MachineError::State(self.state));
         }
         self.check_travel(0, point)?;
-        match self.runner.push(point, None) {
+        match self.push(Target { point, ink: None }) {
             Ok(()) => {
                 self.state = State::Jog;
                 Ok(())
@@ -250,13 +281,13 @@ impl<'m> Machine<'m> {
         while self.is_moving() {
             self.read_targets(path);
             let ahead = self.runner.ticks().wrapping_sub(self.pins.ticks());
-            if queue.room() < Runner::ROOM || ahead >= self.ahead_ticks {
+            if queue.room() < Runner::ROOM || ahead >= self.greatest_ahead() {
                 return;
             }
             match self.runner.produce(queue) {
                 Ok(Progress::More) => {}
-                Ok(Progress::Done) => self.state = State::Idle,
-                Ok(Progress::Stopped) => self.stand(),
+                Ok(Progress::Done) if self.state != State::Home => self.state = State::Idle,
+                Ok(Progress::Done | Progress::Stopped) => self.stand(),
                 Err(_) => self.alarm(Alarm::Queue),
             }
         }
@@ -280,7 +311,8 @@ impl<'m> Machine<'m> {
 
     /// Slows down, raises the pen, forgets the job, keeps the position. Ends a hold and a jog, too.
     pub fn abort(&mut self) {
-        if matches!(self.state, State::Run | State::Hold { .. } | State::Jog) {
+        if matches!(self.state, State::Run | State::Hold { .. } | State::Jog | State::Home) {
+            self.end_homing();
             self.runner.stop();
             self.path_ended = true;
             self.state = State::Abort;
@@ -290,6 +322,7 @@ impl<'m> Machine<'m> {
     /// Stops the pulses at once and raises the pen. The position is where the pins stopped.
     pub fn alarm(&mut self, alarm: Alarm) {
         self.pins.halt();
+        self.end_homing();
         self.runner.forget_path();
         self.path_ended = true;
         self.sleep_due = false;
@@ -329,8 +362,7 @@ impl<'m> Machine<'m> {
         match self.state {
             State::Sleep => {}
             State::Alarm(_) if self.pins.is_drained() => {
-                let position = self.position();
-                self.runner.set_position(position, self.pins.ticks());
+                self.set_position(self.position());
                 self.pins.release();
             }
             _ => return Err(MachineError::State(self.state)),
@@ -349,12 +381,23 @@ impl<'m> Machine<'m> {
         matches!(
             self.state,
             State::Run | State::Hold { standing: false } | State::Abort | State::Jog
-        )
+        ) || self.homing.is_some_and(|homing| !homing.stands)
+    }
+
+    fn greatest_ahead(&self) -> u32 {
+        // A switch is to stop the machine soon: 10 ms.
+        if self.homing.is_some() { self.ahead_ticks.min(250_000) } else { self.ahead_ticks }
     }
 
     fn stand(&mut self) {
         match self.state {
             State::Hold { .. } => self.state = State::Hold { standing: true },
+            State::Home => {
+                self.runner.forget_path();
+                if let Some(homing) = &mut self.homing {
+                    homing.stands = true;
+                }
+            }
             _ => {
                 self.runner.forget_path();
                 self.state = State::Idle;
@@ -367,7 +410,7 @@ impl<'m> Machine<'m> {
             match path.next_target() {
                 // Measured at the start, so it fits.
                 Some(target) => {
-                    if self.runner.push(target.point, target.ink).is_err() {
+                    if self.push(target).is_err() {
                         self.abort();
                     }
                 }
@@ -382,11 +425,13 @@ impl<'m> Machine<'m> {
     fn measure(&self, path: &mut dyn Path) -> Result<JobSize, MachineError> {
         path.rewind();
         let mut size = JobSize::default();
+        let kinematics = self.settings.kinematics();
         let mut at = self.runner.end();
         let mut inked = false;
         let mut number = 0u32;
         while let Some(Target { point, ink }) = path.next_target() {
             self.check_travel(number, point)?;
+            let point = kinematics.motors(point);
             let length = self
                 .runner
                 .limits()
@@ -410,17 +455,15 @@ impl<'m> Machine<'m> {
     fn check_travel(&self, target: u32, point: PagePoint) -> Result<(), MachineError> {
         let beyond = |at: i32, travel: Setting, steps_per_mm: Setting| {
             let (least, most) = if self.settings.is_on(Setting::SoftLimits) {
-                let steps = i64::from(self.settings.get(travel).to_bits())
-                    * i64::from(self.settings.get(steps_per_mm).to_bits());
-                let steps = steps >> (2 * Value::FRAC_NBITS);
-                (0, steps.min(PAGE_LIMIT.into()) as i32)
+                let steps = self.settings.millimetres_as_steps(travel, steps_per_mm);
+                (0, steps.min(PAGE_LIMIT))
             } else {
                 (-PAGE_LIMIT, PAGE_LIMIT)
             };
             at.saturating_sub(at.clamp(least, most))
         };
         let x = beyond(point.x, Setting::TravelX, Setting::StepsPerMmX);
-        let y = beyond(point.y, Setting::TravelY, Setting::StepsPerMmY);
+        let y = beyond(point.y, Setting::TravelY, self.settings.steps_per_mm_y());
         if (x, y) == (0, 0) { Ok(()) } else { Err(MachineError::BeyondTravel { target, x, y }) }
     }
 
