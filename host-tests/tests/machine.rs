@@ -374,3 +374,96 @@ fn a_ramp_takes_the_pen_down_step_by_step() {
     let expected: Vec<_> = (1..=127).chain((0..127).rev()).collect();
     assert_eq!(heights, expected);
 }
+
+#[test]
+fn the_machine_waits_for_each_change_of_the_pen() {
+    struct TwoPens<'a>(TargetList<'a>, usize);
+    impl Path for TwoPens<'_> {
+        fn next_target(&mut self) -> Option<Target> {
+            self.1 += 1;
+            self.0.next_target()
+        }
+        fn rewind(&mut self) {
+            self.1 = 0;
+            self.0.rewind();
+        }
+        fn pen(&self) -> u8 {
+            u8::from(self.1 > 2)
+        }
+    }
+    let targets = [to(100, 0), ink(300, 0), to(400, 0), ink(500, 100), to(0, 0)];
+    let mut waits = Vec::new();
+    let mut path = TwoPens(TargetList::new(&targets), 0);
+    let trace = pin_machine::run(Settings::default(), &mut path, 25_000, &mut |turn| {
+        if turn.now == 0 {
+            let mut again = TwoPens(TargetList::new(&targets), 0);
+            turn.machine.start(&mut again).expect("valid");
+        }
+        if turn.machine.state() == (State::Hold { standing: true }) && turn.machine.stands() {
+            waits.push((turn.machine.status().pen_wanted, turn.pins));
+            turn.machine.resume();
+        }
+        !is_ready(turn.machine)
+    });
+    assert_eq!(waits, [(Some(1), point(300, 0))]);
+    let drawn = event_checker::check_pins(&trace, &Settings::default());
+    assert_eq!((drawn.inked.len(), drawn.end, drawn.pen), (300, point(0, 0), 0));
+}
+
+#[test]
+fn a_pause_comes_at_the_end_of_the_stroke_and_after_so_much_ink() {
+    // Strokes of 400 steps, 5 mm each.
+    let mut targets = Vec::new();
+    for line in 1..=20 {
+        targets.extend([to(0, 10 * line), ink(200, 10 * line), ink(400, 10 * line)]);
+    }
+    for (ink_before_pause, asked, expected) in
+        [(0.0, None, vec![]), (0.0, Some(1), vec![1]), (0.024, None, vec![5, 10, 15])]
+    {
+        let mut settings = Settings::default();
+        settings.set(Setting::InkBeforePause, Value::from_num(ink_before_pause)).expect("valid");
+        let mut waits = Vec::new();
+        let mut seconds = Vec::new();
+        let mut path = TargetList::new(&targets);
+        pin_machine::run(settings, &mut path, 25_000, &mut |turn| {
+            if turn.now == 0 {
+                turn.machine.start(&mut TargetList::new(&targets)).expect("valid");
+                assert_eq!(turn.machine.status().job.strokes, 20);
+            }
+            if asked.is_some() && turn.now == 5_000_000 {
+                turn.machine.pause_after_stroke();
+            }
+            if turn.machine.state() == (State::Hold { standing: true }) && turn.machine.stands() {
+                assert_eq!(turn.pins.x, 400);
+                waits.push(turn.pins.y / 10);
+                turn.machine.resume();
+            }
+            seconds.push(turn.machine.status().seconds_left);
+            !is_ready(turn.machine)
+        });
+        assert_eq!(waits, expected);
+        // 20 times 0.3 s of dwell, 5 mm at 50 mm/s, 5 mm at 100 mm/s.
+        assert!((8..=9).contains(&seconds[0]));
+        assert!(seconds.is_sorted_by(|a, b| a >= b));
+        assert_eq!(seconds.last(), Some(&0));
+    }
+}
+
+#[test]
+fn an_override_slows_the_job() {
+    let targets = [ink(8000, 0)];
+    let seconds = |percent| {
+        let pins = PulserState::new();
+        let mut blocks = [Block::EMPTY; 8];
+        let mut machine = Machine::new(Settings::default(), &mut blocks, &pins, u32::MAX);
+        machine.set_override(percent);
+        let mut path = TargetList::new(&targets);
+        machine.start(&mut path).expect("valid");
+        let mut recorder = pin_machine::Recorder::default();
+        machine.fill(&mut path, &mut recorder);
+        pin_machine::duration(&recorder.0) as f64 / 25e6
+    };
+    // 100 mm at 50 mm/s and 800 mm/s², and 0.3 s of dwell.
+    assert!((seconds(100) - 2.0625 - 0.3).abs() < 0.001);
+    assert!((seconds(50) - 4.03125 - 0.3).abs() < 0.001);
+}

@@ -101,6 +101,10 @@ pub struct Status {
     pub job: JobSize,
     /// What of it is planned already: at most the queue ahead of the pins.
     pub done: JobSize,
+    /// How long the rest takes at least, without what corners and bends cost.
+    pub seconds_left: u32,
+    /// The pen that the machine waits for, if it does.
+    pub pen_wanted: Option<u8>,
 }
 
 /// The main loop's side of the plotter.
@@ -121,6 +125,12 @@ pub struct Machine<'m> {
     /// Whether the drivers are to be switched off once.
     sleep_due: bool,
     homing: Option<Homing>,
+    /// The pen in the holder.
+    pen: u8,
+    /// The pen that comes next, and the first target that it draws.
+    next_pen: Option<(u8, Target)>,
+    /// Ink drawn, in units of 2^-18 mm, at the last pause.
+    ink_at_pause: u64,
 }
 
 impl<'m> Machine<'m> {
@@ -151,6 +161,9 @@ impl<'m> Machine<'m> {
             path_ended: true,
             sleep_due: false,
             homing: None,
+            pen: 0,
+            next_pen: None,
+            ink_at_pause: 0,
         };
         machine.configure_pulser();
         machine
@@ -183,16 +196,34 @@ impl<'m> Machine<'m> {
     /// Where it is, and how far the job is.
     pub fn status(&self) -> Status {
         let run = self.runner.run();
+        let done = JobSize {
+            strokes: run.strokes.wrapping_sub(self.before.strokes),
+            drawn: run.drawn - self.before.drawn,
+            travelled: run.travelled - self.before.travelled,
+        };
         Status {
             state: self.state,
             position: self.position(),
             job: self.job,
-            done: JobSize {
-                strokes: run.strokes.wrapping_sub(self.before.strokes),
-                drawn: run.drawn - self.before.drawn,
-                travelled: run.travelled - self.before.travelled,
-            },
+            done,
+            seconds_left: self.seconds_left(done),
+            pen_wanted: self.next_pen.map(|(pen, _)| pen),
         }
+    }
+
+    fn seconds_left(&self, done: JobSize) -> u32 {
+        let at_speed = |length: u64, speed: Setting| {
+            // 2^-18 mm over 2^-16 mm/min, in milliseconds.
+            let speed = u64::from(self.settings.get(speed).to_bits().unsigned_abs());
+            (length >> 2).saturating_mul(60_000) / speed.max(1)
+        };
+        let strokes = u64::from(self.job.strokes.saturating_sub(done.strokes));
+        let dwell = self.settings.get(Setting::PenUpDwell).saturating_to_num::<u64>()
+            + self.settings.get(Setting::PenDownDwell).saturating_to_num::<u64>();
+        let milliseconds = at_speed(self.job.drawn.saturating_sub(done.drawn), Setting::DrawSpeed)
+            + at_speed(self.job.travelled.saturating_sub(done.travelled), Setting::TravelSpeed)
+            + strokes * dwell;
+        u32::try_from(milliseconds / 1000).unwrap_or(u32::MAX)
     }
 
     /// Where the pins are, in steps of the page.
@@ -243,6 +274,7 @@ impl<'m> Machine<'m> {
         let size = self.measure(path)?;
         if self.state == State::Idle {
             self.job = size;
+            self.ink_at_pause = self.runner.run().drawn;
             self.before = self.runner.run();
             self.path_ended = false;
             self.state = State::Run;
@@ -285,9 +317,8 @@ impl<'m> Machine<'m> {
                 return;
             }
             match self.runner.produce(queue) {
-                Ok(Progress::More) => {}
-                Ok(Progress::Done) if self.state != State::Home => self.state = State::Idle,
-                Ok(Progress::Done | Progress::Stopped) => self.stand(),
+                Ok(Progress::More) => self.pause_if_due(),
+                Ok(progress) => self.stand(progress),
                 Err(_) => self.alarm(Alarm::Queue),
             }
         }
@@ -301,9 +332,32 @@ impl<'m> Machine<'m> {
         }
     }
 
-    /// Lowers the pen where it was raised and goes on.
+    /// Pauses as soon as the stroke in work ends; [`Machine::resume`] goes on.
+    pub fn pause_after_stroke(&mut self) {
+        if self.state == State::Run {
+            self.runner.stop_after_stroke();
+        }
+    }
+
+    /// Scales the speeds to `percent` of the settings, 10 to 100, from the next line on.
+    pub fn set_override(&mut self, percent: u8) {
+        self.runner.set_override(percent);
+    }
+
+    /// Lowers the pen where it was raised and goes on; with the next pen, if the machine waited for
+    /// it.
     pub fn resume(&mut self) {
         if matches!(self.state, State::Hold { .. }) {
+            if self.state == (State::Hold { standing: true })
+                && self.runner.is_at_rest()
+                && let Some((pen, target)) = self.next_pen.take()
+            {
+                self.pen = pen;
+                if self.push(target).is_err() {
+                    self.abort();
+                    return;
+                }
+            }
             self.runner.resume();
             self.state = State::Run;
         }
@@ -313,6 +367,7 @@ impl<'m> Machine<'m> {
     pub fn abort(&mut self) {
         if matches!(self.state, State::Run | State::Hold { .. } | State::Jog | State::Home) {
             self.end_homing();
+            self.next_pen = None;
             self.runner.stop();
             self.path_ended = true;
             self.state = State::Abort;
@@ -323,6 +378,7 @@ impl<'m> Machine<'m> {
     pub fn alarm(&mut self, alarm: Alarm) {
         self.pins.halt();
         self.end_homing();
+        self.next_pen = None;
         self.runner.forget_path();
         self.path_ended = true;
         self.sleep_due = false;
@@ -389,9 +445,14 @@ impl<'m> Machine<'m> {
         if self.homing.is_some() { self.ahead_ticks.min(250_000) } else { self.ahead_ticks }
     }
 
-    fn stand(&mut self) {
+    fn stand(&mut self, progress: Progress) {
         match self.state {
-            State::Hold { .. } => self.state = State::Hold { standing: true },
+            State::Hold { .. } | State::Run
+                if progress == Progress::Stopped || self.next_pen.is_some() =>
+            {
+                self.ink_at_pause = self.runner.run().drawn;
+                self.state = State::Hold { standing: true };
+            }
             State::Home => {
                 self.runner.forget_path();
                 if let Some(homing) = &mut self.homing {
@@ -399,15 +460,29 @@ impl<'m> Machine<'m> {
                 }
             }
             _ => {
+                self.next_pen = None;
                 self.runner.forget_path();
                 self.state = State::Idle;
             }
         }
     }
 
+    fn pause_if_due(&mut self) {
+        let metres = u64::from(self.settings.get(Setting::InkBeforePause).to_bits().unsigned_abs());
+        // 2^-16 m to 2^-18 mm.
+        let due = self.ink_at_pause.saturating_add(metres * 4000);
+        if metres > 0 && self.runner.run().drawn >= due {
+            self.runner.stop_after_stroke();
+        }
+    }
+
     fn read_targets(&mut self, path: &mut dyn Path) {
-        while !self.path_ended && !self.runner.is_full() {
+        while !self.path_ended && self.next_pen.is_none() && !self.runner.is_full() {
             match path.next_target() {
+                Some(target) if path.pen() != self.pen => {
+                    self.next_pen = Some((path.pen(), target));
+                    self.runner.end_path();
+                }
                 // Measured at the start, so it fits.
                 Some(target) => {
                     if self.push(target).is_err() {

@@ -18,6 +18,11 @@ pub trait Path {
     fn next_target(&mut self) -> Option<Target>;
     /// Begins again with the first target.
     fn rewind(&mut self);
+    /// The pen that the last target given wants, from 0. The machine stands and waits for
+    /// [`Machine::resume`](super::Machine::resume) where it changes.
+    fn pen(&self) -> u8 {
+        0
+    }
 }
 
 /// A path of targets in memory.

@@ -68,6 +68,8 @@ pub enum Setting {
     /// `$214` Time in which the pen goes from one end of its heights to the other, step by step; 0
     /// for at once.
     PenRamp,
+    /// `$215` How much ink the pen draws before the machine pauses after a stroke; 0 for never.
+    InkBeforePause,
     /// `$220` Length of the dots and gaps of a dotted line; a dash is three dots.
     DotLength,
     /// `$230` Build of the machine: 0 Cartesian, 1 CoreXY.
@@ -96,7 +98,7 @@ pub struct SettingInfo {
 }
 
 /// How many settings there are.
-pub const SETTING_COUNT: usize = 28;
+pub const SETTING_COUNT: usize = 29;
 
 const fn info(
     setting: Setting,
@@ -150,6 +152,7 @@ pub const SETTINGS: [SettingInfo; SETTING_COUNT] = {
         info(PenUpDwell, 212, "dwell pen up", "ms", (0.0, 1300.0, 150.0), false),
         info(PenDownDwell, 213, "dwell pen down", "ms", (0.0, 1300.0, 150.0), false),
         info(PenRamp, 214, "ramp of the pen", "ms", (0.0, 5000.0, 0.0), false),
+        info(InkBeforePause, 215, "ink before a pause", "m", (0.0, 10000.0, 0.0), false),
         info(DotLength, 220, "length of a dot", "mm", (0.1, 100.0, 1.0), false),
         info(Kinematics, 230, "kinematics", "0|1", (0.0, 1.0, 0.0), true),
     ]

@@ -32,7 +32,8 @@ pub enum Progress {
     More,
     /// All blocks are run, the pen is raised, the machine stands.
     Done,
-    /// It stands on the path, as [`Runner::stop`] asked, with the pen raised.
+    /// It stands on the path with the pen raised, as [`Runner::stop`] or
+    /// [`Runner::stop_after_stroke`] asked.
     Stopped,
 }
 
@@ -102,6 +103,7 @@ pub struct Runner<'m> {
     /// Where the pen was sent last; not known at the start.
     pen_height: Option<u8>,
     stopping: bool,
+    stopping_after_stroke: bool,
     /// Where the events so far lead.
     position: PagePoint,
     /// Where the blocks so far lead.
@@ -134,6 +136,7 @@ impl<'m> Runner<'m> {
             pen_is_down: false,
             pen_height: None,
             stopping: false,
+            stopping_after_stroke: false,
             position: PagePoint::default(),
             end: PagePoint::default(),
             last: None,
@@ -265,9 +268,15 @@ impl<'m> Runner<'m> {
         }
     }
 
-    /// Goes on where [`Runner::stop`] stood.
+    /// Stands before the next move with the pen up.
+    pub fn stop_after_stroke(&mut self) {
+        self.stopping_after_stroke = true;
+    }
+
+    /// Goes on where [`Runner::stop`] or [`Runner::stop_after_stroke`] stood.
     pub fn resume(&mut self) {
         self.stopping = false;
+        self.stopping_after_stroke = false;
     }
 
     /// Gives up what waits; the machine must stand.
@@ -276,6 +285,7 @@ impl<'m> Runner<'m> {
         self.course = None;
         self.pace = Pace::REST;
         self.stopping = false;
+        self.stopping_after_stroke = false;
         self.last = None;
         self.in_stroke = false;
         self.end = self.position;
@@ -349,7 +359,10 @@ impl<'m> Runner<'m> {
     }
 
     fn begin_block(&mut self, queue: &mut dyn EventQueue) -> Result<Progress, StepEvent> {
-        if self.stopping && self.pace == Pace::REST {
+        let stroke_ends =
+            self.in_stroke && self.lookahead.front().is_some_and(|block| block.ink.is_none());
+        let stops = self.stopping || (self.stopping_after_stroke && stroke_ends);
+        if stops && self.pace == Pace::REST {
             return self.stand(Progress::Stopped, queue);
         }
         let Some(block) = self.lookahead.pop() else {
@@ -404,6 +417,7 @@ impl<'m> Runner<'m> {
         }
         if standing == Progress::Done {
             self.last = None;
+            self.in_stroke = false;
         }
         Ok(standing)
     }
