@@ -1,8 +1,13 @@
-//! One strict checker for every event stream: what a real driver, motor and pen would not forgive.
+//! One strict checker for every event stream and for the pins: what a real driver, motor and pen
+//! would not forgive.
 
+#![allow(clippy::expect_used, reason = "a test fails by panicking")]
+
+use crate::pin_machine::{Change, Stamped};
 use penup::drawing::PagePoint;
 use penup::machine::{Setting, Settings};
 use penup::motion::{EventKind, StepEvent, TICKS_PER_SECOND};
+use std::collections::BTreeSet;
 
 /// What the events of a job came to.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,10 +65,10 @@ pub fn check(events: &[StepEvent], settings: &Settings) -> Verdict {
         assert!(event.ticks() > 0, "event {number} takes no time");
         match event.kind() {
             EventKind::Pen { height } => {
-                assert!(time >= pen_ready, "event {number}: the pen moves while it moves");
                 pen_ready = time + dwell(height);
+                // On a ramp the pen moves on before its dwell.
                 let run = runs.last_mut().expect("never empty");
-                run.seconds = (time - run_start) as f64 / second;
+                run.seconds = time.saturating_sub(run_start) as f64 / second;
                 runs.push(Run { height, ..Run::default() });
                 run_start = pen_ready;
             }
@@ -142,4 +147,91 @@ pub fn greatest_acceleration(times: &[f64], places: &[f64], window: f64) -> f64 
         }
     }
     greatest
+}
+
+/// What the pins drew.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Drawn {
+    /// The moves made with the pen down, the lesser point first.
+    pub inked: BTreeSet<(PagePoint, PagePoint)>,
+    /// The sum of the steps.
+    pub end: PagePoint,
+    /// When the last pulse began, ticks.
+    pub last_step: u64,
+    /// The pen's height at the end.
+    pub pen: u8,
+}
+
+/// Checks what the pins did against the settings.
+///
+/// # Panics
+/// At the first change that breaks a rule: a pulse shorter or a pause shorter than a pulse, a
+/// direction that changes during a pulse or too shortly before one, a step with the drivers off, a
+/// step before the pen's dwell is over.
+pub fn check_pins(trace: &[Stamped], settings: &Settings) -> Drawn {
+    let pulse = u64::from(settings.microseconds_as_ticks(Setting::StepPulse));
+    let setup = u64::from(settings.microseconds_as_ticks(Setting::DirectionSetup));
+    let mut drawn = Drawn::default();
+    // Of x and y: pulse high, since when, up, since when.
+    let mut axes = [(false, None::<u64>, true, None::<u64>); 2];
+    let (mut enabled, mut pen_ready) = (false, 0);
+    let mut at = PagePoint::default();
+    let mut index = 0;
+    while let Some(&Stamped { time, .. }) = trace.get(index) {
+        let mut delta = (0, 0);
+        // All that one interrupt did.
+        while let Some(stamped) = trace.get(index).filter(|stamped| stamped.time == time) {
+            index += 1;
+            match stamped.change {
+                Change::Enable(on) => enabled = on,
+                Change::Pen(height) => {
+                    assert!(!axes[0].0 && !axes[1].0, "{time}: the pen moves during a pulse");
+                    let dwell = if height > drawn.pen {
+                        Setting::PenDownDwell
+                    } else {
+                        Setting::PenUpDwell
+                    };
+                    pen_ready = time + u64::from(settings.milliseconds_as_ticks(dwell));
+                    drawn.pen = height;
+                }
+                Change::UpX(up) => turn(&mut axes[0], up, time),
+                Change::UpY(up) => turn(&mut axes[1], up, time),
+                Change::StepX(high) => delta.0 += rise(&mut axes[0], high, time, pulse, setup),
+                Change::StepY(high) => delta.1 += rise(&mut axes[1], high, time, pulse, setup),
+            }
+        }
+        if delta != (0, 0) {
+            assert!(enabled, "{time}: step with the drivers off");
+            assert!(time >= pen_ready, "{time}: step while the pen moves");
+            let next = PagePoint { x: at.x + delta.0, y: at.y + delta.1 };
+            if drawn.pen >= 64 {
+                drawn.inked.insert((at.min(next), at.max(next)));
+            }
+            at = next;
+            drawn.last_step = time;
+        }
+    }
+    drawn.end = at;
+    drawn
+}
+
+type AxisPins = (bool, Option<u64>, bool, Option<u64>);
+
+fn turn(axis: &mut AxisPins, up: bool, time: u64) {
+    assert!(!axis.0, "{time}: direction changes during a pulse");
+    (axis.2, axis.3) = (up, Some(time));
+}
+
+fn rise(axis: &mut AxisPins, high: bool, time: u64, pulse: u64, setup: u64) -> i32 {
+    if let Some(since) = axis.1 {
+        assert!(time >= since + pulse, "{time}: pulse or pause too short");
+    }
+    (axis.0, axis.1) = (high, Some(time));
+    if !high {
+        return 0;
+    }
+    if let Some(turned) = axis.3 {
+        assert!(time >= turned + setup, "{time}: pulse too soon after the direction");
+    }
+    if axis.2 { 1 } else { -1 }
 }

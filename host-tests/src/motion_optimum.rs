@@ -51,7 +51,7 @@ fn squared_limits(points: &[Point], limits: Limits) -> (Vec<f64>, Vec<f64>) {
         if limits.centripetal {
             radius[i] = radius[i].min(shorter * cosine / (2.0 * sine));
         }
-        if sine > 20f64.to_radians().sin() {
+        if sine > 0.342 {
             sharp.push(i);
         }
     }
@@ -91,8 +91,11 @@ fn squared_limits(points: &[Point], limits: Limits) -> (Vec<f64>, Vec<f64>) {
 }
 
 fn circle(first: Point, middle: Point, last: Point, rounding: f64) -> Option<f64> {
+    // Whether a circle counts is a matter of a threshold, so places are rounded as `motion` does.
+    let place = |p: Point| ((p.0 * 4096.0).floor() / 4096.0, (p.1 * 4096.0).floor() / 4096.0);
+    let (first, middle, last) = (place(first), place(middle), place(last));
     let (a, b, c) = (minus(middle, first), minus(last, middle), minus(last, first));
-    if norm(c) < norm(a).max(norm(b)) {
+    if 16.0 * norm(c) < 15.0 * norm(a).max(norm(b)) {
         return None;
     }
     let height = cross(a, b).abs() / norm(c) - rounding;

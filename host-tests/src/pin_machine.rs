@@ -177,6 +177,20 @@ pub fn run(
     turn_ticks: u64,
     visit: &mut dyn FnMut(Turn<'_, '_>) -> bool,
 ) -> Vec<Stamped> {
+    run_with(settings, turn_ticks, &mut |turn, queue| {
+        let Turn { machine, now, pins } = turn;
+        let goes_on = visit(Turn { machine: &mut *machine, now, pins });
+        machine.fill(path, queue);
+        goes_on
+    })
+}
+
+/// The same, but each turn fills the queue itself.
+pub fn run_with(
+    settings: Settings,
+    turn_ticks: u64,
+    turn: &mut dyn FnMut(Turn<'_, '_>, &mut dyn EventQueue) -> bool,
+) -> Vec<Stamped> {
     let state = PulserState::new();
     let mut queue: Queue<StepEvent, 256> = Queue::new();
     let (mut producer, consumer) = queue.split();
@@ -197,11 +211,10 @@ pub fn run(
     loop {
         let now = trace.now();
         let (x, y) = state.steps();
-        let turn = Turn { machine: &mut machine, now, pins: PagePoint { x, y } };
-        if !visit(turn) {
+        let this = Turn { machine: &mut machine, now, pins: PagePoint { x, y } };
+        if !turn(this, &mut producer) {
             return trace.changes();
         }
-        machine.fill(path, &mut producer);
         let next_turn = now + turn_ticks;
         let mut due = interrupt.unwrap_or(now);
         interrupt = loop {

@@ -1,8 +1,10 @@
 //! Speed, measured from the events: against the optimum, the table of known plotters, the limits.
 
+#![allow(clippy::expect_used, reason = "a test fails by panicking")]
+
 use penup::drawing::{LineType, PagePoint};
 use penup::machine::{Setting, Settings, Target, TargetList, Value};
-use penup::step::Line;
+use penup::step::{Arc, Chords, Line, Turn};
 use penup_host_tests::event_checker::{self, Run};
 use penup_host_tests::motion_optimum::{self, Limits};
 use penup_host_tests::pin_machine;
@@ -198,7 +200,7 @@ fn a_short_look_ahead_is_enough_for_dense_points() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 300, ..ProptestConfig::default() })]
     #[test]
     fn random_paths_take_the_time_of_the_optimum(
         turns in prop::collection::vec((-300i32..300, -300i32..300), 1..60),
@@ -227,6 +229,40 @@ proptest! {
     }
 }
 
+/// The greatest speed over any 5 ms, mm/s.
+fn fastest(run: &Run, places: &[f64]) -> f64 {
+    let mut fastest = 0.0f64;
+    let mut first = 0;
+    for (&time, &place) in run.times.iter().zip(places) {
+        while run.times[first + 1] <= time - 0.005 {
+            first += 1;
+        }
+        if time - run.times[first] >= 0.005 {
+            fastest = fastest.max((place - places[first]) / (time - run.times[first]));
+        }
+    }
+    fastest
+}
+
+#[test]
+fn arcs_keep_the_acceleration_and_lead_through_their_points() {
+    for radius in [50, 300, 1000] {
+        let (center, start) =
+            (PagePoint { x: 5000, y: 5000 }, PagePoint { x: 5000 + radius, y: 5000 });
+        let arc = Arc::new(center, start, start, Turn::Clockwise).expect("a circle");
+        let points: Vec<_> =
+            std::iter::once(start).chain(Chords::new(start, arc.clone())).collect();
+        let run = draw(&points, settings(50.0, 200.0, 0.127, true), 128);
+        assert_eq!(run.points, arc.collect::<Vec<_>>());
+        let speed = fastest(&run, &places(&points));
+        let radius = f64::from(radius) / STEPS_PER_MM;
+        assert!(speed * speed / radius <= 1.05 * 200.0, "{radius} mm: {speed} mm/s");
+        let ideal =
+            std::f64::consts::TAU * radius / (200.0 * radius).sqrt() + (radius / 200.0).sqrt();
+        assert!((run.seconds / ideal - 1.0).abs() < 0.01, "{radius} mm: {} s", run.seconds);
+    }
+}
+
 #[test]
 fn bends_keep_the_acceleration_whatever_the_chords() {
     let acceleration = 200.0;
@@ -239,17 +275,7 @@ fn bends_keep_the_acceleration_whatever_the_chords() {
                 let speed = (acceleration * radius).sqrt().min(50.0);
                 std::f64::consts::TAU * radius / speed + speed / acceleration
             };
-            let places = places(&points);
-            let mut fastest = 0.0f64;
-            let mut first = 0;
-            for (&time, &place) in run.times.iter().zip(&places) {
-                while run.times[first + 1] <= time - 0.005 {
-                    first += 1;
-                }
-                if time - run.times[first] >= 0.005 {
-                    fastest = fastest.max((place - places[first]) / (time - run.times[first]));
-                }
-            }
+            let fastest = fastest(&run, &places(&points));
             let case = format!("r {radius} chord {chord}: {:.4} s, {fastest:.2} mm/s", run.seconds);
             assert!(fastest * fastest / radius <= 1.05 * acceleration, "{case}");
             assert!((run.seconds / ideal - 1.0).abs() < 0.015, "{case}, ideally {ideal:.4} s");

@@ -8,11 +8,16 @@
 //! Refused: orders that the state does not allow, settings that conflict, moves beyond the limits;
 //! each leaves everything as it was.
 
+mod homing;
+mod kinematics;
 mod path;
 mod pulser;
 mod settings;
 
-pub use path::{JobSize, Path, Target, TargetList};
+use homing::Homing;
+pub use homing::{Axis, Switches};
+pub use kinematics::Kinematics;
+pub use path::{JobSize, Path, TapePath, Target, TargetList};
 pub use pulser::{Pen, Pins, Pulser, PulserState, Solenoid};
 pub use settings::{SETTING_COUNT, SETTINGS, Setting, SettingError, SettingInfo, Settings, Value};
 
@@ -36,6 +41,8 @@ pub enum State {
     Abort,
     /// Moves by hand.
     Jog,
+    /// Looks for the switches.
+    Home,
     /// Jobs are measured, not drawn.
     Check,
     /// Stopped; needs [`Machine::unlock`].
@@ -52,6 +59,10 @@ pub enum Alarm {
     EmergencyStop,
     /// A limit switch.
     HardLimit,
+    /// The machine starts without knowing where it is; [`Machine::home`] finds out.
+    NotHomed,
+    /// A switch was not found, or stayed pressed.
+    HomingFailed(Axis),
     /// The queue refused an event although it had room: a fault of the program.
     Queue,
 }
@@ -90,6 +101,10 @@ pub struct Status {
     pub job: JobSize,
     /// What of it is planned already: at most the queue ahead of the pins.
     pub done: JobSize,
+    /// How long the rest takes at least, without what corners and bends cost.
+    pub seconds_left: u32,
+    /// The pen that the machine waits for, if it does.
+    pub pen_wanted: Option<u8>,
 }
 
 /// The main loop's side of the plotter.
@@ -99,7 +114,7 @@ pub struct Machine<'m> {
     state: State,
     runner: Runner<'m>,
     pins: &'m PulserState,
-    /// The machine's position where the pins' count is 0.
+    /// The motors' position where the pins' count is 0.
     origin: PagePoint,
     ahead_ticks: u32,
     job: JobSize,
@@ -109,12 +124,19 @@ pub struct Machine<'m> {
     path_ended: bool,
     /// Whether the drivers are to be switched off once.
     sleep_due: bool,
+    homing: Option<Homing>,
+    /// The pen in the holder.
+    pen: u8,
+    /// The pen that comes next, and the first target that it draws.
+    next_pen: Option<(u8, Target)>,
+    /// Ink drawn, in units of 2^-18 mm, at the last pause.
+    ink_at_pause: u64,
 }
 
 impl<'m> Machine<'m> {
-    /// A machine at rest at the page's origin, pen raised.
+    /// A machine at rest at the page's origin, pen raised; in alarm if it must be homed first.
     ///
-    /// `blocks` is the look-ahead (20 bytes each; 100 or more serve well). `ahead_ticks` is how far
+    /// `blocks` is the look-ahead (24 bytes each; 100 or more serve well). `ahead_ticks` is how far
     /// the queue may be planned ahead of the pins, and so how late a hold takes effect;
     /// `u32::MAX` for no bound but the queue's.
     pub fn new(
@@ -125,7 +147,11 @@ impl<'m> Machine<'m> {
     ) -> Self {
         let machine = Self {
             settings,
-            state: State::Idle,
+            state: if settings.is_on(Setting::Homing) {
+                State::Alarm(Alarm::NotHomed)
+            } else {
+                State::Idle
+            },
             runner: Runner::new(settings.limits(), settings.pen_positions(), blocks),
             pins,
             origin: PagePoint::default(),
@@ -134,6 +160,10 @@ impl<'m> Machine<'m> {
             before: RunLengths::default(),
             path_ended: true,
             sleep_due: false,
+            homing: None,
+            pen: 0,
+            next_pen: None,
+            ink_at_pause: 0,
         };
         machine.configure_pulser();
         machine
@@ -166,27 +196,59 @@ impl<'m> Machine<'m> {
     /// Where it is, and how far the job is.
     pub fn status(&self) -> Status {
         let run = self.runner.run();
+        let done = JobSize {
+            strokes: run.strokes.wrapping_sub(self.before.strokes),
+            drawn: run.drawn - self.before.drawn,
+            travelled: run.travelled - self.before.travelled,
+        };
         Status {
             state: self.state,
             position: self.position(),
             job: self.job,
-            done: JobSize {
-                strokes: run.strokes.wrapping_sub(self.before.strokes),
-                drawn: run.drawn - self.before.drawn,
-                travelled: run.travelled - self.before.travelled,
-            },
+            done,
+            seconds_left: self.seconds_left(done),
+            pen_wanted: self.next_pen.map(|(pen, _)| pen),
         }
     }
 
-    /// Where the pins are, in steps.
-    pub fn position(&self) -> PagePoint {
-        let (x, y) = self.pins.steps();
-        PagePoint { x: self.origin.x.wrapping_add(x), y: self.origin.y.wrapping_add(y) }
+    fn seconds_left(&self, done: JobSize) -> u32 {
+        let at_speed = |length: u64, speed: Setting| {
+            // 2^-18 mm over 2^-16 mm/min, in milliseconds.
+            let speed = u64::from(self.settings.get(speed).to_bits().unsigned_abs());
+            (length >> 2).saturating_mul(60_000) / speed.max(1)
+        };
+        let strokes = u64::from(self.job.strokes.saturating_sub(done.strokes));
+        let dwell = self.settings.get(Setting::PenUpDwell).saturating_to_num::<u64>()
+            + self.settings.get(Setting::PenDownDwell).saturating_to_num::<u64>();
+        let milliseconds = at_speed(self.job.drawn.saturating_sub(done.drawn), Setting::DrawSpeed)
+            + at_speed(self.job.travelled.saturating_sub(done.travelled), Setting::TravelSpeed)
+            + strokes * dwell;
+        u32::try_from(milliseconds / 1000).unwrap_or(u32::MAX)
     }
 
-    /// Where the events planned so far lead, in steps.
+    /// Where the pins are, in steps of the page.
+    pub fn position(&self) -> PagePoint {
+        let (x, y) = self.pins.steps();
+        let motors =
+            PagePoint { x: self.origin.x.wrapping_add(x), y: self.origin.y.wrapping_add(y) };
+        self.settings.kinematics().page(motors)
+    }
+
+    /// Where the events planned so far lead, in steps of the page.
     pub fn planned_position(&self) -> PagePoint {
-        self.runner.position()
+        self.settings.kinematics().page(self.runner.position())
+    }
+
+    /// The machine stands at `page`, whatever it thought: the pins' count starts from there.
+    fn set_position(&mut self, page: PagePoint) {
+        let motors = self.settings.kinematics().motors(page);
+        let (x, y) = self.pins.steps();
+        self.origin = PagePoint { x: motors.x.wrapping_sub(x), y: motors.y.wrapping_sub(y) };
+        self.runner.set_position(motors, self.pins.ticks());
+    }
+
+    fn push(&mut self, target: Target) -> Result<(), PushError> {
+        self.runner.push(self.settings.kinematics().motors(target.point), target.ink)
     }
 
     /// The length of a step of x and of y is its setting; this is the position in millimetres.
@@ -197,7 +259,7 @@ impl<'m> Machine<'m> {
             let bits = (i64::from(steps) << (2 * Value::FRAC_NBITS)) / steps_per_mm.max(1);
             Value::from_bits(bits.clamp(i32::MIN.into(), i32::MAX.into()) as i32)
         };
-        [mm(point.x, Setting::StepsPerMmX), mm(point.y, Setting::StepsPerMmY)]
+        [mm(point.x, Setting::StepsPerMmX), mm(point.y, self.settings.steps_per_mm_y())]
     }
 
     /// Measures the path from where the machine stands, and begins to draw it if all of it can be
@@ -212,6 +274,7 @@ impl<'m> Machine<'m> {
         let size = self.measure(path)?;
         if self.state == State::Idle {
             self.job = size;
+            self.ink_at_pause = self.runner.run().drawn;
             self.before = self.runner.run();
             self.path_ended = false;
             self.state = State::Run;
@@ -228,7 +291,7 @@ impl<'m> Machine<'m> {
             return Err(MachineError::State(self.state));
         }
         self.check_travel(0, point)?;
-        match self.runner.push(point, None) {
+        match self.push(Target { point, ink: None }) {
             Ok(()) => {
                 self.state = State::Jog;
                 Ok(())
@@ -250,13 +313,12 @@ impl<'m> Machine<'m> {
         while self.is_moving() {
             self.read_targets(path);
             let ahead = self.runner.ticks().wrapping_sub(self.pins.ticks());
-            if queue.room() < Runner::ROOM || ahead >= self.ahead_ticks {
+            if queue.room() < Runner::ROOM || ahead >= self.greatest_ahead() {
                 return;
             }
             match self.runner.produce(queue) {
-                Ok(Progress::More) => {}
-                Ok(Progress::Done) => self.state = State::Idle,
-                Ok(Progress::Stopped) => self.stand(),
+                Ok(Progress::More) => self.pause_if_due(),
+                Ok(progress) => self.stand(progress),
                 Err(_) => self.alarm(Alarm::Queue),
             }
         }
@@ -270,9 +332,32 @@ impl<'m> Machine<'m> {
         }
     }
 
-    /// Lowers the pen where it was raised and goes on.
+    /// Pauses as soon as the stroke in work ends; [`Machine::resume`] goes on.
+    pub fn pause_after_stroke(&mut self) {
+        if self.state == State::Run {
+            self.runner.stop_after_stroke();
+        }
+    }
+
+    /// Scales the speeds to `percent` of the settings, 10 to 100, from the next line on.
+    pub fn set_override(&mut self, percent: u8) {
+        self.runner.set_override(percent);
+    }
+
+    /// Lowers the pen where it was raised and goes on; with the next pen, if the machine waited for
+    /// it.
     pub fn resume(&mut self) {
         if matches!(self.state, State::Hold { .. }) {
+            if self.state == (State::Hold { standing: true })
+                && self.runner.is_at_rest()
+                && let Some((pen, target)) = self.next_pen.take()
+            {
+                self.pen = pen;
+                if self.push(target).is_err() {
+                    self.abort();
+                    return;
+                }
+            }
             self.runner.resume();
             self.state = State::Run;
         }
@@ -280,7 +365,9 @@ impl<'m> Machine<'m> {
 
     /// Slows down, raises the pen, forgets the job, keeps the position. Ends a hold and a jog, too.
     pub fn abort(&mut self) {
-        if matches!(self.state, State::Run | State::Hold { .. } | State::Jog) {
+        if matches!(self.state, State::Run | State::Hold { .. } | State::Jog | State::Home) {
+            self.end_homing();
+            self.next_pen = None;
             self.runner.stop();
             self.path_ended = true;
             self.state = State::Abort;
@@ -290,6 +377,8 @@ impl<'m> Machine<'m> {
     /// Stops the pulses at once and raises the pen. The position is where the pins stopped.
     pub fn alarm(&mut self, alarm: Alarm) {
         self.pins.halt();
+        self.end_homing();
+        self.next_pen = None;
         self.runner.forget_path();
         self.path_ended = true;
         self.sleep_due = false;
@@ -329,8 +418,7 @@ impl<'m> Machine<'m> {
         match self.state {
             State::Sleep => {}
             State::Alarm(_) if self.pins.is_drained() => {
-                let position = self.position();
-                self.runner.set_position(position, self.pins.ticks());
+                self.set_position(self.position());
                 self.pins.release();
             }
             _ => return Err(MachineError::State(self.state)),
@@ -349,25 +437,55 @@ impl<'m> Machine<'m> {
         matches!(
             self.state,
             State::Run | State::Hold { standing: false } | State::Abort | State::Jog
-        )
+        ) || self.homing.is_some_and(|homing| !homing.stands)
     }
 
-    fn stand(&mut self) {
+    fn greatest_ahead(&self) -> u32 {
+        // A switch is to stop the machine soon: 10 ms.
+        if self.homing.is_some() { self.ahead_ticks.min(250_000) } else { self.ahead_ticks }
+    }
+
+    fn stand(&mut self, progress: Progress) {
         match self.state {
-            State::Hold { .. } => self.state = State::Hold { standing: true },
+            State::Hold { .. } | State::Run
+                if progress == Progress::Stopped || self.next_pen.is_some() =>
+            {
+                self.ink_at_pause = self.runner.run().drawn;
+                self.state = State::Hold { standing: true };
+            }
+            State::Home => {
+                self.runner.forget_path();
+                if let Some(homing) = &mut self.homing {
+                    homing.stands = true;
+                }
+            }
             _ => {
+                self.next_pen = None;
                 self.runner.forget_path();
                 self.state = State::Idle;
             }
         }
     }
 
+    fn pause_if_due(&mut self) {
+        let metres = u64::from(self.settings.get(Setting::InkBeforePause).to_bits().unsigned_abs());
+        // 2^-16 m to 2^-18 mm.
+        let due = self.ink_at_pause.saturating_add(metres * 4000);
+        if metres > 0 && self.runner.run().drawn >= due {
+            self.runner.stop_after_stroke();
+        }
+    }
+
     fn read_targets(&mut self, path: &mut dyn Path) {
-        while !self.path_ended && !self.runner.is_full() {
+        while !self.path_ended && self.next_pen.is_none() && !self.runner.is_full() {
             match path.next_target() {
+                Some(target) if path.pen() != self.pen => {
+                    self.next_pen = Some((path.pen(), target));
+                    self.runner.end_path();
+                }
                 // Measured at the start, so it fits.
                 Some(target) => {
-                    if self.runner.push(target.point, target.ink).is_err() {
+                    if self.push(target).is_err() {
                         self.abort();
                     }
                 }
@@ -382,11 +500,13 @@ impl<'m> Machine<'m> {
     fn measure(&self, path: &mut dyn Path) -> Result<JobSize, MachineError> {
         path.rewind();
         let mut size = JobSize::default();
+        let kinematics = self.settings.kinematics();
         let mut at = self.runner.end();
         let mut inked = false;
         let mut number = 0u32;
         while let Some(Target { point, ink }) = path.next_target() {
             self.check_travel(number, point)?;
+            let point = kinematics.motors(point);
             let length = self
                 .runner
                 .limits()
@@ -410,17 +530,15 @@ impl<'m> Machine<'m> {
     fn check_travel(&self, target: u32, point: PagePoint) -> Result<(), MachineError> {
         let beyond = |at: i32, travel: Setting, steps_per_mm: Setting| {
             let (least, most) = if self.settings.is_on(Setting::SoftLimits) {
-                let steps = i64::from(self.settings.get(travel).to_bits())
-                    * i64::from(self.settings.get(steps_per_mm).to_bits());
-                let steps = steps >> (2 * Value::FRAC_NBITS);
-                (0, steps.min(PAGE_LIMIT.into()) as i32)
+                let steps = self.settings.millimetres_as_steps(travel, steps_per_mm);
+                (0, steps.min(PAGE_LIMIT))
             } else {
                 (-PAGE_LIMIT, PAGE_LIMIT)
             };
             at.saturating_sub(at.clamp(least, most))
         };
         let x = beyond(point.x, Setting::TravelX, Setting::StepsPerMmX);
-        let y = beyond(point.y, Setting::TravelY, Setting::StepsPerMmY);
+        let y = beyond(point.y, Setting::TravelY, self.settings.steps_per_mm_y());
         if (x, y) == (0, 0) { Ok(()) } else { Err(MachineError::BeyondTravel { target, x, y }) }
     }
 

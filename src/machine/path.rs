@@ -1,6 +1,7 @@
 //! The ordered drawing, as the machine asks for it, and what it will take.
 
 use crate::drawing::{LineType, PagePoint};
+use crate::step::tape::{Decoder, TapeLines};
 
 /// Where the pen goes next, and whether it draws on the way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -17,6 +18,11 @@ pub trait Path {
     fn next_target(&mut self) -> Option<Target>;
     /// Begins again with the first target.
     fn rewind(&mut self);
+    /// The pen that the last target given wants, from 0. The machine stands and waits for
+    /// [`Machine::resume`](super::Machine::resume) where it changes.
+    fn pen(&self) -> u8 {
+        0
+    }
 }
 
 /// A path of targets in memory.
@@ -53,6 +59,32 @@ impl Path for TargetList<'_> {
     }
     fn rewind(&mut self) {
         self.next = 0;
+    }
+}
+
+/// A tape as a path from where the machine stands: its moves, and full lines where its pen is down.
+#[derive(Debug, Clone)]
+pub struct TapePath<I> {
+    start: PagePoint,
+    rows: I,
+    lines: TapeLines<Decoder<I>>,
+}
+
+impl<I: Iterator<Item = u8> + Clone> TapePath<I> {
+    /// The path of a tape whose first move is made from `start`.
+    pub fn new(start: PagePoint, rows: I) -> Self {
+        let lines = TapeLines::new(start, Decoder::new(rows.clone()));
+        Self { start, rows, lines }
+    }
+}
+
+impl<I: Iterator<Item = u8> + Clone> Path for TapePath<I> {
+    fn next_target(&mut self) -> Option<Target> {
+        let (point, inked) = self.lines.next()?;
+        Some(Target { point, ink: inked.then_some(LineType::Full) })
+    }
+    fn rewind(&mut self) {
+        *self = Self::new(self.start, self.rows.clone());
     }
 }
 

@@ -56,7 +56,9 @@ impl PulserState {
         self.drained.load(Ordering::Acquire)
     }
 
-    /// No pulse leaves from now on; the interrupt throws the queue away, a few events a call.
+    /// No pulse leaves from now on; the interrupt raises the pen and throws the queue away, one
+    /// event a call. Call [`Pulser::tick`] at once, or the pen stays down until the event in work
+    /// ends.
     pub fn halt(&self) {
         self.halt.store(true, Ordering::Release);
     }
@@ -204,7 +206,11 @@ where
     const DISCARD_TICKS: u32 = 100;
 
     fn run_dry(&mut self) -> Option<u32> {
-        if core::mem::take(&mut self.moving) && !self.state.is_halted() {
+        let halted = self.state.is_halted();
+        if halted {
+            self.pen.set_height(0);
+        }
+        if core::mem::take(&mut self.moving) && !halted {
             let underruns = self.state.underruns.load(Ordering::Relaxed);
             self.state.underruns.store(underruns.wrapping_add(1), Ordering::Relaxed);
         }

@@ -3,6 +3,7 @@
 //! Numbers up to 132 mean what they mean in Grbl 1.1; those from 200 on are penup's own. A value is
 //! checked when it is entered, alone and together with the others; a refused value changes nothing.
 
+use super::Kinematics;
 use crate::fixed::Millimetres;
 use crate::motion::{Limits, LimitsError, MotionSettings, PenPositions, TICKS_PER_SECOND};
 
@@ -26,6 +27,12 @@ pub enum Setting {
     HardLimits,
     /// `$22` Whether the machine must be homed before it draws.
     Homing,
+    /// `$24` Speed of the second approach to a switch.
+    HomingFeed,
+    /// `$25` Speed of the first.
+    HomingSeek,
+    /// `$27` How far from its switch an axis is homed.
+    HomingPullOff,
     /// `$100` Steps per millimetre of x.
     StepsPerMmX,
     /// `$101` The same of y.
@@ -58,8 +65,15 @@ pub enum Setting {
     PenUpDwell,
     /// `$213` From the order to lower the pen to the first move.
     PenDownDwell,
+    /// `$214` Time in which the pen goes from one end of its heights to the other, step by step; 0
+    /// for at once.
+    PenRamp,
+    /// `$215` How much ink the pen draws before the machine pauses after a stroke; 0 for never.
+    InkBeforePause,
     /// `$220` Length of the dots and gaps of a dotted line; a dash is three dots.
     DotLength,
+    /// `$230` Build of the machine: 0 Cartesian, 1 CoreXY.
+    Kinematics,
 }
 
 /// What there is to know about a setting.
@@ -84,7 +98,7 @@ pub struct SettingInfo {
 }
 
 /// How many settings there are.
-pub const SETTING_COUNT: usize = 23;
+pub const SETTING_COUNT: usize = 29;
 
 const fn info(
     setting: Setting,
@@ -118,6 +132,9 @@ pub const SETTINGS: [SettingInfo; SETTING_COUNT] = {
         info(SoftLimits, 20, "soft limits", "0|1", (0.0, 1.0, 1.0), true),
         info(HardLimits, 21, "hard limits", "0|1", (0.0, 1.0, 0.0), true),
         info(Homing, 22, "homing", "0|1", (0.0, 1.0, 0.0), true),
+        info(HomingFeed, 24, "homing speed, second", "mm/min", (1.0, 32767.0, 60.0), false),
+        info(HomingSeek, 25, "homing speed, first", "mm/min", (1.0, 32767.0, 1500.0), false),
+        info(HomingPullOff, 27, "homing pull-off", "mm", (0.1, 50.0, 2.0), false),
         info(StepsPerMmX, 100, "steps of x", "step/mm", (2.0, 4000.0, 80.0), false),
         info(StepsPerMmY, 101, "steps of y", "step/mm", (2.0, 4000.0, 80.0), false),
         info(MaxRateX, 110, "greatest speed of x", "mm/min", (1.0, 32767.0, 6000.0), false),
@@ -134,7 +151,10 @@ pub const SETTINGS: [SettingInfo; SETTING_COUNT] = {
         info(PenDownHeight, 211, "height pen down", "of 127", (0.0, 127.0, 127.0), true),
         info(PenUpDwell, 212, "dwell pen up", "ms", (0.0, 1300.0, 150.0), false),
         info(PenDownDwell, 213, "dwell pen down", "ms", (0.0, 1300.0, 150.0), false),
+        info(PenRamp, 214, "ramp of the pen", "ms", (0.0, 5000.0, 0.0), false),
+        info(InkBeforePause, 215, "ink before a pause", "m", (0.0, 10000.0, 0.0), false),
         info(DotLength, 220, "length of a dot", "mm", (0.1, 100.0, 1.0), false),
+        info(Kinematics, 230, "kinematics", "0|1", (0.0, 1.0, 0.0), true),
     ]
 };
 
@@ -258,12 +278,33 @@ impl Settings {
         self.checked_limits().unwrap_or_default()
     }
 
+    /// The same, but for the speed with the pen up, which is that of `travel`.
+    pub(super) fn limits_at(&self, travel: Setting) -> Limits {
+        let settings = MotionSettings {
+            travel_mm_per_min: self.get(travel).min(self.axes_rate()),
+            ..self.motion_settings()
+        };
+        Limits::new(&settings).unwrap_or_else(|_| self.limits())
+    }
+
     fn checked_limits(&self) -> Result<Limits, LimitsError> {
-        let axes = self.get(Setting::MaxRateX).min(self.get(Setting::MaxRateY));
-        Limits::new(&MotionSettings {
-            steps_per_mm: [self.get(Setting::StepsPerMmX), self.get(Setting::StepsPerMmY)],
-            draw_mm_per_min: self.get(Setting::DrawSpeed).min(axes),
-            travel_mm_per_min: self.get(Setting::TravelSpeed).min(axes),
+        Limits::new(&self.motion_settings())
+    }
+
+    fn axes_rate(&self) -> Value {
+        self.get(Setting::MaxRateX).min(self.get(Setting::MaxRateY))
+    }
+
+    fn motion_settings(&self) -> MotionSettings {
+        let steps = [self.get(Setting::StepsPerMmX), self.get(Setting::StepsPerMmY)];
+        MotionSettings {
+            steps_per_mm: match self.kinematics() {
+                Kinematics::Cartesian => steps,
+                // A move of the page is √2 as long in the steps of both motors.
+                Kinematics::CoreXy => [steps[0].saturating_mul(Value::SQRT_2); 2],
+            },
+            draw_mm_per_min: self.get(Setting::DrawSpeed).min(self.axes_rate()),
+            travel_mm_per_min: self.get(Setting::TravelSpeed).min(self.axes_rate()),
             acceleration_mm_per_s2: self
                 .get(Setting::AccelerationX)
                 .min(self.get(Setting::AccelerationY)),
@@ -271,20 +312,38 @@ impl Settings {
             centripetal: self.is_on(Setting::Centripetal),
             pulse_ticks: self.microseconds_as_ticks(Setting::StepPulse),
             direction_setup_ticks: self.microseconds_as_ticks(Setting::DirectionSetup),
-        })
+        }
+    }
+
+    /// The build of the machine. CoreXY takes the steps per millimetre of x for both axes.
+    pub fn kinematics(&self) -> Kinematics {
+        if self.is_on(Setting::Kinematics) { Kinematics::CoreXy } else { Kinematics::Cartesian }
+    }
+
+    /// Steps of the page per millimetre of y: those of x where one belt moves both.
+    pub(super) fn steps_per_mm_y(&self) -> Setting {
+        match self.kinematics() {
+            Kinematics::Cartesian => Setting::StepsPerMmY,
+            Kinematics::CoreXy => Setting::StepsPerMmX,
+        }
+    }
+
+    /// A setting in millimetres, as steps of the page.
+    pub(super) fn millimetres_as_steps(&self, setting: Setting, steps_per_mm: Setting) -> i32 {
+        let steps =
+            i64::from(self.get(setting).to_bits()) * i64::from(self.get(steps_per_mm).to_bits());
+        // At most 8000 mm of 4000 steps.
+        (steps >> (2 * Value::FRAC_NBITS)) as i32
     }
 
     pub(super) fn pen_positions(&self) -> PenPositions {
-        let steps_per_mm = self.get(Setting::StepsPerMmX).max(self.get(Setting::StepsPerMmY));
-        // Both below 2^28 in bits: 100 mm of 4000 steps.
-        let length = i64::from(self.get(Setting::DotLength).to_bits());
-        let dot = (length * i64::from(steps_per_mm.to_bits())) >> (2 * Value::FRAC_NBITS);
         PenPositions {
             up_height: self.height(Setting::PenUpHeight),
             down_height: self.height(Setting::PenDownHeight),
             up_ticks: self.milliseconds_as_ticks(Setting::PenUpDwell),
             down_ticks: self.milliseconds_as_ticks(Setting::PenDownDwell),
-            dot_moves: dot.max(1) as u32,
+            ramp_ticks: self.milliseconds_as_ticks(Setting::PenRamp) / 127,
+            dot_length: self.get(Setting::DotLength).saturating_to_num(),
         }
     }
 }

@@ -109,15 +109,16 @@ fn circle_limit(limits: &Limits, first: Place, middle: Place, last: Place) -> Op
     if sides >= 4 * u128::from(twice_area) * u128::from(top) {
         return None;
     }
-    let length = |x: i32, y: i32| {
+    let squared = |x: i32, y: i32| {
         let square = |part: i32| u64::from(part.unsigned_abs()) * u64::from(part.unsigned_abs());
-        (square(x) + square(y)).isqrt()
+        square(x) + square(y)
     };
-    let (a, b, c) = (length(ax, ay), length(bx, by), length(cx, cy));
-    // Turned so far that the chord says nothing about one curve.
-    if c < a.max(b) {
+    let (a, b, c) = (squared(ax, ay), squared(bx, by), squared(cx, cy));
+    // Turned so far that the chord says nothing about one curve: c below 15/16 of a or b.
+    if 256 * c < 225 * a.max(b) {
         return None;
     }
+    let (a, b, c) = (a.isqrt(), b.isqrt(), c.isqrt());
     let rounding = u64::from(limits.rounding.to_bits() >> (PathLength::FRAC_NBITS - FRACTION_BITS));
     let height = (twice_area / c).saturating_sub(rounding);
     let half_radius = (a * b).checked_div(4 * height)?;

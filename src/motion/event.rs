@@ -1,5 +1,8 @@
 //! The step event, one word, and the queue in which events wait.
 
+use crate::step::Direction;
+use crate::step::tape::Instruction;
+
 /// What the step interrupt is told: pin levels, and how long until the next event. One word.
 ///
 /// | bits | of a move | of the pen |
@@ -105,6 +108,18 @@ impl StepEvent {
                 axis_step(levels, Self::STEP_X, Self::DOWN_X),
                 axis_step(levels, Self::STEP_Y, Self::DOWN_Y),
             ),
+        }
+    }
+
+    /// What a tape would hold of the event: a move, or the pen going up (height below 64) or down.
+    pub fn instruction(self) -> Option<Instruction> {
+        match self.kind() {
+            EventKind::Pen { height } if height < 64 => Some(Instruction::PenUp),
+            EventKind::Pen { .. } => Some(Instruction::PenDown),
+            EventKind::Levels(_) => {
+                let (dx, dy) = self.step();
+                Direction::from_delta(dx, dy).map(Instruction::Move)
+            }
         }
     }
 

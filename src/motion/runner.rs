@@ -6,6 +6,7 @@ use super::profile::{FRACTION_BITS, Pace, Profile, Slice};
 use super::{Block, Emitter, EventQueue, Limits, Lookahead, PathLength, SliceSpeed, StepEvent};
 use crate::drawing::{LineType, PagePoint};
 use crate::step::{Line, Pattern};
+use core::cmp::Ordering;
 
 /// Where the pen stands and how long it takes to get there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -18,8 +19,10 @@ pub struct PenPositions {
     pub up_ticks: u32,
     /// From the order to lower it to the first move.
     pub down_ticks: u32,
-    /// Length of a dot, in moves.
-    pub dot_moves: u32,
+    /// From one height to the next on the way between the two; 0 for no way.
+    pub ramp_ticks: u32,
+    /// Length of a dot or gap.
+    pub dot_length: PathLength,
 }
 
 /// What one call of [`Runner::produce`] came to.
@@ -29,7 +32,8 @@ pub enum Progress {
     More,
     /// All blocks are run, the pen is raised, the machine stands.
     Done,
-    /// It stands on the path, as [`Runner::stop`] asked, with the pen raised.
+    /// It stands on the path with the pen raised, as [`Runner::stop`] or
+    /// [`Runner::stop_after_stroke`] asked.
     Stopped,
 }
 
@@ -96,7 +100,10 @@ pub struct Runner<'m> {
     /// The plan's time, 1/16 ticks; wraps.
     now: u64,
     pen_is_down: bool,
+    /// Where the pen was sent last; not known at the start.
+    pen_height: Option<u8>,
     stopping: bool,
+    stopping_after_stroke: bool,
     /// Where the events so far lead.
     position: PagePoint,
     /// Where the blocks so far lead.
@@ -127,7 +134,9 @@ impl<'m> Runner<'m> {
             curve: Pace::REST,
             now: 0,
             pen_is_down: false,
+            pen_height: None,
             stopping: false,
+            stopping_after_stroke: false,
             position: PagePoint::default(),
             end: PagePoint::default(),
             last: None,
@@ -207,6 +216,7 @@ impl<'m> Runner<'m> {
         self.forget_path();
         self.emitter.restart(ticks);
         self.pen_is_down = false;
+        self.pen_height = None;
         self.position = point;
         self.end = point;
     }
@@ -258,9 +268,15 @@ impl<'m> Runner<'m> {
         }
     }
 
-    /// Goes on where [`Runner::stop`] stood.
+    /// Stands before the next move with the pen up.
+    pub fn stop_after_stroke(&mut self) {
+        self.stopping_after_stroke = true;
+    }
+
+    /// Goes on where [`Runner::stop`] or [`Runner::stop_after_stroke`] stood.
     pub fn resume(&mut self) {
         self.stopping = false;
+        self.stopping_after_stroke = false;
     }
 
     /// Gives up what waits; the machine must stand.
@@ -269,6 +285,7 @@ impl<'m> Runner<'m> {
         self.course = None;
         self.pace = Pace::REST;
         self.stopping = false;
+        self.stopping_after_stroke = false;
         self.last = None;
         self.in_stroke = false;
         self.end = self.position;
@@ -342,7 +359,10 @@ impl<'m> Runner<'m> {
     }
 
     fn begin_block(&mut self, queue: &mut dyn EventQueue) -> Result<Progress, StepEvent> {
-        if self.stopping && self.pace == Pace::REST {
+        let stroke_ends =
+            self.in_stroke && self.lookahead.front().is_some_and(|block| block.ink.is_none());
+        let stops = self.stopping || (self.stopping_after_stroke && stroke_ends);
+        if stops && self.pace == Pace::REST {
             return self.stand(Progress::Stopped, queue);
         }
         let Some(block) = self.lookahead.pop() else {
@@ -354,9 +374,14 @@ impl<'m> Runner<'m> {
         self.in_stroke = block.ink.is_some();
         let line = Line::by(block.dx, block.dy);
         let moves = line.remaining();
-        let line_type = block.ink.unwrap_or_default();
-        let pattern = Pattern::of(line_type, moves, self.pen.dot_moves);
         let move_length = (u64::from(block.length.to_bits()) << 14) / u64::from(moves.max(1));
+        let line_type = block.ink.unwrap_or_default();
+        let pattern = if line_type == LineType::Full {
+            Pattern::full(moves)
+        } else {
+            let dot_moves = (u64::from(self.pen.dot_length.to_bits()) << 14) / move_length.max(1);
+            Pattern::of(line_type, moves, u32::try_from(dot_moves).unwrap_or(u32::MAX))
+        };
         self.course = Some(Course {
             line,
             ink: block.ink,
@@ -392,19 +417,34 @@ impl<'m> Runner<'m> {
         }
         if standing == Progress::Done {
             self.last = None;
+            self.in_stroke = false;
         }
         Ok(standing)
     }
 
-    /// The pen goes up or down and the dwell passes, in at most four events.
+    /// The pen goes up or down, or one height further on its ramp; at the end the dwell passes. At
+    /// most four events.
     fn move_pen(&mut self, down: bool, queue: &mut dyn EventQueue) -> Result<(), StepEvent> {
         let (height, dwell) = if down {
             (self.pen.down_height, self.pen.down_ticks)
         } else {
             (self.pen.up_height, self.pen.up_ticks)
         };
-        let at = self.emitter.pen(height, self.ticks_now(), queue)?;
+        let far = if down { self.pen.up_height } else { self.pen.down_height };
+        let from = self.pen_height.unwrap_or(far);
+        let next = match height.cmp(&from) {
+            _ if self.pen.ramp_ticks == 0 => height,
+            Ordering::Less => from - 1,
+            Ordering::Equal => height,
+            Ordering::Greater => from + 1,
+        };
+        let at = self.emitter.pen(next, self.ticks_now(), queue)?;
         self.advance_to(at);
+        self.pen_height = Some(next);
+        if next != height {
+            self.now += u64::from(self.pen.ramp_ticks) << FRACTION_BITS;
+            return Ok(());
+        }
         self.pen_is_down = down;
         // Two waits of up to 0.67 s: the settings allow no longer dwell.
         let half = dwell.div_ceil(2).min(StepEvent::MAX_TICKS);

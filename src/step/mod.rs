@@ -1,16 +1,20 @@
-//! A line, a dotted line, a dashed line as single moves of the plotter in eight directions.
+//! A line, a dotted line, an arc as single moves of the plotter in eight directions.
 //!
 //! Harrison 1.6: of the two moves that may follow, a line takes the one that ends nearer to the
 //! true line. Where both are as near (the Knight's move condition, 1.6.1) the choice depends on the
 //! way the line runs, so that the moves from A to B are those from B to A reversed and a line drawn
-//! twice is no thicker. [`Line`] yields the moves; [`Pattern`] says which of them are inked.
+//! twice is no thicker. [`Line`] yields the moves; [`Pattern`] says which of them are inked; [`Arc`]
+//! yields the points of an arc, and [`Chords`] the lines that draw exactly those.
 //!
 //! Not done here: speed, pen, limits. A line of more than 2^21 moves is beyond the page and is
 //! refused where the page is checked.
 
+mod arc;
 mod line;
 mod pattern;
+pub mod tape;
 
+pub use arc::{Arc, ArcError, Chords, Turn};
 pub use line::Line;
 pub use pattern::{DottedLine, InkedMove, Pattern};
 
