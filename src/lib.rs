@@ -28,5 +28,7 @@ pub mod step;
 pub mod view;
 pub mod visibility;
 
+pub mod convex;
+
 #[cfg(feature = "host")]
 pub mod boards;
