@@ -149,6 +149,20 @@ pub fn cut_cube(dice: &mut Dice) -> Vec<Point> {
     points
 }
 
+/// A roof over a pit, often with vertices on both slopes that, from above, only its ridge parts.
+pub fn roof(dice: &mut Dice) -> Vec<Point> {
+    let mut points = vec![[-6, 0, 4], [6, 0, 4], [0, 0, -8]];
+    for side in [-1, 1] {
+        for x in [-2, 2] {
+            if dice.throw(0, 2) > 0 {
+                points.push([x, 2 * side, 2]);
+            }
+        }
+        points.push([dice.throw(-2, 2), 6 * side, -4]);
+    }
+    points
+}
+
 /// Any points: most are not convex.
 pub fn any_points(dice: &mut Dice) -> Vec<Point> {
     let reach = dice.throw(1, 3);
@@ -157,7 +171,7 @@ pub fn any_points(dice: &mut Dice) -> Vec<Point> {
 
 /// A solid of any kind in any order, now and then with corners repeated, now and then as large as can be.
 pub fn any_solid(dice: &mut Dice) -> Vec<Point> {
-    let kinds = [on_sphere, cuboid, prism, pyramid, octahedron, cut_cube, any_points];
+    let kinds = [on_sphere, cuboid, prism, pyramid, octahedron, cut_cube, roof, any_points];
     let mut points = dice.pick(&kinds[..])(dice);
     if dice.throw(0, 4) == 0 {
         let point = dice.pick(&points);
@@ -226,4 +240,36 @@ pub fn read_scene(name: &str) -> (Vec<Point>, Vec<Vec<u16>>) {
             .map(|line| numbers(line).iter().map(|corner| (corner - 1) as u16).collect())
             .collect(),
     )
+}
+
+/// Three perpendicular directions of length 1, at random.
+pub fn any_rotation(dice: &mut Dice) -> [[f64; 3]; 3] {
+    let [w, x, y, z] = loop {
+        let q = [0; 4].map(|_| f64::from(dice.throw(-1000, 1000)) / 1000.0);
+        let length = q.iter().map(|part| part * part).sum::<f64>().sqrt();
+        if length > 0.1 {
+            break q.map(|part| part / length);
+        }
+    };
+    [
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+    ]
+}
+
+/// The solid at radius 1, turned, written with so many decimals, and read in units of 2^-29.
+pub fn as_decimals(points: &[Point], rotation: &[[f64; 3]; 3], decimals: i32) -> Vec<Point> {
+    let square = |point: &Point| point.iter().map(|part| f64::from(part * part)).sum::<f64>();
+    let radius = points.iter().map(square).fold(0.0, f64::max).sqrt();
+    let written = |number: f64| (number * 10f64.powi(decimals)).round() / 10f64.powi(decimals);
+    points
+        .iter()
+        .map(|point| {
+            [0, 1, 2].map(|row| {
+                let turned: f64 = (0..3).map(|k| rotation[row][k] * f64::from(point[k])).sum();
+                (written(turned / radius) * f64::from(1 << 29)).round() as i32
+            })
+        })
+        .collect()
 }

@@ -10,7 +10,9 @@ use penup::convex::{
 use penup::model::Corner;
 use penup::stage::{Aborted, Attention, Scratch, Undisturbed};
 use penup_host_tests::convex_model::{Found, Model, Point, Solid, model};
-use penup_host_tests::convex_solids::{Dice, any_eye, any_solid, read_scene};
+use penup_host_tests::convex_solids::{
+    Dice, any_eye, any_rotation, any_solid, as_decimals, read_scene,
+};
 
 fn found(points: &[Point], eye: Eye, tolerance: u32) -> Result<(SolidSummary, Found), SolidError> {
     let mut words = vec![0; scratch_bytes_from_vertices(points.len()) / 8];
@@ -103,38 +105,6 @@ fn the_scenes_list_the_faces_that_are_found() {
         let found: BTreeSet<_> = found.faces.into_iter().map(|(corners, _)| corners).collect();
         assert_eq!(found, listed_faces(&faces), "{name}");
     }
-}
-
-/// Three perpendicular directions of length 1, at random.
-fn any_rotation(dice: &mut Dice) -> [[f64; 3]; 3] {
-    let [w, x, y, z] = loop {
-        let q = [0; 4].map(|_| f64::from(dice.throw(-1000, 1000)) / 1000.0);
-        let length = q.iter().map(|part| part * part).sum::<f64>().sqrt();
-        if length > 0.1 {
-            break q.map(|part| part / length);
-        }
-    };
-    [
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
-    ]
-}
-
-/// The solid at radius 1, turned, written with so many decimals, and read in units of 2^-29.
-fn as_decimals(points: &[Point], rotation: &[[f64; 3]; 3], decimals: i32) -> Vec<Point> {
-    let square = |point: &Point| point.iter().map(|part| f64::from(part * part)).sum::<f64>();
-    let radius = points.iter().map(square).fold(0.0, f64::max).sqrt();
-    let written = |number: f64| (number * 10f64.powi(decimals)).round() / 10f64.powi(decimals);
-    points
-        .iter()
-        .map(|point| {
-            [0, 1, 2].map(|row| {
-                let turned: f64 = (0..3).map(|k| rotation[row][k] * f64::from(point[k])).sum();
-                (written(turned / radius) * f64::from(1 << 29)).round() as i32
-            })
-        })
-        .collect()
 }
 
 #[test]

@@ -1,16 +1,19 @@
-//! Ways to see a convex solid for which no faces are needed.
+//! The two ways to see a convex solid for which no faces are needed.
 //!
 //! [`from_vertices`] takes vertices alone (Harrison, chapter 3): it finds the outline, then from its
 //! segments the visible and the hidden faces, each once, and hands over faces and edges.
+//! [`from_edges`] takes vertices and edges (Zámožík & Zaťková): it walks the outline along the edges,
+//! takes it out of the graph and decides each component that is left.
 //!
-//! They work on the *positions of the model*, not on the rounded vertices of the view. A square whose
+//! Both work on the *positions of the model*, not on the rounded vertices of the view. A square whose
 //! corners are rounded one by one is no longer flat, and the solid that the user means would fall into
 //! triangles; in the model its corners are exactly coplanar, and a face that is edge-on is exactly
 //! edge-on. The eye is given in the same unit. No page is needed, so the camera's other numbers are not
 //! either, and an eye so near that part of the solid lies behind it is all right.
 //!
-//! Positions that came from decimals may be off their common plane by the rounding of the decimals. The
-//! faces found exactly are then joined: a face takes in its neighbours if each of their corners comes
+//! Positions that came from decimals may be off their common plane by the rounding of the decimals, so
+//! both take a `tolerance` in units of the positions. [`from_edges`] believes the edges and only has to
+//! know the outline; how, it says. [`from_vertices`] joins the faces that it found exactly: a face takes in its neighbours if each of their corners comes
 //! onto its plane by moving each coordinate by at most the `tolerance`. Tolerance zero is exact.
 //! [`default_tolerance`] is a 16384th of the solid's size: five decimals of coordinates about 1 are
 //! enough for it, and on paper it is a fraction of a step.
@@ -19,7 +22,9 @@
 //! the others span, an eye inside. Vertices all in one plane are drawn as the flat polygon that they
 //! are. Vertices at the same place count as one, under the least of their numbers.
 
+mod edges;
 mod exact;
+mod eye;
 mod faces;
 mod joined;
 mod points;
@@ -28,20 +33,10 @@ mod polygon;
 use crate::model::Corner;
 use crate::stage::{Aborted, OutOfScratch};
 
+pub use edges::{from_edges, scratch_bytes_from_edges};
+pub use eye::{EYE_LIMIT, Eye};
 pub use faces::{from_vertices, scratch_bytes_from_vertices};
 pub use points::default_tolerance;
-
-/// Where the user looks from, in units of the model's positions. Exact: nothing here is rounded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Eye {
-    /// Perspective: the lines of sight meet here.
-    At([i64; 3]),
-    /// Parallel projection: the direction from the solid to the user, not zero, of any length.
-    Towards([i64; 3]),
-}
-
-/// The coordinates of an [`Eye`] lie within ± this.
-pub const EYE_LIMIT: i64 = 1 << 61;
 
 /// Positions lie within ± this, so that differences fit 32 bits.
 pub const POSITION_LIMIT: i32 = 1 << 30;
@@ -92,7 +87,7 @@ pub use crate::visibility::SinkFull;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SolidSummary {
-    /// Faces handed over (none if edges were given).
+    /// Faces handed over (none by [`from_edges`]).
     pub faces: usize,
     /// Edges handed over.
     pub edges: usize,
@@ -100,7 +95,7 @@ pub struct SolidSummary {
     pub welded: usize,
     /// Vertices that are no corners: in the middle of a face or an edge.
     pub flat: usize,
-    /// Parts into which the graph fell without the outline (only if edges were given).
+    /// Parts into which the graph fell without the outline ([`from_edges`] only).
     pub components: usize,
 }
 
@@ -166,14 +161,5 @@ impl From<SinkFull> for SolidError {
 impl From<Aborted> for SolidError {
     fn from(_: Aborted) -> Self {
         Self::Aborted
-    }
-}
-
-impl Eye {
-    fn check(self) -> Result<(), SolidError> {
-        let (Self::At(coordinates) | Self::Towards(coordinates)) = self;
-        let in_range =
-            coordinates.iter().all(|part| part.unsigned_abs() <= EYE_LIMIT.unsigned_abs());
-        if in_range && self != Self::Towards([0; 3]) { Ok(()) } else { Err(SolidError::BadEye) }
     }
 }

@@ -12,13 +12,18 @@ use crate::model::VERTEX_NUMBER_LIMIT;
 /// assert_eq!(default_tolerance(&[[0, 0, 0], [1000, 0, 0]]), 0);
 /// ```
 pub fn default_tolerance(positions: &[[i32; 3]]) -> u32 {
+    largest_extent(positions.iter().copied()) >> 14
+}
+
+/// The longest side of the box around the points.
+pub(super) fn largest_extent(points: impl Iterator<Item = Point> + Clone) -> u32 {
     let extent = |axis: usize| {
-        let along = positions.iter().map(|position| position[axis]);
+        let along = points.clone().map(|point| point[axis]);
         let low = along.clone().min().unwrap_or(0);
         let high = along.max().unwrap_or(0);
         high.abs_diff(low)
     };
-    [0, 1, 2].map(extent).into_iter().max().unwrap_or(0) >> 14
+    [0, 1, 2].map(extent).into_iter().max().unwrap_or(0)
 }
 
 /// What a set of different points spans, with points that show it.
@@ -78,4 +83,12 @@ pub(super) fn span(points: &[Point], numbers: &[u16]) -> Span {
         Some(d) => Span::Space([a, b, c, d]),
         None => Span::Plane([a, b, c]),
     }
+}
+
+/// The vertex that stands for `number` among the welded ones.
+pub(super) fn first_at_place(points: &[Point], welded: &[u16], number: u16) -> u16 {
+    let place = points[usize::from(number)];
+    welded
+        .binary_search_by_key(&place, |other| points[usize::from(*other)])
+        .map_or(number, |at| welded[at])
 }
