@@ -112,7 +112,7 @@ fn rounded_decimals_still_give_whole_faces() {
     let mut dice = Dice::new(20);
     for name in SCENES {
         let (points, faces) = read_scene(name);
-        for decimals in [5, 6, 8, 9] {
+        for decimals in [6, 7, 9] {
             for _ in 0..20 {
                 let rounded = as_decimals(&points, &any_rotation(&mut dice), decimals);
                 let eye = Eye::At([0, 1, 2].map(|_| i64::from(dice.throw(-9, 9)) << 32));

@@ -12,11 +12,6 @@
 //! - *Isolated edges*, note 4 (c), join two vertices of the outline. On either side of such an edge there is
 //!   another outline vertex; the line between those two belongs to the solid and crosses the edge on the
 //!   page. The edge is visible if it is nearer at the crossing.
-//!
-//! In a solid with rounded positions a face that is meant to be edge-on is not quite, and a vertex that is
-//! meant to be right behind another peeps out on one side or the other: the outline may not close. The eye
-//! is then moved a little towards the middle of the solid, by as much as the tolerance asks for, so that
-//! all of this is hidden beyond doubt. With tolerance zero everything is exact.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -30,7 +25,8 @@ use crate::stage::{Attention, OutOfScratch, Scratch};
 ///
 /// `edges`: pairs of vertex numbers, from 0, in any order and direction; an edge given twice counts once,
 /// an edge between two vertices at the same place not at all. Vertices without an edge are left out. The
-/// edges are believed: no face is looked for. The sink gets every edge once, lesser vertex first, in order, and no face.
+/// edges are believed: no face is looked for. The sink gets every edge once, lesser vertex first, in order,
+/// and no face. `tolerance`: how far, in units of the positions, a coordinate may be off (see the module).
 ///
 /// # Errors
 /// See [`SolidError`].
@@ -93,7 +89,7 @@ pub fn from_edges(
         Span::Space(inside) => inside,
     };
     let viewpoint = Viewpoint {
-        eye: eye.drawn_in(graph.centre(), graph.extent(), tolerance),
+        eye: points::drawn_in_eye(eye, positions, graph.numbers, tolerance),
         inside: Some(inside.map(|number| positions[usize::from(number)])),
     };
     let outline = graph.find_outline(&viewpoint, inside, &mut scratch, attention)?;
@@ -194,20 +190,6 @@ impl<'s> Graph<'s> {
 
     fn point(&self, number: u16) -> Point {
         self.points[usize::from(number)]
-    }
-
-    fn extent(&self) -> u32 {
-        points::largest_extent(self.numbers.iter().map(|number| self.point(*number)))
-    }
-
-    /// The mean of all corners, rounded: well inside.
-    fn centre(&self) -> Point {
-        let count = self.numbers.len() as i64; // at most 2^14
-        [0, 1, 2].map(|axis| {
-            let sum: i64 =
-                self.numbers.iter().map(|number| i64::from(self.point(*number)[axis])).sum();
-            (sum / count) as i32
-        })
     }
 
     /// Walks around the outline, counter-clockwise on the page, and marks its vertices.

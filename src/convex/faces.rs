@@ -106,9 +106,10 @@ pub fn from_vertices(
         }
         Span::Space(inside) => {
             let mut scratch = scratch.reborrow();
+            let drawn_in = points::drawn_in_eye(eye, positions, numbers, tolerance);
             let mut search = Search::new(positions, eye, inside, numbers, &mut scratch, attention)?;
             search.find_all_faces(attention)?;
-            let mut joining = Joining::new(search.into_solid(), eye, &mut scratch)?;
+            let mut joining = Joining::new(search.into_solid(), eye, drawn_in, &mut scratch)?;
             joining.check_convex(tolerance, attention)?;
             joining.join_faces(tolerance, attention)?;
             joining.hand_over(summary, attention, sink)
@@ -188,8 +189,6 @@ pub(super) struct Solid<'s> {
     pub(super) points: &'s [Point],
     pub(super) edges: &'s [HullEdge],
     pub(super) faces: &'s [FaceCorners],
-    /// The faces before this one are visible.
-    pub(super) visible_faces: usize,
     /// Vertices that are on no face.
     pub(super) inside: &'s [u16],
     /// How many vertices are in the middle of a face or an edge.
@@ -212,7 +211,6 @@ struct Search<'s> {
     outline_count: usize,
     faces: &'s mut [FaceCorners],
     face_count: usize,
-    visible_faces: usize,
     /// Vertices on the plane in hand.
     on_plane: &'s mut [u16],
     /// Room for a polygon.
@@ -261,7 +259,6 @@ impl<'s> Search<'s> {
             outline_count,
             faces,
             face_count: 0,
-            visible_faces: 0,
             on_plane,
             room: outline.into_room(),
             flat: 0,
@@ -291,7 +288,6 @@ impl<'s> Search<'s> {
 
     /// All visible faces are found, so of their corners only those of the outline have more faces.
     fn turn_to_hidden_faces(&mut self) {
-        self.visible_faces = self.face_count;
         for edge in &self.edges[..self.outline_count] {
             self.candidates[self.candidate_count] = edge.from;
             self.candidate_count += 1;
@@ -304,7 +300,6 @@ impl<'s> Search<'s> {
             points: self.points,
             edges: &self.edges[..self.edge_count],
             faces: &self.faces[..self.face_count],
-            visible_faces: self.visible_faces,
             inside: &self.candidates[..self.candidate_count],
             flat: self.flat,
         }

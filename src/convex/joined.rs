@@ -15,6 +15,8 @@ use crate::stage::{Attention, OutOfScratch, Scratch};
 pub(super) struct Joining<'s> {
     solid: Solid<'s>,
     eye: Eye,
+    /// The same, moved as the tolerance asks for: it decides what is visible.
+    drawn_in: Eye,
     /// For each face the face that took it in, which may be itself.
     joined: &'s mut [u16],
     /// For each vertex the one after it around the face in hand.
@@ -33,6 +35,7 @@ impl<'s> Joining<'s> {
     pub(super) fn new(
         solid: Solid<'s>,
         eye: Eye,
+        drawn_in: Eye,
         scratch: &mut Scratch<'s>,
     ) -> Result<Self, OutOfScratch> {
         let joined = scratch.take::<u16>(solid.faces.len())?;
@@ -41,6 +44,7 @@ impl<'s> Joining<'s> {
         }
         Ok(Self {
             eye,
+            drawn_in,
             joined,
             next: scratch.take(solid.points.len())?,
             corners: scratch.take(solid.points.len())?,
@@ -218,7 +222,7 @@ impl<'s> Joining<'s> {
             }
             // Always some: exact faces are simple, and joined ones were tried.
             if let Some(count) = self.go_around(number) {
-                sink.face(&self.corners[..count], face < self.solid.visible_faces)?;
+                sink.face(&self.corners[..count], self.is_visible(number))?;
                 summary.faces += 1;
             }
         }
@@ -240,10 +244,14 @@ impl<'s> Joining<'s> {
         Ok(summary)
     }
 
+    fn is_visible(&self, face: u16) -> bool {
+        self.plane(face).height_of_eye(self.drawn_in) > 0
+    }
+
     fn sight(&self, left: u16, right: u16) -> Sight {
-        let visible = |face: u16| usize::from(face) < self.solid.visible_faces;
-        let edge_on = |face: u16| self.plane(face).height_of_eye(self.eye) == 0;
-        match (visible(left), visible(right)) {
+        // Not turned away, but not visible: edge-on.
+        let edge_on = |face: u16| self.plane(face).height_of_eye(self.eye) >= 0;
+        match (self.is_visible(left), self.is_visible(right)) {
             (true, true) => Sight::Visible,
             (false, false) if edge_on(left) || edge_on(right) => Sight::BehindOutline,
             (false, false) => Sight::Hidden,

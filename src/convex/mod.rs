@@ -11,12 +11,17 @@
 //! edge-on. The eye is given in the same unit. No page is needed, so the camera's other numbers are not
 //! either, and an eye so near that part of the solid lies behind it is all right.
 //!
-//! Positions that came from decimals may be off their common plane by the rounding of the decimals, so
-//! both take a `tolerance` in units of the positions. [`from_edges`] believes the edges and only has to
-//! know the outline; how, it says. [`from_vertices`] joins the faces that it found exactly: a face takes in its neighbours if each of their corners comes
-//! onto its plane by moving each coordinate by at most the `tolerance`. Tolerance zero is exact.
-//! [`default_tolerance`] is a 16384th of the solid's size: five decimals of coordinates about 1 are
-//! enough for it, and on paper it is a fraction of a step.
+//! Positions that came from decimals are off by the rounding of the decimals: by at most the `tolerance`,
+//! in units of the positions, that both take. Tolerance zero is exact. Otherwise
+//! - [`from_vertices`] joins the faces that it found exactly: a face takes in its neighbours if each of
+//!   their corners comes onto its plane by moving each coordinate by at most the tolerance;
+//! - the eye is moved towards the middle of the solid: with e the solid's largest extent, the reciprocal of
+//!   its distance grows by 4 tolerance / e². So what is meant to be edge-on, or one behind the other, is
+//!   hidden beyond doubt, where else it would peep out on one side or the other.
+//!
+//! [`default_tolerance`] is 2^-17 of the largest extent: six decimals of coordinates about 1 are good
+//! enough for it, and on paper it is a thousandth of a millimetre. It turns a parallel view into one from
+//! 32768 times the solid's size away.
 //!
 //! Refused: fewer than four different vertices, vertices all in line, a vertex inside the solid that
 //! the others span, an eye inside. Vertices all in one plane are drawn as the flat polygon that they

@@ -1,18 +1,18 @@
 //! The vertices as points: range, welding, what they span.
 
 use super::exact::{Plane, Point};
-use super::{POSITION_LIMIT, SolidError};
+use super::{Eye, POSITION_LIMIT, SolidError};
 use crate::model::VERTEX_NUMBER_LIMIT;
 
-/// The tolerance that takes rounded decimals for what they mean: a 16384th of the largest extent.
+/// The tolerance that takes rounded decimals for what they mean: 2^-17 of the largest extent.
 ///
 /// ```
 /// use penup::convex::default_tolerance;
-/// assert_eq!(default_tolerance(&[[0, 0, 0], [1 << 20, 9, 9]]), 64);
-/// assert_eq!(default_tolerance(&[[0, 0, 0], [1000, 0, 0]]), 0);
+/// assert_eq!(default_tolerance(&[[0, 0, 0], [1 << 20, 9, 9]]), 8);
+/// assert_eq!(default_tolerance(&[[0, 0, 0], [100_000, 0, 0]]), 0);
 /// ```
 pub fn default_tolerance(positions: &[[i32; 3]]) -> u32 {
-    largest_extent(positions.iter().copied()) >> 14
+    largest_extent(positions.iter().copied()) >> 17
 }
 
 /// The longest side of the box around the points.
@@ -24,6 +24,17 @@ pub(super) fn largest_extent(points: impl Iterator<Item = Point> + Clone) -> u32
         high.abs_diff(low)
     };
     [0, 1, 2].map(extent).into_iter().max().unwrap_or(0)
+}
+
+/// The eye, moved towards the middle of the points at `numbers` as the tolerance asks for.
+pub(super) fn drawn_in_eye(eye: Eye, points: &[Point], numbers: &[u16], tolerance: u32) -> Eye {
+    let corners = numbers.iter().map(|number| points[usize::from(*number)]);
+    let count = numbers.len().max(1) as i64; // at most 2^14
+    let mean = |axis: usize| {
+        let sum: i64 = corners.clone().map(|point| i64::from(point[axis])).sum();
+        (sum / count) as i32
+    };
+    eye.drawn_in([0, 1, 2].map(mean), largest_extent(corners.clone()), tolerance)
 }
 
 /// What a set of different points spans, with points that show it.
