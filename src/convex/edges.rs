@@ -239,11 +239,7 @@ impl<'s> Graph<'s> {
         let origin = self.point(at);
         self.edges
             .iter()
-            .filter_map(|[a, b]| match at {
-                at if at == *a => Some(*b),
-                at if at == *b => Some(*a),
-                _ => None,
-            })
+            .filter_map(|[a, b]| if *a == at { Some(*b) } else { (*b == at).then_some(*a) })
             .filter(|number| *number != from)
             .reduce(|best, number| {
                 if viewpoint.turn(origin, self.point(best), self.point(number)) < 0 {
