@@ -29,6 +29,8 @@ pub mod protocol;
 pub mod plotter;
 
 /// The board made of plain memory. Those made of silicon belong to the firmware binary.
+pub mod convex;
+
 #[cfg(feature = "host")]
 pub mod boards {
     pub mod host;

@@ -7,3 +7,6 @@ pub mod pin_machine;
 pub mod exact_visibility;
 pub mod random_scenes;
 pub mod scene_files;
+pub mod convex_any_faces;
+pub mod convex_model;
+pub mod convex_solids;
