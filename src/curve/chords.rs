@@ -131,11 +131,12 @@ impl<'a, F: Fn([i64; 3]) -> Option<Fine>> Chords<'a, F> {
         let mut waiting = heapless::Vec::<(Span, usize), HALVINGS>::new();
         let mut next = Some((span, HALVINGS));
         while let Some((span, halvings)) = next {
-            if span.points().iter().all(inside) {
+            // The first point is the last of the part before, which is inside.
+            if span.points().iter().skip(1).all(inside) {
                 next = waiting.pop();
                 continue;
             }
-            // The last point is on the curve; so is the first, which is the last of the part before.
+            // The last point is on the curve.
             if halvings == 0 || !span.points().last().is_some_and(inside) {
                 return false;
             }
