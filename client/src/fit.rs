@@ -20,8 +20,11 @@ use piece::Piece;
 /// A place on the plan in millimetres.
 pub type Place = [f64; 2];
 
-/// A polynomial's degree + 1: straight lines, parabolas, cubics.
-const ORDERS: [usize; 3] = [2, 3, 4];
+/// A polynomial's degree + 1: cubics, parabolas, straight lines.
+const ORDERS: [usize; 3] = [4, 3, 2];
+
+/// An order that needs so many times more knots than another did is not looked into further.
+const HOPELESS: usize = 3;
 
 /// What the rounding of control points in the file may take of the tolerance.
 const ROUNDING_SHARE: f64 = 0.03;
@@ -60,12 +63,16 @@ fn fit_one(polyline: &[Place], tolerance: f64) -> Option<FittedCurve> {
     }
     let strict = tolerance * (1.0 - ROUNDING_SHARE);
     let pieces = cut_at_corners(&places, tolerance);
-    let fewest = ORDERS
-        .iter()
-        .filter_map(|order| joined(&pieces, *order, strict))
-        .chain([as_it_is(&places)])
-        .min_by_key(|curve| curve.control.len());
-    fewest
+    let mut fewest = as_it_is(&places);
+    for order in ORDERS {
+        let most = HOPELESS * fewest.control.len();
+        if let Some(curve) = joined(&pieces, order, strict, most)
+            && curve.control.len() <= fewest.control.len()
+        {
+            fewest = curve;
+        }
+    }
+    Some(fewest)
 }
 
 /// The polyline itself as a curve of order 2.
@@ -75,13 +82,14 @@ fn as_it_is(places: &[Place]) -> FittedCurve {
     FittedCurve { order: 2, control: places.to_vec(), knots }
 }
 
-/// The curves of all pieces as one, which may turn sharply where they join.
-fn joined(pieces: &[Vec<Place>], order: usize, tolerance: f64) -> Option<FittedCurve> {
+/// The curves of all pieces as one, which may turn sharply where they join; `None` if one of them needs
+/// more than `most` knots at first, or cannot be fitted.
+fn joined(pieces: &[Vec<Place>], order: usize, tolerance: f64, most: usize) -> Option<FittedCurve> {
     let mut control: Vec<Place> = Vec::new();
     let mut knots = vec![0; order];
     let mut begin = 0;
     for places in pieces {
-        let piece = Piece::fit(places, order, begin, tolerance)?;
+        let piece = Piece::fit(places, order, begin, tolerance, most)?;
         control.extend(&piece.control[usize::from(!control.is_empty())..]);
         knots.extend(piece.inner);
         knots.extend(std::iter::repeat_n(piece.end, order - 1));

@@ -1,5 +1,6 @@
 //! B-splines against the Cox-de Boor basis in floats, and chords against dense sampling and the fewest
 //! chords that there can be.
+#![allow(clippy::unwrap_used)] // a test may: clippy sees only its `#[test]` functions as tests
 
 use penup::curve::{FRACTION_BITS, Fine, Knots, Parameter, Point, Spline};
 use penup_host_tests::curve_reference::{distance, fewest_chords, spline_at};

@@ -111,20 +111,27 @@ fn solve(rows: &mut [[f64; MOST]], sides: &mut [Place]) {
                 if i == j { rest.max(1e-12).sqrt() } else { rest / rows[j][DIAGONAL] };
         }
     }
-    for i in 0..rows.len() {
-        for axis in 0..2 {
-            let before: f64 = (i.saturating_sub(DIAGONAL)..i)
-                .map(|k| rows[i][DIAGONAL - (i - k)] * sides[k][axis])
-                .sum();
-            sides[i][axis] = (sides[i][axis] - before) / rows[i][DIAGONAL];
-        }
+    let count = rows.len();
+    for i in 0..count {
+        let known = i.saturating_sub(DIAGONAL)..i;
+        sides[i] =
+            rest(sides, i, rows[i][DIAGONAL], known.map(|k| (k, rows[i][DIAGONAL - (i - k)])));
     }
-    for i in (0..rows.len()).rev() {
-        for axis in 0..2 {
-            let after: f64 = (i + 1..rows.len().min(i + MOST))
-                .map(|k| rows[k][DIAGONAL - (k - i)] * sides[k][axis])
-                .sum();
-            sides[i][axis] = (sides[i][axis] - after) / rows[i][DIAGONAL];
-        }
+    for i in (0..count).rev() {
+        let known = i + 1..count.min(i + MOST);
+        sides[i] =
+            rest(sides, i, rows[i][DIAGONAL], known.map(|k| (k, rows[k][DIAGONAL - (k - i)])));
     }
+}
+
+/// Number `i` of a triangular system, once the others that act on it are known.
+fn rest(
+    sides: &[Place],
+    i: usize,
+    diagonal: f64,
+    known: impl Iterator<Item = (usize, f64)>,
+) -> Place {
+    let [x, y] = known
+        .fold(sides[i], |[x, y], (k, factor)| [x - factor * sides[k][0], y - factor * sides[k][1]]);
+    [x / diagonal, y / diagonal]
 }

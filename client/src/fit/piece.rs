@@ -38,26 +38,36 @@ struct Try {
 
 impl Piece {
     /// Fits `places` with a curve of `order` whose first knot is `begin`; `None` if no number of knots
-    /// does it.
-    pub fn fit(places: &[Place], order: usize, begin: i32, tolerance: f64) -> Option<Self> {
+    /// does it, or only more than `most` before those that are not needed are taken away.
+    pub fn fit(
+        places: &[Place],
+        order: usize,
+        begin: i32,
+        tolerance: f64,
+        most: usize,
+    ) -> Option<Self> {
         let samples = Samples::new(places, order, begin, tolerance);
         let mut inner = Vec::new();
         let mut found = samples.fit(&inner, &samples.at, ROUNDS);
         while found.worst() > tolerance {
             inner = samples.divided(&inner, &found, tolerance)?;
+            if inner.len() > most {
+                return None;
+            }
             found = samples.fit(&inner, &samples.at, ROUNDS);
         }
         for _ in 0..PASSES {
             let before = inner.len();
             let mut at = 0;
             while at < inner.len() {
-                let mut fewer = inner.clone();
-                fewer.remove(at);
-                let without = samples.fit(&fewer, &found.at, MORE_ROUNDS);
-                if without.worst() <= tolerance {
-                    (inner, found) = (fewer, without);
-                } else {
-                    at += 1;
+                let fewer = [without(&inner, at), merged(&inner, at)];
+                let better = fewer.into_iter().flatten().find_map(|fewer| {
+                    let found = samples.fit(&fewer, &found.at, MORE_ROUNDS);
+                    (found.worst() <= tolerance).then_some((fewer, found))
+                });
+                match better {
+                    Some(better) => (inner, found) = better,
+                    None => at += 1,
                 }
             }
             if inner.len() == before {
@@ -66,6 +76,22 @@ impl Piece {
         }
         Some(Self { control: found.control, inner, end: samples.ends[1] })
     }
+}
+
+/// `knots` without number `at`.
+fn without(knots: &[i32], at: usize) -> Option<Vec<i32>> {
+    let mut fewer = knots.to_vec();
+    fewer.remove(at);
+    Some(fewer)
+}
+
+/// `knots` with one in place of number `at` and the next; `None` if there is no next.
+fn merged(knots: &[i32], at: usize) -> Option<Vec<i32>> {
+    let next = *knots.get(at + 1)?;
+    let mut fewer = knots.to_vec();
+    let first = fewer.remove(at);
+    fewer[at] = first + (next - first) / 2;
+    Some(fewer)
 }
 
 impl Try {
