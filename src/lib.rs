@@ -16,6 +16,8 @@ extern crate std;
 pub mod fixed;
 pub mod stage;
 
+pub mod curve;
+pub mod drawing;
 pub mod geometry;
 pub mod model;
 pub mod view;

@@ -20,3 +20,5 @@ pub mod protocol;
 pub mod run;
 pub mod sender;
 pub mod source;
+
+pub mod fit;

@@ -1,5 +1,6 @@
 //! The simulated machine, the exact reference models and the tests of whole jobs.
 
+pub mod curve_reference;
 pub mod order_reference;
 pub mod event_checker;
 pub mod motion_optimum;

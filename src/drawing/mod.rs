@@ -8,9 +8,11 @@
 
 mod collect;
 mod page;
+mod title;
 
 pub use collect::{Line, PEN_LIMIT, Stored, organise};
 pub use page::{Bounds, Page, PageError, PageMap, StepsPerMillimetre};
+pub use title::Title;
 
 use bytemuck::{Pod, Zeroable};
 

@@ -221,6 +221,18 @@ impl PageMap {
         PagePoint { x, y }
     }
 
+    /// The image (x/w, y/w) in 1/256 step, for [`crate::curve::Spline::chords`]. As [`PageMap::point`], but
+    /// not kept to the page.
+    pub fn fine(&self, x: i64, y: i64, w: i64) -> crate::curve::Fine {
+        [(x, 0), (y, 1)].map(|(c, axis): (i64, usize)| {
+            // Below 2^118, see `point`: the shift does not overflow.
+            let sum = i128::from(self.a[axis]) * i128::from(c) + self.b[axis] * i128::from(w);
+            let fine = divide_rounding(sum << 8, i128::from(w) << self.k);
+            const LIMIT: i128 = 1 << 30;
+            fine.clamp(-LIMIT, LIMIT) as i64
+        })
+    }
+
     /// The place `along` the edge from `p` to `q` in steps.
     pub fn along(&self, p: Vertex, q: Vertex, along: Along, projection: Projection) -> PagePoint {
         // 31 bits of the ratio are 2^-10 steps of the longest edge that a page can hold.
@@ -304,6 +316,8 @@ mod tests {
         assert_eq!(map.point(-100, -100, 100), PagePoint { x: 0, y: 0 });
         assert_eq!(map.point(300, 300, 300), PagePoint { x: 1000, y: 2000 });
         assert_eq!(map.point(0, 0, 5), PagePoint { x: 500, y: 1000 });
+        assert_eq!(map.fine(0, 0, 5), [500 * 256, 1000 * 256]);
+        assert_eq!(map.fine(1, -1, 512), [500 * 256 + 250, 1000 * 256 - 500]);
         // Half way in space from z 100 to z 300 is three quarters of the way in the image.
         let half = Along { numerator: 1 << 60, denominator: 1 << 61 };
         let (p, q) = (corners[0], corners[1]);

@@ -1,0 +1,137 @@
+//! The spline with given knots that comes nearest to given places at given parameters.
+
+use super::Place;
+
+/// The highest order, 4.
+const MOST: usize = 4;
+
+/// The basis functions that act at one parameter.
+#[derive(Debug, Clone, Copy)]
+pub struct Basis {
+    /// The first control point that acts.
+    pub first: usize,
+    weights: [f64; MOST],
+    /// By how much each weight grows with the parameter.
+    slopes: [f64; MOST],
+    order: usize,
+}
+
+impl Basis {
+    /// At parameter `t`, which lies between the first and the last knot.
+    pub fn at(knots: &[f64], order: usize, t: f64) -> Self {
+        let control_points = knots.len() - order;
+        let span = knots.partition_point(|knot| *knot <= t).clamp(order, control_points) - 1;
+        let mut weights = [0.0; MOST];
+        let mut slopes = [0.0; MOST];
+        weights[0] = 1.0;
+        for level in 1..order {
+            let lower = weights;
+            weights = [0.0; MOST];
+            slopes = [0.0; MOST];
+            for number in 0..level {
+                let left = knots[span + 1 + number - level];
+                let width = knots[span + 1 + number] - left;
+                let share = lower[number] / width;
+                weights[number] += (knots[span + 1 + number] - t) * share;
+                weights[number + 1] += (t - left) * share;
+                slopes[number] -= level as f64 * share;
+                slopes[number + 1] += level as f64 * share;
+            }
+        }
+        Self { first: span + 1 - order, weights, slopes, order }
+    }
+
+    /// The place on the curve.
+    pub fn place(&self, control: &[Place]) -> Place {
+        self.sum(&self.weights, control)
+    }
+
+    /// By how much that place moves with the parameter.
+    pub fn slope(&self, control: &[Place]) -> Place {
+        self.sum(&self.slopes, control)
+    }
+
+    fn sum(&self, weights: &[f64; MOST], control: &[Place]) -> Place {
+        let mut sum = [0.0; 2];
+        for (weight, point) in weights.iter().zip(&control[self.first..self.first + self.order]) {
+            sum[0] += weight * point[0];
+            sum[1] += weight * point[1];
+        }
+        sum
+    }
+}
+
+/// The control points of that spline; its ends are the first and the last place.
+pub fn least_squares(places: &[Place], bases: &[Basis], control_points: usize) -> Vec<Place> {
+    let (begin, end) = (places[0], places[places.len() - 1]);
+    let last = control_points - 1;
+    // Normal equations for all but the ends; each row holds what is left of the diagonal, and it.
+    let mut rows = vec![[0.0; MOST]; last.saturating_sub(1)];
+    let mut sides = vec![[0.0; 2]; last.saturating_sub(1)];
+    for (place, basis) in places.iter().zip(bases) {
+        let mut rest = *place;
+        for (number, weight) in basis.weights.iter().enumerate().take(basis.order) {
+            let fixed = match basis.first + number {
+                0 => begin,
+                control if control == last => end,
+                _ => continue,
+            };
+            rest = [rest[0] - weight * fixed[0], rest[1] - weight * fixed[1]];
+        }
+        for (i, weight) in basis.weights.iter().enumerate().take(basis.order) {
+            let row = basis.first + i;
+            if row == 0 || row == last {
+                continue;
+            }
+            sides[row - 1][0] += weight * rest[0];
+            sides[row - 1][1] += weight * rest[1];
+            for (j, other) in basis.weights.iter().enumerate().take(i + 1) {
+                if basis.first + j > 0 {
+                    rows[row - 1][MOST - 1 - (i - j)] += weight * other;
+                }
+            }
+        }
+    }
+    solve(&mut rows, &mut sides);
+    std::iter::once(begin).chain(sides).chain(std::iter::once(end)).collect()
+}
+
+/// Cholesky for a symmetric band; `sides` becomes the solution.
+fn solve(rows: &mut [[f64; MOST]], sides: &mut [Place]) {
+    const DIAGONAL: usize = MOST - 1;
+    for i in 0..rows.len() {
+        // A control point on which no place depends stays near zero instead of nowhere.
+        rows[i][DIAGONAL] += 1e-9;
+        for j in i.saturating_sub(DIAGONAL)..=i {
+            let mut rest = rows[i][DIAGONAL - (i - j)];
+            for k in i.saturating_sub(DIAGONAL)..j {
+                rest -= rows[i][DIAGONAL - (i - k)] * rows[j][DIAGONAL - (j - k)];
+            }
+            rows[i][DIAGONAL - (i - j)] =
+                if i == j { rest.max(1e-12).sqrt() } else { rest / rows[j][DIAGONAL] };
+        }
+    }
+    let count = rows.len();
+    for i in 0..count {
+        let known = i.saturating_sub(DIAGONAL)..i;
+        sides[i] =
+            rest(sides, i, rows[i][DIAGONAL], known.map(|k| (k, rows[i][DIAGONAL - (i - k)])));
+    }
+    for i in (0..count).rev() {
+        let known = i + 1..count.min(i + MOST);
+        sides[i] =
+            rest(sides, i, rows[i][DIAGONAL], known.map(|k| (k, rows[k][DIAGONAL - (k - i)])));
+    }
+}
+
+/// Number `i` of a triangular system, once the others that act on it are known.
+fn rest(
+    sides: &[Place],
+    i: usize,
+    diagonal: f64,
+    known: impl Iterator<Item = (usize, f64)>,
+) -> Place {
+    let [x, y] = known
+        .fold(sides[i], |[x, y], (k, factor)| [x - factor * sides[k][0], y - factor * sides[k][1]]);
+    [x / diagonal, y / diagonal]
+}

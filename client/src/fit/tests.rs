@@ -1,0 +1,237 @@
+use super::*;
+use penup::curve::{CurveStore, FRACTION_BITS, Point};
+use penup::fixed::Decimal;
+
+/// Units of the control points to a millimetre.
+const UNITS: f64 = (1 << 18) as f64;
+/// In the flattening of a test, 1/256 mm.
+const FLATTENING: u16 = 1;
+
+fn trace(count: usize, place: impl Fn(f64) -> Place) -> Vec<Place> {
+    (0..=count).map(|at| place(at as f64 / count as f64)).collect()
+}
+
+fn circle(radius: f64, count: usize) -> Vec<Place> {
+    trace(count, |t| {
+        let (sine, cosine) = (t * std::f64::consts::TAU).sin_cos();
+        [100.0 + radius * cosine, 100.0 + radius * sine]
+    })
+}
+
+fn obj_of(polylines: &[Vec<Place>]) -> String {
+    let mut obj = String::new();
+    let mut vertices = 0;
+    for polyline in polylines {
+        for [x, y] in polyline {
+            obj += &format!("v {x:.4} {y:.4} 0\n");
+        }
+        let numbers: Vec<String> =
+            (1..=polyline.len()).map(|number| (vertices + number).to_string()).collect();
+        obj += &format!("l {}\n", numbers.join(" "));
+        vertices += polyline.len();
+    }
+    obj
+}
+
+/// The chords of every curve of a file, as the plotter would read and flatten it.
+fn flattened(obj: &str) -> Vec<Vec<Place>> {
+    let mut points: Vec<Point> = Vec::new();
+    let mut words = heapless::Vec::<u32, 20_000>::new();
+    let mut curves = CurveStore::new(&mut words);
+    for line in obj.lines() {
+        assert!(line.len() <= 256, "{line}");
+        let (keyword, rest) = line.split_once(' ').unwrap_or((line, ""));
+        let numbers = rest.split(' ').filter_map(|word| Decimal::parse(word).ok());
+        match keyword {
+            "cstype" => assert_eq!(rest, "bspline"),
+            "v" => {
+                let unit = |number: Decimal| (number.to_f64() * UNITS).round() as i32;
+                let place: Vec<i32> = numbers.map(unit).collect();
+                points.push([place[0], place[1], place[2]]);
+            }
+            "deg" => curves.set_degree(rest.parse().unwrap()).unwrap(),
+            "curv" => {
+                let mut numbers = numbers;
+                let ends = [numbers.next().unwrap(), numbers.next().unwrap()];
+                let control = numbers.map(|number| number.to_whole().unwrap() as u16 - 1);
+                curves.begin(ends, control).unwrap();
+            }
+            "parm" => curves.add_knots(numbers).unwrap(),
+            "end" => curves.end().unwrap(),
+            other => panic!("{other}"),
+        }
+    }
+    let scale = f64::from(1 << FRACTION_BITS) * UNITS / 256.0;
+    let on_page =
+        |place: [i64; 3]| Some([0, 1].map(|axis: usize| (place[axis] as f64 / scale) as i64));
+    let chords = |curve: penup::curve::StoredCurve<'_>| -> Vec<Place> {
+        let spline = curve.spline(&points).unwrap();
+        let ends = spline.chords(on_page, FLATTENING);
+        ends.map(|(_, [x, y, _])| [f64::from(x) / UNITS, f64::from(y) / UNITS]).collect()
+    };
+    let mut chains: Vec<Vec<Place>> = Vec::new();
+    for chain in curves.iter().map(chords) {
+        match chains.last_mut() {
+            // Written as several for the length of a line.
+            Some(before) if distance(before[before.len() - 1], chain[0]) < 2.0 / UNITS => {
+                before.extend(&chain[1..]);
+            }
+            _ => chains.push(chain),
+        }
+    }
+    chains
+}
+
+/// How far the farthest place of `from`, its sides included, is from `to`.
+fn stray(from: &[Place], to: &[Place]) -> f64 {
+    let to_side = |place: Place, pair: &[Place]| {
+        let (along, away) = (minus(pair[1], pair[0]), minus(place, pair[0]));
+        let square = dot(along, along);
+        let share = if square > 0.0 { (dot(away, along) / square).clamp(0.0, 1.0) } else { 0.0 };
+        distance(place, [pair[0][0] + share * along[0], pair[0][1] + share * along[1]])
+    };
+    let mut worst: f64 = 0.0;
+    for pair in from.windows(2) {
+        for part in 0..8 {
+            let share = f64::from(part) / 8.0;
+            let side = minus(pair[1], pair[0]);
+            let place = [pair[0][0] + share * side[0], pair[0][1] + share * side[1]];
+            let nearest = to.windows(2).map(|other| to_side(place, other)).fold(f64::MAX, f64::min);
+            worst = worst.max(nearest);
+        }
+    }
+    worst
+}
+
+/// Fits, writes, reads and flattens; returns what was saved.
+fn checked(polylines: &[Vec<Place>], tolerance: f64) -> Saving {
+    let Fitted { obj, saving } = fit_obj(&obj_of(polylines), tolerance).unwrap();
+    let chains = flattened(&obj);
+    assert_eq!(chains.len(), polylines.len());
+    for (chain, polyline) in chains.iter().zip(polylines) {
+        // The text has four decimals; the plotter's own chords take 1/256 mm.
+        let allowed = tolerance + 1.0 / 256.0 + 0.001;
+        let strays = [stray(chain, polyline), stray(polyline, chain)];
+        assert!(strays.iter().all(|stray| *stray <= allowed), "{strays:?} for {tolerance}");
+        for (end, expected) in
+            [(chain[0], polyline[0]), (chain[chain.len() - 1], polyline[polyline.len() - 1])]
+        {
+            assert!(distance(end, expected) <= 0.03 * tolerance + 0.001);
+        }
+    }
+    println!("{saving}");
+    saving
+}
+
+#[test]
+fn smooth_traces_need_few_control_points() {
+    let wave = trace(600, |t| [200.0 * t, 20.0 * (t * 25.0).sin()]);
+    let spiral = trace(2000, |t| {
+        let (sine, cosine) = (40.0 * t).sin_cos();
+        [100.0 + 80.0 * t * cosine, 100.0 + 80.0 * t * sine]
+    });
+    for (polyline, most) in
+        [(circle(50.0, 360), 14), (circle(3.0, 40), 12), (wave, 50), (spiral, 60)]
+    {
+        let saving = checked(&[polyline], 0.1);
+        assert!(saving.vertices_after <= most, "{saving}");
+        assert!(saving.bytes_after * 2 < saving.bytes_before, "{saving}");
+    }
+}
+
+#[test]
+fn corners_and_straight_sides_stay() {
+    let corners = [[10.0, 10.0], [110.0, 10.0], [110.0, 60.0], [10.0, 60.0], [10.0, 10.0]];
+    let square: Vec<Place> = corners
+        .windows(2)
+        .flat_map(|side| {
+            let along = minus(side[1], side[0]);
+            (0..50).map(move |part| {
+                let share = f64::from(part) / 50.0;
+                [side[0][0] + share * along[0], side[0][1] + share * along[1]]
+            })
+        })
+        .chain([corners[4]])
+        .collect();
+    let curves = fit(std::slice::from_ref(&square), 0.1);
+    assert_eq!((curves[0].order, &curves[0].control[..]), (2, &corners[..]));
+    checked(&[square], 0.1);
+    // A half disc: an arc between two corners.
+    let mut half = trace(90, |t| {
+        let (sine, cosine) = (t * std::f64::consts::PI).sin_cos();
+        [100.0 + 40.0 * cosine, 50.0 + 40.0 * sine]
+    });
+    half.push(half[0]);
+    let saving = checked(&[half], 0.05);
+    assert!(saving.vertices_after <= 14, "{saving}");
+}
+
+#[test]
+fn a_scanners_steps_are_smoothed_within_the_tolerance() {
+    // A tenth of a millimetre grid.
+    let stepped: Vec<Place> = circle(30.0, 900)
+        .into_iter()
+        .map(|place| place.map(|c| (c * 10.0).round() / 10.0))
+        .collect();
+    let saving = checked(&[stepped], 0.2);
+    assert!(saving.vertices_after <= 20, "{saving}");
+}
+
+#[test]
+fn random_walks_are_followed_too() {
+    let mut state = 1u64;
+    let mut random = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        (state >> 40) as f64 / f64::from(1 << 24) - 0.5
+    };
+    for step in [0.05, 1.0, 20.0] {
+        let mut place = [100.0, 100.0];
+        let walk: Vec<Place> = (0..150)
+            .map(|_| {
+                place = place.map(|c| c + step * random());
+                place
+            })
+            .collect();
+        let saving = checked(&[walk], 0.2);
+        assert!(saving.vertices_after <= saving.vertices_before, "{saving}");
+    }
+}
+
+#[test]
+fn several_polylines_and_degenerate_ones() {
+    let dot_only = vec![[5.0, 5.0]; 4];
+    let side = vec![[0.0, 0.0], [10.0, 0.0], [10.0, 0.0]];
+    let curves = fit(&[dot_only, side, vec![], vec![[1.0, 1.0]]], 0.1);
+    assert_eq!(curves.len(), 1);
+    assert_eq!((curves[0].order, curves[0].knots.len()), (2, 4));
+    assert_eq!(curves[0].control, [[0.0, 0.0], [10.0, 0.0]]);
+    checked(&[circle(20.0, 100), vec![[0.0, 0.0], [3.0, 4.0]], circle(10.0, 50)], 0.05);
+}
+
+#[test]
+fn sides_that_come_one_by_one_are_one_polyline() {
+    let text = "v 0 0 7\nv 1 0 7\nv 2 0 7\nv 5 5 7\nv 6 6 7\nl 1 2\nl 2 3\nl -2 -1 # a second\n";
+    let Fitted { obj, saving } = fit_obj(text, 0.1).unwrap();
+    assert_eq!((saving.polylines, saving.vertices_before, saving.vertices_after), (2, 5, 4));
+    assert!(obj.contains("v 2 0 7\n"), "{obj}");
+}
+
+#[test]
+fn what_cannot_be_fitted_is_refused() {
+    let line = |text: &str| match fit_obj(text, 0.1) {
+        Err(FitError::Line { number, .. }) => Some(number),
+        _ => None,
+    };
+    assert_eq!(line("v 0 0 0\nv 0 x 0\n"), Some(2));
+    assert_eq!(line("v 0 0 0\nv 0 1\n"), Some(2));
+    assert_eq!(line("v 0 0 0\nv 1 1 1\n"), Some(2));
+    assert_eq!(line("v 0 nan 0\n"), Some(1));
+    assert_eq!(line("v 0 0 0\nv 1 1 0\nl 1 2\nl 1 3\n"), Some(4));
+    assert_eq!(line("v 0 0 0\nl 0 1\n"), Some(2));
+    assert_eq!(line("v 0 0 0\nl 1\n"), Some(2));
+    assert_eq!(line("v 0 0 0\nv 1 1 0\nv 2 1 0\nf 1 2 3\n"), Some(4));
+    assert_eq!(fit_obj("v 0 0 0\n", 0.1), Err(FitError::NoPolyline));
+    for tolerance in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        assert_eq!(fit_obj("", tolerance), Err(FitError::Tolerance));
+    }
+}
