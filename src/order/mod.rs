@@ -12,6 +12,7 @@
 //! Call [`order`] with a [`Drawing`], [`Options`] and memory. Refused: a drawing whose segments name
 //! points that are not there, too many segments, too little memory; the tour is then worth nothing.
 
+pub mod enumeration;
 mod euler;
 mod greedy;
 mod metric;
