@@ -4,9 +4,10 @@
 //! other, which took 423 s at 30 points; here alternating paths that shrink odd loops (Edmonds 1965)
 //! answer the same question in n³.
 
+use super::EnumerationError;
 use super::image::{ImplicitCosts, members};
 use crate::order::pace::Pace;
-use crate::stage::{Aborted, OutOfScratch, Scratch};
+use crate::stage::{Aborted, Attention, OutOfScratch, Scratch};
 
 /// No partner, no predecessor.
 const NONE: u8 = u8::MAX;
@@ -176,18 +177,45 @@ impl<'a> GrowingGraph<'a> {
     }
 }
 
-/// Writes into `pairs` a matching of the image graph to which as little as possible was added.
+/// An upper bound: a matching of the image graph to which as little as possible was added.
 ///
 /// The segments are added in the order of their reduced distances until there is a matching: the
 /// last is needed, be it with few of the others. So it is put in first, and the others again from
 /// the least. (Harrison tries, for each segment, all that are before it; a graph that has no
-/// matching has none with a segment less, so this finds the same.)
+/// matching has none with a segment less, so this finds the same.) The cost of the matching exceeds
+/// the sum of the implicit costs by no more than the reduced distances of what was added.
+///
+/// # Errors
+/// [`EnumerationError::Scratch`] if n² + 13 n bytes do not fit,
+/// [`EnumerationError::Aborted`] if `attention` says so.
+///
+/// ```
+/// use penup::order::enumeration::{Distances, domino_matching, solve_image_problem};
+/// use penup::stage::{Scratch, Undisturbed};
+/// let distances = Distances::new(4, &[1, 5, 6, 7, 8, 1]).unwrap();
+/// let mut memory = [0; 64];
+/// let mut scratch = Scratch::new(&mut memory);
+/// let (costs, _) = solve_image_problem(distances, &mut scratch).unwrap();
+/// let pairs = domino_matching(&costs, &mut scratch, &mut Undisturbed).unwrap();
+/// assert_eq!(distances.cost(pairs), 2);
+/// ```
+pub fn domino_matching<'a>(
+    costs: &ImplicitCosts<'_>,
+    scratch: &mut Scratch<'a>,
+    attention: &mut dyn Attention,
+) -> Result<&'a [[u8; 2]], EnumerationError> {
+    let pairs = scratch.take(costs.distances().count() / 2)?;
+    match_by_domino_graph(costs, scratch.reborrow(), &mut Pace::new(attention), pairs)?;
+    Ok(pairs)
+}
+
+/// Writes [`domino_matching`] into `pairs`.
 pub(super) fn match_by_domino_graph(
     costs: &ImplicitCosts<'_>,
     mut scratch: Scratch<'_>,
     pace: &mut Pace<'_>,
     pairs: &mut [[u8; 2]],
-) -> Result<(), super::EnumerationError> {
+) -> Result<(), EnumerationError> {
     let count = costs.distances().count();
     let segments: &mut [[u8; 2]] = scratch.take(costs.distances().pair_count())?;
     let every = (0..count as u8).flat_map(|a| (a + 1..count as u8).map(move |b| [a, b]));

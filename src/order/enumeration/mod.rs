@@ -22,6 +22,7 @@ mod image;
 mod search;
 
 pub use division::{Division, division_bound};
+pub use domino::domino_matching;
 pub use image::ImplicitCosts;
 
 use super::pace::Pace;
