@@ -16,12 +16,12 @@ extern crate std;
 pub mod fixed;
 pub mod stage;
 
-pub mod curve;
-pub mod drawing;
 pub mod geometry;
 pub mod model;
+pub mod curve;
 pub mod view;
 pub mod visibility;
+pub mod convex;
 pub mod drawing;
 pub mod order;
 pub mod step;
@@ -31,8 +31,6 @@ pub mod protocol;
 pub mod plotter;
 
 /// The board made of plain memory. Those made of silicon belong to the firmware binary.
-pub mod convex;
-
 #[cfg(feature = "host")]
 pub mod boards {
     pub mod host;

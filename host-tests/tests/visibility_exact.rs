@@ -12,10 +12,7 @@ use penup_host_tests::random_scenes::{RandomScene, random_scene};
 use penup_host_tests::scene_files::Stretches;
 
 fn fraction(along: Along) -> BigRational {
-    BigRational::new(
-        BigInt::from(along.numerator),
-        BigInt::from(along.denominator),
-    )
+    BigRational::new(BigInt::from(along.numerator), BigInt::from(along.denominator))
 }
 
 fn library_pieces(random: &RandomScene, spare_bytes: usize) -> Vec<Piece> {
@@ -35,12 +32,7 @@ fn library_pieces(random: &RandomScene, spare_bytes: usize) -> Vec<Piece> {
     );
     assert_eq!(result, Ok(()));
     let piece = |stretch: &penup::visibility::Stretch| {
-        (
-            stretch.edge,
-            fraction(stretch.from),
-            fraction(stretch.to),
-            stretch.visible,
-        )
+        (stretch.edge, fraction(stretch.from), fraction(stretch.to), stretch.visible)
     };
     stretches.0.iter().map(piece).collect()
 }

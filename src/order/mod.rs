@@ -13,6 +13,7 @@
 //! points that are not there, too many segments, too little memory; the tour is then worth nothing.
 
 mod cycle;
+pub mod enumeration;
 mod euler;
 mod greedy;
 mod improve;

@@ -288,6 +288,7 @@ impl Inner<'_> {
             State::Hold { standing: true } => "Hold:0",
             State::Hold { standing: false } => "Hold:1",
             State::Jog => "Jog",
+            State::Home => "Home",
             State::Check => "Check",
             State::Alarm(_) => "Alarm",
             State::Sleep => "Sleep",
