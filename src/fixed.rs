@@ -1,7 +1,295 @@
 //! Number formats, rounding, overflow: said once.
 //!
 //! Lengths on the page are [`Millimetres`]; on the pins, steps (`i32`). Numbers come in as
-//! [`Decimal`] text and leave as text, exactly; no binary float stands between.
+//! [`Decimal`] text and are rounded once, half away from zero, into the format that needs them. What
+//! does not fit is refused, never wrapped.
+
+use core::fmt;
 
 /// A length on the page: ±32768 mm in units of 2^-16 mm.
 pub type Millimetres = ::fixed::types::I16F16;
+
+/// A number as the user wrote it: `mantissa` × 10^`exponent`, exactly.
+///
+/// |mantissa| < 10^18; further digits of a longer text are cut off (they are below 10^-17 of the value).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Decimal {
+    mantissa: i64,
+    exponent: i16,
+}
+
+/// The text is no number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct NotANumber;
+
+/// The number does not fit the format that it is meant for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct OutOfRange;
+
+const MANTISSA_LIMIT: i64 = 1_000_000_000_000_000_000;
+
+impl Decimal {
+    /// Reads `-12`, `+3.5`, `.5`, `6.02e-3`.
+    ///
+    /// # Errors
+    /// [`NotANumber`] for anything else: no digit, a second point, `inf`, `nan`, trailing text, an
+    /// exponent past ±9999.
+    ///
+    /// ```
+    /// use penup::fixed::Decimal;
+    /// assert_eq!(Decimal::parse("-0.5")?.to_binary(16), Ok(-32768));
+    /// assert_eq!(Decimal::parse("25e-2")?.to_binary(2), Ok(1));
+    /// assert!(Decimal::parse("1.2.3").is_err());
+    /// # Ok::<(), penup::fixed::NotANumber>(())
+    /// ```
+    pub fn parse(text: &str) -> Result<Self, NotANumber> {
+        let (negative, unsigned) = match text.as_bytes().first() {
+            Some(b'-') => (true, &text[1..]),
+            Some(b'+') => (false, &text[1..]),
+            _ => (false, text),
+        };
+        let (digits, power) = match unsigned.find(['e', 'E']) {
+            Some(at) => (&unsigned[..at], parse_power(&unsigned[at + 1..])?),
+            None => (unsigned, 0),
+        };
+        let mut mantissa: i64 = 0;
+        let mut exponent: i32 = i32::from(power);
+        let mut any_digit = false;
+        let mut after_point = false;
+        for byte in digits.bytes() {
+            match byte {
+                b'.' if !after_point => after_point = true,
+                b'0'..=b'9' => {
+                    any_digit = true;
+                    if mantissa < MANTISSA_LIMIT / 10 {
+                        mantissa = mantissa * 10 + i64::from(byte - b'0');
+                        exponent -= i32::from(after_point);
+                    } else {
+                        exponent += i32::from(!after_point);
+                    }
+                }
+                _ => return Err(NotANumber),
+            }
+        }
+        if !any_digit {
+            return Err(NotANumber);
+        }
+        let mantissa = if negative { -mantissa } else { mantissa };
+        // A line is far shorter than 20000 digits, so this never fails in practice.
+        let exponent = i16::try_from(exponent).map_err(|_| NotANumber)?;
+        Ok(Self { mantissa, exponent })
+    }
+
+    /// The nearest multiple of 2^-`fraction_bits`, half away from zero, as that many units.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] if it does not fit 62 bits.
+    pub fn to_binary(self, fraction_bits: u32) -> Result<i64, OutOfRange> {
+        if self.mantissa == 0 {
+            return Ok(0);
+        }
+        let magnitude = u128::from(self.mantissa.unsigned_abs()); // below 2^60
+        let shifted = if fraction_bits <= 60 {
+            magnitude << fraction_bits
+        } else {
+            return Err(OutOfRange);
+        };
+        let rounded = if self.exponent >= 0 {
+            let power = power_of_ten(self.exponent.unsigned_abs()).ok_or(OutOfRange)?;
+            shifted.checked_mul(power).ok_or(OutOfRange)?
+        } else {
+            // Past 10^38 the quotient is zero whatever the mantissa.
+            power_of_ten(self.exponent.unsigned_abs())
+                .map_or(0, |power| (shifted + power / 2) / power)
+        };
+        let value =
+            i64::try_from(rounded).ok().filter(|value| *value < 1 << 62).ok_or(OutOfRange)?;
+        Ok(if self.mantissa < 0 { -value } else { value })
+    }
+
+    /// The nearest length in millimetres.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] past ±32768 mm.
+    pub fn to_millimetres(self) -> Result<Millimetres, OutOfRange> {
+        let bits = self.to_binary(16)?;
+        i32::try_from(bits).map(Millimetres::from_bits).map_err(|_| OutOfRange)
+    }
+
+    /// For the camera, whose angles are the one place for binary floats.
+    ///
+    /// Exactly rounded for up to 15 digits and |exponent| <= 22, so the same on every machine.
+    pub fn to_f64(self) -> f64 {
+        let mut value = self.mantissa as f64;
+        for _ in 0..self.exponent.unsigned_abs().min(400) / 22 {
+            value = if self.exponent < 0 { value / 1e22 } else { value * 1e22 };
+        }
+        // 10^22 is the largest power of ten that a double holds exactly.
+        let rest = power_of_ten(self.exponent.unsigned_abs().min(400) % 22).unwrap_or(1) as f64;
+        if self.exponent < 0 { value / rest } else { value * rest }
+    }
+
+    /// The nearest `i32`, if the text was a whole number.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] for a fraction or a number past 32 bits.
+    pub fn to_whole(self) -> Result<i32, OutOfRange> {
+        let value = self.to_binary(0)?;
+        if self.exponent < 0 {
+            let power = power_of_ten(self.exponent.unsigned_abs()).ok_or(OutOfRange)?;
+            if u128::from(self.mantissa.unsigned_abs()) % power != 0 {
+                return Err(OutOfRange);
+            }
+        }
+        i32::try_from(value).map_err(|_| OutOfRange)
+    }
+}
+
+fn parse_power(text: &str) -> Result<i16, NotANumber> {
+    let power: i16 = text.parse().map_err(|_| NotANumber)?;
+    if (-9999..=9999).contains(&power) { Ok(power) } else { Err(NotANumber) }
+}
+
+fn power_of_ten(exponent: u16) -> Option<u128> {
+    10u128.checked_pow(u32::from(exponent))
+}
+
+/// Shifts right, rounding half away from zero: a block of coordinates moves to a coarser unit.
+pub fn shift_right_rounding(value: i32, bits: u32) -> i32 {
+    match bits {
+        0 => value,
+        1..=31 => {
+            let rounded = (i64::from(value).abs() + (1 << (bits - 1))) >> bits;
+            // At most 2^31 / 2.
+            (if value < 0 { -rounded } else { rounded }) as i32
+        }
+        _ => 0,
+    }
+}
+
+/// Divides, rounding half away from zero. `divisor` > 0.
+pub fn divide_rounding(dividend: i128, divisor: i128) -> i128 {
+    let half = divisor / 2;
+    if dividend < 0 { -((half - dividend) / divisor) } else { (dividend + half) / divisor }
+}
+
+/// Writes `units` × 2^-`fraction_bits` with `places` decimals (at most 9), rounded half away from zero.
+///
+/// ```
+/// use penup::fixed::BinaryFraction;
+/// assert_eq!(format!("{}", BinaryFraction { units: -3, fraction_bits: 1, places: 3 }), "-1.500");
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct BinaryFraction {
+    /// How many units.
+    pub units: i64,
+    /// The unit is 2^-this, at most 60.
+    pub fraction_bits: u32,
+    /// Digits after the point, at most 9.
+    pub places: u32,
+}
+
+impl fmt::Display for BinaryFraction {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let places = self.places.min(9);
+        let scale = 10u128.pow(places);
+        let scaled = u128::from(self.units.unsigned_abs()) * scale; // below 2^94
+        let fraction_bits = self.fraction_bits.min(60);
+        let rounded = if fraction_bits == 0 {
+            scaled
+        } else {
+            (scaled + (1 << (fraction_bits - 1))) >> fraction_bits
+        };
+        if self.units < 0 && rounded > 0 {
+            formatter.write_str("-")?;
+        }
+        write!(formatter, "{}", rounded / scale)?;
+        if places > 0 {
+            write!(formatter, ".{:0width$}", rounded % scale, width = places as usize)?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::format;
+
+    fn binary(text: &str, fraction_bits: u32) -> Result<i64, OutOfRange> {
+        Decimal::parse(text).map_err(|_| OutOfRange)?.to_binary(fraction_bits)
+    }
+
+    #[test]
+    fn numbers_are_read_exactly() {
+        for (text, fraction_bits, units) in [
+            ("0", 30, 0),
+            ("-0", 0, 0),
+            ("1", 0, 1),
+            ("1.5", 1, 3),
+            ("-1.5", 0, -2),
+            (".5", 1, 1),
+            ("5.", 0, 5),
+            ("+2", 0, 2),
+            ("1e3", 0, 1000),
+            ("1E-3", 16, 66),
+            ("0.1", 30, 107_374_182),
+            ("123456789012345678901234567890e-30", 30, 132_560_718),
+            ("1e-400", 30, 0),
+            ("0e9999", 30, 0),
+        ] {
+            assert_eq!(binary(text, fraction_bits), Ok(units), "{text}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_number_is_refused() {
+        for text in [
+            "", "-", "+", ".", "e5", "1e", "1e+", "1.2.3", "1,5", "--1", "nan", "inf", "0x10",
+            "1e99999", "1 ", "½",
+        ] {
+            assert_eq!(Decimal::parse(text), Err(NotANumber), "{text:?}");
+        }
+    }
+
+    #[test]
+    fn what_does_not_fit_is_refused() {
+        assert_eq!(binary("1e40", 0), Err(OutOfRange));
+        assert_eq!(binary("1e18", 3), Err(OutOfRange));
+        assert_eq!(binary("9e9999", 0), Err(OutOfRange));
+        assert_eq!(Decimal::parse("32768").map(Decimal::to_millimetres), Ok(Err(OutOfRange)));
+        assert_eq!(Decimal::parse("1.5").map(Decimal::to_whole), Ok(Err(OutOfRange)));
+        assert_eq!(Decimal::parse("15e-1").map(Decimal::to_whole), Ok(Err(OutOfRange)));
+        assert_eq!(Decimal::parse("150e-1").map(Decimal::to_whole), Ok(Ok(15)));
+    }
+
+    #[test]
+    fn floats_come_out_exactly_rounded() {
+        for text in ["0.1", "-12.75", "3e22", "1e-22", "123456789.125", "0"] {
+            let exact: f64 = text.parse().unwrap_or(f64::NAN);
+            assert_eq!(Decimal::parse(text).map(Decimal::to_f64), Ok(exact), "{text}");
+        }
+    }
+
+    #[test]
+    fn rounding_is_half_away_from_zero() {
+        assert_eq!(
+            [3, -3, 5, -5, 2, 1].map(|value| shift_right_rounding(value, 1)),
+            [2, -2, 3, -3, 1, 1]
+        );
+        assert_eq!(shift_right_rounding(i32::MIN, 31), -1);
+        assert_eq!(shift_right_rounding(i32::MAX, 40), 0);
+        assert_eq!([7, -7, 6, -6].map(|value| divide_rounding(value, 4)), [2, -2, 2, -2]);
+    }
+
+    #[test]
+    fn fractions_are_written_rounded_and_without_a_negative_zero() {
+        let shown = |units, fraction_bits, places| {
+            format!("{}", BinaryFraction { units, fraction_bits, places })
+        };
+        assert_eq!(shown(5 << 16, 16, 3), "5.000");
+        assert_eq!(shown(-1, 16, 3), "0.000");
+        assert_eq!(shown(-1, 1, 0), "-1");
+        assert_eq!(shown((1 << 30) - 1, 30, 3), "1.000");
+    }
+}

@@ -14,6 +14,6 @@ use defmt_semihosting as _;
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    let mut board = boards::take();
-    penup::plotter::run(&mut board)
+    let (mut board, memory, pins) = boards::take();
+    penup::plotter::run(&mut board, memory, pins)
 }

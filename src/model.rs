@@ -1,7 +1,10 @@
 //! Vertices, bars, faces, curves: the thing that the user sent, and how it is edited.
 //!
-//! (skeleton: positions and edits follow)
+//! A [`Model`] holds vertices in one array and faces and bars in another, in the order in which they
+//! came (Cárdenas & Seeley's joints and bars in two sequential arrays). It refuses what would break
+//! it (a face through a vertex that does not exist, more than fits) and is then as it was before.
 
+use crate::fixed::{Decimal, shift_right_rounding};
 use bytemuck::{Pod, Zeroable};
 
 /// One more than the largest vertex number that an element can hold.
@@ -64,13 +67,8 @@ pub struct Elements<'a> {
 impl<'a> Elements<'a> {
     /// The elements that `corners` encode. Corners after the last mark are left out.
     pub fn new(corners: &'a [Corner]) -> Self {
-        let whole = corners
-            .iter()
-            .rposition(|corner| corner.is_last())
-            .map_or(0, |last| last + 1);
-        Self {
-            corners: &corners[..whole],
-        }
+        let whole = corners.iter().rposition(|corner| corner.is_last()).map_or(0, |last| last + 1);
+        Self { corners: &corners[..whole] }
     }
 
     /// Every corner of every element.
@@ -80,11 +78,406 @@ impl<'a> Elements<'a> {
 
     /// Each element in turn.
     pub fn iter(&self) -> impl Iterator<Item = Element<'a>> + Clone + use<'a> {
-        self.corners
-            .split_inclusive(|corner| corner.is_last())
-            .map(|corners| match corners {
-                [a, b] if a.of_bar() => Element::Bar(a.vertex(), b.vertex()),
-                _ => Element::Face(corners),
+        self.corners.split_inclusive(|corner| corner.is_last()).map(|corners| match corners {
+            [a, b] if a.of_bar() => Element::Bar(a.vertex(), b.vertex()),
+            _ => Element::Face(corners),
+        })
+    }
+}
+
+/// A place in the model's own space: each coordinate × 2^-[`Model::fraction_bits`], |value| <= 2^30.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct Position {
+    /// First coordinate.
+    pub x: i32,
+    /// Second coordinate.
+    pub y: i32,
+    /// Third coordinate.
+    pub z: i32,
+}
+
+impl Position {
+    /// The coordinates in order.
+    pub fn coordinates(self) -> [i32; 3] {
+        [self.x, self.y, self.z]
+    }
+}
+
+/// Coordinates are stored within ± this, so that differences fit 32 bits.
+pub const POSITION_LIMIT: i32 = 1 << 30;
+
+/// The finest unit of a model, 2^-30, which holds |coordinate| <= 1.
+const FINEST_FRACTION_BITS: u32 = 30;
+
+/// Why the model was not changed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum ModelError {
+    /// A coordinate is past ±2^30.
+    CoordinateTooLarge,
+    /// There is no room for another vertex.
+    TooManyVertices {
+        /// How many there can be.
+        limit: usize,
+    },
+    /// There is no room for the corners of this element.
+    TooManyCorners {
+        /// How many there can be.
+        limit: usize,
+        /// How many there would have been.
+        needed: usize,
+    },
+    /// An element names a vertex that does not exist.
+    UnknownVertex {
+        /// The number as the user wrote it: from 1, or negative and counted from the last.
+        number: i32,
+        /// How many vertices there are.
+        vertices: usize,
+    },
+    /// A face needs three corners, a bar two.
+    TooFewCorners {
+        /// How many it needs.
+        needed: usize,
+    },
+    /// The same vertex twice in a row, or at both ends.
+    RepeatedVertex {
+        /// The vertex, from 1.
+        number: i32,
+    },
+}
+
+/// The vertices, faces and bars that the user sent, in memory lent by the owner.
+///
+/// All coordinates share one binary unit. It begins at 2^-30 and grows when a larger coordinate
+/// comes, so that a model of any size keeps 30 bits of its largest coordinate.
+#[derive(Debug)]
+pub struct Model<'m> {
+    vertices: &'m mut heapless::VecView<Position>,
+    corners: &'m mut heapless::VecView<Corner>,
+    fraction_bits: u32,
+    faces: usize,
+    bars: usize,
+}
+
+impl<'m> Model<'m> {
+    /// An empty model that can hold what the two vectors can; what they hold is forgotten.
+    pub fn new(
+        vertices: &'m mut heapless::VecView<Position>,
+        corners: &'m mut heapless::VecView<Corner>,
+    ) -> Self {
+        vertices.clear();
+        corners.clear();
+        Self { vertices, corners, fraction_bits: FINEST_FRACTION_BITS, faces: 0, bars: 0 }
+    }
+
+    /// Forgets everything.
+    pub fn clear(&mut self) {
+        self.vertices.clear();
+        self.corners.clear();
+        self.fraction_bits = FINEST_FRACTION_BITS;
+        self.faces = 0;
+        self.bars = 0;
+    }
+
+    /// The vertices, in units of 2^-[`Model::fraction_bits`].
+    pub fn vertices(&self) -> &[Position] {
+        self.vertices
+    }
+
+    /// The unit of every coordinate is 2^-this, 0 to 30.
+    pub fn fraction_bits(&self) -> u32 {
+        self.fraction_bits
+    }
+
+    /// The faces and bars.
+    pub fn elements(&self) -> Elements<'_> {
+        Elements { corners: self.corners }
+    }
+
+    /// How many faces there are.
+    pub fn face_count(&self) -> usize {
+        self.faces
+    }
+
+    /// How many bars there are.
+    pub fn bar_count(&self) -> usize {
+        self.bars
+    }
+
+    /// How many vertices there can be.
+    pub fn vertex_limit(&self) -> usize {
+        self.vertices.capacity().min(VERTEX_NUMBER_LIMIT)
+    }
+
+    /// How many corners of elements there are.
+    pub fn corner_count(&self) -> usize {
+        self.corners.len()
+    }
+
+    /// How many corners of elements there can be.
+    pub fn corner_limit(&self) -> usize {
+        self.corners.capacity()
+    }
+
+    /// Adds a vertex. Its coordinates are rounded once, to 30 bits of the model's largest.
+    ///
+    /// # Errors
+    /// [`ModelError::TooManyVertices`], [`ModelError::CoordinateTooLarge`]; the model is unchanged.
+    pub fn add_vertex(&mut self, coordinates: [Decimal; 3]) -> Result<(), ModelError> {
+        let limit = self.vertex_limit();
+        if self.vertices.len() >= limit {
+            return Err(ModelError::TooManyVertices { limit });
+        }
+        let fraction_bits = (0..=self.fraction_bits)
+            .rev()
+            .find(|bits| {
+                coordinates.iter().all(|coordinate| {
+                    coordinate
+                        .to_binary(*bits)
+                        .is_ok_and(|value| value.unsigned_abs() <= POSITION_LIMIT as u64)
+                })
             })
+            .ok_or(ModelError::CoordinateTooLarge)?;
+        let [x, y, z] = coordinates.map(|coordinate| {
+            // In range: the search above tried it.
+            coordinate
+                .to_binary(fraction_bits)
+                .ok()
+                .and_then(|value| i32::try_from(value).ok())
+                .unwrap_or(0)
+        });
+        self.coarsen(self.fraction_bits - fraction_bits);
+        self.vertices.push(Position { x, y, z }).map_err(|_| ModelError::TooManyVertices { limit })
+    }
+
+    fn coarsen(&mut self, bits: u32) {
+        if bits == 0 {
+            return;
+        }
+        for vertex in self.vertices.iter_mut() {
+            *vertex = Position {
+                x: shift_right_rounding(vertex.x, bits),
+                y: shift_right_rounding(vertex.y, bits),
+                z: shift_right_rounding(vertex.z, bits),
+            };
+        }
+        self.fraction_bits -= bits;
+    }
+
+    /// Adds a face through vertices numbered as in OBJ: from 1, or from -1 for the last one.
+    ///
+    /// Corners repeated in a row are an error; the first corner repeated at the end too.
+    ///
+    /// # Errors
+    /// See [`ModelError`]; the model is unchanged.
+    pub fn add_face(
+        &mut self,
+        numbers: impl Iterator<Item = i32> + Clone,
+    ) -> Result<(), ModelError> {
+        let count = self.check_numbers(numbers.clone(), 3)?;
+        let first = numbers.clone().next();
+        let last = numbers.clone().last();
+        if let (Some(first), Some(last)) = (first, last)
+            && self.resolve(first) == self.resolve(last)
+        {
+            return Err(ModelError::RepeatedVertex { number: last });
+        }
+        self.check_corners(count)?;
+        for (at, number) in numbers.enumerate() {
+            self.push_corner(number, false, at + 1 == count)?;
+        }
+        self.faces += 1;
+        Ok(())
+    }
+
+    /// Adds the bars of a polyline through vertices numbered as in OBJ.
+    ///
+    /// # Errors
+    /// See [`ModelError`]; the model is unchanged.
+    pub fn add_polyline(
+        &mut self,
+        numbers: impl Iterator<Item = i32> + Clone,
+    ) -> Result<(), ModelError> {
+        let count = self.check_numbers(numbers.clone(), 2)?;
+        self.check_corners(2 * (count - 1))?;
+        for (from, to) in numbers.clone().zip(numbers.skip(1)) {
+            self.push_corner(from, true, false)?;
+            self.push_corner(to, true, true)?;
+            self.bars += 1;
+        }
+        Ok(())
+    }
+
+    /// How many numbers there are, if each names a vertex and differs from the one before.
+    fn check_numbers(
+        &self,
+        numbers: impl Iterator<Item = i32>,
+        needed: usize,
+    ) -> Result<usize, ModelError> {
+        let mut count = 0;
+        let mut previous = None;
+        for number in numbers {
+            let vertex = self
+                .resolve(number)
+                .ok_or(ModelError::UnknownVertex { number, vertices: self.vertices.len() })?;
+            if previous == Some(vertex) {
+                return Err(ModelError::RepeatedVertex { number });
+            }
+            previous = Some(vertex);
+            count += 1;
+        }
+        if count < needed { Err(ModelError::TooFewCorners { needed }) } else { Ok(count) }
+    }
+
+    fn check_corners(&self, count: usize) -> Result<(), ModelError> {
+        let limit = self.corner_limit();
+        let needed = self.corners.len().saturating_add(count);
+        if needed > limit { Err(ModelError::TooManyCorners { limit, needed }) } else { Ok(()) }
+    }
+
+    fn push_corner(&mut self, number: i32, of_bar: bool, last: bool) -> Result<(), ModelError> {
+        let limit = self.corner_limit();
+        let vertex = self
+            .resolve(number)
+            .ok_or(ModelError::UnknownVertex { number, vertices: self.vertices.len() })?;
+        self.corners
+            .push(Corner::new(vertex, of_bar, last))
+            .map_err(|_| ModelError::TooManyCorners { limit, needed: limit + 1 })
+    }
+
+    /// The vertex that an OBJ number means.
+    fn resolve(&self, number: i32) -> Option<u16> {
+        let count = self.vertices.len() as i64; // at most VERTEX_NUMBER_LIMIT
+        let index = if number < 0 { count + i64::from(number) } else { i64::from(number) - 1 };
+        if (0..count).contains(&index) { u16::try_from(index).ok() } else { None }
+    }
+
+    /// The smallest box around all vertices: least and greatest of each coordinate; `None` if empty.
+    pub fn bounds(&self) -> Option<(Position, Position)> {
+        let first = *self.vertices.first()?;
+        Some(self.vertices.iter().fold((first, first), |(low, high), vertex| {
+            (
+                Position { x: low.x.min(vertex.x), y: low.y.min(vertex.y), z: low.z.min(vertex.z) },
+                Position {
+                    x: high.x.max(vertex.x),
+                    y: high.y.max(vertex.y),
+                    z: high.z.max(vertex.z),
+                },
+            )
+        }))
+    }
+
+    /// Whether this is a plan: bars only, all at one height.
+    pub fn is_plan(&self) -> bool {
+        self.faces == 0 && self.bars > 0 && self.bounds().is_some_and(|(low, high)| low.z == high.z)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    type Vertices = heapless::Vec<Position, 4>;
+    type Corners = heapless::Vec<Corner, 8>;
+
+    fn decimals(texts: [&str; 3]) -> [Decimal; 3] {
+        texts.map(|text| Decimal::parse(text).unwrap())
+    }
+
+    fn with_vertices(count: usize, test: impl FnOnce(&mut Model<'_>)) {
+        let (mut vertices, mut corners) = (Vertices::new(), Corners::new());
+        let mut model = Model::new(&mut vertices, &mut corners);
+        for _ in 0..count {
+            model.add_vertex(decimals(["0.25", "-0.5", "0"])).unwrap();
+        }
+        test(&mut model);
+    }
+
+    #[test]
+    fn a_larger_coordinate_coarsens_the_unit_for_all() {
+        with_vertices(1, |model| {
+            assert_eq!(model.fraction_bits(), 30);
+            model.add_vertex(decimals(["100", "0", "0.1"])).unwrap();
+            assert_eq!(model.fraction_bits(), 23);
+            assert_eq!(model.vertices()[0], Position { x: 1 << 21, y: -(1 << 22), z: 0 });
+            assert_eq!(model.vertices()[1].x, 100 << 23);
+        });
+    }
+
+    #[test]
+    fn refused_vertices_change_nothing() {
+        with_vertices(3, |model| {
+            assert_eq!(
+                model.add_vertex(decimals(["1e10", "0", "0"])),
+                Err(ModelError::CoordinateTooLarge)
+            );
+            assert_eq!((model.vertices().len(), model.fraction_bits()), (3, 30));
+            model.add_vertex(decimals(["0", "0", "0"])).unwrap();
+            assert_eq!(
+                model.add_vertex(decimals(["9", "0", "0"])),
+                Err(ModelError::TooManyVertices { limit: 4 })
+            );
+            assert_eq!((model.vertices().len(), model.fraction_bits()), (4, 30));
+        });
+    }
+
+    #[test]
+    fn refused_elements_change_nothing() {
+        with_vertices(4, |model| {
+            let unknown = |number| Err(ModelError::UnknownVertex { number, vertices: 4 });
+            for number in [0, 5, -5, i32::MIN, i32::MAX] {
+                assert_eq!(model.add_face([1, 2, number].into_iter()), unknown(number));
+                assert_eq!(model.add_polyline([1, number].into_iter()), unknown(number));
+            }
+            assert_eq!(
+                model.add_face([1, 2].into_iter()),
+                Err(ModelError::TooFewCorners { needed: 3 })
+            );
+            assert_eq!(
+                model.add_polyline([1].into_iter()),
+                Err(ModelError::TooFewCorners { needed: 2 })
+            );
+            assert_eq!(
+                model.add_face([1, 2, 2].into_iter()),
+                Err(ModelError::RepeatedVertex { number: 2 })
+            );
+            assert_eq!(
+                model.add_face([1, 2, 3, -4].into_iter()),
+                Err(ModelError::RepeatedVertex { number: -4 })
+            );
+            assert_eq!(
+                model.add_face([1, 2, 3, 1, 2, 3, 1, 2, 3].into_iter()),
+                Err(ModelError::TooManyCorners { limit: 8, needed: 9 })
+            );
+            assert_eq!((model.corner_count(), model.face_count(), model.bar_count()), (0, 0, 0));
+        });
+    }
+
+    #[test]
+    fn elements_come_back_as_they_were_sent() {
+        with_vertices(4, |model| {
+            model.add_polyline([1, 2, -1].into_iter()).unwrap();
+            model.add_face([-4, -3, -2, -1].into_iter()).unwrap();
+            let mut elements = model.elements().iter();
+            assert_eq!(elements.next(), Some(Element::Bar(0, 1)));
+            assert_eq!(elements.next(), Some(Element::Bar(1, 3)));
+            let Some(Element::Face(corners)) = elements.next() else { panic!("a face was sent") };
+            assert!(corners.iter().map(|corner| corner.vertex()).eq(0..4));
+            assert_eq!(elements.next(), None);
+            assert_eq!((model.face_count(), model.bar_count()), (1, 2));
+            assert!(!model.is_plan());
+        });
+    }
+
+    #[test]
+    fn bars_at_one_height_are_a_plan() {
+        with_vertices(2, |model| {
+            assert!(!model.is_plan());
+            model.add_polyline([1, 2].into_iter()).unwrap();
+            assert!(model.is_plan());
+            model.add_vertex(decimals(["0", "0", "1"])).unwrap();
+            assert!(!model.is_plan());
+        });
     }
 }

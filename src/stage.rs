@@ -67,13 +67,10 @@ impl<'a> Scratch<'a> {
         }
         let word_count = Self::bytes_for::<T>(count) / size_of::<u64>();
         let words = core::mem::take(&mut self.words);
-        let (taken, rest) = words
-            .split_at_mut_checked(word_count)
-            .ok_or(out_of_scratch)?;
+        let (taken, rest) = words.split_at_mut_checked(word_count).ok_or(out_of_scratch)?;
         self.words = rest;
         taken.fill(0);
-        let items = bytemuck::cast_slice_mut(taken);
-        items.get_mut(..count).ok_or(out_of_scratch)
+        items_mut(taken, count).ok_or(out_of_scratch)
     }
 
     /// Lends what is left to a stage within this stage.
@@ -89,10 +86,38 @@ impl<'a> Scratch<'a> {
     }
 }
 
+/// The first `count` items of `T` that lie in `words`; `None` if they do not fit.
+pub fn items_mut<T: Pod>(words: &mut [u64], count: usize) -> Option<&mut [T]> {
+    const { assert!(align_of::<T>() <= align_of::<u64>()) };
+    let bytes: &mut [u8] = bytemuck::cast_slice_mut(words);
+    let exact = bytes.get_mut(..count.checked_mul(size_of::<T>())?)?;
+    bytemuck::try_cast_slice_mut(exact).ok()
+}
+
+/// Like [`items_mut`], to read only.
+pub fn items<T: Pod>(words: &[u64], count: usize) -> Option<&[T]> {
+    const { assert!(align_of::<T>() <= align_of::<u64>()) };
+    let bytes: &[u8] = bytemuck::cast_slice(words);
+    let exact = bytes.get(..count.checked_mul(size_of::<T>())?)?;
+    bytemuck::try_cast_slice(exact).ok()
+}
+
 /// The user asked for the job to be given up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Aborted;
+
+/// What a job computes before it moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Stage {
+    /// The camera, and every vertex through it.
+    View,
+    /// Which stretches are seen, and the drawing on the page.
+    Visibility,
+    /// In which order the strokes are drawn.
+    Order,
+}
 
 /// The moment that a long computation gives to the serial line.
 pub trait Attention {
@@ -101,6 +126,9 @@ pub trait Attention {
     /// # Errors
     /// [`Aborted`] if the user gave the job up; the stage then ends at once.
     fn check(&mut self) -> Result<(), Aborted>;
+
+    /// Told when a stage begins.
+    fn enter(&mut self, _stage: Stage) {}
 }
 
 /// Nobody to answer: for tests and benchmarks.
@@ -121,16 +149,19 @@ mod tests {
     fn a_slice_that_does_not_fit_takes_nothing() {
         let mut words = [7u64; 2];
         let mut scratch = Scratch::new(&mut words);
-        assert_eq!(
-            scratch.take::<u32>(5),
-            Err(OutOfScratch {
-                needed: 20,
-                available: 16
-            })
-        );
+        assert_eq!(scratch.take::<u32>(5), Err(OutOfScratch { needed: 20, available: 16 }));
         assert_eq!(scratch.take::<u32>(4).map(|items| items.len()), Ok(4));
         assert_eq!(scratch.available_bytes(), 0);
         assert_eq!(scratch.take::<u8>(0).map(|items| items.len()), Ok(0));
+    }
+
+    #[test]
+    fn items_need_not_fill_their_last_word() {
+        let mut words = [0u64; 4];
+        let mut scratch = Scratch::new(&mut words);
+        assert_eq!(scratch.take::<[u32; 3]>(1).map(|items| items.len()), Ok(1));
+        assert_eq!(scratch.take::<[u8; 3]>(5).map(|items| items.len()), Ok(5));
+        assert_eq!(scratch.available_bytes(), 0);
     }
 
     #[test]

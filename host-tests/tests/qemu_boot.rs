@@ -14,10 +14,7 @@ type TestResult = Result<(), Box<dyn Error>>;
 const GREETING: &str = "\r\nPenup 0.1 ['$' for help]\r\n";
 
 fn start() -> Result<Emulator, Box<dyn Error>> {
-    Ok(Emulator::start(
-        &image_path("lm3s6965"),
-        Options::default(),
-    )?)
+    Ok(Emulator::start(&image_path("lm3s6965"), Options::default())?)
 }
 
 /// What the board says, until it has said `end`.
@@ -38,10 +35,8 @@ fn heard_until(emulator: &mut Emulator, end: &str) -> io::Result<String> {
 fn machine_events(emulator: &mut Emulator) -> Result<Vec<MachineEvent>, Box<dyn Error>> {
     let mut machine = Machine::default();
     let changes = emulator.pin_changes()?;
-    let mut events: Vec<_> = changes
-        .into_iter()
-        .filter_map(|change| machine.change(change))
-        .collect();
+    let mut events: Vec<_> =
+        changes.into_iter().filter_map(|change| machine.change(change)).collect();
     events.extend(machine.last());
     Ok(events)
 }
@@ -54,10 +49,7 @@ fn greets_and_answers_status() -> TestResult {
     assert!(heard_until(&mut emulator, ">\r\n")?.starts_with("<Idle"));
     // Drivers off, pen up, before anything else.
     let off = MachineEventKind::Drivers { on: false };
-    let kinds: Vec<_> = machine_events(&mut emulator)?
-        .iter()
-        .map(|event| event.kind)
-        .collect();
+    let kinds: Vec<_> = machine_events(&mut emulator)?.iter().map(|event| event.kind).collect();
     assert_eq!(kinds, [off]);
     Ok(())
 }

@@ -15,9 +15,7 @@ pub fn cargo() -> Command {
 /// Runs to the end; what it prints is shown.
 pub fn run(command: &mut Command) -> Result<()> {
     let name = describe(command);
-    let status = command
-        .status()
-        .with_context(|| format!("cannot run {name}"))?;
+    let status = command.status().with_context(|| format!("cannot run {name}"))?;
     if !status.success() {
         bail!("{name}: {status}");
     }
@@ -27,9 +25,7 @@ pub fn run(command: &mut Command) -> Result<()> {
 /// Runs to the end, but no longer than `limit`; what it prints is shown.
 pub fn run_within(limit: Duration, command: &mut Command) -> Result<()> {
     let name = describe(command);
-    let mut child = command
-        .spawn()
-        .with_context(|| format!("cannot run {name}"))?;
+    let mut child = command.spawn().with_context(|| format!("cannot run {name}"))?;
     let deadline = Instant::now() + limit;
     while Instant::now() < deadline {
         if let Some(status) = child.try_wait()? {

@@ -92,19 +92,13 @@ impl Board {
 
     fn flash(self) -> Region {
         match self {
-            Self::Lm3s6965 => Region {
-                start: 0,
-                size: 256 << 10,
-            },
+            Self::Lm3s6965 => Region { start: 0, size: 256 << 10 },
         }
     }
 
     fn ram(self) -> Region {
         match self {
-            Self::Lm3s6965 => Region {
-                start: 0x2000_0000,
-                size: 64 << 10,
-            },
+            Self::Lm3s6965 => Region { start: 0x2000_0000, size: 64 << 10 },
         }
     }
 }
@@ -122,9 +116,7 @@ pub fn build(board: Board) -> Result<PathBuf> {
         cargo.args(["--target-dir", directory]);
     }
     run(cargo.arg("--quiet").args(board.cargo_options()))?;
-    let built = Path::new(directory)
-        .join(board.target())
-        .join("release/firmware");
+    let built = Path::new(directory).join(board.target()).join("release/firmware");
     let image = board.image();
     fs::create_dir_all(image.parent().context("the image has a directory")?)?;
     fs::copy(crate::root().join(built), &image)?;
@@ -172,9 +164,7 @@ pub fn check(board: Board, image: &Path) -> Result<Sizes> {
     );
     let table = vectors.data()?;
     let word = |index: usize| -> Result<u64> {
-        let bytes = table
-            .get(4 * index..4 * index + 4)
-            .context("the vector table is cut off")?;
+        let bytes = table.get(4 * index..4 * index + 4).context("the vector table is cut off")?;
         Ok(u64::from(u32::from_le_bytes(bytes.try_into()?)))
     };
     let (stack, entry) = (word(0)?, word(1)?);
@@ -188,11 +178,7 @@ pub fn check(board: Board, image: &Path) -> Result<Sizes> {
         "the entry {entry:#010x} is no code in flash"
     );
 
-    let mut sizes = Sizes {
-        board,
-        flash: 0,
-        ram: 0,
-    };
+    let mut sizes = Sizes { board, flash: 0, ram: 0 };
     for section in elf.sections() {
         let SectionFlags::Elf { sh_flags } = section.flags() else {
             continue;
@@ -214,10 +200,7 @@ pub fn check(board: Board, image: &Path) -> Result<Sizes> {
                 sizes.flash += size;
             }
         } else {
-            bail!(
-                "section {} at {start:#010x} is outside the memory",
-                section.name()?
-            );
+            bail!("section {} at {start:#010x} is outside the memory", section.name()?);
         }
     }
     Ok(sizes)

@@ -70,12 +70,8 @@ fn main() -> Result<()> {
 /// Runs the client, and for an emulated board builds its firmware first.
 fn plot(arguments: &[String]) -> Result<()> {
     let mut client = client("plot", arguments);
-    let at_a_port = arguments
-        .iter()
-        .any(|argument| argument.starts_with("--port"));
-    let asks_only = arguments
-        .iter()
-        .any(|argument| ["-h", "--help"].contains(&&**argument));
+    let at_a_port = arguments.iter().any(|argument| argument.starts_with("--port"));
+    let asks_only = arguments.iter().any(|argument| ["-h", "--help"].contains(&&**argument));
     if !at_a_port && !asks_only {
         let board = Board::from_options(arguments)?;
         set_up::emulator()?;
@@ -89,14 +85,7 @@ fn plot(arguments: &[String]) -> Result<()> {
 fn client(command: &str, arguments: &[String]) -> Command {
     let mut client = cargo();
     client
-        .args([
-            "run",
-            "--quiet",
-            "--package",
-            "penup-client",
-            "--bin",
-            "penup",
-        ])
+        .args(["run", "--quiet", "--package", "penup-client", "--bin", "penup"])
         .arg("--manifest-path")
         .arg(root().join("Cargo.toml"))
         .args(["--", command])

@@ -40,9 +40,7 @@ pub fn toolchain(target: &str) -> Result<Toolchain> {
         println!("penup: installing the Rust target {target} by rustup");
         let mut rustup = Command::new("rustup");
         // A backtrace of rustup's would hide its one line of reason.
-        rustup
-            .args(["target", "add", target])
-            .env("RUST_BACKTRACE", "0");
+        rustup.args(["target", "add", target]).env("RUST_BACKTRACE", "0");
         match run_within(RUSTUP_LIMIT, &mut rustup) {
             Ok(()) if has_core(target) => return Ok(Toolchain::Rustup),
             Ok(()) => println!("penup: rustup added {target} to another toolchain than cargo's"),
@@ -77,14 +75,8 @@ fn has_core(target: &str) -> bool {
     let Some(directory) = output("rustc", &["--print", "target-libdir", "--target", target]) else {
         return false;
     };
-    let files = Path::new(&directory)
-        .read_dir()
-        .into_iter()
-        .flatten()
-        .flatten();
-    files
-        .map(|file| file.file_name())
-        .any(|name| name.to_string_lossy().starts_with("libcore-"))
+    let files = Path::new(&directory).read_dir().into_iter().flatten().flatten();
+    files.map(|file| file.file_name()).any(|name| name.to_string_lossy().starts_with("libcore-"))
 }
 
 fn debian_is_ready() -> bool {
@@ -97,9 +89,7 @@ impl Toolchain {
     /// A cargo command, as `build`, `check` or `clippy`, that compiles for `target`.
     pub fn cargo(self, command: &str, target: &str) -> Command {
         let mut cargo = cargo();
-        cargo
-            .current_dir(crate::root())
-            .args([command, "--target", target]);
+        cargo.current_dir(crate::root()).args([command, "--target", target]);
         if self == Self::Debian {
             // Debian's std for proc macros and build scripts stays apart from rustup's.
             cargo
@@ -114,10 +104,7 @@ impl Toolchain {
 
 /// The variable by which cargo is told a target's linker.
 fn linker_variable(target: &str) -> String {
-    format!(
-        "CARGO_TARGET_{}_LINKER",
-        target.to_uppercase().replace('-', "_")
-    )
+    format!("CARGO_TARGET_{}_LINKER", target.to_uppercase().replace('-', "_"))
 }
 
 /// QEMU for Arm.
@@ -150,14 +137,8 @@ pub fn checkers() -> Result<()> {
         let mut rustup = Command::new("rustup");
         let installed = run_within(RUSTUP_LIMIT, rustup.args(["component", "add", component]));
         if !found() {
-            let reason = installed
-                .err()
-                .map(|error| format!("{error:#}; "))
-                .unwrap_or_default();
-            bail!(
-                "{reason}run `{}` where the network can be reached",
-                describe(&rustup)
-            );
+            let reason = installed.err().map(|error| format!("{error:#}; ")).unwrap_or_default();
+            bail!("{reason}run `{}` where the network can be reached", describe(&rustup));
         }
     }
     Ok(())
@@ -172,9 +153,7 @@ fn apt_install(packages: &[&str]) -> Result<()> {
     println!("penup: installing {} by apt-get", packages.join(" "));
     let install = || {
         let mut command = as_root("apt-get");
-        command
-            .args(["install", "--yes", "--no-install-recommends"])
-            .args(packages);
+        command.args(["install", "--yes", "--no-install-recommends"]).args(packages);
         command
     };
     if run(&mut install()).is_ok() {

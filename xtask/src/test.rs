@@ -54,10 +54,7 @@ fn lint_firmware(board: Board) -> Result<()> {
                 .args(["--", "-Dwarnings"]),
         ),
         Toolchain::Debian => {
-            println!(
-                "penup: no clippy for {}: Debian's compiler has none",
-                board.target()
-            );
+            println!("penup: no clippy for {}: Debian's compiler has none", board.target());
             step(
                 toolchain
                     .cargo("rustc", board.target())

@@ -8,9 +8,7 @@ use super::EmulatorError;
 
 /// The table of `image`, the bytes of an ELF file; `None` if it logs nothing.
 pub fn table(image: &[u8]) -> Result<Option<Table>, EmulatorError> {
-    Table::parse(image).map_err(|error| EmulatorError::BadImage {
-        reason: format!("{error:#}"),
-    })
+    Table::parse(image).map_err(|error| EmulatorError::BadImage { reason: format!("{error:#}") })
 }
 
 /// Decodes frames as they come in, until `input` ends.

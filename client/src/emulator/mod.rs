@@ -72,9 +72,7 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self {
-            instruction_shift: 4,
-        }
+        Self { instruction_shift: 4 }
     }
 }
 
@@ -112,11 +110,7 @@ impl Emulator {
     pub fn start(image: &Path, options: Options) -> Result<Self, EmulatorError> {
         let (process, line) = Process::start(image, options, PATIENCE)?;
         line.set_nodelay(true)?;
-        Ok(Self {
-            process,
-            line,
-            received: 0,
-        })
+        Ok(Self { process, line, received: 0 })
     }
 
     /// Sends all of `bytes` to the board's serial line.
@@ -133,8 +127,7 @@ impl Emulator {
     /// # Errors
     /// [`io::ErrorKind::BrokenPipe`] if the emulator has ended.
     pub fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize> {
-        self.line
-            .set_read_timeout(Some(patience.max(Duration::from_millis(1))))?;
+        self.line.set_read_timeout(Some(patience.max(Duration::from_millis(1))))?;
         match self.line.read(buffer) {
             Ok(0) if !buffer.is_empty() => Err(io::ErrorKind::BrokenPipe.into()),
             Ok(count) => {
@@ -157,8 +150,7 @@ impl Emulator {
     /// The emulator has ended, or its trace makes no sense.
     pub fn pin_changes(&mut self) -> Result<Vec<PinChange>, EmulatorError> {
         let received = self.received;
-        self.process
-            .with_trace(PATIENCE, |trace| trace.sent() >= received, Trace::take_pins)
+        self.process.with_trace(PATIENCE, |trace| trace.sent() >= received, Trace::take_pins)
     }
 
     /// The latest instant on the board's clock that is known. The clock stands still while the
@@ -167,8 +159,7 @@ impl Emulator {
     /// # Errors
     /// As [`Emulator::pin_changes`].
     pub fn clock(&mut self) -> Result<Duration, EmulatorError> {
-        self.process
-            .with_trace(PATIENCE, |_| true, |trace| trace.clock())
+        self.process.with_trace(PATIENCE, |_| true, |trace| trace.clock())
     }
 
     /// What the board has logged since last asked, a line each: time, level, message.

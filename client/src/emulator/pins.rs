@@ -172,10 +172,7 @@ fn joined(first: MachineEventKind, second: MachineEventKind) -> Option<MachineEv
         return None;
     };
     let different_axes = x1 * x2 == 0 && y1 * y2 == 0;
-    different_axes.then_some(MachineEventKind::Step {
-        x: x1 + x2,
-        y: y1 + y2,
-    })
+    different_axes.then_some(MachineEventKind::Step { x: x1 + x2, y: y1 + y2 })
 }
 
 #[cfg(test)]
@@ -194,10 +191,7 @@ mod tests {
             })
             .collect();
         events.extend(machine.last());
-        events
-            .iter()
-            .map(|event| (event.at.as_micros() as u64, event.kind))
-            .collect()
+        events.iter().map(|event| (event.at.as_micros() as u64, event.kind)).collect()
     }
 
     #[test]
@@ -234,11 +228,8 @@ mod tests {
             (2, Pin::StepY, false),
             (2, Pin::StepY, true),
         ]);
-        let expected = [
-            (1, Step { x: -1, y: 0 }),
-            (2, Step { x: 0, y: -1 }),
-            (2, Step { x: 0, y: -1 }),
-        ];
+        let expected =
+            [(1, Step { x: -1, y: 0 }), (2, Step { x: 0, y: -1 }), (2, Step { x: 0, y: -1 })];
         assert_eq!(events, expected);
     }
 

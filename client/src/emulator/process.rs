@@ -72,11 +72,7 @@ impl Process {
         };
         let logged = Arc::clone(&shared);
         let logger = thread::spawn(move || read_log(table.as_ref(), stdout, &logged));
-        let mut process = Self {
-            child,
-            shared,
-            readers: vec![tracer, logger],
-        };
+        let mut process = Self { child, shared, readers: vec![tracer, logger] };
         let line = process.connect(&listener, patience)?;
         Ok((process, line))
     }
@@ -174,20 +170,11 @@ impl Drop for Process {
 fn command(image: &Path, options: Options, port: u16) -> Command {
     let mut command = quitting_with_parent("qemu-system-arm");
     command
-        .args([
-            "-machine",
-            "lm3s6965evb",
-            "-display",
-            "none",
-            "-monitor",
-            "none",
-        ])
+        .args(["-machine", "lm3s6965evb", "-display", "none", "-monitor", "none"])
         .arg("-icount")
         .arg(format!("shift={},sleep=off", options.instruction_shift))
         .arg("-chardev")
-        .arg(format!(
-            "socket,id=uart,host=127.0.0.1,port={port},server=off,nodelay=on"
-        ))
+        .arg(format!("socket,id=uart,host=127.0.0.1,port={port},server=off,nodelay=on"))
         .args(["-serial", "chardev:uart"])
         .args(["-chardev", "stdio,id=log,signal=off"])
         .args(["-semihosting-config", "enable=on,target=native,chardev=log"]);
@@ -195,10 +182,7 @@ fn command(image: &Path, options: Options, port: u16) -> Command {
         command.args(["-trace", event]);
     }
     command.arg("-kernel").arg(image);
-    command
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped());
+    command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
     // Ctrl-C at the terminal is for this process, which ends QEMU when it is done with it.
     #[cfg(unix)]
     std::os::unix::process::CommandExt::process_group(&mut command, 0);

@@ -19,13 +19,8 @@ use std::time::Duration;
 use super::pins::{Pin, PinChange};
 
 /// The events to trace.
-pub const EVENTS: [&str; 5] = [
-    "pl061_set_output",
-    "systick_read",
-    "systick_write",
-    "systick_timer_tick",
-    "pl011_write",
-];
+pub const EVENTS: [&str; 5] =
+    ["pl061_set_output", "systick_read", "systick_write", "systick_timer_tick", "pl011_write"];
 
 const CLOCK_BITS: u32 = 24;
 const CYCLE: Duration = Duration::from_nanos(20);
@@ -178,16 +173,8 @@ mod tests {
              systick_read systick read addr 0x8 data 0xffffff size 4\n\
              pl061_set_output /machine/unattached/device[9] setting output 0 to 0\n",
         );
-        let pen_down = PinChange {
-            pin: Pin::Pen,
-            high: true,
-            at: CYCLE,
-        };
-        let step_over = PinChange {
-            pin: Pin::StepX,
-            high: false,
-            at: CYCLE * (1 << 24),
-        };
+        let pen_down = PinChange { pin: Pin::Pen, high: true, at: CYCLE };
+        let step_over = PinChange { pin: Pin::StepX, high: false, at: CYCLE * (1 << 24) };
         assert_eq!(trace.take_pins(), [pen_down, step_over]);
         assert_eq!(trace.take_pins(), []);
     }

@@ -101,10 +101,7 @@ pub fn microseconds() -> u64 {
 #[exception]
 fn SysTick() {
     // The only writer, so load and store are as good as an increment.
-    WRAPS.store(
-        WRAPS.load(Ordering::Relaxed).wrapping_add(1),
-        Ordering::Relaxed,
-    );
+    WRAPS.store(WRAPS.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
 }
 
 defmt::timestamp!("{=u64:us}", microseconds());

@@ -39,11 +39,7 @@ struct OneLine;
 impl Write for OneLine {
     fn write_str(&mut self, text: &str) -> fmt::Result {
         for byte in text.bytes() {
-            let byte = if byte == b'\n' || byte == b'\r' {
-                b' '
-            } else {
-                byte
-            };
+            let byte = if byte == b'\n' || byte == b'\r' { b' ' } else { byte };
             serial::write(&[byte]);
         }
         Ok(())

@@ -17,7 +17,6 @@ mod critical;
 mod emergency;
 mod handler;
 mod pins;
-mod pulser;
 mod registers;
 mod serial;
 mod steps;
@@ -26,12 +25,11 @@ use core::sync::atomic::{AtomicBool, Ordering};
 
 use cortex_m::interrupt;
 use cortex_m::peripheral::Peripherals;
-use embedded_hal::digital::OutputPin;
-use penup::drawing::PagePoint;
+use penup::machine::PulserState;
 use penup::motion::EventQueue;
-use penup::plotter::{Board, Realtime};
-
-use pins::EnablePin;
+use penup::plotter::{Board, Lent, Lm3s6965Memory};
+use penup::protocol::RealTime;
+use static_cell::StaticCell;
 
 /// An interrupt came since [`Board::wait`] last returned: the Cortex-M event register, in software,
 /// because QEMU's `wfe` does not sleep.
@@ -42,14 +40,13 @@ pub struct Lm3s6965 {
     clock: clock::Clock,
     serial: serial::Line,
     steps: steps::Steps,
-    enable: EnablePin,
 }
 
 /// Sets up clock, pins, serial line and timer: drivers off, pen up, nothing moving.
 ///
 /// # Panics
 /// If the board was taken before.
-pub fn take() -> Lm3s6965 {
+pub fn take() -> (Lm3s6965, Lent<'static>, &'static PulserState) {
     let Some(mut core) = Peripherals::take() else {
         #[allow(clippy::panic)] // A programming error, found at the first start.
         {
@@ -59,23 +56,22 @@ pub fn take() -> Lm3s6965 {
     let clock = clock::start(core.SYST, &mut core.SCB);
     let pins = pins::set_up();
     let serial = serial::set_up(&mut core.NVIC);
-    let steps = steps::set_up(pins.motors, &mut core.NVIC);
+    let steps = steps::set_up(pins, &mut core.NVIC);
     defmt::info!("lm3s6965 at {=u32} Hz", clock::HERTZ);
-    Lm3s6965 {
-        clock,
-        serial,
-        steps,
-        enable: pins.enable,
-    }
+    static MEMORY: StaticCell<Lm3s6965Memory> = StaticCell::new();
+    let memory = MEMORY.init_with(Lm3s6965Memory::new).lend();
+    (Lm3s6965 { clock, serial, steps }, memory, &steps::STATE)
 }
 
 impl Board for Lm3s6965 {
+    const NAME: &'static str = "lm3s6965";
+
     fn read_byte(&mut self) -> Option<u8> {
         self.serial.read_byte()
     }
 
-    fn take_realtime(&mut self) -> Realtime {
-        self.serial.take_realtime()
+    fn take_real_time(&mut self) -> RealTime {
+        self.serial.take_real_time()
     }
 
     fn write(&mut self, bytes: &[u8]) {
@@ -84,22 +80,6 @@ impl Board for Lm3s6965 {
 
     fn queue(&mut self) -> &mut dyn EventQueue {
         &mut self.steps
-    }
-
-    fn stop_steps(&mut self) {
-        self.steps.stop();
-    }
-
-    fn steps_idle(&mut self) -> bool {
-        self.steps.idle()
-    }
-
-    fn pin_position(&mut self) -> PagePoint {
-        self.steps.position()
-    }
-
-    fn set_drivers_enabled(&mut self, on: bool) {
-        let Ok(()) = self.enable.set_state((!on).into());
     }
 
     fn wait(&mut self) {

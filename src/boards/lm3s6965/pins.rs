@@ -24,22 +24,15 @@ pub type StepXPin = Pin<0>;
 pub type DirXPin = Pin<1>;
 pub type StepYPin = Pin<2>;
 pub type DirYPin = Pin<3>;
-pub type EnablePin = Pin<4>;
 pub type PenPin = Pin<5>;
+
+/// The enable input of the drivers, which is active low: high here is low at the pin.
+pub struct EnablePin(Pin<4>);
 
 /// The pins that the step interrupt moves.
 pub struct MotorPins {
-    pub step_x: StepXPin,
-    pub dir_x: DirXPin,
-    pub step_y: StepYPin,
-    pub dir_y: DirYPin,
+    pub axes: penup::machine::Pins<StepXPin, DirXPin, StepYPin, DirYPin, EnablePin>,
     pub pen: PenPin,
-}
-
-/// All pins.
-pub struct Pins {
-    pub motors: MotorPins,
-    pub enable: EnablePin,
 }
 
 impl<const NUMBER: u8> ErrorType for Pin<NUMBER> {
@@ -60,6 +53,22 @@ impl<const NUMBER: u8> OutputPin for Pin<NUMBER> {
     }
 }
 
+impl ErrorType for EnablePin {
+    type Error = Infallible;
+}
+
+impl OutputPin for EnablePin {
+    #[inline(always)]
+    fn set_low(&mut self) -> Result<(), Infallible> {
+        self.0.set_high()
+    }
+
+    #[inline(always)]
+    fn set_high(&mut self) -> Result<(), Infallible> {
+        self.0.set_low()
+    }
+}
+
 /// Sets the pins of `mask` to `levels`, in one store, the others untouched: address bits 2 to 9 of
 /// the data register are its mask.
 #[inline(always)]
@@ -73,25 +82,20 @@ pub fn release() {
 }
 
 /// Makes the pins outputs, with the levels of [`release`].
-pub fn set_up() -> Pins {
+pub fn set_up() -> MotorPins {
     SYSTEM_CONTROL.set_bits(offset::GPIO_CLOCKS, PORT_B_CLOCK);
     // The port answers three cycles after its clock is on; a read takes longer.
     SYSTEM_CONTROL.read(offset::GPIO_CLOCKS);
-    GPIO_B.write(
-        offset::ALTERNATE_FUNCTION,
-        GPIO_B.read(offset::ALTERNATE_FUNCTION) & !ALL,
-    );
+    GPIO_B.write(offset::ALTERNATE_FUNCTION, GPIO_B.read(offset::ALTERNATE_FUNCTION) & !ALL);
     GPIO_B.set_bits(offset::DIRECTION, ALL);
     release();
     GPIO_B.set_bits(offset::DIGITAL_ENABLE, ALL);
-    Pins {
-        motors: MotorPins {
-            step_x: Pin(()),
-            dir_x: Pin(()),
-            step_y: Pin(()),
-            dir_y: Pin(()),
-            pen: Pin(()),
-        },
-        enable: Pin(()),
-    }
+    let axes = penup::machine::Pins {
+        step_x: Pin(()),
+        direction_x: Pin(()),
+        step_y: Pin(()),
+        direction_y: Pin(()),
+        enable: EnablePin(Pin(())),
+    };
+    MotorPins { axes, pen: Pin(()) }
 }

@@ -9,7 +9,7 @@ use core::sync::atomic::{AtomicU8, AtomicU32, Ordering};
 use cortex_m::peripheral::NVIC;
 use heapless::spsc::{Consumer, Producer, Queue};
 use lm3s6965::{Interrupt, interrupt};
-use penup::plotter::Realtime;
+use penup::protocol::RealTime;
 use static_cell::StaticCell;
 
 use super::handler::Owned;
@@ -97,18 +97,12 @@ pub fn set_up(nvic: &mut NVIC) -> Line {
     UART0.write(offset::INTERRUPT_MASK, RECEIVED | RECEIVE_TIMEOUT);
 
     let (producer, consumer) = QUEUE.init(Queue::new()).split();
-    let receiver = Receiver {
-        bytes: producer,
-        count: 0,
-    };
+    let receiver = Receiver { bytes: producer, count: 0 };
     // SAFETY: the interrupt is masked since reset, and this runs once (the queue's cell sees to it).
     unsafe { RECEIVER.fill(receiver) };
     critical::enable(nvic, Interrupt::UART0, critical::SERIAL_PRIORITY);
     UART0.write(offset::CONTROL, ENABLE_BOTH_WAYS);
-    Line {
-        bytes: consumer,
-        count: 0,
-    }
+    Line { bytes: consumer, count: 0 }
 }
 
 impl Line {
@@ -124,24 +118,22 @@ impl Line {
     }
 
     /// What was asked in real time since last taken. An abort drops the bytes received before it.
-    pub fn take_realtime(&mut self) -> Realtime {
+    pub fn take_real_time(&mut self) -> RealTime {
         let flags = FLAGS.swap(0, Ordering::AcqRel);
         let abort = flags & flag::ABORT != 0;
         if abort {
-            let void = COUNT_AT_ABORT
-                .load(Ordering::Acquire)
-                .wrapping_sub(self.count);
+            let void = COUNT_AT_ABORT.load(Ordering::Acquire).wrapping_sub(self.count);
             for _ in 0..void {
                 self.bytes.dequeue();
                 self.count = self.count.wrapping_add(1);
             }
         }
-        Realtime {
+        RealTime {
             status: flags & flag::STATUS != 0,
             hold: flags & flag::HOLD != 0,
             resume: flags & flag::RESUME != 0,
             abort,
-            overrun: flags & flag::OVERRUN != 0,
+            bytes_lost: flags & flag::OVERRUN != 0,
         }
     }
 }

@@ -10,15 +10,14 @@
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use cortex_m::peripheral::NVIC;
-use heapless::spsc::{Consumer, Producer, Queue};
+use heapless::spsc::{Producer, Queue};
 use lm3s6965::{Interrupt, interrupt};
-use penup::drawing::PagePoint;
+use penup::machine::{Pulser, PulserState, Solenoid};
 use penup::motion::{EventQueue, StepEvent, TICKS_PER_SECOND};
 use static_cell::StaticCell;
 
 use super::handler::Owned;
-use super::pins::MotorPins;
-use super::pulser::Pulser;
+use super::pins::{DirXPin, DirYPin, EnablePin, MotorPins, PenPin, StepXPin, StepYPin};
 use super::registers::{SYSTEM_CONTROL, TIMER0};
 use super::{HAPPENED, clock, critical};
 
@@ -50,10 +49,12 @@ static STEPPER: Owned<Stepper> = Owned::empty();
 /// From the first event until the last one is over.
 static RUNNING: AtomicBool = AtomicBool::new(false);
 
+/// What the interrupt has done, for the main loop.
+pub static STATE: PulserState = PulserState::new();
+
 /// The handler's end.
 struct Stepper {
-    events: Consumer<'static, StepEvent>,
-    pulser: Pulser,
+    pulser: Pulser<'static, StepXPin, DirXPin, StepYPin, DirYPin, EnablePin, Solenoid<PenPin>>,
     /// When the present event was planned to begin, in cycles modulo 2^24.
     began: u32,
 }
@@ -74,11 +75,8 @@ pub fn set_up(pins: MotorPins, nvic: &mut NVIC) -> Steps {
     TIMER0.write(offset::INTERRUPT_MASK, TIMED_OUT);
 
     let (producer, consumer) = QUEUE.init(Queue::new()).split();
-    let stepper = Stepper {
-        events: consumer,
-        pulser: Pulser::new(pins),
-        began: 0,
-    };
+    let pulser = Pulser::new(pins.axes, Solenoid(pins.pen), consumer, &STATE);
+    let stepper = Stepper { pulser, began: 0 };
     // SAFETY: the interrupt is masked since reset, and this runs once (the queue's cell sees to it).
     unsafe { STEPPER.fill(stepper) };
     critical::enable(nvic, Interrupt::TIMER_0A, critical::STEP_PRIORITY);
@@ -97,16 +95,6 @@ impl Steps {
     pub fn idle(&self) -> bool {
         self.events.len() == 0 && !RUNNING.load(Ordering::Acquire)
     }
-
-    /// Ends all steps at once; waiting events are dropped.
-    pub fn stop(&mut self) {
-        with_stepper(Stepper::stop);
-    }
-
-    /// Steps executed.
-    pub fn position(&self) -> PagePoint {
-        with_stepper(|stepper| stepper.pulser.position())
-    }
 }
 
 impl EventQueue for Steps {
@@ -123,18 +111,6 @@ impl EventQueue for Steps {
     }
 }
 
-/// Does `work` on the stepper between two events.
-fn with_stepper<T: Default>(work: impl FnOnce(&mut Stepper) -> T) -> T {
-    NVIC::mask(Interrupt::TIMER_0A);
-    cortex_m::asm::dsb();
-    cortex_m::asm::isb();
-    // SAFETY: the handler's interrupt is masked while the reference lives.
-    let result = unsafe { STEPPER.get() }.map(work).unwrap_or_default();
-    // SAFETY: the step interrupt is outside every critical section, so none is broken.
-    unsafe { NVIC::unmask(Interrupt::TIMER_0A) };
-    result
-}
-
 impl Stepper {
     /// One event. No loop, no division, no lock.
     #[inline(always)]
@@ -143,26 +119,17 @@ impl Stepper {
         if !RUNNING.load(Ordering::Relaxed) {
             self.began = now;
         }
-        let Some(event) = self.events.dequeue() else {
+        let Some(ticks) = self.pulser.tick() else {
             RUNNING.store(false, Ordering::Release);
             return;
         };
         RUNNING.store(true, Ordering::Release);
-        let cycles = self.pulser.pulse(event) * CYCLES_PER_TICK;
+        let cycles = ticks * CYCLES_PER_TICK;
         // Late by less than 0.3 s, so 24 bits tell.
         let late = now.wrapping_sub(self.began) & clock::CYCLE_MASK;
         TIMER0.write(offset::INTERVAL_LOAD_A, cycles.saturating_sub(late).max(1));
         TIMER0.write(offset::CONTROL, ENABLE);
         self.began = self.began.wrapping_add(cycles) & clock::CYCLE_MASK;
-    }
-
-    fn stop(&mut self) {
-        TIMER0.write(offset::CONTROL, 0);
-        TIMER0.write(offset::INTERRUPT_CLEAR, TIMED_OUT);
-        NVIC::unpend(Interrupt::TIMER_0A);
-        while self.events.dequeue().is_some() {}
-        self.pulser.release();
-        RUNNING.store(false, Ordering::Release);
     }
 }
 

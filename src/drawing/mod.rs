@@ -1,6 +1,16 @@
-//! The line drawing on the page: points, segments, line type.
+//! The line drawing on the page: points, segments, pen, line type; fit to the page; merge coincident
+//! points.
 //!
-//! (skeleton)
+//! Lines come in as they are found, mapped to steps by a [`PageMap`] that fits the image to the
+//! [`Page`] and packed as [`Line`]s; [`organise`] then makes one [`Drawing`] of them: a graph whose
+//! points are all different (Harrison 5.1.1 and 5.9). Refused: what does not fit the page or the
+//! memory.
+
+mod collect;
+mod page;
+
+pub use collect::{Line, PEN_LIMIT, Stored, organise};
+pub use page::{Bounds, Page, PageError, PageMap, StepsPerMillimetre};
 
 use bytemuck::{Pod, Zeroable};
 
@@ -43,6 +53,17 @@ pub struct Segment {
     pub line_type_code: u8,
     /// The pen that draws it, from 0.
     pub pen: u8,
+}
+
+impl LineType {
+    /// The code by which a [`Segment`] stores it: a full line sorts before the others.
+    pub const fn code(self) -> u8 {
+        match self {
+            Self::Full => 0,
+            Self::Dotted => 1,
+            Self::Dashed => 2,
+        }
+    }
 }
 
 impl Segment {

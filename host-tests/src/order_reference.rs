@@ -1,0 +1,169 @@
+//! What an order of strokes must be, said slowly; and drawings to order.
+
+#![allow(clippy::expect_used, reason = "a test fails by panicking")]
+
+use penup::drawing::{Drawing, PagePoint, Segment};
+use penup::order::{Leg, Options, OrderError, Report, Shape, order};
+use penup::stage::{Scratch, Undisturbed};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// A drawing with its own memory.
+#[derive(Debug, Clone, Default)]
+pub struct Sheet {
+    /// The points, all different.
+    pub points: Vec<PagePoint>,
+    /// The segments between them.
+    pub segments: Vec<Segment>,
+}
+
+impl Sheet {
+    /// The drawing of polylines; equal points become one, a segment that is there already or has
+    /// no length is left out.
+    pub fn from_polylines(polylines: &[Vec<(i32, i32)>]) -> Self {
+        let mut sheet = Self::default();
+        let mut numbers = BTreeMap::new();
+        let mut known = BTreeSet::new();
+        for polyline in polylines {
+            let ends: Vec<u16> = polyline
+                .iter()
+                .map(|&(x, y)| {
+                    *numbers.entry((x, y)).or_insert_with(|| {
+                        sheet.points.push(PagePoint { x, y });
+                        sheet.points.len() as u16 - 1
+                    })
+                })
+                .collect();
+            for pair in ends.windows(2) {
+                let (from, to) = (pair[0], pair[1]);
+                if from != to && known.insert((from.min(to), from.max(to))) {
+                    let segment = Segment { from, to, ..Segment::default() };
+                    sheet.segments.push(segment);
+                }
+            }
+        }
+        sheet
+    }
+
+    /// The plan in an OBJ text, in millimetres, at 80 steps to each.
+    pub fn from_obj(text: &str) -> Self {
+        let mut vertices = Vec::new();
+        let mut polylines = Vec::new();
+        for line in text.lines() {
+            let mut words = line.split_whitespace();
+            match words.next() {
+                Some("v") => {
+                    let mut steps = words
+                        .map(|word| (word.parse::<f64>().expect("a number") * 80.0).round() as i32);
+                    let mut next = || steps.next().expect("a coordinate");
+                    vertices.push((next(), next()));
+                }
+                Some("l") => polylines.push(
+                    words
+                        .map(|word| vertices[word.parse::<usize>().expect("an index") - 1])
+                        .collect(),
+                ),
+                _ => {}
+            }
+        }
+        Self::from_polylines(&polylines)
+    }
+
+    /// As the library takes it.
+    pub fn drawing(&self) -> Drawing<'_> {
+        Drawing { points: &self.points, segments: &self.segments }
+    }
+
+    /// The tour that the library finds, with plenty of memory, checked.
+    pub fn order(&self, options: Options) -> Result<(Vec<Leg>, Report), OrderError> {
+        let mut memory = vec![0; 1 << 18];
+        let mut tour = vec![Leg::new(0, false); self.segments.len()];
+        let scratch = Scratch::new(&mut memory);
+        let report = order(self.drawing(), options, scratch, &mut Undisturbed, &mut tour)?;
+        self.check(options.shape, &tour, &report);
+        Ok((tour, report))
+    }
+
+    /// The point at which a leg begins.
+    pub fn start(&self, leg: Leg) -> PagePoint {
+        let segment = self.segments[leg.segment()];
+        let point = if leg.reversed() { segment.to } else { segment.from };
+        self.points[usize::from(point)]
+    }
+
+    /// The point at which a leg ends.
+    pub fn end(&self, leg: Leg) -> PagePoint {
+        self.start(Leg::new(leg.segment() as u16, !leg.reversed()))
+    }
+
+    /// How many points are odd.
+    pub fn odd_points(&self) -> usize {
+        let mut degree = vec![0; self.points.len()];
+        for segment in &self.segments {
+            degree[usize::from(segment.from)] += 1;
+            degree[usize::from(segment.to)] += 1;
+        }
+        degree.iter().filter(|&degree| degree % 2 == 1).count()
+    }
+
+    /// How many separate parts there are (by flooding).
+    pub fn components(&self) -> usize {
+        let mut left: BTreeSet<usize> = (0..self.segments.len()).collect();
+        let mut count = 0;
+        while let Some(first) = left.pop_first() {
+            count += 1;
+            let mut wet = BTreeSet::from([self.segments[first].from, self.segments[first].to]);
+            loop {
+                let touched: Vec<usize> = left
+                    .iter()
+                    .copied()
+                    .filter(|&number| {
+                        let Segment { from, to, .. } = self.segments[number];
+                        wet.contains(&from) || wet.contains(&to)
+                    })
+                    .collect();
+                if touched.is_empty() {
+                    break;
+                }
+                for number in touched {
+                    left.remove(&number);
+                    wet.insert(self.segments[number].from);
+                    wet.insert(self.segments[number].to);
+                }
+            }
+        }
+        count
+    }
+
+    /// Panics unless `tour` draws each segment once and `report` tells the truth about it.
+    pub fn check(&self, shape: Shape, tour: &[Leg], report: &Report) {
+        let drawn: BTreeSet<usize> = tour.iter().map(|leg| leg.segment()).collect();
+        assert_eq!(drawn.len(), tour.len(), "a segment is drawn twice");
+        assert_eq!(drawn.len(), self.segments.len(), "a segment is missing");
+        let mut moves: Vec<_> =
+            tour.windows(2).map(|pair| (self.end(pair[0]), self.start(pair[1]))).collect();
+        if shape == Shape::ClosedCycle
+            && let (Some(&first), Some(&last)) = (tour.first(), tour.last())
+        {
+            moves.push((self.end(last), self.start(first)));
+        }
+        moves.retain(|(from, to)| from != to);
+        let steps = |from: PagePoint, to: PagePoint| {
+            f64::from(to.x - from.x).hypot(f64::from(to.y - from.y))
+        };
+        let pen_up: f64 = moves.iter().map(|&(from, to)| steps(from, to)).sum();
+        let pen_down: f64 = tour.iter().map(|&leg| steps(self.start(leg), self.end(leg))).sum();
+        let count = tour.len() as f64 + 1.0;
+        assert!((report.pen_up as f64 / 256.0 - pen_up).abs() < count / 256.0);
+        assert!((report.pen_down as f64 / 256.0 - pen_down).abs() < count / 256.0);
+        assert_eq!(report.lifts as usize, moves.len());
+        if self.segments.iter().all(|segment| segment.pen == 0) {
+            assert_eq!(report.odd_points as usize, self.odd_points());
+            assert_eq!(report.components as usize, self.components());
+            if report.components == 1 {
+                assert!(moves.len() <= self.odd_points() / 2, "more lifts than pairs");
+            }
+        }
+        assert!(report.bound <= report.pen_up);
+        assert_eq!(report.optimal, report.bound == report.pen_up);
+    }
+}

@@ -1,0 +1,303 @@
+//! From loose lines to a drawing: coincident points merged (Harrison 5.9), nothing twice.
+//!
+//! While visibility runs, lines are packed at 12 bytes each ([`Line`]). Then [`organise`] turns them,
+//! in the same memory, into points and segments.
+
+use super::{Drawing, LineType, PAGE_LIMIT, PagePoint, Segment};
+use crate::stage::{OutOfScratch, Scratch, items, items_mut};
+use bytemuck::{Pod, Zeroable};
+
+/// A straight line on the page, packed: four coordinates of 21 bits, line type, pen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+#[repr(transparent)]
+pub struct Line([u32; 3]);
+
+/// Pens that a [`Line`] can tell apart.
+pub const PEN_LIMIT: u8 = 32;
+
+impl Line {
+    /// The line from `from` to `to`, both within ±[`PAGE_LIMIT`]; `pen` below [`PEN_LIMIT`].
+    pub fn new(from: PagePoint, to: PagePoint, line_type: LineType, pen: u8) -> Self {
+        let pack = |c: i32| (c.clamp(1 - PAGE_LIMIT, PAGE_LIMIT - 1) + PAGE_LIMIT) as u128;
+        let marks = (pen % PEN_LIMIT) as u128 * 4 + line_type.code() as u128;
+        let packed =
+            pack(from.x) | pack(from.y) << 21 | pack(to.x) << 42 | pack(to.y) << 63 | marks << 84;
+        Self([packed as u32, (packed >> 32) as u32, (packed >> 64) as u32])
+    }
+
+    /// Its ends, line type code and pen.
+    fn unpack(self) -> (PagePoint, PagePoint, u8, u8) {
+        let [low, middle, high] = self.0.map(u128::from);
+        let packed = low | middle << 32 | high << 64;
+        let coordinate = |shift: u32| ((packed >> shift) as i32 & 0x1F_FFFF) - PAGE_LIMIT;
+        let marks = (packed >> 84) as u32;
+        (
+            PagePoint { x: coordinate(0), y: coordinate(21) },
+            PagePoint { x: coordinate(42), y: coordinate(63) },
+            (marks & 3) as u8,
+            (marks >> 2) as u8 % PEN_LIMIT,
+        )
+    }
+}
+
+/// Where a drawing lies in the working memory: segments first, then points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Stored {
+    segments: usize,
+    points: usize,
+}
+
+impl Stored {
+    /// Bytes from the beginning of the memory to the end of the drawing.
+    pub fn bytes(&self) -> usize {
+        self.segment_bytes() + Scratch::bytes_for::<PagePoint>(self.points)
+    }
+
+    fn segment_bytes(&self) -> usize {
+        Scratch::bytes_for::<Segment>(self.segments)
+    }
+
+    /// The drawing, to read only; `None` if this is not the memory in which it was stored.
+    pub fn drawing<'a>(&self, words: &'a [u64]) -> Option<Drawing<'a>> {
+        let points = words.get(self.segment_bytes() / 8..)?;
+        Some(Drawing {
+            segments: items(words, self.segments)?,
+            points: items(points, self.points)?,
+        })
+    }
+
+    /// The drawing, and the memory after it.
+    ///
+    /// # Errors
+    /// [`OutOfScratch`] if this is not the memory in which it was stored.
+    pub fn split<'a>(
+        &self,
+        words: &'a mut [u64],
+    ) -> Result<(Drawing<'a>, Scratch<'a>), OutOfScratch> {
+        let missing = OutOfScratch { needed: self.bytes(), available: size_of_val(words) };
+        let (segments, rest) =
+            words.split_at_mut_checked(self.segment_bytes() / 8).ok_or(missing)?;
+        let point_words = Scratch::bytes_for::<PagePoint>(self.points) / 8;
+        let (points, rest) = rest.split_at_mut_checked(point_words).ok_or(missing)?;
+        let drawing = Drawing {
+            segments: items(segments, self.segments).ok_or(missing)?,
+            points: items(points, self.points).ok_or(missing)?,
+        };
+        Ok((drawing, Scratch::new(rest)))
+    }
+}
+
+/// Turns the `count` lines at the beginning of `words` into a drawing at the beginning of `words`.
+///
+/// Points less than two steps apart along both axes count as one, the first of them; lines that
+/// shrink to a point are dropped; of equal segments one is kept, a full line before a dotted one.
+///
+/// # Errors
+/// [`OutOfScratch`] if the points do not fit beside the lines; the lines are lost then.
+pub fn organise(words: &mut [u64], count: usize) -> Result<Stored, OutOfScratch> {
+    let line_words = Scratch::bytes_for::<Line>(count) / 8;
+    let available = size_of_val(words);
+    let missing = OutOfScratch { needed: line_words * 8, available };
+    let (line_memory, rest) = words.split_at_mut_checked(line_words).ok_or(missing)?;
+    let lines: &mut [Line] = items_mut(line_memory, count).ok_or(missing)?;
+
+    let (segments, points) = {
+        let mut finder = PointFinder::new(Scratch::new(rest), 2 * count)?;
+        let mut kept = 0;
+        for at in 0..count {
+            let (from, to, line_type_code, pen) = lines[at].unpack();
+            let (from, to) = (finder.number(from)?, finder.number(to)?);
+            if from != to {
+                let (from, to) = (from.min(to), from.max(to));
+                lines[kept] = Line([
+                    u32::from(from) << 16 | u32::from(to),
+                    u32::from(line_type_code) << 8 | u32::from(pen),
+                    0,
+                ]);
+                kept += 1;
+            }
+        }
+        let lines = &mut lines[..kept];
+        lines.sort_unstable_by_key(|line| line.0);
+        (drop_repeated(lines), finder.count)
+    };
+
+    // Shrink each line (12 bytes) to its segment (6 bytes) in place, front to back.
+    let halves: &mut [u16] = bytemuck::cast_slice_mut(&mut *line_memory);
+    for at in 0..segments {
+        let line: [u16; 6] = core::array::from_fn(|half| halves[6 * at + half]);
+        let Line([ends, marks, _]) = bytemuck::cast(line);
+        let segment = Segment {
+            from: (ends >> 16) as u16,
+            to: ends as u16,
+            line_type_code: (marks >> 8) as u8,
+            pen: marks as u8,
+        };
+        let packed: [u16; 3] = bytemuck::cast(segment);
+        halves[3 * at..3 * at + 3].copy_from_slice(&packed);
+    }
+
+    let stored = Stored { segments, points };
+    let point_words = Scratch::bytes_for::<PagePoint>(points) / 8;
+    words.copy_within(line_words..line_words + point_words, stored.segment_bytes() / 8);
+    Ok(stored)
+}
+
+/// Keeps the first of each run of equal segments; returns how many are kept, at the front.
+fn drop_repeated(lines: &mut [Line]) -> usize {
+    let mut kept = 0;
+    for at in 0..lines.len() {
+        if kept == 0 || lines[kept - 1].0[0] != lines[at].0[0] {
+            lines[kept] = lines[at];
+            kept += 1;
+        }
+    }
+    kept
+}
+
+/// Numbers points, giving coincident points the same number: a hash table over the steps.
+struct PointFinder<'a> {
+    points: &'a mut [PagePoint],
+    count: usize,
+    /// Point numbers + 1, 0 if free; a power of two long.
+    table: &'a mut [u16],
+}
+
+impl<'a> PointFinder<'a> {
+    /// For at most `most` points; takes a table of twice that if there is room, else what there is.
+    fn new(scratch: Scratch<'a>, most: usize) -> Result<Self, OutOfScratch> {
+        let available = scratch.available_bytes();
+        // A third of the memory at most: a point takes 8 bytes, a full enough table 2 to 4 for each.
+        let longest = (available / 3 / size_of::<u16>()).max(1);
+        let longest = 1 << (usize::BITS - 1 - longest.leading_zeros());
+        let length = (2 * most).next_power_of_two().clamp(8, 1 << 17).min(longest);
+        let (mut points, mut table) = scratch.split(available - Scratch::bytes_for::<u16>(length));
+        let point_limit = (points.available_bytes() / size_of::<PagePoint>()).min(most);
+        Ok(Self { points: points.take(point_limit)?, count: 0, table: table.take(length)? })
+    }
+
+    fn number(&mut self, point: PagePoint) -> Result<u16, OutOfScratch> {
+        const SAME_THEN_AROUND: [(i32, i32); 9] =
+            [(0, 0), (-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (1, -1), (-1, 1), (1, 1)];
+        for (dx, dy) in SAME_THEN_AROUND {
+            if let Some(number) = self.find(PagePoint { x: point.x + dx, y: point.y + dy }) {
+                return Ok(number);
+            }
+        }
+        self.add(point)
+    }
+
+    fn slot(&self, point: PagePoint) -> usize {
+        let mixed =
+            (point.x as u32).wrapping_mul(0x9E37_79B1) ^ (point.y as u32).wrapping_mul(0x85EB_CA77);
+        (mixed ^ mixed >> 15) as usize & (self.table.len() - 1)
+    }
+
+    fn find(&self, point: PagePoint) -> Option<u16> {
+        let mut slot = self.slot(point);
+        // A free slot is always left, so this ends.
+        loop {
+            let number = self.table[slot].checked_sub(1)?;
+            if self.points[usize::from(number)] == point {
+                return Some(number);
+            }
+            slot = (slot + 1) & (self.table.len() - 1);
+        }
+    }
+
+    fn add(&mut self, point: PagePoint) -> Result<u16, OutOfScratch> {
+        let full = OutOfScratch {
+            needed: (self.count + 1) * size_of::<PagePoint>(),
+            available: size_of_val(self.points),
+        };
+        let fullest = self.table.len() - self.table.len() / 8;
+        if self.count >= fullest.min(usize::from(u16::MAX)) {
+            return Err(full);
+        }
+        *self.points.get_mut(self.count).ok_or(full)? = point;
+        let mut slot = self.slot(point);
+        while self.table[slot] != 0 {
+            slot = (slot + 1) & (self.table.len() - 1);
+        }
+        self.count += 1;
+        self.table[slot] = self.count as u16;
+        Ok(self.table[slot] - 1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::vec;
+    use std::vec::Vec;
+
+    fn point(x: i32, y: i32) -> PagePoint {
+        PagePoint { x, y }
+    }
+
+    fn drawn(lines: &[Line], words: usize) -> Result<Vec<[(i32, i32); 2]>, OutOfScratch> {
+        let mut memory = vec![0u64; words];
+        items_mut(&mut memory, lines.len()).unwrap().copy_from_slice(lines);
+        let stored = organise(&mut memory, lines.len())?;
+        let (drawing, _) = stored.split(&mut memory)?;
+        let at = |number: u16| drawing.points[usize::from(number)];
+        Ok(drawing.segments.iter().map(|s| [at(s.from), at(s.to)].map(|p| (p.x, p.y))).collect())
+    }
+
+    fn line(from: (i32, i32), to: (i32, i32)) -> Line {
+        Line::new(point(from.0, from.1), point(to.0, to.1), LineType::Full, 0)
+    }
+
+    #[test]
+    fn a_line_keeps_what_it_is_given() {
+        for (x, y, line_type, pen) in [
+            (0, 0, LineType::Full, 0),
+            (PAGE_LIMIT - 1, 1 - PAGE_LIMIT, LineType::Dashed, 31),
+            (-1, 77, LineType::Dotted, 5),
+        ] {
+            let packed = Line::new(point(x, y), point(y, x), line_type, pen);
+            assert_eq!(packed.unpack(), (point(x, y), point(y, x), line_type.code(), pen));
+        }
+    }
+
+    #[test]
+    fn nothing_gives_nothing() {
+        assert_eq!(drawn(&[], 8), Ok(vec![]));
+    }
+
+    #[test]
+    fn coincident_points_are_one_and_nothing_is_twice() {
+        let lines = [
+            line((0, 0), (100, 0)),
+            line((101, 1), (50, 80)),
+            line((50, 80), (99, -1)), // the same as the one before
+            line((50, 80), (51, 79)), // shrinks to a point
+            line((1, 0), (50, 81)),
+        ];
+        let found = drawn(&lines, 64).unwrap();
+        assert_eq!(found, [[(0, 0), (100, 0)], [(0, 0), (50, 80)], [(100, 0), (50, 80)]]);
+    }
+
+    #[test]
+    fn a_full_line_wins_over_a_dotted_one() {
+        let dotted = Line::new(point(9, 9), point(0, 0), LineType::Dotted, 0);
+        let mut memory = vec![0u64; 64];
+        let lines = [dotted, line((0, 0), (9, 9))];
+        items_mut(&mut memory, 2).unwrap().copy_from_slice(&lines);
+        let stored = organise(&mut memory, 2).unwrap();
+        let (drawing, _) = stored.split(&mut memory).unwrap();
+        assert_eq!(drawing.segments.len(), 1);
+        assert_eq!(drawing.segments[0].line_type(), LineType::Full);
+    }
+
+    #[test]
+    fn too_little_memory_is_an_error_and_never_a_panic() {
+        let lines: Vec<Line> = (0..40).map(|i| line((i * 10, 0), (i * 10, 5))).collect();
+        assert!(drawn(&lines, 120).is_err());
+        let enough = (121..400).find(|words| drawn(&lines, *words).is_ok());
+        assert!(enough.is_some());
+        for words in enough.unwrap()..400 {
+            assert_eq!(drawn(&lines, words).map(|found| found.len()), Ok(40), "{words} words");
+        }
+    }
+}

@@ -1,0 +1,375 @@
+//! The sheet: where on it the drawing goes, and the map from the image to steps.
+
+use super::{PAGE_LIMIT, PagePoint};
+use crate::fixed::{Millimetres, divide_rounding};
+use crate::geometry::{Projection, Vertex};
+use crate::model::Position;
+use crate::visibility::Along;
+
+/// A sheet of paper, its lower left corner at the plotter's origin.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Page {
+    /// Along x.
+    pub width: Millimetres,
+    /// Along y.
+    pub height: Millimetres,
+    /// Kept free on all four sides.
+    pub margin: Millimetres,
+}
+
+/// Why the drawing does not go on the page.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PageError {
+    /// The margins leave nothing free.
+    NoRoom,
+    /// The page has more than 2^20 steps.
+    TooManySteps,
+    /// A plan at true size is larger than the free part of the page.
+    DoesNotFit {
+        /// Size of the plan along x, in units of 2^-16 mm.
+        width: i64,
+        /// Size of the plan along y, in units of 2^-16 mm.
+        height: i64,
+    },
+}
+
+/// Steps in a millimetre along x and along y.
+pub type StepsPerMillimetre = [Millimetres; 2];
+
+/// A box on the image: least and greatest of x/w and of y/w.
+///
+/// In units of 2^-[`Bounds::FRACTION_BITS`], |value| < 2^46.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Bounds {
+    low: [i64; 2],
+    high: [i64; 2],
+}
+
+impl Bounds {
+    /// See [`Bounds`].
+    pub const FRACTION_BITS: u32 = 24;
+
+    /// Around the images of `vertices`, w > 0; `None` without any.
+    pub fn around(vertices: impl Iterator<Item = Vertex>, projection: Projection) -> Option<Self> {
+        vertices
+            .map(|vertex| {
+                let w = match projection {
+                    Projection::Perspective => i64::from(vertex.z.max(1)),
+                    Projection::Parallel => 1,
+                };
+                let image = [vertex.x, vertex.y].map(|c| (i64::from(c) << Self::FRACTION_BITS) / w);
+                Self { low: image, high: image }
+            })
+            .reduce(Self::union)
+    }
+
+    /// Around plan positions in units of 2^-`fraction_bits` mm; `None` without any.
+    ///
+    /// These bounds are in that unit, for [`PageMap::true_size`].
+    fn around_plan(positions: impl Iterator<Item = Position>) -> Option<Self> {
+        positions
+            .map(|position| {
+                let point = [i64::from(position.x), i64::from(position.y)];
+                Self { low: point, high: point }
+            })
+            .reduce(Self::union)
+    }
+
+    fn union(self, other: Self) -> Self {
+        Self {
+            low: [0, 1].map(|axis: usize| self.low[axis].min(other.low[axis])),
+            high: [0, 1].map(|axis: usize| self.high[axis].max(other.high[axis])),
+        }
+    }
+}
+
+/// The map from homogeneous image coordinates to steps: (a x + b w) / (w 2^k), rounded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PageMap {
+    a: [i64; 2],
+    b: [i128; 2],
+    k: u32,
+}
+
+/// The map's scale keeps this many bits; its unit is never finer than 2^-`FINEST`.
+const SCALE_BITS: u32 = 41;
+const FINEST: u32 = 44;
+
+impl PageMap {
+    /// Scales what is within `bounds` to the free part of the page and centres it.
+    ///
+    /// # Errors
+    /// [`PageError::NoRoom`], [`PageError::TooManySteps`].
+    pub fn fit(bounds: &Bounds, page: &Page, steps: StepsPerMillimetre) -> Result<Self, PageError> {
+        Self::fit_unit(bounds, Bounds::FRACTION_BITS, page, steps)
+    }
+
+    /// Scales a plan (positions in units of 2^-`fraction_bits` mm) to the page like [`PageMap::fit`].
+    ///
+    /// # Errors
+    /// [`PageError::NoRoom`], [`PageError::TooManySteps`].
+    pub fn fit_plan(
+        positions: impl Iterator<Item = Position>,
+        fraction_bits: u32,
+        page: &Page,
+        steps: StepsPerMillimetre,
+    ) -> Result<Self, PageError> {
+        let bounds = Bounds::around_plan(positions).ok_or(PageError::NoRoom)?;
+        let mut map = Self::fit_unit(&bounds, fraction_bits, page, steps)?;
+        // Image coordinates of a plan are the positions themselves, w = 1: move the unit into the map.
+        map.coarsen(fraction_bits);
+        Ok(map)
+    }
+
+    /// `bounds` in units of 2^-`unit_bits`.
+    fn fit_unit(
+        bounds: &Bounds,
+        unit_bits: u32,
+        page: &Page,
+        steps: StepsPerMillimetre,
+    ) -> Result<Self, PageError> {
+        let free = page.free()?;
+        page.check_steps(steps)?;
+        let size = [0, 1].map(|axis: usize| (bounds.high[axis] - bounds.low[axis]).unsigned_abs());
+        // The tighter axis decides: millimetres for each unit of the image, as free / size.
+        let (length, extent) = match size {
+            [0, 0] => (1, 1),
+            [width, 0] => (free[0], width),
+            [0, height] => (free[1], height),
+            [width, height] => {
+                let by_width = u128::from(free[0]) * u128::from(height);
+                let by_height = u128::from(free[1]) * u128::from(width);
+                if by_width <= by_height { (free[0], width) } else { (free[1], height) }
+            }
+        };
+        let numerator =
+            [0, 1].map(|axis: usize| u128::from(length) * steps[axis].to_bits() as u128);
+        let denominator = u128::from(extent);
+        // a = numerator / extent 2^-32 2^unit_bits 2^k with k as fine as SCALE_BITS allow.
+        let largest = numerator[0].max(numerator[1]).max(1);
+        let bits = |value: u128| (128 - value.leading_zeros()) as i32;
+        let shift = SCALE_BITS as i32 + bits(denominator) - bits(largest);
+        let k = (shift + 32 - unit_bits as i32).clamp(0, FINEST as i32);
+        let shift = k - 32 + unit_bits as i32;
+        let a = numerator.map(|numerator| {
+            let scaled = if shift >= 0 {
+                (numerator << shift) / denominator
+            } else {
+                numerator / (denominator << -shift)
+            };
+            scaled as i64 // below 2^42 by the choice of k
+        });
+        let b = [0, 1].map(|axis: usize| {
+            let side = i128::from(side_steps(page, steps, axis)) << k;
+            let middle = i128::from(bounds.low[axis]) + i128::from(bounds.high[axis]);
+            side / 2 - ((i128::from(a[axis]) * middle) >> (unit_bits + 1))
+        });
+        Ok(Self { a, b, k: k as u32 })
+    }
+
+    fn coarsen(&mut self, bits: u32) {
+        // (a p 2^-bits + b) / 2^k = (a p + b 2^bits) / 2^(k + bits)
+        self.b = self.b.map(|b| b << bits);
+        self.k += bits;
+    }
+
+    /// Draws a plan at true size: where it lies if that is on the page, else moved just inside.
+    ///
+    /// `positions` in units of 2^-`fraction_bits` mm.
+    ///
+    /// # Errors
+    /// See [`PageError`].
+    pub fn true_size(
+        positions: impl Iterator<Item = Position>,
+        fraction_bits: u32,
+        page: &Page,
+        steps: StepsPerMillimetre,
+    ) -> Result<Self, PageError> {
+        let bounds = Bounds::around_plan(positions).ok_or(PageError::NoRoom)?;
+        let free = page.free()?;
+        page.check_steps(steps)?;
+        let to_page = |value: i64| (i128::from(value) << 16) >> fraction_bits;
+        let size = [0, 1].map(|axis: usize| to_page(bounds.high[axis] - bounds.low[axis]));
+        if size[0] > i128::from(free[0]) || size[1] > i128::from(free[1]) {
+            return Err(PageError::DoesNotFit { width: size[0] as i64, height: size[1] as i64 });
+        }
+        let margin = i128::from(page.margin.to_bits());
+        let moved = [0, 1].map(|axis: usize| {
+            let (low, high) = (to_page(bounds.low[axis]), to_page(bounds.high[axis]));
+            let (first, last) = (margin, margin + i128::from(free[axis]));
+            if low < first { first - low } else { (last - high).min(0) }
+        });
+        let bits = steps.map(|steps| i64::from(steps.to_bits()));
+        Ok(Self {
+            a: bits,
+            b: [0, 1]
+                .map(|axis: usize| (moved[axis] * i128::from(bits[axis])) << fraction_bits >> 16),
+            k: 16 + fraction_bits,
+        })
+    }
+
+    /// The image (x/w, y/w) in steps. |x|, |y| < 2^52, 0 < w < 2^52.
+    pub fn point(&self, x: i64, y: i64, w: i64) -> PagePoint {
+        let [x, y] = [(x, 0), (y, 1)].map(|(c, axis): (i64, usize)| {
+            // Below 2^42 2^52 + 2^(44 + 21) 2^52: fits 127 bits with room.
+            let steps = divide_rounding(
+                i128::from(self.a[axis]) * i128::from(c) + self.b[axis] * i128::from(w),
+                i128::from(w) << self.k,
+            );
+            steps.clamp(-i128::from(PAGE_LIMIT), i128::from(PAGE_LIMIT)) as i32
+        });
+        PagePoint { x, y }
+    }
+
+    /// The place `along` the edge from `p` to `q` in steps.
+    pub fn along(&self, p: Vertex, q: Vertex, along: Along, projection: Projection) -> PagePoint {
+        // 31 bits of the ratio are 2^-10 steps of the longest edge that a page can hold.
+        let shift = (64 - along.denominator.leading_zeros()).saturating_sub(31);
+        let denominator = (along.denominator >> shift).max(1) as i64;
+        let numerator = ((along.numerator >> shift) as i64).min(denominator);
+        let between =
+            |p: i32, q: i32| i64::from(p) * (denominator - numerator) + i64::from(q) * numerator;
+        let w = match projection {
+            Projection::Perspective => between(p.z, q.z).max(1),
+            Projection::Parallel => denominator,
+        };
+        self.point(between(p.x, q.x), between(p.y, q.y), w)
+    }
+}
+
+impl Page {
+    /// What the margins leave, in units of 2^-16 mm.
+    fn free(&self) -> Result<[u64; 2], PageError> {
+        let margins = 2 * i64::from(self.margin.to_bits());
+        let free = [self.width, self.height].map(|side| i64::from(side.to_bits()) - margins);
+        match free {
+            [width, height] if width > 0 && height > 0 => Ok([width as u64, height as u64]),
+            _ => Err(PageError::NoRoom),
+        }
+    }
+
+    fn check_steps(&self, steps: StepsPerMillimetre) -> Result<(), PageError> {
+        let fits = [0, 1]
+            .iter()
+            .all(|&axis: &usize| side_steps(self, steps, axis) <= i64::from(PAGE_LIMIT));
+        if fits { Ok(()) } else { Err(PageError::TooManySteps) }
+    }
+}
+
+/// The length of the page along an axis, in steps.
+fn side_steps(page: &Page, steps: StepsPerMillimetre, axis: usize) -> i64 {
+    let side = if axis == 0 { page.width } else { page.height };
+    (i64::from(side.to_bits()) * i64::from(steps[axis].to_bits())) >> 32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn page(width: i32, height: i32, margin: i32) -> Page {
+        let [width, height, margin] = [width, height, margin].map(Millimetres::from_num);
+        Page { width, height, margin }
+    }
+
+    fn steps(x: i32, y: i32) -> StepsPerMillimetre {
+        [x, y].map(Millimetres::from_num)
+    }
+
+    const A4: [i32; 3] = [210, 297, 10];
+
+    fn a4() -> Page {
+        page(A4[0], A4[1], A4[2])
+    }
+
+    fn vertex(x: i32, y: i32, z: i32) -> Vertex {
+        Vertex { x, y, z }
+    }
+
+    #[test]
+    fn what_is_wide_fills_the_width_and_is_centred() {
+        let corners = [vertex(-400_000, -100_000, 9), vertex(200_000, 100_000, 7)];
+        let bounds = Bounds::around(corners.into_iter(), Projection::Parallel).unwrap();
+        let map = PageMap::fit(&bounds, &a4(), steps(80, 80)).unwrap();
+        let [low, high] = corners.map(|v| map.point(v.x.into(), v.y.into(), 1));
+        assert_eq!((low.x, high.x), (800, 16000));
+        // 63.333 mm high about the middle of 148.5 mm
+        assert_eq!((low.y, high.y), (11880 - 2533, 11880 + 2533));
+    }
+
+    #[test]
+    fn perspective_divides_by_the_depth() {
+        let corners = [vertex(-100, -100, 100), vertex(300, 300, 300), vertex(50, 50, 100)];
+        let bounds = Bounds::around(corners.into_iter(), Projection::Perspective).unwrap();
+        let map = PageMap::fit(&bounds, &page(100, 100, 0), steps(10, 20)).unwrap();
+        assert_eq!(map.point(-100, -100, 100), PagePoint { x: 0, y: 0 });
+        assert_eq!(map.point(300, 300, 300), PagePoint { x: 1000, y: 2000 });
+        assert_eq!(map.point(0, 0, 5), PagePoint { x: 500, y: 1000 });
+        // Half way in space from z 100 to z 300 is three quarters of the way in the image.
+        let half = Along { numerator: 1 << 60, denominator: 1 << 61 };
+        let (p, q) = (corners[0], corners[1]);
+        assert_eq!(map.along(p, q, half, Projection::Perspective), PagePoint { x: 750, y: 1500 });
+        assert_eq!(
+            map.along(p, q, Along { numerator: 0, denominator: 1 }, Projection::Perspective),
+            map.point(-1, -1, 1)
+        );
+        assert_eq!(
+            map.along(p, q, Along { numerator: 3, denominator: 3 }, Projection::Perspective),
+            map.point(1, 1, 1)
+        );
+    }
+
+    #[test]
+    fn points_and_lines_have_a_place_too() {
+        for (corners, low, high) in [
+            ([vertex(7, 7, 7), vertex(7, 7, 7)], (8400, 11880), (8400, 11880)),
+            ([vertex(-5, 0, 7), vertex(5, 0, 7)], (800, 11880), (16000, 11880)),
+            ([vertex(0, -5, 7), vertex(0, 5, 7)], (8400, 800), (8400, 22960)),
+        ] {
+            let bounds = Bounds::around(corners.into_iter(), Projection::Parallel).unwrap();
+            let map = PageMap::fit(&bounds, &a4(), steps(80, 80)).unwrap();
+            let found = corners.map(|v| map.point(v.x.into(), v.y.into(), 1)).map(|p| (p.x, p.y));
+            assert_eq!(found, [low, high]);
+        }
+        assert_eq!(Bounds::around([].into_iter(), Projection::Parallel), None);
+    }
+
+    fn plan(points: [[i32; 2]; 2]) -> [Position; 2] {
+        points.map(|[x, y]| Position { x: x << 8, y: y << 8, z: 0 })
+    }
+
+    fn true_size(points: [[i32; 2]; 2], page: &Page) -> Result<[(i32, i32); 2], PageError> {
+        let positions = plan(points);
+        let map = PageMap::true_size(positions.into_iter(), 8, page, steps(100, 80))?;
+        Ok(positions.map(|p| map.point(p.x.into(), p.y.into(), 1)).map(|p| (p.x, p.y)))
+    }
+
+    #[test]
+    fn a_plan_on_the_page_stays_where_it_is() {
+        assert_eq!(true_size([[10, 20], [200, 30]], &a4()), Ok([(1000, 1600), (20000, 2400)]));
+    }
+
+    #[test]
+    fn a_plan_off_the_page_is_moved_just_inside() {
+        assert_eq!(true_size([[-50, 290], [-40, 400]], &a4()), Ok([(1000, 14160), (2000, 22960)]));
+    }
+
+    #[test]
+    fn a_plan_too_large_is_refused_with_its_size() {
+        let size = |mm: i64| mm << 16;
+        assert_eq!(
+            true_size([[0, 0], [191, 5]], &a4()),
+            Err(PageError::DoesNotFit { width: size(191), height: size(5) })
+        );
+        let positions = plan([[0, 0], [380, 5]]);
+        let map = PageMap::fit_plan(positions.into_iter(), 8, &a4(), steps(100, 80)).unwrap();
+        let ends = positions.map(|p| map.point(p.x.into(), p.y.into(), 1));
+        assert_eq!(ends.map(|p| p.x), [1000, 20000]);
+        assert_eq!(ends[1].y - ends[0].y, 200); // 2.5 mm: the same scale on both axes
+    }
+
+    #[test]
+    fn impossible_pages_are_refused() {
+        assert_eq!(true_size([[0, 0], [1, 1]], &page(20, 50, 10)), Err(PageError::NoRoom));
+        assert_eq!(true_size([[0, 0], [1, 1]], &page(20000, 50, 10)), Err(PageError::TooManySteps));
+    }
+}

@@ -1,0 +1,511 @@
+//! Runs the blocks: pen changes at rest, slices, moves, events.
+
+use super::curvature::Curvature;
+use super::junction::{self, Corner, Heading};
+use super::profile::{FRACTION_BITS, Pace, Profile, Slice};
+use super::{Block, Emitter, EventQueue, Limits, Lookahead, PathLength, SliceSpeed, StepEvent};
+use crate::drawing::{LineType, PagePoint};
+use crate::step::{Line, Pattern};
+
+/// Where the pen stands and how long it takes to get there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PenPositions {
+    /// Height when raised, 0 (fully raised) to 127.
+    pub up_height: u8,
+    /// Height when drawing, 0 to 127.
+    pub down_height: u8,
+    /// From the order to raise it to the first move.
+    pub up_ticks: u32,
+    /// From the order to lower it to the first move.
+    pub down_ticks: u32,
+    /// Length of a dot, in moves.
+    pub dot_moves: u32,
+}
+
+/// What one call of [`Runner::produce`] came to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Progress {
+    /// There is more to do.
+    More,
+    /// All blocks are run, the pen is raised, the machine stands.
+    Done,
+    /// It stands on the path, as [`Runner::stop`] asked, with the pen raised.
+    Stopped,
+}
+
+/// Why a block was not appended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum PushError {
+    /// The ring is full: produce events first.
+    Full,
+    /// The move is longer than 16 m: beyond every page.
+    TooLong,
+}
+
+/// What a runner has run. Lengths in units of 2^-18 mm.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct RunLengths {
+    /// Strokes begun; wraps.
+    pub strokes: u32,
+    /// Length of the blocks ended with the pen down.
+    pub drawn: u64,
+    /// The same with the pen up.
+    pub travelled: u64,
+}
+
+/// The block in work.
+#[derive(Debug, Clone)]
+struct Course {
+    line: Line,
+    ink: Option<LineType>,
+    pattern: Pattern,
+    piece: u32,
+    length: PathLength,
+    curve_limit: PathLength,
+    /// mm per move, 2^-32.
+    move_length: u64,
+    moves: u32,
+    moves_done: u32,
+    /// Moves at the end of the piece.
+    piece_moves: u32,
+    /// From the start of the block to where the plan is, 2^-32 mm.
+    place: u64,
+    /// Where the next move is due.
+    next_move: u64,
+    profile: Option<Profile>,
+    /// The slice in work begins at `place`.
+    slice: Option<Slice>,
+}
+
+/// Turns blocks into events.
+#[derive(Debug)]
+pub struct Runner<'m> {
+    limits: Limits,
+    pen: PenPositions,
+    lookahead: Lookahead<'m>,
+    curvature: Curvature,
+    emitter: Emitter,
+    course: Option<Course>,
+    pace: Pace,
+    draw: Pace,
+    travel: Pace,
+    /// The last pace in a curve: many blocks in a row have the same.
+    curve: Pace,
+    /// The plan's time, 1/16 ticks; wraps.
+    now: u64,
+    pen_is_down: bool,
+    stopping: bool,
+    /// Where the events so far lead.
+    position: PagePoint,
+    /// Where the blocks so far lead.
+    end: PagePoint,
+    /// The way in which the last block runs, its length and ink.
+    last: Option<(Heading, PathLength, Option<LineType>)>,
+    run: RunLengths,
+    /// Whether the last block begun is inked.
+    in_stroke: bool,
+}
+
+impl<'m> Runner<'m> {
+    /// Room in the queue that one call of [`Runner::produce`] may need.
+    pub const ROOM: usize = Emitter::ROOM;
+
+    /// A runner that stands at the page's origin with the pen raised.
+    pub fn new(limits: Limits, pen: PenPositions, blocks: &'m mut [Block]) -> Self {
+        let mut runner = Self {
+            limits,
+            pen,
+            lookahead: Lookahead::new(blocks),
+            curvature: Curvature::default(),
+            emitter: Emitter::new(&limits),
+            course: None,
+            pace: Pace::REST,
+            draw: Pace::REST,
+            travel: Pace::REST,
+            curve: Pace::REST,
+            now: 0,
+            pen_is_down: false,
+            stopping: false,
+            position: PagePoint::default(),
+            end: PagePoint::default(),
+            last: None,
+            run: RunLengths::default(),
+            in_stroke: false,
+        };
+        runner.set_limits(limits, pen);
+        runner
+    }
+
+    /// Takes new settings. Speeds count from the next block on; the rest must not change while
+    /// anything moves.
+    pub fn set_limits(&mut self, limits: Limits, pen: PenPositions) {
+        self.limits = limits;
+        self.curve = Pace::REST;
+        self.pen = pen;
+        self.emitter.set_limits(&limits);
+        self.set_override(100);
+    }
+
+    /// Scales both speeds to `percent` (10 to 100; the settings are the greatest) from the next
+    /// block on.
+    pub fn set_override(&mut self, percent: u8) {
+        let percent = u64::from(percent.clamp(10, 100));
+        let scaled = |speed: SliceSpeed| {
+            let bits = u64::from(speed.to_bits()) * percent / 100;
+            Pace::of_speed(&self.limits, SliceSpeed::from_bits((bits as u32).max(1)))
+        };
+        let (draw, travel) = (scaled(self.limits.draw_speed), scaled(self.limits.travel_speed));
+        self.draw = draw;
+        self.travel = travel;
+    }
+
+    /// The limits in force.
+    pub fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
+    /// Where the events handed over, and the one kept back, lead.
+    pub fn position(&self) -> PagePoint {
+        self.position
+    }
+
+    /// Where the blocks lead.
+    pub fn end(&self) -> PagePoint {
+        self.end
+    }
+
+    /// Ticks of all events handed over; wraps.
+    pub fn ticks(&self) -> u32 {
+        self.emitter.ticks()
+    }
+
+    /// Whether no more targets fit now.
+    pub fn is_full(&self) -> bool {
+        self.lookahead.is_full()
+    }
+
+    /// Whether nothing waits or moves.
+    pub fn is_at_rest(&self) -> bool {
+        self.course.is_none() && self.lookahead.is_empty() && !self.emitter.is_open()
+    }
+
+    /// Whether the pen was last told to go down.
+    pub fn pen_is_down(&self) -> bool {
+        self.pen_is_down
+    }
+
+    /// What has been run since the runner was made.
+    pub fn run(&self) -> RunLengths {
+        self.run
+    }
+
+    /// The machine stands at `point`, nothing waits, and the events worked off took `ticks` (it
+    /// wraps): after homing, or after an emergency stop.
+    pub fn set_position(&mut self, point: PagePoint, ticks: u32) {
+        self.forget_path();
+        self.emitter.restart(ticks);
+        self.pen_is_down = false;
+        self.position = point;
+        self.end = point;
+    }
+
+    /// Appends a straight move to `point`. A move of no length is skipped.
+    ///
+    /// # Errors
+    /// See [`PushError`]; nothing is appended then.
+    pub fn push(&mut self, point: PagePoint, ink: Option<LineType>) -> Result<(), PushError> {
+        let (dx, dy) = (point.x - self.end.x, point.y - self.end.y);
+        if dx == 0 && dy == 0 {
+            return Ok(());
+        }
+        let length = self.limits.length(dx, dy).ok_or(PushError::TooLong)?;
+        let heading = Heading::new(&self.limits, dx, dy, length);
+        let corner = match self.last {
+            Some((before, length_before, ink_before)) if passes(ink_before, ink) => {
+                junction::corner(&self.limits, before, heading, length.min(length_before))
+            }
+            _ => Corner::STOP,
+        };
+        if corner.is_sharp {
+            self.curvature.restart(&self.limits, self.end, &mut self.lookahead);
+        }
+        let block = Block { dx, dy, length, entry_limit: corner.limit, ink, ..Block::EMPTY };
+        self.lookahead.push(block).map_err(|_| PushError::Full)?;
+        if self.limits.centripetal {
+            self.curvature.follow(&self.limits, point, &mut self.lookahead);
+        }
+        self.end = point;
+        self.last = Some((heading, length, ink));
+        Ok(())
+    }
+
+    /// The path ends with the last block: a curve ends there, too.
+    pub fn end_path(&mut self) {
+        self.curvature.restart(&self.limits, self.end, &mut self.lookahead);
+        self.last = None;
+    }
+
+    /// Sheds speed on the path, from the next slice on, and stands with the pen raised.
+    pub fn stop(&mut self) {
+        self.stopping = true;
+        if let Some(course) = &mut self.course {
+            // The slice in work, 164 µs at most, ends as planned.
+            if let Some(profile) = course.profile.take() {
+                self.pace = Pace::of_speed(&self.limits, profile.speed());
+            }
+        }
+    }
+
+    /// Goes on where [`Runner::stop`] stood.
+    pub fn resume(&mut self) {
+        self.stopping = false;
+    }
+
+    /// Gives up what waits; the machine must stand.
+    pub fn forget_path(&mut self) {
+        self.lookahead.clear();
+        self.course = None;
+        self.pace = Pace::REST;
+        self.stopping = false;
+        self.last = None;
+        self.in_stroke = false;
+        self.end = self.position;
+    }
+
+    /// Switches the drivers off; nothing must wait or move.
+    ///
+    /// # Errors
+    /// The event that the queue refused.
+    pub fn release_drivers(&mut self, queue: &mut dyn EventQueue) -> Result<(), StepEvent> {
+        let at = self.emitter.rest(self.ticks_now(), false, queue)?;
+        self.advance_to(at);
+        Ok(())
+    }
+
+    /// Hands over the next few events, at most [`Runner::ROOM`].
+    ///
+    /// # Errors
+    /// The event that the queue refused although it had room.
+    pub fn produce(&mut self, queue: &mut dyn EventQueue) -> Result<Progress, StepEvent> {
+        let Some(course) = &mut self.course else {
+            return self.begin_block(queue);
+        };
+        if let Some(slice) = course.slice {
+            let end = course.place + slice.distance;
+            if course.next_move < end && course.moves_done < course.piece_moves {
+                let offset = offset_in_slice(course.next_move - course.place, slice);
+                course.next_move += course.move_length;
+                course.moves_done += 1;
+                let Some(direction) = course.line.next() else {
+                    return Ok(Progress::More);
+                };
+                let time = (self.now + u64::from(offset)) >> FRACTION_BITS;
+                let time = time as u32;
+                let at = self.emitter.step(direction, time, queue)?;
+                if at != time {
+                    let late = at.wrapping_sub(time);
+                    self.now += u64::from(late) << FRACTION_BITS;
+                }
+                self.position = direction.from_point(self.position);
+                return Ok(Progress::More);
+            }
+            course.place = end;
+            course.slice = None;
+            self.now += u64::from(slice.time);
+            self.emitter.split_long_wait(self.ticks_now(), queue)?;
+            return Ok(Progress::More);
+        }
+        if let Some(profile) = &mut course.profile {
+            match profile.next_slice() {
+                Some(slice) => course.slice = Some(slice),
+                None => {
+                    self.pace = profile.exit();
+                    course.profile = None;
+                    if course.moves_done == course.piece_moves {
+                        self.end_piece();
+                    }
+                }
+            }
+            return Ok(Progress::More);
+        }
+        self.plan(queue)
+    }
+
+    fn top(&self, inked: bool) -> Pace {
+        if inked { self.draw } else { self.travel }
+    }
+
+    fn ticks_now(&self) -> u32 {
+        (self.now >> FRACTION_BITS) as u32
+    }
+
+    fn begin_block(&mut self, queue: &mut dyn EventQueue) -> Result<Progress, StepEvent> {
+        if self.stopping && self.pace == Pace::REST {
+            return self.stand(Progress::Stopped, queue);
+        }
+        let Some(block) = self.lookahead.pop() else {
+            return self.stand(Progress::Done, queue);
+        };
+        if block.ink.is_some() && !self.in_stroke {
+            self.run.strokes = self.run.strokes.wrapping_add(1);
+        }
+        self.in_stroke = block.ink.is_some();
+        let line = Line::by(block.dx, block.dy);
+        let moves = line.remaining();
+        let line_type = block.ink.unwrap_or_default();
+        let pattern = Pattern::of(line_type, moves, self.pen.dot_moves);
+        let move_length = (u64::from(block.length.to_bits()) << 14) / u64::from(moves.max(1));
+        self.course = Some(Course {
+            line,
+            ink: block.ink,
+            pattern,
+            piece: 0,
+            length: block.length,
+            curve_limit: block.curve_limit,
+            move_length,
+            moves,
+            moves_done: 0,
+            piece_moves: pattern.end_of(0),
+            place: 0,
+            next_move: move_length / 2,
+            profile: None,
+            slice: None,
+        });
+        Ok(Progress::More)
+    }
+
+    /// Stands: raises the pen, then closes the time line.
+    fn stand(
+        &mut self,
+        standing: Progress,
+        queue: &mut dyn EventQueue,
+    ) -> Result<Progress, StepEvent> {
+        if self.pen_is_down {
+            self.move_pen(false, queue)?;
+            return Ok(Progress::More);
+        }
+        if self.emitter.is_open() {
+            let at = self.emitter.rest(self.ticks_now(), true, queue)?;
+            self.advance_to(at);
+        }
+        if standing == Progress::Done {
+            self.last = None;
+        }
+        Ok(standing)
+    }
+
+    /// The pen goes up or down and the dwell passes, in at most four events.
+    fn move_pen(&mut self, down: bool, queue: &mut dyn EventQueue) -> Result<(), StepEvent> {
+        let (height, dwell) = if down {
+            (self.pen.down_height, self.pen.down_ticks)
+        } else {
+            (self.pen.up_height, self.pen.up_ticks)
+        };
+        let at = self.emitter.pen(height, self.ticks_now(), queue)?;
+        self.advance_to(at);
+        self.pen_is_down = down;
+        // Two waits of up to 0.67 s: the settings allow no longer dwell.
+        let half = dwell.div_ceil(2).min(StepEvent::MAX_TICKS);
+        for _ in 0..2 {
+            self.now += u64::from(half) << FRACTION_BITS;
+            let at = self.emitter.hold(self.ticks_now(), queue)?;
+            self.advance_to(at);
+        }
+        Ok(())
+    }
+
+    fn advance_to(&mut self, ticks: u32) {
+        let late = ticks.wrapping_sub(self.ticks_now());
+        self.now += u64::from(late) << FRACTION_BITS;
+    }
+
+    /// Plans the rest of the piece in work.
+    fn plan(&mut self, queue: &mut dyn EventQueue) -> Result<Progress, StepEvent> {
+        let Some(course) = &self.course else {
+            return Ok(Progress::More);
+        };
+        let at_rest = self.pace == Pace::REST;
+        if self.stopping && at_rest {
+            return self.stand(Progress::Stopped, queue);
+        }
+        let inked = course.ink.is_some() && Pattern::inked(course.piece);
+        if at_rest {
+            if inked != self.pen_is_down {
+                self.move_pen(inked, queue)?;
+                return Ok(Progress::More);
+            }
+            if !self.emitter.is_open() {
+                self.emitter.hold(self.ticks_now(), queue)?;
+            }
+        }
+        let piece_end = if course.piece_moves == course.moves {
+            u64::from(course.length.to_bits()) << 14
+        } else {
+            course.move_length * u64::from(course.piece_moves)
+        };
+        // Rounded by less than 2^-18 mm; a move is 2^-12 mm or longer and the last one is due half
+        // a move before the end, so none is lost.
+        let left = piece_end.saturating_sub(course.place) >> 14;
+        let left = PathLength::from_bits(left as u32);
+        let profile = if self.stopping {
+            Profile::stopping(&self.limits, self.pace, left)
+        } else {
+            let mut top = self.top(inked);
+            if course.curve_limit < top.stopping_distance {
+                if self.curve.stopping_distance != course.curve_limit {
+                    self.curve = Pace::of_stopping_distance(&self.limits, course.curve_limit);
+                }
+                top = self.curve;
+            }
+            let exit_allowed = if course.piece_moves == course.moves {
+                self.lookahead.entry_allowed(top.stopping_distance)
+            } else {
+                PathLength::ZERO
+            };
+            Profile::new(&self.limits, self.pace, left, top, exit_allowed)
+        };
+        if let Some(course) = &mut self.course {
+            course.profile = Some(profile);
+        }
+        Ok(Progress::More)
+    }
+
+    /// The next piece of a dotted line, or the end of the block.
+    fn end_piece(&mut self) {
+        let Some(course) = &mut self.course else {
+            return;
+        };
+        if course.piece_moves < course.moves {
+            course.piece += 1;
+            course.place = course.move_length * u64::from(course.piece_moves);
+            course.piece_moves = course.pattern.end_of(course.piece);
+            return;
+        }
+        let length = u64::from(course.length.to_bits());
+        if course.ink.is_some() {
+            self.run.drawn += length;
+        } else {
+            self.run.travelled += length;
+        }
+        self.course = None;
+    }
+}
+
+/// Whether the machine may pass from one block to the next without standing.
+fn passes(before: Option<LineType>, after: Option<LineType>) -> bool {
+    before == after && matches!(after, None | Some(LineType::Full))
+}
+
+/// When, within a slice, a place is reached that lies `distance` after its start; 1/16 ticks.
+///
+/// Both distances keep 16 bits, so the product has 32 and the result is true to an eighth of a
+/// tick.
+#[inline]
+fn offset_in_slice(distance: u64, slice: Slice) -> u32 {
+    let shift = (64 - slice.distance.leading_zeros()).saturating_sub(16);
+    let (part, whole) = ((distance >> shift) as u32, (slice.distance >> shift) as u32);
+    // The time of a whole slice, 2^16, times at most 2^16 - 1.
+    (part * slice.time).checked_div(whole).unwrap_or(0)
+}

@@ -1,0 +1,161 @@
+//! Eulerian trails (Harrison 5.11 and appendix 5.2) and the joining of the separate parts.
+//!
+//! Harrison traces a cycle, looks along it for a point with unused segments, and splices in the
+//! cycle traced from there. Here the trail that is being traced and the finished one share one
+//! slice, growing towards each other: linear time, no list besides.
+
+use super::network::Network;
+use super::pace::Pace;
+use super::{EVEN_PART, Leg, NONE, OrderError};
+use crate::stage::{OutOfScratch, Scratch};
+
+/// The chains and the moves not yet used by a trail.
+pub(super) struct Unused<'s, 'a> {
+    network: Network<'a>,
+    /// For each station the first leg from it that may be unused, then, for each leg, the next.
+    first: &'s mut [u16],
+    next: &'s mut [u16],
+    used: &'s mut [u8],
+    /// The other end of the pen-up move of each station: [`NONE`], [`EVEN_PART`] or a station.
+    mate: &'s mut [u16],
+}
+
+impl<'s, 'a> Unused<'s, 'a> {
+    /// All chains of `network`, and a move from each station to its `mate`.
+    pub fn new(
+        network: Network<'a>,
+        mate: &'s mut [u16],
+        scratch: &mut Scratch<'s>,
+    ) -> Result<Self, OutOfScratch> {
+        let chains = usize::from(network.chains());
+        let first = scratch.take(usize::from(network.stations()))?;
+        let next = scratch.take(2 * chains)?;
+        let used = scratch.take(chains)?;
+        first.fill(NONE);
+        for chain in (0..network.chains()).rev() {
+            for leg in [Leg::new(chain, true), Leg::new(chain, false)] {
+                let start = usize::from(network.start(leg));
+                next[usize::from(leg.code())] = first[start];
+                first[start] = leg.code();
+            }
+        }
+        Ok(Self { network, first, next, used, mate })
+    }
+
+    /// The next unused leg from `station`.
+    fn peek(&mut self, station: u16) -> Option<Leg> {
+        let first = &mut self.first[usize::from(station)];
+        while *first != NONE {
+            let leg = Leg::from_code(*first);
+            if self.used[leg.segment()] == 0 {
+                return Some(leg);
+            }
+            *first = self.next[usize::from(leg.code())];
+        }
+        None
+    }
+
+    fn take(&mut self, station: u16) -> Option<Leg> {
+        let leg = self.peek(station)?;
+        self.used[leg.segment()] = 1;
+        Some(leg)
+    }
+
+    /// Uses up the move from `station`; says where it leads.
+    fn lift(&mut self, station: u16) -> Option<u16> {
+        let mate = self.mate[usize::from(station)];
+        if mate == NONE || mate == EVEN_PART {
+            return None;
+        }
+        self.mate[usize::from(station)] = NONE;
+        self.mate[usize::from(mate)] = NONE;
+        Some(mate)
+    }
+
+    /// Traces everything that hangs together with `start` into the front of `route`, and says how
+    /// many legs that took. If one station but `start` is left with an odd number of uses, the
+    /// trail ends there, else where it began.
+    fn trace(
+        &mut self,
+        start: u16,
+        route: &mut [Leg],
+        pace: &mut Pace<'_>,
+    ) -> Result<usize, OrderError> {
+        let mut traced = 0;
+        let mut finished = route.len();
+        let mut here = start;
+        loop {
+            pace.work(1)?;
+            if let Some(leg) = self.take(here) {
+                route[traced] = leg;
+                traced += 1;
+                here = self.network.end(leg);
+            } else if let Some(there) = self.lift(here) {
+                here = there;
+            } else if let Some(&last) = route[..traced].last() {
+                if self.network.end(last) == here {
+                    traced -= 1;
+                    finished -= 1;
+                    route[finished] = last;
+                    here = self.network.start(last);
+                } else {
+                    // The pen came here by a move: back along it.
+                    here = self.network.end(last);
+                }
+            } else {
+                let legs = route.len() - finished;
+                route.copy_within(finished.., 0);
+                return Ok(legs);
+            }
+        }
+    }
+
+    /// The station where a part not yet drawn is best entered: the nearest by `far` that has a
+    /// move to save, or any of a part without odd points.
+    fn entrance(
+        &mut self,
+        far: impl Fn(u16) -> u32,
+        pace: &mut Pace<'_>,
+    ) -> Result<Option<u16>, OrderError> {
+        let mut best = None;
+        let mut least = u32::MAX;
+        for station in 0..self.network.stations() {
+            if self.mate[usize::from(station)] != NONE && self.peek(station).is_some() {
+                pace.work(1)?;
+                let distance = far(station);
+                if distance < least || best.is_none() {
+                    (least, best) = (distance, Some(station));
+                }
+            }
+        }
+        Ok(best)
+    }
+
+    /// Draws everything: from `start` if given, else from the lowest x; each further part from its
+    /// entrance nearest to the pen.
+    pub fn nearest_first(
+        &mut self,
+        start: Option<u16>,
+        route: &mut [Leg],
+        pace: &mut Pace<'_>,
+    ) -> Result<(), OrderError> {
+        let network = self.network;
+        let from_the_left = |station| network.place(station).x.wrapping_sub(i32::MIN) as u32;
+        let mut entrance = match start {
+            Some(start) => Some(start),
+            None => self.entrance(from_the_left, pace)?,
+        };
+        let mut done = 0;
+        while let Some(start) = entrance {
+            // The way in is also the way out: the move that would close the part is not needed.
+            self.lift(start);
+            done += self.trace(start, &mut route[done..], pace)?;
+            let Some(&last) = route[..done].last() else {
+                break;
+            };
+            let pen = network.end(last);
+            entrance = self.entrance(|station| network.distance(pen, station), pace)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,329 @@
+//! In which order, and which way, the segments are drawn: odd points, pen-up matching, Eulerian
+//! tour, joining of the separate parts.
+//!
+//! A pen draws a connected drawing without a lift if no more than two of its points are *odd*
+//! (an odd number of segments meet there). Else the odd points are paired, and the pen is lifted
+//! from one of a pair to the other (Harrison 5.6). The way of the data:
+//!
+//! 1. `network`: the segments of one pen become stations and chains;
+//! 2. `matching` pairs the odd stations at the least length, or `greedy` in less memory;
+//! 3. `euler` traces the strokes, part by part, nearest first.
+//!
+//! Call [`order`] with a [`Drawing`], [`Options`] and memory. Refused: a drawing whose segments name
+//! points that are not there, too many segments, too little memory; the tour is then worth nothing.
+
+mod euler;
+mod greedy;
+mod matching;
+mod metric;
+mod network;
+mod odd;
+mod pace;
+mod partition;
+
+pub use metric::length;
+
+use crate::drawing::{Drawing, PAGE_LIMIT, PagePoint};
+use crate::stage::{Attention, OutOfScratch, Scratch};
+use bytemuck::{Pod, Zeroable};
+use euler::Unused;
+use network::{Network, start_point};
+use odd::OddPoints;
+use pace::Pace;
+use partition::Partition;
+
+/// Points beyond so many have no number of their own: [`NONE`] is not one.
+const POINT_LIMIT: usize = NONE as usize;
+/// No station, no partner.
+const NONE: u16 = u16::MAX;
+/// In the place of a partner: a station of a part that has no odd point.
+const EVEN_PART: u16 = u16::MAX - 1;
+
+/// One segment of the tour and the way it is drawn. At most [`Leg::LIMIT`] segments.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+#[repr(transparent)]
+pub struct Leg(u16);
+
+impl Leg {
+    /// As many segments can be numbered.
+    pub const LIMIT: usize = (1 << 15) - 1;
+
+    /// Segment `segment`, drawn from its `to` end if `reversed`.
+    pub fn new(segment: u16, reversed: bool) -> Self {
+        Self(segment << 1 | u16::from(reversed))
+    }
+    /// The number of the segment in the drawing.
+    pub fn segment(self) -> usize {
+        usize::from(self.0 >> 1)
+    }
+    /// Whether it is drawn from its `to` end to its `from` end.
+    pub fn reversed(self) -> bool {
+        self.0 & 1 != 0
+    }
+    /// The same segment drawn the other way.
+    pub fn flipped(self) -> Self {
+        Self(self.0 ^ 1)
+    }
+    fn code(self) -> u16 {
+        self.0
+    }
+    fn from_code(code: u16) -> Self {
+        Self(code)
+    }
+}
+
+/// How the pen-up moves are chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Method {
+    /// Exact where it fits in memory, else greedy.
+    #[default]
+    Auto,
+    /// Greedy with regret (Harrison 5.10.1), then pair exchange.
+    Greedy,
+    /// Minimum-weight perfect matching.
+    Exact,
+}
+
+/// Whether the pen returns to where it began.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Shape {
+    /// From the first stroke's start to the last stroke's end.
+    #[default]
+    OpenPath,
+    /// And back to the first stroke's start.
+    ClosedCycle,
+}
+
+/// What the user may choose.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Options {
+    /// How the pen-up moves are chosen.
+    pub method: Method,
+    /// Open or closed.
+    pub shape: Shape,
+    /// How many rounds of improvement may be tried after the first tour (a budget in work, not in
+    /// time, so that every machine gives the same tour).
+    pub effort: u32,
+}
+
+/// What came of it. Lengths in 1/256 steps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Report {
+    /// Points where an odd number of segments meet.
+    pub odd_points: u32,
+    /// Separate parts.
+    pub components: u32,
+    /// Length drawn.
+    pub pen_down: u64,
+    /// Length of the moves between strokes.
+    pub pen_up: u64,
+    /// Moves between strokes.
+    pub lifts: u32,
+    /// Lower bound of the pen-up length.
+    pub bound: u64,
+    /// Whether `pen_up` is proved the least.
+    pub optimal: bool,
+}
+
+/// Why there is no order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OrderError {
+    /// Not enough working memory.
+    Scratch(OutOfScratch),
+    /// The user gave up.
+    Aborted,
+    /// More segments than a tour can number ([`Leg::LIMIT`]).
+    TooManySegments,
+    /// The tour has not as many places as the drawing has segments.
+    TourLength,
+    /// This segment names a point that is not there or beyond [`PAGE_LIMIT`], or twice the same.
+    BadSegment(u16),
+}
+
+/// Orders `drawing` into `tour` (as long as `drawing.segments`).
+///
+/// Each segment stands in the tour once; the pen goes up where a leg does not begin where the one
+/// before it ended. The segments of one pen stand together, the lowest pen first.
+///
+/// # Errors
+/// See [`OrderError`].
+pub fn order(
+    drawing: Drawing<'_>,
+    options: Options,
+    mut scratch: Scratch<'_>,
+    attention: &mut dyn Attention,
+    tour: &mut [Leg],
+) -> Result<Report, OrderError> {
+    let drawing =
+        Drawing { points: drawing.points.get(..POINT_LIMIT).unwrap_or(drawing.points), ..drawing };
+    check(drawing, tour.len())?;
+    let mut pace = Pace::new(attention);
+    let mut report = Report::default();
+    let mut rest = &mut *tour;
+    let mut next_pen = drawing.segments.iter().map(|segment| segment.pen).min();
+    while let Some(pen) = next_pen {
+        let pens = drawing.segments.iter().map(|segment| segment.pen);
+        let count = pens.clone().filter(|&other| other == pen).count();
+        let (legs, others) = rest.split_at_mut(count);
+        rest = others;
+        order_pen(drawing, pen, options, scratch.reborrow(), &mut pace, legs, &mut report)?;
+        next_pen = pens.filter(|&other| other > pen).min();
+    }
+    measure(drawing, tour, options.shape, &mut report);
+    Ok(report)
+}
+
+fn check(drawing: Drawing<'_>, tour_length: usize) -> Result<(), OrderError> {
+    if drawing.segments.len() > Leg::LIMIT {
+        return Err(OrderError::TooManySegments);
+    }
+    if tour_length != drawing.segments.len() {
+        return Err(OrderError::TourLength);
+    }
+    let on_the_page = |point: u16| {
+        let limits = -PAGE_LIMIT..=PAGE_LIMIT;
+        let within = |place: &PagePoint| limits.contains(&place.x) && limits.contains(&place.y);
+        drawing.points.get(usize::from(point)).is_some_and(within)
+    };
+    match (0..).zip(drawing.segments).find(|(_, segment)| {
+        segment.from == segment.to || !on_the_page(segment.from) || !on_the_page(segment.to)
+    }) {
+        Some((number, _)) => Err(OrderError::BadSegment(number)),
+        None => Ok(()),
+    }
+}
+
+fn order_pen<'a>(
+    drawing: Drawing<'a>,
+    pen: u8,
+    options: Options,
+    mut scratch: Scratch<'a>,
+    pace: &mut Pace<'_>,
+    tour: &mut [Leg],
+    report: &mut Report,
+) -> Result<(), OrderError> {
+    let network = Network::new(drawing, pen, &mut scratch)?;
+    let route: &mut [Leg] = scratch.take(usize::from(network.chains()))?;
+    {
+        let mut scratch = scratch.reborrow();
+        let mate: &mut [u16] = scratch.take(usize::from(network.stations()))?;
+        report.components += mark_parts(network, scratch.reborrow(), mate)?;
+        let start = pair_odd(network, options, scratch.reborrow(), pace, mate, report)?;
+        Unused::new(network, mate, &mut scratch)?.nearest_first(start, route, pace)?;
+    }
+    turn(network, options.shape, route);
+    network.expand(route, tour, pen, &mut scratch)?;
+    Ok(())
+}
+
+/// Marks each station: an odd one by its own number, an even one by [`NONE`], or by [`EVEN_PART`] if
+/// its part has no odd one. Returns the number of parts.
+fn mark_parts(
+    network: Network<'_>,
+    mut scratch: Scratch<'_>,
+    marks: &mut [u16],
+) -> Result<u32, OutOfScratch> {
+    let stations = network.stations();
+    let degree: &mut [u16] = scratch.take(usize::from(stations))?;
+    let mut parts = Partition::singletons(scratch.take(usize::from(stations))?);
+    for leg in (0..network.chains()).map(|chain| Leg::new(chain, false)) {
+        let (start, end) = (network.start(leg), network.end(leg));
+        degree[usize::from(start)] ^= 1;
+        degree[usize::from(end)] ^= 1;
+        parts.unite(start, end);
+    }
+    marks.fill(EVEN_PART);
+    for station in (0..stations).filter(|&station| degree[usize::from(station)] == 1) {
+        marks[usize::from(parts.find(station))] = NONE;
+    }
+    let mut count = 0;
+    for station in 0..stations {
+        let lowest = parts.find(station);
+        count += u32::from(lowest == station);
+        marks[usize::from(station)] = marks[usize::from(lowest)];
+    }
+    for station in (0..stations).filter(|&station| degree[usize::from(station)] == 1) {
+        marks[usize::from(station)] = station;
+    }
+    Ok(count)
+}
+
+/// Pairs the odd stations of `mate` (marked by themselves). Returns where an open path begins.
+fn pair_odd(
+    network: Network<'_>,
+    options: Options,
+    mut scratch: Scratch<'_>,
+    pace: &mut Pace<'_>,
+    mate: &mut [u16],
+    report: &mut Report,
+) -> Result<Option<u16>, OrderError> {
+    let odd_stations = || (0..).zip(mate.iter()).filter(|&(station, &mark)| station == mark);
+    let stations: &mut [u16] = scratch.take(odd_stations().count())?;
+    for (place, (station, _)) in stations.iter_mut().zip(odd_stations()) {
+        *place = station;
+    }
+    let odd = OddPoints::new(network, stations, options.shape == Shape::OpenPath);
+    report.odd_points += u32::from(odd.real_count());
+    let partners: &mut [u16] = scratch.take(usize::from(odd.count()))?;
+    let exact = match options.method {
+        Method::Greedy => false,
+        Method::Exact => true,
+        Method::Auto => matching::scratch_bytes(partners.len()) <= scratch.available_bytes(),
+    };
+    if exact {
+        report.bound += matching::pair(&odd, scratch, pace, partners)?;
+    } else {
+        greedy::pair(&odd, &mut scratch, pace, partners)?;
+    }
+    for (&station, &partner) in stations.iter().zip(partners.iter()) {
+        mate[usize::from(station)] = odd.station(partner).unwrap_or(NONE);
+    }
+    if !odd.has_free_ends() {
+        return Ok(None);
+    }
+    let ends = odd.free_ends().map(|end| partners[usize::from(end)]);
+    let ends = ends.into_iter().filter_map(|end| odd.station(end));
+    Ok(ends.min_by_key(|&station| (network.place(station).x, station)))
+}
+
+/// Makes a closed cycle begin at the lowest x, and an open path at the lower of its ends.
+fn turn(network: Network<'_>, shape: Shape, route: &mut [Leg]) {
+    let x_of = |leg: &Leg| network.place(network.start(*leg)).x;
+    match shape {
+        Shape::ClosedCycle => {
+            let first = (0..route.len()).min_by_key(|&index| x_of(&route[index]));
+            route.rotate_left(first.unwrap_or(0));
+        }
+        Shape::OpenPath => {
+            if let (Some(first), Some(last)) = (route.first(), route.last())
+                && x_of(&last.flipped()) < x_of(first)
+            {
+                route.reverse();
+                for leg in route {
+                    *leg = leg.flipped();
+                }
+            }
+        }
+    }
+}
+
+/// Measures `tour` into `report`.
+fn measure(drawing: Drawing<'_>, tour: &[Leg], shape: Shape, report: &mut Report) {
+    let place = |leg: Leg| drawing.points[usize::from(start_point(drawing.segments, leg))];
+    let closing = match shape {
+        Shape::OpenPath => None,
+        Shape::ClosedCycle => tour.first(),
+    };
+    let mut pen = tour.first().map(|&leg| place(leg)).unwrap_or_default();
+    for &leg in tour {
+        report.lifts += u32::from(place(leg) != pen);
+        report.pen_up += u64::from(length(pen, place(leg)));
+        report.pen_down += u64::from(length(place(leg), place(leg.flipped())));
+        pen = place(leg.flipped());
+    }
+    if let Some(&leg) = closing {
+        report.lifts += u32::from(place(leg) != pen);
+        report.pen_up += u64::from(length(pen, place(leg)));
+    }
+    report.optimal = report.pen_up == report.bound;
+}

@@ -1,0 +1,232 @@
+//! The strokes of one pen as a network: *stations*, where the pen may stop or turn, joined by
+//! *chains* of segments that it draws in one go.
+//!
+//! A point where two segments meet is only passed through, unless its part has no odd point at
+//! all: such a part (a circle, a square) may be entered anywhere, so all its points are stations.
+//! A polyline of a hundred segments is thus one chain, and the work that follows counts strokes,
+//! not segments. Refused: more memory than there is.
+
+use super::metric::length;
+use super::partition::Partition;
+use super::{Leg, NONE};
+use crate::drawing::{Drawing, PagePoint, Segment};
+use crate::stage::{OutOfScratch, Scratch};
+
+/// Marks, in the degree of a part's lowest point, that the part has an odd point.
+const HAS_ODD: u16 = 1 << 15;
+
+/// Stations and chains of one pen. A chain is numbered like a segment: a [`Leg`] over chains says
+/// which chain and which way.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Network<'a> {
+    points: &'a [PagePoint],
+    segments: &'a [Segment],
+    /// The point of each station.
+    at: &'a [u16],
+    /// The stations at which each chain begins and ends.
+    ends: &'a [[u16; 2]],
+    /// The first and the last segment of each chain, both in its direction.
+    outer: &'a [[Leg; 2]],
+}
+
+impl<'a> Network<'a> {
+    /// The network of the segments of `pen`.
+    pub fn new(
+        drawing: Drawing<'a>,
+        pen: u8,
+        scratch: &mut Scratch<'a>,
+    ) -> Result<Self, OutOfScratch> {
+        let (stations, chains) = {
+            let mut lent = scratch.reborrow();
+            let survey = Survey::new(drawing, pen, &mut lent)?;
+            let degrees = || survey.stations().map(|point| survey.degree(point));
+            (degrees().count(), degrees().sum::<usize>() / 2)
+        };
+        let at = scratch.take(stations)?;
+        let ends = scratch.take(chains)?;
+        let outer = scratch.take(chains)?;
+        let mut lent = scratch.reborrow();
+        Survey::new(drawing, pen, &mut lent)?.lay_chains(&mut lent, at, ends, outer)?;
+        Ok(Self { points: drawing.points, segments: drawing.segments, at, ends, outer })
+    }
+
+    /// How many stations there are.
+    pub fn stations(&self) -> u16 {
+        self.at.len() as u16
+    }
+
+    /// How many chains there are.
+    pub fn chains(&self) -> u16 {
+        self.ends.len() as u16
+    }
+
+    /// Where a station lies.
+    pub fn place(&self, station: u16) -> PagePoint {
+        self.points[usize::from(self.at[usize::from(station)])]
+    }
+
+    /// The way from one station to another, in 1/256 steps.
+    pub fn distance(&self, from: u16, to: u16) -> u32 {
+        length(self.place(from), self.place(to))
+    }
+
+    /// The station at which the leg of a chain begins.
+    pub fn start(&self, leg: Leg) -> u16 {
+        self.ends[leg.segment()][usize::from(leg.reversed())]
+    }
+
+    /// The station at which the leg of a chain ends.
+    pub fn end(&self, leg: Leg) -> u16 {
+        self.start(leg.flipped())
+    }
+
+    /// Puts the segments of the chains of `route`, in turn, into `tour`.
+    pub fn expand(
+        &self,
+        route: &[Leg],
+        tour: &mut [Leg],
+        pen: u8,
+        scratch: &mut Scratch<'_>,
+    ) -> Result<(), OutOfScratch> {
+        let across: &mut [u16] = scratch.take(self.points.len())?;
+        for (number, segment) in pen_segments(self.segments, pen) {
+            across[usize::from(segment.from)] ^= number;
+            across[usize::from(segment.to)] ^= number;
+        }
+        let mut tour = tour.iter_mut();
+        for &chain in route {
+            let [first, last] = self.outer[chain.segment()];
+            let (mut leg, last) =
+                if chain.reversed() { (last.flipped(), first.flipped()) } else { (first, last) };
+            loop {
+                if let Some(place) = tour.next() {
+                    *place = leg;
+                }
+                if leg == last {
+                    break;
+                }
+                leg = next_leg(self.segments, across, leg);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The segments of `pen` with their numbers.
+pub(super) fn pen_segments(segments: &[Segment], pen: u8) -> impl Iterator<Item = (u16, &Segment)> {
+    (0..=u16::MAX).zip(segments).filter(move |(_, segment)| segment.pen == pen)
+}
+
+/// The point at which the leg of a segment begins.
+pub(super) fn start_point(segments: &[Segment], leg: Leg) -> u16 {
+    let segment = &segments[leg.segment()];
+    if leg.reversed() { segment.to } else { segment.from }
+}
+
+/// The leg that goes on where `leg` ends, at a point of two segments. `across` holds for each point
+/// the exclusive or of its segments, so that one of two gives the other.
+fn next_leg(segments: &[Segment], across: &[u16], leg: Leg) -> Leg {
+    let point = start_point(segments, leg.flipped());
+    let number = across[usize::from(point)] ^ leg.segment() as u16;
+    Leg::new(number, segments[usize::from(number)].from != point)
+}
+
+/// What must be known of each point before the chains can be laid.
+struct Survey<'s, 'a> {
+    segments: &'a [Segment],
+    pen: u8,
+    degree: &'s mut [u16],
+    across: &'s mut [u16],
+    /// The lowest point of the part of each point.
+    part: &'s mut [u16],
+}
+
+impl<'s, 'a> Survey<'s, 'a> {
+    fn new(drawing: Drawing<'a>, pen: u8, scratch: &mut Scratch<'s>) -> Result<Self, OutOfScratch> {
+        let count = drawing.points.len();
+        let degree: &mut [u16] = scratch.take(count)?;
+        let across: &mut [u16] = scratch.take(count)?;
+        let part: &mut [u16] = scratch.take(count)?;
+        let mut parts = Partition::singletons(part);
+        for (number, segment) in pen_segments(drawing.segments, pen) {
+            for point in [segment.from, segment.to] {
+                degree[usize::from(point)] += 1;
+                across[usize::from(point)] ^= number;
+            }
+            parts.unite(segment.from, segment.to);
+        }
+        for point in 0..count as u16 {
+            let lowest = parts.find(point);
+            if degree[usize::from(point)] % 2 == 1 {
+                degree[usize::from(lowest)] |= HAS_ODD;
+            }
+        }
+        for point in 0..count as u16 {
+            let lowest = parts.find(point);
+            parts.flatten(point, lowest);
+        }
+        Ok(Self { segments: drawing.segments, pen, degree, across, part })
+    }
+
+    fn degree(&self, point: u16) -> usize {
+        usize::from(self.degree[usize::from(point)] & !HAS_ODD)
+    }
+
+    fn is_station(&self, point: u16) -> bool {
+        let lowest = self.part[usize::from(point)];
+        match self.degree(point) {
+            0 => false,
+            2 => self.degree[usize::from(lowest)] & HAS_ODD == 0,
+            _ => true,
+        }
+    }
+
+    fn stations(&self) -> impl Iterator<Item = u16> {
+        (0..self.degree.len() as u16).filter(|&point| self.is_station(point))
+    }
+
+    fn lay_chains(
+        self,
+        scratch: &mut Scratch<'_>,
+        at: &mut [u16],
+        ends: &mut [[u16; 2]],
+        outer: &mut [[Leg; 2]],
+    ) -> Result<(), OutOfScratch> {
+        for (at, station) in at.iter_mut().zip(self.stations()) {
+            *at = station;
+        }
+        let station_of = self.part;
+        station_of.fill(NONE);
+        for (station, &point) in (0..).zip(at.iter()) {
+            station_of[usize::from(point)] = station;
+        }
+        let laid: &mut [u8] = scratch.take(self.segments.len())?;
+        let mut slots = ends.iter_mut().zip(outer);
+        for (number, segment) in pen_segments(self.segments, self.pen) {
+            let first = match [segment.from, segment.to].map(|point| station_of[usize::from(point)])
+            {
+                [NONE, NONE] => continue,
+                [NONE, _] => Leg::new(number, true),
+                _ => Leg::new(number, false),
+            };
+            if laid[usize::from(number)] != 0 {
+                continue;
+            }
+            let mut last = first;
+            let end = loop {
+                laid[last.segment()] = 1;
+                let station = station_of[usize::from(start_point(self.segments, last.flipped()))];
+                if station != NONE {
+                    break station;
+                }
+                last = next_leg(self.segments, self.across, last);
+            };
+            if let Some((ends, outer)) = slots.next() {
+                let start = station_of[usize::from(start_point(self.segments, first))];
+                *ends = [start, end];
+                *outer = [first, last];
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,80 @@
+//! The odd points, where the pen must be lifted, and how far they are from each other.
+
+use super::metric::length;
+use super::network::Network;
+use crate::drawing::PagePoint;
+
+/// The odd stations of a network, numbered from 0, and after them, for an open path, two *free
+/// ends*: each is no distance away from any odd point, so that whatever is paired with them begins
+/// and ends the path.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct OddPoints<'a> {
+    network: Network<'a>,
+    stations: &'a [u16],
+    free_ends: bool,
+}
+
+impl<'a> OddPoints<'a> {
+    /// `stations` are the odd ones of `network`.
+    pub fn new(network: Network<'a>, stations: &'a [u16], open: bool) -> Self {
+        let free_ends = open && !stations.is_empty();
+        Self { network, stations, free_ends }
+    }
+
+    /// How many odd stations there are.
+    pub fn real_count(&self) -> u16 {
+        self.stations.len() as u16
+    }
+
+    /// How many there are with the free ends.
+    pub fn count(&self) -> u16 {
+        self.real_count() + 2 * u16::from(self.free_ends)
+    }
+
+    /// Whether two free ends are among them.
+    pub fn has_free_ends(&self) -> bool {
+        self.free_ends
+    }
+
+    /// The numbers that the two free ends have if there are any.
+    pub fn free_ends(&self) -> [u16; 2] {
+        [self.real_count(), self.real_count() + 1]
+    }
+
+    /// The station of an odd point, none for a free end.
+    pub fn station(&self, odd: u16) -> Option<u16> {
+        self.stations.get(usize::from(odd)).copied()
+    }
+
+    /// The length of the move between two odd points in 1/256 steps. The two free ends may not be
+    /// paired with each other.
+    pub fn distance(&self, a: u16, b: u16) -> u32 {
+        match (self.station(a), self.station(b)) {
+            (Some(a), Some(b)) => self.network.distance(a, b),
+            (None, None) => u32::MAX / 4,
+            _ => 0,
+        }
+    }
+
+    /// No less than this is the length of the move between two odd points, in 1/256 steps; quick.
+    pub fn least_distance(&self, a: u16, b: u16) -> u32 {
+        match (self.station(a), self.station(b)) {
+            (Some(a), Some(b)) => {
+                let (a, b) = (self.network.place(a), self.network.place(b));
+                a.x.abs_diff(b.x).max(a.y.abs_diff(b.y)) << 8
+            }
+            _ => 0,
+        }
+    }
+
+    /// No move is longer than this, in 1/256 steps.
+    pub fn extent(&self) -> u32 {
+        let places = || self.stations.iter().map(|&station| self.network.place(station));
+        let corner =
+            |x: Option<i32>, y: Option<i32>| PagePoint { x: x.unwrap_or(0), y: y.unwrap_or(0) };
+        length(
+            corner(places().map(|p| p.x).min(), places().map(|p| p.y).min()),
+            corner(places().map(|p| p.x).max(), places().map(|p| p.y).max()),
+        )
+    }
+}

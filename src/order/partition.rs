@@ -1,0 +1,62 @@
+//! Disjoint sets: which points, or which stations, hang together.
+
+/// A partition of `0..len` into sets, each known by one of its members.
+///
+/// A parent never has a higher number than its child, so the result does not depend on the order
+/// of the unions within a set: its representative is its lowest member.
+#[derive(Debug)]
+pub(super) struct Partition<'a> {
+    parent: &'a mut [u16],
+}
+
+impl<'a> Partition<'a> {
+    /// Every member in a set of its own; `parent` gives the memory.
+    pub fn singletons(parent: &'a mut [u16]) -> Self {
+        for (member, parent) in (0..=u16::MAX).zip(parent.iter_mut()) {
+            *parent = member;
+        }
+        Self { parent }
+    }
+
+    /// The lowest member of the set that holds `member`.
+    pub fn find(&mut self, member: u16) -> u16 {
+        let mut member = member;
+        loop {
+            let parent = self.parent[usize::from(member)];
+            if parent == member {
+                return member;
+            }
+            // Path halving keeps the walks short without a rank array.
+            let grandparent = self.parent[usize::from(parent)];
+            self.parent[usize::from(member)] = grandparent;
+            member = grandparent;
+        }
+    }
+
+    /// Lets `member` point straight at `lowest`, the representative of its set.
+    pub fn flatten(&mut self, member: u16, lowest: u16) {
+        self.parent[usize::from(member)] = lowest;
+    }
+
+    /// Makes one set of those of `a` and `b`; says whether they were two.
+    pub fn unite(&mut self, a: u16, b: u16) -> bool {
+        let (a, b) = (self.find(a), self.find(b));
+        self.parent[usize::from(a.max(b))] = a.min(b);
+        a != b
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sets_are_known_by_their_lowest_member() {
+        let mut memory = [0; 5];
+        let mut sets = Partition::singletons(&mut memory);
+        assert!(sets.unite(4, 2));
+        assert!(sets.unite(2, 1));
+        assert!(!sets.unite(1, 4));
+        assert_eq!([0, 1, 2, 3, 4].map(|member| sets.find(member)), [0, 1, 1, 3, 1]);
+    }
+}

@@ -1,1 +1,0 @@
-//! Bytes to lines to typed commands, and replies.

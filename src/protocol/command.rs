@@ -1,0 +1,471 @@
+//! Lines to typed commands.
+
+use super::Refusal;
+use crate::fixed::{Decimal, Millimetres};
+use crate::view::{Direction, Lens};
+
+/// What a line asks for.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Command<'a> {
+    /// An empty line, a comment, or a keyword of OBJ that changes nothing here.
+    Nothing,
+    /// `v x y z`
+    Vertex([Decimal; 3]),
+    /// `f a b c …`
+    Face(Numbers<'a>),
+    /// `l a b …`
+    Polyline(Numbers<'a>),
+    /// `$`
+    Help,
+    /// `$I`
+    BuildInfo,
+    /// `$$`
+    Settings,
+    /// `$name=value` or `$number=value` for a setting of the machine.
+    Setting {
+        /// Name or number.
+        name: &'a str,
+        /// What it shall be.
+        value: &'a str,
+    },
+    /// `$name=value` for what is drawn and how.
+    Option(PlotOption),
+    /// `$options`
+    Options,
+    /// `$model`
+    Model,
+    /// `$clear`
+    Clear,
+    /// `$plot`
+    Plot,
+    /// `$X`
+    Unlock,
+}
+
+/// What is drawn, and how.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum PlotOption {
+    /// `$eye=x,y,z`
+    Eye(Direction),
+    /// `$at=x,y,z`
+    At(Direction),
+    /// `$up=x,y,z`
+    Up(Direction),
+    /// `$angles=α,β,γ`: Harrison's rotation, in degrees.
+    Angles(Direction),
+    /// `$view=auto`: forget eye, at, up and angles.
+    AutomaticView,
+    /// `$projection=…`
+    Projection(ProjectionChoice),
+    /// `$behind=clip|refuse`: what is behind the eye is cut off (`true`), or an error.
+    ClipBehind(bool),
+    /// `$hidden=erased|dotted|shown`
+    Hidden(HiddenLines),
+    /// `$page=WIDTHxHEIGHT` in mm
+    Page {
+        /// Along x.
+        width: Millimetres,
+        /// Along y.
+        height: Millimetres,
+    },
+    /// `$margin=MM`
+    Margin(Millimetres),
+    /// `$fit=on|off`
+    Fit(bool),
+}
+
+/// How the model comes onto the page.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ProjectionChoice {
+    /// From the eye, through a lens.
+    Lens(Lens),
+    /// Parallel, from a direction in degrees; eye and angles are not used.
+    Axonometric {
+        /// From the x axis towards y: -90 is in front.
+        azimuth: f64,
+        /// Above the xy plane.
+        elevation: f64,
+    },
+}
+
+impl Default for ProjectionChoice {
+    fn default() -> Self {
+        Self::Lens(Lens::Perspective)
+    }
+}
+
+impl ProjectionChoice {
+    const CHOICES: &str = "perspective, orthographic, cavalier, cabinet, oblique,ANGLE,RATIO, isometric, \
+                           dimetric, trimetric or axonometric,AZIMUTH,ELEVATION";
+
+    fn parse(value: &str) -> Result<Self, Refusal> {
+        let (name, numbers) = match value.split_once(',') {
+            Some((name, numbers)) => (name.trim(), Some(numbers)),
+            None => (value, None),
+        };
+        let oblique = |angle, ratio| Self::Lens(Lens::Oblique { angle, ratio });
+        let axonometric = |azimuth, elevation| Self::Axonometric { azimuth, elevation };
+        Ok(match (name, numbers) {
+            ("perspective", None) => Self::Lens(Lens::Perspective),
+            ("orthographic", None) => Self::Lens(Lens::Orthographic),
+            ("cavalier", None) => oblique(45.0, 1.0),
+            ("cabinet", None) => oblique(45.0, 0.5),
+            ("oblique", Some(numbers)) => {
+                let [angle, ratio] = values(numbers)?;
+                if !(0.0..=2.0).contains(&ratio) || libm::fabs(angle) > 360.0 {
+                    return Err(Refusal::NumberOutOfRange);
+                }
+                oblique(angle, ratio)
+            }
+            // All three axes are foreshortened alike: the elevation is atan(1 / sqrt 2).
+            ("isometric", None) => axonometric(-45.0, 35.264_389_682_754_654),
+            // The two axes that are foreshortened alike lie at 7 and 42 degrees: 1, 1 and 1/2.
+            ("dimetric", None) => axonometric(-69.295_188_945_364_57, 19.471_220_634_490_69),
+            ("trimetric", None) => axonometric(-60.0, 25.0),
+            ("dimetric" | "trimetric" | "axonometric", Some(numbers)) => {
+                let [azimuth, elevation] = values(numbers)?;
+                if libm::fabs(azimuth) > 360.0 || libm::fabs(elevation) > 90.0 {
+                    return Err(Refusal::NumberOutOfRange);
+                }
+                axonometric(azimuth, elevation)
+            }
+            _ => return Err(Refusal::NotAChoice { choices: Self::CHOICES }),
+        })
+    }
+}
+
+/// What becomes of the hidden lines.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum HiddenLines {
+    /// Left out.
+    #[default]
+    Erased,
+    /// Drawn dotted.
+    Dotted,
+    /// Drawn like visible ones: a wire frame.
+    Shown,
+}
+
+/// The `$` commands and what each does, as `$` lists them.
+pub const HELP: &[(&str, &str)] = &[
+    ("$", "this list"),
+    ("$I", "version, board and limits"),
+    ("$$", "settings of the machine; $NAME=VALUE changes one"),
+    ("$options", "what is drawn and how, as it stands"),
+    ("$eye=X,Y,Z", "where you look from"),
+    ("$at=X,Y,Z", "what you look at"),
+    ("$up=X,Y,Z", "which way is up"),
+    ("$angles=A,B,C", "look along z after turning by C about z, B about y, A about x, in degrees"),
+    ("$view=auto", "forget eye, at, up and angles: a three-quarter view"),
+    (
+        "$projection=perspective|orthographic|cavalier|cabinet|oblique,ANGLE,RATIO",
+        "how lines of sight run",
+    ),
+    (
+        "$projection=isometric|dimetric|trimetric|axonometric,AZIMUTH,ELEVATION",
+        "a parallel view by its direction",
+    ),
+    ("$behind=clip|refuse", "what becomes of what is behind the eye"),
+    ("$hidden=erased|dotted|shown", "what becomes of hidden lines"),
+    ("$page=WIDTHxHEIGHT", "size of the sheet in mm"),
+    ("$margin=MM", "what stays free on each side of the sheet"),
+    ("$fit=on|off", "scale a plan to the page, or draw it at true size"),
+    ("$model", "size of the model against the limits"),
+    ("$clear", "forget the model"),
+    ("$plot", "draw it"),
+    ("$X", "unlock after an alarm"),
+];
+
+impl<'a> Command<'a> {
+    /// Understands one line.
+    ///
+    /// # Errors
+    /// A [`Refusal`] that names the word at fault.
+    ///
+    /// ```
+    /// use penup::protocol::Command;
+    /// assert_eq!(Command::parse("# a comment"), Ok(Command::Nothing));
+    /// assert_eq!(Command::parse("$plot"), Ok(Command::Plot));
+    /// assert!(Command::parse("v 1 2").is_err());
+    /// ```
+    pub fn parse(line: &'a str) -> Result<Self, Refusal> {
+        let line = line.split('#').next().unwrap_or("").trim();
+        if let Some(dollar) = line.strip_prefix('$') {
+            return Self::parse_dollar(dollar.trim());
+        }
+        let (keyword, rest) = line.split_once([' ', '\t']).unwrap_or((line, ""));
+        match keyword {
+            "" | "o" | "g" | "s" | "usemtl" | "mtllib" | "vn" | "vt" => Ok(Self::Nothing),
+            "v" => Ok(Self::Vertex(coordinates(rest)?)),
+            "f" => Numbers::new(rest).map(Self::Face),
+            "l" => Numbers::new(rest).map(Self::Polyline),
+            _ => Err(Refusal::UnknownCommand),
+        }
+    }
+
+    fn parse_dollar(text: &'a str) -> Result<Self, Refusal> {
+        if let Some((name, value)) = text.split_once('=') {
+            let (name, value) = (name.trim(), value.trim());
+            return match PlotOption::parse(name, value)? {
+                Some(option) => Ok(Self::Option(option)),
+                None => Ok(Self::Setting { name, value }),
+            };
+        }
+        match text {
+            "" => Ok(Self::Help),
+            "$" => Ok(Self::Settings),
+            "I" => Ok(Self::BuildInfo),
+            "X" => Ok(Self::Unlock),
+            "options" => Ok(Self::Options),
+            "model" => Ok(Self::Model),
+            "clear" => Ok(Self::Clear),
+            "plot" => Ok(Self::Plot),
+            _ => Err(Refusal::UnknownSystemCommand),
+        }
+    }
+}
+
+impl PlotOption {
+    /// `None` if no option has this name.
+    fn parse(name: &str, value: &str) -> Result<Option<Self>, Refusal> {
+        let option = match name {
+            "eye" => Self::Eye(direction(value)?),
+            "at" => Self::At(direction(value)?),
+            "up" => Self::Up(direction(value)?),
+            "view" => match value {
+                "auto" => Self::AutomaticView,
+                _ => return Err(Refusal::NotAChoice { choices: "auto" }),
+            },
+            "angles" => Self::Angles(direction(value)?),
+            "projection" => Self::Projection(ProjectionChoice::parse(value)?),
+            "behind" => Self::ClipBehind(match value {
+                "clip" => true,
+                "refuse" => false,
+                _ => return Err(Refusal::NotAChoice { choices: "clip or refuse" }),
+            }),
+            "hidden" => Self::Hidden(match value {
+                "erased" => HiddenLines::Erased,
+                "dotted" => HiddenLines::Dotted,
+                "shown" => HiddenLines::Shown,
+                _ => {
+                    return Err(Refusal::NotAChoice { choices: "erased, dotted or shown" });
+                }
+            }),
+            "page" => {
+                let (width, height) = value.split_once(['x', 'X']).ok_or(Refusal::NotAPage)?;
+                Self::Page { width: positive(width)?, height: positive(height)? }
+            }
+            "margin" => {
+                let margin =
+                    number(value)?.to_millimetres().map_err(|_| Refusal::NumberOutOfRange)?;
+                if margin < 0 {
+                    return Err(Refusal::NumberOutOfRange);
+                }
+                Self::Margin(margin)
+            }
+            "fit" => Self::Fit(match value {
+                "on" => true,
+                "off" => false,
+                _ => {
+                    return Err(Refusal::NotAChoice { choices: "on or off" });
+                }
+            }),
+            _ => return Ok(None),
+        };
+        Ok(Some(option))
+    }
+}
+
+fn number(text: &str) -> Result<Decimal, Refusal> {
+    Decimal::parse(text.trim()).map_err(|_| Refusal::NotANumber)
+}
+
+fn positive(text: &str) -> Result<Millimetres, Refusal> {
+    let length = number(text)?.to_millimetres().map_err(|_| Refusal::NumberOutOfRange)?;
+    if length > 0 { Ok(length) } else { Err(Refusal::NumberOutOfRange) }
+}
+
+fn direction(text: &str) -> Result<Direction, Refusal> {
+    values(text)
+}
+
+/// Exactly N numbers with commas between, for angles and places only.
+fn values<const N: usize>(text: &str) -> Result<[f64; N], Refusal> {
+    let wrong_count = Refusal::WrongNumberCount { needed: N };
+    let mut parts = text.split(',').map(number);
+    let mut values = [0.0; N];
+    for value in &mut values {
+        *value = parts.next().unwrap_or(Err(wrong_count))?.to_f64();
+    }
+    if parts.next().is_some() {
+        return Err(wrong_count);
+    }
+    // Past this range squares and quotients of lengths would overflow.
+    if values.iter().any(|value| libm::fabs(*value) > 1e15) {
+        return Err(Refusal::NumberOutOfRange);
+    }
+    Ok(values)
+}
+
+/// x y z, and then the weight or colour that some modellers write, which must be numbers too.
+fn coordinates(text: &str) -> Result<[Decimal; 3], Refusal> {
+    let mut words = text.split_ascii_whitespace().map(number);
+    let mut next = || words.next().unwrap_or(Err(Refusal::WrongNumberCount { needed: 3 }));
+    let coordinates = [next()?, next()?, next()?];
+    for rest in words {
+        rest?;
+    }
+    Ok(coordinates)
+}
+
+/// The vertex numbers of a face or polyline: `7`, `-1`, `7/2`, `7//3` or `7/2/3`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Numbers<'a> {
+    text: &'a str,
+}
+
+impl<'a> Numbers<'a> {
+    /// Checks every word, so that [`Numbers::iter`] cannot fail.
+    fn new(text: &'a str) -> Result<Self, Refusal> {
+        for word in text.split_ascii_whitespace() {
+            vertex_number(word).ok_or(Refusal::NotAVertexNumber)?;
+        }
+        Ok(Self { text })
+    }
+
+    /// The numbers in order.
+    pub fn iter(&self) -> impl Iterator<Item = i32> + Clone + use<'a> {
+        self.text.split_ascii_whitespace().filter_map(vertex_number)
+    }
+}
+
+/// The first part of `v`, `v/vt`, `v//vn`, `v/vt/vn`, if every part is a whole number.
+fn vertex_number(word: &str) -> Option<i32> {
+    let mut parts = word.split('/');
+    let vertex = parts.next()?.parse().ok()?;
+    let texture = parts.next();
+    let normal = parts.next();
+    let whole = |text: &str| text.parse::<i32>().is_ok();
+    let texture_is_right = match texture {
+        None => true,
+        Some("") => normal.is_some(),
+        Some(text) => whole(text),
+    };
+    if texture_is_right && normal.is_none_or(whole) && parts.next().is_none() {
+        Some(vertex)
+    } else {
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::vec::Vec;
+
+    fn numbers(line: &str) -> Result<Vec<i32>, Refusal> {
+        match Command::parse(line)? {
+            Command::Face(numbers) | Command::Polyline(numbers) => Ok(numbers.iter().collect()),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn every_form_of_a_corner_is_read() {
+        assert_eq!(numbers("f 1 2/5 3//6 -1/7/8"), Ok(std::vec![1, 2, 3, -1]));
+        assert_eq!(numbers("l\t4  5 # six"), Ok(std::vec![4, 5]));
+        assert_eq!(numbers("f"), Ok(std::vec![]));
+        for word in ["1/", "1//", "/1", "1/2/3/4", "1.5", "x", "1/x", "99999999999", "1/2/"] {
+            assert_eq!(
+                numbers(&std::format!("f 1 2 {word}")),
+                Err(Refusal::NotAVertexNumber),
+                "{word}"
+            );
+        }
+    }
+
+    #[test]
+    fn vertices_need_three_numbers_and_may_have_more() {
+        for line in ["v 1 2 3", "v  1 2 3 1.0", "v 1 2 3 0.5 0.5 0.5", " v 1 2 3 "] {
+            assert!(matches!(Command::parse(line), Ok(Command::Vertex(_))), "{line}");
+        }
+        assert_eq!(Command::parse("v 1 2"), Err(Refusal::WrongNumberCount { needed: 3 }));
+        assert_eq!(Command::parse("v 1 2 z"), Err(Refusal::NotANumber));
+        assert_eq!(Command::parse("v 1 2 3 z"), Err(Refusal::NotANumber));
+        assert_eq!(Command::parse("v"), Err(Refusal::WrongNumberCount { needed: 3 }));
+    }
+
+    #[test]
+    fn what_is_no_command_is_refused() {
+        for line in ["G0 X1", "vv 1 2 3", "hello", "V 1 2 3", "ff"] {
+            assert_eq!(Command::parse(line), Err(Refusal::UnknownCommand), "{line}");
+        }
+        for line in ["$nothing", "$plo", "$ plot it"] {
+            assert_eq!(Command::parse(line), Err(Refusal::UnknownSystemCommand), "{line}");
+        }
+    }
+
+    #[test]
+    fn options_are_read_with_their_values() {
+        let option = |line| match Command::parse(line) {
+            Ok(Command::Option(option)) => Ok(option),
+            Ok(other) => panic!("{other:?}"),
+            Err(refusal) => Err(refusal),
+        };
+        assert_eq!(option("$eye=-1, 2.5 ,3e1"), Ok(PlotOption::Eye([-1.0, 2.5, 30.0])));
+        let projection = |value| match option(value) {
+            Ok(PlotOption::Projection(choice)) => Ok(choice),
+            Ok(other) => panic!("{other:?}"),
+            Err(refusal) => Err(refusal),
+        };
+        assert_eq!(
+            projection("$projection = orthographic"),
+            Ok(ProjectionChoice::Lens(Lens::Orthographic))
+        );
+        assert_eq!(projection("$projection=cabinet"), projection("$projection=oblique, 45,0.5"));
+        assert_eq!(projection("$projection=oblique,45,3"), Err(Refusal::NumberOutOfRange));
+        assert_eq!(
+            projection("$projection=oblique,45"),
+            Err(Refusal::WrongNumberCount { needed: 2 })
+        );
+        assert_eq!(
+            projection("$projection=trimetric,10,20"),
+            projection("$projection=axonometric,10,20")
+        );
+        assert!(matches!(projection("$projection=isometric,1,2"), Err(Refusal::NotAChoice { .. })));
+        assert_eq!(
+            option("$page=210x297"),
+            Ok(PlotOption::Page {
+                width: Millimetres::from_num(210),
+                height: Millimetres::from_num(297)
+            })
+        );
+        assert_eq!(option("$eye=1,2"), Err(Refusal::WrongNumberCount { needed: 3 }));
+        assert_eq!(option("$eye=1,2,3,4"), Err(Refusal::WrongNumberCount { needed: 3 }));
+        assert_eq!(option("$eye=1,2,"), Err(Refusal::NotANumber));
+        assert_eq!(option("$eye=1,2,1e300"), Err(Refusal::NumberOutOfRange));
+        assert_eq!(option("$page=210"), Err(Refusal::NotAPage));
+        assert_eq!(option("$page=0x297"), Err(Refusal::NumberOutOfRange));
+        assert_eq!(option("$margin=-1"), Err(Refusal::NumberOutOfRange));
+        assert_eq!(
+            option("$hidden=gone"),
+            Err(Refusal::NotAChoice { choices: "erased, dotted or shown" })
+        );
+        assert_eq!(Command::parse("$110=5"), Ok(Command::Setting { name: "110", value: "5" }));
+    }
+
+    #[test]
+    fn every_command_of_the_help_is_one() {
+        for (usage, _) in HELP {
+            let line = usage.split_once('=').map_or(*usage, |(name, _)| name);
+            let parsed = Command::parse(line);
+            let with_value = usage.contains('=');
+            assert!(with_value || parsed.is_ok(), "{usage}");
+            if with_value {
+                let set = std::format!("{line}=?");
+                assert!(!matches!(Command::parse(&set), Ok(Command::Setting { .. })), "{usage}");
+            }
+        }
+    }
+}

@@ -1,0 +1,291 @@
+//! Why a line was not carried out: a number for programs, a sentence for people.
+
+use crate::drawing::PageError;
+use crate::fixed::BinaryFraction;
+use crate::machine::{MachineError, SettingError};
+use crate::model::ModelError;
+use crate::stage::OutOfScratch;
+use crate::view::ViewError;
+use core::fmt;
+
+/// A line that was not carried out; what was there before is untouched.
+///
+/// [`Refusal::number`] is what `error:N` says; the text ([`fmt::Display`]) goes before it as a
+/// message and says what to do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Refusal {
+    /// No command begins like this.
+    UnknownCommand,
+    /// A number was expected.
+    NotANumber,
+    /// No `$` command has this name.
+    UnknownSystemCommand,
+    /// The command needs an idle plotter.
+    Busy,
+    /// The plotter is in alarm.
+    Locked,
+    /// More bytes than a line may have.
+    LineTooLong {
+        /// The longest line.
+        limit: usize,
+    },
+    /// The line is not UTF-8.
+    NotText,
+    /// Bytes were lost because the sender did not wait.
+    BytesLost,
+    /// A number past what can be stored.
+    NumberOutOfRange,
+    /// Too few or too many numbers.
+    WrongNumberCount {
+        /// How many it takes.
+        needed: usize,
+    },
+    /// A corner is not `v`, `v/vt`, `v//vn` or `v/vt/vn` in whole numbers.
+    NotAVertexNumber,
+    /// The value is none of those that there are.
+    NotAChoice {
+        /// Which there are.
+        choices: &'static str,
+    },
+    /// A page is WIDTHxHEIGHT.
+    NotAPage,
+    /// The model refused it.
+    Model(ModelError),
+    /// No face and no bar to plot.
+    NothingToPlot,
+    /// The camera sees nothing that can be drawn.
+    View(ViewError),
+    /// The drawing does not go on the page.
+    Page(PageError),
+    /// The machine refused it.
+    Machine(MachineError),
+    /// The setting was refused.
+    Setting(SettingError),
+    /// Not enough working memory for this drawing.
+    DrawingTooLarge(OutOfScratch),
+    /// More lines than a tour can number.
+    TooManyLines,
+    /// The user gave the job up while it was computed.
+    Aborted,
+}
+
+/// Each `error:N` and what it means, as `docs/protocol.md` lists them.
+pub const MEANINGS: &[(u16, &str)] = &[
+    (1, "unknown command"),
+    (2, "not a number"),
+    (3, "unknown $ command"),
+    (8, "the plotter is busy"),
+    (9, "locked after an alarm"),
+    (11, "line too long"),
+    (15, "beyond the travel"),
+    (100, "line is not text"),
+    (101, "bytes were lost: wait for each reply"),
+    (102, "number out of range"),
+    (103, "wrong number of values"),
+    (104, "not a vertex number"),
+    (105, "not one of the choices"),
+    (106, "not a page size"),
+    (110, "unknown vertex"),
+    (111, "too few corners"),
+    (112, "vertex repeated"),
+    (113, "too many vertices"),
+    (114, "too many corners"),
+    (115, "coordinate too large"),
+    (120, "nothing to plot"),
+    (121, "eye at the point looked at"),
+    (122, "up is along the line of sight"),
+    (123, "vertex not in front of the eye"),
+    (124, "nothing in front of the eye"),
+    (130, "margins leave no room on the page"),
+    (131, "page has too many steps"),
+    (132, "drawing is larger than the page"),
+    (140, "drawing too large for the memory"),
+    (141, "given up"),
+    (142, "too many lines"),
+    (150, "setting out of range"),
+    (151, "setting conflicts with another"),
+    (152, "move too long"),
+];
+
+impl Refusal {
+    /// The number in `error:N`; numbers below 100 mean what they mean in Grbl 1.1.
+    pub const fn number(&self) -> u16 {
+        match self {
+            Self::UnknownCommand => 1,
+            Self::NotANumber => 2,
+            Self::UnknownSystemCommand => 3,
+            Self::Busy => 8,
+            Self::Locked => 9,
+            Self::LineTooLong { .. } => 11,
+            Self::NotText => 100,
+            Self::BytesLost => 101,
+            Self::NumberOutOfRange => 102,
+            Self::WrongNumberCount { .. } => 103,
+            Self::NotAVertexNumber => 104,
+            Self::NotAChoice { .. } => 105,
+            Self::NotAPage => 106,
+            Self::Model(error) => match error {
+                ModelError::UnknownVertex { .. } => 110,
+                ModelError::TooFewCorners { .. } => 111,
+                ModelError::RepeatedVertex { .. } => 112,
+                ModelError::TooManyVertices { .. } => 113,
+                ModelError::TooManyCorners { .. } => 114,
+                ModelError::CoordinateTooLarge => 115,
+            },
+            Self::NothingToPlot | Self::View(ViewError::NothingToSee) => 120,
+            Self::View(ViewError::EyeAtTarget) => 121,
+            Self::View(ViewError::UpAlongSight) => 122,
+            Self::View(ViewError::BehindEye { .. }) => 123,
+            Self::View(ViewError::NothingInFront) => 124,
+            Self::Page(PageError::NoRoom) => 130,
+            Self::Page(PageError::TooManySteps) => 131,
+            Self::Page(PageError::DoesNotFit { .. }) => 132,
+            Self::Setting(SettingError::Busy) => 8,
+            Self::Setting(SettingError::Unknown) => 3,
+            Self::Setting(SettingError::OutOfRange(_) | SettingError::NotWhole(_)) => 150,
+            Self::Setting(SettingError::Conflict(_)) => 151,
+            Self::Machine(MachineError::State(_)) => 8,
+            Self::Machine(MachineError::BeyondTravel { .. }) => 15,
+            Self::Machine(MachineError::MoveTooLong { .. }) => 152,
+            Self::DrawingTooLarge(_) => 140,
+            Self::Aborted => 141,
+            Self::TooManyLines => 142,
+        }
+    }
+}
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::UnknownCommand => formatter.write_str(
+                "a line begins with v, f, l, another OBJ keyword, or $; $ lists the commands",
+            ),
+            Self::NotANumber => formatter.write_str("a number is written like -12.5 or 3e-2"),
+            Self::UnknownSystemCommand => formatter.write_str("$ lists the commands"),
+            Self::Busy => formatter.write_str("wait for the plot to end, or send ctrl-X"),
+            Self::Locked => formatter.write_str("send $X to unlock"),
+            Self::LineTooLong { limit } => write!(formatter, "a line has at most {limit} bytes"),
+            Self::NotText => {
+                formatter.write_str("a byte of the line is no text: check the baud rate")
+            }
+            Self::BytesLost => formatter
+                .write_str("the receive buffer was full: send a line, then wait for its reply"),
+            Self::NumberOutOfRange => {
+                formatter.write_str("the number is too large, too small or has the wrong sign")
+            }
+            Self::WrongNumberCount { needed } => write!(formatter, "it takes {needed} numbers"),
+            Self::NotAVertexNumber => {
+                formatter.write_str("a corner is written 7, -1, 7/2, 7//3 or 7/2/3")
+            }
+            Self::NotAChoice { choices } => write!(formatter, "choose {choices}"),
+            Self::NotAPage => formatter.write_str("a page is written 210x297, in mm"),
+            Self::Model(error) => write_model_error(formatter, error),
+            Self::NothingToPlot | Self::View(ViewError::NothingToSee) => {
+                formatter.write_str("send vertices and faces or lines first")
+            }
+            Self::View(ViewError::EyeAtTarget) => formatter.write_str("move $eye away from $at"),
+            Self::View(ViewError::UpAlongSight) => {
+                formatter.write_str("choose another $up, not along the line of sight")
+            }
+            Self::View(ViewError::NothingInFront) => {
+                formatter.write_str("the model is behind the eye: move or turn it")
+            }
+            Self::View(ViewError::BehindEye { vertex }) => {
+                write!(formatter, "vertex {vertex} is beside or behind the eye: move $eye back")
+            }
+            Self::Page(PageError::NoRoom) => {
+                formatter.write_str("make $margin smaller or $page larger")
+            }
+            Self::Page(PageError::TooManySteps) => {
+                formatter.write_str("the page has more than 1048576 steps: make $page smaller")
+            }
+            Self::Page(PageError::DoesNotFit { width, height }) => {
+                let mm = |units: i64| BinaryFraction { units, fraction_bits: 16, places: 1 };
+                write!(
+                    formatter,
+                    "the plan is {}x{} mm: choose a larger $page, or $fit=on",
+                    mm(*width),
+                    mm(*height)
+                )
+            }
+            Self::DrawingTooLarge(OutOfScratch { needed, available }) => {
+                write!(
+                    formatter,
+                    "{needed} bytes are needed where {available} are free: send a smaller model"
+                )
+            }
+            Self::Setting(error) => write_setting_error(formatter, error),
+            Self::Machine(error) => write_machine_error(formatter, error),
+            Self::TooManyLines => {
+                formatter.write_str("a drawing has at most 32768 lines: send a smaller model")
+            }
+            Self::Aborted => formatter.write_str("the job was given up"),
+        }
+    }
+}
+
+fn write_model_error(formatter: &mut fmt::Formatter<'_>, error: &ModelError) -> fmt::Result {
+    match error {
+        ModelError::CoordinateTooLarge => formatter.write_str("coordinates go up to 1073741824"),
+        ModelError::TooManyVertices { limit } => write!(formatter, "the limit is {limit} vertices"),
+        ModelError::TooManyCorners { limit, needed } => {
+            write!(
+                formatter,
+                "the limit is {limit} corners of faces and ends of lines, this makes {needed}"
+            )
+        }
+        ModelError::UnknownVertex { number, vertices } => {
+            write!(formatter, "there is no vertex {number}: the model has {vertices}")
+        }
+        ModelError::TooFewCorners { needed } => write!(formatter, "it takes {needed} vertices"),
+        ModelError::RepeatedVertex { number } => {
+            write!(formatter, "vertex {number} comes twice in a row")
+        }
+    }
+}
+
+fn write_setting_error(formatter: &mut fmt::Formatter<'_>, error: &SettingError) -> fmt::Result {
+    match error {
+        SettingError::Unknown => formatter.write_str("$$ lists the settings"),
+        SettingError::OutOfRange(setting) => {
+            let info = setting.info();
+            write!(
+                formatter,
+                "{} goes from {} to {} {}",
+                info.name, info.least, info.greatest, info.unit
+            )
+        }
+        SettingError::NotWhole(setting) => {
+            write!(formatter, "{} is a whole number", setting.info().name)
+        }
+        SettingError::Conflict(_) => {
+            formatter.write_str("with it the steps would come too fast or the ramps too slow")
+        }
+        SettingError::Busy => formatter.write_str("wait for the plot to end, or send ctrl-X"),
+    }
+}
+
+fn write_machine_error(formatter: &mut fmt::Formatter<'_>, error: &MachineError) -> fmt::Result {
+    match error {
+        MachineError::State(_) => formatter.write_str("wait for the plot to end, or send ctrl-X"),
+        MachineError::BeyondTravel { x, y, .. } => {
+            write!(
+                formatter,
+                "it would go {x},{y} steps beyond the travel: choose a smaller $page, or set $130 and $131"
+            )
+        }
+        MachineError::MoveTooLong { .. } => {
+            formatter.write_str("a single move is at most 16 m long")
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn meanings_are_sorted_and_unique() {
+        assert!(MEANINGS.windows(2).all(|pair| pair[0].0 < pair[1].0));
+    }
+}

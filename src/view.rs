@@ -1,1 +1,0 @@
-//! Camera from two points; projection to integers.

@@ -1,0 +1,299 @@
+//! What the user chose to look through, and the axes that follow from it.
+//!
+//! The one place for angles, square roots and binary floats: once per view, in `libm`.
+
+use super::ViewError;
+use crate::geometry::Projection;
+use crate::model::Model;
+
+/// A point or direction of the model's space, for angles only.
+pub type Direction = [f64; 3];
+
+/// Where the user looks from, and through what.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Camera {
+    /// Where the eye is and which way it looks.
+    pub sight: Sight,
+    /// How lines of sight run.
+    pub lens: Lens,
+}
+
+/// Where the eye is and which way it looks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Sight {
+    /// From one point to another (Brown IV).
+    Towards {
+        /// The eye, in model units.
+        eye: Direction,
+        /// The point looked at; its image is the origin.
+        at: Direction,
+        /// What is up; `None`: z, or y where the line of sight is along z.
+        up: Option<Direction>,
+    },
+    /// Harrison's viewpoint and rotation (2.3, equations 1 to 6): after turning the model by γ about
+    /// z, β about y and α about x, the line of sight is z, y is up.
+    Turned {
+        /// The viewpoint, in model units.
+        eye: Direction,
+        /// α, β, γ in degrees.
+        angles: [f64; 3],
+    },
+}
+
+/// How lines of sight run (Harrison 2.2).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Lens {
+    /// They meet in the eye.
+    Perspective,
+    /// They are parallel, at right angles to the page.
+    Orthographic,
+    /// They are parallel, at a slant: what recedes is drawn towards `angle`, `ratio` times as long.
+    Oblique {
+        /// Degrees from the page's x axis.
+        angle: f64,
+        /// 1 cavalier, 0.5 cabinet; 0 to 2.
+        ratio: f64,
+    },
+}
+
+impl Lens {
+    /// Perspective or parallel.
+    pub fn projection(self) -> Projection {
+        match self {
+            Self::Perspective => Projection::Perspective,
+            Self::Orthographic | Self::Oblique { .. } => Projection::Parallel,
+        }
+    }
+}
+
+impl Camera {
+    /// The three-quarter view that a model gets if the user chooses none: from the right, in front
+    /// and above (an oblique view: from in front), so far away that the whole model is well inside
+    /// the field. It looks at `at`, or else at the middle. `None` without vertices.
+    pub fn automatic(
+        model: &Model<'_>,
+        lens: Lens,
+        at: Option<Direction>,
+        up: Option<Direction>,
+    ) -> Option<Self> {
+        let from = match lens {
+            Lens::Oblique { .. } => [0.0, -1.0, 0.0],
+            _ => [0.45, -0.75, 0.5],
+        };
+        Self::from_direction(model, from, lens, at, up)
+    }
+
+    /// An axonometric view: from `azimuth` degrees (0 along x, -90 in front) and `elevation` degrees
+    /// above the xy plane. Isometric is (-45, 35.264…).
+    pub fn axonometric(
+        model: &Model<'_>,
+        azimuth: f64,
+        elevation: f64,
+        at: Option<Direction>,
+        up: Option<Direction>,
+    ) -> Option<Self> {
+        let (sin_azimuth, cos_azimuth) = sin_cos_degrees(azimuth);
+        let (sin_elevation, cos_elevation) = sin_cos_degrees(elevation);
+        let from = [cos_azimuth * cos_elevation, sin_azimuth * cos_elevation, sin_elevation];
+        Self::from_direction(model, from, Lens::Orthographic, at, up)
+    }
+
+    /// Harrison's view: along the z axis of the turned model (see [`Sight::Turned`]), from `eye`, or
+    /// else from so far away that the whole model is well inside the field.
+    pub fn turned(
+        model: &Model<'_>,
+        lens: Lens,
+        angles: [f64; 3],
+        eye: Option<Direction>,
+    ) -> Option<Self> {
+        let (middle, radius) = middle_and_radius(model)?;
+        let [_, _, forward] = turned(angles);
+        let eye = eye
+            .unwrap_or([0, 1, 2].map(|axis| middle[axis] - EYE_DISTANCE * radius * forward[axis]));
+        Some(Self { sight: Sight::Turned { eye, angles }, lens })
+    }
+
+    fn from_direction(
+        model: &Model<'_>,
+        from: Direction,
+        lens: Lens,
+        at: Option<Direction>,
+        up: Option<Direction>,
+    ) -> Option<Self> {
+        let (middle, radius) = middle_and_radius(model)?;
+        let at = at.unwrap_or(middle);
+        let eye = [0, 1, 2].map(|axis| at[axis] + EYE_DISTANCE * radius * from[axis]);
+        Some(Self { sight: Sight::Towards { eye, at, up }, lens })
+    }
+}
+
+/// In radii of the model: a sphere around it fills at most 33 degrees.
+const EYE_DISTANCE: f64 = 3.5;
+
+/// The middle of the model and about how far it reaches from there.
+///
+/// The radius is an estimate that only places the automatic eye: `micromath` is enough for it.
+pub(super) fn middle_and_radius(model: &Model<'_>) -> Option<(Direction, f64)> {
+    use micromath::F32Ext;
+    let (low, high) = model.bounds()?;
+    let unit = libm::ldexp(1.0, -(model.fraction_bits() as i32));
+    let (low, high) = (low.coordinates().map(f64::from), high.coordinates().map(f64::from));
+    let middle = [0, 1, 2].map(|axis| (low[axis] + high[axis]) / 2.0 * unit);
+    let largest = [0, 1, 2].map(|axis| (high[axis] - low[axis]) / 2.0 * unit);
+    let size = largest_component(largest);
+    if size == 0.0 {
+        return Some((middle, 1.0));
+    }
+    let squares =
+        largest.iter().map(|half| (half / size) as f32).map(|half| half * half).sum::<f32>();
+    // Named in full: with std at hand, `f32::sqrt` would quietly take its place.
+    Some((middle, size * f64::from(F32Ext::sqrt(squares))))
+}
+
+/// The axes of the image and the point they are measured from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Axes {
+    /// Right, up, away from the eye; of length 1 but for the slant of an oblique lens.
+    pub directions: [Direction; 3],
+    /// The eye in perspective, else the point looked at.
+    pub origin: Direction,
+}
+
+impl Axes {
+    pub fn new(camera: &Camera) -> Result<Self, ViewError> {
+        let (eye, at, [right, up, forward]) = match camera.sight {
+            Sight::Towards { eye, at, up } => (eye, at, towards(eye, at, up)?),
+            Sight::Turned { eye, angles } => (eye, eye, turned(angles)),
+        };
+        let directions = match camera.lens {
+            Lens::Oblique { angle, ratio } => {
+                let (sin, cos) = sin_cos_degrees(angle);
+                let slanted = |axis: Direction, by: f64| {
+                    [0, 1, 2].map(|i: usize| axis[i] + ratio * by * forward[i])
+                };
+                [slanted(right, cos), slanted(up, sin), forward]
+            }
+            Lens::Perspective | Lens::Orthographic => [right, up, forward],
+        };
+        let origin = match camera.lens.projection() {
+            Projection::Perspective => eye,
+            Projection::Parallel => at,
+        };
+        Ok(Self { directions, origin })
+    }
+}
+
+fn towards(
+    eye: Direction,
+    at: Direction,
+    up: Option<Direction>,
+) -> Result<[Direction; 3], ViewError> {
+    let sight = [0, 1, 2].map(|axis| at[axis] - eye[axis]);
+    let forward = normalized(sight).ok_or(ViewError::EyeAtTarget)?;
+    let right = match up {
+        Some(up) => normalized(up).and_then(|up| sideways(forward, up)),
+        None => sideways(forward, [0.0, 0.0, 1.0]).or_else(|| sideways(forward, [0.0, 1.0, 0.0])),
+    };
+    let right = right.ok_or(ViewError::UpAlongSight)?;
+    Ok([right, cross(right, forward), forward])
+}
+
+/// The rows of Harrison's R = Rx Ry Rz (equation 5). His x axis is turned round: with y up and z away
+/// from the eye his axes are right-handed, and the picture would be a mirror image.
+fn turned([alpha, beta, gamma]: [f64; 3]) -> [Direction; 3] {
+    let [(sa, ca), (sb, cb), (sg, cg)] = [alpha, beta, gamma].map(sin_cos_degrees);
+    let up = [sa * sb * cg + ca * sg, ca * cg - sa * sb * sg, -sa * cb];
+    let forward = [sa * sg - ca * sb * cg, sa * cg + ca * sb * sg, ca * cb];
+    [cross(forward, up), up, forward]
+}
+
+/// Sine and cosine; exact for multiples of 90 degrees.
+fn sin_cos_degrees(degrees: f64) -> (f64, f64) {
+    let quarters = libm::round(degrees / 90.0);
+    let (sin, cos) = libm::sincos((degrees - 90.0 * quarters) * (core::f64::consts::PI / 180.0));
+    match libm::fmod(quarters, 4.0) as i32 {
+        1 | -3 => (cos, -sin),
+        2 | -2 => (-sin, -cos),
+        3 | -1 => (-cos, sin),
+        _ => (sin, cos),
+    }
+}
+
+/// forward × up, of length 1, unless they are parallel but for rounding.
+fn sideways(forward: Direction, up: Direction) -> Option<Direction> {
+    let right = cross(forward, up);
+    if dot(right, right) < 1e-20 { None } else { normalized(right) }
+}
+
+pub(super) fn dot(a: Direction, b: Direction) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn cross(a: Direction, b: Direction) -> Direction {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+pub(super) fn largest_component(a: Direction) -> f64 {
+    a.iter().fold(0.0, |most, d| f64::max(most, libm::fabs(*d)))
+}
+
+fn normalized(a: Direction) -> Option<Direction> {
+    // Scaled first, so that neither huge nor tiny vectors leave the range of the squares.
+    let largest = largest_component(a);
+    if largest == 0.0 || !largest.is_finite() {
+        return None;
+    }
+    let scaled = a.map(|d| d / largest);
+    let length = libm::sqrt(dot(scaled, scaled));
+    Some(scaled.map(|d| d / length))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn near(a: Direction, b: Direction) -> bool {
+        [0, 1, 2].iter().all(|&axis: &usize| libm::fabs(a[axis] - b[axis]) < 1e-12)
+    }
+
+    #[test]
+    fn quarter_turns_are_exact() {
+        for (degrees, sin_cos) in [
+            (0.0, (0.0, 1.0)),
+            (90.0, (1.0, 0.0)),
+            (180.0, (0.0, -1.0)),
+            (270.0, (-1.0, 0.0)),
+            (-90.0, (-1.0, 0.0)),
+            (450.0, (1.0, 0.0)),
+        ] {
+            let (sin, cos) = sin_cos_degrees(degrees);
+            assert_eq!((sin + 0.0, cos + 0.0), sin_cos, "{degrees}");
+        }
+        let (sin, cos) = sin_cos_degrees(30.0);
+        assert!(libm::fabs(sin - 0.5) < 1e-15 && libm::fabs(cos * cos - 0.75) < 1e-15);
+    }
+
+    #[test]
+    fn an_unturned_viewpoint_looks_along_z_with_y_up_and_nothing_mirrored() {
+        let [right, up, forward] = turned([0.0; 3]);
+        assert!(
+            near(forward, [0.0, 0.0, 1.0])
+                && near(up, [0.0, 1.0, 0.0])
+                && near(right, [-1.0, 0.0, 0.0])
+        );
+    }
+
+    #[test]
+    fn a_turned_view_is_the_view_towards_the_same_point() {
+        for angles in [[20.0, 30.0, 40.0], [-100.0, 15.0, 200.0], [0.0, 89.0, 1.0]] {
+            let [right, up, forward] = turned(angles);
+            let eye = [1.0, 2.0, 3.0];
+            let at = [0, 1, 2].map(|axis| eye[axis] + 5.0 * forward[axis]);
+            let same = towards(eye, at, Some(up)).unwrap();
+            assert!(
+                near(same[0], right) && near(same[1], up) && near(same[2], forward),
+                "{angles:?}"
+            );
+        }
+    }
+}

@@ -1,0 +1,234 @@
+//! The model through the view: every vertex, and what lies behind the eye cut off.
+//!
+//! A face that reaches behind the near plane is cut along it (Sutherland & Hodgman, one plane); edges
+//! of neighbours that are cut get the same new vertex. The cut itself is no edge of the model:
+//! visibility draws no edge whose ends both lie on the near plane.
+
+use super::View;
+use crate::geometry::Vertex;
+use crate::model::{Corner, Element, Elements, Model, VERTEX_NUMBER_LIMIT};
+use crate::stage::{OutOfScratch, Scratch};
+
+/// A model as the camera sees it.
+#[derive(Debug, Clone, Copy)]
+pub struct Seen<'a> {
+    /// The vertices of the model, and those where an edge is cut.
+    pub vertices: &'a [Vertex],
+    /// What is in front of the eye.
+    pub elements: Elements<'a>,
+}
+
+/// Takes every vertex of `model` to view coordinates and cuts off what is nearer than the near plane.
+///
+/// # Errors
+/// [`OutOfScratch`] if the vertices, or the cut faces, do not fit.
+pub fn see<'a>(
+    view: &View,
+    model: &'a Model<'_>,
+    scratch: &mut Scratch<'a>,
+) -> Result<Seen<'a>, OutOfScratch> {
+    let vertices = scratch.take::<Vertex>(model.vertices().len())?;
+    for (vertex, position) in vertices.iter_mut().zip(model.vertices()) {
+        *vertex = view.vertex(*position);
+    }
+    match view.near() {
+        Some(near) if vertices.iter().any(|vertex| vertex.z < near) => {
+            cut(vertices, model.elements(), near, scratch)
+        }
+        _ => Ok(Seen { vertices, elements: model.elements() }),
+    }
+}
+
+fn cut<'a>(
+    vertices: &[Vertex],
+    elements: Elements<'_>,
+    near: i32,
+    scratch: &mut Scratch<'a>,
+) -> Result<Seen<'a>, OutOfScratch> {
+    let is_seen =
+        |number: u16| vertices.get(usize::from(number)).is_some_and(|vertex| vertex.z >= near);
+    let is_cut = |edge: &Edge| is_seen(edge.0) != is_seen(edge.1);
+
+    let count = elements.iter().flat_map(edges).filter(is_cut).count();
+    let keys = scratch.take::<u32>(count)?;
+    for (key, edge) in keys.iter_mut().zip(elements.iter().flat_map(edges).filter(is_cut)) {
+        *key = edge.key();
+    }
+    keys.sort_unstable();
+    let keys = without_repeats(keys);
+
+    let too_many =
+        OutOfScratch { needed: vertices.len() + keys.len(), available: VERTEX_NUMBER_LIMIT };
+    if too_many.needed > too_many.available {
+        return Err(too_many);
+    }
+    let all = scratch.take::<Vertex>(vertices.len() + keys.len())?;
+    let (same, new) = all.split_at_mut(vertices.len());
+    same.copy_from_slice(vertices);
+    for (vertex, key) in new.iter_mut().zip(keys) {
+        let ends = [(key >> 16) as usize, (key & 0xFFFF) as usize];
+        if let [Some(p), Some(q)] = ends.map(|end| vertices.get(end)) {
+            *vertex = on_plane(*p, *q, near);
+        }
+    }
+    let number_of = |edge: Edge| {
+        let at = keys.binary_search(&edge.key()).unwrap_or(0); // every cut edge is in the list
+        (vertices.len() + at) as u16 // below VERTEX_NUMBER_LIMIT, see above
+    };
+
+    // Each cut adds at most one corner.
+    let corners = scratch.take::<u16>(elements.corners().len() + count)?;
+    let mut length = 0;
+    for element in elements.iter() {
+        let start = length;
+        let mut push = |number: u16| {
+            if let Some(corner) = corners.get_mut(length) {
+                *corner = number;
+                length += 1;
+            }
+        };
+        let of_bar = matches!(element, Element::Bar(..));
+        for edge in edges(element) {
+            if is_seen(edge.0) {
+                push(edge.0);
+            }
+            if is_cut(&edge) {
+                push(number_of(edge));
+            }
+            if of_bar && is_seen(edge.1) {
+                push(edge.1);
+            }
+        }
+        let needed = if of_bar { 2 } else { 3 };
+        if length - start < needed {
+            length = start;
+        }
+        let ends = start..length;
+        let last = ends.end;
+        for at in ends {
+            if let Some(corner) = corners.get_mut(at) {
+                *corner = bytemuck::cast(Corner::new(*corner, of_bar, at + 1 == last));
+            }
+        }
+    }
+    let corners: &'a [u16] = corners;
+    let corners = bytemuck::cast_slice(corners.get(..length).unwrap_or(&[]));
+    Ok(Seen { vertices: all, elements: Elements::new(corners) })
+}
+
+#[derive(Clone, Copy)]
+struct Edge(u16, u16);
+
+impl Edge {
+    /// The same for both directions.
+    fn key(self) -> u32 {
+        u32::from(self.0.min(self.1)) << 16 | u32::from(self.0.max(self.1))
+    }
+}
+
+/// The edges around a face, or the one of a bar.
+fn edges(element: Element<'_>) -> impl Iterator<Item = Edge> + Clone {
+    let (face, bar) = match element {
+        Element::Face(corners) => (corners, None),
+        Element::Bar(from, to) => (&[] as &[Corner], Some(Edge(from, to))),
+    };
+    let nexts = face.iter().cycle().skip(1);
+    face.iter().zip(nexts).map(|(a, b)| Edge(a.vertex(), b.vertex())).chain(bar)
+}
+
+fn without_repeats(sorted: &mut [u32]) -> &[u32] {
+    let mut kept = 0;
+    for at in 0..sorted.len() {
+        if kept == 0 || sorted[kept - 1] != sorted[at] {
+            sorted[kept] = sorted[at];
+            kept += 1;
+        }
+    }
+    &sorted[..kept]
+}
+
+/// Where the line from `p` to `q`, of which one is nearer than `near`, meets the near plane.
+fn on_plane(p: Vertex, q: Vertex, near: i32) -> Vertex {
+    let depth = i64::from(q.z) - i64::from(p.z); // not zero
+    let part = i64::from(near) - i64::from(p.z);
+    // Coordinates are within 2^20: products below 2^41.
+    let between = |p: i32, q: i32| {
+        let rise = (i64::from(q) - i64::from(p)) * part;
+        p + crate::fixed::divide_rounding(
+            i128::from(rise * depth.signum()),
+            i128::from(depth.abs()),
+        ) as i32
+    };
+    Vertex { x: between(p.x, q.x), y: between(p.y, q.y), z: near }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::vec::Vec;
+
+    fn vertex(x: i32, y: i32, z: i32) -> Vertex {
+        Vertex { x, y, z }
+    }
+
+    /// The elements after cutting at z = 10, as lists of places.
+    fn after(vertices: &[Vertex], elements: &[(&[u16], bool)]) -> Vec<Vec<(i32, i32, i32)>> {
+        let corners: Vec<Corner> = elements
+            .iter()
+            .flat_map(|(numbers, bar)| {
+                numbers
+                    .iter()
+                    .enumerate()
+                    .map(|(at, number)| Corner::new(*number, *bar, at + 1 == numbers.len()))
+            })
+            .collect();
+        let mut words = [0u64; 100];
+        let seen =
+            cut(vertices, Elements::new(&corners), 10, &mut Scratch::new(&mut words)).unwrap();
+        let place = |number: u16| seen.vertices[usize::from(number)];
+        let found = seen.elements.iter().map(|element| match element {
+            Element::Bar(a, b) => std::vec![place(a), place(b)],
+            Element::Face(corners) => corners.iter().map(|corner| place(corner.vertex())).collect(),
+        });
+        found.map(|places| places.iter().map(|v| (v.x, v.y, v.z)).collect()).collect()
+    }
+
+    #[test]
+    fn what_is_in_front_stays_and_what_is_behind_goes() {
+        let vertices = [
+            vertex(0, 0, 10),
+            vertex(9, 0, 20),
+            vertex(9, 9, 30),
+            vertex(0, 0, -5),
+            vertex(1, 1, 9),
+        ];
+        assert_eq!(
+            after(&vertices, &[(&[0, 1, 2], false)]),
+            [[(0, 0, 10), (9, 0, 20), (9, 9, 30)]]
+        );
+        assert!(after(&vertices, &[(&[3, 4], true)]).is_empty());
+    }
+
+    #[test]
+    fn neighbours_share_the_vertex_of_their_cut_edge() {
+        // Two faces with the edge 0-1 in common, which goes from z 20 to z 0.
+        let vertices =
+            [vertex(0, 0, 20), vertex(100, 40, 0), vertex(-50, 0, 20), vertex(50, 0, 20)];
+        let found = after(&vertices, &[(&[0, 1, 2], false), (&[1, 0, 3], false), (&[1, 0], true)]);
+        assert_eq!(found[0], [(0, 0, 20), (50, 20, 10), (25, 20, 10), (-50, 0, 20)]);
+        assert_eq!(found[1], [(50, 20, 10), (0, 0, 20), (50, 0, 20), (75, 20, 10)]);
+        assert_eq!(found[2], [(50, 20, 10), (0, 0, 20)]);
+    }
+
+    #[test]
+    fn too_little_memory_is_an_error() {
+        let vertices = [vertex(0, 0, 20), vertex(100, 40, 0), vertex(-50, 0, 20)];
+        let corners = [0, 1, 2].map(|number| Corner::new(number, false, number == 2));
+        for words in 0..9 {
+            let mut words = std::vec![0u64; words];
+            assert!(
+                cut(&vertices, Elements::new(&corners), 10, &mut Scratch::new(&mut words)).is_err()
+            );
+        }
+    }
+}

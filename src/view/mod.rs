@@ -1,0 +1,336 @@
+//! The camera: two points or three angles to integers (x, y, z), z the depth; clip at the eye.
+//!
+//! A [`Camera`] is what the user chose; a [`View`] is that camera looking at one model: a linear map
+//! in fixed point that takes every position to view coordinates within ±2^19. This rounding, once
+//! per vertex and view, is the only one before the page. Square roots and angles happen once per
+//! view, in `libm`, so every machine gets the same map. What lies behind the eye or level with it is
+//! cut off by [`see`]. Refused: an eye at the point looked at, an up direction along the line of
+//! sight, a model wholly behind the eye.
+//!
+//! Sources: Harrison 2.2 and 2.3 (equations 1 to 10) and Brown IV (the view from two points).
+
+mod camera;
+mod clip;
+
+pub use camera::{Camera, Direction, Lens, Sight};
+pub use clip::{Seen, see};
+
+use crate::geometry::{COORDINATE_LIMIT, Projection, Vertex};
+use crate::model::{Model, Position};
+use camera::{Axes, dot, largest_component};
+
+/// Why there is no view.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum ViewError {
+    /// The model has no vertex.
+    NothingToSee,
+    /// The eye is at the point looked at.
+    EyeAtTarget,
+    /// The up direction is along the line of sight, or zero.
+    UpAlongSight,
+    /// The whole model is level with the eye or behind it.
+    NothingInFront,
+    /// A vertex is level with the eye or behind it, and the user wants no clipping.
+    BehindEye {
+        /// The vertex, from 1.
+        vertex: usize,
+    },
+}
+
+/// A camera that looks at one model: the map from its positions to view coordinates.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct View {
+    rows: [Row; 3],
+    projection: Projection,
+    image_unit: f64,
+    near: Option<i32>,
+}
+
+/// One row of the map: (m · position + offset) >> shift, rounded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Row {
+    m: [i32; 3],
+    offset: i64,
+    shift: u32,
+}
+
+impl Row {
+    fn apply(&self, position: Position) -> i32 {
+        // |m| <= 2^30 and |position| <= 2^30: each product below 2^60; `Row::new` keeps the sum below 2^62.
+        let sum = self
+            .m
+            .iter()
+            .zip(position.coordinates())
+            .map(|(m, coordinate)| i64::from(*m) * i64::from(coordinate))
+            .sum::<i64>()
+            + self.offset;
+        ((sum + (1 << (self.shift - 1))) >> self.shift) as i32
+    }
+
+    /// scale (direction · p) + offset for p = position × 2^-fraction_bits, |result| < 2^20.
+    fn new(direction: Direction, scale: f64, offset: f64, fraction_bits: u32, reach: f64) -> Self {
+        // `reach` bounds |direction · p|. Both limits keep the sum and each factor in range.
+        let length = libm::sqrt(dot(direction, direction));
+        let largest = scale * reach * length + libm::fabs(offset) + 1.0;
+        let steepest = scale * largest_component(direction);
+        let mut shift = 61 - exponent(largest);
+        if steepest > 0.0 {
+            shift = shift.min(29 + fraction_bits as i32 - exponent(steepest));
+        }
+        let shift = shift.clamp(1, 62);
+        let unit = libm::ldexp(1.0, shift);
+        let m = direction
+            .map(|d| libm::round(libm::ldexp(d * scale, shift - fraction_bits as i32)) as i32);
+        Self { m, offset: libm::round(offset * unit) as i64, shift: shift as u32 }
+    }
+}
+
+/// The least e with |value| < 2^e, for a positive finite value.
+fn exponent(value: f64) -> i32 {
+    libm::frexp(value).1
+}
+
+/// The near plane is at this fraction of the greatest depth: 2^-10.
+const NEAR_SHIFT: u32 = 10;
+
+impl View {
+    /// Looks at `model` through `camera`.
+    ///
+    /// # Errors
+    /// See [`ViewError`].
+    pub fn new(camera: &Camera, model: &Model<'_>) -> Result<Self, ViewError> {
+        let Axes { directions, origin } = Axes::new(camera)?;
+        let fraction_bits = model.fraction_bits();
+        let projection = camera.lens.projection();
+        let extents = extents(&directions, model).ok_or(ViewError::NothingToSee)?;
+        let reach = reach(model);
+        let limit = f64::from(COORDINATE_LIMIT - 1);
+        let shift = directions.map(|axis| -dot(axis, origin));
+        let width = [0, 1]
+            .iter()
+            .flat_map(|&row: &usize| [extents[row].0 + shift[row], extents[row].1 + shift[row]])
+            .fold(0.0, |most, value| f64::max(most, libm::fabs(value)));
+        let (nearest, farthest) = (extents[2].0 + shift[2], extents[2].1 + shift[2]);
+        // What is narrower than some units of 2^-30 is rounding noise of the directions.
+        let noise = if reach > 0.0 { reach * 6e-8 } else { 1.0 };
+        let scale = limit / f64::max(width, noise);
+        let (depth_scale, depth_offset) = match projection {
+            Projection::Perspective => {
+                if farthest <= 0.0 {
+                    return Err(ViewError::NothingInFront);
+                }
+                (limit / f64::max(f64::max(farthest, -nearest), noise), 0.0)
+            }
+            // Only differences of depth matter: centre them.
+            Projection::Parallel => {
+                let half = (farthest - nearest) / 2.0;
+                (limit / f64::max(half, noise), -(nearest + farthest) / 2.0)
+            }
+        };
+        let offsets = [scale * shift[0], scale * shift[1], depth_scale * (shift[2] + depth_offset)];
+        let scales = [scale, scale, depth_scale];
+        let rows = [0, 1, 2].map(|row: usize| {
+            Row::new(directions[row], scales[row], offsets[row], fraction_bits, reach)
+        });
+        let (image_unit, near) = match projection {
+            Projection::Perspective => {
+                let deepest = libm::ceil(depth_scale * farthest) as i32;
+                (depth_scale / scale, Some((deepest >> NEAR_SHIFT).max(1)))
+            }
+            Projection::Parallel => (1.0 / scale, None),
+        };
+        Ok(Self { rows, projection, image_unit, near })
+    }
+
+    /// A position in view coordinates.
+    pub fn vertex(&self, position: Position) -> Vertex {
+        let [x, y, z] = self.rows.each_ref().map(|row| row.apply(position));
+        Vertex { x, y, z }
+    }
+
+    /// Makes sure that every vertex is in front of the eye.
+    ///
+    /// # Errors
+    /// [`ViewError::BehindEye`] with the first that is not.
+    pub fn refuse_behind(&self, model: &Model<'_>) -> Result<(), ViewError> {
+        let near = self.near.unwrap_or(i32::MIN);
+        let is_behind = |position: &Position| self.vertex(*position).z < near;
+        match model.vertices().iter().position(is_behind) {
+            Some(vertex) => Err(ViewError::BehindEye { vertex: vertex + 1 }),
+            None => Ok(()),
+        }
+    }
+
+    /// Perspective or parallel.
+    pub fn projection(&self) -> Projection {
+        self.projection
+    }
+
+    /// The least depth that is drawn, in view units; `None` in a parallel view, which has no eye.
+    pub fn near(&self) -> Option<i32> {
+        self.near
+    }
+
+    /// What x/w and y/w are multiplied by to give the image plane at distance 1 (perspective) or
+    /// model units (parallel, w = 1). For reports; no decision depends on it.
+    pub fn image_unit(&self) -> f64 {
+        self.image_unit
+    }
+}
+
+/// A bound of |direction · position| for directions of length 1, in model units.
+fn reach(model: &Model<'_>) -> f64 {
+    let largest = model.bounds().map_or(0, |(low, high)| {
+        let corners = [low.coordinates(), high.coordinates()];
+        corners.iter().flatten().map(|c| c.unsigned_abs()).max().unwrap_or(0)
+    });
+    // The square root of 3 and a little.
+    1.75 * libm::ldexp(f64::from(largest), -(model.fraction_bits() as i32))
+}
+
+/// Least and greatest of axis · position over all vertices, for each axis.
+fn extents(axes: &[Direction; 3], model: &Model<'_>) -> Option<[(f64, f64); 3]> {
+    // In integers, with 30 bits of each direction, so that no vertex costs a float.
+    let fixed_axes = axes.map(|axis| axis.map(|d| libm::round(libm::ldexp(d, 30)) as i64));
+    let along = |axis: &[i64; 3], vertex: &Position| -> i64 {
+        axis.iter().zip(vertex.coordinates()).map(|(d, coordinate)| d * i64::from(coordinate)).sum()
+    };
+    let unit = libm::ldexp(1.0, -(30 + model.fraction_bits() as i32));
+    model.vertices().first()?;
+    Some(fixed_axes.map(|axis| {
+        let (low, high) =
+            model.vertices().iter().fold((i64::MAX, i64::MIN), |(low, high), vertex| {
+                let value = along(&axis, vertex);
+                (low.min(value), high.max(value))
+            });
+        (low as f64 * unit, high as f64 * unit)
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixed::Decimal;
+    use crate::model::Corner;
+
+    fn with_model(vertices: &[[&str; 3]], test: impl FnOnce(&Model<'_>)) {
+        let mut memory = (heapless::Vec::<Position, 16>::new(), heapless::Vec::<Corner, 16>::new());
+        let mut model = Model::new(&mut memory.0, &mut memory.1);
+        for vertex in vertices {
+            model.add_vertex(vertex.map(|text| Decimal::parse(text).unwrap())).unwrap();
+        }
+        test(&model);
+    }
+
+    const CUBE: [[&str; 3]; 8] = [
+        ["0", "0", "0"],
+        ["1", "0", "0"],
+        ["1", "1", "0"],
+        ["0", "1", "0"],
+        ["0", "0", "1"],
+        ["1", "0", "1"],
+        ["1", "1", "1"],
+        ["0", "1", "1"],
+    ];
+
+    fn camera(eye: Direction, at: Direction) -> Camera {
+        Camera { sight: Sight::Towards { eye, at, up: None }, lens: Lens::Perspective }
+    }
+
+    #[test]
+    fn images_are_those_of_the_formula() {
+        const OBLIQUE: Lens = Lens::Oblique { angle: 30.0, ratio: 0.5 };
+        with_model(&CUBE, |model| {
+            for lens in [Lens::Perspective, Lens::Orthographic, OBLIQUE] {
+                for (eye, at) in [
+                    ([-3.0, -4.0, 2.5], [0.5, 0.5, 0.5]),
+                    ([1000.0, 2000.0, -500.0], [0.25, 0.5, 0.125]),
+                    ([0.5, -1.2, 0.5], [0.5, 0.5, 0.5]),
+                    ([0.5, 0.5, 5.0], [0.5, 0.5, 0.5]),
+                ] {
+                    let camera = Camera { lens, ..camera(eye, at) };
+                    let view = View::new(&camera, model).unwrap();
+                    let Axes { directions: [right, up, forward], origin } =
+                        Axes::new(&camera).unwrap();
+                    let unit = libm::ldexp(1.0, -(model.fraction_bits() as i32));
+                    for position in model.vertices() {
+                        let p = position.coordinates().map(|c| f64::from(c) * unit);
+                        let d = [0, 1, 2].map(|axis| p[axis] - origin[axis]);
+                        let vertex = view.vertex(*position);
+                        let (w, depth) = match lens {
+                            Lens::Perspective => (f64::from(vertex.z), dot(d, forward)),
+                            _ => (1.0, 1.0),
+                        };
+                        for (axis, seen) in [(right, vertex.x), (up, vertex.y)] {
+                            let image = f64::from(seen) / w * view.image_unit();
+                            let error = image - dot(d, axis) / depth;
+                            assert!(error.abs() < 2e-6, "{eye:?} {lens:?}: off by {error}");
+                        }
+                        let all = [vertex.x, vertex.y, vertex.z];
+                        assert!(all.iter().all(|c| c.abs() <= COORDINATE_LIMIT));
+                    }
+                }
+            }
+        });
+    }
+
+    #[test]
+    fn a_model_of_any_size_fills_the_range() {
+        for size in ["1e-6", "0.001", "1", "12345.678", "1e9"] {
+            with_model(&[["0", "0", "0"], [size, "0", "0"], ["0", size, size]], |model| {
+                let camera = Camera::automatic(model, Lens::Perspective, None, None).unwrap();
+                let view = View::new(&camera, model).unwrap();
+                let seen = model.vertices().iter().map(|p| view.vertex(*p));
+                let widest = seen.map(|v| v.x.abs().max(v.y.abs())).max();
+                assert!(widest > Some(COORDINATE_LIMIT - 10), "{size}: {widest:?}");
+            });
+        }
+    }
+
+    #[test]
+    fn impossible_cameras_are_refused() {
+        with_model(&CUBE, |model| {
+            let (eye, at) = ([0.5, 0.5, 5.0], [0.5, 0.5, 0.5]);
+            assert_eq!(View::new(&camera(at, at), model), Err(ViewError::EyeAtTarget));
+            for up in [[0.0, 0.0, -2.0], [0.0; 3]] {
+                let sight = Sight::Towards { eye, at, up: Some(up) };
+                let upright = Camera { sight, lens: Lens::Perspective };
+                assert_eq!(View::new(&upright, model), Err(ViewError::UpAlongSight));
+            }
+            let away = camera([0.5, 0.5, 5.0], [0.5, 0.5, 6.0]);
+            assert_eq!(View::new(&away, model), Err(ViewError::NothingInFront));
+            // An orthographic eye only gives the direction.
+            assert!(View::new(&Camera { lens: Lens::Orthographic, ..away }, model).is_ok());
+        });
+        with_model(&[], |model| {
+            assert_eq!(View::new(&camera([1.0; 3], [0.0; 3]), model), Err(ViewError::NothingToSee));
+        });
+    }
+
+    #[test]
+    fn one_vertex_alone_can_be_seen() {
+        with_model(&[["5", "5", "5"]], |model| {
+            let camera = Camera::automatic(model, Lens::Orthographic, None, None).unwrap();
+            let vertex = View::new(&camera, model).unwrap().vertex(model.vertices()[0]);
+            assert!([vertex.x, vertex.y, vertex.z].iter().all(|c| c.abs() <= COORDINATE_LIMIT));
+        });
+    }
+
+    #[test]
+    fn an_isometric_cube_is_a_regular_hexagon() {
+        with_model(&CUBE, |model| {
+            let camera =
+                Camera::axonometric(model, -45.0, 35.264_389_682_754_654, None, None).unwrap();
+            let view = View::new(&camera, model).unwrap();
+            let mut radii = model.vertices().iter().map(|p| view.vertex(*p)).map(|v| {
+                let (x, y) =
+                    (f64::from(v.x) * view.image_unit(), f64::from(v.y) * view.image_unit());
+                libm::sqrt(x * x + y * y)
+            });
+            let on_hexagon = radii.clone().filter(|r| libm::fabs(r - libm::sqrt(2.0 / 3.0)) < 1e-5);
+            assert_eq!(on_hexagon.count(), 6);
+            assert_eq!(radii.by_ref().filter(|r| *r < 1e-5).count(), 2);
+        });
+    }
+}

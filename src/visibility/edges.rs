@@ -1,0 +1,138 @@
+//! The distinct edges: which side of which element stands for each edge of the model.
+
+use super::VisibilityError;
+use crate::model::Corner;
+use crate::stage::{Attention, Scratch};
+
+/// The corners of the elements, addressed by the number of an element's first corner.
+#[derive(Debug, Clone, Copy)]
+pub struct Outlines<'a> {
+    pub corners: &'a [Corner],
+}
+
+impl<'a> Outlines<'a> {
+    /// The element that begins at corner `first`.
+    #[inline]
+    pub fn element(&self, first: usize) -> &'a [Corner] {
+        let rest = &self.corners[first..];
+        let last = rest.iter().position(|corner| corner.is_last());
+        &rest[..last.map_or(0, |last| last + 1)]
+    }
+
+    /// Each element with the number of its first corner.
+    pub fn elements(&self) -> impl Iterator<Item = (usize, &'a [Corner])> + use<'a> {
+        let mut next = 0;
+        self.corners
+            .split_inclusive(|corner| corner.is_last())
+            .map(move |corners| {
+                let first = next;
+                next += corners.len();
+                (first, corners)
+            })
+    }
+}
+
+/// Whether the element is a bar, which has one side and no inside.
+pub fn is_bar(corners: &[Corner]) -> bool {
+    corners.len() == 2
+}
+
+/// The sides of an element, each from the corner of its number to the next one.
+pub fn sides(corners: &[Corner]) -> impl Iterator<Item = (usize, u16, u16)> + '_ {
+    let count = if is_bar(corners) { 1 } else { corners.len() };
+    let ends = corners.iter().skip(1).chain(corners.first());
+    corners
+        .iter()
+        .zip(ends)
+        .enumerate()
+        .take(count)
+        .map(|(number, (from, to))| (number, from.vertex(), to.vertex()))
+}
+
+/// One bit for each corner: whether the side that begins there stands for its edge.
+#[derive(Debug)]
+pub struct ChosenSides<'a> {
+    bits: &'a mut [u32],
+}
+
+/// No side: the end of a chain.
+const NONE: u16 = u16::MAX;
+
+/// Sides are chained by 16-bit numbers, one of which means "none".
+pub const MOST_CORNERS: usize = NONE as usize;
+
+impl<'a> ChosenSides<'a> {
+    /// Bytes that stay taken.
+    pub const fn bytes(corners: usize) -> usize {
+        Scratch::bytes_for::<u32>(corners.div_ceil(32))
+    }
+
+    /// Bytes taken while the sides are being chosen.
+    pub const fn bytes_while_choosing(vertices: usize, corners: usize) -> usize {
+        Scratch::bytes_for::<u16>(vertices) + Scratch::bytes_for::<u16>(corners)
+    }
+
+    /// Chooses the first side of each edge, whoever shares it.
+    pub fn choose(
+        outlines: Outlines<'_>,
+        vertices: usize,
+        scratch: &mut Scratch<'a>,
+        attention: &mut dyn Attention,
+    ) -> Result<Self, VisibilityError> {
+        let corners = outlines.corners;
+        let bits = scratch.take(corners.len().div_ceil(32))?;
+        let chosen = Self { bits };
+        let mut meantime = scratch.reborrow();
+        let heads: &mut [u16] = meantime.take(vertices)?;
+        let next: &mut [u16] = meantime.take(corners.len())?;
+        heads.fill(NONE);
+        let mut work = 0;
+        for (first, element) in outlines.elements() {
+            for (number, from, to) in sides(element) {
+                if from == to {
+                    continue;
+                }
+                let side = first + number;
+                let head = &mut heads[usize::from(from.min(to))];
+                let mut known = *head;
+                while known != NONE {
+                    let (a, b) = side_at(corners, usize::from(known));
+                    if (a, b) == (from, to) || (a, b) == (to, from) {
+                        break;
+                    }
+                    known = next[usize::from(known)];
+                    work += 1;
+                }
+                if known == NONE {
+                    next[side] = *head;
+                    *head = side as u16;
+                    chosen.bits[side / 32] |= 1 << (side % 32);
+                }
+            }
+            work += element.len();
+            if work > 2000 {
+                work = 0;
+                attention.check()?;
+            }
+        }
+        Ok(chosen)
+    }
+
+    /// Whether the side that begins at corner `side` stands for its edge.
+    #[inline]
+    pub fn contains(&self, side: usize) -> bool {
+        self.bits[side / 32] >> (side % 32) & 1 != 0
+    }
+}
+
+/// The two ends of the side that begins at a corner.
+fn side_at(corners: &[Corner], side: usize) -> (u16, u16) {
+    let from = corners[side];
+    let to = if from.is_last() {
+        let before = corners[..side].iter().rposition(|corner| corner.is_last());
+        corners[before.map_or(0, |last| last + 1)]
+    } else {
+        corners[side + 1]
+    };
+    (from.vertex(), to.vertex())
+}

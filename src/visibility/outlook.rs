@@ -1,0 +1,198 @@
+//! The scene as it lies on the page: each vertex by its place on a coarse grid of 2^14 by 2^14, and
+//! "on which side" answered from those places where they suffice, exactly where they do not.
+
+use crate::geometry::{Along, Axis, Projection, Vertex, page_offset, page_side};
+use crate::stage::{OutOfScratch, Scratch};
+use bytemuck::{Pod, Zeroable};
+
+/// Places on the coarse grid are below 2^this, so that a product of two differences fits 29 bits.
+pub const PLACE_BITS: u32 = 14;
+
+/// A vertex on the coarse grid, rounded down: the vertex itself lies less than one unit right and up.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Place {
+    pub x: u16,
+    pub y: u16,
+}
+
+impl Place {
+    fn difference(self, from: Self) -> (i32, i32) {
+        (
+            i32::from(self.x) - i32::from(from.x),
+            i32::from(self.y) - i32::from(from.y),
+        )
+    }
+}
+
+/// The sign of [`page_side`], or zero if the places are too coarse to tell.
+///
+/// Each true difference is within one unit of the difference of the places, which moves the
+/// determinant by less than the sum of the differences and two.
+#[inline]
+pub fn coarse_side(a: Place, b: Place, c: Place) -> i32 {
+    let (along_x, along_y) = b.difference(a);
+    let (to_x, to_y) = c.difference(a);
+    let side = along_x * to_y - along_y * to_x;
+    let doubt = along_x.abs() + along_y.abs() + to_x.abs() + to_y.abs() + 2;
+    if side.abs() >= doubt {
+        side.signum()
+    } else {
+        0
+    }
+}
+
+/// The vertices, in view space and on the page.
+#[derive(Debug, Clone, Copy)]
+pub struct Outlook<'a> {
+    pub projection: Projection,
+    pub vertices: &'a [Vertex],
+    pub places: &'a [Place],
+}
+
+impl<'a> Outlook<'a> {
+    /// Places every vertex on the coarse grid.
+    pub fn new<'s: 'a>(
+        projection: Projection,
+        vertices: &'a [Vertex],
+        scratch: &mut Scratch<'s>,
+    ) -> Result<Self, OutOfScratch> {
+        let places: &mut [Place] = scratch.take(vertices.len())?;
+        let fine = |vertex: &Vertex| {
+            let weight = match projection {
+                Projection::Perspective => i64::from(vertex.z),
+                Projection::Parallel => 1,
+            };
+            let ratio = |numerator: i32| (i64::from(numerator) << 20).div_euclid(weight);
+            (ratio(vertex.x), ratio(vertex.y))
+        };
+        let (mut low, mut high) = ((i64::MAX, i64::MAX), (i64::MIN, i64::MIN));
+        for (x, y) in vertices.iter().map(fine) {
+            low = (low.0.min(x), low.1.min(y));
+            high = (high.0.max(x), high.1.max(y));
+        }
+        let shift_for = |extent: i64| (64 - extent.leading_zeros()).saturating_sub(PLACE_BITS);
+        if !vertices.is_empty() {
+            let shift = (shift_for(high.0 - low.0), shift_for(high.1 - low.1));
+            for (place, vertex) in places.iter_mut().zip(vertices) {
+                let (x, y) = fine(vertex);
+                *place = Place {
+                    x: ((x - low.0) >> shift.0) as u16,
+                    y: ((y - low.1) >> shift.1) as u16,
+                };
+            }
+        }
+        Ok(Self {
+            projection,
+            vertices,
+            places,
+        })
+    }
+
+    #[inline]
+    pub fn vertex(&self, number: u16) -> Vertex {
+        self.vertices[usize::from(number)]
+    }
+
+    #[inline]
+    pub fn place(&self, number: u16) -> Place {
+        self.places[usize::from(number)]
+    }
+
+    /// The sign of [`page_side`] of three vertices.
+    #[inline]
+    pub fn side(&self, a: u16, b: u16, c: u16) -> i32 {
+        let coarse = coarse_side(self.place(a), self.place(b), self.place(c));
+        if coarse != 0 {
+            coarse
+        } else {
+            self.exact_side(a, b, c)
+        }
+    }
+
+    #[cold]
+    fn exact_side(&self, a: u16, b: u16, c: u16) -> i32 {
+        if c == a || c == b {
+            return 0;
+        }
+        self.side_value(a, b, c).signum() as i32
+    }
+
+    /// [`page_side`] of three vertices.
+    pub fn side_value(&self, a: u16, b: u16, c: u16) -> i64 {
+        page_side(
+            self.projection,
+            self.vertex(a),
+            self.vertex(b),
+            self.vertex(c),
+        )
+    }
+
+    /// Where the line through a and b crosses the line from p to q. It crosses between them.
+    pub fn crossing(&self, a: u16, b: u16, p: u16, q: u16) -> Along {
+        Along::zero_between(self.side_value(a, b, p), self.side_value(a, b, q))
+    }
+
+    /// An axis of the page along which p and q differ, and the sign of their difference.
+    ///
+    /// `None` if the eye sees them in line.
+    pub fn direction(&self, p: Vertex, q: Vertex) -> Option<(Axis, i64)> {
+        [Axis::X, Axis::Y].into_iter().find_map(|axis| {
+            let sign = page_offset(self.projection, axis, p, q).signum();
+            (sign != 0).then_some((axis, sign))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_fill_the_grid_and_keep_the_order() -> Result<(), OutOfScratch> {
+        let vertices = [
+            Vertex::new(-1 << 19, 0, 1),
+            Vertex::new(1 << 19, 3, 1 << 19),
+            Vertex::new(1 << 19, 4, 1),
+        ];
+        for projection in [Projection::Perspective, Projection::Parallel] {
+            let mut words = [0u64; 4];
+            let outlook = Outlook::new(projection, &vertices, &mut Scratch::new(&mut words))?;
+            let xs: [u16; 3] = [0, 1, 2].map(|n| outlook.place(n).x);
+            assert!(xs[0] == 0 && xs[0] < xs[1] && xs[1] <= xs[2], "{xs:?}");
+            assert!(xs[2] >= 1 << (PLACE_BITS - 1) && xs[2] < 1 << PLACE_BITS);
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn a_coarse_answer_is_never_wrong() -> Result<(), OutOfScratch> {
+        // Every triangle of a small lattice, seen in steep perspective.
+        let vertices: std::vec::Vec<Vertex> = (0..64)
+            .map(|n| {
+                Vertex::new(
+                    n % 4 * 70_001,
+                    n / 4 % 4 * 69_997,
+                    100_000 + n / 16 * 100_003,
+                )
+            })
+            .collect();
+        let mut words = [0u64; 64];
+        let outlook = Outlook::new(
+            Projection::Perspective,
+            &vertices,
+            &mut Scratch::new(&mut words),
+        )?;
+        let mut undecided = 0;
+        for (a, b, c) in (0..64u16)
+            .flat_map(|a| (0..64u16).flat_map(move |b| (0..64u16).map(move |c| (a, b, c))))
+        {
+            let coarse = coarse_side(outlook.place(a), outlook.place(b), outlook.place(c));
+            let exact = outlook.side_value(a, b, c).signum() as i32;
+            assert!(coarse == 0 || coarse == exact, "{a} {b} {c}");
+            undecided += u32::from(coarse == 0 && exact != 0);
+        }
+        assert!(undecided < 64 * 64 * 64 / 20, "{undecided}");
+        Ok(())
+    }
+}
