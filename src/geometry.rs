@@ -84,15 +84,9 @@ pub struct Along {
 
 impl Along {
     /// At p.
-    pub const START: Self = Self {
-        numerator: 0,
-        denominator: 1,
-    };
+    pub const START: Self = Self { numerator: 0, denominator: 1 };
     /// At q.
-    pub const END: Self = Self {
-        numerator: 1,
-        denominator: 1,
-    };
+    pub const END: Self = Self { numerator: 1, denominator: 1 };
 
     /// Where a quantity that varies linearly along the edge in space is zero.
     ///
@@ -104,10 +98,7 @@ impl Along {
     /// ```
     pub fn zero_between(at_p: i64, at_q: i64) -> Self {
         let numerator = at_p.unsigned_abs();
-        Self {
-            numerator,
-            denominator: numerator + at_q.unsigned_abs(),
-        }
+        Self { numerator, denominator: numerator + at_q.unsigned_abs() }
     }
 }
 
@@ -245,14 +236,8 @@ mod tests {
 
     #[test]
     fn places_far_along_a_long_edge_are_told_apart() {
-        let near_end = Along {
-            numerator: (1 << 62) - 1,
-            denominator: 1 << 62,
-        };
-        let nearer_end = Along {
-            numerator: u64::MAX - 1,
-            denominator: u64::MAX,
-        };
+        let near_end = Along { numerator: (1 << 62) - 1, denominator: 1 << 62 };
+        let nearer_end = Along { numerator: u64::MAX - 1, denominator: u64::MAX };
         assert!(near_end < nearer_end && nearer_end < Along::END);
         assert_eq!(Along::zero_between(0, 7), Along::START);
         assert_eq!(Along::zero_between(7, 0), Along::END);

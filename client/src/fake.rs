@@ -96,7 +96,7 @@ impl FakePlotter {
         match self.fault {
             Fault::NotPenup => self.say("Grbl 1.1h ['$' for help]"),
             Fault::IgnoresAbort if self.aborts > 1 => {}
-            _ => self.say("penup 0.1.0 ['$' for help]"),
+            _ => self.say("Grbl 1.1h [penup 0.1.0 '$' for help]"),
         }
     }
 

@@ -3,6 +3,7 @@
 //! Everything that the client knows by name of the plotter's language stands here.
 //! `docs/protocol.md` describes the language itself.
 
+use penup::protocol::MEANINGS;
 use std::fmt::Write as _;
 
 /// Forget the model.
@@ -43,8 +44,10 @@ pub fn acts_at_once(letter: char) -> bool {
     matches!(letter, '?' | '!' | '~') || letter.is_ascii_control() && letter != '\t'
 }
 
-/// What each `error:N` means, by N.
-const MEANINGS: &[(u16, &str)] = &[];
+/// Whether the greeting, Grbl's with the firmware's own name in brackets, is that of a penup.
+pub fn is_penup(greeting: &str) -> bool {
+    greeting.starts_with("Grbl ") && greeting.contains("[penup ")
+}
 
 /// What `error:number` means.
 ///
@@ -113,7 +116,7 @@ impl Reply {
             Self::Error(number)
         } else if let Some(number) = numbered("ALARM:") {
             Self::Alarm(number)
-        } else if line.starts_with("penup ") || line.starts_with("Grbl ") {
+        } else if line.starts_with("Grbl ") {
             Self::Greeting(line.to_owned())
         } else if let Some(text) = enclosed("[MSG:", ']') {
             Self::Message(text.to_owned())

@@ -52,7 +52,7 @@ fn preview(args: &PreviewArgs, interrupt: &AtomicBool) -> Result<String, Error> 
     let settings = args.view.settings();
     let lines = job_lines(read_file(&args.file)?, &settings);
     let mut bar = Bar::default();
-    let mut plotter = machines::in_memory()?;
+    let mut plotter = machines::in_memory();
     draw(plotter.as_mut(), &lines, args.repeat, interrupt, &mut bar)?;
     let result = plotter.result()?;
     drop(bar);

@@ -8,7 +8,9 @@
 use crate::error::Error;
 use crate::link::Link;
 use crate::progress::Progress;
-use crate::protocol::{ABORT, PLOT, RECEIVE_WINDOW, Reply, ReplyReader, STATUS_QUERY, Status};
+use crate::protocol::{
+    ABORT, PLOT, RECEIVE_WINDOW, Reply, ReplyReader, STATUS_QUERY, Status, is_penup,
+};
 use crate::source::JobLine;
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -81,7 +83,7 @@ impl<'a> Sender<'a> {
         // It is idle, so an abort loses nothing; it clears what an older sender left half sent.
         sender.link.send(&[ABORT])?;
         match sender.await_greeting()? {
-            Some(greeting) if greeting.starts_with("penup ") => Ok(sender),
+            Some(greeting) if is_penup(&greeting) => Ok(sender),
             greeting => Err(Error::NotPenup { heard: greeting.unwrap_or_default() }),
         }
     }
@@ -94,7 +96,7 @@ impl<'a> Sender<'a> {
             self.stop_if_interrupted()?;
             match self.listen()? {
                 Some(Reply::Status(status)) => return Ok(status),
-                Some(Reply::Greeting(text)) if !text.starts_with("penup ") => {
+                Some(Reply::Greeting(text)) if !is_penup(&text) => {
                     return Err(Error::NotPenup { heard: text });
                 }
                 Some(Reply::Other(text)) => heard = Some(text),

@@ -51,10 +51,7 @@ fn visible_length(name: &str, spare_bytes: usize) -> std::io::Result<f64> {
 fn the_visible_length_is_that_of_the_reference() -> std::io::Result<()> {
     for (name, total) in TOTALS {
         let length = visible_length(name, 1 << 17)?;
-        assert!(
-            (length / total - 1.0).abs() < 1e-5,
-            "{name}: {length} instead of {total}"
-        );
+        assert!((length / total - 1.0).abs() < 1e-5, "{name}: {length} instead of {total}");
     }
     Ok(())
 }

@@ -6,7 +6,7 @@ use crate::drawing::{
 };
 use crate::geometry::Vertex;
 use crate::machine::{Path, Target};
-use crate::model::{Element, Model};
+use crate::model::{Element, Model, ModelError};
 use crate::order::{self, Leg, OrderError};
 use crate::protocol::{HiddenLines, Refusal};
 use crate::stage::{Aborted, Attention, OutOfScratch, Scratch, Stage, items, items_mut};
@@ -194,31 +194,33 @@ fn project(
 
     attention.enter(Stage::Visibility);
     let scene = Scene { vertices, elements, projection };
-    // Memory: what is taken, then what visibility needs, then the lines as they are found.
+    // Memory: what is taken, then visibility's, then the lines as they are found. A quarter of what
+    // visibility does not need makes its grid finer.
     let available = scratch.available_bytes();
-    let needed = visibility::scratch_bytes(&scene).next_multiple_of(size_of::<u64>());
-    if needed > available {
-        return Err(Refusal::DrawingTooLarge(OutOfScratch { needed, available }));
-    }
-    let lines_at = (total - available + needed) / size_of::<u64>();
-    let (stage_memory, mut line_memory) = scratch.split(needed);
+    let needed = visibility::scratch_bytes(&scene);
+    let spare = available.checked_sub(needed).ok_or(OutOfScratch { needed, available });
+    let stage_bytes = needed + spare.map_err(Refusal::DrawingTooLarge)? / 4;
+    let (stage_memory, mut line_memory) = scratch.split(stage_bytes);
+    let lines_at = (total - line_memory.available_bytes()) / size_of::<u64>();
     let room = line_memory.available_bytes() / size_of::<Line>();
     let lines = line_memory.take(room).map_err(Refusal::DrawingTooLarge)?;
-    let mut sink = PageSink {
-        collector: Collector { lines, count: 0 },
-        scene,
-        map,
-        view,
-        hidden: options.hidden,
-        observer,
-    };
-    let with_hidden = options.hidden != HiddenLines::Erased;
-    let found = visibility::find_stretches(&scene, with_hidden, stage_memory, attention, &mut sink);
+    let collector = Collector { lines, count: 0 };
+    let mut sink = PageSink { collector, scene, map, view, hidden: options.hidden, observer };
+    let options = visibility::Options { with_hidden: options.hidden != HiddenLines::Erased };
+    let found = visibility::find_stretches(&scene, options, stage_memory, attention, &mut sink);
     let count = match found {
         Ok(()) => sink.collector.count,
         Err(VisibilityError::SinkFull) => return Err(sink.collector.out_of_memory()),
         Err(VisibilityError::Scratch(missing)) => return Err(Refusal::DrawingTooLarge(missing)),
         Err(VisibilityError::Aborted) => return Err(Refusal::Aborted),
+        // The model and the view see to it that neither can be.
+        Err(VisibilityError::UnknownVertex(_) | VisibilityError::OutOfRange(_)) => {
+            return Err(Refusal::NothingToPlot);
+        }
+        Err(VisibilityError::TooManyCorners(limit)) => {
+            let needed = elements.corners().len();
+            return Err(Refusal::Model(ModelError::TooManyCorners { limit, needed }));
+        }
     };
     let line_words = Scratch::bytes_for::<Line>(count) / size_of::<u64>();
     words.copy_within(lines_at..lines_at + line_words, 0);
@@ -289,6 +291,10 @@ impl StretchSink for PageSink<'_> {
         let ends = [stretch.edge.0, stretch.edge.1]
             .map(|number| self.scene.vertices.get(usize::from(number)));
         let [Some(&p), Some(&q)] = ends else { return Ok(()) };
+        // The cut along the near plane is no edge of the model.
+        if self.view.near().is_some_and(|near| p.z == near && q.z == near) {
+            return Ok(());
+        }
         let line_type = match (stretch.visible, self.hidden) {
             (true, _) | (false, HiddenLines::Shown) => LineType::Full,
             (false, HiddenLines::Dotted) => LineType::Dotted,

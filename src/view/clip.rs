@@ -2,7 +2,7 @@
 //!
 //! A face that reaches behind the near plane is cut along it (Sutherland & Hodgman, one plane); edges
 //! of neighbours that are cut get the same new vertex. The cut itself is no edge of the model:
-//! visibility draws no edge whose ends both lie on the near plane.
+//! no edge whose ends both lie on the near plane is to be drawn.
 
 use super::View;
 use crate::geometry::Vertex;
@@ -64,7 +64,10 @@ fn cut<'a>(
     }
     let all = scratch.take::<Vertex>(vertices.len() + keys.len())?;
     let (same, new) = all.split_at_mut(vertices.len());
-    same.copy_from_slice(vertices);
+    for (vertex, original) in same.iter_mut().zip(vertices) {
+        // Vertices behind the plane have no edge any more; visibility wants them before the eye.
+        *vertex = Vertex { z: original.z.max(near), ..*original };
+    }
     for (vertex, key) in new.iter_mut().zip(keys) {
         let ends = [(key >> 16) as usize, (key & 0xFFFF) as usize];
         if let [Some(p), Some(q)] = ends.map(|end| vertices.get(end)) {

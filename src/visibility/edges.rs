@@ -22,13 +22,11 @@ impl<'a> Outlines<'a> {
     /// Each element with the number of its first corner.
     pub fn elements(&self) -> impl Iterator<Item = (usize, &'a [Corner])> + use<'a> {
         let mut next = 0;
-        self.corners
-            .split_inclusive(|corner| corner.is_last())
-            .map(move |corners| {
-                let first = next;
-                next += corners.len();
-                (first, corners)
-            })
+        self.corners.split_inclusive(|corner| corner.is_last()).map(move |corners| {
+            let first = next;
+            next += corners.len();
+            (first, corners)
+        })
     }
 }
 

@@ -61,13 +61,10 @@ impl<'a> Grid<'a> {
         faces: &Faces<'_>,
         mut scratch: Scratch<'a>,
     ) -> Result<Self, OutOfScratch> {
-        let far = outlook
-            .places
-            .iter()
-            .fold(Place::default(), |far, place| Place {
-                x: far.x.max(place.x),
-                y: far.y.max(place.y),
-            });
+        let far = outlook.places.iter().fold(Place::default(), |far, place| Place {
+            x: far.x.max(place.x),
+            y: far.y.max(place.y),
+        });
         let wanted_cells = (faces.len() * CELLS_FOR_EACH_FACE).clamp(1, usize::from(u16::MAX));
         let (mut shift_x, mut shift_y) = (0, 0);
         loop {
@@ -80,35 +77,17 @@ impl<'a> Grid<'a> {
             if cell_count <= wanted_cells && fits {
                 let mut attempt = scratch.reborrow();
                 let cells: &mut [Cell] = attempt.take(cell_count)?;
-                let mut counting = Raster {
-                    shift_x,
-                    shift_y,
-                    columns,
-                    rows,
-                    cells,
-                };
+                let mut counting = Raster { shift_x, shift_y, columns, rows, cells };
                 let room =
                     (attempt.available_bytes() / size_of::<u16>()).min(usize::from(u16::MAX));
                 let total = counting.count(outlook, outlines, faces);
                 if total <= room || cell_count == 1 {
                     let cells: &'a mut [Cell] = scratch.take(cell_count)?;
                     let entries: &'a mut [u16] = scratch.take(total)?;
-                    let mut raster = Raster {
-                        shift_x,
-                        shift_y,
-                        columns,
-                        rows,
-                        cells,
-                    };
+                    let mut raster = Raster { shift_x, shift_y, columns, rows, cells };
                     raster.count(outlook, outlines, faces);
                     raster.fill(outlook, outlines, faces, entries);
-                    return Ok(Self {
-                        shift_x,
-                        shift_y,
-                        columns,
-                        cells,
-                        entries,
-                    });
+                    return Ok(Self { shift_x, shift_y, columns, cells, entries });
                 }
             }
             if columns > rows {
@@ -120,14 +99,8 @@ impl<'a> Grid<'a> {
     }
 
     fn view(&self, cell: usize, near: u16) -> CellView<'_> {
-        let begin = cell
-            .checked_sub(1)
-            .map_or(0, |before| self.cells[before].end);
-        let Cell {
-            end,
-            cover_depth,
-            cover,
-        } = self.cells[cell];
+        let begin = cell.checked_sub(1).map_or(0, |before| self.cells[before].end);
+        let Cell { end, cover_depth, cover } = self.cells[cell];
         CellView {
             cover: (cover_depth < near).then_some(cover),
             faces: &self.entries[usize::from(begin)..usize::from(end)],
@@ -146,10 +119,7 @@ impl<'a> Grid<'a> {
         mut visit: impl FnMut(CellView<'_>) -> bool,
     ) -> bool {
         let (low, high) = if p.y <= q.y { (p, q) } else { (q, p) };
-        let (dx, dy) = (
-            i32::from(high.x) - i32::from(low.x),
-            i32::from(high.y) - i32::from(low.y),
-        );
+        let (dx, dy) = (i32::from(high.x) - i32::from(low.x), i32::from(high.y) - i32::from(low.y));
         let (left, right) = (i32::from(p.x.min(q.x)), i32::from(p.x.max(q.x)));
         let rows = (low.y >> self.shift_y)..=(high.y >> self.shift_y);
         for row in rows {
@@ -202,11 +172,7 @@ struct Raster<'c> {
 impl Raster<'_> {
     /// Leaves in each cell where its list begins, and returns how many entries there are.
     fn count(&mut self, outlook: &Outlook<'_>, outlines: Outlines<'_>, faces: &Faces<'_>) -> usize {
-        self.cells.fill(Cell {
-            end: 0,
-            cover_depth: NO_COVER,
-            cover: 0,
-        });
+        self.cells.fill(Cell { end: 0, cover_depth: NO_COVER, cover: 0 });
         let mut total = 0usize;
         self.visit(outlook, outlines, faces, |cell, _| {
             cell.end = cell.end.saturating_add(1);
@@ -215,11 +181,7 @@ impl Raster<'_> {
         let mut begin = 0u16;
         for cell in self.cells.iter_mut() {
             let count = cell.end;
-            *cell = Cell {
-                end: begin,
-                cover_depth: NO_COVER,
-                cover: 0,
-            };
+            *cell = Cell { end: begin, cover_depth: NO_COVER, cover: 0 };
             begin = begin.saturating_add(count);
         }
         total
@@ -345,7 +307,4 @@ fn half_planes(
     true
 }
 
-const _: () = assert!(
-    PLACE_BITS == 14,
-    "products of a side and a place fit 31 bits"
-);
+const _: () = assert!(PLACE_BITS == 14, "products of a side and a place fit 31 bits");

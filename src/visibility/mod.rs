@@ -119,9 +119,7 @@ impl From<Aborted> for VisibilityError {
 ///
 /// It uses more where it is given more: a finer grid, so that fewer faces are tried for each edge.
 pub fn scratch_bytes(scene: &Scene<'_>) -> usize {
-    let outlines = Outlines {
-        corners: scene.elements.corners(),
-    };
+    let outlines = Outlines { corners: scene.elements.corners() };
     let corners = outlines.corners.len();
     let vertices = scene.vertices.len();
     let faces = outlines.elements().count();
@@ -151,9 +149,7 @@ pub fn find_stretches(
     sink: &mut dyn StretchSink,
 ) -> Result<(), VisibilityError> {
     check(scene)?;
-    let outlines = Outlines {
-        corners: scene.elements.corners(),
-    };
+    let outlines = Outlines { corners: scene.elements.corners() };
     let vertices = scene.vertices;
     let chosen = ChosenSides::choose(outlines, vertices.len(), &mut scratch, attention)?;
     let ears = Ears::cut(outlines, vertices, &mut scratch, attention)?;
@@ -166,12 +162,7 @@ pub fn find_stretches(
     let pieces = scratch.take(piece_count.max(FEWEST_PIECES))?;
     let grid = Grid::new(&outlook, outlines, &faces, scratch)?;
     let mut search = Search {
-        around: Surroundings {
-            outlook,
-            outlines,
-            ears,
-            chosen,
-        },
+        around: Surroundings { outlook, outlines, ears, chosen },
         faces,
         grid,
         seen,
@@ -194,9 +185,8 @@ fn check(scene: &Scene<'_>) -> Result<(), VisibilityError> {
     if corners.len() > MOST_CORNERS {
         return Err(VisibilityError::TooManyCorners(MOST_CORNERS));
     }
-    if let Some(corner) = corners
-        .iter()
-        .find(|corner| usize::from(corner.vertex()) >= scene.vertices.len())
+    if let Some(corner) =
+        corners.iter().find(|corner| usize::from(corner.vertex()) >= scene.vertices.len())
     {
         return Err(VisibilityError::UnknownVertex(corner.vertex()));
     }
@@ -237,10 +227,7 @@ impl Search<'_> {
         sink: &mut dyn StretchSink,
     ) -> Result<(), VisibilityError> {
         let outlook = &self.around.outlook;
-        if outlook
-            .direction(outlook.vertex(p), outlook.vertex(q))
-            .is_none()
-        {
+        if outlook.direction(outlook.vertex(p), outlook.vertex(q)).is_none() {
             return Ok(());
         }
         let sight = Sight::new(outlook, side, p, q);
@@ -254,11 +241,8 @@ impl Search<'_> {
             let ends = pieces.iter().skip(1).map(|piece| piece.from).chain([end]);
             for (piece, to) in pieces.iter().zip(ends) {
                 let visible = piece.marks & mark::HIDDEN != mark::HIDDEN;
-                let handed = if visible {
-                    piece.marks & mark::STOOD_IN == 0
-                } else {
-                    options.with_hidden
-                };
+                let handed =
+                    if visible { piece.marks & mark::STOOD_IN == 0 } else { options.with_hidden };
                 match &mut pending {
                     Some(stretch)
                         if handed && stretch.visible == visible && stretch.to == piece.from =>
@@ -288,13 +272,7 @@ impl Search<'_> {
 
     /// Marks on the profile what every face along the way does to the edge.
     fn look_around(&mut self, sight: &Sight) {
-        let Self {
-            around,
-            faces,
-            grid,
-            seen,
-            profile,
-        } = self;
+        let Self { around, faces, grid, seen, profile } = self;
         let (p, q) = (around.outlook.place(sight.p), around.outlook.place(sight.q));
         let near = grid::coarse_depth(sight.near);
         if grid.along(p, q, near, |cell| cell.cover.is_some()) {

@@ -18,10 +18,7 @@ pub struct Place {
 
 impl Place {
     fn difference(self, from: Self) -> (i32, i32) {
-        (
-            i32::from(self.x) - i32::from(from.x),
-            i32::from(self.y) - i32::from(from.y),
-        )
+        (i32::from(self.x) - i32::from(from.x), i32::from(self.y) - i32::from(from.y))
     }
 }
 
@@ -35,11 +32,7 @@ pub fn coarse_side(a: Place, b: Place, c: Place) -> i32 {
     let (to_x, to_y) = c.difference(a);
     let side = along_x * to_y - along_y * to_x;
     let doubt = along_x.abs() + along_y.abs() + to_x.abs() + to_y.abs() + 2;
-    if side.abs() >= doubt {
-        side.signum()
-    } else {
-        0
-    }
+    if side.abs() >= doubt { side.signum() } else { 0 }
 }
 
 /// The vertices, in view space and on the page.
@@ -82,11 +75,7 @@ impl<'a> Outlook<'a> {
                 };
             }
         }
-        Ok(Self {
-            projection,
-            vertices,
-            places,
-        })
+        Ok(Self { projection, vertices, places })
     }
 
     #[inline]
@@ -103,11 +92,7 @@ impl<'a> Outlook<'a> {
     #[inline]
     pub fn side(&self, a: u16, b: u16, c: u16) -> i32 {
         let coarse = coarse_side(self.place(a), self.place(b), self.place(c));
-        if coarse != 0 {
-            coarse
-        } else {
-            self.exact_side(a, b, c)
-        }
+        if coarse != 0 { coarse } else { self.exact_side(a, b, c) }
     }
 
     #[cold]
@@ -120,12 +105,7 @@ impl<'a> Outlook<'a> {
 
     /// [`page_side`] of three vertices.
     pub fn side_value(&self, a: u16, b: u16, c: u16) -> i64 {
-        page_side(
-            self.projection,
-            self.vertex(a),
-            self.vertex(b),
-            self.vertex(c),
-        )
+        page_side(self.projection, self.vertex(a), self.vertex(b), self.vertex(c))
     }
 
     /// Where the line through a and b crosses the line from p to q. It crosses between them.
@@ -169,20 +149,11 @@ mod tests {
     fn a_coarse_answer_is_never_wrong() -> Result<(), OutOfScratch> {
         // Every triangle of a small lattice, seen in steep perspective.
         let vertices: std::vec::Vec<Vertex> = (0..64)
-            .map(|n| {
-                Vertex::new(
-                    n % 4 * 70_001,
-                    n / 4 % 4 * 69_997,
-                    100_000 + n / 16 * 100_003,
-                )
-            })
+            .map(|n| Vertex::new(n % 4 * 70_001, n / 4 % 4 * 69_997, 100_000 + n / 16 * 100_003))
             .collect();
         let mut words = [0u64; 64];
-        let outlook = Outlook::new(
-            Projection::Perspective,
-            &vertices,
-            &mut Scratch::new(&mut words),
-        )?;
+        let outlook =
+            Outlook::new(Projection::Perspective, &vertices, &mut Scratch::new(&mut words))?;
         let mut undecided = 0;
         for (a, b, c) in (0..64u16)
             .flat_map(|a| (0..64u16).flat_map(move |b| (0..64u16).map(move |c| (a, b, c))))

@@ -41,21 +41,14 @@ pub const FEWEST_PIECES: usize = 4;
 impl<'a> Profile<'a> {
     /// A profile that keeps its pieces in `memory`, at least [`FEWEST_PIECES`].
     pub fn new(memory: &'a mut [Piece]) -> Self {
-        let mut profile = Self {
-            memory,
-            count: 0,
-            end: Along::END,
-        };
+        let mut profile = Self { memory, count: 0, end: Along::END };
         profile.open(Along::START);
         profile
     }
 
     /// Opens the window from `start` to the end of the edge, nothing covered.
     pub fn open(&mut self, start: Along) {
-        self.memory[0] = Piece {
-            from: start,
-            marks: 0,
-        };
+        self.memory[0] = Piece { from: start, marks: 0 };
         self.count = 1;
         self.end = Along::END;
     }
@@ -82,11 +75,7 @@ impl<'a> Profile<'a> {
             return;
         }
         let first = self.split(from);
-        let last = if to < self.end {
-            self.split(to)
-        } else {
-            self.count
-        };
+        let last = if to < self.end { self.split(to) } else { self.count };
         for piece in &mut self.memory[first.min(self.count)..last.min(self.count)] {
             piece.marks |= marks;
             if piece.marks & mark::HIDDEN == mark::HIDDEN {

@@ -166,10 +166,7 @@ impl Sight {
         pattern: [bool; 3],
         facing: i32,
     ) -> Option<Passage> {
-        let mut passage = Passage {
-            entry: None,
-            exit: None,
-        };
+        let mut passage = Passage { entry: None, exit: None };
         let mut crossed = false;
         for n in 0..3 {
             let next = (n + 1) % 3;

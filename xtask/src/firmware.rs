@@ -77,7 +77,7 @@ impl Board {
         [
             "--package=penup",
             "--bin=firmware",
-            "--release",
+            "--profile=firmware",
             "--no-default-features",
             "--features",
             &features,
@@ -116,7 +116,7 @@ pub fn build(board: Board) -> Result<PathBuf> {
         cargo.args(["--target-dir", directory]);
     }
     run(cargo.arg("--quiet").args(board.cargo_options()))?;
-    let built = Path::new(directory).join(board.target()).join("release/firmware");
+    let built = Path::new(directory).join(board.target()).join("firmware/firmware");
     let image = board.image();
     fs::create_dir_all(image.parent().context("the image has a directory")?)?;
     fs::copy(crate::root().join(built), &image)?;
