@@ -9,7 +9,7 @@ mod set_up;
 mod test;
 
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, ExitCode};
 
 use anyhow::Result;
 use clap::{CommandFactory, Parser, Subcommand};
@@ -46,7 +46,18 @@ enum Task {
     Test,
 }
 
-fn main() -> Result<()> {
+fn main() -> ExitCode {
+    match carry_out() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            // Without the backtrace that `Debug` adds: the sentence is for the user.
+            eprintln!("penup: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn carry_out() -> Result<()> {
     match Arguments::parse().task {
         None => Arguments::command().print_help()?,
         Some(Task::Build { board }) => {

@@ -6,11 +6,12 @@
 //! | the emulator | `qemu-system-arm` | apt, or brew |
 //! | rustfmt, clippy | `cargo fmt`, `cargo clippy` | rustup |
 
-use std::path::Path;
+use std::fs;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
-use anyhow::{Result, bail};
+use anyhow::{Result, bail, ensure};
 
 use crate::command::{cargo, describe, output, run, run_within};
 
@@ -34,27 +35,40 @@ pub fn toolchain(target: &str) -> Result<Toolchain> {
     if has_core(target) {
         return Ok(Toolchain::Rustup);
     }
-    if output("rustup", &["--version"]).is_some() {
+    let refusal = refusal(target);
+    if !refusal.exists() && output("rustup", &["--version"]).is_some() {
         println!("penup: installing the Rust target {target} by rustup");
-        match run_within(RUSTUP_LIMIT, Command::new("rustup").args(["target", "add", target])) {
+        let mut rustup = Command::new("rustup");
+        // A backtrace of rustup's would hide its one line of reason.
+        rustup.args(["target", "add", target]).env("RUST_BACKTRACE", "0");
+        match run_within(RUSTUP_LIMIT, &mut rustup) {
             Ok(()) if has_core(target) => return Ok(Toolchain::Rustup),
             Ok(()) => println!("penup: rustup added {target} to another toolchain than cargo's"),
             Err(error) => println!("penup: {error:#}"),
         }
     }
-    if debian_is_ready() {
-        return Ok(Toolchain::Debian);
-    }
-    if output("apt-get", &["--version"]).is_some() {
+    if !debian_is_ready() && output("apt-get", &["--version"]).is_some() {
         apt_install(&["rustc-web", "rust-web-src", "lld"])?;
-        if debian_is_ready() {
-            return Ok(Toolchain::Debian);
-        }
     }
-    bail!(
+    ensure!(
+        debian_is_ready(),
         "no compiler for {target}: run `rustup target add {target}` where the network can be \
          reached, or on Debian `apt-get install rustc-web rust-web-src lld`"
-    )
+    );
+    if !refusal.exists() {
+        println!("penup: from now on Debian's compiler builds for {target}");
+        fs::create_dir_all(refusal.parent().unwrap_or(&refusal))?;
+        fs::write(&refusal, [])?;
+    }
+    Ok(Toolchain::Debian)
+}
+
+/// A file that says that rustup could not give `target` to the compiler in use, so that the next
+/// run does not wait for it again. A new compiler or `cargo clean` forgets it.
+fn refusal(target: &str) -> PathBuf {
+    let version = output("rustc", &["--version"]).unwrap_or_default();
+    let number = version.split(' ').nth(1).unwrap_or("unknown");
+    crate::root().join(format!("target/set-up/rustc-{number}-without-{target}"))
 }
 
 fn has_core(target: &str) -> bool {

@@ -59,6 +59,8 @@ mod flag {
 }
 /// The flags seen since last taken.
 static FLAGS: AtomicU8 = AtomicU8::new(0);
+/// When the last `?` came, in cycles modulo 2^24.
+static STATUS_ASKED: AtomicU32 = AtomicU32::new(0);
 /// How many bytes had been queued when the last abort came.
 static COUNT_AT_ABORT: AtomicU32 = AtomicU32::new(0);
 
@@ -128,6 +130,11 @@ impl Line {
                 self.count = self.count.wrapping_add(1);
             }
         }
+        if flags & flag::STATUS != 0 {
+            let waited = clock::cycles_24().wrapping_sub(STATUS_ASKED.load(Ordering::Relaxed));
+            let microseconds = (waited & clock::CYCLE_MASK) / (clock::HERTZ / 1_000_000);
+            defmt::debug!("status after {=u32} us", microseconds);
+        }
         RealTime {
             status: flags & flag::STATUS != 0,
             hold: flags & flag::HOLD != 0,
@@ -155,7 +162,10 @@ pub fn poll() -> Option<u8> {
 impl Receiver {
     fn receive(&mut self, byte: u8) {
         let flag = match byte {
-            b'?' => flag::STATUS,
+            b'?' => {
+                STATUS_ASKED.store(clock::cycles_24(), Ordering::Relaxed);
+                flag::STATUS
+            }
             b'!' => flag::HOLD,
             b'~' => flag::RESUME,
             ABORT => {
