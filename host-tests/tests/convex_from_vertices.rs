@@ -170,6 +170,19 @@ fn the_tolerance_is_the_move_of_each_coordinate() {
 }
 
 #[test]
+fn a_plate_that_is_flat_but_for_rounding_has_two_faces() {
+    let plate = [
+        [0, 0, 1],
+        [900_000, 0, 0],
+        [1_000_000, 700_000, 1],
+        [400_000, 1_000_000, 0],
+        [0, 600_000, 0],
+    ];
+    let summary = found(&plate, Eye::Towards([1, 2, 3]), 2).map(|(summary, _)| summary);
+    assert_eq!(summary.map(|summary| (summary.faces, summary.edges)), Ok((2, 5)));
+}
+
+#[test]
 fn a_vertex_just_inside_a_face_is_flat_and_one_deeper_is_refused() {
     let mut points = ROOFS.to_vec();
     points.push([2500, 4000, 2]); // 3 below the roof, which is at 5 there
