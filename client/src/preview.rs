@@ -7,11 +7,11 @@ use crate::error::Error;
 use crate::job::{JobResult, Lengths, Timings};
 use crate::link::Link;
 use crate::machines::PreviewPlotter;
-use penup::boards::host::{Change, HostBoard, QUEUE_LENGTH};
+use penup::boards::host::{Change, HostBoard, QUEUE_LENGTH, lend_memory};
 use penup::geometry::{Projection, Vertex};
 use penup::machine::{Path, PulserState, Setting, Target};
 use penup::motion::StepEvent;
-use penup::plotter::{HostMemory, NO_MOVES, Observer, Plotter};
+use penup::plotter::{Observer, Plotter};
 use penup::stage::{Aborted, Attention, Stage};
 use penup::view::View;
 use penup::visibility::{Along, Stretch};
@@ -29,12 +29,10 @@ impl InMemory {
     /// Switches it on.
     pub fn new() -> Self {
         // Plotter and board borrow from these for as long as the process lives; there is one a run.
-        let memory = Box::leak(Box::new(HostMemory::new()));
-        let blocks = Box::leak(Box::new(NO_MOVES));
         let queue = Box::leak(Box::new(heapless::spsc::Queue::<StepEvent, QUEUE_LENGTH>::new()));
         let pins = Box::leak(Box::new(PulserState::new()));
         let mut board = HostBoard::new(queue, pins);
-        let plotter = Plotter::new(memory.lend(blocks), pins);
+        let plotter = Plotter::new(lend_memory(), pins);
         plotter.greet(&mut board);
         Self { board, plotter, steps: 0 }
     }

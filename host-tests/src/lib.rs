@@ -11,3 +11,4 @@ pub mod scene_files;
 pub mod convex_any_faces;
 pub mod convex_model;
 pub mod convex_solids;
+pub mod whole_jobs;

@@ -4,12 +4,14 @@
 //! Time passes only in [`Board::wait`] and [`HostBoard::pass`], so a run is the same every time.
 
 use crate::machine::{Pen, Pins, Pulser, PulserState};
+use crate::model::{Corner, Position};
 use crate::motion::{EventQueue, StepEvent};
-use crate::plotter::Board;
+use crate::plotter::{Board, Lent, NO_MOVES};
 use crate::protocol::RealTime;
 use core::convert::Infallible;
 use embedded_hal::digital::{ErrorType, OutputPin};
 use heapless::spsc::{Producer, Queue};
+use std::boxed::Box;
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
 use std::rc::Rc;
@@ -17,6 +19,20 @@ use std::vec::Vec;
 
 /// As many events as the smallest board's queue holds.
 pub const QUEUE_LENGTH: usize = 256;
+
+/// Memory for a plotter on a computer: as many vertices as an element can name, and as much to work
+/// in as any board's jobs ten times over. It is lent for as long as the process lives.
+pub fn lend_memory() -> Lent<'static> {
+    const VERTICES: usize = crate::model::VERTEX_NUMBER_LIMIT;
+    const CORNERS: usize = 1 << 16;
+    const WORDS: usize = 1 << 19;
+    Lent {
+        vertices: Box::leak(Box::new(heapless::Vec::<Position, VERTICES>::new())),
+        corners: Box::leak(Box::new(heapless::Vec::<Corner, CORNERS>::new())),
+        blocks: Box::leak(Box::new(NO_MOVES)),
+        words: std::vec![0; WORDS].leak(),
+    }
+}
 
 /// What a pin did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

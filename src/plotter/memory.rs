@@ -25,9 +25,6 @@ pub type Lm3s6965Memory = Memory<1024, 3072, 4352>;
 /// For 264 KiB of RAM: a lattice of 343 cubes.
 pub type PicoMemory = Memory<4096, 12288, 16384>;
 
-/// For the preview on a computer: as many vertices as an element can name.
-pub type HostMemory = Memory<16384, 65536, { 1 << 19 }>;
-
 impl<const VERTICES: usize, const CORNERS: usize, const WORDS: usize>
     Memory<VERTICES, CORNERS, WORDS>
 {

@@ -13,7 +13,7 @@ mod reply;
 
 pub use board::Board;
 pub use job::{Cursor, Job, Observer, Strokes, Unobserved};
-pub use memory::{HostMemory, Lent, Lm3s6965Memory, Memory, NO_MOVES, PicoMemory};
+pub use memory::{Lent, Lm3s6965Memory, Memory, NO_MOVES, PicoMemory};
 pub use options::PlotOptions;
 
 use crate::fixed::BinaryFraction;
