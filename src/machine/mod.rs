@@ -129,8 +129,6 @@ pub struct Machine<'m> {
     pen: u8,
     /// The pen that comes next, and the first target that it draws.
     next_pen: Option<(u8, Target)>,
-    /// Ink drawn, in units of 2^-18 mm, at the last pause.
-    ink_at_pause: u64,
 }
 
 impl<'m> Machine<'m> {
@@ -163,7 +161,6 @@ impl<'m> Machine<'m> {
             homing: None,
             pen: 0,
             next_pen: None,
-            ink_at_pause: 0,
         };
         machine.configure_pulser();
         machine
@@ -274,7 +271,7 @@ impl<'m> Machine<'m> {
         let size = self.measure(path)?;
         if self.state == State::Idle {
             self.job = size;
-            self.ink_at_pause = self.runner.run().drawn;
+            self.fill_pen();
             self.before = self.runner.run();
             self.path_ended = false;
             self.state = State::Run;
@@ -317,7 +314,7 @@ impl<'m> Machine<'m> {
                 return;
             }
             match self.runner.produce(queue) {
-                Ok(Progress::More) => self.pause_if_due(),
+                Ok(Progress::More) => {}
                 Ok(progress) => self.stand(progress),
                 Err(_) => self.alarm(Alarm::Queue),
             }
@@ -450,7 +447,9 @@ impl<'m> Machine<'m> {
             State::Hold { .. } | State::Run
                 if progress == Progress::Stopped || self.next_pen.is_some() =>
             {
-                self.ink_at_pause = self.runner.run().drawn;
+                if self.state == State::Run {
+                    self.fill_pen();
+                }
                 self.state = State::Hold { standing: true };
             }
             State::Home => {
@@ -467,13 +466,11 @@ impl<'m> Machine<'m> {
         }
     }
 
-    fn pause_if_due(&mut self) {
+    /// The pause after so much ink counts from here.
+    fn fill_pen(&mut self) {
         let metres = u64::from(self.settings.get(Setting::InkBeforePause).to_bits().unsigned_abs());
         // 2^-16 m to 2^-18 mm.
-        let due = self.ink_at_pause.saturating_add(metres * 4000);
-        if metres > 0 && self.runner.run().drawn >= due {
-            self.runner.stop_after_stroke();
-        }
+        self.runner.stop_after_ink((metres > 0).then_some(metres * 4000));
     }
 
     fn read_targets(&mut self, path: &mut dyn Path) {

@@ -1,15 +1,19 @@
 //! Puts moves and pen changes on the time line: least intervals, direction set-up, long waits.
 
+use super::profile::FRACTION_BITS;
 use super::{EventQueue, Limits, StepEvent};
 use crate::step::Direction;
 
 /// Builds events. The last one is kept back until the time of the next is known.
 ///
-/// Times are ticks that wrap; two calls lie less than 2^31 ticks apart.
+/// Times are sixteenths of ticks that wrap, cut to whole ticks here; two calls lie less than 2^31
+/// of them (5 s) apart.
 #[derive(Debug)]
 pub struct Emitter {
+    /// Sixteenths of ticks.
     least_interval: u32,
-    setup_ticks: u32,
+    /// Sixteenths of ticks.
+    setup: u32,
     /// Level of the direction pins.
     directions: u8,
     pending: Option<(StepEvent, u32)>,
@@ -23,8 +27,8 @@ impl Emitter {
 
     pub(super) fn new(limits: &Limits) -> Self {
         Self {
-            least_interval: limits.least_interval(),
-            setup_ticks: limits.setup_ticks,
+            least_interval: limits.least_interval() << FRACTION_BITS,
+            setup: limits.setup_ticks << FRACTION_BITS,
             directions: 0,
             pending: None,
             ticks: 0,
@@ -32,8 +36,8 @@ impl Emitter {
     }
 
     pub(super) fn set_limits(&mut self, limits: &Limits) {
-        self.least_interval = limits.least_interval();
-        self.setup_ticks = limits.setup_ticks;
+        self.least_interval = limits.least_interval() << FRACTION_BITS;
+        self.setup = limits.setup_ticks << FRACTION_BITS;
     }
 
     /// Ticks of all events handed over; wraps.
@@ -54,13 +58,14 @@ impl Emitter {
         mut time: u32,
         queue: &mut dyn EventQueue,
     ) -> Result<u32, StepEvent> {
+        time = whole_ticks(time);
         let (pulses, axes, directions) = levels(direction);
         let wanted = (self.directions & !axes) | directions;
         if wanted != self.directions {
             self.directions = wanted;
-            let at = time.wrapping_sub(self.setup_ticks);
+            let at = time.wrapping_sub(self.setup);
             let at = self.put(self.holding(), at, queue)?;
-            time = later(time, at.wrapping_add(self.setup_ticks));
+            time = later(time, at.wrapping_add(self.setup));
             // The pending event pulses nothing, so no pause is due after it.
             self.hand_over(time, queue)?;
             self.pending = Some((StepEvent::levels(self.level_bits() | pulses, 0), time));
@@ -82,7 +87,7 @@ impl Emitter {
         queue: &mut dyn EventQueue,
     ) -> Result<(), StepEvent> {
         match self.pending {
-            Some((_, since)) if time.wrapping_sub(since) > 1 << 22 => {
+            Some((_, since)) if time.wrapping_sub(since) > 1 << (22 + FRACTION_BITS) => {
                 self.hold(time, queue).map(|_| ())
             }
             _ => Ok(()),
@@ -134,6 +139,7 @@ impl Emitter {
         time: u32,
         queue: &mut dyn EventQueue,
     ) -> Result<u32, StepEvent> {
+        let time = whole_ticks(time);
         let time = match self.pending {
             Some((_, since)) => later(time, since.wrapping_add(self.least_interval)),
             None => time,
@@ -147,13 +153,18 @@ impl Emitter {
     #[inline]
     fn hand_over(&mut self, until: u32, queue: &mut dyn EventQueue) -> Result<(), StepEvent> {
         if let Some((event, since)) = self.pending {
-            let ticks = until.wrapping_sub(since);
+            let ticks = until.wrapping_sub(since) >> FRACTION_BITS;
             queue.push(event.with_ticks(ticks))?;
             self.ticks = self.ticks.wrapping_add(ticks);
             self.pending = None;
         }
         Ok(())
     }
+}
+
+/// Cuts the sixteenths.
+pub(super) const fn whole_ticks(time: u32) -> u32 {
+    time >> FRACTION_BITS << FRACTION_BITS
 }
 
 fn later(a: u32, b: u32) -> u32 {

@@ -63,8 +63,8 @@ impl Phase {
 /// A short time of constant speed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Slice {
-    /// Gone in it, 2^-32 mm, below 2^33.
-    pub(super) distance: u64,
+    /// Gone in it, 2^-32 mm.
+    pub(super) distance: u32,
     /// It lasts, 1/16 ticks, at most one slice.
     pub(super) time: u32,
 }
@@ -159,9 +159,11 @@ impl Profile {
                 phase.speed = SliceSpeed::from_bits(after as u32);
                 phase.distance -= distance;
                 phase.time -= SLICE;
-                return Some(Slice { distance, time: SLICE as u32 });
+                // The mean of two speeds below 2^32.
+                return Some(Slice { distance: distance as u32, time: SLICE as u32 });
             }
-            let rest = Slice { distance: phase.distance, time: phase.time as u32 };
+            // A slice or less of a speed below 2^32.
+            let rest = Slice { distance: phase.distance as u32, time: phase.time as u32 };
             *phase = Phase::default();
             self.phase += 1;
             if rest.distance > 0 {
@@ -184,7 +186,7 @@ mod tests {
     fn run(mut profile: Profile) -> (f64, f64) {
         let (mut distance, mut time) = (0u64, 0u64);
         while let Some(slice) = profile.next_slice() {
-            distance += slice.distance;
+            distance += u64::from(slice.distance);
             time += u64::from(slice.time);
         }
         (distance as f64 / 2f64.powi(32), time as f64 / 16.0 / 25e6)

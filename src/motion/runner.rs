@@ -1,6 +1,7 @@
 //! Runs the blocks: pen changes at rest, slices, moves, events.
 
 use super::curvature::Curvature;
+use super::emitter::whole_ticks;
 use super::junction::{self, Corner, Heading};
 use super::profile::{FRACTION_BITS, Pace, Profile, Slice};
 use super::{Block, Emitter, EventQueue, Limits, Lookahead, PathLength, SliceSpeed, StepEvent};
@@ -76,8 +77,8 @@ struct Course {
     piece_moves: u32,
     /// From the start of the block to where the plan is, 2^-32 mm.
     place: u64,
-    /// Where the next move is due.
-    next_move: u64,
+    /// From there to where the next move is due.
+    to_next: u64,
     profile: Option<Profile>,
     /// The slice in work begins at `place`.
     slice: Option<Slice>,
@@ -98,12 +99,14 @@ pub struct Runner<'m> {
     /// The last pace in a curve: many blocks in a row have the same.
     curve: Pace,
     /// The plan's time, 1/16 ticks; wraps.
-    now: u64,
+    now: u32,
     pen_is_down: bool,
     /// Where the pen was sent last; not known at the start.
     pen_height: Option<u8>,
     stopping: bool,
     stopping_after_stroke: bool,
+    /// Stands after the stroke in which so much is drawn, all in all.
+    ink_bound: u64,
     /// Where the events so far lead.
     position: PagePoint,
     /// Where the blocks so far lead.
@@ -116,7 +119,7 @@ pub struct Runner<'m> {
 }
 
 impl<'m> Runner<'m> {
-    /// Room in the queue that one call of [`Runner::produce`] may need.
+    /// Room in the queue that one call of [`Runner::produce`] needs at least.
     pub const ROOM: usize = Emitter::ROOM;
 
     /// A runner that stands at the page's origin with the pen raised.
@@ -137,6 +140,7 @@ impl<'m> Runner<'m> {
             pen_height: None,
             stopping: false,
             stopping_after_stroke: false,
+            ink_bound: u64::MAX,
             position: PagePoint::default(),
             end: PagePoint::default(),
             last: None,
@@ -273,6 +277,12 @@ impl<'m> Runner<'m> {
         self.stopping_after_stroke = true;
     }
 
+    /// Stands before the next move with the pen up once `length` more, in units of 2^-18 mm, is
+    /// drawn; `None` for no bound.
+    pub fn stop_after_ink(&mut self, length: Option<u64>) {
+        self.ink_bound = length.map_or(u64::MAX, |length| self.run.drawn.saturating_add(length));
+    }
+
     /// Goes on where [`Runner::stop`] or [`Runner::stop_after_stroke`] stood.
     pub fn resume(&mut self) {
         self.stopping = false;
@@ -296,12 +306,12 @@ impl<'m> Runner<'m> {
     /// # Errors
     /// The event that the queue refused.
     pub fn release_drivers(&mut self, queue: &mut dyn EventQueue) -> Result<(), StepEvent> {
-        let at = self.emitter.rest(self.ticks_now(), false, queue)?;
+        let at = self.emitter.rest(self.now, false, queue)?;
         self.advance_to(at);
         Ok(())
     }
 
-    /// Hands over the next few events, at most [`Runner::ROOM`].
+    /// Hands over the next few events: those of one slice, as far as the queue has room.
     ///
     /// # Errors
     /// The event that the queue refused although it had room.
@@ -309,59 +319,67 @@ impl<'m> Runner<'m> {
         let Some(course) = &mut self.course else {
             return self.begin_block(queue);
         };
-        if let Some(slice) = course.slice {
-            let end = course.place + slice.distance;
-            if course.next_move < end && course.moves_done < course.piece_moves {
-                let offset = offset_in_slice(course.next_move - course.place, slice);
-                course.next_move += course.move_length;
-                course.moves_done += 1;
-                let Some(direction) = course.line.next() else {
-                    return Ok(Progress::More);
-                };
-                let time = (self.now + u64::from(offset)) >> FRACTION_BITS;
-                let time = time as u32;
-                let at = self.emitter.step(direction, time, queue)?;
-                if at != time {
-                    let late = at.wrapping_sub(time);
-                    self.now += u64::from(late) << FRACTION_BITS;
+        if course.slice.is_none() {
+            let Some(profile) = &mut course.profile else {
+                return self.plan(queue);
+            };
+            course.slice = profile.next_slice();
+            if course.slice.is_none() {
+                self.pace = profile.exit();
+                course.profile = None;
+                if course.moves_done == course.piece_moves {
+                    self.end_piece();
                 }
-                self.position = direction.from_point(self.position);
                 return Ok(Progress::More);
             }
-            course.place = end;
-            course.slice = None;
-            self.now += u64::from(slice.time);
-            self.emitter.split_long_wait(self.ticks_now(), queue)?;
-            return Ok(Progress::More);
         }
-        if let Some(profile) = &mut course.profile {
-            match profile.next_slice() {
-                Some(slice) => course.slice = Some(slice),
-                None => {
-                    self.pace = profile.exit();
-                    course.profile = None;
-                    if course.moves_done == course.piece_moves {
-                        self.end_piece();
-                    }
-                }
+        self.run_slice(queue)?;
+        Ok(Progress::More)
+    }
+
+    /// The moves of the slice in work, as far as the queue has room.
+    fn run_slice(&mut self, queue: &mut dyn EventQueue) -> Result<(), StepEvent> {
+        let Some(course) = &mut self.course else {
+            return Ok(());
+        };
+        let Some(slice) = course.slice else {
+            return Ok(());
+        };
+        let clock = SliceClock::new(slice);
+        // A move and its direction set-up are two events; one is left for a long wait.
+        let mut room = (queue.room().saturating_sub(1)) / 2;
+        while course.to_next < u64::from(slice.distance) {
+            if room == 0 {
+                return Ok(());
             }
-            return Ok(Progress::More);
+            room -= 1;
+            let offset = clock.offset(course.to_next as u32);
+            course.to_next += course.move_length;
+            course.moves_done += 1;
+            let Some(direction) = course.line.next() else {
+                break;
+            };
+            let time = whole_ticks(self.now.wrapping_add(offset));
+            let at = self.emitter.step(direction, time, queue)?;
+            self.now = self.now.wrapping_add(at.wrapping_sub(time));
+            self.position = direction.from_point(self.position);
         }
-        self.plan(queue)
+        course.place += u64::from(slice.distance);
+        course.to_next -= u64::from(slice.distance);
+        course.slice = None;
+        self.now = self.now.wrapping_add(slice.time);
+        self.emitter.split_long_wait(self.now, queue)
     }
 
     fn top(&self, inked: bool) -> Pace {
         if inked { self.draw } else { self.travel }
     }
 
-    fn ticks_now(&self) -> u32 {
-        (self.now >> FRACTION_BITS) as u32
-    }
-
     fn begin_block(&mut self, queue: &mut dyn EventQueue) -> Result<Progress, StepEvent> {
         let stroke_ends =
             self.in_stroke && self.lookahead.front().is_some_and(|block| block.ink.is_none());
-        let stops = self.stopping || (self.stopping_after_stroke && stroke_ends);
+        let pauses = self.stopping_after_stroke || self.run.drawn >= self.ink_bound;
+        let stops = self.stopping || (pauses && stroke_ends);
         if stops && self.pace == Pace::REST {
             return self.stand(Progress::Stopped, queue);
         }
@@ -394,7 +412,7 @@ impl<'m> Runner<'m> {
             moves_done: 0,
             piece_moves: pattern.end_of(0),
             place: 0,
-            next_move: move_length / 2,
+            to_next: move_length / 2,
             profile: None,
             slice: None,
         });
@@ -412,7 +430,7 @@ impl<'m> Runner<'m> {
             return Ok(Progress::More);
         }
         if self.emitter.is_open() {
-            let at = self.emitter.rest(self.ticks_now(), true, queue)?;
+            let at = self.emitter.rest(self.now, true, queue)?;
             self.advance_to(at);
         }
         if standing == Progress::Done {
@@ -438,27 +456,28 @@ impl<'m> Runner<'m> {
             Ordering::Equal => height,
             Ordering::Greater => from + 1,
         };
-        let at = self.emitter.pen(next, self.ticks_now(), queue)?;
+        let at = self.emitter.pen(next, self.now, queue)?;
         self.advance_to(at);
         self.pen_height = Some(next);
         if next != height {
-            self.now += u64::from(self.pen.ramp_ticks) << FRACTION_BITS;
+            self.now = self.now.wrapping_add(self.pen.ramp_ticks << FRACTION_BITS);
             return Ok(());
         }
         self.pen_is_down = down;
         // Two waits of up to 0.67 s: the settings allow no longer dwell.
         let half = dwell.div_ceil(2).min(StepEvent::MAX_TICKS);
         for _ in 0..2 {
-            self.now += u64::from(half) << FRACTION_BITS;
-            let at = self.emitter.hold(self.ticks_now(), queue)?;
+            self.now = self.now.wrapping_add(half << FRACTION_BITS);
+            let at = self.emitter.hold(self.now, queue)?;
             self.advance_to(at);
         }
         Ok(())
     }
 
-    fn advance_to(&mut self, ticks: u32) {
-        let late = ticks.wrapping_sub(self.ticks_now());
-        self.now += u64::from(late) << FRACTION_BITS;
+    /// The pins needed until then: the plan waits for them.
+    fn advance_to(&mut self, at: u32) {
+        let late = at.wrapping_sub(whole_ticks(self.now));
+        self.now = self.now.wrapping_add(late);
     }
 
     /// Plans the rest of the piece in work.
@@ -477,7 +496,7 @@ impl<'m> Runner<'m> {
                 return Ok(Progress::More);
             }
             if !self.emitter.is_open() {
-                self.emitter.hold(self.ticks_now(), queue)?;
+                self.emitter.hold(self.now, queue)?;
             }
         }
         let piece_end = if course.piece_moves == course.moves {
@@ -520,6 +539,7 @@ impl<'m> Runner<'m> {
         if course.piece_moves < course.moves {
             course.piece += 1;
             course.place = course.move_length * u64::from(course.piece_moves);
+            course.to_next = course.move_length / 2;
             course.piece_moves = course.pattern.end_of(course.piece);
             return;
         }
@@ -538,14 +558,24 @@ fn passes(before: Option<LineType>, after: Option<LineType>) -> bool {
     before == after && matches!(after, None | Some(LineType::Full))
 }
 
-/// When, within a slice, a place is reached that lies `distance` after its start; 1/16 ticks.
-///
-/// Both distances keep 16 bits, so the product has 32 and the result is true to an eighth of a
-/// tick.
-#[inline]
-fn offset_in_slice(distance: u64, slice: Slice) -> u32 {
-    let shift = (64 - slice.distance.leading_zeros()).saturating_sub(16);
-    let (part, whole) = ((distance >> shift) as u32, (slice.distance >> shift) as u32);
-    // The time of a whole slice, 2^16, times at most 2^16 - 1.
-    (part * slice.time).checked_div(whole).unwrap_or(0)
+/// Tells when the places of a slice are reached.
+struct SliceClock {
+    shift: u32,
+    distance: u32,
+    time: u32,
+}
+
+impl SliceClock {
+    fn new(slice: Slice) -> Self {
+        // 16 bits of the distance are true to an eighth of a tick.
+        let shift = (u32::BITS - slice.distance.leading_zeros()).saturating_sub(16);
+        Self { shift, distance: slice.distance >> shift, time: slice.time }
+    }
+
+    /// When a place is reached that lies `distance` after the start; 1/16 ticks.
+    #[inline]
+    fn offset(&self, distance: u32) -> u32 {
+        // At most 2^16 - 1 times the time of a whole slice, 2^16.
+        ((distance >> self.shift) * self.time).checked_div(self.distance).unwrap_or(0)
+    }
 }
