@@ -25,7 +25,7 @@ const SEARCH_BITS: u32 = 6;
 ///
 /// Each chord is the longest that can be proved, to a sixty-fourth of its length, and may pass any number
 /// of knots. So there are at most about 3 in 100 more, and one, than the fewest there could be.
-/// Memory: some 1.5 KiB of stack.
+/// Memory: about 2 KiB of stack.
 #[derive(Debug, Clone)]
 pub struct Chords<'a, F> {
     spline: Spline<'a>,

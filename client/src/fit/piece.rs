@@ -3,9 +3,10 @@
 use super::least_squares::{Basis, least_squares};
 use super::{Place, distance, dot, minus};
 
-/// Fits after each of which the parameters follow the curve: from nothing, and from a curve almost as good.
-const ROUNDS: usize = 4;
-const MORE_ROUNDS: usize = 2;
+/// Fits at most, after each of which the parameters follow the curve: from nothing, and from a curve
+/// almost as good.
+const ROUNDS: usize = 40;
+const MORE_ROUNDS: usize = 10;
 /// Passes over the knots to see which may go.
 const PASSES: usize = 3;
 
@@ -27,6 +28,7 @@ struct Samples {
     at: Vec<f64>,
     order: usize,
     ends: [i32; 2],
+    tolerance: f64,
 }
 
 /// One try: the control points for some inner knots, and how far each sample is from the curve.
@@ -119,7 +121,7 @@ impl Samples {
         let width = dense.len() as i32;
         let scale = f64::from(width) / length;
         let at = along.into_iter().map(|along| f64::from(begin) + along * scale).collect();
-        Self { places: dense, at, order, ends: [begin, begin + width] }
+        Self { places: dense, at, order, ends: [begin, begin + width], tolerance }
     }
 
     fn knots(&self, inner: &[i32]) -> Vec<f64> {
@@ -127,33 +129,56 @@ impl Samples {
         begin.chain(inner.iter().copied()).chain(end).map(f64::from).collect()
     }
 
+    /// Fits, lets each sample's parameter go where the curve is nearest to it, and fits again, until all
+    /// is within the tolerance or that is out of reach.
     fn fit(&self, inner: &[i32], start: &[f64], rounds: usize) -> Try {
         let knots = self.knots(inner);
-        let [begin, end] = self.ends.map(f64::from);
         let mut at = start.to_vec();
-        let mut control = Vec::new();
-        let mut errors = Vec::new();
-        for _ in 0..rounds {
+        let mut worst = f64::INFINITY;
+        for round in 1.. {
             let bases: Vec<Basis> = at.iter().map(|t| Basis::at(&knots, self.order, *t)).collect();
-            control = least_squares(&self.places, &bases, self.order + inner.len());
-            // Each sample's parameter goes where the curve is nearest to it, never back.
-            let mut reached = begin;
-            errors.clear();
-            let last = at.len() - 1;
-            for (number, (t, basis)) in at.iter_mut().zip(&bases).enumerate() {
-                let sample = self.places[number];
-                let (away, slope) = (minus(sample, basis.place(&control)), basis.slope(&control));
-                let square = dot(slope, slope);
-                if square > 0.0 && number > 0 && number < last {
-                    *t += dot(away, slope) / square;
-                }
-                *t = t.clamp(reached, end);
-                reached = *t;
-                let place = Basis::at(&knots, self.order, *t).place(&control);
-                errors.push(distance(place, sample));
+            let control = least_squares(&self.places, &bases, self.order + inner.len());
+            self.follow(&mut at, &bases, &control);
+            let found = Try { errors: self.errors(&knots, &control, &at), control, at };
+            let gained = worst - found.worst();
+            worst = found.worst();
+            // At this rate.
+            let reach = worst - gained.max(0.0) * rounds.saturating_sub(round) as f64;
+            if worst <= self.tolerance || reach > self.tolerance || round >= rounds {
+                return found;
             }
+            at = found.at;
         }
-        Try { control, at, errors }
+        unreachable!("the last round returns")
+    }
+
+    /// Moves each parameter to the nearest place on the curve, by one step, never past the one before.
+    fn follow(&self, at: &mut [f64], bases: &[Basis], control: &[Place]) {
+        let [begin, end] = self.ends.map(f64::from);
+        let inside = 1..at.len() - 1;
+        let mut reached = begin;
+        for (number, (t, basis)) in at.iter_mut().zip(bases).enumerate() {
+            let away = minus(self.places[number], basis.place(control));
+            let slope = basis.slope(control);
+            let square = dot(slope, slope);
+            if square > 0.0 && inside.contains(&number) {
+                *t += dot(away, slope) / square;
+            }
+            *t = t.clamp(reached, end);
+            reached = *t;
+        }
+    }
+
+    /// How far each sample is from its place on the curve, and the curve before it from the polyline.
+    fn errors(&self, knots: &[f64], control: &[Place], at: &[f64]) -> Vec<f64> {
+        let place = |t: f64| Basis::at(knots, self.order, t).place(control);
+        let mut errors = vec![0.0];
+        for (samples, at) in self.places.windows(2).zip(at.windows(2)) {
+            let middle = [0, 1].map(|axis: usize| (samples[0][axis] + samples[1][axis]) / 2.0);
+            let between = distance(place((at[0] + at[1]) / 2.0), middle);
+            errors.push(distance(place(at[1]), samples[1]).max(between));
+        }
+        errors
     }
 
     /// `inner` with another knot in every polynomial that is too far off; `None` if one is too short.

@@ -119,19 +119,18 @@ fn checked(polylines: &[Vec<Place>], tolerance: f64) -> Saving {
             assert!(distance(end, expected) <= 0.03 * tolerance + 0.001);
         }
     }
-    println!("{saving}");
     saving
 }
 
 #[test]
 fn smooth_traces_need_few_control_points() {
     let wave = trace(600, |t| [200.0 * t, 20.0 * (t * 25.0).sin()]);
-    let spiral = trace(2000, |t| {
-        let (sine, cosine) = (40.0 * t).sin_cos();
+    let spiral = trace(800, |t| {
+        let (sine, cosine) = (15.0 * t).sin_cos();
         [100.0 + 80.0 * t * cosine, 100.0 + 80.0 * t * sine]
     });
     for (polyline, most) in
-        [(circle(50.0, 360), 14), (circle(3.0, 40), 12), (wave, 50), (spiral, 60)]
+        [(circle(50.0, 360), 12), (circle(3.0, 40), 8), (wave, 32), (spiral, 32)]
     {
         let saving = checked(&[polyline], 0.1);
         assert!(saving.vertices_after <= most, "{saving}");
