@@ -11,7 +11,7 @@ pub const BLOCKS: usize = 64;
 pub struct Memory<const VERTICES: usize, const CORNERS: usize, const WORDS: usize> {
     vertices: heapless::Vec<Position, VERTICES>,
     corners: heapless::Vec<Corner, CORNERS>,
-    blocks: [Block; BLOCKS],
+    blocks: heapless::Vec<Block, BLOCKS>,
     words: [u64; WORDS],
 }
 
@@ -27,18 +27,19 @@ pub type HostMemory = Memory<16384, 65536, { 1 << 19 }>;
 impl<const VERTICES: usize, const CORNERS: usize, const WORDS: usize>
     Memory<VERTICES, CORNERS, WORDS>
 {
-    /// Empty.
+    /// Empty: all bytes zero, so that a static of it takes no flash.
     pub const fn new() -> Self {
         Self {
             vertices: heapless::Vec::new(),
             corners: heapless::Vec::new(),
-            blocks: [Block::EMPTY; BLOCKS],
+            blocks: heapless::Vec::new(),
             words: [0; WORDS],
         }
     }
 
     /// Lends it to a plotter.
     pub fn lend(&mut self) -> Lent<'_> {
+        while self.blocks.push(Block::EMPTY).is_ok() {}
         Lent {
             vertices: &mut self.vertices,
             corners: &mut self.corners,

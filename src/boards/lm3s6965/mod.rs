@@ -29,7 +29,7 @@ use penup::machine::PulserState;
 use penup::motion::EventQueue;
 use penup::plotter::{Board, Lent, Lm3s6965Memory};
 use penup::protocol::RealTime;
-use static_cell::StaticCell;
+use static_cell::ConstStaticCell;
 
 /// An interrupt came since [`Board::wait`] last returned: the Cortex-M event register, in software,
 /// because QEMU's `wfe` does not sleep.
@@ -58,8 +58,9 @@ pub fn take() -> (Lm3s6965, Lent<'static>, &'static PulserState) {
     let serial = serial::set_up(&mut core.NVIC);
     let steps = steps::set_up(pins, &mut core.NVIC);
     defmt::info!("lm3s6965 at {=u32} Hz", clock::HERTZ);
-    static MEMORY: StaticCell<Lm3s6965Memory> = StaticCell::new();
-    let memory = MEMORY.init_with(Lm3s6965Memory::new).lend();
+    // Made at compile time: made here it would pass through the stack, which is smaller.
+    static MEMORY: ConstStaticCell<Lm3s6965Memory> = ConstStaticCell::new(Lm3s6965Memory::new());
+    let memory = MEMORY.take().lend();
     (Lm3s6965 { clock, serial, steps }, memory, &steps::STATE)
 }
 
