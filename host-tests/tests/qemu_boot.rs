@@ -11,7 +11,7 @@ use penup_client::emulator::{
 
 type TestResult = Result<(), Box<dyn Error>>;
 
-const GREETING: &str = "\r\nPenup 0.1 ['$' for help]\r\n";
+const GREETING: &str = "\r\nGrbl 1.1h [penup 0.1.0 '$' for help]\r\n";
 
 fn start() -> Result<Emulator, Box<dyn Error>> {
     Ok(Emulator::start(&image_path("lm3s6965"), Options::default())?)
