@@ -5,6 +5,9 @@ use crate::machines::Board;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
+/// The scene that README shows.
+const EXAMPLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/interpen.obj");
+
 /// Draws solids and line drawings with a penup plotter.
 #[derive(Debug, Parser)]
 #[command(name = "penup", version, propagate_version = true)]
@@ -26,8 +29,8 @@ pub enum Command {
 /// Options of `penup plot`.
 #[derive(Debug, Args)]
 pub struct PlotArgs {
-    /// The OBJ file to draw
-    #[arg(value_name = "FILE")]
+    /// The OBJ file to draw [default: two boxes that pass through each other]
+    #[arg(value_name = "FILE", default_value = EXAMPLE, hide_default_value = true)]
     pub file: PathBuf,
     /// The board to emulate; the picture is drawn from its pins
     #[arg(long, value_enum, default_value = "lm3s6965", help_heading = "Plotter")]
@@ -87,9 +90,17 @@ pub struct ViewArgs {
     /// The direction that is up in the picture [default: 0,0,1]
     #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true, help_heading = "Camera")]
     pub up: Option<[f64; 3]>,
-    /// How the model gets onto the page
-    #[arg(long, value_enum, default_value = "perspective", help_heading = "Camera")]
-    pub projection: Projection,
+    /// Harrison's rotation in degrees: look along z after turning by C about z, B about y, A about x
+    #[arg(long, value_name = "A,B,C", value_parser = triple, allow_hyphen_values = true, help_heading = "Camera")]
+    pub angles: Option<[f64; 3]>,
+    /// perspective, orthographic, cavalier, cabinet, oblique,ANGLE,RATIO, isometric, dimetric, trimetric
+    /// or axonometric,AZIMUTH,ELEVATION
+    #[arg(long, value_parser = projection, default_value = "perspective", allow_hyphen_values = true,
+          help_heading = "Camera")]
+    pub projection: String,
+    /// What becomes of what is behind the eye
+    #[arg(long, value_enum, default_value = "clip", help_heading = "Camera")]
+    pub behind: Behind,
     /// What to do with hidden lines
     #[arg(long, value_enum, default_value = "erased", help_heading = "Camera")]
     pub hidden: Hidden,
@@ -122,9 +133,11 @@ impl ViewArgs {
             eye: self.eye,
             at: self.at,
             up: self.up,
-            projection: match self.projection {
-                Projection::Perspective => "perspective",
-                Projection::Orthographic => "orthographic",
+            angles: self.angles,
+            projection: self.projection.clone(),
+            behind: match self.behind {
+                Behind::Clip => "clip",
+                Behind::Refuse => "refuse",
             },
             hidden: match self.hidden {
                 Hidden::Erased => "erased",
@@ -138,13 +151,21 @@ impl ViewArgs {
     }
 }
 
-/// How the model gets onto the page.
+/// The plotter's own parser says whether this is a projection.
+fn projection(text: &str) -> Result<String, String> {
+    match penup::protocol::Command::parse(&format!("$projection={text}")) {
+        Ok(_) => Ok(text.to_owned()),
+        Err(refusal) => Err(refusal.to_string()),
+    }
+}
+
+/// What becomes of what is behind the eye.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Projection {
-    /// Lines of sight meet in the eye.
-    Perspective,
-    /// Lines of sight are parallel.
-    Orthographic,
+pub enum Behind {
+    /// It is cut off
+    Clip,
+    /// Nothing is drawn
+    Refuse,
 }
 
 /// What is done with hidden lines.

@@ -1,7 +1,7 @@
 //! What came of a job, and the settings that it was done with.
 
 use crate::protocol::{
-    AT, CLEAR, EYE, FIT, HIDDEN, MARGIN, PAGE, PROJECTION, UP, VIEW_AUTO, setting,
+    ANGLES, AT, BEHIND, CLEAR, EYE, FIT, HIDDEN, MARGIN, PAGE, PROJECTION, UP, VIEW_AUTO, setting,
 };
 use crate::source::JobLine;
 use serde::Serialize;
@@ -104,8 +104,12 @@ pub struct Settings {
     pub at: Option<[f64; 3]>,
     /// What is up.
     pub up: Option<[f64; 3]>,
-    /// `perspective` or `orthographic`.
-    pub projection: &'static str,
+    /// Harrison's angles, in degrees.
+    pub angles: Option<[f64; 3]>,
+    /// How lines of sight run, as the plotter understands it.
+    pub projection: String,
+    /// `clip` or `refuse`.
+    pub behind: &'static str,
     /// `erased`, `dotted` or `shown`.
     pub hidden: &'static str,
     /// The page.
@@ -121,10 +125,12 @@ pub struct Settings {
 /// Each setting is sent, so that nothing of an earlier job remains.
 pub fn job_lines(file: Vec<JobLine>, settings: &Settings) -> Vec<JobLine> {
     let page = settings.page;
-    let points = [(EYE, settings.eye), (AT, settings.at), (UP, settings.up)];
+    let points =
+        [(EYE, settings.eye), (AT, settings.at), (UP, settings.up), (ANGLES, settings.angles)];
     let points = points.into_iter().filter_map(|(name, point)| Some(setting(name, &point?, ',')));
     let commands = std::iter::once(VIEW_AUTO.to_owned()).chain(points).chain([
         format!("{PROJECTION}={}", settings.projection),
+        format!("{BEHIND}={}", settings.behind),
         format!("{HIDDEN}={}", settings.hidden),
         setting(PAGE, &[page.width, page.height], 'x'),
         setting(MARGIN, &[settings.margin], ','),
@@ -172,7 +178,9 @@ mod tests {
             eye: Some([-3.0, -4.0, 2.5]),
             at: None,
             up: Some([0.0, 0.0, 1.0]),
-            projection: "perspective",
+            angles: None,
+            projection: "perspective".to_owned(),
+            behind: "clip",
             hidden: "dotted",
             page: Page { width: 210.0, height: 297.0 },
             margin: 7.5,
@@ -189,6 +197,7 @@ mod tests {
                 "$eye=-3,-4,2.5",
                 "$up=0,0,1",
                 "$projection=perspective",
+                "$behind=clip",
                 "$hidden=dotted",
                 "$page=210x297",
                 "$margin=7.5",

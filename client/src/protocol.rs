@@ -19,7 +19,11 @@ pub const EYE: &str = "$eye";
 pub const AT: &str = "$at";
 /// The direction that is up in the picture.
 pub const UP: &str = "$up";
-/// Perspective or orthographic.
+/// Harrison's rotation.
+pub const ANGLES: &str = "$angles";
+/// What becomes of what is behind the eye.
+pub const BEHIND: &str = "$behind";
+/// Perspective or another.
 pub const PROJECTION: &str = "$projection";
 /// What is done with hidden lines.
 pub const HIDDEN: &str = "$hidden";
