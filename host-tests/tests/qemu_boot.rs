@@ -21,7 +21,8 @@ fn start() -> Result<Emulator, Box<dyn Error>> {
 fn heard_until(emulator: &mut Emulator, end: &str) -> io::Result<String> {
     let mut heard = Vec::new();
     while !heard.ends_with(end.as_bytes()) {
-        let mut buffer = [0; 256];
+        // A byte at a time: what follows `end` is left for the next call.
+        let mut buffer = [0; 1];
         let count = emulator.receive(&mut buffer, Duration::from_secs(10))?;
         if count == 0 {
             let heard = String::from_utf8_lossy(&heard).into_owned();

@@ -41,7 +41,8 @@ impl Line {
     }
 }
 
-fn at_the_pins(lines: &[String]) -> Result<Vec<MachineEventKind>, Box<dyn Error>> {
+/// A board that has begun the job.
+fn begin(lines: &[String]) -> Result<Line, Box<dyn Error>> {
     let emulator = Emulator::start(&image_path("lm3s6965"), Options::default())?;
     let mut line = Line { emulator, heard: Vec::new() };
     while !line.next()?.starts_with("Grbl") {}
@@ -49,6 +50,11 @@ fn at_the_pins(lines: &[String]) -> Result<Vec<MachineEventKind>, Box<dyn Error>
         line.emulator.send(format!("{text}\n").as_bytes())?;
         assert_eq!(line.next()?, "ok", "{text}");
     }
+    Ok(line)
+}
+
+fn at_the_pins(lines: &[String]) -> Result<Vec<MachineEventKind>, Box<dyn Error>> {
+    let mut line = begin(lines)?;
     let (mut machine, mut events) = (Machine::default(), Vec::new());
     loop {
         line.emulator.send(b"?")?;
@@ -60,6 +66,8 @@ fn at_the_pins(lines: &[String]) -> Result<Vec<MachineEventKind>, Box<dyn Error>
             events.extend(machine.last().map(|event| event.kind));
             return Ok(events);
         }
+        // Each question costs the emulator a wait.
+        std::thread::sleep(Duration::from_millis(200));
     }
 }
 
@@ -102,4 +110,40 @@ fn solids_through_each_other_with_dotted_hidden_lines() -> Result<(), Box<dyn Er
 #[test]
 fn many_parts_with_many_odd_points() -> Result<(), Box<dyn Error>> {
     compare("lattice2.obj", &["$page=60x80", "$margin=5"])
+}
+
+#[test]
+fn ctrl_x_stops_the_steps_raises_the_pen_and_knows_the_position() -> Result<(), Box<dyn Error>> {
+    let lines = job_lines("lattice2.obj", &["$page=60x80", "$margin=5"]);
+    let mut line = begin(&lines)?;
+    let mut machine = Machine::default();
+    while !machine.pen_is_down() {
+        line.emulator.send(b"?")?;
+        assert!(line.next()?.starts_with("<Run"));
+        for change in line.emulator.pin_changes()? {
+            machine.change(change);
+        }
+    }
+    line.emulator.send(b"\x18")?;
+    while !line.next()?.starts_with("Grbl") {}
+    let status = loop {
+        line.emulator.send(b"?")?;
+        let status = line.next()?;
+        if status.starts_with("<Idle") {
+            break status;
+        }
+    };
+    for change in line.emulator.pin_changes()? {
+        machine.change(change);
+    }
+    assert!(!machine.pen_is_down());
+    // 80 steps a millimetre: the reported position is that of the pins.
+    let (x, y) = machine.position();
+    let position = format!("|MPos:{:.3},{:.3},", f64::from(x) / 80.0, f64::from(y) / 80.0);
+    assert!(status.contains(&position), "{status} {position}");
+    // Nothing more moves, and it is ready: the model is still there.
+    assert_eq!(line.emulator.pin_changes()?, []);
+    line.emulator.send(b"$plot\n")?;
+    assert_eq!(line.next()?, "ok");
+    Ok(())
 }
