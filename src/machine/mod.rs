@@ -164,7 +164,12 @@ impl<'m> Machine<'m> {
         if !matches!(self.state, State::Idle | State::Check | State::Alarm(_)) || !self.stands() {
             return Err(SettingError::Busy);
         }
+        let page = self.position();
         self.settings.set(setting, value)?;
+        if setting == Setting::Kinematics {
+            // The pen stays where it is; the motors count otherwise.
+            self.set_position(page);
+        }
         self.runner.set_limits(self.settings.limits(), self.settings.pen_positions());
         self.configure_pulser();
         Ok(())
