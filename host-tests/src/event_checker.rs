@@ -104,8 +104,9 @@ pub fn check(events: &[StepEvent], settings: &Settings) -> Verdict {
                     at = PagePoint { x: at.x + dx, y: at.y + dy };
                     assert!(time >= pen_ready, "event {number}: moves while the pen moves");
                     assert!(levels & StepEvent::DRIVERS_ON != 0, "event {number}: drivers off");
+                    let page = settings.kinematics().page(at);
                     assert!(
-                        (0..=most.0).contains(&at.x) && (0..=most.1).contains(&at.y),
+                        (0..=most.0).contains(&page.x) && (0..=most.1).contains(&page.y),
                         "event {number}: beyond the travel at {at:?}"
                     );
                     let run = runs.last_mut().expect("never empty");

@@ -467,3 +467,23 @@ fn an_override_slows_the_job() {
     assert!((seconds(100) - 2.0625 - 0.3).abs() < 0.001);
     assert!((seconds(50) - 4.03125 - 0.3).abs() < 0.001);
 }
+
+#[test]
+fn a_change_of_kinematics_leaves_the_pen_where_it_is() {
+    let targets = [to(1000, 400)];
+    let mut path = TargetList::new(&targets);
+    let mut checked = false;
+    pin_machine::run(Settings::default(), &mut path, 25_000, &mut |turn| {
+        if turn.now == 0 {
+            turn.machine.start(&mut TargetList::new(&targets)).expect("valid");
+        }
+        if is_ready(turn.machine) {
+            turn.machine.set(Setting::Kinematics, Value::ONE).expect("idle");
+            assert_eq!(turn.machine.position(), point(1000, 400));
+            assert_eq!(turn.machine.planned_position(), point(1000, 400));
+            checked = true;
+        }
+        !checked
+    });
+    assert!(checked);
+}

@@ -188,6 +188,56 @@ fn every_path_takes_the_time_of_the_optimum_and_keeps_the_acceleration() {
     }
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, ..ProptestConfig::default() })]
+    #[test]
+    fn whatever_the_settings_the_drivers_forgive_it(
+        targets in prop::collection::vec((0i32..3000, 0i32..3000, 0u8..5), 1..30),
+        near in 1i32..60,
+        pulse in 0.2f64..10.0,
+        setup in 0.0f64..30.0,
+        dwell in 0.0f64..900.0,
+        speed in 60.0f64..32000.0,
+        acceleration in 10.0f64..32000.0,
+        deviation in 0.0f64..1.0,
+        kinematics in 0i32..2,
+        blocks in 1usize..40,
+    ) {
+        let mut settings = Settings::default();
+        let values = [
+            (Setting::StepPulse, pulse),
+            (Setting::DirectionSetup, setup),
+            (Setting::PenUpDwell, dwell),
+            (Setting::PenDownDwell, 900.0 - dwell),
+            (Setting::MaxRateX, 32000.0),
+            (Setting::MaxRateY, 32000.0),
+            (Setting::DrawSpeed, speed),
+            (Setting::TravelSpeed, speed),
+            (Setting::AccelerationX, acceleration),
+            (Setting::AccelerationY, acceleration),
+            (Setting::JunctionDeviation, deviation),
+            (Setting::TravelX, 100.0),
+            (Setting::TravelY, 100.0),
+            (Setting::Kinematics, f64::from(kinematics)),
+        ];
+        for (setting, value) in values {
+            prop_assume!(settings.set(setting, Value::from_num(value)).is_ok());
+        }
+        let inks = [None, Some(LineType::Full), Some(LineType::Full), Some(LineType::Dotted), Some(LineType::Dashed)];
+        let targets: Vec<_> = targets
+            .into_iter()
+            .map(|(x, y, ink)| Target {
+                point: PagePoint { x: x / near, y: y / near },
+                ink: inks[usize::from(ink)],
+            })
+            .collect();
+        let events = pin_machine::record(settings, &mut TargetList::new(&targets), blocks)
+            .expect("within the travel");
+        let end = targets.last().map(|target| settings.kinematics().motors(target.point));
+        prop_assert_eq!(Some(event_checker::check(&events, &settings).end), end);
+    }
+}
+
 #[test]
 fn a_short_look_ahead_is_enough_for_dense_points() {
     let points = steps(&dense());

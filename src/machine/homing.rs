@@ -144,12 +144,14 @@ impl Machine<'_> {
     pub fn watch(&mut self, switches: Switches) {
         match (self.state, self.homing) {
             (State::Home, Some(homing)) => self.watch_homing(homing, switches),
-            (State::Run | State::Hold { .. } | State::Jog | State::Abort, _)
-                if switches.any() && self.settings.is_on(Setting::HardLimits) =>
-            {
-                self.alarm(Alarm::HardLimit);
+            (State::Home | State::Check | State::Sleep | State::Alarm(_), _) => {}
+            (State::Run | State::Hold { .. } | State::Jog | State::Abort | State::Idle, _) => {
+                // Idle as soon as all is planned, while the pins still move.
+                let is_limit = switches.any() && self.settings.is_on(Setting::HardLimits);
+                if is_limit && !self.stands() {
+                    self.alarm(Alarm::HardLimit);
+                }
             }
-            _ => {}
         }
     }
 

@@ -116,7 +116,9 @@ impl<P: OutputPin<Error = Infallible>> Pen for Solenoid<P> {
 /// The step interrupt: pops an event, writes pins, says when to be called next.
 ///
 /// A move takes two calls, one that raises the step pins and one that lowers them. No division, no
-/// loop, no lock.
+/// loop, no lock. Measured on a Cortex-M3 with pins of one store each (opt-level 3): 32 instructions
+/// for both calls of a diagonal move, 20 for an event without a pulse, 15 for one of the pen; on a
+/// Cortex-M0+ 37, 23 and 18. The interrupt's entry and its timer come on top.
 pub struct Pulser<'q, SX, DX, SY, DY, E, P> {
     pins: Pins<SX, DX, SY, DY, E>,
     pen: P,

@@ -13,8 +13,13 @@
 //! The pulses leave when the plan is half a step from the new position: the pins are never more
 //! than half a step from where the plan is.
 //!
+//! Measured on a Cortex-M3 (opt-level 3), everything between target and queue included: 200
+//! instructions for each event at 5,000 moves a second, 70 at 400,000, and 170 to 260 on chords of
+//! five moves; on a Cortex-M0+, which divides in software, about twice as many.
+//!
 //! Not done here: limits of travel, the pen's heights, states. That is `machine`.
 
+mod course;
 mod curvature;
 mod emitter;
 mod event;

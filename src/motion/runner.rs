@@ -1,12 +1,12 @@
 //! Runs the blocks: pen changes at rest, slices, moves, events.
 
+use super::course::{Course, SliceClock};
 use super::curvature::Curvature;
 use super::emitter::whole_ticks;
 use super::junction::{self, Corner, Heading};
-use super::profile::{FRACTION_BITS, Pace, Profile, Slice};
+use super::profile::{FRACTION_BITS, Pace, Profile};
 use super::{Block, Emitter, EventQueue, Limits, Lookahead, PathLength, SliceSpeed, StepEvent};
 use crate::drawing::{LineType, PagePoint};
-use crate::step::{Line, Pattern};
 use core::cmp::Ordering;
 
 /// Where the pen stands and how long it takes to get there.
@@ -58,30 +58,6 @@ pub struct RunLengths {
     pub drawn: u64,
     /// The same with the pen up.
     pub travelled: u64,
-}
-
-/// The block in work.
-#[derive(Debug, Clone)]
-struct Course {
-    line: Line,
-    ink: Option<LineType>,
-    pattern: Pattern,
-    piece: u32,
-    length: PathLength,
-    curve_limit: PathLength,
-    /// mm per move, 2^-32.
-    move_length: u64,
-    moves: u32,
-    moves_done: u32,
-    /// Moves at the end of the piece.
-    piece_moves: u32,
-    /// From the start of the block to where the plan is, 2^-32 mm.
-    place: u64,
-    /// From there to where the next move is due.
-    to_next: u64,
-    profile: Option<Profile>,
-    /// The slice in work begins at `place`.
-    slice: Option<Slice>,
 }
 
 /// Turns blocks into events.
@@ -390,32 +366,7 @@ impl<'m> Runner<'m> {
             self.run.strokes = self.run.strokes.wrapping_add(1);
         }
         self.in_stroke = block.ink.is_some();
-        let line = Line::by(block.dx, block.dy);
-        let moves = line.remaining();
-        let move_length = (u64::from(block.length.to_bits()) << 14) / u64::from(moves.max(1));
-        let line_type = block.ink.unwrap_or_default();
-        let pattern = if line_type == LineType::Full {
-            Pattern::full(moves)
-        } else {
-            let dot_moves = (u64::from(self.pen.dot_length.to_bits()) << 14) / move_length.max(1);
-            Pattern::of(line_type, moves, u32::try_from(dot_moves).unwrap_or(u32::MAX))
-        };
-        self.course = Some(Course {
-            line,
-            ink: block.ink,
-            pattern,
-            piece: 0,
-            length: block.length,
-            curve_limit: block.curve_limit,
-            move_length,
-            moves,
-            moves_done: 0,
-            piece_moves: pattern.end_of(0),
-            place: 0,
-            to_next: move_length / 2,
-            profile: None,
-            slice: None,
-        });
+        self.course = Some(Course::new(&block, self.pen.dot_length));
         Ok(Progress::More)
     }
 
@@ -489,7 +440,7 @@ impl<'m> Runner<'m> {
         if self.stopping && at_rest {
             return self.stand(Progress::Stopped, queue);
         }
-        let inked = course.ink.is_some() && Pattern::inked(course.piece);
+        let inked = course.is_inked();
         if at_rest {
             if inked != self.pen_is_down {
                 self.move_pen(inked, queue)?;
@@ -499,15 +450,7 @@ impl<'m> Runner<'m> {
                 self.emitter.hold(self.now, queue)?;
             }
         }
-        let piece_end = if course.piece_moves == course.moves {
-            u64::from(course.length.to_bits()) << 14
-        } else {
-            course.move_length * u64::from(course.piece_moves)
-        };
-        // Rounded by less than 2^-18 mm; a move is 2^-12 mm or longer and the last one is due half
-        // a move before the end, so none is lost.
-        let left = piece_end.saturating_sub(course.place) >> 14;
-        let left = PathLength::from_bits(left as u32);
+        let left = course.left();
         let profile = if self.stopping {
             Profile::stopping(&self.limits, self.pace, left)
         } else {
@@ -518,7 +461,7 @@ impl<'m> Runner<'m> {
                 }
                 top = self.curve;
             }
-            let exit_allowed = if course.piece_moves == course.moves {
+            let exit_allowed = if course.is_last_piece() {
                 self.lookahead.entry_allowed(top.stopping_distance)
             } else {
                 PathLength::ZERO
@@ -536,11 +479,8 @@ impl<'m> Runner<'m> {
         let Some(course) = &mut self.course else {
             return;
         };
-        if course.piece_moves < course.moves {
-            course.piece += 1;
-            course.place = course.move_length * u64::from(course.piece_moves);
-            course.to_next = course.move_length / 2;
-            course.piece_moves = course.pattern.end_of(course.piece);
+        if !course.is_last_piece() {
+            course.next_piece();
             return;
         }
         let length = u64::from(course.length.to_bits());
@@ -556,26 +496,4 @@ impl<'m> Runner<'m> {
 /// Whether the machine may pass from one block to the next without standing.
 fn passes(before: Option<LineType>, after: Option<LineType>) -> bool {
     before == after && matches!(after, None | Some(LineType::Full))
-}
-
-/// Tells when the places of a slice are reached.
-struct SliceClock {
-    shift: u32,
-    distance: u32,
-    time: u32,
-}
-
-impl SliceClock {
-    fn new(slice: Slice) -> Self {
-        // 16 bits of the distance are true to an eighth of a tick.
-        let shift = (u32::BITS - slice.distance.leading_zeros()).saturating_sub(16);
-        Self { shift, distance: slice.distance >> shift, time: slice.time }
-    }
-
-    /// When a place is reached that lies `distance` after the start; 1/16 ticks.
-    #[inline]
-    fn offset(&self, distance: u32) -> u32 {
-        // At most 2^16 - 1 times the time of a whole slice, 2^16.
-        ((distance >> self.shift) * self.time).checked_div(self.distance).unwrap_or(0)
-    }
 }
