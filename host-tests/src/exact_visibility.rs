@@ -333,7 +333,7 @@ impl World {
                 }
                 let [from, to] = [0, 1].map(|n| self.space_fraction(edge, &pair[n]));
                 match pieces.last_mut() {
-                    Some(last) if last.0 == edge.ends && last.2 == from && last.3 == !hidden => {
+                    Some(last) if last.0 == edge.ends && last.2 == from && last.3 != hidden => {
                         last.2 = to;
                     }
                     _ => pieces.push((edge.ends, from, to, !hidden)),

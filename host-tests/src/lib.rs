@@ -1,5 +1,8 @@
 //! The simulated machine, the exact reference models and the tests of whole jobs.
 
+// A test fails by panicking, and this is what tests are made of.
+#![allow(clippy::panic, clippy::expect_used)]
+
 pub mod curve_reference;
 pub mod order_reference;
 pub mod event_checker;
