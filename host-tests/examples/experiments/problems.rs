@@ -18,7 +18,7 @@ impl Randu {
     /// The next number from 0 to `limit` - 1.
     fn below(&mut self, limit: u32) -> u32 {
         self.0 = self.0.wrapping_mul(65539) & 0x7fff_ffff;
-        (u64::from(self.0) * u64::from(limit) >> 31) as u32
+        ((u64::from(self.0) * u64::from(limit)) >> 31) as u32
     }
 }
 

@@ -13,6 +13,9 @@ use std::fmt::{Result, Write};
 /// "Fairly high", so that there is something to improve (7.5, 7.8, 7.9).
 const HIGH: Start = Start::NoMoreThan(350);
 
+/// What he measured for one n: a row for each value that he varied.
+type Rows<Row> = (usize, &'static [Row]);
+
 /// All tables, in his order.
 pub fn write_all(meter: &mut Meter, page: &mut String) -> Result {
     standard(meter, page)?;
@@ -237,10 +240,10 @@ fn direct_solution(meter: &mut Meter, page: &mut String) -> Result {
 }
 
 fn reduction_of_upper_bound(meter: &mut Meter, page: &mut String) -> Result {
-    const HIS: [(usize, u64, &[(u64, f64)]); 4] = [
+    const OPTIMA: [u64; 4] = [87, 102, 95, 98];
+    const HIS: [Rows<(u64, f64)>; 4] = [
         (
             10,
-            87,
             &[
                 (125, 0.862),
                 (120, 0.847),
@@ -252,16 +255,12 @@ fn reduction_of_upper_bound(meter: &mut Meter, page: &mut String) -> Result {
                 (90, 0.324),
             ],
         ),
-        (12, 102, &[(125, 2.61), (120, 2.6), (115, 2.11), (110, 1.52), (105, 0.96)]),
-        (14, 95, &[(125, 53.6), (120, 53.3), (115, 52.5), (110, 48.5), (105, 44.4), (100, 44.3)]),
-        (
-            16,
-            98,
-            &[(125, 391.0), (120, 382.0), (115, 371.0), (110, 340.0), (105, 317.0), (100, 315.0)],
-        ),
+        (12, &[(125, 2.61), (120, 2.6), (115, 2.11), (110, 1.52), (105, 0.96)]),
+        (14, &[(125, 53.6), (120, 53.3), (115, 52.5), (110, 48.5), (105, 44.4), (100, 44.3)]),
+        (16, &[(125, 391.0), (120, 382.0), (115, 371.0), (110, 340.0), (105, 317.0), (100, 315.0)]),
     ];
     let mut table = Table::new(&["n", "above optimum", "checked", "MI", "s"]);
-    for (count, his_optimum, rows) in HIS {
+    for ((count, rows), his_optimum) in HIS.into_iter().zip(OPTIMA) {
         let problem = Problem::of_matrix(count, 0, 100);
         let least = run(meter, &problem, Options::default()).cost.unwrap_or_default();
         for &(upper_bound, seconds) in rows {
@@ -315,11 +314,11 @@ fn upper_bound_algorithm(meter: &mut Meter, page: &mut String) -> Result {
 }
 
 fn fewer_distances(meter: &mut Meter, page: &mut String) -> Result {
-    const HIS: [(usize, [(usize, f64, f64); 4]); 4] = [
-        (10, [(45, 0.91, 1.94), (38, 0.76, 1.92), (29, 0.64, 1.86), (19, 0.36, 1.71)]),
-        (12, [(66, 2.77, 7.88), (56, 2.45, 7.80), (39, 1.60, 7.57), (25, 0.93, 7.35)]),
-        (14, [(91, 55.29, 34.12), (74, 51.31, 34.09), (54, 45.03, 34.03), (34, 37.25, 33.98)]),
-        (16, [(120, 380.0, 163.0), (98, 341.0, 162.0), (71, 274.0, 160.0), (47, 206.0, 157.0)]),
+    const HIS: [Rows<(usize, f64, f64)>; 4] = [
+        (10, &[(45, 0.91, 1.94), (38, 0.76, 1.92), (29, 0.64, 1.86), (19, 0.36, 1.71)]),
+        (12, &[(66, 2.77, 7.88), (56, 2.45, 7.80), (39, 1.60, 7.57), (25, 0.93, 7.35)]),
+        (14, &[(91, 55.29, 34.12), (74, 51.31, 34.09), (54, 45.03, 34.03), (34, 37.25, 33.98)]),
+        (16, &[(120, 380.0, 163.0), (98, 341.0, 162.0), (71, 274.0, 160.0), (47, 206.0, 157.0)]),
     ];
     let mut table = Table::new(&[
         "n",
@@ -333,7 +332,7 @@ fn fewer_distances(meter: &mut Meter, page: &mut String) -> Result {
     ]);
     for (count, rows) in HIS {
         let problem = Problem::of_matrix(count, 0, 100);
-        for (wanted, seconds, seconds_sorted) in rows {
+        for &(wanted, seconds, seconds_sorted) in rows {
             let (longest, kept) = problem.shortest(wanted);
             let reach = Reach::NoLongerThan(longest);
             let options = Options { start: HIGH, reach, ..Options::STANDARD };
@@ -401,7 +400,7 @@ fn binary_chopping(meter: &mut Meter, page: &mut String) -> Result {
 }
 
 fn sets_of_sub_problems(meter: &mut Meter, page: &mut String) -> Result {
-    const HIS: [(usize, &[f64]); 3] = [
+    const HIS: [Rows<f64>; 3] = [
         (12, &[10.5, 10.1, 9.9, 11.2, 10.5]),
         (14, &[60.3, 55.8, 53.5, 53.5, 61.9, 59.8]),
         (16, &[378.0, 383.0, 399.0, 410.0, 427.0, 422.0, 391.0]),
