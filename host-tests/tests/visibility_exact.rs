@@ -2,6 +2,9 @@
 //!
 //! `PENUP_SCENES` sets how many scenes there are; 2,000 if it is not set.
 
+// A test's way of failing.
+#![allow(clippy::panic)]
+
 use num_bigint::BigInt;
 use num_rational::BigRational;
 use penup::model::Elements;

@@ -12,10 +12,10 @@
 //!   first of the model.
 //! * An edge that the eye sees end-on has no length on the page and no stretch.
 //!
-//! The way: choose one side of a face for each edge ([`edges`]), place the vertices on a coarse grid of
-//! the page ([`outlook`]), cut concave faces ([`triangles`]), sort the faces by depth ([`faces`]) and into
-//! cells ([`grid`]); then follow each edge through the cells and mark on its [`profile`] what each
-//! face hides ([`sight`]). Refused: vertices out of range, a model too large, too little memory.
+//! The way: choose one side of a face for each edge (`edges`), place the vertices on a coarse grid of
+//! the page (`outlook`), cut concave faces (`triangles`), sort the faces by depth (`faces`) and into
+//! cells (`grid`); then follow each edge through the cells and mark on its `profile` what each
+//! face hides (`sight`). Refused: vertices out of range, a model too large, too little memory.
 
 mod edges;
 mod faces;

@@ -4,6 +4,7 @@
 //! with the command that does. A second run finds everything and installs nothing.
 
 mod command;
+mod experiments;
 mod firmware;
 mod set_up;
 mod test;
@@ -40,6 +41,8 @@ enum Task {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         arguments: Vec<String>,
     },
+    /// Repeats Harrison's experiments (his chapter 7), counted in instructions.
+    Experiments,
     /// Installs what building and testing need.
     SetUp,
     /// Runs every check: format, lints, documentation, tests on the host and in the emulator.
@@ -65,6 +68,7 @@ fn carry_out() -> Result<()> {
             println!("{}", firmware::check(board, &image)?);
         }
         Some(Task::Plot { arguments }) => plot(&arguments)?,
+        Some(Task::Experiments) => experiments::repeat()?,
         Some(Task::SetUp) => {
             for &board in Board::ALL {
                 set_up::toolchain(board.target())?;

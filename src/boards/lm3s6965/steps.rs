@@ -26,7 +26,7 @@ use super::{HAPPENED, clock, critical};
 const EVENT_PLACES: usize = 512;
 
 const CYCLES_PER_TICK: u32 = clock::HERTZ / TICKS_PER_SECOND;
-const _: () = assert!(clock::HERTZ % TICKS_PER_SECOND == 0);
+const _: () = assert!(clock::HERTZ.is_multiple_of(TICKS_PER_SECOND));
 
 mod offset {
     pub const CONFIGURATION: usize = 0x000;
@@ -86,14 +86,14 @@ pub fn set_up(pins: MotorPins, nvic: &mut NVIC) -> Steps {
 impl Steps {
     /// Lets waiting events begin.
     pub fn start(&mut self) {
-        if self.events.len() != 0 && !RUNNING.load(Ordering::Acquire) {
+        if !self.events.is_empty() && !RUNNING.load(Ordering::Acquire) {
             NVIC::pend(Interrupt::TIMER_0A);
         }
     }
 
     /// No event waits, and the last is over.
     pub fn idle(&self) -> bool {
-        self.events.len() == 0 && !RUNNING.load(Ordering::Acquire)
+        self.events.is_empty() && !RUNNING.load(Ordering::Acquire)
     }
 }
 
