@@ -117,7 +117,10 @@ impl World {
                 polygon.low[n] > *(&p[n]).max(&q[n]) || polygon.high[n] < *(&p[n]).min(&q[n])
             })
         };
-        self.polygons.iter().filter(|polygon| !apart(polygon)).collect()
+        self.polygons
+            .iter()
+            .filter(|polygon| !apart(polygon))
+            .collect()
     }
 
     /// Depth of a plane at a point of the page; `None` if it is seen edge-on.
@@ -165,10 +168,7 @@ impl World {
             }
         }
         // Where the edge passes a plane: a linear function of the point in space.
-        for plane in about
-            .iter()
-            .filter_map(|polygon| polygon.plane.as_ref())
-        {
+        for plane in about.iter().filter_map(|polygon| polygon.plane.as_ref()) {
             let height = |t: &Number| {
                 let page = at_fraction(&edge.page, t);
                 let depth = self.edge_depth(edge, t);
@@ -343,7 +343,7 @@ impl World {
                 }
                 let [from, to] = [0, 1].map(|n| self.space_fraction(edge, &pair[n]));
                 match pieces.last_mut() {
-                    Some(last) if last.0 == edge.ends && last.2 == from && last.3 == !hidden => {
+                    Some(last) if last.0 == edge.ends && last.2 == from && last.3 != hidden => {
                         last.2 = to;
                     }
                     _ => pieces.push((edge.ends, from, to, !hidden)),

@@ -22,6 +22,7 @@ mod faces;
 mod grid;
 mod outlook;
 mod profile;
+mod raster;
 mod sight;
 mod triangles;
 
@@ -32,7 +33,7 @@ use edges::{ChosenSides, MOST_CORNERS, Outlines, sides};
 use faces::Faces;
 use grid::Grid;
 use outlook::{Outlook, Place};
-use profile::{FEWEST_PIECES, Piece, Profile, mark};
+use profile::{FEWEST_PIECES, Part, Piece, Profile, mark};
 use sight::{Sight, Surroundings};
 use triangles::Ears;
 
@@ -298,7 +299,7 @@ impl Search<'_> {
         let (p, q) = (around.outlook.place(sight.p), around.outlook.place(sight.q));
         let near = grid::coarse_depth(sight.near);
         if grid.along(p, q, near, |cell| cell.cover.is_some()) {
-            profile.mark(Along::START, Along::END, mark::HIDDEN);
+            profile.mark(Part::WHOLE, mark::HIDDEN);
             return;
         }
         seen.fill(0);

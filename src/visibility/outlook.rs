@@ -17,28 +17,99 @@ pub struct Place {
 }
 
 impl Place {
-    fn difference(self, from: Self) -> (i32, i32) {
-        (
-            i32::from(self.x) - i32::from(from.x),
-            i32::from(self.y) - i32::from(from.y),
-        )
+    pub const LOWEST: Self = Self { x: 0, y: 0 };
+    pub const HIGHEST: Self = Self {
+        x: u16::MAX,
+        y: u16::MAX,
+    };
+
+    /// The lower left corner of the two.
+    #[inline]
+    pub fn low(self, other: Self) -> Self {
+        Self {
+            x: self.x.min(other.x),
+            y: self.y.min(other.y),
+        }
+    }
+
+    /// The upper right corner of the two.
+    #[inline]
+    pub fn high(self, other: Self) -> Self {
+        Self {
+            x: self.x.max(other.x),
+            y: self.y.max(other.y),
+        }
+    }
+
+    /// Whether everything up to here is surely left of or below everything from `other` on.
+    #[inline]
+    pub fn is_before(self, other: Self) -> bool {
+        self.x < other.x || self.y < other.y
     }
 }
 
-/// The sign of [`page_side`], or zero if the places are too coarse to tell.
-///
-/// Each true difference is within one unit of the difference of the places, which moves the
-/// determinant by less than the sum of the differences and two.
+/// The line through two places.
+#[derive(Debug, Clone, Copy)]
+pub struct CoarseLine {
+    x: i32,
+    y: i32,
+    along_x: i32,
+    along_y: i32,
+    doubt: i32,
+}
+
+impl CoarseLine {
+    #[inline]
+    pub fn new(a: Place, b: Place) -> Self {
+        let (x, y) = (i32::from(a.x), i32::from(a.y));
+        let (along_x, along_y) = (i32::from(b.x) - x, i32::from(b.y) - y);
+        Self {
+            x,
+            y,
+            along_x,
+            along_y,
+            doubt: along_x.abs() + along_y.abs() + 2,
+        }
+    }
+
+    /// The sign of [`page_side`] for a vertex at `place`, or zero if the places are too coarse to tell.
+    ///
+    /// Each true difference is within one unit of the difference of the places, which moves the
+    /// determinant by less than the sum of the differences and two.
+    #[inline]
+    pub fn side(&self, place: Place) -> i32 {
+        let (to_x, to_y) = (i32::from(place.x) - self.x, i32::from(place.y) - self.y);
+        let side = self.along_x * to_y - self.along_y * to_x;
+        let doubt = self.doubt + to_x.abs() + to_y.abs();
+        i32::from(side >= doubt) - i32::from(side <= -doubt)
+    }
+}
+
+/// [`CoarseLine::side`] of the line from `a` to `b`.
 #[inline]
 pub fn coarse_side(a: Place, b: Place, c: Place) -> i32 {
-    let (along_x, along_y) = b.difference(a);
-    let (to_x, to_y) = c.difference(a);
-    let side = along_x * to_y - along_y * to_x;
-    let doubt = along_x.abs() + along_y.abs() + to_x.abs() + to_y.abs() + 2;
-    if side.abs() >= doubt {
-        side.signum()
-    } else {
-        0
+    CoarseLine::new(a, b).side(c)
+}
+
+/// The line through two vertices of an [`Outlook`].
+#[derive(Debug, Clone, Copy)]
+pub struct Line<'o> {
+    outlook: &'o Outlook<'o>,
+    a: u16,
+    b: u16,
+    coarse: CoarseLine,
+}
+
+impl Line<'_> {
+    /// The sign of [`page_side`] for a vertex.
+    #[inline]
+    pub fn side(&self, number: u16) -> i32 {
+        let coarse = self.coarse.side(self.outlook.place(number));
+        if coarse != 0 {
+            coarse
+        } else {
+            self.outlook.exact_side(self.a, self.b, number)
+        }
     }
 }
 
@@ -99,19 +170,26 @@ impl<'a> Outlook<'a> {
         self.places[usize::from(number)]
     }
 
-    /// The sign of [`page_side`] of three vertices.
+    /// The line through two vertices.
     #[inline]
-    pub fn side(&self, a: u16, b: u16, c: u16) -> i32 {
-        let coarse = coarse_side(self.place(a), self.place(b), self.place(c));
-        if coarse != 0 {
-            coarse
-        } else {
-            self.exact_side(a, b, c)
+    pub fn line(&self, a: u16, b: u16) -> Line<'_> {
+        Line {
+            outlook: self,
+            a,
+            b,
+            coarse: CoarseLine::new(self.place(a), self.place(b)),
         }
     }
 
+    /// The sign of [`page_side`] of three vertices.
+    #[inline]
+    pub fn side(&self, a: u16, b: u16, c: u16) -> i32 {
+        self.line(a, b).side(c)
+    }
+
+    /// [`Self::side`] without a look at the places.
     #[cold]
-    fn exact_side(&self, a: u16, b: u16, c: u16) -> i32 {
+    pub fn exact_side(&self, a: u16, b: u16, c: u16) -> i32 {
         if c == a || c == b {
             return 0;
         }
