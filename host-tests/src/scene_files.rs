@@ -171,11 +171,7 @@ impl View {
     }
 
     /// A place along an edge, on the image plane at distance 1 or in model units.
-    pub fn image(&self, edge: (u16, u16), along: Along) -> [f64; 2] {
-        let (p, q) = (
-            self.vertices[usize::from(edge.0)],
-            self.vertices[usize::from(edge.1)],
-        );
+    pub fn image(&self, (p, q): (Vertex, Vertex), along: Along) -> [f64; 2] {
         let s = along.numerator as f64 / along.denominator as f64;
         let part = |a: i32, b: i32| f64::from(a) + s * (f64::from(b) - f64::from(a));
         let depth = match self.projection {

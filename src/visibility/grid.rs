@@ -7,7 +7,7 @@
 use super::edges::Outlines;
 use super::faces::Faces;
 use super::outlook::{Outlook, Place};
-use super::raster::{Raster, Shape};
+use super::raster::{Bounds, Raster, Shape};
 use crate::geometry::COORDINATE_LIMIT;
 use crate::stage::{OutOfScratch, Scratch};
 use bytemuck::{Pod, Zeroable};
@@ -102,6 +102,16 @@ impl<'a> Grid<'a> {
         CellView {
             cover: (cover_depth < near).then_some(cover),
             faces: &self.entries[usize::from(begin)..usize::from(end)],
+        }
+    }
+
+    /// Visits the faces of every cell within a rectangle.
+    pub fn within(&self, bounds: &Bounds, mut visit: impl FnMut(&[u16])) {
+        let [column0, column1, row0, row1] = self.shape.span(bounds).map(usize::from);
+        for row in row0..=row1 {
+            for column in column0..=column1 {
+                visit(self.view(row * self.columns + column, 0).faces);
+            }
         }
     }
 

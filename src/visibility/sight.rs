@@ -7,10 +7,10 @@
 
 use super::edges::{ChosenSides, Outlines, sides};
 use super::faces::Face;
-use super::outlook::{CoarseLine, Outlook, Place};
+use super::outlook::{CoarseLine, End, Outlook, Place};
 use super::profile::{Part, Profile, mark};
 use super::triangles::Ears;
-use crate::geometry::{Along, line_side, page_offset, plane_side};
+use crate::geometry::{Along, line_side, page_offset, page_side, plane_side};
 use crate::model::Corner;
 
 /// What the search knows of the scene.
@@ -21,13 +21,32 @@ pub struct Surroundings<'a> {
     pub chosen: ChosenSides<'a>,
 }
 
-/// An edge that is being looked at.
+impl Surroundings<'_> {
+    /// One of the triangles of a face, from 0.
+    pub fn triangle(&self, face: Face, number: usize) -> Option<[u16; 3]> {
+        if face.has_ears {
+            return self.ears.of(face.first).get(number).copied();
+        }
+        let corners = self.outlines.element(face.first);
+        match corners.get(number + 1..number + 3) {
+            Some([b, c]) if face.is_fan => Some([corners[0].vertex(), b.vertex(), c.vertex()]),
+            _ => None,
+        }
+    }
+
+    /// The triangles of a face.
+    pub fn triangles(&self, face: Face) -> impl Iterator<Item = [u16; 3]> {
+        (0..).map_while(move |number| self.triangle(face, number))
+    }
+}
+
+/// An edge that is being looked at, or a seam.
 #[derive(Debug, Clone, Copy)]
 pub struct Sight {
-    /// The side that stands for it.
+    /// The side that stands for it; none for a seam.
     pub side: usize,
-    pub p: u16,
-    pub q: u16,
+    pub p: End,
+    pub q: End,
     /// Depth of its nearer end.
     pub near: i32,
     /// Depth of its farther end.
@@ -119,19 +138,41 @@ enum Depth {
 }
 
 impl Sight {
-    pub fn new(outlook: &Outlook<'_>, side: usize, p: u16, q: u16) -> Self {
-        let (z_p, z_q) = (outlook.vertex(p).z, outlook.vertex(q).z);
-        let (place_p, place_q) = (outlook.place(p), outlook.place(q));
+    /// The side of a seam, after those of all edges.
+    pub const NO_SIDE: usize = usize::MAX;
+
+    /// The edge between two ends, for which `side` stands.
+    pub fn new(side: usize, p: End, q: End) -> Self {
         Self {
             side,
             p,
             q,
-            near: z_p.min(z_q),
-            far: z_p.max(z_q),
-            low: place_p.low(place_q),
-            high: place_p.high(place_q),
-            line: CoarseLine::new(place_p, place_q),
+            near: p.vertex.z.min(q.vertex.z),
+            far: p.vertex.z.max(q.vertex.z),
+            low: p.place.low(q.place),
+            high: p.place.high(q.place),
+            line: CoarseLine::new(p.place, q.place),
         }
+    }
+
+    /// On which side of this edge's line a vertex lies on the page.
+    fn side_of(&self, outlook: &Outlook<'_>, number: u16) -> i32 {
+        let coarse = self.line.side(outlook.place(number));
+        if coarse != 0 {
+            coarse
+        } else {
+            self.exact_side_of(outlook, number)
+        }
+    }
+
+    /// [`Self::side_of`] without a look at the places.
+    #[cold]
+    fn exact_side_of(&self, outlook: &Outlook<'_>, number: u16) -> i32 {
+        if number == self.p.number || number == self.q.number {
+            return 0;
+        }
+        let vertex = outlook.vertex(number);
+        page_side(outlook.projection, self.p.vertex, self.q.vertex, vertex).signum() as i32
     }
 
     /// Marks what `face` does to this edge.
@@ -147,7 +188,7 @@ impl Sight {
             let place = outlook.place(number);
             (low, high) = (low.low(place), high.high(place));
             let mut side = 0;
-            if number != self.p && number != self.q {
+            if number != self.p.number && number != self.q.number {
                 side = self.line.side(place);
                 left &= side > 0;
                 right &= side < 0;
@@ -166,45 +207,30 @@ impl Sight {
         if count <= FEW_CORNERS {
             for (side, &number) in sides.iter_mut().zip(&numbers).take(count) {
                 if *side == 0 {
-                    *side = outlook.exact_side(self.p, self.q, number);
+                    *side = self.exact_side_of(outlook, number);
                 }
             }
             let piece = Piece::new(&numbers[..count], &sides);
             if !face.is_fan || !self.pass(outlook, piece, profile) {
-                self.pass_triangles(around, face, corners, profile);
+                self.pass_triangles(around, face, profile);
             }
             if piece.sides_on_line() == 0 {
                 return;
             }
         } else {
-            self.pass_triangles(around, face, corners, profile);
+            self.pass_triangles(around, face, profile);
         }
         self.pass_sides(around, face.first, corners, profile);
     }
 
-    fn pass_triangles(
-        &self,
-        around: &Surroundings<'_>,
-        face: Face,
-        corners: &[Corner],
-        profile: &mut Profile<'_>,
-    ) {
-        let outlook = &around.outlook;
-        if face.has_ears {
-            for triangle in around.ears.of(face.first) {
-                self.pass_triangle(outlook, triangle, profile);
-            }
-        } else if face.is_fan {
-            let apex = corners[0].vertex();
-            for pair in corners[1..].windows(2) {
-                let triangle = [apex, pair[0].vertex(), pair[1].vertex()];
-                self.pass_triangle(outlook, &triangle, profile);
-            }
+    fn pass_triangles(&self, around: &Surroundings<'_>, face: Face, profile: &mut Profile<'_>) {
+        for triangle in around.triangles(face) {
+            self.pass_triangle(&around.outlook, &triangle, profile);
         }
     }
 
     fn pass_triangle(&self, outlook: &Outlook<'_>, triangle: &[u16; 3], profile: &mut Profile<'_>) {
-        let sides = triangle.map(|corner| outlook.side(self.p, self.q, corner));
+        let sides = triangle.map(|corner| self.side_of(outlook, corner));
         self.pass(outlook, Piece::new(triangle, &sides), profile);
     }
 
@@ -280,11 +306,11 @@ impl Sight {
         for pair in corners[1..].windows(2) {
             let triangle = [corners[0], pair[0], pair[1]];
             let [a, b, c] = triangle.map(|corner| outlook.vertex(corner));
-            let height = |number: u16| {
-                if triangle.contains(&number) {
+            let height = |end: End| {
+                if triangle.contains(&end.number) {
                     0
                 } else {
-                    plane_side(a, b, c, outlook.vertex(number)) * i64::from(facing)
+                    plane_side(a, b, c, end.vertex) * i64::from(facing)
                 }
             };
             let here = behind_between(height(self.p), height(self.q));
@@ -344,7 +370,7 @@ impl Sight {
         corners: &[Corner],
         profile: &mut Profile<'_>,
     ) {
-        let is_on_line = |corner: u16| around.outlook.side(self.p, self.q, corner) == 0;
+        let is_on_line = |corner: u16| self.side_of(&around.outlook, corner) == 0;
         for (number, a, b) in sides(corners) {
             let side = first + number;
             if side != self.side && around.chosen.contains(side) && is_on_line(a) && is_on_line(b) {
@@ -364,7 +390,8 @@ impl Sight {
     ) {
         let outlook = &around.outlook;
         let projection = outlook.projection;
-        let [va, vb, vp, vq] = [a, b, self.p, self.q].map(|number| outlook.vertex(number));
+        let (va, vb) = (outlook.vertex(a), outlook.vertex(b));
+        let (vp, vq) = (self.p.vertex, self.q.vertex);
         let Some((axis, ahead)) = outlook.direction(vp, vq) else {
             return;
         };
