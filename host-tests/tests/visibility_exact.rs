@@ -2,20 +2,16 @@
 //!
 //! `PENUP_SCENES` sets how many scenes there are; 2,000 if it is not set.
 
-use num_bigint::BigInt;
-use num_rational::BigRational;
 use penup::model::Elements;
 use penup::stage::{Scratch, Undisturbed};
 use penup::visibility::{Along, Options, Scene, find_stretches, scratch_bytes};
 use penup_host_tests::exact_visibility::{Piece, pieces};
+use penup_host_tests::fraction::Fraction;
 use penup_host_tests::random_scenes::{RandomScene, random_scene};
 use penup_host_tests::scene_files::Stretches;
 
-fn fraction(along: Along) -> BigRational {
-    BigRational::new(
-        BigInt::from(along.numerator),
-        BigInt::from(along.denominator),
-    )
+fn fraction(along: Along) -> Fraction {
+    Fraction::new(along.numerator, along.denominator)
 }
 
 fn library_pieces(random: &RandomScene, spare_bytes: usize) -> Vec<Piece> {
