@@ -49,7 +49,7 @@ fn main() -> std::io::Result<()> {
                 &mut stretches,
             );
             best = best.min(start.elapsed().as_secs_f64() * 1e3);
-            assert_eq!(result, Ok(()));
+            assert!(result.is_ok(), "{result:?}");
             count = stretches.0.len();
         }
         println!("{name}: {best:.3} ms, {count} stretches, at least {least} bytes");

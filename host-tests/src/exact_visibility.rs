@@ -1,24 +1,24 @@
-//! Visibility by definition: big rationals, every edge against everything, no short cut.
+//! Visibility by definition: exact fractions, every edge against everything, no short cut.
 //!
 //! An edge is cut at every place of the page where anything can change: where a side of a face
 //! or another edge crosses or touches it, where it passes through the plane of a face. Between two
 //! such places the midpoint speaks for the whole piece. A face counts as the plane polygon that it is
 //! (inside by the parity of crossings), so faces must be plane and must not cross themselves.
 
+use crate::fraction::Fraction;
 use num_bigint::BigInt;
-use num_rational::BigRational;
-use num_traits::{One, Signed, Zero};
+use num_traits::Zero;
 use penup::geometry::{Projection, Vertex};
 use penup::model::Corner;
 
 /// A piece of an edge: its ends, from and to as fractions of its length in space, whether it is seen.
-pub type Piece = ((u16, u16), BigRational, BigRational, bool);
+pub type Piece = ((u16, u16), Fraction, Fraction, bool);
 
-type Number = BigRational;
+type Number = Fraction;
 type Point = [Number; 2];
 
 fn whole(value: i32) -> Number {
-    Number::from_integer(BigInt::from(value))
+    Number::whole(value)
 }
 
 fn half(value: Number) -> Number {
@@ -112,7 +112,10 @@ impl World {
                 polygon.low[n] > *(&p[n]).max(&q[n]) || polygon.high[n] < *(&p[n]).min(&q[n])
             })
         };
-        self.polygons.iter().filter(|polygon| !apart(polygon)).collect()
+        self.polygons
+            .iter()
+            .filter(|polygon| !apart(polygon))
+            .collect()
     }
 
     /// Depth of a plane at a point of the page; `None` if it is seen edge-on.
@@ -367,7 +370,7 @@ fn plane_of(corners: &[&Vertex]) -> Option<[Number; 4]> {
                     "the model takes plane faces only"
                 );
                 let [x, y, z] = normal;
-                return Some([x, y, z, d].map(Number::from_integer));
+                return Some([x, y, z, d].map(|part| Number::new(part, 1)));
             }
         }
     }

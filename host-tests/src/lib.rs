@@ -9,6 +9,7 @@ pub mod event_checker;
 pub mod motion_optimum;
 pub mod pin_machine;
 pub mod exact_visibility;
+pub mod fraction;
 pub mod random_scenes;
 pub mod scene_files;
 pub mod convex_any_faces;

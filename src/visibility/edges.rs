@@ -1,6 +1,8 @@
 //! The distinct edges: which side of which element stands for each edge of the model.
 
 use super::VisibilityError;
+use super::crease::Crease;
+use crate::geometry::{Projection, Vertex};
 use crate::model::Corner;
 use crate::stage::{Attention, Scratch};
 
@@ -53,6 +55,9 @@ pub struct ChosenSides<'a> {
     bits: &'a mut [u32],
 }
 
+/// Steps along chains and outlines, some 20 instructions each.
+const WORK_BETWEEN_CHECKS: usize = 2000;
+
 /// No side: the end of a chain.
 const NONE: u16 = u16::MAX;
 
@@ -67,22 +72,32 @@ impl<'a> ChosenSides<'a> {
 
     /// Bytes taken while the sides are being chosen.
     pub const fn bytes_while_choosing(vertices: usize, corners: usize) -> usize {
-        Scratch::bytes_for::<u16>(vertices) + Scratch::bytes_for::<u16>(corners)
+        Scratch::bytes_for::<u16>(vertices)
+            + Scratch::bytes_for::<u16>(corners)
+            + Self::bytes(corners)
     }
 
-    /// Chooses the first side of each edge, whoever shares it.
+    /// Chooses the first side of each edge, whoever shares it; with a crease, only of edges that it keeps.
     pub fn choose(
         outlines: Outlines<'_>,
-        vertices: usize,
+        projection: Projection,
+        vertices: &[Vertex],
+        crease: Option<Crease>,
         scratch: &mut Scratch<'a>,
         attention: &mut dyn Attention,
     ) -> Result<Self, VisibilityError> {
         let corners = outlines.corners;
-        let bits = scratch.take(corners.len().div_ceil(32))?;
-        let chosen = Self { bits };
+        let word_count = corners.len().div_ceil(32);
+        let mut chosen = Self {
+            bits: scratch.take(word_count)?,
+        };
         let mut meantime = scratch.reborrow();
-        let heads: &mut [u16] = meantime.take(vertices)?;
+        let heads: &mut [u16] = meantime.take(vertices.len())?;
         let next: &mut [u16] = meantime.take(corners.len())?;
+        // Edges that have met a second side.
+        let mut shared = ChosenSides {
+            bits: meantime.take(word_count)?,
+        };
         heads.fill(NONE);
         let mut work = 0;
         for (first, element) in outlines.elements() {
@@ -93,9 +108,11 @@ impl<'a> ChosenSides<'a> {
                 let side = first + number;
                 let head = &mut heads[usize::from(from.min(to))];
                 let mut known = *head;
+                let mut turned = false;
                 while known != NONE {
                     let (a, b) = side_at(corners, usize::from(known));
-                    if (a, b) == (from, to) || (a, b) == (to, from) {
+                    turned = (a, b) == (from, to);
+                    if turned || (a, b) == (to, from) {
                         break;
                     }
                     known = next[usize::from(known)];
@@ -104,16 +121,39 @@ impl<'a> ChosenSides<'a> {
                 if known == NONE {
                     next[side] = *head;
                     *head = side as u16;
-                    chosen.bits[side / 32] |= 1 << (side % 32);
+                    chosen.insert(side);
+                } else if let Some(crease) = crease {
+                    let known = usize::from(known);
+                    let known_element = outlines.element(start_of(corners, known));
+                    let is_open =
+                        is_bar(element) || is_bar(known_element) || shared.contains(known);
+                    shared.insert(known);
+                    let at = |corner: &Corner| vertices[usize::from(corner.vertex())];
+                    let (mut one, mut other) =
+                        (known_element.iter().map(at), element.iter().map(at));
+                    let end = vertices[usize::from(from)];
+                    if is_open || crease.keeps(projection, end, [&mut one, &mut other], turned) {
+                        chosen.insert(known);
+                    } else {
+                        chosen.remove(known);
+                    }
                 }
             }
             work += element.len();
-            if work > 2000 {
+            if work > WORK_BETWEEN_CHECKS {
                 work = 0;
                 attention.check()?;
             }
         }
         Ok(chosen)
+    }
+
+    fn insert(&mut self, side: usize) {
+        self.bits[side / 32] |= 1 << (side % 32);
+    }
+
+    fn remove(&mut self, side: usize) {
+        self.bits[side / 32] &= !(1 << (side % 32));
     }
 
     /// Whether the side that begins at corner `side` stands for its edge.
@@ -123,12 +163,19 @@ impl<'a> ChosenSides<'a> {
     }
 }
 
+/// The first corner of the element to which a corner belongs.
+fn start_of(corners: &[Corner], corner: usize) -> usize {
+    let before = corners[..corner]
+        .iter()
+        .rposition(|corner| corner.is_last());
+    before.map_or(0, |last| last + 1)
+}
+
 /// The two ends of the side that begins at a corner.
 fn side_at(corners: &[Corner], side: usize) -> (u16, u16) {
     let from = corners[side];
     let to = if from.is_last() {
-        let before = corners[..side].iter().rposition(|corner| corner.is_last());
-        corners[before.map_or(0, |last| last + 1)]
+        corners[start_of(corners, side)]
     } else {
         corners[side + 1]
     };

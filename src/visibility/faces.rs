@@ -1,6 +1,6 @@
 //! The faces in order of their nearest point.
 
-use super::edges::Outlines;
+use super::edges::{Outlines, is_bar};
 use super::triangles::{Cut, cut_of};
 use crate::geometry::{COORDINATE_LIMIT, Vertex};
 use crate::stage::{OutOfScratch, Scratch};
@@ -11,6 +11,7 @@ use crate::stage::{OutOfScratch, Scratch};
 #[derive(Debug)]
 pub struct Faces<'a> {
     order: &'a mut [u32],
+    degenerate: u32,
 }
 
 /// One element.
@@ -25,12 +26,13 @@ pub struct Face {
 }
 
 impl<'a> Faces<'a> {
-    /// Sorts the elements; the number of those without area comes with them.
+    /// Sorts the elements.
     pub fn sort(
         outlines: Outlines<'_>,
         vertices: &[Vertex],
         scratch: &mut Scratch<'a>,
     ) -> Result<Self, OutOfScratch> {
+        let mut degenerate = 0;
         let order: &mut [u32] = scratch.take(outlines.elements().count())?;
         for (key, (first, corners)) in order.iter_mut().zip(outlines.elements()) {
             let near = corners
@@ -40,14 +42,22 @@ impl<'a> Faces<'a> {
                 .unwrap_or(0);
             let depth = ((near + COORDINATE_LIMIT) >> 7) as u32;
             let cut = match cut_of(corners, vertices) {
-                Cut::None => 0,
+                Cut::None => {
+                    degenerate += u32::from(!is_bar(corners));
+                    0
+                }
                 Cut::Fan => 1,
                 Cut::Ears => 2,
             };
             *key = depth.min(0x3FFF) << 18 | cut << 16 | first as u32;
         }
         order.sort_unstable();
-        Ok(Self { order })
+        Ok(Self { order, degenerate })
+    }
+
+    /// How many of the faces have no area.
+    pub fn degenerate(&self) -> u32 {
+        self.degenerate
     }
 
     /// How many there are.

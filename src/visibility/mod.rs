@@ -12,16 +12,19 @@
 //!   first of the model.
 //! * An edge that the eye sees end-on has no length on the page and no stretch.
 //!
-//! The way: choose one side of a face for each edge (`edges`), place the vertices on a coarse grid of
-//! the page (`outlook`), cut concave faces (`triangles`), sort the faces by depth (`faces`) and into
-//! cells (`grid`); then follow each edge through the cells and mark on its `profile` what each
-//! face hides (`sight`). Refused: vertices out of range, a model too large, too little memory.
+//! The way: choose one side of a face for each edge ([`edges`]), place the vertices on a coarse grid of
+//! the page ([`outlook`]), cut concave faces ([`triangles`]), sort the faces by depth ([`faces`]) and into
+//! cells ([`grid`]); then follow each edge through the cells and mark on its [`profile`] what each
+//! face hides ([`sight`]). Refused: vertices out of range, a model too large, too little memory.
 
+mod crease;
 mod edges;
 mod faces;
 mod grid;
 mod outlook;
 mod profile;
+mod raster;
+mod seams;
 mod sight;
 mod triangles;
 
@@ -32,11 +35,14 @@ use edges::{ChosenSides, MOST_CORNERS, Outlines, sides};
 use faces::Faces;
 use grid::Grid;
 use outlook::{Outlook, Place};
-use profile::{FEWEST_PIECES, Piece, Profile, mark};
+use profile::{FEWEST_PIECES, Part, Piece, Profile, mark};
+use raster::Bounds;
+use seams::seam;
 use sight::{Sight, Surroundings};
 use triangles::Ears;
 
 pub use crate::geometry::Along;
+pub use crease::Crease;
 
 /// A scene as the camera sees it: rounded vertices, and the faces and bars between them.
 #[derive(Debug, Clone, Copy)]
@@ -54,13 +60,27 @@ pub struct Scene<'a> {
 pub struct Options {
     /// Also hand over the hidden stretches (dotted or shown).
     pub with_hidden: bool,
+    /// Also hand over what is seen of the seams, where faces pass through each other.
+    pub with_seams: bool,
+    /// Draw only silhouettes, open edges and edges sharper than this; `None` draws every edge.
+    pub crease: Option<Crease>,
 }
 
-/// A longest piece of one edge that is all visible or all hidden.
+/// What was found on the way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Report {
+    /// Faces without an area, which hide nothing; their edges are drawn.
+    pub degenerate_faces: u32,
+}
+
+/// A longest piece of one edge that is all visible or all hidden, or a visible piece of a seam.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stretch {
-    /// The vertices that the edge joins.
-    pub edge: (u16, u16),
+    /// The numbers of the vertices that the edge joins; `None` for a seam.
+    pub edge: Option<(u16, u16)>,
+    /// Those vertices, or the ends of the seam, rounded.
+    pub ends: (Vertex, Vertex),
     /// Where it begins.
     pub from: Along,
     /// Where it ends, after `from`.
@@ -119,7 +139,9 @@ impl From<Aborted> for VisibilityError {
 ///
 /// It uses more where it is given more: a finer grid, so that fewer faces are tried for each edge.
 pub fn scratch_bytes(scene: &Scene<'_>) -> usize {
-    let outlines = Outlines { corners: scene.elements.corners() };
+    let outlines = Outlines {
+        corners: scene.elements.corners(),
+    };
     let corners = outlines.corners.len();
     let vertices = scene.vertices.len();
     let faces = outlines.elements().count();
@@ -128,7 +150,7 @@ pub fn scratch_bytes(scene: &Scene<'_>) -> usize {
         + ChosenSides::bytes_while_choosing(vertices, corners).max(
             Scratch::bytes_for::<Place>(vertices)
                 + Scratch::bytes_for::<u32>(faces)
-                + Scratch::bytes_for::<u32>(faces.div_ceil(32))
+                + 2 * Scratch::bytes_for::<u32>(faces.div_ceil(32))
                 + Scratch::bytes_for::<Piece>(FEWEST_PIECES)
                 + Grid::least_bytes(faces),
         )
@@ -147,22 +169,41 @@ pub fn find_stretches(
     mut scratch: Scratch<'_>,
     attention: &mut dyn Attention,
     sink: &mut dyn StretchSink,
-) -> Result<(), VisibilityError> {
+) -> Result<Report, VisibilityError> {
     check(scene)?;
-    let outlines = Outlines { corners: scene.elements.corners() };
+    let outlines = Outlines {
+        corners: scene.elements.corners(),
+    };
     let vertices = scene.vertices;
-    let chosen = ChosenSides::choose(outlines, vertices.len(), &mut scratch, attention)?;
+    let chosen = ChosenSides::choose(
+        outlines,
+        scene.projection,
+        vertices,
+        options.crease,
+        &mut scratch,
+        attention,
+    )?;
     let ears = Ears::cut(outlines, vertices, &mut scratch, attention)?;
     let outlook = Outlook::new(scene.projection, vertices, &mut scratch)?;
     attention.check()?;
     let faces = Faces::sort(outlines, vertices, &mut scratch)?;
     attention.check()?;
     let seen = scratch.take(faces.len().div_ceil(32))?;
+    let met = if options.with_seams {
+        Some(scratch.take(faces.len().div_ceil(32))?)
+    } else {
+        None
+    };
     let piece_count = MOST_PIECES.min(scratch.available_bytes() / 8 / size_of::<Piece>());
     let pieces = scratch.take(piece_count.max(FEWEST_PIECES))?;
     let grid = Grid::new(&outlook, outlines, &faces, scratch)?;
     let mut search = Search {
-        around: Surroundings { outlook, outlines, ears, chosen },
+        around: Surroundings {
+            outlook,
+            outlines,
+            ears,
+            chosen,
+        },
         faces,
         grid,
         seen,
@@ -171,12 +212,19 @@ pub fn find_stretches(
     for (first, element) in outlines.elements() {
         attention.check()?;
         for (number, p, q) in sides(element) {
-            if search.around.chosen.contains(first + number) {
-                search.follow(first + number, p, q, options, sink)?;
+            let side = first + number;
+            if search.around.chosen.contains(side) {
+                let sight = Sight::new(side, outlook.end(p), outlook.end(q));
+                search.follow(&sight, [None; 2], options.with_hidden, sink)?;
             }
         }
     }
-    Ok(())
+    if let Some(met) = met {
+        search.follow_seams(met, attention, sink)?;
+    }
+    Ok(Report {
+        degenerate_faces: search.faces.degenerate(),
+    })
 }
 
 /// Refuses what the arithmetic cannot take.
@@ -185,8 +233,9 @@ fn check(scene: &Scene<'_>) -> Result<(), VisibilityError> {
     if corners.len() > MOST_CORNERS {
         return Err(VisibilityError::TooManyCorners(MOST_CORNERS));
     }
-    if let Some(corner) =
-        corners.iter().find(|corner| usize::from(corner.vertex()) >= scene.vertices.len())
+    if let Some(corner) = corners
+        .iter()
+        .find(|corner| usize::from(corner.vertex()) >= scene.vertices.len())
     {
         return Err(VisibilityError::UnknownVertex(corner.vertex()));
     }
@@ -217,32 +266,101 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Finds the stretches of the edge from `p` to `q`, for which `side` stands.
+    /// Finds the seams and what is seen of them. `met` has a bit for each rank.
+    fn follow_seams(
+        &mut self,
+        met: &mut [u32],
+        attention: &mut dyn Attention,
+        sink: &mut dyn StretchSink,
+    ) -> Result<(), VisibilityError> {
+        for one in 0..self.faces.len() {
+            attention.check()?;
+            self.meet(one, met);
+            for other in one + 1..self.faces.len() {
+                if met[other / 32] >> (other % 32) & 1 == 0 {
+                    continue;
+                }
+                attention.check()?;
+                let (face_one, face_other) = (self.faces.get(one), self.faces.get(other));
+                for n in 0.. {
+                    let Some(triangle_one) = self.around.triangle(face_one, n) else {
+                        break;
+                    };
+                    for m in 0.. {
+                        let Some(triangle_other) = self.around.triangle(face_other, m) else {
+                            break;
+                        };
+                        let outlook = &self.around.outlook;
+                        let corners = [triangle_one, triangle_other]
+                            .map(|triangle| triangle.map(|number| outlook.vertex(number)));
+                        if let Some((p, q)) = seam(corners[0], corners[1]) {
+                            let sight = Sight::new(
+                                Sight::NO_SIDE,
+                                outlook.free_end(p),
+                                outlook.free_end(q),
+                            );
+                            self.follow(&sight, [Some(one), Some(other)], false, sink)?;
+                        }
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Leaves in `met` the faces after `one` that may pass through it where something is seen.
+    fn meet(&self, one: usize, met: &mut [u32]) {
+        met.fill(0);
+        let outlook = &self.around.outlook;
+        let corners = self.around.outlines.element(self.faces.get(one).first);
+        let bounds = Bounds::of(outlook, corners);
+        let far = corners
+            .iter()
+            .map(|corner| outlook.vertex(corner.vertex()).z)
+            .max();
+        let far = far.unwrap_or(-COORDINATE_LIMIT);
+        self.grid.within(&bounds, |ranks| {
+            for &other in ranks {
+                let other = usize::from(other);
+                if self.faces.begins_behind(other, far) {
+                    break;
+                }
+                if other > one {
+                    met[other / 32] |= 1 << (other % 32);
+                }
+            }
+        });
+    }
+
+    /// Finds the stretches of an edge, or of the seam of two faces.
     fn follow(
         &mut self,
-        side: usize,
-        p: u16,
-        q: u16,
-        options: Options,
+        sight: &Sight,
+        seam_of: [Option<usize>; 2],
+        with_hidden: bool,
         sink: &mut dyn StretchSink,
     ) -> Result<(), VisibilityError> {
         let outlook = &self.around.outlook;
-        if outlook.direction(outlook.vertex(p), outlook.vertex(q)).is_none() {
+        let ends = (sight.p.vertex, sight.q.vertex);
+        if outlook.direction(ends.0, ends.1).is_none() {
             return Ok(());
         }
-        let sight = Sight::new(outlook, side, p, q);
+        let edge = (sight.side != Sight::NO_SIDE).then_some((sight.p.number, sight.q.number));
         let mut pending: Option<Stretch> = None;
         let mut start = Along::START;
         while start < Along::END {
             self.profile.open(start);
-            self.look_around(&sight);
+            self.look_around(sight, seam_of);
             let end = self.profile.end();
             let pieces = self.profile.pieces();
-            let ends = pieces.iter().skip(1).map(|piece| piece.from).chain([end]);
-            for (piece, to) in pieces.iter().zip(ends) {
+            let next = pieces.iter().skip(1).map(|piece| piece.from).chain([end]);
+            for (piece, to) in pieces.iter().zip(next) {
                 let visible = piece.marks & mark::HIDDEN != mark::HIDDEN;
-                let handed =
-                    if visible { piece.marks & mark::STOOD_IN == 0 } else { options.with_hidden };
+                let handed = if visible {
+                    piece.marks & mark::STOOD_IN == 0
+                } else {
+                    with_hidden
+                };
                 match &mut pending {
                     Some(stretch)
                         if handed && stretch.visible == visible && stretch.to == piece.from =>
@@ -251,7 +369,8 @@ impl Search<'_> {
                     }
                     _ => {
                         let next = handed.then_some(Stretch {
-                            edge: (p, q),
+                            edge,
+                            ends,
                             from: piece.from,
                             to,
                             visible,
@@ -271,15 +390,24 @@ impl Search<'_> {
     }
 
     /// Marks on the profile what every face along the way does to the edge.
-    fn look_around(&mut self, sight: &Sight) {
-        let Self { around, faces, grid, seen, profile } = self;
-        let (p, q) = (around.outlook.place(sight.p), around.outlook.place(sight.q));
+    fn look_around(&mut self, sight: &Sight, seam_of: [Option<usize>; 2]) {
+        let Self {
+            around,
+            faces,
+            grid,
+            seen,
+            profile,
+        } = self;
+        let (p, q) = (sight.p.place, sight.q.place);
         let near = grid::coarse_depth(sight.near);
         if grid.along(p, q, near, |cell| cell.cover.is_some()) {
-            profile.mark(Along::START, Along::END, mark::HIDDEN);
+            profile.mark(Part::WHOLE, mark::HIDDEN);
             return;
         }
         seen.fill(0);
+        for rank in seam_of.into_iter().flatten() {
+            seen[rank / 32] |= 1 << (rank % 32);
+        }
         let mut look_at = |rank: u16| {
             let word = &mut seen[usize::from(rank) / 32];
             let bit = 1 << (rank % 32);

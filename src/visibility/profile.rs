@@ -15,6 +15,40 @@ pub mod mark {
     pub const STOOD_IN: u64 = 4;
 }
 
+/// A part of an edge.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Part {
+    /// `None` at p.
+    pub from: Option<Along>,
+    /// `None` at q.
+    pub to: Option<Along>,
+}
+
+impl Part {
+    /// All of the edge.
+    pub const WHOLE: Self = Self {
+        from: None,
+        to: None,
+    };
+
+    /// What both have in common.
+    pub fn and(self, other: Self) -> Self {
+        let both =
+            |a: Option<Along>, b: Option<Along>, choose: fn(Along, Along) -> Along| match (a, b) {
+                (Some(a), Some(b)) => Some(choose(a, b)),
+                (a, b) => a.or(b),
+            };
+        Self {
+            from: both(self.from, other.from, Along::max),
+            to: both(self.to, other.to, Along::min),
+        }
+    }
+
+    fn is_empty(self) -> bool {
+        matches!((self.from, self.to), (Some(from), Some(to)) if from >= to)
+    }
+}
+
 /// A piece of an edge: from here to where the next piece begins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
@@ -41,14 +75,21 @@ pub const FEWEST_PIECES: usize = 4;
 impl<'a> Profile<'a> {
     /// A profile that keeps its pieces in `memory`, at least [`FEWEST_PIECES`].
     pub fn new(memory: &'a mut [Piece]) -> Self {
-        let mut profile = Self { memory, count: 0, end: Along::END };
+        let mut profile = Self {
+            memory,
+            count: 0,
+            end: Along::END,
+        };
         profile.open(Along::START);
         profile
     }
 
     /// Opens the window from `start` to the end of the edge, nothing covered.
     pub fn open(&mut self, start: Along) {
-        self.memory[0] = Piece { from: start, marks: 0 };
+        self.memory[0] = Piece {
+            from: start,
+            marks: 0,
+        };
         self.count = 1;
         self.end = Along::END;
     }
@@ -68,14 +109,13 @@ impl<'a> Profile<'a> {
         &self.memory[..self.count]
     }
 
-    /// Adds `marks` to everything between the two places.
-    pub fn mark(&mut self, from: Along, to: Along, marks: u64) {
-        let from = from.max(self.memory[0].from);
-        if from >= to.min(self.end) {
+    /// Adds `marks` to a part of the edge.
+    pub fn mark(&mut self, part: Part, marks: u64) {
+        if part.is_empty() || part.to.is_some_and(|to| to <= self.memory[0].from) {
             return;
         }
-        let first = self.split(from);
-        let last = if to < self.end { self.split(to) } else { self.count };
+        let first = part.from.map_or(0, |from| self.split(from));
+        let last = part.to.map_or(self.count, |to| self.split(to));
         for piece in &mut self.memory[first.min(self.count)..last.min(self.count)] {
             piece.marks |= marks;
             if piece.marks & mark::HIDDEN == mark::HIDDEN {
@@ -85,10 +125,14 @@ impl<'a> Profile<'a> {
         self.join(first);
     }
 
-    /// The number of the piece that begins at `place`, which is made if there is none.
+    /// The number of the first piece that begins at `place` or later; one is made to begin there if it
+    /// lies in the window.
     fn split(&mut self, place: Along) -> usize {
+        if place >= self.end {
+            return self.count;
+        }
         let after = self.memory[..self.count].partition_point(|piece| piece.from < place);
-        if after < self.count && self.memory[after].from == place {
+        if after == 0 || after < self.count && self.memory[after].from == place {
             return after;
         }
         if self.count == self.memory.len() {

@@ -7,10 +7,10 @@
 
 use super::edges::{ChosenSides, Outlines, sides};
 use super::faces::Face;
-use super::outlook::{Outlook, Place, coarse_side};
-use super::profile::{Profile, mark};
+use super::outlook::{CoarseLine, End, Outlook, Place};
+use super::profile::{Part, Profile, mark};
 use super::triangles::Ears;
-use crate::geometry::{Along, line_side, page_offset, plane_side};
+use crate::geometry::{Along, line_side, page_offset, page_side, plane_side};
 use crate::model::Corner;
 
 /// What the search knows of the scene.
@@ -21,162 +21,334 @@ pub struct Surroundings<'a> {
     pub chosen: ChosenSides<'a>,
 }
 
-/// An edge that is being looked at.
+impl Surroundings<'_> {
+    /// One of the triangles of a face, from 0.
+    pub fn triangle(&self, face: Face, number: usize) -> Option<[u16; 3]> {
+        if face.has_ears {
+            return self.ears.of(face.first).get(number).copied();
+        }
+        let corners = self.outlines.element(face.first);
+        match corners.get(number + 1..number + 3) {
+            Some([b, c]) if face.is_fan => Some([corners[0].vertex(), b.vertex(), c.vertex()]),
+            _ => None,
+        }
+    }
+
+    /// The triangles of a face.
+    pub fn triangles(&self, face: Face) -> impl Iterator<Item = [u16; 3]> {
+        (0..).map_while(move |number| self.triangle(face, number))
+    }
+}
+
+/// An edge that is being looked at, or a seam.
 #[derive(Debug, Clone, Copy)]
 pub struct Sight {
-    /// The side that stands for it.
+    /// The side that stands for it; none for a seam.
     pub side: usize,
-    pub p: u16,
-    pub q: u16,
+    pub p: End,
+    pub q: End,
     /// Depth of its nearer end.
     pub near: i32,
     /// Depth of its farther end.
     pub far: i32,
-    place_p: Place,
-    place_q: Place,
+    low: Place,
+    high: Place,
+    line: CoarseLine,
 }
 
-/// A side of a triangle, from corner to corner.
+/// A side of a face, from corner to corner.
 type Side = (u16, u16);
 
-/// Where the edge enters and leaves a triangle on the page: at a side, or not between its ends.
+/// A face, or a triangle of one, as the edge meets it.
+///
+/// For the points just to the left of the edge a corner on its line lies to the right, and the other
+/// way round; so each corner is left of the line or not, twice.
+#[derive(Clone, Copy)]
+struct Piece<'c> {
+    corners: &'c [u16],
+    /// One bit for each corner: whether it lies to the left.
+    left: u32,
+    /// The same, with those on the line.
+    left_or_on: u32,
+}
+
+impl<'c> Piece<'c> {
+    /// From the corners, at most [`FEW_CORNERS`], and the side of the line on which each lies.
+    fn new(corners: &'c [u16], sides: &[i32]) -> Self {
+        let (mut left, mut left_or_on) = (0, 0);
+        for (n, &side) in sides.iter().enumerate().take(corners.len()) {
+            left |= u32::from(side > 0) << n;
+            left_or_on |= u32::from(side >= 0) << n;
+        }
+        Self {
+            corners,
+            left,
+            left_or_on,
+        }
+    }
+
+    /// The mask of the corners, each put where the next one is.
+    fn shifted(&self, mask: u32) -> u32 {
+        let count = self.corners.len();
+        (mask << 1 | mask >> (count - 1)) & ((1 << count) - 1)
+    }
+
+    /// One bit for each side that crosses the line, at the corner where the side ends.
+    fn crossings(&self, left: u32) -> u32 {
+        left ^ self.shifted(left)
+    }
+
+    /// One bit for each side that lies on the line, at the corner where the side ends.
+    fn sides_on_line(&self) -> u32 {
+        let on = self.left ^ self.left_or_on;
+        on & self.shifted(on)
+    }
+
+    /// The side that ends at a corner.
+    fn side(&self, end: usize) -> Side {
+        let begin = end.checked_sub(1).unwrap_or(self.corners.len() - 1);
+        (self.corners[begin], self.corners[end])
+    }
+}
+
+/// Whether more than two bits are set.
+fn is_many(mask: u32) -> bool {
+    let without_one = mask & mask.wrapping_sub(1);
+    without_one & without_one.wrapping_sub(1) != 0
+}
+
+/// Faces with more corners are looked at triangle by triangle.
+const FEW_CORNERS: usize = 8;
+
+/// The sides at which the edge enters and leaves a piece of a face, if it does so between its ends.
+#[derive(Clone, Copy, Default, PartialEq)]
 struct Passage {
     entry: Option<Side>,
     exit: Option<Side>,
 }
 
+/// What a face does to an edge.
+enum Depth {
+    /// The edge does not lie behind it.
+    Before,
+    /// This part of the edge lies behind it.
+    Behind(Part),
+    /// That differs from triangle to triangle.
+    Mixed,
+}
+
 impl Sight {
-    pub fn new(outlook: &Outlook<'_>, side: usize, p: u16, q: u16) -> Self {
-        let (z_p, z_q) = (outlook.vertex(p).z, outlook.vertex(q).z);
+    /// The side of a seam, after those of all edges.
+    pub const NO_SIDE: usize = usize::MAX;
+
+    /// The edge between two ends, for which `side` stands.
+    pub fn new(side: usize, p: End, q: End) -> Self {
         Self {
             side,
             p,
             q,
-            near: z_p.min(z_q),
-            far: z_p.max(z_q),
-            place_p: outlook.place(p),
-            place_q: outlook.place(q),
+            near: p.vertex.z.min(q.vertex.z),
+            far: p.vertex.z.max(q.vertex.z),
+            low: p.place.low(q.place),
+            high: p.place.high(q.place),
+            line: CoarseLine::new(p.place, q.place),
         }
+    }
+
+    /// On which side of this edge's line a vertex lies on the page.
+    fn side_of(&self, outlook: &Outlook<'_>, number: u16) -> i32 {
+        let coarse = self.line.side(outlook.place(number));
+        if coarse != 0 {
+            coarse
+        } else {
+            self.exact_side_of(outlook, number)
+        }
+    }
+
+    /// [`Self::side_of`] without a look at the places.
+    #[cold]
+    fn exact_side_of(&self, outlook: &Outlook<'_>, number: u16) -> i32 {
+        if number == self.p.number || number == self.q.number {
+            return 0;
+        }
+        let vertex = outlook.vertex(number);
+        page_side(outlook.projection, self.p.vertex, self.q.vertex, vertex).signum() as i32
     }
 
     /// Marks what `face` does to this edge.
     pub fn look_at(&self, around: &Surroundings<'_>, face: Face, profile: &mut Profile<'_>) {
         let outlook = &around.outlook;
         let corners = around.outlines.element(face.first);
-        if self.passes_by(outlook, corners) {
-            return;
-        }
-        if face.is_fan {
-            let apex = corners[0].vertex();
-            for pair in corners[1..].windows(2) {
-                self.pass_triangle(outlook, [apex, pair[0].vertex(), pair[1].vertex()], profile);
-            }
-        } else if face.has_ears {
-            for &triangle in around.ears.of(face.first) {
-                self.pass_triangle(outlook, triangle, profile);
-            }
-        }
-        for (number, a, b) in sides(corners) {
-            if outlook.side(self.p, self.q, a) == 0 && outlook.side(self.p, self.q, b) == 0 {
-                self.pass_side(around, face.first + number, (a, b), profile);
-            }
-        }
-    }
-
-    /// Whether the face surely lies apart from the edge on the page.
-    fn passes_by(&self, outlook: &Outlook<'_>, corners: &[Corner]) -> bool {
-        let (p, q) = (self.place_p, self.place_q);
+        let mut numbers = [0; FEW_CORNERS];
+        let mut sides = [0; FEW_CORNERS];
         let (mut left, mut right) = (true, true);
-        let (mut x0, mut y0, mut x1, mut y1) = (u16::MAX, u16::MAX, 0, 0);
-        for corner in corners {
-            let place = outlook.place(corner.vertex());
-            (x0, y0) = (x0.min(place.x), y0.min(place.y));
-            (x1, y1) = (x1.max(place.x), y1.max(place.y));
-            let side = coarse_side(p, q, place);
-            left &= side > 0;
-            right &= side < 0;
-        }
-        left || right
-            || x0 > p.x.max(q.x)
-            || x1 < p.x.min(q.x)
-            || y0 > p.y.max(q.y)
-            || y1 < p.y.min(q.y)
-    }
-
-    fn pass_triangle(&self, outlook: &Outlook<'_>, triangle: [u16; 3], profile: &mut Profile<'_>) {
-        let [a, b, c] = triangle;
-        let holds = |number: u16| number == a || number == b || number == c;
-        let (holds_p, holds_q) = (holds(self.p), holds(self.q));
-        if holds_p && holds_q {
-            return;
-        }
-        let sides = triangle.map(|corner| outlook.side(self.p, self.q, corner));
-        let as_left = sides.map(|side| side > 0);
-        let as_right = sides.map(|side| side >= 0);
-        let crosses = |pattern: [bool; 3]| pattern[0] != pattern[1] || pattern[1] != pattern[2];
-        if !crosses(as_left) && !crosses(as_right) {
-            return;
-        }
-        let depths = triangle.map(|corner| outlook.vertex(corner).z);
-        if depths[0].min(depths[1]).min(depths[2]) >= self.far {
-            return;
-        }
-        let facing = outlook.side(a, b, c);
-        if facing == 0 {
-            return;
-        }
-        let mut behind = (Along::START, Along::END);
-        if depths[0].max(depths[1]).max(depths[2]) >= self.near {
-            let [va, vb, vc] = triangle.map(|corner| outlook.vertex(corner));
-            let height = |held: bool, number: u16| {
-                if held {
-                    0
-                } else {
-                    plane_side(va, vb, vc, outlook.vertex(number)) * i64::from(facing)
-                }
-            };
-            match behind_between(height(holds_p, self.p), height(holds_q, self.q)) {
-                Some(part) => behind = part,
-                None => return,
+        let (mut low, mut high) = (Place::HIGHEST, Place::LOWEST);
+        for (n, corner) in corners.iter().enumerate() {
+            let number = corner.vertex();
+            let place = outlook.place(number);
+            (low, high) = (low.low(place), high.high(place));
+            let mut side = 0;
+            if number != self.p.number && number != self.q.number {
+                side = self.line.side(place);
+                left &= side > 0;
+                right &= side < 0;
+            }
+            if n < FEW_CORNERS {
+                numbers[n] = number;
+                sides[n] = side;
             }
         }
-        let mut cover = |pattern: [bool; 3], marks: u64| {
-            if let Some(passage) = self.passage(outlook, triangle, pattern, facing) {
-                let place = |side: Option<Side>, end: Along| {
-                    side.map_or(end, |(a, b)| outlook.crossing(a, b, self.p, self.q))
-                };
-                let from = place(passage.entry, Along::START).max(behind.0);
-                let to = place(passage.exit, Along::END).min(behind.1);
-                profile.mark(from, to, marks);
+        // With all other corners on one side, a face that holds p or q meets the edge nowhere else,
+        // and where it holds both, it is not nearer.
+        if left || right || high.is_before(self.low) || self.high.is_before(low) {
+            return;
+        }
+        let count = corners.len();
+        if count <= FEW_CORNERS {
+            for (side, &number) in sides.iter_mut().zip(&numbers).take(count) {
+                if *side == 0 {
+                    *side = self.exact_side_of(outlook, number);
+                }
+            }
+            let piece = Piece::new(&numbers[..count], &sides);
+            if !face.is_fan || !self.pass(outlook, piece, profile) {
+                self.pass_triangles(around, face, profile);
+            }
+            if piece.sides_on_line() == 0 {
+                return;
+            }
+        } else {
+            self.pass_triangles(around, face, profile);
+        }
+        self.pass_sides(around, face.first, corners, profile);
+    }
+
+    fn pass_triangles(&self, around: &Surroundings<'_>, face: Face, profile: &mut Profile<'_>) {
+        for triangle in around.triangles(face) {
+            self.pass_triangle(&around.outlook, &triangle, profile);
+        }
+    }
+
+    fn pass_triangle(&self, outlook: &Outlook<'_>, triangle: &[u16; 3], profile: &mut Profile<'_>) {
+        let sides = triangle.map(|corner| self.side_of(outlook, corner));
+        self.pass(outlook, Piece::new(triangle, &sides), profile);
+    }
+
+    /// Marks what a piece of a face does to this edge. False, and nothing marked, if its triangles
+    /// must be asked one by one; a triangle never must.
+    fn pass(&self, outlook: &Outlook<'_>, piece: Piece<'_>, profile: &mut Profile<'_>) -> bool {
+        let corners = piece.corners;
+        let left = piece.crossings(piece.left);
+        let right = piece.crossings(piece.left_or_on);
+        if left | right == 0 {
+            return true;
+        }
+        if is_many(left) || is_many(right) {
+            return false;
+        }
+        let depth = |number: &u16| outlook.vertex(*number).z;
+        let (mut near, mut far) = (i32::MAX, i32::MIN);
+        for z in corners.iter().map(depth) {
+            (near, far) = (near.min(z), far.max(z));
+        }
+        if near >= self.far {
+            return true;
+        }
+        let mut facing = 0;
+        for pair in corners[1..].windows(2) {
+            let turn = outlook.side(corners[0], pair[0], pair[1]);
+            if facing * turn < 0 {
+                return false;
+            }
+            facing |= turn;
+        }
+        if facing == 0 {
+            return true;
+        }
+        let passages = [
+            self.passage(outlook, piece, left, facing),
+            self.passage(outlook, piece, right, facing),
+        ];
+        if passages == [None; 2] {
+            return true;
+        }
+        let behind = if far < self.near {
+            Part::WHOLE
+        } else {
+            match self.depth_behind(outlook, corners, facing) {
+                Depth::Before => return true,
+                Depth::Behind(part) => part,
+                Depth::Mixed => return false,
             }
         };
-        if as_left == as_right {
-            cover(as_left, mark::HIDDEN);
+        let mut cover = |passage: Option<Passage>, marks: u64| {
+            if let Some(Passage { entry, exit }) = passage {
+                let place = |(a, b): Side| outlook.crossing(a, b, self.p, self.q);
+                let inside = Part {
+                    from: entry.map(place),
+                    to: exit.map(place),
+                };
+                profile.mark(inside.and(behind), marks);
+            }
+        };
+        if left == right {
+            cover(passages[0], mark::HIDDEN);
         } else {
-            cover(as_left, mark::LEFT);
-            cover(as_right, mark::RIGHT);
+            cover(passages[0], mark::LEFT);
+            cover(passages[1], mark::RIGHT);
+        }
+        true
+    }
+
+    /// How the edge lies to the planes of a fan of triangles, all of which turn as `facing` says.
+    fn depth_behind(&self, outlook: &Outlook<'_>, corners: &[u16], facing: i32) -> Depth {
+        let mut depth = None;
+        for pair in corners[1..].windows(2) {
+            let triangle = [corners[0], pair[0], pair[1]];
+            let [a, b, c] = triangle.map(|corner| outlook.vertex(corner));
+            let height = |end: End| {
+                if triangle.contains(&end.number) {
+                    0
+                } else {
+                    plane_side(a, b, c, end.vertex) * i64::from(facing)
+                }
+            };
+            let here = behind_between(height(self.p), height(self.q));
+            if corners.len() > 3 {
+                let is_all = here == Some(Part::WHOLE);
+                if here.is_some() && !is_all || depth.is_some_and(|depth| depth != here) {
+                    return Depth::Mixed;
+                }
+            }
+            depth = Some(here);
+        }
+        match depth.flatten() {
+            Some(part) => Depth::Behind(part),
+            None => Depth::Before,
         }
     }
 
-    /// Where the edge passes the triangle, each corner taken to the left or not of the edge.
+    /// How the edge passes a piece of a face on the page, `None` if it does not meet it. `facing` is how
+    /// the piece turns.
     fn passage(
         &self,
         outlook: &Outlook<'_>,
-        triangle: [u16; 3],
-        pattern: [bool; 3],
+        piece: Piece<'_>,
+        crossings: u32,
         facing: i32,
     ) -> Option<Passage> {
-        let mut passage = Passage { entry: None, exit: None };
-        let mut crossed = false;
-        for n in 0..3 {
-            let next = (n + 1) % 3;
-            if pattern[n] == pattern[next] {
+        if crossings == 0 {
+            return None;
+        }
+        let mut passage = Passage::default();
+        for end in 0..piece.corners.len() {
+            if crossings >> end & 1 == 0 {
                 continue;
             }
-            crossed = true;
-            let side = (triangle[n], triangle[next]);
-            let p_inside = outlook.side(side.0, side.1, self.p) * facing;
-            let q_inside = outlook.side(side.0, side.1, self.q) * facing;
+            let side = piece.side(end);
+            let line = outlook.line(side.0, side.1);
+            let p_inside = line.side(self.p) * facing;
+            let q_inside = line.side(self.q) * facing;
             if p_inside <= 0 && q_inside <= 0 {
                 return None;
             }
@@ -186,7 +358,25 @@ impl Sight {
                 passage.exit = Some(side);
             }
         }
-        crossed.then_some(passage)
+        Some(passage)
+    }
+
+    /// Marks what the sides of an element do that lie on the line of this edge.
+    #[cold]
+    fn pass_sides(
+        &self,
+        around: &Surroundings<'_>,
+        first: usize,
+        corners: &[Corner],
+        profile: &mut Profile<'_>,
+    ) {
+        let is_on_line = |corner: u16| self.side_of(&around.outlook, corner) == 0;
+        for (number, a, b) in sides(corners) {
+            let side = first + number;
+            if side != self.side && around.chosen.contains(side) && is_on_line(a) && is_on_line(b) {
+                self.pass_side(around, side, (a, b), profile);
+            }
+        }
     }
 
     /// Marks where the side (a, b) of a face, on the line of this edge, is drawn in its place: where
@@ -198,12 +388,10 @@ impl Sight {
         (a, b): Side,
         profile: &mut Profile<'_>,
     ) {
-        if side == self.side || !around.chosen.contains(side) {
-            return;
-        }
         let outlook = &around.outlook;
         let projection = outlook.projection;
-        let [va, vb, vp, vq] = [a, b, self.p, self.q].map(|number| outlook.vertex(number));
+        let (va, vb) = (outlook.vertex(a), outlook.vertex(b));
+        let (vp, vq) = (self.p.vertex, self.q.vertex);
         let Some((axis, ahead)) = outlook.direction(vp, vq) else {
             return;
         };
@@ -224,28 +412,31 @@ impl Sight {
         let height = |vertex| line_side(projection, axis, va, vb, vertex);
         let heights = (height(vp), height(vq));
         let behind = if heights == (0, 0) {
-            (side < self.side).then_some((Along::START, Along::END))
+            (side < self.side).then_some(Part::WHOLE)
         } else {
             behind_between(heights.0, heights.1)
         };
         if let Some(behind) = behind {
             let (at_a, at_b) = (place(va), place(vb));
-            let from = at_a.min(at_b).max(behind.0);
-            let to = at_a.max(at_b).min(behind.1);
-            profile.mark(from, to, mark::STOOD_IN);
+            let beside = Part {
+                from: Some(at_a.min(at_b)),
+                to: Some(at_a.max(at_b)),
+            };
+            profile.mark(beside.and(behind), mark::STOOD_IN);
         }
     }
 }
 
 /// The part of an edge that lies behind something flat, from how far behind it p and q lie.
-fn behind_between(at_p: i64, at_q: i64) -> Option<(Along, Along)> {
+fn behind_between(at_p: i64, at_q: i64) -> Option<Part> {
     if at_p <= 0 && at_q <= 0 {
-        None
-    } else if at_p >= 0 && at_q >= 0 {
-        Some((Along::START, Along::END))
-    } else if at_p < 0 {
-        Some((Along::zero_between(at_p, at_q), Along::END))
-    } else {
-        Some((Along::START, Along::zero_between(at_p, at_q)))
+        return None;
     }
+    let mut part = Part::WHOLE;
+    if at_p < 0 {
+        part.from = Some(Along::zero_between(at_p, at_q));
+    } else if at_q < 0 {
+        part.to = Some(Along::zero_between(at_p, at_q));
+    }
+    Some(part)
 }

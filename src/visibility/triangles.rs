@@ -106,6 +106,31 @@ impl<'a> Ears<'a> {
     }
 }
 
+/// Twice the areas of a polygon projected along x, y and z (Newell): the direction is that of its normal.
+///
+/// A sum of 2^16 products of 2^20 and 2^21 at most.
+pub fn areas(polygon: &mut dyn Iterator<Item = Vertex>) -> [i64; 3] {
+    let mut areas = [0i64; 3];
+    let Some(first) = polygon.next() else {
+        return areas;
+    };
+    let mut add = |a: Vertex, b: Vertex| {
+        let product = |from: i32, to: i32, at: i32, with: i32| {
+            (i64::from(from) - i64::from(to)) * (i64::from(at) + i64::from(with))
+        };
+        areas[0] += product(a.y, b.y, a.z, b.z);
+        areas[1] += product(a.z, b.z, a.x, b.x);
+        areas[2] += product(a.x, b.x, a.y, b.y);
+    };
+    let mut before = first;
+    for vertex in polygon {
+        add(before, vertex);
+        before = vertex;
+    }
+    add(before, first);
+    areas
+}
+
 /// A coordinate plane, seen from the side from which a face runs anticlockwise.
 #[derive(Debug, Clone, Copy)]
 struct Plane {
@@ -115,19 +140,8 @@ struct Plane {
 
 impl Plane {
     /// The plane that a polygon leans to most; `None` if it has no area.
-    ///
-    /// The areas of its projections (Newell): a sum of 2^16 products of 2^20 and 2^20.
-    fn of(polygon: impl Iterator<Item = Vertex> + Clone) -> Option<Self> {
-        let next = polygon.clone().skip(1).chain(polygon.clone().take(1));
-        let mut areas = [0i64; 3];
-        for (a, b) in polygon.zip(next) {
-            let product = |rise: i32, fall: i32, sum: i32, with: i32| {
-                (i64::from(rise) - i64::from(fall)) * (i64::from(sum) + i64::from(with))
-            };
-            areas[0] += product(a.y, b.y, a.z, b.z);
-            areas[1] += product(a.z, b.z, a.x, b.x);
-            areas[2] += product(a.x, b.x, a.y, b.y);
-        }
+    fn of(mut polygon: impl Iterator<Item = Vertex>) -> Option<Self> {
+        let areas = areas(&mut polygon);
         let leans_to = (0..3).rev().max_by_key(|&axis| areas[axis].abs())?;
         (areas[leans_to] != 0).then_some(Self { leans_to, flipped: areas[leans_to] < 0 })
     }
