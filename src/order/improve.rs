@@ -20,7 +20,7 @@ use crate::stage::Scratch;
 /// Neighbours of each station that are worth the memory, and as few as are of any use.
 const NEIGHBOURS: core::ops::RangeInclusive<usize> = 4..=8;
 /// A kick changes moves that are at most so many moves apart.
-const KICK_REACH: u32 = 12;
+const KICK_REACH: u32 = 9;
 
 /// What a tour can come to.
 #[derive(Debug, Clone, Copy)]
