@@ -104,6 +104,18 @@ pub struct ViewArgs {
     /// What to do with hidden lines
     #[arg(long, value_enum, default_value = "erased", help_heading = "Camera")]
     pub hidden: Hidden,
+    /// Whether the lines are drawn where faces pass through each other
+    #[arg(long, value_enum, default_value = "on", help_heading = "Camera")]
+    pub seams: Switch,
+    /// Leave out edges between faces that bend less than so many degrees
+    #[arg(
+        long,
+        value_name = "DEGREES",
+        default_value = "0",
+        allow_hyphen_values = true,
+        help_heading = "Camera"
+    )]
+    pub crease: f64,
     /// A4, A3, Letter, or width x height in mm, such as 300x200
     #[arg(long, value_name = "PAGE", value_parser = page, default_value = "A4", allow_hyphen_values = true,
           help_heading = "Page")]
@@ -139,6 +151,11 @@ impl ViewArgs {
                 Behind::Clip => "clip",
                 Behind::Refuse => "refuse",
             },
+            seams: match self.seams {
+                Switch::On => "on",
+                Switch::Off => "off",
+            },
+            crease: self.crease,
             hidden: match self.hidden {
                 Hidden::Erased => "erased",
                 Hidden::Dotted => "dotted",
@@ -157,6 +174,15 @@ fn projection(text: &str) -> Result<String, String> {
         Ok(_) => Ok(text.to_owned()),
         Err(refusal) => Err(refusal.to_string()),
     }
+}
+
+/// On or off.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Switch {
+    /// Yes
+    On,
+    /// No
+    Off,
 }
 
 /// What becomes of what is behind the eye.

@@ -1,7 +1,8 @@
 //! What came of a job, and the settings that it was done with.
 
 use crate::protocol::{
-    ANGLES, AT, BEHIND, CLEAR, EYE, FIT, HIDDEN, MARGIN, PAGE, PROJECTION, UP, VIEW_AUTO, setting,
+    ANGLES, AT, BEHIND, CLEAR, CREASE, EYE, FIT, HIDDEN, MARGIN, PAGE, PROJECTION, SEAMS, UP,
+    VIEW_AUTO, setting,
 };
 use crate::source::JobLine;
 use serde::Serialize;
@@ -110,6 +111,10 @@ pub struct Settings {
     pub projection: String,
     /// `clip` or `refuse`.
     pub behind: &'static str,
+    /// `on` or `off`.
+    pub seams: &'static str,
+    /// Degrees.
+    pub crease: f64,
     /// `erased`, `dotted` or `shown`.
     pub hidden: &'static str,
     /// The page.
@@ -131,6 +136,8 @@ pub fn job_lines(file: Vec<JobLine>, settings: &Settings) -> Vec<JobLine> {
     let commands = std::iter::once(VIEW_AUTO.to_owned()).chain(points).chain([
         format!("{PROJECTION}={}", settings.projection),
         format!("{BEHIND}={}", settings.behind),
+        format!("{SEAMS}={}", settings.seams),
+        setting(CREASE, &[settings.crease], ','),
         format!("{HIDDEN}={}", settings.hidden),
         setting(PAGE, &[page.width, page.height], 'x'),
         setting(MARGIN, &[settings.margin], ','),
@@ -181,6 +188,8 @@ mod tests {
             angles: None,
             projection: "perspective".to_owned(),
             behind: "clip",
+            seams: "on",
+            crease: 0.0,
             hidden: "dotted",
             page: Page { width: 210.0, height: 297.0 },
             margin: 7.5,
@@ -198,6 +207,8 @@ mod tests {
                 "$up=0,0,1",
                 "$projection=perspective",
                 "$behind=clip",
+                "$seams=on",
+                "$crease=0",
                 "$hidden=dotted",
                 "$page=210x297",
                 "$margin=7.5",

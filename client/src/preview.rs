@@ -159,8 +159,9 @@ impl Attention for StopWatch {
 struct Segments(Vec<[f64; 4]>);
 
 impl Observer for Segments {
-    fn stretch(&mut self, view: &View, p: Vertex, q: Vertex, stretch: &Stretch) {
+    fn stretch(&mut self, view: &View, stretch: &Stretch) {
         if stretch.visible {
+            let (p, q) = stretch.ends;
             let [[x1, y1], [x2, y2]] = [stretch.from, stretch.to].map(|end| image(view, p, q, end));
             self.0.push([x1, y1, x2, y2]);
         }

@@ -23,6 +23,10 @@ pub const UP: &str = "$up";
 pub const ANGLES: &str = "$angles";
 /// What becomes of what is behind the eye.
 pub const BEHIND: &str = "$behind";
+/// Whether faces that pass through each other show where.
+pub const SEAMS: &str = "$seams";
+/// Edges that bend less are left out.
+pub const CREASE: &str = "$crease";
 /// Perspective or another.
 pub const PROJECTION: &str = "$projection";
 /// What is done with hidden lines.

@@ -66,7 +66,7 @@ pub fn is_seen_alike(dice: &mut Dice, stretches: impl Fn(&Scene<'_>) -> Vec<Stre
     let scene = Scene { vertices: &vertices, elements: Elements::new(&faces.corners), projection };
     let mut seen: BTreeMap<(u16, u16), Vec<bool>> = BTreeMap::new();
     for stretch in stretches(&scene) {
-        let (a, b) = stretch.edge;
+        let Some((a, b)) = stretch.edge else { continue };
         seen.entry((a.min(b), a.max(b))).or_default().push(stretch.visible);
     }
     for (ends, sight) in &faces.sights {

@@ -112,10 +112,7 @@ impl World {
                 polygon.low[n] > *(&p[n]).max(&q[n]) || polygon.high[n] < *(&p[n]).min(&q[n])
             })
         };
-        self.polygons
-            .iter()
-            .filter(|polygon| !apart(polygon))
-            .collect()
+        self.polygons.iter().filter(|polygon| !apart(polygon)).collect()
     }
 
     /// Depth of a plane at a point of the page; `None` if it is seen edge-on.

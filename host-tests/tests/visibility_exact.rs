@@ -24,10 +24,7 @@ fn library_pieces(random: &RandomScene, spare_bytes: usize) -> Vec<Piece> {
     let mut stretches = Stretches::default();
     let result = find_stretches(
         &scene,
-        Options {
-            with_hidden: true,
-            ..Options::default()
-        },
+        Options { with_hidden: true, ..Options::default() },
         Scratch::new(&mut words),
         &mut Undisturbed,
         &mut stretches,

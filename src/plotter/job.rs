@@ -4,7 +4,6 @@ use super::PlotOptions;
 use crate::drawing::{
     Bounds, Drawing, Line, LineType, PageMap, PagePoint, StepsPerMillimetre, Stored, organise,
 };
-use crate::geometry::Vertex;
 use crate::machine::{Path, Target};
 use crate::model::{Element, Model, ModelError};
 use crate::order::{self, Leg, OrderError};
@@ -15,8 +14,8 @@ use crate::visibility::{self, Scene, SinkFull, Stretch, StretchSink, VisibilityE
 
 /// Who is shown each stretch as it is found, in view coordinates: the preview.
 pub trait Observer {
-    /// One stretch of the edge from `p` to `q`, seen through `view`.
-    fn stretch(&mut self, view: &View, p: Vertex, q: Vertex, stretch: &Stretch);
+    /// One stretch, seen through `view`.
+    fn stretch(&mut self, view: &View, stretch: &Stretch);
 
     /// One bar of a plan, as it lies on the page.
     fn plan_bar(&mut self, from: [f64; 2], to: [f64; 2]);
@@ -27,7 +26,7 @@ pub trait Observer {
 pub struct Unobserved;
 
 impl Observer for Unobserved {
-    fn stretch(&mut self, _: &View, _: Vertex, _: Vertex, _: &Stretch) {}
+    fn stretch(&mut self, _: &View, _: &Stretch) {}
     fn plan_bar(&mut self, _: [f64; 2], _: [f64; 2]) {}
 }
 
@@ -205,11 +204,11 @@ fn project(
     let room = line_memory.available_bytes() / size_of::<Line>();
     let lines = line_memory.take(room).map_err(Refusal::DrawingTooLarge)?;
     let collector = Collector { lines, count: 0 };
-    let mut sink = PageSink { collector, scene, map, view, hidden: options.hidden, observer };
-    let options = visibility::Options { with_hidden: options.hidden != HiddenLines::Erased };
+    let mut sink = PageSink { collector, map, view, hidden: options.hidden, observer };
+    let options = options.visibility(&view);
     let found = visibility::find_stretches(&scene, options, stage_memory, attention, &mut sink);
     let count = match found {
-        Ok(()) => sink.collector.count,
+        Ok(_) => sink.collector.count,
         Err(VisibilityError::SinkFull) => return Err(sink.collector.out_of_memory()),
         Err(VisibilityError::Scratch(missing)) => return Err(Refusal::DrawingTooLarge(missing)),
         Err(VisibilityError::Aborted) => return Err(Refusal::Aborted),
@@ -279,7 +278,6 @@ impl<'a> Collector<'a> {
 /// Puts each stretch on the page.
 struct PageSink<'a> {
     collector: Collector<'a>,
-    scene: Scene<'a>,
     map: PageMap,
     view: View,
     hidden: HiddenLines,
@@ -288,11 +286,10 @@ struct PageSink<'a> {
 
 impl StretchSink for PageSink<'_> {
     fn stretch(&mut self, stretch: Stretch) -> Result<(), SinkFull> {
-        let ends = [stretch.edge.0, stretch.edge.1]
-            .map(|number| self.scene.vertices.get(usize::from(number)));
-        let [Some(&p), Some(&q)] = ends else { return Ok(()) };
+        let (p, q) = stretch.ends;
         // The cut along the near plane is no edge of the model.
-        if self.view.near().is_some_and(|near| p.z == near && q.z == near) {
+        let is_cut = |near| p.z == near && q.z == near && stretch.edge.is_some();
+        if self.view.near().is_some_and(is_cut) {
             return Ok(());
         }
         let line_type = match (stretch.visible, self.hidden) {
@@ -300,9 +297,9 @@ impl StretchSink for PageSink<'_> {
             (false, HiddenLines::Dotted) => LineType::Dotted,
             (false, HiddenLines::Erased) => return Ok(()),
         };
-        self.observer.stretch(&self.view, p, q, &stretch);
+        self.observer.stretch(&self.view, &stretch);
         let [from, to] =
-            [stretch.from, stretch.to].map(|end| self.map.along(p, q, end, self.scene.projection));
+            [stretch.from, stretch.to].map(|end| self.map.along(p, q, end, self.view.projection()));
         self.collector.line(from, to, line_type)
     }
 }

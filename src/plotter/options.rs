@@ -5,7 +5,8 @@ use crate::fixed::Millimetres;
 use crate::model::Model;
 use crate::order;
 use crate::protocol::{HiddenLines, PlotOption, ProjectionChoice};
-use crate::view::{Camera, Direction, Lens, Sight};
+use crate::view::{Camera, Direction, Lens, Sight, View};
+use crate::visibility::{self, Crease};
 
 /// What is drawn and how.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,6 +20,10 @@ pub struct PlotOptions {
     pub clip_behind: bool,
     /// What becomes of hidden lines.
     pub hidden: HiddenLines,
+    /// Whether the lines are drawn where faces pass through each other.
+    pub seams: bool,
+    /// Edges between faces that bend less, in degrees, are not drawn; 0 draws every edge.
+    pub crease: f64,
     /// The sheet.
     pub page: Page,
     /// Whether a plan is scaled to the page.
@@ -39,6 +44,8 @@ impl Default for PlotOptions {
             projection: ProjectionChoice::default(),
             clip_behind: true,
             hidden: HiddenLines::Erased,
+            seams: true,
+            crease: 0.0,
             page: Page { width, height, margin },
             fit: false,
             order: order::Options {
@@ -64,6 +71,8 @@ impl PlotOptions {
             PlotOption::Projection(projection) => self.projection = projection,
             PlotOption::ClipBehind(clip) => self.clip_behind = clip,
             PlotOption::Hidden(hidden) => self.hidden = hidden,
+            PlotOption::Seams(seams) => self.seams = seams,
+            PlotOption::Crease(crease) => self.crease = crease,
             PlotOption::Page { width, height } => {
                 (self.page.width, self.page.height) = (width, height)
             }
@@ -97,6 +106,16 @@ impl PlotOptions {
         Some(camera)
     }
 
+    /// What visibility is to find through `view`.
+    pub fn visibility(&self, view: &View) -> visibility::Options {
+        let crease = (self.crease > 0.0).then(|| Crease {
+            cosine: libm::round(libm::cos(self.crease.to_radians()) * 32768.0) as i32,
+            depth_stretch: view.depth_stretch(),
+        });
+        let with_hidden = self.hidden != HiddenLines::Erased;
+        visibility::Options { with_hidden, with_seams: self.seams, crease }
+    }
+
     /// What stands for each option that is set, as `$options` lists it.
     pub fn list(&self, mut line: impl FnMut(core::fmt::Arguments<'_>)) {
         let places = [("eye", self.eye), ("at", self.at), ("up", self.up), ("angles", self.angles)];
@@ -127,6 +146,8 @@ impl PlotOptions {
         };
         line(format_args!("$behind={}", if self.clip_behind { "clip" } else { "refuse" }));
         line(format_args!("$hidden={hidden}"));
+        line(format_args!("$seams={}", if self.seams { "on" } else { "off" }));
+        line(format_args!("$crease={}", self.crease));
         line(format_args!("$page={}x{}", self.page.width, self.page.height));
         line(format_args!("$margin={}", self.page.margin));
         line(format_args!("$fit={}", if self.fit { "on" } else { "off" }));

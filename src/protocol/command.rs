@@ -61,6 +61,10 @@ pub enum PlotOption {
     ClipBehind(bool),
     /// `$hidden=erased|dotted|shown`
     Hidden(HiddenLines),
+    /// `$seams=on|off`: where faces pass through each other.
+    Seams(bool),
+    /// `$crease=DEGREES`: edges less sharp are not drawn.
+    Crease(f64),
     /// `$page=WIDTHxHEIGHT` in mm
     Page {
         /// Along x.
@@ -168,6 +172,8 @@ pub const HELP: &[(&str, &str)] = &[
     ),
     ("$behind=clip|refuse", "what becomes of what is behind the eye"),
     ("$hidden=erased|dotted|shown", "what becomes of hidden lines"),
+    ("$seams=on|off", "whether the lines are drawn where faces pass through each other"),
+    ("$crease=DEGREES", "leave out edges between faces that bend less; 0 draws every edge"),
     ("$page=WIDTHxHEIGHT", "size of the sheet in mm"),
     ("$margin=MM", "what stays free on each side of the sheet"),
     ("$fit=on|off", "scale a plan to the page, or draw it at true size"),
@@ -264,16 +270,26 @@ impl PlotOption {
                 }
                 Self::Margin(margin)
             }
-            "fit" => Self::Fit(match value {
-                "on" => true,
-                "off" => false,
-                _ => {
-                    return Err(Refusal::NotAChoice { choices: "on or off" });
+            "fit" => Self::Fit(on_or_off(value)?),
+            "seams" => Self::Seams(on_or_off(value)?),
+            "crease" => {
+                let [degrees] = values(value)?;
+                if !(0.0..=180.0).contains(&degrees) {
+                    return Err(Refusal::NumberOutOfRange);
                 }
-            }),
+                Self::Crease(degrees)
+            }
             _ => return Ok(None),
         };
         Ok(Some(option))
+    }
+}
+
+fn on_or_off(text: &str) -> Result<bool, Refusal> {
+    match text {
+        "on" => Ok(true),
+        "off" => Ok(false),
+        _ => Err(Refusal::NotAChoice { choices: "on or off" }),
     }
 }
 

@@ -44,6 +44,7 @@ pub struct View {
     rows: [Row; 3],
     projection: Projection,
     image_unit: f64,
+    depth_stretch: (u32, u32),
     near: Option<i32>,
 }
 
@@ -140,7 +141,8 @@ impl View {
             }
             Projection::Parallel => (1.0 / scale, None),
         };
-        Ok(Self { rows, projection, image_unit, near })
+        let depth_stretch = as_ratio(depth_scale / scale);
+        Ok(Self { rows, projection, image_unit, depth_stretch, near })
     }
 
     /// A position in view coordinates.
@@ -172,11 +174,24 @@ impl View {
         self.near
     }
 
+    /// How much depth is stretched over width and height, as a ratio of numbers from 1 to 2^20: angles
+    /// between faces need it.
+    pub fn depth_stretch(&self) -> (u32, u32) {
+        self.depth_stretch
+    }
+
     /// What x/w and y/w are multiplied by to give the image plane at distance 1 (perspective) or
     /// model units (parallel, w = 1). For reports; no decision depends on it.
     pub fn image_unit(&self) -> f64 {
         self.image_unit
     }
+}
+
+/// A positive number as a ratio of two whole numbers, each from 1 to 2^20.
+fn as_ratio(value: f64) -> (u32, u32) {
+    const LARGEST: f64 = 1_048_576.0;
+    let part = |value: f64| libm::round(value * LARGEST).max(1.0) as u32;
+    if value < 1.0 { (part(value), LARGEST as u32) } else { (LARGEST as u32, part(1.0 / value)) }
 }
 
 /// A bound of |direction · position| for directions of length 1, in model units.

@@ -82,23 +82,12 @@ impl<'a> Grid<'a> {
         let entry_count = raster.count(outlook, outlines, faces);
         let entries: &mut [u16] = scratch.take(entry_count)?;
         raster.fill(outlook, outlines, faces, entries);
-        Ok(Self {
-            shape,
-            columns: shape.columns(),
-            cells: raster.cells(),
-            entries,
-        })
+        Ok(Self { shape, columns: shape.columns(), cells: raster.cells(), entries })
     }
 
     fn view(&self, cell: usize, near: u16) -> CellView<'_> {
-        let begin = cell
-            .checked_sub(1)
-            .map_or(0, |before| self.cells[before].end);
-        let Cell {
-            end,
-            cover_depth,
-            cover,
-        } = self.cells[cell];
+        let begin = cell.checked_sub(1).map_or(0, |before| self.cells[before].end);
+        let Cell { end, cover_depth, cover } = self.cells[cell];
         CellView {
             cover: (cover_depth < near).then_some(cover),
             faces: &self.entries[usize::from(begin)..usize::from(end)],
@@ -126,14 +115,9 @@ impl<'a> Grid<'a> {
         near: u16,
         mut visit: impl FnMut(CellView<'_>) -> bool,
     ) -> bool {
-        let Shape {
-            shift_x, shift_y, ..
-        } = self.shape;
+        let Shape { shift_x, shift_y, .. } = self.shape;
         let (low, high) = if p.y <= q.y { (p, q) } else { (q, p) };
-        let (dx, dy) = (
-            i32::from(high.x) - i32::from(low.x),
-            i32::from(high.y) - i32::from(low.y),
-        );
+        let (dx, dy) = (i32::from(high.x) - i32::from(low.x), i32::from(high.y) - i32::from(low.y));
         let (left, right) = (i32::from(p.x.min(q.x)), i32::from(p.x.max(q.x)));
         let rows = (low.y >> shift_y)..=(high.y >> shift_y);
         for row in rows {

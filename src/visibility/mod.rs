@@ -12,10 +12,10 @@
 //!   first of the model.
 //! * An edge that the eye sees end-on has no length on the page and no stretch.
 //!
-//! The way: choose one side of a face for each edge ([`edges`]), place the vertices on a coarse grid of
-//! the page ([`outlook`]), cut concave faces ([`triangles`]), sort the faces by depth ([`faces`]) and into
-//! cells ([`grid`]); then follow each edge through the cells and mark on its [`profile`] what each
-//! face hides ([`sight`]). Refused: vertices out of range, a model too large, too little memory.
+//! The way: choose one side of a face for each edge (`edges`), place the vertices on a coarse grid of
+//! the page (`outlook`), cut concave faces (`triangles`), sort the faces by depth (`faces`) and into
+//! cells (`grid`); then follow each edge through the cells and mark on its `profile` what each
+//! face hides (`sight`). Refused: vertices out of range, a model too large, too little memory.
 
 mod crease;
 mod edges;
@@ -139,9 +139,7 @@ impl From<Aborted> for VisibilityError {
 ///
 /// It uses more where it is given more: a finer grid, so that fewer faces are tried for each edge.
 pub fn scratch_bytes(scene: &Scene<'_>) -> usize {
-    let outlines = Outlines {
-        corners: scene.elements.corners(),
-    };
+    let outlines = Outlines { corners: scene.elements.corners() };
     let corners = outlines.corners.len();
     let vertices = scene.vertices.len();
     let faces = outlines.elements().count();
@@ -171,9 +169,7 @@ pub fn find_stretches(
     sink: &mut dyn StretchSink,
 ) -> Result<Report, VisibilityError> {
     check(scene)?;
-    let outlines = Outlines {
-        corners: scene.elements.corners(),
-    };
+    let outlines = Outlines { corners: scene.elements.corners() };
     let vertices = scene.vertices;
     let chosen = ChosenSides::choose(
         outlines,
@@ -189,21 +185,12 @@ pub fn find_stretches(
     let faces = Faces::sort(outlines, vertices, &mut scratch)?;
     attention.check()?;
     let seen = scratch.take(faces.len().div_ceil(32))?;
-    let met = if options.with_seams {
-        Some(scratch.take(faces.len().div_ceil(32))?)
-    } else {
-        None
-    };
+    let met = if options.with_seams { Some(scratch.take(faces.len().div_ceil(32))?) } else { None };
     let piece_count = MOST_PIECES.min(scratch.available_bytes() / 8 / size_of::<Piece>());
     let pieces = scratch.take(piece_count.max(FEWEST_PIECES))?;
     let grid = Grid::new(&outlook, outlines, &faces, scratch)?;
     let mut search = Search {
-        around: Surroundings {
-            outlook,
-            outlines,
-            ears,
-            chosen,
-        },
+        around: Surroundings { outlook, outlines, ears, chosen },
         faces,
         grid,
         seen,
@@ -222,9 +209,7 @@ pub fn find_stretches(
     if let Some(met) = met {
         search.follow_seams(met, attention, sink)?;
     }
-    Ok(Report {
-        degenerate_faces: search.faces.degenerate(),
-    })
+    Ok(Report { degenerate_faces: search.faces.degenerate() })
 }
 
 /// Refuses what the arithmetic cannot take.
@@ -233,9 +218,8 @@ fn check(scene: &Scene<'_>) -> Result<(), VisibilityError> {
     if corners.len() > MOST_CORNERS {
         return Err(VisibilityError::TooManyCorners(MOST_CORNERS));
     }
-    if let Some(corner) = corners
-        .iter()
-        .find(|corner| usize::from(corner.vertex()) >= scene.vertices.len())
+    if let Some(corner) =
+        corners.iter().find(|corner| usize::from(corner.vertex()) >= scene.vertices.len())
     {
         return Err(VisibilityError::UnknownVertex(corner.vertex()));
     }
@@ -314,10 +298,7 @@ impl Search<'_> {
         let outlook = &self.around.outlook;
         let corners = self.around.outlines.element(self.faces.get(one).first);
         let bounds = Bounds::of(outlook, corners);
-        let far = corners
-            .iter()
-            .map(|corner| outlook.vertex(corner.vertex()).z)
-            .max();
+        let far = corners.iter().map(|corner| outlook.vertex(corner.vertex()).z).max();
         let far = far.unwrap_or(-COORDINATE_LIMIT);
         self.grid.within(&bounds, |ranks| {
             for &other in ranks {
@@ -356,11 +337,7 @@ impl Search<'_> {
             let next = pieces.iter().skip(1).map(|piece| piece.from).chain([end]);
             for (piece, to) in pieces.iter().zip(next) {
                 let visible = piece.marks & mark::HIDDEN != mark::HIDDEN;
-                let handed = if visible {
-                    piece.marks & mark::STOOD_IN == 0
-                } else {
-                    with_hidden
-                };
+                let handed = if visible { piece.marks & mark::STOOD_IN == 0 } else { with_hidden };
                 match &mut pending {
                     Some(stretch)
                         if handed && stretch.visible == visible && stretch.to == piece.from =>
@@ -368,13 +345,8 @@ impl Search<'_> {
                         stretch.to = to;
                     }
                     _ => {
-                        let next = handed.then_some(Stretch {
-                            edge,
-                            ends,
-                            from: piece.from,
-                            to,
-                            visible,
-                        });
+                        let next =
+                            handed.then_some(Stretch { edge, ends, from: piece.from, to, visible });
                         if let Some(stretch) = core::mem::replace(&mut pending, next) {
                             sink.stretch(stretch)?;
                         }
@@ -391,13 +363,7 @@ impl Search<'_> {
 
     /// Marks on the profile what every face along the way does to the edge.
     fn look_around(&mut self, sight: &Sight, seam_of: [Option<usize>; 2]) {
-        let Self {
-            around,
-            faces,
-            grid,
-            seen,
-            profile,
-        } = self;
+        let Self { around, faces, grid, seen, profile } = self;
         let (p, q) = (sight.p.place, sight.q.place);
         let near = grid::coarse_depth(sight.near);
         if grid.along(p, q, near, |cell| cell.cover.is_some()) {

@@ -18,27 +18,18 @@ pub struct Place {
 
 impl Place {
     pub const LOWEST: Self = Self { x: 0, y: 0 };
-    pub const HIGHEST: Self = Self {
-        x: u16::MAX,
-        y: u16::MAX,
-    };
+    pub const HIGHEST: Self = Self { x: u16::MAX, y: u16::MAX };
 
     /// The lower left corner of the two.
     #[inline]
     pub fn low(self, other: Self) -> Self {
-        Self {
-            x: self.x.min(other.x),
-            y: self.y.min(other.y),
-        }
+        Self { x: self.x.min(other.x), y: self.y.min(other.y) }
     }
 
     /// The upper right corner of the two.
     #[inline]
     pub fn high(self, other: Self) -> Self {
-        Self {
-            x: self.x.max(other.x),
-            y: self.y.max(other.y),
-        }
+        Self { x: self.x.max(other.x), y: self.y.max(other.y) }
     }
 
     /// Whether everything up to here is surely left of or below everything from `other` on.
@@ -63,13 +54,7 @@ impl CoarseLine {
     pub fn new(a: Place, b: Place) -> Self {
         let (x, y) = (i32::from(a.x), i32::from(a.y));
         let (along_x, along_y) = (i32::from(b.x) - x, i32::from(b.y) - y);
-        Self {
-            x,
-            y,
-            along_x,
-            along_y,
-            doubt: along_x.abs() + along_y.abs() + 2,
-        }
+        Self { x, y, along_x, along_y, doubt: along_x.abs() + along_y.abs() + 2 }
     }
 
     /// The sign of [`page_side`] for a vertex at `place`, or zero if the places are too coarse to tell.
@@ -105,11 +90,7 @@ impl Line<'_> {
     #[inline]
     pub fn side(&self, end: End) -> i32 {
         let coarse = self.coarse.side(end.place);
-        if coarse != 0 {
-            coarse
-        } else {
-            self.exact_side(end)
-        }
+        if coarse != 0 { coarse } else { self.exact_side(end) }
     }
 
     /// [`Self::side`] without a look at the places.
@@ -141,11 +122,7 @@ impl Mapping {
             let extent = high.saturating_sub(low).max(0);
             (64 - extent.leading_zeros()).saturating_sub(PLACE_BITS)
         };
-        Self {
-            projection,
-            low,
-            shift: (shift_for(low.0, high.0), shift_for(low.1, high.1)),
-        }
+        Self { projection, low, shift: (shift_for(low.0, high.0), shift_for(low.1, high.1)) }
     }
 
     fn place(&self, vertex: Vertex) -> Place {
@@ -153,10 +130,7 @@ impl Mapping {
         let coarse = |fine: i64, low: i64, shift: u32| {
             ((fine - low) >> shift).clamp(0, (1 << PLACE_BITS) - 1) as u16
         };
-        Place {
-            x: coarse(x, self.low.0, self.shift.0),
-            y: coarse(y, self.low.1, self.shift.1),
-        }
+        Place { x: coarse(x, self.low.0, self.shift.0), y: coarse(y, self.low.1, self.shift.1) }
     }
 }
 
@@ -166,10 +140,7 @@ fn fine(projection: Projection, vertex: Vertex) -> (i64, i64) {
     match projection {
         Projection::Perspective => {
             let depth = i64::from(vertex.z);
-            (
-                fine(vertex.x).div_euclid(depth),
-                fine(vertex.y).div_euclid(depth),
-            )
+            (fine(vertex.x).div_euclid(depth), fine(vertex.y).div_euclid(depth))
         }
         Projection::Parallel => (fine(vertex.x), fine(vertex.y)),
     }
@@ -210,30 +181,17 @@ impl<'a> Outlook<'a> {
         for (place, &vertex) in places.iter_mut().zip(vertices) {
             *place = mapping.place(vertex);
         }
-        Ok(Self {
-            projection,
-            vertices,
-            places,
-            mapping,
-        })
+        Ok(Self { projection, vertices, places, mapping })
     }
 
     /// A vertex as the end of an edge.
     pub fn end(&self, number: u16) -> End {
-        End {
-            number,
-            vertex: self.vertex(number),
-            place: self.place(number),
-        }
+        End { number, vertex: self.vertex(number), place: self.place(number) }
     }
 
     /// Any point between the vertices as the end of an edge.
     pub fn free_end(&self, vertex: Vertex) -> End {
-        End {
-            number: End::FREE,
-            vertex,
-            place: self.mapping.place(vertex),
-        }
+        End { number: End::FREE, vertex, place: self.mapping.place(vertex) }
     }
 
     #[inline]
@@ -249,12 +207,7 @@ impl<'a> Outlook<'a> {
     /// The line through two vertices.
     #[inline]
     pub fn line(&self, a: u16, b: u16) -> Line<'_> {
-        Line {
-            outlook: self,
-            a,
-            b,
-            coarse: CoarseLine::new(self.place(a), self.place(b)),
-        }
+        Line { outlook: self, a, b, coarse: CoarseLine::new(self.place(a), self.place(b)) }
     }
 
     /// The sign of [`page_side`] of three vertices.
@@ -309,20 +262,11 @@ mod tests {
     fn a_coarse_answer_is_never_wrong() -> Result<(), OutOfScratch> {
         // Every triangle of a small lattice, seen in steep perspective.
         let vertices: std::vec::Vec<Vertex> = (0..64)
-            .map(|n| {
-                Vertex::new(
-                    n % 4 * 70_001,
-                    n / 4 % 4 * 69_997,
-                    100_000 + n / 16 * 100_003,
-                )
-            })
+            .map(|n| Vertex::new(n % 4 * 70_001, n / 4 % 4 * 69_997, 100_000 + n / 16 * 100_003))
             .collect();
         let mut words = [0u64; 64];
-        let outlook = Outlook::new(
-            Projection::Perspective,
-            &vertices,
-            &mut Scratch::new(&mut words),
-        )?;
+        let outlook =
+            Outlook::new(Projection::Perspective, &vertices, &mut Scratch::new(&mut words))?;
         let mut undecided = 0;
         for (a, b, c) in (0..64u16)
             .flat_map(|a| (0..64u16).flat_map(move |b| (0..64u16).map(move |c| (a, b, c))))

@@ -20,15 +20,8 @@ pub struct Shape {
 impl Shape {
     /// A cell for every place.
     pub fn finest(outlook: &Outlook<'_>) -> Self {
-        let far = outlook
-            .places
-            .iter()
-            .fold(Place::LOWEST, |far, &place| far.high(place));
-        Self {
-            shift_x: 0,
-            shift_y: 0,
-            far,
-        }
+        let far = outlook.places.iter().fold(Place::LOWEST, |far, &place| far.high(place));
+        Self { shift_x: 0, shift_y: 0, far }
     }
 
     /// Half as many cells, by joining neighbours.
@@ -86,16 +79,10 @@ pub struct Bounds {
 
 impl Bounds {
     pub fn of(outlook: &Outlook<'_>, corners: &[Corner]) -> Self {
-        let none = Self {
-            low: Place::HIGHEST,
-            high: Place::LOWEST,
-        };
+        let none = Self { low: Place::HIGHEST, high: Place::LOWEST };
         corners.iter().fold(none, |bounds, corner| {
             let place = outlook.place(corner.vertex());
-            Self {
-                low: bounds.low.low(place),
-                high: bounds.high.high(place),
-            }
+            Self { low: bounds.low.low(place), high: bounds.high.high(place) }
         })
     }
 }
@@ -134,11 +121,7 @@ pub struct Raster<'c> {
 
 impl<'c> Raster<'c> {
     pub fn new(shape: Shape, cells: &'c mut [Cell]) -> Self {
-        Self {
-            shape,
-            columns: shape.columns(),
-            cells,
-        }
+        Self { shape, columns: shape.columns(), cells }
     }
 
     pub fn cells(self) -> &'c mut [Cell] {
@@ -152,11 +135,7 @@ impl<'c> Raster<'c> {
         outlines: Outlines<'_>,
         faces: &Faces<'_>,
     ) -> usize {
-        let empty = |end: u16| Cell {
-            end,
-            cover_depth: NO_COVER,
-            cover: 0,
-        };
+        let empty = |end: u16| Cell { end, cover_depth: NO_COVER, cover: 0 };
         self.cells.fill(empty(0));
         self.visit(outlook, outlines, faces, |cell, _| cell.end += 1);
         let mut begin = 0;
