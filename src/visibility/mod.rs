@@ -17,6 +17,7 @@
 //! cells ([`grid`]); then follow each edge through the cells and mark on its [`profile`] what each
 //! face hides ([`sight`]). Refused: vertices out of range, a model too large, too little memory.
 
+mod blocks;
 mod crease;
 mod edges;
 mod faces;
@@ -62,6 +63,8 @@ pub struct Options {
     pub with_hidden: bool,
     /// Also hand over what is seen of the seams, where faces pass through each other.
     pub with_seams: bool,
+    /// Draw blocks that touch as one shape: no visible line between two faces that lie in one plane.
+    pub merged_blocks: bool,
     /// Draw only silhouettes, open edges and edges sharper than this; `None` draws every edge.
     pub crease: Option<Crease>,
 }
@@ -203,11 +206,12 @@ pub fn find_stretches(
             outlines,
             ears,
             chosen,
+            faces,
         },
-        faces,
         grid,
         seen,
         profile: Profile::new(pieces),
+        options,
     };
     for (first, element) in outlines.elements() {
         attention.check()?;
@@ -215,7 +219,7 @@ pub fn find_stretches(
             let side = first + number;
             if search.around.chosen.contains(side) {
                 let sight = Sight::new(side, outlook.end(p), outlook.end(q));
-                search.follow(&sight, [None; 2], options.with_hidden, sink)?;
+                search.follow(&sight, [None; 2], sink)?;
             }
         }
     }
@@ -223,7 +227,7 @@ pub fn find_stretches(
         search.follow_seams(met, attention, sink)?;
     }
     Ok(Report {
-        degenerate_faces: search.faces.degenerate(),
+        degenerate_faces: search.around.faces.degenerate(),
     })
 }
 
@@ -258,11 +262,11 @@ fn check(scene: &Scene<'_>) -> Result<(), VisibilityError> {
 /// The search for the stretches of one edge after the other.
 struct Search<'a> {
     around: Surroundings<'a>,
-    faces: Faces<'a>,
     grid: Grid<'a>,
     /// One bit for each rank: whether the edge has met this face.
     seen: &'a mut [u32],
     profile: Profile<'a>,
+    options: Options,
 }
 
 impl Search<'_> {
@@ -273,15 +277,16 @@ impl Search<'_> {
         attention: &mut dyn Attention,
         sink: &mut dyn StretchSink,
     ) -> Result<(), VisibilityError> {
-        for one in 0..self.faces.len() {
+        for one in 0..self.around.faces.len() {
             attention.check()?;
             self.meet(one, met);
-            for other in one + 1..self.faces.len() {
+            for other in one + 1..self.around.faces.len() {
                 if met[other / 32] >> (other % 32) & 1 == 0 {
                     continue;
                 }
                 attention.check()?;
-                let (face_one, face_other) = (self.faces.get(one), self.faces.get(other));
+                let (face_one, face_other) =
+                    (self.around.faces.get(one), self.around.faces.get(other));
                 for n in 0.. {
                     let Some(triangle_one) = self.around.triangle(face_one, n) else {
                         break;
@@ -299,7 +304,7 @@ impl Search<'_> {
                                 outlook.free_end(p),
                                 outlook.free_end(q),
                             );
-                            self.follow(&sight, [Some(one), Some(other)], false, sink)?;
+                            self.follow(&sight, [Some(one), Some(other)], sink)?;
                         }
                     }
                 }
@@ -312,7 +317,10 @@ impl Search<'_> {
     fn meet(&self, one: usize, met: &mut [u32]) {
         met.fill(0);
         let outlook = &self.around.outlook;
-        let corners = self.around.outlines.element(self.faces.get(one).first);
+        let corners = self
+            .around
+            .outlines
+            .element(self.around.faces.get(one).first);
         let bounds = Bounds::of(outlook, corners);
         let far = corners
             .iter()
@@ -322,7 +330,7 @@ impl Search<'_> {
         self.grid.within(&bounds, |ranks| {
             for &other in ranks {
                 let other = usize::from(other);
-                if self.faces.begins_behind(other, far) {
+                if self.around.faces.begins_behind(other, far) {
                     break;
                 }
                 if other > one {
@@ -337,7 +345,6 @@ impl Search<'_> {
         &mut self,
         sight: &Sight,
         seam_of: [Option<usize>; 2],
-        with_hidden: bool,
         sink: &mut dyn StretchSink,
     ) -> Result<(), VisibilityError> {
         let outlook = &self.around.outlook;
@@ -358,8 +365,10 @@ impl Search<'_> {
                 let visible = piece.marks & mark::HIDDEN != mark::HIDDEN;
                 let handed = if visible {
                     piece.marks & mark::STOOD_IN == 0
+                        && !(self.options.merged_blocks
+                            && sight.is_within_plane(&self.around, piece.marks))
                 } else {
-                    with_hidden
+                    self.options.with_hidden && edge.is_some()
                 };
                 match &mut pending {
                     Some(stretch)
@@ -393,11 +402,12 @@ impl Search<'_> {
     fn look_around(&mut self, sight: &Sight, seam_of: [Option<usize>; 2]) {
         let Self {
             around,
-            faces,
             grid,
             seen,
             profile,
+            options,
         } = self;
+        let faces = &around.faces;
         let (p, q) = (sight.p.place, sight.q.place);
         let near = grid::coarse_depth(sight.near);
         if grid.along(p, q, near, |cell| cell.cover.is_some()) {
@@ -413,7 +423,11 @@ impl Search<'_> {
             let bit = 1 << (rank % 32);
             if *word & bit == 0 {
                 *word |= bit;
-                sight.look_at(around, faces.get(usize::from(rank)), profile);
+                let rank = usize::from(rank);
+                sight.look_at(around, faces.get(rank), profile);
+                if options.merged_blocks {
+                    sight.touch(around, faces.get(rank), rank, profile);
+                }
             }
             !profile.is_hidden()
         };
