@@ -161,6 +161,42 @@ pub fn plane_side(a: Vertex, b: Vertex, c: Vertex, d: Vertex) -> i64 {
     determinant(from_a(b), from_a(c), from_a(d))
 }
 
+/// How far [`page_side`] may be off if no coordinate was rounded by more than one half.
+///
+/// ```
+/// use penup::geometry::{Projection, Vertex, page_side_doubt};
+/// let [a, b, c] = [0, 100, 200].map(|x| Vertex::new(x, 0, 1));
+/// assert_eq!(page_side_doubt(Projection::Parallel, a, b, c), 301);
+/// ```
+pub fn page_side_doubt(projection: Projection, a: Vertex, b: Vertex, c: Vertex) -> i64 {
+    match projection {
+        Projection::Perspective => determinant_doubt(a, b, c),
+        Projection::Parallel => {
+            let extent = |to: Vertex| i64::from((to.x - a.x).abs()) + i64::from((to.y - a.y).abs());
+            extent(b) + extent(c) + 1
+        }
+    }
+}
+
+/// How far [`plane_side`] may be off if no coordinate was rounded by more than one half.
+pub fn plane_side_doubt(a: Vertex, b: Vertex, c: Vertex, d: Vertex) -> i64 {
+    let from_a = |to: Vertex| Vertex::new(to.x - a.x, to.y - a.y, to.z - a.z);
+    determinant_doubt(from_a(b), from_a(c), from_a(d))
+}
+
+/// How far a determinant may be off if no number in it is off by more than one: less than what the
+/// minors, the numbers and one add up to.
+fn determinant_doubt(a: Vertex, b: Vertex, c: Vertex) -> i64 {
+    let minors = |a: Vertex, b: Vertex| {
+        let minor = |p: i32, q: i32, r: i32, s: i32| {
+            (i64::from(p) * i64::from(s) - i64::from(q) * i64::from(r)).abs()
+        };
+        minor(a.x, a.y, b.x, b.y) + minor(a.y, a.z, b.y, b.z) + minor(a.x, a.z, b.x, b.z)
+    };
+    let numbers = |a: Vertex| i64::from(a.x.abs()) + i64::from(a.y.abs()) + i64::from(a.z.abs());
+    minors(a, b) + minors(b, c) + minors(a, c) + 2 * (numbers(a) + numbers(b) + numbers(c)) + 6
+}
+
 fn determinant(a: Vertex, b: Vertex, c: Vertex) -> i64 {
     let minor =
         |p: i32, q: i32, r: i32, s: i32| i64::from(p) * i64::from(s) - i64::from(q) * i64::from(r);

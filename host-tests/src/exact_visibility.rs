@@ -317,7 +317,34 @@ impl World {
         })
     }
 
-    fn pieces(&self) -> Vec<Piece> {
+    /// Whether the nearest faces that begin at the edge on both sides lie in one plane.
+    fn is_within_plane(&self, edge: &Edge, about: &[&Polygon], t: &Number) -> bool {
+        let [p, q] = &edge.page;
+        let point = at_fraction(&edge.page, t);
+        let left: Point = [&p[1] - &q[1], &q[0] - &p[0]];
+        let right: Point = [-&left[0], -&left[1]];
+        let holds = |plane: &[Number; 4], t: &Number| {
+            let depth = self.depth_at(plane, &at_fraction(&edge.page, t));
+            depth.is_some_and(|depth| depth == self.edge_depth(edge, t))
+        };
+        let nearest = |beside: &Point| {
+            let there = |n: usize| &point[n] + &beside[n] / whole(1 << 20);
+            about
+                .iter()
+                .filter_map(|polygon| Some((polygon, polygon.plane.as_ref()?)))
+                .filter(|(_, plane)| holds(plane, &Number::zero()) && holds(plane, &Number::one()))
+                .filter(|(polygon, _)| self.covers(polygon, &point, beside))
+                .min_by_key(|(_, plane)| self.depth_at(plane, &[there(0), there(1)]))
+        };
+        match (nearest(&left), nearest(&right)) {
+            (Some((_, one)), Some((_, other))) => (0..4)
+                .flat_map(|a| (0..4).map(move |b| (a, b)))
+                .all(|(a, b)| &one[a] * &other[b] == &one[b] * &other[a]),
+            _ => false,
+        }
+    }
+
+    fn pieces(&self, merged_blocks: bool) -> Vec<Piece> {
         let mut pieces: Vec<Piece> = Vec::new();
         for (number, edge) in self.edges.iter().enumerate() {
             if edge.page[0] == edge.page[1] {
@@ -328,7 +355,10 @@ impl World {
             for pair in cuts.windows(2) {
                 let middle = half(&pair[0] + &pair[1]);
                 let hidden = self.is_hidden(edge, &about, &middle);
-                if !hidden && self.is_stood_in(number, &middle) {
+                if !hidden
+                    && (self.is_stood_in(number, &middle)
+                        || merged_blocks && self.is_within_plane(edge, &about, &middle))
+                {
                     continue;
                 }
                 let [from, to] = [0, 1].map(|n| self.space_fraction(edge, &pair[n]));
@@ -376,8 +406,15 @@ fn plane_of(corners: &[&Vertex]) -> Option<[Number; 4]> {
 
 /// The visible and the hidden pieces of every edge, in the order of the elements.
 ///
+/// `merged_blocks`: without the visible pieces between two faces of one plane.
+///
 /// # Panics
 /// If a face is not plane.
-pub fn pieces(projection: Projection, vertices: &[Vertex], corners: &[Corner]) -> Vec<Piece> {
-    World::new(projection, vertices, corners).pieces()
+pub fn pieces(
+    projection: Projection,
+    vertices: &[Vertex],
+    corners: &[Corner],
+    merged_blocks: bool,
+) -> Vec<Piece> {
+    World::new(projection, vertices, corners).pieces(merged_blocks)
 }

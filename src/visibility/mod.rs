@@ -12,11 +12,12 @@
 //!   first of the model.
 //! * An edge that the eye sees end-on has no length on the page and no stretch.
 //!
-//! The way: choose one side of a face for each edge (`edges`), place the vertices on a coarse grid of
-//! the page (`outlook`), cut concave faces (`triangles`), sort the faces by depth (`faces`) and into
-//! cells (`grid`); then follow each edge through the cells and mark on its `profile` what each
-//! face hides (`sight`). Refused: vertices out of range, a model too large, too little memory.
+//! The way: choose one side of a face for each edge ([`edges`]), place the vertices on a coarse grid of
+//! the page ([`outlook`]), cut concave faces ([`triangles`]), sort the faces by depth ([`faces`]) and into
+//! cells ([`grid`]); then follow each edge through the cells and mark on its [`profile`] what each
+//! face hides ([`sight`]). Refused: vertices out of range, a model too large, too little memory.
 
+mod blocks;
 mod crease;
 mod edges;
 mod faces;
@@ -62,6 +63,8 @@ pub struct Options {
     pub with_hidden: bool,
     /// Also hand over what is seen of the seams, where faces pass through each other.
     pub with_seams: bool,
+    /// Draw blocks that touch as one shape: no visible line between two faces that lie in one plane.
+    pub merged_blocks: bool,
     /// Draw only silhouettes, open edges and edges sharper than this; `None` draws every edge.
     pub crease: Option<Crease>,
 }
@@ -139,7 +142,9 @@ impl From<Aborted> for VisibilityError {
 ///
 /// It uses more where it is given more: a finer grid, so that fewer faces are tried for each edge.
 pub fn scratch_bytes(scene: &Scene<'_>) -> usize {
-    let outlines = Outlines { corners: scene.elements.corners() };
+    let outlines = Outlines {
+        corners: scene.elements.corners(),
+    };
     let corners = outlines.corners.len();
     let vertices = scene.vertices.len();
     let faces = outlines.elements().count();
@@ -169,7 +174,9 @@ pub fn find_stretches(
     sink: &mut dyn StretchSink,
 ) -> Result<Report, VisibilityError> {
     check(scene)?;
-    let outlines = Outlines { corners: scene.elements.corners() };
+    let outlines = Outlines {
+        corners: scene.elements.corners(),
+    };
     let vertices = scene.vertices;
     let chosen = ChosenSides::choose(
         outlines,
@@ -185,16 +192,26 @@ pub fn find_stretches(
     let faces = Faces::sort(outlines, vertices, &mut scratch)?;
     attention.check()?;
     let seen = scratch.take(faces.len().div_ceil(32))?;
-    let met = if options.with_seams { Some(scratch.take(faces.len().div_ceil(32))?) } else { None };
+    let met = if options.with_seams {
+        Some(scratch.take(faces.len().div_ceil(32))?)
+    } else {
+        None
+    };
     let piece_count = MOST_PIECES.min(scratch.available_bytes() / 8 / size_of::<Piece>());
     let pieces = scratch.take(piece_count.max(FEWEST_PIECES))?;
     let grid = Grid::new(&outlook, outlines, &faces, scratch)?;
     let mut search = Search {
-        around: Surroundings { outlook, outlines, ears, chosen },
-        faces,
+        around: Surroundings {
+            outlook,
+            outlines,
+            ears,
+            chosen,
+            faces,
+        },
         grid,
         seen,
         profile: Profile::new(pieces),
+        options,
     };
     for (first, element) in outlines.elements() {
         attention.check()?;
@@ -202,14 +219,16 @@ pub fn find_stretches(
             let side = first + number;
             if search.around.chosen.contains(side) {
                 let sight = Sight::new(side, outlook.end(p), outlook.end(q));
-                search.follow(&sight, [None; 2], options.with_hidden, sink)?;
+                search.follow(&sight, [None; 2], sink)?;
             }
         }
     }
     if let Some(met) = met {
         search.follow_seams(met, attention, sink)?;
     }
-    Ok(Report { degenerate_faces: search.faces.degenerate() })
+    Ok(Report {
+        degenerate_faces: search.around.faces.degenerate(),
+    })
 }
 
 /// Refuses what the arithmetic cannot take.
@@ -218,8 +237,9 @@ fn check(scene: &Scene<'_>) -> Result<(), VisibilityError> {
     if corners.len() > MOST_CORNERS {
         return Err(VisibilityError::TooManyCorners(MOST_CORNERS));
     }
-    if let Some(corner) =
-        corners.iter().find(|corner| usize::from(corner.vertex()) >= scene.vertices.len())
+    if let Some(corner) = corners
+        .iter()
+        .find(|corner| usize::from(corner.vertex()) >= scene.vertices.len())
     {
         return Err(VisibilityError::UnknownVertex(corner.vertex()));
     }
@@ -242,11 +262,11 @@ fn check(scene: &Scene<'_>) -> Result<(), VisibilityError> {
 /// The search for the stretches of one edge after the other.
 struct Search<'a> {
     around: Surroundings<'a>,
-    faces: Faces<'a>,
     grid: Grid<'a>,
     /// One bit for each rank: whether the edge has met this face.
     seen: &'a mut [u32],
     profile: Profile<'a>,
+    options: Options,
 }
 
 impl Search<'_> {
@@ -257,15 +277,16 @@ impl Search<'_> {
         attention: &mut dyn Attention,
         sink: &mut dyn StretchSink,
     ) -> Result<(), VisibilityError> {
-        for one in 0..self.faces.len() {
+        for one in 0..self.around.faces.len() {
             attention.check()?;
             self.meet(one, met);
-            for other in one + 1..self.faces.len() {
+            for other in one + 1..self.around.faces.len() {
                 if met[other / 32] >> (other % 32) & 1 == 0 {
                     continue;
                 }
                 attention.check()?;
-                let (face_one, face_other) = (self.faces.get(one), self.faces.get(other));
+                let (face_one, face_other) =
+                    (self.around.faces.get(one), self.around.faces.get(other));
                 for n in 0.. {
                     let Some(triangle_one) = self.around.triangle(face_one, n) else {
                         break;
@@ -283,7 +304,7 @@ impl Search<'_> {
                                 outlook.free_end(p),
                                 outlook.free_end(q),
                             );
-                            self.follow(&sight, [Some(one), Some(other)], false, sink)?;
+                            self.follow(&sight, [Some(one), Some(other)], sink)?;
                         }
                     }
                 }
@@ -296,14 +317,20 @@ impl Search<'_> {
     fn meet(&self, one: usize, met: &mut [u32]) {
         met.fill(0);
         let outlook = &self.around.outlook;
-        let corners = self.around.outlines.element(self.faces.get(one).first);
+        let corners = self
+            .around
+            .outlines
+            .element(self.around.faces.get(one).first);
         let bounds = Bounds::of(outlook, corners);
-        let far = corners.iter().map(|corner| outlook.vertex(corner.vertex()).z).max();
+        let far = corners
+            .iter()
+            .map(|corner| outlook.vertex(corner.vertex()).z)
+            .max();
         let far = far.unwrap_or(-COORDINATE_LIMIT);
         self.grid.within(&bounds, |ranks| {
             for &other in ranks {
                 let other = usize::from(other);
-                if self.faces.begins_behind(other, far) {
+                if self.around.faces.begins_behind(other, far) {
                     break;
                 }
                 if other > one {
@@ -318,7 +345,6 @@ impl Search<'_> {
         &mut self,
         sight: &Sight,
         seam_of: [Option<usize>; 2],
-        with_hidden: bool,
         sink: &mut dyn StretchSink,
     ) -> Result<(), VisibilityError> {
         let outlook = &self.around.outlook;
@@ -337,7 +363,13 @@ impl Search<'_> {
             let next = pieces.iter().skip(1).map(|piece| piece.from).chain([end]);
             for (piece, to) in pieces.iter().zip(next) {
                 let visible = piece.marks & mark::HIDDEN != mark::HIDDEN;
-                let handed = if visible { piece.marks & mark::STOOD_IN == 0 } else { with_hidden };
+                let handed = if visible {
+                    piece.marks & mark::STOOD_IN == 0
+                        && !(self.options.merged_blocks
+                            && sight.is_within_plane(&self.around, piece.marks))
+                } else {
+                    self.options.with_hidden && edge.is_some()
+                };
                 match &mut pending {
                     Some(stretch)
                         if handed && stretch.visible == visible && stretch.to == piece.from =>
@@ -345,8 +377,13 @@ impl Search<'_> {
                         stretch.to = to;
                     }
                     _ => {
-                        let next =
-                            handed.then_some(Stretch { edge, ends, from: piece.from, to, visible });
+                        let next = handed.then_some(Stretch {
+                            edge,
+                            ends,
+                            from: piece.from,
+                            to,
+                            visible,
+                        });
                         if let Some(stretch) = core::mem::replace(&mut pending, next) {
                             sink.stretch(stretch)?;
                         }
@@ -363,7 +400,14 @@ impl Search<'_> {
 
     /// Marks on the profile what every face along the way does to the edge.
     fn look_around(&mut self, sight: &Sight, seam_of: [Option<usize>; 2]) {
-        let Self { around, faces, grid, seen, profile } = self;
+        let Self {
+            around,
+            grid,
+            seen,
+            profile,
+            options,
+        } = self;
+        let faces = &around.faces;
         let (p, q) = (sight.p.place, sight.q.place);
         let near = grid::coarse_depth(sight.near);
         if grid.along(p, q, near, |cell| cell.cover.is_some()) {
@@ -379,7 +423,11 @@ impl Search<'_> {
             let bit = 1 << (rank % 32);
             if *word & bit == 0 {
                 *word |= bit;
-                sight.look_at(around, faces.get(usize::from(rank)), profile);
+                let rank = usize::from(rank);
+                sight.look_at(around, faces.get(rank), profile);
+                if options.merged_blocks {
+                    sight.touch(around, faces.get(rank), rank, profile);
+                }
             }
             !profile.is_hidden()
         };

@@ -101,13 +101,18 @@ impl<'a> Profile<'a> {
 
     /// Adds `marks` to a part of the edge.
     pub fn mark(&mut self, part: Part, marks: u64) {
+        self.update(part, |known| known | marks);
+    }
+
+    /// Changes the marks of a part of the edge.
+    pub fn update(&mut self, part: Part, change: impl Fn(u64) -> u64) {
         if part.is_empty() || part.to.is_some_and(|to| to <= self.memory[0].from) {
             return;
         }
         let first = part.from.map_or(0, |from| self.split(from));
         let last = part.to.map_or(self.count, |to| self.split(to));
         for piece in &mut self.memory[first.min(self.count)..last.min(self.count)] {
-            piece.marks |= marks;
+            piece.marks = change(piece.marks);
             if piece.marks & mark::HIDDEN == mark::HIDDEN {
                 piece.marks = mark::HIDDEN;
             }

@@ -6,7 +6,7 @@
 //! question and to the left in the second. So every degenerate case falls to one side or the other.
 
 use super::edges::{ChosenSides, Outlines, sides};
-use super::faces::Face;
+use super::faces::{Face, Faces};
 use super::outlook::{CoarseLine, End, Outlook, Place};
 use super::profile::{Part, Profile, mark};
 use super::triangles::Ears;
@@ -19,6 +19,7 @@ pub struct Surroundings<'a> {
     pub outlines: Outlines<'a>,
     pub ears: Ears<'a>,
     pub chosen: ChosenSides<'a>,
+    pub faces: Faces<'a>,
 }
 
 impl Surroundings<'_> {
@@ -64,23 +65,27 @@ type Side = (u16, u16);
 /// For the points just to the left of the edge a corner on its line lies to the right, and the other
 /// way round; so each corner is left of the line or not, twice.
 #[derive(Clone, Copy)]
-struct Piece<'c> {
+pub struct Piece<'c> {
     corners: &'c [u16],
     /// One bit for each corner: whether it lies to the left.
-    left: u32,
+    pub left: u32,
     /// The same, with those on the line.
-    left_or_on: u32,
+    pub left_or_on: u32,
 }
 
 impl<'c> Piece<'c> {
     /// From the corners, at most [`FEW_CORNERS`], and the side of the line on which each lies.
-    fn new(corners: &'c [u16], sides: &[i32]) -> Self {
+    pub fn new(corners: &'c [u16], sides: &[i32]) -> Self {
         let (mut left, mut left_or_on) = (0, 0);
         for (n, &side) in sides.iter().enumerate().take(corners.len()) {
             left |= u32::from(side > 0) << n;
             left_or_on |= u32::from(side >= 0) << n;
         }
-        Self { corners, left, left_or_on }
+        Self {
+            corners,
+            left,
+            left_or_on,
+        }
     }
 
     /// The mask of the corners, each put where the next one is.
@@ -90,7 +95,7 @@ impl<'c> Piece<'c> {
     }
 
     /// One bit for each side that crosses the line, at the corner where the side ends.
-    fn crossings(&self, left: u32) -> u32 {
+    pub fn crossings(&self, left: u32) -> u32 {
         left ^ self.shifted(left)
     }
 
@@ -118,7 +123,7 @@ const FEW_CORNERS: usize = 8;
 
 /// The sides at which the edge enters and leaves a piece of a face, if it does so between its ends.
 #[derive(Clone, Copy, Default, PartialEq)]
-struct Passage {
+pub struct Passage {
     entry: Option<Side>,
     exit: Option<Side>,
 }
@@ -154,7 +159,11 @@ impl Sight {
     /// On which side of this edge's line a vertex lies on the page.
     fn side_of(&self, outlook: &Outlook<'_>, number: u16) -> i32 {
         let coarse = self.line.side(outlook.place(number));
-        if coarse != 0 { coarse } else { self.exact_side_of(outlook, number) }
+        if coarse != 0 {
+            coarse
+        } else {
+            self.exact_side_of(outlook, number)
+        }
     }
 
     /// [`Self::side_of`] without a look at the places.
@@ -274,10 +283,8 @@ impl Sight {
             }
         };
         let mut cover = |passage: Option<Passage>, marks: u64| {
-            if let Some(Passage { entry, exit }) = passage {
-                let place = |(a, b): Side| outlook.crossing(a, b, self.p, self.q);
-                let inside = Part { from: entry.map(place), to: exit.map(place) };
-                profile.mark(inside.and(behind), marks);
+            if let Some(passage) = passage {
+                profile.mark(self.part(outlook, passage).and(behind), marks);
             }
         };
         if left == right {
@@ -319,7 +326,7 @@ impl Sight {
 
     /// How the edge passes a piece of a face on the page, `None` if it does not meet it. `facing` is how
     /// the piece turns.
-    fn passage(
+    pub fn passage(
         &self,
         outlook: &Outlook<'_>,
         piece: Piece<'_>,
@@ -348,6 +355,15 @@ impl Sight {
             }
         }
         Some(passage)
+    }
+
+    /// The part of the edge within a piece of a face.
+    pub fn part(&self, outlook: &Outlook<'_>, passage: Passage) -> Part {
+        let place = |(a, b): Side| outlook.crossing(a, b, self.p, self.q);
+        Part {
+            from: passage.entry.map(place),
+            to: passage.exit.map(place),
+        }
     }
 
     /// Marks what the sides of an element do that lie on the line of this edge.
@@ -407,7 +423,10 @@ impl Sight {
         };
         if let Some(behind) = behind {
             let (at_a, at_b) = (place(va), place(vb));
-            let beside = Part { from: Some(at_a.min(at_b)), to: Some(at_a.max(at_b)) };
+            let beside = Part {
+                from: Some(at_a.min(at_b)),
+                to: Some(at_a.max(at_b)),
+            };
             profile.mark(beside.and(behind), mark::STOOD_IN);
         }
     }
