@@ -10,7 +10,9 @@
 //! (1973), and Martin, Otto and Felten, "Large-step Markov chains" (1991).
 
 use super::cycle::Cycle;
+use super::euler::Unused;
 use super::incidence::Incidence;
+use super::mend::mend;
 use super::near::Near;
 use super::network::Network;
 use super::pace::Pace;
@@ -31,10 +33,13 @@ pub(super) struct Goal {
     pub bound: u64,
 }
 
-/// Improves `route`, which has all chains of `network`, with up to `kicks` kicks. It never gets
-/// longer. Does nothing where there is too little memory.
+/// Shortens `route`, which has all chains of `network`, if it can, with up to `kicks` kicks. It sets
+/// out from `route` or, if that is shorter, from the tour that begins at `start` with the moves `mate`,
+/// mended so that they join the parts. Does nothing where there is too little memory.
 pub(super) fn improve(
     network: Network<'_>,
+    mate: &mut [u16],
+    start: Option<u16>,
     route: &mut [Leg],
     goal: Goal,
     kicks: u32,
@@ -42,21 +47,29 @@ pub(super) fn improve(
     pace: &mut Pace<'_>,
 ) -> Result<(), OrderError> {
     let Goal { open, bound } = goal;
+    let length = route_length(network, route, open);
     let stations = usize::from(network.stations());
     let legs = route.len() + usize::from(open);
-    let lists = |per_station| Near::bytes(stations, per_station);
     let fixed = fixed_bytes(stations, route.len(), legs);
-    let fits = |per_station: &usize| fixed + lists(*per_station) <= scratch.available_bytes();
+    let fits = |per_station: &usize| {
+        fixed + Near::bytes(stations, *per_station) <= scratch.available_bytes()
+    };
     let Some(per_station) = NEIGHBOURS.rev().find(fits) else {
         return Ok(());
     };
-    let near = Near::new(network, per_station, &mut scratch, pace)?;
-    let incidence = Incidence::new(network, &mut scratch)?;
-    let cycle_legs: &mut [Leg] = scratch.take(legs)?;
-    cycle_legs[..route.len()].copy_from_slice(route);
-    if open {
-        cycle_legs[route.len()] = Leg::new(route.len() as u16, false);
+    if length == bound {
+        return Ok(());
     }
+    let near = Near::new(network, per_station, &mut scratch, pace)?;
+    let cycle_legs: &mut [Leg] = scratch.take(legs)?;
+    mend(network, near, mate, scratch.reborrow(), pace)?;
+    let (mended, gap) = cycle_legs.split_at_mut(route.len());
+    Unused::new(network, mate, &mut scratch.reborrow())?.nearest_first(start, mended, pace)?;
+    if route_length(network, mended, open) > length {
+        mended.copy_from_slice(route);
+    }
+    gap.fill(Leg::new(route.len() as u16, false));
+    let incidence = Incidence::new(network, &mut scratch)?;
     let cycle = Cycle::new(cycle_legs, scratch.take(legs)?, scratch.take(Cycle::MEMORY)?);
     let mut search = Search {
         network,
@@ -67,10 +80,6 @@ pub(super) fn improve(
         gap: if open { route.len() } else { usize::MAX },
         random: 1,
     };
-    let at_first = search.length();
-    if at_first == bound {
-        return Ok(());
-    }
     for station in 0..network.stations() {
         search.waiting.add(station);
     }
@@ -80,15 +89,23 @@ pub(super) fn improve(
             break;
         }
     }
-    if search.length() > at_first {
-        return Ok(());
-    }
-    let start = (0..legs).find(|&index| search.cycle.leg(index).segment() == search.gap);
-    let start = start.map_or(0, |gap| gap + 1);
-    for (index, leg) in route.iter_mut().enumerate() {
-        *leg = search.cycle.leg((start + index) % legs);
+    if search.length() < length {
+        let gap = (0..legs).find(|&index| search.cycle.leg(index).segment() == search.gap);
+        let start = gap.map_or(0, |gap| gap + 1);
+        for (index, leg) in route.iter_mut().enumerate() {
+            *leg = search.cycle.leg((start + index) % legs);
+        }
     }
     Ok(())
+}
+
+/// The length of the moves of a route, with the one back if it is not open.
+fn route_length(network: Network<'_>, route: &[Leg], open: bool) -> u64 {
+    let moves = route.iter().zip(route.iter().cycle().skip(1));
+    moves
+        .take(route.len() - usize::from(open))
+        .map(|(&from, &to)| u64::from(network.distance(network.end(from), network.start(to))))
+        .sum()
 }
 
 /// Bytes of scratch besides the lists of neighbours.

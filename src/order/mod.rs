@@ -19,6 +19,7 @@ mod greedy;
 mod improve;
 mod incidence;
 mod matching;
+mod mend;
 mod metric;
 mod near;
 mod network;
@@ -213,18 +214,23 @@ fn order_pen<'a>(
     let network = Network::new(drawing, pen, &mut scratch)?;
     let route: &mut [Leg] = scratch.take(usize::from(network.chains()))?;
     let bound = report.bound;
-    let parts = {
+    {
         let mut scratch = scratch.reborrow();
         let mate: &mut [u16] = scratch.take(usize::from(network.stations()))?;
         let parts = mark_parts(network, scratch.reborrow(), mate)?;
         let start = pair_odd(network, options, scratch.reborrow(), pace, mate, report)?;
-        Unused::new(network, mate, &mut scratch)?.nearest_first(start, route, pace)?;
-        parts
-    };
-    report.components += parts;
-    let goal = Goal { open: options.shape == Shape::OpenPath, bound: report.bound - bound };
-    if parts > 1 && options.effort > 0 {
-        improve(network, route, goal, options.effort, scratch.reborrow(), pace)?;
+        {
+            let mut scratch = scratch.reborrow();
+            let unused: &mut [u16] = scratch.take(mate.len())?;
+            unused.copy_from_slice(mate);
+            Unused::new(network, unused, &mut scratch)?.nearest_first(start, route, pace)?;
+        }
+        report.components += parts;
+        let open = options.shape == Shape::OpenPath;
+        let goal = Goal { open, bound: report.bound - bound };
+        if parts > 1 && options.effort > 0 {
+            improve(network, mate, start, route, goal, options.effort, scratch, pace)?;
+        }
     }
     turn(network, options.shape, route);
     network.expand(route, tour, pen, &mut scratch)?;

@@ -70,6 +70,11 @@ impl<'a> Network<'a> {
         length(self.place(from), self.place(to))
     }
 
+    /// The stations that a chain joins.
+    pub fn ends(&self, chain: u16) -> [u16; 2] {
+        self.ends[usize::from(chain)]
+    }
+
     /// The station at which the leg of a chain begins.
     pub fn start(&self, leg: Leg) -> u16 {
         self.ends[leg.segment()][usize::from(leg.reversed())]
