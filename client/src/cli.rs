@@ -107,6 +107,9 @@ pub struct ViewArgs {
     /// Whether the lines are drawn where faces pass through each other
     #[arg(long, value_enum, default_value = "on", help_heading = "Camera")]
     pub seams: Switch,
+    /// Whether blocks that touch are drawn as one shape
+    #[arg(long, value_enum, default_value = "separate", help_heading = "Camera")]
+    pub blocks: Blocks,
     /// Leave out edges between faces that bend less than so many degrees
     #[arg(
         long,
@@ -155,10 +158,15 @@ impl ViewArgs {
                 Switch::On => "on",
                 Switch::Off => "off",
             },
+            blocks: match self.blocks {
+                Blocks::Separate => "separate",
+                Blocks::Merged => "merged",
+            },
             crease: self.crease,
             hidden: match self.hidden {
                 Hidden::Erased => "erased",
                 Hidden::Dotted => "dotted",
+                Hidden::Dashed => "dashed",
                 Hidden::Shown => "shown",
             },
             page,
@@ -174,6 +182,15 @@ fn projection(text: &str) -> Result<String, String> {
         Ok(_) => Ok(text.to_owned()),
         Err(refusal) => Err(refusal.to_string()),
     }
+}
+
+/// Whether blocks that touch are one shape.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Blocks {
+    /// Each has all its edges
+    Separate,
+    /// No line is drawn between two faces in one plane
+    Merged,
 }
 
 /// On or off.
@@ -201,6 +218,8 @@ pub enum Hidden {
     Erased,
     /// Drawn dotted.
     Dotted,
+    /// Drawn dashed
+    Dashed,
     /// Drawn like the others.
     Shown,
 }

@@ -1,8 +1,8 @@
 //! What came of a job, and the settings that it was done with.
 
 use crate::protocol::{
-    ANGLES, AT, BEHIND, CLEAR, CREASE, EYE, FIT, HIDDEN, MARGIN, PAGE, PROJECTION, SEAMS, UP,
-    VIEW_AUTO, setting,
+    ANGLES, AT, BEHIND, BLOCKS, CLEAR, CREASE, EYE, FIT, HIDDEN, MARGIN, PAGE, PROJECTION, SEAMS,
+    UP, VIEW_AUTO, setting,
 };
 use crate::source::JobLine;
 use serde::Serialize;
@@ -113,9 +113,11 @@ pub struct Settings {
     pub behind: &'static str,
     /// `on` or `off`.
     pub seams: &'static str,
+    /// `separate` or `merged`.
+    pub blocks: &'static str,
     /// Degrees.
     pub crease: f64,
-    /// `erased`, `dotted` or `shown`.
+    /// `erased`, `dotted`, `dashed` or `shown`.
     pub hidden: &'static str,
     /// The page.
     pub page: Page,
@@ -137,6 +139,7 @@ pub fn job_lines(file: Vec<JobLine>, settings: &Settings) -> Vec<JobLine> {
         format!("{PROJECTION}={}", settings.projection),
         format!("{BEHIND}={}", settings.behind),
         format!("{SEAMS}={}", settings.seams),
+        format!("{BLOCKS}={}", settings.blocks),
         setting(CREASE, &[settings.crease], ','),
         format!("{HIDDEN}={}", settings.hidden),
         setting(PAGE, &[page.width, page.height], 'x'),
@@ -189,6 +192,7 @@ mod tests {
             projection: "perspective".to_owned(),
             behind: "clip",
             seams: "on",
+            blocks: "separate",
             crease: 0.0,
             hidden: "dotted",
             page: Page { width: 210.0, height: 297.0 },
@@ -208,6 +212,7 @@ mod tests {
                 "$projection=perspective",
                 "$behind=clip",
                 "$seams=on",
+                "$blocks=separate",
                 "$crease=0",
                 "$hidden=dotted",
                 "$page=210x297",

@@ -25,6 +25,8 @@ pub const ANGLES: &str = "$angles";
 pub const BEHIND: &str = "$behind";
 /// Whether faces that pass through each other show where.
 pub const SEAMS: &str = "$seams";
+/// Whether blocks that touch are one shape.
+pub const BLOCKS: &str = "$blocks";
 /// Edges that bend less are left out.
 pub const CREASE: &str = "$crease";
 /// Perspective or another.

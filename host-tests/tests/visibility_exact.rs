@@ -25,11 +25,7 @@ fn library_pieces(random: &RandomScene, merged_blocks: bool, spare_bytes: usize)
     let mut stretches = Stretches::default();
     let result = find_stretches(
         &scene,
-        Options {
-            with_hidden: true,
-            merged_blocks,
-            ..Options::default()
-        },
+        Options { with_hidden: true, merged_blocks, ..Options::default() },
         Scratch::new(&mut words),
         &mut Undisturbed,
         &mut stretches,
@@ -49,12 +45,7 @@ fn library_pieces(random: &RandomScene, merged_blocks: bool, spare_bytes: usize)
 fn agree(seeds: impl Iterator<Item = u64>, merged_blocks: bool) {
     for seed in seeds {
         let random = random_scene(seed);
-        let expected = pieces(
-            random.projection,
-            &random.vertices,
-            &random.corners,
-            merged_blocks,
-        );
+        let expected = pieces(random.projection, &random.vertices, &random.corners, merged_blocks);
         // Much memory, and the least: few pieces at a time, one cell.
         for spare_bytes in [1 << 14, 0] {
             let found = library_pieces(&random, merged_blocks, spare_bytes);

@@ -36,6 +36,7 @@ pub(super) struct Goal {
 /// Shortens `route`, which has all chains of `network`, if it can, with up to `kicks` kicks. It sets
 /// out from `route` or, if that is shorter, from the tour that begins at `start` with the moves `mate`,
 /// mended so that they join the parts. Does nothing where there is too little memory.
+#[allow(clippy::too_many_arguments)] // All of it belongs to the caller's one job; a struct would serve this call alone.
 pub(super) fn improve(
     network: Network<'_>,
     mate: &mut [u16],

@@ -295,6 +295,7 @@ impl StretchSink for PageSink<'_> {
         let line_type = match (stretch.visible, self.hidden) {
             (true, _) | (false, HiddenLines::Shown) => LineType::Full,
             (false, HiddenLines::Dotted) => LineType::Dotted,
+            (false, HiddenLines::Dashed) => LineType::Dashed,
             (false, HiddenLines::Erased) => return Ok(()),
         };
         self.observer.stretch(&self.view, &stretch);

@@ -22,6 +22,8 @@ pub struct PlotOptions {
     pub hidden: HiddenLines,
     /// Whether the lines are drawn where faces pass through each other.
     pub seams: bool,
+    /// Whether blocks that touch are one shape: no line between two faces that lie in one plane.
+    pub merged_blocks: bool,
     /// Edges between faces that bend less, in degrees, are not drawn; 0 draws every edge.
     pub crease: f64,
     /// The sheet.
@@ -45,6 +47,7 @@ impl Default for PlotOptions {
             clip_behind: true,
             hidden: HiddenLines::Erased,
             seams: true,
+            merged_blocks: false,
             crease: 0.0,
             page: Page { width, height, margin },
             fit: false,
@@ -72,6 +75,7 @@ impl PlotOptions {
             PlotOption::ClipBehind(clip) => self.clip_behind = clip,
             PlotOption::Hidden(hidden) => self.hidden = hidden,
             PlotOption::Seams(seams) => self.seams = seams,
+            PlotOption::MergedBlocks(merged) => self.merged_blocks = merged,
             PlotOption::Crease(crease) => self.crease = crease,
             PlotOption::Page { width, height } => {
                 (self.page.width, self.page.height) = (width, height)
@@ -113,7 +117,12 @@ impl PlotOptions {
             depth_stretch: view.depth_stretch(),
         });
         let with_hidden = self.hidden != HiddenLines::Erased;
-        visibility::Options { with_hidden, with_seams: self.seams, crease }
+        visibility::Options {
+            with_hidden,
+            with_seams: self.seams,
+            merged_blocks: self.merged_blocks,
+            crease,
+        }
     }
 
     /// What stands for each option that is set, as `$options` lists it.
@@ -142,11 +151,13 @@ impl PlotOptions {
         let hidden = match self.hidden {
             HiddenLines::Erased => "erased",
             HiddenLines::Dotted => "dotted",
+            HiddenLines::Dashed => "dashed",
             HiddenLines::Shown => "shown",
         };
         line(format_args!("$behind={}", if self.clip_behind { "clip" } else { "refuse" }));
         line(format_args!("$hidden={hidden}"));
         line(format_args!("$seams={}", if self.seams { "on" } else { "off" }));
+        line(format_args!("$blocks={}", if self.merged_blocks { "merged" } else { "separate" }));
         line(format_args!("$crease={}", self.crease));
         line(format_args!("$page={}x{}", self.page.width, self.page.height));
         line(format_args!("$margin={}", self.page.margin));

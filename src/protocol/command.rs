@@ -59,10 +59,12 @@ pub enum PlotOption {
     Projection(ProjectionChoice),
     /// `$behind=clip|refuse`: what is behind the eye is cut off (`true`), or an error.
     ClipBehind(bool),
-    /// `$hidden=erased|dotted|shown`
+    /// `$hidden=erased|dotted|dashed|shown`
     Hidden(HiddenLines),
     /// `$seams=on|off`: where faces pass through each other.
     Seams(bool),
+    /// `$blocks=separate|merged`: whether blocks that touch are one shape (`true`).
+    MergedBlocks(bool),
     /// `$crease=DEGREES`: edges less sharp are not drawn.
     Crease(f64),
     /// `$page=WIDTHxHEIGHT` in mm
@@ -147,6 +149,8 @@ pub enum HiddenLines {
     Erased,
     /// Drawn dotted.
     Dotted,
+    /// Drawn dashed.
+    Dashed,
     /// Drawn like visible ones: a wire frame.
     Shown,
 }
@@ -171,8 +175,9 @@ pub const HELP: &[(&str, &str)] = &[
         "a parallel view by its direction",
     ),
     ("$behind=clip|refuse", "what becomes of what is behind the eye"),
-    ("$hidden=erased|dotted|shown", "what becomes of hidden lines"),
+    ("$hidden=erased|dotted|dashed|shown", "what becomes of hidden lines"),
     ("$seams=on|off", "whether the lines are drawn where faces pass through each other"),
+    ("$blocks=separate|merged", "whether blocks that touch are drawn as one shape"),
     ("$crease=DEGREES", "leave out edges between faces that bend less; 0 draws every edge"),
     ("$page=WIDTHxHEIGHT", "size of the sheet in mm"),
     ("$margin=MM", "what stays free on each side of the sheet"),
@@ -253,9 +258,10 @@ impl PlotOption {
             "hidden" => Self::Hidden(match value {
                 "erased" => HiddenLines::Erased,
                 "dotted" => HiddenLines::Dotted,
+                "dashed" => HiddenLines::Dashed,
                 "shown" => HiddenLines::Shown,
                 _ => {
-                    return Err(Refusal::NotAChoice { choices: "erased, dotted or shown" });
+                    return Err(Refusal::NotAChoice { choices: "erased, dotted, dashed or shown" });
                 }
             }),
             "page" => {
@@ -272,6 +278,11 @@ impl PlotOption {
             }
             "fit" => Self::Fit(on_or_off(value)?),
             "seams" => Self::Seams(on_or_off(value)?),
+            "blocks" => Self::MergedBlocks(match value {
+                "merged" => true,
+                "separate" => false,
+                _ => return Err(Refusal::NotAChoice { choices: "separate or merged" }),
+            }),
             "crease" => {
                 let [degrees] = values(value)?;
                 if !(0.0..=180.0).contains(&degrees) {
@@ -466,7 +477,7 @@ mod tests {
         assert_eq!(option("$margin=-1"), Err(Refusal::NumberOutOfRange));
         assert_eq!(
             option("$hidden=gone"),
-            Err(Refusal::NotAChoice { choices: "erased, dotted or shown" })
+            Err(Refusal::NotAChoice { choices: "erased, dotted, dashed or shown" })
         );
         assert_eq!(Command::parse("$110=5"), Ok(Command::Setting { name: "110", value: "5" }));
     }

@@ -81,11 +81,7 @@ impl<'c> Piece<'c> {
             left |= u32::from(side > 0) << n;
             left_or_on |= u32::from(side >= 0) << n;
         }
-        Self {
-            corners,
-            left,
-            left_or_on,
-        }
+        Self { corners, left, left_or_on }
     }
 
     /// The mask of the corners, each put where the next one is.
@@ -159,11 +155,7 @@ impl Sight {
     /// On which side of this edge's line a vertex lies on the page.
     fn side_of(&self, outlook: &Outlook<'_>, number: u16) -> i32 {
         let coarse = self.line.side(outlook.place(number));
-        if coarse != 0 {
-            coarse
-        } else {
-            self.exact_side_of(outlook, number)
-        }
+        if coarse != 0 { coarse } else { self.exact_side_of(outlook, number) }
     }
 
     /// [`Self::side_of`] without a look at the places.
@@ -360,10 +352,7 @@ impl Sight {
     /// The part of the edge within a piece of a face.
     pub fn part(&self, outlook: &Outlook<'_>, passage: Passage) -> Part {
         let place = |(a, b): Side| outlook.crossing(a, b, self.p, self.q);
-        Part {
-            from: passage.entry.map(place),
-            to: passage.exit.map(place),
-        }
+        Part { from: passage.entry.map(place), to: passage.exit.map(place) }
     }
 
     /// Marks what the sides of an element do that lie on the line of this edge.
@@ -423,10 +412,7 @@ impl Sight {
         };
         if let Some(behind) = behind {
             let (at_a, at_b) = (place(va), place(vb));
-            let beside = Part {
-                from: Some(at_a.min(at_b)),
-                to: Some(at_a.max(at_b)),
-            };
+            let beside = Part { from: Some(at_a.min(at_b)), to: Some(at_a.max(at_b)) };
             profile.mark(beside.and(behind), mark::STOOD_IN);
         }
     }
