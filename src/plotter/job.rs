@@ -2,7 +2,8 @@
 
 use super::PlotOptions;
 use crate::drawing::{
-    Bounds, Drawing, Line, LineType, PageMap, PagePoint, StepsPerMillimetre, Stored, organise,
+    Bounds, Drawing, Line, LineType, OrganiseError, PageMap, PagePoint, StepsPerMillimetre, Stored,
+    organise,
 };
 use crate::machine::{Path, Target};
 use crate::model::{Element, Model, ModelError};
@@ -59,8 +60,7 @@ impl Job {
         } else {
             project(model, options, steps, words, attention, observer)?
         };
-        attention.check()?;
-        let stored = organise(words, lines).map_err(Refusal::DrawingTooLarge)?;
+        let stored = organise(words, lines, attention)?;
         let (drawing, mut rest) = stored.split(words).map_err(Refusal::DrawingTooLarge)?;
         let legs = drawing.segments.len();
         if legs == 0 {
@@ -229,6 +229,15 @@ fn project(
 impl From<Aborted> for Refusal {
     fn from(_: Aborted) -> Self {
         Self::Aborted
+    }
+}
+
+impl From<OrganiseError> for Refusal {
+    fn from(error: OrganiseError) -> Self {
+        match error {
+            OrganiseError::Scratch(missing) => Self::DrawingTooLarge(missing),
+            OrganiseError::Aborted => Self::Aborted,
+        }
     }
 }
 

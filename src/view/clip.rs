@@ -7,7 +7,7 @@
 use super::View;
 use crate::geometry::Vertex;
 use crate::model::{Corner, Element, Elements, Model, VERTEX_NUMBER_LIMIT};
-use crate::stage::{OutOfScratch, Scratch};
+use crate::stage::{OutOfScratch, Scratch, heap_sort_by_key};
 
 /// A model as the camera sees it.
 #[derive(Debug, Clone, Copy)]
@@ -54,7 +54,7 @@ fn cut<'a>(
     for (key, edge) in keys.iter_mut().zip(elements.iter().flat_map(edges).filter(is_cut)) {
         *key = edge.key();
     }
-    keys.sort_unstable();
+    heap_sort_by_key(keys, |key| *key);
     let keys = without_repeats(keys);
 
     let too_many =

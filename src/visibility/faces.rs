@@ -3,7 +3,7 @@
 use super::edges::{Outlines, is_bar};
 use super::triangles::{Cut, cut_of};
 use crate::geometry::{COORDINATE_LIMIT, Vertex};
-use crate::stage::{OutOfScratch, Scratch};
+use crate::stage::{OutOfScratch, Scratch, heap_sort_by_key};
 
 /// The elements, nearest first. The place of an element in this order is its rank.
 ///
@@ -51,7 +51,7 @@ impl<'a> Faces<'a> {
             };
             *key = depth.min(0x3FFF) << 18 | cut << 16 | first as u32;
         }
-        order.sort_unstable();
+        heap_sort_by_key(order, |item| *item);
         Ok(Self { order, degenerate })
     }
 

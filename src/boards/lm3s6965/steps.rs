@@ -23,7 +23,7 @@ use super::{HAPPENED, clock, critical};
 
 /// Events that wait for the interrupt, at most; one more place than that, for the queue. 4 bytes
 /// each.
-const EVENT_PLACES: usize = 512;
+const EVENT_PLACES: usize = 256;
 
 const CYCLES_PER_TICK: u32 = clock::HERTZ / TICKS_PER_SECOND;
 const _: () = assert!(clock::HERTZ.is_multiple_of(TICKS_PER_SECOND));
