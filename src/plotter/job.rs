@@ -166,6 +166,9 @@ fn lay_out_plan(
     Ok(collector.count)
 }
 
+/// These take some 100,000 instructions.
+const CORNERS_BETWEEN_CHECKS: usize = 128;
+
 /// Anything else: through the camera, hidden lines found. Returns how many lines stand in `words`.
 fn project(
     model: &Model<'_>,
@@ -179,16 +182,24 @@ fn project(
     let total = size_of_val(words);
     let mut scratch = Scratch::new(words);
     let camera = options.camera(model).ok_or(Refusal::NothingToPlot)?;
+    attention.check()?;
     let view = View::new(&camera, model).map_err(Refusal::View)?;
+    attention.check()?;
     let Seen { vertices, elements } =
         see(&view, model, &mut scratch).map_err(Refusal::DrawingTooLarge)?;
     if !options.clip_behind {
         view.refuse_behind(model).map_err(Refusal::View)?;
     }
     let projection = view.projection();
-    let used =
-        elements.corners().iter().filter_map(|c| vertices.get(usize::from(c.vertex()))).copied();
-    let bounds = Bounds::around(used, projection).ok_or(Refusal::NothingToPlot)?;
+    // Two divisions a corner: some at a time, so that the line is answered.
+    let mut bounds: Option<Bounds> = None;
+    for corners in elements.corners().chunks(CORNERS_BETWEEN_CHECKS) {
+        attention.check()?;
+        let used = corners.iter().filter_map(|c| vertices.get(usize::from(c.vertex()))).copied();
+        let more = Bounds::around(used, projection);
+        bounds = bounds.zip(more).map(|(a, b)| a.union(b)).or(bounds).or(more);
+    }
+    let bounds = bounds.ok_or(Refusal::NothingToPlot)?;
     let map = PageMap::fit(&bounds, &options.page, steps).map_err(Refusal::Page)?;
 
     attention.enter(Stage::Visibility);
