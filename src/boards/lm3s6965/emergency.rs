@@ -5,7 +5,6 @@ use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use cortex_m::peripheral::SCB;
-use cortex_m_rt::{ExceptionFrame, exception};
 
 use super::{pins, serial, steps};
 
@@ -54,12 +53,46 @@ fn panic(info: &PanicInfo) -> ! {
     wait_for_reset()
 }
 
+unsafe extern "C" {
+    static _stack_start: u32;
+    static _stack_end: u32;
+}
+
+/// Stands for the address of a fault for which the stack had no place left.
+const STACK_USED_UP: u32 = u32::MAX;
+
+/// Goes to [`report_fault`] with the address of the fault, on a fresh stack: the fault may be that
+/// the stack is used up, and then nothing can be put onto it.
+///
 /// # Safety
 /// Called by the core alone, on a fault.
-#[exception]
-unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
-    if make_safe(format_args!("hard fault at {:#010x}", frame.pc())) {
-        defmt::error!("hard fault at {=u32:#010x}", frame.pc());
+#[unsafe(naked)]
+#[unsafe(no_mangle)]
+unsafe extern "C" fn HardFault() -> ! {
+    core::arch::naked_asm!(
+        "mrs r0, msp",
+        "ldr r1, ={end}",
+        "cmp r0, r1",
+        "mvn r2, #0", // STACK_USED_UP
+        "it hs",
+        "ldrhs r2, [r0, #24]", // the program counter that the core has put there
+        "mov r0, r2",
+        "ldr r1, ={start}",
+        "msr msp, r1",
+        "b {report_fault}",
+        end = sym _stack_end,
+        start = sym _stack_start,
+        report_fault = sym report_fault,
+    )
+}
+
+extern "C" fn report_fault(address: u32) -> ! {
+    if address == STACK_USED_UP {
+        if make_safe(format_args!("the stack is used up")) {
+            defmt::error!("the stack is used up");
+        }
+    } else if make_safe(format_args!("hard fault at {address:#010x}")) {
+        defmt::error!("hard fault at {=u32:#010x}", address);
     }
     wait_for_reset()
 }
