@@ -407,10 +407,16 @@ impl Search<'_> {
             profile,
             options,
         } = self;
-        let faces = &around.faces;
-        let (p, q) = (sight.p.place, sight.q.place);
+        let faces_by_rank = &around.faces;
         let near = grid::coarse_depth(sight.near);
-        if grid.along(p, q, near, |cell| cell.cover.is_some()) {
+        let way = grid.way(sight.p.place, sight.q.place, near);
+        let (mut any_covered, mut all_covered) = (false, true);
+        way.visit(|cell| {
+            any_covered |= cell.cover.is_some();
+            all_covered &= cell.cover.is_some();
+            true
+        });
+        if all_covered {
             profile.mark(Part::WHOLE, mark::HIDDEN);
             return;
         }
@@ -424,20 +430,25 @@ impl Search<'_> {
             if *word & bit == 0 {
                 *word |= bit;
                 let rank = usize::from(rank);
-                sight.look_at(around, faces.get(rank), profile);
+                sight.look_at(around, faces_by_rank.get(rank), profile);
                 if options.merged_blocks {
-                    sight.touch(around, faces.get(rank), rank, profile);
+                    sight.touch(around, faces_by_rank.get(rank), rank, profile);
                 }
             }
             !profile.is_hidden()
         };
-        grid.along(p, q, near, |cell| match cell.cover {
-            Some(cover) => look_at(cover),
-            None => cell
-                .faces
-                .iter()
-                .take_while(|&&rank| !faces.begins_behind(usize::from(rank), sight.far))
-                .all(|&rank| look_at(rank)),
-        });
+        // Covering faces first: they hide most, and what they leave may need no other cell.
+        let _ = (!any_covered || way.visit(|cell| cell.cover.is_none_or(&mut look_at)))
+            && way.visit(|cell| {
+                let faces = if cell.cover.is_some() {
+                    &[]
+                } else {
+                    cell.faces
+                };
+                faces
+                    .iter()
+                    .take_while(|&&rank| !faces_by_rank.begins_behind(usize::from(rank), sight.far))
+                    .all(|&rank| look_at(rank))
+            });
     }
 }
