@@ -82,12 +82,23 @@ impl<'a> Grid<'a> {
         let entry_count = raster.count(outlook, outlines, faces);
         let entries: &mut [u16] = scratch.take(entry_count)?;
         raster.fill(outlook, outlines, faces, entries);
-        Ok(Self { shape, columns: shape.columns(), cells: raster.cells(), entries })
+        Ok(Self {
+            shape,
+            columns: shape.columns(),
+            cells: raster.cells(),
+            entries,
+        })
     }
 
     fn view(&self, cell: usize, near: u16) -> CellView<'_> {
-        let begin = cell.checked_sub(1).map_or(0, |before| self.cells[before].end);
-        let Cell { end, cover_depth, cover } = self.cells[cell];
+        let begin = cell
+            .checked_sub(1)
+            .map_or(0, |before| self.cells[before].end);
+        let Cell {
+            end,
+            cover_depth,
+            cover,
+        } = self.cells[cell];
         CellView {
             cover: (cover_depth < near).then_some(cover),
             faces: &self.entries[usize::from(begin)..usize::from(end)],
@@ -104,38 +115,57 @@ impl<'a> Grid<'a> {
         }
     }
 
-    /// Visits every cell that the edge from `p` to `q`, nowhere nearer than `near`, passes or
-    /// touches, until the visitor says no.
+    /// The way of an edge from `p` to `q` that is nowhere nearer than the coarse depth `near`.
+    pub fn way(&self, p: Place, q: Place, near: u16) -> Way<'_> {
+        let (low, high) = if p.y <= q.y { (p, q) } else { (q, p) };
+        let dx = i32::from(high.x) - i32::from(low.x);
+        let dy = i32::from(high.y) - i32::from(low.y);
+        Way {
+            grid: self,
+            near,
+            low,
+            high,
+            slope: if dy > 0 { (dx << 16) / dy } else { 0 },
+        }
+    }
+}
+
+/// The cells that an edge passes or touches.
+#[derive(Debug, Clone, Copy)]
+pub struct Way<'g> {
+    grid: &'g Grid<'g>,
+    near: u16,
+    low: Place,
+    high: Place,
+    /// Steps to the right for each step up, in units of 2^-16.
+    slope: i32,
+}
+
+impl<'g> Way<'g> {
+    /// Visits each cell until the visitor says no; returns whether it never did.
     ///
     /// The edge lies less than one unit right and up of the line between the places.
-    pub fn along(
-        &self,
-        p: Place,
-        q: Place,
-        near: u16,
-        mut visit: impl FnMut(CellView<'_>) -> bool,
-    ) -> bool {
-        let Shape { shift_x, shift_y, .. } = self.shape;
-        let (low, high) = if p.y <= q.y { (p, q) } else { (q, p) };
-        let (dx, dy) = (i32::from(high.x) - i32::from(low.x), i32::from(high.y) - i32::from(low.y));
-        let (left, right) = (i32::from(p.x.min(q.x)), i32::from(p.x.max(q.x)));
-        let rows = (low.y >> shift_y)..=(high.y >> shift_y);
-        for row in rows {
+    pub fn visit(&self, mut visit: impl FnMut(CellView<'g>) -> bool) -> bool {
+        let Shape {
+            shift_x, shift_y, ..
+        } = self.grid.shape;
+        let (low_x, low_y) = (i32::from(self.low.x), i32::from(self.low.y));
+        let dy = i32::from(self.high.y) - low_y;
+        let left = i32::from(self.low.x.min(self.high.x));
+        let right = i32::from(self.low.x.max(self.high.x));
+        for row in self.low.y >> shift_y..=self.high.y >> shift_y {
             let (mut from, mut to) = (left, right);
             if dy > 0 {
-                let bottom = (i32::from(row) << shift_y) - 1;
-                let top = (i32::from(row) + 1) << shift_y;
-                let x_at = |y: i32| {
-                    let rise = (y - i32::from(low.y)).clamp(0, dy);
-                    i32::from(low.x) + dx * rise / dy
-                };
-                let (x0, x1) = (x_at(bottom), x_at(top));
-                from = from.max(x0.min(x1) - 1);
-                to = to.min(x0.max(x1) + 2);
+                // Rounded towards the lower end; below 2^30, as the slope is at most 2^30 / dy.
+                let x_at = |y: i32| low_x + ((self.slope * (y - low_y).clamp(0, dy)) >> 16);
+                let x_below = x_at((i32::from(row) << shift_y) - 1);
+                let x_above = x_at((i32::from(row) + 1) << shift_y);
+                from = from.max(x_below.min(x_above) - 2);
+                to = to.min(x_below.max(x_above) + 3);
             }
-            let first = usize::from(row) * self.columns;
+            let first = usize::from(row) * self.grid.columns;
             for column in (from >> shift_x)..=(to >> shift_x) {
-                if !visit(self.view(first + column as usize, near)) {
+                if !visit(self.grid.view(first + column as usize, self.near)) {
                     return false;
                 }
             }

@@ -118,7 +118,7 @@ fn is_many(mask: u32) -> bool {
 const FEW_CORNERS: usize = 8;
 
 /// The sides at which the edge enters and leaves a piece of a face, if it does so between its ends.
-#[derive(Clone, Copy, Default, PartialEq)]
+#[derive(Clone, Copy, Default)]
 pub struct Passage {
     entry: Option<Side>,
     exit: Option<Side>,
@@ -258,11 +258,13 @@ impl Sight {
         if facing == 0 {
             return true;
         }
-        let passages = [
-            self.passage(outlook, piece, left, facing),
-            self.passage(outlook, piece, right, facing),
-        ];
-        if passages == [None; 2] {
+        let on_left = self.passage(outlook, piece, left, facing);
+        let on_right = if left == right {
+            on_left
+        } else {
+            self.passage(outlook, piece, right, facing)
+        };
+        if on_left.is_none() && on_right.is_none() {
             return true;
         }
         let behind = if far < self.near {
@@ -280,10 +282,10 @@ impl Sight {
             }
         };
         if left == right {
-            cover(passages[0], mark::HIDDEN);
+            cover(on_left, mark::HIDDEN);
         } else {
-            cover(passages[0], mark::LEFT);
-            cover(passages[1], mark::RIGHT);
+            cover(on_left, mark::LEFT);
+            cover(on_right, mark::RIGHT);
         }
         true
     }
