@@ -1,9 +1,10 @@
 //! The faces in order of their nearest point.
 
+use super::VisibilityError;
 use super::edges::{Outlines, is_bar};
 use super::triangles::{Cut, cut_of};
 use crate::geometry::{COORDINATE_LIMIT, Vertex};
-use crate::stage::{OutOfScratch, Scratch, heap_sort_by_key};
+use crate::stage::{Attention, Scratch, heap_sort_by_key};
 
 /// The elements, nearest first. The place of an element in this order is its rank.
 ///
@@ -31,10 +32,12 @@ impl<'a> Faces<'a> {
         outlines: Outlines<'_>,
         vertices: &[Vertex],
         scratch: &mut Scratch<'a>,
-    ) -> Result<Self, OutOfScratch> {
+        attention: &mut dyn Attention,
+    ) -> Result<Self, VisibilityError> {
         let mut degenerate = 0;
         let order: &mut [u32] = scratch.take(outlines.elements().count())?;
         for (key, (first, corners)) in order.iter_mut().zip(outlines.elements()) {
+            attention.check()?;
             let near = corners
                 .iter()
                 .map(|corner| vertices[usize::from(corner.vertex())].z)
@@ -51,6 +54,7 @@ impl<'a> Faces<'a> {
             };
             *key = depth.min(0x3FFF) << 18 | cut << 16 | first as u32;
         }
+        attention.check()?;
         heap_sort_by_key(order, |item| *item);
         Ok(Self { order, degenerate })
     }

@@ -4,12 +4,13 @@
 //! hides there is hidden already. An edge that lies behind the covering face of every cell on its
 //! way is hidden without another look.
 
+use super::VisibilityError;
 use super::edges::Outlines;
 use super::faces::Faces;
 use super::outlook::{Outlook, Place};
 use super::raster::{Bounds, Raster, Shape};
 use crate::geometry::COORDINATE_LIMIT;
-use crate::stage::{OutOfScratch, Scratch};
+use crate::stage::{Attention, Scratch};
 use bytemuck::{Pod, Zeroable};
 
 /// One cell of the page.
@@ -61,10 +62,12 @@ impl<'a> Grid<'a> {
         outlines: Outlines<'_>,
         faces: &Faces<'_>,
         mut scratch: Scratch<'a>,
-    ) -> Result<Self, OutOfScratch> {
+        attention: &mut dyn Attention,
+    ) -> Result<Self, VisibilityError> {
         let wanted_cells = (faces.len() * CELLS_FOR_EACH_FACE).min(usize::from(u16::MAX));
         let mut shape = Shape::finest(outlook);
         while shape.cells() > 1 {
+            attention.check()?;
             let fits = |entries: usize| {
                 let bytes =
                     Scratch::bytes_for::<Cell>(shape.cells()) + Scratch::bytes_for::<u16>(entries);
@@ -79,26 +82,17 @@ impl<'a> Grid<'a> {
             shape.coarsen();
         }
         let mut raster = Raster::new(shape, scratch.take(shape.cells())?);
+        attention.check()?;
         let entry_count = raster.count(outlook, outlines, faces);
         let entries: &mut [u16] = scratch.take(entry_count)?;
+        attention.check()?;
         raster.fill(outlook, outlines, faces, entries);
-        Ok(Self {
-            shape,
-            columns: shape.columns(),
-            cells: raster.cells(),
-            entries,
-        })
+        Ok(Self { shape, columns: shape.columns(), cells: raster.cells(), entries })
     }
 
     fn view(&self, cell: usize, near: u16) -> CellView<'_> {
-        let begin = cell
-            .checked_sub(1)
-            .map_or(0, |before| self.cells[before].end);
-        let Cell {
-            end,
-            cover_depth,
-            cover,
-        } = self.cells[cell];
+        let begin = cell.checked_sub(1).map_or(0, |before| self.cells[before].end);
+        let Cell { end, cover_depth, cover } = self.cells[cell];
         CellView {
             cover: (cover_depth < near).then_some(cover),
             faces: &self.entries[usize::from(begin)..usize::from(end)],
@@ -120,13 +114,7 @@ impl<'a> Grid<'a> {
         let (low, high) = if p.y <= q.y { (p, q) } else { (q, p) };
         let dx = i32::from(high.x) - i32::from(low.x);
         let dy = i32::from(high.y) - i32::from(low.y);
-        Way {
-            grid: self,
-            near,
-            low,
-            high,
-            slope: if dy > 0 { (dx << 16) / dy } else { 0 },
-        }
+        Way { grid: self, near, low, high, slope: if dy > 0 { (dx << 16) / dy } else { 0 } }
     }
 }
 
@@ -146,9 +134,7 @@ impl<'g> Way<'g> {
     ///
     /// The edge lies less than one unit right and up of the line between the places.
     pub fn visit(&self, mut visit: impl FnMut(CellView<'g>) -> bool) -> bool {
-        let Shape {
-            shift_x, shift_y, ..
-        } = self.grid.shape;
+        let Shape { shift_x, shift_y, .. } = self.grid.shape;
         let (low_x, low_y) = (i32::from(self.low.x), i32::from(self.low.y));
         let dy = i32::from(self.high.y) - low_y;
         let left = i32::from(self.low.x.min(self.high.x));

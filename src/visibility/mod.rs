@@ -12,10 +12,10 @@
 //!   first of the model.
 //! * An edge that the eye sees end-on has no length on the page and no stretch.
 //!
-//! The way: choose one side of a face for each edge ([`edges`]), place the vertices on a coarse grid of
-//! the page ([`outlook`]), cut concave faces ([`triangles`]), sort the faces by depth ([`faces`]) and into
-//! cells ([`grid`]); then follow each edge through the cells and mark on its [`profile`] what each
-//! face hides ([`sight`]). Refused: vertices out of range, a model too large, too little memory.
+//! The way: choose one side of a face for each edge (`edges`), place the vertices on a coarse grid of
+//! the page (`outlook`), cut concave faces (`triangles`), sort the faces by depth (`faces`) and into
+//! cells (`grid`); then follow each edge through the cells and mark on its `profile` what each
+//! face hides (`sight`). Refused: vertices out of range, a model too large, too little memory.
 
 mod blocks;
 mod crease;
@@ -142,9 +142,7 @@ impl From<Aborted> for VisibilityError {
 ///
 /// It uses more where it is given more: a finer grid, so that fewer faces are tried for each edge.
 pub fn scratch_bytes(scene: &Scene<'_>) -> usize {
-    let outlines = Outlines {
-        corners: scene.elements.corners(),
-    };
+    let outlines = Outlines { corners: scene.elements.corners() };
     let corners = outlines.corners.len();
     let vertices = scene.vertices.len();
     let faces = outlines.elements().count();
@@ -174,9 +172,7 @@ pub fn find_stretches(
     sink: &mut dyn StretchSink,
 ) -> Result<Report, VisibilityError> {
     check(scene)?;
-    let outlines = Outlines {
-        corners: scene.elements.corners(),
-    };
+    let outlines = Outlines { corners: scene.elements.corners() };
     let vertices = scene.vertices;
     let chosen = ChosenSides::choose(
         outlines,
@@ -189,25 +185,15 @@ pub fn find_stretches(
     let ears = Ears::cut(outlines, vertices, &mut scratch, attention)?;
     let outlook = Outlook::new(scene.projection, vertices, &mut scratch)?;
     attention.check()?;
-    let faces = Faces::sort(outlines, vertices, &mut scratch)?;
+    let faces = Faces::sort(outlines, vertices, &mut scratch, attention)?;
     attention.check()?;
     let seen = scratch.take(faces.len().div_ceil(32))?;
-    let met = if options.with_seams {
-        Some(scratch.take(faces.len().div_ceil(32))?)
-    } else {
-        None
-    };
+    let met = if options.with_seams { Some(scratch.take(faces.len().div_ceil(32))?) } else { None };
     let piece_count = MOST_PIECES.min(scratch.available_bytes() / 8 / size_of::<Piece>());
     let pieces = scratch.take(piece_count.max(FEWEST_PIECES))?;
-    let grid = Grid::new(&outlook, outlines, &faces, scratch)?;
+    let grid = Grid::new(&outlook, outlines, &faces, scratch, attention)?;
     let mut search = Search {
-        around: Surroundings {
-            outlook,
-            outlines,
-            ears,
-            chosen,
-            faces,
-        },
+        around: Surroundings { outlook, outlines, ears, chosen, faces },
         grid,
         seen,
         profile: Profile::new(pieces),
@@ -226,9 +212,7 @@ pub fn find_stretches(
     if let Some(met) = met {
         search.follow_seams(met, attention, sink)?;
     }
-    Ok(Report {
-        degenerate_faces: search.around.faces.degenerate(),
-    })
+    Ok(Report { degenerate_faces: search.around.faces.degenerate() })
 }
 
 /// Refuses what the arithmetic cannot take.
@@ -237,9 +221,8 @@ fn check(scene: &Scene<'_>) -> Result<(), VisibilityError> {
     if corners.len() > MOST_CORNERS {
         return Err(VisibilityError::TooManyCorners(MOST_CORNERS));
     }
-    if let Some(corner) = corners
-        .iter()
-        .find(|corner| usize::from(corner.vertex()) >= scene.vertices.len())
+    if let Some(corner) =
+        corners.iter().find(|corner| usize::from(corner.vertex()) >= scene.vertices.len())
     {
         return Err(VisibilityError::UnknownVertex(corner.vertex()));
     }
@@ -317,15 +300,9 @@ impl Search<'_> {
     fn meet(&self, one: usize, met: &mut [u32]) {
         met.fill(0);
         let outlook = &self.around.outlook;
-        let corners = self
-            .around
-            .outlines
-            .element(self.around.faces.get(one).first);
+        let corners = self.around.outlines.element(self.around.faces.get(one).first);
         let bounds = Bounds::of(outlook, corners);
-        let far = corners
-            .iter()
-            .map(|corner| outlook.vertex(corner.vertex()).z)
-            .max();
+        let far = corners.iter().map(|corner| outlook.vertex(corner.vertex()).z).max();
         let far = far.unwrap_or(-COORDINATE_LIMIT);
         self.grid.within(&bounds, |ranks| {
             for &other in ranks {
@@ -377,13 +354,8 @@ impl Search<'_> {
                         stretch.to = to;
                     }
                     _ => {
-                        let next = handed.then_some(Stretch {
-                            edge,
-                            ends,
-                            from: piece.from,
-                            to,
-                            visible,
-                        });
+                        let next =
+                            handed.then_some(Stretch { edge, ends, from: piece.from, to, visible });
                         if let Some(stretch) = core::mem::replace(&mut pending, next) {
                             sink.stretch(stretch)?;
                         }
@@ -400,13 +372,7 @@ impl Search<'_> {
 
     /// Marks on the profile what every face along the way does to the edge.
     fn look_around(&mut self, sight: &Sight, seam_of: [Option<usize>; 2]) {
-        let Self {
-            around,
-            grid,
-            seen,
-            profile,
-            options,
-        } = self;
+        let Self { around, grid, seen, profile, options } = self;
         let faces_by_rank = &around.faces;
         let near = grid::coarse_depth(sight.near);
         let way = grid.way(sight.p.place, sight.q.place, near);
@@ -440,11 +406,7 @@ impl Search<'_> {
         // Covering faces first: they hide most, and what they leave may need no other cell.
         let _ = (!any_covered || way.visit(|cell| cell.cover.is_none_or(&mut look_at)))
             && way.visit(|cell| {
-                let faces = if cell.cover.is_some() {
-                    &[]
-                } else {
-                    cell.faces
-                };
+                let faces = if cell.cover.is_some() { &[] } else { cell.faces };
                 faces
                     .iter()
                     .take_while(|&&rank| !faces_by_rank.begins_behind(usize::from(rank), sight.far))

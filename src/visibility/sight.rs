@@ -259,11 +259,8 @@ impl Sight {
             return true;
         }
         let on_left = self.passage(outlook, piece, left, facing);
-        let on_right = if left == right {
-            on_left
-        } else {
-            self.passage(outlook, piece, right, facing)
-        };
+        let on_right =
+            if left == right { on_left } else { self.passage(outlook, piece, right, facing) };
         if on_left.is_none() && on_right.is_none() {
             return true;
         }
