@@ -118,6 +118,7 @@ const LINES_BETWEEN_CHECKS: usize = 32;
 ///
 /// # Errors
 /// See [`OrganiseError`]; the lines are lost then.
+#[inline(never)] // Its frame must not lie under the stages'.
 pub fn organise(
     words: &mut [u64],
     count: usize,

@@ -102,6 +102,7 @@ impl PageMap {
     ///
     /// # Errors
     /// [`PageError::NoRoom`], [`PageError::TooManySteps`].
+    #[inline(never)] // Its frame must not lie under the stages'.
     pub fn fit(bounds: &Bounds, page: &Page, steps: StepsPerMillimetre) -> Result<Self, PageError> {
         Self::fit_unit(bounds, Bounds::FRACTION_BITS, page, steps)
     }

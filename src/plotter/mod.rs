@@ -177,6 +177,7 @@ impl Inner<'_> {
         self.machine.state() == State::Idle
     }
 
+    #[inline(never)] // Its frame must not lie under the stages'.
     fn carry_out<B: Board>(&mut self, line: &str, board: &mut B) -> Result<(), Refusal> {
         match Command::parse(line)? {
             Command::Nothing => {}
@@ -207,6 +208,7 @@ impl Inner<'_> {
         Ok(())
     }
 
+    #[inline(never)] // Its frame must not lie under the stages'.
     fn plot<B: Board>(&mut self, board: &mut B) -> Result<(), Refusal> {
         if !self.is_idle() {
             return Err(match self.machine.state() {
@@ -243,6 +245,7 @@ impl Inner<'_> {
         Ok(())
     }
 
+    #[inline(never)] // Its frame must not lie under the stages'.
     fn change_setting(&mut self, name: &str, value: &str) -> Result<(), Refusal> {
         let setting =
             name.parse().ok().and_then(Setting::numbered).ok_or(Refusal::UnknownSystemCommand)?;
@@ -251,6 +254,7 @@ impl Inner<'_> {
         self.machine.set(setting, value).map_err(Refusal::Setting)
     }
 
+    #[inline(never)] // Its frame must not lie under the stages'.
     fn list_settings<B: Board>(&self, board: &mut B) {
         for (info, value) in self.machine.settings().iter() {
             let value =
@@ -260,12 +264,14 @@ impl Inner<'_> {
         }
     }
 
+    #[inline(never)] // Its frame must not lie under the stages'.
     fn report_build<B: Board>(&self, board: &mut B) {
         const VERSION: &str = env!("CARGO_PKG_VERSION");
         Reply(board).line(format_args!("[VER:1.1h.penup {VERSION}:{}]", B::NAME));
         Reply(board).line(format_args!("[OPT:,{},{LINE_LIMIT}]", memory::BLOCKS));
     }
 
+    #[inline(never)] // Its frame must not lie under the stages'.
     fn report_model<B: Board>(&self, board: &mut B) {
         let model = &self.model;
         let (vertices, limit) = (model.vertices().len(), model.vertex_limit());
@@ -280,6 +286,7 @@ impl Inner<'_> {
         Reply(board).line(format_args!("[MEM:{} bytes to work in]", size_of_val(self.words)));
     }
 
+    #[inline(never)] // Its frame must not lie under the stages'.
     fn report_status<B: Board>(&self, board: &mut B) {
         let status = self.machine.status();
         let state = match status.state {

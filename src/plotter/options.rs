@@ -93,6 +93,7 @@ impl PlotOptions {
     }
 
     /// The camera for `model`; what the user did not choose is chosen here. `None` without vertices.
+    #[inline(never)] // Its frame must not lie under the stages'.
     pub fn camera(&self, model: &Model<'_>) -> Option<Camera> {
         let lens = match self.projection {
             ProjectionChoice::Axonometric { azimuth, elevation } => {
@@ -111,6 +112,7 @@ impl PlotOptions {
     }
 
     /// What visibility is to find through `view`.
+    #[inline(never)] // Its frame must not lie under the stages'.
     pub fn visibility(&self, view: &View) -> visibility::Options {
         let crease = (self.crease > 0.0).then(|| Crease {
             cosine: libm::round(libm::cos(self.crease.to_radians()) * 32768.0) as i32,
@@ -126,6 +128,7 @@ impl PlotOptions {
     }
 
     /// What stands for each option that is set, as `$options` lists it.
+    #[inline(never)] // Its frame must not lie under the stages'.
     pub fn list(&self, mut line: impl FnMut(core::fmt::Arguments<'_>)) {
         let places = [("eye", self.eye), ("at", self.at), ("up", self.up), ("angles", self.angles)];
         for (name, place) in places {

@@ -22,6 +22,7 @@ pub struct Seen<'a> {
 ///
 /// # Errors
 /// [`OutOfScratch`] if the vertices, or the cut faces, do not fit.
+#[inline(never)] // Its frame must not lie under the stages'.
 pub fn see<'a>(
     view: &View,
     model: &'a Model<'_>,

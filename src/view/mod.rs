@@ -100,6 +100,7 @@ impl View {
     ///
     /// # Errors
     /// See [`ViewError`].
+    #[inline(never)] // Its frame must not lie under the stages'.
     pub fn new(camera: &Camera, model: &Model<'_>) -> Result<Self, ViewError> {
         let Axes { directions, origin } = Axes::new(camera)?;
         let fraction_bits = model.fraction_bits();
