@@ -322,7 +322,7 @@ mod tests {
             (["--margin", "-1"], "cannot be negative"),
             (["--repeat", "0"], "0 is not in 1.."),
             (["--repeat", "-1"], "-1 is not in 1.."),
-            (["--hidden", "gone"], "erased, dotted, shown"),
+            (["--hidden", "gone"], "erased, dotted, dashed, shown"),
         ] {
             let error = settings(&options).expect_err("refused");
             assert!(error.contains(reason), "{options:?}: {error}");
