@@ -14,6 +14,7 @@
 
 mod cycle;
 mod euler;
+mod exchange;
 mod greedy;
 mod improve;
 mod incidence;
@@ -32,7 +33,7 @@ use crate::drawing::{Drawing, PAGE_LIMIT, PagePoint};
 use crate::stage::{Attention, OutOfScratch, Scratch};
 use bytemuck::{Pod, Zeroable};
 use euler::Unused;
-use improve::{Goal, improve};
+use improve::{Tour, improve};
 use network::{Network, start_point};
 use odd::OddPoints;
 use pace::Pace;
@@ -106,8 +107,9 @@ pub struct Options {
     pub method: Method,
     /// Open or closed.
     pub shape: Shape,
-    /// How many rounds of improvement may be tried after the first tour (a budget in work, not in
-    /// time, so that every machine gives the same tour).
+    /// How much work may go into improving the first tour of separate parts, for each pen, in units
+    /// of 1024 distances: a budget in work and not in time, so that every machine gives the same
+    /// tour. With 0 the parts are drawn nearest first.
     pub effort: u32,
 }
 
@@ -225,10 +227,11 @@ fn order_pen<'a>(
             Unused::new(network, unused, &mut scratch)?.nearest_first(start, route, pace)?;
         }
         report.components += parts;
-        let open = options.shape == Shape::OpenPath;
-        let goal = Goal { open, bound: report.bound - bound };
         if parts > 1 && options.effort > 0 {
-            improve(network, mate, start, route, goal, options.effort, scratch, pace)?;
+            let open = options.shape == Shape::OpenPath;
+            let bound = report.bound - bound;
+            pace.grant(u64::from(options.effort) << 10);
+            improve(network, Tour { route, open, bound, mate, start }, scratch, pace)?;
         }
     }
     turn(network, options.shape, route);
