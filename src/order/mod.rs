@@ -212,13 +212,16 @@ fn order_pen<'a>(
     tour: &mut [Leg],
     report: &mut Report,
 ) -> Result<(), OrderError> {
+    pace.answer()?;
     let network = Network::new(drawing, pen, &mut scratch)?;
+    pace.answer()?;
     let route: &mut [Leg] = scratch.take(usize::from(network.chains()))?;
     let bound = report.bound;
     {
         let mut scratch = scratch.reborrow();
         let mate: &mut [u16] = scratch.take(usize::from(network.stations()))?;
         let parts = mark_parts(network, scratch.reborrow(), mate)?;
+        pace.answer()?;
         let start = pair_odd(network, options, scratch.reborrow(), pace, mate, report)?;
         {
             let mut scratch = scratch.reborrow();

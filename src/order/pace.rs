@@ -17,6 +17,11 @@ impl<'a> Pace<'a> {
         Self { attention, done: 0, budget: 0 }
     }
 
+    /// Answers now: between two passes over the whole drawing.
+    pub fn answer(&mut self) -> Result<(), Aborted> {
+        self.work(Self::UNITS)
+    }
+
     /// Notes `units` of work, each as much as a distance costs.
     pub fn work(&mut self, units: u32) -> Result<(), Aborted> {
         self.done += units;
