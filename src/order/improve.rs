@@ -33,9 +33,11 @@ pub(super) struct Tour<'t> {
     pub mate: &'t mut [u16],
     /// Where a route with these moves begins.
     pub start: Option<u16>,
+    /// How much may be worked when the first tour stands.
+    pub budget: u64,
 }
 
-/// Shortens `tour.route`, if it can, until `pace` is over. It sets out from that route or, if that
+/// Shortens `tour.route`, if it can, while `tour.budget` lasts. It sets out from that route or, if that
 /// is shorter, from the one with the moves `tour.mate`, mended so that they join the parts. Does
 /// nothing where there is too little memory.
 pub(super) fn improve(
@@ -44,7 +46,7 @@ pub(super) fn improve(
     mut scratch: Scratch<'_>,
     pace: &mut Pace<'_>,
 ) -> Result<(), OrderError> {
-    let Tour { route, open, bound, mate, start } = tour;
+    let Tour { route, open, bound, mate, start, budget } = tour;
     let length = route_length(network, route, open);
     let legs = route.len() + usize::from(open);
     let fits = |per_station: &usize| {
@@ -67,6 +69,7 @@ pub(super) fn improve(
     let gap = open.then_some(network.chains());
     after.fill(Leg::new(network.chains(), false));
     let mut exchanges = Exchanges::new(network, near, cycle, gap, &mut scratch)?;
+    pace.grant(budget);
     exchanges.exchange_all(true, pace)?;
     let moves = (0..legs).filter(|&index| exchanges.move_after(exchanges.cycle.leg(index)) > 0);
     let patience = PATIENCE * moves.count();

@@ -252,8 +252,9 @@ fn order_pen<'a>(
         if parts > 1 && options.effort > 0 {
             let open = options.shape == Shape::OpenPath;
             let bound = report.bound - bound;
-            pace.grant(u64::from(options.effort) << 10);
-            improve(network, Tour { route, open, bound, mate, start }, scratch, pace)?;
+            let budget = u64::from(options.effort) << 10;
+            let tour = Tour { route, open, bound, mate, start, budget };
+            improve(network, tour, scratch, pace)?;
         }
     }
     turn(network, options.shape, route);
