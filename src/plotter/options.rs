@@ -51,11 +51,7 @@ impl Default for PlotOptions {
             crease: 0.0,
             page: Page { width, height, margin },
             fit: false,
-            order: order::Options {
-                method: order::Method::Auto,
-                shape: order::Shape::OpenPath,
-                effort: 100,
-            },
+            order: order::Options::default(),
         }
     }
 }
