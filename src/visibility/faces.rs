@@ -1,9 +1,11 @@
 //! The faces in order of their nearest point.
 
+use super::VisibilityError;
 use super::edges::{Outlines, is_bar};
+use super::pace::Pace;
 use super::triangles::{Cut, cut_of};
 use crate::geometry::{COORDINATE_LIMIT, Vertex};
-use crate::stage::{OutOfScratch, Scratch};
+use crate::stage::Scratch;
 
 /// The elements, nearest first. The place of an element in this order is its rank.
 ///
@@ -31,10 +33,12 @@ impl<'a> Faces<'a> {
         outlines: Outlines<'_>,
         vertices: &[Vertex],
         scratch: &mut Scratch<'a>,
-    ) -> Result<Self, OutOfScratch> {
+        pace: &mut Pace<'_>,
+    ) -> Result<Self, VisibilityError> {
         let mut degenerate = 0;
         let order: &mut [u32] = scratch.take(outlines.elements().count())?;
         for (key, (first, corners)) in order.iter_mut().zip(outlines.elements()) {
+            pace.spend(200 * corners.len())?;
             let near = corners
                 .iter()
                 .map(|corner| vertices[usize::from(corner.vertex())].z)
@@ -51,6 +55,7 @@ impl<'a> Faces<'a> {
             };
             *key = depth.min(0x3FFF) << 18 | cut << 16 | first as u32;
         }
+        pace.spend(100 * order.len())?;
         order.sort_unstable();
         Ok(Self { order, degenerate })
     }

@@ -4,12 +4,14 @@
 //! hides there is hidden already. An edge that lies behind the covering face of every cell on its
 //! way is hidden without another look.
 
+use super::VisibilityError;
 use super::edges::Outlines;
 use super::faces::Faces;
 use super::outlook::{Outlook, Place};
+use super::pace::Pace;
 use super::raster::{Bounds, Raster, Shape};
 use crate::geometry::COORDINATE_LIMIT;
-use crate::stage::{OutOfScratch, Scratch};
+use crate::stage::Scratch;
 use bytemuck::{Pod, Zeroable};
 
 /// One cell of the page.
@@ -61,7 +63,8 @@ impl<'a> Grid<'a> {
         outlines: Outlines<'_>,
         faces: &Faces<'_>,
         mut scratch: Scratch<'a>,
-    ) -> Result<Self, OutOfScratch> {
+        pace: &mut Pace<'_>,
+    ) -> Result<Self, VisibilityError> {
         let wanted_cells = (faces.len() * CELLS_FOR_EACH_FACE).min(usize::from(u16::MAX));
         let mut shape = Shape::finest(outlook);
         while shape.cells() > 1 {
@@ -72,16 +75,16 @@ impl<'a> Grid<'a> {
             };
             if shape.cells() <= wanted_cells
                 && fits(faces.len())
-                && fits(shape.most_entries(outlook, outlines, faces))
+                && fits(shape.most_entries(outlook, outlines, faces, pace)?)
             {
                 break;
             }
             shape.coarsen();
         }
         let mut raster = Raster::new(shape, scratch.take(shape.cells())?);
-        let entry_count = raster.count(outlook, outlines, faces);
+        let entry_count = raster.count(outlook, outlines, faces, pace)?;
         let entries: &mut [u16] = scratch.take(entry_count)?;
-        raster.fill(outlook, outlines, faces, entries);
+        raster.fill(outlook, outlines, faces, entries, pace)?;
         Ok(Self {
             shape,
             columns: shape.columns(),

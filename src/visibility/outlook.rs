@@ -1,8 +1,10 @@
 //! The scene as it lies on the page: each vertex by its place on a coarse grid of 2^14 by 2^14, and
 //! "on which side" answered from those places where they suffice, exactly where they do not.
 
+use super::VisibilityError;
+use super::pace::Pace;
 use crate::geometry::{Along, Axis, Projection, Vertex, page_offset, page_side};
-use crate::stage::{OutOfScratch, Scratch};
+use crate::stage::{Aborted, Scratch};
 use bytemuck::{Pod, Zeroable};
 
 /// Places on the coarse grid are below 2^this, so that a product of two differences fits 29 bits.
@@ -122,6 +124,9 @@ impl Line<'_> {
     }
 }
 
+/// Instructions for two divisions of 64 bits on a core without a divider.
+const TWO_DIVISIONS: usize = 1500;
+
 /// How the page is laid on the coarse grid.
 #[derive(Debug, Clone, Copy)]
 struct Mapping {
@@ -131,21 +136,26 @@ struct Mapping {
 }
 
 impl Mapping {
-    fn new(projection: Projection, vertices: &[Vertex]) -> Self {
+    fn new(
+        projection: Projection,
+        vertices: &[Vertex],
+        pace: &mut Pace<'_>,
+    ) -> Result<Self, Aborted> {
         let (mut low, mut high) = ((i64::MAX, i64::MAX), (i64::MIN, i64::MIN));
         for (x, y) in vertices.iter().map(|&vertex| fine(projection, vertex)) {
             low = (low.0.min(x), low.1.min(y));
             high = (high.0.max(x), high.1.max(y));
+            pace.spend(TWO_DIVISIONS)?;
         }
         let shift_for = |low: i64, high: i64| {
             let extent = high.saturating_sub(low).max(0);
             (64 - extent.leading_zeros()).saturating_sub(PLACE_BITS)
         };
-        Self {
+        Ok(Self {
             projection,
             low,
             shift: (shift_for(low.0, high.0), shift_for(low.1, high.1)),
-        }
+        })
     }
 
     fn place(&self, vertex: Vertex) -> Place {
@@ -204,11 +214,13 @@ impl<'a> Outlook<'a> {
         projection: Projection,
         vertices: &'a [Vertex],
         scratch: &mut Scratch<'s>,
-    ) -> Result<Self, OutOfScratch> {
+        pace: &mut Pace<'_>,
+    ) -> Result<Self, VisibilityError> {
         let places: &mut [Place] = scratch.take(vertices.len())?;
-        let mapping = Mapping::new(projection, vertices);
+        let mapping = Mapping::new(projection, vertices, pace)?;
         for (place, &vertex) in places.iter_mut().zip(vertices) {
             *place = mapping.place(vertex);
+            pace.spend(TWO_DIVISIONS)?;
         }
         Ok(Self {
             projection,
@@ -287,9 +299,10 @@ impl<'a> Outlook<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::stage::Undisturbed;
 
     #[test]
-    fn places_fill_the_grid_and_keep_the_order() -> Result<(), OutOfScratch> {
+    fn places_fill_the_grid_and_keep_the_order() -> Result<(), VisibilityError> {
         let vertices = [
             Vertex::new(-1 << 19, 0, 1),
             Vertex::new(1 << 19, 3, 1 << 19),
@@ -297,7 +310,10 @@ mod tests {
         ];
         for projection in [Projection::Perspective, Projection::Parallel] {
             let mut words = [0u64; 4];
-            let outlook = Outlook::new(projection, &vertices, &mut Scratch::new(&mut words))?;
+            let mut scratch = Scratch::new(&mut words);
+            let mut undisturbed = Undisturbed;
+            let pace = &mut Pace::new(&mut undisturbed);
+            let outlook = Outlook::new(projection, &vertices, &mut scratch, pace)?;
             let xs: [u16; 3] = [0, 1, 2].map(|n| outlook.place(n).x);
             assert!(xs[0] == 0 && xs[0] < xs[1] && xs[1] <= xs[2], "{xs:?}");
             assert!(xs[2] >= 1 << (PLACE_BITS - 1) && xs[2] < 1 << PLACE_BITS);
@@ -306,7 +322,7 @@ mod tests {
     }
 
     #[test]
-    fn a_coarse_answer_is_never_wrong() -> Result<(), OutOfScratch> {
+    fn a_coarse_answer_is_never_wrong() -> Result<(), VisibilityError> {
         // Every triangle of a small lattice, seen in steep perspective.
         let vertices: std::vec::Vec<Vertex> = (0..64)
             .map(|n| {
@@ -322,6 +338,7 @@ mod tests {
             Projection::Perspective,
             &vertices,
             &mut Scratch::new(&mut words),
+            &mut Pace::new(&mut Undisturbed),
         )?;
         let mut undecided = 0;
         for (a, b, c) in (0..64u16)

@@ -35,6 +35,15 @@ impl Surroundings<'_> {
         }
     }
 
+    /// Whether two faces have two corners in common, by their places; such faces do not cross elsewhere.
+    pub fn share_edge(&self, one: Face, other: Face) -> bool {
+        let at = |corner: &Corner| self.outlook.vertex(corner.vertex());
+        let other = self.outlines.element(other.first);
+        let shared = |corner: &&Corner| other.iter().any(|there| at(there) == at(corner));
+        let corners = self.outlines.element(one.first);
+        corners.iter().filter(shared).count() >= 2
+    }
+
     /// The triangles of a face.
     pub fn triangles(&self, face: Face) -> impl Iterator<Item = [u16; 3]> {
         (0..).map_while(move |number| self.triangle(face, number))
