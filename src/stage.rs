@@ -67,14 +67,10 @@ impl<'a> Scratch<'a> {
         }
         let word_count = Self::bytes_for::<T>(count) / size_of::<u64>();
         let words = core::mem::take(&mut self.words);
-        let (taken, rest) = words
-            .split_at_mut_checked(word_count)
-            .ok_or(out_of_scratch)?;
+        let (taken, rest) = words.split_at_mut_checked(word_count).ok_or(out_of_scratch)?;
         self.words = rest;
         taken.fill(0);
-        let bytes: &mut [u8] = bytemuck::cast_slice_mut(taken);
-        let items = bytes.get_mut(..out_of_scratch.needed);
-        items.map(bytemuck::cast_slice_mut).ok_or(out_of_scratch)
+        items_mut(taken, count).ok_or(out_of_scratch)
     }
 
     /// Lends what is left to a stage within this stage.
@@ -90,10 +86,72 @@ impl<'a> Scratch<'a> {
     }
 }
 
+/// The first `count` items of `T` that lie in `words`; `None` if they do not fit.
+pub fn items_mut<T: Pod>(words: &mut [u64], count: usize) -> Option<&mut [T]> {
+    const { assert!(align_of::<T>() <= align_of::<u64>()) };
+    let bytes: &mut [u8] = bytemuck::cast_slice_mut(words);
+    let exact = bytes.get_mut(..count.checked_mul(size_of::<T>())?)?;
+    bytemuck::try_cast_slice_mut(exact).ok()
+}
+
+/// Like [`items_mut`], to read only.
+pub fn items<T: Pod>(words: &[u64], count: usize) -> Option<&[T]> {
+    const { assert!(align_of::<T>() <= align_of::<u64>()) };
+    let bytes: &[u8] = bytemuck::cast_slice(words);
+    let exact = bytes.get(..count.checked_mul(size_of::<T>())?)?;
+    bytemuck::try_cast_slice(exact).ok()
+}
+
+/// Sorts by a key, in place and without recursion (Williams' heapsort): the library's own sorts take
+/// kilobytes of a board's stack, and may order equal keys otherwise in another version.
+///
+/// ```
+/// let mut items = [3, 1, 2];
+/// penup::stage::heap_sort_by_key(&mut items, |item| *item);
+/// assert_eq!(items, [1, 2, 3]);
+/// ```
+pub fn heap_sort_by_key<T, K: Ord>(items: &mut [T], key: impl Fn(&T) -> K) {
+    let sift_down = |items: &mut [T], mut parent: usize| {
+        loop {
+            let mut child = 2 * parent + 1;
+            if child >= items.len() {
+                return;
+            }
+            if child + 1 < items.len() && key(&items[child]) < key(&items[child + 1]) {
+                child += 1;
+            }
+            if key(&items[parent]) >= key(&items[child]) {
+                return;
+            }
+            items.swap(parent, child);
+            parent = child;
+        }
+    };
+    for parent in (0..items.len() / 2).rev() {
+        sift_down(items, parent);
+    }
+    for end in (1..items.len()).rev() {
+        items.swap(0, end);
+        sift_down(&mut items[..end], 0);
+    }
+}
+
 /// The user asked for the job to be given up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Aborted;
+
+/// What a job computes before it moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Stage {
+    /// The camera, and every vertex through it.
+    View,
+    /// Which stretches are seen, and the drawing on the page.
+    Visibility,
+    /// In which order the strokes are drawn.
+    Order,
+}
 
 /// The moment that a long computation gives to the serial line.
 pub trait Attention {
@@ -102,6 +160,9 @@ pub trait Attention {
     /// # Errors
     /// [`Aborted`] if the user gave the job up; the stage then ends at once.
     fn check(&mut self) -> Result<(), Aborted>;
+
+    /// Told when a stage begins.
+    fn enter(&mut self, _stage: Stage) {}
 }
 
 /// Nobody to answer: for tests and benchmarks.
@@ -122,24 +183,31 @@ mod tests {
     fn a_slice_that_does_not_fit_takes_nothing() {
         let mut words = [7u64; 2];
         let mut scratch = Scratch::new(&mut words);
-        assert_eq!(
-            scratch.take::<u32>(5),
-            Err(OutOfScratch {
-                needed: 20,
-                available: 16
-            })
-        );
+        assert_eq!(scratch.take::<u32>(5), Err(OutOfScratch { needed: 20, available: 16 }));
         assert_eq!(scratch.take::<u32>(4).map(|items| items.len()), Ok(4));
         assert_eq!(scratch.available_bytes(), 0);
         assert_eq!(scratch.take::<u8>(0).map(|items| items.len()), Ok(0));
     }
 
     #[test]
-    fn items_that_do_not_fill_a_word_are_taken_whole() {
-        let mut words = [7u64; 3];
+    fn items_need_not_fill_their_last_word() {
+        let mut words = [0u64; 4];
         let mut scratch = Scratch::new(&mut words);
-        assert_eq!(scratch.take::<[u16; 3]>(3).as_deref(), Ok(&[[0; 3]; 3][..]));
+        assert_eq!(scratch.take::<[u32; 3]>(1).map(|items| items.len()), Ok(1));
+        assert_eq!(scratch.take::<[u8; 3]>(5).map(|items| items.len()), Ok(5));
         assert_eq!(scratch.available_bytes(), 0);
+    }
+
+    #[test]
+    fn sorting_is_that_of_the_standard_library() {
+        for length in 0..40u32 {
+            let mut items: std::vec::Vec<u32> =
+                (0..length).map(|i| i.wrapping_mul(0x9E37_79B1) % 17).collect();
+            let mut expected = items.clone();
+            expected.sort_unstable();
+            heap_sort_by_key(&mut items, |item| *item);
+            assert_eq!(items, expected);
+        }
     }
 
     #[test]

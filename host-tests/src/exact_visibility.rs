@@ -60,10 +60,9 @@ fn at_fraction(edge: &[Point; 2], t: &Number) -> Point {
 impl World {
     fn new(projection: Projection, vertices: &[Vertex], corners: &[Corner]) -> Self {
         let page_of = |vertex: &Vertex| match projection {
-            Projection::Perspective => [
-                whole(vertex.x) / whole(vertex.z),
-                whole(vertex.y) / whole(vertex.z),
-            ],
+            Projection::Perspective => {
+                [whole(vertex.x) / whole(vertex.z), whole(vertex.y) / whole(vertex.z)]
+            }
             Projection::Parallel => [whole(vertex.x), whole(vertex.y)],
         };
         let linear_depth = |vertex: &Vertex| match projection {
@@ -101,11 +100,7 @@ impl World {
                 });
             }
         }
-        Self {
-            projection,
-            polygons,
-            edges,
-        }
+        Self { projection, polygons, edges }
     }
 
     /// The polygons that the edge can have anything to do with: those that are not beside, above or
@@ -117,10 +112,7 @@ impl World {
                 polygon.low[n] > *(&p[n]).max(&q[n]) || polygon.high[n] < *(&p[n]).min(&q[n])
             })
         };
-        self.polygons
-            .iter()
-            .filter(|polygon| !apart(polygon))
-            .collect()
+        self.polygons.iter().filter(|polygon| !apart(polygon)).collect()
     }
 
     /// Depth of a plane at a point of the page; `None` if it is seen edge-on.
@@ -304,11 +296,9 @@ impl World {
                     .is_some_and(|face| face < depth)
             })
             .collect();
-        [left, right].iter().all(|beside| {
-            nearer
-                .iter()
-                .any(|polygon| self.covers(polygon, &point, beside))
-        })
+        [left, right]
+            .iter()
+            .all(|beside| nearer.iter().any(|polygon| self.covers(polygon, &point, beside)))
     }
 
     fn is_stood_in(&self, number: usize, t: &Number) -> bool {
@@ -390,16 +380,8 @@ fn plane_of(corners: &[&Vertex]) -> Option<[Number; 4]> {
     let a = corners[0];
     for b in corners {
         for c in corners {
-            let u = [
-                big(b.x) - big(a.x),
-                big(b.y) - big(a.y),
-                big(b.z) - big(a.z),
-            ];
-            let v = [
-                big(c.x) - big(a.x),
-                big(c.y) - big(a.y),
-                big(c.z) - big(a.z),
-            ];
+            let u = [big(b.x) - big(a.x), big(b.y) - big(a.y), big(b.z) - big(a.z)];
+            let v = [big(c.x) - big(a.x), big(c.y) - big(a.y), big(c.z) - big(a.z)];
             let normal = [
                 &u[1] * &v[2] - &u[2] * &v[1],
                 &u[2] * &v[0] - &u[0] * &v[2],

@@ -29,10 +29,7 @@ impl Fraction {
             numerator /= &common;
             denominator /= common;
         }
-        Self {
-            numerator,
-            denominator,
-        }
+        Self { numerator, denominator }
     }
 
     /// A whole number.
@@ -78,10 +75,7 @@ impl Fraction {
 
     /// Its size without its sign.
     pub fn abs(&self) -> Self {
-        Self {
-            numerator: self.numerator.abs(),
-            denominator: self.denominator.clone(),
-        }
+        Self { numerator: self.numerator.abs(), denominator: self.denominator.clone() }
     }
 }
 
@@ -117,10 +111,7 @@ impl Neg for Fraction {
 impl Neg for &Fraction {
     type Output = Fraction;
     fn neg(self) -> Fraction {
-        Fraction {
-            numerator: -&self.numerator,
-            denominator: self.denominator.clone(),
-        }
+        Fraction { numerator: -&self.numerator, denominator: self.denominator.clone() }
     }
 }
 

@@ -67,47 +67,11 @@ const SHAPES: [&[[i32; 2]]; 8] = [
     &[[0, 0], [2, 0], [2, 2], [0, 2]],
     &[[0, 0], [2, 0], [0, 2]],
     &[[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]],
-    &[
-        [0, 0],
-        [3, 0],
-        [3, 2],
-        [2, 2],
-        [2, 1],
-        [1, 1],
-        [1, 2],
-        [0, 2],
-    ],
+    &[[0, 0], [3, 0], [3, 2], [2, 2], [2, 1], [1, 1], [1, 2], [0, 2]],
     &[[0, 0], [2, 0], [4, 0], [4, 2], [2, 2], [0, 2]],
-    &[
-        [0, 0],
-        [2, 1],
-        [4, 0],
-        [3, 2],
-        [4, 4],
-        [2, 3],
-        [0, 4],
-        [1, 2],
-    ],
-    &[
-        [0, 1],
-        [1, 0],
-        [2, 0],
-        [3, 1],
-        [3, 2],
-        [2, 3],
-        [1, 3],
-        [0, 2],
-    ],
-    &[
-        [0, 0],
-        [4, 0],
-        [4, 1],
-        [1, 1],
-        [1, 2],
-        [4, 2],
-        [4, 3],
-        [0, 3],
-    ],
+    &[[0, 0], [2, 1], [4, 0], [3, 2], [4, 4], [2, 3], [0, 4], [1, 2]],
+    &[[0, 1], [1, 0], [2, 0], [3, 1], [3, 2], [2, 3], [1, 3], [0, 2]],
+    &[[0, 0], [4, 0], [4, 1], [1, 1], [1, 2], [4, 2], [4, 3], [0, 3]],
 ];
 
 #[derive(Debug, Default)]
@@ -140,9 +104,8 @@ impl Builder {
         shape: &[[i32; 2]],
     ) {
         let count = shape.len();
-        let bottom = shape
-            .iter()
-            .map(|at| plus(base, plus(times(steps[0], at[0]), times(steps[1], at[1]))));
+        let bottom =
+            shape.iter().map(|at| plus(base, plus(times(steps[0], at[0]), times(steps[1], at[1]))));
         let mut points: Vec<Triple> = bottom.collect();
         for n in 0..count {
             points.push(plus(points[n], steps[2]));
@@ -180,12 +143,7 @@ impl Builder {
     /// Makes equal points one vertex.
     fn weld(&mut self) {
         let points = self.points.clone();
-        let first = |n: usize| {
-            points
-                .iter()
-                .position(|point| *point == points[n])
-                .unwrap_or(n)
-        };
+        let first = |n: usize| points.iter().position(|point| *point == points[n]).unwrap_or(n);
         for element in &mut self.elements {
             for number in element.iter_mut() {
                 *number = first(*number);
@@ -249,22 +207,13 @@ pub fn random_scene(seed: u64) -> RandomScene {
         // A lattice of cubes along the axes or not.
         2 => {
             let frame = frame(random);
-            let counts = [
-                random.between(1, 2),
-                random.between(1, 2),
-                random.between(1, 3),
-            ];
+            let counts = [random.between(1, 2), random.between(1, 2), random.between(1, 3)];
             let base = triple(random, 2);
             let gap = random.between(1, 3);
             for n in 0..counts[0] * counts[1] * counts[2] {
-                let place = [
-                    n % counts[0],
-                    n / counts[0] % counts[1],
-                    n / counts[0] / counts[1],
-                ];
-                let at = (0..3).fold(base, |at, axis| {
-                    plus(at, times(frame[axis], place[axis] * gap))
-                });
+                let place = [n % counts[0], n / counts[0] % counts[1], n / counts[0] / counts[1]];
+                let at =
+                    (0..3).fold(base, |at, axis| plus(at, times(frame[axis], place[axis] * gap)));
                 builder.add_prism(random, at, frame, &[[0, 0], [1, 0], [1, 1], [0, 1]]);
             }
         }
@@ -289,10 +238,8 @@ pub fn random_scene(seed: u64) -> RandomScene {
             for _ in 0..random.between(2, 6) {
                 let base = triple(random, 2);
                 let frame = frame(random);
-                let (a, b) = (
-                    times(frame[0], random.between(1, 3)),
-                    times(frame[1], random.between(1, 3)),
-                );
+                let (a, b) =
+                    (times(frame[0], random.between(1, 3)), times(frame[1], random.between(1, 3)));
                 builder.add_face(
                     random,
                     &[base, plus(base, a), plus(plus(base, a), b), plus(base, b)],
@@ -310,9 +257,8 @@ pub fn random_scene(seed: u64) -> RandomScene {
                     .collect();
                 points.push(plus(base, plus(frame[2], triple(random, 2))));
                 let count = shape.len();
-                let mut faces: Vec<Vec<usize>> = (0..count)
-                    .map(|n| vec![n, (n + 1) % count, count])
-                    .collect();
+                let mut faces: Vec<Vec<usize>> =
+                    (0..count).map(|n| vec![n, (n + 1) % count, count]).collect();
                 faces.push((0..count).collect());
                 builder.add(random, &points, &faces);
             }
@@ -361,42 +307,19 @@ pub fn random_scene(seed: u64) -> RandomScene {
 /// Puts the scene before the eye and makes it as large as the range allows, or leaves it small.
 fn finish(random: &mut Random, builder: &Builder) -> RandomScene {
     let projection = random.one_of(&[Projection::Perspective, Projection::Parallel]);
-    let nearest = builder
-        .points
-        .iter()
-        .map(|point| point[2])
-        .min()
-        .unwrap_or(0);
+    let nearest = builder.points.iter().map(|point| point[2]).min().unwrap_or(0);
     let back = match projection {
         Projection::Perspective => random.between(1, 6) - nearest,
         Projection::Parallel => random.between(-4, 4),
     };
-    let moved: Vec<Triple> = builder
-        .points
-        .iter()
-        .map(|point| plus(*point, [0, 0, back]))
-        .collect();
-    let largest = moved
-        .iter()
-        .flatten()
-        .map(|part| part.abs())
-        .max()
-        .unwrap_or(1)
-        .max(1);
+    let moved: Vec<Triple> =
+        builder.points.iter().map(|point| plus(*point, [0, 0, back])).collect();
+    let largest = moved.iter().flatten().map(|part| part.abs()).max().unwrap_or(1).max(1);
     let most = COORDINATE_LIMIT / largest;
-    let scales = [
-        random.one_of(&[1, most, most / 3]),
-        random.one_of(&[1, most, most / 2 + 1]),
-    ];
+    let scales = [random.one_of(&[1, most, most / 3]), random.one_of(&[1, most, most / 2 + 1])];
     let vertices = moved
         .iter()
-        .map(|point| {
-            Vertex::new(
-                point[0] * scales[0],
-                point[1] * scales[0],
-                point[2] * scales[1],
-            )
-        })
+        .map(|point| Vertex::new(point[0] * scales[0], point[1] * scales[0], point[2] * scales[1]))
         .collect();
     let mut corners = Vec::new();
     for element in &builder.elements {
@@ -405,9 +328,5 @@ fn finish(random: &mut Random, builder: &Builder) -> RandomScene {
             corners.push(Corner::new(vertex as u16, element.len() == 2, last));
         }
     }
-    RandomScene {
-        vertices,
-        corners,
-        projection,
-    }
+    RandomScene { vertices, corners, projection }
 }

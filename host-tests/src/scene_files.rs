@@ -66,9 +66,7 @@ impl Model {
                 |part: usize, whole: usize| std::f64::consts::TAU * part as f64 / whole as f64;
             let (u, v) = (turn(n / across, around), turn(n % across, across));
             let radius = 2.0 + v.cos();
-            model
-                .vertices
-                .push([radius * u.cos(), radius * u.sin(), v.sin()]);
+            model.vertices.push([radius * u.cos(), radius * u.sin(), v.sin()]);
         }
         for n in 0..around * across {
             let (i, j) = (n / across, n % across);
@@ -95,11 +93,7 @@ fn dot(a: Vector, b: Vector) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 fn cross(a: Vector, b: Vector) -> Vector {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 fn minus(a: Vector, b: Vector) -> Vector {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
@@ -122,10 +116,7 @@ impl View {
             .map(|d| [dot(d, right), dot(d, upward), dot(d, forward)])
             .collect();
         let largest = |parts: &[usize]| {
-            parts
-                .iter()
-                .flat_map(|&n| seen.iter().map(move |v| v[n].abs()))
-                .fold(1e-9, f64::max)
+            parts.iter().flat_map(|&n| seen.iter().map(move |v| v[n].abs())).fold(1e-9, f64::max)
         };
         let limit = f64::from(COORDINATE_LIMIT);
         let (scale, depth_scale) = (limit / largest(&[0, 1]), limit / largest(&[2]));

@@ -20,11 +20,7 @@ fn find(
     projection: Projection,
     options: Options,
 ) -> Result<(Report, Vec<Stretch>), VisibilityError> {
-    let scene = Scene {
-        vertices,
-        elements: Elements::new(corners),
-        projection,
-    };
+    let scene = Scene { vertices, elements: Elements::new(corners), projection, positions: &[] };
     let mut words = vec![0u64; scratch_bytes(&scene) / 8 + 4096];
     let mut stretches = Stretches::default();
     let scratch = Scratch::new(&mut words);
@@ -47,22 +43,12 @@ fn add_box(model: &mut Model, low: [f64; 3], high: [f64; 3]) {
     let first = model.vertices.len();
     for n in 0..8 {
         let at = |axis: usize| {
-            if n >> axis & 1 == 0 {
-                low[axis]
-            } else {
-                high[axis]
-            }
+            if n >> axis & 1 == 0 { low[axis] } else { high[axis] }
         };
         model.vertices.push([at(0), at(1), at(2)]);
     }
-    for face in [
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-    ] {
+    for face in [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
+    {
         model.add(&face.map(|n| first + n));
     }
 }
@@ -78,10 +64,7 @@ fn crossing_boxes() -> (Vec<Vertex>, Vec<Corner>, Vec<[Vertex; 2]>) {
     let mut model = Model::default();
     add_box(&mut model, [0.0, 0.0, 0.0], [8.0, 4.0, 4.0]);
     add_box(&mut model, [2.0, -2.0, 1.0], [5.0, 6.0, 6.0]);
-    let vertices = model
-        .vertices
-        .iter()
-        .map(|at| skew(at.map(|part| part as i32)));
+    let vertices = model.vertices.iter().map(|at| skew(at.map(|part| part as i32)));
     let mut seams = Vec::new();
     for y in [0, 4] {
         seams.push([[2, y, 1], [5, y, 1]]);
@@ -118,10 +101,7 @@ fn seams_are_seen_where_bars_in_their_place_would_be() -> Result<(), VisibilityE
             (to - from).to_f64() * space(p, q)
         })
         .sum();
-    let options = Options {
-        with_seams: true,
-        ..Options::default()
-    };
+    let options = Options { with_seams: true, ..Options::default() };
     let (_, stretches) = find(&vertices, &corners, Projection::Parallel, options)?;
     let share = |along: Along| along.numerator as f64 / along.denominator as f64;
     let found: f64 = stretches
@@ -134,12 +114,7 @@ fn seams_are_seen_where_bars_in_their_place_would_be() -> Result<(), VisibilityE
     assert!(expected > 250_000.0, "{expected}");
     // The seams are found triangle by triangle, and where they meet on a diagonal they are rounded.
     assert!((found / expected - 1.0).abs() < 1e-6, "{found} {expected}");
-    let (_, without) = find(
-        &vertices,
-        &corners,
-        Projection::Parallel,
-        Options::default(),
-    )?;
+    let (_, without) = find(&vertices, &corners, Projection::Parallel, Options::default())?;
     assert!(without.iter().all(|stretch| stretch.edge.is_some()));
     assert!(stretches.starts_with(&without));
     Ok(())
@@ -150,10 +125,7 @@ fn scenes_without_crossing_faces_have_no_seams() -> Result<(), Box<dyn std::erro
     for name in ["cube", "lblock", "notched", "lattice3"] {
         let model = Model::example(name)?;
         let view = View::example(name, &model)?;
-        let options = Options {
-            with_seams: true,
-            ..Options::default()
-        };
+        let options = Options { with_seams: true, ..Options::default() };
         let found = find(&view.vertices, &model.corners, view.projection, options);
         assert!(found.is_ok_and(|(_, stretches)| stretches.iter().all(|s| s.edge.is_some())));
     }
@@ -167,8 +139,7 @@ fn a_ball_with_creases_only_is_its_outline() -> Result<(), VisibilityError> {
     for n in 0..around * (up + 1) {
         let u = std::f64::consts::TAU * (n % around) as f64 / around as f64;
         let v = std::f64::consts::PI * (n / around) as f64 / up as f64;
-        ball.vertices
-            .push([u.cos() * v.sin(), u.sin() * v.sin(), v.cos()]);
+        ball.vertices.push([u.cos() * v.sin(), u.sin() * v.sin(), v.cos()]);
     }
     for n in 0..around * up {
         let next = n / around * around + (n + 1) % around;
@@ -194,23 +165,10 @@ fn a_ball_with_creases_only_is_its_outline() -> Result<(), VisibilityError> {
         cosine: 28378, // 30 degrees
         depth_stretch: view.depth_stretch(),
     });
-    let options = Options {
-        crease,
-        ..Options::default()
-    };
-    let (_, all) = find(
-        &view.vertices,
-        &ball.corners,
-        view.projection,
-        Options::default(),
-    )?;
+    let options = Options { crease, ..Options::default() };
+    let (_, all) = find(&view.vertices, &ball.corners, view.projection, Options::default())?;
     let (_, outline) = find(&view.vertices, &ball.corners, view.projection, options)?;
-    assert!(
-        outline.len() * 10 < all.len(),
-        "{} of {}",
-        outline.len(),
-        all.len()
-    );
+    assert!(outline.len() * 10 < all.len(), "{} of {}", outline.len(), all.len());
     let centre = view.image_of_origin();
     for stretch in &outline {
         for along in [stretch.from, stretch.to] {
@@ -226,19 +184,13 @@ fn a_ball_with_creases_only_is_its_outline() -> Result<(), VisibilityError> {
 
 #[test]
 fn merged_blocks_look_like_one_block() -> Result<(), VisibilityError> {
-    let merged = Options {
-        merged_blocks: true,
-        ..Options::default()
-    };
+    let merged = Options { merged_blocks: true, ..Options::default() };
     let mut whole = Model::default();
     add_box(&mut whole, [0.0, 0.0, 0.0], [2.0, 1.0, 2.0]);
     let expected = visible_length(&whole, [1.0, 0.5, 1.0], Options::default())?;
     // A stack of two, and two bricks on one: corners that meet corners, and corners that meet sides.
     let bricks: [&[[[f64; 3]; 2]]; 2] = [
-        &[
-            [[0.0; 3], [2.0, 1.0, 1.3]],
-            [[0.0, 0.0, 1.3], [2.0, 1.0, 2.0]],
-        ],
+        &[[[0.0; 3], [2.0, 1.0, 1.3]], [[0.0, 0.0, 1.3], [2.0, 1.0, 2.0]]],
         &[
             [[0.0; 3], [2.0, 1.0, 0.7]],
             [[0.0, 0.0, 0.7], [0.9, 1.0, 2.0]],
@@ -253,10 +205,7 @@ fn merged_blocks_look_like_one_block() -> Result<(), VisibilityError> {
         let separate = visible_length(&wall, [1.0, 0.5, 1.0], Options::default())?;
         let together = visible_length(&wall, [1.0, 0.5, 1.0], merged)?;
         assert!(separate > expected * 1.1, "{separate} {expected}");
-        assert!(
-            (together / expected - 1.0).abs() < 2e-4,
-            "{together} {expected}"
-        );
+        assert!((together / expected - 1.0).abs() < 2e-4, "{together} {expected}");
     }
     Ok(())
 }
@@ -275,20 +224,48 @@ fn a_wall_on_a_floor_keeps_its_foot() -> Result<(), VisibilityError> {
         .collect();
     let foot = (8, 9);
     for merged_blocks in [false, true] {
-        let options = Options {
-            merged_blocks,
-            ..Options::default()
-        };
+        let options = Options { merged_blocks, ..Options::default() };
         let (_, stretches) = find(&vertices, &model.corners, Projection::Perspective, options)?;
-        let found = stretches.iter().find(|stretch| {
-            stretch
-                .edge
-                .is_some_and(|(p, q)| (p.min(q), p.max(q)) == foot)
-        });
+        let found = stretches
+            .iter()
+            .find(|stretch| stretch.edge.is_some_and(|(p, q)| (p.min(q), p.max(q)) == foot));
         let Some(found) = found else {
             return Err(VisibilityError::SinkFull);
         };
         assert!(found.visible && found.from == Along::START && found.to == Along::END);
+    }
+    Ok(())
+}
+
+#[test]
+fn rounding_does_not_take_a_block_off_its_floor() -> Result<(), VisibilityError> {
+    for turn in 0..12 {
+        let seen = |lift: i32, with_positions: bool| -> Result<f64, VisibilityError> {
+            let mut model = Model::default();
+            let height = 1.0 + 1e-4 * f64::from(lift);
+            add_box(&mut model, [0.0; 3], [10.0, 10.0, 1.0]);
+            add_box(&mut model, [3.0, 3.0, height], [5.0, 6.0, height + 3.0]);
+            let eye = [19.0 + f64::from(turn), 0.3 * f64::from(turn) - 17.0, 12.0];
+            let view = View::new(&model, eye, [5.0, 5.0, 1.0], UP, Projection::Perspective);
+            let positions = model.vertices.iter().map(|at| at.map(|part| (part * 1e4) as i32));
+            let positions: Vec<[i32; 3]> = positions.collect();
+            let scene = Scene {
+                vertices: &view.vertices,
+                elements: Elements::new(&model.corners),
+                projection: view.projection,
+                positions: if with_positions { &positions } else { &[] },
+            };
+            let mut words = vec![0u64; scratch_bytes(&scene) / 8 + 100];
+            let mut stretches = Stretches::default();
+            let scratch = Scratch::new(&mut words);
+            let options = Options::default();
+            find_stretches(&scene, options, scratch, &mut Undisturbed, &mut stretches)?;
+            Ok(stretches.0.iter().map(|stretch| length(&view, stretch)).sum())
+        };
+        // Lifted by a hair, the block shows its whole foot.
+        let expected = seen(1, false)?;
+        let found = seen(0, true)?;
+        assert!((found / expected - 1.0).abs() < 1e-5, "{turn}: {found} {expected}");
     }
     Ok(())
 }
@@ -314,10 +291,7 @@ fn a_bent_face_hides_like_its_triangles() -> Result<(), VisibilityError> {
                 }
             }
         }
-        let options = Options {
-            with_hidden: true,
-            ..Options::default()
-        };
+        let options = Options { with_hidden: true, ..Options::default() };
         let outline = |corners: &[Corner]| -> Result<Vec<_>, VisibilityError> {
             let (_, stretches) = find(&vertices, corners, Projection::Perspective, options)?;
             let mut sides: Vec<_> = stretches
@@ -325,12 +299,9 @@ fn a_bent_face_hides_like_its_triangles() -> Result<(), VisibilityError> {
                 .filter_map(|stretch| Some((stretch.edge?, stretch)))
                 .map(|((p, q), stretch)| match p < q {
                     true => ((p, q), stretch.from, stretch.to, stretch.visible),
-                    false => (
-                        (q, p),
-                        mirrored(stretch.to),
-                        mirrored(stretch.from),
-                        stretch.visible,
-                    ),
+                    false => {
+                        ((q, p), mirrored(stretch.to), mirrored(stretch.from), stretch.visible)
+                    }
                 })
                 .filter(|((p, q), ..)| q - p != 2)
                 .collect();
@@ -343,10 +314,7 @@ fn a_bent_face_hides_like_its_triangles() -> Result<(), VisibilityError> {
 }
 
 fn mirrored(along: Along) -> Along {
-    Along {
-        numerator: along.denominator - along.numerator,
-        denominator: along.denominator,
-    }
+    Along { numerator: along.denominator - along.numerator, denominator: along.denominator }
 }
 
 fn triangle() -> (Vec<Vertex>, Vec<Corner>) {
@@ -363,12 +331,7 @@ fn degenerate_faces_are_counted_and_hide_nothing() {
     corners.extend([0, 3, 0].map(|n| Corner::new(n, false, false)));
     let last = corners.len() - 1;
     corners[last] = Corner::new(0, false, true);
-    let found = find(
-        &vertices,
-        &corners,
-        Projection::Parallel,
-        Options::default(),
-    );
+    let found = find(&vertices, &corners, Projection::Parallel, Options::default());
     assert!(
         found.is_ok_and(|(report, stretches)| report.degenerate_faces == 2 && stretches.len() == 3)
     );
@@ -397,11 +360,8 @@ fn what_the_arithmetic_cannot_take_is_refused() {
         let error = refused(&vertices, &corners, Projection::Perspective);
         assert_eq!(error, number.map(VisibilityError::OutOfRange), "{bad:?}");
     }
-    let unknown = [
-        corners.clone(),
-        [0, 1, 7].map(|n| Corner::new(n, false, n == 7)).to_vec(),
-    ]
-    .concat();
+    let unknown =
+        [corners.clone(), [0, 1, 7].map(|n| Corner::new(n, false, n == 7)).to_vec()].concat();
     assert_eq!(
         refused(&vertices, &unknown, Projection::Parallel),
         Some(VisibilityError::UnknownVertex(7))
@@ -441,43 +401,29 @@ fn an_abort_a_full_sink_and_too_little_memory_end_the_search() -> std::io::Resul
         vertices: &view.vertices,
         elements: Elements::new(&model.corners),
         projection: view.projection,
+        positions: &[],
     };
     let least = scratch_bytes(&scene) / 8;
     let run = |words: usize, looks: usize, room: usize| {
         let mut words = vec![0u64; words];
         let scratch = Scratch::new(&mut words);
-        let options = Options {
-            with_seams: true,
-            ..Options::default()
-        };
+        let options = Options { with_seams: true, ..Options::default() };
         let (mut attention, mut sink) = (Impatient(looks), Small(room));
         let result = find_stretches(&scene, options, scratch, &mut attention, &mut sink);
         (result, looks - attention.0)
     };
     let (result, looks) = run(least, 1_000_000, 1_000_000);
-    assert!(
-        result.is_ok() && looks > 40,
-        "{result:?} after {looks} looks"
-    );
+    assert!(result.is_ok() && looks > 40, "{result:?} after {looks} looks");
     for looks in 0..looks {
-        assert_eq!(
-            run(least, looks, 1_000_000).0,
-            Err(VisibilityError::Aborted)
-        );
+        assert_eq!(run(least, looks, 1_000_000).0, Err(VisibilityError::Aborted));
     }
     for room in 0..216 {
-        assert_eq!(
-            run(least, 1_000_000, room).0,
-            Err(VisibilityError::SinkFull)
-        );
+        assert_eq!(run(least, 1_000_000, room).0, Err(VisibilityError::SinkFull));
     }
     assert!(run(least, 1_000_000, 216).0.is_ok());
     for words in 0..least {
         let result = run(words, 1_000_000, 1_000_000).0;
-        assert!(
-            matches!(result, Ok(_) | Err(VisibilityError::Scratch(_))),
-            "{result:?}"
-        );
+        assert!(matches!(result, Ok(_) | Err(VisibilityError::Scratch(_))), "{result:?}");
         assert!(result.is_err() || words + 60 > least, "{words} of {least}");
     }
     Ok(())

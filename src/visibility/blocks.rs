@@ -22,14 +22,8 @@ struct Bank {
     is_left: bool,
 }
 
-const LEFT: Bank = Bank {
-    shift: 16,
-    is_left: true,
-};
-const RIGHT: Bank = Bank {
-    shift: 32,
-    is_left: false,
-};
+const LEFT: Bank = Bank { shift: 16, is_left: true };
+const RIGHT: Bank = Bank { shift: 32, is_left: false };
 
 impl Bank {
     fn get(self, marks: u64) -> Option<usize> {
@@ -69,11 +63,7 @@ fn height(outlook: &Outlook<'_>, triangle: [u16; 3], end: End) -> i64 {
     }
     let [a, b, c] = triangle.map(|number| outlook.vertex(number));
     let height = plane_side(a, b, c, end.vertex);
-    if height.abs() <= plane_side_doubt(a, b, c, end.vertex) {
-        0
-    } else {
-        height.signum()
-    }
+    if height.abs() <= plane_side_doubt(a, b, c, end.vertex) { 0 } else { height.signum() }
 }
 
 impl Sight {
@@ -91,11 +81,8 @@ impl Sight {
             };
             let piece = Piece::new(&touching.corners, &touching.sides);
             for bank in [LEFT, RIGHT] {
-                let crossings = piece.crossings(if bank.is_left {
-                    piece.left
-                } else {
-                    piece.left_or_on
-                });
+                let crossings =
+                    piece.crossings(if bank.is_left { piece.left } else { piece.left_or_on });
                 let passage = self.passage(&around.outlook, piece, crossings, touching.facing);
                 if let Some(passage) = passage {
                     let part: Part = self.part(&around.outlook, passage);
@@ -120,8 +107,7 @@ impl Sight {
             return false;
         };
         let outlook = &around.outlook;
-        left.corner(LEFT)
-            .is_some_and(|corner| right.height(outlook, outlook.end(corner)) == 0)
+        left.corner(LEFT).is_some_and(|corner| right.height(outlook, outlook.end(corner)) == 0)
     }
 
     /// Whether a triangle is nearer on one side of this edge than the face of a rank.
@@ -133,10 +119,7 @@ impl Sight {
         bank: Bank,
     ) -> bool {
         let outlook = &around.outlook;
-        match (
-            self.find_touching(around, than, bank),
-            touching.corner(bank),
-        ) {
+        match (self.find_touching(around, than, bank), touching.corner(bank)) {
             (Some(other), Some(corner)) => other.height(outlook, outlook.end(corner)) < 0,
             _ => false,
         }

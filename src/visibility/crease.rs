@@ -33,11 +33,7 @@ impl Crease {
         turned: bool,
     ) -> bool {
         let [one, other] = faces.map(areas);
-        let other = if turned {
-            other.map(|area| -area)
-        } else {
-            other
-        };
+        let other = if turned { other.map(|area| -area) } else { other };
         let facing = |normal: [i64; 3]| match projection {
             Projection::Perspective => [end.x, end.y, end.z]
                 .into_iter()
@@ -53,11 +49,7 @@ impl Crease {
 
     /// A normal in true proportions, with parts below 2^20.
     fn unstretched(&self, normal: [i64; 3]) -> [i64; 3] {
-        let by = [
-            self.depth_stretch.1,
-            self.depth_stretch.1,
-            self.depth_stretch.0,
-        ];
+        let by = [self.depth_stretch.1, self.depth_stretch.1, self.depth_stretch.0];
         let exact = [0, 1, 2].map(|n| i128::from(normal[n]) * i128::from(by[n]));
         let largest = exact.iter().map(|part| part.unsigned_abs()).max();
         let bits = 128 - largest.unwrap_or(0).leading_zeros();
@@ -86,10 +78,7 @@ mod tests {
 
     /// Two triangles that share an edge along y and rise by `left` and `right` over 1000 units across.
     fn keeps(cosine: i32, depth_stretch: (u32, u32), left: i32, right: i32) -> bool {
-        let crease = Crease {
-            cosine,
-            depth_stretch,
-        };
+        let crease = Crease { cosine, depth_stretch };
         let far = Vertex::new(0, 500, 1000);
         let one = [AT, far, Vertex::new(-1000, 0, 1000 - left)];
         let other = [far, AT, Vertex::new(1000, 0, 1000 - right)];
@@ -101,17 +90,10 @@ mod tests {
     #[test]
     fn the_angle_between_the_faces_decides() {
         // cos 45 degrees = 23170 / 2^15.
-        for (left, right, is_drawn) in [
-            (0, 0, false),
-            (0, 999, false),
-            (0, 1001, true),
-            (-500, -500, true),
-        ] {
-            assert_eq!(
-                keeps(23170, (1, 1), left, right),
-                is_drawn,
-                "{left} {right}"
-            );
+        for (left, right, is_drawn) in
+            [(0, 0, false), (0, 999, false), (0, 1001, true), (-500, -500, true)]
+        {
+            assert_eq!(keeps(23170, (1, 1), left, right), is_drawn, "{left} {right}");
         }
         // A right angle, approached from both sides; obtuse limits work as well.
         assert!(!keeps(0, (1, 1), -999, -999) && keeps(0, (1, 1), -1001, -1001));
@@ -125,10 +107,7 @@ mod tests {
 
     #[test]
     fn a_silhouette_is_drawn_however_blunt() {
-        let crease = Crease {
-            cosine: -(1 << 15),
-            depth_stretch: (1, 1),
-        };
+        let crease = Crease { cosine: -(1 << 15), depth_stretch: (1, 1) };
         let far = Vertex::new(0, 500, 1000);
         let one = [AT, far, Vertex::new(-1000, 0, 0)];
         for (tip, is_drawn) in [(-1, true), (0, true), (1, false)] {

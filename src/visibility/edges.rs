@@ -25,13 +25,11 @@ impl<'a> Outlines<'a> {
     /// Each element with the number of its first corner.
     pub fn elements(&self) -> impl Iterator<Item = (usize, &'a [Corner])> + use<'a> {
         let mut next = 0;
-        self.corners
-            .split_inclusive(|corner| corner.is_last())
-            .map(move |corners| {
-                let first = next;
-                next += corners.len();
-                (first, corners)
-            })
+        self.corners.split_inclusive(|corner| corner.is_last()).map(move |corners| {
+            let first = next;
+            next += corners.len();
+            (first, corners)
+        })
     }
 }
 
@@ -88,16 +86,12 @@ impl<'a> ChosenSides<'a> {
     ) -> Result<Self, VisibilityError> {
         let corners = outlines.corners;
         let word_count = corners.len().div_ceil(32);
-        let mut chosen = Self {
-            bits: scratch.take(word_count)?,
-        };
+        let mut chosen = Self { bits: scratch.take(word_count)? };
         let mut meantime = scratch.reborrow();
         let heads: &mut [u16] = meantime.take(vertices.len())?;
         let next: &mut [u16] = meantime.take(corners.len())?;
         // Edges that have met a second side.
-        let mut shared = ChosenSides {
-            bits: meantime.take(word_count)?,
-        };
+        let mut shared = ChosenSides { bits: meantime.take(word_count)? };
         heads.fill(NONE);
         for (first, element) in outlines.elements() {
             for (number, from, to) in sides(element) {
@@ -160,19 +154,13 @@ impl<'a> ChosenSides<'a> {
 
 /// The first corner of the element to which a corner belongs.
 fn start_of(corners: &[Corner], corner: usize) -> usize {
-    let before = corners[..corner]
-        .iter()
-        .rposition(|corner| corner.is_last());
+    let before = corners[..corner].iter().rposition(|corner| corner.is_last());
     before.map_or(0, |last| last + 1)
 }
 
 /// The two ends of the side that begins at a corner.
 fn side_at(corners: &[Corner], side: usize) -> (u16, u16) {
     let from = corners[side];
-    let to = if from.is_last() {
-        corners[start_of(corners, side)]
-    } else {
-        corners[side + 1]
-    };
+    let to = if from.is_last() { corners[start_of(corners, side)] } else { corners[side + 1] };
     (from.vertex(), to.vertex())
 }

@@ -85,23 +85,12 @@ impl<'a> Grid<'a> {
         let entry_count = raster.count(outlook, outlines, faces, pace)?;
         let entries: &mut [u16] = scratch.take(entry_count)?;
         raster.fill(outlook, outlines, faces, entries, pace)?;
-        Ok(Self {
-            shape,
-            columns: shape.columns(),
-            cells: raster.cells(),
-            entries,
-        })
+        Ok(Self { shape, columns: shape.columns(), cells: raster.cells(), entries })
     }
 
     fn view(&self, cell: usize, near: u16) -> CellView<'_> {
-        let begin = cell
-            .checked_sub(1)
-            .map_or(0, |before| self.cells[before].end);
-        let Cell {
-            end,
-            cover_depth,
-            cover,
-        } = self.cells[cell];
+        let begin = cell.checked_sub(1).map_or(0, |before| self.cells[before].end);
+        let Cell { end, cover_depth, cover } = self.cells[cell];
         CellView {
             cover: (cover_depth < near).then_some(cover),
             faces: &self.entries[usize::from(begin)..usize::from(end)],
@@ -123,13 +112,7 @@ impl<'a> Grid<'a> {
         let (low, high) = if p.y <= q.y { (p, q) } else { (q, p) };
         let dx = i32::from(high.x) - i32::from(low.x);
         let dy = i32::from(high.y) - i32::from(low.y);
-        Way {
-            grid: self,
-            near,
-            low,
-            high,
-            slope: if dy > 0 { (dx << 16) / dy } else { 0 },
-        }
+        Way { grid: self, near, low, high, slope: if dy > 0 { (dx << 16) / dy } else { 0 } }
     }
 }
 
@@ -149,9 +132,7 @@ impl<'g> Way<'g> {
     ///
     /// The edge lies less than one unit right and up of the line between the places.
     pub fn visit(&self, mut visit: impl FnMut(CellView<'g>) -> bool) -> bool {
-        let Shape {
-            shift_x, shift_y, ..
-        } = self.grid.shape;
+        let Shape { shift_x, shift_y, .. } = self.grid.shape;
         let (low_x, low_y) = (i32::from(self.low.x), i32::from(self.low.y));
         let dy = i32::from(self.high.y) - low_y;
         let left = i32::from(self.low.x.min(self.high.x));

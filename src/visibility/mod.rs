@@ -2,7 +2,8 @@
 //!
 //! [`find_stretches`] takes a [`Scene`], any faces at all (convex or concave, closed or open, touching,
 //! sharing planes, passing through each other) and any bars, and hands over the visible stretches
-//! of each distinct edge, and the hidden ones if asked. The result is exact for the rounded vertices.
+//! of each distinct edge, and the hidden ones if asked. The result is exact for the rounded vertices; only
+//! whether a vertex lies in the plane of a face is asked of the model, if its positions are known.
 //!
 //! * Both sides of a face hide. A face counts as its triangles.
 //! * The rule for ties: a point of an edge is hidden if the points of the page just to its left *and* just
@@ -73,6 +74,11 @@ pub struct Scene<'a> {
     pub elements: Elements<'a>,
     /// Perspective or parallel.
     pub projection: Projection,
+    /// Each vertex in the model's own space, within ±2^30, as far as known; none if empty.
+    ///
+    /// Rounding to view coordinates takes a block's foot off the floor that it stands on. With these, a
+    /// vertex that lies in the plane of a face in the model lies there in the view, too.
+    pub positions: &'a [[i32; 3]],
 }
 
 /// What the user may choose.
@@ -166,9 +172,7 @@ pub fn scratch_bytes(scene: &Scene<'_>) -> usize {
     if check(scene).is_err() {
         return 0;
     }
-    let outlines = Outlines {
-        corners: scene.elements.corners(),
-    };
+    let outlines = Outlines { corners: scene.elements.corners() };
     let corners = outlines.corners.len();
     let vertices = scene.vertices.len();
     let faces = outlines.elements().count();
@@ -193,31 +197,21 @@ pub fn find_stretches(
     sink: &mut dyn StretchSink,
 ) -> Result<Report, VisibilityError> {
     check(scene)?;
-    let outlines = Outlines {
-        corners: scene.elements.corners(),
-    };
+    let outlines = Outlines { corners: scene.elements.corners() };
     let (vertices, projection) = (scene.vertices, scene.projection);
     let pace = &mut Pace::new(attention);
     let memory = &mut scratch;
     let chosen = ChosenSides::choose(outlines, projection, vertices, options.crease, memory, pace)?;
     let ears = Ears::cut(outlines, vertices, memory, pace)?;
-    let outlook = Outlook::new(projection, vertices, memory, pace)?;
+    let outlook = Outlook::new(scene, memory, pace)?;
     let faces = Faces::sort(outlines, vertices, memory, pace)?;
-    let around = Surroundings {
-        outlook,
-        outlines,
-        ears,
-        chosen,
-        faces,
-    };
+    let around = Surroundings { outlook, outlines, ears, chosen, faces };
     let mut search = Search::new(around, options, scratch, pace)?;
     search.follow_edges(pace, sink)?;
     if options.with_seams {
         search.follow_seams(pace, sink)?;
     }
-    Ok(Report {
-        degenerate_faces: search.degenerate_faces(),
-    })
+    Ok(Report { degenerate_faces: search.degenerate_faces() })
 }
 
 /// Refuses what the arithmetic cannot take.
@@ -226,9 +220,8 @@ fn check(scene: &Scene<'_>) -> Result<(), VisibilityError> {
     if corners.len() > MOST_CORNERS {
         return Err(VisibilityError::TooManyCorners(MOST_CORNERS));
     }
-    if let Some(corner) = corners
-        .iter()
-        .find(|corner| usize::from(corner.vertex()) >= scene.vertices.len())
+    if let Some(corner) =
+        corners.iter().find(|corner| usize::from(corner.vertex()) >= scene.vertices.len())
     {
         return Err(VisibilityError::UnknownVertex(corner.vertex()));
     }

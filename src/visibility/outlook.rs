@@ -1,9 +1,13 @@
 //! The scene as it lies on the page: each vertex by its place on a coarse grid of 2^14 by 2^14, and
 //! "on which side" answered from those places where they suffice, exactly where they do not.
 
+use super::Scene;
 use super::VisibilityError;
 use super::pace::Pace;
-use crate::geometry::{Along, Axis, Projection, Vertex, page_offset, page_side};
+use crate::geometry::{
+    Along, Axis, Projection, Vertex, are_coplanar, page_offset, page_side, plane_side,
+    plane_side_margin,
+};
 use crate::stage::{Aborted, Scratch};
 use bytemuck::{Pod, Zeroable};
 
@@ -20,27 +24,18 @@ pub struct Place {
 
 impl Place {
     pub const LOWEST: Self = Self { x: 0, y: 0 };
-    pub const HIGHEST: Self = Self {
-        x: u16::MAX,
-        y: u16::MAX,
-    };
+    pub const HIGHEST: Self = Self { x: u16::MAX, y: u16::MAX };
 
     /// The lower left corner of the two.
     #[inline]
     pub fn low(self, other: Self) -> Self {
-        Self {
-            x: self.x.min(other.x),
-            y: self.y.min(other.y),
-        }
+        Self { x: self.x.min(other.x), y: self.y.min(other.y) }
     }
 
     /// The upper right corner of the two.
     #[inline]
     pub fn high(self, other: Self) -> Self {
-        Self {
-            x: self.x.max(other.x),
-            y: self.y.max(other.y),
-        }
+        Self { x: self.x.max(other.x), y: self.y.max(other.y) }
     }
 
     /// Whether everything up to here is surely left of or below everything from `other` on.
@@ -65,13 +60,7 @@ impl CoarseLine {
     pub fn new(a: Place, b: Place) -> Self {
         let (x, y) = (i32::from(a.x), i32::from(a.y));
         let (along_x, along_y) = (i32::from(b.x) - x, i32::from(b.y) - y);
-        Self {
-            x,
-            y,
-            along_x,
-            along_y,
-            doubt: along_x.abs() + along_y.abs() + 2,
-        }
+        Self { x, y, along_x, along_y, doubt: along_x.abs() + along_y.abs() + 2 }
     }
 
     /// The sign of [`page_side`] for a vertex at `place`, or zero if the places are too coarse to tell.
@@ -107,11 +96,7 @@ impl Line<'_> {
     #[inline]
     pub fn side(&self, end: End) -> i32 {
         let coarse = self.coarse.side(end.place);
-        if coarse != 0 {
-            coarse
-        } else {
-            self.exact_side(end)
-        }
+        if coarse != 0 { coarse } else { self.exact_side(end) }
     }
 
     /// [`Self::side`] without a look at the places.
@@ -151,11 +136,7 @@ impl Mapping {
             let extent = high.saturating_sub(low).max(0);
             (64 - extent.leading_zeros()).saturating_sub(PLACE_BITS)
         };
-        Ok(Self {
-            projection,
-            low,
-            shift: (shift_for(low.0, high.0), shift_for(low.1, high.1)),
-        })
+        Ok(Self { projection, low, shift: (shift_for(low.0, high.0), shift_for(low.1, high.1)) })
     }
 
     fn place(&self, vertex: Vertex) -> Place {
@@ -163,10 +144,7 @@ impl Mapping {
         let coarse = |fine: i64, low: i64, shift: u32| {
             ((fine - low) >> shift).clamp(0, (1 << PLACE_BITS) - 1) as u16
         };
-        Place {
-            x: coarse(x, self.low.0, self.shift.0),
-            y: coarse(y, self.low.1, self.shift.1),
-        }
+        Place { x: coarse(x, self.low.0, self.shift.0), y: coarse(y, self.low.1, self.shift.1) }
     }
 }
 
@@ -176,10 +154,7 @@ fn fine(projection: Projection, vertex: Vertex) -> (i64, i64) {
     match projection {
         Projection::Perspective => {
             let depth = i64::from(vertex.z);
-            (
-                fine(vertex.x).div_euclid(depth),
-                fine(vertex.y).div_euclid(depth),
-            )
+            (fine(vertex.x).div_euclid(depth), fine(vertex.y).div_euclid(depth))
         }
         Projection::Parallel => (fine(vertex.x), fine(vertex.y)),
     }
@@ -205,47 +180,36 @@ pub struct Outlook<'a> {
     pub projection: Projection,
     pub vertices: &'a [Vertex],
     pub places: &'a [Place],
+    /// Each vertex in the model's space, as far as known.
+    positions: &'a [[i32; 3]],
     mapping: Mapping,
 }
 
 impl<'a> Outlook<'a> {
     /// Places every vertex on the coarse grid.
     pub fn new<'s: 'a>(
-        projection: Projection,
-        vertices: &'a [Vertex],
+        scene: &Scene<'a>,
         scratch: &mut Scratch<'s>,
         pace: &mut Pace<'_>,
     ) -> Result<Self, VisibilityError> {
+        let Scene { projection, vertices, .. } = *scene;
         let places: &mut [Place] = scratch.take(vertices.len())?;
         let mapping = Mapping::new(projection, vertices, pace)?;
         for (place, &vertex) in places.iter_mut().zip(vertices) {
             *place = mapping.place(vertex);
             pace.spend(TWO_DIVISIONS)?;
         }
-        Ok(Self {
-            projection,
-            vertices,
-            places,
-            mapping,
-        })
+        Ok(Self { projection, vertices, places, positions: scene.positions, mapping })
     }
 
     /// A vertex as the end of an edge.
     pub fn end(&self, number: u16) -> End {
-        End {
-            number,
-            vertex: self.vertex(number),
-            place: self.place(number),
-        }
+        End { number, vertex: self.vertex(number), place: self.place(number) }
     }
 
     /// Any point between the vertices as the end of an edge.
     pub fn free_end(&self, vertex: Vertex) -> End {
-        End {
-            number: End::FREE,
-            vertex,
-            place: self.mapping.place(vertex),
-        }
+        End { number: End::FREE, vertex, place: self.mapping.place(vertex) }
     }
 
     #[inline]
@@ -261,12 +225,7 @@ impl<'a> Outlook<'a> {
     /// The line through two vertices.
     #[inline]
     pub fn line(&self, a: u16, b: u16) -> Line<'_> {
-        Line {
-            outlook: self,
-            a,
-            b,
-            coarse: CoarseLine::new(self.place(a), self.place(b)),
-        }
+        Line { outlook: self, a, b, coarse: CoarseLine::new(self.place(a), self.place(b)) }
     }
 
     /// The sign of [`page_side`] of three vertices.
@@ -285,6 +244,34 @@ impl<'a> Outlook<'a> {
         Along::zero_between(self.side_value(a, b, p), self.side_value(a, b, q))
     }
 
+    /// How far an end lies behind the plane of a triangle that turns anticlockwise on the page, and before
+    /// that of one that turns clockwise.
+    ///
+    /// Zero if it lies in the plane in the model, where that is known: rounding takes it out of it.
+    pub fn height(&self, triangle: [u16; 3], end: End) -> i64 {
+        if triangle.contains(&end.number) {
+            return 0;
+        }
+        let [a, b, c] = triangle.map(|number| self.vertex(number));
+        let height = plane_side(a, b, c, end.vertex);
+        if height.abs() <= plane_side_margin(a, b, c, end.vertex) && self.holds(triangle, end) {
+            0
+        } else {
+            height
+        }
+    }
+
+    /// Whether the plane of a triangle holds an end in the model.
+    #[cold]
+    fn holds(&self, triangle: [u16; 3], end: End) -> bool {
+        let [a, b, c] = triangle;
+        let at = |number: u16| self.positions.get(usize::from(number)).copied();
+        match [a, b, c, end.number].map(at) {
+            [Some(a), Some(b), Some(c), Some(d)] => are_coplanar([a, b, c, d]),
+            _ => false,
+        }
+    }
+
     /// An axis of the page along which p and q differ, and the sign of their difference.
     ///
     /// `None` if the eye sees them in line.
@@ -299,7 +286,12 @@ impl<'a> Outlook<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::Elements;
     use crate::stage::Undisturbed;
+
+    fn scene(projection: Projection, vertices: &[Vertex]) -> Scene<'_> {
+        Scene { vertices, elements: Elements::new(&[]), projection, positions: &[] }
+    }
 
     #[test]
     fn places_fill_the_grid_and_keep_the_order() -> Result<(), VisibilityError> {
@@ -313,7 +305,7 @@ mod tests {
             let mut scratch = Scratch::new(&mut words);
             let mut undisturbed = Undisturbed;
             let pace = &mut Pace::new(&mut undisturbed);
-            let outlook = Outlook::new(projection, &vertices, &mut scratch, pace)?;
+            let outlook = Outlook::new(&scene(projection, &vertices), &mut scratch, pace)?;
             let xs: [u16; 3] = [0, 1, 2].map(|n| outlook.place(n).x);
             assert!(xs[0] == 0 && xs[0] < xs[1] && xs[1] <= xs[2], "{xs:?}");
             assert!(xs[2] >= 1 << (PLACE_BITS - 1) && xs[2] < 1 << PLACE_BITS);
@@ -325,18 +317,11 @@ mod tests {
     fn a_coarse_answer_is_never_wrong() -> Result<(), VisibilityError> {
         // Every triangle of a small lattice, seen in steep perspective.
         let vertices: std::vec::Vec<Vertex> = (0..64)
-            .map(|n| {
-                Vertex::new(
-                    n % 4 * 70_001,
-                    n / 4 % 4 * 69_997,
-                    100_000 + n / 16 * 100_003,
-                )
-            })
+            .map(|n| Vertex::new(n % 4 * 70_001, n / 4 % 4 * 69_997, 100_000 + n / 16 * 100_003))
             .collect();
         let mut words = [0u64; 64];
         let outlook = Outlook::new(
-            Projection::Perspective,
-            &vertices,
+            &scene(Projection::Perspective, &vertices),
             &mut Scratch::new(&mut words),
             &mut Pace::new(&mut Undisturbed),
         )?;

@@ -26,10 +26,7 @@ pub struct Part {
 
 impl Part {
     /// All of the edge.
-    pub const WHOLE: Self = Self {
-        from: None,
-        to: None,
-    };
+    pub const WHOLE: Self = Self { from: None, to: None };
 
     /// What both have in common.
     pub fn and(self, other: Self) -> Self {
@@ -75,21 +72,14 @@ pub const FEWEST_PIECES: usize = 4;
 impl<'a> Profile<'a> {
     /// A profile that keeps its pieces in `memory`, at least [`FEWEST_PIECES`].
     pub fn new(memory: &'a mut [Piece]) -> Self {
-        let mut profile = Self {
-            memory,
-            count: 0,
-            end: Along::END,
-        };
+        let mut profile = Self { memory, count: 0, end: Along::END };
         profile.open(Along::START);
         profile
     }
 
     /// Opens the window from `start` to the end of the edge, nothing covered.
     pub fn open(&mut self, start: Along) {
-        self.memory[0] = Piece {
-            from: start,
-            marks: 0,
-        };
+        self.memory[0] = Piece { from: start, marks: 0 };
         self.count = 1;
         self.end = Along::END;
     }

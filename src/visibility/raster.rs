@@ -22,15 +22,8 @@ pub struct Shape {
 impl Shape {
     /// A cell for every place.
     pub fn finest(outlook: &Outlook<'_>) -> Self {
-        let far = outlook
-            .places
-            .iter()
-            .fold(Place::LOWEST, |far, &place| far.high(place));
-        Self {
-            shift_x: 0,
-            shift_y: 0,
-            far,
-        }
+        let far = outlook.places.iter().fold(Place::LOWEST, |far, &place| far.high(place));
+        Self { shift_x: 0, shift_y: 0, far }
     }
 
     /// Half as many cells, by joining neighbours.
@@ -92,16 +85,10 @@ pub struct Bounds {
 
 impl Bounds {
     pub fn of(outlook: &Outlook<'_>, corners: &[Corner]) -> Self {
-        let none = Self {
-            low: Place::HIGHEST,
-            high: Place::LOWEST,
-        };
+        let none = Self { low: Place::HIGHEST, high: Place::LOWEST };
         corners.iter().fold(none, |bounds, corner| {
             let place = outlook.place(corner.vertex());
-            Self {
-                low: bounds.low.low(place),
-                high: bounds.high.high(place),
-            }
+            Self { low: bounds.low.low(place), high: bounds.high.high(place) }
         })
     }
 }
@@ -140,11 +127,7 @@ pub struct Raster<'c> {
 
 impl<'c> Raster<'c> {
     pub fn new(shape: Shape, cells: &'c mut [Cell]) -> Self {
-        Self {
-            shape,
-            columns: shape.columns(),
-            cells,
-        }
+        Self { shape, columns: shape.columns(), cells }
     }
 
     pub fn cells(self) -> &'c mut [Cell] {
@@ -159,11 +142,7 @@ impl<'c> Raster<'c> {
         faces: &Faces<'_>,
         pace: &mut Pace<'_>,
     ) -> Result<usize, Aborted> {
-        let empty = |end: u16| Cell {
-            end,
-            cover_depth: NO_COVER,
-            cover: 0,
-        };
+        let empty = |end: u16| Cell { end, cover_depth: NO_COVER, cover: 0 };
         self.cells.fill(empty(0));
         self.visit(outlook, outlines, faces, pace, |cell, _| cell.end += 1)?;
         let mut begin = 0;
@@ -207,7 +186,8 @@ impl<'c> Raster<'c> {
                 let z = outlook.vertex(corner.vertex()).z;
                 (near, far) = (near.min(z), far.max(z));
             }
-            let (near, far) = (coarse_depth(near), coarse_depth(far));
+            // One more: what rounding puts just behind the face may lie on it.
+            let (near, far) = (coarse_depth(near), coarse_depth(far + 1));
             let bounds = Bounds::of(outlook, corners);
             let mut sides = [HalfPlane::default(); MOST_SIDES];
             let side_count = self.half_planes(outlook, corners, &bounds, &mut sides);

@@ -64,32 +64,24 @@ fn farthest(pairs: [(Vertex, Vertex); 3]) -> (Vertex, Vertex) {
         square(p.x, q.x) + square(p.y, q.y) + square(p.z, q.z)
     };
     let [first, rest @ ..] = pairs;
-    rest.into_iter().fold(first, |best, pair| {
-        if distance(&pair) > distance(&best) {
-            pair
-        } else {
-            best
-        }
-    })
+    rest.into_iter().fold(
+        first,
+        |best, pair| {
+            if distance(&pair) > distance(&best) { pair } else { best }
+        },
+    )
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const FLOOR: [Vertex; 3] = [
-        Vertex::new(-10, -10, 0),
-        Vertex::new(10, -10, 0),
-        Vertex::new(0, 20, 0),
-    ];
+    const FLOOR: [Vertex; 3] =
+        [Vertex::new(-10, -10, 0), Vertex::new(10, -10, 0), Vertex::new(0, 20, 0)];
 
     /// A wall across the floor, from `bottom` to `top`.
     fn wall(left: i32, right: i32, bottom: i32, top: i32) -> [Vertex; 3] {
-        [
-            Vertex::new(left, 0, bottom),
-            Vertex::new(right, 0, bottom),
-            Vertex::new(right, 0, top),
-        ]
+        [Vertex::new(left, 0, bottom), Vertex::new(right, 0, bottom), Vertex::new(right, 0, top)]
     }
 
     fn sorted(seam: Option<(Vertex, Vertex)>) -> Option<[(i32, i32, i32); 2]> {
@@ -114,12 +106,7 @@ mod tests {
 
     #[test]
     fn triangles_that_only_touch_or_are_apart_have_none() {
-        for wall in [
-            wall(-2, 2, 1, 3),
-            wall(12, 18, -1, 1),
-            wall(-2, 2, 0, 3),
-            wall(0, 0, -1, 1),
-        ] {
+        for wall in [wall(-2, 2, 1, 3), wall(12, 18, -1, 1), wall(-2, 2, 0, 3), wall(0, 0, -1, 1)] {
             assert_eq!(seam(FLOOR, wall), None);
             assert_eq!(seam(wall, FLOOR), None);
         }

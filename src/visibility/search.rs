@@ -47,26 +47,11 @@ impl<'a> Search<'a> {
         let faces = around.faces.len();
         let seen = scratch.take(faces.div_ceil(32))?;
         let met = scratch.take(faces.div_ceil(32))?;
-        let spare = scratch
-            .available_bytes()
-            .saturating_sub(Self::least_bytes(faces));
+        let spare = scratch.available_bytes().saturating_sub(Self::least_bytes(faces));
         let more_pieces = spare / 8 / size_of::<Piece>();
         let pieces = scratch.take(MOST_PIECES.min(FEWEST_PIECES + more_pieces))?;
-        let grid = Grid::new(
-            &around.outlook,
-            around.outlines,
-            &around.faces,
-            scratch,
-            pace,
-        )?;
-        Ok(Self {
-            around,
-            grid,
-            seen,
-            met,
-            profile: Profile::new(pieces),
-            options,
-        })
+        let grid = Grid::new(&around.outlook, around.outlines, &around.faces, scratch, pace)?;
+        Ok(Self { around, grid, seen, met, profile: Profile::new(pieces), options })
     }
 
     /// How many faces have no area.
@@ -144,15 +129,11 @@ impl<'a> Search<'a> {
 
     /// Leaves in `met` the faces after `one` that may pass through it where something is seen.
     fn meet(&mut self, one: usize) {
-        let Self {
-            around, grid, met, ..
-        } = self;
+        let Self { around, grid, met, .. } = self;
         met.fill(0);
         let corners = around.outlines.element(around.faces.get(one).first);
         let bounds = Bounds::of(&around.outlook, corners);
-        let depths = corners
-            .iter()
-            .map(|corner| around.outlook.vertex(corner.vertex()).z);
+        let depths = corners.iter().map(|corner| around.outlook.vertex(corner.vertex()).z);
         let far = depths.max().unwrap_or(-COORDINATE_LIMIT);
         grid.within(&bounds, |ranks| {
             let near_enough = ranks
@@ -203,13 +184,8 @@ impl<'a> Search<'a> {
                         stretch.to = to;
                     }
                     _ => {
-                        let next = handed.then_some(Stretch {
-                            edge,
-                            ends,
-                            from: piece.from,
-                            to,
-                            visible,
-                        });
+                        let next =
+                            handed.then_some(Stretch { edge, ends, from: piece.from, to, visible });
                         if let Some(stretch) = core::mem::replace(&mut pending, next) {
                             sink.stretch(stretch)?;
                         }
@@ -231,14 +207,7 @@ impl<'a> Search<'a> {
         seam_of: [Option<usize>; 2],
         pace: &mut Pace<'_>,
     ) -> Result<(), Aborted> {
-        let Self {
-            around,
-            grid,
-            seen,
-            profile,
-            options,
-            ..
-        } = self;
+        let Self { around, grid, seen, profile, options, .. } = self;
         let faces_by_rank = &around.faces;
         let near = coarse_depth(sight.near);
         let way = grid.way(sight.p.place, sight.q.place, near);
@@ -274,11 +243,7 @@ impl<'a> Search<'a> {
         // Covering faces first: they hide most, and what they leave may need no other cell.
         let _ = (!any_covered || way.visit(|cell| cell.cover.is_none_or(&mut look_at)))
             && way.visit(|cell| {
-                let faces = if cell.cover.is_some() {
-                    &[]
-                } else {
-                    cell.faces
-                };
+                let faces = if cell.cover.is_some() { &[] } else { cell.faces };
                 faces
                     .iter()
                     .take_while(|&&rank| !faces_by_rank.begins_behind(usize::from(rank), sight.far))

@@ -10,7 +10,7 @@ use super::faces::{Face, Faces};
 use super::outlook::{CoarseLine, End, Outlook, Place};
 use super::profile::{Part, Profile, mark};
 use super::triangles::Ears;
-use crate::geometry::{Along, line_side, page_offset, page_side, plane_side};
+use crate::geometry::{Along, line_side, page_offset, page_side};
 use crate::model::Corner;
 
 /// What the search knows of the scene.
@@ -90,11 +90,7 @@ impl<'c> Piece<'c> {
             left |= u32::from(side > 0) << n;
             left_or_on |= u32::from(side >= 0) << n;
         }
-        Self {
-            corners,
-            left,
-            left_or_on,
-        }
+        Self { corners, left, left_or_on }
     }
 
     /// The mask of the corners, each put where the next one is.
@@ -168,11 +164,7 @@ impl Sight {
     /// On which side of this edge's line a vertex lies on the page.
     fn side_of(&self, outlook: &Outlook<'_>, number: u16) -> i32 {
         let coarse = self.line.side(outlook.place(number));
-        if coarse != 0 {
-            coarse
-        } else {
-            self.exact_side_of(outlook, number)
-        }
+        if coarse != 0 { coarse } else { self.exact_side_of(outlook, number) }
     }
 
     /// [`Self::side_of`] without a look at the places.
@@ -276,15 +268,12 @@ impl Sight {
             return true;
         }
         let on_left = self.passage(outlook, piece, left, facing);
-        let on_right = if left == right {
-            on_left
-        } else {
-            self.passage(outlook, piece, right, facing)
-        };
+        let on_right =
+            if left == right { on_left } else { self.passage(outlook, piece, right, facing) };
         if on_left.is_none() && on_right.is_none() {
             return true;
         }
-        let behind = if far < self.near {
+        let behind = if far + 1 < self.near {
             Part::WHOLE
         } else {
             match self.depth_behind(outlook, corners, facing) {
@@ -312,14 +301,7 @@ impl Sight {
         let mut depth = None;
         for pair in corners[1..].windows(2) {
             let triangle = [corners[0], pair[0], pair[1]];
-            let [a, b, c] = triangle.map(|corner| outlook.vertex(corner));
-            let height = |end: End| {
-                if triangle.contains(&end.number) {
-                    0
-                } else {
-                    plane_side(a, b, c, end.vertex) * i64::from(facing)
-                }
-            };
+            let height = |end: End| outlook.height(triangle, end) * i64::from(facing);
             let here = behind_between(height(self.p), height(self.q));
             if corners.len() > 3 {
                 let is_all = here == Some(Part::WHOLE);
@@ -371,10 +353,7 @@ impl Sight {
     /// The part of the edge within a piece of a face.
     pub fn part(&self, outlook: &Outlook<'_>, passage: Passage) -> Part {
         let place = |(a, b): Side| outlook.crossing(a, b, self.p, self.q);
-        Part {
-            from: passage.entry.map(place),
-            to: passage.exit.map(place),
-        }
+        Part { from: passage.entry.map(place), to: passage.exit.map(place) }
     }
 
     /// Marks what the sides of an element do that lie on the line of this edge.
@@ -434,10 +413,7 @@ impl Sight {
         };
         if let Some(behind) = behind {
             let (at_a, at_b) = (place(va), place(vb));
-            let beside = Part {
-                from: Some(at_a.min(at_b)),
-                to: Some(at_a.max(at_b)),
-            };
+            let beside = Part { from: Some(at_a.min(at_b)), to: Some(at_a.max(at_b)) };
             profile.mark(beside.and(behind), mark::STOOD_IN);
         }
     }

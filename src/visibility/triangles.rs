@@ -47,14 +47,14 @@ struct Needs {
 
 impl Needs {
     fn of(outlines: Outlines<'_>, vertices: &[Vertex]) -> Self {
-        outlines
-            .elements()
-            .filter(|(_, corners)| cut_of(corners, vertices) == Cut::Ears)
-            .fold(Self::default(), |needs, (_, corners)| Self {
+        outlines.elements().filter(|(_, corners)| cut_of(corners, vertices) == Cut::Ears).fold(
+            Self::default(),
+            |needs, (_, corners)| Self {
                 faces: needs.faces + 1,
                 ears: needs.ears + corners.len() - 2,
                 most_corners: needs.most_corners.max(corners.len()),
-            })
+            },
+        )
     }
 }
 
@@ -81,37 +81,22 @@ impl<'a> Ears<'a> {
         let mut meantime = scratch.reborrow();
         let remaining: &mut [u16] = meantime.take(needs.most_corners)?;
         let mut used = 0;
-        let concave = outlines
-            .elements()
-            .filter(|(_, corners)| cut_of(corners, vertices) == Cut::Ears);
+        let concave =
+            outlines.elements().filter(|(_, corners)| cut_of(corners, vertices) == Cut::Ears);
         for (entry, (first, corners)) in entries.iter_mut().zip(concave) {
-            *entry = Entry {
-                first_corner: first as u16,
-                first_ear: used as u16,
-            };
+            *entry = Entry { first_corner: first as u16, first_ear: used as u16 };
             for (place, corner) in remaining.iter_mut().zip(corners) {
                 *place = corner.vertex();
             }
-            used += cut_ears(
-                &mut remaining[..corners.len()],
-                vertices,
-                &mut ears[used..],
-                pace,
-            )?;
+            used += cut_ears(&mut remaining[..corners.len()], vertices, &mut ears[used..], pace)?;
         }
-        Ok(Self {
-            entries,
-            ears: &mut ears[..used],
-        })
+        Ok(Self { entries, ears: &mut ears[..used] })
     }
 
     /// The triangles of the face that begins at corner `first`.
     pub fn of(&self, first: usize) -> &[[u16; 3]] {
         let begins = |entry: &Entry| usize::from(entry.first_ear);
-        match self
-            .entries
-            .binary_search_by_key(&first, |entry| usize::from(entry.first_corner))
-        {
+        match self.entries.binary_search_by_key(&first, |entry| usize::from(entry.first_corner)) {
             Ok(found) => {
                 let end = self.entries.get(found + 1).map_or(self.ears.len(), begins);
                 &self.ears[begins(&self.entries[found])..end]
@@ -158,10 +143,7 @@ impl Plane {
     fn of(mut polygon: impl Iterator<Item = Vertex>) -> Option<Self> {
         let areas = areas(&mut polygon);
         let leans_to = (0..3).rev().max_by_key(|&axis| areas[axis].abs())?;
-        (areas[leans_to] != 0).then_some(Self {
-            leans_to,
-            flipped: areas[leans_to] < 0,
-        })
+        (areas[leans_to] != 0).then_some(Self { leans_to, flipped: areas[leans_to] < 0 })
     }
 
     /// Twice the area of a triangle in the plane, positive if anticlockwise; within ±2^42.
@@ -216,11 +198,7 @@ fn cut_ears(
         pace.spend(100 * left * left)?;
         let rest = &polygon[..left];
         let around = |middle: usize| {
-            [
-                rest[(middle + left - 1) % left],
-                rest[middle],
-                rest[(middle + 1) % left],
-            ]
+            [rest[(middle + left - 1) % left], rest[middle], rest[(middle + 1) % left]]
         };
         let turn_at = |middle: usize| {
             let [a, b, c] = around(middle);
