@@ -299,6 +299,36 @@ mod tests {
     }
 
     #[test]
+    fn doubts_are_those_of_the_differences() {
+        let (a, b, c) = (Vertex::new(5, 7, 1), Vertex::new(105, 27, 1), Vertex::new(-5, 57, 1));
+        // 100 + 20 for b, 10 + 50 for c, and one.
+        assert_eq!(page_side_doubt(Projection::Parallel, a, b, c), 181);
+        let from_a = |x, y, z| Vertex::new(100 + x, 200 + y, 300 + z);
+        let (a, b, c) = (from_a(0, 0, 0), from_a(10, 0, 3), from_a(0, 20, 0));
+        let d = from_a(0, 0, 30);
+        // Minors 200 + 60, 600 and 300; twice 13, 20 and 30; and six.
+        assert_eq!(plane_side_doubt(a, b, c, d), 1160 + 126 + 6);
+        let (b, c, d) = (from_a(2, 3, 5), from_a(7, 11, 13), from_a(17, 19, 23));
+        // Minors |22 - 21| + |39 - 55| + |26 - 35|, and so on.
+        let minors = (1 + 16 + 9) + (54 + 6 + 60) + (13 + 26 + 39);
+        assert_eq!(plane_side_doubt(a, b, c, d), minors + 2 * (10 + 31 + 59) + 6);
+        assert_eq!(plane_side_margin(a, b, c, d), 19 * 31 * 31 + 200);
+    }
+
+    #[test]
+    fn four_points_of_the_model_lie_in_a_plane_or_not() {
+        let points = |x: i32, y: i32, z: i32| [[3, 5, 7], [13, 4, 9], [2, 15, 11], [x, y, z]];
+        // (3, 5, 7) + m (10, -1, 2) + n (-1, 10, 4)
+        for (m, n) in [(1, 1), (-2, 3), (4, -1), (0, 5)] {
+            let at = [3 + 10 * m - n, 5 - m + 10 * n, 7 + 2 * m + 4 * n];
+            assert!(are_coplanar(points(at[0], at[1], at[2])));
+            for (dx, dy, dz) in [(1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 0, -1)] {
+                assert!(!are_coplanar(points(at[0] + dx, at[1] + dy, at[2] + dz)));
+            }
+        }
+    }
+
+    #[test]
     fn the_margin_is_beyond_any_doubt() {
         for n in 1..4000i32 {
             let point = |k: i32| {

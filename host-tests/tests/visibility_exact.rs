@@ -23,7 +23,7 @@ fn library_pieces(random: &RandomScene, merged_blocks: bool, spare_bytes: usize)
         vertices: &random.vertices,
         elements: Elements::new(&random.corners),
         projection: random.projection,
-        positions: &[],
+        positions: if spare_bytes == 0 { &positions } else { &[] },
     };
     let mut words = vec![0u64; (scratch_bytes(&scene) + spare_bytes) / 8];
     let mut stretches = Stretches::default();
