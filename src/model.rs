@@ -64,8 +64,13 @@ pub struct Elements<'a> {
 impl<'a> Elements<'a> {
     /// The elements that `corners` encode. Corners after the last mark are left out.
     pub fn new(corners: &'a [Corner]) -> Self {
-        let whole = corners.iter().rposition(|corner| corner.is_last()).map_or(0, |last| last + 1);
-        Self { corners: &corners[..whole] }
+        let whole = corners
+            .iter()
+            .rposition(|corner| corner.is_last())
+            .map_or(0, |last| last + 1);
+        Self {
+            corners: &corners[..whole],
+        }
     }
 
     /// Every corner of every element.
@@ -75,9 +80,11 @@ impl<'a> Elements<'a> {
 
     /// Each element in turn.
     pub fn iter(&self) -> impl Iterator<Item = Element<'a>> + Clone + use<'a> {
-        self.corners.split_inclusive(|corner| corner.is_last()).map(|corners| match corners {
-            [a, b] if a.of_bar() => Element::Bar(a.vertex(), b.vertex()),
-            _ => Element::Face(corners),
-        })
+        self.corners
+            .split_inclusive(|corner| corner.is_last())
+            .map(|corners| match corners {
+                [a, b] if a.of_bar() => Element::Bar(a.vertex(), b.vertex()),
+                _ => Element::Face(corners),
+            })
     }
 }
