@@ -203,7 +203,8 @@ fn project(
     let map = PageMap::fit(&bounds, &options.page, steps).map_err(Refusal::Page)?;
 
     attention.enter(Stage::Visibility);
-    let scene = Scene { vertices, elements, projection };
+    let positions = bytemuck::cast_slice(model.vertices());
+    let scene = Scene { vertices, elements, projection, positions };
     // Memory: what is taken, then visibility's, then the lines as they are found. A quarter of what
     // visibility does not need makes its grid finer.
     let available = scratch.available_bytes();
