@@ -5,6 +5,7 @@
 //! no edge whose ends both lie on the near plane is to be drawn.
 
 use super::View;
+use super::weld::weld;
 use crate::geometry::Vertex;
 use crate::model::{Corner, Element, Elements, Model, VERTEX_NUMBER_LIMIT};
 use crate::stage::{OutOfScratch, Scratch, heap_sort_by_key};
@@ -18,7 +19,8 @@ pub struct Seen<'a> {
     pub elements: Elements<'a>,
 }
 
-/// Takes every vertex of `model` to view coordinates and cuts off what is nearer than the near plane.
+/// Takes every vertex of `model` to view coordinates, makes one of those at the same place, and cuts off
+/// what is nearer than the near plane.
 ///
 /// # Errors
 /// [`OutOfScratch`] if the vertices, or the cut faces, do not fit.
@@ -32,11 +34,12 @@ pub fn see<'a>(
     for (vertex, position) in vertices.iter_mut().zip(model.vertices()) {
         *vertex = view.vertex(*position);
     }
+    let elements = weld(model, scratch)?;
     match view.near() {
         Some(near) if vertices.iter().any(|vertex| vertex.z < near) => {
-            cut(vertices, model.elements(), near, scratch)
+            cut(vertices, elements, near, scratch)
         }
-        _ => Ok(Seen { vertices, elements: model.elements() }),
+        _ => Ok(Seen { vertices, elements }),
     }
 }
 
