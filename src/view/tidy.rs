@@ -1,30 +1,59 @@
-//! Vertices at the same place made one: meshes from a modeller often have one for each face.
+//! What modellers leave behind: vertices at the same place made one, faces without an area left out.
 
-use crate::model::{Corner, Elements, Model, Position};
+use crate::model::{Corner, Element, Elements, Model, Position};
 use crate::stage::{OutOfScratch, Scratch};
 
-/// The elements of the model with each vertex replaced by the first one at the same place; the model's own
-/// if no two share a place. Corners of a face may come to be the same; visibility lives with that.
+/// The elements of the model with each vertex replaced by the first one at the same place, without the faces that
+/// have no area, and how many those are. The model's own elements if there is nothing to do. Other faces may
+/// come to have the same corner twice in a row; visibility lives with that.
 ///
-/// Memory: 2 bytes for each corner if there is something to weld; 4 to 8 for each vertex meanwhile.
-pub(super) fn weld<'a>(
+/// Memory: 2 bytes for each corner if there is something to do; 4 to 8 for each vertex meanwhile.
+pub(super) fn tidy<'a>(
     model: &'a Model<'_>,
     scratch: &mut Scratch<'a>,
-) -> Result<Elements<'a>, OutOfScratch> {
+) -> Result<(Elements<'a>, u32), OutOfScratch> {
     let positions = model.vertices();
     let elements = model.elements();
-    if Places::new(positions, &mut scratch.reborrow())?.1 == 0 {
-        return Ok(elements);
+    let degenerate = elements.iter().filter(|element| !has_extent(element, positions)).count();
+    if degenerate == 0 && Places::new(positions, &mut scratch.reborrow())?.1 == 0 {
+        return Ok((elements, 0));
     }
     let corners: &mut [Corner] = scratch.take(elements.corners().len())?;
-    corners.copy_from_slice(elements.corners());
     let (places, _) = Places::new(positions, &mut scratch.reborrow())?;
-    for corner in corners.iter_mut() {
-        if let Some(first) = places.first_at(corner.vertex()) {
-            *corner = Corner::new(first, corner.of_bar(), corner.is_last());
+    let mut kept = 0;
+    for element in elements.iter().filter(|element| has_extent(element, positions)) {
+        let bar;
+        let old = match element {
+            Element::Face(corners) => corners,
+            Element::Bar(from, to) => {
+                bar = [Corner::new(from, true, false), Corner::new(to, true, true)];
+                &bar
+            }
+        };
+        for (new, old) in corners.iter_mut().skip(kept).zip(old) {
+            let first = places.first_at(old.vertex()).unwrap_or(old.vertex());
+            *new = Corner::new(first, old.of_bar(), old.is_last());
         }
+        kept += old.len();
     }
-    Ok(Elements::new(corners))
+    let corners: &'a [Corner] = corners;
+    Ok((Elements::new(corners.get(..kept).unwrap_or(corners)), degenerate as u32))
+}
+
+/// Whether a face has an area. Bars need none.
+fn has_extent(element: &Element<'_>, positions: &[Position]) -> bool {
+    let Element::Face(corners) = element else { return true };
+    let mut sides = corners.iter().filter_map(|corner| {
+        let [from, to] = [corners.first()?, corner].map(|c| positions.get(usize::from(c.vertex())));
+        let [from, to] = [from?.coordinates(), to?.coordinates()];
+        let side = [0, 1, 2].map(|axis: usize| i64::from(to[axis]) - i64::from(from[axis]));
+        (side != [0; 3]).then_some(side)
+    });
+    let Some(a) = sides.next() else { return false };
+    // Below 2^31 each, so that a product is below 2^62 and compares without a difference.
+    sides.any(|b| {
+        a[0] * b[1] != a[1] * b[0] || a[1] * b[2] != a[2] * b[1] || a[2] * b[0] != a[0] * b[2]
+    })
 }
 
 /// A hash table of the places that have a vertex, with open addressing.
@@ -108,7 +137,7 @@ mod tests {
             }
         }
         let mut words = [0; 64];
-        let elements = weld(&model, &mut Scratch::new(&mut words)).unwrap();
+        let (elements, _) = tidy(&model, &mut Scratch::new(&mut words)).unwrap();
         elements.corners().iter().map(|c| (c.vertex(), c.of_bar(), c.is_last())).collect()
     }
 
@@ -141,16 +170,17 @@ mod tests {
         let mut vertices = heapless::Vec::<Position, 4>::new();
         let mut corners = heapless::Vec::<Corner, 4>::new();
         let mut model = Model::new(&mut vertices, &mut corners);
-        for x in ["0", "1", "0.5"] {
-            model.add_vertex(decimals([x, x, "0"])).unwrap();
+        for [x, y] in [["0", "0"], ["1", "0"], ["0.5", "1"]] {
+            model.add_vertex(decimals([x, y, "0"])).unwrap();
         }
         model.add_face([1, 2, 3].into_iter()).unwrap();
         let mut words = [0; 2];
         let mut scratch = Scratch::new(&mut words);
-        let elements = weld(&model, &mut scratch).unwrap();
+        let (elements, degenerate) = tidy(&model, &mut scratch).unwrap();
+        assert_eq!(degenerate, 0);
         assert!(core::ptr::eq(elements.corners(), model.elements().corners()));
         assert_eq!(scratch.available_bytes(), 16);
-        assert!(weld(&model, &mut Scratch::new(&mut [0])).is_err());
+        assert!(tidy(&model, &mut Scratch::new(&mut [0])).is_err());
     }
 
     #[test]
@@ -159,9 +189,24 @@ mod tests {
     }
 
     #[test]
-    fn a_full_model_all_at_one_place_becomes_one_vertex() {
+    fn a_full_model_all_at_one_place_has_no_face_left() {
         let places = [["7", "7", "7"]; 16];
-        let corners = welded(&places, &[&[1, 2, 16]]);
-        assert!(corners.iter().all(|corner| corner.0 == 0));
+        assert!(welded(&places, &[&[1, 2, 16]]).is_empty());
+        assert_eq!(welded(&places, &[&[1, 16]]), [(0, true, false), (0, true, true)]);
+    }
+
+    #[test]
+    fn a_face_in_line_is_left_out_and_its_neighbours_stay() {
+        let places = [
+            ["0", "0", "0"],
+            ["1", "2", "3"],
+            ["2", "4", "6"],
+            ["0", "1", "0"],
+            ["-9", "-18", "-27"],
+        ];
+        let faces: [&[i32]; 4] = [&[1, 2, 3], &[1, 3, 4], &[5, 1, 2, 3], &[2, 4]];
+        let corners = welded(&places, &faces);
+        let numbers: Vec<u16> = corners.iter().map(|corner| corner.0).collect();
+        assert_eq!(numbers, [0, 2, 3, 1, 3]);
     }
 }
