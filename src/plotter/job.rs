@@ -10,7 +10,7 @@ use crate::model::{Element, Model, ModelError};
 use crate::order::{self, Leg, OrderError};
 use crate::protocol::{HiddenLines, Refusal, WayToSee};
 use crate::stage::{Aborted, Attention, OutOfScratch, Scratch, Stage, items, items_mut};
-use crate::view::{Seen, View, see};
+use crate::view::{SeeError, Seen, View, see};
 use crate::visibility::{self, Scene, SinkFull, Stretch, StretchSink, VisibilityError};
 
 /// Who is shown each stretch as it is found, in view coordinates: the preview.
@@ -207,8 +207,7 @@ fn project(
     attention.check()?;
     let view = View::new(&camera, model).map_err(Refusal::View)?;
     attention.check()?;
-    let Seen { vertices, elements, degenerate_faces } =
-        see(&view, model, &mut scratch).map_err(Refusal::DrawingTooLarge)?;
+    let Seen { vertices, elements, degenerate_faces } = see(&view, model, &mut scratch, attention)?;
     if !options.clip_behind {
         view.refuse_behind(model).map_err(Refusal::View)?;
     }
@@ -276,6 +275,15 @@ pub(super) fn to_front(words: &mut [u64], at: usize, count: usize) {
 impl From<Aborted> for Refusal {
     fn from(_: Aborted) -> Self {
         Self::Aborted
+    }
+}
+
+impl From<SeeError> for Refusal {
+    fn from(error: SeeError) -> Self {
+        match error {
+            SeeError::Scratch(missing) => Self::DrawingTooLarge(missing),
+            SeeError::Aborted => Self::Aborted,
+        }
     }
 }
 
