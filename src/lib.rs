@@ -16,18 +16,22 @@ extern crate std;
 pub mod fixed;
 pub mod stage;
 
-pub mod curve;
-pub mod drawing;
 pub mod geometry;
-pub mod machine;
 pub mod model;
-pub mod motion;
-pub mod order;
-pub mod plotter;
-pub mod protocol;
-pub mod step;
+pub mod curve;
 pub mod view;
 pub mod visibility;
+pub mod convex;
+pub mod drawing;
+pub mod order;
+pub mod step;
+pub mod motion;
+pub mod machine;
+pub mod protocol;
+pub mod plotter;
 
+/// The board made of plain memory. Those made of silicon belong to the firmware binary.
 #[cfg(feature = "host")]
-pub mod boards;
+pub mod boards {
+    pub mod host;
+}

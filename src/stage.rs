@@ -102,6 +102,40 @@ pub fn items<T: Pod>(words: &[u64], count: usize) -> Option<&[T]> {
     bytemuck::try_cast_slice(exact).ok()
 }
 
+/// Sorts by a key, in place and without recursion (Williams' heapsort): the library's own sorts take
+/// kilobytes of a board's stack, and may order equal keys otherwise in another version.
+///
+/// ```
+/// let mut items = [3, 1, 2];
+/// penup::stage::heap_sort_by_key(&mut items, |item| *item);
+/// assert_eq!(items, [1, 2, 3]);
+/// ```
+pub fn heap_sort_by_key<T, K: Ord>(items: &mut [T], key: impl Fn(&T) -> K) {
+    let sift_down = |items: &mut [T], mut parent: usize| {
+        loop {
+            let mut child = 2 * parent + 1;
+            if child >= items.len() {
+                return;
+            }
+            if child + 1 < items.len() && key(&items[child]) < key(&items[child + 1]) {
+                child += 1;
+            }
+            if key(&items[parent]) >= key(&items[child]) {
+                return;
+            }
+            items.swap(parent, child);
+            parent = child;
+        }
+    };
+    for parent in (0..items.len() / 2).rev() {
+        sift_down(items, parent);
+    }
+    for end in (1..items.len()).rev() {
+        items.swap(0, end);
+        sift_down(&mut items[..end], 0);
+    }
+}
+
 /// The user asked for the job to be given up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -162,6 +196,18 @@ mod tests {
         assert_eq!(scratch.take::<[u32; 3]>(1).map(|items| items.len()), Ok(1));
         assert_eq!(scratch.take::<[u8; 3]>(5).map(|items| items.len()), Ok(5));
         assert_eq!(scratch.available_bytes(), 0);
+    }
+
+    #[test]
+    fn sorting_is_that_of_the_standard_library() {
+        for length in 0..40u32 {
+            let mut items: std::vec::Vec<u32> =
+                (0..length).map(|i| i.wrapping_mul(0x9E37_79B1) % 17).collect();
+            let mut expected = items.clone();
+            expected.sort_unstable();
+            heap_sort_by_key(&mut items, |item| *item);
+            assert_eq!(items, expected);
+        }
     }
 
     #[test]

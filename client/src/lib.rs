@@ -1,3 +1,24 @@
 //! What the `penup` command is made of: sending, emulating, previewing, picturing.
+//!
+//! In the order in which a job passes through: [`cli`] reads the command line, [`source`] the file,
+//! [`job`] joins both into lines, [`sender`] sends them over a [`link`] and follows the plotter's
+//! replies ([`protocol`], [`progress`]); behind the link are the plotters of [`machines`], an
+//! [`emulator`] and the [`preview`] among them; [`picture`] shows what the pen did, [`output`] writes it.
+
+pub mod cli;
+pub mod emulator;
+pub mod error;
+pub mod fake;
+pub mod job;
+pub mod link;
+pub mod machines;
+pub mod output;
+pub mod picture;
+pub mod preview;
+pub mod progress;
+pub mod protocol;
+pub mod run;
+pub mod sender;
+pub mod source;
 
 pub mod fit;

@@ -12,7 +12,7 @@ fn main() {
     for file in arguments {
         let text = std::fs::read_to_string(&file).expect("a file that can be read");
         let sheet = Sheet::from_obj(&text);
-        for method in [Method::Greedy, Method::Auto] {
+        for method in [Method::Auto] {
             for shape in [Shape::OpenPath, Shape::ClosedCycle] {
                 let options = Options { method, shape, effort };
                 let (_, report) = sheet.order(options).expect("an order");

@@ -1,4 +1,18 @@
 //! The simulated machine, the exact reference models and the tests of whole jobs.
 
+// A test fails by panicking, and this is what tests are made of.
+#![allow(clippy::panic, clippy::expect_used)]
+
 pub mod curve_reference;
 pub mod order_reference;
+pub mod event_checker;
+pub mod motion_optimum;
+pub mod pin_machine;
+pub mod exact_visibility;
+pub mod fraction;
+pub mod random_scenes;
+pub mod scene_files;
+pub mod convex_any_faces;
+pub mod convex_model;
+pub mod convex_solids;
+pub mod whole_jobs;

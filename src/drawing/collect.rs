@@ -4,7 +4,7 @@
 //! in the same memory, into points and segments.
 
 use super::{Drawing, LineType, PAGE_LIMIT, PagePoint, Segment};
-use crate::stage::{OutOfScratch, Scratch, items, items_mut};
+use crate::stage::{Aborted, Attention, OutOfScratch, Scratch, heap_sort_by_key, items, items_mut};
 use bytemuck::{Pod, Zeroable};
 
 /// A straight line on the page, packed: four coordinates of 21 bits, line type, pen.
@@ -57,6 +57,15 @@ impl Stored {
         Scratch::bytes_for::<Segment>(self.segments)
     }
 
+    /// The drawing, to read only; `None` if this is not the memory in which it was stored.
+    pub fn drawing<'a>(&self, words: &'a [u64]) -> Option<Drawing<'a>> {
+        let points = words.get(self.segment_bytes() / 8..)?;
+        Some(Drawing {
+            segments: items(words, self.segments)?,
+            points: items(points, self.points)?,
+        })
+    }
+
     /// The drawing, and the memory after it.
     ///
     /// # Errors
@@ -78,14 +87,43 @@ impl Stored {
     }
 }
 
+/// Why lines did not become a drawing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OrganiseError {
+    /// The points do not fit beside the lines.
+    Scratch(OutOfScratch),
+    /// The user gave up.
+    Aborted,
+}
+
+impl From<OutOfScratch> for OrganiseError {
+    fn from(error: OutOfScratch) -> Self {
+        Self::Scratch(error)
+    }
+}
+
+impl From<Aborted> for OrganiseError {
+    fn from(_: Aborted) -> Self {
+        Self::Aborted
+    }
+}
+
+/// Each line looks for its points at up to 18 places: these are about 50,000 instructions.
+const LINES_BETWEEN_CHECKS: usize = 32;
+
 /// Turns the `count` lines at the beginning of `words` into a drawing at the beginning of `words`.
 ///
 /// Points less than two steps apart along both axes count as one, the first of them; lines that
 /// shrink to a point are dropped; of equal segments one is kept, a full line before a dotted one.
 ///
 /// # Errors
-/// [`OutOfScratch`] if the points do not fit beside the lines; the lines are lost then.
-pub fn organise(words: &mut [u64], count: usize) -> Result<Stored, OutOfScratch> {
+/// See [`OrganiseError`]; the lines are lost then.
+#[inline(never)] // Its frame must not lie under the stages'.
+pub fn organise(
+    words: &mut [u64],
+    count: usize,
+    attention: &mut dyn Attention,
+) -> Result<Stored, OrganiseError> {
     let line_words = Scratch::bytes_for::<Line>(count) / 8;
     let available = size_of_val(words);
     let missing = OutOfScratch { needed: line_words * 8, available };
@@ -96,6 +134,9 @@ pub fn organise(words: &mut [u64], count: usize) -> Result<Stored, OutOfScratch>
         let mut finder = PointFinder::new(Scratch::new(rest), 2 * count)?;
         let mut kept = 0;
         for at in 0..count {
+            if at % LINES_BETWEEN_CHECKS == 0 {
+                attention.check()?;
+            }
             let (from, to, line_type_code, pen) = lines[at].unpack();
             let (from, to) = (finder.number(from)?, finder.number(to)?);
             if from != to {
@@ -109,7 +150,7 @@ pub fn organise(words: &mut [u64], count: usize) -> Result<Stored, OutOfScratch>
             }
         }
         let lines = &mut lines[..kept];
-        lines.sort_unstable_by_key(|line| line.0);
+        heap_sort_by_key(lines, |line| line.0);
         (drop_repeated(lines), finder.count)
     };
 
@@ -219,6 +260,7 @@ impl<'a> PointFinder<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::stage::Undisturbed;
     use std::vec;
     use std::vec::Vec;
 
@@ -226,10 +268,10 @@ mod tests {
         PagePoint { x, y }
     }
 
-    fn drawn(lines: &[Line], words: usize) -> Result<Vec<[(i32, i32); 2]>, OutOfScratch> {
+    fn drawn(lines: &[Line], words: usize) -> Result<Vec<[(i32, i32); 2]>, OrganiseError> {
         let mut memory = vec![0u64; words];
         items_mut(&mut memory, lines.len()).unwrap().copy_from_slice(lines);
-        let stored = organise(&mut memory, lines.len())?;
+        let stored = organise(&mut memory, lines.len(), &mut Undisturbed)?;
         let (drawing, _) = stored.split(&mut memory)?;
         let at = |number: u16| drawing.points[usize::from(number)];
         Ok(drawing.segments.iter().map(|s| [at(s.from), at(s.to)].map(|p| (p.x, p.y))).collect())
@@ -275,7 +317,7 @@ mod tests {
         let mut memory = vec![0u64; 64];
         let lines = [dotted, line((0, 0), (9, 9))];
         items_mut(&mut memory, 2).unwrap().copy_from_slice(&lines);
-        let stored = organise(&mut memory, 2).unwrap();
+        let stored = organise(&mut memory, 2, &mut Undisturbed).unwrap();
         let (drawing, _) = stored.split(&mut memory).unwrap();
         assert_eq!(drawing.segments.len(), 1);
         assert_eq!(drawing.segments[0].line_type(), LineType::Full);

@@ -10,7 +10,7 @@ mod collect;
 mod page;
 mod title;
 
-pub use collect::{Line, PEN_LIMIT, Stored, organise};
+pub use collect::{Line, OrganiseError, PEN_LIMIT, Stored, organise};
 pub use page::{Bounds, Page, PageError, PageMap, StepsPerMillimetre};
 pub use title::Title;
 

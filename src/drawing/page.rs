@@ -75,7 +75,9 @@ impl Bounds {
             .reduce(Self::union)
     }
 
-    fn union(self, other: Self) -> Self {
+    /// Around both.
+    #[must_use]
+    pub fn union(self, other: Self) -> Self {
         Self {
             low: [0, 1].map(|axis: usize| self.low[axis].min(other.low[axis])),
             high: [0, 1].map(|axis: usize| self.high[axis].max(other.high[axis])),
@@ -100,6 +102,7 @@ impl PageMap {
     ///
     /// # Errors
     /// [`PageError::NoRoom`], [`PageError::TooManySteps`].
+    #[inline(never)] // Its frame must not lie under the stages'.
     pub fn fit(bounds: &Bounds, page: &Page, steps: StepsPerMillimetre) -> Result<Self, PageError> {
         Self::fit_unit(bounds, Bounds::FRACTION_BITS, page, steps)
     }

@@ -4,6 +4,7 @@
 //! cycle traced from there. Here the trail that is being traced and the finished one share one
 //! slice, growing towards each other: linear time, no list besides.
 
+use super::incidence::Incidence;
 use super::network::Network;
 use super::pace::Pace;
 use super::{EVEN_PART, Leg, NONE, OrderError};
@@ -12,9 +13,8 @@ use crate::stage::{OutOfScratch, Scratch};
 /// The chains and the moves not yet used by a trail.
 pub(super) struct Unused<'s, 'a> {
     network: Network<'a>,
-    /// For each station the first leg from it that may be unused, then, for each leg, the next.
-    first: &'s mut [u16],
-    next: &'s mut [u16],
+    /// Those not yet found to be used.
+    legs: Incidence<'s>,
     used: &'s mut [u8],
     /// The other end of the pen-up move of each station: [`NONE`], [`EVEN_PART`] or a station.
     mate: &'s mut [u16],
@@ -27,30 +27,18 @@ impl<'s, 'a> Unused<'s, 'a> {
         mate: &'s mut [u16],
         scratch: &mut Scratch<'s>,
     ) -> Result<Self, OutOfScratch> {
-        let chains = usize::from(network.chains());
-        let first = scratch.take(usize::from(network.stations()))?;
-        let next = scratch.take(2 * chains)?;
-        let used = scratch.take(chains)?;
-        first.fill(NONE);
-        for chain in (0..network.chains()).rev() {
-            for leg in [Leg::new(chain, true), Leg::new(chain, false)] {
-                let start = usize::from(network.start(leg));
-                next[usize::from(leg.code())] = first[start];
-                first[start] = leg.code();
-            }
-        }
-        Ok(Self { network, first, next, used, mate })
+        let legs = Incidence::new(network, scratch)?;
+        let used = scratch.take(usize::from(network.chains()))?;
+        Ok(Self { network, legs, used, mate })
     }
 
     /// The next unused leg from `station`.
     fn peek(&mut self, station: u16) -> Option<Leg> {
-        let first = &mut self.first[usize::from(station)];
-        while *first != NONE {
-            let leg = Leg::from_code(*first);
+        while let Some(leg) = self.legs.first(station) {
             if self.used[leg.segment()] == 0 {
                 return Some(leg);
             }
-            *first = self.next[usize::from(leg.code())];
+            self.legs.drop_first(station);
         }
         None
     }

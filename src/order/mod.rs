@@ -5,16 +5,23 @@
 //! (an odd number of segments meet there). Else the odd points are paired, and the pen is lifted
 //! from one of a pair to the other (Harrison 5.6). The way of the data:
 //!
-//! 1. [`network`]: the segments of one pen become stations and chains;
-//! 2. [`greedy`] pairs the odd stations;
-//! 3. [`euler`] traces the strokes, part by part, nearest first.
+//! 1. `network`: the segments of one pen become stations and chains;
+//! 2. `matching` pairs the odd stations at the least length, or `greedy` in less memory;
+//! 3. `euler` traces the strokes, part by part, nearest first.
 //!
 //! Call [`order`] with a [`Drawing`], [`Options`] and memory. Refused: a drawing whose segments name
 //! points that are not there, too many segments, too little memory; the tour is then worth nothing.
 
+mod cycle;
+pub mod enumeration;
 mod euler;
 mod greedy;
+mod improve;
+mod incidence;
+mod matching;
+mod mend;
 mod metric;
+mod near;
 mod network;
 mod odd;
 mod pace;
@@ -26,10 +33,10 @@ use crate::drawing::{Drawing, PAGE_LIMIT, PagePoint};
 use crate::stage::{Attention, OutOfScratch, Scratch};
 use bytemuck::{Pod, Zeroable};
 use euler::Unused;
+use improve::{Goal, improve};
 use network::{Network, start_point};
 use odd::OddPoints;
 use pace::Pace;
-use partition::Partition;
 
 /// Points beyond so many have no number of their own: [`NONE`] is not one.
 const POINT_LIMIT: usize = NONE as usize;
@@ -159,14 +166,17 @@ pub fn order(
     let mut pace = Pace::new(attention);
     let mut report = Report::default();
     let mut rest = &mut *tour;
-    let mut next_pen = drawing.segments.iter().map(|segment| segment.pen).min();
+    let pens = || drawing.segments.iter().map(|segment| segment.pen);
+    // Of several pens none returns to its own beginning.
+    let shape = if pens().min() == pens().max() { options.shape } else { Shape::OpenPath };
+    let mut next_pen = pens().min();
     while let Some(pen) = next_pen {
-        let pens = drawing.segments.iter().map(|segment| segment.pen);
-        let count = pens.clone().filter(|&other| other == pen).count();
+        let count = pens().filter(|&other| other == pen).count();
         let (legs, others) = rest.split_at_mut(count);
         rest = others;
+        let options = Options { shape, ..options };
         order_pen(drawing, pen, options, scratch.reborrow(), &mut pace, legs, &mut report)?;
-        next_pen = pens.filter(|&other| other > pen).min();
+        next_pen = pens().filter(|&other| other > pen).min();
     }
     measure(drawing, tour, options.shape, &mut report);
     Ok(report)
@@ -201,14 +211,29 @@ fn order_pen<'a>(
     tour: &mut [Leg],
     report: &mut Report,
 ) -> Result<(), OrderError> {
+    pace.answer()?;
     let network = Network::new(drawing, pen, &mut scratch)?;
+    pace.answer()?;
     let route: &mut [Leg] = scratch.take(usize::from(network.chains()))?;
+    let bound = report.bound;
     {
         let mut scratch = scratch.reborrow();
         let mate: &mut [u16] = scratch.take(usize::from(network.stations()))?;
-        report.components += mark_parts(network, scratch.reborrow(), mate)?;
+        let parts = mark_parts(network, scratch.reborrow(), mate)?;
+        pace.answer()?;
         let start = pair_odd(network, options, scratch.reborrow(), pace, mate, report)?;
-        Unused::new(network, mate, &mut scratch)?.nearest_first(start, route, pace)?;
+        {
+            let mut scratch = scratch.reborrow();
+            let unused: &mut [u16] = scratch.take(mate.len())?;
+            unused.copy_from_slice(mate);
+            Unused::new(network, unused, &mut scratch)?.nearest_first(start, route, pace)?;
+        }
+        report.components += parts;
+        let open = options.shape == Shape::OpenPath;
+        let goal = Goal { open, bound: report.bound - bound };
+        if parts > 1 && options.effort > 0 {
+            improve(network, mate, start, route, goal, options.effort, scratch, pace)?;
+        }
     }
     turn(network, options.shape, route);
     network.expand(route, tour, pen, &mut scratch)?;
@@ -222,27 +247,30 @@ fn mark_parts(
     mut scratch: Scratch<'_>,
     marks: &mut [u16],
 ) -> Result<u32, OutOfScratch> {
-    let stations = network.stations();
-    let degree: &mut [u16] = scratch.take(usize::from(stations))?;
-    let mut parts = Partition::singletons(scratch.take(usize::from(stations))?);
-    for leg in (0..network.chains()).map(|chain| Leg::new(chain, false)) {
-        let (start, end) = (network.start(leg), network.end(leg));
-        degree[usize::from(start)] ^= 1;
-        degree[usize::from(end)] ^= 1;
-        parts.unite(start, end);
+    let odd: &mut [u8] = scratch.take(marks.len())?;
+    for code in 0..2 * network.chains() {
+        odd[usize::from(network.start(Leg::from_code(code)))] ^= 1;
     }
+    let lowest = network.parts(&mut scratch)?;
     marks.fill(EVEN_PART);
-    for station in (0..stations).filter(|&station| degree[usize::from(station)] == 1) {
-        marks[usize::from(parts.find(station))] = NONE;
+    for (&odd, &lowest) in odd.iter().zip(lowest.iter()) {
+        if odd == 1 {
+            marks[usize::from(lowest)] = NONE;
+        }
     }
     let mut count = 0;
-    for station in 0..stations {
-        let lowest = parts.find(station);
+    for (station, (&odd, &lowest)) in (0..).zip(odd.iter().zip(lowest.iter())) {
         count += u32::from(lowest == station);
+        // The lowest comes first, and its mark is asked for until the part's last station.
         marks[usize::from(station)] = marks[usize::from(lowest)];
+        if odd == 1 && lowest != station {
+            marks[usize::from(station)] = station;
+        }
     }
-    for station in (0..stations).filter(|&station| degree[usize::from(station)] == 1) {
-        marks[usize::from(station)] = station;
+    for (station, (&odd, &lowest)) in (0..).zip(odd.iter().zip(lowest.iter())) {
+        if odd == 1 && lowest == station {
+            marks[usize::from(station)] = station;
+        }
     }
     Ok(count)
 }
@@ -264,7 +292,16 @@ fn pair_odd(
     let odd = OddPoints::new(network, stations, options.shape == Shape::OpenPath);
     report.odd_points += u32::from(odd.real_count());
     let partners: &mut [u16] = scratch.take(usize::from(odd.count()))?;
-    greedy::pair(&odd, &mut scratch, pace, partners)?;
+    let exact = match options.method {
+        Method::Greedy => false,
+        Method::Exact => true,
+        Method::Auto => matching::scratch_bytes(partners.len()) <= scratch.available_bytes(),
+    };
+    if exact {
+        report.bound += matching::pair(&odd, scratch, pace, partners)?;
+    } else {
+        greedy::pair(&odd, &mut scratch, pace, partners)?;
+    }
     for (&station, &partner) in stations.iter().zip(partners.iter()) {
         mate[usize::from(station)] = odd.station(partner).unwrap_or(NONE);
     }

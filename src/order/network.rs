@@ -70,6 +70,11 @@ impl<'a> Network<'a> {
         length(self.place(from), self.place(to))
     }
 
+    /// The stations that a chain joins.
+    pub fn ends(&self, chain: u16) -> [u16; 2] {
+        self.ends[usize::from(chain)]
+    }
+
     /// The station at which the leg of a chain begins.
     pub fn start(&self, leg: Leg) -> u16 {
         self.ends[leg.segment()][usize::from(leg.reversed())]
@@ -78,6 +83,17 @@ impl<'a> Network<'a> {
     /// The station at which the leg of a chain ends.
     pub fn end(&self, leg: Leg) -> u16 {
         self.start(leg.flipped())
+    }
+
+    /// For each station the lowest of its part.
+    pub fn parts<'s>(&self, scratch: &mut Scratch<'s>) -> Result<&'s mut [u16], OutOfScratch> {
+        let lowest = scratch.take(usize::from(self.stations()))?;
+        let mut parts = Partition::singletons(lowest);
+        for &[start, end] in self.ends {
+            parts.unite(start, end);
+        }
+        parts.flatten();
+        Ok(lowest)
     }
 
     /// Puts the segments of the chains of `route`, in turn, into `tour`.
@@ -155,15 +171,11 @@ impl<'s, 'a> Survey<'s, 'a> {
             }
             parts.unite(segment.from, segment.to);
         }
-        for point in 0..count as u16 {
-            let lowest = parts.find(point);
-            if degree[usize::from(point)] % 2 == 1 {
+        parts.flatten();
+        for (point, &lowest) in part.iter().enumerate() {
+            if degree[point] % 2 == 1 {
                 degree[usize::from(lowest)] |= HAS_ODD;
             }
-        }
-        for point in 0..count as u16 {
-            let lowest = parts.find(point);
-            parts.flatten(point, lowest);
         }
         Ok(Self { segments: drawing.segments, pen, degree, across, part })
     }

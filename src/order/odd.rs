@@ -1,6 +1,8 @@
 //! The odd points, where the pen must be lifted, and how far they are from each other.
 
+use super::metric::length;
 use super::network::Network;
+use crate::drawing::PagePoint;
 
 /// The odd stations of a network, numbered from 0, and after them, for an open path, two *free
 /// ends*: each is no distance away from any odd point, so that whatever is paired with them begins
@@ -52,5 +54,27 @@ impl<'a> OddPoints<'a> {
             (None, None) => u32::MAX / 4,
             _ => 0,
         }
+    }
+
+    /// No less than this is the length of the move between two odd points, in 1/256 steps; quick.
+    pub fn least_distance(&self, a: u16, b: u16) -> u32 {
+        match (self.station(a), self.station(b)) {
+            (Some(a), Some(b)) => {
+                let (a, b) = (self.network.place(a), self.network.place(b));
+                a.x.abs_diff(b.x).max(a.y.abs_diff(b.y)) << 8
+            }
+            _ => 0,
+        }
+    }
+
+    /// No move is longer than this, in 1/256 steps.
+    pub fn extent(&self) -> u32 {
+        let places = || self.stations.iter().map(|&station| self.network.place(station));
+        let corner =
+            |x: Option<i32>, y: Option<i32>| PagePoint { x: x.unwrap_or(0), y: y.unwrap_or(0) };
+        length(
+            corner(places().map(|p| p.x).min(), places().map(|p| p.y).min()),
+            corner(places().map(|p| p.x).max(), places().map(|p| p.y).max()),
+        )
     }
 }

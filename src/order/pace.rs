@@ -9,12 +9,16 @@ pub(super) struct Pace<'a> {
 }
 
 impl<'a> Pace<'a> {
-    /// Looks of one distance, a few hundred instructions at most on the smallest core, between two
-    /// answers.
-    const UNITS: u32 = 256;
+    /// Distances between two answers: each takes up to 800 instructions on the smallest core.
+    const UNITS: u32 = 200;
 
     pub fn new(attention: &'a mut dyn Attention) -> Self {
         Self { attention, done: 0 }
+    }
+
+    /// Answers now: between two passes over the whole drawing.
+    pub fn answer(&mut self) -> Result<(), Aborted> {
+        self.work(Self::UNITS)
     }
 
     /// Notes `units` of work, each as much as a distance costs.

@@ -33,9 +33,13 @@ impl<'a> Partition<'a> {
         }
     }
 
-    /// Lets `member` point straight at `lowest`, the representative of its set.
-    pub fn flatten(&mut self, member: u16, lowest: u16) {
-        self.parent[usize::from(member)] = lowest;
+    /// Lets every member's parent be the lowest of its set.
+    pub fn flatten(&mut self) {
+        // Parents are lower, so each has been flattened before its children.
+        for member in 0..self.parent.len() {
+            let parent = self.parent[member];
+            self.parent[member] = self.parent[usize::from(parent)];
+        }
     }
 
     /// Makes one set of those of `a` and `b`; says whether they were two.

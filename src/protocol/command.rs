@@ -40,8 +40,6 @@ pub enum Command<'a> {
     Plot,
     /// `$X`
     Unlock,
-    /// `$H`
-    Home,
 }
 
 /// What is drawn, and how.
@@ -61,8 +59,14 @@ pub enum PlotOption {
     Projection(ProjectionChoice),
     /// `$behind=clip|refuse`: what is behind the eye is cut off (`true`), or an error.
     ClipBehind(bool),
-    /// `$hidden=erased|dotted|shown`
+    /// `$hidden=erased|dotted|dashed|shown`
     Hidden(HiddenLines),
+    /// `$seams=on|off`: where faces pass through each other.
+    Seams(bool),
+    /// `$blocks=separate|merged`: whether blocks that touch are one shape (`true`).
+    MergedBlocks(bool),
+    /// `$crease=DEGREES`: edges less sharp are not drawn.
+    Crease(f64),
     /// `$page=WIDTHxHEIGHT` in mm
     Page {
         /// Along x.
@@ -145,6 +149,8 @@ pub enum HiddenLines {
     Erased,
     /// Drawn dotted.
     Dotted,
+    /// Drawn dashed.
+    Dashed,
     /// Drawn like visible ones: a wire frame.
     Shown,
 }
@@ -169,7 +175,10 @@ pub const HELP: &[(&str, &str)] = &[
         "a parallel view by its direction",
     ),
     ("$behind=clip|refuse", "what becomes of what is behind the eye"),
-    ("$hidden=erased|dotted|shown", "what becomes of hidden lines"),
+    ("$hidden=erased|dotted|dashed|shown", "what becomes of hidden lines"),
+    ("$seams=on|off", "whether the lines are drawn where faces pass through each other"),
+    ("$blocks=separate|merged", "whether blocks that touch are drawn as one shape"),
+    ("$crease=DEGREES", "leave out edges between faces that bend less; 0 draws every edge"),
     ("$page=WIDTHxHEIGHT", "size of the sheet in mm"),
     ("$margin=MM", "what stays free on each side of the sheet"),
     ("$fit=on|off", "scale a plan to the page, or draw it at true size"),
@@ -177,7 +186,6 @@ pub const HELP: &[(&str, &str)] = &[
     ("$clear", "forget the model"),
     ("$plot", "draw it"),
     ("$X", "unlock after an alarm"),
-    ("$H", "home"),
 ];
 
 impl<'a> Command<'a> {
@@ -220,7 +228,6 @@ impl<'a> Command<'a> {
             "$" => Ok(Self::Settings),
             "I" => Ok(Self::BuildInfo),
             "X" => Ok(Self::Unlock),
-            "H" => Ok(Self::Home),
             "options" => Ok(Self::Options),
             "model" => Ok(Self::Model),
             "clear" => Ok(Self::Clear),
@@ -251,9 +258,10 @@ impl PlotOption {
             "hidden" => Self::Hidden(match value {
                 "erased" => HiddenLines::Erased,
                 "dotted" => HiddenLines::Dotted,
+                "dashed" => HiddenLines::Dashed,
                 "shown" => HiddenLines::Shown,
                 _ => {
-                    return Err(Refusal::NotAChoice { choices: "erased, dotted or shown" });
+                    return Err(Refusal::NotAChoice { choices: "erased, dotted, dashed or shown" });
                 }
             }),
             "page" => {
@@ -268,16 +276,31 @@ impl PlotOption {
                 }
                 Self::Margin(margin)
             }
-            "fit" => Self::Fit(match value {
-                "on" => true,
-                "off" => false,
-                _ => {
-                    return Err(Refusal::NotAChoice { choices: "on or off" });
-                }
+            "fit" => Self::Fit(on_or_off(value)?),
+            "seams" => Self::Seams(on_or_off(value)?),
+            "blocks" => Self::MergedBlocks(match value {
+                "merged" => true,
+                "separate" => false,
+                _ => return Err(Refusal::NotAChoice { choices: "separate or merged" }),
             }),
+            "crease" => {
+                let [degrees] = values(value)?;
+                if !(0.0..=180.0).contains(&degrees) {
+                    return Err(Refusal::NumberOutOfRange);
+                }
+                Self::Crease(degrees)
+            }
             _ => return Ok(None),
         };
         Ok(Some(option))
+    }
+}
+
+fn on_or_off(text: &str) -> Result<bool, Refusal> {
+    match text {
+        "on" => Ok(true),
+        "off" => Ok(false),
+        _ => Err(Refusal::NotAChoice { choices: "on or off" }),
     }
 }
 
@@ -454,7 +477,7 @@ mod tests {
         assert_eq!(option("$margin=-1"), Err(Refusal::NumberOutOfRange));
         assert_eq!(
             option("$hidden=gone"),
-            Err(Refusal::NotAChoice { choices: "erased, dotted or shown" })
+            Err(Refusal::NotAChoice { choices: "erased, dotted, dashed or shown" })
         );
         assert_eq!(Command::parse("$110=5"), Ok(Command::Setting { name: "110", value: "5" }));
     }

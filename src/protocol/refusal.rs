@@ -2,6 +2,7 @@
 
 use crate::drawing::PageError;
 use crate::fixed::BinaryFraction;
+use crate::machine::{MachineError, SettingError};
 use crate::model::ModelError;
 use crate::stage::OutOfScratch;
 use crate::view::ViewError;
@@ -56,10 +57,14 @@ pub enum Refusal {
     View(ViewError),
     /// The drawing does not go on the page.
     Page(PageError),
-    /// The page is larger than the plotter can reach.
-    PageBeyondReach,
+    /// The machine refused it.
+    Machine(MachineError),
+    /// The setting was refused.
+    Setting(SettingError),
     /// Not enough working memory for this drawing.
     DrawingTooLarge(OutOfScratch),
+    /// More lines than a tour can number.
+    TooManyLines,
     /// The user gave the job up while it was computed.
     Aborted,
 }
@@ -72,6 +77,7 @@ pub const MEANINGS: &[(u16, &str)] = &[
     (8, "the plotter is busy"),
     (9, "locked after an alarm"),
     (11, "line too long"),
+    (15, "beyond the travel"),
     (100, "line is not text"),
     (101, "bytes were lost: wait for each reply"),
     (102, "number out of range"),
@@ -93,9 +99,12 @@ pub const MEANINGS: &[(u16, &str)] = &[
     (130, "margins leave no room on the page"),
     (131, "page has too many steps"),
     (132, "drawing is larger than the page"),
-    (133, "page is larger than the plotter"),
     (140, "drawing too large for the memory"),
     (141, "given up"),
+    (142, "too many lines"),
+    (150, "setting out of range"),
+    (151, "setting conflicts with another"),
+    (152, "move too long"),
 ];
 
 impl Refusal {
@@ -131,9 +140,16 @@ impl Refusal {
             Self::Page(PageError::NoRoom) => 130,
             Self::Page(PageError::TooManySteps) => 131,
             Self::Page(PageError::DoesNotFit { .. }) => 132,
-            Self::PageBeyondReach => 133,
+            Self::Setting(SettingError::Busy) => 8,
+            Self::Setting(SettingError::Unknown) => 3,
+            Self::Setting(SettingError::OutOfRange(_) | SettingError::NotWhole(_)) => 150,
+            Self::Setting(SettingError::Conflict(_)) => 151,
+            Self::Machine(MachineError::State(_)) => 8,
+            Self::Machine(MachineError::BeyondTravel { .. }) => 15,
+            Self::Machine(MachineError::MoveTooLong { .. }) => 152,
             Self::DrawingTooLarge(_) => 140,
             Self::Aborted => 141,
+            Self::TooManyLines => 142,
         }
     }
 }
@@ -147,7 +163,7 @@ impl fmt::Display for Refusal {
             Self::NotANumber => formatter.write_str("a number is written like -12.5 or 3e-2"),
             Self::UnknownSystemCommand => formatter.write_str("$ lists the commands"),
             Self::Busy => formatter.write_str("wait for the plot to end, or send ctrl-X"),
-            Self::Locked => formatter.write_str("send $X to unlock, or $H to home"),
+            Self::Locked => formatter.write_str("send $X to unlock"),
             Self::LineTooLong { limit } => write!(formatter, "a line has at most {limit} bytes"),
             Self::NotText => {
                 formatter.write_str("a byte of the line is no text: check the baud rate")
@@ -192,14 +208,16 @@ impl fmt::Display for Refusal {
                     mm(*height)
                 )
             }
-            Self::PageBeyondReach => {
-                formatter.write_str("make $page smaller, or set the travel ($130, $131)")
-            }
             Self::DrawingTooLarge(OutOfScratch { needed, available }) => {
                 write!(
                     formatter,
                     "{needed} bytes are needed where {available} are free: send a smaller model"
                 )
+            }
+            Self::Setting(error) => write_setting_error(formatter, error),
+            Self::Machine(error) => write_machine_error(formatter, error),
+            Self::TooManyLines => {
+                formatter.write_str("a drawing has at most 32768 lines: send a smaller model")
             }
             Self::Aborted => formatter.write_str("the job was given up"),
         }
@@ -222,6 +240,42 @@ fn write_model_error(formatter: &mut fmt::Formatter<'_>, error: &ModelError) -> 
         ModelError::TooFewCorners { needed } => write!(formatter, "it takes {needed} vertices"),
         ModelError::RepeatedVertex { number } => {
             write!(formatter, "vertex {number} comes twice in a row")
+        }
+    }
+}
+
+fn write_setting_error(formatter: &mut fmt::Formatter<'_>, error: &SettingError) -> fmt::Result {
+    match error {
+        SettingError::Unknown => formatter.write_str("$$ lists the settings"),
+        SettingError::OutOfRange(setting) => {
+            let info = setting.info();
+            write!(
+                formatter,
+                "{} goes from {} to {} {}",
+                info.name, info.least, info.greatest, info.unit
+            )
+        }
+        SettingError::NotWhole(setting) => {
+            write!(formatter, "{} is a whole number", setting.info().name)
+        }
+        SettingError::Conflict(_) => {
+            formatter.write_str("with it the steps would come too fast or the ramps too slow")
+        }
+        SettingError::Busy => formatter.write_str("wait for the plot to end, or send ctrl-X"),
+    }
+}
+
+fn write_machine_error(formatter: &mut fmt::Formatter<'_>, error: &MachineError) -> fmt::Result {
+    match error {
+        MachineError::State(_) => formatter.write_str("wait for the plot to end, or send ctrl-X"),
+        MachineError::BeyondTravel { x, y, .. } => {
+            write!(
+                formatter,
+                "it would go {x},{y} steps beyond the travel: choose a smaller $page, or set $130 and $131"
+            )
+        }
+        MachineError::MoveTooLong { .. } => {
+            formatter.write_str("a single move is at most 16 m long")
         }
     }
 }

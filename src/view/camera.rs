@@ -69,31 +69,66 @@ impl Lens {
 impl Camera {
     /// The three-quarter view that a model gets if the user chooses none: from the right, in front
     /// and above (an oblique view: from in front), so far away that the whole model is well inside
-    /// the field. `None` without vertices.
-    pub fn automatic(model: &Model<'_>, lens: Lens) -> Option<Self> {
+    /// the field. It looks at `at`, or else at the middle. `None` without vertices.
+    pub fn automatic(
+        model: &Model<'_>,
+        lens: Lens,
+        at: Option<Direction>,
+        up: Option<Direction>,
+    ) -> Option<Self> {
         let from = match lens {
             Lens::Oblique { .. } => [0.0, -1.0, 0.0],
             _ => [0.45, -0.75, 0.5],
         };
-        Self::from_direction(model, from, lens)
+        Self::from_direction(model, from, lens, at, up)
     }
 
     /// An axonometric view: from `azimuth` degrees (0 along x, -90 in front) and `elevation` degrees
     /// above the xy plane. Isometric is (-45, 35.264…).
-    pub fn axonometric(model: &Model<'_>, azimuth: f64, elevation: f64) -> Option<Self> {
+    pub fn axonometric(
+        model: &Model<'_>,
+        azimuth: f64,
+        elevation: f64,
+        at: Option<Direction>,
+        up: Option<Direction>,
+    ) -> Option<Self> {
         let (sin_azimuth, cos_azimuth) = sin_cos_degrees(azimuth);
         let (sin_elevation, cos_elevation) = sin_cos_degrees(elevation);
         let from = [cos_azimuth * cos_elevation, sin_azimuth * cos_elevation, sin_elevation];
-        Self::from_direction(model, from, Lens::Orthographic)
+        Self::from_direction(model, from, Lens::Orthographic, at, up)
     }
 
-    fn from_direction(model: &Model<'_>, from: Direction, lens: Lens) -> Option<Self> {
-        let (at, radius) = middle_and_radius(model)?;
-        // At 3.5 radii and more a sphere around the model fills at most 33 degrees.
-        let eye = [0, 1, 2].map(|axis| at[axis] + 3.5 * radius * from[axis]);
-        Some(Self { sight: Sight::Towards { eye, at, up: None }, lens })
+    /// Harrison's view: along the z axis of the turned model (see [`Sight::Turned`]), from `eye`, or
+    /// else from so far away that the whole model is well inside the field.
+    pub fn turned(
+        model: &Model<'_>,
+        lens: Lens,
+        angles: [f64; 3],
+        eye: Option<Direction>,
+    ) -> Option<Self> {
+        let (middle, radius) = middle_and_radius(model)?;
+        let [_, _, forward] = turned(angles);
+        let eye = eye
+            .unwrap_or([0, 1, 2].map(|axis| middle[axis] - EYE_DISTANCE * radius * forward[axis]));
+        Some(Self { sight: Sight::Turned { eye, angles }, lens })
+    }
+
+    fn from_direction(
+        model: &Model<'_>,
+        from: Direction,
+        lens: Lens,
+        at: Option<Direction>,
+        up: Option<Direction>,
+    ) -> Option<Self> {
+        let (middle, radius) = middle_and_radius(model)?;
+        let at = at.unwrap_or(middle);
+        let eye = [0, 1, 2].map(|axis| at[axis] + EYE_DISTANCE * radius * from[axis]);
+        Some(Self { sight: Sight::Towards { eye, at, up }, lens })
     }
 }
+
+/// In radii of the model: a sphere around it fills at most 33 degrees.
+const EYE_DISTANCE: f64 = 3.5;
 
 /// The middle of the model and about how far it reaches from there.
 ///

@@ -2,12 +2,12 @@
 //!
 //! A face that reaches behind the near plane is cut along it (Sutherland & Hodgman, one plane); edges
 //! of neighbours that are cut get the same new vertex. The cut itself is no edge of the model:
-//! visibility draws no edge whose ends both lie on the near plane.
+//! no edge whose ends both lie on the near plane is to be drawn.
 
 use super::View;
 use crate::geometry::Vertex;
 use crate::model::{Corner, Element, Elements, Model, VERTEX_NUMBER_LIMIT};
-use crate::stage::{OutOfScratch, Scratch};
+use crate::stage::{OutOfScratch, Scratch, heap_sort_by_key};
 
 /// A model as the camera sees it.
 #[derive(Debug, Clone, Copy)]
@@ -22,6 +22,7 @@ pub struct Seen<'a> {
 ///
 /// # Errors
 /// [`OutOfScratch`] if the vertices, or the cut faces, do not fit.
+#[inline(never)] // Its frame must not lie under the stages'.
 pub fn see<'a>(
     view: &View,
     model: &'a Model<'_>,
@@ -54,7 +55,7 @@ fn cut<'a>(
     for (key, edge) in keys.iter_mut().zip(elements.iter().flat_map(edges).filter(is_cut)) {
         *key = edge.key();
     }
-    keys.sort_unstable();
+    heap_sort_by_key(keys, |key| *key);
     let keys = without_repeats(keys);
 
     let too_many =
@@ -64,7 +65,10 @@ fn cut<'a>(
     }
     let all = scratch.take::<Vertex>(vertices.len() + keys.len())?;
     let (same, new) = all.split_at_mut(vertices.len());
-    same.copy_from_slice(vertices);
+    for (vertex, original) in same.iter_mut().zip(vertices) {
+        // Vertices behind the plane have no edge any more; visibility wants them before the eye.
+        *vertex = Vertex { z: original.z.max(near), ..*original };
+    }
     for (vertex, key) in new.iter_mut().zip(keys) {
         let ends = [(key >> 16) as usize, (key & 0xFFFF) as usize];
         if let [Some(p), Some(q)] = ends.map(|end| vertices.get(end)) {

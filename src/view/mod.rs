@@ -44,6 +44,7 @@ pub struct View {
     rows: [Row; 3],
     projection: Projection,
     image_unit: f64,
+    depth_stretch: (u32, u32),
     near: Option<i32>,
 }
 
@@ -99,6 +100,7 @@ impl View {
     ///
     /// # Errors
     /// See [`ViewError`].
+    #[inline(never)] // Its frame must not lie under the stages'.
     pub fn new(camera: &Camera, model: &Model<'_>) -> Result<Self, ViewError> {
         let Axes { directions, origin } = Axes::new(camera)?;
         let fraction_bits = model.fraction_bits();
@@ -140,13 +142,27 @@ impl View {
             }
             Projection::Parallel => (1.0 / scale, None),
         };
-        Ok(Self { rows, projection, image_unit, near })
+        let depth_stretch = as_ratio(depth_scale / scale);
+        Ok(Self { rows, projection, image_unit, depth_stretch, near })
     }
 
     /// A position in view coordinates.
     pub fn vertex(&self, position: Position) -> Vertex {
         let [x, y, z] = self.rows.each_ref().map(|row| row.apply(position));
         Vertex { x, y, z }
+    }
+
+    /// Makes sure that every vertex is in front of the eye.
+    ///
+    /// # Errors
+    /// [`ViewError::BehindEye`] with the first that is not.
+    pub fn refuse_behind(&self, model: &Model<'_>) -> Result<(), ViewError> {
+        let near = self.near.unwrap_or(i32::MIN);
+        let is_behind = |position: &Position| self.vertex(*position).z < near;
+        match model.vertices().iter().position(is_behind) {
+            Some(vertex) => Err(ViewError::BehindEye { vertex: vertex + 1 }),
+            None => Ok(()),
+        }
     }
 
     /// Perspective or parallel.
@@ -159,11 +175,24 @@ impl View {
         self.near
     }
 
+    /// How much depth is stretched over width and height, as a ratio of numbers from 1 to 2^20: angles
+    /// between faces need it.
+    pub fn depth_stretch(&self) -> (u32, u32) {
+        self.depth_stretch
+    }
+
     /// What x/w and y/w are multiplied by to give the image plane at distance 1 (perspective) or
     /// model units (parallel, w = 1). For reports; no decision depends on it.
     pub fn image_unit(&self) -> f64 {
         self.image_unit
     }
+}
+
+/// A positive number as a ratio of two whole numbers, each from 1 to 2^20.
+fn as_ratio(value: f64) -> (u32, u32) {
+    const LARGEST: f64 = 1_048_576.0;
+    let part = |value: f64| libm::round(value * LARGEST).max(1.0) as u32;
+    if value < 1.0 { (part(value), LARGEST as u32) } else { (LARGEST as u32, part(1.0 / value)) }
 }
 
 /// A bound of |direction · position| for directions of length 1, in model units.
@@ -266,7 +295,7 @@ mod tests {
     fn a_model_of_any_size_fills_the_range() {
         for size in ["1e-6", "0.001", "1", "12345.678", "1e9"] {
             with_model(&[["0", "0", "0"], [size, "0", "0"], ["0", size, size]], |model| {
-                let camera = Camera::automatic(model, Lens::Perspective).unwrap();
+                let camera = Camera::automatic(model, Lens::Perspective, None, None).unwrap();
                 let view = View::new(&camera, model).unwrap();
                 let seen = model.vertices().iter().map(|p| view.vertex(*p));
                 let widest = seen.map(|v| v.x.abs().max(v.y.abs())).max();
@@ -298,7 +327,7 @@ mod tests {
     #[test]
     fn one_vertex_alone_can_be_seen() {
         with_model(&[["5", "5", "5"]], |model| {
-            let camera = Camera::automatic(model, Lens::Orthographic).unwrap();
+            let camera = Camera::automatic(model, Lens::Orthographic, None, None).unwrap();
             let vertex = View::new(&camera, model).unwrap().vertex(model.vertices()[0]);
             assert!([vertex.x, vertex.y, vertex.z].iter().all(|c| c.abs() <= COORDINATE_LIMIT));
         });
@@ -307,7 +336,8 @@ mod tests {
     #[test]
     fn an_isometric_cube_is_a_regular_hexagon() {
         with_model(&CUBE, |model| {
-            let camera = Camera::axonometric(model, -45.0, 35.264_389_682_754_654).unwrap();
+            let camera =
+                Camera::axonometric(model, -45.0, 35.264_389_682_754_654, None, None).unwrap();
             let view = View::new(&camera, model).unwrap();
             let mut radii = model.vertices().iter().map(|p| view.vertex(*p)).map(|v| {
                 let (x, y) =

@@ -1,3 +1,115 @@
-//! Set-up, build, emulate, flash, size.
+//! Set-up, build, emulate, flash, size: `cargo xtask` lists what it can do.
+//!
+//! Every command sets up what it lacks and says what it installs; what it cannot install it names,
+//! with the command that does. A second run finds everything and installs nothing.
 
-fn main() {}
+mod command;
+mod experiments;
+mod firmware;
+mod set_up;
+mod test;
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+
+use anyhow::Result;
+use clap::{CommandFactory, Parser, Subcommand};
+
+use command::{cargo, run};
+use firmware::Board;
+
+/// Builds, tests and runs penup.
+#[derive(Parser)]
+#[command(bin_name = "cargo xtask", about, disable_help_subcommand = true)]
+struct Arguments {
+    #[command(subcommand)]
+    task: Option<Task>,
+}
+
+#[derive(Subcommand)]
+enum Task {
+    /// Builds a board's firmware and checks the image.
+    Build {
+        /// The board to build for.
+        #[arg(long, value_enum, default_value_t)]
+        board: Board,
+    },
+    /// Plots FILE on the emulated board; the same as `cargo plot`. Its own --help says how.
+    #[command(disable_help_flag = true)]
+    Plot {
+        /// The file, and the options of `penup plot`.
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        arguments: Vec<String>,
+    },
+    /// Repeats Harrison's experiments (his chapter 7), counted in instructions.
+    Experiments,
+    /// Installs what building and testing need.
+    SetUp,
+    /// Runs every check: format, lints, documentation, tests on the host and in the emulator.
+    Test,
+}
+
+fn main() -> ExitCode {
+    match carry_out() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            // Without the backtrace that `Debug` adds: the sentence is for the user.
+            eprintln!("penup: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn carry_out() -> Result<()> {
+    match Arguments::parse().task {
+        None => Arguments::command().print_help()?,
+        Some(Task::Build { board }) => {
+            let image = firmware::build(board)?;
+            println!("{}", firmware::check(board, &image)?);
+        }
+        Some(Task::Plot { arguments }) => plot(&arguments)?,
+        Some(Task::Experiments) => experiments::repeat()?,
+        Some(Task::SetUp) => {
+            for &board in Board::ALL {
+                set_up::toolchain(board.target())?;
+            }
+            set_up::emulator()?;
+            set_up::checkers()?;
+            println!("everything is there");
+        }
+        Some(Task::Test) => test::everything()?,
+    }
+    Ok(())
+}
+
+/// Runs the client, and for an emulated board builds its firmware first.
+fn plot(arguments: &[String]) -> Result<()> {
+    let mut client = client("plot", arguments);
+    let at_a_port = arguments.iter().any(|argument| argument.starts_with("--port"));
+    let asks_only = arguments.iter().any(|argument| ["-h", "--help"].contains(&&**argument));
+    if !at_a_port && !asks_only {
+        let board = Board::from_options(arguments)?;
+        set_up::emulator()?;
+        let image = firmware::build(board)?;
+        firmware::check(board, &image)?;
+    }
+    run(&mut client)
+}
+
+/// The client's command, run where the user stands.
+fn client(command: &str, arguments: &[String]) -> Command {
+    let mut client = cargo();
+    client
+        .args(["run", "--quiet", "--package", "penup-client", "--bin", "penup"])
+        .arg("--manifest-path")
+        .arg(root().join("Cargo.toml"))
+        .args(["--", command])
+        .args(arguments);
+    client
+}
+
+/// The workspace's root.
+fn root() -> PathBuf {
+    let xtask = Path::new(env!("CARGO_MANIFEST_DIR"));
+    xtask.parent().unwrap_or(xtask).to_owned()
+}

@@ -1,0 +1,331 @@
+//! The command line.
+
+use crate::job::{Page, Settings};
+use crate::machines::Board;
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::path::PathBuf;
+
+/// The scene that README shows.
+const EXAMPLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/interpen.obj");
+
+/// Draws solids and line drawings with a penup plotter.
+#[derive(Debug, Parser)]
+#[command(name = "penup", version, propagate_version = true)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Send a file to a plotter, real or emulated, and draw it
+    Plot(PlotArgs),
+    /// Show what would be drawn, without a plotter
+    Preview(PreviewArgs),
+}
+
+/// Options of `penup plot`.
+#[derive(Debug, Args)]
+pub struct PlotArgs {
+    /// The OBJ file to draw [default: two boxes that pass through each other]
+    #[arg(value_name = "FILE", default_value = EXAMPLE, hide_default_value = true)]
+    pub file: PathBuf,
+    /// The board to emulate; the picture is drawn from its pins
+    #[arg(long, value_enum, default_value = "lm3s6965", help_heading = "Plotter")]
+    pub board: Board,
+    /// The serial port of a real plotter, such as /dev/ttyUSB0 or COM3
+    #[arg(long, value_name = "DEVICE", conflicts_with_all = ["board", "svg", "png"], help_heading = "Plotter")]
+    pub port: Option<String>,
+    /// How to see and place it.
+    #[command(flatten)]
+    pub view: ViewArgs,
+    /// Where the pictures go.
+    #[command(flatten)]
+    pub pictures: PictureArgs,
+}
+
+/// Options of `penup preview`.
+#[derive(Debug, Args)]
+pub struct PreviewArgs {
+    /// The OBJ file to show
+    #[arg(value_name = "FILE")]
+    pub file: PathBuf,
+    /// How to see and place it.
+    #[command(flatten)]
+    pub view: ViewArgs,
+    /// Where the pictures go.
+    #[command(flatten)]
+    pub pictures: PictureArgs,
+    /// Write segments, strokes, lengths and times to this file
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    pub json: Option<PathBuf>,
+    /// Run so many times and report the best time of each stage
+    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..),
+          allow_hyphen_values = true, help_heading = "Output")]
+    pub repeat: u32,
+}
+
+/// Where the pictures go. If no output is named: `plot.svg` and `plot.png`.
+#[derive(Debug, Args)]
+pub struct PictureArgs {
+    /// Write the picture as SVG [default: plot.svg and plot.png if no output is named]
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    pub svg: Option<PathBuf>,
+    /// Write the picture as PNG
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    pub png: Option<PathBuf>,
+}
+
+/// Camera and page.
+#[derive(Debug, Args)]
+pub struct ViewArgs {
+    /// Where the eye is [default: a three-quarter view]
+    #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true, help_heading = "Camera")]
+    pub eye: Option<[f64; 3]>,
+    /// The point that the eye looks at [default: the middle of the model]
+    #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true, help_heading = "Camera")]
+    pub at: Option<[f64; 3]>,
+    /// The direction that is up in the picture [default: 0,0,1]
+    #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true, help_heading = "Camera")]
+    pub up: Option<[f64; 3]>,
+    /// Harrison's rotation in degrees: look along z after turning by C about z, B about y, A about x
+    #[arg(long, value_name = "A,B,C", value_parser = triple, allow_hyphen_values = true, help_heading = "Camera")]
+    pub angles: Option<[f64; 3]>,
+    /// perspective, orthographic, cavalier, cabinet, oblique,ANGLE,RATIO, isometric, dimetric, trimetric
+    /// or axonometric,AZIMUTH,ELEVATION
+    #[arg(long, value_parser = projection, default_value = "perspective", allow_hyphen_values = true,
+          help_heading = "Camera")]
+    pub projection: String,
+    /// What becomes of what is behind the eye
+    #[arg(long, value_enum, default_value = "clip", help_heading = "Camera")]
+    pub behind: Behind,
+    /// What to do with hidden lines
+    #[arg(long, value_enum, default_value = "erased", help_heading = "Camera")]
+    pub hidden: Hidden,
+    /// Whether the lines are drawn where faces pass through each other
+    #[arg(long, value_enum, default_value = "on", help_heading = "Camera")]
+    pub seams: Switch,
+    /// Whether blocks that touch are drawn as one shape
+    #[arg(long, value_enum, default_value = "separate", help_heading = "Camera")]
+    pub blocks: Blocks,
+    /// Leave out edges between faces that bend less than so many degrees
+    #[arg(
+        long,
+        value_name = "DEGREES",
+        default_value = "0",
+        allow_hyphen_values = true,
+        help_heading = "Camera"
+    )]
+    pub crease: f64,
+    /// A4, A3, Letter, or width x height in mm, such as 300x200
+    #[arg(long, value_name = "PAGE", value_parser = page, default_value = "A4", allow_hyphen_values = true,
+          help_heading = "Page")]
+    pub page: Page,
+    /// Lay the page on its long side
+    #[arg(long, help_heading = "Page")]
+    pub landscape: bool,
+    /// What stays free on each side, in mm
+    #[arg(long, value_name = "MM", value_parser = margin, default_value = "10", allow_hyphen_values = true,
+          help_heading = "Page")]
+    pub margin: f64,
+    /// Scale a plan to the page, too (solids always are; plans are drawn at true size)
+    #[arg(long, help_heading = "Page")]
+    pub fit: bool,
+}
+
+impl ViewArgs {
+    /// What they say, for the plotter.
+    pub fn settings(&self) -> Settings {
+        let Page { width, height } = self.page;
+        let page = if self.landscape {
+            Page { width: width.max(height), height: width.min(height) }
+        } else {
+            self.page
+        };
+        Settings {
+            eye: self.eye,
+            at: self.at,
+            up: self.up,
+            angles: self.angles,
+            projection: self.projection.clone(),
+            behind: match self.behind {
+                Behind::Clip => "clip",
+                Behind::Refuse => "refuse",
+            },
+            seams: match self.seams {
+                Switch::On => "on",
+                Switch::Off => "off",
+            },
+            blocks: match self.blocks {
+                Blocks::Separate => "separate",
+                Blocks::Merged => "merged",
+            },
+            crease: self.crease,
+            hidden: match self.hidden {
+                Hidden::Erased => "erased",
+                Hidden::Dotted => "dotted",
+                Hidden::Dashed => "dashed",
+                Hidden::Shown => "shown",
+            },
+            page,
+            margin: self.margin,
+            fit: self.fit,
+        }
+    }
+}
+
+/// The plotter's own parser says whether this is a projection.
+fn projection(text: &str) -> Result<String, String> {
+    match penup::protocol::Command::parse(&format!("$projection={text}")) {
+        Ok(_) => Ok(text.to_owned()),
+        Err(refusal) => Err(refusal.to_string()),
+    }
+}
+
+/// Whether blocks that touch are one shape.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Blocks {
+    /// Each has all its edges
+    Separate,
+    /// No line is drawn between two faces in one plane
+    Merged,
+}
+
+/// On or off.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Switch {
+    /// Yes
+    On,
+    /// No
+    Off,
+}
+
+/// What becomes of what is behind the eye.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Behind {
+    /// It is cut off
+    Clip,
+    /// Nothing is drawn
+    Refuse,
+}
+
+/// What is done with hidden lines.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Hidden {
+    /// Not drawn.
+    Erased,
+    /// Drawn dotted.
+    Dotted,
+    /// Drawn dashed
+    Dashed,
+    /// Drawn like the others.
+    Shown,
+}
+
+fn number(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(number) if number.is_finite() => Ok(number),
+        _ => Err(format!("\"{text}\" is not a number")),
+    }
+}
+
+fn triple(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Result<Vec<f64>, String> = text.split(',').map(number).collect();
+    <[f64; 3]>::try_from(numbers?).map_err(|numbers| {
+        format!("three numbers with commas between them are needed, not {}", numbers.len())
+    })
+}
+
+fn page(text: &str) -> Result<Page, String> {
+    let (width, height) = match text.to_ascii_lowercase().as_str() {
+        "a4" => (210.0, 297.0),
+        "a3" => (297.0, 420.0),
+        "letter" => (215.9, 279.4),
+        other => {
+            let (width, height) = other
+                .split_once('x')
+                .ok_or("it is none of A4, A3, Letter, or width x height in mm such as 300x200")?;
+            (number(width)?, number(height)?)
+        }
+    };
+    if width > 0.0 && height > 0.0 {
+        Ok(Page { width, height })
+    } else {
+        Err("a page has a width and a height above 0".to_owned())
+    }
+}
+
+fn margin(text: &str) -> Result<f64, String> {
+    match number(text)? {
+        margin if margin >= 0.0 => Ok(margin),
+        _ => Err("a margin cannot be negative".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    fn settings(options: &[&str]) -> Result<Settings, String> {
+        let line = ["penup", "preview", "f.obj"].iter().chain(options);
+        let cli = Cli::try_parse_from(line).map_err(|error| error.to_string())?;
+        match cli.command {
+            Command::Preview(args) => Ok(args.view.settings()),
+            Command::Plot(_) => Err("the wrong command".to_owned()),
+        }
+    }
+
+    #[test]
+    fn the_options_do_not_contradict_each_other() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn negative_numbers_work_with_a_space_and_with_an_equals_sign() {
+        let spaced = settings(&["--eye", "-3,-4,2.5", "--at", "-.5,0,-1e-1", "--up", "-1,-2,-3"]);
+        let joined = settings(&["--eye=-3,-4,2.5", "--at=-.5,0,-1e-1", "--up=-1,-2,-3"]);
+        assert_eq!(spaced, joined);
+        let settings = spaced.expect("good options");
+        assert_eq!(settings.eye, Some([-3.0, -4.0, 2.5]));
+        assert_eq!(settings.at, Some([-0.5, 0.0, -0.1]));
+        assert_eq!(settings.up, Some([-1.0, -2.0, -3.0]));
+    }
+
+    #[test]
+    fn pages_have_names_or_sizes_and_lie_either_way() {
+        let size = |options: &[&str]| {
+            let page = settings(options).expect("good options").page;
+            (page.width, page.height)
+        };
+        assert_eq!(size(&[]), (210.0, 297.0));
+        assert_eq!(size(&["--landscape"]), (297.0, 210.0));
+        assert_eq!(size(&["--page", "a3"]), (297.0, 420.0));
+        assert_eq!(size(&["--page=Letter", "--landscape"]), (279.4, 215.9));
+        assert_eq!(size(&["--page", "80.5x60"]), (80.5, 60.0));
+        assert_eq!(size(&["--page", "60X80", "--landscape"]), (80.0, 60.0));
+    }
+
+    #[test]
+    fn nonsense_is_refused_with_the_reason() {
+        for (options, reason) in [
+            (["--eye", "1,2"], "three numbers"),
+            (["--eye", "1,2,3,4"], "three numbers"),
+            (["--eye", "1,,3"], "\"\" is not a number"),
+            (["--at", "1,2,nan"], "\"nan\" is not a number"),
+            (["--up", "--fit"], "\"--fit\" is not a number"),
+            (["--page", "B5"], "none of A4"),
+            (["--page", "-10x20"], "above 0"),
+            (["--page", "10xinf"], "\"inf\" is not a number"),
+            (["--margin", "-1"], "cannot be negative"),
+            (["--repeat", "0"], "0 is not in 1.."),
+            (["--repeat", "-1"], "-1 is not in 1.."),
+            (["--hidden", "gone"], "erased, dotted, dashed, shown"),
+        ] {
+            let error = settings(&options).expect_err("refused");
+            assert!(error.contains(reason), "{options:?}: {error}");
+        }
+    }
+}

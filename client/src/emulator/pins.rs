@@ -1,0 +1,241 @@
+//! The board's pins, and what their changes mean for the machine.
+
+use std::time::Duration;
+
+/// A pin of the plotter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Pin {
+    /// A rising edge steps x.
+    StepX,
+    /// High: x counts up.
+    DirX,
+    /// A rising edge steps y.
+    StepY,
+    /// High: y counts up.
+    DirY,
+    /// Low: the motors have current.
+    Enable,
+    /// High: the pen is down.
+    Pen,
+}
+
+impl Pin {
+    /// The pin with this number on the board's port.
+    pub(super) fn of_port(number: u32) -> Option<Self> {
+        Some(match number {
+            0 => Self::StepX,
+            1 => Self::DirX,
+            2 => Self::StepY,
+            3 => Self::DirY,
+            4 => Self::Enable,
+            5 => Self::Pen,
+            _ => return None,
+        })
+    }
+}
+
+/// A pin took another level.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PinChange {
+    /// Which.
+    pub pin: Pin,
+    /// To which level.
+    pub high: bool,
+    /// When, on the board's clock: its last reading before the change. The step interrupt reads it
+    /// as it begins, so all changes of one interrupt have one time, exact to a cycle of 20 ns, and
+    /// the pins follow it by the same few instructions each time.
+    pub at: Duration,
+}
+
+/// Something that the machine did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MachineEvent {
+    /// What.
+    pub kind: MachineEventKind,
+    /// When, as in [`PinChange::at`].
+    pub at: Duration,
+}
+
+/// What a machine does, by its pins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MachineEventKind {
+    /// A single step on one axis or both at once, each -1, 0 or 1.
+    Step {
+        /// To the right.
+        x: i8,
+        /// Up.
+        y: i8,
+    },
+    /// The pen was lowered or raised.
+    Pen {
+        /// Lowered.
+        down: bool,
+    },
+    /// The motors' current was turned on or off.
+    Drivers {
+        /// On.
+        on: bool,
+    },
+}
+
+/// Folds changes of pins into what the machine did.
+///
+/// Both axes' steps at one instant are one event, so an event is out when the next one begins:
+/// [`Machine::change`] gives the event before, [`Machine::last`] the last.
+///
+/// ```
+/// use penup_client::emulator::{Machine, MachineEventKind::Step, Pin, PinChange};
+/// use std::time::Duration;
+///
+/// let change = |pin, high| PinChange { pin, high, at: Duration::ZERO };
+/// let mut machine = Machine::default();
+/// assert_eq!(machine.change(change(Pin::DirX, true)), None);
+/// assert_eq!(machine.change(change(Pin::StepX, true)), None);
+/// assert_eq!(machine.change(change(Pin::StepY, true)), None);
+/// let step = machine.last().map(|event| event.kind);
+/// assert_eq!(step, Some(Step { x: 1, y: -1 }));
+/// assert_eq!(machine.position(), (1, -1));
+/// ```
+#[derive(Debug, Clone, Default)]
+pub struct Machine {
+    up_x: bool,
+    up_y: bool,
+    pen_down: bool,
+    position: (i32, i32),
+    /// The last event, which may still gain the step of the other axis.
+    waiting: Option<MachineEvent>,
+}
+
+impl Machine {
+    /// Takes the next change; gives the event before the one that it belongs to.
+    pub fn change(&mut self, change: PinChange) -> Option<MachineEvent> {
+        let PinChange { pin, high, at } = change;
+        let kind = match pin {
+            Pin::DirX => {
+                self.up_x = high;
+                return None;
+            }
+            Pin::DirY => {
+                self.up_y = high;
+                return None;
+            }
+            Pin::StepX | Pin::StepY if !high => return None,
+            Pin::StepX => self.step(direction(self.up_x), 0),
+            Pin::StepY => self.step(0, direction(self.up_y)),
+            Pin::Enable => MachineEventKind::Drivers { on: !high },
+            Pin::Pen => {
+                self.pen_down = high;
+                MachineEventKind::Pen { down: high }
+            }
+        };
+        if let Some(waiting) = &mut self.waiting
+            && waiting.at == at
+            && let Some(diagonal) = joined(waiting.kind, kind)
+        {
+            waiting.kind = diagonal;
+            return None;
+        }
+        self.waiting.replace(MachineEvent { kind, at })
+    }
+
+    fn step(&mut self, x: i8, y: i8) -> MachineEventKind {
+        self.position.0 += i32::from(x);
+        self.position.1 += i32::from(y);
+        MachineEventKind::Step { x, y }
+    }
+
+    /// The last event, when no more changes come.
+    pub fn last(&mut self) -> Option<MachineEvent> {
+        self.waiting.take()
+    }
+
+    /// The sum of all steps, x and y.
+    pub fn position(&self) -> (i32, i32) {
+        self.position
+    }
+
+    /// Whether the pen is down.
+    pub fn pen_is_down(&self) -> bool {
+        self.pen_down
+    }
+}
+
+fn direction(up: bool) -> i8 {
+    if up { 1 } else { -1 }
+}
+
+/// The diagonal step of two steps on different axes.
+fn joined(first: MachineEventKind, second: MachineEventKind) -> Option<MachineEventKind> {
+    let (MachineEventKind::Step { x: x1, y: y1 }, MachineEventKind::Step { x: x2, y: y2 }) =
+        (first, second)
+    else {
+        return None;
+    };
+    let different_axes = x1 * x2 == 0 && y1 * y2 == 0;
+    different_axes.then_some(MachineEventKind::Step { x: x1 + x2, y: y1 + y2 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use MachineEventKind::{Drivers, Pen, Step};
+
+    /// The events of changes, each at a number of microseconds.
+    fn folded(changes: &[(u64, Pin, bool)]) -> Vec<(u64, MachineEventKind)> {
+        let mut machine = Machine::default();
+        let mut events: Vec<_> = changes
+            .iter()
+            .filter_map(|&(at, pin, high)| {
+                let at = Duration::from_micros(at);
+                machine.change(PinChange { pin, high, at })
+            })
+            .collect();
+        events.extend(machine.last());
+        events.iter().map(|event| (event.at.as_micros() as u64, event.kind)).collect()
+    }
+
+    #[test]
+    fn a_stroke_in_its_order() {
+        let events = folded(&[
+            (0, Pin::Enable, false),
+            (1, Pin::Pen, true),
+            (2, Pin::DirX, true),
+            (3, Pin::StepX, true),
+            (4, Pin::StepX, false),
+            (5, Pin::StepX, true),
+            (5, Pin::StepY, true),
+            (6, Pin::StepX, false),
+            (6, Pin::StepY, false),
+            (7, Pin::Pen, false),
+            (8, Pin::Enable, true),
+        ]);
+        let expected = [
+            (0, Drivers { on: true }),
+            (1, Pen { down: true }),
+            (3, Step { x: 1, y: 0 }),
+            (5, Step { x: 1, y: -1 }),
+            (7, Pen { down: false }),
+            (8, Drivers { on: false }),
+        ];
+        assert_eq!(events, expected);
+    }
+
+    #[test]
+    fn steps_at_two_instants_or_of_one_axis_are_two() {
+        let events = folded(&[
+            (1, Pin::StepX, true),
+            (2, Pin::StepY, true),
+            (2, Pin::StepY, false),
+            (2, Pin::StepY, true),
+        ]);
+        let expected =
+            [(1, Step { x: -1, y: 0 }), (2, Step { x: 0, y: -1 }), (2, Step { x: 0, y: -1 })];
+        assert_eq!(events, expected);
+    }
+
+    #[test]
+    fn nothing_of_nothing() {
+        assert_eq!(folded(&[]), []);
+        assert_eq!(folded(&[(0, Pin::DirX, true), (1, Pin::StepX, false)]), []);
+    }
+}

@@ -1,0 +1,262 @@
+//! The QEMU process, and the threads that read what it prints.
+
+use std::io::{self, BufRead, BufReader, Read};
+use std::net::{TcpListener, TcpStream};
+use std::path::Path;
+use std::process::{Child, ChildStderr, ChildStdout, Command, Stdio};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, mpsc};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+use std::{fmt, fs};
+
+use super::trace::{EVENTS, Trace, TraceError};
+use super::{EmulatorError, Options, log};
+
+/// A running QEMU. Dropping it ends it.
+pub struct Process {
+    child: Child,
+    shared: Arc<Shared>,
+    readers: Vec<JoinHandle<()>>,
+}
+
+/// What the reading threads tell.
+#[derive(Default)]
+struct Shared {
+    state: Mutex<State>,
+    changed: Condvar,
+}
+
+#[derive(Default)]
+struct State {
+    trace: Trace,
+    log: Vec<String>,
+    error: Option<TraceError>,
+    ended: bool,
+}
+
+impl Shared {
+    /// A reader that panicked has left nothing half done: each takes whole lines.
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl fmt::Debug for Process {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Process").field(&self.child.id()).finish()
+    }
+}
+
+impl Process {
+    /// Boots `image`; gives the process and the board's serial line.
+    pub fn start(
+        image: &Path,
+        options: Options,
+        patience: Duration,
+    ) -> Result<(Self, TcpStream), EmulatorError> {
+        let bytes = fs::read(image).map_err(|_| EmulatorError::NoImage { path: image.into() })?;
+        let table = log::table(&bytes)?;
+        let listener = TcpListener::bind("127.0.0.1:0")?;
+        let port = listener.local_addr()?.port();
+        let shared = Arc::<Shared>::default();
+
+        let (sender, started) = mpsc::channel();
+        let command = command(image, options, port);
+        let traced = Arc::clone(&shared);
+        // Linux ends QEMU with the thread that started it, so that is the one that outlives it.
+        let tracer = thread::spawn(move || spawn_and_trace(command, &sender, &traced));
+        let (child, stdout) = match started.recv() {
+            Ok(Ok(spawned)) => spawned,
+            Ok(Err(error)) => return Err(EmulatorError::NotInstalled(error)),
+            Err(_) => return Err(io::Error::from(io::ErrorKind::BrokenPipe).into()),
+        };
+        let logged = Arc::clone(&shared);
+        let logger = thread::spawn(move || read_log(table.as_ref(), stdout, &logged));
+        let mut process = Self { child, shared, readers: vec![tracer, logger] };
+        let line = process.connect(&listener, patience)?;
+        Ok((process, line))
+    }
+
+    /// Waits for QEMU to open the serial line.
+    fn connect(
+        &mut self,
+        listener: &TcpListener,
+        patience: Duration,
+    ) -> Result<TcpStream, EmulatorError> {
+        listener.set_nonblocking(true)?;
+        let deadline = Instant::now() + patience;
+        loop {
+            match listener.accept() {
+                Ok((line, _)) => {
+                    line.set_nonblocking(false)?;
+                    return Ok(line);
+                }
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
+                Err(error) => return Err(error.into()),
+            }
+            let ended = self.child.try_wait()?;
+            if ended.is_some_and(|status| status.code() == Some(NOT_FOUND)) {
+                let not_found = io::Error::from(io::ErrorKind::NotFound);
+                return Err(EmulatorError::NotInstalled(not_found));
+            }
+            if ended.is_some() || Instant::now() > deadline {
+                // All that it has said is in when its readers have ended.
+                self.end();
+                return Err(self.ended());
+            }
+            thread::sleep(Duration::from_millis(2));
+        }
+    }
+
+    /// Waits until `ready`, then does `work` on the trace.
+    pub fn with_trace<T>(
+        &self,
+        patience: Duration,
+        ready: impl Fn(&Trace) -> bool,
+        work: impl FnOnce(&mut Trace) -> T,
+    ) -> Result<T, EmulatorError> {
+        let waits =
+            |state: &mut State| state.error.is_none() && !state.ended && !ready(&state.trace);
+        let (mut state, _) = self
+            .shared
+            .changed
+            .wait_timeout_while(self.shared.lock(), patience, waits)
+            .unwrap_or_else(PoisonError::into_inner);
+        if let Some(error) = state.error.take() {
+            return Err(error.into());
+        }
+        if !ready(&state.trace) {
+            let said = state.trace.said();
+            return Err(EmulatorError::Ended { said });
+        }
+        Ok(work(&mut state.trace))
+    }
+
+    pub fn take_log(&self) -> Vec<String> {
+        std::mem::take(&mut self.shared.lock().log)
+    }
+
+    pub fn said(&self) -> String {
+        self.shared.lock().trace.said()
+    }
+
+    pub fn id(&self) -> u32 {
+        self.child.id()
+    }
+
+    fn ended(&self) -> EmulatorError {
+        EmulatorError::Ended { said: self.said() }
+    }
+
+    fn end(&mut self) {
+        // Both fail only if it has ended by itself.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+        for reader in self.readers.drain(..) {
+            // A reader's panic has been printed, and there is nothing left to read.
+            let _ = reader.join();
+        }
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
+
+/// QEMU's command line: serial line to `port`, log to its standard output, trace to its standard
+/// error.
+fn command(image: &Path, options: Options, port: u16) -> Command {
+    let mut command = quitting_with_parent("qemu-system-arm");
+    command
+        .args(["-machine", "lm3s6965evb", "-display", "none", "-monitor", "none"])
+        .arg("-icount")
+        .arg(format!("shift={},sleep=off", options.instruction_shift))
+        .arg("-chardev")
+        .arg(format!("socket,id=uart,host=127.0.0.1,port={port},server=off,nodelay=on"))
+        .args(["-serial", "chardev:uart"])
+        .args(["-chardev", "stdio,id=log,signal=off"])
+        .args(["-semihosting-config", "enable=on,target=native,chardev=log"]);
+    for event in EVENTS {
+        command.args(["-trace", event]);
+    }
+    command.arg("-kernel").arg(image);
+    command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    // Ctrl-C at the terminal is for this process, which ends QEMU when it is done with it.
+    #[cfg(unix)]
+    std::os::unix::process::CommandExt::process_group(&mut command, 0);
+    command
+}
+
+/// On Linux, a command that the kernel ends with the thread that started it.
+fn quitting_with_parent(program: &str) -> Command {
+    const SETPRIV: &str = "/usr/bin/setpriv";
+    if cfg!(target_os = "linux") && Path::new(SETPRIV).exists() {
+        let mut command = Command::new(SETPRIV);
+        command.args(["--pdeathsig", "KILL", program]);
+        return command;
+    }
+    Command::new(program)
+}
+
+/// What setpriv, as a shell, exits with when there is no such program.
+const NOT_FOUND: i32 = 127;
+
+type Spawned = io::Result<(Child, ChildStdout)>;
+
+fn spawn_and_trace(mut command: Command, sender: &mpsc::Sender<Spawned>, shared: &Shared) {
+    let (spawned, stderr) = match spawn(&mut command) {
+        Ok((child, stdout, stderr)) => (Ok((child, stdout)), Some(stderr)),
+        Err(error) => (Err(error), None),
+    };
+    if sender.send(spawned).is_ok()
+        && let Some(stderr) = stderr
+    {
+        read_trace(stderr, shared);
+    }
+}
+
+fn spawn(command: &mut Command) -> io::Result<(Child, ChildStdout, ChildStderr)> {
+    let mut child = command.spawn()?;
+    match (child.stdout.take(), child.stderr.take()) {
+        (Some(stdout), Some(stderr)) => Ok((child, stdout, stderr)),
+        _ => Err(io::ErrorKind::BrokenPipe.into()),
+    }
+}
+
+/// Takes the trace in until QEMU ends.
+fn read_trace(stderr: ChildStderr, shared: &Shared) {
+    let mut lines = BufReader::with_capacity(1 << 16, stderr);
+    let mut line = String::new();
+    loop {
+        line.clear();
+        // A line that is no UTF-8 ends the trace as the end of QEMU does.
+        let count = lines.read_line(&mut line).unwrap_or(0);
+        let mut state = shared.lock();
+        if count == 0 {
+            state.ended = true;
+        } else if let Err(error) = state.trace.line(line.trim_end()) {
+            state.error.get_or_insert(error);
+        }
+        drop(state);
+        // Waking at every line would cost more than reading it; the last one read wakes.
+        if count == 0 || !lines.buffer().contains(&b'\n') {
+            shared.changed.notify_all();
+        }
+        if count == 0 {
+            return;
+        }
+    }
+}
+
+/// Takes the log in until QEMU ends. Without a table it is only read away, lest QEMU waits.
+fn read_log(table: Option<&defmt_decoder::Table>, mut stdout: ChildStdout, shared: &Shared) {
+    match table {
+        Some(table) => log::decode(table, stdout, |line| shared.lock().log.push(line)),
+        None => {
+            let mut nowhere = [0; 1024];
+            while stdout.read(&mut nowhere).is_ok_and(|count| count > 0) {}
+        }
+    }
+}

@@ -1,0 +1,226 @@
+//! QEMU's trace, line by line: pins, the clock, the bytes that the board sent.
+//!
+//! The events and how QEMU 7.2 prints them:
+//!
+//! ```text
+//! pl061_set_output /machine/unattached/device[9] setting output 4 to 1
+//! systick_read systick read addr 0x8 data 0xffe72e size 4
+//! systick_write systick write addr 0x8 data 0x0 size 4
+//! systick_timer_tick systick reload
+//! pl011_write addr 0x000 value 0x0000006f
+//! ```
+//!
+//! The board's clock is SysTick, which counts down from 2^24 - 1 and begins again. Whatever reads it
+//! tells the time here, and every new beginning is traced, so no gap is too long.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use super::pins::{Pin, PinChange};
+
+/// The events to trace.
+pub const EVENTS: [&str; 5] =
+    ["pl061_set_output", "systick_read", "systick_write", "systick_timer_tick", "pl011_write"];
+
+const CLOCK_BITS: u32 = 24;
+const CYCLE: Duration = Duration::from_nanos(20);
+/// SysTick's register for the present count.
+const CURRENT: u32 = 0x8;
+/// The serial line's data register.
+const DATA: u32 = 0;
+/// Lines of QEMU itself that are kept.
+const SAID_LINES: usize = 20;
+
+/// A line of the trace that cannot be read.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TraceError {
+    /// The line.
+    pub line: String,
+}
+
+/// What the trace has told.
+#[derive(Debug, Default)]
+pub struct Trace {
+    pins: Vec<PinChange>,
+    /// The port of the first change: the board uses one.
+    port: Option<String>,
+    /// Cycles before SysTick was last cleared, at a start of the firmware.
+    cycles_before_start: u64,
+    wraps: u64,
+    cycles: u64,
+    sent: u64,
+    said: VecDeque<String>,
+}
+
+impl Trace {
+    /// Takes a line in.
+    pub fn line(&mut self, line: &str) -> Result<(), TraceError> {
+        let mut words = line.split_ascii_whitespace();
+        let understood = match words.next() {
+            Some("pl061_set_output") => self.pin(words),
+            Some("systick_read") => self.clock_read(words),
+            Some("systick_write") => self.clock_write(words),
+            Some("systick_timer_tick") => {
+                self.wraps += 1;
+                Some(())
+            }
+            Some("pl011_write") => self.byte(words),
+            _ => {
+                self.say(line);
+                Some(())
+            }
+        };
+        understood.ok_or_else(|| TraceError { line: line.into() })
+    }
+
+    fn pin<'a>(&mut self, mut words: impl Iterator<Item = &'a str>) -> Option<()> {
+        let port = words.next()?;
+        if self.port.get_or_insert_with(|| port.into()) != port {
+            return None;
+        }
+        let number = words.nth(2)?.parse().ok()?;
+        let high = words.nth(1)? == "1";
+        let pin = Pin::of_port(number)?;
+        let at = self.clock();
+        self.pins.push(PinChange { pin, high, at });
+        Some(())
+    }
+
+    fn clock_read<'a>(&mut self, words: impl Iterator<Item = &'a str>) -> Option<()> {
+        let (register, count) = register_and_value(words, "addr", "data")?;
+        if register == CURRENT {
+            let passed = u64::from(!count & ((1 << CLOCK_BITS) - 1));
+            self.cycles = self.cycles_before_start + (self.wraps << CLOCK_BITS) + passed;
+        }
+        Some(())
+    }
+
+    fn clock_write<'a>(&mut self, words: impl Iterator<Item = &'a str>) -> Option<()> {
+        let (register, _) = register_and_value(words, "addr", "data")?;
+        if register == CURRENT {
+            self.cycles_before_start = self.cycles;
+            self.wraps = 0;
+        }
+        Some(())
+    }
+
+    fn byte<'a>(&mut self, words: impl Iterator<Item = &'a str>) -> Option<()> {
+        let (register, _) = register_and_value(words, "addr", "value")?;
+        self.sent += u64::from(register == DATA);
+        Some(())
+    }
+
+    fn say(&mut self, line: &str) {
+        if self.said.len() == SAID_LINES {
+            self.said.pop_front();
+        }
+        self.said.push_back(line.into());
+    }
+
+    /// The changes since last taken.
+    pub fn take_pins(&mut self) -> Vec<PinChange> {
+        std::mem::take(&mut self.pins)
+    }
+
+    /// The last reading of the clock.
+    pub fn clock(&self) -> Duration {
+        Duration::from_nanos(self.cycles * CYCLE.as_nanos() as u64)
+    }
+
+    /// Bytes that the board has sent.
+    pub fn sent(&self) -> u64 {
+        self.sent
+    }
+
+    /// What QEMU itself printed last.
+    pub fn said(&self) -> String {
+        Vec::from(self.said.clone()).join("\n")
+    }
+}
+
+/// The two hexadecimal numbers that follow the words `register` and `value`.
+fn register_and_value<'a>(
+    mut words: impl Iterator<Item = &'a str>,
+    register: &str,
+    value: &str,
+) -> Option<(u32, u32)> {
+    let mut after = |name: &str| {
+        words.find(|&word| word == name)?;
+        u32::from_str_radix(words.next()?.strip_prefix("0x")?, 16).ok()
+    };
+    Some((after(register)?, after(value)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn traced(lines: &str) -> Trace {
+        let mut trace = Trace::default();
+        for line in lines.lines() {
+            assert_eq!(trace.line(line), Ok(()));
+        }
+        trace
+    }
+
+    #[test]
+    fn pins_bear_the_last_reading_of_the_clock() {
+        let mut trace = traced(
+            "systick_write systick write addr 0x8 data 0x0 size 4\n\
+             systick_read systick read addr 0x8 data 0xfffffe size 4\n\
+             pl061_set_output /machine/unattached/device[9] setting output 5 to 1\n\
+             systick_timer_tick systick reload\n\
+             systick_read systick read addr 0x8 data 0xffffff size 4\n\
+             pl061_set_output /machine/unattached/device[9] setting output 0 to 0\n",
+        );
+        let pen_down = PinChange { pin: Pin::Pen, high: true, at: CYCLE };
+        let step_over = PinChange { pin: Pin::StepX, high: false, at: CYCLE * (1 << 24) };
+        assert_eq!(trace.take_pins(), [pen_down, step_over]);
+        assert_eq!(trace.take_pins(), []);
+    }
+
+    #[test]
+    fn time_goes_on_over_a_reset() {
+        let trace = traced(
+            "systick_read systick read addr 0x8 data 0xfffff0 size 4\n\
+             systick_write systick write addr 0x8 data 0x0 size 4\n\
+             systick_read systick read addr 0x8 data 0xfffff0 size 4\n",
+        );
+        assert_eq!(trace.clock(), CYCLE * 30);
+    }
+
+    #[test]
+    fn only_data_counts_as_sent() {
+        let trace = traced(
+            "pl011_write addr 0x030 value 0x00000301\n\
+             pl011_write addr 0x000 value 0x0000006f\n\
+             pl011_write addr 0x000 value 0x0000006b reg DR\n",
+        );
+        assert_eq!(trace.sent(), 2);
+    }
+
+    #[test]
+    fn other_lines_are_what_the_emulator_says() {
+        let lines: Vec<_> = (0..30).map(|number| format!("warning {number}")).collect();
+        let said = traced(&lines.join("\n")).said();
+        assert!(said.starts_with("warning 10\n") && said.ends_with("warning 29"));
+    }
+
+    #[test]
+    fn what_cannot_be_read_is_refused() {
+        for line in [
+            "pl061_set_output",
+            "pl061_set_output /machine/x setting output 6 to 1",
+            "pl061_set_output /machine/x setting output five to 1",
+            "systick_read systick read addr 0x8 data",
+            "systick_read systick read addr 0x8 data 12",
+            "pl011_write value 0x1 addr 0x0",
+        ] {
+            let refused = TraceError { line: line.into() };
+            assert_eq!(Trace::default().line(line), Err(refused), "{line}");
+        }
+        let mut trace = traced("pl061_set_output /machine/b setting output 0 to 1");
+        let other_port = "pl061_set_output /machine/a setting output 0 to 1";
+        assert!(trace.line(other_port).is_err());
+    }
+}

@@ -1,0 +1,173 @@
+//! What can go wrong between a file and its picture, in words that say what to do.
+
+use crate::protocol::{RECEIVE_WINDOW, meaning};
+use crate::source::{JobLine, Origin};
+use std::io;
+use std::time::Duration;
+
+/// Why there is no drawing.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The file cannot be read.
+    #[error("cannot read {file}: {source}")]
+    File {
+        /// As the user named it.
+        file: String,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// The file's name does not say that it is one that penup reads.
+    #[error("{file}: penup reads Wavefront OBJ files, whose names end in .obj")]
+    Extension {
+        /// As the user named it.
+        file: String,
+    },
+    /// A file must not command the machine.
+    #[error("{}:{}: a file cannot hold commands for the plotter\n    {}", origin.file, origin.line, origin.text)]
+    CommandInFile {
+        /// Where it stands.
+        origin: Origin,
+    },
+    /// The port cannot be opened.
+    #[error(
+        "cannot open {device}: {source}\nIs it the right port, is the plotter plugged in, may you use the port \
+         (on Linux: group dialout), and does no other program hold it?"
+    )]
+    Port {
+        /// As the user named it.
+        device: String,
+        /// What the system says.
+        source: serialport::Error,
+    },
+    /// The emulated board or the board in memory could not be started.
+    #[error("cannot start the {board} board: {reason}")]
+    Board {
+        /// Its name.
+        board: String,
+        /// Why.
+        reason: String,
+    },
+    /// Nothing was heard.
+    #[error(
+        "the plotter does not answer ({} s without a byte{})\nIs it powered, is it the right port, and does it run \
+         penup at 115200 baud?", patience.as_secs_f32(), waiting_for(line.as_deref())
+    )]
+    Silent {
+        /// How long was waited.
+        patience: Duration,
+        /// The line that it did not answer, if it had been answering before.
+        line: Option<Box<JobLine>>,
+    },
+    /// Bytes come, but not penup's.
+    #[error(
+        "what answers is not penup{}\nIs it the right port, and does the plotter run penup at 115200 baud?",
+        said(heard)
+    )]
+    NotPenup {
+        /// The last thing that it said.
+        heard: String,
+    },
+    /// It is doing something else.
+    #[error("the plotter is not ready: it reports {state}\n{}", remedy(state))]
+    NotReady {
+        /// Its state.
+        state: String,
+    },
+    /// It answers status queries, but a line's answer never came.
+    #[error(
+        "the plotter is alive but never answered{}: bytes were lost on the line\nCheck the cable, and that nothing \
+         else uses the port; a penup plotter takes {RECEIVE_WINDOW} bytes without a pause", waiting_for(line.as_deref())
+    )]
+    LostLine {
+        /// The line that was not answered.
+        line: Option<Box<JobLine>>,
+    },
+    /// It refused a line.
+    #[error("{}", refusal(line, *number, messages))]
+    Refused {
+        /// The line.
+        line: Box<JobLine>,
+        /// Its `error:N`.
+        number: u16,
+        /// What it said just before.
+        messages: Vec<String>,
+    },
+    /// The machine stopped by itself.
+    #[error("the plotter stopped with alarm {number}{}\nSee docs/protocol.md for the alarm's meaning", said(&messages.join("; ")))]
+    Alarm {
+        /// Its `ALARM:N`.
+        number: u16,
+        /// What it said just before.
+        messages: Vec<String>,
+    },
+    /// It started again in the middle of the job.
+    #[error(
+        "the plotter started again in the middle of the job: is its power supply strong enough?"
+    )]
+    Restarted,
+    /// The link broke.
+    #[error("the line to the plotter broke: {0}")]
+    Link(#[from] io::Error),
+    /// A result cannot be written.
+    #[error("cannot write {file}: {source}")]
+    Write {
+        /// As the user named it.
+        file: String,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// A picture cannot be made.
+    #[error("cannot make the picture: {0}")]
+    Picture(String),
+    /// The user gave the job up.
+    #[error("given up: the plot was stopped and the pen is up")]
+    Interrupted,
+    /// The user gave the job up, and the plotter did not confirm that it stopped.
+    #[error("given up, but the plotter did not confirm that it stopped: look after it")]
+    InterruptedUnconfirmed,
+}
+
+impl Error {
+    /// What the process ends with: 130, as shells have it, after Ctrl-C, else 1.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Interrupted | Self::InterruptedUnconfirmed => 130,
+            _ => 1,
+        }
+    }
+}
+
+fn said(text: &str) -> String {
+    if text.is_empty() { String::new() } else { format!(": it said \"{text}\"") }
+}
+
+fn waiting_for(line: Option<&JobLine>) -> String {
+    match line.map(|line| (&line.sent, &line.origin)) {
+        None => String::new(),
+        Some((_, Some(origin))) => format!(", at line {} of {}", origin.line, origin.file),
+        Some((sent, None)) => format!(", at the command {sent}"),
+    }
+}
+
+fn remedy(state: &str) -> &'static str {
+    match state {
+        "Alarm" => "Free the machine, then home or unlock it",
+        "Hold" => "It waits in the middle of a job: resume or abort that first",
+        _ => "Wait until it has finished, or abort its job",
+    }
+}
+
+/// What the plotter said itself is more exact than the number's meaning, so it comes with it.
+fn refusal(line: &JobLine, number: u16, messages: &[String]) -> String {
+    let mut reason = meaning(number).to_owned();
+    for message in messages {
+        reason.push_str(": ");
+        reason.push_str(message);
+    }
+    match &line.origin {
+        Some(Origin { file, line, text }) => {
+            format!("{file}:{line}: {reason} (error {number})\n    {text}")
+        }
+        None => format!("the plotter refuses {}: {reason} (error {number})", line.sent),
+    }
+}

@@ -1,0 +1,224 @@
+//! What came of a job, and the settings that it was done with.
+
+use crate::protocol::{
+    ANGLES, AT, BEHIND, BLOCKS, CLEAR, CREASE, EYE, FIT, HIDDEN, MARGIN, PAGE, PROJECTION, SEAMS,
+    UP, VIEW_AUTO, setting,
+};
+use crate::source::JobLine;
+use serde::Serialize;
+
+/// A point of the page in mm: x right, y up from the lower left corner.
+pub type PagePoint = [f64; 2];
+
+/// What `penup preview --json` writes. Fields are added, never changed.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct JobResult {
+    /// The visible stretches, x1, y1, x2, y2: on the image plane at distance 1 (perspective) or in
+    /// model units (parallel); x right, y up, origin on the line of sight.
+    pub segments: Vec<[f64; 4]>,
+    /// What the pen draws without being lifted, in the order drawn, in mm on the page.
+    pub strokes: Vec<Vec<PagePoint>>,
+    /// Length drawn.
+    pub pen_down_mm: f64,
+    /// Length of the moves between strokes, from the first stroke's start to the last one's end.
+    pub pen_up_mm: f64,
+    /// Harrison's drawing efficiency (5.7, equation 7): the drawn part of the whole way, 0 to 1.
+    pub efficiency: f64,
+    /// Steps of the motors.
+    pub steps: u64,
+    /// How long the stages took.
+    pub timings_ms: Timings,
+}
+
+/// Milliseconds.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Timings {
+    /// Camera and projection.
+    pub view: f64,
+    /// Hidden lines.
+    pub visibility: f64,
+    /// Order of the strokes.
+    pub order: f64,
+}
+
+impl Timings {
+    /// The shorter time of each stage.
+    pub fn best(self, other: Self) -> Self {
+        Self {
+            view: self.view.min(other.view),
+            visibility: self.visibility.min(other.visibility),
+            order: self.order.min(other.order),
+        }
+    }
+}
+
+/// The ways of a pen.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Lengths {
+    /// Length drawn.
+    pub pen_down_mm: f64,
+    /// Length of the moves from each stroke's end to the next one's start.
+    pub pen_up_mm: f64,
+}
+
+impl Lengths {
+    /// Measures `strokes`.
+    ///
+    /// ```
+    /// use penup_client::job::Lengths;
+    /// let lengths = Lengths::of(&[vec![[0.0, 0.0], [3.0, 4.0]], vec![[3.0, 5.0], [4.0, 5.0]]]);
+    /// assert_eq!((lengths.pen_down_mm, lengths.pen_up_mm), (6.0, 1.0));
+    /// assert_eq!(lengths.efficiency(), 6.0 / 7.0);
+    /// ```
+    pub fn of(strokes: &[Vec<PagePoint>]) -> Self {
+        let length = |a: &PagePoint, b: &PagePoint| (a[0] - b[0]).hypot(a[1] - b[1]);
+        let down = strokes.iter().flat_map(|stroke| stroke.windows(2));
+        let up = strokes.windows(2);
+        Self {
+            pen_down_mm: down.map(|ends| length(&ends[0], &ends[1])).sum(),
+            pen_up_mm: up.filter_map(|pair| Some(length(pair[0].last()?, pair[1].first()?))).sum(),
+        }
+    }
+
+    /// Harrison's drawing efficiency, 0 to 1; 1 if nothing moves.
+    pub fn efficiency(self) -> f64 {
+        let whole = self.pen_down_mm + self.pen_up_mm;
+        if whole > 0.0 { self.pen_down_mm / whole } else { 1.0 }
+    }
+}
+
+/// A page, in mm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Page {
+    /// From left to right.
+    pub width: f64,
+    /// From bottom to top.
+    pub height: f64,
+}
+
+/// How to see and place a model. `None` leaves the choice to the plotter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// Where the eye is.
+    pub eye: Option<[f64; 3]>,
+    /// What it looks at.
+    pub at: Option<[f64; 3]>,
+    /// What is up.
+    pub up: Option<[f64; 3]>,
+    /// Harrison's angles, in degrees.
+    pub angles: Option<[f64; 3]>,
+    /// How lines of sight run, as the plotter understands it.
+    pub projection: String,
+    /// `clip` or `refuse`.
+    pub behind: &'static str,
+    /// `on` or `off`.
+    pub seams: &'static str,
+    /// `separate` or `merged`.
+    pub blocks: &'static str,
+    /// Degrees.
+    pub crease: f64,
+    /// `erased`, `dotted`, `dashed` or `shown`.
+    pub hidden: &'static str,
+    /// The page.
+    pub page: Page,
+    /// What stays free on each side, in mm.
+    pub margin: f64,
+    /// Whether a plan, too, is scaled to the page.
+    pub fit: bool,
+}
+
+/// Every line of a job up to the plot command: forget the old model, the file's lines, the settings.
+///
+/// Each setting is sent, so that nothing of an earlier job remains.
+pub fn job_lines(file: Vec<JobLine>, settings: &Settings) -> Vec<JobLine> {
+    let page = settings.page;
+    let points =
+        [(EYE, settings.eye), (AT, settings.at), (UP, settings.up), (ANGLES, settings.angles)];
+    let points = points.into_iter().filter_map(|(name, point)| Some(setting(name, &point?, ',')));
+    let commands = std::iter::once(VIEW_AUTO.to_owned()).chain(points).chain([
+        format!("{PROJECTION}={}", settings.projection),
+        format!("{BEHIND}={}", settings.behind),
+        format!("{SEAMS}={}", settings.seams),
+        format!("{BLOCKS}={}", settings.blocks),
+        setting(CREASE, &[settings.crease], ','),
+        format!("{HIDDEN}={}", settings.hidden),
+        setting(PAGE, &[page.width, page.height], 'x'),
+        setting(MARGIN, &[settings.margin], ','),
+        format!("{FIT}={}", if settings.fit { "on" } else { "off" }),
+    ]);
+    std::iter::once(JobLine::command(CLEAR))
+        .chain(file)
+        .chain(commands.map(JobLine::command))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_json_has_the_promised_fields() {
+        let result = JobResult {
+            segments: vec![[0.0, 0.5, 1.0, -1.0]],
+            strokes: vec![vec![[10.0, 20.0], [30.0, 20.25]]],
+            pen_down_mm: 20.0,
+            pen_up_mm: 0.0,
+            efficiency: 1.0,
+            steps: 1600,
+            timings_ms: Timings { view: 0.5, visibility: 1.5, order: 2.0 },
+        };
+        assert_eq!(
+            serde_json::to_string(&result).expect("numbers are finite"),
+            "{\"segments\":[[0.0,0.5,1.0,-1.0]],\"strokes\":[[[10.0,20.0],[30.0,20.25]]],\
+             \"pen_down_mm\":20.0,\"pen_up_mm\":0.0,\"efficiency\":1.0,\"steps\":1600,\
+             \"timings_ms\":{\"view\":0.5,\"visibility\":1.5,\"order\":2.0}}"
+        );
+    }
+
+    #[test]
+    fn nothing_drawn_is_perfectly_efficient_and_empty_strokes_do_no_harm() {
+        assert_eq!(Lengths::of(&[]).efficiency(), 1.0);
+        let strokes = [vec![], vec![[1.0, 1.0]], vec![]];
+        assert_eq!(Lengths::of(&strokes), Lengths::default());
+    }
+
+    #[test]
+    fn every_setting_is_sent_after_the_file() {
+        let settings = Settings {
+            eye: Some([-3.0, -4.0, 2.5]),
+            at: None,
+            up: Some([0.0, 0.0, 1.0]),
+            angles: None,
+            projection: "perspective".to_owned(),
+            behind: "clip",
+            seams: "on",
+            blocks: "separate",
+            crease: 0.0,
+            hidden: "dotted",
+            page: Page { width: 210.0, height: 297.0 },
+            margin: 7.5,
+            fit: false,
+        };
+        let lines = job_lines(vec![JobLine::command("v 0 0 0")], &settings);
+        let sent: Vec<&str> = lines.iter().map(|line| line.sent.as_str()).collect();
+        assert_eq!(
+            sent,
+            [
+                "$clear",
+                "v 0 0 0",
+                "$view=auto",
+                "$eye=-3,-4,2.5",
+                "$up=0,0,1",
+                "$projection=perspective",
+                "$behind=clip",
+                "$seams=on",
+                "$blocks=separate",
+                "$crease=0",
+                "$hidden=dotted",
+                "$page=210x297",
+                "$margin=7.5",
+                "$fit=off",
+            ]
+        );
+    }
+}

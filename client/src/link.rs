@@ -1,0 +1,60 @@
+//! Bytes to and from a plotter.
+//!
+//! A [`Link`] is all that [`Sender`](crate::sender::Sender) knows of a plotter, so a serial port, an
+//! emulated board, the library in memory and the tests' fake all take the same road.
+
+use std::io;
+use std::time::Duration;
+
+/// A line to a plotter: bytes in, bytes out.
+pub trait Link {
+    /// Sends all of `bytes`.
+    ///
+    /// # Errors
+    /// What the port says, for instance that the plotter was unplugged.
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()>;
+
+    /// Waits up to `patience` for bytes and says how many it put into `buffer`: 0 if none came.
+    ///
+    /// # Errors
+    /// What the port says; an expired patience is no error.
+    fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize>;
+}
+
+/// A plotter at a serial port, 115200 baud, 8 data bits, no parity, 1 stop bit.
+pub struct SerialLink {
+    port: Box<dyn serialport::SerialPort>,
+}
+
+/// The speed of the line, in bits a second.
+pub const BAUD: u32 = 115_200;
+
+impl SerialLink {
+    /// Opens `device`, for instance `/dev/ttyUSB0` or `COM3`.
+    ///
+    /// # Errors
+    /// There is no such port, it is in use, or the user may not open it.
+    pub fn open(device: &str) -> Result<Self, serialport::Error> {
+        let port = serialport::new(device, BAUD).open()?;
+        Ok(Self { port })
+    }
+}
+
+impl Link for SerialLink {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        // Generous: a window of lines takes 25 ms at this speed.
+        self.port.set_timeout(Duration::from_secs(2))?;
+        self.port.write_all(bytes)
+    }
+
+    fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize> {
+        self.port.set_timeout(patience)?;
+        match self.port.read(buffer) {
+            Err(error) if error.kind() == io::ErrorKind::TimedOut => Ok(0),
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => Ok(0),
+            // A port that is ready and has nothing has lost its other end.
+            Ok(0) => Err(io::ErrorKind::BrokenPipe.into()),
+            result => result,
+        }
+    }
+}

@@ -1,0 +1,360 @@
+//! The page with what the pen did to it, as SVG and PNG.
+//!
+//! One unit of the SVG is one millimetre and the page has its true size. Pen-down lines are dark and
+//! as wide as a pen, pen-up moves faint and thin; a green disc marks the start of the ink and a red
+//! ring its end. The PNG is made from that very SVG.
+
+use crate::error::Error;
+use crate::job::{Page, PagePoint};
+use resvg::{tiny_skia, usvg};
+use std::f64::consts::{PI, TAU};
+use std::fmt::{self, Write as _};
+
+/// A way of the pen without lifting or lowering it, in mm.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Run {
+    /// Whether it draws.
+    pub pen_down: bool,
+    /// Where it goes.
+    pub points: Vec<PagePoint>,
+}
+
+/// What the pen did, in order.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Picture {
+    /// The page that it is on.
+    pub page: Page,
+    /// Every way of the pen.
+    pub runs: Vec<Run>,
+    /// The plotter's step in mm. Where single steps stay within half of it of a straight line, the
+    /// picture shows the line. 0 if the runs are exact.
+    pub step: f64,
+}
+
+const PEN_WIDTH: f64 = 0.3;
+const TRAVEL_WIDTH: f64 = 0.15;
+const PAPER: &str = "#ffffff";
+const INK: &str = "#1b1f3b";
+const TRAVEL: &str = "#3d7edb";
+const START: &str = "#2a9d5c";
+const END: &str = "#d7433b";
+
+/// Dots of the PNG for each mm (203 dots per inch).
+const DOTS_PER_MM: f64 = 8.0;
+/// Larger pages get fewer dots for each mm.
+const MOST_DOTS: f64 = 4096.0;
+
+impl Picture {
+    /// `strokes` in order, and straight moves between them.
+    pub fn of_strokes(page: Page, strokes: &[Vec<PagePoint>]) -> Self {
+        let mut runs: Vec<Run> = Vec::with_capacity(2 * strokes.len());
+        let mut pen: Option<PagePoint> = None;
+        for stroke in strokes {
+            let (Some(&start), Some(&end)) = (stroke.first(), stroke.last()) else {
+                continue;
+            };
+            if let Some(from) = pen {
+                runs.push(Run { pen_down: false, points: vec![from, start] });
+            }
+            runs.push(Run { pen_down: true, points: stroke.clone() });
+            pen = Some(end);
+        }
+        Self { page, runs, step: 0.0 }
+    }
+
+    /// As an SVG document.
+    pub fn svg(&self) -> String {
+        let mut text = String::new();
+        // Writing to a string cannot fail.
+        let _ = self.write_svg(&mut text);
+        text
+    }
+
+    fn write_svg(&self, out: &mut String) -> fmt::Result {
+        let Page { width, height } = self.page;
+        let (w, h) = (Number(width), Number(height));
+        writeln!(
+            out,
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{w}mm\" height=\"{h}mm\" viewBox=\"0 0 {w} {h}\">"
+        )?;
+        writeln!(out, "<rect width=\"{w}\" height=\"{h}\" fill=\"{PAPER}\"/>")?;
+        let faint = format!("stroke=\"{TRAVEL}\" stroke-opacity=\"0.5\"");
+        self.write_runs(out, "pen-up", &faint, TRAVEL_WIDTH, false)?;
+        let dark = format!("stroke=\"{INK}\"");
+        self.write_runs(out, "pen-down", &dark, PEN_WIDTH, true)?;
+        self.write_marks(out)?;
+        writeln!(out, "</svg>")
+    }
+
+    fn write_runs(
+        &self,
+        out: &mut String,
+        id: &str,
+        paint: &str,
+        width: f64,
+        pen_down: bool,
+    ) -> fmt::Result {
+        writeln!(
+            out,
+            "<g id=\"{id}\" fill=\"none\" {paint} stroke-width=\"{}\" stroke-linecap=\"round\" stroke-linejoin=\"round\">",
+            Number(width)
+        )?;
+        for run in self.runs.iter().filter(|run| run.pen_down == pen_down) {
+            // Half a step, and a little for the rounding of the numbers.
+            let points = straightened(&run.points, self.step * 0.501);
+            let Some((first, rest)) = points.split_first() else {
+                continue;
+            };
+            write!(out, "<path d=\"M{}", self.place(*first))?;
+            for point in rest {
+                write!(out, "L{}", self.place(*point))?;
+            }
+            if rest.is_empty() {
+                // A dot: round caps draw a line of no length.
+                write!(out, "h0")?;
+            }
+            writeln!(out, "\"/>")?;
+        }
+        writeln!(out, "</g>")
+    }
+
+    fn write_marks(&self, out: &mut String) -> fmt::Result {
+        let mut ink = self.runs.iter().filter(|run| run.pen_down);
+        let start = ink.clone().find_map(|run| run.points.first());
+        let end = ink.rfind(|run| !run.points.is_empty());
+        let end = end.and_then(|run| run.points.last());
+        let radius = (self.page.width.min(self.page.height) / 200.0).clamp(0.4, 2.0);
+        if let Some(&point) = start {
+            let Place(x, y) = self.place(point);
+            writeln!(
+                out,
+                "<circle id=\"start\" cx=\"{x}\" cy=\"{y}\" r=\"{}\" fill=\"{START}\"/>",
+                Number(radius * 0.8)
+            )?;
+        }
+        if let Some(&point) = end {
+            let Place(x, y) = self.place(point);
+            writeln!(
+                out,
+                "<circle id=\"end\" cx=\"{x}\" cy=\"{y}\" r=\"{}\" fill=\"none\" stroke=\"{END}\" stroke-width=\"{}\"/>",
+                Number(radius * 1.3),
+                Number(radius * 0.4)
+            )?;
+        }
+        Ok(())
+    }
+
+    /// SVG counts y downwards.
+    fn place(&self, point: PagePoint) -> Place {
+        Place(Number(point[0]), Number(self.page.height - point[1]))
+    }
+}
+
+/// Renders an SVG that [`Picture::svg`] wrote as PNG.
+///
+/// # Errors
+/// The page is too small for a dot, or too large.
+pub fn png(svg: &str) -> Result<Vec<u8>, Error> {
+    let broken = |error: &dyn fmt::Display| Error::Picture(error.to_string());
+    let tree = usvg::Tree::from_str(svg, &usvg::Options::default()).map_err(|e| broken(&e))?;
+    let size = tree.size();
+    let longest = f64::from(size.width().max(size.height()));
+    // usvg counts 96 dots to the inch.
+    let scale = (DOTS_PER_MM * 25.4 / 96.0).min(MOST_DOTS / longest) as f32;
+    let dots = |length: f32| ((length * scale).round() as u32).max(1);
+    let mut pixels = tiny_skia::Pixmap::new(dots(size.width()), dots(size.height()))
+        .ok_or_else(|| broken(&"the page is too large"))?;
+    let scale = tiny_skia::Transform::from_scale(scale, scale);
+    resvg::render(&tree, scale, &mut pixels.as_mut());
+    pixels.encode_png().map_err(|e| broken(&e))
+}
+
+/// A number with at most three decimals: a thousandth of a mm.
+#[derive(Clone, Copy)]
+struct Number(f64);
+
+impl fmt::Display for Number {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let rounded = (self.0 * 1000.0).round() / 1000.0;
+        // Without a negative zero.
+        write!(f, "{}", rounded + 0.0)
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Place(Number, Number);
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {}", self.0, self.1)
+    }
+}
+
+/// Leaves out points, from front to back as many as it can, such that every point stays within
+/// `tolerance` of the line that replaces it. Ends stay, and so do the places where it turns back.
+///
+/// A line of single steps between two grid points becomes one line if the tolerance is half a step.
+///
+/// ```
+/// use penup_client::picture::straightened;
+/// let steps = [[0.0, 0.0], [1.0, 0.0], [2.0, 1.0], [3.0, 1.0], [4.0, 2.0], [4.0, 3.0], [4.0, 5.0]];
+/// assert_eq!(straightened(&steps, 0.5), [[0.0, 0.0], [4.0, 2.0], [4.0, 5.0]]);
+/// ```
+pub fn straightened(points: &[PagePoint], tolerance: f64) -> Vec<PagePoint> {
+    if tolerance <= 0.0 {
+        return points.to_vec();
+    }
+    let mut kept = Vec::new();
+    let mut rest = points;
+    while let Some((&start, ahead)) = rest.split_first() {
+        kept.push(start);
+        rest = &ahead[reach(start, ahead, tolerance)..];
+    }
+    kept
+}
+
+/// How many of the points `ahead` a straight line from `start` can pass by: to the last point that
+/// lies in the directions that pass every earlier one, and farther away than those.
+fn reach(start: PagePoint, ahead: &[PagePoint], tolerance: f64) -> usize {
+    let mut passed = 0;
+    let mut farthest = 0.0;
+    // The directions that pass all points so far, as angles from the first direction.
+    let mut first = None;
+    let (mut lowest, mut highest) = (-PI, PI);
+    for (i, point) in ahead.iter().enumerate() {
+        let (dx, dy) = (point[0] - start[0], point[1] - start[1]);
+        let distance = dx.hypot(dy);
+        let angle = dy.atan2(dx);
+        let turned = (angle - first.unwrap_or(angle) + 3.0 * PI).rem_euclid(TAU) - PI;
+        if distance >= farthest && (lowest..=highest).contains(&turned) {
+            farthest = distance;
+            passed = i;
+        }
+        if distance > tolerance {
+            first.get_or_insert(angle);
+            let spread = (tolerance / distance).asin();
+            lowest = lowest.max(turned - spread);
+            highest = highest.min(turned + spread);
+        }
+        if lowest > highest || distance + tolerance < farthest {
+            break;
+        }
+    }
+    passed
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PAGE: Page = Page { width: 40.0, height: 30.0 };
+
+    #[test]
+    fn a_picture_shows_ink_moves_start_and_end() {
+        let strokes = [
+            vec![[5.0, 5.0], [35.0, 5.0], [35.0, 25.0]],
+            vec![],
+            vec![[10.0, 25.0], [10.0001, 12.34567]],
+        ];
+        let svg = Picture::of_strokes(PAGE, &strokes).svg();
+        let expected = r##"<svg xmlns="http://www.w3.org/2000/svg" width="40mm" height="30mm" viewBox="0 0 40 30">
+<rect width="40" height="30" fill="#ffffff"/>
+<g id="pen-up" fill="none" stroke="#3d7edb" stroke-opacity="0.5" stroke-width="0.15" stroke-linecap="round" stroke-linejoin="round">
+<path d="M35 5L10 5"/>
+</g>
+<g id="pen-down" fill="none" stroke="#1b1f3b" stroke-width="0.3" stroke-linecap="round" stroke-linejoin="round">
+<path d="M5 25L35 25L35 5"/>
+<path d="M10 5L10 17.654"/>
+</g>
+<circle id="start" cx="5" cy="25" r="0.32" fill="#2a9d5c"/>
+<circle id="end" cx="10" cy="17.654" r="0.52" fill="none" stroke="#d7433b" stroke-width="0.16"/>
+</svg>
+"##;
+        assert_eq!(svg, expected);
+    }
+
+    #[test]
+    fn an_empty_page_is_a_picture() {
+        let svg = Picture::of_strokes(PAGE, &[]).svg();
+        assert!(!svg.contains("path") && !svg.contains("circle"));
+        let png = png(&svg).expect("a white page");
+        assert_eq!(png.get(..8), Some(b"\x89PNG\r\n\x1a\n".as_slice()));
+        // Width and height stand in the header.
+        assert_eq!(png.get(16..24), Some([0, 0, 1, 64, 0, 0, 0, 240].as_slice()));
+    }
+
+    #[test]
+    fn a_png_is_dark_where_the_pen_was_and_white_elsewhere() {
+        let strokes = [vec![[0.0, 15.0], [40.0, 15.0]]];
+        let bytes = png(&Picture::of_strokes(PAGE, &strokes).svg()).expect("a picture");
+        let pixels = tiny_skia::Pixmap::decode_png(&bytes).expect("a PNG");
+        let red = |x, y| pixels.pixel(x, y).expect("within the page").red();
+        assert!(red(160, 120) < 60, "ink is {}", red(160, 120));
+        assert_eq!((red(160, 100), red(160, 140)), (255, 255));
+    }
+
+    #[test]
+    fn a_stroke_that_turns_back_keeps_its_turn() {
+        let there_and_back = [[0.0, 0.0], [5.0, 0.0], [10.0, 0.0], [4.0, 0.0]];
+        assert_eq!(straightened(&there_and_back, 0.1), [[0.0, 0.0], [10.0, 0.0], [4.0, 0.0]]);
+        let closed = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 0.0]];
+        assert_eq!(straightened(&closed, 0.1), closed);
+        assert_eq!(straightened(&[], 0.1), [[0.0; 2]; 0]);
+        assert_eq!(straightened(&[[1.0, 2.0]], 0.1), [[1.0, 2.0]]);
+    }
+
+    /// The grid points of a line, as a plotter steps it.
+    fn steps(from: [i32; 2], to: [i32; 2]) -> Vec<PagePoint> {
+        let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
+        let count = dx.abs().max(dy.abs());
+        let along = |start: i32, d: i32, i: i32| {
+            (f64::from(start) + f64::from(d * i) / f64::from(count)).round()
+        };
+        (0..=count).map(|i| [along(from[0], dx, i), along(from[1], dy, i)]).collect()
+    }
+
+    #[test]
+    fn a_line_of_steps_becomes_one_line_whatever_its_direction() {
+        for to in [[140, 90], [-140, 90], [90, -141], [-7, -200], [300, 0], [0, -9], [-50, -50]] {
+            let line = steps([0, 0], to);
+            let ends = [line[0], line[line.len() - 1]];
+            assert_eq!(straightened(&line, 0.501), ends);
+        }
+    }
+
+    #[test]
+    fn a_stroke_of_steps_keeps_to_its_steps_with_few_points() {
+        let corners = [
+            [0, 0],
+            [500, 30],
+            [510, 400],
+            [80, 390],
+            [500, 30],
+            [-300, 20],
+            [-310, -1000],
+            [-310, 5],
+            [0, 0],
+        ];
+        let pairs = corners.windows(2);
+        let stroke: Vec<PagePoint> = pairs.flat_map(|pair| steps(pair[0], pair[1])).collect();
+        let straight = straightened(&stroke, 0.501);
+        assert!(straight.len() <= 4 * corners.len(), "{} points", straight.len());
+        let mut spans = straight.windows(2);
+        let mut span = spans.next().expect("several lines");
+        for &point in &stroke {
+            while distance(point, span) > 0.501 {
+                span = spans.next().expect("a line near every step");
+            }
+        }
+        assert!(spans.next().is_none(), "a line that no step is near");
+    }
+
+    /// From `p` to the nearest point of a line, not beyond its ends.
+    fn distance(p: PagePoint, line: &[PagePoint]) -> f64 {
+        let [a, b] = [line[0], line[1]];
+        let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
+        let along = ((p[0] - a[0]) * dx + (p[1] - a[1]) * dy) / (dx * dx + dy * dy);
+        let along = along.clamp(0.0, 1.0);
+        (a[0] + along * dx - p[0]).hypot(a[1] + along * dy - p[1])
+    }
+}

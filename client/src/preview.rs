@@ -1,0 +1,184 @@
+//! The plotter's library on this computer, behind the same serial line as a real one.
+//!
+//! Every line goes through the library's own protocol, and the job through its own interrupt code on
+//! a [`HostBoard`], so a preview shows what a plotter would do, refusals included.
+
+use crate::error::Error;
+use crate::job::{JobResult, Lengths, Timings};
+use crate::link::Link;
+use crate::machines::PreviewPlotter;
+use penup::boards::host::{Change, HostBoard, QUEUE_LENGTH, lend_memory};
+use penup::geometry::{Projection, Vertex};
+use penup::machine::{Path, PulserState, Setting, Target};
+use penup::motion::StepEvent;
+use penup::plotter::{Observer, Plotter};
+use penup::stage::{Aborted, Attention, Stage};
+use penup::view::View;
+use penup::visibility::{Along, Stretch};
+use std::io;
+use std::time::{Duration, Instant};
+
+/// A plotter in memory.
+pub struct InMemory {
+    board: HostBoard<'static>,
+    plotter: Plotter<'static>,
+    steps: u64,
+}
+
+impl InMemory {
+    /// Switches it on.
+    pub fn new() -> Self {
+        // Plotter and board borrow from these for as long as the process lives; there is one a run.
+        let queue = Box::leak(Box::new(heapless::spsc::Queue::<StepEvent, QUEUE_LENGTH>::new()));
+        let pins = Box::leak(Box::new(PulserState::new()));
+        let mut board = HostBoard::new(queue, pins);
+        let plotter = Plotter::new(lend_memory(), pins);
+        plotter.greet(&mut board);
+        Self { board, plotter, steps: 0 }
+    }
+
+    /// Polls until every byte is answered; a plot that began goes on in [`Link::receive`].
+    fn answer(&mut self) {
+        while !self.board.has_read_all() {
+            self.plotter.poll(&mut self.board);
+        }
+    }
+}
+
+impl Default for InMemory {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Link for InMemory {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.board.receive(bytes);
+        self.answer();
+        Ok(())
+    }
+
+    fn receive(&mut self, buffer: &mut [u8], _patience: Duration) -> io::Result<usize> {
+        // Each turn lets a tenth of a second of the plotter's time pass.
+        for _ in 0..100 {
+            self.plotter.poll(&mut self.board);
+            penup::plotter::Board::wait(&mut self.board);
+        }
+        let changes = self.board.trace().take_changes();
+        self.steps += count_steps(&changes);
+        let sent = self.board.take_sent();
+        let (now, later) = sent.split_at(sent.len().min(buffer.len()));
+        buffer[..now.len()].copy_from_slice(now);
+        penup::plotter::Board::write(&mut self.board, later);
+        Ok(now.len())
+    }
+}
+
+/// Moves at the pins: rising edges of both axes at one instant are one.
+fn count_steps(changes: &[penup::boards::host::Stamped]) -> u64 {
+    let rises = |change: Change| matches!(change, Change::StepX(true) | Change::StepY(true));
+    let mut times: Vec<u64> = changes.iter().filter(|c| rises(c.change)).map(|c| c.time).collect();
+    times.dedup();
+    times.len() as u64
+}
+
+impl PreviewPlotter for InMemory {
+    fn result(&mut self) -> Result<JobResult, Error> {
+        let mut watch = StopWatch::default();
+        let mut segments = Segments::default();
+        let refused = |refusal: penup::protocol::Refusal| Error::Board {
+            board: "host".to_owned(),
+            reason: refusal.to_string(),
+        };
+        self.plotter.compute(&mut watch, &mut segments).map_err(refused)?;
+        let timings_ms = watch.stop();
+        let settings = self.plotter.machine().settings();
+        let steps =
+            [Setting::StepsPerMmX, Setting::StepsPerMmY].map(|s| settings.get(s).to_num::<f64>());
+        let mut strokes: Vec<Vec<[f64; 2]>> = Vec::new();
+        let mut path = self.plotter.strokes();
+        while let Some(Target { point, ink }) = path.next_target() {
+            let point = [f64::from(point.x) / steps[0], f64::from(point.y) / steps[1]];
+            match (ink, strokes.last_mut()) {
+                (Some(_), Some(stroke)) => stroke.push(point),
+                _ => strokes.push(vec![point]),
+            }
+        }
+        let lengths = Lengths::of(&strokes);
+        Ok(JobResult {
+            segments: segments.0,
+            strokes,
+            pen_down_mm: lengths.pen_down_mm,
+            pen_up_mm: lengths.pen_up_mm,
+            efficiency: lengths.efficiency(),
+            steps: core::mem::take(&mut self.steps),
+            timings_ms,
+        })
+    }
+}
+
+/// How long each stage takes.
+struct StopWatch {
+    began: Instant,
+    stage: Stage,
+    timings: Timings,
+}
+
+impl Default for StopWatch {
+    fn default() -> Self {
+        Self { began: Instant::now(), stage: Stage::View, timings: Timings::default() }
+    }
+}
+
+impl StopWatch {
+    fn stop(mut self) -> Timings {
+        self.enter(Stage::View);
+        self.timings
+    }
+}
+
+impl Attention for StopWatch {
+    fn check(&mut self) -> Result<(), Aborted> {
+        Ok(())
+    }
+
+    fn enter(&mut self, stage: Stage) {
+        let passed = self.began.elapsed().as_secs_f64() * 1000.0;
+        *match self.stage {
+            Stage::View => &mut self.timings.view,
+            Stage::Visibility => &mut self.timings.visibility,
+            Stage::Order => &mut self.timings.order,
+        } += passed;
+        self.stage = stage;
+        self.began = Instant::now();
+    }
+}
+
+/// The visible stretches on the image plane.
+#[derive(Default)]
+struct Segments(Vec<[f64; 4]>);
+
+impl Observer for Segments {
+    fn stretch(&mut self, view: &View, stretch: &Stretch) {
+        if stretch.visible {
+            let (p, q) = stretch.ends;
+            let [[x1, y1], [x2, y2]] = [stretch.from, stretch.to].map(|end| image(view, p, q, end));
+            self.0.push([x1, y1, x2, y2]);
+        }
+    }
+
+    fn plan_bar(&mut self, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2]) {
+        self.0.push([x1, y1, x2, y2]);
+    }
+}
+
+/// Where the place `along` the edge from `p` to `q` is on the image plane.
+fn image(view: &View, p: Vertex, q: Vertex, along: Along) -> [f64; 2] {
+    let part = along.numerator as f64 / along.denominator as f64;
+    let between = |p: i32, q: i32| f64::from(p) * (1.0 - part) + f64::from(q) * part;
+    let w = match view.projection() {
+        Projection::Perspective => between(p.z, q.z),
+        Projection::Parallel => 1.0,
+    };
+    [(p.x, q.x), (p.y, q.y)].map(|(p, q)| between(p, q) / w * view.image_unit())
+}

@@ -1,0 +1,81 @@
+//! Tells the user how far a job is: lines sent, then strokes drawn.
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// Who is told how far a job is.
+pub trait Progress {
+    /// `done` of `all` lines are with the plotter.
+    fn lines_sent(&mut self, done: usize, all: usize);
+    /// `done` of `all` strokes are on the paper.
+    fn strokes_drawn(&mut self, done: u64, all: u64);
+    /// The plotter's state, whenever it reports it.
+    fn state(&mut self, state: &str);
+}
+
+/// Tells nobody.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Quiet;
+
+impl Progress for Quiet {
+    fn lines_sent(&mut self, _: usize, _: usize) {}
+    fn strokes_drawn(&mut self, _: u64, _: u64) {}
+    fn state(&mut self, _: &str) {}
+}
+
+/// A bar on the terminal; nothing if the error output is no terminal.
+#[derive(Debug)]
+pub struct Bar {
+    bar: ProgressBar,
+    phase: &'static str,
+}
+
+impl Default for Bar {
+    fn default() -> Self {
+        let bar = ProgressBar::new(0);
+        // The template is a constant: were it wrong, the plain bar would serve.
+        if let Ok(style) = ProgressStyle::with_template(
+            "{msg:>9} {bar:40.cyan/black.bright} {human_pos}/{human_len} {prefix} {elapsed:.dim}",
+        ) {
+            bar.set_style(style.progress_chars("━╸━"));
+        }
+        Self { bar, phase: "" }
+    }
+}
+
+impl Bar {
+    fn show(&mut self, phase: &'static str, unit: &'static str, done: u64, all: u64) {
+        if self.phase != phase {
+            self.phase = phase;
+            self.bar.reset();
+            self.bar.set_message(phase);
+            self.bar.set_prefix(unit);
+        }
+        self.bar.set_length(all);
+        self.bar.set_position(done);
+    }
+}
+
+impl Progress for Bar {
+    fn lines_sent(&mut self, done: usize, all: usize) {
+        self.show("Sending", "lines", done as u64, all as u64);
+    }
+
+    fn strokes_drawn(&mut self, done: u64, all: u64) {
+        self.show("Drawing", "strokes", done, all);
+    }
+
+    fn state(&mut self, state: &str) {
+        if self.phase == "Drawing" {
+            let message = if state == "Hold" { "Held" } else { "Drawing" };
+            self.bar.set_message(message);
+        } else if state == "Run" {
+            self.bar.set_message("Thinking");
+        }
+    }
+}
+
+impl Drop for Bar {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}

@@ -1,0 +1,247 @@
+//! The words of the line: what is sent to a plotter and what may come back.
+//!
+//! Everything that the client knows by name of the plotter's language stands here.
+//! `docs/protocol.md` describes the language itself.
+
+use penup::protocol::MEANINGS;
+use std::fmt::Write as _;
+
+/// Forget the model.
+pub const CLEAR: &str = "$clear";
+/// Draw the model with the present settings.
+pub const PLOT: &str = "$plot";
+
+/// Let the plotter choose the camera. Later camera settings replace its choice one by one.
+pub const VIEW_AUTO: &str = "$view=auto";
+/// The point that the eye is at.
+pub const EYE: &str = "$eye";
+/// The point that the eye looks at.
+pub const AT: &str = "$at";
+/// The direction that is up in the picture.
+pub const UP: &str = "$up";
+/// Harrison's rotation.
+pub const ANGLES: &str = "$angles";
+/// What becomes of what is behind the eye.
+pub const BEHIND: &str = "$behind";
+/// Whether faces that pass through each other show where.
+pub const SEAMS: &str = "$seams";
+/// Whether blocks that touch are one shape.
+pub const BLOCKS: &str = "$blocks";
+/// Edges that bend less are left out.
+pub const CREASE: &str = "$crease";
+/// Perspective or another.
+pub const PROJECTION: &str = "$projection";
+/// What is done with hidden lines.
+pub const HIDDEN: &str = "$hidden";
+/// Width x height of the page in millimetres.
+pub const PAGE: &str = "$page";
+/// What stays free on each side, in millimetres.
+pub const MARGIN: &str = "$margin";
+/// `on`: scale to the page; `off`: scale solids only and leave plans at true size.
+pub const FIT: &str = "$fit";
+
+/// Asks for a status report; answered at once, between two lines.
+pub const STATUS_QUERY: u8 = b'?';
+/// Give up whatever is going on, pen up, answer with the greeting.
+pub const ABORT: u8 = 0x18;
+
+/// Bytes that the plotter may be sent before it has answered for them: a little less than its
+/// receive queue of 256 holds, so that a status query always fits.
+pub const RECEIVE_WINDOW: usize = 240;
+
+/// Whether `letter` acts at once wherever it stands, or ends a line, so that no line may hold it.
+pub fn acts_at_once(letter: char) -> bool {
+    matches!(letter, '?' | '!' | '~') || letter.is_ascii_control() && letter != '\t'
+}
+
+/// Whether the greeting, Grbl's with the firmware's own name in brackets, is that of a penup.
+pub fn is_penup(greeting: &str) -> bool {
+    greeting.starts_with("Grbl ") && greeting.contains("[penup ")
+}
+
+/// What `error:number` means.
+///
+/// ```
+/// use penup_client::protocol::meaning;
+/// assert_eq!(meaning(9999), "a reason that this client does not know");
+/// ```
+pub fn meaning(number: u16) -> &'static str {
+    let known = MEANINGS.iter().find(|(known, _)| *known == number);
+    known.map_or("a reason that this client does not know", |(_, text)| text)
+}
+
+/// One line from the plotter.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Reply {
+    /// The oldest line not yet answered was taken.
+    Ok,
+    /// The oldest line not yet answered was refused.
+    Error(u16),
+    /// The machine stopped by itself.
+    Alarm(u16),
+    /// It has started, or started again.
+    Greeting(String),
+    /// Answer to a status query.
+    Status(Status),
+    /// `[MSG:text]`, for people.
+    Message(String),
+    /// Anything else.
+    Other(String),
+}
+
+/// `<State|Key:value|...>`
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Status {
+    /// Idle, Run, Hold, Alarm and so on.
+    pub state: String,
+    /// `Strokes:done/all`, while a drawing is drawn.
+    pub strokes: Option<(u64, u64)>,
+}
+
+impl Status {
+    /// Whether the plotter waits for work.
+    pub fn is_idle(&self) -> bool {
+        matches!(self.state.as_str(), "Idle" | "Sleep" | "Check")
+    }
+}
+
+impl Reply {
+    /// Reads a line without its line end.
+    ///
+    /// ```
+    /// use penup_client::protocol::Reply;
+    /// assert_eq!(Reply::parse("ok"), Reply::Ok);
+    /// assert_eq!(Reply::parse("error:7"), Reply::Error(7));
+    /// let Reply::Status(status) = Reply::parse("<Run|MPos:1.0,2.0|Strokes:3/12>") else { panic!() };
+    /// assert_eq!((status.state.as_str(), status.strokes), ("Run", Some((3, 12))));
+    /// ```
+    pub fn parse(line: &str) -> Self {
+        let numbered = |prefix| line.strip_prefix(prefix).and_then(|n: &str| n.parse().ok());
+        let enclosed = |open, close: char| -> Option<&str> {
+            line.strip_prefix::<&str>(open)?.strip_suffix(close)
+        };
+        if line == "ok" {
+            Self::Ok
+        } else if let Some(number) = numbered("error:") {
+            Self::Error(number)
+        } else if let Some(number) = numbered("ALARM:") {
+            Self::Alarm(number)
+        } else if line.starts_with("Grbl ") {
+            Self::Greeting(line.to_owned())
+        } else if let Some(text) = enclosed("[MSG:", ']') {
+            Self::Message(text.to_owned())
+        } else if let Some(report) = enclosed("<", '>') {
+            Self::Status(parse_status(report))
+        } else {
+            Self::Other(line.to_owned())
+        }
+    }
+}
+
+fn parse_status(report: &str) -> Status {
+    let mut fields = report.split('|');
+    // Grbl says Hold:0, Door:1.
+    let state = fields.next().unwrap_or_default();
+    let state = state.split(':').next().unwrap_or_default().to_owned();
+    let strokes = fields
+        .find_map(|field| field.strip_prefix("Strokes:")?.split_once('/'))
+        .and_then(|(done, all)| Some((done.parse().ok()?, all.parse().ok()?)));
+    Status { state, strokes }
+}
+
+/// Bytes to replies. Lines that are longer than any reply are cut.
+#[derive(Debug, Default)]
+pub struct ReplyReader {
+    partial: Vec<u8>,
+}
+
+impl ReplyReader {
+    const LONGEST: usize = 512;
+
+    /// Takes one byte; gives a reply if it ended a line that was not empty.
+    pub fn push(&mut self, byte: u8) -> Option<Reply> {
+        if byte != b'\n' && byte != b'\r' {
+            if self.partial.len() < Self::LONGEST {
+                self.partial.push(byte);
+            }
+            return None;
+        }
+        let line = std::mem::take(&mut self.partial);
+        let text = String::from_utf8_lossy(&line);
+        let text = text.trim();
+        (!text.is_empty()).then(|| Reply::parse(text))
+    }
+}
+
+/// `name=a,b,c` with plain decimals: the plotter reads no exponents.
+///
+/// ```
+/// let line = penup_client::protocol::setting("$eye", &[-3.0, 1e-3, 2.5], ',');
+/// assert_eq!(line, "$eye=-3,0.001,2.5");
+/// ```
+pub fn setting(name: &str, values: &[f64], separator: char) -> String {
+    let mut line = format!("{name}=");
+    for (i, value) in values.iter().enumerate() {
+        if i > 0 {
+            line.push(separator);
+        }
+        // Writing to a string cannot fail.
+        let _ = write!(line, "{value}");
+    }
+    line
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn replies(bytes: &[u8]) -> Vec<Reply> {
+        let mut reader = ReplyReader::default();
+        bytes.iter().filter_map(|&byte| reader.push(byte)).collect()
+    }
+
+    #[test]
+    fn replies_end_with_any_line_end_and_empty_lines_are_none() {
+        assert_eq!(
+            replies(b"\r\nok\r\n\n\nerror:12\nok\rok"),
+            [Reply::Ok, Reply::Error(12), Reply::Ok]
+        );
+    }
+
+    #[test]
+    fn noise_is_neither_an_answer_nor_a_crash() {
+        for noise in [
+            "okay",
+            "OK",
+            "error:",
+            "error:x",
+            "error:70000",
+            "<Idle",
+            "Idle>",
+            "[MSG:",
+            "<>",
+            "<|Strokes:>",
+            "<Run|Strokes:9>",
+            "<Run|Strokes:a/b>",
+        ] {
+            let reply = Reply::parse(noise);
+            assert!(
+                !matches!(reply, Reply::Ok | Reply::Error(_) | Reply::Greeting(_)),
+                "{noise} was taken for {reply:?}"
+            );
+        }
+        assert_eq!(replies(&[0xFF; 3000]), []);
+        let mut long = vec![b'x'; 3000];
+        long.extend_from_slice(b"\nok\n");
+        assert_eq!(replies(&long).last(), Some(&Reply::Ok));
+    }
+
+    #[test]
+    fn a_status_gives_its_state_without_the_sub_state() {
+        let Reply::Status(status) = Reply::parse("<Hold:0|MPos:1,2>") else {
+            panic!("no status");
+        };
+        assert_eq!((status.state.as_str(), status.strokes), ("Hold", None));
+        assert!(!status.is_idle());
+    }
+}

@@ -1,0 +1,140 @@
+//! The two commands.
+
+use crate::cli::{Cli, Command, PictureArgs, PlotArgs, PreviewArgs};
+use crate::error::Error;
+use crate::job::{Lengths, job_lines};
+use crate::link::{Link, SerialLink};
+use crate::machines;
+use crate::output;
+use crate::picture::{self, Picture};
+use crate::progress::{Bar, Progress};
+use crate::sender::{Patience, Sender};
+use crate::source::{JobLine, read_file};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+/// Does what the command line says; returns the sentence for the user.
+///
+/// `interrupt` set by a signal stops the machine with the pen up.
+///
+/// # Errors
+/// See [`Error`]; no result is written then.
+pub fn run(cli: &Cli, interrupt: &AtomicBool) -> Result<String, Error> {
+    match &cli.command {
+        Command::Plot(args) => plot(args, interrupt),
+        Command::Preview(args) => preview(args, interrupt),
+    }
+}
+
+fn plot(args: &PlotArgs, interrupt: &AtomicBool) -> Result<String, Error> {
+    let settings = args.view.settings();
+    let lines = job_lines(read_file(&args.file)?, &settings);
+    let mut bar = Bar::default();
+    if let Some(device) = &args.port {
+        let mut link = SerialLink::open(device)
+            .map_err(|source| Error::Port { device: device.clone(), source })?;
+        draw(&mut link, &lines, 1, interrupt, &mut bar)?;
+        return Ok(format!("{} is drawn", args.file.display()));
+    }
+    let mut board = machines::emulate(args.board)?;
+    draw(board.as_mut(), &lines, 1, interrupt, &mut bar)?;
+    let pen = board.pen_runs()?;
+    let picture = Picture { page: settings.page, runs: pen.runs, step: pen.step };
+    drop(bar);
+    let outputs = Outputs::of(&args.pictures, None);
+    let files = write_pictures(&picture, &outputs)?;
+    let strokes = picture.runs.into_iter().filter(|run| run.pen_down);
+    let strokes: Vec<_> = strokes.map(|run| run.points).collect();
+    Ok(summary(&files, strokes.len(), Lengths::of(&strokes)))
+}
+
+fn preview(args: &PreviewArgs, interrupt: &AtomicBool) -> Result<String, Error> {
+    let settings = args.view.settings();
+    let lines = job_lines(read_file(&args.file)?, &settings);
+    let mut bar = Bar::default();
+    let mut plotter = machines::in_memory();
+    draw(plotter.as_mut(), &lines, args.repeat, interrupt, &mut bar)?;
+    let result = plotter.result()?;
+    drop(bar);
+    let outputs = Outputs::of(&args.pictures, args.json.as_deref());
+    let picture = Picture::of_strokes(settings.page, &result.strokes);
+    let mut files = write_pictures(&picture, &outputs)?;
+    if let Some(path) = &outputs.json {
+        let text = serde_json::to_string(&result).map_err(|error| Error::Write {
+            file: path.display().to_string(),
+            source: error.into(),
+        })?;
+        output::write(path, format!("{text}\n").as_bytes())?;
+        files.push(path);
+    }
+    let lengths = Lengths { pen_down_mm: result.pen_down_mm, pen_up_mm: result.pen_up_mm };
+    Ok(summary(&files, result.strokes.len(), lengths))
+}
+
+/// Sends a whole job over `link` and draws it `times` times.
+///
+/// # Errors
+/// See [`Sender`].
+pub fn draw(
+    link: &mut dyn Link,
+    lines: &[JobLine],
+    times: u32,
+    interrupt: &AtomicBool,
+    progress: &mut dyn Progress,
+) -> Result<(), Error> {
+    let mut sender = Sender::open(link, Patience::default(), interrupt)?;
+    sender.stream(lines, progress)?;
+    (0..times).try_for_each(|_| sender.plot(progress))
+}
+
+struct Outputs {
+    svg: Option<PathBuf>,
+    png: Option<PathBuf>,
+    json: Option<PathBuf>,
+}
+
+impl Outputs {
+    fn of(pictures: &PictureArgs, json: Option<&Path>) -> Self {
+        let named = Self {
+            svg: pictures.svg.clone(),
+            png: pictures.png.clone(),
+            json: json.map(Path::to_owned),
+        };
+        match named {
+            Self { svg: None, png: None, json: None } => {
+                Self { svg: Some("plot.svg".into()), png: Some("plot.png".into()), json: None }
+            }
+            named => named,
+        }
+    }
+}
+
+/// Makes all pictures before it writes the first.
+fn write_pictures<'a>(picture: &Picture, outputs: &'a Outputs) -> Result<Vec<&'a Path>, Error> {
+    let svg = picture.svg();
+    let png = match outputs.png.as_deref() {
+        Some(path) => Some((path, picture::png(&svg)?)),
+        None => None,
+    };
+    let mut files = Vec::new();
+    if let Some(path) = &outputs.svg {
+        output::write(path, svg.as_bytes())?;
+        files.push(path.as_path());
+    }
+    if let Some((path, bytes)) = png {
+        output::write(path, &bytes)?;
+        files.push(path);
+    }
+    Ok(files)
+}
+
+fn summary(files: &[&Path], strokes: usize, lengths: Lengths) -> String {
+    let names: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
+    format!(
+        "{}: {strokes} strokes, {:.1} mm drawn, {:.1} mm between them, efficiency {:.1} %",
+        names.join(", "),
+        lengths.pen_down_mm,
+        lengths.pen_up_mm,
+        100.0 * lengths.efficiency()
+    )
+}

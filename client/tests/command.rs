@@ -1,0 +1,201 @@
+//! The program as a user runs it.
+
+#![allow(clippy::expect_used, reason = "a test fails with the words of what it expected")]
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn penup(folder: &Path, arguments: &[&str]) -> (Option<i32>, String, String) {
+    let Output { status, stdout, stderr } = Command::new(env!("CARGO_BIN_EXE_penup"))
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .expect("the program runs");
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("text");
+    (status.code(), text(stdout), text(stderr))
+}
+
+fn files(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).expect("a folder");
+    let name = |entry: std::io::Result<fs::DirEntry>| entry.expect("an entry").file_name();
+    let mut names: Vec<String> =
+        entries.map(|entry| name(entry).to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn help_names_every_option() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (code, plot, _) = penup(folder.path(), &["plot", "--help"]);
+    assert_eq!(code, Some(0));
+    let (code, preview, _) = penup(folder.path(), &["preview", "--help"]);
+    assert_eq!(code, Some(0));
+    for option in [
+        "--eye",
+        "--at",
+        "--up",
+        "--projection",
+        "--hidden",
+        "--page",
+        "--landscape",
+        "--margin",
+        "--fit",
+        "--svg",
+        "--png",
+    ] {
+        assert!(plot.contains(option) && preview.contains(option), "{option}");
+    }
+    assert!(plot.contains("--board") && plot.contains("--port"));
+    assert!(preview.contains("--json") && preview.contains("--repeat"));
+}
+
+#[test]
+fn a_missing_file_a_stranger_and_a_bad_option_are_explained() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("scene.stl"), "solid").expect("written");
+    fs::write(folder.path().join("bad.obj"), "v 0 0 0\n$plot\n").expect("written");
+    let before = files(folder.path());
+    for command in ["plot", "preview"] {
+        for (file, code, reason) in [
+            ("none.obj", 1, "cannot read none.obj: "),
+            ("scene.stl", 1, "scene.stl: penup reads Wavefront OBJ files"),
+            ("bad.obj", 1, "bad.obj:2: a file cannot hold commands"),
+            ("--page=B5", 2, "none of A4, A3, Letter"),
+        ] {
+            let (status, stdout, stderr) = penup(folder.path(), &[command, file]);
+            assert_eq!(status, Some(code), "{stderr}");
+            assert!(stderr.contains(reason), "{stderr}");
+            assert_eq!(stdout, "");
+        }
+    }
+    assert_eq!(files(folder.path()), before);
+}
+
+#[test]
+fn a_port_that_is_not_there_is_explained() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("a.obj"), "v 0 0 0\n").expect("written");
+    let (code, _, stderr) = penup(folder.path(), &["plot", "a.obj", "--port", "no-such-port"]);
+    assert_eq!(code, Some(1));
+    assert!(stderr.contains("cannot open no-such-port"), "{stderr}");
+    assert!(stderr.contains("is the plotter plugged in"), "{stderr}");
+    let both = ["plot", "a.obj", "--port", "p", "--board", "lm3s6965"];
+    assert_eq!(penup(folder.path(), &both).0, Some(2));
+}
+
+#[cfg(unix)]
+mod at_a_port {
+    use super::*;
+    use penup_client::fake::{FakePlotter, Fault};
+    use penup_client::link::Link as _;
+    use serialport::{SerialPort as _, TTYPort};
+    use std::io::{Read as _, Write as _};
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicBool, Ordering};
+    use std::thread::JoinHandle;
+    use std::time::Duration;
+
+    /// A plotter at the other end of a pseudo-terminal.
+    struct Plugged {
+        device: String,
+        unplug: Arc<AtomicBool>,
+        /// The plot command has come.
+        drawing: Arc<AtomicBool>,
+        thread: JoinHandle<FakePlotter>,
+    }
+
+    impl Plugged {
+        fn new(mut plotter: FakePlotter) -> Self {
+            let (mut wire, terminal) = TTYPort::pair().expect("a pseudo-terminal");
+            wire.set_timeout(Duration::from_millis(1)).expect("set");
+            let device = terminal.name().expect("a name");
+            // Only one may hold it: the program.
+            drop(terminal);
+            let unplug = Arc::new(AtomicBool::new(false));
+            let drawing = Arc::new(AtomicBool::new(false));
+            let (unplugged, draws) = (unplug.clone(), drawing.clone());
+            let thread = std::thread::spawn(move || {
+                let mut buffer = [0; 64];
+                while !unplugged.load(Ordering::Relaxed) {
+                    // An error says that the program does not hold its end yet, or no longer.
+                    if let Ok(count) = wire.read(&mut buffer) {
+                        plotter.send(&buffer[..count]).expect("memory");
+                    }
+                    let last = plotter.lines.last().map(String::as_str);
+                    draws.store(last == Some("$plot"), Ordering::Relaxed);
+                    let count =
+                        plotter.receive(&mut buffer, Duration::from_millis(1)).expect("memory");
+                    // The program may have left: then nobody listens.
+                    let _ = wire.write_all(&buffer[..count]);
+                }
+                plotter
+            });
+            Self { device, unplug, drawing, thread }
+        }
+
+        fn unplug(self) -> FakePlotter {
+            self.unplug.store(true, Ordering::Relaxed);
+            self.thread.join().expect("the plotter ends")
+        }
+    }
+
+    const CUBE: &str = include_str!("../../scenes/cube.obj");
+
+    #[test]
+    fn a_file_is_sent_with_its_settings_and_drawn() {
+        let folder = tempfile::tempdir().expect("a folder");
+        fs::write(folder.path().join("cube.obj"), CUBE).expect("written");
+        let plotter = Plugged::new(FakePlotter::new(Fault::None));
+        let line = ["plot", "cube.obj", "--eye", "-3,-4,2.5", "--port", &plotter.device];
+        let (code, stdout, stderr) = penup(folder.path(), &line);
+        assert_eq!((code, stdout.as_str()), (Some(0), "cube.obj is drawn\n"), "{stderr}");
+        let lines = plotter.unplug().lines;
+        let file = CUBE.lines().filter(|line| !line.starts_with('#'));
+        let count = file.clone().count();
+        assert_eq!(lines[0], "$clear");
+        assert!(lines[1..=count].iter().eq(file));
+        assert!(lines.contains(&"$eye=-3,-4,2.5".to_owned()));
+        assert_eq!(lines.last().map(String::as_str), Some("$plot"));
+    }
+
+    #[test]
+    fn a_line_that_the_plotter_refuses_is_shown() {
+        let folder = tempfile::tempdir().expect("a folder");
+        fs::write(folder.path().join("cube.obj"), CUBE).expect("written");
+        let plotter = Plugged::new(FakePlotter::new(Fault::ErrorAt(3, 9999)));
+        let line = ["plot", "cube.obj", "--port", &plotter.device];
+        let (code, _, stderr) = penup(folder.path(), &line);
+        assert_eq!(code, Some(1));
+        assert!(stderr.starts_with("penup: cube.obj:3: "), "{stderr}");
+        assert!(stderr.contains("    v 1 0 0\n"), "{stderr}");
+        plotter.unplug();
+    }
+
+    #[test]
+    fn an_interrupt_stops_the_plotter() {
+        let folder = tempfile::tempdir().expect("a folder");
+        fs::write(folder.path().join("cube.obj"), CUBE).expect("written");
+        let mut fake = FakePlotter::new(Fault::None);
+        fake.strokes = 1_000_000;
+        let plotter = Plugged::new(fake);
+        let mut program = Command::new(env!("CARGO_BIN_EXE_penup"))
+            .args(["plot", "cube.obj", "--port", &plotter.device])
+            .current_dir(folder.path())
+            .spawn()
+            .expect("the program runs");
+        while !plotter.drawing.load(Ordering::Relaxed) {
+            let ended = program.try_wait().expect("a state");
+            assert_eq!(ended, None, "it ended before the drawing began");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        let sent = Command::new("kill")
+            .args(["-INT", &program.id().to_string()])
+            .status()
+            .expect("a signal");
+        assert!(sent.success());
+        assert_eq!(program.wait().expect("it ends").code(), Some(130));
+        assert_eq!(plotter.unplug().aborts, 2);
+    }
+}

@@ -1,0 +1,185 @@
+//! A sender and a plotter that misbehaves.
+
+#![allow(clippy::expect_used, reason = "a test fails with the words of what it expected")]
+
+use penup_client::error::Error;
+use penup_client::fake::{FakePlotter, Fault};
+use penup_client::progress::{Progress, Quiet};
+use penup_client::sender::{Patience, Sender};
+use penup_client::source::{JobLine, Origin};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+const PATIENCE: Patience = Patience {
+    silence: Duration::from_millis(60),
+    lost: Duration::from_millis(120),
+    greeting: Duration::from_millis(60),
+    query: Duration::from_millis(4),
+};
+
+fn lines(count: usize) -> Vec<JobLine> {
+    let line = |i| JobLine {
+        sent: format!("v {i} {} 0.5", i * 3),
+        origin: Some(Origin {
+            file: "scene.obj".to_owned(),
+            line: i + 10,
+            text: format!("v {i}  {}  0.5 # as written", i * 3),
+        }),
+    };
+    (0..count).map(line).collect()
+}
+
+fn job(plotter: &mut FakePlotter, count: usize) -> Result<(), Error> {
+    let interrupt = AtomicBool::new(false);
+    let mut sender = Sender::open(plotter, PATIENCE, &interrupt)?;
+    sender.stream(&lines(count), &mut Quiet)?;
+    sender.plot(&mut Quiet)
+}
+
+fn failure(fault: Fault) -> (String, FakePlotter) {
+    let mut plotter = FakePlotter::new(fault);
+    match job(&mut plotter, 40) {
+        Ok(()) => (format!("{fault:?} went unnoticed"), plotter),
+        Err(error) => (error.to_string(), plotter),
+    }
+}
+
+#[test]
+fn every_line_arrives_once_in_order_and_the_queue_is_kept_full_but_never_overflows() {
+    for count in [0, 1, 2, 500] {
+        let mut plotter = FakePlotter::new(Fault::None);
+        job(&mut plotter, count).expect("a job without a fault");
+        let mut expected: Vec<String> = lines(count).into_iter().map(|line| line.sent).collect();
+        expected.push("$plot".to_owned());
+        assert_eq!(plotter.lines, expected);
+        assert!(!plotter.overflowed);
+        assert!(count < 500 || plotter.most_waiting > 10);
+    }
+}
+
+#[test]
+fn a_line_longer_than_the_window_goes_alone() {
+    let mut plotter = FakePlotter::new(Fault::None);
+    let interrupt = AtomicBool::new(false);
+    let long = JobLine::command(format!("f{}", " 1".repeat(123)));
+    assert_eq!(long.sent.len(), 247);
+    let job = [JobLine::command("v 0 0 0"), long.clone(), long];
+    let mut sender = Sender::open(&mut plotter, PATIENCE, &interrupt).expect("a plotter");
+    sender.stream(&job, &mut Quiet).expect("all taken");
+    assert!(!plotter.overflowed);
+    assert_eq!(plotter.lines.len(), 3);
+}
+
+#[test]
+fn a_refused_line_is_named_with_its_text_and_nothing_is_drawn() {
+    let (error, plotter) = failure(Fault::ErrorAt(7, 9999));
+    assert_eq!(
+        error,
+        "scene.obj:16: a reason that this client does not know: what it thinks of it (error 9999)\n    \
+         v 6  18  0.5 # as written"
+    );
+    assert!(!plotter.lines.iter().any(|line| line == "$plot"));
+}
+
+#[test]
+fn a_refused_drawing_is_an_error() {
+    let (error, _) = failure(Fault::ErrorAt(41, 9999));
+    assert!(error.starts_with("the plotter refuses $plot"), "{error}");
+}
+
+#[test]
+fn silence_at_the_start_says_what_to_check() {
+    let (error, _) = failure(Fault::Silent);
+    assert!(error.starts_with("the plotter does not answer"), "{error}");
+    assert!(error.contains("Is it powered"), "{error}");
+}
+
+#[test]
+fn silence_in_the_middle_names_the_line() {
+    let (error, _) = failure(Fault::SilentAfter(5));
+    assert!(error.contains("line 15 of scene.obj"), "{error}");
+    let (error, _) = failure(Fault::SilentAfter(40));
+    assert!(error.contains("at the command $plot"), "{error}");
+}
+
+#[test]
+fn lost_bytes_are_told_from_silence() {
+    let (error, _) = failure(Fault::LosesLine(40));
+    assert!(error.contains("never answered, at line 49"), "{error}");
+    let (error, _) = failure(Fault::LosesLine(41));
+    assert!(error.contains("never answered, at the command $plot"), "{error}");
+}
+
+#[test]
+fn strangers_and_busy_plotters_are_left_alone() {
+    let (error, _) = failure(Fault::NotPenup);
+    assert!(error.contains("not penup: it said \"Grbl 1.1h"), "{error}");
+    let (error, _) = failure(Fault::Noise);
+    assert!(error.contains("115200 baud"), "{error}");
+    let (error, plotter) = failure(Fault::Busy);
+    assert!(error.contains("it reports Run"), "{error}");
+    assert_eq!((plotter.aborts, plotter.lines.len()), (0, 0));
+}
+
+#[test]
+fn a_restart_or_an_alarm_ends_the_job() {
+    let (error, _) = failure(Fault::RestartsAt(3));
+    assert!(error.contains("started again"), "{error}");
+    let (error, _) = failure(Fault::AlarmWhileDrawing(2));
+    assert!(error.contains("alarm 2"), "{error}");
+}
+
+/// Presses Ctrl-C as soon as the first stroke is drawn.
+struct GivesUp<'a>(&'a AtomicBool);
+
+impl Progress for GivesUp<'_> {
+    fn lines_sent(&mut self, _: usize, _: usize) {}
+    fn strokes_drawn(&mut self, done: u64, _: u64) {
+        self.0.store(done > 0, Ordering::Relaxed);
+    }
+    fn state(&mut self, _: &str) {}
+}
+
+#[test]
+fn giving_up_stops_the_machine_and_waits_until_it_says_so() {
+    for (fault, expected) in
+        [(Fault::None, "the pen is up"), (Fault::IgnoresAbort, "did not confirm")]
+    {
+        let mut plotter = FakePlotter::new(fault);
+        plotter.strokes = 1000;
+        let interrupt = AtomicBool::new(false);
+        let mut sender = Sender::open(&mut plotter, PATIENCE, &interrupt).expect("a plotter");
+        let error = sender.plot(&mut GivesUp(&interrupt)).expect_err("it was given up");
+        assert!(error.to_string().contains(expected), "{error}");
+        assert_eq!(error.exit_code(), 130);
+        assert_eq!(plotter.aborts, 2);
+    }
+}
+
+/// Remembers what it is told.
+#[derive(Default)]
+struct Recorder(Vec<String>);
+
+impl Progress for Recorder {
+    fn lines_sent(&mut self, done: usize, all: usize) {
+        self.0.push(format!("line {done}/{all}"));
+    }
+    fn strokes_drawn(&mut self, done: u64, all: u64) {
+        self.0.push(format!("stroke {done}/{all}"));
+    }
+    fn state(&mut self, _: &str) {}
+}
+
+#[test]
+fn progress_counts_lines_then_strokes() {
+    let mut plotter = FakePlotter::new(Fault::None);
+    let interrupt = AtomicBool::new(false);
+    let mut told = Recorder::default();
+    let mut sender = Sender::open(&mut plotter, PATIENCE, &interrupt).expect("a plotter");
+    sender.stream(&lines(2), &mut told).expect("all taken");
+    sender.plot(&mut told).expect("drawn");
+    assert_eq!(
+        told.0,
+        ["line 1/2", "line 2/2", "stroke 0/3", "stroke 1/3", "stroke 2/3", "stroke 3/3"]
+    );
+}

@@ -1,0 +1,86 @@
+//! The faces that are found from vertices alone, seen as any faces are seen.
+
+#![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on stops")]
+
+use std::collections::BTreeMap;
+
+use penup::convex::{
+    Eye, Sight, SinkFull, SolidEdge, SolidSink, from_vertices, scratch_bytes_from_vertices,
+};
+use penup::geometry::{Projection, Vertex};
+use penup::model::{Corner, Elements};
+use penup::stage::{Scratch, Undisturbed};
+use penup::visibility::{Scene, Stretch};
+
+use crate::convex_solids::{Dice, any_solid};
+
+#[derive(Default)]
+struct Faces {
+    corners: Vec<Corner>,
+    sights: BTreeMap<(u16, u16), Sight>,
+}
+
+impl SolidSink for Faces {
+    fn face(&mut self, corners: &[Corner], _: bool) -> Result<(), SinkFull> {
+        self.corners.extend(corners);
+        Ok(())
+    }
+
+    fn edge(&mut self, edge: SolidEdge) -> Result<(), SinkFull> {
+        let (a, b) = edge.ends;
+        self.sights.insert((a.min(b), a.max(b)), edge.sight);
+        Ok(())
+    }
+}
+
+/// Throws a solid and an eye for which view coordinates are whole, finds its faces, and asks `stretches`
+/// for the visible and hidden stretches of a scene of these faces. Visible edges must be visible from end
+/// to end, hidden ones hidden. `false` if the throw was no solid.
+pub fn is_seen_alike(dice: &mut Dice, stretches: impl Fn(&Scene<'_>) -> Vec<Stretch>) -> bool {
+    let points = any_solid(dice);
+    if points.iter().flatten().any(|part| part.abs() > 100) {
+        return false;
+    }
+    // The camera looks along y, x to the right, z up.
+    let nearest = points.iter().map(|point| point[1]).min().expect("points");
+    let place = [dice.throw(-9, 9), nearest - dice.throw(1, 9), dice.throw(-9, 9)];
+    let (eye, projection) = if dice.throw(0, 1) == 0 {
+        (Eye::At(place.map(i64::from)), Projection::Perspective)
+    } else {
+        (Eye::Towards([0, -1, 0]), Projection::Parallel)
+    };
+    let mut words = vec![0; scratch_bytes_from_vertices(points.len()) / 8];
+    let mut faces = Faces::default();
+    let scratch = Scratch::new(&mut words);
+    if from_vertices(&points, eye, 0, scratch, &mut Undisturbed, &mut faces).is_err() {
+        return false;
+    }
+    let vertices: Vec<Vertex> = points
+        .iter()
+        .map(|point| Vertex {
+            x: point[0] - place[0],
+            y: point[2] - place[2],
+            z: point[1] - place[1],
+        })
+        .collect();
+    let scene = Scene { vertices: &vertices, elements: Elements::new(&faces.corners), projection };
+    let mut seen: BTreeMap<(u16, u16), Vec<bool>> = BTreeMap::new();
+    for stretch in stretches(&scene) {
+        let Some((a, b)) = stretch.edge else { continue };
+        seen.entry((a.min(b), a.max(b))).or_default().push(stretch.visible);
+    }
+    for (ends, sight) in &faces.sights {
+        let expected = match sight {
+            Sight::Outline | Sight::Visible => true,
+            Sight::Hidden => false,
+            // Which of several lines in one place is drawn is not asked here.
+            Sight::BehindOutline => continue,
+        };
+        assert_eq!(
+            seen.get(ends).map(Vec::as_slice),
+            Some(&[expected][..]),
+            "{ends:?} {sight:?} of {points:?} seen from {eye:?}"
+        );
+    }
+    true
+}

@@ -1,0 +1,275 @@
+//! Random convex solids with small integer coordinates, so that ties are common, and eyes to see them from.
+#![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on stops")]
+
+use penup::convex::Eye;
+
+use crate::convex_model::Point;
+
+/// A small generator of reproducible randomness (xorshift).
+#[derive(Debug, Clone)]
+pub struct Dice(u64);
+
+impl Dice {
+    /// The same seed gives the same throws.
+    pub fn new(seed: u64) -> Self {
+        Self(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1)
+    }
+
+    fn next(&mut self) -> u64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 32
+    }
+
+    /// From `low` to `high`, both included.
+    pub fn throw(&mut self, low: i32, high: i32) -> i32 {
+        low + (self.next() % (high - low + 1) as u64) as i32
+    }
+
+    /// One of them.
+    pub fn pick<T: Copy>(&mut self, items: &[T]) -> T {
+        items[self.throw(0, items.len() as i32 - 1) as usize]
+    }
+
+    /// In any order.
+    pub fn shuffle<T>(&mut self, items: &mut [T]) {
+        for at in (1..items.len()).rev() {
+            items.swap(at, self.throw(0, at as i32) as usize);
+        }
+    }
+}
+
+/// Points of a sphere with whole coordinates: every one is a corner.
+pub fn on_sphere(dice: &mut Dice) -> Vec<Point> {
+    let square = dice.pick(&[3, 5, 6, 9, 14, 17, 21, 26, 29, 41]);
+    let mut points = vec![];
+    for x in -6..=6 {
+        for y in -6..=6 {
+            for z in -6..=6 {
+                if x * x + y * y + z * z == square {
+                    points.push([x, y, z]);
+                }
+            }
+        }
+    }
+    dice.shuffle(&mut points);
+    points.truncate(dice.throw(4, 20) as usize);
+    points
+}
+
+/// A box along the axes.
+pub fn cuboid(dice: &mut Dice) -> Vec<Point> {
+    let low = [0, 1, 2].map(|_| dice.throw(-3, 0));
+    let high = [0, 1, 2].map(|_| dice.throw(1, 3));
+    (0..8).map(|i| [0, 1, 2].map(|k| if i >> k & 1 == 0 { low[k] } else { high[k] })).collect()
+}
+
+/// A convex polygon in the plane z = 0 with whole coordinates, three corners or more.
+pub fn polygon(dice: &mut Dice) -> Vec<Point> {
+    // Directions around the clock: their sums are the corners of a convex polygon.
+    let clock = [
+        [1, 0],
+        [2, 1],
+        [1, 1],
+        [1, 2],
+        [0, 1],
+        [-1, 2],
+        [-1, 1],
+        [-2, 1],
+        [-1, 0],
+        [-2, -1],
+        [-1, -1],
+        [-1, -2],
+        [0, -1],
+        [1, -2],
+        [1, -1],
+        [2, -1],
+    ];
+    loop {
+        let steps: Vec<i32> = clock[..8].iter().map(|_| dice.throw(0, 2) / 2).collect();
+        let mut at = [0, 0];
+        let mut corners = vec![];
+        // Each direction and its opposite, so that the polygon closes.
+        for (k, direction) in clock.iter().enumerate() {
+            if steps[k % 8] > 0 {
+                corners.push([at[0], at[1], 0]);
+                at = [at[0] + direction[0], at[1] + direction[1]];
+            }
+        }
+        if corners.len() >= 4 {
+            if corners.len() > 4 && dice.throw(0, 1) == 1 {
+                corners.remove(dice.throw(0, corners.len() as i32 - 1) as usize);
+            }
+            return corners;
+        }
+    }
+}
+
+/// A prism over a polygon, straight or slanted.
+pub fn prism(dice: &mut Dice) -> Vec<Point> {
+    let base = polygon(dice);
+    let shift = [dice.throw(-1, 1), dice.throw(-1, 1), dice.throw(1, 3)];
+    let top = base.iter().map(|p| [0, 1, 2].map(|k| p[k] + shift[k])).collect::<Vec<_>>();
+    [base, top].concat()
+}
+
+/// A pyramid over a polygon.
+pub fn pyramid(dice: &mut Dice) -> Vec<Point> {
+    let mut points = polygon(dice);
+    points.push([dice.throw(-2, 3), dice.throw(-2, 3), dice.throw(1, 3)]);
+    points
+}
+
+/// An octahedron, regular or not.
+pub fn octahedron(dice: &mut Dice) -> Vec<Point> {
+    (0..6)
+        .map(|i| {
+            let mut point = [0; 3];
+            let length = dice.throw(1, 3);
+            point[i / 2] = if i % 2 == 0 { length } else { -length };
+            point
+        })
+        .collect()
+}
+
+/// A cube with edges or corners cut: all signs and orders of (a, b, c).
+pub fn cut_cube(dice: &mut Dice) -> Vec<Point> {
+    let [a, b, c] = dice.pick(&[[1, 1, 2], [0, 1, 2], [2, 2, 1], [0, 1, 1], [3, 3, 1], [1, 1, 3]]);
+    let orders: &[[i32; 3]] = &[[a, b, c], [b, c, a], [c, a, b]];
+    let mut points = vec![];
+    for order in orders {
+        for signs in 0..8 {
+            let point = [0, 1, 2].map(|k| if signs >> k & 1 == 0 { order[k] } else { -order[k] });
+            if !points.contains(&point) {
+                points.push(point);
+            }
+        }
+    }
+    points
+}
+
+/// A roof over a pit, often with vertices on both slopes that, from above, only its ridge parts.
+pub fn roof(dice: &mut Dice) -> Vec<Point> {
+    let mut points = vec![[-6, 0, 4], [6, 0, 4], [0, 0, -8]];
+    for side in [-1, 1] {
+        for x in [-2, 2] {
+            if dice.throw(0, 2) > 0 {
+                points.push([x, 2 * side, 2]);
+            }
+        }
+        points.push([dice.throw(-2, 2), 6 * side, -4]);
+    }
+    points
+}
+
+/// Any points: most are not convex.
+pub fn any_points(dice: &mut Dice) -> Vec<Point> {
+    let reach = dice.throw(1, 3);
+    (0..dice.throw(1, 14)).map(|_| [0, 1, 2].map(|_| dice.throw(-reach, reach))).collect()
+}
+
+/// A solid of any kind in any order, now and then with corners repeated, now and then as large as can be.
+pub fn any_solid(dice: &mut Dice) -> Vec<Point> {
+    let kinds = [on_sphere, cuboid, prism, pyramid, octahedron, cut_cube, roof, any_points];
+    let mut points = dice.pick(&kinds[..])(dice);
+    if dice.throw(0, 4) == 0 {
+        let point = dice.pick(&points);
+        points.push(point);
+    }
+    dice.shuffle(&mut points);
+    if dice.throw(0, 5) == 0 {
+        // |coordinate| <= 11, so this stays within 2^30.
+        let scale = dice.throw(50_000_000, 90_000_000);
+        points.iter_mut().flatten().for_each(|part| *part *= scale);
+    }
+    points
+}
+
+/// An eye: along an axis, a diagonal or anyhow; or a place, often level with vertices, now and then inside.
+pub fn any_eye(dice: &mut Dice, points: &[Point]) -> Eye {
+    let largest = points.iter().flatten().map(|part| part.abs()).max().unwrap_or(1).max(1);
+    let unit = i64::from(if largest > 100 { largest / 11 } else { 1 });
+    match dice.throw(0, 4) {
+        0 => {
+            let mut direction = [0; 3];
+            direction[dice.throw(0, 2) as usize] = i64::from(dice.pick(&[-1, 1]));
+            Eye::Towards(direction)
+        }
+        1 => loop {
+            let direction = [0, 1, 2].map(|_| i64::from(dice.throw(-3, 3)));
+            if direction != [0; 3] {
+                return Eye::Towards(direction);
+            }
+        },
+        2 => Eye::At([0, 1, 2].map(|_| i64::from(dice.throw(-12, 12)) * unit)),
+        3 => {
+            // Level with vertices in one or two coordinates.
+            let mut place = [0, 1, 2].map(|_| i64::from(dice.throw(-9, 9)) * unit);
+            for _ in 0..2 {
+                let axis = dice.throw(0, 2) as usize;
+                place[axis] = i64::from(dice.pick(points)[axis]);
+            }
+            Eye::At(place)
+        }
+        _ => {
+            // On the line through two vertices.
+            let (a, b) = (dice.pick(points), dice.pick(points));
+            let times = i64::from(dice.throw(2, 4));
+            Eye::At(
+                [0, 1, 2].map(|k| i64::from(a[k]) + times * (i64::from(b[k]) - i64::from(a[k]))),
+            )
+        }
+    }
+}
+
+/// Vertices and faces (corners from 0) of a scene with whole coordinates.
+pub fn read_scene(name: &str) -> (Vec<Point>, Vec<Vec<u16>>) {
+    let path = format!("{}/../scenes/{name}.obj", env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path}: {error}"));
+    let numbers = |line: &str| -> Vec<i32> {
+        let parse =
+            |word: &str| word.parse().unwrap_or_else(|error| panic!("{path}: {word}: {error}"));
+        line.split_whitespace().skip(1).map(parse).collect()
+    };
+    let vertices = text.lines().filter(|line| line.starts_with("v "));
+    let faces = text.lines().filter(|line| line.starts_with("f "));
+    (
+        vertices.map(|line| <Point>::try_from(numbers(line)).expect("three coordinates")).collect(),
+        faces
+            .map(|line| numbers(line).iter().map(|corner| (corner - 1) as u16).collect())
+            .collect(),
+    )
+}
+
+/// Three perpendicular directions of length 1, at random.
+pub fn any_rotation(dice: &mut Dice) -> [[f64; 3]; 3] {
+    let [w, x, y, z] = loop {
+        let q = [0; 4].map(|_| f64::from(dice.throw(-1000, 1000)) / 1000.0);
+        let length = q.iter().map(|part| part * part).sum::<f64>().sqrt();
+        if length > 0.1 {
+            break q.map(|part| part / length);
+        }
+    };
+    [
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+    ]
+}
+
+/// The solid at radius 1, turned, written with so many decimals, and read in units of 2^-29.
+pub fn as_decimals(points: &[Point], rotation: &[[f64; 3]; 3], decimals: i32) -> Vec<Point> {
+    let square = |point: &Point| point.iter().map(|part| f64::from(part * part)).sum::<f64>();
+    let radius = points.iter().map(square).fold(0.0, f64::max).sqrt();
+    let written = |number: f64| (number * 10f64.powi(decimals)).round() / 10f64.powi(decimals);
+    points
+        .iter()
+        .map(|point| {
+            [0, 1, 2].map(|row| {
+                let turned: f64 = (0..3).map(|k| rotation[row][k] * f64::from(point[k])).sum();
+                (written(turned / radius) * f64::from(1 << 29)).round() as i32
+            })
+        })
+        .collect()
+}

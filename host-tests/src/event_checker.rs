@@ -1,0 +1,238 @@
+//! One strict checker for every event stream and for the pins: what a real driver, motor and pen
+//! would not forgive.
+
+#![allow(clippy::expect_used, reason = "a test fails by panicking")]
+
+use crate::pin_machine::{Change, Stamped};
+use penup::drawing::PagePoint;
+use penup::machine::{Setting, Settings};
+use penup::motion::{EventKind, StepEvent, TICKS_PER_SECOND};
+use std::collections::BTreeSet;
+
+/// What the events of a job came to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Verdict {
+    /// Time (s), place along the path (mm) of each move, by run of the pen's height.
+    pub runs: Vec<Run>,
+    /// Where the steps lead.
+    pub end: PagePoint,
+}
+
+/// What happens between two moves of the pen.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Run {
+    /// The pen's height.
+    pub height: u8,
+    /// Seconds from the first event of the run to the end of the last.
+    pub seconds: f64,
+    /// Seconds of each move from the start of the run.
+    pub times: Vec<f64>,
+    /// Where each move leads.
+    pub points: Vec<PagePoint>,
+}
+
+/// Checks the events against the settings.
+///
+/// # Panics
+/// At the first event that breaks a rule, with its number: pulses closer than twice their width, a
+/// pulse too soon after the change of its direction, a direction that changes during a pulse, a
+/// step beyond the soft limits, a step while the pen's dwell runs or with the drivers off, an event
+/// of no time, a stream that does not end at rest with the pen up.
+pub fn check(events: &[StepEvent], settings: &Settings) -> Verdict {
+    let pulse = u64::from(settings.microseconds_as_ticks(Setting::StepPulse));
+    let setup = u64::from(settings.microseconds_as_ticks(Setting::DirectionSetup));
+    let dwell = |height: u8| {
+        let lowered = i64::from(height) == settings.get(Setting::PenDownHeight).to_num::<i64>();
+        let dwell = if lowered { Setting::PenDownDwell } else { Setting::PenUpDwell };
+        u64::from(settings.milliseconds_as_ticks(dwell))
+    };
+    let travel = |travel, steps| {
+        (settings.get(travel).to_num::<f64>() * settings.get(steps).to_num::<f64>()) as i32
+    };
+    let most = (
+        travel(Setting::TravelX, Setting::StepsPerMmX),
+        travel(Setting::TravelY, Setting::StepsPerMmY),
+    );
+    let mut at = PagePoint::default();
+    let mut time = 0u64;
+    let mut run_start = 0u64;
+    let mut pen_ready = 0u64;
+    // Of x and y: the level, when it changed, when the axis was last pulsed.
+    let mut axes = [(false, None::<u64>, None::<u64>); 2];
+    let mut runs = vec![Run::default()];
+    let second = f64::from(TICKS_PER_SECOND);
+    for (number, event) in events.iter().enumerate() {
+        assert!(event.ticks() > 0, "event {number} takes no time");
+        match event.kind() {
+            EventKind::Pen { height } => {
+                pen_ready = time + dwell(height);
+                // On a ramp the pen moves on before its dwell.
+                let run = runs.last_mut().expect("never empty");
+                run.seconds = time.saturating_sub(run_start) as f64 / second;
+                runs.push(Run { height, ..Run::default() });
+                run_start = pen_ready;
+            }
+            EventKind::Levels(levels) => {
+                for (axis, down_bit, pulse_bit) in [
+                    (0, StepEvent::DOWN_X, StepEvent::STEP_X),
+                    (1, StepEvent::DOWN_Y, StepEvent::STEP_Y),
+                ] {
+                    let (level, changed, pulsed) = &mut axes[axis];
+                    let down = levels & down_bit != 0;
+                    if down != *level {
+                        *level = down;
+                        *changed = Some(time);
+                        assert!(
+                            pulsed.is_none_or(|pulsed| time >= pulsed + pulse),
+                            "event {number}: direction changes during a pulse"
+                        );
+                    }
+                    if levels & pulse_bit != 0 {
+                        assert!(
+                            changed.is_none_or(|changed| time >= changed + setup),
+                            "event {number}: pulse too soon after the change of direction"
+                        );
+                        assert!(
+                            pulsed.is_none_or(|pulsed| time >= pulsed + 2 * pulse),
+                            "event {number}: pulses run together"
+                        );
+                        *pulsed = Some(time);
+                    }
+                }
+                let (dx, dy) = event.step();
+                if (dx, dy) != (0, 0) {
+                    at = PagePoint { x: at.x + dx, y: at.y + dy };
+                    assert!(time >= pen_ready, "event {number}: moves while the pen moves");
+                    assert!(levels & StepEvent::DRIVERS_ON != 0, "event {number}: drivers off");
+                    let page = settings.kinematics().page(at);
+                    assert!(
+                        (0..=most.0).contains(&page.x) && (0..=most.1).contains(&page.y),
+                        "event {number}: beyond the travel at {at:?}"
+                    );
+                    let run = runs.last_mut().expect("never empty");
+                    run.times.push((time - run_start) as f64 / second);
+                    run.points.push(at);
+                }
+            }
+        }
+        time += u64::from(event.ticks());
+    }
+    assert!(time >= pen_ready, "the events end while the pen moves");
+    if let Some(run) = runs.last_mut() {
+        run.seconds = (time - run_start) as f64 / second;
+        assert!(run.height < 64, "the events end with the pen down");
+    }
+    Verdict { runs, end: at }
+}
+
+/// The greatest change of speed along the path, mm/s², over windows of at least `window` seconds.
+///
+/// `places` are the path lengths (mm) that the plan has when each move leaves, `times` when it does.
+/// The speed between two moves belongs to the time in the middle between them, which is exact for
+/// constant acceleration.
+pub fn greatest_acceleration(times: &[f64], places: &[f64], window: f64) -> f64 {
+    let speeds: Vec<(f64, f64)> = times
+        .windows(2)
+        .zip(places.windows(2))
+        .map(|(t, s)| ((t[0] + t[1]) / 2.0, (s[1] - s[0]) / (t[1] - t[0])))
+        .collect();
+    let mut greatest = 0.0f64;
+    let mut first = 0;
+    for (index, &(time, speed)) in speeds.iter().enumerate() {
+        while first < index && speeds[first + 1].0 <= time - window {
+            first += 1;
+        }
+        let (before, slower) = speeds[first];
+        if time - before >= window {
+            greatest = greatest.max((speed - slower).abs() / (time - before));
+        }
+    }
+    greatest
+}
+
+/// What the pins drew.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Drawn {
+    /// The moves made with the pen down, the lesser point first.
+    pub inked: BTreeSet<(PagePoint, PagePoint)>,
+    /// The sum of the steps.
+    pub end: PagePoint,
+    /// When the last pulse began, ticks.
+    pub last_step: u64,
+    /// The pen's height at the end.
+    pub pen: u8,
+}
+
+/// Checks what the pins did against the settings.
+///
+/// # Panics
+/// At the first change that breaks a rule: a pulse shorter or a pause shorter than a pulse, a
+/// direction that changes during a pulse or too shortly before one, a step with the drivers off, a
+/// step before the pen's dwell is over.
+pub fn check_pins(trace: &[Stamped], settings: &Settings) -> Drawn {
+    let pulse = u64::from(settings.microseconds_as_ticks(Setting::StepPulse));
+    let setup = u64::from(settings.microseconds_as_ticks(Setting::DirectionSetup));
+    let mut drawn = Drawn::default();
+    // Of x and y: pulse high, since when, up, since when.
+    let mut axes = [(false, None::<u64>, true, None::<u64>); 2];
+    let (mut enabled, mut pen_ready) = (false, 0);
+    let mut at = PagePoint::default();
+    let mut index = 0;
+    while let Some(&Stamped { time, .. }) = trace.get(index) {
+        let mut delta = (0, 0);
+        // All that one interrupt did.
+        while let Some(stamped) = trace.get(index).filter(|stamped| stamped.time == time) {
+            index += 1;
+            match stamped.change {
+                Change::Enable(on) => enabled = on,
+                Change::Pen(height) => {
+                    assert!(!axes[0].0 && !axes[1].0, "{time}: the pen moves during a pulse");
+                    let dwell = if height > drawn.pen {
+                        Setting::PenDownDwell
+                    } else {
+                        Setting::PenUpDwell
+                    };
+                    pen_ready = time + u64::from(settings.milliseconds_as_ticks(dwell));
+                    drawn.pen = height;
+                }
+                Change::UpX(up) => turn(&mut axes[0], up, time),
+                Change::UpY(up) => turn(&mut axes[1], up, time),
+                Change::StepX(high) => delta.0 += rise(&mut axes[0], high, time, pulse, setup),
+                Change::StepY(high) => delta.1 += rise(&mut axes[1], high, time, pulse, setup),
+            }
+        }
+        if delta != (0, 0) {
+            assert!(enabled, "{time}: step with the drivers off");
+            assert!(time >= pen_ready, "{time}: step while the pen moves");
+            let next = PagePoint { x: at.x + delta.0, y: at.y + delta.1 };
+            if drawn.pen >= 64 {
+                drawn.inked.insert((at.min(next), at.max(next)));
+            }
+            at = next;
+            drawn.last_step = time;
+        }
+    }
+    drawn.end = at;
+    drawn
+}
+
+type AxisPins = (bool, Option<u64>, bool, Option<u64>);
+
+fn turn(axis: &mut AxisPins, up: bool, time: u64) {
+    assert!(!axis.0, "{time}: direction changes during a pulse");
+    (axis.2, axis.3) = (up, Some(time));
+}
+
+fn rise(axis: &mut AxisPins, high: bool, time: u64, pulse: u64, setup: u64) -> i32 {
+    if let Some(since) = axis.1 {
+        assert!(time >= since + pulse, "{time}: pulse or pause too short");
+    }
+    (axis.0, axis.1) = (high, Some(time));
+    if !high {
+        return 0;
+    }
+    if let Some(turned) = axis.3 {
+        assert!(time >= turned + setup, "{time}: pulse too soon after the direction");
+    }
+    if axis.2 { 1 } else { -1 }
+}

@@ -1,0 +1,127 @@
+//! The fastest motion that the limits allow, in `f64`: an exact forward and backward pass over the
+//! whole path, for comparison with what the events do.
+
+/// The limits, in mm and s.
+#[derive(Debug, Clone, Copy)]
+pub struct Limits {
+    /// mm/s along the path.
+    pub speed: f64,
+    /// mm/s² along the path.
+    pub acceleration: f64,
+    /// mm
+    pub junction_deviation: f64,
+    /// Whether bends count.
+    pub centripetal: bool,
+    /// mm of one step, the same for both axes.
+    pub step: f64,
+}
+
+type Point = (f64, f64);
+
+fn minus(a: Point, b: Point) -> Point {
+    (a.0 - b.0, a.1 - b.1)
+}
+
+fn cross(a: Point, b: Point) -> f64 {
+    a.0 * b.1 - a.1 * b.0
+}
+
+fn norm(a: Point) -> f64 {
+    a.0.hypot(a.1)
+}
+
+/// Squared speed allowed at each point of `points` (mm) and on each line between two, as the limits
+/// of `motion` say: corners by junction deviation, bends by the circle through points 1, 2, 4, … 64
+/// apart, each less what rounding to steps can explain.
+fn squared_limits(points: &[Point], limits: Limits) -> (Vec<f64>, Vec<f64>) {
+    let rounding = 23.0 / 16.0 * limits.step;
+    let mut radius = vec![f64::INFINITY; points.len()];
+    let mut curve = vec![f64::INFINITY; points.len() - 1];
+    let mut sharp = vec![0];
+    for i in 1..points.len() - 1 {
+        let (a, b) = (minus(points[i], points[i - 1]), minus(points[i + 1], points[i]));
+        let shorter = norm(a).min(norm(b));
+        let turn = cross(a, b).abs().atan2(a.0 * b.0 + a.1 * b.1);
+        let sine = (turn / 2.0).sin() - rounding / shorter;
+        if sine <= 0.0 {
+            continue;
+        }
+        let cosine = (turn / 2.0).cos();
+        radius[i] = limits.junction_deviation * cosine * (1.0 + cosine) / (sine * sine);
+        if limits.centripetal {
+            radius[i] = radius[i].min(shorter * cosine / (2.0 * sine));
+        }
+        if sine > 0.342 {
+            sharp.push(i);
+        }
+    }
+    sharp.push(points.len() - 1);
+    if limits.centripetal {
+        for ends in sharp.windows(2) {
+            for stride in [2usize, 4, 8, 16, 32, 64] {
+                // The circle stands for half of its arc; at the ends of a curve for all of it.
+                let mut last = ends[0] + 2 * stride;
+                while last <= ends[1] {
+                    let middle = last - stride;
+                    let is_first = middle - stride == ends[0];
+                    let from = if is_first { ends[0] } else { middle - stride / 2 };
+                    let is_last = last + stride > ends[1];
+                    let to = if is_last { ends[1] } else { middle + stride / 2 };
+                    let outer = (points[middle - stride], points[last]);
+                    if let Some(r) = circle(outer.0, points[middle], outer.1, rounding) {
+                        for slot in &mut curve[from..to] {
+                            *slot = slot.min(r);
+                        }
+                    }
+                    last += stride;
+                }
+            }
+        }
+    }
+    for (i, r) in curve.iter().enumerate() {
+        radius[i] = radius[i].min(*r);
+        radius[i + 1] = radius[i + 1].min(*r);
+    }
+    let ends = [0, points.len() - 1];
+    for end in ends {
+        radius[end] = 0.0;
+    }
+    let square = |r: f64| (limits.acceleration * r).min(limits.speed.powi(2));
+    (radius.into_iter().map(square).collect(), curve.into_iter().map(square).collect())
+}
+
+fn circle(first: Point, middle: Point, last: Point, rounding: f64) -> Option<f64> {
+    // Whether a circle counts is a matter of a threshold, so places are rounded as `motion` does.
+    let place = |p: Point| ((p.0 * 4096.0).floor() / 4096.0, (p.1 * 4096.0).floor() / 4096.0);
+    let (first, middle, last) = (place(first), place(middle), place(last));
+    let (a, b, c) = (minus(middle, first), minus(last, middle), minus(last, first));
+    if 16.0 * norm(c) < 15.0 * norm(a).max(norm(b)) {
+        return None;
+    }
+    let height = cross(a, b).abs() / norm(c) - rounding;
+    (height > 0.0).then(|| norm(a) * norm(b) / (2.0 * height))
+}
+
+/// Seconds from rest at the first point to rest at the last. Successive points differ.
+pub fn seconds(points: &[Point], limits: Limits) -> f64 {
+    let (mut squares, tops) = squared_limits(points, limits);
+    let lengths: Vec<f64> = points.windows(2).map(|pair| norm(minus(pair[1], pair[0]))).collect();
+    for i in 0..lengths.len() {
+        squares[i + 1] = squares[i + 1].min(squares[i] + 2.0 * limits.acceleration * lengths[i]);
+    }
+    for i in (0..lengths.len()).rev() {
+        squares[i] = squares[i].min(squares[i + 1] + 2.0 * limits.acceleration * lengths[i]);
+    }
+    lengths
+        .iter()
+        .zip(squares.windows(2))
+        .zip(tops)
+        .map(|((&length, ends), top)| {
+            let a = limits.acceleration;
+            let peak = ((ends[0] + ends[1]) / 2.0 + a * length).min(top);
+            let ramps = (2.0 * peak - ends[0] - ends[1]) / (2.0 * a);
+            let speed_up = 2.0 * peak.sqrt() - ends[0].sqrt() - ends[1].sqrt();
+            speed_up / a + (length - ramps) / peak.sqrt()
+        })
+        .sum()
+}

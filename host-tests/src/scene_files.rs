@@ -1,0 +1,180 @@
+//! The example scenes and a plain camera in f64, for tests that need no more.
+
+use penup::geometry::{Along, COORDINATE_LIMIT, Projection, Vertex};
+use penup::model::Corner;
+use penup::visibility::{SinkFull, Stretch, StretchSink};
+
+/// A point or direction in space.
+pub type Vector = [f64; 3];
+
+/// Vertices and elements of an OBJ file.
+#[derive(Debug, Clone, Default)]
+pub struct Model {
+    /// Positions in space.
+    pub vertices: Vec<Vector>,
+    /// Corners of every face and bar.
+    pub corners: Vec<Corner>,
+}
+
+impl Model {
+    /// Adds a face or (two vertices) a bar.
+    pub fn add(&mut self, element: &[usize]) {
+        let of_bar = element.len() == 2;
+        for (n, &vertex) in element.iter().enumerate() {
+            let last = n + 1 == element.len();
+            self.corners.push(Corner::new(vertex as u16, of_bar, last));
+        }
+    }
+
+    /// Reads the `v`, `f` and `l` lines of an OBJ text with plain positive numbers.
+    pub fn from_obj(text: &str) -> Self {
+        let mut model = Self::default();
+        for line in text.lines() {
+            let mut words = line.split_whitespace();
+            match words.next() {
+                Some("v") => {
+                    let numbers: Vec<f64> = words.filter_map(|word| word.parse().ok()).collect();
+                    model.vertices.push([numbers[0], numbers[1], numbers[2]]);
+                }
+                Some("f" | "l") => {
+                    let numbers: Vec<usize> = words
+                        .filter_map(|word| word.parse::<usize>().ok())
+                        .map(|number| number - 1)
+                        .collect();
+                    model.add(&numbers);
+                }
+                _ => {}
+            }
+        }
+        model
+    }
+
+    /// A scene of the `scenes` directory.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn example(name: &str) -> std::io::Result<Self> {
+        let path = format!("{}/../scenes/{name}.obj", env!("CARGO_MANIFEST_DIR"));
+        Ok(Self::from_obj(&std::fs::read_to_string(path)?))
+    }
+
+    /// `around` by `across` quads on a torus of radii 2 and 1.
+    pub fn torus(around: usize, across: usize) -> Self {
+        let mut model = Self::default();
+        for n in 0..around * across {
+            let turn =
+                |part: usize, whole: usize| std::f64::consts::TAU * part as f64 / whole as f64;
+            let (u, v) = (turn(n / across, around), turn(n % across, across));
+            let radius = 2.0 + v.cos();
+            model.vertices.push([radius * u.cos(), radius * u.sin(), v.sin()]);
+        }
+        for n in 0..around * across {
+            let (i, j) = (n / across, n % across);
+            let at = |i: usize, j: usize| i % around * across + j % across;
+            model.add(&[at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]);
+        }
+        model
+    }
+}
+
+/// A camera from two points, and what its view was scaled by.
+#[derive(Debug, Clone)]
+pub struct View {
+    /// Rounded vertices.
+    pub vertices: Vec<Vertex>,
+    /// How they get onto the page.
+    pub projection: Projection,
+    scale: f64,
+    depth_scale: f64,
+}
+
+fn dot(a: Vector, b: Vector) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+fn cross(a: Vector, b: Vector) -> Vector {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+fn minus(a: Vector, b: Vector) -> Vector {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+fn unit(a: Vector) -> Vector {
+    let length = dot(a, a).sqrt();
+    a.map(|part| part / length)
+}
+
+impl View {
+    /// The model as seen from `eye` towards `at`.
+    pub fn new(model: &Model, eye: Vector, at: Vector, up: Vector, projection: Projection) -> Self {
+        let forward = unit(minus(at, eye));
+        let right = unit(cross(forward, up));
+        let upward = cross(right, forward);
+        let seen: Vec<Vector> = model
+            .vertices
+            .iter()
+            .map(|&vertex| minus(vertex, eye))
+            .map(|d| [dot(d, right), dot(d, upward), dot(d, forward)])
+            .collect();
+        let largest = |parts: &[usize]| {
+            parts.iter().flat_map(|&n| seen.iter().map(move |v| v[n].abs())).fold(1e-9, f64::max)
+        };
+        let limit = f64::from(COORDINATE_LIMIT);
+        let (scale, depth_scale) = (limit / largest(&[0, 1]), limit / largest(&[2]));
+        let vertices = seen
+            .iter()
+            .map(|v| Vertex {
+                x: (v[0] * scale).round() as i32,
+                y: (v[1] * scale).round() as i32,
+                z: (v[2] * depth_scale).round() as i32,
+            })
+            .collect();
+        Self { vertices, projection, scale, depth_scale }
+    }
+
+    /// The camera of `scenes/cameras.json` for an example.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn example(name: &str, model: &Model) -> std::io::Result<Self> {
+        let path = format!("{}/../scenes/cameras.json", env!("CARGO_MANIFEST_DIR"));
+        let text = std::fs::read_to_string(path)?;
+        let entry = &text[text.find(&format!("\"{name}\"")).unwrap_or(0)..];
+        let vector = |key: &str| -> Vector {
+            let list = &entry[entry.find(key).unwrap_or(0)..];
+            let list = &list[list.find('[').unwrap_or(0) + 1..list.find(']').unwrap_or(0)];
+            let numbers: Vec<f64> = list
+                .split(',')
+                .filter_map(|word| word.trim().trim_matches('"').parse().ok())
+                .collect();
+            [numbers[0], numbers[1], numbers[2]]
+        };
+        Ok(Self::new(
+            model,
+            vector("\"eye\""),
+            vector("\"at\""),
+            vector("\"up\""),
+            Projection::Perspective,
+        ))
+    }
+
+    /// A place along an edge, on the image plane at distance 1 or in model units.
+    pub fn image(&self, (p, q): (Vertex, Vertex), along: Along) -> [f64; 2] {
+        let s = along.numerator as f64 / along.denominator as f64;
+        let part = |a: i32, b: i32| f64::from(a) + s * (f64::from(b) - f64::from(a));
+        let depth = match self.projection {
+            Projection::Perspective => part(p.z, q.z) / self.depth_scale,
+            Projection::Parallel => 1.0,
+        };
+        [part(p.x, q.x), part(p.y, q.y)].map(|at| at / self.scale / depth)
+    }
+}
+
+/// A sink that keeps everything.
+#[derive(Debug, Clone, Default)]
+pub struct Stretches(pub Vec<Stretch>);
+
+impl StretchSink for Stretches {
+    fn stretch(&mut self, stretch: Stretch) -> Result<(), SinkFull> {
+        self.0.push(stretch);
+        Ok(())
+    }
+}

@@ -1,0 +1,311 @@
+//! Convex solids from vertices and edges, against every plane through three vertices.
+
+#![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on stops")]
+
+use std::collections::BTreeMap;
+
+use penup::convex::{
+    Eye, Sight, SolidError, SolidSummary, default_tolerance, from_edges, from_vertices,
+    scratch_bytes_from_edges, scratch_bytes_from_vertices,
+};
+use penup::stage::{Aborted, Attention, Scratch, Undisturbed};
+use penup_host_tests::convex_model::{Found, Model, Point, model};
+use penup_host_tests::convex_solids::{
+    Dice, any_eye, any_rotation, any_solid, as_decimals, read_scene, roof,
+};
+
+const SCENES: [&str; 5] = ["cube", "octahedron", "icosahedron", "dodecahedron", "eighteen"];
+
+type Sights = BTreeMap<(u16, u16), Sight>;
+
+fn found(
+    points: &[Point],
+    edges: &[[u16; 2]],
+    eye: Eye,
+    tolerance: u32,
+) -> Result<(SolidSummary, Sights), SolidError> {
+    let mut words = vec![0; scratch_bytes_from_edges(points.len(), edges.len()) / 8];
+    let mut sink = Found::default();
+    let scratch = Scratch::new(&mut words);
+    let summary = from_edges(points, edges, eye, tolerance, scratch, &mut Undisturbed, &mut sink)?;
+    assert_eq!((summary.faces, summary.edges), (0, sink.edges.len()));
+    Ok((summary, sink.edges))
+}
+
+/// The edges in any order and direction, some twice.
+fn shuffled(dice: &mut Dice, sights: &Sights) -> Vec<[u16; 2]> {
+    let mut edges: Vec<[u16; 2]> = sights.keys().map(|(a, b)| [*a, *b]).collect();
+    edges.push(dice.pick(&edges));
+    for edge in &mut edges {
+        dice.shuffle(edge);
+    }
+    dice.shuffle(&mut edges);
+    edges
+}
+
+/// Compares with the model where there is one; what kind of case it was.
+fn compare(dice: &mut Dice, points: &[Point], eye: Eye) -> Option<&'static str> {
+    // From an eye inside, the edges are those seen from elsewhere.
+    let outside =
+        if model(points, eye) == Model::EyeInside { Eye::Towards([1, 2, 3]) } else { eye };
+    let Model::Solid(solid) = model(points, outside) else { return None };
+    if solid.edges.is_empty() {
+        return None;
+    }
+    let edges = shuffled(dice, &solid.edges);
+    let case = || format!("{points:?} {edges:?} {eye:?}");
+    if outside != eye {
+        assert_eq!(found(points, &edges, eye, 0), Err(SolidError::EyeInside), "{}", case());
+        return Some("eye inside");
+    }
+    let (summary, sights) =
+        found(points, &edges, eye, 0).unwrap_or_else(|error| panic!("{error:?} {}", case()));
+    assert_eq!(sights, solid.edges, "{}", case());
+    assert_eq!(summary.welded, solid.welded, "{}", case());
+    Some(
+        ["no component", "one component", "two components", "more components"]
+            [summary.components.min(3)],
+    )
+}
+
+#[test]
+fn random_solids_are_seen_exactly() {
+    let mut dice = Dice::new(1980);
+    let mut cases: BTreeMap<&str, usize> = BTreeMap::new();
+    for _ in 0..4000 {
+        let points = any_solid(&mut dice);
+        let eye = any_eye(&mut dice, &points);
+        if let Some(case) = compare(&mut dice, &points, eye) {
+            *cases.entry(case).or_default() += 1;
+        }
+    }
+    for _ in 0..500 {
+        let points = roof(&mut dice);
+        let from_above = [dice.throw(-1, 1), dice.throw(-1, 1), dice.throw(2, 9)].map(i64::from);
+        if let Some(case) = compare(&mut dice, &points, Eye::Towards(from_above)) {
+            *cases.entry(case).or_default() += 1;
+        }
+    }
+    for case in ["no component", "one component", "two components", "more components", "eye inside"]
+    {
+        assert!(cases.get(case) >= Some(&100), "too few cases of {case}: {cases:?}");
+    }
+}
+
+#[test]
+#[ignore = "minutes long: run by hand after a change"]
+fn many_more_random_solids_are_seen_exactly() {
+    for seed in 0..25 {
+        let mut dice = Dice::new(seed);
+        for _ in 0..4000 {
+            let points = any_solid(&mut dice);
+            let eye = any_eye(&mut dice, &points);
+            compare(&mut dice, &points, eye);
+        }
+    }
+}
+
+/// The edges that the faces of a scene have.
+fn edges_of(faces: &[Vec<u16>]) -> Vec<[u16; 2]> {
+    let next = |face: &Vec<u16>, at: usize| face[(at + 1) % face.len()];
+    let sides =
+        faces.iter().flat_map(|face| (0..face.len()).map(move |at| [face[at], next(face, at)]));
+    sides.filter(|side| side[0] < side[1]).collect()
+}
+
+fn found_from_vertices(points: &[Point], eye: Eye, tolerance: u32) -> Result<Sights, SolidError> {
+    let mut words = vec![0; scratch_bytes_from_vertices(points.len()) / 8];
+    let mut sink = Found::default();
+    let scratch = Scratch::new(&mut words);
+    from_vertices(points, eye, tolerance, scratch, &mut Undisturbed, &mut sink)?;
+    Ok(sink.edges)
+}
+
+/// For each edge whether it is drawn, if hidden lines are not.
+fn drawn(sights: Sights) -> BTreeMap<(u16, u16), bool> {
+    let is_drawn = |sight| !matches!(sight, Sight::Hidden | Sight::BehindOutline);
+    sights.into_iter().map(|(ends, sight)| (ends, is_drawn(sight))).collect()
+}
+
+/// The dodecahedron and the other scenes turned and rounded, seen along their axes too and level with
+/// their faces, where faces are edge-on and vertices behind vertices but for the rounding: drawn like the
+/// exact solid, both ways.
+#[test]
+fn rounded_solids_are_seen_like_exact_ones() {
+    let mut dice = Dice::new(12);
+    for name in SCENES {
+        let (points, faces) = read_scene(name);
+        let edges = edges_of(&faces);
+        let square = |point: &Point| point.iter().map(|part| f64::from(part * part)).sum::<f64>();
+        let radius = points.iter().map(square).fold(0.0, f64::max).sqrt();
+        for _ in 0..300 {
+            let rotation = any_rotation(&mut dice);
+            let rounded = as_decimals(&points, &rotation, 6);
+            let turned = |place: [i64; 3]| {
+                let row =
+                    |row: usize| (0..3).map(|k| rotation[row][k] * place[k] as f64).sum::<f64>();
+                [0, 1, 2].map(row)
+            };
+            let (eye, turned_eye) = match any_eye(&mut dice, &points) {
+                Eye::Towards(direction) => {
+                    // So fine that its own rounding is nothing.
+                    let fixed = turned(direction).map(|part| (part * 2f64.powi(50)) as i64);
+                    (Eye::Towards(direction), Eye::Towards(fixed))
+                }
+                Eye::At(place) => {
+                    let fixed = turned(place).map(|part| (part / radius * 2f64.powi(29)) as i64);
+                    (Eye::At(place), Eye::At(fixed))
+                }
+            };
+            let case = || format!("{name} {eye:?} {rounded:?}");
+            let exact = match found(&points, &edges, eye, 0) {
+                Ok((_, exact)) => drawn(exact),
+                // On the surface a rounded eye may be on either side.
+                Err(error) => {
+                    assert_eq!(error, SolidError::EyeInside, "{}", case());
+                    continue;
+                }
+            };
+            let tolerance = default_tolerance(&rounded);
+            let seen = found(&rounded, &edges, turned_eye, tolerance);
+            assert_eq!(seen.map(|(_, sights)| drawn(sights)).as_ref(), Ok(&exact), "{}", case());
+            let seen = found_from_vertices(&rounded, turned_eye, tolerance);
+            assert_eq!(seen.map(drawn).as_ref(), Ok(&exact), "{}", case());
+        }
+    }
+}
+
+#[test]
+fn both_ways_to_see_agree_on_the_scenes() {
+    let mut dice = Dice::new(4);
+    for name in SCENES {
+        let (points, faces) = read_scene(name);
+        for _ in 0..200 {
+            let eye = any_eye(&mut dice, &points);
+            let from_edges = found(&points, &edges_of(&faces), eye, 0).map(|(_, sights)| sights);
+            assert_eq!(from_edges, found_from_vertices(&points, eye, 0), "{name} {eye:?}");
+        }
+    }
+}
+
+const SQUARE_PYRAMID: [Point; 5] = [[0, 0, 0], [4, 0, 0], [4, 4, 0], [0, 4, 0], [2, 2, 3]];
+const ITS_EDGES: [[u16; 2]; 8] = [[0, 1], [1, 2], [2, 3], [3, 0], [0, 4], [1, 4], [2, 4], [3, 4]];
+
+#[test]
+fn a_diagonal_of_a_face_is_seen_like_the_face() {
+    let edges = [&ITS_EDGES[..], &[[0, 2]]].concat();
+    for (eye, sight) in [
+        (Eye::Towards([0, 0, 1]), Sight::Hidden),
+        (Eye::Towards([0, 0, -1]), Sight::Visible),
+        (Eye::Towards([9, 1, 1]), Sight::Hidden),
+        (Eye::Towards([9, 1, -1]), Sight::Visible),
+        (Eye::Towards([9, 1, 0]), Sight::BehindOutline),
+    ] {
+        let (_, sights) = found(&SQUARE_PYRAMID, &edges, eye, 0).expect("a solid");
+        assert_eq!(sights[&(0, 2)], sight, "{eye:?}");
+    }
+}
+
+#[test]
+fn a_vertex_in_the_middle_of_an_edge_or_face_is_seen_like_it() {
+    let mut points = SQUARE_PYRAMID.to_vec();
+    points.extend([[2, 0, 0], [2, 2, 0]]);
+    let split = [[0, 5], [5, 1], [5, 6], [2, 6], [3, 6]];
+    let edges = [&ITS_EDGES[1..], &split].concat();
+    for (eye, of_edge, of_face) in [
+        (Eye::Towards([0, 0, 1]), Sight::Outline, Sight::Hidden),
+        (Eye::Towards([0, 0, -1]), Sight::Outline, Sight::Visible),
+        (Eye::Towards([1, -9, -9]), Sight::Visible, Sight::Visible),
+        (Eye::Towards([1, 9, 1]), Sight::Hidden, Sight::Hidden),
+    ] {
+        let (_, sights) = found(&points, &edges, eye, 0).expect("a solid");
+        assert_eq!([sights[&(0, 5)], sights[&(1, 5)]], [of_edge; 2], "{eye:?}");
+        assert_eq!([sights[&(2, 6)], sights[&(3, 6)], sights[&(5, 6)]], [of_face; 3], "{eye:?}");
+    }
+}
+
+#[test]
+fn what_is_no_solid_is_refused() {
+    let eye = Eye::Towards([0, 0, 1]);
+    let error = |points: &[Point], edges: &[[u16; 2]]| found(points, edges, eye, 0).err();
+    let pyramid = &SQUARE_PYRAMID;
+    assert_eq!(error(pyramid, &[]), Some(SolidError::TooFewVertices { distinct: 0 }));
+    assert_eq!(error(pyramid, &ITS_EDGES[..2]), Some(SolidError::TooFewVertices { distinct: 3 }));
+    assert_eq!(error(pyramid, &[[0, 1], [1, 5]]), Some(SolidError::UnknownVertex { edge: 1 }));
+    assert_eq!(error(pyramid, &[[0, u16::MAX]]), Some(SolidError::UnknownVertex { edge: 0 }));
+    // A side of the base is missing.
+    let broken = error(pyramid, &[&ITS_EDGES[..1], &ITS_EDGES[2..]].concat());
+    assert!(broken.is_none() || matches!(broken, Some(SolidError::OutlineBroken { .. })));
+    // Three loose bars and a bow.
+    assert!(matches!(
+        error(pyramid, &[[0, 1], [2, 3], [0, 4]]),
+        Some(SolidError::OutlineBroken { .. })
+    ));
+    let line: Vec<Point> = (0..5).map(|i| [i, 2 * i, -i]).collect();
+    assert_eq!(error(&line, &ITS_EDGES), Some(SolidError::AllInLine));
+    assert_eq!(
+        found(pyramid, &ITS_EDGES, Eye::At([2, 2, 1]), 0).err(),
+        Some(SolidError::EyeInside)
+    );
+    // In a plane: nothing hides anything.
+    let flat = SQUARE_PYRAMID.map(|[x, y, _]| [x, y, x]);
+    let (_, sights) = found(&flat, &ITS_EDGES, eye, 0).expect("a flat thing");
+    assert!(sights.len() == 8 && sights.values().all(|sight| *sight == Sight::Visible));
+    // An edge of no length, and the same corner under two numbers.
+    let twice = [&SQUARE_PYRAMID[..], &[[0, 0, 0]]].concat();
+    let edges = [&ITS_EDGES[..], &[[0, 5], [5, 5], [5, 1]]].concat();
+    let (summary, sights) = found(&twice, &edges, eye, 0).expect("a solid");
+    assert_eq!((summary.welded, sights.len()), (1, 8));
+}
+
+/// Whatever the edges, an answer or an error.
+#[test]
+fn nonsense_does_no_harm() {
+    let mut dice = Dice::new(99);
+    for _ in 0..5_000 {
+        let points = any_solid(&mut dice);
+        let last = points.len() as i32 - 1;
+        let edges: Vec<[u16; 2]> =
+            (0..dice.throw(0, 30)).map(|_| [0, 1].map(|_| dice.throw(0, last) as u16)).collect();
+        let eye = any_eye(&mut dice, &points);
+        let tolerance = dice.pick(&[0, 1, 1000, u32::MAX]);
+        if let Ok((summary, sights)) = found(&points, &edges, eye, tolerance) {
+            assert!(sights.len() == summary.edges && summary.edges <= edges.len());
+        }
+    }
+}
+
+/// Gives up at the n-th question.
+struct Impatient(usize);
+
+impl Attention for Impatient {
+    fn check(&mut self) -> Result<(), Aborted> {
+        self.0 = self.0.checked_sub(1).ok_or(Aborted)?;
+        Ok(())
+    }
+}
+
+#[test]
+fn a_word_too_few_or_no_patience_is_an_error() {
+    let (points, faces) = read_scene("dodecahedron");
+    let edges = edges_of(&faces);
+    let eye = Eye::Towards([1, 2, 3]);
+    let mut words = vec![0; scratch_bytes_from_edges(points.len(), edges.len()) / 8];
+    let all = words.len();
+    for count in 0..all {
+        let scratch = Scratch::new(&mut words[..count]);
+        let result =
+            from_edges(&points, &edges, eye, 0, scratch, &mut Undisturbed, &mut Found::default());
+        assert!(matches!(result, Err(SolidError::Scratch(_))), "{count} of {all}: {result:?}");
+    }
+    let mut patience = 0;
+    loop {
+        let (scratch, mut attention) = (Scratch::new(&mut words), Impatient(patience));
+        match from_edges(&points, &edges, eye, 0, scratch, &mut attention, &mut Found::default()) {
+            Ok(summary) => break assert_eq!(summary.edges, 30),
+            Err(error) => assert_eq!(error, SolidError::Aborted),
+        }
+        patience += 1;
+    }
+    assert!(patience > 30, "asked only {patience} times");
+}

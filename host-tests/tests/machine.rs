@@ -1,0 +1,489 @@
+//! Jobs through the interrupt's own code: hold, resume, abort, alarm, sleep.
+
+#![allow(clippy::expect_used, reason = "a test fails by panicking")]
+
+use penup::drawing::{LineType, PagePoint};
+use penup::machine::{
+    Alarm, Axis, Machine, MachineError, Path, PulserState, Setting, Settings, State, Switches,
+    TapePath, Target, TargetList, Value,
+};
+use penup::motion::{Block, EventKind};
+use penup::step::tape;
+use penup_host_tests::event_checker::{self, Drawn};
+use penup_host_tests::pin_machine::{self, Turn};
+use proptest::prelude::*;
+use std::sync::LazyLock;
+
+fn point(x: i32, y: i32) -> PagePoint {
+    PagePoint { x, y }
+}
+
+fn to(x: i32, y: i32) -> Target {
+    Target { point: point(x, y), ink: None }
+}
+
+fn ink(x: i32, y: i32) -> Target {
+    Target { point: point(x, y), ink: Some(LineType::Full) }
+}
+
+fn dotted(x: i32, y: i32) -> Target {
+    Target { point: point(x, y), ink: Some(LineType::Dotted) }
+}
+
+fn job() -> Vec<Target> {
+    vec![
+        to(400, 300),
+        ink(1200, 300),
+        ink(1200, 900),
+        ink(1190, 910),
+        ink(400, 300),
+        to(50, 60),
+        dotted(900, 333),
+        ink(900, 333),
+        ink(20, 1000),
+        to(0, 0),
+    ]
+}
+
+/// Draws the job in a pin machine; `visit` is called at each turn of the main loop, which takes
+/// `turn_ticks`, and ends the run by returning `false`.
+fn run_job(turn_ticks: u64, visit: &mut dyn FnMut(Turn<'_, '_>) -> bool) -> Drawn {
+    let targets = job();
+    let settings = Settings::default();
+    let mut path = TargetList::new(&targets);
+    let trace = pin_machine::run(settings, &mut path, turn_ticks, &mut |turn| {
+        if turn.now == 0 {
+            turn.machine.start(&mut TargetList::new(&job())).expect("valid");
+        }
+        assert_eq!(turn.machine.position(), turn.pins);
+        visit(turn)
+    });
+    event_checker::check_pins(&trace, &settings)
+}
+
+fn is_ready(machine: &Machine<'_>) -> bool {
+    machine.state() == State::Idle && machine.stands()
+}
+
+fn undisturbed() -> Drawn {
+    run_job(25_000, &mut |turn| !is_ready(turn.machine))
+}
+
+#[test]
+fn a_job_is_drawn_and_the_pins_end_where_the_path_does() {
+    let drawn = undisturbed();
+    assert_eq!(drawn.end, point(0, 0));
+    // 800 + 600 + 10 + 790 moves, the line from (900, 333) to (20, 1000), and about half the dots.
+    assert!(drawn.inked.len() > 800 + 600 + 10 + 790 + 880);
+    assert_eq!(drawn.pen, 0);
+}
+
+/// An instant of the job and the length of a main loop turn, in ticks.
+fn instants() -> impl Strategy<Value = (u64, u64)> {
+    (1u64..100_000_000, 5_000u64..200_000)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 350, ..ProptestConfig::default() })]
+
+    #[test]
+    fn hold_and_resume_leave_the_same_ink((instant, turn_ticks) in instants(), again in 0u64..9_000_000) {
+        static UNDISTURBED: LazyLock<Drawn> = LazyLock::new(undisturbed);
+        let mut holds = vec![instant + again, instant];
+        let drawn = run_job(turn_ticks, &mut |turn| {
+            if holds.last().is_some_and(|&due| turn.now >= due) {
+                holds.pop();
+                turn.machine.hold();
+            }
+            if turn.machine.state() == (State::Hold { standing: true }) && turn.machine.stands() {
+                assert_eq!(turn.machine.planned_position(), turn.pins);
+                turn.machine.resume();
+            }
+            !is_ready(turn.machine)
+        });
+        prop_assert_eq!(&drawn.inked, &UNDISTURBED.inked);
+        prop_assert_eq!((drawn.end, drawn.pen), (UNDISTURBED.end, 0));
+    }
+
+    #[test]
+    fn abort_keeps_the_position_and_leaves_the_machine_ready((instant, turn_ticks) in instants()) {
+        let mut stood_at = None;
+        let drawn = run_job(turn_ticks, &mut |turn| {
+            if turn.now >= instant {
+                turn.machine.abort();
+            }
+            if turn.now > instant && is_ready(turn.machine) {
+                assert_eq!(turn.machine.planned_position(), turn.pins);
+                stood_at = Some(turn.pins);
+            }
+            stood_at.is_none()
+        });
+        prop_assert_eq!((Some(drawn.end), drawn.pen), (stood_at, 0));
+        // The next job begins where this one was given up.
+        prop_assert!(drawn.last_step < instant + turn_ticks + 10_000_000);
+    }
+
+    #[test]
+    fn an_alarm_stops_the_pins_at_once((instant, turn_ticks) in instants(), switch: bool) {
+        let alarm = if switch { Alarm::HardLimit } else { Alarm::EmergencyStop };
+        let mut alarm_at = None;
+        let drawn = run_job(turn_ticks, &mut |turn| {
+            let Some((time, pins)) = alarm_at else {
+                if turn.now >= instant {
+                    turn.machine.alarm(alarm);
+                    alarm_at = Some((turn.now, turn.pins));
+                }
+                return true;
+            };
+            assert_eq!(turn.pins, pins);
+            assert_eq!(turn.machine.state(), State::Alarm(alarm));
+            if turn.machine.unlock().is_err() {
+                // The event in work may be a dwell.
+                assert!(turn.now < time + 5_000_000);
+                return true;
+            }
+            assert_eq!(turn.machine.planned_position(), pins);
+            assert!(turn.machine.stands());
+            false
+        });
+        let (time, pins) = alarm_at.expect("given");
+        prop_assert!(drawn.last_step < time);
+        prop_assert_eq!((drawn.end, drawn.pen), (pins, 0));
+    }
+}
+
+#[test]
+fn after_abort_and_alarm_the_next_job_starts_from_there() {
+    for alarm in [false, true] {
+        let home = [ink(5, 6), to(0, 0)];
+        let mut stage = 0;
+        let targets = job();
+        let mut first = TargetList::new(&targets);
+        let mut second = TargetList::new(&home);
+        let settings = Settings::default();
+        let trace = pin_machine::run_with(settings, 25_000, &mut |turn, queue| {
+            match stage {
+                0 => {
+                    turn.machine.start(&mut first).expect("valid");
+                    stage = 1;
+                }
+                1 if turn.now >= 30_000_000 => {
+                    if alarm {
+                        turn.machine.alarm(Alarm::EmergencyStop);
+                    } else {
+                        turn.machine.abort();
+                    }
+                    stage = 2;
+                }
+                2 if turn.now >= 60_000_000 => {
+                    assert_eq!(turn.machine.unlock().is_ok(), alarm);
+                    turn.machine.start(&mut second).expect("idle");
+                    stage = 3;
+                }
+                3 if is_ready(turn.machine) => return false,
+                _ => {}
+            }
+            if stage < 3 {
+                turn.machine.fill(&mut first, queue);
+            } else {
+                turn.machine.fill(&mut second, queue);
+            }
+            true
+        });
+        let drawn = event_checker::check_pins(&trace, &settings);
+        assert_eq!((drawn.end, drawn.pen), (point(0, 0), 0));
+        assert!(drawn.inked.iter().any(|ends| ends.0 == point(5, 6) || ends.1 == point(5, 6)));
+    }
+}
+
+#[test]
+fn a_recorded_tape_replays_to_the_same_moves_and_pen() {
+    let targets = job();
+    let settings = Settings::default();
+    let record = |path: &mut dyn Path| {
+        let events = pin_machine::record(settings, path, 64).expect("within the travel");
+        events.iter().filter_map(|event| event.instruction()).collect::<Vec<_>>()
+    };
+    let original = record(&mut TargetList::new(&targets));
+    let tape: Vec<u8> = tape::encode(original.iter().copied()).collect();
+    assert!(tape.len() <= original.len() / 2 + 100);
+    let replayed = record(&mut TapePath::new(point(0, 0), tape.into_iter()));
+    assert_eq!(replayed, original);
+}
+
+#[test]
+fn what_leads_beyond_the_travel_is_refused_before_anything_moves() {
+    let pins = PulserState::new();
+    let mut blocks = [Block::EMPTY; 4];
+    let mut machine = Machine::new(Settings::default(), &mut blocks, &pins, u32::MAX);
+    // 420 mm of 80 steps.
+    let targets = [to(33_600, 0), ink(33_601, 5), ink(0, 0)];
+    assert_eq!(
+        machine.start(&mut TargetList::new(&targets)),
+        Err(MachineError::BeyondTravel { target: 1, x: 1, y: 0 })
+    );
+    assert_eq!(
+        machine.jog(point(0, -7)),
+        Err(MachineError::BeyondTravel { target: 0, x: 0, y: -7 })
+    );
+    assert_eq!(machine.state(), State::Idle);
+    machine.set(Setting::SoftLimits, Value::ZERO).expect("idle");
+    assert!(machine.start(&mut TargetList::new(&targets)).is_ok());
+    assert_eq!(machine.state(), State::Run);
+    assert!(machine.jog(point(0, 0)).is_err());
+    assert!(machine.sleep().is_err());
+    assert!(machine.check(true).is_err());
+    assert!(machine.unlock().is_err());
+}
+
+/// Homes a machine that stands `start` steps from its switches; `press` says what they do.
+/// Returns the final state and where the machine then is, in steps from the switches.
+fn home(
+    start: PagePoint,
+    kinematics: i32,
+    press: &mut dyn FnMut(PagePoint, u64) -> Switches,
+) -> (State, PagePoint) {
+    let mut settings = Settings::default();
+    settings.set(Setting::Homing, Value::ONE).expect("valid");
+    settings.set(Setting::Kinematics, Value::from_num(kinematics)).expect("valid");
+    settings.set(Setting::TravelX, Value::from_num(60)).expect("valid");
+    settings.set(Setting::TravelY, Value::from_num(60)).expect("valid");
+    let build = settings.kinematics();
+    let mut result = (State::Idle, start);
+    let trace = pin_machine::run_with(settings, 25_000, &mut |turn, queue| {
+        let moved = build.page(turn.pins);
+        let place = point(start.x + moved.x, start.y + moved.y);
+        let switches = press(place, turn.now);
+        if turn.now == 0 {
+            assert_eq!(turn.machine.state(), State::Alarm(Alarm::NotHomed));
+            turn.machine.home(switches).expect("ready");
+        }
+        turn.machine.watch(switches);
+        turn.machine.fill(&mut TargetList::new(&[]), queue);
+        if turn.machine.state() == State::Idle {
+            assert_eq!(turn.machine.position(), point(0, 0));
+        }
+        result = (turn.machine.state(), place);
+        assert!(turn.now < 25_000_000 * 60, "homing takes more than a minute");
+        turn.machine.state() == State::Home
+    });
+    event_checker::check_pins(&trace, &settings);
+    result
+}
+
+fn corner(place: PagePoint, _now: u64) -> Switches {
+    Switches { x: place.x <= 0, y: place.y <= 0 }
+}
+
+#[test]
+fn homing_ends_a_pull_off_from_each_switch() {
+    for kinematics in [0, 1] {
+        for start in [point(2000, 900), point(1, 1), point(4000, -100), point(-80, -80)] {
+            let (state, place) = home(start, kinematics, &mut corner);
+            assert_eq!(state, State::Idle);
+            // 2 mm of 80 steps; the second approach makes 80 steps a second.
+            assert!(place.x.abs_diff(160) <= 1 && place.y.abs_diff(160) <= 1, "{place:?}");
+        }
+    }
+}
+
+#[test]
+fn a_bouncing_switch_is_found_as_well() {
+    let mut pressed_since = [None; 2];
+    let mut bounce = |place: PagePoint, now: u64| {
+        let mut bounced = |axis: usize, at: i32| {
+            if at > 0 {
+                pressed_since[axis] = None;
+                return false;
+            }
+            let since = *pressed_since[axis].get_or_insert(now);
+            now - since > 125_000 || (now / 25_000).is_multiple_of(2)
+        };
+        Switches { x: bounced(0, place.x), y: bounced(1, place.y) }
+    };
+    let (state, place) = home(point(1500, 700), 0, &mut bounce);
+    assert_eq!(state, State::Idle);
+    assert!(place.x.abs_diff(160) <= 1 && place.y.abs_diff(160) <= 1, "{place:?}");
+}
+
+#[test]
+fn a_switch_that_is_stuck_or_missing_is_an_alarm() {
+    let stuck = |_: PagePoint, _: u64| Switches { x: true, y: false };
+    let (state, _) = home(point(500, 500), 0, &mut { stuck });
+    assert_eq!(state, State::Alarm(Alarm::HomingFailed(Axis::X)));
+    let missing = |place: PagePoint, _: u64| Switches { x: place.x <= 0, y: false };
+    let (state, _) = home(point(500, 500), 0, &mut { missing });
+    assert_eq!(state, State::Alarm(Alarm::HomingFailed(Axis::Y)));
+}
+
+#[test]
+fn a_limit_switch_is_an_alarm_only_if_asked_for() {
+    for hard in [false, true] {
+        let mut settings = Settings::default();
+        settings.set(Setting::HardLimits, Value::from_num(hard)).expect("valid");
+        let targets = [to(8000, 0)];
+        let mut path = TargetList::new(&targets);
+        let trace = pin_machine::run(settings, &mut path, 25_000, &mut |turn| {
+            if turn.now == 0 {
+                turn.machine.start(&mut TargetList::new(&targets)).expect("valid");
+            }
+            turn.machine.watch(Switches { x: turn.pins.x >= 3000, y: false });
+            turn.machine.state() == State::Run || !turn.machine.stands()
+        });
+        let end = event_checker::check_pins(&trace, &settings).end.x;
+        // 8 steps a millisecond: at most two turns after the switch.
+        assert!(if hard { (3000..3020).contains(&end) } else { end == 8000 }, "{end}");
+    }
+}
+
+#[test]
+fn a_core_xy_machine_draws_the_same_page() {
+    let targets = job();
+    let mut settings = Settings::default();
+    settings.set(Setting::Kinematics, Value::ONE).expect("valid");
+    let events = pin_machine::record(settings, &mut TargetList::new(&targets), 64).expect("fits");
+    let corners: Vec<_> = pin_machine::moves(&events)
+        .iter()
+        .map(|&(_, motors)| settings.kinematics().page(motors))
+        .collect();
+    for target in &targets {
+        assert!(corners.contains(&target.point));
+    }
+    assert_eq!(corners.last(), Some(&point(0, 0)));
+    // As fast as the other build: the same lengths, but for rounding.
+    let cartesian =
+        pin_machine::record(Settings::default(), &mut TargetList::new(&targets), 64).expect("fits");
+    let (a, b) = (pin_machine::duration(&events), pin_machine::duration(&cartesian));
+    assert!(a.abs_diff(b) < b / 100, "{a} {b}");
+}
+
+#[test]
+fn a_ramp_takes_the_pen_down_step_by_step() {
+    let mut settings = Settings::default();
+    settings.set(Setting::PenRamp, Value::from_num(254)).expect("valid");
+    let targets = [to(10, 0), ink(20, 0), to(0, 0)];
+    let events = pin_machine::record(settings, &mut TargetList::new(&targets), 8).expect("fits");
+    event_checker::check(&events, &settings);
+    let heights: Vec<_> = events
+        .iter()
+        .filter_map(|event| match event.kind() {
+            EventKind::Pen { height } => Some(height),
+            EventKind::Levels(_) => None,
+        })
+        .collect();
+    let expected: Vec<_> = (1..=127).chain((0..127).rev()).collect();
+    assert_eq!(heights, expected);
+}
+
+#[test]
+fn the_machine_waits_for_each_change_of_the_pen() {
+    struct TwoPens<'a>(TargetList<'a>, usize);
+    impl Path for TwoPens<'_> {
+        fn next_target(&mut self) -> Option<Target> {
+            self.1 += 1;
+            self.0.next_target()
+        }
+        fn rewind(&mut self) {
+            self.1 = 0;
+            self.0.rewind();
+        }
+        fn pen(&self) -> u8 {
+            u8::from(self.1 > 2)
+        }
+    }
+    let targets = [to(100, 0), ink(300, 0), to(400, 0), ink(500, 100), to(0, 0)];
+    let mut waits = Vec::new();
+    let mut path = TwoPens(TargetList::new(&targets), 0);
+    let trace = pin_machine::run(Settings::default(), &mut path, 25_000, &mut |turn| {
+        if turn.now == 0 {
+            let mut again = TwoPens(TargetList::new(&targets), 0);
+            turn.machine.start(&mut again).expect("valid");
+        }
+        if turn.machine.state() == (State::Hold { standing: true }) && turn.machine.stands() {
+            waits.push((turn.machine.status().pen_wanted, turn.pins));
+            turn.machine.resume();
+        }
+        !is_ready(turn.machine)
+    });
+    assert_eq!(waits, [(Some(1), point(300, 0))]);
+    let drawn = event_checker::check_pins(&trace, &Settings::default());
+    assert_eq!((drawn.inked.len(), drawn.end, drawn.pen), (300, point(0, 0), 0));
+}
+
+#[test]
+fn a_pause_comes_at_the_end_of_the_stroke_and_after_so_much_ink() {
+    // Strokes of 400 steps, 5 mm each.
+    let mut targets = Vec::new();
+    for line in 1..=20 {
+        targets.extend([to(0, 10 * line), ink(200, 10 * line), ink(400, 10 * line)]);
+    }
+    for (ink_before_pause, asked, expected) in
+        [(0.0, None, vec![]), (0.0, Some(1), vec![1]), (0.024, None, vec![5, 10, 15])]
+    {
+        let mut settings = Settings::default();
+        settings.set(Setting::InkBeforePause, Value::from_num(ink_before_pause)).expect("valid");
+        let mut waits = Vec::new();
+        let mut seconds = Vec::new();
+        let mut path = TargetList::new(&targets);
+        pin_machine::run(settings, &mut path, 25_000, &mut |turn| {
+            if turn.now == 0 {
+                turn.machine.start(&mut TargetList::new(&targets)).expect("valid");
+                assert_eq!(turn.machine.status().job.strokes, 20);
+            }
+            if asked.is_some() && turn.now == 5_000_000 {
+                turn.machine.pause_after_stroke();
+            }
+            if turn.machine.state() == (State::Hold { standing: true }) && turn.machine.stands() {
+                assert_eq!(turn.pins.x, 400);
+                waits.push(turn.pins.y / 10);
+                turn.machine.resume();
+            }
+            seconds.push(turn.machine.status().seconds_left);
+            !is_ready(turn.machine)
+        });
+        assert_eq!(waits, expected);
+        // 20 times 0.3 s of dwell, 5 mm at 50 mm/s, 5 mm at 100 mm/s.
+        assert!((8..=9).contains(&seconds[0]));
+        assert!(seconds.is_sorted_by(|a, b| a >= b));
+        assert_eq!(seconds.last(), Some(&0));
+    }
+}
+
+#[test]
+fn an_override_slows_the_job() {
+    let targets = [ink(8000, 0)];
+    let seconds = |percent| {
+        let pins = PulserState::new();
+        let mut blocks = [Block::EMPTY; 8];
+        let mut machine = Machine::new(Settings::default(), &mut blocks, &pins, u32::MAX);
+        machine.set_override(percent);
+        let mut path = TargetList::new(&targets);
+        machine.start(&mut path).expect("valid");
+        let mut recorder = pin_machine::Recorder::default();
+        machine.fill(&mut path, &mut recorder);
+        pin_machine::duration(&recorder.0) as f64 / 25e6
+    };
+    // 100 mm at 50 mm/s and 800 mm/s², and 0.3 s of dwell.
+    assert!((seconds(100) - 2.0625 - 0.3).abs() < 0.001);
+    assert!((seconds(50) - 4.03125 - 0.3).abs() < 0.001);
+}
+
+#[test]
+fn a_change_of_kinematics_leaves_the_pen_where_it_is() {
+    let targets = [to(1000, 400)];
+    let mut path = TargetList::new(&targets);
+    let mut checked = false;
+    pin_machine::run(Settings::default(), &mut path, 25_000, &mut |turn| {
+        if turn.now == 0 {
+            turn.machine.start(&mut TargetList::new(&targets)).expect("valid");
+        }
+        if is_ready(turn.machine) {
+            turn.machine.set(Setting::Kinematics, Value::ONE).expect("idle");
+            assert_eq!(turn.machine.position(), point(1000, 400));
+            assert_eq!(turn.machine.planned_position(), point(1000, 400));
+            checked = true;
+        }
+        !checked
+    });
+    assert!(checked);
+}

@@ -1,0 +1,334 @@
+//! Speed, measured from the events: against the optimum, the table of known plotters, the limits.
+
+#![allow(clippy::expect_used, reason = "a test fails by panicking")]
+
+use penup::drawing::{LineType, PagePoint};
+use penup::machine::{Setting, Settings, Target, TargetList, Value};
+use penup::step::{Arc, Chords, Line, Turn};
+use penup_host_tests::event_checker::{self, Run};
+use penup_host_tests::motion_optimum::{self, Limits};
+use penup_host_tests::pin_machine;
+use proptest::prelude::*;
+
+const STEPS_PER_MM: f64 = 100.0;
+
+fn settings(speed: f64, acceleration: f64, deviation: f64, centripetal: bool) -> Settings {
+    let mut settings = Settings::default();
+    let values = [
+        (Setting::StepsPerMmX, STEPS_PER_MM),
+        (Setting::StepsPerMmY, STEPS_PER_MM),
+        (Setting::MaxRateX, 32000.0),
+        (Setting::MaxRateY, 32000.0),
+        (Setting::TravelSpeed, speed * 60.0),
+        (Setting::DrawSpeed, speed * 60.0),
+        (Setting::AccelerationX, acceleration),
+        (Setting::AccelerationY, acceleration),
+        (Setting::JunctionDeviation, deviation),
+        (Setting::Centripetal, f64::from(u8::from(centripetal))),
+    ];
+    for (setting, value) in values {
+        settings.set(setting, Value::from_num(value)).expect("valid");
+    }
+    settings
+}
+
+fn steps(points: &[(f64, f64)]) -> Vec<PagePoint> {
+    let mut rounded: Vec<_> = points
+        .iter()
+        .map(|&(x, y)| PagePoint {
+            x: (x * STEPS_PER_MM).round() as i32,
+            y: (y * STEPS_PER_MM).round() as i32,
+        })
+        .collect();
+    rounded.dedup();
+    rounded
+}
+
+/// Draws the points, checks the events, and returns the one run with the pen down.
+fn draw(points: &[PagePoint], settings: Settings, blocks: usize) -> Run {
+    let targets: Vec<_> = points
+        .iter()
+        .enumerate()
+        .map(|(index, &point)| Target { point, ink: (index > 0).then_some(LineType::Full) })
+        .collect();
+    let events = pin_machine::record(settings, &mut TargetList::new(&targets), blocks)
+        .expect("within the travel");
+    let verdict = event_checker::check(&events, &settings);
+    assert_eq!(Some(&verdict.end), points.last());
+    let mut inked = verdict.runs.into_iter().filter(|run| run.height > 0);
+    let run = inked.next().expect("a stroke");
+    assert_eq!(inked.count(), 0);
+    let mut expected = Vec::new();
+    for ends in points.windows(2) {
+        let mut at = ends[0];
+        for direction in Line::new(ends[0], ends[1]) {
+            at = direction.from_point(at);
+            expected.push(at);
+        }
+    }
+    assert_eq!(run.points, expected, "the moves are those of the lines");
+    run
+}
+
+/// Where the plan is when each move of the lines through `points` leaves, mm.
+fn places(points: &[PagePoint]) -> Vec<f64> {
+    let mut start = 0.0;
+    let mut places = Vec::new();
+    for ends in points.windows(2) {
+        let (dx, dy) = (ends[1].x - ends[0].x, ends[1].y - ends[0].y);
+        let length = f64::from(dx).hypot(f64::from(dy)) / STEPS_PER_MM;
+        let moves = dx.abs().max(dy.abs());
+        places.extend((0..moves).map(|k| start + length * (f64::from(k) + 0.5) / f64::from(moves)));
+        start += length;
+    }
+    places
+}
+
+fn optimum(
+    points: &[PagePoint],
+    speed: f64,
+    acceleration: f64,
+    deviation: f64,
+    bends: bool,
+) -> f64 {
+    let points: Vec<_> = points
+        .iter()
+        .map(|p| (f64::from(p.x) / STEPS_PER_MM, f64::from(p.y) / STEPS_PER_MM))
+        .collect();
+    motion_optimum::seconds(
+        &points,
+        Limits {
+            speed,
+            acceleration,
+            junction_deviation: deviation,
+            centripetal: bends,
+            step: 1.0 / STEPS_PER_MM,
+        },
+    )
+}
+
+fn circle(radius: f64, chords: u32) -> Vec<(f64, f64)> {
+    (0..=chords)
+        .map(|k| {
+            let angle = f64::from(k) / f64::from(chords) * std::f64::consts::TAU;
+            (50.0 + radius * angle.cos(), 50.0 + radius * angle.sin())
+        })
+        .collect()
+}
+
+fn zigzag() -> Vec<(f64, f64)> {
+    (0..=10)
+        .map(|line| (if line % 2 == 0 { 10.0 } else { 60.0 }, 10.0 + 5.0 * f64::from(line)))
+        .collect()
+}
+
+fn star() -> Vec<(f64, f64)> {
+    (0..=5)
+        .map(|k| {
+            let angle = f64::from(k) * 2.0 / 5.0 * std::f64::consts::TAU;
+            (50.0 + 30.0 * angle.sin(), 50.0 + 30.0 * angle.cos())
+        })
+        .collect()
+}
+
+/// 10,000 points 0.05 mm apart along a slow spiral.
+fn dense() -> Vec<(f64, f64)> {
+    let mut angle = 0.0f64;
+    (0..10_000)
+        .map(|_| {
+            let radius = 20.0 + angle / 2.0;
+            angle += 0.05 / radius;
+            (100.0 + radius * angle.cos(), 100.0 + radius * angle.sin())
+        })
+        .collect()
+}
+
+#[test]
+fn known_paths_are_no_slower_than_known_plotters() {
+    // Without the limit in bends, as saxi has none.
+    for (path, saxi) in [(circle(30.0, 100), 4.019), (zigzag(), 12.402), (star(), 6.826)] {
+        let points = steps(&path);
+        let run = draw(&points, settings(50.0, 200.0, 0.127, false), 128);
+        assert!(run.seconds <= saxi + 0.0005, "{} s, saxi {saxi} s", run.seconds);
+    }
+}
+
+#[test]
+fn every_path_takes_the_time_of_the_optimum_and_keeps_the_acceleration() {
+    let paths = [
+        ("circle 30", circle(30.0, 100)),
+        ("zigzag", zigzag()),
+        ("star", star()),
+        ("circle 3", circle(3.0, 100)),
+        ("circle 0.3", circle(0.3, 40)),
+        ("dense", dense()),
+        ("one move", vec![(1.0, 1.0), (1.01, 1.01)]),
+        ("short", vec![(1.0, 1.0), (1.5, 1.0)]),
+        ("long", vec![(0.0, 0.0), (400.0, 300.0)]),
+    ];
+    for (name, path) in &paths {
+        let points = steps(path);
+        for (speed, acceleration, deviation) in
+            [(50.0, 200.0, 0.127), (50.0, 200.0, 0.01), (100.0, 1000.0, 0.05), (30.0, 2000.0, 0.0)]
+        {
+            for bends in [true, false] {
+                let run = draw(&points, settings(speed, acceleration, deviation, bends), 1000);
+                let least = optimum(&points, speed, acceleration, deviation, bends);
+                let measured =
+                    event_checker::greatest_acceleration(&run.times, &places(&points), 0.005);
+                let case = format!("{name} {speed} {acceleration} {deviation} {bends}");
+                assert!(
+                    (run.seconds / least - 1.0).abs() < 0.01,
+                    "{case}: {} s, optimum {least} s",
+                    run.seconds
+                );
+                assert!(measured <= 1.05 * acceleration, "{case}: {measured} mm/s2");
+            }
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, ..ProptestConfig::default() })]
+    #[test]
+    fn whatever_the_settings_the_drivers_forgive_it(
+        targets in prop::collection::vec((0i32..3000, 0i32..3000, 0u8..5), 1..30),
+        near in 1i32..60,
+        pulse in 0.2f64..10.0,
+        setup in 0.1f64..30.0,
+        dwell in 1.0f64..899.0,
+        speed in 60.0f64..32000.0,
+        acceleration in 10.0f64..32000.0,
+        deviation in 0.0f64..1.0,
+        kinematics in 0i32..2,
+        blocks in 1usize..40,
+    ) {
+        let mut settings = Settings::default();
+        let values = [
+            (Setting::StepPulse, pulse),
+            (Setting::DirectionSetup, setup),
+            (Setting::PenUpDwell, dwell),
+            (Setting::PenDownDwell, 900.0 - dwell),
+            (Setting::MaxRateX, 32000.0),
+            (Setting::MaxRateY, 32000.0),
+            (Setting::DrawSpeed, speed),
+            (Setting::TravelSpeed, speed),
+            (Setting::AccelerationX, acceleration),
+            (Setting::AccelerationY, acceleration),
+            (Setting::JunctionDeviation, deviation),
+            (Setting::TravelX, 100.0),
+            (Setting::TravelY, 100.0),
+            (Setting::Kinematics, f64::from(kinematics)),
+        ];
+        for (setting, value) in values {
+            prop_assume!(settings.set(setting, Value::from_num(value)).is_ok());
+        }
+        let inks = [None, Some(LineType::Full), Some(LineType::Full), Some(LineType::Dotted), Some(LineType::Dashed)];
+        let targets: Vec<_> = targets
+            .into_iter()
+            .map(|(x, y, ink)| Target {
+                point: PagePoint { x: x / near, y: y / near },
+                ink: inks[usize::from(ink)],
+            })
+            .collect();
+        let events = pin_machine::record(settings, &mut TargetList::new(&targets), blocks)
+            .expect("within the travel");
+        let end = targets.last().map(|target| settings.kinematics().motors(target.point));
+        prop_assert_eq!(Some(event_checker::check(&events, &settings).end), end);
+    }
+}
+
+#[test]
+fn a_short_look_ahead_is_enough_for_dense_points() {
+    let points = steps(&dense());
+    let run = draw(&points, settings(50.0, 200.0, 0.127, true), 128);
+    assert!(run.seconds < 1.01 * optimum(&points, 50.0, 200.0, 0.127, true));
+    // With a tenth of it the machine is slower, but never stands.
+    let slow = draw(&points, settings(50.0, 200.0, 0.127, true), 12);
+    let pauses = slow.times[100..slow.times.len() - 100].windows(2).map(|t| t[1] - t[0]);
+    assert!(pauses.fold(0.0, f64::max) < 0.002);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, ..ProptestConfig::default() })]
+    #[test]
+    fn random_paths_take_the_time_of_the_optimum(
+        turns in prop::collection::vec((-300i32..300, -300i32..300), 1..60),
+        scale in 1i32..40,
+        speed in 5.0f64..120.0,
+        acceleration in 50.0f64..5000.0,
+        deviation in 0.001f64..0.5,
+        bends: bool,
+    ) {
+        let mut at = PagePoint { x: 20_000, y: 20_000 };
+        let mut points = vec![at];
+        for (dx, dy) in turns {
+            at = PagePoint {
+                x: (at.x + dx / scale).clamp(0, 42_000),
+                y: (at.y + dy / scale).clamp(0, 42_000),
+            };
+            points.push(at);
+        }
+        points.dedup();
+        prop_assume!(points.len() > 1);
+        let run = draw(&points, settings(speed, acceleration, deviation, bends), 128);
+        let least = optimum(&points, speed, acceleration, deviation, bends);
+        prop_assert!((run.seconds / least - 1.0).abs() < 0.01, "{} s, not {least}", run.seconds);
+        let measured = event_checker::greatest_acceleration(&run.times, &places(&points), 0.005);
+        prop_assert!(measured <= 1.05 * acceleration, "{measured} mm/s2");
+    }
+}
+
+/// The greatest speed over any 5 ms, mm/s.
+fn fastest(run: &Run, places: &[f64]) -> f64 {
+    let mut fastest = 0.0f64;
+    let mut first = 0;
+    for (&time, &place) in run.times.iter().zip(places) {
+        while run.times[first + 1] <= time - 0.005 {
+            first += 1;
+        }
+        if time - run.times[first] >= 0.005 {
+            fastest = fastest.max((place - places[first]) / (time - run.times[first]));
+        }
+    }
+    fastest
+}
+
+#[test]
+fn arcs_keep_the_acceleration_and_lead_through_their_points() {
+    for radius in [50, 300, 1000] {
+        let (center, start) =
+            (PagePoint { x: 5000, y: 5000 }, PagePoint { x: 5000 + radius, y: 5000 });
+        let arc = Arc::new(center, start, start, Turn::Clockwise).expect("a circle");
+        let points: Vec<_> =
+            std::iter::once(start).chain(Chords::new(start, arc.clone())).collect();
+        let run = draw(&points, settings(50.0, 200.0, 0.127, true), 128);
+        assert_eq!(run.points, arc.collect::<Vec<_>>());
+        let speed = fastest(&run, &places(&points));
+        let radius = f64::from(radius) / STEPS_PER_MM;
+        assert!(speed * speed / radius <= 1.05 * 200.0, "{radius} mm: {speed} mm/s");
+        let ideal =
+            std::f64::consts::TAU * radius / (200.0 * radius).sqrt() + (radius / 200.0).sqrt();
+        assert!((run.seconds / ideal - 1.0).abs() < 0.01, "{radius} mm: {} s", run.seconds);
+    }
+}
+
+#[test]
+fn bends_keep_the_acceleration_whatever_the_chords() {
+    let acceleration = 200.0;
+    for radius in [1.0, 2.0, 3.0, 5.0, 8.0, 12.0, 20.0] {
+        for chord in [0.05, 0.1, 0.2, 0.4] {
+            let chords = (std::f64::consts::TAU * radius / chord) as u32;
+            let points = steps(&circle(radius, chords));
+            let run = draw(&points, settings(50.0, acceleration, 0.127, true), 128);
+            let ideal = {
+                let speed = (acceleration * radius).sqrt().min(50.0);
+                std::f64::consts::TAU * radius / speed + speed / acceleration
+            };
+            let fastest = fastest(&run, &places(&points));
+            let case = format!("r {radius} chord {chord}: {:.4} s, {fastest:.2} mm/s", run.seconds);
+            assert!(fastest * fastest / radius <= 1.05 * acceleration, "{case}");
+            assert!((run.seconds / ideal - 1.0).abs() < 0.015, "{case}, ideally {ideal:.4} s");
+        }
+    }
+}

@@ -1,0 +1,91 @@
+//! The library against visibility by definition, on random scenes full of ties.
+//!
+//! `PENUP_SCENES` sets how many scenes there are; 2,000 if it is not set.
+
+use penup::geometry::Vertex;
+use penup::model::Elements;
+use penup::stage::{Scratch, Undisturbed};
+use penup::visibility::{Along, Options, Scene, find_stretches, scratch_bytes};
+use penup_host_tests::exact_visibility::{Piece, pieces};
+use penup_host_tests::fraction::Fraction;
+use penup_host_tests::random_scenes::{RandomScene, random_scene};
+use penup_host_tests::scene_files::Stretches;
+
+fn fraction(along: Along) -> Fraction {
+    Fraction::new(along.numerator, along.denominator)
+}
+
+fn library_pieces(random: &RandomScene, merged_blocks: bool, spare_bytes: usize) -> Vec<Piece> {
+    let scene = Scene {
+        vertices: &random.vertices,
+        elements: Elements::new(&random.corners),
+        projection: random.projection,
+    };
+    let mut words = vec![0u64; (scratch_bytes(&scene) + spare_bytes) / 8];
+    let mut stretches = Stretches::default();
+    let result = find_stretches(
+        &scene,
+        Options { with_hidden: true, merged_blocks, ..Options::default() },
+        Scratch::new(&mut words),
+        &mut Undisturbed,
+        &mut stretches,
+    );
+    assert!(result.is_ok(), "{result:?}");
+    let piece = |stretch: &penup::visibility::Stretch| {
+        (
+            stretch.edge.unwrap_or_default(),
+            fraction(stretch.from),
+            fraction(stretch.to),
+            stretch.visible,
+        )
+    };
+    stretches.0.iter().map(piece).collect()
+}
+
+fn agree(seeds: impl Iterator<Item = u64>, merged_blocks: bool) {
+    for seed in seeds {
+        let random = random_scene(seed);
+        let expected = pieces(random.projection, &random.vertices, &random.corners, merged_blocks);
+        // Much memory, and the least: few pieces at a time, one cell.
+        for spare_bytes in [1 << 14, 0] {
+            let found = library_pieces(&random, merged_blocks, spare_bytes);
+            let count = found.len().max(expected.len());
+            for n in 0..count {
+                assert_eq!(
+                    found.get(n),
+                    expected.get(n),
+                    "piece {n} of seed {seed}, {spare_bytes} spare bytes: {random:?}"
+                );
+            }
+        }
+    }
+}
+
+fn scene_count() -> u64 {
+    let given = std::env::var("PENUP_SCENES").ok();
+    given.and_then(|count| count.parse().ok()).unwrap_or(2000)
+}
+
+#[test]
+fn the_first_half_of_the_random_scenes_agrees() {
+    agree(0..scene_count() / 2, false);
+}
+
+#[test]
+fn the_second_half_of_the_random_scenes_agrees() {
+    agree(scene_count() / 2..scene_count(), false);
+}
+
+#[test]
+fn merged_blocks_agree() {
+    // Where the scene is so small that one unit matters, rounding cannot be told from shape.
+    let is_large = |seed: &u64| {
+        let largest = |part: fn(&Vertex) -> i32| {
+            let vertices = random_scene(*seed).vertices;
+            vertices.iter().map(|vertex| part(vertex).abs()).max()
+        };
+        largest(|vertex| vertex.x.abs().max(vertex.y.abs())) > Some(100_000)
+            && largest(|vertex| vertex.z) > Some(100_000)
+    };
+    agree((0..scene_count()).filter(is_large), true);
+}

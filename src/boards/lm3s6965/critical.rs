@@ -1,0 +1,46 @@
+//! The ranks of the interrupts, and a critical section that the step interrupt does not wait for.
+
+use cortex_m::peripheral::NVIC;
+use cortex_m::register::basepri;
+use lm3s6965::Interrupt;
+
+/// The chip tells eight ranks by the upper three bits.
+const fn rank(number: u8) -> u8 {
+    number << 5
+}
+
+/// Steps: above everything, critical sections too.
+pub const STEP_PRIORITY: u8 = rank(0);
+/// Bytes of the serial line.
+pub const SERIAL_PRIORITY: u8 = rank(1);
+/// The clock's wraps.
+pub const CLOCK_PRIORITY: u8 = rank(2);
+
+/// Ranks and unmasks an interrupt, at set-up.
+pub fn enable(nvic: &mut NVIC, interrupt: Interrupt, priority: u8) {
+    // SAFETY: no critical section is held at set-up that this could break.
+    unsafe {
+        nvic.set_priority(interrupt, priority);
+        NVIC::unmask(interrupt);
+    }
+}
+
+struct MaskAllButSteps;
+critical_section::set_impl!(MaskAllButSteps);
+
+// SAFETY: `acquire` masks every handler below the step interrupt's rank and `release` restores the
+// mask, so sections do not overlap. The step interrupt is not masked, therefore its handler takes
+// no critical section, logs nothing, and shares only atomics and the ends of a lock-free queue.
+unsafe impl critical_section::Impl for MaskAllButSteps {
+    unsafe fn acquire() -> critical_section::RawRestoreState {
+        let before = basepri::read();
+        // SAFETY: raising the mask; sections nest, so it is never lowered here.
+        unsafe { basepri::write(SERIAL_PRIORITY) };
+        before
+    }
+
+    unsafe fn release(before: critical_section::RawRestoreState) {
+        // SAFETY: the value that the paired `acquire` found.
+        unsafe { basepri::write(before) };
+    }
+}

@@ -1,0 +1,36 @@
+//! What an interrupt handler owns.
+
+use core::cell::UnsafeCell;
+
+/// A place that is filled once and from then on belongs to one interrupt handler.
+pub struct Owned<T>(UnsafeCell<Option<T>>);
+
+// SAFETY: `fill` and `get` are never called at once, by their contracts; the value moves from the
+// thread that fills to the handler, therefore `Send`.
+unsafe impl<T: Send> Sync for Owned<T> {}
+
+impl<T> Owned<T> {
+    /// Not yet filled.
+    pub const fn empty() -> Self {
+        Self(UnsafeCell::new(None))
+    }
+
+    /// # Safety
+    /// The handler's interrupt is masked, and nobody holds what [`Owned::get`] gave.
+    pub unsafe fn fill(&self, value: T) {
+        // SAFETY: nobody else has access now, by the contract.
+        unsafe { *self.0.get() = Some(value) };
+    }
+
+    /// What was filled in, `None` before.
+    ///
+    /// # Safety
+    /// Called by the handler itself, or while its interrupt is masked; the reference ends before
+    /// the handler can run again.
+    #[allow(clippy::mut_from_ref)] // One user at a time, by the contract.
+    #[inline(always)]
+    pub unsafe fn get(&self) -> Option<&mut T> {
+        // SAFETY: no other reference lives, by the contract.
+        unsafe { (*self.0.get()).as_mut() }
+    }
+}

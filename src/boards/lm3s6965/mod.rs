@@ -1,0 +1,99 @@
+//! Texas Instruments LM3S6965: Cortex-M3 at 50 MHz, 256 KiB flash, 64 KiB RAM.
+//!
+//! | what | where |
+//! |---|---|
+//! | STEP_X, DIR_X, STEP_Y, DIR_Y | PB0, PB1, PB2, PB3 |
+//! | ENABLE (low: drivers on) | PB4 |
+//! | PEN (high: down) | PB5 |
+//! | serial line, 115200 8N1 | UART0: PA0 receives, PA1 sends |
+//! | steps | timer 0, priority 0: nothing delays it |
+//! | serial line's bytes | UART0, priority 1 |
+//! | clock | SysTick, priority 2; stands still while the machine sleeps without a task |
+//!
+//! What is refused: to be taken twice.
+
+mod clock;
+mod critical;
+mod emergency;
+mod handler;
+mod pins;
+mod registers;
+mod serial;
+mod steps;
+
+use core::sync::atomic::{AtomicBool, Ordering};
+
+use cortex_m::interrupt;
+use cortex_m::peripheral::Peripherals;
+use penup::machine::PulserState;
+use penup::motion::{Block, EventQueue};
+use penup::plotter::{Board, Lent, Lm3s6965Memory, NO_MOVES};
+use penup::protocol::RealTime;
+use static_cell::{ConstStaticCell, StaticCell};
+
+/// An interrupt came since [`Board::wait`] last returned: the Cortex-M event register, in software,
+/// because QEMU's `wfe` does not sleep.
+static HAPPENED: AtomicBool = AtomicBool::new(false);
+
+/// The board, as the plotter sees it.
+pub struct Lm3s6965 {
+    clock: clock::Clock,
+    serial: serial::Line,
+    steps: steps::Steps,
+}
+
+/// Sets up clock, pins, serial line and timer: drivers off, pen up, nothing moving.
+///
+/// # Panics
+/// If the board was taken before.
+pub fn take() -> (Lm3s6965, Lent<'static>, &'static PulserState) {
+    let Some(mut core) = Peripherals::take() else {
+        #[allow(clippy::panic)] // A programming error, found at the first start.
+        {
+            panic!("the board was taken twice")
+        }
+    };
+    let clock = clock::start(core.SYST, &mut core.SCB);
+    let pins = pins::set_up();
+    let serial = serial::set_up(&mut core.NVIC);
+    let steps = steps::set_up(pins, &mut core.NVIC);
+    defmt::info!("lm3s6965 at {=u32} Hz", clock::HERTZ);
+    static MEMORY: ConstStaticCell<Lm3s6965Memory> = ConstStaticCell::new(Lm3s6965Memory::new());
+    static BLOCKS: StaticCell<[Block; NO_MOVES.len()]> = StaticCell::new();
+    let memory = MEMORY.take().lend(BLOCKS.init(NO_MOVES));
+    (Lm3s6965 { clock, serial, steps }, memory, &steps::STATE)
+}
+
+impl Board for Lm3s6965 {
+    const NAME: &'static str = "lm3s6965";
+
+    fn read_byte(&mut self) -> Option<u8> {
+        self.serial.read_byte()
+    }
+
+    fn take_real_time(&mut self) -> RealTime {
+        self.serial.take_real_time()
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        serial::write(bytes);
+    }
+
+    fn queue(&mut self) -> &mut dyn EventQueue {
+        &mut self.steps
+    }
+
+    fn wait(&mut self) {
+        self.steps.start();
+        interrupt::free(|_| {
+            if HAPPENED.swap(false, Ordering::Relaxed) {
+                return;
+            }
+            if self.steps.idle() {
+                self.clock.sleep_stopped();
+            } else {
+                cortex_m::asm::wfi();
+            }
+        });
+    }
+}

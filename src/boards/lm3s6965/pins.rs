@@ -1,0 +1,101 @@
+//! The machine's pins, all on port B.
+
+use core::convert::Infallible;
+
+use embedded_hal::digital::{ErrorType, OutputPin};
+
+use super::registers::{GPIO_B, SYSTEM_CONTROL};
+
+mod offset {
+    pub const DIRECTION: usize = 0x400;
+    pub const ALTERNATE_FUNCTION: usize = 0x420;
+    pub const DIGITAL_ENABLE: usize = 0x51C;
+    /// In system control.
+    pub const GPIO_CLOCKS: usize = 0x108;
+}
+const PORT_B_CLOCK: u32 = 1 << 1;
+/// PB0 to PB5.
+const ALL: u32 = 0x3F;
+
+/// Pin `NUMBER` of port B as an output.
+pub struct Pin<const NUMBER: u8>(());
+
+pub type StepXPin = Pin<0>;
+pub type DirXPin = Pin<1>;
+pub type StepYPin = Pin<2>;
+pub type DirYPin = Pin<3>;
+pub type PenPin = Pin<5>;
+
+/// The enable input of the drivers, which is active low: high here is low at the pin.
+pub struct EnablePin(Pin<4>);
+
+/// The pins that the step interrupt moves.
+pub struct MotorPins {
+    pub axes: penup::machine::Pins<StepXPin, DirXPin, StepYPin, DirYPin, EnablePin>,
+    pub pen: PenPin,
+}
+
+impl<const NUMBER: u8> ErrorType for Pin<NUMBER> {
+    type Error = Infallible;
+}
+
+impl<const NUMBER: u8> OutputPin for Pin<NUMBER> {
+    #[inline(always)]
+    fn set_low(&mut self) -> Result<(), Infallible> {
+        write(1 << NUMBER, 0);
+        Ok(())
+    }
+
+    #[inline(always)]
+    fn set_high(&mut self) -> Result<(), Infallible> {
+        write(1 << NUMBER, 1 << NUMBER);
+        Ok(())
+    }
+}
+
+impl ErrorType for EnablePin {
+    type Error = Infallible;
+}
+
+impl OutputPin for EnablePin {
+    #[inline(always)]
+    fn set_low(&mut self) -> Result<(), Infallible> {
+        self.0.set_high()
+    }
+
+    #[inline(always)]
+    fn set_high(&mut self) -> Result<(), Infallible> {
+        self.0.set_low()
+    }
+}
+
+/// Sets the pins of `mask` to `levels`, in one store, the others untouched: address bits 2 to 9 of
+/// the data register are its mask.
+#[inline(always)]
+fn write(mask: u32, levels: u32) {
+    GPIO_B.write((mask << 2) as usize, levels);
+}
+
+/// Drivers off, pen up, steps low. Safe at any time, in a fault too.
+pub fn release() {
+    write(ALL, 1 << 4);
+}
+
+/// Makes the pins outputs, with the levels of [`release`].
+pub fn set_up() -> MotorPins {
+    SYSTEM_CONTROL.set_bits(offset::GPIO_CLOCKS, PORT_B_CLOCK);
+    // The port answers three cycles after its clock is on; a read takes longer.
+    SYSTEM_CONTROL.read(offset::GPIO_CLOCKS);
+    GPIO_B.write(offset::ALTERNATE_FUNCTION, GPIO_B.read(offset::ALTERNATE_FUNCTION) & !ALL);
+    GPIO_B.set_bits(offset::DIRECTION, ALL);
+    release();
+    GPIO_B.set_bits(offset::DIGITAL_ENABLE, ALL);
+    let axes = penup::machine::Pins {
+        step_x: Pin(()),
+        direction_x: Pin(()),
+        step_y: Pin(()),
+        direction_y: Pin(()),
+        enable: EnablePin(Pin(())),
+    };
+    MotorPins { axes, pen: Pin(()) }
+}

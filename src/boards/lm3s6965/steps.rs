@@ -1,0 +1,150 @@
+//! The step interrupt: pops an event, writes pins, sets the next compare.
+//!
+//! Timer 0 runs one shot at a time. Each shot is shortened by how late its start is against the
+//! planned instant, read from SysTick, so that delays never add up: the planned time between two
+//! events holds over any number of them.
+//!
+//! Events wait until the queue is half full or the planner has nothing to add and sleeps, so that
+//! a motion does not begin with one event and starve.
+
+use core::sync::atomic::{AtomicBool, Ordering};
+
+use cortex_m::peripheral::NVIC;
+use heapless::spsc::{Producer, Queue};
+use lm3s6965::{Interrupt, interrupt};
+use penup::machine::{Pulser, PulserState, Solenoid};
+use penup::motion::{EventQueue, StepEvent, TICKS_PER_SECOND};
+use static_cell::StaticCell;
+
+use super::handler::Owned;
+use super::pins::{DirXPin, DirYPin, EnablePin, MotorPins, PenPin, StepXPin, StepYPin};
+use super::registers::{SYSTEM_CONTROL, TIMER0};
+use super::{HAPPENED, clock, critical};
+
+/// Events that wait for the interrupt, at most; one more place than that, for the queue. 4 bytes
+/// each.
+const EVENT_PLACES: usize = 256;
+
+const CYCLES_PER_TICK: u32 = clock::HERTZ / TICKS_PER_SECOND;
+const _: () = assert!(clock::HERTZ.is_multiple_of(TICKS_PER_SECOND));
+
+mod offset {
+    pub const CONFIGURATION: usize = 0x000;
+    pub const MODE_A: usize = 0x004;
+    pub const CONTROL: usize = 0x00C;
+    pub const INTERRUPT_MASK: usize = 0x018;
+    pub const INTERRUPT_CLEAR: usize = 0x024;
+    pub const INTERVAL_LOAD_A: usize = 0x028;
+    /// In system control.
+    pub const TIMER_CLOCKS: usize = 0x104;
+}
+const TIMER_0_CLOCK: u32 = 1 << 16;
+const ALL_32_BITS: u32 = 0;
+const ONE_SHOT: u32 = 1;
+const ENABLE: u32 = 1;
+const TIMED_OUT: u32 = 1;
+
+static QUEUE: StaticCell<Queue<StepEvent, EVENT_PLACES>> = StaticCell::new();
+static STEPPER: Owned<Stepper> = Owned::empty();
+/// From the first event until the last one is over.
+static RUNNING: AtomicBool = AtomicBool::new(false);
+
+/// What the interrupt has done, for the main loop.
+pub static STATE: PulserState = PulserState::new();
+
+/// The handler's end.
+struct Stepper {
+    pulser: Pulser<'static, StepXPin, DirXPin, StepYPin, DirYPin, EnablePin, Solenoid<PenPin>>,
+    /// When the present event was planned to begin, in cycles modulo 2^24.
+    began: u32,
+}
+
+/// The main loop's end.
+pub struct Steps {
+    events: Producer<'static, StepEvent>,
+}
+
+/// Readies the timer; it starts with the first events.
+pub fn set_up(pins: MotorPins, nvic: &mut NVIC) -> Steps {
+    SYSTEM_CONTROL.set_bits(offset::TIMER_CLOCKS, TIMER_0_CLOCK);
+    // The timer answers three cycles after its clock is on; a read takes longer.
+    SYSTEM_CONTROL.read(offset::TIMER_CLOCKS);
+    TIMER0.write(offset::CONTROL, 0);
+    TIMER0.write(offset::CONFIGURATION, ALL_32_BITS);
+    TIMER0.write(offset::MODE_A, ONE_SHOT);
+    TIMER0.write(offset::INTERRUPT_MASK, TIMED_OUT);
+
+    let (producer, consumer) = QUEUE.init(Queue::new()).split();
+    let pulser = Pulser::new(pins.axes, Solenoid(pins.pen), consumer, &STATE);
+    let stepper = Stepper { pulser, began: 0 };
+    // SAFETY: the interrupt is masked since reset, and this runs once (the queue's cell sees to it).
+    unsafe { STEPPER.fill(stepper) };
+    critical::enable(nvic, Interrupt::TIMER_0A, critical::STEP_PRIORITY);
+    Steps { events: producer }
+}
+
+impl Steps {
+    /// Lets waiting events begin.
+    pub fn start(&mut self) {
+        if !self.events.is_empty() && !RUNNING.load(Ordering::Acquire) {
+            NVIC::pend(Interrupt::TIMER_0A);
+        }
+    }
+
+    /// No event waits, and the last is over.
+    pub fn idle(&self) -> bool {
+        self.events.is_empty() && !RUNNING.load(Ordering::Acquire)
+    }
+}
+
+impl EventQueue for Steps {
+    fn room(&self) -> usize {
+        self.events.capacity() - self.events.len()
+    }
+
+    fn push(&mut self, event: StepEvent) -> Result<(), StepEvent> {
+        self.events.enqueue(event)?;
+        if self.events.len() >= self.events.capacity() / 2 {
+            self.start();
+        }
+        Ok(())
+    }
+}
+
+impl Stepper {
+    /// One event. No loop, no division, no lock.
+    #[inline(always)]
+    fn pulse(&mut self) {
+        let now = clock::cycles_24();
+        if !RUNNING.load(Ordering::Relaxed) {
+            self.began = now;
+        }
+        let Some(ticks) = self.pulser.tick() else {
+            RUNNING.store(false, Ordering::Release);
+            return;
+        };
+        RUNNING.store(true, Ordering::Release);
+        let cycles = ticks * CYCLES_PER_TICK;
+        // Late by less than 0.3 s, so 24 bits tell.
+        let late = now.wrapping_sub(self.began) & clock::CYCLE_MASK;
+        TIMER0.write(offset::INTERVAL_LOAD_A, cycles.saturating_sub(late).max(1));
+        TIMER0.write(offset::CONTROL, ENABLE);
+        self.began = self.began.wrapping_add(cycles) & clock::CYCLE_MASK;
+    }
+}
+
+/// Stops the timer for good, in a fault.
+pub fn halt() {
+    TIMER0.write(offset::CONTROL, 0);
+    NVIC::mask(Interrupt::TIMER_0A);
+}
+
+#[interrupt]
+fn TIMER_0A() {
+    TIMER0.write(offset::INTERRUPT_CLEAR, TIMED_OUT);
+    // SAFETY: this is the handler that owns it.
+    if let Some(stepper) = unsafe { STEPPER.get() } {
+        stepper.pulse();
+    }
+    HAPPENED.store(true, Ordering::Relaxed);
+}

@@ -1,0 +1,586 @@
+//! A convex solid from its vertices and edges: Zámožík & Zaťková.
+//!
+//! The outline is a closed walk along edges. Without its vertices the graph falls into components, and
+//! an edge that does not cross the outline cannot lead from the near side to the far one: each component
+//! is visible as a whole or hidden as a whole.
+//!
+//! What the paper leaves open is settled by comparing depths exactly:
+//! - There may be more than two components, as an edge between two vertices of the outline cuts a side in
+//!   two. So each component is decided by itself, by a vertex of it and the triangle of outline vertices in
+//!   front of or behind it: both belong to the solid, and a corner is at one end of what the line of sight
+//!   has in common with the solid. No component on a side, note 4 (a), or none at all, (b), is no case of its own.
+//! - *Isolated edges*, note 4 (c), join two vertices of the outline. On either side of such an edge there is
+//!   another outline vertex; the line between those two belongs to the solid and crosses the edge on the
+//!   page. The edge is visible if it is nearer at the crossing.
+
+use bytemuck::{Pod, Zeroable};
+
+use super::exact::{Plane, Point, Viewpoint};
+use super::points::{self, Span};
+use super::polygon::Polygon;
+use super::{Eye, Sight, SolidEdge, SolidError, SolidSink, SolidSummary};
+use crate::stage::{Attention, OutOfScratch, Scratch};
+
+/// Finds how each edge of a convex solid is seen.
+///
+/// `edges`: pairs of vertex numbers, from 0, in any order and direction; an edge given twice counts once,
+/// an edge between two vertices at the same place not at all. Vertices without an edge are left out. The
+/// edges are believed: no face is looked for. The sink gets every edge once, lesser vertex first, in order,
+/// and no face. `tolerance`: how far, in units of the positions, a coordinate may be off (see the module).
+///
+/// # Errors
+/// See [`SolidError`].
+///
+/// ```
+/// use penup::convex::*;
+/// use penup::model::Corner;
+/// use penup::stage::{Scratch, Undisturbed};
+///
+/// #[derive(Default)]
+/// struct Hidden(Vec<(u16, u16)>);
+/// impl SolidSink for Hidden {
+///     fn face(&mut self, _: &[Corner], _: bool) -> Result<(), SinkFull> {
+///         Ok(())
+///     }
+///     fn edge(&mut self, edge: SolidEdge) -> Result<(), SinkFull> {
+///         if edge.sight == Sight::Hidden {
+///             self.0.push(edge.ends);
+///         }
+///         Ok(())
+///     }
+/// }
+/// // A pyramid seen from below a side: the apex, 4, is hidden.
+/// let pyramid = [[0, 0, 0], [4, 0, 0], [4, 4, 0], [0, 4, 0], [2, 2, 3]];
+/// let edges = [[0, 1], [1, 2], [2, 3], [3, 0], [0, 4], [1, 4], [2, 4], [3, 4]];
+/// let mut words = vec![0; scratch_bytes_from_edges(5, 8) / 8];
+/// let mut hidden = Hidden::default();
+/// let eye = Eye::At([2, 2, -9]);
+/// let scratch = Scratch::new(&mut words);
+/// let summary = from_edges(&pyramid, &edges, eye, 0, scratch, &mut Undisturbed, &mut hidden)?;
+/// assert_eq!((summary.edges, summary.components), (8, 1));
+/// assert_eq!(hidden.0, [(0, 4), (1, 4), (2, 4), (3, 4)]);
+/// # Ok::<(), SolidError>(())
+/// ```
+pub fn from_edges(
+    positions: &[[i32; 3]],
+    edges: &[[u16; 2]],
+    eye: Eye,
+    tolerance: u32,
+    mut scratch: Scratch<'_>,
+    attention: &mut dyn Attention,
+    sink: &mut dyn SolidSink,
+) -> Result<SolidSummary, SolidError> {
+    eye.check()?;
+    points::check(positions)?;
+    if let Some(edge) =
+        edges.iter().position(|ends| !ends.iter().all(|end| usize::from(*end) < positions.len()))
+    {
+        return Err(SolidError::UnknownVertex { edge });
+    }
+    let mut scratch = scratch.reborrow();
+    let mut graph = Graph::new(positions, edges, &mut scratch)?;
+    if graph.numbers.len() < 4 {
+        return Err(SolidError::TooFewVertices { distinct: graph.numbers.len() });
+    }
+    let inside = match points::span(positions, graph.numbers) {
+        Span::Line => return Err(SolidError::AllInLine),
+        // A flat thing hides nothing.
+        Span::Plane(_) => return graph.hand_over(|_| Sight::Visible, attention, sink),
+        Span::Space(inside) => inside,
+    };
+    let viewpoint = Viewpoint {
+        eye: points::drawn_in_eye(eye, positions, graph.numbers, tolerance),
+        inside: Some(inside.map(|number| positions[usize::from(number)])),
+    };
+    let outline = graph.find_outline(&viewpoint, inside, &mut scratch, attention)?;
+    let visible = scratch.take::<u8>(positions.len())?;
+    graph.find_components();
+    graph.decide_components(&viewpoint, outline, visible, attention)?;
+    graph.hand_over(|ends| graph.sight(ends, eye, outline, visible), attention, sink)
+}
+
+/// The working memory that [`from_edges`] takes.
+pub const fn scratch_bytes_from_edges(vertices: usize, edges: usize) -> usize {
+    3 * Scratch::bytes_for::<u16>(vertices)
+        + Scratch::bytes_for::<u8>(vertices)
+        + Scratch::bytes_for::<[u16; 2]>(edges)
+}
+
+/// Where a vertex is in the graph.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+#[repr(transparent)]
+struct Membership(u16);
+
+impl Membership {
+    const NO_EDGE: Self = Self(u16::MAX);
+    const OUTLINE: u16 = 1 << 15;
+
+    /// In the component that is called after vertex `name`.
+    const fn component(name: u16) -> Self {
+        Self(name)
+    }
+
+    /// The corner of this number of the outline.
+    const fn outline(at: usize) -> Self {
+        Self(Self::OUTLINE | at as u16) // fewer than 2^14
+    }
+
+    fn component_name(self) -> Option<u16> {
+        (self.0 & Self::OUTLINE == 0).then_some(self.0)
+    }
+
+    fn outline_place(self) -> Option<usize> {
+        (self.component_name().is_none() && self != Self::NO_EDGE)
+            .then_some(usize::from(self.0 & !Self::OUTLINE))
+    }
+}
+
+/// The vertices that have edges, at different places, and the edges between them.
+struct Graph<'s> {
+    points: &'s [Point],
+    numbers: &'s [u16],
+    edges: &'s [[u16; 2]],
+    /// For each vertex; a vertex of no component and not on the outline has no edge.
+    membership: &'s mut [Membership],
+    welded: usize,
+}
+
+impl<'s> Graph<'s> {
+    fn new(
+        points: &'s [Point],
+        edges: &[[u16; 2]],
+        scratch: &mut Scratch<'s>,
+    ) -> Result<Self, OutOfScratch> {
+        let numbers = scratch.take::<u16>(points.len())?;
+        for (place, number) in numbers.iter_mut().zip(0..) {
+            *place = number;
+        }
+        let distinct = points::weld(points, numbers);
+        let membership = scratch.take::<Membership>(points.len())?;
+        membership.fill(Membership::NO_EDGE);
+        let own_edges = scratch.take::<[u16; 2]>(edges.len())?;
+        let mut count = 0;
+        for ends in edges {
+            let [a, b] = ends.map(|end| points::first_at_place(points, &numbers[..distinct], end));
+            if a != b {
+                own_edges[count] = [a.min(b), a.max(b)];
+                count += 1;
+                membership[usize::from(a)] = Membership::component(a);
+                membership[usize::from(b)] = Membership::component(b);
+            }
+        }
+        let own_edges = &mut own_edges[..count];
+        own_edges.sort_unstable();
+        let edge_count = remove_repeated(own_edges);
+        let mut used = 0;
+        for at in 0..distinct {
+            if membership[usize::from(numbers[at])] != Membership::NO_EDGE {
+                numbers[used] = numbers[at];
+                used += 1;
+            }
+        }
+        Ok(Self {
+            points,
+            numbers: &numbers[..used],
+            edges: &own_edges[..edge_count],
+            membership,
+            welded: points.len() - distinct,
+        })
+    }
+
+    fn point(&self, number: u16) -> Point {
+        self.points[usize::from(number)]
+    }
+
+    /// Walks around the outline, counter-clockwise on the page, and marks its vertices.
+    fn find_outline(
+        &mut self,
+        viewpoint: &Viewpoint,
+        [a, b, c, _]: [u16; 4],
+        scratch: &mut Scratch<'s>,
+        attention: &mut dyn Attention,
+    ) -> Result<&'s [u16], SolidError> {
+        let room = scratch.take::<u16>(self.numbers.len())?;
+        let mut enclosing = Polygon::triangle(room, self.points, viewpoint, [a, b, c]);
+        for number in self.numbers {
+            attention.check()?;
+            enclosing
+                .enclose(self.points, viewpoint, *number)
+                .map_err(|_| SolidError::EyeInside)?;
+        }
+        // Its other corners need not be joined by the given edges: positions may be rounded.
+        let start = enclosing.corners()[0];
+        let outline = enclosing.into_room();
+        let mut count = 0;
+        let (mut from, mut at) = (start, start);
+        loop {
+            attention.check()?;
+            let seen_before = self.membership[usize::from(at)].outline_place().is_some();
+            let room = outline.get_mut(count).filter(|_| !seen_before);
+            *room.ok_or(SolidError::OutlineBroken { vertex: at })? = at;
+            self.membership[usize::from(at)] = Membership::outline(count);
+            count += 1;
+            let next = self
+                .rightmost_neighbour(from, at, viewpoint)
+                .ok_or(SolidError::OutlineBroken { vertex: at })?;
+            if next == start {
+                break;
+            }
+            (from, at) = (at, next);
+        }
+        if count < 3 {
+            return Err(SolidError::OutlineBroken { vertex: start });
+        }
+        Ok(&outline[..count])
+    }
+
+    /// Of the neighbours of `at`, other than the one it is reached from, that with all others to the left.
+    fn rightmost_neighbour(&self, from: u16, at: u16, viewpoint: &Viewpoint) -> Option<u16> {
+        let origin = self.point(at);
+        self.edges
+            .iter()
+            .filter_map(|[a, b]| if *a == at { Some(*b) } else { (*b == at).then_some(*a) })
+            .filter(|number| *number != from)
+            .reduce(|best, number| {
+                if viewpoint.turn(origin, self.point(best), self.point(number)) < 0 {
+                    number
+                } else {
+                    best
+                }
+            })
+    }
+
+    /// Names each component after the least of its vertices.
+    fn find_components(&mut self) {
+        for [a, b] in self.edges {
+            let (Some(a), Some(b)) = (self.component(*a), self.component(*b)) else {
+                continue;
+            };
+            self.membership[usize::from(a.max(b))] = Membership::component(a.min(b));
+        }
+        // A name is never greater than the vertex, so that one pass in order reaches the last name.
+        for number in 0..self.membership.len() {
+            if let Some(name) = self.membership[number].component_name() {
+                self.membership[number] = self.membership[usize::from(name)];
+            }
+        }
+    }
+
+    /// The name of a vertex's component as far as it is known; `None` on the outline.
+    fn component(&self, number: u16) -> Option<u16> {
+        let mut at = number;
+        loop {
+            let name = self.membership[usize::from(at)].component_name()?;
+            if name == at {
+                return Some(name);
+            }
+            at = name;
+        }
+    }
+
+    /// Sets `visible` to 1 for each component, by its name, that is on the near side.
+    fn decide_components(
+        &self,
+        viewpoint: &Viewpoint,
+        outline: &[u16],
+        visible: &mut [u8],
+        attention: &mut dyn Attention,
+    ) -> Result<(), SolidError> {
+        for name in self.component_names() {
+            // In a rounded solid the vertex farthest from its triangle is the surest witness.
+            let mut height_of_witness = 0i128;
+            let mut plane_of_witness = None;
+            for number in self.numbers {
+                if self.membership[usize::from(*number)] != Membership::component(name) {
+                    continue;
+                }
+                attention.check()?;
+                let Some(plane) = self.triangle_at(*number, viewpoint, outline) else {
+                    continue;
+                };
+                let height = plane.height(self.point(*number));
+                if plane_of_witness.is_none()
+                    || height.unsigned_abs() > height_of_witness.unsigned_abs()
+                {
+                    height_of_witness = height;
+                    plane_of_witness = Some(plane);
+                }
+            }
+            let is_near = match plane_of_witness {
+                Some(plane) if height_of_witness == 0 => self.is_nothing_above(&plane),
+                _ => height_of_witness > 0,
+            };
+            visible[usize::from(name)] = u8::from(is_near);
+        }
+        Ok(())
+    }
+
+    fn component_names(&self) -> impl Iterator<Item = u16> {
+        self.numbers.iter().copied().filter(|number| {
+            self.membership[usize::from(*number)] == Membership::component(*number)
+        })
+    }
+
+    /// The plane, upper side to the eye, of the triangle of outline vertices that has the vertex before or
+    /// behind it on the page.
+    fn triangle_at(&self, number: u16, viewpoint: &Viewpoint, outline: &[u16]) -> Option<Plane> {
+        let (first, rest) = outline.split_first()?;
+        let apex = self.point(*first);
+        let side = |corner: u16| viewpoint.turn(apex, self.point(corner), self.point(number));
+        rest.windows(2)
+            .filter(|base| side(base[0]) >= 0 && side(base[1]) <= 0)
+            .map(|base| Plane::through(apex, self.point(base[0]), self.point(base[1])))
+            .find(|plane| !plane.is_degenerate())
+    }
+
+    /// Whether a plane is the plane of a face turned to the eye, if it is that of a face.
+    fn is_nothing_above(&self, plane: &Plane) -> bool {
+        self.numbers.iter().all(|number| plane.height(self.point(*number)) <= 0)
+    }
+
+    fn sight(&self, ends: [u16; 2], eye: Eye, outline: &[u16], visible: &[u8]) -> Sight {
+        let memberships = ends.map(|end| self.membership[usize::from(end)]);
+        let is_visible = match memberships.map(Membership::component_name) {
+            [Some(name), _] | [None, Some(name)] => visible[usize::from(name)] != 0,
+            [None, None] => {
+                let [one, other] =
+                    memberships.map(|membership| membership.outline_place().unwrap_or(0));
+                let (first, last) = (one.min(other), one.max(other));
+                if last - first == 1 || last - first == outline.len() - 1 {
+                    return Sight::Outline;
+                }
+                self.is_isolated_edge_visible(first, last, outline)
+            }
+        };
+        if is_visible {
+            Sight::Visible
+        } else if self.is_behind_outline(ends, eye, outline) {
+            Sight::BehindOutline
+        } else {
+            Sight::Hidden
+        }
+    }
+
+    /// An edge between two corners of the outline, by their places there, that are not neighbours.
+    fn is_isolated_edge_visible(&self, first: usize, last: usize, outline: &[u16]) -> bool {
+        let [start, end] = [first, last].map(|place| self.point(outline[place]));
+        let right = &outline[first + 1..last];
+        let left = || outline[last + 1..].iter().chain(&outline[..first]);
+        // With its upper side to the eye, since the outline runs counter-clockwise. What crosses the edge
+        // from right to left rises above this plane if its left end does.
+        let height = |right: u16, left: u16| {
+            Plane::through(start, self.point(right), end).height(self.point(left))
+        };
+        // One pair would do, were the solid not rounded: the surest of those with one end fixed.
+        let (mut surest, mut best_left) = (0i128, None);
+        for number in left() {
+            let height = height(right[0], *number);
+            if best_left.is_none() || height.unsigned_abs() > surest.unsigned_abs() {
+                (surest, best_left) = (height, Some(*number));
+            }
+        }
+        for number in right {
+            let height = best_left.map_or(0, |left| height(*number, left));
+            if height.unsigned_abs() > surest.unsigned_abs() {
+                surest = height;
+            }
+        }
+        match surest {
+            // A diagonal of a face whose plane has the whole outline.
+            0 => self.is_nothing_above(&Plane::through(start, self.point(right[0]), end)),
+            _ => surest < 0,
+        }
+    }
+
+    /// Whether both ends are on the line of one side of the outline, exactly.
+    fn is_behind_outline(&self, ends: [u16; 2], eye: Eye, outline: &[u16]) -> bool {
+        let eye_itself = Viewpoint { eye, inside: None };
+        let next = outline.iter().skip(1).chain(outline.first());
+        outline.iter().zip(next).any(|(from, to)| {
+            ends.iter().all(|end| {
+                eye_itself.turn(self.point(*from), self.point(*to), self.point(*end)) == 0
+            })
+        })
+    }
+
+    fn hand_over(
+        &self,
+        sight: impl Fn([u16; 2]) -> Sight,
+        attention: &mut dyn Attention,
+        sink: &mut dyn SolidSink,
+    ) -> Result<SolidSummary, SolidError> {
+        for ends in self.edges {
+            attention.check()?;
+            sink.edge(SolidEdge { ends: (ends[0], ends[1]), sight: sight(*ends) })?;
+        }
+        Ok(SolidSummary {
+            edges: self.edges.len(),
+            welded: self.welded,
+            components: self.component_names().count(),
+            ..SolidSummary::default()
+        })
+    }
+}
+
+/// Keeps the first of equal neighbours; returns how many are left.
+fn remove_repeated(edges: &mut [[u16; 2]]) -> usize {
+    let mut kept = 0;
+    for at in 0..edges.len() {
+        if kept == 0 || edges[kept - 1] != edges[at] {
+            edges[kept] = edges[at];
+            kept += 1;
+        }
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{SinkFull, from_vertices, scratch_bytes_from_vertices};
+    use super::*;
+    use crate::model::Corner;
+    use crate::stage::Undisturbed;
+    use std::vec;
+    use std::vec::Vec;
+
+    #[derive(Default)]
+    struct Edges(Vec<[u16; 2]>);
+
+    impl SolidSink for Edges {
+        fn face(&mut self, _: &[Corner], _: bool) -> Result<(), SinkFull> {
+            Ok(())
+        }
+
+        fn edge(&mut self, edge: SolidEdge) -> Result<(), SinkFull> {
+            self.0.push([edge.ends.0, edge.ends.1]);
+            Ok(())
+        }
+    }
+
+    const FROM_ABOVE: Eye = Eye::Towards([0, 0, 1]);
+
+    fn edges_of(points: &[Point]) -> Vec<[u16; 2]> {
+        let mut words = vec![0; scratch_bytes_from_vertices(points.len()) / 8];
+        let mut edges = Edges::default();
+        let scratch = Scratch::new(&mut words);
+        let found = from_vertices(points, FROM_ABOVE, 0, scratch, &mut Undisturbed, &mut edges);
+        assert_eq!(found.map(|summary| summary.edges), Ok(edges.0.len()));
+        edges.0
+    }
+
+    /// Outline, visible and hidden components as seen from above, in the paper's numbers (from 1).
+    fn parts(points: &[Point]) -> (Vec<u16>, Vec<Vec<u16>>, Vec<Vec<u16>>) {
+        let edges = edges_of(points);
+        let mut words = vec![0; scratch_bytes_from_edges(points.len(), edges.len()) / 8];
+        let mut scratch = Scratch::new(&mut words);
+        let mut scratch = scratch.reborrow();
+        let mut visible = vec![0; points.len()];
+        let mut parts = (vec![], vec![], vec![]);
+        let decided = (|| {
+            let mut graph = Graph::new(points, &edges, &mut scratch)?;
+            let Span::Space(inside) = points::span(points, graph.numbers) else {
+                return Err(SolidError::AllInLine);
+            };
+            let viewpoint = Viewpoint {
+                eye: FROM_ABOVE,
+                inside: Some(inside.map(|number| points[usize::from(number)])),
+            };
+            let outline = graph.find_outline(&viewpoint, inside, &mut scratch, &mut Undisturbed)?;
+            graph.find_components();
+            graph.decide_components(&viewpoint, outline, &mut visible, &mut Undisturbed)?;
+            parts.0 = outline.iter().map(|number| number + 1).collect();
+            for name in graph.component_names() {
+                let of_component = |number: &u16| {
+                    graph.membership[usize::from(*number)] == Membership::component(name)
+                };
+                let numbers = 0..points.len() as u16;
+                let component = numbers.filter(of_component).map(|number| number + 1).collect();
+                let is_visible = visible[usize::from(name)] != 0;
+                if is_visible { &mut parts.1 } else { &mut parts.2 }.push(component);
+            }
+            Ok(())
+        })();
+        assert_eq!(decided, Ok(()));
+        let least = (0..parts.0.len()).min_by_key(|at| parts.0[*at]).unwrap_or(0);
+        parts.0.rotate_left(least);
+        parts.1.sort();
+        parts.2.sort();
+        parts
+    }
+
+    /// Figure 1 is known by its numbers alone; this solid has the same outline and matrix G*.
+    #[test]
+    fn the_papers_example() {
+        let points = [
+            [2, 5, 3],
+            [-3, 4, 3],
+            [9, 3, -1],
+            [3, 9, 1],
+            [-3, 9, 1],
+            [3, -1, 3],
+            [-2, -5, 3],
+            [9, -3, 1],
+            [3, 2, -3],
+            [-9, 3, -2],
+            [-9, -3, -1],
+            [-3, -9, 1],
+            [3, -9, 0],
+            [-1, 2, -3],
+        ];
+        assert_eq!(
+            parts(&points),
+            (vec![3, 4, 5, 10, 11, 12, 13, 8], vec![vec![1, 2, 6, 7]], vec![vec![9, 14]])
+        );
+        let inner = [1, 2, 6, 7, 9, 14];
+        let mut matrix: Vec<_> = edges_of(&points)
+            .iter()
+            .map(|ends| (ends[0].min(ends[1]) + 1, ends[0].max(ends[1]) + 1))
+            .filter(|(a, b)| inner.contains(a) && inner.contains(b))
+            .collect();
+        matrix.sort_unstable();
+        assert_eq!(matrix, [(1, 2), (1, 6), (2, 7), (6, 7), (9, 14)]);
+    }
+
+    /// A rhombic dodecahedron with two faces edge-on: its outline has eight vertices too, and two of its
+    /// vertices lie right behind vertices of the outline. Nothing joins the two visible vertices.
+    #[test]
+    fn edge_on_faces_and_vertices_behind_vertices() {
+        // Turned so that the face between (2, 0, 0) and (0, 2, 0) is on top: x - y, z, x + y.
+        let points = [
+            [2, 0, 2],
+            [-2, 0, -2],
+            [-2, 0, 2],
+            [2, 0, -2],
+            [0, 2, 0],
+            [0, -2, 0],
+            [0, 1, 2],
+            [0, -1, 2],
+            [2, 1, 0],
+            [2, -1, 0],
+            [-2, 1, 0],
+            [-2, -1, 0],
+            [0, 1, -2],
+            [0, -1, -2],
+        ];
+        assert_eq!(
+            parts(&points),
+            (vec![1, 9, 5, 11, 3, 12, 6, 10], vec![vec![7], vec![8]], vec![vec![2, 4, 13, 14]])
+        );
+    }
+
+    /// Note 4 (a) and (b): a side without a component, and no component at all.
+    #[test]
+    fn sides_without_components() {
+        let pyramid = [[0, 0, 0], [4, 0, 0], [4, 4, 0], [0, 4, 0], [2, 2, 3]];
+        assert_eq!(parts(&pyramid), (vec![1, 2, 3, 4], vec![vec![5]], vec![]));
+        let tetrahedron = [[0, 0, 2], [4, 4, 2], [4, 0, 0], [0, 4, 0]];
+        assert_eq!(parts(&tetrahedron), (vec![1, 3, 2, 4], vec![], vec![]));
+    }
+
+    /// A roof whose ridge ends on the outline separates the vertices of a side.
+    #[test]
+    fn an_isolated_edge_makes_more_than_two_components() {
+        let points = [[-6, 0, 4], [6, 0, 4], [0, -6, -4], [0, 6, -4], [0, -2, 2], [0, 2, 2]];
+        assert_eq!(parts(&points), (vec![1, 3, 2, 4], vec![vec![5], vec![6]], vec![]));
+    }
+}

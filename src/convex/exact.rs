@@ -1,0 +1,144 @@
+//! Exact predicates on unrounded positions: planes, heights above them, turns as seen from the eye.
+//!
+//! Positions stay within ±2^30, so a difference of two fits 32 bits. A component of a normal is twice
+//! the area of a triangle inside a square of side 2^31, so at most 2^62. A height multiplies it by a
+//! difference (or by the eye, within ±2^61, or by another normal) and adds three such products: below
+//! 2^126, within `i128`.
+
+use super::Eye;
+
+/// A place in the model's own space, each coordinate within ±2^30.
+pub(super) type Point = [i32; 3];
+
+fn difference(a: Point, b: Point) -> [i64; 3] {
+    [0, 1, 2].map(|axis| i64::from(a[axis]) - i64::from(b[axis]))
+}
+
+fn dot(a: [i64; 3], b: [i64; 3]) -> i128 {
+    i128::from(a[0]) * i128::from(b[0])
+        + i128::from(a[1]) * i128::from(b[1])
+        + i128::from(a[2]) * i128::from(b[2])
+}
+
+/// The plane of three points; its normal points to where they turn counter-clockwise.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Plane {
+    origin: Point,
+    normal: [i64; 3],
+}
+
+impl Plane {
+    pub(super) fn through(a: Point, b: Point, c: Point) -> Self {
+        let u = difference(b, a);
+        let v = difference(c, a);
+        Self {
+            origin: a,
+            normal: [
+                u[1] * v[2] - u[2] * v[1],
+                u[2] * v[0] - u[0] * v[2],
+                u[0] * v[1] - u[1] * v[0],
+            ],
+        }
+    }
+
+    /// Whether the three points are in line, so that there is no plane.
+    pub(super) fn is_degenerate(&self) -> bool {
+        self.normal == [0; 3]
+    }
+
+    /// Positive above the plane, zero on it. The unit is the length of the normal.
+    pub(super) fn height(&self, point: Point) -> i128 {
+        dot(self.normal, difference(point, self.origin))
+    }
+
+    /// Positive if the upper side of the plane is turned to the eye, zero if the plane is edge-on.
+    pub(super) fn height_of_eye(&self, eye: Eye) -> i128 {
+        match eye {
+            Eye::At(place) => {
+                dot(self.normal, [0, 1, 2].map(|axis| place[axis] - i64::from(self.origin[axis])))
+            }
+            Eye::Towards(direction) => dot(self.normal, direction),
+        }
+    }
+
+    /// Looking straight down on the plane.
+    pub(super) fn eye_above(&self) -> Eye {
+        Eye::Towards(self.normal)
+    }
+
+    /// Whether the upper sides of both look to the same half of space.
+    pub(super) fn is_turned_like(&self, other: &Plane) -> bool {
+        dot(self.normal, other.normal) > 0
+    }
+
+    /// |x| + |y| + |z| of the normal: a measure of the triangle's area, at most 3 × 2^62.
+    pub(super) fn size(&self) -> u64 {
+        self.normal.iter().map(|part| part.unsigned_abs()).sum()
+    }
+
+    /// Whether the plane can be made to pass through `point` by moving each of the point's
+    /// coordinates by at most `tolerance`.
+    pub(super) fn is_near(&self, point: Point, tolerance: u32) -> bool {
+        // Of all moves within the tolerance, the one along the signs of the normal reaches farthest.
+        self.height(point).unsigned_abs() <= u128::from(tolerance) * u128::from(self.size())
+    }
+}
+
+/// The eye, drawn in by an infinitely small step towards a point inside the solid.
+///
+/// From there every face that is edge-on counts as hidden (Harrison 3.2.1), the outline follows the
+/// near side of such a face (3.2.2), and of two vertices on one line of sight the nearer is on the
+/// outline: one rule for all of his special cases. The step decides only what the eye itself leaves open.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Viewpoint {
+    pub(super) eye: Eye,
+    /// Four vertices that span the solid: the step leads to their centre. `None`: no step.
+    pub(super) inside: Option<[Point; 4]>,
+}
+
+impl Viewpoint {
+    /// Positive if a, b, c turn counter-clockwise as seen from here, zero if they are in line.
+    pub(super) fn turn(&self, a: Point, b: Point, c: Point) -> i128 {
+        let plane = Plane::through(a, b, c);
+        match (plane.height_of_eye(self.eye), self.inside) {
+            (0, Some(inside)) => inside.iter().map(|point| plane.height(*point)).sum(),
+            (height, _) => height,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FAR: i32 = 1 << 30;
+
+    #[test]
+    fn the_largest_coordinates_do_not_overflow() {
+        let plane = Plane::through([-FAR, -FAR, -FAR], [FAR, -FAR, FAR], [-FAR, FAR, FAR]);
+        let edge = 1i128 << 31;
+        assert_eq!(plane.height([FAR, FAR, -FAR]), -2 * edge * edge * edge);
+        assert!(plane.height_of_eye(Eye::At([-(1 << 61), -(1 << 61), 1 << 61])) > 0);
+        assert!(plane.height_of_eye(plane.eye_above()) > 0);
+        assert_eq!(plane.size(), 3 << 62);
+        assert!(plane.is_near([FAR, FAR, FAR], u32::MAX));
+    }
+
+    #[test]
+    fn nearness_is_measured_along_the_coordinates() {
+        // x + y + z = 0
+        let plane = Plane::through([0, 0, 0], [1, -1, 0], [1, 0, -1]);
+        assert!(plane.is_near([2, 2, 2], 2));
+        assert!(!plane.is_near([2, 2, 3], 2));
+        assert!(!plane.is_near([1, 0, 0], 0));
+    }
+
+    #[test]
+    fn an_edge_on_face_of_the_solid_turns_away() {
+        let inside = [[0, 0, 0], [2, 0, 0], [0, 2, 0], [0, 0, 2]];
+        let viewpoint = Viewpoint { eye: Eye::At([10, 10, 0]), inside: Some(inside) };
+        // The face z = 0, counter-clockwise from outside, which is below.
+        assert!(viewpoint.turn([0, 0, 0], [0, 2, 0], [2, 0, 0]) < 0);
+        assert_eq!(viewpoint.turn([0, 0, 0], [1, 0, 0], [2, 0, 0]), 0);
+    }
+}

@@ -1,0 +1,566 @@
+//! A convex solid from its vertices alone: Harrison, chapter 3.
+//!
+//! The outline comes first. Its segments are the first *perimeter*: the list of directed segments each
+//! of which has one face still to be found, on its left as seen from outside. One segment is taken, its
+//! face found, the face's sides cancel what they meet in the perimeter and the others join it, reversed
+//! (3.2.5). The perimeter may fall into several loops (3.6). When it is empty, all visible faces are
+//! found; the outline the other way round then leads to the hidden ones (3.2.6).
+//!
+//! What differs from the programs of his appendix 3:
+//! - *Valid third vertices* (3.3): he asks for vertices to the left of the segment on the page. No vertex of
+//!   an edge-on face is, so that his program misses such a face. All vertices lie in a wedge about the edge,
+//!   whose two sides are its two faces; turning counter-clockwise about the directed edge ends on the face
+//!   that is sought, whatever the page shows.
+//! - *Vertices that drop out* (3.4): he drops a vertex when two of its segments cancel. A vertex where two
+//!   loops of the perimeter touch would be lost for the second. Here a vertex drops out with its last segment.
+
+use bytemuck::{Pod, Zeroable};
+
+use super::exact::{Plane, Point, Viewpoint};
+use super::joined::Joining;
+use super::points::{self, Span};
+use super::polygon::Polygon;
+use super::{Eye, Sight, SolidEdge, SolidError, SolidSink, SolidSummary};
+use crate::model::Corner;
+use crate::stage::{Attention, Scratch};
+
+/// In place of a face's number: not found yet.
+pub(super) const UNKNOWN: u16 = u16::MAX;
+
+/// How many vertices are looked at between two looks at the serial line.
+const VERTICES_PER_CHECK: usize = 64;
+
+/// An edge with its two faces.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct HullEdge {
+    pub(super) from: u16,
+    pub(super) to: u16,
+    /// The face on the left, seen from outside.
+    pub(super) left: u16,
+    pub(super) right: u16,
+}
+
+/// A face by three of its corners, counter-clockwise from outside, well spread around it.
+pub(super) type FaceCorners = [u16; 3];
+
+/// Finds faces and edges of the convex solid that `positions` are the corners of.
+///
+/// `tolerance`: how far, in units of the positions, a corner may be off the plane of its face (see the
+/// module; [`super::default_tolerance`]).
+///
+/// # Errors
+/// See [`SolidError`].
+///
+/// ```
+/// use penup::convex::*;
+/// use penup::model::Corner;
+/// use penup::stage::{Scratch, Undisturbed};
+///
+/// #[derive(Default)]
+/// struct Count { visible_faces: usize, hidden_edges: usize }
+/// impl SolidSink for Count {
+///     fn face(&mut self, corners: &[Corner], visible: bool) -> Result<(), SinkFull> {
+///         assert_eq!(corners.len(), 4);
+///         self.visible_faces += usize::from(visible);
+///         Ok(())
+///     }
+///     fn edge(&mut self, edge: SolidEdge) -> Result<(), SinkFull> {
+///         self.hidden_edges += usize::from(edge.sight == Sight::Hidden);
+///         Ok(())
+///     }
+/// }
+/// let cube = [0, 1, 2, 3, 4, 5, 6, 7].map(|i| [i & 1, i >> 1 & 1, i >> 2]);
+/// let mut words = vec![0; scratch_bytes_from_vertices(8) / 8];
+/// let mut count = Count::default();
+/// let eye = Eye::At([5, 4, 3]);
+/// let summary = from_vertices(&cube, eye, 0, Scratch::new(&mut words), &mut Undisturbed, &mut count)?;
+/// assert_eq!((summary.faces, summary.edges), (6, 12));
+/// assert_eq!((count.visible_faces, count.hidden_edges), (3, 3));
+/// # Ok::<(), SolidError>(())
+/// ```
+pub fn from_vertices(
+    positions: &[[i32; 3]],
+    eye: Eye,
+    tolerance: u32,
+    mut scratch: Scratch<'_>,
+    attention: &mut dyn Attention,
+    sink: &mut dyn SolidSink,
+) -> Result<SolidSummary, SolidError> {
+    eye.check()?;
+    points::check(positions)?;
+    let numbers = scratch.take::<u16>(positions.len())?;
+    for (place, number) in numbers.iter_mut().zip(0..) {
+        *place = number;
+    }
+    let distinct = points::weld(positions, numbers);
+    let numbers = &mut numbers[..distinct];
+    let summary = SolidSummary { welded: positions.len() - distinct, ..SolidSummary::default() };
+    if distinct < 4 {
+        return Err(SolidError::TooFewVertices { distinct });
+    }
+    match points::span(positions, numbers) {
+        Span::Line => Err(SolidError::AllInLine),
+        Span::Plane(triangle) => {
+            flat_solid(positions, numbers, triangle, eye, scratch, sink, summary)
+        }
+        Span::Space(inside) => {
+            let mut scratch = scratch.reborrow();
+            let drawn_in = points::drawn_in_eye(eye, positions, numbers, tolerance);
+            let mut search = Search::new(positions, eye, inside, numbers, &mut scratch, attention)?;
+            search.find_all_faces(attention)?;
+            let mut joining = Joining::new(search.into_solid(), eye, drawn_in, &mut scratch)?;
+            joining.check_convex(tolerance, attention)?;
+            joining.join_faces(tolerance, attention)?;
+            joining.hand_over(summary, attention, sink)
+        }
+    }
+}
+
+/// The working memory that [`from_vertices`] takes for so many vertices.
+pub const fn scratch_bytes_from_vertices(vertices: usize) -> usize {
+    let edges = most_edges(vertices);
+    let faces = most_faces(vertices);
+    4 * Scratch::bytes_for::<u16>(vertices)
+        + Scratch::bytes_for::<u16>(edges)
+        + Scratch::bytes_for::<HullEdge>(edges)
+        + Scratch::bytes_for::<u16>(3 * faces)
+        + Joining::scratch_bytes(vertices, faces)
+}
+
+/// Euler: v - e + f = 2, and every face has three edges or more.
+const fn most_edges(vertices: usize) -> usize {
+    (3 * vertices).saturating_sub(6)
+}
+
+const fn most_faces(vertices: usize) -> usize {
+    (2 * vertices).saturating_sub(4)
+}
+
+/// All vertices in one plane: one polygon, which hides nothing.
+fn flat_solid(
+    points: &[Point],
+    numbers: &[u16],
+    triangle: [u16; 3],
+    eye: Eye,
+    mut scratch: Scratch<'_>,
+    sink: &mut dyn SolidSink,
+    summary: SolidSummary,
+) -> Result<SolidSummary, SolidError> {
+    let [a, mut b, mut c] = triangle;
+    let plane = |[a, b, c]: [u16; 3]| {
+        Plane::through(points[usize::from(a)], points[usize::from(b)], points[usize::from(c)])
+    };
+    if plane([a, b, c]).height_of_eye(eye) < 0 {
+        (b, c) = (c, b);
+    }
+    let room = scratch.take::<u16>(numbers.len())?;
+    let viewpoint = Viewpoint { eye: plane([a, b, c]).eye_above(), inside: None };
+    let mut polygon = Polygon::triangle(room, points, &viewpoint, [a, b, c]);
+    for number in numbers {
+        polygon.enclose(points, &viewpoint, *number).map_err(|_| SolidError::EyeInside)?;
+    }
+    let corners = polygon.corners();
+    let marked = scratch.take::<Corner>(corners.len())?;
+    for (at, corner) in corners.iter().enumerate() {
+        marked[at] = Corner::new(*corner, false, at + 1 == corners.len());
+    }
+    sink.face(marked, true)?;
+    for (from, to) in sides(corners) {
+        sink.edge(SolidEdge { ends: (from, to), sight: Sight::Outline })?;
+    }
+    Ok(SolidSummary {
+        faces: 1,
+        edges: corners.len(),
+        flat: numbers.len() - corners.len(),
+        ..summary
+    })
+}
+
+/// From each corner to the next, and from the last to the first.
+fn sides(corners: &[u16]) -> impl Iterator<Item = (u16, u16)> + Clone {
+    let next = corners.iter().skip(1).chain(corners.first());
+    corners.iter().copied().zip(next.copied())
+}
+
+/// The solid as found exactly, before faces are joined.
+#[derive(Debug)]
+pub(super) struct Solid<'s> {
+    pub(super) points: &'s [Point],
+    pub(super) edges: &'s [HullEdge],
+    pub(super) faces: &'s [FaceCorners],
+    /// Vertices that are on no face.
+    pub(super) inside: &'s [u16],
+    /// How many vertices are in the middle of a face or an edge.
+    pub(super) flat: usize,
+}
+
+/// Harrison's search.
+struct Search<'s> {
+    points: &'s [Point],
+    /// Vertices that may be corners of faces still to be found: Harrison's vertices list.
+    candidates: &'s mut [u16],
+    candidate_count: usize,
+    /// Numbers of the edges with one face still to be found in this pass: the current perimeter list.
+    perimeter: &'s mut [u16],
+    perimeter_count: usize,
+    /// For each vertex, how many segments of the perimeter begin there (as many end there).
+    segments_from: &'s mut [u16],
+    edges: &'s mut [HullEdge],
+    edge_count: usize,
+    outline_count: usize,
+    faces: &'s mut [FaceCorners],
+    face_count: usize,
+    /// Vertices on the plane in hand.
+    on_plane: &'s mut [u16],
+    /// Room for a polygon.
+    room: &'s mut [u16],
+    flat: usize,
+}
+
+impl<'s> Search<'s> {
+    /// Finds the outline and makes it the perimeter.
+    fn new(
+        points: &'s [Point],
+        eye: Eye,
+        inside: [u16; 4],
+        candidates: &'s mut [u16],
+        scratch: &mut Scratch<'s>,
+        attention: &mut dyn Attention,
+    ) -> Result<Self, SolidError> {
+        let viewpoint =
+            Viewpoint { eye, inside: Some(inside.map(|number| points[usize::from(number)])) };
+        let count = candidates.len();
+        let room = scratch.take::<u16>(count)?;
+        let perimeter = scratch.take::<u16>(most_edges(count))?;
+        let segments_from = scratch.take::<u16>(points.len())?;
+        let edges = scratch.take::<HullEdge>(most_edges(count))?;
+        let faces = bytemuck::cast_slice_mut(scratch.take::<u16>(3 * most_faces(count))?);
+        let on_plane = scratch.take::<u16>(count)?;
+        let [a, b, c, _] = inside;
+        let mut outline = Polygon::triangle(room, points, &viewpoint, [a, b, c]);
+        for number in candidates.iter() {
+            attention.check()?;
+            outline.enclose(points, &viewpoint, *number).map_err(|_| SolidError::EyeInside)?;
+        }
+        let outline_count = outline.corners().len();
+        for (number, (from, to)) in sides(outline.corners()).enumerate() {
+            edges[number] = HullEdge { from, to, left: UNKNOWN, right: UNKNOWN };
+        }
+        let mut search = Self {
+            points,
+            candidates,
+            candidate_count: count,
+            perimeter,
+            perimeter_count: 0,
+            segments_from,
+            edges,
+            edge_count: outline_count,
+            outline_count,
+            faces,
+            face_count: 0,
+            on_plane,
+            room: outline.into_room(),
+            flat: 0,
+        };
+        search.begin_with_outline();
+        Ok(search)
+    }
+
+    fn begin_with_outline(&mut self) {
+        for number in 0..self.outline_count {
+            self.perimeter[number] = number as u16; // fewer than there are vertices
+            self.segments_from[usize::from(self.edges[number].from)] = 1;
+        }
+        self.perimeter_count = self.outline_count;
+    }
+
+    fn find_all_faces(&mut self, attention: &mut dyn Attention) -> Result<(), SolidError> {
+        while self.perimeter_count > 0 {
+            self.find_face(0, attention)?;
+        }
+        self.turn_to_hidden_faces();
+        while self.perimeter_count > 0 {
+            self.find_face(0, attention)?;
+        }
+        Ok(())
+    }
+
+    /// All visible faces are found, so of their corners only those of the outline have more faces.
+    fn turn_to_hidden_faces(&mut self) {
+        for edge in &self.edges[..self.outline_count] {
+            self.candidates[self.candidate_count] = edge.from;
+            self.candidate_count += 1;
+        }
+        self.begin_with_outline();
+    }
+
+    fn into_solid(self) -> Solid<'s> {
+        Solid {
+            points: self.points,
+            edges: &self.edges[..self.edge_count],
+            faces: &self.faces[..self.face_count],
+            inside: &self.candidates[..self.candidate_count],
+            flat: self.flat,
+        }
+    }
+
+    /// A segment of the perimeter, so directed that the face still to be found is on its left.
+    fn segment(&self, at: usize) -> (u16, u16) {
+        let edge = self.edges[usize::from(self.perimeter[at])];
+        if edge.left == UNKNOWN { (edge.from, edge.to) } else { (edge.to, edge.from) }
+    }
+
+    fn point(&self, number: u16) -> Point {
+        self.points[usize::from(number)]
+    }
+
+    /// Finds the face to the left of one segment of the perimeter, and brings the perimeter up to date.
+    fn find_face(&mut self, at: usize, attention: &mut dyn Attention) -> Result<(), SolidError> {
+        let (from, to) = self.segment(at);
+        let on_plane_count = self.find_plane(from, to, attention)?;
+        let third = self.on_plane[2];
+        let viewpoint = Viewpoint {
+            eye: Plane::through(self.point(from), self.point(to), self.point(third)).eye_above(),
+            inside: None,
+        };
+        // The room is taken out while the perimeter changes.
+        let room = core::mem::take(&mut self.room);
+        let mut polygon = Polygon::triangle(room, self.points, &viewpoint, [from, to, third]);
+        for number in &self.on_plane[3..on_plane_count] {
+            polygon.enclose(self.points, &viewpoint, *number).map_err(|_| SolidError::EyeInside)?;
+        }
+        polygon.begin_with(from);
+        let corners = polygon.corners();
+        let face = self.face_count as u16; // below 2^15
+        let spread = corners.len() / 3;
+        self.faces[self.face_count] = [corners[0], corners[spread], corners[2 * spread]];
+        self.face_count += 1;
+        self.flat += on_plane_count - corners.len();
+        for (from, to) in sides(corners) {
+            self.cancel_or_add(from, to, face);
+        }
+        self.room = polygon.into_room();
+        // Neither a corner without a segment nor a vertex in the middle of the face is on another face.
+        for at in 0..on_plane_count {
+            let number = self.on_plane[at];
+            if self.segments_from[usize::from(number)] == 0 {
+                self.drop_candidate(number);
+            }
+        }
+        Ok(())
+    }
+
+    /// Turns the plane about the directed edge until no vertex is above it; leaves its vertices in
+    /// `on_plane`, the two ends and a third corner first, and returns how many they are.
+    fn find_plane(
+        &mut self,
+        from: u16,
+        to: u16,
+        attention: &mut dyn Attention,
+    ) -> Result<usize, SolidError> {
+        let (start, end) = (self.point(from), self.point(to));
+        self.on_plane[0] = from;
+        self.on_plane[1] = to;
+        let mut count = 2;
+        // Degenerate until a third vertex is there; every height is zero then.
+        let mut plane = Plane::through(start, end, end);
+        let mut at = 0;
+        while at < self.candidate_count {
+            if at % VERTICES_PER_CHECK == 0 {
+                attention.check()?;
+            }
+            let number = self.candidates[at];
+            at += 1;
+            if number == from || number == to {
+                continue;
+            }
+            let point = self.point(number);
+            let height = plane.height(point);
+            if height < 0 {
+                continue;
+            }
+            let turned = Plane::through(start, end, point);
+            if turned.is_degenerate() {
+                // In the middle of this edge: no corner of any face.
+                at -= 1;
+                self.candidate_count -= 1;
+                self.candidates.swap(at, self.candidate_count);
+                self.flat += 1;
+            } else if height > 0 || plane.is_degenerate() {
+                plane = turned;
+                self.on_plane[2] = number;
+                count = 3;
+            } else {
+                self.on_plane[count] = number;
+                count += 1;
+            }
+        }
+        Ok(count)
+    }
+
+    /// A side of a new face: it cancels its like in the perimeter, or joins the perimeter reversed.
+    fn cancel_or_add(&mut self, from: u16, to: u16, face: u16) {
+        let met = (0..self.perimeter_count).find(|at| self.segment(*at) == (from, to));
+        if let Some(at) = met {
+            let edge = &mut self.edges[usize::from(self.perimeter[at])];
+            if edge.left == UNKNOWN {
+                edge.left = face;
+            } else {
+                edge.right = face;
+            }
+            self.perimeter.copy_within(at + 1..self.perimeter_count, at);
+            self.perimeter_count -= 1;
+            self.segments_from[usize::from(from)] -= 1;
+        } else {
+            self.edges[self.edge_count] = HullEdge { from, to, left: face, right: UNKNOWN };
+            self.perimeter[self.perimeter_count] = self.edge_count as u16; // below 3 × 2^14
+            self.edge_count += 1;
+            self.perimeter_count += 1;
+            self.segments_from[usize::from(to)] += 1;
+        }
+    }
+
+    fn drop_candidate(&mut self, number: u16) {
+        let candidates = &self.candidates[..self.candidate_count];
+        if let Some(at) = candidates.iter().position(|other| *other == number) {
+            self.candidate_count -= 1;
+            self.candidates.swap(at, self.candidate_count);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stage::Undisturbed;
+    use std::vec;
+    use std::vec::Vec;
+
+    /// Runs `steps` on a search of the solid seen from above, its outline the first perimeter.
+    fn search_from_above(points: &[Point], steps: impl FnOnce(&mut Search<'_>)) {
+        let mut words = vec![0; scratch_bytes_from_vertices(points.len()) / 8];
+        let mut scratch = Scratch::new(&mut words);
+        let mut candidates: Vec<u16> = (0..points.len() as u16).collect();
+        let Span::Space(inside) = points::span(points, &candidates) else {
+            unreachable!("the examples are solids");
+        };
+        let eye = Eye::Towards([0, 0, 1]);
+        let mut scratch = scratch.reborrow();
+        let mut search =
+            Search::new(points, eye, inside, &mut candidates, &mut scratch, &mut Undisturbed);
+        assert_eq!(search.as_mut().map(steps).err(), None);
+    }
+
+    /// The perimeter in any order, in the paper's numbers (from 1).
+    fn perimeter(search: &Search<'_>) -> Vec<(u16, u16)> {
+        let mut segments: Vec<_> = (0..search.perimeter_count)
+            .map(|at| search.segment(at))
+            .map(|(from, to)| (from + 1, to + 1))
+            .collect();
+        segments.sort_unstable();
+        segments
+    }
+
+    fn sorted<T: Ord + Copy>(items: &[T]) -> Vec<T> {
+        let mut items = items.to_vec();
+        items.sort_unstable();
+        items
+    }
+
+    /// Finds the face at a segment; the edges that are new, and the vertices that drop out.
+    fn step(search: &mut Search<'_>, segment: (u16, u16)) -> (Vec<(u16, u16)>, Vec<u16>) {
+        let (edges, candidates) =
+            (search.edge_count, search.candidates[..search.candidate_count].to_vec());
+        let at = (0..search.perimeter_count)
+            .find(|at| search.segment(*at) == (segment.0 - 1, segment.1 - 1));
+        assert_ne!(at, None, "{segment:?} is in the perimeter");
+        let found = search.find_face(at.unwrap_or(0), &mut Undisturbed);
+        assert_eq!(found, Ok(()));
+        let new_edges: Vec<_> = search.edges[edges..search.edge_count]
+            .iter()
+            .map(|edge| (edge.from.min(edge.to) + 1, edge.from.max(edge.to) + 1))
+            .collect();
+        let left = &search.candidates[..search.candidate_count];
+        let dropped: Vec<_> = candidates
+            .iter()
+            .filter(|number| !left.contains(number))
+            .map(|number| number + 1)
+            .collect();
+        (sorted(&new_edges), sorted(&dropped))
+    }
+
+    /// Harrison 3.5. His solid is given by its numbering alone; a triangular cupola has it. His list of
+    /// rejected vertices forgets vertex 4, both of whose segments cancel in the second step.
+    #[test]
+    fn the_general_example() {
+        let cupola = [
+            [-3, -3, 0],
+            [-3, 0, 0],
+            [0, 3, 0],
+            [3, 3, 0],
+            [3, 0, 0],
+            [0, -3, 0],
+            [-1, -2, 2],
+            [-1, 1, 2],
+            [2, 1, 2],
+        ];
+        type Segments = &'static [(u16, u16)];
+        type Step = ((u16, u16), Segments, &'static [u16], Segments);
+        let steps: [Step; 7] = [
+            (
+                (5, 4),
+                &[(4, 9), (5, 9)],
+                &[],
+                &[(1, 6), (2, 1), (3, 2), (4, 3), (5, 9), (6, 5), (9, 4)],
+            ),
+            (
+                (4, 3),
+                &[(3, 8), (8, 9)],
+                &[4],
+                &[(1, 6), (2, 1), (3, 2), (5, 9), (6, 5), (8, 3), (9, 8)],
+            ),
+            ((3, 2), &[(2, 8)], &[3], &[(1, 6), (2, 1), (5, 9), (6, 5), (8, 2), (9, 8)]),
+            ((2, 1), &[(1, 7), (7, 8)], &[2], &[(1, 6), (5, 9), (6, 5), (7, 1), (8, 7), (9, 8)]),
+            ((1, 6), &[(6, 7)], &[1], &[(5, 9), (6, 5), (7, 6), (8, 7), (9, 8)]),
+            ((6, 5), &[(7, 9)], &[5, 6], &[(7, 9), (8, 7), (9, 8)]),
+            ((9, 8), &[], &[7, 8, 9], &[]),
+        ];
+        search_from_above(&cupola, |search| {
+            assert_eq!(perimeter(search), [(1, 6), (2, 1), (3, 2), (4, 3), (5, 4), (6, 5)]);
+            for (segment, new_edges, dropped, new_perimeter) in steps {
+                assert_eq!(
+                    step(search, segment),
+                    (new_edges.to_vec(), dropped.to_vec()),
+                    "{segment:?}"
+                );
+                assert_eq!(perimeter(search), new_perimeter, "{segment:?}");
+            }
+            // As many as his final draw list has.
+            assert_eq!(search.edge_count, 15);
+            search.turn_to_hidden_faces();
+            assert_eq!(perimeter(search), [(1, 2), (2, 3), (3, 4), (4, 5), (5, 6), (6, 1)]);
+            assert_eq!(step(search, (1, 2)).0, []);
+            assert_eq!((search.face_count, perimeter(search)), (8, vec![]));
+        });
+    }
+
+    /// Harrison 3.6: the perimeter falls into loops that touch in vertex 1, which must not drop out
+    /// when the loop of face 1, 3, 4 closes.
+    #[test]
+    fn the_perimeter_splits() {
+        let fan = [[3, 0, 0], [3, 3, 0], [0, 3, 2], [-3, 0, 3], [-3, -3, 2], [0, -3, 0]];
+        search_from_above(&fan, |search| {
+            assert_eq!(perimeter(search), [(1, 2), (2, 3), (3, 4), (4, 5), (5, 6), (6, 1)]);
+            assert_eq!(step(search, (4, 5)), (vec![(1, 4), (1, 5)], vec![]));
+            assert_eq!(perimeter(search), [(1, 2), (1, 5), (2, 3), (3, 4), (4, 1), (5, 6), (6, 1)]);
+            assert_eq!(step(search, (2, 3)), (vec![(1, 3)], vec![2]));
+            assert_eq!(perimeter(search), [(1, 3), (1, 5), (3, 4), (4, 1), (5, 6), (6, 1)]);
+            assert_eq!(step(search, (4, 1)), (vec![], vec![3, 4]));
+            assert_eq!(perimeter(search), [(1, 5), (5, 6), (6, 1)]);
+            assert_eq!(step(search, (5, 6)), (vec![], vec![1, 5, 6]));
+            assert_eq!(perimeter(search), []);
+            assert_eq!(search.edge_count, 9);
+        });
+    }
+}

@@ -1,0 +1,261 @@
+//! Faces that are one but for rounding are joined, and the finished solid is handed over.
+//!
+//! A face takes in its neighbours, and theirs, as long as each of their corners can be brought onto its
+//! plane by moving each coordinate by at most the tolerance, and they look to the same side. The largest
+//! face begins, because its plane is the surest. Nothing chains: every corner is held against the plane of
+//! the face that began. Faces whose union is not one simple polygon stay apart.
+
+use super::exact::Plane;
+use super::faces::{HullEdge, Solid, UNKNOWN};
+use super::{Eye, Sight, SolidEdge, SolidError, SolidSink, SolidSummary};
+use crate::model::Corner;
+use crate::stage::{Attention, OutOfScratch, Scratch};
+
+#[derive(Debug)]
+pub(super) struct Joining<'s> {
+    solid: Solid<'s>,
+    eye: Eye,
+    /// The same, moved as the tolerance asks for: it decides what is visible.
+    drawn_in: Eye,
+    /// For each face the face that took it in, which may be itself.
+    joined: &'s mut [u16],
+    /// For each vertex the one after it around the face in hand.
+    next: &'s mut [u16],
+    /// The corners of the face in hand.
+    corners: &'s mut [Corner],
+}
+
+impl<'s> Joining<'s> {
+    pub(super) const fn scratch_bytes(vertices: usize, faces: usize) -> usize {
+        Scratch::bytes_for::<u16>(faces)
+            + Scratch::bytes_for::<u16>(vertices)
+            + Scratch::bytes_for::<Corner>(vertices)
+    }
+
+    pub(super) fn new(
+        solid: Solid<'s>,
+        eye: Eye,
+        drawn_in: Eye,
+        scratch: &mut Scratch<'s>,
+    ) -> Result<Self, OutOfScratch> {
+        let joined = scratch.take::<u16>(solid.faces.len())?;
+        for (place, face) in joined.iter_mut().zip(0..) {
+            *place = face;
+        }
+        Ok(Self {
+            eye,
+            drawn_in,
+            joined,
+            next: scratch.take(solid.points.len())?,
+            corners: scratch.take(solid.points.len())?,
+            solid,
+        })
+    }
+
+    fn plane(&self, face: u16) -> Plane {
+        let [a, b, c] = self.solid.faces[usize::from(face)]
+            .map(|number| self.solid.points[usize::from(number)]);
+        Plane::through(a, b, c)
+    }
+
+    /// Refuses vertices deeper inside than the tolerance; the others are as good as on a face.
+    pub(super) fn check_convex(
+        &mut self,
+        tolerance: u32,
+        attention: &mut dyn Attention,
+    ) -> Result<(), SolidError> {
+        let mut deep = 0;
+        let mut first = UNKNOWN;
+        for number in self.solid.inside {
+            attention.check()?;
+            let point = self.solid.points[usize::from(*number)];
+            let faces = 0..self.solid.faces.len() as u16; // below 2^15
+            let near = tolerance > 0
+                && faces.into_iter().any(|face| self.plane(face).is_near(point, tolerance));
+            if !near {
+                deep += 1;
+                first = first.min(*number);
+            }
+        }
+        if deep > 0 {
+            return Err(SolidError::VertexInside { vertex: first, count: deep });
+        }
+        self.solid.flat += self.solid.inside.len();
+        Ok(())
+    }
+
+    /// Joins faces that differ by no more than the tolerance.
+    pub(super) fn join_faces(
+        &mut self,
+        tolerance: u32,
+        attention: &mut dyn Attention,
+    ) -> Result<(), SolidError> {
+        if tolerance == 0 {
+            return Ok(());
+        }
+        for edge in self.solid.edges {
+            attention.check()?;
+            if self.is_almost_flat(edge, tolerance) {
+                self.joined[usize::from(edge.left)] = UNKNOWN;
+                self.joined[usize::from(edge.right)] = UNKNOWN;
+            }
+        }
+        while let Some(first) = self.largest_undecided_face() {
+            self.joined[usize::from(first)] = first;
+            let plane = self.plane(first);
+            while self.take_in_neighbours(first, &plane, tolerance, attention)? {}
+            if self.go_around(first).is_none() {
+                for (joined, face) in self.joined.iter_mut().zip(0..) {
+                    if *joined == first && face != first {
+                        *joined = UNKNOWN;
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether one of the two faces might take in the other.
+    fn is_almost_flat(&self, edge: &HullEdge, tolerance: u32) -> bool {
+        let (left, right) = (self.plane(edge.left), self.plane(edge.right));
+        let near = |plane: &Plane, face: u16| {
+            let corners = self.solid.faces[usize::from(face)];
+            corners
+                .iter()
+                .all(|number| plane.is_near(self.solid.points[usize::from(*number)], tolerance))
+        };
+        left.is_turned_like(&right) && (near(&left, edge.right) || near(&right, edge.left))
+    }
+
+    fn largest_undecided_face(&self) -> Option<u16> {
+        self.joined
+            .iter()
+            .zip(0..)
+            .filter(|(joined, _)| **joined == UNKNOWN)
+            .map(|(_, face)| face)
+            .max_by_key(|face| self.plane(*face).size())
+    }
+
+    /// One round over the edges; whether any face was taken in.
+    fn take_in_neighbours(
+        &mut self,
+        first: u16,
+        plane: &Plane,
+        tolerance: u32,
+        attention: &mut dyn Attention,
+    ) -> Result<bool, SolidError> {
+        let mut any = false;
+        for edge in self.solid.edges {
+            let sides = [edge.left, edge.right];
+            let neighbour = match sides.map(|face| self.joined[usize::from(face)]) {
+                [inner, UNKNOWN] if inner == first => edge.right,
+                [UNKNOWN, inner] if inner == first => edge.left,
+                _ => continue,
+            };
+            attention.check()?;
+            if plane.is_turned_like(&self.plane(neighbour))
+                && self.is_all_near(neighbour, plane, tolerance)
+            {
+                self.joined[usize::from(neighbour)] = first;
+                any = true;
+            }
+        }
+        Ok(any)
+    }
+
+    fn is_all_near(&self, face: u16, plane: &Plane, tolerance: u32) -> bool {
+        let near = |number: u16| plane.is_near(self.solid.points[usize::from(number)], tolerance);
+        self.solid
+            .edges
+            .iter()
+            .filter(|edge| edge.left == face || edge.right == face)
+            .all(|edge| near(edge.from) && near(edge.to))
+    }
+
+    /// Puts the corners of a face into `corners` and returns how many; `None` if its boundary is not one
+    /// simple polygon.
+    fn go_around(&mut self, face: u16) -> Option<usize> {
+        self.next.fill(UNKNOWN);
+        let mut count = 0;
+        let mut start = None;
+        for edge in self.solid.edges {
+            let sides = [edge.left, edge.right];
+            let (from, to) = match sides.map(|side| self.joined[usize::from(side)] == face) {
+                [true, false] => (edge.from, edge.to),
+                [false, true] => (edge.to, edge.from),
+                _ => continue,
+            };
+            let next = &mut self.next[usize::from(from)];
+            if *next != UNKNOWN {
+                return None;
+            }
+            *next = to;
+            start.get_or_insert(from);
+            count += 1;
+        }
+        let start = start?;
+        let mut at = start;
+        for corner in &mut self.corners[..count] {
+            if at == UNKNOWN {
+                return None;
+            }
+            let next = self.next[usize::from(at)];
+            *corner = Corner::new(at, false, next == start);
+            at = next;
+        }
+        let closed_at = self.corners[..count].iter().position(|corner| corner.is_last());
+        (closed_at == Some(count - 1)).then_some(count)
+    }
+
+    /// Gives faces and edges to the sink.
+    pub(super) fn hand_over(
+        &mut self,
+        mut summary: SolidSummary,
+        attention: &mut dyn Attention,
+        sink: &mut dyn SolidSink,
+    ) -> Result<SolidSummary, SolidError> {
+        for face in 0..self.solid.faces.len() {
+            attention.check()?;
+            let number = face as u16; // below 2^15
+            if self.joined[face] != number {
+                continue;
+            }
+            // Always some: exact faces are simple, and joined ones were tried.
+            if let Some(count) = self.go_around(number) {
+                sink.face(&self.corners[..count], self.is_visible(number))?;
+                summary.faces += 1;
+            }
+        }
+        // From here on `next` tells which vertices are still corners.
+        self.next.fill(UNKNOWN);
+        for edge in self.solid.edges {
+            let [left, right] = [edge.left, edge.right].map(|face| self.joined[usize::from(face)]);
+            if left == right {
+                continue;
+            }
+            self.next[usize::from(edge.from)] = edge.to;
+            self.next[usize::from(edge.to)] = edge.from;
+            sink.edge(SolidEdge { ends: (edge.from, edge.to), sight: self.sight(left, right) })?;
+            summary.edges += 1;
+        }
+        let exact_corners = self.solid.edges.len() + 2 - self.solid.faces.len(); // Euler
+        let corners = self.next.iter().filter(|next| **next != UNKNOWN).count();
+        summary.flat = self.solid.flat + exact_corners - corners;
+        Ok(summary)
+    }
+
+    fn is_visible(&self, face: u16) -> bool {
+        self.plane(face).height_of_eye(self.drawn_in) > 0
+    }
+
+    fn sight(&self, left: u16, right: u16) -> Sight {
+        // Not turned away, but not visible: edge-on.
+        let edge_on = |face: u16| self.plane(face).height_of_eye(self.eye) >= 0;
+        match (self.is_visible(left), self.is_visible(right)) {
+            (true, true) => Sight::Visible,
+            (false, false) if edge_on(left) || edge_on(right) => Sight::BehindOutline,
+            (false, false) => Sight::Hidden,
+            _ => Sight::Outline,
+        }
+    }
+}

@@ -1,0 +1,105 @@
+//! The vertices as points: range, welding, what they span.
+
+use super::exact::{Plane, Point};
+use super::{Eye, POSITION_LIMIT, SolidError};
+use crate::model::VERTEX_NUMBER_LIMIT;
+
+/// The tolerance that takes rounded decimals for what they mean: 2^-17 of the largest extent.
+///
+/// ```
+/// use penup::convex::default_tolerance;
+/// assert_eq!(default_tolerance(&[[0, 0, 0], [1 << 20, 9, 9]]), 8);
+/// assert_eq!(default_tolerance(&[[0, 0, 0], [100_000, 0, 0]]), 0);
+/// ```
+pub fn default_tolerance(positions: &[[i32; 3]]) -> u32 {
+    largest_extent(positions.iter().copied()) >> 17
+}
+
+/// The longest side of the box around the points.
+pub(super) fn largest_extent(points: impl Iterator<Item = Point> + Clone) -> u32 {
+    let extent = |axis: usize| {
+        let along = points.clone().map(|point| point[axis]);
+        let low = along.clone().min().unwrap_or(0);
+        let high = along.max().unwrap_or(0);
+        high.abs_diff(low)
+    };
+    [0, 1, 2].map(extent).into_iter().max().unwrap_or(0)
+}
+
+/// The eye, moved towards the middle of the points at `numbers` as the tolerance asks for.
+pub(super) fn drawn_in_eye(eye: Eye, points: &[Point], numbers: &[u16], tolerance: u32) -> Eye {
+    let corners = numbers.iter().map(|number| points[usize::from(*number)]);
+    let count = numbers.len().max(1) as i64; // at most 2^14
+    let mean = |axis: usize| {
+        let sum: i64 = corners.clone().map(|point| i64::from(point[axis])).sum();
+        (sum / count) as i32
+    };
+    eye.drawn_in([0, 1, 2].map(mean), largest_extent(corners.clone()), tolerance)
+}
+
+/// What a set of different points spans, with points that show it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Span {
+    Line,
+    Plane([u16; 3]),
+    Space([u16; 4]),
+}
+
+/// Checks the range of every position.
+pub(super) fn check(points: &[Point]) -> Result<(), SolidError> {
+    if points.len() > VERTEX_NUMBER_LIMIT {
+        return Err(SolidError::TooManyVertices);
+    }
+    let out_of_range = |point: &Point| {
+        point.iter().any(|part| part.unsigned_abs() > POSITION_LIMIT.unsigned_abs())
+    };
+    match points.iter().position(out_of_range) {
+        Some(vertex) => Err(SolidError::PositionOutOfRange {
+            vertex: vertex as u16, // below VERTEX_NUMBER_LIMIT
+        }),
+        None => Ok(()),
+    }
+}
+
+/// Orders `numbers` by place and keeps, of those at the same place, the least; returns how many are left.
+pub(super) fn weld(points: &[Point], numbers: &mut [u16]) -> usize {
+    numbers.sort_unstable_by_key(|number| (points[usize::from(*number)], *number));
+    let mut kept = 0;
+    for at in 0..numbers.len() {
+        let number = numbers[at];
+        let same_place =
+            kept > 0 && points[usize::from(numbers[kept - 1])] == points[usize::from(number)];
+        if !same_place {
+            numbers[kept] = number;
+            kept += 1;
+        }
+    }
+    kept
+}
+
+/// What the points at `numbers`, all different and at least four, span.
+pub(super) fn span(points: &[Point], numbers: &[u16]) -> Span {
+    let point = |number: u16| points[usize::from(number)];
+    let (a, b) = (numbers[0], numbers[1]);
+    let mut off_line = numbers
+        .iter()
+        .copied()
+        .filter(|c| !Plane::through(point(a), point(b), point(*c)).is_degenerate());
+    let Some(c) = off_line.next() else {
+        return Span::Line;
+    };
+    let plane = Plane::through(point(a), point(b), point(c));
+    let mut off_plane = numbers.iter().copied().filter(|d| plane.height(point(*d)) != 0);
+    match off_plane.next() {
+        Some(d) => Span::Space([a, b, c, d]),
+        None => Span::Plane([a, b, c]),
+    }
+}
+
+/// The vertex that stands for `number` among the welded ones.
+pub(super) fn first_at_place(points: &[Point], welded: &[u16], number: u16) -> u16 {
+    let place = points[usize::from(number)];
+    welded
+        .binary_search_by_key(&place, |other| points[usize::from(*other)])
+        .map_or(number, |at| welded[at])
+}

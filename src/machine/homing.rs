@@ -1,0 +1,219 @@
+//! Finding the corner of the travel: each axis runs to its switch, backs off, comes again slowly,
+//! backs off for good. There its position is 0.
+
+use super::{Alarm, Machine, MachineError, Setting, State, Target};
+use crate::drawing::{PAGE_LIMIT, PagePoint};
+
+/// An axis of the page.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Axis {
+    /// To the right.
+    X,
+    /// Up.
+    Y,
+}
+
+/// The limit switches: whether each is pressed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Switches {
+    /// At the low end of x.
+    pub x: bool,
+    /// At the low end of y.
+    pub y: bool,
+}
+
+impl Switches {
+    /// Whether the switch of an axis is pressed.
+    pub const fn of(self, axis: Axis) -> bool {
+        match axis {
+            Axis::X => self.x,
+            Axis::Y => self.y,
+        }
+    }
+
+    /// Whether any is pressed.
+    pub const fn any(self) -> bool {
+        self.x || self.y
+    }
+}
+
+/// What the axis does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(super) enum Phase {
+    /// Leaves a switch that was pressed at the start.
+    Leave,
+    /// Runs to the switch.
+    Seek,
+    /// Backs off.
+    Release,
+    /// Runs to it again, slowly.
+    Approach,
+    /// Backs off for good.
+    PullOff,
+}
+
+/// A switch was not found within the travel, or not left by backing off.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct SwitchFault;
+
+/// Where the homing is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(super) struct Homing {
+    pub(super) axis: Axis,
+    pub(super) phase: Phase,
+    /// Where the pins were when the switch was pressed.
+    pub(super) pressed_at: Option<PagePoint>,
+    /// The move of the phase is planned to its end.
+    pub(super) stands: bool,
+}
+
+impl Homing {
+    /// The first phase of an axis.
+    pub(super) const fn begin(axis: Axis, pressed: bool) -> Self {
+        let phase = if pressed { Phase::Leave } else { Phase::Seek };
+        Self { axis, phase, pressed_at: None, stands: false }
+    }
+
+    /// Whether the phase is one of the slow ones.
+    pub(super) const fn is_slow(self) -> bool {
+        matches!(self.phase, Phase::Approach | Phase::PullOff)
+    }
+
+    /// How far the axis is to go: whole travels, and pull-offs.
+    pub(super) const fn distance(self, travel: i32, pull_off: i32) -> i32 {
+        match self.phase {
+            Phase::Leave | Phase::Release | Phase::PullOff => pull_off,
+            Phase::Seek => -(travel + travel / 2),
+            Phase::Approach => -2 * pull_off,
+        }
+    }
+
+    /// Whether the phase ends at the switch.
+    pub(super) const fn seeks(self) -> bool {
+        matches!(self.phase, Phase::Seek | Phase::Approach)
+    }
+
+    /// What follows when the machine stands; `None` at the end.
+    ///
+    /// # Errors
+    /// The switch was not found, or not left.
+    pub(super) const fn next(self, switches: Switches) -> Result<Option<Self>, SwitchFault> {
+        let pressed = switches.of(self.axis);
+        let phase = match self.phase {
+            Phase::Leave | Phase::Release if pressed => return Err(SwitchFault),
+            Phase::Seek | Phase::Approach if self.pressed_at.is_none() => return Err(SwitchFault),
+            Phase::Leave => Phase::Seek,
+            Phase::Seek => Phase::Release,
+            Phase::Release => Phase::Approach,
+            Phase::Approach => {
+                return Ok(Some(Self { phase: Phase::PullOff, stands: false, ..self }));
+            }
+            Phase::PullOff => {
+                return match self.axis {
+                    _ if pressed => Err(SwitchFault),
+                    Axis::X => Ok(Some(Self::begin(Axis::Y, switches.y))),
+                    Axis::Y => Ok(None),
+                };
+            }
+        };
+        Ok(Some(Self { axis: self.axis, phase, pressed_at: None, stands: false }))
+    }
+}
+
+impl Machine<'_> {
+    /// Looks for the switches, x first, then y. Afterwards the machine stands at (0, 0), a pull-off
+    /// from each. [`Machine::watch`] must be called often.
+    ///
+    /// # Errors
+    /// [`MachineError::State`] unless the machine is idle or in [`Alarm::NotHomed`].
+    pub fn home(&mut self, switches: Switches) -> Result<(), MachineError> {
+        if !matches!(self.state, State::Idle | State::Alarm(Alarm::NotHomed)) || !self.stands() {
+            return Err(MachineError::State(self.state));
+        }
+        self.state = State::Home;
+        self.begin_phase(Homing::begin(Axis::X, switches.x));
+        Ok(())
+    }
+
+    /// What the limit switches say now. A pressed one ends an approach while the machine homes, and
+    /// is an alarm in any other motion if [`Setting::HardLimits`] is on.
+    pub fn watch(&mut self, switches: Switches) {
+        match (self.state, self.homing) {
+            (State::Home, Some(homing)) => self.watch_homing(homing, switches),
+            (State::Home | State::Check | State::Sleep | State::Alarm(_), _) => {}
+            (State::Run | State::Hold { .. } | State::Jog | State::Abort | State::Idle, _) => {
+                // Idle as soon as all is planned, while the pins still move.
+                let is_limit = switches.any() && self.settings.is_on(Setting::HardLimits);
+                if is_limit && !self.stands() {
+                    self.alarm(Alarm::HardLimit);
+                }
+            }
+        }
+    }
+
+    fn watch_homing(&mut self, homing: Homing, switches: Switches) {
+        if homing.seeks() && homing.pressed_at.is_none() && switches.of(homing.axis) {
+            let pressed_at = Some(self.position());
+            self.homing = Some(Homing { pressed_at, ..homing });
+            self.runner.stop();
+        } else if homing.stands && self.stands() {
+            match homing.next(switches) {
+                Ok(next) => {
+                    if homing.phase == Phase::PullOff {
+                        self.set_zero(homing.axis);
+                    }
+                    match next {
+                        Some(next) => self.begin_phase(next),
+                        None => {
+                            self.end_homing();
+                            self.state = State::Idle;
+                        }
+                    }
+                }
+                Err(SwitchFault) => self.alarm(Alarm::HomingFailed(homing.axis)),
+            }
+        }
+    }
+
+    /// Gives the machine back its speed.
+    pub(super) fn end_homing(&mut self) {
+        if self.homing.take().is_some() {
+            self.runner.set_limits(self.settings.limits(), self.settings.pen_positions());
+        }
+    }
+
+    fn begin_phase(&mut self, homing: Homing) {
+        let speed = if homing.is_slow() { Setting::HomingFeed } else { Setting::HomingSeek };
+        self.runner.set_limits(self.settings.limits_at(speed), self.settings.pen_positions());
+        let (travel, steps_per_mm) = match homing.axis {
+            Axis::X => (Setting::TravelX, Setting::StepsPerMmX),
+            Axis::Y => (Setting::TravelY, self.settings.steps_per_mm_y()),
+        };
+        let steps =
+            |setting| self.settings.millimetres_as_steps(setting, steps_per_mm).min(PAGE_LIMIT / 2);
+        let distance = homing.distance(steps(travel), steps(Setting::HomingPullOff));
+        let mut point = self.planned_position();
+        let from = homing.pressed_at.unwrap_or(point);
+        match homing.axis {
+            Axis::X => point.x = from.x + distance,
+            Axis::Y => point.y = from.y + distance,
+        }
+        self.homing = Some(homing);
+        if self.push(Target { point, ink: None }).is_err() {
+            self.alarm(Alarm::HomingFailed(homing.axis));
+        }
+    }
+
+    fn set_zero(&mut self, axis: Axis) {
+        let mut point = self.planned_position();
+        match axis {
+            Axis::X => point.x = 0,
+            Axis::Y => point.y = 0,
+        }
+        self.set_position(point);
+    }
+}

@@ -1,0 +1,178 @@
+//! From a path to events: measuring it, reading it, filling the queue, standing where it asks.
+
+use super::{Alarm, JobSize, Machine, MachineError, Path, Setting, State, Target};
+use crate::drawing::{PAGE_LIMIT, PagePoint};
+use crate::motion::{EventQueue, Progress, PushError, Runner};
+
+impl Machine<'_> {
+    /// Measures the path from where the machine stands, and begins to draw it if all of it can be
+    /// drawn (in [`State::Check`] it is only measured).
+    ///
+    /// # Errors
+    /// See [`MachineError`]; nothing moves then.
+    pub fn start(&mut self, path: &mut dyn Path) -> Result<JobSize, MachineError> {
+        if !matches!(self.state, State::Idle | State::Check) {
+            return Err(MachineError::State(self.state));
+        }
+        let size = self.measure(path)?;
+        if self.state == State::Idle {
+            self.job = size;
+            self.fill_pen();
+            self.before = self.runner.run();
+            self.path_ended = false;
+            self.state = State::Run;
+        }
+        Ok(size)
+    }
+
+    /// Moves to `point` with the pen raised.
+    ///
+    /// # Errors
+    /// See [`MachineError`]; nothing moves then.
+    pub fn jog(&mut self, point: PagePoint) -> Result<(), MachineError> {
+        if !matches!(self.state, State::Idle | State::Jog) {
+            return Err(MachineError::State(self.state));
+        }
+        self.check_travel(0, point)?;
+        match self.push(Target { point, ink: None }) {
+            Ok(()) => {
+                self.state = State::Jog;
+                Ok(())
+            }
+            Err(PushError::Full) => Err(MachineError::State(self.state)),
+            Err(PushError::TooLong) => Err(MachineError::MoveTooLong { target: 0 }),
+        }
+    }
+
+    /// Keeps the queue filled: reads targets while the look-ahead has room, hands over events while
+    /// the queue has room and the plan is not too far ahead. Call it often.
+    pub fn fill(&mut self, path: &mut dyn Path, queue: &mut dyn EventQueue) {
+        if self.pins.is_halted() {
+            return;
+        }
+        if core::mem::take(&mut self.sleep_due) && self.runner.release_drivers(queue).is_err() {
+            self.alarm(Alarm::Queue);
+        }
+        while self.is_moving() {
+            self.read_targets(path);
+            let ahead = self.runner.ticks().wrapping_sub(self.pins.ticks());
+            if queue.room() < Runner::ROOM || ahead >= self.greatest_ahead() {
+                return;
+            }
+            match self.runner.produce(queue) {
+                Ok(Progress::More) => {}
+                Ok(progress) => self.stand(progress),
+                Err(_) => self.alarm(Alarm::Queue),
+            }
+        }
+    }
+
+    fn is_moving(&self) -> bool {
+        matches!(
+            self.state,
+            State::Run | State::Hold { standing: false } | State::Abort | State::Jog
+        ) || self.homing.is_some_and(|homing| !homing.stands)
+    }
+
+    fn greatest_ahead(&self) -> u32 {
+        // A switch is to stop the machine soon: 10 ms.
+        if self.homing.is_some() { self.ahead_ticks.min(250_000) } else { self.ahead_ticks }
+    }
+
+    fn stand(&mut self, progress: Progress) {
+        match self.state {
+            State::Hold { .. } | State::Run
+                if progress == Progress::Stopped || self.next_pen.is_some() =>
+            {
+                if self.state == State::Run {
+                    self.fill_pen();
+                }
+                self.state = State::Hold { standing: true };
+            }
+            State::Home => {
+                self.runner.forget_path();
+                if let Some(homing) = &mut self.homing {
+                    homing.stands = true;
+                }
+            }
+            _ => {
+                self.next_pen = None;
+                self.runner.forget_path();
+                self.state = State::Idle;
+            }
+        }
+    }
+
+    /// The pause after so much ink counts from here.
+    fn fill_pen(&mut self) {
+        let metres = u64::from(self.settings.get(Setting::InkBeforePause).to_bits().unsigned_abs());
+        // 2^-16 m to 2^-18 mm.
+        self.runner.stop_after_ink((metres > 0).then_some(metres * 4000));
+    }
+
+    fn read_targets(&mut self, path: &mut dyn Path) {
+        while !self.path_ended && self.next_pen.is_none() && !self.runner.is_full() {
+            match path.next_target() {
+                Some(target) if path.pen() != self.pen => {
+                    self.next_pen = Some((path.pen(), target));
+                    self.runner.end_path();
+                }
+                // Measured at the start, so it fits.
+                Some(target) => {
+                    if self.push(target).is_err() {
+                        self.abort();
+                    }
+                }
+                None => {
+                    self.path_ended = true;
+                    self.runner.end_path();
+                }
+            }
+        }
+    }
+
+    fn measure(&self, path: &mut dyn Path) -> Result<JobSize, MachineError> {
+        path.rewind();
+        let mut size = JobSize::default();
+        let kinematics = self.settings.kinematics();
+        let mut at = self.runner.end();
+        let mut inked = false;
+        let mut number = 0u32;
+        while let Some(Target { point, ink }) = path.next_target() {
+            self.check_travel(number, point)?;
+            let point = kinematics.motors(point);
+            let length = self
+                .runner
+                .limits()
+                .length(point.x - at.x, point.y - at.y)
+                .ok_or(MachineError::MoveTooLong { target: number })?;
+            let length = u64::from(length.to_bits());
+            if ink.is_some() {
+                size.drawn += length;
+                size.strokes += u32::from(!inked);
+            } else {
+                size.travelled += length;
+            }
+            inked = ink.is_some();
+            at = point;
+            number = number.saturating_add(1);
+        }
+        path.rewind();
+        Ok(size)
+    }
+
+    pub(super) fn check_travel(&self, target: u32, point: PagePoint) -> Result<(), MachineError> {
+        let beyond = |at: i32, travel: Setting, steps_per_mm: Setting| {
+            let (least, most) = if self.settings.is_on(Setting::SoftLimits) {
+                let steps = self.settings.millimetres_as_steps(travel, steps_per_mm);
+                (0, steps.min(PAGE_LIMIT))
+            } else {
+                (-PAGE_LIMIT, PAGE_LIMIT)
+            };
+            at.saturating_sub(at.clamp(least, most))
+        };
+        let x = beyond(point.x, Setting::TravelX, Setting::StepsPerMmX);
+        let y = beyond(point.y, Setting::TravelY, self.settings.steps_per_mm_y());
+        if (x, y) == (0, 0) { Ok(()) } else { Err(MachineError::BeyondTravel { target, x, y }) }
+    }
+}

@@ -1,0 +1,310 @@
+//! Axes, kinematics, pen, limits, homing, hold, abort: a state machine.
+//!
+//! [`Machine`] is the main loop's side. It takes a [`Path`], refuses it before anything moves if it
+//! leads beyond the travel, and keeps the interrupt's queue filled. [`Pulser`] is the interrupt's
+//! side; [`PulserState`] joins the two. The events are a function of path and settings, and of the
+//! call of [`Machine::fill`] at which an order arrives: time is never read.
+//!
+//! Refused: orders that the state does not allow, settings that conflict, moves beyond the limits;
+//! each leaves everything as it was.
+
+mod homing;
+mod job;
+mod kinematics;
+mod path;
+mod pulser;
+mod settings;
+mod status;
+
+use homing::Homing;
+pub use homing::{Axis, Switches};
+pub use kinematics::Kinematics;
+pub use path::{JobSize, Path, TapePath, Target, TargetList};
+pub use pulser::{Pen, Pins, Pulser, PulserState, Solenoid};
+pub use settings::{SETTING_COUNT, SETTINGS, Setting, SettingError, SettingInfo, Settings, Value};
+pub use status::Status;
+
+use crate::drawing::PagePoint;
+use crate::motion::{Block, PushError, RunLengths, Runner};
+
+/// What the machine does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum State {
+    /// Ready.
+    Idle,
+    /// Draws.
+    Run,
+    /// Slows down on the path, or stands there with the pen raised.
+    Hold {
+        /// Whether it stands.
+        standing: bool,
+    },
+    /// Slows down to give the job up; then [`State::Idle`].
+    Abort,
+    /// Moves by hand.
+    Jog,
+    /// Looks for the switches.
+    Home,
+    /// Jobs are measured, not drawn.
+    Check,
+    /// Stopped; needs [`Machine::unlock`].
+    Alarm(Alarm),
+    /// Motors off; needs [`Machine::unlock`].
+    Sleep,
+}
+
+/// Why the machine stopped.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Alarm {
+    /// The emergency stop.
+    EmergencyStop,
+    /// A limit switch.
+    HardLimit,
+    /// The machine starts without knowing where it is; [`Machine::home`] finds out.
+    NotHomed,
+    /// A switch was not found, or stayed pressed.
+    HomingFailed(Axis),
+    /// The queue refused an event although it had room: a fault of the program.
+    Queue,
+}
+
+/// Why an order was refused.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum MachineError {
+    /// The state does not allow it.
+    State(State),
+    /// A target lies beyond the travel, by so many steps.
+    BeyondTravel {
+        /// Which target, from 0.
+        target: u32,
+        /// Steps beyond x (negative: below 0).
+        x: i32,
+        /// Steps beyond y.
+        y: i32,
+    },
+    /// A move is longer than motion can plan: 16 m.
+    MoveTooLong {
+        /// Which target, from 0.
+        target: u32,
+    },
+}
+
+/// The main loop's side of the plotter.
+#[derive(Debug)]
+pub struct Machine<'m> {
+    settings: Settings,
+    state: State,
+    runner: Runner<'m>,
+    pins: &'m PulserState,
+    /// The motors' position where the pins' count is 0.
+    origin: PagePoint,
+    ahead_ticks: u32,
+    job: JobSize,
+    /// The runner's lengths and strokes when the job began.
+    before: RunLengths,
+    /// Whether the path has been read to its end.
+    path_ended: bool,
+    /// Whether the drivers are to be switched off once.
+    sleep_due: bool,
+    homing: Option<Homing>,
+    /// The pen in the holder.
+    pen: u8,
+    /// The pen that comes next, and the first target that it draws.
+    next_pen: Option<(u8, Target)>,
+}
+
+impl<'m> Machine<'m> {
+    /// A machine at rest at the page's origin, pen raised; in alarm if it must be homed first.
+    ///
+    /// `blocks` is the look-ahead (24 bytes each; one at least, 100 or more serve well). `ahead_ticks` is how far
+    /// the queue may be planned ahead of the pins, and so how late a hold takes effect;
+    /// `u32::MAX` for no bound but the queue's.
+    pub fn new(
+        settings: Settings,
+        blocks: &'m mut [Block],
+        pins: &'m PulserState,
+        ahead_ticks: u32,
+    ) -> Self {
+        let machine = Self {
+            settings,
+            state: if settings.is_on(Setting::Homing) {
+                State::Alarm(Alarm::NotHomed)
+            } else {
+                State::Idle
+            },
+            runner: Runner::new(settings.limits(), settings.pen_positions(), blocks),
+            pins,
+            origin: PagePoint::default(),
+            ahead_ticks,
+            job: JobSize::default(),
+            before: RunLengths::default(),
+            path_ended: true,
+            sleep_due: false,
+            homing: None,
+            pen: 0,
+            next_pen: None,
+        };
+        machine.configure_pulser();
+        machine
+    }
+
+    /// The settings in force.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// Changes a setting.
+    ///
+    /// # Errors
+    /// See [`SettingError`]; the old value stays then.
+    pub fn set(&mut self, setting: Setting, value: Value) -> Result<(), SettingError> {
+        if !matches!(self.state, State::Idle | State::Check | State::Alarm(_)) || !self.stands() {
+            return Err(SettingError::Busy);
+        }
+        let page = self.position();
+        self.settings.set(setting, value)?;
+        if setting == Setting::Kinematics {
+            // The pen stays where it is; the motors count otherwise.
+            self.set_position(page);
+        }
+        self.runner.set_limits(self.settings.limits(), self.settings.pen_positions());
+        self.configure_pulser();
+        Ok(())
+    }
+
+    /// What it does.
+    pub fn state(&self) -> State {
+        self.state
+    }
+
+    /// The machine stands at `page`, whatever it thought: the pins' count starts from there.
+    fn set_position(&mut self, page: PagePoint) {
+        let motors = self.settings.kinematics().motors(page);
+        let (x, y) = self.pins.steps();
+        self.origin = PagePoint { x: motors.x.wrapping_sub(x), y: motors.y.wrapping_sub(y) };
+        self.runner.set_position(motors, self.pins.ticks());
+    }
+
+    fn push(&mut self, target: Target) -> Result<(), PushError> {
+        self.runner.push(self.settings.kinematics().motors(target.point), target.ink)
+    }
+
+    /// Slows down on the path and raises the pen. Nothing happens unless the machine draws.
+    pub fn hold(&mut self) {
+        if self.state == State::Run {
+            self.runner.stop();
+            self.state = State::Hold { standing: false };
+        }
+    }
+
+    /// Pauses as soon as the stroke in work ends; [`Machine::resume`] goes on.
+    pub fn pause_after_stroke(&mut self) {
+        if self.state == State::Run {
+            self.runner.stop_after_stroke();
+        }
+    }
+
+    /// Scales the speeds to `percent` of the settings, 10 to 100, from the next line on.
+    pub fn set_override(&mut self, percent: u8) {
+        self.runner.set_override(percent);
+    }
+
+    /// Lowers the pen where it was raised and goes on; with the next pen, if the machine waited for
+    /// it.
+    pub fn resume(&mut self) {
+        if matches!(self.state, State::Hold { .. }) {
+            if self.state == (State::Hold { standing: true })
+                && self.runner.is_at_rest()
+                && let Some((pen, target)) = self.next_pen.take()
+            {
+                self.pen = pen;
+                if self.push(target).is_err() {
+                    self.abort();
+                    return;
+                }
+            }
+            self.runner.resume();
+            self.state = State::Run;
+        }
+    }
+
+    /// Slows down, raises the pen, forgets the job, keeps the position. Ends a hold and a jog, too.
+    pub fn abort(&mut self) {
+        if matches!(self.state, State::Run | State::Hold { .. } | State::Jog | State::Home) {
+            self.end_homing();
+            self.next_pen = None;
+            self.runner.stop();
+            self.path_ended = true;
+            self.state = State::Abort;
+        }
+    }
+
+    /// Stops the pulses at once and raises the pen. The position is where the pins stopped.
+    pub fn alarm(&mut self, alarm: Alarm) {
+        self.pins.halt();
+        self.end_homing();
+        self.next_pen = None;
+        self.runner.forget_path();
+        self.path_ended = true;
+        self.sleep_due = false;
+        self.state = State::Alarm(alarm);
+    }
+
+    /// Switches the motors off.
+    ///
+    /// # Errors
+    /// [`MachineError::State`] unless the machine is idle.
+    pub fn sleep(&mut self) -> Result<(), MachineError> {
+        if self.state != State::Idle {
+            return Err(MachineError::State(self.state));
+        }
+        self.sleep_due = true;
+        self.state = State::Sleep;
+        Ok(())
+    }
+
+    /// Whether jobs are measured only.
+    ///
+    /// # Errors
+    /// [`MachineError::State`] unless the machine is idle or checks.
+    pub fn check(&mut self, on: bool) -> Result<(), MachineError> {
+        if !matches!(self.state, State::Idle | State::Check) {
+            return Err(MachineError::State(self.state));
+        }
+        self.state = if on { State::Check } else { State::Idle };
+        Ok(())
+    }
+
+    /// Leaves alarm and sleep. After an alarm the position is what the pins counted.
+    ///
+    /// # Errors
+    /// [`MachineError::State`] in other states, and while the interrupt still empties its queue.
+    pub fn unlock(&mut self) -> Result<(), MachineError> {
+        match self.state {
+            State::Sleep => {}
+            State::Alarm(_) if self.pins.is_drained() => {
+                self.set_position(self.position());
+                self.pins.release();
+            }
+            _ => return Err(MachineError::State(self.state)),
+        }
+        self.state = State::Idle;
+        Ok(())
+    }
+
+    /// Whether every event has been worked off: the pins stand where the plan does.
+    pub fn stands(&self) -> bool {
+        self.pins.is_drained()
+            && (self.pins.is_halted() || self.pins.ticks() == self.runner.ticks())
+    }
+
+    fn configure_pulser(&self) {
+        self.pins.configure(
+            self.settings.microseconds_as_ticks(Setting::StepPulse),
+            self.settings.get(Setting::InvertDirections).saturating_to_num(),
+        );
+    }
+}

@@ -1,0 +1,395 @@
+//! The numbered settings: names, units, ranges.
+//!
+//! Numbers up to 132 mean what they mean in Grbl 1.1; those from 200 on are penup's own. A value is
+//! checked when it is entered, alone and together with the others; a refused value changes nothing.
+
+use super::Kinematics;
+use crate::fixed::Millimetres;
+use crate::motion::{Limits, LimitsError, MotionSettings, PenPositions, TICKS_PER_SECOND};
+
+/// A value of any setting: ±32768 in units of 2^-16 of the setting's unit.
+pub type Value = Millimetres;
+
+/// One setting, in the order of the listing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(u8)]
+pub enum Setting {
+    /// `$0` Width of a step pulse.
+    StepPulse,
+    /// `$3` Which axes run the other way: bit 0 x, bit 1 y.
+    InvertDirections,
+    /// `$11` How far a rounded corner would leave the true one.
+    JunctionDeviation,
+    /// `$20` Whether moves beyond the travel are refused.
+    SoftLimits,
+    /// `$21` Whether a limit switch stops the machine.
+    HardLimits,
+    /// `$22` Whether the machine must be homed before it draws.
+    Homing,
+    /// `$24` Speed of the second approach to a switch.
+    HomingFeed,
+    /// `$25` Speed of the first.
+    HomingSeek,
+    /// `$27` How far from its switch an axis is homed.
+    HomingPullOff,
+    /// `$100` Steps per millimetre of x.
+    StepsPerMmX,
+    /// `$101` The same of y.
+    StepsPerMmY,
+    /// `$110` Greatest speed of x.
+    MaxRateX,
+    /// `$111` The same of y.
+    MaxRateY,
+    /// `$120` Acceleration of x.
+    AccelerationX,
+    /// `$121` The same of y.
+    AccelerationY,
+    /// `$130` Travel of x, from 0.
+    TravelX,
+    /// `$131` The same of y.
+    TravelY,
+    /// `$200` From a change of direction to the pulse.
+    DirectionSetup,
+    /// `$201` Speed along the path with the pen down.
+    DrawSpeed,
+    /// `$202` Speed along the path with the pen up.
+    TravelSpeed,
+    /// `$203` Whether bends of dense polylines are slowed to the acceleration limit.
+    Centripetal,
+    /// `$210` Height of the raised pen.
+    PenUpHeight,
+    /// `$211` Height of the lowered pen.
+    PenDownHeight,
+    /// `$212` From the order to raise the pen to the first move.
+    PenUpDwell,
+    /// `$213` From the order to lower the pen to the first move.
+    PenDownDwell,
+    /// `$214` Time in which the pen goes from one end of its heights to the other, step by step; 0
+    /// for at once.
+    PenRamp,
+    /// `$215` How much ink the pen draws before the machine pauses after a stroke; 0 for never.
+    InkBeforePause,
+    /// `$220` Length of the dots and gaps of a dotted line; a dash is three dots.
+    DotLength,
+    /// `$230` Build of the machine: 0 Cartesian, 1 CoreXY.
+    Kinematics,
+}
+
+/// What there is to know about a setting.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SettingInfo {
+    /// Which.
+    pub setting: Setting,
+    /// Its number after the `$`.
+    pub number: u16,
+    /// Its name.
+    pub name: &'static str,
+    /// Its unit; empty for a plain number.
+    pub unit: &'static str,
+    /// The least value allowed.
+    pub least: Value,
+    /// The greatest value allowed.
+    pub greatest: Value,
+    /// The value of a new machine.
+    pub default: Value,
+    /// Whether only whole numbers are allowed.
+    pub whole: bool,
+}
+
+/// How many settings there are.
+pub const SETTING_COUNT: usize = 29;
+
+const fn info(
+    setting: Setting,
+    number: u16,
+    name: &'static str,
+    unit: &'static str,
+    (least, greatest, default): (f64, f64, f64),
+    whole: bool,
+) -> SettingInfo {
+    const UNIT: f64 = 65536.0;
+    SettingInfo {
+        setting,
+        number,
+        name,
+        unit,
+        least: Value::from_bits((least * UNIT) as i32),
+        greatest: Value::from_bits((greatest * UNIT) as i32),
+        default: Value::from_bits((default * UNIT) as i32),
+        whole,
+    }
+}
+
+/// All settings, by number.
+#[rustfmt::skip] // a table
+pub const SETTINGS: [SettingInfo; SETTING_COUNT] = {
+    use Setting::*;
+    [
+        info(StepPulse, 0, "step pulse", "us", (0.2, 500.0, 2.0), false),
+        info(InvertDirections, 3, "invert directions", "mask", (0.0, 3.0, 0.0), true),
+        info(JunctionDeviation, 11, "junction deviation", "mm", (0.0, 1.0, 0.05), false),
+        info(SoftLimits, 20, "soft limits", "0|1", (0.0, 1.0, 1.0), true),
+        info(HardLimits, 21, "hard limits", "0|1", (0.0, 1.0, 0.0), true),
+        info(Homing, 22, "homing", "0|1", (0.0, 1.0, 0.0), true),
+        info(HomingFeed, 24, "homing speed, second", "mm/min", (1.0, 32767.0, 60.0), false),
+        info(HomingSeek, 25, "homing speed, first", "mm/min", (1.0, 32767.0, 1500.0), false),
+        info(HomingPullOff, 27, "homing pull-off", "mm", (0.1, 50.0, 2.0), false),
+        info(StepsPerMmX, 100, "steps of x", "step/mm", (2.0, 4000.0, 80.0), false),
+        info(StepsPerMmY, 101, "steps of y", "step/mm", (2.0, 4000.0, 80.0), false),
+        info(MaxRateX, 110, "greatest speed of x", "mm/min", (1.0, 32767.0, 6000.0), false),
+        info(MaxRateY, 111, "greatest speed of y", "mm/min", (1.0, 32767.0, 6000.0), false),
+        info(AccelerationX, 120, "acceleration of x", "mm/s2", (10.0, 32767.0, 800.0), false),
+        info(AccelerationY, 121, "acceleration of y", "mm/s2", (10.0, 32767.0, 800.0), false),
+        info(TravelX, 130, "travel of x", "mm", (1.0, 8000.0, 420.0), false),
+        info(TravelY, 131, "travel of y", "mm", (1.0, 8000.0, 420.0), false),
+        info(DirectionSetup, 200, "direction set-up", "us", (0.1, 500.0, 1.0), false),
+        info(DrawSpeed, 201, "speed pen down", "mm/min", (1.0, 32767.0, 3000.0), false),
+        info(TravelSpeed, 202, "speed pen up", "mm/min", (1.0, 32767.0, 6000.0), false),
+        info(Centripetal, 203, "slow in bends", "0|1", (0.0, 1.0, 1.0), true),
+        info(PenUpHeight, 210, "height pen up", "of 127", (0.0, 127.0, 0.0), true),
+        info(PenDownHeight, 211, "height pen down", "of 127", (0.0, 127.0, 127.0), true),
+        info(PenUpDwell, 212, "dwell pen up", "ms", (1.0, 1300.0, 150.0), false),
+        info(PenDownDwell, 213, "dwell pen down", "ms", (1.0, 1300.0, 150.0), false),
+        info(PenRamp, 214, "ramp of the pen", "ms", (0.0, 5000.0, 0.0), false),
+        info(InkBeforePause, 215, "ink before a pause", "m", (0.0, 10000.0, 0.0), false),
+        info(DotLength, 220, "length of a dot", "mm", (0.1, 100.0, 1.0), false),
+        info(Kinematics, 230, "kinematics", "0|1", (0.0, 1.0, 0.0), true),
+    ]
+};
+
+impl Setting {
+    /// What there is to know about it.
+    pub const fn info(self) -> &'static SettingInfo {
+        &SETTINGS[self as usize]
+    }
+
+    /// The setting with that number.
+    ///
+    /// ```
+    /// use penup::machine::Setting;
+    /// assert_eq!(Setting::numbered(100), Some(Setting::StepsPerMmX));
+    /// assert_eq!(Setting::numbered(99), None);
+    /// ```
+    pub fn numbered(number: u16) -> Option<Self> {
+        let index = SETTINGS.binary_search_by_key(&number, |info| info.number);
+        index.ok().map(|index| SETTINGS[index].setting)
+    }
+}
+
+/// Why a setting keeps its value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum SettingError {
+    /// No setting has this number.
+    Unknown,
+    /// Below `least` or above `greatest` of [`Setting::info`].
+    OutOfRange(Setting),
+    /// A whole number is needed.
+    NotWhole(Setting),
+    /// It does not go together with the others.
+    Conflict(LimitsError),
+    /// Not while the machine moves.
+    Busy,
+}
+
+/// The values of all settings: within their ranges, and such that motion can keep them together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Settings {
+    values: [Value; SETTING_COUNT],
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { values: SETTINGS.map(|info| info.default) }
+    }
+}
+
+impl Settings {
+    /// The value of a setting, in its unit.
+    pub fn get(&self, setting: Setting) -> Value {
+        self.values[setting as usize]
+    }
+
+    /// Changes a setting.
+    ///
+    /// # Errors
+    /// See [`SettingError`]; the old value stays then.
+    ///
+    /// ```
+    /// use penup::machine::{Setting, SettingError, Settings, Value};
+    /// let mut settings = Settings::default();
+    /// settings.set(Setting::AccelerationX, Value::from_num(1500))?;
+    /// assert_eq!(settings.get(Setting::AccelerationX), 1500);
+    /// let refused = settings.set(Setting::AccelerationX, Value::ZERO);
+    /// assert_eq!(refused, Err(SettingError::OutOfRange(Setting::AccelerationX)));
+    /// # Ok::<(), SettingError>(())
+    /// ```
+    pub fn set(&mut self, setting: Setting, value: Value) -> Result<(), SettingError> {
+        let info = setting.info();
+        if value < info.least || value > info.greatest {
+            return Err(SettingError::OutOfRange(setting));
+        }
+        if info.whole && value.frac() != 0 {
+            return Err(SettingError::NotWhole(setting));
+        }
+        let mut changed = *self;
+        changed.values[setting as usize] = value;
+        changed.checked_limits().map_err(SettingError::Conflict)?;
+        *self = changed;
+        Ok(())
+    }
+
+    /// All settings with their values, by number.
+    pub fn iter(&self) -> impl Iterator<Item = (&'static SettingInfo, Value)> {
+        SETTINGS.iter().zip(self.values)
+    }
+
+    /// Whether a setting of 0 or 1 is 1.
+    pub fn is_on(&self, setting: Setting) -> bool {
+        self.get(setting) != 0
+    }
+
+    /// A setting in microseconds, as ticks.
+    pub fn microseconds_as_ticks(&self, setting: Setting) -> u32 {
+        self.as_ticks(setting, TICKS_PER_SECOND / 1_000_000)
+    }
+
+    /// A setting in milliseconds, as ticks.
+    pub fn milliseconds_as_ticks(&self, setting: Setting) -> u32 {
+        self.as_ticks(setting, TICKS_PER_SECOND / 1000)
+    }
+
+    fn as_ticks(&self, setting: Setting, ticks_per_unit: u32) -> u32 {
+        let bits = u64::from(self.get(setting).to_bits().max(0).unsigned_abs());
+        // Ranges keep it below 2^27 ticks.
+        ((bits * u64::from(ticks_per_unit)) >> Value::FRAC_NBITS) as u32
+    }
+
+    fn height(&self, setting: Setting) -> u8 {
+        self.get(setting).saturating_to_num::<u8>().min(127)
+    }
+
+    /// What motion needs to know.
+    ///
+    /// Speed and acceleration count along the path, so the slower axis sets both.
+    pub fn limits(&self) -> Limits {
+        // `set` lets nothing in that motion refuses, so the default never shows.
+        self.checked_limits().unwrap_or_default()
+    }
+
+    /// The same, but for the speed with the pen up, which is that of `travel`.
+    pub(super) fn limits_at(&self, travel: Setting) -> Limits {
+        let settings = MotionSettings {
+            travel_mm_per_min: self.get(travel).min(self.axes_rate()),
+            ..self.motion_settings()
+        };
+        Limits::new(&settings).unwrap_or_else(|_| self.limits())
+    }
+
+    fn checked_limits(&self) -> Result<Limits, LimitsError> {
+        Limits::new(&self.motion_settings())
+    }
+
+    fn axes_rate(&self) -> Value {
+        self.get(Setting::MaxRateX).min(self.get(Setting::MaxRateY))
+    }
+
+    fn motion_settings(&self) -> MotionSettings {
+        let steps = [self.get(Setting::StepsPerMmX), self.get(Setting::StepsPerMmY)];
+        MotionSettings {
+            steps_per_mm: match self.kinematics() {
+                Kinematics::Cartesian => steps,
+                // A move of the page is √2 as long in the steps of both motors.
+                Kinematics::CoreXy => [steps[0].saturating_mul(Value::SQRT_2); 2],
+            },
+            draw_mm_per_min: self.get(Setting::DrawSpeed).min(self.axes_rate()),
+            travel_mm_per_min: self.get(Setting::TravelSpeed).min(self.axes_rate()),
+            acceleration_mm_per_s2: self
+                .get(Setting::AccelerationX)
+                .min(self.get(Setting::AccelerationY)),
+            junction_deviation_mm: self.get(Setting::JunctionDeviation),
+            centripetal: self.is_on(Setting::Centripetal),
+            pulse_ticks: self.microseconds_as_ticks(Setting::StepPulse),
+            direction_setup_ticks: self.microseconds_as_ticks(Setting::DirectionSetup),
+        }
+    }
+
+    /// The build of the machine. CoreXY takes the steps per millimetre of x for both axes.
+    pub fn kinematics(&self) -> Kinematics {
+        if self.is_on(Setting::Kinematics) { Kinematics::CoreXy } else { Kinematics::Cartesian }
+    }
+
+    /// Steps of the page per millimetre of y: those of x where one belt moves both.
+    pub(super) fn steps_per_mm_y(&self) -> Setting {
+        match self.kinematics() {
+            Kinematics::Cartesian => Setting::StepsPerMmY,
+            Kinematics::CoreXy => Setting::StepsPerMmX,
+        }
+    }
+
+    /// A setting in millimetres, as steps of the page.
+    pub(super) fn millimetres_as_steps(&self, setting: Setting, steps_per_mm: Setting) -> i32 {
+        let steps =
+            i64::from(self.get(setting).to_bits()) * i64::from(self.get(steps_per_mm).to_bits());
+        // At most 8000 mm of 4000 steps.
+        (steps >> (2 * Value::FRAC_NBITS)) as i32
+    }
+
+    pub(super) fn pen_positions(&self) -> PenPositions {
+        PenPositions {
+            up_height: self.height(Setting::PenUpHeight),
+            down_height: self.height(Setting::PenDownHeight),
+            up_ticks: self.milliseconds_as_ticks(Setting::PenUpDwell),
+            down_ticks: self.milliseconds_as_ticks(Setting::PenDownDwell),
+            ramp_ticks: self.milliseconds_as_ticks(Setting::PenRamp) / 127,
+            dot_length: self.get(Setting::DotLength).saturating_to_num(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_is_in_order_and_its_defaults_are_valid() {
+        for (index, info) in SETTINGS.iter().enumerate() {
+            assert_eq!(info.setting as usize, index);
+            assert_eq!(Setting::numbered(info.number), Some(info.setting));
+            assert!(info.least <= info.default && info.default <= info.greatest);
+        }
+        assert!(SETTINGS.is_sorted_by(|a, b| a.number < b.number));
+        assert!(Settings::default().checked_limits().is_ok());
+    }
+
+    #[test]
+    fn a_refused_value_changes_nothing() {
+        let mut settings = Settings::default();
+        let before = settings;
+        for info in &SETTINGS {
+            for value in [info.least - Value::DELTA, info.greatest + Value::DELTA] {
+                assert_eq!(
+                    settings.set(info.setting, value),
+                    Err(SettingError::OutOfRange(info.setting))
+                );
+            }
+        }
+        assert_eq!(
+            settings.set(Setting::SoftLimits, Value::from_num(0.5)),
+            Err(SettingError::NotWhole(Setting::SoftLimits))
+        );
+        assert!(matches!(
+            settings.set(Setting::StepPulse, Value::from_num(400)),
+            Err(SettingError::Conflict(LimitsError::TooManySteps { .. }))
+        ));
+        assert_eq!(settings, before);
+    }
+
+    #[test]
+    fn ticks() {
+        let settings = Settings::default();
+        assert_eq!(settings.microseconds_as_ticks(Setting::StepPulse), 50);
+        assert_eq!(settings.milliseconds_as_ticks(Setting::PenUpDwell), 3_750_000);
+    }
+}

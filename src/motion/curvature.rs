@@ -1,0 +1,129 @@
+//! How fast a curve that comes as many short blocks may be passed.
+//!
+//! The points lie on the grid of steps, so two short blocks say nothing about the curve that they
+//! are part of: the angle between them is mostly rounding. Circles through three points further
+//! apart say more. So each level of [`Curvature`] looks at every 2nd, 4th, 8th … point. The height
+//! of the middle point over the chord of the outer two counts less what rounding can explain;
+//! the narrowest of the circles that remain is the curve's.
+
+use super::{Limits, Lookahead, PathLength};
+use crate::drawing::PagePoint;
+
+/// The last level looks at every 64th point.
+const LEVELS: usize = 6;
+
+/// Units of 2^-12 mm: a step is at least one, a page at most 2^26.
+const FRACTION_BITS: u32 = 12;
+
+#[derive(Debug, Clone, Copy, Default)]
+struct Place {
+    x: i32,
+    y: i32,
+}
+
+/// Every so many points of the path.
+#[derive(Debug, Clone, Copy, Default)]
+struct Level {
+    /// The last two points looked at, the later first.
+    points: [Place; 2],
+    /// What the last circle allowed.
+    limit: Option<PathLength>,
+}
+
+/// The path since the last sharp corner, as far as it matters.
+#[derive(Debug, Default)]
+pub(super) struct Curvature {
+    levels: [Level; LEVELS],
+    /// Points since the corner.
+    count: u32,
+}
+
+impl Curvature {
+    /// The path stops, or turns sharply, at `point`, the end of the last block of `blocks`: the
+    /// curve so far is complete, the next begins.
+    pub(super) fn restart(
+        &mut self,
+        limits: &Limits,
+        point: PagePoint,
+        blocks: &mut Lookahead<'_>,
+    ) {
+        for (number, level) in (1u32..).zip(&self.levels) {
+            if let Some(limit) = level.limit {
+                let stride = 1 << number;
+                blocks.limit_curve(1, stride / 2 + self.count % stride, limit);
+            }
+        }
+        self.count = 0;
+        let points = [place(limits, point); 2];
+        self.levels = [Level { points, limit: None }; LEVELS];
+    }
+
+    /// The path goes on to `point`, the end of the last block of `blocks`. Limits the blocks that
+    /// lie on too narrow a curve.
+    pub(super) fn follow(&mut self, limits: &Limits, point: PagePoint, blocks: &mut Lookahead<'_>) {
+        let latest = place(limits, point);
+        self.count = self.count.wrapping_add(1);
+        for (number, level) in (1u32..).zip(self.levels.iter_mut()) {
+            let stride = 1 << number;
+            if !self.count.is_multiple_of(stride) {
+                return;
+            }
+            let [middle, first] = level.points;
+            level.points = [latest, middle];
+            if self.count < 2 * stride {
+                continue;
+            }
+            level.limit = circle_limit(limits, first, middle, latest);
+            if let Some(limit) = level.limit {
+                // The circle spans the last two strides. It stands for the middle half, and for the
+                // beginning of the curve.
+                let half = if self.count == 2 * stride { stride } else { stride / 2 };
+                blocks.limit_curve(stride / 2 + 1, stride + half, limit);
+            }
+        }
+    }
+}
+
+fn place(limits: &Limits, point: PagePoint) -> Place {
+    let [step_x, step_y] = limits.step_length;
+    let along = |steps: i32, step: u32| {
+        // Steps within ±2^21 of less than 2^-1 mm; clamped where no page reaches.
+        let bits = (i64::from(steps) * i64::from(step)) >> (32 - FRACTION_BITS);
+        bits.clamp(-(1 << 26), 1 << 26) as i32
+    };
+    Place { x: along(point.x, step_x.to_bits()), y: along(point.y, step_y.to_bits()) }
+}
+
+/// Half the radius of the circle through three points, if it slows the machine at all.
+fn circle_limit(limits: &Limits, first: Place, middle: Place, last: Place) -> Option<PathLength> {
+    // Within ±2^28, so products of two stay below 2^57.
+    let (ax, ay) = (middle.x - first.x, middle.y - first.y);
+    let (bx, by) = (last.x - middle.x, last.y - middle.y);
+    let (cx, cy) = (last.x - first.x, last.y - first.y);
+    let twice_area = (i64::from(ax) * i64::from(by) - i64::from(ay) * i64::from(bx)).unsigned_abs();
+    let top = u64::from(limits.top.to_bits() >> (PathLength::FRAC_NBITS - FRACTION_BITS));
+    // r = abc / 2·(twice the area), and each length is at least its greater part: most circles are
+    // wide, and known to be without a root.
+    let least = |x: i32, y: i32| u64::from(x.unsigned_abs().max(y.unsigned_abs()));
+    let sides = u128::from(least(ax, ay) * least(bx, by)) * u128::from(least(cx, cy));
+    if sides >= 4 * u128::from(twice_area) * u128::from(top) {
+        return None;
+    }
+    let squared = |x: i32, y: i32| {
+        let square = |part: i32| u64::from(part.unsigned_abs()) * u64::from(part.unsigned_abs());
+        square(x) + square(y)
+    };
+    let (a, b, c) = (squared(ax, ay), squared(bx, by), squared(cx, cy));
+    // Turned so far that the chord says nothing about one curve: c below 15/16 of a or b.
+    if 256 * c < 225 * a.max(b) {
+        return None;
+    }
+    let (a, b, c) = (a.isqrt(), b.isqrt(), c.isqrt());
+    let rounding = u64::from(limits.rounding.to_bits() >> (PathLength::FRAC_NBITS - FRACTION_BITS));
+    let height = (twice_area / c).saturating_sub(rounding);
+    let half_radius = (a * b).checked_div(4 * height)?;
+    (half_radius < top).then(|| {
+        let bits = half_radius << (PathLength::FRAC_NBITS - FRACTION_BITS);
+        PathLength::from_bits(u32::try_from(bits).unwrap_or(u32::MAX))
+    })
+}

@@ -1,0 +1,159 @@
+//! The step event, one word, and the queue in which events wait.
+
+use crate::step::Direction;
+use crate::step::tape::Instruction;
+
+/// What the step interrupt is told: pin levels, and how long until the next event. One word.
+///
+/// | bits | of a move | of the pen |
+/// |---|---|---|
+/// | 0, 1 | pulse x, pulse y | height, bits 0 to 6 |
+/// | 2, 3 | x, y runs down | |
+/// | 4 | drivers on | |
+/// | 5 | at rest afterwards | |
+/// | 7 | 0 | 1 |
+/// | 8–31 | ticks to the next event | the same |
+///
+/// A change of direction is an event of its own, without a pulse, before the pulse. Waits longer
+/// than 2^24 - 1 ticks (0.67 s) are several events.
+///
+/// ```
+/// use penup::motion::{EventKind, StepEvent};
+/// let event = StepEvent::pen(100, 25_000);
+/// assert_eq!(event.kind(), EventKind::Pen { height: 100 });
+/// assert_eq!(event.ticks(), 25_000);
+/// let event = StepEvent::levels(StepEvent::STEP_X | StepEvent::DOWN_Y, 500);
+/// assert_eq!(event.step(), (1, 0));
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(transparent)]
+pub struct StepEvent(u32);
+
+/// A [`StepEvent`] taken apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum EventKind {
+    /// Levels of the axes' pins: the low seven bits, see the constants of [`StepEvent`].
+    Levels(u8),
+    /// The pen goes to a height: 0 raised fully, 127 lowered fully.
+    Pen {
+        /// 0 to 127.
+        height: u8,
+    },
+}
+
+impl StepEvent {
+    /// A pulse on x.
+    pub const STEP_X: u8 = 1;
+    /// A pulse on y.
+    pub const STEP_Y: u8 = 1 << 1;
+    /// x counts down.
+    pub const DOWN_X: u8 = 1 << 2;
+    /// y counts down.
+    pub const DOWN_Y: u8 = 1 << 3;
+    /// The drivers hold the motors.
+    pub const DRIVERS_ON: u8 = 1 << 4;
+    /// Nothing moves after this event: the queue may run dry.
+    pub const AT_REST: u8 = 1 << 5;
+    /// The longest wait that one event can hold.
+    pub const MAX_TICKS: u32 = (1 << 24) - 1;
+
+    const PEN: u8 = 1 << 7;
+
+    /// The axes' pins take `levels` (an "or" of the constants), then `ticks` pass (at most
+    /// [`StepEvent::MAX_TICKS`]; more is cut to it).
+    pub const fn levels(levels: u8, ticks: u32) -> Self {
+        Self::new(levels & !Self::PEN, ticks)
+    }
+
+    /// The pen goes to `height` (0 to 127), then `ticks` pass.
+    pub const fn pen(height: u8, ticks: u32) -> Self {
+        Self::new(height | Self::PEN, ticks)
+    }
+
+    const fn new(flags: u8, ticks: u32) -> Self {
+        let ticks = if ticks > Self::MAX_TICKS { Self::MAX_TICKS } else { ticks };
+        Self(ticks << 8 | flags as u32)
+    }
+
+    /// The word, as a board that feeds a state machine by DMA needs it.
+    pub const fn to_bits(self) -> u32 {
+        self.0
+    }
+
+    /// The event of a word.
+    pub const fn from_bits(bits: u32) -> Self {
+        Self(bits)
+    }
+
+    /// Ticks from the start of this event to the start of the next.
+    pub const fn ticks(self) -> u32 {
+        self.0 >> 8
+    }
+
+    /// What happens.
+    pub const fn kind(self) -> EventKind {
+        let flags = self.0 as u8;
+        if flags & Self::PEN == 0 {
+            EventKind::Levels(flags)
+        } else {
+            EventKind::Pen { height: flags & !Self::PEN }
+        }
+    }
+
+    /// What the event adds to x and y.
+    pub const fn step(self) -> (i32, i32) {
+        match self.kind() {
+            EventKind::Pen { .. } => (0, 0),
+            EventKind::Levels(levels) => (
+                axis_step(levels, Self::STEP_X, Self::DOWN_X),
+                axis_step(levels, Self::STEP_Y, Self::DOWN_Y),
+            ),
+        }
+    }
+
+    /// What a tape would hold of the event: a move, or the pen going up (height below 64) or down.
+    pub fn instruction(self) -> Option<Instruction> {
+        match self.kind() {
+            EventKind::Pen { height } if height < 64 => Some(Instruction::PenUp),
+            EventKind::Pen { .. } => Some(Instruction::PenDown),
+            EventKind::Levels(_) => {
+                let (dx, dy) = self.step();
+                Direction::from_delta(dx, dy).map(Instruction::Move)
+            }
+        }
+    }
+
+    pub(crate) const fn with_ticks(self, ticks: u32) -> Self {
+        Self::new(self.0 as u8, ticks)
+    }
+}
+
+const fn axis_step(levels: u8, pulse: u8, down: u8) -> i32 {
+    if levels & pulse == 0 {
+        0
+    } else if levels & down == 0 {
+        1
+    } else {
+        -1
+    }
+}
+
+/// Where planned events go: the interrupt's queue on a board, a recorder in tests.
+pub trait EventQueue {
+    /// How many more events fit.
+    fn room(&self) -> usize;
+    /// Appends one.
+    ///
+    /// # Errors
+    /// Hands the event back if the queue is full.
+    fn push(&mut self, event: StepEvent) -> Result<(), StepEvent>;
+}
+
+impl EventQueue for heapless::spsc::Producer<'_, StepEvent> {
+    fn room(&self) -> usize {
+        self.capacity() - self.len()
+    }
+    fn push(&mut self, event: StepEvent) -> Result<(), StepEvent> {
+        self.enqueue(event)
+    }
+}

@@ -1,0 +1,90 @@
+//! How fast the corner between two blocks may be passed.
+
+use super::{Limits, PathLength};
+
+/// The way in which a block runs: a vector of length 2^30.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Heading {
+    x: i32,
+    y: i32,
+}
+
+impl Heading {
+    /// The way of a move by (`dx`, `dy`) steps whose length is `length`, not 0.
+    pub(super) fn new(limits: &Limits, dx: i32, dy: i32, length: PathLength) -> Self {
+        let [step_x, step_y] = limits.step_length;
+        let part = |steps: i32, step: u32| {
+            // Units of 2^-32 mm over units of 2^-18 mm, scaled to 2^30: 2^16 times as much. A part
+            // is no longer than the whole, below 2^46, so 62 bits hold it.
+            let part = u64::from(steps.unsigned_abs()) * u64::from(step);
+            let heading = (part << 16) / u64::from(length.to_bits().max(1));
+            let heading = i32::try_from(heading).unwrap_or(1 << 30).min(1 << 30);
+            if steps < 0 { -heading } else { heading }
+        };
+        Self { x: part(dx, step_x.to_bits()), y: part(dy, step_y.to_bits()) }
+    }
+}
+
+/// What a corner allows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Corner {
+    /// Stopping distance with which it may be passed.
+    pub(super) limit: PathLength,
+    /// Whether the path turns by more than 40° and so is no curve.
+    pub(super) is_sharp: bool,
+}
+
+impl Corner {
+    /// Where the machine must stand anyway.
+    pub(super) const STOP: Self = Self { limit: PathLength::ZERO, is_sharp: true };
+}
+
+/// The corner between two blocks, the length of the shorter one given.
+///
+/// Junction deviation δ rounds a corner of turning angle θ by an arc of radius
+/// δ cos(θ/2) / (1 - cos(θ/2)); half of it is the stopping distance. Where the blocks are too short
+/// for that arc, the arc that touches both in the middle of the shorter counts, ½ l / tan(θ/2): on a
+/// dense polyline that is the circle through its points.
+///
+/// Points lie on the grid of steps, so a corner may be nothing but rounding: it counts as less
+/// sharp by as much as rounding can explain.
+pub(super) fn corner(
+    limits: &Limits,
+    before: Heading,
+    after: Heading,
+    shorter: PathLength,
+) -> Corner {
+    // With unit vectors u, v: |u + v| = 2 cos(θ/2), |v - u| = 2 sin(θ/2).
+    let sine = half_length(after.x.wrapping_sub(before.x), after.y.wrapping_sub(before.y));
+    let rounding =
+        (u64::from(limits.rounding.to_bits()) << 30) / u64::from(shorter.to_bits().max(1));
+    let sine = sine.saturating_sub(rounding);
+    if sine == 0 {
+        return Corner { limit: PathLength::MAX, is_sharp: false };
+    }
+    let cosine = half_length(before.x.wrapping_add(after.x), before.y.wrapping_add(after.y));
+    let by_deviation = {
+        // δ c (1 + c) / s², as 1 - c itself would lose all its digits in a slight bend.
+        let scaled = (u64::from(limits.junction_deviation.to_bits()) * cosine) >> 30;
+        let doubled = scaled * ((1 << 30) + cosine);
+        doubled / ((sine * sine) >> 30).max(1)
+    };
+    let radius = if limits.centripetal {
+        // l below 2^32, c at most 2^30.
+        by_deviation.min(u64::from(shorter.to_bits()) * cosine / (2 * sine))
+    } else {
+        by_deviation
+    };
+    Corner {
+        limit: PathLength::from_bits(u32::try_from(radius / 2).unwrap_or(u32::MAX)),
+        // sin 20°
+        is_sharp: sine > (1 << 30) / 1000 * 342,
+    }
+}
+
+/// Half the length of a vector of two parts within ±2^31, at most 2^30.
+fn half_length(x: i32, y: i32) -> u64 {
+    let square = |part: i32| u64::from(part.unsigned_abs()) * u64::from(part.unsigned_abs());
+    // Opposite headings can add up to 2^31 by one unit of rounding: within 32 unsigned bits.
+    (square(x) / 4 + square(y) / 4).isqrt().min(1 << 30)
+}

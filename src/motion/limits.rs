@@ -1,0 +1,275 @@
+//! The settings of motion in the units in which motion computes.
+
+use super::{PathLength, SLICE_TICKS, SliceSpeed, StepEvent, TICKS_PER_SECOND};
+use crate::fixed::Millimetres;
+
+/// What the user sets, each positive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MotionSettings {
+    /// Steps per millimetre of x and y: 2 to 4000.
+    pub steps_per_mm: [Millimetres; 2],
+    /// Along the path with the pen down, mm/min, 1 to 32767.
+    pub draw_mm_per_min: Millimetres,
+    /// Along the path with the pen up, mm/min, 1 to 32767.
+    pub travel_mm_per_min: Millimetres,
+    /// Along the path, mm/s², 10 to 32767.
+    pub acceleration_mm_per_s2: Millimetres,
+    /// How far a rounded corner would leave the true one, mm, 0 to 1.
+    pub junction_deviation_mm: Millimetres,
+    /// Whether bends of dense polylines are passed no faster than acceleration allows on the circle
+    /// through them.
+    pub centripetal: bool,
+    /// Width of a step pulse, and the least time between two.
+    pub pulse_ticks: u32,
+    /// From a change of direction to the pulse.
+    pub direction_setup_ticks: u32,
+}
+
+/// A setting that motion cannot keep.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum LimitsError {
+    /// Steps per millimetre outside 2 to 4000.
+    StepsPerMillimetre,
+    /// A speed of zero or less.
+    Speed,
+    /// Acceleration below 10 mm/s².
+    Acceleration,
+    /// Junction deviation below 0 or above 1 mm.
+    JunctionDeviation,
+    /// Pulses of 1 ms or longer.
+    Pulse,
+    /// So many steps per second that the pulses would run together: lower the speed or the pulse.
+    TooManySteps {
+        /// Steps per second asked for.
+        asked: u32,
+        /// Steps per second that pulse and direction set-up leave room for.
+        possible: u32,
+    },
+}
+
+/// The settings as the planner needs them. Whoever has one has valid settings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Limits {
+    /// mm per step of x and y.
+    pub(super) step_length: [SliceSpeed; 2],
+    pub(super) draw_speed: SliceSpeed,
+    pub(super) travel_speed: SliceSpeed,
+    /// Stopping distance of the greater speed.
+    pub(super) top: PathLength,
+    /// Added to the speed by one slice.
+    pub(super) acceleration: SliceSpeed,
+    pub(super) junction_deviation: PathLength,
+    pub(super) centripetal: bool,
+    /// How far rounding of three points to steps can lift one over the line through the others.
+    pub(super) rounding: PathLength,
+    pub(super) pulse_ticks: u32,
+    pub(super) setup_ticks: u32,
+}
+
+impl Default for Limits {
+    /// A gentle machine: 80 steps/mm, 10 mm/s, 100 mm/s².
+    fn default() -> Self {
+        let step_length = SliceSpeed::from_bits(u32::MAX / 80);
+        let speed = SliceSpeed::from_bits(7_036_874);
+        Self {
+            step_length: [step_length; 2],
+            draw_speed: speed,
+            travel_speed: speed,
+            top: PathLength::lit("0.5"),
+            acceleration: SliceSpeed::from_bits(11_529),
+            junction_deviation: PathLength::from_bits(1 << 12),
+            centripetal: true,
+            rounding: rounding([step_length; 2]),
+            pulse_ticks: 50,
+            setup_ticks: 25,
+        }
+    }
+}
+
+impl Limits {
+    /// The settings, checked.
+    ///
+    /// # Errors
+    /// See [`LimitsError`].
+    pub fn new(settings: &MotionSettings) -> Result<Self, LimitsError> {
+        let axis = |steps_per_mm: Millimetres| {
+            if !(Millimetres::lit("2")..=Millimetres::lit("4000")).contains(&steps_per_mm) {
+                return Err(LimitsError::StepsPerMillimetre);
+            }
+            // 2^32 / (bits / 2^16), at most 2^31.
+            let bits = (1u64 << 48) / u64::from(steps_per_mm.to_bits().unsigned_abs());
+            Ok(SliceSpeed::from_bits(bits as u32))
+        };
+        let [x, y] = settings.steps_per_mm;
+        let step_length = [axis(x)?, axis(y)?];
+        let draw_speed = slice_speed(settings.draw_mm_per_min)?;
+        let travel_speed = slice_speed(settings.travel_mm_per_min)?;
+        if settings.acceleration_mm_per_s2 < 10 {
+            return Err(LimitsError::Acceleration);
+        }
+        if settings.junction_deviation_mm < 0 || settings.junction_deviation_mm > 1 {
+            return Err(LimitsError::JunctionDeviation);
+        }
+        if settings.pulse_ticks >= TICKS_PER_SECOND / 1000
+            || settings.direction_setup_ticks >= TICKS_PER_SECOND / 1000
+        {
+            return Err(LimitsError::Pulse);
+        }
+        let mut limits = Self {
+            step_length,
+            draw_speed,
+            travel_speed,
+            top: PathLength::ZERO,
+            acceleration: slice_acceleration(settings.acceleration_mm_per_s2),
+            junction_deviation: settings.junction_deviation_mm.wrapping_to_num(),
+            centripetal: settings.centripetal,
+            rounding: rounding(step_length),
+            pulse_ticks: settings.pulse_ticks.max(1),
+            setup_ticks: settings.direction_setup_ticks,
+        };
+        limits.top = limits.stopping_distance(draw_speed.max(travel_speed));
+        limits.check_step_rate()?;
+        Ok(limits)
+    }
+
+    fn check_step_rate(&self) -> Result<(), LimitsError> {
+        let [x, y] = self.step_length;
+        let speed = u64::from(self.draw_speed.max(self.travel_speed).to_bits());
+        let slices_per_second = u64::from(TICKS_PER_SECOND / SLICE_TICKS);
+        let asked = speed * slices_per_second / u64::from(x.min(y).to_bits());
+        let possible = TICKS_PER_SECOND / self.least_interval();
+        if asked > u64::from(possible) {
+            return Err(LimitsError::TooManySteps {
+                asked: u32::try_from(asked).unwrap_or(u32::MAX),
+                possible,
+            });
+        }
+        Ok(())
+    }
+
+    /// The least time between two events that pulse the same axis: the pulse and as long a pause.
+    pub fn least_interval(&self) -> u32 {
+        (2 * self.pulse_ticks).min(StepEvent::MAX_TICKS)
+    }
+
+    /// The stopping distance of `speed`, v²/2a; at most what a length can hold.
+    pub(super) fn stopping_distance(&self, speed: SliceSpeed) -> PathLength {
+        let squared = u64::from(speed.to_bits()) * u64::from(speed.to_bits());
+        // 2^-64 mm² over 2^-32 mm is 2^-32 mm; 14 bits more than a length has.
+        let bits = (squared / (2 * u64::from(self.acceleration.to_bits()))) >> 14;
+        PathLength::from_bits(u32::try_from(bits).unwrap_or(u32::MAX))
+    }
+
+    /// The speed with that stopping distance, √2as.
+    pub(super) fn speed(&self, stopping_distance: PathLength) -> SliceSpeed {
+        let twice = 2 * u64::from(self.acceleration.to_bits());
+        let squared = (twice * u64::from(stopping_distance.to_bits())).saturating_mul(1 << 14);
+        // The root of 64 bits has 32.
+        SliceSpeed::from_bits(squared.isqrt() as u32)
+    }
+
+    /// The length of a move by (`dx`, `dy`) steps, each within ±2^22; `None` beyond 16 m.
+    pub fn length(&self, dx: i32, dy: i32) -> Option<PathLength> {
+        let [step_x, step_y] = self.step_length;
+        // Each at most 2^22 * 2^31 = 2^53 units of 2^-32 mm.
+        let x = u64::from(dx.unsigned_abs()) * u64::from(step_x.to_bits());
+        let y = u64::from(dy.unsigned_abs()) * u64::from(step_y.to_bits());
+        let bits = hypotenuse(x, y);
+        u32::try_from((bits + (1 << 13)) >> 14).ok().map(PathLength::from_bits)
+    }
+}
+
+/// 23/16 of the longer step. Each of three points is off by up to half a diagonal and the outer two
+/// count half, which is at most √2 steps; a little more, so that no corner is exactly as sharp.
+fn rounding([x, y]: [SliceSpeed; 2]) -> PathLength {
+    PathLength::from_bits(((x.max(y).to_bits() >> 14) * 23).div_ceil(16))
+}
+
+/// √(x² + y²) of numbers below 2^62, to 31 significant bits.
+fn hypotenuse(x: u64, y: u64) -> u64 {
+    if x == 0 || y == 0 {
+        return x + y;
+    }
+    let shift = (64 - x.max(y).leading_zeros()).saturating_sub(31);
+    let (x, y) = (x >> shift, y >> shift);
+    (x * x + y * y).isqrt() << shift
+}
+
+/// mm/min to mm per slice, at most 0.09.
+fn slice_speed(mm_per_min: Millimetres) -> Result<SliceSpeed, LimitsError> {
+    if mm_per_min <= 0 {
+        return Err(LimitsError::Speed);
+    }
+    let bits = u64::from(mm_per_min.to_bits().unsigned_abs());
+    // 2^-16 mm/min to 2^-32 mm/slice: below 2^31 * 2^28.
+    let speed = (bits << 16) * u64::from(SLICE_TICKS) / (60 * u64::from(TICKS_PER_SECOND));
+    Ok(SliceSpeed::from_bits((speed as u32).max(1)))
+}
+
+/// mm/s² to mm per slice per slice.
+fn slice_acceleration(mm_per_s2: Millimetres) -> SliceSpeed {
+    // 2^-16 mm/s² to 2^-32 mm/slice²: bits * 2^16 * 2^24 / (2^6 * 5^8)², the twos cancelled.
+    let bits = u64::from(mm_per_s2.to_bits().unsigned_abs());
+    SliceSpeed::from_bits(((bits << 28) / 5u64.pow(16)) as u32)
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    pub(crate) fn settings() -> MotionSettings {
+        MotionSettings {
+            steps_per_mm: [Millimetres::from_num(100); 2],
+            draw_mm_per_min: Millimetres::from_num(3000),
+            travel_mm_per_min: Millimetres::from_num(6000),
+            acceleration_mm_per_s2: Millimetres::from_num(200),
+            junction_deviation_mm: Millimetres::from_num(0.127),
+            centripetal: true,
+            pulse_ticks: 50,
+            direction_setup_ticks: 25,
+        }
+    }
+
+    #[test]
+    fn units() {
+        let limits = Limits::new(&settings()).expect("valid");
+        let slice = f64::from(SLICE_TICKS) / f64::from(TICKS_PER_SECOND);
+        assert!((limits.draw_speed.to_num::<f64>() / slice - 50.0).abs() < 1e-5);
+        assert!((limits.acceleration.to_num::<f64>() / slice / slice - 200.0).abs() < 1e-2);
+        let stop = limits.stopping_distance(limits.draw_speed);
+        assert!((stop.to_num::<f64>() - 6.25).abs() < 1e-3);
+        assert!((limits.speed(stop).to_num::<f64>() / slice - 50.0).abs() < 1e-3);
+        let length = limits.length(3000, -4000).expect("short");
+        assert!((length.to_num::<f64>() - 50.0).abs() < 1e-4);
+        assert_eq!(limits.length(0, 0), Some(PathLength::ZERO));
+        assert_eq!(limits.length(1 << 22, 1 << 22), None);
+    }
+
+    #[test]
+    fn what_cannot_be_kept_is_refused() {
+        let wrong = |change: fn(&mut MotionSettings)| {
+            let mut wrong = settings();
+            change(&mut wrong);
+            Limits::new(&wrong).err()
+        };
+        assert_eq!(wrong(|_| ()), None);
+        assert_eq!(
+            wrong(|s| s.steps_per_mm[1] = Millimetres::ONE),
+            Some(LimitsError::StepsPerMillimetre)
+        );
+        assert_eq!(wrong(|s| s.draw_mm_per_min = Millimetres::ZERO), Some(LimitsError::Speed));
+        assert_eq!(
+            wrong(|s| s.acceleration_mm_per_s2 = Millimetres::ZERO),
+            Some(LimitsError::Acceleration)
+        );
+        assert_eq!(
+            wrong(|s| s.junction_deviation_mm = -Millimetres::DELTA),
+            Some(LimitsError::JunctionDeviation)
+        );
+        assert!(matches!(
+            wrong(|s| s.pulse_ticks = 2000),
+            Some(LimitsError::TooManySteps { possible: 6250, .. })
+        ));
+    }
+}

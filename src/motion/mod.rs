@@ -1,0 +1,49 @@
+//! Speed profile with look-ahead; step events for the interrupt.
+//!
+//! The ordered drawing comes in as straight [`Block`]s. [`Lookahead`] knows how fast each junction
+//! may be passed, [`Profile`] how the speed runs through one block, [`Runner`] turns both into
+//! [`StepEvent`]s, which wait in an [`EventQueue`] for the step interrupt.
+//!
+//! Speed is planned as *stopping distance*, v²/2a, in millimetres: a block of length L raises or
+//! lowers it by at most L, and an arc of radius r allows r/2. So the look-ahead only adds and
+//! compares lengths, exactly; a square root is taken when a block begins, if at all. Within a block
+//! time goes in slices of [`SLICE_TICKS`]; the speed is constant within a slice, so the moves of a
+//! slice are found by one short division each and every slice begins on the exact parabola.
+//!
+//! The pulses leave when the plan is half a step from the new position: the pins are never more
+//! than half a step from where the plan is.
+//!
+//! Measured on a Cortex-M3 (opt-level 3), everything between target and queue included: 200
+//! instructions for each event at 5,000 moves a second, 70 at 400,000, and 170 to 260 on chords of
+//! five moves; on a Cortex-M0+, which divides in software, about twice as many.
+//!
+//! Not done here: limits of travel, the pen's heights, states. That is `machine`.
+
+mod course;
+mod curvature;
+mod emitter;
+mod event;
+mod junction;
+mod limits;
+mod lookahead;
+mod profile;
+mod runner;
+
+pub use emitter::Emitter;
+pub use event::{EventKind, EventQueue, StepEvent};
+pub use limits::{Limits, LimitsError, MotionSettings};
+pub use lookahead::{Block, Lookahead};
+pub use profile::Profile;
+pub use runner::{PenPositions, Progress, PushError, RunLengths, Runner};
+
+/// The unit of time of every step event: 40 ns. A divisor of both boards' clocks.
+pub const TICKS_PER_SECOND: u32 = 25_000_000;
+
+/// The speed changes at most once in this many ticks (164 µs), by at most acceleration times that.
+pub const SLICE_TICKS: u32 = 4096;
+
+/// A length along the path: 0 to 16384 mm in units of 2^-18 mm (4 nm).
+pub type PathLength = ::fixed::types::U14F18;
+
+/// A speed in millimetres per slice, below 1 (6.1 m/s), in units of 2^-32.
+pub type SliceSpeed = ::fixed::types::U0F32;

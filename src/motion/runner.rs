@@ -1,0 +1,499 @@
+//! Runs the blocks: pen changes at rest, slices, moves, events.
+
+use super::course::{Course, SliceClock};
+use super::curvature::Curvature;
+use super::emitter::whole_ticks;
+use super::junction::{self, Corner, Heading};
+use super::profile::{FRACTION_BITS, Pace, Profile};
+use super::{Block, Emitter, EventQueue, Limits, Lookahead, PathLength, SliceSpeed, StepEvent};
+use crate::drawing::{LineType, PagePoint};
+use core::cmp::Ordering;
+
+/// Where the pen stands and how long it takes to get there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PenPositions {
+    /// Height when raised, 0 (fully raised) to 127.
+    pub up_height: u8,
+    /// Height when drawing, 0 to 127.
+    pub down_height: u8,
+    /// From the order to raise it to the first move.
+    pub up_ticks: u32,
+    /// From the order to lower it to the first move.
+    pub down_ticks: u32,
+    /// From one height to the next on the way between the two; 0 for no way.
+    pub ramp_ticks: u32,
+    /// Length of a dot or gap.
+    pub dot_length: PathLength,
+}
+
+/// What one call of [`Runner::produce`] came to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Progress {
+    /// There is more to do.
+    More,
+    /// All blocks are run, the pen is raised, the machine stands.
+    Done,
+    /// It stands on the path with the pen raised, as [`Runner::stop`] or
+    /// [`Runner::stop_after_stroke`] asked.
+    Stopped,
+}
+
+/// Why a block was not appended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum PushError {
+    /// The ring is full: produce events first.
+    Full,
+    /// The move is longer than 16 m: beyond every page.
+    TooLong,
+}
+
+/// What a runner has run. Lengths in units of 2^-18 mm.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct RunLengths {
+    /// Strokes begun; wraps.
+    pub strokes: u32,
+    /// Length of the blocks ended with the pen down.
+    pub drawn: u64,
+    /// The same with the pen up.
+    pub travelled: u64,
+}
+
+/// Turns blocks into events.
+#[derive(Debug)]
+pub struct Runner<'m> {
+    limits: Limits,
+    pen: PenPositions,
+    lookahead: Lookahead<'m>,
+    curvature: Curvature,
+    emitter: Emitter,
+    course: Option<Course>,
+    pace: Pace,
+    draw: Pace,
+    travel: Pace,
+    /// The last pace in a curve: many blocks in a row have the same.
+    curve: Pace,
+    /// The plan's time, 1/16 ticks; wraps.
+    now: u32,
+    pen_is_down: bool,
+    /// Where the pen was sent last; not known at the start.
+    pen_height: Option<u8>,
+    stopping: bool,
+    stopping_after_stroke: bool,
+    /// Stands after the stroke in which so much is drawn, all in all.
+    ink_bound: u64,
+    /// Where the events so far lead.
+    position: PagePoint,
+    /// Where the blocks so far lead.
+    end: PagePoint,
+    /// The way in which the last block runs, its length and ink.
+    last: Option<(Heading, PathLength, Option<LineType>)>,
+    run: RunLengths,
+    /// Whether the last block begun is inked.
+    in_stroke: bool,
+}
+
+impl<'m> Runner<'m> {
+    /// Room in the queue that one call of [`Runner::produce`] needs at least.
+    pub const ROOM: usize = Emitter::ROOM;
+
+    /// A runner that stands at the page's origin with the pen raised.
+    pub fn new(limits: Limits, pen: PenPositions, blocks: &'m mut [Block]) -> Self {
+        let mut runner = Self {
+            limits,
+            pen,
+            lookahead: Lookahead::new(blocks),
+            curvature: Curvature::default(),
+            emitter: Emitter::new(&limits),
+            course: None,
+            pace: Pace::REST,
+            draw: Pace::REST,
+            travel: Pace::REST,
+            curve: Pace::REST,
+            now: 0,
+            pen_is_down: false,
+            pen_height: None,
+            stopping: false,
+            stopping_after_stroke: false,
+            ink_bound: u64::MAX,
+            position: PagePoint::default(),
+            end: PagePoint::default(),
+            last: None,
+            run: RunLengths::default(),
+            in_stroke: false,
+        };
+        runner.set_limits(limits, pen);
+        runner
+    }
+
+    /// Takes new settings. Speeds count from the next block on; the rest must not change while
+    /// anything moves.
+    pub fn set_limits(&mut self, limits: Limits, pen: PenPositions) {
+        self.limits = limits;
+        self.curve = Pace::REST;
+        self.pen = pen;
+        self.emitter.set_limits(&limits);
+        self.set_override(100);
+    }
+
+    /// Scales both speeds to `percent` (10 to 100; the settings are the greatest) from the next
+    /// block on.
+    pub fn set_override(&mut self, percent: u8) {
+        let percent = u64::from(percent.clamp(10, 100));
+        let scaled = |speed: SliceSpeed| {
+            let bits = u64::from(speed.to_bits()) * percent / 100;
+            Pace::of_speed(&self.limits, SliceSpeed::from_bits((bits as u32).max(1)))
+        };
+        let (draw, travel) = (scaled(self.limits.draw_speed), scaled(self.limits.travel_speed));
+        self.draw = draw;
+        self.travel = travel;
+    }
+
+    /// The limits in force.
+    pub fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
+    /// Where the events handed over, and the one kept back, lead.
+    pub fn position(&self) -> PagePoint {
+        self.position
+    }
+
+    /// Where the blocks lead.
+    pub fn end(&self) -> PagePoint {
+        self.end
+    }
+
+    /// Ticks of all events handed over; wraps.
+    pub fn ticks(&self) -> u32 {
+        self.emitter.ticks()
+    }
+
+    /// Whether no more targets fit now.
+    pub fn is_full(&self) -> bool {
+        self.lookahead.is_full()
+    }
+
+    /// Whether nothing waits or moves.
+    pub fn is_at_rest(&self) -> bool {
+        self.course.is_none() && self.lookahead.is_empty() && !self.emitter.is_open()
+    }
+
+    /// Whether the pen was last told to go down.
+    pub fn pen_is_down(&self) -> bool {
+        self.pen_is_down
+    }
+
+    /// What has been run since the runner was made.
+    pub fn run(&self) -> RunLengths {
+        self.run
+    }
+
+    /// The machine stands at `point`, nothing waits, and the events worked off took `ticks` (it
+    /// wraps): after homing, or after an emergency stop.
+    pub fn set_position(&mut self, point: PagePoint, ticks: u32) {
+        self.forget_path();
+        self.emitter.restart(ticks);
+        self.pen_is_down = false;
+        self.pen_height = None;
+        self.position = point;
+        self.end = point;
+    }
+
+    /// Appends a straight move to `point`. A move of no length is skipped.
+    ///
+    /// # Errors
+    /// See [`PushError`]; nothing is appended then.
+    pub fn push(&mut self, point: PagePoint, ink: Option<LineType>) -> Result<(), PushError> {
+        let (dx, dy) = (point.x - self.end.x, point.y - self.end.y);
+        if dx == 0 && dy == 0 {
+            return Ok(());
+        }
+        let length = self.limits.length(dx, dy).ok_or(PushError::TooLong)?;
+        let heading = Heading::new(&self.limits, dx, dy, length);
+        let corner = match self.last {
+            Some((before, length_before, ink_before)) if passes(ink_before, ink) => {
+                junction::corner(&self.limits, before, heading, length.min(length_before))
+            }
+            _ => Corner::STOP,
+        };
+        if corner.is_sharp {
+            self.curvature.restart(&self.limits, self.end, &mut self.lookahead);
+        }
+        let block = Block { dx, dy, length, entry_limit: corner.limit, ink, ..Block::EMPTY };
+        self.lookahead.push(block).map_err(|_| PushError::Full)?;
+        if self.limits.centripetal {
+            self.curvature.follow(&self.limits, point, &mut self.lookahead);
+        }
+        self.end = point;
+        self.last = Some((heading, length, ink));
+        Ok(())
+    }
+
+    /// The path ends with the last block: a curve ends there, too.
+    pub fn end_path(&mut self) {
+        self.curvature.restart(&self.limits, self.end, &mut self.lookahead);
+        self.last = None;
+    }
+
+    /// Sheds speed on the path, from the next slice on, and stands with the pen raised.
+    pub fn stop(&mut self) {
+        self.stopping = true;
+        if let Some(course) = &mut self.course {
+            // The slice in work, 164 µs at most, ends as planned.
+            if let Some(profile) = course.profile.take() {
+                self.pace = Pace::of_speed(&self.limits, profile.speed());
+            }
+        }
+    }
+
+    /// Stands before the next move with the pen up.
+    pub fn stop_after_stroke(&mut self) {
+        self.stopping_after_stroke = true;
+    }
+
+    /// Stands before the next move with the pen up once `length` more, in units of 2^-18 mm, is
+    /// drawn; `None` for no bound.
+    pub fn stop_after_ink(&mut self, length: Option<u64>) {
+        self.ink_bound = length.map_or(u64::MAX, |length| self.run.drawn.saturating_add(length));
+    }
+
+    /// Goes on where [`Runner::stop`] or [`Runner::stop_after_stroke`] stood.
+    pub fn resume(&mut self) {
+        self.stopping = false;
+        self.stopping_after_stroke = false;
+    }
+
+    /// Gives up what waits; the machine must stand.
+    pub fn forget_path(&mut self) {
+        self.lookahead.clear();
+        self.course = None;
+        self.pace = Pace::REST;
+        self.stopping = false;
+        self.stopping_after_stroke = false;
+        self.last = None;
+        self.in_stroke = false;
+        self.end = self.position;
+    }
+
+    /// Switches the drivers off; nothing must wait or move.
+    ///
+    /// # Errors
+    /// The event that the queue refused.
+    pub fn release_drivers(&mut self, queue: &mut dyn EventQueue) -> Result<(), StepEvent> {
+        let at = self.emitter.rest(self.now, false, queue)?;
+        self.advance_to(at);
+        Ok(())
+    }
+
+    /// Hands over the next few events: those of one slice, as far as the queue has room.
+    ///
+    /// # Errors
+    /// The event that the queue refused although it had room.
+    pub fn produce(&mut self, queue: &mut dyn EventQueue) -> Result<Progress, StepEvent> {
+        let Some(course) = &mut self.course else {
+            return self.begin_block(queue);
+        };
+        if course.slice.is_none() {
+            let Some(profile) = &mut course.profile else {
+                return self.plan(queue);
+            };
+            course.slice = profile.next_slice();
+            if course.slice.is_none() {
+                self.pace = profile.exit();
+                course.profile = None;
+                if course.moves_done == course.piece_moves {
+                    self.end_piece();
+                }
+                return Ok(Progress::More);
+            }
+        }
+        self.run_slice(queue)?;
+        Ok(Progress::More)
+    }
+
+    /// The moves of the slice in work, as far as the queue has room.
+    fn run_slice(&mut self, queue: &mut dyn EventQueue) -> Result<(), StepEvent> {
+        let Some(course) = &mut self.course else {
+            return Ok(());
+        };
+        let Some(slice) = course.slice else {
+            return Ok(());
+        };
+        let clock = SliceClock::new(slice);
+        // A move and its direction set-up are two events; one is left for a long wait.
+        let mut room = (queue.room().saturating_sub(1)) / 2;
+        while course.to_next < u64::from(slice.distance) {
+            if room == 0 {
+                return Ok(());
+            }
+            room -= 1;
+            let offset = clock.offset(course.to_next as u32);
+            course.to_next += course.move_length;
+            course.moves_done += 1;
+            let Some(direction) = course.line.next() else {
+                break;
+            };
+            let time = whole_ticks(self.now.wrapping_add(offset));
+            let at = self.emitter.step(direction, time, queue)?;
+            self.now = self.now.wrapping_add(at.wrapping_sub(time));
+            self.position = direction.from_point(self.position);
+        }
+        course.place += u64::from(slice.distance);
+        course.to_next -= u64::from(slice.distance);
+        course.slice = None;
+        self.now = self.now.wrapping_add(slice.time);
+        self.emitter.split_long_wait(self.now, queue)
+    }
+
+    fn top(&self, inked: bool) -> Pace {
+        if inked { self.draw } else { self.travel }
+    }
+
+    fn begin_block(&mut self, queue: &mut dyn EventQueue) -> Result<Progress, StepEvent> {
+        let stroke_ends =
+            self.in_stroke && self.lookahead.front().is_some_and(|block| block.ink.is_none());
+        let pauses = self.stopping_after_stroke || self.run.drawn >= self.ink_bound;
+        let stops = self.stopping || (pauses && stroke_ends);
+        if stops && self.pace == Pace::REST {
+            return self.stand(Progress::Stopped, queue);
+        }
+        let Some(block) = self.lookahead.pop() else {
+            return self.stand(Progress::Done, queue);
+        };
+        if block.ink.is_some() && !self.in_stroke {
+            self.run.strokes = self.run.strokes.wrapping_add(1);
+        }
+        self.in_stroke = block.ink.is_some();
+        self.course = Some(Course::new(&block, self.pen.dot_length));
+        Ok(Progress::More)
+    }
+
+    /// Stands: raises the pen, then closes the time line.
+    fn stand(
+        &mut self,
+        standing: Progress,
+        queue: &mut dyn EventQueue,
+    ) -> Result<Progress, StepEvent> {
+        if self.pen_is_down {
+            self.move_pen(false, queue)?;
+            return Ok(Progress::More);
+        }
+        if self.emitter.is_open() {
+            let at = self.emitter.rest(self.now, true, queue)?;
+            self.advance_to(at);
+        }
+        if standing == Progress::Done {
+            self.last = None;
+            self.in_stroke = false;
+        }
+        Ok(standing)
+    }
+
+    /// The pen goes up or down, or one height further on its ramp; at the end the dwell passes. At
+    /// most four events.
+    fn move_pen(&mut self, down: bool, queue: &mut dyn EventQueue) -> Result<(), StepEvent> {
+        let (height, dwell) = if down {
+            (self.pen.down_height, self.pen.down_ticks)
+        } else {
+            (self.pen.up_height, self.pen.up_ticks)
+        };
+        let far = if down { self.pen.up_height } else { self.pen.down_height };
+        let from = self.pen_height.unwrap_or(far);
+        let next = match height.cmp(&from) {
+            _ if self.pen.ramp_ticks == 0 => height,
+            Ordering::Less => from - 1,
+            Ordering::Equal => height,
+            Ordering::Greater => from + 1,
+        };
+        let at = self.emitter.pen(next, self.now, queue)?;
+        self.advance_to(at);
+        self.pen_height = Some(next);
+        if next != height {
+            self.now = self.now.wrapping_add(self.pen.ramp_ticks << FRACTION_BITS);
+            return Ok(());
+        }
+        self.pen_is_down = down;
+        // Two waits of up to 0.67 s: the settings allow no longer dwell.
+        let half = dwell.div_ceil(2).min(StepEvent::MAX_TICKS);
+        for _ in 0..2 {
+            self.now = self.now.wrapping_add(half << FRACTION_BITS);
+            let at = self.emitter.hold(self.now, queue)?;
+            self.advance_to(at);
+        }
+        Ok(())
+    }
+
+    /// The pins needed until then: the plan waits for them.
+    fn advance_to(&mut self, at: u32) {
+        let late = at.wrapping_sub(whole_ticks(self.now));
+        self.now = self.now.wrapping_add(late);
+    }
+
+    /// Plans the rest of the piece in work.
+    fn plan(&mut self, queue: &mut dyn EventQueue) -> Result<Progress, StepEvent> {
+        let Some(course) = &self.course else {
+            return Ok(Progress::More);
+        };
+        let at_rest = self.pace == Pace::REST;
+        if self.stopping && at_rest {
+            return self.stand(Progress::Stopped, queue);
+        }
+        let inked = course.is_inked();
+        if at_rest {
+            if inked != self.pen_is_down {
+                self.move_pen(inked, queue)?;
+                return Ok(Progress::More);
+            }
+            if !self.emitter.is_open() {
+                self.emitter.hold(self.now, queue)?;
+            }
+        }
+        let left = course.left();
+        let profile = if self.stopping {
+            Profile::stopping(&self.limits, self.pace, left)
+        } else {
+            let mut top = self.top(inked);
+            if course.curve_limit < top.stopping_distance {
+                if self.curve.stopping_distance != course.curve_limit {
+                    self.curve = Pace::of_stopping_distance(&self.limits, course.curve_limit);
+                }
+                top = self.curve;
+            }
+            let exit_allowed = if course.is_last_piece() {
+                self.lookahead.entry_allowed(top.stopping_distance)
+            } else {
+                PathLength::ZERO
+            };
+            Profile::new(&self.limits, self.pace, left, top, exit_allowed)
+        };
+        if let Some(course) = &mut self.course {
+            course.profile = Some(profile);
+        }
+        Ok(Progress::More)
+    }
+
+    /// The next piece of a dotted line, or the end of the block.
+    fn end_piece(&mut self) {
+        let Some(course) = &mut self.course else {
+            return;
+        };
+        if !course.is_last_piece() {
+            course.next_piece();
+            return;
+        }
+        let length = u64::from(course.length.to_bits());
+        if course.ink.is_some() {
+            self.run.drawn += length;
+        } else {
+            self.run.travelled += length;
+        }
+        self.course = None;
+    }
+}
+
+/// Whether the machine may pass from one block to the next without standing.
+fn passes(before: Option<LineType>, after: Option<LineType>) -> bool {
+    before == after && matches!(after, None | Some(LineType::Full))
+}

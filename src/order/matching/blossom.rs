@@ -1,0 +1,309 @@
+//! Nodes of the matching: a vertex, or a blossom, an odd ring of nodes shrunk to one.
+//!
+//! Which vertex of a blossom is matched outside, its *base*, is all that is kept of the matching
+//! within while it is shut: whichever it is, the others pair up around the ring. So a blossom is
+//! settled when it is opened, and an augmenting path passes through it in one step.
+
+use super::{Label, Matching};
+use crate::order::pace::Pace;
+use crate::order::{NONE, OrderError};
+use bytemuck::{Pod, Zeroable};
+
+/// A vertex or a blossom.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Node {
+    /// The blossom that it is part of, or [`NONE`].
+    pub parent: u16,
+    /// The next in the ring of its parent; of a blossom not in use, the next such.
+    next: u16,
+    /// The pair of vertices, this node's and the other's, by which the ring goes on to `next`. Of
+    /// an inner outermost node: the pair, the other's and this node's, by which the tree came.
+    pub link: [u16; 2],
+    /// The vertex that is matched outside; [`NONE`] of a blossom not in use.
+    pub base: u16,
+}
+
+impl Node {
+    pub fn vertex(vertex: u16) -> Self {
+        Self { parent: NONE, next: NONE, link: [NONE; 2], base: vertex }
+    }
+
+    pub fn is_outermost(&self) -> bool {
+        self.base != NONE && self.parent == NONE
+    }
+}
+
+impl Matching<'_, '_> {
+    /// Chains the blossoms, none in use yet, together.
+    pub(super) fn lay_out_spares(&mut self) {
+        let vertices = self.top.len();
+        for (number, node) in (0..).zip(self.nodes.iter_mut()).skip(vertices) {
+            *node = Node::vertex(NONE);
+            node.next = number + 1;
+        }
+    }
+
+    fn is_blossom(&self, node: u16) -> bool {
+        usize::from(node) >= self.top.len()
+    }
+
+    /// The dual of a blossom, as stored.
+    fn inside(&mut self, blossom: u16) -> &mut i32 {
+        &mut self.slack_inside[usize::from(blossom) - self.top.len()]
+    }
+
+    /// Takes an outermost node without a label into the tree.
+    pub(super) fn enter(&mut self, node: u16, label: Label) {
+        self.set_label(node, label);
+        if self.is_blossom(node) {
+            let twice = 2 * self.now;
+            if label == Label::Inner {
+                *self.inside(node) += twice;
+                self.inner_blossoms += 1;
+            } else {
+                *self.inside(node) -= twice;
+            }
+        }
+    }
+
+    /// Makes the dual of an outermost blossom what it is now, to stay so without a label.
+    pub(super) fn freeze(&mut self, blossom: u16) {
+        let twice = 2 * self.now;
+        match self.label(self.nodes[usize::from(blossom)].base) {
+            Label::Outside => {}
+            Label::Outer | Label::Fresh => *self.inside(blossom) += twice,
+            Label::Inner => {
+                *self.inside(blossom) -= twice;
+                self.inner_blossoms -= 1;
+            }
+        }
+    }
+
+    /// The inner blossom whose dual will be the first to come to nothing, and when.
+    pub(super) fn next_opening(&self) -> Option<(i32, u16)> {
+        let vertices = self.top.len();
+        (vertices as u16..self.nodes.len() as u16)
+            .filter(|&blossom| {
+                let node = &self.nodes[usize::from(blossom)];
+                node.is_outermost() && self.label(node.base) == Label::Inner
+            })
+            .map(|blossom| (self.slack_inside[usize::from(blossom) - vertices] / 2, blossom))
+            .min()
+    }
+
+    /// From an outer node towards the root: the matched pair and the pair beyond it, each lower end
+    /// first.
+    fn step_up(&self, outer: u16) -> Option<[[u16; 2]; 2]> {
+        let base = self.nodes[usize::from(outer)].base;
+        let mate = self.mate[usize::from(base)];
+        if mate == NONE {
+            return None;
+        }
+        let [above, below] = self.nodes[usize::from(self.top[usize::from(mate)])].link;
+        Some([[base, mate], [below, above]])
+    }
+
+    fn top_of(&self, vertex: u16) -> u16 {
+        self.top[usize::from(vertex)]
+    }
+
+    /// How many steps it is up to the root.
+    fn depth(&self, outer: u16) -> u16 {
+        let mut depth = 0;
+        let mut node = outer;
+        while let Some([_, [_, above]]) = self.step_up(node) {
+            node = self.top_of(above);
+            depth += 1;
+        }
+        depth
+    }
+
+    /// The lowest node above both outer nodes.
+    fn meeting(&self, a: u16, b: u16) -> u16 {
+        let (mut a, mut b) = (a, b);
+        let (mut depth_a, mut depth_b) = (self.depth(a), self.depth(b));
+        while a != b {
+            let climber = if depth_a >= depth_b {
+                depth_a = depth_a.saturating_sub(1);
+                &mut a
+            } else {
+                depth_b -= 1;
+                &mut b
+            };
+            match self.step_up(*climber) {
+                Some([_, [_, above]]) => *climber = self.top_of(above),
+                None => break,
+            }
+        }
+        a
+    }
+
+    /// Makes one outer blossom of the ring that the touching pair of two outer vertices closes.
+    pub(super) fn shrink(&mut self, left: u16, right: u16) {
+        let meeting = self.meeting(self.top_of(left), self.top_of(right));
+        let blossom = self.spare;
+        let (mut node, mut onward) = (self.top_of(left), [left, right]);
+        // Down the left side: each node leads to the one below it.
+        loop {
+            let up = self.step_up(node);
+            self.chain(node, onward, blossom);
+            let (Some([[base, mate], [below, above]]), true) = (up, node != meeting) else {
+                break;
+            };
+            self.chain(self.top_of(mate), [mate, base], blossom);
+            (node, onward) = (self.top_of(above), [above, below]);
+        }
+        // Up the right side.
+        let mut node = self.top_of(right);
+        while node != meeting
+            && let Some([matched, beyond]) = self.step_up(node)
+        {
+            self.chain(node, matched, blossom);
+            self.chain(self.top_of(matched[1]), beyond, blossom);
+            node = self.top_of(beyond[1]);
+        }
+        let base = self.nodes[usize::from(meeting)].base;
+        self.spare = self.nodes[usize::from(blossom)].next;
+        self.nodes[usize::from(blossom)] = Node::vertex(base);
+        *self.inside(blossom) = -2 * self.now;
+        for vertex in 0..self.top.len() as u16 {
+            let top = self.top_of(vertex);
+            if self.nodes[usize::from(top)].parent == blossom {
+                if self.label(vertex) == Label::Inner {
+                    self.set_vertex_label(vertex, Label::Fresh);
+                }
+                self.top[usize::from(vertex)] = blossom;
+            }
+        }
+    }
+
+    /// Puts `node` into the ring of `blossom`, which goes on by the pair `onward`.
+    fn chain(&mut self, node: u16, onward: [u16; 2], blossom: u16) {
+        if self.is_blossom(node) {
+            self.freeze(node);
+        }
+        let next = self.top_of(onward[1]);
+        let node = &mut self.nodes[usize::from(node)];
+        node.link = onward;
+        node.next = next;
+        node.parent = blossom;
+    }
+
+    /// The node of the ring of `blossom` that holds `vertex`.
+    fn within(&self, blossom: u16, vertex: u16) -> u16 {
+        let mut node = vertex;
+        while self.nodes[usize::from(node)].parent != blossom {
+            node = self.nodes[usize::from(node)].parent;
+        }
+        node
+    }
+
+    /// Dissolves an outermost blossom: the nodes of its ring become outermost. Returns the one that
+    /// holds the base.
+    fn open(&mut self, blossom: u16) -> u16 {
+        for vertex in 0..self.top.len() as u16 {
+            if self.top_of(vertex) == blossom {
+                self.top[usize::from(vertex)] = self.within(blossom, vertex);
+            }
+        }
+        self.settle(blossom)
+    }
+
+    /// Matches the nodes of an outermost blossom around its ring, from the one that holds the base,
+    /// which is returned. The blossom is no more.
+    fn settle(&mut self, blossom: u16) -> u16 {
+        let base = self.nodes[usize::from(blossom)].base;
+        let first = self.within(blossom, base);
+        self.nodes[usize::from(first)].base = base;
+        self.nodes[usize::from(first)].parent = NONE;
+        let mut node = self.nodes[usize::from(first)].next;
+        while node != first {
+            let Node { next, link: [a, b], .. } = self.nodes[usize::from(node)];
+            self.mate[usize::from(a)] = b;
+            self.mate[usize::from(b)] = a;
+            for (node, base) in [(node, a), (next, b)] {
+                self.nodes[usize::from(node)].base = base;
+                self.nodes[usize::from(node)].parent = NONE;
+            }
+            node = self.nodes[usize::from(next)].next;
+        }
+        let spare = self.spare;
+        self.nodes[usize::from(blossom)] = Node { next: spare, ..Node::vertex(NONE) };
+        self.spare = blossom;
+        first
+    }
+
+    /// Dissolves an inner blossom whose dual has come to nothing. The part of its ring between the
+    /// tree above and the tree below takes its place, the rest leaves the tree.
+    pub(super) fn open_inner(
+        &mut self,
+        blossom: u16,
+        pace: &mut Pace<'_>,
+    ) -> Result<(), OrderError> {
+        let entry = self.nodes[usize::from(blossom)].link;
+        self.freeze(blossom);
+        let first = self.open(blossom);
+        let entrance = self.top_of(entry[1]);
+        let position = self.position(first, entrance);
+        let mut node = first;
+        let mut last = first;
+        for index in 0.. {
+            let Node { next, link, .. } = self.nodes[usize::from(node)];
+            self.charge(u32::from(self.is_blossom(node)), pace)?;
+            self.set_label(node, Label::Outside);
+            // The pairs matched are 1 and 2, 3 and 4 and so on, so the way from the entrance by its
+            // partner to the base goes back from an even position and forward from an odd one.
+            let back = position.is_multiple_of(2);
+            if index == 0
+                || (index % 2 == position % 2 && (index < position) == back)
+                || node == entrance
+            {
+                self.nodes[usize::from(node)].link = match (node == entrance, back) {
+                    (true, _) => entry,
+                    (false, true) => [link[1], link[0]],
+                    (false, false) => self.nodes[usize::from(last)].link,
+                };
+                self.enter(node, Label::Inner);
+            } else if (index < position) == back {
+                self.enter(node, Label::Fresh);
+            } else {
+                self.look_from_each(node, pace)?;
+            }
+            if next == first {
+                if !back {
+                    self.nodes[usize::from(first)].link = self.nodes[usize::from(node)].link;
+                }
+                break;
+            }
+            (last, node) = (node, next);
+        }
+        Ok(())
+    }
+
+    /// How many places in the ring `node` is after `first`.
+    fn position(&self, first: u16, node: u16) -> u16 {
+        let mut position = 0;
+        let mut at = first;
+        while at != node {
+            at = self.nodes[usize::from(at)].next;
+            position += 1;
+        }
+        position
+    }
+
+    /// Settles every blossom, so that every vertex has its mate.
+    pub(super) fn settle_all(&mut self, pace: &mut Pace<'_>) -> Result<(), OrderError> {
+        let mut settled = true;
+        while core::mem::take(&mut settled) {
+            for blossom in self.top.len()..self.nodes.len() {
+                if self.nodes[blossom].is_outermost() {
+                    settled = true;
+                    self.charge(1, pace)?;
+                    self.settle(blossom as u16);
+                }
+            }
+        }
+        Ok(())
+    }
+}

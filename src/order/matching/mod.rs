@@ -1,0 +1,403 @@
+//! Pen-up moves of the least total length: minimum-weight perfect matching, proved by its duals.
+//!
+//! Edmonds' blossom algorithm in its primal-dual form, one alternating tree at a time. Every
+//! vertex has a dual (think of a disc around it), every blossom, an odd set shrunk to one node, a
+//! dual that lets the discs within overlap. No two discs of different nodes overlap; the pairs of
+//! the matching touch. So the duals add up to the weight of the matching, and no matching can
+//! weigh less. From a free vertex a tree grows over touching pairs, and the duals move, until it
+//! reaches another free vertex; the matching then changes along the path between them.
+//!
+//! Distances come from the coordinates when they are asked for, and seldom: a pair whose boxes
+//! already keep it too far apart is passed over. Weights are twice the distances, so that all
+//! duals stay whole numbers. Memory: [`scratch_bytes`], a few dozen bytes for each vertex.
+//! After Edmonds, "Paths, trees, and flowers" (1965), and Galil, "Efficient algorithms for finding
+//! maximum matching in graphs" (1986).
+
+mod blossom;
+mod start;
+
+use super::odd::OddPoints;
+use super::pace::Pace;
+use super::{NONE, OrderError};
+use crate::stage::{OutOfScratch, Scratch};
+use blossom::Node;
+use core::cell::Cell;
+use core::ops::Range;
+
+/// Later than anything that happens.
+const NEVER: i32 = 1 << 30;
+/// Distances are shortened by bits until they stay below this, so that sums of four weights fit.
+const DISTANCE_LIMIT: u32 = 1 << 27;
+
+/// What the tree says of a vertex, and so of the node it belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+enum Label {
+    /// Not in the tree.
+    Outside = 0,
+    /// In the tree, an even number of pairs from the root: its disc grows.
+    Outer = 1,
+    /// As `Outer`, but its pairs have not been looked at yet.
+    Fresh = 2,
+    /// In the tree, an odd number of pairs from the root: its disc shrinks.
+    Inner = 3,
+}
+
+/// Bytes of scratch for `count` vertices (odd points and free ends).
+pub(super) const fn scratch_bytes(count: usize) -> usize {
+    Scratch::bytes_for::<Node>(count + count / 2)
+        + Scratch::bytes_for::<i32>(count / 2)
+        + 2 * Scratch::bytes_for::<i32>(count)
+        + 2 * Scratch::bytes_for::<u16>(count)
+        + Scratch::bytes_for::<u8>(count)
+}
+
+/// Pairs all of `odd` with the least total length: `mate[i]` is the partner of odd point `i`.
+/// Returns a lower bound of that length in 1/256 steps: the length itself, unless the drawing is so
+/// large (above 2^19 steps) that the lengths had to be rounded further.
+pub(super) fn pair<'s>(
+    odd: &'s OddPoints<'s>,
+    mut scratch: Scratch<'s>,
+    pace: &mut Pace<'_>,
+    mate: &'s mut [u16],
+) -> Result<u64, OrderError> {
+    let mut matching = Matching::new(odd, &mut scratch, mate)?;
+    matching.start(pace)?;
+    for root in 0..odd.count() {
+        if matching.mate[usize::from(root)] == NONE {
+            matching.grow_tree(root, pace)?;
+        }
+    }
+    matching.settle_all(pace)?;
+    Ok(matching.length())
+}
+
+struct Matching<'s, 'a> {
+    odd: &'s OddPoints<'a>,
+    /// Vertices, then blossoms.
+    nodes: &'s mut [Node],
+    /// The outermost node of each vertex.
+    top: &'s mut [u16],
+    /// The partner of each vertex that is the base of an outermost node; of no worth for others.
+    mate: &'s mut [u16],
+    label: &'s mut [u8],
+    /// The dual of each vertex: plus `now` if its node is outer, minus `now` if inner.
+    radius: &'s mut [i32],
+    /// The dual of each blossom: plus or minus twice `now` if it is outermost.
+    slack_inside: &'s mut [i32],
+    /// When the best pair of each vertex with an outer vertex will touch.
+    when: &'s mut [i32],
+    /// That outer vertex.
+    best: &'s mut [u16],
+    /// How far the duals of the tree have moved since it was planted.
+    now: i32,
+    /// When the tree will reach a free vertex by the best pair known.
+    limit: i32,
+    /// The first of the blossoms not in use.
+    spare: u16,
+    /// How many inner blossoms there are.
+    inner_blossoms: u16,
+    /// How many bits the distances are shortened by.
+    shortened: u32,
+    /// The weight of a pair with a free end: the same for all, so that it does not matter.
+    end_weight: i32,
+    /// Square roots not yet charged to the pace.
+    roots: Cell<u32>,
+}
+
+impl<'s, 'a> Matching<'s, 'a> {
+    fn new(
+        odd: &'s OddPoints<'a>,
+        scratch: &mut Scratch<'s>,
+        mate: &'s mut [u16],
+    ) -> Result<Self, OutOfScratch> {
+        let count = usize::from(odd.count());
+        let nodes: &mut [Node] = scratch.take(count + count / 2)?;
+        let slack_inside = scratch.take(count / 2)?;
+        let radius = scratch.take(count)?;
+        let when = scratch.take(count)?;
+        let top: &mut [u16] = scratch.take(count)?;
+        let best = scratch.take(count)?;
+        let label = scratch.take(count)?;
+        for (vertex, (node, top)) in (0..).zip(nodes.iter_mut().zip(top.iter_mut())) {
+            *node = Node::vertex(vertex);
+            *top = vertex;
+        }
+        mate.fill(NONE);
+        let mut matching = Self {
+            odd,
+            nodes,
+            top,
+            mate,
+            label,
+            radius,
+            slack_inside,
+            when,
+            best,
+            now: 0,
+            limit: NEVER,
+            spare: odd.count(),
+            inner_blossoms: 0,
+            shortened: 0,
+            end_weight: 0,
+            roots: Cell::new(0),
+        };
+        matching.lay_out_spares();
+        while odd.extent() >> matching.shortened >= DISTANCE_LIMIT {
+            matching.shortened += 1;
+        }
+        Ok(matching)
+    }
+
+    /// Twice the distance.
+    fn weight(&self, a: u16, b: u16) -> i32 {
+        let real = self.odd.real_count();
+        if a < real && b < real {
+            2 * (self.odd.distance(a, b) >> self.shortened) as i32
+        } else if a >= real && b >= real {
+            NEVER / 2
+        } else {
+            self.end_weight
+        }
+    }
+
+    /// The weight if it is less than `bound`; most are seen not to be without a square root.
+    fn weight_below(&self, a: u16, b: u16, bound: i32) -> Option<i32> {
+        if bound <= 0 || (self.odd.least_distance(a, b) >> self.shortened) as i32 * 2 >= bound {
+            return None;
+        }
+        self.roots.set(self.roots.get() + 1);
+        let weight = self.weight(a, b);
+        (weight < bound).then_some(weight)
+    }
+
+    /// Charges the square roots since the last time, and `looks` at all vertices.
+    fn charge(&self, looks: u32, pace: &mut Pace<'_>) -> Result<(), OrderError> {
+        let all = self.top.len() as u32;
+        pace.work(1 + self.roots.take() + looks * all / 32)?;
+        Ok(())
+    }
+
+    fn label(&self, vertex: u16) -> Label {
+        match self.label[usize::from(vertex)] {
+            0 => Label::Outside,
+            1 => Label::Outer,
+            2 => Label::Fresh,
+            _ => Label::Inner,
+        }
+    }
+
+    /// The dual of `vertex` as it is now.
+    fn radius_now(&self, vertex: u16) -> i32 {
+        let radius = self.radius[usize::from(vertex)];
+        match self.label(vertex) {
+            Label::Outside => radius,
+            Label::Outer | Label::Fresh => radius + self.now,
+            Label::Inner => radius - self.now,
+        }
+    }
+
+    /// Gives all vertices of an outermost node a label; their duals stay what they are.
+    fn set_label(&mut self, node: u16, label: Label) {
+        for vertex in self.candidates(node) {
+            if self.top[usize::from(vertex)] == node {
+                self.set_vertex_label(vertex, label);
+            }
+        }
+    }
+
+    /// The vertices that may be in an outermost node.
+    fn candidates(&self, node: u16) -> Range<u16> {
+        let all = self.top.len() as u16;
+        if node < all { node..node + 1 } else { 0..all }
+    }
+
+    fn set_vertex_label(&mut self, vertex: u16, label: Label) {
+        let radius = self.radius_now(vertex);
+        let index = usize::from(vertex);
+        self.label[index] = label as u8;
+        self.when[index] = NEVER;
+        self.radius[index] = match label {
+            Label::Outside => radius,
+            Label::Outer | Label::Fresh => radius - self.now,
+            Label::Inner => radius + self.now,
+        };
+    }
+
+    /// Grows a tree from the free vertex `root` until it reaches another one, and matches both.
+    fn grow_tree(&mut self, root: u16, pace: &mut Pace<'_>) -> Result<(), OrderError> {
+        self.now = 0;
+        self.limit = NEVER;
+        self.inner_blossoms = 0;
+        self.when.fill(NEVER);
+        self.enter(root, Label::Fresh);
+        loop {
+            self.look_around(pace)?;
+            self.charge(1, pace)?;
+            let (time, vertex) = self.next_touch();
+            if self.inner_blossoms > 0
+                && let Some((empty, blossom)) = self.next_opening()
+                && empty <= time
+            {
+                self.now = empty;
+                self.open_inner(blossom, pace)?;
+                continue;
+            }
+            self.now = time;
+            let outer = self.best[usize::from(vertex)];
+            let node = self.top[usize::from(vertex)];
+            if self.label(vertex) == Label::Outer {
+                if self.top[usize::from(outer)] == node {
+                    self.look_from(vertex, pace)?;
+                } else {
+                    self.shrink(outer, vertex);
+                }
+                continue;
+            }
+            let base = self.nodes[usize::from(node)].base;
+            let mate = self.mate[usize::from(base)];
+            if mate == NONE {
+                self.augment(outer, vertex);
+                self.fell_tree();
+                return Ok(());
+            }
+            self.nodes[usize::from(node)].link = [outer, vertex];
+            self.enter(node, Label::Inner);
+            self.enter(self.top[usize::from(mate)], Label::Fresh);
+        }
+    }
+
+    /// The first pair with an outer vertex that will touch: when, and its other vertex.
+    fn next_touch(&self) -> (i32, u16) {
+        let mut first = (NEVER, 0);
+        for (vertex, &when) in (0..).zip(self.when.iter()) {
+            if when < first.0 {
+                first = (when, vertex);
+            }
+        }
+        first
+    }
+
+    /// Looks at the pairs of every fresh vertex.
+    fn look_around(&mut self, pace: &mut Pace<'_>) -> Result<(), OrderError> {
+        for vertex in 0..self.top.len() as u16 {
+            if self.label(vertex) == Label::Fresh {
+                self.label[usize::from(vertex)] = Label::Outer as u8;
+                self.look_from_outer(vertex, pace)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Notes at all other vertices when their pair with the outer vertex `from` will touch, if that
+    /// is sooner than what they know.
+    fn look_from_outer(&mut self, from: u16, pace: &mut Pace<'_>) -> Result<(), OrderError> {
+        self.charge(1, pace)?;
+        let (now, own) = (self.now, self.radius_now(from));
+        let node = self.top[usize::from(from)];
+        for other in 0..self.top.len() as u16 {
+            let index = usize::from(other);
+            let label = self.label(other);
+            if label == Label::Inner || self.top[index] == node {
+                continue;
+            }
+            // Outside, the gap closes from one side; between outer vertices, from both.
+            let left = self.when[index].min(self.limit) - now;
+            let (sides, reach) = match label {
+                Label::Outside => (1, self.radius[index]),
+                _ => (2, self.radius[index] + now),
+            };
+            let Some(weight) = self.weight_below(from, other, sides * left + reach + own) else {
+                continue;
+            };
+            let when = now + (weight - reach - own) / sides;
+            self.when[index] = when;
+            self.best[index] = from;
+            if label == Label::Outside && self.is_free(other) {
+                self.limit = when;
+            }
+        }
+        Ok(())
+    }
+
+    fn is_free(&self, vertex: u16) -> bool {
+        let base = self.nodes[usize::from(self.top[usize::from(vertex)])].base;
+        self.mate[usize::from(base)] == NONE
+    }
+
+    /// Finds anew when the first pair of `vertex`, outside or outer, with an outer vertex of
+    /// another node will touch.
+    fn look_from(&mut self, vertex: u16, pace: &mut Pace<'_>) -> Result<(), OrderError> {
+        self.charge(1, pace)?;
+        let index = usize::from(vertex);
+        let (now, own) = (self.now, self.radius_now(vertex));
+        let sides = if self.label(vertex) == Label::Outside { 1 } else { 2 };
+        self.when[index] = NEVER;
+        for other in 0..self.top.len() as u16 {
+            if self.label(other) != Label::Outer || self.top[usize::from(other)] == self.top[index]
+            {
+                continue;
+            }
+            let left = self.when[index].min(self.limit) - now;
+            let reach = self.radius_now(other) + own;
+            if let Some(weight) = self.weight_below(vertex, other, sides * left + reach) {
+                self.when[index] = now + (weight - reach) / sides;
+                self.best[index] = other;
+            }
+        }
+        Ok(())
+    }
+
+    /// The same for each vertex of a node.
+    fn look_from_each(&mut self, node: u16, pace: &mut Pace<'_>) -> Result<(), OrderError> {
+        for vertex in self.candidates(node) {
+            if self.top[usize::from(vertex)] == node {
+                self.look_from(vertex, pace)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Matches the path from the root to `outer`, and `outer` with the free vertex `free`.
+    fn augment(&mut self, outer: u16, free: u16) {
+        let mut pair = [outer, free];
+        loop {
+            let [outer, inner] = pair;
+            let node = usize::from(self.top[usize::from(outer)]);
+            let base = core::mem::replace(&mut self.nodes[node].base, outer);
+            let next = self.mate[usize::from(base)];
+            self.mate[usize::from(outer)] = inner;
+            self.mate[usize::from(inner)] = outer;
+            if next == NONE {
+                return;
+            }
+            let above = &mut self.nodes[usize::from(self.top[usize::from(next)])];
+            pair = above.link;
+            above.base = pair[1];
+        }
+    }
+
+    /// Takes all labels off.
+    fn fell_tree(&mut self) {
+        for blossom in self.top.len()..self.nodes.len() {
+            if self.nodes[blossom].is_outermost() {
+                self.freeze(blossom as u16);
+            }
+        }
+        for vertex in 0..self.top.len() as u16 {
+            self.set_vertex_label(vertex, Label::Outside);
+        }
+    }
+
+    /// The length of the matching, without the free ends, in 1/256 steps, rounded as the weights.
+    fn length(&self) -> u64 {
+        let twice: u64 = (0..self.odd.real_count())
+            .filter_map(|vertex| {
+                let mate = self.mate[usize::from(vertex)];
+                self.odd.station(mate)?;
+                Some(u64::from(self.odd.distance(vertex, mate) >> self.shortened))
+            })
+            .sum();
+        (twice / 2) << self.shortened
+    }
+}

@@ -1,0 +1,64 @@
+//! Pen-up moves changed so that they join the parts.
+//!
+//! The shortest moves often leave the tour in many cycles. Two moves of different parts that give
+//! up their ends for each other's make one part of two; those that lengthen least go first, nearly:
+//! the allowance grows by halves from round to round (after Karp, "A patching algorithm for the
+//! nonsymmetric traveling-salesman problem", 1979).
+
+use super::near::Near;
+use super::network::Network;
+use super::pace::Pace;
+use super::partition::Partition;
+use super::{EVEN_PART, NONE, OrderError};
+use crate::stage::Scratch;
+
+/// The first allowance: 2 steps.
+const FIRST_ALLOWANCE: i64 = 2 << 8;
+
+/// Changes the moves `mate` between odd stations until no two of `near` can join two parts.
+pub(super) fn mend(
+    network: Network<'_>,
+    near: Near<'_>,
+    mate: &mut [u16],
+    mut scratch: Scratch<'_>,
+    pace: &mut Pace<'_>,
+) -> Result<(), OrderError> {
+    let mut parts = Partition::singletons(scratch.take(mate.len())?);
+    for chain in 0..network.chains() {
+        let [start, end] = network.ends(chain);
+        parts.unite(start, end);
+    }
+    let is_move = |mate: u16| mate != NONE && mate != EVEN_PART;
+    for (station, &mate) in (0..).zip(mate.iter()) {
+        if is_move(mate) {
+            parts.unite(station, mate);
+        }
+    }
+    let mut allowance = FIRST_ALLOWANCE;
+    let mut apart = true;
+    while core::mem::take(&mut apart) {
+        for a in 0..network.stations() {
+            for c in near.of(a) {
+                let (b, d) = (mate[usize::from(a)], mate[usize::from(c)]);
+                pace.work(1)?;
+                if !is_move(b) || !is_move(d) || parts.find(a) == parts.find(c) {
+                    continue;
+                }
+                pace.work(4)?;
+                let length = |from, to| i64::from(network.distance(from, to));
+                let longer = length(a, c) + length(b, d) - length(a, b) - length(c, d);
+                if longer <= allowance {
+                    for (from, to) in [(a, c), (b, d)] {
+                        mate[usize::from(from)] = to;
+                        mate[usize::from(to)] = from;
+                    }
+                    parts.unite(a, c);
+                } else {
+                    apart = true;
+                }
+            }
+        }
+        allowance += allowance / 2;
+    }
+    Ok(())
+}

@@ -1,1 +1,0 @@
-//! Owns the memory and joins the rest.

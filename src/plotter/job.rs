@@ -1,0 +1,326 @@
+//! From the model to ordered strokes: the way of the data, in one place.
+
+use super::PlotOptions;
+use crate::drawing::{
+    Bounds, Drawing, Line, LineType, OrganiseError, PageMap, PagePoint, StepsPerMillimetre, Stored,
+    organise,
+};
+use crate::machine::{Path, Target};
+use crate::model::{Element, Model, ModelError};
+use crate::order::{self, Leg, OrderError};
+use crate::protocol::{HiddenLines, Refusal};
+use crate::stage::{Aborted, Attention, OutOfScratch, Scratch, Stage, items, items_mut};
+use crate::view::{Seen, View, see};
+use crate::visibility::{self, Scene, SinkFull, Stretch, StretchSink, VisibilityError};
+
+/// Who is shown each stretch as it is found, in view coordinates: the preview.
+pub trait Observer {
+    /// One stretch, seen through `view`.
+    fn stretch(&mut self, view: &View, stretch: &Stretch);
+
+    /// One bar of a plan, as it lies on the page.
+    fn plan_bar(&mut self, from: [f64; 2], to: [f64; 2]);
+}
+
+/// Nobody looks on.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Unobserved;
+
+impl Observer for Unobserved {
+    fn stretch(&mut self, _: &View, _: &Stretch) {}
+    fn plan_bar(&mut self, _: [f64; 2], _: [f64; 2]) {}
+}
+
+/// A drawing in the working memory with the order of its strokes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Job {
+    stored: Stored,
+    legs: usize,
+    report: order::Report,
+}
+
+impl Job {
+    /// Computes the job for `model` in `words`, which then hold it.
+    ///
+    /// # Errors
+    /// The [`Refusal`] to reply with; `words` hold no job then, the model is untouched.
+    pub fn compute(
+        model: &Model<'_>,
+        options: &PlotOptions,
+        steps: StepsPerMillimetre,
+        words: &mut [u64],
+        attention: &mut dyn Attention,
+        observer: &mut dyn Observer,
+    ) -> Result<Self, Refusal> {
+        if model.elements().corners().is_empty() {
+            return Err(Refusal::NothingToPlot);
+        }
+        let lines = if model.is_plan() && options.shows_plans_flat() {
+            lay_out_plan(model, options, steps, words, observer)?
+        } else {
+            project(model, options, steps, words, attention, observer)?
+        };
+        let stored = organise(words, lines, attention)?;
+        let (drawing, mut rest) = stored.split(words).map_err(Refusal::DrawingTooLarge)?;
+        let legs = drawing.segments.len();
+        if legs == 0 {
+            return Err(Refusal::NothingToPlot);
+        }
+        let tour = rest.take::<Leg>(legs).map_err(Refusal::DrawingTooLarge)?;
+        attention.enter(Stage::Order);
+        let report = order::order(drawing, options.order, rest, attention, tour)?;
+        Ok(Self { stored, legs, report })
+    }
+
+    /// What came of the order.
+    pub fn report(&self) -> &order::Report {
+        &self.report
+    }
+
+    /// The strokes, from `cursor` on. `words` are those that hold the job.
+    pub fn strokes<'a>(&self, words: &'a mut [u64], cursor: &'a mut Cursor) -> Strokes<'a> {
+        // The memory is the one that `compute` filled, so both reads succeed; else there is no stroke.
+        let nothing = Drawing { points: &[], segments: &[] };
+        let leg_words = self.stored.bytes() / size_of::<u64>();
+        let words: &'a [u64] = words;
+        let tour =
+            words.get(leg_words..).and_then(|rest| items::<Leg>(rest, self.legs)).unwrap_or(&[]);
+        let drawing = self.stored.drawing(words).unwrap_or(nothing);
+        Strokes { drawing, tour, cursor }
+    }
+}
+
+/// How far the strokes of a job have been handed to the machine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Cursor {
+    leg: usize,
+    at: Option<u16>,
+}
+
+/// The strokes of a job as the machine asks for them: a pen-up move wherever a leg does not begin
+/// where the one before ended.
+#[derive(Debug)]
+pub struct Strokes<'a> {
+    drawing: Drawing<'a>,
+    tour: &'a [Leg],
+    cursor: &'a mut Cursor,
+}
+
+impl Path for Strokes<'_> {
+    fn next_target(&mut self) -> Option<Target> {
+        let leg = self.tour.get(self.cursor.leg)?;
+        let segment = self.drawing.segments.get(leg.segment())?;
+        let (from, to) =
+            if leg.reversed() { (segment.to, segment.from) } else { (segment.from, segment.to) };
+        let begins_here = self.cursor.at == Some(from);
+        let number = if begins_here { to } else { from };
+        let point = *self.drawing.points.get(usize::from(number))?;
+        self.cursor.at = Some(number);
+        self.cursor.leg += usize::from(begins_here);
+        Some(Target { point, ink: begins_here.then(|| segment.line_type()) })
+    }
+
+    fn rewind(&mut self) {
+        *self.cursor = Cursor::default();
+    }
+}
+
+/// A plan: its bars are lines on the page already. Returns how many lines stand in `words`.
+fn lay_out_plan(
+    model: &Model<'_>,
+    options: &PlotOptions,
+    steps: StepsPerMillimetre,
+    words: &mut [u64],
+    observer: &mut dyn Observer,
+) -> Result<usize, Refusal> {
+    let vertices = model.vertices();
+    let unit = libm::ldexp(1.0, -(model.fraction_bits() as i32));
+    let used = model
+        .elements()
+        .corners()
+        .iter()
+        .filter_map(|c| vertices.get(usize::from(c.vertex())))
+        .copied();
+    let (page, bits) = (&options.page, model.fraction_bits());
+    let map = if options.fit {
+        PageMap::fit_plan(used, bits, page, steps)
+    } else {
+        PageMap::true_size(used, bits, page, steps)
+    };
+    let map = map.map_err(Refusal::Page)?;
+    let mut collector = Collector::new(words);
+    for element in model.elements().iter() {
+        let Element::Bar(from, to) = element else { continue };
+        let (Some(from), Some(to)) =
+            (vertices.get(usize::from(from)), vertices.get(usize::from(to)))
+        else {
+            continue;
+        };
+        observer.plan_bar(
+            [from.x, from.y].map(|c| f64::from(c) * unit),
+            [to.x, to.y].map(|c| f64::from(c) * unit),
+        );
+        let [from, to] = [from, to].map(|p| map.point(p.x.into(), p.y.into(), 1));
+        collector.line(from, to, LineType::Full).map_err(|SinkFull| collector.out_of_memory())?;
+    }
+    Ok(collector.count)
+}
+
+/// These take some 100,000 instructions.
+const CORNERS_BETWEEN_CHECKS: usize = 128;
+
+/// Anything else: through the camera, hidden lines found. Returns how many lines stand in `words`.
+fn project(
+    model: &Model<'_>,
+    options: &PlotOptions,
+    steps: StepsPerMillimetre,
+    words: &mut [u64],
+    attention: &mut dyn Attention,
+    observer: &mut dyn Observer,
+) -> Result<usize, Refusal> {
+    attention.enter(Stage::View);
+    let total = size_of_val(words);
+    let mut scratch = Scratch::new(words);
+    let camera = options.camera(model).ok_or(Refusal::NothingToPlot)?;
+    attention.check()?;
+    let view = View::new(&camera, model).map_err(Refusal::View)?;
+    attention.check()?;
+    let Seen { vertices, elements } =
+        see(&view, model, &mut scratch).map_err(Refusal::DrawingTooLarge)?;
+    if !options.clip_behind {
+        view.refuse_behind(model).map_err(Refusal::View)?;
+    }
+    let projection = view.projection();
+    // Two divisions a corner: some at a time, so that the line is answered.
+    let mut bounds: Option<Bounds> = None;
+    for corners in elements.corners().chunks(CORNERS_BETWEEN_CHECKS) {
+        attention.check()?;
+        let used = corners.iter().filter_map(|c| vertices.get(usize::from(c.vertex()))).copied();
+        let more = Bounds::around(used, projection);
+        bounds = bounds.zip(more).map(|(a, b)| a.union(b)).or(bounds).or(more);
+    }
+    let bounds = bounds.ok_or(Refusal::NothingToPlot)?;
+    let map = PageMap::fit(&bounds, &options.page, steps).map_err(Refusal::Page)?;
+
+    attention.enter(Stage::Visibility);
+    let scene = Scene { vertices, elements, projection };
+    // Memory: what is taken, then visibility's, then the lines as they are found. A quarter of what
+    // visibility does not need makes its grid finer.
+    let available = scratch.available_bytes();
+    let needed = visibility::scratch_bytes(&scene);
+    let spare = available.checked_sub(needed).ok_or(OutOfScratch { needed, available });
+    let stage_bytes = needed + spare.map_err(Refusal::DrawingTooLarge)? / 4;
+    let (stage_memory, mut line_memory) = scratch.split(stage_bytes);
+    let lines_at = (total - line_memory.available_bytes()) / size_of::<u64>();
+    let room = line_memory.available_bytes() / size_of::<Line>();
+    let lines = line_memory.take(room).map_err(Refusal::DrawingTooLarge)?;
+    let collector = Collector { lines, count: 0 };
+    let mut sink = PageSink { collector, map, view, hidden: options.hidden, observer };
+    let options = options.visibility(&view);
+    let found = visibility::find_stretches(&scene, options, stage_memory, attention, &mut sink);
+    let count = match found {
+        Ok(_) => sink.collector.count,
+        Err(VisibilityError::SinkFull) => return Err(sink.collector.out_of_memory()),
+        Err(VisibilityError::Scratch(missing)) => return Err(Refusal::DrawingTooLarge(missing)),
+        Err(VisibilityError::Aborted) => return Err(Refusal::Aborted),
+        // The model and the view see to it that neither can be.
+        Err(VisibilityError::UnknownVertex(_) | VisibilityError::OutOfRange(_)) => {
+            return Err(Refusal::NothingToPlot);
+        }
+        Err(VisibilityError::TooManyCorners(limit)) => {
+            let needed = elements.corners().len();
+            return Err(Refusal::Model(ModelError::TooManyCorners { limit, needed }));
+        }
+    };
+    let line_words = Scratch::bytes_for::<Line>(count) / size_of::<u64>();
+    words.copy_within(lines_at..lines_at + line_words, 0);
+    Ok(count)
+}
+
+impl From<Aborted> for Refusal {
+    fn from(_: Aborted) -> Self {
+        Self::Aborted
+    }
+}
+
+impl From<OrganiseError> for Refusal {
+    fn from(error: OrganiseError) -> Self {
+        match error {
+            OrganiseError::Scratch(missing) => Self::DrawingTooLarge(missing),
+            OrganiseError::Aborted => Self::Aborted,
+        }
+    }
+}
+
+impl From<OrderError> for Refusal {
+    fn from(error: OrderError) -> Self {
+        match error {
+            OrderError::Scratch(missing) => Self::DrawingTooLarge(missing),
+            OrderError::Aborted => Self::Aborted,
+            OrderError::TooManySegments => Self::TooManyLines,
+            // Of a drawing that `organise` made neither can be.
+            OrderError::TourLength | OrderError::BadSegment(_) => Self::TooManyLines,
+        }
+    }
+}
+
+/// Packs lines at the front of the memory.
+struct Collector<'a> {
+    lines: &'a mut [Line],
+    count: usize,
+}
+
+impl<'a> Collector<'a> {
+    fn new(words: &'a mut [u64]) -> Self {
+        let room = size_of_val(words) / size_of::<Line>();
+        Self { lines: items_mut(words, room).unwrap_or(&mut []), count: 0 }
+    }
+
+    fn line(
+        &mut self,
+        from: PagePoint,
+        to: PagePoint,
+        line_type: LineType,
+    ) -> Result<(), SinkFull> {
+        if from != to {
+            *self.lines.get_mut(self.count).ok_or(SinkFull)? = Line::new(from, to, line_type, 0);
+            self.count += 1;
+        }
+        Ok(())
+    }
+
+    fn out_of_memory(&self) -> Refusal {
+        let available = size_of_val(self.lines);
+        Refusal::DrawingTooLarge(OutOfScratch { needed: available + size_of::<Line>(), available })
+    }
+}
+
+/// Puts each stretch on the page.
+struct PageSink<'a> {
+    collector: Collector<'a>,
+    map: PageMap,
+    view: View,
+    hidden: HiddenLines,
+    observer: &'a mut dyn Observer,
+}
+
+impl StretchSink for PageSink<'_> {
+    fn stretch(&mut self, stretch: Stretch) -> Result<(), SinkFull> {
+        let (p, q) = stretch.ends;
+        // The cut along the near plane is no edge of the model.
+        let is_cut = |near| p.z == near && q.z == near && stretch.edge.is_some();
+        if self.view.near().is_some_and(is_cut) {
+            return Ok(());
+        }
+        let line_type = match (stretch.visible, self.hidden) {
+            (true, _) | (false, HiddenLines::Shown) => LineType::Full,
+            (false, HiddenLines::Dotted) => LineType::Dotted,
+            (false, HiddenLines::Dashed) => LineType::Dashed,
+            (false, HiddenLines::Erased) => return Ok(()),
+        };
+        self.observer.stretch(&self.view, &stretch);
+        let [from, to] =
+            [stretch.from, stretch.to].map(|end| self.map.along(p, q, end, self.view.projection()));
+        self.collector.line(from, to, line_type)
+    }
+}

@@ -1,0 +1,66 @@
+//! The one place that owns memory: capacities are chosen here, by the board.
+
+use crate::model::{Corner, Position};
+use crate::motion::Block;
+
+/// How many moves are planned ahead: see [`crate::motion`].
+pub const BLOCKS: usize = 48;
+
+/// The moves planned ahead, before any is.
+pub const NO_MOVES: [Block; BLOCKS] = [Block::EMPTY; BLOCKS];
+
+/// The large memory of a plotter: a model, and what its jobs are computed in.
+///
+/// New, it is all zero bits, so that a static one costs no flash and is never built on the stack.
+#[derive(Debug)]
+pub struct Memory<const VERTICES: usize, const CORNERS: usize, const WORDS: usize> {
+    vertices: heapless::Vec<Position, VERTICES>,
+    corners: heapless::Vec<Corner, CORNERS>,
+    words: [u64; WORDS],
+}
+
+/// For 64 KiB of RAM: a lattice of 125 cubes.
+pub type Lm3s6965Memory = Memory<1008, 3008, 4576>;
+
+/// For 264 KiB of RAM: a lattice of 343 cubes.
+pub type PicoMemory = Memory<4096, 12288, 16384>;
+
+impl<const VERTICES: usize, const CORNERS: usize, const WORDS: usize>
+    Memory<VERTICES, CORNERS, WORDS>
+{
+    /// Empty.
+    pub const fn new() -> Self {
+        Self { vertices: heapless::Vec::new(), corners: heapless::Vec::new(), words: [0; WORDS] }
+    }
+
+    /// Lends it to a plotter, with memory for the moves planned ahead.
+    pub fn lend<'m>(&'m mut self, blocks: &'m mut [Block]) -> Lent<'m> {
+        Lent {
+            vertices: &mut self.vertices,
+            corners: &mut self.corners,
+            blocks,
+            words: &mut self.words,
+        }
+    }
+}
+
+impl<const VERTICES: usize, const CORNERS: usize, const WORDS: usize> Default
+    for Memory<VERTICES, CORNERS, WORDS>
+{
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Memory lent to a plotter, of whatever size.
+#[derive(Debug)]
+pub struct Lent<'m> {
+    /// For the model's vertices.
+    pub vertices: &'m mut heapless::VecView<Position>,
+    /// For the corners of its faces and the ends of its bars.
+    pub corners: &'m mut heapless::VecView<Corner>,
+    /// For the moves planned ahead.
+    pub blocks: &'m mut [Block],
+    /// For the stages of a job and the drawing that comes of it.
+    pub words: &'m mut [u64],
+}

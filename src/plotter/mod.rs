@@ -1,0 +1,358 @@
+//! Owns the memory and joins the rest: bytes in, step events and replies out.
+//!
+//! A [`Plotter`] is polled by the board's main loop ([`run`] is that loop). Each poll answers what was
+//! asked in real time, carries out the lines that came, and keeps the step queue full. A `$plot`
+//! computes the whole [`Job`] first ([`Attention`] answers the line meanwhile), then the strokes go
+//! to the machine. This is the only module that knows all the others.
+
+mod board;
+mod job;
+mod memory;
+mod options;
+mod reply;
+
+pub use board::Board;
+pub use job::{Cursor, Job, Observer, Strokes, Unobserved};
+pub use memory::{Lent, Lm3s6965Memory, Memory, NO_MOVES, PicoMemory};
+pub use options::PlotOptions;
+
+use crate::fixed::BinaryFraction;
+use crate::machine::{
+    Machine, MachineError, PulserState, Setting, SettingError, Settings, State, Value,
+};
+use crate::model::Model;
+use crate::order;
+use crate::protocol::{Command, HELP, LINE_LIMIT, LineReader, RealTime, Refusal};
+use crate::stage::{Aborted, Attention, Stage};
+use reply::Reply;
+
+/// How far step events are planned ahead of the pins, and so how late a hold takes effect: 50 ms.
+const AHEAD_TICKS: u32 = crate::motion::TICKS_PER_SECOND / 20;
+
+/// Polls the plotter for ever; sleeps when there is nothing to do.
+pub fn run<B: Board>(board: &mut B, memory: Lent<'_>, pins: &PulserState) -> ! {
+    let mut plotter = Plotter::new(memory, pins);
+    plotter.greet(board);
+    loop {
+        if !plotter.poll(board) {
+            board.wait();
+        }
+    }
+}
+
+/// The whole plotter but for its pins.
+#[derive(Debug)]
+pub struct Plotter<'m> {
+    reader: LineReader,
+    inner: Inner<'m>,
+}
+
+/// All but the line being read, which is borrowed while it is carried out.
+#[derive(Debug)]
+struct Inner<'m> {
+    model: Model<'m>,
+    options: PlotOptions,
+    words: &'m mut [u64],
+    machine: Machine<'m>,
+    job: Job,
+    cursor: Cursor,
+}
+
+impl<'m> Plotter<'m> {
+    /// An idle plotter at the page's origin with an empty model. `pins` is what the board's step
+    /// interrupt counts in.
+    pub fn new(memory: Lent<'m>, pins: &'m PulserState) -> Self {
+        let Lent { vertices, corners, blocks, words } = memory;
+        Self {
+            reader: LineReader::default(),
+            inner: Inner {
+                model: Model::new(vertices, corners),
+                options: PlotOptions::default(),
+                words,
+                machine: Machine::new(Settings::default(), blocks, pins, AHEAD_TICKS),
+                job: Job::default(),
+                cursor: Cursor::default(),
+            },
+        }
+    }
+
+    /// The first line that a sender sees, and what it sees after ctrl-X.
+    pub fn greet<B: Board>(&self, board: &mut B) {
+        const VERSION: &str = env!("CARGO_PKG_VERSION");
+        Reply(board).line(format_args!("\r\nGrbl 1.1h [penup {VERSION} '$' for help]"));
+    }
+
+    /// Answers the line, and keeps the step queue full. Whether anything was done.
+    pub fn poll<B: Board>(&mut self, board: &mut B) -> bool {
+        let asked = board.take_real_time();
+        self.act(asked, board);
+        let planned = self.inner.plan(board);
+        let Some(byte) = board.read_byte() else { return planned || asked != RealTime::default() };
+        let outcome = match self.reader.push(byte) {
+            None => return true,
+            Some(Ok(line)) => self.inner.carry_out(line, board),
+            Some(Err(refusal)) => Err(refusal),
+        };
+        if outcome == Err(Refusal::Aborted) {
+            self.reset(board);
+        }
+        Reply(board).outcome(outcome);
+        true
+    }
+
+    /// What the model holds.
+    pub fn model(&self) -> &Model<'m> {
+        &self.inner.model
+    }
+
+    /// What is drawn and how.
+    pub fn options(&self) -> &PlotOptions {
+        &self.inner.options
+    }
+
+    /// The machine's side.
+    pub fn machine(&self) -> &Machine<'m> {
+        &self.inner.machine
+    }
+
+    /// The job drawn last, or being drawn.
+    pub fn job(&self) -> &Job {
+        &self.inner.job
+    }
+
+    /// Computes the job of `$plot` without drawing it.
+    ///
+    /// # Errors
+    /// The [`Refusal`] that `$plot` would reply with.
+    pub fn compute(
+        &mut self,
+        attention: &mut dyn Attention,
+        observer: &mut dyn Observer,
+    ) -> Result<&Job, Refusal> {
+        self.inner.compute(attention, observer)?;
+        Ok(&self.inner.job)
+    }
+
+    /// The strokes of the job computed last, from the beginning.
+    pub fn strokes(&mut self) -> Strokes<'_> {
+        self.inner.cursor = Cursor::default();
+        self.inner.job.strokes(self.inner.words, &mut self.inner.cursor)
+    }
+
+    fn act<B: Board>(&mut self, asked: RealTime, board: &mut B) {
+        if asked.abort {
+            self.inner.machine.abort();
+            self.reset(board);
+        }
+        if asked.hold {
+            self.inner.machine.hold();
+        }
+        if asked.resume {
+            self.inner.machine.resume();
+        }
+        if asked.bytes_lost {
+            Reply(board).outcome(Err(Refusal::BytesLost));
+        }
+        if asked.status {
+            self.inner.report_status(board);
+        }
+    }
+
+    fn reset<B: Board>(&mut self, board: &mut B) {
+        self.reader.clear();
+        self.greet(board);
+    }
+}
+
+impl Inner<'_> {
+    /// Keeps the step queue full. Whether the machine still has something to plan.
+    fn plan<B: Board>(&mut self, board: &mut B) -> bool {
+        let before = self.machine.planned_position();
+        let mut strokes = self.job.strokes(self.words, &mut self.cursor);
+        self.machine.fill(&mut strokes, board.queue());
+        self.machine.planned_position() != before
+    }
+
+    fn is_idle(&self) -> bool {
+        self.machine.state() == State::Idle
+    }
+
+    #[inline(never)] // Its frame must not lie under the stages'.
+    fn carry_out<B: Board>(&mut self, line: &str, board: &mut B) -> Result<(), Refusal> {
+        match Command::parse(line)? {
+            Command::Nothing => {}
+            Command::Vertex(coordinates) => {
+                self.model.add_vertex(coordinates).map_err(Refusal::Model)?
+            }
+            Command::Face(numbers) => {
+                self.model.add_face(numbers.iter()).map_err(Refusal::Model)?
+            }
+            Command::Polyline(numbers) => {
+                self.model.add_polyline(numbers.iter()).map_err(Refusal::Model)?
+            }
+            Command::Help => {
+                for (usage, meaning) in HELP {
+                    Reply(board).line(format_args!("[HLP:{usage} {meaning}]"));
+                }
+            }
+            Command::BuildInfo => self.report_build(board),
+            Command::Settings => self.list_settings(board),
+            Command::Setting { name, value } => self.change_setting(name, value)?,
+            Command::Option(option) => self.options.set(option),
+            Command::Options => self.options.list(|option| Reply(board).line(option)),
+            Command::Model => self.report_model(board),
+            Command::Clear => self.model.clear(),
+            Command::Plot => self.plot(board)?,
+            Command::Unlock => self.machine.unlock()?,
+        }
+        Ok(())
+    }
+
+    #[inline(never)] // Its frame must not lie under the stages'.
+    fn plot<B: Board>(&mut self, board: &mut B) -> Result<(), Refusal> {
+        if !self.is_idle() {
+            return Err(match self.machine.state() {
+                State::Alarm(_) | State::Sleep => Refusal::Locked,
+                _ => Refusal::Busy,
+            });
+        }
+        let position = self.machine.position_mm();
+        let mut listener = Listener { board, position, stage: Stage::View, hold: false };
+        self.compute(&mut listener, &mut Unobserved)?;
+        let hold = listener.hold;
+        let mut strokes = self.job.strokes(self.words, &mut self.cursor);
+        self.machine.start(&mut strokes)?;
+        self.cursor = Cursor::default();
+        if hold {
+            self.machine.hold();
+        }
+        Ok(())
+    }
+
+    fn compute(
+        &mut self,
+        attention: &mut dyn Attention,
+        observer: &mut dyn Observer,
+    ) -> Result<(), Refusal> {
+        // The memory of the last job is used again, so it ends here even if this one fails.
+        self.job = Job::default();
+        self.cursor = Cursor::default();
+        let settings = self.machine.settings();
+        let steps =
+            [Setting::StepsPerMmX, Setting::StepsPerMmY].map(|setting| settings.get(setting));
+        self.job =
+            Job::compute(&self.model, &self.options, steps, self.words, attention, observer)?;
+        Ok(())
+    }
+
+    #[inline(never)] // Its frame must not lie under the stages'.
+    fn change_setting(&mut self, name: &str, value: &str) -> Result<(), Refusal> {
+        let setting =
+            name.parse().ok().and_then(Setting::numbered).ok_or(Refusal::UnknownSystemCommand)?;
+        let value = crate::fixed::Decimal::parse(value).map_err(|_| Refusal::NotANumber)?;
+        let value: Value = value.to_millimetres().map_err(|_| Refusal::NumberOutOfRange)?;
+        self.machine.set(setting, value).map_err(Refusal::Setting)
+    }
+
+    #[inline(never)] // Its frame must not lie under the stages'.
+    fn list_settings<B: Board>(&self, board: &mut B) {
+        for (info, value) in self.machine.settings().iter() {
+            let value =
+                BinaryFraction { units: value.to_bits().into(), fraction_bits: 16, places: 3 };
+            Reply(board)
+                .line(format_args!("${}={value} ({}, {})", info.number, info.name, info.unit));
+        }
+    }
+
+    #[inline(never)] // Its frame must not lie under the stages'.
+    fn report_build<B: Board>(&self, board: &mut B) {
+        const VERSION: &str = env!("CARGO_PKG_VERSION");
+        Reply(board).line(format_args!("[VER:1.1h.penup {VERSION}:{}]", B::NAME));
+        Reply(board).line(format_args!("[OPT:,{},{LINE_LIMIT}]", memory::BLOCKS));
+    }
+
+    #[inline(never)] // Its frame must not lie under the stages'.
+    fn report_model<B: Board>(&self, board: &mut B) {
+        let model = &self.model;
+        let (vertices, limit) = (model.vertices().len(), model.vertex_limit());
+        Reply(board).line(format_args!("[MODEL:vertices {vertices} of {limit}]"));
+        let (corners, limit) = (model.corner_count(), model.corner_limit());
+        let (faces, bars) = (model.face_count(), model.bar_count());
+        Reply(board)
+            .line(format_args!("[MODEL:faces {faces}, bars {bars}, corners {corners} of {limit}]"));
+        let order::Report { odd_points, components, lifts, .. } = *self.job.report();
+        Reply(board)
+            .line(format_args!("[JOB:odd points {odd_points}, parts {components}, lifts {lifts}]"));
+        Reply(board).line(format_args!("[MEM:{} bytes to work in]", size_of_val(self.words)));
+    }
+
+    #[inline(never)] // Its frame must not lie under the stages'.
+    fn report_status<B: Board>(&self, board: &mut B) {
+        let status = self.machine.status();
+        let state = match status.state {
+            State::Idle if self.machine.stands() => "Idle",
+            State::Idle | State::Run | State::Abort => "Run",
+            State::Hold { standing: true } => "Hold:0",
+            State::Hold { standing: false } => "Hold:1",
+            State::Jog => "Jog",
+            State::Home => "Home",
+            State::Check => "Check",
+            State::Alarm(_) => "Alarm",
+            State::Sleep => "Sleep",
+        };
+        let mut reply = Reply(board);
+        reply.part(format_args!("<{state}"));
+        reply.position(self.machine.position_mm());
+        let (done, all) = (status.done, status.job);
+        reply.part(format_args!("|Strokes:{}/{}", done.strokes, all.strokes));
+        let mm = |units: u64| BinaryFraction { units: units as i64, fraction_bits: 18, places: 0 };
+        reply.line(format_args!("|Ink:{}/{}>", mm(done.drawn), mm(all.drawn)));
+    }
+}
+
+/// Answers the line while a job is computed.
+struct Listener<'b, B: Board> {
+    board: &'b mut B,
+    position: [Value; 2],
+    stage: Stage,
+    hold: bool,
+}
+
+impl<B: Board> Attention for Listener<'_, B> {
+    fn check(&mut self) -> Result<(), Aborted> {
+        let asked = self.board.take_real_time();
+        self.hold = (self.hold || asked.hold) && !asked.resume;
+        if asked.status {
+            let stage = match self.stage {
+                Stage::View => "view",
+                Stage::Visibility => "visibility",
+                Stage::Order => "order",
+            };
+            let mut reply = Reply(self.board);
+            reply.part(format_args!("<Run"));
+            reply.position(self.position);
+            reply.line(format_args!("|Stage:{stage}>"));
+        }
+        if asked.abort { Err(Aborted) } else { Ok(()) }
+    }
+
+    fn enter(&mut self, stage: Stage) {
+        self.stage = stage;
+    }
+}
+
+impl From<MachineError> for Refusal {
+    fn from(error: MachineError) -> Self {
+        match error {
+            MachineError::State(State::Alarm(_) | State::Sleep) => Self::Locked,
+            MachineError::State(_) => Self::Busy,
+            error => Self::Machine(error),
+        }
+    }
+}
+
+impl From<SettingError> for Refusal {
+    fn from(error: SettingError) -> Self {
+        Self::Setting(error)
+    }
+}

@@ -1,0 +1,169 @@
+//! What is drawn and how, as the user set it.
+
+use crate::drawing::Page;
+use crate::fixed::Millimetres;
+use crate::model::Model;
+use crate::order;
+use crate::protocol::{HiddenLines, PlotOption, ProjectionChoice};
+use crate::view::{Camera, Direction, Lens, Sight, View};
+use crate::visibility::{self, Crease};
+
+/// What is drawn and how.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlotOptions {
+    eye: Option<Direction>,
+    at: Option<Direction>,
+    up: Option<Direction>,
+    angles: Option<Direction>,
+    projection: ProjectionChoice,
+    /// Whether what is behind the eye is cut off; else it is an error.
+    pub clip_behind: bool,
+    /// What becomes of hidden lines.
+    pub hidden: HiddenLines,
+    /// Whether the lines are drawn where faces pass through each other.
+    pub seams: bool,
+    /// Whether blocks that touch are one shape: no line between two faces that lie in one plane.
+    pub merged_blocks: bool,
+    /// Edges between faces that bend less, in degrees, are not drawn; 0 draws every edge.
+    pub crease: f64,
+    /// The sheet.
+    pub page: Page,
+    /// Whether a plan is scaled to the page.
+    pub fit: bool,
+    /// How strokes are ordered.
+    pub order: order::Options,
+}
+
+impl Default for PlotOptions {
+    /// An automatic view in perspective, hidden lines erased, on A4 upright with a margin of 10 mm.
+    fn default() -> Self {
+        let [width, height, margin] = [210, 297, 10].map(Millimetres::from_num);
+        Self {
+            eye: None,
+            at: None,
+            up: None,
+            angles: None,
+            projection: ProjectionChoice::default(),
+            clip_behind: true,
+            hidden: HiddenLines::Erased,
+            seams: true,
+            merged_blocks: false,
+            crease: 0.0,
+            page: Page { width, height, margin },
+            fit: false,
+            order: order::Options {
+                method: order::Method::Auto,
+                shape: order::Shape::OpenPath,
+                effort: 100,
+            },
+        }
+    }
+}
+
+impl PlotOptions {
+    /// Changes one.
+    pub fn set(&mut self, option: PlotOption) {
+        match option {
+            PlotOption::Eye(eye) => self.eye = Some(eye),
+            PlotOption::At(at) => self.at = Some(at),
+            PlotOption::Up(up) => self.up = Some(up),
+            PlotOption::Angles(angles) => self.angles = Some(angles),
+            PlotOption::AutomaticView => {
+                (self.eye, self.at, self.up, self.angles) = (None, None, None, None)
+            }
+            PlotOption::Projection(projection) => self.projection = projection,
+            PlotOption::ClipBehind(clip) => self.clip_behind = clip,
+            PlotOption::Hidden(hidden) => self.hidden = hidden,
+            PlotOption::Seams(seams) => self.seams = seams,
+            PlotOption::MergedBlocks(merged) => self.merged_blocks = merged,
+            PlotOption::Crease(crease) => self.crease = crease,
+            PlotOption::Page { width, height } => {
+                (self.page.width, self.page.height) = (width, height)
+            }
+            PlotOption::Margin(margin) => self.page.margin = margin,
+            PlotOption::Fit(fit) => self.fit = fit,
+        }
+    }
+
+    /// Whether a plan is drawn as it lies: not if the user chose a view for it.
+    pub fn shows_plans_flat(&self) -> bool {
+        self.eye.is_none()
+            && self.angles.is_none()
+            && matches!(self.projection, ProjectionChoice::Lens(_))
+    }
+
+    /// The camera for `model`; what the user did not choose is chosen here. `None` without vertices.
+    #[inline(never)] // Its frame must not lie under the stages'.
+    pub fn camera(&self, model: &Model<'_>) -> Option<Camera> {
+        let lens = match self.projection {
+            ProjectionChoice::Axonometric { azimuth, elevation } => {
+                return Camera::axonometric(model, azimuth, elevation, self.at, self.up);
+            }
+            ProjectionChoice::Lens(lens) => lens,
+        };
+        if let Some(angles) = self.angles {
+            return Camera::turned(model, lens, angles, self.eye);
+        }
+        let mut camera = Camera::automatic(model, lens, self.at, self.up)?;
+        if let (Sight::Towards { eye, .. }, Some(chosen)) = (&mut camera.sight, self.eye) {
+            *eye = chosen;
+        }
+        Some(camera)
+    }
+
+    /// What visibility is to find through `view`.
+    #[inline(never)] // Its frame must not lie under the stages'.
+    pub fn visibility(&self, view: &View) -> visibility::Options {
+        let crease = (self.crease > 0.0).then(|| Crease {
+            cosine: libm::round(libm::cos(self.crease.to_radians()) * 32768.0) as i32,
+            depth_stretch: view.depth_stretch(),
+        });
+        let with_hidden = self.hidden != HiddenLines::Erased;
+        visibility::Options {
+            with_hidden,
+            with_seams: self.seams,
+            merged_blocks: self.merged_blocks,
+            crease,
+        }
+    }
+
+    /// What stands for each option that is set, as `$options` lists it.
+    #[inline(never)] // Its frame must not lie under the stages'.
+    pub fn list(&self, mut line: impl FnMut(core::fmt::Arguments<'_>)) {
+        let places = [("eye", self.eye), ("at", self.at), ("up", self.up), ("angles", self.angles)];
+        for (name, place) in places {
+            match place {
+                Some([x, y, z]) => line(format_args!("${name}={x},{y},{z}")),
+                None => line(format_args!("${name}=auto")),
+            }
+        }
+        match self.projection {
+            ProjectionChoice::Lens(Lens::Perspective) => {
+                line(format_args!("$projection=perspective"))
+            }
+            ProjectionChoice::Lens(Lens::Orthographic) => {
+                line(format_args!("$projection=orthographic"))
+            }
+            ProjectionChoice::Lens(Lens::Oblique { angle, ratio }) => {
+                line(format_args!("$projection=oblique,{angle},{ratio}"));
+            }
+            ProjectionChoice::Axonometric { azimuth, elevation } => {
+                line(format_args!("$projection=axonometric,{azimuth},{elevation}"));
+            }
+        }
+        let hidden = match self.hidden {
+            HiddenLines::Erased => "erased",
+            HiddenLines::Dotted => "dotted",
+            HiddenLines::Dashed => "dashed",
+            HiddenLines::Shown => "shown",
+        };
+        line(format_args!("$behind={}", if self.clip_behind { "clip" } else { "refuse" }));
+        line(format_args!("$hidden={hidden}"));
+        line(format_args!("$seams={}", if self.seams { "on" } else { "off" }));
+        line(format_args!("$blocks={}", if self.merged_blocks { "merged" } else { "separate" }));
+        line(format_args!("$crease={}", self.crease));
+        line(format_args!("$page={}x{}", self.page.width, self.page.height));
+        line(format_args!("$margin={}", self.page.margin));
+        line(format_args!("$fit={}", if self.fit { "on" } else { "off" }));
+    }
+}

@@ -1,0 +1,163 @@
+//! The incremental line with the Knight's move rule (Harrison 1.6, procedure LINE of appendix 1).
+
+use super::Direction;
+use crate::drawing::PagePoint;
+
+/// The moves from one point to another.
+///
+/// An iterator of exactly max(|dx|, |dy|) moves. After each move the pen is at most half a step from
+/// the true line, measured along the axis of fewer moves.
+///
+/// ```
+/// use penup::step::{Direction, Line};
+/// let there: Vec<_> = Line::by(2, 1).collect();
+/// assert_eq!(there, [Direction::UpRight, Direction::Right]);
+/// let back: Vec<_> = Line::by(-2, -1).map(Direction::reversed).collect();
+/// assert_eq!(back, [Direction::Right, Direction::UpRight]);
+/// ```
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Line {
+    straight: Direction,
+    diagonal: Direction,
+    /// Harrison's B: above zero the diagonal move is the better one, below zero the straight one.
+    balance: i32,
+    /// Added to `balance` by a straight move.
+    straight_gain: i32,
+    /// Taken from `balance` by a diagonal move.
+    diagonal_loss: i32,
+    /// Whether a tie takes the diagonal: so it does if x increases.
+    ties_diagonal: bool,
+    remaining: u32,
+}
+
+impl Line {
+    /// The moves from `from` to `to`, both within the page.
+    pub const fn new(from: PagePoint, to: PagePoint) -> Self {
+        Self::by(to.x - from.x, to.y - from.y)
+    }
+
+    /// The moves by `dx`, `dy` steps, each within ±2^22.
+    pub const fn by(dx: i32, dy: i32) -> Self {
+        let (width, height) = (dx.abs(), dy.abs());
+        let (more, fewer) = if width > height { (width, height) } else { (height, width) };
+        // Of no use to a line without the kind of move, hence any direction will do there.
+        let diagonal = match Direction::from_delta(dx, if dy == 0 { 1 } else { dy }) {
+            Some(direction) => direction,
+            None => Direction::Up,
+        };
+        let straight = if width > height {
+            Direction::from_delta(dx, 0)
+        } else {
+            Direction::from_delta(0, dy)
+        };
+        let straight = match straight {
+            Some(direction) => direction,
+            None => Direction::Up,
+        };
+        let straight_moves = more - fewer;
+        Self {
+            straight,
+            diagonal,
+            balance: fewer - straight_moves,
+            straight_gain: 2 * fewer,
+            diagonal_loss: 2 * straight_moves,
+            ties_diagonal: dx > 0,
+            remaining: more as u32,
+        }
+    }
+
+    /// Moves still to come.
+    pub const fn remaining(&self) -> u32 {
+        self.remaining
+    }
+}
+
+impl Iterator for Line {
+    type Item = Direction;
+
+    #[inline]
+    fn next(&mut self) -> Option<Direction> {
+        self.remaining = self.remaining.checked_sub(1)?;
+        if self.balance > 0 || (self.balance == 0 && self.ties_diagonal) {
+            self.balance -= self.diagonal_loss;
+            Some(self.diagonal)
+        } else {
+            self.balance += self.straight_gain;
+            Some(self.straight)
+        }
+    }
+
+    fn size_hint(&self) -> (usize, Option<usize>) {
+        let count = usize::try_from(self.remaining).unwrap_or(usize::MAX);
+        (count, Some(count))
+    }
+}
+
+impl ExactSizeIterator for Line {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::vec::Vec;
+
+    fn points(dx: i32, dy: i32) -> Vec<PagePoint> {
+        let mut at = PagePoint::default();
+        let mut all = std::vec![at];
+        for direction in Line::by(dx, dy) {
+            at = direction.from_point(at);
+            all.push(at);
+        }
+        all
+    }
+
+    fn digits(dx: i32, dy: i32) -> Vec<u8> {
+        Line::by(dx, dy).map(|direction| direction as u8).collect()
+    }
+
+    #[test]
+    fn forward_is_backward_reversed_and_within_half_a_step() {
+        for dx in -64i32..=64 {
+            for dy in -64i32..=64 {
+                let there = points(dx, dy);
+                assert_eq!(there.last(), Some(&PagePoint { x: dx, y: dy }));
+                assert_eq!(there.len() as i32, dx.abs().max(dy.abs()) + 1);
+                let mut back: Vec<_> = points(-dx, -dy)
+                    .into_iter()
+                    .map(|p| PagePoint { x: p.x + dx, y: p.y + dy })
+                    .collect();
+                back.reverse();
+                assert_eq!(there, back, "to {dx},{dy}");
+                for p in there {
+                    // |minor - major * slope| <= 1/2, without the division.
+                    let off = 2 * (p.x * dy - p.y * dx).abs();
+                    assert!(off <= dx.abs().max(dy.abs()), "to {dx},{dy} at {p:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn harrison_figures_1_and_2() {
+        assert_eq!(digits(2, 1), [2, 3]);
+        assert_eq!(digits(-2, -1), [7, 6]);
+        // (0,0) to (14,9): the tie stands at the middle, (7, 4.5).
+        assert_eq!(digits(14, 9), [2, 3, 2, 2, 3, 2, 2, 3, 2, 3, 2, 2, 3, 2]);
+        assert_eq!(digits(-14, -9), [6, 7, 6, 6, 7, 6, 7, 6, 6, 7, 6, 6, 7, 6]);
+    }
+
+    #[test]
+    fn no_move_one_move_and_the_longest() {
+        assert!(digits(0, 0).is_empty());
+        for direction in Direction::ALL {
+            let (dx, dy) = direction.delta();
+            assert_eq!(digits(dx, dy), [direction as u8]);
+        }
+        let far = 1 << 22;
+        let (mut x, mut y) = (0, 0);
+        for direction in Line::by(far, 1 - far) {
+            let (dx, dy) = direction.delta();
+            (x, y) = (x + dx, y + dy);
+        }
+        assert_eq!((x, y), (far, 1 - far));
+    }
+}

@@ -1,0 +1,115 @@
+//! A line, a dotted line, an arc as single moves of the plotter in eight directions.
+//!
+//! Harrison 1.6: of the two moves that may follow, a line takes the one that ends nearer to the
+//! true line. Where both are as near (the Knight's move condition, 1.6.1) the choice depends on the
+//! way the line runs, so that the moves from A to B are those from B to A reversed and a line drawn
+//! twice is no thicker. [`Line`] yields the moves; [`Pattern`] says which of them are inked; [`Arc`]
+//! yields the points of an arc, and [`Chords`] the lines that draw exactly those.
+//!
+//! Not done here: speed, pen, limits. A line of more than 2^21 moves is beyond the page and is
+//! refused where the page is checked.
+
+mod arc;
+mod line;
+mod pattern;
+pub mod tape;
+
+pub use arc::{Arc, ArcError, Chords, Turn};
+pub use line::Line;
+pub use pattern::{DottedLine, InkedMove, Pattern};
+
+use crate::drawing::PagePoint;
+
+/// One move of the plotter, numbered as Harrison's diagram 1.4 does: clockwise from straight up.
+///
+/// ```
+/// use penup::step::Direction;
+/// assert_eq!(Direction::UpRight.delta(), (1, 1));
+/// assert_eq!(Direction::UpRight.reversed(), Direction::DownLeft);
+/// assert_eq!(Direction::from_delta(0, -1), Some(Direction::Down));
+/// assert_eq!(Direction::from_delta(0, 0), None);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(u8)]
+pub enum Direction {
+    /// y + 1
+    Up = 1,
+    /// x + 1, y + 1
+    UpRight = 2,
+    /// x + 1
+    Right = 3,
+    /// x + 1, y - 1
+    DownRight = 4,
+    /// y - 1
+    Down = 5,
+    /// x - 1, y - 1
+    DownLeft = 6,
+    /// x - 1
+    Left = 7,
+    /// x - 1, y + 1
+    UpLeft = 8,
+}
+
+impl Direction {
+    /// All eight, in the order of their numbers.
+    pub const ALL: [Self; 8] = [
+        Self::Up,
+        Self::UpRight,
+        Self::Right,
+        Self::DownRight,
+        Self::Down,
+        Self::DownLeft,
+        Self::Left,
+        Self::UpLeft,
+    ];
+
+    /// The direction of a move by the signs of (`dx`, `dy`); `None` for no move.
+    pub const fn from_delta(dx: i32, dy: i32) -> Option<Self> {
+        Some(match (dx.signum(), dy.signum()) {
+            (0, 1) => Self::Up,
+            (1, 1) => Self::UpRight,
+            (1, 0) => Self::Right,
+            (1, -1) => Self::DownRight,
+            (0, -1) => Self::Down,
+            (-1, -1) => Self::DownLeft,
+            (-1, 0) => Self::Left,
+            (-1, 1) => Self::UpLeft,
+            _ => return None,
+        })
+    }
+
+    /// What the move adds to x and y, each -1, 0 or 1.
+    pub const fn delta(self) -> (i32, i32) {
+        match self {
+            Self::Up => (0, 1),
+            Self::UpRight => (1, 1),
+            Self::Right => (1, 0),
+            Self::DownRight => (1, -1),
+            Self::Down => (0, -1),
+            Self::DownLeft => (-1, -1),
+            Self::Left => (-1, 0),
+            Self::UpLeft => (-1, 1),
+        }
+    }
+
+    /// The way back.
+    pub const fn reversed(self) -> Self {
+        match self {
+            Self::Up => Self::Down,
+            Self::UpRight => Self::DownLeft,
+            Self::Right => Self::Left,
+            Self::DownRight => Self::UpLeft,
+            Self::Down => Self::Up,
+            Self::DownLeft => Self::UpRight,
+            Self::Left => Self::Right,
+            Self::UpLeft => Self::DownRight,
+        }
+    }
+
+    /// Where the move leads from `point`.
+    pub const fn from_point(self, point: PagePoint) -> PagePoint {
+        let (dx, dy) = self.delta();
+        PagePoint { x: point.x + dx, y: point.y + dy }
+    }
+}

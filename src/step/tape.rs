@@ -1,0 +1,277 @@
+//! The plotter's tape of Harrison 1.4: twelve instructions, two to a row of eight holes.
+//!
+//! The most compact store of a job, half a byte a move. After pen up, pen down and stop three
+//! do-nothing instructions give the pen time; [`encode`] inserts them, [`Decoder`] passes over them.
+
+use super::{Chords, Direction};
+use crate::drawing::PagePoint;
+
+/// One instruction of four bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Instruction {
+    /// 0: one instruction's time passes.
+    Nothing,
+    /// 1 to 8: one move, by its number.
+    Move(Direction),
+    /// 9
+    PenUp,
+    /// 10
+    PenDown,
+    /// 11: the tape ends.
+    Stop,
+}
+
+/// Do-nothing instructions after pen up, pen down and stop.
+const PAUSE: u8 = 3;
+
+impl Instruction {
+    /// Its four bits.
+    pub const fn code(self) -> u8 {
+        match self {
+            Self::Nothing => 0,
+            Self::Move(direction) => direction as u8,
+            Self::PenUp => 9,
+            Self::PenDown => 10,
+            Self::Stop => 11,
+        }
+    }
+
+    /// The instruction of four bits; `None` for 12 to 15 and more.
+    pub fn from_code(code: u8) -> Option<Self> {
+        match code {
+            0 => Some(Self::Nothing),
+            9 => Some(Self::PenUp),
+            10 => Some(Self::PenDown),
+            11 => Some(Self::Stop),
+            _ => Direction::ALL
+                .into_iter()
+                .find(|&direction| direction as u8 == code)
+                .map(Self::Move),
+        }
+    }
+}
+
+/// The rows of a tape with these instructions, a stop at its end if they have none. The first
+/// instruction of a row is in the high four bits.
+///
+/// ```
+/// use penup::step::tape::{Instruction, encode};
+/// use penup::step::Line;
+/// let line = Line::by(3, 1).map(Instruction::Move);
+/// let tape: Vec<u8> = encode([Instruction::PenDown].into_iter().chain(line)).collect();
+/// assert_eq!(tape, [0xA0, 0x00, 0x32, 0x3B, 0x00, 0x00]);
+/// ```
+pub fn encode(instructions: impl IntoIterator<Item = Instruction>) -> impl Iterator<Item = u8> {
+    let mut instructions = instructions.into_iter();
+    let mut stopped = false;
+    let mut pause = 0;
+    let mut next = move || {
+        if pause > 0 {
+            pause -= 1;
+            return Some(Instruction::Nothing);
+        }
+        if stopped {
+            return None;
+        }
+        let instruction = instructions.next().unwrap_or(Instruction::Stop);
+        stopped = instruction == Instruction::Stop;
+        if !matches!(instruction, Instruction::Nothing | Instruction::Move(_)) {
+            pause = PAUSE;
+        }
+        Some(instruction)
+    };
+    core::iter::from_fn(move || {
+        let first = next()?.code();
+        let second = next().unwrap_or(Instruction::Nothing).code();
+        Some(first << 4 | second)
+    })
+}
+
+/// Four holes that are no instruction: the tape is damaged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct BadCode {
+    /// The row, from 0.
+    pub row: u32,
+    /// The code, 12 to 15.
+    pub code: u8,
+}
+
+/// Reads a tape: yields its moves and pen instructions up to the stop or the end.
+///
+/// A bad code ends it, too; [`Decoder::damage`] tells.
+#[derive(Debug, Clone)]
+pub struct Decoder<I> {
+    rows: I,
+    row: u32,
+    second: Option<u8>,
+    ended: bool,
+    damage: Option<BadCode>,
+}
+
+impl<I: Iterator<Item = u8>> Decoder<I> {
+    /// Reads `rows`.
+    pub const fn new(rows: I) -> Self {
+        Self { rows, row: 0, second: None, ended: false, damage: None }
+    }
+
+    /// What ended the tape too early, if anything did.
+    pub const fn damage(&self) -> Option<BadCode> {
+        self.damage
+    }
+
+    fn next_code(&mut self) -> Option<u8> {
+        if let Some(second) = self.second.take() {
+            return Some(second);
+        }
+        let row = self.rows.next()?;
+        self.row = self.row.wrapping_add(1);
+        self.second = Some(row & 15);
+        Some(row >> 4)
+    }
+}
+
+impl<I: Iterator<Item = u8>> Iterator for Decoder<I> {
+    type Item = Instruction;
+
+    fn next(&mut self) -> Option<Instruction> {
+        while !self.ended {
+            let code = self.next_code()?;
+            match Instruction::from_code(code) {
+                Some(Instruction::Nothing) => {}
+                Some(Instruction::Stop) => self.ended = true,
+                Some(instruction) => return Some(instruction),
+                None => {
+                    self.damage = Some(BadCode { row: self.row.wrapping_sub(1), code });
+                    self.ended = true;
+                }
+            }
+        }
+        None
+    }
+}
+
+/// The lines of a tape: their ends and whether they are inked. Drawn, they give the tape's moves.
+#[derive(Debug, Clone)]
+pub struct TapeLines<I> {
+    chords: Chords<Run<I>>,
+    inked: bool,
+}
+
+/// The points up to the next change of the pen.
+#[derive(Debug, Clone)]
+struct Run<I> {
+    instructions: I,
+    at: PagePoint,
+    change: Option<bool>,
+}
+
+impl<I: Iterator<Item = Instruction>> Iterator for Run<I> {
+    type Item = PagePoint;
+
+    fn next(&mut self) -> Option<PagePoint> {
+        while self.change.is_none() {
+            match self.instructions.next()? {
+                Instruction::Move(direction) => {
+                    self.at = direction.from_point(self.at);
+                    return Some(self.at);
+                }
+                Instruction::PenUp => self.change = Some(false),
+                Instruction::PenDown => self.change = Some(true),
+                Instruction::Nothing | Instruction::Stop => {}
+            }
+        }
+        None
+    }
+}
+
+impl<I: Iterator<Item = Instruction>> TapeLines<I> {
+    /// The lines of `instructions`, from `from` on, with the pen up at first.
+    pub fn new(from: PagePoint, instructions: I) -> Self {
+        let run = Run { instructions, at: from, change: None };
+        Self { chords: Chords::new(from, run), inked: false }
+    }
+}
+
+impl<I: Iterator<Item = Instruction>> Iterator for TapeLines<I> {
+    type Item = (PagePoint, bool);
+
+    fn next(&mut self) -> Option<(PagePoint, bool)> {
+        loop {
+            if let Some(end) = self.chords.next() {
+                return Some((end, self.inked));
+            }
+            self.inked = self.chords.points.change.take()?;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::step::Line;
+    use std::vec::Vec;
+
+    #[test]
+    fn codes() {
+        for code in 0..=255 {
+            assert!(Instruction::from_code(code).is_none_or(|known| known.code() == code));
+            assert_eq!(Instruction::from_code(code).is_some(), code < 12);
+        }
+    }
+
+    #[test]
+    fn what_is_encoded_is_decoded() {
+        let mut job = std::vec![Instruction::PenDown];
+        job.extend(Line::by(14, 9).map(Instruction::Move));
+        job.push(Instruction::PenUp);
+        job.extend(Line::by(-3, 1).map(Instruction::Move));
+        let tape: Vec<u8> = encode(job.iter().copied()).collect();
+        // 17 moves and 3 times 1 + 3 instructions, half a byte each, rounded up.
+        assert_eq!(tape.len(), 15);
+        let mut decoder = Decoder::new(tape.into_iter());
+        assert_eq!(decoder.by_ref().collect::<Vec<_>>(), job);
+        assert_eq!(decoder.damage(), None);
+    }
+
+    #[test]
+    fn nothing_after_the_stop_counts_and_damage_is_told() {
+        let after_stop = Decoder::new([0x1B, 0x22].into_iter());
+        assert_eq!(after_stop.collect::<Vec<_>>(), [Instruction::Move(Direction::Up)]);
+        let mut damaged = Decoder::new([0x00, 0x3D, 0x11].into_iter());
+        assert_eq!(damaged.by_ref().count(), 1);
+        assert_eq!(damaged.damage(), Some(BadCode { row: 1, code: 13 }));
+        assert_eq!(encode([]).collect::<Vec<_>>(), [0xB0, 0x00]);
+        assert_eq!(Decoder::new([].into_iter()).next(), None);
+    }
+
+    #[test]
+    fn the_lines_of_a_tape_give_its_moves() {
+        let mut job = Vec::new();
+        for (dx, dy, pen) in [
+            (40, 13, Instruction::PenDown),
+            (-5, 7, Instruction::PenUp),
+            (0, 9, Instruction::PenUp),
+            (100, 100, Instruction::PenDown),
+        ] {
+            job.push(pen);
+            job.extend(Line::by(dx, dy).map(Instruction::Move));
+        }
+        let mut at = PagePoint::default();
+        let mut again = std::vec![false; 0];
+        let mut moves = Vec::new();
+        for (end, inked) in TapeLines::new(at, job.iter().copied()) {
+            for direction in Line::new(at, end) {
+                moves.push(Instruction::Move(direction));
+                again.push(inked);
+            }
+            at = end;
+        }
+        let expected: Vec<_> =
+            job.iter().copied().filter(|i| matches!(i, Instruction::Move(_))).collect();
+        assert_eq!(moves, expected);
+        assert_eq!(again.iter().filter(|inked| **inked).count(), 140);
+        assert_eq!(at, PagePoint { x: 135, y: 129 });
+    }
+}

@@ -1,0 +1,165 @@
+//! Building blocks that touch, drawn as one shape: no line between two faces of one plane.
+//!
+//! What counts is what is seen on both sides of an edge: if the nearest face that begins at the edge
+//! on its left and the nearest on its right lie in one plane, the edge is not drawn there. So the line where
+//! a wall stands on a floor stays, though the wall's underside and the floor lie in one plane. Which
+//! faces those are is noted on the edge's profile, by rank.
+//!
+//! Blocks touch in the model; in the view each corner was rounded on its own. So "in one plane" and "on
+//! one line" mean here, and only here, as nearly as that rounding can tell: no coordinate moves by more
+//! than one half.
+
+use super::faces::Face;
+use super::outlook::{End, Outlook};
+use super::profile::{Part, Profile};
+use super::sight::{Piece, Sight, Surroundings};
+use crate::geometry::{page_side, page_side_doubt, plane_side, plane_side_doubt};
+
+/// A side of an edge, and where its profile keeps the nearest face that begins there: the rank and one.
+#[derive(Clone, Copy)]
+struct Bank {
+    shift: u32,
+    is_left: bool,
+}
+
+const LEFT: Bank = Bank { shift: 16, is_left: true };
+const RIGHT: Bank = Bank { shift: 32, is_left: false };
+
+impl Bank {
+    fn get(self, marks: u64) -> Option<usize> {
+        usize::from((marks >> self.shift) as u16).checked_sub(1)
+    }
+
+    fn put(self, marks: u64, rank: usize) -> u64 {
+        marks & !(0xFFFF << self.shift) | (rank as u64 + 1) << self.shift
+    }
+}
+
+/// A triangle whose plane holds an edge.
+struct Touching {
+    corners: [u16; 3],
+    /// On which side of the edge's line each corner lies.
+    sides: [i32; 3],
+    facing: i32,
+}
+
+impl Touching {
+    /// A corner on one side of the edge.
+    fn corner(&self, bank: Bank) -> Option<u16> {
+        let wanted = if bank.is_left { 1 } else { -1 };
+        let found = self.sides.iter().position(|&side| side == wanted)?;
+        Some(self.corners[found])
+    }
+
+    /// How far a vertex lies behind this triangle; zero if rounding cannot tell it from the plane.
+    fn height(&self, outlook: &Outlook<'_>, end: End) -> i64 {
+        height(outlook, self.corners, end) * i64::from(self.facing)
+    }
+}
+
+fn height(outlook: &Outlook<'_>, triangle: [u16; 3], end: End) -> i64 {
+    if triangle.contains(&end.number) {
+        return 0;
+    }
+    let [a, b, c] = triangle.map(|number| outlook.vertex(number));
+    let height = plane_side(a, b, c, end.vertex);
+    if height.abs() <= plane_side_doubt(a, b, c, end.vertex) { 0 } else { height.signum() }
+}
+
+impl Sight {
+    /// Notes where `face` begins at this edge, where it is the nearest to do so.
+    pub fn touch(
+        &self,
+        around: &Surroundings<'_>,
+        face: Face,
+        rank: usize,
+        profile: &mut Profile<'_>,
+    ) {
+        for triangle in around.triangles(face) {
+            let Some(touching) = self.touching(&around.outlook, triangle) else {
+                continue;
+            };
+            let piece = Piece::new(&touching.corners, &touching.sides);
+            for bank in [LEFT, RIGHT] {
+                let crossings =
+                    piece.crossings(if bank.is_left { piece.left } else { piece.left_or_on });
+                let passage = self.passage(&around.outlook, piece, crossings, touching.facing);
+                if let Some(passage) = passage {
+                    let part: Part = self.part(&around.outlook, passage);
+                    profile.update(part, |marks| {
+                        let known = bank.get(marks);
+                        if known.is_none_or(|known| self.is_nearer(around, &touching, known, bank))
+                        {
+                            bank.put(marks, rank)
+                        } else {
+                            marks
+                        }
+                    });
+                }
+            }
+        }
+    }
+
+    /// Whether what is noted for a piece of this edge is one plane on both sides.
+    pub fn is_within_plane(&self, around: &Surroundings<'_>, marks: u64) -> bool {
+        let beside = |bank: Bank| self.find_touching(around, bank.get(marks)?, bank);
+        let (Some(left), Some(right)) = (beside(LEFT), beside(RIGHT)) else {
+            return false;
+        };
+        let outlook = &around.outlook;
+        left.corner(LEFT).is_some_and(|corner| right.height(outlook, outlook.end(corner)) == 0)
+    }
+
+    /// Whether a triangle is nearer on one side of this edge than the face of a rank.
+    fn is_nearer(
+        &self,
+        around: &Surroundings<'_>,
+        touching: &Touching,
+        than: usize,
+        bank: Bank,
+    ) -> bool {
+        let outlook = &around.outlook;
+        match (self.find_touching(around, than, bank), touching.corner(bank)) {
+            (Some(other), Some(corner)) => other.height(outlook, outlook.end(corner)) < 0,
+            _ => false,
+        }
+    }
+
+    /// The triangle of a face that holds this edge and has a corner on one side of it.
+    fn find_touching(
+        &self,
+        around: &Surroundings<'_>,
+        rank: usize,
+        bank: Bank,
+    ) -> Option<Touching> {
+        around
+            .triangles(around.faces.get(rank))
+            .filter_map(|triangle| self.touching(&around.outlook, triangle))
+            .find(|touching| touching.corner(bank).is_some())
+    }
+
+    fn touching(&self, outlook: &Outlook<'_>, triangle: [u16; 3]) -> Option<Touching> {
+        let holds = |end: End| height(outlook, triangle, end) == 0;
+        let [a, b, c] = triangle;
+        let facing = outlook.side(a, b, c);
+        (facing != 0 && holds(self.p) && holds(self.q)).then(|| Touching {
+            corners: triangle,
+            sides: triangle.map(|corner| self.clear_side(outlook, corner)),
+            facing,
+        })
+    }
+
+    /// On which side of this edge's line a vertex lies; zero if rounding cannot tell it from the line.
+    fn clear_side(&self, outlook: &Outlook<'_>, number: u16) -> i32 {
+        if number == self.p.number || number == self.q.number {
+            return 0;
+        }
+        let (p, q, vertex) = (self.p.vertex, self.q.vertex, outlook.vertex(number));
+        let side = page_side(outlook.projection, p, q, vertex);
+        if side.abs() <= page_side_doubt(outlook.projection, p, q, vertex) {
+            0
+        } else {
+            side.signum() as i32
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! Which edges between two faces are drawn: silhouettes, and creases sharper than an angle.
+
+use super::triangles::areas;
+use crate::geometry::{Projection, Vertex};
+use core::cmp::Ordering;
+
+/// How sharp an edge must be to be drawn for its own sake.
+///
+/// Edges of one face only, of more than two, between a face that the eye sees from its front and one that
+/// it sees from its back, and bars are drawn in any case.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Crease {
+    /// Cosine of the angle that the faces' normals must exceed, in units of 2^-15, within ±2^15.
+    ///
+    /// 2^15 draws every edge that is not flat, 0 those sharper than a right angle.
+    pub cosine: i32,
+    /// How much the view stretches depth over width and height: (7, 2) if what is 2 units long across
+    /// is 7 units long in depth. Each above zero and at most 2^20.
+    pub depth_stretch: (u32, u32),
+}
+
+impl Crease {
+    /// Whether the edge is drawn that ends at `end`, between two faces given by their corners.
+    ///
+    /// `turned`: the two run along the edge the same way, so one of them is seen from its back when the
+    /// other is seen from its front.
+    pub fn keeps(
+        &self,
+        projection: Projection,
+        end: Vertex,
+        faces: [&mut dyn Iterator<Item = Vertex>; 2],
+        turned: bool,
+    ) -> bool {
+        let [one, other] = faces.map(areas);
+        let other = if turned { other.map(|area| -area) } else { other };
+        let facing = |normal: [i64; 3]| match projection {
+            Projection::Perspective => [end.x, end.y, end.z]
+                .into_iter()
+                .zip(normal)
+                .map(|(at, part)| i128::from(at) * i128::from(part))
+                .sum::<i128>()
+                .signum(),
+            Projection::Parallel => i128::from(normal[2].signum()),
+        };
+        facing(one) * facing(other) <= 0
+            || self.is_sharp(self.unstretched(one), self.unstretched(other))
+    }
+
+    /// A normal in true proportions, with parts below 2^20.
+    fn unstretched(&self, normal: [i64; 3]) -> [i64; 3] {
+        let by = [self.depth_stretch.1, self.depth_stretch.1, self.depth_stretch.0];
+        let exact = [0, 1, 2].map(|n| i128::from(normal[n]) * i128::from(by[n]));
+        let largest = exact.iter().map(|part| part.unsigned_abs()).max();
+        let bits = 128 - largest.unwrap_or(0).leading_zeros();
+        exact.map(|part| (part >> bits.saturating_sub(20)) as i64)
+    }
+
+    /// Whether the angle between two normals with parts below 2^20 exceeds the limit.
+    fn is_sharp(&self, one: [i64; 3], other: [i64; 3]) -> bool {
+        let dot = |a: [i64; 3], b: [i64; 3]| -> i128 {
+            let products = a.into_iter().zip(b).map(|(a, b)| i128::from(a * b));
+            products.sum()
+        };
+        let signed_square = |value: i128| value * value * value.signum();
+        // The cosine of the normals against the limit, both squared with their signs: below 2^115.
+        let found = signed_square(dot(one, other) << 15);
+        let limit = signed_square(i128::from(self.cosine)) * dot(one, one) * dot(other, other);
+        found.cmp(&limit) == Ordering::Less
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const AT: Vertex = Vertex::new(0, 0, 1000);
+
+    /// Two triangles that share an edge along y and rise by `left` and `right` over 1000 units across.
+    fn keeps(cosine: i32, depth_stretch: (u32, u32), left: i32, right: i32) -> bool {
+        let crease = Crease { cosine, depth_stretch };
+        let far = Vertex::new(0, 500, 1000);
+        let one = [AT, far, Vertex::new(-1000, 0, 1000 - left)];
+        let other = [far, AT, Vertex::new(1000, 0, 1000 - right)];
+        let faces: [&mut dyn Iterator<Item = Vertex>; 2] =
+            [&mut one.into_iter(), &mut other.into_iter()];
+        crease.keeps(Projection::Parallel, AT, faces, false)
+    }
+
+    #[test]
+    fn the_angle_between_the_faces_decides() {
+        // cos 45 degrees = 23170 / 2^15.
+        for (left, right, is_drawn) in
+            [(0, 0, false), (0, 999, false), (0, 1001, true), (-500, -500, true)]
+        {
+            assert_eq!(keeps(23170, (1, 1), left, right), is_drawn, "{left} {right}");
+        }
+        // A right angle, approached from both sides; obtuse limits work as well.
+        assert!(!keeps(0, (1, 1), -999, -999) && keeps(0, (1, 1), -1001, -1001));
+        assert!(!keeps(-16384, (1, 1), -1700, -1700) && keeps(-16384, (1, 1), -1800, -1800));
+    }
+
+    #[test]
+    fn the_stretch_of_depth_is_undone() {
+        assert!(!keeps(23170, (7, 2), 0, 3499) && keeps(23170, (7, 2), 0, 3501));
+    }
+
+    #[test]
+    fn a_silhouette_is_drawn_however_blunt() {
+        let crease = Crease { cosine: -(1 << 15), depth_stretch: (1, 1) };
+        let far = Vertex::new(0, 500, 1000);
+        let one = [AT, far, Vertex::new(-1000, 0, 0)];
+        for (tip, is_drawn) in [(-1, true), (0, true), (1, false)] {
+            let other = [far, AT, Vertex::new(tip, 0, -5000)];
+            let mut both = (one.into_iter(), other.into_iter());
+            let kept = crease.keeps(Projection::Parallel, AT, [&mut both.0, &mut both.1], false);
+            assert_eq!(kept, is_drawn, "{tip}");
+            // The same with the second face the other way round.
+            let other = [AT, far, Vertex::new(tip, 0, -5000)];
+            let mut both = (one.into_iter(), other.into_iter());
+            let kept = crease.keeps(Projection::Parallel, AT, [&mut both.0, &mut both.1], true);
+            assert_eq!(kept, is_drawn, "{tip}");
+        }
+    }
+}

@@ -1,0 +1,173 @@
+//! The distinct edges: which side of which element stands for each edge of the model.
+
+use super::VisibilityError;
+use super::crease::Crease;
+use crate::geometry::{Projection, Vertex};
+use crate::model::Corner;
+use crate::stage::{Attention, Scratch};
+
+/// The corners of the elements, addressed by the number of an element's first corner.
+#[derive(Debug, Clone, Copy)]
+pub struct Outlines<'a> {
+    pub corners: &'a [Corner],
+}
+
+impl<'a> Outlines<'a> {
+    /// The element that begins at corner `first`.
+    #[inline]
+    pub fn element(&self, first: usize) -> &'a [Corner] {
+        let rest = &self.corners[first..];
+        let last = rest.iter().position(|corner| corner.is_last());
+        &rest[..last.map_or(0, |last| last + 1)]
+    }
+
+    /// Each element with the number of its first corner.
+    pub fn elements(&self) -> impl Iterator<Item = (usize, &'a [Corner])> + use<'a> {
+        let mut next = 0;
+        self.corners.split_inclusive(|corner| corner.is_last()).map(move |corners| {
+            let first = next;
+            next += corners.len();
+            (first, corners)
+        })
+    }
+}
+
+/// Whether the element is a bar, which has one side and no inside.
+pub fn is_bar(corners: &[Corner]) -> bool {
+    corners.len() == 2
+}
+
+/// The sides of an element, each from the corner of its number to the next one.
+pub fn sides(corners: &[Corner]) -> impl Iterator<Item = (usize, u16, u16)> + '_ {
+    let count = if is_bar(corners) { 1 } else { corners.len() };
+    let ends = corners.iter().skip(1).chain(corners.first());
+    corners
+        .iter()
+        .zip(ends)
+        .enumerate()
+        .take(count)
+        .map(|(number, (from, to))| (number, from.vertex(), to.vertex()))
+}
+
+/// One bit for each corner: whether the side that begins there stands for its edge.
+#[derive(Debug)]
+pub struct ChosenSides<'a> {
+    bits: &'a mut [u32],
+}
+
+/// Steps along chains and outlines, some 20 instructions each.
+const WORK_BETWEEN_CHECKS: usize = 2000;
+
+/// No side: the end of a chain.
+const NONE: u16 = u16::MAX;
+
+/// Sides are chained by 16-bit numbers, one of which means "none".
+pub const MOST_CORNERS: usize = NONE as usize;
+
+impl<'a> ChosenSides<'a> {
+    /// Bytes that stay taken.
+    pub const fn bytes(corners: usize) -> usize {
+        Scratch::bytes_for::<u32>(corners.div_ceil(32))
+    }
+
+    /// Bytes taken while the sides are being chosen.
+    pub const fn bytes_while_choosing(vertices: usize, corners: usize) -> usize {
+        Scratch::bytes_for::<u16>(vertices)
+            + Scratch::bytes_for::<u16>(corners)
+            + Self::bytes(corners)
+    }
+
+    /// Chooses the first side of each edge, whoever shares it; with a crease, only of edges that it keeps.
+    pub fn choose(
+        outlines: Outlines<'_>,
+        projection: Projection,
+        vertices: &[Vertex],
+        crease: Option<Crease>,
+        scratch: &mut Scratch<'a>,
+        attention: &mut dyn Attention,
+    ) -> Result<Self, VisibilityError> {
+        let corners = outlines.corners;
+        let word_count = corners.len().div_ceil(32);
+        let mut chosen = Self { bits: scratch.take(word_count)? };
+        let mut meantime = scratch.reborrow();
+        let heads: &mut [u16] = meantime.take(vertices.len())?;
+        let next: &mut [u16] = meantime.take(corners.len())?;
+        // Edges that have met a second side.
+        let mut shared = ChosenSides { bits: meantime.take(word_count)? };
+        heads.fill(NONE);
+        let mut work = 0;
+        for (first, element) in outlines.elements() {
+            for (number, from, to) in sides(element) {
+                if from == to {
+                    continue;
+                }
+                let side = first + number;
+                let head = &mut heads[usize::from(from.min(to))];
+                let mut known = *head;
+                let mut turned = false;
+                while known != NONE {
+                    let (a, b) = side_at(corners, usize::from(known));
+                    turned = (a, b) == (from, to);
+                    if turned || (a, b) == (to, from) {
+                        break;
+                    }
+                    known = next[usize::from(known)];
+                    work += 1;
+                }
+                if known == NONE {
+                    next[side] = *head;
+                    *head = side as u16;
+                    chosen.insert(side);
+                } else if let Some(crease) = crease {
+                    let known = usize::from(known);
+                    let known_element = outlines.element(start_of(corners, known));
+                    let is_open =
+                        is_bar(element) || is_bar(known_element) || shared.contains(known);
+                    shared.insert(known);
+                    let at = |corner: &Corner| vertices[usize::from(corner.vertex())];
+                    let (mut one, mut other) =
+                        (known_element.iter().map(at), element.iter().map(at));
+                    let end = vertices[usize::from(from)];
+                    if is_open || crease.keeps(projection, end, [&mut one, &mut other], turned) {
+                        chosen.insert(known);
+                    } else {
+                        chosen.remove(known);
+                    }
+                }
+            }
+            work += element.len();
+            if work > WORK_BETWEEN_CHECKS {
+                work = 0;
+                attention.check()?;
+            }
+        }
+        Ok(chosen)
+    }
+
+    fn insert(&mut self, side: usize) {
+        self.bits[side / 32] |= 1 << (side % 32);
+    }
+
+    fn remove(&mut self, side: usize) {
+        self.bits[side / 32] &= !(1 << (side % 32));
+    }
+
+    /// Whether the side that begins at corner `side` stands for its edge.
+    #[inline]
+    pub fn contains(&self, side: usize) -> bool {
+        self.bits[side / 32] >> (side % 32) & 1 != 0
+    }
+}
+
+/// The first corner of the element to which a corner belongs.
+fn start_of(corners: &[Corner], corner: usize) -> usize {
+    let before = corners[..corner].iter().rposition(|corner| corner.is_last());
+    before.map_or(0, |last| last + 1)
+}
+
+/// The two ends of the side that begins at a corner.
+fn side_at(corners: &[Corner], side: usize) -> (u16, u16) {
+    let from = corners[side];
+    let to = if from.is_last() { corners[start_of(corners, side)] } else { corners[side + 1] };
+    (from.vertex(), to.vertex())
+}

@@ -1,0 +1,88 @@
+//! The faces in order of their nearest point.
+
+use super::VisibilityError;
+use super::edges::{Outlines, is_bar};
+use super::triangles::{Cut, cut_of};
+use crate::geometry::{COORDINATE_LIMIT, Vertex};
+use crate::stage::{Attention, Scratch, heap_sort_by_key};
+
+/// The elements, nearest first. The place of an element in this order is its rank.
+///
+/// 32 bits each: nearest depth (14 bits, rounded down), cut (2), first corner (16).
+#[derive(Debug)]
+pub struct Faces<'a> {
+    order: &'a mut [u32],
+    degenerate: u32,
+}
+
+/// One element.
+#[derive(Debug, Clone, Copy)]
+pub struct Face {
+    /// The number of its first corner.
+    pub first: usize,
+    /// Whether its triangles are a fan.
+    pub is_fan: bool,
+    /// Whether its triangles are ears.
+    pub has_ears: bool,
+}
+
+impl<'a> Faces<'a> {
+    /// Sorts the elements.
+    pub fn sort(
+        outlines: Outlines<'_>,
+        vertices: &[Vertex],
+        scratch: &mut Scratch<'a>,
+        attention: &mut dyn Attention,
+    ) -> Result<Self, VisibilityError> {
+        let mut degenerate = 0;
+        let order: &mut [u32] = scratch.take(outlines.elements().count())?;
+        for (key, (first, corners)) in order.iter_mut().zip(outlines.elements()) {
+            attention.check()?;
+            let near = corners
+                .iter()
+                .map(|corner| vertices[usize::from(corner.vertex())].z)
+                .min()
+                .unwrap_or(0);
+            let depth = ((near + COORDINATE_LIMIT) >> 7) as u32;
+            let cut = match cut_of(corners, vertices) {
+                Cut::None => {
+                    degenerate += u32::from(!is_bar(corners));
+                    0
+                }
+                Cut::Fan => 1,
+                Cut::Ears => 2,
+            };
+            *key = depth.min(0x3FFF) << 18 | cut << 16 | first as u32;
+        }
+        attention.check()?;
+        heap_sort_by_key(order, |item| *item);
+        Ok(Self { order, degenerate })
+    }
+
+    /// How many of the faces have no area.
+    pub fn degenerate(&self) -> u32 {
+        self.degenerate
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.order.len()
+    }
+
+    /// The element of a rank.
+    #[inline]
+    pub fn get(&self, rank: usize) -> Face {
+        let key = self.order[rank];
+        Face {
+            first: (key & 0xFFFF) as usize,
+            is_fan: key >> 16 & 3 == 1,
+            has_ears: key >> 16 & 3 == 2,
+        }
+    }
+
+    /// Whether the element of this rank, and so all that follow, is surely farther than `far`.
+    #[inline]
+    pub fn begins_behind(&self, rank: usize, far: i32) -> bool {
+        self.order[rank] >> 18 > ((far + COORDINATE_LIMIT) >> 7) as u32
+    }
+}

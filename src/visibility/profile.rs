@@ -1,0 +1,158 @@
+//! What is known of one edge so far: its pieces from p to q and what covers each.
+
+use crate::geometry::Along;
+use bytemuck::{Pod, Zeroable};
+
+/// What covers a piece of an edge, as a set of these marks.
+pub mod mark {
+    /// A nearer face covers the points of the page just to the left.
+    pub const LEFT: u64 = 1;
+    /// A nearer face covers the points of the page just to the right.
+    pub const RIGHT: u64 = 2;
+    /// Both: the piece is hidden.
+    pub const HIDDEN: u64 = LEFT | RIGHT;
+    /// Another edge on the same line of the page is drawn in its place.
+    pub const STOOD_IN: u64 = 4;
+}
+
+/// A part of an edge.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Part {
+    /// `None` at p.
+    pub from: Option<Along>,
+    /// `None` at q.
+    pub to: Option<Along>,
+}
+
+impl Part {
+    /// All of the edge.
+    pub const WHOLE: Self = Self { from: None, to: None };
+
+    /// What both have in common.
+    pub fn and(self, other: Self) -> Self {
+        let both =
+            |a: Option<Along>, b: Option<Along>, choose: fn(Along, Along) -> Along| match (a, b) {
+                (Some(a), Some(b)) => Some(choose(a, b)),
+                (a, b) => a.or(b),
+            };
+        Self {
+            from: both(self.from, other.from, Along::max),
+            to: both(self.to, other.to, Along::min),
+        }
+    }
+
+    fn is_empty(self) -> bool {
+        matches!((self.from, self.to), (Some(from), Some(to)) if from >= to)
+    }
+}
+
+/// A piece of an edge: from here to where the next piece begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Piece {
+    pub from: Along,
+    pub marks: u64,
+}
+
+/// The pieces of the part of an edge between two places, the window.
+///
+/// Neighbours have different marks. Memory for the pieces is bounded: when it is full the window
+/// ends where the last piece began, and the rest of the edge waits for another window.
+#[derive(Debug)]
+pub struct Profile<'a> {
+    memory: &'a mut [Piece],
+    count: usize,
+    end: Along,
+}
+
+/// A profile needs room for this many pieces to make headway: the piece that is being marked, what is
+/// before it and what is behind it.
+pub const FEWEST_PIECES: usize = 4;
+
+impl<'a> Profile<'a> {
+    /// A profile that keeps its pieces in `memory`, at least [`FEWEST_PIECES`].
+    pub fn new(memory: &'a mut [Piece]) -> Self {
+        let mut profile = Self { memory, count: 0, end: Along::END };
+        profile.open(Along::START);
+        profile
+    }
+
+    /// Opens the window from `start` to the end of the edge, nothing covered.
+    pub fn open(&mut self, start: Along) {
+        self.memory[0] = Piece { from: start, marks: 0 };
+        self.count = 1;
+        self.end = Along::END;
+    }
+
+    /// Where the window ends.
+    pub fn end(&self) -> Along {
+        self.end
+    }
+
+    /// Whether nothing can change any more.
+    pub fn is_hidden(&self) -> bool {
+        self.count == 1 && self.memory[0].marks == mark::HIDDEN
+    }
+
+    /// The pieces, in order.
+    pub fn pieces(&self) -> &[Piece] {
+        &self.memory[..self.count]
+    }
+
+    /// Adds `marks` to a part of the edge.
+    pub fn mark(&mut self, part: Part, marks: u64) {
+        self.update(part, |known| known | marks);
+    }
+
+    /// Changes the marks of a part of the edge.
+    pub fn update(&mut self, part: Part, change: impl Fn(u64) -> u64) {
+        if part.is_empty() || part.to.is_some_and(|to| to <= self.memory[0].from) {
+            return;
+        }
+        let first = part.from.map_or(0, |from| self.split(from));
+        let last = part.to.map_or(self.count, |to| self.split(to));
+        for piece in &mut self.memory[first.min(self.count)..last.min(self.count)] {
+            piece.marks = change(piece.marks);
+            if piece.marks & mark::HIDDEN == mark::HIDDEN {
+                piece.marks = mark::HIDDEN;
+            }
+        }
+        self.join(first);
+    }
+
+    /// The number of the first piece that begins at `place` or later; one is made to begin there if it
+    /// lies in the window.
+    fn split(&mut self, place: Along) -> usize {
+        if place >= self.end {
+            return self.count;
+        }
+        let after = self.memory[..self.count].partition_point(|piece| piece.from < place);
+        if after == 0 || after < self.count && self.memory[after].from == place {
+            return after;
+        }
+        if self.count == self.memory.len() {
+            self.count -= 1;
+            self.end = self.memory[self.count].from;
+            if after > self.count {
+                return self.count;
+            }
+        }
+        let marks = self.memory[after - 1].marks;
+        self.memory.copy_within(after..self.count, after + 1);
+        self.memory[after] = Piece { from: place, marks };
+        self.count += 1;
+        after
+    }
+
+    /// Joins neighbours with the same marks, from the one before `first` on.
+    fn join(&mut self, first: usize) {
+        let mut kept = first.saturating_sub(1);
+        for next in kept + 1..self.count {
+            if self.memory[next].marks != self.memory[kept].marks {
+                kept += 1;
+                self.memory[kept] = self.memory[next];
+            }
+        }
+        self.count = self.count.min(kept + 1);
+    }
+}

@@ -1,0 +1,262 @@
+//! Which cells of the page a face lies on, and which it covers.
+
+use super::edges::Outlines;
+use super::faces::Faces;
+use super::grid::{Cell, coarse_depth};
+use super::outlook::{CoarseLine, Outlook, PLACE_BITS, Place, coarse_side};
+use crate::model::Corner;
+
+/// How the page is cut into cells.
+#[derive(Debug, Clone, Copy)]
+pub struct Shape {
+    /// A cell is 2^this wide.
+    pub shift_x: u32,
+    /// A cell is 2^this high.
+    pub shift_y: u32,
+    /// The upper right end of the page.
+    far: Place,
+}
+
+impl Shape {
+    /// A cell for every place.
+    pub fn finest(outlook: &Outlook<'_>) -> Self {
+        let far = outlook.places.iter().fold(Place::LOWEST, |far, &place| far.high(place));
+        Self { shift_x: 0, shift_y: 0, far }
+    }
+
+    /// Half as many cells, by joining neighbours.
+    pub fn coarsen(&mut self) {
+        if self.columns() > self.rows() {
+            self.shift_x += 1;
+        } else {
+            self.shift_y += 1;
+        }
+    }
+
+    pub fn columns(&self) -> usize {
+        usize::from(self.far.x >> self.shift_x) + 1
+    }
+
+    fn rows(&self) -> usize {
+        usize::from(self.far.y >> self.shift_y) + 1
+    }
+
+    pub fn cells(&self) -> usize {
+        self.columns() * self.rows()
+    }
+
+    /// The first and the last column, the first and the last row that a face touches.
+    pub fn span(&self, bounds: &Bounds) -> [u16; 4] {
+        [
+            bounds.low.x >> self.shift_x,
+            bounds.high.x >> self.shift_x,
+            bounds.low.y >> self.shift_y,
+            bounds.high.y >> self.shift_y,
+        ]
+    }
+
+    /// At least as many as the faces have entries in all cells together.
+    pub fn most_entries(
+        &self,
+        outlook: &Outlook<'_>,
+        outlines: Outlines<'_>,
+        faces: &Faces<'_>,
+    ) -> usize {
+        let cells_of = |rank: usize| {
+            let bounds = Bounds::of(outlook, outlines.element(faces.get(rank).first));
+            let [column0, column1, row0, row1] = self.span(&bounds).map(usize::from);
+            (column1 - column0 + 1) * (row1 - row0 + 1)
+        };
+        (0..faces.len()).map(cells_of).sum()
+    }
+}
+
+/// The rectangle around a face on the page.
+pub struct Bounds {
+    low: Place,
+    high: Place,
+}
+
+impl Bounds {
+    pub fn of(outlook: &Outlook<'_>, corners: &[Corner]) -> Self {
+        let none = Self { low: Place::HIGHEST, high: Place::LOWEST };
+        corners.iter().fold(none, |bounds, corner| {
+            let place = outlook.place(corner.vertex());
+            Self { low: bounds.low.low(place), high: bounds.high.high(place) }
+        })
+    }
+}
+
+/// Corners of a face up to which its shape is compared with each cell; beyond, its bounding box is.
+const MOST_SIDES: usize = 8;
+
+/// A side of a convex face on the page, as a linear function of the lower left corner of a cell.
+///
+/// A product of a side and a place is below 2^28, and there are four at most.
+#[derive(Clone, Copy, Default)]
+struct HalfPlane {
+    /// What the function gains from column to column.
+    right: i32,
+    /// What it gains from row to row.
+    up: i32,
+    /// Its value at the lower left corner of the page.
+    constant: i32,
+    /// At or below this, the cell lies outside.
+    outside: i32,
+    /// From this on, the cell lies within.
+    within: i32,
+}
+
+const _: () = assert!(PLACE_BITS == 14);
+
+/// The depth that nothing has: no face covers the cell.
+const NO_COVER: u16 = u16::MAX;
+
+/// The cells while the faces are being sorted into them.
+pub struct Raster<'c> {
+    shape: Shape,
+    columns: usize,
+    cells: &'c mut [Cell],
+}
+
+impl<'c> Raster<'c> {
+    pub fn new(shape: Shape, cells: &'c mut [Cell]) -> Self {
+        Self { shape, columns: shape.columns(), cells }
+    }
+
+    pub fn cells(self) -> &'c mut [Cell] {
+        self.cells
+    }
+
+    /// Leaves in each cell where its list begins, and returns how many entries there are.
+    pub fn count(
+        &mut self,
+        outlook: &Outlook<'_>,
+        outlines: Outlines<'_>,
+        faces: &Faces<'_>,
+    ) -> usize {
+        let empty = |end: u16| Cell { end, cover_depth: NO_COVER, cover: 0 };
+        self.cells.fill(empty(0));
+        self.visit(outlook, outlines, faces, |cell, _| cell.end += 1);
+        let mut begin = 0;
+        for cell in self.cells.iter_mut() {
+            let count = cell.end;
+            *cell = empty(begin);
+            begin += count;
+        }
+        usize::from(begin)
+    }
+
+    /// Writes the lists; then each cell says where its list ends.
+    pub fn fill(
+        &mut self,
+        outlook: &Outlook<'_>,
+        outlines: Outlines<'_>,
+        faces: &Faces<'_>,
+        entries: &mut [u16],
+    ) {
+        self.visit(outlook, outlines, faces, |cell, rank| {
+            entries[usize::from(cell.end)] = rank;
+            cell.end += 1;
+        });
+    }
+
+    /// Calls `enter` for each face and each cell where it may be seen; notes the covering faces.
+    fn visit(
+        &mut self,
+        outlook: &Outlook<'_>,
+        outlines: Outlines<'_>,
+        faces: &Faces<'_>,
+        mut enter: impl FnMut(&mut Cell, u16),
+    ) {
+        for rank in 0..faces.len() {
+            let face = faces.get(rank);
+            let corners = outlines.element(face.first);
+            let (mut near, mut far) = (i32::MAX, i32::MIN);
+            for corner in corners {
+                let z = outlook.vertex(corner.vertex()).z;
+                (near, far) = (near.min(z), far.max(z));
+            }
+            let (near, far) = (coarse_depth(near), coarse_depth(far));
+            let bounds = Bounds::of(outlook, corners);
+            let mut sides = [HalfPlane::default(); MOST_SIDES];
+            let side_count = self.half_planes(outlook, corners, &bounds, &mut sides);
+            let sides = &sides[..side_count];
+            let may_cover = face.is_fan && side_count > 0;
+            let [column0, column1, row0, row1] = self.shape.span(&bounds);
+            for row in row0..=row1 {
+                let first = usize::from(row) * self.columns;
+                let cells = first + usize::from(column0)..=first + usize::from(column1);
+                let mut values = [0; MOST_SIDES];
+                for (value, side) in values.iter_mut().zip(sides) {
+                    *value =
+                        side.constant + side.right * i32::from(column0) + side.up * i32::from(row);
+                }
+                for cell in &mut self.cells[cells] {
+                    let mut covered = may_cover;
+                    let mut outside = near > cell.cover_depth;
+                    for (value, side) in values.iter_mut().zip(sides) {
+                        outside |= *value <= side.outside;
+                        covered &= *value >= side.within;
+                        *value += side.right;
+                    }
+                    if outside {
+                        continue;
+                    }
+                    enter(cell, rank as u16);
+                    if covered && far < cell.cover_depth {
+                        cell.cover_depth = far;
+                        cell.cover = rank as u16;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Finds the sides of a face that is surely convex on the page, and returns how many; 0 if it may
+    /// not be convex or has too many.
+    fn half_planes(
+        &self,
+        outlook: &Outlook<'_>,
+        corners: &[Corner],
+        bounds: &Bounds,
+        sides: &mut [HalfPlane; MOST_SIDES],
+    ) -> usize {
+        let count = corners.len();
+        if !(3..=MOST_SIDES).contains(&count) {
+            return 0;
+        }
+        let place = |n: usize| {
+            let n = if n < count { n } else { n - count };
+            outlook.place(corners[n].vertex())
+        };
+        let (width, height) = (1 << self.shape.shift_x, 1 << self.shape.shift_y);
+        // No corner of a cell in question lies farther than this from a corner of the face.
+        let reach = i32::from(bounds.high.x - bounds.low.x)
+            + i32::from(bounds.high.y - bounds.low.y)
+            + 2 * (width + height);
+        let turn = coarse_side(place(0), place(1), place(2));
+        // Every other corner lies on the inner side; of three or four the next one is enough.
+        let others = if count <= 4 { 1 } else { count - 2 };
+        let (mut a, mut b) = (place(count - 1), place(0));
+        for (n, side) in sides.iter_mut().enumerate().take(count) {
+            let line = CoarseLine::new(a, b);
+            if turn == 0 || (1..=others).any(|ahead| line.side(place(n + ahead)) != turn) {
+                return 0;
+            }
+            let dx = (i32::from(b.x) - i32::from(a.x)) * turn;
+            let dy = (i32::from(b.y) - i32::from(a.y)) * turn;
+            let (right, up) = (-dy * width, dx * height);
+            let doubt = dx.abs() + dy.abs() + reach + 2;
+            *side = HalfPlane {
+                right,
+                up,
+                constant: dy * i32::from(a.x) - dx * i32::from(a.y),
+                outside: -doubt - right.max(0) - up.max(0),
+                within: doubt - right.min(0) - up.min(0),
+            };
+            (a, b) = (b, place(n + 1));
+        }
+        count
+    }
+}

@@ -1,0 +1,125 @@
+//! Where two faces pass through each other: the segment that two triangles have in common.
+
+use crate::geometry::{Vertex, plane_side};
+
+/// The segment where two triangles cross, its ends rounded to whole coordinates.
+///
+/// `None` if they do not reach through each other, or only by less than rounding shows. A corner in the
+/// plane of the other triangle counts as lying on one fixed side of it, so that a seam along a diagonal,
+/// where two triangles of a face meet, is found once.
+pub fn seam(one: [Vertex; 3], other: [Vertex; 3]) -> Option<(Vertex, Vertex)> {
+    let heights = |plane: [Vertex; 3], of: [Vertex; 3]| {
+        let [a, b, c] = plane;
+        of.map(|corner| plane_side(a, b, c, corner))
+    };
+    let crosses = |heights: [i64; 3]| {
+        let above = heights.map(|height| height >= 0);
+        above != [above[0]; 3]
+    };
+    let of_other = heights(one, other);
+    if !crosses(of_other) {
+        return None;
+    }
+    let of_one = heights(other, one);
+    if !crosses(of_one) {
+        return None;
+    }
+    let mut ends: Option<(Vertex, Vertex)> = None;
+    for (triangle, through, heights) in [(other, one, of_other), (one, other, of_one)] {
+        for n in 0..3 {
+            let next = (n + 1) % 3;
+            let (a, b) = (triangle[n], triangle[next]);
+            if (heights[n] >= 0) != (heights[next] >= 0) && pierces(a, b, through) {
+                let point = between(a, b, heights[n], heights[next]);
+                ends = Some(match ends {
+                    None => (point, point),
+                    Some((p, q)) => farthest([(p, q), (p, point), (q, point)]),
+                });
+            }
+        }
+    }
+    ends.filter(|(p, q)| p != q)
+}
+
+/// Whether the segment from a to b, which crosses the plane of a triangle, crosses the triangle.
+fn pierces(a: Vertex, b: Vertex, triangle: [Vertex; 3]) -> bool {
+    let [c, d, e] = triangle;
+    let turns = [(c, d), (d, e), (e, c)].map(|(from, to)| plane_side(a, b, from, to));
+    turns.iter().all(|&turn| turn >= 0) || turns.iter().all(|&turn| turn <= 0)
+}
+
+/// The point between a and b where a height is zero, rounded to the nearest whole coordinates.
+fn between(a: Vertex, b: Vertex, height_a: i64, height_b: i64) -> Vertex {
+    let (from, to) = (i128::from(height_a).abs(), i128::from(height_b).abs());
+    let mixed = |a: i32, b: i32| {
+        let sum = i128::from(a) * to + i128::from(b) * from;
+        (2 * sum + from + to).div_euclid(2 * (from + to)) as i32
+    };
+    Vertex::new(mixed(a.x, b.x), mixed(a.y, b.y), mixed(a.z, b.z))
+}
+
+fn farthest(pairs: [(Vertex, Vertex); 3]) -> (Vertex, Vertex) {
+    let distance = |(p, q): &(Vertex, Vertex)| {
+        let square = |a: i32, b: i32| (i64::from(a) - i64::from(b)).pow(2);
+        square(p.x, q.x) + square(p.y, q.y) + square(p.z, q.z)
+    };
+    let [first, rest @ ..] = pairs;
+    rest.into_iter().fold(
+        first,
+        |best, pair| {
+            if distance(&pair) > distance(&best) { pair } else { best }
+        },
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FLOOR: [Vertex; 3] =
+        [Vertex::new(-10, -10, 0), Vertex::new(10, -10, 0), Vertex::new(0, 20, 0)];
+
+    /// A wall across the floor, from `bottom` to `top`.
+    fn wall(left: i32, right: i32, bottom: i32, top: i32) -> [Vertex; 3] {
+        [Vertex::new(left, 0, bottom), Vertex::new(right, 0, bottom), Vertex::new(right, 0, top)]
+    }
+
+    fn sorted(seam: Option<(Vertex, Vertex)>) -> Option<[(i32, i32, i32); 2]> {
+        let (p, q) = seam?;
+        let mut ends = [(p.x, p.y, p.z), (q.x, q.y, q.z)];
+        ends.sort_unstable();
+        Some(ends)
+    }
+
+    #[test]
+    fn triangles_that_cross_have_a_seam() {
+        let seam = |wall| {
+            let found = sorted(seam(FLOOR, wall));
+            assert_eq!(sorted(super::seam(wall, FLOOR)), found);
+            found
+        };
+        // Inside the floor; through one border of it; through both.
+        assert_eq!(seam(wall(-2, 2, -1, 1)), Some([(0, 0, 0), (2, 0, 0)]));
+        assert_eq!(seam(wall(0, 20, -1, 7)), Some([(3, 0, 0), (7, 0, 0)]));
+        assert_eq!(seam(wall(-20, 20, -1, 7)), Some([(-7, 0, 0), (7, 0, 0)]));
+    }
+
+    #[test]
+    fn triangles_that_only_touch_or_are_apart_have_none() {
+        for wall in [wall(-2, 2, 1, 3), wall(12, 18, -1, 1), wall(-2, 2, 0, 3), wall(0, 0, -1, 1)] {
+            assert_eq!(seam(FLOOR, wall), None);
+            assert_eq!(seam(wall, FLOOR), None);
+        }
+        assert_eq!(seam(FLOOR, FLOOR), None);
+    }
+
+    #[test]
+    fn a_seam_along_a_diagonal_is_found_once() {
+        // Two triangles of one wall that meet in the plane of the floor.
+        let (left, right) = (Vertex::new(-2, 0, 0), Vertex::new(2, 0, 0));
+        let upper = [left, right, Vertex::new(0, 0, 5)];
+        let lower = [right, left, Vertex::new(0, 0, -5)];
+        let found = [seam(FLOOR, upper), seam(FLOOR, lower)];
+        assert_eq!(found.iter().flatten().count(), 1);
+    }
+}

@@ -1,0 +1,432 @@
+//! One edge against one face: which stretch of it the face hides, exactly.
+//!
+//! A triangle hides an edge where the edge lies behind the triangle's plane and, on the page, within
+//! the triangle. "Within" is asked twice, for the points of the page just to the left and just to
+//! the right of the edge: a corner on the line of the edge counts as lying to the right in the first
+//! question and to the left in the second. So every degenerate case falls to one side or the other.
+
+use super::edges::{ChosenSides, Outlines, sides};
+use super::faces::{Face, Faces};
+use super::outlook::{CoarseLine, End, Outlook, Place};
+use super::profile::{Part, Profile, mark};
+use super::triangles::Ears;
+use crate::geometry::{Along, line_side, page_offset, page_side, plane_side};
+use crate::model::Corner;
+
+/// What the search knows of the scene.
+pub struct Surroundings<'a> {
+    pub outlook: Outlook<'a>,
+    pub outlines: Outlines<'a>,
+    pub ears: Ears<'a>,
+    pub chosen: ChosenSides<'a>,
+    pub faces: Faces<'a>,
+}
+
+impl Surroundings<'_> {
+    /// One of the triangles of a face, from 0.
+    pub fn triangle(&self, face: Face, number: usize) -> Option<[u16; 3]> {
+        if face.has_ears {
+            return self.ears.of(face.first).get(number).copied();
+        }
+        let corners = self.outlines.element(face.first);
+        match corners.get(number + 1..number + 3) {
+            Some([b, c]) if face.is_fan => Some([corners[0].vertex(), b.vertex(), c.vertex()]),
+            _ => None,
+        }
+    }
+
+    /// The triangles of a face.
+    pub fn triangles(&self, face: Face) -> impl Iterator<Item = [u16; 3]> {
+        (0..).map_while(move |number| self.triangle(face, number))
+    }
+}
+
+/// An edge that is being looked at, or a seam.
+#[derive(Debug, Clone, Copy)]
+pub struct Sight {
+    /// The side that stands for it; none for a seam.
+    pub side: usize,
+    pub p: End,
+    pub q: End,
+    /// Depth of its nearer end.
+    pub near: i32,
+    /// Depth of its farther end.
+    pub far: i32,
+    low: Place,
+    high: Place,
+    line: CoarseLine,
+}
+
+/// A side of a face, from corner to corner.
+type Side = (u16, u16);
+
+/// A face, or a triangle of one, as the edge meets it.
+///
+/// For the points just to the left of the edge a corner on its line lies to the right, and the other
+/// way round; so each corner is left of the line or not, twice.
+#[derive(Clone, Copy)]
+pub struct Piece<'c> {
+    corners: &'c [u16],
+    /// One bit for each corner: whether it lies to the left.
+    pub left: u32,
+    /// The same, with those on the line.
+    pub left_or_on: u32,
+}
+
+impl<'c> Piece<'c> {
+    /// From the corners, at most [`FEW_CORNERS`], and the side of the line on which each lies.
+    pub fn new(corners: &'c [u16], sides: &[i32]) -> Self {
+        let (mut left, mut left_or_on) = (0, 0);
+        for (n, &side) in sides.iter().enumerate().take(corners.len()) {
+            left |= u32::from(side > 0) << n;
+            left_or_on |= u32::from(side >= 0) << n;
+        }
+        Self { corners, left, left_or_on }
+    }
+
+    /// The mask of the corners, each put where the next one is.
+    fn shifted(&self, mask: u32) -> u32 {
+        let count = self.corners.len();
+        (mask << 1 | mask >> (count - 1)) & ((1 << count) - 1)
+    }
+
+    /// One bit for each side that crosses the line, at the corner where the side ends.
+    pub fn crossings(&self, left: u32) -> u32 {
+        left ^ self.shifted(left)
+    }
+
+    /// One bit for each side that lies on the line, at the corner where the side ends.
+    fn sides_on_line(&self) -> u32 {
+        let on = self.left ^ self.left_or_on;
+        on & self.shifted(on)
+    }
+
+    /// The side that ends at a corner.
+    fn side(&self, end: usize) -> Side {
+        let begin = end.checked_sub(1).unwrap_or(self.corners.len() - 1);
+        (self.corners[begin], self.corners[end])
+    }
+}
+
+/// Whether more than two bits are set.
+fn is_many(mask: u32) -> bool {
+    let without_one = mask & mask.wrapping_sub(1);
+    without_one & without_one.wrapping_sub(1) != 0
+}
+
+/// Faces with more corners are looked at triangle by triangle.
+const FEW_CORNERS: usize = 8;
+
+/// The sides at which the edge enters and leaves a piece of a face, if it does so between its ends.
+#[derive(Clone, Copy, Default)]
+pub struct Passage {
+    entry: Option<Side>,
+    exit: Option<Side>,
+}
+
+/// What a face does to an edge.
+enum Depth {
+    /// The edge does not lie behind it.
+    Before,
+    /// This part of the edge lies behind it.
+    Behind(Part),
+    /// That differs from triangle to triangle.
+    Mixed,
+}
+
+impl Sight {
+    /// The side of a seam, after those of all edges.
+    pub const NO_SIDE: usize = usize::MAX;
+
+    /// The edge between two ends, for which `side` stands.
+    pub fn new(side: usize, p: End, q: End) -> Self {
+        Self {
+            side,
+            p,
+            q,
+            near: p.vertex.z.min(q.vertex.z),
+            far: p.vertex.z.max(q.vertex.z),
+            low: p.place.low(q.place),
+            high: p.place.high(q.place),
+            line: CoarseLine::new(p.place, q.place),
+        }
+    }
+
+    /// On which side of this edge's line a vertex lies on the page.
+    fn side_of(&self, outlook: &Outlook<'_>, number: u16) -> i32 {
+        let coarse = self.line.side(outlook.place(number));
+        if coarse != 0 { coarse } else { self.exact_side_of(outlook, number) }
+    }
+
+    /// [`Self::side_of`] without a look at the places.
+    #[cold]
+    fn exact_side_of(&self, outlook: &Outlook<'_>, number: u16) -> i32 {
+        if number == self.p.number || number == self.q.number {
+            return 0;
+        }
+        let vertex = outlook.vertex(number);
+        page_side(outlook.projection, self.p.vertex, self.q.vertex, vertex).signum() as i32
+    }
+
+    /// Marks what `face` does to this edge.
+    pub fn look_at(&self, around: &Surroundings<'_>, face: Face, profile: &mut Profile<'_>) {
+        let outlook = &around.outlook;
+        let corners = around.outlines.element(face.first);
+        let mut numbers = [0; FEW_CORNERS];
+        let mut sides = [0; FEW_CORNERS];
+        let (mut left, mut right) = (true, true);
+        let (mut low, mut high) = (Place::HIGHEST, Place::LOWEST);
+        for (n, corner) in corners.iter().enumerate() {
+            let number = corner.vertex();
+            let place = outlook.place(number);
+            (low, high) = (low.low(place), high.high(place));
+            let mut side = 0;
+            if number != self.p.number && number != self.q.number {
+                side = self.line.side(place);
+                left &= side > 0;
+                right &= side < 0;
+            }
+            if n < FEW_CORNERS {
+                numbers[n] = number;
+                sides[n] = side;
+            }
+        }
+        // With all other corners on one side, a face that holds p or q meets the edge nowhere else,
+        // and where it holds both, it is not nearer.
+        if left || right || high.is_before(self.low) || self.high.is_before(low) {
+            return;
+        }
+        let count = corners.len();
+        if count <= FEW_CORNERS {
+            for (side, &number) in sides.iter_mut().zip(&numbers).take(count) {
+                if *side == 0 {
+                    *side = self.exact_side_of(outlook, number);
+                }
+            }
+            let piece = Piece::new(&numbers[..count], &sides);
+            if !face.is_fan || !self.pass(outlook, piece, profile) {
+                self.pass_triangles(around, face, profile);
+            }
+            if piece.sides_on_line() == 0 {
+                return;
+            }
+        } else {
+            self.pass_triangles(around, face, profile);
+        }
+        self.pass_sides(around, face.first, corners, profile);
+    }
+
+    fn pass_triangles(&self, around: &Surroundings<'_>, face: Face, profile: &mut Profile<'_>) {
+        for triangle in around.triangles(face) {
+            self.pass_triangle(&around.outlook, &triangle, profile);
+        }
+    }
+
+    fn pass_triangle(&self, outlook: &Outlook<'_>, triangle: &[u16; 3], profile: &mut Profile<'_>) {
+        let sides = triangle.map(|corner| self.side_of(outlook, corner));
+        self.pass(outlook, Piece::new(triangle, &sides), profile);
+    }
+
+    /// Marks what a piece of a face does to this edge. False, and nothing marked, if its triangles
+    /// must be asked one by one; a triangle never must.
+    fn pass(&self, outlook: &Outlook<'_>, piece: Piece<'_>, profile: &mut Profile<'_>) -> bool {
+        let corners = piece.corners;
+        let left = piece.crossings(piece.left);
+        let right = piece.crossings(piece.left_or_on);
+        if left | right == 0 {
+            return true;
+        }
+        if is_many(left) || is_many(right) {
+            return false;
+        }
+        let depth = |number: &u16| outlook.vertex(*number).z;
+        let (mut near, mut far) = (i32::MAX, i32::MIN);
+        for z in corners.iter().map(depth) {
+            (near, far) = (near.min(z), far.max(z));
+        }
+        if near >= self.far {
+            return true;
+        }
+        let mut facing = 0;
+        for pair in corners[1..].windows(2) {
+            let turn = outlook.side(corners[0], pair[0], pair[1]);
+            if facing * turn < 0 {
+                return false;
+            }
+            facing |= turn;
+        }
+        if facing == 0 {
+            return true;
+        }
+        let on_left = self.passage(outlook, piece, left, facing);
+        let on_right =
+            if left == right { on_left } else { self.passage(outlook, piece, right, facing) };
+        if on_left.is_none() && on_right.is_none() {
+            return true;
+        }
+        let behind = if far < self.near {
+            Part::WHOLE
+        } else {
+            match self.depth_behind(outlook, corners, facing) {
+                Depth::Before => return true,
+                Depth::Behind(part) => part,
+                Depth::Mixed => return false,
+            }
+        };
+        let mut cover = |passage: Option<Passage>, marks: u64| {
+            if let Some(passage) = passage {
+                profile.mark(self.part(outlook, passage).and(behind), marks);
+            }
+        };
+        if left == right {
+            cover(on_left, mark::HIDDEN);
+        } else {
+            cover(on_left, mark::LEFT);
+            cover(on_right, mark::RIGHT);
+        }
+        true
+    }
+
+    /// How the edge lies to the planes of a fan of triangles, all of which turn as `facing` says.
+    fn depth_behind(&self, outlook: &Outlook<'_>, corners: &[u16], facing: i32) -> Depth {
+        let mut depth = None;
+        for pair in corners[1..].windows(2) {
+            let triangle = [corners[0], pair[0], pair[1]];
+            let [a, b, c] = triangle.map(|corner| outlook.vertex(corner));
+            let height = |end: End| {
+                if triangle.contains(&end.number) {
+                    0
+                } else {
+                    plane_side(a, b, c, end.vertex) * i64::from(facing)
+                }
+            };
+            let here = behind_between(height(self.p), height(self.q));
+            if corners.len() > 3 {
+                let is_all = here == Some(Part::WHOLE);
+                if here.is_some() && !is_all || depth.is_some_and(|depth| depth != here) {
+                    return Depth::Mixed;
+                }
+            }
+            depth = Some(here);
+        }
+        match depth.flatten() {
+            Some(part) => Depth::Behind(part),
+            None => Depth::Before,
+        }
+    }
+
+    /// How the edge passes a piece of a face on the page, `None` if it does not meet it. `facing` is how
+    /// the piece turns.
+    pub fn passage(
+        &self,
+        outlook: &Outlook<'_>,
+        piece: Piece<'_>,
+        crossings: u32,
+        facing: i32,
+    ) -> Option<Passage> {
+        if crossings == 0 {
+            return None;
+        }
+        let mut passage = Passage::default();
+        for end in 0..piece.corners.len() {
+            if crossings >> end & 1 == 0 {
+                continue;
+            }
+            let side = piece.side(end);
+            let line = outlook.line(side.0, side.1);
+            let p_inside = line.side(self.p) * facing;
+            let q_inside = line.side(self.q) * facing;
+            if p_inside <= 0 && q_inside <= 0 {
+                return None;
+            }
+            if p_inside < 0 {
+                passage.entry = Some(side);
+            } else if q_inside < 0 {
+                passage.exit = Some(side);
+            }
+        }
+        Some(passage)
+    }
+
+    /// The part of the edge within a piece of a face.
+    pub fn part(&self, outlook: &Outlook<'_>, passage: Passage) -> Part {
+        let place = |(a, b): Side| outlook.crossing(a, b, self.p, self.q);
+        Part { from: passage.entry.map(place), to: passage.exit.map(place) }
+    }
+
+    /// Marks what the sides of an element do that lie on the line of this edge.
+    #[cold]
+    fn pass_sides(
+        &self,
+        around: &Surroundings<'_>,
+        first: usize,
+        corners: &[Corner],
+        profile: &mut Profile<'_>,
+    ) {
+        let is_on_line = |corner: u16| self.side_of(&around.outlook, corner) == 0;
+        for (number, a, b) in sides(corners) {
+            let side = first + number;
+            if side != self.side && around.chosen.contains(side) && is_on_line(a) && is_on_line(b) {
+                self.pass_side(around, side, (a, b), profile);
+            }
+        }
+    }
+
+    /// Marks where the side (a, b) of a face, on the line of this edge, is drawn in its place: where
+    /// it is nearer, or as near and before it in the model.
+    fn pass_side(
+        &self,
+        around: &Surroundings<'_>,
+        side: usize,
+        (a, b): Side,
+        profile: &mut Profile<'_>,
+    ) {
+        let outlook = &around.outlook;
+        let projection = outlook.projection;
+        let (va, vb) = (outlook.vertex(a), outlook.vertex(b));
+        let (vp, vq) = (self.p.vertex, self.q.vertex);
+        let Some((axis, ahead)) = outlook.direction(vp, vq) else {
+            return;
+        };
+        if page_offset(projection, axis, va, vb) == 0 {
+            return;
+        }
+        let place = |vertex| {
+            let beyond_p = page_offset(projection, axis, vp, vertex) * ahead;
+            let before_q = page_offset(projection, axis, vertex, vq) * ahead;
+            if beyond_p <= 0 {
+                Along::START
+            } else if before_q <= 0 {
+                Along::END
+            } else {
+                Along::zero_between(beyond_p, before_q)
+            }
+        };
+        let height = |vertex| line_side(projection, axis, va, vb, vertex);
+        let heights = (height(vp), height(vq));
+        let behind = if heights == (0, 0) {
+            (side < self.side).then_some(Part::WHOLE)
+        } else {
+            behind_between(heights.0, heights.1)
+        };
+        if let Some(behind) = behind {
+            let (at_a, at_b) = (place(va), place(vb));
+            let beside = Part { from: Some(at_a.min(at_b)), to: Some(at_a.max(at_b)) };
+            profile.mark(beside.and(behind), mark::STOOD_IN);
+        }
+    }
+}
+
+/// The part of an edge that lies behind something flat, from how far behind it p and q lie.
+fn behind_between(at_p: i64, at_q: i64) -> Option<Part> {
+    if at_p <= 0 && at_q <= 0 {
+        return None;
+    }
+    let mut part = Part::WHOLE;
+    if at_p < 0 {
+        part.from = Some(Along::zero_between(at_p, at_q));
+    } else if at_q < 0 {
+        part.to = Some(Along::zero_between(at_p, at_q));
+    }
+    Some(part)
+}

@@ -1,0 +1,232 @@
+//! Every face as triangles: a fan from its first corner where that serves, else ears.
+//!
+//! Rounding bends a face of more than three corners; its triangles are what hides. They are found
+//! in the coordinate plane that the face leans to most, exactly.
+
+use super::VisibilityError;
+use super::edges::{Outlines, is_bar};
+use crate::geometry::Vertex;
+use crate::model::Corner;
+use crate::stage::{Attention, Scratch};
+use bytemuck::{Pod, Zeroable};
+
+/// How a face becomes triangles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Cut {
+    /// It has no area, or is a bar.
+    None,
+    /// Each triangle joins the first corner to one of the other sides.
+    Fan,
+    /// The triangles are kept in [`Ears`].
+    Ears,
+}
+
+/// Where the triangles of a face begin that is no fan.
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+#[repr(C)]
+struct Entry {
+    first_corner: u16,
+    first_ear: u16,
+}
+
+/// The triangles of the faces that no fan covers, by vertex number.
+#[derive(Debug)]
+pub struct Ears<'a> {
+    entries: &'a mut [Entry],
+    ears: &'a mut [[u16; 3]],
+}
+
+/// How many there are of the faces that no fan covers.
+#[derive(Debug, Clone, Copy, Default)]
+struct Needs {
+    faces: usize,
+    ears: usize,
+    most_corners: usize,
+}
+
+impl Needs {
+    fn of(outlines: Outlines<'_>, vertices: &[Vertex]) -> Self {
+        outlines.elements().filter(|(_, corners)| cut_of(corners, vertices) == Cut::Ears).fold(
+            Self::default(),
+            |needs, (_, corners)| Self {
+                faces: needs.faces + 1,
+                ears: needs.ears + corners.len() - 2,
+                most_corners: needs.most_corners.max(corners.len()),
+            },
+        )
+    }
+}
+
+impl<'a> Ears<'a> {
+    /// Bytes taken, with those for the corners of a face while it is being cut.
+    pub fn bytes(outlines: Outlines<'_>, vertices: &[Vertex]) -> usize {
+        let needs = Needs::of(outlines, vertices);
+        Scratch::bytes_for::<Entry>(needs.faces)
+            + Scratch::bytes_for::<[u16; 3]>(needs.ears)
+            + Scratch::bytes_for::<u16>(needs.most_corners)
+    }
+
+    /// Cuts every face that no fan covers.
+    pub fn cut(
+        outlines: Outlines<'_>,
+        vertices: &[Vertex],
+        scratch: &mut Scratch<'a>,
+        attention: &mut dyn Attention,
+    ) -> Result<Self, VisibilityError> {
+        let needs = Needs::of(outlines, vertices);
+        let entries: &mut [Entry] = scratch.take(needs.faces)?;
+        let ears: &mut [[u16; 3]] = scratch.take(needs.ears)?;
+        let mut meantime = scratch.reborrow();
+        let remaining: &mut [u16] = meantime.take(needs.most_corners)?;
+        let mut used = 0;
+        let concave =
+            outlines.elements().filter(|(_, corners)| cut_of(corners, vertices) == Cut::Ears);
+        for (entry, (first, corners)) in entries.iter_mut().zip(concave) {
+            *entry = Entry { first_corner: first as u16, first_ear: used as u16 };
+            attention.check()?;
+            for (place, corner) in remaining.iter_mut().zip(corners) {
+                *place = corner.vertex();
+            }
+            used +=
+                cut_ears(&mut remaining[..corners.len()], vertices, &mut ears[used..], attention)?;
+        }
+        Ok(Self { entries, ears: &mut ears[..used] })
+    }
+
+    /// The triangles of the face that begins at corner `first`.
+    pub fn of(&self, first: usize) -> &[[u16; 3]] {
+        let begins = |entry: &Entry| usize::from(entry.first_ear);
+        match self.entries.binary_search_by_key(&first, |entry| usize::from(entry.first_corner)) {
+            Ok(found) => {
+                let end = self.entries.get(found + 1).map_or(self.ears.len(), begins);
+                &self.ears[begins(&self.entries[found])..end]
+            }
+            Err(_) => &[],
+        }
+    }
+}
+
+/// Twice the areas of a polygon projected along x, y and z (Newell): the direction is that of its normal.
+///
+/// A sum of 2^16 products of 2^20 and 2^21 at most.
+pub fn areas(polygon: &mut dyn Iterator<Item = Vertex>) -> [i64; 3] {
+    let mut areas = [0i64; 3];
+    let Some(first) = polygon.next() else {
+        return areas;
+    };
+    let mut add = |a: Vertex, b: Vertex| {
+        let product = |from: i32, to: i32, at: i32, with: i32| {
+            (i64::from(from) - i64::from(to)) * (i64::from(at) + i64::from(with))
+        };
+        areas[0] += product(a.y, b.y, a.z, b.z);
+        areas[1] += product(a.z, b.z, a.x, b.x);
+        areas[2] += product(a.x, b.x, a.y, b.y);
+    };
+    let mut before = first;
+    for vertex in polygon {
+        add(before, vertex);
+        before = vertex;
+    }
+    add(before, first);
+    areas
+}
+
+/// A coordinate plane, seen from the side from which a face runs anticlockwise.
+#[derive(Debug, Clone, Copy)]
+struct Plane {
+    leans_to: usize,
+    flipped: bool,
+}
+
+impl Plane {
+    /// The plane that a polygon leans to most; `None` if it has no area.
+    fn of(mut polygon: impl Iterator<Item = Vertex>) -> Option<Self> {
+        let areas = areas(&mut polygon);
+        let leans_to = (0..3).rev().max_by_key(|&axis| areas[axis].abs())?;
+        (areas[leans_to] != 0).then_some(Self { leans_to, flipped: areas[leans_to] < 0 })
+    }
+
+    /// Twice the area of a triangle in the plane, positive if anticlockwise; within ±2^42.
+    fn turn(self, a: Vertex, b: Vertex, c: Vertex) -> i64 {
+        let flat = |vertex: Vertex| {
+            let (x, y) = match self.leans_to {
+                0 => (vertex.y, vertex.z),
+                1 => (vertex.z, vertex.x),
+                _ => (vertex.x, vertex.y),
+            };
+            (i64::from(x), i64::from(y))
+        };
+        let (a, b, c) = (flat(a), flat(b), flat(c));
+        let turn = (b.0 - a.0) * (c.1 - a.1) - (b.1 - a.1) * (c.0 - a.0);
+        if self.flipped { -turn } else { turn }
+    }
+}
+
+/// How a face must be cut.
+pub fn cut_of(corners: &[Corner], vertices: &[Vertex]) -> Cut {
+    if is_bar(corners) {
+        return Cut::None;
+    }
+    let at = |corner: &Corner| vertices[usize::from(corner.vertex())];
+    let Some(plane) = Plane::of(corners.iter().map(at)) else {
+        return Cut::None;
+    };
+    let is_fan = corners[1..]
+        .windows(2)
+        .all(|side| plane.turn(at(&corners[0]), at(&side[0]), at(&side[1])) >= 0);
+    if is_fan { Cut::Fan } else { Cut::Ears }
+}
+
+/// Cuts ear after ear off a polygon and returns how many triangles there are.
+///
+/// A corner is an ear if it is convex and no other corner lies in its triangle. Corners without a
+/// turn are dropped. A polygon that crosses itself can have no ear: then a convex corner is cut all
+/// the same, so that it always ends.
+fn cut_ears(
+    polygon: &mut [u16],
+    vertices: &[Vertex],
+    ears: &mut [[u16; 3]],
+    attention: &mut dyn Attention,
+) -> Result<usize, VisibilityError> {
+    let at = |number: u16| vertices[usize::from(number)];
+    let Some(plane) = Plane::of(polygon.iter().map(|&number| at(number))) else {
+        return Ok(0);
+    };
+    let mut count = 0;
+    let mut left = polygon.len();
+    while left >= 3 {
+        attention.check()?;
+        let rest = &polygon[..left];
+        let around = |middle: usize| {
+            [rest[(middle + left - 1) % left], rest[middle], rest[(middle + 1) % left]]
+        };
+        let turn_at = |middle: usize| {
+            let [a, b, c] = around(middle);
+            plane.turn(at(a), at(b), at(c))
+        };
+        let is_ear = |middle: usize| {
+            let corners = around(middle).map(at);
+            let [a, b, c] = corners;
+            !rest.iter().map(|&number| at(number)).any(|point| {
+                !corners.contains(&point)
+                    && plane.turn(a, b, point) >= 0
+                    && plane.turn(b, c, point) >= 0
+                    && plane.turn(c, a, point) >= 0
+            })
+        };
+        let straight = (0..left).find(|&middle| turn_at(middle) == 0);
+        let cut = straight
+            .or_else(|| (0..left).find(|&middle| turn_at(middle) > 0 && is_ear(middle)))
+            .or_else(|| (0..left).find(|&middle| turn_at(middle) > 0))
+            .unwrap_or(0);
+        if turn_at(cut) > 0
+            && let Some(ear) = ears.get_mut(count)
+        {
+            *ear = around(cut);
+            count += 1;
+        }
+        polygon.copy_within(cut + 1..left, cut);
+        left -= 1;
+    }
+    Ok(count)
+}

@@ -1,0 +1,66 @@
+//! Running other programs.
+
+use std::env;
+use std::process::{Child, Command, Output, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail};
+
+/// The cargo that runs this program.
+pub fn cargo() -> Command {
+    Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+}
+
+/// Runs to the end; what it prints is shown.
+pub fn run(command: &mut Command) -> Result<()> {
+    let name = describe(command);
+    let status = command.status().with_context(|| format!("cannot run {name}"))?;
+    if !status.success() {
+        bail!("{name}: {status}");
+    }
+    Ok(())
+}
+
+/// Runs to the end, but no longer than `limit`; what it prints is shown.
+pub fn run_within(limit: Duration, command: &mut Command) -> Result<()> {
+    let name = describe(command);
+    let mut child = command.spawn().with_context(|| format!("cannot run {name}"))?;
+    let deadline = Instant::now() + limit;
+    while Instant::now() < deadline {
+        if let Some(status) = child.try_wait()? {
+            if !status.success() {
+                bail!("{name}: {status}");
+            }
+            return Ok(());
+        }
+        thread::sleep(Duration::from_millis(20));
+    }
+    end(&mut child);
+    bail!("{name}: gave up after {} s", limit.as_secs())
+}
+
+/// What a program prints, trimmed; `None` if it is not there or fails.
+pub fn output(program: &str, arguments: &[&str]) -> Option<String> {
+    let Output { status, stdout, .. } = Command::new(program)
+        .args(arguments)
+        .stderr(Stdio::null())
+        .stdin(Stdio::null())
+        .output()
+        .ok()?;
+    let text = String::from_utf8_lossy(&stdout).trim().to_owned();
+    status.success().then_some(text)
+}
+
+/// The command as a user would type it.
+pub fn describe(command: &Command) -> String {
+    let words = std::iter::once(command.get_program()).chain(command.get_args());
+    let words: Vec<_> = words.map(|word| word.to_string_lossy()).collect();
+    words.join(" ")
+}
+
+fn end(child: &mut Child) {
+    // Both fail only if it has just ended by itself.
+    let _ = child.kill();
+    let _ = child.wait();
+}

@@ -1,0 +1,208 @@
+//! A board's image: built, checked, measured.
+
+use std::path::{Path, PathBuf};
+use std::{fmt, fs};
+
+use anyhow::{Context, Result, bail, ensure};
+use clap::ValueEnum;
+use object::{Object, ObjectSection, SectionFlags, elf};
+
+use crate::command::run;
+use crate::set_up::{self, Toolchain};
+
+/// A board that firmware is built for.
+#[derive(Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub enum Board {
+    /// Texas Instruments LM3S6965 (Cortex-M3), emulated by QEMU.
+    #[default]
+    Lm3s6965,
+}
+
+/// A range of addresses: where it begins, how many bytes.
+#[derive(Clone, Copy)]
+struct Region {
+    start: u64,
+    size: u64,
+}
+
+impl Region {
+    fn holds(self, start: u64, size: u64) -> bool {
+        start >= self.start && start + size <= self.start + self.size
+    }
+}
+
+impl Board {
+    /// Every board.
+    pub const ALL: &[Self] = &[Self::Lm3s6965];
+
+    /// The board that `--board` names among the options of another program, else the default one.
+    pub fn from_options(options: &[String]) -> Result<Self> {
+        let mut options = options.iter();
+        while let Some(option) = options.next() {
+            let value = match option.strip_prefix("--board") {
+                Some("") => options.next().map(String::as_str),
+                Some(rest) => rest.strip_prefix('='),
+                None => continue,
+            };
+            let name = value.context("--board needs a name")?;
+            return Self::from_str(name, false).map_err(|_| {
+                anyhow::anyhow!("there is no board {name}; there is: {}", Self::names())
+            });
+        }
+        Ok(Self::default())
+    }
+
+    fn names() -> String {
+        let names: Vec<_> = Self::ALL.iter().map(|board| board.name()).collect();
+        names.join(", ")
+    }
+
+    /// Its name, which is its cargo feature too.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Lm3s6965 => "lm3s6965",
+        }
+    }
+
+    /// Its compiler target.
+    pub fn target(self) -> &'static str {
+        match self {
+            Self::Lm3s6965 => "thumbv7m-none-eabi",
+        }
+    }
+
+    /// The options by which cargo builds its firmware.
+    pub fn cargo_options(self) -> [String; 6] {
+        let features = format!("{},log-semihosting", self.name());
+        [
+            "--package=penup",
+            "--bin=firmware",
+            "--profile=firmware",
+            "--no-default-features",
+            "--features",
+            &features,
+        ]
+        .map(str::to_owned)
+    }
+
+    /// Where the image goes.
+    pub fn image(self) -> PathBuf {
+        crate::root().join(format!("target/firmware/{}.elf", self.name()))
+    }
+
+    fn flash(self) -> Region {
+        match self {
+            Self::Lm3s6965 => Region { start: 0, size: 256 << 10 },
+        }
+    }
+
+    fn ram(self) -> Region {
+        match self {
+            Self::Lm3s6965 => Region { start: 0x2000_0000, size: 64 << 10 },
+        }
+    }
+}
+
+/// Sets up the compiler, builds, and returns the image's path.
+pub fn build(board: Board) -> Result<PathBuf> {
+    let toolchain = set_up::toolchain(board.target())?;
+    let directory = match toolchain {
+        Toolchain::Rustup => "target",
+        Toolchain::Debian => "target/debian",
+    };
+    let mut cargo = toolchain.cargo("build", board.target());
+    if toolchain == Toolchain::Rustup {
+        // So that the image is found whatever the user's configuration says.
+        cargo.args(["--target-dir", directory]);
+    }
+    run(cargo.arg("--quiet").args(board.cargo_options()))?;
+    let built = Path::new(directory).join(board.target()).join("firmware/firmware");
+    let image = board.image();
+    fs::create_dir_all(image.parent().context("the image has a directory")?)?;
+    fs::copy(crate::root().join(built), &image)?;
+    Ok(image)
+}
+
+/// What an image takes of the board.
+pub struct Sizes {
+    board: Board,
+    flash: u64,
+    ram: u64,
+    stack: u64,
+}
+
+impl fmt::Display for Sizes {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let Self { board, flash, ram, stack } = self;
+        write!(
+            f,
+            "{}: flash {flash} of {} bytes, RAM {ram} of {} bytes beside a stack of {stack}",
+            board.name(),
+            board.flash().size,
+            board.ram().size - stack,
+        )
+    }
+}
+
+/// Checks that the image links as the board boots: the vector table at the start of flash, the stack
+/// at the start of RAM, the entry in flash, every section within the memory. A wrong memory map or
+/// lost link arguments give no linker error, only such an image.
+pub fn check(board: Board, image: &Path) -> Result<Sizes> {
+    let bytes = fs::read(image).with_context(|| format!("cannot read {}", image.display()))?;
+    let elf = object::File::parse(&*bytes)?;
+    let (flash, ram) = (board.flash(), board.ram());
+
+    let vectors = elf
+        .section_by_name(".vector_table")
+        .context("the image is empty: the link arguments of build.rs did not arrive")?;
+    ensure!(
+        vectors.address() == flash.start,
+        "the vector table is at {:#010x}, but {} boots from {:#010x}: wrong memory map",
+        vectors.address(),
+        board.name(),
+        flash.start
+    );
+    let table = vectors.data()?;
+    let word = |index: usize| -> Result<u64> {
+        let bytes = table.get(4 * index..4 * index + 4).context("the vector table is cut off")?;
+        Ok(u64::from(u32::from_le_bytes(bytes.try_into()?)))
+    };
+    // The stack lies at the start of RAM, so that running over is a fault.
+    let (stack, entry) = (word(0)?, word(1)?);
+    ensure!(
+        stack > ram.start && stack < ram.start + ram.size,
+        "the stack begins at {stack:#010x}, not within {}'s RAM",
+        board.name()
+    );
+    ensure!(
+        entry % 2 == 1 && flash.holds(entry - 1, 2),
+        "the entry {entry:#010x} is no code in flash"
+    );
+
+    let mut sizes = Sizes { board, flash: 0, ram: 0, stack: stack - ram.start };
+    for section in elf.sections() {
+        let SectionFlags::Elf { sh_flags } = section.flags() else {
+            continue;
+        };
+        if sh_flags & u64::from(elf::SHF_ALLOC) == 0 || section.size() == 0 {
+            continue;
+        }
+        let (start, size) = (section.address(), section.size());
+        // The log's strings stay on the host.
+        if section.name()? == ".defmt" {
+            continue;
+        }
+        if flash.holds(start, size) {
+            sizes.flash += size;
+        } else if ram.holds(start, size) {
+            sizes.ram += size;
+            // Initial values are copied from flash.
+            if section.file_range().is_some() {
+                sizes.flash += size;
+            }
+        } else {
+            bail!("section {} at {start:#010x} is outside the memory", section.name()?);
+        }
+    }
+    Ok(sizes)
+}

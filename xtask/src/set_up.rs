@@ -1,0 +1,185 @@
+//! What building and testing need, found or installed.
+//!
+//! | what | found as | installed by |
+//! |---|---|---|
+//! | `core` for the board's target | rustc's target directory | rustup; else Debian's compiler and the sources of `core` |
+//! | the emulator | `qemu-system-arm` | apt, or brew |
+//! | rustfmt, clippy | `cargo fmt`, `cargo clippy` | rustup |
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Duration;
+
+use anyhow::{Result, bail, ensure};
+
+use crate::command::{cargo, describe, output, run, run_within};
+
+/// Who compiles for a target.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Toolchain {
+    /// The compiler in use, with `core` from rustup.
+    Rustup,
+    /// Debian's compiler, which builds `core` from Debian's sources.
+    Debian,
+}
+
+/// rustup takes seconds where it can fetch, and may hang where it cannot.
+const RUSTUP_LIMIT: Duration = Duration::from_secs(120);
+
+const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
+const DEBIAN_CORE: &str = "lib/rustlib/src/rust/library/core/Cargo.toml";
+
+/// A compiler for `target`.
+pub fn toolchain(target: &str) -> Result<Toolchain> {
+    if has_core(target) {
+        return Ok(Toolchain::Rustup);
+    }
+    let refusal = refusal(target);
+    if !refusal.exists() && output("rustup", &["--version"]).is_some() {
+        println!("penup: installing the Rust target {target} by rustup");
+        let mut rustup = Command::new("rustup");
+        // A backtrace of rustup's would hide its one line of reason.
+        rustup.args(["target", "add", target]).env("RUST_BACKTRACE", "0");
+        match run_within(RUSTUP_LIMIT, &mut rustup) {
+            Ok(()) if has_core(target) => return Ok(Toolchain::Rustup),
+            Ok(()) => println!("penup: rustup added {target} to another toolchain than cargo's"),
+            Err(error) => println!("penup: {error:#}"),
+        }
+    }
+    if !debian_is_ready() && output("apt-get", &["--version"]).is_some() {
+        apt_install(&["rustc-web", "rust-web-src", "lld"])?;
+    }
+    ensure!(
+        debian_is_ready(),
+        "no compiler for {target}: run `rustup target add {target}` where the network can be \
+         reached, or on Debian `apt-get install rustc-web rust-web-src lld`"
+    );
+    if !refusal.exists() {
+        println!("penup: from now on Debian's compiler builds for {target}");
+        fs::create_dir_all(refusal.parent().unwrap_or(&refusal))?;
+        fs::write(&refusal, [])?;
+    }
+    Ok(Toolchain::Debian)
+}
+
+/// A file that says that rustup could not give `target` to the compiler in use, so that the next
+/// run does not wait for it again. A new compiler or `cargo clean` forgets it.
+fn refusal(target: &str) -> PathBuf {
+    let version = output("rustc", &["--version"]).unwrap_or_default();
+    let number = version.split(' ').nth(1).unwrap_or("unknown");
+    crate::root().join(format!("target/set-up/rustc-{number}-without-{target}"))
+}
+
+fn has_core(target: &str) -> bool {
+    let Some(directory) = output("rustc", &["--print", "target-libdir", "--target", target]) else {
+        return false;
+    };
+    let files = Path::new(&directory).read_dir().into_iter().flatten().flatten();
+    files.map(|file| file.file_name()).any(|name| name.to_string_lossy().starts_with("libcore-"))
+}
+
+fn debian_is_ready() -> bool {
+    output("ld.lld", &["--version"]).is_some()
+        && output(DEBIAN_RUSTC, &["--print", "sysroot"])
+            .is_some_and(|sysroot| Path::new(&sysroot).join(DEBIAN_CORE).exists())
+}
+
+impl Toolchain {
+    /// A cargo command, as `build`, `check` or `clippy`, that compiles for `target`.
+    pub fn cargo(self, command: &str, target: &str) -> Command {
+        let mut cargo = cargo();
+        cargo.current_dir(crate::root()).args([command, "--target", target]);
+        if self == Self::Debian {
+            // Debian's std for proc macros and build scripts stays apart from rustup's.
+            cargo
+                .args(["-Zbuild-std=core", "--target-dir", "target/debian"])
+                .env("RUSTC", DEBIAN_RUSTC)
+                .env("RUSTC_BOOTSTRAP", "1")
+                .env(linker_variable(target), "ld.lld");
+        }
+        cargo
+    }
+}
+
+/// The variable by which cargo is told a target's linker.
+fn linker_variable(target: &str) -> String {
+    format!("CARGO_TARGET_{}_LINKER", target.to_uppercase().replace('-', "_"))
+}
+
+/// QEMU for Arm.
+pub fn emulator() -> Result<()> {
+    const PROGRAM: &str = "qemu-system-arm";
+    let found = || output(PROGRAM, &["--version"]).is_some();
+    if found() {
+        return Ok(());
+    }
+    if output("apt-get", &["--version"]).is_some() {
+        apt_install(&[PROGRAM])?;
+    } else if output("brew", &["--version"]).is_some() {
+        println!("penup: installing qemu by brew");
+        run(Command::new("brew").args(["install", "qemu"]))?;
+    }
+    if !found() {
+        bail!("install QEMU so that `{PROGRAM} --version` works: https://www.qemu.org/download/");
+    }
+    Ok(())
+}
+
+/// rustfmt and clippy, which a minimal Rust lacks.
+pub fn checkers() -> Result<()> {
+    for (command, component) in [("fmt", "rustfmt"), ("clippy", "clippy")] {
+        let found = || output(&cargo_program(), &[command, "--version"]).is_some();
+        if found() {
+            continue;
+        }
+        println!("penup: installing {component} by rustup");
+        let mut rustup = Command::new("rustup");
+        let installed = run_within(RUSTUP_LIMIT, rustup.args(["component", "add", component]));
+        if !found() {
+            let reason = installed.err().map(|error| format!("{error:#}; ")).unwrap_or_default();
+            bail!("{reason}run `{}` where the network can be reached", describe(&rustup));
+        }
+    }
+    Ok(())
+}
+
+fn cargo_program() -> String {
+    cargo().get_program().to_string_lossy().into_owned()
+}
+
+/// Installs Debian packages; refreshes apt's lists if they are too old or missing.
+fn apt_install(packages: &[&str]) -> Result<()> {
+    println!("penup: installing {} by apt-get", packages.join(" "));
+    let install = || {
+        let mut command = as_root("apt-get");
+        command.args(["install", "--yes", "--no-install-recommends"]).args(packages);
+        command
+    };
+    if run(&mut install()).is_ok() {
+        return Ok(());
+    }
+    println!("penup: refreshing apt's package lists, then once more");
+    let refreshed = run(as_root("apt-get").arg("update"));
+    match refreshed.and_then(|()| run(&mut install())) {
+        Ok(()) => Ok(()),
+        Err(error) => bail!(
+            "{error:#}\ninstall by hand, as root: apt-get update && apt-get install {}",
+            packages.join(" ")
+        ),
+    }
+}
+
+/// A command run as root: directly by root, else through sudo, which may ask for the password.
+fn as_root(program: &str) -> Command {
+    let is_root = output("id", &["-u"]).is_some_and(|user| user == "0");
+    let mut command = if is_root {
+        Command::new(program)
+    } else {
+        let mut sudo = Command::new("sudo");
+        sudo.arg(program);
+        sudo
+    };
+    command.env("DEBIAN_FRONTEND", "noninteractive");
+    command
+}

@@ -1,0 +1,71 @@
+//! Every check there is, in the order of what fails fastest.
+
+use std::process::Command;
+
+use anyhow::Result;
+
+use crate::command::{cargo, describe, run};
+use crate::firmware::{self, Board};
+use crate::set_up::{self, Toolchain};
+
+/// Sets up, then runs everything; ends at the first failure.
+pub fn everything() -> Result<()> {
+    set_up::checkers()?;
+    set_up::emulator()?;
+
+    step(workspace("fmt").args(["--all", "--check"]))?;
+    for &board in Board::ALL {
+        lint_firmware(board)?;
+        let image = firmware::build(board)?;
+        println!("{}", firmware::check(board, &image)?);
+    }
+    step(
+        workspace("clippy")
+            .args(["--workspace", "--all-targets"])
+            .args(EMULATOR)
+            .args(["--", "-Dwarnings"]),
+    )?;
+    step(
+        workspace("doc")
+            .args(["--workspace", "--no-deps", "--document-private-items"])
+            .env("RUSTDOCFLAGS", "-Dwarnings"),
+    )?;
+    // With the emulator's tests, and every doctest.
+    step(workspace("test").arg("--workspace").args(EMULATOR))
+}
+
+/// The tests that need QEMU and the firmware.
+const EMULATOR: [&str; 2] = ["--features", "penup-host-tests/emulator"];
+
+fn workspace(command: &str) -> Command {
+    let mut cargo = cargo();
+    cargo.current_dir(crate::root()).arg(command);
+    cargo
+}
+
+/// Lints as the board's compiler allows.
+fn lint_firmware(board: Board) -> Result<()> {
+    let toolchain = set_up::toolchain(board.target())?;
+    match toolchain {
+        Toolchain::Rustup => step(
+            toolchain
+                .cargo("clippy", board.target())
+                .args(board.cargo_options())
+                .args(["--", "-Dwarnings"]),
+        ),
+        Toolchain::Debian => {
+            println!("penup: no clippy for {}: Debian's compiler has none", board.target());
+            step(
+                toolchain
+                    .cargo("rustc", board.target())
+                    .args(board.cargo_options())
+                    .args(["--", "-Dwarnings"]),
+            )
+        }
+    }
+}
+
+fn step(command: &mut Command) -> Result<()> {
+    println!("penup: {}", describe(command));
+    run(command)
+}
