@@ -208,6 +208,27 @@ proptest! {
 }
 
 #[test]
+fn a_chord_may_stay_by_a_bend_where_shorter_ones_do_not() {
+    let loops = [
+        [-404, 6431, 7857],
+        [1237, 2404, -5390],
+        [6229, -3515, -1797],
+        [569, -4868, 4927],
+        [6381, 5255, -1524],
+        [7897, -3626, -7851],
+    ];
+    let turning = [[-8052, -3452, 2895], [5538, -2140, -288], [-2767, -4095, -5461], [300, 7, -7]];
+    for (points, most) in [(&loops[..], 11), (&turning[..], 7)] {
+        let order = points.len() as u8;
+        let sketch = Sketch { points: points.to_vec(), order, knots: vec![] };
+        // One polynomial by its Bézier points.
+        let knots = [-1000, -999].into_iter().flat_map(|knot| vec![knot; points.len()]).collect();
+        let found = flattened(&Sketch { knots, ..sketch }, parallel, 128, 300);
+        assert!(found.chords <= most, "{} for {most}", found.chords);
+    }
+}
+
+#[test]
 fn the_isobars_of_figure_11_are_read_and_drawn() {
     const UNITS: f64 = (1 << 16) as f64; // to a millimetre
     let mut vertices: Vec<Point> = Vec::new();
