@@ -85,6 +85,20 @@ impl Decimal {
     /// # Errors
     /// [`OutOfRange`] if it does not fit 62 bits.
     pub fn to_binary(self, fraction_bits: u32) -> Result<i64, OutOfRange> {
+        self.binary(fraction_bits, |power| power / 2)
+    }
+
+    /// The multiple of 2^-`fraction_bits` next towards zero, as that many units. Taken again in a coarser
+    /// unit, it is the same as if it had been taken in that unit at once.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] if it does not fit 62 bits.
+    pub fn to_binary_truncated(self, fraction_bits: u32) -> Result<i64, OutOfRange> {
+        self.binary(fraction_bits, |_| 0)
+    }
+
+    /// `more` is what is added before the division by a power of ten.
+    fn binary(self, fraction_bits: u32, more: fn(u128) -> u128) -> Result<i64, OutOfRange> {
         if self.mantissa == 0 {
             return Ok(0);
         }
@@ -100,7 +114,7 @@ impl Decimal {
         } else {
             // Past 10^38 the quotient is zero whatever the mantissa.
             power_of_ten(self.exponent.unsigned_abs())
-                .map_or(0, |power| (shifted + power / 2) / power)
+                .map_or(0, |power| (shifted + more(power)) / power)
         };
         let value =
             i64::try_from(rounded).ok().filter(|value| *value < 1 << 62).ok_or(OutOfRange)?;
@@ -239,6 +253,18 @@ mod tests {
             ("0e9999", 30, 0),
         ] {
             assert_eq!(binary(text, fraction_bits), Ok(units), "{text}");
+        }
+    }
+
+    #[test]
+    fn truncating_twice_is_truncating_once() {
+        for text in ["0.1", "-0.1", "7.3", "-99.999", "1e-9", "3"] {
+            let decimal = Decimal::parse(text).unwrap();
+            let fine = decimal.to_binary_truncated(30).unwrap();
+            for bits in 0..30 {
+                let coarse = decimal.to_binary_truncated(bits).unwrap();
+                assert_eq!(fine / (1 << (30 - bits)), coarse, "{text}");
+            }
         }
     }
 

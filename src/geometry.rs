@@ -161,6 +161,34 @@ pub fn plane_side(a: Vertex, b: Vertex, c: Vertex, d: Vertex) -> i64 {
     determinant(from_a(b), from_a(c), from_a(d))
 }
 
+/// What [`plane_side`] surely exceeds if d lies off the plane by more than rounding to whole
+/// coordinates can hide.
+///
+/// With M the largest difference: nine minors of two products each, within 18 M^2 together, and less than
+/// M^2 + 200 for the rest. Below 2^45.
+pub fn plane_side_margin(a: Vertex, b: Vertex, c: Vertex, d: Vertex) -> i64 {
+    let differences = [b, c, d].map(|to| {
+        (to.x - a.x).unsigned_abs() | (to.y - a.y).unsigned_abs() | (to.z - a.z).unsigned_abs()
+    });
+    let most = i64::from(differences[0] | differences[1] | differences[2]);
+    19 * most * most + 200
+}
+
+/// Whether four points of the model lie in one plane, exactly. Coordinates within ±2^30.
+///
+/// ```
+/// use penup::geometry::are_coplanar;
+/// let far = 1 << 30;
+/// assert!(are_coplanar([[-far, -far, 7], [far, -far, 7], [far, far, 7], [1, 2, 7]]));
+/// assert!(!are_coplanar([[-far, -far, 7], [far, -far, 7], [far, far, 7], [1, 2, 8]]));
+/// ```
+pub fn are_coplanar(points: [[i32; 3]; 4]) -> bool {
+    let [a, points @ ..] = points;
+    let [u, v, w] = points.map(|to| [0, 1, 2].map(|n| i128::from(to[n]) - i128::from(a[n])));
+    let minor = |m: usize, n: usize| u[m] * v[n] - u[n] * v[m];
+    minor(1, 2) * w[0] + minor(2, 0) * w[1] + minor(0, 1) * w[2] == 0
+}
+
 /// How far [`page_side`] may be off if no coordinate was rounded by more than one half.
 ///
 /// ```
@@ -268,6 +296,48 @@ mod tests {
         }
         // The largest tetrahedron in a cube takes a third of it: 6 x (1/3) x (2^20)^3.
         assert_eq!(largest, 2 << 60);
+    }
+
+    #[test]
+    fn doubts_are_those_of_the_differences() {
+        let (a, b, c) = (Vertex::new(5, 7, 1), Vertex::new(105, 27, 1), Vertex::new(-5, 57, 1));
+        // 100 + 20 for b, 10 + 50 for c, and one.
+        assert_eq!(page_side_doubt(Projection::Parallel, a, b, c), 181);
+        let from_a = |x, y, z| Vertex::new(100 + x, 200 + y, 300 + z);
+        let (a, b, c) = (from_a(0, 0, 0), from_a(10, 0, 3), from_a(0, 20, 0));
+        let d = from_a(0, 0, 30);
+        // Minors 200 + 60, 600 and 300; twice 13, 20 and 30; and six.
+        assert_eq!(plane_side_doubt(a, b, c, d), 1160 + 126 + 6);
+        let (b, c, d) = (from_a(2, 3, 5), from_a(7, 11, 13), from_a(17, 19, 23));
+        // Minors |22 - 21| + |39 - 55| + |26 - 35|, and so on.
+        let minors = (1 + 16 + 9) + (54 + 6 + 60) + (13 + 26 + 39);
+        assert_eq!(plane_side_doubt(a, b, c, d), minors + 2 * (10 + 31 + 59) + 6);
+        assert_eq!(plane_side_margin(a, b, c, d), 19 * 31 * 31 + 200);
+    }
+
+    #[test]
+    fn four_points_of_the_model_lie_in_a_plane_or_not() {
+        let points = |x: i32, y: i32, z: i32| [[3, 5, 7], [13, 4, 9], [2, 15, 11], [x, y, z]];
+        // (3, 5, 7) + m (10, -1, 2) + n (-1, 10, 4)
+        for (m, n) in [(1, 1), (-2, 3), (4, -1), (0, 5)] {
+            let at = [3 + 10 * m - n, 5 - m + 10 * n, 7 + 2 * m + 4 * n];
+            assert!(are_coplanar(points(at[0], at[1], at[2])));
+            for (dx, dy, dz) in [(1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 0, -1)] {
+                assert!(!are_coplanar(points(at[0] + dx, at[1] + dy, at[2] + dz)));
+            }
+        }
+    }
+
+    #[test]
+    fn the_margin_is_beyond_any_doubt() {
+        for n in 1..4000i32 {
+            let point = |k: i32| {
+                let part = |m: i32| (n * (k + 2) * m * 7919 + k * 104_729) % (1 << (n % 19 + 1));
+                Vertex::new(part(1), part(3), part(11))
+            };
+            let [a, b, c, d] = [0, 1, 2, 3].map(point);
+            assert!(plane_side_doubt(a, b, c, d) <= plane_side_margin(a, b, c, d));
+        }
     }
 
     #[test]

@@ -33,6 +33,7 @@ fn main() -> std::io::Result<()> {
             vertices: &view.vertices,
             elements: Elements::new(&model.corners),
             projection: view.projection,
+            positions: &[],
         };
         let least = scratch_bytes(&scene);
         let mut words = vec![0u64; bytes.max(least) / 8];

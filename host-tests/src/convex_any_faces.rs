@@ -63,7 +63,12 @@ pub fn is_seen_alike(dice: &mut Dice, stretches: impl Fn(&Scene<'_>) -> Vec<Stre
             z: point[1] - place[1],
         })
         .collect();
-    let scene = Scene { vertices: &vertices, elements: Elements::new(&faces.corners), projection };
+    let scene = Scene {
+        vertices: &vertices,
+        elements: Elements::new(&faces.corners),
+        projection,
+        positions: &[],
+    };
     let mut seen: BTreeMap<(u16, u16), Vec<bool>> = BTreeMap::new();
     for stretch in stretches(&scene) {
         let Some((a, b)) = stretch.edge else { continue };

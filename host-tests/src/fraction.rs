@@ -2,7 +2,7 @@
 
 use num_bigint::BigInt;
 use num_integer::Integer;
-use num_traits::{Signed, Zero};
+use num_traits::{Signed, ToPrimitive, Zero};
 use std::cmp::Ordering;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -65,6 +65,12 @@ impl Fraction {
     /// One divided by it.
     pub fn recip(&self) -> Self {
         Self::new(self.denominator.clone(), self.numerator.clone())
+    }
+
+    /// The nearest float, or nearly.
+    pub fn to_f64(&self) -> f64 {
+        let scaled: BigInt = (&self.numerator << 60u32) / &self.denominator;
+        scaled.to_f64().unwrap_or(f64::NAN) / (1u64 << 60) as f64
     }
 
     /// Its size without its sign.

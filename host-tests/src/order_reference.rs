@@ -75,7 +75,7 @@ impl Sheet {
 
     /// The tour that the library finds, with plenty of memory, checked.
     pub fn order(&self, options: Options) -> Result<(Vec<Leg>, Report), OrderError> {
-        let mut memory = vec![0; 1 << 18];
+        let mut memory = vec![0; 1 << 15];
         let mut tour = vec![Leg::new(0, false); self.segments.len()];
         let scratch = Scratch::new(&mut memory);
         let report = order(self.drawing(), options, scratch, &mut Undisturbed, &mut tour)?;

@@ -86,6 +86,7 @@ pub struct View {
     pub projection: Projection,
     scale: f64,
     depth_scale: f64,
+    origin: [f64; 2],
 }
 
 fn dot(a: Vector, b: Vector) -> f64 {
@@ -127,7 +128,13 @@ impl View {
                 z: (v[2] * depth_scale).round() as i32,
             })
             .collect();
-        Self { vertices, projection, scale, depth_scale }
+        Self {
+            vertices,
+            projection,
+            scale,
+            depth_scale,
+            origin: [dot(eye, right), dot(eye, upward)].map(|part| -part),
+        }
     }
 
     /// The camera of `scenes/cameras.json` for an example.
@@ -154,6 +161,17 @@ impl View {
             vector("\"up\""),
             Projection::Perspective,
         ))
+    }
+
+    /// How much depth is stretched over width and height.
+    pub fn depth_stretch(&self) -> (u32, u32) {
+        let ratio = self.depth_scale / self.scale;
+        ((ratio * 4096.0).round() as u32, 4096)
+    }
+
+    /// Where the origin of a parallel view's model lies.
+    pub fn image_of_origin(&self) -> [f64; 2] {
+        self.origin
     }
 
     /// A place along an edge, on the image plane at distance 1 or in model units.

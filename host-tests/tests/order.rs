@@ -1,8 +1,10 @@
 //! Orders of strokes: each segment once, and not farther than it must be.
 
-#![allow(clippy::expect_used, reason = "a test fails by panicking")]
+#![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
-use penup::order::{Method, Options, OrderError, Shape};
+use penup::drawing::{Drawing, PagePoint, Segment};
+use penup::order::{Leg, Method, Options, OrderError, Report, Shape, order};
+use penup::stage::{Aborted, Attention, Scratch, Undisturbed};
 use penup_host_tests::order_reference::Sheet;
 use proptest::prelude::*;
 
@@ -20,11 +22,122 @@ fn polylines(reach: i32) -> impl Strategy<Value = Vec<Vec<(i32, i32)>>> {
 
 fn orders_everything(sheet: &Sheet) -> Result<(), OrderError> {
     for (method, shape) in ALL {
-        for effort in [0, 1] {
-            sheet.order(Options { method, shape, effort })?;
+        let (_, nearest_first) = sheet.order(Options { method, shape, effort: 0 })?;
+        let (_, improved) = sheet.order(Options { method, shape, effort: 3 })?;
+        if sheet.segments.iter().all(|segment| segment.pen == 0) {
+            assert!(improved.pen_up <= nearest_first.pen_up);
         }
+        assert_eq!(improved.pen_down, nearest_first.pen_down);
     }
     Ok(())
+}
+
+fn scene(name: &str) -> Sheet {
+    let path = format!("{}/../scenes/{name}.obj", env!("CARGO_MANIFEST_DIR"));
+    Sheet::from_obj(&std::fs::read_to_string(path).expect("a scene"))
+}
+
+fn millimetres(length: u64) -> f64 {
+    length as f64 / 256.0 / 80.0
+}
+
+#[test]
+fn a_connected_drawing_is_drawn_at_the_optimum() {
+    let sheet = scene("grid20");
+    for (shape, optimum) in [(Shape::OpenPath, 315.0), (Shape::ClosedCycle, 324.0)] {
+        let (_, report) = sheet.order(Options { shape, ..Options::default() }).expect("fits");
+        assert!((millimetres(report.pen_up) - optimum).abs() < 0.01, "{report:?}");
+        assert!(report.optimal);
+    }
+}
+
+#[test]
+fn separate_parts_are_drawn_within_three_hundredths_of_the_best_known() {
+    let sheet = scene("text300");
+    for (shape, best_known) in [(Shape::OpenPath, 2030.0), (Shape::ClosedCycle, 2067.0)] {
+        let options = Options { shape, effort: 1000, ..Options::default() };
+        let (_, report) = sheet.order(options).expect("fits");
+        assert!(millimetres(report.pen_up) < 1.03 * best_known, "{report:?}");
+    }
+}
+
+#[test]
+fn an_exact_order_is_never_longer_than_a_greedy_one() {
+    let sheet = scene("grid20");
+    let pen_up =
+        |method| sheet.order(Options { method, ..Options::default() }).expect("fits").1.pen_up;
+    assert!(pen_up(Method::Exact) <= pen_up(Method::Greedy));
+}
+
+#[test]
+fn with_less_memory_the_order_is_worse_or_refused_but_never_wrong() {
+    let sheet = scene("text300");
+    let (mut orders, mut refusals) = (0, 0);
+    for words in (0..8000).step_by(250) {
+        let mut memory = vec![0; words];
+        let mut tour = vec![Leg::new(0, false); sheet.segments.len()];
+        let options = Options { effort: 20, ..Options::default() };
+        match order(
+            sheet.drawing(),
+            options,
+            Scratch::new(&mut memory),
+            &mut Undisturbed,
+            &mut tour,
+        ) {
+            Ok(report) => {
+                sheet.check(options.shape, &tour, &report);
+                orders += 1;
+            }
+            Err(OrderError::Scratch(missing)) => {
+                assert!(missing.needed > missing.available);
+                refusals += 1;
+            }
+            Err(error) => panic!("{error:?}"),
+        }
+    }
+    assert!(orders > 3 && refusals > 3, "{orders} {refusals}");
+}
+
+#[test]
+fn a_job_given_up_ends_at_once() {
+    struct GivenUpAfter(u32);
+    impl Attention for GivenUpAfter {
+        fn check(&mut self) -> Result<(), Aborted> {
+            self.0 = self.0.checked_sub(1).ok_or(Aborted)?;
+            Ok(())
+        }
+    }
+    let sheet = scene("text300");
+    for checks in [0, 1, 10, 100, 1000] {
+        let mut memory = vec![0; 1 << 15];
+        let mut tour = vec![Leg::new(0, false); sheet.segments.len()];
+        let options = Options { effort: 1 << 20, ..Options::default() };
+        let mut attention = GivenUpAfter(checks);
+        let scratch = Scratch::new(&mut memory);
+        let result = order(sheet.drawing(), options, scratch, &mut attention, &mut tour);
+        assert_eq!(result, Err(OrderError::Aborted));
+    }
+}
+
+#[test]
+fn a_drawing_that_is_none_is_refused() {
+    let points =
+        [PagePoint { x: 0, y: 0 }, PagePoint { x: 9, y: 0 }, PagePoint { x: 1 << 21, y: 0 }];
+    let segment = |from, to| Segment { from, to, ..Segment::default() };
+    let attempt = |segments: Vec<Segment>, places: usize| {
+        let mut tour = vec![Leg::new(0, false); places];
+        let drawing = Drawing { points: &points, segments: &segments };
+        let mut memory = [0; 100];
+        let scratch = Scratch::new(&mut memory);
+        order(drawing, Options::default(), scratch, &mut Undisturbed, &mut tour)
+    };
+    assert_eq!(attempt(vec![segment(0, 1)], 2), Err(OrderError::TourLength));
+    assert_eq!(attempt(vec![segment(0, 1), segment(1, 3)], 2), Err(OrderError::BadSegment(1)));
+    assert_eq!(attempt(vec![segment(0, 2)], 1), Err(OrderError::BadSegment(0)));
+    assert_eq!(attempt(vec![segment(1, 1)], 1), Err(OrderError::BadSegment(0)));
+    let many = vec![segment(0, 1); Leg::LIMIT + 1];
+    assert_eq!(attempt(many, Leg::LIMIT + 1), Err(OrderError::TooManySegments));
+    assert_eq!(attempt(vec![], 0), Ok(Report { optimal: true, ..Report::default() }));
 }
 
 proptest! {

@@ -16,10 +16,14 @@ fn fraction(along: Along) -> Fraction {
 }
 
 fn library_pieces(random: &RandomScene, merged_blocks: bool, spare_bytes: usize) -> Vec<Piece> {
+    // Vertices that were never rounded are their own positions, and knowing them changes nothing.
+    let positions = random.vertices.iter().map(|vertex| [vertex.x, vertex.y, vertex.z]);
+    let positions: Vec<[i32; 3]> = positions.collect();
     let scene = Scene {
         vertices: &random.vertices,
         elements: Elements::new(&random.corners),
         projection: random.projection,
+        positions: if spare_bytes == 0 { &positions } else { &[] },
     };
     let mut words = vec![0u64; (scratch_bytes(&scene) + spare_bytes) / 8];
     let mut stretches = Stretches::default();

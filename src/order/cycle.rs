@@ -123,6 +123,11 @@ impl<'s> Cycle<'s> {
         self.place[leg.segment()] = place as u16;
     }
 
+    /// How many turns have been taken since it was settled.
+    pub fn turned(&self) -> usize {
+        self.turned
+    }
+
     /// Whether a few more turns can be remembered.
     pub fn can_turn(&self) -> bool {
         self.turned + 16 <= self.turns.len()

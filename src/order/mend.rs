@@ -2,7 +2,7 @@
 //!
 //! The shortest moves often leave the tour in many cycles. Two moves of different parts that give
 //! up their ends for each other's make one part of two; those that lengthen least go first, nearly:
-//! the allowance grows by halves from round to round (after Karp, "A patching algorithm for the
+//! the allowance doubles from round to round (after Karp, "A patching algorithm for the
 //! nonsymmetric traveling-salesman problem", 1979).
 
 use super::near::Near;
@@ -12,8 +12,8 @@ use super::partition::Partition;
 use super::{EVEN_PART, NONE, OrderError};
 use crate::stage::Scratch;
 
-/// The first allowance: 2 steps.
-const FIRST_ALLOWANCE: i64 = 2 << 8;
+/// The first allowance: 8 steps.
+const FIRST_ALLOWANCE: i64 = 8 << 8;
 
 /// Changes the moves `mate` between odd stations until no two of `near` can join two parts.
 pub(super) fn mend(
@@ -58,7 +58,7 @@ pub(super) fn mend(
                 }
             }
         }
-        allowance += allowance / 2;
+        allowance *= 2;
     }
     Ok(())
 }

@@ -17,8 +17,8 @@ pub(super) struct Near<'a> {
 }
 
 impl<'a> Near<'a> {
-    /// Finds up to `per_station` neighbours of each station, half of them at most in its own part:
-    /// the points of a fine curve must not hide what is beside it.
+    /// Finds up to `per_station` neighbours of each station, a quarter of them in each quadrant: what
+    /// crowds on one side, as the ends of a hatching, must not hide what is on the other.
     pub fn new(
         network: Network<'_>,
         per_station: usize,
@@ -28,10 +28,9 @@ impl<'a> Near<'a> {
         let stations = scratch.take(usize::from(network.stations()) * per_station)?;
         stations.fill(NONE);
         let mut lent = scratch.reborrow();
-        let part = network.parts(&mut lent)?;
         let grid = Grid::new(network, &mut lent)?;
         for (station, near) in (0..).zip(stations.chunks_exact_mut(per_station)) {
-            grid.search(station, part, near, pace)?;
+            grid.search(station, near, pace)?;
         }
         Ok(Self { stations, per_station })
     }
@@ -39,6 +38,11 @@ impl<'a> Near<'a> {
     /// Bytes of scratch that stay taken for so many stations.
     pub const fn bytes(stations: usize, per_station: usize) -> usize {
         Scratch::bytes_for::<u16>(stations * per_station)
+    }
+
+    /// Bytes of scratch besides while they are found.
+    pub const fn bytes_to_find(stations: usize) -> usize {
+        Scratch::bytes_for::<u16>(stations / 2 + 2) + Scratch::bytes_for::<u16>(stations)
     }
 
     /// The neighbours of `station`, the nearest first.
@@ -122,23 +126,35 @@ impl<'s, 'a> Grid<'s, 'a> {
         &self.stations[begin(from)..begin(to + 1)]
     }
 
-    /// Fills `near` with the nearest stations of `station`, half of them at most of its own part.
+    /// Fills `near` with the nearest stations around `station`, as many from each quadrant, the
+    /// nearest first.
     fn search(
         &self,
         station: u16,
-        part: &[u16],
         near: &mut [u16],
         pace: &mut Pace<'_>,
     ) -> Result<(), OrderError> {
-        let (column, row) = self.cell(self.network.place(station));
-        let own = part[usize::from(station)];
-        let own_most = near.len().div_ceil(2);
-        let (mut found, mut own_found) = (0, 0);
+        let place = self.network.place(station);
+        let (column, row) = self.cell(place);
+        let distance = |other: u16| match other {
+            NONE => u32::MAX,
+            other => self.network.distance(station, other),
+        };
+        let per_quadrant = near.len() / 4;
+        let mut enough = None;
         for ring in 0..self.columns.max(self.rows) {
-            // Whatever is in this ring or beyond is farther than the cells within are wide.
+            // Whatever is in this ring or beyond is farther than the cells within are wide. Where
+            // a quadrant is all but empty the search ends at twice the width that was enough.
             let reach = ((ring - 1).max(0) as u64) << (self.cell_bits + 8);
-            let full = found == near.len();
-            if full && u64::from(self.network.distance(station, near[found - 1])) <= reach {
+            let last = near.chunks_exact(per_quadrant).filter_map(|quadrant| quadrant.last());
+            if last.clone().filter(|&&last| last != NONE).count() >= 2 && enough.is_none() {
+                enough = Some(2 * ring);
+            }
+            let done = |&last: &u16| match last {
+                NONE => enough.is_some_and(|enough| ring > enough),
+                last => u64::from(distance(last)) <= reach,
+            };
+            if last.clone().all(done) {
                 break;
             }
             for line in row - ring..=row + ring {
@@ -148,43 +164,38 @@ impl<'s, 'a> Grid<'s, 'a> {
                 } else {
                     [column - ring, column + ring].map(|side| self.stretch(line, side, side))
                 };
-                pace.work(0)?;
-                for &other in sides.into_iter().flatten() {
-                    if other == station {
-                        continue;
-                    }
-                    pace.work(2)?;
-                    let is_own = |other: u16| part[usize::from(other)] == own;
-                    let distance = self.network.distance(station, other);
-                    let nearer = |other: u16| {
-                        (self.network.distance(station, other), other) < (distance, NONE)
-                    };
-                    // Who gives way: the last of its own kind if that is full, else the last.
-                    let leaves = if is_own(other) && own_found == own_most {
-                        near[..found].iter().rposition(|&other| is_own(other)).unwrap_or(0)
-                    } else if found < near.len() {
-                        found
-                    } else {
-                        found - 1
-                    };
-                    if leaves < found && nearer(near[leaves]) {
-                        continue;
-                    }
-                    if leaves < found {
-                        own_found -= usize::from(is_own(near[leaves]));
-                    } else {
-                        found += 1;
-                    }
-                    own_found += usize::from(is_own(other));
-                    let mut place = leaves;
-                    while place > 0 && !nearer(near[place - 1]) {
-                        near[place] = near[place - 1];
-                        place -= 1;
-                    }
-                    near[place] = other;
+                for &other in sides.into_iter().flatten().filter(|&&other| other != station) {
+                    pace.work(1)?;
+                    let there = self.network.place(other);
+                    let quadrant =
+                        2 * usize::from(there.y < place.y) + usize::from(there.x < place.x);
+                    let begin = quadrant * per_quadrant;
+                    insert(&mut near[begin..begin + per_quadrant], other, distance);
                 }
             }
         }
+        for index in 1..near.len() {
+            let other = core::mem::replace(&mut near[index], NONE);
+            insert(&mut near[..=index], other, distance);
+        }
         Ok(())
+    }
+}
+
+/// Puts `station` into its place in a sorted list; the last one leaves.
+fn insert(list: &mut [u16], station: u16, distance: impl Fn(u16) -> u32) {
+    let Some((last, _)) = list.split_last_mut() else {
+        return;
+    };
+    let own = (distance(station), station);
+    if own >= (distance(*last), *last) {
+        return;
+    }
+    *last = station;
+    for index in (1..list.len()).rev() {
+        if (distance(list[index - 1]), list[index - 1]) <= own {
+            break;
+        }
+        list.swap(index - 1, index);
     }
 }

@@ -1,4 +1,4 @@
-//! A computation that answers the line as it goes.
+//! A computation that answers the line as it goes, and knows when to end.
 
 use crate::stage::{Aborted, Attention};
 
@@ -6,14 +6,15 @@ use crate::stage::{Aborted, Attention};
 pub(super) struct Pace<'a> {
     attention: &'a mut dyn Attention,
     done: u32,
+    budget: u64,
 }
 
 impl<'a> Pace<'a> {
-    /// Distances between two answers: each takes up to 800 instructions on the smallest core.
-    const UNITS: u32 = 200;
+    /// Distances between two answers: each takes up to 500 instructions on the smallest core.
+    const UNITS: u32 = 256;
 
     pub fn new(attention: &'a mut dyn Attention) -> Self {
-        Self { attention, done: 0 }
+        Self { attention, done: 0, budget: 0 }
     }
 
     /// Answers now: between two passes over the whole drawing.
@@ -24,10 +25,21 @@ impl<'a> Pace<'a> {
     /// Notes `units` of work, each as much as a distance costs.
     pub fn work(&mut self, units: u32) -> Result<(), Aborted> {
         self.done += units;
+        self.budget = self.budget.saturating_sub(u64::from(units));
         if self.done >= Self::UNITS {
             self.done = 0;
             self.attention.check()?;
         }
         Ok(())
+    }
+
+    /// Sets how many units may be worked from now until it [is over](Self::is_over).
+    pub fn grant(&mut self, units: u64) {
+        self.budget = units;
+    }
+
+    /// Whether the units granted have been used up.
+    pub fn is_over(&self) -> bool {
+        self.budget == 0
     }
 }

@@ -10,6 +10,7 @@ mod job;
 mod memory;
 mod options;
 mod reply;
+mod solid;
 
 pub use board::Board;
 pub use job::{Cursor, Job, Observer, Strokes, Unobserved};
@@ -220,6 +221,7 @@ impl Inner<'_> {
         let mut listener = Listener { board, position, stage: Stage::View, hold: false };
         self.compute(&mut listener, &mut Unobserved)?;
         let hold = listener.hold;
+        self.report_degenerate(board);
         let mut strokes = self.job.strokes(self.words, &mut self.cursor);
         self.machine.start(&mut strokes)?;
         self.cursor = Cursor::default();
@@ -227,6 +229,14 @@ impl Inner<'_> {
             self.machine.hold();
         }
         Ok(())
+    }
+
+    #[inline(never)] // Its frame must not lie under the stages'.
+    fn report_degenerate<B: Board>(&self, board: &mut B) {
+        let count = self.job.degenerate_faces();
+        if count > 0 {
+            Reply(board).line(format_args!("[MSG:{count} faces have no area and are left out]"));
+        }
     }
 
     fn compute(

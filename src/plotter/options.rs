@@ -4,7 +4,7 @@ use crate::drawing::Page;
 use crate::fixed::Millimetres;
 use crate::model::Model;
 use crate::order;
-use crate::protocol::{HiddenLines, PlotOption, ProjectionChoice};
+use crate::protocol::{HiddenLines, PlotOption, ProjectionChoice, WayToSee};
 use crate::view::{Camera, Direction, Lens, Sight, View};
 use crate::visibility::{self, Crease};
 
@@ -18,6 +18,8 @@ pub struct PlotOptions {
     projection: ProjectionChoice,
     /// Whether what is behind the eye is cut off; else it is an error.
     pub clip_behind: bool,
+    /// How it is found out what is seen.
+    pub see: WayToSee,
     /// What becomes of hidden lines.
     pub hidden: HiddenLines,
     /// Whether the lines are drawn where faces pass through each other.
@@ -45,17 +47,14 @@ impl Default for PlotOptions {
             angles: None,
             projection: ProjectionChoice::default(),
             clip_behind: true,
+            see: WayToSee::Faces,
             hidden: HiddenLines::Erased,
             seams: true,
             merged_blocks: false,
             crease: 0.0,
             page: Page { width, height, margin },
             fit: false,
-            order: order::Options {
-                method: order::Method::Auto,
-                shape: order::Shape::OpenPath,
-                effort: 100,
-            },
+            order: order::Options::default(),
         }
     }
 }
@@ -73,6 +72,7 @@ impl PlotOptions {
             }
             PlotOption::Projection(projection) => self.projection = projection,
             PlotOption::ClipBehind(clip) => self.clip_behind = clip,
+            PlotOption::See(see) => self.see = see,
             PlotOption::Hidden(hidden) => self.hidden = hidden,
             PlotOption::Seams(seams) => self.seams = seams,
             PlotOption::MergedBlocks(merged) => self.merged_blocks = merged,
@@ -90,6 +90,7 @@ impl PlotOptions {
         self.eye.is_none()
             && self.angles.is_none()
             && matches!(self.projection, ProjectionChoice::Lens(_))
+            && matches!(self.see, WayToSee::Faces | WayToSee::Wire)
     }
 
     /// The camera for `model`; what the user did not choose is chosen here. `None` without vertices.
@@ -151,6 +152,12 @@ impl PlotOptions {
                 line(format_args!("$projection=axonometric,{azimuth},{elevation}"));
             }
         }
+        let see = match self.see {
+            WayToSee::Faces => "faces",
+            WayToSee::Wire => "wire",
+            WayToSee::Vertices => "vertices",
+            WayToSee::Edges => "edges",
+        };
         let hidden = match self.hidden {
             HiddenLines::Erased => "erased",
             HiddenLines::Dotted => "dotted",
@@ -158,6 +165,7 @@ impl PlotOptions {
             HiddenLines::Shown => "shown",
         };
         line(format_args!("$behind={}", if self.clip_behind { "clip" } else { "refuse" }));
+        line(format_args!("$see={see}"));
         line(format_args!("$hidden={hidden}"));
         line(format_args!("$seams={}", if self.seams { "on" } else { "off" }));
         line(format_args!("$blocks={}", if self.merged_blocks { "merged" } else { "separate" }));

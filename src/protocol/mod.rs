@@ -10,6 +10,6 @@ mod command;
 mod line;
 mod refusal;
 
-pub use command::{Command, HELP, HiddenLines, Numbers, PlotOption, ProjectionChoice};
+pub use command::{Command, HELP, HiddenLines, Numbers, PlotOption, ProjectionChoice, WayToSee};
 pub use line::{LINE_LIMIT, LineReader, RealTime};
 pub use refusal::{MEANINGS, Refusal};

@@ -2,9 +2,10 @@
 
 use super::VisibilityError;
 use super::crease::Crease;
+use super::pace::Pace;
 use crate::geometry::{Projection, Vertex};
 use crate::model::Corner;
-use crate::stage::{Attention, Scratch};
+use crate::stage::Scratch;
 
 /// The corners of the elements, addressed by the number of an element's first corner.
 #[derive(Debug, Clone, Copy)]
@@ -55,9 +56,6 @@ pub struct ChosenSides<'a> {
     bits: &'a mut [u32],
 }
 
-/// Steps along chains and outlines, some 20 instructions each.
-const WORK_BETWEEN_CHECKS: usize = 2000;
-
 /// No side: the end of a chain.
 const NONE: u16 = u16::MAX;
 
@@ -84,7 +82,7 @@ impl<'a> ChosenSides<'a> {
         vertices: &[Vertex],
         crease: Option<Crease>,
         scratch: &mut Scratch<'a>,
-        attention: &mut dyn Attention,
+        pace: &mut Pace<'_>,
     ) -> Result<Self, VisibilityError> {
         let corners = outlines.corners;
         let word_count = corners.len().div_ceil(32);
@@ -95,7 +93,6 @@ impl<'a> ChosenSides<'a> {
         // Edges that have met a second side.
         let mut shared = ChosenSides { bits: meantime.take(word_count)? };
         heads.fill(NONE);
-        let mut work = 0;
         for (first, element) in outlines.elements() {
             for (number, from, to) in sides(element) {
                 if from == to {
@@ -112,7 +109,7 @@ impl<'a> ChosenSides<'a> {
                         break;
                     }
                     known = next[usize::from(known)];
-                    work += 1;
+                    pace.spend(30)?;
                 }
                 if known == NONE {
                     next[side] = *head;
@@ -135,11 +132,7 @@ impl<'a> ChosenSides<'a> {
                     }
                 }
             }
-            work += element.len();
-            if work > WORK_BETWEEN_CHECKS {
-                work = 0;
-                attention.check()?;
-            }
+            pace.spend(100 * element.len())?;
         }
         Ok(chosen)
     }

@@ -8,9 +8,10 @@ use super::VisibilityError;
 use super::edges::Outlines;
 use super::faces::Faces;
 use super::outlook::{Outlook, Place};
+use super::pace::Pace;
 use super::raster::{Bounds, Raster, Shape};
 use crate::geometry::COORDINATE_LIMIT;
-use crate::stage::{Attention, Scratch};
+use crate::stage::Scratch;
 use bytemuck::{Pod, Zeroable};
 
 /// One cell of the page.
@@ -62,12 +63,11 @@ impl<'a> Grid<'a> {
         outlines: Outlines<'_>,
         faces: &Faces<'_>,
         mut scratch: Scratch<'a>,
-        attention: &mut dyn Attention,
+        pace: &mut Pace<'_>,
     ) -> Result<Self, VisibilityError> {
         let wanted_cells = (faces.len() * CELLS_FOR_EACH_FACE).min(usize::from(u16::MAX));
         let mut shape = Shape::finest(outlook);
         while shape.cells() > 1 {
-            attention.check()?;
             let fits = |entries: usize| {
                 let bytes =
                     Scratch::bytes_for::<Cell>(shape.cells()) + Scratch::bytes_for::<u16>(entries);
@@ -75,18 +75,16 @@ impl<'a> Grid<'a> {
             };
             if shape.cells() <= wanted_cells
                 && fits(faces.len())
-                && fits(shape.most_entries(outlook, outlines, faces))
+                && fits(shape.most_entries(outlook, outlines, faces, pace)?)
             {
                 break;
             }
             shape.coarsen();
         }
         let mut raster = Raster::new(shape, scratch.take(shape.cells())?);
-        attention.check()?;
-        let entry_count = raster.count(outlook, outlines, faces);
+        let entry_count = raster.count(outlook, outlines, faces, pace)?;
         let entries: &mut [u16] = scratch.take(entry_count)?;
-        attention.check()?;
-        raster.fill(outlook, outlines, faces, entries);
+        raster.fill(outlook, outlines, faces, entries, pace)?;
         Ok(Self { shape, columns: shape.columns(), cells: raster.cells(), entries })
     }
 

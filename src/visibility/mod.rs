@@ -2,7 +2,8 @@
 //!
 //! [`find_stretches`] takes a [`Scene`], any faces at all (convex or concave, closed or open, touching,
 //! sharing planes, passing through each other) and any bars, and hands over the visible stretches
-//! of each distinct edge, and the hidden ones if asked. The result is exact for the rounded vertices.
+//! of each distinct edge, and the hidden ones if asked. The result is exact for the rounded vertices; only
+//! whether a vertex lies in the plane of a face is asked of the model, if its positions are known.
 //!
 //! * Both sides of a face hide. A face counts as its triangles.
 //! * The rule for ties: a point of an edge is hidden if the points of the page just to its left *and* just
@@ -12,10 +13,29 @@
 //!   first of the model.
 //! * An edge that the eye sees end-on has no length on the page and no stretch.
 //!
-//! The way: choose one side of a face for each edge (`edges`), place the vertices on a coarse grid of
-//! the page (`outlook`), cut concave faces (`triangles`), sort the faces by depth (`faces`) and into
-//! cells (`grid`); then follow each edge through the cells and mark on its `profile` what each
-//! face hides (`sight`). Refused: vertices out of range, a model too large, too little memory.
+//! The way: choose one side of a face for each edge (`edges`, `crease`), cut concave faces into
+//! triangles (`triangles`), place the vertices on a coarse grid of the page (`outlook`), sort the faces by
+//! depth (`faces`) and into cells (`grid`, `raster`); then follow each edge through the cells (`search`) and
+//! mark on its `profile` what each face hides (`sight`). On request, find the lines where faces pass
+//! through each other (`seams`) and leave out those within one plane (`blocks`).
+//!
+//! # Memory
+//! [`scratch_bytes`] is the least; with more, the grid is finer and fewer faces are tried for each edge.
+//!
+//! | scene | vertices | faces | least bytes |
+//! |---|---|---|---|
+//! | lattice5 | 1000 | 750 | 9176 |
+//! | lattice7 | 2744 | 2058 | 24992 |
+//! | torus of 2400 quads | 2400 | 2400 | 26400 |
+//!
+//! The least means one cell, and every face is tried for every edge. A tenth more makes it several times
+//! faster; twice as much is as good as any.
+//!
+//! For each vertex 4 bytes; for each corner 1/8; for each element 4 and 1/4; for each entry of the grid 2 and for
+//! each cell 6. Before that, while edges are chosen, 2 for each vertex and 2 1/8 for each corner. Faces that no fan
+//! of triangles covers take 4 bytes and 6 for each of their triangles.
+//!
+//! Refused: vertices out of range, a model too large, too little memory.
 
 mod blocks;
 mod crease;
@@ -23,27 +43,29 @@ mod edges;
 mod faces;
 mod grid;
 mod outlook;
+mod pace;
 mod profile;
 mod raster;
 mod seams;
+mod search;
 mod sight;
 mod triangles;
+mod wire;
 
 use crate::geometry::{COORDINATE_LIMIT, Projection, Vertex};
 use crate::model::Elements;
 use crate::stage::{Aborted, Attention, OutOfScratch, Scratch};
-use edges::{ChosenSides, MOST_CORNERS, Outlines, sides};
+use edges::{ChosenSides, MOST_CORNERS, Outlines};
 use faces::Faces;
-use grid::Grid;
 use outlook::{Outlook, Place};
-use profile::{FEWEST_PIECES, Part, Piece, Profile, mark};
-use raster::Bounds;
-use seams::seam;
-use sight::{Sight, Surroundings};
+use pace::Pace;
+use search::Search;
+use sight::Surroundings;
 use triangles::Ears;
 
 pub use crate::geometry::Along;
 pub use crease::Crease;
+pub use wire::follow_wire;
 
 /// A scene as the camera sees it: rounded vertices, and the faces and bars between them.
 #[derive(Debug, Clone, Copy)]
@@ -54,6 +76,11 @@ pub struct Scene<'a> {
     pub elements: Elements<'a>,
     /// Perspective or parallel.
     pub projection: Projection,
+    /// Each vertex in the model's own space, within ±2^30, as far as known; none if empty.
+    ///
+    /// Rounding to view coordinates takes a block's foot off the floor that it stands on. With these, a
+    /// vertex that lies in the plane of a face in the model lies there in the view, too.
+    pub positions: &'a [[i32; 3]],
 }
 
 /// What the user may choose.
@@ -141,7 +168,12 @@ impl From<Aborted> for VisibilityError {
 /// The least working memory with which [`find_stretches`] does a scene of this size.
 ///
 /// It uses more where it is given more: a finer grid, so that fewer faces are tried for each edge.
+///
+/// Zero for a scene that is refused for what it is.
 pub fn scratch_bytes(scene: &Scene<'_>) -> usize {
+    if check(scene).is_err() {
+        return 0;
+    }
     let outlines = Outlines { corners: scene.elements.corners() };
     let corners = outlines.corners.len();
     let vertices = scene.vertices.len();
@@ -151,14 +183,9 @@ pub fn scratch_bytes(scene: &Scene<'_>) -> usize {
         + ChosenSides::bytes_while_choosing(vertices, corners).max(
             Scratch::bytes_for::<Place>(vertices)
                 + Scratch::bytes_for::<u32>(faces)
-                + 2 * Scratch::bytes_for::<u32>(faces.div_ceil(32))
-                + Scratch::bytes_for::<Piece>(FEWEST_PIECES)
-                + Grid::least_bytes(faces),
+                + Search::least_bytes(faces),
         )
 }
-
-/// Pieces that the profile of an edge may have before the edge is done in parts.
-const MOST_PIECES: usize = 24;
 
 /// Finds the stretches of every edge and bar of the scene, in the order of the model.
 ///
@@ -173,46 +200,20 @@ pub fn find_stretches(
 ) -> Result<Report, VisibilityError> {
     check(scene)?;
     let outlines = Outlines { corners: scene.elements.corners() };
-    let vertices = scene.vertices;
-    let chosen = ChosenSides::choose(
-        outlines,
-        scene.projection,
-        vertices,
-        options.crease,
-        &mut scratch,
-        attention,
-    )?;
-    let ears = Ears::cut(outlines, vertices, &mut scratch, attention)?;
-    let outlook = Outlook::new(scene.projection, vertices, &mut scratch)?;
-    attention.check()?;
-    let faces = Faces::sort(outlines, vertices, &mut scratch, attention)?;
-    attention.check()?;
-    let seen = scratch.take(faces.len().div_ceil(32))?;
-    let met = if options.with_seams { Some(scratch.take(faces.len().div_ceil(32))?) } else { None };
-    let piece_count = MOST_PIECES.min(scratch.available_bytes() / 8 / size_of::<Piece>());
-    let pieces = scratch.take(piece_count.max(FEWEST_PIECES))?;
-    let grid = Grid::new(&outlook, outlines, &faces, scratch, attention)?;
-    let mut search = Search {
-        around: Surroundings { outlook, outlines, ears, chosen, faces },
-        grid,
-        seen,
-        profile: Profile::new(pieces),
-        options,
-    };
-    for (first, element) in outlines.elements() {
-        attention.check()?;
-        for (number, p, q) in sides(element) {
-            let side = first + number;
-            if search.around.chosen.contains(side) {
-                let sight = Sight::new(side, outlook.end(p), outlook.end(q));
-                search.follow(&sight, [None; 2], sink)?;
-            }
-        }
+    let (vertices, projection) = (scene.vertices, scene.projection);
+    let pace = &mut Pace::new(attention);
+    let memory = &mut scratch;
+    let chosen = ChosenSides::choose(outlines, projection, vertices, options.crease, memory, pace)?;
+    let ears = Ears::cut(outlines, vertices, memory, pace)?;
+    let outlook = Outlook::new(scene, memory, pace)?;
+    let faces = Faces::sort(outlines, vertices, memory, pace)?;
+    let around = Surroundings { outlook, outlines, ears, chosen, faces };
+    let mut search = Search::new(around, options, scratch, pace)?;
+    search.follow_edges(pace, sink)?;
+    if options.with_seams {
+        search.follow_seams(pace, sink)?;
     }
-    if let Some(met) = met {
-        search.follow_seams(met, attention, sink)?;
-    }
-    Ok(Report { degenerate_faces: search.around.faces.degenerate() })
+    Ok(Report { degenerate_faces: search.degenerate_faces() })
 }
 
 /// Refuses what the arithmetic cannot take.
@@ -239,178 +240,5 @@ fn check(scene: &Scene<'_>) -> Result<(), VisibilityError> {
     match scene.vertices.iter().position(|vertex| !is_good(vertex)) {
         Some(number) => Err(VisibilityError::OutOfRange(number as u16)),
         None => Ok(()),
-    }
-}
-
-/// The search for the stretches of one edge after the other.
-struct Search<'a> {
-    around: Surroundings<'a>,
-    grid: Grid<'a>,
-    /// One bit for each rank: whether the edge has met this face.
-    seen: &'a mut [u32],
-    profile: Profile<'a>,
-    options: Options,
-}
-
-impl Search<'_> {
-    /// Finds the seams and what is seen of them. `met` has a bit for each rank.
-    fn follow_seams(
-        &mut self,
-        met: &mut [u32],
-        attention: &mut dyn Attention,
-        sink: &mut dyn StretchSink,
-    ) -> Result<(), VisibilityError> {
-        for one in 0..self.around.faces.len() {
-            attention.check()?;
-            self.meet(one, met);
-            for other in one + 1..self.around.faces.len() {
-                if met[other / 32] >> (other % 32) & 1 == 0 {
-                    continue;
-                }
-                attention.check()?;
-                let (face_one, face_other) =
-                    (self.around.faces.get(one), self.around.faces.get(other));
-                for n in 0.. {
-                    let Some(triangle_one) = self.around.triangle(face_one, n) else {
-                        break;
-                    };
-                    for m in 0.. {
-                        let Some(triangle_other) = self.around.triangle(face_other, m) else {
-                            break;
-                        };
-                        let outlook = &self.around.outlook;
-                        let corners = [triangle_one, triangle_other]
-                            .map(|triangle| triangle.map(|number| outlook.vertex(number)));
-                        if let Some((p, q)) = seam(corners[0], corners[1]) {
-                            let sight = Sight::new(
-                                Sight::NO_SIDE,
-                                outlook.free_end(p),
-                                outlook.free_end(q),
-                            );
-                            self.follow(&sight, [Some(one), Some(other)], sink)?;
-                        }
-                    }
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// Leaves in `met` the faces after `one` that may pass through it where something is seen.
-    fn meet(&self, one: usize, met: &mut [u32]) {
-        met.fill(0);
-        let outlook = &self.around.outlook;
-        let corners = self.around.outlines.element(self.around.faces.get(one).first);
-        let bounds = Bounds::of(outlook, corners);
-        let far = corners.iter().map(|corner| outlook.vertex(corner.vertex()).z).max();
-        let far = far.unwrap_or(-COORDINATE_LIMIT);
-        self.grid.within(&bounds, |ranks| {
-            for &other in ranks {
-                let other = usize::from(other);
-                if self.around.faces.begins_behind(other, far) {
-                    break;
-                }
-                if other > one {
-                    met[other / 32] |= 1 << (other % 32);
-                }
-            }
-        });
-    }
-
-    /// Finds the stretches of an edge, or of the seam of two faces.
-    fn follow(
-        &mut self,
-        sight: &Sight,
-        seam_of: [Option<usize>; 2],
-        sink: &mut dyn StretchSink,
-    ) -> Result<(), VisibilityError> {
-        let outlook = &self.around.outlook;
-        let ends = (sight.p.vertex, sight.q.vertex);
-        if outlook.direction(ends.0, ends.1).is_none() {
-            return Ok(());
-        }
-        let edge = (sight.side != Sight::NO_SIDE).then_some((sight.p.number, sight.q.number));
-        let mut pending: Option<Stretch> = None;
-        let mut start = Along::START;
-        while start < Along::END {
-            self.profile.open(start);
-            self.look_around(sight, seam_of);
-            let end = self.profile.end();
-            let pieces = self.profile.pieces();
-            let next = pieces.iter().skip(1).map(|piece| piece.from).chain([end]);
-            for (piece, to) in pieces.iter().zip(next) {
-                let visible = piece.marks & mark::HIDDEN != mark::HIDDEN;
-                let handed = if visible {
-                    piece.marks & mark::STOOD_IN == 0
-                        && !(self.options.merged_blocks
-                            && sight.is_within_plane(&self.around, piece.marks))
-                } else {
-                    self.options.with_hidden && edge.is_some()
-                };
-                match &mut pending {
-                    Some(stretch)
-                        if handed && stretch.visible == visible && stretch.to == piece.from =>
-                    {
-                        stretch.to = to;
-                    }
-                    _ => {
-                        let next =
-                            handed.then_some(Stretch { edge, ends, from: piece.from, to, visible });
-                        if let Some(stretch) = core::mem::replace(&mut pending, next) {
-                            sink.stretch(stretch)?;
-                        }
-                    }
-                }
-            }
-            start = end;
-        }
-        if let Some(stretch) = pending {
-            sink.stretch(stretch)?;
-        }
-        Ok(())
-    }
-
-    /// Marks on the profile what every face along the way does to the edge.
-    fn look_around(&mut self, sight: &Sight, seam_of: [Option<usize>; 2]) {
-        let Self { around, grid, seen, profile, options } = self;
-        let faces_by_rank = &around.faces;
-        let near = grid::coarse_depth(sight.near);
-        let way = grid.way(sight.p.place, sight.q.place, near);
-        let (mut any_covered, mut all_covered) = (false, true);
-        way.visit(|cell| {
-            any_covered |= cell.cover.is_some();
-            all_covered &= cell.cover.is_some();
-            true
-        });
-        if all_covered {
-            profile.mark(Part::WHOLE, mark::HIDDEN);
-            return;
-        }
-        seen.fill(0);
-        for rank in seam_of.into_iter().flatten() {
-            seen[rank / 32] |= 1 << (rank % 32);
-        }
-        let mut look_at = |rank: u16| {
-            let word = &mut seen[usize::from(rank) / 32];
-            let bit = 1 << (rank % 32);
-            if *word & bit == 0 {
-                *word |= bit;
-                let rank = usize::from(rank);
-                sight.look_at(around, faces_by_rank.get(rank), profile);
-                if options.merged_blocks {
-                    sight.touch(around, faces_by_rank.get(rank), rank, profile);
-                }
-            }
-            !profile.is_hidden()
-        };
-        // Covering faces first: they hide most, and what they leave may need no other cell.
-        let _ = (!any_covered || way.visit(|cell| cell.cover.is_none_or(&mut look_at)))
-            && way.visit(|cell| {
-                let faces = if cell.cover.is_some() { &[] } else { cell.faces };
-                faces
-                    .iter()
-                    .take_while(|&&rank| !faces_by_rank.begins_behind(usize::from(rank), sight.far))
-                    .all(|&rank| look_at(rank))
-            });
     }
 }

@@ -1,8 +1,14 @@
 //! The scene as it lies on the page: each vertex by its place on a coarse grid of 2^14 by 2^14, and
 //! "on which side" answered from those places where they suffice, exactly where they do not.
 
-use crate::geometry::{Along, Axis, Projection, Vertex, page_offset, page_side};
-use crate::stage::{OutOfScratch, Scratch};
+use super::Scene;
+use super::VisibilityError;
+use super::pace::Pace;
+use crate::geometry::{
+    Along, Axis, Projection, Vertex, are_coplanar, page_offset, page_side, plane_side,
+    plane_side_margin,
+};
+use crate::stage::{Aborted, Scratch};
 use bytemuck::{Pod, Zeroable};
 
 /// Places on the coarse grid are below 2^this, so that a product of two differences fits 29 bits.
@@ -103,6 +109,9 @@ impl Line<'_> {
     }
 }
 
+/// Instructions for two divisions of 64 bits on a core without a divider.
+const TWO_DIVISIONS: usize = 1500;
+
 /// How the page is laid on the coarse grid.
 #[derive(Debug, Clone, Copy)]
 struct Mapping {
@@ -112,17 +121,22 @@ struct Mapping {
 }
 
 impl Mapping {
-    fn new(projection: Projection, vertices: &[Vertex]) -> Self {
+    fn new(
+        projection: Projection,
+        vertices: &[Vertex],
+        pace: &mut Pace<'_>,
+    ) -> Result<Self, Aborted> {
         let (mut low, mut high) = ((i64::MAX, i64::MAX), (i64::MIN, i64::MIN));
         for (x, y) in vertices.iter().map(|&vertex| fine(projection, vertex)) {
             low = (low.0.min(x), low.1.min(y));
             high = (high.0.max(x), high.1.max(y));
+            pace.spend(TWO_DIVISIONS)?;
         }
         let shift_for = |low: i64, high: i64| {
             let extent = high.saturating_sub(low).max(0);
             (64 - extent.leading_zeros()).saturating_sub(PLACE_BITS)
         };
-        Self { projection, low, shift: (shift_for(low.0, high.0), shift_for(low.1, high.1)) }
+        Ok(Self { projection, low, shift: (shift_for(low.0, high.0), shift_for(low.1, high.1)) })
     }
 
     fn place(&self, vertex: Vertex) -> Place {
@@ -166,22 +180,26 @@ pub struct Outlook<'a> {
     pub projection: Projection,
     pub vertices: &'a [Vertex],
     pub places: &'a [Place],
+    /// Each vertex in the model's space, as far as known.
+    positions: &'a [[i32; 3]],
     mapping: Mapping,
 }
 
 impl<'a> Outlook<'a> {
     /// Places every vertex on the coarse grid.
     pub fn new<'s: 'a>(
-        projection: Projection,
-        vertices: &'a [Vertex],
+        scene: &Scene<'a>,
         scratch: &mut Scratch<'s>,
-    ) -> Result<Self, OutOfScratch> {
+        pace: &mut Pace<'_>,
+    ) -> Result<Self, VisibilityError> {
+        let Scene { projection, vertices, .. } = *scene;
         let places: &mut [Place] = scratch.take(vertices.len())?;
-        let mapping = Mapping::new(projection, vertices);
+        let mapping = Mapping::new(projection, vertices, pace)?;
         for (place, &vertex) in places.iter_mut().zip(vertices) {
             *place = mapping.place(vertex);
+            pace.spend(TWO_DIVISIONS)?;
         }
-        Ok(Self { projection, vertices, places, mapping })
+        Ok(Self { projection, vertices, places, positions: scene.positions, mapping })
     }
 
     /// A vertex as the end of an edge.
@@ -226,6 +244,34 @@ impl<'a> Outlook<'a> {
         Along::zero_between(self.side_value(a, b, p), self.side_value(a, b, q))
     }
 
+    /// How far an end lies behind the plane of a triangle that turns anticlockwise on the page, and before
+    /// that of one that turns clockwise.
+    ///
+    /// Zero if it lies in the plane in the model, where that is known: rounding takes it out of it.
+    pub fn height(&self, triangle: [u16; 3], end: End) -> i64 {
+        if triangle.contains(&end.number) {
+            return 0;
+        }
+        let [a, b, c] = triangle.map(|number| self.vertex(number));
+        let height = plane_side(a, b, c, end.vertex);
+        if height.abs() <= plane_side_margin(a, b, c, end.vertex) && self.holds(triangle, end) {
+            0
+        } else {
+            height
+        }
+    }
+
+    /// Whether the plane of a triangle holds an end in the model.
+    #[cold]
+    fn holds(&self, triangle: [u16; 3], end: End) -> bool {
+        let [a, b, c] = triangle;
+        let at = |number: u16| self.positions.get(usize::from(number)).copied();
+        match [a, b, c, end.number].map(at) {
+            [Some(a), Some(b), Some(c), Some(d)] => are_coplanar([a, b, c, d]),
+            _ => false,
+        }
+    }
+
     /// An axis of the page along which p and q differ, and the sign of their difference.
     ///
     /// `None` if the eye sees them in line.
@@ -240,9 +286,15 @@ impl<'a> Outlook<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::Elements;
+    use crate::stage::Undisturbed;
+
+    fn scene(projection: Projection, vertices: &[Vertex]) -> Scene<'_> {
+        Scene { vertices, elements: Elements::new(&[]), projection, positions: &[] }
+    }
 
     #[test]
-    fn places_fill_the_grid_and_keep_the_order() -> Result<(), OutOfScratch> {
+    fn places_fill_the_grid_and_keep_the_order() -> Result<(), VisibilityError> {
         let vertices = [
             Vertex::new(-1 << 19, 0, 1),
             Vertex::new(1 << 19, 3, 1 << 19),
@@ -250,7 +302,10 @@ mod tests {
         ];
         for projection in [Projection::Perspective, Projection::Parallel] {
             let mut words = [0u64; 4];
-            let outlook = Outlook::new(projection, &vertices, &mut Scratch::new(&mut words))?;
+            let mut scratch = Scratch::new(&mut words);
+            let mut undisturbed = Undisturbed;
+            let pace = &mut Pace::new(&mut undisturbed);
+            let outlook = Outlook::new(&scene(projection, &vertices), &mut scratch, pace)?;
             let xs: [u16; 3] = [0, 1, 2].map(|n| outlook.place(n).x);
             assert!(xs[0] == 0 && xs[0] < xs[1] && xs[1] <= xs[2], "{xs:?}");
             assert!(xs[2] >= 1 << (PLACE_BITS - 1) && xs[2] < 1 << PLACE_BITS);
@@ -259,14 +314,17 @@ mod tests {
     }
 
     #[test]
-    fn a_coarse_answer_is_never_wrong() -> Result<(), OutOfScratch> {
+    fn a_coarse_answer_is_never_wrong() -> Result<(), VisibilityError> {
         // Every triangle of a small lattice, seen in steep perspective.
         let vertices: std::vec::Vec<Vertex> = (0..64)
             .map(|n| Vertex::new(n % 4 * 70_001, n / 4 % 4 * 69_997, 100_000 + n / 16 * 100_003))
             .collect();
         let mut words = [0u64; 64];
-        let outlook =
-            Outlook::new(Projection::Perspective, &vertices, &mut Scratch::new(&mut words))?;
+        let outlook = Outlook::new(
+            &scene(Projection::Perspective, &vertices),
+            &mut Scratch::new(&mut words),
+            &mut Pace::new(&mut Undisturbed),
+        )?;
         let mut undecided = 0;
         for (a, b, c) in (0..64u16)
             .flat_map(|a| (0..64u16).flat_map(move |b| (0..64u16).map(move |c| (a, b, c))))

@@ -4,7 +4,9 @@ use super::edges::Outlines;
 use super::faces::Faces;
 use super::grid::{Cell, coarse_depth};
 use super::outlook::{CoarseLine, Outlook, PLACE_BITS, Place, coarse_side};
+use super::pace::Pace;
 use crate::model::Corner;
+use crate::stage::Aborted;
 
 /// How the page is cut into cells.
 #[derive(Debug, Clone, Copy)]
@@ -61,13 +63,17 @@ impl Shape {
         outlook: &Outlook<'_>,
         outlines: Outlines<'_>,
         faces: &Faces<'_>,
-    ) -> usize {
+        pace: &mut Pace<'_>,
+    ) -> Result<usize, Aborted> {
         let cells_of = |rank: usize| {
             let bounds = Bounds::of(outlook, outlines.element(faces.get(rank).first));
             let [column0, column1, row0, row1] = self.span(&bounds).map(usize::from);
             (column1 - column0 + 1) * (row1 - row0 + 1)
         };
-        (0..faces.len()).map(cells_of).sum()
+        (0..faces.len()).try_fold(0, |sum, rank| {
+            pace.spend(200)?;
+            Ok(sum + cells_of(rank))
+        })
     }
 }
 
@@ -134,17 +140,18 @@ impl<'c> Raster<'c> {
         outlook: &Outlook<'_>,
         outlines: Outlines<'_>,
         faces: &Faces<'_>,
-    ) -> usize {
+        pace: &mut Pace<'_>,
+    ) -> Result<usize, Aborted> {
         let empty = |end: u16| Cell { end, cover_depth: NO_COVER, cover: 0 };
         self.cells.fill(empty(0));
-        self.visit(outlook, outlines, faces, |cell, _| cell.end += 1);
+        self.visit(outlook, outlines, faces, pace, |cell, _| cell.end += 1)?;
         let mut begin = 0;
         for cell in self.cells.iter_mut() {
             let count = cell.end;
             *cell = empty(begin);
             begin += count;
         }
-        usize::from(begin)
+        Ok(usize::from(begin))
     }
 
     /// Writes the lists; then each cell says where its list ends.
@@ -154,11 +161,12 @@ impl<'c> Raster<'c> {
         outlines: Outlines<'_>,
         faces: &Faces<'_>,
         entries: &mut [u16],
-    ) {
-        self.visit(outlook, outlines, faces, |cell, rank| {
+        pace: &mut Pace<'_>,
+    ) -> Result<(), Aborted> {
+        self.visit(outlook, outlines, faces, pace, |cell, rank| {
             entries[usize::from(cell.end)] = rank;
             cell.end += 1;
-        });
+        })
     }
 
     /// Calls `enter` for each face and each cell where it may be seen; notes the covering faces.
@@ -167,8 +175,9 @@ impl<'c> Raster<'c> {
         outlook: &Outlook<'_>,
         outlines: Outlines<'_>,
         faces: &Faces<'_>,
+        pace: &mut Pace<'_>,
         mut enter: impl FnMut(&mut Cell, u16),
-    ) {
+    ) -> Result<(), Aborted> {
         for rank in 0..faces.len() {
             let face = faces.get(rank);
             let corners = outlines.element(face.first);
@@ -177,7 +186,8 @@ impl<'c> Raster<'c> {
                 let z = outlook.vertex(corner.vertex()).z;
                 (near, far) = (near.min(z), far.max(z));
             }
-            let (near, far) = (coarse_depth(near), coarse_depth(far));
+            // One more: what rounding puts just behind the face may lie on it.
+            let (near, far) = (coarse_depth(near), coarse_depth(far + 1));
             let bounds = Bounds::of(outlook, corners);
             let mut sides = [HalfPlane::default(); MOST_SIDES];
             let side_count = self.half_planes(outlook, corners, &bounds, &mut sides);
@@ -185,6 +195,7 @@ impl<'c> Raster<'c> {
             let may_cover = face.is_fan && side_count > 0;
             let [column0, column1, row0, row1] = self.shape.span(&bounds);
             for row in row0..=row1 {
+                pace.spend(200 + 50 * usize::from(column1 - column0))?;
                 let first = usize::from(row) * self.columns;
                 let cells = first + usize::from(column0)..=first + usize::from(column1);
                 let mut values = [0; MOST_SIDES];
@@ -211,6 +222,7 @@ impl<'c> Raster<'c> {
                 }
             }
         }
+        Ok(())
     }
 
     /// Finds the sides of a face that is surely convex on the page, and returns how many; 0 if it may

@@ -10,7 +10,7 @@ use super::faces::{Face, Faces};
 use super::outlook::{CoarseLine, End, Outlook, Place};
 use super::profile::{Part, Profile, mark};
 use super::triangles::Ears;
-use crate::geometry::{Along, line_side, page_offset, page_side, plane_side};
+use crate::geometry::{Along, line_side, page_offset, page_side};
 use crate::model::Corner;
 
 /// What the search knows of the scene.
@@ -33,6 +33,15 @@ impl Surroundings<'_> {
             Some([b, c]) if face.is_fan => Some([corners[0].vertex(), b.vertex(), c.vertex()]),
             _ => None,
         }
+    }
+
+    /// Whether two faces have two corners in common, by their places; such faces do not cross elsewhere.
+    pub fn share_edge(&self, one: Face, other: Face) -> bool {
+        let at = |corner: &Corner| self.outlook.vertex(corner.vertex());
+        let other = self.outlines.element(other.first);
+        let shared = |corner: &&Corner| other.iter().any(|there| at(there) == at(corner));
+        let corners = self.outlines.element(one.first);
+        corners.iter().filter(shared).count() >= 2
     }
 
     /// The triangles of a face.
@@ -264,7 +273,7 @@ impl Sight {
         if on_left.is_none() && on_right.is_none() {
             return true;
         }
-        let behind = if far < self.near {
+        let behind = if far + 1 < self.near {
             Part::WHOLE
         } else {
             match self.depth_behind(outlook, corners, facing) {
@@ -292,14 +301,7 @@ impl Sight {
         let mut depth = None;
         for pair in corners[1..].windows(2) {
             let triangle = [corners[0], pair[0], pair[1]];
-            let [a, b, c] = triangle.map(|corner| outlook.vertex(corner));
-            let height = |end: End| {
-                if triangle.contains(&end.number) {
-                    0
-                } else {
-                    plane_side(a, b, c, end.vertex) * i64::from(facing)
-                }
-            };
+            let height = |end: End| outlook.height(triangle, end) * i64::from(facing);
             let here = behind_between(height(self.p), height(self.q));
             if corners.len() > 3 {
                 let is_all = here == Some(Part::WHOLE);

@@ -5,9 +5,10 @@
 
 use super::VisibilityError;
 use super::edges::{Outlines, is_bar};
+use super::pace::Pace;
 use crate::geometry::Vertex;
 use crate::model::Corner;
-use crate::stage::{Attention, Scratch};
+use crate::stage::Scratch;
 use bytemuck::{Pod, Zeroable};
 
 /// How a face becomes triangles.
@@ -71,9 +72,10 @@ impl<'a> Ears<'a> {
         outlines: Outlines<'_>,
         vertices: &[Vertex],
         scratch: &mut Scratch<'a>,
-        attention: &mut dyn Attention,
+        pace: &mut Pace<'_>,
     ) -> Result<Self, VisibilityError> {
         let needs = Needs::of(outlines, vertices);
+        pace.spend(200 * outlines.corners.len())?;
         let entries: &mut [Entry] = scratch.take(needs.faces)?;
         let ears: &mut [[u16; 3]] = scratch.take(needs.ears)?;
         let mut meantime = scratch.reborrow();
@@ -83,12 +85,10 @@ impl<'a> Ears<'a> {
             outlines.elements().filter(|(_, corners)| cut_of(corners, vertices) == Cut::Ears);
         for (entry, (first, corners)) in entries.iter_mut().zip(concave) {
             *entry = Entry { first_corner: first as u16, first_ear: used as u16 };
-            attention.check()?;
             for (place, corner) in remaining.iter_mut().zip(corners) {
                 *place = corner.vertex();
             }
-            used +=
-                cut_ears(&mut remaining[..corners.len()], vertices, &mut ears[used..], attention)?;
+            used += cut_ears(&mut remaining[..corners.len()], vertices, &mut ears[used..], pace)?;
         }
         Ok(Self { entries, ears: &mut ears[..used] })
     }
@@ -186,7 +186,7 @@ fn cut_ears(
     polygon: &mut [u16],
     vertices: &[Vertex],
     ears: &mut [[u16; 3]],
-    attention: &mut dyn Attention,
+    pace: &mut Pace<'_>,
 ) -> Result<usize, VisibilityError> {
     let at = |number: u16| vertices[usize::from(number)];
     let Some(plane) = Plane::of(polygon.iter().map(|&number| at(number))) else {
@@ -195,7 +195,7 @@ fn cut_ears(
     let mut count = 0;
     let mut left = polygon.len();
     while left >= 3 {
-        attention.check()?;
+        pace.spend(100 * left * left)?;
         let rest = &polygon[..left];
         let around = |middle: usize| {
             [rest[(middle + left - 1) % left], rest[middle], rest[(middle + 1) % left]]

@@ -174,7 +174,7 @@ impl<'s, 'a> Matching<'s, 'a> {
     /// Charges the square roots since the last time, and `looks` at all vertices.
     fn charge(&self, looks: u32, pace: &mut Pace<'_>) -> Result<(), OrderError> {
         let all = self.top.len() as u32;
-        pace.work(1 + self.roots.take() + looks * all / 32)?;
+        pace.work(1 + self.roots.take() + looks * all / 12)?;
         Ok(())
     }
 

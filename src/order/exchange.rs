@@ -1,0 +1,356 @@
+//! Exchanges of moves that make a tour shorter (Lin and Kernighan).
+//!
+//! The tour is a cycle of chains; the moves between them cost, staying at a station costs nothing.
+//! An exchange cuts a move, goes to a station nearer than that move was long, cuts the tour there,
+//! and so on while there is still gain in hand, until the ends are joined with some gain left. A
+//! step of it changes two moves, in any of the ways that leave the tour whole, found by their places
+//! in the cycle alone; only when no step joins with a gain is the best of them made and the next one
+//! sought from there. After Lin and Kernighan, "An effective heuristic algorithm for the
+//! traveling-salesman problem" (1973), and Helsgaun's implementation of it (2000).
+
+use super::cycle::Cycle;
+use super::incidence::Incidence;
+use super::near::Near;
+use super::network::Network;
+use super::pace::Pace;
+use super::{Leg, NONE, OrderError};
+use crate::stage::{OutOfScratch, Scratch};
+
+/// How many steps an exchange may take.
+const STEPS: usize = 3;
+
+/// A part of an exchange: which moves are cut after the first.
+#[derive(Debug, Clone, Copy)]
+struct Step {
+    /// What joining the ends after it leaves.
+    gain: i64,
+    /// What is left before that.
+    hand: i64,
+    /// The leg before the second cut.
+    c: Leg,
+    /// Whether the way goes on from the first cut to the leg after `c`, else to the end of `c`.
+    onward: bool,
+    /// The same for the third cut, if there is one.
+    third: Option<(Leg, bool)>,
+}
+
+/// Stations around which an exchange may help, each once, first come first served.
+struct Waiting<'s> {
+    queue: &'s mut [u16],
+    is_waiting: &'s mut [u8],
+    first: usize,
+    count: usize,
+}
+
+impl<'s> Waiting<'s> {
+    fn new(queue: &'s mut [u16], is_waiting: &'s mut [u8]) -> Self {
+        Self { queue, is_waiting, first: 0, count: 0 }
+    }
+
+    fn add(&mut self, station: u16) {
+        // Nowhere, the end of the gap, is no station.
+        let Some(is_waiting) = self.is_waiting.get_mut(usize::from(station)) else {
+            return;
+        };
+        if core::mem::replace(is_waiting, 1) == 0 {
+            let all = self.queue.len();
+            let last = self.first + self.count;
+            self.queue[if last >= all { last - all } else { last }] = station;
+            self.count += 1;
+        }
+    }
+
+    fn next(&mut self) -> Option<u16> {
+        if self.count == 0 {
+            return None;
+        }
+        let station = self.queue[self.first];
+        self.first = if self.first + 1 == self.queue.len() { 0 } else { self.first + 1 };
+        self.count -= 1;
+        self.is_waiting[usize::from(station)] = 0;
+        Some(station)
+    }
+}
+
+/// The tour, and what is needed to exchange its moves.
+pub(super) struct Exchanges<'s, 'a> {
+    pub cycle: Cycle<'s>,
+    network: Network<'a>,
+    incidence: Incidence<'s>,
+    near: Near<'s>,
+    waiting: Waiting<'s>,
+    /// The number of the gap among the legs, if there is one.
+    gap: Option<u16>,
+}
+
+impl<'s, 'a> Exchanges<'s, 'a> {
+    /// The tour of `legs`, in which `gap`, if there is one, has the number after those of the
+    /// chains. All stations wait.
+    pub fn new(
+        network: Network<'a>,
+        near: Near<'s>,
+        legs: &'s mut [Leg],
+        gap: Option<u16>,
+        scratch: &mut Scratch<'s>,
+    ) -> Result<Self, OutOfScratch> {
+        let stations = usize::from(network.stations());
+        let places = scratch.take(legs.len())?;
+        let mut waiting = Waiting::new(scratch.take(stations)?, scratch.take(stations)?);
+        for station in 0..network.stations() {
+            waiting.add(station);
+        }
+        Ok(Self {
+            cycle: Cycle::new(legs, places, scratch.take(Cycle::MEMORY)?),
+            network,
+            incidence: Incidence::new(network, scratch)?,
+            near,
+            waiting,
+            gap,
+        })
+    }
+
+    /// Bytes of scratch for so many stations, chains, and legs with the gap.
+    pub const fn bytes(stations: usize, chains: usize, legs: usize) -> usize {
+        Incidence::bytes(stations, chains)
+            + Scratch::bytes_for::<u16>(legs)
+            + Scratch::bytes_for::<[u16; 2]>(Cycle::MEMORY)
+            + Scratch::bytes_for::<u16>(stations)
+            + Scratch::bytes_for::<u8>(stations)
+    }
+
+    /// The station where a leg ends; [`NONE`] of the gap.
+    pub fn end(&self, leg: Leg) -> u16 {
+        if self.is_gap(leg) { NONE } else { self.network.end(leg) }
+    }
+
+    /// Whether a leg is the gap.
+    pub fn is_gap(&self, leg: Leg) -> bool {
+        self.gap == Some(leg.segment() as u16)
+    }
+
+    /// The station where a leg begins; [`NONE`] of the gap.
+    pub fn start(&self, leg: Leg) -> u16 {
+        self.end(leg.flipped())
+    }
+
+    /// What a move costs: its length and a little more, lest two moves be better than one because
+    /// their lengths are rounded down.
+    pub fn distance(&self, from: u16, to: u16) -> i64 {
+        if from == NONE || to == NONE || from == to {
+            0
+        } else {
+            i64::from(self.network.distance(from, to)) + 1
+        }
+    }
+
+    /// The length of all moves.
+    pub fn length(&self) -> u64 {
+        (0..self.cycle.len())
+            .map(|index| self.move_after(self.cycle.leg(index)))
+            .map(|cost| cost.saturating_sub(1).max(0) as u64)
+            .sum()
+    }
+
+    /// The cost of the move after `leg`.
+    pub fn move_after(&self, leg: Leg) -> i64 {
+        self.distance(self.end(leg), self.start(self.cycle.next(leg)))
+    }
+
+    /// Tries exchanges around all stations that wait, until the work is done or its end has come,
+    /// and returns the gain. If `keep`, what was gained stays, else it can be taken back.
+    pub fn exchange_all(&mut self, keep: bool, pace: &mut Pace<'_>) -> Result<i64, OrderError> {
+        let mut gain = 0;
+        while let Some(station) = self.waiting.next() {
+            while !pace.is_over()
+                && let Some(more) = self.exchange_at(station, pace)?
+            {
+                gain += more;
+                if keep {
+                    self.cycle.settle();
+                }
+            }
+        }
+        Ok(gain)
+    }
+
+    /// Makes one exchange that cuts a move at `station`, if one helps.
+    fn exchange_at(
+        &mut self,
+        station: u16,
+        pace: &mut Pace<'_>,
+    ) -> Result<Option<i64>, OrderError> {
+        let mut from = self.incidence.first(station);
+        while let Some(leg) = from {
+            if self.move_after(leg.flipped()) > 0
+                && self.cycle.can_turn()
+                && let Some(gain) = self.exchange(leg.flipped(), pace)?
+            {
+                return Ok(Some(gain));
+            }
+            from = self.incidence.next(leg);
+        }
+        Ok(None)
+    }
+
+    /// Cuts the move after `a` and changes two moves more at a time while that leaves something in
+    /// hand, until joining the ends leaves a gain; returns it. Else all is as it was.
+    fn exchange(&mut self, a: Leg, pace: &mut Pace<'_>) -> Result<Option<i64>, OrderError> {
+        let turned = self.cycle.turned();
+        let mut a = a;
+        let mut hand = self.move_after(a);
+        let mut touched = [[NONE; 6]; STEPS];
+        for touched_now in 0..STEPS {
+            let Some(step) = self.best_step(a, hand, pace)? else {
+                break;
+            };
+            touched[touched_now] = self.ends_of(a, step);
+            a = self.make(a, step, pace)?;
+            if step.gain > 0 {
+                for station in touched.into_iter().flatten() {
+                    self.waiting.add(station);
+                }
+                return Ok(Some(step.gain));
+            }
+            hand = step.hand;
+        }
+        self.cycle.take_back(turned);
+        Ok(None)
+    }
+
+    /// The first step found that leaves a gain, else the one that leaves the most in hand.
+    fn best_step(
+        &self,
+        a: Leg,
+        hand: i64,
+        pace: &mut Pace<'_>,
+    ) -> Result<Option<Step>, OrderError> {
+        let b = self.cycle.next(a);
+        let (end, first) = (self.end(a), self.start(b));
+        let mut best: Option<Step> = None;
+        if end == NONE {
+            return Ok(None);
+        }
+        for second in [NONE, end].into_iter().chain(self.near.of(end)) {
+            pace.work(1)?;
+            let hand = hand - self.distance(end, second);
+            if hand <= 0 {
+                break;
+            }
+            for leg in self.legs_from(second) {
+                if leg == a || leg == b || leg.flipped() == a {
+                    continue;
+                }
+                let onward = self.cycle.forward(leg) == self.cycle.forward(a);
+                // The second cut is after `c`; from there the way goes on from `end`.
+                let (c, end) = if onward {
+                    let c = self.cycle.previous(leg);
+                    (c, self.end(c))
+                } else {
+                    let c = leg.flipped();
+                    (c, self.start(self.cycle.next(c)))
+                };
+                pace.work(2)?;
+                let hand = hand + self.move_after(c);
+                let gain = hand - self.distance(end, first);
+                if !onward && gain > 0 {
+                    return Ok(Some(Step { gain, hand, c, onward, third: None }));
+                }
+                if end == NONE {
+                    continue;
+                }
+                let to_c = self.cycle.steps(a, c);
+                for third in [NONE, end].into_iter().chain(self.near.of(end)) {
+                    pace.work(1)?;
+                    let hand = hand - self.distance(end, third);
+                    if hand <= 0 {
+                        break;
+                    }
+                    for leg in self.legs_from(third) {
+                        let third_onward = self.cycle.forward(leg) == self.cycle.forward(a);
+                        let (e, far) = if third_onward {
+                            let e = self.cycle.previous(leg);
+                            (e, self.end(e))
+                        } else {
+                            let e = leg.flipped();
+                            (e, self.start(self.cycle.next(e)))
+                        };
+                        // Where the third cut may be for the tour to stay one.
+                        let within = self.cycle.steps(a, e) <= to_c;
+                        if e == a || e == c || within == (onward || third_onward) {
+                            continue;
+                        }
+                        pace.work(2)?;
+                        let hand = hand + self.move_after(e);
+                        let gain = hand - self.distance(far, first);
+                        let step = Step { gain, hand, c, onward, third: Some((e, third_onward)) };
+                        if gain > 0 {
+                            return Ok(Some(step));
+                        }
+                        if best.is_none_or(|best| hand > best.hand) {
+                            best = Some(step);
+                        }
+                    }
+                }
+            }
+        }
+        Ok(best)
+    }
+
+    /// The ends of the moves that a step cuts.
+    fn ends_of(&self, a: Leg, step: Step) -> [u16; 6] {
+        let third = step.third.map_or(step.c, |(e, _)| e);
+        let mut ends = [NONE; 6];
+        for (pair, leg) in ends.chunks_exact_mut(2).zip([a, step.c, third]) {
+            pair.copy_from_slice(&[self.end(leg), self.start(self.cycle.next(leg))]);
+        }
+        ends
+    }
+
+    /// Makes a step from the cut after `a`. Returns the leg after which the ends are joined.
+    fn make(&mut self, a: Leg, step: Step, pace: &mut Pace<'_>) -> Result<Leg, OrderError> {
+        let c = step.c;
+        let (b, d) = (self.cycle.next(a), self.cycle.next(c));
+        let Some((e, third_onward)) = step.third else {
+            let moved = self.cycle.turn(a, c);
+            pace.work(1 + moved as u32 / 32)?;
+            return Ok(d.flipped());
+        };
+        let f = self.cycle.next(e);
+        let moved = match (step.onward, third_onward) {
+            // … a, d … e, b … c, f …
+            (true, true) => self.cycle.swap(a, d, e),
+            // … a, d … e, c … b, f … with `c … b` flipped.
+            (true, false) => self.cycle.turn(a, e) + self.cycle.turn(a, d.flipped()),
+            // … e, b … c, a … f, d … with `a … f` flipped.
+            (false, true) => self.cycle.turn(a, c) + self.cycle.turn(d.flipped(), f.flipped()),
+            // … a, c … f, b … e, d … with `c … f` flipped.
+            (false, false) => self.cycle.turn(a, c) + self.cycle.turn(f.flipped(), b.flipped()),
+        };
+        pace.work(1 + moved as u32 / 32)?;
+        Ok(if third_onward { e } else { f.flipped() })
+    }
+
+    /// The legs from a station; from nowhere, the gap both ways.
+    fn legs_from(&self, station: u16) -> impl Iterator<Item = Leg> + '_ {
+        let first = if station == NONE {
+            self.gap.map(|gap| Leg::new(gap, false))
+        } else {
+            self.incidence.first(station)
+        };
+        core::iter::successors(first, |&leg| {
+            if self.is_gap(leg) {
+                (!leg.reversed()).then(|| leg.flipped())
+            } else {
+                self.incidence.next(leg)
+            }
+        })
+    }
+
+    /// Lets the ends of `legs` wait for exchanges.
+    pub fn wake(&mut self, legs: &[Leg]) {
+        for &leg in legs {
+            let station = self.end(leg);
+            self.waiting.add(station);
+        }
+    }
+}

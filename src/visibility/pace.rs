@@ -1,0 +1,29 @@
+//! How often a long computation looks up from its work.
+
+use crate::stage::{Aborted, Attention};
+
+/// Instructions between two looks, as near as the callers' estimates go (for thumbv6m).
+const BETWEEN_LOOKS: usize = 50_000;
+
+/// Counts work and gives attention when enough has been done.
+pub struct Pace<'t> {
+    attention: &'t mut dyn Attention,
+    done: usize,
+}
+
+impl<'t> Pace<'t> {
+    pub fn new(attention: &'t mut dyn Attention) -> Self {
+        Self { attention, done: 0 }
+    }
+
+    /// Notes that about so many instructions were spent.
+    #[inline]
+    pub fn spend(&mut self, instructions: usize) -> Result<(), Aborted> {
+        self.done += instructions;
+        if self.done < BETWEEN_LOOKS {
+            return Ok(());
+        }
+        self.done = 0;
+        self.attention.check()
+    }
+}
