@@ -1,16 +1,19 @@
 //! From the model to ordered strokes: the way of the data, in one place.
 
-use super::{PlotOptions, solid};
+use super::{PlotOptions, plan, solid};
 use crate::drawing::{
     Bounds, Drawing, Line, LineType, OrganiseError, PageMap, PagePoint, StepsPerMillimetre, Stored,
     organise,
 };
+use crate::geometry::{Projection, Vertex};
 use crate::machine::{Path, Target};
-use crate::model::{Element, Model, ModelError};
+use crate::model::{Elements, Model, ModelError, Position};
 use crate::order::{self, Leg, OrderError};
 use crate::protocol::{HiddenLines, Refusal, WayToSee};
-use crate::stage::{Aborted, Attention, OutOfScratch, Scratch, Stage, items, items_mut};
-use crate::view::{Seen, View, see};
+use crate::stage::{
+    Aborted, Attention, OutOfScratch, Scratch, Stage, StageError, items, items_mut,
+};
+use crate::view::{Flattening, Seen, View, see};
 use crate::visibility::{self, Scene, SinkFull, Stretch, StretchSink, VisibilityError};
 
 /// Who is shown each stretch as it is found, in view coordinates: the preview.
@@ -53,12 +56,15 @@ impl Job {
         attention: &mut dyn Attention,
         observer: &mut dyn Observer,
     ) -> Result<Self, Refusal> {
-        if model.elements().corners().is_empty() && options.see != WayToSee::Vertices {
+        if model.elements().corners().is_empty()
+            && model.curves().is_empty()
+            && options.see != WayToSee::Vertices
+        {
             return Err(Refusal::NothingToPlot);
         }
         let mut degenerate_faces = 0;
         let lines = if model.is_plan() && options.shows_plans_flat() {
-            lay_out_plan(model, options, steps, words, observer)?
+            plan::lay_out(model, options, steps, words, attention, observer)?
         } else {
             match options.see {
                 WayToSee::Vertices | WayToSee::Edges => {
@@ -141,46 +147,10 @@ impl Path for Strokes<'_> {
     }
 }
 
-/// A plan: its bars are lines on the page already. Returns how many lines stand in `words`.
-fn lay_out_plan(
-    model: &Model<'_>,
-    options: &PlotOptions,
-    steps: StepsPerMillimetre,
-    words: &mut [u64],
-    observer: &mut dyn Observer,
-) -> Result<usize, Refusal> {
-    let vertices = model.vertices();
-    let unit = libm::ldexp(1.0, -(model.fraction_bits() as i32));
-    let used = model
-        .elements()
-        .corners()
-        .iter()
-        .filter_map(|c| vertices.get(usize::from(c.vertex())))
-        .copied();
-    let (page, bits) = (&options.page, model.fraction_bits());
-    let map = if options.fit {
-        PageMap::fit_plan(used, bits, page, steps)
-    } else {
-        PageMap::true_size(used, bits, page, steps)
-    };
-    let map = map.map_err(Refusal::Page)?;
-    let mut collector = Collector::new(words);
-    for element in model.elements().iter() {
-        let Element::Bar(from, to) = element else { continue };
-        let (Some(from), Some(to)) =
-            (vertices.get(usize::from(from)), vertices.get(usize::from(to)))
-        else {
-            continue;
-        };
-        observer.plan_bar(
-            [from.x, from.y].map(|c| f64::from(c) * unit),
-            [to.x, to.y].map(|c| f64::from(c) * unit),
-        );
-        let [from, to] = [from, to].map(|p| map.point(p.x.into(), p.y.into(), 1));
-        collector.line(from, to, LineType::Full).map_err(|SinkFull| collector.out_of_memory())?;
-    }
-    Ok(collector.count)
-}
+/// How far the chords of a curve may stray from it: half a step, in 1/256 step.
+pub(super) const HALF_A_STEP: u16 = 128;
+/// Finer, where only the bounds of curves are sought, before the scale of the page is known.
+pub(super) const FOR_BOUNDS: u16 = 16;
 
 /// These take some 100,000 instructions.
 const CORNERS_BETWEEN_CHECKS: usize = 128;
@@ -207,21 +177,29 @@ fn project(
     attention.check()?;
     let view = View::new(&camera, model).map_err(Refusal::View)?;
     attention.check()?;
-    let Seen { vertices, elements, degenerate_faces } =
-        see(&view, model, &mut scratch).map_err(Refusal::DrawingTooLarge)?;
     if !options.clip_behind {
         view.refuse_behind(model).map_err(Refusal::View)?;
     }
     let projection = view.projection();
-    // Two divisions a corner: some at a time, so that the line is answered.
-    let mut bounds: Option<Bounds> = None;
-    for corners in elements.corners().chunks(CORNERS_BETWEEN_CHECKS) {
-        attention.check()?;
-        let used = corners.iter().filter_map(|c| vertices.get(usize::from(c.vertex()))).copied();
-        bounds = grow(bounds, Bounds::around(used, projection));
-    }
-    let bounds = bounds.ok_or(Refusal::NothingToPlot)?;
-    let map = PageMap::fit(&bounds, &options.page, steps).map_err(Refusal::Page)?;
+    let curves_map = if model.curves().is_empty() {
+        None
+    } else {
+        let bounds =
+            bounds_with_curves(&view, model, options, steps, scratch.reborrow(), attention)?;
+        Some(PageMap::fit(&bounds, &options.page, steps).map_err(Refusal::Page)?)
+    };
+    let on_page = curves_map.map(|map| move |x, y, w| map.fine(x, y, w));
+    let curves = on_page.as_ref().map(|on_page| Flattening { on_page, tolerance: HALF_A_STEP });
+    let Seen { vertices, elements, degenerate_faces } =
+        see(&view, model, curves, &mut scratch, attention)?;
+    let map = match curves_map {
+        Some(map) => map,
+        None => {
+            let bounds = bounds_of(vertices, elements, projection, attention)?;
+            let bounds = bounds.ok_or(Refusal::NothingToPlot)?;
+            PageMap::fit(&bounds, &options.page, steps).map_err(Refusal::Page)?
+        }
+    };
 
     attention.enter(Stage::Visibility);
     let positions = bytemuck::cast_slice(model.vertices());
@@ -262,6 +240,54 @@ fn project(
     Ok(Found { lines, degenerate_faces })
 }
 
+/// Around all that is drawn of the elements.
+fn bounds_of(
+    vertices: &[Vertex],
+    elements: Elements<'_>,
+    projection: Projection,
+    attention: &mut dyn Attention,
+) -> Result<Option<Bounds>, Aborted> {
+    // Two divisions a corner: some at a time, so that the line is answered.
+    let mut bounds: Option<Bounds> = None;
+    for corners in elements.corners().chunks(CORNERS_BETWEEN_CHECKS) {
+        attention.check()?;
+        let used = corners.iter().filter_map(|c| vertices.get(usize::from(c.vertex()))).copied();
+        bounds = grow(bounds, Bounds::around(used, projection));
+    }
+    Ok(bounds)
+}
+
+/// Around all that is drawn of elements and curves, not of control points.
+#[inline(never)] // Its frame must not lie under the stages'.
+fn bounds_with_curves(
+    view: &View,
+    model: &Model<'_>,
+    options: &PlotOptions,
+    steps: StepsPerMillimetre,
+    mut scratch: Scratch<'_>,
+    attention: &mut dyn Attention,
+) -> Result<Bounds, Refusal> {
+    let projection = view.projection();
+    let near = view.near().unwrap_or(i32::MIN);
+    let in_front = |position: &Position| {
+        let vertex = view.vertex(*position);
+        Vertex { z: vertex.z.max(near), ..vertex }
+    };
+    let all = Bounds::around(model.vertices().iter().map(in_front), projection);
+    let all = all.ok_or(Refusal::NothingToPlot)?;
+    let rough = PageMap::fit(&all, &options.page, steps).map_err(Refusal::Page)?;
+    let mut bounds = {
+        let mut scratch = scratch.reborrow();
+        let seen = see(view, model, None, &mut scratch, attention)?;
+        bounds_of(seen.vertices, seen.elements, projection, attention)?
+    };
+    let flattening = Flattening { on_page: &|x, y, w| rough.fine(x, y, w), tolerance: FOR_BOUNDS };
+    flattening.each_chord(view, model, scratch, attention, &mut |chord| {
+        bounds = grow(bounds, Bounds::around(chord.into_iter(), projection));
+    })?;
+    bounds.ok_or(Refusal::NothingToPlot)
+}
+
 /// The bounds of both.
 pub(super) fn grow(bounds: Option<Bounds>, more: Option<Bounds>) -> Option<Bounds> {
     bounds.zip(more).map(|(a, b)| a.union(b)).or(bounds).or(more)
@@ -276,6 +302,15 @@ pub(super) fn to_front(words: &mut [u64], at: usize, count: usize) {
 impl From<Aborted> for Refusal {
     fn from(_: Aborted) -> Self {
         Self::Aborted
+    }
+}
+
+impl From<StageError> for Refusal {
+    fn from(error: StageError) -> Self {
+        match error {
+            StageError::Scratch(missing) => Self::DrawingTooLarge(missing),
+            StageError::Aborted => Self::Aborted,
+        }
     }
 }
 
@@ -312,7 +347,7 @@ impl<'a> Collector<'a> {
         Self { lines: items_mut(words, room).unwrap_or(&mut []), count: 0 }
     }
 
-    fn line(
+    pub(super) fn line(
         &mut self,
         from: PagePoint,
         to: PagePoint,
@@ -325,9 +360,13 @@ impl<'a> Collector<'a> {
         Ok(())
     }
 
-    pub(super) fn out_of_memory(&self) -> Refusal {
+    pub(super) fn missing(&self) -> OutOfScratch {
         let available = size_of_val(self.lines);
-        Refusal::DrawingTooLarge(OutOfScratch { needed: available + size_of::<Line>(), available })
+        OutOfScratch { needed: available + size_of::<Line>(), available }
+    }
+
+    pub(super) fn out_of_memory(&self) -> Refusal {
+        Refusal::DrawingTooLarge(self.missing())
     }
 }
 

@@ -5,10 +5,11 @@
 //! no edge whose ends both lie on the near plane is to be drawn.
 
 use super::View;
+use super::curves::Flattening;
 use super::tidy::tidy;
 use crate::geometry::Vertex;
 use crate::model::{Corner, Element, Elements, Model, VERTEX_NUMBER_LIMIT};
-use crate::stage::{OutOfScratch, Scratch, heap_sort_by_key};
+use crate::stage::{Attention, OutOfScratch, Scratch, StageError, heap_sort_by_key};
 
 /// A model as the camera sees it.
 #[derive(Debug, Clone, Copy)]
@@ -22,26 +23,33 @@ pub struct Seen<'a> {
 }
 
 /// Takes every vertex of `model` to view coordinates, makes one of those at the same place, leaves
-/// out faces without an area, and cuts off what is nearer than the near plane.
+/// out faces without an area, and cuts off what is nearer than the near plane. With `curves` its curves
+/// are there too, as bars between vertices of their own.
 ///
 /// # Errors
-/// [`OutOfScratch`] if the vertices, or the cut faces, do not fit.
+/// [`StageError::Scratch`] if the vertices, or the cut faces, do not fit.
 #[inline(never)] // Its frame must not lie under the stages'.
 pub fn see<'a>(
     view: &View,
     model: &'a Model<'_>,
+    curves: Option<Flattening<'_>>,
     scratch: &mut Scratch<'a>,
-) -> Result<Seen<'a>, OutOfScratch> {
-    let vertices = scratch.take::<Vertex>(model.vertices().len())?;
-    for (vertex, position) in vertices.iter_mut().zip(model.vertices()) {
-        *vertex = view.vertex(*position);
-    }
+    attention: &mut dyn Attention,
+) -> Result<Seen<'a>, StageError> {
     let (elements, degenerate_faces) = tidy(model, scratch)?;
+    let (vertices, elements) = match curves {
+        Some(curves) => curves.add(view, model, elements, scratch, attention)?,
+        None => {
+            let vertices = scratch.take::<Vertex>(model.vertices().len())?;
+            view.fill(model, vertices);
+            (&*vertices, elements)
+        }
+    };
     let (vertices, elements) = match view.near() {
         Some(near) if vertices.iter().any(|vertex| vertex.z < near) => {
             cut(vertices, elements, near, scratch)?
         }
-        _ => (&*vertices, elements),
+        _ => (vertices, elements),
     };
     Ok(Seen { vertices, elements, degenerate_faces })
 }

@@ -11,10 +11,12 @@
 
 mod camera;
 mod clip;
+mod curves;
 mod tidy;
 
 pub use camera::{Camera, Direction, Lens, Sight, SightLines};
 pub use clip::{Seen, distinct_edges, see};
+pub use curves::Flattening;
 
 use crate::geometry::{COORDINATE_LIMIT, Projection, Vertex};
 use crate::model::{Model, Position};
@@ -156,6 +158,13 @@ impl View {
     /// What of an edge is in front of the near plane; `None` if nothing is.
     pub fn clip_edge(&self, ends: [Vertex; 2]) -> Option<[Vertex; 2]> {
         clip::clip_edge(ends, self.near.unwrap_or(i32::MIN))
+    }
+
+    /// Every vertex of `model` in view coordinates.
+    fn fill(&self, model: &Model<'_>, vertices: &mut [Vertex]) {
+        for (vertex, position) in vertices.iter_mut().zip(model.vertices()) {
+            *vertex = self.vertex(*position);
+        }
     }
 
     /// Makes sure that every vertex is in front of the eye.
