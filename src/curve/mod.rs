@@ -235,8 +235,16 @@ impl<'a> Spline<'a> {
 
     /// The place at `t` in units of 2^-[`FRACTION_BITS`].
     fn exactly_at(&self, t: Parameter) -> [i64; 3] {
-        let (span, local) = self.locate(t);
-        span.at(local)
+        let t = t.min(Parameter::start_of(self.spans()));
+        let mut span = Span::default();
+        // The polynomial that `t` lies on, or else the next that has a length, or else the one before.
+        match (t.span()..self.spans()).find(|number| self.load(*number, &mut span)) {
+            Some(number) => span.at(if number == t.span() { t.local() } else { 0 }),
+            None => {
+                let _ = (0..t.span()).rev().find(|number| self.load(*number, &mut span));
+                span.at(Parameter::ONE)
+            }
+        }
     }
 
     /// Chord ends, from the curve's beginning to its end: see [`Chords`].
@@ -251,36 +259,25 @@ impl<'a> Spline<'a> {
         Chords::new(*self, project, tolerance)
     }
 
-    /// Polynomial `span`; `None` if it has no length or does not exist.
-    fn span(&self, span: usize) -> Option<Span> {
+    /// Makes `span` polynomial `number`. `false` if that has no length or does not exist.
+    #[inline(never)] // Its frame must not lie under that of a search.
+    fn load(&self, number: usize, span: &mut Span) -> bool {
         let degree = usize::from(self.order) - 1;
-        let mut points = [[0i64; 3]; GREATEST_ORDER as usize];
-        let numbers = self.control.get(span..span + degree + 1)?;
-        for (point, number) in points.iter_mut().zip(numbers) {
-            *point = self.points.get(usize::from(*number))?.map(i64::from);
-        }
+        let Some(numbers) = self.control.get(number..number + degree + 1) else { return false };
+        span.hold(numbers.iter().map(|number| {
+            // `new` has made sure that it exists.
+            self.points.get(usize::from(*number)).map_or([0; 3], |point| point.map(i64::from))
+        }));
         if self.knots == Knots::Uniform {
-            return Some(Span::by_recursion(&points, degree));
+            span.turn_by_recursion();
+            return true;
         }
         // The 2 m - 2 knots around the polynomial: it lies between the middle two.
         let mut around = [0; 2 * (GREATEST_ORDER as usize - 1)];
-        let around = around.get_mut(..2 * degree)?;
-        for (knot, index) in around.iter_mut().zip(span + 1..) {
+        for (knot, index) in around.iter_mut().take(2 * degree).zip(number + 1..) {
             *knot = self.knots.get(index) as i32; // within KNOT_LIMIT
         }
-        Span::by_de_boor(&points, around)
-    }
-
-    /// The polynomial that `t` lies on, and where along it.
-    fn locate(&self, t: Parameter) -> (Span, u32) {
-        let t = t.min(Parameter::start_of(self.spans()));
-        let local = |number: usize| if number == t.span() { t.local() } else { 0 };
-        let found = |number: usize| Some((self.span(number)?, local(number)));
-        let last = |number: usize| Some((self.span(number)?, Parameter::ONE));
-        (t.span()..self.spans())
-            .find_map(found)
-            .or_else(|| (0..t.span()).rev().find_map(last))
-            .unwrap_or_default() // never: a curve has a length
+        span.turn_by_de_boor(&around)
     }
 }
 

@@ -228,7 +228,13 @@ impl PageMap {
         [(x, 0), (y, 1)].map(|(c, axis): (i64, usize)| {
             // Below 2^118, see `point`: the shift does not overflow.
             let sum = i128::from(self.a[axis]) * i128::from(c) + self.b[axis] * i128::from(w);
-            let fine = divide_rounding(sum << 8, i128::from(w) << self.k);
+            let fine = if w & (w - 1) == 0 {
+                // A parallel view: many times faster.
+                let shift = w.trailing_zeros() + self.k;
+                ((sum << 9 >> shift) + 1) >> 1
+            } else {
+                divide_rounding(sum << 8, i128::from(w) << self.k)
+            };
             const LIMIT: i128 = 1 << 30;
             fine.clamp(-LIMIT, LIMIT) as i64
         })

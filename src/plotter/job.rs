@@ -150,7 +150,7 @@ impl Path for Strokes<'_> {
 /// How far the chords of a curve may stray from it: half a step, in 1/256 step.
 pub(super) const HALF_A_STEP: u16 = 128;
 /// Finer, where only the bounds of curves are sought, before the scale of the page is known.
-pub(super) const FOR_BOUNDS: u16 = 16;
+pub(super) const FOR_BOUNDS: u16 = 32;
 
 /// These take some 100,000 instructions.
 const CORNERS_BETWEEN_CHECKS: usize = 128;
@@ -172,7 +172,6 @@ fn project(
 ) -> Result<Found, Refusal> {
     attention.enter(Stage::View);
     let total = size_of_val(words);
-    let mut scratch = Scratch::new(words);
     let camera = options.camera(model).ok_or(Refusal::NothingToPlot)?;
     attention.check()?;
     let view = View::new(&camera, model).map_err(Refusal::View)?;
@@ -181,14 +180,14 @@ fn project(
         view.refuse_behind(model).map_err(Refusal::View)?;
     }
     let projection = view.projection();
+    let mut scratch = Scratch::new(words);
     let curves_map = if model.curves().is_empty() {
         None
     } else {
-        let bounds =
-            bounds_with_curves(&view, model, options, steps, scratch.reborrow(), attention)?;
-        Some(PageMap::fit(&bounds, &options.page, steps).map_err(Refusal::Page)?)
+        let scratch = scratch.reborrow();
+        Some(map_with_curves(&view, model, options, steps, scratch, attention)?)
     };
-    let on_page = curves_map.map(|map| move |x, y, w| map.fine(x, y, w));
+    let on_page = curves_map.as_ref().map(|map| |x, y, w| map.fine(x, y, w));
     let curves = on_page.as_ref().map(|on_page| Flattening { on_page, tolerance: HALF_A_STEP });
     let Seen { vertices, elements, degenerate_faces } =
         see(&view, model, curves, &mut scratch, attention)?;
@@ -257,23 +256,27 @@ fn bounds_of(
     Ok(bounds)
 }
 
-/// Around all that is drawn of elements and curves, not of control points.
+/// Fits all that is drawn of elements and curves to the page, not the control points.
 #[inline(never)] // Its frame must not lie under the stages'.
-fn bounds_with_curves(
+fn map_with_curves(
     view: &View,
     model: &Model<'_>,
     options: &PlotOptions,
     steps: StepsPerMillimetre,
     mut scratch: Scratch<'_>,
     attention: &mut dyn Attention,
-) -> Result<Bounds, Refusal> {
+) -> Result<PageMap, Refusal> {
     let projection = view.projection();
     let near = view.near().unwrap_or(i32::MIN);
     let in_front = |position: &Position| {
         let vertex = view.vertex(*position);
         Vertex { z: vertex.z.max(near), ..vertex }
     };
-    let all = Bounds::around(model.vertices().iter().map(in_front), projection);
+    let mut all = None;
+    for positions in model.vertices().chunks(CORNERS_BETWEEN_CHECKS) {
+        attention.check()?;
+        all = grow(all, Bounds::around(positions.iter().map(in_front), projection));
+    }
     let all = all.ok_or(Refusal::NothingToPlot)?;
     let rough = PageMap::fit(&all, &options.page, steps).map_err(Refusal::Page)?;
     let mut bounds = {
@@ -285,7 +288,8 @@ fn bounds_with_curves(
     flattening.each_chord(view, model, scratch, attention, &mut |chord| {
         bounds = grow(bounds, Bounds::around(chord.into_iter(), projection));
     })?;
-    bounds.ok_or(Refusal::NothingToPlot)
+    let bounds = bounds.ok_or(Refusal::NothingToPlot)?;
+    PageMap::fit(&bounds, &options.page, steps).map_err(Refusal::Page)
 }
 
 /// The bounds of both.

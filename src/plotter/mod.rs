@@ -246,6 +246,7 @@ impl Inner<'_> {
         }
     }
 
+    #[inline(never)] // Its frame must not lie under that of `plot`.
     fn compute(
         &mut self,
         attention: &mut dyn Attention,

@@ -1,7 +1,7 @@
 //! What is drawn and how, as the user set it.
 
 use crate::drawing::Page;
-use crate::fixed::Millimetres;
+use crate::fixed::{Millimetres, SixDecimals};
 use crate::model::Model;
 use crate::order;
 use crate::protocol::{HiddenLines, PlotOption, ProjectionChoice, WayToSee};
@@ -134,7 +134,10 @@ impl PlotOptions {
         let places = [("eye", self.eye), ("at", self.at), ("up", self.up), ("angles", self.angles)];
         for (name, place) in places {
             match place {
-                Some([x, y, z]) => line(format_args!("${name}={x},{y},{z}")),
+                Some(place) => {
+                    let [x, y, z] = place.map(SixDecimals);
+                    line(format_args!("${name}={x},{y},{z}"))
+                }
                 None => line(format_args!("${name}=auto")),
             }
         }
@@ -146,9 +149,11 @@ impl PlotOptions {
                 line(format_args!("$projection=orthographic"))
             }
             ProjectionChoice::Lens(Lens::Oblique { angle, ratio }) => {
+                let [angle, ratio] = [angle, ratio].map(SixDecimals);
                 line(format_args!("$projection=oblique,{angle},{ratio}"));
             }
             ProjectionChoice::Axonometric { azimuth, elevation } => {
+                let [azimuth, elevation] = [azimuth, elevation].map(SixDecimals);
                 line(format_args!("$projection=axonometric,{azimuth},{elevation}"));
             }
         }
@@ -169,7 +174,7 @@ impl PlotOptions {
         line(format_args!("$hidden={hidden}"));
         line(format_args!("$seams={}", if self.seams { "on" } else { "off" }));
         line(format_args!("$blocks={}", if self.merged_blocks { "merged" } else { "separate" }));
-        line(format_args!("$crease={}", self.crease));
+        line(format_args!("$crease={}", SixDecimals(self.crease)));
         line(format_args!("$page={}x{}", self.page.width, self.page.height));
         line(format_args!("$margin={}", self.page.margin));
         line(format_args!("$fit={}", if self.fit { "on" } else { "off" }));

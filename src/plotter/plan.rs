@@ -10,6 +10,7 @@ use crate::stage::Attention;
 use crate::visibility::SinkFull;
 
 /// Packs the lines of the plan at the front of `words`. Returns how many.
+#[inline(never)] // Its frame must not lie under the other stages'.
 pub(super) fn lay_out(
     model: &Model<'_>,
     options: &PlotOptions,

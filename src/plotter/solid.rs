@@ -13,6 +13,7 @@ use crate::view::{SightLines, View, distinct_edges};
 use crate::visibility::{Along, Stretch, StretchSink};
 
 /// Finds what is seen of the solid. Returns how many lines stand in `words`.
+#[inline(never)] // Its frame must not lie under the other stages'.
 pub(super) fn project(
     model: &Model<'_>,
     options: &PlotOptions,

@@ -36,12 +36,12 @@ pub fn see<'a>(
     scratch: &mut Scratch<'a>,
     attention: &mut dyn Attention,
 ) -> Result<Seen<'a>, StageError> {
-    let (elements, degenerate_faces) = tidy(model, scratch)?;
+    let (elements, degenerate_faces) = tidy(model, scratch, attention)?;
     let (vertices, elements) = match curves {
         Some(curves) => curves.add(view, model, elements, scratch, attention)?,
         None => {
             let vertices = scratch.take::<Vertex>(model.vertices().len())?;
-            view.fill(model, vertices);
+            view.fill(model, vertices, attention)?;
             (&*vertices, elements)
         }
     };

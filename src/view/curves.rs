@@ -51,7 +51,7 @@ impl Flattening<'_> {
         each: &mut dyn FnMut([Vertex; 2]),
     ) -> Result<(), StageError> {
         let points = scratch.take::<Vertex>(model.vertices().len())?;
-        view.fill(model, points);
+        view.fill(model, points, attention)?;
         let near = view.near().unwrap_or(i32::MIN);
         let mut before = None;
         self.flatten(view, model, points, attention, &mut |[x, y, z], begins| {
@@ -81,7 +81,7 @@ impl Flattening<'_> {
             let available = size_of_val(room);
             let full = OutOfScratch { needed: available + size_of::<Vertex>(), available };
             let (points, room) = room.split_at_mut_checked(first).ok_or(full)?;
-            view.fill(model, points);
+            view.fill(model, points, attention)?;
             let limit = VERTEX_NUMBER_LIMIT.saturating_sub(first);
             let mut rest = room.iter_mut().take(limit);
             let (mut number, mut curve) = (first, 0);

@@ -15,7 +15,6 @@
 mod clock;
 mod critical;
 mod emergency;
-mod handler;
 mod pins;
 mod registers;
 mod serial;
