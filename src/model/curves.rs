@@ -109,11 +109,11 @@ pub(super) struct CurveList {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct InHand {
     order: u8,
-    control_points: usize,
-    from: Decimal,
-    to: Decimal,
+    control_points: u16,
+    /// In units of 2^-[`FINEST`], |value| <= 2^44.
+    ends: [i64; 2],
     /// The unit of its knots is 2^-this; `None` while it has none of its own.
-    fraction_bits: Option<u32>,
+    fraction_bits: Option<u8>,
 }
 
 /// Half-words before the control points: how many control points, order, how many knots, nothing, both ends.
@@ -145,7 +145,7 @@ impl CurveList {
     pub(super) fn begin(
         &mut self,
         memory: &mut Memory,
-        [from, to]: [Decimal; 2],
+        ends: [Decimal; 2],
         control: impl Iterator<Item = u16> + Clone,
     ) -> Result<(), ModelError> {
         if self.in_hand.is_some() {
@@ -155,9 +155,16 @@ impl CurveList {
         let control_points = control.clone().count();
         check_shape(control_points, order, Knots::Uniform).map_err(ModelError::Curve)?;
         check_room(memory, HEADER + control_points)?;
-        let header = [control_points as u16, u16::from(order), 0, 0, 0, 0, 0, 0];
+        let limit = i64::from(KNOT_LIMIT) << FINEST;
+        let value = |end: Decimal| end.to_binary(FINEST).ok().filter(|end| end.abs() <= limit);
+        let ends = match ends.map(value) {
+            [Some(from), Some(to)] => [from, to],
+            _ => return Err(ModelError::KnotTooLarge),
+        };
+        let control_points = control_points as u16; // at most 2^12
+        let header = [control_points, u16::from(order), 0, 0, 0, 0, 0, 0];
         memory.extend(header.into_iter().chain(control).map(Corner));
-        self.in_hand = Some(InHand { order, control_points, from, to, fraction_bits: None });
+        self.in_hand = Some(InHand { order, control_points, ends, fraction_bits: None });
         Ok(())
     }
 
@@ -171,13 +178,13 @@ impl CurveList {
         knots: impl Iterator<Item = Decimal> + Clone,
     ) -> Result<(), ModelError> {
         let in_hand = self.in_hand.ok_or(ModelError::NoCurve)?;
-        let before = in_hand.fraction_bits.unwrap_or(FINEST);
+        let before = in_hand.fraction_bits.map_or(FINEST, u32::from);
         let fraction_bits = (0..=before)
             .rev()
             .find(|bits| knots.clone().all(|knot| in_unit(knot, *bits).is_some()))
             .ok_or(ModelError::KnotTooLarge)?;
         check_room(memory, 2 * knots.clone().count())?;
-        let start = self.start + self.whole + HEADER + in_hand.control_points;
+        let start = self.start + self.whole + HEADER + usize::from(in_hand.control_points);
         let listed = memory.get_mut(start..).unwrap_or(&mut []);
         for knot in bytemuck::cast_slice_mut::<Corner, [u16; 2]>(listed) {
             *knot =
@@ -187,7 +194,7 @@ impl CurveList {
             .filter_map(|knot| in_unit(knot, fraction_bits))
             .flat_map(bytemuck::cast::<i32, [u16; 2]>);
         memory.extend(halves.map(Corner));
-        self.in_hand = Some(InHand { fraction_bits: Some(fraction_bits), ..in_hand });
+        self.in_hand = Some(InHand { fraction_bits: Some(fraction_bits as u8), ..in_hand });
         Ok(())
     }
 
@@ -208,6 +215,7 @@ impl CurveList {
     /// Checks the curve in hand and completes its header.
     fn close(&self, memory: &mut Memory, in_hand: &InHand) -> Result<(), ModelError> {
         let InHand { order, control_points, .. } = *in_hand;
+        let control_points = usize::from(control_points);
         let start = self.start + self.whole;
         let halves: &mut [u16] =
             bytemuck::cast_slice_mut(memory.get_mut(start..).unwrap_or(&mut []));
@@ -215,16 +223,12 @@ impl CurveList {
         let knots: &[[u16; 2]] = bytemuck::cast_slice(rest.get(control_points..).unwrap_or(&[]));
         let knot_count = knots.len();
         let (knots, bits, fraction_bits) = match in_hand.fraction_bits {
-            Some(bits) => (Knots::Packed(knots), bits, 0),
+            Some(bits) => (Knots::Packed(knots), u32::from(bits), 0),
             None => (Knots::Uniform, 0, UNIFORM_BITS),
         };
         check_shape(control_points, order, knots).map_err(ModelError::Curve)?;
-        let value = |u: Decimal| {
-            let limit = i64::from(KNOT_LIMIT) << fraction_bits;
-            let value = u.to_binary(bits + fraction_bits).map_err(|_| ModelError::KnotTooLarge)?;
-            if value.abs() <= limit { Ok(value) } else { Err(ModelError::KnotTooLarge) }
-        };
-        let (from, to) = (value(in_hand.from)?, value(in_hand.to)?);
+        let shift = FINEST - bits - fraction_bits;
+        let [from, to] = in_hand.ends.map(|end| (end + (1 << shift >> 1)) >> shift);
         // The same number may be a unit apart as an end and as a knot that was rounded twice.
         let first = knots.get(usize::from(order) - 1) << fraction_bits;
         let last = knots.get(control_points) << fraction_bits;

@@ -161,6 +161,23 @@ struct Found {
     degenerate_faces: u32,
 }
 
+/// Looks at the model through the camera.
+#[inline(never)] // Its frame must not lie under the stages'.
+fn look(
+    model: &Model<'_>,
+    options: &PlotOptions,
+    attention: &mut dyn Attention,
+) -> Result<View, Refusal> {
+    let camera = options.camera(model).ok_or(Refusal::NothingToPlot)?;
+    attention.check()?;
+    let view = View::new(&camera, model).map_err(Refusal::View)?;
+    attention.check()?;
+    if !options.clip_behind {
+        view.refuse_behind(model).map_err(Refusal::View)?;
+    }
+    Ok(view)
+}
+
 /// Anything else: through the camera, hidden lines found.
 fn project(
     model: &Model<'_>,
@@ -172,13 +189,7 @@ fn project(
 ) -> Result<Found, Refusal> {
     attention.enter(Stage::View);
     let total = size_of_val(words);
-    let camera = options.camera(model).ok_or(Refusal::NothingToPlot)?;
-    attention.check()?;
-    let view = View::new(&camera, model).map_err(Refusal::View)?;
-    attention.check()?;
-    if !options.clip_behind {
-        view.refuse_behind(model).map_err(Refusal::View)?;
-    }
+    let view = look(model, options, attention)?;
     let projection = view.projection();
     let mut scratch = Scratch::new(words);
     let curves_map = if model.curves().is_empty() {
@@ -214,7 +225,7 @@ fn project(
     let room = line_memory.available_bytes() / size_of::<Line>();
     let lines = line_memory.take(room).map_err(Refusal::DrawingTooLarge)?;
     let collector = Collector { lines, count: 0 };
-    let mut sink = PageSink { collector, map, view, hidden: options.hidden, observer };
+    let mut sink = PageSink { collector, map: &map, view: &view, hidden: options.hidden, observer };
     let wanted = options.visibility(&view);
     let found = if options.see == WayToSee::Wire {
         visibility::follow_wire(&scene, wanted, stage_memory, attention, &mut sink)
@@ -377,8 +388,8 @@ impl<'a> Collector<'a> {
 /// Puts each stretch on the page.
 pub(super) struct PageSink<'a> {
     pub(super) collector: Collector<'a>,
-    pub(super) map: PageMap,
-    pub(super) view: View,
+    pub(super) map: &'a PageMap,
+    pub(super) view: &'a View,
     pub(super) hidden: HiddenLines,
     pub(super) observer: &'a mut dyn Observer,
 }
@@ -397,7 +408,7 @@ impl StretchSink for PageSink<'_> {
             (false, HiddenLines::Dashed) => LineType::Dashed,
             (false, HiddenLines::Erased) => return Ok(()),
         };
-        self.observer.stretch(&self.view, &stretch);
+        self.observer.stretch(self.view, &stretch);
         let [from, to] =
             [stretch.from, stretch.to].map(|end| self.map.along(p, q, end, self.view.projection()));
         self.collector.line(from, to, line_type)
