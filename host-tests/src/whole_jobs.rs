@@ -51,7 +51,9 @@ impl Bench {
         for _ in 0..3_600_000 {
             let busy = self.plotter.poll(&mut self.board);
             self.board.wait();
-            if !busy && self.plotter.machine().stands() {
+            // What waited for the last event goes on in the turn after it.
+            let stands = !busy && self.plotter.machine().stands();
+            if stands && !self.plotter.poll(&mut self.board) {
                 return;
             }
         }

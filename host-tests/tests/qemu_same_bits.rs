@@ -137,10 +137,13 @@ fn ctrl_x_stops_the_steps_raises_the_pen_and_knows_the_position() -> Result<(), 
         machine.change(change);
     }
     assert!(!machine.pen_is_down());
-    // 80 steps a millimetre: the reported position is that of the pins.
+    // 80 steps a millimetre: the reported position is that of the pins, rounded to a micrometre.
     let (x, y) = machine.position();
-    let position = format!("|MPos:{:.3},{:.3},", f64::from(x) / 80.0, f64::from(y) / 80.0);
-    assert!(status.contains(&position), "{status} {position}");
+    let reported = status.split("|MPos:").nth(1).ok_or("no position")?.split(',');
+    for (reported, steps) in reported.zip([x, y]) {
+        let error = reported.parse::<f64>()? - f64::from(steps) / 80.0;
+        assert!(error.abs() <= 0.001, "{status} {x} {y}");
+    }
     // Nothing more moves, and it is ready: the model is still there.
     assert_eq!(line.emulator.pin_changes()?, []);
     line.emulator.send(b"$plot\n")?;

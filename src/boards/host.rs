@@ -3,11 +3,11 @@
 //!
 //! Time passes only in [`Board::wait`] and [`HostBoard::pass`], so a run is the same every time.
 
-use crate::machine::{Pen, Pins, Pulser, PulserState};
+use crate::machine::{Contacts, Pen, Pins, Pulser, PulserState};
 use crate::model::{Corner, Position};
 use crate::motion::{EventQueue, StepEvent};
 use crate::plotter::{Board, Lent, NO_MOVES};
-use crate::protocol::RealTime;
+use crate::protocol::{RealTime, Sorter};
 use core::convert::Infallible;
 use embedded_hal::digital::{ErrorType, OutputPin};
 use heapless::spsc::{Producer, Queue};
@@ -165,6 +165,7 @@ pub fn traced_pulser<'q, const N: usize>(
 /// The board.
 pub struct HostBoard<'q> {
     received: VecDeque<u8>,
+    sorter: Sorter,
     asked: RealTime,
     sent: Vec<u8>,
     producer: Producer<'q, StepEvent>,
@@ -172,6 +173,7 @@ pub struct HostBoard<'q> {
     trace: Rc<Trace>,
     /// When the step interrupt is due, in ticks from the start.
     due: Option<u64>,
+    contacts: Contacts,
 }
 
 impl core::fmt::Debug for HostBoard<'_> {
@@ -186,21 +188,23 @@ impl<'q> HostBoard<'q> {
         let (producer, pulser, trace) = traced_pulser(queue, state);
         Self {
             received: VecDeque::new(),
+            sorter: Sorter::new(),
             asked: RealTime::default(),
             sent: Vec::new(),
             producer,
             pulser,
             trace,
             due: None,
+            contacts: Contacts::default(),
         }
     }
 
     /// Bytes come over the line.
     pub fn receive(&mut self, bytes: &[u8]) {
         for byte in bytes {
-            match RealTime::of_byte(*byte) {
+            match self.sorter.sort(*byte) {
                 Some(asked) => {
-                    if asked.abort {
+                    if asked.has(RealTime::ABORT) {
                         self.received.clear();
                     }
                     self.asked = self.asked.and(asked);
@@ -208,6 +212,11 @@ impl<'q> HostBoard<'q> {
                 None => self.received.push_back(*byte),
             }
         }
+    }
+
+    /// Closes and opens contacts.
+    pub fn set_contacts(&mut self, contacts: Contacts) {
+        self.contacts = contacts;
     }
 
     /// Whether all bytes received have been read, and real-time ones acted on.
@@ -260,6 +269,16 @@ impl Board for HostBoard<'_> {
 
     fn queue(&mut self) -> &mut dyn EventQueue {
         &mut self.producer
+    }
+
+    fn contacts(&mut self) -> Contacts {
+        self.contacts
+    }
+
+    fn step_now(&mut self) {
+        if !self.pulser.pulse_is_high() {
+            self.due = Some(self.trace.now());
+        }
     }
 
     fn wait(&mut self) {

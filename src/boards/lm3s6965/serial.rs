@@ -4,12 +4,12 @@
 //! so that status, hold and abort are seen however full the queue is. An abort also drops the bytes
 //! received before it. A byte that finds the queue full is lost, and a flag says so.
 
-use core::sync::atomic::{AtomicU8, AtomicU32, Ordering};
+use core::sync::atomic::{AtomicU16, AtomicU32, Ordering};
 
 use cortex_m::peripheral::NVIC;
 use heapless::spsc::{Consumer, Producer, Queue};
 use lm3s6965::{Interrupt, interrupt};
-use penup::protocol::RealTime;
+use penup::protocol::{RealTime, Sorter};
 use static_cell::StaticCell;
 
 use super::handler::Owned;
@@ -50,15 +50,8 @@ const EIGHT_BITS_WITH_FIFO: u32 = 0b111 << 4;
 const ENABLE_BOTH_WAYS: u32 = 1 | 1 << 8 | 1 << 9;
 const SERIAL_PINS: u32 = 0b11;
 
-mod flag {
-    pub const STATUS: u8 = 1;
-    pub const HOLD: u8 = 2;
-    pub const RESUME: u8 = 4;
-    pub const ABORT: u8 = 8;
-    pub const OVERRUN: u8 = 16;
-}
-/// The flags seen since last taken.
-static FLAGS: AtomicU8 = AtomicU8::new(0);
+/// What was asked in real time since last taken, as bits.
+static ASKED: AtomicU16 = AtomicU16::new(0);
 /// When the last `?` came, in cycles modulo 2^24.
 static STATUS_ASKED: AtomicU32 = AtomicU32::new(0);
 /// How many bytes had been queued when the last abort came.
@@ -70,6 +63,7 @@ static RECEIVER: Owned<Receiver> = Owned::empty();
 /// The handler's end of the line.
 struct Receiver {
     bytes: Producer<'static, u8>,
+    sorter: Sorter,
     /// Bytes queued since the start, modulo 2^32.
     count: u32,
 }
@@ -99,7 +93,7 @@ pub fn set_up(nvic: &mut NVIC) -> Line {
     UART0.write(offset::INTERRUPT_MASK, RECEIVED | RECEIVE_TIMEOUT);
 
     let (producer, consumer) = QUEUE.init(Queue::new()).split();
-    let receiver = Receiver { bytes: producer, count: 0 };
+    let receiver = Receiver { bytes: producer, sorter: Sorter::new(), count: 0 };
     // SAFETY: the interrupt is masked since reset, and this runs once (the queue's cell sees to it).
     unsafe { RECEIVER.fill(receiver) };
     critical::enable(nvic, Interrupt::UART0, critical::SERIAL_PRIORITY);
@@ -111,7 +105,7 @@ impl Line {
     /// The next ordinary byte; none while an abort waits to be taken, for the bytes before it are
     /// void.
     pub fn read_byte(&mut self) -> Option<u8> {
-        if FLAGS.load(Ordering::Acquire) & flag::ABORT != 0 {
+        if RealTime::from_bits(ASKED.load(Ordering::Acquire)).has(RealTime::ABORT) {
             return None;
         }
         let byte = self.bytes.dequeue()?;
@@ -121,27 +115,20 @@ impl Line {
 
     /// What was asked in real time since last taken. An abort drops the bytes received before it.
     pub fn take_real_time(&mut self) -> RealTime {
-        let flags = FLAGS.swap(0, Ordering::AcqRel);
-        let abort = flags & flag::ABORT != 0;
-        if abort {
+        let asked = RealTime::from_bits(ASKED.swap(0, Ordering::AcqRel));
+        if asked.has(RealTime::ABORT) {
             let void = COUNT_AT_ABORT.load(Ordering::Acquire).wrapping_sub(self.count);
             for _ in 0..void {
                 self.bytes.dequeue();
                 self.count = self.count.wrapping_add(1);
             }
         }
-        if flags & flag::STATUS != 0 {
+        if asked.has(RealTime::STATUS) {
             let waited = clock::cycles_24().wrapping_sub(STATUS_ASKED.load(Ordering::Relaxed));
             let microseconds = (waited & clock::CYCLE_MASK) / (clock::HERTZ / 1_000_000);
             defmt::debug!("status after {=u32} us", microseconds);
         }
-        RealTime {
-            status: flags & flag::STATUS != 0,
-            hold: flags & flag::HOLD != 0,
-            resume: flags & flag::RESUME != 0,
-            abort,
-            bytes_lost: flags & flag::OVERRUN != 0,
-        }
+        asked
     }
 }
 
@@ -161,26 +148,21 @@ pub fn poll() -> Option<u8> {
 
 impl Receiver {
     fn receive(&mut self, byte: u8) {
-        let flag = match byte {
-            b'?' => {
-                STATUS_ASKED.store(clock::cycles_24(), Ordering::Relaxed);
-                flag::STATUS
+        let asked = match self.sorter.sort(byte) {
+            Some(asked) => asked,
+            None if self.bytes.enqueue(byte).is_ok() => {
+                self.count = self.count.wrapping_add(1);
+                return;
             }
-            b'!' => flag::HOLD,
-            b'~' => flag::RESUME,
-            ABORT => {
-                COUNT_AT_ABORT.store(self.count, Ordering::Release);
-                flag::ABORT
-            }
-            _ => {
-                if self.bytes.enqueue(byte).is_ok() {
-                    self.count = self.count.wrapping_add(1);
-                    return;
-                }
-                flag::OVERRUN
-            }
+            None => RealTime::BYTES_LOST,
         };
-        FLAGS.fetch_or(flag, Ordering::AcqRel);
+        if asked.has(RealTime::STATUS) {
+            STATUS_ASKED.store(clock::cycles_24(), Ordering::Relaxed);
+        }
+        if asked.has(RealTime::ABORT) {
+            COUNT_AT_ABORT.store(self.count, Ordering::Release);
+        }
+        ASKED.fetch_or(asked.to_bits(), Ordering::AcqRel);
     }
 }
 
