@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use std::{env, fs, io};
 
 /// Every board: its cargo feature, and the name of its map in `boards/`.
-const BOARDS: [&str; 1] = ["lm3s6965"];
+const BOARDS: [&str; 2] = ["lm3s6965", "pico"];
 
 fn main() -> io::Result<()> {
     println!("cargo::rerun-if-changed=build.rs");

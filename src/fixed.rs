@@ -85,6 +85,20 @@ impl Decimal {
     /// # Errors
     /// [`OutOfRange`] if it does not fit 62 bits.
     pub fn to_binary(self, fraction_bits: u32) -> Result<i64, OutOfRange> {
+        self.binary(fraction_bits, |power| power / 2)
+    }
+
+    /// The multiple of 2^-`fraction_bits` next towards zero, as that many units. Taken again in a coarser
+    /// unit, it is the same as if it had been taken in that unit at once.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] if it does not fit 62 bits.
+    pub fn to_binary_truncated(self, fraction_bits: u32) -> Result<i64, OutOfRange> {
+        self.binary(fraction_bits, |_| 0)
+    }
+
+    /// `more` is what is added before the division by a power of ten.
+    fn binary(self, fraction_bits: u32, more: fn(u128) -> u128) -> Result<i64, OutOfRange> {
         if self.mantissa == 0 {
             return Ok(0);
         }
@@ -100,7 +114,7 @@ impl Decimal {
         } else {
             // Past 10^38 the quotient is zero whatever the mantissa.
             power_of_ten(self.exponent.unsigned_abs())
-                .map_or(0, |power| (shifted + power / 2) / power)
+                .map_or(0, |power| (shifted + more(power)) / power)
         };
         let value =
             i64::try_from(rounded).ok().filter(|value| *value < 1 << 62).ok_or(OutOfRange)?;
@@ -173,6 +187,38 @@ pub fn divide_rounding(dividend: i128, divisor: i128) -> i128 {
     if dividend < 0 { -((half - dividend) / divisor) } else { (dividend + half) / divisor }
 }
 
+/// Writes a number of the camera with up to six decimals, and no zeros at the end. Far smaller than the
+/// shortest form that the standard library finds.
+///
+/// ```
+/// use penup::fixed::SixDecimals;
+/// assert_eq!(format!("{} {} {}", SixDecimals(-2.5), SixDecimals(1e15), SixDecimals(1e-7)), "-2.5 1000000000000000 0");
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SixDecimals(pub f64);
+
+impl fmt::Display for SixDecimals {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let magnitude = libm::fabs(self.0);
+        let (mut whole, mut millionths) = (magnitude as u64, 0);
+        // Past this a double has no six decimals.
+        if magnitude < 1e9 {
+            let all = libm::round(magnitude * 1e6) as u64;
+            (whole, millionths) = (all / 1_000_000, all % 1_000_000);
+        }
+        if self.0 < 0.0 && (whole, millionths) != (0, 0) {
+            formatter.write_str("-")?;
+        }
+        write!(formatter, "{whole}")?;
+        let mut width = 6;
+        while millionths > 0 && millionths % 10 == 0 {
+            millionths /= 10;
+            width -= 1;
+        }
+        if millionths > 0 { write!(formatter, ".{millionths:0width$}") } else { Ok(()) }
+    }
+}
+
 /// Writes `units` × 2^-`fraction_bits` with `places` decimals (at most 9), rounded half away from zero.
 ///
 /// ```
@@ -192,20 +238,20 @@ pub struct BinaryFraction {
 impl fmt::Display for BinaryFraction {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         let places = self.places.min(9);
-        let scale = 10u128.pow(places);
-        let scaled = u128::from(self.units.unsigned_abs()) * scale; // below 2^94
-        let fraction_bits = self.fraction_bits.min(60);
-        let rounded = if fraction_bits == 0 {
-            scaled
-        } else {
-            (scaled + (1 << (fraction_bits - 1))) >> fraction_bits
-        };
-        if self.units < 0 && rounded > 0 {
+        let scale = 10u64.pow(places);
+        let bits = self.fraction_bits.min(60);
+        let magnitude = self.units.unsigned_abs();
+        let below_one = u128::from(magnitude & ((1 << bits) - 1)) * u128::from(scale); // below 2^90
+        let half = if bits == 0 { 0 } else { 1 << (bits - 1) };
+        let fraction = ((below_one + half) >> bits) as u64; // at most `scale`
+        let whole = (magnitude >> bits) + fraction / scale;
+        let fraction = fraction % scale;
+        if self.units < 0 && (whole, fraction) != (0, 0) {
             formatter.write_str("-")?;
         }
-        write!(formatter, "{}", rounded / scale)?;
+        write!(formatter, "{whole}")?;
         if places > 0 {
-            write!(formatter, ".{:0width$}", rounded % scale, width = places as usize)?;
+            write!(formatter, ".{fraction:0width$}", width = places as usize)?;
         }
         Ok(())
     }
@@ -239,6 +285,18 @@ mod tests {
             ("0e9999", 30, 0),
         ] {
             assert_eq!(binary(text, fraction_bits), Ok(units), "{text}");
+        }
+    }
+
+    #[test]
+    fn truncating_twice_is_truncating_once() {
+        for text in ["0.1", "-0.1", "7.3", "-99.999", "1e-9", "3"] {
+            let decimal = Decimal::parse(text).unwrap();
+            let fine = decimal.to_binary_truncated(30).unwrap();
+            for bits in 0..30 {
+                let coarse = decimal.to_binary_truncated(bits).unwrap();
+                assert_eq!(fine / (1 << (30 - bits)), coarse, "{text}");
+            }
         }
     }
 

@@ -4,7 +4,7 @@
 //! came (Cárdenas & Seeley's joints and bars in two sequential arrays). It refuses what would break
 //! it (a face through a vertex that does not exist, more than fits) and is then as it was before.
 
-use crate::fixed::{Decimal, shift_right_rounding};
+use crate::fixed::Decimal;
 use bytemuck::{Pod, Zeroable};
 
 /// One more than the largest vertex number that an element can hold.
@@ -220,7 +220,8 @@ impl<'m> Model<'m> {
         self.corners.capacity()
     }
 
-    /// Adds a vertex. Its coordinates are rounded once, to 30 bits of the model's largest.
+    /// Adds a vertex. Its coordinates are rounded towards zero to 30 bits of the model's largest, so
+    /// that equal coordinates stay equal whatever comes between them.
     ///
     /// # Errors
     /// [`ModelError::TooManyVertices`], [`ModelError::CoordinateTooLarge`]; the model is unchanged.
@@ -234,7 +235,7 @@ impl<'m> Model<'m> {
             .find(|bits| {
                 coordinates.iter().all(|coordinate| {
                     coordinate
-                        .to_binary(*bits)
+                        .to_binary_truncated(*bits)
                         .is_ok_and(|value| value.unsigned_abs() <= POSITION_LIMIT as u64)
                 })
             })
@@ -242,7 +243,7 @@ impl<'m> Model<'m> {
         let [x, y, z] = coordinates.map(|coordinate| {
             // In range: the search above tried it.
             coordinate
-                .to_binary(fraction_bits)
+                .to_binary_truncated(fraction_bits)
                 .ok()
                 .and_then(|value| i32::try_from(value).ok())
                 .unwrap_or(0)
@@ -255,12 +256,9 @@ impl<'m> Model<'m> {
         if bits == 0 {
             return;
         }
+        let unit = 1 << bits; // at most 2^FINEST_FRACTION_BITS
         for vertex in self.vertices.iter_mut() {
-            *vertex = Position {
-                x: shift_right_rounding(vertex.x, bits),
-                y: shift_right_rounding(vertex.y, bits),
-                z: shift_right_rounding(vertex.z, bits),
-            };
+            *vertex = Position { x: vertex.x / unit, y: vertex.y / unit, z: vertex.z / unit };
         }
         self.fraction_bits -= bits;
     }
@@ -402,6 +400,17 @@ mod tests {
             assert_eq!(model.fraction_bits(), 23);
             assert_eq!(model.vertices()[0], Position { x: 1 << 21, y: -(1 << 22), z: 0 });
             assert_eq!(model.vertices()[1].x, 100 << 23);
+        });
+    }
+
+    #[test]
+    fn equal_coordinates_stay_equal_when_the_unit_coarsens() {
+        with_vertices(0, |model| {
+            let place = ["0.123456789", "-0.7", "0.3"];
+            for place in [place, ["9", "0", "0"], ["-700", "0", "0"], place] {
+                model.add_vertex(decimals(place)).unwrap();
+            }
+            assert_eq!(model.vertices()[0], model.vertices()[3]);
         });
     }
 

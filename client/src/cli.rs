@@ -101,6 +101,9 @@ pub struct ViewArgs {
     /// What becomes of what is behind the eye
     #[arg(long, value_enum, default_value = "clip", help_heading = "Camera")]
     pub behind: Behind,
+    /// What hides: any faces, or nothing; or one convex solid seen from its vertices or edges alone
+    #[arg(long, value_enum, default_value = "faces", help_heading = "Camera")]
+    pub see: See,
     /// What to do with hidden lines
     #[arg(long, value_enum, default_value = "erased", help_heading = "Camera")]
     pub hidden: Hidden,
@@ -163,6 +166,12 @@ impl ViewArgs {
                 Blocks::Merged => "merged",
             },
             crease: self.crease,
+            see: match self.see {
+                See::Faces => "faces",
+                See::Wire => "wire",
+                See::Vertices => "vertices",
+                See::Edges => "edges",
+            },
             hidden: match self.hidden {
                 Hidden::Erased => "erased",
                 Hidden::Dotted => "dotted",
@@ -209,6 +218,19 @@ pub enum Behind {
     Clip,
     /// Nothing is drawn
     Refuse,
+}
+
+/// How it is found out what is seen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum See {
+    /// Faces hide what is behind them
+    Faces,
+    /// Nothing hides anything: a wire frame
+    Wire,
+    /// One convex solid, from its vertices alone
+    Vertices,
+    /// One convex solid, from its vertices and edges
+    Edges,
 }
 
 /// What is done with hidden lines.

@@ -2,7 +2,7 @@
 
 use crate::protocol::{
     ANGLES, AT, BEHIND, BLOCKS, CLEAR, CREASE, EYE, FIT, HIDDEN, MARGIN, PAGE, PROJECTION, SEAMS,
-    UP, VIEW_AUTO, setting,
+    SEE, UP, VIEW_AUTO, setting,
 };
 use crate::source::JobLine;
 use serde::Serialize;
@@ -117,6 +117,8 @@ pub struct Settings {
     pub blocks: &'static str,
     /// Degrees.
     pub crease: f64,
+    /// `faces`, `wire`, `vertices` or `edges`.
+    pub see: &'static str,
     /// `erased`, `dotted`, `dashed` or `shown`.
     pub hidden: &'static str,
     /// The page.
@@ -141,6 +143,7 @@ pub fn job_lines(file: Vec<JobLine>, settings: &Settings) -> Vec<JobLine> {
         format!("{SEAMS}={}", settings.seams),
         format!("{BLOCKS}={}", settings.blocks),
         setting(CREASE, &[settings.crease], ','),
+        format!("{SEE}={}", settings.see),
         format!("{HIDDEN}={}", settings.hidden),
         setting(PAGE, &[page.width, page.height], 'x'),
         setting(MARGIN, &[settings.margin], ','),
@@ -194,6 +197,7 @@ mod tests {
             seams: "on",
             blocks: "separate",
             crease: 0.0,
+            see: "faces",
             hidden: "dotted",
             page: Page { width: 210.0, height: 297.0 },
             margin: 7.5,
@@ -214,6 +218,7 @@ mod tests {
                 "$seams=on",
                 "$blocks=separate",
                 "$crease=0",
+                "$see=faces",
                 "$hidden=dotted",
                 "$page=210x297",
                 "$margin=7.5",

@@ -1,7 +1,8 @@
 //! The plotters that are no hardware: an emulated board, and the library in this process.
 
 use crate::emulator::{
-    Emulator, EmulatorError, Machine, MachineEvent, MachineEventKind, Options, image_path,
+    EmulatedBoard, Emulator, EmulatorError, Machine, MachineEvent, MachineEventKind, Options, Pico,
+    image_path,
 };
 use crate::error::Error;
 use crate::job::JobResult;
@@ -16,6 +17,8 @@ use std::time::Duration;
 pub enum Board {
     /// Cortex-M3, 64 KiB of RAM, in QEMU.
     Lm3s6965,
+    /// Raspberry Pi Pico: Cortex-M0+, 264 KiB of RAM, in rp2040js.
+    Pico,
 }
 
 /// A plotter whose pins are watched.
@@ -62,7 +65,7 @@ pub fn in_memory() -> Box<dyn PreviewPlotter> {
 /// A board in the emulator, with what its pins have done so far.
 struct Emulated {
     board: Board,
-    emulator: Emulator,
+    emulator: Box<dyn EmulatedBoard>,
     machine: Machine,
     runs: Vec<Run>,
 }
@@ -73,8 +76,7 @@ const STEP: f64 = 1.0 / 80.0;
 impl Emulated {
     fn start(board: Board) -> Result<Self, Error> {
         let fault = |error: EmulatorError| board.error(&error);
-        let emulator =
-            Emulator::start(&image_path(board.name()), Options::default()).map_err(fault)?;
+        let emulator = board.boot().map_err(fault)?;
         let start = Run { pen_down: false, points: vec![[0.0; 2]] };
         Ok(Self { board, emulator, machine: Machine::default(), runs: vec![start] })
     }
@@ -111,7 +113,20 @@ impl Board {
     pub fn name(self) -> &'static str {
         match self {
             Self::Lm3s6965 => "lm3s6965",
+            Self::Pico => "pico",
         }
+    }
+
+    /// Boots its firmware in its emulator.
+    ///
+    /// # Errors
+    /// See [`EmulatorError`].
+    pub fn boot(self) -> Result<Box<dyn EmulatedBoard>, EmulatorError> {
+        let image = image_path(self.name());
+        Ok(match self {
+            Self::Lm3s6965 => Box::new(Emulator::start(&image, Options::default())?),
+            Self::Pico => Box::new(Pico::start(&image)?),
+        })
     }
 
     fn error(self, error: &EmulatorError) -> Error {

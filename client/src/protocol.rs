@@ -31,6 +31,8 @@ pub const BLOCKS: &str = "$blocks";
 pub const CREASE: &str = "$crease";
 /// Perspective or another.
 pub const PROJECTION: &str = "$projection";
+/// How it is found out what is seen.
+pub const SEE: &str = "$see";
 /// What is done with hidden lines.
 pub const HIDDEN: &str = "$hidden";
 /// Width x height of the page in millimetres.

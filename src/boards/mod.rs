@@ -4,7 +4,15 @@
 //! each block there states the contract that it meets. `take` gives the board that the firmware is
 //! built for, once.
 
-#[cfg(all(feature = "lm3s6965", target_os = "none"))]
+mod handler;
+mod line;
+mod peripheral;
+
+#[cfg(feature = "lm3s6965")]
 mod lm3s6965;
-#[cfg(all(feature = "lm3s6965", target_os = "none"))]
+#[cfg(feature = "lm3s6965")]
 pub use lm3s6965::take;
+#[cfg(feature = "pico")]
+mod pico;
+#[cfg(feature = "pico")]
+pub use pico::take;

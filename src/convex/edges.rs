@@ -19,7 +19,7 @@ use super::exact::{Plane, Point, Viewpoint};
 use super::points::{self, Span};
 use super::polygon::Polygon;
 use super::{Eye, Sight, SolidEdge, SolidError, SolidSink, SolidSummary};
-use crate::stage::{Attention, OutOfScratch, Scratch};
+use crate::stage::{Attention, OutOfScratch, Scratch, heap_sort_by_key};
 
 /// Finds how each edge of a convex solid is seen.
 ///
@@ -170,7 +170,7 @@ impl<'s> Graph<'s> {
             }
         }
         let own_edges = &mut own_edges[..count];
-        own_edges.sort_unstable();
+        heap_sort_by_key(own_edges, |edge| *edge);
         let edge_count = remove_repeated(own_edges);
         let mut used = 0;
         for at in 0..distinct {

@@ -3,6 +3,7 @@
 use super::exact::{Plane, Point};
 use super::{Eye, POSITION_LIMIT, SolidError};
 use crate::model::VERTEX_NUMBER_LIMIT;
+use crate::stage::heap_sort_by_key;
 
 /// The tolerance that takes rounded decimals for what they mean: 2^-17 of the largest extent.
 ///
@@ -63,7 +64,7 @@ pub(super) fn check(points: &[Point]) -> Result<(), SolidError> {
 
 /// Orders `numbers` by place and keeps, of those at the same place, the least; returns how many are left.
 pub(super) fn weld(points: &[Point], numbers: &mut [u16]) -> usize {
-    numbers.sort_unstable_by_key(|number| (points[usize::from(*number)], *number));
+    heap_sort_by_key(numbers, |number| (points[usize::from(*number)], *number));
     let mut kept = 0;
     for at in 0..numbers.len() {
         let number = numbers[at];

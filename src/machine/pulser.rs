@@ -73,6 +73,30 @@ impl PulserState {
         self.halt.store(false, Ordering::Release);
     }
 
+    /// For a board whose steps are not pulsed by [`Pulser`]: what its hardware has done.
+    pub fn report(&self, (x, y): (i32, i32), ticks: u32, drained: bool) {
+        self.x.store(x, Ordering::Relaxed);
+        self.y.store(y, Ordering::Relaxed);
+        self.ticks.store(ticks, Ordering::Relaxed);
+        self.drained.store(drained, Ordering::Release);
+    }
+
+    /// For such a board: its queue ran dry while the machine moved.
+    pub fn note_underrun(&self) {
+        let underruns = self.underruns.load(Ordering::Relaxed);
+        self.underruns.store(underruns.wrapping_add(1), Ordering::Relaxed);
+    }
+
+    /// Width of a pulse.
+    pub fn pulse_ticks(&self) -> u32 {
+        self.pulse_ticks.load(Ordering::Relaxed)
+    }
+
+    /// Which direction pins are inverted (bit 0 x, bit 1 y).
+    pub fn inverted(&self) -> u8 {
+        self.inverted.load(Ordering::Relaxed)
+    }
+
     /// Width of a pulse, and which direction pins are inverted (bit 0 x, bit 1 y).
     pub(super) fn configure(&self, pulse_ticks: u32, inverted: u8) {
         self.pulse_ticks.store(pulse_ticks, Ordering::Relaxed);
@@ -220,8 +244,7 @@ where
             self.pen.set_height(0);
         }
         if core::mem::take(&mut self.moving) && !halted {
-            let underruns = self.state.underruns.load(Ordering::Relaxed);
-            self.state.underruns.store(underruns.wrapping_add(1), Ordering::Relaxed);
+            self.state.note_underrun();
         }
         self.state.drained.store(true, Ordering::Release);
         None

@@ -76,7 +76,7 @@ impl Default for Limits {
             step_length: [step_length; 2],
             draw_speed: speed,
             travel_speed: speed,
-            top: PathLength::lit("0.5"),
+            top: const { PathLength::lit("0.5") },
             acceleration: SliceSpeed::from_bits(11_529),
             junction_deviation: PathLength::from_bits(1 << 12),
             centripetal: true,
@@ -94,7 +94,7 @@ impl Limits {
     /// See [`LimitsError`].
     pub fn new(settings: &MotionSettings) -> Result<Self, LimitsError> {
         let axis = |steps_per_mm: Millimetres| {
-            if !(Millimetres::lit("2")..=Millimetres::lit("4000")).contains(&steps_per_mm) {
+            if steps_per_mm < 2 || steps_per_mm > 4000 {
                 return Err(LimitsError::StepsPerMillimetre);
             }
             // 2^32 / (bits / 2^16), at most 2^31.

@@ -1,6 +1,6 @@
 //! From the model to ordered strokes: the way of the data, in one place.
 
-use super::PlotOptions;
+use super::{PlotOptions, solid};
 use crate::drawing::{
     Bounds, Drawing, Line, LineType, OrganiseError, PageMap, PagePoint, StepsPerMillimetre, Stored,
     organise,
@@ -8,9 +8,9 @@ use crate::drawing::{
 use crate::machine::{Path, Target};
 use crate::model::{Element, Model, ModelError};
 use crate::order::{self, Leg, OrderError};
-use crate::protocol::{HiddenLines, Refusal};
+use crate::protocol::{HiddenLines, Refusal, WayToSee};
 use crate::stage::{Aborted, Attention, OutOfScratch, Scratch, Stage, items, items_mut};
-use crate::view::{Seen, View, see};
+use crate::view::{SeeError, Seen, View, see};
 use crate::visibility::{self, Scene, SinkFull, Stretch, StretchSink, VisibilityError};
 
 /// Who is shown each stretch as it is found, in view coordinates: the preview.
@@ -37,6 +37,7 @@ pub struct Job {
     stored: Stored,
     legs: usize,
     report: order::Report,
+    degenerate_faces: u32,
 }
 
 impl Job {
@@ -52,13 +53,23 @@ impl Job {
         attention: &mut dyn Attention,
         observer: &mut dyn Observer,
     ) -> Result<Self, Refusal> {
-        if model.elements().corners().is_empty() {
+        if model.elements().corners().is_empty() && options.see != WayToSee::Vertices {
             return Err(Refusal::NothingToPlot);
         }
+        let mut degenerate_faces = 0;
         let lines = if model.is_plan() && options.shows_plans_flat() {
             lay_out_plan(model, options, steps, words, observer)?
         } else {
-            project(model, options, steps, words, attention, observer)?
+            match options.see {
+                WayToSee::Vertices | WayToSee::Edges => {
+                    solid::project(model, options, steps, words, attention, observer)?
+                }
+                WayToSee::Faces | WayToSee::Wire => {
+                    let found = project(model, options, steps, words, attention, observer)?;
+                    degenerate_faces = found.degenerate_faces;
+                    found.lines
+                }
+            }
         };
         let stored = organise(words, lines, attention)?;
         let (drawing, mut rest) = stored.split(words).map_err(Refusal::DrawingTooLarge)?;
@@ -69,12 +80,17 @@ impl Job {
         let tour = rest.take::<Leg>(legs).map_err(Refusal::DrawingTooLarge)?;
         attention.enter(Stage::Order);
         let report = order::order(drawing, options.order, rest, attention, tour)?;
-        Ok(Self { stored, legs, report })
+        Ok(Self { stored, legs, report, degenerate_faces })
     }
 
     /// What came of the order.
     pub fn report(&self) -> &order::Report {
         &self.report
+    }
+
+    /// Faces of the model that were left out because they have no area.
+    pub fn degenerate_faces(&self) -> u32 {
+        self.degenerate_faces
     }
 
     /// The strokes, from `cursor` on. `words` are those that hold the job.
@@ -169,7 +185,13 @@ fn lay_out_plan(
 /// These take some 100,000 instructions.
 const CORNERS_BETWEEN_CHECKS: usize = 128;
 
-/// Anything else: through the camera, hidden lines found. Returns how many lines stand in `words`.
+/// What stands in the memory after the hidden lines are found.
+struct Found {
+    lines: usize,
+    degenerate_faces: u32,
+}
+
+/// Anything else: through the camera, hidden lines found.
 fn project(
     model: &Model<'_>,
     options: &PlotOptions,
@@ -177,7 +199,7 @@ fn project(
     words: &mut [u64],
     attention: &mut dyn Attention,
     observer: &mut dyn Observer,
-) -> Result<usize, Refusal> {
+) -> Result<Found, Refusal> {
     attention.enter(Stage::View);
     let total = size_of_val(words);
     let mut scratch = Scratch::new(words);
@@ -185,8 +207,7 @@ fn project(
     attention.check()?;
     let view = View::new(&camera, model).map_err(Refusal::View)?;
     attention.check()?;
-    let Seen { vertices, elements } =
-        see(&view, model, &mut scratch).map_err(Refusal::DrawingTooLarge)?;
+    let Seen { vertices, elements, degenerate_faces } = see(&view, model, &mut scratch, attention)?;
     if !options.clip_behind {
         view.refuse_behind(model).map_err(Refusal::View)?;
     }
@@ -196,8 +217,7 @@ fn project(
     for corners in elements.corners().chunks(CORNERS_BETWEEN_CHECKS) {
         attention.check()?;
         let used = corners.iter().filter_map(|c| vertices.get(usize::from(c.vertex()))).copied();
-        let more = Bounds::around(used, projection);
-        bounds = bounds.zip(more).map(|(a, b)| a.union(b)).or(bounds).or(more);
+        bounds = grow(bounds, Bounds::around(used, projection));
     }
     let bounds = bounds.ok_or(Refusal::NothingToPlot)?;
     let map = PageMap::fit(&bounds, &options.page, steps).map_err(Refusal::Page)?;
@@ -217,10 +237,14 @@ fn project(
     let lines = line_memory.take(room).map_err(Refusal::DrawingTooLarge)?;
     let collector = Collector { lines, count: 0 };
     let mut sink = PageSink { collector, map, view, hidden: options.hidden, observer };
-    let options = options.visibility(&view);
-    let found = visibility::find_stretches(&scene, options, stage_memory, attention, &mut sink);
-    let count = match found {
-        Ok(_) => sink.collector.count,
+    let wanted = options.visibility(&view);
+    let found = if options.see == WayToSee::Wire {
+        visibility::follow_wire(&scene, wanted, stage_memory, attention, &mut sink)
+    } else {
+        visibility::find_stretches(&scene, wanted, stage_memory, attention, &mut sink).map(|_| ())
+    };
+    let lines = match found {
+        Ok(()) => sink.collector.count,
         Err(VisibilityError::SinkFull) => return Err(sink.collector.out_of_memory()),
         Err(VisibilityError::Scratch(missing)) => return Err(Refusal::DrawingTooLarge(missing)),
         Err(VisibilityError::Aborted) => return Err(Refusal::Aborted),
@@ -233,14 +257,33 @@ fn project(
             return Err(Refusal::Model(ModelError::TooManyCorners { limit, needed }));
         }
     };
+    to_front(words, lines_at, lines);
+    Ok(Found { lines, degenerate_faces })
+}
+
+/// The bounds of both.
+pub(super) fn grow(bounds: Option<Bounds>, more: Option<Bounds>) -> Option<Bounds> {
+    bounds.zip(more).map(|(a, b)| a.union(b)).or(bounds).or(more)
+}
+
+/// Moves `count` lines from word `at` to the front, where [`organise`] looks for them.
+pub(super) fn to_front(words: &mut [u64], at: usize, count: usize) {
     let line_words = Scratch::bytes_for::<Line>(count) / size_of::<u64>();
-    words.copy_within(lines_at..lines_at + line_words, 0);
-    Ok(count)
+    words.copy_within(at..at + line_words, 0);
 }
 
 impl From<Aborted> for Refusal {
     fn from(_: Aborted) -> Self {
         Self::Aborted
+    }
+}
+
+impl From<SeeError> for Refusal {
+    fn from(error: SeeError) -> Self {
+        match error {
+            SeeError::Scratch(missing) => Self::DrawingTooLarge(missing),
+            SeeError::Aborted => Self::Aborted,
+        }
     }
 }
 
@@ -266,13 +309,13 @@ impl From<OrderError> for Refusal {
 }
 
 /// Packs lines at the front of the memory.
-struct Collector<'a> {
+pub(super) struct Collector<'a> {
     lines: &'a mut [Line],
-    count: usize,
+    pub(super) count: usize,
 }
 
 impl<'a> Collector<'a> {
-    fn new(words: &'a mut [u64]) -> Self {
+    pub(super) fn new(words: &'a mut [u64]) -> Self {
         let room = size_of_val(words) / size_of::<Line>();
         Self { lines: items_mut(words, room).unwrap_or(&mut []), count: 0 }
     }
@@ -290,19 +333,19 @@ impl<'a> Collector<'a> {
         Ok(())
     }
 
-    fn out_of_memory(&self) -> Refusal {
+    pub(super) fn out_of_memory(&self) -> Refusal {
         let available = size_of_val(self.lines);
         Refusal::DrawingTooLarge(OutOfScratch { needed: available + size_of::<Line>(), available })
     }
 }
 
 /// Puts each stretch on the page.
-struct PageSink<'a> {
-    collector: Collector<'a>,
-    map: PageMap,
-    view: View,
-    hidden: HiddenLines,
-    observer: &'a mut dyn Observer,
+pub(super) struct PageSink<'a> {
+    pub(super) collector: Collector<'a>,
+    pub(super) map: PageMap,
+    pub(super) view: View,
+    pub(super) hidden: HiddenLines,
+    pub(super) observer: &'a mut dyn Observer,
 }
 
 impl StretchSink for PageSink<'_> {

@@ -11,6 +11,7 @@ mod memory;
 mod options;
 mod program;
 mod reply;
+mod solid;
 mod stream;
 
 pub use board::Board;
@@ -246,11 +247,20 @@ impl Inner<'_> {
             self.act(asked);
         }
         computed?;
+        self.report_degenerate(board);
         let mut strokes = self.job.strokes(self.words, &mut self.cursor);
         self.machine.start(&mut strokes)?;
         self.cursor = Cursor::default();
         self.act(asked);
         Ok(())
+    }
+
+    #[inline(never)] // Its frame must not lie under the stages'.
+    fn report_degenerate<B: Board>(&self, board: &mut B) {
+        let count = self.job.degenerate_faces();
+        if count > 0 {
+            Reply(board).line(format_args!("[MSG:{count} faces have no area and are left out]"));
+        }
     }
 
     fn compute(

@@ -1,10 +1,10 @@
 //! What is drawn and how, as the user set it.
 
 use crate::drawing::Page;
-use crate::fixed::Millimetres;
+use crate::fixed::{Millimetres, SixDecimals};
 use crate::model::Model;
 use crate::order;
-use crate::protocol::{HiddenLines, PlotOption, ProjectionChoice};
+use crate::protocol::{HiddenLines, PlotOption, ProjectionChoice, WayToSee};
 use crate::view::{Camera, Direction, Lens, Sight, View};
 use crate::visibility::{self, Crease};
 
@@ -18,6 +18,8 @@ pub struct PlotOptions {
     projection: ProjectionChoice,
     /// Whether what is behind the eye is cut off; else it is an error.
     pub clip_behind: bool,
+    /// How it is found out what is seen.
+    pub see: WayToSee,
     /// What becomes of hidden lines.
     pub hidden: HiddenLines,
     /// Whether the lines are drawn where faces pass through each other.
@@ -45,6 +47,7 @@ impl Default for PlotOptions {
             angles: None,
             projection: ProjectionChoice::default(),
             clip_behind: true,
+            see: WayToSee::Faces,
             hidden: HiddenLines::Erased,
             seams: true,
             merged_blocks: false,
@@ -69,6 +72,7 @@ impl PlotOptions {
             }
             PlotOption::Projection(projection) => self.projection = projection,
             PlotOption::ClipBehind(clip) => self.clip_behind = clip,
+            PlotOption::See(see) => self.see = see,
             PlotOption::Hidden(hidden) => self.hidden = hidden,
             PlotOption::Seams(seams) => self.seams = seams,
             PlotOption::MergedBlocks(merged) => self.merged_blocks = merged,
@@ -86,6 +90,7 @@ impl PlotOptions {
         self.eye.is_none()
             && self.angles.is_none()
             && matches!(self.projection, ProjectionChoice::Lens(_))
+            && matches!(self.see, WayToSee::Faces | WayToSee::Wire)
     }
 
     /// The camera for `model`; what the user did not choose is chosen here. `None` without vertices.
@@ -129,7 +134,10 @@ impl PlotOptions {
         let places = [("eye", self.eye), ("at", self.at), ("up", self.up), ("angles", self.angles)];
         for (name, place) in places {
             match place {
-                Some([x, y, z]) => line(format_args!("${name}={x},{y},{z}")),
+                Some(place) => {
+                    let [x, y, z] = place.map(SixDecimals);
+                    line(format_args!("${name}={x},{y},{z}"))
+                }
                 None => line(format_args!("${name}=auto")),
             }
         }
@@ -141,12 +149,20 @@ impl PlotOptions {
                 line(format_args!("$projection=orthographic"))
             }
             ProjectionChoice::Lens(Lens::Oblique { angle, ratio }) => {
+                let [angle, ratio] = [angle, ratio].map(SixDecimals);
                 line(format_args!("$projection=oblique,{angle},{ratio}"));
             }
             ProjectionChoice::Axonometric { azimuth, elevation } => {
+                let [azimuth, elevation] = [azimuth, elevation].map(SixDecimals);
                 line(format_args!("$projection=axonometric,{azimuth},{elevation}"));
             }
         }
+        let see = match self.see {
+            WayToSee::Faces => "faces",
+            WayToSee::Wire => "wire",
+            WayToSee::Vertices => "vertices",
+            WayToSee::Edges => "edges",
+        };
         let hidden = match self.hidden {
             HiddenLines::Erased => "erased",
             HiddenLines::Dotted => "dotted",
@@ -154,10 +170,11 @@ impl PlotOptions {
             HiddenLines::Shown => "shown",
         };
         line(format_args!("$behind={}", if self.clip_behind { "clip" } else { "refuse" }));
+        line(format_args!("$see={see}"));
         line(format_args!("$hidden={hidden}"));
         line(format_args!("$seams={}", if self.seams { "on" } else { "off" }));
         line(format_args!("$blocks={}", if self.merged_blocks { "merged" } else { "separate" }));
-        line(format_args!("$crease={}", self.crease));
+        line(format_args!("$crease={}", SixDecimals(self.crease)));
         line(format_args!("$page={}x{}", self.page.width, self.page.height));
         line(format_args!("$margin={}", self.page.margin));
         line(format_args!("$fit={}", if self.fit { "on" } else { "off" }));

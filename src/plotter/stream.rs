@@ -7,13 +7,13 @@ use crate::drawing::{LineType, PagePoint};
 use crate::machine::{Alarm, MachineError, Setting, State, Target};
 use crate::motion::{StepEvent, TICKS_PER_SECOND};
 use crate::protocol::{GCode, RealTime, Refusal};
-use crate::step::{Arc, Chords};
+use crate::step::{Arc, Chords, Line};
 
 /// A line that is being carried out.
 #[derive(Debug)]
 pub(super) enum Task {
-    /// The rest of an arc.
-    Arc(Chords<Arc>),
+    /// The rest of an arc, from a point.
+    Arc(PagePoint, Arc),
     /// So many ticks, once everything stands.
     Dwell(u64),
     /// Waits until everything stands, then for the user.
@@ -98,9 +98,16 @@ impl Inner<'_> {
         let machine = &mut self.machine;
         let stands = machine.state() == State::Idle && machine.stands();
         match &mut self.task {
-            Some(Task::Arc(chords)) if machine.has_room() => {
-                let Some(point) = chords.next() else { return Ok(Progress::Done(Ok(()))) };
-                machine.draw_to(self.program.target(point), self.program.feed)?;
+            Some(Task::Arc(from, arc)) if machine.has_room() => {
+                // To keep the points that a chord reads ahead would cost the stages' stack.
+                let Some(to) = Chords::new(*from, arc.clone()).next() else {
+                    return Ok(Progress::Done(Ok(())));
+                };
+                machine.draw_to(self.program.target(to), self.program.feed)?;
+                // The chord's moves are as many points of the arc.
+                for _ in Line::new(core::mem::replace(from, to), to) {
+                    arc.next();
+                }
                 Ok(Progress::More)
             }
             Some(Task::Dwell(left)) if stands && *left > 0 => {
@@ -144,7 +151,7 @@ impl Inner<'_> {
                 machine.check_travel(0, least)?;
                 machine.check_travel(0, most)?;
                 if waits {
-                    self.task = Some(Task::Arc(Chords::new(machine.end(), arc)));
+                    self.task = Some(Task::Arc(machine.end(), arc));
                 }
             }
             Order::Lower => machine.lower_pen()?,

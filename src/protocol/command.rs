@@ -69,6 +69,8 @@ pub enum PlotOption {
     Projection(ProjectionChoice),
     /// `$behind=clip|refuse`: what is behind the eye is cut off (`true`), or an error.
     ClipBehind(bool),
+    /// `$see=faces|wire|vertices|edges`
+    See(WayToSee),
     /// `$hidden=erased|dotted|dashed|shown`
     Hidden(HiddenLines),
     /// `$seams=on|off`: where faces pass through each other.
@@ -150,6 +152,21 @@ impl ProjectionChoice {
     }
 }
 
+/// How it is found out what is seen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum WayToSee {
+    /// Any faces hide what is behind them.
+    #[default]
+    Faces,
+    /// Nothing hides anything: a wire frame.
+    Wire,
+    /// The vertices alone are those of one convex solid.
+    Vertices,
+    /// The vertices and edges are those of one convex solid.
+    Edges,
+}
+
 /// What becomes of the hidden lines.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -185,6 +202,10 @@ pub const HELP: &[(&str, &str)] = &[
         "a parallel view by its direction",
     ),
     ("$behind=clip|refuse", "what becomes of what is behind the eye"),
+    (
+        "$see=faces|wire|vertices|edges",
+        "any faces hide; nothing hides; one convex solid from its vertices, or its edges",
+    ),
     ("$hidden=erased|dotted|dashed|shown", "what becomes of hidden lines"),
     ("$seams=on|off", "whether the lines are drawn where faces pass through each other"),
     ("$blocks=separate|merged", "whether blocks that touch are drawn as one shape"),
@@ -280,6 +301,15 @@ impl PlotOption {
                 "clip" => true,
                 "refuse" => false,
                 _ => return Err(Refusal::NotAChoice { choices: "clip or refuse" }),
+            }),
+            "see" => Self::See(match value {
+                "faces" => WayToSee::Faces,
+                "wire" => WayToSee::Wire,
+                "vertices" => WayToSee::Vertices,
+                "edges" => WayToSee::Edges,
+                _ => {
+                    return Err(Refusal::NotAChoice { choices: "faces, wire, vertices or edges" });
+                }
             }),
             "hidden" => Self::Hidden(match value {
                 "erased" => HiddenLines::Erased,

@@ -11,7 +11,7 @@ mod gcode;
 mod line;
 mod refusal;
 
-pub use command::{Command, HELP, HiddenLines, Numbers, PlotOption, ProjectionChoice};
+pub use command::{Command, HELP, HiddenLines, Numbers, PlotOption, ProjectionChoice, WayToSee};
 pub use gcode::{GCode, Word};
 pub use line::{LINE_LIMIT, LineReader, RealTime, Sorter};
 pub use refusal::{MEANINGS, Refusal};

@@ -1,5 +1,6 @@
 //! Why a line was not carried out: a number for programs, a sentence for people.
 
+use crate::convex::SolidError;
 use crate::drawing::PageError;
 use crate::fixed::BinaryFraction;
 use crate::machine::{MachineError, SettingError, Value};
@@ -62,6 +63,8 @@ pub enum Refusal {
     NothingToPlot,
     /// The camera sees nothing that can be drawn.
     View(ViewError),
+    /// The vertices, or the edges, are not those of a convex solid.
+    Solid(SolidError),
     /// The drawing does not go on the page.
     Page(PageError),
     /// The machine refused it.
@@ -106,6 +109,8 @@ pub const MEANINGS: &[(u16, &str)] = &[
     (122, "up is along the line of sight"),
     (123, "vertex not in front of the eye"),
     (124, "nothing in front of the eye"),
+    (125, "not a convex solid"),
+    (126, "eye inside the solid"),
     (130, "margins leave no room on the page"),
     (131, "page has too many steps"),
     (132, "drawing is larger than the page"),
@@ -150,6 +155,8 @@ impl Refusal {
             Self::View(ViewError::UpAlongSight) => 122,
             Self::View(ViewError::BehindEye { .. }) => 123,
             Self::View(ViewError::NothingInFront) => 124,
+            Self::Solid(SolidError::EyeInside | SolidError::BadEye) => 126,
+            Self::Solid(_) => 125,
             Self::Page(PageError::NoRoom) => 130,
             Self::Page(PageError::TooManySteps) => 131,
             Self::Page(PageError::DoesNotFit { .. }) => 132,
@@ -213,6 +220,7 @@ impl fmt::Display for Refusal {
             Self::View(ViewError::BehindEye { vertex }) => {
                 write!(formatter, "vertex {vertex} is beside or behind the eye: move $eye back")
             }
+            Self::Solid(error) => write_solid_error(formatter, error),
             Self::Page(PageError::NoRoom) => {
                 formatter.write_str("make $margin smaller or $page larger")
             }
@@ -261,6 +269,25 @@ fn write_model_error(formatter: &mut fmt::Formatter<'_>, error: &ModelError) -> 
         ModelError::RepeatedVertex { number } => {
             write!(formatter, "vertex {number} comes twice in a row")
         }
+    }
+}
+
+fn write_solid_error(formatter: &mut fmt::Formatter<'_>, error: &SolidError) -> fmt::Result {
+    match error {
+        SolidError::EyeInside | SolidError::BadEye => {
+            formatter.write_str("move $eye out of the solid")
+        }
+        SolidError::VertexInside { vertex, count } => write!(
+            formatter,
+            "{count} vertices, vertex {} first, lie inside what the others span: choose $see=faces",
+            vertex + 1
+        ),
+        SolidError::OutlineBroken { vertex } => write!(
+            formatter,
+            "no edge leads on from vertex {}: send all edges, or choose $see=vertices",
+            vertex + 1
+        ),
+        _ => formatter.write_str("it takes four vertices at different places, not all in line"),
     }
 }
 

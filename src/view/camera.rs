@@ -150,6 +150,35 @@ pub(super) fn middle_and_radius(model: &Model<'_>) -> Option<(Direction, f64)> {
     Some((middle, size * f64::from(F32Ext::sqrt(squares))))
 }
 
+/// The lines of sight, in units of 2^-fraction_bits of the model; each coordinate within ±2^60.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SightLines {
+    /// They meet here.
+    Through([i64; 3]),
+    /// They are parallel; this points to the user, and is not zero.
+    Along([i64; 3]),
+}
+
+impl Camera {
+    /// The lines of sight in units of 2^-`fraction_bits` of the model.
+    ///
+    /// # Errors
+    /// See [`ViewError`].
+    pub fn sight_lines(&self, fraction_bits: u32) -> Result<SightLines, ViewError> {
+        let Axes { directions: [right, up, forward], origin } = Axes::new(self)?;
+        let place = origin.map(|coordinate| libm::ldexp(coordinate, fraction_bits as i32));
+        let limit = libm::ldexp(1.0, 60);
+        if self.lens.projection() == Projection::Perspective && largest_component(place) <= limit {
+            return Ok(SightLines::Through(place.map(|coordinate| libm::round(coordinate) as i64)));
+        }
+        // What is neither right nor up on the page; an eye too far away for numbers looks straight on.
+        let sight = cross(right, up);
+        let away = if dot(sight, forward) < 0.0 { 1.0 } else { -1.0 };
+        let scale = away * limit / largest_component(sight);
+        Ok(SightLines::Along(sight.map(|part| libm::round(part * scale) as i64)))
+    }
+}
+
 /// The axes of the image and the point they are measured from.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Axes {

@@ -5,9 +5,10 @@
 //! no edge whose ends both lie on the near plane is to be drawn.
 
 use super::View;
+use super::tidy::tidy;
 use crate::geometry::Vertex;
 use crate::model::{Corner, Element, Elements, Model, VERTEX_NUMBER_LIMIT};
-use crate::stage::{OutOfScratch, Scratch, heap_sort_by_key};
+use crate::stage::{Aborted, Attention, OutOfScratch, Scratch, heap_sort_by_key};
 
 /// A model as the camera sees it.
 #[derive(Debug, Clone, Copy)]
@@ -16,28 +17,91 @@ pub struct Seen<'a> {
     pub vertices: &'a [Vertex],
     /// What is in front of the eye.
     pub elements: Elements<'a>,
+    /// Faces of the model that were left out because they have no area.
+    pub degenerate_faces: u32,
 }
 
-/// Takes every vertex of `model` to view coordinates and cuts off what is nearer than the near plane.
+/// Why nothing is seen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum SeeError {
+    /// The vertices, or the cut faces, do not fit.
+    Scratch(OutOfScratch),
+    /// The user gave up.
+    Aborted,
+}
+
+impl From<OutOfScratch> for SeeError {
+    fn from(error: OutOfScratch) -> Self {
+        Self::Scratch(error)
+    }
+}
+
+impl From<Aborted> for SeeError {
+    fn from(_: Aborted) -> Self {
+        Self::Aborted
+    }
+}
+
+/// Vertices taken through the camera between two looks up from the work: some 100,000 instructions.
+const VERTICES_BETWEEN_CHECKS: usize = 256;
+
+/// Takes every vertex of `model` to view coordinates, makes one of those at the same place, leaves
+/// out faces without an area, and cuts off what is nearer than the near plane.
 ///
 /// # Errors
-/// [`OutOfScratch`] if the vertices, or the cut faces, do not fit.
+/// See [`SeeError`].
 #[inline(never)] // Its frame must not lie under the stages'.
 pub fn see<'a>(
     view: &View,
     model: &'a Model<'_>,
     scratch: &mut Scratch<'a>,
-) -> Result<Seen<'a>, OutOfScratch> {
+    attention: &mut dyn Attention,
+) -> Result<Seen<'a>, SeeError> {
     let vertices = scratch.take::<Vertex>(model.vertices().len())?;
-    for (vertex, position) in vertices.iter_mut().zip(model.vertices()) {
-        *vertex = view.vertex(*position);
-    }
-    match view.near() {
-        Some(near) if vertices.iter().any(|vertex| vertex.z < near) => {
-            cut(vertices, model.elements(), near, scratch)
+    let chunks = vertices.chunks_mut(VERTICES_BETWEEN_CHECKS);
+    for (vertices, positions) in chunks.zip(model.vertices().chunks(VERTICES_BETWEEN_CHECKS)) {
+        for (vertex, position) in vertices.iter_mut().zip(positions) {
+            *vertex = view.vertex(*position);
         }
-        _ => Ok(Seen { vertices, elements: model.elements() }),
+        attention.check()?;
     }
+    let (elements, degenerate_faces) = tidy(model, scratch, attention)?;
+    let (vertices, elements) = match view.near() {
+        Some(near) if vertices.iter().any(|vertex| vertex.z < near) => {
+            cut(vertices, elements, near, scratch)?
+        }
+        _ => (&*vertices, elements),
+    };
+    Ok(Seen { vertices, elements, degenerate_faces })
+}
+
+/// What of an edge is at `near` or beyond; `None` if nothing is.
+pub(super) fn clip_edge([p, q]: [Vertex; 2], near: i32) -> Option<[Vertex; 2]> {
+    match (p.z >= near, q.z >= near) {
+        (true, true) => Some([p, q]),
+        (true, false) => Some([p, on_plane(p, q, near)]),
+        (false, true) => Some([on_plane(p, q, near), q]),
+        (false, false) => None,
+    }
+}
+
+/// The edges of faces, and bars, each once, as numbers of vertices. Memory: 4 bytes for each side of a face and
+/// each bar.
+///
+/// # Errors
+/// [`OutOfScratch`] if that is not there.
+pub fn distinct_edges<'a>(
+    elements: Elements<'_>,
+    scratch: &mut Scratch<'a>,
+) -> Result<&'a [[u16; 2]], OutOfScratch> {
+    let all = || elements.iter().flat_map(edges);
+    let keys = scratch.take::<u32>(all().count())?;
+    for (key, edge) in keys.iter_mut().zip(all()) {
+        *key = edge.key();
+    }
+    heap_sort_by_key(keys, |key| *key);
+    Ok(bytemuck::cast_slice(without_repeats(keys)))
 }
 
 fn cut<'a>(
@@ -45,7 +109,7 @@ fn cut<'a>(
     elements: Elements<'_>,
     near: i32,
     scratch: &mut Scratch<'a>,
-) -> Result<Seen<'a>, OutOfScratch> {
+) -> Result<(&'a [Vertex], Elements<'a>), OutOfScratch> {
     let is_seen =
         |number: u16| vertices.get(usize::from(number)).is_some_and(|vertex| vertex.z >= near);
     let is_cut = |edge: &Edge| is_seen(edge.0) != is_seen(edge.1);
@@ -117,7 +181,7 @@ fn cut<'a>(
     }
     let corners: &'a [u16] = corners;
     let corners = bytemuck::cast_slice(corners.get(..length).unwrap_or(&[]));
-    Ok(Seen { vertices: all, elements: Elements::new(corners) })
+    Ok((all, Elements::new(corners)))
 }
 
 #[derive(Clone, Copy)]
@@ -187,10 +251,10 @@ mod tests {
             })
             .collect();
         let mut words = [0u64; 100];
-        let seen =
+        let (vertices, elements) =
             cut(vertices, Elements::new(&corners), 10, &mut Scratch::new(&mut words)).unwrap();
-        let place = |number: u16| seen.vertices[usize::from(number)];
-        let found = seen.elements.iter().map(|element| match element {
+        let place = |number: u16| vertices[usize::from(number)];
+        let found = elements.iter().map(|element| match element {
             Element::Bar(a, b) => std::vec![place(a), place(b)],
             Element::Face(corners) => corners.iter().map(|corner| place(corner.vertex())).collect(),
         });
@@ -222,6 +286,31 @@ mod tests {
         assert_eq!(found[0], [(0, 0, 20), (50, 20, 10), (25, 20, 10), (-50, 0, 20)]);
         assert_eq!(found[1], [(50, 20, 10), (0, 0, 20), (50, 0, 20), (75, 20, 10)]);
         assert_eq!(found[2], [(50, 20, 10), (0, 0, 20)]);
+    }
+
+    #[test]
+    fn an_edge_alone_is_cut_like_that_of_a_face() {
+        let [p, q] = [vertex(0, 0, 20), vertex(100, 40, 0)];
+        let middle = vertex(50, 20, 10);
+        assert_eq!(clip_edge([p, q], 10), Some([p, middle]));
+        assert_eq!(clip_edge([q, p], 10), Some([middle, p]));
+        assert_eq!(clip_edge([q, vertex(1, 1, 9)], 10), None);
+        assert_eq!(clip_edge([p, q], i32::MIN), Some([p, q]));
+    }
+
+    #[test]
+    fn an_edge_of_two_faces_and_a_bar_is_one() {
+        let corners = [(0, false), (1, false), (2, true), (1, false), (0, false), (3, true)];
+        let mut corners: Vec<Corner> =
+            corners.map(|(number, last)| Corner::new(number, false, last)).into();
+        corners.extend([Corner::new(3, true, false), Corner::new(1, true, true)]);
+        let mut words = [0u64; 4];
+        let edges = distinct_edges(Elements::new(&corners), &mut Scratch::new(&mut words)).unwrap();
+        let sorted = |edge: &[u16; 2]| (edge[0].min(edge[1]), edge[0].max(edge[1]));
+        let found: Vec<_> = edges.iter().map(sorted).collect();
+        assert_eq!(found, [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3)]);
+        assert!(distinct_edges(Elements::new(&corners), &mut Scratch::new(&mut [0; 3])).is_err());
+        assert!(distinct_edges(Elements::new(&[]), &mut Scratch::new(&mut [])).unwrap().is_empty());
     }
 
     #[test]

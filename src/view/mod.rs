@@ -4,16 +4,17 @@
 //! in fixed point that takes every position to view coordinates within ±2^19. This rounding, once
 //! per vertex and view, is the only one before the page. Square roots and angles happen once per
 //! view, in `libm`, so every machine gets the same map. What lies behind the eye or level with it is
-//! cut off by [`see`]. Refused: an eye at the point looked at, an up direction along the line of
+//! cut off by [`see`], vertices at the same place become one. Refused: an eye at the point looked at, an up direction along the line of
 //! sight, a model wholly behind the eye.
 //!
 //! Sources: Harrison 2.2 and 2.3 (equations 1 to 10) and Brown IV (the view from two points).
 
 mod camera;
 mod clip;
+mod tidy;
 
-pub use camera::{Camera, Direction, Lens, Sight};
-pub use clip::{Seen, see};
+pub use camera::{Camera, Direction, Lens, Sight, SightLines};
+pub use clip::{SeeError, Seen, distinct_edges, see};
 
 use crate::geometry::{COORDINATE_LIMIT, Projection, Vertex};
 use crate::model::{Model, Position};
@@ -150,6 +151,11 @@ impl View {
     pub fn vertex(&self, position: Position) -> Vertex {
         let [x, y, z] = self.rows.each_ref().map(|row| row.apply(position));
         Vertex { x, y, z }
+    }
+
+    /// What of an edge is in front of the near plane; `None` if nothing is.
+    pub fn clip_edge(&self, ends: [Vertex; 2]) -> Option<[Vertex; 2]> {
+        clip::clip_edge(ends, self.near.unwrap_or(i32::MIN))
     }
 
     /// Makes sure that every vertex is in front of the eye.

@@ -50,6 +50,7 @@ mod seams;
 mod search;
 mod sight;
 mod triangles;
+mod wire;
 
 use crate::geometry::{COORDINATE_LIMIT, Projection, Vertex};
 use crate::model::Elements;
@@ -64,6 +65,7 @@ use triangles::Ears;
 
 pub use crate::geometry::Along;
 pub use crease::Crease;
+pub use wire::follow_wire;
 
 /// A scene as the camera sees it: rounded vertices, and the faces and bars between them.
 #[derive(Debug, Clone, Copy)]

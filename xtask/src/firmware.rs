@@ -9,6 +9,7 @@ use object::{Object, ObjectSection, SectionFlags, elf};
 
 use crate::command::run;
 use crate::set_up::{self, Toolchain};
+use crate::uf2;
 
 /// A board that firmware is built for.
 #[derive(Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
@@ -16,6 +17,8 @@ pub enum Board {
     /// Texas Instruments LM3S6965 (Cortex-M3), emulated by QEMU.
     #[default]
     Lm3s6965,
+    /// Raspberry Pi Pico (RP2040, Cortex-M0+), emulated by rp2040js.
+    Pico,
 }
 
 /// A range of addresses: where it begins, how many bytes.
@@ -33,7 +36,7 @@ impl Region {
 
 impl Board {
     /// Every board.
-    pub const ALL: &[Self] = &[Self::Lm3s6965];
+    pub const ALL: &[Self] = &[Self::Lm3s6965, Self::Pico];
 
     /// The board that `--board` names among the options of another program, else the default one.
     pub fn from_options(options: &[String]) -> Result<Self> {
@@ -61,6 +64,7 @@ impl Board {
     pub fn name(self) -> &'static str {
         match self {
             Self::Lm3s6965 => "lm3s6965",
+            Self::Pico => "pico",
         }
     }
 
@@ -68,16 +72,34 @@ impl Board {
     pub fn target(self) -> &'static str {
         match self {
             Self::Lm3s6965 => "thumbv7m-none-eabi",
+            Self::Pico => "thumbv6m-none-eabi",
+        }
+    }
+
+    /// How cargo builds its firmware, a profile of the workspace.
+    fn profile(self) -> &'static str {
+        match self {
+            Self::Lm3s6965 => "firmware",
+            Self::Pico => "pico",
+        }
+    }
+
+    /// Where its log goes, a cargo feature. The Pico's image is the one that is flashed.
+    fn log(self) -> &'static str {
+        match self {
+            Self::Lm3s6965 => "log-semihosting",
+            Self::Pico => "log-rtt",
         }
     }
 
     /// The options by which cargo builds its firmware.
     pub fn cargo_options(self) -> [String; 6] {
-        let features = format!("{},log-semihosting", self.name());
+        let features = format!("{},{}", self.name(), self.log());
+        let profile = format!("--profile={}", self.profile());
         [
             "--package=penup",
             "--bin=firmware",
-            "--profile=firmware",
+            &profile,
             "--no-default-features",
             "--features",
             &features,
@@ -93,12 +115,22 @@ impl Board {
     fn flash(self) -> Region {
         match self {
             Self::Lm3s6965 => Region { start: 0, size: 256 << 10 },
+            Self::Pico => Region { start: 0x1000_0000, size: 2 << 20 },
+        }
+    }
+
+    /// Where the vector table lies: on the Pico, behind what its boot ROM runs first.
+    fn vectors(self) -> u64 {
+        match self {
+            Self::Lm3s6965 => self.flash().start,
+            Self::Pico => self.flash().start + 256,
         }
     }
 
     fn ram(self) -> Region {
         match self {
             Self::Lm3s6965 => Region { start: 0x2000_0000, size: 64 << 10 },
+            Self::Pico => Region { start: 0x2000_0000, size: 264 << 10 },
         }
     }
 }
@@ -116,10 +148,14 @@ pub fn build(board: Board) -> Result<PathBuf> {
         cargo.args(["--target-dir", directory]);
     }
     run(cargo.arg("--quiet").args(board.cargo_options()))?;
-    let built = Path::new(directory).join(board.target()).join("firmware/firmware");
+    let built = Path::new(directory).join(board.target()).join(board.profile()).join("firmware");
     let image = board.image();
     fs::create_dir_all(image.parent().context("the image has a directory")?)?;
     fs::copy(crate::root().join(built), &image)?;
+    if board == Board::Pico {
+        let uf2 = uf2::of_elf(&fs::read(&image)?, board.flash().start)?;
+        fs::write(image.with_extension("uf2"), uf2)?;
+    }
     Ok(image)
 }
 
@@ -144,7 +180,7 @@ impl fmt::Display for Sizes {
     }
 }
 
-/// Checks that the image links as the board boots: the vector table at the start of flash, the stack
+/// Checks that the image links as the board boots: the vector table where it looks for it, the stack
 /// at the start of RAM, the entry in flash, every section within the memory. A wrong memory map or
 /// lost link arguments give no linker error, only such an image.
 pub fn check(board: Board, image: &Path) -> Result<Sizes> {
@@ -156,12 +192,19 @@ pub fn check(board: Board, image: &Path) -> Result<Sizes> {
         .section_by_name(".vector_table")
         .context("the image is empty: the link arguments of build.rs did not arrive")?;
     ensure!(
-        vectors.address() == flash.start,
+        vectors.address() == board.vectors(),
         "the vector table is at {:#010x}, but {} boots from {:#010x}: wrong memory map",
         vectors.address(),
         board.name(),
-        flash.start
+        board.vectors()
     );
+    if board == Board::Pico {
+        let boot = elf.section_by_name(".boot2").context("the image lacks the boot loader")?;
+        ensure!(
+            boot.address() == flash.start && boot.size() == 256,
+            "the boot loader is not at the start of flash: wrong memory map"
+        );
+    }
     let table = vectors.data()?;
     let word = |index: usize| -> Result<u64> {
         let bytes = table.get(4 * index..4 * index + 4).context("the vector table is cut off")?;

@@ -5,9 +5,11 @@
 
 mod command;
 mod experiments;
+mod flash;
 mod firmware;
 mod set_up;
 mod test;
+mod uf2;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
@@ -32,6 +34,12 @@ enum Task {
     Build {
         /// The board to build for.
         #[arg(long, value_enum, default_value_t)]
+        board: Board,
+    },
+    /// Builds a board's firmware and writes it to the board that is connected.
+    Flash {
+        /// The board to flash.
+        #[arg(long, value_enum, default_value_t = Board::Pico)]
         board: Board,
     },
     /// Plots FILE on the emulated board; the same as `cargo plot`. Its own --help says how.
@@ -66,14 +74,18 @@ fn carry_out() -> Result<()> {
         Some(Task::Build { board }) => {
             let image = firmware::build(board)?;
             println!("{}", firmware::check(board, &image)?);
+            if board == Board::Pico {
+                println!("{}", flash::by_hand(&image));
+            }
         }
+        Some(Task::Flash { board }) => flash::flash(board)?,
         Some(Task::Plot { arguments }) => plot(&arguments)?,
         Some(Task::Experiments) => experiments::repeat()?,
         Some(Task::SetUp) => {
             for &board in Board::ALL {
                 set_up::toolchain(board.target())?;
+                set_up::emulator(board)?;
             }
-            set_up::emulator()?;
             set_up::checkers()?;
             println!("everything is there");
         }
@@ -89,7 +101,7 @@ fn plot(arguments: &[String]) -> Result<()> {
     let asks_only = arguments.iter().any(|argument| ["-h", "--help"].contains(&&**argument));
     if !at_a_port && !asks_only {
         let board = Board::from_options(arguments)?;
-        set_up::emulator()?;
+        set_up::emulator(board)?;
         let image = firmware::build(board)?;
         firmware::check(board, &image)?;
     }

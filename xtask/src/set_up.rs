@@ -3,7 +3,8 @@
 //! | what | found as | installed by |
 //! |---|---|---|
 //! | `core` for the board's target | rustc's target directory | rustup; else Debian's compiler and the sources of `core` |
-//! | the emulator | `qemu-system-arm` | apt, or brew |
+//! | the LM3S6965's emulator | `qemu-system-arm` | apt, or brew |
+//! | the Pico's emulator | `node` and `npm`; rp2040js in the target directory | apt, or brew; npm |
 //! | rustfmt, clippy | `cargo fmt`, `cargo clippy` | rustup |
 
 use std::fs;
@@ -14,6 +15,7 @@ use std::time::Duration;
 use anyhow::{Result, bail, ensure};
 
 use crate::command::{cargo, describe, output, run, run_within};
+use crate::firmware::Board;
 
 /// Who compiles for a target.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -107,21 +109,73 @@ fn linker_variable(target: &str) -> String {
     format!("CARGO_TARGET_{}_LINKER", target.to_uppercase().replace('-', "_"))
 }
 
+/// What emulates `board`.
+pub fn emulator(board: Board) -> Result<()> {
+    match board {
+        Board::Lm3s6965 => qemu(),
+        Board::Pico => rp2040js(),
+    }
+}
+
 /// QEMU for Arm.
-pub fn emulator() -> Result<()> {
+fn qemu() -> Result<()> {
     const PROGRAM: &str = "qemu-system-arm";
     let found = || output(PROGRAM, &["--version"]).is_some();
-    if found() {
-        return Ok(());
-    }
-    if output("apt-get", &["--version"]).is_some() {
-        apt_install(&[PROGRAM])?;
-    } else if output("brew", &["--version"]).is_some() {
-        println!("penup: installing qemu by brew");
-        run(Command::new("brew").args(["install", "qemu"]))?;
+    if !found() {
+        install(&[PROGRAM], "qemu")?;
     }
     if !found() {
         bail!("install QEMU so that `{PROGRAM} --version` works: https://www.qemu.org/download/");
+    }
+    Ok(())
+}
+
+/// npm takes seconds where it can fetch, and may hang where it cannot.
+const NPM_LIMIT: Duration = Duration::from_secs(120);
+const LEAST_NODE: u32 = 18;
+
+/// Node, and rp2040js as the lock file beside the client's emulator has it.
+fn rp2040js() -> Result<()> {
+    let node = || -> Option<u32> {
+        let version = output("node", &["--version"])?;
+        version.strip_prefix('v')?.split('.').next()?.parse().ok()
+    };
+    let found = || node().is_some_and(|version| version >= LEAST_NODE);
+    if !found() {
+        install(&["nodejs"], "node")?;
+    }
+    ensure!(
+        found(),
+        "install Node {LEAST_NODE} or later so that `node --version` works: https://nodejs.org/"
+    );
+    let from = crate::root().join("client/src/emulator/rp2040js");
+    let to = crate::root().join("target/rp2040js");
+    let lock = fs::read(from.join("package-lock.json"))?;
+    // npm writes this last.
+    let done = to.join("node_modules/.package-lock.json");
+    if done.exists() && fs::read(to.join("package-lock.json")).is_ok_and(|found| found == lock) {
+        return Ok(());
+    }
+    if output("npm", &["--version"]).is_none() {
+        install(&["npm"], "node")?;
+    }
+    println!("penup: installing rp2040js by npm");
+    fs::create_dir_all(&to)?;
+    fs::copy(from.join("package.json"), to.join("package.json"))?;
+    fs::write(to.join("package-lock.json"), lock)?;
+    let mut npm = Command::new("npm");
+    npm.args(["ci", "--ignore-scripts", "--no-audit", "--no-fund", "--loglevel=error"]);
+    run_within(NPM_LIMIT, npm.current_dir(&to))
+}
+
+/// Installs Debian packages, or elsewhere brew's.
+fn install(debian: &[&str], brew: &str) -> Result<()> {
+    if output("apt-get", &["--version"]).is_some() {
+        return apt_install(debian);
+    }
+    if output("brew", &["--version"]).is_some() {
+        println!("penup: installing {brew} by brew");
+        return run(Command::new("brew").args(["install", brew]));
     }
     Ok(())
 }

@@ -11,7 +11,9 @@ use crate::set_up::{self, Toolchain};
 /// Sets up, then runs everything; ends at the first failure.
 pub fn everything() -> Result<()> {
     set_up::checkers()?;
-    set_up::emulator()?;
+    for &board in Board::ALL {
+        set_up::emulator(board)?;
+    }
 
     step(workspace("fmt").args(["--all", "--check"]))?;
     for &board in Board::ALL {
@@ -34,7 +36,7 @@ pub fn everything() -> Result<()> {
     step(workspace("test").arg("--workspace").args(EMULATOR))
 }
 
-/// The tests that need QEMU and the firmware.
+/// The tests that need the emulators and the firmware.
 const EMULATOR: [&str; 2] = ["--features", "penup-host-tests/emulator"];
 
 fn workspace(command: &str) -> Command {

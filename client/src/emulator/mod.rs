@@ -1,18 +1,20 @@
-//! A board in QEMU: its serial line, its pins as they really moved, its log.
+//! An emulated board: its serial line, its pins as they really moved, its log.
 //!
-//! [`Emulator::start`] boots an image. [`Emulator::send`] and [`Emulator::receive`] are the serial
-//! line. [`Emulator::pin_changes`] gives every change of every pin, in order, with the time on the
+//! [`Emulator::start`] boots an image of the LM3S6965 in QEMU, [`Pico::start`] one of the Raspberry Pi
+//! Pico in rp2040js. [`EmulatedBoard::send`] and [`EmulatedBoard::receive`] are the serial line.
+//! [`EmulatedBoard::pin_changes`] gives every change of every pin, in order, with the time on the
 //! board's own clock; [`Machine`] folds them into steps and moves of the pen. Dropping the emulator
-//! ends QEMU, and on Linux so does the death of this process, whatever its cause.
+//! ends its process, and on Linux so does the death of this process, whatever its cause.
 //!
-//! Emulated time is deterministic: every instruction takes [`Options::nanoseconds_per_instruction`],
-//! and while the core sleeps time leaps to the next timer. It has no relation to the time on the
-//! wall, so the instant at which a sent byte arrives is not under control.
+//! Emulated time counts instructions in QEMU, each taking [`Options::nanoseconds_per_instruction`],
+//! and core cycles in rp2040js; while the core sleeps it leaps to the next timer. It has no relation
+//! to the time on the wall, so the instant at which a sent byte arrives is not under control.
 //!
-//! What is refused: an image that does not exist, a QEMU that does not start or ends by itself, a
-//! trace that makes no sense. Each error carries what QEMU said.
+//! What is refused: an image that does not exist, an emulator that does not start or ends by itself, a
+//! trace that makes no sense. Each error carries what the emulator said.
 
 mod log;
+mod pico;
 mod pins;
 mod process;
 mod trace;
@@ -22,6 +24,7 @@ use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+pub use pico::Pico;
 pub use pins::{Machine, MachineEvent, MachineEventKind, Pin, PinChange};
 
 use process::Process;
@@ -31,7 +34,7 @@ use trace::{Trace, TraceError};
 #[derive(Debug, thiserror::Error)]
 pub enum EmulatorError {
     /// The firmware is not built.
-    #[error("there is no firmware image {path}: run `cargo xtask build`")]
+    #[error("there is no firmware image {path}: run `cargo xtask build --board BOARD`")]
     NoImage {
         /// Where it was looked for.
         path: PathBuf,
@@ -42,10 +45,15 @@ pub enum EmulatorError {
         /// What the decoder says.
         reason: String,
     },
-    /// QEMU is not there.
-    #[error("cannot run qemu-system-arm ({0}): run `cargo xtask set-up`")]
-    NotInstalled(#[source] io::Error),
-    /// QEMU ended, or does not answer.
+    /// The emulator is not there.
+    #[error("cannot run {program} ({source}): run `cargo xtask set-up`")]
+    NotInstalled {
+        /// Its program.
+        program: &'static str,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// The emulator ended, or does not answer.
     #[error("the emulator ended: {said}")]
     Ended {
         /// The last lines that it printed.
@@ -90,7 +98,42 @@ pub fn image_path(board: &str) -> PathBuf {
     root.join("target/firmware").join(format!("{board}.elf"))
 }
 
-/// A running LM3S6965.
+/// A running board.
+pub trait EmulatedBoard: std::fmt::Debug {
+    /// Sends all of `bytes` to the board's serial line.
+    ///
+    /// # Errors
+    /// The emulator has ended.
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()>;
+
+    /// Waits up to `patience` for bytes of the board and says how many it put into `buffer`: 0 if
+    /// none came.
+    ///
+    /// # Errors
+    /// [`io::ErrorKind::BrokenPipe`] if the emulator has ended.
+    fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize>;
+
+    /// The changes of pins since last asked: all that came before the last byte that
+    /// [`EmulatedBoard::receive`] gave, and perhaps some after it.
+    ///
+    /// # Errors
+    /// The emulator has ended, or its trace makes no sense.
+    fn pin_changes(&mut self) -> Result<Vec<PinChange>, EmulatorError>;
+
+    /// The latest instant on the board's clock that is known.
+    ///
+    /// # Errors
+    /// As [`EmulatedBoard::pin_changes`].
+    fn clock(&mut self) -> Result<Duration, EmulatorError>;
+
+    /// What the board has logged since last asked, a line each: time, level, message.
+    fn log_lines(&mut self) -> Vec<String>;
+
+    /// The lines that the emulator itself printed, the last of them.
+    fn said(&self) -> String;
+}
+
+/// A running LM3S6965. Its clock stands still while the board sleeps without a task.
 #[derive(Debug)]
 pub struct Emulator {
     process: Process,
@@ -113,20 +156,18 @@ impl Emulator {
         Ok(Self { process, line, received: 0 })
     }
 
-    /// Sends all of `bytes` to the board's serial line.
-    ///
-    /// # Errors
-    /// The emulator has ended.
-    pub fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+    /// The process number of QEMU.
+    pub fn process_id(&self) -> u32 {
+        self.process.id()
+    }
+}
+
+impl EmulatedBoard for Emulator {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.line.write_all(bytes)
     }
 
-    /// Waits up to `patience` for bytes of the board and says how many it put into `buffer`: 0 if
-    /// none came.
-    ///
-    /// # Errors
-    /// [`io::ErrorKind::BrokenPipe`] if the emulator has ended.
-    pub fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize> {
+    fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize> {
         self.line.set_read_timeout(Some(patience.max(Duration::from_millis(1))))?;
         match self.line.read(buffer) {
             Ok(0) if !buffer.is_empty() => Err(io::ErrorKind::BrokenPipe.into()),
@@ -143,38 +184,21 @@ impl Emulator {
         }
     }
 
-    /// The changes of pins since last asked: all that came before the last byte that
-    /// [`Emulator::receive`] gave, and perhaps some after it.
-    ///
-    /// # Errors
-    /// The emulator has ended, or its trace makes no sense.
-    pub fn pin_changes(&mut self) -> Result<Vec<PinChange>, EmulatorError> {
+    fn pin_changes(&mut self) -> Result<Vec<PinChange>, EmulatorError> {
         let received = self.received;
         self.process.with_trace(PATIENCE, |trace| trace.sent() >= received, Trace::take_pins)
     }
 
-    /// The latest instant on the board's clock that is known. The clock stands still while the
-    /// board sleeps without a task.
-    ///
-    /// # Errors
-    /// As [`Emulator::pin_changes`].
-    pub fn clock(&mut self) -> Result<Duration, EmulatorError> {
+    fn clock(&mut self) -> Result<Duration, EmulatorError> {
         self.process.with_trace(PATIENCE, |_| true, |trace| trace.clock())
     }
 
-    /// What the board has logged since last asked, a line each: time, level, message.
-    pub fn log_lines(&mut self) -> Vec<String> {
+    fn log_lines(&mut self) -> Vec<String> {
         self.process.take_log()
     }
 
-    /// The lines that QEMU itself printed, the last of them.
-    pub fn said(&self) -> String {
+    fn said(&self) -> String {
         self.process.said()
-    }
-
-    /// The process number of QEMU.
-    pub fn process_id(&self) -> u32 {
-        self.process.id()
     }
 }
 

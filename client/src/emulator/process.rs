@@ -67,7 +67,7 @@ impl Process {
         let tracer = thread::spawn(move || spawn_and_trace(command, &sender, &traced));
         let (child, stdout) = match started.recv() {
             Ok(Ok(spawned)) => spawned,
-            Ok(Err(error)) => return Err(EmulatorError::NotInstalled(error)),
+            Ok(Err(error)) => return Err(not_installed(error)),
             Err(_) => return Err(io::Error::from(io::ErrorKind::BrokenPipe).into()),
         };
         let logged = Arc::clone(&shared);
@@ -96,8 +96,7 @@ impl Process {
             }
             let ended = self.child.try_wait()?;
             if ended.is_some_and(|status| status.code() == Some(NOT_FOUND)) {
-                let not_found = io::Error::from(io::ErrorKind::NotFound);
-                return Err(EmulatorError::NotInstalled(not_found));
+                return Err(not_installed(io::ErrorKind::NotFound.into()));
             }
             if ended.is_some() || Instant::now() > deadline {
                 // All that it has said is in when its readers have ended.
@@ -165,10 +164,16 @@ impl Drop for Process {
     }
 }
 
+const PROGRAM: &str = "qemu-system-arm";
+
+fn not_installed(source: io::Error) -> EmulatorError {
+    EmulatorError::NotInstalled { program: PROGRAM, source }
+}
+
 /// QEMU's command line: serial line to `port`, log to its standard output, trace to its standard
 /// error.
 fn command(image: &Path, options: Options, port: u16) -> Command {
-    let mut command = quitting_with_parent("qemu-system-arm");
+    let mut command = quitting_with_parent(PROGRAM);
     command
         .args(["-machine", "lm3s6965evb", "-display", "none", "-monitor", "none"])
         .arg("-icount")
@@ -190,7 +195,7 @@ fn command(image: &Path, options: Options, port: u16) -> Command {
 }
 
 /// On Linux, a command that the kernel ends with the thread that started it.
-fn quitting_with_parent(program: &str) -> Command {
+pub(super) fn quitting_with_parent(program: &str) -> Command {
     const SETPRIV: &str = "/usr/bin/setpriv";
     if cfg!(target_os = "linux") && Path::new(SETPRIV).exists() {
         let mut command = Command::new(SETPRIV);
@@ -201,7 +206,7 @@ fn quitting_with_parent(program: &str) -> Command {
 }
 
 /// What setpriv, as a shell, exits with when there is no such program.
-const NOT_FOUND: i32 = 127;
+pub(super) const NOT_FOUND: i32 = 127;
 
 type Spawned = io::Result<(Child, ChildStdout)>;
 

@@ -7,6 +7,7 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use cortex_m::peripheral::SCB;
 
 use super::{pins, serial, steps};
+use crate::boards::line;
 
 /// A second fault while the first is reported ends the report.
 static REPORTING: AtomicBool = AtomicBool::new(false);
@@ -28,7 +29,7 @@ fn make_safe(cause: fmt::Arguments) -> bool {
 }
 
 fn wait_for_reset() -> ! {
-    while serial::poll() != Some(serial::ABORT) {}
+    while serial::poll() != Some(line::ABORT) {}
     SCB::sys_reset()
 }
 

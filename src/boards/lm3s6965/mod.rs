@@ -18,7 +18,6 @@ mod clock;
 mod contacts;
 mod critical;
 mod emergency;
-mod handler;
 mod pins;
 mod registers;
 mod serial;

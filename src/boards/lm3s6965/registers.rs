@@ -1,38 +1,6 @@
 //! The chip's registers.
 
-use core::ptr;
-
-/// The registers of one peripheral.
-#[derive(Clone, Copy)]
-pub struct Peripheral {
-    base: usize,
-}
-
-impl Peripheral {
-    /// # Safety
-    /// A peripheral of the chip begins at `base`, and its registers within 4 KiB may be read and
-    /// written at any time by the code that has it.
-    const unsafe fn at(base: usize) -> Self {
-        Self { base }
-    }
-
-    /// Reads the register at `offset` bytes, a multiple of 4 below 4096.
-    pub fn read(self, offset: usize) -> u32 {
-        // SAFETY: within a peripheral (see `at`), aligned.
-        unsafe { ptr::read_volatile((self.base + offset) as *const u32) }
-    }
-
-    /// Writes the register at `offset` bytes, a multiple of 4 below 4096.
-    pub fn write(self, offset: usize, value: u32) {
-        // SAFETY: within a peripheral (see `at`), aligned.
-        unsafe { ptr::write_volatile((self.base + offset) as *mut u32, value) }
-    }
-
-    /// Sets `bits` of the register at `offset`. Not for a register that an interrupt changes too.
-    pub fn set_bits(self, offset: usize, bits: u32) {
-        self.write(offset, self.read(offset) | bits);
-    }
-}
+use crate::boards::peripheral::Peripheral;
 
 // SAFETY of all: the memory map of the LM3S6965's data sheet, table 3-1; none reaches into memory.
 

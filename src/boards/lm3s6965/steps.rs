@@ -16,10 +16,10 @@ use penup::machine::{Pulser, PulserState, Solenoid};
 use penup::motion::{EventQueue, StepEvent, TICKS_PER_SECOND};
 use static_cell::StaticCell;
 
-use super::handler::Owned;
 use super::pins::{DirXPin, DirYPin, EnablePin, MotorPins, PenPin, StepXPin, StepYPin};
 use super::registers::{SYSTEM_CONTROL, TIMER0};
 use super::{HAPPENED, clock, critical};
+use crate::boards::handler::Owned;
 
 /// Events that wait for the interrupt, at most; one more place than that, for the queue. 4 bytes
 /// each.

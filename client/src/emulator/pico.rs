@@ -1,0 +1,377 @@
+//! A Raspberry Pi Pico in rp2040js, by way of `pico.mjs`, which tells how both talk.
+
+use std::collections::VecDeque;
+use std::io::{self, BufRead, BufReader, PipeWriter, Read, Write};
+use std::path::Path;
+use std::process::{Child, ChildStderr, ChildStdin, ChildStdout, Command, Stdio};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, mpsc};
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+use std::{fmt, fs};
+
+use object::{Object, ObjectSymbol};
+
+use super::process::{NOT_FOUND, quitting_with_parent};
+use super::{EmulatedBoard, EmulatorError, Pin, PinChange, log};
+
+const PROGRAM: &str = "node";
+const SCRIPT: &str = include_str!("pico.mjs");
+/// Where `cargo xtask set-up` puts it, from the workspace's root.
+const RP2040JS: &str = "target/rp2040js/node_modules/rp2040js";
+/// A cycle of the core, at 125 MHz.
+const CYCLE_NANOS: u64 = 8;
+/// Lines of the emulator itself that are kept.
+const SAID_LINES: usize = 20;
+
+/// A running Pico. Dropping it ends its process.
+pub struct Pico {
+    child: Child,
+    input: ChildStdin,
+    shared: Arc<Shared>,
+    readers: Vec<JoinHandle<()>>,
+}
+
+/// What the reading threads tell.
+#[derive(Default)]
+struct Shared {
+    state: Mutex<State>,
+    changed: Condvar,
+}
+
+#[derive(Default)]
+struct State {
+    serial: VecDeque<u8>,
+    pins: Vec<PinChange>,
+    cycles: u64,
+    log: Vec<String>,
+    said: VecDeque<String>,
+    ended: bool,
+}
+
+impl Shared {
+    /// A reader that panicked has left nothing half done: each takes whole records or lines.
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl fmt::Debug for Pico {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Pico").field(&self.child.id()).finish()
+    }
+}
+
+impl Pico {
+    /// Boots `image`, an ELF file; what runs is the UF2 file beside it.
+    ///
+    /// # Errors
+    /// See [`EmulatorError`]; no process is left then.
+    pub fn start(image: &Path) -> Result<Self, EmulatorError> {
+        let flashed = image.with_extension("uf2");
+        let elf = fs::read(image).map_err(|_| EmulatorError::NoImage { path: image.into() })?;
+        if !flashed.exists() {
+            return Err(EmulatorError::NoImage { path: flashed });
+        }
+        let table = log::table(&elf)?;
+        let command = command(&flashed, log_address(&elf)?);
+        let shared = Arc::<Shared>::default();
+        let (log_reader, log_writer) = io::pipe()?;
+        let logged = Arc::clone(&shared);
+        let logger = thread::spawn(move || {
+            if let Some(table) = table {
+                log::decode(&table, log_reader, |line| logged.lock().log.push(line));
+            }
+        });
+
+        let (sender, started) = mpsc::channel();
+        let told = Arc::clone(&shared);
+        // Linux ends the process with the thread that started it, so that is the one that outlives it.
+        let reader = thread::spawn(move || spawn_and_read(command, &sender, &told, log_writer));
+        let (child, input, stderr) = match started.recv() {
+            Ok(Ok(spawned)) => spawned,
+            Ok(Err(source)) => {
+                return Err(EmulatorError::NotInstalled { program: PROGRAM, source });
+            }
+            Err(_) => return Err(io::Error::from(io::ErrorKind::BrokenPipe).into()),
+        };
+        let listened = Arc::clone(&shared);
+        let listener = thread::spawn(move || listen(stderr, &listened));
+        let mut pico = Self { child, input, shared, readers: vec![logger, reader, listener] };
+        pico.wait_for_boot()?;
+        Ok(pico)
+    }
+
+    /// Waits for the first sign of life.
+    fn wait_for_boot(&mut self) -> Result<(), EmulatorError> {
+        let waits = |state: &mut State| state.cycles == 0 && !state.ended;
+        let (state, _) = self
+            .shared
+            .changed
+            .wait_timeout_while(self.shared.lock(), super::PATIENCE, waits)
+            .unwrap_or_else(PoisonError::into_inner);
+        if state.cycles > 0 {
+            return Ok(());
+        }
+        drop(state);
+        if self.child.try_wait()?.is_some_and(|status| status.code() == Some(NOT_FOUND)) {
+            let source = io::ErrorKind::NotFound.into();
+            return Err(EmulatorError::NotInstalled { program: PROGRAM, source });
+        }
+        // All that it has said is in when its readers have ended.
+        self.end();
+        Err(EmulatorError::Ended { said: self.said() })
+    }
+
+    fn end(&mut self) {
+        // Both fail only if it has ended by itself.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+        for reader in self.readers.drain(..) {
+            // A reader's panic has been printed, and there is nothing left to read.
+            let _ = reader.join();
+        }
+    }
+}
+
+impl Drop for Pico {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
+
+impl EmulatedBoard for Pico {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        let records: Vec<u8> = bytes
+            .iter()
+            .flat_map(|&byte| Record { what: SERIAL, value: byte, cycle: 0 }.to_bytes())
+            .collect();
+        self.input.write_all(&records)?;
+        self.input.flush()
+    }
+
+    fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize> {
+        let waits = |state: &mut State| state.serial.is_empty() && !state.ended;
+        let (mut state, _) = self
+            .shared
+            .changed
+            .wait_timeout_while(self.shared.lock(), patience, waits)
+            .unwrap_or_else(PoisonError::into_inner);
+        if state.serial.is_empty() && state.ended {
+            return Err(io::ErrorKind::BrokenPipe.into());
+        }
+        state.serial.read(buffer)
+    }
+
+    fn pin_changes(&mut self) -> Result<Vec<PinChange>, EmulatorError> {
+        Ok(std::mem::take(&mut self.shared.lock().pins))
+    }
+
+    fn clock(&mut self) -> Result<Duration, EmulatorError> {
+        Ok(at(self.shared.lock().cycles))
+    }
+
+    fn log_lines(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.shared.lock().log)
+    }
+
+    fn said(&self) -> String {
+        Vec::from(self.shared.lock().said.clone()).join("\n")
+    }
+}
+
+fn at(cycle: u64) -> Duration {
+    Duration::from_nanos(cycle * CYCLE_NANOS)
+}
+
+/// The command line of the emulator.
+fn command(image: &Path, log_address: u64) -> Command {
+    let client = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let root = client.parent().unwrap_or(client);
+    let mut command = quitting_with_parent(PROGRAM);
+    command.args(["--input-type=module", "--eval", SCRIPT, "--"]);
+    command.arg(root.join(RP2040JS)).arg(image).arg(log_address.to_string());
+    command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    // Ctrl-C at the terminal is for this process, which ends the emulator when it is done with it.
+    #[cfg(unix)]
+    std::os::unix::process::CommandExt::process_group(&mut command, 0);
+    command
+}
+
+/// Where the image keeps its log; 0 if it has none.
+fn log_address(elf: &[u8]) -> Result<u64, EmulatorError> {
+    let elf = object::File::parse(elf)
+        .map_err(|error| EmulatorError::BadImage { reason: error.to_string() })?;
+    let symbol = elf.symbols().find(|symbol| symbol.name() == Ok("_SEGGER_RTT"));
+    Ok(symbol.map_or(0, |symbol| symbol.address()))
+}
+
+type Spawned = io::Result<(Child, ChildStdin, ChildStderr)>;
+
+fn spawn_and_read(
+    mut command: Command,
+    sender: &mpsc::Sender<Spawned>,
+    shared: &Shared,
+    log: PipeWriter,
+) {
+    let (spawned, stdout) = match spawn(&mut command) {
+        Ok((child, input, stdout, stderr)) => (Ok((child, input, stderr)), Some(stdout)),
+        Err(error) => (Err(error), None),
+    };
+    if sender.send(spawned).is_ok()
+        && let Some(stdout) = stdout
+    {
+        read(stdout, shared, log);
+    }
+}
+
+fn spawn(command: &mut Command) -> io::Result<(Child, ChildStdin, ChildStdout, ChildStderr)> {
+    let mut child = command.spawn()?;
+    match (child.stdin.take(), child.stdout.take(), child.stderr.take()) {
+        (Some(stdin), Some(stdout), Some(stderr)) => Ok((child, stdin, stdout, stderr)),
+        _ => Err(io::ErrorKind::BrokenPipe.into()),
+    }
+}
+
+/// Keeps the last lines of what the emulator says.
+fn listen(stderr: ChildStderr, shared: &Shared) {
+    for line in BufReader::new(stderr).lines().map_while(Result::ok) {
+        let mut state = shared.lock();
+        if state.said.len() == SAID_LINES {
+            state.said.pop_front();
+        }
+        state.said.push_back(line);
+    }
+}
+
+/// What the emulator tells or is told.
+struct Record {
+    what: u8,
+    value: u8,
+    cycle: u64,
+}
+
+const RECORD_BYTES: usize = 8;
+const SERIAL: u8 = 0;
+const PIN: u8 = 1;
+const LOG: u8 = 3;
+
+impl Record {
+    fn from_bytes([what, value, cycle @ ..]: [u8; RECORD_BYTES]) -> Self {
+        let [a, b, c, d, e, f] = cycle;
+        Self { what, value, cycle: u64::from_le_bytes([a, b, c, d, e, f, 0, 0]) }
+    }
+
+    fn to_bytes(&self) -> [u8; RECORD_BYTES] {
+        let [a, b, c, d, e, f, ..] = self.cycle.to_le_bytes();
+        [self.what, self.value, a, b, c, d, e, f]
+    }
+}
+
+/// Takes in what the emulator tells until it ends.
+fn read(mut stdout: ChildStdout, shared: &Shared, mut log: PipeWriter) {
+    let mut buffer = vec![0; 1 << 16];
+    let mut filled = 0;
+    let mut servo = Servo::default();
+    loop {
+        let count = stdout.read(&mut buffer[filled..]).unwrap_or(0);
+        filled += count;
+        let whole = filled - filled % RECORD_BYTES;
+        let mut logged = Vec::new();
+        let mut state = shared.lock();
+        state.ended = count == 0;
+        for bytes in buffer[..whole].as_chunks().0 {
+            let record = Record::from_bytes(*bytes);
+            state.cycles = record.cycle;
+            match record.what {
+                SERIAL => state.serial.push_back(record.value),
+                PIN => state.pins.extend(servo.pin_change(&record)),
+                LOG => logged.push(record.value),
+                _ => {}
+            }
+        }
+        drop(state);
+        shared.changed.notify_all();
+        // The log's reader ends with this writer, not before.
+        let _ = log.write_all(&logged);
+        if count == 0 {
+            return;
+        }
+        buffer.copy_within(whole..filled, 0);
+        filled -= whole;
+    }
+}
+
+/// Reads the pen's place off the width of the servo's pulses.
+#[derive(Default)]
+struct Servo {
+    rose_at: u64,
+    down: bool,
+}
+
+impl Servo {
+    const PIN: u8 = 7;
+    /// The pulse at half height: 1.5 ms.
+    const HALF: u64 = 1_508_000 / CYCLE_NANOS;
+
+    /// What a pin's new level means. The pen changes as its pulse ends.
+    fn pin_change(&mut self, record: &Record) -> Option<PinChange> {
+        let (number, high) = (record.value & 0x7F, record.value >= 0x80);
+        let at = at(record.cycle);
+        let pin = match number {
+            2 => Pin::StepX,
+            3 => Pin::StepY,
+            4 => Pin::DirX,
+            5 => Pin::DirY,
+            6 => Pin::Enable,
+            Self::PIN if high => {
+                self.rose_at = record.cycle;
+                return None;
+            }
+            Self::PIN => {
+                let down = record.cycle - self.rose_at >= Self::HALF;
+                let changed = std::mem::replace(&mut self.down, down) != down;
+                return changed.then_some(PinChange { pin: Pin::Pen, high: down, at });
+            }
+            _ => return None,
+        };
+        Some(PinChange { pin, high, at })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn record(number: u8, high: bool, microsecond: u64) -> Record {
+        Record { what: PIN, value: number | u8::from(high) << 7, cycle: microsecond * 125 }
+    }
+
+    #[test]
+    fn records_are_eight_bytes() {
+        let bytes = [1, 0x83, 6, 5, 4, 3, 2, 1];
+        let record = Record::from_bytes(bytes);
+        assert_eq!((record.what, record.value, record.cycle), (1, 0x83, 0x0102_0304_0506));
+        assert_eq!(record.to_bytes(), bytes);
+    }
+
+    #[test]
+    fn the_pen_is_where_the_servo_was_told() {
+        let mut servo = Servo::default();
+        let mut told = Vec::new();
+        for (start, width) in [(0, 1000), (20_000, 2000), (40_000, 1512), (60_000, 1504)] {
+            for record in [record(7, true, start), record(7, false, start + width)] {
+                told.extend(servo.pin_change(&record));
+            }
+        }
+        let pen = |high, at| PinChange { pin: Pin::Pen, high, at: Duration::from_micros(at) };
+        assert_eq!(told, [pen(true, 22_000), pen(false, 61_504)]);
+    }
+
+    #[test]
+    fn other_pins_are_what_they_are() {
+        let change = Servo::default().pin_change(&record(5, true, 8));
+        let up = PinChange { pin: Pin::DirY, high: true, at: Duration::from_micros(8) };
+        assert_eq!(change, Some(up));
+        assert_eq!(Servo::default().pin_change(&record(0, true, 8)), None);
+    }
+}

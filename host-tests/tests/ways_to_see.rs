@@ -1,0 +1,213 @@
+//! The ways to see, over the line, each against the others where they overlap.
+
+// A test fails by panicking.
+#![allow(clippy::panic, clippy::expect_used)]
+
+use penup::plotter::Observer;
+use penup::protocol::Refusal;
+use penup::stage::Undisturbed;
+use penup::view::View;
+use penup::visibility::Stretch;
+use penup_host_tests::whole_jobs::{Bench, job_lines};
+use std::collections::BTreeSet;
+
+const CONVEX: [&str; 5] = ["cube", "octahedron", "icosahedron", "dodecahedron", "eighteen"];
+
+/// The numbers of the vertices that an edge joins, and whether it is visible.
+type Seen = BTreeSet<((u16, u16), bool)>;
+
+#[derive(Default)]
+struct Whole(Seen);
+
+impl Observer for Whole {
+    fn stretch(&mut self, _: &View, stretch: &Stretch) {
+        let (a, b) = stretch.edge.expect("one solid has no seam");
+        assert!(
+            stretch.from.numerator == 0 && stretch.to.numerator == stretch.to.denominator,
+            "an edge of a convex solid is visible from end to end or not at all"
+        );
+        assert!(self.0.insert(((a.min(b), a.max(b)), stretch.visible)), "each edge comes once");
+    }
+
+    fn plan_bar(&mut self, _: [f64; 2], _: [f64; 2]) {
+        panic!("a solid is no plan");
+    }
+}
+
+fn with_scene(scene: &str, keep: impl Fn(&str) -> bool) -> Bench {
+    let mut bench = Bench::new();
+    bench.heard();
+    for line in job_lines(&format!("{scene}.obj"), &[]) {
+        if line != "$plot" && keep(&line) {
+            assert_eq!(bench.say(&format!("{line}\n")), "ok\n", "{line}");
+        }
+    }
+    bench
+}
+
+fn seen(bench: &mut Bench, settings: &str) -> Result<Seen, Refusal> {
+    assert!(!bench.say(settings).contains("error"), "{settings}");
+    let mut whole = Whole::default();
+    bench.plotter.compute(&mut Undisturbed, &mut whole)?;
+    Ok(whole.0)
+}
+
+/// Eyes outside a solid whose greatest coordinate is 1, in no symmetry with it.
+const EYES: [[f64; 3]; 6] = [
+    [6.0, 3.1, 2.3],
+    [-5.3, 4.7, 1.9],
+    [2.9, -7.1, -4.3],
+    [-3.7, -4.1, 6.7],
+    [1.3, 7.9, -5.9],
+    [8.3, -2.1, 5.7],
+];
+
+fn eyes(bench: &Bench) -> impl Iterator<Item = String> + use<> {
+    let model = bench.plotter.model();
+    let unit = 1.0 / f64::from(1u32 << model.fraction_bits());
+    let coordinates = model.vertices().iter().flat_map(|vertex| vertex.coordinates());
+    let greatest = coordinates.map(i32::abs).max().expect("vertices");
+    EYES.into_iter().map(move |eye| {
+        let [x, y, z] = eye.map(|c| c * f64::from(greatest) * unit);
+        format!("{x:.3},{y:.3},{z:.3}")
+    })
+}
+
+#[test]
+fn vertices_alone_edges_alone_and_faces_show_the_same_solid() {
+    for scene in CONVEX {
+        let mut bench = with_scene(scene, |_| true);
+        let mut vertices_alone = with_scene(scene, |line| !line.starts_with('f'));
+        for eye in eyes(&bench) {
+            for projection in ["perspective", "orthographic", "oblique,30,0.7"] {
+                let view = format!("$eye={eye}\n$projection={projection}\n$hidden=dotted\n");
+                let faces = seen(&mut bench, &format!("{view}$see=faces\n")).unwrap();
+                assert!(faces.iter().any(|(_, visible)| !visible), "{scene} from {eye}");
+                let edges = seen(&mut bench, &format!("{view}$see=edges\n")).unwrap();
+                assert_eq!(edges, faces, "{scene} from {eye} in {projection}");
+                let vertices =
+                    seen(&mut vertices_alone, &format!("{view}$see=vertices\n")).unwrap();
+                assert_eq!(vertices, faces, "{scene} from {eye} in {projection}");
+                // A wire frame is the visible and the hidden edges.
+                let wire = seen(&mut bench, &format!("{view}$see=wire\n")).unwrap();
+                let all: Seen = faces.iter().map(|(edge, _)| (*edge, true)).collect();
+                assert_eq!(wire, all, "{scene} from {eye} in {projection}");
+                let erased = seen(&mut bench, "$hidden=erased\n$see=faces\n").unwrap();
+                assert_eq!(erased, seen(&mut bench, "$see=edges\n").unwrap());
+                assert_eq!(erased, seen(&mut vertices_alone, "$hidden=erased\n").unwrap());
+            }
+        }
+    }
+}
+
+#[test]
+fn the_same_strokes_are_drawn_whichever_way_is_chosen() {
+    // Seen straight on and along an axis of symmetry, too: what is edge-on is inked once.
+    for (scene, eye) in [("cube", "0,-9,0"), ("octahedron", "9,9,9"), ("dodecahedron", "3,7,4")] {
+        let mut bench = with_scene(scene, |_| true);
+        let totals = ["faces", "edges", "vertices"].map(|way| {
+            bench.say(&format!(
+                "$eye={eye}\n$at=0,0,0\n$projection=orthographic\n$see={way}\n$plot\n"
+            ));
+            bench.finish();
+            let drawn = bench.plotter.machine().status().done.drawn;
+            bench.say("$clear\n");
+            bench = with_scene(scene, |_| true);
+            drawn
+        });
+        assert!(totals[0] > 0, "{scene}");
+        let near = |total: u64| total.abs_diff(totals[0]) < totals[0] / 2000;
+        assert!(near(totals[1]) && near(totals[2]), "{scene}: {totals:?}");
+    }
+}
+
+#[test]
+fn what_is_no_convex_solid_is_refused_and_nothing_is_lost() {
+    let mut bench = with_scene("lattice2", |_| true);
+    let before = bench.say("$model\n$options\n");
+    let answer = bench.say("$see=vertices\n$plot\n");
+    assert!(answer.contains("[MSG:") && answer.ends_with("error:125\n"), "{answer}");
+    // Three loose bars.
+    let mut open = Bench::new();
+    let answer = open.say(
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv .5 .5 1\nl 1 2\nl 3 4\nl 1 5\n$see=edges\n$plot\n",
+    );
+    assert!(answer.contains("[MSG:no edge leads") && answer.ends_with("error:125\n"), "{answer}");
+    let mut cube = with_scene("cube", |_| true);
+    let answer = cube.say("$see=vertices\n$eye=0.1,0,0\n$at=5,0,0\n$plot\n");
+    assert!(answer.ends_with("error:126\n"), "{answer}");
+    let answer = with_scene("grid20", |_| true).say("$see=edges\n$plot\n");
+    assert!(!answer.contains("error"), "a flat polygon is drawn: {answer}");
+    assert_eq!(Bench::new().say("$see=vertices\n$plot\n").lines().last(), Some("error:120"));
+    bench.say("$see=faces\n");
+    assert_eq!(bench.say("$model\n$options\n"), before);
+    assert!(!bench.say("$plot\n").contains("error"));
+}
+
+#[test]
+fn a_ball_of_loose_triangles_is_a_circle() {
+    // Each triangle of an icosahedron divided twice, with vertices of its own.
+    let mut text = String::new();
+    let phi = (1.0 + 5f64.sqrt()) / 2.0;
+    let corners: Vec<[f64; 3]> = [(1.0, phi), (1.0, -phi), (-1.0, phi), (-1.0, -phi)]
+        .iter()
+        .flat_map(|&(a, b)| [[0.0, a, b], [a, b, 0.0], [b, 0.0, a]])
+        .collect();
+    let distance = |p: [f64; 3], q: [f64; 3]| {
+        (0..3).map(|i| (p[i] - q[i]) * (p[i] - q[i])).sum::<f64>().sqrt()
+    };
+    let near = |p, q| (distance(p, q) - 2.0).abs() < 1e-9;
+    let on_ball = |p: [f64; 3]| {
+        let length = distance(p, [0.0; 3]);
+        p.map(|c| c / length)
+    };
+    let mut triangles = Vec::new();
+    for i in 0..12 {
+        for j in i + 1..12 {
+            for k in j + 1..12 {
+                let [p, q, r] = [corners[i], corners[j], corners[k]];
+                if near(p, q) && near(q, r) && near(p, r) {
+                    triangles.push([p, q, r]);
+                }
+            }
+        }
+    }
+    assert_eq!(triangles.len(), 20);
+    for _ in 0..2 {
+        triangles = triangles
+            .into_iter()
+            .flat_map(|[p, q, r]| {
+                let middle =
+                    |a: [f64; 3], b: [f64; 3]| [0, 1, 2].map(|i: usize| (a[i] + b[i]) / 2.0);
+                let [a, b, c] = [middle(p, q), middle(q, r), middle(r, p)];
+                [[p, a, c], [a, q, b], [c, b, r], [a, b, c]]
+            })
+            .collect();
+    }
+    for triangle in &triangles {
+        for p in triangle {
+            let [x, y, z] = on_ball(*p);
+            text += &format!("v {x:.7} {y:.7} {z:.7}\n");
+        }
+        text += "f -3 -2 -1\n";
+    }
+    let mut bench = Bench::new();
+    assert!(!bench.say(&text).contains("error"));
+    let net = bench.say("$eye=7,5,3\n$crease=60\n$plot\n");
+    assert!(!net.contains("error"), "{net}");
+    bench.finish();
+    let report = *bench.plotter.job().report();
+    let status = bench.plotter.machine().status();
+    // One closed outline: no odd point, one part, one stroke.
+    assert_eq!((report.odd_points, report.components, status.done.strokes), (0, 1, 1));
+}
+
+#[test]
+fn faces_without_an_area_are_counted() {
+    let mut bench = Bench::new();
+    bench.heard();
+    let said = bench
+        .say("v 0 0 0\nv 1 0 0\nv 2 0 0\nv 0 2 1\nv 1 0 0\nf 1 2 3\nf 1 3 4\nf 2 5 4\n$plot\n");
+    assert!(said.contains("[MSG:2 faces have no area and are left out]\n"), "{said}");
+    assert!(said.ends_with("ok\n"), "{said}");
+}

@@ -1,0 +1,44 @@
+//! A chip's registers.
+
+use core::ptr;
+
+/// The registers of one peripheral.
+#[derive(Clone, Copy)]
+pub struct Peripheral {
+    base: usize,
+}
+
+impl Peripheral {
+    /// # Safety
+    /// A peripheral of the chip begins at `base`, and its registers within 16 KiB may be read and
+    /// written at any time by the code that has it.
+    pub const unsafe fn at(base: usize) -> Self {
+        Self { base }
+    }
+
+    /// The address of the register at `offset`, for a DMA channel.
+    #[cfg(feature = "pico")]
+    pub const fn address(self, offset: usize) -> u32 {
+        (self.base + offset) as u32
+    }
+
+    /// Reads the register at `offset` bytes, a multiple of 4 below 16384.
+    #[inline(always)]
+    pub fn read(self, offset: usize) -> u32 {
+        // SAFETY: within a peripheral (see `at`), aligned.
+        unsafe { ptr::read_volatile((self.base + offset) as *const u32) }
+    }
+
+    /// Writes the register at `offset` bytes, a multiple of 4 below 16384.
+    #[inline(always)]
+    pub fn write(self, offset: usize, value: u32) {
+        // SAFETY: within a peripheral (see `at`), aligned.
+        unsafe { ptr::write_volatile((self.base + offset) as *mut u32, value) }
+    }
+
+    /// Sets `bits` of the register at `offset`. Not for a register that an interrupt changes too.
+    #[cfg(feature = "lm3s6965")]
+    pub fn set_bits(self, offset: usize, bits: u32) {
+        self.write(offset, self.read(offset) | bits);
+    }
+}

@@ -1,0 +1,43 @@
+//! The time, and the millisecond that wakes the main loop.
+
+use cortex_m::peripheral::NVIC;
+use rp2040_hal::pac::{Interrupt, interrupt};
+
+use super::critical;
+use super::registers::TIMER;
+
+/// Cycles in a second.
+pub const HERTZ: u32 = 125_000_000;
+
+mod offset {
+    pub const ALARM_0: usize = 0x10;
+    pub const TIME_LOW: usize = 0x28;
+    pub const INTERRUPT: usize = 0x34;
+    pub const INTERRUPT_ENABLE: usize = 0x38;
+}
+const ALARM_0: u32 = 1;
+const MILLISECOND: u32 = 1000;
+
+/// Wakes the main loop every millisecond from now on: it keeps the steps' queue full.
+pub fn start(nvic: &mut NVIC) {
+    TIMER.write(offset::INTERRUPT_ENABLE, ALARM_0);
+    critical::enable(nvic, Interrupt::TIMER_IRQ_0, critical::CLOCK_PRIORITY);
+    schedule();
+}
+
+fn schedule() {
+    TIMER.write(offset::ALARM_0, microseconds().wrapping_add(MILLISECOND));
+}
+
+/// Microseconds since the start; wraps.
+pub fn microseconds() -> u32 {
+    TIMER.read(offset::TIME_LOW)
+}
+
+#[interrupt]
+fn TIMER_IRQ_0() {
+    TIMER.write(offset::INTERRUPT, ALARM_0);
+    schedule();
+}
+
+defmt::timestamp!("{=u32:us}", microseconds());

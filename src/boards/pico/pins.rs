@@ -1,0 +1,18 @@
+//! Which pin does what.
+
+use rp2040_hal::gpio::{FunctionPio0, FunctionPwm, FunctionUart, Pins};
+
+/// STEP_X, STEP_Y, DIR_X, DIR_Y and ENABLE are this one and the next four.
+pub const FIRST_MOTOR_PIN: u32 = 2;
+
+/// Hands the pins over to their peripherals, which must hold the levels to begin with.
+pub fn set_up(pins: Pins) {
+    pins.gpio0.into_function::<FunctionUart>();
+    pins.gpio1.into_function::<FunctionUart>();
+    pins.gpio2.into_function::<FunctionPio0>();
+    pins.gpio3.into_function::<FunctionPio0>();
+    pins.gpio4.into_function::<FunctionPio0>();
+    pins.gpio5.into_function::<FunctionPio0>();
+    pins.gpio6.into_function::<FunctionPio0>();
+    pins.gpio7.into_function::<FunctionPwm>();
+}

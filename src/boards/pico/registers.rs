@@ -1,0 +1,39 @@
+//! The chip's registers.
+
+use crate::boards::peripheral::Peripheral;
+
+// SAFETY of all: the address map of the RP2040's data sheet, 2.2; none reaches into memory.
+
+/// Which peripherals are held in reset. Used at set-up, before interrupts are on.
+const RESETS: Peripheral = unsafe { Peripheral::at(0x4000_C000) };
+/// The serial line. Used by `serial`.
+pub const UART0: Peripheral = unsafe { Peripheral::at(0x4003_4000) };
+/// The servo's pulses. Used by `pen`.
+pub const PWM: Peripheral = unsafe { Peripheral::at(0x4005_0000) };
+/// Microseconds since the start. Used by `clock`.
+pub const TIMER: Peripheral = unsafe { Peripheral::at(0x4005_4000) };
+/// The watchdog. Used by `emergency`.
+pub const WATCHDOG: Peripheral = unsafe { Peripheral::at(0x4005_8000) };
+/// Direct memory access; channel 0 is that of `steps`.
+pub const DMA: Peripheral = unsafe { Peripheral::at(0x5000_0000) };
+/// Programmable input and output; its state machine 0 is that of `steps`.
+pub const PIO0: Peripheral = unsafe { Peripheral::at(0x5020_0000) };
+
+/// Bits of the reset register.
+pub mod reset {
+    pub const DMA: u32 = 1 << 2;
+    pub const PIO0: u32 = 1 << 10;
+    pub const PWM: u32 = 1 << 14;
+    pub const TIMER: u32 = 1 << 21;
+    pub const UART0: u32 = 1 << 22;
+}
+
+/// Gives the peripherals of `bits` their registers' first values and lets them run.
+pub fn restart(bits: u32) {
+    const RESET_DONE: usize = 0x8;
+    const SET: usize = 0x2000;
+    const CLEAR: usize = 0x3000;
+    RESETS.write(SET, bits);
+    RESETS.write(CLEAR, bits);
+    while RESETS.read(RESET_DONE) & bits != bits {}
+}

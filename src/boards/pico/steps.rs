@@ -1,0 +1,398 @@
+//! Steps by a PIO state machine that DMA feeds: no interrupt for a step, and no jitter.
+//!
+//! A word for the state machine is laid out as a step event: the levels of five neighbouring pins
+//! in bits 0 to 4, whether the pen moves in bit 7, the ticks from bit 8 on. The state machine sets
+//! the pins and counts the ticks. A step is two words, its pulse and its rest; other events are one.
+//!
+//! The words wait in a ring that the DMA channel reads in blocks: all that is there when the last
+//! block ends is the next. Between two blocks the state machine lives on the words in its own queue.
+//!
+//! What the state machine has taken is read off the channel and told to the main loop's
+//! [`PulserState`] whenever that loop turns. The pen's heights wait in a queue of their own, for a
+//! word has no place for them; an interrupt sets the servo.
+
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+
+use cortex_m::peripheral::NVIC;
+use heapless::spsc::{Consumer, Producer, Queue};
+use penup::machine::PulserState;
+use penup::motion::{EventKind, EventQueue, StepEvent, TICKS_PER_SECOND};
+use rp2040_hal::pac::{Interrupt, interrupt};
+use static_cell::StaticCell;
+
+use super::pins::FIRST_MOTOR_PIN;
+use super::registers::{self, DMA, PIO0, reset};
+use super::{clock, critical, pen};
+use crate::boards::handler::Owned;
+
+/// Words of the ring, a power of two.
+const WORDS: u32 = 2048;
+/// Words that may still be on their way from the ring to the state machine.
+const IN_FLIGHT: u32 = 16;
+/// Heights of the pen that wait, at most; one more place than that, for the queue.
+const HEIGHTS: usize = 256;
+
+/// A pass of the counting loop is a tick.
+const CYCLES_PER_TICK: u32 = clock::HERTZ / TICKS_PER_SECOND;
+const _: () = assert!(CYCLES_PER_TICK == 5 && clock::HERTZ.is_multiple_of(TICKS_PER_SECOND));
+/// Ticks that a word takes beyond its count.
+const WORD_TICKS: u32 = 2;
+/// Ticks that moving the pen takes.
+const PEN_TICKS: u32 = 1;
+
+/// Registers of the PIO block and its state machine 0.
+mod machine {
+    pub const CONTROL: usize = 0x000;
+    pub const FIFO_DEBUG: usize = 0x008;
+    pub const FIFO_LEVEL: usize = 0x00C;
+    pub const SEND: usize = 0x010;
+    pub const FLAGS: usize = 0x030;
+    pub const INSTRUCTIONS: usize = 0x048;
+    pub const EXECUTION: usize = 0x0CC;
+    pub const SHIFT: usize = 0x0D0;
+    pub const ADDRESS: usize = 0x0D4;
+    pub const INSTRUCTION: usize = 0x0D8;
+    pub const PINS: usize = 0x0DC;
+    pub const INTERRUPT_ENABLE: usize = 0x12C;
+}
+const ENABLE: u32 = 1;
+const RESTART: u32 = 1 << 4;
+const STALLED: u32 = 1 << 24;
+const LEVEL: u32 = 0xF;
+/// Flag 0, in the flags and among the interrupts.
+const FLAG: u32 = 1;
+const FLAG_INTERRUPT: u32 = 1 << 8;
+const SHIFT_RIGHT_BOTH: u32 = 0b11 << 18;
+/// The receiver's places are the sender's: 8 words.
+const JOIN_SENDER: u32 = 1 << 30;
+
+/// Instructions that the core hands to the state machine.
+mod order {
+    pub const JUMP_TO_START: u32 = 0;
+    pub const PULL_WITHOUT_WAITING: u32 = 0b100_00000_1000_0000;
+    pub const SET_PINS: u32 = 0b111_00000_000_00000;
+    pub const SET_DIRECTIONS: u32 = 0b111_00000_100_00000;
+}
+
+/// Registers of channel 0 of the direct memory access, and of all.
+mod channel {
+    pub const READ_ADDRESS: usize = 0x00;
+    pub const WRITE_ADDRESS: usize = 0x04;
+    pub const COUNT: usize = 0x08;
+    /// Without a start.
+    pub const CONTROL: usize = 0x10;
+    /// Count, and starts.
+    pub const START: usize = 0x1C;
+    pub const INTERRUPT_ENABLE: usize = 0x404;
+    pub const INTERRUPT: usize = 0x40C;
+    pub const ABORT: usize = 0x444;
+}
+const CHANNEL: u32 = 1;
+const BUSY: u32 = 1 << 24;
+/// Enabled, before other channels, words, reading on around the ring, no chain, paced by `SEND`.
+const FEED: u32 = 1 | 1 << 1 | 2 << 2 | 1 << 4 | size_of::<Ring>().trailing_zeros() << 6;
+
+#[repr(align(8192))] // Its size, or the channel would not find around.
+struct Ring([AtomicU32; WORDS as usize]);
+const _: () = assert!(align_of::<Ring>() == size_of::<Ring>());
+
+static RING: Ring = Ring([const { AtomicU32::new(0) }; WORDS as usize]);
+/// Words put into the ring; wraps. The main loop alone writes it.
+static WRITTEN: AtomicU32 = AtomicU32::new(0);
+/// Words that the channel was told to take; wraps. Written where the channel's interrupt is masked.
+static TOLD: AtomicU32 = AtomicU32::new(0);
+/// A block is under way. Written where the channel's interrupt is masked.
+static FEEDING: AtomicBool = AtomicBool::new(false);
+
+static HEIGHT_QUEUE: StaticCell<Queue<u8, HEIGHTS>> = StaticCell::new();
+static HEIGHTS_DUE: Owned<Consumer<'static, u8>> = Owned::empty();
+
+/// What the state machine has done, for the main loop.
+pub static STATE: PulserState = PulserState::new();
+
+const LEVELS: u32 = 0x1F;
+const PULSES: u32 = (StepEvent::STEP_X | StepEvent::STEP_Y) as u32;
+const MOVES_PEN: u32 = 1 << 7;
+/// Nothing pulsed, drivers off: their pin is active low.
+const RELEASED: u32 = StepEvent::DRIVERS_ON as u32;
+
+/// The main loop's end.
+pub struct Steps {
+    heights: Producer<'static, u8>,
+    /// The pins' levels after the last word.
+    levels: u32,
+    /// The sum of the words counted so far; all wrap.
+    taken: u32,
+    x: i32,
+    y: i32,
+    ticks: u32,
+    /// Something follows the last event.
+    moving: bool,
+    drained: bool,
+}
+
+/// Readies state machine and channel; they start with the first events. The pins are outputs
+/// afterwards, drivers off.
+pub fn set_up(nvic: &mut NVIC) -> Steps {
+    registers::restart(reset::PIO0 | reset::DMA);
+    let program = pio::pio_asm!(
+        ".wrap_target",
+        "    pull block",
+        "    out pins, 5",
+        "    out y, 3",
+        "    jmp !y, time",
+        "    irq set 0 [4]", // a tick more
+        "time:",
+        "    out x, 24",
+        "count:",
+        "    jmp x--, count [4]",
+        ".wrap",
+    );
+    for (index, &instruction) in program.program.code.iter().enumerate() {
+        PIO0.write(machine::INSTRUCTIONS + 4 * index, u32::from(instruction));
+    }
+    let (top, bottom) = (program.program.wrap.source, program.program.wrap.target);
+    PIO0.write(machine::EXECUTION, u32::from(top) << 12 | u32::from(bottom) << 7);
+    PIO0.write(machine::SHIFT, SHIFT_RIGHT_BOTH | JOIN_SENDER);
+    let count = LEVELS.count_ones();
+    let first = FIRST_MOTOR_PIN;
+    PIO0.write(machine::PINS, count << 26 | count << 20 | first << 5 | first);
+    order(order::SET_PINS | RELEASED);
+    order(order::SET_DIRECTIONS | LEVELS);
+    PIO0.write(machine::INTERRUPT_ENABLE, FLAG_INTERRUPT);
+    PIO0.write(machine::CONTROL, ENABLE);
+
+    DMA.write(channel::READ_ADDRESS, ring_address(0));
+    DMA.write(channel::WRITE_ADDRESS, PIO0.address(machine::SEND));
+    DMA.write(channel::CONTROL, FEED);
+    DMA.write(channel::INTERRUPT_ENABLE, CHANNEL);
+
+    let (heights, due) = HEIGHT_QUEUE.init(Queue::new()).split();
+    // SAFETY: the interrupt is masked since reset, and this runs once (the queue's cell sees to it).
+    unsafe { HEIGHTS_DUE.fill(due) };
+    critical::enable(nvic, Interrupt::DMA_IRQ_0, critical::STEP_PRIORITY);
+    critical::enable(nvic, Interrupt::PIO0_IRQ_0, critical::PEN_PRIORITY);
+    Steps {
+        heights,
+        levels: RELEASED,
+        taken: 0,
+        x: 0,
+        y: 0,
+        ticks: 0,
+        moving: false,
+        drained: true,
+    }
+}
+
+fn order(instruction: u32) {
+    PIO0.write(machine::INSTRUCTION, instruction);
+}
+
+fn place(word: u32) -> &'static AtomicU32 {
+    &RING.0[(word % WORDS) as usize]
+}
+
+fn ring_address(word: u32) -> u32 {
+    place(word).as_ptr() as u32
+}
+
+impl Steps {
+    /// Lets waiting words begin.
+    pub fn start(&mut self) {
+        critical_section::with(|_| {
+            if !FEEDING.load(Ordering::Relaxed) {
+                feed();
+            }
+        });
+    }
+
+    /// Counts what the state machine has taken since, and tells the main loop's state.
+    #[inline(never)]
+    pub fn follow(&mut self) {
+        if STATE.is_halted() {
+            self.throw_away();
+            pen::set_height(0);
+        }
+        let taken = taken();
+        let was_drained = self.drained;
+        let began = taken != self.taken;
+        self.count_to(taken);
+        let stalled = PIO0.read(machine::FIFO_DEBUG) & STALLED != 0;
+        let waits = PIO0.read(machine::ADDRESS) == order::JUMP_TO_START;
+        self.drained = stalled && waits && taken == WRITTEN.load(Ordering::Relaxed);
+        if self.drained && !was_drained {
+            heal_pen();
+        }
+        if stalled && began {
+            PIO0.write(machine::FIFO_DEBUG, STALLED);
+        }
+        // While it was drained before, the flag is as old.
+        if stalled && !was_drained && (self.moving || !self.drained) {
+            STATE.note_underrun();
+            self.moving = false;
+        }
+        STATE.report((self.x, self.y), self.ticks, self.drained);
+    }
+
+    fn count_to(&mut self, taken: u32) {
+        let flips = flips();
+        // A word on its way may be counted a moment early, so the count may seem to go back.
+        while taken.wrapping_sub(self.taken).cast_signed() > 0 {
+            let word = place(self.taken).load(Ordering::Relaxed);
+            self.taken = self.taken.wrapping_add(1);
+            let pen = if word & MOVES_PEN == 0 { 0 } else { PEN_TICKS };
+            self.ticks = self.ticks.wrapping_add((word >> 8) + WORD_TICKS + pen);
+            if word & PULSES != 0 {
+                let (dx, dy) = StepEvent::from_bits((word ^ flips) & LEVELS).step();
+                self.x = self.x.wrapping_add(dx);
+                self.y = self.y.wrapping_add(dy);
+            }
+        }
+    }
+
+    /// Stops at once, and forgets what waits.
+    fn throw_away(&mut self) {
+        if self.drained && WRITTEN.load(Ordering::Relaxed) == self.taken {
+            return;
+        }
+        critical_section::with(|_| {
+            PIO0.write(machine::CONTROL, 0);
+            DMA.write(channel::INTERRUPT_ENABLE, 0);
+            DMA.write(channel::ABORT, CHANNEL);
+            while DMA.read(channel::CONTROL) & BUSY != 0 {}
+            DMA.write(channel::INTERRUPT, CHANNEL);
+            DMA.write(channel::INTERRUPT_ENABLE, CHANNEL);
+            let taken = taken();
+            self.count_to(taken);
+            order(order::SET_PINS | (self.levels_now() & !PULSES));
+            while PIO0.read(machine::FIFO_LEVEL) & LEVEL != 0 {
+                order(order::PULL_WITHOUT_WAITING);
+            }
+            DMA.write(channel::READ_ADDRESS, ring_address(taken));
+            WRITTEN.store(taken, Ordering::Relaxed);
+            TOLD.store(taken, Ordering::Relaxed);
+            FEEDING.store(false, Ordering::Relaxed);
+            order(order::JUMP_TO_START);
+            PIO0.write(machine::CONTROL, ENABLE | RESTART);
+        });
+        heal_pen();
+        self.levels = self.levels_now() & !PULSES;
+        self.moving = false;
+        self.drained = true;
+    }
+
+    /// The levels of the last word counted.
+    fn levels_now(&self) -> u32 {
+        place(self.taken.wrapping_sub(1)).load(Ordering::Relaxed) & LEVELS
+    }
+
+    #[inline]
+    fn put(&mut self, word: u32, ticks: u32) {
+        let written = WRITTEN.load(Ordering::Relaxed);
+        place(written).store(word | ticks.saturating_sub(WORD_TICKS) << 8, Ordering::Relaxed);
+        WRITTEN.store(written.wrapping_add(1), Ordering::Release);
+    }
+}
+
+impl EventQueue for Steps {
+    fn room(&self) -> usize {
+        let waiting = WRITTEN.load(Ordering::Relaxed).wrapping_sub(self.taken);
+        let events = (WORDS - IN_FLIGHT).saturating_sub(waiting) / 2;
+        (events as usize).min(HEIGHTS - 1 - self.heights.len())
+    }
+
+    fn push(&mut self, event: StepEvent) -> Result<(), StepEvent> {
+        if self.room() == 0 {
+            return Err(event);
+        }
+        let ticks = event.ticks();
+        match event.kind() {
+            EventKind::Pen { height } => {
+                self.heights.enqueue(height).map_err(|_| event)?;
+                self.put(self.levels | MOVES_PEN, ticks.saturating_sub(PEN_TICKS));
+                self.moving = false;
+            }
+            EventKind::Levels(levels) => {
+                self.moving = levels & StepEvent::AT_REST == 0;
+                let pins = (u32::from(levels) & LEVELS) ^ flips();
+                self.levels = pins & !PULSES;
+                if pins & PULSES == 0 {
+                    self.put(pins, ticks);
+                } else {
+                    let pulse = STATE.pulse_ticks();
+                    self.put(pins, pulse);
+                    self.put(self.levels, ticks.saturating_sub(pulse));
+                }
+            }
+        }
+        if WRITTEN.load(Ordering::Relaxed).wrapping_sub(self.taken) >= WORDS / 2 {
+            self.start();
+        }
+        Ok(())
+    }
+}
+
+/// The bits in which the pins' levels differ from an event's: drivers are on while their pin is low,
+/// and high direction counts up, unless inverted.
+fn flips() -> u32 {
+    const DOWN: u8 = StepEvent::DOWN_X | StepEvent::DOWN_Y;
+    RELEASED | u32::from(DOWN ^ STATE.inverted() << 2)
+}
+
+/// How many words have left the channel and the state machine's queue.
+fn taken() -> u32 {
+    critical_section::with(|_| {
+        loop {
+            let left = DMA.read(channel::COUNT);
+            let waiting = PIO0.read(machine::FIFO_LEVEL) & LEVEL;
+            if left == DMA.read(channel::COUNT) {
+                return TOLD.load(Ordering::Relaxed).wrapping_sub(left).wrapping_sub(waiting);
+            }
+        }
+    })
+}
+
+/// Tells the channel to take all that is there. Called where its interrupt is masked.
+#[inline]
+fn feed() {
+    let written = WRITTEN.load(Ordering::Acquire);
+    let count = written.wrapping_sub(TOLD.load(Ordering::Relaxed));
+    FEEDING.store(count != 0, Ordering::Relaxed);
+    if count != 0 {
+        TOLD.store(written, Ordering::Relaxed);
+        DMA.write(channel::START, count);
+    }
+}
+
+/// Two heights that come faster than the interrupt would leave one behind: the last counts.
+fn heal_pen() {
+    critical_section::with(|_| {
+        // SAFETY: the handler that owns it is masked.
+        if let Some(due) = unsafe { HEIGHTS_DUE.get() } {
+            while let Some(height) = due.dequeue() {
+                pen::set_height(height);
+            }
+        }
+    });
+}
+
+/// Stops for good with the drivers off, in a fault.
+pub fn release() {
+    PIO0.write(machine::CONTROL, 0);
+    order(order::SET_PINS | RELEASED);
+}
+
+#[interrupt]
+fn DMA_IRQ_0() {
+    DMA.write(channel::INTERRUPT, CHANNEL);
+    feed();
+}
+
+#[interrupt]
+fn PIO0_IRQ_0() {
+    PIO0.write(machine::FLAGS, FLAG);
+    // SAFETY: this is the handler that owns it.
+    if let Some(height) = unsafe { HEIGHTS_DUE.get() }.and_then(Consumer::dequeue) {
+        pen::set_height(height);
+    }
+}

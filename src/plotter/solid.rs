@@ -1,0 +1,118 @@
+//! A convex solid seen without faces: from its vertices, or its edges, to lines on the page.
+
+use super::PlotOptions;
+use super::job::{Collector, Observer, PageSink, grow, to_front};
+use crate::convex::{
+    self, Eye, Sight, SinkFull, SolidEdge, SolidError, SolidSink, default_tolerance,
+};
+use crate::drawing::{Bounds, PageMap, StepsPerMillimetre};
+use crate::model::{Corner, Model};
+use crate::protocol::{HiddenLines, Refusal, WayToSee};
+use crate::stage::{Attention, Scratch, Stage, items_mut};
+use crate::view::{SightLines, View, distinct_edges};
+use crate::visibility::{Along, Stretch, StretchSink};
+
+/// Finds what is seen of the solid. Returns how many lines stand in `words`.
+pub(super) fn project(
+    model: &Model<'_>,
+    options: &PlotOptions,
+    steps: StepsPerMillimetre,
+    words: &mut [u64],
+    attention: &mut dyn Attention,
+    observer: &mut dyn Observer,
+) -> Result<usize, Refusal> {
+    attention.enter(Stage::View);
+    let camera = options.camera(model).ok_or(Refusal::NothingToPlot)?;
+    let view = View::new(&camera, model).map_err(Refusal::View)?;
+    if !options.clip_behind {
+        view.refuse_behind(model).map_err(Refusal::View)?;
+    }
+    let eye = match camera.sight_lines(model.fraction_bits()).map_err(Refusal::View)? {
+        SightLines::Through(place) => Eye::At(place),
+        SightLines::Along(direction) => Eye::Towards(direction),
+    };
+    attention.enter(Stage::Visibility);
+    let positions = bytemuck::cast_slice(model.vertices());
+    let tolerance = default_tolerance(positions);
+    // No solid has more edges than its vertices allow (Euler), nor more than were sent.
+    let most = match options.see {
+        WayToSee::Edges => model.corner_count(),
+        _ => 3 * model.vertices().len(),
+    };
+    let mut scratch = Scratch::new(words);
+    let kept = scratch.take(most).map_err(Refusal::DrawingTooLarge)?;
+    let mut edges = Edges { kept, shown: 0, hidden: 0, wanted: options.hidden };
+    let found = if options.see == WayToSee::Edges {
+        let sent = distinct_edges(model.elements(), &mut scratch);
+        let sent = sent.map_err(Refusal::DrawingTooLarge)?;
+        convex::from_edges(positions, sent, eye, tolerance, scratch, attention, &mut edges)
+    } else {
+        convex::from_vertices(positions, eye, tolerance, scratch, attention, &mut edges)
+    };
+    found.map_err(|error| match error {
+        SolidError::Scratch(missing) => Refusal::DrawingTooLarge(missing),
+        SolidError::Aborted => Refusal::Aborted,
+        error => Refusal::Solid(error),
+    })?;
+    let (shown, hidden) = (edges.shown, edges.hidden);
+    let (edge_words, line_words) = words.split_at_mut(Scratch::bytes_for::<[u16; 2]>(most) / 8);
+    let edges: &[[u16; 2]] = items_mut(edge_words, most).unwrap_or(&mut []);
+    let on_view = |ends: &[u16; 2]| {
+        let [p, q] = ends.map(|number| model.vertices().get(usize::from(number)));
+        view.clip_edge([view.vertex(*p?), view.vertex(*q?)])
+    };
+    let all = || {
+        let visible = edges.iter().take(shown).map(|ends| (ends, true));
+        visible.chain(edges.iter().rev().take(hidden).map(|ends| (ends, false)))
+    };
+    let mut bounds: Option<Bounds> = None;
+    for ends in all().filter_map(|(ends, _)| on_view(ends)) {
+        attention.check()?;
+        bounds = grow(bounds, Bounds::around(ends.into_iter(), view.projection()));
+    }
+    let bounds = bounds.ok_or(Refusal::NothingToPlot)?;
+    let map = PageMap::fit(&bounds, &options.page, steps).map_err(Refusal::Page)?;
+    let collector = Collector::new(line_words);
+    let mut sink = PageSink { collector, map, view, hidden: options.hidden, observer };
+    for (numbers, visible) in all() {
+        attention.check()?;
+        let Some([p, q]) = on_view(numbers) else { continue };
+        let (from, to) = (Along::START, Along::END);
+        let edge = Some((numbers[0], numbers[1]));
+        sink.stretch(Stretch { edge, ends: (p, q), from, to, visible })
+            .map_err(|SinkFull| sink.collector.out_of_memory())?;
+    }
+    let count = sink.collector.count;
+    to_front(words, Scratch::bytes_for::<[u16; 2]>(most) / 8, count);
+    Ok(count)
+}
+
+/// The edges of the solid: those to be drawn as visible from the front, as hidden from the back.
+struct Edges<'a> {
+    kept: &'a mut [[u16; 2]],
+    shown: usize,
+    hidden: usize,
+    wanted: HiddenLines,
+}
+
+impl SolidSink for Edges<'_> {
+    fn face(&mut self, _: &[Corner], _: bool) -> Result<(), SinkFull> {
+        Ok(())
+    }
+
+    fn edge(&mut self, edge: SolidEdge) -> Result<(), SinkFull> {
+        let at = match (edge.sight, self.wanted) {
+            (Sight::Outline | Sight::Visible, _) => {
+                self.shown += 1;
+                self.shown - 1
+            }
+            (Sight::BehindOutline, _) | (Sight::Hidden, HiddenLines::Erased) => return Ok(()),
+            (Sight::Hidden, _) => {
+                self.hidden += 1;
+                self.kept.len().checked_sub(self.hidden).ok_or(SinkFull)?
+            }
+        };
+        *self.kept.get_mut(at).ok_or(SinkFull)? = [edge.ends.0, edge.ends.1];
+        Ok(())
+    }
+}

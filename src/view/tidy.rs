@@ -1,0 +1,218 @@
+//! What modellers leave behind: vertices at the same place made one, faces without an area left out.
+
+use crate::model::{Corner, Element, Elements, Model, Position};
+use crate::stage::{Attention, OutOfScratch, Scratch};
+use crate::view::SeeError;
+
+/// The elements of the model with each vertex replaced by the first one at the same place, without the faces that
+/// have no area, and how many those are. The model's own elements if there is nothing to do. Other faces may
+/// come to have the same corner twice in a row; visibility lives with that.
+///
+/// Memory: 2 bytes for each corner if there is something to do; 4 to 8 for each vertex meanwhile.
+pub(super) fn tidy<'a>(
+    model: &'a Model<'_>,
+    scratch: &mut Scratch<'a>,
+    attention: &mut dyn Attention,
+) -> Result<(Elements<'a>, u32), SeeError> {
+    let positions = model.vertices();
+    let elements = model.elements();
+    let degenerate = elements.iter().filter(|element| !has_extent(element, positions)).count();
+    attention.check()?;
+    if degenerate == 0 && Places::new(positions, &mut scratch.reborrow())?.1 == 0 {
+        return Ok((elements, 0));
+    }
+    let corners: &mut [Corner] = scratch.take(elements.corners().len())?;
+    attention.check()?;
+    let (places, _) = Places::new(positions, &mut scratch.reborrow())?;
+    attention.check()?;
+    let mut kept = 0;
+    for element in elements.iter().filter(|element| has_extent(element, positions)) {
+        let bar;
+        let old = match element {
+            Element::Face(corners) => corners,
+            Element::Bar(from, to) => {
+                bar = [Corner::new(from, true, false), Corner::new(to, true, true)];
+                &bar
+            }
+        };
+        for (new, old) in corners.iter_mut().skip(kept).zip(old) {
+            let first = places.first_at(old.vertex()).unwrap_or(old.vertex());
+            *new = Corner::new(first, old.of_bar(), old.is_last());
+        }
+        kept += old.len();
+    }
+    let corners: &'a [Corner] = corners;
+    Ok((Elements::new(corners.get(..kept).unwrap_or(corners)), degenerate as u32))
+}
+
+/// Whether a face has an area. Bars need none.
+fn has_extent(element: &Element<'_>, positions: &[Position]) -> bool {
+    let Element::Face(corners) = element else { return true };
+    let mut sides = corners.iter().filter_map(|corner| {
+        let [from, to] = [corners.first()?, corner].map(|c| positions.get(usize::from(c.vertex())));
+        let [from, to] = [from?.coordinates(), to?.coordinates()];
+        let side = [0, 1, 2].map(|axis: usize| i64::from(to[axis]) - i64::from(from[axis]));
+        (side != [0; 3]).then_some(side)
+    });
+    let Some(a) = sides.next() else { return false };
+    // Below 2^31 each, so that a product is below 2^62 and compares without a difference.
+    sides.any(|b| {
+        a[0] * b[1] != a[1] * b[0] || a[1] * b[2] != a[2] * b[1] || a[2] * b[0] != a[0] * b[2]
+    })
+}
+
+/// A hash table of the places that have a vertex, with open addressing.
+struct Places<'a> {
+    positions: &'a [Position],
+    /// Numbers of vertices from 1; 0 is free. A power of two, at least twice the vertices.
+    slots: &'a mut [u16],
+}
+
+impl<'a> Places<'a> {
+    /// All places, and how many vertices are at the place of an earlier one.
+    fn new(
+        positions: &'a [Position],
+        scratch: &mut Scratch<'a>,
+    ) -> Result<(Self, usize), OutOfScratch> {
+        let slots = scratch.take((2 * positions.len()).next_power_of_two())?;
+        let places = Self { positions, slots };
+        let mut repeated = 0;
+        for (number, position) in (1..).zip(positions) {
+            let slot = places.slot(position);
+            match places.slots.get_mut(slot) {
+                Some(free @ 0) => *free = number,
+                _ => repeated += 1,
+            }
+        }
+        Ok((places, repeated))
+    }
+
+    /// The least number of a vertex at the place of vertex `number`.
+    fn first_at(&self, number: u16) -> Option<u16> {
+        let slot = self.slot(self.positions.get(usize::from(number))?);
+        self.slots.get(slot)?.checked_sub(1)
+    }
+
+    /// The slot of this place, or the free one where it belongs.
+    fn slot(&self, position: &Position) -> usize {
+        let mask = self.slots.len() - 1; // there is always one
+        let mut slot = hash(position) as usize & mask;
+        while let Some(number) = self.slots.get(slot).and_then(|number| number.checked_sub(1)) {
+            if self.positions.get(usize::from(number)) == Some(position) {
+                break;
+            }
+            slot = (slot + 1) & mask;
+        }
+        slot
+    }
+}
+
+/// Multiplies by odd constants (Knuth, 6.4) and folds the better upper half down.
+fn hash(position: &Position) -> u32 {
+    let [x, y, z] = position.coordinates().map(|coordinate| coordinate as u32);
+    let mixed = [(y, 0x85EB_CA6B), (z, 0xC2B2_AE35)]
+        .into_iter()
+        .fold(x.wrapping_mul(0x9E37_79B1), |hash, (part, factor): (u32, u32)| {
+            (hash ^ hash >> 15 ^ part).wrapping_mul(factor)
+        });
+    mixed ^ mixed >> 16
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixed::Decimal;
+    use crate::stage::Undisturbed;
+    use std::vec::Vec;
+
+    fn decimals(place: [&str; 3]) -> [Decimal; 3] {
+        place.map(|text| Decimal::parse(text).unwrap())
+    }
+
+    fn welded(places: &[[&str; 3]], faces: &[&[i32]]) -> Vec<(u16, bool, bool)> {
+        let mut vertices = heapless::Vec::<Position, 16>::new();
+        let mut corners = heapless::Vec::<Corner, 64>::new();
+        let mut model = Model::new(&mut vertices, &mut corners);
+        for place in places {
+            model.add_vertex(decimals(*place)).unwrap();
+        }
+        for face in faces {
+            match face.len() {
+                2 => model.add_polyline(face.iter().copied()).unwrap(),
+                _ => model.add_face(face.iter().copied()).unwrap(),
+            }
+        }
+        let mut words = [0; 64];
+        let (elements, _) = tidy(&model, &mut Scratch::new(&mut words), &mut Undisturbed).unwrap();
+        elements.corners().iter().map(|c| (c.vertex(), c.of_bar(), c.is_last())).collect()
+    }
+
+    #[test]
+    fn a_square_of_two_loose_triangles_shares_its_diagonal() {
+        let places = [
+            ["0", "0", "0"],
+            ["1", "0", "0"],
+            ["1", "1", "0"],
+            ["0", "0", "-0"],
+            ["1.0", "1e0", "0"],
+            ["0", "1", "0"],
+        ];
+        let corners = welded(&places, &[&[1, 2, 3], &[4, 5, 6], &[5, 6]]);
+        let expected = [
+            (0, false, false),
+            (1, false, false),
+            (2, false, true),
+            (0, false, false),
+            (2, false, false),
+            (5, false, true),
+            (2, true, false),
+            (5, true, true),
+        ];
+        assert_eq!(corners, expected);
+    }
+
+    #[test]
+    fn what_has_no_repeats_is_untouched_and_takes_no_memory() {
+        let mut vertices = heapless::Vec::<Position, 4>::new();
+        let mut corners = heapless::Vec::<Corner, 4>::new();
+        let mut model = Model::new(&mut vertices, &mut corners);
+        for [x, y] in [["0", "0"], ["1", "0"], ["0.5", "1"]] {
+            model.add_vertex(decimals([x, y, "0"])).unwrap();
+        }
+        model.add_face([1, 2, 3].into_iter()).unwrap();
+        let mut words = [0; 2];
+        let mut scratch = Scratch::new(&mut words);
+        let (elements, degenerate) = tidy(&model, &mut scratch, &mut Undisturbed).unwrap();
+        assert_eq!(degenerate, 0);
+        assert!(core::ptr::eq(elements.corners(), model.elements().corners()));
+        assert_eq!(scratch.available_bytes(), 16);
+        assert!(tidy(&model, &mut Scratch::new(&mut [0]), &mut Undisturbed).is_err());
+    }
+
+    #[test]
+    fn nothing_has_nothing_to_weld() {
+        assert!(welded(&[], &[]).is_empty());
+    }
+
+    #[test]
+    fn a_full_model_all_at_one_place_has_no_face_left() {
+        let places = [["7", "7", "7"]; 16];
+        assert!(welded(&places, &[&[1, 2, 16]]).is_empty());
+        assert_eq!(welded(&places, &[&[1, 16]]), [(0, true, false), (0, true, true)]);
+    }
+
+    #[test]
+    fn a_face_in_line_is_left_out_and_its_neighbours_stay() {
+        let places = [
+            ["0", "0", "0"],
+            ["1", "2", "3"],
+            ["2", "4", "6"],
+            ["0", "1", "0"],
+            ["-9", "-18", "-27"],
+        ];
+        let faces: [&[i32]; 4] = [&[1, 2, 3], &[1, 3, 4], &[5, 1, 2, 3], &[2, 4]];
+        let corners = welded(&places, &faces);
+        let numbers: Vec<u16> = corners.iter().map(|corner| corner.0).collect();
+        assert_eq!(numbers, [0, 2, 3, 1, 3]);
+    }
+}

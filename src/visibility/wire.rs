@@ -1,0 +1,38 @@
+//! The wire frame: every edge from end to end.
+
+use super::edges::{ChosenSides, Outlines, sides};
+use super::pace::Pace;
+use super::{Options, Scene, Stretch, StretchSink, VisibilityError, check};
+use crate::geometry::Along;
+use crate::stage::{Attention, Scratch};
+
+/// Hands over every distinct edge and bar whole and visible, in the order of the model, as if no face hid anything.
+/// Of `options` only the crease counts.
+///
+/// # Errors
+/// See [`VisibilityError`]. [`super::scratch_bytes`] are enough.
+pub fn follow_wire(
+    scene: &Scene<'_>,
+    options: Options,
+    mut scratch: Scratch<'_>,
+    attention: &mut dyn Attention,
+    sink: &mut dyn StretchSink,
+) -> Result<(), VisibilityError> {
+    check(scene)?;
+    let outlines = Outlines { corners: scene.elements.corners() };
+    let (vertices, projection) = (scene.vertices, scene.projection);
+    let pace = &mut Pace::new(attention);
+    let chosen =
+        ChosenSides::choose(outlines, projection, vertices, options.crease, &mut scratch, pace)?;
+    for (first, element) in outlines.elements() {
+        pace.spend(500 * element.len())?;
+        for (number, p, q) in sides(element) {
+            if chosen.contains(first + number) {
+                let ends = (vertices[usize::from(p)], vertices[usize::from(q)]);
+                let (from, to) = (Along::START, Along::END);
+                sink.stretch(Stretch { edge: Some((p, q)), ends, from, to, visible: true })?;
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,72 @@
+//! Images for the boot loader that a Pico shows as a drive: UF2, blocks of 512 bytes, each with its
+//! place in flash. Format: Microsoft's UF2 specification.
+
+use anyhow::{Result, ensure};
+use object::read::elf::{FileHeader, ProgramHeader};
+use object::{Endianness, elf};
+
+const PAYLOAD: usize = 256;
+const MAGIC: [u32; 2] = [0x0A32_4655, 0x9E5D_5157];
+const MAGIC_END: u32 = 0x0AB1_6F30;
+const FAMILY_PRESENT: u32 = 0x2000;
+/// The RP2040.
+const FAMILY: u32 = 0xE48B_FF56;
+
+/// The image of an ELF file whose flash begins at `start`: every page that it fills a byte of.
+pub fn of_elf(image: &[u8], start: u64) -> Result<Vec<u8>> {
+    let header = elf::FileHeader32::<Endianness>::parse(image)?;
+    let endian = header.endian()?;
+    let mut flash = Vec::new();
+    for segment in header.program_headers(endian, image)? {
+        let bytes = segment.data(endian, image).unwrap_or_default();
+        if segment.p_type(endian) != elf::PT_LOAD || bytes.is_empty() {
+            continue;
+        }
+        let address = u64::from(segment.p_paddr(endian));
+        ensure!(address >= start, "a segment at {address:#010x} lies before the flash");
+        let offset = usize::try_from(address - start)?;
+        let end = offset + bytes.len();
+        ensure!(end <= 1 << 24, "a segment at {address:#010x} lies behind the flash");
+        flash.resize(end.max(flash.len()), 0xFF);
+        flash[offset..end].copy_from_slice(bytes);
+    }
+    ensure!(!flash.is_empty(), "the image has nothing for the flash");
+    Ok(blocks(&flash, u32::try_from(start)?))
+}
+
+fn blocks(flash: &[u8], start: u32) -> Vec<u8> {
+    let count = flash.len().div_ceil(PAYLOAD) as u32;
+    let mut blocks = Vec::new();
+    for (number, payload) in (0..).zip(flash.chunks(PAYLOAD)) {
+        let address = start + number * PAYLOAD as u32;
+        let [magic, second] = MAGIC;
+        let words = [magic, second, FAMILY_PRESENT, address, PAYLOAD as u32, number, count, FAMILY];
+        let begin = blocks.len();
+        blocks.extend(words.iter().flat_map(|word| word.to_le_bytes()));
+        blocks.extend(payload);
+        blocks.resize(begin + 512 - size_of::<u32>(), 0);
+        blocks.extend(MAGIC_END.to_le_bytes());
+    }
+    blocks
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_page_and_a_byte_are_two_blocks() {
+        let flash: Vec<u8> = (0..=255).chain([7]).collect();
+        let image = blocks(&flash, 0x1000_0000);
+        assert_eq!(image.len(), 1024);
+        let word = |at: usize| u32::from_le_bytes(image[at..at + 4].try_into().unwrap());
+        for (block, address) in [(0, 0x1000_0000), (512, 0x1000_0100)] {
+            assert_eq!([word(block), word(block + 4)], MAGIC);
+            assert_eq!((word(block + 12), word(block + 16)), (address, 256));
+            assert_eq!((word(block + 20), word(block + 24)), (block as u32 / 512, 2));
+            assert_eq!((word(block + 28), word(block + 508)), (FAMILY, MAGIC_END));
+        }
+        assert_eq!(image[32..288], flash[..256]);
+        assert_eq!((image[512 + 32], image[512 + 33]), (7, 0));
+    }
+}
