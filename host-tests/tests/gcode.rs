@@ -3,9 +3,14 @@
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
 
 use penup::boards::host::Change;
+use penup::machine::Settings;
 use penup::machine::{Contacts, State};
 use penup::plotter::Board;
+use penup::plotter::{Memory, NO_MOVES};
+use penup_host_tests::event_checker::{self, Drawn};
 use penup_host_tests::whole_jobs::Bench;
+use proptest::prelude::*;
+use std::sync::LazyLock;
 
 fn bench() -> Bench {
     let mut bench = Bench::new();
@@ -295,4 +300,92 @@ fn letters_of_utf_8_are_no_orders() {
     let mut bench = bench();
     assert_eq!(bench.say("# Å Д °±\n(Ä)\n"), "ok\nok\n");
     assert_eq!(field(&mut bench, "Idle"), "Idle");
+}
+
+/// A few strokes, an arc, a dot.
+const PROGRAM: &str = "$21=1\nG0 X5 Y5\nM3\nG1 X14 Y6\nX15 Y12\nG2 X9 Y18 I-6 J0\nG1 X9.5 Y12 F1200\nM5\n\
+                       G0 X2 Y2\nM3\nM5\nG0 X3 Y9\nM3\nG1 Y10 F3000\nX12 Y10.5\nM5\nG0 X1 Y1\n";
+
+/// What is done to the plotter in the midst of it.
+#[derive(Debug, Clone, Copy)]
+enum Disturbance {
+    Nothing,
+    HoldAndResume,
+    Abort,
+    Limit,
+    StopContact,
+    StopByte,
+}
+
+/// Runs the program, disturbed after so many milliseconds; checks that the plotter knows where its
+/// pins are and that it can go on from there. Returns what was drawn before that.
+fn disturbed(disturbance: Disturbance, instant: u32) -> Drawn {
+    let memory = Box::leak(Box::new(Memory::<4, 4, 16>::new()));
+    let mut bench = Bench::with_memory(memory.lend(Box::leak(Box::new(NO_MOVES))));
+    bench.heard();
+    bench.board.receive(PROGRAM.as_bytes());
+    work(&mut bench, instant);
+    let closed = match disturbance {
+        Disturbance::Limit => Contacts { y: true, ..Contacts::default() },
+        Disturbance::StopContact => Contacts { stop: true, ..Contacts::default() },
+        _ => Contacts::default(),
+    };
+    bench.board.set_contacts(closed);
+    match disturbance {
+        Disturbance::HoldAndResume => bench.board.receive(b"!"),
+        Disturbance::Abort => bench.board.receive(b"\x18"),
+        Disturbance::StopByte => bench.board.receive(&[0xB1]),
+        _ => {}
+    }
+    if matches!(disturbance, Disturbance::HoldAndResume) {
+        work(&mut bench, 1500);
+        assert!(bench.plotter.machine().stands());
+        bench.board.receive(b"~");
+    }
+    bench.finish();
+    bench.board.set_contacts(Contacts::default());
+    let drawn = event_checker::check_pins(&bench.board.trace().changes(), &Settings::default());
+    assert_eq!(drawn.pen, 0);
+    assert_eq!(bench.plotter.machine().position(), drawn.end);
+    bench.heard();
+    // An alarm also refuses the lines that were still to come.
+    if matches!(bench.plotter.machine().state(), State::Alarm(_)) {
+        assert_eq!(bench.say("$X\n"), "ok\n");
+    }
+    assert_eq!(bench.plotter.machine().end(), drawn.end);
+    assert_eq!(bench.say("M5\nG90 G21 G0 X1 Y1\n"), "ok\nok\n");
+    bench.finish();
+    let after = event_checker::check_pins(&bench.board.trace().changes(), &Settings::default());
+    assert_eq!((after.end.x, after.end.y), (80, 80));
+    drawn
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig {
+        cases: 1000,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
+
+    #[test]
+    fn whatever_happens_the_plotter_knows_where_it_is(
+        disturbance in prop::sample::select(vec![
+            Disturbance::HoldAndResume,
+            Disturbance::Abort,
+            Disturbance::Limit,
+            Disturbance::StopContact,
+            Disturbance::StopByte,
+        ]),
+        instant in 0u32..3500,
+    ) {
+        static UNDISTURBED: LazyLock<Drawn> =
+            LazyLock::new(|| disturbed(Disturbance::Nothing, 0));
+        let drawn = disturbed(disturbance, instant);
+        if matches!(disturbance, Disturbance::HoldAndResume) {
+            prop_assert_eq!(&drawn.inked, &UNDISTURBED.inked);
+            prop_assert_eq!(drawn.end, UNDISTURBED.end);
+        } else {
+            prop_assert!(drawn.inked.is_subset(&UNDISTURBED.inked));
+        }
+    }
 }

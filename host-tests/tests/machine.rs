@@ -84,7 +84,7 @@ fn instants() -> impl Strategy<Value = (u64, u64)> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 350, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 1000, ..ProptestConfig::default() })]
 
     #[test]
     fn hold_and_resume_leave_the_same_ink((instant, turn_ticks) in instants(), again in 0u64..9_000_000) {
@@ -103,6 +103,7 @@ proptest! {
         });
         prop_assert_eq!(&drawn.inked, &UNDISTURBED.inked);
         prop_assert_eq!((drawn.end, drawn.pen), (UNDISTURBED.end, 0));
+        event_checker::check_speed(&drawn.runs, &job(), &Settings::default(), false);
     }
 
     #[test]
@@ -119,6 +120,7 @@ proptest! {
             stood_at.is_none()
         });
         prop_assert_eq!((Some(drawn.end), drawn.pen), (stood_at, 0));
+        event_checker::check_speed(&drawn.runs, &job(), &Settings::default(), false);
         // The next job begins where this one was given up.
         prop_assert!(drawn.last_step < instant + turn_ticks + 10_000_000);
     }
@@ -147,6 +149,7 @@ proptest! {
             false
         });
         let (time, pins) = alarm_at.expect("given");
+        event_checker::check_speed(&drawn.runs, &job(), &Settings::default(), true);
         prop_assert!(drawn.last_step < time);
         prop_assert_eq!((drawn.end, drawn.pen), (pins, 0));
     }

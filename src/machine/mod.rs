@@ -275,6 +275,7 @@ impl<'m> Machine<'m> {
         self.end_homing();
         self.next_pen = None;
         self.runner.forget_path();
+        self.runner.forget_pen();
         self.path_ended = true;
         self.streaming = false;
         self.sleep_due = false;

@@ -76,7 +76,8 @@ pub struct Runner<'m> {
     curve: Pace,
     /// The plan's time, 1/16 ticks; wraps.
     now: u32,
-    pen_is_down: bool,
+    /// Not known after an emergency stop, when it may still be on its way.
+    pen_is_down: Option<bool>,
     /// Where the pen was sent last; not known at the start.
     pen_height: Option<u8>,
     stopping: bool,
@@ -116,7 +117,7 @@ impl<'m> Runner<'m> {
             travel: Pace::REST,
             curve: Pace::REST,
             now: 0,
-            pen_is_down: false,
+            pen_is_down: Some(false),
             pen_height: None,
             stopping: false,
             stopping_after_stroke: false,
@@ -190,7 +191,13 @@ impl<'m> Runner<'m> {
 
     /// Whether the pen was last told to go down.
     pub fn pen_is_down(&self) -> bool {
-        self.pen_is_down
+        self.pen_is_down == Some(true)
+    }
+
+    /// The pen was raised by somebody else and may still be on its way.
+    pub fn forget_pen(&mut self) {
+        self.pen_is_down = None;
+        self.pen_height = None;
     }
 
     /// What has been run since the runner was made.
@@ -203,8 +210,6 @@ impl<'m> Runner<'m> {
     pub fn set_position(&mut self, point: PagePoint, ticks: u32) {
         self.forget_path();
         self.emitter.restart(ticks);
-        self.pen_is_down = false;
-        self.pen_height = None;
         self.position = point;
         self.end = point;
     }
@@ -436,7 +441,7 @@ impl<'m> Runner<'m> {
         standing: Progress,
         queue: &mut dyn EventQueue,
     ) -> Result<Progress, StepEvent> {
-        if self.pen_is_down {
+        if self.pen_is_down() {
             self.move_pen(false, queue)?;
             return Ok(Progress::More);
         }
@@ -459,8 +464,8 @@ impl<'m> Runner<'m> {
         } else {
             (self.pen.up_height, self.pen.up_ticks)
         };
-        let far = if down { self.pen.up_height } else { self.pen.down_height };
-        let from = self.pen_height.unwrap_or(far);
+        // Where it stands if that is not known: at the start, and after an emergency stop.
+        let from = self.pen_height.unwrap_or(self.pen.up_height);
         let next = match height.cmp(&from) {
             _ if self.pen.ramp_ticks == 0 => height,
             Ordering::Less => from - 1,
@@ -474,7 +479,7 @@ impl<'m> Runner<'m> {
             self.now = self.now.wrapping_add(self.pen.ramp_ticks << FRACTION_BITS);
             return Ok(());
         }
-        self.pen_is_down = down;
+        self.pen_is_down = Some(down);
         // Two waits of up to 0.67 s: the settings allow no longer dwell.
         let half = dwell.div_ceil(2).min(StepEvent::MAX_TICKS);
         for _ in 0..2 {
@@ -502,7 +507,7 @@ impl<'m> Runner<'m> {
         }
         let inked = course.is_inked();
         if at_rest {
-            if inked != self.pen_is_down {
+            if self.pen_is_down != Some(inked) {
                 self.move_pen(inked, queue)?;
                 return Ok(Progress::More);
             }
