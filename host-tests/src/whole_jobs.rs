@@ -35,9 +35,7 @@ impl Bench {
     /// Sends `text` and returns what comes back until everything is read.
     pub fn say(&mut self, text: &str) -> String {
         self.board.receive(text.as_bytes());
-        while !self.board.has_read_all() {
-            self.plotter.poll(&mut self.board);
-        }
+        while self.plotter.poll(&mut self.board) || !self.board.has_read_all() {}
         self.heard()
     }
 

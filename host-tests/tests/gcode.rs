@@ -302,6 +302,47 @@ fn letters_of_utf_8_are_no_orders() {
     assert_eq!(field(&mut bench, "Idle"), "Idle");
 }
 
+#[test]
+fn no_talk_starves_the_steps() {
+    // The fastest pen of the default settings, on a path of many short moves.
+    let mut program = "$201=6000\nG0 X20 Y20\nM3\n".to_owned();
+    for point in 0..400 {
+        let angle = f64::from(point) / 20.0;
+        let (x, y) = (120.0 + 100.0 * angle.cos(), 120.0 + 100.0 * angle.sin());
+        program.push_str(&format!("G1 X{x:.3} Y{y:.3}\n"));
+    }
+    let run = |talk: bool| {
+        let mut bench = bench();
+        bench.board.set_baud(115_200);
+        let mut lines = program.lines();
+        let mut turn = 0u32;
+        loop {
+            turn += 1;
+            if bench.board.has_read_all() {
+                // Long lines and lists between the moves, a status at every turn.
+                if talk && turn.is_multiple_of(9) {
+                    let long = "x".repeat(250);
+                    bench.board.receive(format!("# {long}\n$$\n$\n$options\n").as_bytes());
+                }
+                let Some(line) = lines.next() else { break };
+                bench.board.receive(format!("{line}\n").as_bytes());
+            }
+            if talk {
+                bench.board.receive(b"?");
+            }
+            if !bench.plotter.poll(&mut bench.board) {
+                bench.board.wait();
+            }
+        }
+        bench.finish();
+        assert_eq!(bench.board.underruns(), 0);
+        event_checker::check_pins(&bench.board.trace().changes(), &Settings::default())
+    };
+    let (quiet, busy) = (run(false), run(true));
+    assert_eq!(quiet.inked, busy.inked);
+    assert_eq!(quiet.end, busy.end);
+}
+
 /// A few strokes, an arc, a dot.
 const PROGRAM: &str = "$21=1\nG0 X5 Y5\nM3\nG1 X14 Y6\nX15 Y12\nG2 X9 Y18 I-6 J0\nG1 X9.5 Y12 F1200\nM5\n\
                        G0 X2 Y2\nM3\nM5\nG0 X3 Y9\nM3\nG1 Y10 F3000\nX12 Y10.5\nM5\nG0 X1 Y1\n";

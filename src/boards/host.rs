@@ -174,6 +174,9 @@ pub struct HostBoard<'q> {
     /// When the step interrupt is due, in ticks from the start.
     due: Option<u64>,
     contacts: Contacts,
+    state: &'q PulserState,
+    /// Ticks that sending a byte takes.
+    byte_ticks: u64,
 }
 
 impl core::fmt::Debug for HostBoard<'_> {
@@ -196,6 +199,8 @@ impl<'q> HostBoard<'q> {
             trace,
             due: None,
             contacts: Contacts::default(),
+            state,
+            byte_ticks: 0,
         }
     }
 
@@ -214,9 +219,19 @@ impl<'q> HostBoard<'q> {
         }
     }
 
+    /// Sends at this speed from now on; at first bytes take no time.
+    pub fn set_baud(&mut self, baud: u32) {
+        self.byte_ticks = u64::from(10 * crate::motion::TICKS_PER_SECOND / baud);
+    }
+
     /// Closes and opens contacts.
     pub fn set_contacts(&mut self, contacts: Contacts) {
         self.contacts = contacts;
+    }
+
+    /// How often the queue of steps ran dry while the machine moved.
+    pub fn underruns(&self) -> u32 {
+        self.state.underruns()
     }
 
     /// Whether all bytes received have been read, and real-time ones acted on.
@@ -265,6 +280,7 @@ impl Board for HostBoard<'_> {
 
     fn write(&mut self, bytes: &[u8]) {
         self.sent.extend_from_slice(bytes);
+        self.pass(self.byte_ticks * bytes.len() as u64);
     }
 
     fn queue(&mut self) -> &mut dyn EventQueue {

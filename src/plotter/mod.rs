@@ -25,11 +25,11 @@ use crate::machine::{
 };
 use crate::model::Model;
 use crate::order;
-use crate::protocol::{Command, HELP, LINE_LIMIT, LineReader, RealTime, Refusal};
+use crate::protocol::{Command, LINE_LIMIT, LineReader, RealTime, Refusal};
 use crate::stage::{Aborted, Attention, Stage};
 use program::Program;
 use reply::Reply;
-use stream::{Progress, Task};
+use stream::{Listing, Progress, Task};
 
 /// How far step events are planned ahead of the pins, and so how late a hold takes effect: 50 ms.
 const AHEAD_TICKS: u32 = crate::motion::TICKS_PER_SECOND / 20;
@@ -207,16 +207,12 @@ impl Inner<'_> {
             Command::Polyline(numbers) => {
                 self.model.add_polyline(numbers.iter()).map_err(Refusal::Model)?
             }
-            Command::Help => {
-                for (usage, meaning) in HELP {
-                    Reply(board).line(format_args!("[HLP:{usage} {meaning}]"));
-                }
-            }
+            Command::Help => self.task = Some(Task::List(Listing::Help, 0)),
             Command::BuildInfo => self.report_build(board),
-            Command::Settings => self.list_settings(board),
+            Command::Settings => self.task = Some(Task::List(Listing::Settings, 0)),
             Command::Setting { name, value } => self.change_setting(name, value)?,
             Command::Option(option) => self.options.set(option),
-            Command::Options => self.options.list(|option| Reply(board).line(option)),
+            Command::Options => self.task = Some(Task::List(Listing::Options, 0)),
             Command::Model => self.report_model(board),
             Command::Clear => self.model.clear(),
             Command::Plot => self.plot(board)?,
@@ -286,16 +282,6 @@ impl Inner<'_> {
         let value = crate::fixed::Decimal::parse(value).map_err(|_| Refusal::NotANumber)?;
         let value: Value = value.to_millimetres().map_err(|_| Refusal::NumberOutOfRange)?;
         self.machine.set(setting, value).map_err(Refusal::Setting)
-    }
-
-    #[inline(never)] // Its frame must not lie under the stages'.
-    fn list_settings<B: Board>(&self, board: &mut B) {
-        for (info, value) in self.machine.settings().iter() {
-            let value =
-                BinaryFraction { units: value.to_bits().into(), fraction_bits: 16, places: 3 };
-            Reply(board)
-                .line(format_args!("${}={value} ({}, {})", info.number, info.name, info.unit));
-        }
     }
 
     #[inline(never)] // Its frame must not lie under the stages'.

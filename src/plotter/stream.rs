@@ -4,10 +4,12 @@
 use super::program::{Order, Program};
 use super::{Board, Inner, Reply};
 use crate::drawing::{LineType, PagePoint};
+use crate::fixed::BinaryFraction;
 use crate::machine::{Alarm, MachineError, Setting, State, Target};
 use crate::motion::{StepEvent, TICKS_PER_SECOND};
-use crate::protocol::{GCode, RealTime, Refusal};
+use crate::protocol::{GCode, HELP, RealTime, Refusal};
 use crate::step::{Arc, Chords, Line};
+use core::fmt;
 
 /// A line that is being carried out.
 #[derive(Debug)]
@@ -20,6 +22,16 @@ pub(super) enum Task {
     Pause,
     /// Looks for the switches.
     Home,
+    /// Writes a list, from this line on.
+    List(Listing, usize),
+}
+
+/// A list of many lines.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Listing {
+    Help,
+    Settings,
+    Options,
 }
 
 /// How far [`Inner::proceed`] came.
@@ -83,6 +95,16 @@ impl Inner<'_> {
 
     /// Goes on with the line in work.
     pub(super) fn proceed<B: Board>(&mut self, board: &mut B) -> Progress {
+        if let Some(Task::List(listing, number)) = &mut self.task {
+            // A line takes up to 10 ms: the queue of steps is filled after each.
+            let (listing, this) = (*listing, *number);
+            *number += 1;
+            if self.list(listing, this, board) {
+                return Progress::More;
+            }
+            self.task = None;
+            return Progress::Done(Ok(()));
+        }
         let progress = match self.machine.state() {
             State::Alarm(_) | State::Sleep => Progress::Done(Err(Refusal::Locked)),
             State::Abort => Progress::Done(Err(Refusal::Aborted)),
@@ -121,6 +143,34 @@ impl Inner<'_> {
             Some(_) => Ok(Progress::Waits),
             None => Ok(Progress::Done(Ok(()))),
         }
+    }
+
+    /// Writes one line of a list; `false` past its end.
+    fn list<B: Board>(&self, listing: Listing, number: usize, board: &mut B) -> bool {
+        let mut lines = 0;
+        let mut line = |text: fmt::Arguments<'_>| {
+            if lines == number {
+                Reply(board).line(text);
+            }
+            lines += 1;
+        };
+        match listing {
+            Listing::Help => {
+                for (usage, meaning) in HELP {
+                    line(format_args!("[HLP:{usage} {meaning}]"));
+                }
+            }
+            Listing::Settings => {
+                for (info, value) in self.machine.settings().iter() {
+                    let (number, name, unit) = (info.number, info.name, info.unit);
+                    let units = value.to_bits().into();
+                    let value = BinaryFraction { units, fraction_bits: 16, places: 3 };
+                    line(format_args!("${number}={value} ({name}, {unit})"));
+                }
+            }
+            Listing::Options => self.options.list(line),
+        }
+        number < lines
     }
 
     #[inline(never)] // Its frame must not lie under the stages'.
