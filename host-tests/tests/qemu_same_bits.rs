@@ -3,7 +3,9 @@
 #![cfg(feature = "emulator")]
 
 use penup::plotter::{Lm3s6965Memory, NO_MOVES};
-use penup_client::emulator::{Emulator, Machine, MachineEventKind, Options, image_path};
+use penup_client::emulator::{
+    EmulatedBoard, Emulator, Machine, MachineEventKind, Options, image_path,
+};
 use penup_host_tests::whole_jobs::{Bench, job_lines, machine_events};
 use std::error::Error;
 use std::time::Duration;
