@@ -141,6 +141,8 @@ pub struct Steps {
     /// As [`flips`] and [`PulserState::pulse_ticks`], which hold while anything moves.
     flips: u32,
     pulse_ticks: u32,
+    /// What a pulse at each of the levels adds to x (in the lower half) and to y.
+    moves: [u32; LEVELS as usize + 1],
     /// The pins' levels after the last word.
     levels: u32,
     /// The sum of the words counted so far; all wrap.
@@ -202,6 +204,7 @@ pub fn set_up(nvic: &mut NVIC) -> Steps {
         room: 0,
         flips: 0,
         pulse_ticks: 0,
+        moves: [0; LEVELS as usize + 1],
         levels: RELEASED,
         taken: 0,
         x: 0,
@@ -290,7 +293,14 @@ impl Steps {
 
     /// Takes the settings over; they change only while nothing moves.
     fn configure(&mut self) {
-        self.flips = flips();
+        let flips = flips();
+        if flips != self.flips {
+            self.flips = flips;
+            for (levels, packed) in (0..).zip(&mut self.moves) {
+                let (dx, dy) = StepEvent::from_bits(levels ^ flips).step();
+                *packed = dx.wrapping_add(dy << 16).cast_unsigned();
+            }
+        }
         let pulse_ticks = STATE.pulse_ticks();
         if pulse_ticks != self.pulse_ticks {
             self.pulse_ticks = pulse_ticks;
@@ -298,27 +308,36 @@ impl Steps {
         }
     }
 
+    /// 20 cycles a word.
+    #[inline(never)] // On its own it stays in the core's registers.
     fn count_to(&mut self, taken: u32) {
-        let flips = self.flips;
-        let pulse_ticks = self.pulse_ticks + PULSE_TICKS;
-        let (mut x, mut y, mut ticks) = (self.x, self.y, self.ticks);
-        let mut counted = self.taken;
+        let count = taken.wrapping_sub(self.taken);
         // A word on its way may be counted a moment early, so the count may seem to go back.
-        while taken.wrapping_sub(counted).cast_signed() > 0 {
-            let word = place(counted).load(Ordering::Relaxed);
-            counted = counted.wrapping_add(1);
+        if count > WORDS {
+            return;
+        }
+        let (mut steps, mut ticks, mut waits, mut pens) = (0u32, 0u32, 0, 0);
+        for number in 0..count {
+            let word = place(self.taken.wrapping_add(number)).load(Ordering::Relaxed);
             ticks = ticks.wrapping_add(word >> 8);
-            if word & TARGETS == target::PULSE {
-                let (dx, dy) = StepEvent::from_bits((word ^ flips) & LEVELS).step();
-                x = x.wrapping_add(dx);
-                y = y.wrapping_add(dy);
-                ticks = ticks.wrapping_add(pulse_ticks);
+            if word & PULSES != 0 {
+                steps = steps.wrapping_add(self.moves[(word & LEVELS) as usize]);
+            } else if word & TARGETS == target::MOVE_PEN {
+                pens += 1;
             } else {
-                let moves_pen = word & TARGETS == target::MOVE_PEN;
-                ticks = ticks.wrapping_add(if moves_pen { PEN_TICKS } else { WAIT_TICKS });
+                waits += 1;
             }
         }
-        (self.x, self.y, self.ticks, self.taken) = (x, y, ticks, counted);
+        let pulses = count - waits - pens;
+        let beyond =
+            waits * WAIT_TICKS + pens * PEN_TICKS + pulses * (PULSE_TICKS + self.pulse_ticks);
+        self.ticks = self.ticks.wrapping_add(ticks).wrapping_add(beyond);
+        // Each within ±2^11, so the halves part again.
+        let dx = i32::from(steps as u16 as i16);
+        let dy = steps.wrapping_sub(dx.cast_unsigned()).cast_signed() >> 16;
+        self.x = self.x.wrapping_add(dx);
+        self.y = self.y.wrapping_add(dy);
+        self.taken = taken;
     }
 
     /// Stops at once, and forgets what waits.
@@ -385,11 +404,39 @@ impl EventQueue for Steps {
         let count = event.ticks().saturating_sub(beyond);
         place(self.written).store(word | count << 8, Ordering::Relaxed);
         self.written = self.written.wrapping_add(1);
+        self.publish();
+        Ok(())
+    }
+
+    /// 15 cycles a step.
+    fn push_steps(&mut self, steps: &[StepEvent]) -> Result<(), StepEvent> {
+        let count = steps.len() as u32;
+        let Some(room) = self.room.checked_sub(count) else {
+            return steps.iter().try_for_each(|&step| self.push(step));
+        };
+        let beyond = (PULSE_TICKS + self.pulse_ticks) << 8;
+        let flips = self.flips | target::PULSE;
+        let mut word = self.levels;
+        for (number, step) in (0u32..).zip(steps) {
+            word = (step.to_bits() ^ flips).wrapping_sub(beyond);
+            place(self.written.wrapping_add(number)).store(word, Ordering::Relaxed);
+        }
+        self.room = room;
+        self.written = self.written.wrapping_add(count);
+        self.levels = word & LEVELS & !PULSES;
+        self.moving = true;
+        self.publish();
+        Ok(())
+    }
+}
+
+impl Steps {
+    /// Shows the words to the channel; lets them begin if they are many.
+    fn publish(&mut self) {
         WRITTEN.store(self.written, Ordering::Release);
         if !FEEDING.load(Ordering::Relaxed) && self.written.wrapping_sub(self.taken) >= WORDS / 2 {
             self.start();
         }
-        Ok(())
     }
 }
 
