@@ -5,7 +5,7 @@ use super::{EventQueue, Limits, StepEvent};
 use crate::step::Direction;
 
 /// As many moves are worked out together: a small core then has registers for each part of the work.
-pub(super) const BATCH: usize = 16;
+pub(super) const BATCH: usize = 32;
 
 /// Builds events. The last one is kept back until the time of the next is known.
 ///
