@@ -1,6 +1,7 @@
 //! Whole jobs on emulated boards, and the same jobs on the host.
 
 use crate::whole_jobs::{Bench, job_lines, machine_events};
+use penup::plotter::{Lm3s6965Memory, NO_MOVES, PicoMemory};
 use penup_client::emulator::{EmulatedBoard, Machine, MachineEventKind};
 use penup_client::machines::Board;
 use std::error::Error;
@@ -8,10 +9,21 @@ use std::time::Duration;
 
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// What the pins of the board of plain memory do in a job.
-pub fn on_the_host(lines: &[String]) -> Vec<MachineEventKind> {
-    let mut bench = Bench::new();
+/// A board of plain memory with the capacities of `board`: memory decides how far the order of
+/// strokes is improved.
+pub fn bench_like(board: Board) -> Bench {
+    let blocks = Box::leak(Box::new(NO_MOVES));
+    let mut bench = Bench::with_memory(match board {
+        Board::Lm3s6965 => Box::leak(Box::new(Lm3s6965Memory::new())).lend(blocks),
+        Board::Pico => Box::leak(Box::new(PicoMemory::new())).lend(blocks),
+    });
     bench.heard();
+    bench
+}
+
+/// What its pins do in a job.
+fn on_the_host(board: Board, lines: &[String]) -> Vec<MachineEventKind> {
+    let mut bench = bench_like(board);
     for line in lines {
         assert_eq!(bench.say(&format!("{line}\n")), "ok\n", "{line}");
     }
@@ -133,7 +145,7 @@ fn job_of(events: &[MachineEventKind]) -> &[MachineEventKind] {
 /// If they are not.
 pub fn compare(board: Board, scene: &str, settings: &[&str]) -> Result<(), Box<dyn Error>> {
     let lines = job_lines(scene, settings);
-    let (host, pins) = (on_the_host(&lines), at_the_pins(board, &lines)?);
+    let (host, pins) = (on_the_host(board, &lines), at_the_pins(board, &lines)?);
     let (host, pins) = (job_of(&host), job_of(&pins));
     assert!(host.len() > 10_000, "{} events are no job", host.len());
     let differs = host.iter().zip(pins).position(|(host, pin)| host != pin);

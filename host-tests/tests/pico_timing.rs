@@ -5,8 +5,8 @@
 use penup::boards::host::{Change, Stamped};
 use penup_client::emulator::Pin;
 use penup_client::machines::Board::Pico;
-use penup_host_tests::emulated_jobs::begin;
-use penup_host_tests::whole_jobs::{Bench, job_lines};
+use penup_host_tests::emulated_jobs::{begin, bench_like};
+use penup_host_tests::whole_jobs::job_lines;
 use std::error::Error;
 use std::time::Duration;
 
@@ -19,7 +19,7 @@ const TICK: Duration = Duration::from_nanos(40);
 const TURN_TICKS: u64 = 2_500;
 
 fn planned(lines: &[String]) -> Vec<Edge> {
-    let mut bench = Bench::new();
+    let mut bench = bench_like(Pico);
     for line in lines {
         bench.say(&format!("{line}\n"));
     }

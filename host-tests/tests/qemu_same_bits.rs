@@ -24,6 +24,12 @@ fn many_parts_with_many_odd_points() -> Result<(), Box<dyn Error>> {
 }
 
 #[test]
+fn a_lattice_of_125_cubes_in_64_kilobytes() -> Result<(), Box<dyn Error>> {
+    let camera = ["$eye=-15.37,-20.71,25.13", "$at=4.5,4.5,4.5", "$up=0,0,1"];
+    compare(Lm3s6965, "lattice5.obj", &[&camera[..], &["$page=40x40", "$margin=2"]].concat())
+}
+
+#[test]
 fn ctrl_x_stops_the_steps_raises_the_pen_and_knows_the_position() -> Result<(), Box<dyn Error>> {
     give_up(Lm3s6965)
 }

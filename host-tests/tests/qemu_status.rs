@@ -8,6 +8,15 @@ use std::time::Duration;
 
 #[test]
 fn a_status_request_waits_less_than_20_ms_while_a_job_is_computed() -> Result<(), Box<dyn Error>> {
+    longest_wait("lattice3.obj", &["$page=60x80", "$margin=5"])
+}
+
+#[test]
+fn and_while_the_largest_job_is_computed() -> Result<(), Box<dyn Error>> {
+    longest_wait("lattice5.obj", &["$eye=-15.37,-20.71,25.13", "$at=4.5,4.5,4.5", "$up=0,0,1"])
+}
+
+fn longest_wait(scene: &str, settings: &[&str]) -> Result<(), Box<dyn Error>> {
     let mut emulator = Emulator::start(&image_path("lm3s6965"), Options::default())?;
     let mut heard = String::new();
     let mut hear = |emulator: &mut Emulator, end: &str| -> Result<String, Box<dyn Error>> {
@@ -23,7 +32,7 @@ fn a_status_request_waits_less_than_20_ms_while_a_job_is_computed() -> Result<()
         Ok(heard.drain(..end).collect())
     };
     hear(&mut emulator, "help]\r\n")?;
-    let lines = job_lines("lattice3.obj", &["$page=60x80", "$margin=5"]);
+    let lines = job_lines(scene, settings);
     let (plot, model) = lines.split_last().ok_or("an empty job")?;
     for line in model {
         emulator.send(format!("{line}\n").as_bytes())?;

@@ -11,8 +11,10 @@ const FINE_LIMIT: i64 = 1 << 29;
 /// leave it by less than 1/4^`HALVINGS` of what they did.
 const HALVINGS: usize = 4;
 
-/// Chord lengths are sought to one part in 2^`SEARCH_BITS`.
-const SEARCH_BITS: u32 = 6;
+/// Lengths are tried that differ by one part in 2^`SAMPLE_BITS`; between the best and the next, chords are
+/// then sought to one part in 2^`SEARCH_BITS`.
+const SAMPLE_BITS: u32 = 4;
+const SEARCH_BITS: u32 = 8;
 
 /// The ends of chords along a spline, in order: where on the curve, and the place in whole units of the
 /// control points. The first is the curve's beginning, the last its end; no two in a row are equal.
@@ -23,8 +25,9 @@ const SEARCH_BITS: u32 = 6;
 /// every vertex is. Two exceptions: a piece that is all within a unit of its beginning is not divided; and
 /// where a curve crosses the near plane, one chord crosses it too.
 ///
-/// Each chord is the longest that can be proved, to a sixty-fourth of its length, and may pass any number
-/// of knots. So there are at most about 3 in 100 more, and one, than the fewest there could be.
+/// Each chord is the longest that can be proved, to a 256th of its length, and may pass any number of
+/// knots. Tried on 10,000 random curves there were at most 5 in 100 more, and one, than the fewest there
+/// could be.
 /// Memory: about 2 KiB of stack.
 #[derive(Debug, Clone)]
 pub struct Chords<'a, F> {
@@ -54,27 +57,66 @@ impl<'a, F: Fn([i64; 3]) -> Option<Fine>> Chords<'a, F> {
 
     /// The longest chord from `from` that can be proved, at most `most` long, at least 1.
     fn longest(&mut self, from: End, most: u32) -> u32 {
-        // `good` is proved, `bad` is not; the search begins with the length of the chord before.
-        let (mut good, mut bad) = (0, None);
-        let mut guess = self.length.clamp(1, most);
-        loop {
+        let mut first = (self.length >> SAMPLE_BITS).clamp(1, most);
+        // `good` is proved, `bad` is not.
+        let (mut good, mut bad) = loop {
+            match self.farthest(from, first, most) {
+                (0, _) if first > 1 => first = (first >> SAMPLE_BITS).max(1),
+                found => break found,
+            }
+        };
+        // A corner is at a knot: knots are tried first, then halves.
+        while good < bad {
+            let guess = match knot_between(from.at.0 + good, from.at.0 + bad) {
+                Some(knot) => knot - from.at.0,
+                None if bad - good <= (good >> SEARCH_BITS).max(1) => break,
+                None => good + (bad - good) / 2,
+            };
             if self.fits(from, Parameter(from.at.0 + guess)) {
                 good = guess;
             } else {
-                bad = Some(guess);
+                bad = guess;
             }
-            guess = match bad {
-                None if good == most => break,
-                None => good.saturating_mul(2).min(most),
-                // A corner is at a knot: knots are tried first, then halves.
-                Some(bad) => match knot_between(from.at.0 + good, from.at.0 + bad) {
-                    Some(knot) => knot - from.at.0,
-                    None if bad - good <= (good >> SEARCH_BITS).max(1) => break,
-                    None => good + (bad - good) / 2,
-                },
-            };
         }
         good.max(1)
+    }
+
+    /// The longest of a series of lengths, from `first` to `most`, that can be proved (0 if none can),
+    /// and the next of the series; the same if that is `most`.
+    ///
+    /// A chord may stay by the curve where shorter ones do not: round a bend, say, and then on. So all
+    /// lengths are tried for which the line of the chord passes near enough to the places before.
+    fn farthest(&mut self, from: End, first: u32, most: u32) -> (u32, u32) {
+        let mut candidates = heapless::Deque::<(u32, u32), 64>::new();
+        let origin = (self.project)(from.place);
+        let mut cone = Cone::ALL;
+        let mut length = first;
+        while !cone.is_empty() {
+            let next = length.saturating_add((length >> SAMPLE_BITS).max(1)).min(most);
+            let place = (self.project)(self.place(Parameter(from.at.0 + length)));
+            let near = match (origin, place) {
+                (Some(origin), Some(place)) => cone.take(origin, place, self.tolerance),
+                // Cut off, both: there is nothing to stay by.
+                (None, None) => true,
+                _ => break,
+            };
+            if near {
+                if candidates.is_full() {
+                    candidates.pop_front();
+                }
+                let _ = candidates.push_back((length, next)); // there is room
+            }
+            if length == most {
+                break;
+            }
+            length = next;
+        }
+        while let Some((length, next)) = candidates.pop_back() {
+            if self.fits(from, Parameter(from.at.0 + length)) {
+                return (length, next);
+            }
+        }
+        (0, first)
     }
 
     /// Whether the curve stays by the chord.
@@ -188,6 +230,59 @@ fn is_within_a_unit(span: &Span, place: [i64; 3]) -> bool {
     span.points().iter().all(near)
 }
 
+/// The directions in which a straight line from one place passes within the tolerance of some others.
+struct Cone {
+    /// Its sides, the second counter-clockwise of the first by less than half a turn, each within
+    /// ±2^30; `None` while every direction is in it.
+    sides: Option<(Fine, Fine)>,
+    empty: bool,
+}
+
+impl Cone {
+    const ALL: Self = Self { sides: None, empty: false };
+
+    fn is_empty(&self) -> bool {
+        self.empty
+    }
+
+    /// Keeps the directions from `origin` that pass within `tolerance` of `place` too. Returns whether
+    /// `place` itself lies in one of them.
+    fn take(&mut self, origin: Fine, place: Fine, tolerance: u16) -> bool {
+        let (origin, place) = (clamped(origin), clamped(place));
+        let away = [place[0] - origin[0], place[1] - origin[1]];
+        let tolerance = i64::from(tolerance);
+        let square = dot(away, away) - tolerance * tolerance;
+        if square > 0 {
+            // The tangents to a circle around the place.
+            let root = square.unsigned_abs().isqrt() as i64;
+            let ahead = [away[0] * root, away[1] * root]; // below 2^61
+            let aside = [-away[1] * tolerance, away[0] * tolerance];
+            let right = shortened([ahead[0] - aside[0], ahead[1] - aside[1]]);
+            let left = shortened([ahead[0] + aside[0], ahead[1] + aside[1]]);
+            let (least, most) = self.sides.unwrap_or((right, left));
+            let within = |side, (least, most)| cross(least, side) >= 0 && cross(side, most) >= 0;
+            let either = |new, old| {
+                if within(new, (least, most)) {
+                    Some(new)
+                } else {
+                    within(old, (right, left)).then_some(old)
+                }
+            };
+            self.sides = either(right, least).zip(either(left, most));
+            self.empty = self.sides.is_none();
+        }
+        let inside = |(least, most)| cross(least, away) >= 0 && cross(away, most) >= 0;
+        !self.empty && self.sides.is_none_or(inside)
+    }
+}
+
+/// The same direction, to 30 bits.
+fn shortened(direction: Fine) -> Fine {
+    let longest = direction[0].unsigned_abs().max(direction[1].unsigned_abs());
+    let excess = (u64::BITS - longest.leading_zeros()).saturating_sub(30);
+    direction.map(|c| c >> excess)
+}
+
 /// All places within the tolerance of a straight line: convex.
 struct Strip {
     from: Fine,
@@ -217,8 +312,7 @@ impl Strip {
         } else if dot(past, self.along) >= 0 {
             dot(past, past) <= square
         } else {
-            let area = away[0] * self.along[1] - away[1] * self.along[0];
-            area.abs() <= self.tolerance * self.length
+            cross(away, self.along).abs() <= self.tolerance * self.length
         }
     }
 }
@@ -230,4 +324,9 @@ fn clamped(place: Fine) -> Fine {
 /// Below 2^61 for components within ±2^30.
 fn dot(a: Fine, b: Fine) -> i64 {
     a[0] * b[0] + a[1] * b[1]
+}
+
+/// Below 2^61, too.
+fn cross(a: Fine, b: Fine) -> i64 {
+    a[0] * b[1] - a[1] * b[0]
 }

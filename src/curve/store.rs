@@ -8,7 +8,7 @@ use super::{
     CurveError, KNOT_LIMIT, Knots, Parameter, Point, Spline, check_interior, check_shape,
     parameter_of,
 };
-use crate::fixed::Decimal;
+use crate::fixed::{Decimal, shift_right_rounding};
 
 /// Why a curve was not taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -177,26 +177,21 @@ impl<'m> CurveStore<'m> {
         &mut self,
         knots: impl Iterator<Item = Decimal> + Clone,
     ) -> Result<(), StoreError> {
-        let in_hand = self.in_hand.as_mut().ok_or(StoreError::NoCurve)?;
+        let in_hand = self.in_hand.ok_or(StoreError::NoCurve)?;
         let before = in_hand.fraction_bits.unwrap_or(FINEST);
         let fraction_bits = (0..=before)
             .rev()
             .find(|bits| knots.clone().all(|knot| in_unit(knot, *bits).is_some()))
             .ok_or(StoreError::TooLarge)?;
+        self.check_room(knots.clone().count())?;
         let start = self.whole + HEADER + in_hand.control_points.div_ceil(2);
-        in_hand.fraction_bits = Some(fraction_bits);
-        self.check_room(knots.clone().count()).inspect_err(|_| {
-            if let Some(in_hand) = &mut self.in_hand {
-                in_hand.fraction_bits = Some(before);
-            }
-        })?;
         for knot in self.words.iter_mut().skip(start) {
-            let finer: i32 = bytemuck::cast(*knot);
-            let coarser = crate::fixed::shift_right_rounding(finer, before - fraction_bits);
+            let coarser = shift_right_rounding(bytemuck::cast(*knot), before - fraction_bits);
             *knot = bytemuck::cast(coarser);
         }
         let words = knots.filter_map(|knot| in_unit(knot, fraction_bits)).map(|k| k as u32);
         self.words.extend(words);
+        self.in_hand = Some(InHand { fraction_bits: Some(fraction_bits), ..in_hand });
         Ok(())
     }
 

@@ -176,6 +176,10 @@ fn points_in_line_give_one_chord() {
     for order in LEAST_ORDER..=GREATEST_ORDER {
         assert_eq!(chord_ends(&uniform(&points, &control, order), 1).len(), 2, "order {order}");
     }
+    // Past a double knot too.
+    let knots: Vec<i32> = (0..43).map(|knot| knot / 2).collect();
+    let doubled = Spline::new(&points, &control, 3, Knots::Listed(&knots)).unwrap();
+    assert_eq!(chord_ends(&doubled, 1).len(), 2);
     // All at one place, and there and back along a line.
     let still = [0u16; 9];
     assert_eq!(chord_ends(&uniform(&points, &still, 4), 1), [[0; 3]]);

@@ -10,13 +10,16 @@ use crate::model::{Element, Model, ModelError};
 use crate::order::{self, Leg, OrderError};
 use crate::protocol::{HiddenLines, Refusal, WayToSee};
 use crate::stage::{Aborted, Attention, OutOfScratch, Scratch, Stage, items, items_mut};
-use crate::view::{Seen, View, see};
+use crate::view::{SeeError, Seen, View, see};
 use crate::visibility::{self, Scene, SinkFull, Stretch, StretchSink, VisibilityError};
 
 /// Who is shown each stretch as it is found, in view coordinates: the preview.
 pub trait Observer {
     /// One stretch, seen through `view`.
     fn stretch(&mut self, view: &View, stretch: &Stretch);
+
+    /// What was shown so far counts no more: the job begins again in other memory.
+    fn start_again(&mut self) {}
 
     /// One bar of a plan, as it lies on the page.
     fn plan_bar(&mut self, from: [f64; 2], to: [f64; 2]);
@@ -185,6 +188,9 @@ fn lay_out_plan(
 /// These take some 100,000 instructions.
 const CORNERS_BETWEEN_CHECKS: usize = 128;
 
+/// Of lines for each corner: a lattice of cubes shows half of its edges, and has two corners to an edge.
+const LIKELY_BYTES: usize = size_of::<Line>() / 3;
+
 /// What stands in the memory after the hidden lines are found.
 struct Found {
     lines: usize,
@@ -207,8 +213,7 @@ fn project(
     attention.check()?;
     let view = View::new(&camera, model).map_err(Refusal::View)?;
     attention.check()?;
-    let Seen { vertices, elements, degenerate_faces } =
-        see(&view, model, &mut scratch).map_err(Refusal::DrawingTooLarge)?;
+    let Seen { vertices, elements, degenerate_faces } = see(&view, model, &mut scratch, attention)?;
     if !options.clip_behind {
         view.refuse_behind(model).map_err(Refusal::View)?;
     }
@@ -226,40 +231,57 @@ fn project(
     attention.enter(Stage::Visibility);
     let positions = bytemuck::cast_slice(model.vertices());
     let scene = Scene { vertices, elements, projection, positions };
-    // Memory: what is taken, then visibility's, then the lines as they are found. A quarter of what
-    // visibility does not need makes its grid finer.
+    // Memory: what is taken, then visibility's, then the lines as they are found. Thrice what visibility
+    // needs makes a grid as fine as is of any use; lines that are likely come before that. If
+    // there turn out to be more, a quarter of what is to spare must do for the grid.
     let available = scratch.available_bytes();
     let needed = visibility::scratch_bytes(&scene);
     let spare = available.checked_sub(needed).ok_or(OutOfScratch { needed, available });
-    let stage_bytes = needed + spare.map_err(Refusal::DrawingTooLarge)? / 4;
-    let (stage_memory, mut line_memory) = scratch.split(stage_bytes);
-    let lines_at = (total - line_memory.available_bytes()) / size_of::<u64>();
-    let room = line_memory.available_bytes() / size_of::<Line>();
-    let lines = line_memory.take(room).map_err(Refusal::DrawingTooLarge)?;
-    let collector = Collector { lines, count: 0 };
-    let mut sink = PageSink { collector, map, view, hidden: options.hidden, observer };
+    let spare = spare.map_err(Refusal::DrawingTooLarge)?;
     let wanted = options.visibility(&view);
-    let found = if options.see == WayToSee::Wire {
-        visibility::follow_wire(&scene, wanted, stage_memory, attention, &mut sink)
-    } else {
-        visibility::find_stretches(&scene, wanted, stage_memory, attention, &mut sink).map(|_| ())
-    };
-    let lines = match found {
-        Ok(()) => sink.collector.count,
-        Err(VisibilityError::SinkFull) => return Err(sink.collector.out_of_memory()),
-        Err(VisibilityError::Scratch(missing)) => return Err(Refusal::DrawingTooLarge(missing)),
-        Err(VisibilityError::Aborted) => return Err(Refusal::Aborted),
-        // The model and the view see to it that neither can be.
-        Err(VisibilityError::UnknownVertex(_) | VisibilityError::OutOfRange(_)) => {
-            return Err(Refusal::NothingToPlot);
+    let likely = elements.corners().len() * LIKELY_BYTES * if wanted.with_hidden { 2 } else { 1 };
+    let grids = [(3 * needed).min(spare.saturating_sub(likely).max(spare / 4)), spare / 4];
+    let mut lines = Err(Refusal::NothingToPlot);
+    for (at, grid) in grids.iter().enumerate() {
+        let (stage_memory, mut line_memory) = scratch.reborrow().split(needed + grid);
+        let lines_at = (total - line_memory.available_bytes()) / size_of::<u64>();
+        let room = line_memory.available_bytes() / size_of::<Line>();
+        let collected = line_memory.take(room).map_err(Refusal::DrawingTooLarge)?;
+        let collector = Collector { lines: collected, count: 0 };
+        let mut sink = PageSink { collector, map, view, hidden: options.hidden, observer };
+        let found = if options.see == WayToSee::Wire {
+            visibility::follow_wire(&scene, wanted, stage_memory, attention, &mut sink)
+        } else {
+            visibility::find_stretches(&scene, wanted, stage_memory, attention, &mut sink)
+                .map(|_| ())
+        };
+        lines = match found {
+            Ok(()) => Ok((lines_at, sink.collector.count)),
+            Err(VisibilityError::SinkFull) => Err(sink.collector.out_of_memory()),
+            Err(error) => Err(refused(error, elements.corners().len())),
+        };
+        if found != Err(VisibilityError::SinkFull) || grids[0] <= grids[1] || at > 0 {
+            break;
         }
-        Err(VisibilityError::TooManyCorners(limit)) => {
-            let needed = elements.corners().len();
-            return Err(Refusal::Model(ModelError::TooManyCorners { limit, needed }));
-        }
-    };
+        sink.observer.start_again();
+    }
+    let (lines_at, lines) = lines?;
     to_front(words, lines_at, lines);
     Ok(Found { lines, degenerate_faces })
+}
+
+fn refused(error: VisibilityError, corners: usize) -> Refusal {
+    match error {
+        VisibilityError::Scratch(missing) => Refusal::DrawingTooLarge(missing),
+        VisibilityError::Aborted => Refusal::Aborted,
+        VisibilityError::TooManyCorners(limit) => {
+            Refusal::Model(ModelError::TooManyCorners { limit, needed: corners })
+        }
+        // The model and the view see to it that neither of the first two can be; the sink speaks for itself.
+        VisibilityError::UnknownVertex(_)
+        | VisibilityError::OutOfRange(_)
+        | VisibilityError::SinkFull => Refusal::NothingToPlot,
+    }
 }
 
 /// The bounds of both.
@@ -276,6 +298,15 @@ pub(super) fn to_front(words: &mut [u64], at: usize, count: usize) {
 impl From<Aborted> for Refusal {
     fn from(_: Aborted) -> Self {
         Self::Aborted
+    }
+}
+
+impl From<SeeError> for Refusal {
+    fn from(error: SeeError) -> Self {
+        match error {
+            SeeError::Scratch(missing) => Self::DrawingTooLarge(missing),
+            SeeError::Aborted => Self::Aborted,
+        }
     }
 }
 

@@ -14,7 +14,7 @@ mod clip;
 mod tidy;
 
 pub use camera::{Camera, Direction, Lens, Sight, SightLines};
-pub use clip::{Seen, distinct_edges, see};
+pub use clip::{SeeError, Seen, distinct_edges, see};
 
 use crate::geometry::{COORDINATE_LIMIT, Projection, Vertex};
 use crate::model::{Model, Position};

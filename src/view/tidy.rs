@@ -1,7 +1,8 @@
 //! What modellers leave behind: vertices at the same place made one, faces without an area left out.
 
 use crate::model::{Corner, Element, Elements, Model, Position};
-use crate::stage::{OutOfScratch, Scratch};
+use crate::stage::{Attention, OutOfScratch, Scratch};
+use crate::view::SeeError;
 
 /// The elements of the model with each vertex replaced by the first one at the same place, without the faces that
 /// have no area, and how many those are. The model's own elements if there is nothing to do. Other faces may
@@ -11,15 +12,19 @@ use crate::stage::{OutOfScratch, Scratch};
 pub(super) fn tidy<'a>(
     model: &'a Model<'_>,
     scratch: &mut Scratch<'a>,
-) -> Result<(Elements<'a>, u32), OutOfScratch> {
+    attention: &mut dyn Attention,
+) -> Result<(Elements<'a>, u32), SeeError> {
     let positions = model.vertices();
     let elements = model.elements();
     let degenerate = elements.iter().filter(|element| !has_extent(element, positions)).count();
+    attention.check()?;
     if degenerate == 0 && Places::new(positions, &mut scratch.reborrow())?.1 == 0 {
         return Ok((elements, 0));
     }
     let corners: &mut [Corner] = scratch.take(elements.corners().len())?;
+    attention.check()?;
     let (places, _) = Places::new(positions, &mut scratch.reborrow())?;
+    attention.check()?;
     let mut kept = 0;
     for element in elements.iter().filter(|element| has_extent(element, positions)) {
         let bar;
@@ -117,6 +122,7 @@ fn hash(position: &Position) -> u32 {
 mod tests {
     use super::*;
     use crate::fixed::Decimal;
+    use crate::stage::Undisturbed;
     use std::vec::Vec;
 
     fn decimals(place: [&str; 3]) -> [Decimal; 3] {
@@ -137,7 +143,7 @@ mod tests {
             }
         }
         let mut words = [0; 64];
-        let (elements, _) = tidy(&model, &mut Scratch::new(&mut words)).unwrap();
+        let (elements, _) = tidy(&model, &mut Scratch::new(&mut words), &mut Undisturbed).unwrap();
         elements.corners().iter().map(|c| (c.vertex(), c.of_bar(), c.is_last())).collect()
     }
 
@@ -176,11 +182,11 @@ mod tests {
         model.add_face([1, 2, 3].into_iter()).unwrap();
         let mut words = [0; 2];
         let mut scratch = Scratch::new(&mut words);
-        let (elements, degenerate) = tidy(&model, &mut scratch).unwrap();
+        let (elements, degenerate) = tidy(&model, &mut scratch, &mut Undisturbed).unwrap();
         assert_eq!(degenerate, 0);
         assert!(core::ptr::eq(elements.corners(), model.elements().corners()));
         assert_eq!(scratch.available_bytes(), 16);
-        assert!(tidy(&model, &mut Scratch::new(&mut [0])).is_err());
+        assert!(tidy(&model, &mut Scratch::new(&mut [0]), &mut Undisturbed).is_err());
     }
 
     #[test]
