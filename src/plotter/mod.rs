@@ -6,6 +6,7 @@
 //! to the machine. This is the only module that knows all the others.
 
 mod board;
+pub mod budget;
 mod job;
 mod memory;
 mod options;
