@@ -22,3 +22,4 @@ pub mod sender;
 pub mod source;
 
 pub mod fit;
+pub mod watch;
