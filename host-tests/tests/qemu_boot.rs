@@ -6,7 +6,7 @@ use std::io;
 use std::time::Duration;
 
 use penup_client::emulator::{
-    Emulator, Machine, MachineEvent, MachineEventKind, Options, image_path,
+    EmulatedBoard, Emulator, Machine, MachineEvent, MachineEventKind, Options, image_path,
 };
 
 type TestResult = Result<(), Box<dyn Error>>;

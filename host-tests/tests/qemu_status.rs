@@ -1,7 +1,7 @@
 //! The line is answered while a hidden-line job is computed: `?` within 20 ms of the board's time.
 #![cfg(feature = "emulator")]
 
-use penup_client::emulator::{Emulator, Options, image_path};
+use penup_client::emulator::{EmulatedBoard, Emulator, Options, image_path};
 use penup_host_tests::whole_jobs::job_lines;
 use std::error::Error;
 use std::time::Duration;

@@ -2,6 +2,7 @@
 
 use super::{PathLength, SLICE_TICKS, SliceSpeed, StepEvent, TICKS_PER_SECOND};
 use crate::fixed::Millimetres;
+use core::ops::RangeInclusive;
 
 /// What the user sets, each positive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -94,7 +95,9 @@ impl Limits {
     /// See [`LimitsError`].
     pub fn new(settings: &MotionSettings) -> Result<Self, LimitsError> {
         let axis = |steps_per_mm: Millimetres| {
-            if steps_per_mm < 2 || steps_per_mm > 4000 {
+            const RANGE: RangeInclusive<Millimetres> =
+                Millimetres::lit("2")..=Millimetres::lit("4000");
+            if !RANGE.contains(&steps_per_mm) {
                 return Err(LimitsError::StepsPerMillimetre);
             }
             // 2^32 / (bits / 2^16), at most 2^31.
@@ -167,6 +170,13 @@ impl Limits {
         let squared = (twice * u64::from(stopping_distance.to_bits())).saturating_mul(1 << 14);
         // The root of 64 bits has 32.
         SliceSpeed::from_bits(squared.isqrt() as u32)
+    }
+
+    /// The stopping distance of a speed in mm/min: what bounds a block to it. Not less than can be
+    /// told from standing (at 800 mm/s², 5 mm/min).
+    pub fn feed(&self, mm_per_min: Millimetres) -> PathLength {
+        let speed = slice_speed(mm_per_min.max(Millimetres::DELTA)).unwrap_or(SliceSpeed::DELTA);
+        self.stopping_distance(speed).max(PathLength::DELTA)
     }
 
     /// The length of a move by (`dx`, `dy`) steps, each within ±2^22; `None` beyond 16 m.

@@ -1,7 +1,9 @@
 //! Changes of the model over the line, listed and taken back.
 
+use super::stream::{Listing, Task};
 use super::{Board, Inner, Reply};
 use crate::fixed::BinaryFraction;
+use crate::machine::State;
 use crate::model::{Change, Edit, Element, Numbers, Part};
 use crate::protocol::Refusal;
 use crate::stage::Scratch;
@@ -10,7 +12,7 @@ use core::fmt;
 impl Inner<'_> {
     /// Copies the model to the working memory, if that is idle, before it is changed.
     pub(super) fn remember(&mut self) {
-        if self.is_idle() {
+        if self.machine.state() == State::Idle {
             self.job.release();
             self.can_undo = self.model.save(self.words);
         }
@@ -18,7 +20,7 @@ impl Inner<'_> {
 
     #[inline(never)] // Its frame must not lie under the stages'.
     pub(super) fn edit<B: Board>(&mut self, edit: Edit, board: &mut B) -> Result<(), Refusal> {
-        if !self.is_idle() {
+        if self.machine.state() != State::Idle {
             return Err(Refusal::Busy);
         }
         // The copy stands at the front; the edit works behind it.
@@ -47,57 +49,47 @@ impl Inner<'_> {
         Ok(())
     }
 
-    #[inline(never)] // Its frame must not lie under the stages'.
-    pub(super) fn list<B: Board>(
-        &self,
-        part: Part,
-        numbers: Numbers,
-        board: &mut B,
-    ) -> Result<(), Refusal> {
+    /// Begins to list what has these numbers.
+    pub(super) fn begin_list(&mut self, part: Part, numbers: Numbers) -> Result<(), Refusal> {
         let range = self.model.range(part, numbers).map_err(Refusal::Model)?;
+        self.task = Some(Task::List(Listing::Model(part, range.end), range.start));
+        Ok(())
+    }
+
+    /// Lists the element at a place in its array.
+    #[inline(never)] // Its frame must not lie under the stages'.
+    pub(super) fn list_one<B: Board>(&self, part: Part, at: usize, board: &mut B) {
         let mut reply = Reply(board);
-        let (first, count) = (range.start, range.len());
-        let bits = self.model.fraction_bits();
-        let coordinate =
-            |c: i32| BinaryFraction { units: c.into(), fraction_bits: bits, places: 6 };
-        let elements = self.model.elements();
+        let number = at + 1;
+        let elements = self.model.elements().iter();
         match part {
             Part::Vertices => {
-                let vertices = self.model.vertices().iter().enumerate();
-                for (at, vertex) in vertices.skip(first).take(count) {
-                    let [x, y, z] = vertex.coordinates().map(coordinate);
-                    reply.line(format_args!("[v {}: {x} {y} {z}]", at + 1));
-                }
+                let Some(vertex) = self.model.vertices().get(at) else { return };
+                let fraction_bits = self.model.fraction_bits();
+                let [x, y, z] = vertex.coordinates().map(|c| BinaryFraction {
+                    units: c.into(),
+                    fraction_bits,
+                    places: 6,
+                });
+                reply.line(format_args!("[v {number}: {x} {y} {z}]"));
             }
             Part::Bars => {
-                let bars = elements.iter().filter_map(|element| match element {
-                    Element::Bar(from, to) => Some([from, to]),
-                    Element::Face(_) => None,
-                });
-                for (at, ends) in bars.enumerate().skip(first).take(count) {
-                    reply.line(format_args!("[l {}:{}]", at + 1, List(ends.iter().copied())));
-                }
+                let mut bars = elements.filter(|element| matches!(element, Element::Bar(..)));
+                let Some(Element::Bar(from, to)) = bars.nth(at) else { return };
+                reply.line(format_args!("[l {number}:{}]", List([from, to].into_iter())));
             }
             Part::Faces => {
-                let faces = elements.iter().filter_map(|element| match element {
-                    Element::Face(corners) => Some(corners),
-                    Element::Bar(..) => None,
-                });
-                for (at, corners) in faces.enumerate().skip(first).take(count) {
-                    let numbers = List(corners.iter().map(|corner| corner.vertex()));
-                    reply.line(format_args!("[f {}:{numbers}]", at + 1));
-                }
+                let mut faces = elements.filter(|face| matches!(face, Element::Face(_)));
+                let Some(Element::Face(corners)) = faces.nth(at) else { return };
+                let numbers = List(corners.iter().map(|corner| corner.vertex()));
+                reply.line(format_args!("[f {number}:{numbers}]"));
             }
             Part::Curves => {
-                let curves = self.model.curves();
-                for (at, curve) in curves.iter().enumerate().skip(first).take(count) {
-                    let numbers = List(curve.control.iter().copied());
-                    let degree = curve.order - 1;
-                    reply.line(format_args!("[c {} of degree {degree}:{numbers}]", at + 1));
-                }
+                let Some(curve) = self.model.curves().iter().nth(at) else { return };
+                let numbers = List(curve.control.iter().copied());
+                reply.line(format_args!("[c {number} of degree {}:{numbers}]", curve.order - 1));
             }
         }
-        Ok(())
     }
 }
 

@@ -1,6 +1,6 @@
 //! Lines to typed commands.
 
-use super::Refusal;
+use super::{GCode, Refusal};
 use crate::curve::CurveError;
 use crate::fixed::{Decimal, Millimetres};
 use crate::model::{self, Edit, ModelError, Part};
@@ -61,6 +61,16 @@ pub enum Command<'a> {
     Plot,
     /// `$X`
     Unlock,
+    /// `$H`
+    Home,
+    /// `$C`
+    Check,
+    /// `$SLP`
+    Sleep,
+    /// `$J=…`: a move by hand.
+    Jog(GCode<'a>),
+    /// `G…`, `M…`, `X…`
+    GCode(GCode<'a>),
 }
 
 /// What is drawn, and how.
@@ -244,6 +254,13 @@ pub const HELP: &[(&str, &str)] = &[
     ("$undo", "take back the last change of the model, unless a plot came after"),
     ("$plot", "draw it"),
     ("$X", "unlock after an alarm"),
+    ("$H", "find the limit switches"),
+    ("$J=G91 X.. Y.. F..", "move by hand with the pen up; byte 0x85 ends it"),
+    ("$C", "begin or end to check only: nothing moves"),
+    ("$SLP", "switch the motors off; $X wakes"),
+    ("G0 G1 G2 G3 G4 G20 G21 G28 G90 G91", "move, arc, wait, inches, mm, park, absolute, relative"),
+    ("X.. Y.. I.. J.. R.. P.. F.. Z..", "numbers of the former; Z0 and below is pen down"),
+    ("M0 M2 M3 M5", "pause until ~, end, pen down, pen up"),
 ];
 
 impl<'a> Command<'a> {
@@ -262,6 +279,9 @@ impl<'a> Command<'a> {
         let line = line.split('#').next().unwrap_or("").trim();
         if let Some(dollar) = line.strip_prefix('$') {
             return Self::parse_dollar(dollar.trim());
+        }
+        if GCode::begins(line) {
+            return GCode::new(line).map(Self::GCode);
         }
         let (keyword, rest) = split_word(line);
         match keyword {
@@ -304,6 +324,9 @@ impl<'a> Command<'a> {
             if let Some(command) = parse_edit(name, value)? {
                 return Ok(command);
             }
+            if name == "J" {
+                return GCode::new(value).map(Self::Jog);
+            }
             return match PlotOption::parse(name, value)? {
                 Some(option) => Ok(Self::Option(option)),
                 None => Ok(Self::Setting { name, value }),
@@ -314,6 +337,9 @@ impl<'a> Command<'a> {
             "$" => Ok(Self::Settings),
             "I" => Ok(Self::BuildInfo),
             "X" => Ok(Self::Unlock),
+            "H" => Ok(Self::Home),
+            "C" => Ok(Self::Check),
+            "SLP" => Ok(Self::Sleep),
             "options" => Ok(Self::Options),
             "model" => Ok(Self::Model),
             "clear" => Ok(Self::Clear),

@@ -4,9 +4,10 @@ use crate::convex::SolidError;
 use crate::curve::CurveError;
 use crate::drawing::PageError;
 use crate::fixed::BinaryFraction;
-use crate::machine::{MachineError, SettingError};
+use crate::machine::{MachineError, SettingError, Value};
 use crate::model::{ModelError, Part};
 use crate::stage::OutOfScratch;
+use crate::step::ArcError;
 use crate::view::ViewError;
 use core::fmt;
 
@@ -22,6 +23,8 @@ pub enum Refusal {
     NotANumber,
     /// No `$` command has this name.
     UnknownSystemCommand,
+    /// `$H` without limit switches.
+    HomingOff,
     /// The command needs an idle plotter.
     Busy,
     /// The plotter is in alarm.
@@ -35,6 +38,10 @@ pub enum Refusal {
     NotText,
     /// Bytes were lost because the sender did not wait.
     BytesLost,
+    /// G-code with this letter, or its number, that is not known.
+    UnsupportedWord(u8),
+    /// There is no such arc.
+    Arc(ArcError),
     /// A number past what can be stored.
     NumberOutOfRange,
     /// Too few or too many numbers.
@@ -80,10 +87,13 @@ pub const MEANINGS: &[(u16, &str)] = &[
     (1, "unknown command"),
     (2, "not a number"),
     (3, "unknown $ command"),
+    (5, "homing is off"),
     (8, "the plotter is busy"),
     (9, "locked after an alarm"),
     (11, "line too long"),
     (15, "beyond the travel"),
+    (20, "unsupported G-code"),
+    (33, "no such arc"),
     (100, "line is not text"),
     (101, "bytes were lost: wait for each reply"),
     (102, "number out of range"),
@@ -127,9 +137,12 @@ impl Refusal {
             Self::UnknownCommand => 1,
             Self::NotANumber => 2,
             Self::UnknownSystemCommand => 3,
+            Self::HomingOff => 5,
             Self::Busy => 8,
             Self::Locked => 9,
             Self::LineTooLong { .. } => 11,
+            Self::UnsupportedWord(_) => 20,
+            Self::Arc(_) => 33,
             Self::NotText => 100,
             Self::BytesLost => 101,
             Self::NumberOutOfRange => 102,
@@ -181,10 +194,17 @@ impl fmt::Display for Refusal {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::UnknownCommand => formatter.write_str(
-                "a line begins with v, f, l, another OBJ keyword, or $; $ lists the commands",
+                "a line begins with v, f, l, another OBJ keyword, G-code, or $; $ lists the commands",
             ),
             Self::NotANumber => formatter.write_str("a number is written like -12.5 or 3e-2"),
             Self::UnknownSystemCommand => formatter.write_str("$ lists the commands"),
+            Self::HomingOff => formatter.write_str("connect limit switches, then set $22=1"),
+            Self::UnsupportedWord(letter) => {
+                write!(formatter, "this word {} is not known here", char::from(*letter))
+            }
+            Self::Arc(_) => formatter.write_str(
+                "both ends of an arc are as far from its centre, within 4 m; x and y have the same steps",
+            ),
             Self::Busy => formatter.write_str("wait for the plot to end, or send ctrl-X"),
             Self::Locked => formatter.write_str("send $X to unlock"),
             Self::LineTooLong { limit } => write!(formatter, "a line has at most {limit} bytes"),
@@ -361,9 +381,16 @@ fn write_machine_error(formatter: &mut fmt::Formatter<'_>, error: &MachineError)
     match error {
         MachineError::State(_) => formatter.write_str("wait for the plot to end, or send ctrl-X"),
         MachineError::BeyondTravel { x, y, .. } => {
+            let mm = |value: &Value| BinaryFraction {
+                units: value.to_bits().into(),
+                fraction_bits: 16,
+                places: 3,
+            };
             write!(
                 formatter,
-                "it would go {x},{y} steps beyond the travel: choose a smaller $page, or set $130 and $131"
+                "it would go {},{} mm beyond the travel: choose a smaller $page, or set $130 and $131",
+                mm(x),
+                mm(y)
             )
         }
         MachineError::MoveTooLong { .. } => {
