@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use std::{env, fs, io};
 
 /// Every board: its cargo feature, and the name of its map in `boards/`.
-const BOARDS: [&str; 2] = ["lm3s6965", "pico"];
+const BOARDS: [&str; 3] = ["lm3s6965", "pico", "mps2"];
 
 fn main() -> io::Result<()> {
     println!("cargo::rerun-if-changed=build.rs");
@@ -26,8 +26,11 @@ fn main() -> io::Result<()> {
     let out_dir = PathBuf::from(env::var_os("OUT_DIR").unwrap_or_default());
     fs::copy(format!("boards/{board}.x"), out_dir.join("board.x"))?;
     println!("cargo::rustc-link-search={}", out_dir.display());
-    println!("cargo::rustc-link-arg-bin=firmware=-Tlink.x");
-    println!("cargo::rustc-link-arg-bin=firmware=-Tdefmt.x");
-    println!("cargo::rustc-link-arg-bin=firmware=--nmagic");
+    let binary = if board == "mps2" { "bench" } else { "firmware" };
+    println!("cargo::rustc-link-arg-bin={binary}=-Tlink.x");
+    println!("cargo::rustc-link-arg-bin={binary}=--nmagic");
+    if board != "mps2" {
+        println!("cargo::rustc-link-arg-bin={binary}=-Tdefmt.x");
+    }
     Ok(())
 }

@@ -7,6 +7,7 @@ use crate::error::Error;
 use crate::job::{JobResult, Lengths, Timings};
 use crate::link::Link;
 use crate::machines::PreviewPlotter;
+use crate::protocol::PLOT;
 use penup::boards::host::{Change, HostBoard, QUEUE_LENGTH, lend_memory};
 use penup::geometry::{Projection, Vertex};
 use penup::machine::{Path, PulserState, Setting, Target};
@@ -53,6 +54,9 @@ impl Default for InMemory {
 
 impl Link for InMemory {
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        if bytes.starts_with(PLOT.as_bytes()) {
+            self.steps = 0;
+        }
         self.board.receive(bytes);
         self.answer();
         Ok(())
@@ -165,6 +169,10 @@ impl Observer for Segments {
             let [[x1, y1], [x2, y2]] = [stretch.from, stretch.to].map(|end| image(view, p, q, end));
             self.0.push([x1, y1, x2, y2]);
         }
+    }
+
+    fn start_again(&mut self) {
+        self.0.clear();
     }
 
     fn plan_bar(&mut self, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2]) {

@@ -16,3 +16,4 @@ pub mod convex_any_faces;
 pub mod convex_model;
 pub mod convex_solids;
 pub mod whole_jobs;
+pub mod emulated_jobs;

@@ -1,5 +1,6 @@
 //! The block in work: its moves, and how far they are.
 
+use super::emitter::whole_ticks;
 use super::profile::{Profile, Slice};
 use super::{Block, PathLength};
 use crate::drawing::LineType;
@@ -82,6 +83,22 @@ impl Course {
         PathLength::from_bits((end.saturating_sub(self.place) >> 14) as u32)
     }
 
+    /// The next moves that fall into `slice`, as many as there is place for: puts the time of each, in
+    /// whole ticks, into `times` if the slice begins at `start`, and says how many they are.
+    pub(super) fn next_times(&mut self, slice: Slice, start: u32, times: &mut [u32]) -> usize {
+        let Some(room) = u64::from(slice.distance).checked_sub(self.to_next + 1) else {
+            return 0;
+        };
+        // Below 1 mm, or 2^32: the settings allow no longer steps.
+        let move_length = (self.move_length as u32).max(1);
+        // Less than the slice.
+        let (room, first) = (room as u32, self.to_next as u32);
+        let count = times.len().min((room / move_length) as usize + 1);
+        SliceClock::new(slice).times(start, first, move_length, &mut times[..count]);
+        self.to_next += u64::from(move_length) * count as u64;
+        count
+    }
+
     /// Begins the next piece of a dotted line.
     pub(super) fn next_piece(&mut self) {
         self.piece += 1;
@@ -92,23 +109,31 @@ impl Course {
 }
 
 /// Tells when the places of a slice are reached.
-pub(super) struct SliceClock {
+struct SliceClock {
     shift: u32,
     distance: u32,
     time: u32,
 }
 
 impl SliceClock {
-    pub(super) fn new(slice: Slice) -> Self {
+    fn new(slice: Slice) -> Self {
         // 16 bits of the distance are true to an eighth of a tick.
         let shift = (u32::BITS - slice.distance.leading_zeros()).saturating_sub(16);
         Self { shift, distance: slice.distance >> shift, time: slice.time }
     }
 
-    /// When a place is reached that lies `distance` after the start; 1/16 ticks.
-    #[inline]
-    pub(super) fn offset(&self, distance: u32) -> u32 {
-        // At most 2^16 - 1 times the time of a whole slice, 2^16.
-        ((distance >> self.shift) * self.time).checked_div(self.distance).unwrap_or(0)
+    /// When the places from `first` on, each by `step` further, are reached if the slice begins at
+    /// `start`: whole ticks.
+    #[inline(never)] // On its own it stays in the registers of a small core.
+    fn times(&self, start: u32, first: u32, step: u32, times: &mut [u32]) {
+        let Self { shift, distance, time } = *self;
+        let mut place = first;
+        for reached in times {
+            // At most 2^16 - 1 times the time of a whole slice, 2^16.
+            let offset = ((place >> shift) * time).checked_div(distance).unwrap_or(0);
+            *reached = whole_ticks(start.wrapping_add(offset));
+            // Only behind the last can it wrap.
+            place = place.wrapping_add(step);
+        }
     }
 }

@@ -4,6 +4,9 @@ use super::profile::FRACTION_BITS;
 use super::{EventQueue, Limits, StepEvent};
 use crate::step::Direction;
 
+/// As many moves are worked out together: a small core then has registers for each part of the work.
+pub(super) const BATCH: usize = 32;
+
 /// Builds events. The last one is kept back until the time of the next is known.
 ///
 /// Times are sixteenths of ticks that wrap, cut to whole ticks here; two calls lie less than 2^31
@@ -45,6 +48,11 @@ impl Emitter {
         self.ticks
     }
 
+    /// Whether the last event was a move.
+    pub(super) fn has_stepped(&self) -> bool {
+        self.pending.is_some_and(|(event, _)| event.is_step())
+    }
+
     /// Whether an event waits for the time of the next.
     pub(super) fn is_open(&self) -> bool {
         self.pending.is_some()
@@ -54,24 +62,61 @@ impl Emitter {
     #[inline]
     pub(super) fn step(
         &mut self,
-        direction: Direction,
+        levels: MoveLevels,
         mut time: u32,
         queue: &mut dyn EventQueue,
     ) -> Result<u32, StepEvent> {
         time = whole_ticks(time);
-        let (pulses, axes, directions) = levels(direction);
-        let wanted = (self.directions & !axes) | directions;
-        if wanted != self.directions {
-            self.directions = wanted;
+        if self.turns(levels) {
+            self.directions = (self.directions & !levels.axes) | levels.directions;
             let at = time.wrapping_sub(self.setup);
             let at = self.put(self.holding(), at, queue)?;
             time = later(time, at.wrapping_add(self.setup));
             // The pending event pulses nothing, so no pause is due after it.
             self.hand_over(time, queue)?;
-            self.pending = Some((StepEvent::levels(self.level_bits() | pulses, 0), time));
+            self.pending = Some((StepEvent::levels(self.level_bits() | levels.pulses, 0), time));
             return Ok(time);
         }
-        self.put(StepEvent::levels(self.level_bits() | pulses, 0), time, queue)
+        self.put(StepEvent::levels(self.level_bits() | levels.pulses, 0), time, queue)
+    }
+
+    /// Whether the move needs other levels at the direction pins.
+    pub(super) fn turns(&self, levels: MoveLevels) -> bool {
+        (self.directions ^ levels.directions) & levels.axes != 0
+    }
+
+    /// Some moves, each one of two kinds that do not [turn](Emitter::turns), after
+    /// [another](Emitter::has_stepped). Each takes place at its time in whole ticks, or later if the pins
+    /// need longer. Returns by how much later the last one is.
+    #[inline(never)] // On its own it stays in the registers of a small core.
+    pub(super) fn steps(
+        &mut self,
+        times: &[u32],
+        kinds: &[u8],
+        levels: [MoveLevels; 2],
+        queue: &mut dyn EventQueue,
+    ) -> Result<u32, StepEvent> {
+        let Some((mut event, mut since)) = self.pending else {
+            return Ok(0);
+        };
+        let level_bits = self.level_bits();
+        let kinds_of_event =
+            levels.map(|move_levels| StepEvent::levels(level_bits | move_levels.pulses, 0));
+        let mut events = [event; BATCH];
+        let (least_interval, began) = (self.least_interval, since);
+        let mut late = 0u32;
+        for ((next, &time), &kind) in events.iter_mut().zip(times).zip(kinds) {
+            let planned = time.wrapping_add(late);
+            let at = later(planned, since.wrapping_add(least_interval));
+            late = late.wrapping_add(at.wrapping_sub(planned));
+            *next = event.with_ticks(at.wrapping_sub(since) >> FRACTION_BITS);
+            event = kinds_of_event[usize::from(kind & 1)];
+            since = at;
+        }
+        queue.push_steps(&events[..times.len().min(BATCH)])?;
+        self.ticks = self.ticks.wrapping_add(since.wrapping_sub(began) >> FRACTION_BITS);
+        self.pending = Some((event, since));
+        Ok(late)
     }
 
     /// Nothing changes at `time`: begins the time line, or splits a long wait.
@@ -171,36 +216,36 @@ fn later(a: u32, b: u32) -> u32 {
     if (a.wrapping_sub(b)).cast_signed() < 0 { b } else { a }
 }
 
-/// Pulse bits, the direction bits of the axes that move, and their levels.
-#[inline]
-fn levels(direction: Direction) -> (u8, u8, u8) {
-    const TABLE: [(u8, u8, u8); 9] = {
-        let mut table = [(0, 0, 0); 9];
-        let mut number = 0;
-        while number < 8 {
-            let direction = Direction::ALL[number];
-            let (dx, dy) = direction.delta();
-            let mut pulses = 0;
-            let mut axes = 0;
-            let mut down = 0;
-            if dx != 0 {
-                pulses |= StepEvent::STEP_X;
-                axes |= StepEvent::DOWN_X;
-            }
-            if dy != 0 {
-                pulses |= StepEvent::STEP_Y;
-                axes |= StepEvent::DOWN_Y;
-            }
-            if dx < 0 {
-                down |= StepEvent::DOWN_X;
-            }
-            if dy < 0 {
-                down |= StepEvent::DOWN_Y;
-            }
-            table[direction as usize] = (pulses, axes, down);
-            number += 1;
+/// What a move does to the pins.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct MoveLevels {
+    /// The axes that step.
+    pulses: u8,
+    /// Their direction pins.
+    axes: u8,
+    /// Those of them that count down.
+    directions: u8,
+}
+
+impl MoveLevels {
+    /// Those of a move in `direction`.
+    pub(super) const fn of(direction: Direction) -> Self {
+        let (dx, dy) = direction.delta();
+        let mut levels = Self { pulses: 0, axes: 0, directions: 0 };
+        if dx != 0 {
+            levels.pulses |= StepEvent::STEP_X;
+            levels.axes |= StepEvent::DOWN_X;
         }
-        table
-    };
-    TABLE[direction as usize]
+        if dy != 0 {
+            levels.pulses |= StepEvent::STEP_Y;
+            levels.axes |= StepEvent::DOWN_Y;
+        }
+        if dx < 0 {
+            levels.directions |= StepEvent::DOWN_X;
+        }
+        if dy < 0 {
+            levels.directions |= StepEvent::DOWN_Y;
+        }
+        levels
+    }
 }

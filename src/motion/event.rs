@@ -111,6 +111,12 @@ impl StepEvent {
         }
     }
 
+    /// Whether it pulses, and does nothing else.
+    pub const fn is_step(self) -> bool {
+        let pulses = (Self::STEP_X | Self::STEP_Y) as u32;
+        self.0 & pulses != 0 && self.0 & (Self::PEN | Self::AT_REST) as u32 == 0
+    }
+
     /// What a tape would hold of the event: a move, or the pen going up (height below 64) or down.
     pub fn instruction(self) -> Option<Instruction> {
         match self.kind() {
@@ -147,6 +153,13 @@ pub trait EventQueue {
     /// # Errors
     /// Hands the event back if the queue is full.
     fn push(&mut self, event: StepEvent) -> Result<(), StepEvent>;
+    /// Appends steps: events that pulse and do nothing else, none shorter than two pulses.
+    ///
+    /// # Errors
+    /// Hands the first event back that finds the queue full.
+    fn push_steps(&mut self, steps: &[StepEvent]) -> Result<(), StepEvent> {
+        steps.iter().try_for_each(|&step| self.push(step))
+    }
 }
 
 impl EventQueue for heapless::spsc::Producer<'_, StepEvent> {

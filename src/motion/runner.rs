@@ -1,8 +1,8 @@
 //! Runs the blocks: pen changes at rest, slices, moves, events.
 
-use super::course::{Course, SliceClock};
+use super::course::Course;
 use super::curvature::Curvature;
-use super::emitter::whole_ticks;
+use super::emitter::{BATCH, MoveLevels, whole_ticks};
 use super::junction::{self, Corner, Heading};
 use super::profile::{FRACTION_BITS, Pace, Profile};
 use super::{Block, Emitter, EventQueue, Limits, Lookahead, PathLength, SliceSpeed, StepEvent};
@@ -394,24 +394,47 @@ impl<'m> Runner<'m> {
         let Some(slice) = course.slice else {
             return Ok(());
         };
-        let clock = SliceClock::new(slice);
+        let levels = course.line.moves().map(MoveLevels::of);
         // A move and its direction set-up are two events; one is left for a long wait.
         let mut room = (queue.room().saturating_sub(1)) / 2;
         while course.to_next < u64::from(slice.distance) {
-            if room == 0 {
+            let left = course.line.remaining();
+            if left == 0 {
+                // The length of a move is rounded down, which leaves a rest of nothing.
+                course.to_next = slice.distance.into();
+                break;
+            }
+            let mut times = [0; BATCH];
+            let most = room.min(BATCH).min(left as usize);
+            let count = course.next_times(slice, self.now, &mut times[..most]);
+            if count == 0 {
                 return Ok(());
             }
-            room -= 1;
-            let offset = clock.offset(course.to_next as u32);
-            course.to_next += course.move_length;
-            course.moves_done += 1;
-            let Some(direction) = course.line.next() else {
-                break;
-            };
-            let time = whole_ticks(self.now.wrapping_add(offset));
-            let at = self.emitter.step(direction, time, queue)?;
-            self.now = self.now.wrapping_add(at.wrapping_sub(time));
-            self.position = direction.from_point(self.position);
+            room -= count;
+            course.moves_done += count as u32;
+            let times = &times[..count];
+            let mut kinds = [0; BATCH];
+            let kinds = &mut kinds[..count];
+            let diagonals = course.line.next_kinds(kinds);
+            let counts = [count - diagonals, diagonals];
+            let turns = |kind: usize| counts[kind] > 0 && self.emitter.turns(levels[kind]);
+            if self.emitter.has_stepped() && !turns(0) && !turns(1) {
+                let late = self.emitter.steps(times, kinds, levels, queue)?;
+                self.now = self.now.wrapping_add(late);
+            } else {
+                let mut late = 0;
+                for (&time, &kind) in times.iter().zip(kinds.iter()) {
+                    let time = time.wrapping_add(late);
+                    let at = self.emitter.step(levels[usize::from(kind)], time, queue)?;
+                    late = late.wrapping_add(at.wrapping_sub(time));
+                }
+                self.now = self.now.wrapping_add(late);
+            }
+            for (direction, count) in course.line.moves().into_iter().zip(counts) {
+                let (dx, dy) = direction.delta();
+                self.position.x += dx * count as i32;
+                self.position.y += dy * count as i32;
+            }
         }
         course.place += u64::from(slice.distance);
         course.to_next -= u64::from(slice.distance);

@@ -9,6 +9,7 @@ mod board;
 mod job;
 mod memory;
 mod options;
+mod plan;
 mod program;
 mod reply;
 mod solid;
@@ -208,6 +209,12 @@ impl Inner<'_> {
             Command::Polyline(numbers) => {
                 self.model.add_polyline(numbers.iter()).map_err(Refusal::Model)?
             }
+            Command::Degree(degree) => self.model.set_degree(degree).map_err(Refusal::Model)?,
+            Command::Curve { ends, control } => {
+                self.model.begin_curve(ends, control.iter()).map_err(Refusal::Model)?
+            }
+            Command::Knots(knots) => self.model.add_knots(knots.iter()).map_err(Refusal::Model)?,
+            Command::EndCurve => self.model.end_curve().map_err(Refusal::Model)?,
             Command::Help => self.task = Some(Task::List(Listing::Help, 0)),
             Command::BuildInfo => self.report_build(board),
             Command::Settings => self.task = Some(Task::List(Listing::Settings, 0)),
@@ -260,6 +267,7 @@ impl Inner<'_> {
         }
     }
 
+    #[inline(never)] // Its frame must not lie under that of `plot`.
     fn compute(
         &mut self,
         attention: &mut dyn Attention,
@@ -298,9 +306,10 @@ impl Inner<'_> {
         let (vertices, limit) = (model.vertices().len(), model.vertex_limit());
         Reply(board).line(format_args!("[MODEL:vertices {vertices} of {limit}]"));
         let (corners, limit) = (model.corner_count(), model.corner_limit());
-        let (faces, bars) = (model.face_count(), model.bar_count());
-        Reply(board)
-            .line(format_args!("[MODEL:faces {faces}, bars {bars}, corners {corners} of {limit}]"));
+        let (faces, bars, curves) = (model.face_count(), model.bar_count(), model.curve_count());
+        Reply(board).line(format_args!(
+            "[MODEL:faces {faces}, bars {bars}, curves {curves}, corners {corners} of {limit}]"
+        ));
         let order::Report { odd_points, components, lifts, .. } = *self.job.report();
         Reply(board)
             .line(format_args!("[JOB:odd points {odd_points}, parts {components}, lifts {lifts}]"));

@@ -1,6 +1,7 @@
 //! Why a line was not carried out: a number for programs, a sentence for people.
 
 use crate::convex::SolidError;
+use crate::curve::CurveError;
 use crate::drawing::PageError;
 use crate::fixed::BinaryFraction;
 use crate::machine::{MachineError, SettingError, Value};
@@ -104,6 +105,8 @@ pub const MEANINGS: &[(u16, &str)] = &[
     (113, "too many vertices"),
     (114, "too many corners"),
     (115, "coordinate too large"),
+    (116, "not a curve"),
+    (117, "curve out of order"),
     (120, "nothing to plot"),
     (121, "eye at the point looked at"),
     (122, "up is along the line of sight"),
@@ -149,6 +152,10 @@ impl Refusal {
                 ModelError::TooManyVertices { .. } => 113,
                 ModelError::TooManyCorners { .. } => 114,
                 ModelError::CoordinateTooLarge => 115,
+                ModelError::Curve(CurveError::UnknownPoint { .. }) => 110,
+                ModelError::Curve(_) => 116,
+                ModelError::NoDegree | ModelError::CurveUnfinished | ModelError::NoCurve => 117,
+                ModelError::KnotTooLarge => 102,
             },
             Self::NothingToPlot | Self::View(ViewError::NothingToSee) => 120,
             Self::View(ViewError::EyeAtTarget) => 121,
@@ -269,6 +276,11 @@ fn write_model_error(formatter: &mut fmt::Formatter<'_>, error: &ModelError) -> 
         ModelError::RepeatedVertex { number } => {
             write!(formatter, "vertex {number} comes twice in a row")
         }
+        ModelError::NoDegree => formatter.write_str("send deg first, 1 to 5"),
+        ModelError::CurveUnfinished => formatter.write_str("end the curve before: send end"),
+        ModelError::NoCurve => formatter.write_str("begin a curve first: send curv"),
+        ModelError::KnotTooLarge => formatter.write_str("knots go up to 4194304"),
+        ModelError::Curve(error) => write_curve_error(formatter, error),
     }
 }
 
@@ -288,6 +300,34 @@ fn write_solid_error(formatter: &mut fmt::Formatter<'_>, error: &SolidError) -> 
             vertex + 1
         ),
         _ => formatter.write_str("it takes four vertices at different places, not all in line"),
+    }
+}
+
+fn write_curve_error(formatter: &mut fmt::Formatter<'_>, error: &CurveError) -> fmt::Result {
+    match error {
+        CurveError::Order => formatter.write_str("a curve has degree 1 to 5"),
+        CurveError::TooFewControlPoints { needed } => {
+            write!(formatter, "a curve of this degree takes {needed} control points")
+        }
+        CurveError::TooManyControlPoints { limit } => {
+            write!(formatter, "a curve has at most {limit} control points")
+        }
+        CurveError::UnknownPoint { number } => {
+            write!(formatter, "there is no vertex {}", u32::from(*number) + 1)
+        }
+        CurveError::WrongKnotCount { needed, given } => {
+            write!(formatter, "the curve takes {needed} knots and has {given}")
+        }
+        CurveError::KnotDecreases { knot } => {
+            write!(formatter, "knot {} is less than the one before", knot + 1)
+        }
+        CurveError::KnotTooLarge { .. } => formatter.write_str("knots go up to 4194304"),
+        CurveError::KnotRepeated { knot } => {
+            write!(formatter, "knot {} is repeated so often that the curve breaks there", knot + 1)
+        }
+        CurveError::OutsideKnots => {
+            formatter.write_str("a curve begins at knot degree + 1 or later, ends later, and not past the last but degree")
+        }
     }
 }
 

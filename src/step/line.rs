@@ -66,6 +66,37 @@ impl Line {
         }
     }
 
+    /// The two moves that it is made of, the straight and the diagonal one.
+    pub const fn moves(&self) -> [Direction; 2] {
+        [self.straight, self.diagonal]
+    }
+
+    /// The next moves, as many as there is place for: 0 for a straight one, 1 for a diagonal one. Says
+    /// how many are diagonal.
+    ///
+    /// ```
+    /// use penup::step::Line;
+    /// let mut kinds = [0; 4];
+    /// assert_eq!(Line::by(4, 2).next_kinds(&mut kinds), 2);
+    /// assert_eq!(kinds, [1, 0, 1, 0]);
+    /// ```
+    #[inline(never)] // On its own it stays in the registers of a small core.
+    pub fn next_kinds(&mut self, kinds: &mut [u8]) -> usize {
+        let mut diagonals = 0;
+        let Self { mut balance, straight_gain, diagonal_loss, .. } = *self;
+        // Above this the diagonal move is the better one.
+        let tie = -i32::from(self.ties_diagonal);
+        for kind in kinds.iter_mut() {
+            let is_diagonal = balance > tie;
+            balance += if is_diagonal { -diagonal_loss } else { straight_gain };
+            *kind = u8::from(is_diagonal);
+            diagonals += usize::from(is_diagonal);
+        }
+        self.balance = balance;
+        self.remaining = self.remaining.saturating_sub(kinds.len() as u32);
+        diagonals
+    }
+
     /// Moves still to come.
     pub const fn remaining(&self) -> u32 {
         self.remaining

@@ -3,10 +3,12 @@
 //! Every command sets up what it lacks and says what it installs; what it cannot install it names,
 //! with the command that does. A second run finds everything and installs nothing.
 
+mod bench;
 mod command;
 mod experiments;
 mod flash;
 mod firmware;
+mod gallery;
 mod set_up;
 mod test;
 mod uf2;
@@ -49,6 +51,10 @@ enum Task {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         arguments: Vec<String>,
     },
+    /// Counts the instructions of each stage on a Cortex-M3, for every lattice.
+    Bench,
+    /// Draws the figures of the papers into docs/gallery.
+    Gallery,
     /// Repeats Harrison's experiments (his chapter 7), counted in instructions.
     Experiments,
     /// Installs what building and testing need.
@@ -80,6 +86,8 @@ fn carry_out() -> Result<()> {
         }
         Some(Task::Flash { board }) => flash::flash(board)?,
         Some(Task::Plot { arguments }) => plot(&arguments)?,
+        Some(Task::Bench) => bench::count()?,
+        Some(Task::Gallery) => gallery::make()?,
         Some(Task::Experiments) => experiments::repeat()?,
         Some(Task::SetUp) => {
             for &board in Board::ALL {

@@ -53,6 +53,29 @@ const chip = new RP2040();
 const { clock, core } = chip;
 chip.logger = { debug() {}, info() {}, warn() {}, error: (from, what) => console.error(from, what) };
 
+// rp2040js folds the carry into the second operand. Where that makes 0x80000000 of 0x7fffffff, its
+// overflow flag is wrong.
+const ADCS = 0b0100000101;
+const SBCS = 0b0100000110;
+const add = core.addUpdateFlags.bind(core);
+core.addUpdateFlags = (first, second) => {
+  const result = add(first, second);
+  if (second === 0x80000000 && chip.readUint16(core.PC - 2) >> 6 === ADCS) {
+    const folded = core.registers[chip.readUint16(core.PC - 2) & 7] === 0x7fffffff;
+    if (folded) core.V = !(first & 0x80000000);
+  }
+  return result;
+};
+const subtract = core.substractUpdateFlags.bind(core);
+core.substractUpdateFlags = (first, second) => {
+  const result = subtract(first, second);
+  if (second === 0x80000000 && chip.readUint16(core.PC - 2) >> 6 === SBCS) {
+    const folded = core.registers[(chip.readUint16(core.PC - 2) >> 3) & 7] === 0x7fffffff;
+    if (folded) core.V = !!(first & 0x80000000);
+  }
+  return result;
+};
+
 /** Blocks of 512 bytes: three magic numbers, where the payload goes, how long it is. */
 function load(image) {
   for (let block = 0; block < image.length; block += 512) {

@@ -22,9 +22,9 @@ fn make_safe(cause: fmt::Arguments) -> bool {
     }
     REPORTING.store(true, Ordering::Relaxed);
     // Fails never: `OneLine` takes every byte.
-    serial::write(b"\r\n");
+    serial::write_now(b"\r\n");
     let _ = write!(OneLine, "[MSG:stopped by a fault, ctrl-X resets: {cause}]");
-    serial::write(b"\r\n");
+    serial::write_now(b"\r\n");
     true
 }
 
@@ -50,7 +50,7 @@ impl Write for OneLine {
     fn write_str(&mut self, text: &str) -> fmt::Result {
         for byte in text.bytes() {
             let byte = if byte == b'\n' || byte == b'\r' { b' ' } else { byte };
-            serial::write(&[byte]);
+            serial::write_now(&[byte]);
         }
         Ok(())
     }

@@ -46,6 +46,7 @@ const CRYSTAL_HERTZ: u32 = 12_000_000;
 /// The board, as the plotter sees it.
 pub struct Pico {
     line: Line,
+    sender: serial::Sender,
     steps: steps::Steps,
 }
 
@@ -76,14 +77,14 @@ pub fn take() -> (Pico, Lent<'static>, &'static PulserState) {
     let gpio = Pins::new(chip.IO_BANK0, chip.PADS_BANK0, sio.gpio_bank0, &mut chip.RESETS);
     let steps = steps::set_up(&mut core.NVIC);
     pen::set_up();
-    let line = serial::set_up(&mut core.NVIC);
+    let (line, sender) = serial::set_up(&mut core.NVIC);
     pins::set_up(gpio);
     clock::start(&mut core.NVIC);
     defmt::info!("pico at {=u32} Hz", clock::HERTZ);
     static MEMORY: ConstStaticCell<PicoMemory> = ConstStaticCell::new(PicoMemory::new());
     static BLOCKS: StaticCell<[Block; NO_MOVES.len()]> = StaticCell::new();
     let memory = MEMORY.take().lend(BLOCKS.init(NO_MOVES));
-    (Pico { line, steps }, memory, &steps::STATE)
+    (Pico { line, sender, steps }, memory, &steps::STATE)
 }
 
 impl Board for Pico {
@@ -98,7 +99,7 @@ impl Board for Pico {
     }
 
     fn write(&mut self, bytes: &[u8]) {
-        serial::write(bytes);
+        self.sender.write(bytes);
     }
 
     fn queue(&mut self) -> &mut dyn EventQueue {

@@ -1,7 +1,11 @@
 //! The serial line: UART0 at 115200 baud, 8 bits, no parity, one stop bit.
+//!
+//! What is sent waits in a queue, so that an answer does not keep the main loop from the steps.
 
 use cortex_m::peripheral::NVIC;
+use heapless::spsc::{Consumer, Producer, Queue};
 use rp2040_hal::pac::{Interrupt, interrupt};
+use static_cell::StaticCell;
 
 use super::registers::{self, UART0, reset};
 use super::{clock, critical};
@@ -23,32 +27,77 @@ mod offset {
 const RECEIVER_EMPTY: u32 = 1 << 4;
 const SENDER_FULL: u32 = 1 << 5;
 const RECEIVED: u32 = 1 << 4;
+const SENT: u32 = 1 << 5;
 const RECEIVE_TIMEOUT: u32 = 1 << 6;
 const EIGHT_BITS_WITH_FIFO: u32 = 0b111 << 4;
 const ENABLE_BOTH_WAYS: u32 = 1 | 1 << 8 | 1 << 9;
 
+/// Bytes that wait to be sent, at most; one more place than that, for the queue.
+const SENT_PLACES: usize = 512;
+
+static QUEUE: StaticCell<Queue<u8, SENT_PLACES>> = StaticCell::new();
 static RECEIVER: Owned<Receiver> = Owned::empty();
+static SENDER: Owned<Consumer<'static, u8>> = Owned::empty();
+
+/// The main loop's end of what is sent.
+pub struct Sender(Producer<'static, u8>);
 
 /// Opens the line. Its pins are those of `pins`.
-pub fn set_up(nvic: &mut NVIC) -> Line {
+pub fn set_up(nvic: &mut NVIC) -> (Line, Sender) {
     registers::restart(reset::UART0);
     // Sixty-fourths of a divider of 16 samples a bit, rounded.
     const DIVIDER: u32 = (clock::HERTZ * 4 + BAUD / 2) / BAUD;
     UART0.write(offset::BAUD_INTEGER, DIVIDER / 64);
     UART0.write(offset::BAUD_FRACTION, DIVIDER % 64);
     UART0.write(offset::LINE_CONTROL, EIGHT_BITS_WITH_FIFO);
-    UART0.write(offset::INTERRUPT_MASK, RECEIVED | RECEIVE_TIMEOUT);
+    UART0.write(offset::INTERRUPT_MASK, RECEIVED | RECEIVE_TIMEOUT | SENT);
 
+    let (sent, to_send) = QUEUE.init(Queue::new()).split();
     let (receiver, line) = line::ends();
     // SAFETY: the interrupt is masked since reset, and this runs once (the line's ends see to it).
-    unsafe { RECEIVER.fill(receiver) };
+    unsafe {
+        RECEIVER.fill(receiver);
+        SENDER.fill(to_send);
+    }
     critical::enable(nvic, Interrupt::UART0_IRQ, critical::SERIAL_PRIORITY);
     UART0.write(offset::CONTROL, ENABLE_BOTH_WAYS);
-    line
+    (line, Sender(sent))
 }
 
-/// Sends `bytes`; returns when the last is in the sender's FIFO.
-pub fn write(bytes: &[u8]) {
+impl Sender {
+    /// Sends `bytes`; waits only while the queue is full.
+    pub fn write(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            let mut rest = self.0.enqueue(byte);
+            while let Err(byte) = rest {
+                pump();
+                rest = self.0.enqueue(byte);
+            }
+        }
+        pump();
+    }
+}
+
+/// Lets the line's handler send: its interrupt comes only when the FIFO gets emptier.
+fn pump() {
+    NVIC::mask(Interrupt::UART0_IRQ);
+    send();
+    // SAFETY: it was unmasked at set-up, before there was a sender.
+    unsafe { NVIC::unmask(Interrupt::UART0_IRQ) };
+}
+
+/// Fills the FIFO. Called by the line's handler, or where it is masked.
+fn send() {
+    // SAFETY: this is the handler that owns it, or the handler is masked.
+    let Some(bytes) = (unsafe { SENDER.get() }) else { return };
+    while UART0.read(offset::FLAGS) & SENDER_FULL == 0 {
+        let Some(byte) = bytes.dequeue() else { return };
+        UART0.write(offset::DATA, u32::from(byte));
+    }
+}
+
+/// Sends `bytes` past the queue: for a fault, when no handler runs.
+pub fn write_now(bytes: &[u8]) {
     for &byte in bytes {
         while UART0.read(offset::FLAGS) & SENDER_FULL != 0 {}
         UART0.write(offset::DATA, u32::from(byte));
@@ -63,7 +112,8 @@ pub fn poll() -> Option<u8> {
 
 #[interrupt]
 fn UART0_IRQ() {
-    UART0.write(offset::INTERRUPT_CLEAR, RECEIVED | RECEIVE_TIMEOUT);
+    UART0.write(offset::INTERRUPT_CLEAR, RECEIVED | RECEIVE_TIMEOUT | SENT);
+    send();
     // SAFETY: this is the handler that owns it.
     if let Some(receiver) = unsafe { RECEIVER.get() } {
         while let Some(byte) = poll() {

@@ -1,8 +1,9 @@
 //! Steps by a PIO state machine that DMA feeds: no interrupt for a step, and no jitter.
 //!
 //! A word for the state machine is laid out as a step event: the levels of five neighbouring pins
-//! in bits 0 to 4, whether the pen moves in bit 7, the ticks from bit 8 on. The state machine sets
-//! the pins and counts the ticks. A step is two words, its pulse and its rest; other events are one.
+//! in bits 0 to 4, where its program goes on in bits 5 to 7, the ticks from bit 8 on. The state
+//! machine sets the pins, ends the pulse if there is one, and counts the ticks; every event takes its
+//! ticks to the cycle.
 //!
 //! The words wait in a ring that the DMA channel reads in blocks: all that is there when the last
 //! block ends is the next. Between two blocks the state machine lives on the words in its own queue.
@@ -35,10 +36,19 @@ const HEIGHTS: usize = 256;
 /// A pass of the counting loop is a tick.
 const CYCLES_PER_TICK: u32 = clock::HERTZ / TICKS_PER_SECOND;
 const _: () = assert!(CYCLES_PER_TICK == 5 && clock::HERTZ.is_multiple_of(TICKS_PER_SECOND));
-/// Ticks that a word takes beyond its count.
-const WORD_TICKS: u32 = 2;
-/// Ticks that moving the pen takes.
-const PEN_TICKS: u32 = 1;
+/// Where the program goes on, in a word's place for it.
+mod target {
+    pub const MOVE_PEN: u32 = 0;
+    pub const WAIT: u32 = 1 << 5;
+    pub const PULSE: u32 = 6 << 5;
+}
+const TARGETS: u32 = 7 << 5;
+/// Ticks that a word takes beyond its count, by its target; a pulse takes its width, too.
+const WAIT_TICKS: u32 = 2;
+const PEN_TICKS: u32 = 3;
+const PULSE_TICKS: u32 = 2;
+/// Ticks of a pulse beyond its count.
+const WIDTH_TICKS: u32 = 2;
 
 /// Registers of the PIO block and its state machine 0.
 mod machine {
@@ -68,10 +78,13 @@ const JOIN_SENDER: u32 = 1 << 30;
 
 /// Instructions that the core hands to the state machine.
 mod order {
-    pub const JUMP_TO_START: u32 = 0;
-    pub const PULL_WITHOUT_WAITING: u32 = 0b100_00000_1000_0000;
-    pub const SET_PINS: u32 = 0b111_00000_000_00000;
-    pub const SET_DIRECTIONS: u32 = 0b111_00000_100_00000;
+    pub const JUMP_TO_START: u32 = super::START;
+    /// The width of the pulses, from the queue to where the program looks for it.
+    pub const PULL: u32 = 0x80A0;
+    pub const KEEP_WIDTH: u32 = 0xA0C7;
+    pub const PULL_WITHOUT_WAITING: u32 = 0x8080;
+    pub const SET_PINS: u32 = 0xE000;
+    pub const SET_DIRECTIONS: u32 = 0xE080;
 }
 
 /// Registers of channel 0 of the direct memory access, and of all.
@@ -110,15 +123,26 @@ static HEIGHTS_DUE: Owned<Consumer<'static, u8>> = Owned::empty();
 /// What the state machine has done, for the main loop.
 pub static STATE: PulserState = PulserState::new();
 
+/// Where the program waits for the next word.
+const START: u32 = 3;
 const LEVELS: u32 = 0x1F;
 const PULSES: u32 = (StepEvent::STEP_X | StepEvent::STEP_Y) as u32;
-const MOVES_PEN: u32 = 1 << 7;
 /// Nothing pulsed, drivers off: their pin is active low.
 const RELEASED: u32 = StepEvent::DRIVERS_ON as u32;
 
 /// The main loop's end.
 pub struct Steps {
     heights: Producer<'static, u8>,
+    /// As [`WRITTEN`].
+    written: u32,
+    /// How many more events fit: so many did when the state machine was last followed, less those
+    /// that have come.
+    room: u32,
+    /// As [`flips`] and [`PulserState::pulse_ticks`], which hold while anything moves.
+    flips: u32,
+    pulse_ticks: u32,
+    /// What a pulse at each of the levels adds to x (in the lower half) and to y.
+    moves: [u32; LEVELS as usize + 1],
     /// The pins' levels after the last word.
     levels: u32,
     /// The sum of the words counted so far; all wrap.
@@ -136,31 +160,33 @@ pub struct Steps {
 pub fn set_up(nvic: &mut NVIC) -> Steps {
     registers::restart(reset::PIO0 | reset::DMA);
     let program = pio::pio_asm!(
-        ".wrap_target",
-        "    pull block",
-        "    out pins, 5",
-        "    out y, 3",
-        "    jmp !y, time",
-        "    irq set 0 [4]", // a tick more
-        "time:",
+        ".origin 0",
+        "move_pen:",
+        "    irq set 0 [4]",
+        "rest:",
         "    out x, 24",
         "count:",
-        "    jmp x--, count [4]",
-        ".wrap",
+        "    jmp x-- count [4]",
+        "start:",
+        "    pull block",
+        "    out pins, 5",
+        "    out pc, 3 [1]",
+        "pulse:",
+        "    mov x, isr [1]",
+        "high:",
+        "    jmp x-- high [4]",
+        "    set pins, 0 [1]",
+        "    jmp rest",
     );
     for (index, &instruction) in program.program.code.iter().enumerate() {
         PIO0.write(machine::INSTRUCTIONS + 4 * index, u32::from(instruction));
     }
-    let (top, bottom) = (program.program.wrap.source, program.program.wrap.target);
-    PIO0.write(machine::EXECUTION, u32::from(top) << 12 | u32::from(bottom) << 7);
+    const WRAP_AT_END: u32 = 31 << 12;
+    PIO0.write(machine::EXECUTION, WRAP_AT_END);
     PIO0.write(machine::SHIFT, SHIFT_RIGHT_BOTH | JOIN_SENDER);
-    let count = LEVELS.count_ones();
-    let first = FIRST_MOTOR_PIN;
-    PIO0.write(machine::PINS, count << 26 | count << 20 | first << 5 | first);
-    order(order::SET_PINS | RELEASED);
-    order(order::SET_DIRECTIONS | LEVELS);
+    set_pins(RELEASED);
     PIO0.write(machine::INTERRUPT_ENABLE, FLAG_INTERRUPT);
-    PIO0.write(machine::CONTROL, ENABLE);
+    order(order::JUMP_TO_START);
 
     DMA.write(channel::READ_ADDRESS, ring_address(0));
     DMA.write(channel::WRITE_ADDRESS, PIO0.address(machine::SEND));
@@ -174,6 +200,11 @@ pub fn set_up(nvic: &mut NVIC) -> Steps {
     critical::enable(nvic, Interrupt::PIO0_IRQ_0, critical::PEN_PRIORITY);
     Steps {
         heights,
+        written: 0,
+        room: 0,
+        flips: 0,
+        pulse_ticks: 0,
+        moves: [0; LEVELS as usize + 1],
         levels: RELEASED,
         taken: 0,
         x: 0,
@@ -186,6 +217,26 @@ pub fn set_up(nvic: &mut NVIC) -> Steps {
 
 fn order(instruction: u32) {
     PIO0.write(machine::INSTRUCTION, instruction);
+}
+
+/// Makes the pins outputs of these levels, at once. The program sets pulses only.
+fn set_pins(levels: u32) {
+    let first = FIRST_MOTOR_PIN;
+    let pins = |set: u32| set.count_ones() << 26 | LEVELS.count_ones() << 20 | first << 5 | first;
+    PIO0.write(machine::PINS, pins(LEVELS));
+    order(order::SET_PINS | levels);
+    order(order::SET_DIRECTIONS | LEVELS);
+    PIO0.write(machine::PINS, pins(PULSES));
+}
+
+/// Lets the state machine begin, with pulses of that width. Its queue is empty.
+fn begin(pulse_ticks: u32) {
+    PIO0.write(machine::CONTROL, RESTART);
+    PIO0.write(machine::SEND, pulse_ticks.saturating_sub(WIDTH_TICKS));
+    order(order::PULL);
+    order(order::KEEP_WIDTH);
+    order(order::JUMP_TO_START);
+    PIO0.write(machine::CONTROL, ENABLE);
 }
 
 fn place(word: u32) -> &'static AtomicU32 {
@@ -214,12 +265,15 @@ impl Steps {
             pen::set_height(0);
         }
         let taken = taken();
+        if self.drained && self.written == self.taken {
+            self.configure();
+        }
         let was_drained = self.drained;
         let began = taken != self.taken;
         self.count_to(taken);
         let stalled = PIO0.read(machine::FIFO_DEBUG) & STALLED != 0;
         let waits = PIO0.read(machine::ADDRESS) == order::JUMP_TO_START;
-        self.drained = stalled && waits && taken == WRITTEN.load(Ordering::Relaxed);
+        self.drained = stalled && waits && taken == self.written;
         if self.drained && !was_drained {
             heal_pen();
         }
@@ -232,27 +286,63 @@ impl Steps {
             self.moving = false;
         }
         STATE.report((self.x, self.y), self.ticks, self.drained);
+        let waiting = self.written.wrapping_sub(self.taken);
+        let words = (WORDS - IN_FLIGHT).saturating_sub(waiting);
+        self.room = words.min((HEIGHTS - 1 - self.heights.len()) as u32);
     }
 
-    fn count_to(&mut self, taken: u32) {
+    /// Takes the settings over; they change only while nothing moves.
+    fn configure(&mut self) {
         let flips = flips();
-        // A word on its way may be counted a moment early, so the count may seem to go back.
-        while taken.wrapping_sub(self.taken).cast_signed() > 0 {
-            let word = place(self.taken).load(Ordering::Relaxed);
-            self.taken = self.taken.wrapping_add(1);
-            let pen = if word & MOVES_PEN == 0 { 0 } else { PEN_TICKS };
-            self.ticks = self.ticks.wrapping_add((word >> 8) + WORD_TICKS + pen);
-            if word & PULSES != 0 {
-                let (dx, dy) = StepEvent::from_bits((word ^ flips) & LEVELS).step();
-                self.x = self.x.wrapping_add(dx);
-                self.y = self.y.wrapping_add(dy);
+        if flips != self.flips {
+            self.flips = flips;
+            for (levels, packed) in (0..).zip(&mut self.moves) {
+                let (dx, dy) = StepEvent::from_bits(levels ^ flips).step();
+                *packed = dx.wrapping_add(dy << 16).cast_unsigned();
             }
         }
+        let pulse_ticks = STATE.pulse_ticks();
+        if pulse_ticks != self.pulse_ticks {
+            self.pulse_ticks = pulse_ticks;
+            begin(pulse_ticks);
+        }
+    }
+
+    /// 20 cycles a word.
+    #[inline(never)] // On its own it stays in the core's registers.
+    fn count_to(&mut self, taken: u32) {
+        let count = taken.wrapping_sub(self.taken);
+        // A word on its way may be counted a moment early, so the count may seem to go back.
+        if count > WORDS {
+            return;
+        }
+        let (mut steps, mut ticks, mut waits, mut pens) = (0u32, 0u32, 0, 0);
+        for number in 0..count {
+            let word = place(self.taken.wrapping_add(number)).load(Ordering::Relaxed);
+            ticks = ticks.wrapping_add(word >> 8);
+            if word & PULSES != 0 {
+                steps = steps.wrapping_add(self.moves[(word & LEVELS) as usize]);
+            } else if word & TARGETS == target::MOVE_PEN {
+                pens += 1;
+            } else {
+                waits += 1;
+            }
+        }
+        let pulses = count - waits - pens;
+        let beyond =
+            waits * WAIT_TICKS + pens * PEN_TICKS + pulses * (PULSE_TICKS + self.pulse_ticks);
+        self.ticks = self.ticks.wrapping_add(ticks).wrapping_add(beyond);
+        // Each within ±2^11, so the halves part again.
+        let dx = i32::from(steps as u16 as i16);
+        let dy = steps.wrapping_sub(dx.cast_unsigned()).cast_signed() >> 16;
+        self.x = self.x.wrapping_add(dx);
+        self.y = self.y.wrapping_add(dy);
+        self.taken = taken;
     }
 
     /// Stops at once, and forgets what waits.
     fn throw_away(&mut self) {
-        if self.drained && WRITTEN.load(Ordering::Relaxed) == self.taken {
+        if self.drained && self.written == self.taken {
             return;
         }
         critical_section::with(|_| {
@@ -264,16 +354,16 @@ impl Steps {
             DMA.write(channel::INTERRUPT_ENABLE, CHANNEL);
             let taken = taken();
             self.count_to(taken);
-            order(order::SET_PINS | (self.levels_now() & !PULSES));
+            set_pins(self.levels_now() & !PULSES);
             while PIO0.read(machine::FIFO_LEVEL) & LEVEL != 0 {
                 order(order::PULL_WITHOUT_WAITING);
             }
             DMA.write(channel::READ_ADDRESS, ring_address(taken));
+            self.written = taken;
             WRITTEN.store(taken, Ordering::Relaxed);
             TOLD.store(taken, Ordering::Relaxed);
             FEEDING.store(false, Ordering::Relaxed);
-            order(order::JUMP_TO_START);
-            PIO0.write(machine::CONTROL, ENABLE | RESTART);
+            begin(self.pulse_ticks);
         });
         heal_pen();
         self.levels = self.levels_now() & !PULSES;
@@ -285,50 +375,68 @@ impl Steps {
     fn levels_now(&self) -> u32 {
         place(self.taken.wrapping_sub(1)).load(Ordering::Relaxed) & LEVELS
     }
-
-    #[inline]
-    fn put(&mut self, word: u32, ticks: u32) {
-        let written = WRITTEN.load(Ordering::Relaxed);
-        place(written).store(word | ticks.saturating_sub(WORD_TICKS) << 8, Ordering::Relaxed);
-        WRITTEN.store(written.wrapping_add(1), Ordering::Release);
-    }
 }
 
 impl EventQueue for Steps {
     fn room(&self) -> usize {
-        let waiting = WRITTEN.load(Ordering::Relaxed).wrapping_sub(self.taken);
-        let events = (WORDS - IN_FLIGHT).saturating_sub(waiting) / 2;
-        (events as usize).min(HEIGHTS - 1 - self.heights.len())
+        self.room as usize
     }
 
     fn push(&mut self, event: StepEvent) -> Result<(), StepEvent> {
-        if self.room() == 0 {
-            return Err(event);
-        }
-        let ticks = event.ticks();
-        match event.kind() {
+        self.room = self.room.checked_sub(1).ok_or(event)?;
+        let (word, beyond) = match event.kind() {
             EventKind::Pen { height } => {
                 self.heights.enqueue(height).map_err(|_| event)?;
-                self.put(self.levels | MOVES_PEN, ticks.saturating_sub(PEN_TICKS));
                 self.moving = false;
+                (self.levels | target::MOVE_PEN, PEN_TICKS)
             }
             EventKind::Levels(levels) => {
                 self.moving = levels & StepEvent::AT_REST == 0;
-                let pins = (u32::from(levels) & LEVELS) ^ flips();
+                let pins = (u32::from(levels) & LEVELS) ^ self.flips;
                 self.levels = pins & !PULSES;
                 if pins & PULSES == 0 {
-                    self.put(pins, ticks);
+                    (pins | target::WAIT, WAIT_TICKS)
                 } else {
-                    let pulse = STATE.pulse_ticks();
-                    self.put(pins, pulse);
-                    self.put(self.levels, ticks.saturating_sub(pulse));
+                    (pins | target::PULSE, PULSE_TICKS + self.pulse_ticks)
                 }
             }
+        };
+        let count = event.ticks().saturating_sub(beyond);
+        place(self.written).store(word | count << 8, Ordering::Relaxed);
+        self.written = self.written.wrapping_add(1);
+        self.publish();
+        Ok(())
+    }
+
+    /// 15 cycles a step.
+    fn push_steps(&mut self, steps: &[StepEvent]) -> Result<(), StepEvent> {
+        let count = steps.len() as u32;
+        let Some(room) = self.room.checked_sub(count) else {
+            return steps.iter().try_for_each(|&step| self.push(step));
+        };
+        let beyond = (PULSE_TICKS + self.pulse_ticks) << 8;
+        let flips = self.flips | target::PULSE;
+        let mut word = self.levels;
+        for (number, step) in (0u32..).zip(steps) {
+            word = (step.to_bits() ^ flips).wrapping_sub(beyond);
+            place(self.written.wrapping_add(number)).store(word, Ordering::Relaxed);
         }
-        if WRITTEN.load(Ordering::Relaxed).wrapping_sub(self.taken) >= WORDS / 2 {
+        self.room = room;
+        self.written = self.written.wrapping_add(count);
+        self.levels = word & LEVELS & !PULSES;
+        self.moving = true;
+        self.publish();
+        Ok(())
+    }
+}
+
+impl Steps {
+    /// Shows the words to the channel; lets them begin if they are many.
+    fn publish(&mut self) {
+        WRITTEN.store(self.written, Ordering::Release);
+        if !FEEDING.load(Ordering::Relaxed) && self.written.wrapping_sub(self.taken) >= WORDS / 2 {
             self.start();
         }
-        Ok(())
     }
 }
 
@@ -379,7 +487,7 @@ fn heal_pen() {
 /// Stops for good with the drivers off, in a fault.
 pub fn release() {
     PIO0.write(machine::CONTROL, 0);
-    order(order::SET_PINS | RELEASED);
+    set_pins(RELEASED);
 }
 
 #[interrupt]

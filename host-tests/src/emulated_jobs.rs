@@ -1,0 +1,204 @@
+//! Whole jobs on emulated boards, and the same jobs on the host.
+
+use crate::whole_jobs::{Bench, job_lines, machine_events};
+use penup::plotter::{Lm3s6965Memory, NO_MOVES, PicoMemory};
+use penup_client::emulator::{EmulatedBoard, Machine, MachineEventKind};
+use penup_client::machines::Board;
+use std::error::Error;
+use std::time::Duration;
+
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// A board of plain memory with the capacities of `board`: memory decides how far the order of
+/// strokes is improved.
+pub fn bench_like(board: Board) -> Bench {
+    let blocks = Box::leak(Box::new(NO_MOVES));
+    let mut bench = Bench::with_memory(match board {
+        Board::Lm3s6965 => Box::leak(Box::new(Lm3s6965Memory::new())).lend(blocks),
+        Board::Pico => Box::leak(Box::new(PicoMemory::new())).lend(blocks),
+    });
+    bench.heard();
+    bench
+}
+
+/// What its pins do in a job.
+fn on_the_host(board: Board, lines: &[String]) -> Vec<MachineEventKind> {
+    let mut bench = bench_like(board);
+    for line in lines {
+        assert_eq!(bench.say(&format!("{line}\n")), "ok\n", "{line}");
+    }
+    bench.finish();
+    machine_events(&bench.board.trace().changes())
+}
+
+/// An emulated board at the other end of a serial line.
+pub struct Line {
+    /// The board.
+    pub emulator: Box<dyn EmulatedBoard>,
+    heard: Vec<u8>,
+}
+
+impl Line {
+    /// A board that has greeted.
+    ///
+    /// # Errors
+    /// It does not start.
+    pub fn open(board: Board) -> Result<Self, Box<dyn Error>> {
+        let mut line = Self { emulator: board.boot()?, heard: Vec::new() };
+        while !line.hear()?.starts_with("Grbl") {}
+        Ok(line)
+    }
+
+    /// The next line that comes back.
+    ///
+    /// # Errors
+    /// None comes.
+    pub fn hear(&mut self) -> Result<String, Box<dyn Error>> {
+        loop {
+            if let Some(end) = self.heard.iter().position(|byte| *byte == b'\n') {
+                let line: Vec<u8> = self.heard.drain(..=end).collect();
+                return Ok(String::from_utf8(line)?.trim().to_owned());
+            }
+            let mut buffer = [0; 256];
+            let count = self.emulator.receive(&mut buffer, PATIENCE)?;
+            if count == 0 {
+                return Err("the board is silent".into());
+            }
+            self.heard.extend_from_slice(&buffer[..count]);
+        }
+    }
+
+    /// Sends a line and returns the next that comes back.
+    ///
+    /// # Errors
+    /// The emulator has ended, or is silent.
+    pub fn ask(&mut self, text: &str) -> Result<String, Box<dyn Error>> {
+        self.emulator.send(format!("{text}\n").as_bytes())?;
+        self.hear()
+    }
+
+    /// The status.
+    ///
+    /// # Errors
+    /// The emulator has ended, or is silent.
+    pub fn status(&mut self) -> Result<String, Box<dyn Error>> {
+        self.emulator.send(b"?")?;
+        self.hear()
+    }
+}
+
+/// A board that has begun the job.
+///
+/// # Errors
+/// It does not start.
+pub fn begin(board: Board, lines: &[String]) -> Result<Line, Box<dyn Error>> {
+    let mut line = Line::open(board)?;
+    for text in lines {
+        assert_eq!(line.ask(text)?, "ok", "{text}");
+    }
+    Ok(line)
+}
+
+/// What the pins of an emulated board do in a job.
+///
+/// # Errors
+/// The emulator fails.
+pub fn at_the_pins(
+    board: Board,
+    lines: &[String],
+) -> Result<Vec<MachineEventKind>, Box<dyn Error>> {
+    let mut line = begin(board, lines)?;
+    let (mut machine, mut events) = (Machine::default(), Vec::new());
+    loop {
+        let idle = line.status()?.starts_with("<Idle");
+        for change in line.emulator.pin_changes()? {
+            events.extend(machine.change(change).map(|event| event.kind));
+        }
+        if idle {
+            events.extend(machine.last().map(|event| event.kind));
+            return Ok(events);
+        }
+        // Each question costs the emulator a wait.
+        std::thread::sleep(Duration::from_millis(200));
+    }
+}
+
+/// Without what the pins do at boot, before the first job.
+fn job_of(events: &[MachineEventKind]) -> &[MachineEventKind] {
+    let is_boot = |event: &&MachineEventKind| {
+        matches!(
+            event,
+            MachineEventKind::Drivers { on: false } | MachineEventKind::Pen { down: false }
+        )
+    };
+    let boot = events.iter().take_while(is_boot).count();
+    &events[boot..]
+}
+
+/// Runs a job of `scenes/` on an emulated board and on the host: the steps and pen moves are the
+/// same, one by one.
+///
+/// # Errors
+/// The emulator fails.
+///
+/// # Panics
+/// If they are not.
+pub fn compare(board: Board, scene: &str, settings: &[&str]) -> Result<(), Box<dyn Error>> {
+    let lines = job_lines(scene, settings);
+    let (host, pins) = (on_the_host(board, &lines), at_the_pins(board, &lines)?);
+    let (host, pins) = (job_of(&host), job_of(&pins));
+    assert!(host.len() > 10_000, "{} events are no job", host.len());
+    let differs = host.iter().zip(pins).position(|(host, pin)| host != pin);
+    let around = differs.map(|at| {
+        let part = |events: &[MachineEventKind]| {
+            format!("{:?}", &events[at.saturating_sub(3)..events.len().min(at + 5)])
+        };
+        (at, part(host), part(pins))
+    });
+    assert_eq!(around, None, "{scene}");
+    assert_eq!(host.len(), pins.len(), "{scene}");
+    Ok(())
+}
+
+/// Gives a job up with the pen down, and plots it again: the steps stop, the pen is raised, the
+/// position is that of the pins.
+///
+/// # Errors
+/// The emulator fails.
+///
+/// # Panics
+/// If they do not.
+pub fn give_up(board: Board) -> Result<(), Box<dyn Error>> {
+    let lines = job_lines("lattice2.obj", &["$page=60x80", "$margin=5"]);
+    let mut line = begin(board, &lines)?;
+    let mut machine = Machine::default();
+    while !machine.pen_is_down() {
+        assert!(line.status()?.starts_with("<Run"));
+        for change in line.emulator.pin_changes()? {
+            machine.change(change);
+        }
+    }
+    line.emulator.send(b"\x18")?;
+    while !line.hear()?.starts_with("Grbl") {}
+    let status = loop {
+        let status = line.status()?;
+        if status.starts_with("<Idle") {
+            break status;
+        }
+    };
+    for change in line.emulator.pin_changes()? {
+        machine.change(change);
+    }
+    assert!(!machine.pen_is_down());
+    // 80 steps a millimetre: the reported position is that of the pins.
+    let (x, y) = machine.position();
+    let reported = status.split("MPos:").nth(1).unwrap_or_default().split(',');
+    let reported: Vec<f64> = reported.take(2).map(str::parse).collect::<Result<_, _>>()?;
+    for (reported, steps) in reported.iter().zip([x, y]) {
+        assert!((reported - f64::from(steps) / 80.0).abs() <= 0.001, "{status} {x} {y}");
+    }
+    // Nothing more moves, and it is ready: the model is still there.
+    assert_eq!(line.emulator.pin_changes()?, []);
+    assert_eq!(line.ask("$plot")?, "ok");
+    Ok(())
+}

@@ -1,0 +1,134 @@
+//! Counts the instructions of each stage of a job on a Cortex-M3: `cargo xtask bench` runs it in QEMU.
+//!
+//! The scenes are sent through the library's own protocol, line by line, into the memory of the largest
+//! board; then their jobs are computed as `$plot` does it, and not drawn.
+#![no_std]
+#![no_main]
+
+#[path = "boards/mps2.rs"]
+mod mps2;
+
+use cortex_m_semihosting::{debug, hprintln};
+use mps2::Counter;
+use panic_semihosting as _;
+use penup::machine::PulserState;
+use penup::motion::{EventQueue, StepEvent};
+use penup::plotter::{Board, NO_MOVES, PicoMemory, Plotter, Unobserved};
+use penup::protocol::RealTime;
+use penup::stage::{Aborted, Attention, Stage};
+use static_cell::StaticCell;
+
+/// A scene, and where the eye is; each looks at the middle.
+const SCENES: [(&str, &str, &str); 9] = [
+    ("lattice1", include_str!("../scenes/lattice1.obj"), "$eye=-3.37,-4.71,5.13\n"),
+    ("lattice2", include_str!("../scenes/lattice2.obj"), "$eye=-6.37,-8.71,10.13\n"),
+    ("lattice3", include_str!("../scenes/lattice3.obj"), "$eye=-9.37,-12.71,15.13\n"),
+    ("lattice4", include_str!("../scenes/lattice4.obj"), "$eye=-12.37,-16.71,20.13\n"),
+    ("lattice5", include_str!("../scenes/lattice5.obj"), "$eye=-15.37,-20.71,25.13\n"),
+    ("lattice6", include_str!("../scenes/lattice6.obj"), "$eye=-18.37,-24.71,30.13\n"),
+    ("lattice7", include_str!("../scenes/lattice7.obj"), "$eye=-21.37,-28.71,35.13\n"),
+    ("grid20", include_str!("../scenes/grid20.obj"), ""),
+    ("text300", include_str!("../scenes/text300.obj"), ""),
+];
+
+/// A serial line that says what it is given and hears nothing but refusals.
+struct Line<'t> {
+    text: &'t [u8],
+    queue: NoSteps,
+}
+
+/// A job that is only computed has no steps.
+struct NoSteps;
+
+impl EventQueue for NoSteps {
+    fn room(&self) -> usize {
+        0
+    }
+    fn push(&mut self, event: StepEvent) -> Result<(), StepEvent> {
+        Err(event)
+    }
+}
+
+impl Board for Line<'_> {
+    const NAME: &'static str = "mps2";
+
+    fn read_byte(&mut self) -> Option<u8> {
+        let (byte, rest) = self.text.split_first()?;
+        self.text = rest;
+        Some(*byte)
+    }
+    fn take_real_time(&mut self) -> RealTime {
+        RealTime::default()
+    }
+    fn write(&mut self, bytes: &[u8]) {
+        if bytes.starts_with(b"error") || bytes.starts_with(b"[MSG") {
+            hprintln!("{}", core::str::from_utf8(bytes).unwrap_or("a refusal"));
+        }
+    }
+    fn queue(&mut self) -> &mut dyn EventQueue {
+        &mut self.queue
+    }
+    fn wait(&mut self) {}
+}
+
+/// The instructions of view, visibility and order.
+struct Stages<'c> {
+    counter: &'c mut Counter,
+    begun: Option<(Stage, u64)>,
+    counts: [u64; 3],
+}
+
+impl Stages<'_> {
+    fn end(&mut self) {
+        let now = self.counter.read();
+        if let Some((stage, begun)) = self.begun.take() {
+            self.counts[stage as usize] += now - begun;
+        }
+    }
+}
+
+impl Attention for Stages<'_> {
+    fn check(&mut self) -> Result<(), Aborted> {
+        self.counter.read();
+        Ok(())
+    }
+
+    fn enter(&mut self, stage: Stage) {
+        self.end();
+        self.begun = Some((stage, self.counter.read()));
+    }
+}
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    static MEMORY: StaticCell<PicoMemory> = StaticCell::new();
+    static PINS: StaticCell<PulserState> = StaticCell::new();
+    let mut moves = NO_MOVES;
+    let memory = MEMORY.init_with(PicoMemory::new).lend(&mut moves);
+    let mut plotter = Plotter::new(memory, PINS.init_with(PulserState::new));
+    let mut counter = Counter::start();
+    for (name, scene, eye) in SCENES {
+        for text in ["$clear\n$view=auto\n", eye, scene] {
+            let mut line = Line { text: text.as_bytes(), queue: NoSteps };
+            while !line.text.is_empty() {
+                plotter.poll(&mut line);
+            }
+        }
+        let mut stages = Stages { counter: &mut counter, begun: None, counts: [0; 3] };
+        let outcome = plotter.compute(&mut stages, &mut Unobserved).map(|_| ());
+        stages.end();
+        let [view, visibility, order] = stages.counts;
+        let (vertices, corners) =
+            (plotter.model().vertices().len(), plotter.model().corner_count());
+        match outcome {
+            Ok(()) => {
+                hprintln!("{} {} {} {} {} {}", name, vertices, corners, view, visibility, order)
+            }
+            Err(refusal) => hprintln!("{}: {}", name, refusal),
+        }
+    }
+    debug::exit(debug::EXIT_SUCCESS);
+    loop {
+        cortex_m::asm::wfi();
+    }
+}

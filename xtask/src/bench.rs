@@ -1,0 +1,91 @@
+//! Instructions of each stage on a Cortex-M3, beside the times of the papers.
+
+use std::process::{Command, Stdio};
+
+use anyhow::{Context, Result, ensure};
+
+use crate::command::{describe, run};
+use crate::firmware::Board;
+use crate::set_up;
+
+/// Seconds for a lattice of 1, 8, 27 … cubes: Griffith on an ICL 1904S, Brown on a PDP-11/34.
+const PAPERS: [[&str; 2]; 7] = [
+    ["0.257", "2.73"],
+    ["2.28", "13.88"],
+    ["8.84", "53.5"],
+    ["23.6", "147.9"],
+    ["51.5", "298"],
+    ["92.6", "573"],
+    ["161", "did not fit"],
+];
+
+/// Builds the counting image, runs it, and prints the table of `docs/performance.md`.
+pub fn count() -> Result<()> {
+    let target = Board::Lm3s6965.target();
+    set_up::emulator(Board::Lm3s6965)?;
+    let mut cargo = set_up::toolchain(target)?.cargo("build", target);
+    let options = ["--package=penup", "--bin=bench", "--profile=firmware", "--no-default-features"];
+    // Apart from the firmware's, so that neither is built anew for the other.
+    let folder = crate::root().join("target/bench");
+    run(cargo.arg("--quiet").args(options).args(["--features=mps2", "--target-dir"]).arg(&folder))?;
+    let mut qemu = Command::new("qemu-system-arm");
+    qemu.args([
+        "-machine",
+        "mps2-an385",
+        "-display",
+        "none",
+        "-monitor",
+        "none",
+        "-serial",
+        "none",
+    ])
+    .args(["-semihosting-config", "enable=on,target=native", "-icount", "shift=0,sleep=off"])
+    .arg("-kernel")
+    .arg(folder.join(target).join("firmware/bench"))
+    .stderr(Stdio::inherit());
+    let answer = qemu.output().with_context(|| format!("cannot run {}", describe(&qemu)))?;
+    ensure!(answer.status.success(), "{}: {}", describe(&qemu), answer.status);
+    print(&String::from_utf8_lossy(&answer.stdout));
+    Ok(())
+}
+
+fn print(counts: &str) {
+    println!(
+        "| scene | vertices | edges | view | visibility | an edge | order | at 50 MHz, s | Griffith, s | Brown, s |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|---|");
+    let papers = PAPERS.iter().copied().chain(std::iter::repeat(["", ""]));
+    for (line, [griffith, brown]) in counts.lines().zip(papers) {
+        let words: Vec<&str> = line.split(' ').collect();
+        let numbers: Vec<u64> = words.iter().skip(1).filter_map(|word| word.parse().ok()).collect();
+        let (Some(name), [vertices, corners, view, visibility, order]) =
+            (words.first(), &numbers[..])
+        else {
+            println!("{line}");
+            continue;
+        };
+        // An edge has two corners, as of two faces or of one bar.
+        let edges = corners / 2;
+        // QEMU counts instructions; the core takes some five cycles for four.
+        let seconds = (view + visibility + order) as f64 * 1.25 / 50e6;
+        println!(
+            "| {name} | {vertices} | {edges} | {} | {} | {} | {} | {seconds:.2} | {griffith} | {brown} |",
+            thousands(*view),
+            thousands(*visibility),
+            thousands(visibility / edges.max(1)),
+            thousands(*order),
+        );
+    }
+}
+
+/// With a space after each three digits.
+fn thousands(number: u64) -> String {
+    let digits = number.to_string();
+    let groups: Vec<&str> = digits
+        .as_bytes()
+        .rchunks(3)
+        .rev()
+        .filter_map(|group| std::str::from_utf8(group).ok())
+        .collect();
+    groups.join(" ")
+}

@@ -1,0 +1,120 @@
+//! The pictures of the papers, drawn by penup, on one page.
+
+use std::fmt::Write as _;
+use std::fs;
+
+use anyhow::{Context, Result};
+
+use crate::command::run;
+
+/// A figure: the paper's number and words, a scene, and how it is seen.
+struct Figure {
+    title: &'static str,
+    scene: &'static str,
+    view: &'static [&'static str],
+    /// Drawn once like this; else once with hidden lines dotted and once erased.
+    alone: bool,
+}
+
+const fn hidden(title: &'static str, scene: &'static str, view: &'static [&'static str]) -> Figure {
+    Figure { title, scene, view, alone: false }
+}
+
+const fn plain(title: &'static str, scene: &'static str, view: &'static [&'static str]) -> Figure {
+    Figure { title, scene, view, alone: true }
+}
+
+/// The chapters of the page.
+const CHAPTERS: [(&str, &[Figure]); 5] = [
+    (
+        "Projections (Harrison, chapter 2)",
+        &[
+            plain("Figure 3: a rotating cube", "rotating", &["--see", "wire"]),
+            plain("Figure 4: a non-convex polyhedron", "notched", &["--see", "wire"]),
+            plain("Figure 5: a wire frame", "lattice2", &["--see", "wire"]),
+            plain("Figure 6: a wire frame", "icosahedron", &["--see", "wire"]),
+            plain("Figure 7: the effect of perspective, from near", "lattice3", &["--eye=-2,-4,6"]),
+            plain("and from afar", "lattice3", &["--eye=-20,-40,60"]),
+            plain("Isometric", "lblock", &["--projection", "isometric"]),
+            plain("Cavalier", "lblock", &["--projection", "cavalier"]),
+        ],
+    ),
+    (
+        "Convex solids, from their vertices alone (Harrison, chapter 3)",
+        &[
+            hidden("Figures 8 and 14: a cube", "cube", &["--see", "vertices"]),
+            hidden("Figures 9 and 11: an icosahedron", "icosahedron", &["--see", "vertices"]),
+            hidden("Figures 10, 12 and 17: an octahedron", "octahedron", &["--see", "vertices"]),
+            hidden("Figures 13 and 15: 18 faces", "eighteen", &["--see", "vertices"]),
+        ],
+    ),
+    (
+        "A convex solid, from its edges (Zámožík and Zaťková)",
+        &[hidden("The dodecahedron", "dodecahedron", &["--see", "edges"])],
+    ),
+    (
+        "Any solids (Harrison, chapters 3 and 4)",
+        &[
+            hidden("Figure 16: a rotating cube", "rotating", &[]),
+            hidden("Figures 18 and 19: a block cut to an L", "lblock", &[]),
+            hidden("Figures 20 and 21: a notch", "notched", &["--eye=5.5,9,5", "--at=2,1.5,1"]),
+            hidden("Figures 22 and 23: eight cubes", "lattice2", &["--eye=-6.37,-8.71,10.13"]),
+            hidden("Figures 24 and 25: boxes through each other", "interpen", &[]),
+        ],
+    ),
+    ("Curves (Allard and Bown)", &[plain("Isobars, after their figure 11", "isobars", &["--fit"])]),
+];
+
+/// Draws every figure into `docs/gallery` and writes the page.
+pub fn make() -> Result<()> {
+    let folder = crate::root().join("docs/gallery");
+    fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
+    let mut page = String::from(
+        "# Gallery\n\nThe figures of the papers, or their like, as penup draws them. Ink is dark, moves with the pen up are \
+         faint. `cargo xtask gallery` makes this page.\n",
+    );
+    for (chapter, figures) in CHAPTERS {
+        write!(page, "\n## {chapter}\n\n| | | |\n|---|---|---|\n")?;
+        for figure in figures {
+            let (vertices, scene) = (count_vertices(figure.scene)?, figure.scene);
+            write!(
+                page,
+                "| {}; [{scene}.obj](../../scenes/{scene}.obj), {vertices} vertices |",
+                figure.title
+            )?;
+            let ways: &[&str] = if figure.alone { &[""] } else { &["dotted", "erased"] };
+            for way in ways {
+                let name = [scene, &words(figure.view), way].join("-");
+                let name = format!("{}.svg", name.trim_end_matches('-').replace("--", "-"));
+                println!("penup: docs/gallery/{name}");
+                draw(figure, way, &folder.join(&name).display().to_string())?;
+                write!(page, " ![{} {way}]({name}) |", figure.title)?;
+            }
+            page += if figure.alone { " |\n" } else { "\n" };
+        }
+    }
+    fs::write(folder.join("README.md"), page).context("cannot write the page")
+}
+
+fn draw(figure: &Figure, hidden: &str, to: &str) -> Result<()> {
+    let file = crate::root().join(format!("scenes/{}.obj", figure.scene)).display().to_string();
+    let mut options = vec![file, format!("--svg={to}"), "--page=80x80".into(), "--margin=3".into()];
+    options.extend(figure.view.iter().map(|word| (*word).to_owned()));
+    if !hidden.is_empty() {
+        options.push(format!("--hidden={hidden}"));
+    }
+    run(&mut crate::client("preview", &options))
+}
+
+/// What of the options goes into a file's name.
+fn words(view: &[&str]) -> String {
+    let text = view.join("-").replace(['=', ','], "-");
+    text.trim_start_matches('-').to_owned()
+}
+
+fn count_vertices(scene: &str) -> Result<usize> {
+    let path = crate::root().join(format!("scenes/{scene}.obj"));
+    let text =
+        fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
+    Ok(text.lines().filter(|line| line.starts_with("v ")).count())
+}
