@@ -35,6 +35,12 @@ pub trait PreviewPlotter: Link {
     /// # Errors
     /// There was none.
     fn result(&mut self) -> Result<JobResult, Error>;
+
+    /// The job of the model that was sent, as a tape ([`crate::tape`]).
+    ///
+    /// # Errors
+    /// What the plotter refuses.
+    fn tape(&mut self) -> Result<Vec<u8>, Error>;
 }
 
 /// Starts the emulated `board`.

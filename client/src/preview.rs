@@ -47,9 +47,8 @@ impl InMemory {
 
     /// Polls until every byte is answered; a plot that began goes on in [`Link::receive`].
     fn answer(&mut self) {
-        while !self.board.has_read_all() {
-            self.plotter.poll(&mut self.board);
-        }
+        // What waits for the machine goes on in `receive`.
+        while !self.board.has_read_all() && self.plotter.poll(&mut self.board) {}
     }
 }
 
@@ -99,13 +98,17 @@ fn count_steps(changes: &[penup::boards::host::Stamped]) -> u64 {
 }
 
 impl PreviewPlotter for InMemory {
+    fn tape(&mut self) -> Result<Vec<u8>, Error> {
+        let computed = self.plotter.compute(&mut StopWatch::default(), &mut Segments::default());
+        computed.map_err(refused)?;
+        let settings = *self.plotter.machine().settings();
+        let tape = crate::tape::record(settings, &mut self.plotter.strokes());
+        tape.map_err(|error| refused(penup::protocol::Refusal::Machine(error)))
+    }
+
     fn result(&mut self) -> Result<JobResult, Error> {
         let mut watch = StopWatch::default();
         let mut segments = Segments::default();
-        let refused = |refusal: penup::protocol::Refusal| Error::Board {
-            board: "host".to_owned(),
-            reason: refusal.to_string(),
-        };
         self.plotter.compute(&mut watch, &mut segments).map_err(refused)?;
         let timings_ms = watch.stop();
         let steps = self.steps_per_mm();
@@ -130,6 +133,11 @@ impl PreviewPlotter for InMemory {
             pen: self.pen.as_mut().map(PenWatch::runs).unwrap_or_default(),
         })
     }
+}
+
+/// What the library refuses on this computer.
+fn refused(refusal: impl std::fmt::Display) -> Error {
+    Error::Board { board: "host".to_owned(), reason: refusal.to_string() }
 }
 
 /// How long each stage takes.
