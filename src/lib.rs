@@ -17,8 +17,8 @@ pub mod fixed;
 pub mod stage;
 
 pub mod geometry;
-pub mod model;
 pub mod curve;
+pub mod model;
 pub mod view;
 pub mod visibility;
 pub mod convex;

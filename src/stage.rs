@@ -73,6 +73,23 @@ impl<'a> Scratch<'a> {
         items_mut(taken, count).ok_or(out_of_scratch)
     }
 
+    /// Takes as many items of `T` as `fill` says that it wrote to the front of all that is left.
+    ///
+    /// # Errors
+    /// What `fill` returns; nothing is taken then.
+    pub fn take_filled<T: Pod, E>(
+        &mut self,
+        fill: impl FnOnce(&mut [T]) -> Result<usize, E>,
+    ) -> Result<&'a mut [T], E> {
+        let room = self.available_bytes() / size_of::<T>();
+        let count = fill(items_mut(self.words, room).unwrap_or(&mut []))?.min(room);
+        let words = core::mem::take(&mut self.words);
+        // At most what there is, since `count` items fit.
+        let (taken, rest) = words.split_at_mut(Self::bytes_for::<T>(count) / size_of::<u64>());
+        self.words = rest;
+        Ok(items_mut(taken, count).unwrap_or(&mut []))
+    }
+
     /// Lends what is left to a stage within this stage.
     pub fn reborrow(&mut self) -> Scratch<'_> {
         Scratch { words: self.words }
@@ -140,6 +157,28 @@ pub fn heap_sort_by_key<T, K: Ord>(items: &mut [T], key: impl Fn(&T) -> K) {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Aborted;
+
+/// Why a stage ended early.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum StageError {
+    /// Not enough working memory.
+    Scratch(OutOfScratch),
+    /// The user gave up.
+    Aborted,
+}
+
+impl From<OutOfScratch> for StageError {
+    fn from(error: OutOfScratch) -> Self {
+        Self::Scratch(error)
+    }
+}
+
+impl From<Aborted> for StageError {
+    fn from(_: Aborted) -> Self {
+        Self::Aborted
+    }
+}
 
 /// What a job computes before it moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -24,6 +24,8 @@ pub enum Command {
     Plot(PlotArgs),
     /// Show what would be drawn, without a plotter
     Preview(PreviewArgs),
+    /// Turn the traced polylines of a plan into few B-spline control points
+    Fit(FitArgs),
 }
 
 /// Options of `penup plot`.
@@ -65,6 +67,26 @@ pub struct PreviewArgs {
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..),
           allow_hyphen_values = true, help_heading = "Output")]
     pub repeat: u32,
+}
+
+/// Options of `penup fit`.
+#[derive(Debug, Args)]
+pub struct FitArgs {
+    /// The OBJ file with the polylines, a plan in mm
+    #[arg(value_name = "FILE")]
+    pub file: PathBuf,
+    /// How far the curves may stray from the polylines
+    #[arg(
+        long,
+        value_name = "MM",
+        default_value = "0.1",
+        value_parser = positive,
+        allow_hyphen_values = true
+    )]
+    pub tolerance: f64,
+    /// The OBJ file to write [default: FILE with -fitted in its name]
+    #[arg(long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
 }
 
 /// Where the pictures go. If no output is named: `plot.svg` and `plot.png`.
@@ -279,6 +301,13 @@ fn page(text: &str) -> Result<Page, String> {
     }
 }
 
+fn positive(text: &str) -> Result<f64, String> {
+    match number(text)? {
+        length if length > 0.0 => Ok(length),
+        _ => Err("a length above 0 is needed".to_owned()),
+    }
+}
+
 fn margin(text: &str) -> Result<f64, String> {
     match number(text)? {
         margin if margin >= 0.0 => Ok(margin),
@@ -296,7 +325,7 @@ mod tests {
         let cli = Cli::try_parse_from(line).map_err(|error| error.to_string())?;
         match cli.command {
             Command::Preview(args) => Ok(args.view.settings()),
-            Command::Plot(_) => Err("the wrong command".to_owned()),
+            Command::Plot(_) | Command::Fit(_) => Err("the wrong command".to_owned()),
         }
     }
 

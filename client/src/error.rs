@@ -22,6 +22,14 @@ pub enum Error {
         /// As the user named it.
         file: String,
     },
+    /// The file's polylines cannot be fitted.
+    #[error("{file}: {source}")]
+    Fit {
+        /// As the user named it.
+        file: String,
+        /// Why.
+        source: crate::fit::FitError,
+    },
     /// A file must not command the machine.
     #[error("{}:{}: a file cannot hold commands for the plotter\n    {}", origin.file, origin.line, origin.text)]
     CommandInFile {

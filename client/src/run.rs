@@ -1,7 +1,8 @@
-//! The two commands.
+//! The commands.
 
-use crate::cli::{Cli, Command, PictureArgs, PlotArgs, PreviewArgs};
+use crate::cli::{Cli, Command, FitArgs, PictureArgs, PlotArgs, PreviewArgs};
 use crate::error::Error;
+use crate::fit::fit_obj;
 use crate::job::{Lengths, job_lines};
 use crate::link::{Link, SerialLink};
 use crate::machines;
@@ -23,6 +24,7 @@ pub fn run(cli: &Cli, interrupt: &AtomicBool) -> Result<String, Error> {
     match &cli.command {
         Command::Plot(args) => plot(args, interrupt),
         Command::Preview(args) => preview(args, interrupt),
+        Command::Fit(args) => fit(args),
     }
 }
 
@@ -69,6 +71,19 @@ fn preview(args: &PreviewArgs, interrupt: &AtomicBool) -> Result<String, Error> 
     }
     let lengths = Lengths { pen_down_mm: result.pen_down_mm, pen_up_mm: result.pen_up_mm };
     Ok(summary(&files, result.strokes.len(), lengths))
+}
+
+fn fit(args: &FitArgs) -> Result<String, Error> {
+    let file = args.file.display().to_string();
+    let text = std::fs::read_to_string(&args.file)
+        .map_err(|source| Error::File { file: file.clone(), source })?;
+    let fitted = fit_obj(&text, args.tolerance)
+        .map_err(|source| Error::Fit { file: file.clone(), source })?;
+    let stem = args.file.file_stem().unwrap_or_default().to_string_lossy();
+    let beside = || args.file.with_file_name(format!("{stem}-fitted.obj"));
+    let output = args.output.clone().unwrap_or_else(beside);
+    output::write(&output, fitted.obj.as_bytes())?;
+    Ok(format!("{}: {}", output.display(), fitted.saving))
 }
 
 /// Sends a whole job over `link` and draws it `times` times.

@@ -199,3 +199,26 @@ mod at_a_port {
         assert_eq!(plotter.unplug().aborts, 2);
     }
 }
+
+#[test]
+fn a_trace_is_fitted_and_the_curves_are_drawn() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let circle = |degree: u32| {
+        let (sine, cosine) = f64::from(degree).to_radians().sin_cos();
+        format!("v {:.3} {:.3} 0\n", 100.0 + 50.0 * cosine, 100.0 + 50.0 * sine)
+    };
+    let numbers: Vec<String> = (1..=181).map(|number| number.to_string()).collect();
+    let trace: String = (0..=180).map(circle).collect();
+    fs::write(folder.path().join("arc.obj"), format!("{trace}l {}\n", numbers.join(" ")))
+        .expect("written");
+    let (code, said, _) = penup(folder.path(), &["fit", "arc.obj", "--tolerance", "0.05"]);
+    assert_eq!(code, Some(0));
+    assert!(said.contains("arc-fitted.obj: 1 polylines: 181 vertices became"), "{said}");
+    let (code, said, error) = penup(folder.path(), &["preview", "arc-fitted.obj"]);
+    assert_eq!(code, Some(0), "{error}");
+    // Half the circumference.
+    assert!(said.contains("1 strokes, 157."), "{said}");
+    let (code, _, error) = penup(folder.path(), &["fit", "arc-fitted.obj"]);
+    assert_eq!(code, Some(1));
+    assert!(error.contains("no polyline"), "{error}");
+}

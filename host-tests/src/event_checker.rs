@@ -3,10 +3,11 @@
 
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
 
-use crate::pin_machine::{Change, Stamped};
+use penup::boards::host::{Change, Stamped};
 use penup::drawing::PagePoint;
-use penup::machine::{Setting, Settings};
+use penup::machine::{Setting, Settings, Target, Value};
 use penup::motion::{EventKind, StepEvent, TICKS_PER_SECOND};
+use penup::step::Line;
 use std::collections::BTreeSet;
 
 /// What the events of a job came to.
@@ -150,8 +151,64 @@ pub fn greatest_acceleration(times: &[f64], places: &[f64], window: f64) -> f64 
     greatest
 }
 
+/// Where a plan along `targets` from the origin is when each move leaves (mm), and where the move
+/// leads. The build is Cartesian.
+fn plan(targets: &[Target], settings: &Settings) -> Vec<(f64, PagePoint)> {
+    let [x, y] = settings.page_steps().map(|steps| steps.to_num::<f64>());
+    let (mut at, mut start) = (PagePoint::default(), 0.0);
+    let mut moves = Vec::new();
+    for target in targets {
+        let (dx, dy) = (target.point.x - at.x, target.point.y - at.y);
+        let length = (f64::from(dx) / x).hypot(f64::from(dy) / y);
+        let count = f64::from(dx.abs().max(dy.abs()));
+        let mut place = start + length * 0.5 / count;
+        for direction in Line::new(at, target.point) {
+            at = direction.from_point(at);
+            moves.push((place, at));
+            place += length / count;
+        }
+        start += length;
+    }
+    moves
+}
+
+/// Checks that `runs` follow `targets` from the origin, from rest to rest between two moves of the
+/// pen; `cut` if an alarm ended the last of them.
+///
+/// # Panics
+/// Off the path; more than 1.05 times the acceleration over any 5 ms; a run that begins or ends
+/// faster than from or to rest.
+pub fn check_speed(runs: &[Run], targets: &[Target], settings: &Settings, cut: bool) {
+    let acceleration: f64 =
+        settings.get(Setting::AccelerationX).min(settings.get(Setting::AccelerationY)).to_num();
+    let plan = plan(targets, settings);
+    let mut rest = plan.as_slice();
+    for (number, run) in runs.iter().enumerate() {
+        let (moves, later) = rest.split_at(run.points.len());
+        rest = later;
+        let (places, points): (Vec<f64>, Vec<PagePoint>) = moves.iter().copied().unzip();
+        assert_eq!(run.points, points, "off the path");
+        let measured = greatest_acceleration(&run.times, &places, 0.005);
+        assert!(measured <= 1.05 * acceleration, "run {number}: {measured} mm/s2");
+        let from_rest = |times: [f64; 2], places: [f64; 2]| {
+            let length = places[1] - places[0];
+            let speed = length / (times[1] - times[0]);
+            // The rest lies at most a move before the first of them.
+            let most = (2.0 * acceleration * 2.0 * length).sqrt();
+            assert!(speed <= 1.05 * most, "run {number}: {speed} mm/s beside a rest, not {most}");
+        };
+        let is_cut = cut && runs[number + 1..].iter().all(|later| later.points.is_empty());
+        if let (&[a, b, ..], &[s, t, ..]) = (&run.times[..], &places[..]) {
+            from_rest([a, b], [s, t]);
+        }
+        if let (&[.., a, b], &[.., s, t], false) = (&run.times[..], &places[..], is_cut) {
+            from_rest([a, b], [s, t]);
+        }
+    }
+}
+
 /// What the pins drew.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Drawn {
     /// The moves made with the pen down, the lesser point first.
     pub inked: BTreeSet<(PagePoint, PagePoint)>,
@@ -161,6 +218,8 @@ pub struct Drawn {
     pub last_step: u64,
     /// The pen's height at the end.
     pub pen: u8,
+    /// The moves between two moves of the pen.
+    pub runs: Vec<Run>,
 }
 
 /// Checks what the pins did against the settings.
@@ -168,11 +227,14 @@ pub struct Drawn {
 /// # Panics
 /// At the first change that breaks a rule: a pulse shorter or a pause shorter than a pulse, a
 /// direction that changes during a pulse or too shortly before one, a step with the drivers off, a
-/// step before the pen's dwell is over.
+/// step before the pen's dwell is over, a step that leads out of the soft limits or further beyond
+/// them (the origin is where the pins began).
 pub fn check_pins(trace: &[Stamped], settings: &Settings) -> Drawn {
     let pulse = u64::from(settings.microseconds_as_ticks(Setting::StepPulse));
     let setup = u64::from(settings.microseconds_as_ticks(Setting::DirectionSetup));
-    let mut drawn = Drawn::default();
+    let mut drawn = Drawn { runs: vec![Run::default()], ..Drawn::default() };
+    let build = settings.kinematics();
+    let second = f64::from(TICKS_PER_SECOND);
     // Of x and y: pulse high, since when, up, since when.
     let mut axes = [(false, None::<u64>, true, None::<u64>); 2];
     let (mut enabled, mut pen_ready) = (false, 0);
@@ -194,6 +256,7 @@ pub fn check_pins(trace: &[Stamped], settings: &Settings) -> Drawn {
                     };
                     pen_ready = time + u64::from(settings.milliseconds_as_ticks(dwell));
                     drawn.pen = height;
+                    drawn.runs.push(Run { height, ..Run::default() });
                 }
                 Change::UpX(up) => turn(&mut axes[0], up, time),
                 Change::UpY(up) => turn(&mut axes[1], up, time),
@@ -208,12 +271,29 @@ pub fn check_pins(trace: &[Stamped], settings: &Settings) -> Drawn {
             if drawn.pen >= 64 {
                 drawn.inked.insert((at.min(next), at.max(next)));
             }
+            if settings.is_on(Setting::SoftLimits) && !settings.is_on(Setting::Homing) {
+                let beyond = [at, next].map(|motors| beyond(build.page(motors), settings));
+                assert!(beyond[1] <= beyond[0], "{time}: out of the soft limits at {next:?}");
+            }
+            let run = drawn.runs.last_mut().expect("never empty");
+            run.times.push(time as f64 / second);
+            run.points.push(next);
             at = next;
             drawn.last_step = time;
         }
     }
     drawn.end = at;
     drawn
+}
+
+/// Steps beyond the travel.
+fn beyond(page: PagePoint, settings: &Settings) -> i64 {
+    let [x, y] = settings.page_steps();
+    let over = |at: i32, travel: Setting, steps: Value| {
+        let most = settings.get(travel).to_num::<f64>() * steps.to_num::<f64>();
+        i64::from(at - at.clamp(0, most as i32)).abs()
+    };
+    over(page.x, Setting::TravelX, x) + over(page.y, Setting::TravelY, y)
 }
 
 type AxisPins = (bool, Option<u64>, bool, Option<u64>);

@@ -1,109 +1,10 @@
 //! A plotter made of pins: the library's own interrupt code on pins that remember what they did.
 
-use embedded_hal::digital::{ErrorType, OutputPin};
 use heapless::spsc::Queue;
+use penup::boards::host::{Stamped, traced_pulser};
 use penup::drawing::PagePoint;
-use penup::machine::{Machine, MachineError, Path, Pen, Pins, Pulser, PulserState, Settings};
+use penup::machine::{Machine, MachineError, Path, PulserState, Settings};
 use penup::motion::{Block, EventQueue, StepEvent};
-use std::cell::{Cell, RefCell};
-use std::convert::Infallible;
-use std::rc::Rc;
-
-/// What a pin did.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Change {
-    /// Step pin of x.
-    StepX(bool),
-    /// Step pin of y.
-    StepY(bool),
-    /// Direction pin of x; high counts up.
-    UpX(bool),
-    /// Direction pin of y; high counts up.
-    UpY(bool),
-    /// Enable pin of the drivers.
-    Enable(bool),
-    /// Height of the pen.
-    Pen(u8),
-}
-
-/// A change and its time in ticks from the start.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Stamped {
-    /// Ticks from the start.
-    pub time: u64,
-    /// What changed.
-    pub change: Change,
-}
-
-/// What all pins did, in order. Writes that change nothing leave no trace.
-#[derive(Debug, Default)]
-pub struct Trace {
-    now: Cell<u64>,
-    changes: RefCell<Vec<Stamped>>,
-}
-
-impl Trace {
-    fn note(&self, change: Change) {
-        self.changes.borrow_mut().push(Stamped { time: self.now.get(), change });
-    }
-    /// Ticks from the start.
-    pub fn now(&self) -> u64 {
-        self.now.get()
-    }
-    /// All changes so far.
-    pub fn changes(&self) -> Vec<Stamped> {
-        self.changes.borrow().clone()
-    }
-}
-
-/// A pin that notes its changes.
-#[derive(Debug)]
-pub struct TracedPin {
-    trace: Rc<Trace>,
-    level: Option<bool>,
-    change: fn(bool) -> Change,
-}
-
-impl ErrorType for TracedPin {
-    type Error = Infallible;
-}
-
-impl TracedPin {
-    fn set(&mut self, level: bool) {
-        if self.level.replace(level) != Some(level) {
-            self.trace.note((self.change)(level));
-        }
-    }
-}
-
-impl OutputPin for TracedPin {
-    fn set_low(&mut self) -> Result<(), Infallible> {
-        self.set(false);
-        Ok(())
-    }
-    fn set_high(&mut self) -> Result<(), Infallible> {
-        self.set(true);
-        Ok(())
-    }
-}
-
-/// A pen that notes its heights.
-#[derive(Debug)]
-pub struct TracedPen {
-    trace: Rc<Trace>,
-    height: Option<u8>,
-}
-
-impl Pen for TracedPen {
-    fn set_height(&mut self, height: u8) {
-        if self.height.replace(height) != Some(height) {
-            self.trace.note(Change::Pen(height));
-        }
-    }
-}
-
-type TracedPulser<'q> =
-    Pulser<'q, TracedPin, TracedPin, TracedPin, TracedPin, TracedPin, TracedPen>;
 
 /// A queue that never fills and remembers everything.
 #[derive(Debug, Default)]
@@ -193,18 +94,7 @@ pub fn run_with(
 ) -> Vec<Stamped> {
     let state = PulserState::new();
     let mut queue: Queue<StepEvent, 256> = Queue::new();
-    let (mut producer, consumer) = queue.split();
-    let trace = Rc::new(Trace::default());
-    let pin = |change| TracedPin { trace: Rc::clone(&trace), level: None, change };
-    let pins = Pins {
-        step_x: pin(Change::StepX),
-        direction_x: pin(Change::UpX),
-        step_y: pin(Change::StepY),
-        direction_y: pin(Change::UpY),
-        enable: pin(Change::Enable),
-    };
-    let pen = TracedPen { trace: Rc::clone(&trace), height: None };
-    let mut pulser: TracedPulser<'_> = Pulser::new(pins, pen, consumer, &state);
+    let (mut producer, mut pulser, trace) = traced_pulser(&mut queue, &state);
     let mut blocks = [Block::EMPTY; 128];
     let mut machine = Machine::new(settings, &mut blocks, &state, 2_500_000);
     let mut interrupt: Option<u64> = None;
@@ -221,12 +111,12 @@ pub fn run_with(
             if due >= next_turn {
                 break Some(due);
             }
-            trace.now.set(due);
+            trace.set_now(due);
             match pulser.tick() {
                 Some(ticks) => due += u64::from(ticks),
                 None => break None,
             }
         };
-        trace.now.set(next_turn);
+        trace.set_now(next_turn);
     }
 }

@@ -35,9 +35,7 @@ impl Bench {
     /// Sends `text` and returns what comes back until everything is read.
     pub fn say(&mut self, text: &str) -> String {
         self.board.receive(text.as_bytes());
-        while !self.board.has_read_all() {
-            self.plotter.poll(&mut self.board);
-        }
+        while self.plotter.poll(&mut self.board) || !self.board.has_read_all() {}
         self.heard()
     }
 
@@ -51,7 +49,9 @@ impl Bench {
         for _ in 0..3_600_000 {
             let busy = self.plotter.poll(&mut self.board);
             self.board.wait();
-            if !busy && self.plotter.machine().stands() {
+            // What waited for the last event goes on in the turn after it.
+            let stands = !busy && self.plotter.machine().stands();
+            if stands && !self.plotter.poll(&mut self.board) {
                 return;
             }
         }

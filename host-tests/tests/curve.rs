@@ -2,8 +2,7 @@
 //! chords that there can be.
 #![allow(clippy::unwrap_used)] // a test may: clippy sees only its `#[test]` functions as tests
 
-use penup::curve::{CurveStore, FRACTION_BITS, Fine, Knots, Parameter, Point, Spline};
-use penup::fixed::Decimal;
+use penup::curve::{FRACTION_BITS, Fine, Knots, Parameter, Point, Spline};
 use penup_host_tests::curve_reference::{distance, fewest_chords, spline_at};
 use proptest::prelude::*;
 
@@ -226,39 +225,4 @@ fn a_chord_may_stay_by_a_bend_where_shorter_ones_do_not() {
         let found = flattened(&Sketch { knots, ..sketch }, parallel, 128, 300);
         assert!(found.chords <= most, "{} for {most}", found.chords);
     }
-}
-
-#[test]
-fn the_isobars_of_figure_11_are_read_and_drawn() {
-    const UNITS: f64 = (1 << 16) as f64; // to a millimetre
-    let mut vertices: Vec<Point> = Vec::new();
-    let mut words = heapless::Vec::<u32, 256>::new();
-    let mut curves = CurveStore::new(&mut words);
-    for line in include_str!("../../scenes/isobars.obj").lines() {
-        let (keyword, rest) = line.split_once(' ').unwrap_or((line, ""));
-        let mut numbers = rest.split(' ').filter_map(|word| Decimal::parse(word).ok());
-        match keyword {
-            "v" => vertices
-                .push([0; 3].map(|_: i32| (numbers.next().unwrap().to_f64() * UNITS) as i32)),
-            "deg" => curves.set_degree(rest.parse().unwrap()).unwrap(),
-            "curv" => {
-                let ends = [numbers.next().unwrap(), numbers.next().unwrap()];
-                let control = numbers.map(|number| number.to_whole().unwrap() as u16 - 1);
-                curves.begin(ends, control).unwrap();
-            }
-            "parm" => curves.add_knots(numbers).unwrap(),
-            "end" => curves.end().unwrap(),
-            _ => assert!(["#", "l", "cstype"].contains(&keyword), "{line}"),
-        }
-    }
-    // 55 vertices for the isobars and 28 for the map, as in the paper.
-    assert_eq!((curves.count(), vertices.len()), (9, 55 + 28));
-    // 80 steps to a millimetre, half a step.
-    let on_page = |place: [i64; 3]| Some([(place[0] * 80) >> 16, (place[1] * 80) >> 16]);
-    let chords: Vec<usize> = curves
-        .iter()
-        .map(|curve| curve.spline(&vertices).unwrap().chords(on_page, 128).count() - 1)
-        .collect();
-    // A polyline would need twelve times as many vertices.
-    assert!((600..=690).contains(&chords.iter().sum::<usize>()), "{chords:?}");
 }

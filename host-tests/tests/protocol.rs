@@ -28,7 +28,7 @@ fn refusal(answer: &str) -> Option<u16> {
 fn a_new_plotter_greets_and_is_idle() {
     let mut bench = Bench::new();
     assert_eq!(bench.heard(), "\nGrbl 1.1h [penup 0.1.0 '$' for help]\n");
-    assert_eq!(bench.say("?"), "<Idle|MPos:0.000,0.000,0.000|Strokes:0/0|Ink:0/0>\n");
+    assert_eq!(bench.say("?"), "<Idle|MPos:0.000,0.000,0.000|Strokes:0/0|Ink:0/0|Left:0>\n");
     assert_eq!(bench.say("\n"), "ok\n");
     assert_eq!(bench.say("$model\n").lines().last(), Some("ok"));
 }
@@ -40,7 +40,15 @@ fn each_refusal_has_its_own_number_and_changes_nothing() {
     let long = format!("# {}\n", "x".repeat(300));
     for (line, number) in [
         ("hello\n", 1),
-        ("G0 X10\n", 1),
+        ("G0 X\n", 2),
+        ("G5 X1\n", 20),
+        ("M7\n", 20),
+        ("G0 X10 U3\n", 20),
+        ("$H\n", 5),
+        ("G0 X-1\n", 15),
+        ("$J=Y500\n", 15),
+        ("G2 X10 Y0\n", 33),
+        ("G3 X10 I400\n", 33),
         ("v 1 2 x\n", 2),
         ("$page=axb\n", 2),
         ("$nonsense\n", 3),
@@ -132,7 +140,7 @@ fn a_plan_is_drawn_at_true_size_or_refused_with_its_size() {
     bench.finish();
     assert_eq!(
         bench.say("?"),
-        "<Idle|MPos:50.000,50.000,0.000|Strokes:1/1|Ink:300/300>\n"
+        "<Idle|MPos:50.000,50.000,0.000|Strokes:1/1|Ink:300/300|Left:0>\n"
             .replace("50.000,50", "350.000,50")
     );
     assert_eq!(bench.say("$page=210x297\n$fit=on\n$plot\n"), "ok\nok\nok\n");

@@ -3,11 +3,11 @@
 //!
 //! Time passes only in [`Board::wait`] and [`HostBoard::pass`], so a run is the same every time.
 
-use crate::machine::{Pen, Pins, Pulser, PulserState};
+use crate::machine::{Contacts, Pen, Pins, Pulser, PulserState};
 use crate::model::{Corner, Position};
 use crate::motion::{EventQueue, StepEvent};
 use crate::plotter::{Board, Lent, NO_MOVES};
-use crate::protocol::RealTime;
+use crate::protocol::{RealTime, Sorter};
 use core::convert::Infallible;
 use embedded_hal::digital::{ErrorType, OutputPin};
 use heapless::spsc::{Producer, Queue};
@@ -165,6 +165,7 @@ pub fn traced_pulser<'q, const N: usize>(
 /// The board.
 pub struct HostBoard<'q> {
     received: VecDeque<u8>,
+    sorter: Sorter,
     asked: RealTime,
     sent: Vec<u8>,
     producer: Producer<'q, StepEvent>,
@@ -172,6 +173,10 @@ pub struct HostBoard<'q> {
     trace: Rc<Trace>,
     /// When the step interrupt is due, in ticks from the start.
     due: Option<u64>,
+    contacts: Contacts,
+    state: &'q PulserState,
+    /// Ticks that sending a byte takes.
+    byte_ticks: u64,
 }
 
 impl core::fmt::Debug for HostBoard<'_> {
@@ -186,21 +191,25 @@ impl<'q> HostBoard<'q> {
         let (producer, pulser, trace) = traced_pulser(queue, state);
         Self {
             received: VecDeque::new(),
+            sorter: Sorter::new(),
             asked: RealTime::default(),
             sent: Vec::new(),
             producer,
             pulser,
             trace,
             due: None,
+            contacts: Contacts::default(),
+            state,
+            byte_ticks: 0,
         }
     }
 
     /// Bytes come over the line.
     pub fn receive(&mut self, bytes: &[u8]) {
         for byte in bytes {
-            match RealTime::of_byte(*byte) {
+            match self.sorter.sort(*byte) {
                 Some(asked) => {
-                    if asked.abort {
+                    if asked.has(RealTime::ABORT) {
                         self.received.clear();
                     }
                     self.asked = self.asked.and(asked);
@@ -208,6 +217,21 @@ impl<'q> HostBoard<'q> {
                 None => self.received.push_back(*byte),
             }
         }
+    }
+
+    /// Sends at this speed from now on; at first bytes take no time.
+    pub fn set_baud(&mut self, baud: u32) {
+        self.byte_ticks = u64::from(10 * crate::motion::TICKS_PER_SECOND / baud);
+    }
+
+    /// Closes and opens contacts.
+    pub fn set_contacts(&mut self, contacts: Contacts) {
+        self.contacts = contacts;
+    }
+
+    /// How often the queue of steps ran dry while the machine moved.
+    pub fn underruns(&self) -> u32 {
+        self.state.underruns()
     }
 
     /// Whether all bytes received have been read, and real-time ones acted on.
@@ -256,10 +280,21 @@ impl Board for HostBoard<'_> {
 
     fn write(&mut self, bytes: &[u8]) {
         self.sent.extend_from_slice(bytes);
+        self.pass(self.byte_ticks * bytes.len() as u64);
     }
 
     fn queue(&mut self) -> &mut dyn EventQueue {
         &mut self.producer
+    }
+
+    fn contacts(&mut self) -> Contacts {
+        self.contacts
+    }
+
+    fn step_now(&mut self) {
+        if !self.pulser.pulse_is_high() {
+            self.due = Some(self.trace.now());
+        }
     }
 
     fn wait(&mut self) {

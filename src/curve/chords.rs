@@ -9,12 +9,15 @@ const FINE_LIMIT: i64 = 1 << 29;
 
 /// A polynomial is halved at most this often to see whether it stays by a chord: its Bézier points then
 /// leave it by less than 1/4^`HALVINGS` of what they did.
-const HALVINGS: usize = 4;
+const HALVINGS: u32 = 4;
 
 /// Lengths are tried that differ by one part in 2^`SAMPLE_BITS`; between the best and the next, chords are
 /// then sought to one part in 2^`SEARCH_BITS`.
 const SAMPLE_BITS: u32 = 4;
 const SEARCH_BITS: u32 = 8;
+
+/// So many lengths are tried before shorter ones are looked for: the last spans a seventh of the first.
+const TRIED: usize = 32;
 
 /// The ends of chords along a spline, in order: where on the curve, and the place in whole units of the
 /// control points. The first is the curve's beginning, the last its end; no two in a row are equal.
@@ -39,7 +42,8 @@ pub struct Chords<'a, F> {
     /// How long that chord was.
     length: u32,
     /// The polynomial used last, and its number.
-    used: Option<(usize, Span)>,
+    span: Span,
+    used: Option<usize>,
 }
 
 /// An end of a chord: where on the curve, and the place in units of 2^-[`FRACTION_BITS`].
@@ -52,16 +56,28 @@ struct End {
 impl<'a, F: Fn([i64; 3]) -> Option<Fine>> Chords<'a, F> {
     pub(super) fn new(spline: Spline<'a>, project: F, tolerance: u16) -> Self {
         let (from, to) = spline.ends();
-        Self { spline, project, tolerance, last: None, length: to.0 - from.0, used: None }
+        Self {
+            spline,
+            project,
+            tolerance,
+            last: None,
+            length: to.0 - from.0,
+            span: Span::default(),
+            used: None,
+        }
     }
 
     /// The longest chord from `from` that can be proved, at most `most` long, at least 1.
     fn longest(&mut self, from: End, most: u32) -> u32 {
-        let mut first = (self.length >> SAMPLE_BITS).clamp(1, most);
+        let mut first = (self.length / 2).clamp(1, most);
+        let mut most = most;
         // `good` is proved, `bad` is not.
         let (mut good, mut bad) = loop {
             match self.farthest(from, first, most) {
-                (0, _) if first > 1 => first = (first >> SAMPLE_BITS).max(1),
+                (0, bad) if bad > 1 => {
+                    most = bad - 1;
+                    first = (first >> SAMPLE_BITS).clamp(1, most);
+                }
                 found => break found,
             }
         };
@@ -81,18 +97,19 @@ impl<'a, F: Fn([i64; 3]) -> Option<Fine>> Chords<'a, F> {
         good.max(1)
     }
 
-    /// The longest of a series of lengths, from `first` to `most`, that can be proved (0 if none can),
-    /// and the next of the series; the same if that is `most`.
+    /// The longest of a series of lengths, from `first` to `most`, that can be proved (0 if none of those
+    /// tried can), and the next of the series; the least tried if none can.
     ///
-    /// A chord may stay by the curve where shorter ones do not: round a bend, say, and then on. So all
-    /// lengths are tried for which the line of the chord passes near enough to the places before.
+    /// A chord may stay by the curve where shorter ones do not: round a bend, say, and then on. So those
+    /// lengths are tried, the longest first, for which the line of the chord passes near enough to the
+    /// places before.
     fn farthest(&mut self, from: End, first: u32, most: u32) -> (u32, u32) {
-        let mut candidates = heapless::Deque::<(u32, u32), 64>::new();
+        let next = |length: u32| length.saturating_add((length >> SAMPLE_BITS).max(1)).min(most);
+        let mut candidates = heapless::Deque::<u32, TRIED>::new();
         let origin = (self.project)(from.place);
         let mut cone = Cone::ALL;
         let mut length = first;
         while !cone.is_empty() {
-            let next = length.saturating_add((length >> SAMPLE_BITS).max(1)).min(most);
             let place = (self.project)(self.place(Parameter(from.at.0 + length)));
             let near = match (origin, place) {
                 (Some(origin), Some(place)) => cone.take(origin, place, self.tolerance),
@@ -104,19 +121,21 @@ impl<'a, F: Fn([i64; 3]) -> Option<Fine>> Chords<'a, F> {
                 if candidates.is_full() {
                     candidates.pop_front();
                 }
-                let _ = candidates.push_back((length, next)); // there is room
+                let _ = candidates.push_back(length); // there is room
             }
             if length == most {
                 break;
             }
-            length = next;
+            length = next(length);
         }
-        while let Some((length, next)) = candidates.pop_back() {
+        let mut least = first;
+        while let Some(length) = candidates.pop_back() {
             if self.fits(from, Parameter(from.at.0 + length)) {
-                return (length, next);
+                return (length, next(length));
             }
+            least = length;
         }
-        (0, first)
+        (0, least)
     }
 
     /// Whether the curve stays by the chord.
@@ -134,61 +153,61 @@ impl<'a, F: Fn([i64; 3]) -> Option<Fine>> Chords<'a, F> {
             if begin == end {
                 continue;
             }
-            let Some(span) = self.span(number) else { continue };
-            let part = span.part(begin, end);
-            if !is_within_a_unit(&part, from.place) && !self.stays(part, strip.as_ref()) {
+            if !self.load(number) {
+                continue;
+            }
+            let part = self.span.part(begin, end);
+            if !is_within_a_unit(&part, from.place) && !self.stays(&part, strip.as_ref()) {
                 return false;
             }
         }
         true
     }
 
-    /// Polynomial `number`; `None` if it has no length.
-    fn span(&mut self, number: usize) -> Option<Span> {
-        match self.used {
-            Some((used, span)) if used == number => Some(span),
-            _ => {
-                let span = self.spline.span(number)?;
-                self.used = Some((number, span));
-                Some(span)
-            }
+    /// Makes `self.span` polynomial `number`; `false` if that has no length.
+    fn load(&mut self, number: usize) -> bool {
+        if self.used != Some(number) {
+            self.used = self.spline.load(number, &mut self.span).then_some(number);
         }
+        self.used.is_some()
     }
 
     fn place(&self, t: Parameter) -> [i64; 3] {
-        match self.used {
-            Some((number, span)) if number == t.span() => span.at(t.local()),
-            _ => self.spline.exactly_at(t),
+        if self.used == Some(t.span()) {
+            self.span.at(t.local())
+        } else {
+            self.spline.exactly_at(t)
         }
     }
 
     /// Whether all of `span` is in the strip; without a strip, whether none of it is seen.
-    fn stays(&self, span: Span, strip: Option<&Strip>) -> bool {
+    fn stays(&self, span: &Span, strip: Option<&Strip>) -> bool {
         let inside = |point: &[i64; 3]| match ((self.project)(*point), strip) {
             (Some(place), Some(strip)) => strip.contains(place),
             (None, None) => true,
             _ => false,
         };
-        // Halves that wait, each with the halvings that it may still have: as many as were made.
-        let mut waiting = heapless::Vec::<(Span, usize), HALVINGS>::new();
-        let mut next = Some((span, HALVINGS));
-        while let Some((span, halvings)) = next {
+        // Part number `part` of 2^`halvings`. Cutting it out again costs less than a stack of halves to keep.
+        let (mut part, mut halvings) = (0, 0);
+        loop {
+            let length = Parameter::ONE >> halvings;
+            let piece = span.part(part * length, (part + 1) * length);
             // The first point is the last of the part before, which is inside.
-            if span.points().iter().skip(1).all(inside) {
-                next = waiting.pop();
-                continue;
-            }
-            // The last point is on the curve.
-            if halvings == 0 || !span.points().last().is_some_and(inside) {
+            if piece.points().iter().skip(1).all(inside) {
+                part += 1;
+                while part % 2 == 0 && halvings > 0 {
+                    (part, halvings) = (part / 2, halvings - 1);
+                }
+                if halvings == 0 {
+                    return true;
+                }
+            } else if halvings == HALVINGS || !piece.points().last().is_some_and(inside) {
+                // The last point is on the curve.
                 return false;
-            }
-            let (left, right) = span.split(Parameter::ONE / 2);
-            next = Some((left, halvings - 1));
-            if waiting.push((right, halvings - 1)).is_err() {
-                return false;
+            } else {
+                (part, halvings) = (2 * part, halvings + 1);
             }
         }
-        true
     }
 }
 

@@ -3,7 +3,7 @@
 //! A [`Spline`] looks at control points in memory that others own; it copies none. [`Spline::at`] gives a
 //! place on it, [`Spline::chords`] the fewest straight lines that stay within a tolerance on the page.
 //! An affine map of the control points is the same map of the curve, so a curve may be evaluated in the
-//! model's space or in view coordinates alike. [`CurveStore`] keeps the curves that the user sent.
+//! model's space or in view coordinates alike.
 //!
 //! Order m is degree m - 1: order 2 is the polygon itself, 3 the paper's quadratic, 4 the common cubic.
 //! Multiplicity is a control point named several times: the first and the last one m - 1 times make the
@@ -12,10 +12,8 @@
 
 mod chords;
 mod span;
-mod store;
 
 pub use chords::{Chords, Fine};
-pub use store::{CurveStore, StoreError, StoredCurve};
 
 use span::Span;
 
@@ -41,16 +39,31 @@ pub enum Knots<'a> {
     /// As many as control points and order together, never decreasing, in any unit,
     /// within ±[`KNOT_LIMIT`].
     Listed(&'a [i32]),
+    /// The same, each in two halves as it lies in memory.
+    Packed(&'a [[u16; 2]]),
 }
 
 impl Knots<'_> {
     /// Knot `index`; past the end the last one.
-    fn get(&self, index: usize) -> i64 {
+    pub(crate) fn get(&self, index: usize) -> i64 {
         match self {
             Self::Uniform => index as i64,
             Self::Listed(knots) => {
                 knots.get(index).or(knots.last()).map_or(0, |knot| i64::from(*knot))
             }
+            Self::Packed(knots) => knots
+                .get(index)
+                .or(knots.last())
+                .map_or(0, |knot| i64::from(bytemuck::cast::<[u16; 2], i32>(*knot))),
+        }
+    }
+
+    /// How many the user listed; `None` if they are uniform.
+    fn count(&self) -> Option<usize> {
+        match self {
+            Self::Uniform => None,
+            Self::Listed(knots) => Some(knots.len()),
+            Self::Packed(knots) => Some(knots.len()),
         }
     }
 }
@@ -222,8 +235,16 @@ impl<'a> Spline<'a> {
 
     /// The place at `t` in units of 2^-[`FRACTION_BITS`].
     fn exactly_at(&self, t: Parameter) -> [i64; 3] {
-        let (span, local) = self.locate(t);
-        span.at(local)
+        let t = t.min(Parameter::start_of(self.spans()));
+        let mut span = Span::default();
+        // The polynomial that `t` lies on, or else the next that has a length, or else the one before.
+        match (t.span()..self.spans()).find(|number| self.load(*number, &mut span)) {
+            Some(number) => span.at(if number == t.span() { t.local() } else { 0 }),
+            None => {
+                let _ = (0..t.span()).rev().find(|number| self.load(*number, &mut span));
+                span.at(Parameter::ONE)
+            }
+        }
     }
 
     /// Chord ends, from the curve's beginning to its end: see [`Chords`].
@@ -238,34 +259,25 @@ impl<'a> Spline<'a> {
         Chords::new(*self, project, tolerance)
     }
 
-    /// Polynomial `span`; `None` if it has no length or does not exist.
-    fn span(&self, span: usize) -> Option<Span> {
+    /// Makes `span` polynomial `number`. `false` if that has no length or does not exist.
+    #[inline(never)] // Its frame must not lie under that of a search.
+    fn load(&self, number: usize, span: &mut Span) -> bool {
         let degree = usize::from(self.order) - 1;
-        let mut points = [[0i64; 3]; GREATEST_ORDER as usize];
-        let numbers = self.control.get(span..span + degree + 1)?;
-        for (point, number) in points.iter_mut().zip(numbers) {
-            *point = self.points.get(usize::from(*number))?.map(i64::from);
+        let Some(numbers) = self.control.get(number..number + degree + 1) else { return false };
+        span.hold(numbers.iter().map(|number| {
+            // `new` has made sure that it exists.
+            self.points.get(usize::from(*number)).map_or([0; 3], |point| point.map(i64::from))
+        }));
+        if self.knots == Knots::Uniform {
+            span.turn_by_recursion();
+            return true;
         }
-        match self.knots {
-            Knots::Uniform => Some(Span::by_recursion(&points, degree)),
-            Knots::Listed(knots) => {
-                // The 2 m - 2 knots around the polynomial: it lies between the middle two.
-                let around = knots.get(span + 1..span + 2 * degree + 1)?;
-                Span::by_de_boor(&points, around)
-            }
+        // The 2 m - 2 knots around the polynomial: it lies between the middle two.
+        let mut around = [0; 2 * (GREATEST_ORDER as usize - 1)];
+        for (knot, index) in around.iter_mut().take(2 * degree).zip(number + 1..) {
+            *knot = self.knots.get(index) as i32; // within KNOT_LIMIT
         }
-    }
-
-    /// The polynomial that `t` lies on, and where along it.
-    fn locate(&self, t: Parameter) -> (Span, u32) {
-        let t = t.min(Parameter::start_of(self.spans()));
-        let local = |number: usize| if number == t.span() { t.local() } else { 0 };
-        let found = |number: usize| Some((self.span(number)?, local(number)));
-        let last = |number: usize| Some((self.span(number)?, Parameter::ONE));
-        (t.span()..self.spans())
-            .find_map(found)
-            .or_else(|| (0..t.span()).rev().find_map(last))
-            .unwrap_or_default() // never: a curve has a length
+        span.turn_by_de_boor(&around)
     }
 }
 
@@ -275,7 +287,7 @@ fn rounded(place: [i64; 3]) -> Point {
 }
 
 /// See [`Spline::parameter`].
-fn parameter_of(
+pub(crate) fn parameter_of(
     control_points: usize,
     order: u8,
     knots: Knots<'_>,
@@ -298,7 +310,11 @@ fn parameter_of(
 }
 
 /// Checks what does not depend on where the points are.
-fn check_shape(control_points: usize, order: u8, knots: Knots<'_>) -> Result<(), CurveError> {
+pub(crate) fn check_shape(
+    control_points: usize,
+    order: u8,
+    knots: Knots<'_>,
+) -> Result<(), CurveError> {
     if !(LEAST_ORDER..=GREATEST_ORDER).contains(&order) {
         return Err(CurveError::Order);
     }
@@ -309,31 +325,39 @@ fn check_shape(control_points: usize, order: u8, knots: Knots<'_>) -> Result<(),
     if control_points > Parameter::SPAN_LIMIT {
         return Err(CurveError::TooManyControlPoints { limit: Parameter::SPAN_LIMIT });
     }
-    let Knots::Listed(listed) = knots else { return Ok(()) };
+    let Some(given) = knots.count() else { return Ok(()) };
     let needed = control_points + usize::from(order);
-    if listed.len() != needed {
-        return Err(CurveError::WrongKnotCount { needed, given: listed.len() });
+    if given != needed {
+        return Err(CurveError::WrongKnotCount { needed, given });
     }
-    if let Some(knot) =
-        listed.iter().position(|knot| knot.unsigned_abs() > KNOT_LIMIT.unsigned_abs())
-    {
+    let is_too_large = |knot: &usize| knots.get(*knot).abs() > i64::from(KNOT_LIMIT);
+    if let Some(knot) = (0..given).find(is_too_large) {
         return Err(CurveError::KnotTooLarge { knot });
     }
-    if let Some(before) = listed.windows(2).position(|pair| pair[1] < pair[0]) {
-        return Err(CurveError::KnotDecreases { knot: before + 1 });
+    let decreases = |knot: &usize| knots.get(*knot) < knots.get(*knot - 1);
+    if let Some(knot) = (1..given).find(decreases) {
+        return Err(CurveError::KnotDecreases { knot });
     }
     Ok(())
 }
 
 /// Checks that the curve has a length and hangs together from one knot value to the other.
-fn check_interior(order: u8, knots: Knots<'_>, from: i64, to: i64) -> Result<(), CurveError> {
+pub(crate) fn check_interior(
+    order: u8,
+    knots: Knots<'_>,
+    from: i64,
+    to: i64,
+) -> Result<(), CurveError> {
     if from >= to {
         return Err(CurveError::OutsideKnots);
     }
-    let Knots::Listed(listed) = knots else { return Ok(()) };
-    let inside = |knot: i32| from < i64::from(knot) && i64::from(knot) < to;
-    let breaks = |run: &[i32]| matches!(run, [first, .., last] if first == last && inside(*first));
-    match listed.windows(usize::from(order)).position(breaks) {
+    let Some(count) = knots.count() else { return Ok(()) };
+    let order = usize::from(order);
+    let breaks = |first: &usize| {
+        let knot = knots.get(*first);
+        from < knot && knot < to && knots.get(*first + order - 1) == knot
+    };
+    match (0..=count.saturating_sub(order)).find(breaks) {
         Some(knot) => Err(CurveError::KnotRepeated { knot }),
         None => Ok(()),
     }

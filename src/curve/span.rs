@@ -32,14 +32,14 @@ const BINOMIAL: [[i64; 7]; 7] = {
 impl Span {
     /// By the recursion of Allard & Bown, equations 15 and 16, for knots one apart.
     ///
-    /// `points`: the degree + 1 control points that act on this polynomial. From one knot to the next
+    /// `self` holds the degree + 1 control points that act on this polynomial. From one knot to the next
     /// the polynomial changes by a correction (t - k)^(m-1) Σ (-1)^i C(m, i) P(k-i) / (m-1)!. Points
     /// that came before act no longer, so the recursion may begin with nothing at the first of these.
     /// (m-1)! times each coefficient is a whole number: nothing is rounded before the last line.
-    pub(super) fn by_recursion(points: &[[i64; 3]; POINTS], degree: usize) -> Self {
+    pub(super) fn turn_by_recursion(&mut self) {
+        let degree = self.degree;
         let order = degree + 1;
         let factorial: i64 = (1..=degree as i64).product();
-        let mut span = Self { points: [[0; 3]; POINTS], degree };
         for axis in 0..3 {
             // (m-1)! R(t) by powers of the distance from the knot; below 2^51.
             let mut powers = [0i64; POINTS];
@@ -53,50 +53,58 @@ impl Span {
                 powers[degree] += (0..=k)
                     .map(|i| {
                         let sign = if i % 2 == 0 { 1 } else { -1 };
-                        sign * BINOMIAL[order][i] * points[k - i][axis]
+                        sign * BINOMIAL[order][i] * self.points[k - i][axis]
                     })
                     .sum::<i64>();
             }
             // Bézier point j is Σ C(j, i) / C(degree, i) times coefficient i; 60 is a multiple of every
             // C(degree, i). The coefficients are now below 2^5 5! C(degree, i) 2^30: no sum passes 2^54.
-            for (j, point) in span.points.iter_mut().enumerate().take(order) {
+            for (j, point) in self.points.iter_mut().enumerate().take(order) {
                 let sum: i64 =
                     (0..=j).map(|i| BINOMIAL[j][i] * (60 / BINOMIAL[degree][i]) * powers[i]).sum();
                 point[axis] = divide_rounding(sum << FRACTION_BITS, 60 * factorial);
             }
         }
-        span
     }
 
     /// By de Boor's recursion (the paper's reference 6), for knots at any distance.
     ///
-    /// `around`: the `degree` knots up to the polynomial's beginning, and as many from its end on.
-    /// `None` if the polynomial has no length. Inserts first its beginning, then its end, until each is
+    /// `self` holds the control points as before. `around`: the `degree` knots up to the polynomial's
+    /// beginning, and as many from its end on. `false` if the polynomial has no length. Inserts first its beginning, then its end, until each is
     /// a knot `degree` times: then the control points are the Bézier points.
-    pub(super) fn by_de_boor(points: &[[i64; 3]; POINTS], around: &[i32]) -> Option<Self> {
-        let degree = around.len() / 2;
+    pub(super) fn turn_by_de_boor(&mut self, around: &[i32]) -> bool {
+        let degree = self.degree;
         let knot = |index: usize| i64::from(around[index]);
         let (begin, end) = (knot(degree - 1), knot(degree));
         if begin >= end {
-            return None;
+            return false;
         }
-        let mut moving = points.map(|point| point.map(|c| c << FRACTION_BITS));
-        let mut span = Self { points: moving, degree };
+        let mut moving = self.points.map(|point| point.map(|c| c << FRACTION_BITS));
+        let last = moving[degree];
         for level in 1..=degree {
             for i in (level..=degree).rev() {
                 let (low, high) = (knot(i - 1), knot(i + degree - level));
                 moving[i] = between(moving[i - 1], moving[i], begin - low, high - low);
             }
-            span.points[degree - level] = moving[degree];
+            self.points[degree - level] = moving[degree];
         }
+        self.points[degree] = last;
         for level in 2..=degree {
             for i in (level..=degree).rev() {
                 let high = knot(degree + 1 + i - level);
-                let ends = (span.points[i - 1], span.points[i]);
-                span.points[i] = between(ends.0, ends.1, end - begin, high - begin);
+                let ends = (self.points[i - 1], self.points[i]);
+                self.points[i] = between(ends.0, ends.1, end - begin, high - begin);
             }
         }
-        Some(span)
+        true
+    }
+
+    /// Holds control points, to be turned into Bézier points.
+    pub(super) fn hold(&mut self, control: impl ExactSizeIterator<Item = [i64; 3]>) {
+        self.degree = control.len() - 1;
+        for (point, control) in self.points.iter_mut().zip(control) {
+            *point = control;
+        }
     }
 
     /// Its Bézier points; the first and the last lie on the curve.
@@ -106,31 +114,41 @@ impl Span {
 
     /// The place at `local` × 2^-20 of the way (de Casteljau).
     pub(super) fn at(&self, local: u32) -> [i64; 3] {
-        self.split(local).0.points[self.degree]
-    }
-
-    /// Cuts it at `local` × 2^-20 of the way.
-    pub(super) fn split(&self, local: u32) -> (Self, Self) {
-        let degree = self.degree;
-        let (mut left, mut right) = (*self, *self);
-        for level in 1..=degree {
-            for i in 0..=degree - level {
-                right.points[i] = along(right.points[i], right.points[i + 1], local);
-            }
-            left.points[level] = right.points[0];
-        }
-        (left, right)
+        let mut rest = *self;
+        rest.keep_from(local);
+        rest.points[0]
     }
 
     /// The part from `from` to `to` × 2^-20 of the way.
     pub(super) fn part(&self, from: u32, to: u32) -> Self {
-        let rest = if from == 0 { *self } else { self.split(from).1 };
-        if to >= Parameter::ONE {
-            return rest;
+        let mut part = *self;
+        if from > 0 {
+            part.keep_from(from);
         }
-        let length = Parameter::ONE - from;
-        let to = (u64::from(to - from) << Parameter::LOCAL_BITS) / u64::from(length.max(1));
-        rest.split(to as u32).0 // at most 2^20, since to <= 2^20
+        if to < Parameter::ONE {
+            let length = Parameter::ONE - from;
+            let to = (u64::from(to - from) << Parameter::LOCAL_BITS) / u64::from(length.max(1));
+            part.keep_to(to as u32); // at most 2^20, since to <= 2^20
+        }
+        part
+    }
+
+    /// Leaves what comes after `local` × 2^-20 of the way.
+    fn keep_from(&mut self, local: u32) {
+        for level in 1..=self.degree {
+            for i in 0..=self.degree - level {
+                self.points[i] = along(self.points[i], self.points[i + 1], local);
+            }
+        }
+    }
+
+    /// Leaves what comes before `local` × 2^-20 of the way.
+    fn keep_to(&mut self, local: u32) {
+        for level in 1..=self.degree {
+            for i in (level..=self.degree).rev() {
+                self.points[i] = along(self.points[i - 1], self.points[i], local);
+            }
+        }
     }
 }
 

@@ -234,7 +234,7 @@ fn what_is_cut_off_costs_no_chords() {
     };
     let ends: Vec<_> = spline.chords(perspective, 128).map(|(_, point)| point).collect();
     let behind = ends.windows(2).filter(|pair| pair.iter().all(|point| point[2] < 1)).count();
-    assert_eq!(behind, 1, "{ends:?}");
+    assert!(behind <= 1, "{ends:?}");
     assert!(ends.len() < 100, "{}", ends.len());
     let hidden: Vec<_> = spline.chords(|_| None, 128).collect();
     assert_eq!(hidden.len(), 2);

@@ -65,8 +65,8 @@ impl Bounds {
 
     /// Around plan positions in units of 2^-`fraction_bits` mm; `None` without any.
     ///
-    /// These bounds are in that unit, for [`PageMap::true_size`].
-    fn around_plan(positions: impl Iterator<Item = Position>) -> Option<Self> {
+    /// These bounds are in that unit, for [`PageMap::true_size`] and [`PageMap::fit_plan`].
+    pub fn around_plan(positions: impl Iterator<Item = Position>) -> Option<Self> {
         positions
             .map(|position| {
                 let point = [i64::from(position.x), i64::from(position.y)];
@@ -107,18 +107,17 @@ impl PageMap {
         Self::fit_unit(bounds, Bounds::FRACTION_BITS, page, steps)
     }
 
-    /// Scales a plan (positions in units of 2^-`fraction_bits` mm) to the page like [`PageMap::fit`].
+    /// Scales a plan (bounds in units of 2^-`fraction_bits` mm) to the page like [`PageMap::fit`].
     ///
     /// # Errors
     /// [`PageError::NoRoom`], [`PageError::TooManySteps`].
     pub fn fit_plan(
-        positions: impl Iterator<Item = Position>,
+        bounds: &Bounds,
         fraction_bits: u32,
         page: &Page,
         steps: StepsPerMillimetre,
     ) -> Result<Self, PageError> {
-        let bounds = Bounds::around_plan(positions).ok_or(PageError::NoRoom)?;
-        let mut map = Self::fit_unit(&bounds, fraction_bits, page, steps)?;
+        let mut map = Self::fit_unit(bounds, fraction_bits, page, steps)?;
         // Image coordinates of a plan are the positions themselves, w = 1: move the unit into the map.
         map.coarsen(fraction_bits);
         Ok(map)
@@ -178,17 +177,16 @@ impl PageMap {
 
     /// Draws a plan at true size: where it lies if that is on the page, else moved just inside.
     ///
-    /// `positions` in units of 2^-`fraction_bits` mm.
+    /// `bounds` in units of 2^-`fraction_bits` mm.
     ///
     /// # Errors
     /// See [`PageError`].
     pub fn true_size(
-        positions: impl Iterator<Item = Position>,
+        bounds: &Bounds,
         fraction_bits: u32,
         page: &Page,
         steps: StepsPerMillimetre,
     ) -> Result<Self, PageError> {
-        let bounds = Bounds::around_plan(positions).ok_or(PageError::NoRoom)?;
         let free = page.free()?;
         page.check_steps(steps)?;
         let to_page = |value: i64| (i128::from(value) << 16) >> fraction_bits;
@@ -230,7 +228,13 @@ impl PageMap {
         [(x, 0), (y, 1)].map(|(c, axis): (i64, usize)| {
             // Below 2^118, see `point`: the shift does not overflow.
             let sum = i128::from(self.a[axis]) * i128::from(c) + self.b[axis] * i128::from(w);
-            let fine = divide_rounding(sum << 8, i128::from(w) << self.k);
+            let fine = if w & (w - 1) == 0 {
+                // A parallel view: many times faster.
+                let shift = w.trailing_zeros() + self.k;
+                ((sum << 9 >> shift) + 1) >> 1
+            } else {
+                divide_rounding(sum << 8, i128::from(w) << self.k)
+            };
             const LIMIT: i128 = 1 << 30;
             fine.clamp(-LIMIT, LIMIT) as i64
         })
@@ -356,7 +360,8 @@ mod tests {
 
     fn true_size(points: [[i32; 2]; 2], page: &Page) -> Result<[(i32, i32); 2], PageError> {
         let positions = plan(points);
-        let map = PageMap::true_size(positions.into_iter(), 8, page, steps(100, 80))?;
+        let bounds = Bounds::around_plan(positions.into_iter()).unwrap();
+        let map = PageMap::true_size(&bounds, 8, page, steps(100, 80))?;
         Ok(positions.map(|p| map.point(p.x.into(), p.y.into(), 1)).map(|p| (p.x, p.y)))
     }
 
@@ -378,7 +383,8 @@ mod tests {
             Err(PageError::DoesNotFit { width: size(191), height: size(5) })
         );
         let positions = plan([[0, 0], [380, 5]]);
-        let map = PageMap::fit_plan(positions.into_iter(), 8, &a4(), steps(100, 80)).unwrap();
+        let bounds = Bounds::around_plan(positions.into_iter()).unwrap();
+        let map = PageMap::fit_plan(&bounds, 8, &a4(), steps(100, 80)).unwrap();
         let ends = positions.map(|p| map.point(p.x.into(), p.y.into(), 1));
         assert_eq!(ends.map(|p| p.x), [1000, 20000]);
         assert_eq!(ends[1].y - ends[0].y, 200); // 2.5 mm: the same scale on both axes

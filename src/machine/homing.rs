@@ -39,6 +39,30 @@ impl Switches {
     }
 }
 
+/// The contacts at the board's inputs: whether each is closed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Contacts {
+    /// The limit switch of x.
+    pub x: bool,
+    /// The limit switch of y.
+    pub y: bool,
+    /// The emergency stop.
+    pub stop: bool,
+}
+
+impl Contacts {
+    /// Those that are pressed if those of `mask` (bit 0 x, bit 1 y, bit 2 stop) are closed at rest.
+    #[must_use]
+    pub const fn pressed(self, mask: u8) -> Self {
+        Self {
+            x: self.x != (mask & 1 != 0),
+            y: self.y != (mask & 2 != 0),
+            stop: self.stop != (mask & 4 != 0),
+        }
+    }
+}
+
 /// What the axis does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -139,6 +163,18 @@ impl Machine<'_> {
         Ok(())
     }
 
+    /// What the contacts say now, every turn of the main loop: the emergency stop is an alarm in any
+    /// state, the limit switches see [`Machine::watch`].
+    pub fn observe(&mut self, contacts: Contacts) {
+        let pressed = contacts.pressed(self.settings.get(Setting::InvertContacts).to_num());
+        self.switches = Switches { x: pressed.x, y: pressed.y };
+        self.stop_is_pressed = pressed.stop;
+        if pressed.stop && self.state != State::Alarm(Alarm::EmergencyStop) {
+            self.alarm(Alarm::EmergencyStop);
+        }
+        self.watch(self.switches);
+    }
+
     /// What the limit switches say now. A pressed one ends an approach while the machine homes, and
     /// is an alarm in any other motion if [`Setting::HardLimits`] is on.
     pub fn watch(&mut self, switches: Switches) {
@@ -182,7 +218,7 @@ impl Machine<'_> {
     /// Gives the machine back its speed.
     pub(super) fn end_homing(&mut self) {
         if self.homing.take().is_some() {
-            self.runner.set_limits(self.settings.limits(), self.settings.pen_positions());
+            self.take_settings();
         }
     }
 

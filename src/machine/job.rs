@@ -1,8 +1,9 @@
 //! From a path to events: measuring it, reading it, filling the queue, standing where it asks.
 
+use super::status::Estimate;
 use super::{Alarm, JobSize, Machine, MachineError, Path, Setting, State, Target};
 use crate::drawing::{PAGE_LIMIT, PagePoint};
-use crate::motion::{EventQueue, Progress, PushError, Runner};
+use crate::motion::{EventQueue, Progress, Runner};
 
 impl Machine<'_> {
     /// Measures the path from where the machine stands, and begins to draw it if all of it can be
@@ -23,25 +24,6 @@ impl Machine<'_> {
             self.state = State::Run;
         }
         Ok(size)
-    }
-
-    /// Moves to `point` with the pen raised.
-    ///
-    /// # Errors
-    /// See [`MachineError`]; nothing moves then.
-    pub fn jog(&mut self, point: PagePoint) -> Result<(), MachineError> {
-        if !matches!(self.state, State::Idle | State::Jog) {
-            return Err(MachineError::State(self.state));
-        }
-        self.check_travel(0, point)?;
-        match self.push(Target { point, ink: None }) {
-            Ok(()) => {
-                self.state = State::Jog;
-                Ok(())
-            }
-            Err(PushError::Full) => Err(MachineError::State(self.state)),
-            Err(PushError::TooLong) => Err(MachineError::MoveTooLong { target: 0 }),
-        }
     }
 
     /// Keeps the queue filled: reads targets while the look-ahead has room, hands over events while
@@ -97,6 +79,7 @@ impl Machine<'_> {
             }
             _ => {
                 self.next_pen = None;
+                self.streaming = false;
                 self.runner.forget_path();
                 self.state = State::Idle;
             }
@@ -104,7 +87,7 @@ impl Machine<'_> {
     }
 
     /// The pause after so much ink counts from here.
-    fn fill_pen(&mut self) {
+    pub(super) fn fill_pen(&mut self) {
         let metres = u64::from(self.settings.get(Setting::InkBeforePause).to_bits().unsigned_abs());
         // 2^-16 m to 2^-18 mm.
         self.runner.stop_after_ink((metres > 0).then_some(metres * 4000));
@@ -137,16 +120,19 @@ impl Machine<'_> {
         let kinematics = self.settings.kinematics();
         let mut at = self.runner.end();
         let mut inked = false;
+        let mut estimate = Estimate::default();
         let mut number = 0u32;
         while let Some(Target { point, ink }) = path.next_target() {
             self.check_travel(number, point)?;
             let point = kinematics.motors(point);
+            let (dx, dy) = (point.x - at.x, point.y - at.y);
             let length = self
                 .runner
                 .limits()
-                .length(point.x - at.x, point.y - at.y)
+                .length(dx, dy)
                 .ok_or(MachineError::MoveTooLong { target: number })?;
             let length = u64::from(length.to_bits());
+            estimate.add(&self.settings, (dx, dy), ink.is_some(), length);
             if ink.is_some() {
                 size.drawn += length;
                 size.strokes += u32::from(!inked);
@@ -158,10 +144,15 @@ impl Machine<'_> {
             number = number.saturating_add(1);
         }
         path.rewind();
+        size.milliseconds = estimate.end(&self.settings);
         Ok(size)
     }
 
-    pub(super) fn check_travel(&self, target: u32, point: PagePoint) -> Result<(), MachineError> {
+    /// Whether the pen may go to `point`.
+    ///
+    /// # Errors
+    /// [`MachineError::BeyondTravel`] with this number of the target.
+    pub fn check_travel(&self, target: u32, point: PagePoint) -> Result<(), MachineError> {
         let beyond = |at: i32, travel: Setting, steps_per_mm: Setting| {
             let (least, most) = if self.settings.is_on(Setting::SoftLimits) {
                 let steps = self.settings.millimetres_as_steps(travel, steps_per_mm);
@@ -169,10 +160,11 @@ impl Machine<'_> {
             } else {
                 (-PAGE_LIMIT, PAGE_LIMIT)
             };
-            at.saturating_sub(at.clamp(least, most))
+            let steps = at.saturating_sub(at.clamp(least, most));
+            self.settings.steps_as_millimetres(steps, steps_per_mm)
         };
         let x = beyond(point.x, Setting::TravelX, Setting::StepsPerMmX);
         let y = beyond(point.y, Setting::TravelY, self.settings.steps_per_mm_y());
-        if (x, y) == (0, 0) { Ok(()) } else { Err(MachineError::BeyondTravel { target, x, y }) }
+        if x == 0 && y == 0 { Ok(()) } else { Err(MachineError::BeyondTravel { target, x, y }) }
     }
 }

@@ -15,9 +15,10 @@ mod path;
 mod pulser;
 mod settings;
 mod status;
+mod stream;
 
 use homing::Homing;
-pub use homing::{Axis, Switches};
+pub use homing::{Axis, Contacts, Switches};
 pub use kinematics::Kinematics;
 pub use path::{JobSize, Path, TapePath, Target, TargetList};
 pub use pulser::{Pen, Pins, Pulser, PulserState, Solenoid};
@@ -72,18 +73,17 @@ pub enum Alarm {
 
 /// Why an order was refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum MachineError {
     /// The state does not allow it.
     State(State),
-    /// A target lies beyond the travel, by so many steps.
+    /// A target lies beyond the travel.
     BeyondTravel {
         /// Which target, from 0.
         target: u32,
-        /// Steps beyond x (negative: below 0).
-        x: i32,
-        /// Steps beyond y.
-        y: i32,
+        /// Millimetres beyond x (negative: below 0).
+        x: Value,
+        /// Millimetres beyond y.
+        y: Value,
     },
     /// A move is longer than motion can plan: 16 m.
     MoveTooLong {
@@ -110,6 +110,14 @@ pub struct Machine<'m> {
     /// Whether the drivers are to be switched off once.
     sleep_due: bool,
     homing: Option<Homing>,
+    /// What was pressed when last observed.
+    switches: Switches,
+    stop_is_pressed: bool,
+    /// Whether the moves come one by one, and whether the last of them was inked.
+    streaming: bool,
+    stream_is_inked: bool,
+    /// Speeds in percent of the settings.
+    percent: u8,
     /// The pen in the holder.
     pen: u8,
     /// The pen that comes next, and the first target that it draws.
@@ -144,6 +152,11 @@ impl<'m> Machine<'m> {
             path_ended: true,
             sleep_due: false,
             homing: None,
+            switches: Switches::default(),
+            stop_is_pressed: false,
+            streaming: false,
+            stream_is_inked: false,
+            percent: 100,
             pen: 0,
             next_pen: None,
         };
@@ -170,9 +183,14 @@ impl<'m> Machine<'m> {
             // The pen stays where it is; the motors count otherwise.
             self.set_position(page);
         }
-        self.runner.set_limits(self.settings.limits(), self.settings.pen_positions());
+        self.take_settings();
         self.configure_pulser();
         Ok(())
+    }
+
+    fn take_settings(&mut self) {
+        self.runner.set_limits(self.settings.limits(), self.settings.pen_positions());
+        self.runner.set_override(self.percent);
     }
 
     /// What it does.
@@ -192,11 +210,15 @@ impl<'m> Machine<'m> {
         self.runner.push(self.settings.kinematics().motors(target.point), target.ink)
     }
 
-    /// Slows down on the path and raises the pen. Nothing happens unless the machine draws.
+    /// Slows down on the path and raises the pen. Ends moves by hand; nothing happens in other states.
     pub fn hold(&mut self) {
-        if self.state == State::Run {
-            self.runner.stop();
-            self.state = State::Hold { standing: false };
+        match self.state {
+            State::Run => {
+                self.runner.stop();
+                self.state = State::Hold { standing: false };
+            }
+            State::Jog => self.abort(),
+            _ => {}
         }
     }
 
@@ -207,9 +229,13 @@ impl<'m> Machine<'m> {
         }
     }
 
-    /// Scales the speeds to `percent` of the settings, 10 to 100, from the next line on.
+    /// Scales the speeds to `percent` of the settings, 10 to 200, at once; never above the greater
+    /// of the two.
     pub fn set_override(&mut self, percent: u8) {
-        self.runner.set_override(percent);
+        self.percent = percent.clamp(10, 200);
+        if self.homing.is_none() {
+            self.runner.set_override(self.percent);
+        }
     }
 
     /// Lowers the pen where it was raised and goes on; with the next pen, if the machine waited for
@@ -236,6 +262,7 @@ impl<'m> Machine<'m> {
         if matches!(self.state, State::Run | State::Hold { .. } | State::Jog | State::Home) {
             self.end_homing();
             self.next_pen = None;
+            self.streaming = false;
             self.runner.stop();
             self.path_ended = true;
             self.state = State::Abort;
@@ -248,7 +275,9 @@ impl<'m> Machine<'m> {
         self.end_homing();
         self.next_pen = None;
         self.runner.forget_path();
+        self.runner.forget_pen();
         self.path_ended = true;
+        self.streaming = false;
         self.sleep_due = false;
         self.state = State::Alarm(alarm);
     }
@@ -281,11 +310,12 @@ impl<'m> Machine<'m> {
     /// Leaves alarm and sleep. After an alarm the position is what the pins counted.
     ///
     /// # Errors
-    /// [`MachineError::State`] in other states, and while the interrupt still empties its queue.
+    /// [`MachineError::State`] in other states, while the interrupt still empties its queue, and
+    /// while the emergency stop is pressed.
     pub fn unlock(&mut self) -> Result<(), MachineError> {
         match self.state {
             State::Sleep => {}
-            State::Alarm(_) if self.pins.is_drained() => {
+            State::Alarm(_) if self.pins.is_drained() && !self.stop_is_pressed => {
                 self.set_position(self.position());
                 self.pins.release();
             }

@@ -98,4 +98,6 @@ pub struct JobSize {
     pub drawn: u64,
     /// Length with the pen up.
     pub travelled: u64,
+    /// How long it takes, about, with the speeds as set.
+    pub milliseconds: u64,
 }

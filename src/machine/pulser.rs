@@ -196,7 +196,8 @@ where
         if self.after_pulse != 0 {
             write(&mut self.pins.step_x, false);
             write(&mut self.pins.step_y, false);
-            return Some(core::mem::take(&mut self.after_pulse));
+            let rest = core::mem::take(&mut self.after_pulse);
+            return Some(if self.state.is_halted() { Self::DISCARD_TICKS } else { rest });
         }
         let Some(event) = self.events.dequeue() else {
             return self.run_dry();
@@ -217,6 +218,12 @@ where
                 Some(event.ticks())
             }
         }
+    }
+
+    /// Whether a pulse is high: [`Pulser::tick`] must not be called before its time.
+    #[inline]
+    pub fn pulse_is_high(&self) -> bool {
+        self.after_pulse != 0
     }
 
     /// Raises the pen and switches the drivers off, whatever waits: for a panic or a fault.

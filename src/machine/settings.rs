@@ -19,6 +19,8 @@ pub enum Setting {
     StepPulse,
     /// `$3` Which axes run the other way: bit 0 x, bit 1 y.
     InvertDirections,
+    /// `$5` Which contacts are closed at rest: bit 0 x, bit 1 y, bit 2 the emergency stop.
+    InvertContacts,
     /// `$11` How far a rounded corner would leave the true one.
     JunctionDeviation,
     /// `$20` Whether moves beyond the travel are refused.
@@ -74,6 +76,10 @@ pub enum Setting {
     DotLength,
     /// `$230` Build of the machine: 0 Cartesian, 1 CoreXY.
     Kinematics,
+    /// `$240` Where the pen is parked (G28): x.
+    ParkX,
+    /// `$241` The same of y.
+    ParkY,
 }
 
 /// What there is to know about a setting.
@@ -98,7 +104,7 @@ pub struct SettingInfo {
 }
 
 /// How many settings there are.
-pub const SETTING_COUNT: usize = 29;
+pub const SETTING_COUNT: usize = 32;
 
 const fn info(
     setting: Setting,
@@ -128,6 +134,7 @@ pub const SETTINGS: [SettingInfo; SETTING_COUNT] = {
     [
         info(StepPulse, 0, "step pulse", "us", (0.2, 500.0, 2.0), false),
         info(InvertDirections, 3, "invert directions", "mask", (0.0, 3.0, 0.0), true),
+        info(InvertContacts, 5, "invert contacts", "mask", (0.0, 7.0, 0.0), true),
         info(JunctionDeviation, 11, "junction deviation", "mm", (0.0, 1.0, 0.05), false),
         info(SoftLimits, 20, "soft limits", "0|1", (0.0, 1.0, 1.0), true),
         info(HardLimits, 21, "hard limits", "0|1", (0.0, 1.0, 0.0), true),
@@ -155,6 +162,8 @@ pub const SETTINGS: [SettingInfo; SETTING_COUNT] = {
         info(InkBeforePause, 215, "ink before a pause", "m", (0.0, 10000.0, 0.0), false),
         info(DotLength, 220, "length of a dot", "mm", (0.1, 100.0, 1.0), false),
         info(Kinematics, 230, "kinematics", "0|1", (0.0, 1.0, 0.0), true),
+        info(ParkX, 240, "park at x", "mm", (0.0, 8000.0, 0.0), false),
+        info(ParkY, 241, "park at y", "mm", (0.0, 8000.0, 0.0), false),
     ]
 };
 
@@ -320,6 +329,11 @@ impl Settings {
         if self.is_on(Setting::Kinematics) { Kinematics::CoreXy } else { Kinematics::Cartesian }
     }
 
+    /// Steps of the page per millimetre of x and y.
+    pub fn page_steps(&self) -> [Value; 2] {
+        [self.get(Setting::StepsPerMmX), self.get(self.steps_per_mm_y())]
+    }
+
     /// Steps of the page per millimetre of y: those of x where one belt moves both.
     pub(super) fn steps_per_mm_y(&self) -> Setting {
         match self.kinematics() {
@@ -334,6 +348,13 @@ impl Settings {
             i64::from(self.get(setting).to_bits()) * i64::from(self.get(steps_per_mm).to_bits());
         // At most 8000 mm of 4000 steps.
         (steps >> (2 * Value::FRAC_NBITS)) as i32
+    }
+
+    /// The other way.
+    pub(super) fn steps_as_millimetres(&self, steps: i32, steps_per_mm: Setting) -> Value {
+        let per_mm = i64::from(self.get(steps_per_mm).to_bits()).max(1);
+        let bits = (i64::from(steps) << (2 * Value::FRAC_NBITS)) / per_mm;
+        Value::from_bits(bits.clamp(i32::MIN.into(), i32::MAX.into()) as i32)
     }
 
     pub(super) fn pen_positions(&self) -> PenPositions {

@@ -1,6 +1,6 @@
 //! What the machine says of itself.
 
-use super::{JobSize, Machine, Setting, State, Value};
+use super::{JobSize, Machine, Setting, Settings, State, Value};
 use crate::drawing::PagePoint;
 
 /// A report for the status line.
@@ -15,8 +15,10 @@ pub struct Status {
     pub job: JobSize,
     /// What of it is planned already: at most the queue ahead of the pins.
     pub done: JobSize,
-    /// How long the rest takes at least, without what corners and bends cost.
+    /// How long the rest takes, about.
     pub seconds_left: u32,
+    /// Speeds in percent of the settings.
+    pub percent: u8,
     /// The pen that the machine waits for, if it does.
     pub pen_wanted: Option<u8>,
 }
@@ -29,6 +31,7 @@ impl Machine<'_> {
             strokes: run.strokes.wrapping_sub(self.before.strokes),
             drawn: run.drawn - self.before.drawn,
             travelled: run.travelled - self.before.travelled,
+            milliseconds: 0,
         };
         Status {
             state: self.state,
@@ -36,23 +39,29 @@ impl Machine<'_> {
             job: self.job,
             done,
             seconds_left: self.seconds_left(done),
+            percent: self.percent,
             pen_wanted: self.next_pen.map(|(pen, _)| pen),
         }
     }
 
+    /// The job's time, shared out by the time of the lengths and strokes that are left.
     fn seconds_left(&self, done: JobSize) -> u32 {
-        let at_speed = |length: u64, speed: Setting| {
-            // 2^-18 mm over 2^-16 mm/min, in milliseconds.
-            let speed = u64::from(self.settings.get(speed).to_bits().unsigned_abs());
-            (length >> 2).saturating_mul(60_000) / speed.max(1)
+        let bare = |size: JobSize| {
+            bare_milliseconds(&self.settings, size.drawn, Setting::DrawSpeed)
+                + bare_milliseconds(&self.settings, size.travelled, Setting::TravelSpeed)
+                + u64::from(size.strokes) * dwells(&self.settings)
         };
-        let strokes = u64::from(self.job.strokes.saturating_sub(done.strokes));
-        let dwell = self.settings.get(Setting::PenUpDwell).saturating_to_num::<u64>()
-            + self.settings.get(Setting::PenDownDwell).saturating_to_num::<u64>();
-        let milliseconds = at_speed(self.job.drawn.saturating_sub(done.drawn), Setting::DrawSpeed)
-            + at_speed(self.job.travelled.saturating_sub(done.travelled), Setting::TravelSpeed)
-            + strokes * dwell;
-        u32::try_from(milliseconds / 1000).unwrap_or(u32::MAX)
+        let left = JobSize {
+            strokes: self.job.strokes.saturating_sub(done.strokes),
+            drawn: self.job.drawn.saturating_sub(done.drawn),
+            travelled: self.job.travelled.saturating_sub(done.travelled),
+            milliseconds: 0,
+        };
+        let all = bare(self.job);
+        let time = self.job.milliseconds.max(all);
+        // Days of milliseconds stay below 2^30.
+        let left = (time.min(1 << 31) * bare(left).min(1 << 31)).checked_div(all).unwrap_or(0);
+        u32::try_from(left / 10 / u64::from(self.percent)).unwrap_or(u32::MAX)
     }
 
     /// Where the pins are, in steps of the page.
@@ -70,12 +79,75 @@ impl Machine<'_> {
 
     /// The length of a step of x and of y is its setting; this is the position in millimetres.
     pub fn position_mm(&self) -> [Value; 2] {
-        let point = self.position();
-        let mm = |steps: i32, setting: Setting| {
-            let steps_per_mm = i64::from(self.settings.get(setting).to_bits());
-            let bits = (i64::from(steps) << (2 * Value::FRAC_NBITS)) / steps_per_mm.max(1);
-            Value::from_bits(bits.clamp(i32::MIN.into(), i32::MAX.into()) as i32)
+        self.millimetres(self.position())
+    }
+
+    /// A place on the page in millimetres.
+    pub fn millimetres(&self, point: PagePoint) -> [Value; 2] {
+        [
+            self.settings.steps_as_millimetres(point.x, Setting::StepsPerMmX),
+            self.settings.steps_as_millimetres(point.y, self.settings.steps_per_mm_y()),
+        ]
+    }
+}
+
+/// How long a length (2^-18 mm) takes at the speed of a setting.
+fn bare_milliseconds(settings: &Settings, length: u64, speed: Setting) -> u64 {
+    // 2^-18 mm over 2^-16 mm/min.
+    let speed = u64::from(settings.get(speed).to_bits().unsigned_abs());
+    (length >> 2).saturating_mul(60_000) / speed.max(1)
+}
+
+/// What the pen costs a stroke, in milliseconds.
+fn dwells(settings: &Settings) -> u64 {
+    let down: u64 = settings.get(Setting::PenDownDwell).saturating_to_num();
+    down + settings.get(Setting::PenUpDwell).saturating_to_num::<u64>()
+}
+
+/// The time of a job, about: each piece between two sharp corners from rest to rest.
+#[derive(Debug, Default)]
+pub(super) struct Estimate {
+    milliseconds: u64,
+    /// Of the piece in work: its length, the way it runs, whether it is inked.
+    piece: u64,
+    way: (i32, i32),
+    inked: bool,
+}
+
+impl Estimate {
+    /// A move by so many steps.
+    pub(super) fn add(&mut self, settings: &Settings, way: (i32, i32), inked: bool, length: u64) {
+        let [(ax, ay), (bx, by)] = [self.way, way].map(|(x, y)| (i64::from(x), i64::from(y)));
+        let (along, across) = (ax * bx + ay * by, ax * by - ay * bx);
+        // A turn of more than 20 degrees is a corner.
+        if self.inked != inked || 8 * across.abs() > 3 * along {
+            self.end_piece(settings);
+        }
+        if inked && !self.inked {
+            self.milliseconds += dwells(settings);
+        }
+        (self.way, self.inked) = (way, inked);
+        self.piece += length;
+    }
+
+    /// The time of all moves.
+    pub(super) fn end(mut self, settings: &Settings) -> u64 {
+        self.end_piece(settings);
+        self.milliseconds
+    }
+
+    fn end_piece(&mut self, settings: &Settings) {
+        let speed = if self.inked { Setting::DrawSpeed } else { Setting::TravelSpeed };
+        let bits = |setting| u64::from(settings.get(setting).to_bits().unsigned_abs()).max(1);
+        let acceleration = bits(Setting::AccelerationX).min(bits(Setting::AccelerationY));
+        // 2^-16 mm/s, and 2^-16 mm until that is reached and shed.
+        let per_second = bits(speed) / 60;
+        let ramps = per_second * per_second / acceleration;
+        self.milliseconds += if self.piece >> 2 >= ramps {
+            bare_milliseconds(settings, self.piece, speed) + per_second * 1000 / acceleration
+        } else {
+            2 * ((self.piece >> 2) * 1_000_000 / acceleration).isqrt()
         };
-        [mm(point.x, Setting::StepsPerMmX), mm(point.y, self.settings.steps_per_mm_y())]
+        self.piece = 0;
     }
 }

@@ -169,6 +169,13 @@ impl Limits {
         SliceSpeed::from_bits(squared.isqrt() as u32)
     }
 
+    /// The stopping distance of a speed in mm/min: what bounds a block to it. Not less than can be
+    /// told from standing (at 800 mm/s², 5 mm/min).
+    pub fn feed(&self, mm_per_min: Millimetres) -> PathLength {
+        let speed = slice_speed(mm_per_min.max(Millimetres::DELTA)).unwrap_or(SliceSpeed::DELTA);
+        self.stopping_distance(speed).max(PathLength::DELTA)
+    }
+
     /// The length of a move by (`dx`, `dy`) steps, each within ±2^22; `None` beyond 16 m.
     pub fn length(&self, dx: i32, dy: i32) -> Option<PathLength> {
         let [step_x, step_y] = self.step_length;

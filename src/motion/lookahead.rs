@@ -61,6 +61,11 @@ impl<'m> Lookahead<'m> {
         self.count == self.blocks.len()
     }
 
+    /// Whether less than half of the memory is in use.
+    pub(super) fn is_short(&self) -> bool {
+        2 * self.count < self.blocks.len()
+    }
+
     /// Appends a block.
     ///
     /// # Errors

@@ -76,11 +76,16 @@ pub struct Runner<'m> {
     curve: Pace,
     /// The plan's time, 1/16 ticks; wraps.
     now: u32,
-    pen_is_down: bool,
+    /// Not known after an emergency stop, when it may still be on its way.
+    pen_is_down: Option<bool>,
     /// Where the pen was sent last; not known at the start.
     pen_height: Option<u8>,
     stopping: bool,
     stopping_after_stroke: bool,
+    /// Whether more blocks may let the piece in work end faster than it was planned to.
+    hurried: bool,
+    /// How fast the plan that was thrown away would have ended the piece in work.
+    exit_reached: Option<PathLength>,
     /// Stands after the stroke in which so much is drawn, all in all.
     ink_bound: u64,
     /// Where the events so far lead.
@@ -112,10 +117,12 @@ impl<'m> Runner<'m> {
             travel: Pace::REST,
             curve: Pace::REST,
             now: 0,
-            pen_is_down: false,
+            pen_is_down: Some(false),
             pen_height: None,
             stopping: false,
             stopping_after_stroke: false,
+            hurried: false,
+            exit_reached: None,
             ink_bound: u64::MAX,
             position: PagePoint::default(),
             end: PagePoint::default(),
@@ -127,8 +134,7 @@ impl<'m> Runner<'m> {
         runner
     }
 
-    /// Takes new settings. Speeds count from the next block on; the rest must not change while
-    /// anything moves.
+    /// Takes new settings, while nothing moves.
     pub fn set_limits(&mut self, limits: Limits, pen: PenPositions) {
         self.limits = limits;
         self.curve = Pace::REST;
@@ -137,17 +143,20 @@ impl<'m> Runner<'m> {
         self.set_override(100);
     }
 
-    /// Scales both speeds to `percent` (10 to 100; the settings are the greatest) from the next
-    /// block on.
+    /// Scales both speeds to `percent` (10 to 200), at once; never above the greater of the two as
+    /// set.
     pub fn set_override(&mut self, percent: u8) {
-        let percent = u64::from(percent.clamp(10, 100));
+        let percent = u64::from(percent.clamp(10, 200));
+        let greatest = self.limits.draw_speed.max(self.limits.travel_speed);
         let scaled = |speed: SliceSpeed| {
             let bits = u64::from(speed.to_bits()) * percent / 100;
-            Pace::of_speed(&self.limits, SliceSpeed::from_bits((bits as u32).max(1)))
+            let bits = bits.clamp(1, greatest.to_bits().into());
+            Pace::of_speed(&self.limits, SliceSpeed::from_bits(bits as u32))
         };
         let (draw, travel) = (scaled(self.limits.draw_speed), scaled(self.limits.travel_speed));
         self.draw = draw;
         self.travel = travel;
+        self.plan_again();
     }
 
     /// The limits in force.
@@ -182,7 +191,13 @@ impl<'m> Runner<'m> {
 
     /// Whether the pen was last told to go down.
     pub fn pen_is_down(&self) -> bool {
-        self.pen_is_down
+        self.pen_is_down == Some(true)
+    }
+
+    /// The pen was raised by somebody else and may still be on its way.
+    pub fn forget_pen(&mut self) {
+        self.pen_is_down = None;
+        self.pen_height = None;
     }
 
     /// What has been run since the runner was made.
@@ -195,8 +210,6 @@ impl<'m> Runner<'m> {
     pub fn set_position(&mut self, point: PagePoint, ticks: u32) {
         self.forget_path();
         self.emitter.restart(ticks);
-        self.pen_is_down = false;
-        self.pen_height = None;
         self.position = point;
         self.end = point;
     }
@@ -206,6 +219,19 @@ impl<'m> Runner<'m> {
     /// # Errors
     /// See [`PushError`]; nothing is appended then.
     pub fn push(&mut self, point: PagePoint, ink: Option<LineType>) -> Result<(), PushError> {
+        self.push_limited(point, ink, PathLength::MAX)
+    }
+
+    /// The same with a speed, by its stopping distance ([`Limits::feed`]), that is not passed.
+    ///
+    /// # Errors
+    /// See [`PushError`]; nothing is appended then.
+    pub fn push_limited(
+        &mut self,
+        point: PagePoint,
+        ink: Option<LineType>,
+        limit: PathLength,
+    ) -> Result<(), PushError> {
         let (dx, dy) = (point.x - self.end.x, point.y - self.end.y);
         if dx == 0 && dy == 0 {
             return Ok(());
@@ -221,13 +247,28 @@ impl<'m> Runner<'m> {
         if corner.is_sharp {
             self.curvature.restart(&self.limits, self.end, &mut self.lookahead);
         }
-        let block = Block { dx, dy, length, entry_limit: corner.limit, ink, ..Block::EMPTY };
+        let (entry_limit, curve_limit) = (corner.limit, limit);
+        let block = Block { dx, dy, length, entry_limit, curve_limit, ink };
         self.lookahead.push(block).map_err(|_| PushError::Full)?;
         if self.limits.centripetal {
             self.curvature.follow(&self.limits, point, &mut self.lookahead);
         }
         self.end = point;
         self.last = Some((heading, length, ink));
+        if self.hurried {
+            self.plan_again();
+        }
+        Ok(())
+    }
+
+    /// Lowers the pen where the path ends so far.
+    ///
+    /// # Errors
+    /// [`PushError::Full`]; nothing is appended then.
+    pub fn push_dot(&mut self) -> Result<(), PushError> {
+        let dot = Block { ink: Some(LineType::Full), ..Block::EMPTY };
+        self.lookahead.push(dot).map_err(|_| PushError::Full)?;
+        self.last = None;
         Ok(())
     }
 
@@ -245,6 +286,17 @@ impl<'m> Runner<'m> {
             if let Some(profile) = course.profile.take() {
                 self.pace = Pace::of_speed(&self.limits, profile.speed());
             }
+        }
+    }
+
+    /// Plans the rest of the piece in work anew, from the next slice on.
+    fn plan_again(&mut self) {
+        if self.stopping {
+            return;
+        }
+        if let Some(profile) = self.course.as_mut().and_then(|course| course.profile.take()) {
+            self.pace = Pace::of_speed(&self.limits, profile.speed());
+            self.exit_reached = Some(profile.exit().stopping_distance);
         }
     }
 
@@ -272,9 +324,22 @@ impl<'m> Runner<'m> {
         self.pace = Pace::REST;
         self.stopping = false;
         self.stopping_after_stroke = false;
+        self.exit_reached = None;
         self.last = None;
         self.in_stroke = false;
         self.end = self.position;
+    }
+
+    /// Lets `ticks` pass; nothing must wait or move.
+    ///
+    /// # Errors
+    /// The event that the queue refused.
+    pub fn dwell(&mut self, ticks: u32, queue: &mut dyn EventQueue) -> Result<(), StepEvent> {
+        self.emitter.hold(self.now, queue)?;
+        self.now = self.now.wrapping_add(ticks.min(StepEvent::MAX_TICKS) << FRACTION_BITS);
+        let at = self.emitter.rest(self.now, true, queue)?;
+        self.advance_to(at);
+        Ok(())
     }
 
     /// Switches the drivers off; nothing must wait or move.
@@ -399,7 +464,7 @@ impl<'m> Runner<'m> {
         standing: Progress,
         queue: &mut dyn EventQueue,
     ) -> Result<Progress, StepEvent> {
-        if self.pen_is_down {
+        if self.pen_is_down() {
             self.move_pen(false, queue)?;
             return Ok(Progress::More);
         }
@@ -422,8 +487,8 @@ impl<'m> Runner<'m> {
         } else {
             (self.pen.up_height, self.pen.up_ticks)
         };
-        let far = if down { self.pen.up_height } else { self.pen.down_height };
-        let from = self.pen_height.unwrap_or(far);
+        // Where it stands if that is not known: at the start, and after an emergency stop.
+        let from = self.pen_height.unwrap_or(self.pen.up_height);
         let next = match height.cmp(&from) {
             _ if self.pen.ramp_ticks == 0 => height,
             Ordering::Less => from - 1,
@@ -437,7 +502,7 @@ impl<'m> Runner<'m> {
             self.now = self.now.wrapping_add(self.pen.ramp_ticks << FRACTION_BITS);
             return Ok(());
         }
-        self.pen_is_down = down;
+        self.pen_is_down = Some(down);
         // Two waits of up to 0.67 s: the settings allow no longer dwell.
         let half = dwell.div_ceil(2).min(StepEvent::MAX_TICKS);
         for _ in 0..2 {
@@ -465,7 +530,7 @@ impl<'m> Runner<'m> {
         }
         let inked = course.is_inked();
         if at_rest {
-            if inked != self.pen_is_down {
+            if self.pen_is_down != Some(inked) {
                 self.move_pen(inked, queue)?;
                 return Ok(Progress::More);
             }
@@ -474,6 +539,11 @@ impl<'m> Runner<'m> {
             }
         }
         let left = course.left();
+        if let Some(exit) = self.exit_reached.take() {
+            // It was within reach; the root that gave the speed back must not deny it.
+            let bound = left.saturating_add(exit);
+            self.pace.stopping_distance = self.pace.stopping_distance.min(bound);
+        }
         let profile = if self.stopping {
             Profile::stopping(&self.limits, self.pace, left)
         } else {
@@ -484,11 +554,14 @@ impl<'m> Runner<'m> {
                 }
                 top = self.curve;
             }
-            let exit_allowed = if course.is_last_piece() {
+            let is_last = course.is_last_piece();
+            let exit_allowed = if is_last {
                 self.lookahead.entry_allowed(top.stopping_distance)
             } else {
                 PathLength::ZERO
             };
+            self.hurried =
+                is_last && self.lookahead.is_short() && exit_allowed < top.stopping_distance;
             Profile::new(&self.limits, self.pace, left, top, exit_allowed)
         };
         if let Some(course) = &mut self.course {

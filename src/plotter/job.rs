@@ -1,16 +1,19 @@
 //! From the model to ordered strokes: the way of the data, in one place.
 
-use super::{PlotOptions, solid};
+use super::{PlotOptions, plan, solid};
 use crate::drawing::{
     Bounds, Drawing, Line, LineType, OrganiseError, PageMap, PagePoint, StepsPerMillimetre, Stored,
     organise,
 };
+use crate::geometry::{Projection, Vertex};
 use crate::machine::{Path, Target};
-use crate::model::{Element, Model, ModelError};
+use crate::model::{Elements, Model, ModelError, Position};
 use crate::order::{self, Leg, OrderError};
 use crate::protocol::{HiddenLines, Refusal, WayToSee};
-use crate::stage::{Aborted, Attention, OutOfScratch, Scratch, Stage, items, items_mut};
-use crate::view::{SeeError, Seen, View, see};
+use crate::stage::{
+    Aborted, Attention, OutOfScratch, Scratch, Stage, StageError, items, items_mut,
+};
+use crate::view::{Flattening, Seen, View, see};
 use crate::visibility::{self, Scene, SinkFull, Stretch, StretchSink, VisibilityError};
 
 /// Who is shown each stretch as it is found, in view coordinates: the preview.
@@ -56,12 +59,15 @@ impl Job {
         attention: &mut dyn Attention,
         observer: &mut dyn Observer,
     ) -> Result<Self, Refusal> {
-        if model.elements().corners().is_empty() && options.see != WayToSee::Vertices {
+        if model.elements().corners().is_empty()
+            && model.curves().is_empty()
+            && options.see != WayToSee::Vertices
+        {
             return Err(Refusal::NothingToPlot);
         }
         let mut degenerate_faces = 0;
         let lines = if model.is_plan() && options.shows_plans_flat() {
-            lay_out_plan(model, options, steps, words, observer)?
+            plan::lay_out(model, options, steps, words, attention, observer)?
         } else {
             match options.see {
                 WayToSee::Vertices | WayToSee::Edges => {
@@ -144,46 +150,10 @@ impl Path for Strokes<'_> {
     }
 }
 
-/// A plan: its bars are lines on the page already. Returns how many lines stand in `words`.
-fn lay_out_plan(
-    model: &Model<'_>,
-    options: &PlotOptions,
-    steps: StepsPerMillimetre,
-    words: &mut [u64],
-    observer: &mut dyn Observer,
-) -> Result<usize, Refusal> {
-    let vertices = model.vertices();
-    let unit = libm::ldexp(1.0, -(model.fraction_bits() as i32));
-    let used = model
-        .elements()
-        .corners()
-        .iter()
-        .filter_map(|c| vertices.get(usize::from(c.vertex())))
-        .copied();
-    let (page, bits) = (&options.page, model.fraction_bits());
-    let map = if options.fit {
-        PageMap::fit_plan(used, bits, page, steps)
-    } else {
-        PageMap::true_size(used, bits, page, steps)
-    };
-    let map = map.map_err(Refusal::Page)?;
-    let mut collector = Collector::new(words);
-    for element in model.elements().iter() {
-        let Element::Bar(from, to) = element else { continue };
-        let (Some(from), Some(to)) =
-            (vertices.get(usize::from(from)), vertices.get(usize::from(to)))
-        else {
-            continue;
-        };
-        observer.plan_bar(
-            [from.x, from.y].map(|c| f64::from(c) * unit),
-            [to.x, to.y].map(|c| f64::from(c) * unit),
-        );
-        let [from, to] = [from, to].map(|p| map.point(p.x.into(), p.y.into(), 1));
-        collector.line(from, to, LineType::Full).map_err(|SinkFull| collector.out_of_memory())?;
-    }
-    Ok(collector.count)
-}
+/// How far the chords of a curve may stray from it: half a step, in 1/256 step.
+pub(super) const HALF_A_STEP: u16 = 128;
+/// Finer, where only the bounds of curves are sought, before the scale of the page is known.
+pub(super) const FOR_BOUNDS: u16 = 32;
 
 /// These take some 100,000 instructions.
 const CORNERS_BETWEEN_CHECKS: usize = 128;
@@ -197,6 +167,23 @@ struct Found {
     degenerate_faces: u32,
 }
 
+/// Looks at the model through the camera.
+#[inline(never)] // Its frame must not lie under the stages'.
+fn look(
+    model: &Model<'_>,
+    options: &PlotOptions,
+    attention: &mut dyn Attention,
+) -> Result<View, Refusal> {
+    let camera = options.camera(model).ok_or(Refusal::NothingToPlot)?;
+    attention.check()?;
+    let view = View::new(&camera, model).map_err(Refusal::View)?;
+    attention.check()?;
+    if !options.clip_behind {
+        view.refuse_behind(model).map_err(Refusal::View)?;
+    }
+    Ok(view)
+}
+
 /// Anything else: through the camera, hidden lines found.
 fn project(
     model: &Model<'_>,
@@ -208,25 +195,27 @@ fn project(
 ) -> Result<Found, Refusal> {
     attention.enter(Stage::View);
     let total = size_of_val(words);
-    let mut scratch = Scratch::new(words);
-    let camera = options.camera(model).ok_or(Refusal::NothingToPlot)?;
-    attention.check()?;
-    let view = View::new(&camera, model).map_err(Refusal::View)?;
-    attention.check()?;
-    let Seen { vertices, elements, degenerate_faces } = see(&view, model, &mut scratch, attention)?;
-    if !options.clip_behind {
-        view.refuse_behind(model).map_err(Refusal::View)?;
-    }
+    let view = look(model, options, attention)?;
     let projection = view.projection();
-    // Two divisions a corner: some at a time, so that the line is answered.
-    let mut bounds: Option<Bounds> = None;
-    for corners in elements.corners().chunks(CORNERS_BETWEEN_CHECKS) {
-        attention.check()?;
-        let used = corners.iter().filter_map(|c| vertices.get(usize::from(c.vertex()))).copied();
-        bounds = grow(bounds, Bounds::around(used, projection));
-    }
-    let bounds = bounds.ok_or(Refusal::NothingToPlot)?;
-    let map = PageMap::fit(&bounds, &options.page, steps).map_err(Refusal::Page)?;
+    let mut scratch = Scratch::new(words);
+    let curves_map = if model.curves().is_empty() {
+        None
+    } else {
+        let scratch = scratch.reborrow();
+        Some(map_with_curves(&view, model, options, steps, scratch, attention)?)
+    };
+    let on_page = curves_map.as_ref().map(|map| |x, y, w| map.fine(x, y, w));
+    let curves = on_page.as_ref().map(|on_page| Flattening { on_page, tolerance: HALF_A_STEP });
+    let Seen { vertices, elements, degenerate_faces } =
+        see(&view, model, curves, &mut scratch, attention)?;
+    let map = match curves_map {
+        Some(map) => map,
+        None => {
+            let bounds = bounds_of(vertices, elements, projection, attention)?;
+            let bounds = bounds.ok_or(Refusal::NothingToPlot)?;
+            PageMap::fit(&bounds, &options.page, steps).map_err(Refusal::Page)?
+        }
+    };
 
     attention.enter(Stage::Visibility);
     let positions = bytemuck::cast_slice(model.vertices());
@@ -248,7 +237,8 @@ fn project(
         let room = line_memory.available_bytes() / size_of::<Line>();
         let collected = line_memory.take(room).map_err(Refusal::DrawingTooLarge)?;
         let collector = Collector { lines: collected, count: 0 };
-        let mut sink = PageSink { collector, map, view, hidden: options.hidden, observer };
+        let mut sink =
+            PageSink { collector, map: &map, view: &view, hidden: options.hidden, observer };
         let found = if options.see == WayToSee::Wire {
             visibility::follow_wire(&scene, wanted, stage_memory, attention, &mut sink)
         } else {
@@ -268,6 +258,59 @@ fn project(
     let (lines_at, lines) = lines?;
     to_front(words, lines_at, lines);
     Ok(Found { lines, degenerate_faces })
+}
+
+/// Around all that is drawn of the elements.
+fn bounds_of(
+    vertices: &[Vertex],
+    elements: Elements<'_>,
+    projection: Projection,
+    attention: &mut dyn Attention,
+) -> Result<Option<Bounds>, Aborted> {
+    // Two divisions a corner: some at a time, so that the line is answered.
+    let mut bounds: Option<Bounds> = None;
+    for corners in elements.corners().chunks(CORNERS_BETWEEN_CHECKS) {
+        attention.check()?;
+        let used = corners.iter().filter_map(|c| vertices.get(usize::from(c.vertex()))).copied();
+        bounds = grow(bounds, Bounds::around(used, projection));
+    }
+    Ok(bounds)
+}
+
+/// Fits all that is drawn of elements and curves to the page, not the control points.
+#[inline(never)] // Its frame must not lie under the stages'.
+fn map_with_curves(
+    view: &View,
+    model: &Model<'_>,
+    options: &PlotOptions,
+    steps: StepsPerMillimetre,
+    mut scratch: Scratch<'_>,
+    attention: &mut dyn Attention,
+) -> Result<PageMap, Refusal> {
+    let projection = view.projection();
+    let near = view.near().unwrap_or(i32::MIN);
+    let in_front = |position: &Position| {
+        let vertex = view.vertex(*position);
+        Vertex { z: vertex.z.max(near), ..vertex }
+    };
+    let mut all = None;
+    for positions in model.vertices().chunks(CORNERS_BETWEEN_CHECKS) {
+        attention.check()?;
+        all = grow(all, Bounds::around(positions.iter().map(in_front), projection));
+    }
+    let all = all.ok_or(Refusal::NothingToPlot)?;
+    let rough = PageMap::fit(&all, &options.page, steps).map_err(Refusal::Page)?;
+    let mut bounds = {
+        let mut scratch = scratch.reborrow();
+        let seen = see(view, model, None, &mut scratch, attention)?;
+        bounds_of(seen.vertices, seen.elements, projection, attention)?
+    };
+    let flattening = Flattening { on_page: &|x, y, w| rough.fine(x, y, w), tolerance: FOR_BOUNDS };
+    flattening.each_chord(view, model, scratch, attention, &mut |chord| {
+        bounds = grow(bounds, Bounds::around(chord.into_iter(), projection));
+    })?;
+    let bounds = bounds.ok_or(Refusal::NothingToPlot)?;
+    PageMap::fit(&bounds, &options.page, steps).map_err(Refusal::Page)
 }
 
 fn refused(error: VisibilityError, corners: usize) -> Refusal {
@@ -301,11 +344,11 @@ impl From<Aborted> for Refusal {
     }
 }
 
-impl From<SeeError> for Refusal {
-    fn from(error: SeeError) -> Self {
+impl From<StageError> for Refusal {
+    fn from(error: StageError) -> Self {
         match error {
-            SeeError::Scratch(missing) => Self::DrawingTooLarge(missing),
-            SeeError::Aborted => Self::Aborted,
+            StageError::Scratch(missing) => Self::DrawingTooLarge(missing),
+            StageError::Aborted => Self::Aborted,
         }
     }
 }
@@ -343,7 +386,7 @@ impl<'a> Collector<'a> {
         Self { lines: items_mut(words, room).unwrap_or(&mut []), count: 0 }
     }
 
-    fn line(
+    pub(super) fn line(
         &mut self,
         from: PagePoint,
         to: PagePoint,
@@ -356,17 +399,21 @@ impl<'a> Collector<'a> {
         Ok(())
     }
 
-    pub(super) fn out_of_memory(&self) -> Refusal {
+    pub(super) fn missing(&self) -> OutOfScratch {
         let available = size_of_val(self.lines);
-        Refusal::DrawingTooLarge(OutOfScratch { needed: available + size_of::<Line>(), available })
+        OutOfScratch { needed: available + size_of::<Line>(), available }
+    }
+
+    pub(super) fn out_of_memory(&self) -> Refusal {
+        Refusal::DrawingTooLarge(self.missing())
     }
 }
 
 /// Puts each stretch on the page.
 pub(super) struct PageSink<'a> {
     pub(super) collector: Collector<'a>,
-    pub(super) map: PageMap,
-    pub(super) view: View,
+    pub(super) map: &'a PageMap,
+    pub(super) view: &'a View,
     pub(super) hidden: HiddenLines,
     pub(super) observer: &'a mut dyn Observer,
 }
@@ -385,7 +432,7 @@ impl StretchSink for PageSink<'_> {
             (false, HiddenLines::Dashed) => LineType::Dashed,
             (false, HiddenLines::Erased) => return Ok(()),
         };
-        self.observer.stretch(&self.view, &stretch);
+        self.observer.stretch(self.view, &stretch);
         let [from, to] =
             [stretch.from, stretch.to].map(|end| self.map.along(p, q, end, self.view.projection()));
         self.collector.line(from, to, line_type)

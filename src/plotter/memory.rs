@@ -4,7 +4,7 @@ use crate::model::{Corner, Position};
 use crate::motion::Block;
 
 /// How many moves are planned ahead: see [`crate::motion`].
-pub const BLOCKS: usize = 48;
+pub const BLOCKS: usize = 36;
 
 /// The moves planned ahead, before any is.
 pub const NO_MOVES: [Block; BLOCKS] = [Block::EMPTY; BLOCKS];
@@ -20,7 +20,7 @@ pub struct Memory<const VERTICES: usize, const CORNERS: usize, const WORDS: usiz
 }
 
 /// For 64 KiB of RAM: a lattice of 125 cubes.
-pub type Lm3s6965Memory = Memory<1008, 3008, 4576>;
+pub type Lm3s6965Memory = Memory<1000, 3000, 4552>;
 
 /// For 264 KiB of RAM: a lattice of 343 cubes.
 pub type PicoMemory = Memory<4096, 12288, 16384>;

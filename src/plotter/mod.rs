@@ -9,8 +9,11 @@ mod board;
 mod job;
 mod memory;
 mod options;
+mod plan;
+mod program;
 mod reply;
 mod solid;
+mod stream;
 
 pub use board::Board;
 pub use job::{Cursor, Job, Observer, Strokes, Unobserved};
@@ -19,13 +22,15 @@ pub use options::PlotOptions;
 
 use crate::fixed::BinaryFraction;
 use crate::machine::{
-    Machine, MachineError, PulserState, Setting, SettingError, Settings, State, Value,
+    Alarm, Machine, MachineError, PulserState, Setting, SettingError, Settings, State, Value,
 };
 use crate::model::Model;
 use crate::order;
-use crate::protocol::{Command, HELP, LINE_LIMIT, LineReader, RealTime, Refusal};
+use crate::protocol::{Command, LINE_LIMIT, LineReader, RealTime, Refusal};
 use crate::stage::{Aborted, Attention, Stage};
+use program::Program;
 use reply::Reply;
+use stream::{Listing, Progress, Task};
 
 /// How far step events are planned ahead of the pins, and so how late a hold takes effect: 50 ms.
 const AHEAD_TICKS: u32 = crate::motion::TICKS_PER_SECOND / 20;
@@ -57,6 +62,10 @@ struct Inner<'m> {
     machine: Machine<'m>,
     job: Job,
     cursor: Cursor,
+    program: Program,
+    /// The line that is answered when it is done.
+    task: Option<Task>,
+    alarm_told: Option<Alarm>,
 }
 
 impl<'m> Plotter<'m> {
@@ -73,6 +82,9 @@ impl<'m> Plotter<'m> {
                 machine: Machine::new(Settings::default(), blocks, pins, AHEAD_TICKS),
                 job: Job::default(),
                 cursor: Cursor::default(),
+                program: Program::default(),
+                task: None,
+                alarm_told: None,
             },
         }
     }
@@ -87,8 +99,18 @@ impl<'m> Plotter<'m> {
     pub fn poll<B: Board>(&mut self, board: &mut B) -> bool {
         let asked = board.take_real_time();
         self.act(asked, board);
+        self.inner.watch(board);
         let planned = self.inner.plan(board);
-        let Some(byte) = board.read_byte() else { return planned || asked != RealTime::default() };
+        if self.inner.task.is_some() {
+            match self.inner.proceed(board) {
+                Progress::Done(outcome) => Reply(board).outcome(outcome),
+                Progress::More => {}
+                Progress::Waits => return planned || asked != RealTime::default(),
+            }
+            return true;
+        }
+        let byte = if self.inner.must_wait() { None } else { board.read_byte() };
+        let Some(byte) = byte else { return planned || asked != RealTime::default() };
         let outcome = match self.reader.push(byte) {
             None => return true,
             Some(Ok(line)) => self.inner.carry_out(line, board),
@@ -97,7 +119,9 @@ impl<'m> Plotter<'m> {
         if outcome == Err(Refusal::Aborted) {
             self.reset(board);
         }
-        Reply(board).outcome(outcome);
+        if self.inner.task.is_none() {
+            Reply(board).outcome(outcome);
+        }
         true
     }
 
@@ -141,26 +165,23 @@ impl<'m> Plotter<'m> {
     }
 
     fn act<B: Board>(&mut self, asked: RealTime, board: &mut B) {
-        if asked.abort {
+        if asked.has(RealTime::ABORT) {
             self.inner.machine.abort();
             self.reset(board);
         }
-        if asked.hold {
-            self.inner.machine.hold();
-        }
-        if asked.resume {
-            self.inner.machine.resume();
-        }
-        if asked.bytes_lost {
+        self.inner.act(asked);
+        if asked.has(RealTime::BYTES_LOST) {
             Reply(board).outcome(Err(Refusal::BytesLost));
         }
-        if asked.status {
+        if asked.has(RealTime::STATUS) {
             self.inner.report_status(board);
         }
     }
 
     fn reset<B: Board>(&mut self, board: &mut B) {
         self.reader.clear();
+        self.inner.task = None;
+        self.inner.program = Program::default();
         self.greet(board);
     }
 }
@@ -172,10 +193,6 @@ impl Inner<'_> {
         let mut strokes = self.job.strokes(self.words, &mut self.cursor);
         self.machine.fill(&mut strokes, board.queue());
         self.machine.planned_position() != before
-    }
-
-    fn is_idle(&self) -> bool {
-        self.machine.state() == State::Idle
     }
 
     #[inline(never)] // Its frame must not lie under the stages'.
@@ -191,43 +208,53 @@ impl Inner<'_> {
             Command::Polyline(numbers) => {
                 self.model.add_polyline(numbers.iter()).map_err(Refusal::Model)?
             }
-            Command::Help => {
-                for (usage, meaning) in HELP {
-                    Reply(board).line(format_args!("[HLP:{usage} {meaning}]"));
-                }
+            Command::Degree(degree) => self.model.set_degree(degree).map_err(Refusal::Model)?,
+            Command::Curve { ends, control } => {
+                self.model.begin_curve(ends, control.iter()).map_err(Refusal::Model)?
             }
+            Command::Knots(knots) => self.model.add_knots(knots.iter()).map_err(Refusal::Model)?,
+            Command::EndCurve => self.model.end_curve().map_err(Refusal::Model)?,
+            Command::Help => self.task = Some(Task::List(Listing::Help, 0)),
             Command::BuildInfo => self.report_build(board),
-            Command::Settings => self.list_settings(board),
+            Command::Settings => self.task = Some(Task::List(Listing::Settings, 0)),
             Command::Setting { name, value } => self.change_setting(name, value)?,
             Command::Option(option) => self.options.set(option),
-            Command::Options => self.options.list(|option| Reply(board).line(option)),
+            Command::Options => self.task = Some(Task::List(Listing::Options, 0)),
             Command::Model => self.report_model(board),
             Command::Clear => self.model.clear(),
             Command::Plot => self.plot(board)?,
             Command::Unlock => self.machine.unlock()?,
+            Command::Home => self.home()?,
+            Command::Check => self.machine.check(self.machine.state() != State::Check)?,
+            Command::Sleep => self.machine.sleep()?,
+            Command::Jog(line) => self.jog(line)?,
+            Command::GCode(line) => self.run_gcode(line)?,
         }
         Ok(())
     }
 
     #[inline(never)] // Its frame must not lie under the stages'.
     fn plot<B: Board>(&mut self, board: &mut B) -> Result<(), Refusal> {
-        if !self.is_idle() {
+        if !matches!(self.machine.state(), State::Idle | State::Check) {
             return Err(match self.machine.state() {
                 State::Alarm(_) | State::Sleep => Refusal::Locked,
                 _ => Refusal::Busy,
             });
         }
         let position = self.machine.position_mm();
-        let mut listener = Listener { board, position, stage: Stage::View, hold: false };
-        self.compute(&mut listener, &mut Unobserved)?;
-        let hold = listener.hold;
+        let asked = RealTime::default();
+        let mut listener = Listener { board, position, stage: Stage::View, asked };
+        let computed = self.compute(&mut listener, &mut Unobserved);
+        let asked = listener.asked;
+        if asked.has(RealTime::EMERGENCY) {
+            self.act(asked);
+        }
+        computed?;
         self.report_degenerate(board);
         let mut strokes = self.job.strokes(self.words, &mut self.cursor);
         self.machine.start(&mut strokes)?;
         self.cursor = Cursor::default();
-        if hold {
-            self.machine.hold();
-        }
+        self.act(asked);
         Ok(())
     }
 
@@ -239,6 +266,7 @@ impl Inner<'_> {
         }
     }
 
+    #[inline(never)] // Its frame must not lie under that of `plot`.
     fn compute(
         &mut self,
         attention: &mut dyn Attention,
@@ -265,16 +293,6 @@ impl Inner<'_> {
     }
 
     #[inline(never)] // Its frame must not lie under the stages'.
-    fn list_settings<B: Board>(&self, board: &mut B) {
-        for (info, value) in self.machine.settings().iter() {
-            let value =
-                BinaryFraction { units: value.to_bits().into(), fraction_bits: 16, places: 3 };
-            Reply(board)
-                .line(format_args!("${}={value} ({}, {})", info.number, info.name, info.unit));
-        }
-    }
-
-    #[inline(never)] // Its frame must not lie under the stages'.
     fn report_build<B: Board>(&self, board: &mut B) {
         const VERSION: &str = env!("CARGO_PKG_VERSION");
         Reply(board).line(format_args!("[VER:1.1h.penup {VERSION}:{}]", B::NAME));
@@ -287,9 +305,10 @@ impl Inner<'_> {
         let (vertices, limit) = (model.vertices().len(), model.vertex_limit());
         Reply(board).line(format_args!("[MODEL:vertices {vertices} of {limit}]"));
         let (corners, limit) = (model.corner_count(), model.corner_limit());
-        let (faces, bars) = (model.face_count(), model.bar_count());
-        Reply(board)
-            .line(format_args!("[MODEL:faces {faces}, bars {bars}, corners {corners} of {limit}]"));
+        let (faces, bars, curves) = (model.face_count(), model.bar_count(), model.curve_count());
+        Reply(board).line(format_args!(
+            "[MODEL:faces {faces}, bars {bars}, curves {curves}, corners {corners} of {limit}]"
+        ));
         let order::Report { odd_points, components, lifts, .. } = *self.job.report();
         Reply(board)
             .line(format_args!("[JOB:odd points {odd_points}, parts {components}, lifts {lifts}]"));
@@ -313,10 +332,24 @@ impl Inner<'_> {
         let mut reply = Reply(board);
         reply.part(format_args!("<{state}"));
         reply.position(self.machine.position_mm());
+        if status.percent != 100 {
+            reply.part(format_args!("|Ov:{},100,100", status.percent));
+        }
+        let (switches, stop) = (self.machine.switches(), self.machine.stop_is_pressed());
+        if switches.any() || stop {
+            let letter = |pressed, letter| if pressed { letter } else { "" };
+            let (x, y, stop) =
+                (letter(switches.x, "X"), letter(switches.y, "Y"), letter(stop, "E"));
+            reply.part(format_args!("|Pn:{x}{y}{stop}"));
+        }
+        if let Some(pen) = status.pen_wanted {
+            reply.part(format_args!("|Pen:{pen}"));
+        }
         let (done, all) = (status.done, status.job);
         reply.part(format_args!("|Strokes:{}/{}", done.strokes, all.strokes));
         let mm = |units: u64| BinaryFraction { units: units as i64, fraction_bits: 18, places: 0 };
-        reply.line(format_args!("|Ink:{}/{}>", mm(done.drawn), mm(all.drawn)));
+        let (drawn, left) = (mm(done.drawn), status.seconds_left);
+        reply.line(format_args!("|Ink:{drawn}/{}|Left:{left}>", mm(all.drawn)));
     }
 }
 
@@ -325,14 +358,18 @@ struct Listener<'b, B: Board> {
     board: &'b mut B,
     position: [Value; 2],
     stage: Stage,
-    hold: bool,
+    /// What is to be done when it ends.
+    asked: RealTime,
 }
 
 impl<B: Board> Attention for Listener<'_, B> {
     fn check(&mut self) -> Result<(), Aborted> {
         let asked = self.board.take_real_time();
-        self.hold = (self.hold || asked.hold) && !asked.resume;
-        if asked.status {
+        if asked.has(RealTime::RESUME) {
+            self.asked = RealTime::default();
+        }
+        self.asked = self.asked.and(asked).only(RealTime::HOLD.and(RealTime::EMERGENCY));
+        if asked.has(RealTime::STATUS) {
             let stage = match self.stage {
                 Stage::View => "view",
                 Stage::Visibility => "visibility",
@@ -343,7 +380,8 @@ impl<B: Board> Attention for Listener<'_, B> {
             reply.position(self.position);
             reply.line(format_args!("|Stage:{stage}>"));
         }
-        if asked.abort { Err(Aborted) } else { Ok(()) }
+        let ends = asked.has(RealTime::ABORT) || asked.has(RealTime::EMERGENCY);
+        if ends { Err(Aborted) } else { Ok(()) }
     }
 
     fn enter(&mut self, stage: Stage) {

@@ -13,6 +13,7 @@ use crate::view::{SightLines, View, distinct_edges};
 use crate::visibility::{Along, Stretch, StretchSink};
 
 /// Finds what is seen of the solid. Returns how many lines stand in `words`.
+#[inline(never)] // Its frame must not lie under the other stages'.
 pub(super) fn project(
     model: &Model<'_>,
     options: &PlotOptions,
@@ -73,7 +74,7 @@ pub(super) fn project(
     let bounds = bounds.ok_or(Refusal::NothingToPlot)?;
     let map = PageMap::fit(&bounds, &options.page, steps).map_err(Refusal::Page)?;
     let collector = Collector::new(line_words);
-    let mut sink = PageSink { collector, map, view, hidden: options.hidden, observer };
+    let mut sink = PageSink { collector, map: &map, view: &view, hidden: options.hidden, observer };
     for (numbers, visible) in all() {
         attention.check()?;
         let Some([p, q]) = on_view(numbers) else { continue };

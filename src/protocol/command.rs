@@ -1,7 +1,9 @@
 //! Lines to typed commands.
 
-use super::Refusal;
+use super::{GCode, Refusal};
+use crate::curve::CurveError;
 use crate::fixed::{Decimal, Millimetres};
+use crate::model::ModelError;
 use crate::view::{Direction, Lens};
 
 /// What a line asks for.
@@ -15,6 +17,19 @@ pub enum Command<'a> {
     Face(Numbers<'a>),
     /// `l a b …`
     Polyline(Numbers<'a>),
+    /// `deg n`
+    Degree(u8),
+    /// `curv u0 u1 a b …`
+    Curve {
+        /// Where it begins and ends.
+        ends: [Decimal; 2],
+        /// Its control points.
+        control: Numbers<'a>,
+    },
+    /// `parm u k1 k2 …`
+    Knots(Decimals<'a>),
+    /// `end`
+    EndCurve,
     /// `$`
     Help,
     /// `$I`
@@ -40,6 +55,16 @@ pub enum Command<'a> {
     Plot,
     /// `$X`
     Unlock,
+    /// `$H`
+    Home,
+    /// `$C`
+    Check,
+    /// `$SLP`
+    Sleep,
+    /// `$J=…`: a move by hand.
+    Jog(GCode<'a>),
+    /// `G…`, `M…`, `X…`
+    GCode(GCode<'a>),
 }
 
 /// What is drawn, and how.
@@ -207,6 +232,13 @@ pub const HELP: &[(&str, &str)] = &[
     ("$clear", "forget the model"),
     ("$plot", "draw it"),
     ("$X", "unlock after an alarm"),
+    ("$H", "find the limit switches"),
+    ("$J=G91 X.. Y.. F..", "move by hand with the pen up; byte 0x85 ends it"),
+    ("$C", "begin or end to check only: nothing moves"),
+    ("$SLP", "switch the motors off; $X wakes"),
+    ("G0 G1 G2 G3 G4 G20 G21 G28 G90 G91", "move, arc, wait, inches, mm, park, absolute, relative"),
+    ("X.. Y.. I.. J.. R.. P.. F.. Z..", "numbers of the former; Z0 and below is pen down"),
+    ("M0 M2 M3 M5", "pause until ~, end, pen down, pen up"),
 ];
 
 impl<'a> Command<'a> {
@@ -226,12 +258,27 @@ impl<'a> Command<'a> {
         if let Some(dollar) = line.strip_prefix('$') {
             return Self::parse_dollar(dollar.trim());
         }
-        let (keyword, rest) = line.split_once([' ', '\t']).unwrap_or((line, ""));
+        if GCode::begins(line) {
+            return GCode::new(line).map(Self::GCode);
+        }
+        let (keyword, rest) = split_word(line);
         match keyword {
             "" | "o" | "g" | "s" | "usemtl" | "mtllib" | "vn" | "vt" => Ok(Self::Nothing),
             "v" => Ok(Self::Vertex(coordinates(rest)?)),
             "f" => Numbers::new(rest).map(Self::Face),
             "l" => Numbers::new(rest).map(Self::Polyline),
+            "cstype" if rest.trim() == "bspline" => Ok(Self::Nothing),
+            "cstype" => Err(Refusal::NotAChoice { choices: "bspline" }),
+            "deg" => match whole(rest)? {
+                degree @ 1..=5 => Ok(Self::Degree(degree as u8)),
+                _ => Err(Refusal::Model(ModelError::Curve(CurveError::Order))),
+            },
+            "curv" => curve(rest),
+            "parm" => match split_word(rest) {
+                ("u", knots) => Decimals::new(knots).map(Self::Knots),
+                _ => Err(Refusal::NotAChoice { choices: "u" }),
+            },
+            "end" => Ok(Self::EndCurve),
             _ => Err(Refusal::UnknownCommand),
         }
     }
@@ -239,6 +286,9 @@ impl<'a> Command<'a> {
     fn parse_dollar(text: &'a str) -> Result<Self, Refusal> {
         if let Some((name, value)) = text.split_once('=') {
             let (name, value) = (name.trim(), value.trim());
+            if name == "J" {
+                return GCode::new(value).map(Self::Jog);
+            }
             return match PlotOption::parse(name, value)? {
                 Some(option) => Ok(Self::Option(option)),
                 None => Ok(Self::Setting { name, value }),
@@ -249,6 +299,9 @@ impl<'a> Command<'a> {
             "$" => Ok(Self::Settings),
             "I" => Ok(Self::BuildInfo),
             "X" => Ok(Self::Unlock),
+            "H" => Ok(Self::Home),
+            "C" => Ok(Self::Check),
+            "SLP" => Ok(Self::Sleep),
             "options" => Ok(Self::Options),
             "model" => Ok(Self::Model),
             "clear" => Ok(Self::Clear),
@@ -376,7 +429,46 @@ fn coordinates(text: &str) -> Result<[Decimal; 3], Refusal> {
     Ok(coordinates)
 }
 
-/// The vertex numbers of a face or polyline: `7`, `-1`, `7/2`, `7//3` or `7/2/3`.
+/// The first word, and what comes after it.
+fn split_word(text: &str) -> (&str, &str) {
+    let text = text.trim_start();
+    text.split_once([' ', '\t']).unwrap_or((text, ""))
+}
+
+/// One whole number.
+fn whole(text: &str) -> Result<i32, Refusal> {
+    number(text)?.to_whole().map_err(|_| Refusal::NumberOutOfRange)
+}
+
+/// u0 u1 a b …
+fn curve(text: &str) -> Result<Command<'_>, Refusal> {
+    let (from, rest) = split_word(text);
+    let (to, rest) = split_word(rest);
+    Ok(Command::Curve { ends: [number(from)?, number(to)?], control: Numbers::new(rest)? })
+}
+
+/// Numbers with spaces between.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Decimals<'a> {
+    text: &'a str,
+}
+
+impl<'a> Decimals<'a> {
+    /// Checks every word, so that [`Decimals::iter`] cannot fail.
+    fn new(text: &'a str) -> Result<Self, Refusal> {
+        for word in text.split_ascii_whitespace() {
+            number(word)?;
+        }
+        Ok(Self { text })
+    }
+
+    /// The numbers in order.
+    pub fn iter(&self) -> impl Iterator<Item = Decimal> + Clone + use<'a> {
+        self.text.split_ascii_whitespace().filter_map(|word| number(word).ok())
+    }
+}
+
+/// The vertex numbers of a face, polyline or curve: `7`, `-1`, `7/2`, `7//3` or `7/2/3`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Numbers<'a> {
     text: &'a str,

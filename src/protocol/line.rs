@@ -10,43 +10,113 @@ pub const LINE_LIMIT: usize = 256;
 /// A board's receive interrupt collects these; the main loop and every long computation look at them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct RealTime {
-    /// `?`: report the status.
-    pub status: bool,
-    /// `!`: stop on the path, pen up.
-    pub hold: bool,
-    /// `~`: go on.
-    pub resume: bool,
-    /// ctrl-X: give up the job. Bytes received before it are dropped.
-    pub abort: bool,
-    /// No byte: bytes were lost because the sender did not wait for replies.
-    pub bytes_lost: bool,
-}
+pub struct RealTime(u16);
 
 impl RealTime {
-    /// What the byte asks for; `None` for a byte of a line.
-    pub const fn of_byte(byte: u8) -> Option<Self> {
-        let nothing =
-            Self { status: false, hold: false, resume: false, abort: false, bytes_lost: false };
-        match byte {
-            b'?' => Some(Self { status: true, ..nothing }),
-            b'!' => Some(Self { hold: true, ..nothing }),
-            b'~' => Some(Self { resume: true, ..nothing }),
-            0x18 => Some(Self { abort: true, ..nothing }),
-            _ => None,
-        }
+    /// `?`: report the status.
+    pub const STATUS: Self = Self(1);
+    /// `!`: stop on the path, pen up.
+    pub const HOLD: Self = Self(1 << 1);
+    /// `~`: go on.
+    pub const RESUME: Self = Self(1 << 2);
+    /// ctrl-X: give up the job. Bytes received before it are dropped.
+    pub const ABORT: Self = Self(1 << 3);
+    /// No byte: bytes were lost because the sender did not wait for replies.
+    pub const BYTES_LOST: Self = Self(1 << 4);
+    /// 0x85: give up the moves by hand.
+    pub const CANCEL_JOG: Self = Self(1 << 5);
+    /// 0x90: speeds as set.
+    pub const FEED_RESET: Self = Self(1 << 6);
+    /// 0x91: speeds 10 % up.
+    pub const FEED_PLUS_10: Self = Self(1 << 7);
+    /// 0x92: speeds 10 % down.
+    pub const FEED_MINUS_10: Self = Self(1 << 8);
+    /// 0x93: speeds 1 % up.
+    pub const FEED_PLUS_1: Self = Self(1 << 9);
+    /// 0x94: speeds 1 % down.
+    pub const FEED_MINUS_1: Self = Self(1 << 10);
+    /// 0xB0: pause at the end of the stroke.
+    pub const PAUSE: Self = Self(1 << 11);
+    /// 0xB1: stop the pins at once.
+    pub const EMERGENCY: Self = Self(1 << 12);
+
+    /// Whether all of `asked` was asked for.
+    pub const fn has(self, asked: Self) -> bool {
+        self.0 & asked.0 == asked.0
     }
 
     /// Both.
     #[must_use]
     pub const fn and(self, other: Self) -> Self {
-        Self {
-            status: self.status || other.status,
-            hold: self.hold || other.hold,
-            resume: self.resume || other.resume,
-            abort: self.abort || other.abort,
-            bytes_lost: self.bytes_lost || other.bytes_lost,
+        Self(self.0 | other.0)
+    }
+
+    /// What of it is in `mask`.
+    #[must_use]
+    pub const fn only(self, mask: Self) -> Self {
+        Self(self.0 & mask.0)
+    }
+
+    /// The bits, for a board that collects them in an atomic.
+    pub const fn to_bits(self) -> u16 {
+        self.0
+    }
+
+    /// What the bits of [`RealTime::to_bits`] stand for.
+    pub const fn from_bits(bits: u16) -> Self {
+        Self(bits)
+    }
+}
+
+/// Tells the bytes that act at once from those of lines, one by one as they come.
+///
+/// Some of the former are also inner bytes of letters in UTF-8; there they are text.
+///
+/// ```
+/// use penup::protocol::{RealTime, Sorter};
+/// let mut sorter = Sorter::default();
+/// assert_eq!(sorter.sort(0x85), Some(RealTime::CANCEL_JOG));
+/// assert!("Å".bytes().all(|byte| sorter.sort(byte).is_none()));
+/// ```
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Sorter {
+    /// Inner bytes of a letter that are still to come.
+    inner: u8,
+}
+
+impl Sorter {
+    /// Before the first byte.
+    pub const fn new() -> Self {
+        Self { inner: 0 }
+    }
+
+    /// What the byte asks for; `None` for a byte of a line.
+    pub const fn sort(&mut self, byte: u8) -> Option<RealTime> {
+        if byte & 0xC0 == 0x80 && self.inner > 0 {
+            self.inner -= 1;
+            return None;
         }
+        self.inner = match byte {
+            0xC2..=0xDF => 1,
+            0xE0..=0xEF => 2,
+            0xF0..=0xF4 => 3,
+            _ => 0,
+        };
+        Some(match byte {
+            b'?' => RealTime::STATUS,
+            b'!' => RealTime::HOLD,
+            b'~' => RealTime::RESUME,
+            0x18 => RealTime::ABORT,
+            0x85 => RealTime::CANCEL_JOG,
+            0x90 => RealTime::FEED_RESET,
+            0x91 => RealTime::FEED_PLUS_10,
+            0x92 => RealTime::FEED_MINUS_10,
+            0x93 => RealTime::FEED_PLUS_1,
+            0x94 => RealTime::FEED_MINUS_1,
+            0xB0 => RealTime::PAUSE,
+            0xB1 => RealTime::EMERGENCY,
+            _ => return None,
+        })
     }
 }
 

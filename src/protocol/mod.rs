@@ -1,15 +1,17 @@
 //! Bytes to lines to typed commands, and replies.
 //!
 //! The framing is that of Grbl 1.1, for which senders exist: a greeting, one `ok` or `error:N` for
-//! each line, `?` `!` `~` ctrl-X acted on at once. A [`LineReader`] makes lines of bytes,
+//! each line, `?` `!` `~` ctrl-X and others acted on at once. A [`LineReader`] makes lines of bytes,
 //! [`Command::parse`] makes a typed command of a line, a [`Refusal`] says why a line was not carried
 //! out. Anything that is no command is refused with a number and the reason; nothing here changes
 //! any state.
 
 mod command;
+mod gcode;
 mod line;
 mod refusal;
 
 pub use command::{Command, HELP, HiddenLines, Numbers, PlotOption, ProjectionChoice, WayToSee};
-pub use line::{LINE_LIMIT, LineReader, RealTime};
+pub use gcode::{GCode, Word};
+pub use line::{LINE_LIMIT, LineReader, RealTime, Sorter};
 pub use refusal::{MEANINGS, Refusal};

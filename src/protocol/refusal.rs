@@ -1,11 +1,13 @@
 //! Why a line was not carried out: a number for programs, a sentence for people.
 
 use crate::convex::SolidError;
+use crate::curve::CurveError;
 use crate::drawing::PageError;
 use crate::fixed::BinaryFraction;
-use crate::machine::{MachineError, SettingError};
+use crate::machine::{MachineError, SettingError, Value};
 use crate::model::ModelError;
 use crate::stage::OutOfScratch;
+use crate::step::ArcError;
 use crate::view::ViewError;
 use core::fmt;
 
@@ -21,6 +23,8 @@ pub enum Refusal {
     NotANumber,
     /// No `$` command has this name.
     UnknownSystemCommand,
+    /// `$H` without limit switches.
+    HomingOff,
     /// The command needs an idle plotter.
     Busy,
     /// The plotter is in alarm.
@@ -34,6 +38,10 @@ pub enum Refusal {
     NotText,
     /// Bytes were lost because the sender did not wait.
     BytesLost,
+    /// G-code with this letter, or its number, that is not known.
+    UnsupportedWord(u8),
+    /// There is no such arc.
+    Arc(ArcError),
     /// A number past what can be stored.
     NumberOutOfRange,
     /// Too few or too many numbers.
@@ -77,10 +85,13 @@ pub const MEANINGS: &[(u16, &str)] = &[
     (1, "unknown command"),
     (2, "not a number"),
     (3, "unknown $ command"),
+    (5, "homing is off"),
     (8, "the plotter is busy"),
     (9, "locked after an alarm"),
     (11, "line too long"),
     (15, "beyond the travel"),
+    (20, "unsupported G-code"),
+    (33, "no such arc"),
     (100, "line is not text"),
     (101, "bytes were lost: wait for each reply"),
     (102, "number out of range"),
@@ -94,6 +105,8 @@ pub const MEANINGS: &[(u16, &str)] = &[
     (113, "too many vertices"),
     (114, "too many corners"),
     (115, "coordinate too large"),
+    (116, "not a curve"),
+    (117, "curve out of order"),
     (120, "nothing to plot"),
     (121, "eye at the point looked at"),
     (122, "up is along the line of sight"),
@@ -119,9 +132,12 @@ impl Refusal {
             Self::UnknownCommand => 1,
             Self::NotANumber => 2,
             Self::UnknownSystemCommand => 3,
+            Self::HomingOff => 5,
             Self::Busy => 8,
             Self::Locked => 9,
             Self::LineTooLong { .. } => 11,
+            Self::UnsupportedWord(_) => 20,
+            Self::Arc(_) => 33,
             Self::NotText => 100,
             Self::BytesLost => 101,
             Self::NumberOutOfRange => 102,
@@ -136,6 +152,10 @@ impl Refusal {
                 ModelError::TooManyVertices { .. } => 113,
                 ModelError::TooManyCorners { .. } => 114,
                 ModelError::CoordinateTooLarge => 115,
+                ModelError::Curve(CurveError::UnknownPoint { .. }) => 110,
+                ModelError::Curve(_) => 116,
+                ModelError::NoDegree | ModelError::CurveUnfinished | ModelError::NoCurve => 117,
+                ModelError::KnotTooLarge => 102,
             },
             Self::NothingToPlot | Self::View(ViewError::NothingToSee) => 120,
             Self::View(ViewError::EyeAtTarget) => 121,
@@ -165,10 +185,17 @@ impl fmt::Display for Refusal {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::UnknownCommand => formatter.write_str(
-                "a line begins with v, f, l, another OBJ keyword, or $; $ lists the commands",
+                "a line begins with v, f, l, another OBJ keyword, G-code, or $; $ lists the commands",
             ),
             Self::NotANumber => formatter.write_str("a number is written like -12.5 or 3e-2"),
             Self::UnknownSystemCommand => formatter.write_str("$ lists the commands"),
+            Self::HomingOff => formatter.write_str("connect limit switches, then set $22=1"),
+            Self::UnsupportedWord(letter) => {
+                write!(formatter, "this word {} is not known here", char::from(*letter))
+            }
+            Self::Arc(_) => formatter.write_str(
+                "both ends of an arc are as far from its centre, within 4 m; x and y have the same steps",
+            ),
             Self::Busy => formatter.write_str("wait for the plot to end, or send ctrl-X"),
             Self::Locked => formatter.write_str("send $X to unlock"),
             Self::LineTooLong { limit } => write!(formatter, "a line has at most {limit} bytes"),
@@ -249,6 +276,11 @@ fn write_model_error(formatter: &mut fmt::Formatter<'_>, error: &ModelError) -> 
         ModelError::RepeatedVertex { number } => {
             write!(formatter, "vertex {number} comes twice in a row")
         }
+        ModelError::NoDegree => formatter.write_str("send deg first, 1 to 5"),
+        ModelError::CurveUnfinished => formatter.write_str("end the curve before: send end"),
+        ModelError::NoCurve => formatter.write_str("begin a curve first: send curv"),
+        ModelError::KnotTooLarge => formatter.write_str("knots go up to 4194304"),
+        ModelError::Curve(error) => write_curve_error(formatter, error),
     }
 }
 
@@ -268,6 +300,34 @@ fn write_solid_error(formatter: &mut fmt::Formatter<'_>, error: &SolidError) -> 
             vertex + 1
         ),
         _ => formatter.write_str("it takes four vertices at different places, not all in line"),
+    }
+}
+
+fn write_curve_error(formatter: &mut fmt::Formatter<'_>, error: &CurveError) -> fmt::Result {
+    match error {
+        CurveError::Order => formatter.write_str("a curve has degree 1 to 5"),
+        CurveError::TooFewControlPoints { needed } => {
+            write!(formatter, "a curve of this degree takes {needed} control points")
+        }
+        CurveError::TooManyControlPoints { limit } => {
+            write!(formatter, "a curve has at most {limit} control points")
+        }
+        CurveError::UnknownPoint { number } => {
+            write!(formatter, "there is no vertex {}", u32::from(*number) + 1)
+        }
+        CurveError::WrongKnotCount { needed, given } => {
+            write!(formatter, "the curve takes {needed} knots and has {given}")
+        }
+        CurveError::KnotDecreases { knot } => {
+            write!(formatter, "knot {} is less than the one before", knot + 1)
+        }
+        CurveError::KnotTooLarge { .. } => formatter.write_str("knots go up to 4194304"),
+        CurveError::KnotRepeated { knot } => {
+            write!(formatter, "knot {} is repeated so often that the curve breaks there", knot + 1)
+        }
+        CurveError::OutsideKnots => {
+            formatter.write_str("a curve begins at knot degree + 1 or later, ends later, and not past the last but degree")
+        }
     }
 }
 
@@ -296,9 +356,16 @@ fn write_machine_error(formatter: &mut fmt::Formatter<'_>, error: &MachineError)
     match error {
         MachineError::State(_) => formatter.write_str("wait for the plot to end, or send ctrl-X"),
         MachineError::BeyondTravel { x, y, .. } => {
+            let mm = |value: &Value| BinaryFraction {
+                units: value.to_bits().into(),
+                fraction_bits: 16,
+                places: 3,
+            };
             write!(
                 formatter,
-                "it would go {x},{y} steps beyond the travel: choose a smaller $page, or set $130 and $131"
+                "it would go {},{} mm beyond the travel: choose a smaller $page, or set $130 and $131",
+                mm(x),
+                mm(y)
             )
         }
         MachineError::MoveTooLong { .. } => {

@@ -106,6 +106,36 @@ impl Arc {
         Ok(arc)
     }
 
+    /// The least and the greatest coordinates of its points; those already passed do not count.
+    ///
+    /// ```
+    /// use penup::drawing::PagePoint;
+    /// use penup::step::{Arc, Turn};
+    /// let at = |x, y| PagePoint { x, y };
+    /// let arc = Arc::new(at(0, 0), at(3, 4), at(-4, 3), Turn::Counterclockwise)?;
+    /// assert_eq!(arc.bounds(), (at(-4, 3), at(2, 5)));
+    /// # Ok::<(), penup::step::ArcError>(())
+    /// ```
+    pub fn bounds(&self) -> (PagePoint, PagePoint) {
+        let (mut least, mut most) = (self.to, self.to);
+        let mut include = |point: PagePoint| {
+            least = PagePoint { x: least.x.min(point.x), y: least.y.min(point.y) };
+            most = PagePoint { x: most.x.max(point.x), y: most.y.max(point.y) };
+        };
+        if self.remaining > 1 {
+            include(self.point_at(self.place + self.step));
+        }
+        // Where a side is crossed in its middle, the circle is furthest out.
+        for side in 0..4 {
+            let middle = side * self.quarter + self.half;
+            let ahead = ((middle - self.place) * self.step).rem_euclid(4 * self.quarter);
+            if ahead.unsigned_abs() < self.remaining {
+                include(self.point_at(middle));
+            }
+        }
+        (least, most)
+    }
+
     /// The place on the circle nearest to `point`: the right side runs up from 0, the top left, and
     /// so on, a quarter each.
     fn place_of(&self, point: PagePoint) -> i32 {

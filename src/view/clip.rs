@@ -5,10 +5,11 @@
 //! no edge whose ends both lie on the near plane is to be drawn.
 
 use super::View;
+use super::curves::Flattening;
 use super::tidy::tidy;
 use crate::geometry::Vertex;
 use crate::model::{Corner, Element, Elements, Model, VERTEX_NUMBER_LIMIT};
-use crate::stage::{Aborted, Attention, OutOfScratch, Scratch, heap_sort_by_key};
+use crate::stage::{Attention, OutOfScratch, Scratch, StageError, heap_sort_by_key};
 
 /// A model as the camera sees it.
 #[derive(Debug, Clone, Copy)]
@@ -21,57 +22,34 @@ pub struct Seen<'a> {
     pub degenerate_faces: u32,
 }
 
-/// Why nothing is seen.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum SeeError {
-    /// The vertices, or the cut faces, do not fit.
-    Scratch(OutOfScratch),
-    /// The user gave up.
-    Aborted,
-}
-
-impl From<OutOfScratch> for SeeError {
-    fn from(error: OutOfScratch) -> Self {
-        Self::Scratch(error)
-    }
-}
-
-impl From<Aborted> for SeeError {
-    fn from(_: Aborted) -> Self {
-        Self::Aborted
-    }
-}
-
-/// Vertices taken through the camera between two looks up from the work: some 100,000 instructions.
-const VERTICES_BETWEEN_CHECKS: usize = 256;
-
 /// Takes every vertex of `model` to view coordinates, makes one of those at the same place, leaves
-/// out faces without an area, and cuts off what is nearer than the near plane.
+/// out faces without an area, and cuts off what is nearer than the near plane. With `curves` its curves
+/// are there too, as bars between vertices of their own.
 ///
 /// # Errors
-/// See [`SeeError`].
+/// [`StageError::Scratch`] if the vertices, or the cut faces, do not fit.
 #[inline(never)] // Its frame must not lie under the stages'.
 pub fn see<'a>(
     view: &View,
     model: &'a Model<'_>,
+    curves: Option<Flattening<'_>>,
     scratch: &mut Scratch<'a>,
     attention: &mut dyn Attention,
-) -> Result<Seen<'a>, SeeError> {
-    let vertices = scratch.take::<Vertex>(model.vertices().len())?;
-    let chunks = vertices.chunks_mut(VERTICES_BETWEEN_CHECKS);
-    for (vertices, positions) in chunks.zip(model.vertices().chunks(VERTICES_BETWEEN_CHECKS)) {
-        for (vertex, position) in vertices.iter_mut().zip(positions) {
-            *vertex = view.vertex(*position);
-        }
-        attention.check()?;
-    }
+) -> Result<Seen<'a>, StageError> {
     let (elements, degenerate_faces) = tidy(model, scratch, attention)?;
+    let (vertices, elements) = match curves {
+        Some(curves) => curves.add(view, model, elements, scratch, attention)?,
+        None => {
+            let vertices = scratch.take::<Vertex>(model.vertices().len())?;
+            view.fill(model, vertices, attention)?;
+            (&*vertices, elements)
+        }
+    };
     let (vertices, elements) = match view.near() {
         Some(near) if vertices.iter().any(|vertex| vertex.z < near) => {
             cut(vertices, elements, near, scratch)?
         }
-        _ => (&*vertices, elements),
+        _ => (vertices, elements),
     };
     Ok(Seen { vertices, elements, degenerate_faces })
 }

@@ -11,13 +11,16 @@
 
 mod camera;
 mod clip;
+mod curves;
 mod tidy;
 
 pub use camera::{Camera, Direction, Lens, Sight, SightLines};
-pub use clip::{SeeError, Seen, distinct_edges, see};
+pub use clip::{Seen, distinct_edges, see};
+pub use curves::Flattening;
 
 use crate::geometry::{COORDINATE_LIMIT, Projection, Vertex};
 use crate::model::{Model, Position};
+use crate::stage::{Aborted, Attention};
 use camera::{Axes, dot, largest_component};
 
 /// Why there is no view.
@@ -93,6 +96,9 @@ fn exponent(value: f64) -> i32 {
     libm::frexp(value).1
 }
 
+/// Vertices taken through the camera between two looks up from the work: some 100,000 instructions.
+const VERTICES_BETWEEN_CHECKS: usize = 256;
+
 /// The near plane is at this fraction of the greatest depth: 2^-10.
 const NEAR_SHIFT: u32 = 10;
 
@@ -156,6 +162,23 @@ impl View {
     /// What of an edge is in front of the near plane; `None` if nothing is.
     pub fn clip_edge(&self, ends: [Vertex; 2]) -> Option<[Vertex; 2]> {
         clip::clip_edge(ends, self.near.unwrap_or(i32::MIN))
+    }
+
+    /// Takes every vertex of `model` to view coordinates.
+    fn fill(
+        &self,
+        model: &Model<'_>,
+        vertices: &mut [Vertex],
+        attention: &mut dyn Attention,
+    ) -> Result<(), Aborted> {
+        let chunks = vertices.chunks_mut(VERTICES_BETWEEN_CHECKS);
+        for (vertices, positions) in chunks.zip(model.vertices().chunks(VERTICES_BETWEEN_CHECKS)) {
+            for (vertex, position) in vertices.iter_mut().zip(positions) {
+                *vertex = self.vertex(*position);
+            }
+            attention.check()?;
+        }
+        Ok(())
     }
 
     /// Makes sure that every vertex is in front of the eye.

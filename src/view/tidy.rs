@@ -1,8 +1,7 @@
 //! What modellers leave behind: vertices at the same place made one, faces without an area left out.
 
 use crate::model::{Corner, Element, Elements, Model, Position};
-use crate::stage::{Attention, OutOfScratch, Scratch};
-use crate::view::SeeError;
+use crate::stage::{Attention, OutOfScratch, Scratch, StageError};
 
 /// The elements of the model with each vertex replaced by the first one at the same place, without the faces that
 /// have no area, and how many those are. The model's own elements if there is nothing to do. Other faces may
@@ -13,7 +12,7 @@ pub(super) fn tidy<'a>(
     model: &'a Model<'_>,
     scratch: &mut Scratch<'a>,
     attention: &mut dyn Attention,
-) -> Result<(Elements<'a>, u32), SeeError> {
+) -> Result<(Elements<'a>, u32), StageError> {
     let positions = model.vertices();
     let elements = model.elements();
     let degenerate = elements.iter().filter(|element| !has_extent(element, positions)).count();

@@ -84,7 +84,8 @@ pub fn make() -> Result<()> {
             )?;
             let ways: &[&str] = if figure.alone { &[""] } else { &["dotted", "erased"] };
             for way in ways {
-                let name = [scene, &words(figure.view), way].concat() + ".svg";
+                let name = [scene, &words(figure.view), way].join("-");
+                let name = format!("{}.svg", name.trim_end_matches('-').replace("--", "-"));
                 println!("penup: docs/gallery/{name}");
                 draw(figure, way, &folder.join(&name).display().to_string())?;
                 write!(page, " ![{} {way}]({name}) |", figure.title)?;
@@ -107,9 +108,8 @@ fn draw(figure: &Figure, hidden: &str, to: &str) -> Result<()> {
 
 /// What of the options goes into a file's name.
 fn words(view: &[&str]) -> String {
-    let kept = |c: &char| c.is_ascii_alphanumeric() || "-,.".contains(*c);
-    let words = view.join("-").chars().filter(kept).collect::<String>();
-    format!("-{}{}", words.trim_matches('-'), if words.is_empty() { "" } else { "-" })
+    let text = view.join("-").replace(['=', ','], "-");
+    text.trim_start_matches('-').to_owned()
 }
 
 fn count_vertices(scene: &str) -> Result<usize> {

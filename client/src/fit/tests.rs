@@ -1,9 +1,8 @@
 use super::*;
-use penup::curve::{CurveStore, FRACTION_BITS, Point};
-use penup::fixed::Decimal;
+use penup::curve::{FRACTION_BITS, Point};
+use penup::model::{Corner, Model, Position};
+use penup::protocol::Command;
 
-/// Units of the control points to a millimetre.
-const UNITS: f64 = (1 << 18) as f64;
 /// In the flattening of a test, 1/256 mm.
 const FLATTENING: u16 = 1;
 
@@ -35,45 +34,37 @@ fn obj_of(polylines: &[Vec<Place>]) -> String {
 
 /// The chords of every curve of a file, as the plotter would read and flatten it.
 fn flattened(obj: &str) -> Vec<Vec<Place>> {
-    let mut points: Vec<Point> = Vec::new();
-    let mut words = heapless::Vec::<u32, 20_000>::new();
-    let mut curves = CurveStore::new(&mut words);
+    let mut vertices = Box::new(heapless::Vec::<Position, 16_000>::new());
+    let mut corners = Box::new(heapless::Vec::<Corner, 40_000>::new());
+    let mut model = Model::new(&mut *vertices, &mut *corners);
     for line in obj.lines() {
         assert!(line.len() <= 256, "{line}");
-        let (keyword, rest) = line.split_once(' ').unwrap_or((line, ""));
-        let numbers = rest.split(' ').filter_map(|word| Decimal::parse(word).ok());
-        match keyword {
-            "cstype" => assert_eq!(rest, "bspline"),
-            "v" => {
-                let unit = |number: Decimal| (number.to_f64() * UNITS).round() as i32;
-                let place: Vec<i32> = numbers.map(unit).collect();
-                points.push([place[0], place[1], place[2]]);
-            }
-            "deg" => curves.set_degree(rest.parse().unwrap()).unwrap(),
-            "curv" => {
-                let mut numbers = numbers;
-                let ends = [numbers.next().unwrap(), numbers.next().unwrap()];
-                let control = numbers.map(|number| number.to_whole().unwrap() as u16 - 1);
-                curves.begin(ends, control).unwrap();
-            }
-            "parm" => curves.add_knots(numbers).unwrap(),
-            "end" => curves.end().unwrap(),
-            other => panic!("{other}"),
-        }
+        let done = match Command::parse(line).unwrap() {
+            Command::Nothing => Ok(()),
+            Command::Vertex(place) => model.add_vertex(place),
+            Command::Degree(degree) => model.set_degree(degree),
+            Command::Curve { ends, control } => model.begin_curve(ends, control.iter()),
+            Command::Knots(knots) => model.add_knots(knots.iter()),
+            Command::EndCurve => model.end_curve(),
+            other => panic!("{other:?}"),
+        };
+        done.unwrap();
     }
-    let scale = f64::from(1 << FRACTION_BITS) * UNITS / 256.0;
+    let points: Vec<Point> = model.vertices().iter().map(|place| place.coordinates()).collect();
+    let units = f64::from(1 << model.fraction_bits());
+    let scale = f64::from(1 << FRACTION_BITS) * units / 256.0;
     let on_page =
         |place: [i64; 3]| Some([0, 1].map(|axis: usize| (place[axis] as f64 / scale) as i64));
-    let chords = |curve: penup::curve::StoredCurve<'_>| -> Vec<Place> {
+    let chords = |curve: penup::model::StoredCurve<'_>| -> Vec<Place> {
         let spline = curve.spline(&points).unwrap();
         let ends = spline.chords(on_page, FLATTENING);
-        ends.map(|(_, [x, y, _])| [f64::from(x) / UNITS, f64::from(y) / UNITS]).collect()
+        ends.map(|(_, [x, y, _])| [f64::from(x) / units, f64::from(y) / units]).collect()
     };
     let mut chains: Vec<Vec<Place>> = Vec::new();
-    for chain in curves.iter().map(chords) {
+    for chain in model.curves().iter().map(chords) {
         match chains.last_mut() {
             // Written as several for the length of a line.
-            Some(before) if distance(before[before.len() - 1], chain[0]) < 2.0 / UNITS => {
+            Some(before) if distance(before[before.len() - 1], chain[0]) < 2.0 / units => {
                 before.extend(&chain[1..]);
             }
             _ => chains.push(chain),

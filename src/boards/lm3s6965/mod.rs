@@ -5,14 +5,17 @@
 //! | STEP_X, DIR_X, STEP_Y, DIR_Y | PB0, PB1, PB2, PB3 |
 //! | ENABLE (low: drivers on) | PB4 |
 //! | PEN (high: down) | PB5 |
+//! | limit switches of x, y, emergency stop (high: closed; pulled down) | PC4, PC5, PC6 |
 //! | serial line, 115200 8N1 | UART0: PA0 receives, PA1 sends |
 //! | steps | timer 0, priority 0: nothing delays it |
 //! | serial line's bytes | UART0, priority 1 |
+//! | contacts | port C, priority 2: wakes the main loop |
 //! | clock | SysTick, priority 2; stands still while the machine sleeps without a task |
 //!
 //! What is refused: to be taken twice.
 
 mod clock;
+mod contacts;
 mod critical;
 mod emergency;
 mod pins;
@@ -24,7 +27,7 @@ use core::sync::atomic::{AtomicBool, Ordering};
 
 use cortex_m::interrupt;
 use cortex_m::peripheral::Peripherals;
-use penup::machine::PulserState;
+use penup::machine::{Contacts, PulserState};
 use penup::motion::{Block, EventQueue};
 use penup::plotter::{Board, Lent, Lm3s6965Memory, NO_MOVES};
 use penup::protocol::RealTime;
@@ -54,6 +57,7 @@ pub fn take() -> (Lm3s6965, Lent<'static>, &'static PulserState) {
     };
     let clock = clock::start(core.SYST, &mut core.SCB);
     let pins = pins::set_up();
+    contacts::set_up(&mut core.NVIC);
     let serial = serial::set_up(&mut core.NVIC);
     let steps = steps::set_up(pins, &mut core.NVIC);
     defmt::info!("lm3s6965 at {=u32} Hz", clock::HERTZ);
@@ -80,6 +84,14 @@ impl Board for Lm3s6965 {
 
     fn queue(&mut self) -> &mut dyn EventQueue {
         &mut self.steps
+    }
+
+    fn contacts(&mut self) -> Contacts {
+        contacts::read()
+    }
+
+    fn step_now(&mut self) {
+        self.steps.start_now();
     }
 
     fn wait(&mut self) {

@@ -10,6 +10,8 @@ pub const SYSTEM_CONTROL: Peripheral = unsafe { Peripheral::at(0x400F_E000) };
 pub const GPIO_A: Peripheral = unsafe { Peripheral::at(0x4000_4000) };
 /// Port B, the machine's pins. Used by `pins`.
 pub const GPIO_B: Peripheral = unsafe { Peripheral::at(0x4000_5000) };
+/// Port C, the contacts. Used by `contacts`.
+pub const GPIO_C: Peripheral = unsafe { Peripheral::at(0x4000_6000) };
 /// The serial line. Used by `serial`.
 pub const UART0: Peripheral = unsafe { Peripheral::at(0x4000_C000) };
 /// The step timer. Used by `steps`.

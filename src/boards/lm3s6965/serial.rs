@@ -81,7 +81,7 @@ impl Line {
     /// As [`line::Line::take_real_time`]; logs how long a request for the status has waited.
     pub fn take_real_time(&mut self) -> RealTime {
         let asked = self.0.take_real_time();
-        if asked.status {
+        if asked.has(RealTime::STATUS) {
             let waited = clock::cycles_24().wrapping_sub(STATUS_ASKED.load(Ordering::Relaxed));
             let microseconds = (waited & clock::CYCLE_MASK) / (clock::HERTZ / 1_000_000);
             defmt::debug!("status after {=u32} us", microseconds);

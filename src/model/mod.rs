@@ -4,8 +4,14 @@
 //! came (Cárdenas & Seeley's joints and bars in two sequential arrays). It refuses what would break
 //! it (a face through a vertex that does not exist, more than fits) and is then as it was before.
 
+mod curves;
+
+pub use curves::{Curves, StoredCurve};
+
+use crate::curve::CurveError;
 use crate::fixed::Decimal;
 use bytemuck::{Pod, Zeroable};
+use curves::CurveList;
 
 /// One more than the largest vertex number that an element can hold.
 pub const VERTEX_NUMBER_LIMIT: usize = 1 << 14;
@@ -145,6 +151,16 @@ pub enum ModelError {
         /// The vertex, from 1.
         number: i32,
     },
+    /// A curve needs its degree first.
+    NoDegree,
+    /// The curve before has no end.
+    CurveUnfinished,
+    /// Knots or an end without a curve.
+    NoCurve,
+    /// A parameter or knot is past ±2^22.
+    KnotTooLarge,
+    /// It is no curve.
+    Curve(CurveError),
 }
 
 /// The vertices, faces and bars that the user sent, in memory lent by the owner.
@@ -154,10 +170,12 @@ pub enum ModelError {
 #[derive(Debug)]
 pub struct Model<'m> {
     vertices: &'m mut heapless::VecView<Position>,
+    /// The corners of elements, then curves.
     corners: &'m mut heapless::VecView<Corner>,
     fraction_bits: u32,
     faces: usize,
     bars: usize,
+    curves: CurveList,
 }
 
 impl<'m> Model<'m> {
@@ -166,9 +184,16 @@ impl<'m> Model<'m> {
         vertices: &'m mut heapless::VecView<Position>,
         corners: &'m mut heapless::VecView<Corner>,
     ) -> Self {
-        vertices.clear();
-        corners.clear();
-        Self { vertices, corners, fraction_bits: FINEST_FRACTION_BITS, faces: 0, bars: 0 }
+        let mut model = Self {
+            vertices,
+            corners,
+            fraction_bits: FINEST_FRACTION_BITS,
+            faces: 0,
+            bars: 0,
+            curves: CurveList::default(),
+        };
+        model.clear();
+        model
     }
 
     /// Forgets everything.
@@ -178,6 +203,7 @@ impl<'m> Model<'m> {
         self.fraction_bits = FINEST_FRACTION_BITS;
         self.faces = 0;
         self.bars = 0;
+        self.curves = CurveList::default();
     }
 
     /// The vertices, in units of 2^-[`Model::fraction_bits`].
@@ -192,7 +218,12 @@ impl<'m> Model<'m> {
 
     /// The faces and bars.
     pub fn elements(&self) -> Elements<'_> {
-        Elements { corners: self.corners }
+        Elements { corners: self.corners.get(..self.curves.start).unwrap_or(&[]) }
+    }
+
+    /// The curves.
+    pub fn curves(&self) -> Curves<'_> {
+        self.curves.curves(self.corners)
     }
 
     /// How many faces there are.
@@ -205,17 +236,22 @@ impl<'m> Model<'m> {
         self.bars
     }
 
+    /// How many curves there are.
+    pub fn curve_count(&self) -> usize {
+        self.curves.count
+    }
+
     /// How many vertices there can be.
     pub fn vertex_limit(&self) -> usize {
         self.vertices.capacity().min(VERTEX_NUMBER_LIMIT)
     }
 
-    /// How many corners of elements there are.
+    /// How many corners of elements there are; half-words of curves count as such.
     pub fn corner_count(&self) -> usize {
         self.corners.len()
     }
 
-    /// How many corners of elements there can be.
+    /// How many corners there can be.
     pub fn corner_limit(&self) -> usize {
         self.corners.capacity()
     }
@@ -341,14 +377,60 @@ impl<'m> Model<'m> {
             .ok_or(ModelError::UnknownVertex { number, vertices: self.vertices.len() })?;
         self.corners
             .push(Corner::new(vertex, of_bar, last))
-            .map_err(|_| ModelError::TooManyCorners { limit, needed: limit + 1 })
+            .map_err(|_| ModelError::TooManyCorners { limit, needed: limit + 1 })?;
+        // Before the curves.
+        self.corners.get_mut(self.curves.start..).unwrap_or(&mut []).rotate_right(1);
+        self.curves.start += 1;
+        Ok(())
+    }
+
+    /// Sets the degree of the curves that follow, 1 to 5.
+    ///
+    /// # Errors
+    /// [`ModelError::Curve`]; the model is unchanged.
+    pub fn set_degree(&mut self, degree: u8) -> Result<(), ModelError> {
+        self.curves.set_degree(degree)
+    }
+
+    /// Begins a curve between two knot values over control points numbered as in OBJ.
+    ///
+    /// # Errors
+    /// See [`ModelError`]; the model is unchanged.
+    pub fn begin_curve(
+        &mut self,
+        ends: [Decimal; 2],
+        numbers: impl Iterator<Item = i32> + Clone,
+    ) -> Result<(), ModelError> {
+        let vertices = self.vertices.len();
+        let resolve = |number| resolve(number, vertices);
+        if let Some(number) = numbers.clone().find(|number| resolve(*number).is_none()) {
+            return Err(ModelError::UnknownVertex { number, vertices });
+        }
+        self.curves.begin(self.corners, ends, numbers.filter_map(resolve))
+    }
+
+    /// Adds knots to the curve in hand.
+    ///
+    /// # Errors
+    /// See [`ModelError`]; the model is unchanged.
+    pub fn add_knots(
+        &mut self,
+        knots: impl Iterator<Item = Decimal> + Clone,
+    ) -> Result<(), ModelError> {
+        self.curves.add_knots(self.corners, knots)
+    }
+
+    /// Ends the curve in hand. If it is refused it is forgotten.
+    ///
+    /// # Errors
+    /// [`ModelError::NoCurve`], [`ModelError::KnotTooLarge`], [`ModelError::Curve`].
+    pub fn end_curve(&mut self) -> Result<(), ModelError> {
+        self.curves.end(self.corners)
     }
 
     /// The vertex that an OBJ number means.
     fn resolve(&self, number: i32) -> Option<u16> {
-        let count = self.vertices.len() as i64; // at most VERTEX_NUMBER_LIMIT
-        let index = if number < 0 { count + i64::from(number) } else { i64::from(number) - 1 };
-        if (0..count).contains(&index) { u16::try_from(index).ok() } else { None }
+        resolve(number, self.vertices.len())
     }
 
     /// The smallest box around all vertices: least and greatest of each coordinate; `None` if empty.
@@ -366,10 +448,19 @@ impl<'m> Model<'m> {
         }))
     }
 
-    /// Whether this is a plan: bars only, all at one height.
+    /// Whether this is a plan: bars and curves only, all at one height.
     pub fn is_plan(&self) -> bool {
-        self.faces == 0 && self.bars > 0 && self.bounds().is_some_and(|(low, high)| low.z == high.z)
+        self.faces == 0
+            && self.bars + self.curves.count > 0
+            && self.bounds().is_some_and(|(low, high)| low.z == high.z)
     }
+}
+
+/// The vertex that an OBJ number means in a model with so many.
+fn resolve(number: i32, vertices: usize) -> Option<u16> {
+    let count = vertices as i64; // at most VERTEX_NUMBER_LIMIT
+    let index = if number < 0 { count + i64::from(number) } else { i64::from(number) - 1 };
+    if (0..count).contains(&index) { u16::try_from(index).ok() } else { None }
 }
 
 #[cfg(test)]

@@ -1,0 +1,432 @@
+//! The machine at the line: G-code, moves by hand, homing, contacts, real-time bytes.
+
+#![allow(clippy::expect_used, reason = "a test fails by panicking")]
+
+use penup::boards::host::Change;
+use penup::machine::Settings;
+use penup::machine::{Contacts, State};
+use penup::plotter::Board;
+use penup::plotter::{Memory, NO_MOVES};
+use penup_host_tests::event_checker::{self, Drawn};
+use penup_host_tests::whole_jobs::Bench;
+use proptest::prelude::*;
+use std::sync::LazyLock;
+
+fn bench() -> Bench {
+    let mut bench = Bench::new();
+    bench.heard();
+    bench
+}
+
+/// Lets `milliseconds` of the plotter's time pass.
+fn work(bench: &mut Bench, milliseconds: u32) {
+    for _ in 0..milliseconds {
+        while bench.plotter.poll(&mut bench.board) {}
+        bench.board.wait();
+    }
+}
+
+/// The field of the status that begins so.
+fn field(bench: &mut Bench, name: &str) -> String {
+    let answers = bench.say("?");
+    let status = answers.lines().find(|line| line.starts_with('<')).unwrap_or_default();
+    let inner = status.trim_start_matches('<').trim_end_matches('>');
+    inner.split('|').find(|field| field.starts_with(name)).unwrap_or("").to_owned()
+}
+
+fn place(bench: &mut Bench) -> String {
+    let field = field(bench, "MPos");
+    let place = field.strip_prefix("MPos:").and_then(|place| place.strip_suffix(",0.000"));
+    place.expect("a status").to_owned()
+}
+
+/// Millimetres moved with the pen down, by the pins, and where they end.
+fn inked(bench: &Bench) -> f64 {
+    let (mut up, mut pen, mut length) = ([false; 2], 0, 0.0);
+    let mut at = (0u64, [0.0f64; 2]);
+    for stamped in bench.board.trace().changes() {
+        if stamped.time != at.0 {
+            length += if pen > 64 { at.1[0].hypot(at.1[1]) / 80.0 } else { 0.0 };
+            at = (stamped.time, [0.0; 2]);
+        }
+        match stamped.change {
+            Change::StepX(true) => at.1[0] = 1.0,
+            Change::StepY(true) => at.1[1] = 1.0,
+            Change::UpX(level) => up[0] = level,
+            Change::UpY(level) => up[1] = level,
+            Change::Pen(height) => pen = height,
+            _ => {}
+        }
+    }
+    length
+}
+
+#[test]
+fn a_program_is_drawn_and_ends_with_the_pen_up() {
+    let mut bench = bench();
+    let program =
+        "%\nG21 G90 (mm)\nG0 X10 Y10\nM3\nG1 X30 F2400\nY30\nG91 X-20\nG90 Y10\nM5\nG28\nM2\n";
+    let lines = program.lines().count();
+    bench.board.receive(program.as_bytes());
+    bench.finish();
+    assert_eq!(bench.heard(), "ok\n".repeat(lines));
+    assert_eq!(bench.say("?"), "<Idle|MPos:0.000,0.000,0.000|Strokes:1/1|Ink:80/80|Left:0>\n");
+    assert!((inked(&bench) - 80.0).abs() < 0.1, "{}", inked(&bench));
+}
+
+#[test]
+fn arcs_by_centre_and_by_radius_inches_and_bounds() {
+    let mut bench = bench();
+    bench.say("G0 X20 Y50\nM3\nG2 X20 Y50 I30 J0\n");
+    bench.finish();
+    assert!((inked(&bench) - 60.0 * std::f64::consts::PI).abs() < 12.0);
+    assert_eq!(place(&mut bench), "20.000,50.000");
+    bench.say("M5\nG20 G0 X1 Y1\n");
+    bench.finish();
+    assert_eq!(place(&mut bench), "25.400,25.400");
+    // A quarter to the left from (60, 50) around (50, 50), and three quarters around (60, 60).
+    bench.say("G21 G0 X60 Y50\nM3\nG3 X50 Y60 R10\n");
+    bench.finish();
+    assert_eq!(place(&mut bench), "50.000,60.000");
+    bench.say("G0 X10 Y10\nG3 X30 Y10 I10 J1\n");
+    bench.finish();
+    assert_eq!(place(&mut bench), "30.000,10.000");
+    // Its ends lie within the travel, its lowest point does not.
+    let answer = bench.say("G0 X5 Y5\nG3 X25 Y5 I10 J0\n");
+    assert!(answer.contains("beyond") && answer.ends_with("error:15\n"), "{answer}");
+    bench.finish();
+    assert_eq!(place(&mut bench), "5.000,5.000");
+}
+
+#[test]
+fn a_pen_that_goes_down_and_up_leaves_a_dot() {
+    let mut bench = bench();
+    bench.say("G0 X5\nM3\nM5\nG0 X10\n");
+    bench.finish();
+    let heights: Vec<_> = bench
+        .board
+        .trace()
+        .changes()
+        .iter()
+        .filter_map(
+            |stamped| if let Change::Pen(height) = stamped.change { Some(height) } else { None },
+        )
+        .collect();
+    assert_eq!(heights, [127, 0]);
+    assert_eq!(place(&mut bench), "10.000,0.000");
+}
+
+#[test]
+fn moves_by_hand_are_cancelled_where_they_are() {
+    let mut bench = bench();
+    assert_eq!(bench.say("$J=G91 X100 F3000\n$J=G91 Y10\n"), "ok\nok\n");
+    work(&mut bench, 500);
+    assert_eq!(field(&mut bench, "Jog"), "Jog");
+    bench.board.receive(&[0x85]);
+    bench.finish();
+    let stood = place(&mut bench);
+    let x: f64 = stood.split(',').next().and_then(|x| x.parse().ok()).expect("a number");
+    assert!((15.0..40.0).contains(&x), "{stood}");
+    assert_eq!(field(&mut bench, "Idle"), "Idle");
+    assert_eq!(bench.say("$J=X0\n"), "ok\n");
+    bench.finish();
+    assert_eq!(place(&mut bench), "0.000,0.000");
+}
+
+#[test]
+fn homing_answers_when_it_is_done() {
+    let mut bench = bench();
+    assert_eq!(bench.say("$22=1\n$130=60\n$131=60\n$J=X30 Y20\n"), "ok\n".repeat(4));
+    bench.finish();
+    bench.board.receive(b"$H\n$J=X1\n");
+    let mut seen = Vec::new();
+    for _ in 0..60_000 {
+        bench.plotter.poll(&mut bench.board);
+        let pins = bench.plotter.machine().position();
+        let home = bench.plotter.machine().state() == State::Home;
+        // The switches stand at 5 mm from where the machine began, while it looks for them.
+        let contacts = Contacts { x: home && pins.x <= 400, y: home && pins.y <= 400, stop: false };
+        bench.board.set_contacts(contacts);
+        seen.push(bench.plotter.machine().state());
+        bench.board.wait();
+        if bench.board.has_read_all() && bench.plotter.machine().state() == State::Idle {
+            break;
+        }
+    }
+    assert!(seen.contains(&State::Home) && seen.contains(&State::Jog));
+    assert_eq!(bench.heard(), "ok\nok\n");
+    bench.finish();
+    assert_eq!(place(&mut bench), "1.000,0.000");
+}
+
+#[test]
+fn a_limit_and_the_emergency_stop_are_alarms() {
+    for (contacts, byte, alarm) in [
+        (Contacts { x: true, ..Contacts::default() }, None, "ALARM:1\n"),
+        (Contacts { stop: true, ..Contacts::default() }, None, "ALARM:10\n"),
+        (Contacts::default(), Some(0xB1), "ALARM:10\n"),
+    ] {
+        let mut bench = bench();
+        assert_eq!(bench.say("$21=1\nG0 X1\nM3\nG1 X90\n"), "ok\n".repeat(4));
+        work(&mut bench, 900);
+        let before = bench.board.trace().now();
+        bench.board.set_contacts(contacts);
+        bench.board.receive(byte.as_slice());
+        work(&mut bench, 2);
+        let changes = bench.board.trace().changes();
+        let late = changes.iter().filter(|stamped| stamped.time > before + 50);
+        assert!(late.count() <= 2, "no pulse after the alarm");
+        let last_pen = changes.iter().rev().find_map(|stamped| match stamped.change {
+            Change::Pen(height) => Some((stamped.time - before, height)),
+            _ => None,
+        });
+        let (after, height) = last_pen.expect("the pen moved");
+        assert!(height == 0 && after < 25_000, "the pen is up within a millisecond");
+        assert_eq!(bench.heard(), alarm);
+        assert!(bench.say("G0 X0\n").ends_with("error:9\n"));
+        work(&mut bench, 20);
+        let stood = place(&mut bench);
+        if contacts.stop {
+            assert!(field(&mut bench, "Pn").contains('E'));
+            assert!(bench.say("$X\n").ends_with("error:9\n"));
+        }
+        bench.board.set_contacts(Contacts::default());
+        assert_eq!(bench.say("$X\n"), "ok\n");
+        assert_eq!(place(&mut bench), stood);
+        bench.say("G0 X0\n");
+        bench.finish();
+        assert_eq!(place(&mut bench), "0.000,0.000");
+    }
+}
+
+#[test]
+fn speeds_change_while_it_draws() {
+    let seconds = |bytes: &[u8]| {
+        let mut bench = bench();
+        bench.say("M3\nG1 X100\n");
+        work(&mut bench, 300);
+        for byte in bytes {
+            bench.board.receive(&[*byte]);
+            work(&mut bench, 1);
+        }
+        bench.finish();
+        bench.board.trace().now() as f64 / 25e6
+    };
+    let plain = seconds(&[]);
+    // 93 mm at 45 mm/s instead of 50.
+    let slow = seconds(&[0x92]);
+    assert!((0.15..0.25).contains(&(slow - plain)), "{slow} {plain}");
+    let reset = seconds(&[0x92, 0x90]);
+    assert!((reset - plain).abs() < 0.01, "{reset} {plain}");
+    let fast = seconds(&[0x91]);
+    assert!((0.1..0.25).contains(&(plain - fast)), "{fast} {plain}");
+    let mut bench = bench();
+    bench.board.receive(&[0x93]);
+    work(&mut bench, 1);
+    assert_eq!(field(&mut bench, "Ov"), "Ov:101,100,100");
+}
+
+#[test]
+fn pauses_wait_for_the_user() {
+    let mut bench = bench();
+    bench.board.receive(b"M3\nG1 X10\nM0\nG1 X20\n");
+    work(&mut bench, 1500);
+    assert_eq!(bench.heard(), "ok\n".repeat(4));
+    assert_eq!(field(&mut bench, "Hold"), "Hold:0");
+    assert_eq!(place(&mut bench), "10.000,0.000");
+    bench.say("~");
+    bench.finish();
+    assert_eq!(place(&mut bench), "20.000,0.000");
+    // At the end of the stroke.
+    bench.say("M5\nG0 X0\nM3\nG1 X10\nG1 X20\nM5\nG0 X50\nG0 X60\n");
+    bench.board.receive(&[0xB0]);
+    work(&mut bench, 3000);
+    assert_eq!(place(&mut bench), "20.000,0.000");
+    assert_eq!(field(&mut bench, "Hold"), "Hold:0");
+    bench.say("~");
+    bench.finish();
+    assert_eq!(place(&mut bench), "60.000,0.000");
+    // A wait by the pins' own clock.
+    let before = bench.board.trace().now();
+    assert_eq!(bench.say("G4 P1.5\n"), "");
+    bench.finish();
+    assert_eq!(bench.heard(), "ok\n");
+    let waited = (bench.board.trace().now() - before) as f64 / 25e6;
+    assert!((1.5..1.6).contains(&waited), "{waited}");
+}
+
+#[test]
+fn checking_refuses_what_would_be_refused_and_moves_nothing() {
+    let mut bench = bench();
+    assert_eq!(bench.say("$C\nM3\nG1 X10\nG91 X100\nG2 X10 I5\nM0\nG4 P9\n"), "ok\n".repeat(7));
+    assert_eq!(field(&mut bench, "Check"), "Check");
+    assert!(bench.say("G91 G1 X400\n").ends_with("error:15\n"));
+    assert_eq!(bench.say("v 0 0 0\nv 9 9 0\nl 1 2\n$plot\n$C\n"), "ok\n".repeat(5));
+    bench.finish();
+    assert!(bench.board.trace().changes().is_empty());
+    assert_eq!(bench.say("?"), "<Idle|MPos:0.000,0.000,0.000|Strokes:0/0|Ink:0/0|Left:0>\n");
+    // What was checked is not where the next line begins.
+    bench.say("G91 G0 X1\n");
+    bench.finish();
+    assert_eq!(place(&mut bench), "1.000,0.000");
+}
+
+#[test]
+fn asleep_it_takes_nothing_but_the_order_to_wake() {
+    let mut bench = bench();
+    bench.say("G0 X3\n");
+    bench.finish();
+    assert_eq!(bench.say("$SLP\n"), "ok\n");
+    work(&mut bench, 50);
+    assert_eq!(field(&mut bench, "Sleep"), "Sleep");
+    let enable =
+        bench.board.trace().changes().iter().rev().find_map(|stamped| match stamped.change {
+            Change::Enable(on) => Some(on),
+            _ => None,
+        });
+    assert_eq!(enable, Some(false));
+    assert!(bench.say("G0 X0\n").ends_with("error:9\n"));
+    assert!(
+        bench.say("$plot\n").ends_with("error:120\n")
+            || bench.say("$plot\n").ends_with("error:9\n")
+    );
+    assert_eq!(bench.say("$X\nG0 X0\n"), "ok\nok\n");
+    bench.finish();
+    assert_eq!(place(&mut bench), "0.000,0.000");
+}
+
+#[test]
+fn letters_of_utf_8_are_no_orders() {
+    let mut bench = bench();
+    assert_eq!(bench.say("# Å Д °±\n(Ä)\n"), "ok\nok\n");
+    assert_eq!(field(&mut bench, "Idle"), "Idle");
+}
+
+#[test]
+fn no_talk_starves_the_steps() {
+    // The fastest pen of the default settings, on a path of many short moves.
+    let mut program = "$201=6000\nG0 X20 Y20\nM3\n".to_owned();
+    for point in 0..400 {
+        let angle = f64::from(point) / 20.0;
+        let (x, y) = (120.0 + 100.0 * angle.cos(), 120.0 + 100.0 * angle.sin());
+        program.push_str(&format!("G1 X{x:.3} Y{y:.3}\n"));
+    }
+    let run = |talk: bool| {
+        let mut bench = bench();
+        bench.board.set_baud(115_200);
+        let mut lines = program.lines();
+        let mut turn = 0u32;
+        loop {
+            turn += 1;
+            if bench.board.has_read_all() {
+                // Long lines and lists between the moves, a status at every turn.
+                if talk && turn.is_multiple_of(9) {
+                    let long = "x".repeat(250);
+                    bench.board.receive(format!("# {long}\n$$\n$\n$options\n").as_bytes());
+                }
+                let Some(line) = lines.next() else { break };
+                bench.board.receive(format!("{line}\n").as_bytes());
+            }
+            if talk {
+                bench.board.receive(b"?");
+            }
+            if !bench.plotter.poll(&mut bench.board) {
+                bench.board.wait();
+            }
+        }
+        bench.finish();
+        assert_eq!(bench.board.underruns(), 0);
+        event_checker::check_pins(&bench.board.trace().changes(), &Settings::default())
+    };
+    let (quiet, busy) = (run(false), run(true));
+    assert_eq!(quiet.inked, busy.inked);
+    assert_eq!(quiet.end, busy.end);
+}
+
+/// A few strokes, an arc, a dot.
+const PROGRAM: &str = "$21=1\nG0 X5 Y5\nM3\nG1 X14 Y6\nX15 Y12\nG2 X9 Y18 I-6 J0\nG1 X9.5 Y12 F1200\nM5\n\
+                       G0 X2 Y2\nM3\nM5\nG0 X3 Y9\nM3\nG1 Y10 F3000\nX12 Y10.5\nM5\nG0 X1 Y1\n";
+
+/// What is done to the plotter in the midst of it.
+#[derive(Debug, Clone, Copy)]
+enum Disturbance {
+    Nothing,
+    HoldAndResume,
+    Abort,
+    Limit,
+    StopContact,
+    StopByte,
+}
+
+/// Runs the program, disturbed after so many milliseconds; checks that the plotter knows where its
+/// pins are and that it can go on from there. Returns what was drawn before that.
+fn disturbed(disturbance: Disturbance, instant: u32) -> Drawn {
+    let memory = Box::leak(Box::new(Memory::<4, 4, 16>::new()));
+    let mut bench = Bench::with_memory(memory.lend(Box::leak(Box::new(NO_MOVES))));
+    bench.heard();
+    bench.board.receive(PROGRAM.as_bytes());
+    work(&mut bench, instant);
+    let closed = match disturbance {
+        Disturbance::Limit => Contacts { y: true, ..Contacts::default() },
+        Disturbance::StopContact => Contacts { stop: true, ..Contacts::default() },
+        _ => Contacts::default(),
+    };
+    bench.board.set_contacts(closed);
+    match disturbance {
+        Disturbance::HoldAndResume => bench.board.receive(b"!"),
+        Disturbance::Abort => bench.board.receive(b"\x18"),
+        Disturbance::StopByte => bench.board.receive(&[0xB1]),
+        _ => {}
+    }
+    if matches!(disturbance, Disturbance::HoldAndResume) {
+        work(&mut bench, 1500);
+        assert!(bench.plotter.machine().stands());
+        bench.board.receive(b"~");
+    }
+    bench.finish();
+    bench.board.set_contacts(Contacts::default());
+    let drawn = event_checker::check_pins(&bench.board.trace().changes(), &Settings::default());
+    assert_eq!(drawn.pen, 0);
+    assert_eq!(bench.plotter.machine().position(), drawn.end);
+    bench.heard();
+    // An alarm also refuses the lines that were still to come.
+    if matches!(bench.plotter.machine().state(), State::Alarm(_)) {
+        assert_eq!(bench.say("$X\n"), "ok\n");
+    }
+    assert_eq!(bench.plotter.machine().end(), drawn.end);
+    assert_eq!(bench.say("M5\nG90 G21 G0 X1 Y1\n"), "ok\nok\n");
+    bench.finish();
+    let after = event_checker::check_pins(&bench.board.trace().changes(), &Settings::default());
+    assert_eq!((after.end.x, after.end.y), (80, 80));
+    drawn
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig {
+        cases: 1000,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
+
+    #[test]
+    fn whatever_happens_the_plotter_knows_where_it_is(
+        disturbance in prop::sample::select(vec![
+            Disturbance::HoldAndResume,
+            Disturbance::Abort,
+            Disturbance::Limit,
+            Disturbance::StopContact,
+            Disturbance::StopByte,
+        ]),
+        instant in 0u32..3500,
+    ) {
+        static UNDISTURBED: LazyLock<Drawn> =
+            LazyLock::new(|| disturbed(Disturbance::Nothing, 0));
+        let drawn = disturbed(disturbance, instant);
+        if matches!(disturbance, Disturbance::HoldAndResume) {
+            prop_assert_eq!(&drawn.inked, &UNDISTURBED.inked);
+            prop_assert_eq!(drawn.end, UNDISTURBED.end);
+        } else {
+            prop_assert!(drawn.inked.is_subset(&UNDISTURBED.inked));
+        }
+    }
+}

@@ -1,0 +1,51 @@
+//! The contacts, on port C: its interrupt wakes the main loop when one changes.
+
+use core::sync::atomic::Ordering;
+
+use cortex_m::peripheral::NVIC;
+use lm3s6965::{Interrupt, interrupt};
+use penup::machine::Contacts;
+
+use super::registers::{GPIO_C, SYSTEM_CONTROL};
+use super::{HAPPENED, critical};
+
+mod offset {
+    pub const BOTH_EDGES: usize = 0x408;
+    pub const INTERRUPT_MASK: usize = 0x410;
+    pub const INTERRUPT_CLEAR: usize = 0x41C;
+    pub const PULL_DOWN: usize = 0x514;
+    pub const DIGITAL_ENABLE: usize = 0x51C;
+    /// In system control.
+    pub const GPIO_CLOCKS: usize = 0x108;
+}
+const PORT_C_CLOCK: u32 = 1 << 2;
+const LIMIT_X: u32 = 1 << 4;
+const LIMIT_Y: u32 = 1 << 5;
+const STOP: u32 = 1 << 6;
+const ALL: u32 = LIMIT_X | LIMIT_Y | STOP;
+
+/// Makes the pins inputs, pulled down.
+pub fn set_up(nvic: &mut NVIC) {
+    SYSTEM_CONTROL.set_bits(offset::GPIO_CLOCKS, PORT_C_CLOCK);
+    // The port answers three cycles after its clock is on; a read takes longer.
+    SYSTEM_CONTROL.read(offset::GPIO_CLOCKS);
+    GPIO_C.set_bits(offset::PULL_DOWN, ALL);
+    GPIO_C.set_bits(offset::DIGITAL_ENABLE, ALL);
+    GPIO_C.set_bits(offset::BOTH_EDGES, ALL);
+    GPIO_C.write(offset::INTERRUPT_CLEAR, ALL);
+    GPIO_C.set_bits(offset::INTERRUPT_MASK, ALL);
+    critical::enable(nvic, Interrupt::GPIOC, critical::CLOCK_PRIORITY);
+}
+
+/// Which contacts are closed: their pins are high.
+pub fn read() -> Contacts {
+    // Address bits 2 to 9 of the data register are its mask.
+    let closed = GPIO_C.read((ALL << 2) as usize);
+    Contacts { x: closed & LIMIT_X != 0, y: closed & LIMIT_Y != 0, stop: closed & STOP != 0 }
+}
+
+#[interrupt]
+fn GPIOC() {
+    GPIO_C.write(offset::INTERRUPT_CLEAR, ALL);
+    HAPPENED.store(true, Ordering::Relaxed);
+}

@@ -1,0 +1,424 @@
+//! The curves of a model, in the half-words that its faces and bars leave free.
+//!
+//! They come as OBJ writes them: `deg 3`, `curv u0 u1 i1 i2 …`, `parm u k1 k2 …` (none, or as many lines
+//! as it takes), `end`. Without `parm` the knots are 0, 1, 2, … Each curve lies in half-words: eight of
+//! header, its control points, its knots two to each if it has any of its own. They stand after the corners of
+//! the elements, and move up when another element comes.
+
+use super::{Corner, ModelError};
+use crate::curve::{
+    CurveError, Fine, KNOT_LIMIT, Knots, Parameter, Point, Spline, check_interior, check_shape,
+    parameter_of,
+};
+use crate::fixed::{Decimal, shift_right_rounding};
+use crate::stage::{Attention, OutOfScratch, StageError};
+
+type Memory = heapless::VecView<Corner>;
+
+/// One stored curve.
+#[derive(Debug, Clone, Copy)]
+pub struct StoredCurve<'a> {
+    /// Degree + 1.
+    pub order: u8,
+    /// The numbers of its control points, from 0.
+    pub control: &'a [u16],
+    /// Its knots.
+    pub knots: Knots<'a>,
+    /// Where it begins.
+    pub from: Parameter,
+    /// Where it ends.
+    pub to: Parameter,
+}
+
+impl<'a> StoredCurve<'a> {
+    /// The curve over these points.
+    ///
+    /// # Errors
+    /// [`CurveError::UnknownPoint`] if `points` has not all of its control points.
+    pub fn spline(&self, points: &'a [Point]) -> Result<Spline<'a>, CurveError> {
+        Spline::new(points, self.control, self.order, self.knots)
+            .map(|whole| whole.between(self.from, self.to))
+    }
+}
+
+/// The whole curves of a model, in the order in which they came.
+///
+/// Guarantees, if they come from a model: every control point exists, every curve is one.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Curves<'a> {
+    halves: &'a [u16],
+}
+
+impl<'a> Curves<'a> {
+    /// Each curve in turn.
+    pub fn iter(&self) -> impl Iterator<Item = StoredCurve<'a>> + Clone + use<'a> {
+        let mut rest = self.halves;
+        core::iter::from_fn(move || {
+            let (curve, after) = read(rest)?;
+            rest = after;
+            Some(curve)
+        })
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.halves.is_empty()
+    }
+
+    /// Hands over the ends of the chords of the curves over `points`, and whether another curve begins
+    /// there; the chords leave the curves by `tolerance` at most: see [`Spline::chords`].
+    ///
+    /// # Errors
+    /// [`StageError::Aborted`], or what `each` returns.
+    #[inline(never)] // Its frame must not lie under the stages'.
+    pub fn flatten(
+        &self,
+        points: &[Point],
+        project: &dyn Fn([i64; 3]) -> Option<Fine>,
+        tolerance: u16,
+        attention: &mut dyn Attention,
+        each: &mut dyn FnMut(Point, bool) -> Result<(), OutOfScratch>,
+    ) -> Result<(), StageError> {
+        for curve in self.iter() {
+            // A model's curves have all their points.
+            let Ok(spline) = curve.spline(points) else { continue };
+            let mut begins = true;
+            for (_, end) in spline.chords(project, tolerance) {
+                attention.check()?;
+                each(end, begins)?;
+                begins = false;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Where the curves of a model stand in its memory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct CurveList {
+    /// Half-words before the first: the corners of the elements.
+    pub(super) start: usize,
+    /// Half-words of whole curves; those of the curve in hand follow.
+    whole: usize,
+    pub(super) count: usize,
+    degree: Option<u8>,
+    in_hand: Option<InHand>,
+}
+
+/// A curve whose `end` has not come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct InHand {
+    order: u8,
+    control_points: u16,
+    /// In units of 2^-[`FINEST`], |value| <= 2^44.
+    ends: [i64; 2],
+    /// The unit of its knots is 2^-this; `None` while it has none of its own.
+    fraction_bits: Option<u8>,
+}
+
+/// Half-words before the control points: how many control points, order, how many knots, nothing, both ends.
+const HEADER: usize = 8;
+
+/// The finest unit of a knot, 2^-22, which holds |knot| <= 1.
+const FINEST: u32 = 22;
+
+/// Without knots of its own, a curve's ends are kept to 2^-16 of the distance between knots.
+const UNIFORM_BITS: u32 = 16;
+
+impl CurveList {
+    /// The whole curves.
+    pub(super) fn curves<'a>(&self, memory: &'a Memory) -> Curves<'a> {
+        let halves = memory.get(self.start..self.start + self.whole).unwrap_or(&[]);
+        Curves { halves: bytemuck::cast_slice(halves) }
+    }
+
+    /// `deg`: the degree of the curves that follow, 1 to 5.
+    pub(super) fn set_degree(&mut self, degree: u8) -> Result<(), ModelError> {
+        if !(1..=5).contains(&degree) {
+            return Err(ModelError::Curve(CurveError::Order));
+        }
+        self.degree = Some(degree);
+        Ok(())
+    }
+
+    /// `curv`: begins a curve from `from` to `to` over the points numbered `control`, from 0, which exist.
+    pub(super) fn begin(
+        &mut self,
+        memory: &mut Memory,
+        ends: [Decimal; 2],
+        control: impl Iterator<Item = u16> + Clone,
+    ) -> Result<(), ModelError> {
+        if self.in_hand.is_some() {
+            return Err(ModelError::CurveUnfinished);
+        }
+        let order = self.degree.ok_or(ModelError::NoDegree)? + 1;
+        let control_points = control.clone().count();
+        check_shape(control_points, order, Knots::Uniform).map_err(ModelError::Curve)?;
+        check_room(memory, HEADER + control_points)?;
+        let limit = i64::from(KNOT_LIMIT) << FINEST;
+        let value = |end: Decimal| end.to_binary(FINEST).ok().filter(|end| end.abs() <= limit);
+        let ends = match ends.map(value) {
+            [Some(from), Some(to)] => [from, to],
+            _ => return Err(ModelError::KnotTooLarge),
+        };
+        let control_points = control_points as u16; // at most 2^12
+        let header = [control_points, u16::from(order), 0, 0, 0, 0, 0, 0];
+        memory.extend(header.into_iter().chain(control).map(Corner));
+        self.in_hand = Some(InHand { order, control_points, ends, fraction_bits: None });
+        Ok(())
+    }
+
+    /// `parm u`: more knots of the curve in hand.
+    ///
+    /// All share one binary unit, which grows when a larger knot comes; each keeps 22 bits of the
+    /// largest.
+    pub(super) fn add_knots(
+        &mut self,
+        memory: &mut Memory,
+        knots: impl Iterator<Item = Decimal> + Clone,
+    ) -> Result<(), ModelError> {
+        let in_hand = self.in_hand.ok_or(ModelError::NoCurve)?;
+        let before = in_hand.fraction_bits.map_or(FINEST, u32::from);
+        let fraction_bits = (0..=before)
+            .rev()
+            .find(|bits| knots.clone().all(|knot| in_unit(knot, *bits).is_some()))
+            .ok_or(ModelError::KnotTooLarge)?;
+        check_room(memory, 2 * knots.clone().count())?;
+        let start = self.start + self.whole + HEADER + usize::from(in_hand.control_points);
+        let listed = memory.get_mut(start..).unwrap_or(&mut []);
+        for knot in bytemuck::cast_slice_mut::<Corner, [u16; 2]>(listed) {
+            *knot =
+                bytemuck::cast(shift_right_rounding(bytemuck::cast(*knot), before - fraction_bits));
+        }
+        let halves = knots
+            .filter_map(|knot| in_unit(knot, fraction_bits))
+            .flat_map(bytemuck::cast::<i32, [u16; 2]>);
+        memory.extend(halves.map(Corner));
+        self.in_hand = Some(InHand { fraction_bits: Some(fraction_bits as u8), ..in_hand });
+        Ok(())
+    }
+
+    /// `end`: the curve in hand is whole. If it is refused it is forgotten.
+    pub(super) fn end(&mut self, memory: &mut Memory) -> Result<(), ModelError> {
+        let in_hand = self.in_hand.take().ok_or(ModelError::NoCurve)?;
+        let closed = self.close(memory, &in_hand);
+        match closed {
+            Ok(()) => {
+                self.whole = memory.len() - self.start;
+                self.count += 1;
+            }
+            Err(_) => memory.truncate(self.start + self.whole),
+        }
+        closed
+    }
+
+    /// Checks the curve in hand and completes its header.
+    fn close(&self, memory: &mut Memory, in_hand: &InHand) -> Result<(), ModelError> {
+        let InHand { order, control_points, .. } = *in_hand;
+        let control_points = usize::from(control_points);
+        let start = self.start + self.whole;
+        let halves: &mut [u16] =
+            bytemuck::cast_slice_mut(memory.get_mut(start..).unwrap_or(&mut []));
+        let (header, rest) = halves.split_at_mut_checked(HEADER).ok_or(ModelError::NoCurve)?;
+        let knots: &[[u16; 2]] = bytemuck::cast_slice(rest.get(control_points..).unwrap_or(&[]));
+        let knot_count = knots.len();
+        let (knots, bits, fraction_bits) = match in_hand.fraction_bits {
+            Some(bits) => (Knots::Packed(knots), u32::from(bits), 0),
+            None => (Knots::Uniform, 0, UNIFORM_BITS),
+        };
+        check_shape(control_points, order, knots).map_err(ModelError::Curve)?;
+        let shift = FINEST - bits - fraction_bits;
+        let [from, to] = in_hand.ends.map(|end| (end + (1 << shift >> 1)) >> shift);
+        // The same number may be a unit apart as an end and as a knot that was rounded twice.
+        let first = knots.get(usize::from(order) - 1) << fraction_bits;
+        let last = knots.get(control_points) << fraction_bits;
+        if from < first - 1 || to > last + 1 {
+            return Err(ModelError::Curve(CurveError::OutsideKnots));
+        }
+        let (from, to) = (from.max(first), to.min(last));
+        check_interior(order, knots, from, to).map_err(ModelError::Curve)?;
+        let [from, to] =
+            [from, to].map(|u| parameter_of(control_points, order, knots, u, fraction_bits));
+        let ends: [u16; 4] = bytemuck::cast([from.to_bits(), to.to_bits()]);
+        if let [_, _, count, _, stored_ends @ ..] = header {
+            *count = knot_count as u16; // it fits: the memory has fewer half-words than vertex numbers
+            stored_ends.copy_from_slice(&ends);
+        }
+        Ok(())
+    }
+}
+
+fn check_room(memory: &Memory, more: usize) -> Result<(), ModelError> {
+    let limit = memory.capacity();
+    let needed = memory.len().saturating_add(more);
+    if needed > limit { Err(ModelError::TooManyCorners { limit, needed }) } else { Ok(()) }
+}
+
+/// How many half-words the first curve takes, and how many control points it has.
+fn lengths(halves: &[u16]) -> Option<(usize, usize)> {
+    let [control_points, _, knots, ..] = *halves else { return None };
+    let control_points = usize::from(control_points);
+    Some((HEADER + control_points + 2 * usize::from(knots), control_points))
+}
+
+/// The first curve, and the half-words after it.
+fn read(halves: &[u16]) -> Option<(StoredCurve<'_>, &[u16])> {
+    let (length, control_points) = lengths(halves)?;
+    let (curve, after) = halves.split_at_checked(length)?;
+    let (header, rest) = curve.split_at_checked(HEADER)?;
+    let (control, knots) = rest.split_at_checked(control_points)?;
+    let knots = match knots {
+        [] => Knots::Uniform,
+        knots => Knots::Packed(bytemuck::cast_slice(knots)),
+    };
+    let [_, order, _, _, a, b, c, d] = *header else { return None };
+    let ends: [u32; 2] = bytemuck::cast([a, b, c, d]);
+    let [from, to] = ends.map(Parameter::from_bits);
+    Some((StoredCurve { order: order as u8, control, knots, from, to }, after))
+}
+
+/// A knot in units of 2^-`fraction_bits`, if it fits.
+fn in_unit(knot: Decimal, fraction_bits: u32) -> Option<i32> {
+    let value = i32::try_from(knot.to_binary(fraction_bits).ok()?).ok()?;
+    (value.unsigned_abs() <= KNOT_LIMIT.unsigned_abs()).then_some(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Corner, Model, Position};
+    use super::*;
+    use std::vec::Vec;
+
+    fn decimal(text: &str) -> Decimal {
+        Decimal::parse(text).unwrap()
+    }
+
+    fn decimals(text: &str) -> impl Iterator<Item = Decimal> + Clone {
+        text.split(' ').map(decimal)
+    }
+
+    /// A model with eight vertices and room for 48 half-words.
+    fn with_model(test: impl FnOnce(&mut Model<'_>)) {
+        let mut memory = (heapless::Vec::<Position, 8>::new(), heapless::Vec::<Corner, 48>::new());
+        let mut model = Model::new(&mut memory.0, &mut memory.1);
+        for _ in 0..8 {
+            model.add_vertex(["0", "0", "0"].map(decimal)).unwrap();
+        }
+        test(&mut model);
+    }
+
+    fn sent(
+        model: &mut Model<'_>,
+        ends: [&str; 2],
+        control: &[i32],
+        knots: &[&str],
+    ) -> Result<(), ModelError> {
+        model.begin_curve(ends.map(decimal), control.iter().copied())?;
+        for line in knots {
+            model.add_knots(decimals(line))?;
+        }
+        model.end_curve()
+    }
+
+    fn controls(model: &Model<'_>) -> Vec<Vec<u16>> {
+        model.curves().iter().map(|curve| curve.control.to_vec()).collect()
+    }
+
+    fn knots(curve: &StoredCurve<'_>) -> Vec<i64> {
+        (0..curve.control.len() + usize::from(curve.order)).map(|at| curve.knots.get(at)).collect()
+    }
+
+    #[test]
+    fn curves_come_back_as_they_were_sent_wherever_the_elements_come() {
+        with_model(|model| {
+            model.set_degree(2).unwrap();
+            model.add_polyline([1, 2].into_iter()).unwrap();
+            sent(model, ["2.5", "4"], &[1, 2, -5, 4, 1], &[]).unwrap();
+            model.begin_curve(["0", "3"].map(decimal), [5, 4, 3, 2].into_iter()).unwrap();
+            model.add_knots(decimals("0 0 0")).unwrap();
+            model.add_face([1, 2, 3].into_iter()).unwrap();
+            // A knot past 1 coarsens those before it.
+            model.add_knots(decimals("0.5")).unwrap();
+            model.add_knots(decimals("3 3 3")).unwrap();
+            model.end_curve().unwrap();
+            let curves: Vec<_> = model.curves().iter().collect();
+            assert_eq!((curves.len(), model.curve_count()), (2, 2));
+            assert_eq!(
+                (curves[0].order, curves[0].control, curves[0].knots),
+                (3, &[0, 1, 3, 3, 0][..], Knots::Uniform)
+            );
+            assert_eq!((curves[0].from.to_bits(), curves[0].to.to_bits()), (1 << 19, 2 << 20));
+            let unit = 1 << 20;
+            assert_eq!(curves[1].control, [4, 3, 2, 1]);
+            assert_eq!(knots(&curves[1]), [0, 0, 0, unit / 2, 3 * unit, 3 * unit, 3 * unit]);
+            assert!(curves[1].spline(&[[0; 3]; 5]).is_ok());
+            assert!(matches!(
+                curves[1].spline(&[[0; 3]; 4]),
+                Err(CurveError::UnknownPoint { number: 4 })
+            ));
+            assert_eq!(model.corner_count(), 5 + (8 + 5) + (8 + 4 + 14));
+            assert_eq!(model.elements().iter().count(), 2);
+            model.clear();
+            assert_eq!((model.curve_count(), model.curves().iter().count()), (0, 0));
+        });
+    }
+
+    #[test]
+    fn what_is_refused_leaves_nothing_behind() {
+        with_model(|model| {
+            let three = [1, 2, 3];
+            assert_eq!(sent(model, ["2", "3"], &three, &[]), Err(ModelError::NoDegree));
+            assert_eq!(model.add_knots(decimals("1")), Err(ModelError::NoCurve));
+            assert_eq!(model.end_curve(), Err(ModelError::NoCurve));
+            for degree in [0, 6] {
+                assert_eq!(model.set_degree(degree), Err(ModelError::Curve(CurveError::Order)));
+            }
+            model.set_degree(2).unwrap();
+            sent(model, ["2", "3"], &three, &[]).unwrap();
+            let full = ModelError::TooManyCorners { limit: 48, needed: 11 + 8 + 30 };
+            let unknown = ModelError::UnknownVertex { number: 9, vertices: 8 };
+            let outside = ModelError::Curve(CurveError::OutsideKnots);
+            let few = ModelError::Curve(CurveError::TooFewControlPoints { needed: 3 });
+            let count = ModelError::Curve(CurveError::WrongKnotCount { needed: 6, given: 5 });
+            let falls = ModelError::Curve(CurveError::KnotDecreases { knot: 5 });
+            for (ends, control, knots, error) in [
+                (["2", "3"], &three[..2], &[][..], few),
+                (["2", "3"], &[1, 2, 9], &[], unknown),
+                (["2", "3"], &[7; 30], &[], full),
+                (["0", "1"], &three, &[], outside),
+                (["3", "2"], &three, &[], outside),
+                (["2", "1e30"], &three, &[], ModelError::KnotTooLarge),
+                (["2", "4"], &three, &[], outside),
+                (["0", "1"], &three, &["0 0 0 1 1"], count),
+                (["0", "1"], &three, &["0 0 0 1 2 1"], falls),
+            ] {
+                assert_eq!(sent(model, ends, control, knots), Err(error), "{ends:?} {knots:?}");
+                assert_eq!((model.curve_count(), model.corner_count()), (1, 11));
+            }
+            assert_eq!(controls(model), [[0, 1, 2]]);
+        });
+    }
+
+    #[test]
+    fn a_refused_line_leaves_the_curve_in_hand() {
+        with_model(|model| {
+            model.set_degree(1).unwrap();
+            model.begin_curve(["0", "1"].map(decimal), [4, 5].into_iter()).unwrap();
+            assert_eq!(
+                model.begin_curve(["0", "1"].map(decimal), [4, 5].into_iter()),
+                Err(ModelError::CurveUnfinished)
+            );
+            model.add_knots(decimals("0 0")).unwrap();
+            assert_eq!(model.add_knots(decimals("1e9")), Err(ModelError::KnotTooLarge));
+            let many = core::iter::repeat_n(decimal("7"), 99);
+            assert_eq!(
+                model.add_knots(many),
+                Err(ModelError::TooManyCorners { limit: 48, needed: 8 + 2 + 4 + 2 * 99 })
+            );
+            model.add_knots(decimals("1 1")).unwrap();
+            model.end_curve().unwrap();
+            let curve = model.curves().iter().next().unwrap();
+            assert_eq!(knots(&curve), [0, 0, 1 << 22, 1 << 22]);
+        });
+    }
+}

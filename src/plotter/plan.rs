@@ -1,0 +1,71 @@
+//! A plan in millimetres: bars and curves at one height, laid on the page as they are.
+
+use super::PlotOptions;
+use super::job::{Collector, FOR_BOUNDS, HALF_A_STEP, Observer, grow};
+use crate::curve::{FRACTION_BITS, Point};
+use crate::drawing::{Bounds, LineType, PageMap, StepsPerMillimetre};
+use crate::model::{Element, Model, Position};
+use crate::protocol::Refusal;
+use crate::stage::Attention;
+use crate::visibility::SinkFull;
+
+/// Packs the lines of the plan at the front of `words`. Returns how many.
+#[inline(never)] // Its frame must not lie under the other stages'.
+pub(super) fn lay_out(
+    model: &Model<'_>,
+    options: &PlotOptions,
+    steps: StepsPerMillimetre,
+    words: &mut [u64],
+    attention: &mut dyn Attention,
+    observer: &mut dyn Observer,
+) -> Result<usize, Refusal> {
+    let (vertices, curves) = (model.vertices(), model.curves());
+    let points: &[Point] = bytemuck::cast_slice(vertices);
+    let unit = libm::ldexp(1.0, -(model.fraction_bits() as i32));
+    let (page, bits) = (&options.page, model.fraction_bits());
+    let on_page =
+        |map: PageMap| move |[x, y, _]: [i64; 3]| Some(map.fine(x, y, 1 << FRACTION_BITS));
+    let corners = model.elements().corners().iter();
+    let used = corners.filter_map(|c| vertices.get(usize::from(c.vertex()))).copied();
+    let mut bounds = Bounds::around_plan(used);
+    if !curves.is_empty() {
+        let all = Bounds::around_plan(vertices.iter().copied()).ok_or(Refusal::NothingToPlot)?;
+        let rough = PageMap::fit_plan(&all, bits, page, steps).map_err(Refusal::Page)?;
+        curves.flatten(points, &on_page(rough), FOR_BOUNDS, attention, &mut |[x, y, z], _| {
+            bounds = grow(bounds, Bounds::around_plan([Position { x, y, z }].into_iter()));
+            Ok(())
+        })?;
+    }
+    let bounds = bounds.ok_or(Refusal::NothingToPlot)?;
+    let map = if options.fit {
+        PageMap::fit_plan(&bounds, bits, page, steps)
+    } else {
+        PageMap::true_size(&bounds, bits, page, steps)
+    };
+    let map = map.map_err(Refusal::Page)?;
+    let mut collector = Collector::new(words);
+    let mut draw = |from: Point, to: Point| {
+        let on_plan = |[x, y, _]: Point| [x, y].map(|c| f64::from(c) * unit);
+        observer.plan_bar(on_plan(from), on_plan(to));
+        let [from, to] = [from, to].map(|[x, y, _]| map.point(x.into(), y.into(), 1));
+        collector.line(from, to, LineType::Full).map_err(|SinkFull| collector.missing())
+    };
+    for element in model.elements().iter() {
+        let Element::Bar(from, to) = element else { continue };
+        if let [Some(from), Some(to)] = [from, to].map(|number| points.get(usize::from(number))) {
+            draw(*from, *to).map_err(Refusal::DrawingTooLarge)?;
+        }
+    }
+    let mut before = None;
+    curves.flatten(
+        points,
+        &on_page(map),
+        HALF_A_STEP,
+        attention,
+        &mut |end, begins| match before.replace(end) {
+            Some(before) if !begins => draw(before, end),
+            _ => Ok(()),
+        },
+    )?;
+    Ok(collector.count)
+}

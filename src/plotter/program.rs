@@ -1,0 +1,231 @@
+//! What a line of G-code asks for, given what the lines before it have set.
+
+use crate::drawing::{PAGE_LIMIT, PagePoint, StepsPerMillimetre};
+use crate::fixed::{Decimal, Millimetres, divide_rounding};
+use crate::machine::Machine;
+use crate::protocol::{GCode, Refusal, Word};
+use crate::step::{Arc, ArcError, Turn};
+
+/// What the lines so far have set. Lengths are in millimetres, from the page's origin.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Program {
+    motion: Motion,
+    inches: bool,
+    relative: bool,
+    pub(super) pen_is_down: bool,
+    /// mm/min
+    pub(super) feed: Option<Millimetres>,
+    at: [Millimetres; 2],
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Motion {
+    Rapid,
+    Line,
+    Arc(Turn),
+}
+
+/// What is to be done now.
+#[derive(Debug, Clone)]
+pub(super) enum Order {
+    /// Nothing moves.
+    Nothing,
+    /// A straight move.
+    Line(PagePoint),
+    /// Along an arc.
+    Arc(Arc),
+    /// The pen goes down where it is.
+    Lower,
+    /// Wait so many units of 2^-16 s.
+    Dwell(u32),
+    /// Wait for the user.
+    Pause,
+    /// To where the pen is parked.
+    Park,
+}
+
+/// The numbers of one line.
+#[derive(Default)]
+struct Numbers {
+    xy: [Option<Decimal>; 2],
+    ij: [Option<Decimal>; 2],
+    radius: Option<Decimal>,
+    seconds: Option<Decimal>,
+}
+
+impl Default for Program {
+    fn default() -> Self {
+        Self {
+            motion: Motion::Rapid,
+            inches: false,
+            relative: false,
+            pen_is_down: false,
+            feed: None,
+            at: [Millimetres::ZERO; 2],
+        }
+    }
+}
+
+impl Program {
+    /// A program that goes on where `machine` will stand. While it only checks, nothing moves, so
+    /// that place does not count.
+    pub(super) fn at(self, machine: &Machine<'_>, checking: bool) -> Self {
+        let steps = machine.settings().page_steps();
+        if checking || steps_at(self.at, steps) == machine.end() {
+            return self;
+        }
+        let point = machine.end();
+        Self { at: machine.millimetres(point), ..self }
+    }
+
+    /// The program after `line`, and what is to be done.
+    ///
+    /// # Errors
+    /// [`Refusal::UnsupportedWord`] for what it does not know, [`Refusal::NumberOutOfRange`],
+    /// [`Refusal::Arc`].
+    pub(super) fn after(
+        mut self,
+        line: GCode<'_>,
+        steps: StepsPerMillimetre,
+    ) -> Result<(Self, Order), Refusal> {
+        let mut numbers = Numbers::default();
+        let mut order = Order::Nothing;
+        let pen_was_down = self.pen_is_down;
+        for Word { letter, number } in line.words() {
+            match letter {
+                b'G' => self.take_g(number, &mut order)?,
+                b'M' => self.take_m(number, &mut order)?,
+                b'X' => numbers.xy[0] = Some(number),
+                b'Y' => numbers.xy[1] = Some(number),
+                b'I' => numbers.ij[0] = Some(number),
+                b'J' => numbers.ij[1] = Some(number),
+                b'R' => numbers.radius = Some(number),
+                b'P' => numbers.seconds = Some(number),
+                // Below the page's height the pen is down.
+                b'Z' => self.pen_is_down = self.length(number)? <= 0,
+                b'F' => self.feed = Some(self.length(number)?).filter(|feed| *feed > 0),
+                b'N' | b'S' | b'T' => {}
+                _ => return Err(Refusal::UnsupportedWord(letter)),
+            }
+        }
+        match order {
+            Order::Dwell(_) => {
+                let seconds = numbers.seconds.map(Decimal::to_millimetres).transpose();
+                let seconds = seconds.map_err(|_| Refusal::NumberOutOfRange)?.unwrap_or_default();
+                order = Order::Dwell(u32::try_from(seconds.to_bits()).unwrap_or(0));
+            }
+            Order::Park => self.pen_is_down = false,
+            Order::Nothing if numbers.xy != [None; 2] || numbers.ij != [None; 2] => {
+                order = self.motion(&numbers, steps)?;
+            }
+            Order::Nothing if self.pen_is_down && !pen_was_down => order = Order::Lower,
+            _ => {}
+        }
+        Ok((self, order))
+    }
+
+    fn take_g(&mut self, number: Decimal, order: &mut Order) -> Result<(), Refusal> {
+        match number.to_whole() {
+            Ok(0) => self.motion = Motion::Rapid,
+            Ok(1) => self.motion = Motion::Line,
+            Ok(2) => self.motion = Motion::Arc(Turn::Clockwise),
+            Ok(3) => self.motion = Motion::Arc(Turn::Counterclockwise),
+            Ok(4) => *order = Order::Dwell(0),
+            Ok(20) => self.inches = true,
+            Ok(21) => self.inches = false,
+            Ok(28) => *order = Order::Park,
+            Ok(90) => self.relative = false,
+            Ok(91) => self.relative = true,
+            // Plane xy, no compensation, no offsets, units a minute: there is nothing else here.
+            Ok(17 | 40 | 49 | 54 | 80 | 94) => {}
+            _ if Decimal::parse("91.1") == Ok(number) => {}
+            _ => return Err(Refusal::UnsupportedWord(b'G')),
+        }
+        Ok(())
+    }
+
+    fn take_m(&mut self, number: Decimal, order: &mut Order) -> Result<(), Refusal> {
+        match number.to_whole() {
+            Ok(0 | 1 | 6) => *order = Order::Pause,
+            Ok(2 | 30) => *self = Self { at: self.at, ..Self::default() },
+            Ok(3 | 4) => self.pen_is_down = true,
+            Ok(5) => self.pen_is_down = false,
+            _ => return Err(Refusal::UnsupportedWord(b'M')),
+        }
+        Ok(())
+    }
+
+    fn motion(&mut self, numbers: &Numbers, steps: StepsPerMillimetre) -> Result<Order, Refusal> {
+        let from = self.at;
+        for (axis, number) in numbers.xy.into_iter().enumerate() {
+            let Some(number) = number else { continue };
+            let base = if self.relative { from[axis] } else { Millimetres::ZERO };
+            self.at[axis] =
+                base.checked_add(self.length(number)?).ok_or(Refusal::NumberOutOfRange)?;
+        }
+        let to = steps_at(self.at, steps);
+        let Motion::Arc(turn) = self.motion else { return Ok(Order::Line(to)) };
+        if steps[0] != steps[1] {
+            return Err(Refusal::Arc(ArcError::TooWide));
+        }
+        let start = steps_at(from, steps);
+        let center = match numbers.radius {
+            Some(radius) => {
+                let radius = to_steps(self.length(radius)?, steps[0]);
+                center_of_radius(start, to, radius, turn).ok_or(Refusal::Arc(ArcError::NoRadius))?
+            }
+            None => {
+                let mut center = from;
+                for (axis, number) in numbers.ij.into_iter().enumerate() {
+                    let Some(number) = number else { continue };
+                    let offset = self.length(number)?;
+                    center[axis] =
+                        center[axis].checked_add(offset).ok_or(Refusal::NumberOutOfRange)?;
+                }
+                steps_at(center, steps)
+            }
+        };
+        Arc::new(center, start, to, turn).map(Order::Arc).map_err(Refusal::Arc)
+    }
+
+    fn length(&self, number: Decimal) -> Result<Millimetres, Refusal> {
+        let bits = number.to_binary(16).map_err(|_| Refusal::NumberOutOfRange)?;
+        let bits = i128::from(bits) * if self.inches { 127 } else { 5 };
+        i32::try_from(divide_rounding(bits, 5))
+            .map(Millimetres::from_bits)
+            .map_err(|_| Refusal::NumberOutOfRange)
+    }
+}
+
+/// Steps from the page's origin; what is beyond every page stays beyond it.
+fn to_steps(length: Millimetres, per_mm: Millimetres) -> i32 {
+    let product = i128::from(length.to_bits()) * i128::from(per_mm.to_bits());
+    let steps = divide_rounding(product, 1 << 32);
+    steps.clamp((-2 * PAGE_LIMIT).into(), (2 * PAGE_LIMIT).into()) as i32
+}
+
+fn steps_at([x, y]: [Millimetres; 2], steps: StepsPerMillimetre) -> PagePoint {
+    PagePoint { x: to_steps(x, steps[0]), y: to_steps(y, steps[1]) }
+}
+
+/// The centre of the arc of less than half a turn (more, if `radius` is negative) between two
+/// points; `None` if they are further apart than the circle is wide.
+fn center_of_radius(from: PagePoint, to: PagePoint, radius: i32, turn: Turn) -> Option<PagePoint> {
+    // Coordinates within 2^21, so squares within 2^46.
+    let (dx, dy) = (i64::from(to.x) - i64::from(from.x), i64::from(to.y) - i64::from(from.y));
+    let distance = (dx * dx + dy * dy).unsigned_abs();
+    let squared = 4 * u64::from(radius.unsigned_abs()) * u64::from(radius.unsigned_abs());
+    let length = distance.isqrt();
+    if length == 0 || length > 2 * u64::from(radius.unsigned_abs()) + 2 {
+        return None;
+    }
+    // Twice the distance from the chord to the centre, which lies on its right for a clockwise arc.
+    let height = squared.saturating_sub(distance).isqrt() as i64;
+    let is_right = (turn == Turn::Clockwise) == (radius > 0);
+    let height = if is_right { height } else { -height };
+    let middle = |a: i32, b: i32, across: i64| {
+        let offset = divide_rounding(i128::from(across * height), i128::from(2 * length));
+        ((i128::from(a) + i128::from(b)).div_euclid(2) + offset) as i32
+    };
+    Some(PagePoint { x: middle(from.x, to.x, dy), y: middle(from.y, to.y, -dx) })
+}

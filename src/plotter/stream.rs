@@ -1,0 +1,250 @@
+//! Lines of G-code and moves by hand, as they come; and the lines that are answered only when what
+//! they asked for is done.
+
+use super::program::{Order, Program};
+use super::{Board, Inner, Reply};
+use crate::drawing::{LineType, PagePoint};
+use crate::fixed::BinaryFraction;
+use crate::machine::{Alarm, MachineError, Setting, State, Target};
+use crate::motion::{StepEvent, TICKS_PER_SECOND};
+use crate::protocol::{GCode, HELP, RealTime, Refusal};
+use crate::step::{Arc, Chords, Line};
+use core::fmt;
+
+/// A line that is being carried out.
+#[derive(Debug)]
+pub(super) enum Task {
+    /// The rest of an arc, from a point.
+    Arc(PagePoint, Arc),
+    /// So many ticks, once everything stands.
+    Dwell(u64),
+    /// Waits until everything stands, then for the user.
+    Pause,
+    /// Looks for the switches.
+    Home,
+    /// Writes a list, from this line on.
+    List(Listing, usize),
+}
+
+/// A list of many lines.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Listing {
+    Help,
+    Settings,
+    Options,
+}
+
+/// How far [`Inner::proceed`] came.
+pub(super) enum Progress {
+    /// The line is done.
+    Done(Result<(), Refusal>),
+    /// Something was done.
+    More,
+    /// It waits for the machine.
+    Waits,
+}
+
+impl Inner<'_> {
+    /// What was asked by single bytes, but for status and abort.
+    pub(super) fn act(&mut self, asked: RealTime) {
+        if asked.has(RealTime::EMERGENCY) {
+            self.machine.alarm(Alarm::EmergencyStop);
+        }
+        if asked.has(RealTime::HOLD) {
+            self.machine.hold();
+        }
+        if asked.has(RealTime::RESUME) {
+            self.machine.resume();
+        }
+        if asked.has(RealTime::CANCEL_JOG) {
+            self.machine.cancel_jog();
+        }
+        if asked.has(RealTime::PAUSE) {
+            self.machine.pause_after_stroke();
+        }
+        let percent = i32::from(self.machine.status().percent);
+        let mut changed = if asked.has(RealTime::FEED_RESET) { 100 } else { percent };
+        for (byte, change) in [
+            (RealTime::FEED_PLUS_10, 10),
+            (RealTime::FEED_MINUS_10, -10),
+            (RealTime::FEED_PLUS_1, 1),
+            (RealTime::FEED_MINUS_1, -1),
+        ] {
+            changed += if asked.has(byte) { change } else { 0 };
+        }
+        if changed != percent {
+            self.machine.set_override(changed.clamp(10, 200) as u8);
+        }
+    }
+
+    /// Looks at the contacts; tells of an alarm once, and lets the board carry it out at once.
+    pub(super) fn watch<B: Board>(&mut self, board: &mut B) {
+        self.machine.observe(board.contacts());
+        let alarm = match self.machine.state() {
+            State::Alarm(alarm) => Some(alarm),
+            _ => None,
+        };
+        if alarm != self.alarm_told {
+            self.alarm_told = alarm;
+            if let Some(alarm) = alarm {
+                board.step_now();
+                Reply(board).line(format_args!("ALARM:{}", number(alarm)));
+            }
+        }
+    }
+
+    /// Goes on with the line in work.
+    pub(super) fn proceed<B: Board>(&mut self, board: &mut B) -> Progress {
+        if let Some(Task::List(listing, number)) = &mut self.task {
+            // A line takes up to 10 ms: the queue of steps is filled after each.
+            let (listing, this) = (*listing, *number);
+            *number += 1;
+            if self.list(listing, this, board) {
+                return Progress::More;
+            }
+            self.task = None;
+            return Progress::Done(Ok(()));
+        }
+        let progress = match self.machine.state() {
+            State::Alarm(_) | State::Sleep => Progress::Done(Err(Refusal::Locked)),
+            State::Abort => Progress::Done(Err(Refusal::Aborted)),
+            _ => self.advance(board).unwrap_or_else(|error| Progress::Done(Err(error.into()))),
+        };
+        if matches!(progress, Progress::Done(_)) {
+            self.task = None;
+        }
+        progress
+    }
+
+    fn advance<B: Board>(&mut self, board: &mut B) -> Result<Progress, MachineError> {
+        let machine = &mut self.machine;
+        let stands = machine.state() == State::Idle && machine.stands();
+        match &mut self.task {
+            Some(Task::Arc(from, arc)) if machine.has_room() => {
+                // To keep the points that a chord reads ahead would cost the stages' stack.
+                let Some(to) = Chords::new(*from, arc.clone()).next() else {
+                    return Ok(Progress::Done(Ok(())));
+                };
+                machine.draw_to(self.program.target(to), self.program.feed)?;
+                // The chord's moves are as many points of the arc.
+                for _ in Line::new(core::mem::replace(from, to), to) {
+                    arc.next();
+                }
+                Ok(Progress::More)
+            }
+            Some(Task::Dwell(left)) if stands && *left > 0 => {
+                let ticks = (*left).min(StepEvent::MAX_TICKS.into());
+                *left -= ticks;
+                machine.dwell(ticks as u32, board.queue());
+                Ok(Progress::More)
+            }
+            Some(Task::Pause) if stands => machine.pause().map(|()| Progress::Done(Ok(()))),
+            Some(Task::Dwell(_) | Task::Home) if stands => Ok(Progress::Done(Ok(()))),
+            Some(_) => Ok(Progress::Waits),
+            None => Ok(Progress::Done(Ok(()))),
+        }
+    }
+
+    /// Writes one line of a list; `false` past its end.
+    fn list<B: Board>(&self, listing: Listing, number: usize, board: &mut B) -> bool {
+        let mut lines = 0;
+        let mut line = |text: fmt::Arguments<'_>| {
+            if lines == number {
+                Reply(board).line(text);
+            }
+            lines += 1;
+        };
+        match listing {
+            Listing::Help => {
+                for (usage, meaning) in HELP {
+                    line(format_args!("[HLP:{usage} {meaning}]"));
+                }
+            }
+            Listing::Settings => {
+                for (info, value) in self.machine.settings().iter() {
+                    let (number, name, unit) = (info.number, info.name, info.unit);
+                    let units = value.to_bits().into();
+                    let value = BinaryFraction { units, fraction_bits: 16, places: 3 };
+                    line(format_args!("${number}={value} ({name}, {unit})"));
+                }
+            }
+            Listing::Options => self.options.list(line),
+        }
+        number < lines
+    }
+
+    #[inline(never)] // Its frame must not lie under the stages'.
+    pub(super) fn home(&mut self) -> Result<(), Refusal> {
+        if !self.machine.settings().is_on(Setting::Homing) {
+            return Err(Refusal::HomingOff);
+        }
+        self.machine.home(self.machine.switches())?;
+        self.task = Some(Task::Home);
+        Ok(())
+    }
+
+    #[inline(never)] // Its frame must not lie under the stages'.
+    pub(super) fn run_gcode(&mut self, line: GCode<'_>) -> Result<(), Refusal> {
+        let steps = self.machine.settings().page_steps();
+        let checking = match self.machine.state() {
+            State::Alarm(_) | State::Sleep => return Err(Refusal::Locked),
+            state => state == State::Check,
+        };
+        let (program, order) = self.program.at(&self.machine, checking).after(line, steps)?;
+        let machine = &mut self.machine;
+        let waits = !checking && !matches!(machine.state(), State::Abort);
+        match order {
+            Order::Nothing => {}
+            Order::Line(point) => machine.draw_to(program.target(point), program.feed)?,
+            Order::Arc(arc) => {
+                let (least, most) = arc.bounds();
+                machine.check_travel(0, least)?;
+                machine.check_travel(0, most)?;
+                if waits {
+                    self.task = Some(Task::Arc(machine.end(), arc));
+                }
+            }
+            Order::Lower => machine.lower_pen()?,
+            Order::Park => machine.draw_to(Target { point: machine.park(), ink: None }, None)?,
+            Order::Dwell(units) if waits => {
+                let ticks = (u64::from(units) * u64::from(TICKS_PER_SECOND)) >> 16;
+                self.task = Some(Task::Dwell(ticks));
+            }
+            Order::Pause if waits => self.task = Some(Task::Pause),
+            Order::Dwell(_) | Order::Pause => {}
+        }
+        self.program = program;
+        Ok(())
+    }
+
+    /// A line of its own: what it sets is forgotten.
+    #[inline(never)] // Its frame must not lie under the stages'.
+    pub(super) fn jog(&mut self, line: GCode<'_>) -> Result<(), Refusal> {
+        let steps = self.machine.settings().page_steps();
+        let (program, order) = Program::default().at(&self.machine, false).after(line, steps)?;
+        let Order::Line(point) = order else { return Err(Refusal::UnsupportedWord(b'J')) };
+        Ok(self.machine.jog(point, program.feed)?)
+    }
+
+    /// Whether the next line must wait: one is being carried out, or there is no room for a move.
+    pub(super) fn must_wait(&self) -> bool {
+        self.task.is_some() || (self.machine.is_streaming() && !self.machine.has_room())
+    }
+}
+
+impl Program {
+    fn target(&self, point: PagePoint) -> Target {
+        Target { point, ink: self.pen_is_down.then_some(LineType::Full) }
+    }
+}
+
+/// As Grbl and its successors number them.
+const fn number(alarm: Alarm) -> u8 {
+    match alarm {
+        Alarm::HardLimit => 1,
+        Alarm::HomingFailed(_) => 9,
+        Alarm::EmergencyStop => 10,
+        Alarm::NotHomed => 11,
+        Alarm::Queue => 100,
+    }
+}

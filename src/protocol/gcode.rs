@@ -1,0 +1,90 @@
+//! A line of G-code as letters with numbers.
+
+use super::Refusal;
+use crate::fixed::Decimal;
+
+/// One letter and its number: `G1`, `X-2.5`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Word {
+    /// In upper case.
+    pub letter: u8,
+    /// What follows it.
+    pub number: Decimal,
+}
+
+/// The words of a line. Whoever has one has words only: comments in parentheses and after a
+/// semicolon are passed over.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct GCode<'a> {
+    text: &'a str,
+}
+
+impl<'a> GCode<'a> {
+    /// Reads `text`.
+    ///
+    /// # Errors
+    /// [`Refusal::NotANumber`] if a letter has no number, or anything else stands there.
+    ///
+    /// ```
+    /// use penup::protocol::GCode;
+    /// let line = GCode::new("G1 X-2.5y3 (a corner) F600 ; slowly")?;
+    /// let letters: Vec<_> = line.words().map(|word| char::from(word.letter)).collect();
+    /// assert_eq!(letters, ['G', 'X', 'Y', 'F']);
+    /// assert!(GCode::new("G1 X").is_err());
+    /// # Ok::<(), penup::protocol::Refusal>(())
+    /// ```
+    pub fn new(text: &'a str) -> Result<Self, Refusal> {
+        let text = text.split(';').next().unwrap_or("");
+        let mut rest = text;
+        while let Some(word) = next_word(&mut rest) {
+            word?;
+        }
+        Ok(Self { text })
+    }
+
+    /// Whether a line that is none of OBJ may be G-code: it begins with a capital, a comment or `%`.
+    pub fn begins(line: &str) -> bool {
+        line.starts_with(|first: char| first.is_ascii_uppercase() || "(;%".contains(first))
+    }
+
+    /// The words in order.
+    pub fn words(self) -> impl Iterator<Item = Word> + use<'a> {
+        let mut rest = self.text;
+        core::iter::from_fn(move || next_word(&mut rest)?.ok())
+    }
+}
+
+/// Takes the next word off `rest`.
+fn next_word(rest: &mut &str) -> Option<Result<Word, Refusal>> {
+    loop {
+        *rest = rest.trim_start_matches([' ', '\t', '%']);
+        let Some(comment) = rest.strip_prefix('(') else { break };
+        *rest = comment.split_once(')').map_or("", |(_, after)| after);
+    }
+    let letter = *rest.as_bytes().first()?;
+    if !letter.is_ascii_alphabetic() {
+        *rest = "";
+        return Some(Err(Refusal::UnknownCommand));
+    }
+    let number = rest[1..].trim_start();
+    let is_part = |c: char| c.is_ascii_digit() || matches!(c, '.' | '-' | '+');
+    let end = number.find(|c| !is_part(c)).unwrap_or(number.len());
+    *rest = &number[end..];
+    let number = Decimal::parse(&number[..end]).map_err(|_| Refusal::NotANumber);
+    Some(number.map(|number| Word { letter: letter.to_ascii_uppercase(), number }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_no_word_is_refused() {
+        for line in ["G1 X", "G1 5", "G1 X1Y", "G1 X--1", "G1 X1.2.3", "G", "G1 =", "GX"] {
+            assert!(GCode::new(line).is_err(), "{line}");
+        }
+        for line in ["", "%", "(only this)", "; that", "N10 (unclosed", "G 1 X 2"] {
+            assert!(GCode::new(line).is_ok(), "{line}");
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! The curves of a model through the view, as straight lines.
+//!
+//! A linear map of the control points is the same map of the curve, so a curve is evaluated in view
+//! coordinates; its chords are then bars like others.
+
+use super::View;
+use super::clip::clip_edge;
+use crate::curve::{FRACTION_BITS, Fine, Point};
+use crate::geometry::{Projection, Vertex};
+use crate::model::{Corner, Elements, Model, VERTEX_NUMBER_LIMIT};
+use crate::stage::{Attention, OutOfScratch, Scratch, StageError};
+
+/// How curves become straight lines: as few as stay within a tolerance on the page.
+#[derive(Clone, Copy)]
+pub struct Flattening<'f> {
+    /// Where the image (x/w, y/w) is on the page in fine units, usually 1/256 step.
+    pub on_page: &'f dyn Fn(i64, i64, i64) -> Fine,
+    /// In the same units.
+    pub tolerance: u16,
+}
+
+impl Flattening<'_> {
+    fn flatten(
+        &self,
+        view: &View,
+        model: &Model<'_>,
+        points: &[Vertex],
+        attention: &mut dyn Attention,
+        each: &mut dyn FnMut(Point, bool) -> Result<(), OutOfScratch>,
+    ) -> Result<(), StageError> {
+        let near = i64::from(view.near().unwrap_or(0)) << FRACTION_BITS;
+        let project = |[x, y, z]: [i64; 3]| match view.projection() {
+            Projection::Perspective => (z >= near).then(|| (self.on_page)(x, y, z)),
+            Projection::Parallel => Some((self.on_page)(x, y, 1 << FRACTION_BITS)),
+        };
+        let points: &[Point] = bytemuck::cast_slice(points);
+        model.curves().flatten(points, &project, self.tolerance, attention, each)
+    }
+
+    /// Hands over each chord of the model's curves in view coordinates, what is nearer than the near
+    /// plane cut off. Memory: 12 bytes for each vertex of the model.
+    ///
+    /// # Errors
+    /// See [`StageError`].
+    pub fn each_chord(
+        &self,
+        view: &View,
+        model: &Model<'_>,
+        mut scratch: Scratch<'_>,
+        attention: &mut dyn Attention,
+        each: &mut dyn FnMut([Vertex; 2]),
+    ) -> Result<(), StageError> {
+        let points = scratch.take::<Vertex>(model.vertices().len())?;
+        view.fill(model, points, attention)?;
+        let near = view.near().unwrap_or(i32::MIN);
+        let mut before = None;
+        self.flatten(view, model, points, attention, &mut |[x, y, z], begins| {
+            let end = Vertex { x, y, z };
+            if let Some(before) = before.replace(end).filter(|_| !begins)
+                && let Some(chord) = clip_edge([before, end], near)
+            {
+                each(chord);
+            }
+            Ok(())
+        })
+    }
+
+    /// The vertices of the model and the ends of the chords of its curves; `elements` and a bar for each chord.
+    pub(super) fn add<'a>(
+        &self,
+        view: &View,
+        model: &Model<'_>,
+        elements: Elements<'_>,
+        scratch: &mut Scratch<'a>,
+        attention: &mut dyn Attention,
+    ) -> Result<(&'a [Vertex], Elements<'a>), StageError> {
+        // The number after the last end of each curve.
+        let curve_ends = scratch.take::<u16>(model.curve_count())?;
+        let first = model.vertices().len();
+        let vertices = scratch.take_filled::<Vertex, StageError>(|room| {
+            let available = size_of_val(room);
+            let full = OutOfScratch { needed: available + size_of::<Vertex>(), available };
+            let (points, room) = room.split_at_mut_checked(first).ok_or(full)?;
+            view.fill(model, points, attention)?;
+            let limit = VERTEX_NUMBER_LIMIT.saturating_sub(first);
+            let mut rest = room.iter_mut().take(limit);
+            let (mut number, mut curve) = (first, 0);
+            self.flatten(view, model, points, attention, &mut |[x, y, z], begins| {
+                *rest.next().ok_or(full)? = Vertex { x, y, z };
+                number += 1;
+                curve += usize::from(begins);
+                if let Some(end) = curve_ends.get_mut(curve - 1) {
+                    *end = number as u16; // at most VERTEX_NUMBER_LIMIT
+                }
+                Ok(())
+            })?;
+            Ok(number)
+        })?;
+        let old = elements.corners();
+        let mut begin = first as u16;
+        let mut bars = curve_ends.iter().flat_map(|&end| {
+            let bars = begin + 1..end;
+            begin = end;
+            bars
+        });
+        let chords = vertices.len() - first - curve_ends.len().min(vertices.len() - first);
+        let corners = scratch.take::<Corner>(old.len() + 2 * chords)?;
+        let (same, new) = corners.split_at_mut(old.len());
+        same.copy_from_slice(old);
+        for pair in new.chunks_exact_mut(2) {
+            let Some(to) = bars.next() else { break };
+            pair.copy_from_slice(&[Corner::new(to - 1, true, false), Corner::new(to, true, true)]);
+        }
+        let corners: &'a [Corner] = corners;
+        Ok((vertices, Elements::new(corners)))
+    }
+}
