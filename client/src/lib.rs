@@ -24,3 +24,4 @@ pub mod source;
 pub mod tape;
 
 pub mod fit;
+pub mod watch;

@@ -8,6 +8,7 @@ use crate::job::{JobResult, Lengths, Timings};
 use crate::link::Link;
 use crate::machines::PreviewPlotter;
 use crate::protocol::PLOT;
+use crate::watch::PenWatch;
 use penup::boards::host::{Change, HostBoard, QUEUE_LENGTH, lend_memory};
 use penup::geometry::{Projection, Vertex};
 use penup::machine::{Path, PulserState, Setting, Target};
@@ -24,6 +25,7 @@ pub struct InMemory {
     board: HostBoard<'static>,
     plotter: Plotter<'static>,
     steps: u64,
+    pen: Option<PenWatch>,
 }
 
 impl InMemory {
@@ -35,7 +37,12 @@ impl InMemory {
         let mut board = HostBoard::new(queue, pins);
         let plotter = Plotter::new(lend_memory(), pins);
         plotter.greet(&mut board);
-        Self { board, plotter, steps: 0 }
+        Self { board, plotter, steps: 0, pen: None }
+    }
+
+    fn steps_per_mm(&self) -> [f64; 2] {
+        let settings = self.plotter.machine().settings();
+        [Setting::StepsPerMmX, Setting::StepsPerMmY].map(|s| settings.get(s).to_num::<f64>())
     }
 
     /// Polls until every byte is answered; a plot that began goes on in [`Link::receive`].
@@ -55,6 +62,8 @@ impl Link for InMemory {
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
         if bytes.starts_with(PLOT.as_bytes()) {
             self.steps = 0;
+            let step = 1.0 / self.steps_per_mm()[0];
+            self.pen.get_or_insert_with(|| PenWatch::new(step)).begin_again();
         }
         self.board.receive(bytes);
         self.answer();
@@ -69,6 +78,9 @@ impl Link for InMemory {
         }
         let changes = self.board.trace().take_changes();
         self.steps += count_steps(&changes);
+        if let Some(pen) = &mut self.pen {
+            changes.iter().for_each(|change| pen.change(change.into()));
+        }
         let sent = self.board.take_sent();
         let (now, later) = sent.split_at(sent.len().min(buffer.len()));
         buffer[..now.len()].copy_from_slice(now);
@@ -99,9 +111,7 @@ impl PreviewPlotter for InMemory {
         let mut segments = Segments::default();
         self.plotter.compute(&mut watch, &mut segments).map_err(refused)?;
         let timings_ms = watch.stop();
-        let settings = self.plotter.machine().settings();
-        let steps =
-            [Setting::StepsPerMmX, Setting::StepsPerMmY].map(|s| settings.get(s).to_num::<f64>());
+        let steps = self.steps_per_mm();
         let mut strokes: Vec<Vec<[f64; 2]>> = Vec::new();
         let mut path = self.plotter.strokes();
         while let Some(Target { point, ink }) = path.next_target() {
@@ -120,6 +130,7 @@ impl PreviewPlotter for InMemory {
             efficiency: lengths.efficiency(),
             steps: core::mem::take(&mut self.steps),
             timings_ms,
+            pen: self.pen.as_mut().map(PenWatch::runs).unwrap_or_default(),
         })
     }
 }

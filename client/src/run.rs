@@ -69,7 +69,8 @@ fn preview(args: &PreviewArgs, interrupt: &AtomicBool) -> Result<String, Error> 
     let result = plotter.result()?;
     drop(bar);
     let outputs = Outputs::of(&args.pictures, args.json.as_deref());
-    let picture = Picture::of_strokes(settings.page, &result.strokes);
+    let picture =
+        Picture { page: settings.page, runs: result.pen.runs.clone(), step: result.pen.step };
     let mut files = write_pictures(&picture, &outputs)?;
     if let Some(path) = &outputs.json {
         let text = serde_json::to_string(&result).map_err(|error| Error::Write {

@@ -2,6 +2,7 @@
 
 use super::{PathLength, SLICE_TICKS, SliceSpeed, StepEvent, TICKS_PER_SECOND};
 use crate::fixed::Millimetres;
+use core::ops::RangeInclusive;
 
 /// What the user sets, each positive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -98,7 +99,9 @@ impl Limits {
     /// See [`LimitsError`].
     pub fn new(settings: &MotionSettings) -> Result<Self, LimitsError> {
         let axis = |steps_per_mm: Millimetres| {
-            if steps_per_mm < 2 || steps_per_mm > 4000 {
+            const RANGE: RangeInclusive<Millimetres> =
+                Millimetres::lit("2")..=Millimetres::lit("4000");
+            if !RANGE.contains(&steps_per_mm) {
                 return Err(LimitsError::StepsPerMillimetre);
             }
             // 2^32 / (bits / 2^16), at most 2^31.

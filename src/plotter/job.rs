@@ -92,6 +92,11 @@ impl Job {
         Ok(Self { stored, legs, report, degenerate_faces })
     }
 
+    /// Gives its memory up; what came of the order stays.
+    pub fn release(&mut self) {
+        (self.stored, self.legs) = (Stored::default(), 0);
+    }
+
     /// What came of the order.
     pub fn report(&self) -> &order::Report {
         &self.report

@@ -6,6 +6,7 @@ use super::{Board, Inner, Reply};
 use crate::drawing::{LineType, PagePoint};
 use crate::fixed::BinaryFraction;
 use crate::machine::{Alarm, MachineError, Setting, State, Target};
+use crate::model::Part;
 use crate::motion::{StepEvent, TICKS_PER_SECOND};
 use crate::protocol::{GCode, HELP, RealTime, Refusal};
 use crate::step::{Arc, Chords, Line};
@@ -32,6 +33,8 @@ pub(super) enum Listing {
     Help,
     Settings,
     Options,
+    /// Of the model, up to this place.
+    Model(Part, usize),
 }
 
 /// How far [`Inner::proceed`] came.
@@ -153,6 +156,12 @@ impl Inner<'_> {
 
     /// Writes one line of a list; `false` past its end.
     fn list<B: Board>(&self, listing: Listing, number: usize, board: &mut B) -> bool {
+        if let Listing::Model(part, end) = listing {
+            if number < end {
+                self.list_one(part, number, board);
+            }
+            return number < end;
+        }
         let mut lines = 0;
         let mut line = |text: fmt::Arguments<'_>| {
             if lines == number {
@@ -174,6 +183,7 @@ impl Inner<'_> {
                     line(format_args!("${number}={value} ({name}, {unit})"));
                 }
             }
+            Listing::Model(..) => {}
             Listing::Options => self.options.list(line),
         }
         number < lines
