@@ -127,7 +127,7 @@ impl EventQueue for Steps {
 impl Stepper {
     /// One event. No loop, no division, no lock.
     ///
-    /// Counted in QEMU, from the handler's first instruction to its last: 91 to 105 for the two calls
+    /// Counted in QEMU, from the handler's first instruction to its last: 88 to 105 for the two calls
     /// of a move, one that raises its pulses and one that lowers them; neither has more than 60.
     #[inline(always)]
     fn pulse(&mut self) {
