@@ -141,7 +141,7 @@ impl Pen for TracedPen {
 
 /// The library's interrupt code on traced pins.
 pub type TracedPulser<'q> =
-    Pulser<'q, TracedPin, TracedPin, TracedPin, TracedPin, TracedPin, TracedPen>;
+    Pulser<'q, Pins<TracedPin, TracedPin, TracedPin, TracedPin, TracedPin>, TracedPen>;
 
 /// A pulser whose pins note their changes in the trace, and the queue's other end.
 pub fn traced_pulser<'q, const N: usize>(

@@ -22,7 +22,7 @@ use homing::Homing;
 pub use homing::{Axis, Contacts, Switches};
 pub use kinematics::{Anchors, Kinematics};
 pub use path::{JobSize, Path, TapePath, Target, TargetList};
-pub use pulser::{Pen, Pins, Pulser, PulserState, Solenoid};
+pub use pulser::{Axes, Pen, Pins, Pulser, PulserState, Solenoid};
 pub use settings::{SETTING_COUNT, SETTINGS, Setting, SettingError, SettingInfo, Settings, Value};
 use split::Split;
 pub use status::Status;

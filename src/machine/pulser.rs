@@ -2,7 +2,7 @@
 
 use crate::motion::{EventKind, StepEvent};
 use core::convert::Infallible;
-use core::sync::atomic::{AtomicBool, AtomicI32, AtomicU8, AtomicU32, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 use embedded_hal::digital::{OutputPin, PinState};
 use heapless::spsc::Consumer;
 
@@ -11,8 +11,8 @@ use heapless::spsc::Consumer;
 /// The interrupt alone writes the counts, the main loop alone the orders.
 #[derive(Debug, Default)]
 pub struct PulserState {
-    x: AtomicI32,
-    y: AtomicI32,
+    x: AtomicU32,
+    y: AtomicU32,
     ticks: AtomicU32,
     underruns: AtomicU32,
     drained: AtomicBool,
@@ -25,8 +25,8 @@ impl PulserState {
     /// Nothing counted, nothing ordered.
     pub const fn new() -> Self {
         Self {
-            x: AtomicI32::new(0),
-            y: AtomicI32::new(0),
+            x: AtomicU32::new(0),
+            y: AtomicU32::new(0),
             ticks: AtomicU32::new(0),
             underruns: AtomicU32::new(0),
             drained: AtomicBool::new(true),
@@ -38,7 +38,8 @@ impl PulserState {
 
     /// The sum of the steps at the pins, x and y; wraps.
     pub fn steps(&self) -> (i32, i32) {
-        (self.x.load(Ordering::Relaxed), self.y.load(Ordering::Relaxed))
+        let [x, y] = [&self.x, &self.y].map(|sum| sum.load(Ordering::Relaxed).cast_signed());
+        (x, y)
     }
 
     /// Ticks of the events taken from the queue; wraps.
@@ -75,8 +76,8 @@ impl PulserState {
 
     /// For a board whose steps are not pulsed by [`Pulser`]: what its hardware has done.
     pub fn report(&self, (x, y): (i32, i32), ticks: u32, drained: bool) {
-        self.x.store(x, Ordering::Relaxed);
-        self.y.store(y, Ordering::Relaxed);
+        self.x.store(x.cast_unsigned(), Ordering::Relaxed);
+        self.y.store(y.cast_unsigned(), Ordering::Relaxed);
         self.ticks.store(ticks, Ordering::Relaxed);
         self.drained.store(drained, Ordering::Release);
     }
@@ -120,6 +121,30 @@ pub struct Pins<SX, DX, SY, DY, E> {
     pub enable: E,
 }
 
+/// The axes' pins, set all at once.
+pub trait Axes {
+    /// The pins take `levels`, bits as in [`StepEvent`]: a high pulse for each step, the level of
+    /// each direction pin where a motor runs down, drivers on. Called from the interrupt, so brief.
+    fn set(&mut self, levels: u8);
+}
+
+impl<SX, DX, SY, DY, E> Axes for Pins<SX, DX, SY, DY, E>
+where
+    SX: OutputPin<Error = Infallible>,
+    DX: OutputPin<Error = Infallible>,
+    SY: OutputPin<Error = Infallible>,
+    DY: OutputPin<Error = Infallible>,
+    E: OutputPin<Error = Infallible>,
+{
+    fn set(&mut self, levels: u8) {
+        write(&mut self.direction_x, levels & StepEvent::DOWN_X == 0);
+        write(&mut self.direction_y, levels & StepEvent::DOWN_Y == 0);
+        write(&mut self.enable, levels & StepEvent::DRIVERS_ON != 0);
+        write(&mut self.step_x, levels & StepEvent::STEP_X != 0);
+        write(&mut self.step_y, levels & StepEvent::STEP_Y != 0);
+    }
+}
+
 /// The pen: a solenoid's pin or a servo.
 pub trait Pen {
     /// Goes to `height`, 0 (fully raised) to 127. Called from the interrupt, so brief.
@@ -140,76 +165,61 @@ impl<P: OutputPin<Error = Infallible>> Pen for Solenoid<P> {
 /// The step interrupt: pops an event, writes pins, says when to be called next.
 ///
 /// A move takes two calls, one that raises the step pins and one that lowers them. No division, no
-/// loop, no lock. Measured on a Cortex-M3 with pins of one store each (opt-level 3): 32 instructions
-/// for both calls of a diagonal move, 20 for an event without a pulse, 15 for one of the pen; on a
-/// Cortex-M0+ 37, 23 and 18. The interrupt's entry and its timer come on top.
-pub struct Pulser<'q, SX, DX, SY, DY, E, P> {
-    pins: Pins<SX, DX, SY, DY, E>,
+/// loop, no lock. What the whole interrupt costs is said and measured where the board has it.
+pub struct Pulser<'q, A, P> {
+    axes: A,
     pen: P,
     events: Consumer<'q, StepEvent>,
     state: &'q PulserState,
-    x: i32,
-    y: i32,
-    ticks: u32,
     /// Ticks that remain of the event whose pulse is high; 0 if none is.
     after_pulse: u32,
+    /// Of the axes' pins without their pulses.
+    levels: u8,
+    /// The levels of the event whose pulse is high: it counts when the pulse ends.
+    pulse: u8,
     moving: bool,
 }
 
-impl<SX, DX, SY, DY, E, P> core::fmt::Debug for Pulser<'_, SX, DX, SY, DY, E, P> {
+impl<A, P> core::fmt::Debug for Pulser<'_, A, P> {
     fn fmt(&self, formatter: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        formatter
-            .debug_struct("Pulser")
-            .field("x", &self.x)
-            .field("y", &self.y)
-            .finish_non_exhaustive()
+        formatter.debug_struct("Pulser").field("state", &self.state).finish_non_exhaustive()
     }
 }
 
-impl<'q, SX, DX, SY, DY, E, P> Pulser<'q, SX, DX, SY, DY, E, P>
-where
-    SX: OutputPin<Error = Infallible>,
-    DX: OutputPin<Error = Infallible>,
-    SY: OutputPin<Error = Infallible>,
-    DY: OutputPin<Error = Infallible>,
-    E: OutputPin<Error = Infallible>,
-    P: Pen,
-{
+impl<'q, A: Axes, P: Pen> Pulser<'q, A, P> {
     /// Ticks between two calls while there is nothing to do: 1 ms.
     pub const IDLE_TICKS: u32 = 25_000;
 
     /// A pulser at rest. The pins stay as they are until the first event.
-    pub fn new(
-        pins: Pins<SX, DX, SY, DY, E>,
-        pen: P,
-        events: Consumer<'q, StepEvent>,
-        state: &'q PulserState,
-    ) -> Self {
-        Self { pins, pen, events, state, x: 0, y: 0, ticks: 0, after_pulse: 0, moving: false }
+    pub fn new(axes: A, pen: P, events: Consumer<'q, StepEvent>, state: &'q PulserState) -> Self {
+        Self { axes, pen, events, state, after_pulse: 0, levels: 0, pulse: 0, moving: false }
     }
 
     /// The work of one interrupt. Returns the ticks until the next, counted from the start of this
     /// one; `None` if there is nothing to do (call again when something is in the queue, or after
     /// [`Pulser::IDLE_TICKS`]).
-    #[inline]
+    #[inline(always)]
     pub fn tick(&mut self) -> Option<u32> {
         if self.after_pulse != 0 {
-            write(&mut self.pins.step_x, false);
-            write(&mut self.pins.step_y, false);
+            self.axes.set(self.levels);
+            // Bit 0 or 1 times 1, or -1 with the bit two above it.
+            let step =
+                |levels: u8| u32::from(levels & 1) * 1u32.wrapping_sub(u32::from(levels >> 1 & 2));
+            add(&self.state.x, step(self.pulse));
+            add(&self.state.y, step(self.pulse >> 1));
             let rest = core::mem::take(&mut self.after_pulse);
-            return Some(if self.state.is_halted() { Self::DISCARD_TICKS } else { rest });
+            return Some(if self.halted() { Self::DISCARD_TICKS } else { rest });
         }
         let Some(event) = self.events.dequeue() else {
             return self.run_dry();
         };
-        if self.state.is_halted() {
+        if self.halted() {
             self.moving = false;
             self.pen.set_height(0);
             return Some(Self::DISCARD_TICKS);
         }
-        self.state.drained.store(false, Ordering::Release);
-        self.ticks = self.ticks.wrapping_add(event.ticks());
-        self.state.ticks.store(self.ticks, Ordering::Relaxed);
+        self.state.drained.store(false, Ordering::Relaxed);
+        add(&self.state.ticks, event.ticks());
         match event.kind() {
             EventKind::Levels(levels) => Some(self.set_levels(levels, event)),
             EventKind::Pen { height } => {
@@ -220,6 +230,12 @@ where
         }
     }
 
+    /// Nothing else is read by it, so it needs no order.
+    #[inline(always)]
+    fn halted(&self) -> bool {
+        self.state.halt.load(Ordering::Relaxed)
+    }
+
     /// Whether a pulse is high: [`Pulser::tick`] must not be called before its time.
     #[inline]
     pub fn pulse_is_high(&self) -> bool {
@@ -228,16 +244,15 @@ where
 
     /// Raises the pen and switches the drivers off, whatever waits: for a panic or a fault.
     pub fn shut_down(&mut self) {
-        write(&mut self.pins.step_x, false);
-        write(&mut self.pins.step_y, false);
         self.pen.set_height(0);
-        write(&mut self.pins.enable, false);
+        self.axes.set(0);
     }
 
     /// One thrown away event in 4 µs: 512 of them are gone in 2 ms, and other interrupts get
     /// their turn.
     const DISCARD_TICKS: u32 = 100;
 
+    #[inline(never)]
     fn run_dry(&mut self) -> Option<u32> {
         let halted = self.state.is_halted();
         if halted {
@@ -250,30 +265,21 @@ where
         None
     }
 
-    #[inline]
+    #[inline(always)]
     fn set_levels(&mut self, levels: u8, event: StepEvent) -> u32 {
+        const PULSES: u8 = StepEvent::STEP_X | StepEvent::STEP_Y;
         let inverted = self.state.inverted.load(Ordering::Relaxed);
-        let up = !levels ^ (inverted << 2);
-        write(&mut self.pins.direction_x, up & StepEvent::DOWN_X != 0);
-        write(&mut self.pins.direction_y, up & StepEvent::DOWN_Y != 0);
-        write(&mut self.pins.enable, levels & StepEvent::DRIVERS_ON != 0);
+        let pins = levels ^ (inverted << 2);
+        self.axes.set(pins);
         self.moving = levels & StepEvent::AT_REST == 0;
-        if levels & (StepEvent::STEP_X | StepEvent::STEP_Y) == 0 {
+        if levels & PULSES == 0 {
             return event.ticks();
         }
-        let (dx, dy) = event.step();
-        if dx != 0 {
-            write(&mut self.pins.step_x, true);
-            self.x = self.x.wrapping_add(dx);
-            self.state.x.store(self.x, Ordering::Relaxed);
-        }
-        if dy != 0 {
-            write(&mut self.pins.step_y, true);
-            self.y = self.y.wrapping_add(dy);
-            self.state.y.store(self.y, Ordering::Relaxed);
-        }
+        self.levels = pins & !PULSES;
+        self.pulse = levels;
         let pulse = self.state.pulse_ticks.load(Ordering::Relaxed);
-        self.after_pulse = event.ticks().saturating_sub(pulse).max(1);
+        let ticks = event.ticks();
+        self.after_pulse = if ticks > pulse { ticks - pulse } else { 1 };
         pulse
     }
 }
@@ -281,4 +287,10 @@ where
 #[inline]
 fn write(pin: &mut impl OutputPin<Error = Infallible>, high: bool) {
     let Ok(()) = pin.set_state(PinState::from(high));
+}
+
+/// Only for the one that writes it: a load and a store, so that a Cortex-M0+ can.
+#[inline(always)]
+fn add(sum: &AtomicU32, more: u32) {
+    sum.store(sum.load(Ordering::Relaxed).wrapping_add(more), Ordering::Relaxed);
 }

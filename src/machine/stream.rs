@@ -118,6 +118,11 @@ impl Machine<'_> {
         }
     }
 
+    /// Speeds in percent of the settings.
+    pub fn percent(&self) -> u8 {
+        self.percent
+    }
+
     /// The limit switches when last observed.
     pub fn switches(&self) -> Switches {
         self.switches

@@ -51,6 +51,9 @@ impl Inner<'_> {
     /// What was asked by single bytes, but for status and abort.
     #[inline(never)] // Its frame must not lie under the stages'.
     pub(super) fn act(&mut self, asked: RealTime) {
+        if asked == RealTime::default() {
+            return;
+        }
         if asked.has(RealTime::EMERGENCY) {
             self.machine.alarm(Alarm::EmergencyStop);
         }
@@ -66,7 +69,7 @@ impl Inner<'_> {
         if asked.has(RealTime::PAUSE) {
             self.machine.pause_after_stroke();
         }
-        let percent = i32::from(self.machine.status().percent);
+        let percent = i32::from(self.machine.percent());
         let mut changed = if asked.has(RealTime::FEED_RESET) { 100 } else { percent };
         for (byte, change) in [
             (RealTime::FEED_PLUS_10, 10),

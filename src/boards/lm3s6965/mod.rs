@@ -96,15 +96,16 @@ impl Board for Lm3s6965 {
 
     fn wait(&mut self) {
         self.steps.start();
-        interrupt::free(|_| {
-            if HAPPENED.swap(false, Ordering::Relaxed) {
-                return;
-            }
-            if self.steps.idle() {
+        // Most step interrupts need no turn of the main loop.
+        while !interrupt::free(|_| {
+            let happened = HAPPENED.swap(false, Ordering::Relaxed);
+            if happened {
+            } else if self.steps.idle() {
                 self.clock.sleep_stopped();
             } else {
                 cortex_m::asm::wfi();
             }
-        });
+            happened
+        }) {}
     }
 }

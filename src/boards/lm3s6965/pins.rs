@@ -3,6 +3,7 @@
 use core::convert::Infallible;
 
 use embedded_hal::digital::{ErrorType, OutputPin};
+use penup::machine::Axes;
 
 use super::registers::{GPIO_B, SYSTEM_CONTROL};
 
@@ -20,19 +21,40 @@ const ALL: u32 = 0x3F;
 /// Pin `NUMBER` of port B as an output.
 pub struct Pin<const NUMBER: u8>(());
 
-pub type StepXPin = Pin<0>;
-pub type DirXPin = Pin<1>;
-pub type StepYPin = Pin<2>;
-pub type DirYPin = Pin<3>;
 pub type PenPin = Pin<5>;
 
-/// The enable input of the drivers, which is active low: high here is low at the pin.
-pub struct EnablePin(Pin<4>);
+/// The pins of the axes.
+pub struct AxisPins(());
 
 /// The pins that the step interrupt moves.
 pub struct MotorPins {
-    pub axes: penup::machine::Pins<StepXPin, DirXPin, StepYPin, DirYPin, EnablePin>,
+    pub axes: AxisPins,
     pub pen: PenPin,
+}
+
+/// PB0 to PB4.
+const AXES: u32 = 0x1F;
+
+/// Their levels for those of a step event: STEP_X, STEP_Y, DIR_X, DIR_Y, ENABLE from bit 0 on there,
+/// STEP_X, DIR_X, STEP_Y, DIR_Y, ENABLE here; high direction counts up, low enable is on.
+const LEVELS: [u8; 32] = {
+    let mut table = [0; 32];
+    let mut levels = 0;
+    while levels < 32u8 {
+        let (step_x, step_y) = (levels & 1, levels >> 1 & 1);
+        let (down_x, down_y, on) = (levels >> 2 & 1, levels >> 3 & 1, levels >> 4 & 1);
+        table[levels as usize] =
+            step_x | (1 - down_x) << 1 | step_y << 2 | (1 - down_y) << 3 | (1 - on) << 4;
+        levels += 1;
+    }
+    table
+};
+
+impl Axes for AxisPins {
+    #[inline(always)]
+    fn set(&mut self, levels: u8) {
+        write(AXES, LEVELS[usize::from(levels) % LEVELS.len()].into());
+    }
 }
 
 impl<const NUMBER: u8> ErrorType for Pin<NUMBER> {
@@ -50,22 +72,6 @@ impl<const NUMBER: u8> OutputPin for Pin<NUMBER> {
     fn set_high(&mut self) -> Result<(), Infallible> {
         write(1 << NUMBER, 1 << NUMBER);
         Ok(())
-    }
-}
-
-impl ErrorType for EnablePin {
-    type Error = Infallible;
-}
-
-impl OutputPin for EnablePin {
-    #[inline(always)]
-    fn set_low(&mut self) -> Result<(), Infallible> {
-        self.0.set_high()
-    }
-
-    #[inline(always)]
-    fn set_high(&mut self) -> Result<(), Infallible> {
-        self.0.set_low()
     }
 }
 
@@ -90,12 +96,5 @@ pub fn set_up() -> MotorPins {
     GPIO_B.set_bits(offset::DIRECTION, ALL);
     release();
     GPIO_B.set_bits(offset::DIGITAL_ENABLE, ALL);
-    let axes = penup::machine::Pins {
-        step_x: Pin(()),
-        direction_x: Pin(()),
-        step_y: Pin(()),
-        direction_y: Pin(()),
-        enable: EnablePin(Pin(())),
-    };
-    MotorPins { axes, pen: Pin(()) }
+    MotorPins { axes: AxisPins(()), pen: Pin(()) }
 }
