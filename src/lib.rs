@@ -27,6 +27,7 @@ pub mod order;
 pub mod step;
 pub mod motion;
 pub mod machine;
+pub mod storage;
 pub mod protocol;
 pub mod plotter;
 

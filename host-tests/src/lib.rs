@@ -15,5 +15,6 @@ pub mod scene_files;
 pub mod convex_any_faces;
 pub mod convex_model;
 pub mod convex_solids;
+pub mod cut_flash;
 pub mod whole_jobs;
 pub mod emulated_jobs;

@@ -10,6 +10,7 @@ mod collect;
 mod overlap;
 mod page;
 mod title;
+mod window;
 
 pub use collect::{Line, OrganiseError, PEN_LIMIT, Stored, organise};
 pub use page::{Bounds, Page, PageError, PageMap, StepsPerMillimetre};

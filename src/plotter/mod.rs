@@ -203,6 +203,7 @@ impl<'m> Plotter<'m> {
 
 impl Inner<'_> {
     /// Keeps the step queue full. Whether the machine still has something to plan.
+    #[inline(never)] // Its frame must not lie under the stages'.
     fn plan<B: Board>(&mut self, board: &mut B) -> bool {
         let before = self.machine.planned_position();
         let mut strokes = self.job.strokes(self.words, &mut self.cursor);

@@ -49,6 +49,7 @@ pub(super) enum Progress {
 
 impl Inner<'_> {
     /// What was asked by single bytes, but for status and abort.
+    #[inline(never)] // Its frame must not lie under the stages'.
     pub(super) fn act(&mut self, asked: RealTime) {
         if asked.has(RealTime::EMERGENCY) {
             self.machine.alarm(Alarm::EmergencyStop);
@@ -81,6 +82,7 @@ impl Inner<'_> {
     }
 
     /// Looks at the contacts; tells of an alarm once, and lets the board carry it out at once.
+    #[inline(never)] // Its frame must not lie under the stages'.
     pub(super) fn watch<B: Board>(&mut self, board: &mut B) {
         self.machine.observe(board.contacts());
         let alarm = match self.machine.state() {
@@ -97,6 +99,7 @@ impl Inner<'_> {
     }
 
     /// Goes on with the line in work.
+    #[inline(never)] // Its frame must not lie under the stages'.
     pub(super) fn proceed<B: Board>(&mut self, board: &mut B) -> Progress {
         if let Some(Task::List(listing, number)) = &mut self.task {
             // A line takes up to 10 ms: the queue of steps is filled after each.

@@ -300,9 +300,12 @@ pub const HELP: &[(&str, &str)] = &[
     ("$J=G91 X.. Y.. F..", "move by hand with the pen up; byte 0x85 ends it"),
     ("$C", "begin or end to check only: nothing moves"),
     ("$SLP", "switch the motors off; $X wakes"),
-    ("G0 G1 G2 G3 G4 G20 G21 G28 G90 G91", "move, arc, wait, inches, mm, park, absolute, relative"),
-    ("X.. Y.. I.. J.. R.. P.. F.. Z..", "numbers of the former; Z0 and below is pen down"),
-    ("M0 M2 M3 M5", "pause until ~, end, pen down, pen up"),
+    (
+        "G0 | G1 | G2 | G3 | G4 | G20 | G21 | G28 | G90 | G91",
+        "move, arc, wait, inches, mm, park, absolute, relative",
+    ),
+    ("X1 | Y1 | I1 | J1 | R1 | P1 | F1 | Z1", "numbers of the former; Z0 and below is pen down"),
+    ("M0 | M2 | M3 | M5", "pause until ~, end, pen down, pen up"),
 ];
 
 impl<'a> Command<'a> {
@@ -722,7 +725,7 @@ mod tests {
 
     #[test]
     fn what_is_no_command_is_refused() {
-        for line in ["G0 X1", "vv 1 2 3", "hello", "V 1 2 3", "ff"] {
+        for line in ["vv 1 2 3", "hello", "G1 = 2", "ff"] {
             assert_eq!(Command::parse(line), Err(Refusal::UnknownCommand), "{line}");
         }
         for line in ["$nothing", "$plo", "$ plot it"] {
@@ -783,9 +786,9 @@ mod tests {
     fn every_command_of_the_help_is_one() {
         for (usage, _) in HELP {
             let line = usage.split_once('=').map_or(*usage, |(name, _)| name);
-            let parsed = Command::parse(line);
             let with_value = usage.contains('=');
-            assert!(with_value || parsed.is_ok(), "{usage}");
+            let all_are = |line: &str| line.split(" | ").all(|one| Command::parse(one).is_ok());
+            assert!(with_value || all_are(line), "{usage}");
             if with_value {
                 let set = std::format!("{line}=?");
                 assert!(!matches!(Command::parse(&set), Ok(Command::Setting { .. })), "{usage}");

@@ -50,7 +50,7 @@ pub fn set_up(nvic: &mut NVIC) -> (Line, Sender) {
     UART0.write(offset::BAUD_INTEGER, DIVIDER / 64);
     UART0.write(offset::BAUD_FRACTION, DIVIDER % 64);
     UART0.write(offset::LINE_CONTROL, EIGHT_BITS_WITH_FIFO);
-    UART0.write(offset::INTERRUPT_MASK, RECEIVED | RECEIVE_TIMEOUT | SENT);
+    UART0.write(offset::INTERRUPT_MASK, RECEIVED | RECEIVE_TIMEOUT);
 
     let (sent, to_send) = QUEUE.init(Queue::new()).split();
     let (receiver, line) = line::ends();
@@ -86,14 +86,18 @@ fn pump() {
     unsafe { NVIC::unmask(Interrupt::UART0_IRQ) };
 }
 
-/// Fills the FIFO. Called by the line's handler, or where it is masked.
+/// Fills the FIFO, and asks for an interrupt if more waits. Called by the line's handler, or where it
+/// is masked.
 fn send() {
     // SAFETY: this is the handler that owns it, or the handler is masked.
     let Some(bytes) = (unsafe { SENDER.get() }) else { return };
-    while UART0.read(offset::FLAGS) & SENDER_FULL == 0 {
-        let Some(byte) = bytes.dequeue() else { return };
+    while UART0.read(offset::FLAGS) & SENDER_FULL == 0
+        && let Some(byte) = bytes.dequeue()
+    {
         UART0.write(offset::DATA, u32::from(byte));
     }
+    let more = if bytes.is_empty() { 0 } else { SENT };
+    UART0.write(offset::INTERRUPT_MASK, RECEIVED | RECEIVE_TIMEOUT | more);
 }
 
 /// Sends `bytes` past the queue: for a fault, when no handler runs.

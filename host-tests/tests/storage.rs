@@ -1,0 +1,96 @@
+//! Records in flash whose power goes between any two bytes.
+
+use penup::storage::{Slots, StorageError};
+use penup_host_tests::cut_flash::{Cut, CutFlash};
+
+/// Not at the beginning of the flash, and of more than one sector.
+const SLOTS: Slots = Slots { start: 4096, bytes: 8192 };
+const FLASH_BYTES: usize = 5 * 4096;
+
+/// A state that tells itself from others, of that length.
+fn state(number: u8, length: usize) -> Vec<u8> {
+    (0..length).map(|at| (at as u8).wrapping_mul(7) ^ number).collect()
+}
+
+fn save(flash: &mut CutFlash, state: &[u8]) -> Result<(), StorageError<Cut>> {
+    let mut writer = SLOTS.write(flash)?;
+    // In pieces that are no pages.
+    for piece in state.chunks(100) {
+        writer.write(piece)?;
+    }
+    writer.finish()
+}
+
+fn latest(flash: &mut CutFlash) -> Option<Vec<u8>> {
+    let mut reader = SLOTS.latest(flash)?;
+    let mut state = vec![0; reader.left()];
+    let count = reader.read(&mut state);
+    assert_eq!((count, reader.left()), (state.len(), 0));
+    Some(state)
+}
+
+#[test]
+fn a_state_is_read_as_it_was_written() {
+    let mut flash = CutFlash::new(FLASH_BYTES);
+    assert_eq!(latest(&mut flash), None);
+    for (number, length) in (0u8..).zip([0, 1, 255, 256, 257, 3840, 3841, 8192 - 256]) {
+        let state = state(number, length);
+        assert_eq!(save(&mut flash, &state), Ok(()));
+        assert_eq!(latest(&mut flash), Some(state));
+    }
+    // Nothing beyond the slots was touched.
+    assert!(flash.bytes[..4096].iter().all(|byte| *byte == 0xFF));
+}
+
+#[test]
+fn too_long_a_state_leaves_the_one_before() {
+    let mut flash = CutFlash::new(FLASH_BYTES);
+    let before = state(1, 500);
+    save(&mut flash, &before).expect("it fits");
+    let refused = save(&mut flash, &state(2, 8192 - 255));
+    assert_eq!(refused, Err(StorageError::TooLong));
+    assert_eq!(latest(&mut flash), Some(before));
+}
+
+#[test]
+fn after_a_cut_between_any_two_bytes_it_is_the_old_state_or_the_new_one() {
+    // The first save ever; one over an older; and one whose slot held a longer state.
+    let histories: [&[usize]; 3] = [&[], &[40], &[700, 5000, 300]];
+    for history in histories {
+        let mut before = CutFlash::new(FLASH_BYTES);
+        for (number, length) in (10u8..).zip(history) {
+            save(&mut before, &state(number, *length)).expect("it fits");
+        }
+        let old = latest(&mut before);
+        let new = state(99, 600);
+        for budget in 0.. {
+            let mut flash = CutFlash { budget, ..before.clone() };
+            let outcome = save(&mut flash, &new);
+            flash.budget = usize::MAX;
+            let found = latest(&mut flash);
+            if outcome.is_ok() {
+                assert_eq!(found.as_ref(), Some(&new));
+                break;
+            }
+            assert!(found == old || found.as_ref() == Some(&new), "cut after {budget} bytes");
+            // It goes on as if nothing had been.
+            let next = state(7, 300);
+            save(&mut flash, &next).expect("it fits");
+            assert_eq!(latest(&mut flash), Some(next), "after a cut after {budget} bytes");
+        }
+    }
+}
+
+#[test]
+fn a_flipped_bit_makes_a_state_invalid() {
+    let mut flash = CutFlash::new(FLASH_BYTES);
+    let (old, new) = (state(1, 50), state(2, 50));
+    save(&mut flash, &old).expect("it fits");
+    save(&mut flash, &new).expect("it fits");
+    let second = 4096 + 8192;
+    for bit in (0..16 * 8).chain(256 * 8..306 * 8) {
+        let mut worn = flash.clone();
+        worn.bytes[second + bit / 8] ^= 1 << (bit % 8);
+        assert_eq!(latest(&mut worn).as_ref(), Some(&old), "bit {bit}");
+    }
+}

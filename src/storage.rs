@@ -1,0 +1,281 @@
+//! Records that outlive a loss of power, whenever it comes.
+//!
+//! A record has two [`Slots`] in flash. It is written to the one that does not hold its latest state,
+//! the payload first and the header last, whose sum over both makes it valid. So what is read is the
+//! old state or the new one, never a mixture, though the power went between any two bytes. A state is
+//! read whole, by [`Reader`], and written whole, by [`Writer`], in pieces of any size.
+//!
+//! The flash is any [`NorFlash`]: what is erased is all ones, and writing makes zeros of ones. Refused:
+//! a state longer than a slot.
+//!
+//! A slot begins with a page for the header, four words in little-endian order: a mark, a sequence
+//! number, the length of the payload in bytes, and the sum, CRC-32 of these three and the payload.
+
+use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
+use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
+
+/// What flash writes at once.
+pub const PAGE_BYTES: usize = 256;
+
+const MARK: u32 = u32::from_le_bytes(*b"pen1");
+const HEADER_BYTES: usize = 16;
+
+static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
+
+/// Why a state was not kept; the one before still is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StorageError<E> {
+    /// It is longer than a slot.
+    TooLong,
+    /// What the flash says.
+    Flash(E),
+}
+
+impl<E> From<E> for StorageError<E> {
+    fn from(error: E) -> Self {
+        Self::Flash(error)
+    }
+}
+
+/// The two places of a record in flash, one behind the other.
+///
+/// ```
+/// # use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
+/// # struct Flash([u8; 8192]);
+/// # impl ErrorType for Flash { type Error = core::convert::Infallible; }
+/// # impl ReadNorFlash for Flash {
+/// #     const READ_SIZE: usize = 1;
+/// #     fn read(&mut self, at: u32, bytes: &mut [u8]) -> Result<(), Self::Error> {
+/// #         let at = at as usize;
+/// #         bytes.copy_from_slice(&self.0[at..at + bytes.len()]);
+/// #         Ok(())
+/// #     }
+/// #     fn capacity(&self) -> usize { 8192 }
+/// # }
+/// # impl NorFlash for Flash {
+/// #     const WRITE_SIZE: usize = 256;
+/// #     const ERASE_SIZE: usize = 4096;
+/// #     fn erase(&mut self, from: u32, to: u32) -> Result<(), Self::Error> {
+/// #         self.0[from as usize..to as usize].fill(0xFF);
+/// #         Ok(())
+/// #     }
+/// #     fn write(&mut self, at: u32, bytes: &[u8]) -> Result<(), Self::Error> {
+/// #         self.0[at as usize..][..bytes.len()].copy_from_slice(bytes);
+/// #         Ok(())
+/// #     }
+/// # }
+/// # let mut flash = Flash([0xFF; 8192]);
+/// use penup::storage::Slots;
+/// let slots = Slots { start: 0, bytes: 4096 };
+/// assert!(slots.latest(&mut flash).is_none());
+/// let mut writer = slots.write(&mut flash).unwrap();
+/// writer.write(b"old or new").unwrap();
+/// writer.finish().unwrap();
+/// let mut kept = [0; 20];
+/// let length = slots.latest(&mut flash).unwrap().read(&mut kept);
+/// assert_eq!(&kept[..length], b"old or new");
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Slots {
+    /// Where the first one begins: a multiple of what the flash erases at once.
+    pub start: u32,
+    /// The size of each: another such multiple.
+    pub bytes: u32,
+}
+
+/// A slot's valid header.
+#[derive(Clone, Copy)]
+struct Valid {
+    slot: u32,
+    sequence: u32,
+    length: u32,
+}
+
+impl Slots {
+    /// The latest state; `None` if there is none.
+    pub fn latest<F: ReadNorFlash>(self, flash: &mut F) -> Option<Reader<'_, F>> {
+        let valid = self.find(flash)?;
+        let at = self.begin(valid.slot) + PAGE_BYTES as u32;
+        Some(Reader { flash, at, left: valid.length })
+    }
+
+    /// Begins a new state.
+    ///
+    /// # Errors
+    /// What the flash says; the latest state is untouched.
+    pub fn write<F: NorFlash>(
+        self,
+        flash: &mut F,
+    ) -> Result<Writer<'_, F>, StorageError<F::Error>> {
+        let latest = self.find(flash);
+        let slot = latest.map_or(0, |valid| 1 - valid.slot);
+        let start = self.begin(slot);
+        flash.erase(start, start + F::ERASE_SIZE as u32)?;
+        Ok(Writer {
+            flash,
+            slots: self,
+            start,
+            sequence: latest.map_or(0, |valid| valid.sequence.wrapping_add(1)),
+            length: 0,
+            erased: F::ERASE_SIZE as u32,
+            page: [0xFF; PAGE_BYTES],
+            digest: CRC.digest(),
+        })
+    }
+
+    fn begin(self, slot: u32) -> u32 {
+        self.start + slot * self.bytes
+    }
+
+    fn find<F: ReadNorFlash>(self, flash: &mut F) -> Option<Valid> {
+        let [first, second] = [0, 1].map(|slot| self.check(flash, slot));
+        match (first, second) {
+            (Some(first), Some(second)) => {
+                let newer = second.sequence.wrapping_sub(first.sequence).cast_signed() > 0;
+                Some(if newer { second } else { first })
+            }
+            (first, second) => first.or(second),
+        }
+    }
+
+    /// The slot's header, if its sum is right.
+    fn check<F: ReadNorFlash>(self, flash: &mut F, slot: u32) -> Option<Valid> {
+        let mut header = [0; HEADER_BYTES];
+        flash.read(self.begin(slot), &mut header).ok()?;
+        let [mark, sequence, length, sum] = words(header);
+        if mark != MARK || length > self.bytes - PAGE_BYTES as u32 {
+            return None;
+        }
+        let at = self.begin(slot) + PAGE_BYTES as u32;
+        let mut payload = Reader { flash, at, left: length };
+        let mut digest = CRC.digest();
+        let mut piece = [0; 64];
+        loop {
+            match payload.read(&mut piece) {
+                0 => break,
+                count => digest.update(&piece[..count]),
+            }
+        }
+        (payload.left == 0 && sum == total(digest, sequence, length)).then_some(Valid {
+            slot,
+            sequence,
+            length,
+        })
+    }
+}
+
+fn words(header: [u8; HEADER_BYTES]) -> [u32; 4] {
+    let [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p] = header;
+    [[a, b, c, d], [e, f, g, h], [i, j, k, l], [m, n, o, p]].map(u32::from_le_bytes)
+}
+
+/// The sum of a payload and its header.
+fn total(mut digest: Digest<'_, u32, Table<1>>, sequence: u32, length: u32) -> u32 {
+    for word in [MARK, sequence, length] {
+        digest.update(&word.to_le_bytes());
+    }
+    digest.finalize()
+}
+
+/// A state that is read, from its beginning on.
+#[derive(Debug)]
+pub struct Reader<'f, F> {
+    flash: &'f mut F,
+    at: u32,
+    left: u32,
+}
+
+impl<F: ReadNorFlash> Reader<'_, F> {
+    /// The next bytes, as many as there are and `into` holds; says how many.
+    pub fn read(&mut self, into: &mut [u8]) -> usize {
+        let count = into.len().min(self.left as usize);
+        match self.flash.read(self.at, &mut into[..count]) {
+            Ok(()) => {
+                self.at += count as u32;
+                self.left -= count as u32;
+                count
+            }
+            Err(_) => 0,
+        }
+    }
+
+    /// How many are left.
+    pub fn left(&self) -> usize {
+        self.left as usize
+    }
+}
+
+/// A state that is written. Given up before [`Writer::finish`], it never was.
+pub struct Writer<'f, F> {
+    flash: &'f mut F,
+    slots: Slots,
+    start: u32,
+    sequence: u32,
+    /// Bytes taken, of which the last are in `page`.
+    length: u32,
+    /// Bytes from the slot's beginning that are erased.
+    erased: u32,
+    page: [u8; PAGE_BYTES],
+    digest: Digest<'static, u32, Table<1>>,
+}
+
+impl<F> core::fmt::Debug for Writer<'_, F> {
+    fn fmt(&self, formatter: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        formatter.debug_struct("Writer").field("length", &self.length).finish_non_exhaustive()
+    }
+}
+
+impl<F: NorFlash> Writer<'_, F> {
+    /// Appends bytes.
+    ///
+    /// # Errors
+    /// See [`StorageError`]; the latest state is still the one before.
+    pub fn write(&mut self, bytes: &[u8]) -> Result<(), StorageError<F::Error>> {
+        for &byte in bytes {
+            let place = self.length as usize % PAGE_BYTES;
+            self.page[place] = byte;
+            self.length += 1;
+            if place + 1 == PAGE_BYTES {
+                self.put_page()?;
+            }
+        }
+        self.digest.update(bytes);
+        Ok(())
+    }
+
+    /// Makes it the latest state.
+    ///
+    /// # Errors
+    /// See [`StorageError`]; the latest state is still the one before.
+    pub fn finish(mut self) -> Result<(), StorageError<F::Error>> {
+        if !(self.length as usize).is_multiple_of(PAGE_BYTES) {
+            self.put_page()?;
+        }
+        let sum = total(self.digest, self.sequence, self.length);
+        let mut header = [0xFF; PAGE_BYTES];
+        let words = [MARK, self.sequence, self.length, sum];
+        for (place, word) in header.chunks_exact_mut(4).zip(words) {
+            place.copy_from_slice(&word.to_le_bytes());
+        }
+        self.flash.write(self.start, &header)?;
+        Ok(())
+    }
+
+    /// Writes the page that the payload has come to.
+    fn put_page(&mut self) -> Result<(), StorageError<F::Error>> {
+        // Behind the header's.
+        let page = self.length.div_ceil(PAGE_BYTES as u32);
+        let (from, to) = (page * PAGE_BYTES as u32, (page + 1) * PAGE_BYTES as u32);
+        if to > self.slots.bytes {
+            return Err(StorageError::TooLong);
+        }
+        if to > self.erased {
+            let start = self.start + self.erased;
+            self.flash.erase(start, start + F::ERASE_SIZE as u32)?;
+            self.erased += F::ERASE_SIZE as u32;
+        }
+        self.flash.write(self.start + from, &self.page)?;
+        self.page.fill(0xFF);
+        Ok(())
+    }
+}
