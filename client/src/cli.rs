@@ -175,9 +175,9 @@ pub struct ViewArgs {
     /// What hides: any faces, or nothing; or one convex solid seen from its vertices or edges alone
     #[arg(long, value_enum, default_value = "faces", help_heading = "Camera")]
     pub see: See,
-    /// What to do with hidden lines
-    #[arg(long, value_enum, default_value = "erased", help_heading = "Camera")]
-    pub hidden: Hidden,
+    /// What to do with hidden lines: erased, dotted, dashed, shown, pen or pen,NUMBER
+    #[arg(long, value_parser = hidden, default_value = "erased", help_heading = "Camera")]
+    pub hidden: String,
     /// Whether the lines are drawn where faces pass through each other
     #[arg(long, value_enum, default_value = "on", help_heading = "Camera")]
     pub seams: Switch,
@@ -207,6 +207,22 @@ pub struct ViewArgs {
     /// Scale a plan to the page, too (solids always are; plans are drawn at true size)
     #[arg(long, help_heading = "Page")]
     pub fit: bool,
+    /// How the moves between strokes are chosen
+    #[arg(long, value_enum, default_value = "auto", help_heading = "Order")]
+    pub order: Order,
+    /// Let the pen return to where it began
+    #[arg(long, help_heading = "Order")]
+    pub cycle: bool,
+    /// Work to improve the order of many parts, for each pen; with 0 the nearest part comes next
+    #[arg(
+        long,
+        value_name = "NUMBER",
+        default_value = "1000",
+        value_parser = clap::value_parser!(u32).range(0..1 << 30),
+        allow_hyphen_values = true,
+        help_heading = "Order"
+    )]
+    pub effort: u32,
 }
 
 impl ViewArgs {
@@ -243,25 +259,46 @@ impl ViewArgs {
                 See::Vertices => "vertices",
                 See::Edges => "edges",
             },
-            hidden: match self.hidden {
-                Hidden::Erased => "erased",
-                Hidden::Dotted => "dotted",
-                Hidden::Dashed => "dashed",
-                Hidden::Shown => "shown",
-            },
+            hidden: self.hidden.clone(),
             page,
             margin: self.margin,
             fit: self.fit,
+            order: match self.order {
+                Order::Auto => "auto",
+                Order::Greedy => "greedy",
+                Order::Exact => "exact",
+            },
+            cycle: self.cycle,
+            effort: self.effort,
         }
     }
 }
 
-/// The plotter's own parser says whether this is a projection.
 fn projection(text: &str) -> Result<String, String> {
-    match penup::protocol::Command::parse(&format!("$projection={text}")) {
+    understood("projection", text)
+}
+
+fn hidden(text: &str) -> Result<String, String> {
+    understood("hidden", text)
+}
+
+/// The plotter's own parser says whether this is a value of the option.
+fn understood(option: &str, text: &str) -> Result<String, String> {
+    match penup::protocol::Command::parse(&format!("${option}={text}")) {
         Ok(_) => Ok(text.to_owned()),
         Err(refusal) => Err(refusal.to_string()),
     }
+}
+
+/// How the moves between strokes are chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Order {
+    /// Exact where it fits in memory, else greedy
+    Auto,
+    /// Greedy with regret, then pair exchange
+    Greedy,
+    /// At the least length
+    Exact,
 }
 
 /// Whether blocks that touch are one shape.
@@ -302,19 +339,6 @@ pub enum See {
     Vertices,
     /// One convex solid, from its vertices and edges
     Edges,
-}
-
-/// What is done with hidden lines.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Hidden {
-    /// Not drawn.
-    Erased,
-    /// Drawn dotted.
-    Dotted,
-    /// Drawn dashed
-    Dashed,
-    /// Drawn like the others.
-    Shown,
 }
 
 fn number(text: &str) -> Result<f64, String> {

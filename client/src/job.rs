@@ -1,8 +1,8 @@
 //! What came of a job, and the settings that it was done with.
 
 use crate::protocol::{
-    ANGLES, AT, BEHIND, BLOCKS, CLEAR, CREASE, EYE, FIT, HIDDEN, MARGIN, PAGE, PROJECTION, SEAMS,
-    SEE, UP, VIEW_AUTO, setting,
+    ANGLES, AT, BEHIND, BLOCKS, CLEAR, CREASE, CYCLE, EFFORT, EYE, FIT, HIDDEN, MARGIN, ORDER,
+    PAGE, PROJECTION, SEAMS, SEE, UP, VIEW_AUTO, setting,
 };
 use crate::source::JobLine;
 use crate::watch::PenRuns;
@@ -123,14 +123,20 @@ pub struct Settings {
     pub crease: f64,
     /// `faces`, `wire`, `vertices` or `edges`.
     pub see: &'static str,
-    /// `erased`, `dotted`, `dashed` or `shown`.
-    pub hidden: &'static str,
+    /// What becomes of hidden lines, as the plotter understands it.
+    pub hidden: String,
     /// The page.
     pub page: Page,
     /// What stays free on each side, in mm.
     pub margin: f64,
     /// Whether a plan, too, is scaled to the page.
     pub fit: bool,
+    /// `auto`, `greedy` or `exact`.
+    pub order: &'static str,
+    /// Whether the pen returns to where it began.
+    pub cycle: bool,
+    /// As the plotter understands it.
+    pub effort: u32,
 }
 
 /// Every line of a job up to the plot command: forget the old model, the file's lines, the settings.
@@ -152,6 +158,9 @@ pub fn job_lines(file: Vec<JobLine>, settings: &Settings) -> Vec<JobLine> {
         setting(PAGE, &[page.width, page.height], 'x'),
         setting(MARGIN, &[settings.margin], ','),
         format!("{FIT}={}", if settings.fit { "on" } else { "off" }),
+        format!("{ORDER}={}", settings.order),
+        format!("{CYCLE}={}", if settings.cycle { "on" } else { "off" }),
+        format!("{EFFORT}={}", settings.effort),
     ]);
     std::iter::once(JobLine::command(CLEAR))
         .chain(file)
@@ -203,10 +212,13 @@ mod tests {
             blocks: "separate",
             crease: 0.0,
             see: "faces",
-            hidden: "dotted",
+            hidden: "dotted".to_owned(),
             page: Page { width: 210.0, height: 297.0 },
             margin: 7.5,
             fit: false,
+            order: "auto",
+            cycle: false,
+            effort: 1000,
         };
         let lines = job_lines(vec![JobLine::command("v 0 0 0")], &settings);
         let sent: Vec<&str> = lines.iter().map(|line| line.sent.as_str()).collect();
@@ -228,6 +240,9 @@ mod tests {
                 "$page=210x297",
                 "$margin=7.5",
                 "$fit=off",
+                "$order=auto",
+                "$cycle=off",
+                "$effort=1000",
             ]
         );
     }

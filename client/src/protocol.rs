@@ -33,6 +33,12 @@ pub const CREASE: &str = "$crease";
 pub const PROJECTION: &str = "$projection";
 /// How it is found out what is seen.
 pub const SEE: &str = "$see";
+/// How the moves between strokes are chosen.
+pub const ORDER: &str = "$order";
+/// Whether the pen returns to where it began.
+pub const CYCLE: &str = "$cycle";
+/// Work to improve the order.
+pub const EFFORT: &str = "$effort";
 /// What is done with hidden lines.
 pub const HIDDEN: &str = "$hidden";
 /// Width x height of the page in millimetres.

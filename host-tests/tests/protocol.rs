@@ -223,3 +223,60 @@ fn the_documentation_lists_every_error_and_every_command() {
         assert!(text.contains(&format!("| `{usage}` | {meaning} |")), "{usage}");
     }
 }
+
+#[test]
+fn hidden_lines_have_their_own_pen_after_a_pause() {
+    let mut bench = with_cube();
+    bench.say("$hidden=pen\n");
+    bench
+        .plotter
+        .compute(&mut penup::stage::Undisturbed, &mut penup::plotter::Unobserved)
+        .expect("a job");
+    let mut strokes = bench.plotter.strokes();
+    let mut pens = Vec::new();
+    while let Some(penup::machine::Target { ink, .. }) =
+        penup::machine::Path::next_target(&mut strokes)
+    {
+        if ink.is_some() {
+            pens.push(penup::machine::Path::pen(&strokes));
+        }
+    }
+    // Nine edges are seen, three are not.
+    assert_eq!(pens, [[0; 9].as_slice(), &[1; 3]].concat());
+    assert_eq!(bench.say("$plot\n"), "ok\n");
+    bench.finish();
+    let paused = bench.say("?");
+    assert!(!paused.starts_with("<Idle"), "{paused}");
+    bench.say("~");
+    bench.finish();
+    assert!(bench.say("?").starts_with("<Idle"));
+}
+
+#[test]
+fn the_order_is_as_it_was_asked_for_and_told() {
+    let mut bench = Bench::new();
+    bench.heard();
+    // Two squares: two parts without odd points.
+    for (x, first) in [(20, 1), (60, 5)] {
+        for (dx, dy) in [(0, 0), (10, 0), (10, 10), (0, 10)] {
+            bench.say(&format!("v {} {} 0\n", x + dx, 50 + dy));
+        }
+        bench.say(&format!("l {} {} {} {} {}\n", first, first + 1, first + 2, first + 3, first));
+    }
+    for (settings, (lifts, up)) in
+        [("$order=exact\n$effort=10\n", (1, "30.0")), ("$cycle=on\n", (2, "60.0"))]
+    {
+        bench.say(settings);
+        assert_eq!(bench.say("$plot\n"), "ok\n");
+        bench.finish();
+        let told = bench.say("$model\n");
+        let counts = format!("[JOB:odd points 0, parts 2, lifts {lifts}]");
+        assert!(told.contains(&counts), "{told}");
+        let job = format!("[JOB:pen down 80.0 mm, up {up} mm, efficiency ");
+        assert!(told.contains(&job), "{told}");
+    }
+    for (line, number) in [("$order=best\n", 105), ("$effort=-1\n", 102), ("$hidden=pen,33\n", 102)]
+    {
+        assert_eq!(refusal(&bench.say(line)), Some(number), "{line}");
+    }
+}

@@ -3,8 +3,11 @@
 //! While visibility runs, lines are packed at 12 bytes each ([`Line`]). Then [`organise`] turns them,
 //! in the same memory, into points and segments.
 
+use super::overlap::{Loose, ink_once};
 use super::{Drawing, LineType, PAGE_LIMIT, PagePoint, Segment};
-use crate::stage::{Aborted, Attention, OutOfScratch, Scratch, heap_sort_by_key, items, items_mut};
+use crate::stage::{
+    Aborted, Attention, OutOfScratch, Scratch, StageError, heap_sort_by_key, items, items_mut,
+};
 use bytemuck::{Pod, Zeroable};
 
 /// A straight line on the page, packed: four coordinates of 21 bits, line type, pen.
@@ -102,6 +105,15 @@ impl From<OutOfScratch> for OrganiseError {
     }
 }
 
+impl From<StageError> for OrganiseError {
+    fn from(error: StageError) -> Self {
+        match error {
+            StageError::Scratch(missing) => Self::Scratch(missing),
+            StageError::Aborted => Self::Aborted,
+        }
+    }
+}
+
 impl From<Aborted> for OrganiseError {
     fn from(_: Aborted) -> Self {
         Self::Aborted
@@ -114,7 +126,8 @@ const LINES_BETWEEN_CHECKS: usize = 32;
 /// Turns the `count` lines at the beginning of `words` into a drawing at the beginning of `words`.
 ///
 /// Points less than two steps apart along both axes count as one, the first of them; lines that
-/// shrink to a point are dropped; of equal segments one is kept, a full line before a dotted one.
+/// shrink to a point are dropped; where segments of a pen overlap one is kept, a full line before a dotted
+/// one.
 ///
 /// # Errors
 /// See [`OrganiseError`]; the lines are lost then.
@@ -124,11 +137,15 @@ pub fn organise(
     count: usize,
     attention: &mut dyn Attention,
 ) -> Result<Stored, OrganiseError> {
-    let line_words = Scratch::bytes_for::<Line>(count) / 8;
+    // A full line inside a dotted or dashed one leaves two pieces of it.
+    let is_cut = |line: &Line| line.unpack().2 != LineType::Full.code();
+    let all: &[Line] = items(words, count).unwrap_or(&[]);
+    let room = if all.iter().any(is_cut) { count + count / 4 + 8 } else { count };
+    let line_words = Scratch::bytes_for::<Line>(room) / 8;
     let available = size_of_val(words);
     let missing = OutOfScratch { needed: line_words * 8, available };
     let (line_memory, rest) = words.split_at_mut_checked(line_words).ok_or(missing)?;
-    let lines: &mut [Line] = items_mut(line_memory, count).ok_or(missing)?;
+    let lines: &mut [Line] = items_mut(line_memory, room).ok_or(missing)?;
 
     let (segments, points) = {
         let mut finder = PointFinder::new(Scratch::new(rest), 2 * count)?;
@@ -149,9 +166,15 @@ pub fn organise(
                 kept += 1;
             }
         }
-        let lines = &mut lines[..kept];
-        heap_sort_by_key(lines, |line| line.0);
-        (drop_repeated(lines), finder.count)
+        let points = finder.points.get(..finder.count).unwrap_or(&[]);
+        let loose: &mut [Loose] = bytemuck::cast_slice_mut(&mut *lines);
+        let segments = ink_once(loose, kept, points, attention)?;
+        for [ends, ..] in loose.iter_mut().take(segments) {
+            let (from, to) = (*ends >> 16, *ends & 0xFFFF);
+            *ends = from.min(to) << 16 | from.max(to);
+        }
+        heap_sort_by_key(loose.get_mut(..segments).unwrap_or(&mut []), |segment| *segment);
+        (segments, points.len())
     };
 
     // Shrink each line (12 bytes) to its segment (6 bytes) in place, front to back.
@@ -173,18 +196,6 @@ pub fn organise(
     let point_words = Scratch::bytes_for::<PagePoint>(points) / 8;
     words.copy_within(line_words..line_words + point_words, stored.segment_bytes() / 8);
     Ok(stored)
-}
-
-/// Keeps the first of each run of equal segments; returns how many are kept, at the front.
-fn drop_repeated(lines: &mut [Line]) -> usize {
-    let mut kept = 0;
-    for at in 0..lines.len() {
-        if kept == 0 || lines[kept - 1].0[0] != lines[at].0[0] {
-            lines[kept] = lines[at];
-            kept += 1;
-        }
-    }
-    kept
 }
 
 /// Numbers points, giving coincident points the same number: a hash table over the steps.

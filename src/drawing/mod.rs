@@ -7,6 +7,7 @@
 //! memory.
 
 mod collect;
+mod overlap;
 mod page;
 mod title;
 mod window;

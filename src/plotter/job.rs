@@ -125,6 +125,7 @@ impl Job {
 pub struct Cursor {
     leg: usize,
     at: Option<u16>,
+    pen: u8,
 }
 
 /// The strokes of a job as the machine asks for them: a pen-up move wherever a leg does not begin
@@ -146,8 +147,13 @@ impl Path for Strokes<'_> {
         let number = if begins_here { to } else { from };
         let point = *self.drawing.points.get(usize::from(number))?;
         self.cursor.at = Some(number);
+        self.cursor.pen = segment.pen;
         self.cursor.leg += usize::from(begins_here);
         Some(Target { point, ink: begins_here.then(|| segment.line_type()) })
+    }
+
+    fn pen(&self) -> u8 {
+        self.cursor.pen
     }
 
     fn rewind(&mut self) {
@@ -411,9 +417,10 @@ impl<'a> Collector<'a> {
         from: PagePoint,
         to: PagePoint,
         line_type: LineType,
+        pen: u8,
     ) -> Result<(), SinkFull> {
         if from != to {
-            *self.lines.get_mut(self.count).ok_or(SinkFull)? = Line::new(from, to, line_type, 0);
+            *self.lines.get_mut(self.count).ok_or(SinkFull)? = Line::new(from, to, line_type, pen);
             self.count += 1;
         }
         Ok(())
@@ -446,16 +453,17 @@ impl StretchSink for PageSink<'_> {
         if self.view.near().is_some_and(is_cut) {
             return Ok(());
         }
-        let line_type = match (stretch.visible, self.hidden) {
-            (true, _) | (false, HiddenLines::Shown) => LineType::Full,
-            (false, HiddenLines::Dotted) => LineType::Dotted,
-            (false, HiddenLines::Dashed) => LineType::Dashed,
+        let (line_type, pen) = match (stretch.visible, self.hidden) {
+            (true, _) | (false, HiddenLines::Shown) => (LineType::Full, 0),
+            (false, HiddenLines::Dotted) => (LineType::Dotted, 0),
+            (false, HiddenLines::Dashed) => (LineType::Dashed, 0),
+            (false, HiddenLines::Pen(pen)) => (LineType::Full, pen),
             (false, HiddenLines::Erased) => return Ok(()),
         };
         self.observer.stretch(self.view, &stretch);
         let along = [stretch.from, stretch.to];
         match self.map.stretch((p, q), along, self.view.projection()) {
-            Some([from, to]) => self.collector.line(from, to, line_type),
+            Some([from, to]) => self.collector.line(from, to, line_type, pen),
             None => Ok(()),
         }
     }

@@ -333,9 +333,27 @@ impl Inner<'_> {
         Reply(board).line(format_args!(
             "[MODEL:faces {faces}, bars {bars}, curves {curves}, corners {corners} of {limit}]"
         ));
-        let order::Report { odd_points, components, lifts, .. } = *self.job.report();
+        let order::Report { odd_points, components, pen_down, pen_up, lifts, bound, optimal } =
+            *self.job.report();
         Reply(board)
             .line(format_args!("[JOB:odd points {odd_points}, parts {components}, lifts {lifts}]"));
+        // From 1/256 steps to 1/256 mm; below 2^56.
+        let steps = self.machine.settings().get(Setting::StepsPerMmX).to_bits().max(1);
+        let mm = |length: u64| BinaryFraction {
+            units: ((length << 16) / u64::from(steps.unsigned_abs())) as i64,
+            fraction_bits: 8,
+            places: 1,
+        };
+        let percent = BinaryFraction {
+            units: ((pen_down * 25600) / (pen_down + pen_up).max(1)) as i64,
+            fraction_bits: 8,
+            places: 1,
+        };
+        let (down, up, bound) = (mm(pen_down), mm(pen_up), mm(bound));
+        let proof = if optimal { "the least" } else { "not proved the least" };
+        Reply(board).line(format_args!(
+            "[JOB:pen down {down} mm, up {up} mm, efficiency {percent} %, bound {bound} mm, {proof}]"
+        ));
         Reply(board).line(format_args!("[MEM:{} bytes to work in]", size_of_val(self.words)));
     }
 

@@ -82,6 +82,10 @@ impl PlotOptions {
             }
             PlotOption::Margin(margin) => self.page.margin = margin,
             PlotOption::Fit(fit) => self.fit = fit,
+            PlotOption::Order(method) => self.order.method = method,
+            PlotOption::Cycle(true) => self.order.shape = order::Shape::ClosedCycle,
+            PlotOption::Cycle(false) => self.order.shape = order::Shape::OpenPath,
+            PlotOption::Effort(effort) => self.order.effort = effort,
         }
     }
 
@@ -168,15 +172,28 @@ impl PlotOptions {
             HiddenLines::Dotted => "dotted",
             HiddenLines::Dashed => "dashed",
             HiddenLines::Shown => "shown",
+            HiddenLines::Pen(_) => "pen",
         };
+        let method = match self.order.method {
+            order::Method::Auto => "auto",
+            order::Method::Greedy => "greedy",
+            order::Method::Exact => "exact",
+        };
+        let on = |on: bool| if on { "on" } else { "off" };
         line(format_args!("$behind={}", if self.clip_behind { "clip" } else { "refuse" }));
         line(format_args!("$see={see}"));
-        line(format_args!("$hidden={hidden}"));
-        line(format_args!("$seams={}", if self.seams { "on" } else { "off" }));
+        match self.hidden {
+            HiddenLines::Pen(pen) => line(format_args!("$hidden=pen,{}", pen + 1)),
+            _ => line(format_args!("$hidden={hidden}")),
+        }
+        line(format_args!("$seams={}", on(self.seams)));
         line(format_args!("$blocks={}", if self.merged_blocks { "merged" } else { "separate" }));
         line(format_args!("$crease={}", SixDecimals(self.crease)));
         line(format_args!("$page={}x{}", self.page.width, self.page.height));
         line(format_args!("$margin={}", self.page.margin));
-        line(format_args!("$fit={}", if self.fit { "on" } else { "off" }));
+        line(format_args!("$fit={}", on(self.fit)));
+        line(format_args!("$order={method}"));
+        line(format_args!("$cycle={}", on(self.order.shape == order::Shape::ClosedCycle)));
+        line(format_args!("$effort={}", self.order.effort));
     }
 }

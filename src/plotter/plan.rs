@@ -48,7 +48,7 @@ pub(super) fn lay_out(
         let on_plan = |[x, y, _]: Point| [x, y].map(|c| f64::from(c) * unit);
         observer.plan_bar(on_plan(from), on_plan(to));
         let [from, to] = [from, to].map(|[x, y, _]| map.point(x.into(), y.into(), 1));
-        collector.line(from, to, LineType::Full).map_err(|SinkFull| collector.missing())
+        collector.line(from, to, LineType::Full, 0).map_err(|SinkFull| collector.missing())
     };
     for element in model.elements().iter() {
         let Element::Bar(from, to) = element else { continue };

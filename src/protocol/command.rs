@@ -2,8 +2,10 @@
 
 use super::{GCode, Refusal};
 use crate::curve::CurveError;
+use crate::drawing::PEN_LIMIT;
 use crate::fixed::{Decimal, Millimetres};
 use crate::model::{self, Edit, ModelError, Part};
+use crate::order;
 use crate::view::{Direction, Lens};
 
 /// What a line asks for.
@@ -111,6 +113,12 @@ pub enum PlotOption {
     Margin(Millimetres),
     /// `$fit=on|off`
     Fit(bool),
+    /// `$order=auto|greedy|exact`
+    Order(order::Method),
+    /// `$cycle=on|off`: whether the pen returns to where it began.
+    Cycle(bool),
+    /// `$effort=N`
+    Effort(u32),
 }
 
 /// How the model comes onto the page.
@@ -201,7 +209,35 @@ pub enum HiddenLines {
     Dashed,
     /// Drawn like visible ones: a wire frame.
     Shown,
+    /// Drawn with this pen, from 0.
+    Pen(u8),
 }
+
+impl HiddenLines {
+    const CHOICES: &str = "erased, dotted, dashed, shown, pen or pen,NUMBER";
+
+    fn parse(value: &str) -> Result<Self, Refusal> {
+        Ok(match value {
+            "erased" => Self::Erased,
+            "dotted" => Self::Dotted,
+            "dashed" => Self::Dashed,
+            "shown" => Self::Shown,
+            // The first pen draws what is seen.
+            "pen" => Self::Pen(1),
+            _ => {
+                let number = value.strip_prefix("pen,");
+                let number = number.ok_or(Refusal::NotAChoice { choices: Self::CHOICES })?;
+                match whole(number)? {
+                    number @ 1..=PENS => Self::Pen(number as u8 - 1),
+                    _ => return Err(Refusal::NumberOutOfRange),
+                }
+            }
+        })
+    }
+}
+
+/// How many pens there are.
+const PENS: i32 = PEN_LIMIT as i32;
 
 /// The `$` commands and what each does, as `$` lists them.
 pub const HELP: &[(&str, &str)] = &[
@@ -227,13 +263,19 @@ pub const HELP: &[(&str, &str)] = &[
         "$see=faces|wire|vertices|edges",
         "any faces hide; nothing hides; one convex solid from its vertices, or its edges",
     ),
-    ("$hidden=erased|dotted|dashed|shown", "what becomes of hidden lines"),
+    ("$hidden=erased|dotted|dashed|shown|pen|pen,NUMBER", "what becomes of hidden lines"),
     ("$seams=on|off", "whether the lines are drawn where faces pass through each other"),
     ("$blocks=separate|merged", "whether blocks that touch are drawn as one shape"),
     ("$crease=DEGREES", "leave out edges between faces that bend less; 0 draws every edge"),
     ("$page=WIDTHxHEIGHT", "size of the sheet in mm"),
     ("$margin=MM", "what stays free on each side of the sheet"),
     ("$fit=on|off", "scale a plan to the page, or draw it at true size"),
+    ("$order=auto|greedy|exact", "how the moves between strokes are chosen"),
+    ("$cycle=on|off", "whether the pen returns to where it began"),
+    (
+        "$effort=NUMBER",
+        "work to improve the order of many parts, for each pen; 0 takes the nearest next",
+    ),
     ("$model", "size of the model against the limits"),
     ("$clear", "forget the model"),
     (
@@ -380,15 +422,7 @@ impl PlotOption {
                     return Err(Refusal::NotAChoice { choices: "faces, wire, vertices or edges" });
                 }
             }),
-            "hidden" => Self::Hidden(match value {
-                "erased" => HiddenLines::Erased,
-                "dotted" => HiddenLines::Dotted,
-                "dashed" => HiddenLines::Dashed,
-                "shown" => HiddenLines::Shown,
-                _ => {
-                    return Err(Refusal::NotAChoice { choices: "erased, dotted, dashed or shown" });
-                }
-            }),
+            "hidden" => Self::Hidden(HiddenLines::parse(value)?),
             "page" => {
                 let (width, height) = value.split_once(['x', 'X']).ok_or(Refusal::NotAPage)?;
                 Self::Page { width: positive(width)?, height: positive(height)? }
@@ -402,6 +436,16 @@ impl PlotOption {
                 Self::Margin(margin)
             }
             "fit" => Self::Fit(on_or_off(value)?),
+            "order" => Self::Order(match value {
+                "auto" => order::Method::Auto,
+                "greedy" => order::Method::Greedy,
+                "exact" => order::Method::Exact,
+                _ => return Err(Refusal::NotAChoice { choices: "auto, greedy or exact" }),
+            }),
+            "cycle" => Self::Cycle(on_or_off(value)?),
+            "effort" => {
+                Self::Effort(u32::try_from(whole(value)?).map_err(|_| Refusal::NumberOutOfRange)?)
+            }
             "seams" => Self::Seams(on_or_off(value)?),
             "blocks" => Self::MergedBlocks(match value {
                 "merged" => true,

@@ -1,0 +1,98 @@
+//! No stretch of paper is inked twice, and none is lost: against every pair of lines, one by one.
+
+use penup::drawing::{Line, LineType, PagePoint, organise};
+use penup::stage::{Undisturbed, items_mut};
+use proptest::prelude::*;
+
+/// A line of a pen with its line type code: 0 full, 1 dotted, 2 dashed.
+type Drawn = ((i64, i64), (i64, i64), u8, u8);
+
+fn organised(lines: &[Drawn]) -> Vec<Drawn> {
+    let mut words = vec![0u64; 4000];
+    let point = |(x, y): (i64, i64)| PagePoint { x: x as i32, y: y as i32 };
+    let types = [LineType::Full, LineType::Dotted, LineType::Dashed];
+    let packed: Vec<Line> = lines
+        .iter()
+        .map(|(from, to, code, pen)| {
+            Line::new(point(*from), point(*to), types[usize::from(*code)], *pen)
+        })
+        .collect();
+    items_mut(&mut words, lines.len()).expect("room").copy_from_slice(&packed);
+    let stored = organise(&mut words, lines.len(), &mut Undisturbed).expect("room");
+    let (drawing, _) = stored.split(&mut words).expect("the same memory");
+    let at = |number: u16| {
+        let point = drawing.points[usize::from(number)];
+        (i64::from(point.x), i64::from(point.y))
+    };
+    let segments = drawing.segments.iter();
+    segments.map(|s| (at(s.from), at(s.to), s.line_type_code, s.pen)).collect()
+}
+
+/// Where a place lies along a line, in units of its length squared; `None` if it is beside it.
+fn along(place: (i64, i64), (from, to, ..): &Drawn) -> Option<i64> {
+    let (d, w) = ((to.0 - from.0, to.1 - from.1), (place.0 - from.0, place.1 - from.1));
+    (d.0 * w.1 == d.1 * w.0).then_some(d.0 * w.0 + d.1 * w.1)
+}
+
+/// The stretch of `line` that `other` covers, from 0 to the square of its length; `None` if no length.
+fn covered(line: &Drawn, other: &Drawn) -> Option<(i64, i64)> {
+    let whole = along(line.1, line)?;
+    let (a, b) = (along(other.0, line)?, along(other.1, line)?);
+    let (from, to) = (a.min(b).max(0), a.max(b).min(whole));
+    (from < to && line.3 == other.3).then_some((from, to))
+}
+
+fn drawn() -> impl Strategy<Value = Drawn> {
+    // Ten steps apart, so that no points are made one; few slopes, so that many lie in line.
+    let place = || (0i64..7, 0i64..7).prop_map(|(x, y)| (10 * x, 10 * y));
+    let slope = prop_oneof![Just((1, 0)), Just((0, 1)), Just((1, 1)), Just((2, -1)), Just((3, 2))];
+    let sloped = (place(), slope, 1i64..6, any::<bool>()).prop_map(|(from, (dx, dy), by, back)| {
+        let to = (from.0 + 10 * dx * by, from.1 + 10 * dy * by);
+        if back { (to, from) } else { (from, to) }
+    });
+    let any = (place(), place()).prop_filter("a length", |(from, to)| from != to);
+    (prop_oneof![4 => sloped, 1 => any], 0u8..3, 0u8..2)
+        .prop_map(|((from, to), code, pen)| (from, to, code, pen))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(2000))]
+
+    #[test]
+    fn every_stretch_is_drawn_once(lines in prop::collection::vec(drawn(), 1..60)) {
+        let found = organised(&lines);
+        for (at, segment) in found.iter().enumerate() {
+            for other in &found[at + 1..] {
+                prop_assert_eq!(covered(segment, other), None, "{:?} {:?}", segment, other);
+            }
+        }
+        for line in &lines {
+            // Between the ends of all that lies on it, each stretch is drawn as the best of those that want it.
+            let on_it = || lines.iter().chain(&found);
+            let mut cuts: Vec<i64> =
+                on_it().filter_map(|other| covered(line, other)).flat_map(|(a, b)| [a, b]).collect();
+            cuts.sort_unstable();
+            for pair in cuts.windows(2).filter(|pair| pair[0] < pair[1]) {
+                let best = |of: &[Drawn]| {
+                    of.iter()
+                        .filter(|other| {
+                            covered(line, other).is_some_and(|(a, b)| a <= pair[0] && pair[1] <= b)
+                        })
+                        .map(|other| other.2)
+                        .min()
+                };
+                prop_assert_eq!(best(&found), best(&lines), "{:?} {:?}", line, pair);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_long_line_keeps_what_a_crossing_full_one_leaves() {
+    let dotted = ((0, 0), (100, 50), 1, 0);
+    let full = ((40, 20), (60, 30), 0, 0);
+    let mut found = organised(&[dotted, full]);
+    found.sort_unstable_by_key(|line| line.0.min(line.1));
+    let ends = found.iter().map(|(a, b, code, _)| (*a.min(b), *a.max(b), *code));
+    assert!(ends.eq([((0, 0), (40, 20), 1), ((40, 20), (60, 30), 0), ((60, 30), (100, 50), 1)]));
+}

@@ -1,0 +1,197 @@
+//! No stretch of paper is inked twice by one pen: collinear segments that overlap are drawn once.
+//!
+//! Segments are sorted by pen, by the straight line that they lie on, then full before dotted before dashed, then by
+//! where they begin. Each is then cut to what those before it in that order leave free. All is exact on
+//! the points of the page, and every cut is at a point that another segment has, so no point is new.
+
+use super::PagePoint;
+use crate::stage::{Attention, OutOfScratch, StageError, heap_sort_by_key};
+use core::cmp::Ordering;
+
+/// A segment on its way to the drawing: the numbers of its points, line type and pen, a slope.
+pub(super) type Loose = [u32; 3];
+
+/// Which point comes first along a line: the left one, or the lower of a vertical line.
+type Place = (i32, i32);
+
+/// What a segment is sorted by.
+struct Key {
+    pen: u32,
+    slope: u32,
+    from: Place,
+    to: Place,
+    line_type: u32,
+}
+
+impl Key {
+    fn of(segment: &Loose, points: &[PagePoint]) -> Self {
+        Self {
+            pen: segment[1] & 0xFF,
+            slope: segment[2],
+            from: End::first(segment, points).place,
+            to: End::second(segment, points).place,
+            line_type: segment[1] >> 8,
+        }
+    }
+
+    /// Each within ±2^21.
+    fn direction(&self) -> (i64, i64) {
+        (
+            i64::from(self.to.0) - i64::from(self.from.0),
+            i64::from(self.to.1) - i64::from(self.from.1),
+        )
+    }
+
+    /// The same for parallel segments; mostly another for others.
+    fn slope(&self) -> u32 {
+        let (dx, dy) = self.direction();
+        if dx >= dy.abs() {
+            (((dy << 28) / dx.max(1)) + (1 << 28)) as u32
+        } else {
+            1 << 31 | ((dx << 28) / dy) as u32 & 0x7FFF_FFFF
+        }
+    }
+
+    /// Pen, direction and distance from the origin.
+    fn compare_line(&self, other: &Self) -> Ordering {
+        let ((ax, ay), (bx, by)) = (self.direction(), other.direction());
+        let fast = self.pen.cmp(&other.pen).then(self.slope.cmp(&other.slope));
+        fast.then_with(|| (ay * bx).cmp(&(by * ax))).then_with(|| {
+            // Twice the area with the origin, below 2^43, by the length along the longer axis.
+            let area = |key: &Self, (dx, dy): (i64, i64)| {
+                dx * i64::from(key.from.1) - dy * i64::from(key.from.0)
+            };
+            let (long_a, long_b) = if ax >= ay.abs() { (ax, bx) } else { (ay.abs(), by.abs()) };
+            let a = i128::from(area(self, (ax, ay))) * i128::from(long_b);
+            a.cmp(&(i128::from(area(other, (bx, by))) * i128::from(long_a)))
+        })
+    }
+}
+
+impl Ord for Key {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.compare_line(other)
+            .then_with(|| self.line_type.cmp(&other.line_type))
+            .then_with(|| self.from.cmp(&other.from))
+            .then_with(|| self.to.cmp(&other.to))
+    }
+}
+impl PartialOrd for Key {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+impl PartialEq for Key {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+impl Eq for Key {}
+
+/// These take some 100,000 instructions.
+const SEGMENTS_BETWEEN_CHECKS: usize = 64;
+
+/// Cuts the first `count` of `segments` until none overlap, and returns how many there are then. More
+/// than before only where a full line lies inside a dotted or dashed one.
+///
+/// # Errors
+/// [`StageError::Scratch`] if those do not fit.
+pub(super) fn ink_once(
+    segments: &mut [Loose],
+    count: usize,
+    points: &[PagePoint],
+    attention: &mut dyn Attention,
+) -> Result<usize, StageError> {
+    let full = OutOfScratch {
+        needed: size_of_val(segments) + size_of::<Loose>(),
+        available: size_of_val(segments),
+    };
+    let (sorted, _) = segments.split_at_mut_checked(count).ok_or(full)?;
+    for segment in &mut *sorted {
+        segment[2] = Key::of(segment, points).slope();
+    }
+    attention.check()?;
+    heap_sort_by_key(sorted, |segment| Key::of(segment, points));
+
+    // Pieces stand at the front; those that find no room there, from `count` on. Both are runs of each line type,
+    // sorted and disjoint: `starts` is where those of the line in hand begin.
+    let mut ends = [0, count];
+    let mut starts = [ends; TYPES];
+    let mut line_type = 0;
+    let mut last: Option<Key> = None;
+    for read in 0..count {
+        if read % SEGMENTS_BETWEEN_CHECKS == 0 {
+            attention.check()?;
+        }
+        let segment = segments[read];
+        let key = Key::of(&segment, points);
+        if last.as_ref().is_none_or(|last| last.compare_line(&key) != Ordering::Equal) {
+            (starts, line_type) = ([ends; TYPES], 0);
+        }
+        while line_type < (key.line_type as usize).min(TYPES - 1) {
+            line_type += 1;
+            starts[line_type] = ends;
+        }
+        let (mut from, to) = (End::first(&segment, points), End::second(&segment, points));
+        while from.place < to.place {
+            // How far this place is covered; else where the next cover begins.
+            let (mut reach, mut next) = (from, to);
+            for (run, start) in starts.iter().enumerate().take(line_type + 1) {
+                let limit = if run == line_type { ends } else { starts[run + 1] };
+                for side in 0..2 {
+                    let pieces = segments.get(start[side]..limit[side]).unwrap_or(&[]);
+                    let begun = |piece: &Loose| End::first(piece, points).place <= from.place;
+                    let after = pieces.partition_point(begun);
+                    if let Some(piece) = after.checked_sub(1).and_then(|at| pieces.get(at)) {
+                        reach = reach.max(End::second(piece, points));
+                    }
+                    if let Some(piece) = pieces.get(after) {
+                        next = next.min(End::first(piece, points));
+                    }
+                }
+            }
+            if reach.place > from.place {
+                from = reach;
+                continue;
+            }
+            let piece = [from.number << 16 | next.number, segment[1], segment[2]];
+            let at = &mut ends[usize::from(ends[0] > read)];
+            *segments.get_mut(*at).ok_or(full)? = piece;
+            *at += 1;
+            from = next;
+        }
+        last = Some(key);
+    }
+    segments.copy_within(count..ends[1], ends[0]);
+    Ok(ends[0] + ends[1] - count)
+}
+
+/// Full, dotted, dashed.
+const TYPES: usize = 3;
+
+/// An end of a segment, with its point's number.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct End {
+    place: Place,
+    number: u32,
+}
+
+impl End {
+    fn both(segment: &Loose, points: &[PagePoint]) -> [Self; 2] {
+        [segment[0] >> 16, segment[0] & 0xFFFF].map(|number| {
+            let place = points.get(number as usize).map_or((0, 0), |point| (point.x, point.y));
+            Self { place, number }
+        })
+    }
+
+    /// That which comes first along the line.
+    fn first(segment: &Loose, points: &[PagePoint]) -> Self {
+        let [a, b] = Self::both(segment, points);
+        a.min(b)
+    }
+
+    fn second(segment: &Loose, points: &[PagePoint]) -> Self {
+        let [a, b] = Self::both(segment, points);
+        a.max(b)
+    }
+}
