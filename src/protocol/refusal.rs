@@ -78,6 +78,8 @@ pub enum Refusal {
     TooManyLines,
     /// The user gave the job up while it was computed.
     Aborted,
+    /// The flash does not keep it.
+    NotKept,
 }
 
 /// Each `error:N` and what it means, as `docs/protocol.md` lists them.
@@ -123,6 +125,7 @@ pub const MEANINGS: &[(u16, &str)] = &[
     (150, "setting out of range"),
     (151, "setting conflicts with another"),
     (152, "move too long"),
+    (160, "in force, but not kept: the flash is worn out"),
 ];
 
 impl Refusal {
@@ -176,6 +179,7 @@ impl Refusal {
             Self::Machine(MachineError::MoveTooLong { .. }) => 152,
             Self::DrawingTooLarge(_) => 140,
             Self::Aborted => 141,
+            Self::NotKept => 160,
             Self::TooManyLines => 142,
         }
     }
@@ -255,6 +259,7 @@ impl fmt::Display for Refusal {
                 formatter.write_str("a drawing has at most 32768 lines: send a smaller model")
             }
             Self::Aborted => formatter.write_str("the job was given up"),
+            Self::NotKept => formatter.write_str("in force until power is lost: the flash does not keep it"),
         }
     }
 }

@@ -47,6 +47,13 @@ pub struct PinChange {
     pub at: Duration,
 }
 
+impl PinChange {
+    /// Whether it is a rising edge that steps.
+    pub fn is_step(self) -> bool {
+        self.high && matches!(self.pin, Pin::StepX | Pin::StepY)
+    }
+}
+
 /// Something that the machine did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MachineEvent {
