@@ -12,7 +12,7 @@ pub type Millimetres = ::fixed::types::I16F16;
 /// A number as the user wrote it: `mantissa` × 10^`exponent`, exactly.
 ///
 /// |mantissa| < 10^18; further digits of a longer text are cut off (they are below 10^-17 of the value).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Decimal {
     mantissa: i64,
     exponent: i16,
@@ -182,6 +182,7 @@ pub fn shift_right_rounding(value: i32, bits: u32) -> i32 {
 }
 
 /// Divides, rounding half away from zero. `divisor` > 0.
+#[inline(never)] // 128 bits by 128 are long.
 pub fn divide_rounding(dividend: i128, divisor: i128) -> i128 {
     let half = divisor / 2;
     if dividend < 0 { -((half - dividend) / divisor) } else { (dividend + half) / divisor }

@@ -195,6 +195,7 @@ pub fn are_coplanar(points: [[i32; 3]; 4]) -> bool {
 /// use penup::geometry::{Projection, Vertex, page_side_doubt};
 /// let [a, b, c] = [0, 100, 200].map(|x| Vertex::new(x, 0, 1));
 /// assert_eq!(page_side_doubt(Projection::Parallel, a, b, c), 301);
+/// assert_eq!(page_side_doubt(Projection::Parallel, b, c, a), 201);
 /// ```
 pub fn page_side_doubt(projection: Projection, a: Vertex, b: Vertex, c: Vertex) -> i64 {
     match projection {

@@ -26,6 +26,55 @@ pub enum Command {
     Preview(PreviewArgs),
     /// Turn the traced polylines of a plan into few B-spline control points
     Fit(FitArgs),
+    /// Harrison's tape of single steps: half a byte each
+    #[command(subcommand)]
+    Tape(TapeCommand),
+}
+
+/// What to do with a tape.
+#[derive(Debug, Subcommand)]
+pub enum TapeCommand {
+    /// Record the job of an OBJ file as a tape
+    Encode(TapeEncodeArgs),
+    /// Print the instructions of a tape
+    Decode {
+        /// The tape
+        #[arg(value_name = "FILE")]
+        file: PathBuf,
+    },
+    /// Show what a tape draws
+    Show(TapeShowArgs),
+}
+
+/// Options of `penup tape encode`.
+#[derive(Debug, Args)]
+pub struct TapeEncodeArgs {
+    /// The OBJ file
+    #[arg(value_name = "FILE")]
+    pub file: PathBuf,
+    /// The tape to write [default: beside the file, with the ending .tape]
+    #[arg(short, long, value_name = "FILE", help_heading = "Output")]
+    pub output: Option<PathBuf>,
+    /// How to see and place it.
+    #[command(flatten)]
+    pub view: ViewArgs,
+}
+
+/// Options of `penup tape show`.
+#[derive(Debug, Args)]
+pub struct TapeShowArgs {
+    /// The tape
+    #[arg(value_name = "FILE")]
+    pub file: PathBuf,
+    /// A4, A3, Letter, or width x height in mm
+    #[arg(long, value_name = "PAGE", value_parser = page, default_value = "A4")]
+    pub page: Page,
+    /// Steps in a millimetre
+    #[arg(long, value_name = "N", default_value = "80")]
+    pub steps: f64,
+    /// Where the pictures go.
+    #[command(flatten)]
+    pub pictures: PictureArgs,
 }
 
 /// Options of `penup plot`.
@@ -325,7 +374,7 @@ mod tests {
         let cli = Cli::try_parse_from(line).map_err(|error| error.to_string())?;
         match cli.command {
             Command::Preview(args) => Ok(args.view.settings()),
-            Command::Plot(_) | Command::Fit(_) => Err("the wrong command".to_owned()),
+            _ => Err("the wrong command".to_owned()),
         }
     }
 

@@ -30,6 +30,16 @@ pub enum Error {
         /// Why.
         source: crate::fit::FitError,
     },
+    /// Four holes of a tape that are no instruction.
+    #[error("{file}: row {row} of the tape holds {code}, which is no instruction")]
+    Tape {
+        /// As the user named it.
+        file: String,
+        /// The row, from 0.
+        row: u32,
+        /// 12 to 15.
+        code: u8,
+    },
     /// A file must not command the machine.
     #[error("{}:{}: a file cannot hold commands for the plotter\n    {}", origin.file, origin.line, origin.text)]
     CommandInFile {

@@ -5,6 +5,7 @@ use crate::protocol::{
     SEE, UP, VIEW_AUTO, setting,
 };
 use crate::source::JobLine;
+use crate::watch::PenRuns;
 use serde::Serialize;
 
 /// A point of the page in mm: x right, y up from the lower left corner.
@@ -28,6 +29,9 @@ pub struct JobResult {
     pub steps: u64,
     /// How long the stages took.
     pub timings_ms: Timings,
+    /// What the pins did, for the picture.
+    #[serde(skip)]
+    pub pen: PenRuns,
 }
 
 /// Milliseconds.
@@ -169,6 +173,7 @@ mod tests {
             efficiency: 1.0,
             steps: 1600,
             timings_ms: Timings { view: 0.5, visibility: 1.5, order: 2.0 },
+            pen: PenRuns::default(),
         };
         assert_eq!(
             serde_json::to_string(&result).expect("numbers are finite"),

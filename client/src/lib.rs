@@ -4,6 +4,7 @@
 //! [`job`] joins both into lines, [`sender`] sends them over a [`link`] and follows the plotter's
 //! replies ([`protocol`], [`progress`]); behind the link are the plotters of [`machines`], an
 //! [`emulator`] and the [`preview`] among them; [`picture`] shows what the pen did, [`output`] writes it.
+//! [`tape`] keeps a job as single steps.
 
 pub mod cli;
 pub mod emulator;
@@ -20,5 +21,7 @@ pub mod protocol;
 pub mod run;
 pub mod sender;
 pub mod source;
+pub mod tape;
 
 pub mod fit;
+pub mod watch;

@@ -1,14 +1,11 @@
 //! The plotters that are no hardware: an emulated board, and the library in this process.
 
-use crate::emulator::{
-    EmulatedBoard, Emulator, EmulatorError, Machine, MachineEvent, MachineEventKind, Options, Pico,
-    image_path,
-};
+use crate::emulator::{EmulatedBoard, Emulator, EmulatorError, Options, Pico, image_path};
 use crate::error::Error;
 use crate::job::JobResult;
 use crate::link::Link;
-use crate::picture::Run;
 use crate::preview::InMemory;
+use crate::watch::{PenRuns, PenWatch};
 use std::io;
 use std::time::Duration;
 
@@ -30,15 +27,6 @@ pub trait WatchedPlotter: Link {
     fn pen_runs(&mut self) -> Result<PenRuns, Error>;
 }
 
-/// What the pins did.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PenRuns {
-    /// Every way of the pen, in mm.
-    pub runs: Vec<Run>,
-    /// The length of a step, in mm.
-    pub step: f64,
-}
-
 /// The plotter's library on this computer.
 pub trait PreviewPlotter: Link {
     /// What came of the last plot command, with the best time of each stage in all of them
@@ -47,6 +35,12 @@ pub trait PreviewPlotter: Link {
     /// # Errors
     /// There was none.
     fn result(&mut self) -> Result<JobResult, Error>;
+
+    /// The job of the model that was sent, as a tape ([`crate::tape`]).
+    ///
+    /// # Errors
+    /// What the plotter refuses.
+    fn tape(&mut self) -> Result<Vec<u8>, Error>;
 }
 
 /// Starts the emulated `board`.
@@ -66,8 +60,7 @@ pub fn in_memory() -> Box<dyn PreviewPlotter> {
 struct Emulated {
     board: Board,
     emulator: Box<dyn EmulatedBoard>,
-    machine: Machine,
-    runs: Vec<Run>,
+    pen: PenWatch,
 }
 
 /// The firmware's default, in mm: see setting `$100`.
@@ -77,34 +70,7 @@ impl Emulated {
     fn start(board: Board) -> Result<Self, Error> {
         let fault = |error: EmulatorError| board.error(&error);
         let emulator = board.boot().map_err(fault)?;
-        let start = Run { pen_down: false, points: vec![[0.0; 2]] };
-        Ok(Self { board, emulator, machine: Machine::default(), runs: vec![start] })
-    }
-
-    /// Takes in what the pins did since last asked.
-    fn follow_pins(&mut self) -> Result<(), Error> {
-        let changes = self.emulator.pin_changes().map_err(|error| self.board.error(&error))?;
-        for change in changes {
-            let event = self.machine.change(change);
-            self.follow(event);
-        }
-        Ok(())
-    }
-
-    fn follow(&mut self, event: Option<MachineEvent>) {
-        let Some(run) = self.runs.last_mut() else { return };
-        let Some(&[x, y]) = run.points.last() else { return };
-        match event.map(|event| event.kind) {
-            Some(MachineEventKind::Step { x: dx, y: dy }) => {
-                // Whole steps, so that no error adds up.
-                let moved = |from: f64, by: i8| ((from / STEP).round() + f64::from(by)) * STEP;
-                run.points.push([moved(x, dx), moved(y, dy)]);
-            }
-            Some(MachineEventKind::Pen { down }) if down != run.pen_down => {
-                self.runs.push(Run { pen_down: down, points: vec![[x, y]] });
-            }
-            _ => {}
-        }
+        Ok(Self { board, emulator, pen: PenWatch::new(STEP) })
     }
 }
 
@@ -146,10 +112,10 @@ impl Link for Emulated {
 
 impl WatchedPlotter for Emulated {
     fn pen_runs(&mut self) -> Result<PenRuns, Error> {
-        self.follow_pins()?;
-        let last = self.machine.last();
-        self.follow(last);
-        let drawn = self.runs.iter().filter(|run| run.points.len() > 1).cloned();
-        Ok(PenRuns { runs: drawn.collect(), step: STEP })
+        let changes = self.emulator.pin_changes().map_err(|error| self.board.error(&error))?;
+        for change in changes {
+            self.pen.change(change);
+        }
+        Ok(self.pen.runs())
     }
 }

@@ -3,6 +3,7 @@
 use clap::Parser;
 use penup_client::cli::Cli;
 use penup_client::run::run;
+use std::io::Write;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -18,7 +19,8 @@ fn main() -> ExitCode {
     });
     match run(&cli, &INTERRUPT) {
         Ok(sentence) => {
-            println!("{sentence}");
+            // Whoever listened may have heard enough.
+            let _ = writeln!(std::io::stdout(), "{sentence}");
             ExitCode::SUCCESS
         }
         Err(error) => {

@@ -8,6 +8,7 @@ use crate::job::{JobResult, Lengths, Timings};
 use crate::link::Link;
 use crate::machines::PreviewPlotter;
 use crate::protocol::PLOT;
+use crate::watch::PenWatch;
 use penup::boards::host::{Change, HostBoard, QUEUE_LENGTH, lend_memory};
 use penup::geometry::{Projection, Vertex};
 use penup::machine::{Path, PulserState, Setting, Target};
@@ -24,6 +25,7 @@ pub struct InMemory {
     board: HostBoard<'static>,
     plotter: Plotter<'static>,
     steps: u64,
+    pen: Option<PenWatch>,
 }
 
 impl InMemory {
@@ -35,14 +37,18 @@ impl InMemory {
         let mut board = HostBoard::new(queue, pins);
         let plotter = Plotter::new(lend_memory(), pins);
         plotter.greet(&mut board);
-        Self { board, plotter, steps: 0 }
+        Self { board, plotter, steps: 0, pen: None }
+    }
+
+    fn steps_per_mm(&self) -> [f64; 2] {
+        let settings = self.plotter.machine().settings();
+        [Setting::StepsPerMmX, Setting::StepsPerMmY].map(|s| settings.get(s).to_num::<f64>())
     }
 
     /// Polls until every byte is answered; a plot that began goes on in [`Link::receive`].
     fn answer(&mut self) {
-        while !self.board.has_read_all() {
-            self.plotter.poll(&mut self.board);
-        }
+        // What waits for the machine goes on in `receive`.
+        while !self.board.has_read_all() && self.plotter.poll(&mut self.board) {}
     }
 }
 
@@ -56,6 +62,8 @@ impl Link for InMemory {
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
         if bytes.starts_with(PLOT.as_bytes()) {
             self.steps = 0;
+            let step = 1.0 / self.steps_per_mm()[0];
+            self.pen.get_or_insert_with(|| PenWatch::new(step)).begin_again();
         }
         self.board.receive(bytes);
         self.answer();
@@ -70,6 +78,9 @@ impl Link for InMemory {
         }
         let changes = self.board.trace().take_changes();
         self.steps += count_steps(&changes);
+        if let Some(pen) = &mut self.pen {
+            changes.iter().for_each(|change| pen.change(change.into()));
+        }
         let sent = self.board.take_sent();
         let (now, later) = sent.split_at(sent.len().min(buffer.len()));
         buffer[..now.len()].copy_from_slice(now);
@@ -87,18 +98,20 @@ fn count_steps(changes: &[penup::boards::host::Stamped]) -> u64 {
 }
 
 impl PreviewPlotter for InMemory {
+    fn tape(&mut self) -> Result<Vec<u8>, Error> {
+        let computed = self.plotter.compute(&mut StopWatch::default(), &mut Segments::default());
+        computed.map_err(refused)?;
+        let settings = *self.plotter.machine().settings();
+        let tape = crate::tape::record(settings, &mut self.plotter.strokes());
+        tape.map_err(|error| refused(penup::protocol::Refusal::Machine(error)))
+    }
+
     fn result(&mut self) -> Result<JobResult, Error> {
         let mut watch = StopWatch::default();
         let mut segments = Segments::default();
-        let refused = |refusal: penup::protocol::Refusal| Error::Board {
-            board: "host".to_owned(),
-            reason: refusal.to_string(),
-        };
         self.plotter.compute(&mut watch, &mut segments).map_err(refused)?;
         let timings_ms = watch.stop();
-        let settings = self.plotter.machine().settings();
-        let steps =
-            [Setting::StepsPerMmX, Setting::StepsPerMmY].map(|s| settings.get(s).to_num::<f64>());
+        let steps = self.steps_per_mm();
         let mut strokes: Vec<Vec<[f64; 2]>> = Vec::new();
         let mut path = self.plotter.strokes();
         while let Some(Target { point, ink }) = path.next_target() {
@@ -117,8 +130,14 @@ impl PreviewPlotter for InMemory {
             efficiency: lengths.efficiency(),
             steps: core::mem::take(&mut self.steps),
             timings_ms,
+            pen: self.pen.as_mut().map(PenWatch::runs).unwrap_or_default(),
         })
     }
+}
+
+/// What the library refuses on this computer.
+fn refused(refusal: impl std::fmt::Display) -> Error {
+    Error::Board { board: "host".to_owned(), reason: refusal.to_string() }
 }
 
 /// How long each stage takes.

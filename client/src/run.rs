@@ -1,6 +1,9 @@
 //! The commands.
 
-use crate::cli::{Cli, Command, FitArgs, PictureArgs, PlotArgs, PreviewArgs};
+use crate::cli::{
+    Cli, Command, FitArgs, PictureArgs, PlotArgs, PreviewArgs, TapeCommand, TapeEncodeArgs,
+    TapeShowArgs,
+};
 use crate::error::Error;
 use crate::fit::fit_obj;
 use crate::job::{Lengths, job_lines};
@@ -11,6 +14,8 @@ use crate::picture::{self, Picture};
 use crate::progress::{Bar, Progress};
 use crate::sender::{Patience, Sender};
 use crate::source::{JobLine, read_file};
+use crate::tape;
+use penup::step::tape::BadCode;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
@@ -25,6 +30,11 @@ pub fn run(cli: &Cli, interrupt: &AtomicBool) -> Result<String, Error> {
         Command::Plot(args) => plot(args, interrupt),
         Command::Preview(args) => preview(args, interrupt),
         Command::Fit(args) => fit(args),
+        Command::Tape(TapeCommand::Encode(args)) => encode_tape(args, interrupt),
+        Command::Tape(TapeCommand::Decode { file }) => {
+            Ok(tape::decode(&read_tape(file)?).map_err(damaged(file))?.trim_end().to_owned())
+        }
+        Command::Tape(TapeCommand::Show(args)) => show_tape(args),
     }
 }
 
@@ -59,7 +69,8 @@ fn preview(args: &PreviewArgs, interrupt: &AtomicBool) -> Result<String, Error> 
     let result = plotter.result()?;
     drop(bar);
     let outputs = Outputs::of(&args.pictures, args.json.as_deref());
-    let picture = Picture::of_strokes(settings.page, &result.strokes);
+    let picture =
+        Picture { page: settings.page, runs: result.pen.runs.clone(), step: result.pen.step };
     let mut files = write_pictures(&picture, &outputs)?;
     if let Some(path) = &outputs.json {
         let text = serde_json::to_string(&result).map_err(|error| Error::Write {
@@ -84,6 +95,38 @@ fn fit(args: &FitArgs) -> Result<String, Error> {
     let output = args.output.clone().unwrap_or_else(beside);
     output::write(&output, fitted.obj.as_bytes())?;
     Ok(format!("{}: {}", output.display(), fitted.saving))
+}
+
+fn encode_tape(args: &TapeEncodeArgs, interrupt: &AtomicBool) -> Result<String, Error> {
+    let lines = job_lines(read_file(&args.file)?, &args.view.settings());
+    let mut plotter = machines::in_memory();
+    {
+        let mut bar = Bar::default();
+        let mut sender = Sender::open(plotter.as_mut(), Patience::default(), interrupt)?;
+        sender.stream(&lines, &mut bar)?;
+    }
+    let tape = plotter.tape()?;
+    let output = args.output.clone().unwrap_or_else(|| args.file.with_extension("tape"));
+    output::write(&output, &tape)?;
+    Ok(format!("{}: {} bytes", output.display(), tape.len()))
+}
+
+fn show_tape(args: &TapeShowArgs) -> Result<String, Error> {
+    let tape = read_tape(&args.file)?;
+    let shown = tape::show(&tape, args.page, args.steps);
+    let (picture, moves) = shown.map_err(damaged(&args.file))?;
+    let outputs = Outputs::of(&args.pictures, None);
+    let files = write_pictures(&picture, &outputs)?;
+    let names: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
+    Ok(format!("{}: {moves} moves from {} bytes", names.join(", "), tape.len()))
+}
+
+fn read_tape(file: &Path) -> Result<Vec<u8>, Error> {
+    std::fs::read(file).map_err(|source| Error::File { file: file.display().to_string(), source })
+}
+
+fn damaged(file: &Path) -> impl Fn(BadCode) -> Error {
+    move |BadCode { row, code }| Error::Tape { file: file.display().to_string(), row, code }
 }
 
 /// Sends a whole job over `link` and draws it `times` times.

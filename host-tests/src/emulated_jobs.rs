@@ -25,7 +25,8 @@ pub fn bench_like(board: Board) -> Bench {
 fn on_the_host(board: Board, lines: &[String]) -> Vec<MachineEventKind> {
     let mut bench = bench_like(board);
     for line in lines {
-        assert_eq!(bench.say(&format!("{line}\n")), "ok\n", "{line}");
+        let answer = bench.say(&format!("{line}\n"));
+        assert_eq!(answer.lines().last(), Some("ok"), "{line}: {answer}");
     }
     bench.finish();
     machine_events(&bench.board.trace().changes())
@@ -113,7 +114,11 @@ impl<E: EmulatedBoard + ?Sized> Line<E> {
 pub fn begin(board: Board, lines: &[String]) -> Result<Line, Box<dyn Error>> {
     let mut line = Line::open(board)?;
     for text in lines {
-        assert_eq!(line.ask(text)?, "ok", "{text}");
+        let mut answer = line.ask(text)?;
+        while answer.starts_with('[') {
+            answer = line.hear()?;
+        }
+        assert_eq!(answer, "ok", "{text}");
     }
     Ok(line)
 }

@@ -1,11 +1,10 @@
 //! Whole jobs on the board of plain memory, over its serial line.
 
-use penup::boards::host::{Change, HostBoard, QUEUE_LENGTH, Stamped, lend_memory};
+use penup::boards::host::{HostBoard, QUEUE_LENGTH, Stamped, lend_memory};
 use penup::machine::PulserState;
 use penup::motion::StepEvent;
 use penup::plotter::{Board, Lent, Plotter};
-use penup_client::emulator::{Machine, MachineEventKind, Pin, PinChange};
-use std::time::Duration;
+use penup_client::emulator::{Machine, MachineEventKind};
 
 /// A plotter of plain memory at the other end of a serial line.
 pub struct Bench {
@@ -68,21 +67,8 @@ impl Default for Bench {
 /// What the machine did, by the changes of its pins, in order.
 pub fn machine_events(changes: &[Stamped]) -> Vec<MachineEventKind> {
     let mut machine = Machine::default();
-    let mut events: Vec<_> = changes
-        .iter()
-        .filter_map(|Stamped { time, change }| {
-            let (pin, high) = match *change {
-                Change::StepX(high) => (Pin::StepX, high),
-                Change::StepY(high) => (Pin::StepY, high),
-                Change::UpX(high) => (Pin::DirX, high),
-                Change::UpY(high) => (Pin::DirY, high),
-                // Drivers are on while the pin is low.
-                Change::Enable(on) => (Pin::Enable, !on),
-                Change::Pen(height) => (Pin::Pen, height >= 64),
-            };
-            machine.change(PinChange { pin, high, at: Duration::from_nanos(time * 40) })
-        })
-        .collect();
+    let mut events: Vec<_> =
+        changes.iter().filter_map(|change| machine.change(change.into())).collect();
     events.extend(machine.last());
     events.iter().map(|event| event.kind).collect()
 }

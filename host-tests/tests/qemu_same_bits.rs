@@ -30,6 +30,18 @@ fn a_lattice_of_125_cubes_in_64_kilobytes() -> Result<(), Box<dyn Error>> {
 }
 
 #[test]
+fn a_structure_mirrored_twice_in_an_editing_session() -> Result<(), Box<dyn Error>> {
+    // Figure 4 of Cárdenas & Seeley, from a quarter.
+    compare(Lm3s6965, "structure.txt", &["$page=80x80", "$margin=5"])
+}
+
+#[test]
+fn curves_in_space_and_on_a_plan() -> Result<(), Box<dyn Error>> {
+    compare(Lm3s6965, "isobars.obj", &["$fit=on", "$page=60x60", "$margin=5"])?;
+    compare(Lm3s6965, "isobars.obj", &["$projection=isometric", "$page=60x60", "$margin=5"])
+}
+
+#[test]
 fn ctrl_x_stops_the_steps_raises_the_pen_and_knows_the_position() -> Result<(), Box<dyn Error>> {
     give_up(Lm3s6965)
 }

@@ -3,6 +3,7 @@
 // A test fails by panicking.
 #![allow(clippy::panic, clippy::expect_used)]
 
+use penup::machine::Path;
 use penup::plotter::Observer;
 use penup::protocol::Refusal;
 use penup::stage::Undisturbed;
@@ -210,4 +211,28 @@ fn faces_without_an_area_are_counted() {
         .say("v 0 0 0\nv 1 0 0\nv 2 0 0\nv 0 2 1\nv 1 0 0\nf 1 2 3\nf 1 3 4\nf 2 5 4\n$plot\n");
     assert!(said.contains("[MSG:2 faces have no area and are left out]\n"), "{said}");
     assert!(said.ends_with("ok\n"), "{said}");
+}
+
+#[test]
+fn an_eye_inside_sees_what_is_before_it_and_stays_on_the_page() {
+    for see in ["faces", "wire"] {
+        let mut bench = with_scene("lattice3", |_| true);
+        let view = "$eye=1.5,1.5,1.5\n$at=5,4,3\n$page=100x100\n$margin=10\n";
+        assert!(bench.say(&format!("{view}$see={see}\n$plot\n")).ends_with("ok\n"));
+        let steps = 80 * 10..=80 * 90;
+        let mut path = bench.plotter.strokes();
+        let mut targets = 0;
+        // Something is drawn within a tenth of the page about its middle, and nothing off the page.
+        let mut in_the_middle = 0;
+        while let Some(target) = path.next_target() {
+            let place = [target.point.x, target.point.y];
+            assert!(place.iter().all(|steps_of| steps.contains(steps_of)), "{place:?}");
+            targets += 1;
+            in_the_middle += i32::from(place.iter().all(|steps| (steps - 4000).abs() < 1500));
+        }
+        assert!(
+            targets > 40 && in_the_middle > 10,
+            "{targets} targets, {in_the_middle} in the middle"
+        );
+    }
 }

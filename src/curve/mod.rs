@@ -59,7 +59,7 @@ impl Knots<'_> {
     }
 
     /// How many the user listed; `None` if they are uniform.
-    fn count(&self) -> Option<usize> {
+    pub(crate) fn count(&self) -> Option<usize> {
         match self {
             Self::Uniform => None,
             Self::Listed(knots) => Some(knots.len()),

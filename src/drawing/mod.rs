@@ -9,6 +9,7 @@
 mod collect;
 mod page;
 mod title;
+mod window;
 
 pub use collect::{Line, OrganiseError, PEN_LIMIT, Stored, organise};
 pub use page::{Bounds, Page, PageError, PageMap, StepsPerMillimetre};

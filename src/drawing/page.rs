@@ -1,5 +1,6 @@
 //! The sheet: where on it the drawing goes, and the map from the image to steps.
 
+use super::window::Window;
 use super::{PAGE_LIMIT, PagePoint};
 use crate::fixed::{Millimetres, divide_rounding};
 use crate::geometry::{Projection, Vertex};
@@ -91,6 +92,7 @@ pub struct PageMap {
     a: [i64; 2],
     b: [i128; 2],
     k: u32,
+    window: Option<Window>,
 }
 
 /// The map's scale keeps this many bits; its unit is never finer than 2^-`FINEST`.
@@ -105,6 +107,28 @@ impl PageMap {
     #[inline(never)] // Its frame must not lie under the stages'.
     pub fn fit(bounds: &Bounds, page: &Page, steps: StepsPerMillimetre) -> Result<Self, PageError> {
         Self::fit_unit(bounds, Bounds::FRACTION_BITS, page, steps)
+    }
+
+    /// As [`PageMap::fit`], but what is farther than `field` from the middle of the image (in units of
+    /// 2^-[`Bounds::FRACTION_BITS`]) may fall off the page: what is nearly beside the eye is nearly endless.
+    ///
+    /// # Errors
+    /// [`PageError::NoRoom`], [`PageError::TooManySteps`].
+    pub fn fit_field(
+        bounds: &Bounds,
+        field: i64,
+        page: &Page,
+        steps: StepsPerMillimetre,
+    ) -> Result<Self, PageError> {
+        let limited = Bounds {
+            low: bounds.low.map(|low| low.clamp(-field, field)),
+            high: bounds.high.map(|high| high.clamp(-field, field)),
+        };
+        let mut map = Self::fit(&limited, page, steps)?;
+        if limited != *bounds {
+            map.window = Some(Window::new(page, steps));
+        }
+        Ok(map)
     }
 
     /// Scales a plan (bounds in units of 2^-`fraction_bits` mm) to the page like [`PageMap::fit`].
@@ -166,7 +190,7 @@ impl PageMap {
             let middle = i128::from(bounds.low[axis]) + i128::from(bounds.high[axis]);
             side / 2 - ((i128::from(a[axis]) * middle) >> (unit_bits + 1))
         });
-        Ok(Self { a, b, k: k as u32 })
+        Ok(Self { a, b, k: k as u32, window: None })
     }
 
     fn coarsen(&mut self, bits: u32) {
@@ -206,6 +230,7 @@ impl PageMap {
             b: [0, 1]
                 .map(|axis: usize| (moved[axis] * i128::from(bits[axis])) << fraction_bits >> 16),
             k: 16 + fraction_bits,
+            window: None,
         })
     }
 
@@ -235,25 +260,45 @@ impl PageMap {
             } else {
                 divide_rounding(sum << 8, i128::from(w) << self.k)
             };
-            const LIMIT: i128 = 1 << 30;
+            const LIMIT: i128 = 1 << 40;
             fine.clamp(-LIMIT, LIMIT) as i64
         })
     }
 
+    /// A stretch of the edge from `p` to `q` in steps; `None` if none of it is on the page.
+    pub fn stretch(
+        &self,
+        (p, q): (Vertex, Vertex),
+        [from, to]: [Along; 2],
+        projection: Projection,
+    ) -> Option<[PagePoint; 2]> {
+        let [from, to] = [from, to].map(|end| between(p, q, end, projection));
+        match &self.window {
+            None => Some([from, to].map(|[x, y, w]| self.point(x, y, w))),
+            Some(window) => window.clip([from, to].map(|[x, y, w]| self.fine(x, y, w))),
+        }
+    }
+
     /// The place `along` the edge from `p` to `q` in steps.
     pub fn along(&self, p: Vertex, q: Vertex, along: Along, projection: Projection) -> PagePoint {
-        // 31 bits of the ratio are 2^-10 steps of the longest edge that a page can hold.
-        let shift = (64 - along.denominator.leading_zeros()).saturating_sub(31);
-        let denominator = (along.denominator >> shift).max(1) as i64;
-        let numerator = ((along.numerator >> shift) as i64).min(denominator);
-        let between =
-            |p: i32, q: i32| i64::from(p) * (denominator - numerator) + i64::from(q) * numerator;
-        let w = match projection {
-            Projection::Perspective => between(p.z, q.z).max(1),
-            Projection::Parallel => denominator,
-        };
-        self.point(between(p.x, q.x), between(p.y, q.y), w)
+        let [x, y, w] = between(p, q, along, projection);
+        self.point(x, y, w)
     }
+}
+
+/// The place `along` the edge from `p` to `q`, homogeneous.
+fn between(p: Vertex, q: Vertex, along: Along, projection: Projection) -> [i64; 3] {
+    // 31 bits of the ratio are 2^-10 steps of the longest edge that a page can hold.
+    let shift = (64 - along.denominator.leading_zeros()).saturating_sub(31);
+    let denominator = (along.denominator >> shift).max(1) as i64;
+    let numerator = ((along.numerator >> shift) as i64).min(denominator);
+    let between =
+        |p: i32, q: i32| i64::from(p) * (denominator - numerator) + i64::from(q) * numerator;
+    let w = match projection {
+        Projection::Perspective => between(p.z, q.z).max(1),
+        Projection::Parallel => denominator,
+    };
+    [between(p.x, q.x), between(p.y, q.y), w]
 }
 
 impl Page {

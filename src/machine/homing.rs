@@ -1,8 +1,10 @@
 //! Finding the corner of the travel: each axis runs to its switch, backs off, comes again slowly,
-//! backs off for good. There its position is 0.
+//! backs off for good. There its position is 0. A polargraph winds one belt after the other; there
+//! its length is a setting.
 
-use super::{Alarm, Machine, MachineError, Setting, State, Target};
+use super::{Alarm, Kinematics, Machine, MachineError, Setting, State, Target};
 use crate::drawing::{PAGE_LIMIT, PagePoint};
+use crate::motion::PathLength;
 
 /// An axis of the page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -193,7 +195,7 @@ impl Machine<'_> {
 
     fn watch_homing(&mut self, homing: Homing, switches: Switches) {
         if homing.seeks() && homing.pressed_at.is_none() && switches.of(homing.axis) {
-            let pressed_at = Some(self.position());
+            let pressed_at = Some(self.homing_place(self.motors_now()));
             self.homing = Some(Homing { pressed_at, ..homing });
             self.runner.stop();
         } else if homing.stands && self.stands() {
@@ -225,31 +227,59 @@ impl Machine<'_> {
     fn begin_phase(&mut self, homing: Homing) {
         let speed = if homing.is_slow() { Setting::HomingFeed } else { Setting::HomingSeek };
         self.runner.set_limits(self.settings.limits_at(speed), self.settings.pen_positions());
+        let polargraph = matches!(self.settings.kinematics(), Kinematics::Polargraph(_));
         let (travel, steps_per_mm) = match homing.axis {
+            _ if polargraph => (Setting::AnchorWidth, Setting::StepsPerMmX),
             Axis::X => (Setting::TravelX, Setting::StepsPerMmX),
             Axis::Y => (Setting::TravelY, self.settings.steps_per_mm_y()),
         };
         let steps =
             |setting| self.settings.millimetres_as_steps(setting, steps_per_mm).min(PAGE_LIMIT / 2);
         let distance = homing.distance(steps(travel), steps(Setting::HomingPullOff));
-        let mut point = self.planned_position();
+        let mut point = self.homing_place(self.runner.position());
         let from = homing.pressed_at.unwrap_or(point);
         match homing.axis {
             Axis::X => point.x = from.x + distance,
             Axis::Y => point.y = from.y + distance,
         }
         self.homing = Some(homing);
-        if self.push(Target { point, ink: None }).is_err() {
+        let pushed = if polargraph {
+            // A belt alone: where that leads the pen does not matter, only how far.
+            let (end, page) = (self.runner.end(), self.runner.page_end());
+            let page = PagePoint { x: page.x + point.x - end.x, y: page.y + point.y - end.y };
+            self.runner.push(point, page, None, PathLength::MAX)
+        } else {
+            self.push(Target { point, ink: None }, PathLength::MAX)
+        };
+        if pushed.is_err() {
             self.alarm(Alarm::HomingFailed(homing.axis));
         }
     }
 
-    fn set_zero(&mut self, axis: Axis) {
-        let mut point = self.planned_position();
-        match axis {
-            Axis::X => point.x = 0,
-            Axis::Y => point.y = 0,
+    /// What homing counts in: the belts of a polargraph, else the page.
+    fn homing_place(&self, motors: PagePoint) -> PagePoint {
+        match self.settings.kinematics() {
+            Kinematics::Polargraph(_) => motors,
+            build => build.page(motors),
         }
-        self.set_position(point);
+    }
+
+    fn set_zero(&mut self, axis: Axis) {
+        let build = self.settings.kinematics();
+        let mut place = self.homing_place(self.runner.position());
+        let zero = match build {
+            Kinematics::Polargraph(_) => {
+                self.settings.millimetres_as_steps(Setting::HomedBelt, Setting::StepsPerMmX)
+            }
+            _ => 0,
+        };
+        match axis {
+            Axis::X => place.x = zero,
+            Axis::Y => place.y = zero,
+        }
+        match build {
+            Kinematics::Polargraph(_) => self.set_motors(place, build.page(place)),
+            _ => self.set_position(place),
+        }
     }
 }

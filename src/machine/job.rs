@@ -1,9 +1,9 @@
 //! From a path to events: measuring it, reading it, filling the queue, standing where it asks.
 
 use super::status::Estimate;
-use super::{Alarm, JobSize, Machine, MachineError, Path, Setting, State, Target};
+use super::{Alarm, JobSize, Kinematics, Machine, MachineError, Path, Setting, State, Target};
 use crate::drawing::{PAGE_LIMIT, PagePoint};
-use crate::motion::{EventQueue, Progress, Runner};
+use crate::motion::{EventQueue, PathLength, Progress, Runner};
 
 impl Machine<'_> {
     /// Measures the path from where the machine stands, and begins to draw it if all of it can be
@@ -72,7 +72,7 @@ impl Machine<'_> {
                 self.state = State::Hold { standing: true };
             }
             State::Home => {
-                self.runner.forget_path();
+                self.runner.forget_path(self.planned_position());
                 if let Some(homing) = &mut self.homing {
                     homing.stands = true;
                 }
@@ -80,7 +80,11 @@ impl Machine<'_> {
             _ => {
                 self.next_pen = None;
                 self.streaming = false;
-                self.runner.forget_path();
+                let page = match progress {
+                    Progress::Done => self.runner.page_end(),
+                    _ => self.planned_position(),
+                };
+                self.runner.forget_path(page);
                 self.state = State::Idle;
             }
         }
@@ -94,7 +98,8 @@ impl Machine<'_> {
     }
 
     fn read_targets(&mut self, path: &mut dyn Path) {
-        while !self.path_ended && self.next_pen.is_none() && !self.runner.is_full() {
+        self.push_pieces();
+        while !self.path_ended && self.next_pen.is_none() && self.has_room() {
             match path.next_target() {
                 Some(target) if path.pen() != self.pen => {
                     self.next_pen = Some((path.pen(), target));
@@ -102,7 +107,7 @@ impl Machine<'_> {
                 }
                 // Measured at the start, so it fits.
                 Some(target) => {
-                    if self.push(target).is_err() {
+                    if self.push(target, PathLength::MAX).is_err() {
                         self.abort();
                     }
                 }
@@ -117,14 +122,12 @@ impl Machine<'_> {
     fn measure(&self, path: &mut dyn Path) -> Result<JobSize, MachineError> {
         path.rewind();
         let mut size = JobSize::default();
-        let kinematics = self.settings.kinematics();
-        let mut at = self.runner.end();
+        let mut at = self.runner.page_end();
         let mut inked = false;
         let mut estimate = Estimate::default();
         let mut number = 0u32;
         while let Some(Target { point, ink }) = path.next_target() {
             self.check_travel(number, point)?;
-            let point = kinematics.motors(point);
             let (dx, dy) = (point.x - at.x, point.y - at.y);
             let length = self
                 .runner
@@ -153,8 +156,11 @@ impl Machine<'_> {
     /// # Errors
     /// [`MachineError::BeyondTravel`] with this number of the target.
     pub fn check_travel(&self, target: u32, point: PagePoint) -> Result<(), MachineError> {
+        // Belts are no use above their anchors.
+        let limited = self.settings.is_on(Setting::SoftLimits)
+            || matches!(self.settings.kinematics(), Kinematics::Polargraph(_));
         let beyond = |at: i32, travel: Setting, steps_per_mm: Setting| {
-            let (least, most) = if self.settings.is_on(Setting::SoftLimits) {
+            let (least, most) = if limited {
                 let steps = self.settings.millimetres_as_steps(travel, steps_per_mm);
                 (0, steps.min(PAGE_LIMIT))
             } else {

@@ -14,19 +14,21 @@ mod kinematics;
 mod path;
 mod pulser;
 mod settings;
+mod split;
 mod status;
 mod stream;
 
 use homing::Homing;
 pub use homing::{Axis, Contacts, Switches};
-pub use kinematics::Kinematics;
+pub use kinematics::{Anchors, Kinematics};
 pub use path::{JobSize, Path, TapePath, Target, TargetList};
 pub use pulser::{Pen, Pins, Pulser, PulserState, Solenoid};
 pub use settings::{SETTING_COUNT, SETTINGS, Setting, SettingError, SettingInfo, Settings, Value};
+use split::Split;
 pub use status::Status;
 
 use crate::drawing::PagePoint;
-use crate::motion::{Block, PushError, RunLengths, Runner};
+use crate::motion::{Block, PathLength, RunLengths, Runner};
 
 /// What the machine does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -107,6 +109,8 @@ pub struct Machine<'m> {
     job: JobSize,
     /// The runner's lengths and strokes when the job began.
     before: RunLengths,
+    /// The move that is being cut into pieces.
+    split: Option<Split>,
     /// Whether the path has been read to its end.
     path_ended: bool,
     /// Whether the drivers are to be switched off once.
@@ -138,7 +142,7 @@ impl<'m> Machine<'m> {
         pins: &'m PulserState,
         ahead_ticks: u32,
     ) -> Self {
-        let machine = Self {
+        let mut machine = Self {
             settings,
             state: if settings.is_on(Setting::Homing) {
                 State::Alarm(Alarm::NotHomed)
@@ -151,6 +155,7 @@ impl<'m> Machine<'m> {
             ahead_ticks,
             job: JobSize::default(),
             before: RunLengths::default(),
+            split: None,
             path_ended: true,
             sleep_due: false,
             homing: None,
@@ -163,6 +168,7 @@ impl<'m> Machine<'m> {
             next_pen: None,
         };
         machine.configure_pulser();
+        machine.set_position(PagePoint::default());
         machine
     }
 
@@ -179,9 +185,9 @@ impl<'m> Machine<'m> {
         if !matches!(self.state, State::Idle | State::Check | State::Alarm(_)) || !self.stands() {
             return Err(SettingError::Busy);
         }
-        let page = self.position();
+        let (page, before) = (self.position(), self.settings.kinematics());
         self.settings.set(setting, value)?;
-        if setting == Setting::Kinematics {
+        if self.settings.kinematics() != before {
             // The pen stays where it is; the motors count otherwise.
             self.set_position(page);
         }
@@ -202,14 +208,14 @@ impl<'m> Machine<'m> {
 
     /// The machine stands at `page`, whatever it thought: the pins' count starts from there.
     fn set_position(&mut self, page: PagePoint) {
-        let motors = self.settings.kinematics().motors(page);
-        let (x, y) = self.pins.steps();
-        self.origin = PagePoint { x: motors.x.wrapping_sub(x), y: motors.y.wrapping_sub(y) };
-        self.runner.set_position(motors, self.pins.ticks());
+        self.set_motors(self.settings.kinematics().motors(page), page);
     }
 
-    fn push(&mut self, target: Target) -> Result<(), PushError> {
-        self.runner.push(self.settings.kinematics().motors(target.point), target.ink)
+    fn set_motors(&mut self, motors: PagePoint, page: PagePoint) {
+        let (x, y) = self.pins.steps();
+        self.origin = PagePoint { x: motors.x.wrapping_sub(x), y: motors.y.wrapping_sub(y) };
+        self.split = None;
+        self.runner.set_position(motors, page, self.pins.ticks());
     }
 
     /// Slows down on the path and raises the pen. Ends moves by hand; nothing happens in other states.
@@ -249,7 +255,7 @@ impl<'m> Machine<'m> {
                 && let Some((pen, target)) = self.next_pen.take()
             {
                 self.pen = pen;
-                if self.push(target).is_err() {
+                if self.push(target, PathLength::MAX).is_err() {
                     self.abort();
                     return;
                 }
@@ -265,6 +271,7 @@ impl<'m> Machine<'m> {
             self.end_homing();
             self.next_pen = None;
             self.streaming = false;
+            self.split = None;
             self.runner.stop();
             self.path_ended = true;
             self.state = State::Abort;
@@ -276,7 +283,8 @@ impl<'m> Machine<'m> {
         self.pins.halt();
         self.end_homing();
         self.next_pen = None;
-        self.runner.forget_path();
+        self.split = None;
+        self.runner.forget_path(self.planned_position());
         self.runner.forget_pen();
         self.path_ended = true;
         self.streaming = false;
@@ -318,7 +326,7 @@ impl<'m> Machine<'m> {
         match self.state {
             State::Sleep => {}
             State::Alarm(_) if self.pins.is_drained() && !self.stop_is_pressed => {
-                self.set_position(self.position());
+                self.set_motors(self.motors_now(), self.position());
                 self.pins.release();
             }
             _ => return Err(MachineError::State(self.state)),

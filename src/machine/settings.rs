@@ -3,7 +3,8 @@
 //! Numbers up to 132 mean what they mean in Grbl 1.1; those from 200 on are penup's own. A value is
 //! checked when it is entered, alone and together with the others; a refused value changes nothing.
 
-use super::Kinematics;
+use super::{Anchors, Kinematics};
+use crate::drawing::{PAGE_LIMIT, PagePoint};
 use crate::fixed::Millimetres;
 use crate::motion::{Limits, LimitsError, MotionSettings, PenPositions, TICKS_PER_SECOND};
 
@@ -74,8 +75,16 @@ pub enum Setting {
     InkBeforePause,
     /// `$220` Length of the dots and gaps of a dotted line; a dash is three dots.
     DotLength,
-    /// `$230` Build of the machine: 0 Cartesian, 1 CoreXY.
+    /// `$230` Build of the machine: 0 Cartesian, 1 CoreXY, 2 polargraph.
     Kinematics,
+    /// `$231` From the left anchor of the belts to the right one.
+    AnchorWidth,
+    /// `$232` From the left anchor to the page's origin, to the right.
+    AnchorLeft,
+    /// `$233` Height of the anchors above the page's origin.
+    AnchorHeight,
+    /// `$234` Length of a belt when it is homed.
+    HomedBelt,
     /// `$240` Where the pen is parked (G28): x.
     ParkX,
     /// `$241` The same of y.
@@ -104,7 +113,7 @@ pub struct SettingInfo {
 }
 
 /// How many settings there are.
-pub const SETTING_COUNT: usize = 32;
+pub const SETTING_COUNT: usize = 36;
 
 const fn info(
     setting: Setting,
@@ -161,7 +170,11 @@ pub const SETTINGS: [SettingInfo; SETTING_COUNT] = {
         info(PenRamp, 214, "ramp of the pen", "ms", (0.0, 5000.0, 0.0), false),
         info(InkBeforePause, 215, "ink before a pause", "m", (0.0, 10000.0, 0.0), false),
         info(DotLength, 220, "length of a dot", "mm", (0.1, 100.0, 1.0), false),
-        info(Kinematics, 230, "kinematics", "0|1", (0.0, 1.0, 0.0), true),
+        info(Kinematics, 230, "kinematics", "0|1|2", (0.0, 2.0, 0.0), true),
+        info(AnchorWidth, 231, "anchors apart", "mm", (100.0, 8000.0, 800.0), false),
+        info(AnchorLeft, 232, "left anchor to the page", "mm", (0.0, 8000.0, 190.0), false),
+        info(AnchorHeight, 233, "anchors above the page's origin", "mm", (10.0, 8000.0, 700.0), false),
+        info(HomedBelt, 234, "belt when homed", "mm", (10.0, 8000.0, 500.0), false),
         info(ParkX, 240, "park at x", "mm", (0.0, 8000.0, 0.0), false),
         info(ParkY, 241, "park at y", "mm", (0.0, 8000.0, 0.0), false),
     ]
@@ -316,6 +329,10 @@ impl Settings {
     }
 
     fn checked_limits(&self) -> Result<Limits, LimitsError> {
+        let below_anchors = self.get(Setting::AnchorHeight) > self.get(Setting::TravelY);
+        if matches!(self.kinematics(), Kinematics::Polargraph(_)) && !below_anchors {
+            return Err(LimitsError::Anchors);
+        }
         Limits::new(&self.motion_settings())
     }
 
@@ -324,12 +341,15 @@ impl Settings {
     }
 
     fn motion_settings(&self) -> MotionSettings {
-        let steps = [self.get(Setting::StepsPerMmX), self.get(Setting::StepsPerMmY)];
+        let steps = self.page_steps();
         MotionSettings {
-            steps_per_mm: match self.kinematics() {
-                Kinematics::Cartesian => steps,
-                // A move of the page is √2 as long in the steps of both motors.
-                Kinematics::CoreXy => [steps[0].saturating_mul(Value::SQRT_2); 2],
+            steps_per_mm: steps,
+            motor_steps_per_mm: match self.kinematics() {
+                Kinematics::Cartesian => steps[0].max(steps[1]),
+                // A diagonal of the page is √2 as long for one of the motors.
+                Kinematics::CoreXy => steps[0].saturating_mul(Value::SQRT_2),
+                // A belt is never faster than the pen.
+                Kinematics::Polargraph(_) => steps[0],
             },
             draw_mm_per_min: self.get(Setting::DrawSpeed).min(self.axes_rate()),
             travel_mm_per_min: self.get(Setting::TravelSpeed).min(self.axes_rate()),
@@ -343,9 +363,19 @@ impl Settings {
         }
     }
 
-    /// The build of the machine. CoreXY takes the steps per millimetre of x for both axes.
+    /// The build of the machine. But for the Cartesian one, the steps per millimetre of x are those
+    /// of both motors.
     pub fn kinematics(&self) -> Kinematics {
-        if self.is_on(Setting::Kinematics) { Kinematics::CoreXy } else { Kinematics::Cartesian }
+        let steps =
+            |setting| self.millimetres_as_steps(setting, Setting::StepsPerMmX).min(2 * PAGE_LIMIT);
+        match self.get(Setting::Kinematics).to_num::<u8>() {
+            0 => Kinematics::Cartesian,
+            1 => Kinematics::CoreXy,
+            _ => Kinematics::Polargraph(Anchors {
+                left: PagePoint { x: -steps(Setting::AnchorLeft), y: steps(Setting::AnchorHeight) },
+                width: steps(Setting::AnchorWidth),
+            }),
+        }
     }
 
     /// Steps of the page per millimetre of x and y.
@@ -353,12 +383,9 @@ impl Settings {
         [self.get(Setting::StepsPerMmX), self.get(self.steps_per_mm_y())]
     }
 
-    /// Steps of the page per millimetre of y: those of x where one belt moves both.
+    /// Steps of the page per millimetre of y: those of x where belts move both.
     pub(super) fn steps_per_mm_y(&self) -> Setting {
-        match self.kinematics() {
-            Kinematics::Cartesian => Setting::StepsPerMmY,
-            Kinematics::CoreXy => Setting::StepsPerMmX,
-        }
+        if self.get(Setting::Kinematics) == 0 { Setting::StepsPerMmY } else { Setting::StepsPerMmX }
     }
 
     /// A setting in millimetres, as steps of the page.

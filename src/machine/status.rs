@@ -66,10 +66,12 @@ impl Machine<'_> {
 
     /// Where the pins are, in steps of the page.
     pub fn position(&self) -> PagePoint {
+        self.settings.kinematics().page(self.motors_now())
+    }
+
+    pub(super) fn motors_now(&self) -> PagePoint {
         let (x, y) = self.pins.steps();
-        let motors =
-            PagePoint { x: self.origin.x.wrapping_add(x), y: self.origin.y.wrapping_add(y) };
-        self.settings.kinematics().page(motors)
+        PagePoint { x: self.origin.x.wrapping_add(x), y: self.origin.y.wrapping_add(y) }
     }
 
     /// Where the events planned so far lead, in steps of the page.

@@ -71,7 +71,7 @@ impl Machine<'_> {
 
     /// Whether another move can be appended now.
     pub fn has_room(&self) -> bool {
-        !self.runner.is_full()
+        self.split.is_none() && !self.runner.is_full()
     }
 
     /// Whether a move that comes now has to wait for [`Machine::has_room`].
@@ -84,7 +84,7 @@ impl Machine<'_> {
 
     /// Where all moves known lead, in steps of the page.
     pub fn end(&self) -> PagePoint {
-        self.settings.kinematics().page(self.runner.end())
+        self.split.map_or(self.runner.page_end(), |split| split.end())
     }
 
     /// Where the pen is parked, in steps of the page.
@@ -152,13 +152,12 @@ impl Machine<'_> {
 
     /// Its length, 2^-18 mm.
     fn append(&mut self, target: Target, feed: Option<Value>) -> Result<u64, MachineError> {
-        let motors = self.settings.kinematics().motors(target.point);
-        let from = self.runner.end();
+        let (from, to) = (self.runner.page_end(), target.point);
         let limits = self.runner.limits();
         let too_long = MachineError::MoveTooLong { target: 0 };
-        let length = limits.length(motors.x - from.x, motors.y - from.y).ok_or(too_long)?;
+        let length = limits.length(to.x - from.x, to.y - from.y).ok_or(too_long)?;
         let limit = feed.map_or(PathLength::MAX, |feed| limits.feed(feed));
-        match self.runner.push_limited(motors, target.ink, limit) {
+        match self.push(target, limit) {
             Ok(()) => Ok(length.to_bits().into()),
             Err(PushError::Full) => Err(MachineError::State(self.state)),
             Err(PushError::TooLong) => Err(too_long),

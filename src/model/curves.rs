@@ -12,6 +12,7 @@ use crate::curve::{
 };
 use crate::fixed::{Decimal, shift_right_rounding};
 use crate::stage::{Attention, OutOfScratch, StageError};
+use core::ops::Range;
 
 type Memory = heapless::VecView<Corner>;
 
@@ -31,6 +32,11 @@ pub struct StoredCurve<'a> {
 }
 
 impl<'a> StoredCurve<'a> {
+    /// Half-words of the model's memory that it takes.
+    pub fn half_words(&self) -> usize {
+        HEADER + self.control.len() + 2 * self.knots.count().unwrap_or(0)
+    }
+
     /// The curve over these points.
     ///
     /// # Errors
@@ -245,6 +251,94 @@ impl CurveList {
             stored_ends.copy_from_slice(&ends);
         }
         Ok(())
+    }
+
+    /// Whether a curve has no end yet.
+    pub(super) fn is_in_hand(&self) -> bool {
+        self.in_hand.is_some()
+    }
+
+    /// Gives control points new numbers, as the model does with its vertices. A curve with a control
+    /// point that `new` maps to `None` goes.
+    pub(super) fn renumber(&mut self, memory: &mut Memory, new: &dyn Fn(u16) -> Option<u16>) {
+        self.retain(memory, &mut |control| {
+            control.iter_mut().all(|number| new(*number).inspect(|new| *number = *new).is_some())
+        });
+    }
+
+    /// Deletes the curves in `range`. With `plug` the last one takes the place of the first of them.
+    pub(super) fn delete(&mut self, memory: &mut Memory, range: Range<usize>, plug: bool) {
+        let length =
+            |number| self.curves(memory).iter().nth(number).map(|curve| curve.half_words());
+        let mut gone = range.clone();
+        let last = self.count - 1; // the range is not empty
+        if plug && range.start < last {
+            let before: usize = (0..range.start).filter_map(length).sum();
+            let last = length(last).unwrap_or(0);
+            let (start, end) = (self.start + before, self.start + self.whole);
+            memory.get_mut(start..end).unwrap_or(&mut []).rotate_right(last);
+            gone = range.start + 1..range.start + 2;
+        }
+        let mut number = 0;
+        self.retain(memory, &mut |_| {
+            number += 1;
+            !gone.contains(&(number - 1))
+        });
+    }
+
+    /// Keeps the curves for which `stays` says so; it may change their control points.
+    fn retain(&mut self, memory: &mut Memory, stays: &mut dyn FnMut(&mut [u16]) -> bool) {
+        let halves: &mut [u16] =
+            bytemuck::cast_slice_mut(memory.get_mut(self.start..).unwrap_or(&mut []));
+        let (mut read, mut write, mut kept) = (0, 0, 0);
+        while let Some((length, control_points)) = halves.get(read..self.whole).and_then(lengths) {
+            let control = read + HEADER..read + HEADER + control_points;
+            if stays(halves.get_mut(control).unwrap_or(&mut [])) {
+                halves.copy_within(read..read + length, write);
+                write += length;
+                kept += 1;
+            }
+            read += length;
+        }
+        memory.truncate(self.start + write);
+        (self.whole, self.count) = (write, kept);
+    }
+
+    /// Adds a copy of each curve that `is_copied`, with new control points. There is room.
+    pub(super) fn copy(
+        &mut self,
+        memory: &mut Memory,
+        is_copied: &dyn Fn(&mut dyn Iterator<Item = u16>) -> bool,
+        new: &dyn Fn(u16) -> Option<u16>,
+    ) {
+        let end = self.start + self.whole;
+        let mut at = self.start;
+        while let Some((length, control_points)) =
+            memory.get(at..end).map(bytemuck::cast_slice).and_then(lengths)
+        {
+            let control = at + HEADER..at + HEADER + control_points;
+            let numbers = memory.get(control.clone()).unwrap_or(&[]);
+            if is_copied(&mut numbers.iter().map(|number| number.0)) {
+                for half in at..at + length {
+                    let Some(Corner(old)) = memory.get(half).copied() else { continue };
+                    let copy = if control.contains(&half) { new(old).unwrap_or(old) } else { old };
+                    let _ = memory.push(Corner(copy)); // there is room
+                }
+                self.count += 1;
+            }
+            at += length;
+        }
+        self.whole = memory.len() - self.start;
+    }
+
+    /// How many half-words of whole curves there are.
+    pub(super) fn whole(&self) -> usize {
+        self.whole
+    }
+
+    /// So many curves in so many half-words after `start`, as they were once.
+    pub(super) fn restore(&mut self, start: usize, whole: usize, count: usize) {
+        *self = Self { start, whole, count, degree: self.degree, in_hand: None };
     }
 }
 

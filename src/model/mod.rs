@@ -2,14 +2,19 @@
 //!
 //! A [`Model`] holds vertices in one array and faces and bars in another, in the order in which they
 //! came (Cárdenas & Seeley's joints and bars in two sequential arrays). It refuses what would break
-//! it (a face through a vertex that does not exist, more than fits) and is then as it was before.
+//! it (a face through a vertex that does not exist, more than fits) and is then as it was before. [`Model::edit`]
+//! changes it, [`Model::restore`] takes a change back.
 
 mod curves;
+mod edit;
+mod undo;
 
 pub use curves::{Curves, StoredCurve};
+pub use edit::{Change, Edit, Numbers, Part};
 
 use crate::curve::CurveError;
 use crate::fixed::Decimal;
+use crate::stage::OutOfScratch;
 use bytemuck::{Pod, Zeroable};
 use curves::CurveList;
 
@@ -161,6 +166,19 @@ pub enum ModelError {
     KnotTooLarge,
     /// It is no curve.
     Curve(CurveError),
+    /// An edit names a bar, face or curve that does not exist.
+    UnknownElement {
+        /// Which of them.
+        part: Part,
+        /// The number as the user wrote it.
+        number: i32,
+        /// How many there are.
+        count: usize,
+    },
+    /// The three vertices of a plane are in line.
+    NoPlane,
+    /// Not enough working memory for the edit.
+    Scratch(OutOfScratch),
 }
 
 /// The vertices, faces and bars that the user sent, in memory lent by the owner.
@@ -266,6 +284,12 @@ impl<'m> Model<'m> {
         if self.vertices.len() >= limit {
             return Err(ModelError::TooManyVertices { limit });
         }
+        let place = self.place(coordinates)?;
+        self.vertices.push(place).map_err(|_| ModelError::TooManyVertices { limit })
+    }
+
+    /// A place in the model's unit, which grows if it must.
+    fn place(&mut self, coordinates: [Decimal; 3]) -> Result<Position, ModelError> {
         let fraction_bits = (0..=self.fraction_bits)
             .rev()
             .find(|bits| {
@@ -285,7 +309,7 @@ impl<'m> Model<'m> {
                 .unwrap_or(0)
         });
         self.coarsen(self.fraction_bits - fraction_bits);
-        self.vertices.push(Position { x, y, z }).map_err(|_| ModelError::TooManyVertices { limit })
+        Ok(Position { x, y, z })
     }
 
     fn coarsen(&mut self, bits: u32) {
@@ -371,14 +395,18 @@ impl<'m> Model<'m> {
     }
 
     fn push_corner(&mut self, number: i32, of_bar: bool, last: bool) -> Result<(), ModelError> {
-        let limit = self.corner_limit();
         let vertex = self
             .resolve(number)
             .ok_or(ModelError::UnknownVertex { number, vertices: self.vertices.len() })?;
+        self.insert(Corner::new(vertex, of_bar, last))
+    }
+
+    /// Adds a corner after those of the elements, before the curves.
+    fn insert(&mut self, corner: Corner) -> Result<(), ModelError> {
+        let limit = self.corner_limit();
         self.corners
-            .push(Corner::new(vertex, of_bar, last))
+            .push(corner)
             .map_err(|_| ModelError::TooManyCorners { limit, needed: limit + 1 })?;
-        // Before the curves.
         self.corners.get_mut(self.curves.start..).unwrap_or(&mut []).rotate_right(1);
         self.curves.start += 1;
         Ok(())

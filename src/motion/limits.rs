@@ -2,12 +2,15 @@
 
 use super::{PathLength, SLICE_TICKS, SliceSpeed, StepEvent, TICKS_PER_SECOND};
 use crate::fixed::Millimetres;
+use core::ops::RangeInclusive;
 
 /// What the user sets, each positive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MotionSettings {
-    /// Steps per millimetre of x and y: 2 to 4000.
+    /// Steps per millimetre of x and y of the page: 2 to 4000.
     pub steps_per_mm: [Millimetres; 2],
+    /// The most steps that a motor makes in a millimetre of the path.
+    pub motor_steps_per_mm: Millimetres,
     /// Along the path with the pen down, mm/min, 1 to 32767.
     pub draw_mm_per_min: Millimetres,
     /// Along the path with the pen up, mm/min, 1 to 32767.
@@ -37,6 +40,8 @@ pub enum LimitsError {
     Acceleration,
     /// Junction deviation below 0 or above 1 mm.
     JunctionDeviation,
+    /// The page reaches up to the anchors of the belts.
+    Anchors,
     /// Pulses of 1 ms or longer.
     Pulse,
     /// So many steps per second that the pulses would run together: lower the speed or the pulse.
@@ -94,7 +99,9 @@ impl Limits {
     /// See [`LimitsError`].
     pub fn new(settings: &MotionSettings) -> Result<Self, LimitsError> {
         let axis = |steps_per_mm: Millimetres| {
-            if steps_per_mm < 2 || steps_per_mm > 4000 {
+            const RANGE: RangeInclusive<Millimetres> =
+                Millimetres::lit("2")..=Millimetres::lit("4000");
+            if !RANGE.contains(&steps_per_mm) {
                 return Err(LimitsError::StepsPerMillimetre);
             }
             // 2^32 / (bits / 2^16), at most 2^31.
@@ -129,15 +136,14 @@ impl Limits {
             setup_ticks: settings.direction_setup_ticks,
         };
         limits.top = limits.stopping_distance(draw_speed.max(travel_speed));
-        limits.check_step_rate()?;
+        limits.check_step_rate(axis(settings.motor_steps_per_mm.min(Millimetres::lit("4000")))?)?;
         Ok(limits)
     }
 
-    fn check_step_rate(&self) -> Result<(), LimitsError> {
-        let [x, y] = self.step_length;
+    fn check_step_rate(&self, step_length: SliceSpeed) -> Result<(), LimitsError> {
         let speed = u64::from(self.draw_speed.max(self.travel_speed).to_bits());
         let slices_per_second = u64::from(TICKS_PER_SECOND / SLICE_TICKS);
-        let asked = speed * slices_per_second / u64::from(x.min(y).to_bits());
+        let asked = speed * slices_per_second / u64::from(step_length.to_bits());
         let possible = TICKS_PER_SECOND / self.least_interval();
         if asked > u64::from(possible) {
             return Err(LimitsError::TooManySteps {
@@ -228,6 +234,7 @@ pub(crate) mod tests {
     pub(crate) fn settings() -> MotionSettings {
         MotionSettings {
             steps_per_mm: [Millimetres::from_num(100); 2],
+            motor_steps_per_mm: Millimetres::from_num(100),
             draw_mm_per_min: Millimetres::from_num(3000),
             travel_mm_per_min: Millimetres::from_num(6000),
             acceleration_mm_per_s2: Millimetres::from_num(200),

@@ -90,8 +90,9 @@ pub struct Runner<'m> {
     ink_bound: u64,
     /// Where the events so far lead.
     position: PagePoint,
-    /// Where the blocks so far lead.
+    /// Where the blocks so far lead: the motors, and the pen on the page.
     end: PagePoint,
+    page_end: PagePoint,
     /// The way in which the last block runs, its length and ink.
     last: Option<(Heading, PathLength, Option<LineType>)>,
     run: RunLengths,
@@ -126,6 +127,7 @@ impl<'m> Runner<'m> {
             ink_bound: u64::MAX,
             position: PagePoint::default(),
             end: PagePoint::default(),
+            page_end: PagePoint::default(),
             last: None,
             run: RunLengths::default(),
             in_stroke: false,
@@ -169,9 +171,14 @@ impl<'m> Runner<'m> {
         self.position
     }
 
-    /// Where the blocks lead.
+    /// Where the blocks lead the motors.
     pub fn end(&self) -> PagePoint {
         self.end
+    }
+
+    /// Where the blocks lead the pen.
+    pub fn page_end(&self) -> PagePoint {
+        self.page_end
     }
 
     /// Ticks of all events handed over; wraps.
@@ -205,39 +212,38 @@ impl<'m> Runner<'m> {
         self.run
     }
 
-    /// The machine stands at `point`, nothing waits, and the events worked off took `ticks` (it
-    /// wraps): after homing, or after an emergency stop.
-    pub fn set_position(&mut self, point: PagePoint, ticks: u32) {
-        self.forget_path();
+    /// The motors stand at `motors`, the pen at `page`, nothing waits, and the events worked off took
+    /// `ticks` (it wraps): after homing, or after an emergency stop.
+    pub fn set_position(&mut self, motors: PagePoint, page: PagePoint, ticks: u32) {
+        self.position = motors;
+        self.forget_path(page);
         self.emitter.restart(ticks);
-        self.position = point;
-        self.end = point;
     }
 
-    /// Appends a straight move to `point`. A move of no length is skipped.
+    /// Appends a move of the motors straight to `motors`, which takes the pen straight to `page`; a
+    /// speed, by its stopping distance ([`Limits::feed`]), is not passed. Lengths, corners and bends
+    /// are those of the page. A move of no length is skipped.
     ///
     /// # Errors
     /// See [`PushError`]; nothing is appended then.
-    pub fn push(&mut self, point: PagePoint, ink: Option<LineType>) -> Result<(), PushError> {
-        self.push_limited(point, ink, PathLength::MAX)
-    }
-
-    /// The same with a speed, by its stopping distance ([`Limits::feed`]), that is not passed.
-    ///
-    /// # Errors
-    /// See [`PushError`]; nothing is appended then.
-    pub fn push_limited(
+    pub fn push(
         &mut self,
-        point: PagePoint,
+        motors: PagePoint,
+        page: PagePoint,
         ink: Option<LineType>,
         limit: PathLength,
     ) -> Result<(), PushError> {
-        let (dx, dy) = (point.x - self.end.x, point.y - self.end.y);
+        let (dx, dy) = (motors.x - self.end.x, motors.y - self.end.y);
         if dx == 0 && dy == 0 {
             return Ok(());
         }
-        let length = self.limits.length(dx, dy).ok_or(PushError::TooLong)?;
-        let heading = Heading::new(&self.limits, dx, dy, length);
+        let way = match (page.x - self.page_end.x, page.y - self.page_end.y) {
+            // Less than a step of the page.
+            (0, 0) => (dx.signum(), dy.signum()),
+            way => way,
+        };
+        let length = self.limits.length(way.0, way.1).ok_or(PushError::TooLong)?;
+        let heading = Heading::new(&self.limits, way.0, way.1, length);
         let corner = match self.last {
             Some((before, length_before, ink_before)) if passes(ink_before, ink) => {
                 junction::corner(&self.limits, before, heading, length.min(length_before))
@@ -245,15 +251,16 @@ impl<'m> Runner<'m> {
             _ => Corner::STOP,
         };
         if corner.is_sharp {
-            self.curvature.restart(&self.limits, self.end, &mut self.lookahead);
+            self.curvature.restart(&self.limits, self.page_end, &mut self.lookahead);
         }
         let (entry_limit, curve_limit) = (corner.limit, limit);
         let block = Block { dx, dy, length, entry_limit, curve_limit, ink };
         self.lookahead.push(block).map_err(|_| PushError::Full)?;
         if self.limits.centripetal {
-            self.curvature.follow(&self.limits, point, &mut self.lookahead);
+            self.curvature.follow(&self.limits, page, &mut self.lookahead);
         }
-        self.end = point;
+        self.end = motors;
+        self.page_end = page;
         self.last = Some((heading, length, ink));
         if self.hurried {
             self.plan_again();
@@ -274,7 +281,7 @@ impl<'m> Runner<'m> {
 
     /// The path ends with the last block: a curve ends there, too.
     pub fn end_path(&mut self) {
-        self.curvature.restart(&self.limits, self.end, &mut self.lookahead);
+        self.curvature.restart(&self.limits, self.page_end, &mut self.lookahead);
         self.last = None;
     }
 
@@ -317,8 +324,8 @@ impl<'m> Runner<'m> {
         self.stopping_after_stroke = false;
     }
 
-    /// Gives up what waits; the machine must stand.
-    pub fn forget_path(&mut self) {
+    /// Gives up what waits; the machine must stand, the pen at `page`.
+    pub fn forget_path(&mut self, page: PagePoint) {
         self.lookahead.clear();
         self.course = None;
         self.pace = Pace::REST;
@@ -328,6 +335,7 @@ impl<'m> Runner<'m> {
         self.last = None;
         self.in_stroke = false;
         self.end = self.position;
+        self.page_end = page;
     }
 
     /// Lets `ticks` pass; nothing must wait or move.

@@ -30,6 +30,7 @@ mod odd;
 mod pace;
 mod partition;
 
+pub use matching::scratch_bytes as matching_bytes;
 pub use metric::length;
 
 use crate::drawing::{Drawing, PAGE_LIMIT, PagePoint};

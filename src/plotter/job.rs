@@ -92,6 +92,11 @@ impl Job {
         Ok(Self { stored, legs, report, degenerate_faces })
     }
 
+    /// Gives its memory up; what came of the order stays.
+    pub fn release(&mut self) {
+        (self.stored, self.legs) = (Stored::default(), 0);
+    }
+
     /// What came of the order.
     pub fn report(&self) -> &order::Report {
         &self.report
@@ -206,14 +211,14 @@ fn project(
     };
     let on_page = curves_map.as_ref().map(|map| |x, y, w| map.fine(x, y, w));
     let curves = on_page.as_ref().map(|on_page| Flattening { on_page, tolerance: HALF_A_STEP });
-    let Seen { vertices, elements, degenerate_faces } =
+    let Seen { vertices, elements, degenerate_faces, is_cut } =
         see(&view, model, curves, &mut scratch, attention)?;
     let map = match curves_map {
         Some(map) => map,
         None => {
             let bounds = bounds_of(vertices, elements, projection, attention)?;
             let bounds = bounds.ok_or(Refusal::NothingToPlot)?;
-            PageMap::fit(&bounds, &options.page, steps).map_err(Refusal::Page)?
+            fit(&view, is_cut, &bounds, options, steps)?
         }
     };
 
@@ -300,17 +305,32 @@ fn map_with_curves(
     }
     let all = all.ok_or(Refusal::NothingToPlot)?;
     let rough = PageMap::fit(&all, &options.page, steps).map_err(Refusal::Page)?;
-    let mut bounds = {
+    let (mut bounds, is_cut) = {
         let mut scratch = scratch.reborrow();
         let seen = see(view, model, None, &mut scratch, attention)?;
-        bounds_of(seen.vertices, seen.elements, projection, attention)?
+        (bounds_of(seen.vertices, seen.elements, projection, attention)?, seen.is_cut)
     };
     let flattening = Flattening { on_page: &|x, y, w| rough.fine(x, y, w), tolerance: FOR_BOUNDS };
     flattening.each_chord(view, model, scratch, attention, &mut |chord| {
         bounds = grow(bounds, Bounds::around(chord.into_iter(), projection));
     })?;
     let bounds = bounds.ok_or(Refusal::NothingToPlot)?;
-    PageMap::fit(&bounds, &options.page, steps).map_err(Refusal::Page)
+    fit(view, is_cut, &bounds, options, steps)
+}
+
+/// Fits what is seen to the page; with an eye among it, what is within 45 degrees of the line of sight.
+fn fit(
+    view: &View,
+    is_cut: bool,
+    bounds: &Bounds,
+    options: &PlotOptions,
+    steps: StepsPerMillimetre,
+) -> Result<PageMap, Refusal> {
+    match view.field(Bounds::FRACTION_BITS).filter(|_| is_cut) {
+        Some(field) => PageMap::fit_field(bounds, field, &options.page, steps),
+        None => PageMap::fit(bounds, &options.page, steps),
+    }
+    .map_err(Refusal::Page)
 }
 
 fn refused(error: VisibilityError, corners: usize) -> Refusal {
@@ -433,8 +453,10 @@ impl StretchSink for PageSink<'_> {
             (false, HiddenLines::Erased) => return Ok(()),
         };
         self.observer.stretch(self.view, &stretch);
-        let [from, to] =
-            [stretch.from, stretch.to].map(|end| self.map.along(p, q, end, self.view.projection()));
-        self.collector.line(from, to, line_type)
+        let along = [stretch.from, stretch.to];
+        match self.map.stretch((p, q), along, self.view.projection()) {
+            Some([from, to]) => self.collector.line(from, to, line_type),
+            None => Ok(()),
+        }
     }
 }

@@ -4,7 +4,7 @@ use crate::model::{Corner, Position};
 use crate::motion::Block;
 
 /// How many moves are planned ahead: see [`crate::motion`].
-pub const BLOCKS: usize = 36;
+pub const BLOCKS: usize = 32;
 
 /// The moves planned ahead, before any is.
 pub const NO_MOVES: [Block; BLOCKS] = [Block::EMPTY; BLOCKS];

@@ -6,6 +6,8 @@
 //! to the machine. This is the only module that knows all the others.
 
 mod board;
+pub mod budget;
+mod editor;
 mod job;
 mod kept;
 mod memory;
@@ -57,6 +59,12 @@ pub struct Plotter<'m> {
     inner: Inner<'m>,
 }
 
+/// What is left to do when a line is carried out: a job, whose stages need the stack.
+enum Next {
+    Nothing,
+    Plot,
+}
+
 /// All but the line being read, which is borrowed while it is carried out.
 #[derive(Debug)]
 struct Inner<'m> {
@@ -66,6 +74,8 @@ struct Inner<'m> {
     machine: Machine<'m>,
     job: Job,
     cursor: Cursor,
+    /// Whether `words` hold the model as it was before the last change.
+    can_undo: bool,
     program: Program,
     /// The line that is answered when it is done.
     task: Option<Task>,
@@ -91,6 +101,7 @@ impl<'m> Plotter<'m> {
                 machine: Machine::new(settings, blocks, pins, AHEAD_TICKS),
                 job: Job::default(),
                 cursor: Cursor::default(),
+                can_undo: false,
                 program: Program::default(),
                 task: None,
                 alarm_told: None,
@@ -122,7 +133,11 @@ impl<'m> Plotter<'m> {
         let Some(byte) = byte else { return planned || asked != RealTime::default() };
         let outcome = match self.reader.push(byte) {
             None => return true,
-            Some(Ok(line)) => self.inner.carry_out(line, board),
+            Some(Ok(line)) => match self.inner.carry_out(line, board) {
+                Ok(Next::Plot) => self.inner.plot(board),
+                Ok(Next::Nothing) => Ok(()),
+                Err(refusal) => Err(refusal),
+            },
             Some(Err(refusal)) => Err(refusal),
         };
         if outcome == Err(Refusal::Aborted) {
@@ -197,6 +212,7 @@ impl<'m> Plotter<'m> {
 
 impl Inner<'_> {
     /// Keeps the step queue full. Whether the machine still has something to plan.
+    #[inline(never)] // Its frame must not lie under the stages'.
     fn plan<B: Board>(&mut self, board: &mut B) -> bool {
         let before = self.machine.planned_position();
         let mut strokes = self.job.strokes(self.words, &mut self.cursor);
@@ -205,8 +221,12 @@ impl Inner<'_> {
     }
 
     #[inline(never)] // Its frame must not lie under the stages'.
-    fn carry_out<B: Board>(&mut self, line: &str, board: &mut B) -> Result<(), Refusal> {
-        match Command::parse(line)? {
+    fn carry_out<B: Board>(&mut self, line: &str, board: &mut B) -> Result<Next, Refusal> {
+        let command = Command::parse(line)?;
+        if command.changes_the_model() {
+            self.remember();
+        }
+        match command {
             Command::Nothing => {}
             Command::Vertex(coordinates) => {
                 self.model.add_vertex(coordinates).map_err(Refusal::Model)?
@@ -234,7 +254,10 @@ impl Inner<'_> {
             Command::Options => self.task = Some(Task::List(Listing::Options, 0)),
             Command::Model => self.report_model(board),
             Command::Clear => self.model.clear(),
-            Command::Plot => self.plot(board)?,
+            Command::Edit(edit) => self.edit(edit, board)?,
+            Command::List(part, numbers) => self.begin_list(part, numbers)?,
+            Command::Undo => self.undo()?,
+            Command::Plot => return Ok(Next::Plot),
             Command::Unlock => self.machine.unlock()?,
             Command::Home => self.home()?,
             Command::Check => self.machine.check(self.machine.state() != State::Check)?,
@@ -242,7 +265,7 @@ impl Inner<'_> {
             Command::Jog(line) => self.jog(line)?,
             Command::GCode(line) => self.run_gcode(line)?,
         }
-        Ok(())
+        Ok(Next::Nothing)
     }
 
     #[inline(never)] // Its frame must not lie under the stages'.
@@ -285,6 +308,7 @@ impl Inner<'_> {
         observer: &mut dyn Observer,
     ) -> Result<(), Refusal> {
         // The memory of the last job is used again, so it ends here even if this one fails.
+        self.can_undo = false;
         self.job = Job::default();
         self.cursor = Cursor::default();
         let settings = self.machine.settings();

@@ -6,6 +6,7 @@ use super::{Board, Inner, Reply};
 use crate::drawing::{LineType, PagePoint};
 use crate::fixed::BinaryFraction;
 use crate::machine::{Alarm, MachineError, Setting, State, Target};
+use crate::model::Part;
 use crate::motion::{StepEvent, TICKS_PER_SECOND};
 use crate::protocol::{GCode, HELP, RealTime, Refusal};
 use crate::step::{Arc, Chords, Line};
@@ -32,6 +33,8 @@ pub(super) enum Listing {
     Help,
     Settings,
     Options,
+    /// Of the model, up to this place.
+    Model(Part, usize),
 }
 
 /// How far [`Inner::proceed`] came.
@@ -46,6 +49,7 @@ pub(super) enum Progress {
 
 impl Inner<'_> {
     /// What was asked by single bytes, but for status and abort.
+    #[inline(never)] // Its frame must not lie under the stages'.
     pub(super) fn act(&mut self, asked: RealTime) {
         if asked.has(RealTime::EMERGENCY) {
             self.machine.alarm(Alarm::EmergencyStop);
@@ -78,6 +82,7 @@ impl Inner<'_> {
     }
 
     /// Looks at the contacts; tells of an alarm once, and lets the board carry it out at once.
+    #[inline(never)] // Its frame must not lie under the stages'.
     pub(super) fn watch<B: Board>(&mut self, board: &mut B) {
         self.machine.observe(board.contacts());
         let alarm = match self.machine.state() {
@@ -94,6 +99,7 @@ impl Inner<'_> {
     }
 
     /// Goes on with the line in work.
+    #[inline(never)] // Its frame must not lie under the stages'.
     pub(super) fn proceed<B: Board>(&mut self, board: &mut B) -> Progress {
         if let Some(Task::List(listing, number)) = &mut self.task {
             // A line takes up to 10 ms: the queue of steps is filled after each.
@@ -147,6 +153,12 @@ impl Inner<'_> {
 
     /// Writes one line of a list; `false` past its end.
     fn list<B: Board>(&self, listing: Listing, number: usize, board: &mut B) -> bool {
+        if let Listing::Model(part, end) = listing {
+            if number < end {
+                self.list_one(part, number, board);
+            }
+            return number < end;
+        }
         let mut lines = 0;
         let mut line = |text: fmt::Arguments<'_>| {
             if lines == number {
@@ -168,6 +180,7 @@ impl Inner<'_> {
                     line(format_args!("${number}={value} ({name}, {unit})"));
                 }
             }
+            Listing::Model(..) => {}
             Listing::Options => self.options.list(line),
         }
         number < lines

@@ -3,7 +3,7 @@
 use super::{GCode, Refusal};
 use crate::curve::CurveError;
 use crate::fixed::{Decimal, Millimetres};
-use crate::model::ModelError;
+use crate::model::{self, Edit, ModelError, Part};
 use crate::view::{Direction, Lens};
 
 /// What a line asks for.
@@ -51,6 +51,12 @@ pub enum Command<'a> {
     Model,
     /// `$clear`
     Clear,
+    /// `$delete=…` and others: changes the model.
+    Edit(Edit),
+    /// `$list=PART,FIRST,LAST`
+    List(Part, model::Numbers),
+    /// `$undo`
+    Undo,
     /// `$plot`
     Plot,
     /// `$X`
@@ -230,15 +236,34 @@ pub const HELP: &[(&str, &str)] = &[
     ("$fit=on|off", "scale a plan to the page, or draw it at true size"),
     ("$model", "size of the model against the limits"),
     ("$clear", "forget the model"),
+    (
+        "$list=v|l|f|c,FIRST,LAST",
+        "vertices, bars, faces or curves with their numbers; without numbers all",
+    ),
+    ("$delete=v|l|f|c,FIRST,LAST", "take some out; the numbers above fall"),
+    ("$plug=v|l|f|c,NUMBER", "take one out; the last takes its number"),
+    ("$move=NUMBER,X,Y,Z", "move a vertex to a place"),
+    ("$translate=X,Y,Z,FIRST,LAST", "shift vertices; without numbers all, here and below"),
+    ("$scale=X,Y,Z,FIRST,LAST", "multiply coordinates"),
+    ("$rotate=x|y|z,DEGREES,FIRST,LAST", "turn about an axis"),
+    (
+        "$mirror=A,B,C,FIRST,LAST",
+        "add the image about the plane of three vertices, joined on the plane",
+    ),
+    ("$reflect=A,B,C,FIRST,LAST", "move to the image about the plane of three vertices"),
+    ("$undo", "take back the last change of the model, unless a plot came after"),
     ("$plot", "draw it"),
     ("$X", "unlock after an alarm"),
     ("$H", "find the limit switches"),
     ("$J=G91 X.. Y.. F..", "move by hand with the pen up; byte 0x85 ends it"),
     ("$C", "begin or end to check only: nothing moves"),
     ("$SLP", "switch the motors off; $X wakes"),
-    ("G0 G1 G2 G3 G4 G20 G21 G28 G90 G91", "move, arc, wait, inches, mm, park, absolute, relative"),
-    ("X.. Y.. I.. J.. R.. P.. F.. Z..", "numbers of the former; Z0 and below is pen down"),
-    ("M0 M2 M3 M5", "pause until ~, end, pen down, pen up"),
+    (
+        "G0 | G1 | G2 | G3 | G4 | G20 | G21 | G28 | G90 | G91",
+        "move, arc, wait, inches, mm, park, absolute, relative",
+    ),
+    ("X1 | Y1 | I1 | J1 | R1 | P1 | F1 | Z1", "numbers of the former; Z0 and below is pen down"),
+    ("M0 | M2 | M3 | M5", "pause until ~, end, pen down, pen up"),
 ];
 
 impl<'a> Command<'a> {
@@ -283,9 +308,25 @@ impl<'a> Command<'a> {
         }
     }
 
+    /// Whether `$undo` takes it back.
+    pub fn changes_the_model(&self) -> bool {
+        matches!(
+            self,
+            Self::Vertex(_)
+                | Self::Face(_)
+                | Self::Polyline(_)
+                | Self::Curve { .. }
+                | Self::Clear
+                | Self::Edit(_)
+        )
+    }
+
     fn parse_dollar(text: &'a str) -> Result<Self, Refusal> {
         if let Some((name, value)) = text.split_once('=') {
             let (name, value) = (name.trim(), value.trim());
+            if let Some(command) = parse_edit(name, value)? {
+                return Ok(command);
+            }
             if name == "J" {
                 return GCode::new(value).map(Self::Jog);
             }
@@ -305,6 +346,7 @@ impl<'a> Command<'a> {
             "options" => Ok(Self::Options),
             "model" => Ok(Self::Model),
             "clear" => Ok(Self::Clear),
+            "undo" => Ok(Self::Undo),
             "plot" => Ok(Self::Plot),
             _ => Err(Refusal::UnknownSystemCommand),
         }
@@ -429,6 +471,98 @@ fn coordinates(text: &str) -> Result<[Decimal; 3], Refusal> {
     Ok(coordinates)
 }
 
+/// The values of an edit, with commas between.
+struct Values<'a> {
+    rest: Option<&'a str>,
+    needed: usize,
+}
+
+impl<'a> Values<'a> {
+    fn text(&mut self) -> Result<&'a str, Refusal> {
+        let rest = self.rest.ok_or(Refusal::WrongNumberCount { needed: self.needed })?;
+        let (value, rest) = match rest.split_once(',') {
+            Some((value, rest)) => (value, Some(rest)),
+            None => (rest, None),
+        };
+        self.rest = rest;
+        Ok(value.trim())
+    }
+
+    fn three<T: Copy + Default>(
+        &mut self,
+        read: impl Fn(&str) -> Result<T, Refusal>,
+    ) -> Result<[T; 3], Refusal> {
+        let mut values = [T::default(); 3];
+        for value in &mut values {
+            *value = read(self.text()?)?;
+        }
+        Ok(values)
+    }
+
+    fn part(&mut self) -> Result<Part, Refusal> {
+        match self.text()? {
+            "v" => Ok(Part::Vertices),
+            "l" => Ok(Part::Bars),
+            "f" => Ok(Part::Faces),
+            "c" => Ok(Part::Curves),
+            _ => Err(Refusal::NotAChoice { choices: "v, l, f or c" }),
+        }
+    }
+
+    /// First and last, or one number for both.
+    fn numbers(&mut self) -> Result<[i32; 2], Refusal> {
+        let first = whole(self.text()?)?;
+        let last = if self.rest.is_some() { whole(self.text()?)? } else { first };
+        Ok([first, last])
+    }
+
+    fn numbers_or_all(&mut self) -> Result<model::Numbers, Refusal> {
+        if self.rest.is_some() { self.numbers().map(Some) } else { Ok(None) }
+    }
+}
+
+/// `None` if no edit has this name.
+#[inline(never)] // Its frame must not lie under the stages'.
+fn parse_edit<'a>(name: &str, value: &str) -> Result<Option<Command<'a>>, Refusal> {
+    let mut values = Values { rest: Some(value), needed: 3 };
+    let edit = match name {
+        "list" => {
+            let part = values.part()?;
+            let numbers = values.numbers_or_all()?;
+            return Ok(Some(Command::List(part, numbers)));
+        }
+        "delete" => Edit::Delete(values.part()?, values.numbers()?),
+        "plug" => Edit::Plug(values.part()?, whole(values.text()?)?),
+        "move" => {
+            values.needed = 4;
+            Edit::Move(whole(values.text()?)?, values.three(number)?)
+        }
+        "translate" => Edit::Translate(values.three(number)?, values.numbers_or_all()?),
+        "scale" => Edit::Scale(values.three(number)?, values.numbers_or_all()?),
+        "rotate" => {
+            let axis = match values.text()? {
+                "x" => 0,
+                "y" => 1,
+                "z" => 2,
+                _ => return Err(Refusal::NotAChoice { choices: "x, y or z" }),
+            };
+            values.needed = 2;
+            let degrees = number(values.text()?)?.to_f64();
+            if libm::fabs(degrees) > 36000.0 {
+                return Err(Refusal::NumberOutOfRange);
+            }
+            Edit::Rotate(axis, degrees, values.numbers_or_all()?)
+        }
+        "mirror" => Edit::Mirror(values.three(whole)?, values.numbers_or_all()?),
+        "reflect" => Edit::Reflect(values.three(whole)?, values.numbers_or_all()?),
+        _ => return Ok(None),
+    };
+    match values.rest {
+        None => Ok(Some(Command::Edit(edit))),
+        Some(_) => Err(Refusal::WrongNumberCount { needed: values.needed }),
+    }
+}
+
 /// The first word, and what comes after it.
 fn split_word(text: &str) -> (&str, &str) {
     let text = text.trim_start();
@@ -547,7 +681,7 @@ mod tests {
 
     #[test]
     fn what_is_no_command_is_refused() {
-        for line in ["G0 X1", "vv 1 2 3", "hello", "V 1 2 3", "ff"] {
+        for line in ["vv 1 2 3", "hello", "G1 = 2", "ff"] {
             assert_eq!(Command::parse(line), Err(Refusal::UnknownCommand), "{line}");
         }
         for line in ["$nothing", "$plo", "$ plot it"] {
@@ -608,9 +742,9 @@ mod tests {
     fn every_command_of_the_help_is_one() {
         for (usage, _) in HELP {
             let line = usage.split_once('=').map_or(*usage, |(name, _)| name);
-            let parsed = Command::parse(line);
             let with_value = usage.contains('=');
-            assert!(with_value || parsed.is_ok(), "{usage}");
+            let all_are = |line: &str| line.split(" | ").all(|one| Command::parse(one).is_ok());
+            assert!(with_value || all_are(line), "{usage}");
             if with_value {
                 let set = std::format!("{line}=?");
                 assert!(!matches!(Command::parse(&set), Ok(Command::Setting { .. })), "{usage}");

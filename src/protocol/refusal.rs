@@ -5,7 +5,7 @@ use crate::curve::CurveError;
 use crate::drawing::PageError;
 use crate::fixed::BinaryFraction;
 use crate::machine::{MachineError, SettingError, Value};
-use crate::model::ModelError;
+use crate::model::{ModelError, Part};
 use crate::stage::OutOfScratch;
 use crate::step::ArcError;
 use crate::view::ViewError;
@@ -76,6 +76,8 @@ pub enum Refusal {
     DrawingTooLarge(OutOfScratch),
     /// More lines than a tour can number.
     TooManyLines,
+    /// No change of the model, or a plot came after it.
+    NothingToUndo,
     /// The user gave the job up while it was computed.
     Aborted,
     /// The flash does not keep it.
@@ -109,6 +111,8 @@ pub const MEANINGS: &[(u16, &str)] = &[
     (115, "coordinate too large"),
     (116, "not a curve"),
     (117, "curve out of order"),
+    (118, "unknown bar, face or curve"),
+    (119, "no plane"),
     (120, "nothing to plot"),
     (121, "eye at the point looked at"),
     (122, "up is along the line of sight"),
@@ -122,6 +126,7 @@ pub const MEANINGS: &[(u16, &str)] = &[
     (140, "drawing too large for the memory"),
     (141, "given up"),
     (142, "too many lines"),
+    (143, "nothing to undo"),
     (150, "setting out of range"),
     (151, "setting conflicts with another"),
     (152, "move too long"),
@@ -159,6 +164,9 @@ impl Refusal {
                 ModelError::Curve(_) => 116,
                 ModelError::NoDegree | ModelError::CurveUnfinished | ModelError::NoCurve => 117,
                 ModelError::KnotTooLarge => 102,
+                ModelError::UnknownElement { .. } => 118,
+                ModelError::NoPlane => 119,
+                ModelError::Scratch(_) => 140,
             },
             Self::NothingToPlot | Self::View(ViewError::NothingToSee) => 120,
             Self::View(ViewError::EyeAtTarget) => 121,
@@ -181,6 +189,7 @@ impl Refusal {
             Self::Aborted => 141,
             Self::NotKept => 160,
             Self::TooManyLines => 142,
+            Self::NothingToUndo => 143,
         }
     }
 }
@@ -247,16 +256,14 @@ impl fmt::Display for Refusal {
                     mm(*height)
                 )
             }
-            Self::DrawingTooLarge(OutOfScratch { needed, available }) => {
-                write!(
-                    formatter,
-                    "{needed} bytes are needed where {available} are free: send a smaller model"
-                )
-            }
+            Self::DrawingTooLarge(missing) => write_missing(formatter, missing),
             Self::Setting(error) => write_setting_error(formatter, error),
             Self::Machine(error) => write_machine_error(formatter, error),
             Self::TooManyLines => {
                 formatter.write_str("a drawing has at most 32768 lines: send a smaller model")
+            }
+            Self::NothingToUndo => {
+                formatter.write_str("only the last change can be taken back, and not after a plot")
             }
             Self::Aborted => formatter.write_str("the job was given up"),
             Self::NotKept => formatter.write_str("in force until power is lost: the flash does not keep it"),
@@ -286,6 +293,19 @@ fn write_model_error(formatter: &mut fmt::Formatter<'_>, error: &ModelError) -> 
         ModelError::NoCurve => formatter.write_str("begin a curve first: send curv"),
         ModelError::KnotTooLarge => formatter.write_str("knots go up to 4194304"),
         ModelError::Curve(error) => write_curve_error(formatter, error),
+        ModelError::UnknownElement { part, number, count } => {
+            let name = match part {
+                Part::Vertices => "vertex",
+                Part::Bars => "bar",
+                Part::Faces => "face",
+                Part::Curves => "curve",
+            };
+            write!(formatter, "there is no {name} {number}: the model has {count}")
+        }
+        ModelError::NoPlane => {
+            formatter.write_str("three vertices that are not in line make a plane")
+        }
+        ModelError::Scratch(missing) => write_missing(formatter, missing),
     }
 }
 
@@ -306,6 +326,11 @@ fn write_solid_error(formatter: &mut fmt::Formatter<'_>, error: &SolidError) -> 
         ),
         _ => formatter.write_str("it takes four vertices at different places, not all in line"),
     }
+}
+
+fn write_missing(formatter: &mut fmt::Formatter<'_>, missing: &OutOfScratch) -> fmt::Result {
+    let OutOfScratch { needed, available } = missing;
+    write!(formatter, "{needed} bytes are needed where {available} are free: send a smaller model")
 }
 
 fn write_curve_error(formatter: &mut fmt::Formatter<'_>, error: &CurveError) -> fmt::Result {

@@ -20,6 +20,8 @@ pub struct Seen<'a> {
     pub elements: Elements<'a>,
     /// Faces of the model that were left out because they have no area.
     pub degenerate_faces: u32,
+    /// Whether something was nearer than the near plane.
+    pub is_cut: bool,
 }
 
 /// Takes every vertex of `model` to view coordinates, makes one of those at the same place, leaves
@@ -45,13 +47,13 @@ pub fn see<'a>(
             (&*vertices, elements)
         }
     };
-    let (vertices, elements) = match view.near() {
-        Some(near) if vertices.iter().any(|vertex| vertex.z < near) => {
-            cut(vertices, elements, near, scratch)?
-        }
-        _ => (vertices, elements),
+    let is_nearer = |near: &i32| vertices.iter().any(|vertex| vertex.z < *near);
+    let near = view.near().filter(is_nearer);
+    let (vertices, elements) = match near {
+        Some(near) => cut(vertices, elements, near, scratch)?,
+        None => (vertices, elements),
     };
-    Ok(Seen { vertices, elements, degenerate_faces })
+    Ok(Seen { vertices, elements, degenerate_faces, is_cut: near.is_some() })
 }
 
 /// What of an edge is at `near` or beyond; `None` if nothing is.

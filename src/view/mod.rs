@@ -159,6 +159,11 @@ impl View {
         Vertex { x, y, z }
     }
 
+    /// What x/w and y/w are 45 degrees off the line of sight, in units of 2^-`fraction_bits`; `None` in a parallel view.
+    pub fn field(&self, fraction_bits: u32) -> Option<i64> {
+        self.near.map(|_| libm::ldexp(1.0 / self.image_unit, fraction_bits as i32) as i64)
+    }
+
     /// What of an edge is in front of the near plane; `None` if nothing is.
     pub fn clip_edge(&self, ends: [Vertex; 2]) -> Option<[Vertex; 2]> {
         clip::clip_edge(ends, self.near.unwrap_or(i32::MIN))

@@ -178,13 +178,16 @@ pub fn scratch_bytes(scene: &Scene<'_>) -> usize {
     let corners = outlines.corners.len();
     let vertices = scene.vertices.len();
     let faces = outlines.elements().count();
-    ChosenSides::bytes(corners)
-        + Ears::bytes(outlines, scene.vertices)
-        + ChosenSides::bytes_while_choosing(vertices, corners).max(
-            Scratch::bytes_for::<Place>(vertices)
-                + Scratch::bytes_for::<u32>(faces)
-                + Search::least_bytes(faces),
-        )
+    least_bytes(vertices, corners, faces) + Ears::bytes(outlines, scene.vertices)
+}
+
+/// The same for faces that are convex, or are covered by one fan of triangles, by numbers alone.
+pub const fn least_bytes(vertices: usize, corners: usize, faces: usize) -> usize {
+    let choosing = ChosenSides::bytes_while_choosing(vertices, corners);
+    let searching = Scratch::bytes_for::<Place>(vertices)
+        + Scratch::bytes_for::<u32>(faces)
+        + Search::least_bytes(faces);
+    ChosenSides::bytes(corners) + if choosing > searching { choosing } else { searching }
 }
 
 /// Finds the stretches of every edge and bar of the scene, in the order of the model.

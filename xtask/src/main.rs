@@ -57,6 +57,12 @@ enum Task {
     Gallery,
     /// Repeats Harrison's experiments (his chapter 7), counted in instructions.
     Experiments,
+    /// Compares hidden lines on many random scenes with an exact model.
+    Scenes {
+        /// How many scenes.
+        #[arg(default_value_t = 20_000)]
+        count: u32,
+    },
     /// Installs what building and testing need.
     SetUp,
     /// Runs every check: format, lints, documentation, tests on the host and in the emulator.
@@ -89,6 +95,7 @@ fn carry_out() -> Result<()> {
         Some(Task::Bench) => bench::count()?,
         Some(Task::Gallery) => gallery::make()?,
         Some(Task::Experiments) => experiments::repeat()?,
+        Some(Task::Scenes { count }) => test::random_scenes(count)?,
         Some(Task::SetUp) => {
             for &board in Board::ALL {
                 set_up::toolchain(board.target())?;

@@ -39,6 +39,15 @@ pub fn everything() -> Result<()> {
 /// The tests that need the emulators and the firmware.
 const EMULATOR: [&str; 2] = ["--features", "penup-host-tests/emulator"];
 
+/// As many random scenes as wanted, where `everything` has 2,000.
+pub fn random_scenes(count: u32) -> Result<()> {
+    step(
+        workspace("test")
+            .args(["--release", "--package", "penup-host-tests", "--test", "visibility_exact"])
+            .env("PENUP_SCENES", count.to_string()),
+    )
+}
+
 fn workspace(command: &str) -> Command {
     let mut cargo = cargo();
     cargo.current_dir(crate::root()).arg(command);

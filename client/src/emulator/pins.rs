@@ -1,5 +1,6 @@
 //! The board's pins, and what their changes mean for the machine.
 
+use penup::boards::host::{Change, Stamped};
 use std::time::Duration;
 
 /// A pin of the plotter.
@@ -51,6 +52,22 @@ impl PinChange {
     /// Whether it is a rising edge that steps.
     pub fn is_step(self) -> bool {
         self.high && matches!(self.pin, Pin::StepX | Pin::StepY)
+    }
+}
+
+impl From<&Stamped> for PinChange {
+    /// What a pin of the board of plain memory did; its ticks are 40 ns long.
+    fn from(Stamped { time, change }: &Stamped) -> Self {
+        let (pin, high) = match *change {
+            Change::StepX(high) => (Pin::StepX, high),
+            Change::StepY(high) => (Pin::StepY, high),
+            Change::UpX(high) => (Pin::DirX, high),
+            Change::UpY(high) => (Pin::DirY, high),
+            // Drivers are on while the pin is low.
+            Change::Enable(on) => (Pin::Enable, !on),
+            Change::Pen(height) => (Pin::Pen, height >= 64),
+        };
+        Self { pin, high, at: Duration::from_nanos(time * 40) }
     }
 }
 

@@ -45,9 +45,16 @@ struct Rom {
 }
 
 /// What is to be done.
-enum Work {
-    Erase { from: u32, bytes: usize },
-    Write { to: u32, page: [u8; PAGE_BYTES] },
+enum Work<'p> {
+    Erase {
+        from: u32,
+        bytes: usize,
+    },
+    /// The page is in RAM.
+    Write {
+        to: u32,
+        page: &'p [u8; PAGE_BYTES],
+    },
 }
 
 /// Does it, out of RAM.
@@ -56,7 +63,7 @@ enum Work {
 /// Interrupts are masked, and nothing else reads the flash; the work is within it.
 #[inline(never)]
 #[unsafe(link_section = ".data.flash")]
-unsafe extern "C" fn carry_out(rom: &Rom, work: &Work) {
+unsafe extern "C" fn carry_out(rom: &Rom, work: &Work<'_>) {
     // SAFETY: the order of the data sheet, 2.8.3.1.3; all is in ROM or RAM.
     unsafe {
         (rom.connect)();
@@ -80,7 +87,7 @@ impl Flash {
         Self(())
     }
 
-    fn work(&mut self, work: &Work) {
+    fn work(&mut self, work: &Work<'_>) {
         emergency::feed();
         // The boot loader's code, where it can be run while the flash cannot.
         let boot_2: [u32; 64] = bytemuck::cast(BOOT_2);
@@ -142,7 +149,7 @@ impl NorFlash for Flash {
             if to >= START && to < END {
                 let mut page = [0; PAGE_BYTES];
                 page.copy_from_slice(bytes);
-                self.work(&Work::Write { to, page });
+                self.work(&Work::Write { to, page: &page });
             }
         }
         Ok(())

@@ -44,7 +44,7 @@ enum Label {
 }
 
 /// Bytes of scratch for `count` vertices (odd points and free ends).
-pub(super) const fn scratch_bytes(count: usize) -> usize {
+pub const fn scratch_bytes(count: usize) -> usize {
     Scratch::bytes_for::<Node>(count + count / 2)
         + Scratch::bytes_for::<i32>(count / 2)
         + 2 * Scratch::bytes_for::<i32>(count)

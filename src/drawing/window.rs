@@ -1,0 +1,108 @@
+//! The part of the page that may be drawn on, and what of a line is in it.
+
+use super::{Page, PagePoint, StepsPerMillimetre};
+use crate::curve::Fine;
+use crate::fixed::divide_rounding;
+
+/// What the margins leave of a page, in 1/256 steps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Window {
+    low: Fine,
+    high: Fine,
+}
+
+impl Window {
+    pub fn new(page: &Page, steps: StepsPerMillimetre) -> Self {
+        let to_fine = |bits: i32, axis: usize| {
+            (i64::from(bits) * i64::from(steps[axis].to_bits())) >> 24 // 32 fraction bits, 8 stay
+        };
+        let margin = page.margin.to_bits();
+        let far = [page.width, page.height].map(|side| side.to_bits() - margin);
+        Self {
+            low: [0, 1].map(|axis: usize| to_fine(margin, axis)),
+            high: [0, 1].map(|axis: usize| to_fine(far[axis], axis)),
+        }
+    }
+
+    /// The part of a line that is inside, in steps (Liang and Barsky, 1984); `None` if nothing is.
+    /// Coordinates within ±2^40.
+    pub fn clip(&self, [from, to]: [Fine; 2]) -> Option<[PagePoint; 2]> {
+        let along = [0, 1].map(|axis: usize| to[axis] - from[axis]);
+        // Where the line enters and leaves, as ratios of numbers below 2^42.
+        let (mut enter, mut leave) = ((0, 1), (1, 1));
+        let later = |a: (i64, i64), b: (i64, i64)| {
+            i128::from(a.0) * i128::from(b.1) > i128::from(b.0) * i128::from(a.1)
+        };
+        for axis in [0, 1] {
+            for (way, room) in [
+                (-along[axis], from[axis] - self.low[axis]),
+                (along[axis], self.high[axis] - from[axis]),
+            ] {
+                if way == 0 && room < 0 {
+                    return None;
+                }
+                if way < 0 && later((-room, -way), enter) {
+                    enter = (-room, -way);
+                }
+                if way > 0 && later(leave, (room, way)) {
+                    leave = (room, way);
+                }
+            }
+        }
+        if later(enter, leave) {
+            return None;
+        }
+        let at = |(part, whole): (i64, i64)| {
+            let [x, y] = [0, 1].map(|axis: usize| {
+                let moved = i128::from(along[axis]) * i128::from(part)
+                    + i128::from(from[axis]) * i128::from(whole);
+                divide_rounding(moved, i128::from(whole) << 8) as i32
+            });
+            PagePoint { x, y }
+        };
+        Some([at(enter), at(leave)])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixed::Millimetres;
+
+    fn window() -> Window {
+        let [width, height, margin, steps] = [100, 60, 10, 10].map(Millimetres::from_num);
+        Window::new(&Page { width, height, margin }, [steps; 2])
+    }
+
+    fn clipped(ends: [[i64; 2]; 2]) -> Option<[[i32; 2]; 2]> {
+        let fine = ends.map(|end| end.map(|steps| steps * 256));
+        window().clip(fine).map(|ends| ends.map(|PagePoint { x, y }| [x, y]))
+    }
+
+    #[test]
+    fn what_is_inside_stays_and_what_is_outside_goes() {
+        assert_eq!(clipped([[100, 100], [900, 500]]), Some([[100, 100], [900, 500]]));
+        assert_eq!(clipped([[300, 200], [300, 200]]), Some([[300, 200], [300, 200]]));
+        for outside in [
+            [[99, 0], [99, 600]],
+            [[0, 501], [1000, 501]],
+            [[0, 300], [90, 590]],
+            [[950, 400], [900, 600]],
+        ] {
+            assert_eq!(clipped(outside), None, "{outside:?}");
+        }
+    }
+
+    #[test]
+    fn a_line_across_is_cut_at_both_borders_either_way() {
+        let ends = [[-700, 300], [1_000_900, 300]];
+        assert_eq!(clipped(ends), Some([[100, 300], [900, 300]]));
+        assert_eq!(clipped([ends[1], ends[0]]), Some([[900, 300], [100, 300]]));
+        // From the corner, up the diagonal of a far away place.
+        assert_eq!(
+            clipped([[0, 0], [4_000_000_000, 2_000_000_000]]),
+            Some([[200, 100], [900, 450]])
+        );
+        assert_eq!(clipped([[500, 300], [500, -9000]]), Some([[500, 300], [500, 100]]));
+    }
+}

@@ -1,0 +1,525 @@
+//! The editor of Cárdenas & Seeley: sequential arrays of joints and bars, and of faces and curves.
+//!
+//! [`Model::edit`] does one [`Edit`]. Deletion closes the hole by compaction, so that all numbers above
+//! fall, or plugs it with the last element, so that only that one's number changes. What hangs on a
+//! deleted vertex goes too. Refused, and the model is as it was: numbers that do not exist, a plane
+//! through vertices in line, coordinates or a copy that do not fit.
+
+use super::{Corner, Model, ModelError, POSITION_LIMIT, Position};
+use crate::fixed::{Decimal, divide_rounding};
+use crate::stage::{OutOfScratch, Scratch};
+use core::ops::Range;
+
+/// The arrays of a model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Part {
+    /// Joints.
+    Vertices,
+    /// Bars.
+    Bars,
+    /// Faces.
+    Faces,
+    /// Curves.
+    Curves,
+}
+
+/// First and last number, from 1 or from -1 backwards; `None` for all.
+pub type Numbers = Option<[i32; 2]>;
+
+/// One change. Numbers are those of OBJ: from 1, or from -1 for the last.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Edit {
+    /// Takes some out; the numbers above fall.
+    Delete(Part, [i32; 2]),
+    /// Takes one out; the last takes its number.
+    Plug(Part, i32),
+    /// Moves a vertex to a place.
+    Move(i32, [Decimal; 3]),
+    /// Adds to each coordinate.
+    Translate([Decimal; 3], Numbers),
+    /// Multiplies each coordinate by its factor.
+    Scale([Decimal; 3], Numbers),
+    /// Turns about an axis (0 to 2) through the origin by degrees, counter-clockwise seen against it.
+    Rotate(u8, f64, Numbers),
+    /// Adds the image about the plane of three vertices; those on the plane are in both.
+    Mirror([i32; 3], Numbers),
+    /// Moves to the image about the plane of three vertices.
+    Reflect([i32; 3], Numbers),
+}
+
+/// How many an edit added, or took away if negative.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Change {
+    /// Joints.
+    pub vertices: i32,
+    /// Bars.
+    pub bars: i32,
+    /// Faces.
+    pub faces: i32,
+    /// Curves.
+    pub curves: i32,
+}
+
+/// A matrix entry of 1 is 2^this.
+const UNIT_BITS: u32 = 30;
+
+/// Factors of scale stay within ± this.
+const SCALE_LIMIT: i64 = 1 << (20 + UNIT_BITS);
+
+/// Of a normal: then a product with a difference of positions fits 64 bits.
+const NORMAL_BITS: u32 = 28;
+
+/// A vertex this near to its image, in units of the model, counts as on the plane: rounding.
+const ON_PLANE: u64 = 16;
+
+/// A map of positions.
+enum Map {
+    /// Rows of a matrix in units of 2^-[`UNIT_BITS`], and what is added.
+    Affine([[i64; 3]; 3], [i64; 3]),
+    /// About the plane through a position with this normal, each component within ±2^[`NORMAL_BITS`].
+    Reflection(Position, [i64; 3]),
+}
+
+impl Map {
+    const NO_SHIFT: [i64; 3] = [0; 3];
+
+    fn diagonal(entries: [i64; 3]) -> [[i64; 3]; 3] {
+        [0, 1, 2].map(|row| [0, 1, 2].map(|column| if row == column { entries[row] } else { 0 }))
+    }
+
+    /// Counter-clockwise about an axis, seen from its far end.
+    fn rotation(axis: u8, degrees: f64) -> Self {
+        let radians = libm::remainder(degrees, 360.0).to_radians();
+        let entry = |value: f64| libm::round(libm::ldexp(value, UNIT_BITS as i32)) as i64;
+        let (sine, cosine) = (entry(libm::sin(radians)), entry(libm::cos(radians)));
+        let axis = usize::from(axis % 3);
+        let (from, to) = ((axis + 1) % 3, (axis + 2) % 3);
+        let mut rows = Self::diagonal([1 << UNIT_BITS; 3]);
+        (rows[from][from], rows[from][to]) = (cosine, -sine);
+        (rows[to][from], rows[to][to]) = (sine, cosine);
+        Self::Affine(rows, Self::NO_SHIFT)
+    }
+
+    /// Where a position goes, rounded; kept within ±2^62.
+    #[inline(never)] // Once is enough: it is 128 bits wide.
+    fn apply(&self, position: Position) -> [i64; 3] {
+        let p = position.coordinates().map(i64::from);
+        match self {
+            Self::Affine(rows, shift) => [0, 1, 2].map(|row: usize| {
+                let products = rows[row].iter().zip(p).map(|(m, p)| i128::from(*m) * i128::from(p));
+                let half = 1 << (UNIT_BITS - 1);
+                within((products.sum::<i128>() + half) >> UNIT_BITS).saturating_add(shift[row])
+            }),
+            Self::Reflection(on_plane, n) => {
+                let q = on_plane.coordinates().map(i64::from);
+                // Below 3 2^31 2^28.
+                let height: i64 = (0..3).map(|k| (p[k] - q[k]) * n[k]).sum();
+                let square: i64 = n.iter().map(|c| c * c).sum();
+                [0, 1, 2].map(|k: usize| {
+                    let product = 2 * i128::from(height) * i128::from(n[k]);
+                    p[k] - within(divide_rounding(product, square.into()))
+                })
+            }
+        }
+    }
+}
+
+fn within(value: i128) -> i64 {
+    const LIMIT: i128 = 1 << 62;
+    value.clamp(-LIMIT, LIMIT) as i64
+}
+
+impl Model<'_> {
+    /// Does one change. `scratch`: 2 bytes for each vertex.
+    ///
+    /// # Errors
+    /// See [`ModelError`]; the model is unchanged.
+    pub fn edit(&mut self, edit: Edit, scratch: Scratch<'_>) -> Result<Change, ModelError> {
+        if self.curves.is_in_hand() {
+            return Err(ModelError::CurveUnfinished);
+        }
+        let before = self.counts();
+        match edit {
+            Edit::Delete(part, numbers) => {
+                let range = self.range(part, Some(numbers))?;
+                self.delete(part, range, false);
+            }
+            Edit::Plug(part, number) => {
+                let range = self.range(part, Some([number; 2]))?;
+                self.delete(part, range, true);
+            }
+            Edit::Move(number, place) => {
+                let range = self.range(Part::Vertices, Some([number; 2]))?;
+                let place = self.place(place)?;
+                for vertex in self.vertices.get_mut(range).unwrap_or(&mut []) {
+                    *vertex = place;
+                }
+            }
+            Edit::Translate(by, numbers) => {
+                let range = self.range(Part::Vertices, numbers)?;
+                let mut shift = Map::NO_SHIFT;
+                for (shift, by) in shift.iter_mut().zip(by) {
+                    *shift = by
+                        .to_binary_truncated(self.fraction_bits)
+                        .map_err(|_| ModelError::CoordinateTooLarge)?;
+                }
+                let map = Map::Affine(Map::diagonal([1 << UNIT_BITS; 3]), shift);
+                self.transform(&map, range)?;
+            }
+            Edit::Scale(by, numbers) => {
+                let range = self.range(Part::Vertices, numbers)?;
+                let mut factors = [0; 3];
+                for (factor, by) in factors.iter_mut().zip(by) {
+                    let value = by.to_binary(UNIT_BITS).ok();
+                    *factor = value
+                        .filter(|factor| factor.abs() <= SCALE_LIMIT)
+                        .ok_or(ModelError::CoordinateTooLarge)?;
+                }
+                self.transform(&Map::Affine(Map::diagonal(factors), Map::NO_SHIFT), range)?;
+            }
+            Edit::Rotate(axis, degrees, numbers) => {
+                let range = self.range(Part::Vertices, numbers)?;
+                self.transform(&Map::rotation(axis, degrees), range)?;
+            }
+            Edit::Reflect(plane, numbers) => {
+                let range = self.range(Part::Vertices, numbers)?;
+                self.transform(&self.reflection(plane)?, range.clone())?;
+                self.turn_faces(&range);
+            }
+            Edit::Mirror(plane, numbers) => {
+                let range = self.range(Part::Vertices, numbers)?;
+                self.mirror(&self.reflection(plane)?, range, scratch)?;
+            }
+        }
+        let after = self.counts();
+        let [vertices, bars, faces, curves] =
+            [0, 1, 2, 3].map(|part: usize| after[part] as i32 - before[part] as i32);
+        Ok(Change { vertices, bars, faces, curves })
+    }
+
+    fn counts(&self) -> [usize; 4] {
+        [Part::Vertices, Part::Bars, Part::Faces, Part::Curves].map(|part| self.count(part))
+    }
+
+    /// How many there are.
+    pub fn count(&self, part: Part) -> usize {
+        match part {
+            Part::Vertices => self.vertices.len(),
+            Part::Bars => self.bars,
+            Part::Faces => self.faces,
+            Part::Curves => self.curves.count,
+        }
+    }
+
+    /// The indices of the elements with these numbers; never empty but for `None` of nothing.
+    ///
+    /// # Errors
+    /// [`ModelError::UnknownVertex`], [`ModelError::UnknownElement`].
+    pub fn range(&self, part: Part, numbers: Numbers) -> Result<Range<usize>, ModelError> {
+        let count = self.count(part);
+        let Some(numbers) = numbers else { return Ok(0..count) };
+        let mut ends = [0; 2];
+        for (end, number) in ends.iter_mut().zip(numbers) {
+            *end = super::resolve(number, count).map(usize::from).ok_or(match part {
+                Part::Vertices => ModelError::UnknownVertex { number, vertices: count },
+                _ => ModelError::UnknownElement { part, number, count },
+            })?;
+        }
+        let [first, last] = ends;
+        Ok(first.min(last)..first.max(last) + 1)
+    }
+
+    fn delete(&mut self, part: Part, range: Range<usize>, plug: bool) {
+        match part {
+            Part::Vertices => {
+                let gone = range.len();
+                if plug {
+                    self.vertices.swap_remove(range.start);
+                } else {
+                    let count = self.vertices.len();
+                    self.vertices.copy_within(range.end..count, range.start);
+                    self.vertices.truncate(count - gone);
+                }
+                let last = self.vertices.len();
+                self.renumber(&|number| {
+                    let at = usize::from(number);
+                    if range.contains(&at) {
+                        None
+                    } else if plug && at == last {
+                        Some(range.start as u16) // below VERTEX_NUMBER_LIMIT
+                    } else if plug || at < range.start {
+                        Some(number)
+                    } else {
+                        Some(number - gone as u16)
+                    }
+                });
+            }
+            Part::Curves => self.curves.delete(self.corners, range, plug),
+            Part::Bars | Part::Faces => self.delete_elements(part == Part::Bars, range, plug),
+        }
+    }
+
+    /// Deletes those of the bars, or faces, whose places among them are in `range`.
+    fn delete_elements(&mut self, bars: bool, range: Range<usize>, plug: bool) {
+        if plug {
+            // The last one before the one that goes.
+            let corners = self.corners.get_mut(..self.curves.start).unwrap_or(&mut []);
+            let (mut at, mut number, mut hole) = (0, 0, 0);
+            let mut last = 0..0;
+            while let Some(length) = corners.get(at..).and_then(element_length) {
+                if corners.get(at).is_some_and(|corner| corner.of_bar() == bars) {
+                    if number == range.start {
+                        hole = at;
+                    }
+                    number += 1;
+                    last = at..at + length;
+                }
+                at += length;
+            }
+            if let Some(between) = corners.get_mut(hole..last.end).filter(|_| last.start > hole) {
+                between.rotate_right(last.len());
+                self.keep_elements(bars, range.start + 1..range.end + 1);
+                return;
+            }
+        }
+        self.keep_elements(bars, range);
+    }
+
+    /// Takes out those of the bars, or faces, whose places among them are in `gone`.
+    fn keep_elements(&mut self, bars: bool, gone: Range<usize>) {
+        let mut number = 0;
+        self.retain(&mut |element| {
+            let counts = element.first().is_some_and(|corner| corner.of_bar() == bars);
+            number += usize::from(counts);
+            !(counts && gone.contains(&(number - 1)))
+        });
+    }
+
+    /// Gives every corner and control point its new number. What has one that maps to `None` goes.
+    fn renumber(&mut self, new: &dyn Fn(u16) -> Option<u16>) {
+        self.retain(&mut |element| {
+            element.iter_mut().all(|corner| match new(corner.vertex()) {
+                Some(number) => {
+                    *corner = Corner::new(number, corner.of_bar(), corner.is_last());
+                    true
+                }
+                None => false,
+            })
+        });
+        self.curves.renumber(self.corners, new);
+    }
+
+    /// Keeps the elements for which `stays` says so; it may change them.
+    fn retain(&mut self, stays: &mut dyn FnMut(&mut [Corner]) -> bool) {
+        let start = self.curves.start;
+        let (mut read, mut write, mut bars, mut faces) = (0, 0, 0, 0);
+        while let Some(length) = self.corners.get(read..start).and_then(element_length) {
+            let element = self.corners.get_mut(read..read + length).unwrap_or(&mut []);
+            let of_bar = element.first().is_some_and(|corner| corner.of_bar());
+            if stays(element) {
+                self.corners.copy_within(read..read + length, write);
+                write += length;
+                *(if of_bar { &mut bars } else { &mut faces }) += 1;
+            }
+            read += length;
+        }
+        let count = self.corners.len();
+        self.corners.copy_within(start..count, write);
+        self.corners.truncate(count - (start - write));
+        self.curves.start = write;
+        (self.bars, self.faces) = (bars, faces);
+    }
+
+    /// The reflection about the plane of three vertices.
+    fn reflection(&self, numbers: [i32; 3]) -> Result<Map, ModelError> {
+        let vertices = self.vertices.len();
+        let mut corners = [Position::default(); 3];
+        for (corner, number) in corners.iter_mut().zip(numbers) {
+            *corner = super::resolve(number, vertices)
+                .and_then(|at| self.vertices.get(usize::from(at)))
+                .copied()
+                .ok_or(ModelError::UnknownVertex { number, vertices })?;
+        }
+        let [a, b, c] = corners.map(Position::coordinates);
+        let [u, v] =
+            [b, c].map(|end| [0, 1, 2].map(|k: usize| i64::from(end[k]) - i64::from(a[k])));
+        let cross = [0, 1, 2].map(|k: usize| {
+            let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+            // At most 2^63.
+            (u[i] * v[j]).saturating_sub(u[j] * v[i])
+        });
+        let divisor = cross.iter().fold(0, |divisor, part| gcd(divisor, part.unsigned_abs()));
+        if divisor == 0 {
+            return Err(ModelError::NoPlane);
+        }
+        let divisor = i64::try_from(divisor).unwrap_or(i64::MAX);
+        let normal = cross.map(|part| part / divisor);
+        let largest = normal.iter().map(|part| part.unsigned_abs()).max().unwrap_or(1);
+        let excess = (u64::BITS - largest.leading_zeros()).saturating_sub(NORMAL_BITS);
+        Ok(Map::Reflection(corners[0], normal.map(|part| part >> excess)))
+    }
+
+    /// Takes some vertices through a map, in a coarser unit if it must be.
+    fn transform(&mut self, map: &Map, range: Range<usize>) -> Result<(), ModelError> {
+        let positions = self.vertices.get(range.clone()).unwrap_or(&[]);
+        let coarser = self.coarser_for(positions.iter().map(|position| map.apply(*position)))?;
+        for position in self.vertices.get_mut(range.clone()).unwrap_or(&mut []) {
+            *position = in_unit(map.apply(*position), coarser);
+        }
+        self.coarsen_others(coarser, range);
+        Ok(())
+    }
+
+    /// By how many bits the unit must grow so that these positions fit.
+    fn coarser_for(&self, positions: impl Iterator<Item = [i64; 3]>) -> Result<u32, ModelError> {
+        let largest = positions.flatten().map(i64::unsigned_abs).max().unwrap_or(0);
+        (0..=self.fraction_bits)
+            .find(|bits| largest >> bits <= POSITION_LIMIT as u64)
+            .ok_or(ModelError::CoordinateTooLarge)
+    }
+
+    /// All but `range` to a coarser unit.
+    fn coarsen_others(&mut self, bits: u32, range: Range<usize>) {
+        if bits > 0 {
+            for (at, position) in self.vertices.iter_mut().enumerate() {
+                if !range.contains(&at) {
+                    *position = in_unit(position.coordinates().map(i64::from), bits);
+                }
+            }
+            self.fraction_bits -= bits;
+        }
+    }
+
+    /// Turns faces round that have all their vertices in `range`, so that they face outwards again.
+    fn turn_faces(&mut self, range: &Range<usize>) {
+        self.retain(&mut |element| {
+            let inside = element.iter().all(|corner| range.contains(&usize::from(corner.vertex())));
+            if inside && element.first().is_some_and(|corner| !corner.of_bar()) {
+                reverse(element);
+            }
+            true
+        });
+    }
+
+    /// Adds the image of the vertices in `range` and of what has all its vertices there.
+    fn mirror(
+        &mut self,
+        map: &Map,
+        range: Range<usize>,
+        mut scratch: Scratch<'_>,
+    ) -> Result<(), ModelError> {
+        let images = scratch.take::<u16>(range.len()).map_err(ModelError::Scratch)?;
+        let (old, limit) = (self.vertices.len(), self.vertex_limit());
+        let mut count = old;
+        for (at, image) in range.clone().zip(images.iter_mut()) {
+            let Some(position) = self.vertices.get(at) else { continue };
+            let near = |(image, c): (i64, i32)| (image - i64::from(c)).unsigned_abs() <= ON_PLANE;
+            let stays = map.apply(*position).into_iter().zip(position.coordinates()).all(near);
+            // Below VERTEX_NUMBER_LIMIT, or refused below.
+            *image = if stays { at } else { count } as u16;
+            count += usize::from(!stays);
+        }
+        if count > limit {
+            return Err(ModelError::TooManyVertices { limit });
+        }
+        let image = |number: u16| {
+            let at = usize::from(number).checked_sub(range.start)?;
+            images.get(at).copied()
+        };
+        // What lies in the plane is its own image.
+        let is_copied = |mut numbers: &mut dyn Iterator<Item = u16>| {
+            let mut moves = false;
+            Iterator::all(&mut numbers, |number| {
+                image(number).inspect(|new| moves |= *new != number).is_some()
+            }) && moves
+        };
+        let elements = self.elements();
+        let of_elements: usize = elements
+            .corners()
+            .split_inclusive(|corner| corner.is_last())
+            .filter(|element| is_copied(&mut element.iter().map(|corner| corner.vertex())))
+            .map(<[Corner]>::len)
+            .sum();
+        let of_curves: usize = self
+            .curves()
+            .iter()
+            .filter(|curve| is_copied(&mut curve.control.iter().copied()))
+            .map(|curve| curve.half_words())
+            .sum();
+        self.check_corners(of_elements + of_curves)?;
+        let positions = self.vertices.get(range.clone()).unwrap_or(&[]);
+        let coarser = self.coarser_for(positions.iter().map(|position| map.apply(*position)))?;
+
+        for at in range.clone() {
+            let Some(position) = self.vertices.get(at) else { continue };
+            if image(at as u16) != Some(at as u16) {
+                let position = in_unit(map.apply(*position), coarser);
+                // There is room: it was counted.
+                let _ = self.vertices.push(position);
+            }
+        }
+        self.coarsen_others(coarser, old..count);
+        let end = self.curves.start;
+        let mut at = 0;
+        while let Some(length) = self.corners.get(at..end).and_then(element_length) {
+            let element = at..at + length;
+            at += length;
+            let corners = self.corners.get(element.clone()).unwrap_or(&[]);
+            if !is_copied(&mut corners.iter().map(|corner| corner.vertex())) {
+                continue;
+            }
+            let start = self.curves.start;
+            for at in element {
+                let Some(corner) = self.corners.get(at).copied() else { continue };
+                let number = image(corner.vertex()).unwrap_or(0);
+                // There is room: it was counted.
+                let _ = self.insert(Corner::new(number, corner.of_bar(), corner.is_last()));
+            }
+            let copy = self.corners.get_mut(start..self.curves.start).unwrap_or(&mut []);
+            if copy.first().is_some_and(|corner| corner.of_bar()) {
+                self.bars += 1;
+            } else {
+                reverse(copy);
+                self.faces += 1;
+            }
+        }
+        self.curves.copy(self.corners, &is_copied, &image);
+        Ok(())
+    }
+}
+
+/// The corners of the first element.
+fn element_length(corners: &[Corner]) -> Option<usize> {
+    corners.iter().position(|corner| corner.is_last()).map(|last| last + 1)
+}
+
+/// The other way round, beginning at the same vertex.
+fn reverse(face: &mut [Corner]) {
+    let Some((_, rest)) = face.split_first_mut() else { return };
+    rest.reverse();
+    let last = face.len() - 1;
+    for (at, corner) in face.iter_mut().enumerate() {
+        *corner = Corner::new(corner.vertex(), false, at == last);
+    }
+}
+
+/// Towards zero, as when the unit grows.
+fn in_unit(position: [i64; 3], coarser: u32) -> Position {
+    // It fits: see `coarser_for`.
+    let [x, y, z] = position.map(|c| ((c.abs() >> coarser) * c.signum()) as i32);
+    Position { x, y, z }
+}
+
+fn gcd(mut a: u64, mut b: u64) -> u64 {
+    while b != 0 {
+        (a, b) = (b, a % b);
+    }
+    a
+}
+
+impl From<OutOfScratch> for ModelError {
+    fn from(missing: OutOfScratch) -> Self {
+        Self::Scratch(missing)
+    }
+}

@@ -1,0 +1,56 @@
+//! The whole model in memory that is idle, to take back an edit.
+
+use super::{Corner, Model, Position};
+use crate::stage::{Scratch, items};
+
+/// Numbers before the vertices.
+const HEAD: usize = 8;
+
+impl Model<'_> {
+    /// Copies the model to `words`. `false` if it does not fit, or a curve has no end yet.
+    pub fn save(&self, words: &mut [u64]) -> bool {
+        !self.curves.is_in_hand() && self.copy_to(Scratch::new(words)).is_some()
+    }
+
+    /// How many words [`Model::save`] uses of those that it is given.
+    pub fn saved_words(&self) -> usize {
+        let vertices = Scratch::bytes_for::<Position>(self.vertices.len());
+        let corners = Scratch::bytes_for::<Corner>(self.corners.len());
+        (Scratch::bytes_for::<u32>(HEAD) + vertices + corners) / size_of::<u64>()
+    }
+
+    fn copy_to(&self, mut scratch: Scratch<'_>) -> Option<()> {
+        let (curves, lengths) = (&self.curves, [self.vertices.len(), self.corners.len()]);
+        let numbers = [self.faces, self.bars, curves.start, curves.whole(), curves.count];
+        let numbers = [self.fraction_bits as usize].into_iter().chain(lengths).chain(numbers);
+        for (word, number) in scratch.take::<u32>(HEAD).ok()?.iter_mut().zip(numbers) {
+            *word = number as u32;
+        }
+        scratch.take::<Position>(lengths[0]).ok()?.copy_from_slice(self.vertices);
+        scratch.take::<Corner>(lengths[1]).ok()?.copy_from_slice(self.corners);
+        Some(())
+    }
+
+    /// Makes the model what it was when [`Model::save`] copied it to `words`, which nobody has changed.
+    pub fn restore(&mut self, words: &[u64]) {
+        let _ = self.copy_from(words); // it fits where it was
+    }
+
+    fn copy_from(&mut self, words: &[u64]) -> Option<()> {
+        let head: &[u32] = items(words, HEAD)?;
+        let [fraction_bits, vertices, corners, faces, bars, start, whole, count] = *head else {
+            return None;
+        };
+        let positions_at = Scratch::bytes_for::<u32>(HEAD) / 8;
+        let corners_at = positions_at + Scratch::bytes_for::<Position>(vertices as usize) / 8;
+        self.vertices.clear();
+        let saved = items(words.get(positions_at..)?, vertices as usize)?;
+        self.vertices.extend_from_slice(saved).ok()?;
+        self.corners.clear();
+        self.corners.extend_from_slice(items(words.get(corners_at..)?, corners as usize)?).ok()?;
+        self.fraction_bits = fraction_bits;
+        (self.faces, self.bars) = (faces as usize, bars as usize);
+        self.curves.restore(start as usize, whole as usize, count as usize);
+        Some(())
+    }
+}
