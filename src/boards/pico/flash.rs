@@ -146,7 +146,7 @@ impl NorFlash for Flash {
 
     fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Infallible> {
         for (to, bytes) in (offset..).step_by(PAGE_BYTES).zip(bytes.chunks_exact(PAGE_BYTES)) {
-            if to >= START && to < END {
+            if (START..END).contains(&to) {
                 let mut page = [0; PAGE_BYTES];
                 page.copy_from_slice(bytes);
                 self.work(&Work::Write { to, page: &page });
