@@ -101,7 +101,9 @@ fn stops(pin: u8, alarm: &str, settings: &[&str]) -> TestResult {
     for text in job_lines("lattice2.obj", &["$page=60x80", "$margin=5"]) {
         assert_eq!(line.ask(&text)?, "ok", "{text}");
     }
-    while line.emulator.pin_changes()?.len() < 1000 {
+    let mut seen = 0;
+    while seen < 1000 {
+        seen += line.emulator.pin_changes()?.len();
         std::thread::sleep(Duration::from_millis(5));
     }
     line.emulator.bounce(pin, false, Duration::from_millis(5))?;
