@@ -33,10 +33,10 @@ fn on_the_host(board: Board, lines: &[String]) -> Vec<MachineEventKind> {
 }
 
 /// An emulated board at the other end of a serial line.
-pub struct Line {
-    /// The board.
-    pub emulator: Box<dyn EmulatedBoard>,
+pub struct Line<E: ?Sized = dyn EmulatedBoard> {
     heard: Vec<u8>,
+    /// The board.
+    pub emulator: Box<E>,
 }
 
 impl Line {
@@ -45,9 +45,28 @@ impl Line {
     /// # Errors
     /// It does not start.
     pub fn open(board: Board) -> Result<Self, Box<dyn Error>> {
-        let mut line = Self { emulator: board.boot()?, heard: Vec::new() };
-        while !line.hear()?.starts_with("Grbl") {}
+        Self::to(board.boot()?)
+    }
+}
+
+impl<E: EmulatedBoard + ?Sized> Line<E> {
+    /// A line to a board that is starting.
+    ///
+    /// # Errors
+    /// It does not greet.
+    pub fn to(emulator: Box<E>) -> Result<Self, Box<dyn Error>> {
+        let mut line = Self { heard: Vec::new(), emulator };
+        line.hear_greeting()?;
         Ok(line)
+    }
+
+    /// Listens until the board greets.
+    ///
+    /// # Errors
+    /// It does not.
+    pub fn hear_greeting(&mut self) -> Result<(), Box<dyn Error>> {
+        while !self.hear()?.starts_with("Grbl") {}
+        Ok(())
     }
 
     /// The next line that comes back.

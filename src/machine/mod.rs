@@ -71,6 +71,8 @@ pub enum Alarm {
     HomingFailed(Axis),
     /// The queue refused an event although it had room: a fault of the program.
     Queue,
+    /// The watchdog started the board again: a fault of the program.
+    Restarted,
 }
 
 /// Why an order was refused.

@@ -262,6 +262,25 @@ impl Settings {
         Ok(())
     }
 
+    /// The defaults, but for `values` by their numbers: as they were once read from
+    /// [`Settings::iter`]. Numbers that there are no more are passed over; a value out of its range,
+    /// or values that conflict, give the defaults.
+    pub fn restored(values: impl IntoIterator<Item = (u16, Value)>) -> Self {
+        let mut restored = Self::default();
+        for (setting, value) in values.into_iter().filter_map(|(number, value)| {
+            let setting = Setting::numbered(number)?;
+            Some((setting, value))
+        }) {
+            let info = setting.info();
+            let out_of_range = value < info.least || value > info.greatest;
+            if out_of_range || (info.whole && value.frac() != 0) {
+                return Self::default();
+            }
+            restored.values[setting as usize] = value;
+        }
+        if restored.checked_limits().is_ok() { restored } else { Self::default() }
+    }
+
     /// All settings with their values, by number.
     pub fn iter(&self) -> impl Iterator<Item = (&'static SettingInfo, Value)> {
         SETTINGS.iter().zip(self.values)
@@ -432,6 +451,25 @@ mod tests {
             Err(SettingError::Conflict(LimitsError::TooManySteps { .. }))
         ));
         assert_eq!(settings, before);
+    }
+
+    #[test]
+    fn restored_settings_are_those_that_were_kept_or_the_defaults() {
+        let mut settings = Settings::default();
+        settings.set(Setting::TravelX, Value::from_num(300)).expect("valid");
+        settings.set(Setting::StepPulse, Value::from_num(1.5)).expect("valid");
+        let kept = |settings: &Settings| {
+            settings.iter().map(|(info, value)| (info.number, value)).collect::<std::vec::Vec<_>>()
+        };
+        let mut values = kept(&settings);
+        assert_eq!(Settings::restored(values.clone()), settings);
+        values.push((9999, Value::ONE)); // of another version
+        assert_eq!(Settings::restored(values.clone()), settings);
+        for (number, value) in [(130, 0.0), (20, 0.5), (0, 400.0)] {
+            let mut spoilt = values.clone();
+            spoilt.push((number, Value::from_num(value)));
+            assert_eq!(Settings::restored(spoilt), Settings::default());
+        }
     }
 
     #[test]

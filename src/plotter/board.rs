@@ -24,6 +24,48 @@ pub trait Board {
     /// Runs the step interrupt as soon as no pulse is high, although its time has not come: the pins
     /// were halted.
     fn step_now(&mut self) {}
+    /// Whether its watchdog has started it again.
+    fn was_restarted(&self) -> bool {
+        false
+    }
+    /// Keeps what `parts` hold, one after the other, through a loss of power: as the new state of
+    /// `record`, in place of the last one. May block, so only while the machine stands.
+    ///
+    /// # Errors
+    /// The last state is still kept.
+    fn keep(&mut self, record: Record, parts: &[&[u8]]) -> Result<(), NotKept> {
+        let _ = (record, parts);
+        Ok(())
+    }
+    /// Hands the kept state of `record` to `take`, if there is one.
+    fn recall(&mut self, record: Record, take: &mut dyn FnMut(&mut dyn Kept)) {
+        let _ = (record, take);
+    }
     /// Sleeps until an interrupt; returns at once if one came since it last returned.
     fn wait(&mut self);
+}
+
+/// What a board with flash keeps through a loss of power.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Record {
+    /// The settings of the machine.
+    Settings,
+    /// The model and the options of the last job.
+    Job,
+}
+
+/// The board cannot keep something.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct NotKept;
+
+/// A kept state, from its beginning on.
+pub trait Kept {
+    /// The next bytes, as many as there are and `into` holds; says how many.
+    fn read(&mut self, into: &mut [u8]) -> usize;
+}
+
+impl<F: embedded_storage::nor_flash::ReadNorFlash> Kept for crate::storage::Reader<'_, F> {
+    fn read(&mut self, into: &mut [u8]) -> usize {
+        Self::read(self, into)
+    }
 }

@@ -9,6 +9,7 @@ mod board;
 pub mod budget;
 mod editor;
 mod job;
+mod kept;
 mod memory;
 mod options;
 mod plan;
@@ -17,7 +18,7 @@ mod reply;
 mod solid;
 mod stream;
 
-pub use board::Board;
+pub use board::{Board, Kept, NotKept, Record};
 pub use job::{Cursor, Job, Observer, Strokes, Unobserved};
 pub use memory::{Lent, Lm3s6965Memory, Memory, NO_MOVES, PicoMemory};
 pub use options::PlotOptions;
@@ -39,7 +40,10 @@ const AHEAD_TICKS: u32 = crate::motion::TICKS_PER_SECOND / 20;
 
 /// Polls the plotter for ever; sleeps when there is nothing to do.
 pub fn run<B: Board>(board: &mut B, memory: Lent<'_>, pins: &PulserState) -> ! {
-    let mut plotter = Plotter::new(memory, pins);
+    let mut plotter = Plotter::with_settings(memory, pins, kept::settings(board));
+    if board.was_restarted() {
+        plotter.inner.machine.alarm(Alarm::Restarted);
+    }
     plotter.greet(board);
     loop {
         if !plotter.poll(board) {
@@ -82,6 +86,11 @@ impl<'m> Plotter<'m> {
     /// An idle plotter at the page's origin with an empty model. `pins` is what the board's step
     /// interrupt counts in.
     pub fn new(memory: Lent<'m>, pins: &'m PulserState) -> Self {
+        Self::with_settings(memory, pins, Settings::default())
+    }
+
+    /// The same with other settings than the defaults.
+    pub fn with_settings(memory: Lent<'m>, pins: &'m PulserState, settings: Settings) -> Self {
         let Lent { vertices, corners, blocks, words } = memory;
         Self {
             reader: LineReader::default(),
@@ -89,7 +98,7 @@ impl<'m> Plotter<'m> {
                 model: Model::new(vertices, corners),
                 options: PlotOptions::default(),
                 words,
-                machine: Machine::new(Settings::default(), blocks, pins, AHEAD_TICKS),
+                machine: Machine::new(settings, blocks, pins, AHEAD_TICKS),
                 job: Job::default(),
                 cursor: Cursor::default(),
                 can_undo: false,
@@ -237,7 +246,10 @@ impl Inner<'_> {
             Command::Help => self.task = Some(Task::List(Listing::Help, 0)),
             Command::BuildInfo => self.report_build(board),
             Command::Settings => self.task = Some(Task::List(Listing::Settings, 0)),
-            Command::Setting { name, value } => self.change_setting(name, value)?,
+            Command::Setting { name, value } => {
+                self.change_setting(name, value)?;
+                kept::keep_settings(self.machine.settings(), board)?;
+            }
             Command::Option(option) => self.options.set(option),
             Command::Options => self.task = Some(Task::List(Listing::Options, 0)),
             Command::Model => self.report_model(board),
@@ -376,6 +388,9 @@ impl Inner<'_> {
         reply.position(self.machine.position_mm());
         if status.percent != 100 {
             reply.part(format_args!("|Ov:{},100,100", status.percent));
+        }
+        if let State::Alarm(alarm) = status.state {
+            reply.part(format_args!("|Alarm:{}", stream::number(alarm)));
         }
         let (switches, stop) = (self.machine.switches(), self.machine.stop_is_pressed());
         if switches.any() || stop {

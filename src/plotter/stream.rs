@@ -255,12 +255,13 @@ impl Program {
 }
 
 /// As Grbl and its successors number them.
-const fn number(alarm: Alarm) -> u8 {
+pub(super) const fn number(alarm: Alarm) -> u8 {
     match alarm {
         Alarm::HardLimit => 1,
         Alarm::HomingFailed(_) => 9,
         Alarm::EmergencyStop => 10,
         Alarm::NotHomed => 11,
         Alarm::Queue => 100,
+        Alarm::Restarted => 101,
     }
 }

@@ -80,6 +80,8 @@ pub enum Refusal {
     NothingToUndo,
     /// The user gave the job up while it was computed.
     Aborted,
+    /// The flash does not keep it.
+    NotKept,
 }
 
 /// Each `error:N` and what it means, as `docs/protocol.md` lists them.
@@ -128,6 +130,7 @@ pub const MEANINGS: &[(u16, &str)] = &[
     (150, "setting out of range"),
     (151, "setting conflicts with another"),
     (152, "move too long"),
+    (160, "in force, but not kept: the flash is worn out"),
 ];
 
 impl Refusal {
@@ -184,6 +187,7 @@ impl Refusal {
             Self::Machine(MachineError::MoveTooLong { .. }) => 152,
             Self::DrawingTooLarge(_) => 140,
             Self::Aborted => 141,
+            Self::NotKept => 160,
             Self::TooManyLines => 142,
             Self::NothingToUndo => 143,
         }
@@ -262,6 +266,7 @@ impl fmt::Display for Refusal {
                 formatter.write_str("only the last change can be taken back, and not after a plot")
             }
             Self::Aborted => formatter.write_str("the job was given up"),
+            Self::NotKept => formatter.write_str("in force until power is lost: the flash does not keep it"),
         }
     }
 }

@@ -4,8 +4,14 @@
 //
 // Standard input and output carry records of 8 bytes: what, a value, and the core cycle (48 bits,
 // little-endian). In: 0 a byte for the serial line, 1 a level for a pin (its number, + 128 if high),
-// not before that cycle. Out: 0 a byte of the serial line, 1 a pin's new level, 2 the time, 3 a byte
-// of the log.
+// not before that cycle; 2 the power goes at that cycle, 3 it goes when so many more bytes of flash
+// have been erased or written (the number in the cycle's place), and comes back at once; 4 the main
+// loop hangs from that cycle on. Out: 0 a byte
+// of the serial line, 1 a pin's new level, 2 the time, 3 a byte of the log, 4 the chip was reset (0 by
+// the loss of power, 1 by the watchdog).
+//
+// rp2040js has no boot ROM: here is one, of the functions that the image asks for. Each is a
+// breakpoint that this program serves. Flash takes as long as a Pico's.
 //
 // rp2040js lets its PIO run free; here it keeps time: each enabled state machine executes when it is
 // due, delays and clock divider counted. A counting loop is leapt over, and so is all time in which
@@ -15,7 +21,7 @@ import { readFileSync, writeSync } from 'node:fs';
 import { pathToFileURL } from 'node:url';
 
 const [directory, imagePath, logAddress] = process.argv.slice(-3);
-const { RP2040, LogLevel } = await import(pathToFileURL(`${directory}/dist/esm/index.js`));
+const { RP2040 } = await import(pathToFileURL(`${directory}/dist/esm/index.js`));
 
 const NANOS = 8;
 const CYCLES_PER_BYTE = Math.round((125e6 * 10) / 115200);
@@ -30,6 +36,10 @@ const SERIAL = 0;
 const PIN = 1;
 const TIME = 2;
 const LOG = 3;
+const RESET = 4;
+const CUT_POWER = 2;
+const CUT_FLASH = 3;
+const HANG = 4;
 const output = Buffer.alloc(1 << 16);
 let filled = 0;
 
@@ -47,71 +57,182 @@ function report(what, value, cycle) {
   filled += 8;
 }
 
-// --- The chip ------------------------------------------------------------------------------------
+// --- The boot ROM --------------------------------------------------------------------------------
 
-const chip = new RP2040();
-const { clock, core } = chip;
-chip.logger = { debug() {}, info() {}, warn() {}, error: (from, what) => console.error(from, what) };
+const ERASE = 3;
+const PROGRAM = 4;
+/** The breakpoints' numbers by the functions' codes. */
+const FUNCTIONS = { IF: 1, EX: 2, RE: ERASE, RP: PROGRAM, FC: 5, CX: 6 };
+const LOOK_UP = 0x20;
+const TABLE = 0x40;
+const CODE = 0x80;
+const FOR_EVER = 0x100;
+const RETURN = 0x4770;
 
-// rp2040js folds the carry into the second operand. Where that makes 0x80000000 of 0x7fffffff, its
-// overflow flag is wrong.
-const ADCS = 0b0100000101;
-const SBCS = 0b0100000110;
-const add = core.addUpdateFlags.bind(core);
-core.addUpdateFlags = (first, second) => {
-  const result = add(first, second);
-  if (second === 0x80000000 && chip.readUint16(core.PC - 2) >> 6 === ADCS) {
-    const folded = core.registers[chip.readUint16(core.PC - 2) & 7] === 0x7fffffff;
-    if (folded) core.V = !(first & 0x80000000);
-  }
-  return result;
-};
-const subtract = core.substractUpdateFlags.bind(core);
-core.substractUpdateFlags = (first, second) => {
-  const result = subtract(first, second);
-  if (second === 0x80000000 && chip.readUint16(core.PC - 2) >> 6 === SBCS) {
-    const folded = core.registers[(chip.readUint16(core.PC - 2) >> 3) & 7] === 0x7fffffff;
-    if (folded) core.V = !!(first & 0x80000000);
-  }
-  return result;
-};
+/** Laid out as the RP2040's: 16-bit pointers to a table of codes and functions, and to its search. */
+function bootRom() {
+  const rom = new Uint16Array(0x2000);
+  rom[0x10 / 2] = 0x754d; // its mark
+  rom[0x12 / 2] = 0x0201;
+  rom[0x14 / 2] = TABLE;
+  rom[0x18 / 2] = LOOK_UP | 1;
+  // r2 = code of the entry; none left: 0; found: its function; else the next entry
+  const search = [0x8802, 0x2a00, 0xd003, 0x428a, 0xd003, 0x3004, 0xe7f8, 0x2000, RETURN, 0x8840, RETURN];
+  rom.set(search, LOOK_UP / 2);
+  rom.set([0xbf30, 0xe7fd], FOR_EVER / 2); // sleep, and again
+  Object.entries(FUNCTIONS).forEach(([name, number], index) => {
+    const at = CODE + 4 * index;
+    rom[at / 2] = 0xbe00 | number;
+    rom[at / 2 + 1] = RETURN;
+    rom[TABLE / 2 + 2 * index] = name.charCodeAt(0) | (name.charCodeAt(1) << 8);
+    rom[TABLE / 2 + 2 * index + 1] = at | 1;
+  });
+  return new Uint32Array(rom.buffer);
+}
 
-/** Blocks of 512 bytes: three magic numbers, where the payload goes, how long it is. */
-function load(image) {
-  for (let block = 0; block < image.length; block += 512) {
-    const target = image.readUInt32LE(block + 12) - FLASH;
-    const size = image.readUInt32LE(block + 16);
-    chip.flash.set(image.subarray(block + 32, block + 32 + size), target);
+const SECTOR_MICROSECONDS = 45_000;
+const PAGE_MICROSECONDS = 400;
+/** Bytes of flash until the power goes. */
+let flashBudget = Infinity;
+/** The core waits for the flash for so many nanoseconds. */
+let flashNanos = 0;
+
+class PowerCut extends Error {}
+
+/** Changes bytes of flash, one by one. */
+function changeFlash(from, count, change) {
+  for (let at = from; at < from + count; at++) {
+    if (flashBudget-- <= 0) throw new PowerCut();
+    chip.flash[at] = change(at, chip.flash[at]);
   }
 }
 
-load(readFileSync(imagePath));
-core.VTOR = VECTORS;
-core.SP = chip.readUint32(VECTORS);
-core.PC = chip.readUint32(VECTORS + 4) & ~1;
+function serveRom(number) {
+  const [first, second, third] = core.registers;
+  if (number === ERASE) {
+    changeFlash(first, second, () => 0xff);
+    flashNanos += (second / 4096) * SECTOR_MICROSECONDS * 1000;
+  } else if (number === PROGRAM) {
+    changeFlash(first, third, (at, before) => before & chip.readUint8(second + at - first));
+    flashNanos += (third / 256) * PAGE_MICROSECONDS * 1000;
+  }
+}
 
+// --- The chip ------------------------------------------------------------------------------------
+
+let chip, clock, core, uart, machines;
 /** The cycle at which what happens now happens, while a state machine executes. */
 let stamp = -1;
-const now = () => (stamp >= 0 ? stamp : Math.round(clock.nanosCounter / NANOS));
+/** Cycles before the chip was last reset. */
+let cyclesBefore = 0;
+const now = () => (stamp >= 0 ? stamp : cyclesBefore + Math.round(clock.nanosCounter / NANOS));
+
+/** The flash with an image: blocks of 512 bytes that say where in flash they go, and how long they are. */
+function flashOf(image) {
+  const flash = new Uint8Array(16 << 20).fill(0xff);
+  for (let block = 0; block < image.length; block += 512) {
+    const target = image.readUInt32LE(block + 12) - FLASH;
+    const size = image.readUInt32LE(block + 16);
+    flash.set(image.subarray(block + 32, block + 32 + size), target);
+  }
+  return flash;
+}
+
+/** A chip that begins with this flash. */
+function start(flash) {
+  stamp = -1;
+  cyclesBefore = clock ? now() : 0;
+  chip = new RP2040();
+  ({ clock, core } = chip);
+  chip.logger = { debug() {}, info() {}, warn() {}, error: (from, what) => console.error(from, what) };
+  chip.loadBootrom(bootRom());
+  chip.flash.set(flash);
+  chip.onBreak = serveRom;
+  core.VTOR = VECTORS;
+  core.SP = chip.readUint32(VECTORS);
+  core.PC = chip.readUint32(VECTORS + 4) & ~1;
+  mendFlags();
+  watchPins();
+  uart = chip.uart[0];
+  uart.onByte = (byte) => report(SERIAL, byte, now());
+  machines = chip.pio.flatMap((pio) => pio.machines);
+  machines.forEach(followQueue);
+  chip.pio.forEach(followPio);
+  schedule();
+  const watchdog = chip.peripherals[WATCHDOG];
+  watchdog.onWatchdogTrigger = () => {
+    // Or its alarm would come again at once, for ever.
+    watchdog.alarm.enable = false;
+    watchdogDue = true;
+  };
+}
+
+const WATCHDOG = 0x40058;
+const POWER = 0;
+let watchdogDue = false;
+
+/** The watchdog resets the chip; its reason and scratch registers outlive that. */
+function resetByWatchdog() {
+  watchdogDue = false;
+  const { reason, scratchData } = chip.peripherals[WATCHDOG];
+  report(RESET, 1, now());
+  start(chip.flash);
+  Object.assign(chip.peripherals[WATCHDOG], { reason, scratchData });
+}
+
+function cutPower() {
+  flashBudget = Infinity;
+  flashNanos = 0;
+  bytes.length = 0;
+  report(RESET, POWER, now());
+  start(chip.flash);
+}
+
+// rp2040js folds the carry into the second operand. Where that makes 0x80000000 of 0x7fffffff, its
+// overflow flag is wrong.
+function mendFlags() {
+  const ADCS = 0b0100000101;
+  const SBCS = 0b0100000110;
+  const add = core.addUpdateFlags.bind(core);
+  core.addUpdateFlags = (first, second) => {
+    const result = add(first, second);
+    if (second === 0x80000000 && chip.readUint16(core.PC - 2) >> 6 === ADCS) {
+      const folded = core.registers[chip.readUint16(core.PC - 2) & 7] === 0x7fffffff;
+      if (folded) core.V = !(first & 0x80000000);
+    }
+    return result;
+  };
+  const subtract = core.substractUpdateFlags.bind(core);
+  core.substractUpdateFlags = (first, second) => {
+    const result = subtract(first, second);
+    if (second === 0x80000000 && chip.readUint16(core.PC - 2) >> 6 === SBCS) {
+      const folded = core.registers[(chip.readUint16(core.PC - 2) >> 3) & 7] === 0x7fffffff;
+      if (folded) core.V = !!(first & 0x80000000);
+    }
+    return result;
+  };
+}
 
 const INPUT = 2;
-chip.gpio.forEach((pin, number) => {
-  let last = 0;
-  pin.addListener((level) => {
-    if (level >= INPUT || level === last) return;
-    last = level;
-    report(PIN, number | (level << 7), now());
-  });
-});
+/** What the inputs are driven to; open ones are pulled up. */
+const inputs = new Map();
 
-const uart = chip.uart[0];
-uart.onByte = (byte) => report(SERIAL, byte, now());
+function watchPins() {
+  chip.gpio.forEach((pin, number) => {
+    let last = 0;
+    pin.addListener((level) => {
+      if (level >= INPUT || level === last) return;
+      last = level;
+      report(PIN, number | (level << 7), now());
+    });
+    pin.setInputValue(inputs.get(number) ?? true);
+  });
+}
 
 // --- Programmable input and output ---------------------------------------------------------------
 
 const JUMP_WHILE_X = 0b000_00000_010_00000;
 const JUMP_MASK = 0b111_00000_111_00000;
-const machines = chip.pio.flatMap((pio) => pio.machines);
 /** The earliest cycle at which a machine executes. */
 let pioDue = Infinity;
 
@@ -126,7 +247,7 @@ function schedule() {
   }
 }
 
-for (const machine of machines) {
+function followQueue(machine) {
   machine.due = 0;
   const writeFifo = machine.writeFIFO.bind(machine);
   machine.writeFIFO = (value) => {
@@ -140,7 +261,7 @@ for (const machine of machines) {
   };
 }
 
-for (const pio of chip.pio) {
+function followPio(pio) {
   pio.run = () => {};
   const write = pio.writeUint32.bind(pio);
   pio.writeUint32 = (offset, value) => {
@@ -186,7 +307,8 @@ function catchUp(cycle) {
 // --- Records in ----------------------------------------------------------------------------------
 
 const bytes = [];
-const levels = [];
+/** Levels of pins and losses of power, in their order. */
+const events = [];
 let byteDue = 0;
 let rest = Buffer.alloc(0);
 
@@ -195,7 +317,9 @@ process.stdin.on('data', (data) => {
   let at = 0;
   for (; at + 8 <= rest.length; at += 8) {
     const entry = { value: rest[at + 1], cycle: rest.readUIntLE(at + 2, 6) };
-    (rest[at] === SERIAL ? bytes : levels).push(entry);
+    if (rest[at] === SERIAL) bytes.push(entry);
+    else if (rest[at] === CUT_FLASH) flashBudget = entry.cycle;
+    else events.push({ what: rest[at], ...entry });
   }
   rest = rest.subarray(at);
 });
@@ -203,14 +327,22 @@ process.stdin.on('end', () => process.exit(0));
 
 function inputDue() {
   const byte = bytes.length ? Math.max(byteDue, bytes[0].cycle) : Infinity;
-  const level = levels.length ? levels[0].cycle : Infinity;
-  return Math.min(byte, level);
+  return Math.min(byte, events.length ? events[0].cycle : Infinity);
 }
 
 function takeInput(cycle) {
-  while (levels.length && levels[0].cycle <= cycle) {
-    const { value } = levels.shift();
-    chip.gpio[value & 0x7f].setInputValue(value >= 0x80);
+  // In a handler nothing is done to the main loop.
+  while (events.length && events[0].cycle <= cycle && !(events[0].what === HANG && core.IPSR)) {
+    const { what, value } = events.shift();
+    if (what === CUT_POWER) return cutPower();
+    if (what === HANG) {
+      core.PC = FOR_EVER;
+      core.waiting = false;
+      continue;
+    }
+    const [number, high] = [value & 0x7f, value >= 0x80];
+    inputs.set(number, high);
+    chip.gpio[number].setInputValue(high);
   }
   if (bytes.length && uart.enabled && Math.max(byteDue, bytes[0].cycle) <= cycle) {
     uart.feedByte(bytes.shift().value);
@@ -242,31 +374,49 @@ function pass(nanos) {
   else clock.nanosCounter = then;
 }
 
+/** The core stands, all else goes on. */
+function waitForFlash() {
+  const end = now() + flashNanos / NANOS;
+  flashNanos = 0;
+  for (let cycle = now(); cycle < end; cycle = now()) {
+    const alarm = clock.nextAlarm ? cyclesBefore + clock.nextAlarm.nanos / NANOS : Infinity;
+    pass(Math.max(Math.min(alarm, Math.ceil(pioDue), end) - cycle, 0) * NANOS);
+    if (pioDue <= now()) catchUp(now());
+  }
+}
+
 /** Runs for so many cycles. */
 function run(cycles) {
   let cycle = now();
   const end = cycle + cycles;
   while (cycle < end) {
     if (core.waiting) {
-      const alarm = clock.nextAlarm ? clock.nextAlarm.nanos / NANOS : Infinity;
+      const alarm = clock.nextAlarm ? cyclesBefore + clock.nextAlarm.nanos / NANOS : Infinity;
       const due = Math.min(alarm, Math.ceil(pioDue), inputDue(), end);
       pass(Math.max(due - cycle, 0) * NANOS);
     } else {
       pass(core.executeInstruction() * NANOS);
+      if (flashNanos) waitForFlash();
     }
     cycle = now();
     if (pioDue <= cycle) catchUp(cycle);
-    if (bytes.length || levels.length) takeInput(cycle);
+    if (bytes.length || events.length) takeInput(cycle);
+    if (watchdogDue) resetByWatchdog();
   }
 }
 
 function idle() {
-  return core.waiting && pioDue === Infinity && !bytes.length && !levels.length;
+  return core.waiting && pioDue === Infinity && !bytes.length && !events.length;
 }
 
 function turn() {
   const sleeps = idle();
-  run(sleeps ? MILLISECOND : SLICE);
+  try {
+    run(sleeps ? MILLISECOND : SLICE);
+  } catch (error) {
+    if (!(error instanceof PowerCut)) throw error;
+    cutPower();
+  }
   takeLog();
   report(TIME, 0, now());
   flush();
@@ -274,4 +424,5 @@ function turn() {
   else setImmediate(turn);
 }
 
+start(flashOf(readFileSync(imagePath)));
 turn();

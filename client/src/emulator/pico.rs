@@ -20,6 +20,10 @@ const SCRIPT: &str = include_str!("pico.mjs");
 const RP2040JS: &str = "target/rp2040js/node_modules/rp2040js";
 /// A cycle of the core, at 125 MHz.
 const CYCLE_NANOS: u64 = 8;
+/// Turns of a contact that bounces.
+const BOUNCES: u64 = 16;
+/// How far the emulator's clock may be ahead of what it has told: 20 ms.
+const CYCLES_AHEAD: u64 = 2_500_000;
 /// Lines of the emulator itself that are kept.
 const SAID_LINES: usize = 20;
 
@@ -99,6 +103,58 @@ impl Pico {
         let mut pico = Self { child, input, shared, readers: vec![logger, reader, listener] };
         pico.wait_for_boot()?;
         Ok(pico)
+    }
+
+    /// Drives an input of the chip from now on.
+    ///
+    /// # Errors
+    /// The emulator has ended.
+    pub fn drive(&mut self, number: u8, high: bool) -> io::Result<()> {
+        self.tell(PIN, number | u8::from(high) << 7, 0)
+    }
+
+    /// The same, with the level changing to and fro in between.
+    ///
+    /// # Errors
+    /// The emulator has ended.
+    pub fn bounce(&mut self, number: u8, high: bool, time: Duration) -> io::Result<()> {
+        // After all that has been told so far, the emulator's clock being ahead of this.
+        let start = self.shared.lock().cycles + CYCLES_AHEAD;
+        let cycles = time.as_nanos() as u64 / CYCLE_NANOS;
+        for turn in 0..BOUNCES {
+            let level = high ^ (turn % 2 == 1);
+            self.tell(PIN, number | u8::from(level) << 7, start + turn * cycles / BOUNCES)?;
+        }
+        self.tell(PIN, number | u8::from(high) << 7, start + cycles)
+    }
+
+    /// Takes the power away and gives it back: what flash holds is left.
+    ///
+    /// # Errors
+    /// The emulator has ended.
+    pub fn cut_power(&mut self) -> io::Result<()> {
+        self.tell(CUT_POWER, 0, 0)
+    }
+
+    /// The same, when so many more bytes of flash have been erased or written.
+    ///
+    /// # Errors
+    /// The emulator has ended.
+    pub fn cut_power_in_flash(&mut self, bytes: u64) -> io::Result<()> {
+        self.tell(CUT_FLASH, 0, bytes)
+    }
+
+    /// Lets the firmware's main loop hang.
+    ///
+    /// # Errors
+    /// The emulator has ended.
+    pub fn hang(&mut self) -> io::Result<()> {
+        self.tell(HANG, 0, 0)
+    }
+
+    fn tell(&mut self, what: u8, value: u8, cycle: u64) -> io::Result<()> {
+        self.input.write_all(&Record { what, value, cycle }.to_bytes())?;
+        self.input.flush()
     }
 
     /// Waits for the first sign of life.
@@ -254,6 +310,9 @@ const RECORD_BYTES: usize = 8;
 const SERIAL: u8 = 0;
 const PIN: u8 = 1;
 const LOG: u8 = 3;
+const CUT_POWER: u8 = 2;
+const CUT_FLASH: u8 = 3;
+const HANG: u8 = 4;
 
 impl Record {
     fn from_bytes([what, value, cycle @ ..]: [u8; RECORD_BYTES]) -> Self {

@@ -48,6 +48,13 @@ pub struct PinChange {
     pub at: Duration,
 }
 
+impl PinChange {
+    /// Whether it is a rising edge that steps.
+    pub fn is_step(self) -> bool {
+        self.high && matches!(self.pin, Pin::StepX | Pin::StepY)
+    }
+}
+
 impl From<&Stamped> for PinChange {
     /// What a pin of the board of plain memory did; its ticks are 40 ns long.
     fn from(Stamped { time, change }: &Stamped) -> Self {

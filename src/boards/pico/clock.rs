@@ -1,10 +1,10 @@
-//! The time, and the millisecond that wakes the main loop.
+//! The time, and the millisecond that wakes the main loop and looks at the contacts.
 
 use cortex_m::peripheral::NVIC;
 use rp2040_hal::pac::{Interrupt, interrupt};
 
-use super::critical;
 use super::registers::TIMER;
+use super::{contacts, critical};
 
 /// Cycles in a second.
 pub const HERTZ: u32 = 125_000_000;
@@ -37,6 +37,7 @@ pub fn microseconds() -> u32 {
 #[interrupt]
 fn TIMER_IRQ_0() {
     TIMER.write(offset::INTERRUPT, ALARM_0);
+    contacts::look();
     schedule();
 }
 

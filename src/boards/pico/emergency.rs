@@ -1,4 +1,4 @@
-//! A panic or a fault: steps stop, pen up, drivers off, a report, then nothing until ctrl-X resets.
+//! The watchdog. A panic or a fault: steps stop, pen up, drivers off, a report, then nothing until ctrl-X resets.
 
 use core::fmt::{self, Write};
 use core::panic::PanicInfo;
@@ -7,6 +7,27 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use super::registers::WATCHDOG;
 use super::{pen, serial, steps};
 use crate::boards::line;
+
+mod watchdog {
+    pub const CONTROL: usize = 0x0;
+    pub const LOAD: usize = 0x4;
+    pub const REASON: usize = 0x8;
+    pub const TRIGGER: u32 = 1 << 31;
+    pub const TIMED_OUT: u32 = 1;
+}
+/// Longer than the longest event, 0.67 s, and than erasing a sector; the chip counts two in a
+/// microsecond.
+const PATIENCE: u32 = 2 * 3_000_000;
+
+/// Whether the watchdog, unfed, has started the chip again.
+pub fn was_restarted() -> bool {
+    WATCHDOG.read(watchdog::REASON) & watchdog::TIMED_OUT != 0
+}
+
+/// Feeds the watchdog.
+pub fn feed() {
+    WATCHDOG.write(watchdog::LOAD, PATIENCE);
+}
 
 /// A second fault while the first is reported ends the report.
 static REPORTING: AtomicBool = AtomicBool::new(false);
@@ -29,15 +50,14 @@ fn make_safe(cause: fmt::Arguments) -> bool {
 }
 
 fn wait_for_reset() -> ! {
+    WATCHDOG.write(watchdog::CONTROL, 0);
     while serial::poll() != Some(line::ABORT) {}
     reset()
 }
 
 /// Resets the whole chip. The core's own request would leave its peripherals as they are.
 fn reset() -> ! {
-    const CONTROL: usize = 0x0;
-    const TRIGGER: u32 = 1 << 31;
-    WATCHDOG.write(CONTROL, TRIGGER);
+    WATCHDOG.write(watchdog::CONTROL, watchdog::TRIGGER);
     loop {
         cortex_m::asm::nop();
     }

@@ -6,17 +6,24 @@
 //! | STEP_X, STEP_Y, DIR_X, DIR_Y | GP2, GP3, GP4, GP5: PIO 0, fed by DMA channel 0 |
 //! | ENABLE (low: drivers on) | GP6: the same |
 //! | PEN (servo) | GP7: PWM slice 3 |
+//! | limit switches of x and y, emergency stop (closed: low) | GP8, GP9, GP10 |
+//! | settings and last job | the last 192 KiB of flash |
 //! | next block of steps | DMA_IRQ_0, priority 0 |
 //! | pen's heights | PIO0_IRQ_0, priority 1 |
 //! | serial line's bytes | UART0_IRQ, priority 2 |
 //! | millisecond | TIMER_IRQ_0, priority 3 |
 //!
+//! The watchdog is fed only while the main loop turns, or listens in a long computation, and the steps
+//! get on.
+//!
 //! What is refused: to be taken twice.
 
 mod clock;
+mod contacts;
 mod critical;
 mod divider;
 mod emergency;
+mod flash;
 mod pen;
 mod pins;
 mod registers;
@@ -24,11 +31,12 @@ mod serial;
 mod steps;
 
 use cortex_m::peripheral::Peripherals as Core;
-use penup::machine::PulserState;
+use penup::machine::{Contacts, PulserState};
 use penup::motion::{Block, EventQueue};
-use penup::plotter::{Board, Lent, NO_MOVES, PicoMemory};
+use penup::plotter::{Board, Kept, Lent, NO_MOVES, NotKept, PicoMemory, Record};
 use penup::protocol::RealTime;
 use rp2040_hal::clocks::init_clocks_and_plls;
+use rp2040_hal::fugit::ExtU32;
 use rp2040_hal::gpio::Pins;
 use rp2040_hal::pac::Peripherals;
 use rp2040_hal::{Sio, Watchdog};
@@ -48,6 +56,8 @@ pub struct Pico {
     line: Line,
     sender: serial::Sender,
     steps: steps::Steps,
+    flash: flash::Flash,
+    was_restarted: bool,
 }
 
 /// Sets up clock, pins, serial line, state machine and timer: drivers off, pen up, nothing moving.
@@ -59,6 +69,7 @@ pub fn take() -> (Pico, Lent<'static>, &'static PulserState) {
     let (Some(mut core), Some(mut chip)) = (Core::take(), Peripherals::take()) else {
         panic!("the board was taken twice")
     };
+    let was_restarted = emergency::was_restarted();
     let mut watchdog = Watchdog::new(chip.WATCHDOG);
     let clocks = init_clocks_and_plls(
         CRYSTAL_HERTZ,
@@ -79,12 +90,15 @@ pub fn take() -> (Pico, Lent<'static>, &'static PulserState) {
     pen::set_up();
     let (line, sender) = serial::set_up(&mut core.NVIC);
     pins::set_up(gpio);
+    contacts::set_up();
     clock::start(&mut core.NVIC);
+    watchdog.start(3.secs());
     defmt::info!("pico at {=u32} Hz", clock::HERTZ);
     static MEMORY: ConstStaticCell<PicoMemory> = ConstStaticCell::new(PicoMemory::new());
     static BLOCKS: StaticCell<[Block; NO_MOVES.len()]> = StaticCell::new();
     let memory = MEMORY.take().lend(BLOCKS.init(NO_MOVES));
-    (Pico { line, sender, steps }, memory, &steps::STATE)
+    let board = Pico { line, sender, steps, flash: flash::Flash::new(), was_restarted };
+    (board, memory, &steps::STATE)
 }
 
 impl Board for Pico {
@@ -95,6 +109,9 @@ impl Board for Pico {
     }
 
     fn take_real_time(&mut self) -> RealTime {
+        if self.steps.gets_on() {
+            emergency::feed();
+        }
         self.line.take_real_time()
     }
 
@@ -105,6 +122,32 @@ impl Board for Pico {
     fn queue(&mut self) -> &mut dyn EventQueue {
         self.steps.follow();
         &mut self.steps
+    }
+
+    fn contacts(&mut self) -> Contacts {
+        contacts::closed()
+    }
+
+    fn step_now(&mut self) {
+        self.steps.follow();
+    }
+
+    fn was_restarted(&self) -> bool {
+        self.was_restarted
+    }
+
+    fn keep(&mut self, record: Record, parts: &[&[u8]]) -> Result<(), NotKept> {
+        let mut writer = flash::slots(record).write(&mut self.flash).map_err(|_| NotKept)?;
+        for part in parts {
+            writer.write(part).map_err(|_| NotKept)?;
+        }
+        writer.finish().map_err(|_| NotKept)
+    }
+
+    fn recall(&mut self, record: Record, take: &mut dyn FnMut(&mut dyn Kept)) {
+        if let Some(mut state) = flash::slots(record).latest(&mut self.flash) {
+            take(&mut state);
+        }
     }
 
     fn wait(&mut self) {

@@ -15,4 +15,8 @@ pub fn set_up(pins: Pins) {
     pins.gpio5.into_function::<FunctionPio0>();
     pins.gpio6.into_function::<FunctionPio0>();
     pins.gpio7.into_function::<FunctionPwm>();
+    // The contacts.
+    pins.gpio8.into_pull_up_input();
+    pins.gpio9.into_pull_up_input();
+    pins.gpio10.into_pull_up_input();
 }

@@ -153,6 +153,9 @@ pub struct Steps {
     /// Something follows the last event.
     moving: bool,
     drained: bool,
+    /// How many words were taken, and when that was first seen, in microseconds.
+    taken_seen: u32,
+    seen_at: u32,
 }
 
 /// Readies state machine and channel; they start with the first events. The pins are outputs
@@ -212,6 +215,8 @@ pub fn set_up(nvic: &mut NVIC) -> Steps {
         ticks: 0,
         moving: false,
         drained: true,
+        taken_seen: 0,
+        seen_at: 0,
     }
 }
 
@@ -255,6 +260,19 @@ impl Steps {
                 feed();
             }
         });
+    }
+
+    /// Whether the state machine gets on: it has nothing to do, or takes its next word before the
+    /// longest event could be over twice.
+    pub fn gets_on(&mut self) -> bool {
+        const LONGEST: u32 = 2 * (StepEvent::MAX_TICKS / (TICKS_PER_SECOND / 1_000_000));
+        let now = clock::microseconds();
+        let taken = taken();
+        if self.drained || taken != self.taken_seen {
+            self.taken_seen = taken;
+            self.seen_at = now;
+        }
+        now.wrapping_sub(self.seen_at) <= LONGEST
     }
 
     /// Counts what the state machine has taken since, and tells the main loop's state.
