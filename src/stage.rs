@@ -6,6 +6,7 @@
 //! answered while it computes. What is refused: a slice that does not fit, with the figures.
 
 use bytemuck::Pod;
+use core::convert::Infallible;
 
 /// A piece of working memory from which a stage takes its slices.
 ///
@@ -128,6 +129,29 @@ pub fn items<T: Pod>(words: &[u64], count: usize) -> Option<&[T]> {
 /// assert_eq!(items, [1, 2, 3]);
 /// ```
 pub fn heap_sort_by_key<T, K: Ord>(items: &mut [T], key: impl Fn(&T) -> K) {
+    let done = heap_sort(items, key, || Ok::<(), Infallible>(()));
+    match done {
+        Ok(()) => {}
+    }
+}
+
+/// [`heap_sort_by_key`] for keys that take long to compare: looks up from the work for each item.
+///
+/// # Errors
+/// [`Aborted`] if the user gave up; the items are in some order then.
+pub fn heap_sort_attentively<T, K: Ord>(
+    items: &mut [T],
+    key: impl Fn(&T) -> K,
+    attention: &mut dyn Attention,
+) -> Result<(), Aborted> {
+    heap_sort(items, key, || attention.check())
+}
+
+fn heap_sort<T, K: Ord, E>(
+    items: &mut [T],
+    key: impl Fn(&T) -> K,
+    mut between: impl FnMut() -> Result<(), E>,
+) -> Result<(), E> {
     let sift_down = |items: &mut [T], mut parent: usize| {
         loop {
             let mut child = 2 * parent + 1;
@@ -145,12 +169,15 @@ pub fn heap_sort_by_key<T, K: Ord>(items: &mut [T], key: impl Fn(&T) -> K) {
         }
     };
     for parent in (0..items.len() / 2).rev() {
+        between()?;
         sift_down(items, parent);
     }
     for end in (1..items.len()).rev() {
+        between()?;
         items.swap(0, end);
         sift_down(&mut items[..end], 0);
     }
+    Ok(())
 }
 
 /// The user asked for the job to be given up.

@@ -6,7 +6,7 @@
 use super::overlap::{Loose, ink_once};
 use super::{Drawing, LineType, PAGE_LIMIT, PagePoint, Segment};
 use crate::stage::{
-    Aborted, Attention, OutOfScratch, Scratch, StageError, heap_sort_by_key, items, items_mut,
+    Aborted, Attention, OutOfScratch, Scratch, StageError, heap_sort_attentively, items, items_mut,
 };
 use bytemuck::{Pod, Zeroable};
 
@@ -173,7 +173,8 @@ pub fn organise(
             let (from, to) = (*ends >> 16, *ends & 0xFFFF);
             *ends = from.min(to) << 16 | from.max(to);
         }
-        heap_sort_by_key(loose.get_mut(..segments).unwrap_or(&mut []), |segment| *segment);
+        let segments_found = loose.get_mut(..segments).unwrap_or(&mut []);
+        heap_sort_attentively(segments_found, |segment| *segment, attention)?;
         (segments, points.len())
     };
 

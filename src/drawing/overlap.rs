@@ -5,7 +5,7 @@
 //! the points of the page, and every cut is at a point that another segment has, so no point is new.
 
 use super::PagePoint;
-use crate::stage::{Attention, OutOfScratch, StageError, heap_sort_by_key};
+use crate::stage::{Attention, OutOfScratch, StageError, heap_sort_attentively};
 use core::cmp::Ordering;
 
 /// A segment on its way to the drawing: the numbers of its points, line type and pen, a slope.
@@ -107,11 +107,13 @@ pub(super) fn ink_once(
         available: size_of_val(segments),
     };
     let (sorted, _) = segments.split_at_mut_checked(count).ok_or(full)?;
-    for segment in &mut *sorted {
-        segment[2] = Key::of(segment, points).slope();
+    for segments in sorted.chunks_mut(SEGMENTS_BETWEEN_CHECKS) {
+        for segment in segments {
+            segment[2] = Key::of(segment, points).slope();
+        }
+        attention.check()?;
     }
-    attention.check()?;
-    heap_sort_by_key(sorted, |segment| Key::of(segment, points));
+    heap_sort_attentively(sorted, |segment| Key::of(segment, points), attention)?;
 
     // Pieces stand at the front; those that find no room there, from `count` on. Both are runs of each line type,
     // sorted and disjoint: `starts` is where those of the line in hand begin.

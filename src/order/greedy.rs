@@ -14,7 +14,6 @@ use bytemuck::{Pod, Zeroable};
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct Choice {
-    distance: u32,
     /// How much farther the second choice is.
     regret: u32,
     first: u16,
@@ -43,25 +42,25 @@ fn choose(
     chooser: u16,
     pace: &mut Pace<'_>,
 ) -> Result<Choice, OrderError> {
-    let mut choice = Choice { distance: u32::MAX, regret: u32::MAX, first: NONE, second: NONE };
-    let mut second_distance = u32::MAX;
+    let mut choice = Choice { regret: u32::MAX, first: NONE, second: NONE };
+    let [mut first_distance, mut second_distance] = [u32::MAX; 2];
     for other in 0..odd.real_count() {
         if other == chooser || mate[usize::from(other)] != NONE {
             continue;
         }
         pace.work(1)?;
         let distance = odd.distance(chooser, other);
-        if distance < choice.distance {
-            second_distance = choice.distance;
+        if distance < first_distance {
+            second_distance = first_distance;
             choice.second = choice.first;
-            choice.distance = distance;
+            first_distance = distance;
             choice.first = other;
         } else if distance < second_distance {
             second_distance = distance;
             choice.second = other;
         }
     }
-    choice.regret = second_distance - choice.distance;
+    choice.regret = second_distance - first_distance;
     Ok(choice)
 }
 

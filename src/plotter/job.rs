@@ -233,14 +233,15 @@ fn project(
     let scene = Scene { vertices, elements, projection, positions };
     // Memory: what is taken, then visibility's, then the lines as they are found. Thrice what visibility
     // needs makes a grid as fine as is of any use; lines that are likely come before that. If
-    // there turn out to be more, a quarter of what is to spare must do for the grid.
+    // there turn out to be more, less and less of what is to spare must do for the grid.
     let available = scratch.available_bytes();
     let needed = visibility::scratch_bytes(&scene);
     let spare = available.checked_sub(needed).ok_or(OutOfScratch { needed, available });
     let spare = spare.map_err(Refusal::DrawingTooLarge)?;
     let wanted = options.visibility(&view);
     let likely = elements.corners().len() * LIKELY_BYTES * if wanted.with_hidden { 2 } else { 1 };
-    let grids = [(3 * needed).min(spare.saturating_sub(likely).max(spare / 4)), spare / 4];
+    let finest = (3 * needed).min(spare.saturating_sub(likely).max(spare / 4));
+    let grids = [finest, finest.min(spare / 4), finest.min(spare / 8), finest.min(spare / 16)];
     let mut lines = Err(Refusal::NothingToPlot);
     for (at, grid) in grids.iter().enumerate() {
         let (stage_memory, mut line_memory) = scratch.reborrow().split(needed + grid);
@@ -261,7 +262,7 @@ fn project(
             Err(VisibilityError::SinkFull) => Err(sink.collector.out_of_memory()),
             Err(error) => Err(refused(error, elements.corners().len())),
         };
-        if found != Err(VisibilityError::SinkFull) || grids[0] <= grids[1] || at > 0 {
+        if found != Err(VisibilityError::SinkFull) || at + 1 == grids.len() {
             break;
         }
         sink.observer.start_again();

@@ -25,7 +25,8 @@ pub use options::PlotOptions;
 
 use crate::fixed::BinaryFraction;
 use crate::machine::{
-    Alarm, Machine, MachineError, PulserState, Setting, SettingError, Settings, State, Value,
+    Alarm, Machine, MachineError, Path, PulserState, Setting, SettingError, Settings, State,
+    Target, Value,
 };
 use crate::model::Model;
 use crate::order;
@@ -280,16 +281,28 @@ impl Inner<'_> {
         let asked = RealTime::default();
         let mut listener = Listener { board, position, stage: Stage::View, asked };
         let computed = self.compute(&mut listener, &mut Unobserved);
+        let begun = computed.and_then(|()| self.begin(&mut listener));
         let asked = listener.asked;
         if asked.has(RealTime::EMERGENCY) {
             self.act(asked);
         }
-        computed?;
+        begun?;
         self.report_degenerate(board);
-        let mut strokes = self.job.strokes(self.words, &mut self.cursor);
-        self.machine.start(&mut strokes)?;
-        self.cursor = Cursor::default();
         self.act(asked);
+        Ok(())
+    }
+
+    /// Hands the job to the machine, which measures it first.
+    #[inline(never)] // Its frame must not lie under the stages'.
+    fn begin(&mut self, attention: &mut dyn Attention) -> Result<(), Refusal> {
+        let strokes = self.job.strokes(self.words, &mut self.cursor);
+        let mut strokes = Attended { strokes, attention, targets: 0, given_up: false };
+        self.machine.start(&mut strokes)?;
+        if strokes.given_up {
+            self.machine.abort();
+            return Err(Refusal::Aborted);
+        }
+        self.cursor = Cursor::default();
         Ok(())
     }
 
@@ -407,6 +420,33 @@ impl Inner<'_> {
         let mm = |units: u64| BinaryFraction { units: units as i64, fraction_bits: 18, places: 0 };
         let (drawn, left) = (mm(done.drawn), status.seconds_left);
         reply.line(format_args!("|Ink:{drawn}/{}|Left:{left}>", mm(all.drawn)));
+    }
+}
+
+/// Strokes that are measured while the line is answered.
+struct Attended<'s, 'a> {
+    strokes: Strokes<'s>,
+    attention: &'a mut dyn Attention,
+    targets: usize,
+    given_up: bool,
+}
+
+impl Path for Attended<'_, '_> {
+    fn next_target(&mut self) -> Option<Target> {
+        self.targets += 1;
+        // These take some 100,000 instructions.
+        if self.targets.is_multiple_of(64) && self.attention.check().is_err() {
+            self.given_up = true;
+        }
+        self.strokes.next_target().filter(|_| !self.given_up)
+    }
+
+    fn rewind(&mut self) {
+        self.strokes.rewind();
+    }
+
+    fn pen(&self) -> u8 {
+        self.strokes.pen()
     }
 }
 

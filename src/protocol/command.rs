@@ -777,7 +777,9 @@ mod tests {
         assert_eq!(option("$margin=-1"), Err(Refusal::NumberOutOfRange));
         assert_eq!(
             option("$hidden=gone"),
-            Err(Refusal::NotAChoice { choices: "erased, dotted, dashed or shown" })
+            Err(Refusal::NotAChoice {
+                choices: "erased, dotted, dashed, shown, pen or pen,NUMBER"
+            })
         );
         assert_eq!(Command::parse("$110=5"), Ok(Command::Setting { name: "110", value: "5" }));
     }
