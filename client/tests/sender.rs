@@ -11,10 +11,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 const PATIENCE: Patience = Patience {
-    silence: Duration::from_millis(60),
-    lost: Duration::from_millis(120),
-    greeting: Duration::from_millis(60),
-    query: Duration::from_millis(4),
+    silence: Duration::from_millis(600),
+    lost: Duration::from_millis(1200),
+    greeting: Duration::from_millis(600),
+    query: Duration::from_millis(40),
 };
 
 fn lines(count: usize) -> Vec<JobLine> {

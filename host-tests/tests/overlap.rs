@@ -1,5 +1,7 @@
 //! No stretch of paper is inked twice, and none is lost: against every pair of lines, one by one.
 
+#![allow(clippy::expect_used)] // a test fails by panicking
+
 use penup::drawing::{Line, LineType, PagePoint, organise};
 use penup::stage::{Undisturbed, items_mut};
 use proptest::prelude::*;
