@@ -44,6 +44,9 @@ fn longest_wait(scene: &str, settings: &[&str]) -> Result<(), Box<dyn Error>> {
     loop {
         emulator.send(b"?")?;
         let answer = hear(&mut emulator, ">\r\n")?;
+        if answer.contains("error:") {
+            return Err(format!("{scene} was refused: {answer}").into());
+        }
         if answer.contains("ok\r\n") {
             break;
         }
