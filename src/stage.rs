@@ -213,9 +213,9 @@ impl From<Aborted> for StageError {
 pub enum Stage {
     /// The camera, and every vertex through it.
     View,
-    /// Which stretches are seen, and the drawing on the page.
+    /// Which stretches are seen.
     Visibility,
-    /// In which order the strokes are drawn.
+    /// The drawing organised (Harrison 5), and in which order its strokes are drawn.
     Order,
 }
 

@@ -41,7 +41,7 @@ pub struct Timings {
     pub view: f64,
     /// Hidden lines.
     pub visibility: f64,
-    /// Order of the strokes.
+    /// The drawing without repeats, and the order of its strokes.
     pub order: f64,
 }
 

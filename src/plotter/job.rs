@@ -80,6 +80,7 @@ impl Job {
                 }
             }
         };
+        attention.enter(Stage::Order);
         let stored = organise(words, lines, attention)?;
         let (drawing, mut rest) = stored.split(words).map_err(Refusal::DrawingTooLarge)?;
         let legs = drawing.segments.len();
@@ -87,7 +88,6 @@ impl Job {
             return Err(Refusal::NothingToPlot);
         }
         let tour = rest.take::<Leg>(legs).map_err(Refusal::DrawingTooLarge)?;
-        attention.enter(Stage::Order);
         let report = order::order(drawing, options.order, rest, attention, tour)?;
         Ok(Self { stored, legs, report, degenerate_faces })
     }
