@@ -347,7 +347,7 @@ impl<'m> Machine<'m> {
             self.settings.microseconds_as_ticks(Setting::StepPulse),
             self.settings.get(Setting::InvertDirections).saturating_to_num(),
         );
-        let rule = self.settings.brake(self.pins.capacity());
+        let rule = self.settings.brake(self.pins.queue());
         self.runner.set_brake(rule);
         self.pins.brake().set_rule(rule);
     }

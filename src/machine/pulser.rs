@@ -1,8 +1,8 @@
 //! The step interrupt's work, and what it tells the main loop.
 
-use crate::motion::{Brake, BrakeOrders, EventKind, EventQueue, StepEvent, StepLength};
+use crate::motion::{Brake, BrakeOrders, EventKind, EventQueue, QueueSize, StepEvent, StepLength};
 use core::convert::Infallible;
-use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU16, AtomicU32, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 use embedded_hal::digital::{OutputPin, PinState};
 use heapless::spsc::{Consumer, Producer, Queue};
 
@@ -19,7 +19,8 @@ pub struct PulserState {
     halt: AtomicBool,
     pulse_ticks: AtomicU32,
     inverted: AtomicU8,
-    capacity: AtomicU16,
+    queue_steps: AtomicU32,
+    queue_rate: AtomicU32,
     brake: BrakeOrders,
 }
 
@@ -35,7 +36,8 @@ impl PulserState {
             halt: AtomicBool::new(false),
             pulse_ticks: AtomicU32::new(50),
             inverted: AtomicU8::new(0),
-            capacity: AtomicU16::new(0),
+            queue_steps: AtomicU32::new(QueueSize::ENDLESS.steps),
+            queue_rate: AtomicU32::new(QueueSize::ENDLESS.greatest_rate),
             brake: BrakeOrders::new(),
         }
     }
@@ -108,13 +110,22 @@ impl PulserState {
         self.inverted.store(inverted, Ordering::Relaxed);
     }
 
-    /// How many events the queue holds; 0 if it has no end.
-    pub(super) fn capacity(&self) -> usize {
-        self.capacity.load(Ordering::Relaxed).into()
+    /// What the board's queue holds; before the machine asks.
+    pub fn set_queue(&self, queue: QueueSize) {
+        self.queue_steps.store(queue.steps, Ordering::Relaxed);
+        self.queue_rate.store(queue.greatest_rate, Ordering::Relaxed);
+    }
+
+    /// The same; without a board it has no end.
+    pub(super) fn queue(&self) -> QueueSize {
+        QueueSize {
+            steps: self.queue_steps.load(Ordering::Relaxed),
+            greatest_rate: self.queue_rate.load(Ordering::Relaxed),
+        }
     }
 
     /// How a queue that runs dry brakes.
-    pub(super) fn brake(&self) -> &BrakeOrders {
+    pub fn brake(&self) -> &BrakeOrders {
         &self.brake
     }
 }
@@ -153,7 +164,7 @@ impl EventQueue for StepQueue<'_> {
     fn push(&mut self, event: StepEvent) -> Result<(), StepEvent> {
         self.events.enqueue(event)?;
         if event.is_step() {
-            self.state.brake.add(self.step_length.step());
+            self.state.brake.add(self.step_length.step().around);
         }
         Ok(())
     }
@@ -237,6 +248,7 @@ pub struct Pulser<'q, A, P> {
     step_ticks: u32,
     /// Keeps a queue that runs dry from stopping the machine with a jerk.
     brake: Brake,
+    step_length: StepLength,
     /// Of the axes' pins without their pulses.
     levels: u8,
     /// The levels of the event whose pulse is high: it counts when the pulse ends.
@@ -263,9 +275,8 @@ impl<'q, A: Axes, P: Pen> Pulser<'q, A, P> {
         state: &'q PulserState,
     ) -> (Self, StepQueue<'q>) {
         let (producer, events) = queue.split();
-        let capacity = u16::try_from(producer.capacity()).unwrap_or(u16::MAX);
-        state.capacity.store(capacity, Ordering::Relaxed);
-        let brake = Brake::default();
+        state.set_queue(QueueSize { steps: producer.capacity() as u32, ..QueueSize::ENDLESS });
+        let (brake, step_length) = (Brake::default(), StepLength::default());
         let pulser = Self {
             axes,
             pen,
@@ -273,6 +284,7 @@ impl<'q, A: Axes, P: Pen> Pulser<'q, A, P> {
             state,
             step_ticks: 0,
             brake,
+            step_length,
             levels: 0,
             pulse: 0,
             moving: false,
@@ -293,7 +305,7 @@ impl<'q, A: Axes, P: Pen> Pulser<'q, A, P> {
             add(&self.state.x, step(self.pulse));
             add(&self.state.y, step(self.pulse >> 1));
             let mut ticks = core::mem::take(&mut self.step_ticks);
-            let least = self.brake.step(&self.state.brake);
+            let least = self.brake.step(self.step_length.step(), &self.state.brake);
             if least > ticks {
                 ticks = ticks.max(self.without_what_follows(least));
             }
@@ -358,7 +370,7 @@ impl<'q, A: Axes, P: Pen> Pulser<'q, A, P> {
     #[cold]
     #[inline(never)]
     fn set_step_length(&mut self, units: u32, after_next: bool) -> Option<u32> {
-        self.brake.set_step_length(units, after_next);
+        self.step_length.set(units, after_next);
         Some(0)
     }
 
@@ -366,7 +378,7 @@ impl<'q, A: Axes, P: Pen> Pulser<'q, A, P> {
     #[inline(never)]
     fn throw_away(&mut self, event: StepEvent) -> u32 {
         if event.is_step() {
-            self.brake.skip_step();
+            self.brake.skip(self.step_length.step().around);
         }
         self.moving = false;
         self.pen.set_height(0);
@@ -375,7 +387,6 @@ impl<'q, A: Axes, P: Pen> Pulser<'q, A, P> {
 
     #[inline(never)]
     fn run_dry(&mut self) -> Option<u32> {
-        self.brake.rest();
         let halted = self.state.is_halted();
         if halted {
             self.pen.set_height(0);

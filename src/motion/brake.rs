@@ -63,24 +63,41 @@ pub struct BrakeRule {
 }
 
 impl BrakeRule {
-    /// A step of so many 2^-32 mm, in units.
+    /// A step of so many 2^-32 mm, in units: even.
     pub fn step_length(self, length: u64) -> u32 {
         let units = length.saturating_mul(self.reciprocal) >> RECIPROCAL_BITS;
-        (units as u32).clamp(LEAST_LENGTH, GREATEST_LENGTH)
+        (units as u32).clamp(LEAST_LENGTH, GREATEST_LENGTH) & !1
     }
 }
 
+/// What there is for steps to wait in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct QueueSize {
+    /// How many wait at least when it is full; 0 for no end.
+    pub steps: u32,
+    /// Steps a second up to which each of them can be looked at.
+    pub greatest_rate: u32,
+}
+
+impl QueueSize {
+    /// A queue without end.
+    pub const ENDLESS: Self = Self { steps: 0, greatest_rate: u32::MAX };
+}
+
 impl Limits {
-    /// The rule for a queue of `capacity` steps (0 for a queue without end), at most `longer` times as
-    /// long as a diagonal one, on a machine that is never faster than the stopping distance `fastest`.
+    /// The rule for a `queue` of steps that are at most `longer` times as long as a diagonal one, on a
+    /// machine that is never faster than the stopping distance `fastest`.
     ///
     /// It brakes as hard as the machine accelerates, or harder if it must in order to stop within
     /// 13/16 of the queue. Both by 1/32, so that it never slows a plan that is in time.
-    pub fn brake(&self, fastest: PathLength, longer: u64, capacity: usize) -> BrakeRule {
+    pub fn brake(&self, fastest: PathLength, longer: u64, queue: QueueSize) -> BrakeRule {
+        if self.step_rate(self.speed(fastest)) > u64::from(queue.greatest_rate) {
+            return BrakeRule::default();
+        }
         let acceleration = u64::from(self.acceleration.to_bits());
         let fastest = u64::from(fastest.to_bits());
         // 2^-18 mm; below 2^20 steps of at most 1 mm.
-        let held = (u64::from(self.least_move.to_bits()) * capacity as u64 / 16 * 13) >> 14;
+        let held = (u64::from(self.least_move.to_bits()) * u64::from(queue.steps) / 16 * 13) >> 14;
         let harder = (acceleration * fastest).checked_div(held).unwrap_or(0);
         let braking = (acceleration + acceleration / 32).max(harder).clamp(1, u64::from(u32::MAX));
         let [x, y] = self.step_length.map(|step| u64::from(step.to_bits()));
@@ -118,6 +135,12 @@ impl BrakeOrders {
         self.top.store(rule.top, Ordering::Relaxed);
     }
 
+    /// Whether there is a rule.
+    #[inline]
+    pub fn is_on(&self) -> bool {
+        self.top.load(Ordering::Relaxed) != 0
+    }
+
     /// Steps of so many units were put into the queue.
     #[inline]
     pub fn add(&self, units: u32) {
@@ -126,13 +149,22 @@ impl BrakeOrders {
     }
 }
 
+/// A step of the queue, in units, all even.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct StepWay {
+    /// From the middle before it to the middle behind it: what it adds to the queue.
+    pub around: u32,
+    /// From its pulse to the next.
+    pub behind: u32,
+}
+
 /// How long the steps of a queue are, in units.
 #[derive(Debug, Default)]
 pub struct StepLength {
     /// From the last step to the next.
     before: u32,
     /// From the next step to the one behind it.
-    after: u32,
+    behind: u32,
     /// From there on.
     later: u32,
 }
@@ -142,7 +174,7 @@ impl StepLength {
     /// the old length to the first of the new one it is half of both.
     #[inline]
     pub fn set(&mut self, units: u32, after_next: bool) {
-        self.after = if after_next { (self.later + units) / 2 } else { units };
+        self.behind = if after_next { (self.later + units) / 2 & !1 } else { units };
         self.later = units;
     }
 
@@ -152,20 +184,18 @@ impl StepLength {
         self.later
     }
 
-    /// A step: from the middle before it to the middle behind it.
+    /// The next step.
     #[inline(always)]
-    pub fn step(&mut self) -> u32 {
-        let before = core::mem::replace(&mut self.before, self.after);
-        self.after = self.later;
-        (before + self.before) / 2
+    pub fn step(&mut self) -> StepWay {
+        let before = core::mem::replace(&mut self.before, self.behind);
+        self.behind = self.later;
+        StepWay { around: (before + self.before) / 2, behind: self.before }
     }
 }
 
 /// Where the queue's other end is. Of the interrupt.
 #[derive(Debug, Default)]
 pub struct Brake {
-    /// Of the steps, in units.
-    length: StepLength,
     /// Units of all steps taken; wraps.
     taken: u32,
     /// Units in which the machine could stop from the speed that it may have.
@@ -173,40 +203,56 @@ pub struct Brake {
 }
 
 impl Brake {
-    /// See [`StepLength::set`].
-    #[inline]
-    pub fn set_step_length(&mut self, units: u32, after_next: bool) {
-        self.length.set(units, after_next);
-    }
-
     /// A step was taken. The least ticks from it to the next; 0 if any are enough.
     #[inline(always)]
-    pub fn step(&mut self, orders: &BrakeOrders) -> u32 {
-        let length = self.skip_step();
-        // Negative for a moment, between a step's way into the queue and its entry in the sum.
-        let waits = orders.queued.load(Ordering::Relaxed).wrapping_sub(self.taken).cast_signed();
+    pub fn step(&mut self, step: StepWay, orders: &BrakeOrders) -> u32 {
+        self.skip(step.around);
         let top = orders.top.load(Ordering::Relaxed);
         // From rest it takes a step to the middle behind the first pulse.
-        let reach = if self.reach == 0 { self.length.before } else { self.reach + length };
-        self.reach = reach.min(waits.max(0).cast_unsigned()).min(top);
+        let reach = if self.reach == 0 { step.behind } else { self.reach + step.around };
+        self.reach = reach.min(self.waiting(orders)).min(top);
         if self.reach == top {
             return 0;
         }
-        least_interval(self.length.before, self.reach, orders.exponent.load(Ordering::Relaxed))
+        least_interval(step.behind, self.reach, orders.exponent.load(Ordering::Relaxed))
     }
 
-    /// A step was thrown away. Returns by how much the queue is shorter.
+    /// Takes some steps at once, `around` units in all, if they can go as planned: `longest` is the
+    /// longest way behind one, `shortest` are the least ticks to the next.
+    pub fn pass(&mut self, around: u32, longest: u32, shortest: u32, orders: &BrakeOrders) -> bool {
+        let top = orders.top.load(Ordering::Relaxed);
+        let left = self.waiting(orders).saturating_sub(around);
+        // In between it is further.
+        let least = self.reach.min(left);
+        let exponent = orders.exponent.load(Ordering::Relaxed);
+        let is_calm = around == 0
+            || least >= top
+            || (least > 0 && least_interval(longest, least, exponent) <= shortest);
+        if is_calm {
+            self.skip(around);
+            self.reach = (self.reach + around).min(left).min(top);
+        }
+        is_calm
+    }
+
+    /// Steps of so many units were thrown away.
     #[inline(always)]
-    pub fn skip_step(&mut self) -> u32 {
-        let length = self.length.step();
-        self.taken = self.taken.wrapping_add(length);
-        length
+    pub fn skip(&mut self, units: u32) {
+        self.taken = self.taken.wrapping_add(units);
     }
 
-    /// The machine stands: the next step is the first of a ramp.
-    #[inline]
-    pub fn rest(&mut self) {
+    /// All steps were thrown away.
+    pub fn skip_all(&mut self, orders: &BrakeOrders) {
+        self.taken = orders.queued.load(Ordering::Relaxed);
         self.reach = 0;
+    }
+
+    /// Units of the steps that wait.
+    #[inline(always)]
+    fn waiting(&self, orders: &BrakeOrders) -> u32 {
+        // Negative for a moment, between a step's way into the queue and its entry in the sum.
+        let waiting = orders.queued.load(Ordering::Relaxed).wrapping_sub(self.taken);
+        waiting.cast_signed().max(0).cast_unsigned()
     }
 }
 
@@ -220,13 +266,17 @@ mod tests {
         Limits::new(&settings()).expect("valid")
     }
 
+    fn queue(steps: u32) -> QueueSize {
+        QueueSize { steps, ..QueueSize::ENDLESS }
+    }
+
     /// 0.01 mm.
     const STEP: u64 = (1 << 32) / 100;
 
     #[test]
     fn an_interval_is_that_of_the_speed_that_can_be_shed() {
         let limits = limits();
-        let rule = limits.brake(limits.top, 1, 0);
+        let rule = limits.brake(limits.top, 1, queue(0));
         let length = rule.step_length(STEP);
         for steps in 1..=300u32 {
             let ticks = least_interval(length, steps * length, rule.exponent);
@@ -245,7 +295,7 @@ mod tests {
         let limits = limits();
         // 100 mm/s: 25 mm, 2500 steps.
         let braking = |capacity| {
-            let rule = limits.brake(limits.top, 1, capacity);
+            let rule = limits.brake(limits.top, 1, queue(capacity));
             let length = rule.step_length(STEP);
             let slowest = least_interval(length, length, rule.exponent);
             let speed = 0.01 / f64::from(slowest) * f64::from(TICKS_PER_SECOND);
@@ -255,6 +305,15 @@ mod tests {
         assert!((braking(5000) - 206.25).abs() < 0.5);
         // 10,000 mm²/s² over twice 812 steps.
         assert!((braking(1000) - 615.4).abs() < 1.0, "{}", braking(1000));
+    }
+
+    #[test]
+    fn a_queue_that_is_too_fast_is_not_braked() {
+        // 100 mm/s of 100 steps, but for rounding.
+        let rule =
+            |greatest_rate| limits().brake(limits().top, 1, QueueSize { steps: 0, greatest_rate });
+        assert_eq!(rule(9_990), BrakeRule::default());
+        assert_ne!(rule(10_000), BrakeRule::default());
     }
 
     #[test]
@@ -269,7 +328,7 @@ mod tests {
             settings.acceleration_mm_per_s2 = value(acceleration);
             let limits = Limits::new(&settings).expect("valid");
             let step = u64::from(limits.step_length[0].to_bits());
-            let rule = limits.brake(limits.top, 1, 600);
+            let rule = limits.brake(limits.top, 1, queue(600));
             let length = rule.step_length(step);
             let ticks = least_interval(length, length, rule.exponent);
             let mm = 1.0 / f64::from(steps_per_mm);
@@ -282,28 +341,27 @@ mod tests {
     #[test]
     fn a_queue_that_runs_dry_is_a_ramp_to_rest_and_one_that_fills_is_a_ramp_up() {
         let limits = limits();
-        let rule = limits.brake(limits.top, 1, 0);
+        let rule = limits.brake(limits.top, 1, queue(0));
         let orders = BrakeOrders::new();
-        let mut brake = Brake::default();
+        let (mut brake, mut steps) = (Brake::default(), StepLength::default());
         let length = rule.step_length(STEP);
-        brake.set_step_length(length, false);
+        steps.set(length, false);
         // The first is counted from the middle before it.
         orders.add(length / 2 + 100 * length);
-        assert_eq!(brake.step(&orders), 0, "no rule");
+        assert_eq!(brake.step(steps.step(), &orders), 0, "no rule");
         orders.set_rule(rule);
         let squared_speed = |ticks: u32| 1.0 / f64::from(ticks).powi(2);
         let unit = squared_speed(least_interval(length, length, rule.exponent));
         let mut came = 0;
         for step in 1..=100 {
-            let reach = squared_speed(brake.step(&orders)) / unit;
+            let reach = squared_speed(brake.step(steps.step(), &orders)) / unit;
             let expected = f64::from(step).min(f64::from(100 - step)).max(0.5);
             assert!((reach / expected - 1.0).abs() < 0.003, "{step}: {reach}, not {expected}");
             came += 1;
         }
         assert_eq!(came, 100);
-        brake.rest();
         orders.add(50 * length);
-        let reach = squared_speed(brake.step(&orders)) / unit;
+        let reach = squared_speed(brake.step(steps.step(), &orders)) / unit;
         assert!((reach - 1.0).abs() < 0.003, "{reach}");
     }
 }

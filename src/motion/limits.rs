@@ -145,9 +145,7 @@ impl Limits {
     }
 
     fn check_step_rate(&self) -> Result<(), LimitsError> {
-        let speed = u64::from(self.draw_speed.max(self.travel_speed).to_bits());
-        let slices_per_second = u64::from(TICKS_PER_SECOND / SLICE_TICKS);
-        let asked = speed * slices_per_second / u64::from(self.least_move.to_bits());
+        let asked = self.step_rate(self.draw_speed.max(self.travel_speed));
         let possible = TICKS_PER_SECOND / self.least_interval();
         if asked > u64::from(possible) {
             return Err(LimitsError::TooManySteps {
@@ -156,6 +154,12 @@ impl Limits {
             });
         }
         Ok(())
+    }
+
+    /// The most steps a second at a speed.
+    pub(super) fn step_rate(&self, speed: SliceSpeed) -> u64 {
+        let slices_per_second = u64::from(TICKS_PER_SECOND / SLICE_TICKS);
+        u64::from(speed.to_bits()) * slices_per_second / u64::from(self.least_move.to_bits()).max(1)
     }
 
     /// The least time between two events that pulse the same axis: the pulse and as long a pause.

@@ -30,7 +30,7 @@ mod lookahead;
 mod profile;
 mod runner;
 
-pub use brake::{Brake, BrakeOrders, BrakeRule, StepLength};
+pub use brake::{Brake, BrakeOrders, BrakeRule, QueueSize, StepLength, StepWay};
 pub use emitter::Emitter;
 pub use event::{EventKind, EventQueue, StepEvent};
 pub use limits::{Limits, LimitsError, MotionSettings};
