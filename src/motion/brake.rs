@@ -174,7 +174,7 @@ impl StepLength {
     /// the old length to the first of the new one it is half of both.
     #[inline]
     pub fn set(&mut self, units: u32, after_next: bool) {
-        self.behind = if after_next { (self.later + units) / 2 & !1 } else { units };
+        self.behind = if after_next { ((self.later + units) / 2) & !1 } else { units };
         self.later = units;
     }
 
