@@ -78,7 +78,7 @@ impl Machine<'_> {
                 self.state = State::Hold { standing: true };
             }
             State::Home => {
-                self.runner.forget_path(self.planned_position());
+                self.forget_path(self.planned_position());
                 if let Some(homing) = &mut self.homing {
                     homing.stands = true;
                 }
@@ -90,7 +90,7 @@ impl Machine<'_> {
                     Progress::Done => self.runner.page_end(),
                     _ => self.planned_position(),
                 };
-                self.runner.forget_path(page);
+                self.forget_path(page);
                 self.state = State::Idle;
             }
         }

@@ -13,6 +13,8 @@ use heapless::spsc::{Consumer, Producer, Queue};
 pub struct PulserState {
     x: AtomicU32,
     y: AtomicU32,
+    slack_x: AtomicU32,
+    slack_y: AtomicU32,
     ticks: AtomicU32,
     underruns: AtomicU32,
     drained: AtomicBool,
@@ -30,6 +32,8 @@ impl PulserState {
         Self {
             x: AtomicU32::new(0),
             y: AtomicU32::new(0),
+            slack_x: AtomicU32::new(0),
+            slack_y: AtomicU32::new(0),
             ticks: AtomicU32::new(0),
             underruns: AtomicU32::new(0),
             drained: AtomicBool::new(true),
@@ -45,6 +49,13 @@ impl PulserState {
     /// The sum of the steps at the pins, x and y; wraps.
     pub fn steps(&self) -> (i32, i32) {
         let [x, y] = [&self.x, &self.y].map(|sum| sum.load(Ordering::Relaxed).cast_signed());
+        (x, y)
+    }
+
+    /// The sum of the steps that took up slack, which [`PulserState::steps`] leaves out; wraps.
+    pub fn slack(&self) -> (i32, i32) {
+        let [x, y] =
+            [&self.slack_x, &self.slack_y].map(|sum| sum.load(Ordering::Relaxed).cast_signed());
         (x, y)
     }
 
@@ -86,6 +97,12 @@ impl PulserState {
         self.y.store(y.cast_unsigned(), Ordering::Relaxed);
         self.ticks.store(ticks, Ordering::Relaxed);
         self.drained.store(drained, Ordering::Release);
+    }
+
+    /// The same for steps that take up slack.
+    pub fn report_slack(&self, (x, y): (i32, i32)) {
+        self.slack_x.store(x.cast_unsigned(), Ordering::Relaxed);
+        self.slack_y.store(y.cast_unsigned(), Ordering::Relaxed);
     }
 
     /// For such a board: its queue ran dry while the machine moved.
@@ -299,15 +316,15 @@ impl<'q, A: Axes, P: Pen> Pulser<'q, A, P> {
     pub fn tick(&mut self) -> Option<u32> {
         if self.step_ticks != 0 {
             self.axes.set(self.levels);
-            // Bit 0 or 1 times 1, or -1 with the bit two above it.
-            let step =
-                |levels: u8| u32::from(levels & 1) * 1u32.wrapping_sub(u32::from(levels >> 1 & 2));
-            add(&self.state.x, step(self.pulse));
-            add(&self.state.y, step(self.pulse >> 1));
             let mut ticks = core::mem::take(&mut self.step_ticks);
-            let least = self.brake.step(self.step_length.step(), &self.state.brake);
-            if least > ticks {
-                ticks = ticks.max(self.without_what_follows(least));
+            if self.pulse & StepEvent::AT_REST == 0 {
+                count([&self.state.x, &self.state.y], self.pulse);
+                let least = self.brake.step(self.step_length.step(), &self.state.brake);
+                if least > ticks {
+                    ticks = ticks.max(self.without_what_follows(least));
+                }
+            } else {
+                self.count_slack();
             }
             if self.halted() {
                 return Some(Self::DISCARD_TICKS);
@@ -366,6 +383,12 @@ impl<'q, A: Axes, P: Pen> Pulser<'q, A, P> {
         ticks.saturating_sub(next.map_or(0, |wait| wait.ticks()))
     }
 
+    #[cold]
+    #[inline(never)]
+    fn count_slack(&self) {
+        count([&self.state.slack_x, &self.state.slack_y], self.pulse);
+    }
+
     /// Takes no time: the next call is due at once.
     #[cold]
     #[inline(never)]
@@ -418,6 +441,15 @@ impl<'q, A: Axes, P: Pen> Pulser<'q, A, P> {
 #[inline]
 fn write(pin: &mut impl OutputPin<Error = Infallible>, high: bool) {
     let Ok(()) = pin.set_state(PinState::from(high));
+}
+
+/// Adds the steps of these levels.
+#[inline(always)]
+fn count([x, y]: [&AtomicU32; 2], levels: u8) {
+    // Bit 0 or 1 times 1, or -1 with the bit two above it.
+    let step = |levels: u8| u32::from(levels & 1) * 1u32.wrapping_sub(u32::from(levels >> 1 & 2));
+    add(x, step(levels));
+    add(y, step(levels >> 1));
 }
 
 /// Only for the one that writes it: a load and a store, so that a Cortex-M0+ can.
