@@ -2,10 +2,11 @@
 
 use crate::protocol::{
     ANGLES, AT, BEHIND, BLOCKS, CLEAR, CREASE, CYCLE, EFFORT, EYE, FIT, HIDDEN, MARGIN, ORDER,
-    PAGE, PROJECTION, SEAMS, SEE, UP, VIEW_AUTO, setting,
+    PAGE, PROJECTION, SEAMS, SEE, TITLE, TITLE_SIZE, UP, VIEW_AUTO, setting,
 };
 use crate::source::JobLine;
 use crate::watch::PenRuns;
+use penup::protocol::Escape;
 use serde::Serialize;
 
 /// A point of the page in mm: x right, y up from the lower left corner.
@@ -129,6 +130,10 @@ pub struct Settings {
     pub page: Page,
     /// What stays free on each side, in mm.
     pub margin: f64,
+    /// What stands below the drawing; empty for nothing.
+    pub title: String,
+    /// Height of its capitals, in mm.
+    pub title_size: f64,
     /// Whether a plan, too, is scaled to the page.
     pub fit: bool,
     /// `auto`, `greedy` or `exact`.
@@ -157,6 +162,8 @@ pub fn job_lines(file: Vec<JobLine>, settings: &Settings) -> Vec<JobLine> {
         format!("{HIDDEN}={}", settings.hidden),
         setting(PAGE, &[page.width, page.height], 'x'),
         setting(MARGIN, &[settings.margin], ','),
+        format!("{TITLE}={}", Escape(&settings.title)),
+        setting(TITLE_SIZE, &[settings.title_size], ','),
         format!("{FIT}={}", if settings.fit { "on" } else { "off" }),
         format!("{ORDER}={}", settings.order),
         format!("{CYCLE}={}", if settings.cycle { "on" } else { "off" }),
@@ -215,6 +222,8 @@ mod tests {
             hidden: "dotted".to_owned(),
             page: Page { width: 210.0, height: 297.0 },
             margin: 7.5,
+            title: "Für Ada".to_owned(),
+            title_size: 4.5,
             fit: false,
             order: "auto",
             cycle: false,
@@ -239,6 +248,8 @@ mod tests {
                 "$hidden=dotted",
                 "$page=210x297",
                 "$margin=7.5",
+                "$title=F\\xFCr Ada",
+                "$title-size=4.5",
                 "$fit=off",
                 "$order=auto",
                 "$cycle=off",

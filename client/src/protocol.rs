@@ -45,6 +45,10 @@ pub const HIDDEN: &str = "$hidden";
 pub const PAGE: &str = "$page";
 /// What stays free on each side, in millimetres.
 pub const MARGIN: &str = "$margin";
+/// What stands below the drawing.
+pub const TITLE: &str = "$title";
+/// Height of its capitals, in millimetres.
+pub const TITLE_SIZE: &str = "$title-size";
 /// `on`: scale to the page; `off`: scale solids only and leave plans at true size.
 pub const FIT: &str = "$fit";
 

@@ -28,6 +28,12 @@ impl Line {
         Self([packed as u32, (packed >> 32) as u32, (packed >> 64) as u32])
     }
 
+    /// Its ends.
+    pub fn ends(self) -> [PagePoint; 2] {
+        let (from, to, ..) = self.unpack();
+        [from, to]
+    }
+
     /// Its ends, line type code and pen.
     fn unpack(self) -> (PagePoint, PagePoint, u8, u8) {
         let [low, middle, high] = self.0.map(u128::from);

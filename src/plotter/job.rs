@@ -1,6 +1,6 @@
 //! From the model to ordered strokes: the way of the data, in one place.
 
-use super::{PlotOptions, plan, solid};
+use super::{PlotOptions, plan, solid, title};
 use crate::drawing::{
     Bounds, Drawing, Line, LineType, OrganiseError, PageMap, PagePoint, StepsPerMillimetre, Stored,
     organise,
@@ -65,6 +65,7 @@ impl Job {
         {
             return Err(Refusal::NothingToPlot);
         }
+        title::check(options, steps)?;
         let mut degenerate_faces = 0;
         let lines = if model.is_plan() && options.shows_plans_flat() {
             plan::lay_out(model, options, steps, words, attention, observer)?
@@ -80,6 +81,7 @@ impl Job {
                 }
             }
         };
+        let lines = title::write(options, steps, words, lines, attention)?;
         attention.enter(Stage::Order);
         let stored = organise(words, lines, attention)?;
         let (drawing, mut rest) = stored.split(words).map_err(Refusal::DrawingTooLarge)?;
@@ -311,7 +313,7 @@ fn map_with_curves(
         all = grow(all, Bounds::around(positions.iter().map(in_front), projection));
     }
     let all = all.ok_or(Refusal::NothingToPlot)?;
-    let rough = PageMap::fit(&all, &options.page, steps).map_err(Refusal::Page)?;
+    let rough = PageMap::fit(&all, &options.sheet(), steps).map_err(Refusal::Page)?;
     let (mut bounds, is_cut) = {
         let mut scratch = scratch.reborrow();
         let seen = see(view, model, None, &mut scratch, attention)?;
@@ -334,8 +336,8 @@ fn fit(
     steps: StepsPerMillimetre,
 ) -> Result<PageMap, Refusal> {
     match view.field(Bounds::FRACTION_BITS).filter(|_| is_cut) {
-        Some(field) => PageMap::fit_field(bounds, field, &options.page, steps),
-        None => PageMap::fit(bounds, &options.page, steps),
+        Some(field) => PageMap::fit_field(bounds, field, &options.sheet(), steps),
+        None => PageMap::fit(bounds, &options.sheet(), steps),
     }
     .map_err(Refusal::Page)
 }

@@ -17,6 +17,7 @@ mod program;
 mod reply;
 mod solid;
 mod stream;
+mod title;
 
 pub use board::{Board, Kept, NotKept, Record};
 pub use job::{Cursor, Job, Observer, Strokes, Unobserved};
@@ -252,6 +253,7 @@ impl Inner<'_> {
                 kept::keep_settings(self.machine.settings(), board)?;
             }
             Command::Option(option) => self.options.set(option),
+            Command::Title(text) => self.options.set_title(text)?,
             Command::Options => self.task = Some(Task::List(Listing::Options, 0)),
             Command::Model => self.report_model(board),
             Command::Clear => self.model.clear(),

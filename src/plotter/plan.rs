@@ -22,7 +22,7 @@ pub(super) fn lay_out(
     let (vertices, curves) = (model.vertices(), model.curves());
     let points: &[Point] = bytemuck::cast_slice(vertices);
     let unit = libm::ldexp(1.0, -(model.fraction_bits() as i32));
-    let (page, bits) = (&options.page, model.fraction_bits());
+    let (page, bits) = (&options.sheet(), model.fraction_bits());
     let on_page =
         |map: PageMap| move |[x, y, _]: [i64; 3]| Some(map.fine(x, y, 1 << FRACTION_BITS));
     let corners = model.elements().corners().iter();

@@ -72,7 +72,7 @@ pub(super) fn project(
         bounds = grow(bounds, Bounds::around(ends.into_iter(), view.projection()));
     }
     let bounds = bounds.ok_or(Refusal::NothingToPlot)?;
-    let map = PageMap::fit(&bounds, &options.page, steps).map_err(Refusal::Page)?;
+    let map = PageMap::fit(&bounds, &options.sheet(), steps).map_err(Refusal::Page)?;
     let collector = Collector::new(line_words);
     let mut sink = PageSink { collector, map: &map, view: &view, hidden: options.hidden, observer };
     for (numbers, visible) in all() {

@@ -1,6 +1,6 @@
 //! Lines to typed commands.
 
-use super::{GCode, Refusal};
+use super::{EscapedText, GCode, Refusal};
 use crate::curve::CurveError;
 use crate::drawing::PEN_LIMIT;
 use crate::fixed::{Decimal, Millimetres};
@@ -47,6 +47,8 @@ pub enum Command<'a> {
     },
     /// `$name=value` for what is drawn and how.
     Option(PlotOption),
+    /// `$title=TEXT`
+    Title(EscapedText<'a>),
     /// `$options`
     Options,
     /// `$model`
@@ -111,6 +113,8 @@ pub enum PlotOption {
     },
     /// `$margin=MM`
     Margin(Millimetres),
+    /// `$title-size=MM`
+    TitleSize(Millimetres),
     /// `$fit=on|off`
     Fit(bool),
     /// `$order=auto|greedy|exact`
@@ -269,6 +273,8 @@ pub const HELP: &[(&str, &str)] = &[
     ("$crease=DEGREES", "leave out edges between faces that bend less; 0 draws every edge"),
     ("$page=WIDTHxHEIGHT", "size of the sheet in mm"),
     ("$margin=MM", "what stays free on each side of the sheet"),
+    ("$title=TEXT", "what stands below the drawing, the rest of the line; nothing for none"),
+    ("$title-size=MM", "height of its capitals, 1 to 100"),
     ("$fit=on|off", "scale a plan to the page, or draw it at true size"),
     ("$order=auto|greedy|exact", "how the moves between strokes are chosen"),
     ("$cycle=on|off", "whether the pen returns to where it began"),
@@ -320,7 +326,11 @@ impl<'a> Command<'a> {
     /// assert_eq!(Command::parse("$plot"), Ok(Command::Plot));
     /// assert!(Command::parse("v 1 2").is_err());
     /// ```
+    #[inline(never)] // Its frame must not lie under the stages'.
     pub fn parse(line: &'a str) -> Result<Self, Refusal> {
+        if let Some(text) = title(line) {
+            return EscapedText::new(text).map(Self::Title);
+        }
         let line = line.split('#').next().unwrap_or("").trim();
         if let Some(dollar) = line.strip_prefix('$') {
             return Self::parse_dollar(dollar.trim());
@@ -363,6 +373,7 @@ impl<'a> Command<'a> {
         )
     }
 
+    #[inline(never)] // Its frame must not lie under the stages'.
     fn parse_dollar(text: &'a str) -> Result<Self, Refusal> {
         if let Some((name, value)) = text.split_once('=') {
             let (name, value) = (name.trim(), value.trim());
@@ -435,6 +446,13 @@ impl PlotOption {
                 }
                 Self::Margin(margin)
             }
+            "title-size" => {
+                let size = positive(value)?;
+                if !(1..=100).contains(&size) {
+                    return Err(Refusal::NumberOutOfRange);
+                }
+                Self::TitleSize(size)
+            }
             "fit" => Self::Fit(on_or_off(value)?),
             "order" => Self::Order(match value {
                 "auto" => order::Method::Auto,
@@ -465,6 +483,13 @@ impl PlotOption {
     }
 }
 
+/// The text of a `$title=` line as it stands, with its spaces and whatever else a title may hold.
+#[inline(never)] // Its frame must not lie under the stages'.
+fn title(line: &str) -> Option<&str> {
+    let (name, text) = line.trim_start().strip_prefix('$')?.split_once('=')?;
+    (name.trim() == "title").then_some(text)
+}
+
 fn on_or_off(text: &str) -> Result<bool, Refusal> {
     match text {
         "on" => Ok(true),
@@ -477,6 +502,7 @@ fn number(text: &str) -> Result<Decimal, Refusal> {
     Decimal::parse(text.trim()).map_err(|_| Refusal::NotANumber)
 }
 
+#[inline(never)] // Once is enough.
 fn positive(text: &str) -> Result<Millimetres, Refusal> {
     let length = number(text)?.to_millimetres().map_err(|_| Refusal::NumberOutOfRange)?;
     if length > 0 { Ok(length) } else { Err(Refusal::NumberOutOfRange) }
