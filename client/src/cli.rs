@@ -38,7 +38,7 @@ pub enum Command {
 #[derive(Debug, Subcommand)]
 pub enum TapeCommand {
     /// Record the job of an OBJ file as a tape
-    Encode(TapeEncodeArgs),
+    Encode(Box<TapeEncodeArgs>),
     /// Print the instructions of a tape
     Decode {
         /// The tape

@@ -216,6 +216,22 @@ fn change(plain: &mut Plain, kind: u8, a: usize, b: usize, c: i64) -> Option<Str
     }
 }
 
+/// Changes that are refused whatever the model is.
+const REFUSED: [&str; 12] = [
+    "v 1e12 0 0",
+    "f 1 2 9999",
+    "f 1 1 1",
+    "l 1",
+    "deg 1\ncurv 2 1 1 2\nend",
+    "$delete=v,9999",
+    "$plug=f,9999",
+    "$move=9999,1,2,3",
+    "$translate=1e12,0,0",
+    "$scale=1e9,1e9,1e9",
+    "$mirror=1,1,1",
+    "$reflect=2,9999,1",
+];
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
 
@@ -245,6 +261,11 @@ proptest! {
             }
             prop_assert_eq!(&of(&bench), &plain, "{}", line);
             if b % 3 == 0 {
+                // What is refused in between changes nothing, nor what is taken back.
+                let refused = REFUSED[usize::from(a) % REFUSED.len()];
+                let answer = bench.say(&format!("{refused}\n"));
+                prop_assert!(answer.contains("error:"), "{}: {}", refused, answer);
+                prop_assert_eq!(&of(&bench), &plain, "{}", refused);
                 prop_assert_eq!(bench.say("$undo\n"), "ok\n");
                 prop_assert_eq!(&of(&bench), &before, "{} taken back", line);
                 plain = before;
@@ -291,6 +312,10 @@ fn a_session_reads_as_it_is_documented() {
         ("$mirror=1,2,2", "[MSG:three vertices that are not in line make a plane]\nerror:119\n"),
         ("$translate=1e12,0,0", "[MSG:coordinates go up to 1073741824]\nerror:115\n"),
         ("$move=1,2", "[MSG:it takes 4 numbers]\nerror:103\n"),
+        ("$scale=2,2,2", "[EDIT:vertices +0, bars +0, faces +0, curves +0]\nok\n"),
+        ("$mirror=1,2,9", "[MSG:there is no vertex 9: the model has 6]\nerror:110\n"),
+        ("$undo", "ok\n"),
+        ("$list=v,2", "[v 2: 0.000000 100.000000 0.000000]\nok\n"),
         ("$rotate=w,2", "[MSG:choose x, y or z]\nerror:105\n"),
         ("$list=q", "[MSG:choose v, l, f or c]\nerror:105\n"),
     ] {

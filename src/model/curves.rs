@@ -204,18 +204,21 @@ impl CurveList {
         Ok(())
     }
 
-    /// `end`: the curve in hand is whole. If it is refused it is forgotten.
+    /// `end`: completes the curve in hand, which [`CurveList::count_in`] then makes one of the model's. If it is
+    /// refused it is forgotten.
     pub(super) fn end(&mut self, memory: &mut Memory) -> Result<(), ModelError> {
         let in_hand = self.in_hand.take().ok_or(ModelError::NoCurve)?;
         let closed = self.close(memory, &in_hand);
-        match closed {
-            Ok(()) => {
-                self.whole = memory.len() - self.start;
-                self.count += 1;
-            }
-            Err(_) => memory.truncate(self.start + self.whole),
+        if closed.is_err() {
+            memory.truncate(self.start + self.whole);
         }
         closed
+    }
+
+    /// The memory up to `end` holds whole curves, one more than before.
+    pub(super) fn count_in(&mut self, end: usize) {
+        self.whole = end - self.start;
+        self.count += 1;
     }
 
     /// Checks the curve in hand and completes its header.
@@ -379,7 +382,7 @@ fn in_unit(knot: Decimal, fraction_bits: u32) -> Option<i32> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Corner, Model, Position};
+    use super::super::{Corner, Model, Position, unkept};
     use super::*;
     use std::vec::Vec;
 
@@ -396,7 +399,7 @@ mod tests {
         let mut memory = (heapless::Vec::<Position, 8>::new(), heapless::Vec::<Corner, 48>::new());
         let mut model = Model::new(&mut memory.0, &mut memory.1);
         for _ in 0..8 {
-            model.add_vertex(["0", "0", "0"].map(decimal)).unwrap();
+            model.add_vertex(["0", "0", "0"].map(decimal), &mut unkept).unwrap();
         }
         test(&mut model);
     }
@@ -411,7 +414,7 @@ mod tests {
         for line in knots {
             model.add_knots(decimals(line))?;
         }
-        model.end_curve()
+        model.end_curve(&mut unkept)
     }
 
     fn controls(model: &Model<'_>) -> Vec<Vec<u16>> {
@@ -426,15 +429,15 @@ mod tests {
     fn curves_come_back_as_they_were_sent_wherever_the_elements_come() {
         with_model(|model| {
             model.set_degree(2).unwrap();
-            model.add_polyline([1, 2].into_iter()).unwrap();
+            model.add_polyline([1, 2].into_iter(), &mut unkept).unwrap();
             sent(model, ["2.5", "4"], &[1, 2, -5, 4, 1], &[]).unwrap();
             model.begin_curve(["0", "3"].map(decimal), [5, 4, 3, 2].into_iter()).unwrap();
             model.add_knots(decimals("0 0 0")).unwrap();
-            model.add_face([1, 2, 3].into_iter()).unwrap();
+            model.add_face([1, 2, 3].into_iter(), &mut unkept).unwrap();
             // A knot past 1 coarsens those before it.
             model.add_knots(decimals("0.5")).unwrap();
             model.add_knots(decimals("3 3 3")).unwrap();
-            model.end_curve().unwrap();
+            model.end_curve(&mut unkept).unwrap();
             let curves: Vec<_> = model.curves().iter().collect();
             assert_eq!((curves.len(), model.curve_count()), (2, 2));
             assert_eq!(
@@ -463,7 +466,7 @@ mod tests {
             let three = [1, 2, 3];
             assert_eq!(sent(model, ["2", "3"], &three, &[]), Err(ModelError::NoDegree));
             assert_eq!(model.add_knots(decimals("1")), Err(ModelError::NoCurve));
-            assert_eq!(model.end_curve(), Err(ModelError::NoCurve));
+            assert_eq!(model.end_curve(&mut unkept), Err(ModelError::NoCurve));
             for degree in [0, 6] {
                 assert_eq!(model.set_degree(degree), Err(ModelError::Curve(CurveError::Order)));
             }
@@ -510,7 +513,7 @@ mod tests {
                 Err(ModelError::TooManyCorners { limit: 48, needed: 8 + 2 + 4 + 2 * 99 })
             );
             model.add_knots(decimals("1 1")).unwrap();
-            model.end_curve().unwrap();
+            model.end_curve(&mut unkept).unwrap();
             let curve = model.curves().iter().next().unwrap();
             assert_eq!(knots(&curve), [0, 0, 1 << 22, 1 << 22]);
         });

@@ -5,7 +5,7 @@
 //! deleted vertex goes too. Refused, and the model is as it was: numbers that do not exist, a plane
 //! through vertices in line, coordinates or a copy that do not fit.
 
-use super::{Corner, Model, ModelError, POSITION_LIMIT, Position};
+use super::{Before, Corner, Model, ModelError, POSITION_LIMIT, Position};
 use crate::fixed::{Decimal, divide_rounding};
 use crate::stage::{OutOfScratch, Scratch};
 use core::ops::Range;
@@ -131,27 +131,34 @@ fn within(value: i128) -> i64 {
 }
 
 impl Model<'_> {
-    /// Does one change. `scratch`: 2 bytes for each vertex.
+    /// Does one change. `scratch`: 2 bytes for each vertex. `keep` is shown the model before it changes.
     ///
     /// # Errors
     /// See [`ModelError`]; the model is unchanged.
-    pub fn edit(&mut self, edit: Edit, scratch: Scratch<'_>) -> Result<Change, ModelError> {
+    pub fn edit(
+        &mut self,
+        edit: Edit,
+        scratch: Scratch<'_>,
+        keep: Before<'_>,
+    ) -> Result<Change, ModelError> {
         if self.curves.is_in_hand() {
             return Err(ModelError::CurveUnfinished);
         }
-        let before = self.counts();
+        let counts = self.counts();
         match edit {
             Edit::Delete(part, numbers) => {
                 let range = self.range(part, Some(numbers))?;
+                keep(self);
                 self.delete(part, range, false);
             }
             Edit::Plug(part, number) => {
                 let range = self.range(part, Some([number; 2]))?;
+                keep(self);
                 self.delete(part, range, true);
             }
             Edit::Move(number, place) => {
                 let range = self.range(Part::Vertices, Some([number; 2]))?;
-                let place = self.place(place)?;
+                let place = self.place(place, keep)?;
                 for vertex in self.vertices.get_mut(range).unwrap_or(&mut []) {
                     *vertex = place;
                 }
@@ -165,7 +172,7 @@ impl Model<'_> {
                         .map_err(|_| ModelError::CoordinateTooLarge)?;
                 }
                 let map = Map::Affine(Map::diagonal([1 << UNIT_BITS; 3]), shift);
-                self.transform(&map, range)?;
+                self.transform(&map, range, keep)?;
             }
             Edit::Scale(by, numbers) => {
                 let range = self.range(Part::Vertices, numbers)?;
@@ -176,25 +183,26 @@ impl Model<'_> {
                         .filter(|factor| factor.abs() <= SCALE_LIMIT)
                         .ok_or(ModelError::CoordinateTooLarge)?;
                 }
-                self.transform(&Map::Affine(Map::diagonal(factors), Map::NO_SHIFT), range)?;
+                let map = Map::Affine(Map::diagonal(factors), Map::NO_SHIFT);
+                self.transform(&map, range, keep)?;
             }
             Edit::Rotate(axis, degrees, numbers) => {
                 let range = self.range(Part::Vertices, numbers)?;
-                self.transform(&Map::rotation(axis, degrees), range)?;
+                self.transform(&Map::rotation(axis, degrees), range, keep)?;
             }
             Edit::Reflect(plane, numbers) => {
                 let range = self.range(Part::Vertices, numbers)?;
-                self.transform(&self.reflection(plane)?, range.clone())?;
+                self.transform(&self.reflection(plane)?, range.clone(), keep)?;
                 self.turn_faces(&range);
             }
             Edit::Mirror(plane, numbers) => {
                 let range = self.range(Part::Vertices, numbers)?;
-                self.mirror(&self.reflection(plane)?, range, scratch)?;
+                self.mirror(&self.reflection(plane)?, range, scratch, keep)?;
             }
         }
         let after = self.counts();
         let [vertices, bars, faces, curves] =
-            [0, 1, 2, 3].map(|part: usize| after[part] as i32 - before[part] as i32);
+            [0, 1, 2, 3].map(|part: usize| after[part] as i32 - counts[part] as i32);
         Ok(Change { vertices, bars, faces, curves })
     }
 
@@ -361,9 +369,15 @@ impl Model<'_> {
     }
 
     /// Takes some vertices through a map, in a coarser unit if it must be.
-    fn transform(&mut self, map: &Map, range: Range<usize>) -> Result<(), ModelError> {
+    fn transform(
+        &mut self,
+        map: &Map,
+        range: Range<usize>,
+        keep: Before<'_>,
+    ) -> Result<(), ModelError> {
         let positions = self.vertices.get(range.clone()).unwrap_or(&[]);
         let coarser = self.coarser_for(positions.iter().map(|position| map.apply(*position)))?;
+        keep(self);
         for position in self.vertices.get_mut(range.clone()).unwrap_or(&mut []) {
             *position = in_unit(map.apply(*position), coarser);
         }
@@ -408,6 +422,7 @@ impl Model<'_> {
         map: &Map,
         range: Range<usize>,
         mut scratch: Scratch<'_>,
+        keep: Before<'_>,
     ) -> Result<(), ModelError> {
         let images = scratch.take::<u16>(range.len()).map_err(ModelError::Scratch)?;
         let (old, limit) = (self.vertices.len(), self.vertex_limit());
@@ -451,6 +466,7 @@ impl Model<'_> {
         let positions = self.vertices.get(range.clone()).unwrap_or(&[]);
         let coarser = self.coarser_for(positions.iter().map(|position| map.apply(*position)))?;
 
+        keep(self);
         for at in range.clone() {
             let Some(position) = self.vertices.get(at) else { continue };
             if image(at as u16) != Some(at as u16) {

@@ -181,6 +181,13 @@ pub enum ModelError {
     Scratch(OutOfScratch),
 }
 
+/// Who is shown the model just before it changes, and never when a change is refused: [`Model::save`] may
+/// copy it then.
+pub type Before<'b> = &'b mut dyn FnMut(&Model<'_>);
+
+/// For a [`Before`]: no copy is kept.
+pub fn unkept(_: &Model<'_>) {}
+
 /// The vertices, faces and bars that the user sent, in memory lent by the owner.
 ///
 /// All coordinates share one binary unit. It begins at 2^-30 and grows when a larger coordinate
@@ -279,17 +286,25 @@ impl<'m> Model<'m> {
     ///
     /// # Errors
     /// [`ModelError::TooManyVertices`], [`ModelError::CoordinateTooLarge`]; the model is unchanged.
-    pub fn add_vertex(&mut self, coordinates: [Decimal; 3]) -> Result<(), ModelError> {
+    pub fn add_vertex(
+        &mut self,
+        coordinates: [Decimal; 3],
+        before: Before<'_>,
+    ) -> Result<(), ModelError> {
         let limit = self.vertex_limit();
         if self.vertices.len() >= limit {
             return Err(ModelError::TooManyVertices { limit });
         }
-        let place = self.place(coordinates)?;
+        let place = self.place(coordinates, before)?;
         self.vertices.push(place).map_err(|_| ModelError::TooManyVertices { limit })
     }
 
     /// A place in the model's unit, which grows if it must.
-    fn place(&mut self, coordinates: [Decimal; 3]) -> Result<Position, ModelError> {
+    fn place(
+        &mut self,
+        coordinates: [Decimal; 3],
+        before: Before<'_>,
+    ) -> Result<Position, ModelError> {
         let fraction_bits = (0..=self.fraction_bits)
             .rev()
             .find(|bits| {
@@ -308,6 +323,7 @@ impl<'m> Model<'m> {
                 .and_then(|value| i32::try_from(value).ok())
                 .unwrap_or(0)
         });
+        before(self);
         self.coarsen(self.fraction_bits - fraction_bits);
         Ok(Position { x, y, z })
     }
@@ -332,6 +348,7 @@ impl<'m> Model<'m> {
     pub fn add_face(
         &mut self,
         numbers: impl Iterator<Item = i32> + Clone,
+        before: Before<'_>,
     ) -> Result<(), ModelError> {
         let count = self.check_numbers(numbers.clone(), 3)?;
         let first = numbers.clone().next();
@@ -342,6 +359,7 @@ impl<'m> Model<'m> {
             return Err(ModelError::RepeatedVertex { number: last });
         }
         self.check_corners(count)?;
+        before(self);
         for (at, number) in numbers.enumerate() {
             self.push_corner(number, false, at + 1 == count)?;
         }
@@ -356,9 +374,11 @@ impl<'m> Model<'m> {
     pub fn add_polyline(
         &mut self,
         numbers: impl Iterator<Item = i32> + Clone,
+        before: Before<'_>,
     ) -> Result<(), ModelError> {
         let count = self.check_numbers(numbers.clone(), 2)?;
         self.check_corners(2 * (count - 1))?;
+        before(self);
         for (from, to) in numbers.clone().zip(numbers.skip(1)) {
             self.push_corner(from, true, false)?;
             self.push_corner(to, true, true)?;
@@ -452,8 +472,11 @@ impl<'m> Model<'m> {
     ///
     /// # Errors
     /// [`ModelError::NoCurve`], [`ModelError::KnotTooLarge`], [`ModelError::Curve`].
-    pub fn end_curve(&mut self) -> Result<(), ModelError> {
-        self.curves.end(self.corners)
+    pub fn end_curve(&mut self, before: Before<'_>) -> Result<(), ModelError> {
+        self.curves.end(self.corners)?;
+        before(self);
+        self.curves.count_in(self.corners.len());
+        Ok(())
     }
 
     /// The vertex that an OBJ number means.
@@ -506,7 +529,7 @@ mod tests {
         let (mut vertices, mut corners) = (Vertices::new(), Corners::new());
         let mut model = Model::new(&mut vertices, &mut corners);
         for _ in 0..count {
-            model.add_vertex(decimals(["0.25", "-0.5", "0"])).unwrap();
+            model.add_vertex(decimals(["0.25", "-0.5", "0"]), &mut unkept).unwrap();
         }
         test(&mut model);
     }
@@ -515,7 +538,7 @@ mod tests {
     fn a_larger_coordinate_coarsens_the_unit_for_all() {
         with_vertices(1, |model| {
             assert_eq!(model.fraction_bits(), 30);
-            model.add_vertex(decimals(["100", "0", "0.1"])).unwrap();
+            model.add_vertex(decimals(["100", "0", "0.1"]), &mut unkept).unwrap();
             assert_eq!(model.fraction_bits(), 23);
             assert_eq!(model.vertices()[0], Position { x: 1 << 21, y: -(1 << 22), z: 0 });
             assert_eq!(model.vertices()[1].x, 100 << 23);
@@ -527,7 +550,7 @@ mod tests {
         with_vertices(0, |model| {
             let place = ["0.123456789", "-0.7", "0.3"];
             for place in [place, ["9", "0", "0"], ["-700", "0", "0"], place] {
-                model.add_vertex(decimals(place)).unwrap();
+                model.add_vertex(decimals(place), &mut unkept).unwrap();
             }
             assert_eq!(model.vertices()[0], model.vertices()[3]);
         });
@@ -537,13 +560,13 @@ mod tests {
     fn refused_vertices_change_nothing() {
         with_vertices(3, |model| {
             assert_eq!(
-                model.add_vertex(decimals(["1e10", "0", "0"])),
+                model.add_vertex(decimals(["1e10", "0", "0"]), &mut unkept),
                 Err(ModelError::CoordinateTooLarge)
             );
             assert_eq!((model.vertices().len(), model.fraction_bits()), (3, 30));
-            model.add_vertex(decimals(["0", "0", "0"])).unwrap();
+            model.add_vertex(decimals(["0", "0", "0"]), &mut unkept).unwrap();
             assert_eq!(
-                model.add_vertex(decimals(["9", "0", "0"])),
+                model.add_vertex(decimals(["9", "0", "0"]), &mut unkept),
                 Err(ModelError::TooManyVertices { limit: 4 })
             );
             assert_eq!((model.vertices().len(), model.fraction_bits()), (4, 30));
@@ -555,27 +578,33 @@ mod tests {
         with_vertices(4, |model| {
             let unknown = |number| Err(ModelError::UnknownVertex { number, vertices: 4 });
             for number in [0, 5, -5, i32::MIN, i32::MAX] {
-                assert_eq!(model.add_face([1, 2, number].into_iter()), unknown(number));
-                assert_eq!(model.add_polyline([1, number].into_iter()), unknown(number));
+                assert_eq!(
+                    model.add_face([1, 2, number].into_iter(), &mut unkept),
+                    unknown(number)
+                );
+                assert_eq!(
+                    model.add_polyline([1, number].into_iter(), &mut unkept),
+                    unknown(number)
+                );
             }
             assert_eq!(
-                model.add_face([1, 2].into_iter()),
+                model.add_face([1, 2].into_iter(), &mut unkept),
                 Err(ModelError::TooFewCorners { needed: 3 })
             );
             assert_eq!(
-                model.add_polyline([1].into_iter()),
+                model.add_polyline([1].into_iter(), &mut unkept),
                 Err(ModelError::TooFewCorners { needed: 2 })
             );
             assert_eq!(
-                model.add_face([1, 2, 2].into_iter()),
+                model.add_face([1, 2, 2].into_iter(), &mut unkept),
                 Err(ModelError::RepeatedVertex { number: 2 })
             );
             assert_eq!(
-                model.add_face([1, 2, 3, -4].into_iter()),
+                model.add_face([1, 2, 3, -4].into_iter(), &mut unkept),
                 Err(ModelError::RepeatedVertex { number: -4 })
             );
             assert_eq!(
-                model.add_face([1, 2, 3, 1, 2, 3, 1, 2, 3].into_iter()),
+                model.add_face([1, 2, 3, 1, 2, 3, 1, 2, 3].into_iter(), &mut unkept),
                 Err(ModelError::TooManyCorners { limit: 8, needed: 9 })
             );
             assert_eq!((model.corner_count(), model.face_count(), model.bar_count()), (0, 0, 0));
@@ -585,8 +614,8 @@ mod tests {
     #[test]
     fn elements_come_back_as_they_were_sent() {
         with_vertices(4, |model| {
-            model.add_polyline([1, 2, -1].into_iter()).unwrap();
-            model.add_face([-4, -3, -2, -1].into_iter()).unwrap();
+            model.add_polyline([1, 2, -1].into_iter(), &mut unkept).unwrap();
+            model.add_face([-4, -3, -2, -1].into_iter(), &mut unkept).unwrap();
             let mut elements = model.elements().iter();
             assert_eq!(elements.next(), Some(Element::Bar(0, 1)));
             assert_eq!(elements.next(), Some(Element::Bar(1, 3)));
@@ -602,9 +631,9 @@ mod tests {
     fn bars_at_one_height_are_a_plan() {
         with_vertices(2, |model| {
             assert!(!model.is_plan());
-            model.add_polyline([1, 2].into_iter()).unwrap();
+            model.add_polyline([1, 2].into_iter(), &mut unkept).unwrap();
             assert!(model.is_plan());
-            model.add_vertex(decimals(["0", "0", "1"])).unwrap();
+            model.add_vertex(decimals(["0", "0", "1"]), &mut unkept).unwrap();
             assert!(!model.is_plan());
         });
     }

@@ -7,27 +7,34 @@ use crate::stage::{Scratch, items};
 const HEAD: usize = 8;
 
 impl Model<'_> {
-    /// Copies the model to `words`. `false` if it does not fit, or a curve has no end yet.
+    /// Copies the model to `words`, without a curve that has no end yet. `false` if it does not fit.
     pub fn save(&self, words: &mut [u64]) -> bool {
-        !self.curves.is_in_hand() && self.copy_to(Scratch::new(words)).is_some()
+        self.copy_to(Scratch::new(words)).is_some()
     }
 
     /// How many words [`Model::save`] uses of those that it is given.
     pub fn saved_words(&self) -> usize {
         let vertices = Scratch::bytes_for::<Position>(self.vertices.len());
-        let corners = Scratch::bytes_for::<Corner>(self.corners.len());
+        let corners = Scratch::bytes_for::<Corner>(self.whole_corners().len());
         (Scratch::bytes_for::<u32>(HEAD) + vertices + corners) / size_of::<u64>()
     }
 
+    /// Corners of elements and whole curves.
+    fn whole_corners(&self) -> &[Corner] {
+        let end = self.curves.start + self.curves.whole();
+        self.corners.get(..end).unwrap_or(self.corners)
+    }
+
     fn copy_to(&self, mut scratch: Scratch<'_>) -> Option<()> {
-        let (curves, lengths) = (&self.curves, [self.vertices.len(), self.corners.len()]);
+        let corners = self.whole_corners();
+        let (curves, lengths) = (&self.curves, [self.vertices.len(), corners.len()]);
         let numbers = [self.faces, self.bars, curves.start, curves.whole(), curves.count];
         let numbers = [self.fraction_bits as usize].into_iter().chain(lengths).chain(numbers);
         for (word, number) in scratch.take::<u32>(HEAD).ok()?.iter_mut().zip(numbers) {
             *word = number as u32;
         }
         scratch.take::<Position>(lengths[0]).ok()?.copy_from_slice(self.vertices);
-        scratch.take::<Corner>(lengths[1]).ok()?.copy_from_slice(self.corners);
+        scratch.take::<Corner>(lengths[1]).ok()?.copy_from_slice(corners);
         Some(())
     }
 

@@ -360,19 +360,6 @@ impl<'a> Command<'a> {
         }
     }
 
-    /// Whether `$undo` takes it back.
-    pub fn changes_the_model(&self) -> bool {
-        matches!(
-            self,
-            Self::Vertex(_)
-                | Self::Face(_)
-                | Self::Polyline(_)
-                | Self::Curve { .. }
-                | Self::Clear
-                | Self::Edit(_)
-        )
-    }
-
     #[inline(never)] // Its frame must not lie under the stages'.
     fn parse_dollar(text: &'a str) -> Result<Self, Refusal> {
         if let Some((name, value)) = text.split_once('=') {

@@ -121,6 +121,7 @@ fn hash(position: &Position) -> u32 {
 mod tests {
     use super::*;
     use crate::fixed::Decimal;
+    use crate::model::unkept;
     use crate::stage::Undisturbed;
     use std::vec::Vec;
 
@@ -133,12 +134,12 @@ mod tests {
         let mut corners = heapless::Vec::<Corner, 64>::new();
         let mut model = Model::new(&mut vertices, &mut corners);
         for place in places {
-            model.add_vertex(decimals(*place)).unwrap();
+            model.add_vertex(decimals(*place), &mut unkept).unwrap();
         }
         for face in faces {
             match face.len() {
-                2 => model.add_polyline(face.iter().copied()).unwrap(),
-                _ => model.add_face(face.iter().copied()).unwrap(),
+                2 => model.add_polyline(face.iter().copied(), &mut unkept).unwrap(),
+                _ => model.add_face(face.iter().copied(), &mut unkept).unwrap(),
             }
         }
         let mut words = [0; 64];
@@ -176,9 +177,9 @@ mod tests {
         let mut corners = heapless::Vec::<Corner, 4>::new();
         let mut model = Model::new(&mut vertices, &mut corners);
         for [x, y] in [["0", "0"], ["1", "0"], ["0.5", "1"]] {
-            model.add_vertex(decimals([x, y, "0"])).unwrap();
+            model.add_vertex(decimals([x, y, "0"]), &mut unkept).unwrap();
         }
-        model.add_face([1, 2, 3].into_iter()).unwrap();
+        model.add_face([1, 2, 3].into_iter(), &mut unkept).unwrap();
         let mut words = [0; 2];
         let mut scratch = Scratch::new(&mut words);
         let (elements, degenerate) = tidy(&model, &mut scratch, &mut Undisturbed).unwrap();
