@@ -196,6 +196,9 @@ pub struct ViewArgs {
         help_heading = "Camera"
     )]
     pub crease: f64,
+    /// Whether the file's usemtl, or else its groups, choose pens: pen1 to pen32, or by name
+    #[arg(long, value_enum, default_value = "auto", help_heading = "Page")]
+    pub pens: Pens,
     /// A4, A3, Letter, or width x height in mm, such as 300x200
     #[arg(long, value_name = "PAGE", value_parser = page, default_value = "A4", allow_hyphen_values = true,
           help_heading = "Page")]
@@ -271,6 +274,10 @@ impl ViewArgs {
                 See::Edges => "edges",
             },
             hidden: self.hidden.clone(),
+            pens: match self.pens {
+                Pens::Auto => "auto",
+                Pens::One => "one",
+            },
             page,
             margin: self.margin,
             title: self.title.clone(),
@@ -344,6 +351,15 @@ pub enum Blocks {
     Separate,
     /// No line is drawn between two faces in one plane
     Merged,
+}
+
+/// Who chooses pens.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Pens {
+    /// The file
+    Auto,
+    /// Nobody: one pen draws all
+    One,
 }
 
 /// On or off.

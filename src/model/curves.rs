@@ -21,6 +21,8 @@ type Memory = heapless::VecView<Corner>;
 pub struct StoredCurve<'a> {
     /// Degree + 1.
     pub order: u8,
+    /// The pen that draws it, from 0.
+    pub pen: u8,
     /// The numbers of its control points, from 0.
     pub control: &'a [u16],
     /// Its knots.
@@ -122,8 +124,10 @@ struct InHand {
     fraction_bits: Option<u8>,
 }
 
-/// Half-words before the control points: how many control points, order, how many knots, nothing, both ends.
+/// Half-words before the control points: how many control points, order, how many knots, pen, both ends.
 const HEADER: usize = 8;
+/// Which of them is the pen.
+const PEN: usize = 3;
 
 /// The finest unit of a knot, 2^-22, which holds |knot| <= 1.
 const FINEST: u32 = 22;
@@ -147,12 +151,13 @@ impl CurveList {
         Ok(())
     }
 
-    /// `curv`: begins a curve from `from` to `to` over the points numbered `control`, from 0, which exist.
+    /// `curv`: begins a curve between two `ends` over the points numbered `control`, from 0, which exist.
     pub(super) fn begin(
         &mut self,
         memory: &mut Memory,
         ends: [Decimal; 2],
         control: impl Iterator<Item = u16> + Clone,
+        pen: u8,
     ) -> Result<(), ModelError> {
         if self.in_hand.is_some() {
             return Err(ModelError::CurveUnfinished);
@@ -168,7 +173,7 @@ impl CurveList {
             _ => return Err(ModelError::KnotTooLarge),
         };
         let control_points = control_points as u16; // at most 2^12
-        let header = [control_points, u16::from(order), 0, 0, 0, 0, 0, 0];
+        let header = [control_points, u16::from(order), 0, u16::from(pen), 0, 0, 0, 0];
         memory.extend(header.into_iter().chain(control).map(Corner));
         self.in_hand = Some(InHand { order, control_points, ends, fraction_bits: None });
         Ok(())
@@ -334,6 +339,19 @@ impl CurveList {
         self.whole = memory.len() - self.start;
     }
 
+    /// All are the first pen's, the curve in hand too.
+    pub(super) fn forget_pens(&mut self, memory: &mut Memory) {
+        let mut at = self.start;
+        while let Some(header) = memory.get_mut(at..).and_then(|rest| rest.get_mut(..HEADER)) {
+            header[PEN] = Corner(0);
+            match lengths(bytemuck::cast_slice(header)) {
+                // The count of knots of the curve in hand is not yet known: it is the last one.
+                Some((length, _)) if at < self.start + self.whole => at += length,
+                _ => break,
+            }
+        }
+    }
+
     /// How many half-words of whole curves there are.
     pub(super) fn whole(&self) -> usize {
         self.whole
@@ -368,10 +386,10 @@ fn read(halves: &[u16]) -> Option<(StoredCurve<'_>, &[u16])> {
         [] => Knots::Uniform,
         knots => Knots::Packed(bytemuck::cast_slice(knots)),
     };
-    let [_, order, _, _, a, b, c, d] = *header else { return None };
+    let [_, order, _, pen, a, b, c, d] = *header else { return None };
     let ends: [u32; 2] = bytemuck::cast([a, b, c, d]);
     let [from, to] = ends.map(Parameter::from_bits);
-    Some((StoredCurve { order: order as u8, control, knots, from, to }, after))
+    Some((StoredCurve { order: order as u8, pen: pen as u8, control, knots, from, to }, after))
 }
 
 /// A knot in units of 2^-`fraction_bits`, if it fits.

@@ -5,6 +5,7 @@
 //! deleted vertex goes too. Refused, and the model is as it was: numbers that do not exist, a plane
 //! through vertices in line, coordinates or a copy that do not fit.
 
+use super::pens::{PenRun, RUN, close_gap, open_gap};
 use super::{Before, Corner, Model, ModelError, POSITION_LIMIT, Position};
 use crate::fixed::{Decimal, divide_rounding};
 use crate::stage::{OutOfScratch, Scratch};
@@ -153,6 +154,10 @@ impl Model<'_> {
             }
             Edit::Plug(part, number) => {
                 let range = self.range(part, Some([number; 2]))?;
+                if self.runs > 0 && matches!(part, Part::Bars | Part::Faces) {
+                    // The pen may change before and after the element that comes there.
+                    self.check_corners(2 * RUN)?;
+                }
                 keep(self);
                 self.delete(part, range, true);
             }
@@ -272,7 +277,8 @@ impl Model<'_> {
     fn delete_elements(&mut self, bars: bool, range: Range<usize>, plug: bool) {
         if plug {
             // The last one before the one that goes.
-            let corners = self.corners.get_mut(..self.curves.start).unwrap_or(&mut []);
+            let end = self.elements_end();
+            let corners = self.corners.get_mut(..end).unwrap_or(&mut []);
             let (mut at, mut number, mut hole) = (0, 0, 0);
             let mut last = 0..0;
             while let Some(length) = corners.get(at..).and_then(element_length) {
@@ -287,6 +293,7 @@ impl Model<'_> {
             }
             if let Some(between) = corners.get_mut(hole..last.end).filter(|_| last.start > hole) {
                 between.rotate_right(last.len());
+                self.move_pen(last, hole);
                 self.keep_elements(bars, range.start + 1..range.end + 1);
                 return;
             }
@@ -320,23 +327,50 @@ impl Model<'_> {
 
     /// Keeps the elements for which `stays` says so; it may change them.
     fn retain(&mut self, stays: &mut dyn FnMut(&mut [Corner]) -> bool) {
-        let start = self.curves.start;
+        let (end, mut runs) = (self.elements_end(), self.runs);
         let (mut read, mut write, mut bars, mut faces) = (0, 0, 0, 0);
-        while let Some(length) = self.corners.get(read..start).and_then(element_length) {
+        while let Some(length) = self.corners.get(read..end).and_then(element_length) {
             let element = self.corners.get_mut(read..read + length).unwrap_or(&mut []);
             let of_bar = element.first().is_some_and(|corner| corner.of_bar());
             if stays(element) {
                 self.corners.copy_within(read..read + length, write);
                 write += length;
                 *(if of_bar { &mut bars } else { &mut faces }) += 1;
+            } else {
+                let list = self.corners.get_mut(end..self.curves.start).unwrap_or(&mut []);
+                runs = close_gap(bytemuck::cast_slice_mut(list), runs, write..write + length);
             }
             read += length;
         }
-        let count = self.corners.len();
-        self.corners.copy_within(start..count, write);
-        self.corners.truncate(count - (start - write));
-        self.curves.start = write;
+        self.set_runs(end, runs, write);
+        self.remove_halves(write..end);
         (self.bars, self.faces) = (bars, faces);
+    }
+
+    /// The corners in `from` were moved to `to`, before them: so is their pen. There is room for two more runs.
+    fn move_pen(&mut self, from: Range<usize>, to: usize) {
+        if self.runs == 0 {
+            return;
+        }
+        let (end, pen) = (self.elements_end(), self.pens().at(from.start));
+        for _ in 0..2 * RUN {
+            let _ = self.insert_half(self.curves.start, 0);
+        }
+        let list = self.corners.get_mut(end..self.curves.start).unwrap_or(&mut []);
+        let runs = bytemuck::cast_slice_mut(list);
+        let count = close_gap(runs, self.runs, from.clone());
+        let count = open_gap(runs, count, to, from.len(), pen);
+        self.set_runs(end, count, end);
+    }
+
+    /// So many of the runs after `start` are left, of elements up to `end`.
+    fn set_runs(&mut self, start: usize, count: usize, end: usize) {
+        let list = self.corners.get(start..self.curves.start).unwrap_or(&[]);
+        let runs: &[PenRun] = bytemuck::cast_slice(list);
+        // One that begins at the end is empty.
+        let is_empty = count > 0 && runs.get(count - 1).is_some_and(|run| run.begins_at(end));
+        self.runs = count - usize::from(is_empty);
+        self.remove_halves(start + RUN * self.runs..self.curves.start);
     }
 
     /// The reflection about the plane of three vertices.
@@ -450,12 +484,14 @@ impl Model<'_> {
             }) && moves
         };
         let elements = self.elements();
-        let of_elements: usize = elements
-            .corners()
-            .split_inclusive(|corner| corner.is_last())
-            .filter(|element| is_copied(&mut element.iter().map(|corner| corner.vertex())))
-            .map(<[Corner]>::len)
-            .sum();
+        let (mut of_elements, mut at, mut pen) = (0, 0, elements.pens().last());
+        for element in elements.corners().split_inclusive(|corner| corner.is_last()) {
+            if is_copied(&mut element.iter().map(|corner| corner.vertex())) {
+                let last = core::mem::replace(&mut pen, elements.pens().at(at));
+                of_elements += element.len() + if pen == last { 0 } else { RUN };
+            }
+            at += element.len();
+        }
         let of_curves: usize = self
             .curves()
             .iter()
@@ -476,7 +512,7 @@ impl Model<'_> {
             }
         }
         self.coarsen_others(coarser, old..count);
-        let end = self.curves.start;
+        let end = self.elements_end();
         let mut at = 0;
         while let Some(length) = self.corners.get(at..end).and_then(element_length) {
             let element = at..at + length;
@@ -485,14 +521,16 @@ impl Model<'_> {
             if !is_copied(&mut corners.iter().map(|corner| corner.vertex())) {
                 continue;
             }
-            let start = self.curves.start;
+            self.begin_run(self.pens().at(element.start));
+            let start = self.elements_end();
             for at in element {
                 let Some(corner) = self.corners.get(at).copied() else { continue };
                 let number = image(corner.vertex()).unwrap_or(0);
                 // There is room: it was counted.
                 let _ = self.insert(Corner::new(number, corner.of_bar(), corner.is_last()));
             }
-            let copy = self.corners.get_mut(start..self.curves.start).unwrap_or(&mut []);
+            let end = self.elements_end();
+            let copy = self.corners.get_mut(start..end).unwrap_or(&mut []);
             if copy.first().is_some_and(|corner| corner.of_bar()) {
                 self.bars += 1;
             } else {

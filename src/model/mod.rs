@@ -7,16 +7,20 @@
 
 mod curves;
 mod edit;
+mod pens;
 mod undo;
 
 pub use curves::{Curves, StoredCurve};
 pub use edit::{Change, Edit, Numbers, Part};
+pub use pens::{PEN_LIMIT, PenName, PenRun, PenWriter, Pens};
 
 use crate::curve::CurveError;
 use crate::fixed::Decimal;
 use crate::stage::OutOfScratch;
 use bytemuck::{Pod, Zeroable};
+use core::ops::Range;
 use curves::CurveList;
+use pens::{PenBook, RUN};
 
 /// One more than the largest vertex number that an element can hold.
 pub const VERTEX_NUMBER_LIMIT: usize = 1 << 14;
@@ -66,6 +70,16 @@ pub enum Element<'a> {
     Bar(u16, u16),
 }
 
+impl Element<'_> {
+    /// How many corners it takes.
+    pub fn corner_count(&self) -> usize {
+        match self {
+            Self::Face(corners) => corners.len(),
+            Self::Bar(..) => 2,
+        }
+    }
+}
+
 /// Faces and bars in the order in which they were sent.
 ///
 /// Guarantees, if it comes from a model: every vertex number exists, every face has at least three
@@ -73,13 +87,19 @@ pub enum Element<'a> {
 #[derive(Debug, Clone, Copy)]
 pub struct Elements<'a> {
     corners: &'a [Corner],
+    pens: Pens<'a>,
 }
 
 impl<'a> Elements<'a> {
-    /// The elements that `corners` encode. Corners after the last mark are left out.
+    /// The elements that `corners` encode, of the first pen. Corners after the last mark are left out.
     pub fn new(corners: &'a [Corner]) -> Self {
+        Self::with_pens(corners, Pens::default())
+    }
+
+    /// The same with their pens.
+    pub fn with_pens(corners: &'a [Corner], pens: Pens<'a>) -> Self {
         let whole = corners.iter().rposition(|corner| corner.is_last()).map_or(0, |last| last + 1);
-        Self { corners: &corners[..whole] }
+        Self { corners: &corners[..whole], pens }
     }
 
     /// Every corner of every element.
@@ -87,11 +107,26 @@ impl<'a> Elements<'a> {
         self.corners
     }
 
+    /// The pens of the elements, by their corners.
+    pub fn pens(&self) -> Pens<'a> {
+        self.pens
+    }
+
     /// Each element in turn.
     pub fn iter(&self) -> impl Iterator<Item = Element<'a>> + Clone + use<'a> {
         self.corners.split_inclusive(|corner| corner.is_last()).map(|corners| match corners {
             [a, b] if a.of_bar() => Element::Bar(a.vertex(), b.vertex()),
             _ => Element::Face(corners),
+        })
+    }
+
+    /// Each element in turn with its pen.
+    pub fn iter_with_pens(&self) -> impl Iterator<Item = (Element<'a>, u8)> + use<'a> {
+        let (pens, mut first) = (self.pens, 0);
+        self.iter().map(move |element| {
+            let pen = pens.at(first);
+            first += element.corner_count();
+            (element, pen)
         })
     }
 }
@@ -177,6 +212,8 @@ pub enum ModelError {
     },
     /// The three vertices of a plane are in line.
     NoPlane,
+    /// More names than pens, or a pen past [`PEN_LIMIT`].
+    TooManyPens,
     /// Not enough working memory for the edit.
     Scratch(OutOfScratch),
 }
@@ -195,12 +232,15 @@ pub fn unkept(_: &Model<'_>) {}
 #[derive(Debug)]
 pub struct Model<'m> {
     vertices: &'m mut heapless::VecView<Position>,
-    /// The corners of elements, then curves.
+    /// The corners of elements, then their [`PenRun`]s, then curves.
     corners: &'m mut heapless::VecView<Corner>,
     fraction_bits: u32,
     faces: usize,
     bars: usize,
     curves: CurveList,
+    /// How many [`PenRun`]s there are.
+    runs: usize,
+    pens: PenBook,
 }
 
 impl<'m> Model<'m> {
@@ -216,6 +256,8 @@ impl<'m> Model<'m> {
             faces: 0,
             bars: 0,
             curves: CurveList::default(),
+            runs: 0,
+            pens: PenBook::default(),
         };
         model.clear();
         model
@@ -229,6 +271,8 @@ impl<'m> Model<'m> {
         self.faces = 0;
         self.bars = 0;
         self.curves = CurveList::default();
+        self.runs = 0;
+        self.pens = PenBook::default();
     }
 
     /// The vertices, in units of 2^-[`Model::fraction_bits`].
@@ -243,7 +287,51 @@ impl<'m> Model<'m> {
 
     /// The faces and bars.
     pub fn elements(&self) -> Elements<'_> {
-        Elements { corners: self.corners.get(..self.curves.start).unwrap_or(&[]) }
+        let corners = self.corners.get(..self.elements_end()).unwrap_or(&[]);
+        Elements { corners, pens: self.pens() }
+    }
+
+    /// Where the corners of the elements end.
+    fn elements_end(&self) -> usize {
+        self.curves.start - RUN * self.runs
+    }
+
+    /// The pens of the elements.
+    fn pens(&self) -> Pens<'_> {
+        let runs = self.corners.get(self.elements_end()..self.curves.start).unwrap_or(&[]);
+        Pens::new(bytemuck::cast_slice(runs))
+    }
+
+    /// Chooses the pen of the elements and curves that follow, by `usemtl` or by `g`. Once `usemtl` has come, `g`
+    /// chooses no more, and what it chose before is the first pen's again.
+    ///
+    /// # Errors
+    /// [`ModelError::TooManyPens`]; the model is unchanged.
+    #[inline(never)] // Its frame must not lie under the stages'.
+    pub fn choose_pen(
+        &mut self,
+        by_material: bool,
+        name: PenName,
+        before: Before<'_>,
+    ) -> Result<(), ModelError> {
+        if self.pens.by_material && !by_material {
+            return Ok(());
+        }
+        let mut book = self.pens;
+        if by_material != book.by_material {
+            book = PenBook { by_material, ..PenBook::default() };
+        }
+        book.choose(name)?;
+        if book != self.pens {
+            before(self);
+            if book.by_material != self.pens.by_material {
+                self.remove_halves(self.elements_end()..self.curves.start);
+                self.runs = 0;
+                self.curves.forget_pens(self.corners);
+            }
+            self.pens = book;
+        }
+        Ok(())
     }
 
     /// The curves.
@@ -271,7 +359,7 @@ impl<'m> Model<'m> {
         self.vertices.capacity().min(VERTEX_NUMBER_LIMIT)
     }
 
-    /// How many corners of elements there are; half-words of curves count as such.
+    /// How many corners of elements there are; half-words of curves and changes of the pen count as such.
     pub fn corner_count(&self) -> usize {
         self.corners.len()
     }
@@ -358,8 +446,9 @@ impl<'m> Model<'m> {
         {
             return Err(ModelError::RepeatedVertex { number: last });
         }
-        self.check_corners(count)?;
+        self.check_corners(count + self.run_for(self.pens.current))?;
         before(self);
+        self.begin_run(self.pens.current);
         for (at, number) in numbers.enumerate() {
             self.push_corner(number, false, at + 1 == count)?;
         }
@@ -377,8 +466,9 @@ impl<'m> Model<'m> {
         before: Before<'_>,
     ) -> Result<(), ModelError> {
         let count = self.check_numbers(numbers.clone(), 2)?;
-        self.check_corners(2 * (count - 1))?;
+        self.check_corners(2 * (count - 1) + self.run_for(self.pens.current))?;
         before(self);
+        self.begin_run(self.pens.current);
         for (from, to) in numbers.clone().zip(numbers.skip(1)) {
             self.push_corner(from, true, false)?;
             self.push_corner(to, true, true)?;
@@ -421,15 +511,44 @@ impl<'m> Model<'m> {
         self.insert(Corner::new(vertex, of_bar, last))
     }
 
-    /// Adds a corner after those of the elements, before the curves.
+    /// Adds a corner after those of the elements.
     fn insert(&mut self, corner: Corner) -> Result<(), ModelError> {
+        self.insert_half(self.elements_end(), corner.0)
+    }
+
+    /// Adds a half-word before the curves.
+    fn insert_half(&mut self, at: usize, half: u16) -> Result<(), ModelError> {
         let limit = self.corner_limit();
         self.corners
-            .push(corner)
+            .push(Corner(half))
             .map_err(|_| ModelError::TooManyCorners { limit, needed: limit + 1 })?;
-        self.corners.get_mut(self.curves.start..).unwrap_or(&mut []).rotate_right(1);
+        self.corners.get_mut(at..).unwrap_or(&mut []).rotate_right(1);
         self.curves.start += 1;
         Ok(())
+    }
+
+    /// Takes half-words out that stand before the curves.
+    fn remove_halves(&mut self, gone: Range<usize>) {
+        let count = self.corners.len();
+        self.corners.copy_within(gone.end..count, gone.start);
+        self.corners.truncate(count - gone.len());
+        self.curves.start -= gone.len();
+    }
+
+    /// How many half-words it takes that elements with this pen follow.
+    fn run_for(&self, pen: u8) -> usize {
+        if pen == self.pens().last() { 0 } else { RUN }
+    }
+
+    /// Elements with this pen follow. There is room.
+    fn begin_run(&mut self, pen: u8) {
+        if pen != self.pens().last() {
+            let first = self.elements_end() as u16; // the memory has fewer half-words than 2^16
+            for half in [first, pen.into()] {
+                let _ = self.insert_half(self.curves.start, half);
+            }
+            self.runs += 1;
+        }
     }
 
     /// Sets the degree of the curves that follow, 1 to 5.
@@ -454,7 +573,7 @@ impl<'m> Model<'m> {
         if let Some(number) = numbers.clone().find(|number| resolve(*number).is_none()) {
             return Err(ModelError::UnknownVertex { number, vertices });
         }
-        self.curves.begin(self.corners, ends, numbers.filter_map(resolve))
+        self.curves.begin(self.corners, ends, numbers.filter_map(resolve), self.pens.current)
     }
 
     /// Adds knots to the curve in hand.

@@ -2,8 +2,7 @@
 
 use super::{PlotOptions, plan, solid, title};
 use crate::drawing::{
-    Bounds, Drawing, Line, LineType, OrganiseError, PageMap, PagePoint, StepsPerMillimetre, Stored,
-    organise,
+    Bounds, Drawing, Line, LineType, OrganiseError, PageMap, StepsPerMillimetre, Stored, organise,
 };
 use crate::geometry::{Projection, Vertex};
 use crate::machine::{Path, Target};
@@ -24,8 +23,8 @@ pub trait Observer {
     /// What was shown so far counts no more: the job begins again in other memory.
     fn start_again(&mut self) {}
 
-    /// One bar of a plan, as it lies on the page.
-    fn plan_bar(&mut self, from: [f64; 2], to: [f64; 2]);
+    /// One bar of a plan, as it lies on the page, and its pen, from 0.
+    fn plan_bar(&mut self, from: [f64; 2], to: [f64; 2], pen: u8);
 }
 
 /// Nobody looks on.
@@ -34,7 +33,7 @@ pub struct Unobserved;
 
 impl Observer for Unobserved {
     fn stretch(&mut self, _: &View, _: &Stretch) {}
-    fn plan_bar(&mut self, _: [f64; 2], _: [f64; 2]) {}
+    fn plan_bar(&mut self, _: [f64; 2], _: [f64; 2], _: u8) {}
 }
 
 /// A drawing in the working memory with the order of its strokes.
@@ -251,8 +250,7 @@ fn project(
         let room = line_memory.available_bytes() / size_of::<Line>();
         let collected = line_memory.take(room).map_err(Refusal::DrawingTooLarge)?;
         let collector = Collector { lines: collected, count: 0 };
-        let mut sink =
-            PageSink { collector, map: &map, view: &view, hidden: options.hidden, observer };
+        let mut sink = PageSink { collector, map: &map, view: &view, options, observer };
         let found = if options.see == WayToSee::Wire {
             visibility::follow_wire(&scene, wanted, stage_memory, attention, &mut sink)
         } else {
@@ -415,15 +413,9 @@ impl<'a> Collector<'a> {
         Self { lines: items_mut(words, room).unwrap_or(&mut []), count: 0 }
     }
 
-    pub(super) fn line(
-        &mut self,
-        from: PagePoint,
-        to: PagePoint,
-        line_type: LineType,
-        pen: u8,
-    ) -> Result<(), SinkFull> {
-        if from != to {
-            *self.lines.get_mut(self.count).ok_or(SinkFull)? = Line::new(from, to, line_type, pen);
+    pub(super) fn line(&mut self, line: Line) -> Result<(), SinkFull> {
+        if line.has_length() {
+            *self.lines.get_mut(self.count).ok_or(SinkFull)? = line;
             self.count += 1;
         }
         Ok(())
@@ -444,7 +436,7 @@ pub(super) struct PageSink<'a> {
     pub(super) collector: Collector<'a>,
     pub(super) map: &'a PageMap,
     pub(super) view: &'a View,
-    pub(super) hidden: HiddenLines,
+    pub(super) options: &'a PlotOptions,
     pub(super) observer: &'a mut dyn Observer,
 }
 
@@ -456,17 +448,27 @@ impl StretchSink for PageSink<'_> {
         if self.view.near().is_some_and(is_cut) {
             return Ok(());
         }
-        let (line_type, pen) = match (stretch.visible, self.hidden) {
-            (true, _) | (false, HiddenLines::Shown) => (LineType::Full, 0),
-            (false, HiddenLines::Dotted) => (LineType::Dotted, 0),
-            (false, HiddenLines::Dashed) => (LineType::Dashed, 0),
-            (false, HiddenLines::Pen(pen)) => (LineType::Full, pen),
+        let mut stretch = stretch;
+        if self.options.one_pen {
+            stretch.pen = 0;
+        }
+        let line_type = match (stretch.visible, self.options.hidden) {
+            (true, _) | (false, HiddenLines::Shown) => LineType::Full,
+            (false, HiddenLines::Dotted) => LineType::Dotted,
+            (false, HiddenLines::Dashed) => LineType::Dashed,
+            (false, HiddenLines::Pen(pen)) => {
+                stretch.pen = pen;
+                LineType::Full
+            }
             (false, HiddenLines::Erased) => return Ok(()),
         };
         self.observer.stretch(self.view, &stretch);
         let along = [stretch.from, stretch.to];
         match self.map.stretch((p, q), along, self.view.projection()) {
-            Some([from, to]) => self.collector.line(from, to, line_type, pen),
+            Some([from, to]) => {
+                let line = Line::new(from, to, line_type, stretch.pen);
+                self.collector.line(if stretch.visible { line } else { line.under() })
+            }
             None => Ok(()),
         }
     }

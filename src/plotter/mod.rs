@@ -82,6 +82,8 @@ struct Inner<'m> {
     /// The line that is answered when it is done.
     task: Option<Task>,
     alarm_told: Option<Alarm>,
+    /// The pen that the user was asked for.
+    pen_told: Option<u8>,
 }
 
 impl<'m> Plotter<'m> {
@@ -107,6 +109,7 @@ impl<'m> Plotter<'m> {
                 program: Program::default(),
                 task: None,
                 alarm_told: None,
+                pen_told: None,
             },
         }
     }
@@ -225,6 +228,7 @@ impl Inner<'_> {
     #[inline(never)] // Its frame must not lie under the stages'.
     fn carry_out<B: Board>(&mut self, line: &str, board: &mut B) -> Result<Next, Refusal> {
         let command = Command::parse(line)?;
+        let one_pen = self.options.one_pen;
         let (model, mut keeper, _) = self.split();
         let keep = &mut |model: &Model<'_>| keeper.keep(model);
         match command {
@@ -243,6 +247,11 @@ impl Inner<'_> {
                 model.begin_curve(ends, control.iter()).map_err(Refusal::Model)?
             }
             Command::Knots(knots) => model.add_knots(knots.iter()).map_err(Refusal::Model)?,
+            // So that no file has too many.
+            Command::Pen { .. } if one_pen => {}
+            Command::Pen { by_material, name } => {
+                model.choose_pen(by_material, name, keep).map_err(Refusal::Model)?
+            }
             Command::EndCurve => model.end_curve(keep).map_err(Refusal::Model)?,
             Command::Help => self.task = Some(Task::List(Listing::Help, 0)),
             Command::BuildInfo => self.report_build(board),
@@ -417,7 +426,7 @@ impl Inner<'_> {
             reply.part(format_args!("|Pn:{x}{y}{stop}"));
         }
         if let Some(pen) = status.pen_wanted {
-            reply.part(format_args!("|Pen:{pen}"));
+            reply.part(format_args!("|Pen:{}", pen + 1));
         }
         let (done, all) = (status.done, status.job);
         reply.part(format_args!("|Strokes:{}/{}", done.strokes, all.strokes));

@@ -30,6 +30,8 @@ pub struct PlotOptions {
     pub merged_blocks: bool,
     /// Edges between faces that bend less, in degrees, are not drawn; 0 draws every edge.
     pub crease: f64,
+    /// Whether one pen draws all, whatever the model says.
+    pub one_pen: bool,
     /// The sheet.
     pub page: Page,
     /// What stands below the drawing, if it is not empty.
@@ -58,6 +60,7 @@ impl Default for PlotOptions {
             seams: true,
             merged_blocks: false,
             crease: 0.0,
+            one_pen: false,
             page: Page { width, height, margin, foot: Millimetres::ZERO },
             title: TitleText::default(),
             title_size,
@@ -85,6 +88,7 @@ impl PlotOptions {
             PlotOption::Seams(seams) => self.seams = seams,
             PlotOption::MergedBlocks(merged) => self.merged_blocks = merged,
             PlotOption::Crease(crease) => self.crease = crease,
+            PlotOption::OnePen(one) => self.one_pen = one,
             PlotOption::Page { width, height } => {
                 (self.page.width, self.page.height) = (width, height)
             }
@@ -223,6 +227,7 @@ impl PlotOptions {
         line(format_args!("$seams={}", on(self.seams)));
         line(format_args!("$blocks={}", if self.merged_blocks { "merged" } else { "separate" }));
         line(format_args!("$crease={}", SixDecimals(self.crease)));
+        line(format_args!("$pens={}", if self.one_pen { "one" } else { "auto" }));
         line(format_args!("$page={}x{}", self.page.width, self.page.height));
         line(format_args!("$margin={}", self.page.margin));
         line(format_args!("$title={}", Escape(self.title.as_str())));

@@ -74,13 +74,13 @@ pub(super) fn project(
     let bounds = bounds.ok_or(Refusal::NothingToPlot)?;
     let map = PageMap::fit(&bounds, &options.sheet(), steps).map_err(Refusal::Page)?;
     let collector = Collector::new(line_words);
-    let mut sink = PageSink { collector, map: &map, view: &view, hidden: options.hidden, observer };
+    let mut sink = PageSink { collector, map: &map, view: &view, options, observer };
     for (numbers, visible) in all() {
         attention.check()?;
         let Some([p, q]) = on_view(numbers) else { continue };
         let (from, to) = (Along::START, Along::END);
         let edge = Some((numbers[0], numbers[1]));
-        sink.stretch(Stretch { edge, ends: (p, q), from, to, visible })
+        sink.stretch(Stretch { edge, ends: (p, q), from, to, visible, pen: 0 })
             .map_err(|SinkFull| sink.collector.out_of_memory())?;
     }
     let count = sink.collector.count;

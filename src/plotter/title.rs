@@ -49,7 +49,7 @@ pub(super) fn write(
                 attention.check()?;
             }
             drawn += 1;
-            let added = collector.line(from, to, LineType::Full, 0);
+            let added = collector.line(Line::new(from, to, LineType::Full, 0));
             added.map_err(|SinkFull| collector.missing().into())
         })
         .map_err(|error: StageError| Refusal::from(error))?;

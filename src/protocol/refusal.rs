@@ -5,7 +5,7 @@ use crate::curve::CurveError;
 use crate::drawing::PageError;
 use crate::fixed::{BinaryFraction, Millimetres};
 use crate::machine::{MachineError, SettingError, Value};
-use crate::model::{ModelError, Part};
+use crate::model::{ModelError, PEN_LIMIT, Part};
 use crate::stage::OutOfScratch;
 use crate::step::ArcError;
 use crate::view::ViewError;
@@ -132,6 +132,7 @@ pub const MEANINGS: &[(u16, &str)] = &[
     (124, "nothing in front of the eye"),
     (125, "not a convex solid"),
     (126, "eye inside the solid"),
+    (127, "too many pens"),
     (130, "margins leave no room on the page"),
     (131, "page has too many steps"),
     (132, "drawing is larger than the page"),
@@ -182,6 +183,7 @@ impl Refusal {
                 ModelError::KnotTooLarge => 102,
                 ModelError::UnknownElement { .. } => 118,
                 ModelError::NoPlane => 119,
+                ModelError::TooManyPens => 127,
                 ModelError::Scratch(_) => 140,
             },
             Self::NothingToPlot | Self::View(ViewError::NothingToSee) => 120,
@@ -346,6 +348,10 @@ fn write_model_error(formatter: &mut fmt::Formatter<'_>, error: &ModelError) -> 
         ModelError::NoPlane => {
             formatter.write_str("three vertices that are not in line make a plane")
         }
+        ModelError::TooManyPens => write!(
+            formatter,
+            "there are pens 1 to {PEN_LIMIT}, and other names take a free one each: send $pens=one to draw all with one"
+        ),
         ModelError::Scratch(missing) => write_missing(formatter, missing),
     }
 }
