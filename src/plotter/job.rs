@@ -12,7 +12,7 @@ use crate::protocol::{HiddenLines, Refusal, WayToSee};
 use crate::stage::{
     Aborted, Attention, OutOfScratch, Scratch, Stage, StageError, items, items_mut,
 };
-use crate::view::{Flattening, Seen, View, see};
+use crate::view::{Camera, Flattening, Seen, View, see};
 use crate::visibility::{self, Scene, SinkFull, Stretch, StretchSink, VisibilityError};
 
 /// Who is shown each stretch as it is found, in view coordinates: the preview.
@@ -179,13 +179,14 @@ struct Found {
     degenerate_faces: u32,
 }
 
-/// Looks at the model through the camera.
+/// Looks at the model through the camera that the options choose.
 #[inline(never)] // Its frame must not lie under the stages'.
-fn look(
+pub(super) fn look(
     model: &Model<'_>,
     options: &PlotOptions,
     attention: &mut dyn Attention,
-) -> Result<View, Refusal> {
+) -> Result<(Camera, View), Refusal> {
+    attention.enter(Stage::View);
     let camera = options.camera(model).ok_or(Refusal::NothingToPlot)?;
     attention.check()?;
     let view = View::new(&camera, model).map_err(Refusal::View)?;
@@ -193,7 +194,7 @@ fn look(
     if !options.clip_behind {
         view.refuse_behind(model).map_err(Refusal::View)?;
     }
-    Ok(view)
+    Ok((camera, view))
 }
 
 /// Anything else: through the camera, hidden lines found.
@@ -205,9 +206,8 @@ fn project(
     attention: &mut dyn Attention,
     observer: &mut dyn Observer,
 ) -> Result<Found, Refusal> {
-    attention.enter(Stage::View);
     let total = size_of_val(words);
-    let view = look(model, options, attention)?;
+    let (_, view) = look(model, options, attention)?;
     let projection = view.projection();
     let mut scratch = Scratch::new(words);
     let curves_map = if model.curves().is_empty() {
