@@ -114,7 +114,7 @@ impl Decimal {
         } else {
             // Past 10^38 the quotient is zero whatever the mantissa.
             power_of_ten(self.exponent.unsigned_abs())
-                .map_or(0, |power| (shifted + more(power)) / power)
+                .map_or(0, |power| divide(shifted + more(power), power))
         };
         let value =
             i64::try_from(rounded).ok().filter(|value| *value < 1 << 62).ok_or(OutOfRange)?;
@@ -151,7 +151,8 @@ impl Decimal {
         let value = self.to_binary(0)?;
         if self.exponent < 0 {
             let power = power_of_ten(self.exponent.unsigned_abs()).ok_or(OutOfRange)?;
-            if u128::from(self.mantissa.unsigned_abs()) % power != 0 {
+            let mantissa = u128::from(self.mantissa.unsigned_abs());
+            if divide(mantissa, power) * power != mantissa {
                 return Err(OutOfRange);
             }
         }
@@ -182,10 +183,16 @@ pub fn shift_right_rounding(value: i32, bits: u32) -> i32 {
 }
 
 /// Divides, rounding half away from zero. `divisor` > 0.
-#[inline(never)] // 128 bits by 128 are long.
 pub fn divide_rounding(dividend: i128, divisor: i128) -> i128 {
     let half = divisor / 2;
-    if dividend < 0 { -((half - dividend) / divisor) } else { (dividend + half) / divisor }
+    let quotient = |dividend: i128| divide(dividend as u128, divisor as u128) as i128; // neither is negative
+    if dividend < 0 { -quotient(half - dividend) } else { quotient(dividend + half) }
+}
+
+/// The quotient, rounded down. `divisor` > 0.
+#[inline(never)] // 128 bits by 128 are long.
+pub fn divide(dividend: u128, divisor: u128) -> u128 {
+    dividend / divisor
 }
 
 /// Writes a number of the camera with up to six decimals, and no zeros at the end. Far smaller than the

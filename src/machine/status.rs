@@ -24,6 +24,11 @@ pub struct Status {
 }
 
 impl Machine<'_> {
+    /// The pen, from 0, that the machine waits for, or will when it stands.
+    pub fn pen_wanted(&self) -> Option<u8> {
+        self.next_pen.map(|(pen, _)| pen)
+    }
+
     /// Where it is, and how far the job is.
     pub fn status(&self) -> Status {
         let run = self.runner.run();
@@ -40,7 +45,7 @@ impl Machine<'_> {
             done,
             seconds_left: self.seconds_left(done),
             percent: self.percent,
-            pen_wanted: self.next_pen.map(|(pen, _)| pen),
+            pen_wanted: self.pen_wanted(),
         }
     }
 

@@ -92,6 +92,9 @@ impl Default for Limits {
     }
 }
 
+/// The most steps in a millimetre; a constant, for reading it from text when the device runs takes 4 KB of flash.
+const MOST_STEPS: Millimetres = Millimetres::lit("4000");
+
 impl Limits {
     /// The settings, checked.
     ///
@@ -99,8 +102,7 @@ impl Limits {
     /// See [`LimitsError`].
     pub fn new(settings: &MotionSettings) -> Result<Self, LimitsError> {
         let axis = |steps_per_mm: Millimetres| {
-            const RANGE: RangeInclusive<Millimetres> =
-                Millimetres::lit("2")..=Millimetres::lit("4000");
+            const RANGE: RangeInclusive<Millimetres> = Millimetres::lit("2")..=MOST_STEPS;
             if !RANGE.contains(&steps_per_mm) {
                 return Err(LimitsError::StepsPerMillimetre);
             }
@@ -136,7 +138,7 @@ impl Limits {
             setup_ticks: settings.direction_setup_ticks,
         };
         limits.top = limits.stopping_distance(draw_speed.max(travel_speed));
-        limits.check_step_rate(axis(settings.motor_steps_per_mm.min(Millimetres::lit("4000")))?)?;
+        limits.check_step_rate(axis(settings.motor_steps_per_mm.min(MOST_STEPS))?)?;
         Ok(limits)
     }
 
