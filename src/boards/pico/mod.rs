@@ -24,6 +24,7 @@ mod critical;
 mod divider;
 mod emergency;
 mod flash;
+mod multiply;
 mod pen;
 mod pins;
 mod registers;
