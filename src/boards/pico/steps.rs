@@ -255,7 +255,7 @@ fn ring_address(word: u32) -> u32 {
 impl Steps {
     /// Lets waiting words begin.
     pub fn start(&mut self) {
-        critical_section::with(|_| {
+        critical::with_steps_masked(|| {
             if !FEEDING.load(Ordering::Relaxed) {
                 feed();
             }
@@ -363,7 +363,7 @@ impl Steps {
         if self.drained && self.written == self.taken {
             return;
         }
-        critical_section::with(|_| {
+        critical::with_steps_masked(|| {
             PIO0.write(machine::CONTROL, 0);
             DMA.write(channel::INTERRUPT_ENABLE, 0);
             DMA.write(channel::ABORT, CHANNEL);
@@ -467,7 +467,7 @@ fn flips() -> u32 {
 
 /// How many words have left the channel and the state machine's queue.
 fn taken() -> u32 {
-    critical_section::with(|_| {
+    critical::with_steps_masked(|| {
         loop {
             let left = DMA.read(channel::COUNT);
             let waiting = PIO0.read(machine::FIFO_LEVEL) & LEVEL;
@@ -492,7 +492,7 @@ fn feed() {
 
 /// Two heights that come faster than the interrupt would leave one behind: the last counts.
 fn heal_pen() {
-    critical_section::with(|_| {
+    critical::with_steps_masked(|| {
         // SAFETY: the handler that owns it is masked.
         if let Some(due) = unsafe { HEIGHTS_DUE.get() } {
             while let Some(height) = due.dequeue() {
