@@ -69,6 +69,11 @@ impl Machine<'_> {
         u32::try_from(left / 10 / u64::from(self.percent)).unwrap_or(u32::MAX)
     }
 
+    /// How often the queue ran dry while the machine moved: the main loop was late; wraps.
+    pub fn underruns(&self) -> u32 {
+        self.pins.underruns()
+    }
+
     /// Where the pins are, in steps of the page.
     pub fn position(&self) -> PagePoint {
         self.settings.kinematics().page(self.motors_now())

@@ -19,6 +19,7 @@
 //!
 //! Not done here: limits of travel, the pen's heights, states. That is `machine`.
 
+mod brake;
 mod course;
 mod curvature;
 mod emitter;
@@ -29,6 +30,7 @@ mod lookahead;
 mod profile;
 mod runner;
 
+pub use brake::{Brake, BrakeOrders, BrakeRule, QueueSize, StepLength, StepWay};
 pub use emitter::Emitter;
 pub use event::{EventKind, EventQueue, StepEvent};
 pub use limits::{Limits, LimitsError, MotionSettings};
