@@ -160,6 +160,11 @@ impl Estimate {
         } else {
             2 * ((self.piece >> 2) * 1_000_000 / acceleration).isqrt()
         };
+        // Each change of speed takes as long as acceleration takes to be built up, about.
+        let jerk = u64::from(settings.get(Setting::Jerk).to_bits().unsigned_abs());
+        if let Some(ramp) = acceleration.checked_div(jerk) {
+            self.milliseconds += ramp.min((per_second * 1000 / jerk).isqrt());
+        }
         self.piece = 0;
     }
 }
