@@ -7,6 +7,7 @@ pub mod curve_reference;
 pub mod order_reference;
 pub mod event_checker;
 pub mod motion_optimum;
+pub mod motion_paths;
 pub mod pin_machine;
 pub mod exact_visibility;
 pub mod fraction;

@@ -131,7 +131,8 @@ impl Machine<'_> {
         path.rewind();
         let mut size = JobSize::default();
         let mut at = self.runner.page_end();
-        let mut inked = false;
+        // Another pen begins another stroke, where the last one ended too.
+        let (mut inked, mut pen) = (false, self.pen);
         let mut estimate = Estimate::default();
         let mut number = 0u32;
         while let Some(Target { point, ink }) = path.next_target() {
@@ -146,11 +147,11 @@ impl Machine<'_> {
             estimate.add(&self.settings, (dx, dy), ink.is_some(), length);
             if ink.is_some() {
                 size.drawn += length;
-                size.strokes += u32::from(!inked);
+                size.strokes += u32::from(!inked || path.pen() != pen);
             } else {
                 size.travelled += length;
             }
-            inked = ink.is_some();
+            (inked, pen) = (ink.is_some(), path.pen());
             at = point;
             number = number.saturating_add(1);
         }

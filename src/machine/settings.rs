@@ -62,6 +62,8 @@ pub enum Setting {
     TravelSpeed,
     /// `$203` Whether bends of dense polylines are slowed to the acceleration limit.
     Centripetal,
+    /// `$204` The most by which acceleration along the path changes in a second, at least 0.1; 0 for no limit.
+    Jerk,
     /// `$210` Height of the raised pen.
     PenUpHeight,
     /// `$211` Height of the lowered pen.
@@ -119,7 +121,7 @@ pub struct SettingInfo {
 }
 
 /// How many settings there are.
-pub const SETTING_COUNT: usize = 38;
+pub const SETTING_COUNT: usize = 39;
 
 const fn info(
     setting: Setting,
@@ -169,6 +171,7 @@ pub const SETTINGS: [SettingInfo; SETTING_COUNT] = {
         info(DrawSpeed, 201, "speed pen down", "mm/min", (1.0, 32767.0, 3000.0), false),
         info(TravelSpeed, 202, "speed pen up", "mm/min", (1.0, 32767.0, 6000.0), false),
         info(Centripetal, 203, "slow in bends", "0|1", (0.0, 1.0, 1.0), true),
+        info(Jerk, 204, "jerk", "m/s3", (0.0, 1000.0, 0.0), false),
         info(PenUpHeight, 210, "height pen up", "of 127", (0.0, 127.0, 0.0), true),
         info(PenDownHeight, 211, "height pen down", "of 127", (0.0, 127.0, 127.0), true),
         info(PenUpDwell, 212, "dwell pen up", "ms", (1.0, 1300.0, 150.0), false),
@@ -327,10 +330,12 @@ impl Settings {
         self.checked_limits().unwrap_or_default()
     }
 
-    /// The same, but for the speed with the pen up, which is that of `travel`.
+    /// The same, but for the speed with the pen up, which is that of `travel`, and without a limit on
+    /// jerk: at a switch the machine is to brake soon.
     pub(super) fn limits_at(&self, travel: Setting) -> Limits {
         let settings = MotionSettings {
             travel_mm_per_min: self.get(travel).min(self.axes_rate()),
+            jerk_m_per_s3: Value::ZERO,
             ..self.motion_settings()
         };
         Limits::new(&settings).unwrap_or_else(|_| self.limits())
@@ -373,6 +378,7 @@ impl Settings {
             acceleration_mm_per_s2: self
                 .get(Setting::AccelerationX)
                 .min(self.get(Setting::AccelerationY)),
+            jerk_m_per_s3: self.get(Setting::Jerk),
             junction_deviation_mm: self.get(Setting::JunctionDeviation),
             centripetal: self.is_on(Setting::Centripetal),
             pulse_ticks: self.microseconds_as_ticks(Setting::StepPulse),

@@ -306,7 +306,7 @@ fn unpack(way: u32) -> StepWay {
 impl Steps {
     /// Lets waiting words begin.
     pub fn start(&mut self) {
-        critical_section::with(|_| {
+        critical::with_steps_masked(|| {
             if !FEEDING.load(Ordering::Relaxed) {
                 feed();
             }
@@ -416,7 +416,7 @@ impl Steps {
         if self.drained && self.written == self.taken {
             return;
         }
-        critical_section::with(|_| {
+        critical::with_steps_masked(|| {
             PIO0.write(machine::CONTROL, 0);
             DMA.write(channel::INTERRUPT_ENABLE, 0);
             DMA.write(channel::ABORT, CHANNEL);
@@ -588,7 +588,7 @@ fn add_packed((x, y): &mut (i32, i32), packed: u32) {
 
 /// How many words have left the channel and the state machine's queue.
 fn taken() -> u32 {
-    critical_section::with(|_| {
+    critical::with_steps_masked(|| {
         loop {
             let left = DMA.read(channel::COUNT);
             let waiting = PIO0.read(machine::FIFO_LEVEL) & LEVEL;
@@ -677,7 +677,7 @@ fn brake_words(brake: &mut Brake, told: u32, count: u32) -> u32 {
 
 /// Two heights that come faster than the interrupt would leave one behind: the last counts.
 fn heal_pen() {
-    critical_section::with(|_| {
+    critical::with_steps_masked(|| {
         // SAFETY: the handler that owns it is masked.
         if let Some(due) = unsafe { HEIGHTS_DUE.get() } {
             while let Some(height) = due.dequeue() {
