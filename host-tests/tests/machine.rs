@@ -269,6 +269,14 @@ fn steps_of_any_length_and_slow_drivers_are_braked_as_well() {
 }
 
 #[test]
+fn ramps_with_limited_jerk_are_braked_as_well() {
+    let mut settings = slack(true);
+    settings.set(Setting::Jerk, Value::from_num(20)).expect("valid");
+    // The brake keeps the acceleration, not the jerk.
+    starve_often(settings, slack(true), 40);
+}
+
+#[test]
 fn what_the_queue_cannot_hold_is_braked_within_what_it_holds() {
     let fast = with(&[
         (Setting::MaxRateX, 15_000.0),
@@ -289,14 +297,17 @@ fn what_the_queue_cannot_hold_is_braked_within_what_it_holds() {
 
 #[test]
 fn a_main_loop_that_is_in_time_is_not_slowed() {
-    let settings = Settings::default();
-    let targets = fast_job();
-    let planned = pin_machine::record(settings, &mut TargetList::new(&targets), 128).expect("fits");
-    let last = pin_machine::moves(&planned).last().map(|&(time, _)| time);
-    // 0.2 ms and 10 ms.
-    for turn_ticks in [5_000, 250_000] {
-        let (drawn, underruns) = starve(settings, 0, 0, turn_ticks);
-        assert_eq!((Some(drawn.last_step), underruns), (last, 0));
+    for jerk in [0.0, 20.0] {
+        let settings = with(&[(Setting::Jerk, jerk)]);
+        let targets = fast_job();
+        let planned =
+            pin_machine::record(settings, &mut TargetList::new(&targets), 128).expect("fits");
+        let last = pin_machine::moves(&planned).last().map(|&(time, _)| time);
+        // 0.2 ms and 10 ms.
+        for turn_ticks in [5_000, 250_000] {
+            let (drawn, underruns) = starve(settings, 0, 0, turn_ticks);
+            assert_eq!((Some(drawn.last_step), underruns), (last, 0));
+        }
     }
 }
 

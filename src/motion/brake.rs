@@ -5,7 +5,8 @@
 //! them. A queue that holds the stopping distance is not slowed at all; one that runs dry is a ramp
 //! down to rest, on the path. When more comes, s grows by a step's length a step, which is a ramp up.
 //! The squared speed is then the lesser of two functions of the place, the plan's and this one, and
-//! neither changes faster than the acceleration allows.
+//! neither changes faster than the acceleration allows. (It does not keep the jerk: it is for what
+//! should not happen.)
 //!
 //! Lengths are counted in units of 2a·4^k ticks², with k such that the longest step is just below
 //! 2^16 of them: then the interval is 2^k·ℓ/√s ticks, one product of 32 bits and a shift.

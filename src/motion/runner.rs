@@ -524,6 +524,10 @@ impl<'m> Runner<'m> {
         let Some(slice) = course.slice else {
             return Ok(());
         };
+        if course.moves_done == 0 && !course.is_slack {
+            let units = self.brake.step_length(course.move_length);
+            queue.set_step_length(units, self.emitter.has_stepped())?;
+        }
         let mut levels = course.line.moves().map(MoveLevels::of);
         if course.is_slack {
             levels = levels.map(MoveLevels::as_slack);
@@ -679,10 +683,6 @@ impl<'m> Runner<'m> {
             if !self.emitter.is_open() {
                 self.emitter.hold(self.now, queue)?;
             }
-        }
-        if course.moves_done == 0 && !course.is_slack {
-            let units = self.brake.step_length(course.move_length);
-            queue.set_step_length(units, self.emitter.has_stepped())?;
         }
         if let Some(jerk) = self.limits.jerk {
             let top = if self.stopping { Pace::REST } else { self.top(inked) };
