@@ -227,11 +227,11 @@ pub struct ViewArgs {
     /// Let the pen return to where it began
     #[arg(long, help_heading = "Order")]
     pub cycle: bool,
-    /// Work to improve the order of many parts, for each pen; with 0 the nearest part comes next
+    /// Work to improve the order of many parts, for each move with the pen up; with 0 the nearest part comes next
     #[arg(
         long,
         value_name = "NUMBER",
-        default_value = "1000",
+        default_value = "4000",
         value_parser = clap::value_parser!(u32).range(0..1 << 30),
         allow_hyphen_values = true,
         help_heading = "Order"

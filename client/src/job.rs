@@ -241,7 +241,7 @@ mod tests {
             fit: false,
             order: "auto",
             cycle: false,
-            effort: 1000,
+            effort: 4000,
         };
         let lines = job_lines(vec![JobLine::command("v 0 0 0")], &settings);
         let sent: Vec<&str> = lines.iter().map(|line| line.sent.as_str()).collect();
@@ -268,7 +268,7 @@ mod tests {
                 "$fit=off",
                 "$order=auto",
                 "$cycle=off",
-                "$effort=1000",
+                "$effort=4000",
             ]
         );
     }

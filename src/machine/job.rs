@@ -5,6 +5,9 @@ use super::{Alarm, JobSize, Kinematics, Machine, MachineError, Path, Setting, St
 use crate::drawing::{PAGE_LIMIT, PagePoint};
 use crate::motion::{EventQueue, PathLength, Progress, Runner};
 
+/// A turn of the main loop may take so long: 20 ms, while it writes to the serial line.
+const LATE_TICKS: u32 = crate::motion::TICKS_PER_SECOND / 50;
+
 impl Machine<'_> {
     /// Measures the path from where the machine stands, and begins to draw it if all of it can be
     /// drawn (in [`State::Check`] it is only measured).
@@ -57,8 +60,11 @@ impl Machine<'_> {
     }
 
     fn greatest_ahead(&self) -> u32 {
-        // A switch is to stop the machine soon: 10 ms.
-        if self.homing.is_some() { self.ahead_ticks.min(250_000) } else { self.ahead_ticks }
+        // Less would slow the machine whenever the main loop is late by that much.
+        let stopping = self.runner.stopping_ticks().saturating_add(LATE_TICKS);
+        // A switch is to stop the machine soon.
+        let ahead = if self.homing.is_some() { LATE_TICKS } else { self.ahead_ticks };
+        ahead.max(stopping)
     }
 
     fn stand(&mut self, progress: Progress) {

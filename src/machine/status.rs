@@ -71,6 +71,11 @@ impl Machine<'_> {
         u32::try_from(left / 10 / u64::from(self.percent)).unwrap_or(u32::MAX)
     }
 
+    /// How often the queue ran dry while the machine moved: the main loop was late; wraps.
+    pub fn underruns(&self) -> u32 {
+        self.pins.underruns()
+    }
+
     /// Where the pins are, in steps of the page.
     pub fn position(&self) -> PagePoint {
         self.settings.kinematics().page(self.motors_now())
@@ -157,6 +162,11 @@ impl Estimate {
         } else {
             2 * ((self.piece >> 2) * 1_000_000 / acceleration).isqrt()
         };
+        // Each change of speed takes as long as acceleration takes to be built up, about.
+        let jerk = u64::from(settings.get(Setting::Jerk).to_bits().unsigned_abs());
+        if let Some(ramp) = acceleration.checked_div(jerk) {
+            self.milliseconds += ramp.min((per_second * 1000 / jerk).isqrt());
+        }
         self.piece = 0;
     }
 }

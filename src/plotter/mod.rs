@@ -37,7 +37,8 @@ use program::Program;
 use reply::Reply;
 use stream::{Listing, Progress, Task};
 
-/// How far step events are planned ahead of the pins, and so how late a hold takes effect: 50 ms.
+/// How far step events are planned ahead of the pins at least, and so how late a hold takes effect:
+/// 50 ms. More if the machine could not stop within them.
 const AHEAD_TICKS: u32 = crate::motion::TICKS_PER_SECOND / 20;
 
 /// Polls the plotter for ever; sleeps when there is nothing to do.
@@ -203,6 +204,8 @@ impl<'m> Plotter<'m> {
             Reply(board).outcome(Err(Refusal::BytesLost));
         }
         if asked.has(RealTime::STATUS) {
+            // To write it takes 10 ms; so may what was done since the queue was filled last.
+            self.inner.plan(board);
             self.inner.report_status(board);
         }
     }
@@ -427,6 +430,9 @@ impl Inner<'_> {
         }
         if let Some(pen) = status.pen_wanted {
             reply.part(format_args!("|Pen:{}", pen + 1));
+        }
+        if self.machine.underruns() != 0 {
+            reply.part(format_args!("|Late:{}", self.machine.underruns()));
         }
         let (done, all) = (status.done, status.job);
         reply.part(format_args!("|Strokes:{}/{}", done.strokes, all.strokes));

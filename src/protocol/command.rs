@@ -289,7 +289,7 @@ pub const HELP: &[(&str, &str)] = &[
     ("$cycle=on|off", "whether the pen returns to where it began"),
     (
         "$effort=NUMBER",
-        "work to improve the order of many parts, for each pen; 0 takes the nearest next",
+        "distances tried for each move with the pen up to improve it; 0 takes the nearest next",
     ),
     ("$model", "size of the model against the limits"),
     ("$clear", "forget the model"),

@@ -2,6 +2,38 @@
 
 use crate::geometry::{Vertex, plane_side};
 
+/// The box around a face in view coordinates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Extent {
+    low: Vertex,
+    high: Vertex,
+}
+
+impl Extent {
+    /// Around all of `corners`.
+    pub fn around(corners: impl Iterator<Item = Vertex>) -> Self {
+        let none = Self {
+            low: Vertex::new(i32::MAX, i32::MAX, i32::MAX),
+            high: Vertex::new(i32::MIN, i32::MIN, i32::MIN),
+        };
+        corners.fold(none, |Self { low, high }, at| Self {
+            low: Vertex::new(low.x.min(at.x), low.y.min(at.y), low.z.min(at.z)),
+            high: Vertex::new(high.x.max(at.x), high.y.max(at.y), high.z.max(at.z)),
+        })
+    }
+
+    /// Whether they have a point in common; else what they hold does not cross.
+    pub fn meets(&self, other: &Self) -> bool {
+        let (low, high) = (other.low, other.high);
+        self.low.x <= high.x
+            && low.x <= self.high.x
+            && self.low.y <= high.y
+            && low.y <= self.high.y
+            && self.low.z <= high.z
+            && low.z <= self.high.z
+    }
+}
+
 /// The segment where two triangles cross, its ends rounded to whole coordinates.
 ///
 /// `None` if they do not reach through each other, or only by less than rounding shows. A corner in the
@@ -111,6 +143,20 @@ mod tests {
             assert_eq!(seam(wall, FLOOR), None);
         }
         assert_eq!(seam(FLOOR, FLOOR), None);
+    }
+
+    #[test]
+    fn boxes_that_touch_meet() {
+        let extent = |triangle: [Vertex; 3]| Extent::around(triangle.into_iter());
+        for (wall, meets) in [
+            (wall(-2, 2, -1, 1), true),
+            (wall(10, 20, 0, 1), true),
+            (wall(11, 20, 0, 1), false),
+            (wall(-2, 2, 1, 3), false),
+        ] {
+            assert_eq!(extent(FLOOR).meets(&extent(wall)), meets);
+            assert_eq!(extent(wall).meets(&extent(FLOOR)), meets);
+        }
     }
 
     #[test]

@@ -86,12 +86,19 @@ impl<'a> Search<'a> {
     ) -> Result<(), VisibilityError> {
         for one in 0..self.around.faces.len() {
             self.meet(one);
-            for other in one + 1..self.around.faces.len() {
-                if self.met[other / 32] >> (other % 32) & 1 != 0 {
-                    self.follow_seams_of(one, other, pace, sink)?;
+            let extent = self.around.extent(one);
+            for word in one / 32..self.met.len() {
+                let mut bits = self.met[word];
+                while bits != 0 {
+                    let other = 32 * word + bits.trailing_zeros() as usize;
+                    bits &= bits - 1;
+                    if extent.meets(&self.around.extent(other)) {
+                        self.follow_seams_of(one, other, pace, sink)?;
+                    }
+                    pace.spend(200)?;
                 }
             }
-            pace.spend(30 * (self.around.faces.len() - one))?;
+            pace.spend(1000)?;
         }
         Ok(())
     }

@@ -9,6 +9,7 @@ use super::edges::{ChosenSides, Outlines, sides};
 use super::faces::{Face, Faces};
 use super::outlook::{CoarseLine, End, Outlook, Place};
 use super::profile::{Part, Profile, mark};
+use super::seams::Extent;
 use super::triangles::Ears;
 use crate::geometry::{Along, line_side, page_offset, page_side};
 use crate::model::Corner;
@@ -33,6 +34,12 @@ impl Surroundings<'_> {
             Some([b, c]) if face.is_fan => Some([corners[0].vertex(), b.vertex(), c.vertex()]),
             _ => None,
         }
+    }
+
+    /// The box around the face of a rank.
+    pub fn extent(&self, rank: usize) -> Extent {
+        let corners = self.outlines.element(self.faces.get(rank).first);
+        Extent::around(corners.iter().map(|corner| self.outlook.vertex(corner.vertex())))
     }
 
     /// Whether two faces have two corners in common, by their places; such faces do not cross elsewhere.
