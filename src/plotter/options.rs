@@ -1,7 +1,7 @@
 //! What is drawn and how, as the user set it.
 
 use crate::drawing::{Page, Title, TitleText};
-use crate::fixed::{Millimetres, SixDecimals};
+use crate::fixed::{Length, Millimetres, SixDecimals};
 use crate::model::Model;
 use crate::order;
 use crate::protocol::{
@@ -228,10 +228,10 @@ impl PlotOptions {
         line(format_args!("$blocks={}", if self.merged_blocks { "merged" } else { "separate" }));
         line(format_args!("$crease={}", SixDecimals(self.crease)));
         line(format_args!("$pens={}", if self.one_pen { "one" } else { "auto" }));
-        line(format_args!("$page={}x{}", self.page.width, self.page.height));
-        line(format_args!("$margin={}", self.page.margin));
+        line(format_args!("$page={}x{}", Length(self.page.width), Length(self.page.height)));
+        line(format_args!("$margin={}", Length(self.page.margin)));
         line(format_args!("$title={}", Escape(self.title.as_str())));
-        line(format_args!("$title-size={}", self.title_size));
+        line(format_args!("$title-size={}", Length(self.title_size)));
         line(format_args!("$fit={}", on(self.fit)));
         line(format_args!("$order={method}"));
         line(format_args!("$cycle={}", on(self.order.shape == order::Shape::ClosedCycle)));

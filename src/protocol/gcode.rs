@@ -66,11 +66,14 @@ fn next_word(rest: &mut &str) -> Option<Result<Word, Refusal>> {
         *rest = "";
         return Some(Err(Refusal::UnknownCommand));
     }
-    let number = rest[1..].trim_start();
+    let mut letters = rest.chars();
+    letters.next();
+    let number = letters.as_str().trim_start();
     let is_part = |c: char| c.is_ascii_digit() || matches!(c, '.' | '-' | '+');
     let end = number.find(|c| !is_part(c)).unwrap_or(number.len());
-    *rest = &number[end..];
-    let number = Decimal::parse(&number[..end]).map_err(|_| Refusal::NotANumber);
+    let (number, after) = number.split_at_checked(end).unwrap_or((number, ""));
+    *rest = after;
+    let number = Decimal::parse(number).map_err(|_| Refusal::NotANumber);
     Some(number.map(|number| Word { letter: letter.to_ascii_uppercase(), number }))
 }
 

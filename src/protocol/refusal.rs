@@ -3,7 +3,7 @@
 use crate::convex::SolidError;
 use crate::curve::CurveError;
 use crate::drawing::PageError;
-use crate::fixed::{BinaryFraction, Millimetres};
+use crate::fixed::{BinaryFraction, Length, Millimetres};
 use crate::machine::{MachineError, SettingError, Value};
 use crate::model::{ModelError, PEN_LIMIT, Part};
 use crate::stage::OutOfScratch;
@@ -416,7 +416,10 @@ fn write_setting_error(formatter: &mut fmt::Formatter<'_>, error: &SettingError)
             write!(
                 formatter,
                 "{} goes from {} to {} {}",
-                info.name, info.least, info.greatest, info.unit
+                info.name,
+                Length(info.least),
+                Length(info.greatest),
+                info.unit
             )
         }
         SettingError::NotWhole(setting) => {
