@@ -1,16 +1,12 @@
-//! The Raspberry Pi Pico through a loss of power, a hanging program, and its contacts.
+//! The Raspberry Pi Pico through a loss of power and a hanging program.
 #![cfg(feature = "emulator")]
 
 use penup_client::emulator::{EmulatedBoard, Machine, MachineEventKind, Pico, image_path};
 use penup_host_tests::emulated_jobs::Line;
 use penup_host_tests::whole_jobs::job_lines;
 use std::error::Error;
-use std::time::Duration;
 
 type TestResult = Result<(), Box<dyn Error>>;
-
-const LIMIT_X: u8 = 8;
-const STOP: u8 = 10;
 
 fn start() -> Result<Line<Pico>, Box<dyn Error>> {
     Line::to(Box::new(Pico::start(&image_path("pico"))?))
@@ -90,43 +86,4 @@ fn a_hanging_program_is_started_again_in_alarm() -> TestResult {
     assert!(!drivers_on && !machine.pen_is_down());
     assert_eq!(line.ask("$X")?, "ok");
     Ok(())
-}
-
-/// Presses a contact in the middle of a job, with 5 ms of bounce: one alarm, no step after it.
-fn stops(pin: u8, alarm: &str, settings: &[&str]) -> TestResult {
-    let mut line = start()?;
-    for setting in settings {
-        assert_eq!(line.ask(setting)?, "ok");
-    }
-    for text in job_lines("lattice2.obj", &["$page=60x80", "$margin=5"]) {
-        assert_eq!(line.ask(&text)?, "ok", "{text}");
-    }
-    let mut seen = 0;
-    while seen < 1000 {
-        seen += line.emulator.pin_changes()?.len();
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    line.emulator.bounce(pin, false, Duration::from_millis(5))?;
-    assert_eq!(line.hear()?, alarm);
-    let told_at = line.emulator.clock()?;
-    let status = line.status()?;
-    assert!(status.starts_with("<Alarm"), "{status}");
-    let changes = line.emulator.pin_changes()?;
-    let last_step = changes.iter().filter(|change| change.is_step()).map(|change| change.at).max();
-    assert!(last_step.is_none_or(|last| last <= told_at), "{last_step:?} {told_at:?}");
-    // Told once, and nothing moves any more.
-    std::thread::sleep(Duration::from_millis(100));
-    assert!(line.status()?.starts_with("<Alarm"));
-    assert!(!line.emulator.pin_changes()?.iter().any(|change| change.is_step()));
-    Ok(())
-}
-
-#[test]
-fn a_limit_switch_stops_a_job() -> TestResult {
-    stops(LIMIT_X, "ALARM:1", &["$21=1"])
-}
-
-#[test]
-fn the_emergency_stop_stops_a_job() -> TestResult {
-    stops(STOP, "ALARM:10", &[])
 }

@@ -129,6 +129,15 @@ impl Pico {
         self.tell(PIN, number | u8::from(high) << 7, start + cycles)
     }
 
+    /// Fits a limit switch to pin 8 (x) or 9 (y): it closes where the axis, which began at 0 when the emulator
+    /// started, has come to `place`, in steps, or lies below. It bounces for 5 ms.
+    ///
+    /// # Errors
+    /// The emulator has ended.
+    pub fn fit_switch(&mut self, number: u8, place: i32) -> io::Result<()> {
+        self.tell(SWITCH, number, (SWITCH_ZERO + i64::from(place)) as u64)
+    }
+
     /// Takes the power away and gives it back: what flash holds is left.
     ///
     /// # Errors
@@ -389,6 +398,9 @@ const CUT_FLASH: u8 = 3;
 const HANG: u8 = 4;
 const USB: u8 = 5;
 const USB_HOST: u8 = 6;
+const SWITCH: u8 = 7;
+/// Where the emulator's axes begin.
+const SWITCH_ZERO: i64 = 1 << 40;
 
 impl Record {
     fn from_bytes([what, value, cycle @ ..]: [u8; RECORD_BYTES]) -> Self {
