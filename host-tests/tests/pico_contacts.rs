@@ -82,9 +82,9 @@ fn the_emergency_stop_stops_a_job_and_is_reported_until_it_is_released() -> Test
     line.emulator.bounce(STOP, false, BOUNCE)?;
     stands_in_alarm(&mut line, 10)?;
     assert!(line.status()?.contains("|Pn:E|"));
-    // Pressed, it locks again at once.
-    assert_eq!(line.ask("$X")?, "ok");
-    assert!(line.status()?.starts_with("<Alarm"));
+    // Pressed, it cannot be unlocked.
+    assert!(line.ask("$X")?.starts_with("[MSG:"));
+    assert!(line.hear()?.starts_with("error:"));
     line.emulator.bounce(STOP, true, BOUNCE)?;
     while line.status()?.contains("|Pn:") {}
     assert_eq!(line.ask("$X")?, "ok");
