@@ -90,6 +90,9 @@ fn the_emergency_stop_stops_a_job_and_is_reported_until_it_is_released() -> Test
     assert_eq!(line.ask("$X")?, "ok");
     assert!(line.status()?.starts_with("<Idle"));
     assert!(!line.emulator.pin_changes()?.iter().any(|change| change.is_step()));
+    // It goes on from where the pins stand.
+    assert_eq!(line.ask("$J=X0F6000")?, "ok");
+    while !line.status()?.starts_with("<Idle|MPos:0.000,0.000,") {}
     Ok(())
 }
 

@@ -114,6 +114,9 @@ static RING: Ring = Ring([const { AtomicU32::new(0) }; WORDS as usize]);
 static WRITTEN: AtomicU32 = AtomicU32::new(0);
 /// Words that the channel was told to take; wraps. Written where the channel's interrupt is masked.
 static TOLD: AtomicU32 = AtomicU32::new(0);
+/// Words of a block that was given up, which the channel's count still shows. Written where the channel's interrupt
+/// is masked.
+static GIVEN_UP: AtomicU32 = AtomicU32::new(0);
 /// A block is under way. Written where the channel's interrupt is masked.
 static FEEDING: AtomicBool = AtomicBool::new(false);
 
@@ -380,6 +383,7 @@ impl Steps {
             self.written = taken;
             WRITTEN.store(taken, Ordering::Relaxed);
             TOLD.store(taken, Ordering::Relaxed);
+            GIVEN_UP.store(DMA.read(channel::COUNT), Ordering::Relaxed);
             FEEDING.store(false, Ordering::Relaxed);
             begin(self.pulse_ticks);
         });
@@ -472,7 +476,8 @@ fn taken() -> u32 {
             let left = DMA.read(channel::COUNT);
             let waiting = PIO0.read(machine::FIFO_LEVEL) & LEVEL;
             if left == DMA.read(channel::COUNT) {
-                return TOLD.load(Ordering::Relaxed).wrapping_sub(left).wrapping_sub(waiting);
+                let to_come = left - GIVEN_UP.load(Ordering::Relaxed) + waiting;
+                return TOLD.load(Ordering::Relaxed).wrapping_sub(to_come);
             }
         }
     })
@@ -486,6 +491,7 @@ fn feed() {
     FEEDING.store(count != 0, Ordering::Relaxed);
     if count != 0 {
         TOLD.store(written, Ordering::Relaxed);
+        GIVEN_UP.store(0, Ordering::Relaxed);
         DMA.write(channel::START, count);
     }
 }
