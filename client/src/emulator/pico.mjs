@@ -252,6 +252,7 @@ function cutPower() {
   flashBudget = Infinity;
   flashNanos = 0;
   bytes.length = 0;
+  usbBytes.length = 0;
   report(RESET, POWER, now());
   start(chip.flash);
 }

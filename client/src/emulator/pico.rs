@@ -146,6 +146,16 @@ impl Pico {
         self.tell(CUT_POWER, 0, 0)
     }
 
+    /// The same, so much later.
+    ///
+    /// # Errors
+    /// The emulator has ended.
+    pub fn cut_power_after(&mut self, time: Duration) -> io::Result<()> {
+        let cycles = time.as_nanos() as u64 / CYCLE_NANOS;
+        let cycle = self.shared.lock().cycles + cycles;
+        self.tell(CUT_POWER, 0, cycle)
+    }
+
     /// The same, when so many more bytes of flash have been erased or written.
     ///
     /// # Errors
