@@ -147,6 +147,9 @@ static BRAKE: Owned<Brake> = Owned::empty();
 static WRITTEN: AtomicU32 = AtomicU32::new(0);
 /// Words that the channel was told to take; wraps. Written where the channel's interrupt is masked.
 static TOLD: AtomicU32 = AtomicU32::new(0);
+/// Words of a block that was given up, which the channel's count still shows. Written where the channel's interrupt
+/// is masked.
+static GIVEN_UP: AtomicU32 = AtomicU32::new(0);
 /// A block is under way. Written where the channel's interrupt is masked.
 static FEEDING: AtomicBool = AtomicBool::new(false);
 
@@ -436,6 +439,7 @@ impl Steps {
             self.written = taken;
             WRITTEN.store(taken, Ordering::Relaxed);
             TOLD.store(taken, Ordering::Relaxed);
+            GIVEN_UP.store(DMA.read(channel::COUNT), Ordering::Relaxed);
             FEEDING.store(false, Ordering::Relaxed);
             begin(self.pulse_ticks);
         });
@@ -593,7 +597,8 @@ fn taken() -> u32 {
             let left = DMA.read(channel::COUNT);
             let waiting = PIO0.read(machine::FIFO_LEVEL) & LEVEL;
             if left == DMA.read(channel::COUNT) {
-                return TOLD.load(Ordering::Relaxed).wrapping_sub(left).wrapping_sub(waiting);
+                let to_come = left - GIVEN_UP.load(Ordering::Relaxed) + waiting;
+                return TOLD.load(Ordering::Relaxed).wrapping_sub(to_come);
             }
         }
     })
@@ -618,6 +623,7 @@ fn feed() {
         address = BRAKED.0.as_ptr() as u32;
     }
     TOLD.store(told.wrapping_add(words), Ordering::Relaxed);
+    GIVEN_UP.store(0, Ordering::Relaxed);
     DMA.write(channel::READ_ADDRESS, address);
     DMA.write(channel::START, words);
 }
