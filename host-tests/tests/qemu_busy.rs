@@ -15,8 +15,8 @@ const JITTER: Duration = Duration::from_micros(5);
 
 #[test]
 fn lists_long_lines_and_status_requests_make_no_gap_between_steps() -> Result<(), Box<dyn Error>> {
-    // Short pieces of curves, drawn at 100 mm/s.
-    let lines = job_lines("isobars.obj", &["$201=6000", "$fit=on", "$page=25x25", "$margin=5"]);
+    // Short pieces of curves.
+    let lines = job_lines("isobars.obj", &["$fit=on", "$page=25x25", "$margin=5"]);
     let planned = planned(Lm3s6965, &lines);
     let mut line = begin(Lm3s6965, &lines)?;
     let mut changes = line.emulator.pin_changes()?;
