@@ -161,6 +161,7 @@ impl Machine<'_> {
             return Err(MachineError::State(self.state));
         }
         self.state = State::Home;
+        self.slack.forget();
         self.begin_phase(Homing::begin(Axis::X, switches.x));
         Ok(())
     }
@@ -247,7 +248,9 @@ impl Machine<'_> {
             // A belt alone: where that leads the pen does not matter, only how far.
             let (end, page) = (self.runner.end(), self.runner.page_end());
             let page = PagePoint { x: page.x + point.x - end.x, y: page.y + point.y - end.y };
-            self.runner.push(point, page, None, PathLength::MAX)
+            let push = |machine: &mut Self| machine.push_motors(point, page, None, PathLength::MAX);
+            // Its slack first, if there is any to take up.
+            push(self).and_then(|moves| if moves { Ok(()) } else { push(self).map(|_| ()) })
         } else {
             self.push(Target { point, ink: None }, PathLength::MAX)
         };

@@ -43,18 +43,18 @@ impl Machine<'_> {
 
     /// Appends the pieces for which there is room.
     pub(super) fn push_pieces(&mut self) {
-        while let Some(split) = &mut self.split
+        while let Some(split) = self.split
             && !self.runner.is_full()
         {
-            split.done += 1;
-            let Split { from, to, ink, limit, done, pieces } = *split;
-            if done == pieces {
-                self.split = None;
-            }
+            let Split { from, to, ink, limit, done, pieces } = split;
+            let done = done + 1;
             let [motors, page] = self.settings.kinematics().part([from, to], done, pieces);
             // There is room, and it is no longer than the move that was checked.
-            let pushed = self.runner.push(motors, page, ink, limit);
-            debug_assert_eq!(pushed, Ok(()));
+            let pushed = self.push_motors(motors, page, ink, limit);
+            debug_assert!(pushed.is_ok());
+            if pushed != Ok(false) {
+                self.split = (done < pieces).then_some(Split { done, ..split });
+            }
         }
     }
 }

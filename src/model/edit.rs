@@ -7,7 +7,7 @@
 
 use super::pens::{PenRun, RUN, close_gap, open_gap};
 use super::{Before, Corner, Model, ModelError, POSITION_LIMIT, Position};
-use crate::fixed::{Decimal, divide_rounding};
+use crate::fixed::{Decimal, divide_rounding, sin_cos_degrees};
 use crate::stage::{OutOfScratch, Scratch};
 use core::ops::Range;
 
@@ -91,9 +91,9 @@ impl Map {
 
     /// Counter-clockwise about an axis, seen from its far end.
     fn rotation(axis: u8, degrees: f64) -> Self {
-        let radians = libm::remainder(degrees, 360.0).to_radians();
         let entry = |value: f64| libm::round(libm::ldexp(value, UNIT_BITS as i32)) as i64;
-        let (sine, cosine) = (entry(libm::sin(radians)), entry(libm::cos(radians)));
+        let (sine, cosine) = sin_cos_degrees(degrees);
+        let (sine, cosine) = (entry(sine), entry(cosine));
         let axis = usize::from(axis % 3);
         let (from, to) = ((axis + 1) % 3, (axis + 2) % 3);
         let mut rows = Self::diagonal([1 << UNIT_BITS; 3]);

@@ -11,6 +11,7 @@ use crate::step::{Line, Pattern};
 pub(super) struct Course {
     pub(super) line: Line,
     pub(super) ink: Option<LineType>,
+    pub(super) is_slack: bool,
     pub(super) pattern: Pattern,
     pub(super) piece: u32,
     pub(super) length: PathLength,
@@ -45,6 +46,7 @@ impl Course {
         Self {
             line,
             ink: block.ink,
+            is_slack: block.is_slack,
             pattern,
             piece: 0,
             length: block.length,

@@ -18,6 +18,8 @@ pub struct Block {
     /// Greatest stopping distance within the block, as it is part of a curve.
     pub(super) curve_limit: PathLength,
     pub(super) ink: Option<LineType>,
+    /// Whether the motors only take up their slack: the pen stays where it is.
+    pub(super) is_slack: bool,
 }
 
 impl Block {
@@ -29,6 +31,7 @@ impl Block {
         entry_limit: PathLength::ZERO,
         curve_limit: PathLength::MAX,
         ink: None,
+        is_slack: false,
     };
 }
 

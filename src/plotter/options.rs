@@ -1,7 +1,7 @@
 //! What is drawn and how, as the user set it.
 
 use crate::drawing::{Page, Title, TitleText};
-use crate::fixed::{Length, Millimetres, SixDecimals};
+use crate::fixed::{Length, Millimetres, SixDecimals, sin_cos_degrees};
 use crate::model::Model;
 use crate::order;
 use crate::protocol::{
@@ -158,7 +158,7 @@ impl PlotOptions {
     #[inline(never)] // Its frame must not lie under the stages'.
     pub fn visibility(&self, view: &View) -> visibility::Options {
         let crease = (self.crease > 0.0).then(|| Crease {
-            cosine: libm::round(libm::cos(self.crease.to_radians()) * 32768.0) as i32,
+            cosine: libm::round(sin_cos_degrees(self.crease).1 * 32768.0) as i32,
             depth_stretch: view.depth_stretch(),
         });
         let with_hidden = self.hidden != HiddenLines::Erased;
@@ -228,8 +228,10 @@ impl PlotOptions {
         line(format_args!("$blocks={}", if self.merged_blocks { "merged" } else { "separate" }));
         line(format_args!("$crease={}", SixDecimals(self.crease)));
         line(format_args!("$pens={}", if self.one_pen { "one" } else { "auto" }));
-        line(format_args!("$page={}x{}", Length(self.page.width), Length(self.page.height)));
-        line(format_args!("$margin={}", Length(self.page.margin)));
+        let [width, height, margin] =
+            [self.page.width, self.page.height, self.page.margin].map(Length);
+        line(format_args!("$page={width}x{height}"));
+        line(format_args!("$margin={margin}"));
         line(format_args!("$title={}", Escape(self.title.as_str())));
         line(format_args!("$title-size={}", Length(self.title_size)));
         line(format_args!("$fit={}", on(self.fit)));
