@@ -18,6 +18,9 @@ pub struct Block {
     /// Greatest stopping distance within the block, as it is part of a curve.
     pub(super) curve_limit: PathLength,
     pub(super) ink: Option<LineType>,
+    /// See [`Move`](super::Move).
+    pub(super) offsets: [i8; 2],
+    pub(super) is_gap: bool,
 }
 
 impl Block {
@@ -29,6 +32,8 @@ impl Block {
         entry_limit: PathLength::ZERO,
         curve_limit: PathLength::MAX,
         ink: None,
+        offsets: [0; 2],
+        is_gap: false,
     };
 }
 

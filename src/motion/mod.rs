@@ -38,7 +38,7 @@ pub use event::{EventKind, EventQueue, StepEvent};
 pub use limits::{Limits, LimitsError, MotionSettings};
 pub use lookahead::{Block, Lookahead};
 pub use profile::Profile;
-pub use runner::{PenPositions, Progress, PushError, RunLengths, Runner};
+pub use runner::{Move, PenPositions, Progress, PushError, RunLengths, Runner};
 
 /// The unit of time of every step event: 40 ns. A divisor of both boards' clocks.
 pub const TICKS_PER_SECOND: u32 = 25_000_000;

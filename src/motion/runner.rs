@@ -39,6 +39,25 @@ pub enum Progress {
     Stopped,
 }
 
+/// A straight move of the pen, or a piece of one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Move {
+    /// Where it takes the motors.
+    pub motors: PagePoint,
+    /// How far start and end lie beside the motors' steps: see [`Line::beside`](crate::step::Line::beside).
+    pub offsets: [i8; 2],
+    /// Where it takes the pen.
+    pub page: PagePoint,
+    /// The whole move on the page,
+    pub way: (i32, i32),
+    /// its length,
+    pub whole: PathLength,
+    /// and that of the piece.
+    pub length: PathLength,
+    /// The pen is raised within an inked line.
+    pub is_gap: bool,
+}
+
 /// Why a block was not appended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -236,32 +255,32 @@ impl<'m> Runner<'m> {
         self.emitter.restart(ticks);
     }
 
-    /// Appends a move of the motors straight to `motors`, which takes the pen straight to `page`; a
-    /// speed, by its stopping distance ([`Limits::feed`]), is not passed. Lengths, corners and bends
-    /// are those of the page. A move of no length is skipped.
+    /// Appends a move; a speed, by its stopping distance ([`Limits::feed`]), is not passed. Lengths, corners
+    /// and bends are those of the page. A move of no length is skipped.
     ///
     /// # Errors
     /// See [`PushError`]; nothing is appended then.
     pub fn push(
         &mut self,
-        motors: PagePoint,
-        page: PagePoint,
+        piece: &Move,
         ink: Option<LineType>,
         limit: PathLength,
     ) -> Result<(), PushError> {
+        let Move { motors, offsets, page, mut way, mut whole, mut length, is_gap } = *piece;
         let (dx, dy) = (motors.x - self.end.x, motors.y - self.end.y);
         if dx == 0 && dy == 0 {
             return Ok(());
         }
-        let way = match (page.x - self.page_end.x, page.y - self.page_end.y) {
+        if way == (0, 0) || length == 0 {
             // Less than a step of the page.
-            (0, 0) => (dx.signum(), dy.signum()),
-            way => way,
-        };
-        let length = self.limits.length(way.0, way.1).ok_or(PushError::TooLong)?;
-        let heading = Heading::new(&self.limits, way.0, way.1, length);
+            way = (dx.signum(), dy.signum());
+            whole = self.limits.length(way.0, way.1).ok_or(PushError::TooLong)?;
+            length = whole;
+        }
+        let inked = ink.filter(|_| !is_gap);
+        let heading = Heading::new(&self.limits, way.0, way.1, whole);
         let corner = match self.last {
-            Some((before, length_before, ink_before)) if passes(ink_before, ink) => {
+            Some((before, length_before, ink_before)) if passes(ink_before, inked) => {
                 junction::corner(&self.limits, before, heading, length.min(length_before))
             }
             _ => Corner::STOP,
@@ -270,14 +289,14 @@ impl<'m> Runner<'m> {
             self.curvature.restart(&self.limits, self.page_end, &mut self.lookahead);
         }
         let (entry_limit, curve_limit) = (corner.limit, limit);
-        let block = Block { dx, dy, length, entry_limit, curve_limit, ink };
+        let block = Block { dx, dy, length, entry_limit, curve_limit, ink, offsets, is_gap };
         self.lookahead.push(block).map_err(|_| PushError::Full)?;
         if self.limits.centripetal {
             self.curvature.follow(&self.limits, page, &mut self.lookahead);
         }
         self.end = motors;
         self.page_end = page;
-        self.last = Some((heading, length, ink));
+        self.last = Some((heading, length, inked));
         if self.hurried {
             self.plan_again();
         }
