@@ -43,13 +43,12 @@ impl Decimal {
     /// # Ok::<(), penup::fixed::NotANumber>(())
     /// ```
     pub fn parse(text: &str) -> Result<Self, NotANumber> {
-        let (negative, unsigned) = match text.as_bytes().first() {
-            Some(b'-') => (true, &text[1..]),
-            Some(b'+') => (false, &text[1..]),
-            _ => (false, text),
+        let (negative, unsigned) = match text.strip_prefix('-') {
+            Some(unsigned) => (true, unsigned),
+            None => (false, text.strip_prefix('+').unwrap_or(text)),
         };
-        let (digits, power) = match unsigned.find(['e', 'E']) {
-            Some(at) => (&unsigned[..at], parse_power(&unsigned[at + 1..])?),
+        let (digits, power) = match unsigned.split_once(['e', 'E']) {
+            Some((digits, power)) => (digits, parse_power(power)?),
             None => (unsigned, 0),
         };
         let mut mantissa: i64 = 0;
@@ -114,7 +113,7 @@ impl Decimal {
         } else {
             // Past 10^38 the quotient is zero whatever the mantissa.
             power_of_ten(self.exponent.unsigned_abs())
-                .map_or(0, |power| (shifted + more(power)) / power)
+                .map_or(0, |power| divide(shifted + more(power), power))
         };
         let value =
             i64::try_from(rounded).ok().filter(|value| *value < 1 << 62).ok_or(OutOfRange)?;
@@ -151,7 +150,8 @@ impl Decimal {
         let value = self.to_binary(0)?;
         if self.exponent < 0 {
             let power = power_of_ten(self.exponent.unsigned_abs()).ok_or(OutOfRange)?;
-            if u128::from(self.mantissa.unsigned_abs()) % power != 0 {
+            let mantissa = u128::from(self.mantissa.unsigned_abs());
+            if divide(mantissa, power) * power != mantissa {
                 return Err(OutOfRange);
             }
         }
@@ -182,10 +182,46 @@ pub fn shift_right_rounding(value: i32, bits: u32) -> i32 {
 }
 
 /// Divides, rounding half away from zero. `divisor` > 0.
-#[inline(never)] // 128 bits by 128 are long.
 pub fn divide_rounding(dividend: i128, divisor: i128) -> i128 {
     let half = divisor / 2;
-    if dividend < 0 { -((half - dividend) / divisor) } else { (dividend + half) / divisor }
+    let quotient = |dividend: i128| divide(dividend as u128, divisor as u128) as i128; // neither is negative
+    if dividend < 0 { -quotient(half - dividend) } else { quotient(dividend + half) }
+}
+
+/// The quotient, rounded towards minus infinity. `divisor` > 0.
+///
+/// ```
+/// use penup::fixed::divide_down;
+/// assert_eq!([-7, -6, -1, 0, 5, 6].map(|dividend| divide_down(dividend, 3)), [-3, -2, -1, 0, 1, 2]);
+/// ```
+pub fn divide_down(dividend: i128, divisor: i128) -> i128 {
+    let quotient = |dividend: i128| divide(dividend as u128, divisor as u128) as i128; // neither is negative
+    if dividend < 0 { -quotient(divisor - 1 - dividend) } else { quotient(dividend) }
+}
+
+/// The quotient, rounded down. `divisor` > 0.
+#[inline(never)] // 128 bits by 128 are long.
+pub fn divide(dividend: u128, divisor: u128) -> u128 {
+    dividend / divisor
+}
+
+/// Sine and cosine of an angle in degrees, within ±2^52; exact for multiples of 90.
+///
+/// ```
+/// assert_eq!(penup::fixed::sin_cos_degrees(-450.0), (-1.0, 0.0));
+/// ```
+pub fn sin_cos_degrees(degrees: f64) -> (f64, f64) {
+    let quarters = libm::round(degrees / 90.0);
+    let radians = (degrees - 90.0 * quarters).to_radians();
+    // At most π/4. Said in libm's way, this spares the device the reduction of larger angles: 3 KB.
+    let high_word = (radians.to_bits() >> 32) as u32 & 0x7FFF_FFFF;
+    let (sin, cos) = if high_word <= 0x3FE9_21FB { libm::sincos(radians) } else { (0.0, 1.0) };
+    match quarters as i64 & 3 {
+        0 => (sin, cos),
+        1 => (cos, -sin),
+        2 => (-sin, -cos),
+        _ => (-cos, sin),
+    }
 }
 
 /// Writes a number of the camera with up to six decimals, and no zeros at the end. Far smaller than the
@@ -217,6 +253,31 @@ impl fmt::Display for SixDecimals {
             width -= 1;
         }
         if millionths > 0 { write!(formatter, ".{millionths:0width$}") } else { Ok(()) }
+    }
+}
+
+/// Writes a length with as few decimals as tell it from others. Far smaller than what its type brings along.
+///
+/// ```
+/// use penup::fixed::{Length, Millimetres};
+/// let text = |length: f64| Length(Millimetres::from_num(length)).to_string();
+/// assert_eq!([210.0, 7.3, -0.25, 0.0].map(text), ["210", "7.3", "-0.25", "0"]);
+/// assert_eq!(Length(Millimetres::from_bits(1)).to_string(), "0.00002");
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct Length(pub Millimetres);
+
+impl fmt::Display for Length {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let units = i64::from(self.0.to_bits());
+        let magnitude = units.abs();
+        let tells_it = |places: &u32| {
+            let power = 10i64.pow(*places);
+            let digits = (magnitude * power + (1 << 15)) >> 16;
+            ((digits << 16) + power / 2) / power == magnitude
+        };
+        let places = (0..5).find(tells_it).unwrap_or(5);
+        BinaryFraction { units, fraction_bits: 16, places }.fmt(formatter)
     }
 }
 
@@ -265,6 +326,14 @@ mod tests {
 
     fn binary(text: &str, fraction_bits: u32) -> Result<i64, OutOfRange> {
         Decimal::parse(text).map_err(|_| OutOfRange)?.to_binary(fraction_bits)
+    }
+
+    #[test]
+    fn every_length_is_told_from_its_neighbours() {
+        for bits in (-70_000..70_000).chain([i32::MIN, i32::MAX, i32::MAX - 1]) {
+            let text = format!("{}", Length(Millimetres::from_bits(bits)));
+            assert_eq!(binary(&text, 16), Ok(i64::from(bits)), "{text}");
+        }
     }
 
     #[test]

@@ -55,9 +55,14 @@ impl<E: EmulatedBoard + ?Sized> Line<E> {
     /// # Errors
     /// It does not greet.
     pub fn to(emulator: Box<E>) -> Result<Self, Box<dyn Error>> {
-        let mut line = Self { heard: Vec::new(), emulator };
+        let mut line = Self::silent(emulator);
         line.hear_greeting()?;
         Ok(line)
+    }
+
+    /// A line to a board that has not spoken.
+    pub fn silent(emulator: Box<E>) -> Self {
+        Self { heard: Vec::new(), emulator }
     }
 
     /// Listens until the board greets.
@@ -112,7 +117,17 @@ impl<E: EmulatedBoard + ?Sized> Line<E> {
 /// # Errors
 /// It does not start.
 pub fn begin(board: Board, lines: &[String]) -> Result<Line, Box<dyn Error>> {
-    let mut line = Line::open(board)?;
+    begin_on(Line::open(board)?, lines)
+}
+
+/// The same on a board that has greeted.
+///
+/// # Errors
+/// It falls silent.
+pub fn begin_on<E: EmulatedBoard + ?Sized>(
+    mut line: Line<E>,
+    lines: &[String],
+) -> Result<Line<E>, Box<dyn Error>> {
     for text in lines {
         let mut answer = line.ask(text)?;
         while answer.starts_with('[') {
@@ -131,7 +146,16 @@ pub fn at_the_pins(
     board: Board,
     lines: &[String],
 ) -> Result<Vec<MachineEventKind>, Box<dyn Error>> {
-    let mut line = begin(board, lines)?;
+    events_until_idle(&mut begin(board, lines)?)
+}
+
+/// What the pins do until the job that has begun is done.
+///
+/// # Errors
+/// The emulator fails.
+pub fn events_until_idle<E: EmulatedBoard + ?Sized>(
+    line: &mut Line<E>,
+) -> Result<Vec<MachineEventKind>, Box<dyn Error>> {
     let (mut machine, mut events) = (Machine::default(), Vec::new());
     loop {
         let idle = line.status()?.starts_with("<Idle");
@@ -169,8 +193,18 @@ fn job_of(events: &[MachineEventKind]) -> &[MachineEventKind] {
 /// If they are not.
 pub fn compare(board: Board, scene: &str, settings: &[&str]) -> Result<(), Box<dyn Error>> {
     let lines = job_lines(scene, settings);
-    let (host, pins) = (on_the_host(board, &lines), at_the_pins(board, &lines)?);
-    let (host, pins) = (job_of(&host), job_of(&pins));
+    let pins = at_the_pins(board, &lines)?;
+    assert_same_as_on_the_host(board, &lines, &pins);
+    Ok(())
+}
+
+/// The job of `lines` on the host has these steps and pen moves, one by one.
+///
+/// # Panics
+/// If it has not.
+pub fn assert_same_as_on_the_host(board: Board, lines: &[String], pins: &[MachineEventKind]) {
+    let host = on_the_host(board, lines);
+    let (host, pins) = (job_of(&host), job_of(pins));
     assert!(host.len() > 10_000, "{} events are no job", host.len());
     let differs = host.iter().zip(pins).position(|(host, pin)| host != pin);
     let around = differs.map(|at| {
@@ -179,9 +213,8 @@ pub fn compare(board: Board, scene: &str, settings: &[&str]) -> Result<(), Box<d
         };
         (at, part(host), part(pins))
     });
-    assert_eq!(around, None, "{scene}");
-    assert_eq!(host.len(), pins.len(), "{scene}");
-    Ok(())
+    assert_eq!(around, None);
+    assert_eq!(host.len(), pins.len());
 }
 
 /// Gives a job up with the pen down, and plots it again: the steps stop, the pen is raised, the

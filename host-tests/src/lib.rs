@@ -19,3 +19,4 @@ pub mod convex_solids;
 pub mod cut_flash;
 pub mod whole_jobs;
 pub mod emulated_jobs;
+pub mod step_edges;

@@ -54,16 +54,35 @@ pub fn ends() -> (Receiver, Line) {
 }
 
 impl Receiver {
-    /// Takes a byte in. Called in the handler, and no handler that could interrupt it does the same.
+    /// Takes a byte in; an ordinary one is lost if the queue is full. Called in the handler, and no
+    /// handler that could interrupt it does the same.
     pub fn receive(&mut self, byte: u8) {
-        let asked = match self.sorter.sort(byte) {
-            Some(asked) => asked,
-            None if self.bytes.enqueue(byte).is_ok() => {
-                self.count = self.count.wrapping_add(1);
-                return;
+        if let Some(byte) = self.sort_out(byte)
+            && self.append(byte).is_err()
+        {
+            self.ask(RealTime::BYTES_LOST);
+        }
+    }
+
+    /// Notes what a real-time byte asks for, and gives an ordinary byte back.
+    pub fn sort_out(&mut self, byte: u8) -> Option<u8> {
+        match self.sorter.sort(byte) {
+            Some(asked) => {
+                self.ask(asked);
+                None
             }
-            None => RealTime::BYTES_LOST,
-        };
+            None => Some(byte),
+        }
+    }
+
+    /// Puts an ordinary byte into the queue; gives it back if there is no place.
+    pub fn append(&mut self, byte: u8) -> Result<(), u8> {
+        self.bytes.enqueue(byte)?;
+        self.count = self.count.wrapping_add(1);
+        Ok(())
+    }
+
+    fn ask(&mut self, asked: RealTime) {
         if asked.has(RealTime::ABORT) {
             COUNT_AT_ABORT.store(self.count, Ordering::Release);
         }

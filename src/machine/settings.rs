@@ -6,7 +6,9 @@
 use super::{Anchors, Kinematics};
 use crate::drawing::{PAGE_LIMIT, PagePoint};
 use crate::fixed::Millimetres;
-use crate::motion::{Limits, LimitsError, MotionSettings, PenPositions, TICKS_PER_SECOND};
+use crate::motion::{
+    BrakeRule, Limits, LimitsError, MotionSettings, PenPositions, QueueSize, TICKS_PER_SECOND,
+};
 
 /// A value of any setting: ±32768 in units of 2^-16 of the setting's unit.
 pub type Value = Millimetres;
@@ -331,6 +333,15 @@ impl Settings {
             ..self.motion_settings()
         };
         Limits::new(&settings).unwrap_or_else(|_| self.limits())
+    }
+
+    /// How a queue brakes if it runs dry.
+    pub(super) fn brake(&self, queue: QueueSize) -> BrakeRule {
+        let limits = self.limits();
+        let fastest = limits.fastest().max(self.limits_at(Setting::HomingSeek).fastest());
+        // The belts of a wall may run much slower than the pen.
+        let longer = if matches!(self.kinematics(), Kinematics::Polargraph(_)) { 8 } else { 1 };
+        limits.brake(fastest, longer, queue)
     }
 
     fn checked_limits(&self) -> Result<Limits, LimitsError> {

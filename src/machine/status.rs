@@ -24,6 +24,13 @@ pub struct Status {
 }
 
 impl Machine<'_> {
+    /// The pen, from 0, that the machine stands and waits for.
+    pub fn pen_wanted(&self) -> Option<u8> {
+        // It is known earlier, when the path was read; a hold may come in between.
+        let stands = self.state == State::Hold { standing: true } && self.runner.is_at_rest();
+        self.next_pen.filter(|_| stands).map(|(pen, _)| pen)
+    }
+
     /// Where it is, and how far the job is.
     pub fn status(&self) -> Status {
         let run = self.runner.run();
@@ -40,7 +47,7 @@ impl Machine<'_> {
             done,
             seconds_left: self.seconds_left(done),
             percent: self.percent,
-            pen_wanted: self.next_pen.map(|(pen, _)| pen),
+            pen_wanted: self.pen_wanted(),
         }
     }
 
@@ -62,6 +69,11 @@ impl Machine<'_> {
         // Days of milliseconds stay below 2^30.
         let left = (time.min(1 << 31) * bare(left).min(1 << 31)).checked_div(all).unwrap_or(0);
         u32::try_from(left / 10 / u64::from(self.percent)).unwrap_or(u32::MAX)
+    }
+
+    /// How often the queue ran dry while the machine moved: the main loop was late; wraps.
+    pub fn underruns(&self) -> u32 {
+        self.pins.underruns()
     }
 
     /// Where the pins are, in steps of the page.

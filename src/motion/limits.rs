@@ -63,6 +63,8 @@ pub enum LimitsError {
 pub struct Limits {
     /// mm per step of x and y.
     pub(super) step_length: [SliceSpeed; 2],
+    /// The least mm that a move is long.
+    pub(super) least_move: SliceSpeed,
     pub(super) draw_speed: SliceSpeed,
     pub(super) travel_speed: SliceSpeed,
     /// Stopping distance of the greater speed.
@@ -86,6 +88,7 @@ impl Default for Limits {
         let speed = SliceSpeed::from_bits(7_036_874);
         Self {
             step_length: [step_length; 2],
+            least_move: step_length,
             draw_speed: speed,
             travel_speed: speed,
             top: const { PathLength::lit("0.5") },
@@ -100,6 +103,9 @@ impl Default for Limits {
     }
 }
 
+/// The most steps in a millimetre; a constant, for reading it from text when the device runs takes 4 KB of flash.
+const MOST_STEPS: Millimetres = Millimetres::lit("4000");
+
 impl Limits {
     /// The settings, checked.
     ///
@@ -107,8 +113,7 @@ impl Limits {
     /// See [`LimitsError`].
     pub fn new(settings: &MotionSettings) -> Result<Self, LimitsError> {
         let axis = |steps_per_mm: Millimetres| {
-            const RANGE: RangeInclusive<Millimetres> =
-                Millimetres::lit("2")..=Millimetres::lit("4000");
+            const RANGE: RangeInclusive<Millimetres> = Millimetres::lit("2")..=MOST_STEPS;
             if !RANGE.contains(&steps_per_mm) {
                 return Err(LimitsError::StepsPerMillimetre);
             }
@@ -139,6 +144,7 @@ impl Limits {
         }
         let mut limits = Self {
             step_length,
+            least_move: axis(settings.motor_steps_per_mm.min(MOST_STEPS))?,
             draw_speed,
             travel_speed,
             top: PathLength::ZERO,
@@ -153,14 +159,12 @@ impl Limits {
         let fastest = draw_speed.max(travel_speed);
         limits.top = limits.stopping_distance(fastest);
         limits.jerk = JerkLimit::new(jerk, limits.acceleration, fastest);
-        limits.check_step_rate(axis(settings.motor_steps_per_mm.min(Millimetres::lit("4000")))?)?;
+        limits.check_step_rate()?;
         Ok(limits)
     }
 
-    fn check_step_rate(&self, step_length: SliceSpeed) -> Result<(), LimitsError> {
-        let speed = u64::from(self.draw_speed.max(self.travel_speed).to_bits());
-        let slices_per_second = u64::from(TICKS_PER_SECOND / SLICE_TICKS);
-        let asked = speed * slices_per_second / u64::from(step_length.to_bits());
+    fn check_step_rate(&self) -> Result<(), LimitsError> {
+        let asked = self.step_rate(self.draw_speed.max(self.travel_speed));
         let possible = TICKS_PER_SECOND / self.least_interval();
         if asked > u64::from(possible) {
             return Err(LimitsError::TooManySteps {
@@ -171,9 +175,20 @@ impl Limits {
         Ok(())
     }
 
+    /// The most steps a second at a speed.
+    pub(super) fn step_rate(&self, speed: SliceSpeed) -> u64 {
+        let slices_per_second = u64::from(TICKS_PER_SECOND / SLICE_TICKS);
+        u64::from(speed.to_bits()) * slices_per_second / u64::from(self.least_move.to_bits()).max(1)
+    }
+
     /// The least time between two events that pulse the same axis: the pulse and as long a pause.
     pub fn least_interval(&self) -> u32 {
         (2 * self.pulse_ticks).min(StepEvent::MAX_TICKS)
+    }
+
+    /// The stopping distance of the greater speed.
+    pub fn fastest(&self) -> PathLength {
+        self.top
     }
 
     /// The stopping distance of `speed`, v²/2a; at most what a length can hold.
@@ -221,7 +236,7 @@ fn rounding([x, y]: [SliceSpeed; 2]) -> PathLength {
 }
 
 /// √(x² + y²) of numbers below 2^62, to 31 significant bits.
-fn hypotenuse(x: u64, y: u64) -> u64 {
+pub(super) fn hypotenuse(x: u64, y: u64) -> u64 {
     if x == 0 || y == 0 {
         return x + y;
     }

@@ -22,6 +22,7 @@
 //!
 //! Not done here: limits of travel, the pen's heights, states. That is `machine`.
 
+mod brake;
 mod course;
 mod curvature;
 mod emitter;
@@ -33,6 +34,7 @@ mod profile;
 mod runner;
 mod smooth;
 
+pub use brake::{Brake, BrakeOrders, BrakeRule, QueueSize, StepLength, StepWay};
 pub use emitter::Emitter;
 pub use event::{EventKind, EventQueue, StepEvent};
 pub use limits::{Limits, LimitsError, MotionSettings};

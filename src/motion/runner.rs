@@ -6,7 +6,10 @@ use super::emitter::{BATCH, MoveLevels, whole_ticks};
 use super::junction::{self, Corner, Heading};
 use super::profile::{FRACTION_BITS, Pace, Profile};
 use super::smooth::{Interval, Road, State};
-use super::{Block, Emitter, EventQueue, Limits, Lookahead, PathLength, SliceSpeed, StepEvent};
+use super::{
+    Block, BrakeRule, Emitter, EventQueue, Limits, Lookahead, PathLength, SLICE_TICKS, SliceSpeed,
+    StepEvent,
+};
 use crate::drawing::{LineType, PagePoint};
 use core::cmp::Ordering;
 
@@ -93,6 +96,7 @@ enum Plan {
 #[derive(Debug)]
 pub struct Runner<'m> {
     limits: Limits,
+    brake: BrakeRule,
     pen: PenPositions,
     lookahead: Lookahead<'m>,
     curvature: Curvature,
@@ -141,6 +145,7 @@ impl<'m> Runner<'m> {
     pub fn new(limits: Limits, pen: PenPositions, blocks: &'m mut [Block]) -> Self {
         let mut runner = Self {
             limits,
+            brake: BrakeRule::default(),
             pen,
             lookahead: Lookahead::new(blocks),
             curvature: Curvature::default(),
@@ -178,6 +183,28 @@ impl<'m> Runner<'m> {
         self.pen = pen;
         self.emitter.set_limits(&limits);
         self.set_override(100);
+    }
+
+    /// The rule by which the lengths of steps are told, while nothing moves.
+    pub fn set_brake(&mut self, brake: BrakeRule) {
+        self.brake = brake;
+    }
+
+    /// How long the events that wait must last so that the machine can stop within them, wherever in
+    /// them it is, no matter what comes behind.
+    ///
+    /// Events that end at a speed u and last t hold the stopping distance of every speed v in them if
+    /// t ≥ (v - (√2 - 1) u) / a: then the plan is slower in between, or goes far enough.
+    pub fn stopping_ticks(&self) -> u32 {
+        let end = match &self.plan {
+            Some(Plan::Profile(profile)) => profile.speed().to_bits(),
+            Some(Plan::Interval(interval)) => interval.state().speed,
+            None => self.pace.speed.to_bits(),
+        };
+        let speed = self.top(self.in_stroke).speed.to_bits();
+        let change = speed.saturating_sub(end / 8 * 3);
+        let slices = change.checked_div(self.limits.acceleration.to_bits()).unwrap_or(u32::MAX);
+        slices.saturating_mul(SLICE_TICKS)
     }
 
     /// Scales both speeds to `percent` (10 to 200), at once; never above the greater of the two as
@@ -624,6 +651,10 @@ impl<'m> Runner<'m> {
             if !self.emitter.is_open() {
                 self.emitter.hold(self.now, queue)?;
             }
+        }
+        if course.moves_done == 0 {
+            let units = self.brake.step_length(course.move_length);
+            queue.set_step_length(units, self.emitter.has_stepped())?;
         }
         if let Some(jerk) = self.limits.jerk {
             let top = if self.stopping { Pace::REST } else { self.top(inked) };

@@ -1,6 +1,39 @@
 //! Where two faces pass through each other: the segment that two triangles have in common.
 
+use crate::fixed::divide_down;
 use crate::geometry::{Vertex, plane_side};
+
+/// The box around a face in view coordinates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Extent {
+    low: Vertex,
+    high: Vertex,
+}
+
+impl Extent {
+    /// Around all of `corners`.
+    pub fn around(corners: impl Iterator<Item = Vertex>) -> Self {
+        let none = Self {
+            low: Vertex::new(i32::MAX, i32::MAX, i32::MAX),
+            high: Vertex::new(i32::MIN, i32::MIN, i32::MIN),
+        };
+        corners.fold(none, |Self { low, high }, at| Self {
+            low: Vertex::new(low.x.min(at.x), low.y.min(at.y), low.z.min(at.z)),
+            high: Vertex::new(high.x.max(at.x), high.y.max(at.y), high.z.max(at.z)),
+        })
+    }
+
+    /// Whether they have a point in common; else what they hold does not cross.
+    pub fn meets(&self, other: &Self) -> bool {
+        let (low, high) = (other.low, other.high);
+        self.low.x <= high.x
+            && low.x <= self.high.x
+            && self.low.y <= high.y
+            && low.y <= self.high.y
+            && self.low.z <= high.z
+            && low.z <= self.high.z
+    }
+}
 
 /// The segment where two triangles cross, its ends rounded to whole coordinates.
 ///
@@ -53,7 +86,7 @@ fn between(a: Vertex, b: Vertex, height_a: i64, height_b: i64) -> Vertex {
     let (from, to) = (i128::from(height_a).abs(), i128::from(height_b).abs());
     let mixed = |a: i32, b: i32| {
         let sum = i128::from(a) * to + i128::from(b) * from;
-        (2 * sum + from + to).div_euclid(2 * (from + to)) as i32
+        divide_down(2 * sum + from + to, 2 * (from + to)) as i32
     };
     Vertex::new(mixed(a.x, b.x), mixed(a.y, b.y), mixed(a.z, b.z))
 }
@@ -111,6 +144,20 @@ mod tests {
             assert_eq!(seam(wall, FLOOR), None);
         }
         assert_eq!(seam(FLOOR, FLOOR), None);
+    }
+
+    #[test]
+    fn boxes_that_touch_meet() {
+        let extent = |triangle: [Vertex; 3]| Extent::around(triangle.into_iter());
+        for (wall, meets) in [
+            (wall(-2, 2, -1, 1), true),
+            (wall(10, 20, 0, 1), true),
+            (wall(11, 20, 0, 1), false),
+            (wall(-2, 2, 1, 3), false),
+        ] {
+            assert_eq!(extent(FLOOR).meets(&extent(wall)), meets);
+            assert_eq!(extent(wall).meets(&extent(FLOOR)), meets);
+        }
     }
 
     #[test]

@@ -86,12 +86,19 @@ impl<'a> Search<'a> {
     ) -> Result<(), VisibilityError> {
         for one in 0..self.around.faces.len() {
             self.meet(one);
-            for other in one + 1..self.around.faces.len() {
-                if self.met[other / 32] >> (other % 32) & 1 != 0 {
-                    self.follow_seams_of(one, other, pace, sink)?;
+            let extent = self.around.extent(one);
+            for word in one / 32..self.met.len() {
+                let mut bits = self.met[word];
+                while bits != 0 {
+                    let other = 32 * word + bits.trailing_zeros() as usize;
+                    bits &= bits - 1;
+                    if extent.meets(&self.around.extent(other)) {
+                        self.follow_seams_of(one, other, pace, sink)?;
+                    }
+                    pace.spend(200)?;
                 }
             }
-            pace.spend(30 * (self.around.faces.len() - one))?;
+            pace.spend(1000)?;
         }
         Ok(())
     }
@@ -159,6 +166,9 @@ impl<'a> Search<'a> {
         if outlook.direction(ends.0, ends.1).is_none() {
             return Ok(());
         }
+        let pen_at = |corner: usize| self.around.outlines.pens.at(corner);
+        let pen_of = |rank: &usize| pen_at(self.around.faces.get(*rank).first);
+        let pen = seam_of.iter().flatten().map(pen_of).min().unwrap_or_else(|| pen_at(sight.side));
         let edge = (sight.side != Sight::NO_SIDE).then_some((sight.p.number, sight.q.number));
         let mut pending: Option<Stretch> = None;
         let mut start = Along::START;
@@ -184,8 +194,8 @@ impl<'a> Search<'a> {
                         stretch.to = to;
                     }
                     _ => {
-                        let next =
-                            handed.then_some(Stretch { edge, ends, from: piece.from, to, visible });
+                        let from = piece.from;
+                        let next = handed.then_some(Stretch { edge, ends, from, to, visible, pen });
                         if let Some(stretch) = core::mem::replace(&mut pending, next) {
                             sink.stretch(stretch)?;
                         }

@@ -9,6 +9,7 @@ use super::edges::{ChosenSides, Outlines, sides};
 use super::faces::{Face, Faces};
 use super::outlook::{CoarseLine, End, Outlook, Place};
 use super::profile::{Part, Profile, mark};
+use super::seams::Extent;
 use super::triangles::Ears;
 use crate::geometry::{Along, line_side, page_offset, page_side};
 use crate::model::Corner;
@@ -33,6 +34,12 @@ impl Surroundings<'_> {
             Some([b, c]) if face.is_fan => Some([corners[0].vertex(), b.vertex(), c.vertex()]),
             _ => None,
         }
+    }
+
+    /// The box around the face of a rank.
+    pub fn extent(&self, rank: usize) -> Extent {
+        let corners = self.outlines.element(self.faces.get(rank).first);
+        Extent::around(corners.iter().map(|corner| self.outlook.vertex(corner.vertex())))
     }
 
     /// Whether two faces have two corners in common, by their places; such faces do not cross elsewhere.
@@ -375,7 +382,7 @@ impl Sight {
     }
 
     /// Marks where the side (a, b) of a face, on the line of this edge, is drawn in its place: where
-    /// it is nearer, or as near and before it in the model.
+    /// it is nearer, or as near and of a lower pen, or of the same and before it in the model.
     fn pass_side(
         &self,
         around: &Surroundings<'_>,
@@ -407,7 +414,10 @@ impl Sight {
         let height = |vertex| line_side(projection, axis, va, vb, vertex);
         let heights = (height(vp), height(vq));
         let behind = if heights == (0, 0) {
-            (side < self.side).then_some(Part::WHOLE)
+            let pens = around.outlines.pens;
+            let is_first = self.side == Self::NO_SIDE
+                || (pens.at(side), side) < (pens.at(self.side), self.side);
+            is_first.then_some(Part::WHOLE)
         } else {
             behind_between(heights.0, heights.1)
         };

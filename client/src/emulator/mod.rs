@@ -24,7 +24,7 @@ use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-pub use pico::Pico;
+pub use pico::{Pico, PicoByUsb};
 pub use pins::{Machine, MachineEvent, MachineEventKind, Pin, PinChange};
 
 use process::Process;

@@ -6,9 +6,10 @@
 // little-endian). In: 0 a byte for the serial line, 1 a level for a pin (its number, + 128 if high),
 // not before that cycle; 2 the power goes at that cycle, 3 it goes when so many more bytes of flash
 // have been erased or written (the number in the cycle's place), and comes back at once; 4 the main
-// loop hangs from that cycle on. Out: 0 a byte
+// loop hangs from that cycle on, 5 a byte for USB, 6 the USB host is plugged in (1), takes
+// nothing more (2), takes again (3). Out: 0 a byte
 // of the serial line, 1 a pin's new level, 2 the time, 3 a byte of the log, 4 the chip was reset (0 by
-// the loss of power, 1 by the watchdog).
+// the loss of power, 1 by the watchdog), 5 a byte of USB.
 //
 // rp2040js has no boot ROM: here is one, of the functions that the image asks for. Each is a
 // breakpoint that this program serves. Flash takes as long as a Pico's.
@@ -21,7 +22,7 @@ import { readFileSync, writeSync } from 'node:fs';
 import { pathToFileURL } from 'node:url';
 
 const [directory, imagePath, logAddress] = process.argv.slice(-3);
-const { RP2040 } = await import(pathToFileURL(`${directory}/dist/esm/index.js`));
+const { RP2040, USBCDC } = await import(pathToFileURL(`${directory}/dist/esm/index.js`));
 
 const NANOS = 8;
 const CYCLES_PER_BYTE = Math.round((125e6 * 10) / 115200);
@@ -40,6 +41,8 @@ const RESET = 4;
 const CUT_POWER = 2;
 const CUT_FLASH = 3;
 const HANG = 4;
+const USB = 5;
+const USB_HOST = 6;
 const output = Buffer.alloc(1 << 16);
 let filled = 0;
 
@@ -152,6 +155,7 @@ function start(flash) {
   core.SP = chip.readUint32(VECTORS);
   core.PC = chip.readUint32(VECTORS + 4) & ~1;
   mendFlags();
+  mendVectors();
   watchPins();
   uart = chip.uart[0];
   uart.onByte = (byte) => report(SERIAL, byte, now());
@@ -159,6 +163,7 @@ function start(flash) {
   machines.forEach(followQueue);
   chip.pio.forEach(followPio);
   schedule();
+  if (usbHost) plugIn();
   const watchdog = chip.peripherals[WATCHDOG];
   watchdog.onWatchdogTrigger = () => {
     // Or its alarm would come again at once, for ever.
@@ -166,6 +171,66 @@ function start(flash) {
     watchdogDue = true;
   };
 }
+
+// --- The USB host --------------------------------------------------------------------------------
+
+const PACKET = 64;
+const AVAILABLE = 1 << 10;
+const IN_BUFFER_CONTROL = 0x80;
+const HOST = { PLUGGED_IN: 1, STOPS: 2, TAKES: 3 };
+/** Whether there is a host, and whether it takes packets. */
+let usbHost = false;
+let usbTakes = true;
+/** Bytes for the device. */
+const usbBytes = [];
+/** Hands the device its next packet, while it waits for one. */
+let offerPacket = null;
+/** A packet of the device's that the host does not take. */
+let leftPacket = null;
+
+/** rp2040js's host finds the device; afterwards the device gets a packet only when there is something in it. */
+function plugIn() {
+  const { usbCtrl } = chip;
+  const host = new USBCDC(usbCtrl);
+  offerPacket = null;
+  host.onSerialData = (data) => data.forEach((byte) => report(USB, byte, now()));
+  usbCtrl.onEndpointRead = (endpoint, size) => {
+    if (endpoint === 0) return;
+    offerPacket = () => {
+      offerPacket = null;
+      usbCtrl.endpointReadDone(endpoint, Uint8Array.from(usbBytes.splice(0, Math.min(size, PACKET))));
+    };
+    offerUsb();
+  };
+  // A packet that the host does not take stays where it is.
+  const updated = usbCtrl.DPRAMUpdated.bind(usbCtrl);
+  usbCtrl.DPRAMUpdated = (offset, value) => {
+    const sent = offset === IN_BUFFER_CONTROL + 8 * host.inEndpoint && value & AVAILABLE;
+    if (sent && !usbTakes) leftPacket = () => updated(offset, value);
+    else updated(offset, value);
+  };
+  leftPacket = null;
+  // Already enabled if the host comes later.
+  if (usbCtrl.mainCtrl & 1) usbCtrl.resetDevice();
+}
+
+function offerUsb() {
+  if (usbBytes.length && offerPacket) offerPacket();
+}
+
+function hostDoes(what) {
+  if (what === HOST.PLUGGED_IN) {
+    usbHost = true;
+    plugIn();
+  } else usbTakes = what === HOST.TAKES;
+  if (usbTakes && leftPacket) {
+    const take = leftPacket;
+    leftPacket = null;
+    take();
+  }
+}
+
+// --- Resets --------------------------------------------------------------------------------------
 
 const WATCHDOG = 0x40058;
 const POWER = 0;
@@ -210,6 +275,16 @@ function mendFlags() {
       if (folded) core.V = !!(first & 0x80000000);
     }
     return result;
+  };
+}
+
+// rp2040js leaves the mark of Thumb code, bit 0 of a vector, in the program counter: a jump table in a handler
+// is then read a byte off.
+function mendVectors() {
+  const enter = core.exceptionEntry.bind(core);
+  core.exceptionEntry = (number) => {
+    enter(number);
+    core.PC &= ~1;
   };
 }
 
@@ -318,10 +393,12 @@ process.stdin.on('data', (data) => {
   for (; at + 8 <= rest.length; at += 8) {
     const entry = { value: rest[at + 1], cycle: rest.readUIntLE(at + 2, 6) };
     if (rest[at] === SERIAL) bytes.push(entry);
+    else if (rest[at] === USB) usbBytes.push(entry.value);
     else if (rest[at] === CUT_FLASH) flashBudget = entry.cycle;
     else events.push({ what: rest[at], ...entry });
   }
   rest = rest.subarray(at);
+  offerUsb();
 });
 process.stdin.on('end', () => process.exit(0));
 
@@ -338,6 +415,10 @@ function takeInput(cycle) {
     if (what === HANG) {
       core.PC = FOR_EVER;
       core.waiting = false;
+      continue;
+    }
+    if (what === USB_HOST) {
+      hostDoes(value);
       continue;
     }
     const [number, high] = [value & 0x7f, value >= 0x80];

@@ -45,6 +45,7 @@ struct Shared {
 #[derive(Default)]
 struct State {
     serial: VecDeque<u8>,
+    usb: VecDeque<u8>,
     pins: Vec<PinChange>,
     cycles: u64,
     log: Vec<String>,
@@ -152,6 +153,63 @@ impl Pico {
         self.tell(HANG, 0, 0)
     }
 
+    /// Plugs a USB host in, which finds the device.
+    ///
+    /// # Errors
+    /// The emulator has ended.
+    pub fn plug_usb_in(&mut self) -> io::Result<()> {
+        self.tell(USB_HOST, 1, 0)
+    }
+
+    /// Lets the USB host take what the board sends, or not.
+    ///
+    /// # Errors
+    /// The emulator has ended.
+    pub fn let_usb_take(&mut self, takes: bool) -> io::Result<()> {
+        self.tell(USB_HOST, if takes { 3 } else { 2 }, 0)
+    }
+
+    /// [`EmulatedBoard::send`] by USB.
+    ///
+    /// # Errors
+    /// The emulator has ended.
+    pub fn send_by_usb(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.send_to(USB, bytes)
+    }
+
+    /// [`EmulatedBoard::receive`] by USB.
+    ///
+    /// # Errors
+    /// [`io::ErrorKind::BrokenPipe`] if the emulator has ended.
+    pub fn receive_by_usb(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize> {
+        self.receive_from(|state| &mut state.usb, buffer, patience)
+    }
+
+    fn send_to(&mut self, port: u8, bytes: &[u8]) -> io::Result<()> {
+        let record = |&byte| Record { what: port, value: byte, cycle: 0 }.to_bytes();
+        let records: Vec<u8> = bytes.iter().flat_map(record).collect();
+        self.input.write_all(&records)?;
+        self.input.flush()
+    }
+
+    fn receive_from(
+        &mut self,
+        port: impl Fn(&mut State) -> &mut VecDeque<u8>,
+        buffer: &mut [u8],
+        patience: Duration,
+    ) -> io::Result<usize> {
+        let waits = |state: &mut State| port(state).is_empty() && !state.ended;
+        let (mut state, _) = self
+            .shared
+            .changed
+            .wait_timeout_while(self.shared.lock(), patience, waits)
+            .unwrap_or_else(PoisonError::into_inner);
+        if port(&mut state).is_empty() && state.ended {
+            return Err(io::ErrorKind::BrokenPipe.into());
+        }
+        port(&mut state).read(buffer)
+    }
+
     fn tell(&mut self, what: u8, value: u8, cycle: u64) -> io::Result<()> {
         self.input.write_all(&Record { what, value, cycle }.to_bytes())?;
         self.input.flush()
@@ -189,6 +247,36 @@ impl Pico {
     }
 }
 
+/// The same board, its line being USB.
+#[derive(Debug)]
+pub struct PicoByUsb(pub Pico);
+
+impl EmulatedBoard for PicoByUsb {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.0.send_by_usb(bytes)
+    }
+
+    fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize> {
+        self.0.receive_by_usb(buffer, patience)
+    }
+
+    fn pin_changes(&mut self) -> Result<Vec<PinChange>, EmulatorError> {
+        self.0.pin_changes()
+    }
+
+    fn clock(&mut self) -> Result<Duration, EmulatorError> {
+        self.0.clock()
+    }
+
+    fn log_lines(&mut self) -> Vec<String> {
+        self.0.log_lines()
+    }
+
+    fn said(&self) -> String {
+        self.0.said()
+    }
+}
+
 impl Drop for Pico {
     fn drop(&mut self) {
         self.end();
@@ -197,25 +285,11 @@ impl Drop for Pico {
 
 impl EmulatedBoard for Pico {
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
-        let records: Vec<u8> = bytes
-            .iter()
-            .flat_map(|&byte| Record { what: SERIAL, value: byte, cycle: 0 }.to_bytes())
-            .collect();
-        self.input.write_all(&records)?;
-        self.input.flush()
+        self.send_to(SERIAL, bytes)
     }
 
     fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize> {
-        let waits = |state: &mut State| state.serial.is_empty() && !state.ended;
-        let (mut state, _) = self
-            .shared
-            .changed
-            .wait_timeout_while(self.shared.lock(), patience, waits)
-            .unwrap_or_else(PoisonError::into_inner);
-        if state.serial.is_empty() && state.ended {
-            return Err(io::ErrorKind::BrokenPipe.into());
-        }
-        state.serial.read(buffer)
+        self.receive_from(|state| &mut state.serial, buffer, patience)
     }
 
     fn pin_changes(&mut self) -> Result<Vec<PinChange>, EmulatorError> {
@@ -313,6 +387,8 @@ const LOG: u8 = 3;
 const CUT_POWER: u8 = 2;
 const CUT_FLASH: u8 = 3;
 const HANG: u8 = 4;
+const USB: u8 = 5;
+const USB_HOST: u8 = 6;
 
 impl Record {
     fn from_bytes([what, value, cycle @ ..]: [u8; RECORD_BYTES]) -> Self {
@@ -343,6 +419,7 @@ fn read(mut stdout: ChildStdout, shared: &Shared, mut log: PipeWriter) {
             state.cycles = record.cycle;
             match record.what {
                 SERIAL => state.serial.push_back(record.value),
+                USB => state.usb.push_back(record.value),
                 PIN => state.pins.extend(servo.pin_change(&record)),
                 LOG => logged.push(record.value),
                 _ => {}

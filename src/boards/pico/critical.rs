@@ -1,11 +1,16 @@
-//! The ranks of the interrupts, and the critical section.
+//! The ranks of the interrupts, and a critical section that the steps do not wait for.
 //!
-//! A Cortex-M0+ can mask all interrupts or none. The next block of steps waits for a section to end,
-//! so each must be shorter than the state machine's queue lasts: 4 words, 4 µs at the greatest rate.
+//! A Cortex-M0+ can mask all interrupts at once or each by itself. Sections mask all but the next block of steps
+//! one by one: some, of the USB driver, last longer than the state machine's queue. What shares data
+//! with that interrupt masks it too, by [`with_steps_masked`], and briefly: the queue holds 8 words, 8 µs at the greatest
+//! rate.
+
+use core::sync::atomic::{AtomicU32, Ordering};
 
 use cortex_m::peripheral::NVIC;
-use cortex_m::register::primask;
 use rp2040_hal::pac::Interrupt;
+
+use super::registers::NVIC_SET;
 
 /// The chip tells four ranks by the upper two bits.
 const fn rank(number: u8) -> u8 {
@@ -21,6 +26,10 @@ pub const SERIAL_PRIORITY: u8 = rank(2);
 /// The clock's millisecond.
 pub const CLOCK_PRIORITY: u8 = rank(3);
 
+/// Registers of the interrupts' masks: those that are enabled, by a write too; a write to the other disables.
+const ENABLED: usize = 0x100;
+const MASK: usize = 0x180;
+
 /// Ranks and unmasks an interrupt, at set-up.
 pub fn enable(nvic: &mut NVIC, interrupt: Interrupt, priority: u8) {
     // SAFETY: no critical section is held at set-up that this could break.
@@ -30,21 +39,40 @@ pub fn enable(nvic: &mut NVIC, interrupt: Interrupt, priority: u8) {
     }
 }
 
-struct MaskAll;
-critical_section::set_impl!(MaskAll);
+/// Carries `work` out with every interrupt masked, that of the steps too.
+pub fn with_steps_masked<T>(work: impl FnOnce() -> T) -> T {
+    cortex_m::interrupt::free(|_| work())
+}
 
-// SAFETY: one core runs, and `acquire` masks all its interrupts until the outermost `release`.
-unsafe impl critical_section::Impl for MaskAll {
+/// Every interrupt but that of the next block of steps.
+const OTHERS: u32 = !(1 << Interrupt::DMA_IRQ_0 as u32);
+
+/// Those that the outermost section has masked.
+static MASKED: AtomicU32 = AtomicU32::new(0);
+
+struct MaskAllButSteps;
+critical_section::set_impl!(MaskAllButSteps);
+
+// SAFETY: one core runs, and `acquire` masks each of its interrupts but one until the outermost
+// `release`. The handler of that one takes no critical section, logs nothing, and shares only atomics.
+unsafe impl critical_section::Impl for MaskAllButSteps {
     unsafe fn acquire() -> critical_section::RawRestoreState {
-        let before = primask::read();
-        cortex_m::interrupt::disable();
-        u8::from(before.is_active())
+        // A handler that comes in between leaves the set as it was.
+        let set = NVIC_SET.read(ENABLED) & OTHERS;
+        NVIC_SET.write(MASK, OTHERS);
+        cortex_m::asm::dsb();
+        cortex_m::asm::isb();
+        if set != 0 {
+            MASKED.store(set, Ordering::Relaxed);
+        }
+        u8::from(set != 0)
     }
 
-    unsafe fn release(before: critical_section::RawRestoreState) {
-        if before != 0 {
-            // SAFETY: interrupts were on when the paired `acquire` was called.
-            unsafe { cortex_m::interrupt::enable() };
+    unsafe fn release(outermost: critical_section::RawRestoreState) {
+        if outermost != 0 {
+            // What the section did must be done before a handler looks.
+            core::sync::atomic::compiler_fence(Ordering::SeqCst);
+            NVIC_SET.write(ENABLED, MASKED.load(Ordering::Relaxed));
         }
     }
 }

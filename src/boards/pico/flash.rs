@@ -13,7 +13,7 @@ use penup::plotter::Record;
 use penup::storage::{PAGE_BYTES, Slots};
 use rp2040_hal::rom_data;
 
-use super::{BOOT_2, emergency};
+use super::{BOOT_2, critical, emergency};
 
 /// Where the flash is read.
 const MAPPED_AT: usize = 0x1000_0000;
@@ -104,7 +104,7 @@ impl Flash {
             flush_cache: rom_data::flash_flush_cache::ptr(),
             boot_2,
         };
-        critical_section::with(|_| {
+        critical::with_steps_masked(|| {
             // SAFETY: interrupts are masked, one core runs, and the channel of the steps reads RAM; the
             // callers check the place.
             unsafe { carry_out(&rom, work) };

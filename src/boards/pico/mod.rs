@@ -2,7 +2,7 @@
 //!
 //! | what | where |
 //! |---|---|
-//! | serial line, 115200 8N1 | UART0: GP0 sends, GP1 receives |
+//! | serial line | USB, and UART0 at 115200 8N1: GP0 sends, GP1 receives |
 //! | STEP_X, STEP_Y, DIR_X, DIR_Y | GP2, GP3, GP4, GP5: PIO 0, fed by DMA channel 0 |
 //! | ENABLE (low: drivers on) | GP6: the same |
 //! | PEN (servo) | GP7: PWM slice 3 |
@@ -10,7 +10,7 @@
 //! | settings and last job | the last 192 KiB of flash |
 //! | next block of steps | DMA_IRQ_0, priority 0 |
 //! | pen's heights | PIO0_IRQ_0, priority 1 |
-//! | serial line's bytes | UART0_IRQ, priority 2 |
+//! | serial line's bytes | UART0_IRQ, USBCTRL_IRQ, priority 2 |
 //! | millisecond | TIMER_IRQ_0, priority 3 |
 //!
 //! The watchdog is fed only while the main loop turns, or listens in a long computation, and the steps
@@ -24,11 +24,14 @@ mod critical;
 mod divider;
 mod emergency;
 mod flash;
+mod multiply;
 mod pen;
 mod pins;
+mod ports;
 mod registers;
 mod serial;
 mod steps;
+mod usb;
 
 use cortex_m::peripheral::Peripherals as Core;
 use penup::machine::{Contacts, PulserState};
@@ -42,7 +45,7 @@ use rp2040_hal::pac::Peripherals;
 use rp2040_hal::{Sio, Watchdog};
 use static_cell::{ConstStaticCell, StaticCell};
 
-use crate::boards::line::Line;
+use self::ports::Ports;
 
 /// What the boot ROM runs to set the flash up.
 #[unsafe(link_section = ".boot2")]
@@ -53,8 +56,7 @@ const CRYSTAL_HERTZ: u32 = 12_000_000;
 
 /// The board, as the plotter sees it.
 pub struct Pico {
-    line: Line,
-    sender: serial::Sender,
+    ports: Ports,
     steps: steps::Steps,
     flash: flash::Flash,
     was_restarted: bool,
@@ -80,15 +82,17 @@ pub fn take() -> (Pico, Lent<'static>, &'static PulserState) {
         &mut chip.RESETS,
         &mut watchdog,
     );
-    if clocks.is_err() {
-        panic!("the clocks do not start")
-    }
+    let Ok(clocks) = clocks else { panic!("the clocks do not start") };
     registers::restart(registers::reset::TIMER);
     let sio = Sio::new(chip.SIO);
     let gpio = Pins::new(chip.IO_BANK0, chip.PADS_BANK0, sio.gpio_bank0, &mut chip.RESETS);
     let steps = steps::set_up(&mut core.NVIC);
     pen::set_up();
-    let (line, sender) = serial::set_up(&mut core.NVIC);
+    let line = ports::set_up();
+    let uart = serial::set_up(&mut core.NVIC);
+    let controller = (chip.USBCTRL_REGS, chip.USBCTRL_DPRAM);
+    let usb = usb::set_up(&mut core.NVIC, controller, clocks.usb_clock, &mut chip.RESETS);
+    let ports = Ports::new(line, uart, usb);
     pins::set_up(gpio);
     contacts::set_up();
     clock::start(&mut core.NVIC);
@@ -97,7 +101,7 @@ pub fn take() -> (Pico, Lent<'static>, &'static PulserState) {
     static MEMORY: ConstStaticCell<PicoMemory> = ConstStaticCell::new(PicoMemory::new());
     static BLOCKS: StaticCell<[Block; NO_MOVES.len()]> = StaticCell::new();
     let memory = MEMORY.take().lend(BLOCKS.init(NO_MOVES));
-    let board = Pico { line, sender, steps, flash: flash::Flash::new(), was_restarted };
+    let board = Pico { ports, steps, flash: flash::Flash::new(), was_restarted };
     (board, memory, &steps::STATE)
 }
 
@@ -105,18 +109,18 @@ impl Board for Pico {
     const NAME: &'static str = "pico";
 
     fn read_byte(&mut self) -> Option<u8> {
-        self.line.read_byte()
+        self.ports.read_byte()
     }
 
     fn take_real_time(&mut self) -> RealTime {
         if self.steps.gets_on() {
             emergency::feed();
         }
-        self.line.take_real_time()
+        self.ports.take_real_time()
     }
 
     fn write(&mut self, bytes: &[u8]) {
-        self.sender.write(bytes);
+        self.ports.write(bytes);
     }
 
     fn queue(&mut self) -> &mut dyn EventQueue {

@@ -1,4 +1,4 @@
-//! The serial line: UART0 at 115200 baud, 8 bits, no parity, one stop bit.
+//! The first serial port: UART0 at 115200 baud, 8 bits, no parity, one stop bit.
 //!
 //! What is sent waits in a queue, so that an answer does not keep the main loop from the steps.
 
@@ -7,10 +7,10 @@ use heapless::spsc::{Consumer, Producer, Queue};
 use rp2040_hal::pac::{Interrupt, interrupt};
 use static_cell::StaticCell;
 
+use super::ports::{self, Port};
 use super::registers::{self, UART0, reset};
 use super::{clock, critical};
 use crate::boards::handler::Owned;
-use crate::boards::line::{self, Line, Receiver};
 
 const BAUD: u32 = 115_200;
 
@@ -36,14 +36,13 @@ const ENABLE_BOTH_WAYS: u32 = 1 | 1 << 8 | 1 << 9;
 const SENT_PLACES: usize = 512;
 
 static QUEUE: StaticCell<Queue<u8, SENT_PLACES>> = StaticCell::new();
-static RECEIVER: Owned<Receiver> = Owned::empty();
 static SENDER: Owned<Consumer<'static, u8>> = Owned::empty();
 
 /// The main loop's end of what is sent.
 pub struct Sender(Producer<'static, u8>);
 
-/// Opens the line. Its pins are those of `pins`.
-pub fn set_up(nvic: &mut NVIC) -> (Line, Sender) {
+/// Opens the port. Its pins are those of `pins`, and `ports` is set up.
+pub fn set_up(nvic: &mut NVIC) -> Sender {
     registers::restart(reset::UART0);
     // Sixty-fourths of a divider of 16 samples a bit, rounded.
     const DIVIDER: u32 = (clock::HERTZ * 4 + BAUD / 2) / BAUD;
@@ -53,15 +52,11 @@ pub fn set_up(nvic: &mut NVIC) -> (Line, Sender) {
     UART0.write(offset::INTERRUPT_MASK, RECEIVED | RECEIVE_TIMEOUT);
 
     let (sent, to_send) = QUEUE.init(Queue::new()).split();
-    let (receiver, line) = line::ends();
-    // SAFETY: the interrupt is masked since reset, and this runs once (the line's ends see to it).
-    unsafe {
-        RECEIVER.fill(receiver);
-        SENDER.fill(to_send);
-    }
+    // SAFETY: the interrupt is masked since reset, and this runs once (the queue's cell sees to it).
+    unsafe { SENDER.fill(to_send) };
     critical::enable(nvic, Interrupt::UART0_IRQ, critical::SERIAL_PRIORITY);
     UART0.write(offset::CONTROL, ENABLE_BOTH_WAYS);
-    (line, Sender(sent))
+    Sender(sent)
 }
 
 impl Sender {
@@ -118,10 +113,10 @@ pub fn poll() -> Option<u8> {
 fn UART0_IRQ() {
     UART0.write(offset::INTERRUPT_CLEAR, RECEIVED | RECEIVE_TIMEOUT | SENT);
     send();
-    // SAFETY: this is the handler that owns it.
-    if let Some(receiver) = unsafe { RECEIVER.get() } {
+    // SAFETY: this is a handler that owns it.
+    if let Some(inlet) = unsafe { ports::inlet() } {
         while let Some(byte) = poll() {
-            receiver.receive(byte);
+            inlet.receive(Port::Uart, byte);
         }
     }
 }
