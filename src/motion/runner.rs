@@ -568,7 +568,13 @@ impl<'m> Runner<'m> {
             self.run.strokes = self.run.strokes.wrapping_add(1);
         }
         self.in_stroke = block.ink.is_some();
-        self.course = Some(Course::new(&block, self.pen.dot_length));
+        let course = Course::new(&block, self.pen.dot_length);
+        if self.plan.is_some() {
+            // The interval in work goes on with these moves.
+            let units = self.brake.step_length(course.move_length);
+            queue.set_step_length(units, self.emitter.has_stepped())?;
+        }
+        self.course = Some(course);
         Ok(Progress::More)
     }
 
