@@ -248,6 +248,15 @@ fn steps_of_any_length_and_slow_drivers_are_braked_as_well() {
 }
 
 #[test]
+fn an_underrun_keeps_the_acceleration_where_jerk_is_limited() {
+    // Jerk itself is not kept: the interrupt knows nothing of it.
+    let allowed = with(&[(Setting::StepsPerMmX, 100.0), (Setting::TravelSpeed, 4000.0)]);
+    let mut settings = allowed;
+    settings.set(Setting::Jerk, Value::from_num(20)).expect("valid");
+    starve_often(settings, allowed, 40);
+}
+
+#[test]
 fn what_the_queue_cannot_hold_is_braked_within_what_it_holds() {
     let fast = with(&[
         (Setting::MaxRateX, 15_000.0),
@@ -268,7 +277,11 @@ fn what_the_queue_cannot_hold_is_braked_within_what_it_holds() {
 
 #[test]
 fn a_main_loop_that_is_in_time_is_not_slowed() {
-    let settings = Settings::default();
+    in_time_is_not_slowed(Settings::default());
+    in_time_is_not_slowed(with(&[(Setting::Jerk, 20.0)]));
+}
+
+fn in_time_is_not_slowed(settings: Settings) {
     let targets = fast_job();
     let planned = pin_machine::record(settings, &mut TargetList::new(&targets), 128).expect("fits");
     let last = pin_machine::moves(&planned).last().map(|&(time, _)| time);
