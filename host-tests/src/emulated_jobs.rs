@@ -65,6 +65,11 @@ impl<E: EmulatedBoard + ?Sized> Line<E> {
         Self { heard: Vec::new(), emulator }
     }
 
+    /// Forgets half a line: the board has started again.
+    pub fn forget(&mut self) {
+        self.heard.clear();
+    }
+
     /// Listens until the board greets.
     ///
     /// # Errors

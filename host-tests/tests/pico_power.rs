@@ -1,16 +1,15 @@
-//! The Raspberry Pi Pico through a loss of power, a hanging program, and its contacts.
+//! The Raspberry Pi Pico through a loss of power and a hanging program.
 #![cfg(feature = "emulator")]
 
-use penup_client::emulator::{EmulatedBoard, Machine, MachineEventKind, Pico, image_path};
+use penup_client::emulator::{
+    EmulatedBoard, Machine, MachineEventKind, Pico, PicoByUsb, image_path,
+};
 use penup_host_tests::emulated_jobs::Line;
 use penup_host_tests::whole_jobs::job_lines;
 use std::error::Error;
 use std::time::Duration;
 
 type TestResult = Result<(), Box<dyn Error>>;
-
-const LIMIT_X: u8 = 8;
-const STOP: u8 = 10;
 
 fn start() -> Result<Line<Pico>, Box<dyn Error>> {
     Line::to(Box::new(Pico::start(&image_path("pico"))?))
@@ -42,24 +41,137 @@ fn settings_outlive_the_power() -> TestResult {
     Ok(())
 }
 
+/// A board with a USB host, which is much faster than the other port. That one hears when the board starts again: nothing
+/// is said to it.
+struct Watched(Line<PicoByUsb>);
+
+/// Bytes of flash that change when settings are kept: a sector is erased, a page of payload and the header's are written.
+const SAVE_BYTES: u64 = 4096 + 256 + 256;
+/// The payload is written, and the header up to the last byte of its sum.
+const VALID_FROM: u64 = 4096 + 256 + 16;
+
+impl Watched {
+    fn start() -> Result<Self, Box<dyn Error>> {
+        let mut uart = start()?;
+        uart.emulator.plug_usb_in()?;
+        let mut watched = Self(Line::silent(Box::new(PicoByUsb(*uart.emulator))));
+        watched.greet()?;
+        Ok(watched)
+    }
+
+    fn greet(&mut self) -> TestResult {
+        self.0.emulator.send(b"\x18")?;
+        self.0.hear_greeting()
+    }
+
+    /// Every setting, by its line.
+    fn settings(&mut self) -> Result<Vec<String>, Box<dyn Error>> {
+        self.0.emulator.send(b"$$\n")?;
+        let mut lines = Vec::new();
+        loop {
+            match self.0.hear()? {
+                line if line == "ok" => return Ok(lines),
+                line => lines.push(line),
+            }
+        }
+    }
+
+    /// Waits for the power to be cut while a setting is changed, and says which of the two states is there afterwards.
+    ///
+    /// # Panics
+    /// If it is neither.
+    fn survive(&mut self, old: &[String], travel: u32) -> Result<bool, Box<dyn Error>> {
+        self.0.emulator.send(format!("$130={travel}\n").as_bytes())?;
+        let mut heard = Vec::new();
+        while !heard.windows(4).any(|four| four == b"Grbl") {
+            let mut buffer = [0; 256];
+            let count = self.0.emulator.0.receive(&mut buffer, Duration::from_secs(60))?;
+            if count == 0 {
+                return Err("the power was not cut".into());
+            }
+            heard.extend_from_slice(&buffer[..count]);
+        }
+        while self.0.emulator.0.receive(&mut [0; 256], Duration::ZERO)? > 0 {}
+        self.0.forget();
+        self.greet()?;
+        let found = self.settings()?;
+        if found == old {
+            return Ok(false);
+        }
+        let new: Vec<String> = old.iter().map(|line| changed(line, travel)).collect();
+        assert_eq!(found, new);
+        Ok(true)
+    }
+}
+
+/// The line of a setting when the travel of x is changed.
+fn changed(line: &str, travel: u32) -> String {
+    match line.strip_prefix("$130=").and_then(|rest| rest.split_once(' ')) {
+        Some((_, meaning)) => format!("$130={travel}.000 {meaning}"),
+        None => line.to_owned(),
+    }
+}
+
+/// How many cuts: `PENUP_CUTS`, else 200.
+fn cut_count() -> u64 {
+    std::env::var("PENUP_CUTS").ok().and_then(|count| count.parse().ok()).unwrap_or(200)
+}
+
+/// Marsaglia's xorshift.
+fn next_random(state: &mut u64) -> u64 {
+    *state ^= *state << 13;
+    *state ^= *state >> 7;
+    *state ^= *state << 17;
+    *state
+}
+
 #[test]
-fn a_cut_while_the_flash_changes_leaves_the_old_settings_or_the_new_ones() -> TestResult {
-    let mut line = start()?;
-    assert_eq!(line.ask("$130=300")?, "ok");
-    let mut before = 300;
-    // In the erasing of a sector, in the payload's page, in the header's.
-    for (number, bytes) in (301..).zip([0, 1, 2000, 4095, 4096, 4100, 4351, 4352, 4355, 4367, 4368])
-    {
-        line.emulator.cut_power_in_flash(bytes)?;
-        line.emulator.send(format!("$130={number}\n").as_bytes())?;
-        line.hear_greeting()?;
-        let after = travel(&mut line)?;
-        let is_new = after == format!("{number}.000");
-        assert!(is_new || after == format!("{before}.000"), "{before}, {number}: {after}");
-        // Valid with the last byte of its sum.
-        assert_eq!(is_new, bytes >= 4096 + 256 + 16, "cut after {bytes} bytes");
+fn after_a_cut_at_any_instant_the_settings_are_the_old_or_the_new_ones() -> TestResult {
+    let mut watched = Watched::start()?;
+    let mut settings = watched.settings()?;
+    let mut random = 1971;
+    let mut kept = 0;
+    for number in 0..cut_count() {
+        // A line takes microseconds, a save 46 ms.
+        let after = Duration::from_micros(next_random(&mut random) % 120_000);
+        watched.0.emulator.0.cut_power_after(after)?;
+        let travel = 100 + (number % 300) as u32;
+        if watched.survive(&settings, travel)? {
+            settings = settings.iter().map(|line| changed(line, travel)).collect();
+            kept += 1;
+        }
+    }
+    assert!(kept > 0 && kept < cut_count(), "{kept}");
+    Ok(())
+}
+
+/// At the ends of every erasure and every page, around the last byte that counts, and at random bytes; with as many cuts as
+/// bytes, before every byte.
+#[test]
+fn after_a_cut_in_any_write_of_the_flash_the_settings_are_the_old_or_the_new_ones() -> TestResult {
+    let mut watched = Watched::start()?;
+    // Both slots are used.
+    for line in ["$131=300\n", "$131=301\n"] {
+        watched.0.emulator.send(line.as_bytes())?;
+        assert_eq!(watched.0.hear()?, "ok");
+    }
+    let mut settings = watched.settings()?;
+    let edges = [0, 4096, 4096 + 256, VALID_FROM, SAVE_BYTES];
+    let edges = edges.into_iter().flat_map(|edge| edge.saturating_sub(1)..=edge + 1);
+    let mut places: Vec<u64> = edges.filter(|&place| place < SAVE_BYTES).collect();
+    if cut_count() >= SAVE_BYTES {
+        places = (0..SAVE_BYTES).collect();
+    } else {
+        let mut random = 2026;
+        places.extend((0..cut_count()).map(|_| next_random(&mut random) % SAVE_BYTES));
+    }
+    for (number, place) in (0u32..).zip(places) {
+        watched.0.emulator.0.cut_power_in_flash(place)?;
+        let travel = 100 + number % 300;
+        let is_new = watched.survive(&settings, travel)?;
+        assert_eq!(is_new, place >= VALID_FROM, "cut after {place} bytes");
         if is_new {
-            before = number;
+            settings = settings.iter().map(|line| changed(line, travel)).collect();
         }
     }
     Ok(())
@@ -90,43 +202,4 @@ fn a_hanging_program_is_started_again_in_alarm() -> TestResult {
     assert!(!drivers_on && !machine.pen_is_down());
     assert_eq!(line.ask("$X")?, "ok");
     Ok(())
-}
-
-/// Presses a contact in the middle of a job, with 5 ms of bounce: one alarm, no step after it.
-fn stops(pin: u8, alarm: &str, settings: &[&str]) -> TestResult {
-    let mut line = start()?;
-    for setting in settings {
-        assert_eq!(line.ask(setting)?, "ok");
-    }
-    for text in job_lines("lattice2.obj", &["$page=60x80", "$margin=5"]) {
-        assert_eq!(line.ask(&text)?, "ok", "{text}");
-    }
-    let mut seen = 0;
-    while seen < 1000 {
-        seen += line.emulator.pin_changes()?.len();
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    line.emulator.bounce(pin, false, Duration::from_millis(5))?;
-    assert_eq!(line.hear()?, alarm);
-    let told_at = line.emulator.clock()?;
-    let status = line.status()?;
-    assert!(status.starts_with("<Alarm"), "{status}");
-    let changes = line.emulator.pin_changes()?;
-    let last_step = changes.iter().filter(|change| change.is_step()).map(|change| change.at).max();
-    assert!(last_step.is_none_or(|last| last <= told_at), "{last_step:?} {told_at:?}");
-    // Told once, and nothing moves any more.
-    std::thread::sleep(Duration::from_millis(100));
-    assert!(line.status()?.starts_with("<Alarm"));
-    assert!(!line.emulator.pin_changes()?.iter().any(|change| change.is_step()));
-    Ok(())
-}
-
-#[test]
-fn a_limit_switch_stops_a_job() -> TestResult {
-    stops(LIMIT_X, "ALARM:1", &["$21=1"])
-}
-
-#[test]
-fn the_emergency_stop_stops_a_job() -> TestResult {
-    stops(STOP, "ALARM:10", &[])
 }

@@ -161,6 +161,7 @@ impl Machine<'_> {
             return Err(MachineError::State(self.state));
         }
         self.state = State::Home;
+        self.slack.forget();
         self.begin_phase(Homing::begin(Axis::X, switches.x));
         Ok(())
     }
@@ -252,7 +253,11 @@ impl Machine<'_> {
             length.ok_or(PushError::TooLong).and_then(|length| {
                 let (motors, offsets, is_gap) = (point, [0; 2], false);
                 let belt = Move { motors, offsets, page, way, whole: length, length, is_gap };
-                self.runner.push(&belt, None, PathLength::MAX)
+                // Its slack first, if there is any to take up.
+                if !self.push_motors(&belt, None, PathLength::MAX)? {
+                    self.push_motors(&belt, None, PathLength::MAX)?;
+                }
+                Ok(())
             })
         } else {
             self.push(Target { point, ink: None }, PathLength::MAX)

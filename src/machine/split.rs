@@ -44,10 +44,11 @@ impl Machine<'_> {
 
     /// Appends the pieces for which there is room.
     pub(super) fn push_pieces(&mut self) {
-        while let Some(split) = &mut self.split
+        while let Some(split) = self.split
             && !self.runner.is_full()
         {
-            let Split { from, to, place, dot, mut ink, limit } = *split;
+            let Split { from, to, place, dot, mut ink, limit } = split;
+            let mut next_dot = dot;
             let way = (to.x - from.x, to.y - from.y);
             let build = self.settings.kinematics();
             // The move was measured before.
@@ -70,22 +71,22 @@ impl Machine<'_> {
                 is_gap = !Pattern::inked(dot);
                 end =
                     dot_end.min(place.to_bits().saturating_add(length.to_bits().div_ceil(pieces)));
-                split.dot += u32::from(end == dot_end);
+                next_dot += u32::from(end == dot_end);
             }
             let end = PathLength::from_bits(end);
-            split.place = end;
-            if end == length {
-                self.split = None;
-            }
             let places = [place, end].map(PathLength::to_bits);
             let begin = self.runner.end();
             let Piece { motors, page, offsets } =
                 build.piece([from, to], places, length.to_bits(), begin);
             let piece =
                 Move { motors, offsets, page, way, whole: length, length: end - place, is_gap };
-            // There is room.
-            let pushed = self.runner.push(&piece, ink, limit);
-            debug_assert_eq!(pushed, Ok(()));
+            // There is room, and it is no longer than the move that was measured.
+            let pushed = self.push_motors(&piece, ink, limit);
+            debug_assert!(pushed.is_ok());
+            if pushed != Ok(false) {
+                let rest = Split { place: end, dot: next_dot, ..split };
+                self.split = (end < length).then_some(rest);
+            }
         }
     }
 }

@@ -1,6 +1,7 @@
 //! The block in work: its moves, and how far they are.
 
 use super::emitter::whole_ticks;
+use super::lookahead::BlockKind;
 use super::profile::Slice;
 use super::{Block, PathLength};
 use crate::drawing::LineType;
@@ -11,7 +12,7 @@ use crate::step::{Line, Pattern};
 pub(super) struct Course {
     pub(super) line: Line,
     pub(super) ink: Option<LineType>,
-    is_gap: bool,
+    kind: BlockKind,
     pub(super) pattern: Pattern,
     pub(super) piece: u32,
     pub(super) length: PathLength,
@@ -46,7 +47,7 @@ impl Course {
         Self {
             line,
             ink: block.ink,
-            is_gap: block.is_gap,
+            kind: block.kind,
             pattern,
             piece: 0,
             length: block.length,
@@ -63,7 +64,12 @@ impl Course {
 
     /// Whether the piece in work is drawn.
     pub(super) fn is_inked(&self) -> bool {
-        self.ink.is_some() && !self.is_gap && Pattern::inked(self.piece)
+        self.ink.is_some() && self.kind != BlockKind::Gap && Pattern::inked(self.piece)
+    }
+
+    /// Whether the motors only take up their slack: the pen stays where it is.
+    pub(super) fn is_slack(&self) -> bool {
+        self.kind == BlockKind::Slack
     }
 
     /// Whether it is the last one.

@@ -20,7 +20,18 @@ pub struct Block {
     pub(super) ink: Option<LineType>,
     /// See [`Move`](super::Move).
     pub(super) offsets: [i8; 2],
-    pub(super) is_gap: bool,
+    pub(super) kind: BlockKind,
+}
+
+/// What a block is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum BlockKind {
+    /// A line.
+    Line,
+    /// A gap within an inked line: the pen is raised.
+    Gap,
+    /// The motors only take up their slack: the pen stays where it is.
+    Slack,
 }
 
 impl Block {
@@ -33,7 +44,7 @@ impl Block {
         curve_limit: PathLength::MAX,
         ink: None,
         offsets: [0; 2],
-        is_gap: false,
+        kind: BlockKind::Line,
     };
 }
 

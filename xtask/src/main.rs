@@ -67,6 +67,12 @@ enum Task {
         #[arg(default_value_t = 20_000)]
         count: u32,
     },
+    /// Cuts the emulated Pico's power at many instants, and in as many writes of its flash.
+    Cuts {
+        /// How many of each; from 4608 on, before every byte that a save changes (some 10 minutes).
+        #[arg(default_value_t = 4608)]
+        count: u32,
+    },
     /// Installs what building and testing need.
     SetUp,
     /// Runs every check: format, lints, documentation, tests on the host and in the emulator.
@@ -101,6 +107,7 @@ fn carry_out() -> Result<()> {
         Some(Task::Gallery) => gallery::make()?,
         Some(Task::Experiments) => experiments::repeat()?,
         Some(Task::Scenes { count }) => test::random_scenes(count)?,
+        Some(Task::Cuts { count }) => test::power_cuts(count)?,
         Some(Task::SetUp) => {
             for &board in Board::ALL {
                 set_up::toolchain(board.target())?;

@@ -48,6 +48,19 @@ pub fn random_scenes(count: u32) -> Result<()> {
     )
 }
 
+/// As many losses of power as wanted, where `everything` has 200 of each kind; from 4608 on, before every byte of
+/// flash that a save changes.
+pub fn power_cuts(count: u32) -> Result<()> {
+    set_up::emulator(Board::Pico)?;
+    firmware::check(Board::Pico, &firmware::build(Board::Pico)?)?;
+    step(
+        workspace("test")
+            .args(["--package", "penup-host-tests", "--test", "pico_power"])
+            .args(EMULATOR)
+            .env("PENUP_CUTS", count.to_string()),
+    )
+}
+
 fn workspace(command: &str) -> Command {
     let mut cargo = cargo();
     cargo.current_dir(crate::root()).arg(command);

@@ -7,7 +7,8 @@
 // not before that cycle; 2 the power goes at that cycle, 3 it goes when so many more bytes of flash
 // have been erased or written (the number in the cycle's place), and comes back at once; 4 the main
 // loop hangs from that cycle on, 5 a byte for USB, 6 the USB host is plugged in (1), takes
-// nothing more (2), takes again (3). Out: 0 a byte
+// nothing more (2), takes again (3); 7 a switch is fitted to a pin, which closes where its axis has gone to so many
+// steps (+ 2^40) or below, and bounces. Out: 0 a byte
 // of the serial line, 1 a pin's new level, 2 the time, 3 a byte of the log, 4 the chip was reset (0 by
 // the loss of power, 1 by the watchdog), 5 a byte of USB.
 //
@@ -43,6 +44,8 @@ const CUT_FLASH = 3;
 const HANG = 4;
 const USB = 5;
 const USB_HOST = 6;
+const SWITCH = 7;
+const SWITCH_ZERO = 2 ** 40;
 const output = Buffer.alloc(1 << 16);
 let filled = 0;
 
@@ -249,6 +252,7 @@ function cutPower() {
   flashBudget = Infinity;
   flashNanos = 0;
   bytes.length = 0;
+  usbBytes.length = 0;
   report(RESET, POWER, now());
   start(chip.flash);
 }
@@ -292,12 +296,41 @@ const INPUT = 2;
 /** What the inputs are driven to; open ones are pulled up. */
 const inputs = new Map();
 
+const STEP_X = 2;
+const DIR_X = 4;
+const BOUNCE = 5 * 125_000;
+const TURNS = 16;
+/** Where the axes have gone to, in steps. */
+const places = [0, 0];
+/** Of each axis: its pin, where it closes, whether it is closed. */
+const switches = [null, null];
+/** Levels of switches that bounce, the next one first. */
+const bounces = [];
+
+function moveAxis(axis, level) {
+  if (!level) return;
+  places[axis] += chip.gpio[DIR_X + axis].value === 1 ? 1 : -1;
+  lookAtSwitch(axis);
+}
+
+function lookAtSwitch(axis) {
+  const fitted = switches[axis];
+  if (!fitted || places[axis] <= fitted.at === fitted.closed) return;
+  fitted.closed = !fitted.closed;
+  const { pin, closed } = fitted;
+  for (let turn = 0; turn <= TURNS; turn++) {
+    bounces.push({ pin, high: !closed !== (turn % 2 === 1), cycle: now() + Math.round((turn * BOUNCE) / TURNS) });
+  }
+  bounces.sort((one, other) => one.cycle - other.cycle);
+}
+
 function watchPins() {
   chip.gpio.forEach((pin, number) => {
     let last = 0;
     pin.addListener((level) => {
       if (level >= INPUT || level === last) return;
       last = level;
+      if (number === STEP_X || number === STEP_X + 1) moveAxis(number - STEP_X, level);
       report(PIN, number | (level << 7), now());
     });
     pin.setInputValue(inputs.get(number) ?? true);
@@ -393,7 +426,11 @@ process.stdin.on('data', (data) => {
   for (; at + 8 <= rest.length; at += 8) {
     const entry = { value: rest[at + 1], cycle: rest.readUIntLE(at + 2, 6) };
     if (rest[at] === SERIAL) bytes.push(entry);
-    else if (rest[at] === USB) usbBytes.push(entry.value);
+    else if (rest[at] === SWITCH) {
+      const axis = entry.value - 8;
+      switches[axis] = { pin: entry.value, at: entry.cycle - SWITCH_ZERO, closed: false };
+      lookAtSwitch(axis);
+    } else if (rest[at] === USB) usbBytes.push(entry.value);
     else if (rest[at] === CUT_FLASH) flashBudget = entry.cycle;
     else events.push({ what: rest[at], ...entry });
   }
@@ -404,10 +441,20 @@ process.stdin.on('end', () => process.exit(0));
 
 function inputDue() {
   const byte = bytes.length ? Math.max(byteDue, bytes[0].cycle) : Infinity;
-  return Math.min(byte, events.length ? events[0].cycle : Infinity);
+  const bounce = bounces.length ? bounces[0].cycle : Infinity;
+  return Math.min(byte, bounce, events.length ? events[0].cycle : Infinity);
+}
+
+function setInput(number, high) {
+  inputs.set(number, high);
+  chip.gpio[number].setInputValue(high);
 }
 
 function takeInput(cycle) {
+  while (bounces.length && bounces[0].cycle <= cycle) {
+    const { pin, high } = bounces.shift();
+    setInput(pin, high);
+  }
   // In a handler nothing is done to the main loop.
   while (events.length && events[0].cycle <= cycle && !(events[0].what === HANG && core.IPSR)) {
     const { what, value } = events.shift();
@@ -421,9 +468,7 @@ function takeInput(cycle) {
       hostDoes(value);
       continue;
     }
-    const [number, high] = [value & 0x7f, value >= 0x80];
-    inputs.set(number, high);
-    chip.gpio[number].setInputValue(high);
+    setInput(value & 0x7f, value >= 0x80);
   }
   if (bytes.length && uart.enabled && Math.max(byteDue, bytes[0].cycle) <= cycle) {
     uart.feedByte(bytes.shift().value);
@@ -481,13 +526,13 @@ function run(cycles) {
     }
     cycle = now();
     if (pioDue <= cycle) catchUp(cycle);
-    if (bytes.length || events.length) takeInput(cycle);
+    if (bytes.length || events.length || bounces.length) takeInput(cycle);
     if (watchdogDue) resetByWatchdog();
   }
 }
 
 function idle() {
-  return core.waiting && pioDue === Infinity && !bytes.length && !events.length;
+  return core.waiting && pioDue === Infinity && !bytes.length && !events.length && !bounces.length;
 }
 
 function turn() {

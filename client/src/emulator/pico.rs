@@ -129,12 +129,31 @@ impl Pico {
         self.tell(PIN, number | u8::from(high) << 7, start + cycles)
     }
 
+    /// Fits a limit switch to pin 8 (x) or 9 (y): it closes where the axis, which began at 0 when the emulator
+    /// started, has come to `place`, in steps, or lies below. It bounces for 5 ms.
+    ///
+    /// # Errors
+    /// The emulator has ended.
+    pub fn fit_switch(&mut self, number: u8, place: i32) -> io::Result<()> {
+        self.tell(SWITCH, number, (SWITCH_ZERO + i64::from(place)) as u64)
+    }
+
     /// Takes the power away and gives it back: what flash holds is left.
     ///
     /// # Errors
     /// The emulator has ended.
     pub fn cut_power(&mut self) -> io::Result<()> {
         self.tell(CUT_POWER, 0, 0)
+    }
+
+    /// The same, so much later.
+    ///
+    /// # Errors
+    /// The emulator has ended.
+    pub fn cut_power_after(&mut self, time: Duration) -> io::Result<()> {
+        let cycles = time.as_nanos() as u64 / CYCLE_NANOS;
+        let cycle = self.shared.lock().cycles + cycles;
+        self.tell(CUT_POWER, 0, cycle)
     }
 
     /// The same, when so many more bytes of flash have been erased or written.
@@ -389,6 +408,9 @@ const CUT_FLASH: u8 = 3;
 const HANG: u8 = 4;
 const USB: u8 = 5;
 const USB_HOST: u8 = 6;
+const SWITCH: u8 = 7;
+/// Where the emulator's axes begin.
+const SWITCH_ZERO: i64 = 1 << 40;
 
 impl Record {
     fn from_bytes([what, value, cycle @ ..]: [u8; RECORD_BYTES]) -> Self {

@@ -1,0 +1,182 @@
+//! The Raspberry Pi Pico's limit switches and emergency stop, each with 5 ms of bounce: the right state, the right
+//! report, and no step after the stop.
+#![cfg(feature = "emulator")]
+
+use penup_client::emulator::{EmulatedBoard, Machine, Pico, image_path};
+use penup_host_tests::emulated_jobs::Line;
+use penup_host_tests::whole_jobs::job_lines;
+use std::error::Error;
+use std::thread::sleep;
+use std::time::Duration;
+
+type TestResult = Result<(), Box<dyn Error>>;
+
+const LIMIT_X: u8 = 8;
+const LIMIT_Y: u8 = 9;
+const STOP: u8 = 10;
+const BOUNCE: Duration = Duration::from_millis(5);
+
+/// A board with these settings.
+fn start(settings: &[&str]) -> Result<Line<Pico>, Box<dyn Error>> {
+    let mut line = Line::to(Box::new(Pico::start(&image_path("pico"))?))?;
+    for setting in settings {
+        assert_eq!(line.ask(setting)?, "ok", "{setting}");
+    }
+    Ok(line)
+}
+
+/// Waits until the pins have moved.
+fn wait_for_steps(line: &mut Line<Pico>) -> TestResult {
+    let mut seen = 0;
+    while seen < 1000 {
+        seen += line.emulator.pin_changes()?.iter().filter(|change| change.is_step()).count();
+        sleep(Duration::from_millis(5));
+    }
+    Ok(())
+}
+
+/// Hears the alarm once; the state is that of an alarm and its number is in the report. From when it is
+/// told on, there is no step.
+fn stands_in_alarm(line: &mut Line<Pico>, number: u8) -> TestResult {
+    assert_eq!(line.hear()?, format!("ALARM:{number}"));
+    let told_at = line.emulator.clock()?;
+    // A line in work is refused.
+    let mut status = line.status()?;
+    while !status.starts_with('<') {
+        status = line.hear()?;
+    }
+    assert!(
+        status.starts_with("<Alarm") && status.contains(&format!("|Alarm:{number}|")),
+        "{status}"
+    );
+    let changes = line.emulator.pin_changes()?;
+    let last_step = changes.iter().filter(|change| change.is_step()).map(|change| change.at).max();
+    assert!(last_step.is_none_or(|last| last <= told_at), "{last_step:?} {told_at:?}");
+    sleep(Duration::from_millis(100));
+    assert!(line.status()?.starts_with("<Alarm"));
+    assert!(!line.emulator.pin_changes()?.iter().any(|change| change.is_step()));
+    Ok(())
+}
+
+/// Presses a contact in the middle of a job.
+fn stops_a_job(pin: u8, number: u8, settings: &[&str]) -> TestResult {
+    let mut line = start(settings)?;
+    for text in job_lines("lattice2.obj", &["$page=60x80", "$margin=5"]) {
+        assert_eq!(line.ask(&text)?, "ok", "{text}");
+    }
+    wait_for_steps(&mut line)?;
+    line.emulator.bounce(pin, false, BOUNCE)?;
+    stands_in_alarm(&mut line, number)
+}
+
+#[test]
+fn a_limit_switch_stops_a_job() -> TestResult {
+    stops_a_job(LIMIT_X, 1, &["$21=1"])
+}
+
+#[test]
+fn the_emergency_stop_stops_a_job_and_is_reported_until_it_is_released() -> TestResult {
+    let mut line = start(&[])?;
+    assert_eq!(line.ask("$J=X400F6000")?, "ok");
+    wait_for_steps(&mut line)?;
+    line.emulator.bounce(STOP, false, BOUNCE)?;
+    stands_in_alarm(&mut line, 10)?;
+    assert!(line.status()?.contains("|Pn:E|"));
+    // Pressed, it cannot be unlocked.
+    assert!(line.ask("$X")?.starts_with("[MSG:"));
+    assert!(line.hear()?.starts_with("error:"));
+    line.emulator.bounce(STOP, true, BOUNCE)?;
+    while line.status()?.contains("|Pn:") {}
+    assert_eq!(line.ask("$X")?, "ok");
+    assert!(line.status()?.starts_with("<Idle"));
+    assert!(!line.emulator.pin_changes()?.iter().any(|change| change.is_step()));
+    // It goes on from where the pins stand.
+    assert_eq!(line.ask("$J=X0F6000")?, "ok");
+    while !line.status()?.starts_with("<Idle|MPos:0.000,0.000,") {}
+    Ok(())
+}
+
+#[test]
+fn a_switch_within_the_way_of_a_move_by_hand_stops_it_there() -> TestResult {
+    for (pin, jog) in [(LIMIT_X, "$J=G91X-50F3000"), (LIMIT_Y, "$J=G91Y-50F3000")] {
+        // Where it stands is not known to be the corner.
+        let mut line = start(&["$21=1", "$20=0"])?;
+        line.emulator.fit_switch(pin, -800)?;
+        let mut machine = Machine::default();
+        assert_eq!(line.ask(jog)?, "ok");
+        assert_eq!(line.hear()?, "ALARM:1");
+        assert!(line.status()?.contains(if pin == LIMIT_X { "|Pn:X|" } else { "|Pn:Y|" }));
+        for change in line.emulator.pin_changes()? {
+            machine.change(change);
+        }
+        let (x, y) = machine.position();
+        // 4000 steps a second, and the contacts are looked at every millisecond.
+        assert!((-812..=-800).contains(&(x + y)), "{x} {y}");
+        sleep(Duration::from_millis(100));
+        assert!(!line.emulator.pin_changes()?.iter().any(|change| change.is_step()));
+    }
+    Ok(())
+}
+
+const HOMING: [&str; 3] = ["$22=1", "$130=60", "$131=60"];
+
+/// Homes with switches at these places: where the machine stands afterwards.
+fn home(x: i32, y: i32) -> Result<(i32, i32), Box<dyn Error>> {
+    let mut line = start(&HOMING)?;
+    line.emulator.fit_switch(LIMIT_X, x)?;
+    line.emulator.fit_switch(LIMIT_Y, y)?;
+    // Past their first bounce, if they are pressed.
+    sleep(Duration::from_millis(200));
+    line.status()?;
+    assert_eq!(line.ask("$H")?, "ok");
+    let status = line.status()?;
+    assert!(status.starts_with("<Idle|MPos:0.000,0.000,"), "{status}");
+    let mut machine = Machine::default();
+    for change in line.emulator.pin_changes()? {
+        machine.change(change);
+    }
+    Ok(machine.position())
+}
+
+/// A pull-off, 160 steps, from the switches, whether they are open or pressed at the start.
+#[test]
+fn homing_finds_switches_that_bounce_from_either_side() -> TestResult {
+    for (x, y) in [(-400, -240), (100, -200), (-300, 60)] {
+        let (at_x, at_y) = home(x, y)?;
+        // The second approach makes 80 steps a second.
+        assert!((-2..=2).contains(&(at_x - x - 160)), "{at_x} for {x}");
+        assert!((-2..=2).contains(&(at_y - y - 160)), "{at_y} for {y}");
+    }
+    Ok(())
+}
+
+#[test]
+fn a_switch_that_is_stuck_or_never_found_fails_the_homing() -> TestResult {
+    let mut line = start(&HOMING)?;
+    line.emulator.bounce(LIMIT_X, false, BOUNCE)?;
+    while !line.status()?.contains("|Pn:X|") {}
+    line.emulator.send(b"$H\n")?;
+    stands_in_alarm(&mut line, 9)?;
+    // Never found: the way is one and a half travels.
+    let mut line = start(&HOMING)?;
+    line.emulator.send(b"$H\n")?;
+    stands_in_alarm(&mut line, 9)
+}
+
+#[test]
+fn the_emergency_stop_before_homing_and_during_it() -> TestResult {
+    let mut line = start(&HOMING)?;
+    line.emulator.send(b"$H\n")?;
+    wait_for_steps(&mut line)?;
+    line.emulator.bounce(STOP, false, BOUNCE)?;
+    stands_in_alarm(&mut line, 10)?;
+    // The line is answered, as refused; and so is another try.
+    let mut line = start(&HOMING)?;
+    line.emulator.bounce(STOP, false, BOUNCE)?;
+    stands_in_alarm(&mut line, 10)?;
+    let refused = line.ask("$H")?;
+    assert!(refused.starts_with("[MSG:"), "{refused}");
+    assert!(line.hear()?.starts_with("error:"));
+    assert!(!line.emulator.pin_changes()?.iter().any(|change| change.is_step()));
+    Ok(())
+}
