@@ -21,7 +21,7 @@ mod stream;
 
 use homing::Homing;
 pub use homing::{Axis, Contacts, Switches};
-pub use kinematics::{Anchors, Kinematics};
+pub use kinematics::{Anchors, Kinematics, Piece};
 pub use path::{JobSize, Path, TapePath, Target, TargetList};
 pub use pulser::{Axes, Pen, Pins, Pulser, PulserState, Solenoid, StepQueue};
 pub use settings::{SETTING_COUNT, SETTINGS, Setting, SettingError, SettingInfo, Settings, Value};

@@ -9,7 +9,7 @@
 
 use super::{Axis, Machine, Setting};
 use crate::drawing::{LineType, PagePoint};
-use crate::motion::{PathLength, PushError};
+use crate::motion::{Move, PathLength, PushError};
 
 /// How the motors lie in their slack, once all blocks are run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -76,16 +76,15 @@ impl Machine<'_> {
     /// See [`PushError`]; nothing is appended then.
     pub(super) fn push_motors(
         &mut self,
-        motors: PagePoint,
-        page: PagePoint,
+        piece: &Move,
         ink: Option<LineType>,
         limit: PathLength,
     ) -> Result<bool, PushError> {
-        let end = self.runner.end();
+        let (motors, end) = (piece.motors, self.runner.end());
         let mut slack = self.slack;
         let [x, y] = slack.take_up(self.slack_steps(), [motors.x - end.x, motors.y - end.y]);
         if (x, y) == (0, 0) {
-            self.runner.push(motors, page, ink, limit)?;
+            self.runner.push(piece, ink, limit)?;
         } else {
             self.runner.push_slack(PagePoint { x, y }, ink)?;
         }

@@ -4,6 +4,7 @@ use super::course::Course;
 use super::curvature::Curvature;
 use super::emitter::{BATCH, MoveLevels, whole_ticks};
 use super::junction::{self, Corner, Heading};
+use super::lookahead::BlockKind;
 use super::profile::{FRACTION_BITS, Pace, Profile};
 use super::smooth::{Interval, Road, State};
 use super::{
@@ -40,6 +41,25 @@ pub enum Progress {
     /// It stands on the path with the pen raised, as [`Runner::stop`] or
     /// [`Runner::stop_after_stroke`] asked.
     Stopped,
+}
+
+/// A straight move of the pen, or a piece of one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Move {
+    /// Where it takes the motors.
+    pub motors: PagePoint,
+    /// How far start and end lie beside the motors' steps: see [`Line::beside`](crate::step::Line::beside).
+    pub offsets: [i8; 2],
+    /// Where it takes the pen.
+    pub page: PagePoint,
+    /// The whole move on the page,
+    pub way: (i32, i32),
+    /// its length,
+    pub whole: PathLength,
+    /// and that of the piece.
+    pub length: PathLength,
+    /// The pen is raised within an inked line.
+    pub is_gap: bool,
 }
 
 /// Why a block was not appended.
@@ -275,32 +295,32 @@ impl<'m> Runner<'m> {
         self.emitter.restart(ticks);
     }
 
-    /// Appends a move of the motors straight to `motors`, which takes the pen straight to `page`; a
-    /// speed, by its stopping distance ([`Limits::feed`]), is not passed. Lengths, corners and bends
-    /// are those of the page. A move of no length is skipped.
+    /// Appends a move; a speed, by its stopping distance ([`Limits::feed`]), is not passed. Lengths, corners
+    /// and bends are those of the page. A move of no length is skipped.
     ///
     /// # Errors
     /// See [`PushError`]; nothing is appended then.
     pub fn push(
         &mut self,
-        motors: PagePoint,
-        page: PagePoint,
+        piece: &Move,
         ink: Option<LineType>,
         limit: PathLength,
     ) -> Result<(), PushError> {
+        let Move { motors, offsets, page, mut way, mut whole, mut length, is_gap } = *piece;
         let (dx, dy) = (motors.x - self.end.x, motors.y - self.end.y);
         if dx == 0 && dy == 0 {
             return Ok(());
         }
-        let way = match (page.x - self.page_end.x, page.y - self.page_end.y) {
+        if way == (0, 0) || length == 0 {
             // Less than a step of the page.
-            (0, 0) => (dx.signum(), dy.signum()),
-            way => way,
-        };
-        let length = self.limits.length(way.0, way.1).ok_or(PushError::TooLong)?;
-        let heading = Heading::new(&self.limits, way.0, way.1, length);
+            way = (dx.signum(), dy.signum());
+            whole = self.limits.length(way.0, way.1).ok_or(PushError::TooLong)?;
+            length = whole;
+        }
+        let inked = ink.filter(|_| !is_gap);
+        let heading = Heading::new(&self.limits, way.0, way.1, whole);
         let corner = match self.last {
-            Some((before, length_before, ink_before)) if passes(ink_before, ink) => {
+            Some((before, length_before, ink_before)) if passes(ink_before, inked) => {
                 junction::corner(&self.limits, before, heading, length.min(length_before))
             }
             _ => Corner::STOP,
@@ -309,14 +329,15 @@ impl<'m> Runner<'m> {
             self.curvature.restart(&self.limits, self.page_end, &mut self.lookahead);
         }
         let (entry_limit, curve_limit) = (corner.limit, limit);
-        let block = Block { dx, dy, length, entry_limit, curve_limit, ink, is_slack: false };
+        let kind = if is_gap { BlockKind::Gap } else { BlockKind::Line };
+        let block = Block { dx, dy, length, entry_limit, curve_limit, ink, offsets, kind };
         self.lookahead.push(block).map_err(|_| PushError::Full)?;
         if self.limits.centripetal {
             self.curvature.follow(&self.limits, page, &mut self.lookahead);
         }
         self.end = motors;
         self.page_end = page;
-        self.last = Some((heading, length, ink));
+        self.last = Some((heading, length, inked));
         if self.hurried {
             self.plan_again();
         }
@@ -332,7 +353,7 @@ impl<'m> Runner<'m> {
         let PagePoint { x: dx, y: dy } = by;
         let length = self.limits.length(dx, dy).ok_or(PushError::TooLong)?;
         let ink = ink.map(|_| LineType::Full);
-        let block = Block { dx, dy, length, ink, is_slack: true, ..Block::EMPTY };
+        let block = Block { dx, dy, length, ink, kind: BlockKind::Slack, ..Block::EMPTY };
         self.end_path();
         self.lookahead.push(block).map_err(|_| PushError::Full)?;
         self.slack_end.x = self.slack_end.x.wrapping_add(dx);
@@ -524,12 +545,8 @@ impl<'m> Runner<'m> {
         let Some(slice) = course.slice else {
             return Ok(());
         };
-        if course.moves_done == 0 && !course.is_slack {
-            let units = self.brake.step_length(course.move_length);
-            queue.set_step_length(units, self.emitter.has_stepped())?;
-        }
         let mut levels = course.line.moves().map(MoveLevels::of);
-        if course.is_slack {
+        if course.is_slack() {
             levels = levels.map(MoveLevels::as_slack);
         }
         // A move and its direction set-up are two events; one is left for a long wait.
@@ -555,7 +572,7 @@ impl<'m> Runner<'m> {
             let diagonals = course.line.next_kinds(kinds);
             let counts = [count - diagonals, diagonals];
             let turns = |kind: usize| counts[kind] > 0 && self.emitter.turns(levels[kind]);
-            if self.emitter.has_stepped() && !course.is_slack && !turns(0) && !turns(1) {
+            if self.emitter.has_stepped() && !course.is_slack() && !turns(0) && !turns(1) {
                 let late = self.emitter.steps(times, kinds, levels, queue)?;
                 self.now = self.now.wrapping_add(late);
             } else {
@@ -567,7 +584,7 @@ impl<'m> Runner<'m> {
                 }
                 self.now = self.now.wrapping_add(late);
             }
-            let place = if course.is_slack { &mut self.slack } else { &mut self.position };
+            let place = if course.is_slack() { &mut self.slack } else { &mut self.position };
             for (direction, count) in course.line.moves().into_iter().zip(counts) {
                 let (dx, dy) = direction.delta();
                 place.x = place.x.wrapping_add(dx * count as i32);
@@ -600,7 +617,13 @@ impl<'m> Runner<'m> {
             self.run.strokes = self.run.strokes.wrapping_add(1);
         }
         self.in_stroke = block.ink.is_some();
-        self.course = Some(Course::new(&block, self.pen.dot_length));
+        let course = Course::new(&block, self.pen.dot_length);
+        if self.plan.is_some() {
+            // The interval in work goes on with these moves.
+            let units = self.brake.step_length(course.move_length);
+            queue.set_step_length(units, self.emitter.has_stepped())?;
+        }
+        self.course = Some(course);
         Ok(Progress::More)
     }
 
@@ -684,6 +707,10 @@ impl<'m> Runner<'m> {
                 self.emitter.hold(self.now, queue)?;
             }
         }
+        if course.moves_done == 0 && !course.is_slack() {
+            let units = self.brake.step_length(course.move_length);
+            queue.set_step_length(units, self.emitter.has_stepped())?;
+        }
         if let Some(jerk) = self.limits.jerk {
             let top = if self.stopping { Pace::REST } else { self.top(inked) };
             let road = Road {
@@ -737,7 +764,7 @@ impl<'m> Runner<'m> {
             course.next_piece();
             return;
         }
-        let length = if course.is_slack { 0 } else { u64::from(course.length.to_bits()) };
+        let length = if course.is_slack() { 0 } else { u64::from(course.length.to_bits()) };
         if course.ink.is_some() {
             self.run.drawn += length;
         } else {

@@ -52,7 +52,11 @@ enum Task {
         arguments: Vec<String>,
     },
     /// Counts the instructions of each stage on a Cortex-M3, for every lattice.
-    Bench,
+    Bench {
+        /// Those of planning for each step event alone.
+        #[arg(long)]
+        motion: bool,
+    },
     /// Draws the figures of the papers into docs/gallery.
     Gallery,
     /// Repeats Harrison's experiments (his chapter 7), counted in instructions.
@@ -98,7 +102,8 @@ fn carry_out() -> Result<()> {
         }
         Some(Task::Flash { board }) => flash::flash(board)?,
         Some(Task::Plot { arguments }) => plot(&arguments)?,
-        Some(Task::Bench) => bench::count()?,
+        Some(Task::Bench { motion: true }) => bench::count_motion()?,
+        Some(Task::Bench { motion: false }) => bench::count()?,
         Some(Task::Gallery) => gallery::make()?,
         Some(Task::Experiments) => experiments::repeat()?,
         Some(Task::Scenes { count }) => test::random_scenes(count)?,
