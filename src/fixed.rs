@@ -43,13 +43,12 @@ impl Decimal {
     /// # Ok::<(), penup::fixed::NotANumber>(())
     /// ```
     pub fn parse(text: &str) -> Result<Self, NotANumber> {
-        let (negative, unsigned) = match text.as_bytes().first() {
-            Some(b'-') => (true, &text[1..]),
-            Some(b'+') => (false, &text[1..]),
-            _ => (false, text),
+        let (negative, unsigned) = match text.strip_prefix('-') {
+            Some(unsigned) => (true, unsigned),
+            None => (false, text.strip_prefix('+').unwrap_or(text)),
         };
-        let (digits, power) = match unsigned.find(['e', 'E']) {
-            Some(at) => (&unsigned[..at], parse_power(&unsigned[at + 1..])?),
+        let (digits, power) = match unsigned.split_once(['e', 'E']) {
+            Some((digits, power)) => (digits, parse_power(power)?),
             None => (unsigned, 0),
         };
         let mut mantissa: i64 = 0;
@@ -114,7 +113,7 @@ impl Decimal {
         } else {
             // Past 10^38 the quotient is zero whatever the mantissa.
             power_of_ten(self.exponent.unsigned_abs())
-                .map_or(0, |power| (shifted + more(power)) / power)
+                .map_or(0, |power| divide(shifted + more(power), power))
         };
         let value =
             i64::try_from(rounded).ok().filter(|value| *value < 1 << 62).ok_or(OutOfRange)?;
@@ -151,7 +150,8 @@ impl Decimal {
         let value = self.to_binary(0)?;
         if self.exponent < 0 {
             let power = power_of_ten(self.exponent.unsigned_abs()).ok_or(OutOfRange)?;
-            if u128::from(self.mantissa.unsigned_abs()) % power != 0 {
+            let mantissa = u128::from(self.mantissa.unsigned_abs());
+            if divide(mantissa, power) * power != mantissa {
                 return Err(OutOfRange);
             }
         }
@@ -182,10 +182,35 @@ pub fn shift_right_rounding(value: i32, bits: u32) -> i32 {
 }
 
 /// Divides, rounding half away from zero. `divisor` > 0.
-#[inline(never)] // 128 bits by 128 are long.
 pub fn divide_rounding(dividend: i128, divisor: i128) -> i128 {
     let half = divisor / 2;
-    if dividend < 0 { -((half - dividend) / divisor) } else { (dividend + half) / divisor }
+    let quotient = |dividend: i128| divide(dividend as u128, divisor as u128) as i128; // neither is negative
+    if dividend < 0 { -quotient(half - dividend) } else { quotient(dividend + half) }
+}
+
+/// The quotient, rounded down. `divisor` > 0.
+#[inline(never)] // 128 bits by 128 are long.
+pub fn divide(dividend: u128, divisor: u128) -> u128 {
+    dividend / divisor
+}
+
+/// Sine and cosine of an angle in degrees, within ±2^52; exact for multiples of 90.
+///
+/// ```
+/// assert_eq!(penup::fixed::sin_cos_degrees(-450.0), (-1.0, 0.0));
+/// ```
+pub fn sin_cos_degrees(degrees: f64) -> (f64, f64) {
+    let quarters = libm::round(degrees / 90.0);
+    let radians = (degrees - 90.0 * quarters).to_radians();
+    // At most π/4. Said in libm's way, this spares the device the reduction of larger angles: 3 KB.
+    let high_word = (radians.to_bits() >> 32) as u32 & 0x7FFF_FFFF;
+    let (sin, cos) = if high_word <= 0x3FE9_21FB { libm::sincos(radians) } else { (0.0, 1.0) };
+    match quarters as i64 & 3 {
+        0 => (sin, cos),
+        1 => (cos, -sin),
+        2 => (-sin, -cos),
+        _ => (-cos, sin),
+    }
 }
 
 /// Writes a number of the camera with up to six decimals, and no zeros at the end. Far smaller than the
@@ -197,6 +222,12 @@ pub fn divide_rounding(dividend: i128, divisor: i128) -> i128 {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SixDecimals(pub f64);
+
+impl From<Millimetres> for SixDecimals {
+    fn from(length: Millimetres) -> Self {
+        Self(f64::from(length.to_bits()) / f64::from(1 << Millimetres::FRAC_NBITS))
+    }
+}
 
 impl fmt::Display for SixDecimals {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -2,7 +2,10 @@
 
 use crate::job::{Page, Settings};
 use crate::machines::Board;
+use crate::protocol::TITLE;
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use penup::drawing::TitleText;
+use penup::protocol::{Command as PlotterCommand, Escape, LINE_LIMIT, Refusal};
 use std::path::PathBuf;
 
 /// The scene that README shows.
@@ -35,7 +38,7 @@ pub enum Command {
 #[derive(Debug, Subcommand)]
 pub enum TapeCommand {
     /// Record the job of an OBJ file as a tape
-    Encode(TapeEncodeArgs),
+    Encode(Box<TapeEncodeArgs>),
     /// Print the instructions of a tape
     Decode {
         /// The tape
@@ -193,6 +196,9 @@ pub struct ViewArgs {
         help_heading = "Camera"
     )]
     pub crease: f64,
+    /// Whether the file's usemtl, or else its groups, choose pens: pen1 to pen32, or by name
+    #[arg(long, value_enum, default_value = "auto", help_heading = "Page")]
+    pub pens: Pens,
     /// A4, A3, Letter, or width x height in mm, such as 300x200
     #[arg(long, value_name = "PAGE", value_parser = page, default_value = "A4", allow_hyphen_values = true,
           help_heading = "Page")]
@@ -204,6 +210,14 @@ pub struct ViewArgs {
     #[arg(long, value_name = "MM", value_parser = margin, default_value = "10", allow_hyphen_values = true,
           help_heading = "Page")]
     pub margin: f64,
+    /// Write this below the drawing
+    #[arg(long, value_name = "TEXT", value_parser = title, default_value = "", hide_default_value = true,
+          allow_hyphen_values = true, help_heading = "Page")]
+    pub title: String,
+    /// Height of the title's capitals, 1 to 100 mm
+    #[arg(long, value_name = "MM", value_parser = title_size, default_value = "5", allow_hyphen_values = true,
+          help_heading = "Page")]
+    pub title_size: f64,
     /// Scale a plan to the page, too (solids always are; plans are drawn at true size)
     #[arg(long, help_heading = "Page")]
     pub fit: bool,
@@ -213,11 +227,11 @@ pub struct ViewArgs {
     /// Let the pen return to where it began
     #[arg(long, help_heading = "Order")]
     pub cycle: bool,
-    /// Work to improve the order of many parts, for each pen; with 0 the nearest part comes next
+    /// Work to improve the order of many parts, for each move with the pen up; with 0 the nearest part comes next
     #[arg(
         long,
         value_name = "NUMBER",
-        default_value = "1000",
+        default_value = "4000",
         value_parser = clap::value_parser!(u32).range(0..1 << 30),
         allow_hyphen_values = true,
         help_heading = "Order"
@@ -260,8 +274,14 @@ impl ViewArgs {
                 See::Edges => "edges",
             },
             hidden: self.hidden.clone(),
+            pens: match self.pens {
+                Pens::Auto => "auto",
+                Pens::One => "one",
+            },
             page,
             margin: self.margin,
+            title: self.title.clone(),
+            title_size: self.title_size,
             fit: self.fit,
             order: match self.order {
                 Order::Auto => "auto",
@@ -282,9 +302,32 @@ fn hidden(text: &str) -> Result<String, String> {
     understood("hidden", text)
 }
 
+fn title(text: &str) -> Result<String, String> {
+    let line = format!("{TITLE}={}", Escape(text));
+    if line.len() > LINE_LIMIT {
+        return Err(
+            "it is too long: letters beyond ASCII take four to eight bytes of a line".to_owned()
+        );
+    }
+    match PlotterCommand::parse(&line).map_err(|refusal| refusal.to_string())? {
+        // It fits.
+        PlotterCommand::Title(letters) if TitleText::new(letters.letters()).is_some() => {
+            Ok(text.to_owned())
+        }
+        _ => Err(Refusal::TitleTooLong { limit: TitleText::LIMIT }.to_string()),
+    }
+}
+
+fn title_size(text: &str) -> Result<f64, String> {
+    match number(text)? {
+        size if (1.0..=100.0).contains(&size) => Ok(size),
+        _ => Err("a title is 1 to 100 mm high".to_owned()),
+    }
+}
+
 /// The plotter's own parser says whether this is a value of the option.
 fn understood(option: &str, text: &str) -> Result<String, String> {
-    match penup::protocol::Command::parse(&format!("${option}={text}")) {
+    match PlotterCommand::parse(&format!("${option}={text}")) {
         Ok(_) => Ok(text.to_owned()),
         Err(refusal) => Err(refusal.to_string()),
     }
@@ -308,6 +351,15 @@ pub enum Blocks {
     Separate,
     /// No line is drawn between two faces in one plane
     Merged,
+}
+
+/// Who chooses pens.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Pens {
+    /// The file
+    Auto,
+    /// Nobody: one pen draws all
+    One,
 }
 
 /// On or off.
@@ -432,6 +484,17 @@ mod tests {
         assert_eq!(size(&["--page", "60X80", "--landscape"]), (80.0, 60.0));
     }
 
+    /// One letter more than a title may have.
+    const LONG: &str =
+        "0123456789 123456789 123456789 123456789 123456789 123456789 123456789 1234567890";
+
+    #[test]
+    fn a_title_may_have_any_letter_of_the_font() {
+        let title = "Café – 3 % \\ #1: ¿sí? ~ «ÿ»!";
+        let settings = settings(&["--title", title, "--title-size=12.5"]).expect("good options");
+        assert_eq!((settings.title.as_str(), settings.title_size), (title, 12.5));
+    }
+
     #[test]
     fn nonsense_is_refused_with_the_reason() {
         for (options, reason) in [
@@ -444,6 +507,10 @@ mod tests {
             (["--page", "-10x20"], "above 0"),
             (["--page", "10xinf"], "\"inf\" is not a number"),
             (["--margin", "-1"], "cannot be negative"),
+            (["--title", "a→b"], "the font lacks → (U+2192)"),
+            (["--title", "line\nline"], "the font lacks"),
+            (["--title", LONG], "at most 80 bytes"),
+            (["--title-size", "0.5"], "1 to 100 mm"),
             (["--repeat", "0"], "0 is not in 1.."),
             (["--repeat", "-1"], "-1 is not in 1.."),
             (["--hidden", "gone"], "erased, dotted, dashed, shown"),

@@ -52,6 +52,10 @@ pub struct FakePlotter {
     pub aborts: usize,
     /// How many strokes a drawing has.
     pub strokes: u64,
+    /// Before which stroke, from 0, it waits for which pen.
+    pub pen_before: Option<(u64, u8)>,
+    /// Each pen that it was asked to change to.
+    pub pens_asked: Vec<u8>,
     queue: Vec<u8>,
     output: VecDeque<u8>,
     drawn: Option<u64>,
@@ -82,6 +86,13 @@ impl FakePlotter {
             let state = if self.fault == Fault::Busy { "Run" } else { "Idle" };
             return self.say(&format!("<{state}|MPos:0.000,0.000>"));
         };
+        if let Some((stroke, pen)) = self.pen_before
+            && stroke == drawn
+        {
+            let place = self.pens_asked.len();
+            return self
+                .say(&format!("<Hold:0|MPos:{place}.000,2.000|Pen:{pen}|Strokes:{drawn}/9>"));
+        }
         self.say(&format!("<Run|MPos:1.000,2.000|Strokes:{drawn}/{}>", self.strokes));
         if let Fault::AlarmWhileDrawing(number) = self.fault {
             self.say(&format!("ALARM:{number}"));
@@ -134,6 +145,7 @@ impl Link for FakePlotter {
                 b'?' if self.fault == Fault::Noise => self.output.extend(b"\xFE\x00\x81"),
                 b'?' => self.report(),
                 ABORT => self.abort(),
+                b'~' => self.pen_before = None,
                 _ if self.queue.len() < Self::QUEUE => self.queue.push(byte),
                 _ => self.overflowed = true,
             }
@@ -155,5 +167,11 @@ impl Link for FakePlotter {
             *slot = byte;
         }
         Ok(count)
+    }
+
+    /// The second time that it is asked for.
+    fn change_pen(&mut self, pen: u8) -> io::Result<bool> {
+        self.pens_asked.push(pen);
+        Ok(self.pens_asked.len() == 2)
     }
 }

@@ -2,10 +2,11 @@
 
 use crate::protocol::{
     ANGLES, AT, BEHIND, BLOCKS, CLEAR, CREASE, CYCLE, EFFORT, EYE, FIT, HIDDEN, MARGIN, ORDER,
-    PAGE, PROJECTION, SEAMS, SEE, UP, VIEW_AUTO, setting,
+    PAGE, PENS, PROJECTION, SEAMS, SEE, TITLE, TITLE_SIZE, UP, VIEW_AUTO, setting,
 };
 use crate::source::JobLine;
 use crate::watch::PenRuns;
+use penup::protocol::Escape;
 use serde::Serialize;
 
 /// A point of the page in mm: x right, y up from the lower left corner.
@@ -17,8 +18,12 @@ pub struct JobResult {
     /// The visible stretches, x1, y1, x2, y2: on the image plane at distance 1 (perspective) or in
     /// model units (parallel); x right, y up, origin on the line of sight.
     pub segments: Vec<[f64; 4]>,
+    /// The pen of each segment, from 1.
+    pub segment_pens: Vec<u8>,
     /// What the pen draws without being lifted, in the order drawn, in mm on the page.
     pub strokes: Vec<Vec<PagePoint>>,
+    /// The pen of each stroke, from 1.
+    pub stroke_pens: Vec<u8>,
     /// Length drawn.
     pub pen_down_mm: f64,
     /// Length of the moves between strokes, from the first stroke's start to the last one's end.
@@ -125,10 +130,16 @@ pub struct Settings {
     pub see: &'static str,
     /// What becomes of hidden lines, as the plotter understands it.
     pub hidden: String,
+    /// `auto` or `one`.
+    pub pens: &'static str,
     /// The page.
     pub page: Page,
     /// What stays free on each side, in mm.
     pub margin: f64,
+    /// What stands below the drawing; empty for nothing.
+    pub title: String,
+    /// Height of its capitals, in mm.
+    pub title_size: f64,
     /// Whether a plan, too, is scaled to the page.
     pub fit: bool,
     /// `auto`, `greedy` or `exact`.
@@ -139,7 +150,7 @@ pub struct Settings {
     pub effort: u32,
 }
 
-/// Every line of a job up to the plot command: forget the old model, the file's lines, the settings.
+/// Every line of a job up to the plot command: forget the old model, how pens are chosen, the file's lines, the settings.
 ///
 /// Each setting is sent, so that nothing of an earlier job remains.
 pub fn job_lines(file: Vec<JobLine>, settings: &Settings) -> Vec<JobLine> {
@@ -157,12 +168,18 @@ pub fn job_lines(file: Vec<JobLine>, settings: &Settings) -> Vec<JobLine> {
         format!("{HIDDEN}={}", settings.hidden),
         setting(PAGE, &[page.width, page.height], 'x'),
         setting(MARGIN, &[settings.margin], ','),
+        format!("{TITLE}={}", Escape(&settings.title)),
+        setting(TITLE_SIZE, &[settings.title_size], ','),
         format!("{FIT}={}", if settings.fit { "on" } else { "off" }),
         format!("{ORDER}={}", settings.order),
         format!("{CYCLE}={}", if settings.cycle { "on" } else { "off" }),
         format!("{EFFORT}={}", settings.effort),
     ]);
-    std::iter::once(JobLine::command(CLEAR))
+    // Before the file, whose names of pens may be too many.
+    let before = [CLEAR.to_owned(), format!("{PENS}={}", settings.pens)];
+    before
+        .into_iter()
+        .map(JobLine::command)
         .chain(file)
         .chain(commands.map(JobLine::command))
         .collect()
@@ -176,7 +193,9 @@ mod tests {
     fn the_json_has_the_promised_fields() {
         let result = JobResult {
             segments: vec![[0.0, 0.5, 1.0, -1.0]],
+            segment_pens: vec![1],
             strokes: vec![vec![[10.0, 20.0], [30.0, 20.25]]],
+            stroke_pens: vec![2],
             pen_down_mm: 20.0,
             pen_up_mm: 0.0,
             efficiency: 1.0,
@@ -186,7 +205,8 @@ mod tests {
         };
         assert_eq!(
             serde_json::to_string(&result).expect("numbers are finite"),
-            "{\"segments\":[[0.0,0.5,1.0,-1.0]],\"strokes\":[[[10.0,20.0],[30.0,20.25]]],\
+            "{\"segments\":[[0.0,0.5,1.0,-1.0]],\"segment_pens\":[1],\
+             \"strokes\":[[[10.0,20.0],[30.0,20.25]]],\"stroke_pens\":[2],\
              \"pen_down_mm\":20.0,\"pen_up_mm\":0.0,\"efficiency\":1.0,\"steps\":1600,\
              \"timings_ms\":{\"view\":0.5,\"visibility\":1.5,\"order\":2.0}}"
         );
@@ -213,12 +233,15 @@ mod tests {
             crease: 0.0,
             see: "faces",
             hidden: "dotted".to_owned(),
+            pens: "auto",
             page: Page { width: 210.0, height: 297.0 },
             margin: 7.5,
+            title: "Für Ada".to_owned(),
+            title_size: 4.5,
             fit: false,
             order: "auto",
             cycle: false,
-            effort: 1000,
+            effort: 4000,
         };
         let lines = job_lines(vec![JobLine::command("v 0 0 0")], &settings);
         let sent: Vec<&str> = lines.iter().map(|line| line.sent.as_str()).collect();
@@ -226,6 +249,7 @@ mod tests {
             sent,
             [
                 "$clear",
+                "$pens=auto",
                 "v 0 0 0",
                 "$view=auto",
                 "$eye=-3,-4,2.5",
@@ -239,10 +263,12 @@ mod tests {
                 "$hidden=dotted",
                 "$page=210x297",
                 "$margin=7.5",
+                "$title=F\\xFCr Ada",
+                "$title-size=4.5",
                 "$fit=off",
                 "$order=auto",
                 "$cycle=off",
-                "$effort=1000",
+                "$effort=4000",
             ]
         );
     }

@@ -4,6 +4,7 @@
 //! emulated board, the library in memory and the tests' fake all take the same road.
 
 use std::io;
+use std::sync::mpsc::{self, Receiver};
 use std::time::Duration;
 
 /// A line to a plotter: bytes in, bytes out.
@@ -19,11 +20,30 @@ pub trait Link {
     /// # Errors
     /// What the port says; an expired patience is no error.
     fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize>;
+
+    /// The machine stands and waits for this pen, from 1: changes it if it can, and says whether it is in.
+    ///
+    /// # Errors
+    /// What the port says.
+    fn change_pen(&mut self, pen: u8) -> io::Result<bool>;
 }
 
 /// A plotter at a serial port, 115200 baud, 8 data bits, no parity, 1 stop bit.
 pub struct SerialLink {
     port: Box<dyn serialport::SerialPort>,
+    pen_asked: Option<u8>,
+    /// A line that the user typed, once it was asked for.
+    typed: Option<Receiver<()>>,
+}
+
+/// Tells of each line that the user types: a thread waits for them, as long as the process lives.
+fn typed_lines() -> Receiver<()> {
+    let (sender, receiver) = mpsc::channel();
+    std::thread::spawn(move || {
+        let is_heard = |line: io::Result<String>| line.is_ok() && sender.send(()).is_ok();
+        io::stdin().lines().all(is_heard)
+    });
+    receiver
 }
 
 /// The speed of the line, in bits a second.
@@ -36,7 +56,7 @@ impl SerialLink {
     /// There is no such port, it is in use, or the user may not open it.
     pub fn open(device: &str) -> Result<Self, serialport::Error> {
         let port = serialport::new(device, BAUD).open()?;
-        Ok(Self { port })
+        Ok(Self { port, pen_asked: None, typed: None })
     }
 }
 
@@ -56,5 +76,21 @@ impl Link for SerialLink {
             Ok(0) => Err(io::ErrorKind::BrokenPipe.into()),
             result => result,
         }
+    }
+
+    /// Asks the user; the pen is in when a line is typed.
+    fn change_pen(&mut self, pen: u8) -> io::Result<bool> {
+        let typed = self.typed.get_or_insert_with(typed_lines);
+        if self.pen_asked != Some(pen) {
+            // What was typed before is no answer.
+            while typed.try_recv().is_ok() {}
+            self.pen_asked = Some(pen);
+            eprintln!("Put in pen {pen}, then press Enter");
+        }
+        let is_in = typed.try_recv().is_ok();
+        if is_in {
+            self.pen_asked = None;
+        }
+        Ok(is_in)
     }
 }

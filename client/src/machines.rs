@@ -72,6 +72,13 @@ impl Emulated {
         let emulator = board.boot().map_err(fault)?;
         Ok(Self { board, emulator, pen: PenWatch::new(STEP) })
     }
+
+    fn follow_pins(&mut self) -> Result<(), EmulatorError> {
+        for change in self.emulator.pin_changes()? {
+            self.pen.change(change);
+        }
+        Ok(())
+    }
 }
 
 impl Board {
@@ -108,14 +115,17 @@ impl Link for Emulated {
     fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize> {
         self.emulator.receive(buffer, patience)
     }
+
+    fn change_pen(&mut self, pen: u8) -> io::Result<bool> {
+        self.follow_pins().map_err(io::Error::other)?;
+        self.pen.change_pen(pen);
+        Ok(true)
+    }
 }
 
 impl WatchedPlotter for Emulated {
     fn pen_runs(&mut self) -> Result<PenRuns, Error> {
-        let changes = self.emulator.pin_changes().map_err(|error| self.board.error(&error))?;
-        for change in changes {
-            self.pen.change(change);
-        }
+        self.follow_pins().map_err(|error| self.board.error(&error))?;
         Ok(self.pen.runs())
     }
 }

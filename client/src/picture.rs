@@ -1,12 +1,13 @@
 //! The page with what the pen did to it, as SVG and PNG.
 //!
-//! One unit of the SVG is one millimetre and the page has its true size. Pen-down lines are dark and
-//! as wide as a pen, pen-up moves faint and thin; a green disc marks the start of the ink and a red
+//! One unit of the SVG is one millimetre and the page has its true size. Pen-down lines are dark, or in colour
+//! from the second pen on, and as wide as a pen, pen-up moves faint and thin; a green disc marks the start of the ink and a red
 //! ring its end. The PNG is made from that very SVG.
 
 use crate::error::Error;
 use crate::job::{Page, PagePoint};
 use resvg::{tiny_skia, usvg};
+use std::collections::BTreeSet;
 use std::f64::consts::{PI, TAU};
 use std::fmt::{self, Write as _};
 
@@ -15,6 +16,8 @@ use std::fmt::{self, Write as _};
 pub struct Run {
     /// Whether it draws.
     pub pen_down: bool,
+    /// Which pen, from 1.
+    pub pen: u8,
     /// Where it goes.
     pub points: Vec<PagePoint>,
 }
@@ -35,6 +38,9 @@ const PEN_WIDTH: f64 = 0.3;
 const TRAVEL_WIDTH: f64 = 0.15;
 const PAPER: &str = "#ffffff";
 const INK: &str = "#1b1f3b";
+/// The inks of the other pens, in turn.
+const INKS: [&str; 7] =
+    ["#c1121f", "#0077b6", "#2d6a4f", "#e07a00", "#7b2cbf", "#8a5a2b", "#d81b84"];
 const TRAVEL: &str = "#3d7edb";
 const START: &str = "#2a9d5c";
 const END: &str = "#d7433b";
@@ -54,9 +60,9 @@ impl Picture {
                 continue;
             };
             if let Some(from) = pen {
-                runs.push(Run { pen_down: false, points: vec![from, start] });
+                runs.push(Run { pen_down: false, pen: 1, points: vec![from, start] });
             }
-            runs.push(Run { pen_down: true, points: stroke.clone() });
+            runs.push(Run { pen_down: true, pen: 1, points: stroke.clone() });
             pen = Some(end);
         }
         Self { page, runs, step: 0.0 }
@@ -79,9 +85,17 @@ impl Picture {
         )?;
         writeln!(out, "<rect width=\"{w}\" height=\"{h}\" fill=\"{PAPER}\"/>")?;
         let faint = format!("stroke=\"{TRAVEL}\" stroke-opacity=\"0.5\"");
-        self.write_runs(out, "pen-up", &faint, TRAVEL_WIDTH, false)?;
-        let dark = format!("stroke=\"{INK}\"");
-        self.write_runs(out, "pen-down", &dark, PEN_WIDTH, true)?;
+        self.write_runs(out, "pen-up", &faint, TRAVEL_WIDTH, |run| !run.pen_down)?;
+        let inked = self.runs.iter().filter(|run| run.pen_down);
+        let pens: BTreeSet<u8> = inked.map(|run| run.pen).chain([1]).collect();
+        for pen in pens {
+            let (id, ink) = match usize::from(pen).checked_sub(2) {
+                None => ("pen-down".to_owned(), INK),
+                Some(other) => (format!("pen-{pen}"), INKS[other % INKS.len()]),
+            };
+            let paint = format!("stroke=\"{ink}\"");
+            self.write_runs(out, &id, &paint, PEN_WIDTH, |run| run.pen_down && run.pen == pen)?;
+        }
         self.write_marks(out)?;
         writeln!(out, "</svg>")
     }
@@ -92,14 +106,14 @@ impl Picture {
         id: &str,
         paint: &str,
         width: f64,
-        pen_down: bool,
+        of: impl Fn(&Run) -> bool,
     ) -> fmt::Result {
         writeln!(
             out,
             "<g id=\"{id}\" fill=\"none\" {paint} stroke-width=\"{}\" stroke-linecap=\"round\" stroke-linejoin=\"round\">",
             Number(width)
         )?;
-        for run in self.runs.iter().filter(|run| run.pen_down == pen_down) {
+        for run in self.runs.iter().filter(|run| of(run)) {
             // Half a step, and a little for the rounding of the numbers.
             let points = straightened(&run.points, self.step * 0.501);
             let Some((first, rest)) = points.split_first() else {
@@ -271,6 +285,24 @@ mod tests {
 </svg>
 "##;
         assert_eq!(svg, expected);
+    }
+
+    #[test]
+    fn each_pen_has_its_ink() {
+        let run = |pen, x| Run { pen_down: true, pen, points: vec![[x, 5.0], [x, 9.0]] };
+        let runs = vec![run(1, 1.0), run(3, 2.0), run(2, 3.0), run(3, 4.0), run(9, 5.0)];
+        let svg = Picture { page: PAGE, runs, step: 0.0 }.svg();
+        let groups: Vec<&str> = svg.split("<g id=\"").skip(2).collect();
+        for (group, (id, ink, paths)) in groups.iter().zip([
+            ("pen-down", INK, 1),
+            ("pen-2", INKS[0], 1),
+            ("pen-3", INKS[1], 2),
+            ("pen-9", INKS[0], 1),
+        ]) {
+            assert!(group.starts_with(&format!("{id}\"")) && group.contains(ink), "{group}");
+            assert_eq!(group.matches("<path").count(), paths, "{group}");
+        }
+        assert_eq!(groups.len(), 4);
     }
 
     #[test]

@@ -45,6 +45,14 @@ impl InMemory {
         [Setting::StepsPerMmX, Setting::StepsPerMmY].map(|s| settings.get(s).to_num::<f64>())
     }
 
+    fn follow_pins(&mut self) {
+        let changes = self.board.trace().take_changes();
+        self.steps += count_steps(&changes);
+        if let Some(pen) = &mut self.pen {
+            changes.iter().for_each(|change| pen.change(change.into()));
+        }
+    }
+
     /// Polls until every byte is answered; a plot that began goes on in [`Link::receive`].
     fn answer(&mut self) {
         // What waits for the machine goes on in `receive`.
@@ -76,16 +84,20 @@ impl Link for InMemory {
             self.plotter.poll(&mut self.board);
             penup::plotter::Board::wait(&mut self.board);
         }
-        let changes = self.board.trace().take_changes();
-        self.steps += count_steps(&changes);
-        if let Some(pen) = &mut self.pen {
-            changes.iter().for_each(|change| pen.change(change.into()));
-        }
+        self.follow_pins();
         let sent = self.board.take_sent();
         let (now, later) = sent.split_at(sent.len().min(buffer.len()));
         buffer[..now.len()].copy_from_slice(now);
         penup::plotter::Board::write(&mut self.board, later);
         Ok(now.len())
+    }
+
+    fn change_pen(&mut self, pen: u8) -> io::Result<bool> {
+        self.follow_pins();
+        if let Some(watch) = &mut self.pen {
+            watch.change_pen(pen);
+        }
+        Ok(true)
     }
 }
 
@@ -113,18 +125,31 @@ impl PreviewPlotter for InMemory {
         let timings_ms = watch.stop();
         let steps = self.steps_per_mm();
         let mut strokes: Vec<Vec<[f64; 2]>> = Vec::new();
+        let mut stroke_pens: Vec<u8> = Vec::new();
         let mut path = self.plotter.strokes();
         while let Some(Target { point, ink }) = path.next_target() {
             let point = [f64::from(point.x) / steps[0], f64::from(point.y) / steps[1]];
-            match (ink, strokes.last_mut()) {
-                (Some(_), Some(stroke)) => stroke.push(point),
-                _ => strokes.push(vec![point]),
+            let pen = path.pen() + 1;
+            match (ink, strokes.last_mut(), stroke_pens.last()) {
+                (Some(_), Some(stroke), Some(last)) if *last == pen => stroke.push(point),
+                // Another pen goes on where the last one ended.
+                (Some(_), Some(stroke), _) => {
+                    let from = stroke.last().copied().unwrap_or(point);
+                    strokes.push(vec![from, point]);
+                    stroke_pens.push(pen);
+                }
+                _ => {
+                    strokes.push(vec![point]);
+                    stroke_pens.push(pen);
+                }
             }
         }
         let lengths = Lengths::of(&strokes);
         Ok(JobResult {
-            segments: segments.0,
+            segments: segments.ends,
+            segment_pens: segments.pens,
             strokes,
+            stroke_pens,
             pen_down_mm: lengths.pen_down_mm,
             pen_up_mm: lengths.pen_up_mm,
             efficiency: lengths.efficiency(),
@@ -177,25 +202,35 @@ impl Attention for StopWatch {
     }
 }
 
-/// The visible stretches on the image plane.
+/// The visible stretches on the image plane, and the pen of each.
 #[derive(Default)]
-struct Segments(Vec<[f64; 4]>);
+struct Segments {
+    ends: Vec<[f64; 4]>,
+    pens: Vec<u8>,
+}
+
+impl Segments {
+    fn push(&mut self, ends: [f64; 4], pen: u8) {
+        self.ends.push(ends);
+        self.pens.push(pen + 1);
+    }
+}
 
 impl Observer for Segments {
     fn stretch(&mut self, view: &View, stretch: &Stretch) {
         if stretch.visible {
             let (p, q) = stretch.ends;
             let [[x1, y1], [x2, y2]] = [stretch.from, stretch.to].map(|end| image(view, p, q, end));
-            self.0.push([x1, y1, x2, y2]);
+            self.push([x1, y1, x2, y2], stretch.pen);
         }
     }
 
     fn start_again(&mut self) {
-        self.0.clear();
+        *self = Self::default();
     }
 
-    fn plan_bar(&mut self, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2]) {
-        self.0.push([x1, y1, x2, y2]);
+    fn plan_bar(&mut self, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2], pen: u8) {
+        self.push([x1, y1, x2, y2], pen);
     }
 }
 

@@ -45,11 +45,19 @@ pub const HIDDEN: &str = "$hidden";
 pub const PAGE: &str = "$page";
 /// What stays free on each side, in millimetres.
 pub const MARGIN: &str = "$margin";
+/// Whether the file chooses pens.
+pub const PENS: &str = "$pens";
+/// What stands below the drawing.
+pub const TITLE: &str = "$title";
+/// Height of its capitals, in millimetres.
+pub const TITLE_SIZE: &str = "$title-size";
 /// `on`: scale to the page; `off`: scale solids only and leave plans at true size.
 pub const FIT: &str = "$fit";
 
 /// Asks for a status report; answered at once, between two lines.
 pub const STATUS_QUERY: u8 = b'?';
+/// Go on.
+pub const RESUME: u8 = b'~';
 /// Give up whatever is going on, pen up, answer with the greeting.
 pub const ABORT: u8 = 0x18;
 
@@ -104,6 +112,10 @@ pub struct Status {
     pub state: String,
     /// `Strokes:done/all`, while a drawing is drawn.
     pub strokes: Option<(u64, u64)>,
+    /// `Pen:number`, if it stands and waits for that pen.
+    pub pen_wanted: Option<u8>,
+    /// Where it is, in its own words.
+    pub position: String,
 }
 
 impl Status {
@@ -149,12 +161,18 @@ impl Reply {
 fn parse_status(report: &str) -> Status {
     let mut fields = report.split('|');
     // Grbl says Hold:0, Door:1.
-    let state = fields.next().unwrap_or_default();
-    let state = state.split(':').next().unwrap_or_default().to_owned();
-    let strokes = fields
-        .find_map(|field| field.strip_prefix("Strokes:")?.split_once('/'))
-        .and_then(|(done, all)| Some((done.parse().ok()?, all.parse().ok()?)));
-    Status { state, strokes }
+    let full_state = fields.next().unwrap_or_default();
+    let state = full_state.split(':').next().unwrap_or_default().to_owned();
+    let field = |name: &str| fields.clone().find_map(|field| field.strip_prefix(name));
+    let strokes = field("Strokes:").and_then(|strokes| strokes.split_once('/'));
+    let strokes = strokes.and_then(|(done, all)| Some((done.parse().ok()?, all.parse().ok()?)));
+    let pen_wanted = field("Pen:").filter(|_| full_state == "Hold:0");
+    Status {
+        state,
+        strokes,
+        pen_wanted: pen_wanted.and_then(|pen| pen.parse().ok()),
+        position: field("MPos:").unwrap_or_default().to_owned(),
+    }
 }
 
 /// Bytes to replies. Lines that are longer than any reply are cut.
@@ -251,5 +269,11 @@ mod tests {
         };
         assert_eq!((status.state.as_str(), status.strokes), ("Hold", None));
         assert!(!status.is_idle());
+        let pen = |line| match Reply::parse(line) {
+            Reply::Status(status) => (status.pen_wanted, status.position),
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(pen("<Hold:0|MPos:1,2|Pen:3|Left:9>"), (Some(3), "1,2".to_owned()));
+        assert_eq!(pen("<Hold:1|MPos:1,2|Pen:3|Left:9>").0, None, "it does not stand yet");
     }
 }

@@ -2,14 +2,14 @@
 //!
 //! Framing as in Grbl 1.1: one reply to each line, in order. [`Sender::open`] makes sure that a
 //! penup answers and is idle, [`Sender::stream`] keeps the plotter's receive queue filled but never
-//! over-filled (counting the bytes that are not yet answered), [`Sender::plot`] draws and waits for
+//! over-filled (counting the bytes that are not yet answered), [`Sender::plot`] draws, changes pens and waits for
 //! the end. If anything goes wrong the sender stops at once and says which line it was at.
 
 use crate::error::Error;
 use crate::link::Link;
 use crate::progress::Progress;
 use crate::protocol::{
-    ABORT, PLOT, RECEIVE_WINDOW, Reply, ReplyReader, STATUS_QUERY, Status, is_penup,
+    ABORT, PLOT, RECEIVE_WINDOW, RESUME, Reply, ReplyReader, STATUS_QUERY, Status, is_penup,
 };
 use crate::source::JobLine;
 use std::collections::VecDeque;
@@ -37,6 +37,25 @@ impl Default for Patience {
             greeting: Duration::from_secs(3),
             query: Duration::from_millis(100),
         }
+    }
+}
+
+/// How often in a row the plotter said that it stands at a place and waits for a pen.
+#[derive(Debug, Default)]
+struct Standing {
+    at: Option<(u8, String)>,
+    times: u32,
+}
+
+impl Standing {
+    /// The first reports may come before the last moves are done; later ones do not.
+    const SURE: u32 = 3;
+
+    fn pen_wanted(&mut self, status: &Status) -> Option<u8> {
+        let at = status.pen_wanted.map(|pen| (pen, status.position.clone()));
+        self.times = if at == self.at { self.times + 1 } else { 1 };
+        self.at = at;
+        status.pen_wanted.filter(|_| self.times >= Self::SURE)
     }
 }
 
@@ -160,6 +179,7 @@ impl<'a> Sender<'a> {
         self.last_heard = Instant::now();
         let mut acknowledged = false;
         let mut idle_since = None;
+        let mut standing = Standing::default();
         loop {
             self.stop_if_interrupted()?;
             match self.listen()? {
@@ -172,6 +192,12 @@ impl<'a> Sender<'a> {
                     progress.state(&status.state);
                     if let Some((done, all)) = status.strokes {
                         progress.strokes_drawn(done, all);
+                    }
+                    if let Some(pen) = standing.pen_wanted(&status)
+                        && self.link.change_pen(pen)?
+                    {
+                        self.link.send(&[RESUME])?;
+                        standing = Standing::default();
                     }
                     if status.state == "Alarm" {
                         return Err(Error::NotReady { state: status.state });

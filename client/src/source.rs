@@ -68,7 +68,7 @@ fn lines(file: &str, bytes: &[u8]) -> Result<Vec<JobLine>, Error> {
     Ok(lines)
 }
 
-/// A `!` in a name would hold the machine; the plotter reads no names, so another letter serves.
+/// A `!` in a name would hold the machine; a name only tells pens apart, so another letter serves.
 fn sendable(content: &str) -> String {
     let letter = |letter| if acts_at_once(letter) { '_' } else { letter };
     content.chars().map(letter).collect()

@@ -82,7 +82,7 @@ pub fn show(tape: &[u8], page: Page, steps_per_mm: f64) -> Result<(Picture, usiz
     for (end, pen_down) in TapeLines::new(at, instructions.into_iter()) {
         match runs.last_mut().filter(|run| run.pen_down == pen_down) {
             Some(run) => run.points.push(mm(end)),
-            None => runs.push(Run { pen_down, points: vec![mm(at), mm(end)] }),
+            None => runs.push(Run { pen_down, pen: 1, points: vec![mm(at), mm(end)] }),
         }
         at = end;
     }

@@ -18,18 +18,25 @@ pub struct PenWatch {
     machine: Machine,
     runs: Vec<Run>,
     step: f64,
+    /// From 1.
+    pen: u8,
 }
 
 impl PenWatch {
     /// `step` is the length of a step in mm.
     pub fn new(step: f64) -> Self {
-        Self { machine: Machine::default(), runs: vec![start([0.0; 2])], step }
+        Self { machine: Machine::default(), runs: vec![start([0.0; 2])], step, pen: 1 }
     }
 
     /// Takes in one change of a pin.
     pub fn change(&mut self, change: PinChange) {
         let event = self.machine.change(change);
         self.follow(event);
+    }
+
+    /// Another pen, from 1, draws what comes.
+    pub fn change_pen(&mut self, pen: u8) {
+        self.pen = pen;
     }
 
     /// Forgets the ways, not the place: another job begins.
@@ -57,7 +64,7 @@ impl PenWatch {
                 run.points.push([moved(x, dx), moved(y, dy)]);
             }
             Some(MachineEventKind::Pen { down }) if down != run.pen_down => {
-                self.runs.push(Run { pen_down: down, points: vec![[x, y]] });
+                self.runs.push(Run { pen_down: down, pen: self.pen, points: vec![[x, y]] });
             }
             _ => {}
         }
@@ -65,5 +72,5 @@ impl PenWatch {
 }
 
 fn start(at: [f64; 2]) -> Run {
-    Run { pen_down: false, points: vec![at] }
+    Run { pen_down: false, pen: 1, points: vec![at] }
 }

@@ -45,6 +45,15 @@ fn failure(fault: Fault) -> (String, FakePlotter) {
 }
 
 #[test]
+fn a_pen_is_changed_when_the_machine_stands_and_the_job_goes_on_when_it_is_in() {
+    let mut plotter = FakePlotter::new(Fault::None);
+    plotter.pen_before = Some((2, 5));
+    job(&mut plotter, 3).expect("a job without a fault");
+    assert_eq!(plotter.pens_asked, [5, 5], "the first time it was not in");
+    assert_eq!(plotter.pen_before, None, "it was told to go on");
+}
+
+#[test]
 fn every_line_arrives_once_in_order_and_the_queue_is_kept_full_but_never_overflows() {
     for count in [0, 1, 2, 500] {
         let mut plotter = FakePlotter::new(Fault::None);

@@ -33,7 +33,7 @@ fn norm(a: Point) -> f64 {
 /// Squared speed allowed at each point of `points` (mm) and on each line between two, as the limits
 /// of `motion` say: corners by junction deviation, bends by the circle through points 1, 2, 4, … 64
 /// apart, each less what rounding to steps can explain.
-fn squared_limits(points: &[Point], limits: Limits) -> (Vec<f64>, Vec<f64>) {
+pub fn squared_limits(points: &[Point], limits: Limits) -> (Vec<f64>, Vec<f64>) {
     let rounding = 23.0 / 16.0 * limits.step;
     let mut radius = vec![f64::INFINITY; points.len()];
     let mut curve = vec![f64::INFINITY; points.len() - 1];
@@ -124,4 +124,29 @@ pub fn seconds(points: &[Point], limits: Limits) -> f64 {
             speed_up / a + (length - ramps) / peak.sqrt()
         })
         .sum()
+}
+
+/// Seconds of a straight line of `length` mm from rest to rest with a limit on jerk, mm/s³.
+pub fn straight_seconds(length: f64, limits: Limits, jerk: f64) -> f64 {
+    let ramp = |speed: f64| {
+        let full = limits.acceleration.powi(2) / jerk;
+        if speed < full {
+            2.0 * (speed / jerk).sqrt()
+        } else {
+            speed / limits.acceleration + limits.acceleration / jerk
+        }
+    };
+    // A ramp from rest is as long as half its speed all the time; two of them fit.
+    let (mut slow, mut fast) = (0.0, limits.speed);
+    if fast * ramp(fast) > length {
+        for _ in 0..100 {
+            let middle = (slow + fast) / 2.0;
+            if middle * ramp(middle) > length {
+                fast = middle;
+            } else {
+                slow = middle;
+            }
+        }
+    }
+    2.0 * ramp(fast) + (length - fast * ramp(fast)).max(0.0) / fast
 }

@@ -1,7 +1,7 @@
 //! A plotter made of pins: the library's own interrupt code on pins that remember what they did.
 
 use heapless::spsc::Queue;
-use penup::boards::host::{Stamped, traced_pulser};
+use penup::boards::host::{QUEUE_LENGTH, Stamped, traced_pulser};
 use penup::drawing::PagePoint;
 use penup::machine::{Machine, MachineError, Path, PulserState, Settings};
 use penup::motion::{Block, EventQueue, StepEvent};
@@ -93,7 +93,7 @@ pub fn run_with(
     turn: &mut dyn FnMut(Turn<'_, '_>, &mut dyn EventQueue) -> bool,
 ) -> Vec<Stamped> {
     let state = PulserState::new();
-    let mut queue: Queue<StepEvent, 256> = Queue::new();
+    let mut queue: Queue<StepEvent, QUEUE_LENGTH> = Queue::new();
     let (mut producer, mut pulser, trace) = traced_pulser(&mut queue, &state);
     let mut blocks = [Block::EMPTY; 128];
     let mut machine = Machine::new(settings, &mut blocks, &state, 2_500_000);

@@ -158,6 +158,127 @@ proptest! {
     }
 }
 
+/// Numbers that look random, the same in every run.
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, bound: u64) -> u64 {
+        // Knuth's MMIX.
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (self.0 >> 33) % bound
+    }
+}
+
+/// Long moves, a dense circle and a zigzag: at every instant something else is fast.
+fn fast_job() -> Vec<Target> {
+    let mut targets = vec![to(9000, 500)];
+    for chord in 0..=180 {
+        let angle = f64::from(chord) * std::f64::consts::TAU / 180.0;
+        let (x, y) = (8000.0 + 1000.0 * angle.cos(), 2000.0 + 1000.0 * angle.sin());
+        targets.push(ink(x.round() as i32, y.round() as i32));
+    }
+    targets.extend([to(500, 7000), ink(4000, 7400), ink(7500, 7000), ink(7600, 6900)]);
+    targets.extend((0..8).map(|line| ink(6000 - 300 * line, 3000 + 900 * (line % 2))));
+    targets.push(to(0, 0));
+    targets
+}
+
+/// Draws the fast job; the main loop stands still from `instant` on for `pause` ticks. Returns how
+/// often the queue ran dry, too.
+fn starve(settings: Settings, instant: u64, pause: u64, turn_ticks: u64) -> (Drawn, u32) {
+    let targets = fast_job();
+    let mut path = TargetList::new(&targets);
+    let mut underruns = 0;
+    let trace = pin_machine::run_with(settings, turn_ticks, &mut |turn, queue| {
+        if turn.now == 0 {
+            turn.machine.start(&mut TargetList::new(&targets)).expect("valid");
+        }
+        assert_eq!(turn.machine.position(), turn.pins);
+        if !(instant..instant + pause).contains(&turn.now) {
+            turn.machine.fill(&mut path, queue);
+        }
+        underruns = turn.machine.underruns();
+        !is_ready(turn.machine)
+    });
+    (event_checker::check_pins(&trace, &settings), underruns)
+}
+
+/// Lets the main loop be late `count` times, each in a job of its own; the acceleration is measured
+/// against that of `allowed`.
+fn starve_often(settings: Settings, allowed: Settings, count: u32) {
+    let undisturbed = starve(settings, 0, 0, 25_000).0;
+    let mut random = Random(1971);
+    let mut underruns = 0;
+    for _ in 0..count {
+        let instant = random.below(undisturbed.last_step);
+        // 0.05 s to 2 s, and turns of 0.2 ms to 4 ms before and after.
+        let pause = 1_250_000 + random.below(48_750_000);
+        let (drawn, dry) = starve(settings, instant, pause, 5_000 + random.below(95_000));
+        underruns += dry;
+        assert_eq!(drawn.inked, undisturbed.inked);
+        assert_eq!((drawn.end, drawn.pen), (undisturbed.end, 0));
+        // From rest to rest, the acceleration over any 5 ms within 1.05 of the limit.
+        event_checker::check_speed(&drawn.runs, &fast_job(), &allowed, false);
+    }
+    // The others were late while the pen moved, or by less than the queue held.
+    assert!((count / 2..=count).contains(&underruns), "{underruns} of {count}");
+}
+
+#[test]
+fn a_main_loop_that_is_late_brakes_the_machine_on_the_path() {
+    starve_often(Settings::default(), Settings::default(), 200);
+}
+
+fn with(values: &[(Setting, f64)]) -> Settings {
+    let mut settings = Settings::default();
+    for &(setting, value) in values {
+        settings.set(setting, Value::from_num(value)).expect("valid");
+    }
+    settings
+}
+
+#[test]
+fn steps_of_any_length_and_slow_drivers_are_braked_as_well() {
+    let settings = with(&[
+        (Setting::StepsPerMmX, 100.0),
+        (Setting::DirectionSetup, 20.0),
+        (Setting::TravelSpeed, 4000.0),
+    ]);
+    starve_often(settings, settings, 40);
+}
+
+#[test]
+fn what_the_queue_cannot_hold_is_braked_within_what_it_holds() {
+    let fast = with(&[
+        (Setting::MaxRateX, 15_000.0),
+        (Setting::MaxRateY, 15_000.0),
+        (Setting::TravelSpeed, 15_000.0),
+        (Setting::DrawSpeed, 9_000.0),
+        (Setting::AccelerationX, 2000.0),
+        (Setting::AccelerationY, 2000.0),
+    ]);
+    // 250 mm/s within 13/16 of 623 steps of 1/80 mm.
+    let mut allowed = fast;
+    let hardest = 250.0 * 250.0 / (2.0 * 13.0 / 16.0 * 623.0 / 80.0);
+    for axis in [Setting::AccelerationX, Setting::AccelerationY] {
+        allowed.set(axis, Value::from_num(hardest)).expect("valid");
+    }
+    starve_often(fast, allowed, 40);
+}
+
+#[test]
+fn a_main_loop_that_is_in_time_is_not_slowed() {
+    let settings = Settings::default();
+    let targets = fast_job();
+    let planned = pin_machine::record(settings, &mut TargetList::new(&targets), 128).expect("fits");
+    let last = pin_machine::moves(&planned).last().map(|&(time, _)| time);
+    // 0.2 ms and 10 ms.
+    for turn_ticks in [5_000, 250_000] {
+        let (drawn, underruns) = starve(settings, 0, 0, turn_ticks);
+        assert_eq!((Some(drawn.last_step), underruns), (last, 0));
+    }
+}
+
 #[test]
 fn after_abort_and_alarm_the_next_job_starts_from_there() {
     for alarm in [false, true] {

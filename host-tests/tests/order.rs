@@ -55,8 +55,25 @@ fn a_connected_drawing_is_drawn_at_the_optimum() {
 fn separate_parts_are_drawn_within_three_hundredths_of_the_best_known() {
     let sheet = scene("text300");
     for (shape, best_known) in [(Shape::OpenPath, 2030.0), (Shape::ClosedCycle, 2067.0)] {
-        let options = Options { shape, effort: 1000, ..Options::default() };
-        let (_, report) = sheet.order(options).expect("fits");
+        let (_, report) = sheet.order(Options { shape, ..Options::default() }).expect("fits");
+        assert!(millimetres(report.pen_up) < 1.03 * best_known, "{report:?}");
+    }
+}
+
+/// 500 lines in two columns, the best known by LKH: to and fro, down one column and up the other.
+#[test]
+fn a_hatching_is_drawn_within_three_hundredths_of_the_best_known() {
+    let lines = (0..250).flat_map(|row| {
+        let turn = f64::from(row);
+        let (y, middle) = (15.0 + turn, 95.0 + 30.0 * (turn / 20.0).sin());
+        let left = (20.0 + 5.0 * (turn / 9.0).sin(), middle - 4.0);
+        let right = (middle + 4.0, 175.0 + 8.0 * (turn / 7.0).cos());
+        let steps = |mm: f64| (80.0 * mm).round() as i32;
+        [left, right].map(|(from, to)| vec![(steps(from), steps(y)), (steps(to), steps(y))])
+    });
+    let sheet = Sheet::from_polylines(&lines.collect::<Vec<_>>());
+    for (shape, best_known) in [(Shape::OpenPath, 653.7), (Shape::ClosedCycle, 661.7)] {
+        let (_, report) = sheet.order(Options { shape, ..Options::default() }).expect("fits");
         assert!(millimetres(report.pen_up) < 1.03 * best_known, "{report:?}");
     }
 }

@@ -41,7 +41,7 @@ fn covered(line: &Drawn, other: &Drawn) -> Option<(i64, i64)> {
     let whole = along(line.1, line)?;
     let (a, b) = (along(other.0, line)?, along(other.1, line)?);
     let (from, to) = (a.min(b).max(0), a.max(b).min(whole));
-    (from < to && line.3 == other.3).then_some((from, to))
+    (from < to).then_some((from, to))
 }
 
 fn drawn() -> impl Strategy<Value = Drawn> {
@@ -53,7 +53,7 @@ fn drawn() -> impl Strategy<Value = Drawn> {
         if back { (to, from) } else { (from, to) }
     });
     let any = (place(), place()).prop_filter("a length", |(from, to)| from != to);
-    (prop_oneof![4 => sloped, 1 => any], 0u8..3, 0u8..2)
+    (prop_oneof![4 => sloped, 1 => any], 0u8..3, 0u8..4)
         .prop_map(|((from, to), code, pen)| (from, to, code, pen))
 }
 
@@ -80,7 +80,7 @@ proptest! {
                         .filter(|other| {
                             covered(line, other).is_some_and(|(a, b)| a <= pair[0] && pair[1] <= b)
                         })
-                        .map(|other| other.2)
+                        .map(|other| (other.2, other.3))
                         .min()
                 };
                 prop_assert_eq!(best(&found), best(&lines), "{:?} {:?}", line, pair);

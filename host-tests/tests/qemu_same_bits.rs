@@ -42,6 +42,12 @@ fn curves_in_space_and_on_a_plan() -> Result<(), Box<dyn Error>> {
 }
 
 #[test]
+fn a_title_below_a_solid() -> Result<(), Box<dyn Error>> {
+    let title = ["$title=Caf\\xE9 \\u{2013} 3 %", "$title-size=4", "$page=80x80", "$margin=5"];
+    compare(Lm3s6965, "octahedron.obj", &title)
+}
+
+#[test]
 fn ctrl_x_stops_the_steps_raises_the_pen_and_knows_the_position() -> Result<(), Box<dyn Error>> {
     give_up(Lm3s6965)
 }

@@ -30,7 +30,7 @@ impl Observer for Whole {
         assert!(self.0.insert(((a.min(b), a.max(b)), stretch.visible)), "each edge comes once");
     }
 
-    fn plan_bar(&mut self, _: [f64; 2], _: [f64; 2]) {
+    fn plan_bar(&mut self, _: [f64; 2], _: [f64; 2], _: u8) {
         panic!("a solid is no plan");
     }
 }

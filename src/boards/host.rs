@@ -3,14 +3,14 @@
 //!
 //! Time passes only in [`Board::wait`] and [`HostBoard::pass`], so a run is the same every time.
 
-use crate::machine::{Contacts, Pen, Pins, Pulser, PulserState};
+use crate::machine::{Contacts, Pen, Pins, Pulser, PulserState, StepQueue};
 use crate::model::{Corner, Position};
 use crate::motion::{EventQueue, StepEvent};
 use crate::plotter::{Board, Lent, NO_MOVES};
 use crate::protocol::{RealTime, Sorter};
 use core::convert::Infallible;
 use embedded_hal::digital::{ErrorType, OutputPin};
-use heapless::spsc::{Producer, Queue};
+use heapless::spsc::Queue;
 use std::boxed::Box;
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
@@ -18,7 +18,7 @@ use std::rc::Rc;
 use std::vec::Vec;
 
 /// As many events as the smallest board's queue holds.
-pub const QUEUE_LENGTH: usize = 256;
+pub const QUEUE_LENGTH: usize = 624;
 
 /// Memory for a plotter on a computer: as many vertices as an element can name, and as much to work
 /// in as any board's jobs ten times over. It is lent for as long as the process lives.
@@ -147,7 +147,7 @@ pub type TracedPulser<'q> =
 pub fn traced_pulser<'q, const N: usize>(
     queue: &'q mut Queue<StepEvent, N>,
     state: &'q PulserState,
-) -> (Producer<'q, StepEvent>, TracedPulser<'q>, Rc<Trace>) {
+) -> (StepQueue<'q>, TracedPulser<'q>, Rc<Trace>) {
     let trace = Rc::new(Trace::default());
     let pin = |change| TracedPin { trace: Rc::clone(&trace), level: None, change };
     let pins = Pins {
@@ -158,8 +158,8 @@ pub fn traced_pulser<'q, const N: usize>(
         enable: pin(Change::Enable),
     };
     let pen = TracedPen { trace: Rc::clone(&trace), height: None };
-    let (producer, consumer) = queue.split();
-    (producer, Pulser::new(pins, pen, consumer, state), trace)
+    let (pulser, producer) = Pulser::new(pins, pen, queue, state);
+    (producer, pulser, trace)
 }
 
 /// The board.
@@ -168,7 +168,7 @@ pub struct HostBoard<'q> {
     sorter: Sorter,
     asked: RealTime,
     sent: Vec<u8>,
-    producer: Producer<'q, StepEvent>,
+    producer: StepQueue<'q>,
     pulser: TracedPulser<'q>,
     trace: Rc<Trace>,
     /// When the step interrupt is due, in ticks from the start.

@@ -5,6 +5,7 @@
 
 use super::overlap::{Loose, ink_once};
 use super::{Drawing, LineType, PAGE_LIMIT, PagePoint, Segment};
+use crate::model::PEN_LIMIT;
 use crate::stage::{
     Aborted, Attention, OutOfScratch, Scratch, StageError, heap_sort_attentively, items, items_mut,
 };
@@ -15,8 +16,8 @@ use bytemuck::{Pod, Zeroable};
 #[repr(transparent)]
 pub struct Line([u32; 3]);
 
-/// Pens that a [`Line`] can tell apart.
-pub const PEN_LIMIT: u8 = 32;
+/// The code of a full line that yields to any other: it sorts after them.
+const UNDER: u8 = 3;
 
 impl Line {
     /// The line from `from` to `to`, both within ±[`PAGE_LIMIT`]; `pen` below [`PEN_LIMIT`].
@@ -26,6 +27,27 @@ impl Line {
         let packed =
             pack(from.x) | pack(from.y) << 21 | pack(to.x) << 42 | pack(to.y) << 63 | marks << 84;
         Self([packed as u32, (packed >> 32) as u32, (packed >> 64) as u32])
+    }
+
+    /// The same, if it is a full line, yielding to any other in its place: what is hidden may not win over what is seen.
+    #[must_use]
+    pub fn under(self) -> Self {
+        let Self([low, middle, high]) = self;
+        let code = high >> (84 - 64) & 3;
+        let mark = if code == u32::from(LineType::Full.code()) { u32::from(UNDER) } else { 0 };
+        Self([low, middle, high | mark << (84 - 64)])
+    }
+
+    /// Whether its ends differ.
+    pub fn has_length(self) -> bool {
+        let [from, to] = self.ends();
+        from != to
+    }
+
+    /// Its ends.
+    pub fn ends(self) -> [PagePoint; 2] {
+        let (from, to, ..) = self.unpack();
+        [from, to]
     }
 
     /// Its ends, line type code and pen.
@@ -126,8 +148,8 @@ const LINES_BETWEEN_CHECKS: usize = 32;
 /// Turns the `count` lines at the beginning of `words` into a drawing at the beginning of `words`.
 ///
 /// Points less than two steps apart along both axes count as one, the first of them; lines that
-/// shrink to a point are dropped; where segments of a pen overlap one is kept, a full line before a dotted
-/// one.
+/// shrink to a point are dropped; where segments overlap one is kept: a full line before a dotted one, then the
+/// lower pen before the higher.
 ///
 /// # Errors
 /// See [`OrganiseError`]; the lines are lost then.
@@ -137,10 +159,11 @@ pub fn organise(
     count: usize,
     attention: &mut dyn Attention,
 ) -> Result<Stored, OrganiseError> {
-    // A full line inside a dotted or dashed one leaves two pieces of it.
-    let is_cut = |line: &Line| line.unpack().2 != LineType::Full.code();
+    // A line inside another that yields to it leaves two pieces of that.
     let all: &[Line] = items(words, count).unwrap_or(&[]);
-    let room = if all.iter().any(is_cut) { count + count / 4 + 8 } else { count };
+    let marks = |line: &Line| line.0[2] >> (84 - 64);
+    let yields = all.iter().any(|line| Some(marks(line)) != all.first().map(marks));
+    let room = if yields { count + count / 4 + 8 } else { count };
     let line_words = Scratch::bytes_for::<Line>(room) / 8;
     let available = size_of_val(words);
     let missing = OutOfScratch { needed: line_words * 8, available };
@@ -186,7 +209,7 @@ pub fn organise(
         let segment = Segment {
             from: (ends >> 16) as u16,
             to: ends as u16,
-            line_type_code: (marks >> 8) as u8,
+            line_type_code: ((marks >> 8) % u32::from(UNDER)) as u8, // a full line like others
             pen: marks as u8,
         };
         let packed: [u16; 3] = bytemuck::cast(segment);
@@ -333,6 +356,26 @@ mod tests {
         let (drawing, _) = stored.split(&mut memory).unwrap();
         assert_eq!(drawing.segments.len(), 1);
         assert_eq!(drawing.segments[0].line_type(), LineType::Full);
+    }
+
+    #[test]
+    fn what_is_seen_wins_over_what_is_hidden_and_the_lower_pen_over_the_higher() {
+        let full = |pen| Line::new(point(0, 0), point(9, 9), LineType::Full, pen);
+        let dotted = Line::new(point(9, 9), point(0, 0), LineType::Dotted, 0);
+        for (lines, pen, line_type) in [
+            ([full(0).under(), full(5), full(6)], 5, LineType::Full),
+            ([full(7), full(1).under(), full(9).under()], 7, LineType::Full),
+            ([full(3).under(), full(2).under(), full(4).under()], 2, LineType::Full),
+            ([dotted, full(8), full(9).under()], 8, LineType::Full),
+            ([dotted.under(), dotted, full(0).under()], 0, LineType::Dotted),
+        ] {
+            let mut memory = vec![0u64; 64];
+            items_mut(&mut memory, 3).unwrap().copy_from_slice(&lines);
+            let stored = organise(&mut memory, 3, &mut Undisturbed).unwrap();
+            let (drawing, _) = stored.split(&mut memory).unwrap();
+            let segments = drawing.segments.iter().map(|s| (s.pen, s.line_type()));
+            assert_eq!(segments.collect::<Vec<_>>(), [(pen, line_type)], "{lines:?}");
+        }
     }
 
     #[test]

@@ -12,9 +12,9 @@ mod page;
 mod title;
 mod window;
 
-pub use collect::{Line, OrganiseError, PEN_LIMIT, Stored, organise};
+pub use collect::{Line, OrganiseError, Stored, organise};
 pub use page::{Bounds, Page, PageError, PageMap, StepsPerMillimetre};
-pub use title::Title;
+pub use title::{Title, TitleText, is_in_font};
 
 use bytemuck::{Pod, Zeroable};
 

@@ -1,8 +1,9 @@
-//! No stretch of paper is inked twice by one pen: collinear segments that overlap are drawn once.
+//! No stretch of paper is inked twice: collinear segments that overlap are drawn once.
 //!
-//! Segments are sorted by pen, by the straight line that they lie on, then full before dotted before dashed, then by
-//! where they begin. Each is then cut to what those before it in that order leave free. All is exact on
-//! the points of the page, and every cut is at a point that another segment has, so no point is new.
+//! Segments are sorted by the straight line that they lie on, then by rank (full before dotted before dashed
+//! before a full one that yields, the lower pen before the higher), then by where they begin. Each is then cut to what
+//! those before it in that order leave free. All is exact on the points of the page, and every cut is at a point that
+//! another segment has, so no point is new.
 
 use super::PagePoint;
 use crate::stage::{Attention, OutOfScratch, StageError, heap_sort_attentively};
@@ -16,21 +17,19 @@ type Place = (i32, i32);
 
 /// What a segment is sorted by.
 struct Key {
-    pen: u32,
     slope: u32,
     from: Place,
     to: Place,
-    line_type: u32,
+    rank: u32,
 }
 
 impl Key {
     fn of(segment: &Loose, points: &[PagePoint]) -> Self {
         Self {
-            pen: segment[1] & 0xFF,
             slope: segment[2],
             from: End::first(segment, points).place,
             to: End::second(segment, points).place,
-            line_type: segment[1] >> 8,
+            rank: segment[1],
         }
     }
 
@@ -52,10 +51,10 @@ impl Key {
         }
     }
 
-    /// Pen, direction and distance from the origin.
+    /// Direction and distance from the origin.
     fn compare_line(&self, other: &Self) -> Ordering {
         let ((ax, ay), (bx, by)) = (self.direction(), other.direction());
-        let fast = self.pen.cmp(&other.pen).then(self.slope.cmp(&other.slope));
+        let fast = self.slope.cmp(&other.slope);
         fast.then_with(|| (ay * bx).cmp(&(by * ax))).then_with(|| {
             // Twice the area with the origin, below 2^43, by the length along the longer axis.
             let area = |key: &Self, (dx, dy): (i64, i64)| {
@@ -71,7 +70,7 @@ impl Key {
 impl Ord for Key {
     fn cmp(&self, other: &Self) -> Ordering {
         self.compare_line(other)
-            .then_with(|| self.line_type.cmp(&other.line_type))
+            .then_with(|| self.rank.cmp(&other.rank))
             .then_with(|| self.from.cmp(&other.from))
             .then_with(|| self.to.cmp(&other.to))
     }
@@ -92,7 +91,7 @@ impl Eq for Key {}
 const SEGMENTS_BETWEEN_CHECKS: usize = 64;
 
 /// Cuts the first `count` of `segments` until none overlap, and returns how many there are then. More
-/// than before only where a full line lies inside a dotted or dashed one.
+/// than before only where a line lies inside another that yields to it.
 ///
 /// # Errors
 /// [`StageError::Scratch`] if those do not fit.
@@ -115,11 +114,10 @@ pub(super) fn ink_once(
     }
     heap_sort_attentively(sorted, |segment| Key::of(segment, points), attention)?;
 
-    // Pieces stand at the front; those that find no room there, from `count` on. Both are runs of each line type,
-    // sorted and disjoint: `starts` is where those of the line in hand begin.
+    // Pieces stand at the front; those that find no room there, from `count` on. On both sides those of the line in
+    // hand, from `starts` on, are runs of one rank each, sorted and disjoint.
     let mut ends = [0, count];
-    let mut starts = [ends; TYPES];
-    let mut line_type = 0;
+    let mut starts = ends;
     let mut last: Option<Key> = None;
     for read in 0..count {
         if read % SEGMENTS_BETWEEN_CHECKS == 0 {
@@ -128,26 +126,24 @@ pub(super) fn ink_once(
         let segment = segments[read];
         let key = Key::of(&segment, points);
         if last.as_ref().is_none_or(|last| last.compare_line(&key) != Ordering::Equal) {
-            (starts, line_type) = ([ends; TYPES], 0);
-        }
-        while line_type < (key.line_type as usize).min(TYPES - 1) {
-            line_type += 1;
-            starts[line_type] = ends;
+            starts = ends;
         }
         let (mut from, to) = (End::first(&segment, points), End::second(&segment, points));
         while from.place < to.place {
             // How far this place is covered; else where the next cover begins.
             let (mut reach, mut next) = (from, to);
-            for (run, start) in starts.iter().enumerate().take(line_type + 1) {
-                let limit = if run == line_type { ends } else { starts[run + 1] };
-                for side in 0..2 {
-                    let pieces = segments.get(start[side]..limit[side]).unwrap_or(&[]);
+            for side in 0..2 {
+                let mut pieces = segments.get(starts[side]..ends[side]).unwrap_or(&[]);
+                while let Some(&[_, rank, _]) = pieces.first() {
+                    let of_rank = pieces.partition_point(|piece| piece[1] <= rank);
+                    let (run, rest) = pieces.split_at(of_rank);
+                    pieces = rest;
                     let begun = |piece: &Loose| End::first(piece, points).place <= from.place;
-                    let after = pieces.partition_point(begun);
-                    if let Some(piece) = after.checked_sub(1).and_then(|at| pieces.get(at)) {
+                    let after = run.partition_point(begun);
+                    if let Some(piece) = after.checked_sub(1).and_then(|at| run.get(at)) {
                         reach = reach.max(End::second(piece, points));
                     }
-                    if let Some(piece) = pieces.get(after) {
+                    if let Some(piece) = run.get(after) {
                         next = next.min(End::first(piece, points));
                     }
                 }
@@ -167,9 +163,6 @@ pub(super) fn ink_once(
     segments.copy_within(count..ends[1], ends[0]);
     Ok(ends[0] + ends[1] - count)
 }
-
-/// Full, dotted, dashed.
-const TYPES: usize = 3;
 
 /// An end of a segment, with its point's number.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -1,8 +1,8 @@
 //! The sheet: where on it the drawing goes, and the map from the image to steps.
 
 use super::window::Window;
-use super::{PAGE_LIMIT, PagePoint};
-use crate::fixed::{Millimetres, divide_rounding};
+use super::{PAGE_LIMIT, PagePoint, Title};
+use crate::fixed::{Millimetres, divide, divide_rounding};
 use crate::geometry::{Projection, Vertex};
 use crate::model::Position;
 use crate::visibility::Along;
@@ -16,6 +16,8 @@ pub struct Page {
     pub height: Millimetres,
     /// Kept free on all four sides.
     pub margin: Millimetres,
+    /// Kept free below the drawing, for its title; 0 without one.
+    pub foot: Millimetres,
 }
 
 /// Why the drawing does not go on the page.
@@ -31,6 +33,15 @@ pub enum PageError {
         width: i64,
         /// Size of the plan along y, in units of 2^-16 mm.
         height: i64,
+        /// What its title takes along y, in units of 2^-16 mm.
+        foot: i64,
+    },
+    /// The title is wider than the free part of the page.
+    TitleTooWide {
+        /// Its width.
+        width: Millimetres,
+        /// What there is.
+        free: Millimetres,
     },
 }
 
@@ -177,16 +188,15 @@ impl PageMap {
         let shift = SCALE_BITS as i32 + bits(denominator) - bits(largest);
         let k = (shift + 32 - unit_bits as i32).clamp(0, FINEST as i32);
         let shift = k - 32 + unit_bits as i32;
+        let (up, down) = (shift.max(0), (-shift).max(0));
         let a = numerator.map(|numerator| {
-            let scaled = if shift >= 0 {
-                (numerator << shift) / denominator
-            } else {
-                numerator / (denominator << -shift)
-            };
-            scaled as i64 // below 2^42 by the choice of k
+            // Below 2^42 by the choice of k.
+            divide(numerator << up, denominator << down) as i64
         });
         let b = [0, 1].map(|axis: usize| {
-            let side = i128::from(side_steps(page, steps, axis)) << k;
+            // The drawing and what is below it are centred together.
+            let side =
+                i128::from(side_steps(page, steps, axis) + foot_steps(page, steps, axis)) << k;
             let middle = i128::from(bounds.low[axis]) + i128::from(bounds.high[axis]);
             side / 2 - ((i128::from(a[axis]) * middle) >> (unit_bits + 1))
         });
@@ -216,12 +226,14 @@ impl PageMap {
         let to_page = |value: i64| (i128::from(value) << 16) >> fraction_bits;
         let size = [0, 1].map(|axis: usize| to_page(bounds.high[axis] - bounds.low[axis]));
         if size[0] > i128::from(free[0]) || size[1] > i128::from(free[1]) {
-            return Err(PageError::DoesNotFit { width: size[0] as i64, height: size[1] as i64 });
+            let [width, height] = size.map(|size| size as i64);
+            let foot = page.foot.to_bits().into();
+            return Err(PageError::DoesNotFit { width, height, foot });
         }
-        let margin = i128::from(page.margin.to_bits());
         let moved = [0, 1].map(|axis: usize| {
             let (low, high) = (to_page(bounds.low[axis]), to_page(bounds.high[axis]));
-            let (first, last) = (margin, margin + i128::from(free[axis]));
+            let first = i128::from(page.first(axis));
+            let last = first + i128::from(free[axis]);
             if low < first { first - low } else { (last - high).min(0) }
         });
         let bits = steps.map(|steps| i64::from(steps.to_bits()));
@@ -302,14 +314,53 @@ fn between(p: Vertex, q: Vertex, along: Along, projection: Projection) -> [i64; 
 }
 
 impl Page {
-    /// What the margins leave, in units of 2^-16 mm.
+    /// What the margins and the title leave, in units of 2^-16 mm.
     fn free(&self) -> Result<[u64; 2], PageError> {
-        let margins = 2 * i64::from(self.margin.to_bits());
-        let free = [self.width, self.height].map(|side| i64::from(side.to_bits()) - margins);
+        let margin = i64::from(self.margin.to_bits());
+        let free = [(self.width, 0), (self.height, 1)]
+            .map(|(side, axis)| i64::from(side.to_bits()) - margin - self.first(axis));
         match free {
             [width, height] if width > 0 && height > 0 => Ok([width as u64, height as u64]),
             _ => Err(PageError::NoRoom),
         }
+    }
+
+    /// Where along an axis the drawing may begin, in units of 2^-16 mm.
+    pub(super) fn first(&self, axis: usize) -> i64 {
+        let foot = if axis == 0 { 0 } else { self.foot.to_bits() };
+        i64::from(self.margin.to_bits()) + i64::from(foot)
+    }
+
+    /// Where a title goes on the page: left end and baseline, below a drawing in the middle between
+    /// `left` and `right`, and down to `bottom` (steps); moved to be within the margins.
+    ///
+    /// # Errors
+    /// [`PageError::TitleTooWide`], [`PageError::NoRoom`].
+    pub fn place_title(
+        &self,
+        title: &Title<'_>,
+        [left, right, bottom]: [i32; 3],
+        steps: StepsPerMillimetre,
+    ) -> Result<[Millimetres; 2], PageError> {
+        let free = self.width.saturating_sub(self.margin).saturating_sub(self.margin);
+        let width = title.width();
+        if free <= 0 {
+            return Err(PageError::NoRoom);
+        }
+        if width > free {
+            return Err(PageError::TitleTooWide { width, free });
+        }
+        // Steps within 2^21, by millimetres of 2^16: the page has less than 2^20 steps.
+        let millimetres = |steps: i64, per_millimetre: Millimetres| {
+            Millimetres::from_bits(
+                ((steps << 32) / i64::from(per_millimetre.to_bits()).max(1)) as i32,
+            )
+        };
+        let middle = millimetres((i64::from(left) + i64::from(right)) / 2, steps[0]);
+        let last = self.margin.saturating_add(free - width);
+        let x = middle.saturating_sub(width / 2).clamp(self.margin, last);
+        let y = millimetres(bottom.into(), steps[1]).saturating_sub(title.rise());
+        Ok([x, y.max(self.margin.saturating_add(title.depth()))])
     }
 
     fn check_steps(&self, steps: StepsPerMillimetre) -> Result<(), PageError> {
@@ -326,13 +377,22 @@ fn side_steps(page: &Page, steps: StepsPerMillimetre, axis: usize) -> i64 {
     (i64::from(side.to_bits()) * i64::from(steps[axis].to_bits())) >> 32
 }
 
+/// What is kept free below the drawing, in steps.
+fn foot_steps(page: &Page, steps: StepsPerMillimetre, axis: usize) -> i64 {
+    if axis == 0 {
+        0
+    } else {
+        (i64::from(page.foot.to_bits()) * i64::from(steps[1].to_bits())) >> 32
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn page(width: i32, height: i32, margin: i32) -> Page {
         let [width, height, margin] = [width, height, margin].map(Millimetres::from_num);
-        Page { width, height, margin }
+        Page { width, height, margin, foot: Millimetres::ZERO }
     }
 
     fn steps(x: i32, y: i32) -> StepsPerMillimetre {
@@ -425,7 +485,7 @@ mod tests {
         let size = |mm: i64| mm << 16;
         assert_eq!(
             true_size([[0, 0], [191, 5]], &a4()),
-            Err(PageError::DoesNotFit { width: size(191), height: size(5) })
+            Err(PageError::DoesNotFit { width: size(191), height: size(5), foot: 0 })
         );
         let positions = plan([[0, 0], [380, 5]]);
         let bounds = Bounds::around_plan(positions.into_iter()).unwrap();

@@ -1,7 +1,7 @@
 //! A title in a vector font: the Hershey Roman Simplex, with all letters of Latin-1 and Latin-9.
 //!
 //! A [`Title`] is a text and its size; it gives its width, so that it can be centred, and its pen-down
-//! lines on the page, one after the other. Nothing is stored: the font stays in flash (5 KB, see
+//! lines on the page, one after the other. A [`TitleText`] keeps a text of its own. The font stays in flash (5 KB, see
 //! `font/LICENCE.txt`) and is read as it is drawn. A character that the font lacks becomes a box, and
 //! [`Title::unknown`] tells it.
 //!
@@ -11,8 +11,27 @@
 
 use super::{PAGE_LIMIT, PagePoint, StepsPerMillimetre};
 use crate::fixed::{Millimetres, divide_rounding};
+use core::cmp::Ordering;
 
 const FONT: &str = include_str!("font/simplex.txt");
+
+/// Where each line of the font begins, and its end: they stand in the order of their letters.
+const STARTS: [u16; GLYPHS + 1] = starts();
+const GLYPHS: usize = 158;
+
+const fn starts() -> [u16; GLYPHS + 1] {
+    let font = FONT.as_bytes();
+    let (mut starts, mut line, mut at) = ([0; GLYPHS + 1], 0, 0);
+    while at < font.len() {
+        at += 1;
+        if font[at - 1] == b'\n' {
+            line += 1;
+            starts[line] = at as u16; // the font has 5 KB
+        }
+    }
+    assert!(line == GLYPHS, "another number of letters");
+    starts
+}
 
 /// Height of the capitals in the font's units.
 const CAPITAL_HEIGHT: i32 = 21;
@@ -41,9 +60,13 @@ const ACCENTED: &str = "\
 /// let title = Title { text: "Übersicht", height: Millimetres::from_num(5) };
 /// assert_eq!(title.unknown(), None);
 /// let steps = [Millimetres::from_num(80); 2];
-/// let lines = title.lines(Millimetres::from_num(10), Millimetres::from_num(20), steps);
-/// // Every line of the letters lies above the baseline, at 20 mm.
-/// assert!(lines.flatten().all(|point| point.x >= 800 && point.y >= 1600));
+/// let [left, baseline] = [10, 20].map(Millimetres::from_num);
+/// let drawn = title.draw::<()>(left, baseline, steps, &mut |line| {
+///     // Every line of these letters lies above the baseline.
+///     assert!(line.iter().all(|point| point.x >= 800 && point.y >= 1600));
+///     Ok(())
+/// });
+/// assert_eq!(drawn, Ok(()));
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Title<'t> {
@@ -53,11 +76,15 @@ pub struct Title<'t> {
     pub height: Millimetres,
 }
 
-impl<'t> Title<'t> {
+impl Title<'_> {
     /// How wide it is, the space beside the first and last letter included; at most the largest length.
     pub fn width(&self) -> Millimetres {
-        let units = placed(self.text).last().map_or(0, |letter| letter.end);
-        let bits = i64::from(units) * i64::from(self.height.to_bits()) / i64::from(CAPITAL_HEIGHT);
+        let mut line = TypeLine::default();
+        for letter in self.text.chars() {
+            line.set(letter, &mut |_| {});
+        }
+        let bits =
+            i64::from(line.end) * i64::from(self.height.to_bits()) / i64::from(CAPITAL_HEIGHT);
         Millimetres::from_bits(i32::try_from(bits).unwrap_or(i32::MAX))
     }
 
@@ -66,38 +93,112 @@ impl<'t> Title<'t> {
         self.height / 3
     }
 
-    /// The first character that the font lacks.
-    pub fn unknown(&self) -> Option<char> {
-        self.text.chars().flat_map(decomposed).find(|letter| Glyph::find(*letter).is_none())
+    /// From the baseline up to the drawing: the capitals, and as much again for accents and a gap.
+    pub fn rise(&self) -> Millimetres {
+        self.height * 2
     }
 
-    /// Its straight lines on the page, letter by letter, each stroke's in order.
+    /// The first character that the font lacks.
+    pub fn unknown(&self) -> Option<char> {
+        self.text.chars().find(|letter| !is_in_font(*letter))
+    }
+
+    /// Hands over its straight lines on the page, letter by letter, each stroke's in order.
     ///
     /// The text begins at `left` and stands on `baseline`. What passes ±2^20 steps is moved there.
-    pub fn lines(
+    ///
+    /// # Errors
+    /// What `each` returns.
+    pub fn draw<E>(
         &self,
         left: Millimetres,
         baseline: Millimetres,
         steps: StepsPerMillimetre,
-    ) -> impl Iterator<Item = [PagePoint; 2]> + Clone + use<'t> {
-        let height = i128::from(self.height.to_bits());
+        each: &mut dyn FnMut([PagePoint; 2]) -> Result<(), E>,
+    ) -> Result<(), E> {
         // Millimetres times steps for each are units of 2^-32 step.
-        let on_axis = move |origin: Millimetres, units: i32, axis: usize| {
-            let length = i128::from(origin.to_bits()) * i128::from(CAPITAL_HEIGHT)
-                + i128::from(units) * height;
-            let steps = length * i128::from(steps[axis].to_bits());
+        let on_axis = |origin: Millimetres, units: i32, axis: usize| {
+            // Below 2^63; what is saturated lies beyond the page as well.
+            let length = i64::from(origin.to_bits()) * i64::from(CAPITAL_HEIGHT)
+                + i64::from(units) * i64::from(self.height.to_bits());
+            let steps = length.saturating_mul(steps[axis].to_bits().into());
             let limit = i128::from(PAGE_LIMIT);
-            let rounded = divide_rounding(steps, i128::from(CAPITAL_HEIGHT) << 32);
+            let rounded = divide_rounding(steps.into(), i128::from(CAPITAL_HEIGHT) << 32);
             rounded.clamp(-limit, limit) as i32
         };
-        placed(self.text).flat_map(move |letter| {
-            letter.glyph.lines().map(move |line| {
-                line.map(|[x, y]| PagePoint {
-                    x: on_axis(left, letter.x + x, 0),
-                    y: on_axis(baseline, letter.rise + BASELINE - y, 1),
-                })
-            })
-        })
+        let mut line = TypeLine::default();
+        let mut outcome = Ok(());
+        for letter in self.text.chars() {
+            line.set(letter, &mut |Placed { glyph, x, rise }| {
+                let mut before = None;
+                for point in glyph.points.chunks_exact(2) {
+                    let here = match *point {
+                        [right, down] if right != b' ' => Some(PagePoint {
+                            x: on_axis(left, x + offset(right), 0),
+                            y: on_axis(baseline, rise + BASELINE - offset(down), 1),
+                        }),
+                        _ => None,
+                    };
+                    if let (Some(from), Some(to), Ok(())) = (before, here, &outcome) {
+                        outcome = each([from, to]);
+                    }
+                    before = here;
+                }
+            });
+        }
+        outcome
+    }
+}
+
+/// Whether the font has a letter, with its accent.
+pub fn is_in_font(letter: char) -> bool {
+    let (base, accent) = decomposed(letter);
+    Glyph::find(base).is_some() && accent.is_none_or(|accent| Glyph::find(accent).is_some())
+}
+
+/// A text of a few words, kept with its owner.
+///
+/// ```
+/// use penup::drawing::TitleText;
+/// assert_eq!(TitleText::new("Café".chars()).unwrap().as_str(), "Café");
+/// assert_eq!(TitleText::new(core::iter::repeat_n('x', 81)), None);
+/// assert_eq!(TitleText::default().as_str(), "");
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TitleText {
+    /// UTF-8.
+    bytes: [u8; TitleText::LIMIT],
+    length: u8,
+}
+
+impl TitleText {
+    /// The longest text, in bytes of UTF-8.
+    pub const LIMIT: usize = 80;
+
+    /// These letters; `None` if they are too many.
+    #[inline(never)] // Its frame must not lie under the stages'.
+    pub fn new(letters: impl Iterator<Item = char>) -> Option<Self> {
+        let mut text = Self::default();
+        for letter in letters {
+            let start = usize::from(text.length);
+            let place = text.bytes.get_mut(start..start + letter.len_utf8())?;
+            text.length += letter.encode_utf8(place).len() as u8;
+        }
+        Some(text)
+    }
+
+    /// What it says.
+    pub fn as_str(&self) -> &str {
+        // Whole letters were put in, so it is UTF-8.
+        let bytes = self.bytes.get(..usize::from(self.length)).unwrap_or(&[]);
+        core::str::from_utf8(bytes).unwrap_or("")
+    }
+}
+
+impl Default for TitleText {
+    /// No text.
+    fn default() -> Self {
+        Self { bytes: [0; Self::LIMIT], length: 0 }
     }
 }
 
@@ -111,25 +212,28 @@ struct Glyph {
 
 impl Glyph {
     fn find(letter: char) -> Option<Self> {
-        let line = FONT.lines().find_map(|line| line.strip_prefix(letter))?;
-        match line.as_bytes() {
-            [left, right, points @ ..] => {
-                Some(Self { left: offset(*left), right: offset(*right), points })
-            }
-            _ => None,
-        }
-    }
-
-    /// Its straight lines in the font's units.
-    fn lines(self) -> impl Iterator<Item = [[i32; 2]; 2]> + Clone {
-        let points = || {
-            self.points.chunks_exact(2).map(|point| match point {
-                [b' ', _] => None,
-                [x, y] => Some([offset(*x), offset(*y)]),
-                _ => None,
-            })
+        let line = |at: usize| {
+            let [start, end] = [STARTS.get(at)?, STARTS.get(at + 1)?].map(|at| usize::from(*at));
+            FONT.get(start..end)
         };
-        points().zip(points().skip(1)).filter_map(|(from, to)| Some([from?, to?]))
+        let (mut low, mut high) = (0, GLYPHS);
+        while low < high {
+            let middle = (low + high) / 2;
+            let mut letters = line(middle)?.chars();
+            match letters.next()?.cmp(&letter) {
+                Ordering::Less => low = middle + 1,
+                Ordering::Greater => high = middle,
+                Ordering::Equal => {
+                    return match letters.as_str().trim_ascii_end().as_bytes() {
+                        [left, right, points @ ..] => {
+                            Some(Self { left: offset(*left), right: offset(*right), points })
+                        }
+                        _ => None,
+                    };
+                }
+            }
+        }
+        None
     }
 }
 
@@ -145,39 +249,47 @@ struct Placed {
     x: i32,
     /// Above where it would be by itself.
     rise: i32,
+}
+
+/// The letters set so far, side by side, each accent over the letter before it.
+#[derive(Debug, Default)]
+struct TypeLine {
     /// Where the next letter begins.
     end: i32,
+    /// The middle of the last letter.
+    middle: i32,
+    /// By how much an accent on it is raised.
+    rise: i32,
 }
 
-/// The letters side by side, each accent over the letter before it.
-fn placed(text: &str) -> impl Iterator<Item = Placed> + Clone {
-    let nothing = Glyph { left: 0, right: 0, points: &[] };
-    // The end of the text so far; the middle of the last letter and the rise of an accent on it.
-    text.chars().flat_map(decomposed).scan((0i32, 0, 0), move |(end, middle, rise), letter| {
-        let glyph = Glyph::find(letter).or_else(|| Glyph::find(BOX)).unwrap_or(nothing);
-        if is_accent(letter) {
-            let rise = if letter == '\u{327}' { 0 } else { *rise };
-            return Some(Placed { glyph, x: *middle, rise, end: *end });
+impl TypeLine {
+    /// Sets a letter, or a box if the font lacks it, and its accent.
+    fn set(&mut self, letter: char, each: &mut dyn FnMut(Placed)) {
+        let (base, accent) = decomposed(letter);
+        for letter in [Some(base), accent].into_iter().flatten() {
+            let Some(glyph) = Glyph::find(letter).or_else(|| Glyph::find(BOX)) else { continue };
+            let mut rise = 0;
+            if ('\u{300}'..='\u{36F}').contains(&letter) {
+                rise = if letter == '\u{327}' { 0 } else { self.rise };
+            } else {
+                self.middle = self.end.saturating_sub(glyph.left);
+                self.end = self.middle.saturating_add(glyph.right);
+                self.rise = if letter.is_ascii_uppercase() { ACCENT_RISE } else { 0 };
+            }
+            each(Placed { glyph, x: self.middle, rise });
         }
-        let x = end.saturating_sub(glyph.left);
-        *end = x.saturating_add(glyph.right);
-        *middle = x;
-        *rise = if letter.is_uppercase() { ACCENT_RISE } else { 0 };
-        Some(Placed { glyph, x, rise: 0, end: *end })
-    })
-}
-
-fn is_accent(letter: char) -> bool {
-    ('\u{300}'..='\u{36F}').contains(&letter)
+    }
 }
 
 /// The letter without its accent, and the accent.
-fn decomposed(letter: char) -> impl Iterator<Item = char> + Clone {
-    let mut rest = ACCENTED.chars();
-    let parts = core::iter::from_fn(|| Some([rest.next()?, rest.next()?, rest.next()?]))
-        .find(|[composed, ..]| *composed == letter && !letter.is_ascii());
-    let (base, accent) = parts.map_or((letter, None), |[_, base, accent]| (base, Some(accent)));
-    core::iter::once(base).chain(accent)
+fn decomposed(letter: char) -> (char, Option<char>) {
+    let mut rest = if letter.is_ascii() { "" } else { ACCENTED }.chars();
+    while let (Some(composed), Some(base), accent) = (rest.next(), rest.next(), rest.next()) {
+        if composed == letter {
+            return (base, accent);
+        }
+    }
+    (letter, None)
 }
 
 #[cfg(test)]
@@ -191,11 +303,26 @@ mod tests {
         Millimetres::from_num(length)
     }
 
+    fn lines(
+        title: Title<'_>,
+        left: Millimetres,
+        baseline: Millimetres,
+        steps: StepsPerMillimetre,
+    ) -> Vec<[PagePoint; 2]> {
+        let mut lines = Vec::new();
+        let drawn: Result<(), ()> = title.draw(left, baseline, steps, &mut |line| {
+            lines.push(line);
+            Ok(())
+        });
+        assert_eq!(drawn, Ok(()));
+        lines
+    }
+
     /// One step to a unit of the font, the baseline at 0.
     fn drawn(text: &str) -> Vec<[(i32, i32); 2]> {
         let title = Title { text, height: mm(CAPITAL_HEIGHT) };
-        let lines = title.lines(mm(0), mm(0), [mm(1); 2]);
-        lines.map(|line| line.map(|point| (point.x, point.y))).collect()
+        let lines = lines(title, mm(0), mm(0), [mm(1); 2]);
+        lines.into_iter().map(|line| line.map(|point| (point.x, point.y))).collect()
     }
 
     fn width(text: &str) -> i32 {
@@ -287,12 +414,12 @@ mod tests {
     #[test]
     fn a_title_is_placed_and_scaled_in_millimetres() {
         let title = Title { text: "I", height: mm(21) };
-        let ends: Vec<_> = title.lines(mm(100), mm(50), [mm(10), mm(20)]).flatten().collect();
+        let ends = lines(title, mm(100), mm(50), [mm(10), mm(20)]).concat();
         let middle = 1000 + 10 * width("I") / 2;
         let expected = [PagePoint { x: middle, y: 1420 }, PagePoint { x: middle, y: 1000 }];
         assert_eq!(ends, expected);
         let far = Title { text: "I", height: Millimetres::MAX };
-        let limits = far.lines(mm(0), Millimetres::MAX, [mm(32_000); 2]).flatten();
+        let limits = lines(far, mm(0), Millimetres::MAX, [mm(32_000); 2]).concat();
         assert!(limits.into_iter().all(|point| point.y == PAGE_LIMIT));
     }
 }

@@ -13,13 +13,13 @@ pub(super) struct Window {
 
 impl Window {
     pub fn new(page: &Page, steps: StepsPerMillimetre) -> Self {
-        let to_fine = |bits: i32, axis: usize| {
-            (i64::from(bits) * i64::from(steps[axis].to_bits())) >> 24 // 32 fraction bits, 8 stay
+        let to_fine = |bits: i64, axis: usize| {
+            (bits * i64::from(steps[axis].to_bits())) >> 24 // 32 fraction bits, 8 stay
         };
-        let margin = page.margin.to_bits();
-        let far = [page.width, page.height].map(|side| side.to_bits() - margin);
+        let far = [page.width, page.height]
+            .map(|side| i64::from(side.to_bits()) - i64::from(page.margin.to_bits()));
         Self {
-            low: [0, 1].map(|axis: usize| to_fine(margin, axis)),
+            low: [0, 1].map(|axis: usize| to_fine(page.first(axis), axis)),
             high: [0, 1].map(|axis: usize| to_fine(far[axis], axis)),
         }
     }
@@ -71,7 +71,7 @@ mod tests {
 
     fn window() -> Window {
         let [width, height, margin, steps] = [100, 60, 10, 10].map(Millimetres::from_num);
-        Window::new(&Page { width, height, margin }, [steps; 2])
+        Window::new(&Page { width, height, margin, foot: Millimetres::ZERO }, [steps; 2])
     }
 
     fn clipped(ends: [[i64; 2]; 2]) -> Option<[[i32; 2]; 2]> {

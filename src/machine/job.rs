@@ -5,6 +5,9 @@ use super::{Alarm, JobSize, Kinematics, Machine, MachineError, Path, Setting, St
 use crate::drawing::{PAGE_LIMIT, PagePoint};
 use crate::motion::{EventQueue, PathLength, Progress, Runner};
 
+/// A turn of the main loop may take so long: 20 ms, while it writes to the serial line.
+const LATE_TICKS: u32 = crate::motion::TICKS_PER_SECOND / 50;
+
 impl Machine<'_> {
     /// Measures the path from where the machine stands, and begins to draw it if all of it can be
     /// drawn (in [`State::Check`] it is only measured).
@@ -57,8 +60,11 @@ impl Machine<'_> {
     }
 
     fn greatest_ahead(&self) -> u32 {
-        // A switch is to stop the machine soon: 10 ms.
-        if self.homing.is_some() { self.ahead_ticks.min(250_000) } else { self.ahead_ticks }
+        // Less would slow the machine whenever the main loop is late by that much.
+        let stopping = self.runner.stopping_ticks().saturating_add(LATE_TICKS);
+        // A switch is to stop the machine soon.
+        let ahead = if self.homing.is_some() { LATE_TICKS } else { self.ahead_ticks };
+        ahead.max(stopping)
     }
 
     fn stand(&mut self, progress: Progress) {
@@ -123,7 +129,8 @@ impl Machine<'_> {
         path.rewind();
         let mut size = JobSize::default();
         let mut at = self.runner.page_end();
-        let mut inked = false;
+        // Another pen begins another stroke, where the last one ended too.
+        let (mut inked, mut pen) = (false, self.pen);
         let mut estimate = Estimate::default();
         let mut number = 0u32;
         while let Some(Target { point, ink }) = path.next_target() {
@@ -138,11 +145,11 @@ impl Machine<'_> {
             estimate.add(&self.settings, (dx, dy), ink.is_some(), length);
             if ink.is_some() {
                 size.drawn += length;
-                size.strokes += u32::from(!inked);
+                size.strokes += u32::from(!inked || path.pen() != pen);
             } else {
                 size.travelled += length;
             }
-            inked = ink.is_some();
+            (inked, pen) = (ink.is_some(), path.pen());
             at = point;
             number = number.saturating_add(1);
         }

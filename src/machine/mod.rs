@@ -22,7 +22,7 @@ use homing::Homing;
 pub use homing::{Axis, Contacts, Switches};
 pub use kinematics::{Anchors, Kinematics};
 pub use path::{JobSize, Path, TapePath, Target, TargetList};
-pub use pulser::{Axes, Pen, Pins, Pulser, PulserState, Solenoid};
+pub use pulser::{Axes, Pen, Pins, Pulser, PulserState, Solenoid, StepQueue};
 pub use settings::{SETTING_COUNT, SETTINGS, Setting, SettingError, SettingInfo, Settings, Value};
 use split::Split;
 pub use status::Status;
@@ -134,8 +134,8 @@ impl<'m> Machine<'m> {
     /// A machine at rest at the page's origin, pen raised; in alarm if it must be homed first.
     ///
     /// `blocks` is the look-ahead (24 bytes each; one at least, 100 or more serve well). `ahead_ticks` is how far
-    /// the queue may be planned ahead of the pins, and so how late a hold takes effect;
-    /// `u32::MAX` for no bound but the queue's.
+    /// the queue is planned ahead of the pins, or further if the machine could not stop within that
+    /// should the main loop be late; so late a hold takes effect. `u32::MAX` for no bound but the queue's.
     pub fn new(
         settings: Settings,
         blocks: &'m mut [Block],
@@ -341,10 +341,14 @@ impl<'m> Machine<'m> {
             && (self.pins.is_halted() || self.pins.ticks() == self.runner.ticks())
     }
 
-    fn configure_pulser(&self) {
+    /// While nothing moves.
+    fn configure_pulser(&mut self) {
         self.pins.configure(
             self.settings.microseconds_as_ticks(Setting::StepPulse),
             self.settings.get(Setting::InvertDirections).saturating_to_num(),
         );
+        let rule = self.settings.brake(self.pins.queue());
+        self.runner.set_brake(rule);
+        self.pins.brake().set_rule(rule);
     }
 }

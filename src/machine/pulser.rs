@@ -1,10 +1,10 @@
 //! The step interrupt's work, and what it tells the main loop.
 
-use crate::motion::{EventKind, StepEvent};
+use crate::motion::{Brake, BrakeOrders, EventKind, EventQueue, QueueSize, StepEvent, StepLength};
 use core::convert::Infallible;
 use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 use embedded_hal::digital::{OutputPin, PinState};
-use heapless::spsc::Consumer;
+use heapless::spsc::{Consumer, Producer, Queue};
 
 /// What the interrupt and the main loop share. Only loads and stores, so a Cortex-M0+ has it too.
 ///
@@ -19,6 +19,9 @@ pub struct PulserState {
     halt: AtomicBool,
     pulse_ticks: AtomicU32,
     inverted: AtomicU8,
+    queue_steps: AtomicU32,
+    queue_rate: AtomicU32,
+    brake: BrakeOrders,
 }
 
 impl PulserState {
@@ -33,6 +36,9 @@ impl PulserState {
             halt: AtomicBool::new(false),
             pulse_ticks: AtomicU32::new(50),
             inverted: AtomicU8::new(0),
+            queue_steps: AtomicU32::new(QueueSize::ENDLESS.steps),
+            queue_rate: AtomicU32::new(QueueSize::ENDLESS.greatest_rate),
+            brake: BrakeOrders::new(),
         }
     }
 
@@ -103,6 +109,73 @@ impl PulserState {
         self.pulse_ticks.store(pulse_ticks, Ordering::Relaxed);
         self.inverted.store(inverted, Ordering::Relaxed);
     }
+
+    /// What the board's queue holds; before the machine asks.
+    pub fn set_queue(&self, queue: QueueSize) {
+        self.queue_steps.store(queue.steps, Ordering::Relaxed);
+        self.queue_rate.store(queue.greatest_rate, Ordering::Relaxed);
+    }
+
+    /// The same; without a board it has no end.
+    pub(super) fn queue(&self) -> QueueSize {
+        QueueSize {
+            steps: self.queue_steps.load(Ordering::Relaxed),
+            greatest_rate: self.queue_rate.load(Ordering::Relaxed),
+        }
+    }
+
+    /// How a queue that runs dry brakes.
+    pub fn brake(&self) -> &BrakeOrders {
+        &self.brake
+    }
+}
+
+/// The main loop's end of the interrupt's queue.
+pub struct StepQueue<'q> {
+    events: Producer<'q, StepEvent>,
+    state: &'q PulserState,
+    /// Of the steps put in last, in units of the brake's rule.
+    step_length: StepLength,
+}
+
+impl core::fmt::Debug for StepQueue<'_> {
+    fn fmt(&self, formatter: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        formatter.debug_struct("StepQueue").field("len", &self.events.len()).finish_non_exhaustive()
+    }
+}
+
+impl StepQueue<'_> {
+    /// Whether no event waits.
+    pub fn is_empty(&self) -> bool {
+        self.events.is_empty()
+    }
+
+    /// Whether half of the places are taken.
+    pub fn is_half_full(&self) -> bool {
+        self.events.len() >= self.events.capacity() / 2
+    }
+}
+
+impl EventQueue for StepQueue<'_> {
+    fn room(&self) -> usize {
+        self.events.capacity() - self.events.len()
+    }
+
+    fn push(&mut self, event: StepEvent) -> Result<(), StepEvent> {
+        self.events.enqueue(event)?;
+        if event.is_step() {
+            self.state.brake.add(self.step_length.step().around);
+        }
+        Ok(())
+    }
+
+    fn set_step_length(&mut self, units: u32, after_next: bool) -> Result<(), StepEvent> {
+        if units != self.step_length.last() {
+            self.events.enqueue(StepEvent::step_length(units, after_next))?;
+            self.step_length.set(units, after_next);
+        }
+        Ok(())
+    }
 }
 
 /// The pins of a machine. High steps, high direction counts up (unless inverted), high enable
@@ -171,8 +244,11 @@ pub struct Pulser<'q, A, P> {
     pen: P,
     events: Consumer<'q, StepEvent>,
     state: &'q PulserState,
-    /// Ticks that remain of the event whose pulse is high; 0 if none is.
-    after_pulse: u32,
+    /// Ticks of the event whose pulse is high; 0 if none is.
+    step_ticks: u32,
+    /// Keeps a queue that runs dry from stopping the machine with a jerk.
+    brake: Brake,
+    step_length: StepLength,
     /// Of the axes' pins without their pulses.
     levels: u8,
     /// The levels of the event whose pulse is high: it counts when the pulse ends.
@@ -190,9 +266,30 @@ impl<'q, A: Axes, P: Pen> Pulser<'q, A, P> {
     /// Ticks between two calls while there is nothing to do: 1 ms.
     pub const IDLE_TICKS: u32 = 25_000;
 
-    /// A pulser at rest. The pins stay as they are until the first event.
-    pub fn new(axes: A, pen: P, events: Consumer<'q, StepEvent>, state: &'q PulserState) -> Self {
-        Self { axes, pen, events, state, after_pulse: 0, levels: 0, pulse: 0, moving: false }
+    /// A pulser at rest, and the other end of its queue. The pins stay as they are until the first
+    /// event.
+    pub fn new<const N: usize>(
+        axes: A,
+        pen: P,
+        queue: &'q mut Queue<StepEvent, N>,
+        state: &'q PulserState,
+    ) -> (Self, StepQueue<'q>) {
+        let (producer, events) = queue.split();
+        state.set_queue(QueueSize { steps: producer.capacity() as u32, ..QueueSize::ENDLESS });
+        let (brake, step_length) = (Brake::default(), StepLength::default());
+        let pulser = Self {
+            axes,
+            pen,
+            events,
+            state,
+            step_ticks: 0,
+            brake,
+            step_length,
+            levels: 0,
+            pulse: 0,
+            moving: false,
+        };
+        (pulser, StepQueue { events: producer, state, step_length: StepLength::default() })
     }
 
     /// The work of one interrupt. Returns the ticks until the next, counted from the start of this
@@ -200,23 +297,32 @@ impl<'q, A: Axes, P: Pen> Pulser<'q, A, P> {
     /// [`Pulser::IDLE_TICKS`]).
     #[inline(always)]
     pub fn tick(&mut self) -> Option<u32> {
-        if self.after_pulse != 0 {
+        if self.step_ticks != 0 {
             self.axes.set(self.levels);
             // Bit 0 or 1 times 1, or -1 with the bit two above it.
             let step =
                 |levels: u8| u32::from(levels & 1) * 1u32.wrapping_sub(u32::from(levels >> 1 & 2));
             add(&self.state.x, step(self.pulse));
             add(&self.state.y, step(self.pulse >> 1));
-            let rest = core::mem::take(&mut self.after_pulse);
-            return Some(if self.halted() { Self::DISCARD_TICKS } else { rest });
+            let mut ticks = core::mem::take(&mut self.step_ticks);
+            let least = self.brake.step(self.step_length.step(), &self.state.brake);
+            if least > ticks {
+                ticks = ticks.max(self.without_what_follows(least));
+            }
+            if self.halted() {
+                return Some(Self::DISCARD_TICKS);
+            }
+            let pulse = self.state.pulse_ticks.load(Ordering::Relaxed);
+            return Some(if ticks > pulse { ticks - pulse } else { 1 });
         }
         let Some(event) = self.events.dequeue() else {
             return self.run_dry();
         };
+        if let Some((units, after_next)) = event.as_step_length() {
+            return self.set_step_length(units, after_next);
+        }
         if self.halted() {
-            self.moving = false;
-            self.pen.set_height(0);
-            return Some(Self::DISCARD_TICKS);
+            return Some(self.throw_away(event));
         }
         self.state.drained.store(false, Ordering::Relaxed);
         add(&self.state.ticks, event.ticks());
@@ -239,7 +345,7 @@ impl<'q, A: Axes, P: Pen> Pulser<'q, A, P> {
     /// Whether a pulse is high: [`Pulser::tick`] must not be called before its time.
     #[inline]
     pub fn pulse_is_high(&self) -> bool {
-        self.after_pulse != 0
+        self.step_ticks != 0
     }
 
     /// Raises the pen and switches the drivers off, whatever waits: for a panic or a fault.
@@ -251,6 +357,33 @@ impl<'q, A: Axes, P: Pen> Pulser<'q, A, P> {
     /// One thrown away event in 4 µs: 512 of them are gone in 2 ms, and other interrupts get
     /// their turn.
     const DISCARD_TICKS: u32 = 100;
+
+    /// The ticks from one step to the next, less those of an event between the two.
+    #[cold]
+    #[inline(never)]
+    fn without_what_follows(&self, ticks: u32) -> u32 {
+        let next = self.events.peek().filter(|next| next.is_wait());
+        ticks.saturating_sub(next.map_or(0, |wait| wait.ticks()))
+    }
+
+    /// Takes no time: the next call is due at once.
+    #[cold]
+    #[inline(never)]
+    fn set_step_length(&mut self, units: u32, after_next: bool) -> Option<u32> {
+        self.step_length.set(units, after_next);
+        Some(0)
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn throw_away(&mut self, event: StepEvent) -> u32 {
+        if event.is_step() {
+            self.brake.skip(self.step_length.step().around);
+        }
+        self.moving = false;
+        self.pen.set_height(0);
+        Self::DISCARD_TICKS
+    }
 
     #[inline(never)]
     fn run_dry(&mut self) -> Option<u32> {
@@ -277,10 +410,8 @@ impl<'q, A: Axes, P: Pen> Pulser<'q, A, P> {
         }
         self.levels = pins & !PULSES;
         self.pulse = levels;
-        let pulse = self.state.pulse_ticks.load(Ordering::Relaxed);
-        let ticks = event.ticks();
-        self.after_pulse = if ticks > pulse { ticks - pulse } else { 1 };
-        pulse
+        self.step_ticks = event.ticks().max(1);
+        self.state.pulse_ticks.load(Ordering::Relaxed)
     }
 }
 

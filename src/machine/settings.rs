@@ -6,7 +6,9 @@
 use super::{Anchors, Kinematics};
 use crate::drawing::{PAGE_LIMIT, PagePoint};
 use crate::fixed::Millimetres;
-use crate::motion::{Limits, LimitsError, MotionSettings, PenPositions, TICKS_PER_SECOND};
+use crate::motion::{
+    BrakeRule, Limits, LimitsError, MotionSettings, PenPositions, QueueSize, TICKS_PER_SECOND,
+};
 
 /// A value of any setting: ±32768 in units of 2^-16 of the setting's unit.
 pub type Value = Millimetres;
@@ -60,6 +62,8 @@ pub enum Setting {
     TravelSpeed,
     /// `$203` Whether bends of dense polylines are slowed to the acceleration limit.
     Centripetal,
+    /// `$204` The most by which acceleration along the path changes in a second, at least 0.1; 0 for no limit.
+    Jerk,
     /// `$210` Height of the raised pen.
     PenUpHeight,
     /// `$211` Height of the lowered pen.
@@ -113,7 +117,7 @@ pub struct SettingInfo {
 }
 
 /// How many settings there are.
-pub const SETTING_COUNT: usize = 36;
+pub const SETTING_COUNT: usize = 37;
 
 const fn info(
     setting: Setting,
@@ -163,6 +167,7 @@ pub const SETTINGS: [SettingInfo; SETTING_COUNT] = {
         info(DrawSpeed, 201, "speed pen down", "mm/min", (1.0, 32767.0, 3000.0), false),
         info(TravelSpeed, 202, "speed pen up", "mm/min", (1.0, 32767.0, 6000.0), false),
         info(Centripetal, 203, "slow in bends", "0|1", (0.0, 1.0, 1.0), true),
+        info(Jerk, 204, "jerk", "m/s3", (0.0, 1000.0, 0.0), false),
         info(PenUpHeight, 210, "height pen up", "of 127", (0.0, 127.0, 0.0), true),
         info(PenDownHeight, 211, "height pen down", "of 127", (0.0, 127.0, 127.0), true),
         info(PenUpDwell, 212, "dwell pen up", "ms", (1.0, 1300.0, 150.0), false),
@@ -319,13 +324,24 @@ impl Settings {
         self.checked_limits().unwrap_or_default()
     }
 
-    /// The same, but for the speed with the pen up, which is that of `travel`.
+    /// The same, but for the speed with the pen up, which is that of `travel`, and without a limit on
+    /// jerk: at a switch the machine is to brake soon.
     pub(super) fn limits_at(&self, travel: Setting) -> Limits {
         let settings = MotionSettings {
             travel_mm_per_min: self.get(travel).min(self.axes_rate()),
+            jerk_m_per_s3: Value::ZERO,
             ..self.motion_settings()
         };
         Limits::new(&settings).unwrap_or_else(|_| self.limits())
+    }
+
+    /// How a queue brakes if it runs dry.
+    pub(super) fn brake(&self, queue: QueueSize) -> BrakeRule {
+        let limits = self.limits();
+        let fastest = limits.fastest().max(self.limits_at(Setting::HomingSeek).fastest());
+        // The belts of a wall may run much slower than the pen.
+        let longer = if matches!(self.kinematics(), Kinematics::Polargraph(_)) { 8 } else { 1 };
+        limits.brake(fastest, longer, queue)
     }
 
     fn checked_limits(&self) -> Result<Limits, LimitsError> {
@@ -356,6 +372,7 @@ impl Settings {
             acceleration_mm_per_s2: self
                 .get(Setting::AccelerationX)
                 .min(self.get(Setting::AccelerationY)),
+            jerk_m_per_s3: self.get(Setting::Jerk),
             junction_deviation_mm: self.get(Setting::JunctionDeviation),
             centripetal: self.is_on(Setting::Centripetal),
             pulse_ticks: self.microseconds_as_ticks(Setting::StepPulse),

@@ -24,6 +24,11 @@ pub struct Status {
 }
 
 impl Machine<'_> {
+    /// The pen, from 0, that the machine waits for, or will when it stands.
+    pub fn pen_wanted(&self) -> Option<u8> {
+        self.next_pen.map(|(pen, _)| pen)
+    }
+
     /// Where it is, and how far the job is.
     pub fn status(&self) -> Status {
         let run = self.runner.run();
@@ -40,7 +45,7 @@ impl Machine<'_> {
             done,
             seconds_left: self.seconds_left(done),
             percent: self.percent,
-            pen_wanted: self.next_pen.map(|(pen, _)| pen),
+            pen_wanted: self.pen_wanted(),
         }
     }
 
@@ -62,6 +67,11 @@ impl Machine<'_> {
         // Days of milliseconds stay below 2^30.
         let left = (time.min(1 << 31) * bare(left).min(1 << 31)).checked_div(all).unwrap_or(0);
         u32::try_from(left / 10 / u64::from(self.percent)).unwrap_or(u32::MAX)
+    }
+
+    /// How often the queue ran dry while the machine moved: the main loop was late; wraps.
+    pub fn underruns(&self) -> u32 {
+        self.pins.underruns()
     }
 
     /// Where the pins are, in steps of the page.
@@ -150,6 +160,11 @@ impl Estimate {
         } else {
             2 * ((self.piece >> 2) * 1_000_000 / acceleration).isqrt()
         };
+        // Each change of speed takes as long as acceleration takes to be built up, about.
+        let jerk = u64::from(settings.get(Setting::Jerk).to_bits().unsigned_abs());
+        if let Some(ramp) = acceleration.checked_div(jerk) {
+            self.milliseconds += ramp.min((per_second * 1000 / jerk).isqrt());
+        }
         self.piece = 0;
     }
 }

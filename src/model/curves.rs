@@ -21,6 +21,8 @@ type Memory = heapless::VecView<Corner>;
 pub struct StoredCurve<'a> {
     /// Degree + 1.
     pub order: u8,
+    /// The pen that draws it, from 0.
+    pub pen: u8,
     /// The numbers of its control points, from 0.
     pub control: &'a [u16],
     /// Its knots.
@@ -122,8 +124,10 @@ struct InHand {
     fraction_bits: Option<u8>,
 }
 
-/// Half-words before the control points: how many control points, order, how many knots, nothing, both ends.
+/// Half-words before the control points: how many control points, order, how many knots, pen, both ends.
 const HEADER: usize = 8;
+/// Which of them is the pen.
+const PEN: usize = 3;
 
 /// The finest unit of a knot, 2^-22, which holds |knot| <= 1.
 const FINEST: u32 = 22;
@@ -147,12 +151,13 @@ impl CurveList {
         Ok(())
     }
 
-    /// `curv`: begins a curve from `from` to `to` over the points numbered `control`, from 0, which exist.
+    /// `curv`: begins a curve between two `ends` over the points numbered `control`, from 0, which exist.
     pub(super) fn begin(
         &mut self,
         memory: &mut Memory,
         ends: [Decimal; 2],
         control: impl Iterator<Item = u16> + Clone,
+        pen: u8,
     ) -> Result<(), ModelError> {
         if self.in_hand.is_some() {
             return Err(ModelError::CurveUnfinished);
@@ -168,7 +173,7 @@ impl CurveList {
             _ => return Err(ModelError::KnotTooLarge),
         };
         let control_points = control_points as u16; // at most 2^12
-        let header = [control_points, u16::from(order), 0, 0, 0, 0, 0, 0];
+        let header = [control_points, u16::from(order), 0, u16::from(pen), 0, 0, 0, 0];
         memory.extend(header.into_iter().chain(control).map(Corner));
         self.in_hand = Some(InHand { order, control_points, ends, fraction_bits: None });
         Ok(())
@@ -204,18 +209,21 @@ impl CurveList {
         Ok(())
     }
 
-    /// `end`: the curve in hand is whole. If it is refused it is forgotten.
+    /// `end`: completes the curve in hand, which [`CurveList::count_in`] then makes one of the model's. If it is
+    /// refused it is forgotten.
     pub(super) fn end(&mut self, memory: &mut Memory) -> Result<(), ModelError> {
         let in_hand = self.in_hand.take().ok_or(ModelError::NoCurve)?;
         let closed = self.close(memory, &in_hand);
-        match closed {
-            Ok(()) => {
-                self.whole = memory.len() - self.start;
-                self.count += 1;
-            }
-            Err(_) => memory.truncate(self.start + self.whole),
+        if closed.is_err() {
+            memory.truncate(self.start + self.whole);
         }
         closed
+    }
+
+    /// The memory up to `end` holds whole curves, one more than before.
+    pub(super) fn count_in(&mut self, end: usize) {
+        self.whole = end - self.start;
+        self.count += 1;
     }
 
     /// Checks the curve in hand and completes its header.
@@ -331,6 +339,19 @@ impl CurveList {
         self.whole = memory.len() - self.start;
     }
 
+    /// All are the first pen's, the curve in hand too.
+    pub(super) fn forget_pens(&mut self, memory: &mut Memory) {
+        let mut at = self.start;
+        while let Some(header) = memory.get_mut(at..).and_then(|rest| rest.get_mut(..HEADER)) {
+            header[PEN] = Corner(0);
+            match lengths(bytemuck::cast_slice(header)) {
+                // The count of knots of the curve in hand is not yet known: it is the last one.
+                Some((length, _)) if at < self.start + self.whole => at += length,
+                _ => break,
+            }
+        }
+    }
+
     /// How many half-words of whole curves there are.
     pub(super) fn whole(&self) -> usize {
         self.whole
@@ -365,10 +386,10 @@ fn read(halves: &[u16]) -> Option<(StoredCurve<'_>, &[u16])> {
         [] => Knots::Uniform,
         knots => Knots::Packed(bytemuck::cast_slice(knots)),
     };
-    let [_, order, _, _, a, b, c, d] = *header else { return None };
+    let [_, order, _, pen, a, b, c, d] = *header else { return None };
     let ends: [u32; 2] = bytemuck::cast([a, b, c, d]);
     let [from, to] = ends.map(Parameter::from_bits);
-    Some((StoredCurve { order: order as u8, control, knots, from, to }, after))
+    Some((StoredCurve { order: order as u8, pen: pen as u8, control, knots, from, to }, after))
 }
 
 /// A knot in units of 2^-`fraction_bits`, if it fits.
@@ -379,7 +400,7 @@ fn in_unit(knot: Decimal, fraction_bits: u32) -> Option<i32> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Corner, Model, Position};
+    use super::super::{Corner, Model, Position, unkept};
     use super::*;
     use std::vec::Vec;
 
@@ -396,7 +417,7 @@ mod tests {
         let mut memory = (heapless::Vec::<Position, 8>::new(), heapless::Vec::<Corner, 48>::new());
         let mut model = Model::new(&mut memory.0, &mut memory.1);
         for _ in 0..8 {
-            model.add_vertex(["0", "0", "0"].map(decimal)).unwrap();
+            model.add_vertex(["0", "0", "0"].map(decimal), &mut unkept).unwrap();
         }
         test(&mut model);
     }
@@ -411,7 +432,7 @@ mod tests {
         for line in knots {
             model.add_knots(decimals(line))?;
         }
-        model.end_curve()
+        model.end_curve(&mut unkept)
     }
 
     fn controls(model: &Model<'_>) -> Vec<Vec<u16>> {
@@ -426,15 +447,15 @@ mod tests {
     fn curves_come_back_as_they_were_sent_wherever_the_elements_come() {
         with_model(|model| {
             model.set_degree(2).unwrap();
-            model.add_polyline([1, 2].into_iter()).unwrap();
+            model.add_polyline([1, 2].into_iter(), &mut unkept).unwrap();
             sent(model, ["2.5", "4"], &[1, 2, -5, 4, 1], &[]).unwrap();
             model.begin_curve(["0", "3"].map(decimal), [5, 4, 3, 2].into_iter()).unwrap();
             model.add_knots(decimals("0 0 0")).unwrap();
-            model.add_face([1, 2, 3].into_iter()).unwrap();
+            model.add_face([1, 2, 3].into_iter(), &mut unkept).unwrap();
             // A knot past 1 coarsens those before it.
             model.add_knots(decimals("0.5")).unwrap();
             model.add_knots(decimals("3 3 3")).unwrap();
-            model.end_curve().unwrap();
+            model.end_curve(&mut unkept).unwrap();
             let curves: Vec<_> = model.curves().iter().collect();
             assert_eq!((curves.len(), model.curve_count()), (2, 2));
             assert_eq!(
@@ -463,7 +484,7 @@ mod tests {
             let three = [1, 2, 3];
             assert_eq!(sent(model, ["2", "3"], &three, &[]), Err(ModelError::NoDegree));
             assert_eq!(model.add_knots(decimals("1")), Err(ModelError::NoCurve));
-            assert_eq!(model.end_curve(), Err(ModelError::NoCurve));
+            assert_eq!(model.end_curve(&mut unkept), Err(ModelError::NoCurve));
             for degree in [0, 6] {
                 assert_eq!(model.set_degree(degree), Err(ModelError::Curve(CurveError::Order)));
             }
@@ -510,7 +531,7 @@ mod tests {
                 Err(ModelError::TooManyCorners { limit: 48, needed: 8 + 2 + 4 + 2 * 99 })
             );
             model.add_knots(decimals("1 1")).unwrap();
-            model.end_curve().unwrap();
+            model.end_curve(&mut unkept).unwrap();
             let curve = model.curves().iter().next().unwrap();
             assert_eq!(knots(&curve), [0, 0, 1 << 22, 1 << 22]);
         });

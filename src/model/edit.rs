@@ -5,8 +5,9 @@
 //! deleted vertex goes too. Refused, and the model is as it was: numbers that do not exist, a plane
 //! through vertices in line, coordinates or a copy that do not fit.
 
-use super::{Corner, Model, ModelError, POSITION_LIMIT, Position};
-use crate::fixed::{Decimal, divide_rounding};
+use super::pens::{PenRun, RUN, close_gap, open_gap};
+use super::{Before, Corner, Model, ModelError, POSITION_LIMIT, Position};
+use crate::fixed::{Decimal, divide_rounding, sin_cos_degrees};
 use crate::stage::{OutOfScratch, Scratch};
 use core::ops::Range;
 
@@ -90,9 +91,9 @@ impl Map {
 
     /// Counter-clockwise about an axis, seen from its far end.
     fn rotation(axis: u8, degrees: f64) -> Self {
-        let radians = libm::remainder(degrees, 360.0).to_radians();
         let entry = |value: f64| libm::round(libm::ldexp(value, UNIT_BITS as i32)) as i64;
-        let (sine, cosine) = (entry(libm::sin(radians)), entry(libm::cos(radians)));
+        let (sine, cosine) = sin_cos_degrees(degrees);
+        let (sine, cosine) = (entry(sine), entry(cosine));
         let axis = usize::from(axis % 3);
         let (from, to) = ((axis + 1) % 3, (axis + 2) % 3);
         let mut rows = Self::diagonal([1 << UNIT_BITS; 3]);
@@ -131,27 +132,38 @@ fn within(value: i128) -> i64 {
 }
 
 impl Model<'_> {
-    /// Does one change. `scratch`: 2 bytes for each vertex.
+    /// Does one change. `scratch`: 2 bytes for each vertex. `keep` is shown the model before it changes.
     ///
     /// # Errors
     /// See [`ModelError`]; the model is unchanged.
-    pub fn edit(&mut self, edit: Edit, scratch: Scratch<'_>) -> Result<Change, ModelError> {
+    pub fn edit(
+        &mut self,
+        edit: Edit,
+        scratch: Scratch<'_>,
+        keep: Before<'_>,
+    ) -> Result<Change, ModelError> {
         if self.curves.is_in_hand() {
             return Err(ModelError::CurveUnfinished);
         }
-        let before = self.counts();
+        let counts = self.counts();
         match edit {
             Edit::Delete(part, numbers) => {
                 let range = self.range(part, Some(numbers))?;
+                keep(self);
                 self.delete(part, range, false);
             }
             Edit::Plug(part, number) => {
                 let range = self.range(part, Some([number; 2]))?;
+                if self.runs > 0 && matches!(part, Part::Bars | Part::Faces) {
+                    // The pen may change before and after the element that comes there.
+                    self.check_corners(2 * RUN)?;
+                }
+                keep(self);
                 self.delete(part, range, true);
             }
             Edit::Move(number, place) => {
                 let range = self.range(Part::Vertices, Some([number; 2]))?;
-                let place = self.place(place)?;
+                let place = self.place(place, keep)?;
                 for vertex in self.vertices.get_mut(range).unwrap_or(&mut []) {
                     *vertex = place;
                 }
@@ -165,7 +177,7 @@ impl Model<'_> {
                         .map_err(|_| ModelError::CoordinateTooLarge)?;
                 }
                 let map = Map::Affine(Map::diagonal([1 << UNIT_BITS; 3]), shift);
-                self.transform(&map, range)?;
+                self.transform(&map, range, keep)?;
             }
             Edit::Scale(by, numbers) => {
                 let range = self.range(Part::Vertices, numbers)?;
@@ -176,25 +188,26 @@ impl Model<'_> {
                         .filter(|factor| factor.abs() <= SCALE_LIMIT)
                         .ok_or(ModelError::CoordinateTooLarge)?;
                 }
-                self.transform(&Map::Affine(Map::diagonal(factors), Map::NO_SHIFT), range)?;
+                let map = Map::Affine(Map::diagonal(factors), Map::NO_SHIFT);
+                self.transform(&map, range, keep)?;
             }
             Edit::Rotate(axis, degrees, numbers) => {
                 let range = self.range(Part::Vertices, numbers)?;
-                self.transform(&Map::rotation(axis, degrees), range)?;
+                self.transform(&Map::rotation(axis, degrees), range, keep)?;
             }
             Edit::Reflect(plane, numbers) => {
                 let range = self.range(Part::Vertices, numbers)?;
-                self.transform(&self.reflection(plane)?, range.clone())?;
+                self.transform(&self.reflection(plane)?, range.clone(), keep)?;
                 self.turn_faces(&range);
             }
             Edit::Mirror(plane, numbers) => {
                 let range = self.range(Part::Vertices, numbers)?;
-                self.mirror(&self.reflection(plane)?, range, scratch)?;
+                self.mirror(&self.reflection(plane)?, range, scratch, keep)?;
             }
         }
         let after = self.counts();
         let [vertices, bars, faces, curves] =
-            [0, 1, 2, 3].map(|part: usize| after[part] as i32 - before[part] as i32);
+            [0, 1, 2, 3].map(|part: usize| after[part] as i32 - counts[part] as i32);
         Ok(Change { vertices, bars, faces, curves })
     }
 
@@ -264,7 +277,8 @@ impl Model<'_> {
     fn delete_elements(&mut self, bars: bool, range: Range<usize>, plug: bool) {
         if plug {
             // The last one before the one that goes.
-            let corners = self.corners.get_mut(..self.curves.start).unwrap_or(&mut []);
+            let end = self.elements_end();
+            let corners = self.corners.get_mut(..end).unwrap_or(&mut []);
             let (mut at, mut number, mut hole) = (0, 0, 0);
             let mut last = 0..0;
             while let Some(length) = corners.get(at..).and_then(element_length) {
@@ -279,6 +293,7 @@ impl Model<'_> {
             }
             if let Some(between) = corners.get_mut(hole..last.end).filter(|_| last.start > hole) {
                 between.rotate_right(last.len());
+                self.move_pen(last, hole);
                 self.keep_elements(bars, range.start + 1..range.end + 1);
                 return;
             }
@@ -312,23 +327,50 @@ impl Model<'_> {
 
     /// Keeps the elements for which `stays` says so; it may change them.
     fn retain(&mut self, stays: &mut dyn FnMut(&mut [Corner]) -> bool) {
-        let start = self.curves.start;
+        let (end, mut runs) = (self.elements_end(), self.runs);
         let (mut read, mut write, mut bars, mut faces) = (0, 0, 0, 0);
-        while let Some(length) = self.corners.get(read..start).and_then(element_length) {
+        while let Some(length) = self.corners.get(read..end).and_then(element_length) {
             let element = self.corners.get_mut(read..read + length).unwrap_or(&mut []);
             let of_bar = element.first().is_some_and(|corner| corner.of_bar());
             if stays(element) {
                 self.corners.copy_within(read..read + length, write);
                 write += length;
                 *(if of_bar { &mut bars } else { &mut faces }) += 1;
+            } else {
+                let list = self.corners.get_mut(end..self.curves.start).unwrap_or(&mut []);
+                runs = close_gap(bytemuck::cast_slice_mut(list), runs, write..write + length);
             }
             read += length;
         }
-        let count = self.corners.len();
-        self.corners.copy_within(start..count, write);
-        self.corners.truncate(count - (start - write));
-        self.curves.start = write;
+        self.set_runs(end, runs, write);
+        self.remove_halves(write..end);
         (self.bars, self.faces) = (bars, faces);
+    }
+
+    /// The corners in `from` were moved to `to`, before them: so is their pen. There is room for two more runs.
+    fn move_pen(&mut self, from: Range<usize>, to: usize) {
+        if self.runs == 0 {
+            return;
+        }
+        let (end, pen) = (self.elements_end(), self.pens().at(from.start));
+        for _ in 0..2 * RUN {
+            let _ = self.insert_half(self.curves.start, 0);
+        }
+        let list = self.corners.get_mut(end..self.curves.start).unwrap_or(&mut []);
+        let runs = bytemuck::cast_slice_mut(list);
+        let count = close_gap(runs, self.runs, from.clone());
+        let count = open_gap(runs, count, to, from.len(), pen);
+        self.set_runs(end, count, end);
+    }
+
+    /// So many of the runs after `start` are left, of elements up to `end`.
+    fn set_runs(&mut self, start: usize, count: usize, end: usize) {
+        let list = self.corners.get(start..self.curves.start).unwrap_or(&[]);
+        let runs: &[PenRun] = bytemuck::cast_slice(list);
+        // One that begins at the end is empty.
+        let is_empty = count > 0 && runs.get(count - 1).is_some_and(|run| run.begins_at(end));
+        self.runs = count - usize::from(is_empty);
+        self.remove_halves(start + RUN * self.runs..self.curves.start);
     }
 
     /// The reflection about the plane of three vertices.
@@ -361,9 +403,15 @@ impl Model<'_> {
     }
 
     /// Takes some vertices through a map, in a coarser unit if it must be.
-    fn transform(&mut self, map: &Map, range: Range<usize>) -> Result<(), ModelError> {
+    fn transform(
+        &mut self,
+        map: &Map,
+        range: Range<usize>,
+        keep: Before<'_>,
+    ) -> Result<(), ModelError> {
         let positions = self.vertices.get(range.clone()).unwrap_or(&[]);
         let coarser = self.coarser_for(positions.iter().map(|position| map.apply(*position)))?;
+        keep(self);
         for position in self.vertices.get_mut(range.clone()).unwrap_or(&mut []) {
             *position = in_unit(map.apply(*position), coarser);
         }
@@ -408,6 +456,7 @@ impl Model<'_> {
         map: &Map,
         range: Range<usize>,
         mut scratch: Scratch<'_>,
+        keep: Before<'_>,
     ) -> Result<(), ModelError> {
         let images = scratch.take::<u16>(range.len()).map_err(ModelError::Scratch)?;
         let (old, limit) = (self.vertices.len(), self.vertex_limit());
@@ -435,12 +484,14 @@ impl Model<'_> {
             }) && moves
         };
         let elements = self.elements();
-        let of_elements: usize = elements
-            .corners()
-            .split_inclusive(|corner| corner.is_last())
-            .filter(|element| is_copied(&mut element.iter().map(|corner| corner.vertex())))
-            .map(<[Corner]>::len)
-            .sum();
+        let (mut of_elements, mut at, mut pen) = (0, 0, elements.pens().last());
+        for element in elements.corners().split_inclusive(|corner| corner.is_last()) {
+            if is_copied(&mut element.iter().map(|corner| corner.vertex())) {
+                let last = core::mem::replace(&mut pen, elements.pens().at(at));
+                of_elements += element.len() + if pen == last { 0 } else { RUN };
+            }
+            at += element.len();
+        }
         let of_curves: usize = self
             .curves()
             .iter()
@@ -451,6 +502,7 @@ impl Model<'_> {
         let positions = self.vertices.get(range.clone()).unwrap_or(&[]);
         let coarser = self.coarser_for(positions.iter().map(|position| map.apply(*position)))?;
 
+        keep(self);
         for at in range.clone() {
             let Some(position) = self.vertices.get(at) else { continue };
             if image(at as u16) != Some(at as u16) {
@@ -460,7 +512,7 @@ impl Model<'_> {
             }
         }
         self.coarsen_others(coarser, old..count);
-        let end = self.curves.start;
+        let end = self.elements_end();
         let mut at = 0;
         while let Some(length) = self.corners.get(at..end).and_then(element_length) {
             let element = at..at + length;
@@ -469,14 +521,16 @@ impl Model<'_> {
             if !is_copied(&mut corners.iter().map(|corner| corner.vertex())) {
                 continue;
             }
-            let start = self.curves.start;
+            self.begin_run(self.pens().at(element.start));
+            let start = self.elements_end();
             for at in element {
                 let Some(corner) = self.corners.get(at).copied() else { continue };
                 let number = image(corner.vertex()).unwrap_or(0);
                 // There is room: it was counted.
                 let _ = self.insert(Corner::new(number, corner.of_bar(), corner.is_last()));
             }
-            let copy = self.corners.get_mut(start..self.curves.start).unwrap_or(&mut []);
+            let end = self.elements_end();
+            let copy = self.corners.get_mut(start..end).unwrap_or(&mut []);
             if copy.first().is_some_and(|corner| corner.of_bar()) {
                 self.bars += 1;
             } else {

@@ -7,16 +7,20 @@
 
 mod curves;
 mod edit;
+mod pens;
 mod undo;
 
 pub use curves::{Curves, StoredCurve};
 pub use edit::{Change, Edit, Numbers, Part};
+pub use pens::{PEN_LIMIT, PenName, PenRun, PenWriter, Pens};
 
 use crate::curve::CurveError;
 use crate::fixed::Decimal;
 use crate::stage::OutOfScratch;
 use bytemuck::{Pod, Zeroable};
+use core::ops::Range;
 use curves::CurveList;
+use pens::{PenBook, RUN};
 
 /// One more than the largest vertex number that an element can hold.
 pub const VERTEX_NUMBER_LIMIT: usize = 1 << 14;
@@ -66,6 +70,16 @@ pub enum Element<'a> {
     Bar(u16, u16),
 }
 
+impl Element<'_> {
+    /// How many corners it takes.
+    pub fn corner_count(&self) -> usize {
+        match self {
+            Self::Face(corners) => corners.len(),
+            Self::Bar(..) => 2,
+        }
+    }
+}
+
 /// Faces and bars in the order in which they were sent.
 ///
 /// Guarantees, if it comes from a model: every vertex number exists, every face has at least three
@@ -73,13 +87,19 @@ pub enum Element<'a> {
 #[derive(Debug, Clone, Copy)]
 pub struct Elements<'a> {
     corners: &'a [Corner],
+    pens: Pens<'a>,
 }
 
 impl<'a> Elements<'a> {
-    /// The elements that `corners` encode. Corners after the last mark are left out.
+    /// The elements that `corners` encode, of the first pen. Corners after the last mark are left out.
     pub fn new(corners: &'a [Corner]) -> Self {
+        Self::with_pens(corners, Pens::default())
+    }
+
+    /// The same with their pens.
+    pub fn with_pens(corners: &'a [Corner], pens: Pens<'a>) -> Self {
         let whole = corners.iter().rposition(|corner| corner.is_last()).map_or(0, |last| last + 1);
-        Self { corners: &corners[..whole] }
+        Self { corners: &corners[..whole], pens }
     }
 
     /// Every corner of every element.
@@ -87,11 +107,26 @@ impl<'a> Elements<'a> {
         self.corners
     }
 
+    /// The pens of the elements, by their corners.
+    pub fn pens(&self) -> Pens<'a> {
+        self.pens
+    }
+
     /// Each element in turn.
     pub fn iter(&self) -> impl Iterator<Item = Element<'a>> + Clone + use<'a> {
         self.corners.split_inclusive(|corner| corner.is_last()).map(|corners| match corners {
             [a, b] if a.of_bar() => Element::Bar(a.vertex(), b.vertex()),
             _ => Element::Face(corners),
+        })
+    }
+
+    /// Each element in turn with its pen.
+    pub fn iter_with_pens(&self) -> impl Iterator<Item = (Element<'a>, u8)> + use<'a> {
+        let (pens, mut first) = (self.pens, 0);
+        self.iter().map(move |element| {
+            let pen = pens.at(first);
+            first += element.corner_count();
+            (element, pen)
         })
     }
 }
@@ -177,9 +212,18 @@ pub enum ModelError {
     },
     /// The three vertices of a plane are in line.
     NoPlane,
+    /// More names than pens, or a pen past [`PEN_LIMIT`].
+    TooManyPens,
     /// Not enough working memory for the edit.
     Scratch(OutOfScratch),
 }
+
+/// Who is shown the model just before it changes, and never when a change is refused: [`Model::save`] may
+/// copy it then.
+pub type Before<'b> = &'b mut dyn FnMut(&Model<'_>);
+
+/// For a [`Before`]: no copy is kept.
+pub fn unkept(_: &Model<'_>) {}
 
 /// The vertices, faces and bars that the user sent, in memory lent by the owner.
 ///
@@ -188,12 +232,15 @@ pub enum ModelError {
 #[derive(Debug)]
 pub struct Model<'m> {
     vertices: &'m mut heapless::VecView<Position>,
-    /// The corners of elements, then curves.
+    /// The corners of elements, then their [`PenRun`]s, then curves.
     corners: &'m mut heapless::VecView<Corner>,
     fraction_bits: u32,
     faces: usize,
     bars: usize,
     curves: CurveList,
+    /// How many [`PenRun`]s there are.
+    runs: usize,
+    pens: PenBook,
 }
 
 impl<'m> Model<'m> {
@@ -209,6 +256,8 @@ impl<'m> Model<'m> {
             faces: 0,
             bars: 0,
             curves: CurveList::default(),
+            runs: 0,
+            pens: PenBook::default(),
         };
         model.clear();
         model
@@ -222,6 +271,8 @@ impl<'m> Model<'m> {
         self.faces = 0;
         self.bars = 0;
         self.curves = CurveList::default();
+        self.runs = 0;
+        self.pens = PenBook::default();
     }
 
     /// The vertices, in units of 2^-[`Model::fraction_bits`].
@@ -236,7 +287,51 @@ impl<'m> Model<'m> {
 
     /// The faces and bars.
     pub fn elements(&self) -> Elements<'_> {
-        Elements { corners: self.corners.get(..self.curves.start).unwrap_or(&[]) }
+        let corners = self.corners.get(..self.elements_end()).unwrap_or(&[]);
+        Elements { corners, pens: self.pens() }
+    }
+
+    /// Where the corners of the elements end.
+    fn elements_end(&self) -> usize {
+        self.curves.start - RUN * self.runs
+    }
+
+    /// The pens of the elements.
+    fn pens(&self) -> Pens<'_> {
+        let runs = self.corners.get(self.elements_end()..self.curves.start).unwrap_or(&[]);
+        Pens::new(bytemuck::cast_slice(runs))
+    }
+
+    /// Chooses the pen of the elements and curves that follow, by `usemtl` or by `g`. Once `usemtl` has come, `g`
+    /// chooses no more, and what it chose before is the first pen's again.
+    ///
+    /// # Errors
+    /// [`ModelError::TooManyPens`]; the model is unchanged.
+    #[inline(never)] // Its frame must not lie under the stages'.
+    pub fn choose_pen(
+        &mut self,
+        by_material: bool,
+        name: PenName,
+        before: Before<'_>,
+    ) -> Result<(), ModelError> {
+        if self.pens.by_material && !by_material {
+            return Ok(());
+        }
+        let mut book = self.pens;
+        if by_material != book.by_material {
+            book = PenBook { by_material, ..PenBook::default() };
+        }
+        book.choose(name)?;
+        if book != self.pens {
+            before(self);
+            if book.by_material != self.pens.by_material {
+                self.remove_halves(self.elements_end()..self.curves.start);
+                self.runs = 0;
+                self.curves.forget_pens(self.corners);
+            }
+            self.pens = book;
+        }
+        Ok(())
     }
 
     /// The curves.
@@ -264,7 +359,7 @@ impl<'m> Model<'m> {
         self.vertices.capacity().min(VERTEX_NUMBER_LIMIT)
     }
 
-    /// How many corners of elements there are; half-words of curves count as such.
+    /// How many corners of elements there are; half-words of curves and changes of the pen count as such.
     pub fn corner_count(&self) -> usize {
         self.corners.len()
     }
@@ -279,17 +374,25 @@ impl<'m> Model<'m> {
     ///
     /// # Errors
     /// [`ModelError::TooManyVertices`], [`ModelError::CoordinateTooLarge`]; the model is unchanged.
-    pub fn add_vertex(&mut self, coordinates: [Decimal; 3]) -> Result<(), ModelError> {
+    pub fn add_vertex(
+        &mut self,
+        coordinates: [Decimal; 3],
+        before: Before<'_>,
+    ) -> Result<(), ModelError> {
         let limit = self.vertex_limit();
         if self.vertices.len() >= limit {
             return Err(ModelError::TooManyVertices { limit });
         }
-        let place = self.place(coordinates)?;
+        let place = self.place(coordinates, before)?;
         self.vertices.push(place).map_err(|_| ModelError::TooManyVertices { limit })
     }
 
     /// A place in the model's unit, which grows if it must.
-    fn place(&mut self, coordinates: [Decimal; 3]) -> Result<Position, ModelError> {
+    fn place(
+        &mut self,
+        coordinates: [Decimal; 3],
+        before: Before<'_>,
+    ) -> Result<Position, ModelError> {
         let fraction_bits = (0..=self.fraction_bits)
             .rev()
             .find(|bits| {
@@ -308,6 +411,7 @@ impl<'m> Model<'m> {
                 .and_then(|value| i32::try_from(value).ok())
                 .unwrap_or(0)
         });
+        before(self);
         self.coarsen(self.fraction_bits - fraction_bits);
         Ok(Position { x, y, z })
     }
@@ -332,6 +436,7 @@ impl<'m> Model<'m> {
     pub fn add_face(
         &mut self,
         numbers: impl Iterator<Item = i32> + Clone,
+        before: Before<'_>,
     ) -> Result<(), ModelError> {
         let count = self.check_numbers(numbers.clone(), 3)?;
         let first = numbers.clone().next();
@@ -341,7 +446,9 @@ impl<'m> Model<'m> {
         {
             return Err(ModelError::RepeatedVertex { number: last });
         }
-        self.check_corners(count)?;
+        self.check_corners(count + self.run_for(self.pens.current))?;
+        before(self);
+        self.begin_run(self.pens.current);
         for (at, number) in numbers.enumerate() {
             self.push_corner(number, false, at + 1 == count)?;
         }
@@ -356,9 +463,12 @@ impl<'m> Model<'m> {
     pub fn add_polyline(
         &mut self,
         numbers: impl Iterator<Item = i32> + Clone,
+        before: Before<'_>,
     ) -> Result<(), ModelError> {
         let count = self.check_numbers(numbers.clone(), 2)?;
-        self.check_corners(2 * (count - 1))?;
+        self.check_corners(2 * (count - 1) + self.run_for(self.pens.current))?;
+        before(self);
+        self.begin_run(self.pens.current);
         for (from, to) in numbers.clone().zip(numbers.skip(1)) {
             self.push_corner(from, true, false)?;
             self.push_corner(to, true, true)?;
@@ -401,15 +511,44 @@ impl<'m> Model<'m> {
         self.insert(Corner::new(vertex, of_bar, last))
     }
 
-    /// Adds a corner after those of the elements, before the curves.
+    /// Adds a corner after those of the elements.
     fn insert(&mut self, corner: Corner) -> Result<(), ModelError> {
+        self.insert_half(self.elements_end(), corner.0)
+    }
+
+    /// Adds a half-word before the curves.
+    fn insert_half(&mut self, at: usize, half: u16) -> Result<(), ModelError> {
         let limit = self.corner_limit();
         self.corners
-            .push(corner)
+            .push(Corner(half))
             .map_err(|_| ModelError::TooManyCorners { limit, needed: limit + 1 })?;
-        self.corners.get_mut(self.curves.start..).unwrap_or(&mut []).rotate_right(1);
+        self.corners.get_mut(at..).unwrap_or(&mut []).rotate_right(1);
         self.curves.start += 1;
         Ok(())
+    }
+
+    /// Takes half-words out that stand before the curves.
+    fn remove_halves(&mut self, gone: Range<usize>) {
+        let count = self.corners.len();
+        self.corners.copy_within(gone.end..count, gone.start);
+        self.corners.truncate(count - gone.len());
+        self.curves.start -= gone.len();
+    }
+
+    /// How many half-words it takes that elements with this pen follow.
+    fn run_for(&self, pen: u8) -> usize {
+        if pen == self.pens().last() { 0 } else { RUN }
+    }
+
+    /// Elements with this pen follow. There is room.
+    fn begin_run(&mut self, pen: u8) {
+        if pen != self.pens().last() {
+            let first = self.elements_end() as u16; // the memory has fewer half-words than 2^16
+            for half in [first, pen.into()] {
+                let _ = self.insert_half(self.curves.start, half);
+            }
+            self.runs += 1;
+        }
     }
 
     /// Sets the degree of the curves that follow, 1 to 5.
@@ -434,7 +573,7 @@ impl<'m> Model<'m> {
         if let Some(number) = numbers.clone().find(|number| resolve(*number).is_none()) {
             return Err(ModelError::UnknownVertex { number, vertices });
         }
-        self.curves.begin(self.corners, ends, numbers.filter_map(resolve))
+        self.curves.begin(self.corners, ends, numbers.filter_map(resolve), self.pens.current)
     }
 
     /// Adds knots to the curve in hand.
@@ -452,8 +591,11 @@ impl<'m> Model<'m> {
     ///
     /// # Errors
     /// [`ModelError::NoCurve`], [`ModelError::KnotTooLarge`], [`ModelError::Curve`].
-    pub fn end_curve(&mut self) -> Result<(), ModelError> {
-        self.curves.end(self.corners)
+    pub fn end_curve(&mut self, before: Before<'_>) -> Result<(), ModelError> {
+        self.curves.end(self.corners)?;
+        before(self);
+        self.curves.count_in(self.corners.len());
+        Ok(())
     }
 
     /// The vertex that an OBJ number means.
@@ -506,7 +648,7 @@ mod tests {
         let (mut vertices, mut corners) = (Vertices::new(), Corners::new());
         let mut model = Model::new(&mut vertices, &mut corners);
         for _ in 0..count {
-            model.add_vertex(decimals(["0.25", "-0.5", "0"])).unwrap();
+            model.add_vertex(decimals(["0.25", "-0.5", "0"]), &mut unkept).unwrap();
         }
         test(&mut model);
     }
@@ -515,7 +657,7 @@ mod tests {
     fn a_larger_coordinate_coarsens_the_unit_for_all() {
         with_vertices(1, |model| {
             assert_eq!(model.fraction_bits(), 30);
-            model.add_vertex(decimals(["100", "0", "0.1"])).unwrap();
+            model.add_vertex(decimals(["100", "0", "0.1"]), &mut unkept).unwrap();
             assert_eq!(model.fraction_bits(), 23);
             assert_eq!(model.vertices()[0], Position { x: 1 << 21, y: -(1 << 22), z: 0 });
             assert_eq!(model.vertices()[1].x, 100 << 23);
@@ -527,7 +669,7 @@ mod tests {
         with_vertices(0, |model| {
             let place = ["0.123456789", "-0.7", "0.3"];
             for place in [place, ["9", "0", "0"], ["-700", "0", "0"], place] {
-                model.add_vertex(decimals(place)).unwrap();
+                model.add_vertex(decimals(place), &mut unkept).unwrap();
             }
             assert_eq!(model.vertices()[0], model.vertices()[3]);
         });
@@ -537,13 +679,13 @@ mod tests {
     fn refused_vertices_change_nothing() {
         with_vertices(3, |model| {
             assert_eq!(
-                model.add_vertex(decimals(["1e10", "0", "0"])),
+                model.add_vertex(decimals(["1e10", "0", "0"]), &mut unkept),
                 Err(ModelError::CoordinateTooLarge)
             );
             assert_eq!((model.vertices().len(), model.fraction_bits()), (3, 30));
-            model.add_vertex(decimals(["0", "0", "0"])).unwrap();
+            model.add_vertex(decimals(["0", "0", "0"]), &mut unkept).unwrap();
             assert_eq!(
-                model.add_vertex(decimals(["9", "0", "0"])),
+                model.add_vertex(decimals(["9", "0", "0"]), &mut unkept),
                 Err(ModelError::TooManyVertices { limit: 4 })
             );
             assert_eq!((model.vertices().len(), model.fraction_bits()), (4, 30));
@@ -555,27 +697,33 @@ mod tests {
         with_vertices(4, |model| {
             let unknown = |number| Err(ModelError::UnknownVertex { number, vertices: 4 });
             for number in [0, 5, -5, i32::MIN, i32::MAX] {
-                assert_eq!(model.add_face([1, 2, number].into_iter()), unknown(number));
-                assert_eq!(model.add_polyline([1, number].into_iter()), unknown(number));
+                assert_eq!(
+                    model.add_face([1, 2, number].into_iter(), &mut unkept),
+                    unknown(number)
+                );
+                assert_eq!(
+                    model.add_polyline([1, number].into_iter(), &mut unkept),
+                    unknown(number)
+                );
             }
             assert_eq!(
-                model.add_face([1, 2].into_iter()),
+                model.add_face([1, 2].into_iter(), &mut unkept),
                 Err(ModelError::TooFewCorners { needed: 3 })
             );
             assert_eq!(
-                model.add_polyline([1].into_iter()),
+                model.add_polyline([1].into_iter(), &mut unkept),
                 Err(ModelError::TooFewCorners { needed: 2 })
             );
             assert_eq!(
-                model.add_face([1, 2, 2].into_iter()),
+                model.add_face([1, 2, 2].into_iter(), &mut unkept),
                 Err(ModelError::RepeatedVertex { number: 2 })
             );
             assert_eq!(
-                model.add_face([1, 2, 3, -4].into_iter()),
+                model.add_face([1, 2, 3, -4].into_iter(), &mut unkept),
                 Err(ModelError::RepeatedVertex { number: -4 })
             );
             assert_eq!(
-                model.add_face([1, 2, 3, 1, 2, 3, 1, 2, 3].into_iter()),
+                model.add_face([1, 2, 3, 1, 2, 3, 1, 2, 3].into_iter(), &mut unkept),
                 Err(ModelError::TooManyCorners { limit: 8, needed: 9 })
             );
             assert_eq!((model.corner_count(), model.face_count(), model.bar_count()), (0, 0, 0));
@@ -585,8 +733,8 @@ mod tests {
     #[test]
     fn elements_come_back_as_they_were_sent() {
         with_vertices(4, |model| {
-            model.add_polyline([1, 2, -1].into_iter()).unwrap();
-            model.add_face([-4, -3, -2, -1].into_iter()).unwrap();
+            model.add_polyline([1, 2, -1].into_iter(), &mut unkept).unwrap();
+            model.add_face([-4, -3, -2, -1].into_iter(), &mut unkept).unwrap();
             let mut elements = model.elements().iter();
             assert_eq!(elements.next(), Some(Element::Bar(0, 1)));
             assert_eq!(elements.next(), Some(Element::Bar(1, 3)));
@@ -602,9 +750,9 @@ mod tests {
     fn bars_at_one_height_are_a_plan() {
         with_vertices(2, |model| {
             assert!(!model.is_plan());
-            model.add_polyline([1, 2].into_iter()).unwrap();
+            model.add_polyline([1, 2].into_iter(), &mut unkept).unwrap();
             assert!(model.is_plan());
-            model.add_vertex(decimals(["0", "0", "1"])).unwrap();
+            model.add_vertex(decimals(["0", "0", "1"]), &mut unkept).unwrap();
             assert!(!model.is_plan());
         });
     }

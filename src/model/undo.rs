@@ -1,33 +1,53 @@
 //! The whole model in memory that is idle, to take back an edit.
 
-use super::{Corner, Model, Position};
+use super::pens::PenBook;
+use super::{Corner, Model, PEN_LIMIT, Position};
 use crate::stage::{Scratch, items};
 
 /// Numbers before the vertices.
-const HEAD: usize = 8;
+const HEAD: usize = 11 + PEN_LIMIT as usize;
 
 impl Model<'_> {
-    /// Copies the model to `words`. `false` if it does not fit, or a curve has no end yet.
+    /// Copies the model to `words`, without a curve that has no end yet. `false` if it does not fit.
     pub fn save(&self, words: &mut [u64]) -> bool {
-        !self.curves.is_in_hand() && self.copy_to(Scratch::new(words)).is_some()
+        self.copy_to(Scratch::new(words)).is_some()
     }
 
     /// How many words [`Model::save`] uses of those that it is given.
     pub fn saved_words(&self) -> usize {
         let vertices = Scratch::bytes_for::<Position>(self.vertices.len());
-        let corners = Scratch::bytes_for::<Corner>(self.corners.len());
+        let corners = Scratch::bytes_for::<Corner>(self.whole_corners().len());
         (Scratch::bytes_for::<u32>(HEAD) + vertices + corners) / size_of::<u64>()
     }
 
+    /// Corners of elements and whole curves.
+    fn whole_corners(&self) -> &[Corner] {
+        let end = self.curves.start + self.curves.whole();
+        self.corners.get(..end).unwrap_or(self.corners)
+    }
+
     fn copy_to(&self, mut scratch: Scratch<'_>) -> Option<()> {
-        let (curves, lengths) = (&self.curves, [self.vertices.len(), self.corners.len()]);
-        let numbers = [self.faces, self.bars, curves.start, curves.whole(), curves.count];
-        let numbers = [self.fraction_bits as usize].into_iter().chain(lengths).chain(numbers);
-        for (word, number) in scratch.take::<u32>(HEAD).ok()?.iter_mut().zip(numbers) {
-            *word = number as u32;
-        }
+        let corners = self.whole_corners();
+        let (curves, lengths) = (&self.curves, [self.vertices.len(), corners.len()]);
+        let PenBook { names, current, by_material } = self.pens;
+        let (numbers, rest) = scratch.take::<u32>(HEAD).ok()?.split_first_chunk_mut()?;
+        *numbers = [
+            self.fraction_bits as usize,
+            lengths[0],
+            lengths[1],
+            self.faces,
+            self.bars,
+            curves.start,
+            curves.whole(),
+            curves.count,
+            self.runs,
+            current.into(),
+            by_material.into(),
+        ]
+        .map(|number| number as u32);
+        *rest.first_chunk_mut()? = names;
         scratch.take::<Position>(lengths[0]).ok()?.copy_from_slice(self.vertices);
-        scratch.take::<Corner>(lengths[1]).ok()?.copy_from_slice(self.corners);
+        scratch.take::<Corner>(lengths[1]).ok()?.copy_from_slice(corners);
         Some(())
     }
 
@@ -38,9 +58,9 @@ impl Model<'_> {
 
     fn copy_from(&mut self, words: &[u64]) -> Option<()> {
         let head: &[u32] = items(words, HEAD)?;
-        let [fraction_bits, vertices, corners, faces, bars, start, whole, count] = *head else {
-            return None;
-        };
+        let (numbers, names) = head.split_first_chunk()?;
+        let [fraction_bits, vertices, corners, faces, bars, start, whole, count, runs, pen, by] =
+            *numbers;
         let positions_at = Scratch::bytes_for::<u32>(HEAD) / 8;
         let corners_at = positions_at + Scratch::bytes_for::<Position>(vertices as usize) / 8;
         self.vertices.clear();
@@ -50,6 +70,9 @@ impl Model<'_> {
         self.corners.extend_from_slice(items(words.get(corners_at..)?, corners as usize)?).ok()?;
         self.fraction_bits = fraction_bits;
         (self.faces, self.bars) = (faces as usize, bars as usize);
+        self.runs = runs as usize;
+        let names = names.try_into().ok()?;
+        self.pens = PenBook { names, current: pen as u8, by_material: by != 0 };
         self.curves.restore(start as usize, whole as usize, count as usize);
         Some(())
     }

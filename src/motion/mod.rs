@@ -10,6 +10,9 @@
 //! time goes in slices of [`SLICE_TICKS`]; the speed is constant within a slice, so the moves of a
 //! slice are found by one short division each and every slice begins on the exact parabola.
 //!
+//! With a limit on jerk, another planner (`smooth`) is at work: at intervals it looks how far acceleration may rise such that
+//! all that is known ahead can still be kept.
+//!
 //! The pulses leave when the plan is half a step from the new position: the pins are never more
 //! than half a step from where the plan is.
 //!
@@ -19,6 +22,7 @@
 //!
 //! Not done here: limits of travel, the pen's heights, states. That is `machine`.
 
+mod brake;
 mod course;
 mod curvature;
 mod emitter;
@@ -28,7 +32,9 @@ mod limits;
 mod lookahead;
 mod profile;
 mod runner;
+mod smooth;
 
+pub use brake::{Brake, BrakeOrders, BrakeRule, QueueSize, StepLength, StepWay};
 pub use emitter::Emitter;
 pub use event::{EventKind, EventQueue, StepEvent};
 pub use limits::{Limits, LimitsError, MotionSettings};

@@ -61,7 +61,7 @@ impl Phase {
 }
 
 /// A short time of constant speed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct Slice {
     /// Gone in it, 2^-32 mm.
     pub(super) distance: u32,

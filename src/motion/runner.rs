@@ -5,7 +5,11 @@ use super::curvature::Curvature;
 use super::emitter::{BATCH, MoveLevels, whole_ticks};
 use super::junction::{self, Corner, Heading};
 use super::profile::{FRACTION_BITS, Pace, Profile};
-use super::{Block, Emitter, EventQueue, Limits, Lookahead, PathLength, SliceSpeed, StepEvent};
+use super::smooth::{Interval, Road, State};
+use super::{
+    Block, BrakeRule, Emitter, EventQueue, Limits, Lookahead, PathLength, SLICE_TICKS, SliceSpeed,
+    StepEvent,
+};
 use crate::drawing::{LineType, PagePoint};
 use core::cmp::Ordering;
 
@@ -60,16 +64,30 @@ pub struct RunLengths {
     pub travelled: u64,
 }
 
+/// The speed planned.
+#[derive(Debug)]
+enum Plan {
+    /// For the rest of the piece in work.
+    Profile(Profile),
+    /// With a limit on jerk, for an interval of time, whatever ends in it.
+    Interval(Interval),
+}
+
 /// Turns blocks into events.
 #[derive(Debug)]
 pub struct Runner<'m> {
     limits: Limits,
+    brake: BrakeRule,
     pen: PenPositions,
     lookahead: Lookahead<'m>,
     curvature: Curvature,
     emitter: Emitter,
     course: Option<Course>,
+    plan: Option<Plan>,
+    /// Where the last plan ended.
     pace: Pace,
+    /// The acceleration there, with a limit on jerk.
+    ramp: i32,
     draw: Pace,
     travel: Pace,
     /// The last pace in a curve: many blocks in a row have the same.
@@ -108,12 +126,15 @@ impl<'m> Runner<'m> {
     pub fn new(limits: Limits, pen: PenPositions, blocks: &'m mut [Block]) -> Self {
         let mut runner = Self {
             limits,
+            brake: BrakeRule::default(),
             pen,
             lookahead: Lookahead::new(blocks),
             curvature: Curvature::default(),
             emitter: Emitter::new(&limits),
             course: None,
+            plan: None,
             pace: Pace::REST,
+            ramp: 0,
             draw: Pace::REST,
             travel: Pace::REST,
             curve: Pace::REST,
@@ -143,6 +164,28 @@ impl<'m> Runner<'m> {
         self.pen = pen;
         self.emitter.set_limits(&limits);
         self.set_override(100);
+    }
+
+    /// The rule by which the lengths of steps are told, while nothing moves.
+    pub fn set_brake(&mut self, brake: BrakeRule) {
+        self.brake = brake;
+    }
+
+    /// How long the events that wait must last so that the machine can stop within them, wherever in
+    /// them it is, no matter what comes behind.
+    ///
+    /// Events that end at a speed u and last t hold the stopping distance of every speed v in them if
+    /// t ≥ (v - (√2 - 1) u) / a: then the plan is slower in between, or goes far enough.
+    pub fn stopping_ticks(&self) -> u32 {
+        let end = match &self.plan {
+            Some(Plan::Profile(profile)) => profile.speed().to_bits(),
+            Some(Plan::Interval(interval)) => interval.state().speed,
+            None => self.pace.speed.to_bits(),
+        };
+        let speed = self.top(self.in_stroke).speed.to_bits();
+        let change = speed.saturating_sub(end / 8 * 3);
+        let slices = change.checked_div(self.limits.acceleration.to_bits()).unwrap_or(u32::MAX);
+        slices.saturating_mul(SLICE_TICKS)
     }
 
     /// Scales both speeds to `percent` (10 to 200), at once; never above the greater of the two as
@@ -288,22 +331,33 @@ impl<'m> Runner<'m> {
     /// Sheds speed on the path, from the next slice on, and stands with the pen raised.
     pub fn stop(&mut self) {
         self.stopping = true;
-        if let Some(course) = &mut self.course {
-            // The slice in work, 164 µs at most, ends as planned.
-            if let Some(profile) = course.profile.take() {
+        // The slice in work, 164 µs at most, ends as planned.
+        self.give_plan_up();
+    }
+
+    /// The plan ends with the last slice that it gave. Says how fast it would have ended the piece in
+    /// work, if it was to.
+    fn give_plan_up(&mut self) -> Option<PathLength> {
+        match self.plan.take()? {
+            Plan::Profile(profile) => {
                 self.pace = Pace::of_speed(&self.limits, profile.speed());
+                Some(profile.exit().stopping_distance)
+            }
+            Plan::Interval(interval) => {
+                let State { speed, ramp } = interval.state();
+                self.pace = Pace { speed: SliceSpeed::from_bits(speed), ..Pace::REST };
+                self.ramp = ramp;
+                None
             }
         }
     }
 
     /// Plans the rest of the piece in work anew, from the next slice on.
     fn plan_again(&mut self) {
-        if self.stopping {
-            return;
-        }
-        if let Some(profile) = self.course.as_mut().and_then(|course| course.profile.take()) {
-            self.pace = Pace::of_speed(&self.limits, profile.speed());
-            self.exit_reached = Some(profile.exit().stopping_distance);
+        if !self.stopping
+            && let Some(exit) = self.give_plan_up()
+        {
+            self.exit_reached = Some(exit);
         }
     }
 
@@ -328,7 +382,7 @@ impl<'m> Runner<'m> {
     pub fn forget_path(&mut self, page: PagePoint) {
         self.lookahead.clear();
         self.course = None;
-        self.pace = Pace::REST;
+        self.rest();
         self.stopping = false;
         self.stopping_after_stroke = false;
         self.exit_reached = None;
@@ -369,21 +423,54 @@ impl<'m> Runner<'m> {
             return self.begin_block(queue);
         };
         if course.slice.is_none() {
-            let Some(profile) = &mut course.profile else {
-                return self.plan(queue);
+            course.slice = match &mut self.plan {
+                None => return self.plan(queue),
+                Some(Plan::Profile(profile)) => profile.next_slice(),
+                Some(Plan::Interval(interval)) => interval.next_slice(course.room()),
             };
-            course.slice = profile.next_slice();
             if course.slice.is_none() {
-                self.pace = profile.exit();
-                course.profile = None;
-                if course.moves_done == course.piece_moves {
-                    self.end_piece();
-                }
+                self.end_plan();
                 return Ok(Progress::More);
             }
         }
         self.run_slice(queue)?;
         Ok(Progress::More)
+    }
+
+    /// The plan is carried out, or has led to the end of the piece in work.
+    fn end_plan(&mut self) {
+        let Some(course) = &self.course else {
+            return;
+        };
+        let ends = match &self.plan {
+            Some(Plan::Profile(profile)) => {
+                self.pace = profile.exit();
+                self.plan = None;
+                course.moves_done == course.piece_moves
+            }
+            Some(Plan::Interval(_)) if course.room() > 0 => {
+                self.give_plan_up();
+                false
+            }
+            // The interval goes on, unless the next piece begins at rest.
+            _ => {
+                let next = self.lookahead.front().filter(|_| course.is_last_piece());
+                if next.is_none_or(|block| block.entry_limit == 0) {
+                    self.rest();
+                }
+                true
+            }
+        };
+        if ends {
+            self.end_piece();
+        }
+    }
+
+    /// Nothing moves.
+    fn rest(&mut self) {
+        self.plan = None;
+        self.pace = Pace::REST;
+        self.ramp = 0;
     }
 
     /// The moves of the slice in work, as far as the queue has room.
@@ -452,7 +539,7 @@ impl<'m> Runner<'m> {
             self.in_stroke && self.lookahead.front().is_some_and(|block| block.ink.is_none());
         let pauses = self.stopping_after_stroke || self.run.drawn >= self.ink_bound;
         let stops = self.stopping || (pauses && stroke_ends);
-        if stops && self.pace == Pace::REST {
+        if stops && self.plan.is_none() && self.pace == Pace::REST {
             return self.stand(Progress::Stopped, queue);
         }
         let Some(block) = self.lookahead.pop() else {
@@ -546,6 +633,24 @@ impl<'m> Runner<'m> {
                 self.emitter.hold(self.now, queue)?;
             }
         }
+        if course.moves_done == 0 {
+            let units = self.brake.step_length(course.move_length);
+            queue.set_step_length(units, self.emitter.has_stepped())?;
+        }
+        if let Some(jerk) = self.limits.jerk {
+            let top = if self.stopping { Pace::REST } else { self.top(inked) };
+            let road = Road {
+                limits: &self.limits,
+                jerk,
+                top: top.speed,
+                room: course.room(),
+                curve_limit: course.curve_limit,
+                beyond: course.is_last_piece().then_some(&self.lookahead),
+            };
+            let state = State { speed: self.pace.speed.to_bits(), ramp: self.ramp };
+            self.plan = Some(Plan::Interval(road.next(state)));
+            return Ok(Progress::More);
+        }
         let left = course.left();
         if let Some(exit) = self.exit_reached.take() {
             // It was within reach; the root that gave the speed back must not deny it.
@@ -572,9 +677,7 @@ impl<'m> Runner<'m> {
                 is_last && self.lookahead.is_short() && exit_allowed < top.stopping_distance;
             Profile::new(&self.limits, self.pace, left, top, exit_allowed)
         };
-        if let Some(course) = &mut self.course {
-            course.profile = Some(profile);
-        }
+        self.plan = Some(Plan::Profile(profile));
         Ok(Progress::More)
     }
 

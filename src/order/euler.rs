@@ -5,9 +5,12 @@
 //! slice, growing towards each other: linear time, no list besides.
 
 use super::incidence::Incidence;
+use super::metric::length;
+use super::near::Near;
 use super::network::Network;
 use super::pace::Pace;
 use super::{EVEN_PART, Leg, NONE, OrderError};
+use crate::drawing::PagePoint;
 use crate::stage::{OutOfScratch, Scratch};
 
 /// The chains and the moves not yet used by a trail.
@@ -98,19 +101,24 @@ impl<'s, 'a> Unused<'s, 'a> {
         }
     }
 
-    /// The station where a part not yet drawn is best entered: the nearest by `far` that has a
-    /// move to save, or any of a part without odd points.
-    fn entrance(
+    /// Whether a part not yet drawn may be entered at `station`: it has a move to save, or no part
+    /// of it has.
+    fn is_entrance(&mut self, station: u16) -> bool {
+        self.mate[usize::from(station)] != NONE && self.peek(station).is_some()
+    }
+
+    /// The entrance for which `far` is least.
+    pub fn entrance(
         &mut self,
-        far: impl Fn(u16) -> u32,
+        far: impl Fn(PagePoint) -> u32,
         pace: &mut Pace<'_>,
     ) -> Result<Option<u16>, OrderError> {
         let mut best = None;
         let mut least = u32::MAX;
         for station in 0..self.network.stations() {
-            if self.mate[usize::from(station)] != NONE && self.peek(station).is_some() {
+            if self.is_entrance(station) {
                 pace.work(1)?;
-                let distance = far(station);
+                let distance = far(self.network.place(station));
                 if distance < least || best.is_none() {
                     (least, best) = (distance, Some(station));
                 }
@@ -119,16 +127,34 @@ impl<'s, 'a> Unused<'s, 'a> {
         Ok(best)
     }
 
+    /// The entrance nearest to the station `pen`: if `near` knows any, the first of those.
+    fn next_entrance(
+        &mut self,
+        pen: u16,
+        near: Option<Near<'_>>,
+        pace: &mut Pace<'_>,
+    ) -> Result<Option<u16>, OrderError> {
+        for station in near.into_iter().flat_map(|near| near.of(pen)) {
+            pace.work(1)?;
+            if self.is_entrance(station) {
+                return Ok(Some(station));
+            }
+        }
+        let at = self.network.place(pen);
+        self.entrance(|place| length(at, place), pace)
+    }
+
     /// Draws everything: from `start` if given, else from the lowest x; each further part from its
-    /// entrance nearest to the pen.
+    /// entrance nearest to the pen, nearly so if it may be one of those that `near` knows.
     pub fn nearest_first(
         &mut self,
         start: Option<u16>,
+        near: Option<Near<'_>>,
         route: &mut [Leg],
         pace: &mut Pace<'_>,
     ) -> Result<(), OrderError> {
         let network = self.network;
-        let from_the_left = |station| network.place(station).x.wrapping_sub(i32::MIN) as u32;
+        let from_the_left = |place: PagePoint| place.x.wrapping_sub(i32::MIN) as u32;
         let mut entrance = match start {
             Some(start) => Some(start),
             None => self.entrance(from_the_left, pace)?,
@@ -141,8 +167,7 @@ impl<'s, 'a> Unused<'s, 'a> {
             let Some(&last) = route[..done].last() else {
                 break;
             };
-            let pen = network.end(last);
-            entrance = self.entrance(|station| network.distance(pen, station), pace)?;
+            entrance = self.next_entrance(network.end(last), near, pace)?;
         }
         Ok(())
     }

@@ -17,7 +17,7 @@ use super::{Leg, NONE, OrderError};
 use crate::stage::{OutOfScratch, Scratch};
 
 /// How many steps an exchange may take.
-const STEPS: usize = 3;
+const STEPS: usize = 2;
 
 /// A part of an exchange: which moves are cut after the first.
 #[derive(Debug, Clone, Copy)]
@@ -230,7 +230,10 @@ impl<'s, 'a> Exchanges<'s, 'a> {
         if end == NONE {
             return Ok(None);
         }
-        for second in [NONE, end].into_iter().chain(self.near.of(end)) {
+        let to_ends = self.distance_to_path_ends(first);
+        pace.work(2)?;
+        let by_gap = self.gap.map(|_| NONE);
+        for second in by_gap.into_iter().chain([end]).chain(self.near.of(end)) {
             pace.work(1)?;
             let hand = hand - self.distance(end, second);
             if hand <= 0 {
@@ -255,11 +258,14 @@ impl<'s, 'a> Exchanges<'s, 'a> {
                 if !onward && gain > 0 {
                     return Ok(Some(Step { gain, hand, c, onward, third: None }));
                 }
-                if end == NONE {
+                // What a longer step by the gap can do is found from its other end.
+                if end == NONE || second == NONE {
                     continue;
                 }
                 let to_c = self.cycle.steps(a, c);
-                for third in [NONE, end].into_iter().chain(self.near.of(end)) {
+                let by_gap = by_gap.filter(|_| hand > to_ends);
+                let near = self.near.of(end);
+                for third in by_gap.into_iter().chain([end]).chain(near) {
                     pace.work(1)?;
                     let hand = hand - self.distance(end, third);
                     if hand <= 0 {
@@ -294,6 +300,16 @@ impl<'s, 'a> Exchanges<'s, 'a> {
             }
         }
         Ok(best)
+    }
+
+    /// How far `station` is from the nearer end of the path; far if it is a cycle.
+    fn distance_to_path_ends(&self, station: u16) -> i64 {
+        let Some(gap) = self.gap.map(|gap| Leg::new(gap, false)) else {
+            return i64::MAX;
+        };
+        let ends = [gap, gap.flipped()].map(|gap| self.start(self.cycle.next(gap)));
+        let [a, b] = ends.map(|end| self.distance(end, station));
+        a.min(b)
     }
 
     /// The ends of the moves that a step cuts.

@@ -1,17 +1,22 @@
 //! A shorter tour of all parts, within a budget of work.
 //!
-//! When no exchange of moves helps any more, four moves near each other are changed at random, the
-//! exchanges are tried again around them, and all is taken back unless it came out no longer: a
-//! tour only ever gets better. The same budget gives the same tour on every machine. After Martin,
-//! Otto and Felten, "Large-step Markov chains for the traveling salesman problem" (1991).
+//! Several first tours are shortened until no exchange of moves and no turning of strokes helps any
+//! more, and the shortest is kept: that from the matched moves, part by part; that from the same
+//! moves, mended; and where each part is one stroke, as in hatching and writing, those that take the
+//! nearest next from each corner of the drawing. Then four moves near each other are changed at
+//! random, the exchanges are tried again around them, and all is taken back unless it came out no
+//! longer: a tour only ever gets better. The same budget gives the same tour on every machine. After
+//! Martin, Otto and Felten, "Large-step Markov chains for the traveling salesman problem" (1991).
 
 use super::euler::Unused;
 use super::exchange::Exchanges;
 use super::mend::mend;
 use super::near::Near;
 use super::network::Network;
+use super::orient::orient;
 use super::pace::Pace;
-use super::{Leg, OrderError};
+use super::{EVEN_PART, Leg, NONE, OrderError, mark_parts};
+use crate::drawing::PagePoint;
 use crate::stage::Scratch;
 
 /// Neighbours of each station that are worth the memory, and what will do with less.
@@ -19,7 +24,11 @@ const NEIGHBOURS: [usize; 2] = [8, 4];
 /// A kick changes moves that are at most so many moves apart.
 const KICK_REACH: u32 = 6;
 /// So many kicks in vain for each move of the tour are enough.
-const PATIENCE: usize = 50;
+const PATIENCE: u32 = 50;
+/// After so many kicks the strokes are turned where that helps.
+const KICKS_BETWEEN_TURNS: u32 = 64;
+/// Of the work, what goes into choosing the tour that the rest is spent on.
+const FIRST_TOURS_PERCENT: u64 = 48;
 
 /// A tour to be improved.
 pub(super) struct Tour<'t> {
@@ -33,21 +42,21 @@ pub(super) struct Tour<'t> {
     pub mate: &'t mut [u16],
     /// Where a route with these moves begins.
     pub start: Option<u16>,
-    /// How much may be worked when the first tour stands.
-    pub budget: u64,
+    /// Whether no part has more than two odd stations.
+    pub strokes_only: bool,
+    /// Distances that may be worked for each move.
+    pub effort: u32,
 }
 
-/// Shortens `tour.route`, if it can, while `tour.budget` lasts. It sets out from that route or, if that
-/// is shorter, from the one with the moves `tour.mate`, mended so that they join the parts. Does
-/// nothing where there is too little memory.
+/// Shortens `tour.route`, if it can, while the effort lasts. Does nothing where there is too little
+/// memory.
 pub(super) fn improve(
     network: Network<'_>,
     tour: Tour<'_>,
     mut scratch: Scratch<'_>,
     pace: &mut Pace<'_>,
 ) -> Result<(), OrderError> {
-    let Tour { route, open, bound, mate, start, budget } = tour;
-    let length = route_length(network, route, open);
+    let Tour { route, open, bound, mate, start, strokes_only, effort } = tour;
     let legs = route.len() + usize::from(open);
     let fits = |per_station: &usize| {
         scratch_bytes(network, legs, *per_station) <= scratch.available_bytes()
@@ -55,49 +64,169 @@ pub(super) fn improve(
     let Some(per_station) = NEIGHBOURS.into_iter().find(fits) else {
         return Ok(());
     };
-    if length == bound {
+    if route_length(network, route, open) == bound {
         return Ok(());
     }
     let near = Near::new(network, per_station, &mut scratch, pace)?;
+    let moves = moves(network, route, open);
+    let budget = u64::from(moves) * u64::from(effort);
+    let first_tours = if strokes_only { 2 + CORNERS.len() as u64 } else { 2 };
+    let share = budget * FIRST_TOURS_PERCENT / 100 / first_tours;
+    let patience = PATIENCE.saturating_mul(moves);
+    let length = route_length(network, route, open);
     let cycle: &mut [Leg] = scratch.take(legs)?;
+    let mut best = Best { network, near, open, patience, length, route };
+    best.restore(cycle);
+    best.work_on(cycle, share, scratch.reborrow(), pace)?;
     mend(network, near, mate, scratch.reborrow(), pace)?;
-    let (mended, after) = cycle.split_at_mut(route.len());
-    Unused::new(network, mate, &mut scratch.reborrow())?.nearest_first(start, mended, pace)?;
-    if route_length(network, mended, open) > length {
-        mended.copy_from_slice(route);
-    }
-    let gap = open.then_some(network.chains());
-    after.fill(Leg::new(network.chains(), false));
-    let mut exchanges = Exchanges::new(network, near, cycle, gap, &mut scratch)?;
-    pace.grant(budget);
-    exchanges.exchange_all(true, pace)?;
-    let moves = (0..legs).filter(|&index| exchanges.move_after(exchanges.cycle.leg(index)) > 0);
-    let patience = PATIENCE * moves.count();
-    let mut kicks = Kicks { random: 1 };
-    let mut in_vain = 0;
-    while in_vain < patience && !pace.is_over() {
-        in_vain += 1;
-        if kicks.kick(&mut exchanges, pace)? > 0 {
-            in_vain = 0;
+    best.follow(mate, start, None, cycle, scratch.reborrow(), pace)?;
+    best.work_on(cycle, share, scratch.reborrow(), pace)?;
+    if strokes_only {
+        // Each part as one stroke, without any move.
+        mark_parts(network, scratch.reborrow(), mate)?;
+        for mate in mate.iter_mut().filter(|mate| **mate != NONE) {
+            *mate = EVEN_PART;
+        }
+        for corner in CORNERS {
+            best.follow(mate, None, Some(corner), cycle, scratch.reborrow(), pace)?;
+            best.work_on(cycle, share, scratch.reborrow(), pace)?;
         }
     }
-    if exchanges.length() < length {
-        let leg = |index: usize| exchanges.cycle.leg(index % legs);
-        let gap = (0..legs).find(|&index| exchanges.is_gap(leg(index)));
+    best.restore(cycle);
+    best.work_on(cycle, budget - first_tours * share, scratch, pace)
+}
+
+/// The corners of the page: on which side of it in x and y.
+const CORNERS: [(i32, i32); 4] = [(1, 1), (1, -1), (-1, 1), (-1, -1)];
+
+/// How far a place is from a corner far outside the page, in steps along x and y.
+fn from_corner(place: PagePoint, (x, y): (i32, i32)) -> u32 {
+    // A place is within ±2^20.
+    (x * place.x + y * place.y + (1 << 22)).cast_unsigned()
+}
+
+/// The shortest tour so far.
+struct Best<'b, 'a> {
+    network: Network<'a>,
+    near: Near<'b>,
+    open: bool,
+    /// So many kicks in vain are enough.
+    patience: u32,
+    length: u64,
+    route: &'b mut [Leg],
+}
+
+impl Best<'_, '_> {
+    /// Makes a tour of the moves `mate`, part by part, the nearest part next, from `corner` or else
+    /// from `start`.
+    fn follow(
+        &self,
+        mate: &[u16],
+        start: Option<u16>,
+        corner: Option<(i32, i32)>,
+        cycle: &mut [Leg],
+        mut scratch: Scratch<'_>,
+        pace: &mut Pace<'_>,
+    ) -> Result<(), OrderError> {
+        let moves: &mut [u16] = scratch.take(mate.len())?;
+        moves.copy_from_slice(mate);
+        let mut unused = Unused::new(self.network, moves, &mut scratch)?;
+        let start = match corner {
+            Some(corner) => unused.entrance(|place| from_corner(place, corner), pace)?,
+            None => start,
+        };
+        let (route, _) = cycle.split_at_mut(self.route.len());
+        unused.nearest_first(start, Some(self.near), route, pace)
+    }
+
+    /// Puts the shortest tour into `cycle`.
+    fn restore(&self, cycle: &mut [Leg]) {
+        let (route, _) = cycle.split_at_mut(self.route.len());
+        route.copy_from_slice(self.route);
+    }
+
+    /// Shortens the tour of `cycle` with `budget` distances, and keeps it if it is the shortest.
+    fn work_on(
+        &mut self,
+        cycle: &mut [Leg],
+        budget: u64,
+        mut scratch: Scratch<'_>,
+        pace: &mut Pace<'_>,
+    ) -> Result<(), OrderError> {
+        let mut scratch = scratch.reborrow();
+        let chains = self.network.chains();
+        let (_, gap) = cycle.split_at_mut(self.route.len());
+        gap.fill(Leg::new(chains, false));
+        let gap = self.open.then_some(chains);
+        let ways: &mut [u8] = scratch.take(cycle.len())?;
+        let mut tour = Exchanges::new(self.network, self.near, cycle, gap, &mut scratch)?;
+        pace.grant(budget);
+        shorten(&mut tour, ways, pace)?;
+        let mut kicks = Kicks { random: 1 };
+        let mut in_vain = 0;
+        for count in 1.. {
+            if in_vain >= self.patience || pace.is_over() {
+                break;
+            }
+            let mut gain = kicks.kick(&mut tour, pace)?;
+            if count % KICKS_BETWEEN_TURNS == 0 {
+                gain += shorten(&mut tour, ways, pace)?;
+            }
+            in_vain = if gain > 0 { 0 } else { in_vain + 1 };
+        }
+        self.keep(&tour);
+        Ok(())
+    }
+
+    /// Keeps the tour if it is the shortest so far.
+    fn keep(&mut self, tour: &Exchanges<'_, '_>) {
+        let length = tour.length();
+        if length >= self.length {
+            return;
+        }
+        self.length = length;
+        let legs = tour.cycle.len();
+        let leg = |index: usize| tour.cycle.leg(index % legs);
+        let gap = (0..legs).find(|&index| tour.is_gap(leg(index)));
         let start = gap.map_or(0, |gap| gap + 1);
-        for (index, place) in route.iter_mut().enumerate() {
+        for (index, place) in self.route.iter_mut().enumerate() {
             *place = leg(start + index);
         }
     }
-    Ok(())
+}
+
+/// Exchanges moves and turns strokes until neither helps any more. Returns the gain.
+fn shorten(
+    tour: &mut Exchanges<'_, '_>,
+    ways: &mut [u8],
+    pace: &mut Pace<'_>,
+) -> Result<i64, OrderError> {
+    let mut gain = tour.exchange_all(true, pace)?;
+    while !pace.is_over() {
+        let more = orient(tour, ways, pace)?;
+        if more == 0 {
+            break;
+        }
+        gain += more + tour.exchange_all(true, pace)?;
+    }
+    Ok(gain)
 }
 
 /// The most scratch that is taken at a time, in bytes.
 fn scratch_bytes(network: Network<'_>, legs: usize, per_station: usize) -> usize {
     let (stations, chains) = (usize::from(network.stations()), usize::from(network.chains()));
     let lists = Near::bytes(stations, per_station);
-    let exchanges = Scratch::bytes_for::<u16>(legs) + Exchanges::bytes(stations, chains, legs);
+    let exchanges = Scratch::bytes_for::<u16>(legs)
+        + Scratch::bytes_for::<u8>(legs)
+        + Exchanges::bytes(stations, chains, legs);
     lists + exchanges.max(Near::bytes_to_find(stations))
+}
+
+/// How many moves a route has.
+fn moves(network: Network<'_>, route: &[Leg], open: bool) -> u32 {
+    let pairs =
+        route.iter().zip(route.iter().cycle().skip(1)).take(route.len() - usize::from(open));
+    pairs.map(|(&from, &to)| u32::from(network.end(from) != network.start(to))).sum()
 }
 
 /// The length of the moves of a route, with the one back if it is not open.

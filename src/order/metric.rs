@@ -14,9 +14,13 @@ use crate::drawing::PagePoint;
 /// assert_eq!(length(origin, PagePoint { x: 1, y: 1 }), 362);
 /// ```
 pub fn length(a: PagePoint, b: PagePoint) -> u32 {
+    root(square(a, b) << 16)
+}
+
+/// The square of the distance between two such points, in steps.
+pub(super) fn square(a: PagePoint, b: PagePoint) -> u64 {
     let (dx, dy) = (a.x.abs_diff(b.x), a.y.abs_diff(b.y));
-    let square = u64::from(dx) * u64::from(dx) + u64::from(dy) * u64::from(dy);
-    root(square << 16)
+    u64::from(dx) * u64::from(dx) + u64::from(dy) * u64::from(dy)
 }
 
 /// The first guess at 2^15 / √x for x in 32nds from 1 to 4.

@@ -137,22 +137,22 @@ impl<'s, 'a> Grid<'s, 'a> {
         let place = self.network.place(station);
         let (column, row) = self.cell(place);
         let distance = |other: u16| match other {
-            NONE => u32::MAX,
-            other => self.network.distance(station, other),
+            NONE => u64::MAX,
+            other => self.network.square(station, other),
         };
         let per_quadrant = near.len() / 4;
         let mut enough = None;
         for ring in 0..self.columns.max(self.rows) {
             // Whatever is in this ring or beyond is farther than the cells within are wide. Where
             // a quadrant is all but empty the search ends at twice the width that was enough.
-            let reach = ((ring - 1).max(0) as u64) << (self.cell_bits + 8);
+            let reach = ((ring - 1).max(0) as u64) << self.cell_bits;
             let last = near.chunks_exact(per_quadrant).filter_map(|quadrant| quadrant.last());
             if last.clone().filter(|&&last| last != NONE).count() >= 2 && enough.is_none() {
                 enough = Some(2 * ring);
             }
             let done = |&last: &u16| match last {
                 NONE => enough.is_some_and(|enough| ring > enough),
-                last => u64::from(distance(last)) <= reach,
+                last => distance(last) <= reach * reach,
             };
             if last.clone().all(done) {
                 break;
@@ -183,7 +183,7 @@ impl<'s, 'a> Grid<'s, 'a> {
 }
 
 /// Puts `station` into its place in a sorted list; the last one leaves.
-fn insert(list: &mut [u16], station: u16, distance: impl Fn(u16) -> u32) {
+fn insert(list: &mut [u16], station: u16, distance: impl Fn(u16) -> u64) {
     let Some((last, _)) = list.split_last_mut() else {
         return;
     };

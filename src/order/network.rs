@@ -4,9 +4,10 @@
 //! A point where two segments meet is only passed through, unless its part has no odd point at
 //! all: such a part (a circle, a square) may be entered anywhere, so all its points are stations.
 //! A polyline of a hundred segments is thus one chain, and the work that follows counts strokes,
-//! not segments. Refused: more memory than there is.
+//! not segments. Where polylines are short and there is memory, every point is a station: the pen
+//! may leave a corner for what lies near it, and come back. Refused: more memory than there is.
 
-use super::metric::length;
+use super::metric::{length, square};
 use super::partition::Partition;
 use super::{Leg, NONE};
 use crate::drawing::{Drawing, PagePoint, Segment};
@@ -14,6 +15,20 @@ use crate::stage::{OutOfScratch, Scratch};
 
 /// Marks, in the degree of a part's lowest point, that the part has an odd point.
 const HAS_ODD: u16 = 1 << 15;
+
+/// Every point is a station if that makes at most so many chains of one...
+const MOST_STOPS: usize = 3;
+/// ...and if there are so many bytes for each: enough for all that comes after.
+const BYTES_A_STOP: usize = 64;
+
+/// Which of the points where two segments meet are stations.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Stops {
+    /// Those of parts that have no odd point.
+    Few,
+    /// All.
+    All,
+}
 
 /// Stations and chains of one pen. A chain is numbered like a segment: a [`Leg`] over chains says
 /// which chain and which way.
@@ -36,17 +51,23 @@ impl<'a> Network<'a> {
         pen: u8,
         scratch: &mut Scratch<'a>,
     ) -> Result<Self, OutOfScratch> {
-        let (stations, chains) = {
+        let (mut stations, mut chains, mut stops) = (0, 0, Stops::Few);
+        for wanted in [Stops::Few, Stops::All] {
+            let available = scratch.available_bytes();
             let mut lent = scratch.reborrow();
-            let survey = Survey::new(drawing, pen, &mut lent)?;
+            let survey = Survey::new(drawing, pen, wanted, &mut lent)?;
             let degrees = || survey.stations().map(|point| survey.degree(point));
-            (degrees().count(), degrees().sum::<usize>() / 2)
-        };
+            let (points, ends) = (degrees().count(), degrees().sum::<usize>());
+            let is_worth_it = ends / 2 <= MOST_STOPS * chains && points * BYTES_A_STOP <= available;
+            if wanted == Stops::Few || is_worth_it {
+                (stations, chains, stops) = (points, ends / 2, wanted);
+            }
+        }
         let at = scratch.take(stations)?;
         let ends = scratch.take(chains)?;
         let outer = scratch.take(chains)?;
         let mut lent = scratch.reborrow();
-        Survey::new(drawing, pen, &mut lent)?.lay_chains(&mut lent, at, ends, outer)?;
+        Survey::new(drawing, pen, stops, &mut lent)?.lay_chains(&mut lent, at, ends, outer)?;
         Ok(Self { points: drawing.points, segments: drawing.segments, at, ends, outer })
     }
 
@@ -68,6 +89,11 @@ impl<'a> Network<'a> {
     /// The way from one station to another, in 1/256 steps.
     pub fn distance(&self, from: u16, to: u16) -> u32 {
         length(self.place(from), self.place(to))
+    }
+
+    /// The square of the way from one station to another, in steps.
+    pub fn square(&self, from: u16, to: u16) -> u64 {
+        square(self.place(from), self.place(to))
     }
 
     /// The stations that a chain joins.
@@ -151,6 +177,7 @@ fn next_leg(segments: &[Segment], across: &[u16], leg: Leg) -> Leg {
 struct Survey<'s, 'a> {
     segments: &'a [Segment],
     pen: u8,
+    stops: Stops,
     degree: &'s mut [u16],
     across: &'s mut [u16],
     /// The lowest point of the part of each point.
@@ -158,7 +185,12 @@ struct Survey<'s, 'a> {
 }
 
 impl<'s, 'a> Survey<'s, 'a> {
-    fn new(drawing: Drawing<'a>, pen: u8, scratch: &mut Scratch<'s>) -> Result<Self, OutOfScratch> {
+    fn new(
+        drawing: Drawing<'a>,
+        pen: u8,
+        stops: Stops,
+        scratch: &mut Scratch<'s>,
+    ) -> Result<Self, OutOfScratch> {
         let count = drawing.points.len();
         let degree: &mut [u16] = scratch.take(count)?;
         let across: &mut [u16] = scratch.take(count)?;
@@ -177,7 +209,7 @@ impl<'s, 'a> Survey<'s, 'a> {
                 degree[usize::from(lowest)] |= HAS_ODD;
             }
         }
-        Ok(Self { segments: drawing.segments, pen, degree, across, part })
+        Ok(Self { segments: drawing.segments, pen, stops, degree, across, part })
     }
 
     fn degree(&self, point: u16) -> usize {
@@ -188,7 +220,7 @@ impl<'s, 'a> Survey<'s, 'a> {
         let lowest = self.part[usize::from(point)];
         match self.degree(point) {
             0 => false,
-            2 => self.degree[usize::from(lowest)] & HAS_ODD == 0,
+            2 => self.stops == Stops::All || self.degree[usize::from(lowest)] & HAS_ODD == 0,
             _ => true,
         }
     }

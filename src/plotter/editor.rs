@@ -1,21 +1,47 @@
 //! Changes of the model over the line, listed and taken back.
 
 use super::stream::{Listing, Task};
-use super::{Board, Inner, Reply};
+use super::{Board, Inner, Job, Reply};
 use crate::fixed::BinaryFraction;
 use crate::machine::State;
-use crate::model::{Change, Edit, Element, Numbers, Part};
+use crate::model::{Change, Edit, Element, Model, Numbers, Part};
 use crate::protocol::Refusal;
 use crate::stage::Scratch;
 use core::fmt;
 
-impl Inner<'_> {
-    /// Copies the model to the working memory, if that is idle, before it is changed.
-    pub(super) fn remember(&mut self) {
-        if self.machine.state() == State::Idle {
+/// Keeps a copy of the model, where there is room for one.
+pub(super) struct Keeper<'k> {
+    words: &'k mut [u64],
+    kept_words: &'k mut usize,
+    job: &'k mut Job,
+    is_idle: bool,
+}
+
+impl Keeper<'_> {
+    /// Copies the model in place of the last copy: it is about to change.
+    #[inline(never)] // Once is enough.
+    pub(super) fn keep(&mut self, model: &Model<'_>) {
+        *self.kept_words = 0;
+        if self.is_idle {
             self.job.release();
-            self.can_undo = self.model.save(self.words);
+            if model.save(self.words) {
+                *self.kept_words = model.saved_words();
+            }
         }
+    }
+}
+
+impl<'m> Inner<'m> {
+    /// The model, and who keeps a copy of it at the front of the working memory, which `edit` may use only behind.
+    pub(super) fn split(&mut self) -> (&mut Model<'m>, Keeper<'_>, Scratch<'_>) {
+        // A change that is refused must leave the last copy.
+        let next = Some(self.model.saved_words()).filter(|words| *words <= self.words.len());
+        let copies = self.kept_words.max(next.unwrap_or(0));
+        let (words, free) = self.words.split_at_mut(copies.min(self.words.len()));
+        let is_idle = self.machine.state() == State::Idle;
+        let keeper =
+            Keeper { words, kept_words: &mut self.kept_words, job: &mut self.job, is_idle };
+        (&mut self.model, keeper, Scratch::new(free))
     }
 
     #[inline(never)] // Its frame must not lie under the stages'.
@@ -23,15 +49,14 @@ impl Inner<'_> {
         if self.machine.state() != State::Idle {
             return Err(Refusal::Busy);
         }
-        // The copy stands at the front; the edit works behind it.
-        let free = if self.can_undo { self.model.saved_words() } else { 0 };
-        let scratch = Scratch::new(self.words.get_mut(free..).unwrap_or(&mut []));
-        match self.model.edit(edit, scratch) {
+        self.job.release();
+        let (model, mut keeper, scratch) = self.split();
+        match model.edit(edit, scratch, &mut |model| keeper.keep(model)) {
             Ok(Change { vertices, bars, faces, curves }) => {
                 Reply(board).line(format_args!(
                     "[EDIT:vertices {vertices:+}, bars {bars:+}, faces {faces:+}, curves {curves:+}]"
                 ));
-                if !self.can_undo {
+                if self.kept_words == 0 {
                     Reply(board).line(format_args!("[MSG:no memory to take this back]"));
                 }
                 Ok(())
@@ -42,7 +67,7 @@ impl Inner<'_> {
 
     #[inline(never)] // Its frame must not lie under the stages'.
     pub(super) fn undo(&mut self) -> Result<(), Refusal> {
-        if !core::mem::take(&mut self.can_undo) {
+        if core::mem::take(&mut self.kept_words) == 0 {
             return Err(Refusal::NothingToUndo);
         }
         self.model.restore(self.words);

@@ -1,9 +1,8 @@
 //! From the model to ordered strokes: the way of the data, in one place.
 
-use super::{PlotOptions, plan, solid};
+use super::{PlotOptions, plan, solid, title};
 use crate::drawing::{
-    Bounds, Drawing, Line, LineType, OrganiseError, PageMap, PagePoint, StepsPerMillimetre, Stored,
-    organise,
+    Bounds, Drawing, Line, LineType, OrganiseError, PageMap, StepsPerMillimetre, Stored, organise,
 };
 use crate::geometry::{Projection, Vertex};
 use crate::machine::{Path, Target};
@@ -13,7 +12,7 @@ use crate::protocol::{HiddenLines, Refusal, WayToSee};
 use crate::stage::{
     Aborted, Attention, OutOfScratch, Scratch, Stage, StageError, items, items_mut,
 };
-use crate::view::{Flattening, Seen, View, see};
+use crate::view::{Camera, Flattening, Seen, View, see};
 use crate::visibility::{self, Scene, SinkFull, Stretch, StretchSink, VisibilityError};
 
 /// Who is shown each stretch as it is found, in view coordinates: the preview.
@@ -24,8 +23,8 @@ pub trait Observer {
     /// What was shown so far counts no more: the job begins again in other memory.
     fn start_again(&mut self) {}
 
-    /// One bar of a plan, as it lies on the page.
-    fn plan_bar(&mut self, from: [f64; 2], to: [f64; 2]);
+    /// One bar of a plan, as it lies on the page, and its pen, from 0.
+    fn plan_bar(&mut self, from: [f64; 2], to: [f64; 2], pen: u8);
 }
 
 /// Nobody looks on.
@@ -34,7 +33,7 @@ pub struct Unobserved;
 
 impl Observer for Unobserved {
     fn stretch(&mut self, _: &View, _: &Stretch) {}
-    fn plan_bar(&mut self, _: [f64; 2], _: [f64; 2]) {}
+    fn plan_bar(&mut self, _: [f64; 2], _: [f64; 2], _: u8) {}
 }
 
 /// A drawing in the working memory with the order of its strokes.
@@ -65,6 +64,7 @@ impl Job {
         {
             return Err(Refusal::NothingToPlot);
         }
+        title::check(options, steps)?;
         let mut degenerate_faces = 0;
         let lines = if model.is_plan() && options.shows_plans_flat() {
             plan::lay_out(model, options, steps, words, attention, observer)?
@@ -80,6 +80,7 @@ impl Job {
                 }
             }
         };
+        let lines = title::write(options, steps, words, lines, attention)?;
         attention.enter(Stage::Order);
         let stored = organise(words, lines, attention)?;
         let (drawing, mut rest) = stored.split(words).map_err(Refusal::DrawingTooLarge)?;
@@ -178,13 +179,14 @@ struct Found {
     degenerate_faces: u32,
 }
 
-/// Looks at the model through the camera.
+/// Looks at the model through the camera that the options choose.
 #[inline(never)] // Its frame must not lie under the stages'.
-fn look(
+pub(super) fn look(
     model: &Model<'_>,
     options: &PlotOptions,
     attention: &mut dyn Attention,
-) -> Result<View, Refusal> {
+) -> Result<(Camera, View), Refusal> {
+    attention.enter(Stage::View);
     let camera = options.camera(model).ok_or(Refusal::NothingToPlot)?;
     attention.check()?;
     let view = View::new(&camera, model).map_err(Refusal::View)?;
@@ -192,7 +194,7 @@ fn look(
     if !options.clip_behind {
         view.refuse_behind(model).map_err(Refusal::View)?;
     }
-    Ok(view)
+    Ok((camera, view))
 }
 
 /// Anything else: through the camera, hidden lines found.
@@ -204,9 +206,8 @@ fn project(
     attention: &mut dyn Attention,
     observer: &mut dyn Observer,
 ) -> Result<Found, Refusal> {
-    attention.enter(Stage::View);
     let total = size_of_val(words);
-    let view = look(model, options, attention)?;
+    let (_, view) = look(model, options, attention)?;
     let projection = view.projection();
     let mut scratch = Scratch::new(words);
     let curves_map = if model.curves().is_empty() {
@@ -249,8 +250,7 @@ fn project(
         let room = line_memory.available_bytes() / size_of::<Line>();
         let collected = line_memory.take(room).map_err(Refusal::DrawingTooLarge)?;
         let collector = Collector { lines: collected, count: 0 };
-        let mut sink =
-            PageSink { collector, map: &map, view: &view, hidden: options.hidden, observer };
+        let mut sink = PageSink { collector, map: &map, view: &view, options, observer };
         let found = if options.see == WayToSee::Wire {
             visibility::follow_wire(&scene, wanted, stage_memory, attention, &mut sink)
         } else {
@@ -311,7 +311,7 @@ fn map_with_curves(
         all = grow(all, Bounds::around(positions.iter().map(in_front), projection));
     }
     let all = all.ok_or(Refusal::NothingToPlot)?;
-    let rough = PageMap::fit(&all, &options.page, steps).map_err(Refusal::Page)?;
+    let rough = PageMap::fit(&all, &options.sheet(), steps).map_err(Refusal::Page)?;
     let (mut bounds, is_cut) = {
         let mut scratch = scratch.reborrow();
         let seen = see(view, model, None, &mut scratch, attention)?;
@@ -334,8 +334,8 @@ fn fit(
     steps: StepsPerMillimetre,
 ) -> Result<PageMap, Refusal> {
     match view.field(Bounds::FRACTION_BITS).filter(|_| is_cut) {
-        Some(field) => PageMap::fit_field(bounds, field, &options.page, steps),
-        None => PageMap::fit(bounds, &options.page, steps),
+        Some(field) => PageMap::fit_field(bounds, field, &options.sheet(), steps),
+        None => PageMap::fit(bounds, &options.sheet(), steps),
     }
     .map_err(Refusal::Page)
 }
@@ -413,15 +413,9 @@ impl<'a> Collector<'a> {
         Self { lines: items_mut(words, room).unwrap_or(&mut []), count: 0 }
     }
 
-    pub(super) fn line(
-        &mut self,
-        from: PagePoint,
-        to: PagePoint,
-        line_type: LineType,
-        pen: u8,
-    ) -> Result<(), SinkFull> {
-        if from != to {
-            *self.lines.get_mut(self.count).ok_or(SinkFull)? = Line::new(from, to, line_type, pen);
+    pub(super) fn line(&mut self, line: Line) -> Result<(), SinkFull> {
+        if line.has_length() {
+            *self.lines.get_mut(self.count).ok_or(SinkFull)? = line;
             self.count += 1;
         }
         Ok(())
@@ -442,7 +436,7 @@ pub(super) struct PageSink<'a> {
     pub(super) collector: Collector<'a>,
     pub(super) map: &'a PageMap,
     pub(super) view: &'a View,
-    pub(super) hidden: HiddenLines,
+    pub(super) options: &'a PlotOptions,
     pub(super) observer: &'a mut dyn Observer,
 }
 
@@ -454,17 +448,27 @@ impl StretchSink for PageSink<'_> {
         if self.view.near().is_some_and(is_cut) {
             return Ok(());
         }
-        let (line_type, pen) = match (stretch.visible, self.hidden) {
-            (true, _) | (false, HiddenLines::Shown) => (LineType::Full, 0),
-            (false, HiddenLines::Dotted) => (LineType::Dotted, 0),
-            (false, HiddenLines::Dashed) => (LineType::Dashed, 0),
-            (false, HiddenLines::Pen(pen)) => (LineType::Full, pen),
+        let mut stretch = stretch;
+        if self.options.one_pen {
+            stretch.pen = 0;
+        }
+        let line_type = match (stretch.visible, self.options.hidden) {
+            (true, _) | (false, HiddenLines::Shown) => LineType::Full,
+            (false, HiddenLines::Dotted) => LineType::Dotted,
+            (false, HiddenLines::Dashed) => LineType::Dashed,
+            (false, HiddenLines::Pen(pen)) => {
+                stretch.pen = pen;
+                LineType::Full
+            }
             (false, HiddenLines::Erased) => return Ok(()),
         };
         self.observer.stretch(self.view, &stretch);
         let along = [stretch.from, stretch.to];
         match self.map.stretch((p, q), along, self.view.projection()) {
-            Some([from, to]) => self.collector.line(from, to, line_type, pen),
+            Some([from, to]) => {
+                let line = Line::new(from, to, line_type, stretch.pen);
+                self.collector.line(if stretch.visible { line } else { line.under() })
+            }
             None => Ok(()),
         }
     }

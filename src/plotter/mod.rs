@@ -17,6 +17,7 @@ mod program;
 mod reply;
 mod solid;
 mod stream;
+mod title;
 
 pub use board::{Board, Kept, NotKept, Record};
 pub use job::{Cursor, Job, Observer, Strokes, Unobserved};
@@ -36,7 +37,8 @@ use program::Program;
 use reply::Reply;
 use stream::{Listing, Progress, Task};
 
-/// How far step events are planned ahead of the pins, and so how late a hold takes effect: 50 ms.
+/// How far step events are planned ahead of the pins at least, and so how late a hold takes effect:
+/// 50 ms. More if the machine could not stop within them.
 const AHEAD_TICKS: u32 = crate::motion::TICKS_PER_SECOND / 20;
 
 /// Polls the plotter for ever; sleeps when there is nothing to do.
@@ -75,12 +77,14 @@ struct Inner<'m> {
     machine: Machine<'m>,
     job: Job,
     cursor: Cursor,
-    /// Whether `words` hold the model as it was before the last change.
-    can_undo: bool,
+    /// How many of the `words`, from the first on, hold the model as it was before the last change; 0 for none.
+    kept_words: usize,
     program: Program,
     /// The line that is answered when it is done.
     task: Option<Task>,
     alarm_told: Option<Alarm>,
+    /// The pen that the user was asked for.
+    pen_told: Option<u8>,
 }
 
 impl<'m> Plotter<'m> {
@@ -102,10 +106,11 @@ impl<'m> Plotter<'m> {
                 machine: Machine::new(settings, blocks, pins, AHEAD_TICKS),
                 job: Job::default(),
                 cursor: Cursor::default(),
-                can_undo: false,
+                kept_words: 0,
                 program: Program::default(),
                 task: None,
                 alarm_told: None,
+                pen_told: None,
             },
         }
     }
@@ -199,6 +204,8 @@ impl<'m> Plotter<'m> {
             Reply(board).outcome(Err(Refusal::BytesLost));
         }
         if asked.has(RealTime::STATUS) {
+            // To write it takes 10 ms; so may what was done since the queue was filled last.
+            self.inner.plan(board);
             self.inner.report_status(board);
         }
     }
@@ -224,26 +231,31 @@ impl Inner<'_> {
     #[inline(never)] // Its frame must not lie under the stages'.
     fn carry_out<B: Board>(&mut self, line: &str, board: &mut B) -> Result<Next, Refusal> {
         let command = Command::parse(line)?;
-        if command.changes_the_model() {
-            self.remember();
-        }
+        let one_pen = self.options.one_pen;
+        let (model, mut keeper, _) = self.split();
+        let keep = &mut |model: &Model<'_>| keeper.keep(model);
         match command {
             Command::Nothing => {}
             Command::Vertex(coordinates) => {
-                self.model.add_vertex(coordinates).map_err(Refusal::Model)?
+                model.add_vertex(coordinates, keep).map_err(Refusal::Model)?
             }
             Command::Face(numbers) => {
-                self.model.add_face(numbers.iter()).map_err(Refusal::Model)?
+                model.add_face(numbers.iter(), keep).map_err(Refusal::Model)?
             }
             Command::Polyline(numbers) => {
-                self.model.add_polyline(numbers.iter()).map_err(Refusal::Model)?
+                model.add_polyline(numbers.iter(), keep).map_err(Refusal::Model)?
             }
-            Command::Degree(degree) => self.model.set_degree(degree).map_err(Refusal::Model)?,
+            Command::Degree(degree) => model.set_degree(degree).map_err(Refusal::Model)?,
             Command::Curve { ends, control } => {
-                self.model.begin_curve(ends, control.iter()).map_err(Refusal::Model)?
+                model.begin_curve(ends, control.iter()).map_err(Refusal::Model)?
             }
-            Command::Knots(knots) => self.model.add_knots(knots.iter()).map_err(Refusal::Model)?,
-            Command::EndCurve => self.model.end_curve().map_err(Refusal::Model)?,
+            Command::Knots(knots) => model.add_knots(knots.iter()).map_err(Refusal::Model)?,
+            // So that no file has too many.
+            Command::Pen { .. } if one_pen => {}
+            Command::Pen { by_material, name } => {
+                model.choose_pen(by_material, name, keep).map_err(Refusal::Model)?
+            }
+            Command::EndCurve => model.end_curve(keep).map_err(Refusal::Model)?,
             Command::Help => self.task = Some(Task::List(Listing::Help, 0)),
             Command::BuildInfo => self.report_build(board),
             Command::Settings => self.task = Some(Task::List(Listing::Settings, 0)),
@@ -252,9 +264,13 @@ impl Inner<'_> {
                 kept::keep_settings(self.machine.settings(), board)?;
             }
             Command::Option(option) => self.options.set(option),
+            Command::Title(text) => self.options.set_title(text)?,
             Command::Options => self.task = Some(Task::List(Listing::Options, 0)),
             Command::Model => self.report_model(board),
-            Command::Clear => self.model.clear(),
+            Command::Clear => {
+                keep(model);
+                model.clear();
+            }
             Command::Edit(edit) => self.edit(edit, board)?,
             Command::List(part, numbers) => self.begin_list(part, numbers)?,
             Command::Undo => self.undo()?,
@@ -321,7 +337,7 @@ impl Inner<'_> {
         observer: &mut dyn Observer,
     ) -> Result<(), Refusal> {
         // The memory of the last job is used again, so it ends here even if this one fails.
-        self.can_undo = false;
+        self.kept_words = 0;
         self.job = Job::default();
         self.cursor = Cursor::default();
         let settings = self.machine.settings();
@@ -413,7 +429,10 @@ impl Inner<'_> {
             reply.part(format_args!("|Pn:{x}{y}{stop}"));
         }
         if let Some(pen) = status.pen_wanted {
-            reply.part(format_args!("|Pen:{pen}"));
+            reply.part(format_args!("|Pen:{}", pen + 1));
+        }
+        if self.machine.underruns() != 0 {
+            reply.part(format_args!("|Late:{}", self.machine.underruns()));
         }
         let (done, all) = (status.done, status.job);
         reply.part(format_args!("|Strokes:{}/{}", done.strokes, all.strokes));

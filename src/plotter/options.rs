@@ -1,10 +1,12 @@
 //! What is drawn and how, as the user set it.
 
-use crate::drawing::Page;
-use crate::fixed::{Millimetres, SixDecimals};
+use crate::drawing::{Page, Title, TitleText};
+use crate::fixed::{Millimetres, SixDecimals, sin_cos_degrees};
 use crate::model::Model;
 use crate::order;
-use crate::protocol::{HiddenLines, PlotOption, ProjectionChoice, WayToSee};
+use crate::protocol::{
+    Escape, EscapedText, HiddenLines, PlotOption, ProjectionChoice, Refusal, WayToSee,
+};
 use crate::view::{Camera, Direction, Lens, Sight, View};
 use crate::visibility::{self, Crease};
 
@@ -28,8 +30,14 @@ pub struct PlotOptions {
     pub merged_blocks: bool,
     /// Edges between faces that bend less, in degrees, are not drawn; 0 draws every edge.
     pub crease: f64,
+    /// Whether one pen draws all, whatever the model says.
+    pub one_pen: bool,
     /// The sheet.
     pub page: Page,
+    /// What stands below the drawing, if it is not empty.
+    title: TitleText,
+    /// Height of its capitals.
+    title_size: Millimetres,
     /// Whether a plan is scaled to the page.
     pub fit: bool,
     /// How strokes are ordered.
@@ -37,9 +45,9 @@ pub struct PlotOptions {
 }
 
 impl Default for PlotOptions {
-    /// An automatic view in perspective, hidden lines erased, on A4 upright with a margin of 10 mm.
+    /// An automatic view in perspective, hidden lines erased, on A4 upright with a margin of 10 mm, without a title.
     fn default() -> Self {
-        let [width, height, margin] = [210, 297, 10].map(Millimetres::from_num);
+        let [width, height, margin, title_size] = [210, 297, 10, 5].map(Millimetres::from_num);
         Self {
             eye: None,
             at: None,
@@ -52,7 +60,10 @@ impl Default for PlotOptions {
             seams: true,
             merged_blocks: false,
             crease: 0.0,
-            page: Page { width, height, margin },
+            one_pen: false,
+            page: Page { width, height, margin, foot: Millimetres::ZERO },
+            title: TitleText::default(),
+            title_size,
             fit: false,
             order: order::Options::default(),
         }
@@ -77,16 +88,43 @@ impl PlotOptions {
             PlotOption::Seams(seams) => self.seams = seams,
             PlotOption::MergedBlocks(merged) => self.merged_blocks = merged,
             PlotOption::Crease(crease) => self.crease = crease,
+            PlotOption::OnePen(one) => self.one_pen = one,
             PlotOption::Page { width, height } => {
                 (self.page.width, self.page.height) = (width, height)
             }
             PlotOption::Margin(margin) => self.page.margin = margin,
+            PlotOption::TitleSize(size) => self.title_size = size,
             PlotOption::Fit(fit) => self.fit = fit,
             PlotOption::Order(method) => self.order.method = method,
             PlotOption::Cycle(true) => self.order.shape = order::Shape::ClosedCycle,
             PlotOption::Cycle(false) => self.order.shape = order::Shape::OpenPath,
             PlotOption::Effort(effort) => self.order.effort = effort,
         }
+    }
+
+    /// Changes the title; an empty one is none.
+    ///
+    /// # Errors
+    /// [`Refusal::TitleTooLong`]; the title is as it was.
+    #[inline(never)] // Its frame must not lie under the stages'.
+    pub fn set_title(&mut self, text: EscapedText<'_>) -> Result<(), Refusal> {
+        let limit = TitleText::LIMIT;
+        self.title = TitleText::new(text.letters()).ok_or(Refusal::TitleTooLong { limit })?;
+        Ok(())
+    }
+
+    /// The title, if there is one to be seen.
+    #[inline(never)] // Once is enough: it is asked for everywhere.
+    pub fn title(&self) -> Option<Title<'_>> {
+        let text = self.title.as_str();
+        text.bytes().any(|byte| byte != b' ').then_some(Title { text, height: self.title_size })
+    }
+
+    /// The sheet with the room for the title.
+    #[inline(never)] // Its frame must not lie under the stages'.
+    pub fn sheet(&self) -> Page {
+        let foot = self.title().map(|title| title.rise() + title.depth());
+        Page { foot: foot.unwrap_or_default(), ..self.page }
     }
 
     /// Whether a plan is drawn as it lies: not if the user chose a view for it.
@@ -120,7 +158,7 @@ impl PlotOptions {
     #[inline(never)] // Its frame must not lie under the stages'.
     pub fn visibility(&self, view: &View) -> visibility::Options {
         let crease = (self.crease > 0.0).then(|| Crease {
-            cosine: libm::round(libm::cos(self.crease.to_radians()) * 32768.0) as i32,
+            cosine: libm::round(sin_cos_degrees(self.crease).1 * 32768.0) as i32,
             depth_stretch: view.depth_stretch(),
         });
         let with_hidden = self.hidden != HiddenLines::Erased;
@@ -189,8 +227,13 @@ impl PlotOptions {
         line(format_args!("$seams={}", on(self.seams)));
         line(format_args!("$blocks={}", if self.merged_blocks { "merged" } else { "separate" }));
         line(format_args!("$crease={}", SixDecimals(self.crease)));
-        line(format_args!("$page={}x{}", self.page.width, self.page.height));
-        line(format_args!("$margin={}", self.page.margin));
+        line(format_args!("$pens={}", if self.one_pen { "one" } else { "auto" }));
+        let [width, height, margin] =
+            [self.page.width, self.page.height, self.page.margin].map(SixDecimals::from);
+        line(format_args!("$page={width}x{height}"));
+        line(format_args!("$margin={margin}"));
+        line(format_args!("$title={}", Escape(self.title.as_str())));
+        line(format_args!("$title-size={}", SixDecimals::from(self.title_size)));
         line(format_args!("$fit={}", on(self.fit)));
         line(format_args!("$order={method}"));
         line(format_args!("$cycle={}", on(self.order.shape == order::Shape::ClosedCycle)));

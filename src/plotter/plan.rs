@@ -3,7 +3,7 @@
 use super::PlotOptions;
 use super::job::{Collector, FOR_BOUNDS, HALF_A_STEP, Observer, grow};
 use crate::curve::{FRACTION_BITS, Point};
-use crate::drawing::{Bounds, LineType, PageMap, StepsPerMillimetre};
+use crate::drawing::{Bounds, Line, LineType, PageMap, StepsPerMillimetre};
 use crate::model::{Element, Model, Position};
 use crate::protocol::Refusal;
 use crate::stage::Attention;
@@ -22,7 +22,7 @@ pub(super) fn lay_out(
     let (vertices, curves) = (model.vertices(), model.curves());
     let points: &[Point] = bytemuck::cast_slice(vertices);
     let unit = libm::ldexp(1.0, -(model.fraction_bits() as i32));
-    let (page, bits) = (&options.page, model.fraction_bits());
+    let (page, bits) = (&options.sheet(), model.fraction_bits());
     let on_page =
         |map: PageMap| move |[x, y, _]: [i64; 3]| Some(map.fine(x, y, 1 << FRACTION_BITS));
     let corners = model.elements().corners().iter();
@@ -44,28 +44,31 @@ pub(super) fn lay_out(
     };
     let map = map.map_err(Refusal::Page)?;
     let mut collector = Collector::new(words);
-    let mut draw = |from: Point, to: Point| {
+    let mut draw = |from: Point, to: Point, pen: u8| {
+        let pen = if options.one_pen { 0 } else { pen };
         let on_plan = |[x, y, _]: Point| [x, y].map(|c| f64::from(c) * unit);
-        observer.plan_bar(on_plan(from), on_plan(to));
+        observer.plan_bar(on_plan(from), on_plan(to), pen);
         let [from, to] = [from, to].map(|[x, y, _]| map.point(x.into(), y.into(), 1));
-        collector.line(from, to, LineType::Full, 0).map_err(|SinkFull| collector.missing())
+        collector
+            .line(Line::new(from, to, LineType::Full, pen))
+            .map_err(|SinkFull| collector.missing())
     };
-    for element in model.elements().iter() {
+    for (element, pen) in model.elements().iter_with_pens() {
         let Element::Bar(from, to) = element else { continue };
         if let [Some(from), Some(to)] = [from, to].map(|number| points.get(usize::from(number))) {
-            draw(*from, *to).map_err(Refusal::DrawingTooLarge)?;
+            draw(*from, *to, pen).map_err(Refusal::DrawingTooLarge)?;
         }
     }
     let mut before = None;
-    curves.flatten(
-        points,
-        &on_page(map),
-        HALF_A_STEP,
-        attention,
-        &mut |end, begins| match before.replace(end) {
-            Some(before) if !begins => draw(before, end),
+    let (mut pens, mut pen) = (curves.iter().map(|curve| curve.pen), 0);
+    curves.flatten(points, &on_page(map), HALF_A_STEP, attention, &mut |end, begins| {
+        if begins {
+            pen = pens.next().unwrap_or(pen);
+        }
+        match before.replace(end) {
+            Some(before) if !begins => draw(before, end, pen),
             _ => Ok(()),
-        },
-    )?;
+        }
+    })?;
     Ok(collector.count)
 }

@@ -1,7 +1,7 @@
 //! A convex solid seen without faces: from its vertices, or its edges, to lines on the page.
 
 use super::PlotOptions;
-use super::job::{Collector, Observer, PageSink, grow, to_front};
+use super::job::{Collector, Observer, PageSink, grow, look, to_front};
 use crate::convex::{
     self, Eye, Sight, SinkFull, SolidEdge, SolidError, SolidSink, default_tolerance,
 };
@@ -9,7 +9,7 @@ use crate::drawing::{Bounds, PageMap, StepsPerMillimetre};
 use crate::model::{Corner, Model};
 use crate::protocol::{HiddenLines, Refusal, WayToSee};
 use crate::stage::{Attention, Scratch, Stage, items_mut};
-use crate::view::{SightLines, View, distinct_edges};
+use crate::view::{SightLines, distinct_edges};
 use crate::visibility::{Along, Stretch, StretchSink};
 
 /// Finds what is seen of the solid. Returns how many lines stand in `words`.
@@ -22,12 +22,7 @@ pub(super) fn project(
     attention: &mut dyn Attention,
     observer: &mut dyn Observer,
 ) -> Result<usize, Refusal> {
-    attention.enter(Stage::View);
-    let camera = options.camera(model).ok_or(Refusal::NothingToPlot)?;
-    let view = View::new(&camera, model).map_err(Refusal::View)?;
-    if !options.clip_behind {
-        view.refuse_behind(model).map_err(Refusal::View)?;
-    }
+    let (camera, view) = look(model, options, attention)?;
     let eye = match camera.sight_lines(model.fraction_bits()).map_err(Refusal::View)? {
         SightLines::Through(place) => Eye::At(place),
         SightLines::Along(direction) => Eye::Towards(direction),
@@ -72,15 +67,15 @@ pub(super) fn project(
         bounds = grow(bounds, Bounds::around(ends.into_iter(), view.projection()));
     }
     let bounds = bounds.ok_or(Refusal::NothingToPlot)?;
-    let map = PageMap::fit(&bounds, &options.page, steps).map_err(Refusal::Page)?;
+    let map = PageMap::fit(&bounds, &options.sheet(), steps).map_err(Refusal::Page)?;
     let collector = Collector::new(line_words);
-    let mut sink = PageSink { collector, map: &map, view: &view, hidden: options.hidden, observer };
+    let mut sink = PageSink { collector, map: &map, view: &view, options, observer };
     for (numbers, visible) in all() {
         attention.check()?;
         let Some([p, q]) = on_view(numbers) else { continue };
         let (from, to) = (Along::START, Along::END);
         let edge = Some((numbers[0], numbers[1]));
-        sink.stretch(Stretch { edge, ends: (p, q), from, to, visible })
+        sink.stretch(Stretch { edge, ends: (p, q), from, to, visible, pen: 0 })
             .map_err(|SinkFull| sink.collector.out_of_memory())?;
     }
     let count = sink.collector.count;

@@ -84,7 +84,8 @@ impl Inner<'_> {
         }
     }
 
-    /// Looks at the contacts; tells of an alarm once, and lets the board carry it out at once.
+    /// Looks at the contacts; tells of an alarm once, and lets the board carry it out at once. Asks for the next pen,
+    /// once, when the machine stands and waits for it.
     #[inline(never)] // Its frame must not lie under the stages'.
     pub(super) fn watch<B: Board>(&mut self, board: &mut B) {
         self.machine.observe(board.contacts());
@@ -97,6 +98,14 @@ impl Inner<'_> {
             if let Some(alarm) = alarm {
                 board.step_now();
                 Reply(board).line(format_args!("ALARM:{}", number(alarm)));
+            }
+        }
+        let stands = self.machine.state() == State::Hold { standing: true };
+        let pen = self.machine.pen_wanted().filter(|_| stands);
+        if pen != self.pen_told {
+            self.pen_told = pen;
+            if let Some(pen) = pen {
+                Reply(board).line(format_args!("[MSG:put in pen {}, then send ~]", pen + 1));
             }
         }
     }

@@ -1,10 +1,9 @@
 //! Lines to typed commands.
 
-use super::{GCode, Refusal};
+use super::{EscapedText, GCode, Refusal};
 use crate::curve::CurveError;
-use crate::drawing::PEN_LIMIT;
 use crate::fixed::{Decimal, Millimetres};
-use crate::model::{self, Edit, ModelError, Part};
+use crate::model::{self, Edit, ModelError, PEN_LIMIT, Part, PenName};
 use crate::order;
 use crate::view::{Direction, Lens};
 
@@ -32,6 +31,13 @@ pub enum Command<'a> {
     Knots(Decimals<'a>),
     /// `end`
     EndCurve,
+    /// `usemtl NAME` or `g NAME …`
+    Pen {
+        /// Whether it is `usemtl`.
+        by_material: bool,
+        /// What it names; a number may be past the last pen.
+        name: PenName,
+    },
     /// `$`
     Help,
     /// `$I`
@@ -47,6 +53,8 @@ pub enum Command<'a> {
     },
     /// `$name=value` for what is drawn and how.
     Option(PlotOption),
+    /// `$title=TEXT`
+    Title(EscapedText<'a>),
     /// `$options`
     Options,
     /// `$model`
@@ -102,6 +110,8 @@ pub enum PlotOption {
     MergedBlocks(bool),
     /// `$crease=DEGREES`: edges less sharp are not drawn.
     Crease(f64),
+    /// `$pens=auto|one`: whether one pen draws all (`true`).
+    OnePen(bool),
     /// `$page=WIDTHxHEIGHT` in mm
     Page {
         /// Along x.
@@ -111,6 +121,8 @@ pub enum PlotOption {
     },
     /// `$margin=MM`
     Margin(Millimetres),
+    /// `$title-size=MM`
+    TitleSize(Millimetres),
     /// `$fit=on|off`
     Fit(bool),
     /// `$order=auto|greedy|exact`
@@ -267,14 +279,17 @@ pub const HELP: &[(&str, &str)] = &[
     ("$seams=on|off", "whether the lines are drawn where faces pass through each other"),
     ("$blocks=separate|merged", "whether blocks that touch are drawn as one shape"),
     ("$crease=DEGREES", "leave out edges between faces that bend less; 0 draws every edge"),
+    ("$pens=auto|one", "whether usemtl, or else g, chooses pens, or one draws all"),
     ("$page=WIDTHxHEIGHT", "size of the sheet in mm"),
     ("$margin=MM", "what stays free on each side of the sheet"),
+    ("$title=TEXT", "what stands below the drawing, the rest of the line; nothing for none"),
+    ("$title-size=MM", "height of its capitals, 1 to 100"),
     ("$fit=on|off", "scale a plan to the page, or draw it at true size"),
     ("$order=auto|greedy|exact", "how the moves between strokes are chosen"),
     ("$cycle=on|off", "whether the pen returns to where it began"),
     (
         "$effort=NUMBER",
-        "work to improve the order of many parts, for each pen; 0 takes the nearest next",
+        "distances tried for each move with the pen up to improve it; 0 takes the nearest next",
     ),
     ("$model", "size of the model against the limits"),
     ("$clear", "forget the model"),
@@ -320,7 +335,11 @@ impl<'a> Command<'a> {
     /// assert_eq!(Command::parse("$plot"), Ok(Command::Plot));
     /// assert!(Command::parse("v 1 2").is_err());
     /// ```
+    #[inline(never)] // Its frame must not lie under the stages'.
     pub fn parse(line: &'a str) -> Result<Self, Refusal> {
+        if let Some(text) = title(line) {
+            return EscapedText::new(text).map(Self::Title);
+        }
         let line = line.split('#').next().unwrap_or("").trim();
         if let Some(dollar) = line.strip_prefix('$') {
             return Self::parse_dollar(dollar.trim());
@@ -330,7 +349,10 @@ impl<'a> Command<'a> {
         }
         let (keyword, rest) = split_word(line);
         match keyword {
-            "" | "o" | "g" | "s" | "usemtl" | "mtllib" | "vn" | "vt" => Ok(Self::Nothing),
+            "" | "o" | "s" | "mtllib" | "vn" | "vt" => Ok(Self::Nothing),
+            "usemtl" | "g" => {
+                Ok(Self::Pen { by_material: keyword == "usemtl", name: pen_name(rest) })
+            }
             "v" => Ok(Self::Vertex(coordinates(rest)?)),
             "f" => Numbers::new(rest).map(Self::Face),
             "l" => Numbers::new(rest).map(Self::Polyline),
@@ -350,19 +372,7 @@ impl<'a> Command<'a> {
         }
     }
 
-    /// Whether `$undo` takes it back.
-    pub fn changes_the_model(&self) -> bool {
-        matches!(
-            self,
-            Self::Vertex(_)
-                | Self::Face(_)
-                | Self::Polyline(_)
-                | Self::Curve { .. }
-                | Self::Clear
-                | Self::Edit(_)
-        )
-    }
-
+    #[inline(never)] // Its frame must not lie under the stages'.
     fn parse_dollar(text: &'a str) -> Result<Self, Refusal> {
         if let Some((name, value)) = text.split_once('=') {
             let (name, value) = (name.trim(), value.trim());
@@ -423,6 +433,11 @@ impl PlotOption {
                 }
             }),
             "hidden" => Self::Hidden(HiddenLines::parse(value)?),
+            "pens" => Self::OnePen(match value {
+                "one" => true,
+                "auto" => false,
+                _ => return Err(Refusal::NotAChoice { choices: "auto or one" }),
+            }),
             "page" => {
                 let (width, height) = value.split_once(['x', 'X']).ok_or(Refusal::NotAPage)?;
                 Self::Page { width: positive(width)?, height: positive(height)? }
@@ -434,6 +449,13 @@ impl PlotOption {
                     return Err(Refusal::NumberOutOfRange);
                 }
                 Self::Margin(margin)
+            }
+            "title-size" => {
+                let size = positive(value)?;
+                if !(1..=100).contains(&size) {
+                    return Err(Refusal::NumberOutOfRange);
+                }
+                Self::TitleSize(size)
             }
             "fit" => Self::Fit(on_or_off(value)?),
             "order" => Self::Order(match value {
@@ -465,6 +487,40 @@ impl PlotOption {
     }
 }
 
+/// The text of a `$title=` line as it stands, with its spaces and whatever else a title may hold.
+#[inline(never)] // Its frame must not lie under the stages'.
+fn title(line: &str) -> Option<&str> {
+    let (name, text) = line.trim_start().strip_prefix('$')?.split_once('=')?;
+    (name.trim() == "title").then_some(text)
+}
+
+/// The pen that one of the words numbers, as in `pen3` or `3`, else all of the text by a hash. Without a
+/// name it is the first pen.
+#[inline(never)] // Its frame must not lie under the stages'.
+fn pen_name(text: &str) -> PenName {
+    let mut words = text.split_ascii_whitespace();
+    let numbered = words.find_map(|word| {
+        let is_pen = |head: &str| head.eq_ignore_ascii_case("pen");
+        let (_, digits) =
+            word.split_at_checked(3).filter(|(head, _)| is_pen(head)).unwrap_or(("", word));
+        let all_are = digits.bytes().all(|byte| byte.is_ascii_digit()) && !digits.is_empty();
+        // No pen has the number 0 or one that is too large.
+        all_are.then(|| {
+            digits.parse::<u8>().ok().and_then(|pen| pen.checked_sub(1)).unwrap_or(u8::MAX)
+        })
+    });
+    let text = text.trim_ascii();
+    match numbered {
+        Some(pen) => PenName::Number(pen),
+        None if text.is_empty() => PenName::Number(0),
+        // Fowler, Noll and Vo's, 32 bits.
+        None => PenName::Other(
+            text.bytes()
+                .fold(0x811C_9DC5, |hash, byte| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193)),
+        ),
+    }
+}
+
 fn on_or_off(text: &str) -> Result<bool, Refusal> {
     match text {
         "on" => Ok(true),
@@ -477,6 +533,7 @@ fn number(text: &str) -> Result<Decimal, Refusal> {
     Decimal::parse(text.trim()).map_err(|_| Refusal::NotANumber)
 }
 
+#[inline(never)] // Once is enough.
 fn positive(text: &str) -> Result<Millimetres, Refusal> {
     let length = number(text)?.to_millimetres().map_err(|_| Refusal::NumberOutOfRange)?;
     if length > 0 { Ok(length) } else { Err(Refusal::NumberOutOfRange) }
@@ -721,6 +778,33 @@ mod tests {
         assert_eq!(Command::parse("v 1 2 z"), Err(Refusal::NotANumber));
         assert_eq!(Command::parse("v 1 2 3 z"), Err(Refusal::NotANumber));
         assert_eq!(Command::parse("v"), Err(Refusal::WrongNumberCount { needed: 3 }));
+    }
+
+    #[test]
+    fn pens_have_numbers_or_names() {
+        let pen = |line| match Command::parse(line) {
+            Ok(Command::Pen { by_material, name }) => (by_material, name),
+            other => panic!("{other:?}"),
+        };
+        for (line, by_material, number) in [
+            ("usemtl pen1", true, 0),
+            ("usemtl  Pen32 # blue", true, 31),
+            ("g PEN07", false, 6),
+            ("g cube 3", false, 2),
+            ("g", false, 0),
+            ("usemtl", true, 0),
+            ("usemtl pen0", true, 255),
+            ("usemtl pen33", true, 32),
+            ("usemtl 256", true, 255),
+        ] {
+            assert_eq!(pen(line), (by_material, PenName::Number(number)), "{line}");
+        }
+        let names = ["red", "Red", "pen", "penx", "pen3b", "rot grün", "grün", "-1", "+1"];
+        let names: Vec<PenName> = names.iter().map(|name| pen_name(name)).collect();
+        for (at, name) in names.iter().enumerate() {
+            assert!(matches!(name, PenName::Other(_)) && !names[..at].contains(name), "{at}");
+        }
+        assert_eq!(pen("g  red "), (false, names[0]));
     }
 
     #[test]

@@ -66,11 +66,12 @@ fn next_word(rest: &mut &str) -> Option<Result<Word, Refusal>> {
         *rest = "";
         return Some(Err(Refusal::UnknownCommand));
     }
-    let number = rest[1..].trim_start();
+    let after = rest.split_at_checked(1).map_or("", |(_, after)| after).trim_start();
     let is_part = |c: char| c.is_ascii_digit() || matches!(c, '.' | '-' | '+');
-    let end = number.find(|c| !is_part(c)).unwrap_or(number.len());
-    *rest = &number[end..];
-    let number = Decimal::parse(&number[..end]).map_err(|_| Refusal::NotANumber);
+    let end = after.find(|c| !is_part(c)).unwrap_or(after.len());
+    let (number, after) = after.split_at_checked(end).unwrap_or((after, ""));
+    *rest = after;
+    let number = Decimal::parse(number).map_err(|_| Refusal::NotANumber);
     Some(number.map(|number| Word { letter: letter.to_ascii_uppercase(), number }))
 }
 

@@ -7,11 +7,13 @@
 //! any state.
 
 mod command;
+mod escape;
 mod gcode;
 mod line;
 mod refusal;
 
 pub use command::{Command, HELP, HiddenLines, Numbers, PlotOption, ProjectionChoice, WayToSee};
+pub use escape::{Escape, EscapedText};
 pub use gcode::{GCode, Word};
 pub use line::{LINE_LIMIT, LineReader, RealTime, Sorter};
 pub use refusal::{MEANINGS, Refusal};

@@ -3,9 +3,9 @@
 use crate::convex::SolidError;
 use crate::curve::CurveError;
 use crate::drawing::PageError;
-use crate::fixed::BinaryFraction;
+use crate::fixed::{BinaryFraction, Millimetres, SixDecimals};
 use crate::machine::{MachineError, SettingError, Value};
-use crate::model::{ModelError, Part};
+use crate::model::{ModelError, PEN_LIMIT, Part};
 use crate::stage::OutOfScratch;
 use crate::step::ArcError;
 use crate::view::ViewError;
@@ -58,6 +58,15 @@ pub enum Refusal {
     },
     /// A page is WIDTHxHEIGHT.
     NotAPage,
+    /// A backslash of a title begins no escape.
+    NotAnEscape,
+    /// A title with a letter that the font lacks.
+    NotInTheFont(char),
+    /// More letters than a title may have.
+    TitleTooLong {
+        /// The longest title, in bytes of UTF-8.
+        limit: usize,
+    },
     /// The model refused it.
     Model(ModelError),
     /// No face and no bar to plot.
@@ -103,6 +112,9 @@ pub const MEANINGS: &[(u16, &str)] = &[
     (104, "not a vertex number"),
     (105, "not one of the choices"),
     (106, "not a page size"),
+    (107, "not an escape"),
+    (108, "not in the font"),
+    (109, "title too long"),
     (110, "unknown vertex"),
     (111, "too few corners"),
     (112, "vertex repeated"),
@@ -120,9 +132,11 @@ pub const MEANINGS: &[(u16, &str)] = &[
     (124, "nothing in front of the eye"),
     (125, "not a convex solid"),
     (126, "eye inside the solid"),
+    (127, "too many pens"),
     (130, "margins leave no room on the page"),
     (131, "page has too many steps"),
     (132, "drawing is larger than the page"),
+    (133, "title is wider than the page"),
     (140, "drawing too large for the memory"),
     (141, "given up"),
     (142, "too many lines"),
@@ -153,6 +167,9 @@ impl Refusal {
             Self::NotAVertexNumber => 104,
             Self::NotAChoice { .. } => 105,
             Self::NotAPage => 106,
+            Self::NotAnEscape => 107,
+            Self::NotInTheFont(_) => 108,
+            Self::TitleTooLong { .. } => 109,
             Self::Model(error) => match error {
                 ModelError::UnknownVertex { .. } => 110,
                 ModelError::TooFewCorners { .. } => 111,
@@ -166,6 +183,7 @@ impl Refusal {
                 ModelError::KnotTooLarge => 102,
                 ModelError::UnknownElement { .. } => 118,
                 ModelError::NoPlane => 119,
+                ModelError::TooManyPens => 127,
                 ModelError::Scratch(_) => 140,
             },
             Self::NothingToPlot | Self::View(ViewError::NothingToSee) => 120,
@@ -178,6 +196,7 @@ impl Refusal {
             Self::Page(PageError::NoRoom) => 130,
             Self::Page(PageError::TooManySteps) => 131,
             Self::Page(PageError::DoesNotFit { .. }) => 132,
+            Self::Page(PageError::TitleTooWide { .. }) => 133,
             Self::Setting(SettingError::Busy) => 8,
             Self::Setting(SettingError::Unknown) => 3,
             Self::Setting(SettingError::OutOfRange(_) | SettingError::NotWhole(_)) => 150,
@@ -226,6 +245,18 @@ impl fmt::Display for Refusal {
             }
             Self::NotAChoice { choices } => write!(formatter, "choose {choices}"),
             Self::NotAPage => formatter.write_str("a page is written 210x297, in mm"),
+            Self::NotAnEscape => formatter.write_str(
+                "a backslash begins \\xE9 or \\u{2013}, the letter's hexadecimal number, or \\\\ for itself",
+            ),
+            Self::NotInTheFont(letter) => {
+                let shown = if letter.is_ascii_control() { ' ' } else { *letter };
+                let number = u32::from(*letter);
+                write!(formatter, "the font lacks {shown} (U+{number:04X}): leave it out")
+            }
+            Self::TitleTooLong { limit } => write!(
+                formatter,
+                "a title has at most {limit} bytes, letters beyond ASCII two or three: shorten it"
+            ),
             Self::Model(error) => write_model_error(formatter, error),
             Self::NothingToPlot | Self::View(ViewError::NothingToSee) => {
                 formatter.write_str("send vertices and faces or lines first")
@@ -242,18 +273,30 @@ impl fmt::Display for Refusal {
             }
             Self::Solid(error) => write_solid_error(formatter, error),
             Self::Page(PageError::NoRoom) => {
-                formatter.write_str("make $margin smaller or $page larger")
+                formatter.write_str("make $margin or $title-size smaller or $page larger")
             }
             Self::Page(PageError::TooManySteps) => {
                 formatter.write_str("the page has more than 1048576 steps: make $page smaller")
             }
-            Self::Page(PageError::DoesNotFit { width, height }) => {
+            Self::Page(PageError::DoesNotFit { width, height, foot }) => {
                 let mm = |units: i64| BinaryFraction { units, fraction_bits: 16, places: 1 };
+                write!(formatter, "the plan is {}x{} mm", mm(*width), mm(*height))?;
+                if *foot > 0 {
+                    write!(formatter, " and its title takes {} mm below it", mm(*foot))?;
+                }
+                formatter.write_str(": choose a larger $page, or $fit=on")
+            }
+            Self::Page(PageError::TitleTooWide { width, free }) => {
+                let mm = |length: &Millimetres| BinaryFraction {
+                    units: length.to_bits().into(),
+                    fraction_bits: 16,
+                    places: 1,
+                };
                 write!(
                     formatter,
-                    "the plan is {}x{} mm: choose a larger $page, or $fit=on",
-                    mm(*width),
-                    mm(*height)
+                    "the title is {} mm wide where {} are free: shorten it, or make $title-size smaller",
+                    mm(width),
+                    mm(free)
                 )
             }
             Self::DrawingTooLarge(missing) => write_missing(formatter, missing),
@@ -305,6 +348,10 @@ fn write_model_error(formatter: &mut fmt::Formatter<'_>, error: &ModelError) -> 
         ModelError::NoPlane => {
             formatter.write_str("three vertices that are not in line make a plane")
         }
+        ModelError::TooManyPens => write!(
+            formatter,
+            "there are pens 1 to {PEN_LIMIT}, and other names take a free one each: send $pens=one to draw all with one"
+        ),
         ModelError::Scratch(missing) => write_missing(formatter, missing),
     }
 }
@@ -369,7 +416,10 @@ fn write_setting_error(formatter: &mut fmt::Formatter<'_>, error: &SettingError)
             write!(
                 formatter,
                 "{} goes from {} to {} {}",
-                info.name, info.least, info.greatest, info.unit
+                info.name,
+                SixDecimals::from(info.least),
+                SixDecimals::from(info.greatest),
+                info.unit
             )
         }
         SettingError::NotWhole(setting) => {

@@ -3,6 +3,7 @@
 //! The one place for angles, square roots and binary floats: once per view, in `libm`.
 
 use super::ViewError;
+use crate::fixed::sin_cos_degrees;
 use crate::geometry::Projection;
 use crate::model::Model;
 
@@ -234,18 +235,6 @@ fn turned([alpha, beta, gamma]: [f64; 3]) -> [Direction; 3] {
     let up = [sa * sb * cg + ca * sg, ca * cg - sa * sb * sg, -sa * cb];
     let forward = [sa * sg - ca * sb * cg, sa * cg + ca * sb * sg, ca * cb];
     [cross(forward, up), up, forward]
-}
-
-/// Sine and cosine; exact for multiples of 90 degrees.
-fn sin_cos_degrees(degrees: f64) -> (f64, f64) {
-    let quarters = libm::round(degrees / 90.0);
-    let (sin, cos) = libm::sincos((degrees - 90.0 * quarters) * (core::f64::consts::PI / 180.0));
-    match libm::fmod(quarters, 4.0) as i32 {
-        1 | -3 => (cos, -sin),
-        2 | -2 => (-sin, -cos),
-        3 | -1 => (-cos, sin),
-        _ => (sin, cos),
-    }
 }
 
 /// forward × up, of length 1, unless they are parallel but for rounding.

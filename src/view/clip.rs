@@ -8,7 +8,7 @@ use super::View;
 use super::curves::Flattening;
 use super::tidy::tidy;
 use crate::geometry::Vertex;
-use crate::model::{Corner, Element, Elements, Model, VERTEX_NUMBER_LIMIT};
+use crate::model::{Corner, Element, Elements, Model, PenWriter, VERTEX_NUMBER_LIMIT};
 use crate::stage::{Attention, OutOfScratch, Scratch, StageError, heap_sort_by_key};
 
 /// A model as the camera sees it.
@@ -126,8 +126,9 @@ fn cut<'a>(
 
     // Each cut adds at most one corner.
     let corners = scratch.take::<u16>(elements.corners().len() + count)?;
+    let mut pens = PenWriter::new(scratch, elements.pens().changes())?;
     let mut length = 0;
-    for element in elements.iter() {
+    for (element, pen) in elements.iter_with_pens() {
         let start = length;
         let mut push = |number: u16| {
             if let Some(corner) = corners.get_mut(length) {
@@ -150,6 +151,8 @@ fn cut<'a>(
         let needed = if of_bar { 2 } else { 3 };
         if length - start < needed {
             length = start;
+        } else {
+            pens.element(start, pen);
         }
         let ends = start..length;
         let last = ends.end;
@@ -161,7 +164,7 @@ fn cut<'a>(
     }
     let corners: &'a [u16] = corners;
     let corners = bytemuck::cast_slice(corners.get(..length).unwrap_or(&[]));
-    Ok((all, Elements::new(corners)))
+    Ok((all, Elements::with_pens(corners, pens.finish())))
 }
 
 #[derive(Clone, Copy)]

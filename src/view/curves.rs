@@ -7,7 +7,7 @@ use super::View;
 use super::clip::clip_edge;
 use crate::curve::{FRACTION_BITS, Fine, Point};
 use crate::geometry::{Projection, Vertex};
-use crate::model::{Corner, Elements, Model, VERTEX_NUMBER_LIMIT};
+use crate::model::{Corner, Elements, Model, PenWriter, VERTEX_NUMBER_LIMIT};
 use crate::stage::{Attention, OutOfScratch, Scratch, StageError};
 
 /// How curves become straight lines: as few as stay within a tolerance on the page.
@@ -97,21 +97,30 @@ impl Flattening<'_> {
             Ok(number)
         })?;
         let old = elements.corners();
-        let mut begin = first as u16;
-        let mut bars = curve_ends.iter().flat_map(|&end| {
-            let bars = begin + 1..end;
-            begin = end;
-            bars
-        });
         let chords = vertices.len() - first - curve_ends.len().min(vertices.len() - first);
         let corners = scratch.take::<Corner>(old.len() + 2 * chords)?;
         let (same, new) = corners.split_at_mut(old.len());
         same.copy_from_slice(old);
-        for pair in new.chunks_exact_mut(2) {
-            let Some(to) = bars.next() else { break };
-            pair.copy_from_slice(&[Corner::new(to - 1, true, false), Corner::new(to, true, true)]);
+        let mut pens = PenWriter::new(scratch, elements.pens().changes() + curve_ends.len())?;
+        let mut at = 0;
+        for (element, pen) in elements.iter_with_pens() {
+            pens.element(at, pen);
+            at += element.corner_count();
+        }
+        let mut begin = first as u16;
+        let mut pairs = new.chunks_exact_mut(2);
+        for (curve, &end) in model.curves().iter().zip(&*curve_ends) {
+            for (to, pair) in (begin + 1..end).zip(&mut pairs) {
+                pens.element(at, curve.pen);
+                pair.copy_from_slice(&[
+                    Corner::new(to - 1, true, false),
+                    Corner::new(to, true, true),
+                ]);
+                at += 2;
+            }
+            begin = end;
         }
         let corners: &'a [Corner] = corners;
-        Ok((vertices, Elements::new(corners)))
+        Ok((vertices, Elements::with_pens(corners, pens.finish())))
     }
 }

@@ -263,12 +263,15 @@ mod tests {
     use super::*;
     use crate::fixed::Decimal;
     use crate::model::Corner;
+    use crate::model::unkept;
 
     fn with_model(vertices: &[[&str; 3]], test: impl FnOnce(&Model<'_>)) {
         let mut memory = (heapless::Vec::<Position, 16>::new(), heapless::Vec::<Corner, 16>::new());
         let mut model = Model::new(&mut memory.0, &mut memory.1);
         for vertex in vertices {
-            model.add_vertex(vertex.map(|text| Decimal::parse(text).unwrap())).unwrap();
+            model
+                .add_vertex(vertex.map(|text| Decimal::parse(text).unwrap()), &mut unkept)
+                .unwrap();
         }
         test(&model);
     }

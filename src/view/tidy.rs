@@ -1,13 +1,13 @@
 //! What modellers leave behind: vertices at the same place made one, faces without an area left out.
 
-use crate::model::{Corner, Element, Elements, Model, Position};
+use crate::model::{Corner, Element, Elements, Model, PenWriter, Position};
 use crate::stage::{Attention, OutOfScratch, Scratch, StageError};
 
 /// The elements of the model with each vertex replaced by the first one at the same place, without the faces that
 /// have no area, and how many those are. The model's own elements if there is nothing to do. Other faces may
 /// come to have the same corner twice in a row; visibility lives with that.
 ///
-/// Memory: 2 bytes for each corner if there is something to do; 4 to 8 for each vertex meanwhile.
+/// Memory: 2 bytes for each corner and 4 for each change of the pen if there is something to do; 4 to 8 for each vertex meanwhile.
 pub(super) fn tidy<'a>(
     model: &'a Model<'_>,
     scratch: &mut Scratch<'a>,
@@ -21,11 +21,15 @@ pub(super) fn tidy<'a>(
         return Ok((elements, 0));
     }
     let corners: &mut [Corner] = scratch.take(elements.corners().len())?;
+    let mut pens = PenWriter::new(scratch, elements.pens().changes())?;
     attention.check()?;
     let (places, _) = Places::new(positions, &mut scratch.reborrow())?;
     attention.check()?;
     let mut kept = 0;
-    for element in elements.iter().filter(|element| has_extent(element, positions)) {
+    let with_extent =
+        elements.iter_with_pens().filter(|(element, _)| has_extent(element, positions));
+    for (element, pen) in with_extent {
+        pens.element(kept, pen);
         let bar;
         let old = match element {
             Element::Face(corners) => corners,
@@ -41,7 +45,8 @@ pub(super) fn tidy<'a>(
         kept += old.len();
     }
     let corners: &'a [Corner] = corners;
-    Ok((Elements::new(corners.get(..kept).unwrap_or(corners)), degenerate as u32))
+    let corners = corners.get(..kept).unwrap_or(corners);
+    Ok((Elements::with_pens(corners, pens.finish()), degenerate as u32))
 }
 
 /// Whether a face has an area. Bars need none.
@@ -121,6 +126,7 @@ fn hash(position: &Position) -> u32 {
 mod tests {
     use super::*;
     use crate::fixed::Decimal;
+    use crate::model::unkept;
     use crate::stage::Undisturbed;
     use std::vec::Vec;
 
@@ -133,12 +139,12 @@ mod tests {
         let mut corners = heapless::Vec::<Corner, 64>::new();
         let mut model = Model::new(&mut vertices, &mut corners);
         for place in places {
-            model.add_vertex(decimals(*place)).unwrap();
+            model.add_vertex(decimals(*place), &mut unkept).unwrap();
         }
         for face in faces {
             match face.len() {
-                2 => model.add_polyline(face.iter().copied()).unwrap(),
-                _ => model.add_face(face.iter().copied()).unwrap(),
+                2 => model.add_polyline(face.iter().copied(), &mut unkept).unwrap(),
+                _ => model.add_face(face.iter().copied(), &mut unkept).unwrap(),
             }
         }
         let mut words = [0; 64];
@@ -176,9 +182,9 @@ mod tests {
         let mut corners = heapless::Vec::<Corner, 4>::new();
         let mut model = Model::new(&mut vertices, &mut corners);
         for [x, y] in [["0", "0"], ["1", "0"], ["0.5", "1"]] {
-            model.add_vertex(decimals([x, y, "0"])).unwrap();
+            model.add_vertex(decimals([x, y, "0"]), &mut unkept).unwrap();
         }
-        model.add_face([1, 2, 3].into_iter()).unwrap();
+        model.add_face([1, 2, 3].into_iter(), &mut unkept).unwrap();
         let mut words = [0; 2];
         let mut scratch = Scratch::new(&mut words);
         let (elements, degenerate) = tidy(&model, &mut scratch, &mut Undisturbed).unwrap();

@@ -4,16 +4,21 @@ use super::VisibilityError;
 use super::crease::Crease;
 use super::pace::Pace;
 use crate::geometry::{Projection, Vertex};
-use crate::model::Corner;
+use crate::model::{Corner, Elements, Pens};
 use crate::stage::Scratch;
 
 /// The corners of the elements, addressed by the number of an element's first corner.
 #[derive(Debug, Clone, Copy)]
 pub struct Outlines<'a> {
     pub corners: &'a [Corner],
+    pub pens: Pens<'a>,
 }
 
 impl<'a> Outlines<'a> {
+    pub fn of(elements: Elements<'a>) -> Self {
+        Self { corners: elements.corners(), pens: elements.pens() }
+    }
+
     /// The element that begins at corner `first`.
     #[inline]
     pub fn element(&self, first: usize) -> &'a [Corner] {
@@ -75,7 +80,8 @@ impl<'a> ChosenSides<'a> {
             + Self::bytes(corners)
     }
 
-    /// Chooses the first side of each edge, whoever shares it; with a crease, only of edges that it keeps.
+    /// Chooses the first side of each edge among those of the lowest pen, whoever shares it; with a crease, only of
+    /// edges that it keeps.
     pub fn choose(
         outlines: Outlines<'_>,
         projection: Projection,
@@ -101,6 +107,7 @@ impl<'a> ChosenSides<'a> {
                 let side = first + number;
                 let head = &mut heads[usize::from(from.min(to))];
                 let mut known = *head;
+                let mut before = NONE;
                 let mut turned = false;
                 while known != NONE {
                     let (a, b) = side_at(corners, usize::from(known));
@@ -108,6 +115,7 @@ impl<'a> ChosenSides<'a> {
                     if turned || (a, b) == (to, from) {
                         break;
                     }
+                    before = known;
                     known = next[usize::from(known)];
                     pace.spend(30)?;
                 }
@@ -115,21 +123,35 @@ impl<'a> ChosenSides<'a> {
                     next[side] = *head;
                     *head = side as u16;
                     chosen.insert(side);
-                } else if let Some(crease) = crease {
-                    let known = usize::from(known);
-                    let known_element = outlines.element(start_of(corners, known));
-                    let is_open =
-                        is_bar(element) || is_bar(known_element) || shared.contains(known);
-                    shared.insert(known);
-                    let at = |corner: &Corner| vertices[usize::from(corner.vertex())];
-                    let (mut one, mut other) =
-                        (known_element.iter().map(at), element.iter().map(at));
-                    let end = vertices[usize::from(from)];
-                    if is_open || crease.keeps(projection, end, [&mut one, &mut other], turned) {
-                        chosen.insert(known);
-                    } else {
+                    continue;
+                }
+                let known = usize::from(known);
+                let is_open = is_bar(element) || shared.contains(known);
+                let mut best = known;
+                if outlines.pens.at(side) < outlines.pens.at(known) {
+                    // It stands for the edge from now on.
+                    best = side;
+                    next[side] = next[known];
+                    *(if before == NONE { head } else { &mut next[usize::from(before)] }) =
+                        side as u16;
+                    if chosen.contains(known) {
                         chosen.remove(known);
+                        chosen.insert(best);
                     }
+                }
+                shared.insert(best);
+                let Some(crease) = crease else { continue };
+                let known_element = outlines.element(start_of(corners, known));
+                let at = |corner: &Corner| vertices[usize::from(corner.vertex())];
+                let (mut one, mut other) = (known_element.iter().map(at), element.iter().map(at));
+                let end = vertices[usize::from(from)];
+                if is_open
+                    || is_bar(known_element)
+                    || crease.keeps(projection, end, [&mut one, &mut other], turned)
+                {
+                    chosen.insert(best);
+                } else {
+                    chosen.remove(best);
                 }
             }
             pace.spend(100 * element.len())?;

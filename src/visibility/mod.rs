@@ -9,8 +9,8 @@
 //! * The rule for ties: a point of an edge is hidden if the points of the page just to its left *and* just
 //!   to its right along the edge are covered by a nearer face. A face that touches the edge there is
 //!   not nearer.
-//! * Of edges that coincide on the page, the nearest is drawn; of those that coincide in space, the
-//!   first of the model.
+//! * Of edges that coincide on the page, the nearest is drawn; of those that coincide in space, that of the
+//!   lowest pen, and of one pen the first of the model. An edge has the lowest pen of its faces, a seam too.
 //! * An edge that the eye sees end-on has no length on the page and no stretch.
 //!
 //! The way: choose one side of a face for each edge (`edges`, `crease`), cut concave faces into
@@ -117,6 +117,8 @@ pub struct Stretch {
     pub to: Along,
     /// Whether it is seen.
     pub visible: bool,
+    /// The pen that draws it, from 0.
+    pub pen: u8,
 }
 
 /// Who takes the stretches as they are found.
@@ -174,7 +176,7 @@ pub fn scratch_bytes(scene: &Scene<'_>) -> usize {
     if check(scene).is_err() {
         return 0;
     }
-    let outlines = Outlines { corners: scene.elements.corners() };
+    let outlines = Outlines::of(scene.elements);
     let corners = outlines.corners.len();
     let vertices = scene.vertices.len();
     let faces = outlines.elements().count();
@@ -202,7 +204,7 @@ pub fn find_stretches(
     sink: &mut dyn StretchSink,
 ) -> Result<Report, VisibilityError> {
     check(scene)?;
-    let outlines = Outlines { corners: scene.elements.corners() };
+    let outlines = Outlines::of(scene.elements);
     let (vertices, projection) = (scene.vertices, scene.projection);
     let pace = &mut Pace::new(attention);
     let memory = &mut scratch;

@@ -166,6 +166,9 @@ impl<'a> Search<'a> {
         if outlook.direction(ends.0, ends.1).is_none() {
             return Ok(());
         }
+        let pen_at = |corner: usize| self.around.outlines.pens.at(corner);
+        let pen_of = |rank: &usize| pen_at(self.around.faces.get(*rank).first);
+        let pen = seam_of.iter().flatten().map(pen_of).min().unwrap_or_else(|| pen_at(sight.side));
         let edge = (sight.side != Sight::NO_SIDE).then_some((sight.p.number, sight.q.number));
         let mut pending: Option<Stretch> = None;
         let mut start = Along::START;
@@ -191,8 +194,8 @@ impl<'a> Search<'a> {
                         stretch.to = to;
                     }
                     _ => {
-                        let next =
-                            handed.then_some(Stretch { edge, ends, from: piece.from, to, visible });
+                        let from = piece.from;
+                        let next = handed.then_some(Stretch { edge, ends, from, to, visible, pen });
                         if let Some(stretch) = core::mem::replace(&mut pending, next) {
                             sink.stretch(stretch)?;
                         }

@@ -382,7 +382,7 @@ impl Sight {
     }
 
     /// Marks where the side (a, b) of a face, on the line of this edge, is drawn in its place: where
-    /// it is nearer, or as near and before it in the model.
+    /// it is nearer, or as near and of a lower pen, or of the same and before it in the model.
     fn pass_side(
         &self,
         around: &Surroundings<'_>,
@@ -414,7 +414,10 @@ impl Sight {
         let height = |vertex| line_side(projection, axis, va, vb, vertex);
         let heights = (height(vp), height(vq));
         let behind = if heights == (0, 0) {
-            (side < self.side).then_some(Part::WHOLE)
+            let pens = around.outlines.pens;
+            let is_first = self.side == Self::NO_SIDE
+                || (pens.at(side), side) < (pens.at(self.side), self.side);
+            is_first.then_some(Part::WHOLE)
         } else {
             behind_between(heights.0, heights.1)
         };

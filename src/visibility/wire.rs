@@ -19,7 +19,7 @@ pub fn follow_wire(
     sink: &mut dyn StretchSink,
 ) -> Result<(), VisibilityError> {
     check(scene)?;
-    let outlines = Outlines { corners: scene.elements.corners() };
+    let outlines = Outlines::of(scene.elements);
     let (vertices, projection) = (scene.vertices, scene.projection);
     let pace = &mut Pace::new(attention);
     let chosen =
@@ -30,7 +30,8 @@ pub fn follow_wire(
             if chosen.contains(first + number) {
                 let ends = (vertices[usize::from(p)], vertices[usize::from(q)]);
                 let (from, to) = (Along::START, Along::END);
-                sink.stretch(Stretch { edge: Some((p, q)), ends, from, to, visible: true })?;
+                let pen = outlines.pens.at(first);
+                sink.stretch(Stretch { edge: Some((p, q)), ends, from, to, visible: true, pen })?;
             }
         }
     }

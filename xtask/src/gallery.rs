@@ -25,7 +25,7 @@ const fn plain(title: &'static str, scene: &'static str, view: &'static [&'stati
 }
 
 /// The chapters of the page.
-const CHAPTERS: [(&str, &[Figure]); 5] = [
+const CHAPTERS: [(&str, &[Figure]); 6] = [
     (
         "Projections (Harrison, chapter 2)",
         &[
@@ -63,6 +63,14 @@ const CHAPTERS: [(&str, &[Figure]); 5] = [
         ],
     ),
     ("Curves (Allard and Bown)", &[plain("Isobars, after their figure 11", "isobars", &["--fit"])]),
+    (
+        "Titles",
+        &[plain(
+            "A title in the Hershey font",
+            "notched",
+            &["--title", "Figure 20 – détail", "--title-size=4"],
+        )],
+    ),
 ];
 
 /// Draws every figure into `docs/gallery` and writes the page.
@@ -108,8 +116,9 @@ fn draw(figure: &Figure, hidden: &str, to: &str) -> Result<()> {
 
 /// What of the options goes into a file's name.
 fn words(view: &[&str]) -> String {
-    let text = view.join("-").replace(['=', ','], "-");
-    text.trim_start_matches('-').to_owned()
+    let text = view.join("-").replace(['=', ',', ' '], "-");
+    let plain = |letter: &char| letter.is_ascii_alphanumeric() || ".-".contains(*letter);
+    text.trim_start_matches('-').chars().filter(plain).collect()
 }
 
 fn count_vertices(scene: &str) -> Result<usize> {

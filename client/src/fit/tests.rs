@@ -1,6 +1,6 @@
 use super::*;
 use penup::curve::{FRACTION_BITS, Point};
-use penup::model::{Corner, Model, Position};
+use penup::model::{Corner, Model, Position, unkept};
 use penup::protocol::Command;
 
 /// In the flattening of a test, 1/256 mm.
@@ -41,11 +41,11 @@ fn flattened(obj: &str) -> Vec<Vec<Place>> {
         assert!(line.len() <= 256, "{line}");
         let done = match Command::parse(line).unwrap() {
             Command::Nothing => Ok(()),
-            Command::Vertex(place) => model.add_vertex(place),
+            Command::Vertex(place) => model.add_vertex(place, &mut unkept),
             Command::Degree(degree) => model.set_degree(degree),
             Command::Curve { ends, control } => model.begin_curve(ends, control.iter()),
             Command::Knots(knots) => model.add_knots(knots.iter()),
-            Command::EndCurve => model.end_curve(),
+            Command::EndCurve => model.end_curve(&mut unkept),
             other => panic!("{other:?}"),
         };
         done.unwrap();

@@ -8,6 +8,10 @@
 //! The words wait in a ring that the DMA channel reads in blocks: all that is there when the last
 //! block ends is the next. Between two blocks the state machine lives on the words in its own queue.
 //!
+//! Should the main loop be late, the ring runs dry at speed. So the interrupt that hands the blocks
+//! over looks at them: where [`Brake`] asks for more ticks, it hands over a copy with those, and the ring
+//! keeps the planned ones. Beyond [`BRAKED_RATE`] it does not.
+//!
 //! What the state machine has taken is read off the channel and told to the main loop's
 //! [`PulserState`] whenever that loop turns. The pen's heights wait in a queue of their own, for a
 //! word has no place for them; an interrupt sets the servo.
@@ -17,7 +21,10 @@ use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use cortex_m::peripheral::NVIC;
 use heapless::spsc::{Consumer, Producer, Queue};
 use penup::machine::PulserState;
-use penup::motion::{EventKind, EventQueue, StepEvent, TICKS_PER_SECOND};
+use penup::motion::{
+    Brake, EventKind, EventQueue, QueueSize, Runner, StepEvent, StepLength, StepWay,
+    TICKS_PER_SECOND,
+};
 use rp2040_hal::pac::{Interrupt, interrupt};
 use static_cell::StaticCell;
 
@@ -28,8 +35,23 @@ use crate::boards::handler::Owned;
 
 /// Words of the ring, a power of two.
 const WORDS: u32 = 2048;
-/// Words that may still be on their way from the ring to the state machine.
-const IN_FLIGHT: u32 = 16;
+/// Words that may still be on their way from the ring to the state machine, and those that waits may
+/// take beyond one each.
+const RESERVED: u32 = 16 + Runner::ROOM as u32 * WAIT_WORDS;
+/// The machine is to stop within as many steps as are held by a ring half full: on long paths it is
+/// always fuller.
+const STOPPING_STEPS: u32 = WORDS / 2;
+/// Beyond so many steps a second there is no time to look at each word twice, and nothing is braked.
+const BRAKED_RATE: u32 = 100_000;
+/// Words in a block that goes as planned, at most: the state machine's queue lasts while they are
+/// looked at, some 45 cycles each.
+const CALM_WORDS: u32 = 16;
+/// Words in a block that is braked, at most: some 100 cycles each.
+const BRAKED_WORDS: u32 = 8;
+/// It ends before its steps are known too early, when more may come: 2 ms.
+const BRAKED_TICKS: u32 = TICKS_PER_SECOND / 500;
+/// A wait is so many words at most, of 2 ms if that is enough, for the same reason.
+const WAIT_WORDS: u32 = 64;
 /// Heights of the pen that wait, at most; one more place than that, for the queue.
 const HEIGHTS: usize = 256;
 
@@ -110,6 +132,17 @@ struct Ring([AtomicU32; WORDS as usize]);
 const _: () = assert!(align_of::<Ring>() == size_of::<Ring>());
 
 static RING: Ring = Ring([const { AtomicU32::new(0) }; WORDS as usize]);
+/// Of each word of the ring that is a step: `around` of [`StepWay`] in the lower half, `behind` in the
+/// upper one; 0 for other words.
+static WAYS: [AtomicU32; WORDS as usize] = [const { AtomicU32::new(0) }; WORDS as usize];
+
+#[repr(align(64))] // Its size, so that the channel finds no end of a ring in it.
+struct Block([AtomicU32; BRAKED_WORDS as usize]);
+const _: () = assert!(align_of::<Block>() == size_of::<Block>());
+
+/// The block that is braked.
+static BRAKED: Block = Block([const { AtomicU32::new(0) }; BRAKED_WORDS as usize]);
+static BRAKE: Owned<Brake> = Owned::empty();
 /// Words put into the ring; wraps. The main loop alone writes it.
 static WRITTEN: AtomicU32 = AtomicU32::new(0);
 /// Words that the channel was told to take; wraps. Written where the channel's interrupt is masked.
@@ -136,6 +169,7 @@ const RELEASED: u32 = StepEvent::DRIVERS_ON as u32;
 /// The main loop's end.
 pub struct Steps {
     heights: Producer<'static, u8>,
+    step_length: StepLength,
     /// As [`WRITTEN`].
     written: u32,
     /// How many more events fit: so many did when the state machine was last followed, less those
@@ -201,11 +235,16 @@ pub fn set_up(nvic: &mut NVIC) -> Steps {
 
     let (heights, due) = HEIGHT_QUEUE.init(Queue::new()).split();
     // SAFETY: the interrupt is masked since reset, and this runs once (the queue's cell sees to it).
-    unsafe { HEIGHTS_DUE.fill(due) };
+    unsafe {
+        HEIGHTS_DUE.fill(due);
+        BRAKE.fill(Brake::default());
+    }
+    STATE.set_queue(QueueSize { steps: STOPPING_STEPS, greatest_rate: BRAKED_RATE });
     critical::enable(nvic, Interrupt::DMA_IRQ_0, critical::STEP_PRIORITY);
     critical::enable(nvic, Interrupt::PIO0_IRQ_0, critical::PEN_PRIORITY);
     Steps {
         heights,
+        step_length: StepLength::default(),
         written: 0,
         room: 0,
         flips: 0,
@@ -253,6 +292,18 @@ fn place(word: u32) -> &'static AtomicU32 {
 
 fn ring_address(word: u32) -> u32 {
     place(word).as_ptr() as u32
+}
+
+fn way(word: u32) -> &'static AtomicU32 {
+    &WAYS[(word % WORDS) as usize]
+}
+
+fn pack(way: StepWay) -> u32 {
+    way.around | way.behind << 16
+}
+
+fn unpack(way: u32) -> StepWay {
+    StepWay { around: way & 0xFFFF, behind: way >> 16 }
 }
 
 impl Steps {
@@ -308,7 +359,7 @@ impl Steps {
         }
         STATE.report((self.x, self.y), self.ticks, self.drained);
         let waiting = self.written.wrapping_sub(self.taken);
-        let words = (WORDS - IN_FLIGHT).saturating_sub(waiting);
+        let words = (WORDS - RESERVED).saturating_sub(waiting);
         self.room = words.min((HEIGHTS - 1 - self.heights.len()) as u32);
     }
 
@@ -379,7 +430,10 @@ impl Steps {
             while PIO0.read(machine::FIFO_LEVEL) & LEVEL != 0 {
                 order(order::PULL_WITHOUT_WAITING);
             }
-            DMA.write(channel::READ_ADDRESS, ring_address(taken));
+            // SAFETY: the handler that owns it is masked.
+            if let Some(brake) = unsafe { BRAKE.get() } {
+                brake.skip_all(STATE.brake());
+            }
             self.written = taken;
             WRITTEN.store(taken, Ordering::Relaxed);
             TOLD.store(taken, Ordering::Relaxed);
@@ -423,14 +477,35 @@ impl EventQueue for Steps {
                 }
             }
         };
-        let count = event.ticks().saturating_sub(beyond);
-        place(self.written).store(word | count << 8, Ordering::Relaxed);
-        self.written = self.written.wrapping_add(1);
+        // Without a rule nothing is told, and nothing counted.
+        let is_told = event.is_step() && STATE.brake().is_on();
+        let step = if is_told { self.step_length.step() } else { StepWay::default() };
+        let mut ticks = event.ticks();
+        if word & TARGETS == target::PULSE || ticks <= BRAKED_TICKS {
+            self.put(word, ticks.saturating_sub(beyond), step);
+        } else {
+            let part = (ticks / WAIT_WORDS).max(BRAKED_TICKS);
+            self.put(word, part - beyond, step);
+            ticks -= part;
+            while ticks > 0 {
+                let part = if ticks < 2 * part { ticks } else { part };
+                self.put(self.levels | target::WAIT, part - WAIT_TICKS, step);
+                ticks -= part;
+            }
+        }
+        STATE.brake().add(step.around);
         self.publish();
         Ok(())
     }
 
-    /// 15 cycles a step.
+    fn set_step_length(&mut self, units: u32, after_next: bool) -> Result<(), StepEvent> {
+        if units != self.step_length.last() {
+            self.step_length.set(units, after_next);
+        }
+        Ok(())
+    }
+
+    /// 15 cycles a step, 25 if it may be braked.
     fn push_steps(&mut self, steps: &[StepEvent]) -> Result<(), StepEvent> {
         let count = steps.len() as u32;
         let Some(room) = self.room.checked_sub(count) else {
@@ -443,6 +518,9 @@ impl EventQueue for Steps {
             word = (step.to_bits() ^ flips).wrapping_sub(beyond);
             place(self.written.wrapping_add(number)).store(word, Ordering::Relaxed);
         }
+        if STATE.brake().is_on() {
+            self.tell_ways(count);
+        }
         self.room = room;
         self.written = self.written.wrapping_add(count);
         self.levels = word & LEVELS & !PULSES;
@@ -453,6 +531,24 @@ impl EventQueue for Steps {
 }
 
 impl Steps {
+    /// The next words are so many steps.
+    #[inline(never)] // On its own it stays in the core's registers.
+    fn tell_ways(&mut self, count: u32) {
+        let mut around = 0;
+        for number in 0..count {
+            let step = self.step_length.step();
+            way(self.written.wrapping_add(number)).store(pack(step), Ordering::Relaxed);
+            around += step.around;
+        }
+        STATE.brake().add(around);
+    }
+
+    fn put(&mut self, word: u32, count: u32, step: StepWay) {
+        place(self.written).store(word | count << 8, Ordering::Relaxed);
+        way(self.written).store(pack(step), Ordering::Relaxed);
+        self.written = self.written.wrapping_add(1);
+    }
+
     /// Shows the words to the channel; lets them begin if they are many.
     fn publish(&mut self) {
         WRITTEN.store(self.written, Ordering::Release);
@@ -483,17 +579,81 @@ fn taken() -> u32 {
     })
 }
 
-/// Tells the channel to take all that is there. Called where its interrupt is masked.
-#[inline]
+/// Tells the channel what to take next. Called where its interrupt is masked.
 fn feed() {
-    let written = WRITTEN.load(Ordering::Acquire);
-    let count = written.wrapping_sub(TOLD.load(Ordering::Relaxed));
+    let told = TOLD.load(Ordering::Relaxed);
+    let count = WRITTEN.load(Ordering::Acquire).wrapping_sub(told);
     FEEDING.store(count != 0, Ordering::Relaxed);
-    if count != 0 {
-        TOLD.store(written, Ordering::Relaxed);
-        GIVEN_UP.store(0, Ordering::Relaxed);
-        DMA.write(channel::START, count);
+    // SAFETY: this is the handler that owns it, or the handler is masked.
+    let Some(brake) = (unsafe { BRAKE.get() }) else { return };
+    if count == 0 {
+        return;
     }
+    let (mut address, mut words) = (ring_address(told), count);
+    if STATE.brake().is_on() {
+        words = calm_words(brake, told, count);
+    }
+    if words == 0 {
+        words = brake_words(brake, told, count);
+        address = BRAKED.0.as_ptr() as u32;
+    }
+    TOLD.store(told.wrapping_add(words), Ordering::Relaxed);
+    GIVEN_UP.store(0, Ordering::Relaxed);
+    DMA.write(channel::READ_ADDRESS, address);
+    DMA.write(channel::START, words);
+}
+
+/// How many of the `count` words from `told` on go as planned, with one look at all of them; 0 if they
+/// have to be looked at one by one.
+#[inline(never)] // On its own it stays in the core's registers.
+fn calm_words(brake: &mut Brake, told: u32, count: u32) -> u32 {
+    let (mut words, mut ticks) = (0, 0);
+    let (mut around, mut longest, mut shortest) = (0, 0, u32::MAX);
+    while words < count.min(CALM_WORDS) && ticks <= BRAKED_TICKS {
+        let at = told.wrapping_add(words);
+        let step = way(at).load(Ordering::Relaxed);
+        let planned = place(at).load(Ordering::Relaxed) >> 8;
+        if step != 0 {
+            around += step & 0xFFFF;
+            longest = longest.max(step >> 16);
+            shortest = shortest.min(planned);
+        }
+        ticks += planned;
+        words += 1;
+    }
+    if brake.pass(around, longest, shortest, STATE.brake()) { words } else { 0 }
+}
+
+/// Copies the first of the `count` words from `told` on, each step with as many ticks as it takes at
+/// least. Says how many.
+#[inline(never)]
+fn brake_words(brake: &mut Brake, told: u32, count: u32) -> u32 {
+    let beyond = PULSE_TICKS + STATE.pulse_ticks();
+    let (mut words, mut ticks) = (0, 0);
+    for (number, braked) in (0..count).zip(&BRAKED.0) {
+        let at = told.wrapping_add(number);
+        let mut word = place(at).load(Ordering::Relaxed);
+        let step = way(at).load(Ordering::Relaxed);
+        if step != 0 {
+            let mut least = brake.step(unpack(step), STATE.brake());
+            let planned = (word >> 8) + beyond;
+            if least > planned && number + 1 < count {
+                // What follows may be a wait between two steps.
+                let next = place(at.wrapping_add(1)).load(Ordering::Relaxed);
+                if next & TARGETS == target::WAIT {
+                    least = least.saturating_sub((next >> 8) + WAIT_TICKS);
+                }
+            }
+            word += least.saturating_sub(planned).min(StepEvent::MAX_TICKS - (word >> 8)) << 8;
+        }
+        braked.store(word, Ordering::Relaxed);
+        words += 1;
+        ticks += word >> 8;
+        if ticks > BRAKED_TICKS {
+            break;
+        }
+    }
+    words
 }
 
 /// Two heights that come faster than the interrupt would leave one behind: the last counts.

@@ -1,0 +1,59 @@
+//! When the step pins rise and fall: as planned, and on an emulated board.
+
+use crate::emulated_jobs::bench_like;
+use penup::boards::host::{Change, Stamped};
+use penup_client::emulator::{Pin, PinChange};
+use penup_client::machines::Board;
+use std::time::Duration;
+
+/// A level of a step pin, and when it came.
+pub type Edge = (Pin, bool, Duration);
+
+const TICK: Duration = Duration::from_nanos(40);
+
+/// A turn of the host's main loop: its queue is short.
+const TURN_TICKS: u64 = 2_500;
+
+/// As planned, with the capacities of a board.
+pub fn planned(board: Board, lines: &[String]) -> Vec<Edge> {
+    let mut bench = bench_like(board);
+    for line in lines {
+        bench.say(&format!("{line}\n"));
+    }
+    while bench.plotter.poll(&mut bench.board) || !bench.plotter.machine().stands() {
+        bench.board.pass(TURN_TICKS);
+    }
+    let (mut x, mut y) = (false, false);
+    let mut edge = |stamped: &Stamped| {
+        let (pin, level, high) = match stamped.change {
+            Change::StepX(high) => (Pin::StepX, &mut x, high),
+            Change::StepY(high) => (Pin::StepY, &mut y, high),
+            _ => return None,
+        };
+        let at = Duration::from_nanos(stamped.time * TICK.as_nanos() as u64);
+        (std::mem::replace(level, high) != high).then_some((pin, high, at))
+    };
+    bench.board.trace().changes().iter().filter_map(&mut edge).collect()
+}
+
+/// Of what the pins did.
+pub fn of_changes(changes: &[PinChange]) -> Vec<Edge> {
+    let is_step = |pin| matches!(pin, Pin::StepX | Pin::StepY);
+    changes.iter().filter(|c| is_step(c.pin)).map(|c| (c.pin, c.high, c.at)).collect()
+}
+
+/// Checks that there are at least so many edges, and that each has its planned time since the first
+/// one, within `tolerance`.
+///
+/// # Panics
+/// At the first that has not.
+pub fn assert_in_time(planned: &[Edge], pins: &[Edge], least: usize, tolerance: Duration) {
+    assert!(planned.len() > least, "{} edges", planned.len());
+    assert_eq!(planned.len(), pins.len());
+    let (first_planned, first) = (planned[0].2, pins[0].2);
+    for (number, (planned, pin)) in planned.iter().zip(pins).enumerate() {
+        assert_eq!((planned.0, planned.1), (pin.0, pin.1), "edge {number}");
+        let (due, came) = (planned.2 - first_planned, pin.2 - first);
+        assert!(due.abs_diff(came) <= tolerance, "edge {number} at {came:?}, not {due:?}");
+    }
+}

@@ -1,0 +1,260 @@
+//! S-curves: the jerk limit, measured from the events.
+
+#![allow(clippy::expect_used, reason = "a test fails by panicking")]
+
+use penup::drawing::{LineType, PagePoint};
+use penup::machine::{Setting, Settings, State, Target, TargetList, Value};
+use penup::motion::StepEvent;
+use penup_host_tests::event_checker::{self, Run};
+use penup_host_tests::motion_optimum::{Limits, squared_limits, straight_seconds};
+use penup_host_tests::motion_paths::{
+    STEPS_PER_MM, circle, dense, draw, places, settings, star, steps, zigzag,
+};
+use penup_host_tests::pin_machine;
+use proptest::prelude::*;
+
+fn events(points: &[PagePoint], ink: LineType, settings: Settings) -> Vec<StepEvent> {
+    let targets: Vec<_> = points
+        .iter()
+        .enumerate()
+        .map(|(index, &point)| Target { point, ink: (index > 0).then_some(ink) })
+        .collect();
+    pin_machine::record(settings, &mut TargetList::new(&targets), 128).expect("within the travel")
+}
+
+/// FNV-1a of all words.
+fn digest(events: &[StepEvent]) -> u64 {
+    let bytes = events.iter().flat_map(|event| event.to_bits().to_le_bytes());
+    bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+    })
+}
+
+/// The digests are those of the plotter before it knew of jerk.
+#[test]
+fn without_a_jerk_limit_the_events_are_what_they_were() {
+    let cases = [
+        (circle(30.0, 100), LineType::Full, 50.0, 200.0, 0x3f44_f408_14ea_75ef),
+        (circle(3.0, 100), LineType::Full, 50.0, 200.0, 0x0a5d_8eac_4300_9ecd),
+        (zigzag(), LineType::Dashed, 50.0, 200.0, 0x38fe_3f23_17fc_4583),
+        (star(), LineType::Full, 100.0, 3000.0, 0x0f0e_ff48_be23_8bf5),
+        (dense(), LineType::Full, 30.0, 1000.0, 0x2e3b_5129_6e54_7c93),
+    ];
+    for (path, ink, speed, acceleration, expected) in cases {
+        let events = events(&steps(&path), ink, settings(speed, acceleration, 0.127, true));
+        assert_eq!(digest(&events), expected, "{speed} {acceleration}: {:#x}", digest(&events));
+    }
+}
+
+/// mm/s³
+fn with_jerk(mut settings: Settings, jerk: f64) -> Settings {
+    settings.set(Setting::Jerk, Value::from_num(jerk / 1000.0)).expect("valid");
+    settings
+}
+
+/// What a plotter is set to.
+#[derive(Debug, Clone, Copy)]
+struct Case {
+    speed: f64,
+    acceleration: f64,
+    jerk: f64,
+    deviation: f64,
+}
+
+impl Case {
+    fn settings(self) -> Settings {
+        with_jerk(settings(self.speed, self.acceleration, self.deviation, true), self.jerk)
+    }
+
+    fn limits(self) -> Limits {
+        Limits {
+            speed: self.speed,
+            acceleration: self.acceleration,
+            junction_deviation: self.deviation,
+            centripetal: true,
+            step: 1.0 / STEPS_PER_MM,
+        }
+    }
+
+    /// Checks jerk, acceleration, and the speed at each corner and on each line.
+    fn check(self, name: &str, points: &[PagePoint], run: &Run) {
+        let case = format!("{name} {self:?}");
+        let places = places(points);
+        let measured = event_checker::greatest_acceleration(&run.times, &places, 0.005);
+        assert!(measured <= 1.05 * self.acceleration, "{case}: {measured} mm/s2");
+        let measured = event_checker::greatest_jerk(&run.times, &places, self.jerk);
+        assert!(measured <= 1.1 * self.jerk, "{case}: {measured} mm/s3");
+        let mm: Vec<_> = points
+            .iter()
+            .map(|p| (f64::from(p.x) / STEPS_PER_MM, f64::from(p.y) / STEPS_PER_MM))
+            .collect();
+        let (corners, lines) = squared_limits(&mm, self.limits());
+        // Of each line its first move, and its length.
+        let mut first = 0;
+        for (line, (ends, &limit)) in points.windows(2).zip(&lines).enumerate() {
+            let (dx, dy) = (ends[1].x - ends[0].x, ends[1].y - ends[0].y);
+            let after = first + dx.abs().max(dy.abs()) as usize;
+            let speed = |index: usize| {
+                (places[index] - places[index - 1]) / (run.times[index] - run.times[index - 1])
+            };
+            // At 0.4 mm/s, times are a slice apart.
+            let most = 1.03 * limit.sqrt() + 0.1;
+            for index in first + 1..after {
+                assert!(
+                    speed(index) <= most,
+                    "{case}: {} mm/s, not {most} in {line}",
+                    speed(index)
+                );
+            }
+            if line > 0 {
+                // Between the last move of one line and the first of the next the corner is passed.
+                let way = places[first] - places[first - 1];
+                let most = 1.03 * (corners[line] + self.acceleration * 2.0 * way).sqrt() + 0.1;
+                assert!(
+                    speed(first) <= most,
+                    "{case}: {} mm/s, not {most} at {line}",
+                    speed(first)
+                );
+            }
+            first = after;
+        }
+    }
+}
+
+#[test]
+fn known_paths_keep_every_limit_and_take_a_sane_time() {
+    let line = |length: f64| vec![(10.0, 10.0), (10.0 + length, 10.0)];
+    // Each a number of straights, or of curves of one speed: how many, how long, how fast.
+    let paths = [
+        ("zigzag", zigzag(), 10.0, 50.25, f64::INFINITY),
+        ("star", star(), 5.0, 57.06, f64::INFINITY),
+        ("circle 30", circle(30.0, 100), 1.0, 188.5, 30.0),
+        ("circle 3", circle(3.0, 100), 1.0, 18.85, 3.0),
+        ("circle 0.3", circle(0.3, 40), 1.0, 1.9, 0.3),
+        ("dense", dense(), 1.0, 500.0, 20.0),
+        ("short", line(0.5), 1.0, 0.5, f64::INFINITY),
+        ("long", line(300.0), 1.0, 300.0, f64::INFINITY),
+    ];
+    for (name, path, count, length, radius) in paths {
+        let points = steps(&path);
+        for (speed, acceleration) in [(50.0f64, 200.0f64), (100.0, 1000.0), (30.0, 3000.0)] {
+            for jerk in [500.0, 3000.0, 20_000.0, 100_000.0] {
+                let case = Case { speed, acceleration, jerk, deviation: 0.127 };
+                let run = draw(&points, case.settings(), 2000);
+                case.check(name, &points, &run);
+                let curve = (acceleration * radius).sqrt().min(speed);
+                let least =
+                    straight_seconds(length, Limits { speed: curve, ..case.limits() }, jerk);
+                // Braking is reckoned with 16/18 of the jerk, and begins and ends with an interval.
+                let ramp = (acceleration / jerk).min((speed / jerk).sqrt());
+                let most = count * (1.06 * least + 3.0 * (ramp / 16.0).max(0.0013));
+                assert!(run.seconds <= most, "{name} {case:?}: {} s, not {most}", run.seconds);
+            }
+        }
+    }
+}
+
+#[test]
+fn dense_points_never_stop_it_with_a_short_look_ahead() {
+    let points = steps(&dense());
+    for (jerk, blocks) in [(500.0, 128), (3000.0, 128), (100_000.0, 128), (20_000.0, 12)] {
+        let case = Case { speed: 50.0, acceleration: 200.0, jerk, deviation: 0.127 };
+        let run = draw(&points, case.settings(), blocks);
+        case.check("dense", &points, &run);
+        // Blocks end each 0.05 mm; at the slowest of these speeds that is 20 ms.
+        let moves = &run.times[400..run.times.len() - 400];
+        let pause = moves.windows(2).map(|t| t[1] - t[0]).fold(0.0, f64::max);
+        assert!(pause < 0.004, "{case:?}: {pause} s");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, ..ProptestConfig::default() })]
+    #[test]
+    fn random_paths_keep_every_limit(
+        turns in prop::collection::vec((-300i32..300, -300i32..300), 1..60),
+        scale in 1i32..40,
+        speed in 5.0f64..120.0,
+        acceleration in 50.0f64..5000.0,
+        jerk in 500.0f64..100_000.0,
+        deviation in 0.001f64..0.5,
+        blocks in 2usize..130,
+    ) {
+        let mut at = PagePoint { x: 20_000, y: 20_000 };
+        let mut points = vec![at];
+        for (dx, dy) in turns {
+            at = PagePoint { x: at.x + dx / scale, y: at.y + dy / scale };
+            points.push(at);
+        }
+        points.dedup();
+        prop_assume!(points.len() > 1);
+        let case = Case { speed, acceleration, jerk, deviation };
+        let run = draw(&points, case.settings(), blocks);
+        case.check("random", &points, &run);
+    }
+}
+
+/// Strokes with corners, a curve and dashes, and moves with the pen up.
+fn job() -> Vec<Target> {
+    let line = |points: Vec<(f64, f64)>, ink: LineType| {
+        let points = steps(&points);
+        points
+            .into_iter()
+            .enumerate()
+            .map(move |(index, point)| Target { point, ink: (index > 0).then_some(ink) })
+    };
+    line(vec![(2.0, 3.0), (14.0, 3.0), (14.0, 9.0), (3.0, 10.5)], LineType::Full)
+        .chain(line(circle(2.0, 80), LineType::Full))
+        .chain(line(vec![(20.0, 2.0), (31.0, 7.0)], LineType::Dashed))
+        .collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
+    #[test]
+    fn holds_overrides_and_aborts_keep_the_limits_too(
+        mut orders in prop::collection::vec((0u64..150_000_000, 0u8..3, 10u8..200), 1..6),
+        aborts: bool,
+        turn_ticks in 5_000u64..200_000,
+        jerk in 500.0f64..100_000.0,
+        acceleration in 50.0f64..5000.0,
+    ) {
+        let settings = Case { speed: 50.0, acceleration, jerk, deviation: 0.05 }.settings();
+        let targets = job();
+        let mut path = TargetList::new(&targets);
+        let mut started = false;
+        orders.sort_unstable();
+        let last = orders.last().map_or(0, |&(due, ..)| due);
+        let mut waiting = orders.iter().peekable();
+        let trace = {
+            let mut first = path.clone();
+            pin_machine::run(settings, &mut path, turn_ticks, &mut |turn| {
+                if !started {
+                    started = true;
+                    turn.machine.start(&mut first).expect("within the travel");
+                }
+                while let Some(&(_, order, percent)) = waiting.next_if(|order| turn.now >= order.0) {
+                    match order {
+                        0 => turn.machine.set_override(percent),
+                        1 => turn.machine.set_override(100),
+                        _ => turn.machine.hold(),
+                    }
+                }
+                if aborts && turn.now >= last {
+                    turn.machine.abort();
+                }
+                if turn.machine.state() == (State::Hold { standing: true }) && turn.machine.stands() {
+                    assert_eq!(turn.machine.planned_position(), turn.pins);
+                    turn.machine.resume();
+                }
+                turn.machine.state() != State::Idle || !turn.machine.stands()
+            })
+        };
+        let drawn = event_checker::check_pins(&trace, &settings);
+        event_checker::check_speed(&drawn.runs, &targets, &settings, false);
+        prop_assert_eq!(drawn.pen, 0);
+        if !aborts {
+            prop_assert_eq!(Some(drawn.end), targets.last().map(|target| target.point));
+        }
+    }
+}

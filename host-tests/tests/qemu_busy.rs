@@ -1,0 +1,50 @@
+//! A job goes on in time whatever the serial line brings: the steps have their planned times at the
+//! pins of the LM3S6965.
+#![cfg(feature = "emulator")]
+
+use penup_client::machines::Board::Lm3s6965;
+use penup_host_tests::emulated_jobs::begin;
+use penup_host_tests::step_edges::{assert_in_time, of_changes, planned};
+use penup_host_tests::whole_jobs::job_lines;
+use std::error::Error;
+use std::time::Duration;
+
+/// The interrupt is late by one of its own calls where it is told of another length of the steps; by
+/// nothing else.
+const JITTER: Duration = Duration::from_micros(5);
+
+#[test]
+fn lists_long_lines_and_status_requests_make_no_gap_between_steps() -> Result<(), Box<dyn Error>> {
+    // Short pieces of curves, drawn at 100 mm/s.
+    let lines = job_lines("isobars.obj", &["$201=6000", "$fit=on", "$page=25x25", "$margin=5"]);
+    let planned = planned(Lm3s6965, &lines);
+    let mut line = begin(Lm3s6965, &lines)?;
+    let mut changes = line.emulator.pin_changes()?;
+    // As much as its queue of 255 bytes takes at once.
+    let long = format!("# {}\n", "x".repeat(150));
+    let talk = [long.as_str(), "v 1 2\n$nonsense\n", "$$\n", "$100=81\n", "$options\n", "$\n"];
+    let mut answers = 0;
+    'job: for words in talk.iter().cycle() {
+        line.emulator.send("?".repeat(20).as_bytes())?;
+        line.emulator.send(words.as_bytes())?;
+        for _ in 0..words.lines().count() {
+            loop {
+                let answer = line.hear()?;
+                if answer.starts_with("<Idle") {
+                    break 'job;
+                }
+                assert!(!answer.contains("|Late:"), "{answer}");
+                if answer == "ok" || answer.starts_with("error:") {
+                    answers += 1;
+                    break;
+                }
+            }
+        }
+        changes.extend(line.emulator.pin_changes()?);
+    }
+    changes.extend(line.emulator.pin_changes()?);
+    println!("{answers} lines answered during {} changes of pins", changes.len());
+    assert!(answers > 50, "{answers} lines are no flood");
+    assert_in_time(&planned, &of_changes(&changes), 10_000, JITTER);
+    Ok(())
+}

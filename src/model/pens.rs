@@ -1,0 +1,271 @@
+//! Which pen draws each element.
+//!
+//! Neighbours mostly have the same pen, so what is stored is where another one begins: a [`PenRun`] each, in the
+//! half-words after the corners. A model of one pen stores none. Pens are chosen by `usemtl` and `g`: a name with a
+//! number is that pen, any other takes the first pen that no name has. Of those names a hash is kept.
+
+use super::ModelError;
+use crate::stage::{OutOfScratch, Scratch};
+use bytemuck::{Pod, Zeroable};
+use core::ops::Range;
+
+/// How many pens there are.
+pub const PEN_LIMIT: u8 = 32;
+
+/// From an element on, another pen than before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct PenRun {
+    /// The element's first corner.
+    first: u16,
+    /// The pen, from 0.
+    pen: u16,
+}
+
+impl PenRun {
+    pub(super) fn begins_at(self, corner: usize) -> bool {
+        usize::from(self.first) == corner
+    }
+}
+
+/// Half-words of a [`PenRun`].
+pub(super) const RUN: usize = 2;
+
+/// The pens of elements; the first pen has those before the first run.
+///
+/// Guarantees, if they come from a model or a [`PenWriter`]: runs are in order, none is empty, each has another
+/// pen than the one before.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Pens<'a> {
+    runs: &'a [PenRun],
+}
+
+impl<'a> Pens<'a> {
+    pub(super) fn new(runs: &'a [PenRun]) -> Self {
+        Self { runs }
+    }
+
+    /// The pen, from 0, of the element to which a corner belongs.
+    #[inline]
+    pub fn at(&self, corner: usize) -> u8 {
+        let after = self.runs.partition_point(|run| usize::from(run.first) <= corner);
+        after.checked_sub(1).and_then(|last| self.runs.get(last)).map_or(0, |run| run.pen as u8)
+    }
+
+    /// How many times the pen changes.
+    pub fn changes(&self) -> usize {
+        self.runs.len()
+    }
+
+    /// The pen of the last element.
+    pub(super) fn last(&self) -> u8 {
+        self.runs.last().map_or(0, |run| run.pen as u8)
+    }
+}
+
+/// Notes the pens of elements as they are written one after the other.
+#[derive(Debug)]
+pub struct PenWriter<'a> {
+    runs: &'a mut [PenRun],
+    count: usize,
+}
+
+impl<'a> PenWriter<'a> {
+    /// For at most so many changes of the pen.
+    ///
+    /// # Errors
+    /// [`OutOfScratch`] if there is no room for them.
+    pub fn new(scratch: &mut Scratch<'a>, changes: usize) -> Result<Self, OutOfScratch> {
+        Ok(Self { runs: scratch.take(changes)?, count: 0 })
+    }
+
+    /// An element with this first corner follows; corners only grow.
+    pub fn element(&mut self, first: usize, pen: u8) {
+        let last = Pens { runs: self.runs.get(..self.count).unwrap_or(&[]) }.last();
+        if let Some(run) = self.runs.get_mut(self.count).filter(|_| pen != last) {
+            *run = PenRun { first: first as u16, pen: pen.into() }; // corners are fewer than 2^16
+            self.count += 1;
+        }
+    }
+
+    /// The pens of all of them.
+    pub fn finish(self) -> Pens<'a> {
+        let runs: &'a [PenRun] = self.runs;
+        Pens { runs: runs.get(..self.count).unwrap_or(runs) }
+    }
+}
+
+/// Takes the corners in `gone` out of the first `count` of `runs`, and returns how many runs are left.
+/// The last may be empty then.
+pub(super) fn close_gap(runs: &mut [PenRun], count: usize, gone: Range<usize>) -> usize {
+    let (mut kept, mut last) = (0usize, 0);
+    for at in 0..count.min(runs.len()) {
+        let PenRun { first, pen } = runs[at];
+        let before = usize::from(first);
+        let first =
+            if before >= gone.end { before - gone.len() } else { before.min(gone.start) } as u16; // it does not grow
+        // What an earlier run has lost wholly is this one's.
+        if kept > 0 && runs[kept - 1].first == first {
+            kept -= 1;
+            last = if kept > 0 { runs[kept - 1].pen } else { 0 };
+        }
+        if pen != last {
+            runs[kept] = PenRun { first, pen };
+            (kept, last) = (kept + 1, pen);
+        }
+    }
+    kept
+}
+
+/// Puts `length` corners with `pen` where `at` is into the first `count` of `runs`, which have at least
+/// two more places, and returns how many runs there are then.
+pub(super) fn open_gap(
+    runs: &mut [PenRun],
+    mut count: usize,
+    at: usize,
+    length: usize,
+    pen: u8,
+) -> usize {
+    let (at, end, pen) = (at as u16, (at + length) as u16, u16::from(pen));
+    let next = runs.iter().take(count).take_while(|run| run.first < at).count();
+    let before = next.checked_sub(1).map_or(0, |last| runs[last].pen);
+    let mut after = before;
+    if let Some(run) = runs.get(next).filter(|run| next < count && run.first == at) {
+        after = run.pen;
+        runs.copy_within(next + 1..count, next);
+        count -= 1;
+    }
+    for run in &mut runs[next..count] {
+        run.first += length as u16;
+    }
+    let new = [PenRun { first: at, pen }, PenRun { first: end, pen: after }];
+    let is_new = [pen != before, after != pen];
+    let mut place = next;
+    for run in new.into_iter().zip(is_new).filter_map(|(run, is_new)| is_new.then_some(run)) {
+        runs.copy_within(place..count, place + 1);
+        runs[place] = run;
+        (place, count) = (place + 1, count + 1);
+    }
+    count
+}
+
+/// What `usemtl` or `g` names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PenName {
+    /// A pen, from 0, below [`PEN_LIMIT`].
+    Number(u8),
+    /// Anything else, by a hash.
+    Other(u32),
+}
+
+/// Which pen is chosen, and which names have which.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct PenBook {
+    /// The hash of the name that has the pen, [`FREE`] or [`BY_NUMBER`].
+    pub(super) names: [u32; PEN_LIMIT as usize],
+    /// The pen of elements that follow.
+    pub(super) current: u8,
+    /// Whether `usemtl` came: then `g` chooses no more.
+    pub(super) by_material: bool,
+}
+
+const FREE: u32 = 0;
+const BY_NUMBER: u32 = 1;
+
+impl PenBook {
+    /// Chooses the pen of a name.
+    ///
+    /// # Errors
+    /// [`ModelError::TooManyPens`]; nothing is changed.
+    pub(super) fn choose(&mut self, name: PenName) -> Result<(), ModelError> {
+        let pen = match name {
+            PenName::Number(pen) => {
+                let place = self.names.get_mut(usize::from(pen)).ok_or(ModelError::TooManyPens)?;
+                if *place == FREE {
+                    *place = BY_NUMBER;
+                }
+                pen
+            }
+            PenName::Other(hash) => {
+                let hash = hash.max(BY_NUMBER + 1);
+                let pen = self.names.iter().position(|name| *name == hash);
+                let pen = pen.or_else(|| self.names.iter().position(|name| *name == FREE));
+                let pen = pen.ok_or(ModelError::TooManyPens)?;
+                self.names[pen] = hash;
+                pen as u8
+            }
+        };
+        self.current = pen;
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::vec::Vec;
+
+    /// The pen of each corner.
+    fn of(runs: &[PenRun], corners: usize) -> Vec<u8> {
+        (0..corners).map(|corner| Pens { runs }.at(corner)).collect()
+    }
+
+    #[test]
+    fn gaps_are_closed_and_opened_as_in_a_list() {
+        let mut state = 1u32;
+        let mut random = |below: usize| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 16) as usize % below
+        };
+        let (mut list, mut runs, mut count) = (Vec::new(), [PenRun::zeroed(); 400], 0);
+        for _ in 0..20_000 {
+            let (at, length, pen) = (random(list.len() + 1), random(4) + 1, random(4) as u8);
+            if list.len() < 100 && random(2) == 0 {
+                list.splice(at..at, std::iter::repeat_n(pen, length));
+                count = open_gap(&mut runs, count, at, length, pen);
+            } else {
+                let gone = at..(at + length).min(list.len());
+                list.drain(gone.clone());
+                count = close_gap(&mut runs, count, gone);
+            }
+            let (used, end) = (&runs[..count], list.len());
+            assert!(used.first().is_none_or(|run| run.pen != 0), "{used:?}");
+            let in_order = |two: &[PenRun]| two[0].first < two[1].first && two[0].pen != two[1].pen;
+            assert!(used.windows(2).all(in_order), "{used:?}");
+            assert_eq!(of(used, end), list);
+            // The model drops a run that begins at its end.
+            if used.last().is_some_and(|run| usize::from(run.first) >= end) {
+                count -= 1;
+            }
+        }
+    }
+
+    #[test]
+    fn names_take_free_pens_and_numbers_are_pens() {
+        let mut book = PenBook::default();
+        let mut chosen = |name| book.choose(name).map(|()| book.current);
+        assert_eq!(chosen(PenName::Number(1)), Ok(1));
+        for (name, pen) in [(70, 0), (71, 2), (70, 0), (72, 3), (0, 4), (1, 4), (71, 2)] {
+            assert_eq!(chosen(PenName::Other(name)), Ok(pen), "{name}");
+        }
+        assert_eq!(chosen(PenName::Number(31)), Ok(31));
+        assert_eq!(chosen(PenName::Number(32)), Err(ModelError::TooManyPens));
+        for name in 100..126 {
+            assert_eq!(chosen(PenName::Other(name)), Ok(name as u8 - 100 + 5));
+        }
+        assert_eq!(chosen(PenName::Other(999)), Err(ModelError::TooManyPens));
+        assert_eq!(chosen(PenName::Other(70)), Ok(0));
+    }
+
+    #[test]
+    fn a_writer_notes_changes_only() {
+        let mut words = [0; 8];
+        let mut writer = PenWriter::new(&mut Scratch::new(&mut words), 3).unwrap();
+        for (first, pen) in [(0, 0), (3, 2), (6, 2), (8, 0), (10, 5)] {
+            writer.element(first, pen);
+        }
+        let pens = writer.finish();
+        assert_eq!(of(pens.runs, 12), [0, 0, 0, 2, 2, 2, 2, 2, 0, 0, 5, 5]);
+        assert_eq!(pens.changes(), 3);
+    }
+}

@@ -1,0 +1,411 @@
+//! Speeds without kinks: acceleration along the path changes no faster than the limit on jerk.
+//!
+//! Time goes in intervals of constant jerk. At the beginning of each, [`Road::next`] takes the greatest
+//! acceleration for its end from which all that is known ahead can still be kept: the end of the
+//! path, corners, bends, feeds. Every limit is looked at by itself: braking to it as fast as
+//! acceleration and jerk let it, and without acceleration in the end, must be possible before it stands. That is
+//! enough for all of them together, since who brakes harder than one limit asks is slower everywhere. So nothing
+//! is bound to where blocks begin or end: acceleration runs on through any number of short ones.
+//!
+//! An acceleration is told by its *ramp*: for how long the jerk has built it up, in sixteenths of
+//! slices, negative for braking. Then all changes are polynomials in whole numbers.
+
+use super::profile::{FRACTION_BITS, Slice};
+use super::{Limits, Lookahead, PathLength, SLICE_TICKS, SliceSpeed};
+use crate::fixed::Millimetres;
+use core::num::NonZeroU32;
+
+/// The limit in sixteenths of the jerk with which braking is reckoned: the difference makes up for
+/// changes at the ends of intervals only.
+const MOST_GROWTH: i32 = 18;
+
+/// The limit on jerk as the planner needs it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct JerkLimit {
+    /// With which braking is reckoned, 2^-40 mm per slice³, below 2^23.
+    jerk: NonZeroU32,
+    /// The longest ramp, 2^7 to 2^16: no acceleration beyond the limit, nor beyond what the greatest
+    /// speed leaves time for. A multiple of the slices of an interval, as all ramps are at its ends.
+    longest: i32,
+}
+
+impl JerkLimit {
+    /// The least longest ramp: eight slices. The speed is not looked after more often.
+    const SHORTEST: u32 = 1 << 7;
+    const LONGEST: u64 = 1 << 16;
+
+    /// `None` for no limit, 0. Jerks up to 1000 m/s³.
+    pub(super) fn new(
+        jerk_m_per_s3: Millimetres,
+        acceleration: SliceSpeed,
+        fastest: SliceSpeed,
+    ) -> Option<Self> {
+        let bits = u64::from(jerk_m_per_s3.to_bits().unsigned_abs());
+        // 2^-16 m/s³ to 2^-40 mm/slice³: bits * 1000 * 2^24 * (2^12 / 5^8 / 2^6)³, the twos cancelled.
+        let jerk = (((bits << 36) / 5u64.pow(10)) << 9) / 5u64.pow(11);
+        let jerk = jerk * 16 / u64::from(MOST_GROWTH.unsigned_abs());
+        let (acceleration, fastest) =
+            (u64::from(acceleration.to_bits()), u64::from(fastest.to_bits()));
+        // A jerk that builds all up within less than the shortest ramp is of no use.
+        let most = (acceleration << 12) / u64::from(Self::SHORTEST);
+        let jerk = jerk.min(most).min((fastest << 16) / u64::from(Self::SHORTEST).pow(2));
+        let limit = NonZeroU32::new(u32::try_from(jerk).unwrap_or(u32::MAX))?;
+        let by_acceleration = (acceleration << 12) / jerk;
+        let by_speed = ((fastest << 16) / jerk).isqrt();
+        let longest = by_acceleration.min(by_speed).min(Self::LONGEST) as i32;
+        let limit = Self { jerk: limit, longest };
+        Some(Self { longest: longest - longest % i32::from(limit.slices()), ..limit })
+    }
+
+    /// How long an interval is, 8 to 256 slices: a sixteenth of the longest ramp.
+    fn slices(self) -> u16 {
+        (self.longest >> 8).max(8) as u16
+    }
+
+    fn jerk(self) -> i64 {
+        i64::from(self.jerk.get())
+    }
+
+    /// What a ramp that grows from `ramp` by `growth` a slice adds to the speed in so many slices.
+    fn gain(self, ramp: i32, growth: i32, slices: u16) -> i64 {
+        let (ramp, growth, slices) = (i64::from(ramp), i64::from(growth), i64::from(slices));
+        (self.jerk() * (2 * ramp * slices + growth * slices * slices)) >> 13
+    }
+
+    /// The way that it adds, 2^-32 mm.
+    fn gained_way(self, ramp: i32, growth: i32, slices: u16) -> i64 {
+        let (ramp, growth, slices) = (i64::from(ramp), i64::from(growth), i64::from(slices));
+        self.jerk() * (slices * slices * (3 * ramp + growth * slices)) / (6 << 12)
+    }
+
+    /// Speed over jerk, in squares of sixteenths of slices.
+    fn scaled(self, speed: u32) -> i64 {
+        ((u64::from(speed) << 16) / u64::from(self.jerk.get())) as i64
+    }
+
+    /// How fast it is when the ramp has ended as soon as it can.
+    fn settled(self, state: State) -> u64 {
+        let square = i64::from(state.ramp) * i64::from(state.ramp.abs());
+        (i64::from(state.speed) + ((self.jerk() * square) >> 17)).max(0).unsigned_abs()
+    }
+
+    /// How far it is, 2^-32 mm, from the speed and ramp of `from` to the speed `to` and no ramp, braking as
+    /// hard as the limits let it; to `to` alone, if the ramp of a faster `from` leads on to a slower
+    /// speed. If `to` is never passed, nothing of use.
+    fn braking_distance(self, from: State, to: u32) -> u64 {
+        let ramp = i64::from(from.ramp);
+        let (from, to) = (self.scaled(from.speed) + 1, self.scaled(to));
+        // The ramp at which to turn, if none is too long: v - u = (2 peak² - ramp²) / 2.
+        let longest = i64::from(self.longest);
+        let square = from - to + ramp * ramp / 2;
+        if ramp < 0 && square < ramp * ramp {
+            let time =
+                -ramp - (ramp * ramp - 2 * (from - to).max(0)).max(0).unsigned_abs().isqrt() as i64;
+            return self.distance(from * time + time * time * (3 * ramp + time) / 6);
+        }
+        let peak = if square < longest * longest {
+            square.max(1).unsigned_abs().isqrt() as i64
+        } else {
+            longest
+        };
+        let peak = peak.max(-ramp).max(1);
+        let down = ramp + peak;
+        let (first, second) = (from + (ramp * ramp - peak * peak) / 2, to + peak * peak / 2);
+        let hold = (first - second + peak - 1).max(0) / peak;
+        // Times below 2^22, speeds below 2^37, their product below 2^58.
+        let way = from * down
+            + down * down * (3 * ramp - down) / 6
+            + hold * ((first + second) / 2)
+            + to * peak
+            + peak * peak * peak / 6;
+        self.distance(way)
+    }
+
+    /// Scaled speed times sixteenths of slices, as 2^-32 mm.
+    fn distance(self, scaled: i64) -> u64 {
+        ((scaled.max(0).unsigned_abs() >> 8) * u64::from(self.jerk.get())) >> 12
+    }
+}
+
+/// How the plan moves at an instant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct State {
+    /// 2^-32 mm per slice.
+    pub(super) speed: u32,
+    /// See the module.
+    pub(super) ramp: i32,
+}
+
+/// An interval of constant jerk, cut into slices.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Interval {
+    limit: JerkLimit,
+    from: State,
+    /// Added to the ramp by each slice: sixteenths of the jerk of [`JerkLimit`].
+    growth: i8,
+    slices: u16,
+    done: u16,
+    /// What is left of a slice that the end of a block cut.
+    rest: Slice,
+}
+
+impl Interval {
+    fn new(limit: JerkLimit, from: State, growth: i32) -> Self {
+        let slices = limit.slices();
+        Self { limit, from, growth: growth as i8, slices, done: 0, rest: Slice::default() }
+    }
+
+    /// The next slice, or as much of it as there is `room` for (2^-32 mm); `None` at the end of the interval or
+    /// without room.
+    pub(super) fn next_slice(&mut self, room: u64) -> Option<Slice> {
+        if room == 0 {
+            return None;
+        }
+        if self.rest.distance == 0 {
+            let (before, after) = (self.speed(self.done), self.speed(self.done + 1));
+            let stands = before == 0 && after == 0 && self.growth <= 0;
+            if self.done == self.slices || stands {
+                return None;
+            }
+            self.done += 1;
+            self.rest =
+                Slice { distance: before.midpoint(after), time: SLICE_TICKS << FRACTION_BITS };
+        }
+        let mut slice = core::mem::take(&mut self.rest);
+        if u64::from(slice.distance) > room {
+            // Less than the distance, and so than the time.
+            let time = (u64::from(slice.time) * room / u64::from(slice.distance)) as u32;
+            let distance = room as u32;
+            self.rest = Slice { distance: slice.distance - distance, time: slice.time - time };
+            slice = Slice { distance, time };
+        }
+        Some(slice)
+    }
+
+    /// How the plan moves at the end of the last slice given; within the interval, the ramp is rounded
+    /// down by less than a sixteenth of it.
+    pub(super) fn state(&self) -> State {
+        let speed = self.speed(self.done);
+        let grown = self.from.ramp + i32::from(self.growth) * i32::from(self.done);
+        let ramp = grown - grown.rem_euclid(self.slices.into());
+        State { speed, ramp: if speed == 0 { 0 } else { ramp } }
+    }
+
+    fn speed(&self, slices: u16) -> u32 {
+        let gain = self.limit.gain(self.from.ramp, self.growth.into(), slices);
+        // The limits keep it below 2^32.
+        (i64::from(self.from.speed) + gain).max(0) as u32
+    }
+}
+
+/// What the plan has to keep.
+#[derive(Debug)]
+pub(super) struct Road<'a, 'm> {
+    pub(super) limits: &'a Limits,
+    pub(super) jerk: JerkLimit,
+    /// Not to be passed, but not at once if it is passed already; 0 to brake to rest.
+    pub(super) top: SliceSpeed,
+    /// To the end of the piece in work, 2^-32 mm.
+    pub(super) room: u64,
+    /// Greatest stopping distance until there.
+    pub(super) curve_limit: PathLength,
+    /// What comes then; `None` if it ends there at rest.
+    pub(super) beyond: Option<&'a Lookahead<'m>>,
+}
+
+impl Road<'_, '_> {
+    /// The next interval.
+    ///
+    /// If nothing is allowed, it brakes. From rest, if not even the least acceleration is, it
+    /// creeps: what is left is less than a start and a stop take.
+    pub(super) fn next(&self, from: State) -> Interval {
+        let slices = i32::from(self.jerk.slices());
+        let bounds = |ramp: i32| ((ramp - from.ramp) / slices).clamp(-MOST_GROWTH, MOST_GROWTH);
+        let (mut least, mut most) = (bounds(-self.jerk.longest), bounds(self.jerk.longest));
+        if self.allows(from, most) {
+            least = most;
+        }
+        while most - least > 1 {
+            let middle = (least + most) >> 1;
+            if self.allows(from, middle) {
+                least = middle;
+            } else {
+                most = middle;
+            }
+        }
+        if from.speed == 0 && least <= 0 {
+            let slices = self.jerk.slices();
+            let way = self.jerk.gained_way(0, 1, slices).unsigned_abs();
+            let speed = (way / u64::from(slices)).max(1) as u32;
+            return Interval::new(self.jerk, State { speed, ramp: 0 }, 0);
+        }
+        Interval::new(self.jerk, from, least)
+    }
+
+    /// Whether all limits can be kept after an interval of such a growth, and are kept in it.
+    fn allows(&self, from: State, growth: i32) -> bool {
+        let (jerk, slices) = (self.jerk, self.jerk.slices());
+        let way =
+            i64::from(from.speed) * i64::from(slices) + jerk.gained_way(from.ramp, growth, slices);
+        let way = way.max(0).unsigned_abs();
+        let speed = i64::from(from.speed) + jerk.gain(from.ramp, growth, slices);
+        let ramp = from.ramp + growth * i32::from(slices);
+        let after = if speed > 0 { State { speed: speed as u32, ramp } } else { State::default() };
+        let settled = jerk.settled(after);
+        if settled > u64::from(self.top.to_bits()) {
+            return false;
+        }
+        let fastest = settled.max(after.speed.into());
+        let exceeds =
+            |speed: u64, limit: PathLength| speed * speed > self.limits.squared_speed(limit);
+        let passes = |place: u64, limit: PathLength| {
+            // Speed as if it were linear along the way: too much where braking fades.
+            let change = i64::from(after.speed) - i64::from(from.speed);
+            let part = change * (place >> 12).cast_signed() / (way >> 12).max(1).cast_signed();
+            let speed = (i64::from(from.speed) + part).unsigned_abs();
+            let settled = jerk.settled(from);
+            !exceeds(speed, limit)
+                || (after.ramp <= 0
+                    && !exceeds(settled - settled / 128, limit)
+                    && jerk.braking_distance(from, self.limits.speed(limit).to_bits()) <= place)
+        };
+        let stop = jerk.braking_distance(after, 0);
+        let mut lowest = PathLength::MAX;
+        let (mut begin, mut end, mut curve_limit) = (0, self.room, self.curve_limit);
+        for block in self.beyond.into_iter().flat_map(Lookahead::iter) {
+            let limit = block.entry_limit.min(block.curve_limit);
+            if end < way {
+                if !passes(end, limit.min(curve_limit)) {
+                    return false;
+                }
+            } else {
+                if begin <= way && exceeds(settled, curve_limit) {
+                    return false;
+                }
+                if end - way >= stop {
+                    return true;
+                }
+                // A limit behind a lower one does not bind.
+                if limit < lowest && exceeds(fastest, limit) {
+                    lowest = limit;
+                    let limit = self.limits.speed(limit).to_bits();
+                    if end - way < jerk.braking_distance(after, limit) {
+                        return false;
+                    }
+                }
+            }
+            curve_limit = block.curve_limit;
+            (begin, end) = (end, end + (u64::from(block.length.to_bits()) << 14));
+        }
+        if begin <= way && exceeds(settled, curve_limit) {
+            return false;
+        }
+        way.saturating_add(stop) <= end
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// mm/s, mm/s², m/s³; mm per slice at 1 mm/s.
+    const SLICE: f64 = SLICE_TICKS as f64 / 25e6;
+
+    fn limit(speed: f64, acceleration: f64, jerk: f64) -> JerkLimit {
+        let limit = JerkLimit::new(
+            Millimetres::from_num(jerk),
+            SliceSpeed::from_num(acceleration * SLICE * SLICE),
+            SliceSpeed::from_num(speed * SLICE),
+        );
+        limit.expect("a limit")
+    }
+
+    #[test]
+    fn the_longest_ramp_is_that_of_acceleration_or_speed() {
+        assert_eq!(
+            JerkLimit::new(Millimetres::ZERO, SliceSpeed::MAX, SliceSpeed::from_num(0.01)),
+            None
+        );
+        let reckoned = 16.0 / 18.0;
+        for (speed, acceleration, jerk, seconds) in [
+            (100.0, 200.0, 2.0, 200.0 / (2000.0 * reckoned)),
+            (50.0, 800.0, 0.5, (50.0f64 / (500.0 * reckoned)).sqrt()),
+            (50.0, 200.0, 1000.0, 8.0 * SLICE),
+            (500.0, 800.0, 0.1, 4096.0 * SLICE),
+        ] {
+            let limit = limit(speed, acceleration, jerk);
+            let longest = f64::from(limit.longest) / 16.0 * SLICE;
+            assert!((longest / seconds - 1.0).abs() < 0.01, "{jerk}: {longest} s, not {seconds} s");
+            assert_eq!(limit.longest % i32::from(limit.slices()), 0);
+        }
+    }
+
+    /// The way, mm, from a speed, mm/s, and ramp, braking as hard as possible for `first` slices and
+    /// then less and less; and the speed then.
+    fn braked(limit: JerkLimit, from: State, hard: f64) -> (f64, f64) {
+        let jerk = f64::from(limit.jerk.get()) / 2f64.powi(40) / SLICE.powi(3);
+        let (mut speed, mut way) = (f64::from(from.speed) / 2f64.powi(32) / SLICE, 0.0);
+        let longest = f64::from(limit.longest) / 16.0 * SLICE;
+        let (mut ramp, mut time, step) = (f64::from(from.ramp) / 16.0 * SLICE, 0.0, 1e-5);
+        loop {
+            ramp = if time < hard { (ramp - step).max(-longest) } else { ramp + step };
+            if (time >= hard && ramp >= 0.0) || speed < 0.0 {
+                return (speed, way);
+            }
+            speed += jerk * ramp * step;
+            way += speed * step;
+            time += step;
+        }
+    }
+
+    #[test]
+    fn the_braking_distance_is_that_of_the_hardest_braking() {
+        for (top, acceleration, jerk) in
+            [(50.0, 200.0, 0.5), (100.0, 1000.0, 10.0), (80.0, 300.0, 90.0)]
+        {
+            let limit = limit(top, acceleration, jerk);
+            for ramp in [-0.9, -0.5, 0.0, 0.4, 1.0] {
+                for to in [0.0, 0.1, 0.5] {
+                    let ramp = (f64::from(limit.longest) * ramp) as i32;
+                    let speed = (0.9 * top * SLICE * 2f64.powi(32)) as u32;
+                    let from = State { speed, ramp };
+                    let to = to * top;
+                    // The time of hard braking after which the speed settles at `to`, by bisection.
+                    let (mut short, mut long) = (0.0, 10.0);
+                    if braked(limit, from, 0.0).0 < to {
+                        continue;
+                    }
+                    for _ in 0..30 {
+                        let middle = (short + long) / 2.0;
+                        if braked(limit, from, middle).0 > to {
+                            short = middle
+                        } else {
+                            long = middle
+                        }
+                    }
+                    let expected = braked(limit, from, long).1;
+                    let scaled = (to * SLICE * 2f64.powi(32)) as u32;
+                    let way = limit.braking_distance(from, scaled) as f64 / 2f64.powi(32);
+                    assert!(
+                        (way - expected).abs() < 0.01 * expected + 0.01,
+                        "{way} mm, not {expected}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_slice_cut_short_goes_on_as_long_and_as_far() {
+        let limit = limit(50.0, 200.0, 5.0);
+        let interval = Interval::new(limit, State { speed: 30_000_000, ramp: 1000 }, 7);
+        let all = |room: u64| {
+            let mut interval = interval;
+            core::iter::from_fn(|| interval.next_slice(room))
+                .map(|slice| (u64::from(slice.distance), u64::from(slice.time)))
+                .fold((0, 0), |sum, slice| (sum.0 + slice.0, sum.1 + slice.1))
+        };
+        assert_eq!(all(u64::MAX), all(10_000_019));
+        assert_eq!(all(0), (0, 0));
+    }
+}

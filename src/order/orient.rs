@@ -1,0 +1,94 @@
+//! Which way each stroke is best drawn, their order left as it is.
+//!
+//! Exchanges shift a fault slowly: where a hatching is drawn to and fro, and two lines one after the
+//! other come from the same side, every line between this fault and the next must be turned. For a
+//! given order the best way of all strokes is found at once, from the first to the last: what is best
+//! up to a stroke depends only on which way that stroke is drawn (Bellman's principle).
+
+use super::exchange::Exchanges;
+use super::pace::Pace;
+use super::{Leg, NONE, OrderError};
+
+/// Turns strokes (legs between two moves) around where that makes the tour shorter. Returns the
+/// gain. `ways` has a place for each leg of the tour.
+pub(super) fn orient(
+    tour: &mut Exchanges<'_, '_>,
+    ways: &mut [u8],
+    pace: &mut Pace<'_>,
+) -> Result<i64, OrderError> {
+    let Some(begin) = tour.first_of_a_stroke() else {
+        return Ok(0);
+    };
+    // The least cost up to a stroke that is drawn as it is, and turned: then it ends where it began.
+    let mut least = [0, i64::MAX / 2];
+    let (mut ends, mut first_start, mut old) = ([NONE; 2], NONE, 0);
+    let mut strokes = 0;
+    let mut leg = begin;
+    loop {
+        pace.work(4)?;
+        let last = tour.last_of_stroke(leg, begin);
+        let (start, end) = (tour.start(leg), tour.end(last));
+        if strokes == 0 {
+            first_start = start;
+        } else {
+            old += tour.distance(ends[0], start);
+            let reach = |to| [0, 1].map(|way| least[way] + tour.distance(ends[way], to));
+            let (kept, turned) = (reach(start), reach(end));
+            ways[strokes] = u8::from(kept[1] < kept[0]) | u8::from(turned[1] < turned[0]) << 1;
+            least = [kept, turned].map(|[a, b]| a.min(b));
+        }
+        ends = [end, start];
+        strokes += 1;
+        leg = tour.cycle.next(last);
+        if leg == begin {
+            break;
+        }
+    }
+    old += tour.distance(ends[0], first_start);
+    let closed = [0, 1].map(|way| least[way] + tour.distance(ends[way], first_start));
+    let gain = old - closed[0].min(closed[1]);
+    if gain <= 0 {
+        return Ok(0);
+    }
+    // Back from the last stroke: which way each must be drawn for the best end.
+    let mut way = u8::from(closed[1] < closed[0]);
+    for stroke in (1..strokes).rev() {
+        way = core::mem::replace(&mut ways[stroke], way) >> way & 1;
+    }
+    let mut leg = begin;
+    for (stroke, &way) in ways.iter().enumerate().take(strokes) {
+        let last = tour.last_of_stroke(leg, begin);
+        let (before, after) = (tour.cycle.previous(leg), tour.cycle.next(last));
+        if stroke > 0 && way == 1 {
+            tour.wake(&[before, leg.flipped(), last, after.flipped()]);
+            let moved = tour.cycle.turn(before, last);
+            pace.work(moved as u32 / 32)?;
+        }
+        leg = after;
+    }
+    tour.cycle.settle();
+    Ok(gain)
+}
+
+impl Exchanges<'_, '_> {
+    /// A leg before which the pen is lifted; the gap of an open path.
+    fn first_of_a_stroke(&self) -> Option<Leg> {
+        let legs = || (0..self.cycle.len()).map(|index| self.cycle.leg(index));
+        let begins = |leg: &Leg| self.move_after(self.cycle.previous(*leg)) > 0;
+        legs().find(|&leg| self.is_gap(leg)).or_else(|| legs().find(begins))
+    }
+
+    /// The last leg drawn without a lift from `leg` on; the gap is a stroke by itself, and a stroke
+    /// ends before `begin`.
+    fn last_of_stroke(&self, leg: Leg, begin: Leg) -> Leg {
+        let mut last = leg;
+        while !self.is_gap(last) && self.move_after(last) == 0 {
+            let next = self.cycle.next(last);
+            if self.is_gap(next) || next == begin {
+                break;
+            }
+            last = next;
+        }
+        last
+    }
+}

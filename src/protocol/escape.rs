@@ -1,0 +1,130 @@
+//! Any text in ASCII: letters that a line cannot hold are written as numbers.
+//!
+//! `\xE9` is the letter with this number, two hexadecimal digits; `\u{2013}` one with up to six; `\\\\` is a backslash.
+//! Other letters stand for themselves, so UTF-8 may be sent as it is, too.
+
+use super::Refusal;
+use crate::drawing::is_in_font;
+use core::fmt::{self, Write};
+use core::str::Chars;
+
+/// Text of a line for a title: every escape is one, and the font has every letter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct EscapedText<'a> {
+    text: &'a str,
+}
+
+impl<'a> EscapedText<'a> {
+    /// Checks every letter, so that [`EscapedText::letters`] cannot fail.
+    ///
+    /// # Errors
+    /// [`Refusal::NotAnEscape`], [`Refusal::NotInTheFont`].
+    #[inline(never)] // Its frame must not lie under the stages'.
+    pub(super) fn new(text: &'a str) -> Result<Self, Refusal> {
+        let mut rest = text.chars();
+        while let Some(letter) = next(&mut rest) {
+            let letter = letter.ok_or(Refusal::NotAnEscape)?;
+            if !is_in_font(letter) {
+                return Err(Refusal::NotInTheFont(letter));
+            }
+        }
+        Ok(Self { text })
+    }
+
+    /// The letters that it stands for.
+    pub fn letters(&self) -> impl Iterator<Item = char> + use<'a> {
+        let mut rest = self.text.chars();
+        core::iter::from_fn(move || next(&mut rest)?)
+    }
+}
+
+/// The next letter; `Some(None)` if it is no escape.
+fn next(rest: &mut Chars<'_>) -> Option<Option<char>> {
+    let first = rest.next()?;
+    if first != '\\' {
+        return Some(Some(first));
+    }
+    Some(escaped(rest).and_then(char::from_u32))
+}
+
+/// The number after a backslash.
+fn escaped(rest: &mut Chars<'_>) -> Option<u32> {
+    let (digits, after) = match rest.next()? {
+        '\\' => return Some('\\'.into()),
+        'x' => rest.as_str().split_at_checked(2)?,
+        'u' => rest.as_str().strip_prefix('{')?.split_once('}')?,
+        _ => return None,
+    };
+    *rest = after.chars();
+    let is_number = (1..=6).contains(&digits.len()) && !digits.starts_with('+');
+    u32::from_str_radix(digits, 16).ok().filter(|_| is_number)
+}
+
+/// Any text as a line takes it, in ASCII without bytes that act at once.
+///
+/// ```
+/// use penup::protocol::{Command, Escape};
+/// assert_eq!(Escape("Café – 3 % \\ ok?").to_string(), r"Caf\xE9 \u{2013} 3 % \\ ok\x3F");
+/// let line = format!("$title={}", Escape("Café – 3 %"));
+/// let Ok(Command::Title(text)) = Command::parse(&line) else { panic!("{line}") };
+/// assert!(text.letters().eq("Café – 3 %".chars()));
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct Escape<'a>(pub &'a str);
+
+impl fmt::Display for Escape<'_> {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.chars().try_for_each(|letter| match letter {
+            '\\' => formatter.write_str("\\\\"),
+            '?' | '!' | '~' => write!(formatter, "\\x{:02X}", u32::from(letter)),
+            ' '..='~' => formatter.write_char(letter),
+            ..='\u{FF}' => write!(formatter, "\\x{:02X}", u32::from(letter)),
+            _ => write!(formatter, "\\u{{{:X}}}", u32::from(letter)),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::string::{String, ToString};
+
+    fn read(text: &str) -> Result<String, Refusal> {
+        EscapedText::new(text).map(|text| text.letters().collect())
+    }
+
+    #[test]
+    fn every_letter_comes_back_and_no_byte_acts_at_once() {
+        let latin_1 = (' '..='~').chain('\u{A0}'..='ÿ').chain("–—‘’“”…€Œœ".chars());
+        let text: String = latin_1.collect();
+        let sent = Escape(&text).to_string();
+        assert!(
+            sent.bytes().all(|byte| matches!(byte, b' '..=b'}') && byte != b'?' && byte != b'!')
+        );
+        assert_eq!(read(&sent), Ok(text.clone()));
+        let quiet = |letter: &char| !matches!(letter, '\\');
+        let plain: String = text.chars().filter(quiet).collect();
+        assert_eq!(read(&plain), Ok(plain.clone()));
+    }
+
+    #[test]
+    fn what_is_no_escape_or_no_letter_of_the_font_is_refused() {
+        for text in [
+            r"\",
+            r"\n",
+            r"\x4",
+            r"\xg0",
+            r"\u2013",
+            r"\u{}",
+            r"\u{0002013}",
+            r"\u{d800}",
+            r"\u{20",
+        ] {
+            assert_eq!(read(text), Err(Refusal::NotAnEscape), "{text}");
+        }
+        assert_eq!(read("a→b"), Err(Refusal::NotInTheFont('→')));
+        assert_eq!(read(r"\x0A"), Err(Refusal::NotInTheFont('\n')));
+        assert_eq!(read(r"\u{1f600}"), Err(Refusal::NotInTheFont('\u{1F600}')));
+        assert_eq!(read(""), Ok(String::new()));
+    }
+}
