@@ -51,8 +51,12 @@ enum Task {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         arguments: Vec<String>,
     },
-    /// Counts the instructions of each stage on a Cortex-M3, for every lattice.
-    Bench,
+    /// Counts the instructions of each stage on a Cortex-M3, or the cycles on a Pico, for every lattice.
+    Bench {
+        /// The LM3S6965's core, or the Pico itself.
+        #[arg(long, value_enum, default_value_t)]
+        board: Board,
+    },
     /// Draws the figures of the papers into docs/gallery.
     Gallery,
     /// Repeats Harrison's experiments (his chapter 7), counted in instructions.
@@ -98,7 +102,8 @@ fn carry_out() -> Result<()> {
         }
         Some(Task::Flash { board }) => flash::flash(board)?,
         Some(Task::Plot { arguments }) => plot(&arguments)?,
-        Some(Task::Bench) => bench::count()?,
+        Some(Task::Bench { board: Board::Lm3s6965 }) => bench::count()?,
+        Some(Task::Bench { board: Board::Pico }) => bench::count_cycles()?,
         Some(Task::Gallery) => gallery::make()?,
         Some(Task::Experiments) => experiments::repeat()?,
         Some(Task::Scenes { count }) => test::random_scenes(count)?,
