@@ -26,11 +26,14 @@ fn main() -> io::Result<()> {
     let out_dir = PathBuf::from(env::var_os("OUT_DIR").unwrap_or_default());
     fs::copy(format!("boards/{board}.x"), out_dir.join("board.x"))?;
     println!("cargo::rustc-link-search={}", out_dir.display());
-    let binary = if board == "mps2" { "bench" } else { "firmware" };
-    println!("cargo::rustc-link-arg-bin={binary}=-Tlink.x");
-    println!("cargo::rustc-link-arg-bin={binary}=--nmagic");
-    if board != "mps2" {
-        println!("cargo::rustc-link-arg-bin={binary}=-Tdefmt.x");
+    let binaries: &[&str] =
+        if board == "mps2" { &["bench", "bench-motion"] } else { &["firmware"] };
+    for binary in binaries {
+        println!("cargo::rustc-link-arg-bin={binary}=-Tlink.x");
+        println!("cargo::rustc-link-arg-bin={binary}=--nmagic");
+        if board != "mps2" {
+            println!("cargo::rustc-link-arg-bin={binary}=-Tdefmt.x");
+        }
     }
     Ok(())
 }

@@ -188,6 +188,17 @@ pub fn divide_rounding(dividend: i128, divisor: i128) -> i128 {
     if dividend < 0 { -quotient(half - dividend) } else { quotient(dividend + half) }
 }
 
+/// The quotient, rounded towards minus infinity. `divisor` > 0.
+///
+/// ```
+/// use penup::fixed::divide_down;
+/// assert_eq!([-7, -6, -1, 0, 5, 6].map(|dividend| divide_down(dividend, 3)), [-3, -2, -1, 0, 1, 2]);
+/// ```
+pub fn divide_down(dividend: i128, divisor: i128) -> i128 {
+    let quotient = |dividend: i128| divide(dividend as u128, divisor as u128) as i128; // neither is negative
+    if dividend < 0 { -quotient(divisor - 1 - dividend) } else { quotient(dividend) }
+}
+
 /// The quotient, rounded down. `divisor` > 0.
 #[inline(never)] // 128 bits by 128 are long.
 pub fn divide(dividend: u128, divisor: u128) -> u128 {
@@ -223,12 +234,6 @@ pub fn sin_cos_degrees(degrees: f64) -> (f64, f64) {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SixDecimals(pub f64);
 
-impl From<Millimetres> for SixDecimals {
-    fn from(length: Millimetres) -> Self {
-        Self(f64::from(length.to_bits()) / f64::from(1 << Millimetres::FRAC_NBITS))
-    }
-}
-
 impl fmt::Display for SixDecimals {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         let magnitude = libm::fabs(self.0);
@@ -248,6 +253,31 @@ impl fmt::Display for SixDecimals {
             width -= 1;
         }
         if millionths > 0 { write!(formatter, ".{millionths:0width$}") } else { Ok(()) }
+    }
+}
+
+/// Writes a length with as few decimals as tell it from others. Far smaller than what its type brings along.
+///
+/// ```
+/// use penup::fixed::{Length, Millimetres};
+/// let text = |length: f64| Length(Millimetres::from_num(length)).to_string();
+/// assert_eq!([210.0, 7.3, -0.25, 0.0].map(text), ["210", "7.3", "-0.25", "0"]);
+/// assert_eq!(Length(Millimetres::from_bits(1)).to_string(), "0.00002");
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct Length(pub Millimetres);
+
+impl fmt::Display for Length {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let units = i64::from(self.0.to_bits());
+        let magnitude = units.abs();
+        let tells_it = |places: &u32| {
+            let power = 10i64.pow(*places);
+            let digits = (magnitude * power + (1 << 15)) >> 16;
+            ((digits << 16) + power / 2) / power == magnitude
+        };
+        let places = (0..5).find(tells_it).unwrap_or(5);
+        BinaryFraction { units, fraction_bits: 16, places }.fmt(formatter)
     }
 }
 
@@ -296,6 +326,14 @@ mod tests {
 
     fn binary(text: &str, fraction_bits: u32) -> Result<i64, OutOfRange> {
         Decimal::parse(text).map_err(|_| OutOfRange)?.to_binary(fraction_bits)
+    }
+
+    #[test]
+    fn every_length_is_told_from_its_neighbours() {
+        for bits in (-70_000..70_000).chain([i32::MIN, i32::MAX, i32::MAX - 1]) {
+            let text = format!("{}", Length(Millimetres::from_bits(bits)));
+            assert_eq!(binary(&text, 16), Ok(i64::from(bits)), "{text}");
+        }
     }
 
     #[test]

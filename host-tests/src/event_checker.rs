@@ -100,11 +100,13 @@ pub fn check(events: &[StepEvent], settings: &Settings) -> Verdict {
                         *pulsed = Some(time);
                     }
                 }
+                if event.pulses() != (0, 0) {
+                    assert!(time >= pen_ready, "event {number}: moves while the pen moves");
+                    assert!(levels & StepEvent::DRIVERS_ON != 0, "event {number}: drivers off");
+                }
                 let (dx, dy) = event.step();
                 if (dx, dy) != (0, 0) {
                     at = PagePoint { x: at.x + dx, y: at.y + dy };
-                    assert!(time >= pen_ready, "event {number}: moves while the pen moves");
-                    assert!(levels & StepEvent::DRIVERS_ON != 0, "event {number}: drivers off");
                     let page = settings.kinematics().page(at);
                     assert!(
                         (0..=most.0).contains(&page.x) && (0..=most.1).contains(&page.y),
@@ -246,6 +248,46 @@ pub fn check_speed(runs: &[Run], targets: &[Target], settings: &Settings, cut: b
     }
 }
 
+/// The slack of a motor: it takes the pen along at either end of it only.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Play {
+    slack: i32,
+    /// How far the motor is beyond the pen at the lower end; `None` before it has moved.
+    low: Option<i32>,
+    beyond: i32,
+}
+
+impl Play {
+    /// Of a motor that lies at the end at which its first move finds it.
+    pub fn new(slack: i32) -> Self {
+        Self { slack, low: None, beyond: 0 }
+    }
+
+    /// Of a motor that lies in the middle of its slack.
+    pub fn in_the_middle(slack: i32) -> Self {
+        Self { slack, low: Some(-slack / 2), beyond: 0 }
+    }
+
+    /// The motor moves by so many steps; how far it takes the pen.
+    pub fn turn(&mut self, steps: i32) -> i32 {
+        if steps == 0 {
+            return 0;
+        }
+        let low = *self.low.get_or_insert(if steps > 0 { -self.slack } else { 0 });
+        let beyond = (self.beyond + steps).clamp(low, low + self.slack);
+        let moved = self.beyond + steps - beyond;
+        self.beyond = beyond;
+        moved
+    }
+}
+
+/// Steps of slack of each motor.
+pub fn slack_steps(settings: &Settings) -> [i32; 2] {
+    let [x, y] = settings.page_steps();
+    [(Setting::BacklashX, x), (Setting::BacklashY, y)]
+        .map(|(slack, steps)| (settings.get(slack).to_num::<f64>() * steps.to_num::<f64>()) as i32)
+}
+
 /// What the pins drew.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Drawn {
@@ -259,6 +301,8 @@ pub struct Drawn {
     pub pen: u8,
     /// The moves between two moves of the pen.
     pub runs: Vec<Run>,
+    /// Where motors took up their slack in one go, by the motors' steps.
+    pub slack: Vec<Run>,
 }
 
 /// Checks what the pins did against the settings.
@@ -267,7 +311,8 @@ pub struct Drawn {
 /// At the first change that breaks a rule: a pulse shorter or a pause shorter than a pulse, a
 /// direction that changes during a pulse or too shortly before one, a step with the drivers off, a
 /// step before the pen's dwell is over, a step that leads out of the soft limits or further beyond
-/// them (the origin is where the pins began).
+/// them (the origin is where the pins began), a motor that takes up its slack while the other one
+/// moves the pen.
 pub fn check_pins(trace: &[Stamped], settings: &Settings) -> Drawn {
     let pulse = u64::from(settings.microseconds_as_ticks(Setting::StepPulse));
     let setup = u64::from(settings.microseconds_as_ticks(Setting::DirectionSetup));
@@ -277,7 +322,9 @@ pub fn check_pins(trace: &[Stamped], settings: &Settings) -> Drawn {
     // Of x and y: pulse high, since when, up, since when.
     let mut axes = [(false, None::<u64>, true, None::<u64>); 2];
     let (mut enabled, mut pen_ready) = (false, 0);
-    let mut at = PagePoint::default();
+    let (mut at, mut motors) = (PagePoint::default(), PagePoint::default());
+    let mut plays = slack_steps(settings).map(Play::new);
+    let mut takes_up = false;
     let mut index = 0;
     while let Some(&Stamped { time, .. }) = trace.get(index) {
         let mut delta = (0, 0);
@@ -306,6 +353,19 @@ pub fn check_pins(trace: &[Stamped], settings: &Settings) -> Drawn {
         if delta != (0, 0) {
             assert!(enabled, "{time}: step with the drivers off");
             assert!(time >= pen_ready, "{time}: step while the pen moves");
+            motors = PagePoint { x: motors.x + delta.0, y: motors.y + delta.1 };
+            let moved = (plays[0].turn(delta.0), plays[1].turn(delta.1));
+            if moved == (0, 0) {
+                if !std::mem::replace(&mut takes_up, true) {
+                    drawn.slack.push(Run::default());
+                }
+                let run = drawn.slack.last_mut().expect("never empty");
+                run.times.push(time as f64 / second);
+                run.points.push(motors);
+                continue;
+            }
+            takes_up = false;
+            assert_eq!(moved, delta, "{time}: slack is taken up while the pen moves");
             let next = PagePoint { x: at.x + delta.0, y: at.y + delta.1 };
             if drawn.pen >= 64 {
                 drawn.inked.insert((at.min(next), at.max(next)));

@@ -65,8 +65,10 @@ pub struct Turn<'a, 'm> {
     pub machine: &'a mut Machine<'m>,
     /// Ticks since the start.
     pub now: u64,
-    /// The sum of the steps at the pins so far.
+    /// The sum of the steps at the pins so far, without those that take up slack.
     pub pins: PagePoint,
+    /// The sum of all steps.
+    pub motors: PagePoint,
 }
 
 /// Runs a job through the interrupt's code: a main loop turn every `turn_ticks`, interrupts when
@@ -79,8 +81,8 @@ pub fn run(
     visit: &mut dyn FnMut(Turn<'_, '_>) -> bool,
 ) -> Vec<Stamped> {
     run_with(settings, turn_ticks, &mut |turn, queue| {
-        let Turn { machine, now, pins } = turn;
-        let goes_on = visit(Turn { machine: &mut *machine, now, pins });
+        let Turn { machine, now, pins, motors } = turn;
+        let goes_on = visit(Turn { machine: &mut *machine, now, pins, motors });
         machine.fill(path, queue);
         goes_on
     })
@@ -101,7 +103,9 @@ pub fn run_with(
     loop {
         let now = trace.now();
         let (x, y) = state.steps();
-        let this = Turn { machine: &mut machine, now, pins: PagePoint { x, y } };
+        let (pins, slack) = (PagePoint { x, y }, state.slack());
+        let motors = PagePoint { x: x + slack.0, y: y + slack.1 };
+        let this = Turn { machine: &mut machine, now, pins, motors };
         if !turn(this, &mut producer) {
             return trace.changes();
         }

@@ -98,6 +98,63 @@ fn arcs_by_centre_and_by_radius_inches_and_bounds() {
     assert_eq!(place(&mut bench), "5.000,5.000");
 }
 
+/// Where the pins' steps lead with the pen down, in steps from where they began.
+fn inked_points(bench: &Bench) -> Vec<[i32; 2]> {
+    let (mut up, mut pen, mut at) = ([true; 2], 0, [0; 2]);
+    let mut points = Vec::new();
+    let changes = bench.board.trace().changes();
+    for (index, stamped) in changes.iter().enumerate() {
+        let mut step = |axis: usize, level: bool| at[axis] += if level { 1 } else { -1 };
+        match stamped.change {
+            Change::StepX(true) => step(0, up[0]),
+            Change::StepY(true) => step(1, up[1]),
+            Change::UpX(level) => up[0] = level,
+            Change::UpY(level) => up[1] = level,
+            Change::Pen(height) => pen = height,
+            _ => continue,
+        }
+        let is_last = changes.get(index + 1).is_none_or(|next| next.time != stamped.time);
+        if pen > 64 && is_last {
+            points.push(at);
+        }
+    }
+    points
+}
+
+#[test]
+fn circles_are_round_on_the_page_whatever_the_steps() {
+    for (x, y) in [(80.0, 50.0), (40.0, 120.0), (79.8, 80.3)] {
+        let mut bench = bench();
+        bench.say(&format!("$100={x}\n$101={y}\n"));
+        // Around (50, 50) by its centre; then, around (50, 20), by the radius.
+        bench
+            .board
+            .receive(b"G0 X80 Y50\nM3\nG3 X80 Y50 I-30\nM5\nG0 X65 Y20\nM3\nG3 X35 Y20 R15\nM5\n");
+        bench.finish();
+        let points = inked_points(&bench);
+        let (mut full, mut half) = (0, 0);
+        for [px, py] in points {
+            let (px, py) = (f64::from(px), f64::from(py));
+            let off = |cx: f64, cy: f64, radius: f64| {
+                let (dx, dy) = (px - (cx * x).round(), py - (cy * y).round());
+                let across = |wide: f64, high: f64, along: f64| {
+                    wide * (1.0 - (along / high).powi(2)).max(0.0).sqrt()
+                };
+                let (wide, high) = (radius * x, radius * y);
+                (across(wide, high, dy) - dx.abs())
+                    .abs()
+                    .min((across(high, wide, dx) - dy.abs()).abs())
+            };
+            let [whole, part] = [off(50.0, 50.0, 30.0), off(50.0, 20.0, 15.0)];
+            // Half a step, and what rounding of the ends adds to the radius.
+            assert!(whole.min(part) <= 0.75, "{x} {y}: {whole} and {part} steps off at {px},{py}");
+            full += u32::from(whole <= 0.75);
+            half += u32::from(part <= 0.75);
+        }
+        assert!(full > 5000 && half > 1000, "{x} {y}: {full} and {half} points");
+    }
+}
+
 #[test]
 fn a_pen_that_goes_down_and_up_leaves_a_dot() {
     let mut bench = bench();

@@ -9,7 +9,7 @@ use penup::machine::{
 };
 use penup::motion::{Block, EventKind};
 use penup::step::tape;
-use penup_host_tests::event_checker::{self, Drawn};
+use penup_host_tests::event_checker::{self, Drawn, Play};
 use penup_host_tests::pin_machine::{self, Turn};
 use proptest::prelude::*;
 use std::sync::LazyLock;
@@ -45,11 +45,28 @@ fn job() -> Vec<Target> {
     ]
 }
 
+fn with(values: &[(Setting, f64)]) -> Settings {
+    let mut settings = Settings::default();
+    for &(setting, value) in values {
+        settings.set(setting, Value::from_num(value)).expect("valid");
+    }
+    settings
+}
+
+/// A machine with 23 and 15 steps of slack, or none.
+fn slack(loose: bool) -> Settings {
+    let slack = f64::from(u8::from(loose));
+    with(&[(Setting::BacklashX, 0.3 * slack), (Setting::BacklashY, 0.2 * slack)])
+}
+
 /// Draws the job in a pin machine; `visit` is called at each turn of the main loop, which takes
 /// `turn_ticks`, and ends the run by returning `false`.
-fn run_job(turn_ticks: u64, visit: &mut dyn FnMut(Turn<'_, '_>) -> bool) -> Drawn {
+fn run_job(
+    settings: Settings,
+    turn_ticks: u64,
+    visit: &mut dyn FnMut(Turn<'_, '_>) -> bool,
+) -> Drawn {
     let targets = job();
-    let settings = Settings::default();
     let mut path = TargetList::new(&targets);
     let trace = pin_machine::run(settings, &mut path, turn_ticks, &mut |turn| {
         if turn.now == 0 {
@@ -66,7 +83,7 @@ fn is_ready(machine: &Machine<'_>) -> bool {
 }
 
 fn undisturbed() -> Drawn {
-    run_job(25_000, &mut |turn| !is_ready(turn.machine))
+    run_job(Settings::default(), 25_000, &mut |turn| !is_ready(turn.machine))
 }
 
 #[test]
@@ -87,10 +104,14 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 1000, ..ProptestConfig::default() })]
 
     #[test]
-    fn hold_and_resume_leave_the_same_ink((instant, turn_ticks) in instants(), again in 0u64..9_000_000) {
+    fn hold_and_resume_leave_the_same_ink(
+        (instant, turn_ticks) in instants(),
+        again in 0u64..9_000_000,
+        loose: bool,
+    ) {
         static UNDISTURBED: LazyLock<Drawn> = LazyLock::new(undisturbed);
         let mut holds = vec![instant + again, instant];
-        let drawn = run_job(turn_ticks, &mut |turn| {
+        let drawn = run_job(slack(loose), turn_ticks, &mut |turn| {
             if holds.last().is_some_and(|&due| turn.now >= due) {
                 holds.pop();
                 turn.machine.hold();
@@ -107,9 +128,12 @@ proptest! {
     }
 
     #[test]
-    fn abort_keeps_the_position_and_leaves_the_machine_ready((instant, turn_ticks) in instants()) {
+    fn abort_keeps_the_position_and_leaves_the_machine_ready(
+        (instant, turn_ticks) in instants(),
+        loose: bool,
+    ) {
         let mut stood_at = None;
-        let drawn = run_job(turn_ticks, &mut |turn| {
+        let drawn = run_job(slack(loose), turn_ticks, &mut |turn| {
             if turn.now >= instant {
                 turn.machine.abort();
             }
@@ -126,11 +150,15 @@ proptest! {
     }
 
     #[test]
-    fn an_alarm_stops_the_pins_at_once((instant, turn_ticks) in instants(), switch: bool) {
+    fn an_alarm_stops_the_pins_at_once(
+        (instant, turn_ticks) in instants(),
+        switch: bool,
+        loose: bool,
+    ) {
         let alarm = if switch { Alarm::HardLimit } else { Alarm::EmergencyStop };
         let mut alarm_at = None;
         let mut stands_at = None;
-        let drawn = run_job(turn_ticks, &mut |turn| {
+        let drawn = run_job(slack(loose), turn_ticks, &mut |turn| {
             let Some(time) = alarm_at else {
                 if turn.now >= instant {
                     turn.machine.alarm(alarm);
@@ -227,14 +255,7 @@ fn starve_often(settings: Settings, allowed: Settings, count: u32) {
 #[test]
 fn a_main_loop_that_is_late_brakes_the_machine_on_the_path() {
     starve_often(Settings::default(), Settings::default(), 200);
-}
-
-fn with(values: &[(Setting, f64)]) -> Settings {
-    let mut settings = Settings::default();
-    for &(setting, value) in values {
-        settings.set(setting, Value::from_num(value)).expect("valid");
-    }
-    settings
+    starve_often(slack(true), slack(true), 20);
 }
 
 #[test]
@@ -245,6 +266,15 @@ fn steps_of_any_length_and_slow_drivers_are_braked_as_well() {
         (Setting::TravelSpeed, 4000.0),
     ]);
     starve_often(settings, settings, 40);
+}
+
+#[test]
+fn an_underrun_keeps_the_acceleration_where_jerk_is_limited() {
+    // Jerk itself is not kept: the interrupt knows nothing of it.
+    let allowed = with(&[(Setting::StepsPerMmX, 100.0), (Setting::TravelSpeed, 4000.0)]);
+    let mut settings = allowed;
+    settings.set(Setting::Jerk, Value::from_num(20)).expect("valid");
+    starve_often(settings, allowed, 40);
 }
 
 #[test]
@@ -268,7 +298,11 @@ fn what_the_queue_cannot_hold_is_braked_within_what_it_holds() {
 
 #[test]
 fn a_main_loop_that_is_in_time_is_not_slowed() {
-    let settings = Settings::default();
+    in_time_is_not_slowed(Settings::default());
+    in_time_is_not_slowed(with(&[(Setting::Jerk, 20.0)]));
+}
+
+fn in_time_is_not_slowed(settings: Settings) {
     let targets = fast_job();
     let planned = pin_machine::record(settings, &mut TargetList::new(&targets), 128).expect("fits");
     let last = pin_machine::moves(&planned).last().map(|&(time, _)| time);
@@ -281,20 +315,23 @@ fn a_main_loop_that_is_in_time_is_not_slowed() {
 
 #[test]
 fn after_abort_and_alarm_the_next_job_starts_from_there() {
-    for alarm in [false, true] {
+    // The second job would be off by what the first took up of its slack, or did not.
+    for (alarm, loose, instant) in
+        (0..400).map(|case| (case % 2 == 1, case % 4 > 1, 1_000_000 + 220_000 * case))
+    {
         let home = [ink(5, 6), to(0, 0)];
         let mut stage = 0;
         let targets = job();
         let mut first = TargetList::new(&targets);
         let mut second = TargetList::new(&home);
-        let settings = Settings::default();
+        let settings = slack(loose);
         let trace = pin_machine::run_with(settings, 25_000, &mut |turn, queue| {
             match stage {
                 0 => {
                     turn.machine.start(&mut first).expect("valid");
                     stage = 1;
                 }
-                1 if turn.now >= 30_000_000 => {
+                1 if turn.now >= instant => {
                     if alarm {
                         turn.machine.alarm(Alarm::EmergencyStop);
                     } else {
@@ -302,7 +339,7 @@ fn after_abort_and_alarm_the_next_job_starts_from_there() {
                     }
                     stage = 2;
                 }
-                2 if turn.now >= 60_000_000 => {
+                2 if turn.now >= instant + 30_000_000 => {
                     assert_eq!(turn.machine.unlock().is_ok(), alarm);
                     turn.machine.start(&mut second).expect("idle");
                     stage = 3;
@@ -320,6 +357,21 @@ fn after_abort_and_alarm_the_next_job_starts_from_there() {
         let drawn = event_checker::check_pins(&trace, &settings);
         assert_eq!((drawn.end, drawn.pen), (point(0, 0), 0));
         assert!(drawn.inked.iter().any(|ends| ends.0 == point(5, 6) || ends.1 == point(5, 6)));
+    }
+}
+
+#[test]
+fn slack_is_taken_up_at_rest_and_leaves_the_same_ink() {
+    let [tight, loose] = [false, true].map(|loose| starve(slack(loose), 0, 0, 25_000).0);
+    assert_eq!((&loose.inked, loose.end, loose.pen), (&tight.inked, tight.end, 0));
+    event_checker::check_speed(&loose.runs, &fast_job(), &slack(true), false);
+    // The circle alone turns x twice and y twice, the zigzag y at each corner.
+    assert!(loose.slack.len() > 12 && tight.slack.is_empty());
+    for run in &loose.slack {
+        let places: Vec<f64> = (0..run.times.len()).map(|step| step as f64 / 80.0).collect();
+        assert!(event_checker::slack_steps(&slack(true)).contains(&(run.times.len() as i32)));
+        let measured = event_checker::greatest_acceleration(&run.times, &places, 0.005);
+        assert!(measured <= 1.05 * 800.0, "{measured} mm/s2");
     }
 }
 
@@ -370,17 +422,23 @@ fn what_leads_beyond_the_travel_is_refused_before_anything_moves() {
 fn home(
     start: PagePoint,
     kinematics: i32,
+    loose: bool,
     press: &mut dyn FnMut(PagePoint, u64) -> Switches,
 ) -> (State, PagePoint) {
-    let mut settings = Settings::default();
+    let mut settings = slack(loose);
     settings.set(Setting::Homing, Value::ONE).expect("valid");
     settings.set(Setting::Kinematics, Value::from_num(kinematics)).expect("valid");
     settings.set(Setting::TravelX, Value::from_num(60)).expect("valid");
     settings.set(Setting::TravelY, Value::from_num(60)).expect("valid");
     let build = settings.kinematics();
     let mut result = (State::Idle, start);
+    let mut plays = event_checker::slack_steps(&settings).map(Play::in_the_middle);
+    let (mut motors, mut pen) = (point(0, 0), point(0, 0));
     let trace = pin_machine::run_with(settings, 25_000, &mut |turn, queue| {
-        let moved = build.page(turn.pins);
+        pen.x += plays[0].turn(turn.motors.x - motors.x);
+        pen.y += plays[1].turn(turn.motors.y - motors.y);
+        motors = turn.motors;
+        let moved = build.page(pen);
         let place = point(start.x + moved.x, start.y + moved.y);
         let switches = press(place, turn.now);
         if turn.now == 0 {
@@ -396,7 +454,9 @@ fn home(
         assert!(turn.now < 25_000_000 * 60, "homing takes more than a minute");
         turn.machine.state() == State::Home
     });
-    event_checker::check_pins(&trace, &settings);
+    if !loose {
+        event_checker::check_pins(&trace, &settings);
+    }
     result
 }
 
@@ -406,9 +466,9 @@ fn corner(place: PagePoint, _now: u64) -> Switches {
 
 #[test]
 fn homing_ends_a_pull_off_from_each_switch() {
-    for kinematics in [0, 1] {
+    for (kinematics, loose) in [(0, false), (0, true), (1, false), (1, true)] {
         for start in [point(2000, 900), point(1, 1), point(4000, -100), point(-80, -80)] {
-            let (state, place) = home(start, kinematics, &mut corner);
+            let (state, place) = home(start, kinematics, loose, &mut corner);
             assert_eq!(state, State::Idle);
             // 2 mm of 80 steps; the second approach makes 80 steps a second.
             assert!(place.x.abs_diff(160) <= 1 && place.y.abs_diff(160) <= 1, "{place:?}");
@@ -430,7 +490,7 @@ fn a_bouncing_switch_is_found_as_well() {
         };
         Switches { x: bounced(0, place.x), y: bounced(1, place.y) }
     };
-    let (state, place) = home(point(1500, 700), 0, &mut bounce);
+    let (state, place) = home(point(1500, 700), 0, false, &mut bounce);
     assert_eq!(state, State::Idle);
     assert!(place.x.abs_diff(160) <= 1 && place.y.abs_diff(160) <= 1, "{place:?}");
 }
@@ -438,10 +498,10 @@ fn a_bouncing_switch_is_found_as_well() {
 #[test]
 fn a_switch_that_is_stuck_or_missing_is_an_alarm() {
     let stuck = |_: PagePoint, _: u64| Switches { x: true, y: false };
-    let (state, _) = home(point(500, 500), 0, &mut { stuck });
+    let (state, _) = home(point(500, 500), 0, false, &mut { stuck });
     assert_eq!(state, State::Alarm(Alarm::HomingFailed(Axis::X)));
     let missing = |place: PagePoint, _: u64| Switches { x: place.x <= 0, y: false };
-    let (state, _) = home(point(500, 500), 0, &mut { missing });
+    let (state, _) = home(point(500, 500), 0, false, &mut { missing });
     assert_eq!(state, State::Alarm(Alarm::HomingFailed(Axis::Y)));
 }
 
@@ -636,49 +696,12 @@ fn wall() -> Settings {
     settings
 }
 
-/// The pen of the wall, in steps, exactly.
-fn hanging(belts: PagePoint) -> (f64, f64) {
-    let (a, b, w) = (f64::from(belts.x), f64::from(belts.y), 36_000.0);
-    let x = (a * a - b * b + w * w) / (2.0 * w);
-    (x - 8000.0, 30_000.0 - (a * a - x * x).sqrt())
-}
-
 #[test]
-fn a_wall_draws_straight_lines_in_the_time_of_any_machine() {
+fn a_wall_draws_in_the_time_of_any_machine() {
     let targets =
         [to(1000, 2000), ink(15_000, 14_000), ink(15_000, 500), ink(1000, 2000), ink(9000, 2100)];
     let settings = wall();
     let events = pin_machine::record(settings, &mut TargetList::new(&targets), 64).expect("fits");
-    let start = settings.kinematics().motors(point(0, 0));
-    let moves: Vec<_> = pin_machine::moves(&events)
-        .into_iter()
-        .map(|(_, moved)| point(start.x + moved.x, start.y + moved.y))
-        .collect();
-    let mut furthest = 0.0f64;
-    let mut rest = moves.as_slice();
-    let mut from = point(0, 0);
-    for target in &targets {
-        let end = settings.kinematics().motors(target.point);
-        let count =
-            rest.iter().position(|&belts| belts == end).expect("every corner is reached") + 1;
-        let (dx, dy) = (f64::from(target.point.x - from.x), f64::from(target.point.y - from.y));
-        for &belts in &rest[..count] {
-            let (x, y) = hanging(belts);
-            let (x, y) = (x - f64::from(from.x), y - f64::from(from.y));
-            let along = (x * dx + y * dy) / (dx * dx + dy * dy);
-            let (x, y) = (f64::from(from.x) + along * dx, f64::from(from.y) + along * dy);
-            // The belts of the nearest point of the line.
-            let (left, right, down) = (x + 8000.0, 28_000.0 - x, 30_000.0 - y);
-            let off =
-                [f64::from(belts.x) - left.hypot(down), f64::from(belts.y) - right.hypot(down)];
-            furthest = furthest.max(off[0].abs()).max(off[1].abs());
-        }
-        rest = &rest[count..];
-        from = target.point;
-    }
-    assert!(rest.is_empty());
-    // Half a step between the ends of a piece, half a step at each, and the page's own rounding.
-    assert!(furthest <= 1.2, "{furthest} steps off the line");
     // The same lengths at the same speeds on the page.
     let mut plain = Settings::default();
     for setting in [Setting::StepsPerMmX, Setting::StepsPerMmY] {

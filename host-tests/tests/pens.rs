@@ -2,11 +2,15 @@
 
 #![allow(clippy::unwrap_used)] // a test may: clippy sees only its `#[test]` functions as tests
 
+use penup::geometry::Projection;
 use penup::machine::Path;
-use penup::plotter::Observer;
-use penup::stage::Undisturbed;
+use penup::model::{Elements, PenWriter, Pens};
+use penup::plotter::{Board, Observer};
+use penup::stage::{Scratch, Undisturbed};
 use penup::view::View;
-use penup::visibility::Stretch;
+use penup::visibility::{Options, Scene, Stretch, find_stretches, scratch_bytes};
+use penup_host_tests::random_scenes::{Random, random_scene};
+use penup_host_tests::scene_files::Stretches;
 use penup_host_tests::whole_jobs::{Bench, job_lines};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -304,6 +308,87 @@ fn materials_rule_over_groups_and_names_are_counted() {
         "ok\n".repeat(5)
     );
     assert_eq!(job(&mut bench).0.bars[0].2, 7);
+}
+
+/// How long a stretch is on the image plane.
+fn length(projection: Projection, stretch: &Stretch) -> f64 {
+    let (p, q) = stretch.ends;
+    let [from, to] = [stretch.from, stretch.to].map(|along| {
+        let part = along.numerator as f64 / along.denominator as f64;
+        let between = |p: i32, q: i32| f64::from(p) * (1.0 - part) + f64::from(q) * part;
+        let w = if projection == Projection::Perspective { between(p.z, q.z) } else { 1.0 };
+        [between(p.x, q.x) / w, between(p.y, q.y) / w]
+    });
+    (from[0] - to[0]).hypot(from[1] - to[1])
+}
+
+#[test]
+fn pens_change_no_line_and_each_edge_has_the_lowest_of_its_own() {
+    for seed in 0..2000 {
+        let random = random_scene(seed);
+        let mut number = Random::new(seed);
+        let mut words = vec![0u64; 1000];
+        let mut writer = PenWriter::new(&mut Scratch::new(&mut words), 1000).unwrap();
+        // The pens of each edge, by the numbers of its ends.
+        let mut pens: BTreeMap<(u16, u16), Vec<u8>> = BTreeMap::new();
+        let (mut at, mut pen) = (0, 0);
+        for element in random.corners.split_inclusive(|corner| corner.is_last()) {
+            if number.once_in(2) {
+                pen = number.between(0, 5) as u8;
+            }
+            writer.element(at, pen);
+            at += element.len();
+            let next = element.iter().cycle().skip(1);
+            for (a, b) in element.iter().zip(next) {
+                let (a, b) = (a.vertex(), b.vertex());
+                pens.entry((a.min(b), a.max(b))).or_default().push(pen);
+            }
+        }
+        let elements = [Pens::default(), writer.finish()]
+            .map(|pens| Elements::with_pens(&random.corners, pens));
+        let [plain, with_pens] = elements.map(|elements| {
+            let (vertices, projection) = (&random.vertices[..], random.projection);
+            let scene = Scene { vertices, elements, projection, positions: &[] };
+            let mut words = vec![0u64; scratch_bytes(&scene) / 8 + 2000];
+            let mut found = Stretches::default();
+            let options = Options { with_hidden: true, ..Options::default() };
+            let scratch = Scratch::new(&mut words);
+            find_stretches(&scene, options, scratch, &mut Undisturbed, &mut found).unwrap();
+            found.0
+        });
+        let whole = |stretches: &[Stretch]| -> f64 {
+            let visible = stretches.iter().filter(|stretch| stretch.visible);
+            visible.map(|stretch| length(random.projection, stretch)).sum()
+        };
+        let (a, b) = (whole(&plain), whole(&with_pens));
+        assert!((a - b).abs() <= 1e-9 * a.max(1e-9), "seed {seed}: {a} {b}");
+        assert!(plain.iter().all(|stretch| stretch.pen == 0));
+        for stretch in &with_pens {
+            if let Some((a, b)) = stretch.edge {
+                let lowest = pens[&(a.min(b), a.max(b))].iter().min();
+                assert_eq!(Some(&stretch.pen), lowest, "seed {seed}: {stretch:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_hold_before_the_last_stroke_asks_for_no_pen_yet() {
+    let mut bench = bench("v 10 10 0\nv 200 10 0\nv 200 20 0\nl 1 2\nusemtl pen2\nl 2 3\n");
+    assert_eq!(bench.say("$plot\n"), "ok\n");
+    // In the middle of the first stroke; the path has been read to its end.
+    while bench.plotter.machine().position_mm()[0] < 100 {
+        bench.plotter.poll(&mut bench.board);
+        bench.board.wait();
+    }
+    bench.say("!");
+    bench.finish();
+    let held = bench.say("?");
+    assert!(held.starts_with("<Hold:0|") && !held.contains("Pen:"), "{held}");
+    assert_eq!(bench.say("~"), "");
+    bench.finish();
+    assert_eq!(bench.heard(), "[MSG:put in pen 2, then send ~]\n");
+    assert!(bench.say("?").contains("|Pen:2|"));
 }
 
 #[test]

@@ -41,9 +41,15 @@ fn lists_long_lines_and_status_requests_make_no_gap_between_steps() -> Result<()
             }
         }
         changes.extend(line.emulator.pin_changes()?);
+        if answers > 1_500 {
+            // Each costs the emulator a wait.
+            while !line.status()?.starts_with("<Idle") {
+                std::thread::sleep(Duration::from_millis(200));
+            }
+            break;
+        }
     }
     changes.extend(line.emulator.pin_changes()?);
-    println!("{answers} lines answered during {} changes of pins", changes.len());
     assert!(answers > 50, "{answers} lines are no flood");
     assert_in_time(&planned, &of_changes(&changes), 10_000, JITTER);
     Ok(())

@@ -4,6 +4,7 @@
 //! each block there states the contract that it meets. `take` gives the board that the firmware is
 //! built for, once.
 
+mod fault;
 mod handler;
 mod line;
 mod peripheral;

@@ -4,7 +4,7 @@
 
 use super::{Alarm, Kinematics, Machine, MachineError, Setting, State, Target};
 use crate::drawing::{PAGE_LIMIT, PagePoint};
-use crate::motion::PathLength;
+use crate::motion::{Move, PathLength, PushError};
 
 /// An axis of the page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -161,6 +161,7 @@ impl Machine<'_> {
             return Err(MachineError::State(self.state));
         }
         self.state = State::Home;
+        self.slack.forget();
         self.begin_phase(Homing::begin(Axis::X, switches.x));
         Ok(())
     }
@@ -247,7 +248,17 @@ impl Machine<'_> {
             // A belt alone: where that leads the pen does not matter, only how far.
             let (end, page) = (self.runner.end(), self.runner.page_end());
             let page = PagePoint { x: page.x + point.x - end.x, y: page.y + point.y - end.y };
-            self.runner.push(point, page, None, PathLength::MAX)
+            let way = (page.x - self.runner.page_end().x, page.y - self.runner.page_end().y);
+            let length = self.runner.limits().length(way.0, way.1);
+            length.ok_or(PushError::TooLong).and_then(|length| {
+                let (motors, offsets, is_gap) = (point, [0; 2], false);
+                let belt = Move { motors, offsets, page, way, whole: length, length, is_gap };
+                // Its slack first, if there is any to take up.
+                if !self.push_motors(&belt, None, PathLength::MAX)? {
+                    self.push_motors(&belt, None, PathLength::MAX)?;
+                }
+                Ok(())
+            })
         } else {
             self.push(Target { point, ink: None }, PathLength::MAX)
         };

@@ -32,6 +32,8 @@ impl Machine<'_> {
     /// Keeps the queue filled: reads targets while the look-ahead has room, hands over events while
     /// the queue has room and the plan is not too far ahead. Call it often.
     pub fn fill(&mut self, path: &mut dyn Path, queue: &mut dyn EventQueue) {
+        // So that the sums of the steps are up to date.
+        self.pins.steps();
         if self.pins.is_halted() {
             return;
         }
@@ -78,7 +80,7 @@ impl Machine<'_> {
                 self.state = State::Hold { standing: true };
             }
             State::Home => {
-                self.runner.forget_path(self.planned_position());
+                self.forget_path(self.planned_position());
                 if let Some(homing) = &mut self.homing {
                     homing.stands = true;
                 }
@@ -90,7 +92,7 @@ impl Machine<'_> {
                     Progress::Done => self.runner.page_end(),
                     _ => self.planned_position(),
                 };
-                self.runner.forget_path(page);
+                self.forget_path(page);
                 self.state = State::Idle;
             }
         }

@@ -15,6 +15,20 @@ pub enum Kinematics {
     Polargraph(Anchors),
 }
 
+/// Of a step: the unit of [`Line::beside`](crate::step::Line::beside).
+const FINE: i32 = 256;
+
+/// The end of a piece of a line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Piece {
+    /// The motors' steps there.
+    pub motors: PagePoint,
+    /// The page's.
+    pub page: PagePoint,
+    /// How far start and end lie beside the motors' steps: see [`Line::beside`](crate::step::Line::beside).
+    pub offsets: [i8; 2],
+}
+
 /// Where the belts of a polargraph leave their motors: both at the same height, above the page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -46,32 +60,61 @@ impl Kinematics {
             Self::CoreXy => PagePoint { x: page.x + page.y, y: page.x - page.y },
             Self::Polargraph(Anchors { left, width }) => {
                 let (x, y) = (page.x - left.x, left.y - page.y);
-                PagePoint { x: length(x, y), y: length(width - x, y) }
+                PagePoint { x: length_of(x, y), y: length_of(width - x, y) }
             }
         }
     }
 
-    /// The end of piece number `part`, from 1, of `pieces` of a line on the page: the motors, not
-    /// rounded on the way, and the page.
-    pub fn part(self, ends: [PagePoint; 2], part: u32, pieces: u32) -> [PagePoint; 2] {
-        /// Of a step.
-        const PARTS: i64 = 32;
+    /// The piece of a straight line on the page between two `places` along it, counted such that the line is
+    /// `length` long. It begins where the motors stand in the end of the piece before, at `begin`.
+    pub fn piece(
+        self,
+        ends: [PagePoint; 2],
+        places: [u32; 2],
+        length: u32,
+        begin: PagePoint,
+    ) -> Piece {
         let [from, to] = ends;
-        let (Self::Polargraph(Anchors { left, width }), true) = (self, part < pieces) else {
-            return [self.motors(to), to];
+        let Self::Polargraph(Anchors { left, width }) = self else {
+            return Piece { motors: self.motors(to), page: to, offsets: [0; 2] };
         };
-        let along = |from: i32, to: i32| {
-            let way = PARTS * (i64::from(to) - i64::from(from)) * i64::from(part);
-            // Within 2^27.
-            (PARTS * i64::from(from) + way / i64::from(pieces)) as i32
+        let fine = |steps: i32| steps * FINE;
+        let [start, end] = places.map(|place| {
+            let along = |from: i32, to: i32| {
+                let way = i64::from(FINE) * (i64::from(to) - i64::from(from)) * i64::from(place);
+                // Within 2^30.
+                fine(from) + (way / i64::from(length.max(1))) as i32
+            };
+            let page = PagePoint { x: along(from.x, to.x), y: along(from.y, to.y) };
+            let (x, y) = (page.x - fine(left.x), fine(left.y) - page.y);
+            ([length_of(x, y), length_of(fine(width) - x, y)], page)
+        });
+        let change = [end.0[0] - start.0[0], end.0[1] - start.0[1]];
+        // How far the belts are, along the axis of fewer steps, from where the piece passes `steps` of
+        // the other one.
+        let beside = |belts: [i32; 2], steps: i32, more: usize| {
+            let ahead = i64::from(fine(steps) - belts[more]) * i64::from(change[1 - more]);
+            let ahead = ahead.checked_div(change[more].into()).unwrap_or(0);
+            i64::from(belts[1 - more]) + ahead
         };
-        let rounded = |fine: i32| (fine + PARTS as i32 / 2).div_euclid(PARTS as i32);
-        let fine = |steps: i32| steps * PARTS as i32;
-        let (page_x, page_y) = (along(from.x, to.x), along(from.y, to.y));
-        let (x, y) = (page_x - fine(left.x), fine(left.y) - page_y);
-        let belts = PagePoint { x: length(x, y), y: length(fine(width) - x, y) };
-        [belts, PagePoint { x: page_x, y: page_y }]
-            .map(|point| PagePoint { x: rounded(point.x), y: rounded(point.y) })
+        let more_of = |x: i32, y: i32| usize::from(x.abs() <= y.abs());
+        let motors = if places[1] >= length {
+            self.motors(to)
+        } else {
+            let more = more_of(change[0], change[1]);
+            let steps = rounded(end.0[more].into());
+            let others = rounded(beside(end.0, steps, more));
+            let [x, y] = if more == 0 { [steps, others] } else { [others, steps] };
+            PagePoint { x, y }
+        };
+        let more = more_of(motors.x - begin.x, motors.y - begin.y);
+        let offsets = [(start.0, begin), (end.0, motors)].map(|(belts, PagePoint { x, y })| {
+            let (steps, others) = if more == 0 { (x, y) } else { (y, x) };
+            // At the ends of a line both belts are rounded, so it may be more.
+            (beside(belts, steps, more) - i64::from(fine(others))).clamp(-127, 127) as i8
+        });
+        let page = PagePoint { x: rounded(end.1.x.into()), y: rounded(end.1.y.into()) };
+        Piece { motors, page, offsets }
     }
 
     /// The place on the page for the motors' steps; rounded where it lies between two steps.
@@ -94,8 +137,8 @@ impl Kinematics {
         }
     }
 
-    /// Into how many pieces a line of the page must be cut so that each is straight within an
-    /// eighth of a step of the motors (their own rounding adds a step at most).
+    /// Into how many pieces a line of the page must be cut so that each is straight within 1/64 of a
+    /// step of the motors; their own rounding adds half a step.
     ///
     /// Along a line a belt of length a bends by 1/a at most, so a piece of length h is off by h²/8a;
     /// no belt is shorter than the line lies below the anchors.
@@ -103,17 +146,22 @@ impl Kinematics {
         let Self::Polargraph(Anchors { left, .. }) = self else { return 1 };
         let least = (left.y - from.y.max(to.y)).max(1).unsigned_abs();
         let length = from.x.abs_diff(to.x) + from.y.abs_diff(to.y);
-        length.div_ceil(least.isqrt()).max(1)
+        length.div_ceil((least / 8).isqrt().max(1)).max(1)
     }
 }
 
 /// √(x² + y²), rounded.
-fn length(x: i32, y: i32) -> i32 {
+fn length_of(x: i32, y: i32) -> i32 {
     let square = |steps: i32| i64::from(steps).unsigned_abs() * i64::from(steps).unsigned_abs();
     rounded_root(square(x) + square(y))
 }
 
-/// The root of a number below 2^61, rounded.
+/// Fine units as steps.
+fn rounded(fine: i64) -> i32 {
+    (fine + i64::from(FINE / 2)).div_euclid(FINE.into()) as i32
+}
+
+/// The root of a number below 2^62, rounded.
 fn rounded_root(squared: u64) -> i32 {
     (4 * squared).isqrt().div_ceil(2) as i32
 }

@@ -14,16 +14,18 @@ mod kinematics;
 mod path;
 mod pulser;
 mod settings;
+mod slack;
 mod split;
 mod status;
 mod stream;
 
 use homing::Homing;
 pub use homing::{Axis, Contacts, Switches};
-pub use kinematics::{Anchors, Kinematics};
+pub use kinematics::{Anchors, Kinematics, Piece};
 pub use path::{JobSize, Path, TapePath, Target, TargetList};
 pub use pulser::{Axes, Pen, Pins, Pulser, PulserState, Solenoid, StepQueue};
 pub use settings::{SETTING_COUNT, SETTINGS, Setting, SettingError, SettingInfo, Settings, Value};
+use slack::Slack;
 use split::Split;
 pub use status::Status;
 
@@ -111,6 +113,7 @@ pub struct Machine<'m> {
     before: RunLengths,
     /// The move that is being cut into pieces.
     split: Option<Split>,
+    slack: Slack,
     /// Whether the path has been read to its end.
     path_ended: bool,
     /// Whether the drivers are to be switched off once.
@@ -156,6 +159,7 @@ impl<'m> Machine<'m> {
             job: JobSize::default(),
             before: RunLengths::default(),
             split: None,
+            slack: Slack::default(),
             path_ended: true,
             sleep_due: false,
             homing: None,
@@ -186,7 +190,9 @@ impl<'m> Machine<'m> {
             return Err(SettingError::Busy);
         }
         let (page, before) = (self.position(), self.settings.kinematics());
+        let slack = self.slack_steps();
         self.settings.set(setting, value)?;
+        self.resize_slack(slack);
         if self.settings.kinematics() != before {
             // The pen stays where it is; the motors count otherwise.
             self.set_position(page);
@@ -215,7 +221,8 @@ impl<'m> Machine<'m> {
         let (x, y) = self.pins.steps();
         self.origin = PagePoint { x: motors.x.wrapping_sub(x), y: motors.y.wrapping_sub(y) };
         self.split = None;
-        self.runner.set_position(motors, page, self.pins.ticks());
+        let slack = self.find_slack();
+        self.runner.set_position(motors, slack, page, self.pins.ticks());
     }
 
     /// Slows down on the path and raises the pen. Ends moves by hand; nothing happens in other states.
@@ -284,7 +291,7 @@ impl<'m> Machine<'m> {
         self.end_homing();
         self.next_pen = None;
         self.split = None;
-        self.runner.forget_path(self.planned_position());
+        self.forget_path(self.planned_position());
         self.runner.forget_pen();
         self.path_ended = true;
         self.streaming = false;
@@ -324,7 +331,8 @@ impl<'m> Machine<'m> {
     /// while the emergency stop is pressed.
     pub fn unlock(&mut self) -> Result<(), MachineError> {
         match self.state {
-            State::Sleep => {}
+            // The motors were off.
+            State::Sleep => self.slack.forget(),
             State::Alarm(_) if self.pins.is_drained() && !self.stop_is_pressed => {
                 self.set_motors(self.motors_now(), self.position());
                 self.pins.release();

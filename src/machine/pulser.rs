@@ -8,11 +8,17 @@ use heapless::spsc::{Consumer, Producer, Queue};
 
 /// What the interrupt and the main loop share. Only loads and stores, so a Cortex-M0+ has it too.
 ///
-/// The interrupt alone writes the counts, the main loop alone the orders.
+/// The interrupt alone writes the counts, the main loop alone the orders and the sums of the counts.
 #[derive(Debug, Default)]
 pub struct PulserState {
+    /// The steps of x and y, packed as in [`PACKED_STEPS`]; wraps.
+    packed: AtomicU32,
+    /// As much of it as is in the sums.
+    summed: AtomicU32,
     x: AtomicU32,
     y: AtomicU32,
+    slack_x: AtomicU32,
+    slack_y: AtomicU32,
     ticks: AtomicU32,
     underruns: AtomicU32,
     drained: AtomicBool,
@@ -28,8 +34,12 @@ impl PulserState {
     /// Nothing counted, nothing ordered.
     pub const fn new() -> Self {
         Self {
+            packed: AtomicU32::new(0),
+            summed: AtomicU32::new(0),
             x: AtomicU32::new(0),
             y: AtomicU32::new(0),
+            slack_x: AtomicU32::new(0),
+            slack_y: AtomicU32::new(0),
             ticks: AtomicU32::new(0),
             underruns: AtomicU32::new(0),
             drained: AtomicBool::new(true),
@@ -42,9 +52,23 @@ impl PulserState {
         }
     }
 
-    /// The sum of the steps at the pins, x and y; wraps.
+    /// The sum of the steps at the pins, x and y; wraps. For the main loop alone, and at least once in
+    /// 2^15 steps.
     pub fn steps(&self) -> (i32, i32) {
+        let packed = self.packed.load(Ordering::Relaxed);
+        let more = packed.wrapping_sub(self.summed.load(Ordering::Relaxed));
+        self.summed.store(packed, Ordering::Relaxed);
+        let dx = i32::from(more as u16 as i16).cast_unsigned();
+        add(&self.x, dx);
+        add(&self.y, (more.wrapping_sub(dx).cast_signed() >> 16).cast_unsigned());
         let [x, y] = [&self.x, &self.y].map(|sum| sum.load(Ordering::Relaxed).cast_signed());
+        (x, y)
+    }
+
+    /// The sum of the steps that took up slack, which [`PulserState::steps`] leaves out; wraps.
+    pub fn slack(&self) -> (i32, i32) {
+        let [x, y] =
+            [&self.slack_x, &self.slack_y].map(|sum| sum.load(Ordering::Relaxed).cast_signed());
         (x, y)
     }
 
@@ -86,6 +110,12 @@ impl PulserState {
         self.y.store(y.cast_unsigned(), Ordering::Relaxed);
         self.ticks.store(ticks, Ordering::Relaxed);
         self.drained.store(drained, Ordering::Release);
+    }
+
+    /// The same for steps that take up slack.
+    pub fn report_slack(&self, (x, y): (i32, i32)) {
+        self.slack_x.store(x.cast_unsigned(), Ordering::Relaxed);
+        self.slack_y.store(y.cast_unsigned(), Ordering::Relaxed);
     }
 
     /// For such a board: its queue ran dry while the machine moved.
@@ -199,6 +229,8 @@ pub trait Axes {
     /// The pins take `levels`, bits as in [`StepEvent`]: a high pulse for each step, the level of
     /// each direction pin where a motor runs down, drivers on. Called from the interrupt, so brief.
     fn set(&mut self, levels: u8);
+    /// The pulses end. Called from the interrupt, too.
+    fn end_pulses(&mut self);
 }
 
 impl<SX, DX, SY, DY, E> Axes for Pins<SX, DX, SY, DY, E>
@@ -215,6 +247,11 @@ where
         write(&mut self.enable, levels & StepEvent::DRIVERS_ON != 0);
         write(&mut self.step_x, levels & StepEvent::STEP_X != 0);
         write(&mut self.step_y, levels & StepEvent::STEP_Y != 0);
+    }
+
+    fn end_pulses(&mut self) {
+        write(&mut self.step_x, false);
+        write(&mut self.step_y, false);
     }
 }
 
@@ -249,8 +286,6 @@ pub struct Pulser<'q, A, P> {
     /// Keeps a queue that runs dry from stopping the machine with a jerk.
     brake: Brake,
     step_length: StepLength,
-    /// Of the axes' pins without their pulses.
-    levels: u8,
     /// The levels of the event whose pulse is high: it counts when the pulse ends.
     pulse: u8,
     moving: bool,
@@ -285,7 +320,6 @@ impl<'q, A: Axes, P: Pen> Pulser<'q, A, P> {
             step_ticks: 0,
             brake,
             step_length,
-            levels: 0,
             pulse: 0,
             moving: false,
         };
@@ -298,16 +332,16 @@ impl<'q, A: Axes, P: Pen> Pulser<'q, A, P> {
     #[inline(always)]
     pub fn tick(&mut self) -> Option<u32> {
         if self.step_ticks != 0 {
-            self.axes.set(self.levels);
-            // Bit 0 or 1 times 1, or -1 with the bit two above it.
-            let step =
-                |levels: u8| u32::from(levels & 1) * 1u32.wrapping_sub(u32::from(levels >> 1 & 2));
-            add(&self.state.x, step(self.pulse));
-            add(&self.state.y, step(self.pulse >> 1));
+            self.axes.end_pulses();
             let mut ticks = core::mem::take(&mut self.step_ticks);
-            let least = self.brake.step(self.step_length.step(), &self.state.brake);
-            if least > ticks {
-                ticks = ticks.max(self.without_what_follows(least));
+            if self.pulse & StepEvent::AT_REST == 0 {
+                add(&self.state.packed, PACKED_STEPS[usize::from(self.pulse & STEPS)]);
+                let least = self.brake.step(self.step_length.step(), &self.state.brake);
+                if least > ticks {
+                    ticks = ticks.max(self.without_what_follows(least));
+                }
+            } else {
+                self.count_slack();
             }
             if self.halted() {
                 return Some(Self::DISCARD_TICKS);
@@ -366,6 +400,15 @@ impl<'q, A: Axes, P: Pen> Pulser<'q, A, P> {
         ticks.saturating_sub(next.map_or(0, |wait| wait.ticks()))
     }
 
+    #[cold]
+    #[inline(never)]
+    fn count_slack(&self) {
+        let steps = PACKED_STEPS[usize::from(self.pulse & STEPS)];
+        let dx = i32::from(steps as u16 as i16).cast_unsigned();
+        add(&self.state.slack_x, dx);
+        add(&self.state.slack_y, (steps.wrapping_sub(dx).cast_signed() >> 16).cast_unsigned());
+    }
+
     /// Takes no time: the next call is due at once.
     #[cold]
     #[inline(never)]
@@ -408,7 +451,6 @@ impl<'q, A: Axes, P: Pen> Pulser<'q, A, P> {
         if levels & PULSES == 0 {
             return event.ticks();
         }
-        self.levels = pins & !PULSES;
         self.pulse = levels;
         self.step_ticks = event.ticks().max(1);
         self.state.pulse_ticks.load(Ordering::Relaxed)
@@ -419,6 +461,21 @@ impl<'q, A: Axes, P: Pen> Pulser<'q, A, P> {
 fn write(pin: &mut impl OutputPin<Error = Infallible>, high: bool) {
     let Ok(()) = pin.set_state(PinState::from(high));
 }
+
+/// Pulses and directions of the levels.
+const STEPS: u8 = StepEvent::STEP_X | StepEvent::STEP_Y | StepEvent::DOWN_X | StepEvent::DOWN_Y;
+
+/// What they add to x in the lower half and to y in the upper one.
+const PACKED_STEPS: [u32; 16] = {
+    let mut table = [0; 16];
+    let mut levels = 0;
+    while levels < 16u8 {
+        let (dx, dy) = StepEvent::levels(levels, 0).step();
+        table[levels as usize] = (dx as u32).wrapping_add((dy as u32) << 16);
+        levels += 1;
+    }
+    table
+};
 
 /// Only for the one that writes it: a load and a store, so that a Cortex-M0+ can.
 #[inline(always)]

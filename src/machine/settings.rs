@@ -89,6 +89,10 @@ pub enum Setting {
     AnchorHeight,
     /// `$234` Length of a belt when it is homed.
     HomedBelt,
+    /// `$235` Slack of x: what is lost when its motor turns round.
+    BacklashX,
+    /// `$236` The same of y, or of the other motor.
+    BacklashY,
     /// `$240` Where the pen is parked (G28): x.
     ParkX,
     /// `$241` The same of y.
@@ -117,7 +121,7 @@ pub struct SettingInfo {
 }
 
 /// How many settings there are.
-pub const SETTING_COUNT: usize = 37;
+pub const SETTING_COUNT: usize = 39;
 
 const fn info(
     setting: Setting,
@@ -180,6 +184,8 @@ pub const SETTINGS: [SettingInfo; SETTING_COUNT] = {
         info(AnchorLeft, 232, "left anchor to the page", "mm", (0.0, 8000.0, 190.0), false),
         info(AnchorHeight, 233, "anchors above the page's origin", "mm", (10.0, 8000.0, 700.0), false),
         info(HomedBelt, 234, "belt when homed", "mm", (10.0, 8000.0, 500.0), false),
+        info(BacklashX, 235, "backlash of x", "mm", (0.0, 10.0, 0.0), false),
+        info(BacklashY, 236, "backlash of y", "mm", (0.0, 10.0, 0.0), false),
         info(ParkX, 240, "park at x", "mm", (0.0, 8000.0, 0.0), false),
         info(ParkY, 241, "park at y", "mm", (0.0, 8000.0, 0.0), false),
     ]

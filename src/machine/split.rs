@@ -1,16 +1,19 @@
 //! A move to pieces that are straight for the motors, too.
 
-use super::{Machine, Target};
+use super::{Machine, Piece, Target};
 use crate::drawing::{LineType, PagePoint};
-use crate::motion::{PathLength, PushError};
+use crate::motion::{Move, PathLength, PushError};
+use crate::step::Pattern;
 
-/// What is left of a move: pieces from `done` on.
+/// What is left of a move.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Split {
     from: PagePoint,
     to: PagePoint,
-    done: u32,
-    pieces: u32,
+    /// How much of its length is done.
+    place: PathLength,
+    /// The dot or gap in work.
+    dot: u32,
     ink: Option<LineType>,
     limit: PathLength,
 }
@@ -33,28 +36,57 @@ impl Machine<'_> {
             return Err(PushError::Full);
         }
         let from = self.runner.page_end();
-        let pieces = self.settings.kinematics().pieces(from, to);
-        // A piece is no longer than the whole.
         self.runner.limits().length(to.x - from.x, to.y - from.y).ok_or(PushError::TooLong)?;
-        self.split = Some(Split { from, to, done: 0, pieces, ink, limit });
+        self.split = Some(Split { from, to, place: PathLength::ZERO, dot: 0, ink, limit });
         self.push_pieces();
         Ok(())
     }
 
     /// Appends the pieces for which there is room.
     pub(super) fn push_pieces(&mut self) {
-        while let Some(split) = &mut self.split
+        while let Some(split) = self.split
             && !self.runner.is_full()
         {
-            split.done += 1;
-            let Split { from, to, ink, limit, done, pieces } = *split;
-            if done == pieces {
-                self.split = None;
+            let Split { from, to, place, dot, mut ink, limit } = split;
+            let mut next_dot = dot;
+            let way = (to.x - from.x, to.y - from.y);
+            let build = self.settings.kinematics();
+            // The move was measured before.
+            let length = self.runner.limits().length(way.0, way.1).unwrap_or_default();
+            let pieces = build.pieces(from, to);
+            let (mut end, mut is_gap) = (length.to_bits(), false);
+            if pieces > 1 {
+                // Dots and gaps are cut here: each piece is shorter than the pattern.
+                let pattern = match ink.replace(LineType::Full) {
+                    Some(line_type @ (LineType::Dotted | LineType::Dashed)) => {
+                        let dot_length = self.settings.pen_positions().dot_length;
+                        Pattern::of(line_type, length.to_bits(), dot_length.to_bits())
+                    }
+                    before => {
+                        ink = before;
+                        Pattern::full(length.to_bits())
+                    }
+                };
+                let dot_end = pattern.end_of(dot);
+                is_gap = !Pattern::inked(dot);
+                end =
+                    dot_end.min(place.to_bits().saturating_add(length.to_bits().div_ceil(pieces)));
+                next_dot += u32::from(end == dot_end);
             }
-            let [motors, page] = self.settings.kinematics().part([from, to], done, pieces);
-            // There is room, and it is no longer than the move that was checked.
-            let pushed = self.runner.push(motors, page, ink, limit);
-            debug_assert_eq!(pushed, Ok(()));
+            let end = PathLength::from_bits(end);
+            let places = [place, end].map(PathLength::to_bits);
+            let begin = self.runner.end();
+            let Piece { motors, page, offsets } =
+                build.piece([from, to], places, length.to_bits(), begin);
+            let piece =
+                Move { motors, offsets, page, way, whole: length, length: end - place, is_gap };
+            // There is room, and it is no longer than the move that was measured.
+            let pushed = self.push_motors(&piece, ink, limit);
+            debug_assert!(pushed.is_ok());
+            if pushed != Ok(false) {
+                let rest = Split { place: end, dot: next_dot, ..split };
+                self.split = (end < length).then_some(rest);
+            }
         }
     }
 }

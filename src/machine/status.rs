@@ -24,9 +24,11 @@ pub struct Status {
 }
 
 impl Machine<'_> {
-    /// The pen, from 0, that the machine waits for, or will when it stands.
+    /// The pen, from 0, that the machine stands and waits for.
     pub fn pen_wanted(&self) -> Option<u8> {
-        self.next_pen.map(|(pen, _)| pen)
+        // It is known earlier, when the path was read; a hold may come in between.
+        let stands = self.state == State::Hold { standing: true } && self.runner.is_at_rest();
+        self.next_pen.filter(|_| stands).map(|(pen, _)| pen)
     }
 
     /// Where it is, and how far the job is.

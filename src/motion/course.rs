@@ -1,6 +1,7 @@
 //! The block in work: its moves, and how far they are.
 
 use super::emitter::whole_ticks;
+use super::lookahead::BlockKind;
 use super::profile::Slice;
 use super::{Block, PathLength};
 use crate::drawing::LineType;
@@ -11,6 +12,7 @@ use crate::step::{Line, Pattern};
 pub(super) struct Course {
     pub(super) line: Line,
     pub(super) ink: Option<LineType>,
+    kind: BlockKind,
     pub(super) pattern: Pattern,
     pub(super) piece: u32,
     pub(super) length: PathLength,
@@ -32,7 +34,7 @@ pub(super) struct Course {
 impl Course {
     /// The beginning of a block, its dots about `dot_length` long.
     pub(super) fn new(block: &Block, dot_length: PathLength) -> Self {
-        let line = Line::by(block.dx, block.dy);
+        let line = Line::beside(block.dx, block.dy, block.offsets);
         let moves = line.remaining();
         let move_length = (u64::from(block.length.to_bits()) << 14) / u64::from(moves.max(1));
         let line_type = block.ink.unwrap_or_default();
@@ -45,6 +47,7 @@ impl Course {
         Self {
             line,
             ink: block.ink,
+            kind: block.kind,
             pattern,
             piece: 0,
             length: block.length,
@@ -61,7 +64,12 @@ impl Course {
 
     /// Whether the piece in work is drawn.
     pub(super) fn is_inked(&self) -> bool {
-        self.ink.is_some() && Pattern::inked(self.piece)
+        self.ink.is_some() && self.kind != BlockKind::Gap && Pattern::inked(self.piece)
+    }
+
+    /// Whether the motors only take up their slack: the pen stays where it is.
+    pub(super) fn is_slack(&self) -> bool {
+        self.kind == BlockKind::Slack
     }
 
     /// Whether it is the last one.

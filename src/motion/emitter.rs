@@ -219,7 +219,7 @@ fn later(a: u32, b: u32) -> u32 {
 /// What a move does to the pins.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct MoveLevels {
-    /// The axes that step.
+    /// The axes that step, and whether they take up slack.
     pulses: u8,
     /// Their direction pins.
     axes: u8,
@@ -247,5 +247,10 @@ impl MoveLevels {
             levels.directions |= StepEvent::DOWN_Y;
         }
         levels
+    }
+
+    /// The same where the motors take up their slack.
+    pub(super) const fn as_slack(self) -> Self {
+        Self { pulses: self.pulses | StepEvent::AT_REST, ..self }
     }
 }

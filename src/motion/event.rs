@@ -10,7 +10,7 @@ use crate::step::tape::Instruction;
 /// | 0, 1 | pulse x, pulse y | height, bits 0 to 6 |
 /// | 2, 3 | x, y runs down | |
 /// | 4 | drivers on | |
-/// | 5 | at rest afterwards | |
+/// | 5 | at rest afterwards; with a pulse: takes up slack | |
 /// | 6 | 0 | |
 /// | 7 | 0 | 1 |
 /// | 8–31 | ticks to the next event | the same |
@@ -56,7 +56,8 @@ impl StepEvent {
     pub const DOWN_Y: u8 = 1 << 3;
     /// The drivers hold the motors.
     pub const DRIVERS_ON: u8 = 1 << 4;
-    /// Nothing moves after this event: the queue may run dry.
+    /// Nothing moves after this event: the queue may run dry. With a pulse: the motor takes up its
+    /// slack, and the pen stays where it is.
     pub const AT_REST: u8 = 1 << 5;
     /// The longest wait that one event can hold.
     pub const MAX_TICKS: u32 = (1 << 24) - 1;
@@ -119,8 +120,13 @@ impl StepEvent {
         }
     }
 
-    /// What the event adds to x and y.
+    /// What the event adds to x and y; nothing where the motors take up their slack.
     pub const fn step(self) -> (i32, i32) {
+        if self.is_slack() { (0, 0) } else { self.pulses() }
+    }
+
+    /// Which motors it moves, and which way.
+    pub const fn pulses(self) -> (i32, i32) {
         match self.kind() {
             EventKind::Pen { .. } => (0, 0),
             EventKind::Levels(levels) => (
@@ -128,6 +134,12 @@ impl StepEvent {
                 axis_step(levels, Self::STEP_Y, Self::DOWN_Y),
             ),
         }
+    }
+
+    /// Whether motors take up their slack.
+    pub const fn is_slack(self) -> bool {
+        let pulses = (Self::STEP_X | Self::STEP_Y) as u32;
+        self.0 & pulses != 0 && self.0 & (Self::PEN | Self::AT_REST) as u32 == Self::AT_REST as u32
     }
 
     /// Whether it pulses, and does nothing else.

@@ -18,6 +18,20 @@ pub struct Block {
     /// Greatest stopping distance within the block, as it is part of a curve.
     pub(super) curve_limit: PathLength,
     pub(super) ink: Option<LineType>,
+    /// See [`Move`](super::Move).
+    pub(super) offsets: [i8; 2],
+    pub(super) kind: BlockKind,
+}
+
+/// What a block is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum BlockKind {
+    /// A line.
+    Line,
+    /// A gap within an inked line: the pen is raised.
+    Gap,
+    /// The motors only take up their slack: the pen stays where it is.
+    Slack,
 }
 
 impl Block {
@@ -29,6 +43,8 @@ impl Block {
         entry_limit: PathLength::ZERO,
         curve_limit: PathLength::MAX,
         ink: None,
+        offsets: [0; 2],
+        kind: BlockKind::Line,
     };
 }
 

@@ -16,9 +16,9 @@
 //! The pulses leave when the plan is half a step from the new position: the pins are never more
 //! than half a step from where the plan is.
 //!
-//! Measured on a Cortex-M3 (opt-level 3), everything between target and queue included: 200
-//! instructions for each event at 5,000 moves a second, 70 at 400,000, and 170 to 260 on chords of
-//! five moves; on a Cortex-M0+, which divides in software, about twice as many.
+//! Measured on a Cortex-M3, built for size, everything between target and queue included: 132
+//! instructions for each event at 100,000 moves a second, and 170 to 340 with a limit on jerk; at 5,000 moves a
+//! second, 1060 and 1310 to 2000. `cargo xtask bench --motion` counts them.
 //!
 //! Not done here: limits of travel, the pen's heights, states. That is `machine`.
 
@@ -40,7 +40,7 @@ pub use event::{EventKind, EventQueue, StepEvent};
 pub use limits::{Limits, LimitsError, MotionSettings};
 pub use lookahead::{Block, Lookahead};
 pub use profile::Profile;
-pub use runner::{PenPositions, Progress, PushError, RunLengths, Runner};
+pub use runner::{Move, PenPositions, Progress, PushError, RunLengths, Runner};
 
 /// The unit of time of every step event: 40 ns. A divisor of both boards' clocks.
 pub const TICKS_PER_SECOND: u32 = 25_000_000;

@@ -4,6 +4,7 @@ use super::course::Course;
 use super::curvature::Curvature;
 use super::emitter::{BATCH, MoveLevels, whole_ticks};
 use super::junction::{self, Corner, Heading};
+use super::lookahead::BlockKind;
 use super::profile::{FRACTION_BITS, Pace, Profile};
 use super::smooth::{Interval, Road, State};
 use super::{
@@ -40,6 +41,25 @@ pub enum Progress {
     /// It stands on the path with the pen raised, as [`Runner::stop`] or
     /// [`Runner::stop_after_stroke`] asked.
     Stopped,
+}
+
+/// A straight move of the pen, or a piece of one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Move {
+    /// Where it takes the motors.
+    pub motors: PagePoint,
+    /// How far start and end lie beside the motors' steps: see [`Line::beside`](crate::step::Line::beside).
+    pub offsets: [i8; 2],
+    /// Where it takes the pen.
+    pub page: PagePoint,
+    /// The whole move on the page,
+    pub way: (i32, i32),
+    /// its length,
+    pub whole: PathLength,
+    /// and that of the piece.
+    pub length: PathLength,
+    /// The pen is raised within an inked line.
+    pub is_gap: bool,
 }
 
 /// Why a block was not appended.
@@ -108,6 +128,9 @@ pub struct Runner<'m> {
     ink_bound: u64,
     /// Where the events so far lead.
     position: PagePoint,
+    /// Where the steps so far lead that take up slack, and where the blocks so far do.
+    slack: PagePoint,
+    slack_end: PagePoint,
     /// Where the blocks so far lead: the motors, and the pen on the page.
     end: PagePoint,
     page_end: PagePoint,
@@ -147,6 +170,8 @@ impl<'m> Runner<'m> {
             exit_reached: None,
             ink_bound: u64::MAX,
             position: PagePoint::default(),
+            slack: PagePoint::default(),
+            slack_end: PagePoint::default(),
             end: PagePoint::default(),
             page_end: PagePoint::default(),
             last: None,
@@ -255,40 +280,47 @@ impl<'m> Runner<'m> {
         self.run
     }
 
-    /// The motors stand at `motors`, the pen at `page`, nothing waits, and the events worked off took
-    /// `ticks` (it wraps): after homing, or after an emergency stop.
-    pub fn set_position(&mut self, motors: PagePoint, page: PagePoint, ticks: u32) {
+    /// The motors stand at `motors` and have taken up `slack`, the pen at `page`, nothing waits, and the
+    /// events worked off took `ticks` (it wraps): after homing, or after an emergency stop.
+    pub fn set_position(
+        &mut self,
+        motors: PagePoint,
+        slack: PagePoint,
+        page: PagePoint,
+        ticks: u32,
+    ) {
         self.position = motors;
+        self.slack = slack;
         self.forget_path(page);
         self.emitter.restart(ticks);
     }
 
-    /// Appends a move of the motors straight to `motors`, which takes the pen straight to `page`; a
-    /// speed, by its stopping distance ([`Limits::feed`]), is not passed. Lengths, corners and bends
-    /// are those of the page. A move of no length is skipped.
+    /// Appends a move; a speed, by its stopping distance ([`Limits::feed`]), is not passed. Lengths, corners
+    /// and bends are those of the page. A move of no length is skipped.
     ///
     /// # Errors
     /// See [`PushError`]; nothing is appended then.
     pub fn push(
         &mut self,
-        motors: PagePoint,
-        page: PagePoint,
+        piece: &Move,
         ink: Option<LineType>,
         limit: PathLength,
     ) -> Result<(), PushError> {
+        let Move { motors, offsets, page, mut way, mut whole, mut length, is_gap } = *piece;
         let (dx, dy) = (motors.x - self.end.x, motors.y - self.end.y);
         if dx == 0 && dy == 0 {
             return Ok(());
         }
-        let way = match (page.x - self.page_end.x, page.y - self.page_end.y) {
+        if way == (0, 0) || length == 0 {
             // Less than a step of the page.
-            (0, 0) => (dx.signum(), dy.signum()),
-            way => way,
-        };
-        let length = self.limits.length(way.0, way.1).ok_or(PushError::TooLong)?;
-        let heading = Heading::new(&self.limits, way.0, way.1, length);
+            way = (dx.signum(), dy.signum());
+            whole = self.limits.length(way.0, way.1).ok_or(PushError::TooLong)?;
+            length = whole;
+        }
+        let inked = ink.filter(|_| !is_gap);
+        let heading = Heading::new(&self.limits, way.0, way.1, whole);
         let corner = match self.last {
-            Some((before, length_before, ink_before)) if passes(ink_before, ink) => {
+            Some((before, length_before, ink_before)) if passes(ink_before, inked) => {
                 junction::corner(&self.limits, before, heading, length.min(length_before))
             }
             _ => Corner::STOP,
@@ -297,18 +329,49 @@ impl<'m> Runner<'m> {
             self.curvature.restart(&self.limits, self.page_end, &mut self.lookahead);
         }
         let (entry_limit, curve_limit) = (corner.limit, limit);
-        let block = Block { dx, dy, length, entry_limit, curve_limit, ink };
+        let kind = if is_gap { BlockKind::Gap } else { BlockKind::Line };
+        let block = Block { dx, dy, length, entry_limit, curve_limit, ink, offsets, kind };
         self.lookahead.push(block).map_err(|_| PushError::Full)?;
         if self.limits.centripetal {
             self.curvature.follow(&self.limits, page, &mut self.lookahead);
         }
         self.end = motors;
         self.page_end = page;
-        self.last = Some((heading, length, ink));
+        self.last = Some((heading, length, inked));
         if self.hurried {
             self.plan_again();
         }
         Ok(())
+    }
+
+    /// Appends steps by which the motors take up their slack, from rest to rest; the pen stays where it
+    /// is, lowered if `ink` says so.
+    ///
+    /// # Errors
+    /// See [`PushError`]; nothing is appended then.
+    pub fn push_slack(&mut self, by: PagePoint, ink: Option<LineType>) -> Result<(), PushError> {
+        let PagePoint { x: dx, y: dy } = by;
+        let length = self.limits.length(dx, dy).ok_or(PushError::TooLong)?;
+        let ink = ink.map(|_| LineType::Full);
+        let block = Block { dx, dy, length, ink, kind: BlockKind::Slack, ..Block::EMPTY };
+        self.end_path();
+        self.lookahead.push(block).map_err(|_| PushError::Full)?;
+        self.slack_end.x = self.slack_end.x.wrapping_add(dx);
+        self.slack_end.y = self.slack_end.y.wrapping_add(dy);
+        Ok(())
+    }
+
+    /// The slack that the blocks that wait take up: what [`Runner::forget_path`] forgets of it.
+    pub fn slack_ahead(&self) -> PagePoint {
+        PagePoint {
+            x: self.slack_end.x.wrapping_sub(self.slack.x),
+            y: self.slack_end.y.wrapping_sub(self.slack.y),
+        }
+    }
+
+    /// All slack taken up so far; wraps.
+    pub fn slack(&self) -> PagePoint {
+        self.slack
     }
 
     /// Lowers the pen where the path ends so far.
@@ -389,6 +452,7 @@ impl<'m> Runner<'m> {
         self.last = None;
         self.in_stroke = false;
         self.end = self.position;
+        self.slack_end = self.slack;
         self.page_end = page;
     }
 
@@ -481,7 +545,10 @@ impl<'m> Runner<'m> {
         let Some(slice) = course.slice else {
             return Ok(());
         };
-        let levels = course.line.moves().map(MoveLevels::of);
+        let mut levels = course.line.moves().map(MoveLevels::of);
+        if course.is_slack() {
+            levels = levels.map(MoveLevels::as_slack);
+        }
         // A move and its direction set-up are two events; one is left for a long wait.
         let mut room = (queue.room().saturating_sub(1)) / 2;
         while course.to_next < u64::from(slice.distance) {
@@ -505,7 +572,7 @@ impl<'m> Runner<'m> {
             let diagonals = course.line.next_kinds(kinds);
             let counts = [count - diagonals, diagonals];
             let turns = |kind: usize| counts[kind] > 0 && self.emitter.turns(levels[kind]);
-            if self.emitter.has_stepped() && !turns(0) && !turns(1) {
+            if self.emitter.has_stepped() && !course.is_slack() && !turns(0) && !turns(1) {
                 let late = self.emitter.steps(times, kinds, levels, queue)?;
                 self.now = self.now.wrapping_add(late);
             } else {
@@ -517,10 +584,11 @@ impl<'m> Runner<'m> {
                 }
                 self.now = self.now.wrapping_add(late);
             }
+            let place = if course.is_slack() { &mut self.slack } else { &mut self.position };
             for (direction, count) in course.line.moves().into_iter().zip(counts) {
                 let (dx, dy) = direction.delta();
-                self.position.x += dx * count as i32;
-                self.position.y += dy * count as i32;
+                place.x = place.x.wrapping_add(dx * count as i32);
+                place.y = place.y.wrapping_add(dy * count as i32);
             }
         }
         course.place += u64::from(slice.distance);
@@ -549,7 +617,13 @@ impl<'m> Runner<'m> {
             self.run.strokes = self.run.strokes.wrapping_add(1);
         }
         self.in_stroke = block.ink.is_some();
-        self.course = Some(Course::new(&block, self.pen.dot_length));
+        let course = Course::new(&block, self.pen.dot_length);
+        if self.plan.is_some() {
+            // The interval in work goes on with these moves.
+            let units = self.brake.step_length(course.move_length);
+            queue.set_step_length(units, self.emitter.has_stepped())?;
+        }
+        self.course = Some(course);
         Ok(Progress::More)
     }
 
@@ -633,7 +707,7 @@ impl<'m> Runner<'m> {
                 self.emitter.hold(self.now, queue)?;
             }
         }
-        if course.moves_done == 0 {
+        if course.moves_done == 0 && !course.is_slack() {
             let units = self.brake.step_length(course.move_length);
             queue.set_step_length(units, self.emitter.has_stepped())?;
         }
@@ -690,7 +764,7 @@ impl<'m> Runner<'m> {
             course.next_piece();
             return;
         }
-        let length = u64::from(course.length.to_bits());
+        let length = if course.is_slack() { 0 } else { u64::from(course.length.to_bits()) };
         if course.ink.is_some() {
             self.run.drawn += length;
         } else {

@@ -1,7 +1,7 @@
 //! What is drawn and how, as the user set it.
 
 use crate::drawing::{Page, Title, TitleText};
-use crate::fixed::{Millimetres, SixDecimals, sin_cos_degrees};
+use crate::fixed::{Length, Millimetres, SixDecimals, sin_cos_degrees};
 use crate::model::Model;
 use crate::order;
 use crate::protocol::{
@@ -229,11 +229,11 @@ impl PlotOptions {
         line(format_args!("$crease={}", SixDecimals(self.crease)));
         line(format_args!("$pens={}", if self.one_pen { "one" } else { "auto" }));
         let [width, height, margin] =
-            [self.page.width, self.page.height, self.page.margin].map(SixDecimals::from);
+            [self.page.width, self.page.height, self.page.margin].map(Length);
         line(format_args!("$page={width}x{height}"));
         line(format_args!("$margin={margin}"));
         line(format_args!("$title={}", Escape(self.title.as_str())));
-        line(format_args!("$title-size={}", SixDecimals::from(self.title_size)));
+        line(format_args!("$title-size={}", Length(self.title_size)));
         line(format_args!("$fit={}", on(self.fit)));
         line(format_args!("$order={method}"));
         line(format_args!("$cycle={}", on(self.order.shape == order::Shape::ClosedCycle)));

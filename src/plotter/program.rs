@@ -165,14 +165,12 @@ impl Program {
         }
         let to = steps_at(self.at, steps);
         let Motion::Arc(turn) = self.motion else { return Ok(Order::Line(to)) };
-        if steps[0] != steps[1] {
-            return Err(Refusal::Arc(ArcError::TooWide));
-        }
         let start = steps_at(from, steps);
         let center = match numbers.radius {
             Some(radius) => {
-                let radius = to_steps(self.length(radius)?, steps[0]);
-                center_of_radius(start, to, radius, turn).ok_or(Refusal::Arc(ArcError::NoRadius))?
+                let radius = self.length(radius)?;
+                let center = center_of_radius(from, self.at, radius, turn);
+                steps_at(center.ok_or(Refusal::Arc(ArcError::NoRadius))?, steps)
             }
             None => {
                 let mut center = from;
@@ -185,7 +183,7 @@ impl Program {
                 steps_at(center, steps)
             }
         };
-        Arc::new(center, start, to, turn).map(Order::Arc).map_err(Refusal::Arc)
+        Arc::scaled(steps, center, start, to, turn).map(Order::Arc).map_err(Refusal::Arc)
     }
 
     fn length(&self, number: Decimal) -> Result<Millimetres, Refusal> {
@@ -210,22 +208,30 @@ fn steps_at([x, y]: [Millimetres; 2], steps: StepsPerMillimetre) -> PagePoint {
 
 /// The centre of the arc of less than half a turn (more, if `radius` is negative) between two
 /// points; `None` if they are further apart than the circle is wide.
-fn center_of_radius(from: PagePoint, to: PagePoint, radius: i32, turn: Turn) -> Option<PagePoint> {
-    // Coordinates within 2^21, so squares within 2^46.
-    let (dx, dy) = (i64::from(to.x) - i64::from(from.x), i64::from(to.y) - i64::from(from.y));
+fn center_of_radius(
+    from: [Millimetres; 2],
+    to: [Millimetres; 2],
+    radius: Millimetres,
+    turn: Turn,
+) -> Option<[Millimetres; 2]> {
+    // In units of 2^-15 mm within 2^30, so differences within 2^31 and squares within 2^62.
+    let halved = |length: Millimetres| i64::from(length.to_bits()) / 2;
+    let [dx, dy] = [0, 1].map(|axis| halved(to[axis]) - halved(from[axis]));
     let distance = (dx * dx + dy * dy).unsigned_abs();
-    let squared = 4 * u64::from(radius.unsigned_abs()) * u64::from(radius.unsigned_abs());
+    let wide = 2 * halved(radius).unsigned_abs();
     let length = distance.isqrt();
-    if length == 0 || length > 2 * u64::from(radius.unsigned_abs()) + 2 {
+    // Rounded ends may lie a step apart from it.
+    if length == 0 || length > wide + (1 << 15) / 20 {
         return None;
     }
     // Twice the distance from the chord to the centre, which lies on its right for a clockwise arc.
-    let height = squared.saturating_sub(distance).isqrt() as i64;
+    let height = (wide * wide).saturating_sub(distance).isqrt() as i64;
     let is_right = (turn == Turn::Clockwise) == (radius > 0);
     let height = if is_right { height } else { -height };
-    let middle = |a: i32, b: i32, across: i64| {
-        let offset = divide_rounding(i128::from(across * height), i128::from(2 * length));
-        ((i128::from(a) + i128::from(b)).div_euclid(2) + offset) as i32
+    let middle = |axis: usize, across: i64| {
+        let offset = divide_rounding(i128::from(across) * i128::from(height), length.into());
+        let sum = i128::from(from[axis].to_bits()) + i128::from(to[axis].to_bits()) + 2 * offset;
+        i32::try_from(sum / 2).ok().map(Millimetres::from_bits)
     };
-    Some(PagePoint { x: middle(from.x, to.x, dy), y: middle(from.y, to.y, -dx) })
+    Some([middle(0, dy)?, middle(1, -dx)?])
 }

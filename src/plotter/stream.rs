@@ -100,8 +100,7 @@ impl Inner<'_> {
                 Reply(board).line(format_args!("ALARM:{}", number(alarm)));
             }
         }
-        let stands = self.machine.state() == State::Hold { standing: true };
-        let pen = self.machine.pen_wanted().filter(|_| stands);
+        let pen = self.machine.pen_wanted();
         if pen != self.pen_told {
             self.pen_told = pen;
             if let Some(pen) = pen {

@@ -504,14 +504,17 @@ fn title(line: &str) -> Option<&str> {
 fn pen_name(text: &str) -> PenName {
     let mut words = text.split_ascii_whitespace();
     let numbered = words.find_map(|word| {
-        let is_pen = |head: &str| head.eq_ignore_ascii_case("pen");
-        let (_, digits) =
-            word.split_at_checked(3).filter(|(head, _)| is_pen(head)).unwrap_or(("", word));
-        let all_are = digits.bytes().all(|byte| byte.is_ascii_digit()) && !digits.is_empty();
-        // No pen has the number 0 or one that is too large.
-        all_are.then(|| {
-            digits.parse::<u8>().ok().and_then(|pen| pen.checked_sub(1)).unwrap_or(u8::MAX)
-        })
+        let (head, tail) = word.split_at_checked(3).unwrap_or(("", word));
+        let is_pen = head.eq_ignore_ascii_case("pen");
+        let digits = if is_pen { tail } else { word };
+        let is_number = digits.bytes().all(|byte| byte.is_ascii_digit()) && !digits.is_empty();
+        let number = digits.parse::<i32>().ok().filter(|number| (1..=PENS).contains(number));
+        match number {
+            Some(number) if is_number => Some(number as u8 - 1),
+            // No pen has this number; without the word it is a name like others.
+            None if is_number && is_pen => Some(u8::MAX),
+            _ => None,
+        }
     });
     let text = text.trim_ascii();
     match numbered {
@@ -798,12 +801,14 @@ mod tests {
             ("g", false, 0),
             ("usemtl", true, 0),
             ("usemtl pen0", true, 255),
-            ("usemtl pen33", true, 32),
-            ("usemtl 256", true, 255),
+            ("usemtl pen33", true, 255),
+            ("usemtl 32", true, 31),
+            ("g 1001 2", false, 1),
         ] {
             assert_eq!(pen(line), (by_material, PenName::Number(number)), "{line}");
         }
-        let names = ["red", "Red", "pen", "penx", "pen3b", "rot grün", "grün", "-1", "+1"];
+        let names =
+            ["red", "Red", "pen", "penx", "pen3b", "rot grün", "grün", "-1", "+1", "0", "33"];
         let names: Vec<PenName> = names.iter().map(|name| pen_name(name)).collect();
         for (at, name) in names.iter().enumerate() {
             assert!(matches!(name, PenName::Other(_)) && !names[..at].contains(name), "{at}");

@@ -3,7 +3,7 @@
 use crate::convex::SolidError;
 use crate::curve::CurveError;
 use crate::drawing::PageError;
-use crate::fixed::{BinaryFraction, Millimetres, SixDecimals};
+use crate::fixed::{BinaryFraction, Length, Millimetres};
 use crate::machine::{MachineError, SettingError, Value};
 use crate::model::{ModelError, PEN_LIMIT, Part};
 use crate::stage::OutOfScratch;
@@ -427,8 +427,8 @@ fn write_setting_error(formatter: &mut fmt::Formatter<'_>, error: &SettingError)
                 formatter,
                 "{} goes from {} to {} {}",
                 info.name,
-                SixDecimals::from(info.least),
-                SixDecimals::from(info.greatest),
+                Length(info.least),
+                Length(info.greatest),
                 info.unit
             )
         }

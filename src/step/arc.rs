@@ -2,6 +2,7 @@
 
 use super::{Direction, Line};
 use crate::drawing::PagePoint;
+use crate::fixed::Millimetres;
 
 /// Which way an arc turns, y up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,7 +20,8 @@ pub enum Turn {
 pub enum ArcError {
     /// An end is the centre.
     NoRadius,
-    /// The centre lies more than 2^22 steps from an end.
+    /// The centre lies more than 2^22 steps from an end, or so far that steps of different length in x and y
+    /// cannot be told apart.
     TooWide,
     /// The ends are not equally far from the centre: more than two steps apart.
     EndOffCircle,
@@ -43,24 +45,68 @@ pub enum ArcError {
 pub struct Arc {
     center: PagePoint,
     to: PagePoint,
-    /// Four times the squared radius.
+    /// How much a step of x and of y counts, so that the arc is part of a circle.
+    weights: [u16; 2],
+    /// Four times the squared radius, weighted.
     radius: u64,
-    /// The greatest u with a point (u, v), u <= v, of the circle around 0.
-    half: i32,
-    /// Moves of a quarter turn.
-    quarter: i32,
+    /// Of the right and left side, and of the others: how far they go both ways from their middle.
+    half: [i32; 2],
+    /// Whether a side ends where the next one begins.
+    corner_is_shared: bool,
     /// Place on the circle, in moves counterclockwise.
     place: i32,
-    step: i32,
+    step: i8,
     remaining: u32,
 }
 
 impl Arc {
-    /// The arc around `center` from `from` to `to`.
+    /// The arc around `center` from `from` to `to`, steps of x as long as those of y.
     ///
     /// # Errors
     /// See [`ArcError`].
     pub fn new(
+        center: PagePoint,
+        from: PagePoint,
+        to: PagePoint,
+        turn: Turn,
+    ) -> Result<Self, ArcError> {
+        Self::weighted([1; 2], center, from, to, turn)
+    }
+
+    /// The same if there are so many steps of x and of y in a millimetre: a circle on the page, but for r²/2^31
+    /// steps of one r steps wide.
+    ///
+    /// ```
+    /// use penup::drawing::PagePoint;
+    /// use penup::fixed::Millimetres;
+    /// use penup::step::{Arc, Turn};
+    /// let at = |x, y| PagePoint { x, y };
+    /// let steps = [Millimetres::lit("100"), Millimetres::lit("50")];
+    /// let arc = Arc::scaled(steps, at(0, 0), at(4, 0), at(-4, 0), Turn::Counterclockwise)?;
+    /// assert!(arc.map(|point| point.y).eq([1, 1, 2, 2, 2, 2, 2, 1, 1, 0]));
+    /// # Ok::<(), penup::step::ArcError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// See [`ArcError`].
+    pub fn scaled(
+        steps_per_mm: [Millimetres; 2],
+        center: PagePoint,
+        from: PagePoint,
+        to: PagePoint,
+        turn: Turn,
+    ) -> Result<Self, ArcError> {
+        let extent = [from, to]
+            .map(|end| end.x.abs_diff(center.x).max(end.y.abs_diff(center.y)))
+            .into_iter()
+            .fold(1, u32::max);
+        let most = u16::try_from((1 << 30) / extent).unwrap_or(u16::MAX);
+        let weights = weights(steps_per_mm, most).ok_or(ArcError::TooWide)?;
+        Self::weighted(weights, center, from, to, turn)
+    }
+
+    fn weighted(
+        weights: [u16; 2],
         center: PagePoint,
         from: PagePoint,
         to: PagePoint,
@@ -71,39 +117,72 @@ impl Arc {
             if x.max(y) > 1 << 22 {
                 return Err(ArcError::TooWide);
             }
-            Ok(u64::from(x) * u64::from(x) + u64::from(y) * u64::from(y))
+            let [x, y] = [(x, weights[0]), (y, weights[1])]
+                .map(|(steps, weight)| u64::from(steps) * u64::from(weight));
+            // Squares of 2^30, four of them doubled: below 2^63.
+            if x.max(y) > 1 << 30 {
+                return Err(ArcError::TooWide);
+            }
+            Ok(x * x + y * y)
         };
         let (first, last) = (squared(from)?, squared(to)?);
         if first == 0 || last == 0 {
             return Err(ArcError::NoRadius);
         }
-        if first.isqrt().abs_diff(last.isqrt()) > 2 {
+        let two_steps = 2 * u64::from(weights[0].max(weights[1]));
+        if first.isqrt().abs_diff(last.isqrt()) > two_steps {
             return Err(ArcError::EndOffCircle);
         }
-        let radius = 2 * (first + last);
-        // Near r / √2, found to the step.
-        let mut half = (radius / 8).isqrt() as i32 + 1;
-        while half > 0 && half > across(radius, half) {
-            half -= 1;
-        }
-        let corner_is_shared = half == across(radius, half);
-        let quarter = 2 * half + i32::from(!corner_is_shared);
         let mut arc = Self {
             center,
             to,
-            radius,
-            half,
-            quarter: quarter.max(1),
+            weights,
+            radius: 2 * (first + last),
+            half: [0; 2],
+            corner_is_shared: false,
             place: 0,
             step: if turn == Turn::Clockwise { -1 } else { 1 },
             remaining: 0,
         };
+        arc.find_corner();
         arc.place = arc.place_of(from);
-        let ahead = (arc.place_of(to) - arc.place) * arc.step;
-        let whole = 4 * arc.quarter;
+        let ahead = (arc.place_of(to) - arc.place) * i32::from(arc.step);
+        let whole = 2 * (arc.moves_of(0) + arc.moves_of(1));
         let moves = ahead.rem_euclid(whole);
         arc.remaining = if from == to { whole } else { moves }.unsigned_abs().max(1);
         Ok(arc)
+    }
+
+    /// Where the right side ends above, and the upper one on the right: where the circle runs more along the other
+    /// axis.
+    fn find_corner(&mut self) {
+        let [x, y] = self.weights.map(|weight| i64::from(weight) * i64::from(weight));
+        // Where it is as steep along both, found to the step.
+        let place = |mine: i64, others: i64| {
+            let (mine, others) = (mine.unsigned_abs(), others.unsigned_abs());
+            // Four times the square; at most a quarter of the radius over the weight.
+            let square = self.radius / 4 / (mine + others) * others / mine;
+            square.isqrt() as i32 + 1
+        };
+        let mut half = [place(y, x), place(x, y)];
+        while half[0] > 0 && y * i64::from(half[0]) > x * i64::from(self.across(0, half[0])) {
+            half[0] -= 1;
+        }
+        let corner = self.across(0, half[0]);
+        while half[1] > 0
+            && (half[1] > corner
+                || self.across(1, half[1]) < half[0]
+                || x * i64::from(half[1]) > y * i64::from(self.across(1, half[1])))
+        {
+            half[1] -= 1;
+        }
+        self.half = half;
+        self.corner_is_shared = half[1] == corner && half[0] == self.across(1, half[1]);
+    }
+
+    /// Moves along a side: 0 the right or left one, 1 the others.
+    fn moves_of(&self, side: usize) -> i32 {
+        (2 * self.half[side] + i32::from(!self.corner_is_shared)).max(1)
     }
 
     /// The least and the greatest coordinates of its points; those already passed do not count.
@@ -122,13 +201,15 @@ impl Arc {
             least = PagePoint { x: least.x.min(point.x), y: least.y.min(point.y) };
             most = PagePoint { x: most.x.max(point.x), y: most.y.max(point.y) };
         };
+        let step = i32::from(self.step);
         if self.remaining > 1 {
-            include(self.point_at(self.place + self.step));
+            include(self.point_at(self.place + step));
         }
         // Where a side is crossed in its middle, the circle is furthest out.
+        let half_turn = self.moves_of(0) + self.moves_of(1);
         for side in 0..4 {
-            let middle = side * self.quarter + self.half;
-            let ahead = ((middle - self.place) * self.step).rem_euclid(4 * self.quarter);
+            let middle = self.begin_of(side) + self.half[side % 2];
+            let ahead = ((middle - self.place) * step).rem_euclid(2 * half_turn);
             if ahead.unsigned_abs() < self.remaining {
                 include(self.point_at(middle));
             }
@@ -136,40 +217,72 @@ impl Arc {
         (least, most)
     }
 
-    /// The place on the circle nearest to `point`: the right side runs up from 0, the top left, and
-    /// so on, a quarter each.
+    /// The place where a side begins: the right side runs up from 0, the top left, and so on.
+    fn begin_of(&self, side: usize) -> i32 {
+        let half_turn = self.moves_of(0) + self.moves_of(1);
+        half_turn * (side / 2) as i32 + self.moves_of(0) * (side % 2) as i32
+    }
+
+    /// The place on the circle nearest to `point`.
     fn place_of(&self, point: PagePoint) -> i32 {
         let (x, y) = (point.x - self.center.x, point.y - self.center.y);
-        let (side, along) = if x.abs() >= y.abs() {
+        let [weighted_x, weighted_y] = [(x, self.weights[0]), (y, self.weights[1])]
+            .map(|(steps, weight)| i64::from(steps) * i64::from(weight) * i64::from(weight));
+        let (side, along) = if weighted_x.abs() >= weighted_y.abs() {
             if x >= 0 { (0, y) } else { (2, -y) }
         } else if y > 0 {
             (1, -x)
         } else {
             (3, x)
         };
-        side * self.quarter + along.clamp(-self.half, self.half) + self.half
+        let half = self.half[side % 2];
+        self.begin_of(side) + along.clamp(-half, half) + half
     }
 
     fn point_at(&self, place: i32) -> PagePoint {
-        let place = place.rem_euclid(4 * self.quarter);
-        let along = place % self.quarter - self.half;
-        let out = across(self.radius, along);
-        let (x, y) = match place / self.quarter {
-            0 => (out, along),
-            1 => (-along, out),
-            2 => (-out, -along),
-            _ => (along, -out),
-        };
+        let [mut place, half_turn] = [place, self.moves_of(0) + self.moves_of(1)];
+        place = place.rem_euclid(2 * half_turn);
+        let is_second = place >= half_turn;
+        place -= if is_second { half_turn } else { 0 };
+        let side = usize::from(place >= self.moves_of(0));
+        let along = place - self.begin_of(side) - self.half[side];
+        let out = self.across(side, along);
+        let (x, y) = if side == 0 { (out, along) } else { (-along, out) };
+        let (x, y) = if is_second { (-x, -y) } else { (x, y) };
         PagePoint { x: self.center.x + x, y: self.center.y + y }
+    }
+
+    /// How far out the circle is nearest to at `along` of such a side.
+    fn across(&self, side: usize, along: i32) -> i32 {
+        let out = u32::from(self.weights[side]);
+        let along = u64::from(along.unsigned_abs()) * u64::from(self.weights[1 - side]);
+        // The root of 63 bits.
+        let doubled = self.radius.saturating_sub(4 * along * along).isqrt() as u32;
+        ((doubled + out) / (2 * out)) as i32
     }
 }
 
-/// The v nearest to the circle at u = `along`; never halfway, as four times the squared radius is
-/// even.
-fn across(radius: u64, along: i32) -> i32 {
-    let along = u64::from(along.unsigned_abs());
-    let doubled = radius.saturating_sub(4 * along * along).isqrt();
-    doubled.div_ceil(2) as i32
+/// Weights of a step of x and of y, none above `most`, in the ratio of their lengths as nearly as can be: to
+/// half of 1 / `most`, or better. `None` if one is longer than so many of the other.
+fn weights(steps_per_mm: [Millimetres; 2], most: u16) -> Option<[u16; 2]> {
+    let most = u32::from(most);
+    let [mut x, mut y] = steps_per_mm.map(|steps| steps.to_bits().unsigned_abs());
+    // Convergents of the continued fraction of y / x: a step of x is as long as there are steps of y.
+    let (mut before, mut ratio) = ([0u32, 1], [1u32, 0]);
+    while let Some(whole) = y.checked_div(x) {
+        let room = |part: usize| (most - before[part]).checked_div(ratio[part]);
+        let times = whole.min(room(0).unwrap_or(whole)).min(room(1).unwrap_or(whole));
+        // Fewer times than whole is nearer from half of it on.
+        if times < whole && 2 * u64::from(times) <= u64::from(whole) {
+            break;
+        }
+        (before, ratio) = (ratio, [0, 1].map(|part| times * ratio[part] + before[part]));
+        if times < whole {
+            break;
+        }
+        (x, y) = (y % x, x);
+    }
+    ratio.iter().all(|part| *part > 0).then_some(ratio.map(|part| part as u16))
 }
 
 impl Iterator for Arc {
@@ -180,7 +293,7 @@ impl Iterator for Arc {
         if self.remaining == 0 {
             return Some(self.to);
         }
-        self.place += self.step;
+        self.place += i32::from(self.step);
         Some(self.point_at(self.place))
     }
 }
@@ -307,6 +420,65 @@ mod tests {
             }
             back.reverse();
             assert_eq!(there, back);
+        }
+    }
+
+    #[test]
+    fn circles_of_the_page_are_round_within_half_a_step_and_the_same_both_ways() {
+        for (x, y) in [(80.0, 100.0), (100.0, 33.3), (20.0, 400.0), (79.97, 80.013), (3.0, 2.0)] {
+            let steps = [x, y].map(Millimetres::from_num);
+            for radius in [1, 2, 3, 7, 20, 95, 400, 4001] {
+                let (center, start) = (at(7, -3), at(7 + radius, -3));
+                let circle = |turn| {
+                    let arc = Arc::scaled(steps, center, start, start, turn).expect("a circle");
+                    core::iter::once(start).chain(arc).collect::<Vec<_>>()
+                };
+                let there = circle(Turn::Counterclockwise);
+                let mut back = circle(Turn::Clockwise);
+                back.reverse();
+                assert_eq!(there, back);
+                let (wide, high) = (f64::from(radius), f64::from(radius) / x * y);
+                for p in &there {
+                    let (px, py) = (f64::from(p.x - 7).abs(), f64::from(p.y + 3).abs());
+                    // Along the axis on which it is nearer.
+                    let across = |a: f64, b: f64, along: f64| {
+                        a * (1.0 - (along / b).powi(2)).max(0.0).sqrt()
+                    };
+                    let off = (across(wide, high, py) - px)
+                        .abs()
+                        .min((across(high, wide, px) - py).abs());
+                    assert!(off <= 0.51, "{x} {y}, radius {radius} at {p:?}: {off}");
+                }
+                // Bends of less than a step are no moves from point to point.
+                if wide * wide > 2.0 * high && high * high > 2.0 * wide {
+                    assert!(are_moves(&there), "{x} {y}, radius {radius}");
+                }
+                let (least, most) = Arc::scaled(steps, center, start, start, Turn::Clockwise)
+                    .expect("a circle")
+                    .bounds();
+                let extreme = |of: fn(&PagePoint) -> i32| {
+                    let all = there.iter().map(of);
+                    (all.clone().min(), all.max())
+                };
+                assert_eq!(extreme(|p| p.x), (Some(least.x), Some(most.x)));
+                assert_eq!(extreme(|p| p.y), (Some(least.y), Some(most.y)));
+            }
+        }
+    }
+
+    #[test]
+    fn weights_are_those_of_the_steps_lengths() {
+        let of = |x: f64, y: f64, most| weights([x, y].map(Millimetres::from_num), most);
+        assert_eq!(of(80.0, 80.0, 9), Some([1, 1]));
+        assert_eq!(of(80.0, 100.0, 9), Some([5, 4]));
+        assert_eq!(of(4000.0, 2.0, 900), None);
+        for most in [500u16, 3000, 65_535] {
+            for (x, y) in [(79.97, 80.013), (123.4567, 7.89), (400.0, 399.9), (80.0, 80.03)] {
+                let [a, b] = of(x, y, most).expect("near").map(f64::from);
+                assert!(a.max(b) <= f64::from(most));
+                let wrong = (a / b * x / y - 1.0).abs();
+                assert!(wrong < 0.51 / f64::from(most) + 2e-6, "{x} {y}: {a} {b}");
+            }
         }
     }
 

@@ -66,6 +66,37 @@ impl Line {
         }
     }
 
+    /// The same for a piece of a line or curve whose ends lie beside the grid's points: by `offsets`, in units of
+    /// 2^-8 steps within ±127, at the start and at the end, along the axis of fewer moves (that of x if both
+    /// have as many). So pieces join to a line that is nowhere off by more than half a step.
+    ///
+    /// `dx` and `dy` are within ±2^21.
+    ///
+    /// ```
+    /// use penup::step::{Direction::{Right, UpRight}, Line};
+    /// let moves: Vec<_> = Line::beside(3, 1, [0, 0]).collect();
+    /// assert_eq!(moves, [Right, UpRight, Right]);
+    /// let moves: Vec<_> = Line::beside(3, 1, [100, 100]).collect();
+    /// assert_eq!(moves, [UpRight, Right, Right]);
+    /// ```
+    pub fn beside(dx: i32, dy: i32, offsets: [i8; 2]) -> Self {
+        const UNIT: i32 = 256;
+        let mut line = Self::by(dx, dy);
+        if offsets == [0; 2] {
+            return line;
+        }
+        let (more, fewer, way) =
+            if dx.abs() > dy.abs() { (dx.abs(), dy.abs(), dy) } else { (dy.abs(), dx.abs(), dx) };
+        let [start, end] = offsets.map(|offset| i32::from(offset) * way.signum());
+        // Twice by how much a straight move falls behind, times the moves; never below 0, and where a
+        // line of diagonals alone gains a little more, that changes none of them.
+        let gain = UNIT * fewer + end - start;
+        line.straight_gain = 2 * gain;
+        line.diagonal_loss = 2 * (UNIT * more - gain);
+        line.balance = 2 * (start * more + gain) - UNIT * more;
+        line
+    }
+
     /// The two moves that it is made of, the straight and the diagonal one.
     pub const fn moves(&self) -> [Direction; 2] {
         [self.straight, self.diagonal]
@@ -174,6 +205,27 @@ mod tests {
         // (0,0) to (14,9): the tie stands at the middle, (7, 4.5).
         assert_eq!(digits(14, 9), [2, 3, 2, 2, 3, 2, 2, 3, 2, 3, 2, 2, 3, 2]);
         assert_eq!(digits(-14, -9), [6, 7, 6, 6, 7, 6, 7, 6, 6, 7, 6, 6, 7, 6]);
+    }
+
+    #[test]
+    fn pieces_whose_ends_lie_beside_the_grid_are_within_half_a_step() {
+        for dx in -9i32..=40 {
+            for dy in -40i32..=9 {
+                for offsets in [[0, 90], [-127, 127], [127, -127], [50, -3], [127, 127]] {
+                    let (more, fewer) = if dx.abs() > dy.abs() { (dx, dy) } else { (dy, dx) };
+                    let mut at = PagePoint::default();
+                    for (index, direction) in Line::beside(dx, dy, offsets).enumerate() {
+                        at = direction.from_point(at);
+                        let part = (index + 1) as f64 / f64::from(more.abs());
+                        let [start, end] = offsets.map(|offset| f64::from(offset) / 256.0);
+                        let line = start + (f64::from(fewer) + end - start) * part;
+                        let off = line - f64::from(if dx.abs() > dy.abs() { at.y } else { at.x });
+                        assert!(off.abs() <= 0.5, "to {dx},{dy} {offsets:?} at {at:?}: {off}");
+                    }
+                    assert_eq!(at, PagePoint { x: dx, y: dy });
+                }
+            }
+        }
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Where two faces pass through each other: the segment that two triangles have in common.
 
+use crate::fixed::divide_down;
 use crate::geometry::{Vertex, plane_side};
 
 /// The box around a face in view coordinates.
@@ -85,7 +86,7 @@ fn between(a: Vertex, b: Vertex, height_a: i64, height_b: i64) -> Vertex {
     let (from, to) = (i128::from(height_a).abs(), i128::from(height_b).abs());
     let mixed = |a: i32, b: i32| {
         let sum = i128::from(a) * to + i128::from(b) * from;
-        (2 * sum + from + to).div_euclid(2 * (from + to)) as i32
+        divide_down(2 * sum + from + to, 2 * (from + to)) as i32
     };
     Vertex::new(mixed(a.x, b.x), mixed(a.y, b.y), mixed(a.z, b.z))
 }

@@ -27,12 +27,29 @@ pub fn count_cycles() -> Result<()> {
     run(cargo().current_dir(crate::root()).args(["run", "--quiet", "--release"]).args(program))
 }
 
-/// Builds the counting image, runs it, and prints the table of `docs/performance.md`.
+/// Prints the table of scenes of `docs/performance.md`.
 pub fn count() -> Result<()> {
+    print(&run_image("bench")?);
+    Ok(())
+}
+
+/// Prints the table of planning there.
+pub fn count_motion() -> Result<()> {
+    let counts = run_image("bench-motion")?;
+    println!("| job | without a jerk | 100 m/s³ | 10 m/s³ | 1 m/s³ |");
+    println!("|---|---|---|---|---|");
+    for line in counts.lines() {
+        println!("| {} |", line.replace('|', " | "));
+    }
+    Ok(())
+}
+
+/// Builds a counting image and runs it: what it says.
+fn run_image(name: &str) -> Result<String> {
     let target = Board::Lm3s6965.target();
     set_up::emulator(Board::Lm3s6965)?;
     let mut cargo = set_up::toolchain(target)?.cargo("build", target);
-    let options = ["--package=penup", "--bin=bench", "--profile=firmware", "--no-default-features"];
+    let options = ["--package=penup", "--bin", name, "--profile=firmware", "--no-default-features"];
     // Apart from the firmware's, so that neither is built anew for the other.
     let folder = crate::root().join("target/bench");
     run(cargo.arg("--quiet").args(options).args(["--features=mps2", "--target-dir"]).arg(&folder))?;
@@ -49,12 +66,11 @@ pub fn count() -> Result<()> {
     ])
     .args(["-semihosting-config", "enable=on,target=native", "-icount", "shift=0,sleep=off"])
     .arg("-kernel")
-    .arg(folder.join(target).join("firmware/bench"))
+    .arg(folder.join(target).join("firmware").join(name))
     .stderr(Stdio::inherit());
     let answer = qemu.output().with_context(|| format!("cannot run {}", describe(&qemu)))?;
     ensure!(answer.status.success(), "{}: {}", describe(&qemu), answer.status);
-    print(&String::from_utf8_lossy(&answer.stdout));
-    Ok(())
+    Ok(String::from_utf8_lossy(&answer.stdout).into_owned())
 }
 
 fn print(counts: &str) {

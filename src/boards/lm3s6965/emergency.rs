@@ -1,66 +1,43 @@
-//! A panic or a fault: steps stop, pen up, drivers off, a report, then nothing until ctrl-X resets.
+//! What becomes of a panic or a fault: see [`fault`].
 
-use core::fmt::{self, Write};
 use core::panic::PanicInfo;
-use core::sync::atomic::{AtomicBool, Ordering};
 
 use cortex_m::peripheral::SCB;
 
 use super::{pins, serial, steps};
-use crate::boards::line;
+use crate::boards::fault::{self, Fault};
 
-/// A second fault while the first is reported ends the report.
-static REPORTING: AtomicBool = AtomicBool::new(false);
+struct Lm3s6965;
 
-/// Makes the machine safe, then reports `cause` on the serial line. Returns whether to go on
-/// reporting.
-fn make_safe(cause: fmt::Arguments) -> bool {
-    cortex_m::interrupt::disable();
-    steps::halt();
-    pins::release();
-    if REPORTING.swap(true, Ordering::Relaxed) {
-        return false;
+impl Fault for Lm3s6965 {
+    fn make_safe() {
+        cortex_m::interrupt::disable();
+        steps::halt();
+        pins::release();
     }
-    // Fails never: `OneLine` takes every byte.
-    serial::write(b"\r\n");
-    let _ = write!(OneLine, "[MSG:stopped by a fault, ctrl-X resets: {cause}]");
-    serial::write(b"\r\n");
-    true
-}
 
-fn wait_for_reset() -> ! {
-    while serial::poll() != Some(line::ABORT) {}
-    SCB::sys_reset()
-}
+    fn write(bytes: &[u8]) {
+        serial::write(bytes);
+    }
 
-/// Writes to the serial line, with line ends as spaces.
-struct OneLine;
+    fn poll() -> Option<u8> {
+        serial::poll()
+    }
 
-impl Write for OneLine {
-    fn write_str(&mut self, text: &str) -> fmt::Result {
-        for byte in text.bytes() {
-            let byte = if byte == b'\n' || byte == b'\r' { b' ' } else { byte };
-            serial::write(&[byte]);
-        }
-        Ok(())
+    fn reset() -> ! {
+        SCB::sys_reset()
     }
 }
 
 #[panic_handler]
 fn panic(info: &PanicInfo) -> ! {
-    if make_safe(format_args!("{info}")) {
-        defmt::error!("{}", defmt::Display2Format(info));
-    }
-    wait_for_reset()
+    fault::panic::<Lm3s6965>(info)
 }
 
 unsafe extern "C" {
     static _stack_start: u32;
     static _stack_end: u32;
 }
-
-/// Stands for the address of a fault for which the stack had no place left.
-const STACK_USED_UP: u32 = u32::MAX;
 
 /// Goes to [`report_fault`] with the address of the fault, on a fresh stack: the fault may be that
 /// the stack is used up, and then nothing can be put onto it.
@@ -74,7 +51,7 @@ unsafe extern "C" fn HardFault() -> ! {
         "mrs r0, msp",
         "ldr r1, ={end}",
         "cmp r0, r1",
-        "mvn r2, #0", // STACK_USED_UP
+        "mvn r2, #0", // fault::STACK_USED_UP
         "it hs",
         "ldrhs r2, [r0, #24]", // the program counter that the core has put there
         "mov r0, r2",
@@ -88,12 +65,5 @@ unsafe extern "C" fn HardFault() -> ! {
 }
 
 extern "C" fn report_fault(address: u32) -> ! {
-    if address == STACK_USED_UP {
-        if make_safe(format_args!("the stack is used up")) {
-            defmt::error!("the stack is used up");
-        }
-    } else if make_safe(format_args!("hard fault at {address:#010x}")) {
-        defmt::error!("hard fault at {=u32:#010x}", address);
-    }
-    wait_for_reset()
+    fault::hard_fault::<Lm3s6965>(address)
 }

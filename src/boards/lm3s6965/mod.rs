@@ -96,9 +96,10 @@ impl Board for Lm3s6965 {
 
     fn wait(&mut self) {
         self.steps.start();
+        self.steps.end_turn();
         // Most step interrupts need no turn of the main loop.
         while !interrupt::free(|_| {
-            let happened = HAPPENED.swap(false, Ordering::Relaxed);
+            let happened = HAPPENED.swap(false, Ordering::Relaxed) || self.steps.wants_turn();
             if happened {
             } else if self.steps.idle() {
                 self.clock.sleep_stopped();

@@ -34,6 +34,8 @@ pub struct MotorPins {
 
 /// PB0 to PB4.
 const AXES: u32 = 0x1F;
+const STEP_X: u32 = 1;
+const STEP_Y: u32 = 1 << 2;
 
 /// Their levels for those of a step event: STEP_X, STEP_Y, DIR_X, DIR_Y, ENABLE from bit 0 on there,
 /// STEP_X, DIR_X, STEP_Y, DIR_Y, ENABLE here; high direction counts up, low enable is on.
@@ -54,6 +56,11 @@ impl Axes for AxisPins {
     #[inline(always)]
     fn set(&mut self, levels: u8) {
         write(AXES, LEVELS[usize::from(levels) % LEVELS.len()].into());
+    }
+
+    #[inline(always)]
+    fn end_pulses(&mut self) {
+        write(STEP_X | STEP_Y, 0);
     }
 }
 

@@ -1,12 +1,10 @@
-//! The watchdog. A panic or a fault: steps stop, pen up, drivers off, a report, then nothing until ctrl-X resets.
+//! The watchdog, and what becomes of a panic or a fault: see [`fault`].
 
-use core::fmt::{self, Write};
 use core::panic::PanicInfo;
-use core::sync::atomic::{AtomicBool, Ordering};
 
 use super::registers::WATCHDOG;
 use super::{pen, serial, steps};
-use crate::boards::line;
+use crate::boards::fault::{self, Fault};
 
 mod watchdog {
     pub const CONTROL: usize = 0x0;
@@ -29,68 +27,45 @@ pub fn feed() {
     WATCHDOG.write(watchdog::LOAD, PATIENCE);
 }
 
-/// A second fault while the first is reported ends the report.
-static REPORTING: AtomicBool = AtomicBool::new(false);
+struct Pico;
 
-/// Makes the machine safe, then reports `cause` on the serial line. Returns whether to go on
-/// reporting.
-fn make_safe(cause: fmt::Arguments) -> bool {
-    cortex_m::interrupt::disable();
-    steps::release();
-    pen::set_height(0);
-    if REPORTING.load(Ordering::Relaxed) {
-        return false;
+impl Fault for Pico {
+    fn make_safe() {
+        cortex_m::interrupt::disable();
+        steps::release();
+        pen::set_height(0);
     }
-    REPORTING.store(true, Ordering::Relaxed);
-    // Fails never: `OneLine` takes every byte.
-    serial::write_now(b"\r\n");
-    let _ = write!(OneLine, "[MSG:stopped by a fault, ctrl-X resets: {cause}]");
-    serial::write_now(b"\r\n");
-    true
-}
 
-fn wait_for_reset() -> ! {
-    WATCHDOG.write(watchdog::CONTROL, 0);
-    while serial::poll() != Some(line::ABORT) {}
-    reset()
-}
-
-/// Resets the whole chip. The core's own request would leave its peripherals as they are.
-fn reset() -> ! {
-    WATCHDOG.write(watchdog::CONTROL, watchdog::TRIGGER);
-    loop {
-        cortex_m::asm::nop();
+    fn write(bytes: &[u8]) {
+        serial::write_now(bytes);
     }
-}
 
-/// Writes to the serial line, with line ends as spaces.
-struct OneLine;
+    fn begin_to_wait() {
+        WATCHDOG.write(watchdog::CONTROL, 0);
+    }
 
-impl Write for OneLine {
-    fn write_str(&mut self, text: &str) -> fmt::Result {
-        for byte in text.bytes() {
-            let byte = if byte == b'\n' || byte == b'\r' { b' ' } else { byte };
-            serial::write_now(&[byte]);
+    fn poll() -> Option<u8> {
+        serial::poll()
+    }
+
+    /// Resets the whole chip. The core's own request would leave its peripherals as they are.
+    fn reset() -> ! {
+        WATCHDOG.write(watchdog::CONTROL, watchdog::TRIGGER);
+        loop {
+            cortex_m::asm::nop();
         }
-        Ok(())
     }
 }
 
 #[panic_handler]
 fn panic(info: &PanicInfo) -> ! {
-    if make_safe(format_args!("{info}")) {
-        defmt::error!("{}", defmt::Display2Format(info));
-    }
-    wait_for_reset()
+    fault::panic::<Pico>(info)
 }
 
 unsafe extern "C" {
     static _stack_start: u32;
     static _stack_end: u32;
 }
-
-/// Stands for the address of a fault for which the stack had no place left.
-const STACK_USED_UP: u32 = u32::MAX;
 
 /// Goes to [`report_fault`] with the address of the fault, on a fresh stack: the fault may be that
 /// the stack is used up, and then nothing can be put onto it.
@@ -104,7 +79,7 @@ unsafe extern "C" fn HardFault() -> ! {
         "mrs r1, msp",
         "ldr r2, ={end}",
         "movs r0, #0",
-        "mvns r0, r0", // STACK_USED_UP
+        "mvns r0, r0", // fault::STACK_USED_UP
         "cmp r1, r2",
         "blo 1f",
         "ldr r0, [r1, #24]", // the program counter that the core has put there
@@ -119,12 +94,5 @@ unsafe extern "C" fn HardFault() -> ! {
 }
 
 extern "C" fn report_fault(address: u32) -> ! {
-    if address == STACK_USED_UP {
-        if make_safe(format_args!("the stack is used up")) {
-            defmt::error!("the stack is used up");
-        }
-    } else if make_safe(format_args!("hard fault at {address:#010x}")) {
-        defmt::error!("hard fault at {=u32:#010x}", address);
-    }
-    wait_for_reset()
+    fault::hard_fault::<Pico>(address)
 }

@@ -184,8 +184,8 @@ pub struct Steps {
     levels: u32,
     /// The sum of the words counted so far; all wrap.
     taken: u32,
-    x: i32,
-    y: i32,
+    steps: (i32, i32),
+    slack: (i32, i32),
     ticks: u32,
     /// Something follows the last event.
     moving: bool,
@@ -252,8 +252,8 @@ pub fn set_up(nvic: &mut NVIC) -> Steps {
         moves: [0; LEVELS as usize + 1],
         levels: RELEASED,
         taken: 0,
-        x: 0,
-        y: 0,
+        steps: (0, 0),
+        slack: (0, 0),
         ticks: 0,
         moving: false,
         drained: true,
@@ -357,7 +357,8 @@ impl Steps {
             STATE.note_underrun();
             self.moving = false;
         }
-        STATE.report((self.x, self.y), self.ticks, self.drained);
+        STATE.report_slack(self.slack);
+        STATE.report(self.steps, self.ticks, self.drained);
         let waiting = self.written.wrapping_sub(self.taken);
         let words = (WORDS - RESERVED).saturating_sub(waiting);
         self.room = words.min((HEIGHTS - 1 - self.heights.len()) as u32);
@@ -388,27 +389,28 @@ impl Steps {
         if count > WORDS {
             return;
         }
-        let (mut steps, mut ticks, mut waits, mut pens) = (0u32, 0u32, 0, 0);
+        let (mut steps, mut slack) = (0u32, 0u32);
+        let (mut ticks, mut waits, mut pens) = (0u32, 0, 0);
         for number in 0..count {
             let word = place(self.taken.wrapping_add(number)).load(Ordering::Relaxed);
             ticks = ticks.wrapping_add(word >> 8);
-            if word & PULSES != 0 {
+            if word & TARGETS == target::PULSE {
                 steps = steps.wrapping_add(self.moves[(word & LEVELS) as usize]);
             } else if word & TARGETS == target::MOVE_PEN {
                 pens += 1;
             } else {
                 waits += 1;
+                if word & PULSES != 0 {
+                    slack = slack.wrapping_add(self.moves[(word & LEVELS) as usize]);
+                }
             }
         }
         let pulses = count - waits - pens;
         let beyond =
             waits * WAIT_TICKS + pens * PEN_TICKS + pulses * (PULSE_TICKS + self.pulse_ticks);
         self.ticks = self.ticks.wrapping_add(ticks).wrapping_add(beyond);
-        // Each within ±2^11, so the halves part again.
-        let dx = i32::from(steps as u16 as i16);
-        let dy = steps.wrapping_sub(dx.cast_unsigned()).cast_signed() >> 16;
-        self.x = self.x.wrapping_add(dx);
-        self.y = self.y.wrapping_add(dy);
+        add_packed(&mut self.steps, steps);
+        add_packed(&mut self.slack, slack);
         self.taken = taken;
     }
 
@@ -470,6 +472,9 @@ impl EventQueue for Steps {
                 self.moving = levels & StepEvent::AT_REST == 0;
                 let pins = (u32::from(levels) & LEVELS) ^ self.flips;
                 self.levels = pins & !PULSES;
+                if event.is_slack() {
+                    return self.push_slack(pins, event.ticks());
+                }
                 if pins & PULSES == 0 {
                     (pins | target::WAIT, WAIT_TICKS)
                 } else {
@@ -531,6 +536,19 @@ impl EventQueue for Steps {
 }
 
 impl Steps {
+    /// A pulse that is none for the state machine, so that it is counted apart: a wait while the pins
+    /// are high, and one while they are low.
+    fn push_slack(&mut self, pins: u32, ticks: u32) -> Result<(), StepEvent> {
+        self.room = self.room.saturating_sub(1);
+        let low = ticks.saturating_sub(self.pulse_ticks);
+        for (levels, ticks) in [(pins, self.pulse_ticks), (self.levels, low)] {
+            let count = ticks.saturating_sub(WAIT_TICKS);
+            self.put(levels | target::WAIT, count, StepWay::default());
+        }
+        self.publish();
+        Ok(())
+    }
+
     /// The next words are so many steps.
     #[inline(never)] // On its own it stays in the core's registers.
     fn tell_ways(&mut self, count: u32) {
@@ -563,6 +581,13 @@ impl Steps {
 fn flips() -> u32 {
     const DOWN: u8 = StepEvent::DOWN_X | StepEvent::DOWN_Y;
     RELEASED | u32::from(DOWN ^ STATE.inverted() << 2)
+}
+
+/// Adds the halves, each within ±2^11, so that they part again.
+fn add_packed((x, y): &mut (i32, i32), packed: u32) {
+    let dx = i32::from(packed as u16 as i16);
+    *x = x.wrapping_add(dx);
+    *y = y.wrapping_add(packed.wrapping_sub(dx.cast_unsigned()).cast_signed() >> 16);
 }
 
 /// How many words have left the channel and the state machine's queue.

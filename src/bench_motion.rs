@@ -1,0 +1,138 @@
+//! Counts the instructions of planning for each step event on a Cortex-M3: `cargo xtask bench --motion` runs it
+//! in QEMU.
+//!
+//! All that the main loop does from a target to the queue is counted, and nothing that the interrupt does.
+#![no_std]
+#![no_main]
+
+#[path = "boards/mps2.rs"]
+mod mps2;
+
+use cortex_m_semihosting::{debug, hprintln};
+use mps2::Counter;
+use panic_semihosting as _;
+use penup::drawing::{LineType, PagePoint};
+use penup::machine::{Machine, Path, PulserState, Setting, Settings, Target, Value};
+use penup::motion::{Block, EventQueue, StepEvent};
+use penup::step::{Arc, Turn};
+use static_cell::StaticCell;
+
+/// A queue that is never full and counts.
+struct Count(u64);
+
+impl EventQueue for Count {
+    fn room(&self) -> usize {
+        128
+    }
+    fn push(&mut self, _event: StepEvent) -> Result<(), StepEvent> {
+        self.0 += 1;
+        Ok(())
+    }
+}
+
+/// Steps per millimetre and mm/s of a job, and how many points of a circle are a target.
+struct Job {
+    name: &'static str,
+    steps: u16,
+    speed: u16,
+    stride: Option<usize>,
+}
+
+const JOBS: [Job; 4] = [
+    Job { name: "a line, 5 000 moves a second", steps: 100, speed: 50, stride: None },
+    Job { name: "a line, 100 000 moves a second", steps: 200, speed: 500, stride: None },
+    Job { name: "chords of 5 moves, 5 000 moves a second", steps: 100, speed: 50, stride: Some(5) },
+    Job {
+        name: "chords of 50 moves, 50 000 moves a second",
+        steps: 250,
+        speed: 200,
+        stride: Some(50),
+    },
+];
+
+/// m/s³
+const JERKS: [u16; 4] = [0, 100, 10, 1];
+
+/// The job's targets.
+enum Way {
+    Line(bool),
+    Circle(Arc, usize),
+}
+
+impl Way {
+    fn of(job: &Job) -> Self {
+        let Some(stride) = job.stride else { return Self::Line(false) };
+        let steps = i32::from(job.steps);
+        let [center, start] = [100, 190].map(|x| PagePoint { x: x * steps, y: 100 * steps });
+        match Arc::new(center, start, start, Turn::Clockwise) {
+            Ok(arc) => Self::Circle(arc, stride),
+            Err(_) => Self::Line(true),
+        }
+    }
+}
+
+impl Path for Way {
+    fn next_target(&mut self) -> Option<Target> {
+        let point = match self {
+            Self::Circle(arc, stride) => arc.nth(*stride - 1)?,
+            Self::Line(done) => {
+                if core::mem::replace(done, true) {
+                    return None;
+                }
+                PagePoint { x: 40_000, y: 17_000 }
+            }
+        };
+        Some(Target { point, ink: Some(LineType::Full) })
+    }
+    fn rewind(&mut self) {}
+}
+
+fn settings(job: &Job, jerk: u16) -> Settings {
+    let mut settings = Settings::default();
+    let acceleration = if job.speed > 100 { 5000 } else { 800 };
+    for (setting, value) in [
+        (Setting::StepPulse, 1),
+        (Setting::StepsPerMmX, i32::from(job.steps)),
+        (Setting::StepsPerMmY, i32::from(job.steps)),
+        (Setting::MaxRateX, 60 * i32::from(job.speed)),
+        (Setting::MaxRateY, 60 * i32::from(job.speed)),
+        (Setting::DrawSpeed, 60 * i32::from(job.speed)),
+        (Setting::AccelerationX, acceleration),
+        (Setting::AccelerationY, acceleration),
+        (Setting::Jerk, jerk.into()),
+    ] {
+        if settings.set(setting, Value::from_num(value)).is_err() {
+            hprintln!("refused: {} {}", setting.info().name, value);
+        }
+    }
+    settings
+}
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    static PINS: StaticCell<PulserState> = StaticCell::new();
+    static BLOCKS: StaticCell<[Block; 128]> = StaticCell::new();
+    let pins = PINS.init_with(PulserState::new);
+    let blocks = BLOCKS.init_with(|| [Block::EMPTY; 128]);
+    let mut counter = Counter::start();
+    for job in &JOBS {
+        let counts = JERKS.map(|jerk| {
+            let mut machine = Machine::new(settings(job, jerk), blocks, pins, u32::MAX);
+            let mut queue = Count(0);
+            // Measured by its first target; the rest is drawn.
+            if machine.start(&mut Way::Line(true)).is_err() {
+                hprintln!("refused");
+            }
+            let mut way = Way::of(job);
+            let begun = counter.read();
+            machine.fill(&mut way, &mut queue);
+            (counter.read() - begun) / queue.0.max(1)
+        });
+        let [none, high, middle, low] = counts;
+        hprintln!("{}|{}|{}|{}|{}", job.name, none, high, middle, low);
+    }
+    debug::exit(debug::EXIT_SUCCESS);
+    loop {
+        cortex_m::asm::wfi();
+    }
+}
