@@ -4,7 +4,8 @@
 use penup_client::emulator::{
     EmulatedBoard, Machine, MachineEventKind, Pico, PicoByUsb, image_path,
 };
-use penup_host_tests::emulated_jobs::Line;
+use penup_client::machines::Board;
+use penup_host_tests::emulated_jobs::{Line, assert_same_as_on_the_host, events_until_idle};
 use penup_host_tests::whole_jobs::job_lines;
 use std::error::Error;
 use std::time::Duration;
@@ -64,6 +65,13 @@ impl Watched {
         self.0.hear_greeting()
     }
 
+    /// Gives the job up.
+    fn give_up(&mut self) -> TestResult {
+        self.greet()?;
+        while !self.0.status()?.starts_with("<Idle") {}
+        Ok(())
+    }
+
     /// Every setting, by its line.
     fn settings(&mut self) -> Result<Vec<String>, Box<dyn Error>> {
         self.0.emulator.send(b"$$\n")?;
@@ -82,6 +90,18 @@ impl Watched {
     /// If it is neither.
     fn survive(&mut self, old: &[String], travel: u32) -> Result<bool, Box<dyn Error>> {
         self.0.emulator.send(format!("$130={travel}\n").as_bytes())?;
+        self.hear_restart()?;
+        let found = self.settings()?;
+        if found == old {
+            return Ok(false);
+        }
+        let new: Vec<String> = old.iter().map(|line| changed(line, travel)).collect();
+        assert_eq!(found, new);
+        Ok(true)
+    }
+
+    /// Waits until the board has started again, and for the host to find it.
+    fn hear_restart(&mut self) -> TestResult {
         let mut heard = Vec::new();
         while !heard.windows(4).any(|four| four == b"Grbl") {
             let mut buffer = [0; 256];
@@ -93,14 +113,7 @@ impl Watched {
         }
         while self.0.emulator.0.receive(&mut [0; 256], Duration::ZERO)? > 0 {}
         self.0.forget();
-        self.greet()?;
-        let found = self.settings()?;
-        if found == old {
-            return Ok(false);
-        }
-        let new: Vec<String> = old.iter().map(|line| changed(line, travel)).collect();
-        assert_eq!(found, new);
-        Ok(true)
+        self.greet()
     }
 }
 
@@ -201,5 +214,88 @@ fn a_hanging_program_is_started_again_in_alarm() -> TestResult {
     }
     assert!(!drivers_on && !machine.pen_is_down());
     assert_eq!(line.ask("$X")?, "ok");
+    Ok(())
+}
+
+/// The board's answer to a question of one line, up to `ok` or the error.
+fn ask_all(line: &mut Line<PicoByUsb>, text: &str) -> Result<Vec<String>, Box<dyn Error>> {
+    line.emulator.send(format!("{text}\n").as_bytes())?;
+    let mut heard = Vec::new();
+    loop {
+        heard.push(line.hear()?);
+        if heard.last().is_some_and(|last| last == "ok" || last.starts_with("error")) {
+            return Ok(heard);
+        }
+    }
+}
+
+/// What the job is, by its lengths.
+fn job(line: &mut Line<PicoByUsb>) -> Result<Vec<String>, Box<dyn Error>> {
+    let answer = ask_all(line, "$model")?;
+    Ok(answer.into_iter().filter(|line| line.starts_with("[JOB:")).collect())
+}
+
+#[test]
+fn the_last_job_is_drawn_again_after_a_loss_of_power() -> TestResult {
+    let lines = job_lines("lattice2.obj", &["$page=60x80", "$margin=5"]);
+    let mut line = Watched::start()?.0;
+    assert_eq!(ask_all(&mut line, "$again")?.last().map(String::as_str), Some("error:161"));
+    for text in &lines {
+        assert_eq!(ask_all(&mut line, text)?, ["ok"], "{text}");
+    }
+    let plotted = job(&mut line)?;
+    let mut watched = Watched(line);
+    watched.0.emulator.0.cut_power()?;
+    watched.hear_restart()?;
+    let mut line = watched.0;
+    // Not while the steps are others: it would be drawn at another size.
+    assert_eq!(ask_all(&mut line, "$100=160")?, ["ok"]);
+    assert_eq!(ask_all(&mut line, "$again")?.last().map(String::as_str), Some("error:162"));
+    assert_eq!(ask_all(&mut line, "$100=80")?, ["ok"]);
+    line.emulator.pin_changes()?;
+    assert_eq!(ask_all(&mut line, "$again")?, ["ok"]);
+    assert_eq!(job(&mut line)?, plotted);
+    let pins = events_until_idle(&mut line)?;
+    assert_same_as_on_the_host(Board::Pico, &lines, &pins);
+    Ok(())
+}
+
+#[test]
+fn after_a_cut_while_a_job_is_kept_it_is_the_old_one_or_the_new_one() -> TestResult {
+    /// A sector is erased, a page of figures and strokes is written, and the header's.
+    const JOB_BYTES: u64 = 4096 + 2 * 256;
+    let mut watched = Watched::start()?;
+    let page = ["$page=60x60", "$margin=5"];
+    let lines = [job_lines("cube.obj", &page), job_lines("octahedron.obj", &page)];
+    let mut jobs = Vec::new();
+    for lines in &lines {
+        for text in [String::from("$clear")].iter().chain(lines) {
+            assert_eq!(ask_all(&mut watched.0, text)?, ["ok"], "{text}");
+        }
+        jobs.push(job(&mut watched.0)?);
+        watched.give_up()?;
+    }
+    let mut random = 1834;
+    let (mut kept, mut changes) = (1, 0);
+    for number in 0..cut_count().div_ceil(10) {
+        let (plot, model) = lines[1 - kept].split_last().ok_or("no line")?;
+        for text in [String::from("$clear")].iter().chain(model) {
+            assert_eq!(ask_all(&mut watched.0, text)?, ["ok"], "{text}");
+        }
+        // Every other time when it counts already.
+        let place = if number % 2 == 0 { 0 } else { VALID_FROM };
+        let place = place + next_random(&mut random) % (JOB_BYTES - place);
+        watched.0.emulator.0.cut_power_in_flash(place)?;
+        watched.0.emulator.send(format!("{plot}\n").as_bytes())?;
+        watched.hear_restart()?;
+        assert_eq!(ask_all(&mut watched.0, "$again")?, ["ok"]);
+        let found = job(&mut watched.0)?;
+        let now = jobs.iter().position(|job| *job == found).ok_or("neither")?;
+        assert_eq!(now != kept, place >= VALID_FROM, "cut after {place} bytes");
+        changes += usize::from(now != kept);
+        kept = now;
+        watched.give_up()?;
+    }
+    assert!(changes > 0);
     Ok(())
 }

@@ -73,6 +73,16 @@ pub struct Stored {
 }
 
 impl Stored {
+    /// How many segments and points there are.
+    pub fn counts(&self) -> [usize; 2] {
+        [self.segments, self.points]
+    }
+
+    /// What has these [`Stored::counts`].
+    pub fn of_counts([segments, points]: [usize; 2]) -> Self {
+        Self { segments, points }
+    }
+
     /// Bytes from the beginning of the memory to the end of the drawing.
     pub fn bytes(&self) -> usize {
         self.segment_bytes() + Scratch::bytes_for::<PagePoint>(self.points)

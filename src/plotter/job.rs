@@ -93,6 +93,61 @@ impl Job {
         Ok(Self { stored, legs, report, degenerate_faces })
     }
 
+    /// How many words of its memory hold it.
+    pub(super) fn words(&self) -> usize {
+        (self.stored.bytes() + Scratch::bytes_for::<Leg>(self.legs)) / size_of::<u64>()
+    }
+
+    /// All of it but its memory, as numbers: see [`Job::from_figures`].
+    pub(super) fn figures(&self) -> [u32; Self::FIGURES] {
+        let [segments, points] = self.stored.counts().map(|count| count as u32);
+        let report = &self.report;
+        let low = |length: u64| length as u32;
+        let high = |length: u64| (length >> 32) as u32;
+        [
+            segments,
+            points,
+            self.legs as u32,
+            report.odd_points,
+            report.components,
+            report.lifts,
+            u32::from(report.optimal),
+            low(report.pen_down),
+            high(report.pen_down),
+            low(report.pen_up),
+            high(report.pen_up),
+            low(report.bound),
+            high(report.bound),
+        ]
+    }
+
+    /// How many numbers it takes.
+    pub(super) const FIGURES: usize = 13;
+
+    /// The job that these numbers stand for; `None` if its memory would be larger than any. No number
+    /// makes [`Job::strokes`] leave its memory.
+    pub(super) fn from_figures(figures: [u32; Self::FIGURES]) -> Option<Self> {
+        let [segments, points, legs, odd_points, components, lifts, optimal, lengths @ ..] =
+            figures;
+        let [down, down_high, up, up_high, bound, bound_high] = lengths;
+        let count = |count: u32| u16::try_from(count).ok().map(usize::from);
+        let length = |low: u32, high: u32| u64::from(high) << 32 | u64::from(low);
+        Some(Self {
+            stored: Stored::of_counts([count(segments)?, count(points)?]),
+            legs: count(legs)?,
+            report: order::Report {
+                odd_points,
+                components,
+                lifts,
+                optimal: optimal != 0,
+                pen_down: length(down, down_high),
+                pen_up: length(up, up_high),
+                bound: length(bound, bound_high),
+            },
+            degenerate_faces: 0,
+        })
+    }
+
     /// Gives its memory up; what came of the order stays.
     pub fn release(&mut self) {
         (self.stored, self.legs) = (Stored::default(), 0);

@@ -1,7 +1,7 @@
 //! What outlives a loss of power.
 
-use super::{Board, Record};
-use crate::machine::{SETTING_COUNT, Settings, Value};
+use super::{Board, Job, NotKept, Record};
+use crate::machine::{SETTING_COUNT, Setting, Settings, Value};
 use crate::protocol::Refusal;
 
 /// A setting: its number, its value.
@@ -35,4 +35,67 @@ pub(super) fn keep_settings<B: Board>(settings: &Settings, board: &mut B) -> Res
         place[2..].copy_from_slice(&value.to_bits().to_le_bytes());
     }
     board.keep(Record::Settings, &[&bytes]).map_err(|_| Refusal::NotKept)
+}
+
+/// Tells a kept job from one of another layout.
+const JOB_LAYOUT: u32 = u32::from_le_bytes(*b"job1");
+/// The layout, the steps of a millimetre, the job's figures; then its memory.
+const JOB_HEADER: usize = 3 + Job::FIGURES;
+
+/// The steps of a millimetre, which a job is counted in.
+fn steps(settings: &Settings) -> [u32; 2] {
+    [Setting::StepsPerMmX, Setting::StepsPerMmY]
+        .map(|setting| settings.get(setting).to_bits().cast_unsigned())
+}
+
+/// Keeps a job, which lies in `words`.
+///
+/// # Errors
+/// [`NotKept`]: the job before still is.
+#[inline(never)] // Its frame must not lie under the stages'.
+pub(super) fn keep_job<B: Board>(
+    job: &Job,
+    settings: &Settings,
+    words: &[u64],
+    board: &mut B,
+) -> Result<(), NotKept> {
+    let [x, y] = steps(settings);
+    let numbers = [JOB_LAYOUT, x, y].into_iter().chain(job.figures());
+    let mut header = [[0; 4]; JOB_HEADER];
+    for (place, number) in header.iter_mut().zip(numbers) {
+        *place = number.to_le_bytes();
+    }
+    let memory = words.get(..job.words()).ok_or(NotKept)?;
+    board.keep(Record::Job, &[header.as_flattened(), bytemuck::cast_slice(memory)])
+}
+
+/// The job that was kept last; its memory is then in `words`.
+///
+/// # Errors
+/// [`Refusal::NoJobKept`], [`Refusal::OtherSteps`]; `words` hold no job then.
+#[inline(never)] // Its frame must not lie under the stages'.
+pub(super) fn job<B: Board>(
+    settings: &Settings,
+    words: &mut [u64],
+    board: &mut B,
+) -> Result<Job, Refusal> {
+    let mut found = Err(Refusal::NoJobKept);
+    board.recall(Record::Job, &mut |kept| {
+        let mut header = [[0; 4]; JOB_HEADER];
+        if kept.read(header.as_flattened_mut()) != size_of_val(&header) {
+            return;
+        }
+        let [layout, x, y, figures @ ..] = header.map(u32::from_le_bytes);
+        let job = Job::from_figures(figures).filter(|_| layout == JOB_LAYOUT);
+        let Some((job, memory)) = job.and_then(|job| Some((job, words.get_mut(..job.words())?)))
+        else {
+            return;
+        };
+        if [x, y] != steps(settings) {
+            found = Err(Refusal::OtherSteps);
+        } else if kept.read(bytemuck::cast_slice_mut(memory)) == size_of_val(memory) {
+            found = Ok(job);
+        }
+    });
+    found
 }

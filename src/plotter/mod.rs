@@ -66,6 +66,7 @@ pub struct Plotter<'m> {
 enum Next {
     Nothing,
     Plot,
+    Again,
 }
 
 /// All but the line being read, which is borrowed while it is carried out.
@@ -141,7 +142,8 @@ impl<'m> Plotter<'m> {
         let outcome = match self.reader.push(byte) {
             None => return true,
             Some(Ok(line)) => match self.inner.carry_out(line, board) {
-                Ok(Next::Plot) => self.inner.plot(board),
+                Ok(Next::Plot) => self.inner.plot(board, false),
+                Ok(Next::Again) => self.inner.plot(board, true),
                 Ok(Next::Nothing) => Ok(()),
                 Err(refusal) => Err(refusal),
             },
@@ -276,6 +278,7 @@ impl Inner<'_> {
             Command::List(part, numbers) => self.begin_list(part, numbers)?,
             Command::Undo => self.undo()?,
             Command::Plot => return Ok(Next::Plot),
+            Command::Again => return Ok(Next::Again),
             Command::Unlock => self.machine.unlock()?,
             Command::Home => self.home()?,
             Command::Check => self.machine.check(self.machine.state() != State::Check)?,
@@ -287,7 +290,7 @@ impl Inner<'_> {
     }
 
     #[inline(never)] // Its frame must not lie under the stages'.
-    fn plot<B: Board>(&mut self, board: &mut B) -> Result<(), Refusal> {
+    fn plot<B: Board>(&mut self, board: &mut B, again: bool) -> Result<(), Refusal> {
         if !matches!(self.machine.state(), State::Idle | State::Check) {
             return Err(match self.machine.state() {
                 State::Alarm(_) | State::Sleep => Refusal::Locked,
@@ -297,7 +300,11 @@ impl Inner<'_> {
         let position = self.machine.position_mm();
         let asked = RealTime::default();
         let mut listener = Listener { board, position, stage: Stage::View, asked };
-        let computed = self.compute(&mut listener, &mut Unobserved);
+        let computed = if again {
+            self.recall(listener.board)
+        } else {
+            self.compute(&mut listener, &mut Unobserved).map(|()| self.keep(listener.board))
+        };
         let begun = computed.and_then(|()| self.begin(&mut listener));
         let asked = listener.asked;
         if asked.has(RealTime::EMERGENCY) {
@@ -306,6 +313,25 @@ impl Inner<'_> {
         begun?;
         self.report_degenerate(board);
         self.act(asked);
+        Ok(())
+    }
+
+    /// Keeps the job, before anything moves: flash cannot be read meanwhile.
+    #[inline(never)] // Its frame must not lie under the stages'.
+    fn keep<B: Board>(&self, board: &mut B) {
+        if kept::keep_job(&self.job, self.machine.settings(), self.words, board).is_err() {
+            Reply(board)
+                .line(format_args!("[MSG:$again will not draw this: the flash is worn out]"));
+        }
+    }
+
+    /// Takes the kept job in place of the last one.
+    #[inline(never)] // Its frame must not lie under the stages'.
+    fn recall<B: Board>(&mut self, board: &mut B) -> Result<(), Refusal> {
+        self.kept_words = 0;
+        self.job = Job::default();
+        self.cursor = Cursor::default();
+        self.job = kept::job(self.machine.settings(), self.words, board)?;
         Ok(())
     }
 

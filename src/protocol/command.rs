@@ -69,6 +69,8 @@ pub enum Command<'a> {
     Undo,
     /// `$plot`
     Plot,
+    /// `$again`
+    Again,
     /// `$X`
     Unlock,
     /// `$H`
@@ -310,6 +312,7 @@ pub const HELP: &[(&str, &str)] = &[
     ("$reflect=A,B,C,FIRST,LAST", "move to the image about the plane of three vertices"),
     ("$undo", "take back the last change of the model, unless a plot came after"),
     ("$plot", "draw it"),
+    ("$again", "draw the last job again, also after a loss of power"),
     ("$X", "unlock after an alarm"),
     ("$H", "find the limit switches"),
     ("$J=G91 X.. Y.. F..", "move by hand with the pen up; byte 0x85 ends it"),
@@ -400,6 +403,7 @@ impl<'a> Command<'a> {
             "clear" => Ok(Self::Clear),
             "undo" => Ok(Self::Undo),
             "plot" => Ok(Self::Plot),
+            "again" => Ok(Self::Again),
             _ => Err(Refusal::UnknownSystemCommand),
         }
     }

@@ -91,6 +91,10 @@ pub enum Refusal {
     Aborted,
     /// The flash does not keep it.
     NotKept,
+    /// No job is kept.
+    NoJobKept,
+    /// The kept job is counted in other steps.
+    OtherSteps,
 }
 
 /// Each `error:N` and what it means, as `docs/protocol.md` lists them.
@@ -145,6 +149,8 @@ pub const MEANINGS: &[(u16, &str)] = &[
     (151, "setting conflicts with another"),
     (152, "move too long"),
     (160, "in force, but not kept: the flash is worn out"),
+    (161, "no job is kept"),
+    (162, "the kept job is for other steps"),
 ];
 
 impl Refusal {
@@ -207,6 +213,8 @@ impl Refusal {
             Self::DrawingTooLarge(_) => 140,
             Self::Aborted => 141,
             Self::NotKept => 160,
+            Self::NoJobKept => 161,
+            Self::OtherSteps => 162,
             Self::TooManyLines => 142,
             Self::NothingToUndo => 143,
         }
@@ -310,6 +318,8 @@ impl fmt::Display for Refusal {
             }
             Self::Aborted => formatter.write_str("the job was given up"),
             Self::NotKept => formatter.write_str("in force until power is lost: the flash does not keep it"),
+            Self::NoJobKept => formatter.write_str("send a model and $plot; only boards with flash for it keep the job"),
+            Self::OtherSteps => formatter.write_str("set $100 and $101 as they were, or $plot anew"),
         }
     }
 }

@@ -4,8 +4,8 @@ use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, ensure};
 
-use crate::command::{describe, run};
-use crate::firmware::Board;
+use crate::command::{cargo, describe, run};
+use crate::firmware::{self, Board};
 use crate::set_up;
 
 /// Seconds for a lattice of 1, 8, 27 … cubes: Griffith on an ICL 1904S, Brown on a PDP-11/34.
@@ -18,6 +18,14 @@ const PAPERS: [[&str; 2]; 7] = [
     ["92.6", "573"],
     ["161", "did not fit"],
 ];
+
+/// Builds the Pico's image, runs it in its emulator, and prints the cycles of each stage (some 5 minutes).
+pub fn count_cycles() -> Result<()> {
+    set_up::emulator(Board::Pico)?;
+    firmware::check(Board::Pico, &firmware::build(Board::Pico)?)?;
+    let program = ["--package", "penup-host-tests", "--example", "pico_cycles"];
+    run(cargo().current_dir(crate::root()).args(["run", "--quiet", "--release"]).args(program))
+}
 
 /// Prints the table of scenes of `docs/performance.md`.
 pub fn count() -> Result<()> {

@@ -159,17 +159,52 @@ pub fn build(board: Board) -> Result<PathBuf> {
     Ok(image)
 }
 
+/// What an image may take of a board, in bytes. Whoever needs more raises it here, and says why.
+struct Budget {
+    flash: u64,
+    ram: u64,
+    /// At least.
+    stack: u64,
+}
+
+impl Board {
+    fn budget(self) -> Budget {
+        match self {
+            // All that the linker leaves: it refuses what is beyond.
+            Self::Lm3s6965 => Budget { flash: 256 << 10, ram: 55_936, stack: 9_600 },
+            Self::Pico => Budget { flash: 480 << 10, ram: 232 << 10, stack: 12 << 10 },
+        }
+    }
+}
+
 /// What an image takes of the board.
 pub struct Sizes {
     board: Board,
     flash: u64,
     ram: u64,
     stack: u64,
+    /// Each section: its name, its bytes.
+    sections: Vec<(String, u64)>,
+}
+
+impl Sizes {
+    /// Refuses what takes more than its budget.
+    fn keep_budget(&self) -> Result<()> {
+        let Budget { flash, ram, stack } = self.board.budget();
+        let name = self.board.name();
+        ensure!(self.flash <= flash, "{name}: {} bytes of flash, budget {flash}", self.flash);
+        ensure!(self.ram <= ram, "{name}: {} bytes of RAM, budget {ram}", self.ram);
+        ensure!(self.stack >= stack, "{name}: a stack of {}, budget {stack}", self.stack);
+        Ok(())
+    }
 }
 
 impl fmt::Display for Sizes {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let Self { board, flash, ram, stack } = self;
+        let Self { board, flash, ram, stack, sections } = self;
+        for (name, size) in sections {
+            writeln!(f, "{}: {size:7} {name}", board.name())?;
+        }
         write!(
             f,
             "{}: flash {flash} of {} bytes, RAM {ram} of {} bytes beside a stack of {stack}",
@@ -222,7 +257,8 @@ pub fn check(board: Board, image: &Path) -> Result<Sizes> {
         "the entry {entry:#010x} is no code in flash"
     );
 
-    let mut sizes = Sizes { board, flash: 0, ram: 0, stack: stack - ram.start };
+    let mut sizes =
+        Sizes { board, flash: 0, ram: 0, stack: stack - ram.start, sections: Vec::new() };
     for section in elf.sections() {
         let SectionFlags::Elf { sh_flags } = section.flags() else {
             continue;
@@ -235,6 +271,7 @@ pub fn check(board: Board, image: &Path) -> Result<Sizes> {
         if section.name()? == ".defmt" {
             continue;
         }
+        sizes.sections.push((section.name()?.to_owned(), size));
         if flash.holds(start, size) {
             sizes.flash += size;
         } else if ram.holds(start, size) {
@@ -247,5 +284,6 @@ pub fn check(board: Board, image: &Path) -> Result<Sizes> {
             bail!("section {} at {start:#010x} is outside the memory", section.name()?);
         }
     }
+    sizes.keep_budget()?;
     Ok(sizes)
 }

@@ -51,10 +51,13 @@ enum Task {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         arguments: Vec<String>,
     },
-    /// Counts the instructions of each stage on a Cortex-M3, for every lattice.
+    /// Counts the instructions of each stage on a Cortex-M3, or the cycles on a Pico, for every lattice.
     Bench {
-        /// Those of planning for each step event alone.
-        #[arg(long)]
+        /// The LM3S6965's core, or the Pico itself.
+        #[arg(long, value_enum, default_value_t)]
+        board: Board,
+        /// Those of planning for each step event alone, on the Cortex-M3.
+        #[arg(long, conflicts_with = "board")]
         motion: bool,
     },
     /// Draws the figures of the papers into docs/gallery.
@@ -102,8 +105,9 @@ fn carry_out() -> Result<()> {
         }
         Some(Task::Flash { board }) => flash::flash(board)?,
         Some(Task::Plot { arguments }) => plot(&arguments)?,
-        Some(Task::Bench { motion: true }) => bench::count_motion()?,
-        Some(Task::Bench { motion: false }) => bench::count()?,
+        Some(Task::Bench { motion: true, .. }) => bench::count_motion()?,
+        Some(Task::Bench { board: Board::Lm3s6965, .. }) => bench::count()?,
+        Some(Task::Bench { board: Board::Pico, .. }) => bench::count_cycles()?,
         Some(Task::Gallery) => gallery::make()?,
         Some(Task::Experiments) => experiments::repeat()?,
         Some(Task::Scenes { count }) => test::random_scenes(count)?,

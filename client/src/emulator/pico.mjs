@@ -8,9 +8,11 @@
 // have been erased or written (the number in the cycle's place), and comes back at once; 4 the main
 // loop hangs from that cycle on, 5 a byte for USB, 6 the USB host is plugged in (1), takes
 // nothing more (2), takes again (3); 7 a switch is fitted to a pin, which closes where its axis has gone to so many
-// steps (+ 2^40) or below, and bounces. Out: 0 a byte
+// steps (+ 2^40) or below, and bounces; 8 a function (its number, its
+// address in the cycle's place) is timed. Out: 0 a byte
 // of the serial line, 1 a pin's new level, 2 the time, 3 a byte of the log, 4 the chip was reset (0 by
-// the loss of power, 1 by the watchdog), 5 a byte of USB.
+// the loss of power, 1 by the watchdog), 5 a byte of USB, 6 a timed function has
+// returned (its number, the cycles in the cycle's place).
 //
 // rp2040js has no boot ROM: here is one, of the functions that the image asks for. Each is a
 // breakpoint that this program serves. Flash takes as long as a Pico's.
@@ -46,6 +48,8 @@ const USB = 5;
 const USB_HOST = 6;
 const SWITCH = 7;
 const SWITCH_ZERO = 2 ** 40;
+const TIMED = 8;
+const RETURNED = 6;
 const output = Buffer.alloc(1 << 16);
 let filled = 0;
 
@@ -426,6 +430,7 @@ process.stdin.on('data', (data) => {
   for (; at + 8 <= rest.length; at += 8) {
     const entry = { value: rest[at + 1], cycle: rest.readUIntLE(at + 2, 6) };
     if (rest[at] === SERIAL) bytes.push(entry);
+    else if (rest[at] === TIMED) timed.set(entry.cycle, entry.value);
     else if (rest[at] === SWITCH) {
       const axis = entry.value - 8;
       switches[axis] = { pin: entry.value, at: entry.cycle - SWITCH_ZERO, closed: false };
@@ -491,6 +496,25 @@ function takeLog() {
   chip.writeUint32(transfer + 40, read);
 }
 
+// --- Functions that are timed ----------------------------------------------------------------------
+
+/** Their numbers, by address. */
+const timed = new Map();
+/** Those that have been called, and where each returns to. */
+const calls = [];
+
+/** Before each instruction. */
+function timeFunctions() {
+  const last = calls.at(-1);
+  if (last && core.PC === last.returnsTo && core.SP === last.stack) {
+    calls.pop();
+    report(RETURNED, last.number, now() - last.began);
+  }
+  const number = timed.get(core.PC);
+  if (number === undefined) return;
+  calls.push({ number, returnsTo: core.LR & ~1, stack: core.SP, began: now() });
+}
+
 // --- Time ----------------------------------------------------------------------------------------
 
 function pass(nanos) {
@@ -521,6 +545,7 @@ function run(cycles) {
       const due = Math.min(alarm, Math.ceil(pioDue), inputDue(), end);
       pass(Math.max(due - cycle, 0) * NANOS);
     } else {
+      if (timed.size) timeFunctions();
       pass(core.executeInstruction() * NANOS);
       if (flashNanos) waitForFlash();
     }

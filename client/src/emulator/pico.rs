@@ -46,6 +46,7 @@ struct Shared {
 struct State {
     serial: VecDeque<u8>,
     usb: VecDeque<u8>,
+    timed: Vec<(u8, u64)>,
     pins: Vec<PinChange>,
     cycles: u64,
     log: Vec<String>,
@@ -162,6 +163,31 @@ impl Pico {
     /// The emulator has ended.
     pub fn cut_power_in_flash(&mut self, bytes: u64) -> io::Result<()> {
         self.tell(CUT_FLASH, 0, bytes)
+    }
+
+    /// Counts the cycles of each call of a function of `image` from now on, interrupts counted in: the first function whose
+    /// mangled name contains `name`. What [`Pico::take_timed`] gives bears `number`.
+    ///
+    /// # Errors
+    /// [`EmulatorError::BadImage`] if there is none, or the emulator has ended.
+    pub fn time_function(
+        &mut self,
+        image: &Path,
+        name: &str,
+        number: u8,
+    ) -> Result<(), EmulatorError> {
+        let bad = |reason: String| EmulatorError::BadImage { reason };
+        let elf = fs::read(image).map_err(|_| EmulatorError::NoImage { path: image.into() })?;
+        let elf = object::File::parse(&*elf).map_err(|error| bad(error.to_string()))?;
+        let mut symbols = elf.symbols();
+        let symbol = symbols.find(|symbol| symbol.name().is_ok_and(|found| found.contains(name)));
+        let symbol = symbol.ok_or_else(|| bad(format!("there is no function {name}")))?;
+        Ok(self.tell(TIMED, number, symbol.address() & !1)?)
+    }
+
+    /// Each call of a function that is timed and has returned since last asked: its number, its cycles.
+    pub fn take_timed(&mut self) -> Vec<(u8, u64)> {
+        std::mem::take(&mut self.shared.lock().timed)
     }
 
     /// Lets the firmware's main loop hang.
@@ -409,6 +435,8 @@ const HANG: u8 = 4;
 const USB: u8 = 5;
 const USB_HOST: u8 = 6;
 const SWITCH: u8 = 7;
+const TIMED: u8 = 8;
+const RETURNED: u8 = 6;
 /// Where the emulator's axes begin.
 const SWITCH_ZERO: i64 = 1 << 40;
 
@@ -438,9 +466,12 @@ fn read(mut stdout: ChildStdout, shared: &Shared, mut log: PipeWriter) {
         state.ended = count == 0;
         for bytes in buffer[..whole].as_chunks().0 {
             let record = Record::from_bytes(*bytes);
-            state.cycles = record.cycle;
+            if record.what != RETURNED {
+                state.cycles = record.cycle;
+            }
             match record.what {
                 SERIAL => state.serial.push_back(record.value),
+                RETURNED => state.timed.push((record.value, record.cycle)),
                 USB => state.usb.push_back(record.value),
                 PIN => state.pins.extend(servo.pin_change(&record)),
                 LOG => logged.push(record.value),

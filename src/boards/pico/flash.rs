@@ -18,15 +18,17 @@ use super::{BOOT_2, critical, emergency};
 /// Where the flash is read.
 const MAPPED_AT: usize = 0x1000_0000;
 /// The memory map leaves what follows to this module.
-const START: u32 = 1856 << 10;
+const START: u32 = 1760 << 10;
 const END: u32 = 2048 << 10;
 const SECTOR_BYTES: usize = 4096;
+/// For all of the working memory, with a page before it and less than a sector of figures.
+const JOB_BYTES: u32 = (128 << 10) + SECTOR_BYTES as u32;
 
 /// Where a record lies.
 pub const fn slots(record: Record) -> Slots {
     match record {
         Record::Settings => Slots { start: START, bytes: SECTOR_BYTES as u32 },
-        Record::Job => Slots { start: START + 0x2000, bytes: 0x1_6000 },
+        Record::Job => Slots { start: START + 0x2000, bytes: JOB_BYTES },
     }
 }
 const _: () = assert!(slots(Record::Job).start + 2 * slots(Record::Job).bytes <= END);

@@ -7,7 +7,7 @@
 //! | ENABLE (low: drivers on) | GP6: the same |
 //! | PEN (servo) | GP7: PWM slice 3 |
 //! | limit switches of x and y, emergency stop (closed: low) | GP8, GP9, GP10 |
-//! | settings and last job | the last 192 KiB of flash |
+//! | settings and last job | the last 288 KiB of flash |
 //! | next block of steps | DMA_IRQ_0, priority 0 |
 //! | pen's heights | PIO0_IRQ_0, priority 1 |
 //! | serial line's bytes | UART0_IRQ, USBCTRL_IRQ, priority 2 |
