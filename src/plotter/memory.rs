@@ -20,7 +20,7 @@ pub struct Memory<const VERTICES: usize, const CORNERS: usize, const WORDS: usiz
 }
 
 /// For 64 KiB of RAM: a lattice of 125 cubes.
-pub type Lm3s6965Memory = Memory<1000, 3000, 4192>;
+pub type Lm3s6965Memory = Memory<1000, 3000, 4224>;
 
 /// For 264 KiB of RAM: a lattice of 343 cubes.
 pub type PicoMemory = Memory<4096, 12288, 16384>;

@@ -95,6 +95,7 @@ impl<'m> Plotter<'m> {
     }
 
     /// The same with other settings than the defaults.
+    #[inline(never)] // What it builds the parts in must not lie under the stages' frames.
     pub fn with_settings(memory: Lent<'m>, pins: &'m PulserState, settings: Settings) -> Self {
         let Lent { vertices, corners, blocks, words } = memory;
         Self {
