@@ -16,9 +16,9 @@
 //! The pulses leave when the plan is half a step from the new position: the pins are never more
 //! than half a step from where the plan is.
 //!
-//! Measured on a Cortex-M3, built for size, everything between target and queue included: 132
-//! instructions for each event at 100,000 moves a second, and 170 to 340 with a limit on jerk; at 5,000 moves a
-//! second, 1060 and 1310 to 2000. `cargo xtask bench --motion` counts them.
+//! Measured on a Cortex-M3, built for size, everything between target and queue included: 135
+//! instructions for each event at 100,000 moves a second, and 170 to 350 with a limit on jerk; at 5,000 moves a
+//! second, 1100 and 1350 to 2040. `cargo xtask bench --motion` counts them.
 //!
 //! Not done here: limits of travel, the pen's heights, states. That is `machine`.
 

@@ -83,7 +83,7 @@ impl Arc {
     /// let at = |x, y| PagePoint { x, y };
     /// let steps = [Millimetres::lit("100"), Millimetres::lit("50")];
     /// let arc = Arc::scaled(steps, at(0, 0), at(4, 0), at(-4, 0), Turn::Counterclockwise)?;
-    /// assert!(arc.map(|point| point.y).eq([1, 1, 2, 2, 2, 2, 2, 1, 1, 0]));
+    /// assert!(arc.map(|point| point.y).eq([1, 2, 2, 2, 2, 2, 1, 0]));
     /// # Ok::<(), penup::step::ArcError>(())
     /// ```
     ///
