@@ -237,7 +237,7 @@ impl fmt::Display for Refusal {
                 "both ends of an arc are as far from its centre, within 4 m; x and y have the same steps",
             ),
             Self::Busy => formatter.write_str("wait for the plot to end, or send ctrl-X"),
-            Self::Locked => formatter.write_str("send $X to unlock"),
+            Self::Locked => formatter.write_str("release the stop if it is pressed, then send $X to unlock"),
             Self::LineTooLong { limit } => write!(formatter, "a line has at most {limit} bytes"),
             Self::NotText => {
                 formatter.write_str("a byte of the line is no text: check the baud rate")
