@@ -30,6 +30,9 @@ const KICKS_BETWEEN_TURNS: u32 = 64;
 /// Of the work, what goes into choosing the tour that the rest is spent on.
 const FIRST_TOURS_PERCENT: u64 = 48;
 
+/// Where the kicks' random numbers begin: anywhere but at 0; this is no worse than others on a dozen drawings.
+const SEED: u32 = 23_757;
+
 /// A tour to be improved.
 pub(super) struct Tour<'t> {
     /// All chains of the network.
@@ -75,7 +78,8 @@ pub(super) fn improve(
     let patience = PATIENCE.saturating_mul(moves);
     let length = route_length(network, route, open);
     let cycle: &mut [Leg] = scratch.take(legs)?;
-    let mut best = Best { network, near, open, patience, length, route };
+    let mut best =
+        Best { network, near, open, patience, length, route, kicks: Kicks { random: SEED } };
     best.restore(cycle);
     best.work_on(cycle, share, scratch.reborrow(), pace)?;
     mend(network, near, mate, scratch.reborrow(), pace)?;
@@ -114,6 +118,7 @@ struct Best<'b, 'a> {
     patience: u32,
     length: u64,
     route: &'b mut [Leg],
+    kicks: Kicks,
 }
 
 impl Best<'_, '_> {
@@ -162,7 +167,7 @@ impl Best<'_, '_> {
         let mut tour = Exchanges::new(self.network, self.near, cycle, gap, &mut scratch)?;
         pace.grant(budget);
         shorten(&mut tour, ways, pace)?;
-        let mut kicks = Kicks { random: 1 };
+        let kicks = &mut self.kicks;
         let mut in_vain = 0;
         for count in 1.. {
             if in_vain >= self.patience || pace.is_over() {
