@@ -325,6 +325,7 @@ fn pair_odd(
     for (place, (station, _)) in stations.iter_mut().zip(odd_stations()) {
         *place = station;
     }
+    pace.sort(stations, |&station| (network.place(station).x, station))?;
     let odd = OddPoints::new(network, stations, options.shape == Shape::OpenPath);
     report.odd_points += u32::from(odd.real_count());
     let partners: &mut [u16] = scratch.take(usize::from(odd.count()))?;

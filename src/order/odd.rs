@@ -3,6 +3,7 @@
 use super::metric::length;
 use super::network::Network;
 use crate::drawing::PagePoint;
+use core::ops::Range;
 
 /// The odd stations of a network, numbered from 0, and after them, for an open path, two *free
 /// ends*: each is no distance away from any odd point, so that whatever is paired with them begins
@@ -15,7 +16,7 @@ pub(super) struct OddPoints<'a> {
 }
 
 impl<'a> OddPoints<'a> {
-    /// `stations` are the odd ones of `network`.
+    /// `stations` are the odd ones of `network`, from the lowest x on.
     pub fn new(network: Network<'a>, stations: &'a [u16], open: bool) -> Self {
         let free_ends = open && !stations.is_empty();
         Self { network, stations, free_ends }
@@ -65,6 +66,19 @@ impl<'a> OddPoints<'a> {
             }
             _ => 0,
         }
+    }
+
+    /// The odd stations whose x is at most `reach` 1/256 steps from that of `odd`: no other is nearer than
+    /// that. All of them, for a free end.
+    pub fn around(&self, odd: u16, reach: u32) -> Range<u16> {
+        let x_of = |station: &u16| self.network.place(*station).x;
+        let Some(x) = self.stations.get(usize::from(odd)).map(x_of) else {
+            return 0..self.real_count();
+        };
+        let reach = (reach >> 8) as i32 + 1;
+        let begin = self.stations.partition_point(|station| x_of(station) < x - reach);
+        let end = self.stations.partition_point(|station| x_of(station) <= x + reach);
+        begin as u16..end as u16
     }
 
     /// No move is longer than this, in 1/256 steps.

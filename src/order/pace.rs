@@ -1,6 +1,6 @@
 //! A computation that answers the line as it goes, and knows when to end.
 
-use crate::stage::{Aborted, Attention};
+use crate::stage::{Aborted, Attention, heap_sort_attentively};
 
 /// Counts work and calls [`Attention::check`] in time.
 pub(super) struct Pace<'a> {
@@ -31,6 +31,15 @@ impl<'a> Pace<'a> {
             self.attention.check()?;
         }
         Ok(())
+    }
+
+    /// Sorts by a key, answering as it goes.
+    pub fn sort<T, K: Ord>(
+        &mut self,
+        items: &mut [T],
+        key: impl Fn(&T) -> K,
+    ) -> Result<(), Aborted> {
+        heap_sort_attentively(items, key, self.attention)
     }
 
     /// Sets how many units may be worked from now until it [is over](Self::is_over).

@@ -7,8 +7,9 @@
 //! weigh less. From a free vertex a tree grows over touching pairs, and the duals move, until it
 //! reaches another free vertex; the matching then changes along the path between them.
 //!
-//! Distances come from the coordinates when they are asked for, and seldom: a pair whose boxes
-//! already keep it too far apart is passed over. Weights are twice the distances, so that all
+//! Distances come from the coordinates when they are asked for, and seldom: vertices are numbered by
+//! their x, those too far to touch by that alone are not looked at, and a pair whose boxes already keep
+//! it too far apart is passed over. Weights are twice the distances, so that all
 //! duals stay whole numbers. Memory: [`scratch_bytes`], a few dozen bytes for each vertex.
 //! After Edmonds, "Paths, trees, and flowers" (1965), and Galil, "Efficient algorithms for finding
 //! maximum matching in graphs" (1986).
@@ -91,6 +92,8 @@ struct Matching<'s, 'a> {
     best: &'s mut [u16],
     /// How far the duals of the tree have moved since it was planted.
     now: i32,
+    /// The greatest radius when it was planted.
+    widest: i32,
     /// When the tree will reach a free vertex by the best pair known.
     limit: i32,
     /// The first of the blossoms not in use.
@@ -135,6 +138,7 @@ impl<'s, 'a> Matching<'s, 'a> {
             when,
             best,
             now: 0,
+            widest: 0,
             limit: NEVER,
             spare: odd.count(),
             inner_blossoms: 0,
@@ -227,6 +231,7 @@ impl<'s, 'a> Matching<'s, 'a> {
     /// Grows a tree from the free vertex `root` until it reaches another one, and matches both.
     fn grow_tree(&mut self, root: u16, pace: &mut Pace<'_>) -> Result<(), OrderError> {
         self.now = 0;
+        self.widest = self.radius.iter().copied().max().unwrap_or(0);
         self.limit = NEVER;
         self.inner_blossoms = 0;
         self.when.fill(NEVER);
@@ -295,7 +300,7 @@ impl<'s, 'a> Matching<'s, 'a> {
         self.charge(1, pace)?;
         let (now, own) = (self.now, self.radius_now(from));
         let node = self.top[usize::from(from)];
-        for other in 0..self.top.len() as u16 {
+        for other in self.within_limit(from, own) {
             let index = usize::from(other);
             let label = self.label(other);
             if label == Label::Inner || self.top[index] == node {
@@ -320,6 +325,17 @@ impl<'s, 'a> Matching<'s, 'a> {
         Ok(())
     }
 
+    /// The vertices that may touch one whose radius is now `own` before the tree reaches a free one.
+    fn within_limit(&self, vertex: u16, own: i32) -> impl Iterator<Item = u16> + use<> {
+        // The gap closes from both sides at most; no radius has grown by more than `now`.
+        let closing = 2 * i64::from(self.limit - self.now);
+        let weight = closing + i64::from(own) + i64::from(self.widest) + i64::from(self.now);
+        let reach = (weight.max(0).unsigned_abs() / 2) << self.shortened;
+        let reach = u32::try_from(reach).unwrap_or(u32::MAX);
+        let free_ends = self.odd.real_count()..self.odd.count();
+        self.odd.around(vertex, reach).chain(free_ends)
+    }
+
     fn is_free(&self, vertex: u16) -> bool {
         let base = self.nodes[usize::from(self.top[usize::from(vertex)])].base;
         self.mate[usize::from(base)] == NONE
@@ -333,7 +349,7 @@ impl<'s, 'a> Matching<'s, 'a> {
         let (now, own) = (self.now, self.radius_now(vertex));
         let sides = if self.label(vertex) == Label::Outside { 1 } else { 2 };
         self.when[index] = NEVER;
-        for other in 0..self.top.len() as u16 {
+        for other in self.within_limit(vertex, own) {
             if self.label(other) != Label::Outer || self.top[usize::from(other)] == self.top[index]
             {
                 continue;
