@@ -205,12 +205,15 @@ pub fn divide(dividend: u128, divisor: u128) -> u128 {
     dividend / divisor
 }
 
-/// Sine and cosine of an angle in degrees, within ±2^52; exact for multiples of 90.
+/// Sine and cosine of an angle in degrees; exact for multiples of 90.
 ///
 /// ```
-/// assert_eq!(penup::fixed::sin_cos_degrees(-450.0), (-1.0, 0.0));
+/// use penup::fixed::sin_cos_degrees;
+/// assert_eq!(sin_cos_degrees(-450.0), (-1.0, 0.0));
+/// assert_eq!(sin_cos_degrees(1e15), sin_cos_degrees(280.0));
 /// ```
 pub fn sin_cos_degrees(degrees: f64) -> (f64, f64) {
+    let degrees = libm::fmod(degrees, 360.0); // exact, so what follows is within 45 degrees
     let quarters = libm::round(degrees / 90.0);
     let radians = (degrees - 90.0 * quarters).to_radians();
     // At most π/4. Said in libm's way, this spares the device the reduction of larger angles: 3 KB.
