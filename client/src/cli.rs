@@ -237,6 +237,10 @@ pub struct ViewArgs {
         help_heading = "Order"
     )]
     pub effort: u32,
+    /// How much longer the way with the pen up may be for one lift less, 0 to 1000 mm
+    #[arg(long, value_name = "MM", value_parser = lift, default_value = "2", allow_hyphen_values = true,
+          help_heading = "Order")]
+    pub lift: f64,
 }
 
 impl ViewArgs {
@@ -290,6 +294,7 @@ impl ViewArgs {
             },
             cycle: self.cycle,
             effort: self.effort,
+            lift: self.lift,
         }
     }
 }
@@ -433,6 +438,13 @@ fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
+fn lift(text: &str) -> Result<f64, String> {
+    match number(text)? {
+        lift if (0.0..=1000.0).contains(&lift) => Ok(lift),
+        _ => Err("a lift is worth 0 to 1000 mm".to_owned()),
+    }
+}
+
 fn margin(text: &str) -> Result<f64, String> {
     match number(text)? {
         margin if margin >= 0.0 => Ok(margin),
@@ -511,6 +523,7 @@ mod tests {
             (["--title", "line\nline"], "the font lacks"),
             (["--title", LONG], "at most 80 bytes"),
             (["--title-size", "0.5"], "1 to 100 mm"),
+            (["--lift", "-1"], "0 to 1000 mm"),
             (["--repeat", "0"], "0 is not in 1.."),
             (["--repeat", "-1"], "-1 is not in 1.."),
             (["--hidden", "gone"], "erased, dotted, dashed, shown"),

@@ -1,8 +1,8 @@
 //! What came of a job, and the settings that it was done with.
 
 use crate::protocol::{
-    ANGLES, AT, BEHIND, BLOCKS, CLEAR, CREASE, CYCLE, EFFORT, EYE, FIT, HIDDEN, MARGIN, ORDER,
-    PAGE, PENS, PROJECTION, SEAMS, SEE, TITLE, TITLE_SIZE, UP, VIEW_AUTO, setting,
+    ANGLES, AT, BEHIND, BLOCKS, CLEAR, CREASE, CYCLE, EFFORT, EYE, FIT, HIDDEN, LIFT, MARGIN,
+    ORDER, PAGE, PENS, PROJECTION, SEAMS, SEE, TITLE, TITLE_SIZE, UP, VIEW_AUTO, setting,
 };
 use crate::source::JobLine;
 use crate::watch::PenRuns;
@@ -148,6 +148,8 @@ pub struct Settings {
     pub cycle: bool,
     /// As the plotter understands it.
     pub effort: u32,
+    /// How much longer a way with the pen up may be for one lift less, in mm.
+    pub lift: f64,
 }
 
 /// Every line of a job up to the plot command: forget the old model, how pens are chosen, the file's lines, the settings.
@@ -174,6 +176,7 @@ pub fn job_lines(file: Vec<JobLine>, settings: &Settings) -> Vec<JobLine> {
         format!("{ORDER}={}", settings.order),
         format!("{CYCLE}={}", if settings.cycle { "on" } else { "off" }),
         format!("{EFFORT}={}", settings.effort),
+        setting(LIFT, &[settings.lift], ','),
     ]);
     // Before the file, whose names of pens may be too many.
     let before = [CLEAR.to_owned(), format!("{PENS}={}", settings.pens)];
@@ -242,6 +245,7 @@ mod tests {
             order: "auto",
             cycle: false,
             effort: 4000,
+            lift: 2.5,
         };
         let lines = job_lines(vec![JobLine::command("v 0 0 0")], &settings);
         let sent: Vec<&str> = lines.iter().map(|line| line.sent.as_str()).collect();
@@ -269,6 +273,7 @@ mod tests {
                 "$order=auto",
                 "$cycle=off",
                 "$effort=4000",
+                "$lift=2.5",
             ]
         );
     }

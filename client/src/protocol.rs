@@ -39,6 +39,8 @@ pub const ORDER: &str = "$order";
 pub const CYCLE: &str = "$cycle";
 /// Work to improve the order.
 pub const EFFORT: &str = "$effort";
+/// What a lift is worth, in millimetres.
+pub const LIFT: &str = "$lift";
 /// What is done with hidden lines.
 pub const HIDDEN: &str = "$hidden";
 /// Width x height of the page in millimetres.

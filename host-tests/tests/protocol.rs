@@ -275,8 +275,13 @@ fn the_order_is_as_it_was_asked_for_and_told() {
         let job = format!("[JOB:pen down 80.0 mm, up {up} mm, efficiency ");
         assert!(told.contains(&job), "{told}");
     }
-    for (line, number) in [("$order=best\n", 105), ("$effort=-1\n", 102), ("$hidden=pen,33\n", 102)]
-    {
+    for (line, number) in [
+        ("$order=best\n", 105),
+        ("$effort=-1\n", 102),
+        ("$lift=1000.5\n", 102),
+        ("$lift=-1\n", 102),
+        ("$hidden=pen,33\n", 102),
+    ] {
         assert_eq!(refusal(&bench.say(line)), Some(number), "{line}");
     }
 }

@@ -81,6 +81,8 @@ pub(super) struct Exchanges<'s, 'a> {
     waiting: Waiting<'s>,
     /// The number of the gap among the legs, if there is one.
     gap: Option<u16>,
+    /// What a move costs besides its length, in 1/256 steps.
+    lift: u32,
 }
 
 impl<'s, 'a> Exchanges<'s, 'a> {
@@ -91,6 +93,7 @@ impl<'s, 'a> Exchanges<'s, 'a> {
         near: Near<'s>,
         legs: &'s mut [Leg],
         gap: Option<u16>,
+        lift: u32,
         scratch: &mut Scratch<'s>,
     ) -> Result<Self, OutOfScratch> {
         let stations = usize::from(network.stations());
@@ -106,6 +109,7 @@ impl<'s, 'a> Exchanges<'s, 'a> {
             near,
             waiting,
             gap,
+            lift,
         })
     }
 
@@ -133,21 +137,20 @@ impl<'s, 'a> Exchanges<'s, 'a> {
         self.end(leg.flipped())
     }
 
-    /// What a move costs: its length and a little more, lest two moves be better than one because
-    /// their lengths are rounded down.
+    /// What a move costs: its length and the lift, and a little more, lest two moves be better than
+    /// one because their lengths are rounded down.
     pub fn distance(&self, from: u16, to: u16) -> i64 {
         if from == NONE || to == NONE || from == to {
             0
         } else {
-            i64::from(self.network.distance(from, to)) + 1
+            i64::from(self.network.distance(from, to)) + i64::from(self.lift) + 1
         }
     }
 
-    /// The length of all moves.
-    pub fn length(&self) -> u64 {
+    /// What all moves cost.
+    pub fn cost(&self) -> u64 {
         (0..self.cycle.len())
-            .map(|index| self.move_after(self.cycle.leg(index)))
-            .map(|cost| cost.saturating_sub(1).max(0) as u64)
+            .map(|index| self.move_after(self.cycle.leg(index)).max(0) as u64)
             .sum()
     }
 

@@ -3,10 +3,11 @@
 //! Several first tours are shortened until no exchange of moves and no turning of strokes helps any
 //! more, and the shortest is kept: that from the matched moves, part by part; that from the same
 //! moves, mended; and where each part is one stroke, as in hatching and writing, those that take the
-//! nearest next from each corner of the drawing. Then four moves near each other are changed at
-//! random, the exchanges are tried again around them, and all is taken back unless it came out no
-//! longer: a tour only ever gets better. The same budget gives the same tour on every machine. After
-//! Martin, Otto and Felten, "Large-step Markov chains for the traveling salesman problem" (1991).
+//! nearest next from each corner of the drawing. From here on a lift has its price. Then four moves
+//! near each other are changed at random, the exchanges are tried again around them, and all is taken
+//! back unless it came out no dearer: a tour only ever gets better. The same budget gives the same
+//! tour on every machine. After Martin, Otto and Felten, "Large-step Markov chains for the traveling
+//! salesman problem" (1991).
 
 use super::euler::Unused;
 use super::exchange::Exchanges;
@@ -49,6 +50,8 @@ pub(super) struct Tour<'t> {
     pub strokes_only: bool,
     /// Distances that may be worked for each move.
     pub effort: u32,
+    /// What a move costs besides its length, in 1/256 steps.
+    pub lift: u32,
 }
 
 /// Shortens `tour.route`, if it can, while the effort lasts. Does nothing where there is too little
@@ -59,7 +62,7 @@ pub(super) fn improve(
     mut scratch: Scratch<'_>,
     pace: &mut Pace<'_>,
 ) -> Result<(), OrderError> {
-    let Tour { route, open, bound, mate, start, strokes_only, effort } = tour;
+    let Tour { route, open, bound, mate, start, strokes_only, effort, lift } = tour;
     let legs = route.len() + usize::from(open);
     let fits = |per_station: &usize| {
         scratch_bytes(network, legs, *per_station) <= scratch.available_bytes()
@@ -67,19 +70,26 @@ pub(super) fn improve(
     let Some(per_station) = NEIGHBOURS.into_iter().find(fits) else {
         return Ok(());
     };
-    if route_length(network, route, open) == bound {
+    if route_moves(network, route, open).sum::<u64>() == bound {
         return Ok(());
     }
     let near = Near::new(network, per_station, &mut scratch, pace)?;
-    let moves = moves(network, route, open);
+    let moves = route_moves(network, route, open).filter(|&length| length > 0).count() as u32;
     let budget = u64::from(moves) * u64::from(effort);
     let first_tours = if strokes_only { 2 + CORNERS.len() as u64 } else { 2 };
     let share = budget * FIRST_TOURS_PERCENT / 100 / first_tours;
     let patience = PATIENCE.saturating_mul(moves);
-    let length = route_length(network, route, open);
     let cycle: &mut [Leg] = scratch.take(legs)?;
-    let mut best =
-        Best { network, near, open, patience, length, route, kicks: Kicks { random: SEED } };
+    let mut best = Best {
+        network,
+        near,
+        open,
+        lift: 0,
+        patience,
+        cost: u64::MAX,
+        route,
+        kicks: Kicks { random: SEED },
+    };
     best.restore(cycle);
     best.work_on(cycle, share, scratch.reborrow(), pace)?;
     mend(network, near, mate, scratch.reborrow(), pace)?;
@@ -96,6 +106,8 @@ pub(super) fn improve(
             best.work_on(cycle, share, scratch.reborrow(), pace)?;
         }
     }
+    // Not before: a price on lifts bars the ways by which the moves become short.
+    (best.lift, best.cost) = (lift, u64::MAX);
     best.restore(cycle);
     best.work_on(cycle, budget - first_tours * share, scratch, pace)
 }
@@ -114,9 +126,11 @@ struct Best<'b, 'a> {
     network: Network<'a>,
     near: Near<'b>,
     open: bool,
+    /// What a move costs besides its length, in 1/256 steps.
+    lift: u32,
     /// So many kicks in vain are enough.
     patience: u32,
-    length: u64,
+    cost: u64,
     route: &'b mut [Leg],
     kicks: Kicks,
 }
@@ -164,7 +178,8 @@ impl Best<'_, '_> {
         gap.fill(Leg::new(chains, false));
         let gap = self.open.then_some(chains);
         let ways: &mut [u8] = scratch.take(cycle.len())?;
-        let mut tour = Exchanges::new(self.network, self.near, cycle, gap, &mut scratch)?;
+        let mut tour =
+            Exchanges::new(self.network, self.near, cycle, gap, self.lift, &mut scratch)?;
         pace.grant(budget);
         shorten(&mut tour, ways, pace)?;
         let kicks = &mut self.kicks;
@@ -185,11 +200,11 @@ impl Best<'_, '_> {
 
     /// Keeps the tour if it is the shortest so far.
     fn keep(&mut self, tour: &Exchanges<'_, '_>) {
-        let length = tour.length();
-        if length >= self.length {
+        let cost = tour.cost();
+        if cost >= self.cost {
             return;
         }
-        self.length = length;
+        self.cost = cost;
         let legs = tour.cycle.len();
         let leg = |index: usize| tour.cycle.leg(index % legs);
         let gap = (0..legs).find(|&index| tour.is_gap(leg(index)));
@@ -227,20 +242,12 @@ fn scratch_bytes(network: Network<'_>, legs: usize, per_station: usize) -> usize
     lists + exchanges.max(Near::bytes_to_find(stations))
 }
 
-/// How many moves a route has.
-fn moves(network: Network<'_>, route: &[Leg], open: bool) -> u32 {
-    let pairs =
-        route.iter().zip(route.iter().cycle().skip(1)).take(route.len() - usize::from(open));
-    pairs.map(|(&from, &to)| u32::from(network.end(from) != network.start(to))).sum()
-}
-
-/// The length of the moves of a route, with the one back if it is not open.
-fn route_length(network: Network<'_>, route: &[Leg], open: bool) -> u64 {
-    let moves = route.iter().zip(route.iter().cycle().skip(1));
-    moves
+/// The lengths of the moves of a route, with the one back if it is not open; 0 where there is none.
+fn route_moves(network: Network<'_>, route: &[Leg], open: bool) -> impl Iterator<Item = u64> {
+    let pairs = route.iter().zip(route.iter().cycle().skip(1));
+    pairs
         .take(route.len() - usize::from(open))
-        .map(|(&from, &to)| u64::from(network.distance(network.end(from), network.start(to))))
-        .sum()
+        .map(move |(&from, &to)| u64::from(network.distance(network.end(from), network.start(to))))
 }
 
 /// A source of kicks.

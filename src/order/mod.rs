@@ -116,13 +116,16 @@ pub struct Options {
     /// move: a budget in work and not in time, so that every machine gives the same tour. With 0
     /// the parts are drawn nearest first.
     pub effort: u32,
+    /// How much longer a way with the pen up may be for one lift less, in 1/256 steps, up to 2^30: each
+    /// takes its time, and shows where it is within a stroke.
+    pub lift: u32,
 }
 
 impl Default for Options {
     /// The exact open path where it fits, and as much effort as brings a page of some hundred strokes
     /// within 3 % of the best known.
     fn default() -> Self {
-        Self { method: Method::default(), shape: Shape::default(), effort: 4000 }
+        Self { method: Method::default(), shape: Shape::default(), effort: 4000, lift: 0 }
     }
 }
 
@@ -257,8 +260,16 @@ fn order_pen<'a>(
             let open = options.shape == Shape::OpenPath;
             let strokes_only = report.odd_points - odd_before == 2 * odd_parts;
             let bound = report.bound - bound;
-            let tour =
-                Tour { route, open, bound, mate, start, strokes_only, effort: options.effort };
+            let tour = Tour {
+                route,
+                open,
+                bound,
+                mate,
+                start,
+                strokes_only,
+                effort: options.effort,
+                lift: options.lift,
+            };
             improve(network, tour, scratch, pace)?;
         }
     }

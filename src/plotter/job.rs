@@ -89,7 +89,7 @@ impl Job {
             return Err(Refusal::NothingToPlot);
         }
         let tour = rest.take::<Leg>(legs).map_err(Refusal::DrawingTooLarge)?;
-        let report = order::order(drawing, options.order, rest, attention, tour)?;
+        let report = order::order(drawing, options.order(steps), rest, attention, tour)?;
         Ok(Self { stored, legs, report, degenerate_faces })
     }
 

@@ -1,6 +1,6 @@
 //! What is drawn and how, as the user set it.
 
-use crate::drawing::{Page, Title, TitleText};
+use crate::drawing::{Page, StepsPerMillimetre, Title, TitleText};
 use crate::fixed::{Length, Millimetres, SixDecimals, sin_cos_degrees};
 use crate::model::Model;
 use crate::order;
@@ -40,14 +40,17 @@ pub struct PlotOptions {
     title_size: Millimetres,
     /// Whether a plan is scaled to the page.
     pub fit: bool,
-    /// How strokes are ordered.
-    pub order: order::Options,
+    /// How strokes are ordered; its lift is not used.
+    order: order::Options,
+    /// How much longer a way with the pen up may be for one lift less.
+    lift: Millimetres,
 }
 
 impl Default for PlotOptions {
     /// An automatic view in perspective, hidden lines erased, on A4 upright with a margin of 10 mm, without a title.
     fn default() -> Self {
-        let [width, height, margin, title_size] = [210, 297, 10, 5].map(Millimetres::from_num);
+        let [width, height, margin, title_size, lift] =
+            [210, 297, 10, 5, 2].map(Millimetres::from_num);
         Self {
             eye: None,
             at: None,
@@ -66,6 +69,7 @@ impl Default for PlotOptions {
             title_size,
             fit: false,
             order: order::Options::default(),
+            lift,
         }
     }
 }
@@ -99,6 +103,7 @@ impl PlotOptions {
             PlotOption::Cycle(true) => self.order.shape = order::Shape::ClosedCycle,
             PlotOption::Cycle(false) => self.order.shape = order::Shape::OpenPath,
             PlotOption::Effort(effort) => self.order.effort = effort,
+            PlotOption::Lift(lift) => self.lift = lift,
         }
     }
 
@@ -133,6 +138,12 @@ impl PlotOptions {
             && self.angles.is_none()
             && matches!(self.projection, ProjectionChoice::Lens(_))
             && matches!(self.see, WayToSee::Faces | WayToSee::Wire)
+    }
+
+    /// How strokes are ordered on a machine of so many steps.
+    pub fn order(&self, steps: StepsPerMillimetre) -> order::Options {
+        let lift = self.lift.wide_mul(steps[0]).saturating_mul_int(256);
+        order::Options { lift: lift.saturating_to_num(), ..self.order }
     }
 
     /// The camera for `model`; what the user did not choose is chosen here. `None` without vertices.
@@ -238,5 +249,6 @@ impl PlotOptions {
         line(format_args!("$order={method}"));
         line(format_args!("$cycle={}", on(self.order.shape == order::Shape::ClosedCycle)));
         line(format_args!("$effort={}", self.order.effort));
+        line(format_args!("$lift={}", Length(self.lift)));
     }
 }

@@ -133,6 +133,8 @@ pub enum PlotOption {
     Cycle(bool),
     /// `$effort=N`
     Effort(u32),
+    /// `$lift=MM`
+    Lift(Millimetres),
 }
 
 /// How the model comes onto the page.
@@ -293,6 +295,7 @@ pub const HELP: &[(&str, &str)] = &[
         "$effort=NUMBER",
         "distances tried for each move with the pen up to improve it; 0 takes the nearest next",
     ),
+    ("$lift=MM", "how much longer a way with the pen up may be for one lift less, 0 to 1000"),
     ("$model", "size of the model against the limits"),
     ("$clear", "forget the model"),
     (
@@ -446,13 +449,15 @@ impl PlotOption {
                 let (width, height) = value.split_once(['x', 'X']).ok_or(Refusal::NotAPage)?;
                 Self::Page { width: positive(width)?, height: positive(height)? }
             }
-            "margin" => {
-                let margin =
+            "margin" | "lift" => {
+                let length =
                     number(value)?.to_millimetres().map_err(|_| Refusal::NumberOutOfRange)?;
-                if margin < 0 {
-                    return Err(Refusal::NumberOutOfRange);
+                match name {
+                    _ if length < 0 => return Err(Refusal::NumberOutOfRange),
+                    "margin" => Self::Margin(length),
+                    _ if length > 1000 => return Err(Refusal::NumberOutOfRange),
+                    _ => Self::Lift(length),
                 }
-                Self::Margin(margin)
             }
             "title-size" => {
                 let size = positive(value)?;

@@ -91,7 +91,8 @@ impl Star {
     /// Orders it with the pen-up heuristic.
     pub fn order(&mut self) -> Report {
         let drawing = Drawing { points: &self.points, segments: &self.segments };
-        let options = Options { method: Method::Greedy, shape: Shape::ClosedCycle, effort: 0 };
+        let options =
+            Options { method: Method::Greedy, shape: Shape::ClosedCycle, effort: 0, lift: 0 };
         let scratch = Scratch::new(&mut self.memory);
         order(drawing, options, scratch, &mut Undisturbed, &mut self.tour).expect("an order")
     }
