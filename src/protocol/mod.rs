@@ -7,13 +7,18 @@
 //! any state.
 
 mod command;
+mod edit;
 mod escape;
 mod gcode;
 mod line;
+mod option;
 mod refusal;
+mod values;
 
-pub use command::{Command, HELP, HiddenLines, Numbers, PlotOption, ProjectionChoice, WayToSee};
+pub use command::{Command, HELP};
 pub use escape::{Escape, EscapedText};
 pub use gcode::{GCode, Word};
 pub use line::{LINE_LIMIT, LineReader, RealTime, Sorter};
+pub use option::{HiddenLines, PlotOption, ProjectionChoice, WayToSee};
 pub use refusal::{MEANINGS, Refusal};
+pub use values::{Decimals, Numbers};

@@ -1,0 +1,97 @@
+//! The edits of the model, `$name=value`.
+
+use super::values::{number, whole};
+use super::{Command, Refusal};
+use crate::model::{self, Edit, Part};
+
+/// The values of an edit, with commas between.
+struct Values<'a> {
+    rest: Option<&'a str>,
+    needed: usize,
+}
+
+impl<'a> Values<'a> {
+    fn text(&mut self) -> Result<&'a str, Refusal> {
+        let rest = self.rest.ok_or(Refusal::WrongNumberCount { needed: self.needed })?;
+        let (value, rest) = match rest.split_once(',') {
+            Some((value, rest)) => (value, Some(rest)),
+            None => (rest, None),
+        };
+        self.rest = rest;
+        Ok(value.trim())
+    }
+
+    fn three<T: Copy + Default>(
+        &mut self,
+        read: impl Fn(&str) -> Result<T, Refusal>,
+    ) -> Result<[T; 3], Refusal> {
+        let mut values = [T::default(); 3];
+        for value in &mut values {
+            *value = read(self.text()?)?;
+        }
+        Ok(values)
+    }
+
+    fn part(&mut self) -> Result<Part, Refusal> {
+        match self.text()? {
+            "v" => Ok(Part::Vertices),
+            "l" => Ok(Part::Bars),
+            "f" => Ok(Part::Faces),
+            "c" => Ok(Part::Curves),
+            _ => Err(Refusal::NotAChoice { choices: "v, l, f or c" }),
+        }
+    }
+
+    /// First and last, or one number for both.
+    fn numbers(&mut self) -> Result<[i32; 2], Refusal> {
+        let first = whole(self.text()?)?;
+        let last = if self.rest.is_some() { whole(self.text()?)? } else { first };
+        Ok([first, last])
+    }
+
+    fn numbers_or_all(&mut self) -> Result<model::Numbers, Refusal> {
+        if self.rest.is_some() { self.numbers().map(Some) } else { Ok(None) }
+    }
+}
+
+/// `None` if no edit has this name.
+#[inline(never)] // Its frame must not lie under the stages'.
+pub(super) fn parse_edit<'a>(name: &str, value: &str) -> Result<Option<Command<'a>>, Refusal> {
+    let mut values = Values { rest: Some(value), needed: 3 };
+    let edit = match name {
+        "list" => {
+            let part = values.part()?;
+            let numbers = values.numbers_or_all()?;
+            return Ok(Some(Command::List(part, numbers)));
+        }
+        "delete" => Edit::Delete(values.part()?, values.numbers()?),
+        "plug" => Edit::Plug(values.part()?, whole(values.text()?)?),
+        "move" => {
+            values.needed = 4;
+            Edit::Move(whole(values.text()?)?, values.three(number)?)
+        }
+        "translate" => Edit::Translate(values.three(number)?, values.numbers_or_all()?),
+        "scale" => Edit::Scale(values.three(number)?, values.numbers_or_all()?),
+        "rotate" => {
+            let axis = match values.text()? {
+                "x" => 0,
+                "y" => 1,
+                "z" => 2,
+                _ => return Err(Refusal::NotAChoice { choices: "x, y or z" }),
+            };
+            values.needed = 2;
+            let degrees = number(values.text()?)?.to_f64();
+            if libm::fabs(degrees) > 36000.0 {
+                return Err(Refusal::NumberOutOfRange);
+            }
+            Edit::Rotate(axis, degrees, values.numbers_or_all()?)
+        }
+        "mirror" => Edit::Mirror(values.three(whole)?, values.numbers_or_all()?),
+        "reflect" => Edit::Reflect(values.three(whole)?, values.numbers_or_all()?),
+        _ => return Ok(None),
+    };
+    match values.rest {
+        None => Ok(Some(Command::Edit(edit))),
+        Some(_) => Err(Refusal::WrongNumberCount { needed: values.needed }),
+    }
+}

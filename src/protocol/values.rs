@@ -1,0 +1,132 @@
+//! The numbers and words of a line.
+
+use super::Refusal;
+use crate::fixed::{Decimal, Millimetres};
+use crate::model::PEN_LIMIT;
+use crate::view::Direction;
+
+/// How many pens there are.
+pub(super) const PENS: i32 = PEN_LIMIT as i32;
+
+pub(super) fn on_or_off(text: &str) -> Result<bool, Refusal> {
+    match text {
+        "on" => Ok(true),
+        "off" => Ok(false),
+        _ => Err(Refusal::NotAChoice { choices: "on or off" }),
+    }
+}
+
+pub(super) fn number(text: &str) -> Result<Decimal, Refusal> {
+    Decimal::parse(text.trim()).map_err(|_| Refusal::NotANumber)
+}
+
+#[inline(never)] // Once is enough.
+pub(super) fn positive(text: &str) -> Result<Millimetres, Refusal> {
+    let length = number(text)?.to_millimetres().map_err(|_| Refusal::NumberOutOfRange)?;
+    if length > 0 { Ok(length) } else { Err(Refusal::NumberOutOfRange) }
+}
+
+pub(super) fn direction(text: &str) -> Result<Direction, Refusal> {
+    values(text)
+}
+
+/// Exactly N numbers with commas between, for angles and places only.
+pub(super) fn values<const N: usize>(text: &str) -> Result<[f64; N], Refusal> {
+    let wrong_count = Refusal::WrongNumberCount { needed: N };
+    let mut parts = text.split(',').map(number);
+    let mut values = [0.0; N];
+    for value in &mut values {
+        *value = parts.next().unwrap_or(Err(wrong_count))?.to_f64();
+    }
+    if parts.next().is_some() {
+        return Err(wrong_count);
+    }
+    // Past this range squares and quotients of lengths would overflow.
+    if values.iter().any(|value| libm::fabs(*value) > 1e15) {
+        return Err(Refusal::NumberOutOfRange);
+    }
+    Ok(values)
+}
+
+/// x y z, and then the weight or colour that some modellers write, which must be numbers too.
+pub(super) fn coordinates(text: &str) -> Result<[Decimal; 3], Refusal> {
+    let mut words = text.split_ascii_whitespace().map(number);
+    let mut next = || words.next().unwrap_or(Err(Refusal::WrongNumberCount { needed: 3 }));
+    let coordinates = [next()?, next()?, next()?];
+    for rest in words {
+        rest?;
+    }
+    Ok(coordinates)
+}
+
+/// The first word, and what comes after it.
+pub(super) fn split_word(text: &str) -> (&str, &str) {
+    let text = text.trim_start();
+    text.split_once([' ', '\t']).unwrap_or((text, ""))
+}
+
+/// One whole number.
+pub(super) fn whole(text: &str) -> Result<i32, Refusal> {
+    number(text)?.to_whole().map_err(|_| Refusal::NumberOutOfRange)
+}
+
+/// Numbers with spaces between.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Decimals<'a> {
+    text: &'a str,
+}
+
+impl<'a> Decimals<'a> {
+    /// Checks every word, so that [`Decimals::iter`] cannot fail.
+    pub(super) fn new(text: &'a str) -> Result<Self, Refusal> {
+        for word in text.split_ascii_whitespace() {
+            number(word)?;
+        }
+        Ok(Self { text })
+    }
+
+    /// The numbers in order.
+    pub fn iter(&self) -> impl Iterator<Item = Decimal> + Clone + use<'a> {
+        self.text.split_ascii_whitespace().filter_map(|word| number(word).ok())
+    }
+}
+
+/// The vertex numbers of a face, polyline or curve: `7`, `-1`, `7/2`, `7//3` or `7/2/3`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Numbers<'a> {
+    text: &'a str,
+}
+
+impl<'a> Numbers<'a> {
+    /// Checks every word, so that [`Numbers::iter`] cannot fail.
+    pub(super) fn new(text: &'a str) -> Result<Self, Refusal> {
+        for word in text.split_ascii_whitespace() {
+            vertex_number(word).ok_or(Refusal::NotAVertexNumber)?;
+        }
+        Ok(Self { text })
+    }
+
+    /// The numbers in order.
+    pub fn iter(&self) -> impl Iterator<Item = i32> + Clone + use<'a> {
+        self.text.split_ascii_whitespace().filter_map(vertex_number)
+    }
+}
+
+/// The first part of `v`, `v/vt`, `v//vn`, `v/vt/vn`, if every part is a whole number.
+fn vertex_number(word: &str) -> Option<i32> {
+    let mut parts = word.split('/');
+    let vertex = parts.next()?.parse().ok()?;
+    let texture = parts.next();
+    let normal = parts.next();
+    let whole = |text: &str| text.parse::<i32>().is_ok();
+    let texture_is_right = match texture {
+        None => true,
+        Some("") => normal.is_some(),
+        Some(text) => whole(text),
+    };
+    if texture_is_right && normal.is_none_or(whole) && parts.next().is_none() {
+        Some(vertex)
+    } else {
+        None
+    }
+}
