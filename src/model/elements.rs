@@ -1,0 +1,113 @@
+//! Faces and bars, as the model stores them.
+
+use super::Pens;
+use bytemuck::{Pod, Zeroable};
+
+/// One more than the largest vertex number that an element can hold.
+pub const VERTEX_NUMBER_LIMIT: usize = 1 << 14;
+
+/// A vertex number as an element stores it, with two marks.
+///
+/// Bits 0 to 13 the vertex, from 0; bit 14 set in the corners of a bar; bit 15 set in the last
+/// corner of an element. So a face of n corners costs n half-words and no header.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+#[repr(transparent)]
+pub struct Corner(pub(super) u16);
+
+impl Corner {
+    const VERTEX: u16 = 0x3FFF;
+    const BAR: u16 = 0x4000;
+    const LAST: u16 = 0x8000;
+
+    /// The corner at `vertex`, which must be below [`VERTEX_NUMBER_LIMIT`] (higher bits are cut off).
+    pub const fn new(vertex: u16, of_bar: bool, last: bool) -> Self {
+        let bar = if of_bar { Self::BAR } else { 0 };
+        let last = if last { Self::LAST } else { 0 };
+        Self(vertex & Self::VERTEX | bar | last)
+    }
+
+    /// The vertex number, from 0.
+    pub const fn vertex(self) -> u16 {
+        self.0 & Self::VERTEX
+    }
+
+    /// Whether this corner belongs to a bar.
+    pub const fn of_bar(self) -> bool {
+        self.0 & Self::BAR != 0
+    }
+
+    /// Whether the element ends here.
+    pub const fn is_last(self) -> bool {
+        self.0 & Self::LAST != 0
+    }
+}
+
+/// One face or bar.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Element<'a> {
+    /// A polygon of at least three different corners, in order around it.
+    Face(&'a [Corner]),
+    /// A straight bar between two different vertices.
+    Bar(u16, u16),
+}
+
+impl Element<'_> {
+    /// How many corners it takes.
+    pub fn corner_count(&self) -> usize {
+        match self {
+            Self::Face(corners) => corners.len(),
+            Self::Bar(..) => 2,
+        }
+    }
+}
+
+/// Faces and bars in the order in which they were sent.
+///
+/// Guarantees, if it comes from a model: every vertex number exists, every face has at least three
+/// corners, every bar two, the last corner of each is marked.
+#[derive(Debug, Clone, Copy)]
+pub struct Elements<'a> {
+    pub(super) corners: &'a [Corner],
+    pub(super) pens: Pens<'a>,
+}
+
+impl<'a> Elements<'a> {
+    /// The elements that `corners` encode, of the first pen. Corners after the last mark are left out.
+    pub fn new(corners: &'a [Corner]) -> Self {
+        Self::with_pens(corners, Pens::default())
+    }
+
+    /// The same with their pens.
+    pub fn with_pens(corners: &'a [Corner], pens: Pens<'a>) -> Self {
+        let whole = corners.iter().rposition(|corner| corner.is_last()).map_or(0, |last| last + 1);
+        Self { corners: &corners[..whole], pens }
+    }
+
+    /// Every corner of every element.
+    pub fn corners(&self) -> &'a [Corner] {
+        self.corners
+    }
+
+    /// The pens of the elements, by their corners.
+    pub fn pens(&self) -> Pens<'a> {
+        self.pens
+    }
+
+    /// Each element in turn.
+    pub fn iter(&self) -> impl Iterator<Item = Element<'a>> + Clone + use<'a> {
+        self.corners.split_inclusive(|corner| corner.is_last()).map(|corners| match corners {
+            [a, b] if a.of_bar() => Element::Bar(a.vertex(), b.vertex()),
+            _ => Element::Face(corners),
+        })
+    }
+
+    /// Each element in turn with its pen.
+    pub fn iter_with_pens(&self) -> impl Iterator<Item = (Element<'a>, u8)> + use<'a> {
+        let (pens, mut first) = (self.pens, 0);
+        self.iter().map(move |element| {
+            let pen = pens.at(first);
+            first += element.corner_count();
+            (element, pen)
+        })
+    }
+}
