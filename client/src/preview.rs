@@ -9,10 +9,9 @@ use crate::link::Link;
 use crate::machines::PreviewPlotter;
 use crate::protocol::PLOT;
 use crate::watch::PenWatch;
-use penup::boards::host::{Change, HostBoard, QUEUE_LENGTH, lend_memory};
+use penup::boards::host::{Change, HostBoard, lend_memory};
 use penup::geometry::{Projection, Vertex};
-use penup::machine::{Path, PulserState, Setting, Target};
-use penup::motion::StepEvent;
+use penup::machine::{EventRing, Path, PulserState, Setting, Target};
 use penup::plotter::{Observer, Plotter};
 use penup::stage::{Aborted, Attention, Stage};
 use penup::view::View;
@@ -32,9 +31,9 @@ impl InMemory {
     /// Switches it on.
     pub fn new() -> Self {
         // Plotter and board borrow from these for as long as the process lives; there is one a run.
-        let queue = Box::leak(Box::new(heapless::spsc::Queue::<StepEvent, QUEUE_LENGTH>::new()));
+        let ring = Box::leak(Box::new(EventRing::new()));
         let pins = Box::leak(Box::new(PulserState::new()));
-        let mut board = HostBoard::new(queue, pins);
+        let mut board = HostBoard::new(ring, pins);
         let plotter = Plotter::new(lend_memory(), pins);
         plotter.greet(&mut board);
         Self { board, plotter, steps: 0, pen: None }

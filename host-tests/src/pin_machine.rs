@@ -1,9 +1,8 @@
 //! A plotter made of pins: the library's own interrupt code on pins that remember what they did.
 
-use heapless::spsc::Queue;
-use penup::boards::host::{QUEUE_LENGTH, Stamped, traced_pulser};
+use penup::boards::host::{Stamped, traced_steps};
 use penup::drawing::PagePoint;
-use penup::machine::{Machine, MachineError, Path, PulserState, Settings};
+use penup::machine::{EventRing, Machine, MachineError, Path, PulserState, Settings};
 use penup::motion::{Block, EventQueue, StepEvent};
 
 /// A queue that never fills and remembers everything.
@@ -95,32 +94,20 @@ pub fn run_with(
     turn: &mut dyn FnMut(Turn<'_, '_>, &mut dyn EventQueue) -> bool,
 ) -> Vec<Stamped> {
     let state = PulserState::new();
-    let mut queue: Queue<StepEvent, QUEUE_LENGTH> = Queue::new();
-    let (mut producer, mut pulser, trace) = traced_pulser(&mut queue, &state);
+    let mut ring = EventRing::new();
+    let (mut queue, mut steps) = traced_steps(&mut ring, &state);
     let mut blocks = [Block::EMPTY; 128];
     let mut machine = Machine::new(settings, &mut blocks, &state, 2_500_000);
-    let mut interrupt: Option<u64> = None;
     loop {
-        let now = trace.now();
+        let now = steps.trace().now();
+        queue.follow();
         let (x, y) = state.steps();
         let (pins, slack) = (PagePoint { x, y }, state.slack());
         let motors = PagePoint { x: x + slack.0, y: y + slack.1 };
         let this = Turn { machine: &mut machine, now, pins, motors };
-        if !turn(this, &mut producer) {
-            return trace.changes();
+        if !turn(this, &mut queue) {
+            return steps.trace().changes();
         }
-        let next_turn = now + turn_ticks;
-        let mut due = interrupt.unwrap_or(now);
-        interrupt = loop {
-            if due >= next_turn {
-                break Some(due);
-            }
-            trace.set_now(due);
-            match pulser.tick() {
-                Some(ticks) => due += u64::from(ticks),
-                None => break None,
-            }
-        };
-        trace.set_now(next_turn);
+        steps.pass_until(now + turn_ticks);
     }
 }

@@ -1,8 +1,7 @@
 //! Whole jobs on the board of plain memory, over its serial line.
 
-use penup::boards::host::{HostBoard, QUEUE_LENGTH, Stamped, lend_memory};
-use penup::machine::PulserState;
-use penup::motion::StepEvent;
+use penup::boards::host::{HostBoard, Stamped, lend_memory};
+use penup::machine::{EventRing, PulserState};
 use penup::plotter::{Board, Lent, Plotter};
 use penup_client::emulator::{Machine, MachineEventKind};
 
@@ -18,9 +17,9 @@ impl Bench {
     /// With the capacities of `memory`, switched on and greeted.
     pub fn with_memory(memory: Lent<'static>) -> Self {
         // A test's process ends soon; until then the plotter borrows from these.
-        let queue = Box::leak(Box::new(heapless::spsc::Queue::<StepEvent, QUEUE_LENGTH>::new()));
+        let ring = Box::leak(Box::new(EventRing::new()));
         let pins = Box::leak(Box::new(PulserState::new()));
-        let mut board = HostBoard::new(queue, pins);
+        let mut board = HostBoard::new(ring, pins);
         let plotter = Plotter::new(memory, pins);
         plotter.greet(&mut board);
         Self { board, plotter }

@@ -33,4 +33,16 @@ impl<T> Owned<T> {
         // SAFETY: no other reference lives, by the contract.
         unsafe { (*self.0.get()).as_mut() }
     }
+
+    /// The same without a check.
+    ///
+    /// # Safety
+    /// As for [`Owned::get`], and it was filled before.
+    #[cfg(feature = "lm3s6965")]
+    #[allow(clippy::mut_from_ref)] // One user at a time, by the contract.
+    #[inline(always)]
+    pub unsafe fn get_filled(&self) -> &mut T {
+        // SAFETY: no other reference lives and there is a value, by the contract.
+        unsafe { (*self.0.get()).as_mut().unwrap_unchecked() }
+    }
 }

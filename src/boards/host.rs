@@ -3,14 +3,13 @@
 //!
 //! Time passes only in [`Board::wait`] and [`HostBoard::pass`], so a run is the same every time.
 
-use crate::machine::{Contacts, Pen, Pins, Pulser, PulserState, StepQueue};
+use crate::machine::{Contacts, EventRing, Pen, Pins, Pulser, PulserState, StepQueue, Tick};
 use crate::model::{Corner, Position};
-use crate::motion::{EventQueue, StepEvent};
+use crate::motion::EventQueue;
 use crate::plotter::{Board, Lent, NO_MOVES};
 use crate::protocol::{RealTime, Sorter};
 use core::convert::Infallible;
 use embedded_hal::digital::{ErrorType, OutputPin};
-use heapless::spsc::Queue;
 use std::boxed::Box;
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
@@ -140,14 +139,30 @@ impl Pen for TracedPen {
 }
 
 /// The library's interrupt code on traced pins.
-pub type TracedPulser<'q> =
-    Pulser<'q, Pins<TracedPin, TracedPin, TracedPin, TracedPin, TracedPin>, TracedPen>;
+type TracedPulser<'q> = Pulser<
+    'q,
+    Pins<TracedPin, TracedPin, TracedPin, TracedPin, TracedPin>,
+    TracedPen,
+    QUEUE_LENGTH,
+>;
 
-/// A pulser whose pins note their changes in the trace, and the queue's other end.
-pub fn traced_pulser<'q, const N: usize>(
-    queue: &'q mut Queue<StepEvent, N>,
+/// The interrupt's calls at their times.
+#[derive(Debug)]
+pub struct TracedSteps<'q> {
+    pulser: TracedPulser<'q>,
     state: &'q PulserState,
-) -> (StepQueue<'q>, TracedPulser<'q>, Rc<Trace>) {
+    trace: Rc<Trace>,
+    /// When the next event is due, in ticks from the start.
+    due: Option<u64>,
+    /// When the pulses end that are high.
+    pulses_end: Option<u64>,
+}
+
+/// Pins that note their changes in a trace, the interrupt that writes them, and its queue's other end.
+pub fn traced_steps<'q>(
+    ring: &'q mut EventRing<QUEUE_LENGTH>,
+    state: &'q PulserState,
+) -> (StepQueue<'q, QUEUE_LENGTH>, TracedSteps<'q>) {
     let trace = Rc::new(Trace::default());
     let pin = |change| TracedPin { trace: Rc::clone(&trace), level: None, change };
     let pins = Pins {
@@ -158,8 +173,64 @@ pub fn traced_pulser<'q, const N: usize>(
         enable: pin(Change::Enable),
     };
     let pen = TracedPen { trace: Rc::clone(&trace), height: None };
-    let (pulser, producer) = Pulser::new(pins, pen, queue, state);
-    (producer, pulser, trace)
+    let (pulser, queue) = Pulser::new(pins, pen, ring, state);
+    (queue, TracedSteps { pulser, state, trace, due: None, pulses_end: None })
+}
+
+impl TracedSteps<'_> {
+    /// What the pins did.
+    pub fn trace(&self) -> &Trace {
+        &self.trace
+    }
+
+    /// The next event is due now.
+    pub fn step_now(&mut self) {
+        self.due = Some(self.trace.now());
+    }
+
+    /// Lets time pass until `end`, in ticks from the start: what is due before it happens.
+    pub fn pass_until(&mut self, end: u64) {
+        if self.due.is_none() && self.pulser.begin() {
+            self.step_now();
+        }
+        loop {
+            let ends =
+                self.pulses_end.filter(|&at| at < end && self.due.is_none_or(|due| at <= due));
+            if let Some(at) = ends {
+                self.trace.set_now(at);
+                self.pulses_end = None;
+                if self.pulser.end_pulses() {
+                    self.brake();
+                }
+            } else if let Some(at) = self.due.filter(|&due| due < end) {
+                self.trace.set_now(at);
+                match self.pulser.tick() {
+                    Tick::Begun { ticks, pulses } => {
+                        self.due = Some(at + u64::from(ticks));
+                        if pulses {
+                            self.pulses_end = Some(at + u64::from(self.state.pulse_ticks()));
+                        }
+                    }
+                    Tick::Told => self.brake(),
+                    Tick::Over => self.due = None,
+                }
+            } else {
+                break;
+            }
+        }
+        self.trace.set_now(end);
+    }
+
+    fn brake(&mut self) {
+        loop {
+            let (is_due, more) = self.pulser.brake();
+            let more = u64::from(more.saturating_sub(self.pulser.wait_behind()));
+            self.due = self.due.map(|due| due + more);
+            if !is_due {
+                break;
+            }
+        }
+    }
 }
 
 /// The board.
@@ -168,11 +239,8 @@ pub struct HostBoard<'q> {
     sorter: Sorter,
     asked: RealTime,
     sent: Vec<u8>,
-    producer: StepQueue<'q>,
-    pulser: TracedPulser<'q>,
-    trace: Rc<Trace>,
-    /// When the step interrupt is due, in ticks from the start.
-    due: Option<u64>,
+    queue: StepQueue<'q, QUEUE_LENGTH>,
+    steps: TracedSteps<'q>,
     contacts: Contacts,
     state: &'q PulserState,
     /// Ticks that sending a byte takes.
@@ -181,23 +249,24 @@ pub struct HostBoard<'q> {
 
 impl core::fmt::Debug for HostBoard<'_> {
     fn fmt(&self, formatter: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        formatter.debug_struct("HostBoard").field("now", &self.trace.now()).finish_non_exhaustive()
+        formatter
+            .debug_struct("HostBoard")
+            .field("now", &self.trace().now())
+            .finish_non_exhaustive()
     }
 }
 
 impl<'q> HostBoard<'q> {
     /// A board at rest.
-    pub fn new(queue: &'q mut Queue<StepEvent, QUEUE_LENGTH>, state: &'q PulserState) -> Self {
-        let (producer, pulser, trace) = traced_pulser(queue, state);
+    pub fn new(ring: &'q mut EventRing<QUEUE_LENGTH>, state: &'q PulserState) -> Self {
+        let (queue, steps) = traced_steps(ring, state);
         Self {
             received: VecDeque::new(),
             sorter: Sorter::new(),
             asked: RealTime::default(),
             sent: Vec::new(),
-            producer,
-            pulser,
-            trace,
-            due: None,
+            queue,
+            steps,
             contacts: Contacts::default(),
             state,
             byte_ticks: 0,
@@ -246,24 +315,13 @@ impl<'q> HostBoard<'q> {
 
     /// What the pins did.
     pub fn trace(&self) -> &Trace {
-        &self.trace
+        self.steps.trace()
     }
 
     /// Lets `ticks` pass: the step interrupts that are due in them run.
     pub fn pass(&mut self, ticks: u64) {
-        let end = self.trace.now() + ticks;
-        let mut due = self.due.unwrap_or(self.trace.now());
-        self.due = loop {
-            if due >= end {
-                break Some(due);
-            }
-            self.trace.set_now(due);
-            match self.pulser.tick() {
-                Some(ticks) => due += u64::from(ticks),
-                None => break None,
-            }
-        };
-        self.trace.set_now(end);
+        self.steps.pass_until(self.trace().now() + ticks);
+        self.queue.follow();
     }
 }
 
@@ -284,7 +342,8 @@ impl Board for HostBoard<'_> {
     }
 
     fn queue(&mut self) -> &mut dyn EventQueue {
-        &mut self.producer
+        self.queue.follow();
+        &mut self.queue
     }
 
     fn contacts(&mut self) -> Contacts {
@@ -292,9 +351,7 @@ impl Board for HostBoard<'_> {
     }
 
     fn step_now(&mut self) {
-        if !self.pulser.pulse_is_high() {
-            self.due = Some(self.trace.now());
-        }
+        self.steps.step_now();
     }
 
     fn wait(&mut self) {

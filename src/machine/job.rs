@@ -32,8 +32,6 @@ impl Machine<'_> {
     /// Keeps the queue filled: reads targets while the look-ahead has room, hands over events while
     /// the queue has room and the plan is not too far ahead. Call it often.
     pub fn fill(&mut self, path: &mut dyn Path, queue: &mut dyn EventQueue) {
-        // So that the sums of the steps are up to date.
-        self.pins.steps();
         if self.pins.is_halted() {
             return;
         }

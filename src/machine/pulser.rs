@@ -1,20 +1,17 @@
 //! The step interrupt's work, and what it tells the main loop.
 
-use crate::motion::{Brake, BrakeOrders, EventKind, EventQueue, QueueSize, StepEvent, StepLength};
+use super::ring::EventRing;
+use crate::motion::{BrakeOrders, EventQueue, QueueSize, Runner, StepBrake, StepEvent, StepLength};
 use core::convert::Infallible;
 use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 use embedded_hal::digital::{OutputPin, PinState};
-use heapless::spsc::{Consumer, Producer, Queue};
 
 /// What the interrupt and the main loop share. Only loads and stores, so a Cortex-M0+ has it too.
 ///
-/// The interrupt alone writes the counts, the main loop alone the orders and the sums of the counts.
+/// The interrupt alone writes how often it ran dry, the main loop alone the orders, and the counts of what it
+/// finds to be taken.
 #[derive(Debug, Default)]
 pub struct PulserState {
-    /// The steps of x and y, packed as in [`PACKED_STEPS`]; wraps.
-    packed: AtomicU32,
-    /// As much of it as is in the sums.
-    summed: AtomicU32,
     x: AtomicU32,
     y: AtomicU32,
     slack_x: AtomicU32,
@@ -26,7 +23,6 @@ pub struct PulserState {
     pulse_ticks: AtomicU32,
     inverted: AtomicU8,
     queue_steps: AtomicU32,
-    queue_rate: AtomicU32,
     brake: BrakeOrders,
 }
 
@@ -34,8 +30,6 @@ impl PulserState {
     /// Nothing counted, nothing ordered.
     pub const fn new() -> Self {
         Self {
-            packed: AtomicU32::new(0),
-            summed: AtomicU32::new(0),
             x: AtomicU32::new(0),
             y: AtomicU32::new(0),
             slack_x: AtomicU32::new(0),
@@ -47,20 +41,12 @@ impl PulserState {
             pulse_ticks: AtomicU32::new(50),
             inverted: AtomicU8::new(0),
             queue_steps: AtomicU32::new(QueueSize::ENDLESS.steps),
-            queue_rate: AtomicU32::new(QueueSize::ENDLESS.greatest_rate),
             brake: BrakeOrders::new(),
         }
     }
 
-    /// The sum of the steps at the pins, x and y; wraps. For the main loop alone, and at least once in
-    /// 2^15 steps.
+    /// The sum of the steps at the pins, x and y, as counted last; wraps.
     pub fn steps(&self) -> (i32, i32) {
-        let packed = self.packed.load(Ordering::Relaxed);
-        let more = packed.wrapping_sub(self.summed.load(Ordering::Relaxed));
-        self.summed.store(packed, Ordering::Relaxed);
-        let dx = i32::from(more as u16 as i16).cast_unsigned();
-        add(&self.x, dx);
-        add(&self.y, (more.wrapping_sub(dx).cast_signed() >> 16).cast_unsigned());
         let [x, y] = [&self.x, &self.y].map(|sum| sum.load(Ordering::Relaxed).cast_signed());
         (x, y)
     }
@@ -87,9 +73,8 @@ impl PulserState {
         self.drained.load(Ordering::Acquire)
     }
 
-    /// No pulse leaves from now on; the interrupt raises the pen and throws the queue away, one
-    /// event a call. Call [`Pulser::tick`] at once, or the pen stays down until the event in work
-    /// ends.
+    /// No pulse leaves from now on; the interrupt raises the pen, and the main loop throws the queue away.
+    /// Call [`Pulser::tick`] at once, or the pen stays down until the event in work ends.
     pub fn halt(&self) {
         self.halt.store(true, Ordering::Release);
     }
@@ -102,6 +87,16 @@ impl PulserState {
     /// Allows pulses again. Only after [`PulserState::is_drained`].
     pub fn release(&self) {
         self.halt.store(false, Ordering::Release);
+    }
+
+    /// Adds what was taken from the queue, steps packed as in [`PACKED_STEPS`], less than 2^15 each.
+    fn count(&self, steps: u32, slack: u32, ticks: u32) {
+        for (x, y, packed) in [(&self.x, &self.y, steps), (&self.slack_x, &self.slack_y, slack)] {
+            let dx = i32::from(packed as u16 as i16).cast_unsigned();
+            add(x, dx);
+            add(y, (packed.wrapping_sub(dx).cast_signed() >> 16).cast_unsigned());
+        }
+        add(&self.ticks, ticks);
     }
 
     /// For a board whose steps are not pulsed by [`Pulser`]: what its hardware has done.
@@ -143,15 +138,11 @@ impl PulserState {
     /// What the board's queue holds; before the machine asks.
     pub fn set_queue(&self, queue: QueueSize) {
         self.queue_steps.store(queue.steps, Ordering::Relaxed);
-        self.queue_rate.store(queue.greatest_rate, Ordering::Relaxed);
     }
 
     /// The same; without a board it has no end.
     pub(super) fn queue(&self) -> QueueSize {
-        QueueSize {
-            steps: self.queue_steps.load(Ordering::Relaxed),
-            greatest_rate: self.queue_rate.load(Ordering::Relaxed),
-        }
+        QueueSize { steps: self.queue_steps.load(Ordering::Relaxed) }
     }
 
     /// How a queue that runs dry brakes.
@@ -161,38 +152,94 @@ impl PulserState {
 }
 
 /// The main loop's end of the interrupt's queue.
-pub struct StepQueue<'q> {
-    events: Producer<'q, StepEvent>,
+#[derive(Debug)]
+pub struct StepQueue<'q, const N: usize> {
+    ring: &'q EventRing<N>,
     state: &'q PulserState,
+    order: &'static PinOrder,
     /// Of the steps put in last, in units of the brake's rule.
     step_length: StepLength,
+    /// The place behind the word counted last.
+    counted: u32,
 }
 
-impl core::fmt::Debug for StepQueue<'_> {
-    fn fmt(&self, formatter: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        formatter.debug_struct("StepQueue").field("len", &self.events.len()).finish_non_exhaustive()
-    }
-}
+impl<const N: usize> StepQueue<'_, N> {
+    /// Room for what is told of some of the events.
+    const RESERVED: usize = Runner::ROOM;
+    /// Events that fit.
+    const EVENTS: usize = N - 1 - Self::RESERVED;
 
-impl StepQueue<'_> {
     /// Whether no event waits.
     pub fn is_empty(&self) -> bool {
-        self.events.is_empty()
+        self.ring.is_empty()
     }
 
     /// Whether half of the places are taken.
     pub fn is_half_full(&self) -> bool {
-        self.events.len() >= self.events.capacity() / 2
+        self.ring.waiting() as usize >= N / 2
+    }
+
+    /// Whether the last event is over, and [`Pulser::begin`] is to be called for the next.
+    pub fn is_stopped(&self) -> bool {
+        !self.ring.is_running()
+    }
+
+    /// How many events were taken since [`StepQueue::follow`] was called.
+    pub fn taken(&self) -> usize {
+        self.ring.taken_behind(self.counted) as usize
+    }
+
+    /// Counts what the interrupt has taken since, which makes room, and tells the state. After
+    /// [`PulserState::halt`] it throws the queue away.
+    pub fn follow(&mut self) {
+        let stopped = !self.ring.is_running();
+        let down = self.state.inverted() << 2;
+        let (mut steps, mut slack, mut ticks) = (0u32, 0u32, 0u32);
+        self.ring.count(&mut self.counted, |word| {
+            let flags = word as u8;
+            if flags & (StepEvent::PEN | StepEvent::LENGTH) == StepEvent::LENGTH {
+                return;
+            }
+            ticks = ticks.wrapping_add(word >> 8);
+            if flags & StepEvent::PEN != 0 {
+                return;
+            }
+            let levels = self.order.levels[usize::from(flags & LEVELS)] ^ down;
+            let step = PACKED_STEPS[usize::from(levels & STEPS)];
+            let sum = if flags & StepEvent::AT_REST == 0 { &mut steps } else { &mut slack };
+            *sum = sum.wrapping_add(step);
+        });
+        self.state.count(steps, slack, ticks);
+        if stopped && self.state.is_halted() {
+            self.ring.clear();
+            self.state.brake.forget();
+            self.step_length = StepLength::new();
+        }
+        self.state.drained.store(stopped, Ordering::Release);
     }
 }
 
-impl EventQueue for StepQueue<'_> {
+impl<const N: usize> EventQueue for StepQueue<'_, N> {
     fn room(&self) -> usize {
-        self.events.capacity() - self.events.len()
+        self.ring.room(self.counted).saturating_sub(Self::RESERVED)
     }
 
     fn push(&mut self, event: StepEvent) -> Result<(), StepEvent> {
-        self.events.enqueue(event)?;
+        if self.ring.room(self.counted) <= usize::from(event.is_slack()) {
+            return Err(event);
+        }
+        self.state.drained.store(false, Ordering::Relaxed);
+        if event.is_slack() {
+            self.ring.put(StepEvent::skip_next().to_bits());
+        }
+        let mut word = event.to_bits();
+        let flags = word as u8;
+        if flags & StepEvent::PEN == 0 {
+            let levels = (flags ^ self.state.inverted() << 2) & LEVELS;
+            let pins = self.order.pins[usize::from(levels)];
+            word = word & !u32::from(LEVELS) | u32::from(pins);
+        }
+        self.ring.put(word);
         if event.is_step() {
             self.state.brake.add(self.step_length.step().around);
         }
@@ -201,8 +248,13 @@ impl EventQueue for StepQueue<'_> {
 
     fn set_step_length(&mut self, units: u32, after_next: bool) -> Result<(), StepEvent> {
         if units != self.step_length.last() {
-            self.events.enqueue(StepEvent::step_length(units, after_next))?;
-            self.step_length.set(units, after_next);
+            let start = self.step_length.start(after_next);
+            let word = StepEvent::step_length(units, start);
+            if self.ring.room(self.counted) == 0 {
+                return Err(word);
+            }
+            self.ring.put(word.to_bits());
+            self.step_length.set_from(units, start);
         }
         Ok(())
     }
@@ -224,11 +276,51 @@ pub struct Pins<SX, DX, SY, DY, E> {
     pub enable: E,
 }
 
+/// Which of the axes' pins has which bit where they are written: at most 5 of them.
+#[derive(Debug)]
+pub struct PinOrder {
+    /// The pins' levels for those of a [`StepEvent`].
+    pins: [u8; 32],
+    /// And the other way round.
+    levels: [u8; 32],
+    /// The step pins.
+    pulses: u8,
+}
+
+impl PinOrder {
+    /// As in a [`StepEvent`].
+    pub const OF_EVENTS: Self = Self::new([0, 1, 2, 3, 4], 0);
+
+    /// Where the event's bits 0 to 4 are among the pins, each a different one of 0 to 4, and which of the pins are
+    /// inverted.
+    pub const fn new(places: [u8; 5], inverted: u8) -> Self {
+        let (mut pins, mut levels, mut pulses) = ([0; 32], [0; 32], 0);
+        let mut event = 0u8;
+        while event < 32 {
+            let (mut moved, mut bit) = (0, 0);
+            while bit < 5 {
+                moved |= (event >> bit & 1) << places[bit];
+                bit += 1;
+            }
+            if event == StepEvent::STEP_X | StepEvent::STEP_Y {
+                pulses = moved;
+            }
+            pins[event as usize] = moved ^ inverted;
+            levels[(moved ^ inverted) as usize] = event;
+            event += 1;
+        }
+        Self { pins, levels, pulses }
+    }
+}
+
 /// The axes' pins, set all at once.
 pub trait Axes {
-    /// The pins take `levels`, bits as in [`StepEvent`]: a high pulse for each step, the level of
-    /// each direction pin where a motor runs down, drivers on. Called from the interrupt, so brief.
-    fn set(&mut self, levels: u8);
+    /// How they lie; steps are not inverted.
+    const ORDER: &'static PinOrder = &PinOrder::OF_EVENTS;
+    /// The pins take `levels`, in bits 0 to 4 as [`Axes::ORDER`] says, the others mean nothing. In a
+    /// [`StepEvent`]'s order: a high pulse for each step, the level of each direction pin where a motor
+    /// runs down, drivers on. Called from the interrupt, so brief.
+    fn set(&mut self, levels: u32);
     /// The pulses end. Called from the interrupt, too.
     fn end_pulses(&mut self);
 }
@@ -241,12 +333,13 @@ where
     DY: OutputPin<Error = Infallible>,
     E: OutputPin<Error = Infallible>,
 {
-    fn set(&mut self, levels: u8) {
-        write(&mut self.direction_x, levels & StepEvent::DOWN_X == 0);
-        write(&mut self.direction_y, levels & StepEvent::DOWN_Y == 0);
-        write(&mut self.enable, levels & StepEvent::DRIVERS_ON != 0);
-        write(&mut self.step_x, levels & StepEvent::STEP_X != 0);
-        write(&mut self.step_y, levels & StepEvent::STEP_Y != 0);
+    fn set(&mut self, levels: u32) {
+        let is_set = |level: u8| levels & u32::from(level) != 0;
+        write(&mut self.direction_x, !is_set(StepEvent::DOWN_X));
+        write(&mut self.direction_y, !is_set(StepEvent::DOWN_Y));
+        write(&mut self.enable, is_set(StepEvent::DRIVERS_ON));
+        write(&mut self.step_x, is_set(StepEvent::STEP_X));
+        write(&mut self.step_y, is_set(StepEvent::STEP_Y));
     }
 
     fn end_pulses(&mut self) {
@@ -272,188 +365,143 @@ impl<P: OutputPin<Error = Infallible>> Pen for Solenoid<P> {
     }
 }
 
-/// The step interrupt: pops an event, writes pins, says when to be called next.
+/// The work of the step interrupt.
 ///
-/// A move takes two calls, one that raises the step pins and one that lowers them. No division, no
-/// loop, no lock. What the whole interrupt costs is said and measured where the board has it.
-pub struct Pulser<'q, A, P> {
+/// A move takes two calls, [`Pulser::tick`] that raises the step pins and [`Pulser::end_pulses`], and some
+/// more of [`Pulser::brake`] where the queue may run dry at speed. No division, no loop, no lock. What the
+/// interrupt costs is said and measured where the board has it.
+#[derive(Debug)]
+pub struct Pulser<'q, A, P, const N: usize> {
     axes: A,
     pen: P,
-    events: Consumer<'q, StepEvent>,
+    ring: &'q EventRing<N>,
     state: &'q PulserState,
-    /// Ticks of the event whose pulse is high; 0 if none is.
-    step_ticks: u32,
+    /// Ticks of the event in work.
+    ticks: u32,
     /// Keeps a queue that runs dry from stopping the machine with a jerk.
-    brake: Brake,
-    step_length: StepLength,
-    /// The levels of the event whose pulse is high: it counts when the pulse ends.
-    pulse: u8,
-    moving: bool,
+    brake: StepBrake,
 }
 
-impl<A, P> core::fmt::Debug for Pulser<'_, A, P> {
-    fn fmt(&self, formatter: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        formatter.debug_struct("Pulser").field("state", &self.state).finish_non_exhaustive()
-    }
+/// What [`Pulser::tick`] found in the queue.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Tick {
+    /// An event has begun.
+    Begun {
+        /// When the next is due, from the time on at which this one was.
+        ticks: u32,
+        /// Whether [`Pulser::end_pulses`] is due [`PulserState::pulse_ticks`] from now.
+        pulses: bool,
+    },
+    /// No event: first [`Pulser::brake`] is due at once, then the next tick.
+    Told,
+    /// Nothing, or no more is wanted: the event in work was the last.
+    Over,
 }
 
-impl<'q, A: Axes, P: Pen> Pulser<'q, A, P> {
-    /// Ticks between two calls while there is nothing to do: 1 ms.
-    pub const IDLE_TICKS: u32 = 25_000;
-
+impl<'q, A: Axes, P: Pen, const N: usize> Pulser<'q, A, P, N> {
     /// A pulser at rest, and the other end of its queue. The pins stay as they are until the first
     /// event.
-    pub fn new<const N: usize>(
+    pub fn new(
         axes: A,
         pen: P,
-        queue: &'q mut Queue<StepEvent, N>,
+        ring: &'q mut EventRing<N>,
         state: &'q PulserState,
-    ) -> (Self, StepQueue<'q>) {
-        let (producer, events) = queue.split();
-        state.set_queue(QueueSize { steps: producer.capacity() as u32, ..QueueSize::ENDLESS });
-        let (brake, step_length) = (Brake::default(), StepLength::default());
-        let pulser = Self {
-            axes,
-            pen,
-            events,
-            state,
-            step_ticks: 0,
-            brake,
-            step_length,
-            pulse: 0,
-            moving: false,
-        };
-        (pulser, StepQueue { events: producer, state, step_length: StepLength::default() })
+    ) -> (Self, StepQueue<'q, N>) {
+        let ring = &*ring;
+        state.set_queue(QueueSize { steps: StepQueue::<N>::EVENTS as u32 });
+        let pulser = Self { axes, pen, ring, state, ticks: 0, brake: StepBrake::new() };
+        let counted = ring.taken_place();
+        let step_length = StepLength::new();
+        (pulser, StepQueue { ring, state, order: A::ORDER, step_length, counted })
     }
 
-    /// The work of one interrupt. Returns the ticks until the next, counted from the start of this
-    /// one; `None` if there is nothing to do (call again when something is in the queue, or after
-    /// [`Pulser::IDLE_TICKS`]).
+    /// Before the first event, and again after [`Tick::Over`]. Whether there is anything to do.
+    pub fn begin(&mut self) -> bool {
+        let has_work = !self.ring.is_empty() || self.is_halted();
+        if has_work {
+            self.ring.set_running(true);
+        }
+        has_work
+    }
+
+    /// The next event.
     #[inline(always)]
-    pub fn tick(&mut self) -> Option<u32> {
-        if self.step_ticks != 0 {
-            self.axes.end_pulses();
-            let mut ticks = core::mem::take(&mut self.step_ticks);
-            if self.pulse & StepEvent::AT_REST == 0 {
-                add(&self.state.packed, PACKED_STEPS[usize::from(self.pulse & STEPS)]);
-                let least = self.brake.step(self.step_length.step(), &self.state.brake);
-                if least > ticks {
-                    ticks = ticks.max(self.without_what_follows(least));
-                }
-            } else {
-                self.count_slack();
-            }
-            if self.halted() {
-                return Some(Self::DISCARD_TICKS);
-            }
-            let pulse = self.state.pulse_ticks.load(Ordering::Relaxed);
-            return Some(if ticks > pulse { ticks - pulse } else { 1 });
+    pub fn tick(&mut self) -> Tick {
+        const RARE: u32 = (StepEvent::LENGTH | StepEvent::PEN) as u32;
+        if self.is_halted() {
+            self.stop();
+            return Tick::Over;
         }
-        let Some(event) = self.events.dequeue() else {
-            return self.run_dry();
+        let Some(word) = self.ring.take() else {
+            self.run_dry();
+            return Tick::Over;
         };
-        if let Some((units, after_next)) = event.as_step_length() {
-            return self.set_step_length(units, after_next);
+        let ticks = word >> 8;
+        if word & RARE == 0 {
+            self.axes.set(word);
+            self.ticks = ticks;
+            return Tick::Begun { ticks, pulses: word & u32::from(A::ORDER.pulses) != 0 };
         }
-        if self.halted() {
-            return Some(self.throw_away(event));
+        if word & u32::from(StepEvent::PEN) == 0 {
+            self.brake.tell(StepEvent::from_bits(word));
+            return Tick::Told;
         }
-        self.state.drained.store(false, Ordering::Relaxed);
-        add(&self.state.ticks, event.ticks());
-        match event.kind() {
-            EventKind::Levels(levels) => Some(self.set_levels(levels, event)),
-            EventKind::Pen { height } => {
-                self.moving = false;
-                self.pen.set_height(height);
-                Some(event.ticks())
-            }
-        }
+        self.pen.set_height(word as u8 & !StepEvent::PEN);
+        Tick::Begun { ticks, pulses: false }
     }
 
     /// Nothing else is read by it, so it needs no order.
     #[inline(always)]
-    fn halted(&self) -> bool {
+    pub fn is_halted(&self) -> bool {
         self.state.halt.load(Ordering::Relaxed)
     }
 
-    /// Whether a pulse is high: [`Pulser::tick`] must not be called before its time.
-    #[inline]
-    pub fn pulse_is_high(&self) -> bool {
-        self.step_ticks != 0
+    /// The pulses of an event end. Whether [`Pulser::brake`] is due at once.
+    #[inline(always)]
+    pub fn end_pulses(&mut self) -> bool {
+        self.axes.end_pulses();
+        self.brake.step(&self.state.brake)
     }
 
-    /// Raises the pen and switches the drivers off, whatever waits: for a panic or a fault.
-    pub fn shut_down(&mut self) {
-        self.pen.set_height(0);
-        self.axes.set(0);
+    /// Whether this is due once more, and by how many ticks the event in work must last longer than was planned: with fewer
+    /// steps waiting the machine would be too fast to stop within them.
+    #[inline(always)]
+    pub fn brake(&mut self) -> (bool, u32) {
+        let (is_due, least) = self.brake.work(&self.state.brake);
+        (is_due, least.saturating_sub(self.ticks))
     }
 
-    /// One thrown away event in 4 µs: 512 of them are gone in 2 ms, and other interrupts get
-    /// their turn.
-    const DISCARD_TICKS: u32 = 100;
-
-    /// The ticks from one step to the next, less those of an event between the two.
-    #[cold]
-    #[inline(never)]
-    fn without_what_follows(&self, ticks: u32) -> u32 {
-        let next = self.events.peek().filter(|next| next.is_wait());
-        ticks.saturating_sub(next.map_or(0, |wait| wait.ticks()))
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn count_slack(&self) {
-        let steps = PACKED_STEPS[usize::from(self.pulse & STEPS)];
-        let dx = i32::from(steps as u16 as i16).cast_unsigned();
-        add(&self.state.slack_x, dx);
-        add(&self.state.slack_y, (steps.wrapping_sub(dx).cast_signed() >> 16).cast_unsigned());
-    }
-
-    /// Takes no time: the next call is due at once.
-    #[cold]
-    #[inline(never)]
-    fn set_step_length(&mut self, units: u32, after_next: bool) -> Option<u32> {
-        self.step_length.set(units, after_next);
-        Some(0)
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn throw_away(&mut self, event: StepEvent) -> u32 {
-        if event.is_step() {
-            self.brake.skip(self.step_length.step().around);
+    /// The ticks of what comes between the event in work and the next step, which count where the first is lengthened.
+    pub fn wait_behind(&self) -> u32 {
+        let others = A::ORDER.pulses | StepEvent::AT_REST | StepEvent::LENGTH | StepEvent::PEN;
+        match self.ring.peek() {
+            Some(word) if word as u8 & others == 0 => word >> 8,
+            _ => 0,
         }
-        self.moving = false;
-        self.pen.set_height(0);
-        Self::DISCARD_TICKS
     }
 
+    /// Raises the pen; the event in work was the last.
+    #[cold]
     #[inline(never)]
-    fn run_dry(&mut self) -> Option<u32> {
-        let halted = self.state.is_halted();
-        if halted {
-            self.pen.set_height(0);
+    pub fn stop(&mut self) {
+        self.pen.set_height(0);
+        self.brake.stop();
+        self.ring.set_running(false);
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn run_dry(&mut self) {
+        const UNMOVED: u8 = StepEvent::AT_REST | StepEvent::PEN;
+        let mut last = self.ring.taken_before(0) as u8;
+        if last & (StepEvent::LENGTH | StepEvent::PEN) == StepEvent::LENGTH {
+            last = self.ring.taken_before(1) as u8;
         }
-        if core::mem::take(&mut self.moving) && !halted {
+        if last & UNMOVED == 0 {
             self.state.note_underrun();
         }
-        self.state.drained.store(true, Ordering::Release);
-        None
-    }
-
-    #[inline(always)]
-    fn set_levels(&mut self, levels: u8, event: StepEvent) -> u32 {
-        const PULSES: u8 = StepEvent::STEP_X | StepEvent::STEP_Y;
-        let inverted = self.state.inverted.load(Ordering::Relaxed);
-        let pins = levels ^ (inverted << 2);
-        self.axes.set(pins);
-        self.moving = levels & StepEvent::AT_REST == 0;
-        if levels & PULSES == 0 {
-            return event.ticks();
-        }
-        self.pulse = levels;
-        self.step_ticks = event.ticks().max(1);
-        self.state.pulse_ticks.load(Ordering::Relaxed)
+        self.brake.rest();
+        self.ring.set_running(false);
     }
 }
 
@@ -461,6 +509,9 @@ impl<'q, A: Axes, P: Pen> Pulser<'q, A, P> {
 fn write(pin: &mut impl OutputPin<Error = Infallible>, high: bool) {
     let Ok(()) = pin.set_state(PinState::from(high));
 }
+
+/// All that an event says of the axes' pins.
+const LEVELS: u8 = (1 << 5) - 1;
 
 /// Pulses and directions of the levels.
 const STEPS: u8 = StepEvent::STEP_X | StepEvent::STEP_Y | StepEvent::DOWN_X | StepEvent::DOWN_Y;
@@ -478,7 +529,7 @@ const PACKED_STEPS: [u32; 16] = {
 };
 
 /// Only for the one that writes it: a load and a store, so that a Cortex-M0+ can.
-#[inline(always)]
+#[inline]
 fn add(sum: &AtomicU32, more: u32) {
     sum.store(sum.load(Ordering::Relaxed).wrapping_add(more), Ordering::Relaxed);
 }

@@ -12,7 +12,7 @@
 //! 2^16 of them: then the interval is 2^k·ℓ/√s ticks, one product of 32 bits and a shift.
 
 use super::limits::hypotenuse;
-use super::{Limits, PathLength};
+use super::{Limits, PathLength, StepEvent};
 use core::sync::atomic::{AtomicU32, Ordering};
 
 /// The root's interval is between two of these.
@@ -76,13 +76,11 @@ impl BrakeRule {
 pub struct QueueSize {
     /// How many wait at least when it is full; 0 for no end.
     pub steps: u32,
-    /// Steps a second up to which each of them can be looked at.
-    pub greatest_rate: u32,
 }
 
 impl QueueSize {
     /// A queue without end.
-    pub const ENDLESS: Self = Self { steps: 0, greatest_rate: u32::MAX };
+    pub const ENDLESS: Self = Self { steps: 0 };
 }
 
 impl Limits {
@@ -92,9 +90,6 @@ impl Limits {
     /// It brakes as hard as the machine accelerates, or harder if it must in order to stop within
     /// 13/16 of the queue. Both by 1/32, so that it never slows a plan that is in time.
     pub fn brake(&self, fastest: PathLength, longer: u64, queue: QueueSize) -> BrakeRule {
-        if self.step_rate(self.speed(fastest)) > u64::from(queue.greatest_rate) {
-            return BrakeRule::default();
-        }
         let acceleration = u64::from(self.acceleration.to_bits());
         let fastest = u64::from(fastest.to_bits());
         // 2^-18 mm; below 2^20 steps of at most 1 mm.
@@ -119,6 +114,8 @@ impl Limits {
 pub struct BrakeOrders {
     /// Units of all steps that were put into the queue; wraps.
     queued: AtomicU32,
+    /// Units of all steps that were taken from it, or thrown away; wraps. Of the interrupt.
+    taken: AtomicU32,
     exponent: AtomicU32,
     /// Units in which any speed can be shed; 0 as long as there is no rule.
     top: AtomicU32,
@@ -127,7 +124,12 @@ pub struct BrakeOrders {
 impl BrakeOrders {
     /// No rule: nothing is slowed.
     pub const fn new() -> Self {
-        Self { queued: AtomicU32::new(0), exponent: AtomicU32::new(0), top: AtomicU32::new(0) }
+        Self {
+            queued: AtomicU32::new(0),
+            taken: AtomicU32::new(0),
+            exponent: AtomicU32::new(0),
+            top: AtomicU32::new(0),
+        }
     }
 
     /// Only while no step waits.
@@ -147,6 +149,38 @@ impl BrakeOrders {
     pub fn add(&self, units: u32) {
         let queued = self.queued.load(Ordering::Relaxed);
         self.queued.store(queued.wrapping_add(units), Ordering::Relaxed);
+    }
+
+    /// Units of all steps that were put into the queue; wraps.
+    #[inline]
+    pub fn queued(&self) -> u32 {
+        self.queued.load(Ordering::Relaxed)
+    }
+
+    /// So many are in it now.
+    #[inline]
+    pub fn set_queued(&self, units: u32) {
+        self.queued.store(units, Ordering::Relaxed);
+    }
+
+    /// All that waited was thrown away. For the main loop, while the interrupt takes nothing.
+    pub fn forget(&self) {
+        self.queued.store(self.taken.load(Ordering::Relaxed), Ordering::Relaxed);
+    }
+
+    /// Steps of so many units were taken. For the interrupt.
+    #[inline(always)]
+    pub(super) fn take(&self, units: u32) {
+        let taken = self.taken.load(Ordering::Relaxed);
+        self.taken.store(taken.wrapping_add(units), Ordering::Relaxed);
+    }
+
+    /// Units of the steps that wait. Negative for a moment, between a step's way into the queue and its
+    /// entry in the sum.
+    #[inline(always)]
+    pub(super) fn waiting(&self) -> i32 {
+        let queued = self.queued.load(Ordering::Relaxed);
+        queued.wrapping_sub(self.taken.load(Ordering::Relaxed)).cast_signed()
     }
 }
 
@@ -171,15 +205,39 @@ pub struct StepLength {
 }
 
 impl StepLength {
+    /// As before anything was told.
+    pub const fn new() -> Self {
+        Self { before: 0, behind: 0, later: 0 }
+    }
+
     /// The steps from the next one on are so long, or from the one behind it on: from the last step of
-    /// the old length to the first of the new one it is half of both.
+    /// the old length to the first of the new one it is half of both. The first of all lengths is that of
+    /// the step before, too.
     #[inline]
     pub fn set(&mut self, units: u32, after_next: bool) {
-        self.behind = if after_next { ((self.later + units) / 2) & !1 } else { units };
+        self.set_from(units, self.start(after_next));
+    }
+
+    /// Where a new length begins.
+    pub(crate) fn start(&self, after_next: bool) -> LengthStart {
+        match (self.later, after_next) {
+            (0, _) => LengthStart::Anew,
+            (_, false) => LengthStart::Next,
+            (_, true) => LengthStart::AfterNext,
+        }
+    }
+
+    pub(crate) fn set_from(&mut self, units: u32, start: LengthStart) {
+        self.behind = units;
+        match start {
+            LengthStart::Next => {}
+            LengthStart::AfterNext => self.behind = ((self.later + units) / 2) & !1,
+            LengthStart::Anew => self.before = units,
+        }
         self.later = units;
     }
 
-    /// Of the steps told of last.
+    /// Of the steps told of last; 0 if none were.
     #[inline]
     pub fn last(&self) -> u32 {
         self.later
@@ -194,27 +252,52 @@ impl StepLength {
     }
 }
 
+/// From where on steps have another length.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum LengthStart {
+    /// From the next one.
+    Next,
+    /// From the one behind it.
+    AfterNext,
+    /// From the next one, and nothing is known of those before.
+    Anew,
+}
+
 /// Where the queue's other end is. Of the interrupt.
 #[derive(Debug, Default)]
 pub struct Brake {
-    /// Units of all steps taken; wraps.
-    taken: u32,
     /// Units in which the machine could stop from the speed that it may have.
     reach: u32,
 }
 
 impl Brake {
+    /// As at rest.
+    pub const fn new() -> Self {
+        Self { reach: 0 }
+    }
+
     /// A step was taken. The least ticks from it to the next; 0 if any are enough.
     #[inline(always)]
     pub fn step(&mut self, step: StepWay, orders: &BrakeOrders) -> u32 {
-        self.skip(step.around);
+        orders.take(step.around);
+        if self.move_on(step, orders.waiting(), orders) {
+            return 0;
+        }
+        self.least_ticks(step, orders)
+    }
+
+    /// Past a step that has been counted. Whether the machine can stop from any speed.
+    #[inline(always)]
+    fn move_on(&mut self, step: StepWay, waiting: i32, orders: &BrakeOrders) -> bool {
         let top = orders.top.load(Ordering::Relaxed);
         // From rest it takes a step to the middle behind the first pulse.
         let reach = if self.reach == 0 { step.behind } else { self.reach + step.around };
-        self.reach = reach.min(self.waiting(orders)).min(top);
-        if self.reach == top {
-            return 0;
-        }
+        self.reach = reach.min(waiting.max(0).cast_unsigned()).min(top);
+        self.reach == top
+    }
+
+    #[inline(always)]
+    fn least_ticks(&self, step: StepWay, orders: &BrakeOrders) -> u32 {
         least_interval(step.behind, self.reach, orders.exponent.load(Ordering::Relaxed))
     }
 
@@ -222,7 +305,7 @@ impl Brake {
     /// longest way behind one, `shortest` are the least ticks to the next.
     pub fn pass(&mut self, around: u32, longest: u32, shortest: u32, orders: &BrakeOrders) -> bool {
         let top = orders.top.load(Ordering::Relaxed);
-        let left = self.waiting(orders).saturating_sub(around);
+        let left = orders.waiting().max(0).cast_unsigned().saturating_sub(around);
         // In between it is further.
         let least = self.reach.min(left);
         let exponent = orders.exponent.load(Ordering::Relaxed);
@@ -230,30 +313,149 @@ impl Brake {
             || least >= top
             || (least > 0 && least_interval(longest, least, exponent) <= shortest);
         if is_calm {
-            self.skip(around);
+            orders.take(around);
             self.reach = (self.reach + around).min(left).min(top);
         }
         is_calm
     }
 
-    /// Steps of so many units were thrown away.
-    #[inline(always)]
-    pub fn skip(&mut self, units: u32) {
-        self.taken = self.taken.wrapping_add(units);
+    /// Takes all steps at once that come before `queued` was the sum, if enough waits behind them.
+    #[inline]
+    pub fn pass_far(&mut self, queued: u32, orders: &BrakeOrders) -> bool {
+        let top = orders.top.load(Ordering::Relaxed);
+        let is_far = self.reach == top && orders.queued().wrapping_sub(queued) >= top;
+        if is_far {
+            orders.taken.store(queued, Ordering::Relaxed);
+        }
+        is_far
     }
 
     /// All steps were thrown away.
     pub fn skip_all(&mut self, orders: &BrakeOrders) {
-        self.taken = orders.queued.load(Ordering::Relaxed);
+        orders.forget();
         self.reach = 0;
     }
+}
 
-    /// Units of the steps that wait.
+/// The brake of an interrupt that comes at each step and has no time to look closely at each: the little that
+/// always has to be done is [`StepBrake::step`], and the rest comes in pieces.
+#[derive(Debug, Default)]
+pub struct StepBrake {
+    /// With no more units waiting than these, a step must be looked at.
+    calm_above: i32,
+    /// What has to be done: see below; 0 for nothing.
+    todo: u8,
+    /// Of the present step, and of each to come unless something is to be done.
+    way: StepWay,
+    brake: Brake,
+    length: StepLength,
+    /// The word that tells another length.
+    told: u32,
+}
+
+/// Steps to come until all have the same way.
+const CHANGES: u8 = 3;
+/// It was told that a pulse is none of a step, which is to come.
+const AHEAD: u8 = 1 << 3;
+/// The step whose way is known is taken.
+const TAKE: u8 = 1 << 4;
+/// A length was told.
+const TOLD: u8 = 1 << 5;
+/// It may be too soon for the next step.
+const LOOK: u8 = 1 << 6;
+/// The next pulse is none of a step.
+const SKIP: u8 = 1 << 7;
+
+impl StepBrake {
+    /// As at rest, nothing told.
+    pub const fn new() -> Self {
+        Self {
+            calm_above: i32::MAX,
+            todo: 0,
+            way: StepWay { around: 0, behind: 0 },
+            brake: Brake::new(),
+            length: StepLength::new(),
+            told: 0,
+        }
+    }
+
+    /// The machine rests. The next step will be looked at.
+    pub fn rest(&mut self) {
+        self.calm_above = i32::MAX;
+    }
+
+    /// All steps were thrown away, and the machine stands.
+    pub fn stop(&mut self) {
+        self.brake.reach = 0;
+        self.rest();
+    }
+
+    /// Takes a word that is no event. [`StepBrake::work`] must be called before the next event.
     #[inline(always)]
-    fn waiting(&self, orders: &BrakeOrders) -> u32 {
-        // Negative for a moment, between a step's way into the queue and its entry in the sum.
-        let waiting = orders.queued.load(Ordering::Relaxed).wrapping_sub(self.taken);
-        waiting.cast_signed().max(0).cast_unsigned()
+    pub(crate) fn tell(&mut self, word: StepEvent) {
+        if word.skips_next() {
+            self.todo |= SKIP | AHEAD;
+        } else {
+            self.told = word.to_bits();
+            self.todo = TOLD;
+        }
+    }
+
+    /// The pulse of a step is over. Whether [`StepBrake::work`] must be called, soon.
+    #[inline(always)]
+    pub fn step(&mut self, orders: &BrakeOrders) -> bool {
+        self.todo != 0 || self.take(orders)
+    }
+
+    #[inline(always)]
+    fn take(&mut self, orders: &BrakeOrders) -> bool {
+        orders.take(self.way.around);
+        let waiting = orders.waiting();
+        if waiting > self.calm_above {
+            return false;
+        }
+        let is_calm = self.brake.move_on(self.way, waiting, orders);
+        self.calm_above = i32::MAX;
+        if is_calm {
+            // Without a rule nothing waits, and nothing is looked at again.
+            self.calm_above = orders.top.load(Ordering::Relaxed).cast_signed() - 1;
+        } else {
+            self.todo |= LOOK;
+        }
+        !is_calm
+    }
+
+    /// Does a piece of what has to be done. Whether there is more of it, and the least ticks from the last step to the
+    /// next, as far as is known.
+    #[inline(always)]
+    pub fn work(&mut self, orders: &BrakeOrders) -> (bool, u32) {
+        let todo = self.todo;
+        if todo & LOOK != 0 {
+            self.todo = todo & !LOOK;
+            return (false, self.brake.least_ticks(self.way, orders));
+        }
+        (self.prepare(todo, orders), 0)
+    }
+
+    #[inline(never)]
+    fn prepare(&mut self, todo: u8, orders: &BrakeOrders) -> bool {
+        if todo & TAKE != 0 {
+            self.todo = todo & !TAKE;
+            return self.take(orders);
+        }
+        if todo & SKIP != 0 {
+            self.todo = todo & !(if todo & AHEAD != 0 { AHEAD } else { SKIP });
+            return false;
+        }
+        if todo & TOLD != 0 {
+            let (units, start) = StepEvent::from_bits(self.told).told_length();
+            self.length.set_from(units, start);
+            self.todo = CHANGES;
+            return false;
+        }
+        self.way = self.length.step();
+        self.todo = todo.saturating_sub(1) | TAKE;
+        true
     }
 }
 
@@ -268,7 +470,7 @@ mod tests {
     }
 
     fn queue(steps: u32) -> QueueSize {
-        QueueSize { steps, ..QueueSize::ENDLESS }
+        QueueSize { steps }
     }
 
     /// 0.01 mm.
@@ -309,15 +511,6 @@ mod tests {
     }
 
     #[test]
-    fn a_queue_that_is_too_fast_is_not_braked() {
-        // 100 mm/s of 100 steps, but for rounding.
-        let rule =
-            |greatest_rate| limits().brake(limits().top, 1, QueueSize { steps: 0, greatest_rate });
-        assert_eq!(rule(9_990), BrakeRule::default());
-        assert_ne!(rule(10_000), BrakeRule::default());
-    }
-
-    #[test]
     fn the_longest_and_the_shortest_steps_there_are_fit() {
         for (steps_per_mm, acceleration) in [(2, 10), (2, 32767), (4000, 10), (4000, 32767)] {
             let mut settings = settings();
@@ -347,8 +540,7 @@ mod tests {
         let (mut brake, mut steps) = (Brake::default(), StepLength::default());
         let length = rule.step_length(STEP);
         steps.set(length, false);
-        // The first is counted from the middle before it.
-        orders.add(length / 2 + 100 * length);
+        orders.add(101 * length);
         assert_eq!(brake.step(steps.step(), &orders), 0, "no rule");
         orders.set_rule(rule);
         let squared_speed = |ticks: u32| 1.0 / f64::from(ticks).powi(2);

@@ -1,5 +1,6 @@
 //! The step event, one word, and the queue in which events wait.
 
+use super::brake::LengthStart;
 use crate::step::Direction;
 use crate::step::tape::Instruction;
 
@@ -16,7 +17,7 @@ use crate::step::tape::Instruction;
 /// | 8–31 | ticks to the next event | the same |
 ///
 /// With bit 6 set and bit 7 clear it is no event, but tells how long the steps behind it are: see
-/// [`Brake`](super::Brake).
+/// [`StepBrake`](super::StepBrake).
 ///
 /// A change of direction is an event of its own, without a pulse, before the pulse. Waits longer
 /// than 2^24 - 1 ticks (0.67 s) are several events.
@@ -62,8 +63,8 @@ impl StepEvent {
     /// The longest wait that one event can hold.
     pub const MAX_TICKS: u32 = (1 << 24) - 1;
 
-    const PEN: u8 = 1 << 7;
-    const LENGTH: u8 = 1 << 6;
+    pub(crate) const PEN: u8 = 1 << 7;
+    pub(crate) const LENGTH: u8 = 1 << 6;
 
     /// The axes' pins take `levels` (an "or" of the constants), then `ticks` pass (at most
     /// [`StepEvent::MAX_TICKS`]; more is cut to it).
@@ -76,18 +77,33 @@ impl StepEvent {
         Self::new(height | Self::PEN, ticks)
     }
 
-    /// A word for [`StepLength::set`](super::StepLength::set): units below 2^16.
-    pub const fn step_length(units: u32, after_next: bool) -> Self {
-        Self::new(Self::LENGTH, units | (after_next as u32) << 16)
+    /// A word that tells how long the steps from somewhere on are: units below 2^16.
+    pub(crate) const fn step_length(units: u32, start: LengthStart) -> Self {
+        Self::new(Self::LENGTH, units | (start as u32) << 16)
     }
 
-    /// What it tells, if it is such a word.
+    /// What such a word tells.
     #[inline(always)]
-    pub const fn as_step_length(self) -> Option<(u32, bool)> {
-        if self.0 & (Self::PEN | Self::LENGTH) as u32 != Self::LENGTH as u32 {
-            return None;
-        }
-        Some((self.0 >> 8 & 0xFFFF, self.0 >> 24 != 0))
+    pub(crate) const fn told_length(self) -> (u32, LengthStart) {
+        let start = match self.0 >> 24 {
+            0 => LengthStart::Next,
+            1 => LengthStart::AfterNext,
+            _ => LengthStart::Anew,
+        };
+        (self.0 >> 8 & 0xFFFF, start)
+    }
+
+    const SKIP_NEXT: u32 = 1 << 31;
+
+    /// A word that tells that the next pulse is none of a step.
+    pub(crate) const fn skip_next() -> Self {
+        Self(Self::SKIP_NEXT | Self::LENGTH as u32)
+    }
+
+    /// Whether it is such a word.
+    #[inline(always)]
+    pub(crate) const fn skips_next(self) -> bool {
+        self.0 & Self::SKIP_NEXT != 0
     }
 
     const fn new(flags: u8, ticks: u32) -> Self {
@@ -146,12 +162,6 @@ impl StepEvent {
     pub const fn is_step(self) -> bool {
         let pulses = (Self::STEP_X | Self::STEP_Y) as u32;
         self.0 & pulses != 0 && self.0 & (Self::PEN | Self::AT_REST) as u32 == 0
-    }
-
-    /// Whether it pulses nothing, and something follows.
-    pub const fn is_wait(self) -> bool {
-        let others = Self::STEP_X | Self::STEP_Y | Self::AT_REST | Self::LENGTH | Self::PEN;
-        self.0 & others as u32 == 0
     }
 
     /// What a tape would hold of the event: a move, or the pen going up (height below 64) or down.

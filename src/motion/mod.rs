@@ -34,7 +34,7 @@ mod profile;
 mod runner;
 mod smooth;
 
-pub use brake::{Brake, BrakeOrders, BrakeRule, QueueSize, StepLength, StepWay};
+pub use brake::{Brake, BrakeOrders, BrakeRule, QueueSize, StepBrake, StepLength, StepWay};
 pub use emitter::Emitter;
 pub use event::{EventKind, EventQueue, StepEvent};
 pub use limits::{Limits, LimitsError, MotionSettings};

@@ -78,10 +78,16 @@ impl Clock {
     }
 }
 
-/// Cycles since the start, modulo 2^24: what the step interrupt counts by.
+/// Cycles since the start, modulo 2^24.
 #[inline(always)]
 pub fn cycles_24() -> u32 {
-    !SYST::get_current() & CYCLE_MASK
+    !count_down() & CYCLE_MASK
+}
+
+/// The same counted down: what the step interrupt counts by.
+#[inline(always)]
+pub fn count_down() -> u32 {
+    SYST::get_current()
 }
 
 /// Microseconds of time awake since the start.

@@ -7,7 +7,7 @@
 //! | PEN (high: down) | PB5 |
 //! | limit switches of x, y, emergency stop (high: closed; pulled down) | PC4, PC5, PC6 |
 //! | serial line, 115200 8N1 | UART0: PA0 receives, PA1 sends |
-//! | steps | timer 0, priority 0: nothing delays it |
+//! | steps | timers 1 and 2, priority 0: nothing delays them |
 //! | serial line's bytes | UART0, priority 1 |
 //! | contacts | port C, priority 2: wakes the main loop |
 //! | clock | SysTick, priority 2; stands still while the machine sleeps without a task |
@@ -83,6 +83,7 @@ impl Board for Lm3s6965 {
     }
 
     fn queue(&mut self) -> &mut dyn EventQueue {
+        self.steps.follow();
         &mut self.steps
     }
 

@@ -3,7 +3,7 @@
 use core::convert::Infallible;
 
 use embedded_hal::digital::{ErrorType, OutputPin};
-use penup::machine::Axes;
+use penup::machine::{Axes, PinOrder};
 
 use super::registers::{GPIO_B, SYSTEM_CONTROL};
 
@@ -37,25 +37,13 @@ const AXES: u32 = 0x1F;
 const STEP_X: u32 = 1;
 const STEP_Y: u32 = 1 << 2;
 
-/// Their levels for those of a step event: STEP_X, STEP_Y, DIR_X, DIR_Y, ENABLE from bit 0 on there,
-/// STEP_X, DIR_X, STEP_Y, DIR_Y, ENABLE here; high direction counts up, low enable is on.
-const LEVELS: [u8; 32] = {
-    let mut table = [0; 32];
-    let mut levels = 0;
-    while levels < 32u8 {
-        let (step_x, step_y) = (levels & 1, levels >> 1 & 1);
-        let (down_x, down_y, on) = (levels >> 2 & 1, levels >> 3 & 1, levels >> 4 & 1);
-        table[levels as usize] =
-            step_x | (1 - down_x) << 1 | step_y << 2 | (1 - down_y) << 3 | (1 - on) << 4;
-        levels += 1;
-    }
-    table
-};
-
 impl Axes for AxisPins {
+    /// STEP_X, STEP_Y, DIR_X, DIR_Y, ENABLE of an event; high direction counts up, low enable is on.
+    const ORDER: &'static PinOrder = &PinOrder::new([0, 2, 1, 3, 4], 0b11010);
+
     #[inline(always)]
-    fn set(&mut self, levels: u8) {
-        write(AXES, LEVELS[usize::from(levels) % LEVELS.len()].into());
+    fn set(&mut self, levels: u32) {
+        write(AXES, levels);
     }
 
     #[inline(always)]

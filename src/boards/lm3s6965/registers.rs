@@ -15,4 +15,6 @@ pub const GPIO_C: Peripheral = unsafe { Peripheral::at(0x4000_6000) };
 /// The serial line. Used by `serial`.
 pub const UART0: Peripheral = unsafe { Peripheral::at(0x4000_C000) };
 /// The step timer. Used by `steps`.
-pub const TIMER0: Peripheral = unsafe { Peripheral::at(0x4003_0000) };
+pub const TIMER1: Peripheral = unsafe { Peripheral::at(0x4003_1000) };
+/// The timer of the pulses. Used by `steps`.
+pub const TIMER2: Peripheral = unsafe { Peripheral::at(0x4003_2000) };

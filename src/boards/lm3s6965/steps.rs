@@ -1,23 +1,24 @@
 //! The step interrupt: pops an event, writes pins, sets the next compare.
 //!
-//! Timer 0 runs one shot at a time. Each shot is shortened by how late its start is against the
-//! planned instant, read from SysTick, so that delays never add up: the planned time between two
-//! events holds over any number of them.
+//! Timer 1 runs one shot at a time, from one event to the next. Each shot is shortened by how late its start is
+//! against the planned instant, read from SysTick, so that delays never add up: the planned time between
+//! two events holds over any number of them. Timer 2 ends the pulses, and its handler counts the steps that
+//! wait. Where they are few it sets a third one off that lengthens the event in work, if the machine would else be
+//! too fast. All have one priority, so none comes in between another.
 //!
 //! Events wait until the queue is half full or the planner has nothing to add and sleeps, so that
 //! a motion does not begin with one event and starve.
 
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::sync::atomic::Ordering;
 
 use cortex_m::peripheral::NVIC;
-use heapless::spsc::Queue;
 use lm3s6965::{Interrupt, interrupt};
-use penup::machine::{Pulser, PulserState, Solenoid, StepQueue};
+use penup::machine::{EventRing, Pulser, PulserState, Solenoid, StepQueue, Tick};
 use penup::motion::{EventQueue, StepEvent, TICKS_PER_SECOND};
-use static_cell::StaticCell;
+use static_cell::ConstStaticCell;
 
 use super::pins::{AxisPins, MotorPins, PenPin};
-use super::registers::{SYSTEM_CONTROL, TIMER0};
+use super::registers::{SYSTEM_CONTROL, TIMER1, TIMER2};
 use super::{HAPPENED, clock, critical};
 use crate::boards::handler::Owned;
 
@@ -28,9 +29,9 @@ const EVENT_PLACES: usize = 624;
 const CYCLES_PER_TICK: u32 = clock::HERTZ / TICKS_PER_SECOND;
 const _: () = assert!(clock::HERTZ.is_multiple_of(TICKS_PER_SECOND));
 
-/// The main loop turns after this many ticks (2.5 ms) or events, so that it does not for every step
+/// The main loop turns after this many cycles (2.5 ms) or events, so that it does not for every step
 /// and yet keeps the queue full.
-const TURN_TICKS: u32 = 62_500;
+const TURN_CYCLES: u32 = clock::HERTZ / 400;
 const TURN_EVENTS: usize = 30;
 
 mod offset {
@@ -43,83 +44,96 @@ mod offset {
     /// In system control.
     pub const TIMER_CLOCKS: usize = 0x104;
 }
-const TIMER_0_CLOCK: u32 = 1 << 16;
+const TIMER_CLOCKS: u32 = 0b11 << 17;
 const ALL_32_BITS: u32 = 0;
 const ONE_SHOT: u32 = 1;
 const ENABLE: u32 = 1;
 const TIMED_OUT: u32 = 1;
 
-static QUEUE: StaticCell<Queue<StepEvent, EVENT_PLACES>> = StaticCell::new();
+/// Those of the handlers. That of no timer has the least number: it comes before the others.
+const STEP: Interrupt = Interrupt::TIMER_1A;
+const PULSE: Interrupt = Interrupt::TIMER_2A;
+const BRAKE: Interrupt = Interrupt::TIMER_0B;
+const _: () = assert!((BRAKE as u16) < (STEP as u16) && (BRAKE as u16) < (PULSE as u16));
+
+/// An event is never lengthened by more, 0.15 s, so that early can be told from late.
+const MOST_MORE_TICKS: u32 = TICKS_PER_SECOND * 3 / 20;
+
+static RING: ConstStaticCell<EventRing<EVENT_PLACES>> = ConstStaticCell::new(EventRing::new());
 static STEPPER: Owned<Stepper> = Owned::empty();
-/// From the first event until the last one is over.
-static RUNNING: AtomicBool = AtomicBool::new(false);
 
 /// What the interrupt has done, for the main loop.
 pub static STATE: PulserState = PulserState::new();
 
-/// The handler's end.
+/// The handlers' end.
 struct Stepper {
-    pulser: Pulser<'static, AxisPins, Solenoid<PenPin>>,
-    /// When the present event was planned to begin, in cycles modulo 2^24.
-    began: u32,
-    running: bool,
+    pulser: Pulser<'static, AxisPins, Solenoid<PenPin>, EVENT_PLACES>,
+    /// What SysTick, counting down, is to show when the event in work ends; modulo 2^24.
+    due: u32,
 }
 
 /// The main loop's end.
 pub struct Steps {
-    events: StepQueue<'static>,
-    /// As the main loop's last turn left it: places that were free, and ticks that had passed.
-    room: usize,
-    ticks: u32,
+    events: StepQueue<'static, EVENT_PLACES>,
+    /// When the main loop's last turn was over, in cycles modulo 2^24.
+    turned: u32,
 }
 
-/// Readies the timer; it starts with the first events.
+/// Readies the timers; they start with the first events.
 pub fn set_up(pins: MotorPins, nvic: &mut NVIC) -> Steps {
-    SYSTEM_CONTROL.set_bits(offset::TIMER_CLOCKS, TIMER_0_CLOCK);
-    // The timer answers three cycles after its clock is on; a read takes longer.
+    SYSTEM_CONTROL.set_bits(offset::TIMER_CLOCKS, TIMER_CLOCKS);
+    // The timers answer three cycles after their clock is on; a read takes longer.
     SYSTEM_CONTROL.read(offset::TIMER_CLOCKS);
-    TIMER0.write(offset::CONTROL, 0);
-    TIMER0.write(offset::CONFIGURATION, ALL_32_BITS);
-    TIMER0.write(offset::MODE_A, ONE_SHOT);
-    TIMER0.write(offset::INTERRUPT_MASK, TIMED_OUT);
+    for timer in [TIMER1, TIMER2] {
+        timer.write(offset::CONTROL, 0);
+        timer.write(offset::CONFIGURATION, ALL_32_BITS);
+        timer.write(offset::MODE_A, ONE_SHOT);
+        timer.write(offset::INTERRUPT_MASK, TIMED_OUT);
+    }
 
-    let queue = QUEUE.init(Queue::new());
-    let (pulser, events) = Pulser::new(pins.axes, Solenoid(pins.pen), queue, &STATE);
-    let stepper = Stepper { pulser, began: 0, running: false };
-    // SAFETY: the interrupt is masked since reset, and this runs once (the queue's cell sees to it).
+    let (pulser, events) = Pulser::new(pins.axes, Solenoid(pins.pen), RING.take(), &STATE);
+    let stepper = Stepper { pulser, due: 0 };
+    // SAFETY: the interrupts are masked since reset, and this runs once (the ring's cell sees to it).
     unsafe { STEPPER.fill(stepper) };
-    critical::enable(nvic, Interrupt::TIMER_0A, critical::STEP_PRIORITY);
-    Steps { events, room: 0, ticks: 0 }
+    for interrupt in [STEP, PULSE, BRAKE] {
+        critical::enable(nvic, interrupt, critical::STEP_PRIORITY);
+    }
+    Steps { events, turned: 0 }
 }
 
 impl Steps {
     /// Lets waiting events begin.
     pub fn start(&mut self) {
-        if !self.events.is_empty() && !RUNNING.load(Ordering::Acquire) {
-            NVIC::pend(Interrupt::TIMER_0A);
+        if !self.events.is_empty() && self.events.is_stopped() {
+            // SAFETY: no handler is active, and none is wanted: there is nothing to do for them.
+            cortex_m::interrupt::free(|_| unsafe { STEPPER.get_filled() }.begin());
         }
     }
 
     /// Lets the interrupt run before the event in work is over: the pins were halted.
     pub fn start_now(&mut self) {
-        NVIC::pend(Interrupt::TIMER_0A);
+        NVIC::pend(STEP);
+    }
+
+    /// Tells the main loop what has been done.
+    pub fn follow(&mut self) {
+        self.events.follow();
     }
 
     /// The main loop has had its turn.
     pub fn end_turn(&mut self) {
-        self.room = self.events.room();
-        self.ticks = STATE.ticks();
+        self.turned = clock::cycles_24();
     }
 
     /// Whether enough has passed since for another.
     pub fn wants_turn(&self) -> bool {
-        self.events.room() > self.room + TURN_EVENTS
-            || STATE.ticks().wrapping_sub(self.ticks) > TURN_TICKS
+        let passed = clock::cycles_24().wrapping_sub(self.turned) & clock::CYCLE_MASK;
+        self.events.taken() > TURN_EVENTS || passed > TURN_CYCLES
     }
 
     /// No event waits, and the last is over.
     pub fn idle(&self) -> bool {
-        self.events.is_empty() && !RUNNING.load(Ordering::Acquire)
+        self.events.is_empty() && self.events.is_stopped()
     }
 }
 
@@ -142,61 +156,113 @@ impl EventQueue for Steps {
 }
 
 impl Stepper {
-    /// One event. No loop, no division, no lock.
-    ///
-    /// Counted in QEMU, built for size, from the handler's first instruction to its last: 93 for the
-    /// call that raises a move's pulses, 116 for the one that lowers them, of which the brake is 45;
-    /// 15 more where it binds, and 60 where the steps get another length.
-    #[inline(always)]
-    fn pulse(&mut self) {
-        let now = clock::cycles_24();
-        // Late by less than 0.16 s, so the top bit of 24 tells early from late.
-        let mut late = now.wrapping_sub(self.began) & clock::CYCLE_MASK;
-        if !self.running || late > clock::CYCLE_MASK / 2 {
-            if self.running && self.keeps_pulse(clock::CYCLE_MASK + 1 - late) {
-                return;
-            }
-            (self.began, late, self.running) = (now, 0, true);
-            RUNNING.store(true, Ordering::Release);
+    /// The first event is due.
+    fn begin(&mut self) {
+        if self.pulser.begin() {
+            TIMER2.write(offset::INTERVAL_LOAD_A, STATE.pulse_ticks() * CYCLES_PER_TICK);
+            self.due = clock::count_down();
+            NVIC::pend(STEP);
         }
-        let Some(ticks) = self.pulser.tick() else {
-            self.running = false;
-            RUNNING.store(false, Ordering::Release);
-            HAPPENED.store(true, Ordering::Relaxed);
-            return;
-        };
-        let cycles = ticks * CYCLES_PER_TICK;
-        let left = if cycles > late { cycles - late } else { 1 };
-        TIMER0.write(offset::INTERVAL_LOAD_A, left);
-        TIMER0.write(offset::CONTROL, ENABLE);
-        self.began = self.began.wrapping_add(cycles);
     }
 
-    /// Only an alarm calls before the time. A pulse keeps its width all the same: it has `cycles` to
-    /// go.
+    /// One event. No loop, no division, no lock.
+    #[inline(always)]
+    fn step(&mut self) {
+        let now = clock::count_down();
+        // Late by less than 0.16 s, so the top bit of 24 tells early from late.
+        let late = self.due.wrapping_sub(now) << 8;
+        if late.cast_signed() < 0 {
+            return self.wait_on(now);
+        }
+        match self.pulser.tick() {
+            Tick::Begun { ticks, pulses } => {
+                if pulses {
+                    TIMER2.write(offset::CONTROL, ENABLE);
+                }
+                let (cycles, late) = (ticks * CYCLES_PER_TICK, late >> 8);
+                run_for(if cycles > late { cycles - late } else { 1 });
+                self.due = self.due.wrapping_sub(cycles);
+            }
+            Tick::Told => {
+                NVIC::pend(BRAKE);
+                NVIC::pend(STEP);
+            }
+            Tick::Over => rest(),
+        }
+    }
+
+    /// It is early: the event in work was lengthened, or an alarm calls.
     #[cold]
     #[inline(never)]
-    fn keeps_pulse(&self, cycles: u32) -> bool {
-        let high = self.pulser.pulse_is_high();
-        if high {
-            TIMER0.write(offset::INTERVAL_LOAD_A, cycles);
-            TIMER0.write(offset::CONTROL, ENABLE);
+    fn wait_on(&mut self, now: u32) {
+        if self.pulser.is_halted() {
+            self.pulser.stop();
+            return rest();
         }
-        high
+        let left = now.wrapping_sub(self.due) & clock::CYCLE_MASK;
+        let behind = left.min(self.pulser.wait_behind() * CYCLES_PER_TICK);
+        self.due = self.due.wrapping_add(behind);
+        run_for((left - behind).max(1));
+    }
+
+    /// A piece of what keeps a queue that runs dry from stopping the machine with a jerk.
+    #[inline(always)]
+    fn brake(&mut self) {
+        let (is_due, more) = self.pulser.brake();
+        // The timer goes on as it was set, and is set again when it is over.
+        self.due = self.due.wrapping_sub(more.min(MOST_MORE_TICKS) * CYCLES_PER_TICK);
+        if is_due {
+            NVIC::pend(BRAKE);
+        }
     }
 }
 
-/// Stops the timer for good, in a fault.
+#[cold]
+#[inline(never)]
+fn rest() {
+    TIMER1.write(offset::CONTROL, 0);
+    HAPPENED.store(true, Ordering::Relaxed);
+}
+
+/// Calls for the next event after so many cycles, at least 1.
+#[inline(always)]
+fn run_for(cycles: u32) {
+    TIMER1.write(offset::INTERVAL_LOAD_A, cycles);
+    TIMER1.write(offset::CONTROL, ENABLE);
+}
+
+/// Stops the timers for good, in a fault.
 pub fn halt() {
-    TIMER0.write(offset::CONTROL, 0);
-    NVIC::mask(Interrupt::TIMER_0A);
+    for timer in [TIMER1, TIMER2] {
+        timer.write(offset::CONTROL, 0);
+    }
+    NVIC::mask(STEP);
 }
 
+/// The next event.
 #[interrupt]
-fn TIMER_0A() {
-    TIMER0.write(offset::INTERRUPT_CLEAR, TIMED_OUT);
-    // SAFETY: this is the handler that owns it.
-    if let Some(stepper) = unsafe { STEPPER.get() } {
-        stepper.pulse();
+fn TIMER_1A() {
+    TIMER1.write(offset::INTERRUPT_CLEAR, TIMED_OUT);
+    // SAFETY: one of the handlers that own it, and of the same priority; it was filled before they
+    // were unmasked.
+    unsafe { STEPPER.get_filled() }.step();
+}
+
+/// The pulses end.
+#[interrupt]
+fn TIMER_2A() {
+    TIMER2.write(offset::INTERRUPT_CLEAR, TIMED_OUT);
+    // An emulator's trace tells the time of the pins by what was read here last.
+    clock::count_down();
+    // SAFETY: as above.
+    if unsafe { STEPPER.get_filled() }.pulser.end_pulses() {
+        NVIC::pend(BRAKE);
     }
+}
+
+/// Few steps wait, or they get another length.
+#[interrupt]
+fn TIMER_0B() {
+    // SAFETY: as above.
+    unsafe { STEPPER.get_filled() }.brake();
 }

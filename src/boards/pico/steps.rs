@@ -10,7 +10,7 @@
 //!
 //! Should the main loop be late, the ring runs dry at speed. So the interrupt that hands the blocks
 //! over looks at them: where [`Brake`] asks for more ticks, it hands over a copy with those, and the ring
-//! keeps the planned ones. Beyond [`BRAKED_RATE`] it does not.
+//! keeps the planned ones. As long as enough waits behind a group of words, one look at the group will do.
 //!
 //! What the state machine has taken is read off the channel and told to the main loop's
 //! [`PulserState`] whenever that loop turns. The pen's heights wait in a queue of their own, for a
@@ -41,13 +41,16 @@ const RESERVED: u32 = 16 + Runner::ROOM as u32 * WAIT_WORDS;
 /// The machine is to stop within as many steps as are held by a ring half full: on long paths it is
 /// always fuller.
 const STOPPING_STEPS: u32 = WORDS / 2;
-/// Beyond so many steps a second there is no time to look at each word twice, and nothing is braked.
-const BRAKED_RATE: u32 = 100_000;
 /// Words in a block that goes as planned, at most: the state machine's queue lasts while they are
 /// looked at, some 45 cycles each.
 const CALM_WORDS: u32 = 16;
-/// Words in a block that is braked, at most: some 100 cycles each.
+/// Words in a block that is braked, at most: some 100 cycles each. The state machine's queue is as long, and
+/// lasts 2000 cycles at 500,000 steps a second.
 const BRAKED_WORDS: u32 = 8;
+/// Of so many words, from a multiple of it on, there is a sum.
+const GROUP: u32 = 16;
+/// Groups in a block behind which enough waits, at most.
+const FAR_GROUPS: u32 = 8;
 /// It ends before its steps are known too early, when more may come: 2 ms.
 const BRAKED_TICKS: u32 = TICKS_PER_SECOND / 500;
 /// A wait is so many words at most, of 2 ms if that is enough, for the same reason.
@@ -136,6 +139,10 @@ static RING: Ring = Ring([const { AtomicU32::new(0) }; WORDS as usize]);
 /// upper one; 0 for other words.
 static WAYS: [AtomicU32; WORDS as usize] = [const { AtomicU32::new(0) }; WORDS as usize];
 
+/// For each group of words how many units were queued up to its end; wraps.
+static SUMS: [AtomicU32; (WORDS / GROUP) as usize] =
+    [const { AtomicU32::new(0) }; (WORDS / GROUP) as usize];
+
 #[repr(align(64))] // Its size, so that the channel finds no end of a ring in it.
 struct Block([AtomicU32; BRAKED_WORDS as usize]);
 const _: () = assert!(align_of::<Block>() == size_of::<Block>());
@@ -143,6 +150,8 @@ const _: () = assert!(align_of::<Block>() == size_of::<Block>());
 /// The block that is braked.
 static BRAKED: Block = Block([const { AtomicU32::new(0) }; BRAKED_WORDS as usize]);
 static BRAKE: Owned<Brake> = Owned::empty();
+/// The last block was braked. Written where the channel's interrupt is masked.
+static BRAKING: AtomicBool = AtomicBool::new(false);
 /// Words put into the ring; wraps. The main loop alone writes it.
 static WRITTEN: AtomicU32 = AtomicU32::new(0);
 /// Words that the channel was told to take; wraps. Written where the channel's interrupt is masked.
@@ -239,7 +248,7 @@ pub fn set_up(nvic: &mut NVIC) -> Steps {
         HEIGHTS_DUE.fill(due);
         BRAKE.fill(Brake::default());
     }
-    STATE.set_queue(QueueSize { steps: STOPPING_STEPS, greatest_rate: BRAKED_RATE });
+    STATE.set_queue(QueueSize { steps: STOPPING_STEPS });
     critical::enable(nvic, Interrupt::DMA_IRQ_0, critical::STEP_PRIORITY);
     critical::enable(nvic, Interrupt::PIO0_IRQ_0, critical::PEN_PRIORITY);
     Steps {
@@ -296,6 +305,11 @@ fn ring_address(word: u32) -> u32 {
 
 fn way(word: u32) -> &'static AtomicU32 {
     &WAYS[(word % WORDS) as usize]
+}
+
+/// The sum of the group that ends before `word`.
+fn sum(word: u32) -> &'static AtomicU32 {
+    &SUMS[(word / GROUP) as usize % SUMS.len()]
 }
 
 fn pack(way: StepWay) -> u32 {
@@ -498,7 +512,6 @@ impl EventQueue for Steps {
                 ticks -= part;
             }
         }
-        STATE.brake().add(step.around);
         self.publish();
         Ok(())
     }
@@ -552,19 +565,28 @@ impl Steps {
     /// The next words are so many steps.
     #[inline(never)] // On its own it stays in the core's registers.
     fn tell_ways(&mut self, count: u32) {
-        let mut around = 0;
+        let mut queued = STATE.brake().queued();
         for number in 0..count {
+            let word = self.written.wrapping_add(number);
             let step = self.step_length.step();
-            way(self.written.wrapping_add(number)).store(pack(step), Ordering::Relaxed);
-            around += step.around;
+            way(word).store(pack(step), Ordering::Relaxed);
+            queued = queued.wrapping_add(step.around);
+            let next = word.wrapping_add(1);
+            if next.is_multiple_of(GROUP) {
+                sum(next).store(queued, Ordering::Relaxed);
+            }
         }
-        STATE.brake().add(around);
+        STATE.brake().set_queued(queued);
     }
 
     fn put(&mut self, word: u32, count: u32, step: StepWay) {
         place(self.written).store(word | count << 8, Ordering::Relaxed);
         way(self.written).store(pack(step), Ordering::Relaxed);
         self.written = self.written.wrapping_add(1);
+        STATE.brake().add(step.around);
+        if self.written.is_multiple_of(GROUP) {
+            sum(self.written).store(STATE.brake().queued(), Ordering::Relaxed);
+        }
     }
 
     /// Shows the words to the channel; lets them begin if they are many.
@@ -616,16 +638,33 @@ fn feed() {
     }
     let (mut address, mut words) = (ring_address(told), count);
     if STATE.brake().is_on() {
-        words = calm_words(brake, told, count);
-    }
-    if words == 0 {
-        words = brake_words(brake, told, count);
-        address = BRAKED.0.as_ptr() as u32;
+        words = far_words(brake, told, count);
+        // What had to be braked goes on so, and is not looked at twice.
+        if words == 0 && !BRAKING.load(Ordering::Relaxed) {
+            words = calm_words(brake, told, count);
+        }
+        if words == 0 {
+            words = brake_words(brake, told, count);
+            address = BRAKED.0.as_ptr() as u32;
+        }
     }
     TOLD.store(told.wrapping_add(words), Ordering::Relaxed);
     GIVEN_UP.store(0, Ordering::Relaxed);
     DMA.write(channel::READ_ADDRESS, address);
     DMA.write(channel::START, words);
+}
+
+/// How many of the `count` words from `told` on go as planned, since enough waits behind them, whatever they are.
+fn far_words(brake: &mut Brake, told: u32, count: u32) -> u32 {
+    let group = told / GROUP;
+    for groups in [FAR_GROUPS, 1] {
+        let end = group.wrapping_add(groups).wrapping_mul(GROUP);
+        let words = end.wrapping_sub(told);
+        if words <= count && brake.pass_far(sum(end).load(Ordering::Relaxed), STATE.brake()) {
+            return words;
+        }
+    }
+    0
 }
 
 /// How many of the `count` words from `told` on go as planned, with one look at all of them; 0 if they
@@ -654,7 +693,7 @@ fn calm_words(brake: &mut Brake, told: u32, count: u32) -> u32 {
 #[inline(never)]
 fn brake_words(brake: &mut Brake, told: u32, count: u32) -> u32 {
     let beyond = PULSE_TICKS + STATE.pulse_ticks();
-    let (mut words, mut ticks) = (0, 0);
+    let (mut words, mut ticks, mut more) = (0, 0, 0);
     for (number, braked) in (0..count).zip(&BRAKED.0) {
         let at = told.wrapping_add(number);
         let mut word = place(at).load(Ordering::Relaxed);
@@ -669,6 +708,7 @@ fn brake_words(brake: &mut Brake, told: u32, count: u32) -> u32 {
                     least = least.saturating_sub((next >> 8) + WAIT_TICKS);
                 }
             }
+            more |= least.saturating_sub(planned);
             word += least.saturating_sub(planned).min(StepEvent::MAX_TICKS - (word >> 8)) << 8;
         }
         braked.store(word, Ordering::Relaxed);
@@ -678,6 +718,7 @@ fn brake_words(brake: &mut Brake, told: u32, count: u32) -> u32 {
             break;
         }
     }
+    BRAKING.store(more != 0, Ordering::Relaxed);
     words
 }
 
