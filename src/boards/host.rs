@@ -49,6 +49,10 @@ pub enum Change {
     Enable(bool),
     /// Height of the pen, 0 raised to 127 lowered.
     Pen(u8),
+    /// Step pin of the pen's motor.
+    StepZ(bool),
+    /// Its direction pin; high lowers the pen.
+    DownZ(bool),
 }
 
 /// A change and its time in ticks from the start.
@@ -140,8 +144,11 @@ impl Pen for TracedPen {
 }
 
 /// The library's interrupt code on traced pins.
-pub type TracedPulser<'q> =
-    Pulser<'q, Pins<TracedPin, TracedPin, TracedPin, TracedPin, TracedPin>, TracedPen>;
+pub type TracedPulser<'q> = Pulser<
+    'q,
+    Pins<TracedPin, TracedPin, TracedPin, TracedPin, TracedPin, TracedPin, TracedPin>,
+    TracedPen,
+>;
 
 /// A pulser whose pins note their changes in the trace, and the queue's other end.
 pub fn traced_pulser<'q, const N: usize>(
@@ -156,6 +163,8 @@ pub fn traced_pulser<'q, const N: usize>(
         step_y: pin(Change::StepY),
         direction_y: pin(Change::UpY),
         enable: pin(Change::Enable),
+        step_z: pin(Change::StepZ),
+        direction_z: pin(Change::DownZ),
     };
     let pen = TracedPen { trace: Rc::clone(&trace), height: None };
     let (pulser, producer) = Pulser::new(pins, pen, queue, state);

@@ -34,8 +34,9 @@ impl Machine<'_> {
     pub fn fill(&mut self, path: &mut dyn Path, queue: &mut dyn EventQueue) {
         // So that the sums of the steps are up to date.
         self.pins.steps();
-        if self.pins.is_halted() {
-            return;
+        self.runner.follow_lift(self.pins.ticks());
+        if let State::Alarm(alarm) = self.state {
+            return self.raise_pen(alarm, queue);
         }
         if core::mem::take(&mut self.sleep_due) && self.runner.release_drivers(queue).is_err() {
             self.alarm(Alarm::Queue);
@@ -50,6 +51,28 @@ impl Machine<'_> {
                 Ok(Progress::More) => {}
                 Ok(progress) => self.stand(progress),
                 Err(_) => self.alarm(Alarm::Queue),
+            }
+        }
+    }
+
+    /// In an alarm a motor that holds the pen raises it, as soon as the queue is empty; after a restart, when the
+    /// motors had no current, they have none afterwards.
+    fn raise_pen(&mut self, alarm: Alarm, queue: &mut dyn EventQueue) {
+        let restarted = alarm == Alarm::Restarted;
+        if self.pins.is_halted() {
+            if !self.runner.is_pen_held(restarted) || !self.pins.is_drained() {
+                return;
+            }
+            self.set_motors(self.motors_now(), self.position());
+            self.pins.release();
+        }
+        while self.runner.is_pen_held(restarted) && queue.room() >= Runner::ROOM {
+            let raised = match self.runner.raise_pen(queue) {
+                Ok(Progress::Done) if restarted => self.runner.release_drivers(queue),
+                raised => raised.map(|_| ()),
+            };
+            if raised.is_err() {
+                return self.alarm(Alarm::Queue);
             }
         }
     }

@@ -19,12 +19,14 @@ pub struct PulserState {
     y: AtomicU32,
     slack_x: AtomicU32,
     slack_y: AtomicU32,
+    lift: AtomicU32,
     ticks: AtomicU32,
     underruns: AtomicU32,
     drained: AtomicBool,
     halt: AtomicBool,
     pulse_ticks: AtomicU32,
     inverted: AtomicU8,
+    lift_inverted: AtomicBool,
     queue_steps: AtomicU32,
     queue_rate: AtomicU32,
     brake: BrakeOrders,
@@ -40,12 +42,14 @@ impl PulserState {
             y: AtomicU32::new(0),
             slack_x: AtomicU32::new(0),
             slack_y: AtomicU32::new(0),
+            lift: AtomicU32::new(0),
             ticks: AtomicU32::new(0),
             underruns: AtomicU32::new(0),
             drained: AtomicBool::new(true),
             halt: AtomicBool::new(false),
             pulse_ticks: AtomicU32::new(50),
             inverted: AtomicU8::new(0),
+            lift_inverted: AtomicBool::new(false),
             queue_steps: AtomicU32::new(QueueSize::ENDLESS.steps),
             queue_rate: AtomicU32::new(QueueSize::ENDLESS.greatest_rate),
             brake: BrakeOrders::new(),
@@ -70,6 +74,16 @@ impl PulserState {
         let [x, y] =
             [&self.slack_x, &self.slack_y].map(|sum| sum.load(Ordering::Relaxed).cast_signed());
         (x, y)
+    }
+
+    /// The sum of the steps of the pen's motor, down is up; wraps.
+    pub fn lift(&self) -> i32 {
+        self.lift.load(Ordering::Relaxed).cast_signed()
+    }
+
+    /// The pen's motor made a step. For the interrupt that pulses it.
+    pub fn count_lift(&self, down: bool) {
+        add(&self.lift, if down { 1 } else { u32::MAX });
     }
 
     /// Ticks of the events taken from the queue; wraps.
@@ -134,10 +148,16 @@ impl PulserState {
         self.inverted.load(Ordering::Relaxed)
     }
 
-    /// Width of a pulse, and which direction pins are inverted (bit 0 x, bit 1 y).
+    /// Whether the direction pin of the pen's motor is inverted.
+    pub fn lift_is_inverted(&self) -> bool {
+        self.lift_inverted.load(Ordering::Relaxed)
+    }
+
+    /// Width of a pulse, and which direction pins are inverted (bit 0 x, bit 1 y, bit 2 the pen's motor).
     pub(super) fn configure(&self, pulse_ticks: u32, inverted: u8) {
         self.pulse_ticks.store(pulse_ticks, Ordering::Relaxed);
-        self.inverted.store(inverted, Ordering::Relaxed);
+        self.inverted.store(inverted & 3, Ordering::Relaxed);
+        self.lift_inverted.store(inverted & 4 != 0, Ordering::Relaxed);
     }
 
     /// What the board's queue holds; before the machine asks.
@@ -211,7 +231,7 @@ impl EventQueue for StepQueue<'_> {
 /// The pins of a machine. High steps, high direction counts up (unless inverted), high enable
 /// switches the drivers on; a board that needs it otherwise wraps its pin.
 #[derive(Debug)]
-pub struct Pins<SX, DX, SY, DY, E> {
+pub struct Pins<SX, DX, SY, DY, E, SZ, DZ> {
     /// Steps of x.
     pub step_x: SX,
     /// Direction of x.
@@ -220,8 +240,12 @@ pub struct Pins<SX, DX, SY, DY, E> {
     pub step_y: SY,
     /// Direction of y.
     pub direction_y: DY,
-    /// Both drivers.
+    /// All drivers.
     pub enable: E,
+    /// Steps of the pen's motor.
+    pub step_z: SZ,
+    /// Its direction: high lowers the pen.
+    pub direction_z: DZ,
 }
 
 /// The axes' pins, set all at once.
@@ -229,17 +253,22 @@ pub trait Axes {
     /// The pins take `levels`, bits as in [`StepEvent`]: a high pulse for each step, the level of
     /// each direction pin where a motor runs down, drivers on. Called from the interrupt, so brief.
     fn set(&mut self, levels: u8);
+    /// The pen's motor takes a direction, high to lower the pen, and a step if asked. Called from the
+    /// interrupt, too.
+    fn set_lift(&mut self, step: bool, down: bool);
     /// The pulses end. Called from the interrupt, too.
     fn end_pulses(&mut self);
 }
 
-impl<SX, DX, SY, DY, E> Axes for Pins<SX, DX, SY, DY, E>
+impl<SX, DX, SY, DY, E, SZ, DZ> Axes for Pins<SX, DX, SY, DY, E, SZ, DZ>
 where
     SX: OutputPin<Error = Infallible>,
     DX: OutputPin<Error = Infallible>,
     SY: OutputPin<Error = Infallible>,
     DY: OutputPin<Error = Infallible>,
     E: OutputPin<Error = Infallible>,
+    SZ: OutputPin<Error = Infallible>,
+    DZ: OutputPin<Error = Infallible>,
 {
     fn set(&mut self, levels: u8) {
         write(&mut self.direction_x, levels & StepEvent::DOWN_X == 0);
@@ -249,9 +278,15 @@ where
         write(&mut self.step_y, levels & StepEvent::STEP_Y != 0);
     }
 
+    fn set_lift(&mut self, step: bool, down: bool) {
+        write(&mut self.direction_z, down);
+        write(&mut self.step_z, step);
+    }
+
     fn end_pulses(&mut self) {
         write(&mut self.step_x, false);
         write(&mut self.step_y, false);
+        write(&mut self.step_z, false);
     }
 }
 
@@ -352,8 +387,8 @@ impl<'q, A: Axes, P: Pen> Pulser<'q, A, P> {
         let Some(event) = self.events.dequeue() else {
             return self.run_dry();
         };
-        if let Some((units, after_next)) = event.as_step_length() {
-            return self.set_step_length(units, after_next);
+        if event.is_aside() {
+            return Some(self.take_aside(event));
         }
         if self.halted() {
             return Some(self.throw_away(event));
@@ -367,6 +402,8 @@ impl<'q, A: Axes, P: Pen> Pulser<'q, A, P> {
                 self.pen.set_height(height);
                 Some(event.ticks())
             }
+            // Taken aside above.
+            EventKind::Lift { .. } => None,
         }
     }
 
@@ -409,12 +446,30 @@ impl<'q, A: Axes, P: Pen> Pulser<'q, A, P> {
         add(&self.state.slack_y, (steps.wrapping_sub(dx).cast_signed() >> 16).cast_unsigned());
     }
 
-    /// Takes no time: the next call is due at once.
+    /// A length of steps takes no time: the next call is due at once.
     #[cold]
     #[inline(never)]
-    fn set_step_length(&mut self, units: u32, after_next: bool) -> Option<u32> {
-        self.step_length.set(units, after_next);
-        Some(0)
+    fn take_aside(&mut self, event: StepEvent) -> u32 {
+        if let Some((units, after_next)) = event.as_step_length() {
+            self.step_length.set(units, after_next);
+            return 0;
+        }
+        let EventKind::Lift { step, down } = event.kind() else { return 0 };
+        if self.halted() {
+            return self.throw_away(event);
+        }
+        self.state.drained.store(false, Ordering::Relaxed);
+        add(&self.state.ticks, event.ticks());
+        self.axes.set_lift(step, down != self.state.lift_is_inverted());
+        self.moving = true;
+        if !step {
+            return event.ticks();
+        }
+        self.state.count_lift(down);
+        // Ends as a pulse that is no way of x and y.
+        self.pulse = StepEvent::AT_REST;
+        self.step_ticks = event.ticks().max(1);
+        self.state.pulse_ticks()
     }
 
     #[cold]
