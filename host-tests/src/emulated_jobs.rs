@@ -264,3 +264,50 @@ pub fn give_up(board: Board) -> Result<(), Box<dyn Error>> {
     assert_eq!(line.ask("$plot")?, "ok");
     Ok(())
 }
+
+/// Settings of a machine whose pen a motor lifts: 400 steps, of which 62 when it is raised.
+pub const PEN_ON_A_MOTOR: [&str; 5] = ["$132=1", "$112=900", "$122=500", "$210=20", "$209=1"];
+
+/// An emergency stop with the pen down: no step of x and y comes after it, and a motor raises the pen
+/// before the board can be unlocked.
+///
+/// # Errors
+/// The emulator fails.
+///
+/// # Panics
+/// If it does not.
+pub fn stop_at_once(board: Board) -> Result<(), Box<dyn Error>> {
+    let settings = [&PEN_ON_A_MOTOR[..], &["$page=60x80", "$margin=5"]].concat();
+    let mut line = begin(board, &job_lines("lattice2.obj", &settings))?;
+    let (mut machine, mut events) = (Machine::default(), Vec::new());
+    while !machine.pen_is_down() {
+        for change in line.emulator.pin_changes()? {
+            events.extend(machine.change(change).map(|event| event.kind));
+        }
+    }
+    line.emulator.send(b"\xB1")?;
+    while line.hear()? != "ALARM:10" {}
+    for change in line.emulator.pin_changes()? {
+        events.extend(machine.change(change).map(|event| event.kind));
+    }
+    let stopped_at = events.len();
+    while line.ask("$X")? != "ok" {
+        // A refusal is two lines.
+        line.hear()?;
+    }
+    for change in line.emulator.pin_changes()? {
+        events.extend(machine.change(change).map(|event| event.kind));
+    }
+    events.extend(machine.last().map(|event| event.kind));
+    // It began as low as it can be, and the stop holds it.
+    let place = |events: &[MachineEventKind]| {
+        events.iter().fold(400, |place: i32, event| match event {
+            MachineEventKind::Lift { down } => (place + if *down { 1 } else { -1 }).max(0),
+            _ => place,
+        })
+    };
+    assert_eq!(place(&events), 62);
+    let after = &events[stopped_at + 1..];
+    assert!(!after.iter().any(|event| matches!(event, MachineEventKind::Step { .. })), "{after:?}");
+    Ok(())
+}

@@ -6,7 +6,7 @@
 use penup::boards::host::{Change, Stamped};
 use penup::drawing::PagePoint;
 use penup::machine::{Setting, Settings, Target, Value};
-use penup::motion::{EventKind, StepEvent, TICKS_PER_SECOND};
+use penup::motion::{EventKind, LiftRule, StepEvent, TICKS_PER_SECOND};
 use penup::step::Line;
 use std::collections::BTreeSet;
 
@@ -37,8 +37,9 @@ pub struct Run {
 /// # Panics
 /// At the first event that breaks a rule, with its number: pulses closer than twice their width, a
 /// pulse too soon after the change of its direction, a direction that changes during a pulse, a
-/// step beyond the soft limits, a step while the pen's dwell runs or with the drivers off, an event
-/// of no time, a stream that does not end at rest with the pen up.
+/// step beyond the soft limits, a step while the pen's dwell runs, while its motor moves, or with the drivers
+/// off, an event of no time, a pen that is not at the height that its motor's steps lead to, or moves faster or
+/// accelerates more than is set, a stream that does not end at rest with the pen up.
 pub fn check(events: &[StepEvent], settings: &Settings) -> Verdict {
     let pulse = u64::from(settings.microseconds_as_ticks(Setting::StepPulse));
     let setup = u64::from(settings.microseconds_as_ticks(Setting::DirectionSetup));
@@ -60,12 +61,22 @@ pub fn check(events: &[StepEvent], settings: &Settings) -> Verdict {
     let mut pen_ready = 0u64;
     // Of x and y: the level, when it changed, when the axis was last pulsed.
     let mut axes = [(false, None::<u64>, None::<u64>); 2];
+    let mut lift = LiftWatch::new(settings, false);
     let mut runs = vec![Run::default()];
     let second = f64::from(TICKS_PER_SECOND);
     for (number, event) in events.iter().enumerate() {
         assert!(event.ticks() > 0, "event {number} takes no time");
         match event.kind() {
+            EventKind::Lift { step, down } => {
+                assert!(event.ticks() >= setup as u32, "event {number}: no time for the direction");
+                if step {
+                    lift.step(down, time);
+                }
+                // Until it is at its height.
+                pen_ready = u64::MAX;
+            }
             EventKind::Pen { height } => {
+                lift.assert_at(height, "an event of the pen");
                 pen_ready = time + dwell(height);
                 // On a ramp the pen moves on before its dwell.
                 let run = runs.last_mut().expect("never empty");
@@ -126,6 +137,68 @@ pub fn check(events: &[StepEvent], settings: &Settings) -> Verdict {
         assert!(run.height < 64, "the events end with the pen down");
     }
     Verdict { runs, end: at }
+}
+
+/// The motor that lifts the pen, as it stands: the upper stop holds it.
+#[derive(Debug)]
+struct LiftWatch {
+    rule: Option<LiftRule>,
+    acceleration: f64,
+    /// An alarm may stop it at once.
+    may_be_cut: bool,
+    /// Steps below the stop; it began as low as it can be.
+    place: i32,
+    /// When it last stepped, which way, at how many steps a second.
+    last: Option<(u64, bool, f64)>,
+}
+
+impl LiftWatch {
+    fn new(settings: &Settings, may_be_cut: bool) -> Self {
+        let value = |setting| settings.get(setting).to_num::<f64>();
+        let steps = value(Setting::StepsPerMmZ);
+        let acceleration = value(Setting::AccelerationZ) * steps;
+        let rule = settings.is_on(Setting::PenLift).then(|| {
+            let (travel, rate) =
+                (value(Setting::TravelZ) * steps, value(Setting::MaxRateZ) * steps / 60.0);
+            LiftRule::new(travel as i32, rate as u32, acceleration as u32)
+        });
+        let place = rule.map_or(0, |rule| rule.travel);
+        Self { rule, acceleration, may_be_cut, place, last: None }
+    }
+
+    /// # Panics
+    /// Without such a motor; at a step too soon; at too great an acceleration.
+    fn step(&mut self, down: bool, time: u64) {
+        let rule = self.rule.expect("a motor lifts the pen");
+        self.place = (self.place + if down { 1 } else { -1 }).max(0);
+        assert!(self.place <= rule.travel, "{time}: the pen is driven too low");
+        let second = f64::from(TICKS_PER_SECOND);
+        let mut speed = 0.0;
+        if let Some((before, downward, slower)) = self.last {
+            let ticks = time - before;
+            assert!(ticks >= u64::from(rule.least_ticks), "{time}: the pen is too fast");
+            speed = if down == downward { second / ticks as f64 } else { 0.0 };
+            let slowest = self.acceleration.sqrt();
+            if slower == 0.0 || speed <= slowest {
+                let jerks = speed.max(slower) > 1.42 * slowest;
+                assert!(!jerks || self.may_be_cut, "{time}: the pen jerks to {speed} steps/s");
+            } else {
+                // From the middle of one interval to that of the next; pulses are at whole ticks.
+                let change = (speed - slower).abs() * 2.0 / (1.0 / speed + 1.0 / slower);
+                let rounding = 2.0 * speed.max(slower).powi(3) / second;
+                assert!(change <= 1.02 * self.acceleration + rounding, "{time}: {change} steps/s2");
+            }
+        }
+        self.last = Some((time, down, speed));
+    }
+
+    /// # Panics
+    /// If the pen is not at `height`.
+    fn assert_at(&self, height: u8, what: &str) {
+        if let Some(rule) = self.rule {
+            assert_eq!(self.place, rule.steps(height), "{what} at height {height}");
+        }
+    }
 }
 
 /// The greatest change of speed along the path, mm/s², over windows of at least `window` seconds.
@@ -299,6 +372,8 @@ pub struct Drawn {
     pub last_step: u64,
     /// The pen's height at the end.
     pub pen: u8,
+    /// Steps of the motor that lifts it, from its upper stop.
+    pub lift: i32,
     /// The moves between two moves of the pen.
     pub runs: Vec<Run>,
     /// Where motors took up their slack in one go, by the motors' steps.
@@ -312,7 +387,7 @@ pub struct Drawn {
 /// direction that changes during a pulse or too shortly before one, a step with the drivers off, a
 /// step before the pen's dwell is over, a step that leads out of the soft limits or further beyond
 /// them (the origin is where the pins began), a motor that takes up its slack while the other one
-/// moves the pen.
+/// moves the pen, a step while the pen's motor moves or is not at the pen's height.
 pub fn check_pins(trace: &[Stamped], settings: &Settings) -> Drawn {
     let pulse = u64::from(settings.microseconds_as_ticks(Setting::StepPulse));
     let setup = u64::from(settings.microseconds_as_ticks(Setting::DirectionSetup));
@@ -320,7 +395,8 @@ pub fn check_pins(trace: &[Stamped], settings: &Settings) -> Drawn {
     let build = settings.kinematics();
     let second = f64::from(TICKS_PER_SECOND);
     // Of x and y: pulse high, since when, up, since when.
-    let mut axes = [(false, None::<u64>, true, None::<u64>); 2];
+    let mut axes = [(false, None::<u64>, true, None::<u64>); 3];
+    let mut lift = LiftWatch::new(settings, true);
     let (mut enabled, mut pen_ready) = (false, 0);
     let (mut at, mut motors) = (PagePoint::default(), PagePoint::default());
     let mut plays = slack_steps(settings).map(Play::new);
@@ -346,6 +422,16 @@ pub fn check_pins(trace: &[Stamped], settings: &Settings) -> Drawn {
                 }
                 Change::UpX(up) => turn(&mut axes[0], up, time),
                 Change::UpY(up) => turn(&mut axes[1], up, time),
+                Change::DownZ(down) => turn(&mut axes[2], down, time),
+                Change::StepZ(high) => {
+                    assert!(!axes[0].0 && !axes[1].0, "{time}: the pen moves during a pulse");
+                    match rise(&mut axes[2], high, time, pulse, setup) {
+                        0 => {}
+                        steps => lift.step(steps > 0, time),
+                    }
+                    assert!(enabled, "{time}: the pen moves with the drivers off");
+                    pen_ready = pen_ready.max(time);
+                }
                 Change::StepX(high) => delta.0 += rise(&mut axes[0], high, time, pulse, setup),
                 Change::StepY(high) => delta.1 += rise(&mut axes[1], high, time, pulse, setup),
             }
@@ -353,6 +439,7 @@ pub fn check_pins(trace: &[Stamped], settings: &Settings) -> Drawn {
         if delta != (0, 0) {
             assert!(enabled, "{time}: step with the drivers off");
             assert!(time >= pen_ready, "{time}: step while the pen moves");
+            lift.assert_at(drawn.pen, "a step with the pen");
             motors = PagePoint { x: motors.x + delta.0, y: motors.y + delta.1 };
             let moved = (plays[0].turn(delta.0), plays[1].turn(delta.1));
             if moved == (0, 0) {
@@ -382,6 +469,7 @@ pub fn check_pins(trace: &[Stamped], settings: &Settings) -> Drawn {
         }
     }
     drawn.end = at;
+    drawn.lift = lift.place;
     drawn
 }
 

@@ -4,10 +4,10 @@
 
 use penup::drawing::{LineType, PagePoint};
 use penup::machine::{
-    Alarm, Axis, Machine, MachineError, Path, PulserState, Setting, Settings, State, Switches,
-    TapePath, Target, TargetList, Value,
+    Alarm, Axis, Machine, MachineError, Path, PulserState, Setting, SettingError, Settings, State,
+    Switches, TapePath, Target, TargetList, Value,
 };
-use penup::motion::{Block, EventKind};
+use penup::motion::{Block, EventKind, LimitsError};
 use penup::step::tape;
 use penup_host_tests::event_checker::{self, Drawn, Play};
 use penup_host_tests::pin_machine::{self, Turn};
@@ -59,6 +59,20 @@ fn slack(loose: bool) -> Settings {
     with(&[(Setting::BacklashX, 0.3 * slack), (Setting::BacklashY, 0.2 * slack)])
 }
 
+/// A machine whose pen a motor lifts, or not.
+fn lifted(mut settings: Settings, by_a_motor: bool) -> Settings {
+    for (setting, value) in [
+        (Setting::TravelZ, 1.0),
+        (Setting::MaxRateZ, 900.0),
+        (Setting::AccelerationZ, 500.0),
+        (Setting::PenUpHeight, 20.0 * f64::from(u8::from(by_a_motor))),
+        (Setting::PenLift, f64::from(u8::from(by_a_motor))),
+    ] {
+        settings.set(setting, Value::from_num(value)).expect("valid");
+    }
+    settings
+}
+
 /// Draws the job in a pin machine; `visit` is called at each turn of the main loop, which takes
 /// `turn_ticks`, and ends the run by returning `false`.
 fn run_job(
@@ -108,10 +122,12 @@ proptest! {
         (instant, turn_ticks) in instants(),
         again in 0u64..9_000_000,
         loose: bool,
+        by_a_motor: bool,
     ) {
         static UNDISTURBED: LazyLock<Drawn> = LazyLock::new(undisturbed);
         let mut holds = vec![instant + again, instant];
-        let drawn = run_job(slack(loose), turn_ticks, &mut |turn| {
+        let settings = lifted(slack(loose), by_a_motor);
+        let drawn = run_job(settings, turn_ticks, &mut |turn| {
             if holds.last().is_some_and(|&due| turn.now >= due) {
                 holds.pop();
                 turn.machine.hold();
@@ -123,7 +139,8 @@ proptest! {
             !is_ready(turn.machine)
         });
         prop_assert_eq!(&drawn.inked, &UNDISTURBED.inked);
-        prop_assert_eq!((drawn.end, drawn.pen), (UNDISTURBED.end, 0));
+        prop_assert_eq!(drawn.end, UNDISTURBED.end);
+        prop_assert_eq!((drawn.pen, drawn.lift), raised(by_a_motor));
         event_checker::check_speed(&drawn.runs, &job(), &Settings::default(), false);
     }
 
@@ -131,9 +148,10 @@ proptest! {
     fn abort_keeps_the_position_and_leaves_the_machine_ready(
         (instant, turn_ticks) in instants(),
         loose: bool,
+        by_a_motor: bool,
     ) {
         let mut stood_at = None;
-        let drawn = run_job(slack(loose), turn_ticks, &mut |turn| {
+        let drawn = run_job(lifted(slack(loose), by_a_motor), turn_ticks, &mut |turn| {
             if turn.now >= instant {
                 turn.machine.abort();
             }
@@ -143,7 +161,8 @@ proptest! {
             }
             stood_at.is_none()
         });
-        prop_assert_eq!((Some(drawn.end), drawn.pen), (stood_at, 0));
+        prop_assert_eq!(Some(drawn.end), stood_at);
+        prop_assert_eq!((drawn.pen, drawn.lift), raised(by_a_motor));
         event_checker::check_speed(&drawn.runs, &job(), &Settings::default(), false);
         // The next job begins where this one was given up.
         prop_assert!(drawn.last_step < instant + turn_ticks + 10_000_000);
@@ -154,11 +173,12 @@ proptest! {
         (instant, turn_ticks) in instants(),
         switch: bool,
         loose: bool,
+        by_a_motor: bool,
     ) {
         let alarm = if switch { Alarm::HardLimit } else { Alarm::EmergencyStop };
         let mut alarm_at = None;
         let mut stands_at = None;
-        let drawn = run_job(slack(loose), turn_ticks, &mut |turn| {
+        let drawn = run_job(lifted(slack(loose), by_a_motor), turn_ticks, &mut |turn| {
             let Some(time) = alarm_at else {
                 if turn.now >= instant {
                     turn.machine.alarm(alarm);
@@ -171,8 +191,8 @@ proptest! {
             assert_eq!(turn.pins, pins);
             assert_eq!(turn.machine.state(), State::Alarm(alarm));
             if turn.machine.unlock().is_err() {
-                // The event in work may be a dwell.
-                assert!(turn.now < time + 5_000_000);
+                // The event in work may be a dwell, and a motor raises the pen.
+                assert!(turn.now < time + 5_000_000 + u64::from(by_a_motor) * 8_000_000);
                 return true;
             }
             assert_eq!(turn.machine.planned_position(), pins);
@@ -182,8 +202,103 @@ proptest! {
         let (time, pins) = alarm_at.zip(stands_at).expect("given");
         event_checker::check_speed(&drawn.runs, &job(), &Settings::default(), true);
         prop_assert!(drawn.last_step < time);
-        prop_assert_eq!((drawn.end, drawn.pen), (pins, 0));
+        prop_assert_eq!(drawn.end, pins);
+        if by_a_motor && drawn.runs.iter().any(|run| run.height == 20) {
+            prop_assert_eq!((drawn.pen, drawn.lift), raised(true));
+        } else {
+            // Where a motor has the pen was not known yet, or nobody has one.
+            prop_assert_eq!(drawn.pen, 0);
+        }
     }
+}
+
+/// The pen's height and the steps of its motor when it is raised.
+fn raised(by_a_motor: bool) -> (u8, i32) {
+    // 20 of 127 heights, 400 steps.
+    if by_a_motor { (20, 62) } else { (0, 0) }
+}
+
+#[test]
+fn a_motor_lowers_the_pen_on_the_same_moves_and_tape() {
+    let targets = job();
+    let instructions = |settings| {
+        let events = pin_machine::record(settings, &mut TargetList::new(&targets), 64);
+        let events = events.expect("within the travel");
+        event_checker::check(&events, &settings);
+        let lifts = events.iter().filter(|event| matches!(event.kind(), EventKind::Lift { .. }));
+        let tape: Vec<_> = events.iter().filter_map(|event| event.instruction()).collect();
+        (lifts.count(), tape)
+    };
+    let (none, mut by_servo) = instructions(Settings::default());
+    let (steps, by_motor) = instructions(lifted(Settings::default(), true));
+    // The motor raises the pen before the first move.
+    by_servo.insert(0, tape::Instruction::PenUp);
+    assert_eq!(by_motor, by_servo);
+    let heights = by_motor.iter().filter(|instruction| {
+        matches!(instruction, tape::Instruction::PenUp | tape::Instruction::PenDown)
+    });
+    // 451 to find the stop, 62 down from it, 338 and a direction for each change.
+    assert_eq!((none, steps), (0, 452 + 63 + 339 * (heights.count() - 1)));
+}
+
+#[test]
+fn after_a_restart_a_motor_raises_the_pen_and_then_has_no_current() {
+    let settings = lifted(Settings::default(), true);
+    let targets = job();
+    let mut path = TargetList::new(&targets);
+    let mut stage = 0;
+    let trace = pin_machine::run(settings, &mut path, 25_000, &mut |turn| {
+        match stage {
+            0 => turn.machine.alarm(Alarm::Restarted),
+            1 => assert_eq!(turn.machine.unlock(), Err(MachineError::State(turn.machine.state()))),
+            _ => {}
+        }
+        stage += 1;
+        // 451 steps at 1500 a second, 62 at 6000, 150 ms.
+        turn.now < 25_000_000
+    });
+    let drawn = event_checker::check_pins(&trace, &settings);
+    assert_eq!((drawn.pen, drawn.lift), raised(true));
+    let last = trace.last().map(|stamped| stamped.change);
+    assert_eq!(last, Some(penup::boards::host::Change::Enable(false)));
+}
+
+#[test]
+fn a_motor_that_slept_looks_for_its_stop_again() {
+    let settings = lifted(Settings::default(), true);
+    let targets = [ink(50, 60), to(0, 0)];
+    let mut path = TargetList::new(&targets);
+    let mut jobs = 0;
+    let trace = pin_machine::run_with(settings, 25_000, &mut |turn, queue| {
+        if turn.machine.state() == State::Sleep && turn.machine.stands() {
+            turn.machine.unlock().expect("asleep");
+        } else if is_ready(turn.machine) {
+            jobs += 1;
+            match jobs {
+                2 => turn.machine.sleep().expect("idle"),
+                4 => return false,
+                _ => {
+                    let size = turn.machine.start(&mut path);
+                    assert_eq!(size.expect("valid").strokes, 1);
+                }
+            }
+        }
+        turn.machine.fill(&mut path, queue);
+        true
+    });
+    event_checker::check_pins(&trace, &settings);
+    let steps =
+        trace.iter().filter(|stamped| stamped.change == penup::boards::host::Change::StepZ(true));
+    // Each time up against the stop and down from it; down and up.
+    assert_eq!(steps.count(), 2 * (451 + 62 + 2 * 338));
+}
+
+#[test]
+fn a_motor_of_the_pen_that_steps_too_fast_is_refused() {
+    let mut settings = lifted(Settings::default(), true);
+    let refused = settings.set(Setting::MaxRateZ, Value::from_num(1600));
+    let too_many = LimitsError::TooManySteps { asked: 10_666, possible: 10_000 };
+    assert_eq!(refused, Err(SettingError::Conflict(too_many)));
 }
 
 /// Numbers that look random, the same in every run.
@@ -557,7 +672,7 @@ fn a_ramp_takes_the_pen_down_step_by_step() {
         .iter()
         .filter_map(|event| match event.kind() {
             EventKind::Pen { height } => Some(height),
-            EventKind::Levels(_) => None,
+            EventKind::Levels(_) | EventKind::Lift { .. } => None,
         })
         .collect();
     let expected: Vec<_> = (1..=127).chain((0..127).rev()).collect();

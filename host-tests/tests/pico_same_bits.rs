@@ -3,7 +3,7 @@
 #![cfg(feature = "emulator")]
 
 use penup_client::machines::Board::Pico;
-use penup_host_tests::emulated_jobs::{compare, give_up};
+use penup_host_tests::emulated_jobs::{PEN_ON_A_MOTOR, compare, give_up, stop_at_once};
 use std::error::Error;
 
 #[test]
@@ -15,6 +15,17 @@ fn a_concave_solid_in_perspective() -> Result<(), Box<dyn Error>> {
 #[test]
 fn many_parts_with_many_odd_points() -> Result<(), Box<dyn Error>> {
     compare(Pico, "lattice2.obj", &["$page=60x80", "$margin=5"])
+}
+
+#[test]
+fn a_motor_lifts_the_pen() -> Result<(), Box<dyn Error>> {
+    let settings = [&PEN_ON_A_MOTOR[..], &["$page=80x80", "$margin=5"]].concat();
+    compare(Pico, "notched.obj", &settings)
+}
+
+#[test]
+fn a_motor_raises_the_pen_after_an_emergency_stop() -> Result<(), Box<dyn Error>> {
+    stop_at_once(Pico)
 }
 
 #[test]

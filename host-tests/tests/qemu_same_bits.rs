@@ -3,7 +3,7 @@
 #![cfg(feature = "emulator")]
 
 use penup_client::machines::Board::Lm3s6965;
-use penup_host_tests::emulated_jobs::{compare, give_up};
+use penup_host_tests::emulated_jobs::{PEN_ON_A_MOTOR, compare, give_up, stop_at_once};
 use std::error::Error;
 
 #[test]
@@ -45,6 +45,17 @@ fn curves_in_space_and_on_a_plan() -> Result<(), Box<dyn Error>> {
 fn a_title_below_a_solid() -> Result<(), Box<dyn Error>> {
     let title = ["$title=Caf\\xE9 \\u{2013} 3 %", "$title-size=4", "$page=80x80", "$margin=5"];
     compare(Lm3s6965, "octahedron.obj", &title)
+}
+
+#[test]
+fn a_motor_lifts_the_pen() -> Result<(), Box<dyn Error>> {
+    let settings = [&PEN_ON_A_MOTOR[..], &["$page=80x80", "$margin=5"]].concat();
+    compare(Lm3s6965, "notched.obj", &settings)
+}
+
+#[test]
+fn a_motor_raises_the_pen_after_an_emergency_stop() -> Result<(), Box<dyn Error>> {
+    stop_at_once(Lm3s6965)
 }
 
 #[test]

@@ -48,6 +48,10 @@ pub enum Change {
     Enable(bool),
     /// Height of the pen, 0 raised to 127 lowered.
     Pen(u8),
+    /// Step pin of the pen's motor.
+    StepZ(bool),
+    /// Its direction pin; high lowers the pen.
+    DownZ(bool),
 }
 
 /// A change and its time in ticks from the start.
@@ -141,7 +145,7 @@ impl Pen for TracedPen {
 /// The library's interrupt code on traced pins.
 type TracedPulser<'q> = Pulser<
     'q,
-    Pins<TracedPin, TracedPin, TracedPin, TracedPin, TracedPin>,
+    Pins<TracedPin, TracedPin, TracedPin, TracedPin, TracedPin, TracedPin, TracedPin>,
     TracedPen,
     QUEUE_LENGTH,
 >;
@@ -171,6 +175,8 @@ pub fn traced_steps<'q>(
         step_y: pin(Change::StepY),
         direction_y: pin(Change::UpY),
         enable: pin(Change::Enable),
+        step_z: pin(Change::StepZ),
+        direction_z: pin(Change::DownZ),
     };
     let pen = TracedPen { trace: Rc::clone(&trace), height: None };
     let (pulser, queue) = Pulser::new(pins, pen, ring, state);

@@ -32,6 +32,10 @@ impl Machine<'_> {
     /// Keeps the queue filled: reads targets while the look-ahead has room, hands over events while
     /// the queue has room and the plan is not too far ahead. Call it often.
     pub fn fill(&mut self, path: &mut dyn Path, queue: &mut dyn EventQueue) {
+        self.runner.follow_lift(self.pins.ticks());
+        if let State::Alarm(alarm) = self.state {
+            return self.raise_pen(alarm, queue);
+        }
         if self.pins.is_halted() {
             return;
         }
@@ -48,6 +52,28 @@ impl Machine<'_> {
                 Ok(Progress::More) => {}
                 Ok(progress) => self.stand(progress),
                 Err(_) => self.alarm(Alarm::Queue),
+            }
+        }
+    }
+
+    /// In an alarm a motor that holds the pen raises it, as soon as the queue is empty; after a restart, when the
+    /// motors had no current, they have none afterwards.
+    fn raise_pen(&mut self, alarm: Alarm, queue: &mut dyn EventQueue) {
+        let restarted = alarm == Alarm::Restarted;
+        if self.pins.is_halted() {
+            if !self.runner.is_pen_held(restarted) || !self.pins.is_drained() {
+                return;
+            }
+            self.set_motors(self.motors_now(), self.position());
+            self.pins.release();
+        }
+        while self.runner.is_pen_held(restarted) && queue.room() >= Runner::ROOM {
+            let raised = match self.runner.raise_pen(queue) {
+                Ok(Progress::Done) if restarted => self.runner.release_drivers(queue),
+                raised => raised.map(|_| ()),
+            };
+            if raised.is_err() {
+                return self.alarm(Alarm::Queue);
             }
         }
     }

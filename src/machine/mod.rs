@@ -224,6 +224,8 @@ impl<'m> Machine<'m> {
         self.origin = PagePoint { x: motors.x.wrapping_sub(x), y: motors.y.wrapping_sub(y) };
         self.split = None;
         let slack = self.find_slack();
+        self.runner.follow_lift(self.pins.ticks());
+        self.runner.set_lift(self.pins.lift());
         self.runner.set_position(motors, slack, page, self.pins.ticks());
     }
 
@@ -329,13 +331,20 @@ impl<'m> Machine<'m> {
     /// Leaves alarm and sleep. After an alarm the position is what the pins counted.
     ///
     /// # Errors
-    /// [`MachineError::State`] in other states, while the interrupt still empties its queue, and
-    /// while the emergency stop is pressed.
+    /// [`MachineError::State`] in other states, while the interrupt still empties its queue, while a
+    /// motor still raises the pen, and while the emergency stop is pressed.
     pub fn unlock(&mut self) -> Result<(), MachineError> {
         match self.state {
             // The motors were off.
-            State::Sleep => self.slack.forget(),
-            State::Alarm(_) if self.pins.is_drained() && !self.stop_is_pressed => {
+            State::Sleep => {
+                self.slack.forget();
+                self.runner.forget_lift();
+            }
+            State::Alarm(alarm)
+                if self.pins.is_drained()
+                    && !self.stop_is_pressed
+                    && !self.runner.is_pen_held(alarm == Alarm::Restarted) =>
+            {
                 self.set_motors(self.motors_now(), self.position());
                 self.pins.release();
             }

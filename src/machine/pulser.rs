@@ -1,7 +1,9 @@
 //! The step interrupt's work, and what it tells the main loop.
 
 use super::ring::EventRing;
-use crate::motion::{BrakeOrders, EventQueue, QueueSize, Runner, StepBrake, StepEvent, StepLength};
+use crate::motion::{
+    BrakeOrders, EventKind, EventQueue, QueueSize, Runner, StepBrake, StepEvent, StepLength,
+};
 use core::convert::Infallible;
 use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 use embedded_hal::digital::{OutputPin, PinState};
@@ -16,12 +18,14 @@ pub struct PulserState {
     y: AtomicU32,
     slack_x: AtomicU32,
     slack_y: AtomicU32,
+    lift: AtomicU32,
     ticks: AtomicU32,
     underruns: AtomicU32,
     drained: AtomicBool,
     halt: AtomicBool,
     pulse_ticks: AtomicU32,
     inverted: AtomicU8,
+    lift_inverted: AtomicBool,
     queue_steps: AtomicU32,
     brake: BrakeOrders,
 }
@@ -34,12 +38,14 @@ impl PulserState {
             y: AtomicU32::new(0),
             slack_x: AtomicU32::new(0),
             slack_y: AtomicU32::new(0),
+            lift: AtomicU32::new(0),
             ticks: AtomicU32::new(0),
             underruns: AtomicU32::new(0),
             drained: AtomicBool::new(true),
             halt: AtomicBool::new(false),
             pulse_ticks: AtomicU32::new(50),
             inverted: AtomicU8::new(0),
+            lift_inverted: AtomicBool::new(false),
             queue_steps: AtomicU32::new(QueueSize::ENDLESS.steps),
             brake: BrakeOrders::new(),
         }
@@ -56,6 +62,16 @@ impl PulserState {
         let [x, y] =
             [&self.slack_x, &self.slack_y].map(|sum| sum.load(Ordering::Relaxed).cast_signed());
         (x, y)
+    }
+
+    /// The sum of the steps of the pen's motor, down is up; wraps.
+    pub fn lift(&self) -> i32 {
+        self.lift.load(Ordering::Relaxed).cast_signed()
+    }
+
+    /// The pen's motor made a step. For whoever counts them.
+    pub fn count_lift(&self, down: bool) {
+        add(&self.lift, if down { 1 } else { u32::MAX });
     }
 
     /// Ticks of the events taken from the queue; wraps.
@@ -129,10 +145,16 @@ impl PulserState {
         self.inverted.load(Ordering::Relaxed)
     }
 
-    /// Width of a pulse, and which direction pins are inverted (bit 0 x, bit 1 y).
+    /// Whether the direction pin of the pen's motor is inverted.
+    pub fn lift_is_inverted(&self) -> bool {
+        self.lift_inverted.load(Ordering::Relaxed)
+    }
+
+    /// Width of a pulse, and which direction pins are inverted (bit 0 x, bit 1 y, bit 2 the pen's motor).
     pub(super) fn configure(&self, pulse_ticks: u32, inverted: u8) {
         self.pulse_ticks.store(pulse_ticks, Ordering::Relaxed);
-        self.inverted.store(inverted, Ordering::Relaxed);
+        self.inverted.store(inverted & 3, Ordering::Relaxed);
+        self.lift_inverted.store(inverted & 4 != 0, Ordering::Relaxed);
     }
 
     /// What the board's queue holds; before the machine asks.
@@ -196,13 +218,15 @@ impl<const N: usize> StepQueue<'_, N> {
         let down = self.state.inverted() << 2;
         let (mut steps, mut slack, mut ticks) = (0u32, 0u32, 0u32);
         self.ring.count(&mut self.counted, |word| {
-            let flags = word as u8;
-            if flags & (StepEvent::PEN | StepEvent::LENGTH) == StepEvent::LENGTH {
+            let (event, flags) = (StepEvent::from_bits(word), word as u8);
+            if event.is_told() {
                 return;
             }
             ticks = ticks.wrapping_add(word >> 8);
-            if flags & StepEvent::PEN != 0 {
-                return;
+            match event.kind() {
+                EventKind::Levels(_) => {}
+                EventKind::Lift { step: true, down } => return self.state.count_lift(down),
+                EventKind::Lift { .. } | EventKind::Pen { .. } => return,
             }
             let levels = self.order.levels[usize::from(flags & LEVELS)] ^ down;
             let step = PACKED_STEPS[usize::from(levels & STEPS)];
@@ -225,16 +249,18 @@ impl<const N: usize> EventQueue for StepQueue<'_, N> {
     }
 
     fn push(&mut self, event: StepEvent) -> Result<(), StepEvent> {
-        if self.ring.room(self.counted) <= usize::from(event.is_slack()) {
+        let is_no_step =
+            event.is_slack() || matches!(event.kind(), EventKind::Lift { step: true, .. });
+        if self.ring.room(self.counted) <= usize::from(is_no_step) {
             return Err(event);
         }
         self.state.drained.store(false, Ordering::Relaxed);
-        if event.is_slack() {
+        if is_no_step {
             self.ring.put(StepEvent::skip_next().to_bits());
         }
         let mut word = event.to_bits();
         let flags = word as u8;
-        if flags & StepEvent::PEN == 0 {
+        if matches!(event.kind(), EventKind::Levels(_)) {
             let levels = (flags ^ self.state.inverted() << 2) & LEVELS;
             let pins = self.order.pins[usize::from(levels)];
             word = word & !u32::from(LEVELS) | u32::from(pins);
@@ -263,7 +289,7 @@ impl<const N: usize> EventQueue for StepQueue<'_, N> {
 /// The pins of a machine. High steps, high direction counts up (unless inverted), high enable
 /// switches the drivers on; a board that needs it otherwise wraps its pin.
 #[derive(Debug)]
-pub struct Pins<SX, DX, SY, DY, E> {
+pub struct Pins<SX, DX, SY, DY, E, SZ, DZ> {
     /// Steps of x.
     pub step_x: SX,
     /// Direction of x.
@@ -272,8 +298,12 @@ pub struct Pins<SX, DX, SY, DY, E> {
     pub step_y: SY,
     /// Direction of y.
     pub direction_y: DY,
-    /// Both drivers.
+    /// All drivers.
     pub enable: E,
+    /// Steps of the pen's motor.
+    pub step_z: SZ,
+    /// Its direction: high lowers the pen.
+    pub direction_z: DZ,
 }
 
 /// Which of the axes' pins has which bit where they are written: at most 5 of them.
@@ -321,17 +351,22 @@ pub trait Axes {
     /// [`StepEvent`]'s order: a high pulse for each step, the level of each direction pin where a motor
     /// runs down, drivers on. Called from the interrupt, so brief.
     fn set(&mut self, levels: u32);
+    /// The pen's motor takes a direction, high to lower the pen, and a step if asked. Called from the
+    /// interrupt, too.
+    fn set_lift(&mut self, step: bool, down: bool);
     /// The pulses end. Called from the interrupt, too.
     fn end_pulses(&mut self);
 }
 
-impl<SX, DX, SY, DY, E> Axes for Pins<SX, DX, SY, DY, E>
+impl<SX, DX, SY, DY, E, SZ, DZ> Axes for Pins<SX, DX, SY, DY, E, SZ, DZ>
 where
     SX: OutputPin<Error = Infallible>,
     DX: OutputPin<Error = Infallible>,
     SY: OutputPin<Error = Infallible>,
     DY: OutputPin<Error = Infallible>,
     E: OutputPin<Error = Infallible>,
+    SZ: OutputPin<Error = Infallible>,
+    DZ: OutputPin<Error = Infallible>,
 {
     fn set(&mut self, levels: u32) {
         let is_set = |level: u8| levels & u32::from(level) != 0;
@@ -342,9 +377,15 @@ where
         write(&mut self.step_y, is_set(StepEvent::STEP_Y));
     }
 
+    fn set_lift(&mut self, step: bool, down: bool) {
+        write(&mut self.direction_z, down);
+        write(&mut self.step_z, step);
+    }
+
     fn end_pulses(&mut self) {
         write(&mut self.step_x, false);
         write(&mut self.step_y, false);
+        write(&mut self.step_z, false);
     }
 }
 
@@ -442,11 +483,20 @@ impl<'q, A: Axes, P: Pen, const N: usize> Pulser<'q, A, P, N> {
             self.ticks = ticks;
             return Tick::Begun { ticks, pulses: word & u32::from(A::ORDER.pulses) != 0 };
         }
-        if word & u32::from(StepEvent::PEN) == 0 {
-            self.brake.tell(StepEvent::from_bits(word));
+        let event = StepEvent::from_bits(word);
+        if event.is_told() {
+            self.brake.tell(event);
             return Tick::Told;
         }
-        self.pen.set_height(word as u8 & !StepEvent::PEN);
+        match event.kind() {
+            EventKind::Pen { height } => self.pen.set_height(height),
+            EventKind::Lift { step, down } => {
+                self.axes.set_lift(step, down != self.state.lift_is_inverted());
+                return Tick::Begun { ticks, pulses: step };
+            }
+            // Done above.
+            EventKind::Levels(_) => {}
+        }
         Tick::Begun { ticks, pulses: false }
     }
 
@@ -493,11 +543,11 @@ impl<'q, A: Axes, P: Pen, const N: usize> Pulser<'q, A, P, N> {
     #[inline(never)]
     fn run_dry(&mut self) {
         const UNMOVED: u8 = StepEvent::AT_REST | StepEvent::PEN;
-        let mut last = self.ring.taken_before(0) as u8;
-        if last & (StepEvent::LENGTH | StepEvent::PEN) == StepEvent::LENGTH {
-            last = self.ring.taken_before(1) as u8;
+        let mut last = StepEvent::from_bits(self.ring.taken_before(0));
+        if last.is_told() {
+            last = StepEvent::from_bits(self.ring.taken_before(1));
         }
-        if last & UNMOVED == 0 {
+        if last.to_bits() as u8 & UNMOVED == 0 {
             self.state.note_underrun();
         }
         self.brake.rest();

@@ -7,7 +7,8 @@ use super::{Anchors, Kinematics};
 use crate::drawing::{PAGE_LIMIT, PagePoint};
 use crate::fixed::Millimetres;
 use crate::motion::{
-    BrakeRule, Limits, LimitsError, MotionSettings, PenPositions, QueueSize, TICKS_PER_SECOND,
+    BrakeRule, LiftRule, Limits, LimitsError, MotionSettings, PenPositions, QueueSize,
+    TICKS_PER_SECOND,
 };
 
 /// A value of any setting: ±32768 in units of 2^-16 of the setting's unit.
@@ -20,7 +21,7 @@ pub type Value = Millimetres;
 pub enum Setting {
     /// `$0` Width of a step pulse.
     StepPulse,
-    /// `$3` Which axes run the other way: bit 0 x, bit 1 y.
+    /// `$3` Which motors run the other way: bit 0 x, bit 1 y, bit 2 that of the pen.
     InvertDirections,
     /// `$5` Which contacts are closed at rest: bit 0 x, bit 1 y, bit 2 the emergency stop.
     InvertContacts,
@@ -42,18 +43,26 @@ pub enum Setting {
     StepsPerMmX,
     /// `$101` The same of y.
     StepsPerMmY,
+    /// `$102` The same of the motor that lifts the pen.
+    StepsPerMmZ,
     /// `$110` Greatest speed of x.
     MaxRateX,
     /// `$111` The same of y.
     MaxRateY,
+    /// `$112` Greatest speed of the pen's motor.
+    MaxRateZ,
     /// `$120` Acceleration of x.
     AccelerationX,
     /// `$121` The same of y.
     AccelerationY,
+    /// `$122` The same of the pen's motor.
+    AccelerationZ,
     /// `$130` Travel of x, from 0.
     TravelX,
     /// `$131` The same of y.
     TravelY,
+    /// `$132` From the upper stop of the pen's motor to height 127.
+    TravelZ,
     /// `$200` From a change of direction to the pulse.
     DirectionSetup,
     /// `$201` Speed along the path with the pen down.
@@ -64,6 +73,8 @@ pub enum Setting {
     Centripetal,
     /// `$204` The most by which acceleration along the path changes in a second, at least 0.1; 0 for no limit.
     Jerk,
+    /// `$209` How the pen is lifted: 0 by a servo or a solenoid, 1 by a motor.
+    PenLift,
     /// `$210` Height of the raised pen.
     PenUpHeight,
     /// `$211` Height of the lowered pen.
@@ -120,8 +131,11 @@ pub struct SettingInfo {
     pub whole: bool,
 }
 
+/// Steps a second of the pen's motor, at most: every board keeps up with it.
+const GREATEST_LIFT_RATE: u32 = 10_000;
+
 /// How many settings there are.
-pub const SETTING_COUNT: usize = 39;
+pub const SETTING_COUNT: usize = 44;
 
 const fn info(
     setting: Setting,
@@ -150,7 +164,7 @@ pub const SETTINGS: [SettingInfo; SETTING_COUNT] = {
     use Setting::*;
     [
         info(StepPulse, 0, "step pulse", "us", (0.2, 500.0, 2.0), false),
-        info(InvertDirections, 3, "invert directions", "mask", (0.0, 3.0, 0.0), true),
+        info(InvertDirections, 3, "invert directions", "mask", (0.0, 7.0, 0.0), true),
         info(InvertContacts, 5, "invert contacts", "mask", (0.0, 7.0, 0.0), true),
         info(JunctionDeviation, 11, "junction deviation", "mm", (0.0, 1.0, 0.05), false),
         info(SoftLimits, 20, "soft limits", "0|1", (0.0, 1.0, 1.0), true),
@@ -161,17 +175,22 @@ pub const SETTINGS: [SettingInfo; SETTING_COUNT] = {
         info(HomingPullOff, 27, "homing pull-off", "mm", (0.1, 50.0, 2.0), false),
         info(StepsPerMmX, 100, "steps of x", "step/mm", (2.0, 4000.0, 80.0), false),
         info(StepsPerMmY, 101, "steps of y", "step/mm", (2.0, 4000.0, 80.0), false),
+        info(StepsPerMmZ, 102, "steps of z", "step/mm", (2.0, 4000.0, 400.0), false),
         info(MaxRateX, 110, "greatest speed of x", "mm/min", (1.0, 32767.0, 6000.0), false),
         info(MaxRateY, 111, "greatest speed of y", "mm/min", (1.0, 32767.0, 6000.0), false),
+        info(MaxRateZ, 112, "greatest speed of z", "mm/min", (1.0, 32767.0, 300.0), false),
         info(AccelerationX, 120, "acceleration of x", "mm/s2", (10.0, 32767.0, 800.0), false),
         info(AccelerationY, 121, "acceleration of y", "mm/s2", (10.0, 32767.0, 800.0), false),
+        info(AccelerationZ, 122, "acceleration of z", "mm/s2", (10.0, 32767.0, 50.0), false),
         info(TravelX, 130, "travel of x", "mm", (1.0, 8000.0, 420.0), false),
         info(TravelY, 131, "travel of y", "mm", (1.0, 8000.0, 420.0), false),
+        info(TravelZ, 132, "travel of z", "mm", (0.1, 50.0, 4.0), false),
         info(DirectionSetup, 200, "direction set-up", "us", (0.1, 500.0, 1.0), false),
         info(DrawSpeed, 201, "speed pen down", "mm/min", (1.0, 32767.0, 3000.0), false),
         info(TravelSpeed, 202, "speed pen up", "mm/min", (1.0, 32767.0, 6000.0), false),
         info(Centripetal, 203, "slow in bends", "0|1", (0.0, 1.0, 1.0), true),
         info(Jerk, 204, "jerk", "m/s3", (0.0, 1000.0, 0.0), false),
+        info(PenLift, 209, "pen lifted by a motor", "0|1", (0.0, 1.0, 0.0), true),
         info(PenUpHeight, 210, "height pen up", "of 127", (0.0, 127.0, 0.0), true),
         info(PenDownHeight, 211, "height pen down", "of 127", (0.0, 127.0, 127.0), true),
         info(PenUpDwell, 212, "dwell pen up", "ms", (1.0, 1300.0, 150.0), false),
@@ -355,7 +374,29 @@ impl Settings {
         if matches!(self.kinematics(), Kinematics::Polargraph(_)) && !below_anchors {
             return Err(LimitsError::Anchors);
         }
+        self.checked_lift()?;
         Limits::new(&self.motion_settings())
+    }
+
+    /// How the motor lifts the pen, if one does.
+    fn checked_lift(&self) -> Result<Option<LiftRule>, LimitsError> {
+        if !self.is_on(Setting::PenLift) {
+            return Ok(None);
+        }
+        let per_second = |setting, seconds| {
+            let product = u64::from(self.get(setting).to_bits().unsigned_abs())
+                * u64::from(self.get(Setting::StepsPerMmZ).to_bits().unsigned_abs());
+            // Below 2^27 steps.
+            ((product >> (2 * Value::FRAC_NBITS)) / seconds) as u32
+        };
+        let asked = per_second(Setting::MaxRateZ, 60);
+        let pulse = self.microseconds_as_ticks(Setting::StepPulse).max(1);
+        let possible = (TICKS_PER_SECOND / pulse / 2).min(GREATEST_LIFT_RATE);
+        if asked > possible {
+            return Err(LimitsError::TooManySteps { asked, possible });
+        }
+        let travel = self.millimetres_as_steps(Setting::TravelZ, Setting::StepsPerMmZ);
+        Ok(Some(LiftRule::new(travel, asked, per_second(Setting::AccelerationZ, 1))))
     }
 
     fn axes_rate(&self) -> Value {
@@ -434,7 +475,23 @@ impl Settings {
             down_ticks: self.milliseconds_as_ticks(Setting::PenDownDwell),
             ramp_ticks: self.milliseconds_as_ticks(Setting::PenRamp) / 127,
             dot_length: self.get(Setting::DotLength).saturating_to_num(),
+            // `set` lets nothing in that is refused here.
+            lift: self.checked_lift().unwrap_or_default(),
         }
+    }
+
+    /// How long the pen's way is between its heights, in milliseconds.
+    pub(super) fn pen_way(&self) -> u64 {
+        let pen = self.pen_positions();
+        let heights = [pen.up_height, pen.down_height];
+        let ticks = match pen.lift {
+            Some(rule) => {
+                let [up, down] = heights.map(|height| rule.steps(height));
+                rule.ticks(up.abs_diff(down))
+            }
+            None => u64::from(heights[0].abs_diff(heights[1])) * u64::from(pen.ramp_ticks),
+        };
+        ticks / u64::from(TICKS_PER_SECOND / 1000)
     }
 }
 

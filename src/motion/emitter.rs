@@ -1,5 +1,6 @@
 //! Puts moves and pen changes on the time line: least intervals, direction set-up, long waits.
 
+use super::lift::LiftStep;
 use super::profile::FRACTION_BITS;
 use super::{EventQueue, Limits, StepEvent};
 use crate::step::Direction;
@@ -147,6 +148,16 @@ impl Emitter {
         queue: &mut dyn EventQueue,
     ) -> Result<u32, StepEvent> {
         self.put(StepEvent::pen(height, 0), time, queue)
+    }
+
+    /// The pen's motor does this at `time`.
+    pub(super) fn lift(
+        &mut self,
+        next: LiftStep,
+        time: u32,
+        queue: &mut dyn EventQueue,
+    ) -> Result<u32, StepEvent> {
+        self.put(StepEvent::lift(next.step, next.down, 0), time, queue)
     }
 
     /// Everything stands from `time` on and the queue may run dry.

@@ -16,8 +16,9 @@ use crate::step::tape::Instruction;
 /// | 7 | 0 | 1 |
 /// | 8–31 | ticks to the next event | the same |
 ///
-/// With bit 6 set and bit 7 clear it is no event, but tells how long the steps behind it are: see
-/// [`StepBrake`](super::StepBrake).
+/// With bit 6 set and bit 7 clear it stands aside of both. With bit 2 it is an event of the motor that lifts the pen:
+/// bit 3 a pulse, bit 4 it runs down. Without bit 2 it is no event, but tells how long the steps behind it are:
+/// see [`StepBrake`](super::StepBrake).
 ///
 /// A change of direction is an event of its own, without a pulse, before the pulse. Waits longer
 /// than 2^24 - 1 ticks (0.67 s) are several events.
@@ -44,6 +45,13 @@ pub enum EventKind {
         /// 0 to 127.
         height: u8,
     },
+    /// The motor that lifts the pen: its direction pin takes a level, and it may step.
+    Lift {
+        /// With a pulse.
+        step: bool,
+        /// Towards the paper.
+        down: bool,
+    },
 }
 
 impl StepEvent {
@@ -65,6 +73,9 @@ impl StepEvent {
 
     pub(crate) const PEN: u8 = 1 << 7;
     pub(crate) const LENGTH: u8 = 1 << 6;
+    pub(crate) const LIFT: u8 = 1 << 2;
+    const LIFT_STEP: u8 = 1 << 3;
+    const LIFT_DOWN: u8 = 1 << 4;
 
     /// The axes' pins take `levels` (an "or" of the constants), then `ticks` pass (at most
     /// [`StepEvent::MAX_TICKS`]; more is cut to it).
@@ -75,6 +86,26 @@ impl StepEvent {
     /// The pen goes to `height` (0 to 127), then `ticks` pass.
     pub const fn pen(height: u8, ticks: u32) -> Self {
         Self::new(height | Self::PEN, ticks)
+    }
+
+    /// The motor that lifts the pen takes a direction, and a step if asked, then `ticks` pass.
+    pub const fn lift(step: bool, down: bool, ticks: u32) -> Self {
+        let step = if step { Self::LIFT_STEP } else { 0 };
+        let down = if down { Self::LIFT_DOWN } else { 0 };
+        Self::new(Self::LENGTH | Self::LIFT | step | down, ticks)
+    }
+
+    /// Whether it is neither of a move nor of the pen's height.
+    #[inline(always)]
+    pub const fn is_aside(self) -> bool {
+        self.0 & (Self::PEN | Self::LENGTH) as u32 == Self::LENGTH as u32
+    }
+
+    /// Whether it is no event, but tells something of those behind it.
+    #[inline(always)]
+    pub(crate) const fn is_told(self) -> bool {
+        const ASIDE: u8 = StepEvent::PEN | StepEvent::LENGTH | StepEvent::LIFT;
+        self.0 as u8 & ASIDE == Self::LENGTH
     }
 
     /// A word that tells how long the steps from somewhere on are: units below 2^16.
@@ -129,10 +160,13 @@ impl StepEvent {
     /// What happens.
     pub const fn kind(self) -> EventKind {
         let flags = self.0 as u8;
-        if flags & Self::PEN == 0 {
-            EventKind::Levels(flags)
-        } else {
+        if flags & Self::PEN != 0 {
             EventKind::Pen { height: flags & !Self::PEN }
+        } else if self.is_aside() {
+            let (step, down) = (flags & Self::LIFT_STEP != 0, flags & Self::LIFT_DOWN != 0);
+            EventKind::Lift { step, down }
+        } else {
+            EventKind::Levels(flags)
         }
     }
 
@@ -144,7 +178,7 @@ impl StepEvent {
     /// Which motors it moves, and which way.
     pub const fn pulses(self) -> (i32, i32) {
         match self.kind() {
-            EventKind::Pen { .. } => (0, 0),
+            EventKind::Pen { .. } | EventKind::Lift { .. } => (0, 0),
             EventKind::Levels(levels) => (
                 axis_step(levels, Self::STEP_X, Self::DOWN_X),
                 axis_step(levels, Self::STEP_Y, Self::DOWN_Y),
@@ -169,6 +203,7 @@ impl StepEvent {
         match self.kind() {
             EventKind::Pen { height } if height < 64 => Some(Instruction::PenUp),
             EventKind::Pen { .. } => Some(Instruction::PenDown),
+            EventKind::Lift { .. } => None,
             EventKind::Levels(_) => {
                 let (dx, dy) = self.step();
                 Direction::from_delta(dx, dy).map(Instruction::Move)

@@ -4,6 +4,7 @@ use super::course::Course;
 use super::curvature::Curvature;
 use super::emitter::{BATCH, MoveLevels, whole_ticks};
 use super::junction::{self, Corner, Heading};
+use super::lift::{Lift, LiftRule};
 use super::lookahead::BlockKind;
 use super::profile::{FRACTION_BITS, Pace, Profile};
 use super::smooth::{Interval, Road, State};
@@ -29,6 +30,8 @@ pub struct PenPositions {
     pub ramp_ticks: u32,
     /// Length of a dot or gap.
     pub dot_length: PathLength,
+    /// The motor that lifts it, if that is how it is lifted.
+    pub lift: Option<LiftRule>,
 }
 
 /// What one call of [`Runner::produce`] came to.
@@ -118,6 +121,7 @@ pub struct Runner<'m> {
     pen_is_down: Option<bool>,
     /// Where the pen was sent last; not known at the start.
     pen_height: Option<u8>,
+    lift: Lift,
     stopping: bool,
     stopping_after_stroke: bool,
     /// Whether more blocks may let the piece in work end faster than it was planned to.
@@ -162,8 +166,10 @@ impl<'m> Runner<'m> {
             travel: Pace::REST,
             curve: Pace::REST,
             now: 0,
-            pen_is_down: Some(false),
+            // A motor holds it where it happened to stand.
+            pen_is_down: pen.lift.is_none().then_some(false),
             pen_height: None,
+            lift: Lift::default(),
             stopping: false,
             stopping_after_stroke: false,
             hurried: false,
@@ -186,6 +192,9 @@ impl<'m> Runner<'m> {
     pub fn set_limits(&mut self, limits: Limits, pen: PenPositions) {
         self.limits = limits;
         self.curve = Pace::REST;
+        if pen.lift != self.pen.lift {
+            self.forget_lift();
+        }
         self.pen = pen;
         self.emitter.set_limits(&limits);
         self.set_override(100);
@@ -273,6 +282,36 @@ impl<'m> Runner<'m> {
     pub fn forget_pen(&mut self) {
         self.pen_is_down = None;
         self.pen_height = None;
+    }
+
+    /// The pen's motor had no current: where it stands is not known.
+    pub fn forget_lift(&mut self) {
+        self.lift.forget();
+        self.forget_pen();
+    }
+
+    /// The pins have worked off so many ticks: they may have found the stop of the pen's motor.
+    pub fn follow_lift(&mut self, ticks: u32) {
+        self.lift.follow(ticks);
+    }
+
+    /// The pulses of the pen's motor sum up to `place`, and none waits.
+    pub fn set_lift(&mut self, place: i32) {
+        self.lift.stand_at(place);
+    }
+
+    /// Whether a motor has still to raise the pen. Where it is not known how far, only if `anywhere`.
+    pub fn is_pen_held(&self, anywhere: bool) -> bool {
+        let is_lowered = self.pen_is_down != Some(false) && (anywhere || self.lift.is_known());
+        self.pen.lift.is_some() && (is_lowered || self.emitter.is_open())
+    }
+
+    /// Hands over the next few events of a pen that is raised while nothing else moves.
+    ///
+    /// # Errors
+    /// The event that the queue refused although it had room.
+    pub fn raise_pen(&mut self, queue: &mut dyn EventQueue) -> Result<Progress, StepEvent> {
+        self.stand(Progress::Done, queue)
     }
 
     /// What has been run since the runner was made.
@@ -633,7 +672,7 @@ impl<'m> Runner<'m> {
         standing: Progress,
         queue: &mut dyn EventQueue,
     ) -> Result<Progress, StepEvent> {
-        if self.pen_is_down() {
+        if self.pen_is_down != Some(false) {
             self.move_pen(false, queue)?;
             return Ok(Progress::More);
         }
@@ -656,10 +695,28 @@ impl<'m> Runner<'m> {
         } else {
             (self.pen.up_height, self.pen.up_ticks)
         };
+        // On its way it is neither up nor down.
+        self.pen_is_down = None;
+        let was_known = self.lift.is_known();
+        if let Some(rule) = self.pen.lift
+            && let Some(next) = self.lift.next(rule, height)
+        {
+            if !self.emitter.is_open() {
+                self.emitter.hold(self.now, queue)?;
+            }
+            let at = self.emitter.lift(next, self.now, queue)?;
+            self.advance_to(at);
+            if !was_known && self.lift.is_known() {
+                self.lift.found(self.emitter.ticks());
+            }
+            let ticks = next.ticks.max(self.limits.setup_ticks);
+            self.now = self.now.wrapping_add(ticks << FRACTION_BITS);
+            return Ok(());
+        }
         // Where it stands if that is not known: at the start, and after an emergency stop.
         let from = self.pen_height.unwrap_or(self.pen.up_height);
         let next = match height.cmp(&from) {
-            _ if self.pen.ramp_ticks == 0 => height,
+            _ if self.pen.ramp_ticks == 0 || self.pen.lift.is_some() => height,
             Ordering::Less => from - 1,
             Ordering::Equal => height,
             Ordering::Greater => from + 1,

@@ -512,6 +512,8 @@ impl Servo {
             4 => Pin::DirX,
             5 => Pin::DirY,
             6 => Pin::Enable,
+            11 => Pin::StepZ,
+            12 => Pin::DirZ,
             Self::PIN if high => {
                 self.rose_at = record.cycle;
                 return None;

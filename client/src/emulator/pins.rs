@@ -18,6 +18,10 @@ pub enum Pin {
     Enable,
     /// High: the pen is down.
     Pen,
+    /// A rising edge steps the motor that lifts the pen.
+    StepZ,
+    /// High: it lowers the pen.
+    DirZ,
 }
 
 impl Pin {
@@ -30,6 +34,8 @@ impl Pin {
             3 => Self::DirY,
             4 => Self::Enable,
             5 => Self::Pen,
+            6 => Self::StepZ,
+            7 => Self::DirZ,
             _ => return None,
         })
     }
@@ -66,6 +72,8 @@ impl From<&Stamped> for PinChange {
             // Drivers are on while the pin is low.
             Change::Enable(on) => (Pin::Enable, !on),
             Change::Pen(height) => (Pin::Pen, height >= 64),
+            Change::StepZ(high) => (Pin::StepZ, high),
+            Change::DownZ(high) => (Pin::DirZ, high),
         };
         Self { pin, high, at: Duration::from_nanos(time * 40) }
     }
@@ -93,6 +101,11 @@ pub enum MachineEventKind {
     /// The pen was lowered or raised.
     Pen {
         /// Lowered.
+        down: bool,
+    },
+    /// A step of the motor that lifts the pen.
+    Lift {
+        /// Towards the paper.
         down: bool,
     },
     /// The motors' current was turned on or off.
@@ -124,6 +137,7 @@ pub enum MachineEventKind {
 pub struct Machine {
     up_x: bool,
     up_y: bool,
+    down_z: bool,
     pen_down: bool,
     position: (i32, i32),
     /// The last event, which may still gain the step of the other axis.
@@ -143,10 +157,17 @@ impl Machine {
                 self.up_y = high;
                 return None;
             }
-            Pin::StepX | Pin::StepY if !high => return None,
+            Pin::DirZ => {
+                self.down_z = high;
+                return None;
+            }
+            Pin::StepX | Pin::StepY | Pin::StepZ if !high => return None,
+            Pin::StepZ => MachineEventKind::Lift { down: self.down_z },
             Pin::StepX => self.step(direction(self.up_x), 0),
             Pin::StepY => self.step(0, direction(self.up_y)),
             Pin::Enable => MachineEventKind::Drivers { on: !high },
+            // Another height on the same side of the middle.
+            Pin::Pen if high == self.pen_down => return None,
             Pin::Pen => {
                 self.pen_down = high;
                 MachineEventKind::Pen { down: high }

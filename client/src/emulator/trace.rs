@@ -210,7 +210,7 @@ mod tests {
     fn what_cannot_be_read_is_refused() {
         for line in [
             "pl061_set_output",
-            "pl061_set_output /machine/x setting output 6 to 1",
+            "pl061_set_output /machine/x setting output 8 to 1",
             "pl061_set_output /machine/x setting output five to 1",
             "systick_read systick read addr 0x8 data",
             "systick_read systick read addr 0x8 data 12",

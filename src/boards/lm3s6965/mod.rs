@@ -5,6 +5,7 @@
 //! | STEP_X, DIR_X, STEP_Y, DIR_Y | PB0, PB1, PB2, PB3 |
 //! | ENABLE (low: drivers on) | PB4 |
 //! | PEN (high: down) | PB5 |
+//! | STEP_Z, DIR_Z of a motor that lifts the pen (high: down) | PB6, PB7 |
 //! | limit switches of x, y, emergency stop (high: closed; pulled down) | PC4, PC5, PC6 |
 //! | serial line, 115200 8N1 | UART0: PA0 receives, PA1 sends |
 //! | steps | timers 1 and 2, priority 0: nothing delays them |

@@ -11,12 +11,16 @@ mod offset {
     pub const DIRECTION: usize = 0x400;
     pub const ALTERNATE_FUNCTION: usize = 0x420;
     pub const DIGITAL_ENABLE: usize = 0x51C;
+    pub const LOCK: usize = 0x520;
+    pub const COMMIT: usize = 0x524;
     /// In system control.
     pub const GPIO_CLOCKS: usize = 0x108;
 }
 const PORT_B_CLOCK: u32 = 1 << 1;
-/// PB0 to PB5.
-const ALL: u32 = 0x3F;
+/// PB0 to PB7.
+const ALL: u32 = 0xFF;
+/// Opens the register that lets PB7 be something else than JTAG's reset.
+const UNLOCK: u32 = 0x1ACC_E551;
 
 /// Pin `NUMBER` of port B as an output.
 pub struct Pin<const NUMBER: u8>(());
@@ -36,6 +40,8 @@ pub struct MotorPins {
 const AXES: u32 = 0x1F;
 const STEP_X: u32 = 1;
 const STEP_Y: u32 = 1 << 2;
+const STEP_Z: u32 = 1 << 6;
+const DIRECTION_Z: u32 = 1 << 7;
 
 impl Axes for AxisPins {
     /// STEP_X, STEP_Y, DIR_X, DIR_Y, ENABLE of an event; high direction counts up, low enable is on.
@@ -46,9 +52,14 @@ impl Axes for AxisPins {
         write(AXES, levels);
     }
 
+    fn set_lift(&mut self, step: bool, down: bool) {
+        let levels = if step { STEP_Z } else { 0 } | if down { DIRECTION_Z } else { 0 };
+        write(STEP_Z | DIRECTION_Z, levels);
+    }
+
     #[inline(always)]
     fn end_pulses(&mut self) {
-        write(STEP_X | STEP_Y, 0);
+        write(STEP_X | STEP_Y | STEP_Z, 0);
     }
 }
 
@@ -87,6 +98,8 @@ pub fn set_up() -> MotorPins {
     SYSTEM_CONTROL.set_bits(offset::GPIO_CLOCKS, PORT_B_CLOCK);
     // The port answers three cycles after its clock is on; a read takes longer.
     SYSTEM_CONTROL.read(offset::GPIO_CLOCKS);
+    GPIO_B.write(offset::LOCK, UNLOCK);
+    GPIO_B.write(offset::COMMIT, ALL);
     GPIO_B.write(offset::ALTERNATE_FUNCTION, GPIO_B.read(offset::ALTERNATE_FUNCTION) & !ALL);
     GPIO_B.set_bits(offset::DIRECTION, ALL);
     release();

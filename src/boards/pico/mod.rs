@@ -7,9 +7,10 @@
 //! | ENABLE (low: drivers on) | GP6: the same |
 //! | PEN (servo) | GP7: PWM slice 3 |
 //! | limit switches of x and y, emergency stop (closed: low) | GP8, GP9, GP10 |
+//! | STEP_Z, DIR_Z of a motor that lifts the pen (high: down) | GP11, GP12 |
 //! | settings and last job | the last 288 KiB of flash |
 //! | next block of steps | DMA_IRQ_0, priority 0 |
-//! | pen's heights | PIO0_IRQ_0, priority 1 |
+//! | pen's heights, and the steps of its motor | PIO0_IRQ_0, priority 1 |
 //! | serial line's bytes | UART0_IRQ, USBCTRL_IRQ, priority 2 |
 //! | millisecond | TIMER_IRQ_0, priority 3 |
 //!
@@ -24,6 +25,7 @@ mod critical;
 mod divider;
 mod emergency;
 mod flash;
+mod lift;
 mod multiply;
 mod pen;
 mod pins;
@@ -88,6 +90,7 @@ pub fn take() -> (Pico, Lent<'static>, &'static PulserState) {
     let gpio = Pins::new(chip.IO_BANK0, chip.PADS_BANK0, sio.gpio_bank0, &mut chip.RESETS);
     let steps = steps::set_up(&mut core.NVIC);
     pen::set_up();
+    lift::set_up();
     let line = ports::set_up();
     let uart = serial::set_up(&mut core.NVIC);
     let controller = (chip.USBCTRL_REGS, chip.USBCTRL_DPRAM);

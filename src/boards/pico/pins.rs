@@ -1,6 +1,6 @@
 //! Which pin does what.
 
-use rp2040_hal::gpio::{FunctionPio0, FunctionPwm, FunctionUart, Pins};
+use rp2040_hal::gpio::{FunctionPio0, FunctionPwm, FunctionSioOutput, FunctionUart, Pins};
 
 /// STEP_X, STEP_Y, DIR_X, DIR_Y and ENABLE are this one and the next four.
 pub const FIRST_MOTOR_PIN: u32 = 2;
@@ -15,6 +15,8 @@ pub fn set_up(pins: Pins) {
     pins.gpio5.into_function::<FunctionPio0>();
     pins.gpio6.into_function::<FunctionPio0>();
     pins.gpio7.into_function::<FunctionPwm>();
+    pins.gpio11.into_function::<FunctionSioOutput>();
+    pins.gpio12.into_function::<FunctionSioOutput>();
     // The contacts.
     pins.gpio8.into_pull_up_input();
     pins.gpio9.into_pull_up_input();

@@ -12,7 +12,7 @@ pub const UART0: Peripheral = unsafe { Peripheral::at(0x4003_4000) };
 pub const PWM: Peripheral = unsafe { Peripheral::at(0x4005_0000) };
 /// Microseconds since the start. Used by `clock`.
 pub const TIMER: Peripheral = unsafe { Peripheral::at(0x4005_4000) };
-/// The pins' levels. Used by `contacts`.
+/// The pins' levels. Used by `contacts` and `lift`.
 pub const SIO: Peripheral = unsafe { Peripheral::at(0xD000_0000) };
 /// The watchdog. Used by `emergency`.
 pub const WATCHDOG: Peripheral = unsafe { Peripheral::at(0x4005_8000) };

@@ -13,8 +13,8 @@
 //! keeps the planned ones. As long as enough waits behind a group of words, one look at the group will do.
 //!
 //! What the state machine has taken is read off the channel and told to the main loop's
-//! [`PulserState`] whenever that loop turns. The pen's heights wait in a queue of their own, for a
-//! word has no place for them; an interrupt sets the servo.
+//! [`PulserState`] whenever that loop turns. The pen's heights, and the steps of a motor that lifts it, wait in a
+//! queue of their own, for a word has no place for them; an interrupt sets servo and pins.
 
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
@@ -30,7 +30,7 @@ use static_cell::StaticCell;
 
 use super::pins::FIRST_MOTOR_PIN;
 use super::registers::{self, DMA, PIO0, reset};
-use super::{clock, critical, pen};
+use super::{clock, critical, lift, pen};
 use crate::boards::handler::Owned;
 
 /// Words of the ring, a power of two.
@@ -55,8 +55,14 @@ const FAR_GROUPS: u32 = 8;
 const BRAKED_TICKS: u32 = TICKS_PER_SECOND / 500;
 /// A wait is so many words at most, of 2 ms if that is enough, for the same reason.
 const WAIT_WORDS: u32 = 64;
-/// Heights of the pen that wait, at most; one more place than that, for the queue.
-const HEIGHTS: usize = 256;
+/// Heights of the pen that wait, or two for each step of its motor, at most; one more place than that, for the queue.
+const HEIGHTS: usize = 1024;
+/// In the place of a height: the pins of the pen's motor take levels.
+mod lift_levels {
+    pub const MARK: u8 = 1 << 7;
+    pub const STEP: u8 = 1;
+    pub const DOWN: u8 = 1 << 1;
+}
 
 /// A pass of the counting loop is a tick.
 const CYCLES_PER_TICK: u32 = clock::HERTZ / TICKS_PER_SECOND;
@@ -482,6 +488,10 @@ impl EventQueue for Steps {
                 self.moving = false;
                 (self.levels | target::MOVE_PEN, PEN_TICKS)
             }
+            EventKind::Lift { step, down } => {
+                self.moving = true;
+                return self.push_lift(step, down, event);
+            }
             EventKind::Levels(levels) => {
                 self.moving = levels & StepEvent::AT_REST == 0;
                 let pins = (u32::from(levels) & LEVELS) ^ self.flips;
@@ -499,18 +509,10 @@ impl EventQueue for Steps {
         // Without a rule nothing is told, and nothing counted.
         let is_told = event.is_step() && STATE.brake().is_on();
         let step = if is_told { self.step_length.step() } else { StepWay::default() };
-        let mut ticks = event.ticks();
-        if word & TARGETS == target::PULSE || ticks <= BRAKED_TICKS {
-            self.put(word, ticks.saturating_sub(beyond), step);
+        if word & TARGETS == target::PULSE {
+            self.put(word, event.ticks().saturating_sub(beyond), step);
         } else {
-            let part = (ticks / WAIT_WORDS).max(BRAKED_TICKS);
-            self.put(word, part - beyond, step);
-            ticks -= part;
-            while ticks > 0 {
-                let part = if ticks < 2 * part { ticks } else { part };
-                self.put(self.levels | target::WAIT, part - WAIT_TICKS, step);
-                ticks -= part;
-            }
+            self.put_wait(word, beyond, event.ticks());
         }
         self.publish();
         Ok(())
@@ -549,6 +551,42 @@ impl EventQueue for Steps {
 }
 
 impl Steps {
+    /// A word that takes `beyond` ticks beside its count, and waits behind it: `ticks` in all.
+    fn put_wait(&mut self, word: u32, beyond: u32, mut ticks: u32) {
+        let step = StepWay::default();
+        if ticks <= BRAKED_TICKS {
+            self.put(word, ticks.saturating_sub(beyond), step);
+            return;
+        }
+        let part = (ticks / WAIT_WORDS).max(BRAKED_TICKS);
+        self.put(word, part - beyond, step);
+        ticks -= part;
+        while ticks > 0 {
+            let part = if ticks < 2 * part { ticks } else { part };
+            self.put(self.levels | target::WAIT, part - WAIT_TICKS, step);
+            ticks -= part;
+        }
+    }
+
+    /// The pen's motor: its pulse lasts half of the event, so that the handler is never two levels behind.
+    fn push_lift(&mut self, step: bool, down: bool, event: StepEvent) -> Result<(), StepEvent> {
+        use lift_levels::{DOWN, MARK, STEP};
+        let pins = MARK | if down { DOWN } else { 0 };
+        let word = self.levels | target::MOVE_PEN;
+        let mut ticks = event.ticks();
+        if step {
+            self.room = self.room.saturating_sub(1);
+            self.heights.enqueue(pins | STEP).map_err(|_| event)?;
+            let high = (ticks / 2).min(BRAKED_TICKS);
+            self.put_wait(word, PEN_TICKS, high);
+            ticks -= high;
+        }
+        self.heights.enqueue(pins).map_err(|_| event)?;
+        self.put_wait(word, PEN_TICKS, ticks);
+        self.publish();
+        Ok(())
+    }
+
     /// A pulse that is none for the state machine, so that it is counted apart: a wait while the pins
     /// are high, and one while they are low.
     fn push_slack(&mut self, pins: u32, ticks: u32) -> Result<(), StepEvent> {
@@ -722,16 +760,28 @@ fn brake_words(brake: &mut Brake, told: u32, count: u32) -> u32 {
     words
 }
 
-/// Two heights that come faster than the interrupt would leave one behind: the last counts.
+/// Two heights that come faster than the interrupt would leave one behind: the last counts. Steps of the pen's
+/// motor are left over only where all was thrown away.
 fn heal_pen() {
     critical::with_steps_masked(|| {
         // SAFETY: the handler that owns it is masked.
         if let Some(due) = unsafe { HEIGHTS_DUE.get() } {
             while let Some(height) = due.dequeue() {
-                pen::set_height(height);
+                if height & lift_levels::MARK == 0 {
+                    pen::set_height(height);
+                }
             }
+            lift::end_pulse();
         }
     });
+}
+
+/// The pen's motor takes a direction, and a step if asked.
+fn set_lift(step: bool, down: bool) {
+    lift::set(step, down != STATE.lift_is_inverted());
+    if step {
+        STATE.count_lift(down);
+    }
 }
 
 /// Stops for good with the drivers off, in a fault.
@@ -751,6 +801,10 @@ fn PIO0_IRQ_0() {
     PIO0.write(machine::FLAGS, FLAG);
     // SAFETY: this is the handler that owns it.
     if let Some(height) = unsafe { HEIGHTS_DUE.get() }.and_then(Consumer::dequeue) {
-        pen::set_height(height);
+        if height & lift_levels::MARK == 0 {
+            pen::set_height(height);
+        } else {
+            set_lift(height & lift_levels::STEP != 0, height & lift_levels::DOWN != 0);
+        }
     }
 }
