@@ -217,8 +217,9 @@ pub fn sin_cos_degrees(degrees: f64) -> (f64, f64) {
     let quarters = libm::round(degrees / 90.0);
     let radians = (degrees - 90.0 * quarters).to_radians();
     // At most π/4. Said in libm's way, this spares the device the reduction of larger angles: 3 KB.
-    let high_word = (radians.to_bits() >> 32) as u32 & 0x7FFF_FFFF;
-    let (sin, cos) = if high_word <= 0x3FE9_21FB { libm::sincos(radians) } else { (0.0, 1.0) };
+    let [high, low] = [radians.to_bits() >> 32, radians.to_bits()].map(|word| word as u32);
+    let high = (high & 0x7FFF_FFFF).min(0x3FE9_21FB) | high & 0x8000_0000;
+    let (sin, cos) = libm::sincos(f64::from_bits(u64::from(high) << 32 | u64::from(low)));
     match quarters as i64 & 3 {
         0 => (sin, cos),
         1 => (cos, -sin),
