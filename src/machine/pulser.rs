@@ -23,6 +23,7 @@ pub struct PulserState {
     pulse_ticks: AtomicU32,
     inverted: AtomicU8,
     queue_steps: AtomicU32,
+    queue_full: AtomicU32,
     brake: BrakeOrders,
 }
 
@@ -41,6 +42,7 @@ impl PulserState {
             pulse_ticks: AtomicU32::new(50),
             inverted: AtomicU8::new(0),
             queue_steps: AtomicU32::new(QueueSize::ENDLESS.steps),
+            queue_full: AtomicU32::new(QueueSize::ENDLESS.full),
             brake: BrakeOrders::new(),
         }
     }
@@ -138,11 +140,15 @@ impl PulserState {
     /// What the board's queue holds; before the machine asks.
     pub fn set_queue(&self, queue: QueueSize) {
         self.queue_steps.store(queue.steps, Ordering::Relaxed);
+        self.queue_full.store(queue.full, Ordering::Relaxed);
     }
 
     /// The same; without a board it has no end.
     pub(super) fn queue(&self) -> QueueSize {
-        QueueSize { steps: self.queue_steps.load(Ordering::Relaxed) }
+        QueueSize {
+            steps: self.queue_steps.load(Ordering::Relaxed),
+            full: self.queue_full.load(Ordering::Relaxed),
+        }
     }
 
     /// How a queue that runs dry brakes.
@@ -408,7 +414,7 @@ impl<'q, A: Axes, P: Pen, const N: usize> Pulser<'q, A, P, N> {
         state: &'q PulserState,
     ) -> (Self, StepQueue<'q, N>) {
         let ring = &*ring;
-        state.set_queue(QueueSize { steps: StepQueue::<N>::EVENTS as u32 });
+        state.set_queue(QueueSize { steps: StepQueue::<N>::EVENTS as u32, ..QueueSize::ENDLESS });
         let pulser = Self { axes, pen, ring, state, ticks: 0, brake: StepBrake::new() };
         let counted = ring.taken_place();
         let step_length = StepLength::new();
