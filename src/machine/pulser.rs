@@ -8,8 +8,7 @@ use embedded_hal::digital::{OutputPin, PinState};
 
 /// What the interrupt and the main loop share. Only loads and stores, so a Cortex-M0+ has it too.
 ///
-/// The interrupt alone writes how often it ran dry, the main loop alone the orders, and the counts of what it
-/// finds to be taken.
+/// The main loop alone writes the orders, and the counts of what it finds to be taken.
 #[derive(Debug, Default)]
 pub struct PulserState {
     x: AtomicU32,
@@ -115,7 +114,7 @@ impl PulserState {
         self.slack_y.store(y.cast_unsigned(), Ordering::Relaxed);
     }
 
-    /// For such a board: its queue ran dry while the machine moved.
+    /// The queue ran dry while the machine moved.
     pub fn note_underrun(&self) {
         let underruns = self.underruns.load(Ordering::Relaxed);
         self.underruns.store(underruns.wrapping_add(1), Ordering::Relaxed);
@@ -167,6 +166,8 @@ pub struct StepQueue<'q, const N: usize> {
     step_length: StepLength,
     /// The place behind the word counted last.
     counted: u32,
+    /// Something follows the event counted last.
+    moving: bool,
 }
 
 impl<const N: usize> StepQueue<'_, N> {
@@ -201,12 +202,14 @@ impl<const N: usize> StepQueue<'_, N> {
         let stopped = !self.ring.is_running();
         let down = self.state.inverted() << 2;
         let (mut steps, mut slack, mut ticks) = (0u32, 0u32, 0u32);
+        let moving = &mut self.moving;
         self.ring.count(&mut self.counted, |word| {
             let flags = word as u8;
             if flags & (StepEvent::PEN | StepEvent::LENGTH) == StepEvent::LENGTH {
                 return;
             }
             ticks = ticks.wrapping_add(word >> 8);
+            *moving = flags & (StepEvent::AT_REST | StepEvent::PEN) == 0;
             if flags & StepEvent::PEN != 0 {
                 return;
             }
@@ -216,6 +219,9 @@ impl<const N: usize> StepQueue<'_, N> {
             *sum = sum.wrapping_add(step);
         });
         self.state.count(steps, slack, ticks);
+        if stopped && core::mem::take(&mut self.moving) && !self.state.is_halted() {
+            self.state.note_underrun();
+        }
         if stopped && self.state.is_halted() {
             self.ring.clear();
             self.state.brake.forget();
@@ -418,7 +424,7 @@ impl<'q, A: Axes, P: Pen, const N: usize> Pulser<'q, A, P, N> {
         let pulser = Self { axes, pen, ring, state, ticks: 0, brake: StepBrake::new() };
         let counted = ring.taken_place();
         let step_length = StepLength::new();
-        (pulser, StepQueue { ring, state, order: A::ORDER, step_length, counted })
+        (pulser, StepQueue { ring, state, order: A::ORDER, step_length, counted, moving: false })
     }
 
     /// Before the first event, and again after [`Tick::Over`]. Whether there is anything to do.
@@ -498,14 +504,6 @@ impl<'q, A: Axes, P: Pen, const N: usize> Pulser<'q, A, P, N> {
     #[cold]
     #[inline(never)]
     fn run_dry(&mut self) {
-        const UNMOVED: u8 = StepEvent::AT_REST | StepEvent::PEN;
-        let mut last = self.ring.taken_before(0) as u8;
-        if last & (StepEvent::LENGTH | StepEvent::PEN) == StepEvent::LENGTH {
-            last = self.ring.taken_before(1) as u8;
-        }
-        if last & UNMOVED == 0 {
-            self.state.note_underrun();
-        }
         self.brake.rest();
         self.ring.set_running(false);
     }
