@@ -10,8 +10,7 @@ use embedded_hal::digital::{OutputPin, PinState};
 
 /// What the interrupt and the main loop share. Only loads and stores, so a Cortex-M0+ has it too.
 ///
-/// The interrupt alone writes how often it ran dry, the main loop alone the orders, and the counts of what it
-/// finds to be taken.
+/// The main loop alone writes the orders, and the counts of what it finds to be taken.
 #[derive(Debug, Default)]
 pub struct PulserState {
     x: AtomicU32,
@@ -27,6 +26,7 @@ pub struct PulserState {
     inverted: AtomicU8,
     lift_inverted: AtomicBool,
     queue_steps: AtomicU32,
+    queue_full: AtomicU32,
     brake: BrakeOrders,
 }
 
@@ -47,6 +47,7 @@ impl PulserState {
             inverted: AtomicU8::new(0),
             lift_inverted: AtomicBool::new(false),
             queue_steps: AtomicU32::new(QueueSize::ENDLESS.steps),
+            queue_full: AtomicU32::new(QueueSize::ENDLESS.full),
             brake: BrakeOrders::new(),
         }
     }
@@ -129,7 +130,7 @@ impl PulserState {
         self.slack_y.store(y.cast_unsigned(), Ordering::Relaxed);
     }
 
-    /// For such a board: its queue ran dry while the machine moved.
+    /// The queue ran dry while the machine moved.
     pub fn note_underrun(&self) {
         let underruns = self.underruns.load(Ordering::Relaxed);
         self.underruns.store(underruns.wrapping_add(1), Ordering::Relaxed);
@@ -160,11 +161,15 @@ impl PulserState {
     /// What the board's queue holds; before the machine asks.
     pub fn set_queue(&self, queue: QueueSize) {
         self.queue_steps.store(queue.steps, Ordering::Relaxed);
+        self.queue_full.store(queue.full, Ordering::Relaxed);
     }
 
     /// The same; without a board it has no end.
     pub(super) fn queue(&self) -> QueueSize {
-        QueueSize { steps: self.queue_steps.load(Ordering::Relaxed) }
+        QueueSize {
+            steps: self.queue_steps.load(Ordering::Relaxed),
+            full: self.queue_full.load(Ordering::Relaxed),
+        }
     }
 
     /// How a queue that runs dry brakes.
@@ -183,6 +188,8 @@ pub struct StepQueue<'q, const N: usize> {
     step_length: StepLength,
     /// The place behind the word counted last.
     counted: u32,
+    /// Something follows the event counted last.
+    moving: bool,
 }
 
 impl<const N: usize> StepQueue<'_, N> {
@@ -217,12 +224,14 @@ impl<const N: usize> StepQueue<'_, N> {
         let stopped = !self.ring.is_running();
         let down = self.state.inverted() << 2;
         let (mut steps, mut slack, mut ticks) = (0u32, 0u32, 0u32);
+        let moving = &mut self.moving;
         self.ring.count(&mut self.counted, |word| {
             let (event, flags) = (StepEvent::from_bits(word), word as u8);
             if event.is_told() {
                 return;
             }
             ticks = ticks.wrapping_add(word >> 8);
+            *moving = flags & (StepEvent::AT_REST | StepEvent::PEN) == 0;
             match event.kind() {
                 EventKind::Levels(_) => {}
                 EventKind::Lift { step: true, down } => return self.state.count_lift(down),
@@ -234,6 +243,9 @@ impl<const N: usize> StepQueue<'_, N> {
             *sum = sum.wrapping_add(step);
         });
         self.state.count(steps, slack, ticks);
+        if stopped && core::mem::take(&mut self.moving) && !self.state.is_halted() {
+            self.state.note_underrun();
+        }
         if stopped && self.state.is_halted() {
             self.ring.clear();
             self.state.brake.forget();
@@ -449,11 +461,11 @@ impl<'q, A: Axes, P: Pen, const N: usize> Pulser<'q, A, P, N> {
         state: &'q PulserState,
     ) -> (Self, StepQueue<'q, N>) {
         let ring = &*ring;
-        state.set_queue(QueueSize { steps: StepQueue::<N>::EVENTS as u32 });
+        state.set_queue(QueueSize { steps: StepQueue::<N>::EVENTS as u32, ..QueueSize::ENDLESS });
         let pulser = Self { axes, pen, ring, state, ticks: 0, brake: StepBrake::new() };
         let counted = ring.taken_place();
         let step_length = StepLength::new();
-        (pulser, StepQueue { ring, state, order: A::ORDER, step_length, counted })
+        (pulser, StepQueue { ring, state, order: A::ORDER, step_length, counted, moving: false })
     }
 
     /// Before the first event, and again after [`Tick::Over`]. Whether there is anything to do.
@@ -542,14 +554,6 @@ impl<'q, A: Axes, P: Pen, const N: usize> Pulser<'q, A, P, N> {
     #[cold]
     #[inline(never)]
     fn run_dry(&mut self) {
-        const UNMOVED: u8 = StepEvent::AT_REST | StepEvent::PEN;
-        let mut last = StepEvent::from_bits(self.ring.taken_before(0));
-        if last.is_told() {
-            last = StepEvent::from_bits(self.ring.taken_before(1));
-        }
-        if last.to_bits() as u8 & UNMOVED == 0 {
-            self.state.note_underrun();
-        }
         self.brake.rest();
         self.ring.set_running(false);
     }

@@ -73,13 +73,6 @@ impl<const N: usize> EventRing<N> {
         (!is_empty).then(|| self.at(taken).0.load(Ordering::Relaxed))
     }
 
-    /// The word taken last but `count` others; 0 before there was one. For the interrupt.
-    pub(super) fn taken_before(&self, count: u32) -> u32 {
-        let taken = self.taken.load(Ordering::Relaxed);
-        let place = if taken > count { taken } else { taken + N as u32 } - 1 - count;
-        self.at(place).0.load(Ordering::Relaxed)
-    }
-
     /// The interrupt begins to take words, or takes no more. For the interrupt.
     pub(super) fn set_running(&self, running: bool) {
         compiler_fence(Ordering::Release);
@@ -158,9 +151,8 @@ mod tests {
             assert_eq!((ring.room(counted), ring.waiting()), (0, 3));
             for word in next..next + 3 {
                 assert_eq!((ring.peek(), ring.take()), (Some(word), Some(word)));
-                assert_eq!(ring.taken_before(0), word);
             }
-            assert_eq!((ring.taken_before(1), ring.take()), (next + 1, None));
+            assert_eq!(ring.take(), None);
             assert_eq!((ring.room(counted), ring.taken_behind(counted)), (0, 3));
             ring.count(&mut counted, |word| sum += word);
             next += 3;

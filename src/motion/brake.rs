@@ -74,13 +74,25 @@ impl BrakeRule {
 /// What there is for steps to wait in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct QueueSize {
-    /// How many wait at least when it is full; 0 for no end.
+    /// How many can be counted on to wait, on a long path; 0 for no end.
     pub steps: u32,
+    /// How many wait when it is full; more than can be, if the main loop is never late by as much as they last.
+    pub full: u32,
 }
+
+/// So late the main loop may be, without slowing the greatest rate.
+const LATE_MILLISECONDS: u64 = 2;
 
 impl QueueSize {
     /// A queue without end.
-    pub const ENDLESS: Self = Self { steps: 0 };
+    pub const ENDLESS: Self = Self { steps: 0, full: u32::MAX };
+
+    /// How many can be counted on at so many steps a second: at least a quarter of all.
+    fn steps_at(self, rate: u64) -> u64 {
+        let late = rate * LATE_MILLISECONDS / 1000;
+        let full = u64::from(self.full);
+        u64::from(self.steps).min(full.saturating_sub(late).max(full / 4))
+    }
 }
 
 impl Limits {
@@ -91,9 +103,11 @@ impl Limits {
     /// 13/16 of the queue. Both by 1/32, so that it never slows a plan that is in time.
     pub fn brake(&self, fastest: PathLength, longer: u64, queue: QueueSize) -> BrakeRule {
         let acceleration = u64::from(self.acceleration.to_bits());
+        let rate = self.step_rate(self.speed(fastest));
         let fastest = u64::from(fastest.to_bits());
         // 2^-18 mm; below 2^20 steps of at most 1 mm.
-        let held = (u64::from(self.least_move.to_bits()) * u64::from(queue.steps) / 16 * 13) >> 14;
+        let steps = queue.steps_at(rate);
+        let held = (u64::from(self.least_move.to_bits()) * steps / 16 * 13) >> 14;
         let harder = (acceleration * fastest).checked_div(held).unwrap_or(0);
         let braking = (acceleration + acceleration / 32).max(harder).clamp(1, u64::from(u32::MAX));
         let [x, y] = self.step_length.map(|step| u64::from(step.to_bits()));
@@ -241,6 +255,12 @@ impl StepLength {
     #[inline]
     pub fn last(&self) -> u32 {
         self.later
+    }
+
+    /// The way of each step to come, if it is the same.
+    pub fn steady(&self) -> Option<StepWay> {
+        let StepLength { before, behind, later } = *self;
+        (before == behind && behind == later).then_some(StepWay { around: later, behind: later })
     }
 
     /// The next step.
@@ -470,7 +490,7 @@ mod tests {
     }
 
     fn queue(steps: u32) -> QueueSize {
-        QueueSize { steps }
+        QueueSize { steps, ..QueueSize::ENDLESS }
     }
 
     /// 0.01 mm.

@@ -254,7 +254,7 @@ pub fn set_up(nvic: &mut NVIC) -> Steps {
         HEIGHTS_DUE.fill(due);
         BRAKE.fill(Brake::default());
     }
-    STATE.set_queue(QueueSize { steps: STOPPING_STEPS });
+    STATE.set_queue(QueueSize { steps: STOPPING_STEPS, full: WORDS - RESERVED });
     critical::enable(nvic, Interrupt::DMA_IRQ_0, critical::STEP_PRIORITY);
     critical::enable(nvic, Interrupt::PIO0_IRQ_0, critical::PEN_PRIORITY);
     Steps {
@@ -600,9 +600,12 @@ impl Steps {
         Ok(())
     }
 
-    /// The next words are so many steps.
+    /// The next words are so many steps, fewer than there are places.
     #[inline(never)] // On its own it stays in the core's registers.
     fn tell_ways(&mut self, count: u32) {
+        if let Some(step) = self.step_length.steady() {
+            return self.tell_same_ways(step, count);
+        }
         let mut queued = STATE.brake().queued();
         for number in 0..count {
             let word = self.written.wrapping_add(number);
@@ -615,6 +618,28 @@ impl Steps {
             }
         }
         STATE.brake().set_queued(queued);
+    }
+
+    /// The same where all have the same way: a few cycles a step.
+    fn tell_same_ways(&self, step: StepWay, count: u32) {
+        let packed = pack(step);
+        let first = (self.written % WORDS) as usize;
+        let (around, behind) = WAYS.split_at(first);
+        let before_end = behind.len().min(count as usize);
+        let ways = [&behind[..before_end], &around[..count as usize - before_end]];
+        for part in ways {
+            for way in part {
+                way.store(packed, Ordering::Relaxed);
+            }
+        }
+        let queued = STATE.brake().queued();
+        let mut number = GROUP - self.written % GROUP;
+        while number <= count {
+            let units = queued.wrapping_add(step.around * number);
+            sum(self.written.wrapping_add(number)).store(units, Ordering::Relaxed);
+            number += GROUP;
+        }
+        STATE.brake().set_queued(queued.wrapping_add(step.around * count));
     }
 
     fn put(&mut self, word: u32, count: u32, step: StepWay) {
@@ -630,7 +655,11 @@ impl Steps {
     /// Shows the words to the channel; lets them begin if they are many.
     fn publish(&mut self) {
         WRITTEN.store(self.written, Ordering::Release);
-        if !FEEDING.load(Ordering::Relaxed) && self.written.wrapping_sub(self.taken) >= WORDS / 2 {
+        if FEEDING.load(Ordering::Relaxed) {
+            return;
+        }
+        // What has begun goes on at once.
+        if !self.drained || self.written.wrapping_sub(self.taken) >= WORDS / 2 {
             self.start();
         }
     }
