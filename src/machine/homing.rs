@@ -133,7 +133,8 @@ impl Homing {
             Phase::Leave | Phase::Release if pressed => return Err(SwitchFault),
             Phase::Seek | Phase::Approach if self.pressed_at.is_none() => return Err(SwitchFault),
             Phase::Leave => Phase::Seek,
-            Phase::Seek => Phase::Release,
+            // From where it was pressed, however far the axis ran on.
+            Phase::Seek => return Ok(Some(Self { phase: Phase::Release, stands: false, ..self })),
             Phase::Release => Phase::Approach,
             Phase::Approach => {
                 return Ok(Some(Self { phase: Phase::PullOff, stands: false, ..self }));

@@ -1,6 +1,8 @@
 //! How the pen's place on the page follows from the two motors.
 
+use super::Cuts;
 use crate::drawing::PagePoint;
+use crate::step::Line;
 
 /// The build of the machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -15,8 +17,9 @@ pub enum Kinematics {
     Polargraph(Anchors),
 }
 
-/// Of a step: the unit of [`Line::beside`](crate::step::Line::beside).
-const FINE: i32 = 256;
+/// Of a step: the walls that there may be allow so many, and what is finer changes nothing.
+const LEAST_BITS: u32 = 8;
+const MOST_BITS: u32 = 14;
 
 /// The end of a piece of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -67,6 +70,8 @@ impl Kinematics {
 
     /// The piece of a straight line on the page between two `places` along it, counted such that the line is
     /// `length` long. It begins where the motors stand in the end of the piece before, at `begin`.
+    ///
+    /// All is reckoned from the line's lesser end, so drawn backward it has the same points.
     pub fn piece(
         self,
         ends: [PagePoint; 2],
@@ -74,46 +79,34 @@ impl Kinematics {
         length: u32,
         begin: PagePoint,
     ) -> Piece {
-        let [from, to] = ends;
-        let Self::Polargraph(Anchors { left, width }) = self else {
+        let to = ends[1];
+        let Self::Polargraph(anchors) = self else {
             return Piece { motors: self.motors(to), page: to, offsets: [0; 2] };
         };
-        let fine = |steps: i32| steps * FINE;
+        let line = FineLine::new(anchors, in_order(ends));
+        let backward = in_order(ends) != ends;
         let [start, end] = places.map(|place| {
-            let along = |from: i32, to: i32| {
-                let way = i64::from(FINE) * (i64::from(to) - i64::from(from)) * i64::from(place);
-                // Within 2^30.
-                fine(from) + (way / i64::from(length.max(1))) as i32
-            };
-            let page = PagePoint { x: along(from.x, to.x), y: along(from.y, to.y) };
-            let (x, y) = (page.x - fine(left.x), fine(left.y) - page.y);
-            ([length_of(x, y), length_of(fine(width) - x, y)], page)
+            line.at(if backward { length.saturating_sub(place) } else { place }, length)
         });
-        let change = [end.0[0] - start.0[0], end.0[1] - start.0[1]];
-        // How far the belts are, along the axis of fewer steps, from where the piece passes `steps` of
-        // the other one.
-        let beside = |belts: [i32; 2], steps: i32, more: usize| {
-            let ahead = i64::from(fine(steps) - belts[more]) * i64::from(change[1 - more]);
-            let ahead = ahead.checked_div(change[more].into()).unwrap_or(0);
-            i64::from(belts[1 - more]) + ahead
-        };
-        let more_of = |x: i32, y: i32| usize::from(x.abs() <= y.abs());
         let motors = if places[1] >= length {
             self.motors(to)
         } else {
-            let more = more_of(change[0], change[1]);
-            let steps = rounded(end.0[more].into());
-            let others = rounded(beside(end.0, steps, more));
+            let [x, y] = end.ways;
+            let more = usize::from(x.abs() <= y.abs());
+            let steps = rounded(end.belts[more].into(), line.bits);
+            let others = rounded(line.beside(end, steps, more), line.bits);
             let [x, y] = if more == 0 { [steps, others] } else { [others, steps] };
             PagePoint { x, y }
         };
-        let more = more_of(motors.x - begin.x, motors.y - begin.y);
-        let offsets = [(start.0, begin), (end.0, motors)].map(|(belts, PagePoint { x, y })| {
+        let more = usize::from((motors.x - begin.x).abs() <= (motors.y - begin.y).abs());
+        let offsets = [(start, begin), (end, motors)].map(|(place, PagePoint { x, y })| {
             let (steps, others) = if more == 0 { (x, y) } else { (y, x) };
+            let beside = line.beside(place, steps, more) - (i64::from(others) << line.bits);
             // At the ends of a line both belts are rounded, so it may be more.
-            (beside(belts, steps, more) - i64::from(fine(others))).clamp(-127, 127) as i8
+            rounded(beside * i64::from(Line::OFFSET_UNIT), line.bits).clamp(-127, 127) as i8
         });
-        let page = PagePoint { x: rounded(end.1.x.into()), y: rounded(end.1.y.into()) };
+        let [x, down] = end.place.map(|fine| rounded(fine.into(), line.bits));
+        let page = PagePoint { x: anchors.left.x + x, y: anchors.left.y - down };
         Piece { motors, page, offsets }
     }
 
@@ -137,28 +130,92 @@ impl Kinematics {
         }
     }
 
-    /// Into how many pieces a line of the page must be cut so that each is straight within 1/64 of a
-    /// step of the motors; their own rounding adds half a step.
-    ///
-    /// Along a line a belt of length a bends by 1/a at most, so a piece of length h is off by h²/8a;
-    /// no belt is shorter than the line lies below the anchors.
-    pub fn pieces(self, from: PagePoint, to: PagePoint) -> u32 {
-        let Self::Polargraph(Anchors { left, .. }) = self else { return 1 };
-        let least = (left.y - from.y.max(to.y)).max(1).unsigned_abs();
-        let length = from.x.abs_diff(to.x) + from.y.abs_diff(to.y);
-        length.div_ceil((least / 8).isqrt().max(1)).max(1)
+    /// Where a line of the page is cut into pieces; `None` if it is straight for the motors, too.
+    pub fn cuts(self, from: PagePoint, to: PagePoint) -> Option<Cuts> {
+        match self {
+            Self::Polargraph(anchors) => Some(Cuts::new(anchors, from, to)),
+            Self::Cartesian | Self::CoreXy => None,
+        }
+    }
+}
+
+/// The ends of a line, the lesser first.
+pub(super) fn in_order([a, b]: [PagePoint; 2]) -> [PagePoint; 2] {
+    if (b.x, b.y) < (a.x, a.y) { [b, a] } else { [a, b] }
+}
+
+/// A line on a wall, in 2^-`bits` steps from the left anchor, to the right and down.
+struct FineLine {
+    bits: u32,
+    from: [i32; 2],
+    way: [i32; 2],
+    width: i32,
+    /// The way again, made as long as 32 bits allow: only its direction counts.
+    direction: [i64; 2],
+}
+
+/// A place on it.
+#[derive(Clone, Copy)]
+struct FinePlace {
+    place: [i32; 2],
+    /// The lengths of both belts.
+    belts: [i32; 2],
+    /// How fast they change along the line, one against the other.
+    ways: [i64; 2],
+}
+
+impl FineLine {
+    fn new(Anchors { left, width }: Anchors, ends: [PagePoint; 2]) -> Self {
+        let [from, to] = ends.map(|end| [end.x - left.x, left.y - end.y]);
+        let greatest = [from, to].map(|[x, y]| x.abs().max((width - x).abs()).max(y.abs()));
+        // Below 2^22, so that all stays below 2^30.
+        let bits = (greatest[0].max(greatest[1]) | 1).leading_zeros() - 2;
+        let bits = bits.clamp(LEAST_BITS, MOST_BITS);
+        let way = [to[0] - from[0], to[1] - from[1]];
+        // Below 2^21.
+        let longer = (way[0].abs().max(way[1].abs()) | 1).leading_zeros().saturating_sub(10);
+        let direction = way.map(|way| i64::from(way) << longer);
+        let [from, way] = [from, way].map(|point| point.map(|steps| steps << bits));
+        Self { bits, from, way, width: width << bits, direction }
+    }
+
+    /// The place at `done` of a `length`.
+    fn at(&self, done: u32, length: u32) -> FinePlace {
+        let along = |axis: usize| {
+            // Below 2^62.
+            let way = i64::from(self.way[axis]) * i64::from(done);
+            let half = i64::from(length / 2);
+            self.from[axis] + (way + half).div_euclid(length.max(1).into()) as i32
+        };
+        let place @ [x, y] = [along(0), along(1)];
+        let beside = [x, x - self.width];
+        let belts = beside.map(|x| length_of(x, y));
+        let way = |axis: usize| {
+            // Below 2^54.
+            let way =
+                i64::from(beside[axis]) * self.direction[0] + i64::from(y) * self.direction[1];
+            way.checked_div(belts[axis].into()).unwrap_or(0)
+        };
+        FinePlace { place, belts, ways: [way(0), way(1)] }
+    }
+
+    /// The length of the other belt where, beside a place on the line, the belt `more` is `steps` long.
+    fn beside(&self, place: FinePlace, steps: i32, more: usize) -> i64 {
+        let ahead = (i64::from(steps) << self.bits) - i64::from(place.belts[more]);
+        let ahead = (ahead * place.ways[1 - more]).checked_div(place.ways[more]).unwrap_or(0);
+        i64::from(place.belts[1 - more]) + ahead
     }
 }
 
 /// √(x² + y²), rounded.
-fn length_of(x: i32, y: i32) -> i32 {
+pub(super) fn length_of(x: i32, y: i32) -> i32 {
     let square = |steps: i32| i64::from(steps).unsigned_abs() * i64::from(steps).unsigned_abs();
     rounded_root(square(x) + square(y))
 }
 
-/// Fine units as steps.
-fn rounded(fine: i64) -> i32 {
-    (fine + i64::from(FINE / 2)).div_euclid(FINE.into()) as i32
+/// A number of 2^-`bits`, one bit at least, rounded.
+fn rounded(fine: i64, bits: u32) -> i32 {
+    ((fine + (1 << (bits - 1))) >> bits) as i32
 }
 
 /// The root of a number below 2^62, rounded.

@@ -8,6 +8,7 @@
 //! Refused: orders that the state does not allow, settings that conflict, moves beyond the limits;
 //! each leaves everything as it was.
 
+mod cuts;
 mod homing;
 mod job;
 mod kinematics;
@@ -20,6 +21,7 @@ mod split;
 mod status;
 mod stream;
 
+pub use cuts::Cuts;
 use homing::Homing;
 pub use homing::{Axis, Contacts, Switches};
 pub use kinematics::{Anchors, Kinematics, Piece};
@@ -291,7 +293,12 @@ impl<'m> Machine<'m> {
 
     /// Stops the pulses at once and raises the pen. The position is where the pins stopped.
     pub fn alarm(&mut self, alarm: Alarm) {
+        // What the interrupt has not begun with yet it has still to throw away.
+        let waits = self.pins.is_drained() && !self.stands();
         self.pins.halt();
+        if waits {
+            self.pins.fill();
+        }
         self.end_homing();
         self.next_pen = None;
         self.split = None;
@@ -341,7 +348,7 @@ impl<'m> Machine<'m> {
                 self.runner.forget_lift();
             }
             State::Alarm(alarm)
-                if self.pins.is_drained()
+                if self.stands()
                     && !self.stop_is_pressed
                     && !self.runner.is_pen_held(alarm == Alarm::Restarted) =>
             {

@@ -96,6 +96,11 @@ impl PulserState {
         self.halt.store(true, Ordering::Release);
     }
 
+    /// Events wait that the interrupt does not know of.
+    pub(super) fn fill(&self) {
+        self.drained.store(false, Ordering::Release);
+    }
+
     /// Whether [`PulserState::halt`] is in force.
     pub fn is_halted(&self) -> bool {
         self.halt.load(Ordering::Acquire)

@@ -348,6 +348,8 @@ impl<'m> Runner<'m> {
         let Move { motors, offsets, page, mut way, mut whole, mut length, is_gap } = *piece;
         let (dx, dy) = (motors.x - self.end.x, motors.y - self.end.y);
         if dx == 0 && dy == 0 {
+            // The pen may stand only about there.
+            self.page_end = page;
             return Ok(());
         }
         if way == (0, 0) || length == 0 {

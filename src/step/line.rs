@@ -31,6 +31,9 @@ pub struct Line {
 }
 
 impl Line {
+    /// Offsets of [`Line::beside`] in a step: 127 of them are just less than half of one.
+    pub const OFFSET_UNIT: i32 = 255;
+
     /// The moves from `from` to `to`, both within the page.
     pub const fn new(from: PagePoint, to: PagePoint) -> Self {
         Self::by(to.x - from.x, to.y - from.y)
@@ -67,7 +70,7 @@ impl Line {
     }
 
     /// The same for a piece of a line or curve whose ends lie beside the grid's points: by `offsets`, in units of
-    /// 2^-8 steps within ±127, at the start and at the end, along the axis of fewer moves (that of x if both
+    /// 1/255 of a step within ±127, at the start and at the end, along the axis of fewer moves (that of x if both
     /// have as many). So pieces join to a line that is nowhere off by more than half a step.
     ///
     /// `dx` and `dy` are within ±2^21.
@@ -80,7 +83,7 @@ impl Line {
     /// assert_eq!(moves, [UpRight, Right, Right]);
     /// ```
     pub fn beside(dx: i32, dy: i32, offsets: [i8; 2]) -> Self {
-        const UNIT: i32 = 256;
+        const UNIT: i32 = Line::OFFSET_UNIT;
         let mut line = Self::by(dx, dy);
         if offsets == [0; 2] {
             return line;
@@ -217,7 +220,7 @@ mod tests {
                     for (index, direction) in Line::beside(dx, dy, offsets).enumerate() {
                         at = direction.from_point(at);
                         let part = (index + 1) as f64 / f64::from(more.abs());
-                        let [start, end] = offsets.map(|offset| f64::from(offset) / 256.0);
+                        let [start, end] = offsets.map(|offset| f64::from(offset) / 255.0);
                         let line = start + (f64::from(fewer) + end - start) * part;
                         let off = line - f64::from(if dx.abs() > dy.abs() { at.y } else { at.x });
                         assert!(off.abs() <= 0.5, "to {dx},{dy} {offsets:?} at {at:?}: {off}");
