@@ -7,7 +7,8 @@ use penup_client::machines::Board;
 use std::error::Error;
 use std::time::Duration;
 
-const PATIENCE: Duration = Duration::from_secs(60);
+/// How long a board may compute without a word: minutes, on a machine with much else to do.
+const PATIENCE: Duration = Duration::from_secs(300);
 
 /// A board of plain memory with the capacities of `board`: memory decides how far the order of
 /// strokes is improved.
@@ -29,6 +30,11 @@ fn on_the_host(board: Board, lines: &[String]) -> Vec<MachineEventKind> {
         assert_eq!(answer.lines().last(), Some("ok"), "{line}: {answer}");
     }
     bench.finish();
+    // Each pen is put in at once.
+    while bench.heard().contains("then send ~") {
+        bench.say("~");
+        bench.finish();
+    }
     machine_events(&bench.board.trace().changes())
 }
 

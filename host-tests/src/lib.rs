@@ -17,6 +17,7 @@ pub mod convex_any_faces;
 pub mod convex_model;
 pub mod convex_solids;
 pub mod cut_flash;
+pub mod heaviest_jobs;
 pub mod whole_jobs;
 pub mod emulated_jobs;
 pub mod step_edges;

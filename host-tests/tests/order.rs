@@ -3,7 +3,7 @@
 #![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
 use penup::drawing::{Drawing, PagePoint, Segment};
-use penup::order::{Leg, Method, Options, OrderError, Report, Shape, order};
+use penup::order::{EXACT_POINTS, Leg, Method, Options, OrderError, Report, Shape, order};
 use penup::stage::{Aborted, Attention, Scratch, Undisturbed};
 use penup_host_tests::order_reference::Sheet;
 use proptest::prelude::*;
@@ -104,6 +104,19 @@ fn a_lift_is_saved_where_it_is_worth_the_way() {
     assert!(free.0 > cheap.0 && cheap.0 > dear.0, "{free:?} {cheap:?} {dear:?}");
     // One stroke for each of 300 parts.
     assert_eq!(dear.0, 299);
+}
+
+#[test]
+fn very_many_odd_points_are_paired_exactly_only_when_asked() {
+    let dashes = (0..600).map(|dash| vec![(40 * dash, 0), (40 * dash + 30, dash % 7)]);
+    let sheet = Sheet::from_polylines(&dashes.collect::<Vec<_>>());
+    let paired = |method| {
+        let (_, report) =
+            sheet.order(Options { method, effort: 0, ..Options::default() }).expect("fits");
+        assert!(report.odd_points > u32::from(EXACT_POINTS));
+        report.bound > 0
+    };
+    assert!(!paired(Method::Auto) && paired(Method::Exact));
 }
 
 #[test]

@@ -2,7 +2,8 @@
 //!
 //! The point whose second choice is so much worse than its first is given its first choice; so to
 //! the end. Then any two moves give up their ends for each other's while that shortens them.
-//! Nothing is proved of the result.
+//! Nothing is proved of the result. Points are numbered by their x; those too far off by x or y alone
+//! are passed over without a square root.
 
 use super::odd::OddPoints;
 use super::pace::Pace;
@@ -20,6 +21,9 @@ struct Choice {
     second: u16,
 }
 
+/// A point first chooses among those within so far by x, 256 steps, then within twice that, and so on.
+const FIRST_REACH: u32 = 256 << 8;
+
 /// Pairs all of `odd`: `mate[i]` is the partner of odd point `i`.
 pub(super) fn pair(
     odd: &OddPoints<'_>,
@@ -28,11 +32,15 @@ pub(super) fn pair(
     mate: &mut [u16],
 ) -> Result<(), OrderError> {
     mate.fill(NONE);
-    with_regret(odd, scratch, pace, mate)?;
+    with_regret(odd, scratch.reborrow(), pace, mate)?;
     if odd.has_free_ends() {
         free_the_longest(odd, mate);
     }
-    while exchange(odd, pace, mate)? {}
+    let lengths: &mut [u32] = scratch.take(mate.len())?;
+    for (point, (length, &partner)) in (0..).zip(lengths.iter_mut().zip(mate.iter())) {
+        *length = odd.distance(point, partner);
+    }
+    while exchange(odd, lengths, pace, mate)? {}
     Ok(())
 }
 
@@ -42,31 +50,39 @@ fn choose(
     chooser: u16,
     pace: &mut Pace<'_>,
 ) -> Result<Choice, OrderError> {
-    let mut choice = Choice { regret: u32::MAX, first: NONE, second: NONE };
-    let [mut first_distance, mut second_distance] = [u32::MAX; 2];
-    for other in 0..odd.real_count() {
-        if other == chooser || mate[usize::from(other)] != NONE {
-            continue;
+    let mut reach = FIRST_REACH;
+    loop {
+        let among = odd.around(chooser, reach);
+        let is_everyone = among.len() == usize::from(odd.real_count());
+        pace.work(1 + among.len() as u32 / 32)?;
+        let [mut first, mut second] = [(u32::MAX, NONE); 2];
+        for other in among {
+            if other == chooser
+                || mate[usize::from(other)] != NONE
+                || odd.least_distance(chooser, other) >= second.0
+            {
+                continue;
+            }
+            pace.work(1)?;
+            let distance = odd.distance(chooser, other);
+            if distance < first.0 {
+                second = first;
+                first = (distance, other);
+            } else if distance < second.0 {
+                second = (distance, other);
+            }
         }
-        pace.work(1)?;
-        let distance = odd.distance(chooser, other);
-        if distance < first_distance {
-            second_distance = first_distance;
-            choice.second = choice.first;
-            first_distance = distance;
-            choice.first = other;
-        } else if distance < second_distance {
-            second_distance = distance;
-            choice.second = other;
+        // All others are farther off than `reach`.
+        if is_everyone || second.0 <= reach {
+            return Ok(Choice { regret: second.0 - first.0, first: first.1, second: second.1 });
         }
+        reach = reach.saturating_mul(2);
     }
-    choice.regret = second_distance - first_distance;
-    Ok(choice)
 }
 
 fn with_regret(
     odd: &OddPoints<'_>,
-    scratch: &mut Scratch<'_>,
+    mut scratch: Scratch<'_>,
     pace: &mut Pace<'_>,
     mate: &mut [u16],
 ) -> Result<(), OrderError> {
@@ -119,36 +135,54 @@ fn join(mate: &mut [u16], a: u16, b: u16) {
     mate[usize::from(b)] = a;
 }
 
-/// One round of exchanges over all pairs of moves; says whether it shortened anything.
+/// One round of exchanges over all pairs of moves, whose `lengths` stand with both of their points; says
+/// whether it shortened anything.
 fn exchange(
     odd: &OddPoints<'_>,
+    lengths: &mut [u32],
     pace: &mut Pace<'_>,
     mate: &mut [u16],
 ) -> Result<bool, OrderError> {
     let count = odd.count();
     let mut improved = false;
     for a in 0..count {
+        pace.work(1 + u32::from(count - a) / 16)?;
         for c in a + 1..count {
             let (b, d) = (mate[usize::from(a)], mate[usize::from(c)]);
             if b == c || b < a || d < c {
                 continue;
             }
-            pace.work(4)?;
-            let now = odd.distance(a, b) + odd.distance(c, d);
-            let parallel = odd.distance(a, c).saturating_add(odd.distance(b, d));
-            let crossed = odd.distance(a, d).saturating_add(odd.distance(b, c));
-            if parallel < now && parallel <= crossed {
-                join(mate, a, c);
-                join(mate, b, d);
-                improved = true;
-            } else if crossed < now {
-                join(mate, a, d);
-                join(mate, b, c);
-                improved = true;
+            let now = lengths[usize::from(a)] + lengths[usize::from(c)];
+            let parallel = sum_below(odd, [a, c, b, d], now, pace)?;
+            let crossed = sum_below(odd, [a, d, b, c], now, pace)?;
+            if parallel.min(crossed) >= now {
+                continue;
             }
+            let pairs = if parallel <= crossed { [(a, c), (b, d)] } else { [(a, d), (b, c)] };
+            for (from, to) in pairs {
+                join(mate, from, to);
+                lengths[usize::from(from)] = odd.distance(from, to);
+                lengths[usize::from(to)] = lengths[usize::from(from)];
+            }
+            improved = true;
         }
     }
     Ok(improved)
+}
+
+/// The length of two moves, first to second and third to fourth point; any large number if it is not below
+/// `bound`, which is mostly seen without a square root.
+fn sum_below(
+    odd: &OddPoints<'_>,
+    [a, b, c, d]: [u16; 4],
+    bound: u32,
+    pace: &mut Pace<'_>,
+) -> Result<u32, OrderError> {
+    if odd.least_distance(a, b) + odd.least_distance(c, d) >= bound {
+        return Ok(u32::MAX);
+    }
+    pace.work(2)?;
+    Ok(odd.distance(a, b).saturating_add(odd.distance(c, d)))
 }
 
 impl From<crate::stage::Aborted> for OrderError {

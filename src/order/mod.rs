@@ -86,7 +86,7 @@ impl Leg {
 /// How the pen-up moves are chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Method {
-    /// Exact where it fits in memory, else greedy.
+    /// Exact where it fits in memory and is worth its time ([`EXACT_POINTS`]), else greedy.
     #[default]
     Auto,
     /// Greedy with regret (Harrison 5.10.1), then pair exchange.
@@ -94,6 +94,10 @@ pub enum Method {
     /// Minimum-weight perfect matching.
     Exact,
 }
+
+/// [`Method::Auto`] pairs more odd points than this by greed. The exact pairing's work grows faster than their square: a
+/// Cortex-M0+ would take minutes for 2000, and move the pen a hundredth less.
+pub const EXACT_POINTS: u16 = 1000;
 
 /// Whether the pen returns to where it began.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -343,7 +347,10 @@ fn pair_odd(
     let exact = match options.method {
         Method::Greedy => false,
         Method::Exact => true,
-        Method::Auto => matching::scratch_bytes(partners.len()) <= scratch.available_bytes(),
+        Method::Auto => {
+            let fits = matching::scratch_bytes(partners.len()) <= scratch.available_bytes();
+            fits && odd.real_count() <= EXACT_POINTS
+        }
     };
     if exact {
         report.bound += matching::pair(&odd, scratch, pace, partners)?;

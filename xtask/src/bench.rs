@@ -19,11 +19,23 @@ const PAPERS: [[&str; 2]; 7] = [
     ["161", "did not fit"],
 ];
 
-/// Builds the Pico's image, runs it in its emulator, and prints the cycles of each stage (some 5 minutes).
+/// Builds the Pico's image, runs it in its emulator, and prints the cycles of each stage (some 10 minutes).
 pub fn count_cycles() -> Result<()> {
-    set_up::emulator(Board::Pico)?;
-    firmware::check(Board::Pico, &firmware::build(Board::Pico)?)?;
-    let program = ["--package", "penup-host-tests", "--example", "pico_cycles"];
+    run_in_emulators(&[Board::Pico], "pico_cycles")
+}
+
+/// Builds both images and prints how deep their stacks become.
+pub fn deepest_stack() -> Result<()> {
+    run_in_emulators(Board::ALL, "deepest_stack")
+}
+
+/// Builds what `example` runs in emulators, and runs it.
+fn run_in_emulators(boards: &[Board], example: &str) -> Result<()> {
+    for &board in boards {
+        set_up::emulator(board)?;
+        firmware::check(board, &firmware::build(board)?)?;
+    }
+    let program = ["--package", "penup-host-tests", "--example", example];
     run(cargo().current_dir(crate::root()).args(["run", "--quiet", "--release"]).args(program))
 }
 

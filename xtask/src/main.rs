@@ -60,6 +60,8 @@ enum Task {
         #[arg(long, conflicts_with = "board")]
         motion: bool,
     },
+    /// Prints how deep the stacks of the emulated boards become over the heaviest jobs (some 2 minutes).
+    Stack,
     /// Draws the figures of the papers into docs/gallery.
     Gallery,
     /// Repeats Harrison's experiments (his chapter 7), counted in instructions.
@@ -108,6 +110,7 @@ fn carry_out() -> Result<()> {
         Some(Task::Bench { motion: true, .. }) => bench::count_motion()?,
         Some(Task::Bench { board: Board::Lm3s6965, .. }) => bench::count()?,
         Some(Task::Bench { board: Board::Pico, .. }) => bench::count_cycles()?,
+        Some(Task::Stack) => bench::deepest_stack()?,
         Some(Task::Gallery) => gallery::make()?,
         Some(Task::Experiments) => experiments::repeat()?,
         Some(Task::Scenes { count }) => test::random_scenes(count)?,

@@ -13,10 +13,13 @@
 //! What is refused: an image that does not exist, an emulator that does not start or ends by itself, a
 //! trace that makes no sense. Each error carries what the emulator said.
 
+mod debugger;
 mod log;
 mod pico;
 mod pins;
 mod process;
+mod running;
+mod stack;
 mod trace;
 
 use std::io::{self, Read, Write};
@@ -26,6 +29,7 @@ use std::time::Duration;
 
 pub use pico::{Pico, PicoByUsb};
 pub use pins::{Machine, MachineEvent, MachineEventKind, Pin, PinChange};
+pub use stack::Stack;
 
 use process::Process;
 use trace::{Trace, TraceError};
@@ -76,11 +80,13 @@ pub struct Options {
     /// The time of each instruction is 2 to this power, in nanoseconds. 4 is 16 ns: the LM3S6965 at
     /// 50 MHz with four instructions in five cycles.
     pub instruction_shift: u8,
+    /// Whether [`Emulator::stack`] is to be known.
+    pub paints_stack: bool,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { instruction_shift: 4 }
+        Self { instruction_shift: 4, paints_stack: false }
     }
 }
 
@@ -154,6 +160,14 @@ impl Emulator {
         let (process, line) = Process::start(image, options, PATIENCE)?;
         line.set_nodelay(true)?;
         Ok(Self { process, line, received: 0 })
+    }
+
+    /// The deepest stack since the boot; none unless [`Options::paints_stack`].
+    ///
+    /// # Errors
+    /// QEMU has ended.
+    pub fn stack(&mut self) -> Result<Option<Stack>, EmulatorError> {
+        self.process.stack()
     }
 
     /// The process number of QEMU.

@@ -9,10 +9,11 @@
 // loop hangs from that cycle on, 5 a byte for USB, 6 the USB host is plugged in (1), takes
 // nothing more (2), takes again (3); 7 a switch is fitted to a pin, which closes where its axis has gone to so many
 // steps (+ 2^40) or below, and bounces; 8 a function (its number, its
-// address in the cycle's place) is timed. Out: 0 a byte
+// address in the cycle's place) is timed; 9 how much of the stack is unused is asked. Out: 0 a byte
 // of the serial line, 1 a pin's new level, 2 the time, 3 a byte of the log, 4 the chip was reset (0 by
 // the loss of power, 1 by the watchdog), 5 a byte of USB, 6 a timed function has
-// returned (its number, the cycles in the cycle's place).
+// returned (its number, the cycles in the cycle's place), 7 so many bytes of the stack have not been used since
+// the chip began (in the cycle's place).
 //
 // rp2040js has no boot ROM: here is one, of the functions that the image asks for. Each is a
 // breakpoint that this program serves. Flash takes as long as a Pico's.
@@ -33,6 +34,10 @@ const SLICE = 400_000;
 const MILLISECOND = 125_000;
 const FLASH = 0x10000000;
 const VECTORS = 0x10000100;
+/** The stack lies at its start. */
+const RAM = 0x20000000;
+/** What an unused byte of the stack holds. */
+const PAINT = 0xa5;
 
 // --- Records out ---------------------------------------------------------------------------------
 
@@ -50,6 +55,8 @@ const SWITCH = 7;
 const SWITCH_ZERO = 2 ** 40;
 const TIMED = 8;
 const RETURNED = 6;
+const STACK = 9;
+const UNUSED_STACK = 7;
 const output = Buffer.alloc(1 << 16);
 let filled = 0;
 
@@ -161,6 +168,7 @@ function start(flash) {
   core.VTOR = VECTORS;
   core.SP = chip.readUint32(VECTORS);
   core.PC = chip.readUint32(VECTORS + 4) & ~1;
+  for (let at = RAM; at < core.SP; at++) chip.writeUint8(at, PAINT);
   mendFlags();
   mendVectors();
   watchPins();
@@ -177,6 +185,13 @@ function start(flash) {
     watchdog.alarm.enable = false;
     watchdogDue = true;
   };
+}
+
+function unusedStack() {
+  const end = chip.readUint32(VECTORS);
+  let at = RAM;
+  while (at < end && chip.readUint8(at) === PAINT) at++;
+  return at - RAM;
 }
 
 // --- The USB host --------------------------------------------------------------------------------
@@ -436,6 +451,7 @@ process.stdin.on('data', (data) => {
       switches[axis] = { pin: entry.value, at: entry.cycle - SWITCH_ZERO, closed: false };
       lookAtSwitch(axis);
     } else if (rest[at] === USB) usbBytes.push(entry.value);
+    else if (rest[at] === STACK) report(UNUSED_STACK, 0, unusedStack());
     else if (rest[at] === CUT_FLASH) flashBudget = entry.cycle;
     else events.push({ what: rest[at], ...entry });
   }

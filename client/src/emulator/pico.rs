@@ -4,14 +4,15 @@ use std::collections::VecDeque;
 use std::io::{self, BufRead, BufReader, PipeWriter, Read, Write};
 use std::path::Path;
 use std::process::{Child, ChildStderr, ChildStdin, ChildStdout, Command, Stdio};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, mpsc};
-use std::thread::{self, JoinHandle};
+use std::sync::{Arc, mpsc};
 use std::time::Duration;
-use std::{fmt, fs};
+use std::{fmt, fs, thread};
 
 use object::{Object, ObjectSymbol};
 
-use super::process::{NOT_FOUND, quitting_with_parent};
+use super::process::quitting_with_parent;
+use super::running::{Running, Shared};
+use super::stack::{self, Stack};
 use super::{EmulatedBoard, EmulatorError, Pin, PinChange, log};
 
 const PROGRAM: &str = "node";
@@ -29,17 +30,11 @@ const SAID_LINES: usize = 20;
 
 /// A running Pico. Dropping it ends its process.
 pub struct Pico {
-    child: Child,
+    running: Running,
     input: ChildStdin,
-    shared: Arc<Shared>,
-    readers: Vec<JoinHandle<()>>,
-}
-
-/// What the reading threads tell.
-#[derive(Default)]
-struct Shared {
-    state: Mutex<State>,
-    changed: Condvar,
+    shared: Arc<Shared<State>>,
+    /// Bytes of the stack.
+    stack: usize,
 }
 
 #[derive(Default)]
@@ -49,21 +44,16 @@ struct State {
     timed: Vec<(u8, u64)>,
     pins: Vec<PinChange>,
     cycles: u64,
+    /// Bytes of the stack that are not used, as last asked.
+    unused_stack: Option<u64>,
     log: Vec<String>,
     said: VecDeque<String>,
     ended: bool,
 }
 
-impl Shared {
-    /// A reader that panicked has left nothing half done: each takes whole records or lines.
-    fn lock(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
 impl fmt::Debug for Pico {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_tuple("Pico").field(&self.child.id()).finish()
+        self.running.fmt(f)
     }
 }
 
@@ -80,7 +70,7 @@ impl Pico {
         }
         let table = log::table(&elf)?;
         let command = command(&flashed, log_address(&elf)?);
-        let shared = Arc::<Shared>::default();
+        let shared = Arc::<Shared<State>>::default();
         let (log_reader, log_writer) = io::pipe()?;
         let logged = Arc::clone(&shared);
         let logger = thread::spawn(move || {
@@ -102,7 +92,8 @@ impl Pico {
         };
         let listened = Arc::clone(&shared);
         let listener = thread::spawn(move || listen(stderr, &listened));
-        let mut pico = Self { child, input, shared, readers: vec![logger, reader, listener] };
+        let running = Running::new(child, vec![logger, reader, listener]);
+        let mut pico = Self { running, input, shared, stack: stack::size(&elf)? };
         pico.wait_for_boot()?;
         Ok(pico)
     }
@@ -244,11 +235,7 @@ impl Pico {
         patience: Duration,
     ) -> io::Result<usize> {
         let waits = |state: &mut State| port(state).is_empty() && !state.ended;
-        let (mut state, _) = self
-            .shared
-            .changed
-            .wait_timeout_while(self.shared.lock(), patience, waits)
-            .unwrap_or_else(PoisonError::into_inner);
+        let mut state = self.shared.wait_while(patience, waits);
         if port(&mut state).is_empty() && state.ended {
             return Err(io::ErrorKind::BrokenPipe.into());
         }
@@ -263,32 +250,25 @@ impl Pico {
     /// Waits for the first sign of life.
     fn wait_for_boot(&mut self) -> Result<(), EmulatorError> {
         let waits = |state: &mut State| state.cycles == 0 && !state.ended;
-        let (state, _) = self
-            .shared
-            .changed
-            .wait_timeout_while(self.shared.lock(), super::PATIENCE, waits)
-            .unwrap_or_else(PoisonError::into_inner);
-        if state.cycles > 0 {
+        if self.shared.wait_while(super::PATIENCE, waits).cycles > 0 {
             return Ok(());
         }
-        drop(state);
-        if self.child.try_wait()?.is_some_and(|status| status.code() == Some(NOT_FOUND)) {
-            let source = io::ErrorKind::NotFound.into();
-            return Err(EmulatorError::NotInstalled { program: PROGRAM, source });
-        }
-        // All that it has said is in when its readers have ended.
-        self.end();
+        self.running.has_ended(PROGRAM)?;
+        self.running.end();
         Err(EmulatorError::Ended { said: self.said() })
     }
 
-    fn end(&mut self) {
-        // Both fail only if it has ended by itself.
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-        for reader in self.readers.drain(..) {
-            // A reader's panic has been printed, and there is nothing left to read.
-            let _ = reader.join();
-        }
+    /// The deepest stack since the board last started.
+    ///
+    /// # Errors
+    /// The emulator has ended.
+    pub fn stack(&mut self) -> Result<Stack, EmulatorError> {
+        self.shared.lock().unused_stack = None;
+        self.tell(STACK, 0, 0)?;
+        let waits = |state: &mut State| state.unused_stack.is_none() && !state.ended;
+        let unused = self.shared.wait_while(super::PATIENCE, waits).unused_stack;
+        let unused = unused.ok_or_else(|| EmulatorError::Ended { said: self.said() })?;
+        Ok(Stack { size: self.stack, deepest: self.stack - (unused as usize).min(self.stack) })
     }
 }
 
@@ -319,12 +299,6 @@ impl EmulatedBoard for PicoByUsb {
 
     fn said(&self) -> String {
         self.0.said()
-    }
-}
-
-impl Drop for Pico {
-    fn drop(&mut self) {
-        self.end();
     }
 }
 
@@ -385,7 +359,7 @@ type Spawned = io::Result<(Child, ChildStdin, ChildStderr)>;
 fn spawn_and_read(
     mut command: Command,
     sender: &mpsc::Sender<Spawned>,
-    shared: &Shared,
+    shared: &Shared<State>,
     log: PipeWriter,
 ) {
     let (spawned, stdout) = match spawn(&mut command) {
@@ -408,7 +382,7 @@ fn spawn(command: &mut Command) -> io::Result<(Child, ChildStdin, ChildStdout, C
 }
 
 /// Keeps the last lines of what the emulator says.
-fn listen(stderr: ChildStderr, shared: &Shared) {
+fn listen(stderr: ChildStderr, shared: &Shared<State>) {
     for line in BufReader::new(stderr).lines().map_while(Result::ok) {
         let mut state = shared.lock();
         if state.said.len() == SAID_LINES {
@@ -437,6 +411,8 @@ const USB_HOST: u8 = 6;
 const SWITCH: u8 = 7;
 const TIMED: u8 = 8;
 const RETURNED: u8 = 6;
+const STACK: u8 = 9;
+const UNUSED_STACK: u8 = 7;
 /// Where the emulator's axes begin.
 const SWITCH_ZERO: i64 = 1 << 40;
 
@@ -453,7 +429,7 @@ impl Record {
 }
 
 /// Takes in what the emulator tells until it ends.
-fn read(mut stdout: ChildStdout, shared: &Shared, mut log: PipeWriter) {
+fn read(mut stdout: ChildStdout, shared: &Shared<State>, mut log: PipeWriter) {
     let mut buffer = vec![0; 1 << 16];
     let mut filled = 0;
     let mut servo = Servo::default();
@@ -466,12 +442,13 @@ fn read(mut stdout: ChildStdout, shared: &Shared, mut log: PipeWriter) {
         state.ended = count == 0;
         for bytes in buffer[..whole].as_chunks().0 {
             let record = Record::from_bytes(*bytes);
-            if record.what != RETURNED {
+            if record.what != RETURNED && record.what != UNUSED_STACK {
                 state.cycles = record.cycle;
             }
             match record.what {
                 SERIAL => state.serial.push_back(record.value),
                 RETURNED => state.timed.push((record.value, record.cycle)),
+                UNUSED_STACK => state.unused_stack = Some(record.cycle),
                 USB => state.usb.push_back(record.value),
                 PIN => state.pins.extend(servo.pin_change(&record)),
                 LOG => logged.push(record.value),
@@ -479,7 +456,7 @@ fn read(mut stdout: ChildStdout, shared: &Shared, mut log: PipeWriter) {
             }
         }
         drop(state);
-        shared.changed.notify_all();
+        shared.tell();
         // The log's reader ends with this writer, not before.
         let _ = log.write_all(&logged);
         if count == 0 {

@@ -4,26 +4,22 @@ use std::io::{self, BufRead, BufReader, Read};
 use std::net::{TcpListener, TcpStream};
 use std::path::Path;
 use std::process::{Child, ChildStderr, ChildStdout, Command, Stdio};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, mpsc};
-use std::thread::{self, JoinHandle};
+use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
-use std::{fmt, fs};
+use std::{fs, thread};
 
+use super::debugger::Debugger;
+use super::running::{Running, Shared};
+use super::stack::{self, Stack};
 use super::trace::{EVENTS, Trace, TraceError};
 use super::{EmulatorError, Options, log};
 
 /// A running QEMU. Dropping it ends it.
 pub struct Process {
-    child: Child,
-    shared: Arc<Shared>,
-    readers: Vec<JoinHandle<()>>,
-}
-
-/// What the reading threads tell.
-#[derive(Default)]
-struct Shared {
-    state: Mutex<State>,
-    changed: Condvar,
+    running: Running,
+    shared: Arc<Shared<State>>,
+    /// With the size of the stack, if that is painted.
+    debugger: Option<(Debugger, usize)>,
 }
 
 #[derive(Default)]
@@ -34,16 +30,9 @@ struct State {
     ended: bool,
 }
 
-impl Shared {
-    /// A reader that panicked has left nothing half done: each takes whole lines.
-    fn lock(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-impl fmt::Debug for Process {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_tuple("Process").field(&self.child.id()).finish()
+impl std::fmt::Debug for Process {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.running.fmt(f)
     }
 }
 
@@ -58,7 +47,7 @@ impl Process {
         let table = log::table(&bytes)?;
         let listener = TcpListener::bind("127.0.0.1:0")?;
         let port = listener.local_addr()?.port();
-        let shared = Arc::<Shared>::default();
+        let shared = Arc::<Shared<State>>::default();
 
         let (sender, started) = mpsc::channel();
         let command = command(image, options, port);
@@ -72,12 +61,30 @@ impl Process {
         };
         let logged = Arc::clone(&shared);
         let logger = thread::spawn(move || read_log(table.as_ref(), stdout, &logged));
-        let mut process = Self { child, shared, readers: vec![tracer, logger] };
+        let running = Running::new(child, vec![tracer, logger]);
+        let mut process = Self { running, shared, debugger: None };
+        // In the order in which QEMU is told of them.
         let line = process.connect(&listener, patience)?;
+        if options.paints_stack {
+            let mut debugger = Debugger::new(process.connect(&listener, patience)?);
+            let size = stack::size(&bytes)?;
+            debugger.write(stack::RAM, &vec![stack::PAINT; size])?;
+            debugger.run()?;
+            process.debugger = Some((debugger, size));
+        }
         Ok((process, line))
     }
 
-    /// Waits for QEMU to open the serial line.
+    /// The deepest stack since the boot; none if it was not painted. The board stands while it is looked at.
+    pub fn stack(&mut self) -> Result<Option<Stack>, EmulatorError> {
+        let Some((debugger, size)) = &mut self.debugger else { return Ok(None) };
+        debugger.stop()?;
+        let bytes = debugger.read(stack::RAM, *size)?;
+        debugger.run()?;
+        Ok(Some(Stack::of(&bytes)))
+    }
+
+    /// Waits for QEMU to open a line.
     fn connect(
         &mut self,
         listener: &TcpListener,
@@ -94,14 +101,9 @@ impl Process {
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
                 Err(error) => return Err(error.into()),
             }
-            let ended = self.child.try_wait()?;
-            if ended.is_some_and(|status| status.code() == Some(NOT_FOUND)) {
-                return Err(not_installed(io::ErrorKind::NotFound.into()));
-            }
-            if ended.is_some() || Instant::now() > deadline {
-                // All that it has said is in when its readers have ended.
-                self.end();
-                return Err(self.ended());
+            if self.running.has_ended(PROGRAM)? || Instant::now() > deadline {
+                self.running.end();
+                return Err(EmulatorError::Ended { said: self.said() });
             }
             thread::sleep(Duration::from_millis(2));
         }
@@ -116,11 +118,7 @@ impl Process {
     ) -> Result<T, EmulatorError> {
         let waits =
             |state: &mut State| state.error.is_none() && !state.ended && !ready(&state.trace);
-        let (mut state, _) = self
-            .shared
-            .changed
-            .wait_timeout_while(self.shared.lock(), patience, waits)
-            .unwrap_or_else(PoisonError::into_inner);
+        let mut state = self.shared.wait_while(patience, waits);
         if let Some(error) = state.error.take() {
             return Err(error.into());
         }
@@ -140,27 +138,7 @@ impl Process {
     }
 
     pub fn id(&self) -> u32 {
-        self.child.id()
-    }
-
-    fn ended(&self) -> EmulatorError {
-        EmulatorError::Ended { said: self.said() }
-    }
-
-    fn end(&mut self) {
-        // Both fail only if it has ended by itself.
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-        for reader in self.readers.drain(..) {
-            // A reader's panic has been printed, and there is nothing left to read.
-            let _ = reader.join();
-        }
-    }
-}
-
-impl Drop for Process {
-    fn drop(&mut self) {
-        self.end();
+        self.running.id()
     }
 }
 
@@ -187,6 +165,14 @@ fn command(image: &Path, options: Options, port: u16) -> Command {
         command.args(["-trace", event]);
     }
     command.arg("-kernel").arg(image);
+    if options.paints_stack {
+        // It stands until the debugger lets it run.
+        command
+            .arg("-S")
+            .arg("-chardev")
+            .arg(format!("socket,id=gdb,host=127.0.0.1,port={port},server=off,nodelay=on"))
+            .args(["-gdb", "chardev:gdb"]);
+    }
     command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
     // Ctrl-C at the terminal is for this process, which ends QEMU when it is done with it.
     #[cfg(unix)]
@@ -210,7 +196,7 @@ pub(super) const NOT_FOUND: i32 = 127;
 
 type Spawned = io::Result<(Child, ChildStdout)>;
 
-fn spawn_and_trace(mut command: Command, sender: &mpsc::Sender<Spawned>, shared: &Shared) {
+fn spawn_and_trace(mut command: Command, sender: &mpsc::Sender<Spawned>, shared: &Shared<State>) {
     let (spawned, stderr) = match spawn(&mut command) {
         Ok((child, stdout, stderr)) => (Ok((child, stdout)), Some(stderr)),
         Err(error) => (Err(error), None),
@@ -231,7 +217,7 @@ fn spawn(command: &mut Command) -> io::Result<(Child, ChildStdout, ChildStderr)>
 }
 
 /// Takes the trace in until QEMU ends.
-fn read_trace(stderr: ChildStderr, shared: &Shared) {
+fn read_trace(stderr: ChildStderr, shared: &Shared<State>) {
     let mut lines = BufReader::with_capacity(1 << 16, stderr);
     let mut line = String::new();
     loop {
@@ -247,7 +233,7 @@ fn read_trace(stderr: ChildStderr, shared: &Shared) {
         drop(state);
         // Waking at every line would cost more than reading it; the last one read wakes.
         if count == 0 || !lines.buffer().contains(&b'\n') {
-            shared.changed.notify_all();
+            shared.tell();
         }
         if count == 0 {
             return;
@@ -256,7 +242,7 @@ fn read_trace(stderr: ChildStderr, shared: &Shared) {
 }
 
 /// Takes the log in until QEMU ends. Without a table it is only read away, lest QEMU waits.
-fn read_log(table: Option<&defmt_decoder::Table>, mut stdout: ChildStdout, shared: &Shared) {
+fn read_log(table: Option<&defmt_decoder::Table>, mut stdout: ChildStdout, shared: &Shared<State>) {
     match table {
         Some(table) => log::decode(table, stdout, |line| shared.lock().log.push(line)),
         None => {

@@ -1,0 +1,115 @@
+//! The jobs that need the most of a board's stack, and how much they leave of it.
+
+use crate::emulated_jobs::Line;
+use crate::whole_jobs::job_lines;
+use penup_client::emulator::{
+    EmulatedBoard, Emulator, EmulatorError, Options, Pico, Stack, image_path,
+};
+use std::error::Error;
+use std::thread::sleep;
+use std::time::Duration;
+
+/// What a job is called, and its lines.
+type Job = (&'static str, Vec<String>);
+
+/// `lattice` is as large a lattice as the board is to see. Little effort: more of it is longer, not deeper.
+fn jobs(lattice: &str) -> Vec<Job> {
+    let page = "$page=40x40";
+    let of = |scene: &str, settings: &[&str]| {
+        job_lines(scene, &[&[page, "$margin=2"], settings].concat())
+    };
+    let typed = |lines: &[&str]| lines.iter().map(|line| (*line).to_owned()).collect();
+    vec![
+        (
+            "lists and settings",
+            typed(&["$", "$$", "$I", "$options", "$130=300", "$204=50", "$effort=200"]),
+        ),
+        ("hidden lines", of(lattice, &["$see=faces"])),
+        (
+            "hidden lines dotted, with an eye among them",
+            of("interpen.obj", &["$hidden=dotted", "$seams=on", "$behind=clip", "$eye=1,2,3"]),
+        ),
+        ("merged blocks, creases", of("notched.obj", &["$blocks=merged", "$crease=30"])),
+        ("a convex solid from its vertices", of("eighteen.obj", &["$see=vertices"])),
+        ("a convex solid from its edges", of("dodecahedron.obj", &["$see=edges"])),
+        ("curves on a plan", of("isobars.obj", &["$see=faces", "$fit=on"])),
+        ("curves in space", of("isobars.obj", &["$projection=isometric"])),
+        ("an editing session", of("structure.txt", &["$list=v", "$model", "$undo"])),
+        (
+            "a title",
+            of("octahedron.obj", &["$see=faces", "$title=\\xC9tude \\u{2013} 3", "$title-size=3"]),
+        ),
+        ("greedy pairs", of("text300.obj", &["$title=", "$fit=on", "$order=greedy"])),
+        ("the last job again", typed(&["$again"])),
+        ("arcs", typed(&["$204=0", "G0X20Y20", "M3", "G3I5J0", "G2X30Y30R9", "M5"])),
+        ("homing", typed(&["$22=1", "$130=60", "$131=60", "$H", "$X", "$22=0"])),
+        ("what is refused", typed(&["v 1 1e99 x", "f 1 2 99", "G7", "$130=0", "$eye=1", "$pen=x"])),
+    ]
+}
+
+/// Runs all jobs on the LM3S6965; tells how deep its stack was after each.
+///
+/// # Errors
+/// The emulator fails.
+pub fn on_the_lm3s6965(tell: impl FnMut(&str, Stack)) -> Result<(), Box<dyn Error>> {
+    let options = Options { paints_stack: true, ..Options::default() };
+    let emulator = Emulator::start(&image_path("lm3s6965"), options)?;
+    let line = Line::to(Box::new(emulator))?;
+    let stack = |emulator: &mut Emulator| {
+        let painted = emulator.stack()?;
+        painted.ok_or(EmulatorError::Ended { said: "the stack was not painted".into() })
+    };
+    run_all(line, "lattice5.obj", |_| Ok(()), stack, tell)
+}
+
+/// Runs all jobs on the Pico, whose USB host asks for the status all the time.
+///
+/// # Errors
+/// The emulator fails.
+pub fn on_the_pico(tell: impl FnMut(&str, Stack)) -> Result<(), Box<dyn Error>> {
+    let mut line = Line::to(Box::new(Pico::start(&image_path("pico"))?))?;
+    line.emulator.plug_usb_in()?;
+    let ask_by_usb = |pico: &mut Pico| {
+        pico.send_by_usb(b"?")?;
+        while pico.receive_by_usb(&mut [0; 256], Duration::ZERO)? > 0 {}
+        Ok(())
+    };
+    run_all(line, "lattice2.obj", ask_by_usb, Pico::stack, tell)
+}
+
+fn run_all<E: EmulatedBoard>(
+    mut line: Line<E>,
+    lattice: &str,
+    mut meanwhile: impl FnMut(&mut E) -> std::io::Result<()>,
+    mut stack: impl FnMut(&mut E) -> Result<Stack, EmulatorError>,
+    mut tell: impl FnMut(&str, Stack),
+) -> Result<(), Box<dyn Error>> {
+    for (name, lines) in jobs(lattice) {
+        for text in [String::from("$clear")].into_iter().chain(lines) {
+            line.emulator.send(format!("{text}\n").as_bytes())?;
+            let asks = text == "$plot";
+            loop {
+                if asks {
+                    line.emulator.send(b"?")?;
+                    meanwhile(&mut line.emulator)?;
+                    sleep(Duration::from_millis(20));
+                }
+                let heard = line.hear()?;
+                if heard == "ok" || heard.starts_with("error:") {
+                    break;
+                }
+            }
+        }
+        // Draws some of it, held once, and gives the rest up.
+        for byte in [b'?', b'?', b'!', b'?', b'~', b'?', b'?', 0x18] {
+            line.emulator.send(&[byte])?;
+            meanwhile(&mut line.emulator)?;
+            sleep(Duration::from_millis(20));
+        }
+        line.hear_greeting()?;
+        while !line.status()?.contains("<Idle") {}
+        line.emulator.pin_changes()?;
+        tell(name, stack(&mut line.emulator)?);
+    }
+    Ok(())
+}
