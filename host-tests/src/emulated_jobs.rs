@@ -1,7 +1,7 @@
 //! Whole jobs on emulated boards, and the same jobs on the host.
 
 use crate::whole_jobs::{Bench, job_lines, machine_events};
-use penup::plotter::{Lm3s6965Memory, NO_MOVES, PicoMemory};
+use penup::plotter::{Lm3s6965Memory, NO_MOVES, NO_MOVES_OF_PICO, PicoMemory};
 use penup_client::emulator::{EmulatedBoard, Machine, MachineEventKind};
 use penup_client::machines::Board;
 use std::error::Error;
@@ -13,10 +13,13 @@ const PATIENCE: Duration = Duration::from_secs(300);
 /// A board of plain memory with the capacities of `board`: memory decides how far the order of
 /// strokes is improved.
 pub fn bench_like(board: Board) -> Bench {
-    let blocks = Box::leak(Box::new(NO_MOVES));
     let mut bench = Bench::with_memory(match board {
-        Board::Lm3s6965 => Box::leak(Box::new(Lm3s6965Memory::new())).lend(blocks),
-        Board::Pico => Box::leak(Box::new(PicoMemory::new())).lend(blocks),
+        Board::Lm3s6965 => {
+            Box::leak(Box::new(Lm3s6965Memory::new())).lend(Box::leak(Box::new(NO_MOVES)))
+        }
+        Board::Pico => {
+            Box::leak(Box::new(PicoMemory::new())).lend(Box::leak(Box::new(NO_MOVES_OF_PICO)))
+        }
     });
     bench.heard();
     bench

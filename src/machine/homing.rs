@@ -261,7 +261,7 @@ impl Machine<'_> {
                 Ok(())
             })
         } else {
-            self.push(Target { point, ink: None }, PathLength::MAX)
+            self.push(Target { point, ink: None }, PathLength::MAX).map(|_| ())
         };
         if pushed.is_err() {
             self.alarm(Alarm::HomingFailed(homing.axis));

@@ -45,7 +45,7 @@ impl Machine<'_> {
         while self.is_moving() {
             self.read_targets(path);
             let ahead = self.runner.ticks().wrapping_sub(self.pins.ticks());
-            if queue.room() < Runner::ROOM || ahead >= self.greatest_ahead() {
+            if queue.room() < Runner::ROOM || self.is_far_enough(ahead) {
                 return;
             }
             match self.runner.produce(queue) {
@@ -85,12 +85,11 @@ impl Machine<'_> {
         ) || self.homing.is_some_and(|homing| !homing.stands)
     }
 
-    fn greatest_ahead(&self) -> u32 {
-        // Less would slow the machine whenever the main loop is late by that much.
-        let stopping = self.runner.stopping_ticks().saturating_add(LATE_TICKS);
+    fn is_far_enough(&self, ahead: u32) -> bool {
         // A switch is to stop the machine soon.
-        let ahead = if self.homing.is_some() { LATE_TICKS } else { self.ahead_ticks };
-        ahead.max(stopping)
+        let enough = if self.homing.is_some() { LATE_TICKS } else { self.ahead_ticks };
+        // Less than it takes to stop would slow the machine whenever the main loop is late by that much.
+        ahead >= enough && ahead >= self.runner.stopping_ticks().saturating_add(LATE_TICKS)
     }
 
     fn stand(&mut self, progress: Progress) {

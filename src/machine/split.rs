@@ -10,6 +10,7 @@ use crate::step::Pattern;
 pub(super) struct Split {
     from: PagePoint,
     to: PagePoint,
+    length: PathLength,
     /// How much of its length is done.
     place: PathLength,
     /// Where it is cut, if it must be, and the last of these cuts behind it.
@@ -28,21 +29,27 @@ impl Split {
 }
 
 impl Machine<'_> {
-    /// Appends a move, not faster than a stopping distance, in pieces.
+    /// Appends a move, not faster than a stopping distance, in pieces. Says how long it is.
     ///
     /// # Errors
     /// See [`PushError`]; nothing is appended then.
-    pub(super) fn push(&mut self, target: Target, limit: PathLength) -> Result<(), PushError> {
+    pub(super) fn push(
+        &mut self,
+        target: Target,
+        limit: PathLength,
+    ) -> Result<PathLength, PushError> {
         let Target { point: to, ink } = target;
         if !self.has_room() {
             return Err(PushError::Full);
         }
         let from = self.runner.page_end();
-        self.runner.limits().length(to.x - from.x, to.y - from.y).ok_or(PushError::TooLong)?;
+        let (dx, dy) = (to.x - from.x, to.y - from.y);
+        let length = self.runner.limits().length(dx, dy).ok_or(PushError::TooLong)?;
         let cuts = self.settings.kinematics().cuts(from, to).map(|cuts| (cuts, cuts.start()));
-        self.split = Some(Split { from, to, place: PathLength::ZERO, cuts, dot: 0, ink, limit });
+        let place = PathLength::ZERO;
+        self.split = Some(Split { from, to, length, place, cuts, dot: 0, ink, limit });
         self.push_pieces();
-        Ok(())
+        Ok(length)
     }
 
     /// Appends the pieces for which there is room.
@@ -50,12 +57,10 @@ impl Machine<'_> {
         while let Some(split) = self.split
             && !self.runner.is_full()
         {
-            let Split { from, to, place, mut cuts, dot, mut ink, limit } = split;
+            let Split { from, to, length, place, mut cuts, dot, mut ink, limit } = split;
             let mut next_dot = dot;
             let way = (to.x - from.x, to.y - from.y);
             let build = self.settings.kinematics();
-            // The move was measured before.
-            let length = self.runner.limits().length(way.0, way.1).unwrap_or_default();
             let (mut end, mut is_gap) = (length.to_bits(), false);
             if let Some((cuts, cut)) = &mut cuts {
                 let next = cuts.next(*cut);

@@ -69,6 +69,11 @@ impl Machine<'_> {
         }
     }
 
+    /// How many moves are planned ahead, at most.
+    pub fn moves_ahead(&self) -> usize {
+        self.runner.capacity()
+    }
+
     /// Whether another move can be appended now.
     pub fn has_room(&self) -> bool {
         self.split.is_none() && !self.runner.is_full()
@@ -157,15 +162,11 @@ impl Machine<'_> {
 
     /// Its length, 2^-18 mm.
     fn append(&mut self, target: Target, feed: Option<Value>) -> Result<u64, MachineError> {
-        let (from, to) = (self.runner.page_end(), target.point);
-        let limits = self.runner.limits();
-        let too_long = MachineError::MoveTooLong { target: 0 };
-        let length = limits.length(to.x - from.x, to.y - from.y).ok_or(too_long)?;
-        let limit = feed.map_or(PathLength::MAX, |feed| limits.feed(feed));
+        let limit = feed.map_or(PathLength::MAX, |feed| self.runner.limits().feed(feed));
         match self.push(target, limit) {
-            Ok(()) => Ok(length.to_bits().into()),
+            Ok(length) => Ok(length.to_bits().into()),
             Err(PushError::Full) => Err(MachineError::State(self.state)),
-            Err(PushError::TooLong) => Err(too_long),
+            Err(PushError::TooLong) => Err(MachineError::MoveTooLong { target: 0 }),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The block in work: its moves, and how far they are.
 
-use super::emitter::whole_ticks;
+use super::emitter::Train;
 use super::lookahead::BlockKind;
 use super::profile::Slice;
 use super::{Block, PathLength};
@@ -28,7 +28,7 @@ pub(super) struct Course {
     /// From there to where the next move is due.
     pub(super) to_next: u64,
     /// The slice in work begins at `place`.
-    pub(super) slice: Option<Slice>,
+    pub(super) slice: Option<SliceMoves>,
 }
 
 impl Course {
@@ -94,20 +94,39 @@ impl Course {
         PathLength::from_bits((self.room() >> 14) as u32)
     }
 
-    /// The next moves that fall into `slice`, as many as there is place for: puts the time of each, in
-    /// whole ticks, into `times` if the slice begins at `start`, and says how many they are.
-    pub(super) fn next_times(&mut self, slice: Slice, start: u32, times: &mut [u32]) -> usize {
-        let Some(room) = u64::from(slice.distance).checked_sub(self.to_next + 1) else {
-            return 0;
-        };
-        // Below 1 mm, or 2^32: the settings allow no longer steps.
-        let move_length = (self.move_length as u32).max(1);
-        // Less than the slice.
-        let (room, first) = (room as u32, self.to_next as u32);
-        let count = times.len().min((room / move_length) as usize + 1);
-        SliceClock::new(slice).times(start, first, move_length, &mut times[..count]);
-        self.to_next += u64::from(move_length) * count as u64;
-        count
+    /// Takes the next slice into work.
+    pub(super) fn begin_slice(&mut self, slice: Slice) {
+        let mut moves = SliceMoves { slice, left: 0, due: 0, interval: 0 };
+        if let Some(room) = u64::from(slice.distance).checked_sub(self.to_next + 1) {
+            // Below 1 mm, or 2^32: the settings allow no longer steps.
+            let move_length = (self.move_length as u32).max(1);
+            // Less than the slice.
+            let (room, first) = (room as u32, self.to_next as u32);
+            // The length of a move is rounded down, which leaves a rest of nothing behind the last.
+            moves.left = (room / move_length + 1).min(self.line.remaining());
+            let clock = SliceClock::new(slice);
+            moves.due = clock.time_of(first);
+            moves.interval = clock.time_of(move_length.min(slice.distance));
+        }
+        self.slice = Some(moves);
+    }
+
+    /// The slice in work is done.
+    pub(super) fn end_slice(&mut self, slice: Slice) {
+        self.place += u64::from(slice.distance);
+        // What is behind the last move is a rest of nothing.
+        self.to_next = self.to_next.saturating_sub(slice.distance.into());
+        self.slice = None;
+    }
+
+    /// So many moves of the slice in work are made.
+    pub(super) fn advance(&mut self, count: usize) {
+        self.moves_done += count as u32;
+        self.to_next += self.move_length * count as u64;
+        if let Some(moves) = &mut self.slice {
+            moves.left = moves.left.saturating_sub(count as u32);
+            moves.due = moves.due.wrapping_add(moves.interval.wrapping_mul(count as u32));
+        }
     }
 
     /// Begins the next piece of a dotted line.
@@ -119,32 +138,45 @@ impl Course {
     }
 }
 
+/// A slice in work.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SliceMoves {
+    pub(super) slice: Slice,
+    /// Moves left.
+    pub(super) left: u32,
+    /// When the next one is due after the slice's beginning, and how long it is from one to the next: units of
+    /// [`Train`], below 2^31.
+    due: u32,
+    interval: u32,
+}
+
+impl SliceMoves {
+    /// The next moves, at most `most`.
+    pub(super) fn train(&self, most: usize) -> Train {
+        let count = most.min(self.left as usize);
+        Train { first: self.due, interval: self.interval, count }
+    }
+}
+
 /// Tells when the places of a slice are reached.
 struct SliceClock {
-    shift: u32,
-    distance: u32,
-    time: u32,
+    /// By which a distance is shifted so that it counts as a fraction of the slice's.
+    zeros: u32,
+    /// Time over distance, 2^31 in all at most.
+    slowness: u32,
 }
 
 impl SliceClock {
     fn new(slice: Slice) -> Self {
-        // 16 bits of the distance are true to an eighth of a tick.
-        let shift = (u32::BITS - slice.distance.leading_zeros()).saturating_sub(16);
-        Self { shift, distance: slice.distance >> shift, time: slice.time }
+        let zeros = slice.distance.leading_zeros();
+        // From 2^31 on, and up to 2^31, so that 2^31 is the greatest quotient.
+        let distance = u64::from(slice.distance << zeros).max(1);
+        let time = u64::from(slice.time << Train::BITS_BELOW);
+        Self { zeros, slowness: ((time << 31) / distance) as u32 }
     }
 
-    /// When the places from `first` on, each by `step` further, are reached if the slice begins at
-    /// `start`: whole ticks.
-    #[inline(never)] // On its own it stays in the registers of a small core.
-    fn times(&self, start: u32, first: u32, step: u32, times: &mut [u32]) {
-        let Self { shift, distance, time } = *self;
-        let mut place = first;
-        for reached in times {
-            // At most 2^16 - 1 times the time of a whole slice, 2^16.
-            let offset = ((place >> shift) * time).checked_div(distance).unwrap_or(0);
-            *reached = whole_ticks(start.wrapping_add(offset));
-            // Only behind the last can it wrap.
-            place = place.wrapping_add(step);
-        }
+    /// When a place within the slice is reached: below 2^31 units of [`Train`], and 2 units early at most.
+    fn time_of(&self, place: u32) -> u32 {
+        ((u64::from(place << self.zeros) * u64::from(self.slowness)) >> 31) as u32
     }
 }

@@ -102,11 +102,22 @@ fn circle_limit(limits: &Limits, first: Place, middle: Place, last: Place) -> Op
     let (cx, cy) = (last.x - first.x, last.y - first.y);
     let twice_area = (i64::from(ax) * i64::from(by) - i64::from(ay) * i64::from(bx)).unsigned_abs();
     let top = u64::from(limits.top.to_bits() >> (PathLength::FRAC_NBITS - FRACTION_BITS));
-    // r = abc / 2·(twice the area), and each length is at least its greater part: most circles are
-    // wide, and known to be without a root.
-    let least = |x: i32, y: i32| u64::from(x.unsigned_abs().max(y.unsigned_abs()));
-    let sides = u128::from(least(ax, ay) * least(bx, by)) * u128::from(least(cx, cy));
-    if sides >= 4 * u128::from(twice_area) * u128::from(top) {
+    // r = abc / 2·(twice the area), and each length is at least its greater part, and 11/16 of both: most
+    // circles are wide, and known to be without a root.
+    let least = |x: i32, y: i32| {
+        let (x, y) = (x.unsigned_abs(), y.unsigned_abs());
+        let sum = x + y;
+        u64::from(x.max(y).max((sum >> 1) + (sum >> 3) + (sum >> 4)))
+    };
+    let (ab, c) = (least(ax, ay) * least(bx, by), least(cx, cy));
+    // `c` is below 2^29, `top` below 2^26.
+    const HALF: u64 = u32::MAX as u64;
+    let is_wide = if ab <= HALF && twice_area <= HALF {
+        ab * c >= 4 * twice_area * top
+    } else {
+        u128::from(ab) * u128::from(c) >= 4 * u128::from(twice_area) * u128::from(top)
+    };
+    if is_wide {
         return None;
     }
     let squared = |x: i32, y: i32| {

@@ -2,11 +2,8 @@
 
 use super::lift::LiftStep;
 use super::profile::FRACTION_BITS;
-use super::{EventQueue, Limits, StepEvent};
-use crate::step::Direction;
-
-/// As many moves are worked out together: a small core then has registers for each part of the work.
-pub(super) const BATCH: usize = 32;
+use super::{EventQueue, Limits, StepEvent, StepTrain};
+use crate::step::{Direction, Line};
 
 /// Builds events. The last one is kept back until the time of the next is known.
 ///
@@ -86,38 +83,76 @@ impl Emitter {
         (self.directions ^ levels.directions) & levels.axes != 0
     }
 
-    /// Some moves, each one of two kinds that do not [turn](Emitter::turns), after
-    /// [another](Emitter::has_stepped). Each takes place at its time in whole ticks, or later if the pins
-    /// need longer. Returns by how much later the last one is.
-    #[inline(never)] // On its own it stays in the registers of a small core.
+    /// Some moves of `line`, which do not [turn](Emitter::turns), after [another](Emitter::has_stepped). They
+    /// take place at the times of `train` after `start`, or later if the pins need longer. They are no faster than
+    /// [`Emitter::keeps_up`] says.
     pub(super) fn steps(
         &mut self,
-        times: &[u32],
-        kinds: &[u8],
+        start: u32,
+        train: Train,
+        line: &mut Line,
         levels: [MoveLevels; 2],
         queue: &mut dyn EventQueue,
-    ) -> Result<u32, StepEvent> {
-        let Some((mut event, mut since)) = self.pending else {
-            return Ok(0);
+    ) -> Result<Stepped, StepEvent> {
+        let Some((event, since)) = self.pending else {
+            return Ok(Stepped::default());
         };
         let level_bits = self.level_bits();
-        let kinds_of_event =
-            levels.map(|move_levels| StepEvent::levels(level_bits | move_levels.pulses, 0));
-        let mut events = [event; BATCH];
-        let (least_interval, began) = (self.least_interval, since);
-        let mut late = 0u32;
-        for ((next, &time), &kind) in events.iter_mut().zip(times).zip(kinds) {
-            let planned = time.wrapping_add(late);
-            let at = later(planned, since.wrapping_add(least_interval));
-            late = late.wrapping_add(at.wrapping_sub(planned));
-            *next = event.with_ticks(at.wrapping_sub(since) >> FRACTION_BITS);
-            event = kinds_of_event[usize::from(kind & 1)];
-            since = at;
+        let [straight, diagonal] = levels
+            .map(|move_levels| StepEvent::levels(level_bits | move_levels.pulses, 0).to_bits());
+        // All times are counted from here, which is a whole tick.
+        let due = whole_ticks(train.due(start, 0));
+        let late = later(due, since.wrapping_add(self.least_interval)).wrapping_sub(due);
+        let begin = whole_ticks(start).wrapping_add(late);
+        let ahead = since.wrapping_sub(begin).cast_signed() >> FRACTION_BITS;
+        let [balance, gain, loss] = line.rule();
+        let mut steps = StepTrain {
+            time: train.first + ((start - whole_ticks(start)) << Train::BITS_BELOW),
+            interval: train.interval,
+            before: ahead.cast_unsigned(),
+            event: event.to_bits(),
+            straight,
+            diagonal,
+            balance,
+            gain,
+            loss,
+            diagonals: 0,
+        };
+        if train.count > 0 {
+            queue.push_train(&mut steps, train.count as u32)?;
         }
-        queue.push_steps(&events[..times.len().min(BATCH)])?;
-        self.ticks = self.ticks.wrapping_add(since.wrapping_sub(began) >> FRACTION_BITS);
-        self.pending = Some((event, since));
-        Ok(late)
+        line.go_on(steps.balance, train.count);
+        let last = begin.wrapping_add(steps.before << FRACTION_BITS);
+        self.ticks = self.ticks.wrapping_add(last.wrapping_sub(since) >> FRACTION_BITS);
+        self.pending = Some((StepEvent::from_bits(steps.event), last));
+        let diagonals = steps.diagonals as usize;
+        Ok(Stepped { late, diagonals })
+    }
+
+    /// The same for moves of any kind, one by one.
+    pub(super) fn single_steps(
+        &mut self,
+        start: u32,
+        train: Train,
+        line: &mut Line,
+        levels: [MoveLevels; 2],
+        queue: &mut dyn EventQueue,
+    ) -> Result<Stepped, StepEvent> {
+        let mut stepped = Stepped::default();
+        for number in 0..train.count as u32 {
+            let is_diagonal = line.next_is_diagonal();
+            stepped.diagonals += usize::from(is_diagonal);
+            let due = whole_ticks(train.due(start, number)).wrapping_add(stepped.late);
+            let at = self.step(levels[usize::from(is_diagonal)], due, queue)?;
+            stepped.late = stepped.late.wrapping_add(at.wrapping_sub(due));
+        }
+        Ok(stepped)
+    }
+
+    /// Whether the pins keep up with moves at such intervals.
+    pub(super) fn keeps_up(&self, train: &Train) -> bool {
+        // Cut to whole ticks, an interval may lose one.
+        (train.interval >> Train::BITS_BELOW) & !((1 << FRACTION_BITS) - 1) >= self.least_interval
     }
 
     /// Nothing changes at `time`: begins the time line, or splits a long wait.
@@ -216,6 +251,37 @@ impl Emitter {
         }
         Ok(())
     }
+}
+
+/// Moves at even intervals.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Train {
+    /// Until the first of them, 2^-15 ticks.
+    pub(super) first: u32,
+    /// From one to the next, 2^-15 ticks.
+    pub(super) interval: u32,
+    /// How many there are; the last is less than 2^17 ticks away.
+    pub(super) count: usize,
+}
+
+impl Train {
+    /// Below sixteenths.
+    pub(super) const BITS_BELOW: u32 = StepTrain::FRACTION_BITS - FRACTION_BITS;
+
+    /// When a move is due, in sixteenths of ticks, if the train begins at `start`.
+    pub(super) fn due(&self, start: u32, number: u32) -> u32 {
+        let after = self.first.wrapping_add(self.interval.wrapping_mul(number));
+        start.wrapping_add(after >> Self::BITS_BELOW)
+    }
+}
+
+/// What became of a [`Train`].
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Stepped {
+    /// By how much later it took place, sixteenths of ticks.
+    pub(super) late: u32,
+    /// Diagonal moves in it.
+    pub(super) diagonals: usize,
 }
 
 /// Cuts the sixteenths.

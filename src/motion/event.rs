@@ -226,6 +226,78 @@ const fn axis_step(levels: u8, pulse: u8, down: u8) -> i32 {
     }
 }
 
+/// Steps at even intervals along a line.
+///
+/// Times count from somewhere, in units of 2^-15 ticks; events are words without their ticks. Each step handed over
+/// lasts up to the next one, which waits for that. A board may make the words of its queue from the fields,
+/// as [`StepTrain::push_each`] does.
+#[derive(Debug, Clone, Copy)]
+#[repr(C)]
+pub struct StepTrain {
+    /// Of the next step.
+    pub time: u32,
+    /// From each to the one behind it, never shorter than two pulses.
+    pub interval: u32,
+    /// When the step that waits took place, in whole ticks.
+    pub before: u32,
+    /// That step,
+    pub event: u32,
+    /// a straight one of the train,
+    pub straight: u32,
+    /// and a diagonal one.
+    pub diagonal: u32,
+    /// If above zero, the next step is diagonal.
+    pub balance: i32,
+    /// Added to it by a straight step.
+    pub gain: i32,
+    /// Taken from it by a diagonal step.
+    pub loss: i32,
+    /// Diagonal steps so far.
+    pub diagonals: u32,
+}
+
+impl StepTrain {
+    /// Of a tick, in times and intervals.
+    pub const FRACTION_BITS: u32 = 15;
+
+    /// Hands the next `count` steps over.
+    ///
+    /// # Errors
+    /// That of `push`.
+    #[inline]
+    pub fn push_each(
+        &mut self,
+        count: u32,
+        mut push: impl FnMut(StepEvent) -> Result<(), StepEvent>,
+    ) -> Result<(), StepEvent> {
+        for _ in 0..count {
+            let ticks = self.time >> Self::FRACTION_BITS;
+            // Waits are below 2^24 ticks.
+            push(StepEvent(self.event + (ticks.wrapping_sub(self.before) << 8)))?;
+            self.before = ticks;
+            // Only behind the last can it wrap.
+            self.time = self.time.wrapping_add(self.interval);
+            if self.balance > 0 {
+                self.balance -= self.loss;
+                self.event = self.diagonal;
+                self.diagonals += 1;
+            } else {
+                self.balance += self.gain;
+                self.event = self.straight;
+            }
+        }
+        Ok(())
+    }
+
+    /// Turns the three events into others.
+    #[inline]
+    pub fn convert(&mut self, turn: impl Fn(u32) -> u32) {
+        for event in [&mut self.event, &mut self.straight, &mut self.diagonal] {
+            *event = turn(*event);
+        }
+    }
+}
+
 /// Where planned events go: the interrupt's queue on a board, a recorder in tests.
 pub trait EventQueue {
     /// How many more events fit.
@@ -235,12 +307,12 @@ pub trait EventQueue {
     /// # Errors
     /// Hands the event back if the queue is full.
     fn push(&mut self, event: StepEvent) -> Result<(), StepEvent>;
-    /// Appends steps: events that pulse and do nothing else, none shorter than two pulses.
+    /// Appends the next `count` steps of a train, one at least; there is room.
     ///
     /// # Errors
-    /// Hands the first event back that finds the queue full.
-    fn push_steps(&mut self, steps: &[StepEvent]) -> Result<(), StepEvent> {
-        steps.iter().try_for_each(|&step| self.push(step))
+    /// Hands the first event back that finds the queue full after all.
+    fn push_train(&mut self, train: &mut StepTrain, count: u32) -> Result<(), StepEvent> {
+        train.push_each(count, |event| self.push(event))
     }
     /// The steps that follow are so long, in units of the [`BrakeRule`](super::BrakeRule), below 2^16;
     /// but for the next one, if a step of the old length has still to come. Takes a place, as an event

@@ -13,12 +13,18 @@ impl Heading {
     /// The way of a move by (`dx`, `dy`) steps whose length is `length`, not 0.
     pub(super) fn new(limits: &Limits, dx: i32, dy: i32, length: PathLength) -> Self {
         let [step_x, step_y] = limits.step_length;
+        // One division for both parts: 2^63 over a length from 2^31 on.
+        let length = length.to_bits().max(1);
+        let zeros = length.leading_zeros();
+        let inverse = (1u64 << 63) / u64::from(length << zeros);
         let part = |steps: i32, step: u32| {
-            // Units of 2^-32 mm over units of 2^-18 mm, scaled to 2^30: 2^16 times as much. A part
-            // is no longer than the whole, below 2^46, so 62 bits hold it.
+            // Units of 2^-32 mm; the length's are 2^-18 mm. A part is no longer than the whole but for
+            // rounding, below 2^46, so that 32 bits hold it in units of the length as it is shifted.
             let part = u64::from(steps.unsigned_abs()) * u64::from(step);
-            let heading = (part << 16) / u64::from(length.to_bits().max(1));
-            let heading = i32::try_from(heading).unwrap_or(1 << 30).min(1 << 30);
+            let part = ((part << zeros) >> 14).min(u32::MAX.into());
+            let heading = (part * inverse) >> 33;
+            // 2^30 but for rounding.
+            let heading = heading.min(1 << 30) as i32;
             if steps < 0 { -heading } else { heading }
         };
         Self { x: part(dx, step_x.to_bits()), y: part(dy, step_y.to_bits()) }
@@ -54,13 +60,19 @@ pub(super) fn corner(
     after: Heading,
     shorter: PathLength,
 ) -> Corner {
+    const NONE: Corner = Corner { limit: PathLength::MAX, is_sharp: false };
     // With unit vectors u, v: |u + v| = 2 cos(θ/2), |v - u| = 2 sin(θ/2).
-    let sine = half_length(after.x.wrapping_sub(before.x), after.y.wrapping_sub(before.y));
-    let rounding =
-        (u64::from(limits.rounding.to_bits()) << 30) / u64::from(shorter.to_bits().max(1));
-    let sine = sine.saturating_sub(rounding);
+    let (dx, dy) = (after.x.wrapping_sub(before.x), after.y.wrapping_sub(before.y));
+    let rounding = u64::from(limits.rounding.to_bits()) << 30;
+    let shorter = shorter.to_bits().max(1);
+    // On dense curves rounding explains all, which takes no root to see.
+    let most = dx.unsigned_abs() / 2 + dy.unsigned_abs() / 2 + 1;
+    if u64::from(most) * u64::from(shorter) <= rounding {
+        return NONE;
+    }
+    let sine = half_length(dx, dy).saturating_sub(rounding / u64::from(shorter));
     if sine == 0 {
-        return Corner { limit: PathLength::MAX, is_sharp: false };
+        return NONE;
     }
     let cosine = half_length(before.x.wrapping_add(after.x), before.y.wrapping_add(after.y));
     let by_deviation = {
@@ -71,7 +83,7 @@ pub(super) fn corner(
     };
     let radius = if limits.centripetal {
         // l below 2^32, c at most 2^30.
-        by_deviation.min(u64::from(shorter.to_bits()) * cosine / (2 * sine))
+        by_deviation.min(u64::from(shorter) * cosine / (2 * sine))
     } else {
         by_deviation
     };

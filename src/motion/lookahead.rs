@@ -13,7 +13,7 @@ pub struct Block {
     pub(super) dx: i32,
     pub(super) dy: i32,
     pub(super) length: PathLength,
-    /// Stopping distance with which the block may be entered.
+    /// Stopping distance with which the block may be entered; see [`Lookahead::passes_limits_on`].
     pub(super) entry_limit: PathLength,
     /// Greatest stopping distance within the block, as it is part of a curve.
     pub(super) curve_limit: PathLength,
@@ -54,12 +54,22 @@ pub struct Lookahead<'m> {
     blocks: &'m mut [Block],
     first: usize,
     count: usize,
+    /// Of all blocks, 2^-18 mm.
+    length: u64,
+    /// Whether each block's `entry_limit` is lowered to what the blocks behind it allow and to its
+    /// `curve_limit`, so that none has to be looked for when the block before it begins.
+    passes_limits_on: bool,
 }
 
 impl<'m> Lookahead<'m> {
     /// A ring in the memory lent; its length is the capacity.
     pub fn new(blocks: &'m mut [Block]) -> Self {
-        Self { blocks, first: 0, count: 0 }
+        Self { blocks, first: 0, count: 0, length: 0, passes_limits_on: true }
+    }
+
+    /// Blocks that fit.
+    pub fn capacity(&self) -> usize {
+        self.blocks.len()
     }
 
     /// Blocks waiting.
@@ -75,6 +85,12 @@ impl<'m> Lookahead<'m> {
     /// Whether no more fit.
     pub fn is_full(&self) -> bool {
         self.count == self.blocks.len()
+    }
+
+    /// Whether limits are known at each block at once, as if speed might change by the acceleration without a
+    /// limit on jerk; while none wait.
+    pub(super) fn pass_limits_on(&mut self, on: bool) {
+        self.passes_limits_on = on;
     }
 
     /// Whether less than half of the memory is in use.
@@ -96,6 +112,8 @@ impl<'m> Lookahead<'m> {
             None => return Err(block),
         }
         self.count += 1;
+        self.length += u64::from(block.length.to_bits());
+        self.limit_curve(1, 1, block.curve_limit);
         Ok(())
     }
 
@@ -104,15 +122,17 @@ impl<'m> Lookahead<'m> {
         let block = *self.front()?;
         self.first = self.wrapped(1);
         self.count -= 1;
+        self.length -= u64::from(block.length.to_bits());
         Some(block)
     }
 
     pub(super) fn front(&self) -> Option<&Block> {
-        self.iter().next()
+        if self.is_empty() { None } else { self.blocks.get(self.first) }
     }
 
     pub(super) fn clear(&mut self) {
         self.count = 0;
+        self.length = 0;
     }
 
     fn wrapped(&self, index: usize) -> usize {
@@ -127,36 +147,50 @@ impl<'m> Lookahead<'m> {
 
     /// The last blocks, from the `least`th to the `most`th counted from 1 at the end, are part of a
     /// curve.
+    ///
+    /// What one block allows is passed on to those before it, each of which may be entered with its own length
+    /// more, as far as that is less than they had: on smooth paths, not far.
     pub(super) fn limit_curve(&mut self, least: u32, most: u32, limit: PathLength) {
-        for back in least.max(1)..=most {
+        let mut allowed = PathLength::MAX;
+        for back in least.max(1).. {
+            let is_curve = back <= most;
             let Some(index) = self.count.checked_sub(back as usize) else {
                 return;
             };
             let at = self.wrapped(index);
-            if let Some(block) = self.blocks.get_mut(at) {
+            let Some(block) = self.blocks.get_mut(at) else {
+                return;
+            };
+            if is_curve {
                 block.curve_limit = block.curve_limit.min(limit);
+                if !self.passes_limits_on {
+                    continue;
+                }
+                allowed = allowed.min(block.curve_limit);
+            } else if !self.passes_limits_on || block.entry_limit <= allowed {
+                return;
             }
+            block.entry_limit = block.entry_limit.min(allowed);
+            let before = at.checked_sub(1).unwrap_or(self.blocks.len().saturating_sub(1));
+            let length = self.blocks.get(before).map_or(PathLength::ZERO, |block| block.length);
+            allowed = self
+                .blocks
+                .get(at)
+                .map_or(allowed, |block| block.entry_limit)
+                .saturating_add(length);
         }
     }
 
     /// The greatest stopping distance with which the first block may be entered, such that every
     /// junction known is passed within its limit and the path known is not overrun. At most `top`.
-    ///
-    /// A limit that stands `d` further on allows `d` more here. Beyond `top` nothing binds, so the
-    /// search ends there; it visits each block at most once.
     pub(super) fn entry_allowed(&self, top: PathLength) -> PathLength {
-        let mut allowed = top;
-        let mut distance = PathLength::ZERO;
-        for block in self.iter() {
-            let limit = block.entry_limit.min(block.curve_limit);
-            allowed = allowed.min(distance.saturating_add(limit));
-            distance = distance.saturating_add(block.length);
-            if distance >= allowed {
-                return allowed;
-            }
-        }
+        debug_assert!(self.passes_limits_on);
+        let Some(front) = self.front() else {
+            return PathLength::ZERO;
+        };
         // At the end of what is known the machine must be able to stand.
-        allowed.min(distance)
+        let length = u32::try_from(self.length).map_or(PathLength::MAX, PathLength::from_bits);
+        top.min(front.entry_limit).min(length)
     }
 }
 
@@ -208,5 +242,29 @@ mod tests {
         ring.push(block(300, 1000)).expect("room");
         ring.pop();
         assert_eq!(allowed(&ring, 5000), 20);
+    }
+
+    #[test]
+    fn what_a_block_allows_is_known_to_all_before_it() {
+        let mut memory = [Block::EMPTY; 7];
+        let mut ring = Lookahead::new(&mut memory);
+        for round in 0..200u32 {
+            if ring.is_full() {
+                ring.pop();
+            }
+            let limit = if round % 5 == 0 { round % 70 } else { 5000 };
+            ring.push(block(10 + round * 7 % 90, limit)).expect("room");
+            if round % 11 == 0 {
+                ring.limit_curve(2, 4, PathLength::from_bits(30 + round));
+            }
+            // Each block by itself, from the end on.
+            let blocks: std::vec::Vec<_> = ring.iter().copied().collect();
+            let mut allowed = 0;
+            for block in blocks.iter().rev() {
+                let limit = block.entry_limit.min(block.curve_limit).to_bits();
+                allowed = limit.min(allowed + block.length.to_bits());
+            }
+            assert_eq!(ring.entry_allowed(PathLength::MAX).to_bits(), allowed, "{round}");
+        }
     }
 }

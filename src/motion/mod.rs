@@ -6,9 +6,10 @@
 //!
 //! Speed is planned as *stopping distance*, v²/2a, in millimetres: a block of length L raises or
 //! lowers it by at most L, and an arc of radius r allows r/2. So the look-ahead only adds and
-//! compares lengths, exactly; a square root is taken when a block begins, if at all. Within a block
-//! time goes in slices of [`SLICE_TICKS`]; the speed is constant within a slice, so the moves of a
-//! slice are found by one short division each and every slice begins on the exact parabola.
+//! compares lengths, exactly; a square root is taken when a block begins, if at all. What a block allows is passed on
+//! to those before it as it comes, so nothing is looked for when one begins. Within a block
+//! time goes in slices of [`SLICE_TICKS`], or longer ones while the speed stays; the speed is constant within a slice, so its
+//! moves are evenly spaced, a [`StepTrain`], and every slice begins on the exact parabola.
 //!
 //! With a limit on jerk, another planner (`smooth`) is at work: at intervals it looks how far acceleration may rise such that
 //! all that is known ahead can still be kept.
@@ -16,9 +17,9 @@
 //! The pulses leave when the plan is half a step from the new position: the pins are never more
 //! than half a step from where the plan is.
 //!
-//! Measured on a Cortex-M3, built for size, everything between target and queue included: 135
-//! instructions for each event at 100,000 moves a second, and 170 to 350 with a limit on jerk; at 5,000 moves a
-//! second, 1100 and 1350 to 2040. `cargo xtask bench --motion` counts them.
+//! Measured on a Cortex-M3, built for size, everything between target and queue included: 54
+//! instructions for each event at 100,000 moves a second, and 120 to 290 with a limit on jerk; at 5,000 moves a
+//! second, 184 and 360 to 1880. `cargo xtask bench --motion` counts them.
 //!
 //! Not done here: limits of travel, the pen's heights, states. That is `machine`.
 
@@ -37,7 +38,7 @@ mod smooth;
 
 pub use brake::{Brake, BrakeOrders, BrakeRule, QueueSize, StepBrake, StepLength, StepWay};
 pub use emitter::Emitter;
-pub use event::{EventKind, EventQueue, StepEvent};
+pub use event::{EventKind, EventQueue, StepEvent, StepTrain};
 pub use lift::LiftRule;
 pub use limits::{Limits, LimitsError, MotionSettings};
 pub use lookahead::{Block, Lookahead};

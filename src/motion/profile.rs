@@ -40,6 +40,9 @@ struct Phase {
 
 impl Phase {
     fn new(limits: &Limits, from: Pace, to: Pace, distance: PathLength) -> Self {
+        if distance == 0 {
+            return Self::default();
+        }
         let speeds = u64::from(from.speed.to_bits()) + u64::from(to.speed.to_bits());
         let bits = u64::from(distance.to_bits());
         // Time = 2 s / (v0 + v1) slices of 2^12 ticks, s and v in the same unit: below 2^63.
@@ -65,8 +68,15 @@ impl Phase {
 pub(super) struct Slice {
     /// Gone in it, 2^-32 mm.
     pub(super) distance: u32,
-    /// It lasts, 1/16 ticks, at most one slice.
+    /// It lasts, 1/16 ticks, at most [`Slice::MOST`] times [`Slice::TIME`].
     pub(super) time: u32,
+}
+
+impl Slice {
+    /// [`SLICE_TICKS`].
+    pub(super) const TIME: u32 = SLICE_TICKS << FRACTION_BITS;
+    /// Where the speed does not change, so many are one: 1.3 ms.
+    pub(super) const MOST: u32 = 8;
 }
 
 /// The speed along one piece of the path: at most three phases of constant acceleration.
@@ -148,21 +158,22 @@ impl Profile {
 
     /// The next slice, `None` at the end.
     pub(super) fn next_slice(&mut self) -> Option<Slice> {
-        const SLICE: u64 = (SLICE_TICKS as u64) << FRACTION_BITS;
         loop {
             let phase = self.phases.get_mut(self.phase)?;
-            if phase.time > SLICE {
+            let slices = if phase.gain == 0 { Slice::MOST } else { 1 };
+            let time = u64::from(slices * Slice::TIME);
+            if phase.time > time {
                 let speed = i64::from(phase.speed.to_bits());
                 let after = (speed + i64::from(phase.gain)).max(0);
-                let distance = (speed + after).unsigned_abs() / 2;
+                let distance = (speed + after).unsigned_abs() * u64::from(slices) / 2;
                 let distance = distance.min(phase.distance);
                 phase.speed = SliceSpeed::from_bits(after as u32);
                 phase.distance -= distance;
-                phase.time -= SLICE;
-                // The mean of two speeds below 2^32.
-                return Some(Slice { distance: distance as u32, time: SLICE as u32 });
+                phase.time -= time;
+                // Speeds are at most 0.09, and a slice is no longer than eight.
+                return Some(Slice { distance: distance as u32, time: time as u32 });
             }
-            // A slice or less of a speed below 2^32.
+            // No more than that.
             let rest = Slice { distance: phase.distance as u32, time: phase.time as u32 };
             *phase = Phase::default();
             self.phase += 1;

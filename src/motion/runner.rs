@@ -2,7 +2,7 @@
 
 use super::course::Course;
 use super::curvature::Curvature;
-use super::emitter::{BATCH, MoveLevels, whole_ticks};
+use super::emitter::{MoveLevels, whole_ticks};
 use super::junction::{self, Corner, Heading};
 use super::lift::{Lift, LiftRule};
 use super::lookahead::BlockKind;
@@ -124,8 +124,8 @@ pub struct Runner<'m> {
     lift: Lift,
     stopping: bool,
     stopping_after_stroke: bool,
-    /// Whether more blocks may let the piece in work end faster than it was planned to.
-    hurried: bool,
+    /// How fast the piece in work was allowed to end, if more blocks may allow it to be faster.
+    hurried: Option<PathLength>,
     /// How fast the plan that was thrown away would have ended the piece in work.
     exit_reached: Option<PathLength>,
     /// Stands after the stroke in which so much is drawn, all in all.
@@ -172,7 +172,7 @@ impl<'m> Runner<'m> {
             lift: Lift::default(),
             stopping: false,
             stopping_after_stroke: false,
-            hurried: false,
+            hurried: None,
             exit_reached: None,
             ink_bound: u64::MAX,
             position: PagePoint::default(),
@@ -197,6 +197,7 @@ impl<'m> Runner<'m> {
         }
         self.pen = pen;
         self.emitter.set_limits(&limits);
+        self.lookahead.pass_limits_on(limits.jerk.is_none());
         self.set_override(100);
     }
 
@@ -261,6 +262,11 @@ impl<'m> Runner<'m> {
     /// Ticks of all events handed over; wraps.
     pub fn ticks(&self) -> u32 {
         self.emitter.ticks()
+    }
+
+    /// How many targets fit in all.
+    pub fn capacity(&self) -> usize {
+        self.lookahead.capacity()
     }
 
     /// Whether no more targets fit now.
@@ -379,7 +385,8 @@ impl<'m> Runner<'m> {
         self.end = motors;
         self.page_end = page;
         self.last = Some((heading, length, inked));
-        if self.hurried {
+        if self.hurried.is_some_and(|exit| exit < self.lookahead.entry_allowed(PathLength::MAX)) {
+            self.hurried = None;
             self.plan_again();
         }
         Ok(())
@@ -435,7 +442,7 @@ impl<'m> Runner<'m> {
     /// Sheds speed on the path, from the next slice on, and stands with the pen raised.
     pub fn stop(&mut self) {
         self.stopping = true;
-        // The slice in work, 164 µs at most, ends as planned.
+        // The slice in work, 1.3 ms at most, ends as planned.
         self.give_plan_up();
     }
 
@@ -524,19 +531,31 @@ impl<'m> Runner<'m> {
     /// # Errors
     /// The event that the queue refused although it had room.
     pub fn produce(&mut self, queue: &mut dyn EventQueue) -> Result<Progress, StepEvent> {
-        let Some(course) = &mut self.course else {
-            return self.begin_block(queue);
-        };
-        if course.slice.is_none() {
-            course.slice = match &mut self.plan {
-                None => return self.plan(queue),
+        if self.course.is_none() {
+            let progress = self.begin_block(queue)?;
+            if self.course.is_none() {
+                return Ok(progress);
+            }
+        }
+        while let Some(course) = &mut self.course
+            && course.slice.is_none()
+        {
+            let slice = match &mut self.plan {
+                None => {
+                    let progress = self.plan(queue)?;
+                    if self.plan.is_none() {
+                        return Ok(progress);
+                    }
+                    continue;
+                }
                 Some(Plan::Profile(profile)) => profile.next_slice(),
                 Some(Plan::Interval(interval)) => interval.next_slice(course.room()),
             };
-            if course.slice.is_none() {
+            let Some(slice) = slice else {
                 self.end_plan();
                 return Ok(Progress::More);
-            }
+            };
+            course.begin_slice(slice);
         }
         self.run_slice(queue)?;
         Ok(Progress::More)
@@ -583,58 +602,46 @@ impl<'m> Runner<'m> {
         let Some(course) = &mut self.course else {
             return Ok(());
         };
-        let Some(slice) = course.slice else {
+        let Some(slice) = course.slice.map(|moves| moves.slice) else {
             return Ok(());
         };
+        // A move and its direction set-up are two events; one is left for a long wait.
+        let mut room = (queue.room().saturating_sub(1)) / 2;
         let mut levels = course.line.moves().map(MoveLevels::of);
         if course.is_slack() {
             levels = levels.map(MoveLevels::as_slack);
         }
-        // A move and its direction set-up are two events; one is left for a long wait.
-        let mut room = (queue.room().saturating_sub(1)) / 2;
-        while course.to_next < u64::from(slice.distance) {
-            let left = course.line.remaining();
-            if left == 0 {
-                // The length of a move is rounded down, which leaves a rest of nothing.
-                course.to_next = slice.distance.into();
-                break;
-            }
-            let mut times = [0; BATCH];
-            let most = room.min(BATCH).min(left as usize);
-            let count = course.next_times(slice, self.now, &mut times[..most]);
+        while let Some(moves) = &course.slice
+            && moves.left > 0
+        {
+            let train = moves.train(room);
+            let count = train.count;
             if count == 0 {
                 return Ok(());
             }
             room -= count;
-            course.moves_done += count as u32;
-            let times = &times[..count];
-            let mut kinds = [0; BATCH];
-            let kinds = &mut kinds[..count];
-            let diagonals = course.line.next_kinds(kinds);
-            let counts = [count - diagonals, diagonals];
-            let turns = |kind: usize| counts[kind] > 0 && self.emitter.turns(levels[kind]);
-            if self.emitter.has_stepped() && !course.is_slack() && !turns(0) && !turns(1) {
-                let late = self.emitter.steps(times, kinds, levels, queue)?;
-                self.now = self.now.wrapping_add(late);
+            let turning = levels.map(|levels| self.emitter.turns(levels));
+            let turns = turning != [false; 2] && {
+                let diagonals = course.line.diagonals_within(count);
+                (turning[0] && diagonals < count) || (turning[1] && diagonals > 0)
+            };
+            let is_even = !turns && !course.is_slack() && self.emitter.has_stepped();
+            let stepped = if is_even && self.emitter.keeps_up(&train) {
+                self.emitter.steps(self.now, train, &mut course.line, levels, queue)?
             } else {
-                let mut late = 0;
-                for (&time, &kind) in times.iter().zip(kinds.iter()) {
-                    let time = time.wrapping_add(late);
-                    let at = self.emitter.step(levels[usize::from(kind)], time, queue)?;
-                    late = late.wrapping_add(at.wrapping_sub(time));
-                }
-                self.now = self.now.wrapping_add(late);
-            }
+                self.emitter.single_steps(self.now, train, &mut course.line, levels, queue)?
+            };
+            self.now = self.now.wrapping_add(stepped.late);
             let place = if course.is_slack() { &mut self.slack } else { &mut self.position };
+            let counts = [count - stepped.diagonals, stepped.diagonals];
             for (direction, count) in course.line.moves().into_iter().zip(counts) {
                 let (dx, dy) = direction.delta();
                 place.x = place.x.wrapping_add(dx * count as i32);
                 place.y = place.y.wrapping_add(dy * count as i32);
             }
+            course.advance(count);
         }
-        course.place += u64::from(slice.distance);
-        course.to_next -= u64::from(slice.distance);
-        course.slice = None;
+        course.end_slice(slice);
         self.now = self.now.wrapping_add(slice.time);
         self.emitter.split_long_wait(self.now, queue)
     }
@@ -806,8 +813,9 @@ impl<'m> Runner<'m> {
             } else {
                 PathLength::ZERO
             };
-            self.hurried =
+            let may_change =
                 is_last && self.lookahead.is_short() && exit_allowed < top.stopping_distance;
+            self.hurried = may_change.then_some(exit_allowed);
             Profile::new(&self.limits, self.pace, left, top, exit_allowed)
         };
         self.plan = Some(Plan::Profile(profile));

@@ -10,8 +10,8 @@
 //! An acceleration is told by its *ramp*: for how long the jerk has built it up, in sixteenths of
 //! slices, negative for braking. Then all changes are polynomials in whole numbers.
 
-use super::profile::{FRACTION_BITS, Slice};
-use super::{Limits, Lookahead, PathLength, SLICE_TICKS, SliceSpeed};
+use super::profile::Slice;
+use super::{Limits, Lookahead, PathLength, SliceSpeed};
 use crate::fixed::Millimetres;
 use core::num::NonZeroU32;
 
@@ -162,14 +162,20 @@ impl Interval {
             return None;
         }
         if self.rest.distance == 0 {
-            let (before, after) = (self.speed(self.done), self.speed(self.done + 1));
+            let before = self.speed(self.done);
+            let is_even = self.growth == 0 && self.from.ramp == 0;
+            let slices: u16 = if is_even { Slice::MOST as u16 } else { 1 };
+            let slices = slices.min(self.slices - self.done);
+            let after = self.speed(self.done + slices);
             let stands = before == 0 && after == 0 && self.growth <= 0;
-            if self.done == self.slices || stands {
+            if slices == 0 || stands {
                 return None;
             }
-            self.done += 1;
+            self.done += slices;
+            let slices = u32::from(slices);
+            // Speeds are at most 0.09.
             self.rest =
-                Slice { distance: before.midpoint(after), time: SLICE_TICKS << FRACTION_BITS };
+                Slice { distance: before.midpoint(after) * slices, time: Slice::TIME * slices };
         }
         let mut slice = core::mem::take(&mut self.rest);
         if u64::from(slice.distance) > room {
@@ -307,6 +313,7 @@ impl Road<'_, '_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::motion::SLICE_TICKS;
 
     /// mm/s, mm/s², m/s³; mm per slice at 1 mm/s.
     const SLICE: f64 = SLICE_TICKS as f64 / 25e6;

@@ -3,11 +3,11 @@
 use crate::model::{Corner, Position};
 use crate::motion::Block;
 
-/// How many moves are planned ahead: see [`crate::motion`].
-pub const BLOCKS: usize = 32;
+/// The moves planned ahead with 64 KiB of RAM, before any is: see [`crate::motion`].
+pub const NO_MOVES: [Block; 32] = [Block::EMPTY; 32];
 
-/// The moves planned ahead, before any is.
-pub const NO_MOVES: [Block; BLOCKS] = [Block::EMPTY; BLOCKS];
+/// The same for 264 KiB of RAM: at 500 mm/s and 15 m/s² the machine stops within 167 chords of 0.05 mm.
+pub const NO_MOVES_OF_PICO: [Block; 192] = [Block::EMPTY; 192];
 
 /// The large memory of a plotter: a model, and what its jobs are computed in.
 ///

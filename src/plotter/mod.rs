@@ -21,7 +21,7 @@ mod title;
 
 pub use board::{Board, Kept, NotKept, Record};
 pub use job::{Cursor, Job, Observer, Strokes, Unobserved};
-pub use memory::{Lent, Lm3s6965Memory, Memory, NO_MOVES, PicoMemory};
+pub use memory::{Lent, Lm3s6965Memory, Memory, NO_MOVES, NO_MOVES_OF_PICO, PicoMemory};
 pub use options::PlotOptions;
 
 use crate::fixed::BinaryFraction;
@@ -388,7 +388,8 @@ impl Inner<'_> {
     fn report_build<B: Board>(&self, board: &mut B) {
         const VERSION: &str = env!("CARGO_PKG_VERSION");
         Reply(board).line(format_args!("[VER:1.1h.penup {VERSION}:{}]", B::NAME));
-        Reply(board).line(format_args!("[OPT:,{},{LINE_LIMIT}]", memory::BLOCKS));
+        let blocks = self.machine.moves_ahead();
+        Reply(board).line(format_args!("[OPT:,{blocks},{LINE_LIMIT}]"));
     }
 
     #[inline(never)] // Its frame must not lie under the stages'.

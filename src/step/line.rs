@@ -101,34 +101,42 @@ impl Line {
     }
 
     /// The two moves that it is made of, the straight and the diagonal one.
+    #[inline]
     pub const fn moves(&self) -> [Direction; 2] {
         [self.straight, self.diagonal]
     }
 
-    /// The next moves, as many as there is place for: 0 for a straight one, 1 for a diagonal one. Says
-    /// how many are diagonal.
+    /// How many of the next `count` moves are diagonal.
     ///
     /// ```
     /// use penup::step::Line;
-    /// let mut kinds = [0; 4];
-    /// assert_eq!(Line::by(4, 2).next_kinds(&mut kinds), 2);
-    /// assert_eq!(kinds, [1, 0, 1, 0]);
+    /// assert_eq!(Line::by(4, 1).diagonals_within(2), 1);
+    /// assert_eq!(Line::by(4, 1).diagonals_within(1), 0);
     /// ```
-    #[inline(never)] // On its own it stays in the registers of a small core.
-    pub fn next_kinds(&mut self, kinds: &mut [u8]) -> usize {
-        let mut diagonals = 0;
-        let Self { mut balance, straight_gain, diagonal_loss, .. } = *self;
-        // Above this the diagonal move is the better one.
-        let tie = -i32::from(self.ties_diagonal);
-        for kind in kinds.iter_mut() {
-            let is_diagonal = balance > tie;
-            balance += if is_diagonal { -diagonal_loss } else { straight_gain };
-            *kind = u8::from(is_diagonal);
-            diagonals += usize::from(is_diagonal);
-        }
-        self.balance = balance;
-        self.remaining = self.remaining.saturating_sub(kinds.len() as u32);
-        diagonals
+    pub fn diagonals_within(&self, count: usize) -> usize {
+        let mut line = self.clone();
+        (0..count).filter(|_| line.next_is_diagonal()).count()
+    }
+
+    /// Makes the next move; whether it is diagonal.
+    pub(crate) fn next_is_diagonal(&mut self) -> bool {
+        let [balance, gain, loss] = self.rule();
+        let is_diagonal = balance > 0;
+        self.go_on(if is_diagonal { balance - loss } else { balance + gain }, 1);
+        is_diagonal
+    }
+
+    /// The next move is diagonal if the first of these is above zero; a straight move adds the second to it, a
+    /// diagonal one takes the third.
+    pub(crate) fn rule(&self) -> [i32; 3] {
+        let balance = self.balance + i32::from(self.ties_diagonal);
+        [balance, self.straight_gain, self.diagonal_loss]
+    }
+
+    /// So many moves were made by that rule, which left this balance.
+    pub(crate) fn go_on(&mut self, balance: i32, moves: usize) {
+        self.balance = balance - i32::from(self.ties_diagonal);
+        self.remaining = self.remaining.saturating_sub(moves as u32);
     }
 
     /// Moves still to come.

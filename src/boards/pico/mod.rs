@@ -34,18 +34,19 @@ mod registers;
 mod serial;
 mod steps;
 mod usb;
+mod words;
 
 use cortex_m::peripheral::Peripherals as Core;
 use penup::machine::{Contacts, PulserState};
 use penup::motion::{Block, EventQueue};
-use penup::plotter::{Board, Kept, Lent, NO_MOVES, NotKept, PicoMemory, Record};
+use penup::plotter::{Board, Kept, Lent, NO_MOVES_OF_PICO, NotKept, PicoMemory, Record};
 use penup::protocol::RealTime;
 use rp2040_hal::clocks::init_clocks_and_plls;
 use rp2040_hal::fugit::ExtU32;
 use rp2040_hal::gpio::Pins;
 use rp2040_hal::pac::Peripherals;
 use rp2040_hal::{Sio, Watchdog};
-use static_cell::{ConstStaticCell, StaticCell};
+use static_cell::ConstStaticCell;
 
 use self::ports::Ports;
 
@@ -102,8 +103,9 @@ pub fn take() -> (Pico, Lent<'static>, &'static PulserState) {
     watchdog.start(3.secs());
     defmt::info!("pico at {=u32} Hz", clock::HERTZ);
     static MEMORY: ConstStaticCell<PicoMemory> = ConstStaticCell::new(PicoMemory::new());
-    static BLOCKS: StaticCell<[Block; NO_MOVES.len()]> = StaticCell::new();
-    let memory = MEMORY.take().lend(BLOCKS.init(NO_MOVES));
+    static BLOCKS: ConstStaticCell<[Block; NO_MOVES_OF_PICO.len()]> =
+        ConstStaticCell::new(NO_MOVES_OF_PICO);
+    let memory = MEMORY.take().lend(BLOCKS.take());
     let board = Pico { ports, steps, flash: flash::Flash::new(), was_restarted };
     (board, memory, &steps::STATE)
 }

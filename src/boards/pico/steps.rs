@@ -22,7 +22,7 @@ use cortex_m::peripheral::NVIC;
 use heapless::spsc::{Consumer, Producer, Queue};
 use penup::machine::PulserState;
 use penup::motion::{
-    Brake, EventKind, EventQueue, QueueSize, Runner, StepEvent, StepLength, StepWay,
+    Brake, EventKind, EventQueue, QueueSize, Runner, StepEvent, StepLength, StepTrain, StepWay,
     TICKS_PER_SECOND,
 };
 use rp2040_hal::pac::{Interrupt, interrupt};
@@ -30,7 +30,7 @@ use static_cell::StaticCell;
 
 use super::pins::FIRST_MOTOR_PIN;
 use super::registers::{self, DMA, PIO0, reset};
-use super::{clock, critical, lift, pen};
+use super::{clock, critical, lift, pen, words};
 use crate::boards::handler::Owned;
 
 /// Words of the ring, a power of two.
@@ -73,6 +73,7 @@ mod target {
     pub const WAIT: u32 = 1 << 5;
     pub const PULSE: u32 = 6 << 5;
 }
+pub(super) use target::PULSE;
 const TARGETS: u32 = 7 << 5;
 /// Ticks that a word takes beyond its count, by its target; a pulse takes its width, too.
 const WAIT_TICKS: u32 = 2;
@@ -205,6 +206,8 @@ pub struct Steps {
     /// Something follows the last event.
     moving: bool,
     drained: bool,
+    /// It has taken nothing since it was drained, or since an underrun.
+    resting: bool,
     /// How many words were taken, and when that was first seen, in microseconds.
     taken_seen: u32,
     seen_at: u32,
@@ -272,6 +275,7 @@ pub fn set_up(nvic: &mut NVIC) -> Steps {
         ticks: 0,
         moving: false,
         drained: true,
+        resting: true,
         taken_seen: 0,
         seen_at: 0,
     }
@@ -303,6 +307,12 @@ fn begin(pulse_ticks: u32) {
 
 fn place(word: u32) -> &'static AtomicU32 {
     &RING.0[(word % WORDS) as usize]
+}
+
+/// Up to `count` words from `word` on, as far as they lie in a row.
+fn row(word: u32, count: u32) -> &'static [AtomicU32] {
+    let start = word % WORDS;
+    &RING.0[start as usize..(start + count).min(WORDS) as usize]
 }
 
 fn ring_address(word: u32) -> u32 {
@@ -361,6 +371,7 @@ impl Steps {
             self.configure();
         }
         let was_drained = self.drained;
+        let was_resting = self.resting;
         let began = taken != self.taken;
         self.count_to(taken);
         let stalled = PIO0.read(machine::FIFO_DEBUG) & STALLED != 0;
@@ -372,10 +383,12 @@ impl Steps {
         if stalled && began {
             PIO0.write(machine::FIFO_DEBUG, STALLED);
         }
-        // While it was drained before, the flag is as old.
-        if stalled && !was_drained && (self.moving || !self.drained) {
+        self.resting = self.drained || (was_resting && !began);
+        // Until it begins, and when that is first seen, the flag may be from before.
+        if stalled && !was_resting && (self.moving || !self.drained) {
             STATE.note_underrun();
             self.moving = false;
+            self.resting = true;
         }
         STATE.report_slack(self.slack);
         STATE.report(self.steps, self.ticks, self.drained);
@@ -401,22 +414,27 @@ impl Steps {
         }
     }
 
-    /// 20 cycles a word.
-    #[inline(never)] // On its own it stays in the core's registers.
+    /// 14 cycles a pulse.
     fn count_to(&mut self, taken: u32) {
         let count = taken.wrapping_sub(self.taken);
         // A word on its way may be counted a moment early, so the count may seem to go back.
         if count > WORDS {
             return;
         }
-        let (mut steps, mut slack) = (0u32, 0u32);
+        let (mut counted, mut pulses) = (0, 0);
+        let (mut sums, mut slack) = ([0; 2], 0u32);
         let (mut ticks, mut waits, mut pens) = (0u32, 0, 0);
-        for number in 0..count {
-            let word = place(self.taken.wrapping_add(number)).load(Ordering::Relaxed);
+        while counted < count {
+            let row = row(self.taken.wrapping_add(counted), count - counted);
+            let in_row = words::count_pulses(row, &self.moves, &mut sums);
+            pulses += in_row as u32;
+            counted += in_row as u32;
+            let Some(word) = row.get(in_row).map(|word| word.load(Ordering::Relaxed)) else {
+                continue;
+            };
+            counted += 1;
             ticks = ticks.wrapping_add(word >> 8);
-            if word & TARGETS == target::PULSE {
-                steps = steps.wrapping_add(self.moves[(word & LEVELS) as usize]);
-            } else if word & TARGETS == target::MOVE_PEN {
+            if word & TARGETS == target::MOVE_PEN {
                 pens += 1;
             } else {
                 waits += 1;
@@ -425,10 +443,10 @@ impl Steps {
                 }
             }
         }
-        let pulses = count - waits - pens;
+        let [steps, pulse_ticks] = sums;
         let beyond =
             waits * WAIT_TICKS + pens * PEN_TICKS + pulses * (PULSE_TICKS + self.pulse_ticks);
-        self.ticks = self.ticks.wrapping_add(ticks).wrapping_add(beyond);
+        self.ticks = self.ticks.wrapping_add(ticks).wrapping_add(pulse_ticks).wrapping_add(beyond);
         add_packed(&mut self.steps, steps);
         add_packed(&mut self.slack, slack);
         self.taken = taken;
@@ -467,6 +485,7 @@ impl Steps {
         self.levels = self.levels_now() & !PULSES;
         self.moving = false;
         self.drained = true;
+        self.resting = true;
     }
 
     /// The levels of the last word counted.
@@ -525,19 +544,22 @@ impl EventQueue for Steps {
         Ok(())
     }
 
-    /// 15 cycles a step, 25 if it may be braked.
-    fn push_steps(&mut self, steps: &[StepEvent]) -> Result<(), StepEvent> {
-        let count = steps.len() as u32;
+    /// 17 cycles a step; more if it may be braked.
+    fn push_train(&mut self, train: &mut StepTrain, count: u32) -> Result<(), StepEvent> {
         let Some(room) = self.room.checked_sub(count) else {
-            return steps.iter().try_for_each(|&step| self.push(step));
+            return train.push_each(count, |event| self.push(event));
         };
         let beyond = (PULSE_TICKS + self.pulse_ticks) << 8;
         let flips = self.flips | target::PULSE;
-        let mut word = self.levels;
-        for (number, step) in (0u32..).zip(steps) {
-            word = (step.to_bits() ^ flips).wrapping_sub(beyond);
-            place(self.written.wrapping_add(number)).store(word, Ordering::Relaxed);
+        train.convert(|event| (event ^ flips).wrapping_sub(beyond));
+        let mut done = 0;
+        while done < count {
+            let row = row(self.written.wrapping_add(done), count - done);
+            words::write_train(train, row);
+            done += row.len() as u32;
         }
+        let word = place(self.written.wrapping_add(count - 1)).load(Ordering::Relaxed);
+        train.convert(|word| word.wrapping_add(beyond) ^ flips);
         if STATE.brake().is_on() {
             self.tell_ways(count);
         }
