@@ -68,7 +68,8 @@ fn a_late_main_loop_brakes_half_a_million_steps_a_second() -> Result<(), Box<dyn
         }
     }
     println!("late {late} times, {pauses} pauses, {:.3} of the limit", worst / hardest);
-    // Eight at a time are braked alike there, which is a stair.
-    assert!(worst <= 1.3 * hardest, "{worst:.0} steps/s², not {hardest:.0}");
+    // Eight at a time are braked alike there, which is a stair: 1.2 to 1.6 were measured. A stop between two
+    // steps would be 30.
+    assert!(worst <= 2.5 * hardest, "{worst:.0} steps/s², not {hardest:.0}");
     Ok(())
 }
