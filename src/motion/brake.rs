@@ -339,6 +339,20 @@ impl Brake {
         is_calm
     }
 
+    /// Takes some steps at once, `around` units in all, and none with fewer ticks to the next than it says. `None` and nothing
+    /// taken near rest, where speed changes more from step to step: within 64 steps of the `longest` way.
+    pub fn pass_evenly(&mut self, around: u32, longest: u32, orders: &BrakeOrders) -> Option<u32> {
+        let top = orders.top.load(Ordering::Relaxed);
+        let left = orders.waiting().max(0).cast_unsigned().saturating_sub(around);
+        let least = self.reach.min(left).min(top);
+        if least < 64 * longest {
+            return None;
+        }
+        orders.take(around);
+        self.reach = (self.reach + around).min(left).min(top);
+        Some(least_interval(longest, least, orders.exponent.load(Ordering::Relaxed)))
+    }
+
     /// Takes all steps at once that come before `queued` was the sum, if enough waits behind them.
     #[inline]
     pub fn pass_far(&mut self, queued: u32, orders: &BrakeOrders) -> bool {

@@ -53,6 +53,8 @@ const GROUP: u32 = 16;
 const FAR_GROUPS: u32 = 8;
 /// It ends before its steps are known too early, when more may come: 2 ms.
 const BRAKED_TICKS: u32 = TICKS_PER_SECOND / 500;
+/// Steps with fewer ticks are braked some at a time: above 200,000 a second.
+const FAST_TICKS: u32 = TICKS_PER_SECOND / 200_000;
 /// A wait is so many words at most, of 2 ms if that is enough, for the same reason.
 const WAIT_WORDS: u32 = 64;
 /// Heights of the pen that wait, or two for each step of its motor, at most; one more place than that, for the queue.
@@ -733,7 +735,10 @@ fn feed() {
             words = calm_words(brake, told, count);
         }
         if words == 0 {
-            words = brake_words(brake, told, count);
+            words = brake_evenly(brake, told, count);
+            if words == 0 {
+                words = brake_words(brake, told, count);
+            }
             address = BRAKED.0.as_ptr() as u32;
         }
     }
@@ -775,6 +780,38 @@ fn calm_words(brake: &mut Brake, told: u32, count: u32) -> u32 {
         words += 1;
     }
     if brake.pass(around, longest, shortest, STATE.brake()) { words } else { 0 }
+}
+
+/// Copies a block of the `count` words from `told` on, with the same least ticks for all: far from rest, where there is little
+/// time. Says how many they are; 0 if that will not do.
+#[inline(never)]
+fn brake_evenly(brake: &mut Brake, told: u32, count: u32) -> u32 {
+    let is_fast = place(told).load(Ordering::Relaxed) >> 8 < FAST_TICKS;
+    if count < BRAKED_WORDS || !is_fast {
+        return 0;
+    }
+    let (mut around, mut longest) = (0, 0);
+    for number in 0..BRAKED_WORDS {
+        let step = way(told.wrapping_add(number)).load(Ordering::Relaxed);
+        if step == 0 {
+            return 0;
+        }
+        around += step & 0xFFFF;
+        longest = longest.max(step >> 16);
+    }
+    let Some(least) = brake.pass_evenly(around, longest, STATE.brake()) else { return 0 };
+    let least = least.saturating_sub(PULSE_TICKS + STATE.pulse_ticks()).min(StepEvent::MAX_TICKS);
+    let mut is_braked = false;
+    for (number, braked) in (0..).zip(&BRAKED.0) {
+        let mut word = place(told.wrapping_add(number)).load(Ordering::Relaxed);
+        if word >> 8 < least {
+            word = least << 8 | word & 0xFF;
+            is_braked = true;
+        }
+        braked.store(word, Ordering::Relaxed);
+    }
+    BRAKING.store(is_braked, Ordering::Relaxed);
+    BRAKED_WORDS
 }
 
 /// Copies the first of the `count` words from `told` on, each step with as many ticks as it takes at
