@@ -153,8 +153,8 @@ fn exchange(
                 continue;
             }
             let now = lengths[usize::from(a)] + lengths[usize::from(c)];
-            let parallel = sum_below(odd, [a, c, b, d], now, pace)?;
-            let crossed = sum_below(odd, [a, d, b, c], now, pace)?;
+            let parallel = sum_below(odd, [a, c, b, d], now);
+            let crossed = sum_below(odd, [a, d, b, c], now);
             if parallel.min(crossed) >= now {
                 continue;
             }
@@ -172,17 +172,11 @@ fn exchange(
 
 /// The length of two moves, first to second and third to fourth point; any large number if it is not below
 /// `bound`, which is mostly seen without a square root.
-fn sum_below(
-    odd: &OddPoints<'_>,
-    [a, b, c, d]: [u16; 4],
-    bound: u32,
-    pace: &mut Pace<'_>,
-) -> Result<u32, OrderError> {
+fn sum_below(odd: &OddPoints<'_>, [a, b, c, d]: [u16; 4], bound: u32) -> u32 {
     if odd.least_distance(a, b) + odd.least_distance(c, d) >= bound {
-        return Ok(u32::MAX);
+        return u32::MAX;
     }
-    pace.work(2)?;
-    Ok(odd.distance(a, b).saturating_add(odd.distance(c, d)))
+    odd.distance(a, b).saturating_add(odd.distance(c, d))
 }
 
 impl From<crate::stage::Aborted> for OrderError {

@@ -72,6 +72,8 @@ enum Task {
         #[arg(default_value_t = 20_000)]
         count: u32,
     },
+    /// Lets the emulated Pico draw 343 cubes, and compares every step with the host's (some minutes).
+    Lattice7,
     /// Cuts the emulated Pico's power at many instants, and in as many writes of its flash.
     Cuts {
         /// How many of each; from 4608 on, before every byte that a save changes (some 10 minutes).
@@ -115,6 +117,7 @@ fn carry_out() -> Result<()> {
         Some(Task::Experiments) => experiments::repeat()?,
         Some(Task::Scenes { count }) => test::random_scenes(count)?,
         Some(Task::Cuts { count }) => test::power_cuts(count)?,
+        Some(Task::Lattice7) => test::lattice7()?,
         Some(Task::SetUp) => {
             for &board in Board::ALL {
                 set_up::toolchain(board.target())?;

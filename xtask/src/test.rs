@@ -51,14 +51,21 @@ pub fn random_scenes(count: u32) -> Result<()> {
 /// As many losses of power as wanted, where `everything` has 200 of each kind; from 4608 on, before every byte of
 /// flash that a save changes.
 pub fn power_cuts(count: u32) -> Result<()> {
+    step(on_the_pico("pico_power")?.env("PENUP_CUTS", count.to_string()))
+}
+
+/// The largest scene of the Pico, from its upload to the last step.
+pub fn lattice7() -> Result<()> {
+    step(on_the_pico("pico_lattice7")?.args(["--", "--ignored"]))
+}
+
+/// Builds the Pico's image; the command of a test that runs it.
+fn on_the_pico(test: &str) -> Result<Command> {
     set_up::emulator(Board::Pico)?;
     firmware::check(Board::Pico, &firmware::build(Board::Pico)?)?;
-    step(
-        workspace("test")
-            .args(["--package", "penup-host-tests", "--test", "pico_power"])
-            .args(EMULATOR)
-            .env("PENUP_CUTS", count.to_string()),
-    )
+    let mut cargo = workspace("test");
+    cargo.args(["--package", "penup-host-tests", "--test", test]).args(EMULATOR);
+    Ok(cargo)
 }
 
 fn workspace(command: &str) -> Command {
