@@ -1,6 +1,6 @@
 //! A move to pieces that are straight for the motors, too.
 
-use super::{Cuts, Machine, Piece, Target};
+use super::{Machine, Piece, Target};
 use crate::drawing::{LineType, PagePoint};
 use crate::motion::{Move, PathLength, PushError};
 use crate::step::Pattern;
@@ -12,8 +12,8 @@ pub(super) struct Split {
     to: PagePoint,
     /// How much of its length is done.
     place: PathLength,
-    /// Where it is cut, if it must be, and the last of these cuts behind it.
-    cuts: Option<(Cuts, i32)>,
+    /// The last of its cuts behind it; 0 at the beginning.
+    cut: i32,
     /// The dot or gap in work.
     dot: u32,
     ink: Option<LineType>,
@@ -39,8 +39,7 @@ impl Machine<'_> {
         }
         let from = self.runner.page_end();
         self.runner.limits().length(to.x - from.x, to.y - from.y).ok_or(PushError::TooLong)?;
-        let cuts = self.settings.kinematics().cuts(from, to).map(|cuts| (cuts, cuts.start()));
-        self.split = Some(Split { from, to, place: PathLength::ZERO, cuts, dot: 0, ink, limit });
+        self.split = Some(Split { from, to, place: PathLength::ZERO, cut: 0, dot: 0, ink, limit });
         self.push_pieces();
         Ok(())
     }
@@ -50,15 +49,15 @@ impl Machine<'_> {
         while let Some(split) = self.split
             && !self.runner.is_full()
         {
-            let Split { from, to, place, mut cuts, dot, mut ink, limit } = split;
+            let Split { from, to, place, mut cut, dot, mut ink, limit } = split;
             let mut next_dot = dot;
             let way = (to.x - from.x, to.y - from.y);
             let build = self.settings.kinematics();
             // The move was measured before.
             let length = self.runner.limits().length(way.0, way.1).unwrap_or_default();
             let (mut end, mut is_gap) = (length.to_bits(), false);
-            if let Some((cuts, cut)) = &mut cuts {
-                let next = cuts.next(*cut);
+            if let Some(cuts) = build.cuts(from, to) {
+                let next = cuts.next(cut);
                 // Dots and gaps are cut here: each piece is shorter than the pattern.
                 let pattern = match ink.replace(LineType::Full) {
                     Some(line_type @ (LineType::Dotted | LineType::Dashed)) => {
@@ -76,7 +75,7 @@ impl Machine<'_> {
                 end = dot_end.min(next_place);
                 next_dot += u32::from(end == dot_end);
                 if end == next_place {
-                    *cut = next;
+                    cut = next;
                 }
             }
             let end = PathLength::from_bits(end);
@@ -90,7 +89,7 @@ impl Machine<'_> {
             let pushed = self.push_motors(&piece, ink, limit);
             debug_assert!(pushed.is_ok());
             if pushed != Ok(false) {
-                let rest = Split { place: end, cuts, dot: next_dot, ..split };
+                let rest = Split { place: end, cut, dot: next_dot, ..split };
                 self.split = (end < length).then_some(rest);
             }
         }
