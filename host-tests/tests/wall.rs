@@ -70,8 +70,10 @@ impl Wall {
         if off(along.clamp(0.0, 1.0)) <= 0.5 {
             return 0.5;
         }
-        // The greater of the two has one valley within some steps.
-        let reach = 5.0 / squared.sqrt();
+        // The greater of the two has one valley within some steps; close below the anchors' height a step of
+        // the belts is many of the page.
+        let depth = (self.height - y).max(1.0);
+        let reach = 5.0 * (1.0 + f64::from(belts.x.max(belts.y)) / depth) / squared.sqrt();
         let (mut low, mut high) = ((along - reach).max(0.0), (along + reach).min(1.0));
         for _ in 0..60 {
             let third = (high - low) / 3.0;

@@ -83,8 +83,8 @@ impl Kinematics {
         let Self::Polargraph(anchors) = self else {
             return Piece { motors: self.motors(to), page: to, offsets: [0; 2] };
         };
-        let line = FineLine::new(anchors, in_order(ends));
-        let backward = in_order(ends) != ends;
+        let (ends, backward) = in_order(ends);
+        let line = FineLine::new(anchors, ends);
         let [start, end] = places.map(|place| {
             line.at(if backward { length.saturating_sub(place) } else { place }, length)
         });
@@ -93,7 +93,7 @@ impl Kinematics {
         } else {
             let [x, y] = end.ways;
             let more = usize::from(x.abs() <= y.abs());
-            let steps = rounded(end.belts[more].into(), line.bits);
+            let steps = rounded(end.belts[more], line.bits);
             let others = rounded(line.beside(end, steps, more), line.bits);
             let [x, y] = if more == 0 { [steps, others] } else { [others, steps] };
             PagePoint { x, y }
@@ -101,11 +101,13 @@ impl Kinematics {
         let more = usize::from((motors.x - begin.x).abs() <= (motors.y - begin.y).abs());
         let offsets = [(start, begin), (end, motors)].map(|(place, PagePoint { x, y })| {
             let (steps, others) = if more == 0 { (x, y) } else { (y, x) };
-            let beside = line.beside(place, steps, more) - (i64::from(others) << line.bits);
-            // At the ends of a line both belts are rounded, so it may be more.
-            rounded(beside * i64::from(Line::OFFSET_UNIT), line.bits).clamp(-127, 127) as i8
+            // At the ends of a line both belts are rounded, so it may be more than half of a step.
+            let step = 1 << line.bits;
+            let beside = line.beside(place, steps, more) - (others << line.bits);
+            let units = beside.clamp(-step, step) * Line::OFFSET_UNIT;
+            rounded(units, line.bits).clamp(-127, 127) as i8
         });
-        let [x, down] = end.place.map(|fine| rounded(fine.into(), line.bits));
+        let [x, down] = end.place.map(|fine| rounded(fine, line.bits));
         let page = PagePoint { x: anchors.left.x + x, y: anchors.left.y - down };
         Piece { motors, page, offsets }
     }
@@ -139,9 +141,10 @@ impl Kinematics {
     }
 }
 
-/// The ends of a line, the lesser first.
-pub(super) fn in_order([a, b]: [PagePoint; 2]) -> [PagePoint; 2] {
-    if (b.x, b.y) < (a.x, a.y) { [b, a] } else { [a, b] }
+/// The ends of a line, the lesser first, and whether that turns it round.
+pub(super) fn in_order([a, b]: [PagePoint; 2]) -> ([PagePoint; 2], bool) {
+    let backward = (b.x, b.y) < (a.x, a.y);
+    (if backward { [b, a] } else { [a, b] }, backward)
 }
 
 /// A line on a wall, in 2^-`bits` steps from the left anchor, to the right and down.
@@ -151,7 +154,7 @@ struct FineLine {
     way: [i32; 2],
     width: i32,
     /// The way again, made as long as 32 bits allow: only its direction counts.
-    direction: [i64; 2],
+    direction: [i32; 2],
 }
 
 /// A place on it.
@@ -161,7 +164,7 @@ struct FinePlace {
     /// The lengths of both belts.
     belts: [i32; 2],
     /// How fast they change along the line, one against the other.
-    ways: [i64; 2],
+    ways: [i32; 2],
 }
 
 impl FineLine {
@@ -174,48 +177,53 @@ impl FineLine {
         let way = [to[0] - from[0], to[1] - from[1]];
         // Below 2^21.
         let longer = (way[0].abs().max(way[1].abs()) | 1).leading_zeros().saturating_sub(10);
-        let direction = way.map(|way| i64::from(way) << longer);
+        let direction = way.map(|way| way << longer);
         let [from, way] = [from, way].map(|point| point.map(|steps| steps << bits));
         Self { bits, from, way, width: width << bits, direction }
     }
 
     /// The place at `done` of a `length`.
+    #[inline(never)] // Not in each of its places: flash is short.
     fn at(&self, done: u32, length: u32) -> FinePlace {
         let along = |axis: usize| {
             // Below 2^62.
             let way = i64::from(self.way[axis]) * i64::from(done);
-            let half = i64::from(length / 2);
-            self.from[axis] + (way + half).div_euclid(length.max(1).into()) as i32
+            self.from[axis] + way.checked_div(length.into()).unwrap_or(0) as i32
         };
         let place @ [x, y] = [along(0), along(1)];
         let beside = [x, x - self.width];
         let belts = beside.map(|x| length_of(x, y));
         let way = |axis: usize| {
             // Below 2^54.
-            let way =
-                i64::from(beside[axis]) * self.direction[0] + i64::from(y) * self.direction[1];
-            way.checked_div(belts[axis].into()).unwrap_or(0)
+            let [right, down] = self.direction.map(i64::from);
+            let way = i64::from(beside[axis]) * right + i64::from(y) * down;
+            // Below 2^23, as the direction.
+            way.checked_div(belts[axis].into()).unwrap_or(0) as i32
         };
         FinePlace { place, belts, ways: [way(0), way(1)] }
     }
 
     /// The length of the other belt where, beside a place on the line, the belt `more` is `steps` long.
-    fn beside(&self, place: FinePlace, steps: i32, more: usize) -> i64 {
-        let ahead = (i64::from(steps) << self.bits) - i64::from(place.belts[more]);
-        let ahead = (ahead * place.ways[1 - more]).checked_div(place.ways[more]).unwrap_or(0);
-        i64::from(place.belts[1 - more]) + ahead
+    #[inline(never)] // Not in each of its places: flash is short.
+    fn beside(&self, place: FinePlace, steps: i32, more: usize) -> i32 {
+        let ahead = i64::from((steps << self.bits) - place.belts[more]);
+        let ahead = ahead * i64::from(place.ways[1 - more]);
+        // A step or two, unless the belts nearly stand still.
+        let ahead = ahead.checked_div(place.ways[more].into()).unwrap_or(0);
+        place.belts[1 - more].saturating_add(ahead as i32)
     }
 }
 
 /// √(x² + y²), rounded.
+#[inline(never)] // Not in each of its places: flash is short.
 pub(super) fn length_of(x: i32, y: i32) -> i32 {
     let square = |steps: i32| i64::from(steps).unsigned_abs() * i64::from(steps).unsigned_abs();
     rounded_root(square(x) + square(y))
 }
 
 /// A number of 2^-`bits`, one bit at least, rounded.
-fn rounded(fine: i64, bits: u32) -> i32 {
-    ((fine + (1 << (bits - 1))) >> bits) as i32
+fn rounded(fine: i32, bits: u32) -> i32 {
+    (fine + (1 << (bits - 1))) >> bits
 }
 
 /// The root of a number below 2^62, rounded.

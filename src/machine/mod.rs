@@ -226,7 +226,6 @@ impl<'m> Machine<'m> {
         self.origin = PagePoint { x: motors.x.wrapping_sub(x), y: motors.y.wrapping_sub(y) };
         self.split = None;
         let slack = self.find_slack();
-        self.runner.follow_lift(self.pins.ticks());
         self.runner.set_lift(self.pins.lift());
         self.runner.set_position(motors, slack, page, self.pins.ticks());
     }

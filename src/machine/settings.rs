@@ -190,7 +190,7 @@ pub const SETTINGS: [SettingInfo; SETTING_COUNT] = {
         info(TravelSpeed, 202, "speed pen up", "mm/min", (1.0, 32767.0, 6000.0), false),
         info(Centripetal, 203, "slow in bends", "0|1", (0.0, 1.0, 1.0), true),
         info(Jerk, 204, "jerk", "m/s3", (0.0, 1000.0, 0.0), false),
-        info(PenLift, 209, "pen lifted by a motor", "0|1", (0.0, 1.0, 0.0), true),
+        info(PenLift, 209, "pen on a motor", "0|1", (0.0, 1.0, 0.0), true),
         info(PenUpHeight, 210, "height pen up", "of 127", (0.0, 127.0, 0.0), true),
         info(PenDownHeight, 211, "height pen down", "of 127", (0.0, 127.0, 127.0), true),
         info(PenUpDwell, 212, "dwell pen up", "ms", (1.0, 1300.0, 150.0), false),
@@ -379,6 +379,7 @@ impl Settings {
     }
 
     /// How the motor lifts the pen, if one does.
+    #[inline(never)] // Not in each of its places: flash is short.
     fn checked_lift(&self) -> Result<Option<LiftRule>, LimitsError> {
         if !self.is_on(Setting::PenLift) {
             return Ok(None);
@@ -390,10 +391,8 @@ impl Settings {
             ((product >> (2 * Value::FRAC_NBITS)) / seconds) as u32
         };
         let asked = per_second(Setting::MaxRateZ, 60);
-        let pulse = self.microseconds_as_ticks(Setting::StepPulse).max(1);
-        let possible = (TICKS_PER_SECOND / pulse / 2).min(GREATEST_LIFT_RATE);
-        if asked > possible {
-            return Err(LimitsError::TooManySteps { asked, possible });
+        if asked > GREATEST_LIFT_RATE {
+            return Err(LimitsError::TooManySteps { asked, possible: GREATEST_LIFT_RATE });
         }
         let travel = self.millimetres_as_steps(Setting::TravelZ, Setting::StepsPerMmZ);
         Ok(Some(LiftRule::new(travel, asked, per_second(Setting::AccelerationZ, 1))))
@@ -467,6 +466,7 @@ impl Settings {
         Value::from_bits(bits.clamp(i32::MIN.into(), i32::MAX.into()) as i32)
     }
 
+    #[inline(never)] // Not in each of its places: flash is short.
     pub(super) fn pen_positions(&self) -> PenPositions {
         PenPositions {
             up_height: self.height(Setting::PenUpHeight),
@@ -478,20 +478,6 @@ impl Settings {
             // `set` lets nothing in that is refused here.
             lift: self.checked_lift().unwrap_or_default(),
         }
-    }
-
-    /// How long the pen's way is between its heights, in milliseconds.
-    pub(super) fn pen_way(&self) -> u64 {
-        let pen = self.pen_positions();
-        let heights = [pen.up_height, pen.down_height];
-        let ticks = match pen.lift {
-            Some(rule) => {
-                let [up, down] = heights.map(|height| rule.steps(height));
-                rule.ticks(up.abs_diff(down))
-            }
-            None => u64::from(heights[0].abs_diff(heights[1])) * u64::from(pen.ramp_ticks),
-        };
-        ticks / u64::from(TICKS_PER_SECOND / 1000)
     }
 }
 

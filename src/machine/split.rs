@@ -1,6 +1,6 @@
 //! A move to pieces that are straight for the motors, too.
 
-use super::{Cuts, Machine, Piece, Target};
+use super::{Machine, Piece, Target};
 use crate::drawing::{LineType, PagePoint};
 use crate::motion::{Move, PathLength, PushError};
 use crate::step::Pattern;
@@ -13,8 +13,8 @@ pub(super) struct Split {
     length: PathLength,
     /// How much of its length is done.
     place: PathLength,
-    /// Where it is cut, if it must be, and the last of these cuts behind it.
-    cuts: Option<(Cuts, i32)>,
+    /// The last of its cuts behind it; 0 at the beginning.
+    cut: i32,
     /// The dot or gap in work.
     dot: u32,
     ink: Option<LineType>,
@@ -45,9 +45,8 @@ impl Machine<'_> {
         let from = self.runner.page_end();
         let (dx, dy) = (to.x - from.x, to.y - from.y);
         let length = self.runner.limits().length(dx, dy).ok_or(PushError::TooLong)?;
-        let cuts = self.settings.kinematics().cuts(from, to).map(|cuts| (cuts, cuts.start()));
         let place = PathLength::ZERO;
-        self.split = Some(Split { from, to, length, place, cuts, dot: 0, ink, limit });
+        self.split = Some(Split { from, to, length, place, cut: 0, dot: 0, ink, limit });
         self.push_pieces();
         Ok(length)
     }
@@ -57,13 +56,13 @@ impl Machine<'_> {
         while let Some(split) = self.split
             && !self.runner.is_full()
         {
-            let Split { from, to, length, place, mut cuts, dot, mut ink, limit } = split;
+            let Split { from, to, length, place, mut cut, dot, mut ink, limit } = split;
             let mut next_dot = dot;
             let way = (to.x - from.x, to.y - from.y);
             let build = self.settings.kinematics();
             let (mut end, mut is_gap) = (length.to_bits(), false);
-            if let Some((cuts, cut)) = &mut cuts {
-                let next = cuts.next(*cut);
+            if let Some(cuts) = build.cuts(from, to) {
+                let next = cuts.next(cut);
                 // Dots and gaps are cut here: each piece is shorter than the pattern.
                 let pattern = match ink.replace(LineType::Full) {
                     Some(line_type @ (LineType::Dotted | LineType::Dashed)) => {
@@ -81,7 +80,7 @@ impl Machine<'_> {
                 end = dot_end.min(next_place);
                 next_dot += u32::from(end == dot_end);
                 if end == next_place {
-                    *cut = next;
+                    cut = next;
                 }
             }
             let end = PathLength::from_bits(end);
@@ -95,7 +94,7 @@ impl Machine<'_> {
             let pushed = self.push_motors(&piece, ink, limit);
             debug_assert!(pushed.is_ok());
             if pushed != Ok(false) {
-                let rest = Split { place: end, cuts, dot: next_dot, ..split };
+                let rest = Split { place: end, cut, dot: next_dot, ..split };
                 self.split = (end < length).then_some(rest);
             }
         }

@@ -115,7 +115,7 @@ fn bare_milliseconds(settings: &Settings, length: u64, speed: Setting) -> u64 {
 /// What the pen costs a stroke, in milliseconds.
 fn dwells(settings: &Settings) -> u64 {
     let down: u64 = settings.get(Setting::PenDownDwell).saturating_to_num();
-    down + settings.get(Setting::PenUpDwell).saturating_to_num::<u64>() + 2 * settings.pen_way()
+    down + settings.get(Setting::PenUpDwell).saturating_to_num::<u64>()
 }
 
 /// The time of a job, about: each piece between two sharp corners from rest to rest.
