@@ -1,7 +1,7 @@
 //! Orders, alarms and switches at random instants: of a whole plotter that draws over its line, and of a
 //! polargraph with slack that homes.
 
-#![allow(clippy::expect_used, reason = "a test fails by panicking")]
+#![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
 use penup::boards::host::{Change, Stamped};
 use penup::drawing::{LineType, PagePoint};
@@ -312,10 +312,10 @@ fn home_and_disturb(random: &mut Random) -> Stage {
                     stage = Stage::Drawing;
                 }
                 // Far from where it takes itself for, if the switches were pressed at a wrong place.
-                Stage::Homing | Stage::Stopped if matches!(machine.state(), State::Alarm(_)) => {
-                    if machine.unlock().is_ok() {
-                        stage = Stage::Stopped;
-                    }
+                Stage::Homing | Stage::Stopped
+                    if matches!(machine.state(), State::Alarm(_)) && machine.unlock().is_ok() =>
+                {
+                    stage = Stage::Stopped;
                 }
                 Stage::Held
                     if machine.state() == (State::Hold { standing: true }) && machine.stands() =>
