@@ -227,11 +227,14 @@ mod tests {
                     let mut at = PagePoint::default();
                     for (index, direction) in Line::beside(dx, dy, offsets).enumerate() {
                         at = direction.from_point(at);
-                        let part = (index + 1) as f64 / f64::from(more.abs());
-                        let [start, end] = offsets.map(|offset| f64::from(offset) / 255.0);
-                        let line = start + (f64::from(fewer) + end - start) * part;
-                        let off = line - f64::from(if dx.abs() > dy.abs() { at.y } else { at.x });
-                        assert!(off.abs() <= 0.5, "to {dx},{dy} {offsets:?} at {at:?}: {off}");
+                        // In units of an offset times the moves in all.
+                        let [start, end] = offsets.map(i32::from);
+                        let rise = Line::OFFSET_UNIT * fewer + end - start;
+                        let line = start * more.abs() + rise * (index as i32 + 1);
+                        let minor = if dx.abs() > dy.abs() { at.y } else { at.x };
+                        let off = line - Line::OFFSET_UNIT * minor * more.abs();
+                        let half = Line::OFFSET_UNIT * more.abs();
+                        assert!(2 * off.abs() <= half, "to {dx},{dy} {offsets:?} at {at:?}: {off}");
                     }
                     assert_eq!(at, PagePoint { x: dx, y: dy });
                 }
