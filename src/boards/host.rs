@@ -196,7 +196,7 @@ impl TracedSteps<'_> {
 
     /// Lets time pass until `end`, in ticks from the start: what is due before it happens.
     pub fn pass_until(&mut self, end: u64) {
-        if self.due.is_none() && self.pulser.begin() {
+        if self.due.is_none() && self.trace.now() < end && self.pulser.begin() {
             self.step_now();
         }
         loop {
