@@ -46,10 +46,10 @@ fn settings_outlive_the_power() -> TestResult {
 /// is said to it.
 struct Watched(Line<PicoByUsb>);
 
-/// Bytes of flash that change when settings are kept: a sector is erased, a page of payload and the header's are written.
-const SAVE_BYTES: u64 = 4096 + 256 + 256;
+/// Bytes of flash that change when settings are kept: a sector is erased, two pages of payload and the header's are written.
+const SAVE_BYTES: u64 = 4096 + 2 * 256 + 256;
 /// The payload is written, and the header up to the last byte of its sum.
-const VALID_FROM: u64 = 4096 + 256 + 16;
+const VALID_FROM: u64 = 4096 + 2 * 256 + 16;
 
 impl Watched {
     fn start() -> Result<Self, Box<dyn Error>> {
@@ -169,7 +169,7 @@ fn after_a_cut_in_any_write_of_the_flash_the_settings_are_the_old_or_the_new_one
         assert_eq!(watched.0.hear()?, "ok");
     }
     let mut settings = watched.settings()?;
-    let edges = [0, 4096, 4096 + 256, VALID_FROM, SAVE_BYTES];
+    let edges = [0, 4096, 4096 + 256, 4096 + 2 * 256, VALID_FROM, SAVE_BYTES];
     let edges = edges.into_iter().flat_map(|edge| edge.saturating_sub(1)..=edge + 1);
     let mut places: Vec<u64> = edges.filter(|&place| place < SAVE_BYTES).collect();
     if cut_count() >= SAVE_BYTES {
@@ -264,6 +264,7 @@ fn the_last_job_is_drawn_again_after_a_loss_of_power() -> TestResult {
 fn after_a_cut_while_a_job_is_kept_it_is_the_old_one_or_the_new_one() -> TestResult {
     /// A sector is erased, a page of figures and strokes is written, and the header's.
     const JOB_BYTES: u64 = 4096 + 2 * 256;
+    const VALID_FROM: u64 = 4096 + 256 + 16;
     let mut watched = Watched::start()?;
     let page = ["$page=60x60", "$margin=5"];
     let lines = [job_lines("cube.obj", &page), job_lines("octahedron.obj", &page)];

@@ -1,4 +1,5 @@
-//! A main loop that is late at half a million steps a second: the Pico brakes on the path, and goes on.
+//! A main loop that prints long lists at half a million steps a second: the Pico loses no step, and never stops with
+//! a jerk.
 #![cfg(feature = "emulator")]
 
 use penup_client::emulator::Pin;
@@ -15,7 +16,7 @@ const PAUSE: f64 = 0.0002;
 const LAST: usize = 8;
 
 #[test]
-fn a_late_main_loop_brakes_half_a_million_steps_a_second() -> Result<(), Box<dyn Error>> {
+fn lists_do_not_stop_half_a_million_steps_a_second_with_a_jerk() -> Result<(), Box<dyn Error>> {
     // A line of the list takes longer to send than the ring lasts.
     let fast = [
         "$0=0.5",
@@ -32,15 +33,8 @@ fn a_late_main_loop_brakes_half_a_million_steps_a_second() -> Result<(), Box<dyn
     ];
     let lines = job_lines("diagonal.obj", &fast);
     let mut line = begin(Pico, &lines)?;
-    line.emulator.send(b"$$\n$$\n$$\n$$\n")?;
-    let status = loop {
-        let status = line.status()?;
-        if status.starts_with("<Idle") {
-            break status;
-        }
-    };
-    let late = status.split("|Late:").nth(1).and_then(|rest| rest.split(['|', '>']).next());
-    let late: u32 = late.ok_or("it was never late")?.parse()?;
+    line.emulator.send(b"$\n$\n")?;
+    while !line.status()?.starts_with("<Idle") {}
     let edges = of_changes(&line.emulator.pin_changes()?);
     let planned = planned(Pico, &lines);
     assert!(
@@ -67,9 +61,7 @@ fn a_late_main_loop_brakes_half_a_million_steps_a_second() -> Result<(), Box<dyn
             worst = worst.max(square(at - LAST, at) / (2.0 * LAST as f64));
         }
     }
-    println!("late {late} times, {pauses} pauses, {:.3} of the limit", worst / hardest);
-    // Eight at a time are braked alike there, which is a stair: 1.2 to 1.6 were measured. A stop between two
-    // steps would be 30.
-    assert!(worst <= 2.5 * hardest, "{worst:.0} steps/s², not {hardest:.0}");
+    println!("{pauses} pauses, {:.3} of the limit", worst / hardest);
+    assert!(worst <= hardest, "{worst:.0} steps/s², not {hardest:.0}");
     Ok(())
 }

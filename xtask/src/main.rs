@@ -76,8 +76,8 @@ enum Task {
     Lattice7,
     /// Cuts the emulated Pico's power at many instants, and in as many writes of its flash.
     Cuts {
-        /// How many of each; from 4608 on, before every byte that a save changes (some 10 minutes).
-        #[arg(default_value_t = 4608)]
+        /// How many of each; from 4864 on, before every byte that a save changes (some 10 minutes).
+        #[arg(default_value_t = 4864)]
         count: u32,
     },
     /// Installs what building and testing need.

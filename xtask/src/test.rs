@@ -48,7 +48,7 @@ pub fn random_scenes(count: u32) -> Result<()> {
     )
 }
 
-/// As many losses of power as wanted, where `everything` has 200 of each kind; from 4608 on, before every byte of
+/// As many losses of power as wanted, where `everything` has 200 of each kind; from 4864 on, before every byte of
 /// flash that a save changes.
 pub fn power_cuts(count: u32) -> Result<()> {
     step(on_the_pico("pico_power")?.env("PENUP_CUTS", count.to_string()))
