@@ -16,6 +16,14 @@ pub(super) struct Cycle<'s> {
     turned: usize,
 }
 
+/// How a leg stands in a cycle: until the next turn.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Stand {
+    place: usize,
+    /// Whether the leg goes the way in which the cycle is stored.
+    pub forward: bool,
+}
+
 impl<'s> Cycle<'s> {
     /// Turns that can be taken back.
     pub const MEMORY: usize = 256;
@@ -43,32 +51,48 @@ impl<'s> Cycle<'s> {
         usize::from(self.place[leg.segment()])
     }
 
-    /// Whether `leg` goes the way in which the cycle is stored.
-    pub fn forward(&self, leg: Leg) -> bool {
-        self.legs[self.place(leg)] == leg
+    /// How `leg` stands in the cycle.
+    pub fn stand(&self, leg: Leg) -> Stand {
+        let place = self.place(leg);
+        Stand { place, forward: self.legs[place] == leg }
     }
 
-    /// The leg after `leg`, the way that `leg` goes.
-    pub fn next(&self, leg: Leg) -> Leg {
-        let place = self.place(leg);
+    /// The leg after the one that stands there, the way that it goes.
+    pub fn after(&self, stand: Stand) -> Leg {
         let last = self.legs.len() - 1;
-        if self.legs[place] == leg {
+        let place = stand.place;
+        if stand.forward {
             self.legs[if place == last { 0 } else { place + 1 }]
         } else {
             self.legs[if place == 0 { last } else { place - 1 }].flipped()
         }
     }
 
+    /// The leg before the one that stands there, the way that it goes.
+    pub fn before(&self, stand: Stand) -> Leg {
+        self.after(Stand { forward: !stand.forward, ..stand }).flipped()
+    }
+
+    /// The leg after `leg`, the way that `leg` goes.
+    pub fn next(&self, leg: Leg) -> Leg {
+        self.after(self.stand(leg))
+    }
+
     /// The leg before `leg`, the way that `leg` goes.
     pub fn previous(&self, leg: Leg) -> Leg {
-        self.next(leg.flipped()).flipped()
+        self.before(self.stand(leg))
+    }
+
+    /// How many legs after `from` the place of `to` comes, the way that the leg of `from` goes.
+    pub fn way(&self, from: Stand, to: Stand) -> usize {
+        let (begin, end) =
+            if from.forward { (from.place, to.place) } else { (to.place, from.place) };
+        if end >= begin { end - begin } else { end + self.legs.len() - begin }
     }
 
     /// How many legs after `from` the leg `to` comes, the way that `from` goes.
     pub fn steps(&self, from: Leg, to: Leg) -> usize {
-        let (begin, end) = (self.place(from), self.place(to));
-        let (begin, end) = if self.forward(from) { (begin, end) } else { (end, begin) };
-        if end >= begin { end - begin } else { end + self.legs.len() - begin }
+        self.way(self.stand(from), self.stand(to))
     }
 
     /// From `… a, b … c, d …` makes `… a, c … b, d …`, `b` to `c` flipped. `a` and `c` go the same
@@ -79,7 +103,7 @@ impl<'s> Cycle<'s> {
         let outer = self.legs.len() - inner;
         let after = |place: usize| if place + 1 == self.legs.len() { 0 } else { place + 1 };
         // Turning the rest instead gives the same cycle.
-        let (begin, count) = match (self.forward(a), inner <= outer) {
+        let (begin, count) = match (self.stand(a).forward, inner <= outer) {
             (true, true) => (after(place_a), inner),
             (true, false) => (after(place_c), outer),
             (false, true) => (place_c, inner),

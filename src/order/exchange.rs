@@ -9,10 +9,12 @@
 //! traveling-salesman problem" (1973), and Helsgaun's implementation of it (2000).
 
 use super::cycle::Cycle;
+use super::distances::Distances;
 use super::incidence::Incidence;
 use super::near::Near;
 use super::network::Network;
 use super::pace::Pace;
+use super::search::Search;
 use super::{Leg, NONE, OrderError};
 use crate::stage::{OutOfScratch, Scratch};
 
@@ -21,17 +23,17 @@ const STEPS: usize = 2;
 
 /// A part of an exchange: which moves are cut after the first.
 #[derive(Debug, Clone, Copy)]
-struct Step {
-    /// What joining the ends after it leaves.
-    gain: i64,
+pub(super) struct Step {
+    /// What joining the ends after it leaves, 0 if nothing.
+    pub gain: i64,
     /// What is left before that.
-    hand: i64,
+    pub hand: i64,
     /// The leg before the second cut.
-    c: Leg,
+    pub c: Leg,
     /// Whether the way goes on from the first cut to the leg after `c`, else to the end of `c`.
-    onward: bool,
+    pub onward: bool,
     /// The same for the third cut, if there is one.
-    third: Option<(Leg, bool)>,
+    pub third: Option<(Leg, bool)>,
 }
 
 /// Stations around which an exchange may help, each once, first come first served.
@@ -76,6 +78,7 @@ impl<'s> Waiting<'s> {
 pub(super) struct Exchanges<'s, 'a> {
     pub cycle: Cycle<'s>,
     network: Network<'a>,
+    distances: Distances<'s, 'a>,
     incidence: Incidence<'s>,
     near: Near<'s>,
     waiting: Waiting<'s>,
@@ -102,10 +105,13 @@ impl<'s, 'a> Exchanges<'s, 'a> {
         for station in 0..network.stations() {
             waiting.add(station);
         }
+        let cycle = Cycle::new(legs, places, scratch.take(Cycle::MEMORY)?);
+        let incidence = Incidence::new(network, scratch)?;
         Ok(Self {
-            cycle: Cycle::new(legs, places, scratch.take(Cycle::MEMORY)?),
+            cycle,
             network,
-            incidence: Incidence::new(network, scratch)?,
+            distances: Distances::new(network, scratch)?,
+            incidence,
             near,
             waiting,
             gap,
@@ -120,6 +126,11 @@ impl<'s, 'a> Exchanges<'s, 'a> {
             + Scratch::bytes_for::<[u16; 2]>(Cycle::MEMORY)
             + Scratch::bytes_for::<u16>(stations)
             + Scratch::bytes_for::<u8>(stations)
+    }
+
+    /// Whether the tour has a gap, and so two ends.
+    pub fn is_open(&self) -> bool {
+        self.gap.is_some()
     }
 
     /// The station where a leg ends; [`NONE`] of the gap.
@@ -143,8 +154,19 @@ impl<'s, 'a> Exchanges<'s, 'a> {
         if from == NONE || to == NONE || from == to {
             0
         } else {
-            i64::from(self.network.distance(from, to)) + i64::from(self.lift) + 1
+            i64::from(self.distances.between(from, to)) + i64::from(self.lift) + 1
         }
+    }
+
+    /// What a move leaves of `hand`: 0 if nothing is left, mostly seen without a root.
+    pub fn left(&self, hand: i64, from: u16, to: u16) -> i64 {
+        if from == NONE || to == NONE || from == to {
+            return hand.max(0);
+        }
+        let hand = hand - i64::from(self.lift);
+        let bound = u32::try_from(hand.clamp(0, i64::from(u32::MAX))).unwrap_or(u32::MAX);
+        // A little more is left over than the move's length: see `distance`.
+        self.distances.below(bound, from, to).map_or(0, |length| hand - i64::from(length) - 1)
     }
 
     /// What all moves cost.
@@ -203,7 +225,7 @@ impl<'s, 'a> Exchanges<'s, 'a> {
         let mut hand = self.move_after(a);
         let mut touched = [[NONE; 6]; STEPS];
         for touched_now in 0..STEPS {
-            let Some(step) = self.best_step(a, hand, pace)? else {
+            let Some(step) = Search::best_step(self, a, hand, pace)? else {
                 break;
             };
             touched[touched_now] = self.ends_of(a, step);
@@ -220,93 +242,14 @@ impl<'s, 'a> Exchanges<'s, 'a> {
         Ok(None)
     }
 
-    /// The first step found that leaves a gain, else the one that leaves the most in hand.
-    fn best_step(
-        &self,
-        a: Leg,
-        hand: i64,
-        pace: &mut Pace<'_>,
-    ) -> Result<Option<Step>, OrderError> {
-        let b = self.cycle.next(a);
-        let (end, first) = (self.end(a), self.start(b));
-        let mut best: Option<Step> = None;
-        if end == NONE {
-            return Ok(None);
-        }
-        let to_ends = self.distance_to_path_ends(first);
-        pace.work(2)?;
-        let by_gap = self.gap.map(|_| NONE);
-        for second in by_gap.into_iter().chain([end]).chain(self.near.of(end)) {
-            pace.work(1)?;
-            let hand = hand - self.distance(end, second);
-            if hand <= 0 {
-                break;
-            }
-            for leg in self.legs_from(second) {
-                if leg == a || leg == b || leg.flipped() == a {
-                    continue;
-                }
-                let onward = self.cycle.forward(leg) == self.cycle.forward(a);
-                // The second cut is after `c`; from there the way goes on from `end`.
-                let (c, end) = if onward {
-                    let c = self.cycle.previous(leg);
-                    (c, self.end(c))
-                } else {
-                    let c = leg.flipped();
-                    (c, self.start(self.cycle.next(c)))
-                };
-                pace.work(2)?;
-                let hand = hand + self.move_after(c);
-                let gain = hand - self.distance(end, first);
-                if !onward && gain > 0 {
-                    return Ok(Some(Step { gain, hand, c, onward, third: None }));
-                }
-                // What a longer step by the gap can do is found from its other end.
-                if end == NONE || second == NONE {
-                    continue;
-                }
-                let to_c = self.cycle.steps(a, c);
-                let by_gap = by_gap.filter(|_| hand > to_ends);
-                let near = self.near.of(end);
-                for third in by_gap.into_iter().chain([end]).chain(near) {
-                    pace.work(1)?;
-                    let hand = hand - self.distance(end, third);
-                    if hand <= 0 {
-                        break;
-                    }
-                    for leg in self.legs_from(third) {
-                        let third_onward = self.cycle.forward(leg) == self.cycle.forward(a);
-                        let (e, far) = if third_onward {
-                            let e = self.cycle.previous(leg);
-                            (e, self.end(e))
-                        } else {
-                            let e = leg.flipped();
-                            (e, self.start(self.cycle.next(e)))
-                        };
-                        // Where the third cut may be for the tour to stay one.
-                        let within = self.cycle.steps(a, e) <= to_c;
-                        if e == a || e == c || within == (onward || third_onward) {
-                            continue;
-                        }
-                        pace.work(2)?;
-                        let hand = hand + self.move_after(e);
-                        let gain = hand - self.distance(far, first);
-                        let step = Step { gain, hand, c, onward, third: Some((e, third_onward)) };
-                        if gain > 0 {
-                            return Ok(Some(step));
-                        }
-                        if best.is_none_or(|best| hand > best.hand) {
-                            best = Some(step);
-                        }
-                    }
-                }
-            }
-        }
-        Ok(best)
+    /// Where a move from `station` may go: by the gap, if that is wanted, to itself, and to those near it.
+    pub fn candidates(&self, station: u16, by_gap: bool) -> impl Iterator<Item = u16> + use<'s> {
+        let own = [NONE, station].into_iter().skip(usize::from(!by_gap));
+        own.chain(self.near.of(station))
     }
 
     /// How far `station` is from the nearer end of the path; far if it is a cycle.
-    fn distance_to_path_ends(&self, station: u16) -> i64 {
+    pub fn distance_to_path_ends(&self, station: u16) -> i64 {
         let Some(gap) = self.gap.map(|gap| Leg::new(gap, false)) else {
             return i64::MAX;
         };
@@ -350,7 +293,7 @@ impl<'s, 'a> Exchanges<'s, 'a> {
     }
 
     /// The legs from a station; from nowhere, the gap both ways.
-    fn legs_from(&self, station: u16) -> impl Iterator<Item = Leg> + '_ {
+    pub fn legs_from(&self, station: u16) -> impl Iterator<Item = Leg> + '_ {
         let first = if station == NONE {
             self.gap.map(|gap| Leg::new(gap, false))
         } else {

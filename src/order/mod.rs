@@ -15,6 +15,7 @@
 //! points that are not there, too many segments, too little memory; the tour is then worth nothing.
 
 mod cycle;
+mod distances;
 pub mod enumeration;
 mod euler;
 mod exchange;
@@ -30,6 +31,7 @@ mod odd;
 mod orient;
 mod pace;
 mod partition;
+mod search;
 
 pub use matching::scratch_bytes as matching_bytes;
 pub use metric::length;
@@ -344,19 +346,7 @@ fn pair_odd(
     let odd = OddPoints::new(network, stations, options.shape == Shape::OpenPath);
     report.odd_points += u32::from(odd.real_count());
     let partners: &mut [u16] = scratch.take(usize::from(odd.count()))?;
-    let exact = match options.method {
-        Method::Greedy => false,
-        Method::Exact => true,
-        Method::Auto => {
-            let fits = matching::scratch_bytes(partners.len()) <= scratch.available_bytes();
-            fits && odd.real_count() <= EXACT_POINTS
-        }
-    };
-    if exact {
-        report.bound += matching::pair(&odd, scratch, pace, partners)?;
-    } else {
-        greedy::pair(&odd, &mut scratch, pace, partners)?;
-    }
+    report.bound += pair_points(&odd, options.method, scratch, pace, partners)?;
     for (&station, &partner) in stations.iter().zip(partners.iter()) {
         mate[usize::from(station)] = odd.station(partner).unwrap_or(NONE);
     }
@@ -366,6 +356,30 @@ fn pair_odd(
     let ends = odd.free_ends().map(|end| partners[usize::from(end)]);
     let ends = ends.into_iter().filter_map(|end| odd.station(end));
     Ok(ends.min_by_key(|&station| (network.place(station).x, station)))
+}
+
+/// Pairs odd points. Returns a lower bound of the length of their moves in 1/256 steps, 0 if none is known.
+#[inline(never)] // Its frame is gone before the tour is improved; and its cycles can be counted.
+fn pair_points(
+    odd: &OddPoints<'_>,
+    method: Method,
+    mut scratch: Scratch<'_>,
+    pace: &mut Pace<'_>,
+    partners: &mut [u16],
+) -> Result<u64, OrderError> {
+    let exact = match method {
+        Method::Greedy => false,
+        Method::Exact => true,
+        Method::Auto => {
+            let fits = matching::scratch_bytes(partners.len()) <= scratch.available_bytes();
+            fits && odd.real_count() <= EXACT_POINTS
+        }
+    };
+    if exact {
+        return matching::pair(odd, scratch, pace, partners);
+    }
+    greedy::pair(odd, &mut scratch, pace, partners)?;
+    Ok(0)
 }
 
 /// Makes a closed cycle begin at the lowest x, and an open path at the lower of its ends.

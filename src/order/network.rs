@@ -7,7 +7,7 @@
 //! not segments. Where polylines are short and there is memory, every point is a station: the pen
 //! may leave a corner for what lies near it, and come back. Refused: more memory than there is.
 
-use super::metric::{length, square};
+use super::metric::{least_length, length, square};
 use super::partition::Partition;
 use super::{Leg, NONE};
 use crate::drawing::{Drawing, PagePoint, Segment};
@@ -89,6 +89,11 @@ impl<'a> Network<'a> {
     /// The way from one station to another, in 1/256 steps.
     pub fn distance(&self, from: u16, to: u16) -> u32 {
         length(self.place(from), self.place(to))
+    }
+
+    /// No more than that way, quickly, in 1/256 steps.
+    pub fn least_distance(&self, from: u16, to: u16) -> u32 {
+        least_length(self.place(from), self.place(to))
     }
 
     /// The square of the way from one station to another, in steps.

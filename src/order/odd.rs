@@ -42,6 +42,11 @@ impl<'a> OddPoints<'a> {
         [self.real_count(), self.real_count() + 1]
     }
 
+    /// The same as a range, empty if there are none.
+    pub fn free_numbers(&self) -> Range<u16> {
+        self.real_count()..self.count()
+    }
+
     /// The station of an odd point, none for a free end.
     pub fn station(&self, odd: u16) -> Option<u16> {
         self.stations.get(usize::from(odd)).copied()
@@ -60,12 +65,15 @@ impl<'a> OddPoints<'a> {
     /// No less than this is the length of the move between two odd points, in 1/256 steps; quick.
     pub fn least_distance(&self, a: u16, b: u16) -> u32 {
         match (self.station(a), self.station(b)) {
-            (Some(a), Some(b)) => {
-                let (a, b) = (self.network.place(a), self.network.place(b));
-                a.x.abs_diff(b.x).max(a.y.abs_diff(b.y)) << 8
-            }
+            (Some(a), Some(b)) => self.network.least_distance(a, b),
             _ => 0,
         }
+    }
+
+    /// How far apart two odd points are along x, in 1/256 steps; 0 for a free end.
+    pub fn distance_along_x(&self, a: u16, b: u16) -> u32 {
+        let x = |odd| self.station(odd).map(|station| self.network.place(station).x);
+        x(a).zip(x(b)).map_or(0, |(a, b)| a.abs_diff(b) << 8)
     }
 
     /// The odd stations whose x is at most `reach` 1/256 steps from that of `odd`: no other is nearer than

@@ -5,7 +5,9 @@ use crate::stage::{Aborted, Attention, heap_sort_attentively};
 /// Counts work and calls [`Attention::check`] in time.
 pub(super) struct Pace<'a> {
     attention: &'a mut dyn Attention,
+    /// Units since the last answer.
     done: u32,
+    /// Units left at the last answer.
     budget: u64,
 }
 
@@ -25,8 +27,8 @@ impl<'a> Pace<'a> {
     /// Notes `units` of work, each as much as a distance costs.
     pub fn work(&mut self, units: u32) -> Result<(), Aborted> {
         self.done += units;
-        self.budget = self.budget.saturating_sub(u64::from(units));
         if self.done >= Self::UNITS {
+            self.budget = self.budget.saturating_sub(self.done.into());
             self.done = 0;
             self.attention.check()?;
         }
@@ -44,11 +46,11 @@ impl<'a> Pace<'a> {
 
     /// Sets how many units may be worked from now until it [is over](Self::is_over).
     pub fn grant(&mut self, units: u64) {
-        self.budget = units;
+        self.budget = units.saturating_add(self.done.into());
     }
 
     /// Whether the units granted have been used up.
     pub fn is_over(&self) -> bool {
-        self.budget == 0
+        self.budget <= u64::from(self.done)
     }
 }

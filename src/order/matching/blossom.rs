@@ -70,7 +70,7 @@ impl Matching<'_, '_> {
     /// Makes the dual of an outermost blossom what it is now, to stay so without a label.
     pub(super) fn freeze(&mut self, blossom: u16) {
         let twice = 2 * self.now;
-        match self.label(self.nodes[usize::from(blossom)].base) {
+        match self.label(self.node(blossom).base) {
             Label::Outside => {}
             Label::Outer | Label::Fresh => *self.inside(blossom) += twice,
             Label::Inner => {
@@ -83,9 +83,9 @@ impl Matching<'_, '_> {
     /// The inner blossom whose dual will be the first to come to nothing, and when.
     pub(super) fn next_opening(&self) -> Option<(i32, u16)> {
         let vertices = self.top.len();
-        (vertices as u16..self.nodes.len() as u16)
+        self.blossoms()
             .filter(|&blossom| {
-                let node = &self.nodes[usize::from(blossom)];
+                let node = self.node(blossom);
                 node.is_outermost() && self.label(node.base) == Label::Inner
             })
             .map(|blossom| (self.slack_inside[usize::from(blossom) - vertices] / 2, blossom))
@@ -95,16 +95,25 @@ impl Matching<'_, '_> {
     /// From an outer node towards the root: the matched pair and the pair beyond it, each lower end
     /// first.
     fn step_up(&self, outer: u16) -> Option<[[u16; 2]; 2]> {
-        let base = self.nodes[usize::from(outer)].base;
+        let base = self.node(outer).base;
         let mate = self.mate[usize::from(base)];
         if mate == NONE {
             return None;
         }
-        let [above, below] = self.nodes[usize::from(self.top[usize::from(mate)])].link;
+        let [above, below] = self.node(self.top_of(mate)).link;
         Some([[base, mate], [below, above]])
     }
 
-    fn top_of(&self, vertex: u16) -> u16 {
+    pub(super) fn node(&self, node: u16) -> &Node {
+        &self.nodes[usize::from(node)]
+    }
+
+    pub(super) fn node_mut(&mut self, node: u16) -> &mut Node {
+        &mut self.nodes[usize::from(node)]
+    }
+
+    /// The outermost node of a vertex.
+    pub(super) fn top_of(&self, vertex: u16) -> u16 {
         self.top[usize::from(vertex)]
     }
 
@@ -143,6 +152,7 @@ impl Matching<'_, '_> {
     pub(super) fn shrink(&mut self, left: u16, right: u16) {
         let meeting = self.meeting(self.top_of(left), self.top_of(right));
         let blossom = self.spare;
+        self.unused = self.unused.max(blossom + 1);
         let (mut node, mut onward) = (self.top_of(left), [left, right]);
         // Down the left side: each node leads to the one below it.
         loop {
@@ -163,13 +173,13 @@ impl Matching<'_, '_> {
             self.chain(self.top_of(matched[1]), beyond, blossom);
             node = self.top_of(beyond[1]);
         }
-        let base = self.nodes[usize::from(meeting)].base;
-        self.spare = self.nodes[usize::from(blossom)].next;
-        self.nodes[usize::from(blossom)] = Node::vertex(base);
+        let base = self.node(meeting).base;
+        self.spare = self.node(blossom).next;
+        *self.node_mut(blossom) = Node::vertex(base);
         *self.inside(blossom) = -2 * self.now;
         for vertex in 0..self.top.len() as u16 {
             let top = self.top_of(vertex);
-            if self.nodes[usize::from(top)].parent == blossom {
+            if self.node(top).parent == blossom {
                 if self.label(vertex) == Label::Inner {
                     self.set_vertex_label(vertex, Label::Fresh);
                 }
@@ -184,7 +194,7 @@ impl Matching<'_, '_> {
             self.freeze(node);
         }
         let next = self.top_of(onward[1]);
-        let node = &mut self.nodes[usize::from(node)];
+        let node = self.node_mut(node);
         node.link = onward;
         node.next = next;
         node.parent = blossom;
@@ -193,8 +203,8 @@ impl Matching<'_, '_> {
     /// The node of the ring of `blossom` that holds `vertex`.
     fn within(&self, blossom: u16, vertex: u16) -> u16 {
         let mut node = vertex;
-        while self.nodes[usize::from(node)].parent != blossom {
-            node = self.nodes[usize::from(node)].parent;
+        while self.node(node).parent != blossom {
+            node = self.node(node).parent;
         }
         node
     }
@@ -213,23 +223,23 @@ impl Matching<'_, '_> {
     /// Matches the nodes of an outermost blossom around its ring, from the one that holds the base,
     /// which is returned. The blossom is no more.
     fn settle(&mut self, blossom: u16) -> u16 {
-        let base = self.nodes[usize::from(blossom)].base;
+        let base = self.node(blossom).base;
         let first = self.within(blossom, base);
-        self.nodes[usize::from(first)].base = base;
-        self.nodes[usize::from(first)].parent = NONE;
-        let mut node = self.nodes[usize::from(first)].next;
+        self.node_mut(first).base = base;
+        self.node_mut(first).parent = NONE;
+        let mut node = self.node(first).next;
         while node != first {
-            let Node { next, link: [a, b], .. } = self.nodes[usize::from(node)];
+            let Node { next, link: [a, b], .. } = *self.node(node);
             self.mate[usize::from(a)] = b;
             self.mate[usize::from(b)] = a;
             for (node, base) in [(node, a), (next, b)] {
-                self.nodes[usize::from(node)].base = base;
-                self.nodes[usize::from(node)].parent = NONE;
+                self.node_mut(node).base = base;
+                self.node_mut(node).parent = NONE;
             }
-            node = self.nodes[usize::from(next)].next;
+            node = self.node(next).next;
         }
         let spare = self.spare;
-        self.nodes[usize::from(blossom)] = Node { next: spare, ..Node::vertex(NONE) };
+        *self.node_mut(blossom) = Node { next: spare, ..Node::vertex(NONE) };
         self.spare = blossom;
         first
     }
@@ -241,7 +251,7 @@ impl Matching<'_, '_> {
         blossom: u16,
         pace: &mut Pace<'_>,
     ) -> Result<(), OrderError> {
-        let entry = self.nodes[usize::from(blossom)].link;
+        let entry = self.node(blossom).link;
         self.freeze(blossom);
         let first = self.open(blossom);
         let entrance = self.top_of(entry[1]);
@@ -249,8 +259,9 @@ impl Matching<'_, '_> {
         let mut node = first;
         let mut last = first;
         for index in 0.. {
-            let Node { next, link, .. } = self.nodes[usize::from(node)];
-            self.charge(u32::from(self.is_blossom(node)), pace)?;
+            let Node { next, link, .. } = *self.node(node);
+            let vertices = self.candidates(node).len();
+            self.charge(vertices, pace)?;
             self.set_label(node, Label::Outside);
             // The pairs matched are 1 and 2, 3 and 4 and so on, so the way from the entrance by its
             // partner to the base goes back from an even position and forward from an odd one.
@@ -259,10 +270,10 @@ impl Matching<'_, '_> {
                 || (index % 2 == position % 2 && (index < position) == back)
                 || node == entrance
             {
-                self.nodes[usize::from(node)].link = match (node == entrance, back) {
+                self.node_mut(node).link = match (node == entrance, back) {
                     (true, _) => entry,
                     (false, true) => [link[1], link[0]],
-                    (false, false) => self.nodes[usize::from(last)].link,
+                    (false, false) => self.node(last).link,
                 };
                 self.enter(node, Label::Inner);
             } else if (index < position) == back {
@@ -272,7 +283,7 @@ impl Matching<'_, '_> {
             }
             if next == first {
                 if !back {
-                    self.nodes[usize::from(first)].link = self.nodes[usize::from(node)].link;
+                    self.node_mut(first).link = self.node(node).link;
                 }
                 break;
             }
@@ -286,7 +297,7 @@ impl Matching<'_, '_> {
         let mut position = 0;
         let mut at = first;
         while at != node {
-            at = self.nodes[usize::from(at)].next;
+            at = self.node(at).next;
             position += 1;
         }
         position
@@ -296,11 +307,11 @@ impl Matching<'_, '_> {
     pub(super) fn settle_all(&mut self, pace: &mut Pace<'_>) -> Result<(), OrderError> {
         let mut settled = true;
         while core::mem::take(&mut settled) {
-            for blossom in self.top.len()..self.nodes.len() {
-                if self.nodes[blossom].is_outermost() {
+            for blossom in self.blossoms() {
+                if self.node(blossom).is_outermost() {
                     settled = true;
-                    self.charge(1, pace)?;
-                    self.settle(blossom as u16);
+                    self.charge(0, pace)?;
+                    self.settle(blossom);
                 }
             }
         }

@@ -27,6 +27,8 @@ use core::ops::Range;
 
 /// Later than anything that happens.
 const NEVER: i32 = 1 << 30;
+/// No vertex.
+const NOTHING: Range<u16> = Range { start: NONE, end: 0 };
 /// Distances are shortened by bits until they stay below this, so that sums of four weights fit.
 const DISTANCE_LIMIT: u32 = 1 << 27;
 
@@ -86,10 +88,14 @@ struct Matching<'s, 'a> {
     radius: &'s mut [i32],
     /// The dual of each blossom: plus or minus twice `now` if it is outermost.
     slack_inside: &'s mut [i32],
+    /// No other vertices are fresh.
+    fresh: Range<u16>,
     /// When the best pair of each vertex with an outer vertex will touch.
     when: &'s mut [i32],
     /// That outer vertex.
     best: &'s mut [u16],
+    /// Of the odd points, no others know such a pair.
+    reached: Range<u16>,
     /// How far the duals of the tree have moved since it was planted.
     now: i32,
     /// The greatest radius when it was planted.
@@ -98,6 +104,8 @@ struct Matching<'s, 'a> {
     limit: i32,
     /// The first of the blossoms not in use.
     spare: u16,
+    /// No blossom from this on has ever been in use.
+    unused: u16,
     /// How many inner blossoms there are.
     inner_blossoms: u16,
     /// How many bits the distances are shortened by.
@@ -135,12 +143,15 @@ impl<'s, 'a> Matching<'s, 'a> {
             label,
             radius,
             slack_inside,
+            fresh: NOTHING,
             when,
             best,
+            reached: NOTHING,
             now: 0,
             widest: 0,
             limit: NEVER,
             spare: odd.count(),
+            unused: odd.count(),
             inner_blossoms: 0,
             shortened: 0,
             end_weight: 0,
@@ -165,6 +176,11 @@ impl<'s, 'a> Matching<'s, 'a> {
         }
     }
 
+    /// No less than this is the weight of a pair of odd points, by their x alone.
+    fn weight_along_x(&self, a: u16, b: u16) -> i32 {
+        2 * (self.odd.distance_along_x(a, b) >> self.shortened) as i32
+    }
+
     /// The weight if it is less than `bound`; most are seen not to be without a square root.
     fn weight_below(&self, a: u16, b: u16, bound: i32) -> Option<i32> {
         if bound <= 0 || (self.odd.least_distance(a, b) >> self.shortened) as i32 * 2 >= bound {
@@ -175,10 +191,9 @@ impl<'s, 'a> Matching<'s, 'a> {
         (weight < bound).then_some(weight)
     }
 
-    /// Charges the square roots since the last time, and `looks` at all vertices.
-    fn charge(&self, looks: u32, pace: &mut Pace<'_>) -> Result<(), OrderError> {
-        let all = self.top.len() as u32;
-        pace.work(1 + self.roots.take() + looks * all / 12)?;
+    /// Charges the square roots since the last time, and so many vertices looked at.
+    fn charge(&self, vertices: usize, pace: &mut Pace<'_>) -> Result<(), OrderError> {
+        pace.work(1 + self.roots.take() + vertices as u32 / 12)?;
         Ok(())
     }
 
@@ -204,7 +219,7 @@ impl<'s, 'a> Matching<'s, 'a> {
     /// Gives all vertices of an outermost node a label; their duals stay what they are.
     fn set_label(&mut self, node: u16, label: Label) {
         for vertex in self.candidates(node) {
-            if self.top[usize::from(vertex)] == node {
+            if self.top_of(vertex) == node {
                 self.set_vertex_label(vertex, label);
             }
         }
@@ -221,6 +236,9 @@ impl<'s, 'a> Matching<'s, 'a> {
         let index = usize::from(vertex);
         self.label[index] = label as u8;
         self.when[index] = NEVER;
+        if label == Label::Fresh {
+            cover(&mut self.fresh, vertex);
+        }
         self.radius[index] = match label {
             Label::Outside => radius,
             Label::Outer | Label::Fresh => radius - self.now,
@@ -235,10 +253,11 @@ impl<'s, 'a> Matching<'s, 'a> {
         self.limit = NEVER;
         self.inner_blossoms = 0;
         self.when.fill(NEVER);
+        self.reached = NOTHING;
         self.enter(root, Label::Fresh);
         loop {
             self.look_around(pace)?;
-            self.charge(1, pace)?;
+            self.charge(self.reached.len(), pace)?;
             let (time, vertex) = self.next_touch();
             if self.inner_blossoms > 0
                 && let Some((empty, blossom)) = self.next_opening()
@@ -250,34 +269,37 @@ impl<'s, 'a> Matching<'s, 'a> {
             }
             self.now = time;
             let outer = self.best[usize::from(vertex)];
-            let node = self.top[usize::from(vertex)];
+            let node = self.top_of(vertex);
             if self.label(vertex) == Label::Outer {
-                if self.top[usize::from(outer)] == node {
+                if self.top_of(outer) == node {
                     self.look_from(vertex, pace)?;
                 } else {
                     self.shrink(outer, vertex);
                 }
                 continue;
             }
-            let base = self.nodes[usize::from(node)].base;
+            let base = self.node(node).base;
             let mate = self.mate[usize::from(base)];
             if mate == NONE {
                 self.augment(outer, vertex);
                 self.fell_tree();
                 return Ok(());
             }
-            self.nodes[usize::from(node)].link = [outer, vertex];
+            self.node_mut(node).link = [outer, vertex];
             self.enter(node, Label::Inner);
-            self.enter(self.top[usize::from(mate)], Label::Fresh);
+            self.enter(self.top_of(mate), Label::Fresh);
         }
     }
 
     /// The first pair with an outer vertex that will touch: when, and its other vertex.
     fn next_touch(&self) -> (i32, u16) {
         let mut first = (NEVER, 0);
-        for (vertex, &when) in (0..).zip(self.when.iter()) {
-            if when < first.0 {
-                first = (when, vertex);
+        for Range { start, end } in [self.reached.clone(), self.odd.free_numbers()] {
+            let all = self.when.get(usize::from(start)..usize::from(end)).unwrap_or(&[]);
+            for (vertex, &when) in (start..).zip(all) {
+                if when < first.0 {
+                    first = (when, vertex);
+                }
             }
         }
         first
@@ -285,7 +307,7 @@ impl<'s, 'a> Matching<'s, 'a> {
 
     /// Looks at the pairs of every fresh vertex.
     fn look_around(&mut self, pace: &mut Pace<'_>) -> Result<(), OrderError> {
-        for vertex in 0..self.top.len() as u16 {
+        for vertex in core::mem::replace(&mut self.fresh, NOTHING) {
             if self.label(vertex) == Label::Fresh {
                 self.label[usize::from(vertex)] = Label::Outer as u8;
                 self.look_from_outer(vertex, pace)?;
@@ -297,68 +319,96 @@ impl<'s, 'a> Matching<'s, 'a> {
     /// Notes at all other vertices when their pair with the outer vertex `from` will touch, if that
     /// is sooner than what they know.
     fn look_from_outer(&mut self, from: u16, pace: &mut Pace<'_>) -> Result<(), OrderError> {
-        self.charge(1, pace)?;
-        let (now, own) = (self.now, self.radius_now(from));
-        let node = self.top[usize::from(from)];
-        for other in self.within_limit(from, own) {
-            let index = usize::from(other);
-            let label = self.label(other);
-            if label == Label::Inner || self.top[index] == node {
-                continue;
-            }
-            // Outside, the gap closes from one side; between outer vertices, from both.
-            let left = self.when[index].min(self.limit) - now;
-            let (sides, reach) = match label {
-                Label::Outside => (1, self.radius[index]),
-                _ => (2, self.radius[index] + now),
-            };
-            let Some(weight) = self.weight_below(from, other, sides * left + reach + own) else {
-                continue;
-            };
-            let when = now + (weight - reach - own) / sides;
-            self.when[index] = when;
-            self.best[index] = from;
-            if label == Label::Outside && self.is_free(other) {
-                self.limit = when;
+        let own = self.radius_now(from);
+        let node = self.top_of(from);
+        for others in self.within_limit(from, own, pace)? {
+            for other in others {
+                let label = self.label(other);
+                if label != Label::Inner && self.top_of(other) != node {
+                    self.look_at(other, label, from, own);
+                }
             }
         }
         Ok(())
     }
 
+    /// Notes when the pair of `other` with the outer vertex `from`, of radius `own`, will touch.
+    fn look_at(&mut self, other: u16, label: Label, from: u16, own: i32) {
+        let (now, index) = (self.now, usize::from(other));
+        // Outside, the gap closes from one side; between outer vertices, from both.
+        let left = self.when[index].min(self.limit) - now;
+        let (sides, reach) = match label {
+            Label::Outside => (1, self.radius[index]),
+            _ => (2, self.radius[index] + now),
+        };
+        let Some(weight) = self.weight_below(from, other, sides * left + reach + own) else {
+            return;
+        };
+        let when = now + (weight - reach - own) / sides;
+        self.note(other, when, from);
+        if label == Label::Outside && self.is_free(other) {
+            self.limit = when;
+        }
+    }
+
+    /// Notes when the pair of `vertex` with the outer vertex `best` will touch.
+    fn note(&mut self, vertex: u16, when: i32, best: u16) {
+        self.when[usize::from(vertex)] = when;
+        self.best[usize::from(vertex)] = best;
+        if vertex < self.odd.real_count() {
+            cover(&mut self.reached, vertex);
+        }
+    }
+
     /// The vertices that may touch one whose radius is now `own` before the tree reaches a free one.
-    fn within_limit(&self, vertex: u16, own: i32) -> impl Iterator<Item = u16> + use<> {
+    fn within_limit(
+        &self,
+        vertex: u16,
+        own: i32,
+        pace: &mut Pace<'_>,
+    ) -> Result<[Range<u16>; 2], OrderError> {
         // The gap closes from both sides at most; no radius has grown by more than `now`.
         let closing = 2 * i64::from(self.limit - self.now);
         let weight = closing + i64::from(own) + i64::from(self.widest) + i64::from(self.now);
+        self.up_to(vertex, weight, pace)
+    }
+
+    /// No other odd points have a pair with `vertex` of at most this weight; and the free ends. They are
+    /// about to be looked at.
+    fn up_to(
+        &self,
+        vertex: u16,
+        weight: i64,
+        pace: &mut Pace<'_>,
+    ) -> Result<[Range<u16>; 2], OrderError> {
         let reach = (weight.max(0).unsigned_abs() / 2) << self.shortened;
-        let reach = u32::try_from(reach).unwrap_or(u32::MAX);
-        let free_ends = self.odd.real_count()..self.odd.count();
-        self.odd.around(vertex, reach).chain(free_ends)
+        let others = self.odd.around(vertex, u32::try_from(reach).unwrap_or(u32::MAX));
+        self.charge(others.len(), pace)?;
+        Ok([others, self.odd.free_numbers()])
     }
 
     fn is_free(&self, vertex: u16) -> bool {
-        let base = self.nodes[usize::from(self.top[usize::from(vertex)])].base;
+        let base = self.node(self.top_of(vertex)).base;
         self.mate[usize::from(base)] == NONE
     }
 
     /// Finds anew when the first pair of `vertex`, outside or outer, with an outer vertex of
     /// another node will touch.
     fn look_from(&mut self, vertex: u16, pace: &mut Pace<'_>) -> Result<(), OrderError> {
-        self.charge(1, pace)?;
         let index = usize::from(vertex);
         let (now, own) = (self.now, self.radius_now(vertex));
         let sides = if self.label(vertex) == Label::Outside { 1 } else { 2 };
         self.when[index] = NEVER;
-        for other in self.within_limit(vertex, own) {
-            if self.label(other) != Label::Outer || self.top[usize::from(other)] == self.top[index]
-            {
-                continue;
-            }
-            let left = self.when[index].min(self.limit) - now;
-            let reach = self.radius_now(other) + own;
-            if let Some(weight) = self.weight_below(vertex, other, sides * left + reach) {
-                self.when[index] = now + (weight - reach) / sides;
-                self.best[index] = other;
+        for others in self.within_limit(vertex, own, pace)? {
+            for other in others {
+                if self.label(other) != Label::Outer || self.top_of(other) == self.top_of(vertex) {
+                    continue;
+                }
+                let left = self.when[index].min(self.limit) - now;
+                let reach = self.radius_now(other) + own;
+                if let Some(weight) = self.weight_below(vertex, other, sides * left + reach) {
+                    self.note(vertex, now + (weight - reach) / sides, other);
+                }
             }
         }
         Ok(())
@@ -367,7 +417,7 @@ impl<'s, 'a> Matching<'s, 'a> {
     /// The same for each vertex of a node.
     fn look_from_each(&mut self, node: u16, pace: &mut Pace<'_>) -> Result<(), OrderError> {
         for vertex in self.candidates(node) {
-            if self.top[usize::from(vertex)] == node {
+            if self.top_of(vertex) == node {
                 self.look_from(vertex, pace)?;
             }
         }
@@ -379,25 +429,30 @@ impl<'s, 'a> Matching<'s, 'a> {
         let mut pair = [outer, free];
         loop {
             let [outer, inner] = pair;
-            let node = usize::from(self.top[usize::from(outer)]);
-            let base = core::mem::replace(&mut self.nodes[node].base, outer);
+            let node = self.top_of(outer);
+            let base = core::mem::replace(&mut self.node_mut(node).base, outer);
             let next = self.mate[usize::from(base)];
             self.mate[usize::from(outer)] = inner;
             self.mate[usize::from(inner)] = outer;
             if next == NONE {
                 return;
             }
-            let above = &mut self.nodes[usize::from(self.top[usize::from(next)])];
+            let above = self.node_mut(self.top_of(next));
             pair = above.link;
             above.base = pair[1];
         }
     }
 
+    /// The blossoms that are or were in use.
+    fn blossoms(&self) -> Range<u16> {
+        self.odd.count()..self.unused
+    }
+
     /// Takes all labels off.
     fn fell_tree(&mut self) {
-        for blossom in self.top.len()..self.nodes.len() {
-            if self.nodes[blossom].is_outermost() {
-                self.freeze(blossom as u16);
+        for blossom in self.blossoms() {
+            if self.node(blossom).is_outermost() {
+                self.freeze(blossom);
             }
         }
         for vertex in 0..self.top.len() as u16 {
@@ -416,4 +471,9 @@ impl<'s, 'a> Matching<'s, 'a> {
             .sum();
         (twice / 2) << self.shortened
     }
+}
+
+/// Takes `vertex` into the range.
+fn cover(range: &mut Range<u16>, vertex: u16) {
+    *range = range.start.min(vertex)..range.end.max(vertex + 1);
 }

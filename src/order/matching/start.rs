@@ -10,45 +10,72 @@ impl Matching<'_, '_> {
     pub(super) fn start(&mut self, pace: &mut Pace<'_>) -> Result<(), OrderError> {
         let real = self.odd.real_count();
         for vertex in 0..real {
-            self.charge(1, pace)?;
-            let mut nearest = i32::MAX;
-            for other in (0..real).filter(|&other| other != vertex) {
-                if let Some(weight) = self.weight_below(vertex, other, nearest) {
-                    nearest = weight;
-                }
-            }
+            let nearest = self.nearest(&mut (0..vertex).rev(), vertex, i32::MAX, pace)?;
+            let nearest = self.nearest(&mut (vertex + 1..real), vertex, nearest, pace)?;
             // Half the weight each: no two discs overlap.
             self.radius[usize::from(vertex)] = nearest / 2;
         }
         // With this weight the free ends, of no radius, overlap none either.
         self.end_weight = self.radius.iter().copied().max().unwrap_or(0);
+        self.widest = self.end_weight;
         for vertex in 0..self.odd.count() {
             if self.mate[usize::from(vertex)] == NONE {
-                self.charge(1, pace)?;
-                self.widen(vertex);
+                self.widen(vertex, pace)?;
             }
         }
         Ok(())
     }
 
+    /// The weight of the lightest pair of `vertex` with any of `others`, which lie ever farther from it
+    /// along x, if that is below `bound`, else `bound`.
+    fn nearest(
+        &self,
+        others: &mut dyn Iterator<Item = u16>,
+        vertex: u16,
+        bound: i32,
+        pace: &mut Pace<'_>,
+    ) -> Result<i32, OrderError> {
+        let mut nearest = bound;
+        let mut looked_at = 0;
+        for other in others {
+            looked_at += 1;
+            if self.weight_along_x(vertex, other) >= nearest {
+                break;
+            }
+            if let Some(weight) = self.weight_below(vertex, other, nearest) {
+                nearest = weight;
+            }
+        }
+        self.charge(looked_at, pace)?;
+        Ok(nearest)
+    }
+
     /// Lets the disc of a free vertex grow until it touches another, and matches them if that one
     /// is free too.
-    fn widen(&mut self, vertex: u16) {
+    fn widen(&mut self, vertex: u16, pace: &mut Pace<'_>) -> Result<(), OrderError> {
         let own = self.radius[usize::from(vertex)];
         let mut gap = i32::MAX / 2;
         let mut touched = NONE;
-        for other in (0..self.odd.count()).filter(|&other| other != vertex) {
-            let reach = own + self.radius[usize::from(other)];
-            let free = self.mate[usize::from(other)] == NONE;
-            if let Some(weight) = self.weight_below(vertex, other, gap + reach + i32::from(free)) {
-                gap = weight - reach;
-                touched = other;
+        // Its nearest neighbour is no farther than twice its radius, and one.
+        let weight = 2 * i64::from(own) + 1 + i64::from(self.widest);
+        for others in self.up_to(vertex, weight, pace)? {
+            for other in others.filter(|&other| other != vertex) {
+                let reach = own + self.radius[usize::from(other)];
+                let free = self.mate[usize::from(other)] == NONE;
+                let bound = gap + reach + i32::from(free);
+                if let Some(weight) = self.weight_below(vertex, other, bound) {
+                    gap = weight - reach;
+                    touched = other;
+                }
             }
         }
-        self.radius[usize::from(vertex)] += gap;
+        let radius = own + gap;
+        self.radius[usize::from(vertex)] = radius;
+        self.widest = self.widest.max(radius);
         if let Some(&NONE) = self.mate.get(usize::from(touched)) {
             self.mate[usize::from(vertex)] = touched;
             self.mate[usize::from(touched)] = vertex;
         }
+        Ok(())
     }
 }
