@@ -758,6 +758,36 @@ fn a_pause_comes_at_the_end_of_the_stroke_and_after_so_much_ink() {
 }
 
 #[test]
+fn the_time_left_counts_the_ways_of_a_pen_on_a_motor() {
+    let mut targets = Vec::new();
+    for line in 1..=20 {
+        targets.extend([to(0, 10 * line), ink(400, 10 * line)]);
+    }
+    // The whole way in a ramp, and at the greatest speed.
+    for (travel, rate) in [(1.0, 1200.0), (4.0, 300.0)] {
+        let mut settings = Settings::default();
+        settings.set(Setting::PenLift, Value::ONE).expect("valid");
+        settings.set(Setting::TravelZ, Value::from_num(travel)).expect("valid");
+        settings.set(Setting::MaxRateZ, Value::from_num(rate)).expect("valid");
+        let mut told = 0;
+        let mut time = 0;
+        let mut path = TargetList::new(&targets);
+        pin_machine::run(settings, &mut path, 25_000, &mut |turn| {
+            if turn.now == 0 {
+                turn.machine.start(&mut TargetList::new(&targets)).expect("valid");
+                told = turn.machine.status().seconds_left;
+            }
+            time = turn.now;
+            !is_ready(turn.machine)
+        });
+        // The search for the upper stop, before all, is not counted.
+        let search = 1.125 * travel * 4.0 / (rate / 60.0);
+        let truth = (time as f64 / 25e6 - search) as u32;
+        assert!(truth > 10 && told.abs_diff(truth) <= 1 + truth / 20, "{told} s, not {truth}");
+    }
+}
+
+#[test]
 fn an_override_slows_the_job() {
     let targets = [ink(8000, 0)];
     let seconds = |percent| {

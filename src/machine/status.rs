@@ -56,7 +56,7 @@ impl Machine<'_> {
         let bare = |size: JobSize| {
             bare_milliseconds(&self.settings, size.drawn, Setting::DrawSpeed)
                 + bare_milliseconds(&self.settings, size.travelled, Setting::TravelSpeed)
-                + u64::from(size.strokes) * dwells(&self.settings)
+                + u64::from(size.strokes) * pen_milliseconds(&self.settings)
         };
         let left = JobSize {
             strokes: self.job.strokes.saturating_sub(done.strokes),
@@ -112,10 +112,33 @@ fn bare_milliseconds(settings: &Settings, length: u64, speed: Setting) -> u64 {
     (length >> 2).saturating_mul(60_000) / speed.max(1)
 }
 
-/// What the pen costs a stroke, in milliseconds.
-fn dwells(settings: &Settings) -> u64 {
-    let down: u64 = settings.get(Setting::PenDownDwell).saturating_to_num();
-    down + settings.get(Setting::PenUpDwell).saturating_to_num::<u64>()
+/// What the pen costs a stroke, in milliseconds: its dwells, and the ways down and up of a motor.
+fn pen_milliseconds(settings: &Settings) -> u64 {
+    let whole = |setting| settings.get(setting).saturating_to_num::<u64>();
+    let dwells = whole(Setting::PenDownDwell) + whole(Setting::PenUpDwell);
+    if !settings.is_on(Setting::PenLift) {
+        return dwells;
+    }
+    let heights = whole(Setting::PenDownHeight).abs_diff(whole(Setting::PenUpHeight));
+    let way = bits(settings, Setting::TravelZ) * heights / 127;
+    let per_second = bits(settings, Setting::MaxRateZ) / 60;
+    dwells + 2 * rest_to_rest(way, per_second, bits(settings, Setting::AccelerationZ))
+}
+
+/// A setting above 0, in 2^-16 of its unit.
+fn bits(settings: &Settings, setting: Setting) -> u64 {
+    u64::from(settings.get(setting).to_bits().unsigned_abs()).max(1)
+}
+
+/// The milliseconds of a way (2^-16 mm) from rest to rest, at most at a speed (2^-16 mm/s, above 0) and by an
+/// acceleration (2^-16 mm/s²).
+fn rest_to_rest(way: u64, speed: u64, acceleration: u64) -> u64 {
+    // The way until the speed is reached and shed.
+    if way >= speed * speed / acceleration {
+        way.saturating_mul(1000) / speed + speed * 1000 / acceleration
+    } else {
+        2 * (way * 1_000_000 / acceleration).isqrt()
+    }
 }
 
 /// The time of a job, about: each piece between two sharp corners from rest to rest.
@@ -138,7 +161,7 @@ impl Estimate {
             self.end_piece(settings);
         }
         if inked && !self.inked {
-            self.milliseconds += dwells(settings);
+            self.milliseconds += pen_milliseconds(settings);
         }
         (self.way, self.inked) = (way, inked);
         self.piece += length;
@@ -152,16 +175,11 @@ impl Estimate {
 
     fn end_piece(&mut self, settings: &Settings) {
         let speed = if self.inked { Setting::DrawSpeed } else { Setting::TravelSpeed };
-        let bits = |setting| u64::from(settings.get(setting).to_bits().unsigned_abs()).max(1);
-        let acceleration = bits(Setting::AccelerationX).min(bits(Setting::AccelerationY));
-        // 2^-16 mm/s, and 2^-16 mm until that is reached and shed.
-        let per_second = bits(speed) / 60;
-        let ramps = per_second * per_second / acceleration;
-        self.milliseconds += if self.piece >> 2 >= ramps {
-            bare_milliseconds(settings, self.piece, speed) + per_second * 1000 / acceleration
-        } else {
-            2 * ((self.piece >> 2) * 1_000_000 / acceleration).isqrt()
-        };
+        let acceleration = [Setting::AccelerationX, Setting::AccelerationY];
+        let acceleration = acceleration.map(|setting| bits(settings, setting));
+        let acceleration = acceleration[0].min(acceleration[1]);
+        let per_second = bits(settings, speed) / 60;
+        self.milliseconds += rest_to_rest(self.piece >> 2, per_second, acceleration);
         // Each change of speed takes as long as acceleration takes to be built up, about.
         let jerk = u64::from(settings.get(Setting::Jerk).to_bits().unsigned_abs());
         if let Some(ramp) = acceleration.checked_div(jerk) {
