@@ -140,9 +140,12 @@ impl<'m> Lookahead<'m> {
         if index >= self.blocks.len() { index - self.blocks.len() } else { index }
     }
 
-    pub(super) fn iter(&self) -> impl Iterator<Item = &Block> {
-        let (wrapped, straight) = self.blocks.split_at(self.first);
-        straight.iter().chain(wrapped).take(self.count)
+    /// All in their order, in two parts.
+    pub(super) fn blocks(&self) -> [&[Block]; 2] {
+        let (wrapped, straight) = self.blocks.split_at(self.first.min(self.blocks.len()));
+        let count = self.count.min(straight.len());
+        let rest = (self.count - count).min(wrapped.len());
+        [&straight[..count], &wrapped[..rest]]
     }
 
     /// The last blocks, from the `least`th to the `most`th counted from 1 at the end, are part of a
@@ -258,7 +261,7 @@ mod tests {
                 ring.limit_curve(2, 4, PathLength::from_bits(30 + round));
             }
             // Each block by itself, from the end on.
-            let blocks: std::vec::Vec<_> = ring.iter().copied().collect();
+            let blocks: std::vec::Vec<_> = ring.blocks().concat();
             let mut allowed = 0;
             for block in blocks.iter().rev() {
                 let limit = block.entry_limit.min(block.curve_limit).to_bits();

@@ -311,11 +311,17 @@ impl Road<'_, '_> {
                     && jerk.braking_distance(from, self.limits.speed(limit).to_bits()) <= place)
         };
         let stop = jerk.braking_distance(after, 0);
-        let mut lowest = PathLength::MAX;
+        // No speed looked at is too fast for limits from this one on.
+        let harmless = self.limits.least_limit(fastest.max(from.speed.into()));
+        let (enough, mut lowest) = (way.saturating_add(stop), PathLength::MAX);
         let (mut begin, mut end, mut curve_limit) = (0, self.room, self.curve_limit);
-        for block in self.beyond.into_iter().flat_map(Lookahead::iter) {
+        for block in self.beyond.map_or([&[][..]; 2], Lookahead::blocks).into_iter().flatten() {
             let limit = block.entry_limit.min(block.curve_limit);
-            if end < way {
+            if limit.min(curve_limit) >= harmless {
+                if end >= enough {
+                    return true;
+                }
+            } else if end < way {
                 if !passes(end, limit.min(curve_limit)) {
                     return false;
                 }
@@ -323,7 +329,7 @@ impl Road<'_, '_> {
                 if begin <= way && exceeds(settled, curve_limit) {
                     return false;
                 }
-                if end - way >= stop {
+                if end >= enough {
                     return true;
                 }
                 // A limit behind a lower one does not bind.
@@ -341,7 +347,7 @@ impl Road<'_, '_> {
         if begin <= way && exceeds(settled, curve_limit) {
             return false;
         }
-        way.saturating_add(stop) <= end
+        enough <= end
     }
 }
 
