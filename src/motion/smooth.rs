@@ -315,8 +315,13 @@ impl Road<'_, '_> {
         let harmless = self.limits.least_limit(fastest.max(from.speed.into()));
         let (enough, mut lowest) = (way.saturating_add(stop), PathLength::MAX);
         let (mut begin, mut end, mut curve_limit) = (0, self.room, self.curve_limit);
+        if let Some(blocks) = self.beyond
+            && blocks.lowest_limit().min(curve_limit) >= harmless
+        {
+            return end + blocks.known() >= enough;
+        }
         for block in self.beyond.map_or([&[][..]; 2], Lookahead::blocks).into_iter().flatten() {
-            let limit = block.entry_limit.min(block.curve_limit);
+            let limit = block.limit();
             if limit.min(curve_limit) >= harmless {
                 if end >= enough {
                     return true;
