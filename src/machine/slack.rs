@@ -22,19 +22,17 @@ impl Slack {
     /// The steps to take up before a move by (`dx`, `dy`) steps of motors that have `slack`; they are
     /// taken up from here on.
     fn take_up(&mut self, slack: [i32; 2], way: [i32; 2]) -> [i32; 2] {
-        let mut steps = [0; 2];
-        for (((steps, ahead), slack), way) in
-            steps.iter_mut().zip(&mut self.ahead).zip(slack).zip(way)
-        {
-            if way == 0 {
-                continue;
+        let mut take = |axis: usize| {
+            if way[axis] == 0 {
+                return 0;
             }
-            let up = way > 0;
+            let (up, ahead, slack) = (way[axis] > 0, &mut self.ahead[axis], slack[axis]);
             let now = ahead.unwrap_or(if up { 0 } else { slack });
-            *steps = if up { now } else { now - slack };
-            *ahead = Some(now - *steps);
-        }
-        steps
+            let steps = if up { now } else { now - slack };
+            *ahead = Some(now - steps);
+            steps
+        };
+        [take(0), take(1)]
     }
 
     /// So much of it was not taken up after all.

@@ -82,8 +82,12 @@ impl Slice {
 /// The speed along one piece of the path: at most three phases of constant acceleration.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Profile {
-    phases: [Phase; 3],
-    phase: usize,
+    /// The phase in work.
+    phase: Phase,
+    /// How long the speed then stays, and how long it sinks at the end.
+    flat: PathLength,
+    down: PathLength,
+    peak: Pace,
     exit: Pace,
 }
 
@@ -127,14 +131,23 @@ impl Profile {
         let up = start.abs_diff(peak).min(length);
         let down = (peak - exit).min(length - up);
         Self {
-            phases: [
-                Phase::new(limits, entry, peak_pace, up),
-                Phase::new(limits, peak_pace, peak_pace, length - up - down),
-                Phase::new(limits, peak_pace, exit_pace, down),
-            ],
-            phase: 0,
+            phase: Phase::new(limits, entry, peak_pace, up),
+            flat: length - up - down,
+            down,
+            peak: peak_pace,
             exit: exit_pace,
         }
+    }
+
+    /// Takes the next phase into work, if there is one.
+    fn begin_phase(&mut self, limits: &Limits) -> bool {
+        let (to, length) = if self.flat > 0 {
+            (self.peak, core::mem::take(&mut self.flat))
+        } else {
+            (self.exit, core::mem::take(&mut self.down))
+        };
+        self.phase = Phase::new(limits, self.peak, to, length);
+        length > 0
     }
 
     /// Sheds speed from `entry` to rest, or as far as `length` allows.
@@ -150,16 +163,19 @@ impl Profile {
 
     /// The speed where the next slice begins.
     pub(super) fn speed(&self) -> SliceSpeed {
-        self.phases[self.phase.min(2)..]
-            .iter()
-            .find(|phase| phase.distance > 0)
-            .map_or(self.exit.speed, |phase| phase.speed)
+        if self.phase.distance > 0 {
+            self.phase.speed
+        } else if self.flat > 0 || self.down > 0 {
+            self.peak.speed
+        } else {
+            self.exit.speed
+        }
     }
 
     /// The next slice, `None` at the end.
-    pub(super) fn next_slice(&mut self) -> Option<Slice> {
+    pub(super) fn next_slice(&mut self, limits: &Limits) -> Option<Slice> {
         loop {
-            let phase = self.phases.get_mut(self.phase)?;
+            let phase = &mut self.phase;
             let slices = if phase.gain == 0 { Slice::MOST } else { 1 };
             let time = u64::from(slices * Slice::TIME);
             if phase.time > time {
@@ -175,10 +191,12 @@ impl Profile {
             }
             // No more than that.
             let rest = Slice { distance: phase.distance as u32, time: phase.time as u32 };
-            *phase = Phase::default();
-            self.phase += 1;
+            let goes_on = self.begin_phase(limits);
             if rest.distance > 0 {
                 return Some(rest);
+            }
+            if !goes_on {
+                return None;
             }
         }
     }
@@ -194,9 +212,9 @@ mod tests {
     }
 
     /// Distance (mm) and time (s) of all slices.
-    fn run(mut profile: Profile) -> (f64, f64) {
+    fn run(limits: &Limits, mut profile: Profile) -> (f64, f64) {
         let (mut distance, mut time) = (0u64, 0u64);
-        while let Some(slice) = profile.next_slice() {
+        while let Some(slice) = profile.next_slice(limits) {
             distance += u64::from(slice.distance);
             time += u64::from(slice.time);
         }
@@ -219,14 +237,14 @@ mod tests {
         for (length, entry, exit, seconds) in cases {
             let entry = Pace::of_stopping_distance(&limits, mm(entry).min(top.stopping_distance));
             let profile = Profile::new(&limits, entry, mm(length), top, mm(exit));
-            let (distance, time) = run(profile);
+            let (distance, time) = run(&limits, profile);
             assert!((distance - length).abs() < 1e-5, "{length}: {distance}");
             assert!((time - seconds).abs() < 2e-4 * seconds, "{length}: {time}, not {seconds}");
         }
-        let (distance, time) = run(Profile::stopping(&limits, top, mm(100.0)));
+        let (distance, time) = run(&limits, Profile::stopping(&limits, top, mm(100.0)));
         assert!((distance - 6.25).abs() < 1e-3 && (time - 0.25).abs() < 1e-4);
         let short = Profile::stopping(&limits, top, mm(1.0));
         assert_eq!(short.exit().stopping_distance, top.stopping_distance - mm(1.0));
-        assert_eq!(run(Profile::stopping(&limits, Pace::REST, mm(1.0))), (0.0, 0.0));
+        assert_eq!(run(&limits, Profile::stopping(&limits, Pace::REST, mm(1.0))), (0.0, 0.0));
     }
 }

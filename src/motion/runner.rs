@@ -13,6 +13,7 @@ use super::{
     StepEvent,
 };
 use crate::drawing::{LineType, PagePoint};
+use crate::step::Direction;
 use core::cmp::Ordering;
 
 /// Where the pen stands and how long it takes to get there.
@@ -548,7 +549,7 @@ impl<'m> Runner<'m> {
                     }
                     continue;
                 }
-                Some(Plan::Profile(profile)) => profile.next_slice(),
+                Some(Plan::Profile(profile)) => profile.next_slice(&self.limits),
                 Some(Plan::Interval(interval)) => interval.next_slice(course.room()),
             };
             let Some(slice) = slice else {
@@ -633,12 +634,11 @@ impl<'m> Runner<'m> {
             };
             self.now = self.now.wrapping_add(stepped.late);
             let place = if course.is_slack() { &mut self.slack } else { &mut self.position };
-            let counts = [count - stepped.diagonals, stepped.diagonals];
-            for (direction, count) in course.line.moves().into_iter().zip(counts) {
-                let (dx, dy) = direction.delta();
-                place.x = place.x.wrapping_add(dx * count as i32);
-                place.y = place.y.wrapping_add(dy * count as i32);
-            }
+            let [(x, y), (dx, dy)] = course.line.moves().map(Direction::delta);
+            let [straight, diagonal] =
+                [count - stepped.diagonals, stepped.diagonals].map(|count| count as i32);
+            place.x = place.x.wrapping_add(x * straight + dx * diagonal);
+            place.y = place.y.wrapping_add(y * straight + dy * diagonal);
             course.advance(count);
         }
         course.end_slice(slice);
