@@ -7,7 +7,7 @@
 //! On which side a motor lies is not known until it has moved: the first move takes up nothing, so the
 //! pen may be off by the slack until the machine is homed.
 
-use super::{Axis, Machine, Setting};
+use super::{Machine, Setting};
 use crate::drawing::{LineType, PagePoint};
 use crate::motion::{Move, PathLength, PushError};
 
@@ -58,13 +58,13 @@ impl Slack {
 impl Machine<'_> {
     /// Steps of slack of each motor.
     pub(super) fn slack_steps(&self) -> [i32; 2] {
-        [Axis::X, Axis::Y].map(|axis| {
-            let (slack, steps_per_mm) = match axis {
-                Axis::X => (Setting::BacklashX, Setting::StepsPerMmX),
-                Axis::Y => (Setting::BacklashY, self.settings.steps_per_mm_y()),
-            };
+        let steps = |slack: Setting, steps_per_mm: Setting| {
             self.settings.millimetres_as_steps(slack, steps_per_mm)
-        })
+        };
+        [
+            steps(Setting::BacklashX, Setting::StepsPerMmX),
+            steps(Setting::BacklashY, self.settings.steps_per_mm_y()),
+        ]
     }
 
     /// Appends a move of the motors, or first one that takes up their slack: then the other is still to

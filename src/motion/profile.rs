@@ -39,10 +39,8 @@ struct Phase {
 }
 
 impl Phase {
+    /// From one pace to another; `distance` is not 0.
     fn new(limits: &Limits, from: Pace, to: Pace, distance: PathLength) -> Self {
-        if distance == 0 {
-            return Self::default();
-        }
         let speeds = u64::from(from.speed.to_bits()) + u64::from(to.speed.to_bits());
         let bits = u64::from(distance.to_bits());
         // Time = 2 s / (v0 + v1) slices of 2^12 ticks, s and v in the same unit: below 2^63.
@@ -130,13 +128,19 @@ impl Profile {
         let (peak_pace, exit_pace) = (pace(peak), pace(exit));
         let up = start.abs_diff(peak).min(length);
         let down = (peak - exit).min(length - up);
-        Self {
-            phase: Phase::new(limits, entry, peak_pace, up),
+        let mut profile = Self {
+            phase: Phase::default(),
             flat: length - up - down,
             down,
             peak: peak_pace,
             exit: exit_pace,
+        };
+        if up > 0 {
+            profile.phase = Phase::new(limits, entry, peak_pace, up);
+        } else {
+            profile.begin_phase(limits);
         }
+        profile
     }
 
     /// Takes the next phase into work, if there is one.
@@ -146,8 +150,12 @@ impl Profile {
         } else {
             (self.exit, core::mem::take(&mut self.down))
         };
+        if length == 0 {
+            (self.phase.distance, self.phase.time) = (0, 0);
+            return false;
+        }
         self.phase = Phase::new(limits, self.peak, to, length);
-        length > 0
+        true
     }
 
     /// Sheds speed from `entry` to rest, or as far as `length` allows.

@@ -2,7 +2,7 @@
 
 use super::course::Course;
 use super::curvature::Curvature;
-use super::emitter::{MoveLevels, whole_ticks};
+use super::emitter::{Kinds, MoveLevels, whole_ticks};
 use super::junction::{self, Corner, Heading};
 use super::lift::{Lift, LiftRule};
 use super::lookahead::BlockKind;
@@ -608,10 +608,14 @@ impl<'m> Runner<'m> {
         };
         // A move and its direction set-up are two events; one is left for a long wait.
         let mut room = (queue.room().saturating_sub(1)) / 2;
-        let mut levels = course.line.moves().map(MoveLevels::of);
-        if course.is_slack() {
-            levels = levels.map(MoveLevels::as_slack);
-        }
+        // One by one: arrays would go through memory.
+        let [straight, diagonal] = course.line.moves();
+        let levels = |direction: Direction| {
+            let levels = MoveLevels::of(direction);
+            if course.is_slack() { levels.as_slack() } else { levels }
+        };
+        let levels = Kinds { straight: levels(straight), diagonal: levels(diagonal) };
+        let ((x, y), (diagonal_x, diagonal_y)) = (straight.delta(), diagonal.delta());
         while let Some(moves) = &course.slice
             && moves.left > 0
         {
@@ -621,10 +625,11 @@ impl<'m> Runner<'m> {
                 return Ok(());
             }
             room -= count;
-            let turning = levels.map(|levels| self.emitter.turns(levels));
-            let turns = turning != [false; 2] && {
+            let turning =
+                (self.emitter.turns(levels.straight), self.emitter.turns(levels.diagonal));
+            let turns = turning != (false, false) && {
                 let diagonals = course.line.diagonals_within(count);
-                (turning[0] && diagonals < count) || (turning[1] && diagonals > 0)
+                (turning.0 && diagonals < count) || (turning.1 && diagonals > 0)
             };
             let is_even = !turns && !course.is_slack() && self.emitter.has_stepped();
             let stepped = if is_even && self.emitter.keeps_up(&train) {
@@ -634,11 +639,10 @@ impl<'m> Runner<'m> {
             };
             self.now = self.now.wrapping_add(stepped.late);
             let place = if course.is_slack() { &mut self.slack } else { &mut self.position };
-            let [(x, y), (dx, dy)] = course.line.moves().map(Direction::delta);
-            let [straight, diagonal] =
-                [count - stepped.diagonals, stepped.diagonals].map(|count| count as i32);
-            place.x = place.x.wrapping_add(x * straight + dx * diagonal);
-            place.y = place.y.wrapping_add(y * straight + dy * diagonal);
+            let diagonals = stepped.diagonals as i32;
+            let straights = count as i32 - diagonals;
+            place.x = place.x.wrapping_add(x * straights + diagonal_x * diagonals);
+            place.y = place.y.wrapping_add(y * straights + diagonal_y * diagonals);
             course.advance(count);
         }
         course.end_slice(slice);
