@@ -39,7 +39,7 @@ struct Phase {
 }
 
 impl Phase {
-    /// From one pace to another; `distance` is not 0.
+    /// From one pace to another.
     fn new(limits: &Limits, from: Pace, to: Pace, distance: PathLength) -> Self {
         let speeds = u64::from(from.speed.to_bits()) + u64::from(to.speed.to_bits());
         let bits = u64::from(distance.to_bits());
@@ -128,19 +128,15 @@ impl Profile {
         let (peak_pace, exit_pace) = (pace(peak), pace(exit));
         let up = start.abs_diff(peak).min(length);
         let down = (peak - exit).min(length - up);
-        let mut profile = Self {
-            phase: Phase::default(),
-            flat: length - up - down,
-            down,
-            peak: peak_pace,
-            exit: exit_pace,
-        };
-        if up > 0 {
-            profile.phase = Phase::new(limits, entry, peak_pace, up);
+        let (mut flat, mut down) = (length - up - down, down);
+        let phase = if up > 0 {
+            Phase::new(limits, entry, peak_pace, up)
+        } else if flat > 0 {
+            Phase::new(limits, peak_pace, peak_pace, core::mem::take(&mut flat))
         } else {
-            profile.begin_phase(limits);
-        }
-        profile
+            Phase::new(limits, peak_pace, exit_pace, core::mem::take(&mut down))
+        };
+        Self { phase, flat, down, peak: peak_pace, exit: exit_pace }
     }
 
     /// Takes the next phase into work, if there is one.
@@ -158,10 +154,9 @@ impl Profile {
         true
     }
 
-    /// Sheds speed from `entry` to rest, or as far as `length` allows.
-    pub(super) fn stopping(limits: &Limits, entry: Pace, length: PathLength) -> Self {
-        let length = length.min(entry.stopping_distance);
-        Self::new(limits, entry, length, Pace::REST, PathLength::ZERO)
+    /// The length, greatest pace and exit of one that sheds speed from `entry` to rest, or as far as `length` allows.
+    pub(super) fn stop(entry: Pace, length: PathLength) -> (PathLength, Pace, PathLength) {
+        (length.min(entry.stopping_distance), Pace::REST, PathLength::ZERO)
     }
 
     /// The speed at its end.
@@ -229,6 +224,11 @@ mod tests {
         (distance as f64 / 2f64.powi(32), time as f64 / 16.0 / 25e6)
     }
 
+    fn stopping(limits: &Limits, entry: Pace, length: PathLength) -> Profile {
+        let (length, top, exit) = Profile::stop(entry, length);
+        Profile::new(limits, entry, length, top, exit)
+    }
+
     #[test]
     fn triangle_trapezoid_and_stop_take_the_time_of_the_formula() {
         let limits = Limits::new(&settings()).expect("valid");
@@ -249,10 +249,10 @@ mod tests {
             assert!((distance - length).abs() < 1e-5, "{length}: {distance}");
             assert!((time - seconds).abs() < 2e-4 * seconds, "{length}: {time}, not {seconds}");
         }
-        let (distance, time) = run(&limits, Profile::stopping(&limits, top, mm(100.0)));
+        let (distance, time) = run(&limits, stopping(&limits, top, mm(100.0)));
         assert!((distance - 6.25).abs() < 1e-3 && (time - 0.25).abs() < 1e-4);
-        let short = Profile::stopping(&limits, top, mm(1.0));
+        let short = stopping(&limits, top, mm(1.0));
         assert_eq!(short.exit().stopping_distance, top.stopping_distance - mm(1.0));
-        assert_eq!(run(&limits, Profile::stopping(&limits, Pace::REST, mm(1.0))), (0.0, 0.0));
+        assert_eq!(run(&limits, stopping(&limits, Pace::REST, mm(1.0))), (0.0, 0.0));
     }
 }

@@ -669,13 +669,12 @@ impl<'m> Runner<'m> {
             self.run.strokes = self.run.strokes.wrapping_add(1);
         }
         self.in_stroke = block.ink.is_some();
-        let course = Course::new(&block, self.pen.dot_length);
+        let course = self.course.insert(Course::new(&block, self.pen.dot_length));
         if self.plan.is_some() {
             // The interval in work goes on with these moves.
             let units = self.brake.step_length(course.move_length);
             queue.set_step_length(units, self.emitter.has_stepped())?;
         }
-        self.course = Some(course);
         Ok(Progress::More)
     }
 
@@ -801,8 +800,8 @@ impl<'m> Runner<'m> {
             let bound = left.saturating_add(exit);
             self.pace.stopping_distance = self.pace.stopping_distance.min(bound);
         }
-        let profile = if self.stopping {
-            Profile::stopping(&self.limits, self.pace, left)
+        let (length, top, exit_allowed) = if self.stopping {
+            Profile::stop(self.pace, left)
         } else {
             let mut top = self.top(inked);
             if course.curve_limit < top.stopping_distance {
@@ -820,9 +819,11 @@ impl<'m> Runner<'m> {
             let may_change =
                 is_last && self.lookahead.is_short() && exit_allowed < top.stopping_distance;
             self.hurried = may_change.then_some(exit_allowed);
-            Profile::new(&self.limits, self.pace, left, top, exit_allowed)
+            (left, top, exit_allowed)
         };
-        self.plan = Some(Plan::Profile(profile));
+        // No copies: they cost as much as the plan.
+        self.plan =
+            Some(Plan::Profile(Profile::new(&self.limits, self.pace, length, top, exit_allowed)));
         Ok(Progress::More)
     }
 
