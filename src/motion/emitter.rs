@@ -314,7 +314,22 @@ pub(super) struct MoveLevels {
 
 impl MoveLevels {
     /// Those of a move in `direction`.
-    pub(super) const fn of(direction: Direction) -> Self {
+    pub(super) fn of(direction: Direction) -> Self {
+        /// By the numbers of directions.
+        const ALL: [MoveLevels; 9] = {
+            let mut all = [MoveLevels { pulses: 0, axes: 0, directions: 0 }; 9];
+            let mut index = 0;
+            while index < Direction::ALL.len() {
+                let direction = Direction::ALL[index];
+                all[direction as usize] = MoveLevels::told_by(direction);
+                index += 1;
+            }
+            all
+        };
+        ALL[direction as usize]
+    }
+
+    const fn told_by(direction: Direction) -> Self {
         let (dx, dy) = direction.delta();
         let mut levels = Self { pulses: 0, axes: 0, directions: 0 };
         if dx != 0 {

@@ -130,10 +130,10 @@ impl<'m> Lookahead<'m> {
         }
         self.count += 1;
         self.length += u64::from(block.length.to_bits());
-        if self.passes_limits_on {
-            self.limit_curve(1, 1, block.curve_limit);
-        } else {
+        if !self.passes_limits_on {
             self.note(self.count - 1, block.limit());
+        } else if block.limit() < PathLength::MAX {
+            self.limit_curve(1, 1, block.curve_limit);
         }
         Ok(())
     }
@@ -146,6 +146,7 @@ impl<'m> Lookahead<'m> {
         self.length -= u64::from(block.length.to_bits());
         match self.lowest_at.checked_sub(1) {
             Some(at) => self.lowest_at = at,
+            None if self.passes_limits_on => {}
             None => self.find_lowest(),
         }
         Some(block)

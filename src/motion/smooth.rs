@@ -181,25 +181,24 @@ impl Interval {
         if room == 0 {
             return None;
         }
+        // What is left of one is made up to a whole.
+        let missing = (u32::from(self.stride) * Slice::TIME).saturating_sub(self.rest.time);
+        let slices = ((missing / Slice::TIME) as u16).min(self.slices - self.done);
         let is_even = self.growth == 0 && self.from.ramp == 0;
-        if self.rest.distance == 0 || is_even {
-            // What is left of an even one is made up to a whole.
-            let whole = u32::from(self.stride) * Slice::TIME;
-            let slices = (whole.saturating_sub(self.rest.time) / Slice::TIME) as u16;
-            let slices = slices.min(self.slices - self.done);
+        if slices > 0 && (is_even || self.rest.distance == 0) {
             let before = self.speed;
             self.done += slices;
-            if !is_even {
-                self.speed = self.speed_after(self.done);
-            }
-            let slices = u32::from(slices);
-            // Speeds are at most 0.09.
-            self.rest.distance += before.midpoint(self.speed) * slices;
-            self.rest.time += Slice::TIME * slices;
+            self.speed = self.speed_after(self.done);
             let stands = before == 0 && self.speed == 0 && self.growth <= 0;
-            if self.rest.time == 0 || stands {
-                return None;
+            if !stands {
+                let slices = u32::from(slices);
+                // Speeds are at most 0.09.
+                self.rest.distance += before.midpoint(self.speed) * slices;
+                self.rest.time += Slice::TIME * slices;
             }
+        }
+        if self.rest.time == 0 {
+            return None;
         }
         let mut slice = core::mem::take(&mut self.rest);
         if u64::from(slice.distance) > room {
