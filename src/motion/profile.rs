@@ -39,9 +39,10 @@ struct Phase {
 }
 
 impl Phase {
-    /// From one pace to another.
-    fn new(limits: &Limits, from: Pace, to: Pace, distance: PathLength) -> Self {
-        let speeds = u64::from(from.speed.to_bits()) + u64::from(to.speed.to_bits());
+    /// From one speed to another.
+    #[inline(always)] // A copy of what it returns costs more.
+    fn new(limits: &Limits, from: SliceSpeed, to: SliceSpeed, distance: PathLength) -> Self {
+        let speeds = u64::from(from.to_bits()) + u64::from(to.to_bits());
         let bits = u64::from(distance.to_bits());
         // Time = 2 s / (v0 + v1) slices of 2^12 ticks, s and v in the same unit: below 2^63.
         let time = (bits << (14 + 1 + SLICE_TICKS.trailing_zeros() + FRACTION_BITS))
@@ -51,8 +52,8 @@ impl Phase {
         Self {
             distance: bits << 14,
             time,
-            speed: from.speed,
-            gain: match to.speed.cmp(&from.speed) {
+            speed: from,
+            gain: match to.cmp(&from) {
                 core::cmp::Ordering::Less => -acceleration,
                 core::cmp::Ordering::Equal => 0,
                 core::cmp::Ordering::Greater => acceleration,
@@ -129,13 +130,14 @@ impl Profile {
         let up = start.abs_diff(peak).min(length);
         let down = (peak - exit).min(length - up);
         let (mut flat, mut down) = (length - up - down, down);
-        let phase = if up > 0 {
-            Phase::new(limits, entry, peak_pace, up)
+        let (from, to, distance) = if up > 0 {
+            (entry, peak_pace, up)
         } else if flat > 0 {
-            Phase::new(limits, peak_pace, peak_pace, core::mem::take(&mut flat))
+            (peak_pace, peak_pace, core::mem::take(&mut flat))
         } else {
-            Phase::new(limits, peak_pace, exit_pace, core::mem::take(&mut down))
+            (peak_pace, exit_pace, core::mem::take(&mut down))
         };
+        let phase = Phase::new(limits, from.speed, to.speed, distance);
         Self { phase, flat, down, peak: peak_pace, exit: exit_pace }
     }
 
@@ -150,7 +152,7 @@ impl Profile {
             (self.phase.distance, self.phase.time) = (0, 0);
             return false;
         }
-        self.phase = Phase::new(limits, self.peak, to, length);
+        self.phase = Phase::new(limits, self.peak.speed, to.speed, length);
         true
     }
 

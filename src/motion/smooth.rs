@@ -123,11 +123,8 @@ impl JerkLimit {
         let (first, second) = (from + (ramp * ramp - peak * peak) / 2, to + peak * peak / 2);
         let hold = (first - second + peak - 1).max(0) / peak;
         // Times below 2^22, speeds below 2^37, their product below 2^58.
-        let way = from * down
-            + down * down * (3 * ramp - down) / 6
-            + hold * ((first + second) / 2)
-            + to * peak
-            + peak * peak * peak / 6;
+        let curves = down * down * (3 * ramp - down) + peak * peak * peak;
+        let way = from * down + hold * ((first + second) / 2) + to * peak + curves / 6;
         self.distance(way)
     }
 
