@@ -355,7 +355,8 @@ impl Road<'_, '_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motion::SLICE_TICKS;
+    use crate::motion::limits::tests::settings;
+    use crate::motion::{MotionSettings, SLICE_TICKS};
 
     /// mm/s, mm/s², m/s³; mm per slice at 1 mm/s.
     const SLICE: f64 = SLICE_TICKS as f64 / 25e6;
@@ -441,6 +442,33 @@ mod tests {
                     );
                 }
             }
+        }
+    }
+
+    #[test]
+    fn at_the_top_the_speed_stays_for_long_intervals() {
+        for jerk in [100, 10, 1] {
+            let jerk_m_per_s3 = Millimetres::from_num(jerk);
+            let limits = Limits::new(&MotionSettings { jerk_m_per_s3, ..settings() });
+            let limits = limits.expect("valid");
+            let (mut state, mut room) = (State::default(), 100u64 << 32);
+            let mut tops = std::vec::Vec::new();
+            while room > 0 {
+                let jerk = limits.jerk.expect("a limit");
+                let (top, curve_limit) = (limits.draw_speed, PathLength::MAX);
+                let road = Road { limits: &limits, jerk, top, room, curve_limit, beyond: None };
+                let mut interval = road.next(state);
+                while let Some(slice) = interval.next_slice(room) {
+                    room -= u64::from(slice.distance);
+                }
+                state = interval.state();
+                if u64::from(state.speed) * 100 > u64::from(top.to_bits()) * 99 && state.ramp == 0 {
+                    tops.push((state.speed, interval.slices));
+                }
+            }
+            assert!(tops.windows(2).all(|two| two[0].0 == two[1].0), "{jerk}: {tops:?}");
+            // Some 80 mm at 50 mm/s are 1.6 s.
+            assert!((4..60).contains(&tops.len()), "{jerk}: {tops:?}");
         }
     }
 
