@@ -4,6 +4,8 @@
 //! each block there states the contract that it meets. `take` gives the board that the firmware is
 //! built for, once.
 
+#[cfg(feature = "lm3s6965")]
+mod divide;
 mod fault;
 mod handler;
 mod line;

@@ -129,7 +129,9 @@ impl Machine<'_> {
     }
 
     fn read_targets(&mut self, path: &mut dyn Path) {
-        self.push_pieces();
+        if self.split.is_some() {
+            self.push_pieces();
+        }
         while !self.path_ended && self.next_pen.is_none() && self.has_room() {
             match path.next_target() {
                 Some(target) if path.pen() != self.pen => {

@@ -431,7 +431,7 @@ impl Settings {
     pub fn kinematics(&self) -> Kinematics {
         let steps =
             |setting| self.millimetres_as_steps(setting, Setting::StepsPerMmX).min(2 * PAGE_LIMIT);
-        match self.get(Setting::Kinematics).to_num::<u8>() {
+        match self.get(Setting::Kinematics).to_bits() >> Value::FRAC_NBITS {
             0 => Kinematics::Cartesian,
             1 => Kinematics::CoreXy,
             _ => Kinematics::Polargraph(Anchors {

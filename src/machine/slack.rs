@@ -7,7 +7,7 @@
 //! On which side a motor lies is not known until it has moved: the first move takes up nothing, so the
 //! pen may be off by the slack until the machine is homed.
 
-use super::{Axis, Machine, Setting};
+use super::{Machine, Setting};
 use crate::drawing::{LineType, PagePoint};
 use crate::motion::{Move, PathLength, PushError};
 
@@ -22,19 +22,17 @@ impl Slack {
     /// The steps to take up before a move by (`dx`, `dy`) steps of motors that have `slack`; they are
     /// taken up from here on.
     fn take_up(&mut self, slack: [i32; 2], way: [i32; 2]) -> [i32; 2] {
-        let mut steps = [0; 2];
-        for (((steps, ahead), slack), way) in
-            steps.iter_mut().zip(&mut self.ahead).zip(slack).zip(way)
-        {
-            if way == 0 {
-                continue;
+        let mut take = |axis: usize| {
+            if way[axis] == 0 {
+                return 0;
             }
-            let up = way > 0;
+            let (up, ahead, slack) = (way[axis] > 0, &mut self.ahead[axis], slack[axis]);
             let now = ahead.unwrap_or(if up { 0 } else { slack });
-            *steps = if up { now } else { now - slack };
-            *ahead = Some(now - *steps);
-        }
-        steps
+            let steps = if up { now } else { now - slack };
+            *ahead = Some(now - steps);
+            steps
+        };
+        [take(0), take(1)]
     }
 
     /// So much of it was not taken up after all.
@@ -60,13 +58,13 @@ impl Slack {
 impl Machine<'_> {
     /// Steps of slack of each motor.
     pub(super) fn slack_steps(&self) -> [i32; 2] {
-        [Axis::X, Axis::Y].map(|axis| {
-            let (slack, steps_per_mm) = match axis {
-                Axis::X => (Setting::BacklashX, Setting::StepsPerMmX),
-                Axis::Y => (Setting::BacklashY, self.settings.steps_per_mm_y()),
-            };
+        let steps = |slack: Setting, steps_per_mm: Setting| {
             self.settings.millimetres_as_steps(slack, steps_per_mm)
-        })
+        };
+        [
+            steps(Setting::BacklashX, Setting::StepsPerMmX),
+            steps(Setting::BacklashY, self.settings.steps_per_mm_y()),
+        ]
     }
 
     /// Appends a move of the motors, or first one that takes up their slack: then the other is still to

@@ -84,7 +84,7 @@ impl Machine<'_> {
                 }
             }
             let end = PathLength::from_bits(end);
-            let places = [place, end].map(PathLength::to_bits);
+            let places = [place.to_bits(), end.to_bits()];
             let begin = self.runner.end();
             let Piece { motors, page, offsets } =
                 build.piece([from, to], places, length.to_bits(), begin);

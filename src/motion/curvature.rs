@@ -109,7 +109,13 @@ fn circle_limit(limits: &Limits, first: Place, middle: Place, last: Place) -> Op
         let sum = x + y;
         u64::from(x.max(y).max((sum >> 1) + (sum >> 3) + (sum >> 4)))
     };
-    let (ab, c) = (least(ax, ay) * least(bx, by), least(cx, cy));
+    let c = least(cx, cy);
+    let rounding = u64::from(limits.rounding.to_bits() >> (PathLength::FRAC_NBITS - FRACTION_BITS));
+    // The height over the chord is that of rounding.
+    if twice_area < (rounding + 1) * c {
+        return None;
+    }
+    let ab = least(ax, ay) * least(bx, by);
     // `c` is below 2^29, `top` below 2^26.
     const HALF: u64 = u32::MAX as u64;
     let is_wide = if ab <= HALF && twice_area <= HALF {
@@ -130,7 +136,6 @@ fn circle_limit(limits: &Limits, first: Place, middle: Place, last: Place) -> Op
         return None;
     }
     let (a, b, c) = (a.isqrt(), b.isqrt(), c.isqrt());
-    let rounding = u64::from(limits.rounding.to_bits() >> (PathLength::FRAC_NBITS - FRACTION_BITS));
     let height = (twice_area / c).saturating_sub(rounding);
     let half_radius = (a * b).checked_div(4 * height)?;
     (half_radius < top).then(|| {

@@ -91,15 +91,15 @@ impl Emitter {
         start: u32,
         train: Train,
         line: &mut Line,
-        levels: [MoveLevels; 2],
+        levels: Kinds,
         queue: &mut dyn EventQueue,
     ) -> Result<Stepped, StepEvent> {
         let Some((event, since)) = self.pending else {
             return Ok(Stepped::default());
         };
         let level_bits = self.level_bits();
-        let [straight, diagonal] = levels
-            .map(|move_levels| StepEvent::levels(level_bits | move_levels.pulses, 0).to_bits());
+        let event_of =
+            |levels: MoveLevels| StepEvent::levels(level_bits | levels.pulses, 0).to_bits();
         // All times are counted from here, which is a whole tick.
         let due = whole_ticks(train.due(start, 0));
         let late = later(due, since.wrapping_add(self.least_interval)).wrapping_sub(due);
@@ -111,8 +111,8 @@ impl Emitter {
             interval: train.interval,
             before: ahead.cast_unsigned(),
             event: event.to_bits(),
-            straight,
-            diagonal,
+            straight: event_of(levels.straight),
+            diagonal: event_of(levels.diagonal),
             balance,
             gain,
             loss,
@@ -135,7 +135,7 @@ impl Emitter {
         start: u32,
         train: Train,
         line: &mut Line,
-        levels: [MoveLevels; 2],
+        levels: Kinds,
         queue: &mut dyn EventQueue,
     ) -> Result<Stepped, StepEvent> {
         let mut stepped = Stepped::default();
@@ -143,7 +143,8 @@ impl Emitter {
             let is_diagonal = line.next_is_diagonal();
             stepped.diagonals += usize::from(is_diagonal);
             let due = whole_ticks(train.due(start, number)).wrapping_add(stepped.late);
-            let at = self.step(levels[usize::from(is_diagonal)], due, queue)?;
+            let levels = if is_diagonal { levels.diagonal } else { levels.straight };
+            let at = self.step(levels, due, queue)?;
             stepped.late = stepped.late.wrapping_add(at.wrapping_sub(due));
         }
         Ok(stepped)
@@ -293,6 +294,13 @@ fn later(a: u32, b: u32) -> u32 {
     if (a.wrapping_sub(b)).cast_signed() < 0 { b } else { a }
 }
 
+/// What the two moves of a line do to the pins.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Kinds {
+    pub(super) straight: MoveLevels,
+    pub(super) diagonal: MoveLevels,
+}
+
 /// What a move does to the pins.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct MoveLevels {
@@ -306,7 +314,22 @@ pub(super) struct MoveLevels {
 
 impl MoveLevels {
     /// Those of a move in `direction`.
-    pub(super) const fn of(direction: Direction) -> Self {
+    pub(super) fn of(direction: Direction) -> Self {
+        /// By the numbers of directions.
+        const ALL: [MoveLevels; 9] = {
+            let mut all = [MoveLevels { pulses: 0, axes: 0, directions: 0 }; 9];
+            let mut index = 0;
+            while index < Direction::ALL.len() {
+                let direction = Direction::ALL[index];
+                all[direction as usize] = MoveLevels::told_by(direction);
+                index += 1;
+            }
+            all
+        };
+        ALL[direction as usize]
+    }
+
+    const fn told_by(direction: Direction) -> Self {
         let (dx, dy) = direction.delta();
         let mut levels = Self { pulses: 0, axes: 0, directions: 0 };
         if dx != 0 {

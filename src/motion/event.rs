@@ -158,6 +158,7 @@ impl StepEvent {
     }
 
     /// What happens.
+    #[inline(always)] // Not a call in the step interrupt.
     pub const fn kind(self) -> EventKind {
         let flags = self.0 as u8;
         if flags & Self::PEN != 0 {

@@ -211,6 +211,13 @@ impl Limits {
         (twice * u64::from(stopping_distance.to_bits())).saturating_mul(1 << 14)
     }
 
+    /// The least stopping distance whose [squared speed](Limits::squared_speed) is not below that of `speed`.
+    pub(super) fn least_limit(&self, speed: u64) -> PathLength {
+        let twice = 2 * u64::from(self.acceleration.to_bits());
+        let bits = (speed * speed).div_ceil(twice.max(1)).div_ceil(1 << 14);
+        PathLength::from_bits(u32::try_from(bits).unwrap_or(u32::MAX))
+    }
+
     /// The stopping distance of a speed in mm/min: what bounds a block to it. Not less than can be
     /// told from standing (at 800 mm/s², 5 mm/min).
     pub fn feed(&self, mm_per_min: Millimetres) -> PathLength {

@@ -46,6 +46,11 @@ impl Block {
         offsets: [0; 2],
         kind: BlockKind::Line,
     };
+
+    /// The greatest stopping distance at its beginning.
+    pub(super) fn limit(&self) -> PathLength {
+        self.entry_limit.min(self.curve_limit)
+    }
 }
 
 /// A ring of blocks, in the order in which they are drawn.
@@ -59,12 +64,23 @@ pub struct Lookahead<'m> {
     /// Whether each block's `entry_limit` is lowered to what the blocks behind it allow and to its
     /// `curve_limit`, so that none has to be looked for when the block before it begins.
     passes_limits_on: bool,
+    /// The lowest limit of all blocks, and which of them is the last to have it: known only if limits are not passed on.
+    lowest: PathLength,
+    lowest_at: usize,
 }
 
 impl<'m> Lookahead<'m> {
     /// A ring in the memory lent; its length is the capacity.
     pub fn new(blocks: &'m mut [Block]) -> Self {
-        Self { blocks, first: 0, count: 0, length: 0, passes_limits_on: true }
+        Self {
+            blocks,
+            first: 0,
+            count: 0,
+            length: 0,
+            passes_limits_on: true,
+            lowest: PathLength::MAX,
+            lowest_at: 0,
+        }
     }
 
     /// Blocks that fit.
@@ -91,6 +107,7 @@ impl<'m> Lookahead<'m> {
     /// limit on jerk; while none wait.
     pub(super) fn pass_limits_on(&mut self, on: bool) {
         self.passes_limits_on = on;
+        self.find_lowest();
     }
 
     /// Whether less than half of the memory is in use.
@@ -113,7 +130,11 @@ impl<'m> Lookahead<'m> {
         }
         self.count += 1;
         self.length += u64::from(block.length.to_bits());
-        self.limit_curve(1, 1, block.curve_limit);
+        if !self.passes_limits_on {
+            self.note(self.count - 1, block.limit());
+        } else if block.limit() < PathLength::MAX {
+            self.limit_curve(1, 1, block.curve_limit);
+        }
         Ok(())
     }
 
@@ -123,6 +144,11 @@ impl<'m> Lookahead<'m> {
         self.first = self.wrapped(1);
         self.count -= 1;
         self.length -= u64::from(block.length.to_bits());
+        match self.lowest_at.checked_sub(1) {
+            Some(at) => self.lowest_at = at,
+            None if self.passes_limits_on => {}
+            None => self.find_lowest(),
+        }
         Some(block)
     }
 
@@ -133,6 +159,36 @@ impl<'m> Lookahead<'m> {
     pub(super) fn clear(&mut self) {
         self.count = 0;
         self.length = 0;
+        self.find_lowest();
+    }
+
+    /// The lowest limit of all blocks, of which the one before the first may be the last to have had it.
+    fn find_lowest(&mut self) {
+        (self.lowest, self.lowest_at) = (PathLength::MAX, 0);
+        if !self.passes_limits_on {
+            for index in 0..self.count {
+                let limit = self.blocks.get(self.wrapped(index)).map(Block::limit);
+                self.note(index, limit.unwrap_or(PathLength::MAX));
+            }
+        }
+    }
+
+    /// A block has, or had a higher limit and now has, this one.
+    fn note(&mut self, index: usize, limit: PathLength) {
+        if limit < self.lowest || (limit == self.lowest && index > self.lowest_at) {
+            (self.lowest, self.lowest_at) = (limit, index);
+        }
+    }
+
+    /// The lowest limit of all blocks; while limits are not passed on.
+    pub(super) fn lowest_limit(&self) -> PathLength {
+        debug_assert!(!self.passes_limits_on);
+        self.lowest
+    }
+
+    /// The length of all blocks, 2^-32 mm.
+    pub(super) fn known(&self) -> u64 {
+        self.length << 14
     }
 
     fn wrapped(&self, index: usize) -> usize {
@@ -140,9 +196,12 @@ impl<'m> Lookahead<'m> {
         if index >= self.blocks.len() { index - self.blocks.len() } else { index }
     }
 
-    pub(super) fn iter(&self) -> impl Iterator<Item = &Block> {
-        let (wrapped, straight) = self.blocks.split_at(self.first);
-        straight.iter().chain(wrapped).take(self.count)
+    /// All in their order, in two parts.
+    pub(super) fn blocks(&self) -> [&[Block]; 2] {
+        let (wrapped, straight) = self.blocks.split_at(self.first.min(self.blocks.len()));
+        let count = self.count.min(straight.len());
+        let rest = (self.count - count).min(wrapped.len());
+        [&straight[..count], &wrapped[..rest]]
     }
 
     /// The last blocks, from the `least`th to the `most`th counted from 1 at the end, are part of a
@@ -164,6 +223,8 @@ impl<'m> Lookahead<'m> {
             if is_curve {
                 block.curve_limit = block.curve_limit.min(limit);
                 if !self.passes_limits_on {
+                    let limit = block.limit();
+                    self.note(index, limit);
                     continue;
                 }
                 allowed = allowed.min(block.curve_limit);
@@ -245,6 +306,26 @@ mod tests {
     }
 
     #[test]
+    fn the_lowest_limit_is_known() {
+        let mut memory = [Block::EMPTY; 7];
+        let mut ring = Lookahead::new(&mut memory);
+        ring.pass_limits_on(false);
+        for round in 0..300u32 {
+            if ring.is_full() || round % 13 > 9 {
+                ring.pop();
+            }
+            ring.push(block(10, 20 + round * 7 % 31)).expect("room");
+            if round % 11 == 0 {
+                ring.limit_curve(2, 4, PathLength::from_bits(round * 5 % 37));
+            }
+            let lowest = ring.blocks().concat().iter().map(Block::limit).min();
+            assert_eq!(Some(ring.lowest_limit()), lowest, "{round}");
+        }
+        ring.clear();
+        assert_eq!(ring.lowest_limit(), PathLength::MAX);
+    }
+
+    #[test]
     fn what_a_block_allows_is_known_to_all_before_it() {
         let mut memory = [Block::EMPTY; 7];
         let mut ring = Lookahead::new(&mut memory);
@@ -258,7 +339,7 @@ mod tests {
                 ring.limit_curve(2, 4, PathLength::from_bits(30 + round));
             }
             // Each block by itself, from the end on.
-            let blocks: std::vec::Vec<_> = ring.iter().copied().collect();
+            let blocks: std::vec::Vec<_> = ring.blocks().concat();
             let mut allowed = 0;
             for block in blocks.iter().rev() {
                 let limit = block.entry_limit.min(block.curve_limit).to_bits();

@@ -17,9 +17,9 @@
 //! The pulses leave when the plan is half a step from the new position: the pins are never more
 //! than half a step from where the plan is.
 //!
-//! Measured on a Cortex-M3, built for size, everything between target and queue included: 54
-//! instructions for each event at 100,000 moves a second, and 120 to 290 with a limit on jerk; at 5,000 moves a
-//! second, 184 and 360 to 1880. `cargo xtask bench --motion` counts them.
+//! Measured on a Cortex-M3, built for size, everything between target and queue included: 37
+//! instructions for each event of a line at 100,000 moves a second, and 51 to 123 with a limit on jerk; for chords of five
+//! moves at 5,000 a second 437, and 435 to 642. `cargo xtask bench --motion` counts them.
 //!
 //! Not done here: limits of travel, the pen's heights, states. That is `machine`.
 

@@ -39,11 +39,10 @@ struct Phase {
 }
 
 impl Phase {
-    fn new(limits: &Limits, from: Pace, to: Pace, distance: PathLength) -> Self {
-        if distance == 0 {
-            return Self::default();
-        }
-        let speeds = u64::from(from.speed.to_bits()) + u64::from(to.speed.to_bits());
+    /// From one speed to another.
+    #[inline(always)] // A copy of what it returns costs more.
+    fn new(limits: &Limits, from: SliceSpeed, to: SliceSpeed, distance: PathLength) -> Self {
+        let speeds = u64::from(from.to_bits()) + u64::from(to.to_bits());
         let bits = u64::from(distance.to_bits());
         // Time = 2 s / (v0 + v1) slices of 2^12 ticks, s and v in the same unit: below 2^63.
         let time = (bits << (14 + 1 + SLICE_TICKS.trailing_zeros() + FRACTION_BITS))
@@ -53,8 +52,8 @@ impl Phase {
         Self {
             distance: bits << 14,
             time,
-            speed: from.speed,
-            gain: match to.speed.cmp(&from.speed) {
+            speed: from,
+            gain: match to.cmp(&from) {
                 core::cmp::Ordering::Less => -acceleration,
                 core::cmp::Ordering::Equal => 0,
                 core::cmp::Ordering::Greater => acceleration,
@@ -82,8 +81,12 @@ impl Slice {
 /// The speed along one piece of the path: at most three phases of constant acceleration.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Profile {
-    phases: [Phase; 3],
-    phase: usize,
+    /// The phase in work.
+    phase: Phase,
+    /// How long the speed then stays, and how long it sinks at the end.
+    flat: PathLength,
+    down: PathLength,
+    peak: Pace,
     exit: Pace,
 }
 
@@ -126,21 +129,36 @@ impl Profile {
         let (peak_pace, exit_pace) = (pace(peak), pace(exit));
         let up = start.abs_diff(peak).min(length);
         let down = (peak - exit).min(length - up);
-        Self {
-            phases: [
-                Phase::new(limits, entry, peak_pace, up),
-                Phase::new(limits, peak_pace, peak_pace, length - up - down),
-                Phase::new(limits, peak_pace, exit_pace, down),
-            ],
-            phase: 0,
-            exit: exit_pace,
-        }
+        let (mut flat, mut down) = (length - up - down, down);
+        let (from, to, distance) = if up > 0 {
+            (entry, peak_pace, up)
+        } else if flat > 0 {
+            (peak_pace, peak_pace, core::mem::take(&mut flat))
+        } else {
+            (peak_pace, exit_pace, core::mem::take(&mut down))
+        };
+        let phase = Phase::new(limits, from.speed, to.speed, distance);
+        Self { phase, flat, down, peak: peak_pace, exit: exit_pace }
     }
 
-    /// Sheds speed from `entry` to rest, or as far as `length` allows.
-    pub(super) fn stopping(limits: &Limits, entry: Pace, length: PathLength) -> Self {
-        let length = length.min(entry.stopping_distance);
-        Self::new(limits, entry, length, Pace::REST, PathLength::ZERO)
+    /// Takes the next phase into work, if there is one.
+    fn begin_phase(&mut self, limits: &Limits) -> bool {
+        let (to, length) = if self.flat > 0 {
+            (self.peak, core::mem::take(&mut self.flat))
+        } else {
+            (self.exit, core::mem::take(&mut self.down))
+        };
+        if length == 0 {
+            (self.phase.distance, self.phase.time) = (0, 0);
+            return false;
+        }
+        self.phase = Phase::new(limits, self.peak.speed, to.speed, length);
+        true
+    }
+
+    /// The length, greatest pace and exit of one that sheds speed from `entry` to rest, or as far as `length` allows.
+    pub(super) fn stop(entry: Pace, length: PathLength) -> (PathLength, Pace, PathLength) {
+        (length.min(entry.stopping_distance), Pace::REST, PathLength::ZERO)
     }
 
     /// The speed at its end.
@@ -150,16 +168,19 @@ impl Profile {
 
     /// The speed where the next slice begins.
     pub(super) fn speed(&self) -> SliceSpeed {
-        self.phases[self.phase.min(2)..]
-            .iter()
-            .find(|phase| phase.distance > 0)
-            .map_or(self.exit.speed, |phase| phase.speed)
+        if self.phase.distance > 0 {
+            self.phase.speed
+        } else if self.flat > 0 || self.down > 0 {
+            self.peak.speed
+        } else {
+            self.exit.speed
+        }
     }
 
     /// The next slice, `None` at the end.
-    pub(super) fn next_slice(&mut self) -> Option<Slice> {
+    pub(super) fn next_slice(&mut self, limits: &Limits) -> Option<Slice> {
         loop {
-            let phase = self.phases.get_mut(self.phase)?;
+            let phase = &mut self.phase;
             let slices = if phase.gain == 0 { Slice::MOST } else { 1 };
             let time = u64::from(slices * Slice::TIME);
             if phase.time > time {
@@ -175,10 +196,12 @@ impl Profile {
             }
             // No more than that.
             let rest = Slice { distance: phase.distance as u32, time: phase.time as u32 };
-            *phase = Phase::default();
-            self.phase += 1;
+            let goes_on = self.begin_phase(limits);
             if rest.distance > 0 {
                 return Some(rest);
+            }
+            if !goes_on {
+                return None;
             }
         }
     }
@@ -194,13 +217,18 @@ mod tests {
     }
 
     /// Distance (mm) and time (s) of all slices.
-    fn run(mut profile: Profile) -> (f64, f64) {
+    fn run(limits: &Limits, mut profile: Profile) -> (f64, f64) {
         let (mut distance, mut time) = (0u64, 0u64);
-        while let Some(slice) = profile.next_slice() {
+        while let Some(slice) = profile.next_slice(limits) {
             distance += u64::from(slice.distance);
             time += u64::from(slice.time);
         }
         (distance as f64 / 2f64.powi(32), time as f64 / 16.0 / 25e6)
+    }
+
+    fn stopping(limits: &Limits, entry: Pace, length: PathLength) -> Profile {
+        let (length, top, exit) = Profile::stop(entry, length);
+        Profile::new(limits, entry, length, top, exit)
     }
 
     #[test]
@@ -219,14 +247,14 @@ mod tests {
         for (length, entry, exit, seconds) in cases {
             let entry = Pace::of_stopping_distance(&limits, mm(entry).min(top.stopping_distance));
             let profile = Profile::new(&limits, entry, mm(length), top, mm(exit));
-            let (distance, time) = run(profile);
+            let (distance, time) = run(&limits, profile);
             assert!((distance - length).abs() < 1e-5, "{length}: {distance}");
             assert!((time - seconds).abs() < 2e-4 * seconds, "{length}: {time}, not {seconds}");
         }
-        let (distance, time) = run(Profile::stopping(&limits, top, mm(100.0)));
+        let (distance, time) = run(&limits, stopping(&limits, top, mm(100.0)));
         assert!((distance - 6.25).abs() < 1e-3 && (time - 0.25).abs() < 1e-4);
-        let short = Profile::stopping(&limits, top, mm(1.0));
+        let short = stopping(&limits, top, mm(1.0));
         assert_eq!(short.exit().stopping_distance, top.stopping_distance - mm(1.0));
-        assert_eq!(run(Profile::stopping(&limits, Pace::REST, mm(1.0))), (0.0, 0.0));
+        assert_eq!(run(&limits, stopping(&limits, Pace::REST, mm(1.0))), (0.0, 0.0));
     }
 }

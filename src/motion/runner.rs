@@ -2,7 +2,7 @@
 
 use super::course::Course;
 use super::curvature::Curvature;
-use super::emitter::{MoveLevels, whole_ticks};
+use super::emitter::{Kinds, MoveLevels, whole_ticks};
 use super::junction::{self, Corner, Heading};
 use super::lift::{Lift, LiftRule};
 use super::lookahead::BlockKind;
@@ -13,6 +13,7 @@ use super::{
     StepEvent,
 };
 use crate::drawing::{LineType, PagePoint};
+use crate::step::Direction;
 use core::cmp::Ordering;
 
 /// Where the pen stands and how long it takes to get there.
@@ -548,7 +549,7 @@ impl<'m> Runner<'m> {
                     }
                     continue;
                 }
-                Some(Plan::Profile(profile)) => profile.next_slice(),
+                Some(Plan::Profile(profile)) => profile.next_slice(&self.limits),
                 Some(Plan::Interval(interval)) => interval.next_slice(course.room()),
             };
             let Some(slice) = slice else {
@@ -607,10 +608,14 @@ impl<'m> Runner<'m> {
         };
         // A move and its direction set-up are two events; one is left for a long wait.
         let mut room = (queue.room().saturating_sub(1)) / 2;
-        let mut levels = course.line.moves().map(MoveLevels::of);
-        if course.is_slack() {
-            levels = levels.map(MoveLevels::as_slack);
-        }
+        // One by one: arrays would go through memory.
+        let [straight, diagonal] = course.line.moves();
+        let levels = |direction: Direction| {
+            let levels = MoveLevels::of(direction);
+            if course.is_slack() { levels.as_slack() } else { levels }
+        };
+        let levels = Kinds { straight: levels(straight), diagonal: levels(diagonal) };
+        let ((x, y), (diagonal_x, diagonal_y)) = (straight.delta(), diagonal.delta());
         while let Some(moves) = &course.slice
             && moves.left > 0
         {
@@ -620,10 +625,11 @@ impl<'m> Runner<'m> {
                 return Ok(());
             }
             room -= count;
-            let turning = levels.map(|levels| self.emitter.turns(levels));
-            let turns = turning != [false; 2] && {
+            let turning =
+                (self.emitter.turns(levels.straight), self.emitter.turns(levels.diagonal));
+            let turns = turning != (false, false) && {
                 let diagonals = course.line.diagonals_within(count);
-                (turning[0] && diagonals < count) || (turning[1] && diagonals > 0)
+                (turning.0 && diagonals < count) || (turning.1 && diagonals > 0)
             };
             let is_even = !turns && !course.is_slack() && self.emitter.has_stepped();
             let stepped = if is_even && self.emitter.keeps_up(&train) {
@@ -633,12 +639,10 @@ impl<'m> Runner<'m> {
             };
             self.now = self.now.wrapping_add(stepped.late);
             let place = if course.is_slack() { &mut self.slack } else { &mut self.position };
-            let counts = [count - stepped.diagonals, stepped.diagonals];
-            for (direction, count) in course.line.moves().into_iter().zip(counts) {
-                let (dx, dy) = direction.delta();
-                place.x = place.x.wrapping_add(dx * count as i32);
-                place.y = place.y.wrapping_add(dy * count as i32);
-            }
+            let diagonals = stepped.diagonals as i32;
+            let straights = count as i32 - diagonals;
+            place.x = place.x.wrapping_add(x * straights + diagonal_x * diagonals);
+            place.y = place.y.wrapping_add(y * straights + diagonal_y * diagonals);
             course.advance(count);
         }
         course.end_slice(slice);
@@ -665,13 +669,12 @@ impl<'m> Runner<'m> {
             self.run.strokes = self.run.strokes.wrapping_add(1);
         }
         self.in_stroke = block.ink.is_some();
-        let course = Course::new(&block, self.pen.dot_length);
+        let course = self.course.insert(Course::new(&block, self.pen.dot_length));
         if self.plan.is_some() {
             // The interval in work goes on with these moves.
             let units = self.brake.step_length(course.move_length);
             queue.set_step_length(units, self.emitter.has_stepped())?;
         }
-        self.course = Some(course);
         Ok(Progress::More)
     }
 
@@ -797,8 +800,8 @@ impl<'m> Runner<'m> {
             let bound = left.saturating_add(exit);
             self.pace.stopping_distance = self.pace.stopping_distance.min(bound);
         }
-        let profile = if self.stopping {
-            Profile::stopping(&self.limits, self.pace, left)
+        let (length, top, exit_allowed) = if self.stopping {
+            Profile::stop(self.pace, left)
         } else {
             let mut top = self.top(inked);
             if course.curve_limit < top.stopping_distance {
@@ -816,9 +819,11 @@ impl<'m> Runner<'m> {
             let may_change =
                 is_last && self.lookahead.is_short() && exit_allowed < top.stopping_distance;
             self.hurried = may_change.then_some(exit_allowed);
-            Profile::new(&self.limits, self.pace, left, top, exit_allowed)
+            (left, top, exit_allowed)
         };
-        self.plan = Some(Plan::Profile(profile));
+        // No copies: they cost as much as the plan.
+        self.plan =
+            Some(Plan::Profile(Profile::new(&self.limits, self.pace, length, top, exit_allowed)));
         Ok(Progress::More)
     }
 

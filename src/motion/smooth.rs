@@ -19,6 +19,13 @@ use core::num::NonZeroU32;
 /// changes at the ends of intervals only.
 const MOST_GROWTH: i32 = 18;
 
+/// Where slices are taken together, a constant speed leaves the place that the acceleration leads to by no more than this,
+/// 2^-32 mm: 4 nm.
+const MOST_DEVIATION: u64 = 1 << 14;
+
+/// Slices, about 0.1 s: a cruise is not looked after more often than that.
+const LONGEST_CRUISE: u16 = 512;
+
 /// The limit on jerk as the planner needs it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct JerkLimit {
@@ -68,8 +75,9 @@ impl JerkLimit {
 
     /// What a ramp that grows from `ramp` by `growth` a slice adds to the speed in so many slices.
     fn gain(self, ramp: i32, growth: i32, slices: u16) -> i64 {
-        let (ramp, growth, slices) = (i64::from(ramp), i64::from(growth), i64::from(slices));
-        (self.jerk() * (2 * ramp * slices + growth * slices * slices)) >> 13
+        // Below 2^27: without a ramp, intervals may be longer.
+        let slices = i32::from(slices);
+        (self.jerk() * i64::from((2 * ramp + growth * slices) * slices)) >> 13
     }
 
     /// The way that it adds, 2^-32 mm.
@@ -83,9 +91,11 @@ impl JerkLimit {
         ((u64::from(speed) << 16) / u64::from(self.jerk.get())) as i64
     }
 
-    /// How fast it is when the ramp has ended as soon as it can.
+    /// How fast it is when the ramp has ended as soon as it can. One that builds speed up does not end within less than
+    /// an interval: to reckon with less would let a speed that cannot be kept rise and fall for ever.
     fn settled(self, state: State) -> u64 {
-        let square = i64::from(state.ramp) * i64::from(state.ramp.abs());
+        let shortest = if state.ramp > 0 { 16 * i32::from(self.slices()) } else { 0 };
+        let square = i64::from(state.ramp) * i64::from(state.ramp.abs().max(shortest));
         (i64::from(state.speed) + ((self.jerk() * square) >> 17)).max(0).unsigned_abs()
     }
 
@@ -113,11 +123,8 @@ impl JerkLimit {
         let (first, second) = (from + (ramp * ramp - peak * peak) / 2, to + peak * peak / 2);
         let hold = (first - second + peak - 1).max(0) / peak;
         // Times below 2^22, speeds below 2^37, their product below 2^58.
-        let way = from * down
-            + down * down * (3 * ramp - down) / 6
-            + hold * ((first + second) / 2)
-            + to * peak
-            + peak * peak * peak / 6;
+        let curves = down * down * (3 * ramp - down) + peak * peak * peak;
+        let way = from * down + hold * ((first + second) / 2) + to * peak + curves / 6;
         self.distance(way)
     }
 
@@ -143,16 +150,26 @@ pub(super) struct Interval {
     from: State,
     /// Added to the ramp by each slice: sixteenths of the jerk of [`JerkLimit`].
     growth: i8,
+    /// So many slices are one.
+    stride: u8,
     slices: u16,
     done: u16,
+    /// When so many are done.
+    speed: u32,
     /// What is left of a slice that the end of a block cut.
     rest: Slice,
 }
 
 impl Interval {
-    fn new(limit: JerkLimit, from: State, growth: i32) -> Self {
-        let slices = limit.slices();
-        Self { limit, from, growth: growth as i8, slices, done: 0, rest: Slice::default() }
+    fn new(limit: JerkLimit, from: State, growth: i32, slices: u16) -> Self {
+        let last = from.ramp + growth * i32::from(slices);
+        let longest = u64::from(from.ramp.unsigned_abs().max(last.unsigned_abs()));
+        let acceleration = (u64::from(limit.jerk.get()) * longest) >> 12;
+        let is_straight =
+            |slices: &u32| acceleration * u64::from(slices * slices) <= MOST_DEVIATION * 8;
+        let stride = [Slice::MOST, 4, 2].into_iter().find(is_straight).unwrap_or(1);
+        let (growth, stride, speed) = (growth as i8, stride as u8, from.speed);
+        Self { limit, from, growth, stride, slices, done: 0, speed, rest: Slice::default() }
     }
 
     /// The next slice, or as much of it as there is `room` for (2^-32 mm); `None` at the end of the interval or
@@ -161,21 +178,24 @@ impl Interval {
         if room == 0 {
             return None;
         }
-        if self.rest.distance == 0 {
-            let before = self.speed(self.done);
-            let is_even = self.growth == 0 && self.from.ramp == 0;
-            let slices: u16 = if is_even { Slice::MOST as u16 } else { 1 };
-            let slices = slices.min(self.slices - self.done);
-            let after = self.speed(self.done + slices);
-            let stands = before == 0 && after == 0 && self.growth <= 0;
-            if slices == 0 || stands {
-                return None;
-            }
+        // What is left of one is made up to a whole.
+        let missing = (u32::from(self.stride) * Slice::TIME).saturating_sub(self.rest.time);
+        let slices = ((missing / Slice::TIME) as u16).min(self.slices - self.done);
+        let is_even = self.growth == 0 && self.from.ramp == 0;
+        if slices > 0 && (is_even || self.rest.distance == 0) {
+            let before = self.speed;
             self.done += slices;
-            let slices = u32::from(slices);
-            // Speeds are at most 0.09.
-            self.rest =
-                Slice { distance: before.midpoint(after) * slices, time: Slice::TIME * slices };
+            self.speed = self.speed_after(self.done);
+            let stands = before == 0 && self.speed == 0 && self.growth <= 0;
+            if !stands {
+                let slices = u32::from(slices);
+                // Speeds are at most 0.09.
+                self.rest.distance += before.midpoint(self.speed) * slices;
+                self.rest.time += Slice::TIME * slices;
+            }
+        }
+        if self.rest.time == 0 {
+            return None;
         }
         let mut slice = core::mem::take(&mut self.rest);
         if u64::from(slice.distance) > room {
@@ -191,13 +211,12 @@ impl Interval {
     /// How the plan moves at the end of the last slice given; within the interval, the ramp is rounded
     /// down by less than a sixteenth of it.
     pub(super) fn state(&self) -> State {
-        let speed = self.speed(self.done);
         let grown = self.from.ramp + i32::from(self.growth) * i32::from(self.done);
-        let ramp = grown - grown.rem_euclid(self.slices.into());
-        State { speed, ramp: if speed == 0 { 0 } else { ramp } }
+        let ramp = grown - grown.rem_euclid(self.limit.slices().into());
+        State { speed: self.speed, ramp: if self.speed == 0 { 0 } else { ramp } }
     }
 
-    fn speed(&self, slices: u16) -> u32 {
+    fn speed_after(&self, slices: u16) -> u32 {
         let gain = self.limit.gain(self.from.ramp, self.growth.into(), slices);
         // The limits keep it below 2^32.
         (i64::from(self.from.speed) + gain).max(0) as u32
@@ -225,42 +244,54 @@ impl Road<'_, '_> {
     /// If nothing is allowed, it brakes. From rest, if not even the least acceleration is, it
     /// creeps: what is left is less than a start and a stop take.
     pub(super) fn next(&self, from: State) -> Interval {
-        let slices = i32::from(self.jerk.slices());
-        let bounds = |ramp: i32| ((ramp - from.ramp) / slices).clamp(-MOST_GROWTH, MOST_GROWTH);
-        let (mut least, mut most) = (bounds(-self.jerk.longest), bounds(self.jerk.longest));
-        if self.allows(from, most) {
+        let (jerk, mut slices) = (self.jerk, self.jerk.slices());
+        let bounds =
+            |ramp: i32| ((ramp - from.ramp) / i32::from(slices)).clamp(-MOST_GROWTH, MOST_GROWTH);
+        let (mut least, mut most) = (bounds(-jerk.longest), bounds(jerk.longest));
+        if self.allows(from, most, slices) {
             least = most;
         }
         while most - least > 1 {
             let middle = (least + most) >> 1;
-            if self.allows(from, middle) {
+            if self.allows(from, middle, slices) {
                 least = middle;
             } else {
                 most = middle;
             }
         }
         if from.speed == 0 && least <= 0 {
-            let slices = self.jerk.slices();
-            let way = self.jerk.gained_way(0, 1, slices).unsigned_abs();
+            let way = jerk.gained_way(0, 1, slices).unsigned_abs();
             let speed = (way / u64::from(slices)).max(1) as u32;
-            return Interval::new(self.jerk, State { speed, ramp: 0 }, 0);
+            return Interval::new(jerk, State { speed, ramp: 0 }, 0, slices);
         }
-        Interval::new(self.jerk, from, least)
+        // As fast as it may be at all: nothing that comes can change that.
+        if from.ramp == 0 && least == 0 && self.settled(from, 1, slices).is_none() {
+            while slices < LONGEST_CRUISE && self.allows(from, 0, 2 * slices) {
+                slices *= 2;
+            }
+        }
+        Interval::new(jerk, from, least, slices)
+    }
+
+    /// How it moves after an interval of such a growth, and how fast it is when it has no ramp any more; `None` if that is
+    /// too fast.
+    fn settled(&self, from: State, growth: i32, slices: u16) -> Option<(State, u64)> {
+        let speed = i64::from(from.speed) + self.jerk.gain(from.ramp, growth, slices);
+        let ramp = from.ramp + growth * i32::from(slices);
+        let after = if speed > 0 { State { speed: speed as u32, ramp } } else { State::default() };
+        let settled = self.jerk.settled(after);
+        (settled <= u64::from(self.top.to_bits())).then_some((after, settled))
     }
 
     /// Whether all limits can be kept after an interval of such a growth, and are kept in it.
-    fn allows(&self, from: State, growth: i32) -> bool {
-        let (jerk, slices) = (self.jerk, self.jerk.slices());
+    fn allows(&self, from: State, growth: i32, slices: u16) -> bool {
+        let jerk = self.jerk;
+        let Some((after, settled)) = self.settled(from, growth, slices) else {
+            return false;
+        };
         let way =
             i64::from(from.speed) * i64::from(slices) + jerk.gained_way(from.ramp, growth, slices);
         let way = way.max(0).unsigned_abs();
-        let speed = i64::from(from.speed) + jerk.gain(from.ramp, growth, slices);
-        let ramp = from.ramp + growth * i32::from(slices);
-        let after = if speed > 0 { State { speed: speed as u32, ramp } } else { State::default() };
-        let settled = jerk.settled(after);
-        if settled > u64::from(self.top.to_bits()) {
-            return false;
-        }
         let fastest = settled.max(after.speed.into());
         let exceeds =
             |speed: u64, limit: PathLength| speed * speed > self.limits.squared_speed(limit);
@@ -276,11 +307,22 @@ impl Road<'_, '_> {
                     && jerk.braking_distance(from, self.limits.speed(limit).to_bits()) <= place)
         };
         let stop = jerk.braking_distance(after, 0);
-        let mut lowest = PathLength::MAX;
+        // No speed looked at is too fast for limits from this one on.
+        let harmless = self.limits.least_limit(fastest.max(from.speed.into()));
+        let (enough, mut lowest) = (way.saturating_add(stop), PathLength::MAX);
         let (mut begin, mut end, mut curve_limit) = (0, self.room, self.curve_limit);
-        for block in self.beyond.into_iter().flat_map(Lookahead::iter) {
-            let limit = block.entry_limit.min(block.curve_limit);
-            if end < way {
+        if let Some(blocks) = self.beyond
+            && blocks.lowest_limit().min(curve_limit) >= harmless
+        {
+            return end + blocks.known() >= enough;
+        }
+        for block in self.beyond.map_or([&[][..]; 2], Lookahead::blocks).into_iter().flatten() {
+            let limit = block.limit();
+            if limit.min(curve_limit) >= harmless {
+                if end >= enough {
+                    return true;
+                }
+            } else if end < way {
                 if !passes(end, limit.min(curve_limit)) {
                     return false;
                 }
@@ -288,7 +330,7 @@ impl Road<'_, '_> {
                 if begin <= way && exceeds(settled, curve_limit) {
                     return false;
                 }
-                if end - way >= stop {
+                if end >= enough {
                     return true;
                 }
                 // A limit behind a lower one does not bind.
@@ -306,14 +348,15 @@ impl Road<'_, '_> {
         if begin <= way && exceeds(settled, curve_limit) {
             return false;
         }
-        way.saturating_add(stop) <= end
+        enough <= end
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motion::SLICE_TICKS;
+    use crate::motion::limits::tests::settings;
+    use crate::motion::{MotionSettings, SLICE_TICKS};
 
     /// mm/s, mm/s², m/s³; mm per slice at 1 mm/s.
     const SLICE: f64 = SLICE_TICKS as f64 / 25e6;
@@ -403,9 +446,37 @@ mod tests {
     }
 
     #[test]
+    fn at_the_top_the_speed_stays_for_long_intervals() {
+        for jerk in [100, 10, 1] {
+            let jerk_m_per_s3 = Millimetres::from_num(jerk);
+            let limits = Limits::new(&MotionSettings { jerk_m_per_s3, ..settings() });
+            let limits = limits.expect("valid");
+            let (mut state, mut room) = (State::default(), 100u64 << 32);
+            let mut tops = std::vec::Vec::new();
+            while room > 0 {
+                let jerk = limits.jerk.expect("a limit");
+                let (top, curve_limit) = (limits.draw_speed, PathLength::MAX);
+                let road = Road { limits: &limits, jerk, top, room, curve_limit, beyond: None };
+                let mut interval = road.next(state);
+                while let Some(slice) = interval.next_slice(room) {
+                    room -= u64::from(slice.distance);
+                }
+                state = interval.state();
+                if u64::from(state.speed) * 100 > u64::from(top.to_bits()) * 99 && state.ramp == 0 {
+                    tops.push((state.speed, interval.slices));
+                }
+            }
+            assert!(tops.windows(2).all(|two| two[0].0 == two[1].0), "{jerk}: {tops:?}");
+            // Some 80 mm at 50 mm/s are 1.6 s.
+            assert!((4..60).contains(&tops.len()), "{jerk}: {tops:?}");
+        }
+    }
+
+    #[test]
     fn a_slice_cut_short_goes_on_as_long_and_as_far() {
         let limit = limit(50.0, 200.0, 5.0);
-        let interval = Interval::new(limit, State { speed: 30_000_000, ramp: 1000 }, 7);
+        let from = State { speed: 30_000_000, ramp: 1000 };
+        let interval = Interval::new(limit, from, 7, limit.slices());
         let all = |room: u64| {
             let mut interval = interval;
             core::iter::from_fn(|| interval.next_slice(room))

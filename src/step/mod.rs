@@ -81,16 +81,11 @@ impl Direction {
 
     /// What the move adds to x and y, each -1, 0 or 1.
     pub const fn delta(self) -> (i32, i32) {
-        match self {
-            Self::Up => (0, 1),
-            Self::UpRight => (1, 1),
-            Self::Right => (1, 0),
-            Self::DownRight => (1, -1),
-            Self::Down => (0, -1),
-            Self::DownLeft => (-1, -1),
-            Self::Left => (-1, 0),
-            Self::UpLeft => (-1, 1),
-        }
+        /// By their numbers.
+        const DELTAS: [(i8, i8); 9] =
+            [(0, 0), (0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1)];
+        let (dx, dy) = DELTAS[self as usize];
+        (dx as i32, dy as i32)
     }
 
     /// The way back.

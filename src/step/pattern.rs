@@ -46,6 +46,9 @@ impl Pattern {
 
     /// Moves from the start of the line to the end of piece number `piece`, counted from 0.
     pub const fn end_of(self, piece: u32) -> u32 {
+        if self.pieces == 1 {
+            return self.moves;
+        }
         // Rounded to nearest. No tie: an odd number of pieces never halves a move.
         let pieces = self.pieces as u64;
         let doubled = 2 * (piece as u64 + 1) * self.moves as u64 + pieces;
