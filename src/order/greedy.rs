@@ -145,9 +145,15 @@ fn exchange(
 ) -> Result<bool, OrderError> {
     let count = odd.count();
     let mut improved = false;
+    let mut longest = lengths.iter().copied().max().unwrap_or(0);
     for a in 0..count {
-        pace.work(1 + u32::from(count - a) / 16)?;
+        let mut looked_at = 0;
         for c in a + 1..count {
+            // From here on either new move from `a` is as long as both old ones, by its x alone.
+            if odd.distance_along_x(a, c) >= lengths[usize::from(a)].saturating_add(longest) {
+                break;
+            }
+            looked_at += 1;
             let (b, d) = (mate[usize::from(a)], mate[usize::from(c)]);
             if b == c || b < a || d < c {
                 continue;
@@ -163,9 +169,11 @@ fn exchange(
                 join(mate, from, to);
                 lengths[usize::from(from)] = odd.distance(from, to);
                 lengths[usize::from(to)] = lengths[usize::from(from)];
+                longest = longest.max(lengths[usize::from(to)]);
             }
             improved = true;
         }
+        pace.work(1 + looked_at / 16)?;
     }
     Ok(improved)
 }
