@@ -9,7 +9,8 @@
 // loop hangs from that cycle on, 5 a byte for USB, 6 the USB host is plugged in (1), takes
 // nothing more (2), takes again (3); 7 a switch is fitted to a pin, which closes where its axis has gone to so many
 // steps (+ 2^40) or below, and bounces; 8 a function (its number, its
-// address in the cycle's place) is timed; 9 how much of the stack is unused is asked. Out: 0 a byte
+// address in the cycle's place) is timed; 9 how much of the stack is unused is asked; 10 where x has gone to so many steps, the
+// main loop stands still for so many hundredths of a second. Out: 0 a byte
 // of the serial line, 1 a pin's new level, 2 the time, 3 a byte of the log, 4 the chip was reset (0 by
 // the loss of power, 1 by the watchdog), 5 a byte of USB, 6 a timed function has
 // returned (its number, the cycles in the cycle's place), 7 so many bytes of the stack have not been used since
@@ -32,6 +33,7 @@ const NANOS = 8;
 const CYCLES_PER_BYTE = Math.round((125e6 * 10) / 115200);
 const SLICE = 400_000;
 const MILLISECOND = 125_000;
+const HUNDREDTH = 1_250_000;
 const VECTORS = 0x10000100;
 /** What an unused byte of the stack holds. */
 const PAINT = 0xa5;
@@ -53,6 +55,8 @@ const SWITCH_ZERO = 2 ** 40;
 const TIMED = 8;
 const RETURNED = 6;
 const STACK = 9;
+const STALL = 10;
+const GO_ON = -1;
 const UNUSED_STACK = 7;
 const output = Buffer.alloc(1 << 16);
 let filled = 0;
@@ -288,6 +292,18 @@ function moveAxis(axis, level) {
   if (!level) return;
   places[axis] += chip.gpio[DIR_X + axis].value === 1 ? 1 : -1;
   lookAtSwitch(axis);
+  if (stalls.length && axis === 0 && places[0] === stalls[0].place) stall(stalls.shift().hundredths);
+}
+
+/** Where along x the main loop is to stand still, the next place first. */
+const stalls = [];
+/** Where the main loop was when it was made to hang. */
+let hungAt = 0;
+
+function stall(hundredths) {
+  const cycle = now();
+  events.push({ what: HANG, value: 0, cycle }, { what: GO_ON, value: 0, cycle: cycle + hundredths * HUNDREDTH });
+  disturbed = true;
 }
 
 function lookAtSwitch(axis) {
@@ -412,6 +428,7 @@ process.stdin.on('data', (data) => {
       lookAtSwitch(axis);
     } else if (rest[at] === USB) usbBytes.push(entry.value);
     else if (rest[at] === STACK) report(UNUSED_STACK, 0, unusedStack());
+    else if (rest[at] === STALL) stalls.push({ place: entry.cycle, hundredths: entry.value });
     else if (rest[at] === CUT_FLASH) flashBudget = entry.cycle;
     else events.push({ what: rest[at], ...entry });
   }
@@ -431,17 +448,22 @@ function setInput(number, high) {
   chip.gpio[number].setInputValue(high);
 }
 
+/** In a handler, or where it has masked them all, nothing is done to the main loop. */
+function waitsForMainLoop(what) {
+  return (what === HANG || what === GO_ON) && (core.IPSR !== 0 || core.PM);
+}
+
 function takeInput(cycle) {
   while (bounces.length && bounces[0].cycle <= cycle) {
     const { pin, high } = bounces.shift();
     setInput(pin, high);
   }
-  // In a handler nothing is done to the main loop.
-  while (events.length && events[0].cycle <= cycle && !(events[0].what === HANG && core.IPSR)) {
+  while (events.length && events[0].cycle <= cycle && !waitsForMainLoop(events[0].what)) {
     const { what, value } = events.shift();
     if (what === CUT_POWER) return cutPower();
-    if (what === HANG) {
-      core.PC = FOR_EVER;
+    if (what === HANG || what === GO_ON) {
+      if (what === HANG) hungAt = core.PC;
+      core.PC = what === HANG ? FOR_EVER : hungAt;
       core.waiting = false;
       continue;
     }

@@ -189,6 +189,15 @@ impl Pico {
         self.tell(HANG, 0, 0)
     }
 
+    /// Lets the firmware's main loop stand still for so many hundredths of a second, its interrupts going on, where x, which
+    /// began at 0 when the emulator started, has come to `place`, in steps. Further places follow in the order of the way.
+    ///
+    /// # Errors
+    /// The emulator has ended.
+    pub fn stall_at(&mut self, place: u32, hundredths: u8) -> io::Result<()> {
+        self.tell(STALL, hundredths, u64::from(place))
+    }
+
     /// Plugs a USB host in, which finds the device.
     ///
     /// # Errors
@@ -413,6 +422,7 @@ const TIMED: u8 = 8;
 const RETURNED: u8 = 6;
 const STACK: u8 = 9;
 const UNUSED_STACK: u8 = 7;
+const STALL: u8 = 10;
 /// Where the emulator's axes begin.
 const SWITCH_ZERO: i64 = 1 << 40;
 
