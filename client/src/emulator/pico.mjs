@@ -1,6 +1,6 @@
 // A Raspberry Pi Pico in rp2040js: its serial line, its pins, and the core cycle of each change.
 //
-// Usage: node pico.mjs RP2040JS-DIRECTORY IMAGE.uf2
+// Behind core.mjs. Arguments: the directory of rp2040js, the UF2 image, where the image keeps its log (0: nowhere)
 //
 // Standard input and output carry records of 8 bytes: what, a value, and the core cycle (48 bits,
 // little-endian). In: 0 a byte for the serial line, 1 a level for a pin (its number, + 128 if high),
@@ -9,7 +9,8 @@
 // loop hangs from that cycle on, 5 a byte for USB, 6 the USB host is plugged in (1), takes
 // nothing more (2), takes again (3); 7 a switch is fitted to a pin, which closes where its axis has gone to so many
 // steps (+ 2^40) or below, and bounces; 8 a function (its number, its
-// address in the cycle's place) is timed; 9 how much of the stack is unused is asked. Out: 0 a byte
+// address in the cycle's place) is timed; 9 how much of the stack is unused is asked; 10 where x has gone to so many steps, the
+// main loop stands still for so many hundredths of a second. Out: 0 a byte
 // of the serial line, 1 a pin's new level, 2 the time, 3 a byte of the log, 4 the chip was reset (0 by
 // the loss of power, 1 by the watchdog), 5 a byte of USB, 6 a timed function has
 // returned (its number, the cycles in the cycle's place), 7 so many bytes of the stack have not been used since
@@ -32,10 +33,8 @@ const NANOS = 8;
 const CYCLES_PER_BYTE = Math.round((125e6 * 10) / 115200);
 const SLICE = 400_000;
 const MILLISECOND = 125_000;
-const FLASH = 0x10000000;
+const HUNDREDTH = 1_250_000;
 const VECTORS = 0x10000100;
-/** The stack lies at its start. */
-const RAM = 0x20000000;
 /** What an unused byte of the stack holds. */
 const PAINT = 0xa5;
 
@@ -56,6 +55,8 @@ const SWITCH_ZERO = 2 ** 40;
 const TIMED = 8;
 const RETURNED = 6;
 const STACK = 9;
+const STALL = 10;
+const GO_ON = -1;
 const UNUSED_STACK = 7;
 const output = Buffer.alloc(1 << 16);
 let filled = 0;
@@ -120,7 +121,7 @@ class PowerCut extends Error {}
 function changeFlash(from, count, change) {
   for (let at = from; at < from + count; at++) {
     if (flashBudget-- <= 0) throw new PowerCut();
-    chip.flash[at] = change(at, chip.flash[at]);
+    flash[at] = change(at, flash[at]);
   }
 }
 
@@ -137,40 +138,35 @@ function serveRom(number) {
 
 // --- The chip ------------------------------------------------------------------------------------
 
-let chip, clock, core, uart, machines;
+let clock, uart, machines;
 /** The cycle at which what happens now happens, while a state machine executes. */
 let stamp = -1;
 /** Cycles before the chip was last reset. */
 let cyclesBefore = 0;
 const now = () => (stamp >= 0 ? stamp : cyclesBefore + Math.round(clock.nanosCounter / NANOS));
 
-/** The flash with an image: blocks of 512 bytes that say where in flash they go, and how long they are. */
-function flashOf(image) {
-  const flash = new Uint8Array(16 << 20).fill(0xff);
+/** Writes an image into flash: blocks of 512 bytes that say where in flash they go, and how long they are. */
+function flashImage(image) {
   for (let block = 0; block < image.length; block += 512) {
     const target = image.readUInt32LE(block + 12) - FLASH;
     const size = image.readUInt32LE(block + 16);
     flash.set(image.subarray(block + 32, block + 32 + size), target);
   }
-  return flash;
 }
 
-/** A chip that begins with this flash. */
-function start(flash) {
+/** A chip that begins with what is in flash. */
+function start() {
   stamp = -1;
   cyclesBefore = clock ? now() : 0;
-  chip = new RP2040();
-  ({ clock, core } = chip);
+  replaceChip(new RP2040());
+  ({ clock } = chip);
   chip.logger = { debug() {}, info() {}, warn() {}, error: (from, what) => console.error(from, what) };
-  chip.loadBootrom(bootRom());
-  chip.flash.set(flash);
+  chip.bootrom.set(bootRom());
   chip.onBreak = serveRom;
   core.VTOR = VECTORS;
   core.SP = chip.readUint32(VECTORS);
   core.PC = chip.readUint32(VECTORS + 4) & ~1;
   for (let at = RAM; at < core.SP; at++) chip.writeUint8(at, PAINT);
-  mendFlags();
-  mendVectors();
   watchPins();
   uart = chip.uart[0];
   uart.onByte = (byte) => report(SERIAL, byte, now());
@@ -184,6 +180,7 @@ function start(flash) {
     // Or its alarm would come again at once, for ever.
     watchdog.alarm.enable = false;
     watchdogDue = true;
+    disturbed = true;
   };
 }
 
@@ -263,7 +260,7 @@ function resetByWatchdog() {
   watchdogDue = false;
   const { reason, scratchData } = chip.peripherals[WATCHDOG];
   report(RESET, 1, now());
-  start(chip.flash);
+  start();
   Object.assign(chip.peripherals[WATCHDOG], { reason, scratchData });
 }
 
@@ -273,42 +270,7 @@ function cutPower() {
   bytes.length = 0;
   usbBytes.length = 0;
   report(RESET, POWER, now());
-  start(chip.flash);
-}
-
-// rp2040js folds the carry into the second operand. Where that makes 0x80000000 of 0x7fffffff, its
-// overflow flag is wrong.
-function mendFlags() {
-  const ADCS = 0b0100000101;
-  const SBCS = 0b0100000110;
-  const add = core.addUpdateFlags.bind(core);
-  core.addUpdateFlags = (first, second) => {
-    const result = add(first, second);
-    if (second === 0x80000000 && chip.readUint16(core.PC - 2) >> 6 === ADCS) {
-      const folded = core.registers[chip.readUint16(core.PC - 2) & 7] === 0x7fffffff;
-      if (folded) core.V = !(first & 0x80000000);
-    }
-    return result;
-  };
-  const subtract = core.substractUpdateFlags.bind(core);
-  core.substractUpdateFlags = (first, second) => {
-    const result = subtract(first, second);
-    if (second === 0x80000000 && chip.readUint16(core.PC - 2) >> 6 === SBCS) {
-      const folded = core.registers[(chip.readUint16(core.PC - 2) >> 3) & 7] === 0x7fffffff;
-      if (folded) core.V = !!(first & 0x80000000);
-    }
-    return result;
-  };
-}
-
-// rp2040js leaves the mark of Thumb code, bit 0 of a vector, in the program counter: a jump table in a handler
-// is then read a byte off.
-function mendVectors() {
-  const enter = core.exceptionEntry.bind(core);
-  core.exceptionEntry = (number) => {
-    enter(number);
-    core.PC &= ~1;
-  };
+  start();
 }
 
 const INPUT = 2;
@@ -330,12 +292,25 @@ function moveAxis(axis, level) {
   if (!level) return;
   places[axis] += chip.gpio[DIR_X + axis].value === 1 ? 1 : -1;
   lookAtSwitch(axis);
+  if (stalls.length && axis === 0 && places[0] === stalls[0].place) stall(stalls.shift().hundredths);
+}
+
+/** Where along x the main loop is to stand still, the next place first. */
+const stalls = [];
+/** Where the main loop was when it was made to hang. */
+let hungAt = 0;
+
+function stall(hundredths) {
+  const cycle = now();
+  events.push({ what: HANG, value: 0, cycle }, { what: GO_ON, value: 0, cycle: cycle + hundredths * HUNDREDTH });
+  disturbed = true;
 }
 
 function lookAtSwitch(axis) {
   const fitted = switches[axis];
   if (!fitted || places[axis] <= fitted.at === fitted.closed) return;
   fitted.closed = !fitted.closed;
+  disturbed = true;
   const { pin, closed } = fitted;
   for (let turn = 0; turn <= TURNS; turn++) {
     bounces.push({ pin, high: !closed !== (turn % 2 === 1), cycle: now() + Math.round((turn * BOUNCE) / TURNS) });
@@ -368,6 +343,7 @@ function cyclesPerTick(machine) {
 }
 
 function schedule() {
+  disturbed = true;
   pioDue = Infinity;
   for (const machine of machines) {
     if (machine.enabled && !machine.waiting && machine.due < pioDue) pioDue = machine.due;
@@ -452,6 +428,7 @@ process.stdin.on('data', (data) => {
       lookAtSwitch(axis);
     } else if (rest[at] === USB) usbBytes.push(entry.value);
     else if (rest[at] === STACK) report(UNUSED_STACK, 0, unusedStack());
+    else if (rest[at] === STALL) stalls.push({ place: entry.cycle, hundredths: entry.value });
     else if (rest[at] === CUT_FLASH) flashBudget = entry.cycle;
     else events.push({ what: rest[at], ...entry });
   }
@@ -471,17 +448,22 @@ function setInput(number, high) {
   chip.gpio[number].setInputValue(high);
 }
 
+/** In a handler, or where it has masked them all, nothing is done to the main loop. */
+function waitsForMainLoop(what) {
+  return (what === HANG || what === GO_ON) && (core.IPSR !== 0 || core.PM);
+}
+
 function takeInput(cycle) {
   while (bounces.length && bounces[0].cycle <= cycle) {
     const { pin, high } = bounces.shift();
     setInput(pin, high);
   }
-  // In a handler nothing is done to the main loop.
-  while (events.length && events[0].cycle <= cycle && !(events[0].what === HANG && core.IPSR)) {
+  while (events.length && events[0].cycle <= cycle && !waitsForMainLoop(events[0].what)) {
     const { what, value } = events.shift();
     if (what === CUT_POWER) return cutPower();
-    if (what === HANG) {
-      core.PC = FOR_EVER;
+    if (what === HANG || what === GO_ON) {
+      if (what === HANG) hungAt = core.PC;
+      core.PC = what === HANG ? FOR_EVER : hungAt;
       core.waiting = false;
       continue;
     }
@@ -551,20 +533,32 @@ function waitForFlash() {
   }
 }
 
+/** Something may be due earlier than it was. */
+let disturbed = false;
+
+/** The core executes, an instruction at least, until it sleeps, something is due or it has disturbed what is. */
+function executeUntil(due) {
+  // From when on `now` is so much.
+  const nanos = (due - 0.5 - cyclesBefore) * NANOS;
+  const times = timed.size > 0;
+  disturbed = false;
+  do {
+    if (times) timeFunctions();
+    pass(core.executeInstruction() * NANOS);
+    if (flashNanos) waitForFlash();
+  } while (clock.nanosCounter < nanos && !core.waiting && !disturbed);
+}
+
 /** Runs for so many cycles. */
 function run(cycles) {
   let cycle = now();
   const end = cycle + cycles;
   while (cycle < end) {
+    const due = Math.min(Math.ceil(pioDue), inputDue(), end);
     if (core.waiting) {
       const alarm = clock.nextAlarm ? cyclesBefore + clock.nextAlarm.nanos / NANOS : Infinity;
-      const due = Math.min(alarm, Math.ceil(pioDue), inputDue(), end);
-      pass(Math.max(due - cycle, 0) * NANOS);
-    } else {
-      if (timed.size) timeFunctions();
-      pass(core.executeInstruction() * NANOS);
-      if (flashNanos) waitForFlash();
-    }
+      pass(Math.max(Math.min(alarm, due) - cycle, 0) * NANOS);
+    } else executeUntil(due);
     cycle = now();
     if (pioDue <= cycle) catchUp(cycle);
     if (bytes.length || events.length || bounces.length) takeInput(cycle);
@@ -591,5 +585,6 @@ function turn() {
   else setImmediate(turn);
 }
 
-start(flashOf(readFileSync(imagePath)));
+flashImage(readFileSync(imagePath));
+start();
 turn();

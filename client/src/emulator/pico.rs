@@ -1,4 +1,4 @@
-//! A Raspberry Pi Pico in rp2040js, by way of `pico.mjs`, which tells how both talk.
+//! A Raspberry Pi Pico in rp2040js, by way of `pico.mjs`, which tells how both talk, and of `core.mjs`.
 
 use std::collections::VecDeque;
 use std::io::{self, BufRead, BufReader, PipeWriter, Read, Write};
@@ -16,7 +16,7 @@ use super::stack::{self, Stack};
 use super::{EmulatedBoard, EmulatorError, Pin, PinChange, log};
 
 const PROGRAM: &str = "node";
-const SCRIPT: &str = include_str!("pico.mjs");
+const SCRIPT: &str = concat!(include_str!("core.mjs"), include_str!("pico.mjs"));
 /// Where `cargo xtask set-up` puts it, from the workspace's root.
 const RP2040JS: &str = "target/rp2040js/node_modules/rp2040js";
 /// A cycle of the core, at 125 MHz.
@@ -187,6 +187,15 @@ impl Pico {
     /// The emulator has ended.
     pub fn hang(&mut self) -> io::Result<()> {
         self.tell(HANG, 0, 0)
+    }
+
+    /// Lets the firmware's main loop stand still for so many hundredths of a second, its interrupts going on, where x, which
+    /// began at 0 when the emulator started, has come to `place`, in steps. Further places follow in the order of the way.
+    ///
+    /// # Errors
+    /// The emulator has ended.
+    pub fn stall_at(&mut self, place: u32, hundredths: u8) -> io::Result<()> {
+        self.tell(STALL, hundredths, u64::from(place))
     }
 
     /// Plugs a USB host in, which finds the device.
@@ -413,6 +422,7 @@ const TIMED: u8 = 8;
 const RETURNED: u8 = 6;
 const STACK: u8 = 9;
 const UNUSED_STACK: u8 = 7;
+const STALL: u8 = 10;
 /// Where the emulator's axes begin.
 const SWITCH_ZERO: i64 = 1 << 40;
 
