@@ -1,6 +1,6 @@
 // A Raspberry Pi Pico in rp2040js: its serial line, its pins, and the core cycle of each change.
 //
-// Behind core.mjs. Arguments: the directory of rp2040js, the UF2 image, where the image keeps its log (0: nowhere)
+// Usage: node pico.mjs RP2040JS-DIRECTORY IMAGE.uf2
 //
 // Standard input and output carry records of 8 bytes: what, a value, and the core cycle (48 bits,
 // little-endian). In: 0 a byte for the serial line, 1 a level for a pin (its number, + 128 if high),
@@ -34,7 +34,10 @@ const CYCLES_PER_BYTE = Math.round((125e6 * 10) / 115200);
 const SLICE = 400_000;
 const MILLISECOND = 125_000;
 const HUNDREDTH = 1_250_000;
+const FLASH = 0x10000000;
 const VECTORS = 0x10000100;
+/** The stack lies at its start. */
+const RAM = 0x20000000;
 /** What an unused byte of the stack holds. */
 const PAINT = 0xa5;
 
@@ -121,7 +124,7 @@ class PowerCut extends Error {}
 function changeFlash(from, count, change) {
   for (let at = from; at < from + count; at++) {
     if (flashBudget-- <= 0) throw new PowerCut();
-    flash[at] = change(at, flash[at]);
+    chip.flash[at] = change(at, chip.flash[at]);
   }
 }
 
@@ -138,35 +141,40 @@ function serveRom(number) {
 
 // --- The chip ------------------------------------------------------------------------------------
 
-let clock, uart, machines;
+let chip, clock, core, uart, machines;
 /** The cycle at which what happens now happens, while a state machine executes. */
 let stamp = -1;
 /** Cycles before the chip was last reset. */
 let cyclesBefore = 0;
 const now = () => (stamp >= 0 ? stamp : cyclesBefore + Math.round(clock.nanosCounter / NANOS));
 
-/** Writes an image into flash: blocks of 512 bytes that say where in flash they go, and how long they are. */
-function flashImage(image) {
+/** The flash with an image: blocks of 512 bytes that say where in flash they go, and how long they are. */
+function flashOf(image) {
+  const flash = new Uint8Array(16 << 20).fill(0xff);
   for (let block = 0; block < image.length; block += 512) {
     const target = image.readUInt32LE(block + 12) - FLASH;
     const size = image.readUInt32LE(block + 16);
     flash.set(image.subarray(block + 32, block + 32 + size), target);
   }
+  return flash;
 }
 
-/** A chip that begins with what is in flash. */
-function start() {
+/** A chip that begins with this flash. */
+function start(flash) {
   stamp = -1;
   cyclesBefore = clock ? now() : 0;
-  replaceChip(new RP2040());
-  ({ clock } = chip);
+  chip = new RP2040();
+  ({ clock, core } = chip);
   chip.logger = { debug() {}, info() {}, warn() {}, error: (from, what) => console.error(from, what) };
-  chip.bootrom.set(bootRom());
+  chip.loadBootrom(bootRom());
+  chip.flash.set(flash);
   chip.onBreak = serveRom;
   core.VTOR = VECTORS;
   core.SP = chip.readUint32(VECTORS);
   core.PC = chip.readUint32(VECTORS + 4) & ~1;
   for (let at = RAM; at < core.SP; at++) chip.writeUint8(at, PAINT);
+  mendFlags();
+  mendVectors();
   watchPins();
   uart = chip.uart[0];
   uart.onByte = (byte) => report(SERIAL, byte, now());
@@ -260,7 +268,7 @@ function resetByWatchdog() {
   watchdogDue = false;
   const { reason, scratchData } = chip.peripherals[WATCHDOG];
   report(RESET, 1, now());
-  start();
+  start(chip.flash);
   Object.assign(chip.peripherals[WATCHDOG], { reason, scratchData });
 }
 
@@ -270,7 +278,42 @@ function cutPower() {
   bytes.length = 0;
   usbBytes.length = 0;
   report(RESET, POWER, now());
-  start();
+  start(chip.flash);
+}
+
+// rp2040js folds the carry into the second operand. Where that makes 0x80000000 of 0x7fffffff, its
+// overflow flag is wrong.
+function mendFlags() {
+  const ADCS = 0b0100000101;
+  const SBCS = 0b0100000110;
+  const add = core.addUpdateFlags.bind(core);
+  core.addUpdateFlags = (first, second) => {
+    const result = add(first, second);
+    if (second === 0x80000000 && chip.readUint16(core.PC - 2) >> 6 === ADCS) {
+      const folded = core.registers[chip.readUint16(core.PC - 2) & 7] === 0x7fffffff;
+      if (folded) core.V = !(first & 0x80000000);
+    }
+    return result;
+  };
+  const subtract = core.substractUpdateFlags.bind(core);
+  core.substractUpdateFlags = (first, second) => {
+    const result = subtract(first, second);
+    if (second === 0x80000000 && chip.readUint16(core.PC - 2) >> 6 === SBCS) {
+      const folded = core.registers[(chip.readUint16(core.PC - 2) >> 3) & 7] === 0x7fffffff;
+      if (folded) core.V = !!(first & 0x80000000);
+    }
+    return result;
+  };
+}
+
+// rp2040js leaves the mark of Thumb code, bit 0 of a vector, in the program counter: a jump table in a handler
+// is then read a byte off.
+function mendVectors() {
+  const enter = core.exceptionEntry.bind(core);
+  core.exceptionEntry = (number) => {
+    enter(number);
+    core.PC &= ~1;
+  };
 }
 
 const INPUT = 2;
@@ -585,6 +628,5 @@ function turn() {
   else setImmediate(turn);
 }
 
-flashImage(readFileSync(imagePath));
-start();
+start(flashOf(readFileSync(imagePath)));
 turn();

@@ -1,4 +1,4 @@
-//! A Raspberry Pi Pico in rp2040js, by way of `pico.mjs`, which tells how both talk, and of `core.mjs`.
+//! A Raspberry Pi Pico in rp2040js, by way of `pico.mjs`, which tells how both talk.
 
 use std::collections::VecDeque;
 use std::io::{self, BufRead, BufReader, PipeWriter, Read, Write};
@@ -16,7 +16,7 @@ use super::stack::{self, Stack};
 use super::{EmulatedBoard, EmulatorError, Pin, PinChange, log};
 
 const PROGRAM: &str = "node";
-const SCRIPT: &str = concat!(include_str!("core.mjs"), include_str!("pico.mjs"));
+const SCRIPT: &str = include_str!("pico.mjs");
 /// Where `cargo xtask set-up` puts it, from the workspace's root.
 const RP2040JS: &str = "target/rp2040js/node_modules/rp2040js";
 /// A cycle of the core, at 125 MHz.
