@@ -173,6 +173,40 @@ fn dense_points_never_stop_it_with_a_short_look_ahead() {
     }
 }
 
+/// A straight, in chords or at once, into a half circle and back.
+fn bend(radius: f64, chord: f64, straight_in_chords: bool) -> Vec<(f64, f64)> {
+    let mut path = vec![(10.0, 10.0)];
+    let count = if straight_in_chords { (40.0 / chord) as usize } else { 1 };
+    path.extend((1..=count).map(|index| (10.0 + 40.0 * index as f64 / count as f64, 10.0)));
+    let chords = (std::f64::consts::PI * radius / chord).ceil();
+    path.extend((1..=chords as usize).map(|index| {
+        let (sine, cosine) = (std::f64::consts::PI * index as f64 / chords).sin_cos();
+        (50.0 + radius * sine, 10.0 + radius * (1.0 - cosine))
+    }));
+    path.push((10.0, 10.0 + 2.0 * radius));
+    path
+}
+
+/// Whether a curve bends is known when some of its points are; a cruise must not last until then.
+#[test]
+fn bends_behind_straights_are_seen_in_time() {
+    for (radius, chord) in [(0.3, 0.05), (0.5, 0.05), (0.8, 0.1)] {
+        for straight_in_chords in [false, true] {
+            let points = steps(&bend(radius, chord, straight_in_chords));
+            for (speed, acceleration) in [(30.0, 3000.0), (50.0, 3000.0)] {
+                for jerk in [100_000.0, 400_000.0] {
+                    let case = Case { speed, acceleration, jerk, deviation: 0.127 };
+                    for blocks in [32, 128] {
+                        let run = draw(&points, case.settings(), blocks);
+                        let name = format!("{radius} {chord} {straight_in_chords} {blocks}");
+                        case.check(&name, &points, &run);
+                    }
+                }
+            }
+        }
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 300, ..ProptestConfig::default() })]
     #[test]

@@ -67,6 +67,8 @@ pub struct Lookahead<'m> {
     /// The lowest limit of all blocks, and which of them is the last to have it: known only if limits are not passed on.
     lowest: PathLength,
     lowest_at: usize,
+    /// The lowest limit that was set to blocks which waited, since it was asked for.
+    lowered: PathLength,
 }
 
 impl<'m> Lookahead<'m> {
@@ -80,6 +82,7 @@ impl<'m> Lookahead<'m> {
             passes_limits_on: true,
             lowest: PathLength::MAX,
             lowest_at: 0,
+            lowered: PathLength::MAX,
         }
     }
 
@@ -186,6 +189,11 @@ impl<'m> Lookahead<'m> {
         self.lowest
     }
 
+    /// The lowest limit that was set to blocks which waited, since this was asked last.
+    pub(super) fn take_lowered(&mut self) -> PathLength {
+        core::mem::replace(&mut self.lowered, PathLength::MAX)
+    }
+
     /// The length of all blocks, 2^-32 mm.
     pub(super) fn known(&self) -> u64 {
         self.length << 14
@@ -210,6 +218,7 @@ impl<'m> Lookahead<'m> {
     /// What one block allows is passed on to those before it, each of which may be entered with its own length
     /// more, as far as that is less than they had: on smooth paths, not far.
     pub(super) fn limit_curve(&mut self, least: u32, most: u32, limit: PathLength) {
+        self.lowered = self.lowered.min(limit);
         let mut allowed = PathLength::MAX;
         for back in least.max(1).. {
             let is_curve = back <= most;

@@ -386,6 +386,7 @@ impl<'m> Runner<'m> {
         self.end = motors;
         self.page_end = page;
         self.last = Some((heading, length, inked));
+        self.heed_bends();
         if self.hurried.is_some_and(|exit| exit < self.lookahead.entry_allowed(PathLength::MAX)) {
             self.hurried = None;
             self.plan_again();
@@ -438,6 +439,20 @@ impl<'m> Runner<'m> {
     pub fn end_path(&mut self) {
         self.curvature.restart(&self.limits, self.page_end, &mut self.lookahead);
         self.last = None;
+        self.heed_bends();
+    }
+
+    /// A cruise that would pass a bend too fast, which is known only now, ends.
+    #[inline]
+    fn heed_bends(&mut self) {
+        let limit = self.lookahead.take_lowered();
+        if limit < PathLength::MAX
+            && let Some(Plan::Interval(interval)) = &self.plan
+            && interval.is_cruise()
+            && u64::from(interval.state().speed).pow(2) > self.limits.squared_speed(limit)
+        {
+            self.give_plan_up();
+        }
     }
 
     /// Sheds speed on the path, from the next slice on, and stands with the pen raised.

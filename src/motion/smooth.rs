@@ -5,7 +5,8 @@
 //! path, corners, bends, feeds. Every limit is looked at by itself: braking to it as fast as
 //! acceleration and jerk let it, and without acceleration in the end, must be possible before it stands. That is
 //! enough for all of them together, since who brakes harder than one limit asks is slower everywhere. So nothing
-//! is bound to where blocks begin or end: acceleration runs on through any number of short ones.
+//! is bound to where blocks begin or end: acceleration runs on through any number of short ones. At the greatest
+//! speed an interval lasts as long as what is known lets it; a bend that is found later ends it.
 //!
 //! An acceleration is told by its *ramp*: for how long the jerk has built it up, in sixteenths of
 //! slices, negative for braking. Then all changes are polynomials in whole numbers.
@@ -206,6 +207,11 @@ impl Interval {
             slice = Slice { distance, time };
         }
         Some(slice)
+    }
+
+    /// Whether it is longer than others.
+    pub(super) fn is_cruise(&self) -> bool {
+        self.slices > self.limit.slices()
     }
 
     /// How the plan moves at the end of the last slice given; within the interval, the ramp is rounded
