@@ -144,6 +144,8 @@ pub struct Runner<'m> {
     run: RunLengths,
     /// Whether the last block begun is inked.
     in_stroke: bool,
+    /// Since the pen last moved, speeds were greater: what waits may still be as fast.
+    was_faster: SliceSpeed,
 }
 
 impl<'m> Runner<'m> {
@@ -184,6 +186,7 @@ impl<'m> Runner<'m> {
             last: None,
             run: RunLengths::default(),
             in_stroke: false,
+            was_faster: SliceSpeed::ZERO,
         };
         runner.set_limits(limits, pen);
         runner
@@ -218,7 +221,7 @@ impl<'m> Runner<'m> {
             Some(Plan::Interval(interval)) => interval.state().speed,
             None => self.pace.speed.to_bits(),
         };
-        let speed = self.top(self.in_stroke).speed.to_bits();
+        let speed = self.top(self.in_stroke).speed.max(self.was_faster).to_bits();
         let change = speed.saturating_sub(end / 8 * 3);
         let slices = change.checked_div(self.limits.acceleration.to_bits()).unwrap_or(u32::MAX);
         slices.saturating_mul(SLICE_TICKS)
@@ -235,6 +238,7 @@ impl<'m> Runner<'m> {
             Pace::of_speed(&self.limits, SliceSpeed::from_bits(bits as u32))
         };
         let (draw, travel) = (scaled(self.limits.draw_speed), scaled(self.limits.travel_speed));
+        self.was_faster = self.was_faster.max(self.top(self.in_stroke).speed);
         self.draw = draw;
         self.travel = travel;
         self.plan_again();
@@ -724,6 +728,7 @@ impl<'m> Runner<'m> {
         };
         // On its way it is neither up nor down.
         self.pen_is_down = None;
+        self.was_faster = SliceSpeed::ZERO;
         let was_known = self.lift.is_known();
         if let Some(rule) = self.pen.lift
             && let Some(next) = self.lift.next(rule, height)
