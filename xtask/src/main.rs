@@ -10,6 +10,7 @@ mod flash;
 mod firmware;
 mod gallery;
 mod set_up;
+mod side_by_side;
 mod test;
 mod uf2;
 

@@ -7,6 +7,7 @@ use anyhow::Result;
 use crate::command::{cargo, describe, run};
 use crate::firmware::{self, Board};
 use crate::set_up::{self, Toolchain};
+use crate::side_by_side;
 
 /// Sets up, then runs everything; ends at the first failure.
 pub fn everything() -> Result<()> {
@@ -33,7 +34,11 @@ pub fn everything() -> Result<()> {
             .env("RUSTDOCFLAGS", "-Dwarnings"),
     )?;
     // With the emulator's tests, and every doctest.
-    step(workspace("test").arg("--workspace").args(EMULATOR))
+    let mut tests = side_by_side::built_by(workspace("test").arg("--workspace").args(EMULATOR))?;
+    let mut doctests = workspace("test");
+    doctests.args(["--workspace", "--doc"]).args(EMULATOR);
+    tests.push(doctests);
+    side_by_side::run(tests)
 }
 
 /// The tests that need the emulators and the firmware.

@@ -1,0 +1,73 @@
+//! Test programs side by side. Cargo runs one after the other, and while the longest test of one ends, the other
+//! cores wait.
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::sync::{Mutex, PoisonError};
+use std::thread;
+use std::time::Instant;
+
+use anyhow::{Context, Result, anyhow, ensure};
+use serde_json::Value;
+
+use crate::command::describe;
+
+/// Test programs whose names begin so are the longest, and run first.
+const LONGEST: [&str; 2] = ["pico_", "qemu_"];
+
+/// Builds what the command `cargo test …` would run, but for the doctests: each program, to be run in its package's directory.
+pub fn built_by(cargo_test: &mut Command) -> Result<Vec<Command>> {
+    cargo_test.args(["--no-run", "--message-format=json-render-diagnostics"]);
+    let name = describe(cargo_test);
+    let built = cargo_test.stderr(Stdio::inherit()).output();
+    let built = built.with_context(|| format!("cannot run {name}"))?;
+    ensure!(built.status.success(), "{name}: {}", built.status);
+    let mut programs = Vec::new();
+    for line in String::from_utf8(built.stdout)?.lines() {
+        let message: Value = serde_json::from_str(line)?;
+        let text = |value: &Value| value.as_str().map(str::to_owned);
+        let is_test = message["profile"]["test"] == true;
+        let (Some(program), true) = (text(&message["executable"]), is_test) else { continue };
+        let manifest = text(&message["manifest_path"]).context("a program without a package")?;
+        let package = Path::new(&manifest).parent().context("a package without a directory")?;
+        let name = text(&message["target"]["name"]).unwrap_or_default();
+        let mut command = Command::new(program);
+        command.current_dir(package).env("CARGO_MANIFEST_DIR", package);
+        programs.push((LONGEST.iter().all(|longest| !name.starts_with(longest)), command));
+    }
+    ensure!(!programs.is_empty(), "{name}: no tests");
+    programs.sort_by_key(|(is_short, _)| *is_short);
+    Ok(programs.into_iter().map(|(_, command)| command).collect())
+}
+
+/// Runs as many at once as there are cores, in their order; what each prints is shown when it ends. After a failure none is
+/// begun.
+pub fn run(programs: Vec<Command>) -> Result<()> {
+    let cores = thread::available_parallelism().map_or(1, usize::from);
+    let waiting = Mutex::new(programs.into_iter());
+    let next = || waiting.lock().unwrap_or_else(PoisonError::into_inner).next();
+    let work = || -> Result<()> {
+        while let Some(mut program) = next() {
+            if let Err(error) = run_one(&mut program) {
+                while next().is_some() {}
+                return Err(error);
+            }
+        }
+        Ok(())
+    };
+    thread::scope(|scope| {
+        let workers: Vec<_> = (0..cores).map(|_| scope.spawn(work)).collect();
+        let mut ended = workers.into_iter().map(|worker| worker.join());
+        ended.try_for_each(|result| result.unwrap_or_else(|_| Err(anyhow!("a panic"))))
+    })
+}
+
+fn run_one(program: &mut Command) -> Result<()> {
+    let name = describe(program);
+    let began = Instant::now();
+    let output = program.output().with_context(|| format!("cannot run {name}"))?;
+    let said = [&output.stdout, &output.stderr].map(|said| String::from_utf8_lossy(said));
+    println!("penup: {name}: {} s\n{}{}", began.elapsed().as_secs(), said[0], said[1]);
+    ensure!(output.status.success(), "{name}: {}", output.status);
+    Ok(())
+}
