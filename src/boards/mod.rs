@@ -10,6 +10,7 @@ mod fault;
 mod handler;
 mod line;
 mod peripheral;
+mod pl011;
 
 #[cfg(feature = "lm3s6965")]
 mod lm3s6965;

@@ -4,7 +4,8 @@ use core::panic::PanicInfo;
 
 use cortex_m::peripheral::SCB;
 
-use super::{pins, serial, steps};
+use super::registers::UART0;
+use super::{pins, steps};
 use crate::boards::fault::{self, Fault};
 
 struct Lm3s6965;
@@ -17,11 +18,11 @@ impl Fault for Lm3s6965 {
     }
 
     fn write(bytes: &[u8]) {
-        serial::write(bytes);
+        UART0.write(bytes);
     }
 
     fn poll() -> Option<u8> {
-        serial::poll()
+        UART0.poll()
     }
 
     fn reset() -> ! {

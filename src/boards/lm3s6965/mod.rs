@@ -80,7 +80,7 @@ impl Board for Lm3s6965 {
     }
 
     fn write(&mut self, bytes: &[u8]) {
-        serial::write(bytes);
+        registers::UART0.write(bytes);
     }
 
     fn queue(&mut self) -> &mut dyn EventQueue {

@@ -1,6 +1,7 @@
 //! The chip's registers.
 
 use crate::boards::peripheral::Peripheral;
+use crate::boards::pl011::Uart;
 
 // SAFETY of all: the memory map of the LM3S6965's data sheet, table 3-1; none reaches into memory.
 
@@ -13,7 +14,7 @@ pub const GPIO_B: Peripheral = unsafe { Peripheral::at(0x4000_5000) };
 /// Port C, the contacts. Used by `contacts`.
 pub const GPIO_C: Peripheral = unsafe { Peripheral::at(0x4000_6000) };
 /// The serial line. Used by `serial`.
-pub const UART0: Peripheral = unsafe { Peripheral::at(0x4000_C000) };
+pub const UART0: Uart = Uart(unsafe { Peripheral::at(0x4000_C000) });
 /// The step timer. Used by `steps`.
 pub const TIMER1: Peripheral = unsafe { Peripheral::at(0x4003_1000) };
 /// The timer of the pulses. Used by `steps`.

@@ -2,8 +2,8 @@
 
 use core::panic::PanicInfo;
 
-use super::registers::WATCHDOG;
-use super::{pen, serial, steps};
+use super::registers::{UART0, WATCHDOG};
+use super::{pen, steps};
 use crate::boards::fault::{self, Fault};
 
 mod watchdog {
@@ -37,7 +37,7 @@ impl Fault for Pico {
     }
 
     fn write(bytes: &[u8]) {
-        serial::write_now(bytes);
+        UART0.write(bytes);
     }
 
     fn begin_to_wait() {
@@ -45,7 +45,7 @@ impl Fault for Pico {
     }
 
     fn poll() -> Option<u8> {
-        serial::poll()
+        UART0.poll()
     }
 
     /// Resets the whole chip. The core's own request would leave its peripherals as they are.

@@ -1,13 +1,14 @@
 //! The chip's registers.
 
 use crate::boards::peripheral::Peripheral;
+use crate::boards::pl011::Uart;
 
 // SAFETY of all: the address map of the RP2040's data sheet, 2.2; none reaches into memory.
 
 /// Which peripherals are held in reset. Used at set-up, before interrupts are on.
 const RESETS: Peripheral = unsafe { Peripheral::at(0x4000_C000) };
 /// The serial line. Used by `serial`.
-pub const UART0: Peripheral = unsafe { Peripheral::at(0x4003_4000) };
+pub const UART0: Uart = Uart(unsafe { Peripheral::at(0x4003_4000) });
 /// The servo's pulses. Used by `pen`.
 pub const PWM: Peripheral = unsafe { Peripheral::at(0x4005_0000) };
 /// Microseconds since the start. Used by `clock`.

@@ -1,4 +1,4 @@
-//! The first serial port: UART0 at 115200 baud, 8 bits, no parity, one stop bit.
+//! The first serial port: UART0.
 //!
 //! What is sent waits in a queue, so that an answer does not keep the main loop from the steps.
 
@@ -12,26 +12,6 @@ use super::registers::{self, UART0, reset};
 use super::{clock, critical};
 use crate::boards::handler::Owned;
 
-const BAUD: u32 = 115_200;
-
-mod offset {
-    pub const DATA: usize = 0x000;
-    pub const FLAGS: usize = 0x018;
-    pub const BAUD_INTEGER: usize = 0x024;
-    pub const BAUD_FRACTION: usize = 0x028;
-    pub const LINE_CONTROL: usize = 0x02C;
-    pub const CONTROL: usize = 0x030;
-    pub const INTERRUPT_MASK: usize = 0x038;
-    pub const INTERRUPT_CLEAR: usize = 0x044;
-}
-const RECEIVER_EMPTY: u32 = 1 << 4;
-const SENDER_FULL: u32 = 1 << 5;
-const RECEIVED: u32 = 1 << 4;
-const SENT: u32 = 1 << 5;
-const RECEIVE_TIMEOUT: u32 = 1 << 6;
-const EIGHT_BITS_WITH_FIFO: u32 = 0b111 << 4;
-const ENABLE_BOTH_WAYS: u32 = 1 | 1 << 8 | 1 << 9;
-
 /// Bytes that wait to be sent, at most; one more place than that, for the queue.
 const SENT_PLACES: usize = 512;
 
@@ -44,18 +24,13 @@ pub struct Sender(Producer<'static, u8>);
 /// Opens the port. Its pins are those of `pins`, and `ports` is set up.
 pub fn set_up(nvic: &mut NVIC) -> Sender {
     registers::restart(reset::UART0);
-    // Sixty-fourths of a divider of 16 samples a bit, rounded.
-    const DIVIDER: u32 = (clock::HERTZ * 4 + BAUD / 2) / BAUD;
-    UART0.write(offset::BAUD_INTEGER, DIVIDER / 64);
-    UART0.write(offset::BAUD_FRACTION, DIVIDER % 64);
-    UART0.write(offset::LINE_CONTROL, EIGHT_BITS_WITH_FIFO);
-    UART0.write(offset::INTERRUPT_MASK, RECEIVED | RECEIVE_TIMEOUT);
+    UART0.set_up(clock::HERTZ);
 
     let (sent, to_send) = QUEUE.init(Queue::new()).split();
     // SAFETY: the interrupt is masked since reset, and this runs once (the queue's cell sees to it).
     unsafe { SENDER.fill(to_send) };
     critical::enable(nvic, Interrupt::UART0_IRQ, critical::SERIAL_PRIORITY);
-    UART0.write(offset::CONTROL, ENABLE_BOTH_WAYS);
+    UART0.enable();
     Sender(sent)
 }
 
@@ -86,36 +61,21 @@ fn pump() {
 fn send() {
     // SAFETY: this is the handler that owns it, or the handler is masked.
     let Some(bytes) = (unsafe { SENDER.get() }) else { return };
-    while UART0.read(offset::FLAGS) & SENDER_FULL == 0
+    while UART0.has_place()
         && let Some(byte) = bytes.dequeue()
     {
-        UART0.write(offset::DATA, u32::from(byte));
+        UART0.put(byte);
     }
-    let more = if bytes.is_empty() { 0 } else { SENT };
-    UART0.write(offset::INTERRUPT_MASK, RECEIVED | RECEIVE_TIMEOUT | more);
-}
-
-/// Sends `bytes` past the queue: for a fault, when no handler runs.
-pub fn write_now(bytes: &[u8]) {
-    for &byte in bytes {
-        while UART0.read(offset::FLAGS) & SENDER_FULL != 0 {}
-        UART0.write(offset::DATA, u32::from(byte));
-    }
-}
-
-/// A byte straight from the receiver: for the handler, and for a fault, when no handler runs.
-pub fn poll() -> Option<u8> {
-    let empty = UART0.read(offset::FLAGS) & RECEIVER_EMPTY != 0;
-    (!empty).then(|| (UART0.read(offset::DATA) & 0xFF) as u8)
+    UART0.interrupt_when_sent(!bytes.is_empty());
 }
 
 #[interrupt]
 fn UART0_IRQ() {
-    UART0.write(offset::INTERRUPT_CLEAR, RECEIVED | RECEIVE_TIMEOUT | SENT);
+    UART0.clear_interrupt();
     send();
     // SAFETY: this is a handler that owns it.
     if let Some(inlet) = unsafe { ports::inlet() } {
-        while let Some(byte) = poll() {
+        while let Some(byte) = UART0.poll() {
             inlet.receive(Port::Uart, byte);
         }
     }

@@ -1,0 +1,82 @@
+//! The UART of both chips, Arm's PrimeCell PL011: 115200 baud, 8 bits, no parity, one stop bit, both ways by FIFO.
+
+use super::peripheral::Peripheral;
+
+const BAUD: u32 = 115_200;
+
+mod offset {
+    pub const DATA: usize = 0x000;
+    pub const FLAGS: usize = 0x018;
+    pub const BAUD_INTEGER: usize = 0x024;
+    pub const BAUD_FRACTION: usize = 0x028;
+    pub const LINE_CONTROL: usize = 0x02C;
+    pub const CONTROL: usize = 0x030;
+    pub const INTERRUPT_MASK: usize = 0x038;
+    pub const INTERRUPT_CLEAR: usize = 0x044;
+}
+const RECEIVER_EMPTY: u32 = 1 << 4;
+const SENDER_FULL: u32 = 1 << 5;
+const RECEIVED: u32 = 1 << 4;
+const SENT: u32 = 1 << 5;
+const RECEIVE_TIMEOUT: u32 = 1 << 6;
+const EIGHT_BITS_WITH_FIFO: u32 = 0b111 << 4;
+const ENABLE_BOTH_WAYS: u32 = 1 | 1 << 8 | 1 << 9;
+
+/// A UART of the chip.
+#[derive(Clone, Copy)]
+pub struct Uart(pub Peripheral);
+
+impl Uart {
+    /// Readies it, with a clock of so many hertz; what is received interrupts once it is enabled.
+    #[inline(always)]
+    pub fn set_up(self, hertz: u32) {
+        // Sixty-fourths of a divider of 16 samples a bit, rounded.
+        let divider = (hertz * 4 + BAUD / 2) / BAUD;
+        self.0.write(offset::CONTROL, 0);
+        self.0.write(offset::BAUD_INTEGER, divider / 64);
+        self.0.write(offset::BAUD_FRACTION, divider % 64);
+        self.0.write(offset::LINE_CONTROL, EIGHT_BITS_WITH_FIFO);
+        self.0.write(offset::INTERRUPT_MASK, RECEIVED | RECEIVE_TIMEOUT);
+    }
+
+    /// From now on it sends and receives.
+    pub fn enable(self) {
+        self.0.write(offset::CONTROL, ENABLE_BOTH_WAYS);
+    }
+
+    /// Whether the sender's FIFO has a place.
+    pub fn has_place(self) -> bool {
+        self.0.read(offset::FLAGS) & SENDER_FULL == 0
+    }
+
+    /// Sends a byte, for which there is a place.
+    pub fn put(self, byte: u8) {
+        self.0.write(offset::DATA, u32::from(byte));
+    }
+
+    /// Sends `bytes`; returns when the last is in the FIFO.
+    pub fn write(self, bytes: &[u8]) {
+        for &byte in bytes {
+            while !self.has_place() {}
+            self.put(byte);
+        }
+    }
+
+    /// A byte straight from the receiver.
+    pub fn poll(self) -> Option<u8> {
+        let empty = self.0.read(offset::FLAGS) & RECEIVER_EMPTY != 0;
+        (!empty).then(|| (self.0.read(offset::DATA) & 0xFF) as u8)
+    }
+
+    /// Whether an emptier FIFO is to interrupt, too.
+    #[cfg(feature = "pico")]
+    pub fn interrupt_when_sent(self, also: bool) {
+        let sent = if also { SENT } else { 0 };
+        self.0.write(offset::INTERRUPT_MASK, RECEIVED | RECEIVE_TIMEOUT | sent);
+    }
+
+    /// The interrupt is being handled.
+    pub fn clear_interrupt(self) {
+        self.0.write(offset::INTERRUPT_CLEAR, RECEIVED | RECEIVE_TIMEOUT | SENT);
+    }
+}
