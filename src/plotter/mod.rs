@@ -15,6 +15,7 @@ mod options;
 mod plan;
 mod program;
 mod reply;
+mod report;
 mod solid;
 mod stream;
 mod title;
@@ -24,14 +25,12 @@ pub use job::{Cursor, Job, Observer, Strokes, Unobserved};
 pub use memory::{Lent, Lm3s6965Memory, Memory, NO_MOVES, NO_MOVES_OF_PICO, PicoMemory};
 pub use options::PlotOptions;
 
-use crate::fixed::BinaryFraction;
 use crate::machine::{
     Alarm, Machine, MachineError, Path, PulserState, Setting, SettingError, Settings, State,
     Target, Value,
 };
 use crate::model::Model;
-use crate::order;
-use crate::protocol::{Command, LINE_LIMIT, LineReader, RealTime, Refusal};
+use crate::protocol::{Command, LineReader, RealTime, Refusal};
 use crate::stage::{Aborted, Attention, Stage};
 use program::Program;
 use reply::Reply;
@@ -349,14 +348,6 @@ impl Inner<'_> {
         Ok(())
     }
 
-    #[inline(never)] // Its frame must not lie under the stages'.
-    fn report_degenerate<B: Board>(&self, board: &mut B) {
-        let count = self.job.degenerate_faces();
-        if count > 0 {
-            Reply(board).line(format_args!("[MSG:{count} faces have no area and are left out]"));
-        }
-    }
-
     #[inline(never)] // Its frame must not lie under that of `plot`.
     fn compute(
         &mut self,
@@ -382,91 +373,6 @@ impl Inner<'_> {
         let value = crate::fixed::Decimal::parse(value).map_err(|_| Refusal::NotANumber)?;
         let value: Value = value.to_millimetres().map_err(|_| Refusal::NumberOutOfRange)?;
         self.machine.set(setting, value).map_err(Refusal::Setting)
-    }
-
-    #[inline(never)] // Its frame must not lie under the stages'.
-    fn report_build<B: Board>(&self, board: &mut B) {
-        const VERSION: &str = env!("CARGO_PKG_VERSION");
-        Reply(board).line(format_args!("[VER:1.1h.penup {VERSION}:{}]", B::NAME));
-        let blocks = self.machine.moves_ahead();
-        Reply(board).line(format_args!("[OPT:,{blocks},{LINE_LIMIT}]"));
-    }
-
-    #[inline(never)] // Its frame must not lie under the stages'.
-    fn report_model<B: Board>(&self, board: &mut B) {
-        let model = &self.model;
-        let (vertices, limit) = (model.vertices().len(), model.vertex_limit());
-        Reply(board).line(format_args!("[MODEL:vertices {vertices} of {limit}]"));
-        let (corners, limit) = (model.corner_count(), model.corner_limit());
-        let (faces, bars, curves) = (model.face_count(), model.bar_count(), model.curve_count());
-        Reply(board).line(format_args!(
-            "[MODEL:faces {faces}, bars {bars}, curves {curves}, corners {corners} of {limit}]"
-        ));
-        let order::Report { odd_points, components, pen_down, pen_up, lifts, bound, optimal } =
-            *self.job.report();
-        Reply(board)
-            .line(format_args!("[JOB:odd points {odd_points}, parts {components}, lifts {lifts}]"));
-        // From 1/256 steps to 1/256 mm; below 2^56.
-        let steps = self.machine.settings().get(Setting::StepsPerMmX).to_bits().max(1);
-        let mm = |length: u64| BinaryFraction {
-            units: ((length << 16) / u64::from(steps.unsigned_abs())) as i64,
-            fraction_bits: 8,
-            places: 1,
-        };
-        let percent = BinaryFraction {
-            units: ((pen_down * 25600) / (pen_down + pen_up).max(1)) as i64,
-            fraction_bits: 8,
-            places: 1,
-        };
-        let (down, up, bound) = (mm(pen_down), mm(pen_up), mm(bound));
-        let proof = if optimal { "the least" } else { "not proved the least" };
-        Reply(board).line(format_args!(
-            "[JOB:pen down {down} mm, up {up} mm, efficiency {percent} %, bound {bound} mm, {proof}]"
-        ));
-        Reply(board).line(format_args!("[MEM:{} bytes to work in]", size_of_val(self.words)));
-    }
-
-    #[inline(never)] // Its frame must not lie under the stages'.
-    fn report_status<B: Board>(&self, board: &mut B) {
-        let status = self.machine.status();
-        let state = match status.state {
-            State::Idle if self.machine.stands() => "Idle",
-            State::Idle | State::Run | State::Abort => "Run",
-            State::Hold { standing: true } => "Hold:0",
-            State::Hold { standing: false } => "Hold:1",
-            State::Jog => "Jog",
-            State::Home => "Home",
-            State::Check => "Check",
-            State::Alarm(_) => "Alarm",
-            State::Sleep => "Sleep",
-        };
-        let mut reply = Reply(board);
-        reply.part(format_args!("<{state}"));
-        reply.position(self.machine.position_mm());
-        if status.percent != 100 {
-            reply.part(format_args!("|Ov:{},100,100", status.percent));
-        }
-        if let State::Alarm(alarm) = status.state {
-            reply.part(format_args!("|Alarm:{}", stream::number(alarm)));
-        }
-        let (switches, stop) = (self.machine.switches(), self.machine.stop_is_pressed());
-        if switches.any() || stop {
-            let letter = |pressed, letter| if pressed { letter } else { "" };
-            let (x, y, stop) =
-                (letter(switches.x, "X"), letter(switches.y, "Y"), letter(stop, "E"));
-            reply.part(format_args!("|Pn:{x}{y}{stop}"));
-        }
-        if let Some(pen) = status.pen_wanted {
-            reply.part(format_args!("|Pen:{}", pen + 1));
-        }
-        if self.machine.underruns() != 0 {
-            reply.part(format_args!("|Late:{}", self.machine.underruns()));
-        }
-        let (done, all) = (status.done, status.job);
-        reply.part(format_args!("|Strokes:{}/{}", done.strokes, all.strokes));
-        let mm = |units: u64| BinaryFraction { units: units as i64, fraction_bits: 18, places: 0 };
-        let (drawn, left) = (mm(done.drawn), status.seconds_left);
-        reply.line(format_args!("|Ink:{drawn}/{}|Left:{left}>", mm(all.drawn)));
     }
 }
 
