@@ -1,0 +1,60 @@
+//! The pen's heights and the steps of its motor, which wait beside the words.
+
+use heapless::spsc::{Consumer, Queue};
+use rp2040_hal::pac::interrupt;
+use static_cell::StaticCell;
+
+use super::STATE;
+use super::engine::{FLAG, machine};
+use crate::boards::handler::Owned;
+use crate::boards::pico::registers::PIO0;
+use crate::boards::pico::{critical, lift, pen};
+
+/// Heights of the pen that wait, or two for each step of its motor, at most; one more place than that, for the queue.
+pub const HEIGHTS: usize = 1024;
+/// In the place of a height: the pins of the pen's motor take levels.
+pub mod lift_levels {
+    pub const MARK: u8 = 1 << 7;
+    pub const STEP: u8 = 1;
+    pub const DOWN: u8 = 1 << 1;
+}
+
+pub static HEIGHT_QUEUE: StaticCell<Queue<u8, HEIGHTS>> = StaticCell::new();
+pub static HEIGHTS_DUE: Owned<Consumer<'static, u8>> = Owned::empty();
+
+/// Two heights that come faster than the interrupt would leave one behind: the last counts. Steps of the pen's
+/// motor are left over only where all was thrown away.
+pub fn heal_pen() {
+    critical::with_steps_masked(|| {
+        // SAFETY: the handler that owns it is masked.
+        if let Some(due) = unsafe { HEIGHTS_DUE.get() } {
+            while let Some(height) = due.dequeue() {
+                if height & lift_levels::MARK == 0 {
+                    pen::set_height(height);
+                }
+            }
+            lift::end_pulse();
+        }
+    });
+}
+
+/// The pen's motor takes a direction, and a step if asked.
+fn set_lift(step: bool, down: bool) {
+    lift::set(step, down != STATE.lift_is_inverted());
+    if step {
+        STATE.count_lift(down);
+    }
+}
+
+#[interrupt]
+fn PIO0_IRQ_0() {
+    PIO0.write(machine::FLAGS, FLAG);
+    // SAFETY: this is the handler that owns it.
+    if let Some(height) = unsafe { HEIGHTS_DUE.get() }.and_then(Consumer::dequeue) {
+        if height & lift_levels::MARK == 0 {
+            pen::set_height(height);
+        } else {
+            set_lift(height & lift_levels::STEP != 0, height & lift_levels::DOWN != 0);
+        }
+    }
+}
