@@ -106,7 +106,7 @@ impl Session {
                 trace.iter().rev().find(is_same).copied()
             })
             .collect();
-        let drawn = event_checker::check_pins(&trace, &self.settings);
+        let drawn = event_checker::check_pins_in_alarms(&trace, &self.settings);
         assert_eq!(drawn.end, PagePoint::default(), "the place is lost");
         drawn
     }
