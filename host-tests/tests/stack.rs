@@ -19,7 +19,6 @@ fn of_the_lm3s6965() -> Result<(), Box<dyn Error>> {
 }
 
 #[test]
-#[ignore = "takes many minutes: cargo xtask stack"]
 fn of_the_pico() -> Result<(), Box<dyn Error>> {
     on_the_pico(leaves_a_margin)
 }
