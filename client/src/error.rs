@@ -41,7 +41,7 @@ pub enum Error {
         code: u8,
     },
     /// A file must not command the machine.
-    #[error("{}:{}: a file cannot hold commands for the plotter\n    {}", origin.file, origin.line, origin.text)]
+    #[error("{}:{}: a file cannot hold commands for the plotter\n    {}", origin.file, origin.line, origin.shown())]
     CommandInFile {
         /// Where it stands.
         origin: Origin,
@@ -183,8 +183,9 @@ fn refusal(line: &JobLine, number: u16, messages: &[String]) -> String {
         reason.push_str(message);
     }
     match &line.origin {
-        Some(Origin { file, line, text }) => {
-            format!("{file}:{line}: {reason} (error {number})\n    {text}")
+        Some(origin) => {
+            let Origin { file, line, .. } = origin;
+            format!("{file}:{line}: {reason} (error {number})\n    {}", origin.shown())
         }
         None => format!("the plotter refuses {}: {reason} (error {number})", line.sent),
     }

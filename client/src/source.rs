@@ -28,6 +28,24 @@ pub struct Origin {
     pub text: String,
 }
 
+impl Origin {
+    /// How much of a line is shown, in characters.
+    const MOST_SHOWN: usize = 100;
+
+    /// The beginning of the line, in characters that a terminal only shows.
+    pub fn shown(&self) -> String {
+        let is_shown = |character: &char| !character.is_control() && *character != '\u{FFFD}';
+        let mut shown: String = (self.text.chars())
+            .map(|character| if is_shown(&character) { character } else { '·' })
+            .take(Self::MOST_SHOWN)
+            .collect();
+        if self.text.chars().nth(Self::MOST_SHOWN).is_some() {
+            shown.push('…');
+        }
+        shown
+    }
+}
+
 impl JobLine {
     /// A command of the client itself.
     pub fn command(text: impl Into<String>) -> Self {
@@ -113,5 +131,16 @@ mod tests {
     fn a_command_in_a_file_is_refused() {
         let error = lines("f.obj", b"v 0 0 0\n  $plot\n").expect_err("refused");
         assert!(error.to_string().starts_with("f.obj:2: "), "{error}");
+    }
+
+    #[test]
+    fn a_line_is_shown_without_what_acts_on_a_terminal() {
+        let shown = |bytes: &[u8]| {
+            let lines = lines("f.obj", bytes).expect("a file that can be sent");
+            lines[0].origin.as_ref().expect("from the file").shown()
+        };
+        assert_eq!(shown(b"f \x1b[2J\x07 Z\xff\n"), "f ·[2J· Z·");
+        let long = shown("ü".repeat(101).as_bytes());
+        assert_eq!((long.chars().count(), long.chars().last()), (101, Some('…')));
     }
 }

@@ -17,10 +17,10 @@ mod uf2;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use clap::{CommandFactory, Parser, Subcommand};
 
-use command::{cargo, run};
+use command::{cargo, describe};
 use firmware::Board;
 
 /// Builds, tests and runs penup.
@@ -143,7 +143,12 @@ fn plot(arguments: &[String]) -> Result<()> {
         let image = firmware::build(board)?;
         firmware::check(board, &image)?;
     }
-    run(&mut client)
+    let status = client.status().with_context(|| format!("cannot run {}", describe(&client)))?;
+    if !status.success() {
+        // It has said why itself.
+        std::process::exit(status.code().unwrap_or(1));
+    }
+    Ok(())
 }
 
 /// The client's command, run where the user stands.
