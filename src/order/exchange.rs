@@ -165,7 +165,7 @@ impl<'s, 'a> Exchanges<'s, 'a> {
         }
         let hand = hand - i64::from(self.lift);
         let bound = u32::try_from(hand.clamp(0, i64::from(u32::MAX))).unwrap_or(u32::MAX);
-        // A little more is left over than the move's length: see `distance`.
+        // A little more than the length is taken: see `distance`.
         self.distances.below(bound, from, to).map_or(0, |length| hand - i64::from(length) - 1)
     }
 

@@ -9,7 +9,7 @@
 //! 2. `matching` pairs the odd stations at the least length, or `greedy` in less memory;
 //! 3. `euler` traces the strokes, part by part, nearest first;
 //! 4. `improve` shortens the tour of several parts: `mend` joins them by their own moves, `exchange`
-//!    changes moves while that helps, `orient` turns strokes around.
+//!    changes moves while that helps (`search` finds how), `orient` turns strokes around.
 //!
 //! Call [`order`] with a [`Drawing`], [`Options`] and memory. Refused: a drawing whose segments name
 //! points that are not there, too many segments, too little memory; the tour is then worth nothing.
