@@ -294,7 +294,7 @@ pub fn stop_at_once(board: Board) -> Result<(), Box<dyn Error>> {
             events.extend(machine.change(change).map(|event| event.kind));
         }
     }
-    line.emulator.send(b"\xB1")?;
+    line.emulator.send(b"\xFD")?;
     while line.hear()? != "ALARM:10" {}
     for change in line.emulator.pin_changes()? {
         events.extend(machine.change(change).map(|event| event.kind));

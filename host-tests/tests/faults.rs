@@ -137,7 +137,7 @@ fn disturb(values: &[(Setting, f64)], count: u64, seed: u64) {
                 session.send(b'~');
             }
             2 => {
-                session.send(0xB0);
+                session.send(0xFB);
                 session.bench.finish();
                 session.send(b'~');
             }
@@ -153,7 +153,7 @@ fn disturb(values: &[(Setting, f64)], count: u64, seed: u64) {
                 session.work(random.below(400));
                 session.send(0x18);
             }
-            6 => session.send(0xB1),
+            6 => session.send(0xFD),
             _ => {
                 let stop = random.below(2) == 0;
                 session.press(Contacts { x: !stop, y: false, stop });

@@ -221,7 +221,7 @@ fn a_limit_and_the_emergency_stop_are_alarms() {
     for (contacts, byte, alarm) in [
         (Contacts { x: true, ..Contacts::default() }, None, "ALARM:1\n"),
         (Contacts { stop: true, ..Contacts::default() }, None, "ALARM:10\n"),
-        (Contacts::default(), Some(0xB1), "ALARM:10\n"),
+        (Contacts::default(), Some(0xFD), "ALARM:10\n"),
     ] {
         let mut bench = bench();
         assert_eq!(bench.say("$21=1\nG0 X1\nM3\nG1 X90\n"), "ok\n".repeat(4));
@@ -296,7 +296,7 @@ fn pauses_wait_for_the_user() {
     assert_eq!(place(&mut bench), "20.000,0.000");
     // At the end of the stroke.
     bench.say("M5\nG0 X0\nM3\nG1 X10\nG1 X20\nM5\nG0 X50\nG0 X60\n");
-    bench.board.receive(&[0xB0]);
+    bench.board.receive(&[0xFB]);
     work(&mut bench, 3000);
     assert_eq!(place(&mut bench), "20.000,0.000");
     assert_eq!(field(&mut bench, "Hold"), "Hold:0");
@@ -432,7 +432,7 @@ fn disturbed(disturbance: Disturbance, instant: u32) -> Drawn {
     match disturbance {
         Disturbance::HoldAndResume => bench.board.receive(b"!"),
         Disturbance::Abort => bench.board.receive(b"\x18"),
-        Disturbance::StopByte => bench.board.receive(&[0xB1]),
+        Disturbance::StopByte => bench.board.receive(&[0xFD]),
         _ => {}
     }
     if matches!(disturbance, Disturbance::HoldAndResume) {

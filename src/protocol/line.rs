@@ -35,9 +35,9 @@ impl RealTime {
     pub const FEED_PLUS_1: Self = Self(1 << 9);
     /// 0x94: speeds 1 % down.
     pub const FEED_MINUS_1: Self = Self(1 << 10);
-    /// 0xB0: pause at the end of the stroke.
+    /// 0xFB: pause at the end of the stroke.
     pub const PAUSE: Self = Self(1 << 11);
-    /// 0xB1: stop the pins at once.
+    /// 0xFD: stop the pins at once.
     pub const EMERGENCY: Self = Self(1 << 12);
 
     /// Whether all of `asked` was asked for.
@@ -70,29 +70,45 @@ impl RealTime {
 
 /// Tells the bytes that act at once from those of lines, one by one as they come.
 ///
-/// Some of the former are also inner bytes of letters in UTF-8; there they are text.
+/// The bytes 0x85 and 0x90 to 0x94, which are Grbl's, are also inner bytes of letters in UTF-8; there
+/// they are text. All others act wherever they stand, whatever came before them: 0xFB and 0xFD, which
+/// are penup's own, are never part of UTF-8.
 ///
 /// ```
 /// use penup::protocol::{RealTime, Sorter};
 /// let mut sorter = Sorter::default();
 /// assert_eq!(sorter.sort(0x85), Some(RealTime::CANCEL_JOG));
-/// assert!("Å".bytes().all(|byte| sorter.sort(byte).is_none()));
+/// assert!("Å ñ".bytes().all(|byte| sorter.sort(byte).is_none()));
+/// // The first byte of a letter that never comes does not keep a stop from acting.
+/// assert_eq!(sorter.sort(0xF0), None);
+/// assert_eq!(sorter.sort(0xFD), Some(RealTime::EMERGENCY));
 /// ```
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Sorter {
     /// Inner bytes of a letter that are still to come.
     inner: u8,
+    /// The byte before.
+    last: u8,
 }
 
 impl Sorter {
     /// Before the first byte.
     pub const fn new() -> Self {
-        Self { inner: 0 }
+        Self { inner: 0, last: 0 }
     }
 
     /// What the byte asks for; `None` for a byte of a line.
     pub const fn sort(&mut self, byte: u8) -> Option<RealTime> {
-        if byte & 0xC0 == 0x80 && self.inner > 0 {
+        // The second byte of a well-formed letter (Unicode, table 3-7).
+        let is_inner = match self.last {
+            0xE0 => matches!(byte, 0xA0..=0xBF),
+            0xED => matches!(byte, 0x80..=0x9F),
+            0xF0 => matches!(byte, 0x90..=0xBF),
+            0xF4 => matches!(byte, 0x80..=0x8F),
+            _ => matches!(byte, 0x80..=0xBF),
+        };
+        self.last = byte;
+        if is_inner && self.inner > 0 {
             self.inner -= 1;
             return None;
         }
@@ -113,8 +129,8 @@ impl Sorter {
             0x92 => RealTime::FEED_MINUS_10,
             0x93 => RealTime::FEED_PLUS_1,
             0x94 => RealTime::FEED_MINUS_1,
-            0xB0 => RealTime::PAUSE,
-            0xB1 => RealTime::EMERGENCY,
+            0xFB => RealTime::PAUSE,
+            0xFD => RealTime::EMERGENCY,
             _ => return None,
         })
     }
@@ -193,6 +209,52 @@ mod tests {
         let mut bytes = std::vec![b'x'; LINE_LIMIT];
         bytes.push(b'\n');
         assert_eq!(lines(&bytes), [Ok("x".repeat(LINE_LIMIT))]);
+    }
+
+    /// What the bytes ask for, one after the other.
+    fn asked(bytes: &[u8]) -> Vec<RealTime> {
+        let mut sorter = Sorter::new();
+        bytes.iter().filter_map(|byte| sorter.sort(*byte)).collect()
+    }
+
+    #[test]
+    fn a_stop_acts_after_any_three_bytes() {
+        for first in 0..=u8::MAX {
+            for second in [b'a', 0x80, 0xA5, 0xC3, 0xE2, 0xF0, 0xFF] {
+                for third in [b'a', 0x80, 0xBF, 0xDF, 0xED, 0xF4] {
+                    for (byte, expected) in [
+                        (0xFD, RealTime::EMERGENCY),
+                        (0xFB, RealTime::PAUSE),
+                        (b'!', RealTime::HOLD),
+                        (0x18, RealTime::ABORT),
+                    ] {
+                        let found = asked(&[first, second, third, byte]);
+                        assert_eq!(found.last(), Some(&expected), "{first} {second} {third}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn no_letter_asks_for_anything() {
+        let commands = "?!~\u{18}";
+        let letters = (' '..=char::MAX).filter(|letter| !commands.contains(*letter));
+        let mut sorter = Sorter::new();
+        for letter in letters {
+            let mut bytes = [0; 4];
+            for byte in letter.encode_utf8(&mut bytes).bytes() {
+                assert_eq!(sorter.sort(byte), None, "{letter}");
+            }
+        }
+    }
+
+    #[test]
+    fn grbls_bytes_act_after_what_begins_no_letter() {
+        assert_eq!(asked(b"\xC3\x85"), [], "a letter");
+        for bytes in [b"\xE0\x90".as_slice(), b"\xF0\x85", b"\xF4\x90", b"\xC3 \x85"] {
+            assert_eq!(asked(bytes).len(), 1, "{bytes:?}");
+        }
     }
 
     #[test]
