@@ -2,6 +2,7 @@
 
 use crate::protocol::{RECEIVE_WINDOW, meaning};
 use crate::source::{JobLine, Origin};
+use penup::protocol::Refusal;
 use std::io;
 use std::time::Duration;
 
@@ -45,6 +46,48 @@ pub enum Error {
     CommandInFile {
         /// Where it stands.
         origin: Origin,
+    },
+    /// A line that no plotter takes.
+    #[error("{}:{}: {refusal}\n    {}", origin.file, origin.line, origin.shown())]
+    BadLine {
+        /// Where it stands.
+        origin: Origin,
+        /// What the plotter would say of it.
+        refusal: Refusal,
+    },
+    /// A line of the file has more bytes than a plotter takes.
+    #[error(
+        "{}:{}: the line has {length} bytes, and a line may have at most {limit}\n    {}",
+        origin.file, origin.line, origin.shown()
+    )]
+    LineTooLong {
+        /// Where it stands.
+        origin: Origin,
+        /// Bytes of the line.
+        length: usize,
+        /// The most that it may have.
+        limit: usize,
+    },
+    /// A line of the file holds a NUL byte.
+    #[error(
+        "{}:{}: this is no text, and an OBJ file is: is it another file under this name?",
+        origin.file, origin.line
+    )]
+    NotText {
+        /// Where it stands.
+        origin: Origin,
+    },
+    /// The file is UTF-16.
+    #[error("{file}: this is UTF-16 text: save it as UTF-8")]
+    Utf16 {
+        /// As the user named it.
+        file: String,
+    },
+    /// The file has more bytes than penup counts.
+    #[error("{file}: the file is larger than 4 GB, which is more than any plotter takes")]
+    FileTooLarge {
+        /// As the user named it.
+        file: String,
     },
     /// The port cannot be opened.
     #[error(

@@ -4,7 +4,7 @@ use crate::protocol::{
     ANGLES, AT, BEHIND, BLOCKS, CLEAR, CREASE, CYCLE, EFFORT, EYE, FIT, HIDDEN, LIFT, MARGIN,
     ORDER, PAGE, PENS, PROJECTION, SEAMS, SEE, TITLE, TITLE_SIZE, UP, VIEW_AUTO, setting,
 };
-use crate::source::JobLine;
+use crate::source::{JobLine, Lines};
 use crate::watch::PenRuns;
 use penup::protocol::Escape;
 use serde::Serialize;
@@ -152,40 +152,67 @@ pub struct Settings {
     pub lift: f64,
 }
 
-/// Every line of a job up to the plot command: forget the old model, how pens are chosen, the file's lines, the settings.
-///
-/// Each setting is sent, so that nothing of an earlier job remains.
-pub fn job_lines(file: Vec<JobLine>, settings: &Settings) -> Vec<JobLine> {
-    let page = settings.page;
-    let points =
-        [(EYE, settings.eye), (AT, settings.at), (UP, settings.up), (ANGLES, settings.angles)];
-    let points = points.into_iter().filter_map(|(name, point)| Some(setting(name, &point?, ',')));
-    let commands = std::iter::once(VIEW_AUTO.to_owned()).chain(points).chain([
-        format!("{PROJECTION}={}", settings.projection),
-        format!("{BEHIND}={}", settings.behind),
-        format!("{SEAMS}={}", settings.seams),
-        format!("{BLOCKS}={}", settings.blocks),
-        setting(CREASE, &[settings.crease], ','),
-        format!("{SEE}={}", settings.see),
-        format!("{HIDDEN}={}", settings.hidden),
-        setting(PAGE, &[page.width, page.height], 'x'),
-        setting(MARGIN, &[settings.margin], ','),
-        format!("{TITLE}={}", Escape(&settings.title)),
-        setting(TITLE_SIZE, &[settings.title_size], ','),
-        format!("{FIT}={}", if settings.fit { "on" } else { "off" }),
-        format!("{ORDER}={}", settings.order),
-        format!("{CYCLE}={}", if settings.cycle { "on" } else { "off" }),
-        format!("{EFFORT}={}", settings.effort),
-        setting(LIFT, &[settings.lift], ','),
-    ]);
-    // Before the file, whose names of pens may be too many.
-    let before = [CLEAR.to_owned(), format!("{PENS}={}", settings.pens)];
-    before
-        .into_iter()
-        .map(JobLine::command)
-        .chain(file)
-        .chain(commands.map(JobLine::command))
-        .collect()
+/// Every line of a job up to the plot command: forget the old model, how pens are chosen, the file's
+/// lines, the settings.
+#[derive(Debug)]
+pub struct Job<L> {
+    before: Vec<JobLine>,
+    file: L,
+    after: Vec<JobLine>,
+}
+
+impl<L: Lines> Job<L> {
+    /// The job that draws `file` as `settings` say.
+    ///
+    /// Each setting is sent, so that nothing of an earlier job remains.
+    pub fn new(file: L, settings: &Settings) -> Self {
+        let page = settings.page;
+        let points =
+            [(EYE, settings.eye), (AT, settings.at), (UP, settings.up), (ANGLES, settings.angles)];
+        let points =
+            points.into_iter().filter_map(|(name, point)| Some(setting(name, &point?, ',')));
+        let commands = std::iter::once(VIEW_AUTO.to_owned()).chain(points).chain([
+            format!("{PROJECTION}={}", settings.projection),
+            format!("{BEHIND}={}", settings.behind),
+            format!("{SEAMS}={}", settings.seams),
+            format!("{BLOCKS}={}", settings.blocks),
+            setting(CREASE, &[settings.crease], ','),
+            format!("{SEE}={}", settings.see),
+            format!("{HIDDEN}={}", settings.hidden),
+            setting(PAGE, &[page.width, page.height], 'x'),
+            setting(MARGIN, &[settings.margin], ','),
+            format!("{TITLE}={}", Escape(&settings.title)),
+            setting(TITLE_SIZE, &[settings.title_size], ','),
+            format!("{FIT}={}", if settings.fit { "on" } else { "off" }),
+            format!("{ORDER}={}", settings.order),
+            format!("{CYCLE}={}", if settings.cycle { "on" } else { "off" }),
+            format!("{EFFORT}={}", settings.effort),
+            setting(LIFT, &[settings.lift], ','),
+        ]);
+        // Before the file, whose names of pens may be too many.
+        let before = [CLEAR.to_owned(), format!("{PENS}={}", settings.pens)];
+        Self {
+            before: before.into_iter().map(JobLine::command).collect(),
+            file,
+            after: commands.map(JobLine::command).collect(),
+        }
+    }
+}
+
+impl<L: Lines> Lines for Job<L> {
+    fn count(&self) -> usize {
+        self.before.count() + self.file.count() + self.after.count()
+    }
+
+    fn line(&self, index: usize) -> Option<JobLine> {
+        let Some(index) = index.checked_sub(self.before.count()) else {
+            return self.before.line(index);
+        };
+        match index.checked_sub(self.file.count()) {
+            None => self.file.line(index),
+            Some(index) => self.after.line(index),
+        }
+    }
 }
 
 #[cfg(test)]
@@ -247,8 +274,10 @@ mod tests {
             effort: 4000,
             lift: 2.5,
         };
-        let lines = job_lines(vec![JobLine::command("v 0 0 0")], &settings);
-        let sent: Vec<&str> = lines.iter().map(|line| line.sent.as_str()).collect();
+        let job = Job::new([JobLine::command("v 0 0 0")], &settings);
+        let lines = (0..job.count()).filter_map(|index| job.line(index));
+        let sent: Vec<String> = lines.map(|line| line.sent).collect();
+        assert_eq!(job.line(job.count()), None);
         assert_eq!(
             sent,
             [

@@ -6,14 +6,14 @@ use crate::cli::{
 };
 use crate::error::Error;
 use crate::fit::fit_obj;
-use crate::job::{Lengths, job_lines};
+use crate::job::{Job, Lengths};
 use crate::link::{Link, SerialLink};
 use crate::machines;
 use crate::output;
 use crate::picture::{self, Picture};
 use crate::progress::{Bar, Progress};
 use crate::sender::{Patience, Sender};
-use crate::source::{JobLine, read_file};
+use crate::source::{Lines, SourceFile};
 use crate::tape;
 use penup::step::tape::BadCode;
 use std::path::{Path, PathBuf};
@@ -40,16 +40,16 @@ pub fn run(cli: &Cli, interrupt: &AtomicBool) -> Result<String, Error> {
 
 fn plot(args: &PlotArgs, interrupt: &AtomicBool) -> Result<String, Error> {
     let settings = args.view.settings();
-    let lines = job_lines(read_file(&args.file)?, &settings);
+    let job = Job::new(SourceFile::read(&args.file)?, &settings);
     let mut bar = Bar::default();
     if let Some(device) = &args.port {
         let mut link = SerialLink::open(device)
             .map_err(|source| Error::Port { device: device.clone(), source })?;
-        draw(&mut link, &lines, 1, interrupt, &mut bar)?;
+        draw(&mut link, &job, 1, interrupt, &mut bar)?;
         return Ok(format!("{} is drawn", args.file.display()));
     }
     let mut board = machines::emulate(args.board)?;
-    draw(board.as_mut(), &lines, 1, interrupt, &mut bar)?;
+    draw(board.as_mut(), &job, 1, interrupt, &mut bar)?;
     let pen = board.pen_runs()?;
     let picture = Picture { page: settings.page, runs: pen.runs, step: pen.step };
     drop(bar);
@@ -62,10 +62,10 @@ fn plot(args: &PlotArgs, interrupt: &AtomicBool) -> Result<String, Error> {
 
 fn preview(args: &PreviewArgs, interrupt: &AtomicBool) -> Result<String, Error> {
     let settings = args.view.settings();
-    let lines = job_lines(read_file(&args.file)?, &settings);
+    let job = Job::new(SourceFile::read(&args.file)?, &settings);
     let mut bar = Bar::default();
     let mut plotter = machines::in_memory();
-    draw(plotter.as_mut(), &lines, args.repeat, interrupt, &mut bar)?;
+    draw(plotter.as_mut(), &job, args.repeat, interrupt, &mut bar)?;
     let result = plotter.result()?;
     drop(bar);
     let outputs = Outputs::of(&args.pictures, args.json.as_deref());
@@ -98,12 +98,12 @@ fn fit(args: &FitArgs) -> Result<String, Error> {
 }
 
 fn encode_tape(args: &TapeEncodeArgs, interrupt: &AtomicBool) -> Result<String, Error> {
-    let lines = job_lines(read_file(&args.file)?, &args.view.settings());
+    let job = Job::new(SourceFile::read(&args.file)?, &args.view.settings());
     let mut plotter = machines::in_memory();
     {
         let mut bar = Bar::default();
         let mut sender = Sender::open(plotter.as_mut(), Patience::default(), interrupt)?;
-        sender.stream(&lines, &mut bar)?;
+        sender.stream(&job, &mut bar)?;
     }
     let tape = plotter.tape()?;
     let output = args.output.clone().unwrap_or_else(|| args.file.with_extension("tape"));
@@ -135,13 +135,13 @@ fn damaged(file: &Path) -> impl Fn(BadCode) -> Error {
 /// See [`Sender`].
 pub fn draw(
     link: &mut dyn Link,
-    lines: &[JobLine],
+    job: &dyn Lines,
     times: u32,
     interrupt: &AtomicBool,
     progress: &mut dyn Progress,
 ) -> Result<(), Error> {
     let mut sender = Sender::open(link, Patience::default(), interrupt)?;
-    sender.stream(lines, progress)?;
+    sender.stream(job, progress)?;
     (0..times).try_for_each(|_| sender.plot(progress))
 }
 

@@ -11,7 +11,7 @@ use crate::progress::Progress;
 use crate::protocol::{
     ABORT, PLOT, RECEIVE_WINDOW, RESUME, Reply, ReplyReader, STATUS_QUERY, Status, is_penup,
 };
-use crate::source::JobLine;
+use crate::source::{JobLine, Lines};
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -133,37 +133,37 @@ impl<'a> Sender<'a> {
     ///
     /// # Errors
     /// The first line that is refused or not answered; later lines may have been taken.
-    pub fn stream(&mut self, lines: &[JobLine], progress: &mut dyn Progress) -> Result<(), Error> {
+    pub fn stream(&mut self, lines: &dyn Lines, progress: &mut dyn Progress) -> Result<(), Error> {
         let cost = |line: &JobLine| line.sent.len() + 1;
         let (mut sent, mut answered, mut in_queue) = (0, 0, 0);
         let mut last_answer = Instant::now();
         self.last_heard = last_answer;
-        while let Some(oldest) = lines.get(answered) {
-            while let Some(line) = lines.get(sent)
+        while let Some(oldest) = lines.line(answered) {
+            while let Some(line) = lines.line(sent)
                 // A line longer than the queue goes alone; the plotter judges its length.
-                && (in_queue == 0 || in_queue + cost(line) <= RECEIVE_WINDOW)
+                && (in_queue == 0 || in_queue + cost(&line) <= RECEIVE_WINDOW)
             {
                 self.send_line(&line.sent)?;
-                in_queue += cost(line);
+                in_queue += cost(&line);
                 sent += 1;
             }
             self.stop_if_interrupted()?;
             match self.listen()? {
                 Some(Reply::Ok) => {
-                    in_queue -= cost(oldest);
+                    in_queue -= cost(&oldest);
                     answered += 1;
                     last_answer = Instant::now();
                     self.messages.clear();
-                    progress.lines_sent(answered, lines.len());
+                    progress.lines_sent(answered, lines.count());
                 }
-                Some(reply) => self.fail_on(reply, Some(oldest))?,
+                Some(reply) => self.fail_on(reply, Some(&oldest))?,
                 None => {
                     self.query_if_due()?;
-                    self.fail_if_silent(Some(oldest))?;
+                    self.fail_if_silent(Some(&oldest))?;
                 }
             }
             if last_answer.elapsed() > self.patience.lost {
-                return Err(Error::LostLine { line: Some(Box::new(oldest.clone())) });
+                return Err(Error::LostLine { line: Some(Box::new(oldest)) });
             }
         }
         Ok(())

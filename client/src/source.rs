@@ -1,11 +1,21 @@
 //! A file, line by line, as it is sent.
 //!
-//! Every line keeps its number and its text, so that a refusal names both. Blank lines and comments
-//! stay at home. Refused: files that are not OBJ by their name, `$` commands inside a file.
+//! [`SourceFile::read`] reads an OBJ file and checks every line with the plotter's own parser, before
+//! anything is sent: a line that no plotter would take is refused with its number and its text. The
+//! bytes of the file stay as they are, and the lines are made from them as they are asked for
+//! ([`Lines::line`]), so that a job takes little more memory than its file.
+//!
+//! Blank lines, comments and keywords that change nothing for a plotter are not sent. A line that ends
+//! in a backslash goes on in the next one. A polyline that is longer than a line may be is sent as
+//! several, which share a vertex. Refused: what is not OBJ by its name, what is no text, lines of other
+//! kinds that are too long, and commands for the machine inside a file.
 
 use crate::error::Error;
 use crate::protocol::acts_at_once;
-use std::fs;
+use penup::protocol::{Command, LINE_LIMIT, Refusal};
+use std::borrow::Cow;
+use std::fs::File;
+use std::io::{self, Read as _};
 use std::path::Path;
 
 /// One line to send.
@@ -24,13 +34,13 @@ pub struct Origin {
     pub file: String,
     /// The line's number, from 1.
     pub line: usize,
-    /// The line as it stands there.
+    /// The line as it stands there, or its first [`Origin::MOST_SHOWN`] characters and more.
     pub text: String,
 }
 
 impl Origin {
     /// How much of a line is shown, in characters.
-    const MOST_SHOWN: usize = 100;
+    pub const MOST_SHOWN: usize = 100;
 
     /// The beginning of the line, in characters that a terminal only shows.
     pub fn shown(&self) -> String {
@@ -53,94 +63,356 @@ impl JobLine {
     }
 }
 
-/// Reads the lines of `path`.
-///
-/// # Errors
-/// The file cannot be read, its name does not end in `.obj`, or it holds a `$` command.
-pub fn read_file(path: &Path) -> Result<Vec<JobLine>, Error> {
-    let name = path.display().to_string();
-    let extension = path.extension().unwrap_or_default().to_string_lossy();
-    let bytes = fs::read(path).map_err(|source| Error::File { file: name.clone(), source })?;
-    if !extension.eq_ignore_ascii_case("obj") {
-        return Err(Error::Extension { file: name });
-    }
-    lines(&name, &bytes)
+/// Lines to send, numbered from 0, made as they are asked for.
+pub trait Lines {
+    /// How many there are.
+    fn count(&self) -> usize;
+
+    /// Line number `index`; `None` past the last one.
+    fn line(&self, index: usize) -> Option<JobLine>;
 }
 
-fn lines(file: &str, bytes: &[u8]) -> Result<Vec<JobLine>, Error> {
-    let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
-    let mut lines = Vec::new();
-    for (index, line) in bytes.split(|&byte| byte == b'\n').enumerate() {
-        let text = String::from_utf8_lossy(line);
-        let content = text.split('#').next().unwrap_or_default().trim();
-        if content.is_empty() {
-            continue;
-        }
-        let origin =
-            Origin { file: file.to_owned(), line: index + 1, text: text.trim().to_owned() };
-        if content.starts_with('$') {
-            return Err(Error::CommandInFile { origin });
-        }
-        lines.push(JobLine { sent: sendable(content), origin: Some(origin) });
+impl<const COUNT: usize> Lines for [JobLine; COUNT] {
+    fn count(&self) -> usize {
+        COUNT
     }
-    Ok(lines)
+
+    fn line(&self, index: usize) -> Option<JobLine> {
+        self.get(index).cloned()
+    }
+}
+
+impl Lines for Vec<JobLine> {
+    fn count(&self) -> usize {
+        self.len()
+    }
+
+    fn line(&self, index: usize) -> Option<JobLine> {
+        self.get(index).cloned()
+    }
+}
+
+/// The largest file that is read, in bytes. At 11 kB/s it would take days to send.
+const SIZE_LIMIT: u64 = 1 << 32;
+
+/// After how many lines the next place is kept from which lines can be made again. Fewer would make
+/// lines quicker, and take more memory: 12 bytes for each place.
+const PLACE_EVERY: usize = 16;
+
+/// A file whose every line has been checked.
+#[derive(Debug)]
+pub struct SourceFile {
+    /// As the user named it.
+    name: String,
+    bytes: Vec<u8>,
+    /// The place of every line whose number is a multiple of [`PLACE_EVERY`].
+    places: Vec<Place>,
+    count: usize,
+}
+
+/// Where a reader stands in the bytes of a file.
+#[derive(Debug, Clone, Copy, Default)]
+struct Place {
+    /// Bytes before it, below [`SIZE_LIMIT`].
+    at: u32,
+    /// Ends of lines before it.
+    line: u32,
+    /// Whether it stands inside a polyline of which an earlier part was sent: before the vertex that
+    /// both parts share.
+    in_polyline: bool,
+}
+
+impl SourceFile {
+    /// Reads the file at `path` and checks its lines.
+    ///
+    /// # Errors
+    /// The file cannot be read, its name does not end in `.obj`, or it holds what no plotter takes.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let name = path.display().to_string();
+        let unreadable = |source| Error::File { file: name.clone(), source };
+        let file = File::open(path).map_err(unreadable)?;
+        let about = file.metadata().map_err(unreadable)?;
+        if about.is_dir() {
+            return Err(unreadable(io::ErrorKind::IsADirectory.into()));
+        }
+        let extension = path.extension().unwrap_or_default().to_string_lossy();
+        if !extension.eq_ignore_ascii_case("obj") {
+            return Err(Error::Extension { file: name });
+        }
+        let mut bytes = Vec::new();
+        if about.len() < SIZE_LIMIT {
+            // One more byte, lest the buffer grows only to find the end of the file.
+            bytes.reserve_exact(about.len() as usize + 1);
+        }
+        file.take(SIZE_LIMIT).read_to_end(&mut bytes).map_err(unreadable)?;
+        Self::new(name, bytes)
+    }
+
+    fn new(name: String, bytes: Vec<u8>) -> Result<Self, Error> {
+        if bytes.len() as u64 >= SIZE_LIMIT {
+            return Err(Error::FileTooLarge { file: name });
+        }
+        if bytes.starts_with(b"\xFF\xFE") || bytes.starts_with(b"\xFE\xFF") {
+            return Err(Error::Utf16 { file: name });
+        }
+        let mut file = Self { name, bytes, places: Vec::new(), count: 0 };
+        let mut place = Place::default();
+        if file.bytes.starts_with(b"\xEF\xBB\xBF") {
+            place.at = 3;
+        }
+        let mut content = String::new();
+        loop {
+            let mut next = place;
+            match next.read(&file.bytes, &mut content) {
+                Ok(None) => return Ok(file),
+                Ok(Some(from)) => {
+                    if file.count.is_multiple_of(PLACE_EVERY) {
+                        file.places.push(from);
+                    }
+                    file.count += 1;
+                }
+                Err((from, fault)) => return Err(file.refused(from, fault)),
+            }
+            place = next;
+        }
+    }
+
+    fn refused(&self, place: Place, fault: LineFault) -> Error {
+        let origin = self.origin(place);
+        match fault {
+            LineFault::TooLong { length } => {
+                Error::LineTooLong { origin, length, limit: LINE_LIMIT }
+            }
+            LineFault::Command => Error::CommandInFile { origin },
+            LineFault::NotText => Error::NotText { origin },
+            LineFault::Refused(refusal) => Error::BadLine { origin, refusal },
+        }
+    }
+
+    /// The line of the file in which `place` is.
+    fn origin(&self, place: Place) -> Origin {
+        let at = place.at as usize;
+        let before = self.bytes.get(..at).unwrap_or_default();
+        let begin = before.iter().rposition(|byte| is_line_end(*byte)).map_or(0, |end| end + 1);
+        let line = self.bytes.get(begin..).unwrap_or_default();
+        let line = line.split(|byte| is_line_end(*byte)).next().unwrap_or_default();
+        // No character is longer than four bytes, and none is shown in part.
+        let shown = line.get(..4 * (Origin::MOST_SHOWN + 1)).map_or(line, |head| {
+            let whole = std::str::from_utf8(head).map_err(|error| error.valid_up_to());
+            whole.map_or_else(
+                |end| &head[..if end + 4 > head.len() { end } else { head.len() }],
+                str::as_bytes,
+            )
+        });
+        let text = decoded(shown.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(shown));
+        let text = text.trim().to_owned();
+        Origin { file: self.name.clone(), line: place.line as usize + 1, text }
+    }
+}
+
+impl Lines for SourceFile {
+    fn count(&self) -> usize {
+        self.count
+    }
+
+    fn line(&self, index: usize) -> Option<JobLine> {
+        let mut place = *self.places.get(index / PLACE_EVERY)?;
+        let mut content = String::new();
+        let mut from = place;
+        for _ in 0..=index % PLACE_EVERY {
+            // Every line was read once without a fault.
+            from = place.read(&self.bytes, &mut content).ok()??;
+        }
+        Some(JobLine { sent: content, origin: Some(self.origin(from)) })
+    }
+}
+
+/// What is wrong with a line.
+enum LineFault {
+    TooLong { length: usize },
+    Command,
+    NotText,
+    Refused(Refusal),
+}
+
+fn is_line_end(byte: u8) -> bool {
+    matches!(byte, b'\n' | b'\r')
+}
+
+fn is_space(byte: u8) -> bool {
+    matches!(byte, b' ' | b'\t' | 0x0B | 0x0C)
+}
+
+/// As UTF-8, or what is not as Latin-1: names that differ stay different.
+fn decoded(bytes: &[u8]) -> Cow<'_, str> {
+    match std::str::from_utf8(bytes) {
+        Ok(text) => Cow::Borrowed(text),
+        Err(_) => bytes.iter().map(|byte| char::from(*byte)).collect(),
+    }
 }
 
 /// A `!` in a name would hold the machine; a name only tells pens apart, so another letter serves.
-fn sendable(content: &str) -> String {
-    let letter = |letter| if acts_at_once(letter) { '_' } else { letter };
-    content.chars().map(letter).collect()
+fn sendable(letter: char) -> char {
+    if acts_at_once(letter) { '_' } else { letter }
+}
+
+impl Place {
+    /// Puts the next line to send into `content` and stands behind it; gives where that line begins,
+    /// or `None` at the end of the file.
+    ///
+    /// # Errors
+    /// What is wrong with the line, and where it is.
+    fn read(
+        &mut self,
+        bytes: &[u8],
+        content: &mut String,
+    ) -> Result<Option<Self>, (Self, LineFault)> {
+        while (self.at as usize) < bytes.len() {
+            let from = *self;
+            match self.read_line(bytes, content) {
+                Ok(true) => return Ok(Some(from)),
+                Ok(false) => {}
+                Err(fault) => return Err((from, fault)),
+            }
+        }
+        Ok(None)
+    }
+
+    /// Reads one line, its words with single spaces between them; `true` if it is to be sent.
+    fn read_line(&mut self, bytes: &[u8], content: &mut String) -> Result<bool, LineFault> {
+        content.clear();
+        if self.in_polyline {
+            content.push('l');
+        }
+        let mut words = Words { bytes, at: self.at as usize, line: self.line };
+        let mut vertices = 0;
+        // Where the last word of `content` begins, should it be the last that fits.
+        let mut last = *self;
+        while let Some(word) = words.next() {
+            // A word that is too long is not decoded: it may be as long as the file.
+            let head = &word[..word.len().min(LINE_LIMIT + 1)];
+            if head.contains(&0) {
+                return Err(LineFault::NotText);
+            }
+            let before = content.len();
+            if before > 0 {
+                content.push(' ');
+                vertices += 1;
+            }
+            content.extend(decoded(head).chars().map(sendable));
+            if content.len() > LINE_LIMIT {
+                content.truncate(before);
+                if before > 0 && Command::parse(content) == Ok(Command::Nothing) {
+                    break;
+                }
+                if !content.starts_with("l ") || vertices < 3 {
+                    // What is no UTF-8 becomes longer.
+                    let length = self.line_length(bytes).max(LINE_LIMIT + 1);
+                    return Err(LineFault::TooLong { length });
+                }
+                *self = Self { in_polyline: true, ..last };
+                return judged(content);
+            }
+            // Both are below the size of the file.
+            last.at = (words.at - word.len()) as u32;
+            last.line = words.line;
+        }
+        words.end_line();
+        *self = Self { at: words.at as u32, line: words.line, in_polyline: false };
+        judged(content)
+    }
+
+    /// From here to the end of the line, in bytes.
+    fn line_length(&self, bytes: &[u8]) -> usize {
+        let rest = bytes.get(self.at as usize..).unwrap_or_default();
+        rest.iter().position(|byte| is_line_end(*byte)).unwrap_or(rest.len())
+    }
+}
+
+/// What the plotter's own parser says of a line: `true` if it is to be sent.
+fn judged(content: &str) -> Result<bool, LineFault> {
+    match Command::parse(content) {
+        Ok(Command::Nothing) => Ok(false),
+        Ok(
+            Command::Vertex(_)
+            | Command::Face(_)
+            | Command::Polyline(_)
+            | Command::Degree(_)
+            | Command::Curve { .. }
+            | Command::Knots(_)
+            | Command::EndCurve
+            | Command::Pen { .. },
+        ) => Ok(true),
+        Err(_) if content.starts_with('$') => Err(LineFault::Command),
+        // Any other would act on the machine, as G-code does.
+        Ok(_) | Err(Refusal::UnsupportedWord(_)) => Err(LineFault::Command),
+        Err(refusal) => Err(LineFault::Refused(refusal)),
+    }
+}
+
+/// The words of a line, up to a comment or its end.
+struct Words<'a> {
+    bytes: &'a [u8],
+    at: usize,
+    /// Ends of lines before it.
+    line: u32,
+}
+
+impl<'a> Words<'a> {
+    fn next(&mut self) -> Option<&'a [u8]> {
+        self.skip_space();
+        let rest = self.bytes.get(self.at..)?;
+        let mut length = 0;
+        while let Some(&byte) = rest.get(length)
+            && !is_space(byte)
+            && !is_line_end(byte)
+            && byte != b'#'
+            && !(length > 0 && rest[length - 1].is_ascii_digit() && goes_on(&rest[length..]))
+        {
+            length += 1;
+        }
+        self.at += length;
+        rest.get(..length).filter(|word| !word.is_empty())
+    }
+
+    fn skip_space(&mut self) {
+        while let Some(rest) = self.bytes.get(self.at..)
+            && let Some(&byte) = rest.first()
+        {
+            if is_space(byte) {
+                self.at += 1;
+            } else if goes_on(rest) {
+                self.at += 1;
+                self.pass_line_end();
+            } else {
+                return;
+            }
+        }
+    }
+
+    /// Stands behind the end of this line.
+    fn end_line(&mut self) {
+        let rest = self.bytes.get(self.at..).unwrap_or_default();
+        self.at += rest.iter().position(|byte| is_line_end(*byte)).unwrap_or(rest.len());
+        self.pass_line_end();
+    }
+
+    fn pass_line_end(&mut self) {
+        match self.bytes.get(self.at..).unwrap_or_default() {
+            [b'\r', b'\n', ..] => self.at += 2,
+            [_, ..] => self.at += 1,
+            [] => return,
+        }
+        self.line += 1;
+    }
+}
+
+/// Whether `rest` begins with a backslash that joins this line and the next.
+///
+/// It does after a space or a number only: a Windows path may end in one.
+fn goes_on(rest: &[u8]) -> bool {
+    matches!(rest, [b'\\'] | [b'\\', b'\n' | b'\r', ..])
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn sent(bytes: &[u8]) -> Vec<(usize, String)> {
-        let lines = lines("f.obj", bytes).expect("a file that can be sent");
-        lines
-            .into_iter()
-            .map(|line| (line.origin.expect("from the file").line, line.sent))
-            .collect()
-    }
-
-    #[test]
-    fn blank_lines_and_comments_stay_at_home_and_numbers_count_them() {
-        assert_eq!(
-            sent(b"\xEF\xBB\xBF# cube\r\n\r\nv 0 0 0\r\n  # again\n\tf 1 2 3  # mine\n"),
-            [(3, "v 0 0 0".into()), (5, "f 1 2 3".into())]
-        );
-        assert_eq!(sent("o Würfel".as_bytes()), [(1, "o Würfel".into())]);
-        assert_eq!(sent(b""), []);
-        assert_eq!(sent(b"v 1 2 3"), [(1, "v 1 2 3".into())]);
-    }
-
-    #[test]
-    fn no_byte_of_a_file_acts_at_once() {
-        let other = |byte: &u8| !matches!(byte, b'\n' | b'#');
-        let all: Vec<u8> = (0..=255).filter(other).collect();
-        let lines = sent(&[b"o ".as_slice(), &all, b" end"].concat());
-        let [(1, sent)] = lines.as_slice() else {
-            panic!("one line expected: {lines:?}");
-        };
-        assert!(!sent.chars().any(acts_at_once), "{sent}");
-        assert!(sent.starts_with("o _") && sent.ends_with(" end"), "{sent}");
-    }
-
-    #[test]
-    fn a_command_in_a_file_is_refused() {
-        let error = lines("f.obj", b"v 0 0 0\n  $plot\n").expect_err("refused");
-        assert!(error.to_string().starts_with("f.obj:2: "), "{error}");
-    }
-
-    #[test]
-    fn a_line_is_shown_without_what_acts_on_a_terminal() {
-        let shown = |bytes: &[u8]| {
-            let lines = lines("f.obj", bytes).expect("a file that can be sent");
-            lines[0].origin.as_ref().expect("from the file").shown()
-        };
-        assert_eq!(shown(b"f \x1b[2J\x07 Z\xff\n"), "f ·[2J· Z·");
-        let long = shown("ü".repeat(101).as_bytes());
-        assert_eq!((long.chars().count(), long.chars().last()), (101, Some('…')));
-    }
-}
+mod tests;

@@ -74,6 +74,40 @@ fn a_missing_file_a_stranger_and_a_bad_option_are_explained() {
 }
 
 #[test]
+fn a_hopeless_line_is_named_before_anything_is_sent() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let long = format!("v 0 0 0\nf {}\n", "1 ".repeat(50_000_000));
+    fs::write(folder.path().join("long.obj"), long).expect("written");
+    fs::write(folder.path().join("machine.obj"), "v 0 0 0\nG1 X10\n").expect("written");
+    fs::write(folder.path().join("binary.obj"), b"v 0 0 0\nv \0\x01\0\n").expect("written");
+    for (file, reason) in [
+        ("long.obj:2", "the line has 100000002 bytes, and a line may have at most 256"),
+        ("machine.obj:2", "a file cannot hold commands for the plotter"),
+        ("binary.obj:2", "this is no text"),
+    ] {
+        let name = file.split(':').next().unwrap_or_default();
+        // There is no such port: the file comes first.
+        let (code, _, stderr) = penup(folder.path(), &["plot", name, "--port", "no-such-port"]);
+        assert_eq!(code, Some(1));
+        assert!(stderr.starts_with(&format!("penup: {file}: {reason}")), "{stderr}");
+    }
+}
+
+/// The limit, 200 MB, is that of the whole program with its threads and libraries.
+#[cfg(target_os = "linux")]
+#[test]
+fn memory_grows_with_the_file_and_little_faster() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let text = format!("{}v 0 0\n", "v 0 0 0\n".repeat(2_000_000));
+    fs::write(folder.path().join("many.obj"), text).expect("written");
+    let program = env!("CARGO_BIN_EXE_penup");
+    let line = format!("ulimit -v 200000; exec {program} preview many.obj");
+    let run = Command::new("sh").args(["-c", &line]).current_dir(folder.path()).output();
+    let said = String::from_utf8(run.expect("a shell").stderr).expect("text");
+    assert!(said.starts_with("penup: many.obj:2000001: it takes 3 numbers"), "{said}");
+}
+
+#[test]
 fn a_port_that_is_not_there_is_explained() {
     let folder = tempfile::tempdir().expect("a folder");
     fs::write(folder.path().join("a.obj"), "v 0 0 0\n").expect("written");
