@@ -166,19 +166,38 @@ mod tests {
 
     #[test]
     fn pieces_are_as_near_to_the_wish_as_an_odd_number_allows() {
-        for moves in 1..300 {
-            for dot in 1..20 {
+        for moves in 1..300_u32 {
+            for dot in 1..20_u32 {
                 let pattern = Pattern::new(moves, dot);
-                assert_eq!(pattern.pieces() % 2, 1);
-                assert_eq!(pattern.end_of(pattern.pieces() - 1), moves);
+                // How far the line would be from its length if each piece had the wished length.
+                let error = |pieces: u32| (pieces * dot).abs_diff(moves);
+                let least = (1..=moves).step_by(2).map(error).min();
+                let pieces = pattern.pieces();
+                assert_eq!((pieces % 2, Some(error(pieces))), (1, least), "{moves} of {dot}");
                 let mut start = 0;
-                for piece in 0..pattern.pieces() {
+                for piece in 0..pieces {
                     let end = pattern.end_of(piece);
-                    assert!(end > start);
+                    assert!(end > start, "{moves} of {dot}");
+                    // The nearest move to the place where equal pieces would end.
+                    let error = (end * pieces).abs_diff((piece + 1) * moves);
+                    assert!(2 * error < pieces, "{moves} of {dot}");
                     start = end;
                 }
+                assert_eq!(start, moves);
             }
+            assert_eq!(Pattern::new(moves, 0), Pattern::new(moves, 1));
         }
         assert_eq!(Pattern::new(0, 5).pieces(), 1);
+    }
+
+    #[test]
+    fn a_dash_is_three_dots_long() {
+        let lengths = |line_type| {
+            let pattern = Pattern::of(line_type, 45, 3);
+            (pattern.pieces(), pattern.end_of(0))
+        };
+        assert_eq!(lengths(LineType::Full), (1, 45));
+        assert_eq!(lengths(LineType::Dotted), (15, 3));
+        assert_eq!(lengths(LineType::Dashed), (5, 9));
     }
 }
