@@ -169,6 +169,14 @@ pub fn any_points(dice: &mut Dice) -> Vec<Point> {
     (0..dice.throw(1, 14)).map(|_| [0, 1, 2].map(|_| dice.throw(-reach, reach))).collect()
 }
 
+/// How many random solids a test compares: 4,000, or as many as `PENUP_SOLIDS` says.
+pub fn solid_count() -> u32 {
+    match std::env::var("PENUP_SOLIDS") {
+        Ok(count) => count.parse().expect("PENUP_SOLIDS is a whole number"),
+        Err(_) => 4000,
+    }
+}
+
 /// A solid of any kind in any order, now and then with corners repeated, now and then as large as can be.
 pub fn any_solid(dice: &mut Dice) -> Vec<Point> {
     let kinds = [on_sphere, cuboid, prism, pyramid, octahedron, cut_cube, roof, any_points];

@@ -1,4 +1,7 @@
 //! Convex solids from vertices alone, against every plane through three vertices.
+//!
+//! `PENUP_SOLIDS` sets how many random solids there are; 4,000 if it is not set.
+
 #![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on stops")]
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -11,7 +14,7 @@ use penup::model::Corner;
 use penup::stage::{Aborted, Attention, Scratch, Undisturbed};
 use penup_host_tests::convex_model::{Found, Model, Point, Solid, model};
 use penup_host_tests::convex_solids::{
-    Dice, any_eye, any_rotation, any_solid, as_decimals, read_scene,
+    Dice, any_eye, any_rotation, any_solid, as_decimals, read_scene, solid_count,
 };
 
 fn found(points: &[Point], eye: Eye, tolerance: u32) -> Result<(SolidSummary, Found), SolidError> {
@@ -60,7 +63,7 @@ fn compare(points: &[Point], eye: Eye) -> &'static str {
 fn random_solids_are_found_exactly() {
     let mut dice = Dice::new(1971);
     let mut cases: BTreeMap<&str, usize> = BTreeMap::new();
-    for _ in 0..4000 {
+    for _ in 0..solid_count() {
         let points = any_solid(&mut dice);
         let eye = any_eye(&mut dice, &points);
         *cases.entry(compare(&points, eye)).or_default() += 1;
@@ -69,18 +72,6 @@ fn random_solids_are_found_exactly() {
         [("solid", 1000), ("edge-on", 500), ("eye inside", 50), ("not convex", 50), ("flat", 5)]
     {
         assert!(cases.get(case) >= Some(&least), "too few cases of {case}: {cases:?}");
-    }
-}
-
-#[test]
-#[ignore = "minutes long: run by hand after a change"]
-fn many_more_random_solids_are_found_exactly() {
-    for seed in 0..100 {
-        let mut dice = Dice::new(seed);
-        for _ in 0..4000 {
-            let points = any_solid(&mut dice);
-            compare(&points, any_eye(&mut dice, &points));
-        }
     }
 }
 

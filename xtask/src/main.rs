@@ -73,6 +73,12 @@ enum Task {
         #[arg(default_value_t = 20_000)]
         count: u32,
     },
+    /// Compares many random convex solids, from vertices and from edges, with an exact model.
+    Solids {
+        /// How many solids of each kind (some minutes for 100,000).
+        #[arg(default_value_t = 100_000)]
+        count: u32,
+    },
     /// Lets the emulated Pico draw 343 cubes, and compares every step with the host's (some minutes).
     Lattice7,
     /// Cuts the emulated Pico's power at many instants, and in as many writes of its flash.
@@ -117,6 +123,7 @@ fn carry_out() -> Result<()> {
         Some(Task::Gallery) => gallery::make()?,
         Some(Task::Experiments) => experiments::repeat()?,
         Some(Task::Scenes { count }) => test::random_scenes(count)?,
+        Some(Task::Solids { count }) => test::random_solids(count)?,
         Some(Task::Cuts { count }) => test::power_cuts(count)?,
         Some(Task::Lattice7) => test::lattice7()?,
         Some(Task::SetUp) => {

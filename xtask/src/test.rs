@@ -53,6 +53,17 @@ pub fn random_scenes(count: u32) -> Result<()> {
     )
 }
 
+/// As many random convex solids of each kind as wanted, where `everything` has 4,000.
+pub fn random_solids(count: u32) -> Result<()> {
+    step(
+        workspace("test")
+            .args(["--release", "--package", "penup-host-tests"])
+            .args(["--test", "convex_from_vertices", "--test", "convex_from_edges"])
+            .arg("random_solids_are")
+            .env("PENUP_SOLIDS", count.to_string()),
+    )
+}
+
 /// As many losses of power as wanted, where `everything` has 200 of each kind; from 4864 on, before every byte of
 /// flash that a save changes.
 pub fn power_cuts(count: u32) -> Result<()> {
