@@ -1,7 +1,8 @@
 //! The numbered settings: names, units, ranges.
 //!
-//! Numbers up to 132 mean what they mean in Grbl 1.1; those from 200 on are penup's own. A value is
-//! checked when it is entered, alone and together with the others; a refused value changes nothing.
+//! Numbers up to 132 mean what they mean in Grbl 1.1, but for 5, which is a mask here and covers the
+//! emergency stop too; those from 200 on are penup's own. A value is checked when it is entered,
+//! alone and together with the others; a refused value changes nothing.
 
 use super::{Anchors, Kinematics};
 use crate::drawing::{PAGE_LIMIT, PagePoint};
@@ -145,15 +146,18 @@ const fn info(
     (least, greatest, default): (f64, f64, f64),
     whole: bool,
 ) -> SettingInfo {
-    const UNIT: f64 = 65536.0;
+    // Rounded to nearest, as a sent value is; none is negative.
+    const fn value(number: f64) -> Value {
+        Value::from_bits((number * 65536.0 + 0.5) as i32)
+    }
     SettingInfo {
         setting,
         number,
         name,
         unit,
-        least: Value::from_bits((least * UNIT) as i32),
-        greatest: Value::from_bits((greatest * UNIT) as i32),
-        default: Value::from_bits((default * UNIT) as i32),
+        least: value(least),
+        greatest: value(greatest),
+        default: value(default),
         whole,
     }
 }

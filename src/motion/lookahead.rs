@@ -5,9 +5,9 @@ use crate::drawing::LineType;
 
 /// A straight move that waits: 24 bytes.
 ///
-/// A small board lends 100 to 128 of them (2.4 to 3 KiB): at 50 mm/s and 200 mm/s² the stopping
-/// distance is 6.25 mm, which is 125 blocks of 0.05 mm. With fewer blocks the machine is slower on
-/// such paths, never wrong.
+/// The LM3S6965 lends 32 of them and the Pico 192 (`src/plotter/memory.rs`). At 50 mm/s and
+/// 200 mm/s² the stopping distance is 6.25 mm, which is 125 blocks of 0.05 mm. With fewer blocks the
+/// machine is slower on such paths, never wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Block {
     pub(super) dx: i32,

@@ -50,7 +50,8 @@ pub trait Board {
 pub enum Record {
     /// The settings of the machine.
     Settings,
-    /// The model and the options of the last job.
+    /// The strokes of the last job in the order in which they are drawn, and the steps per millimetre
+    /// that they are counted in. Neither the model nor the options are kept.
     Job,
 }
 

@@ -44,9 +44,9 @@ pub enum Command<'a> {
     BuildInfo,
     /// `$$`
     Settings,
-    /// `$name=value` or `$number=value` for a setting of the machine.
+    /// `$number=value` for a setting of the machine, or a name that no option has.
     Setting {
-        /// Name or number.
+        /// What stands before the equals sign; only a setting's number is accepted later.
         name: &'a str,
         /// What it shall be.
         value: &'a str,
@@ -85,11 +85,11 @@ pub enum Command<'a> {
     GCode(GCode<'a>),
 }
 
-/// The `$` commands and what each does, as `$` lists them.
+/// The `$` commands, options and words of G-code, and what each does, as `$` lists them.
 pub const HELP: &[(&str, &str)] = &[
     ("$", "this list"),
     ("$I", "version, board and limits"),
-    ("$$", "settings of the machine; $NAME=VALUE changes one"),
+    ("$$", "settings of the machine; $NUMBER=VALUE changes one"),
     ("$options", "what is drawn and how, as it stands"),
     ("$eye=X,Y,Z", "where you look from"),
     ("$at=X,Y,Z", "what you look at"),

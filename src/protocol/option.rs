@@ -25,7 +25,7 @@ pub enum PlotOption {
     ClipBehind(bool),
     /// `$see=faces|wire|vertices|edges`
     See(WayToSee),
-    /// `$hidden=erased|dotted|dashed|shown`
+    /// `$hidden=erased|dotted|dashed|shown|pen|pen,NUMBER`
     Hidden(HiddenLines),
     /// `$seams=on|off`: where faces pass through each other.
     Seams(bool),

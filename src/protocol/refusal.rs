@@ -6,6 +6,7 @@ use crate::drawing::PageError;
 use crate::fixed::{BinaryFraction, Length, Millimetres};
 use crate::machine::{MachineError, SettingError, Value};
 use crate::model::{ModelError, PEN_LIMIT, Part};
+use crate::order::Leg;
 use crate::stage::OutOfScratch;
 use crate::step::ArcError;
 use crate::view::ViewError;
@@ -23,7 +24,7 @@ pub enum Refusal {
     NotANumber,
     /// No `$` command has this name.
     UnknownSystemCommand,
-    /// `$H` without limit switches.
+    /// `$H` while homing is switched off (`$22=0`).
     HomingOff,
     /// The command needs an idle plotter.
     Busy,
@@ -234,7 +235,7 @@ impl fmt::Display for Refusal {
                 write!(formatter, "this word {} is not known here", char::from(*letter))
             }
             Self::Arc(_) => formatter.write_str(
-                "both ends of an arc are as far from its centre, within 4 m; x and y have the same steps",
+                "both ends of an arc lie equally far from its centre, at most 4194304 steps: check I and J, or R",
             ),
             Self::Busy => formatter.write_str("wait for the plot to end, or send ctrl-X"),
             Self::Locked => formatter.write_str("release the stop if it is pressed, then send $X to unlock"),
@@ -310,9 +311,11 @@ impl fmt::Display for Refusal {
             Self::DrawingTooLarge(missing) => write_missing(formatter, missing),
             Self::Setting(error) => write_setting_error(formatter, error),
             Self::Machine(error) => write_machine_error(formatter, error),
-            Self::TooManyLines => {
-                formatter.write_str("a drawing has at most 32768 lines: send a smaller model")
-            }
+            Self::TooManyLines => write!(
+                formatter,
+                "a drawing has at most {} lines: send a smaller model",
+                Leg::LIMIT
+            ),
             Self::NothingToUndo => {
                 formatter.write_str("only the last change can be taken back, and not after a plot")
             }

@@ -1,0 +1,168 @@
+//! The tables of the documents, read as Markdown, against the tables of the source.
+//!
+//! A row that is missing, out of date or too many is told with the row to write in its place.
+
+#![allow(clippy::expect_used, reason = "a test that cannot go on stops")]
+
+use penup::fixed::Length;
+use penup::machine::SETTINGS;
+use penup::protocol::{HELP, MEANINGS};
+use pulldown_cmark::{Event, Options, Parser, Tag, TagEnd};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+/// A table of a document: its heading, then its rows, each a list of cells in plain text.
+type Table = Vec<Vec<String>>;
+
+/// All tables of a document, with the place of each row in its text.
+fn tables_of(text: &str) -> Vec<(Table, Vec<Range<usize>>)> {
+    let mut tables: Vec<(Table, Vec<Range<usize>>)> = Vec::new();
+    for (event, place) in Parser::new_ext(text, Options::ENABLE_TABLES).into_offset_iter() {
+        let Event::Start(Tag::Table(_)) = event else {
+            let Some((rows, places)) = tables.last_mut() else { continue };
+            match event {
+                Event::Start(Tag::TableHead | Tag::TableRow) => {
+                    rows.push(Vec::new());
+                    places.push(place);
+                }
+                Event::Start(Tag::TableCell) => {
+                    rows.last_mut().expect("a row before its cells").push(String::new());
+                }
+                Event::Text(part) => push_text(rows, &part),
+                // Code keeps its marks: a reader tells `$` from a dollar.
+                Event::Code(part) => push_text(rows, &format!("`{part}`")),
+                // Text behind the table is none of its last cell.
+                Event::End(TagEnd::Table) => rows.push(Vec::new()),
+                _ => {}
+            }
+            continue;
+        };
+        tables.push((Table::new(), Vec::new()));
+    }
+    for (rows, _) in &mut tables {
+        rows.pop();
+    }
+    tables
+}
+
+fn push_text(rows: &mut Table, text: &str) {
+    if let Some(cell) = rows.last_mut().and_then(|row| row.last_mut()) {
+        cell.push_str(text);
+    }
+}
+
+/// One row, as it is to be written.
+fn written(cells: &[String]) -> String {
+    let cells: Vec<String> = cells.iter().map(|cell| cell.replace('|', "\\|")).collect();
+    format!("| {} |", cells.join(" | "))
+}
+
+fn protocol() -> String {
+    std::fs::read_to_string(root().join("docs/protocol.md")).expect("docs/protocol.md")
+}
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the workspace").to_owned()
+}
+
+/// Compares a table of `docs/protocol.md`, found by its heading, with the rows that it is to have.
+fn assert_table(heading: &[&str], rows: &[Vec<String>]) {
+    let text = protocol();
+    let tables = tables_of(&text);
+    let found = tables.iter().find(|(table, _)| table.first().is_some_and(|row| row == heading));
+    let (found, _) = found.unwrap_or_else(|| {
+        panic!("docs/protocol.md has no table with the heading | {} |", heading.join(" | "))
+    });
+    let found = &found[1..];
+    let mut faults = String::new();
+    for row in rows.iter().filter(|row| !found.contains(row)) {
+        faults += &format!("write this row: {}\n", written(row));
+    }
+    for row in found.iter().filter(|row| !rows.contains(row)) {
+        faults += &format!("take this row out: {}\n", written(row));
+    }
+    assert!(faults.is_empty(), "the table of docs/protocol.md is not the source's:\n{faults}");
+    assert_eq!(found, rows, "the rows of docs/protocol.md stand in another order");
+}
+
+#[test]
+fn the_settings_are_those_of_the_source() {
+    let rows: Vec<Vec<String>> = SETTINGS
+        .iter()
+        .map(|info| {
+            let [least, greatest, default] =
+                [info.least, info.greatest, info.default].map(|value| Length(value).to_string());
+            let number = info.number.to_string();
+            vec![number, info.name.into(), info.unit.into(), least, greatest, default]
+        })
+        .collect();
+    assert_table(&["number", "name", "unit", "least", "greatest", "default"], &rows);
+}
+
+#[test]
+fn the_errors_are_those_of_the_source() {
+    let row = |(number, meaning): &(u16, &str)| vec![number.to_string(), (*meaning).into()];
+    let rows: Vec<Vec<String>> = MEANINGS.iter().map(row).collect();
+    assert_table(&["number", "meaning"], &rows);
+}
+
+#[test]
+fn the_commands_and_options_are_those_of_the_source() {
+    let row = |(usage, meaning): &(&str, &str)| vec![format!("`{usage}`"), (*meaning).into()];
+    let rows: Vec<Vec<String>> = HELP.iter().map(row).collect();
+    assert_table(&["command", "what it does"], &rows);
+}
+
+/// How many cells a row has been written with: a reader drops those that are too many.
+fn cells_written(row: &str) -> usize {
+    let row = row.trim().trim_start_matches('|');
+    let bars = row.match_indices('|').filter(|(at, _)| !row[..*at].ends_with('\\')).count();
+    if row.ends_with('|') && !row.ends_with("\\|") { bars } else { bars + 1 }
+}
+
+#[test]
+fn every_row_of_every_document_has_as_many_cells_as_its_heading() {
+    let mut documents = vec![root().join("README.md"), root().join("CHANGELOG.md")];
+    for folder in ["docs", "docs/gallery"] {
+        let files = std::fs::read_dir(root().join(folder)).expect("a folder of documents");
+        let files = files.map(|file| file.expect("a file").path());
+        documents.extend(files.filter(|file| file.extension().is_some_and(|end| end == "md")));
+    }
+    for document in documents {
+        let text = std::fs::read_to_string(&document).expect("a document");
+        for (table, places) in tables_of(&text) {
+            let columns = table.first().map_or(0, Vec::len);
+            for place in places {
+                let row = &text[place];
+                assert_eq!(cells_written(row), columns, "{}: {row}", document.display());
+            }
+        }
+    }
+}
+
+#[test]
+fn a_bar_that_is_not_escaped_shifts_the_cells_and_is_found() {
+    let heading = "| unit | least | default |\n|---|---|---|\n";
+    let cells = |row: &str| {
+        let text = format!("{heading}{row}\n\nText.");
+        let (table, places) = tables_of(&text).remove(0);
+        (table[1].clone(), cells_written(&text[places[1].clone()]))
+    };
+    let own = |cells: [&str; 3]| cells.map(String::from).to_vec();
+    assert_eq!(cells("| 0|1 | 0 | 1 |"), (own(["0", "1", "0"]), 4));
+    assert_eq!(cells("| 0\\|1 | 0 | `a\\|b` |"), (own(["0|1", "0", "`a|b`"]), 3));
+    assert_eq!(cells("| 0 | 1 |"), (own(["0", "1", ""]), 2));
+}
+
+#[test]
+fn the_licences_that_are_declared_have_their_texts() {
+    let read = |name: &str| std::fs::read_to_string(root().join(name)).expect(name);
+    let readme = read("README.md");
+    assert!(read("Cargo.toml").contains("license = \"MIT OR Apache-2.0\""));
+    for (name, words) in
+        [("LICENSE-MIT", "the penup contributors"), ("LICENSE-APACHE", "Version 2.0, January 2004")]
+    {
+        assert!(read(name).contains(words), "{name}");
+        assert!(readme.contains(&format!("]({name})")), "README.md does not lead to {name}");
+    }
+}
