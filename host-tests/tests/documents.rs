@@ -2,7 +2,7 @@
 //!
 //! A row that is missing, out of date or too many is told with the row to write in its place.
 
-#![allow(clippy::expect_used, reason = "a test that cannot go on stops")]
+#![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on stops")]
 
 use penup::fixed::Length;
 use penup::machine::SETTINGS;
