@@ -34,6 +34,10 @@ fn main() -> io::Result<()> {
         if board != "mps2" {
             println!("cargo::rustc-link-arg-bin={binary}=-Tdefmt.x");
         }
+        if board != "pico" {
+            // Functions with the same instructions are stored once: flash is short.
+            println!("cargo::rustc-link-arg-bin={binary}=--icf=all");
+        }
     }
     Ok(())
 }

@@ -2,7 +2,6 @@
 //! until ctrl-X resets.
 
 use core::fmt::{self, Write};
-use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use super::line;
@@ -27,10 +26,11 @@ pub const STACK_USED_UP: u32 = u32::MAX;
 /// A second fault while the first is reported ends the report. Read and written with interrupts off.
 static REPORTING: AtomicBool = AtomicBool::new(false);
 
-/// What a panic comes to.
-pub fn panic<F: Fault>(info: &PanicInfo) -> ! {
-    if make_safe::<F>(format_args!("{info}")) {
-        defmt::error!("{}", defmt::Display2Format(info));
+/// What a panic comes to. `cause` says where it came from: the `PanicInfo` itself, or less where
+/// the flash has no room for its text.
+pub fn panic<F: Fault>(cause: impl fmt::Display) -> ! {
+    if make_safe::<F>(format_args!("{cause}")) {
+        defmt::error!("{}", defmt::Display2Format(&cause));
     }
     wait_for_reset::<F>()
 }

@@ -4,6 +4,7 @@ use core::panic::PanicInfo;
 
 use cortex_m::peripheral::SCB;
 
+use super::callers::Callers;
 use super::registers::UART0;
 use super::{pins, steps};
 use crate::boards::fault::{self, Fault};
@@ -31,8 +32,8 @@ impl Fault for Lm3s6965 {
 }
 
 #[panic_handler]
-fn panic(info: &PanicInfo) -> ! {
-    fault::panic::<Lm3s6965>(info)
+fn panic(_: &PanicInfo) -> ! {
+    fault::panic::<Lm3s6965>(Callers::new(&raw const _stack_start as usize))
 }
 
 unsafe extern "C" {

@@ -15,6 +15,7 @@
 //!
 //! What is refused: to be taken twice.
 
+mod callers;
 mod clock;
 mod contacts;
 mod critical;

@@ -1,0 +1,64 @@
+//! Where a panic came from, told by addresses.
+//!
+//! The text of a panic costs some 19 KiB of flash: messages, file names, line numbers, and the code
+//! that passes them on. The compiler leaves all of that out if the panic handler does not read it.
+//! What remains is the chain of calls on the stack. To turn its addresses into functions and lines:
+//! `addr2line -f -i -e target/firmware/lm3s6965.elf ADDRESS …`.
+
+use core::{arch, fmt};
+
+/// How many calls are reported, from the innermost outwards.
+const MOST: usize = 12;
+
+/// What every function that calls another one pushes on entry, on this target, before it points
+/// register 7 at it.
+#[derive(Clone, Copy)]
+#[repr(C)]
+struct Frame {
+    /// The address of the caller's frame.
+    caller: usize,
+    /// Where the caller goes on, with bit 0 set.
+    return_address: usize,
+}
+
+/// The chain of calls that led to where it was made.
+#[derive(Clone, Copy)]
+pub struct Callers {
+    innermost: usize,
+    stack_start: usize,
+}
+
+impl Callers {
+    /// Those of the function that calls this one. The stack grows down from `stack_start`.
+    #[inline(always)] // So that register 7 is the caller's.
+    pub fn new(stack_start: usize) -> Self {
+        let innermost;
+        // SAFETY: it copies a register and touches nothing else.
+        unsafe {
+            arch::asm!("mov {}, r7", out(reg) innermost, options(nomem, nostack, preserves_flags));
+        }
+        Self { innermost, stack_start }
+    }
+}
+
+impl fmt::Display for Callers {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("panic, called from")?;
+        let mut at = self.innermost;
+        for _ in 0..MOST {
+            if !at.is_multiple_of(4) || at > self.stack_start - size_of::<Frame>() {
+                break;
+            }
+            // SAFETY: it lies on the stack, aligned: the first frame is the running function's, and each
+            // further one lies above the one before and below the stack's start. Nobody writes it now.
+            let frame = unsafe { *(at as *const Frame) };
+            // Within the instruction that called.
+            write!(formatter, " {:#x}", (frame.return_address & !1).wrapping_sub(2))?;
+            if frame.caller <= at {
+                break;
+            }
+            at = frame.caller;
+        }
+        Ok(())
+    }
+}
