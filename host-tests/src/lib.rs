@@ -20,4 +20,5 @@ pub mod cut_flash;
 pub mod heaviest_jobs;
 pub mod whole_jobs;
 pub mod emulated_jobs;
+pub mod spiral;
 pub mod step_edges;

@@ -4,6 +4,7 @@
 
 use penup_client::machines::Board::Pico;
 use penup_host_tests::emulated_jobs::begin;
+use penup_host_tests::spiral;
 use penup_host_tests::step_edges::{Edge, HALF_A_MILLION, assert_in_time, of_changes, planned};
 use penup_host_tests::whole_jobs::job_lines;
 use std::error::Error;
@@ -38,26 +39,6 @@ fn a_long_diagonal_at_half_a_million_steps_a_second_keeps_time() -> Result<(), B
     keeps_time("diagonal.obj", &HALF_A_MILLION, 300_000)
 }
 
-/// Chords of 0.05 mm, so many, of a spiral that begins with this radius, mm, and grows by a millimetre a turn.
-fn spiral(chords: u16, radius: f64, settings: &[&str]) -> Vec<String> {
-    let (mut angle, mut lines) = (0.0f64, Vec::new());
-    for _ in 0..=chords {
-        let radius = radius + angle / std::f64::consts::TAU;
-        let (x, y) = (20.0 + radius * angle.cos(), 20.0 + radius * angle.sin());
-        lines.push(format!("v {x:.4} {y:.4} 0"));
-        angle += 0.05 / radius;
-    }
-    for first in (1..=chords).step_by(10) {
-        let points = first..=(first + 10).min(chords + 1);
-        let points: Vec<_> = points.map(|point| point.to_string()).collect();
-        lines.push(format!("l {}", points.join(" ")));
-    }
-    let fast = ["$0=0.5", "$110=32767", "$111=32767", "$page=45x45", "$margin=1"];
-    lines.extend(fast.iter().chain(settings).map(|setting| (*setting).to_owned()));
-    lines.push("$plot".to_owned());
-    lines
-}
-
 /// The drawn events a second, without the tenths at the beginning and the end, where the speed changes.
 fn events_a_second(edges: &[Edge]) -> f64 {
     let mut rises: Vec<_> = edges.iter().filter(|edge| edge.1).map(|edge| edge.2).collect();
@@ -76,8 +57,7 @@ fn events_a_second(edges: &[Edge]) -> f64 {
 #[test]
 fn a_spiral_of_short_chords_at_half_a_million_steps_a_second_keeps_time()
 -> Result<(), Box<dyn Error>> {
-    let settings = ["$100=4000", "$101=4000", "$120=20000", "$121=20000", "$201=8460", "$202=8460"];
-    let lines = spiral(1200, 4.0, &settings);
+    let lines = spiral::at_half_a_million();
     let pins = at_the_pins(&lines)?;
     assert_in_time(&planned(Pico, &lines), &pins, 400_000, Duration::ZERO);
     let rate = events_a_second(&pins);
@@ -90,7 +70,7 @@ fn a_spiral_of_short_chords_at_half_a_million_steps_a_second_keeps_time()
 fn a_spiral_of_short_chords_at_the_greatest_speed_keeps_time() -> Result<(), Box<dyn Error>> {
     let settings =
         ["$100=1000", "$101=1000", "$120=32767", "$121=32767", "$201=32767", "$202=32767"];
-    let lines = spiral(1500, 12.0, &settings);
+    let lines = spiral::lines(1500, 12.0, &settings);
     let pins = at_the_pins(&lines)?;
     assert_in_time(&planned(Pico, &lines), &pins, 100_000, Duration::ZERO);
     let rate = events_a_second(&pins);

@@ -14,6 +14,15 @@
 //! | clock | SysTick, priority 2; stands still while the machine sleeps without a task |
 //!
 //! What is refused: to be taken twice.
+//!
+//! This board is for the emulator only: it is QEMU's machine `lm3s6965evb`, a Cortex-M3 whose pins
+//! can be watched. Do not flash the image on an EK-LM3S6965 board. Three things would go wrong there:
+//!
+//! - The log goes out by semihosting. Without a debugger each `bkpt` of it is a fault.
+//! - The chip's first revisions need their LDO at 2.75 V before the PLL runs (erratum of the PLL);
+//!   the image leaves it at 2.5 V.
+//! - PC6, here the emergency stop, switches the 15 V supply of the board's OLED display on, and PA2 to
+//!   PA5 and PC7 belong to that display too.
 
 mod callers;
 mod clock;
