@@ -1,5 +1,6 @@
 //! The command line.
 
+use crate::fit::{FitError, TOLERANCES};
 use crate::job::{Page, Settings};
 use crate::machines::Board;
 use crate::protocol::TITLE;
@@ -132,7 +133,7 @@ pub struct FitArgs {
         long,
         value_name = "MM",
         default_value = "0.1",
-        value_parser = positive,
+        value_parser = tolerance,
         allow_hyphen_values = true
     )]
     pub tolerance: f64,
@@ -431,10 +432,10 @@ fn page(text: &str) -> Result<Page, String> {
     }
 }
 
-fn positive(text: &str) -> Result<f64, String> {
+fn tolerance(text: &str) -> Result<f64, String> {
     match number(text)? {
-        length if length > 0.0 => Ok(length),
-        _ => Err("a length above 0 is needed".to_owned()),
+        tolerance if TOLERANCES.contains(&tolerance) => Ok(tolerance),
+        _ => Err(FitError::Tolerance.to_string()),
     }
 }
 

@@ -1,5 +1,6 @@
 //! What can go wrong between a file and its picture, in words that say what to do.
 
+use crate::interrupt::EXIT_CODE;
 use crate::protocol::{RECEIVE_WINDOW, meaning};
 use crate::source::{JobLine, Origin};
 use penup::protocol::Refusal;
@@ -192,7 +193,7 @@ impl Error {
     /// What the process ends with: 130, as shells have it, after Ctrl-C, else 1.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Interrupted | Self::InterruptedUnconfirmed => 130,
+            Self::Interrupted | Self::InterruptedUnconfirmed => EXIT_CODE,
             _ => 1,
         }
     }

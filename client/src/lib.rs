@@ -10,6 +10,7 @@ pub mod cli;
 pub mod emulator;
 pub mod error;
 pub mod fake;
+pub mod interrupt;
 pub mod job;
 pub mod link;
 pub mod machines;

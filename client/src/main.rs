@@ -2,30 +2,36 @@
 
 use clap::Parser;
 use penup_client::cli::Cli;
+use penup_client::error::Error;
+use penup_client::interrupt;
 use penup_client::run::run;
-use std::io::Write;
+use std::io::{self, Write};
 use std::process::ExitCode;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 static INTERRUPT: AtomicBool = AtomicBool::new(false);
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    // The second Ctrl-C leaves at once. Without a handler Ctrl-C still ends the process.
-    let _ = ctrlc::set_handler(|| {
-        if INTERRUPT.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-    });
-    match run(&cli, &INTERRUPT) {
-        Ok(sentence) => {
-            // Whoever listened may have heard enough.
-            let _ = writeln!(std::io::stdout(), "{sentence}");
-            ExitCode::SUCCESS
-        }
+    // Without a handler Ctrl-C still ends the process.
+    let _ = ctrlc::set_handler(|| interrupt::ctrl_c(&INTERRUPT));
+    match run(&cli, &INTERRUPT).and_then(|sentence| say(&sentence)) {
+        Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("penup: {error}");
+            // Where nobody can be told the exit code must do.
+            let _ = writeln!(io::stderr(), "penup: {error}");
             ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+fn say(sentence: &str) -> Result<(), Error> {
+    let mut stdout = io::stdout();
+    match writeln!(stdout, "{sentence}").and_then(|()| stdout.flush()) {
+        // Whoever listened has heard enough, as `head` does.
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        result => {
+            result.map_err(|source| Error::Write { file: "the standard output".to_owned(), source })
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Results into files, whole or not at all.
 
 use crate::error::Error;
+use crate::interrupt::while_unfinished;
 use std::fs;
 use std::io;
 use std::path::Path;
@@ -24,7 +25,9 @@ fn write_beside(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let mut unfinished = name.to_owned();
     unfinished.push(format!(".{}.part", std::process::id()));
     let unfinished = path.with_file_name(unfinished);
-    let result = fs::write(&unfinished, bytes).and_then(|()| fs::rename(&unfinished, path));
+    let result = while_unfinished(&unfinished, || {
+        fs::write(&unfinished, bytes).and_then(|()| fs::rename(&unfinished, path))
+    });
     if result.is_err() {
         // The first error is the one to report.
         let _ = fs::remove_file(&unfinished);

@@ -43,6 +43,11 @@ impl Default for Bar {
 }
 
 impl Bar {
+    /// `done` of `all` vertices have their curve.
+    pub fn fitted(&mut self, done: usize, all: usize) {
+        self.show("Fitting", "vertices", done as u64, all as u64);
+    }
+
     fn show(&mut self, phase: &'static str, unit: &'static str, done: u64, all: u64) {
         if self.phase != phase {
             self.phase = phase;

@@ -6,6 +6,7 @@ use crate::cli::{
 };
 use crate::error::Error;
 use crate::fit::fit_obj;
+use crate::interrupt::MovingPlotter;
 use crate::job::{Job, Lengths};
 use crate::link::{Link, SerialLink};
 use crate::machines;
@@ -45,12 +46,19 @@ fn plot(args: &PlotArgs, interrupt: &AtomicBool) -> Result<String, Error> {
     if let Some(device) = &args.port {
         let mut link = SerialLink::open(device)
             .map_err(|source| Error::Port { device: device.clone(), source })?;
+        let _moving = MovingPlotter::new();
         draw(&mut link, &job, 1, interrupt, &mut bar)?;
         return Ok(format!("{} is drawn", args.file.display()));
     }
+    // On Linux the emulator ends with this program; elsewhere it must be ended.
+    let booting = (!cfg!(target_os = "linux")).then(MovingPlotter::new);
     let mut board = machines::emulate(args.board)?;
+    let moving = MovingPlotter::new();
+    drop(booting);
     draw(board.as_mut(), &job, 1, interrupt, &mut bar)?;
     let pen = board.pen_runs()?;
+    drop(board);
+    drop(moving);
     let picture = Picture { page: settings.page, runs: pen.runs, step: pen.step };
     drop(bar);
     let outputs = Outputs::of(&args.pictures, None);
@@ -86,10 +94,11 @@ fn preview(args: &PreviewArgs, interrupt: &AtomicBool) -> Result<String, Error> 
 
 fn fit(args: &FitArgs) -> Result<String, Error> {
     let file = args.file.display().to_string();
-    let text = std::fs::read_to_string(&args.file)
-        .map_err(|source| Error::File { file: file.clone(), source })?;
-    let fitted = fit_obj(&text, args.tolerance)
+    let source = SourceFile::read(&args.file)?;
+    let mut bar = Bar::default();
+    let fitted = fit_obj(&source, args.tolerance, &mut |done, all| bar.fitted(done, all))
         .map_err(|source| Error::Fit { file: file.clone(), source })?;
+    drop(bar);
     let stem = args.file.file_stem().unwrap_or_default().to_string_lossy();
     let beside = || args.file.with_file_name(format!("{stem}-fitted.obj"));
     let output = args.output.clone().unwrap_or_else(beside);

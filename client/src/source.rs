@@ -148,7 +148,11 @@ impl SourceFile {
         Self::new(name, bytes)
     }
 
-    fn new(name: String, bytes: Vec<u8>) -> Result<Self, Error> {
+    /// Checks the lines of a file called `name`.
+    ///
+    /// # Errors
+    /// It holds what no plotter takes.
+    pub fn new(name: String, bytes: Vec<u8>) -> Result<Self, Error> {
         if bytes.len() as u64 >= SIZE_LIMIT {
             return Err(Error::FileTooLarge { file: name });
         }
@@ -175,6 +179,22 @@ impl SourceFile {
             }
             place = next;
         }
+    }
+
+    /// Its size in bytes.
+    pub fn size(&self) -> usize {
+        self.bytes.len()
+    }
+
+    /// All lines in order; quicker than [`Lines::line`] for each.
+    pub fn lines(&self) -> impl Iterator<Item = JobLine> {
+        let mut place = self.places.first().copied().unwrap_or_default();
+        (0..self.count).map_while(move |_| {
+            let mut sent = String::new();
+            // Every line was read once without a fault.
+            let from = place.read(&self.bytes, &mut sent).ok()??;
+            Some(JobLine { sent, origin: Some(self.origin(from)) })
+        })
     }
 
     fn refused(&self, place: Place, fault: LineFault) -> Error {

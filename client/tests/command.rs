@@ -256,3 +256,65 @@ fn a_trace_is_fitted_and_the_curves_are_drawn() {
     assert_eq!(code, Some(1));
     assert!(error.contains("no polyline"), "{error}");
 }
+
+/// Every command reads its file from a pipe that never ends, and is given up there.
+#[cfg(unix)]
+#[test]
+fn ctrl_c_ends_every_command_at_once() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let pipe = folder.path().join("endless.obj");
+    assert!(Command::new("mkfifo").arg(&pipe).status().expect("a pipe").success());
+    for arguments in [
+        &["fit"][..],
+        &["preview"],
+        &["plot"],
+        &["tape", "encode"],
+        &["tape", "decode"],
+        &["tape", "show"],
+    ] {
+        let program = Command::new(env!("CARGO_BIN_EXE_penup"))
+            .args(arguments)
+            .arg("endless.obj")
+            .current_dir(folder.path())
+            .stderr(std::process::Stdio::piped())
+            .spawn()
+            .expect("the program runs");
+        // Opening it to write waits until the program reads it.
+        let writer = fs::OpenOptions::new().write(true).open(&pipe).expect("a pipe");
+        let number = program.id().to_string();
+        let sent = Command::new("kill").args(["-INT", &number]).status().expect("a signal");
+        assert!(sent.success());
+        let output = program.wait_with_output().expect("it ends");
+        assert_eq!(output.status.code(), Some(130), "{arguments:?}");
+        assert_eq!(String::from_utf8_lossy(&output.stderr), "penup: given up\n");
+        drop(writer);
+    }
+    assert_eq!(files(folder.path()), ["endless.obj"]);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn an_output_that_is_closed_is_no_error_and_a_full_one_is() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("long.tape"), [0x33; 100_000]).expect("written");
+    let shell = |line: &str| {
+        let program = env!("CARGO_BIN_EXE_penup");
+        let output = Command::new("bash")
+            .args(["-c", &line.replace("penup", program)])
+            .current_dir(folder.path())
+            .output()
+            .expect("a shell");
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    for line in [
+        "penup --help | head -1; exit ${PIPESTATUS[0]}",
+        "penup tape decode long.tape | true; exit ${PIPESTATUS[0]}",
+        "penup tape decode long.tape >&-",
+    ] {
+        assert_eq!(shell(line), (Some(0), String::new()), "{line}");
+    }
+    let (code, said) = shell("penup tape decode long.tape > /dev/full");
+    assert_eq!(code, Some(1));
+    assert!(said.starts_with("penup: cannot write the standard output: "), "{said}");
+    assert_eq!(shell("penup preview none.obj 2> /dev/full").0, Some(1));
+}

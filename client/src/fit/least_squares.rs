@@ -1,9 +1,22 @@
-//! The spline with given knots that comes nearest to given places at given parameters.
+//! The spline with given knots, some of its control points fixed, that comes nearest to given places
+//! at given parameters.
 
 use super::Place;
+use std::ops::Range;
 
 /// The highest order, 4.
 const MOST: usize = 4;
+
+#[cfg(test)]
+thread_local! {
+    /// How often basis functions were computed in this thread: the work of fitting.
+    static EVALUATIONS: std::cell::Cell<u64> = const { std::cell::Cell::new(0) };
+}
+
+#[cfg(test)]
+pub fn evaluations() -> u64 {
+    EVALUATIONS.get()
+}
 
 /// The basis functions that act at one parameter.
 #[derive(Debug, Clone, Copy)]
@@ -19,6 +32,8 @@ pub struct Basis {
 impl Basis {
     /// At parameter `t`, which lies between the first and the last knot.
     pub fn at(knots: &[f64], order: usize, t: f64) -> Self {
+        #[cfg(test)]
+        EVALUATIONS.with(|count| count.set(count.get() + 1));
         let control_points = knots.len() - order;
         let span = knots.partition_point(|knot| *knot <= t).clamp(order, control_points) - 1;
         let mut weights = [0.0; MOST];
@@ -61,39 +76,42 @@ impl Basis {
     }
 }
 
-/// The control points of that spline; its ends are the first and the last place.
-pub fn least_squares(places: &[Place], bases: &[Basis], control_points: usize) -> Vec<Place> {
-    let (begin, end) = (places[0], places[places.len() - 1]);
-    let last = control_points - 1;
-    // Normal equations for all but the ends; each row holds what is left of the diagonal, and it.
-    let mut rows = vec![[0.0; MOST]; last.saturating_sub(1)];
-    let mut sides = vec![[0.0; 2]; last.saturating_sub(1)];
-    for (place, basis) in places.iter().zip(bases) {
+/// Moves the control points numbered `free` to where the spline comes nearest to `places`; the others
+/// stay. `bases` are those of the places.
+pub fn least_squares<'a>(
+    places: impl Iterator<Item = (&'a Place, &'a Basis)>,
+    control: &mut [Place],
+    free: Range<usize>,
+) {
+    // Normal equations for the free ones; each row holds what is left of the diagonal, and it.
+    let mut rows = vec![[0.0; MOST]; free.len()];
+    let mut sides = vec![[0.0; 2]; free.len()];
+    for (place, basis) in places {
         let mut rest = *place;
         for (number, weight) in basis.weights.iter().enumerate().take(basis.order) {
-            let fixed = match basis.first + number {
-                0 => begin,
-                control if control == last => end,
-                _ => continue,
-            };
-            rest = [rest[0] - weight * fixed[0], rest[1] - weight * fixed[1]];
+            let point = basis.first + number;
+            if !free.contains(&point) {
+                let fixed = control[point];
+                rest = [rest[0] - weight * fixed[0], rest[1] - weight * fixed[1]];
+            }
         }
         for (i, weight) in basis.weights.iter().enumerate().take(basis.order) {
-            let row = basis.first + i;
-            if row == 0 || row == last {
+            let point = basis.first + i;
+            if !free.contains(&point) {
                 continue;
             }
-            sides[row - 1][0] += weight * rest[0];
-            sides[row - 1][1] += weight * rest[1];
+            let row = point - free.start;
+            sides[row][0] += weight * rest[0];
+            sides[row][1] += weight * rest[1];
             for (j, other) in basis.weights.iter().enumerate().take(i + 1) {
-                if basis.first + j > 0 {
-                    rows[row - 1][MOST - 1 - (i - j)] += weight * other;
+                if free.contains(&(basis.first + j)) {
+                    rows[row][MOST - 1 - (i - j)] += weight * other;
                 }
             }
         }
     }
     solve(&mut rows, &mut sides);
-    std::iter::once(begin).chain(sides).chain(std::iter::once(end)).collect()
+    control[free].copy_from_slice(&sides);
 }
 
 /// Cholesky for a symmetric band; `sides` becomes the solution.

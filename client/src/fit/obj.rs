@@ -1,14 +1,17 @@
 //! The file: polylines in, curves out, and what was saved.
 
-use super::{FittedCurve, Place, fit};
+use super::{FittedCurve, Place, fit_each};
+use crate::source::SourceFile;
+use penup::protocol::Command;
 use std::fmt::{self, Write};
+use std::rc::Rc;
 
 /// Why a file was not fitted.
 #[derive(Debug, Clone, PartialEq)]
 pub enum FitError {
-    /// The tolerance is not a positive number of millimetres.
+    /// The tolerance is not within [`TOLERANCES`].
     Tolerance,
-    /// A line of the file cannot be read.
+    /// A line of the file cannot be fitted.
     Line {
         /// From 1.
         number: usize,
@@ -19,10 +22,21 @@ pub enum FitError {
     NoPolyline,
 }
 
+/// The tolerances that make sense on paper, in mm.
+pub const TOLERANCES: std::ops::RangeInclusive<f64> = 1e-4..=1000.0;
+
+/// The largest coordinate that a plotter takes, in mm.
+const COORDINATE_LIMIT: f64 = (1u32 << 30) as f64;
+
 impl fmt::Display for FitError {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Tolerance => write!(formatter, "the tolerance must be a positive number of mm"),
+            Self::Tolerance => write!(
+                formatter,
+                "the tolerance is {} to {} mm",
+                TOLERANCES.start(),
+                TOLERANCES.end()
+            ),
             Self::Line { number, reason } => write!(formatter, "line {number}: {reason}"),
             Self::NoPolyline => write!(formatter, "there is no polyline (`l` element) to fit"),
         }
@@ -44,6 +58,8 @@ pub struct Saving {
     pub bytes_before: usize,
     /// Bytes of the file written.
     pub bytes_after: usize,
+    /// Polylines that are not written because they have no length.
+    pub left_out: usize,
 }
 
 impl fmt::Display for Saving {
@@ -61,7 +77,12 @@ impl fmt::Display for Saving {
             self.bytes_before,
             self.bytes_after,
             saved(self.bytes_before, self.bytes_after),
-        )
+        )?;
+        match self.left_out {
+            0 => Ok(()),
+            1 => write!(formatter, "; 1 without a length is left out"),
+            count => write!(formatter, "; {count} without a length are left out"),
+        }
     }
 }
 
@@ -74,23 +95,32 @@ pub struct Fitted {
     pub saving: Saving,
 }
 
-/// Fits every polyline of an OBJ plan within `tolerance` mm.
+/// Fits every polyline of an OBJ plan within `tolerance` mm; each keeps its pen. `progress` is told from
+/// time to time how many of all vertices are done.
 ///
 /// # Errors
 /// See [`FitError`].
-pub fn fit_obj(text: &str, tolerance: f64) -> Result<Fitted, FitError> {
-    if !(tolerance > 0.0 && tolerance.is_finite()) {
+pub fn fit_obj(
+    file: &SourceFile,
+    tolerance: f64,
+    progress: &mut dyn FnMut(usize, usize),
+) -> Result<Fitted, FitError> {
+    if !TOLERANCES.contains(&tolerance) {
         return Err(FitError::Tolerance);
     }
-    let plan = Plan::read(text)?;
-    let curves = fit(&plan.polylines, tolerance);
-    let obj = write_obj(&curves, plan.height, tolerance);
+    let Plan { polylines, pens, height } = Plan::read(file)?;
+    let fitted = fit_each(&polylines, tolerance, progress);
+    let left_out = fitted.iter().filter(|curve| curve.is_none()).count();
+    let penned = |(curve, pen): (Option<FittedCurve>, _)| Some((pen, curve?));
+    let (pens, curves): (Vec<_>, Vec<_>) = fitted.into_iter().zip(pens).filter_map(penned).unzip();
+    let obj = write_obj(&curves, &pens, height, tolerance);
     let saving = Saving {
-        polylines: plan.polylines.len(),
-        vertices_before: plan.polylines.iter().map(Vec::len).sum(),
+        polylines: polylines.len(),
+        vertices_before: polylines.iter().map(Vec::len).sum(),
         vertices_after: curves.iter().map(|curve| curve.control.len()).sum(),
-        bytes_before: text.len(),
+        bytes_before: file.size(),
         bytes_after: obj.len(),
+        left_out,
     };
     Ok(Fitted { obj, saving })
 }
@@ -101,13 +131,25 @@ const CONTROL_LIMIT: usize = 30;
 /// Writes curves as OBJ, `height` the z of all, rounded to a hundredth of `tolerance` or finer.
 ///
 /// A long curve is written as several, which share control points: each polynomial depends on `order`
-/// of them only.
-pub fn write_obj(curves: &[FittedCurve], height: f64, tolerance: f64) -> String {
+/// of them only. `pens` are the lines that choose the pen of each.
+pub fn write_obj(
+    curves: &[FittedCurve],
+    pens: &[Option<Rc<str>>],
+    height: f64,
+    tolerance: f64,
+) -> String {
     let places = (2.0 - tolerance.log10()).ceil().clamp(0.0, 9.0) as usize;
     let mut obj = String::from("cstype bspline\n");
     let mut vertices = 0;
     let mut order = 0;
-    for curve in curves {
+    let mut pen = &None;
+    for (curve, its_pen) in curves.iter().zip(pens) {
+        if let Some(line) = its_pen
+            && its_pen != pen
+        {
+            let _ = writeln!(obj, "{line}");
+            pen = its_pen;
+        }
         for place in &curve.control {
             let [x, y] = place.map(|c| shortest(c, places));
             let _ = writeln!(obj, "v {x} {y} {}", shortest(height, places));
@@ -151,62 +193,82 @@ fn shortest(value: f64, places: usize) -> String {
 /// The polylines of a file, all at one height.
 struct Plan {
     polylines: Vec<Vec<Place>>,
+    /// The line that chooses the pen of each; none before the first such line.
+    pens: Vec<Option<Rc<str>>>,
     height: f64,
 }
 
 impl Plan {
-    fn read(text: &str) -> Result<Self, FitError> {
+    fn read(file: &SourceFile) -> Result<Self, FitError> {
         let mut vertices: Vec<Place> = Vec::new();
         let mut height = None;
         let mut chains: Vec<Vec<usize>> = Vec::new();
-        for (number, line) in text.lines().enumerate() {
-            let refused = |reason| FitError::Line { number: number + 1, reason };
-            let mut words = line.split('#').next().unwrap_or("").split_ascii_whitespace();
-            match words.next() {
-                Some("v") => {
-                    let numbers: Vec<f64> = words.filter_map(|word| word.parse().ok()).collect();
-                    let [x, y, z, ..] = numbers[..] else {
-                        return Err(refused("a vertex needs three numbers"));
-                    };
-                    if !numbers.iter().all(|number| number.is_finite()) {
-                        return Err(refused("a vertex needs three numbers"));
+        let mut pens = Vec::new();
+        let mut pen: Option<Rc<str>> = None;
+        let mut first_curve = None;
+        for line in file.lines() {
+            let number = line.origin.map_or(0, |origin| origin.line);
+            let refused = |reason| FitError::Line { number, reason };
+            match Command::parse(&line.sent) {
+                Ok(Command::Vertex(numbers)) => {
+                    let [x, y, z] = numbers.map(|number| number.to_f64());
+                    let is_usable = |number: &f64| number.abs() <= COORDINATE_LIMIT;
+                    if ![x, y, z].iter().all(is_usable) {
+                        return Err(refused("coordinates go up to 1073741824"));
                     }
                     if *height.get_or_insert(z) != z {
                         return Err(refused("the plan is not flat: z must be the same everywhere"));
                     }
                     vertices.push([x, y]);
                 }
-                Some("l") => {
+                Ok(Command::Polyline(numbers)) => {
                     let chain: Option<Vec<usize>> =
-                        words.map(|word| vertex(word, vertices.len())).collect();
+                        numbers.iter().map(|number| vertex(number, vertices.len())).collect();
                     let chain = chain.ok_or_else(|| refused("there is no such vertex"))?;
                     if chain.len() < 2 {
                         return Err(refused("a polyline needs two vertices"));
                     }
                     match chains.last_mut() {
                         // A trace that comes as one element for each side.
-                        Some(before) if before.last() == chain.first() => {
+                        Some(before)
+                            if before.last() == chain.first() && pens.last() == Some(&pen) =>
+                        {
                             before.extend(&chain[1..]);
                         }
-                        _ => chains.push(chain),
+                        _ => {
+                            chains.push(chain);
+                            pens.push(pen.clone());
+                        }
                     }
                 }
-                Some("f") => return Err(refused("faces cannot be fitted, only polylines")),
+                Ok(Command::Face(_)) => {
+                    return Err(refused("faces cannot be fitted, only polylines"));
+                }
+                Ok(Command::Pen { .. }) => pen = Some(line.sent.into()),
+                Ok(Command::Curve { .. }) => {
+                    first_curve.get_or_insert(number);
+                }
+                // What belongs to a curve. The reader of the file lets nothing else pass.
                 _ => {}
             }
         }
-        if chains.is_empty() {
-            return Err(FitError::NoPolyline);
+        match first_curve {
+            _ if chains.is_empty() => return Err(FitError::NoPolyline),
+            Some(number) => {
+                let reason = "this is a curve already: fit a file of polylines alone";
+                return Err(FitError::Line { number, reason });
+            }
+            None => {}
         }
         let polylines =
             chains.iter().map(|chain| chain.iter().map(|at| vertices[*at]).collect()).collect();
-        Ok(Self { polylines, height: height.unwrap_or(0.0) })
+        Ok(Self { polylines, pens, height: height.unwrap_or(0.0) })
     }
 }
 
 /// The vertex that an OBJ number means, from 0.
-fn vertex(word: &str, count: usize) -> Option<usize> {
-    let number: i64 = word.split('/').next()?.parse().ok()?;
+fn vertex(number: i32, count: usize) -> Option<usize> {
+    let number = i64::from(number);
     let at = if number < 0 { count as i64 + number } else { number - 1 };
     usize::try_from(at).ok().filter(|at| *at < count)
 }

@@ -2,6 +2,7 @@
 
 use super::least_squares::{Basis, least_squares};
 use super::{Place, distance, dot, minus};
+use std::ops::Range;
 
 /// Fits at most, after each of which the parameters follow the curve: from nothing, and from a curve
 /// almost as good.
@@ -21,6 +22,11 @@ pub struct Piece {
     pub end: i32,
 }
 
+/// Knots on either side of one that may go, up to which the curve is fitted again to see whether it
+/// may. A spline hardly changes farther away than some knots, so that all of the curve need not be
+/// fitted for each of its knots, which would take a time quadratic in their number.
+const REACH: usize = 12;
+
 /// Places along the piece, close together, and the frame that all tries share.
 struct Samples {
     places: Vec<Place>,
@@ -38,38 +44,54 @@ struct Try {
     errors: Vec<f64>,
 }
 
+/// A part of the curve between two of its knots, to be fitted while the rest stays.
+struct Part {
+    /// The knots that act in it, also those before and after it.
+    knots: Vec<f64>,
+    /// Its control points, of which some act outside it, too.
+    control: Vec<Place>,
+    /// Those that do not.
+    free: Range<usize>,
+    /// Where it begins and ends.
+    ends: [f64; 2],
+    /// Its samples, and one before and one after it.
+    samples: Range<usize>,
+}
+
 impl Piece {
     /// Fits `places` with a curve of `order` whose first knot is `begin`; `None` if no number of knots
-    /// does it, or only more than `most` before those that are not needed are taken away.
+    /// does it, or only more than `most` before those that are not needed are taken away. `progress` is
+    /// told from time to time which part of the work is done, 0 to 1.
     pub fn fit(
         places: &[Place],
         order: usize,
         begin: i32,
         tolerance: f64,
         most: usize,
+        progress: &mut dyn FnMut(f64),
     ) -> Option<Self> {
         let samples = Samples::new(places, order, begin, tolerance);
         let mut inner = Vec::new();
-        let mut found = samples.fit(&inner, &samples.at, ROUNDS);
+        let mut found = samples.fit(&inner);
         while found.worst() > tolerance {
             inner = samples.divided(&inner, &found, tolerance)?;
             if inner.len() > most {
                 return None;
             }
-            found = samples.fit(&inner, &samples.at, ROUNDS);
+            found = samples.fit(&inner);
+            progress(0.0);
         }
-        for _ in 0..PASSES {
+        for pass in 0..PASSES {
             let before = inner.len();
             let mut at = 0;
             while at < inner.len() {
-                let fewer = [without(&inner, at), merged(&inner, at)];
-                let better = fewer.into_iter().flatten().find_map(|fewer| {
-                    let found = samples.fit(&fewer, &found.at, MORE_ROUNDS);
-                    (found.worst() <= tolerance).then_some((fewer, found))
-                });
-                match better {
-                    Some(better) => (inner, found) = better,
-                    None => at += 1,
+                if samples.spares(&mut inner, at, &mut found) {
+                    continue;
+                }
+                at += 1;
+                if at.is_multiple_of(64) {
+                    let share = at as f64 / inner.len() as f64;
+                    progress((pass as f64 + share) / PASSES as f64);
                 }
             }
             if inner.len() == before {
@@ -78,22 +100,6 @@ impl Piece {
         }
         Some(Self { control: found.control, inner, end: samples.ends[1] })
     }
-}
-
-/// `knots` without number `at`.
-fn without(knots: &[i32], at: usize) -> Option<Vec<i32>> {
-    let mut fewer = knots.to_vec();
-    fewer.remove(at);
-    Some(fewer)
-}
-
-/// `knots` with one in place of number `at` and the next; `None` if there is no next.
-fn merged(knots: &[i32], at: usize) -> Option<Vec<i32>> {
-    let next = *knots.get(at + 1)?;
-    let mut fewer = knots.to_vec();
-    let first = fewer.remove(at);
-    fewer[at] = first + (next - first) / 2;
-    Some(fewer)
 }
 
 impl Try {
@@ -120,8 +126,10 @@ impl Samples {
         }
         let width = dense.len() as i32;
         let scale = f64::from(width) / length;
-        let at = along.into_iter().map(|along| f64::from(begin) + along * scale).collect();
-        Self { places: dense, at, order, ends: [begin, begin + width], tolerance }
+        let ends = [begin, begin + width];
+        let [from, to] = ends.map(f64::from);
+        let at = along.into_iter().map(|along| (from + along * scale).min(to)).collect();
+        Self { places: dense, at, order, ends, tolerance }
     }
 
     fn knots(&self, inner: &[i32]) -> Vec<f64> {
@@ -129,17 +137,97 @@ impl Samples {
         begin.chain(inner.iter().copied()).chain(end).map(f64::from).collect()
     }
 
+    /// Fits all of the curve.
+    fn fit(&self, inner: &[i32]) -> Try {
+        let mut control = vec![[0.0; 2]; self.order + inner.len()];
+        let last = control.len() - 1;
+        control[0] = self.places[0];
+        control[last] = self.places[self.places.len() - 1];
+        let whole = Part {
+            knots: self.knots(inner),
+            control,
+            free: 1..last,
+            ends: self.ends.map(f64::from),
+            samples: 0..self.places.len(),
+        };
+        self.fit_part(whole, &self.at, ROUNDS)
+    }
+
+    /// Takes knot number `at` away, or puts one in place of it and the next, if the curve stays within
+    /// the tolerance; says whether it does.
+    fn spares(&self, inner: &mut Vec<i32>, at: usize, found: &mut Try) -> bool {
+        let knots_before = inner[at.saturating_sub(REACH)..at].to_vec();
+        let (last, after) = (inner.len() - 1, at + 1);
+        let after = &inner[after..last.min(at + 1 + REACH) + 1];
+        let without = knots_before.iter().chain(after).copied().collect::<Vec<i32>>();
+        let merged = after.split_first().map(|(next, rest)| {
+            let middle = inner[at] + (next - inner[at]) / 2;
+            knots_before.iter().chain([&middle]).chain(rest).copied().collect::<Vec<i32>>()
+        });
+        let first = at - knots_before.len();
+        let replaced = first..at + 1 + after.len();
+        for fewer in [Some(without), merged].into_iter().flatten() {
+            let (part, points) = self.part(inner, &replaced, &fewer, found);
+            let samples = part.samples.clone();
+            let tried = self.fit_part(part, &found.at, MORE_ROUNDS);
+            if tried.worst() <= self.tolerance {
+                found.control.splice(points, tried.control);
+                found.at[samples].copy_from_slice(&tried.at);
+                inner.splice(replaced, fewer);
+                return true;
+            }
+        }
+        false
+    }
+    /// The part of a curve in which the inner knots numbered `replaced` become `fewer`, and the numbers
+    /// of the control points that it replaces.
+    fn part(
+        &self,
+        inner: &[i32],
+        replaced: &Range<usize>,
+        fewer: &[i32],
+        found: &Try,
+    ) -> (Part, Range<usize>) {
+        let order = self.order;
+        let knot = |number: usize| match number.checked_sub(order) {
+            None => self.ends[0],
+            Some(number) => inner.get(number).copied().unwrap_or(self.ends[1]),
+        };
+        // The knots between which it lies, by their numbers among all.
+        let (left, right) = (order + replaced.start - 1, order + replaced.end);
+        let before = (left + 1 - order..=left).map(knot);
+        let after = (right..right + order).map(knot);
+        let points = left + 1 - order..right;
+        // Those at its ends act beyond them, but for the ends of the curve.
+        let shared = |is_end| if is_end { 1 } else { order - 1 };
+        let (head, tail) = (shared(replaced.start == 0), shared(replaced.end == inner.len()));
+        let free = head..order + fewer.len() - tail;
+        let mut control = found.control[points.start..points.start + head].to_vec();
+        control.resize(free.end, [0.0; 2]);
+        control.extend(&found.control[points.end - tail..points.end]);
+        let ends = [left, right].map(|number| f64::from(knot(number)));
+        let first = found.at.partition_point(|t| *t < ends[0]).saturating_sub(1);
+        let last = found.at.partition_point(|t| *t <= ends[1]).min(found.at.len() - 1);
+        let knots = before.chain(fewer.iter().copied()).chain(after).map(f64::from).collect();
+        (Part { knots, control, free, ends, samples: first..last + 1 }, points)
+    }
+
     /// Fits, lets each sample's parameter go where the curve is nearest to it, and fits again, until all
-    /// is within the tolerance or that is out of reach.
-    fn fit(&self, inner: &[i32], start: &[f64], rounds: usize) -> Try {
-        let knots = self.knots(inner);
-        let mut at = start.to_vec();
+    /// is within the tolerance or that is out of reach. `start` are the parameters of all samples.
+    fn fit_part(&self, part: Part, start: &[f64], rounds: usize) -> Try {
+        let Part { knots, mut control, free, ends, samples } = part;
+        let places = &self.places[samples.clone()];
+        let mut at = start[samples].to_vec();
+        let is_inside = |t: f64| (ends[0]..=ends[1]).contains(&t);
         let mut worst = f64::INFINITY;
         for round in 1.. {
             let bases: Vec<Basis> = at.iter().map(|t| Basis::at(&knots, self.order, *t)).collect();
-            let control = least_squares(&self.places, &bases, self.order + inner.len());
-            self.follow(&mut at, &bases, &control);
-            let found = Try { errors: self.errors(&knots, &control, &at), control, at };
+            let inside = places.iter().zip(&bases).zip(&at).filter(|(_, t)| is_inside(**t));
+            least_squares(inside.map(|(sample, _)| sample), &mut control, free.clone());
+            follow(places, &mut at, &bases, &control, ends);
+            let place = |t: f64| Basis::at(&knots, self.order, t).place(&control);
+            let errors = errors(places, &at, |t| is_inside(t).then(|| place(t)));
+            let found = Try { control, at, errors };
             let gained = worst - found.worst();
             worst = found.worst();
             // At this rate.
@@ -147,38 +235,9 @@ impl Samples {
             if worst <= self.tolerance || reach > self.tolerance || round >= rounds {
                 return found;
             }
-            at = found.at;
+            (control, at) = (found.control, found.at);
         }
         unreachable!("the last round returns")
-    }
-
-    /// Moves each parameter to the nearest place on the curve, by one step, never past the one before.
-    fn follow(&self, at: &mut [f64], bases: &[Basis], control: &[Place]) {
-        let [begin, end] = self.ends.map(f64::from);
-        let inside = 1..at.len() - 1;
-        let mut reached = begin;
-        for (number, (t, basis)) in at.iter_mut().zip(bases).enumerate() {
-            let away = minus(self.places[number], basis.place(control));
-            let slope = basis.slope(control);
-            let square = dot(slope, slope);
-            if square > 0.0 && inside.contains(&number) {
-                *t += dot(away, slope) / square;
-            }
-            *t = t.clamp(reached, end);
-            reached = *t;
-        }
-    }
-
-    /// How far each sample is from its place on the curve, and the curve before it from the polyline.
-    fn errors(&self, knots: &[f64], control: &[Place], at: &[f64]) -> Vec<f64> {
-        let place = |t: f64| Basis::at(knots, self.order, t).place(control);
-        let mut errors = vec![0.0];
-        for (samples, at) in self.places.windows(2).zip(at.windows(2)) {
-            let middle = [0, 1].map(|axis: usize| (samples[0][axis] + samples[1][axis]) / 2.0);
-            let between = distance(place((at[0] + at[1]) / 2.0), middle);
-            errors.push(distance(place(at[1]), samples[1]).max(between));
-        }
-        errors
     }
 
     /// `inner` with another knot in every polynomial that is too far off; `None` if one is too short.
@@ -204,4 +263,36 @@ impl Samples {
         // An error just at a knot may be seen on neither side.
         (divided.len() > inner.len()).then_some(divided)
     }
+}
+
+/// Moves each parameter to the nearest place on the curve, by one step, never past the one before; the
+/// first and the last stay, and so do those outside.
+fn follow(places: &[Place], at: &mut [f64], bases: &[Basis], control: &[Place], ends: [f64; 2]) {
+    let between = 1..at.len() - 1;
+    let [mut reached, end] = ends;
+    for (number, (t, basis)) in at.iter_mut().zip(bases).enumerate() {
+        if !between.contains(&number) {
+            continue;
+        }
+        let away = minus(places[number], basis.place(control));
+        let slope = basis.slope(control);
+        let step = dot(away, slope) / dot(slope, slope);
+        if step.is_finite() {
+            *t += step;
+        }
+        *t = t.clamp(reached, end);
+        reached = *t;
+    }
+}
+
+/// How far each sample is from its place on the curve, and the curve before it from the polyline; 0 where
+/// there is no `place`.
+fn errors(places: &[Place], at: &[f64], place: impl Fn(f64) -> Option<Place>) -> Vec<f64> {
+    let from = |t, to| place(t).map_or(0.0, |place| distance(place, to));
+    let mut errors = vec![0.0];
+    for (samples, at) in places.windows(2).zip(at.windows(2)) {
+        let middle = [0, 1].map(|axis: usize| (samples[0][axis] + samples[1][axis]) / 2.0);
+        errors.push(from(at[1], samples[1]).max(from((at[0] + at[1]) / 2.0, middle)));
+    }
+    errors
 }

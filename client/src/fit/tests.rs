@@ -1,7 +1,14 @@
 use super::*;
+use crate::source::SourceFile;
 use penup::curve::{FRACTION_BITS, Point};
 use penup::model::{Corner, Model, Position, unkept};
 use penup::protocol::Command;
+
+/// Fits the text of a file.
+fn fit_text(text: &str, tolerance: f64) -> Result<Fitted, FitError> {
+    let file = SourceFile::new("f.obj".to_owned(), text.into()).expect("lines of OBJ");
+    fit_obj(&file, tolerance, &mut |_, _| ())
+}
 
 /// In the flattening of a test, 1/256 mm.
 const FLATTENING: u16 = 1;
@@ -96,7 +103,7 @@ fn stray(from: &[Place], to: &[Place]) -> f64 {
 
 /// Fits, writes, reads and flattens; returns what was saved.
 fn checked(polylines: &[Vec<Place>], tolerance: f64) -> Saving {
-    let Fitted { obj, saving } = fit_obj(&obj_of(polylines), tolerance).unwrap();
+    let Fitted { obj, saving } = fit_text(&obj_of(polylines), tolerance).unwrap();
     let chains = flattened(&obj);
     assert_eq!(chains.len(), polylines.len());
     for (chain, polyline) in chains.iter().zip(polylines) {
@@ -143,7 +150,7 @@ fn corners_and_straight_sides_stay() {
         })
         .chain([corners[4]])
         .collect();
-    let curves = fit(std::slice::from_ref(&square), 0.1);
+    let curves = fit(std::slice::from_ref(&square), 0.1, &mut |_, _| ());
     assert_eq!((curves[0].order, &curves[0].control[..]), (2, &corners[..]));
     checked(&[square], 0.1);
     // A half disc: an arc between two corners.
@@ -191,7 +198,7 @@ fn random_walks_are_followed_too() {
 fn several_polylines_and_degenerate_ones() {
     let dot_only = vec![[5.0, 5.0]; 4];
     let side = vec![[0.0, 0.0], [10.0, 0.0], [10.0, 0.0]];
-    let curves = fit(&[dot_only, side, vec![], vec![[1.0, 1.0]]], 0.1);
+    let curves = fit(&[dot_only, side, vec![], vec![[1.0, 1.0]]], 0.1, &mut |_, _| ());
     assert_eq!(curves.len(), 1);
     assert_eq!((curves[0].order, curves[0].knots.len()), (2, 4));
     assert_eq!(curves[0].control, [[0.0, 0.0], [10.0, 0.0]]);
@@ -201,27 +208,100 @@ fn several_polylines_and_degenerate_ones() {
 #[test]
 fn sides_that_come_one_by_one_are_one_polyline() {
     let text = "v 0 0 7\nv 1 0 7\nv 2 0 7\nv 5 5 7\nv 6 6 7\nl 1 2\nl 2 3\nl -2 -1 # a second\n";
-    let Fitted { obj, saving } = fit_obj(text, 0.1).unwrap();
+    let Fitted { obj, saving } = fit_text(text, 0.1).unwrap();
     assert_eq!((saving.polylines, saving.vertices_before, saving.vertices_after), (2, 5, 4));
     assert!(obj.contains("v 2 0 7\n"), "{obj}");
 }
 
 #[test]
 fn what_cannot_be_fitted_is_refused() {
-    let line = |text: &str| match fit_obj(text, 0.1) {
+    let line = |text: &str| match fit_text(text, 0.1) {
         Err(FitError::Line { number, .. }) => Some(number),
         _ => None,
     };
-    assert_eq!(line("v 0 0 0\nv 0 x 0\n"), Some(2));
-    assert_eq!(line("v 0 0 0\nv 0 1\n"), Some(2));
     assert_eq!(line("v 0 0 0\nv 1 1 1\n"), Some(2));
-    assert_eq!(line("v 0 nan 0\n"), Some(1));
     assert_eq!(line("v 0 0 0\nv 1 1 0\nl 1 2\nl 1 3\n"), Some(4));
     assert_eq!(line("v 0 0 0\nl 0 1\n"), Some(2));
     assert_eq!(line("v 0 0 0\nl 1\n"), Some(2));
     assert_eq!(line("v 0 0 0\nv 1 1 0\nv 2 1 0\nf 1 2 3\n"), Some(4));
-    assert_eq!(fit_obj("v 0 0 0\n", 0.1), Err(FitError::NoPolyline));
-    for tolerance in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        assert_eq!(fit_obj("", tolerance), Err(FitError::Tolerance));
+    // It would be lost.
+    assert_eq!(
+        line("v 0 0 0\nv 1 1 0\nl 1 2\ndeg 1\ncurv 0 1 1 2\nparm u 0 0 1 1\nend\n"),
+        Some(5)
+    );
+    assert_eq!(fit_text("v 0 0 0\n", 0.1), Err(FitError::NoPolyline));
+    for tolerance in [0.0, -1.0, 1e-300, 1e308, f64::NAN, f64::INFINITY] {
+        assert_eq!(fit_text("", tolerance), Err(FitError::Tolerance));
     }
+}
+
+#[test]
+fn numbers_that_no_plotter_takes_are_refused_with_their_line() {
+    for number in ["1e308", "-1e308", "1.7976931348623157e308", "1073741825", "1e30", "-2e9"] {
+        let text = format!("v 0 0 0\nv {number} 1 0\nv 1 {number} 0\nl 1 2 3\n");
+        let expected = FitError::Line { number: 2, reason: "coordinates go up to 1073741824" };
+        match SourceFile::new("f.obj".to_owned(), text.into()) {
+            Ok(file) => assert_eq!(fit_obj(&file, 0.1, &mut |_, _| ()), Err(expected)),
+            Err(error) => assert!(error.to_string().starts_with("f.obj:2: "), "{error}"),
+        }
+    }
+    for number in ["nan", "inf", "-inf", "x", "1,5", "0x10", "1e999999"] {
+        let text = format!("v 0 0 0\nv {number} 1 0\n");
+        let error = SourceFile::new("f.obj".to_owned(), text.into()).expect_err("no number");
+        assert!(error.to_string().starts_with("f.obj:2: "), "{error}");
+    }
+    // The largest and the smallest differences.
+    for far in [[1073741824.0, 1073741824.0], [1e-300, 0.0], [f64::MIN_POSITIVE, 5e-324]] {
+        let curves = fit(&[vec![[0.0, 0.0], far, [-far[0], far[1]]]], 1e-4, &mut |_, _| ());
+        let finite = |curve: &FittedCurve| curve.control.iter().flatten().all(|c| c.is_finite());
+        assert!(curves.iter().all(finite));
+    }
+}
+
+#[test]
+fn what_has_no_length_is_told() {
+    let text = "v 0 0 0\nv 0 0.000001 0\nv 5 5 0\nl 1 2\nl 1 3\n";
+    let text = text.replace("l 1 2\nl 1 3", "l 2 1\nl 3 1");
+    let Fitted { saving, .. } = fit_text(&text, 0.1).unwrap();
+    assert_eq!((saving.polylines, saving.left_out), (2, 1));
+    assert!(saving.to_string().ends_with("; 1 without a length is left out"), "{saving}");
+}
+
+#[test]
+fn curves_keep_the_pens_of_their_polylines() {
+    let text = "v 0 0 0\nv 1 0 0\nv 1 5 0\nl 1 2\nusemtl red\nl 2 3\nl 3 1\nusemtl blue\nl 1 3\n";
+    let Fitted { obj, saving } = fit_text(text, 0.1).unwrap();
+    assert_eq!(saving.polylines, 3);
+    let lines: Vec<&str> = obj.lines().collect();
+    let at = |wanted: &str| lines.iter().position(|line| *line == wanted).expect("written");
+    let curves: Vec<usize> =
+        (0..lines.len()).filter(|number| lines[*number].starts_with("curv")).collect();
+    assert_eq!(curves.len(), 3);
+    assert!(curves[0] < at("usemtl red") && at("usemtl red") < curves[1]);
+    assert!(curves[1] < at("usemtl blue") && at("usemtl blue") < curves[2]);
+}
+
+/// Work is counted in evaluations of the basis functions, which is nearly all of it.
+#[test]
+fn a_long_trace_takes_work_in_proportion_to_its_length() {
+    // Without corners, and nowhere the same.
+    let wanders = |count: usize| {
+        let (mut state, mut bend, mut angle, mut place) = (1u64, 0.0, 0.0_f64, [0.0; 2]);
+        let mut step = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            bend = 0.98 * bend + 0.04 * ((state >> 40) as f64 / f64::from(1 << 24) - 0.5);
+            angle += bend;
+            place = [place[0] + 0.1 * angle.cos(), place[1] + 0.1 * angle.sin()];
+            place
+        };
+        (0..count).map(|_| step()).collect::<Vec<Place>>()
+    };
+    let evaluations = |count| {
+        let before = least_squares::evaluations();
+        let curves = fit(&[wanders(count)], 0.1, &mut |_, _| ());
+        assert!(curves[0].control.len() * 8 < count, "{}", curves[0].control.len());
+        least_squares::evaluations() - before
+    };
+    let (short, long) = (evaluations(700), evaluations(4200));
+    assert!(long < 9 * short, "{short} evaluations for 700 places, {long} for 4200");
 }

@@ -8,6 +8,7 @@ fn sent(bytes: &[u8]) -> Vec<(usize, String)> {
     let file = read(bytes).expect("a file that can be sent");
     let lines: Vec<JobLine> = (0..file.count()).filter_map(|index| file.line(index)).collect();
     assert_eq!((lines.len(), file.line(file.count())), (file.count(), None));
+    assert!(file.lines().eq(lines.iter().cloned()));
     let number = |line: &JobLine| line.origin.as_ref().expect("from the file").line;
     lines.into_iter().map(|line| (number(&line), line.sent)).collect()
 }
