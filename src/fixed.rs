@@ -18,6 +18,16 @@ pub struct Decimal {
     exponent: i16,
 }
 
+impl fmt::Display for Decimal {
+    /// So that it is read again as it is: `5e-4`.
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.exponent {
+            0 => write!(formatter, "{}", self.mantissa),
+            exponent => write!(formatter, "{}e{exponent}", self.mantissa),
+        }
+    }
+}
+
 /// The text is no number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NotANumber;
@@ -118,6 +128,27 @@ impl Decimal {
         let value =
             i64::try_from(rounded).ok().filter(|value| *value < 1 << 62).ok_or(OutOfRange)?;
         Ok(if self.mantissa < 0 { -value } else { value })
+    }
+
+    /// How many decimals it has, without the zeros at its end.
+    ///
+    /// ```
+    /// use penup::fixed::Decimal;
+    /// for (text, decimals) in [("0.250", 2), ("-3", 0), ("1e-3", 3), ("2.5e1", 0), ("0.000", 0)] {
+    ///     assert_eq!(Decimal::parse(text)?.decimals(), decimals);
+    /// }
+    /// # Ok::<(), penup::fixed::NotANumber>(())
+    /// ```
+    pub fn decimals(self) -> u32 {
+        let (mut mantissa, mut exponent) = (self.mantissa, self.exponent);
+        while exponent < 0 && mantissa % 10 == 0 {
+            if mantissa == 0 {
+                return 0;
+            }
+            mantissa /= 10;
+            exponent += 1;
+        }
+        if exponent < 0 { u32::from(exponent.unsigned_abs()) } else { 0 }
     }
 
     /// The nearest length in millimetres.

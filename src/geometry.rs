@@ -161,69 +161,122 @@ pub fn plane_side(a: Vertex, b: Vertex, c: Vertex, d: Vertex) -> i64 {
     determinant(from_a(b), from_a(c), from_a(d))
 }
 
-/// What [`plane_side`] surely exceeds if d lies off the plane by more than rounding to whole
-/// coordinates can hide.
+/// What [`plane_side`] surely exceeds if d lies off the plane by more than rounding can hide, where no
+/// coordinate is off by more than half of `doubt`.
 ///
-/// With M the largest difference: nine minors of two products each, within 18 M^2 together, and less than
-/// M^2 + 200 for the rest. Below 2^45.
-pub fn plane_side_margin(a: Vertex, b: Vertex, c: Vertex, d: Vertex) -> i64 {
+/// With M the largest difference and D the doubt: nine minors of two products each are within
+/// 18 D M^2 together, the products of two doubts within 18 D^2 M, those of three within 6 D^3.
+/// Saturates, which means that nothing is sure.
+///
+/// ```
+/// use penup::geometry::{Vertex, plane_side_margin};
+/// let [a, b, c, d] = [0, 7, 15, 8].map(|x| Vertex::new(x, 0, 1));
+/// assert_eq!(plane_side_margin(a, b, c, d, 1), 18 * 15 * 16 + 6);
+/// ```
+pub fn plane_side_margin(a: Vertex, b: Vertex, c: Vertex, d: Vertex, doubt: u32) -> i64 {
     let differences = [b, c, d].map(|to| {
         (to.x - a.x).unsigned_abs() | (to.y - a.y).unsigned_abs() | (to.z - a.z).unsigned_abs()
     });
     let most = i64::from(differences[0] | differences[1] | differences[2]);
-    19 * most * most + 200
-}
-
-/// Whether four points of the model lie in one plane, exactly. Coordinates within ±2^30.
-///
-/// ```
-/// use penup::geometry::are_coplanar;
-/// let far = 1 << 30;
-/// assert!(are_coplanar([[-far, -far, 7], [far, -far, 7], [far, far, 7], [1, 2, 7]]));
-/// assert!(!are_coplanar([[-far, -far, 7], [far, -far, 7], [far, far, 7], [1, 2, 8]]));
-/// ```
-pub fn are_coplanar(points: [[i32; 3]; 4]) -> bool {
-    let [a, points @ ..] = points;
-    let [u, v, w] = points.map(|to| [0, 1, 2].map(|n| i128::from(to[n]) - i128::from(a[n])));
-    let minor = |m: usize, n: usize| u[m] * v[n] - u[n] * v[m];
-    minor(1, 2) * w[0] + minor(2, 0) * w[1] + minor(0, 1) * w[2] == 0
-}
-
-/// How far [`page_side`] may be off if no coordinate was rounded by more than one half.
-///
-/// ```
-/// use penup::geometry::{Projection, Vertex, page_side_doubt};
-/// let [a, b, c] = [0, 100, 200].map(|x| Vertex::new(x, 0, 1));
-/// assert_eq!(page_side_doubt(Projection::Parallel, a, b, c), 301);
-/// assert_eq!(page_side_doubt(Projection::Parallel, b, c, a), 201);
-/// ```
-pub fn page_side_doubt(projection: Projection, a: Vertex, b: Vertex, c: Vertex) -> i64 {
-    match projection {
-        Projection::Perspective => determinant_doubt(a, b, c),
-        Projection::Parallel => {
-            let extent = |to: Vertex| i64::from((to.x - a.x).abs()) + i64::from((to.y - a.y).abs());
-            extent(b) + extent(c) + 1
-        }
+    let doubt = i64::from(doubt);
+    let first = (18 * most * (most + doubt)).saturating_mul(doubt); // 2^21 and 2^32: below 2^58
+    if doubt == 1 {
+        first + 6
+    } else {
+        first.saturating_add((6 * doubt).saturating_mul(doubt * doubt))
     }
 }
 
-/// How far [`plane_side`] may be off if no coordinate was rounded by more than one half.
-pub fn plane_side_doubt(a: Vertex, b: Vertex, c: Vertex, d: Vertex) -> i64 {
-    let from_a = |to: Vertex| Vertex::new(to.x - a.x, to.y - a.y, to.z - a.z);
-    determinant_doubt(from_a(b), from_a(c), from_a(d))
+/// How far the coordinates of a model may be off, in the unit in which they are whole numbers.
+///
+/// The default is exact.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Precision {
+    /// By the rounding of whoever wrote the numbers, and by that to whole numbers; at most 2^30.
+    pub written: u32,
+    /// By the rounding to whole numbers alone; at most `written`.
+    pub unit: u32,
 }
 
-/// How far a determinant may be off if no number in it is off by more than one: less than what the
-/// minors, the numbers and one add up to.
-fn determinant_doubt(a: Vertex, b: Vertex, c: Vertex) -> i64 {
-    let minors = |a: Vertex, b: Vertex| {
-        let minor = |p: i32, q: i32, r: i32, s: i32| {
-            (i64::from(p) * i64::from(s) - i64::from(q) * i64::from(r)).abs()
-        };
-        minor(a.x, a.y, b.x, b.y) + minor(a.y, a.z, b.y, b.z) + minor(a.x, a.z, b.x, b.z)
+/// A triangle that is less than so many times the precision wide is too small to tell from its rounded
+/// corners in which plane it lies. Its plane is then taken to be exact.
+const WIDTHS: u128 = 64;
+
+/// Whether four points of the model may lie in one plane, each coordinate being off by at most what
+/// `precision` says. The first three are a triangle whose plane is meant. Coordinates within ±2^30.
+///
+/// The determinant of the four points is zero if they lie in one plane. Its twelve derivatives are
+/// the minors of its rows; so with E the precision it is at most E times the sum of their sizes,
+/// and a little more for products of two and three errors. Where the triangle is narrower than 64 E
+/// that bound would let nearly any point pass, and the precision of the unit counts alone.
+///
+/// ```
+/// use penup::geometry::{Precision, are_coplanar};
+/// let (far, exact) = (1 << 30, Precision::default());
+/// assert!(are_coplanar([[-far, -far, 7], [far, -far, 7], [far, far, 7], [1, 2, 7]], exact));
+/// let near = [[-far, -far, 7], [far, -far, 7], [far, far, 7], [1, 2, 8]];
+/// assert!(!are_coplanar(near, exact));
+/// assert!(are_coplanar(near, Precision { written: 1, unit: 1 }));
+/// ```
+#[inline(never)] // It is 128 bits wide.
+pub fn are_coplanar(points: [[i32; 3]; 4], precision: Precision) -> bool {
+    let [a, points @ ..] = points;
+    let [u, v, w] = points.map(|to| difference(to, a));
+    let (uv, vw, wu) = (cross(u, v), cross(v, w), cross(w, u));
+    let height: i128 = (0..3).map(|n| uv[n] * i128::from(w[n])).sum();
+    if height == 0 || precision.written == 0 {
+        return height == 0;
+    }
+    let side = largest(u).max(largest(v)).max(largest([0, 1, 2].map(|n| v[n] - u[n])));
+    let area = uv.iter().map(|part| part.unsigned_abs()).max().unwrap_or(0);
+    let is_wide = |off: u32| area >= WIDTHS * u128::from(off) * u128::from(side);
+    let off = [precision.written, precision.unit].into_iter().find(|off| is_wide(*off));
+    let off = u128::from(off.unwrap_or(0));
+    let size = |parts: [i128; 3]| parts.iter().map(|part| part.unsigned_abs()).sum::<u128>();
+    let derivatives =
+        size(uv) + size(vw) + size(wu) + size([0, 1, 2].map(|n| uv[n] + vw[n] + wu[n])); // below 2^69
+    let lengths = size([u, v, w].map(|to| i128::from(largest(to)))); // below 2^33
+    // At most 2^30 2^69, 2^60 2^38 and 2^96.
+    height.unsigned_abs() <= off * derivatives + 24 * off * off * lengths + 48 * off * off * off
+}
+
+/// Whether three points of the model may lie in one line, as [`are_coplanar`] says of four. The first
+/// two are the line that is meant.
+///
+/// ```
+/// use penup::geometry::{Precision, are_in_line};
+/// let points = [[0, 0, 0], [1000, 2000, 4000], [500, 1000, 2001]];
+/// assert!(!are_in_line(points, Precision::default()));
+/// assert!(are_in_line(points, Precision { written: 1, unit: 1 }));
+/// ```
+#[inline(never)] // It is 128 bits wide.
+pub fn are_in_line(points: [[i32; 3]; 3], precision: Precision) -> bool {
+    let [a, b, c] = points;
+    let (u, v) = (difference(b, a), difference(c, a));
+    let turn = cross(u, v);
+    let is_long = |off: &u32| u128::from(largest(u)) >= WIDTHS * u128::from(*off);
+    let off = [precision.written, precision.unit].into_iter().find(is_long);
+    let off = i128::from(off.unwrap_or(0));
+    // Each minor has four factors, each off by two errors.
+    let most = 4 * i128::from(largest(u)) + 4 * i128::from(largest(v)) + 8 * off;
+    turn.iter().all(|part| part.abs() <= off * most)
+}
+
+/// From a to `to`; each part within ±2^31.
+fn difference(to: [i32; 3], a: [i32; 3]) -> [i64; 3] {
+    [0, 1, 2].map(|n| i64::from(to[n]) - i64::from(a[n]))
+}
+
+fn cross(u: [i64; 3], v: [i64; 3]) -> [i128; 3] {
+    let minor = |m: usize, n: usize| {
+        i128::from(u[m]) * i128::from(v[n]) - i128::from(u[n]) * i128::from(v[m])
     };
-    let numbers = |a: Vertex| i64::from(a.x.abs()) + i64::from(a.y.abs()) + i64::from(a.z.abs());
-    minors(a, b) + minors(b, c) + minors(a, c) + 2 * (numbers(a) + numbers(b) + numbers(c)) + 6
+    [minor(1, 2), minor(2, 0), minor(0, 1)]
+}
+
+fn largest(parts: [i64; 3]) -> u64 {
+    parts.iter().fold(0, |most, part| most.max(part.unsigned_abs()))
 }
 
 fn determinant(a: Vertex, b: Vertex, c: Vertex) -> i64 {
@@ -300,44 +353,81 @@ mod tests {
     }
 
     #[test]
-    fn doubts_are_those_of_the_differences() {
-        let (a, b, c) = (Vertex::new(5, 7, 1), Vertex::new(105, 27, 1), Vertex::new(-5, 57, 1));
-        // 100 + 20 for b, 10 + 50 for c, and one.
-        assert_eq!(page_side_doubt(Projection::Parallel, a, b, c), 181);
-        let from_a = |x, y, z| Vertex::new(100 + x, 200 + y, 300 + z);
-        let (a, b, c) = (from_a(0, 0, 0), from_a(10, 0, 3), from_a(0, 20, 0));
-        let d = from_a(0, 0, 30);
-        // Minors 200 + 60, 600 and 300; twice 13, 20 and 30; and six.
-        assert_eq!(plane_side_doubt(a, b, c, d), 1160 + 126 + 6);
-        let (b, c, d) = (from_a(2, 3, 5), from_a(7, 11, 13), from_a(17, 19, 23));
-        // Minors |22 - 21| + |39 - 55| + |26 - 35|, and so on.
-        let minors = (1 + 16 + 9) + (54 + 6 + 60) + (13 + 26 + 39);
-        assert_eq!(plane_side_doubt(a, b, c, d), minors + 2 * (10 + 31 + 59) + 6);
-        assert_eq!(plane_side_margin(a, b, c, d), 19 * 31 * 31 + 200);
-    }
-
-    #[test]
     fn four_points_of_the_model_lie_in_a_plane_or_not() {
         let points = |x: i32, y: i32, z: i32| [[3, 5, 7], [13, 4, 9], [2, 15, 11], [x, y, z]];
         // (3, 5, 7) + m (10, -1, 2) + n (-1, 10, 4)
         for (m, n) in [(1, 1), (-2, 3), (4, -1), (0, 5)] {
             let at = [3 + 10 * m - n, 5 - m + 10 * n, 7 + 2 * m + 4 * n];
-            assert!(are_coplanar(points(at[0], at[1], at[2])));
+            let exact = Precision::default();
+            assert!(are_coplanar(points(at[0], at[1], at[2]), exact));
             for (dx, dy, dz) in [(1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 0, -1)] {
-                assert!(!are_coplanar(points(at[0] + dx, at[1] + dy, at[2] + dz)));
+                assert!(!are_coplanar(points(at[0] + dx, at[1] + dy, at[2] + dz), exact));
+            }
+        }
+    }
+
+    /// Numbers as if they were random.
+    fn scattered(n: i64) -> impl Fn(i64) -> i64 {
+        move |k| (n * 7919 + k * 104_729) * (n * 31 + k * 17 + 5) % 1_000_003
+    }
+
+    #[test]
+    fn points_of_one_plane_are_known_however_they_were_rounded() {
+        for n in 1..4000i64 {
+            let number = scattered(n);
+            let written = 1 + (n % 40) as i32;
+            // A point and two steps, all whole, and errors of up to `written`.
+            let [a, u, v] = [0, 3, 6].map(|k| [0, 1, 2].map(|axis| (number(k + axis) * 40) as i32));
+            let place = |i: i32, j: i32, k: i64| {
+                [0, 1, 2].map(|axis: usize| {
+                    let off = number(k + axis as i64) as i32 % (written + 1);
+                    a[axis] + i * u[axis] / 4 * 4 + j * v[axis] / 4 * 4 + off
+                })
+            };
+            let points = [
+                place(0, 0, 20),
+                place(4, 0, 30),
+                place(0, 4, 40),
+                place((n % 9) as i32 - 4, (n % 7) as i32 - 3, 50),
+            ];
+            let precision = Precision { written: written as u32, unit: 1 };
+            let area =
+                cross([0, 1, 2].map(|n| i64::from(u[n])), [0, 1, 2].map(|n| i64::from(v[n])));
+            if area.iter().any(|part| part.unsigned_abs() > 1 << 44) {
+                assert!(are_coplanar(points, precision), "{n}: {points:?}");
             }
         }
     }
 
     #[test]
-    fn the_margin_is_beyond_any_doubt() {
-        for n in 1..4000i32 {
-            let point = |k: i32| {
-                let part = |m: i32| (n * (k + 2) * m * 7919 + k * 104_729) % (1 << (n % 19 + 1));
-                Vertex::new(part(1), part(3), part(11))
+    fn a_point_off_the_plane_is_off_it() {
+        let precision = Precision { written: 500, unit: 1 };
+        let side = 1_000_000;
+        let of_plane = |z| [[0, 0, 0], [side, 0, 0], [0, side, 0], [side / 3, side / 3, z]];
+        assert!(are_coplanar(of_plane(999), precision));
+        assert!(!are_coplanar(of_plane(1300), precision));
+        // Of a triangle hardly larger than the precision nothing is known but what it says.
+        let side = 20_000;
+        let of_small = |z| [[0, 0, 0], [side, 0, 0], [0, side, 0], [side, side, z]];
+        assert!(are_coplanar(of_small(1), precision) && !are_coplanar(of_small(20), precision));
+    }
+
+    #[test]
+    fn the_margin_covers_every_rounding() {
+        for n in 1..4000i64 {
+            let number = scattered(n);
+            let doubt = 1 + (n % 9) as i32;
+            let reach = 1 << (n % 17 + 2);
+            let part = |k: i64| number(k) as i32 % reach;
+            // Four points of the plane z = x, each moved by up to half of the doubt.
+            let point = |k: i64| {
+                let off = |m: i64| number(k + m) as i32 % (doubt / 2 + 1);
+                let (x, y) = (part(k), part(k + 1));
+                Vertex::new(x + off(2), y + off(3), x + off(4))
             };
-            let [a, b, c, d] = [0, 1, 2, 3].map(point);
-            assert!(plane_side_doubt(a, b, c, d) <= plane_side_margin(a, b, c, d));
+            let [a, b, c, d] = [0, 10, 20, 30].map(point);
+            let margin = plane_side_margin(a, b, c, d, doubt as u32);
+            assert!(plane_side(a, b, c, d).abs() <= margin, "{n}");
         }
     }
 

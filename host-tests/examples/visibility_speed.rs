@@ -2,7 +2,7 @@
 
 use penup::model::Elements;
 use penup::stage::{Scratch, Undisturbed};
-use penup::visibility::{Options, Scene, find_stretches, scratch_bytes};
+use penup::visibility::{Options, Scene, Unrounded, find_stretches, scratch_bytes};
 use penup_host_tests::scene_files::{Model, Stretches, View};
 use std::time::Instant;
 
@@ -33,7 +33,7 @@ fn main() -> std::io::Result<()> {
             vertices: &view.vertices,
             elements: Elements::new(&model.corners),
             projection: view.projection,
-            positions: &[],
+            unrounded: Unrounded::UNKNOWN,
         };
         let least = scratch_bytes(&scene);
         let mut words = vec![0u64; bytes.max(least) / 8];

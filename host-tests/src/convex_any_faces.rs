@@ -10,7 +10,7 @@ use penup::convex::{
 use penup::geometry::{Projection, Vertex};
 use penup::model::{Corner, Elements};
 use penup::stage::{Scratch, Undisturbed};
-use penup::visibility::{Scene, Stretch};
+use penup::visibility::{Scene, Stretch, Unrounded};
 
 use crate::convex_solids::{Dice, any_solid};
 
@@ -67,7 +67,7 @@ pub fn is_seen_alike(dice: &mut Dice, stretches: impl Fn(&Scene<'_>) -> Vec<Stre
         vertices: &vertices,
         elements: Elements::new(&faces.corners),
         projection,
-        positions: &[],
+        unrounded: Unrounded::UNKNOWN,
     };
     let mut seen: BTreeMap<(u16, u16), Vec<bool>> = BTreeMap::new();
     for stretch in stretches(&scene) {

@@ -9,6 +9,8 @@ pub mod event_checker;
 pub mod motion_optimum;
 pub mod motion_paths;
 pub mod pin_machine;
+pub mod camera_scenes;
+pub mod exact_picture;
 pub mod exact_visibility;
 pub mod fraction;
 pub mod random_scenes;

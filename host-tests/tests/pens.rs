@@ -8,7 +8,7 @@ use penup::model::{Elements, PenWriter, Pens};
 use penup::plotter::{Board, Observer};
 use penup::stage::{Scratch, Undisturbed};
 use penup::view::View;
-use penup::visibility::{Options, Scene, Stretch, find_stretches, scratch_bytes};
+use penup::visibility::{Options, Scene, Stretch, Unrounded, find_stretches, scratch_bytes};
 use penup_host_tests::random_scenes::{Random, random_scene};
 use penup_host_tests::scene_files::Stretches;
 use penup_host_tests::whole_jobs::{Bench, job_lines};
@@ -348,7 +348,7 @@ fn pens_change_no_line_and_each_edge_has_the_lowest_of_its_own() {
             .map(|pens| Elements::with_pens(&random.corners, pens));
         let [plain, with_pens] = elements.map(|elements| {
             let (vertices, projection) = (&random.vertices[..], random.projection);
-            let scene = Scene { vertices, elements, projection, positions: &[] };
+            let scene = Scene { vertices, elements, projection, unrounded: Unrounded::UNKNOWN };
             let mut words = vec![0u64; scratch_bytes(&scene) / 8 + 2000];
             let mut found = Stretches::default();
             let options = Options { with_hidden: true, ..Options::default() };

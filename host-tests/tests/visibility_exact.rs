@@ -2,10 +2,10 @@
 //!
 //! `PENUP_SCENES` sets how many scenes there are; 2,000 if it is not set.
 
-use penup::geometry::Vertex;
+use penup::geometry::Precision;
 use penup::model::Elements;
 use penup::stage::{Scratch, Undisturbed};
-use penup::visibility::{Along, Options, Scene, find_stretches, scratch_bytes};
+use penup::visibility::{Along, Options, Scene, Unrounded, find_stretches, scratch_bytes};
 use penup_host_tests::exact_visibility::{Piece, pieces};
 use penup_host_tests::fraction::Fraction;
 use penup_host_tests::random_scenes::{RandomScene, random_scene};
@@ -23,7 +23,10 @@ fn library_pieces(random: &RandomScene, merged_blocks: bool, spare_bytes: usize)
         vertices: &random.vertices,
         elements: Elements::new(&random.corners),
         projection: random.projection,
-        positions: if spare_bytes == 0 { &positions } else { &[] },
+        unrounded: match spare_bytes {
+            0 => Unrounded::new(&positions, Precision::default(), 1),
+            _ => Unrounded::UNKNOWN,
+        },
     };
     let mut words = vec![0u64; (scratch_bytes(&scene) + spare_bytes) / 8];
     let mut stretches = Stretches::default();
@@ -82,14 +85,5 @@ fn the_second_half_of_the_random_scenes_agrees() {
 
 #[test]
 fn merged_blocks_agree() {
-    // Where the scene is so small that one unit matters, rounding cannot be told from shape.
-    let is_large = |seed: &u64| {
-        let largest = |part: fn(&Vertex) -> i32| {
-            let vertices = random_scene(*seed).vertices;
-            vertices.iter().map(|vertex| part(vertex).abs()).max()
-        };
-        largest(|vertex| vertex.x.abs().max(vertex.y.abs())) > Some(100_000)
-            && largest(|vertex| vertex.z) > Some(100_000)
-    };
-    agree((0..scene_count()).filter(is_large), true);
+    agree(0..scene_count(), true);
 }

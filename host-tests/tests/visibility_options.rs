@@ -1,10 +1,10 @@
 //! Seams, creases, merged blocks, bent faces, and everything that visibility refuses.
 
-use penup::geometry::{Along, Projection, Vertex};
+use penup::geometry::{Along, Precision, Projection, Vertex};
 use penup::model::{Corner, Elements};
 use penup::stage::{Aborted, Attention, Scratch, Undisturbed};
 use penup::visibility::{
-    Crease, Options, Report, Scene, SinkFull, Stretch, StretchSink, VisibilityError,
+    Crease, Options, Report, Scene, SinkFull, Stretch, StretchSink, Unrounded, VisibilityError,
     find_stretches, scratch_bytes,
 };
 use penup_host_tests::exact_visibility::pieces;
@@ -20,7 +20,17 @@ fn find(
     projection: Projection,
     options: Options,
 ) -> Result<(Report, Vec<Stretch>), VisibilityError> {
-    let scene = Scene { vertices, elements: Elements::new(corners), projection, positions: &[] };
+    find_in(vertices, corners, projection, Unrounded::UNKNOWN, options)
+}
+
+fn find_in(
+    vertices: &[Vertex],
+    corners: &[Corner],
+    projection: Projection,
+    unrounded: Unrounded<'_>,
+    options: Options,
+) -> Result<(Report, Vec<Stretch>), VisibilityError> {
+    let scene = Scene { vertices, elements: Elements::new(corners), projection, unrounded };
     let mut words = vec![0u64; scratch_bytes(&scene) / 8 + 4096];
     let mut stretches = Stretches::default();
     let scratch = Scratch::new(&mut words);
@@ -30,7 +40,11 @@ fn find(
 
 fn visible_length(model: &Model, at: [f64; 3], options: Options) -> Result<f64, VisibilityError> {
     let view = View::new(model, EYE, at, UP, Projection::Perspective);
-    let (_, stretches) = find(&view.vertices, &model.corners, view.projection, options)?;
+    let positions = model.vertices.iter().map(|at| at.map(|part| (part * 1e4).round() as i32));
+    let positions: Vec<[i32; 3]> = positions.collect();
+    let unrounded = Unrounded::new(&positions, Precision::default(), 1);
+    let (_, stretches) =
+        find_in(&view.vertices, &model.corners, view.projection, unrounded, options)?;
     Ok(stretches.iter().map(|stretch| length(&view, stretch)).sum())
 }
 
@@ -253,7 +267,10 @@ fn rounding_does_not_take_a_block_off_its_floor() -> Result<(), VisibilityError>
                 vertices: &view.vertices,
                 elements: Elements::new(&model.corners),
                 projection: view.projection,
-                positions: if with_positions { &positions } else { &[] },
+                unrounded: match with_positions {
+                    true => Unrounded::new(&positions, Precision::default(), 1),
+                    false => Unrounded::UNKNOWN,
+                },
             };
             let mut words = vec![0u64; scratch_bytes(&scene) / 8 + 100];
             let mut stretches = Stretches::default();
@@ -401,7 +418,7 @@ fn an_abort_a_full_sink_and_too_little_memory_end_the_search() -> std::io::Resul
         vertices: &view.vertices,
         elements: Elements::new(&model.corners),
         projection: view.projection,
-        positions: &[],
+        unrounded: Unrounded::UNKNOWN,
     };
     let least = scratch_bytes(&scene) / 8;
     let run = |words: usize, looks: usize, room: usize| {

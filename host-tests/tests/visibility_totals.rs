@@ -2,7 +2,7 @@
 
 use penup::model::Elements;
 use penup::stage::{Scratch, Undisturbed};
-use penup::visibility::{Options, Scene, find_stretches, scratch_bytes};
+use penup::visibility::{Options, Scene, Unrounded, find_stretches, scratch_bytes};
 use penup_host_tests::scene_files::{Model, Stretches, View};
 
 const TOTALS: [(&str, f64); 11] = [
@@ -28,7 +28,7 @@ fn the_least_memory_is_what_the_documentation_says() -> std::io::Result<()> {
             vertices: &view.vertices,
             elements: Elements::new(&model.corners),
             projection: view.projection,
-            positions: &[],
+            unrounded: Unrounded::UNKNOWN,
         };
         assert_eq!(scratch_bytes(&scene), bytes, "{name}");
     }
@@ -42,7 +42,7 @@ fn visible_length(name: &str, spare_bytes: usize) -> std::io::Result<f64> {
         vertices: &view.vertices,
         elements: Elements::new(&model.corners),
         projection: view.projection,
-        positions: &[],
+        unrounded: Unrounded::UNKNOWN,
     };
     let mut words = vec![0u64; (scratch_bytes(&scene) + spare_bytes) / 8];
     let mut stretches = Stretches::default();

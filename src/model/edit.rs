@@ -177,7 +177,9 @@ impl Model<'_> {
                         .map_err(|_| ModelError::CoordinateTooLarge)?;
                 }
                 let map = Map::Affine(Map::diagonal([1 << UNIT_BITS; 3]), shift);
-                self.transform(&map, range, keep)?;
+                self.transform(&map, range.clone(), keep)?;
+                let is_whole = by.iter().all(|by| by.decimals() == 0);
+                self.scale_errors(1 << UNIT_BITS, is_whole, &range);
             }
             Edit::Scale(by, numbers) => {
                 let range = self.range(Part::Vertices, numbers)?;
@@ -189,26 +191,46 @@ impl Model<'_> {
                         .ok_or(ModelError::CoordinateTooLarge)?;
                 }
                 let map = Map::Affine(Map::diagonal(factors), Map::NO_SHIFT);
-                self.transform(&map, range, keep)?;
+                self.transform(&map, range.clone(), keep)?;
+                let most = factors.iter().map(|factor| factor.unsigned_abs()).max().unwrap_or(0);
+                let is_whole = factors.iter().all(|factor| factor % (1 << UNIT_BITS) == 0);
+                self.scale_errors(most, is_whole, &range);
             }
             Edit::Rotate(axis, degrees, numbers) => {
                 let range = self.range(Part::Vertices, numbers)?;
-                self.transform(&Map::rotation(axis, degrees), range, keep)?;
+                self.transform(&Map::rotation(axis, degrees), range.clone(), keep)?;
+                if libm::fmod(degrees, 90.0) != 0.0 {
+                    self.turn_errors(&range);
+                }
             }
             Edit::Reflect(plane, numbers) => {
                 let range = self.range(Part::Vertices, numbers)?;
                 self.transform(&self.reflection(plane)?, range.clone(), keep)?;
                 self.turn_faces(&range);
+                self.turn_errors(&range);
             }
             Edit::Mirror(plane, numbers) => {
                 let range = self.range(Part::Vertices, numbers)?;
                 self.mirror(&self.reflection(plane)?, range, scratch, keep)?;
+                self.turn_errors(&(0..0));
             }
         }
         let after = self.counts();
         let [vertices, bars, faces, curves] =
             [0, 1, 2, 3].map(|part: usize| after[part] as i32 - counts[part] as i32);
         Ok(Change { vertices, bars, faces, curves })
+    }
+
+    /// The errors of the vertices in `range` were multiplied, in units of 2^-30.
+    fn scale_errors(&mut self, by: u64, is_whole: bool, range: &Range<usize>) {
+        let all = range.len() == self.vertices.len();
+        self.rounding.scale(self.fraction_bits, by, is_whole, all);
+    }
+
+    /// The errors of the vertices in `range` were turned.
+    fn turn_errors(&mut self, range: &Range<usize>) {
+        let all = range.len() == self.vertices.len();
+        self.rounding.turn(self.fraction_bits, all);
     }
 
     fn counts(&self) -> [usize; 4] {
@@ -435,6 +457,7 @@ impl Model<'_> {
                     *position = in_unit(position.coordinates().map(i64::from), bits);
                 }
             }
+            self.rounding.coarsen(bits);
             self.fraction_bits -= bits;
         }
     }

@@ -10,6 +10,7 @@ mod edit;
 mod elements;
 mod error;
 mod pens;
+mod precision;
 mod undo;
 
 pub use curves::{Curves, StoredCurve};
@@ -23,6 +24,7 @@ use bytemuck::{Pod, Zeroable};
 use core::ops::Range;
 use curves::CurveList;
 use pens::{PenBook, RUN};
+use precision::Rounding;
 
 /// A place in the model's own space: each coordinate × 2^-[`Model::fraction_bits`], |value| <= 2^30.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
@@ -66,6 +68,7 @@ pub struct Model<'m> {
     /// The corners of elements, then their [`PenRun`]s, then curves.
     corners: &'m mut heapless::VecView<Corner>,
     fraction_bits: u32,
+    rounding: Rounding,
     faces: usize,
     bars: usize,
     curves: CurveList,
@@ -84,6 +87,7 @@ impl<'m> Model<'m> {
             vertices,
             corners,
             fraction_bits: FINEST_FRACTION_BITS,
+            rounding: Rounding::default(),
             faces: 0,
             bars: 0,
             curves: CurveList::default(),
@@ -99,6 +103,7 @@ impl<'m> Model<'m> {
         self.vertices.clear();
         self.corners.clear();
         self.fraction_bits = FINEST_FRACTION_BITS;
+        self.rounding = Rounding::default();
         self.faces = 0;
         self.bars = 0;
         self.curves = CurveList::default();
@@ -244,6 +249,7 @@ impl<'m> Model<'m> {
         });
         before(self);
         self.coarsen(self.fraction_bits - fraction_bits);
+        self.rounding.write(&coordinates);
         Ok(Position { x, y, z })
     }
 
@@ -255,6 +261,7 @@ impl<'m> Model<'m> {
         for vertex in self.vertices.iter_mut() {
             *vertex = Position { x: vertex.x / unit, y: vertex.y / unit, z: vertex.z / unit };
         }
+        self.rounding.coarsen(bits);
         self.fraction_bits -= bits;
     }
 

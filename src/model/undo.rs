@@ -1,11 +1,12 @@
 //! The whole model in memory that is idle, to take back an edit.
 
 use super::pens::PenBook;
+use super::precision::Rounding;
 use super::{Corner, Model, PEN_LIMIT, Position};
 use crate::stage::{Scratch, items};
 
 /// Numbers before the vertices.
-const HEAD: usize = 11 + PEN_LIMIT as usize;
+const HEAD: usize = 13 + PEN_LIMIT as usize;
 
 impl Model<'_> {
     /// Copies the model to `words`, without a curve that has no end yet. `false` if it does not fit.
@@ -30,6 +31,7 @@ impl Model<'_> {
         let corners = self.whole_corners();
         let (curves, lengths) = (&self.curves, [self.vertices.len(), corners.len()]);
         let PenBook { names, current, by_material } = self.pens;
+        let [decimals, edited] = self.rounding.numbers();
         let (numbers, rest) = scratch.take::<u32>(HEAD).ok()?.split_first_chunk_mut()?;
         *numbers = [
             self.fraction_bits as usize,
@@ -43,6 +45,8 @@ impl Model<'_> {
             self.runs,
             current.into(),
             by_material.into(),
+            decimals,
+            edited,
         ]
         .map(|number| number as u32);
         *rest.first_chunk_mut()? = names;
@@ -59,8 +63,21 @@ impl Model<'_> {
     fn copy_from(&mut self, words: &[u64]) -> Option<()> {
         let head: &[u32] = items(words, HEAD)?;
         let (numbers, names) = head.split_first_chunk()?;
-        let [fraction_bits, vertices, corners, faces, bars, start, whole, count, runs, pen, by] =
-            *numbers;
+        let [
+            fraction_bits,
+            vertices,
+            corners,
+            faces,
+            bars,
+            start,
+            whole,
+            count,
+            runs,
+            pen,
+            by,
+            decimals,
+            edited,
+        ] = *numbers;
         let positions_at = Scratch::bytes_for::<u32>(HEAD) / 8;
         let corners_at = positions_at + Scratch::bytes_for::<Position>(vertices as usize) / 8;
         self.vertices.clear();
@@ -69,6 +86,7 @@ impl Model<'_> {
         self.corners.clear();
         self.corners.extend_from_slice(items(words.get(corners_at..)?, corners as usize)?).ok()?;
         self.fraction_bits = fraction_bits;
+        self.rounding = Rounding::from_numbers([decimals, edited]);
         (self.faces, self.bars) = (faces as usize, bars as usize);
         self.runs = runs as usize;
         let names = names.try_into().ok()?;

@@ -13,7 +13,7 @@ use crate::stage::{
     Aborted, Attention, OutOfScratch, Scratch, Stage, StageError, items, items_mut,
 };
 use crate::view::{Camera, Flattening, Seen, View, see};
-use crate::visibility::{self, Scene, SinkFull, Stretch, StretchSink, VisibilityError};
+use crate::visibility::{self, Scene, SinkFull, Stretch, StretchSink, Unrounded, VisibilityError};
 
 /// Who is shown each stretch as it is found, in view coordinates: the preview.
 pub trait Observer {
@@ -285,8 +285,10 @@ fn project(
     };
 
     attention.enter(Stage::Visibility);
+    let precision = options.precision_of(model);
     let positions = bytemuck::cast_slice(model.vertices());
-    let scene = Scene { vertices, elements, projection, positions };
+    let unrounded = Unrounded::new(positions, precision, view.doubt(precision.written));
+    let scene = Scene { vertices, elements, projection, unrounded };
     // Memory: what is taken, then visibility's, then the lines as they are found. Thrice what visibility
     // needs makes a grid as fine as is of any use; lines that are likely come before that. If
     // there turn out to be more, less and less of what is to spare must do for the grid.

@@ -1,7 +1,8 @@
 //! What is drawn and how, as the user set it.
 
 use crate::drawing::{Page, StepsPerMillimetre, Title, TitleText};
-use crate::fixed::{Length, Millimetres, SixDecimals, sin_cos_degrees};
+use crate::fixed::{Decimal, Length, Millimetres, SixDecimals, sin_cos_degrees};
+use crate::geometry::Precision;
 use crate::model::Model;
 use crate::order;
 use crate::protocol::{
@@ -30,6 +31,8 @@ pub struct PlotOptions {
     pub merged_blocks: bool,
     /// Edges between faces that bend less, in degrees, are not drawn; 0 draws every edge.
     pub crease: f64,
+    /// How far coordinates may be off, in units of the model; `None` goes by their decimals.
+    precision: Option<Decimal>,
     /// Whether one pen draws all, whatever the model says.
     pub one_pen: bool,
     /// The sheet.
@@ -63,6 +66,7 @@ impl Default for PlotOptions {
             seams: true,
             merged_blocks: false,
             crease: 0.0,
+            precision: None,
             one_pen: false,
             page: Page { width, height, margin, foot: Millimetres::ZERO },
             title: TitleText::default(),
@@ -92,6 +96,7 @@ impl PlotOptions {
             PlotOption::Seams(seams) => self.seams = seams,
             PlotOption::MergedBlocks(merged) => self.merged_blocks = merged,
             PlotOption::Crease(crease) => self.crease = crease,
+            PlotOption::Precision(precision) => self.precision = precision,
             PlotOption::OnePen(one) => self.one_pen = one,
             PlotOption::Page { width, height } => {
                 (self.page.width, self.page.height) = (width, height)
@@ -144,6 +149,14 @@ impl PlotOptions {
     pub fn order(&self, steps: StepsPerMillimetre) -> order::Options {
         let lift = self.lift.wide_mul(steps[0]).saturating_mul_int(256);
         order::Options { lift: lift.saturating_to_num(), ..self.order }
+    }
+
+    /// How far the coordinates of `model` may be off.
+    pub fn precision_of(&self, model: &Model<'_>) -> Precision {
+        match self.precision {
+            Some(chosen) => model.chosen_precision(chosen),
+            None => model.precision(),
+        }
     }
 
     /// The camera for `model`; what the user did not choose is chosen here. `None` without vertices.
@@ -238,6 +251,10 @@ impl PlotOptions {
         line(format_args!("$seams={}", on(self.seams)));
         line(format_args!("$blocks={}", if self.merged_blocks { "merged" } else { "separate" }));
         line(format_args!("$crease={}", SixDecimals(self.crease)));
+        match self.precision {
+            Some(precision) => line(format_args!("$precision={precision}")),
+            None => line(format_args!("$precision=auto")),
+        }
         line(format_args!("$pens={}", if self.one_pen { "one" } else { "auto" }));
         let [width, height, margin] =
             [self.page.width, self.page.height, self.page.margin].map(Length);

@@ -2,7 +2,7 @@
 
 use super::Refusal;
 use super::values::{PENS, direction, number, on_or_off, positive, values, whole};
-use crate::fixed::Millimetres;
+use crate::fixed::{Decimal, Millimetres};
 use crate::order;
 use crate::view::{Direction, Lens};
 
@@ -33,6 +33,8 @@ pub enum PlotOption {
     MergedBlocks(bool),
     /// `$crease=DEGREES`: edges less sharp are not drawn.
     Crease(f64),
+    /// `$precision=auto|LENGTH`: how far coordinates may be off; `None` goes by their decimals.
+    Precision(Option<Decimal>),
     /// `$pens=auto|one`: whether one pen draws all (`true`).
     OnePen(bool),
     /// `$page=WIDTHxHEIGHT` in mm
@@ -201,6 +203,14 @@ impl PlotOption {
                 }
             }),
             "hidden" => Self::Hidden(HiddenLines::parse(value)?),
+            "precision" if value == "auto" => Self::Precision(None),
+            "precision" => {
+                let precision = number(value)?;
+                if !(0.0..=1e6).contains(&precision.to_f64()) {
+                    return Err(Refusal::NumberOutOfRange);
+                }
+                Self::Precision(Some(precision))
+            }
             "pens" => Self::OnePen(match value {
                 "one" => true,
                 "auto" => false,

@@ -169,6 +169,18 @@ impl View {
         clip::clip_edge(ends, self.near.unwrap_or(i32::MIN))
     }
 
+    /// Twice what a view coordinate may be off if positions may be off by so many of their units, with
+    /// its own rounding; at least 1.
+    pub fn doubt(&self, units: u32) -> u32 {
+        let most = |row: &Row| {
+            let steepness: u64 = row.m.iter().map(|m| u64::from(m.unsigned_abs())).sum();
+            // 3 2^30 and 2^30.
+            (steepness * u64::from(units) >> (row.shift - 1)).saturating_add(1)
+        };
+        let doubt = self.rows.iter().map(most).max().unwrap_or(1) + u64::from(units > 0);
+        u32::try_from(doubt).unwrap_or(u32::MAX)
+    }
+
     /// Takes every vertex of `model` to view coordinates.
     fn fill(
         &self,

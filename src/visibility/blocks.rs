@@ -6,14 +6,12 @@
 //! faces those are is noted on the edge's profile, by rank.
 //!
 //! Blocks touch in the model; in the view each corner was rounded on its own. So "in one plane" and "on
-//! one line" mean here, and only here, as nearly as that rounding can tell: no coordinate moves by more
-//! than one half.
+//! one line" are asked of the model.
 
 use super::faces::Face;
-use super::outlook::{End, Outlook};
+use super::outlook::Outlook;
 use super::profile::{Part, Profile};
 use super::sight::{Piece, Sight, Surroundings};
-use crate::geometry::{page_side, page_side_doubt, plane_side, plane_side_doubt};
 
 /// A side of an edge, and where its profile keeps the nearest face that begins there: the rank and one.
 #[derive(Clone, Copy)]
@@ -51,19 +49,10 @@ impl Touching {
         Some(self.corners[found])
     }
 
-    /// How far a vertex lies behind this triangle; zero if rounding cannot tell it from the plane.
-    fn height(&self, outlook: &Outlook<'_>, end: End) -> i64 {
-        height(outlook, self.corners, end) * i64::from(self.facing)
+    /// Whether a vertex lies behind this triangle (positive), before it, or in its plane.
+    fn height(&self, outlook: &Outlook<'_>, vertex: u16) -> i64 {
+        outlook.height(self.corners, outlook.end(vertex)) * i64::from(self.facing)
     }
-}
-
-fn height(outlook: &Outlook<'_>, triangle: [u16; 3], end: End) -> i64 {
-    if triangle.contains(&end.number) {
-        return 0;
-    }
-    let [a, b, c] = triangle.map(|number| outlook.vertex(number));
-    let height = plane_side(a, b, c, end.vertex);
-    if height.abs() <= plane_side_doubt(a, b, c, end.vertex) { 0 } else { height.signum() }
 }
 
 impl Sight {
@@ -107,7 +96,7 @@ impl Sight {
             return false;
         };
         let outlook = &around.outlook;
-        left.corner(LEFT).is_some_and(|corner| right.height(outlook, outlook.end(corner)) == 0)
+        left.corner(LEFT).is_some_and(|corner| right.height(outlook, corner) == 0)
     }
 
     /// Whether a triangle is nearer on one side of this edge than the face of a rank.
@@ -120,7 +109,7 @@ impl Sight {
     ) -> bool {
         let outlook = &around.outlook;
         match (self.find_touching(around, than, bank), touching.corner(bank)) {
-            (Some(other), Some(corner)) => other.height(outlook, outlook.end(corner)) < 0,
+            (Some(other), Some(corner)) => other.height(outlook, corner) < 0,
             _ => false,
         }
     }
@@ -139,27 +128,36 @@ impl Sight {
     }
 
     fn touching(&self, outlook: &Outlook<'_>, triangle: [u16; 3]) -> Option<Touching> {
-        let holds = |end: End| height(outlook, triangle, end) == 0;
         let [a, b, c] = triangle;
         let facing = outlook.side(a, b, c);
-        (facing != 0 && holds(self.p) && holds(self.q)).then(|| Touching {
+        (facing != 0 && self.lies_in_plane_of(outlook, triangle)).then(|| Touching {
             corners: triangle,
-            sides: triangle.map(|corner| self.clear_side(outlook, corner)),
+            sides: triangle.map(|corner| {
+                if self.is_in_line_with(outlook, corner) {
+                    0
+                } else {
+                    self.side_of(outlook, corner)
+                }
+            }),
             facing,
         })
     }
 
-    /// On which side of this edge's line a vertex lies; zero if rounding cannot tell it from the line.
-    fn clear_side(&self, outlook: &Outlook<'_>, number: u16) -> i32 {
-        if number == self.p.number || number == self.q.number {
-            return 0;
+    /// Whether the plane of a triangle holds this edge. That of a seam is held by every plane of
+    /// either of its faces.
+    pub fn lies_in_plane_of(&self, outlook: &Outlook<'_>, triangle: [u16; 3]) -> bool {
+        match self.seam {
+            Some(seam) => seam.iter().any(|of| outlook.heights(triangle, *of) == [0; 3]),
+            None => [self.p, self.q].iter().all(|end| outlook.height(triangle, *end) == 0),
         }
-        let (p, q, vertex) = (self.p.vertex, self.q.vertex, outlook.vertex(number));
-        let side = page_side(outlook.projection, p, q, vertex);
-        if side.abs() <= page_side_doubt(outlook.projection, p, q, vertex) {
-            0
-        } else {
-            side.signum() as i32
+    }
+
+    /// Whether a vertex lies on the line of this edge, or of this seam, in the model.
+    fn is_in_line_with(&self, outlook: &Outlook<'_>, vertex: u16) -> bool {
+        let [p, q] = [self.p.number, self.q.number];
+        match self.seam {
+            Some(seam) => seam.iter().all(|of| outlook.height(*of, outlook.end(vertex)) == 0),
+            None => vertex == p || vertex == q || outlook.unrounded.are_in_line(p, q, vertex),
         }
     }
 }

@@ -50,6 +50,7 @@ mod seams;
 mod search;
 mod sight;
 mod triangles;
+mod unrounded;
 mod wire;
 
 use crate::geometry::{COORDINATE_LIMIT, Projection, Vertex};
@@ -65,6 +66,7 @@ use triangles::Ears;
 
 pub use crate::geometry::Along;
 pub use crease::Crease;
+pub use unrounded::Unrounded;
 pub use wire::follow_wire;
 
 /// A scene as the camera sees it: rounded vertices, and the faces and bars between them.
@@ -76,11 +78,9 @@ pub struct Scene<'a> {
     pub elements: Elements<'a>,
     /// Perspective or parallel.
     pub projection: Projection,
-    /// Each vertex in the model's own space, within ±2^30, as far as known; none if empty.
-    ///
-    /// Rounding to view coordinates takes a block's foot off the floor that it stands on. With these, a
-    /// vertex that lies in the plane of a face in the model lies there in the view, too.
-    pub positions: &'a [[i32; 3]],
+    /// The same vertices before they were rounded, as far as known: what lies in one plane in the model
+    /// lies there in the view, too.
+    pub unrounded: Unrounded<'a>,
 }
 
 /// What the user may choose.

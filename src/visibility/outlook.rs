@@ -2,11 +2,10 @@
 //! "on which side" answered from those places where they suffice, exactly where they do not.
 
 use super::Scene;
-use super::VisibilityError;
 use super::pace::Pace;
+use super::{Unrounded, VisibilityError};
 use crate::geometry::{
-    Along, Axis, Projection, Vertex, are_coplanar, page_offset, page_side, plane_side,
-    plane_side_margin,
+    Along, Axis, Projection, Vertex, page_offset, page_side, plane_side, plane_side_margin,
 };
 use crate::stage::{Aborted, Scratch};
 use bytemuck::{Pod, Zeroable};
@@ -180,8 +179,7 @@ pub struct Outlook<'a> {
     pub projection: Projection,
     pub vertices: &'a [Vertex],
     pub places: &'a [Place],
-    /// Each vertex in the model's space, as far as known.
-    positions: &'a [[i32; 3]],
+    pub unrounded: Unrounded<'a>,
     mapping: Mapping,
 }
 
@@ -199,7 +197,7 @@ impl<'a> Outlook<'a> {
             *place = mapping.place(vertex);
             pace.spend(TWO_DIVISIONS)?;
         }
-        Ok(Self { projection, vertices, places, positions: scene.positions, mapping })
+        Ok(Self { projection, vertices, places, unrounded: scene.unrounded, mapping })
     }
 
     /// A vertex as the end of an edge.
@@ -254,22 +252,17 @@ impl<'a> Outlook<'a> {
         }
         let [a, b, c] = triangle.map(|number| self.vertex(number));
         let height = plane_side(a, b, c, end.vertex);
-        if height.abs() <= plane_side_margin(a, b, c, end.vertex) && self.holds(triangle, end) {
+        let margin = plane_side_margin(a, b, c, end.vertex, self.unrounded.doubt());
+        if height.abs() <= margin && self.unrounded.holds(triangle, end.number) {
             0
         } else {
             height
         }
     }
 
-    /// Whether the plane of a triangle holds an end in the model.
-    #[cold]
-    fn holds(&self, triangle: [u16; 3], end: End) -> bool {
-        let [a, b, c] = triangle;
-        let at = |number: u16| self.positions.get(usize::from(number)).copied();
-        match [a, b, c, end.number].map(at) {
-            [Some(a), Some(b), Some(c), Some(d)] => are_coplanar([a, b, c, d]),
-            _ => false,
-        }
+    /// How far the corners of one triangle lie behind another, each as [`Self::height`] says.
+    pub fn heights(&self, triangle: [u16; 3], of: [u16; 3]) -> [i64; 3] {
+        of.map(|corner| self.height(triangle, self.end(corner)))
     }
 
     /// An axis of the page along which p and q differ, and the sign of their difference.
@@ -290,7 +283,7 @@ mod tests {
     use crate::stage::Undisturbed;
 
     fn scene(projection: Projection, vertices: &[Vertex]) -> Scene<'_> {
-        Scene { vertices, elements: Elements::new(&[]), projection, positions: &[] }
+        Scene { vertices, elements: Elements::new(&[]), projection, unrounded: Unrounded::UNKNOWN }
     }
 
     #[test]

@@ -35,26 +35,24 @@ impl Extent {
     }
 }
 
-/// The segment where two triangles cross, its ends rounded to whole coordinates.
+/// The segment where two triangles cross, its ends rounded to whole coordinates. `of_one`: how far the
+/// corners of the first lie behind the plane of the second, zero if it holds them; `of_other`: the
+/// same the other way round.
 ///
 /// `None` if they do not reach through each other, or only by less than rounding shows. A corner in the
 /// plane of the other triangle counts as lying on one fixed side of it, so that a seam along a diagonal,
 /// where two triangles of a face meet, is found once.
-pub fn seam(one: [Vertex; 3], other: [Vertex; 3]) -> Option<(Vertex, Vertex)> {
-    let heights = |plane: [Vertex; 3], of: [Vertex; 3]| {
-        let [a, b, c] = plane;
-        of.map(|corner| plane_side(a, b, c, corner))
-    };
+pub fn seam(
+    one: [Vertex; 3],
+    other: [Vertex; 3],
+    of_one: [i64; 3],
+    of_other: [i64; 3],
+) -> Option<(Vertex, Vertex)> {
     let crosses = |heights: [i64; 3]| {
         let above = heights.map(|height| height >= 0);
         above != [above[0]; 3]
     };
-    let of_other = heights(one, other);
-    if !crosses(of_other) {
-        return None;
-    }
-    let of_one = heights(other, one);
-    if !crosses(of_one) {
+    if !crosses(of_one) || !crosses(of_other) {
         return None;
     }
     let mut ends: Option<(Vertex, Vertex)> = None;
@@ -117,6 +115,13 @@ mod tests {
         [Vertex::new(left, 0, bottom), Vertex::new(right, 0, bottom), Vertex::new(right, 0, top)]
     }
 
+    /// The seam of triangles that were never rounded.
+    fn seam(one: [Vertex; 3], other: [Vertex; 3]) -> Option<(Vertex, Vertex)> {
+        let heights =
+            |[a, b, c]: [Vertex; 3], of: [Vertex; 3]| of.map(|corner| plane_side(a, b, c, corner));
+        super::seam(one, other, heights(other, one), heights(one, other))
+    }
+
     fn sorted(seam: Option<(Vertex, Vertex)>) -> Option<[(i32, i32, i32); 2]> {
         let (p, q) = seam?;
         let mut ends = [(p.x, p.y, p.z), (q.x, q.y, q.z)];
@@ -127,8 +132,8 @@ mod tests {
     #[test]
     fn triangles_that_cross_have_a_seam() {
         let seam = |wall| {
-            let found = sorted(seam(FLOOR, wall));
-            assert_eq!(sorted(super::seam(wall, FLOOR)), found);
+            let found = sorted(self::seam(FLOOR, wall));
+            assert_eq!(sorted(self::seam(wall, FLOOR)), found);
             found
         };
         // Inside the floor; through one border of it; through both.

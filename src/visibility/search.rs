@@ -116,20 +116,30 @@ impl<'a> Search<'a> {
         }
         let mut n = 0;
         while let Some(triangle_one) = self.around.triangle(face_one, n) {
+            n += 1;
+            pace.spend(1500)?;
+            if !self.around.passes_through(face_other, triangle_one) {
+                continue;
+            }
             let mut m = 0;
             while let Some(triangle_other) = self.around.triangle(face_other, m) {
-                pace.spend(1500)?;
+                m += 1;
+                pace.spend(3000)?;
+                if !self.around.passes_through(face_one, triangle_other) {
+                    continue;
+                }
                 let outlook = &self.around.outlook;
-                let [corners_one, corners_other] = [triangle_one, triangle_other]
-                    .map(|triangle| triangle.map(|number| outlook.vertex(number)));
-                if let Some((p, q)) = seam(corners_one, corners_other) {
+                let triangles = [triangle_one, triangle_other];
+                let [corners_one, corners_other] =
+                    triangles.map(|triangle| triangle.map(|number| outlook.vertex(number)));
+                let of_one = outlook.heights(triangle_other, triangle_one);
+                let of_other = outlook.heights(triangle_one, triangle_other);
+                if let Some((p, q)) = seam(corners_one, corners_other, of_one, of_other) {
                     let (p, q) = (outlook.free_end(p), outlook.free_end(q));
-                    let sight = Sight::new(Sight::NO_SIDE, p, q);
+                    let sight = Sight::of_seam(triangles, p, q);
                     self.follow(&sight, [Some(one), Some(other)], pace, sink)?;
                 }
-                m += 1;
             }
-            n += 1;
         }
         Ok(())
     }
@@ -234,6 +244,9 @@ impl<'a> Search<'a> {
         seen.fill(0);
         for rank in seam_of.into_iter().flatten() {
             seen[rank / 32] |= 1 << (rank % 32);
+            if options.merged_blocks {
+                sight.touch(around, faces_by_rank.get(rank), rank, profile);
+            }
         }
         let mut spent = pace.spend(1000);
         let mut look_at = |rank: u16| {

@@ -51,6 +51,18 @@ impl Surroundings<'_> {
         corners.iter().filter(shared).count() >= 2
     }
 
+    /// Whether a face has corners on both sides of the plane of a triangle. One that only touches it ends
+    /// there, with an edge or a corner.
+    pub fn passes_through(&self, face: Face, triangle: [u16; 3]) -> bool {
+        let (mut before, mut behind) = (false, false);
+        self.outlines.element(face.first).iter().any(|corner| {
+            let height = self.outlook.height(triangle, self.outlook.end(corner.vertex()));
+            before |= height < 0;
+            behind |= height > 0;
+            before && behind
+        })
+    }
+
     /// The triangles of a face.
     pub fn triangles(&self, face: Face) -> impl Iterator<Item = [u16; 3]> {
         (0..).map_while(move |number| self.triangle(face, number))
@@ -68,6 +80,8 @@ pub struct Sight {
     pub near: i32,
     /// Depth of its farther end.
     pub far: i32,
+    /// The two triangles that pass through each other there, if it is a seam.
+    pub seam: Option<[[u16; 3]; 2]>,
     low: Place,
     high: Place,
     line: CoarseLine,
@@ -154,6 +168,11 @@ impl Sight {
     /// The side of a seam, after those of all edges.
     pub const NO_SIDE: usize = usize::MAX;
 
+    /// The seam of two triangles, from p to q.
+    pub fn of_seam(triangles: [[u16; 3]; 2], p: End, q: End) -> Self {
+        Self { seam: Some(triangles), ..Self::new(Self::NO_SIDE, p, q) }
+    }
+
     /// The edge between two ends, for which `side` stands.
     pub fn new(side: usize, p: End, q: End) -> Self {
         Self {
@@ -162,6 +181,7 @@ impl Sight {
             q,
             near: p.vertex.z.min(q.vertex.z),
             far: p.vertex.z.max(q.vertex.z),
+            seam: None,
             low: p.place.low(q.place),
             high: p.place.high(q.place),
             line: CoarseLine::new(p.place, q.place),
@@ -169,7 +189,7 @@ impl Sight {
     }
 
     /// On which side of this edge's line a vertex lies on the page.
-    fn side_of(&self, outlook: &Outlook<'_>, number: u16) -> i32 {
+    pub fn side_of(&self, outlook: &Outlook<'_>, number: u16) -> i32 {
         let coarse = self.line.side(outlook.place(number));
         if coarse != 0 { coarse } else { self.exact_side_of(outlook, number) }
     }
@@ -308,8 +328,12 @@ impl Sight {
         let mut depth = None;
         for pair in corners[1..].windows(2) {
             let triangle = [corners[0], pair[0], pair[1]];
-            let height = |end: End| outlook.height(triangle, end) * i64::from(facing);
-            let here = behind_between(height(self.p), height(self.q));
+            let here = if self.seam.is_some() && self.lies_in_plane_of(outlook, triangle) {
+                None
+            } else {
+                let height = |end: End| outlook.height(triangle, end) * i64::from(facing);
+                behind_between(height(self.p), height(self.q))
+            };
             if corners.len() > 3 {
                 let is_all = here == Some(Part::WHOLE);
                 if here.is_some() && !is_all || depth.is_some_and(|depth| depth != here) {

@@ -1,0 +1,502 @@
+//! The picture of a scene that a camera rounded, by definition: what lies in one plane is taken from
+//! the grid on which the scene was made, everything else from the rounded vertices.
+//!
+//! Along an edge everything is linear in space: on which side of a line of the page a point lies, how
+//! far it lies behind a plane. So each such quantity is two whole numbers, its values at the ends.
+//! The edge is cut wherever any of them changes its sign, and between two cuts the mediant of the
+//! two speaks for the whole piece. Every triangle is asked about every edge; there is no short cut.
+//!
+//! A face counts as the triangles of the fan from its first corner, so faces must be convex.
+
+use crate::camera_scenes::{CameraScene, Place};
+use penup::geometry::{Projection, Vertex};
+use std::cmp::Ordering;
+
+/// A place along an edge: a numerator and a denominator above zero.
+pub type Ratio = (u128, u128);
+
+/// A piece of an edge, from and to as fractions of its length in space, and whether it is seen.
+pub type Piece = ((u16, u16), Ratio, Ratio, bool);
+
+/// A seam: its ends, and its visible pieces.
+#[derive(Debug, Clone)]
+pub struct Seam {
+    /// Its ends, rounded to whole coordinates.
+    pub ends: [Vertex; 2],
+    /// What is seen of it.
+    pub visible: Vec<(Ratio, Ratio)>,
+}
+
+/// Which is less.
+pub fn compare(a: Ratio, b: Ratio) -> Ordering {
+    (a.0 * b.1).cmp(&(b.0 * a.1))
+}
+
+/// A quantity that is linear along an edge, by its values at the two ends; below 2^62.
+type Linear = (i128, i128);
+
+fn zero_of(linear: Linear) -> Option<Ratio> {
+    let (p, q) = (linear.0.unsigned_abs(), linear.1.unsigned_abs());
+    (linear.0.signum() * linear.1.signum() < 0).then_some((p, p + q))
+}
+
+fn sign_at(linear: Linear, at: Ratio) -> i128 {
+    (linear.0 * (at.1 - at.0) as i128 + linear.1 * at.0 as i128).signum()
+}
+
+type Vector = [i128; 3];
+
+fn vector(vertex: Vertex) -> Vector {
+    [vertex.x, vertex.y, vertex.z].map(i128::from)
+}
+
+fn minus(a: Vector, b: Vector) -> Vector {
+    [0, 1, 2].map(|n: usize| a[n] - b[n])
+}
+
+fn cross(a: Vector, b: Vector) -> Vector {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+fn dot(a: Vector, b: Vector) -> i128 {
+    (0..3).map(|n| a[n] * b[n]).sum()
+}
+
+/// The plane through three points: its normal, and a point in it.
+#[derive(Debug, Clone, Copy)]
+struct Plane {
+    normal: Vector,
+    at: Vector,
+}
+
+impl Plane {
+    fn through([a, b, c]: [Vector; 3]) -> Self {
+        Self { normal: cross(minus(b, a), minus(c, a)), at: a }
+    }
+
+    fn height(&self, point: Vector) -> i128 {
+        dot(self.normal, minus(point, self.at))
+    }
+
+    /// The same where the eye is.
+    fn height_of_eye(&self, projection: Projection) -> i128 {
+        match projection {
+            Projection::Perspective => -dot(self.normal, self.at),
+            Projection::Parallel => -self.normal[2],
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Triangle {
+    corners: [u16; 3],
+    face: usize,
+    plane: Plane,
+    /// The sign of the eye's height over the plane; zero if it is seen edge-on.
+    eye: i128,
+    /// In which sense the corners run on the page.
+    turn: i128,
+}
+
+/// A line to be looked at: an edge, or the seam of two faces.
+#[derive(Debug, Clone, Copy)]
+struct Sight {
+    ends: [Vector; 2],
+    of: Of,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Of {
+    Edge { number: usize, vertices: [u16; 2] },
+    Seam([usize; 2]),
+}
+
+/// What is known of one triangle along one line.
+struct Passing {
+    triangle: Triangle,
+    /// Which side of each of its sides, positive within.
+    sides: [Linear; 3],
+    /// On which side of the line each corner lies on the page.
+    corners: [i128; 3],
+    /// How far behind its plane.
+    behind: Linear,
+    /// Whether its plane holds the line, and then on which side each corner lies, zero if on it.
+    holds: Option<[i128; 3]>,
+}
+
+/// A scene with its triangles and distinct edges.
+pub struct Picture<'s> {
+    scene: &'s CameraScene,
+    faces: Vec<Vec<u16>>,
+    triangles: Vec<Triangle>,
+    edges: Vec<[u16; 2]>,
+}
+
+fn on_grid(place: Place) -> Vector {
+    place.map(i128::from)
+}
+
+impl<'s> Picture<'s> {
+    /// Gets ready.
+    pub fn new(scene: &'s CameraScene) -> Self {
+        let faces: Vec<Vec<u16>> = scene
+            .corners
+            .split_inclusive(|corner| corner.is_last())
+            .map(|face| face.iter().map(|corner| corner.vertex()).collect())
+            .collect();
+        let mut picture = Self { scene, faces, triangles: Vec::new(), edges: Vec::new() };
+        for (face, corners) in picture.faces.iter().enumerate() {
+            for pair in corners[1..].windows(2) {
+                let corners = [corners[0], pair[0], pair[1]];
+                let plane = Plane::through(corners.map(|number| picture.vertex(number)));
+                let [a, b, c] = corners.map(|number| picture.vertex(number));
+                picture.triangles.push(Triangle {
+                    corners,
+                    face,
+                    plane,
+                    eye: plane.height_of_eye(scene.projection).signum(),
+                    turn: picture.side(a, b, c).signum(),
+                });
+            }
+            for (n, &from) in corners.iter().enumerate() {
+                let to = corners[(n + 1) % corners.len()];
+                let known = |edge: &[u16; 2]| *edge == [from, to] || *edge == [to, from];
+                if !picture.edges.iter().any(known) {
+                    picture.edges.push([from, to]);
+                }
+            }
+        }
+        picture
+    }
+
+    fn vertex(&self, number: u16) -> Vector {
+        vector(self.scene.vertices[usize::from(number)])
+    }
+
+    fn grid(&self, number: u16) -> Vector {
+        on_grid(self.scene.grid[usize::from(number)])
+    }
+
+    /// Whether the plane of a triangle holds a vertex before anything was rounded.
+    fn is_in_plane(&self, triangle: [u16; 3], vertex: u16) -> bool {
+        Plane::through(triangle.map(|number| self.grid(number))).height(self.grid(vertex)) == 0
+    }
+
+    fn is_in_line(&self, a: u16, b: u16, c: u16) -> bool {
+        let [a, b, c] = [a, b, c].map(|number| self.grid(number));
+        cross(minus(b, a), minus(c, a)) == [0; 3]
+    }
+
+    fn are_in_one_plane(&self, triangle: [u16; 3], face: usize) -> bool {
+        self.faces[face].iter().all(|corner| self.is_in_plane(triangle, *corner))
+    }
+
+    /// On which side of the line from a to b the point c lies on the page: positive to the left.
+    fn side(&self, a: Vector, b: Vector, c: Vector) -> i128 {
+        match self.scene.projection {
+            Projection::Perspective => dot(a, cross(b, c)),
+            Projection::Parallel => (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]),
+        }
+    }
+
+    /// How far a vertex lies behind a triangle as the eye sees it; zero if they lie in one plane.
+    fn behind(&self, triangle: &Triangle, vertex: u16) -> i128 {
+        if self.is_in_plane(triangle.corners, vertex) {
+            return 0;
+        }
+        -triangle.eye * triangle.plane.height(self.vertex(vertex))
+    }
+
+    fn passing(&self, triangle: Triangle, sight: &Sight) -> Passing {
+        let [p, q] = sight.ends;
+        let corners = triangle.corners.map(|number| self.side(p, q, self.vertex(number)).signum());
+        let sides = [0, 1, 2].map(|n: usize| {
+            let [a, b] = [n, (n + 1) % 3].map(|n| self.vertex(triangle.corners[n]));
+            (triangle.turn * self.side(a, b, p), triangle.turn * self.side(a, b, q))
+        });
+        let (behind, holds) = match sight.of {
+            Of::Edge { vertices, .. } => {
+                let [p, q] = vertices.map(|vertex| self.behind(&triangle, vertex));
+                let holds =
+                    vertices.iter().all(|vertex| self.is_in_plane(triangle.corners, *vertex));
+                let [from, to] = vertices;
+                let corner = |n: usize| {
+                    let is_on = self.is_in_line(from, to, triangle.corners[n]);
+                    if is_on { 0 } else { corners[n] }
+                };
+                ((p, q), holds.then(|| [0, 1, 2].map(corner)))
+            }
+            Of::Seam(faces) => {
+                let is_of = |face: &usize| {
+                    *face == triangle.face || self.are_in_one_plane(triangle.corners, *face)
+                };
+                let behind = |point| -triangle.eye * triangle.plane.height(point);
+                let corner = |n: usize| {
+                    let is_on = |face: &usize| {
+                        let [a, b, c] = [0, 1, 2].map(|n: usize| self.faces[*face][n]);
+                        self.is_in_plane([a, b, c], triangle.corners[n])
+                    };
+                    if faces.iter().all(is_on) { 0 } else { corners[n] }
+                };
+                match faces.iter().any(is_of) {
+                    true => ((0, 0), Some([0, 1, 2].map(corner))),
+                    false => ((behind(p), behind(q)), None),
+                }
+            }
+        };
+        Passing { triangle, sides, corners, behind, holds }
+    }
+
+    /// Other edges that lie on the same line of the page: before, after, and behind them.
+    fn shadows(&self, sight: &Sight) -> Vec<(usize, [Linear; 3])> {
+        let [p, q] = sight.ends;
+        let projection = self.scene.projection;
+        let offset = |axis: usize, a: Vector, b: Vector| match projection {
+            Projection::Perspective => b[axis] * a[2] - a[axis] * b[2],
+            Projection::Parallel => b[axis] - a[axis],
+        };
+        let axis = usize::from(offset(0, p, q) == 0);
+        let mut shadows = Vec::new();
+        for (number, edge) in self.edges.iter().enumerate() {
+            let [a, b] = edge.map(|number| self.vertex(number));
+            let is_self = matches!(sight.of, Of::Edge { number: own, .. } if own == number);
+            if is_self
+                || self.side(p, q, a) != 0
+                || self.side(p, q, b) != 0
+                || offset(axis, a, b) == 0
+            {
+                continue;
+            }
+            let along = |from: Vector| (offset(axis, from, p), offset(axis, from, q));
+            let depth = |x: Vector| {
+                (b[axis] - a[axis]) * (x[2] - a[2]) - (b[2] - a[2]) * (x[axis] - a[axis])
+            };
+            let eye = match projection {
+                Projection::Perspective => depth([0; 3]),
+                Projection::Parallel => -(b[axis] - a[axis]),
+            };
+            let behind = (-eye.signum() * depth(p), -eye.signum() * depth(q));
+            shadows.push((number, [along(a), along(b), behind]));
+        }
+        shadows
+    }
+
+    /// The pieces of a line: from, to, whether it is hidden and whether it is drawn.
+    fn look(&self, sight: &Sight, merged: bool) -> Vec<(Ratio, Ratio, bool, bool)> {
+        let passings: Vec<Passing> = self
+            .triangles
+            .iter()
+            .filter(|triangle| triangle.turn != 0)
+            .map(|triangle| self.passing(*triangle, sight))
+            .collect();
+        let shadows = self.shadows(sight);
+        let mut cuts: Vec<Ratio> = vec![(0, 1), (1, 1)];
+        for passing in &passings {
+            cuts.extend(passing.sides.into_iter().filter_map(zero_of));
+            cuts.extend(zero_of(passing.behind));
+        }
+        for (_, linears) in &shadows {
+            cuts.extend(linears.iter().filter_map(|linear| zero_of(*linear)));
+        }
+        cuts.sort_by(|a, b| compare(*a, *b));
+        cuts.dedup_by(|a, b| compare(*a, *b) == Ordering::Equal);
+        cuts.windows(2)
+            .map(|pair| {
+                let at = (pair[0].0 + pair[1].0, pair[0].1 + pair[1].1);
+                let is_hidden = [1, -1].into_iter().all(|beside| {
+                    passings.iter().any(|passing| {
+                        sign_at(passing.behind, at) > 0 && covers(passing, at, beside)
+                    })
+                });
+                let is_drawn = !self.is_stood_in(sight, &shadows, at)
+                    && !(merged && self.is_flat(&passings, at));
+                (pair[0], pair[1], is_hidden, is_drawn)
+            })
+            .collect()
+    }
+
+    fn is_stood_in(&self, sight: &Sight, shadows: &[(usize, [Linear; 3])], at: Ratio) -> bool {
+        shadows.iter().any(|(number, [from_a, from_b, behind])| {
+            if sign_at(*from_a, at) * sign_at(*from_b, at) >= 0 {
+                return false;
+            }
+            match (sign_at(*behind, at), sight.of) {
+                (0, Of::Edge { number: own, .. }) => *number < own,
+                (0, Of::Seam(_)) => true,
+                (sign, _) => sign > 0,
+            }
+        })
+    }
+
+    /// Whether the nearest triangles that lie beside the line, in a plane with it, are one plane.
+    fn is_flat(&self, passings: &[Passing], at: Ratio) -> bool {
+        let nearest = |beside: i128| {
+            let mut best: Option<(&Triangle, u16)> = None;
+            for passing in passings {
+                let Some(corners) = passing.holds else { continue };
+                let is_there = |n: usize| corners[n] * beside > 0;
+                let crosses = |n: &usize| is_there(*n) != is_there((n + 1) % 3);
+                let Some(corner) = (0..3).find(|n| is_there(*n)) else { continue };
+                let mut crossing = (0..3).filter(crosses).peekable();
+                if crossing.peek().is_none() || crossing.any(|n| sign_at(passing.sides[n], at) <= 0)
+                {
+                    continue;
+                }
+                let corner = passing.triangle.corners[corner];
+                if best.is_none_or(|(known, _)| self.behind(known, corner) < 0) {
+                    best = Some((&passing.triangle, corner));
+                }
+            }
+            best
+        };
+        match (nearest(1), nearest(-1)) {
+            (Some((_, corner)), Some((right, _))) => self.behind(right, corner) == 0,
+            _ => false,
+        }
+    }
+
+    /// The visible and the hidden pieces of every edge, in the order of the elements.
+    pub fn pieces(&self, merged: bool) -> Vec<Piece> {
+        let mut pieces: Vec<Piece> = Vec::new();
+        for (number, &vertices) in self.edges.iter().enumerate() {
+            let ends = vertices.map(|vertex| self.vertex(vertex));
+            if self.is_point(ends) {
+                continue;
+            }
+            let sight = Sight { ends, of: Of::Edge { number, vertices } };
+            let [from, to] = vertices;
+            for (begin, end, is_hidden, is_drawn) in self.look(&sight, merged) {
+                if !is_hidden && !is_drawn {
+                    continue;
+                }
+                match pieces.last_mut() {
+                    Some(last)
+                        if last.0 == (from, to)
+                            && compare(last.2, begin) == Ordering::Equal
+                            && last.3 != is_hidden =>
+                    {
+                        last.2 = end;
+                    }
+                    _ => pieces.push(((from, to), begin, end, !is_hidden)),
+                }
+            }
+        }
+        pieces
+    }
+
+    fn is_point(&self, [p, q]: [Vector; 2]) -> bool {
+        match self.scene.projection {
+            Projection::Perspective => cross(p, q) == [0; 3],
+            Projection::Parallel => p[0] == q[0] && p[1] == q[1],
+        }
+    }
+
+    /// Every seam with what is seen of it.
+    pub fn seams(&self, merged: bool) -> Vec<Seam> {
+        let mut seams = Vec::new();
+        for other in 0..self.faces.len() {
+            for one in 0..other {
+                if self.shared(one, other) >= 2
+                    || !self.is_through(one, other)
+                    || !self.is_through(other, one)
+                {
+                    continue;
+                }
+                let of = |face: usize| self.triangles.iter().filter(move |t| t.face == face);
+                for first in of(one) {
+                    for second in of(other) {
+                        let Some(ends) = self.crossing(first, second) else { continue };
+                        let ends = ends.map(vector);
+                        if self.is_point(ends) {
+                            continue;
+                        }
+                        let sight = Sight { ends, of: Of::Seam([one, other]) };
+                        let mut visible: Vec<(Ratio, Ratio)> = Vec::new();
+                        for (from, to, is_hidden, is_drawn) in self.look(&sight, merged) {
+                            match visible.last_mut() {
+                                _ if is_hidden || !is_drawn => {}
+                                Some(last) if compare(last.1, from) == Ordering::Equal => {
+                                    last.1 = to
+                                }
+                                _ => visible.push((from, to)),
+                            }
+                        }
+                        let round =
+                            |at: Vector| Vertex::new(at[0] as i32, at[1] as i32, at[2] as i32);
+                        seams.push(Seam { ends: ends.map(round), visible });
+                    }
+                }
+            }
+        }
+        seams
+    }
+
+    /// How many corners two faces have in common.
+    fn shared(&self, one: usize, other: usize) -> usize {
+        let is_there = |corner: &&u16| self.faces[other].contains(corner);
+        self.faces[one].iter().filter(is_there).count()
+    }
+
+    /// Whether a face has corners on both sides of the plane of another.
+    fn is_through(&self, face: usize, plane: usize) -> bool {
+        let [a, b, c] = [0, 1, 2].map(|n: usize| self.grid(self.faces[plane][n]));
+        let plane = Plane::through([a, b, c]);
+        let signs = self.faces[face].iter().map(|corner| plane.height(self.grid(*corner)).signum());
+        let (low, high) = signs.fold((0, 0), |(low, high), sign| (low.min(sign), high.max(sign)));
+        (low, high) == (-1, 1)
+    }
+
+    /// The segment that two triangles have in common, rounded; a corner in the plane of the other
+    /// triangle counts as lying on the positive side of it.
+    fn crossing(&self, one: &Triangle, other: &Triangle) -> Option<[Vertex; 2]> {
+        let along = cross(one.plane.normal, other.plane.normal);
+        let axis = (0..3).max_by_key(|axis| along[*axis].abs())?;
+        // Where the border of a triangle passes a plane: points as fractions of one denominator.
+        let passes = |triangle: &Triangle, plane: &Triangle| -> Option<[(Vector, i128); 2]> {
+            let height = |corner: u16| match self.is_in_plane(plane.corners, corner) {
+                true => 0,
+                false => plane.plane.height(self.vertex(corner)),
+            };
+            let mut points = (0..3).filter_map(|n| {
+                let [a, b] = [n, (n + 1) % 3].map(|n| triangle.corners[n]);
+                let (at_a, at_b) = (height(a), height(b));
+                ((at_a >= 0) != (at_b >= 0)).then(|| {
+                    let (from, to) = (at_a.abs(), at_b.abs());
+                    let (a, b) = (self.vertex(a), self.vertex(b));
+                    ([0, 1, 2].map(|n: usize| a[n] * to + b[n] * from), from + to)
+                })
+            });
+            let pair = [points.next()?, points.next()?];
+            let is_before = compare_along(&pair[0], &pair[1], axis) == Ordering::Less;
+            Some(if is_before { pair } else { [pair[1], pair[0]] })
+        };
+        let ([a, b], [c, d]) = (passes(one, other)?, passes(other, one)?);
+        let low = if compare_along(&a, &c, axis) == Ordering::Less { c } else { a };
+        let high = if compare_along(&b, &d, axis) == Ordering::Less { b } else { d };
+        if compare_along(&low, &high, axis) != Ordering::Less {
+            return None;
+        }
+        let ends = [low, high].map(|(sum, by)| {
+            let [x, y, z] = sum.map(|part| (2 * part + by).div_euclid(2 * by) as i32);
+            Vertex::new(x, y, z)
+        });
+        (ends[0] != ends[1]).then_some(ends)
+    }
+}
+
+/// Which of two points, each given as a sum and what to divide it by, is less along an axis.
+fn compare_along(a: &(Vector, i128), b: &(Vector, i128), axis: usize) -> Ordering {
+    // Below 2^20 2^62 2^62: too long to multiply, so whole parts first.
+    let whole = |(sum, by): &(Vector, i128)| (sum[axis].div_euclid(*by), sum[axis].rem_euclid(*by));
+    let ((whole_a, rest_a), (whole_b, rest_b)) = (whole(a), whole(b));
+    whole_a.cmp(&whole_b).then((rest_a * b.1).cmp(&(rest_b * a.1)))
+}
+
+/// Whether the page just beside a line, to the left (1) or right (-1), lies within a triangle.
+fn covers(passing: &Passing, at: Ratio, beside: i128) -> bool {
+    (0..3).all(|n| match passing.sides[n] {
+        // The line of the page that is looked along: the third corner tells.
+        (0, 0) => passing.corners[(n + 2) % 3] * beside > 0,
+        side => sign_at(side, at) > 0,
+    })
+}

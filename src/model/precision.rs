@@ -1,0 +1,225 @@
+//! How far the coordinates may be off: what was written rounded, and what every edit adds to that.
+
+use super::{FINEST_FRACTION_BITS, Model};
+use crate::fixed::Decimal;
+use crate::geometry::Precision;
+
+/// Numbers with fewer decimals are meant as they stand: `0.25`, or a grid of steps of 0.1.
+const FEWEST_ROUNDED: u32 = 3;
+
+/// What is known of the rounding of a model's coordinates.
+///
+/// The greatest number of decimals in the model counts, without zeros at the end: whether a modeller
+/// writes those zeros makes no difference. From three decimals on, the last one is taken to be
+/// rounded. Fewer are taken to be exact, and so are whole numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Rounding {
+    /// The greatest number of decimals of the coordinates that were sent.
+    decimals: u8,
+    /// Whether an error along one axis may since have been turned into all three.
+    turned: bool,
+    /// What edits have made of the errors, in the model's unit.
+    edited: u32,
+}
+
+impl Rounding {
+    /// Takes note of coordinates that were sent.
+    pub(super) fn write(&mut self, coordinates: &[Decimal]) {
+        for coordinate in coordinates {
+            let decimals = coordinate.decimals().min(u8::MAX.into()) as u8;
+            self.decimals = self.decimals.max(decimals);
+        }
+    }
+
+    /// What each coordinate may be off, in units of 2^-`fraction_bits`.
+    fn precision(&self, fraction_bits: u32) -> Precision {
+        let unit = u32::from(self.decimals > 0);
+        let decimals = u32::from(self.decimals);
+        let half = match 10u64.checked_pow(decimals) {
+            _ if decimals < FEWEST_ROUNDED => 0,
+            Some(power) => ((1 << fraction_bits) / (2 * power).max(1)) as u32 + 1, // at most 2^30
+            None => 1,
+        };
+        let written = (half + unit).max(self.edited);
+        Precision { written, unit: written.min(1) }
+    }
+
+    /// As the unit grows by `bits`.
+    pub(super) fn coarsen(&mut self, bits: u32) {
+        if self.edited > 0 && bits > 0 {
+            self.edited = (self.edited >> bits) + 2;
+        }
+    }
+
+    /// As coordinates are multiplied by a number, in units of 2^-30, and rounded if it is not whole.
+    pub(super) fn scale(&mut self, fraction_bits: u32, by: u64, is_whole: bool, all: bool) {
+        const BITS: u32 = FINEST_FRACTION_BITS;
+        let written = u64::from(self.precision(fraction_bits).written);
+        // Below 2^31 2^51; what is larger than the model is large enough.
+        let scaled = u128::from(written) * u128::from(by) >> BITS;
+        let scaled = u32::try_from(scaled).unwrap_or(u32::MAX).min(1 << BITS);
+        let more = u32::from(written > 0) + u32::from(!is_whole);
+        if all {
+            (self.decimals, self.edited) = (0, 0);
+        }
+        self.edited = self.edited.max(scaled.saturating_add(more));
+    }
+
+    /// As coordinates are turned. An error within a cube lies within the sphere around it, and stays
+    /// there however often it is turned: 7/4 is more than the square root of 3.
+    pub(super) fn turn(&mut self, fraction_bits: u32, all: bool) {
+        const WHOLE: u64 = 1 << FINEST_FRACTION_BITS;
+        let by = if self.turned { WHOLE } else { WHOLE / 4 * 7 };
+        self.scale(fraction_bits, by, false, all);
+        self.turned = true;
+    }
+
+    /// The same as two numbers, to be kept.
+    pub(super) fn numbers(&self) -> [usize; 2] {
+        [usize::from(self.decimals) << 1 | usize::from(self.turned), self.edited as usize]
+    }
+
+    /// What these numbers stand for.
+    pub(super) fn from_numbers([decimals, edited]: [u32; 2]) -> Self {
+        Self { decimals: (decimals >> 1) as u8, turned: decimals & 1 != 0, edited }
+    }
+}
+
+impl Model<'_> {
+    /// How far each coordinate may be off, in the model's unit: by half of the last decimal that was
+    /// written if there are three or more, and by what the unit and edits have added.
+    ///
+    /// ```
+    /// use penup::fixed::Decimal;
+    /// use penup::model::{Model, unkept};
+    /// let (mut vertices, mut corners) = (heapless::Vec::<_, 2>::new(), heapless::Vec::<_, 2>::new());
+    /// let mut model = Model::new(&mut vertices, &mut corners);
+    /// model.add_vertex(["8", "2.5", "0"].map(|text| Decimal::parse(text).unwrap()), &mut unkept)?;
+    /// assert_eq!(model.precision().written, 1); // Exact but for the unit.
+    /// model.add_vertex(["1", "2.540", "0.125"].map(|text| Decimal::parse(text).unwrap()), &mut unkept)?;
+    /// let half = model.precision().written as f64 / (1 << model.fraction_bits()) as f64;
+    /// assert!((half - 0.0005).abs() < 1e-7);
+    /// # Ok::<(), penup::model::ModelError>(())
+    /// ```
+    pub fn precision(&self) -> Precision {
+        self.rounding.precision(self.fraction_bits)
+    }
+
+    /// The precision where the user says how far coordinates may be off, in units of the model; zero
+    /// means that they are meant as they stand.
+    pub fn chosen_precision(&self, chosen: Decimal) -> Precision {
+        let known = self.precision();
+        let units = chosen.to_binary(self.fraction_bits).unwrap_or(i64::MAX);
+        let written = u32::try_from(units).unwrap_or(u32::MAX).min(1 << FINEST_FRACTION_BITS);
+        Precision { written: written.max(known.unit), unit: known.unit }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::*;
+    use super::*;
+    use crate::stage::Scratch;
+
+    fn decimals(texts: [&str; 3]) -> [Decimal; 3] {
+        texts.map(|text| Decimal::parse(text).unwrap())
+    }
+
+    fn with_vertices(places: &[[&str; 3]], test: impl FnOnce(&mut Model<'_>)) {
+        let mut vertices = heapless::Vec::<Position, 8>::new();
+        let mut corners = heapless::Vec::<Corner, 4>::new();
+        let mut model = Model::new(&mut vertices, &mut corners);
+        for place in places {
+            model.add_vertex(decimals(*place), &mut unkept).unwrap();
+        }
+        test(&mut model);
+    }
+
+    /// The precision in units of the model.
+    fn written(model: &Model<'_>) -> f64 {
+        f64::from(model.precision().written) / (model.fraction_bits() as f64).exp2()
+    }
+
+    fn is_about(found: f64, expected: f64) -> bool {
+        (found - expected).abs() < 1e-7
+    }
+
+    #[test]
+    fn whole_numbers_are_exact_and_stay_so() {
+        with_vertices(&[["1000", "0", "1"], ["0", "2", "3"]], |model| {
+            assert_eq!(model.precision(), Precision::default());
+            let edits = [
+                Edit::Rotate(2, 90.0, None),
+                Edit::Scale(decimals(["3", "-2", "1"]), None),
+                Edit::Translate(decimals(["5", "0", "-7"]), None),
+            ];
+            for edit in edits {
+                model.edit(edit, Scratch::new(&mut []), &mut unkept).unwrap();
+                assert_eq!(model.precision(), Precision::default(), "{edit:?}");
+            }
+        });
+    }
+
+    #[test]
+    fn few_decimals_are_meant_as_they_stand() {
+        for place in [["0.1", "0.2", "0"], ["0.25", "1.75", "2.50"], ["0.100", "0.2000", "1e-2"]] {
+            with_vertices(&[place, ["100", "1", "1"]], |model| {
+                assert_eq!(model.precision(), Precision { written: 1, unit: 1 });
+            });
+        }
+    }
+
+    #[test]
+    fn the_most_decimals_count_wherever_zeros_end() {
+        for last in ["0.125000", "0.125", "1.25e-1"] {
+            with_vertices(&[["0.000001", "5", last], ["9", "-2.5", "0.75"]], |model| {
+                assert!(is_about(written(model), 5e-7));
+            });
+        }
+    }
+
+    #[test]
+    fn the_precision_survives_a_coarser_unit_and_undoing() {
+        with_vertices(&[["0.1234", "0", "0"]], |model| {
+            assert!(is_about(written(model), 5e-5));
+            let mut words = [0; 64];
+            assert!(model.save(&mut words));
+            model.add_vertex(decimals(["1000", "0", "0"]), &mut unkept).unwrap();
+            assert!((written(model) - 5e-5).abs() < 3e-6);
+            model.edit(Edit::Rotate(0, 10.0, None), Scratch::new(&mut []), &mut unkept).unwrap();
+            assert!(written(model) > 8e-5);
+            model.restore(&words);
+            assert!(is_about(written(model), 5e-5));
+            model.clear();
+            assert_eq!(model.precision(), Precision::default());
+        });
+    }
+
+    #[test]
+    fn edits_carry_the_error_along() {
+        let place = ["0.123", "0.5", "0"];
+        with_vertices(&[place, ["7", "7", "7"]], |model| {
+            let mut edit = |model: &mut Model<'_>, edit| {
+                model.edit(edit, Scratch::new(&mut [0; 4]), &mut unkept).unwrap();
+                written(model)
+            };
+            assert!(is_about(
+                edit(model, Edit::Scale(decimals(["0.1", "0.1", "0.2"]), None)),
+                1e-4
+            ));
+            // However often it is turned, the error lies in the same sphere.
+            for _ in 0..40 {
+                let turned = edit(model, Edit::Rotate(1, 33.0, None));
+                assert!((1.7e-4..1.8e-4).contains(&turned), "{turned}");
+            }
+            assert!(edit(model, Edit::Scale(decimals(["9", "1", "1"]), Some([1, 1]))) > 15e-4);
+            // What is sent afterwards has its own.
+            model.clear();
+            model.add_vertex(decimals(place), &mut unkept).unwrap();
+            assert!(is_about(written(model), 5e-4));
+            assert_eq!(model.chosen_precision(Decimal::parse("0").unwrap()).written, 1);
+            let chosen = model.chosen_precision(Decimal::parse("0.25").unwrap()).written;
+            assert_eq!(chosen, 1 << (model.fraction_bits() - 2));
+        });
+    }
+}
