@@ -197,6 +197,11 @@ pub struct ViewArgs {
         help_heading = "Camera"
     )]
     pub crease: f64,
+    /// How far coordinates may be off, in units of the model: half of the last of three or more
+    /// decimals (auto), or a number; 0 takes them as they stand
+    #[arg(long, value_name = "LENGTH", value_parser = precision, default_value = "auto",
+          allow_hyphen_values = true, help_heading = "Camera")]
+    pub precision: String,
     /// Whether the file's usemtl, or else its groups, choose pens: pen1 to pen32, or by name
     #[arg(long, value_enum, default_value = "auto", help_heading = "Page")]
     pub pens: Pens,
@@ -272,6 +277,7 @@ impl ViewArgs {
                 Blocks::Merged => "merged",
             },
             crease: self.crease,
+            precision: self.precision.clone(),
             see: match self.see {
                 See::Faces => "faces",
                 See::Wire => "wire",
@@ -302,6 +308,10 @@ impl ViewArgs {
 
 fn projection(text: &str) -> Result<String, String> {
     understood("projection", text)
+}
+
+fn precision(text: &str) -> Result<String, String> {
+    understood("precision", text)
 }
 
 fn hidden(text: &str) -> Result<String, String> {

@@ -2,7 +2,8 @@
 
 use crate::protocol::{
     ANGLES, AT, BEHIND, BLOCKS, CLEAR, CREASE, CYCLE, EFFORT, EYE, FIT, HIDDEN, LIFT, MARGIN,
-    ORDER, PAGE, PENS, PROJECTION, SEAMS, SEE, TITLE, TITLE_SIZE, UP, VIEW_AUTO, setting,
+    ORDER, PAGE, PENS, PRECISION, PROJECTION, SEAMS, SEE, TITLE, TITLE_SIZE, UP, VIEW_AUTO,
+    setting,
 };
 use crate::source::{JobLine, Lines};
 use crate::watch::PenRuns;
@@ -126,6 +127,8 @@ pub struct Settings {
     pub blocks: &'static str,
     /// Degrees.
     pub crease: f64,
+    /// `auto`, or a length in units of the model, as the plotter understands it.
+    pub precision: String,
     /// `faces`, `wire`, `vertices` or `edges`.
     pub see: &'static str,
     /// What becomes of hidden lines, as the plotter understands it.
@@ -177,6 +180,7 @@ impl<L: Lines> Job<L> {
             format!("{SEAMS}={}", settings.seams),
             format!("{BLOCKS}={}", settings.blocks),
             setting(CREASE, &[settings.crease], ','),
+            format!("{PRECISION}={}", settings.precision),
             format!("{SEE}={}", settings.see),
             format!("{HIDDEN}={}", settings.hidden),
             setting(PAGE, &[page.width, page.height], 'x'),
@@ -261,6 +265,7 @@ mod tests {
             seams: "on",
             blocks: "separate",
             crease: 0.0,
+            precision: "auto".to_owned(),
             see: "faces",
             hidden: "dotted".to_owned(),
             pens: "auto",
@@ -292,6 +297,7 @@ mod tests {
                 "$seams=on",
                 "$blocks=separate",
                 "$crease=0",
+                "$precision=auto",
                 "$see=faces",
                 "$hidden=dotted",
                 "$page=210x297",

@@ -29,6 +29,8 @@ pub const SEAMS: &str = "$seams";
 pub const BLOCKS: &str = "$blocks";
 /// Edges that bend less are left out.
 pub const CREASE: &str = "$crease";
+/// How far coordinates may be off.
+pub const PRECISION: &str = "$precision";
 /// Perspective or another.
 pub const PROJECTION: &str = "$projection";
 /// How it is found out what is seen.

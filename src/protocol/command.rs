@@ -113,6 +113,10 @@ pub const HELP: &[(&str, &str)] = &[
     ("$seams=on|off", "whether the lines are drawn where faces pass through each other"),
     ("$blocks=separate|merged", "whether blocks that touch are drawn as one shape"),
     ("$crease=DEGREES", "leave out edges between faces that bend less; 0 draws every edge"),
+    (
+        "$precision=auto|LENGTH",
+        "how far coordinates may be off: auto goes by their decimals, 0 takes them as they stand",
+    ),
     ("$pens=auto|one", "whether usemtl, or else g, chooses pens, or one draws all"),
     ("$page=WIDTHxHEIGHT", "size of the sheet in mm"),
     ("$margin=MM", "what stays free on each side of the sheet"),

@@ -48,7 +48,8 @@ const EMULATOR: [&str; 2] = ["--features", "penup-host-tests/emulator"];
 pub fn random_scenes(count: u32) -> Result<()> {
     step(
         workspace("test")
-            .args(["--release", "--package", "penup-host-tests", "--test", "visibility_exact"])
+            .args(["--release", "--package", "penup-host-tests"])
+            .args(["--test", "visibility_exact", "--test", "visibility_cameras"])
             .env("PENUP_SCENES", count.to_string()),
     )
 }
