@@ -308,9 +308,9 @@ impl<'s> Picture<'s> {
                         sign_at(passing.behind, at) > 0 && covers(passing, at, beside)
                     })
                 });
-                let is_drawn = !self.is_stood_in(sight, &shadows, at)
-                    && !(merged && self.is_flat(&passings, at));
-                (pair[0], pair[1], is_hidden, is_drawn)
+                let is_left_out =
+                    self.is_stood_in(sight, &shadows, at) || merged && self.is_flat(&passings, at);
+                (pair[0], pair[1], is_hidden, !is_left_out)
             })
             .collect()
     }

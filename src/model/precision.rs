@@ -56,7 +56,7 @@ impl Rounding {
         const BITS: u32 = FINEST_FRACTION_BITS;
         let written = u64::from(self.precision(fraction_bits).written);
         // Below 2^31 2^51; what is larger than the model is large enough.
-        let scaled = u128::from(written) * u128::from(by) >> BITS;
+        let scaled = (u128::from(written) * u128::from(by)) >> BITS;
         let scaled = u32::try_from(scaled).unwrap_or(u32::MAX).min(1 << BITS);
         let more = u32::from(written > 0) + u32::from(!is_whole);
         if all {
@@ -199,7 +199,7 @@ mod tests {
     fn edits_carry_the_error_along() {
         let place = ["0.123", "0.5", "0"];
         with_vertices(&[place, ["7", "7", "7"]], |model| {
-            let mut edit = |model: &mut Model<'_>, edit| {
+            let edit = |model: &mut Model<'_>, edit| {
                 model.edit(edit, Scratch::new(&mut [0; 4]), &mut unkept).unwrap();
                 written(model)
             };

@@ -175,7 +175,7 @@ impl View {
         let most = |row: &Row| {
             let steepness: u64 = row.m.iter().map(|m| u64::from(m.unsigned_abs())).sum();
             // 3 2^30 and 2^30.
-            (steepness * u64::from(units) >> (row.shift - 1)).saturating_add(1)
+            ((steepness * u64::from(units)) >> (row.shift - 1)).saturating_add(1)
         };
         let doubt = self.rows.iter().map(most).max().unwrap_or(1) + u64::from(units > 0);
         u32::try_from(doubt).unwrap_or(u32::MAX)
