@@ -4,6 +4,7 @@ use crate::fit::{FitError, TOLERANCES};
 use crate::job::{Page, Settings};
 use crate::machines::Board;
 use crate::protocol::TITLE;
+use crate::words::told;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use penup::drawing::TitleText;
 use penup::protocol::{Command as PlotterCommand, Escape, LINE_LIMIT, Refusal};
@@ -325,7 +326,7 @@ fn title(text: &str) -> Result<String, String> {
             "it is too long: letters beyond ASCII take four to eight bytes of a line".to_owned()
         );
     }
-    match PlotterCommand::parse(&line).map_err(|refusal| refusal.to_string())? {
+    match PlotterCommand::parse(&line).map_err(|refusal| told(&refusal.to_string()))? {
         // It fits.
         PlotterCommand::Title(letters) if TitleText::new(letters.letters()).is_some() => {
             Ok(text.to_owned())
@@ -345,7 +346,7 @@ fn title_size(text: &str) -> Result<f64, String> {
 fn understood(option: &str, text: &str) -> Result<String, String> {
     match PlotterCommand::parse(&format!("${option}={text}")) {
         Ok(_) => Ok(text.to_owned()),
-        Err(refusal) => Err(refusal.to_string()),
+        Err(refusal) => Err(told(&refusal.to_string())),
     }
 }
 

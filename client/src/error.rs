@@ -1,8 +1,9 @@
 //! What can go wrong between a file and its picture, in words that say what to do.
 
 use crate::interrupt::EXIT_CODE;
-use crate::protocol::{RECEIVE_WINDOW, meaning};
+use crate::protocol::RECEIVE_WINDOW;
 use crate::source::{JobLine, Origin};
+use crate::words::{asked, explained, told};
 use penup::protocol::Refusal;
 use std::io;
 use std::time::Duration;
@@ -49,7 +50,10 @@ pub enum Error {
         origin: Origin,
     },
     /// A line that no plotter takes.
-    #[error("{}:{}: {refusal}\n    {}", origin.file, origin.line, origin.shown())]
+    #[error(
+        "{}:{}: {}\n    {}", origin.file, origin.line,
+        explained(refusal.number(), &[refusal.to_string()]), origin.shown()
+    )]
     BadLine {
         /// Where it stands.
         origin: Origin,
@@ -100,6 +104,12 @@ pub enum Error {
         device: String,
         /// What the system says.
         source: serialport::Error,
+    },
+    /// The library refuses the drawing on this computer.
+    #[error("cannot draw it: {}", explained(refusal.number(), &[refusal.to_string()]))]
+    NotDrawn {
+        /// Why.
+        refusal: Refusal,
     },
     /// The emulated board or the board in memory could not be started.
     #[error("cannot start the {board} board: {reason}")]
@@ -155,7 +165,7 @@ pub enum Error {
         messages: Vec<String>,
     },
     /// The machine stopped by itself.
-    #[error("the plotter stopped with alarm {number}{}\nSee docs/protocol.md for the alarm's meaning", said(&messages.join("; ")))]
+    #[error("the plotter stopped with alarm {number}{}\nSee docs/protocol.md for the alarm's meaning", said(&told(&messages.join("; "))))]
     Alarm {
         /// Its `ALARM:N`.
         number: u16,
@@ -207,7 +217,7 @@ fn waiting_for(line: Option<&JobLine>) -> String {
     match line.map(|line| (&line.sent, &line.origin)) {
         None => String::new(),
         Some((_, Some(origin))) => format!(", at line {} of {}", origin.line, origin.file),
-        Some((sent, None)) => format!(", at the command {sent}"),
+        Some((sent, None)) => format!(", asked for {}", asked(sent)),
     }
 }
 
@@ -219,18 +229,13 @@ fn remedy(state: &str) -> &'static str {
     }
 }
 
-/// What the plotter said itself is more exact than the number's meaning, so it comes with it.
 fn refusal(line: &JobLine, number: u16, messages: &[String]) -> String {
-    let mut reason = meaning(number).to_owned();
-    for message in messages {
-        reason.push_str(": ");
-        reason.push_str(message);
-    }
+    let reason = explained(number, messages);
     match &line.origin {
         Some(origin) => {
             let Origin { file, line, .. } = origin;
-            format!("{file}:{line}: {reason} (error {number})\n    {}", origin.shown())
+            format!("{file}:{line}: {reason}\n    {}", origin.shown())
         }
-        None => format!("the plotter refuses {}: {reason} (error {number})", line.sent),
+        None => format!("the plotter refuses {}: {reason}", asked(&line.sent)),
     }
 }

@@ -9,6 +9,8 @@ use crate::source::{JobLine, Lines};
 use crate::watch::PenRuns;
 use penup::protocol::Escape;
 use serde::Serialize;
+use std::fmt;
+use std::ops::Add;
 
 /// A point of the page in mm: x right, y up from the lower left corner.
 pub type PagePoint = [f64; 2];
@@ -84,9 +86,11 @@ impl Lengths {
         let length = |a: &PagePoint, b: &PagePoint| (a[0] - b[0]).hypot(a[1] - b[1]);
         let down = strokes.iter().flat_map(|stroke| stroke.windows(2));
         let up = strokes.windows(2);
+        let up = up.filter_map(|pair| Some(length(pair[0].last()?, pair[1].first()?)));
+        // The sum of no lengths at all would be -0.
         Self {
-            pen_down_mm: down.map(|ends| length(&ends[0], &ends[1])).sum(),
-            pen_up_mm: up.filter_map(|pair| Some(length(pair[0].last()?, pair[1].first()?))).sum(),
+            pen_down_mm: down.map(|ends| length(&ends[0], &ends[1])).fold(0.0, Add::add),
+            pen_up_mm: up.fold(0.0, Add::add),
         }
     }
 
@@ -94,6 +98,50 @@ impl Lengths {
     pub fn efficiency(self) -> f64 {
         let whole = self.pen_down_mm + self.pen_up_mm;
         if whole > 0.0 { self.pen_down_mm / whole } else { 1.0 }
+    }
+}
+
+/// What the plotter itself tells of a job that it has drawn, whichever plotter it is.
+///
+/// Lengths are those of the drawing's lines, not of the single steps that the motors make of them.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct JobReport {
+    /// How often the pen goes down, but for the pieces of dotted lines.
+    pub strokes: u64,
+    /// The length drawn in mm, as told: with one decimal.
+    pub pen_down_mm: String,
+    /// The length of the moves between strokes in mm.
+    pub pen_up_mm: String,
+    /// The drawn part of the whole way, in %.
+    pub efficiency: String,
+}
+
+impl JobReport {
+    /// Reads it from one of the lines that answer `$model`; `None` if it is another one.
+    ///
+    /// ```
+    /// use penup_client::job::JobReport;
+    /// let line = "[JOB:pen down 80.0 mm, up 30.5 mm, efficiency 72.3 %, bound 30.5 mm, the least]";
+    /// let report = JobReport::parse(2, line).expect("the line of lengths");
+    /// assert_eq!(report.pen_up_mm, "30.5");
+    /// ```
+    pub fn parse(strokes: u64, line: &str) -> Option<Self> {
+        let (down, rest) = line.strip_prefix("[JOB:pen down ")?.split_once(" mm, up ")?;
+        let (up, rest) = rest.split_once(" mm, efficiency ")?;
+        let (efficiency, _) = rest.split_once(" %")?;
+        let [pen_down_mm, pen_up_mm, efficiency] = [down, up, efficiency].map(str::to_owned);
+        Some(Self { strokes, pen_down_mm, pen_up_mm, efficiency })
+    }
+}
+
+impl fmt::Display for JobReport {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { strokes, pen_down_mm, pen_up_mm, efficiency } = self;
+        write!(
+            formatter,
+            "{strokes} strokes, {pen_down_mm} mm drawn, {pen_up_mm} mm between them, \
+             efficiency {efficiency} %"
+        )
     }
 }
 
@@ -249,6 +297,8 @@ mod tests {
     #[test]
     fn nothing_drawn_is_perfectly_efficient_and_empty_strokes_do_no_harm() {
         assert_eq!(Lengths::of(&[]).efficiency(), 1.0);
+        let one = Lengths::of(&[vec![[0.0, 0.0], [1.0, 0.0]]]);
+        assert!([one.pen_up_mm, Lengths::of(&[]).pen_down_mm].iter().all(|c| c.is_sign_positive()));
         let strokes = [vec![], vec![[1.0, 1.0]], vec![]];
         assert_eq!(Lengths::of(&strokes), Lengths::default());
     }

@@ -4,7 +4,7 @@
 //! [`job`] joins both into lines, [`sender`] sends them over a [`link`] and follows the plotter's
 //! replies ([`protocol`], [`progress`]); behind the link are the plotters of [`machines`], an
 //! [`emulator`] and the [`preview`] among them; [`picture`] shows what the pen did, [`output`] writes it.
-//! [`tape`] keeps a job as single steps.
+//! [`tape`] keeps a job as single steps. [`words`] turns what the plotter says into this program's words.
 
 pub mod cli;
 pub mod emulator;
@@ -26,3 +26,4 @@ pub mod tape;
 
 pub mod fit;
 pub mod watch;
+pub mod words;

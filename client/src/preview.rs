@@ -13,6 +13,7 @@ use penup::boards::host::{Change, HostBoard, lend_memory};
 use penup::geometry::{Projection, Vertex};
 use penup::machine::{EventRing, Path, PulserState, Setting, Target};
 use penup::plotter::{Observer, Plotter};
+use penup::protocol::Refusal;
 use penup::stage::{Aborted, Attention, Stage};
 use penup::view::View;
 use penup::visibility::{Along, Stretch};
@@ -111,16 +112,17 @@ fn count_steps(changes: &[penup::boards::host::Stamped]) -> u64 {
 impl PreviewPlotter for InMemory {
     fn tape(&mut self) -> Result<Vec<u8>, Error> {
         let computed = self.plotter.compute(&mut StopWatch::default(), &mut Segments::default());
-        computed.map_err(refused)?;
+        computed.map_err(|refusal| Error::NotDrawn { refusal })?;
         let settings = *self.plotter.machine().settings();
         let tape = crate::tape::record(settings, &mut self.plotter.strokes());
-        tape.map_err(|error| refused(penup::protocol::Refusal::Machine(error)))
+        tape.map_err(|error| Error::NotDrawn { refusal: Refusal::Machine(error) })
     }
 
     fn result(&mut self) -> Result<JobResult, Error> {
         let mut watch = StopWatch::default();
         let mut segments = Segments::default();
-        self.plotter.compute(&mut watch, &mut segments).map_err(refused)?;
+        let computed = self.plotter.compute(&mut watch, &mut segments);
+        computed.map_err(|refusal| Error::NotDrawn { refusal })?;
         let timings_ms = watch.stop();
         let steps = self.steps_per_mm();
         let mut strokes: Vec<Vec<[f64; 2]>> = Vec::new();
@@ -157,11 +159,6 @@ impl PreviewPlotter for InMemory {
             pen: self.pen.as_mut().map(PenWatch::runs).unwrap_or_default(),
         })
     }
-}
-
-/// What the library refuses on this computer.
-fn refused(refusal: impl std::fmt::Display) -> Error {
-    Error::Board { board: "host".to_owned(), reason: refusal.to_string() }
 }
 
 /// How long each stage takes.

@@ -1,6 +1,8 @@
 //! Tells the user how far a job is: lines sent, then strokes drawn.
 
+use crate::words::told;
 use indicatif::{ProgressBar, ProgressStyle};
+use std::io::{self, Write as _};
 
 /// Who is told how far a job is.
 pub trait Progress {
@@ -10,6 +12,8 @@ pub trait Progress {
     fn strokes_drawn(&mut self, done: u64, all: u64);
     /// The plotter's state, whenever it reports it.
     fn state(&mut self, state: &str);
+    /// What the plotter says of a job that it draws all the same, for instance what it leaves out.
+    fn note(&mut self, _note: &str) {}
 }
 
 /// Tells nobody.
@@ -67,6 +71,13 @@ impl Progress for Bar {
 
     fn strokes_drawn(&mut self, done: u64, all: u64) {
         self.show("Drawing", "strokes", done, all);
+    }
+
+    fn note(&mut self, note: &str) {
+        self.bar.suspend(|| {
+            // Where nobody reads it, nobody is told.
+            let _ = writeln!(io::stderr(), "penup: note: {}", told(note));
+        });
     }
 
     fn state(&mut self, state: &str) {

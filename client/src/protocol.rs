@@ -8,6 +8,8 @@ use std::fmt::Write as _;
 
 /// Forget the model.
 pub const CLEAR: &str = "$clear";
+/// Tell what the model and the last job are.
+pub const MODEL: &str = "$model";
 /// Draw the model with the present settings.
 pub const PLOT: &str = "$plot";
 

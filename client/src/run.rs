@@ -7,7 +7,7 @@ use crate::cli::{
 use crate::error::Error;
 use crate::fit::fit_obj;
 use crate::interrupt::MovingPlotter;
-use crate::job::{Job, Lengths};
+use crate::job::{Job, JobReport};
 use crate::link::{Link, SerialLink};
 use crate::machines;
 use crate::output;
@@ -47,15 +47,16 @@ fn plot(args: &PlotArgs, interrupt: &AtomicBool) -> Result<String, Error> {
         let mut link = SerialLink::open(device)
             .map_err(|source| Error::Port { device: device.clone(), source })?;
         let _moving = MovingPlotter::new();
-        draw(&mut link, &job, 1, interrupt, &mut bar)?;
-        return Ok(format!("{} is drawn", args.file.display()));
+        let report = draw(&mut link, &job, 1, interrupt, &mut bar)?;
+        let report = report.map(|report| format!(": {report}")).unwrap_or_default();
+        return Ok(format!("{} is drawn{report}", args.file.display()));
     }
     // On Linux the emulator ends with this program; elsewhere it must be ended.
     let booting = (!cfg!(target_os = "linux")).then(MovingPlotter::new);
     let mut board = machines::emulate(args.board)?;
     let moving = MovingPlotter::new();
     drop(booting);
-    draw(board.as_mut(), &job, 1, interrupt, &mut bar)?;
+    let report = draw(board.as_mut(), &job, 1, interrupt, &mut bar)?;
     let pen = board.pen_runs()?;
     drop(board);
     drop(moving);
@@ -63,9 +64,7 @@ fn plot(args: &PlotArgs, interrupt: &AtomicBool) -> Result<String, Error> {
     drop(bar);
     let outputs = Outputs::of(&args.pictures, None);
     let files = write_pictures(&picture, &outputs)?;
-    let strokes = picture.runs.into_iter().filter(|run| run.pen_down);
-    let strokes: Vec<_> = strokes.map(|run| run.points).collect();
-    Ok(summary(&files, strokes.len(), Lengths::of(&strokes)))
+    Ok(summary(&files, report))
 }
 
 fn preview(args: &PreviewArgs, interrupt: &AtomicBool) -> Result<String, Error> {
@@ -73,7 +72,7 @@ fn preview(args: &PreviewArgs, interrupt: &AtomicBool) -> Result<String, Error> 
     let job = Job::new(SourceFile::read(&args.file)?, &settings);
     let mut bar = Bar::default();
     let mut plotter = machines::in_memory();
-    draw(plotter.as_mut(), &job, args.repeat, interrupt, &mut bar)?;
+    let report = draw(plotter.as_mut(), &job, args.repeat, interrupt, &mut bar)?;
     let result = plotter.result()?;
     drop(bar);
     let outputs = Outputs::of(&args.pictures, args.json.as_deref());
@@ -88,8 +87,7 @@ fn preview(args: &PreviewArgs, interrupt: &AtomicBool) -> Result<String, Error> 
         output::write(path, format!("{text}\n").as_bytes())?;
         files.push(path);
     }
-    let lengths = Lengths { pen_down_mm: result.pen_down_mm, pen_up_mm: result.pen_up_mm };
-    Ok(summary(&files, result.strokes.len(), lengths))
+    Ok(summary(&files, report))
 }
 
 fn fit(args: &FitArgs) -> Result<String, Error> {
@@ -138,7 +136,7 @@ fn damaged(file: &Path) -> impl Fn(BadCode) -> Error {
     move |BadCode { row, code }| Error::Tape { file: file.display().to_string(), row, code }
 }
 
-/// Sends a whole job over `link` and draws it `times` times.
+/// Sends a whole job over `link`, draws it `times` times and asks what came of it.
 ///
 /// # Errors
 /// See [`Sender`].
@@ -148,10 +146,11 @@ pub fn draw(
     times: u32,
     interrupt: &AtomicBool,
     progress: &mut dyn Progress,
-) -> Result<(), Error> {
+) -> Result<Option<JobReport>, Error> {
     let mut sender = Sender::open(link, Patience::default(), interrupt)?;
     sender.stream(job, progress)?;
-    (0..times).try_for_each(|_| sender.plot(progress))
+    (0..times).try_for_each(|_| sender.plot(progress))?;
+    sender.report()
 }
 
 struct Outputs {
@@ -195,13 +194,8 @@ fn write_pictures<'a>(picture: &Picture, outputs: &'a Outputs) -> Result<Vec<&'a
     Ok(files)
 }
 
-fn summary(files: &[&Path], strokes: usize, lengths: Lengths) -> String {
+fn summary(files: &[&Path], report: Option<JobReport>) -> String {
     let names: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
-    format!(
-        "{}: {strokes} strokes, {:.1} mm drawn, {:.1} mm between them, efficiency {:.1} %",
-        names.join(", "),
-        lengths.pen_down_mm,
-        lengths.pen_up_mm,
-        100.0 * lengths.efficiency()
-    )
+    let report = report.map_or("drawn".to_owned(), |report| report.to_string());
+    format!("{}: {report}", names.join(", "))
 }

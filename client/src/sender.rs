@@ -6,10 +6,11 @@
 //! the end. If anything goes wrong the sender stops at once and says which line it was at.
 
 use crate::error::Error;
+use crate::job::JobReport;
 use crate::link::Link;
-use crate::progress::Progress;
+use crate::progress::{Progress, Quiet};
 use crate::protocol::{
-    ABORT, PLOT, RECEIVE_WINDOW, RESUME, Reply, ReplyReader, STATUS_QUERY, Status, is_penup,
+    ABORT, MODEL, PLOT, RECEIVE_WINDOW, RESUME, Reply, ReplyReader, STATUS_QUERY, Status, is_penup,
 };
 use crate::source::{JobLine, Lines};
 use std::collections::VecDeque;
@@ -70,6 +71,10 @@ pub struct Sender<'a> {
     last_query: Instant,
     /// What it said for people since its last answer.
     messages: Vec<String>,
+    /// What it told of itself when it was asked last.
+    told: Vec<String>,
+    /// The strokes of the job that it draws.
+    strokes: u64,
 }
 
 impl<'a> Sender<'a> {
@@ -94,6 +99,8 @@ impl<'a> Sender<'a> {
             last_heard: now,
             last_query: now,
             messages: Vec::new(),
+            told: Vec::new(),
+            strokes: 0,
         };
         let state = sender.find_state()?;
         if !state.is_idle() {
@@ -185,13 +192,14 @@ impl<'a> Sender<'a> {
             match self.listen()? {
                 Some(Reply::Ok) if !acknowledged => {
                     acknowledged = true;
-                    self.messages.clear();
+                    self.messages.drain(..).for_each(|note| progress.note(&note));
                     self.query()?;
                 }
                 Some(Reply::Status(status)) => {
                     progress.state(&status.state);
                     if let Some((done, all)) = status.strokes {
                         progress.strokes_drawn(done, all);
+                        self.strokes = all;
                     }
                     if let Some(pen) = standing.pen_wanted(&status)
                         && self.link.change_pen(pen)?
@@ -220,6 +228,17 @@ impl<'a> Sender<'a> {
         }
     }
 
+    /// What came of the job that was drawn; `None` if the plotter's firmware does not tell.
+    ///
+    /// # Errors
+    /// As [`Sender::stream`].
+    pub fn report(&mut self) -> Result<Option<JobReport>, Error> {
+        self.told.clear();
+        self.stream(&[JobLine::command(MODEL)], &mut Quiet)?;
+        let strokes = self.strokes;
+        Ok(self.told.iter().find_map(|line| JobReport::parse(strokes, line)))
+    }
+
     fn fail_on(&mut self, reply: Reply, line: Option<&JobLine>) -> Result<(), Error> {
         match reply {
             Reply::Error(number) => Err(Error::Refused {
@@ -235,7 +254,11 @@ impl<'a> Sender<'a> {
                 self.messages.push(text);
                 Ok(())
             }
-            Reply::Ok | Reply::Status(_) | Reply::Other(_) => Ok(()),
+            Reply::Other(text) => {
+                self.told.push(text);
+                Ok(())
+            }
+            Reply::Ok | Reply::Status(_) => Ok(()),
         }
     }
 

@@ -93,7 +93,7 @@ fn a_refused_line_is_named_with_its_text_and_nothing_is_drawn() {
 #[test]
 fn a_refused_drawing_is_an_error() {
     let (error, _) = failure(Fault::ErrorAt(41, 9999));
-    assert!(error.starts_with("the plotter refuses $plot"), "{error}");
+    assert!(error.starts_with("the plotter refuses the drawing"), "{error}");
 }
 
 #[test]
@@ -108,7 +108,7 @@ fn silence_in_the_middle_names_the_line() {
     let (error, _) = failure(Fault::SilentAfter(5));
     assert!(error.contains("line 15 of scene.obj"), "{error}");
     let (error, _) = failure(Fault::SilentAfter(40));
-    assert!(error.contains("at the command $plot"), "{error}");
+    assert!(error.contains("asked for the drawing"), "{error}");
 }
 
 #[test]
@@ -116,7 +116,7 @@ fn lost_bytes_are_told_from_silence() {
     let (error, _) = failure(Fault::LosesLine(40));
     assert!(error.contains("never answered, at line 49"), "{error}");
     let (error, _) = failure(Fault::LosesLine(41));
-    assert!(error.contains("never answered, at the command $plot"), "{error}");
+    assert!(error.contains("never answered, asked for the drawing"), "{error}");
 }
 
 #[test]
