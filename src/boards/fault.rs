@@ -1,5 +1,8 @@
-//! A panic or a fault: the machine is made safe, a report goes out on the serial line, then nothing
-//! until ctrl-X resets.
+//! What becomes of a panic or a fault: the machine is made safe at once, and the cause is reported.
+//!
+//! How it is reported is the board's choice ([`Fault::report`]). Without a choice of its own it says the cause on its
+//! serial line and waits for ctrl-X, which resets it. A board that can keep the cause through a reset starts
+//! again by itself, and tells the cause then.
 
 use core::fmt::{self, Write};
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -10,13 +13,17 @@ use super::line;
 pub trait Fault {
     /// No interrupt, no step, pen up, drivers off.
     fn make_safe();
+    /// Reports the cause, or starts again and reports it then.
+    fn report(cause: fmt::Arguments) {
+        say::<Self>(cause);
+    }
     /// Sends bytes past any queue.
     fn write(bytes: &[u8]);
     /// From here on it only waits: nothing feeds a watchdog.
     fn begin_to_wait() {}
     /// A byte straight from the receiver.
     fn poll() -> Option<u8>;
-    /// Starts again.
+    /// Starts again, because the user has asked for it.
     fn reset() -> !;
 }
 
@@ -29,37 +36,43 @@ static REPORTING: AtomicBool = AtomicBool::new(false);
 /// What a panic comes to. `cause` says where it came from: the `PanicInfo` itself, or less where
 /// the flash has no room for its text.
 pub fn panic<F: Fault>(cause: impl fmt::Display) -> ! {
-    if make_safe::<F>(format_args!("{cause}")) {
+    if begin_report::<F>() {
         defmt::error!("{}", defmt::Display2Format(&cause));
+        F::report(format_args!("{cause}"));
     }
     wait_for_reset::<F>()
 }
 
 /// What a fault at this address comes to, or at [`STACK_USED_UP`].
 pub fn hard_fault<F: Fault>(address: u32) -> ! {
-    if address == STACK_USED_UP {
-        if make_safe::<F>(format_args!("the stack is used up")) {
+    if begin_report::<F>() {
+        if address == STACK_USED_UP {
             defmt::error!("the stack is used up");
+            F::report(format_args!("the stack is used up"));
+        } else {
+            defmt::error!("hard fault at {=u32:#010x}", address);
+            F::report(format_args!("hard fault at {address:#010x}"));
         }
-    } else if make_safe::<F>(format_args!("hard fault at {address:#010x}")) {
-        defmt::error!("hard fault at {=u32:#010x}", address);
     }
     wait_for_reset::<F>()
 }
 
-/// Makes the machine safe, then reports `cause` on the serial line. Returns whether to go on
-/// reporting.
-fn make_safe<F: Fault>(cause: fmt::Arguments) -> bool {
+/// Makes the machine safe. Whether there is something to report: not while another fault is reported.
+fn begin_report<F: Fault>() -> bool {
     F::make_safe();
     if REPORTING.load(Ordering::Relaxed) {
         return false;
     }
     REPORTING.store(true, Ordering::Relaxed);
+    true
+}
+
+/// Says the cause on the serial line.
+pub fn say<F: Fault + ?Sized>(cause: fmt::Arguments) {
     F::write(b"\r\n");
     // Fails never: `OneLine` takes every byte.
     let _ = write!(OneLine(F::write), "[MSG:stopped by a fault, ctrl-X resets: {cause}]");
     F::write(b"\r\n");
-    true
 }
 
 fn wait_for_reset<F: Fault>() -> ! {

@@ -24,9 +24,9 @@ pub trait Board {
     /// Runs the step interrupt as soon as no pulse is high, although its time has not come: the pins
     /// were halted.
     fn step_now(&mut self) {}
-    /// Whether its watchdog has started it again.
-    fn was_restarted(&self) -> bool {
-        false
+    /// What ended the program before, if that was a fault after which the board has started again by itself.
+    fn fault(&self) -> Option<&str> {
+        None
     }
     /// Keeps what `parts` hold, one after the other, through a loss of power: as the new state of
     /// `record`, in place of the last one. May block, so only while the machine stands.

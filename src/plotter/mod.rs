@@ -43,10 +43,11 @@ const AHEAD_TICKS: u32 = crate::motion::TICKS_PER_SECOND / 20;
 /// Polls the plotter for ever; sleeps when there is nothing to do.
 pub fn run<B: Board>(board: &mut B, memory: Lent<'_>, pins: &PulserState) -> ! {
     let mut plotter = Plotter::with_settings(memory, pins, kept::settings(board));
-    if board.was_restarted() {
+    if board.fault().is_some() {
         plotter.inner.machine.alarm(Alarm::Restarted);
     }
     plotter.greet(board);
+    Inner::report_fault(board);
     loop {
         if !plotter.poll(board) {
             board.wait();

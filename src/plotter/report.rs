@@ -8,6 +8,19 @@ use crate::order;
 use crate::protocol::LINE_LIMIT;
 
 impl Inner<'_> {
+    /// What ended the program before, if it was a fault.
+    #[inline(never)] // Its frame must not lie under the stages'.
+    pub fn report_fault<B: Board>(board: &mut B) {
+        // Longer messages are cut by the board.
+        let mut text = heapless::String::<256>::new();
+        if let Some(fault) = board.fault() {
+            let _ = text.push_str(fault.get(..text.capacity().min(fault.len())).unwrap_or_default());
+        }
+        if !text.is_empty() {
+            Reply(board).line(format_args!("[MSG:started again after a fault: {text}]"));
+        }
+    }
+
     #[inline(never)] // Its frame must not lie under the stages'.
     pub fn report_degenerate<B: Board>(&self, board: &mut B) {
         let count = self.job.degenerate_faces();

@@ -10,7 +10,10 @@
 // nothing more (2), takes again (3); 7 a switch is fitted to a pin, which closes where its axis has gone to so many
 // steps (+ 2^40) or below, and bounces; 8 a function (its number, its
 // address in the cycle's place) is timed; 9 how much of the stack is unused is asked; 10 where x has gone to so many steps, the
-// main loop stands still for so many hundredths of a second. Out: 0 a byte
+// main loop stands still for so many hundredths of a second. 32 the pin RUN is pulled low for a moment, 33 the image is
+// copied onto the drive that the board shows with BOOTSEL held, 34 and 35 bits (the value) of a byte of flash (the
+// cycle) stay low or high from now on, 36 the main loop goes on at an address, with the stack used up (1) or as it is
+// (0). Out: 0 a byte
 // of the serial line, 1 a pin's new level, 2 the time, 3 a byte of the log, 4 the chip was reset (0 by
 // the loss of power, 1 by the watchdog), 5 a byte of USB, 6 a timed function has
 // returned (its number, the cycles in the cycle's place), 7 so many bytes of the stack have not been used since
@@ -25,6 +28,8 @@
 
 import { readFileSync, writeSync } from 'node:fs';
 import { pathToFileURL } from 'node:url';
+import * as resets from './pico/resets.mjs';
+import { settled, wear } from './pico/worn_flash.mjs';
 
 const [directory, imagePath, logAddress] = process.argv.slice(-3);
 const { RP2040, USBCDC } = await import(pathToFileURL(`${directory}/dist/esm/index.js`));
@@ -61,6 +66,12 @@ const STACK = 9;
 const STALL = 10;
 const GO_ON = -1;
 const UNUSED_STACK = 7;
+const RUN_PIN = 32;
+const UF2 = 33;
+const STAYS_LOW = 34;
+const STAYS_HIGH = 35;
+const JUMP = 36;
+const BOOTSEL = 32;
 const output = Buffer.alloc(1 << 16);
 let filled = 0;
 
@@ -83,12 +94,15 @@ function report(what, value, cycle) {
 const ERASE = 3;
 const PROGRAM = 4;
 /** The breakpoints' numbers by the functions' codes. */
-const FUNCTIONS = { IF: 1, EX: 2, RE: ERASE, RP: PROGRAM, FC: 5, CX: 6 };
+const USB_BOOT = 7;
+const FUNCTIONS = { IF: 1, EX: 2, RE: ERASE, RP: PROGRAM, FC: 5, CX: 6, UB: USB_BOOT };
 const LOOK_UP = 0x20;
 const TABLE = 0x40;
 const CODE = 0x80;
 const FOR_EVER = 0x100;
 const RETURN = 0x4770;
+/** Where the boot ROM begins as a drive. */
+const USB_BOOT_ENTRY = 0x2581;
 
 /** Laid out as the RP2040's: 16-bit pointers to a table of codes and functions, and to its search. */
 function bootRom() {
@@ -104,7 +118,8 @@ function bootRom() {
   Object.entries(FUNCTIONS).forEach(([name, number], index) => {
     const at = CODE + 4 * index;
     rom[at / 2] = 0xbe00 | number;
-    rom[at / 2 + 1] = RETURN;
+    // Who asks for the drive waits for the restart, with whatever interrupts are on.
+    rom[at / 2 + 1] = number === USB_BOOT ? 0xe000 | (((FOR_EVER - at - 6) >> 1) & 0x7ff) : RETURN;
     rom[TABLE / 2 + 2 * index] = name.charCodeAt(0) | (name.charCodeAt(1) << 8);
     rom[TABLE / 2 + 2 * index + 1] = at | 1;
   });
@@ -124,7 +139,7 @@ class PowerCut extends Error {}
 function changeFlash(from, count, change) {
   for (let at = from; at < from + count; at++) {
     if (flashBudget-- <= 0) throw new PowerCut();
-    chip.flash[at] = change(at, chip.flash[at]);
+    chip.flash[at] = settled(at, change(at, chip.flash[at]));
   }
 }
 
@@ -136,6 +151,10 @@ function serveRom(number) {
   } else if (number === PROGRAM) {
     changeFlash(first, third, (at, before) => before & chip.readUint8(second + at - first));
     flashNanos += (third / 256) * PAGE_MICROSECONDS * 1000;
+  } else if (number === USB_BOOT) {
+    const { scratchData } = chip.peripherals[WATCHDOG];
+    scratchData.set([first, second]);
+    resets.restart(chip, USB_BOOT_ENTRY, 10);
   }
 }
 
@@ -148,33 +167,38 @@ let stamp = -1;
 let cyclesBefore = 0;
 const now = () => (stamp >= 0 ? stamp : cyclesBefore + Math.round(clock.nanosCounter / NANOS));
 
-/** The flash with an image: blocks of 512 bytes that say where in flash they go, and how long they are. */
-function flashOf(image) {
-  const flash = new Uint8Array(16 << 20).fill(0xff);
+/** Puts an image into flash: blocks of 512 bytes that say where in flash they go, and how long they are. */
+function flashImage(image, flash) {
   for (let block = 0; block < image.length; block += 512) {
     const target = image.readUInt32LE(block + 12) - FLASH;
     const size = image.readUInt32LE(block + 16);
     flash.set(image.subarray(block + 32, block + 32 + size), target);
   }
-  return flash;
 }
 
-/** A chip that begins with this flash. */
-function start(flash) {
+/** A chip that begins with this flash, after such a reset. */
+function start(flash, kind) {
   stamp = -1;
   cyclesBefore = clock ? now() : 0;
+  const before = chip;
   chip = new RP2040();
+  resets.carryOver(kind, before, chip);
   ({ clock, core } = chip);
-  chip.logger = { debug() {}, info() {}, warn() {}, error: (from, what) => console.error(from, what) };
+  chip.logger = { debug() {}, info() {}, warn, error: (from, what) => console.error(from, what) };
   chip.loadBootrom(bootRom());
   chip.flash.set(flash);
   chip.onBreak = serveRom;
   core.VTOR = VECTORS;
   core.SP = chip.readUint32(VECTORS);
   core.PC = chip.readUint32(VECTORS + 4) & ~1;
-  for (let at = RAM; at < core.SP; at++) chip.writeUint8(at, PAINT);
+  if (resets.beginBoot(chip)) {
+    core.PC = FOR_EVER;
+    core.PM = true;
+    report(BOOTSEL, 0, now());
+  } else for (let at = RAM; at < core.SP; at++) chip.writeUint8(at, PAINT);
   mendFlags();
   mendVectors();
+  faultDue = isLockedUp = false;
   watchPins();
   uart = chip.uart[0];
   uart.onByte = (byte) => report(SERIAL, byte, now());
@@ -260,25 +284,39 @@ function hostDoes(what) {
 // --- Resets --------------------------------------------------------------------------------------
 
 const WATCHDOG = 0x40058;
-const POWER = 0;
 let watchdogDue = false;
 
-/** The watchdog resets the chip; its reason and scratch registers outlive that. */
+/** The watchdog resets what it was allowed to. */
 function resetByWatchdog() {
   watchdogDue = false;
-  const { reason, scratchData } = chip.peripherals[WATCHDOG];
-  report(RESET, 1, now());
-  start(chip.flash);
-  Object.assign(chip.peripherals[WATCHDOG], { reason, scratchData });
+  if (!resets.watchdogResets(chip)) return;
+  report(RESET, resets.KIND.WATCHDOG, now());
+  start(chip.flash, resets.KIND.WATCHDOG);
 }
 
-function cutPower() {
+/** All that was on its way is gone. */
+function resetByHand(kind) {
   flashBudget = Infinity;
   flashNanos = 0;
   bytes.length = 0;
   usbBytes.length = 0;
-  report(RESET, POWER, now());
-  start(chip.flash);
+  report(RESET, kind, now());
+  start(chip.flash, kind);
+}
+
+function cutPower() {
+  resetByHand(resets.KIND.POWER);
+}
+
+/** With BOOTSEL held the boot ROM shows a drive; once an image is on it, it restarts by the watchdog, a second later. */
+function copyImage() {
+  cutPower();
+  core.PC = FOR_EVER;
+  core.PM = true;
+  core.waiting = false;
+  report(BOOTSEL, 0, now());
+  flashImage(readFileSync(imagePath), chip.flash);
+  resets.restart(chip, 0, 1000);
 }
 
 // rp2040js folds the carry into the second operand. Where that makes 0x80000000 of 0x7fffffff, its
@@ -316,6 +354,24 @@ function mendVectors() {
   };
 }
 
+/** What the core has just done is a fault. */
+let faultDue = false;
+/** A fault in the handler of faults: only a reset helps. */
+let isLockedUp = false;
+
+/** rp2040js only warns of what faults on the chip: an access where nothing is, an instruction that there is not. */
+function warn(_, what) {
+  if (/invalid memory address|undefined address|is not implemented yet/.test(what)) faultDue = true;
+}
+
+function takeFault() {
+  const HARD_FAULT = 3;
+  if (core.IPSR === HARD_FAULT) isLockedUp = true;
+  else core.exceptionEntry(HARD_FAULT);
+  // What finds no place on the stack is lost.
+  faultDue = false;
+}
+
 const INPUT = 2;
 /** What the inputs are driven to; open ones are pulled up. */
 const inputs = new Map();
@@ -342,6 +398,8 @@ function moveAxis(axis, level) {
 const stalls = [];
 /** Where the main loop was when it was made to hang. */
 let hungAt = 0;
+/** Where it is made to go on. */
+let jumpTo = 0;
 
 function stall(hundredths) {
   const cycle = now();
@@ -473,6 +531,12 @@ process.stdin.on('data', (data) => {
     else if (rest[at] === STACK) report(UNUSED_STACK, 0, unusedStack());
     else if (rest[at] === STALL) stalls.push({ place: entry.cycle, hundredths: entry.value });
     else if (rest[at] === CUT_FLASH) flashBudget = entry.cycle;
+    else if (rest[at] === STAYS_LOW) wear(entry.cycle, entry.value, false);
+    else if (rest[at] === STAYS_HIGH) wear(entry.cycle, entry.value, true);
+    else if (rest[at] === JUMP) {
+      jumpTo = entry.cycle & ~1;
+      events.push({ what: JUMP, value: entry.value, cycle: 0 });
+    }
     else events.push({ what: rest[at], ...entry });
   }
   rest = rest.subarray(at);
@@ -493,7 +557,7 @@ function setInput(number, high) {
 
 /** In a handler, or where it has masked them all, nothing is done to the main loop. */
 function waitsForMainLoop(what) {
-  return (what === HANG || what === GO_ON) && (core.IPSR !== 0 || core.PM);
+  return (what === HANG || what === GO_ON || what === JUMP) && (core.IPSR !== 0 || core.PM);
 }
 
 function takeInput(cycle) {
@@ -504,6 +568,14 @@ function takeInput(cycle) {
   while (events.length && events[0].cycle <= cycle && !waitsForMainLoop(events[0].what)) {
     const { what, value } = events.shift();
     if (what === CUT_POWER) return cutPower();
+    if (what === RUN_PIN) return resetByHand(resets.KIND.RUN);
+    if (what === UF2) return copyImage();
+    if (what === JUMP) {
+      core.PC = jumpTo;
+      if (value) core.SP = RAM + 8;
+      core.waiting = false;
+      continue;
+    }
     if (what === HANG || what === GO_ON) {
       if (what === HANG) hungAt = core.PC;
       core.PC = what === HANG ? FOR_EVER : hungAt;
@@ -588,8 +660,9 @@ function executeUntil(due) {
   do {
     if (times) timeFunctions();
     pass(core.executeInstruction() * NANOS);
+    if (faultDue) takeFault();
     if (flashNanos) waitForFlash();
-  } while (clock.nanosCounter < nanos && !core.waiting && !disturbed);
+  } while (clock.nanosCounter < nanos && !core.waiting && !disturbed && !isLockedUp);
 }
 
 /** Runs for so many cycles. */
@@ -598,7 +671,7 @@ function run(cycles) {
   const end = cycle + cycles;
   while (cycle < end) {
     const due = Math.min(Math.ceil(pioDue), inputDue(), end);
-    if (core.waiting) {
+    if (core.waiting || isLockedUp) {
       const alarm = clock.nextAlarm ? cyclesBefore + clock.nextAlarm.nanos / NANOS : Infinity;
       pass(Math.max(Math.min(alarm, due) - cycle, 0) * NANOS);
     } else executeUntil(due);
@@ -628,5 +701,7 @@ function turn() {
   else setImmediate(turn);
 }
 
-start(flashOf(readFileSync(imagePath)));
+const blank = new Uint8Array(16 << 20).fill(0xff);
+flashImage(readFileSync(imagePath), blank);
+start(blank, resets.KIND.POWER);
 turn();

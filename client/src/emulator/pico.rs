@@ -17,6 +17,11 @@ use super::{EmulatedBoard, EmulatorError, Pin, PinChange, log};
 
 const PROGRAM: &str = "node";
 const SCRIPT: &str = include_str!("pico.mjs");
+/// What the script imports: the name there, and the text.
+const MODULES: &[(&str, &str)] = &[
+    ("./pico/resets.mjs", include_str!("pico/resets.mjs")),
+    ("./pico/worn_flash.mjs", include_str!("pico/worn_flash.mjs")),
+];
 /// Where `cargo xtask set-up` puts it, from the workspace's root.
 const RP2040JS: &str = "target/rp2040js/node_modules/rp2040js";
 /// A cycle of the core, at 125 MHz.
@@ -46,6 +51,8 @@ struct State {
     cycles: u64,
     /// Bytes of the stack that are not used, as last asked.
     unused_stack: Option<u64>,
+    /// The boot ROM waits for an image.
+    shows_drive: bool,
     log: Vec<String>,
     said: VecDeque<String>,
     ended: bool,
@@ -167,18 +174,66 @@ impl Pico {
         name: &str,
         number: u8,
     ) -> Result<(), EmulatorError> {
-        let bad = |reason: String| EmulatorError::BadImage { reason };
-        let elf = fs::read(image).map_err(|_| EmulatorError::NoImage { path: image.into() })?;
-        let elf = object::File::parse(&*elf).map_err(|error| bad(error.to_string()))?;
-        let mut symbols = elf.symbols();
-        let symbol = symbols.find(|symbol| symbol.name().is_ok_and(|found| found.contains(name)));
-        let symbol = symbol.ok_or_else(|| bad(format!("there is no function {name}")))?;
-        Ok(self.tell(TIMED, number, symbol.address() & !1)?)
+        let address = function(image, |found| found.contains(name), name)?;
+        Ok(self.tell(TIMED, number, address)?)
     }
 
     /// Each call of a function that is timed and has returned since last asked: its number, its cycles.
     pub fn take_timed(&mut self) -> Vec<(u8, u64)> {
         std::mem::take(&mut self.shared.lock().timed)
+    }
+
+    /// Pulls the pin RUN low for a moment: the chip is reset, the power stays.
+    ///
+    /// # Errors
+    /// The emulator has ended.
+    pub fn pull_run_low(&mut self) -> io::Result<()> {
+        self.tell(RUN_PIN, 0, 0)
+    }
+
+    /// Plugs the board in with BOOTSEL held, and copies the image onto the drive that it shows. The boot ROM then
+    /// restarts the board by the watchdog.
+    ///
+    /// # Errors
+    /// The emulator has ended.
+    pub fn copy_image(&mut self) -> io::Result<()> {
+        self.tell(UF2, 0, 0)
+    }
+
+    /// Wears a byte of flash out, by its place from the beginning of the flash: the bits of `mask` stay high, or low,
+    /// from the next change on.
+    ///
+    /// # Errors
+    /// The emulator has ended.
+    pub fn wear_flash(&mut self, place: u32, mask: u8, high: bool) -> io::Result<()> {
+        self.tell(if high { STAYS_HIGH } else { STAYS_LOW }, mask, u64::from(place))
+    }
+
+    /// Lets the firmware's main loop go on at another address, with its stack as it is or used up.
+    ///
+    /// # Errors
+    /// The emulator has ended.
+    pub fn jump_to(&mut self, address: u32, uses_stack_up: bool) -> io::Result<()> {
+        self.tell(JUMP, u8::from(uses_stack_up), u64::from(address))
+    }
+
+    /// Lets it go on at the function of `image` that has this name.
+    ///
+    /// # Errors
+    /// As [`Pico::time_function`].
+    pub fn jump_to_function(
+        &mut self,
+        image: &Path,
+        name: &str,
+        uses_stack_up: bool,
+    ) -> Result<(), EmulatorError> {
+        let address = function(image, |found| found == name, name)?;
+        Ok(self.jump_to(address as u32, uses_stack_up)?)
+    }
+
+    /// Whether the board shows the drive of its boot ROM now.
+    pub fn shows_drive(&self) -> bool {
+        self.shared.lock().shows_drive
     }
 
     /// Lets the firmware's main loop hang.
@@ -337,8 +392,38 @@ impl EmulatedBoard for Pico {
     }
 }
 
+/// The address of the first function of `image` that has such a name.
+fn function(
+    image: &Path,
+    is_wanted: impl Fn(&str) -> bool,
+    name: &str,
+) -> Result<u64, EmulatorError> {
+    let bad = |reason: String| EmulatorError::BadImage { reason };
+    let elf = fs::read(image).map_err(|_| EmulatorError::NoImage { path: image.into() })?;
+    let elf = object::File::parse(&*elf).map_err(|error| bad(error.to_string()))?;
+    let symbol = elf.symbols().find(|symbol| symbol.name().is_ok_and(&is_wanted));
+    let symbol = symbol.ok_or_else(|| bad(format!("there is no function {name}")))?;
+    Ok(symbol.address() & !1)
+}
+
 fn at(cycle: u64) -> Duration {
     Duration::from_nanos(cycle * CYCLE_NANOS)
+}
+
+/// The script with its modules in it: each import by its name becomes one by a `data:` address (RFC 2397).
+fn script() -> String {
+    let mut script = SCRIPT.to_owned();
+    for (name, text) in MODULES {
+        let mut address = String::from("data:text/javascript,");
+        for byte in text.bytes() {
+            match byte {
+                b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' => address.push(char::from(byte)),
+                _ => address.push_str(&format!("%{byte:02X}")),
+            }
+        }
+        script = script.replace(name, &address);
+    }
+    script
 }
 
 /// The command line of the emulator.
@@ -346,7 +431,7 @@ fn command(image: &Path, log_address: u64) -> Command {
     let client = Path::new(env!("CARGO_MANIFEST_DIR"));
     let root = client.parent().unwrap_or(client);
     let mut command = quitting_with_parent(PROGRAM);
-    command.args(["--input-type=module", "--eval", SCRIPT, "--"]);
+    command.args(["--input-type=module", "--eval", &script(), "--"]);
     command.arg(root.join(RP2040JS)).arg(image).arg(log_address.to_string());
     command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     // Ctrl-C at the terminal is for this process, which ends the emulator when it is done with it.
@@ -423,6 +508,13 @@ const RETURNED: u8 = 6;
 const STACK: u8 = 9;
 const UNUSED_STACK: u8 = 7;
 const STALL: u8 = 10;
+const RESET: u8 = 4;
+const RUN_PIN: u8 = 32;
+const UF2: u8 = 33;
+const STAYS_LOW: u8 = 34;
+const STAYS_HIGH: u8 = 35;
+const JUMP: u8 = 36;
+const BOOTSEL: u8 = 32;
 /// Where the emulator's axes begin.
 const SWITCH_ZERO: i64 = 1 << 40;
 
@@ -462,6 +554,8 @@ fn read(mut stdout: ChildStdout, shared: &Shared<State>, mut log: PipeWriter) {
                 USB => state.usb.push_back(record.value),
                 PIN => state.pins.extend(servo.pin_change(&record)),
                 LOG => logged.push(record.value),
+                RESET => state.shows_drive = false,
+                BOOTSEL => state.shows_drive = true,
                 _ => {}
             }
         }

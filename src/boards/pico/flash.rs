@@ -4,11 +4,15 @@
 //! done by the boot ROM's functions, called from RAM with interrupts masked: 45 ms for a sector, half
 //! a millisecond for a page, in which bytes of the serial line beyond its FIFO's 32 are lost. Steps
 //! would go on for as long as their words last; callers see to it that nothing moves.
+//!
+//! A worn flash says nothing by itself: its cells no longer change. So what was erased or written is read back, and
+//! [`Worn`] is the error if it is not what it should be.
 
-use core::convert::Infallible;
 use core::ptr;
 
-use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
+use embedded_storage::nor_flash::{
+    ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
+};
 use penup::plotter::Record;
 use penup::storage::{PAGE_BYTES, Slots};
 use rp2040_hal::rom_data;
@@ -83,6 +87,13 @@ unsafe extern "C" fn carry_out(rom: &Rom, work: &Work<'_>) {
     }
 }
 
+/// A byte of the flash as it is now: the cache forgets all when something is written.
+fn byte_at(offset: u32) -> u8 {
+    // SAFETY: the lower 16 MiB are mapped to flash, whatever its size, and reading it has no effect. Volatile, for it
+    // changes behind the compiler's back.
+    unsafe { ptr::read_volatile((MAPPED_AT + (offset as usize & 0xFF_FFFF)) as *const u8) }
+}
+
 impl Flash {
     /// The flash of the board, which is taken once.
     pub const fn new() -> Self {
@@ -114,18 +125,26 @@ impl Flash {
     }
 }
 
+/// The flash does not hold what was written to it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Worn;
+
+impl NorFlashError for Worn {
+    fn kind(&self) -> NorFlashErrorKind {
+        NorFlashErrorKind::Other
+    }
+}
+
 impl ErrorType for Flash {
-    type Error = Infallible;
+    type Error = Worn;
 }
 
 impl ReadNorFlash for Flash {
     const READ_SIZE: usize = 1;
 
-    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Infallible> {
-        for (at, byte) in (MAPPED_AT + offset as usize..).zip(bytes) {
-            // SAFETY: `Slots` stays within its slots, which are mapped flash. Volatile, for it changes
-            // behind the compiler's back.
-            *byte = unsafe { ptr::read_volatile(at as *const u8) };
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Worn> {
+        for (at, byte) in (offset..).zip(bytes) {
+            *byte = byte_at(at);
         }
         Ok(())
     }
@@ -139,19 +158,24 @@ impl NorFlash for Flash {
     const WRITE_SIZE: usize = PAGE_BYTES;
     const ERASE_SIZE: usize = SECTOR_BYTES;
 
-    fn erase(&mut self, from: u32, to: u32) -> Result<(), Infallible> {
+    /// Erases sectors that lie in what is left to this module; others stay as they are, which is [`Worn`] too.
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), Worn> {
         if from >= START && to <= END {
             self.work(&Work::Erase { from, bytes: (to - from) as usize });
         }
-        Ok(())
+        if (from..to).all(|at| byte_at(at) == 0xFF) { Ok(()) } else { Err(Worn) }
     }
 
-    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Infallible> {
+    /// Writes whole pages, with the same condition.
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Worn> {
         for (to, bytes) in (offset..).step_by(PAGE_BYTES).zip(bytes.chunks_exact(PAGE_BYTES)) {
             if (START..END).contains(&to) {
                 let mut page = [0; PAGE_BYTES];
                 page.copy_from_slice(bytes);
                 self.work(&Work::Write { to, page: &page });
+            }
+            if !(to..).zip(bytes).all(|(at, &byte)| byte_at(at) == byte) {
+                return Err(Worn);
             }
         }
         Ok(())

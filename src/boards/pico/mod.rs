@@ -31,6 +31,7 @@ mod pen;
 mod pins;
 mod ports;
 mod registers;
+mod rescue;
 mod serial;
 mod steps;
 mod usb;
@@ -48,6 +49,7 @@ use rp2040_hal::pac::Peripherals;
 use rp2040_hal::{Sio, Watchdog};
 use static_cell::ConstStaticCell;
 
+use self::emergency::Start;
 use self::ports::Ports;
 
 /// What the boot ROM runs to set the flash up.
@@ -62,7 +64,8 @@ pub struct Pico {
     ports: Ports,
     steps: steps::Steps,
     flash: flash::Flash,
-    was_restarted: bool,
+    /// The fault after which the board started again.
+    fault: Option<emergency::Cause>,
 }
 
 /// Sets up clock, pins, serial line, state machine and timer: drivers off, pen up, nothing moving.
@@ -74,7 +77,7 @@ pub fn take() -> (Pico, Lent<'static>, &'static PulserState) {
     let (Some(mut core), Some(mut chip)) = (Core::take(), Peripherals::take()) else {
         panic!("the board was taken twice")
     };
-    let was_restarted = emergency::was_restarted();
+    let start = emergency::start();
     let mut watchdog = Watchdog::new(chip.WATCHDOG);
     let clocks = init_clocks_and_plls(
         CRYSTAL_HERTZ,
@@ -105,8 +108,13 @@ pub fn take() -> (Pico, Lent<'static>, &'static PulserState) {
     static MEMORY: ConstStaticCell<PicoMemory> = ConstStaticCell::new(PicoMemory::new());
     static BLOCKS: ConstStaticCell<[Block; NO_MOVES_OF_PICO.len()]> =
         ConstStaticCell::new(NO_MOVES_OF_PICO);
+    let fault = match start {
+        Start::Fresh => None,
+        Start::AfterFault(cause) => Some(cause),
+        Start::Rescue(cause) => rescue::run(ports, &cause),
+    };
     let memory = MEMORY.take().lend(BLOCKS.take());
-    let board = Pico { ports, steps, flash: flash::Flash::new(), was_restarted };
+    let board = Pico { ports, steps, flash: flash::Flash::new(), fault };
     (board, memory, &steps::STATE)
 }
 
@@ -118,6 +126,7 @@ impl Board for Pico {
     }
 
     fn take_real_time(&mut self) -> RealTime {
+        emergency::note_running(clock::microseconds());
         if self.steps.gets_on() {
             emergency::feed();
         }
@@ -141,8 +150,8 @@ impl Board for Pico {
         self.steps.follow();
     }
 
-    fn was_restarted(&self) -> bool {
-        self.was_restarted
+    fn fault(&self) -> Option<&str> {
+        self.fault.as_deref()
     }
 
     fn keep(&mut self, record: Record, parts: &[&[u8]]) -> Result<(), NotKept> {

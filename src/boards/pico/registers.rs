@@ -15,6 +15,8 @@ pub const PWM: Peripheral = unsafe { Peripheral::at(0x4005_0000) };
 pub const TIMER: Peripheral = unsafe { Peripheral::at(0x4005_4000) };
 /// The pins' levels. Used by `contacts` and `lift`.
 pub const SIO: Peripheral = unsafe { Peripheral::at(0xD000_0000) };
+/// What a reset reaches. Used by `emergency`.
+pub const PSM: Peripheral = unsafe { Peripheral::at(0x4001_0000) };
 /// The watchdog. Used by `emergency`.
 pub const WATCHDOG: Peripheral = unsafe { Peripheral::at(0x4005_8000) };
 /// Direct memory access; channel 0 is that of `steps`.
