@@ -9,12 +9,25 @@ pub trait Board {
     /// Its name, as `$I` tells it.
     const NAME: &'static str;
 
+    /// Whether it can become a drive that takes a new image.
+    const HAS_DRIVE: bool = false;
+
     /// The next ordinary byte of the line; none while an abort waits in [`Board::take_real_time`].
     fn read_byte(&mut self) -> Option<u8>;
     /// What was asked in real time since last taken.
     fn take_real_time(&mut self) -> RealTime;
     /// Sends bytes; may block.
     fn write(&mut self, bytes: &[u8]);
+    /// Whether a program has opened a port since last asked: it is greeted there alone.
+    fn take_opened(&mut self) -> bool {
+        false
+    }
+    /// What is written from now on goes to the port opened last alone, or again to all.
+    fn speak_aside(&mut self, is_aside: bool) {
+        let _ = is_aside;
+    }
+    /// Becomes that drive, if there is one: pen up, drivers off. What was written is sent before.
+    fn show_drive(&mut self) {}
     /// Where step events go. They begin when the queue is half full, or at [`Board::wait`].
     fn queue(&mut self) -> &mut dyn EventQueue;
     /// Which contacts are closed; none where there are none. A change ends [`Board::wait`].

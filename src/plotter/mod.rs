@@ -47,7 +47,7 @@ pub fn run<B: Board>(board: &mut B, memory: Lent<'_>, pins: &PulserState) -> ! {
         plotter.inner.machine.alarm(Alarm::Restarted);
     }
     plotter.greet(board);
-    Inner::report_fault(board);
+    report::fault(board);
     loop {
         if !plotter.poll(board) {
             board.wait();
@@ -67,6 +67,7 @@ enum Next {
     Nothing,
     Plot,
     Again,
+    ShowDrive,
 }
 
 /// All but the line being read, which is borrowed while it is carried out.
@@ -119,8 +120,7 @@ impl<'m> Plotter<'m> {
 
     /// The first line that a sender sees, and what it sees after ctrl-X.
     pub fn greet<B: Board>(&self, board: &mut B) {
-        const VERSION: &str = env!("CARGO_PKG_VERSION");
-        Reply(board).line(format_args!("\r\nGrbl 1.1h [penup {VERSION} '$' for help]"));
+        report::greet(board);
     }
 
     /// Answers the line, and keeps the step queue full. Whether anything was done.
@@ -139,12 +139,17 @@ impl<'m> Plotter<'m> {
         }
         let byte = if self.inner.must_wait() { None } else { board.read_byte() };
         let Some(byte) = byte else { return planned || asked != RealTime::default() };
+        let mut shows_drive = false;
         let outcome = match self.reader.push(byte) {
             None => return true,
             Some(Ok(line)) => match self.inner.carry_out(line, board) {
                 Ok(Next::Plot) => self.inner.plot(board, false),
                 Ok(Next::Again) => self.inner.plot(board, true),
                 Ok(Next::Nothing) => Ok(()),
+                Ok(Next::ShowDrive) => {
+                    shows_drive = true;
+                    Ok(())
+                }
                 Err(refusal) => Err(refusal),
             },
             Some(Err(refusal)) => Err(refusal),
@@ -154,6 +159,9 @@ impl<'m> Plotter<'m> {
         }
         if self.inner.task.is_none() {
             Reply(board).outcome(outcome);
+        }
+        if shows_drive {
+            board.show_drive();
         }
         true
     }
@@ -198,6 +206,7 @@ impl<'m> Plotter<'m> {
     }
 
     fn act<B: Board>(&mut self, asked: RealTime, board: &mut B) {
+        report::greet_opened(self.inner.machine.state(), board);
         if asked.has(RealTime::ABORT) {
             self.inner.machine.abort();
             self.reset(board);
@@ -279,6 +288,9 @@ impl Inner<'_> {
             Command::Undo => self.undo()?,
             Command::Plot => return Ok(Next::Plot),
             Command::Again => return Ok(Next::Again),
+            Command::ShowDrive if !B::HAS_DRIVE => return Err(Refusal::UnknownSystemCommand),
+            Command::ShowDrive if !self.machine.stands() => return Err(Refusal::Busy),
+            Command::ShowDrive => return Ok(Next::ShowDrive),
             Command::Unlock => self.machine.unlock()?,
             Command::Home => self.home()?,
             Command::Check => self.machine.check(self.machine.state() != State::Check)?,
@@ -415,6 +427,7 @@ struct Listener<'b, B: Board> {
 
 impl<B: Board> Attention for Listener<'_, B> {
     fn check(&mut self) -> Result<(), Aborted> {
+        report::greet_opened(State::Run, self.board);
         let asked = self.board.take_real_time();
         if asked.has(RealTime::RESUME) {
             self.asked = RealTime::default();

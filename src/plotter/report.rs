@@ -3,24 +3,45 @@
 use super::reply::Reply;
 use super::{Board, Inner, stream};
 use crate::fixed::BinaryFraction;
-use crate::machine::{Setting, State};
+use crate::machine::{Alarm, Setting, State};
 use crate::order;
 use crate::protocol::LINE_LIMIT;
 
-impl Inner<'_> {
-    /// What ended the program before, if it was a fault.
-    #[inline(never)] // Its frame must not lie under the stages'.
-    pub fn report_fault<B: Board>(board: &mut B) {
-        // Longer messages are cut by the board.
-        let mut text = heapless::String::<256>::new();
-        if let Some(fault) = board.fault() {
-            let _ = text.push_str(fault.get(..text.capacity().min(fault.len())).unwrap_or_default());
-        }
-        if !text.is_empty() {
-            Reply(board).line(format_args!("[MSG:started again after a fault: {text}]"));
-        }
-    }
+/// The first line that a sender sees, and what it sees after ctrl-X.
+pub(super) fn greet<B: Board>(board: &mut B) {
+    const VERSION: &str = env!("CARGO_PKG_VERSION");
+    Reply(board).line(format_args!("\r\nGrbl 1.1h [penup {VERSION} '$' for help]"));
+}
 
+/// Greets a program that has opened a port, there alone, and tells it of an alarm that others have heard of.
+#[inline(never)] // Its frame must not lie under the stages'.
+pub(super) fn greet_opened<B: Board>(state: State, board: &mut B) {
+    if !board.take_opened() {
+        return;
+    }
+    board.speak_aside(true);
+    greet(board);
+    if let State::Alarm(alarm) = state {
+        if alarm == Alarm::Restarted {
+            fault(board);
+        }
+        Reply(board).line(format_args!("ALARM:{}", stream::number(alarm)));
+    }
+    board.speak_aside(false);
+}
+
+/// What ended the program before, if it was a fault.
+#[inline(never)] // Its frame must not lie under the stages'.
+pub(super) fn fault<B: Board>(board: &mut B) {
+    // The board has cut longer messages.
+    let mut text = heapless::String::<192>::new();
+    if let Some(fault) = board.fault() {
+        let _ = text.push_str(fault);
+        Reply(board).line(format_args!("[MSG:started again after a fault: {text}]"));
+    }
+}
+
+impl Inner<'_> {
     #[inline(never)] // Its frame must not lie under the stages'.
     pub fn report_degenerate<B: Board>(&self, board: &mut B) {
         let count = self.job.degenerate_faces();

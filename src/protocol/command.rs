@@ -79,6 +79,8 @@ pub enum Command<'a> {
     Check,
     /// `$SLP`
     Sleep,
+    /// `$UF2`
+    ShowDrive,
     /// `$J=…`: a move by hand.
     Jog(GCode<'a>),
     /// `G…`, `M…`, `X…`
@@ -155,6 +157,7 @@ pub const HELP: &[(&str, &str)] = &[
     ("$J=G91 X.. Y.. F..", "move by hand with the pen up; byte 0x85 ends it"),
     ("$C", "begin or end to check only: nothing moves"),
     ("$SLP", "switch the motors off; $X wakes"),
+    ("$UF2", "become the drive onto which a new image is copied, where the board has one"),
     (
         "G0 | G1 | G2 | G3 | G4 | G20 | G21 | G28 | G90 | G91",
         "move, arc, wait, inches, mm, park, absolute, relative",
@@ -235,6 +238,7 @@ impl<'a> Command<'a> {
             "H" => Ok(Self::Home),
             "C" => Ok(Self::Check),
             "SLP" => Ok(Self::Sleep),
+            "UF2" => Ok(Self::ShowDrive),
             "options" => Ok(Self::Options),
             "model" => Ok(Self::Model),
             "clear" => Ok(Self::Clear),

@@ -7,13 +7,14 @@
 // not before that cycle; 2 the power goes at that cycle, 3 it goes when so many more bytes of flash
 // have been erased or written (the number in the cycle's place), and comes back at once; 4 the main
 // loop hangs from that cycle on, 5 a byte for USB, 6 the USB host is plugged in (1), takes
-// nothing more (2), takes again (3); 7 a switch is fitted to a pin, which closes where its axis has gone to so many
+// nothing more (2), takes again (3), suspends the bus (4), resumes it (5), is unplugged (6), is plugged in on a busy
+// bus (7); 7 a switch is fitted to a pin, which closes where its axis has gone to so many
 // steps (+ 2^40) or below, and bounces; 8 a function (its number, its
 // address in the cycle's place) is timed; 9 how much of the stack is unused is asked; 10 where x has gone to so many steps, the
 // main loop stands still for so many hundredths of a second. 32 the pin RUN is pulled low for a moment, 33 the image is
 // copied onto the drive that the board shows with BOOTSEL held, 34 and 35 bits (the value) of a byte of flash (the
 // cycle) stay low or high from now on, 36 the main loop goes on at an address, with the stack used up (1) or as it is
-// (0). Out: 0 a byte
+// (0), 37 the host opens the USB port (1) or closes it (0) at a rate (the cycle). Out: 0 a byte
 // of the serial line, 1 a pin's new level, 2 the time, 3 a byte of the log, 4 the chip was reset (0 by
 // the loss of power, 1 by the watchdog), 5 a byte of USB, 6 a timed function has
 // returned (its number, the cycles in the cycle's place), 7 so many bytes of the stack have not been used since
@@ -28,11 +29,13 @@
 
 import { readFileSync, writeSync } from 'node:fs';
 import { pathToFileURL } from 'node:url';
+import { attachFlashChip } from './pico/flash_chip.mjs';
 import * as resets from './pico/resets.mjs';
+import { Usb } from './pico/usb_host.mjs';
 import { settled, wear } from './pico/worn_flash.mjs';
 
 const [directory, imagePath, logAddress] = process.argv.slice(-3);
-const { RP2040, USBCDC } = await import(pathToFileURL(`${directory}/dist/esm/index.js`));
+const { RP2040 } = await import(pathToFileURL(`${directory}/dist/esm/index.js`));
 
 const NANOS = 8;
 const CYCLES_PER_BYTE = Math.round((125e6 * 10) / 115200);
@@ -71,7 +74,9 @@ const UF2 = 33;
 const STAYS_LOW = 34;
 const STAYS_HIGH = 35;
 const JUMP = 36;
+const USB_LINE = 37;
 const BOOTSEL = 32;
+const USB_SERIAL = 33;
 const output = Buffer.alloc(1 << 16);
 let filled = 0;
 
@@ -206,7 +211,8 @@ function start(flash, kind) {
   machines.forEach(followQueue);
   chip.pio.forEach(followPio);
   schedule();
-  if (usbHost) plugIn();
+  usb.attach(chip);
+  attachFlashChip(chip);
   const watchdog = chip.peripherals[WATCHDOG];
   watchdog.onWatchdogTrigger = () => {
     // Or its alarm would come again at once, for ever.
@@ -225,61 +231,10 @@ function unusedStack() {
 
 // --- The USB host --------------------------------------------------------------------------------
 
-const PACKET = 64;
-const AVAILABLE = 1 << 10;
-const IN_BUFFER_CONTROL = 0x80;
-const HOST = { PLUGGED_IN: 1, STOPS: 2, TAKES: 3 };
-/** Whether there is a host, and whether it takes packets. */
-let usbHost = false;
-let usbTakes = true;
-/** Bytes for the device. */
-const usbBytes = [];
-/** Hands the device its next packet, while it waits for one. */
-let offerPacket = null;
-/** A packet of the device's that the host does not take. */
-let leftPacket = null;
-
-/** rp2040js's host finds the device; afterwards the device gets a packet only when there is something in it. */
-function plugIn() {
-  const { usbCtrl } = chip;
-  const host = new USBCDC(usbCtrl);
-  offerPacket = null;
-  host.onSerialData = (data) => data.forEach((byte) => report(USB, byte, now()));
-  usbCtrl.onEndpointRead = (endpoint, size) => {
-    if (endpoint === 0) return;
-    offerPacket = () => {
-      offerPacket = null;
-      usbCtrl.endpointReadDone(endpoint, Uint8Array.from(usbBytes.splice(0, Math.min(size, PACKET))));
-    };
-    offerUsb();
-  };
-  // A packet that the host does not take stays where it is.
-  const updated = usbCtrl.DPRAMUpdated.bind(usbCtrl);
-  usbCtrl.DPRAMUpdated = (offset, value) => {
-    const sent = offset === IN_BUFFER_CONTROL + 8 * host.inEndpoint && value & AVAILABLE;
-    if (sent && !usbTakes) leftPacket = () => updated(offset, value);
-    else updated(offset, value);
-  };
-  leftPacket = null;
-  // Already enabled if the host comes later.
-  if (usbCtrl.mainCtrl & 1) usbCtrl.resetDevice();
-}
-
-function offerUsb() {
-  if (usbBytes.length && offerPacket) offerPacket();
-}
-
-function hostDoes(what) {
-  if (what === HOST.PLUGGED_IN) {
-    usbHost = true;
-    plugIn();
-  } else usbTakes = what === HOST.TAKES;
-  if (usbTakes && leftPacket) {
-    const take = leftPacket;
-    leftPacket = null;
-    take();
-  }
-}
+const usb = new Usb({
+  byte: (byte) => report(USB, byte, now()),
+  serialNumber: (text) => [0, ...Buffer.from(text)].forEach((byte) => report(USB_SERIAL, byte, now())),
+});
 
 // --- Resets --------------------------------------------------------------------------------------
 
@@ -299,7 +254,7 @@ function resetByHand(kind) {
   flashBudget = Infinity;
   flashNanos = 0;
   bytes.length = 0;
-  usbBytes.length = 0;
+  usb.bytes.length = 0;
   report(RESET, kind, now());
   start(chip.flash, kind);
 }
@@ -527,7 +482,8 @@ process.stdin.on('data', (data) => {
       const axis = entry.value - 8;
       switches[axis] = { pin: entry.value, at: entry.cycle - SWITCH_ZERO, closed: false };
       lookAtSwitch(axis);
-    } else if (rest[at] === USB) usbBytes.push(entry.value);
+    } else if (rest[at] === USB) usb.send(entry.value);
+    else if (rest[at] === USB_LINE) usb.setLine(entry.cycle, entry.value !== 0);
     else if (rest[at] === STACK) report(UNUSED_STACK, 0, unusedStack());
     else if (rest[at] === STALL) stalls.push({ place: entry.cycle, hundredths: entry.value });
     else if (rest[at] === CUT_FLASH) flashBudget = entry.cycle;
@@ -540,7 +496,7 @@ process.stdin.on('data', (data) => {
     else events.push({ what: rest[at], ...entry });
   }
   rest = rest.subarray(at);
-  offerUsb();
+  usb.offer();
 });
 process.stdin.on('end', () => process.exit(0));
 
@@ -583,7 +539,7 @@ function takeInput(cycle) {
       continue;
     }
     if (what === USB_HOST) {
-      hostDoes(value);
+      usb.act(value);
       continue;
     }
     setInput(value & 0x7f, value >= 0x80);
@@ -603,6 +559,9 @@ function takeLog() {
   const field = (offset) => chip.readUint32(transfer + offset);
   const [buffer, size, written] = [field(28), field(32), field(36)];
   let read = field(40);
+  // Until the program has begun, anything lies there.
+  const SEGG = 0x47474553;
+  if (field(0) !== SEGG || size > 1 << 16 || written >= size || read >= size) return;
   for (; size && read !== written; read = (read + 1) % size) {
     report(LOG, chip.readUint8(buffer + read), now());
   }

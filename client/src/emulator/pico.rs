@@ -19,7 +19,9 @@ const PROGRAM: &str = "node";
 const SCRIPT: &str = include_str!("pico.mjs");
 /// What the script imports: the name there, and the text.
 const MODULES: &[(&str, &str)] = &[
+    ("./pico/flash_chip.mjs", include_str!("pico/flash_chip.mjs")),
     ("./pico/resets.mjs", include_str!("pico/resets.mjs")),
+    ("./pico/usb_host.mjs", include_str!("pico/usb_host.mjs")),
     ("./pico/worn_flash.mjs", include_str!("pico/worn_flash.mjs")),
 ];
 /// Where `cargo xtask set-up` puts it, from the workspace's root.
@@ -53,6 +55,8 @@ struct State {
     unused_stack: Option<u64>,
     /// The boot ROM waits for an image.
     shows_drive: bool,
+    /// As the USB host has read it.
+    usb_serial_number: String,
     log: Vec<String>,
     said: VecDeque<String>,
     ended: bool,
@@ -267,6 +271,36 @@ impl Pico {
     /// The emulator has ended.
     pub fn let_usb_take(&mut self, takes: bool) -> io::Result<()> {
         self.tell(USB_HOST, if takes { 3 } else { 2 }, 0)
+    }
+
+    /// Plugs it in where the bus is never idle: other devices at the same hub are busy.
+    ///
+    /// # Errors
+    /// The emulator has ended.
+    pub fn plug_usb_into_busy_bus(&mut self) -> io::Result<()> {
+        self.tell(USB_HOST, 7, 0)
+    }
+
+    /// Lets the USB host suspend the bus, as a computer does that goes to sleep, or resume it.
+    ///
+    /// # Errors
+    /// The emulator has ended.
+    pub fn suspend_usb(&mut self, suspends: bool) -> io::Result<()> {
+        self.tell(USB_HOST, if suspends { 4 } else { 5 }, 0)
+    }
+
+    /// Lets a program on the USB host open the port or close it (DTR), at a rate in baud. The host opens it at 115200 baud
+    /// when it has found the device.
+    ///
+    /// # Errors
+    /// The emulator has ended.
+    pub fn open_usb(&mut self, opens: bool, rate: u32) -> io::Result<()> {
+        self.tell(USB_LINE, u8::from(opens), u64::from(rate))
+    }
+
+    /// The serial number that the USB host has read from the device; empty before.
+    pub fn usb_serial_number(&self) -> String {
+        self.shared.lock().usb_serial_number.clone()
     }
 
     /// [`EmulatedBoard::send`] by USB.
@@ -514,7 +548,9 @@ const UF2: u8 = 33;
 const STAYS_LOW: u8 = 34;
 const STAYS_HIGH: u8 = 35;
 const JUMP: u8 = 36;
+const USB_LINE: u8 = 37;
 const BOOTSEL: u8 = 32;
+const USB_SERIAL: u8 = 33;
 /// Where the emulator's axes begin.
 const SWITCH_ZERO: i64 = 1 << 40;
 
@@ -556,6 +592,8 @@ fn read(mut stdout: ChildStdout, shared: &Shared<State>, mut log: PipeWriter) {
                 LOG => logged.push(record.value),
                 RESET => state.shows_drive = false,
                 BOOTSEL => state.shows_drive = true,
+                USB_SERIAL if record.value == 0 => state.usb_serial_number.clear(),
+                USB_SERIAL => state.usb_serial_number.push(char::from(record.value)),
                 _ => {}
             }
         }

@@ -11,9 +11,10 @@ use core::mem::MaybeUninit;
 use core::panic::PanicInfo;
 
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
+use rp2040_hal::rom_data;
 
 use super::registers::{PSM, UART0, WATCHDOG};
-use super::{pen, steps};
+use super::{clock, pen, steps};
 use crate::boards::fault::{self, Fault};
 
 mod watchdog {
@@ -185,6 +186,19 @@ fn restart(word: u32) -> ! {
 pub fn restart_fresh() -> ! {
     make_safe();
     restart(0)
+}
+
+/// Raises the pen, switches the drivers off and gives the board to the boot ROM, which shows the drive for a new image.
+/// Takes a second; nothing else goes on.
+pub fn show_drive() -> ! {
+    /// The servo has time to raise the pen: nothing tells it to afterwards. In microseconds.
+    const RAISING: u32 = 700_000;
+    make_safe();
+    feed();
+    let began = clock::microseconds();
+    while clock::microseconds().wrapping_sub(began) < RAISING {}
+    // The boot ROM restarts itself by the watchdog. It does not show the activity at a pin, and leaves no interface out.
+    rom_data::reset_to_usb_boot(0, 0)
 }
 
 struct Pico;

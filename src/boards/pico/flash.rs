@@ -8,16 +8,19 @@
 //! A worn flash says nothing by itself: its cells no longer change. So what was erased or written is read back, and
 //! [`Worn`] is the error if it is not what it should be.
 
+use core::fmt::Write;
 use core::ptr;
 
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
 };
+use heapless::String;
 use penup::plotter::Record;
 use penup::storage::{PAGE_BYTES, Slots};
 use rp2040_hal::rom_data;
 
 use super::{BOOT_2, critical, emergency};
+use crate::boards::peripheral::Peripheral;
 
 /// Where the flash is read.
 const MAPPED_AT: usize = 0x1000_0000;
@@ -61,6 +64,30 @@ enum Work<'p> {
         to: u32,
         page: &'p [u8; PAGE_BYTES],
     },
+    /// Asks the chip for its number, which comes behind the command's own bytes.
+    Number {
+        exchanged: &'p mut [u8; NUMBER_COMMAND],
+    },
+}
+
+/// The command, four bytes without meaning, and the answer.
+const NUMBER_COMMAND: usize = 1 + 4 + 8;
+const READ_NUMBER: u8 = 0x4B;
+
+/// The serial line to the flash chip (data sheet, 4.10.13), and the pad that selects the chip (2.19.6.2).
+// SAFETY of both: the address map of the data sheet, 2.2. They are used while nothing else reads the flash.
+const SSI: Peripheral = unsafe { Peripheral::at(0x1800_0000) };
+const QSPI_PADS: Peripheral = unsafe { Peripheral::at(0x4001_8000) };
+mod ssi {
+    pub const STATUS: usize = 0x28;
+    pub const HAS_PLACE: u32 = 1 << 1;
+    pub const HAS_BYTE: u32 = 1 << 3;
+    pub const DATA: usize = 0x60;
+    pub const SELECT: usize = 0x0C;
+    /// The pad's level by hand: low is selected.
+    pub const LEVEL: u32 = 3 << 8;
+    pub const LOW: u32 = 2 << 8;
+    pub const HIGH: u32 = 3 << 8;
 }
 
 /// Does it, out of RAM.
@@ -69,7 +96,7 @@ enum Work<'p> {
 /// Interrupts are masked, and nothing else reads the flash; the work is within it.
 #[inline(never)]
 #[unsafe(link_section = ".data.flash")]
-unsafe extern "C" fn carry_out(rom: &Rom, work: &Work<'_>) {
+unsafe extern "C" fn carry_out(rom: &Rom, work: &mut Work<'_>) {
     // SAFETY: the order of the data sheet, 2.8.3.1.3; all is in ROM or RAM.
     unsafe {
         (rom.connect)();
@@ -81,6 +108,18 @@ unsafe extern "C" fn carry_out(rom: &Rom, work: &Work<'_>) {
                 (rom.erase)(*from, *bytes, BLOCK_BYTES, ERASE_BLOCK);
             }
             Work::Write { to, page } => (rom.write)(*to, page.as_ptr(), PAGE_BYTES),
+            Work::Number { exchanged } => {
+                // The boot ROM has set the line up for single bytes. An answer comes with each of them.
+                let select = QSPI_PADS.read(ssi::SELECT) & !ssi::LEVEL;
+                QSPI_PADS.write(ssi::SELECT, select | ssi::LOW);
+                for byte in exchanged.iter_mut() {
+                    while SSI.read(ssi::STATUS) & ssi::HAS_PLACE == 0 {}
+                    SSI.write(ssi::DATA, *byte as u32);
+                    while SSI.read(ssi::STATUS) & ssi::HAS_BYTE == 0 {}
+                    *byte = SSI.read(ssi::DATA) as u8;
+                }
+                QSPI_PADS.write(ssi::SELECT, select | ssi::HIGH);
+            }
         }
         (rom.flush_cache)();
         (rom.boot_2)();
@@ -100,7 +139,19 @@ impl Flash {
         Self(())
     }
 
-    fn work(&mut self, work: &Work<'_>) {
+    /// The number of the chip, which no other has: 16 hexadecimal digits.
+    pub fn number(&mut self) -> String<16> {
+        let mut exchanged = [0; NUMBER_COMMAND];
+        exchanged[0] = READ_NUMBER;
+        self.work(Work::Number { exchanged: &mut exchanged });
+        let [.., a, b, c, d, e, f, g, h] = exchanged;
+        let mut digits = String::new();
+        // Fails never: it is as long as that.
+        let _ = write!(digits, "{:016X}", u64::from_be_bytes([a, b, c, d, e, f, g, h]));
+        digits
+    }
+
+    fn work(&mut self, mut work: Work<'_>) {
         emergency::feed();
         // The boot loader's code, where it can be run while the flash cannot.
         let boot_2: [u32; 64] = bytemuck::cast(BOOT_2);
@@ -120,7 +171,7 @@ impl Flash {
         critical::with_steps_masked(|| {
             // SAFETY: interrupts are masked, one core runs, and the channel of the steps reads RAM; the
             // callers check the place.
-            unsafe { carry_out(&rom, work) };
+            unsafe { carry_out(&rom, &mut work) };
         });
     }
 }
@@ -161,7 +212,7 @@ impl NorFlash for Flash {
     /// Erases sectors that lie in what is left to this module; others stay as they are, which is [`Worn`] too.
     fn erase(&mut self, from: u32, to: u32) -> Result<(), Worn> {
         if from >= START && to <= END {
-            self.work(&Work::Erase { from, bytes: (to - from) as usize });
+            self.work(Work::Erase { from, bytes: (to - from) as usize });
         }
         if (from..to).all(|at| byte_at(at) == 0xFF) { Ok(()) } else { Err(Worn) }
     }
@@ -172,7 +223,7 @@ impl NorFlash for Flash {
             if (START..END).contains(&to) {
                 let mut page = [0; PAGE_BYTES];
                 page.copy_from_slice(bytes);
-                self.work(&Work::Write { to, page: &page });
+                self.work(Work::Write { to, page: &page });
             }
             if !(to..).zip(bytes).all(|(at, &byte)| byte_at(at) == byte) {
                 return Err(Worn);

@@ -8,6 +8,7 @@
 //! | PEN (servo) | GP7: PWM slice 3 |
 //! | limit switches of x and y, emergency stop (closed: low) | GP8, GP9, GP10 |
 //! | STEP_Z, DIR_Z of a motor that lifts the pen (high: down) | GP11, GP12 |
+//! | nothing: the driver of USB uses the pin when a host resets the bus | GP15 |
 //! | settings and last job | the last 288 KiB of flash |
 //! | next block of steps | DMA_IRQ_0, priority 0 |
 //! | pen's heights, and the steps of its motor | PIO0_IRQ_0, priority 1 |
@@ -47,7 +48,7 @@ use rp2040_hal::fugit::ExtU32;
 use rp2040_hal::gpio::Pins;
 use rp2040_hal::pac::Peripherals;
 use rp2040_hal::{Sio, Watchdog};
-use static_cell::ConstStaticCell;
+use static_cell::{ConstStaticCell, StaticCell};
 
 use self::emergency::Start;
 use self::ports::Ports;
@@ -95,10 +96,13 @@ pub fn take() -> (Pico, Lent<'static>, &'static PulserState) {
     let steps = steps::set_up(&mut core.NVIC);
     pen::set_up();
     lift::set_up();
+    let mut flash = flash::Flash::new();
     let line = ports::set_up();
     let uart = serial::set_up(&mut core.NVIC);
     let controller = (chip.USBCTRL_REGS, chip.USBCTRL_DPRAM);
-    let usb = usb::set_up(&mut core.NVIC, controller, clocks.usb_clock, &mut chip.RESETS);
+    static NUMBER: StaticCell<heapless::String<16>> = StaticCell::new();
+    let number = NUMBER.init(flash.number());
+    let usb = usb::set_up(&mut core.NVIC, controller, clocks.usb_clock, &mut chip.RESETS, number);
     let ports = Ports::new(line, uart, usb);
     pins::set_up(gpio);
     contacts::set_up();
@@ -114,18 +118,20 @@ pub fn take() -> (Pico, Lent<'static>, &'static PulserState) {
         Start::Rescue(cause) => rescue::run(ports, &cause),
     };
     let memory = MEMORY.take().lend(BLOCKS.take());
-    let board = Pico { ports, steps, flash: flash::Flash::new(), fault };
+    let board = Pico { ports, steps, flash, fault };
     (board, memory, &steps::STATE)
 }
 
 impl Board for Pico {
     const NAME: &'static str = "pico";
+    const HAS_DRIVE: bool = true;
 
     fn read_byte(&mut self) -> Option<u8> {
         self.ports.read_byte()
     }
 
     fn take_real_time(&mut self) -> RealTime {
+        usb::go_on();
         emergency::note_running(clock::microseconds());
         if self.steps.gets_on() {
             emergency::feed();
@@ -135,6 +141,22 @@ impl Board for Pico {
 
     fn write(&mut self, bytes: &[u8]) {
         self.ports.write(bytes);
+    }
+
+    fn take_opened(&mut self) -> bool {
+        usb::take_opened()
+    }
+
+    fn speak_aside(&mut self, is_aside: bool) {
+        self.ports.speak_aside(is_aside);
+    }
+
+    fn show_drive(&mut self) {
+        /// For the last reply, on the slower port, in microseconds.
+        const SENDING: u32 = 100_000;
+        let began = clock::microseconds();
+        while clock::microseconds().wrapping_sub(began) < SENDING {}
+        emergency::show_drive()
     }
 
     fn queue(&mut self) -> &mut dyn EventQueue {

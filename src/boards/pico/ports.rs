@@ -38,6 +38,8 @@ pub struct Inlet {
 /// The main loop's end.
 pub struct Ports {
     line: Line,
+    /// What is sent goes to USB alone.
+    is_aside: bool,
     pub uart: serial::Sender,
     pub usb: usb::Sender,
 }
@@ -102,7 +104,7 @@ impl Inlet {
 impl Ports {
     /// Joins what the ports' set-up gave.
     pub fn new(line: Line, uart: serial::Sender, usb: usb::Sender) -> Self {
-        Self { line, uart, usb }
+        Self { line, is_aside: false, uart, usb }
     }
 
     /// The next ordinary byte: see [`Line::read_byte`].
@@ -119,8 +121,16 @@ impl Ports {
         self.line.take_real_time()
     }
 
+    /// What is sent from now on goes to USB alone, or again to who has spoken.
+    pub fn speak_aside(&mut self, is_aside: bool) {
+        self.is_aside = is_aside;
+    }
+
     /// Sends `bytes` to who has spoken.
     pub fn write(&mut self, bytes: &[u8]) {
+        if self.is_aside {
+            return self.usb.write(bytes);
+        }
         let spoken = SPOKEN.load(Ordering::Relaxed);
         let hears = |port: Port| spoken == 0 || spoken & port as u8 != 0;
         if hears(Port::Uart) {

@@ -5,7 +5,7 @@
 
 use core::fmt::Write;
 
-use penup::protocol::{Refusal, RealTime};
+use penup::protocol::{RealTime, Refusal};
 
 use super::emergency::{self, Cause};
 use super::ports::Ports;

@@ -1,14 +1,25 @@
 //! The second serial port: USB, of the class CDC-ACM, for which every system has a driver.
 //!
-//! Bytes that find no place wait in the controller, and the host waits with the rest; none is lost.
+//! Received bytes that find no place in the line's queue wait here, and when this is full too, the controller refuses
+//! further packets, so that the host waits with the rest. None is lost: not when the host suspends the bus, and not when
+//! it closes the port. Bytes that act at once act as their packet comes in.
+//!
 //! What is sent waits in a queue. If the host takes nothing for [`PATIENCE`] although the queue is full, it counts
-//! as gone, and what would be sent is dropped until it takes something again: nobody may keep the steps waiting.
+//! as gone, and what would be sent is dropped until it takes something again: nobody may keep the steps waiting. The same
+//! holds once a program has closed the port (DTR has fallen): replies that it has not taken are dropped, and so is
+//! the rest of a line that it has not ended. A program that opens the port (DTR rises) is greeted, alone: see
+//! [`take_opened`].
+//!
+//! Of the chip's errata, E5 is dealt with by the driver; it takes GPIO 15 for a millisecond when a host resets the bus
+//! (see [`go_on`]). E15 is dealt with here: see [`frame`].
+
+mod frame;
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use cortex_m::peripheral::NVIC;
-use heapless::Vec;
 use heapless::spsc::{Consumer, Producer, Queue};
+use heapless::{Deque, Vec};
 use rp2040_hal::clocks::UsbClock;
 use rp2040_hal::pac::{Interrupt, RESETS, USBCTRL_DPRAM, USBCTRL_REGS, interrupt};
 use rp2040_hal::usb::UsbBus;
@@ -19,11 +30,13 @@ use usb_device::device::{
 };
 use usbd_serial::{CdcAcmClass, USB_CLASS_CDC};
 
+use self::frame::Frame;
 use super::ports::{self, Inlet, Port};
 use super::registers::USB;
-use super::{clock, critical};
+use super::{clock, critical, emergency};
 use crate::boards::handler::Owned;
 use crate::boards::line::ABORT;
+use crate::boards::peripheral::Peripheral;
 
 /// For tests and for projects without a number of their own: <https://pid.codes/1209/0001>.
 const VENDOR_AND_PRODUCT: UsbVidPid = UsbVidPid(0x1209, 0x0001);
@@ -35,8 +48,31 @@ const SENT_PLACES: usize = 2048;
 /// In microseconds. A host takes a packet a millisecond when it is busy.
 const PATIENCE: u32 = 20_000;
 
-/// The register of the controller's that tells of filled and emptied packets.
+/// Received bytes that wait for a place in the line's queue, at most.
+const WAITING_PLACES: usize = 512;
+/// Who opens the port at this rate and closes it wants the drive for a new image, as of an Arduino.
+const TOUCH_RATE: u32 = 1200;
+
+/// Registers of the controller's: interrupts as they are, masked or not; bits to set in their mask, and to clear in it;
+/// filled and emptied packets.
+const INTERRUPTS: usize = 0x8C;
+const ENABLE: usize = 0x2090;
+const DISABLE: usize = 0x3090;
+const BUS_RESET: u32 = 1 << 12;
 const PACKETS_DONE: usize = 0x58;
+
+/// The controller's memory: the control words of the endpoints' buffers begin at 0x80. Used here only where the driver
+/// has no function, beside it.
+// SAFETY: the address map of the RP2040's data sheet, 4.1.3; the words may be read and written at any time.
+const BUFFERS: Peripheral = unsafe { Peripheral::at(0x5010_0000) };
+mod buffer {
+    pub const CONTROLS: usize = 0x80;
+    pub const AVAILABLE: u32 = 1 << 10;
+    pub const IS_DATA_1: u32 = 1 << 13;
+    pub const FULL: u32 = 1 << 15;
+    /// Cycles of the core in which a packet of 64 bytes, begun before, is over: 60 microseconds.
+    pub const CYCLES: u32 = 7500;
+}
 
 static BUS: StaticCell<UsbBusAllocator<UsbBus>> = StaticCell::new();
 static QUEUE: StaticCell<Queue<u8, SENT_PLACES>> = StaticCell::new();
@@ -44,15 +80,24 @@ static DEVICE: Owned<Device> = Owned::empty();
 
 /// The host takes nothing. The main loop sets it, the handler clears it.
 static HOST_IS_GONE: AtomicBool = AtomicBool::new(true);
-/// Received bytes wait for a place. The handler writes it.
-static BYTES_WAIT: AtomicBool = AtomicBool::new(false);
+/// Received bytes wait for a place, or the driver waits for the bus. The handler writes it.
+static IS_WAITED: AtomicBool = AtomicBool::new(false);
+/// A program has opened the port. The handler sets it, the main loop clears it.
+static WAS_OPENED: AtomicBool = AtomicBool::new(false);
 
 struct Device {
     device: UsbDevice<'static, UsbBus>,
     class: CdcAcmClass<'static, UsbBus>,
     is_up: bool,
+    /// A program has the port open: DTR.
+    is_open: bool,
+    /// The host resets the bus, and erratum E5 is being worked around.
+    awaits_bus: bool,
+    frame: Frame,
     /// Received bytes that wait for a place.
-    waiting: Vec<u8, PACKET>,
+    waiting: Deque<u8, WAITING_PLACES>,
+    /// The last received byte does not end a line.
+    is_in_line: bool,
     to_send: Consumer<'static, u8>,
     /// Bytes that the controller has not taken yet.
     packet: Vec<u8, SENT_PACKET>,
@@ -61,7 +106,7 @@ struct Device {
 /// The main loop's end of what is sent.
 pub struct Sender(Producer<'static, u8>);
 
-/// Shows the device to the host. `ports` is set up.
+/// Shows the device to the host, with this serial number. `ports` is set up, and the pins are out of their reset.
 ///
 /// # Panics
 /// Never: the strings fit.
@@ -70,6 +115,7 @@ pub fn set_up(
     controller: (USBCTRL_REGS, USBCTRL_DPRAM),
     clock: UsbClock,
     resets: &mut RESETS,
+    number: &'static str,
 ) -> Sender {
     const POWERED: bool = true; // The Pico's power comes from there; the pin that would tell is in use.
     let bus: &UsbBusAllocator<_> = BUS.init(UsbBusAllocator::new(UsbBus::new(
@@ -83,7 +129,7 @@ pub fn set_up(
     let strings = StringDescriptors::default()
         .manufacturer("penup")
         .product("penup pen plotter")
-        .serial_number("pico");
+        .serial_number(number);
     let builder = UsbDeviceBuilder::new(bus, VENDOR_AND_PRODUCT).device_class(USB_CLASS_CDC);
     let builder = builder.strings(&[strings]).and_then(|builder| builder.max_packet_size_0(64));
     let (sent, to_send) = QUEUE.init(Queue::new()).split();
@@ -92,7 +138,11 @@ pub fn set_up(
             device: builder.build(),
             class,
             is_up: false,
-            waiting: Vec::new(),
+            is_open: false,
+            awaits_bus: false,
+            frame: Frame::new(),
+            waiting: Deque::new(),
+            is_in_line: false,
             to_send,
             packet: Vec::new(),
         };
@@ -121,39 +171,92 @@ impl Sender {
     }
 }
 
-/// Takes bytes in that found no place, if there are any. Called by the main loop.
+/// Takes bytes in that found no place, if there are any, and looks whether the bus is ready. Called by the main loop.
 pub fn go_on() {
-    if BYTES_WAIT.load(Ordering::Relaxed) {
+    if IS_WAITED.load(Ordering::Relaxed) {
         critical_section::with(|_| serve());
     }
+}
+
+/// Whether a program has opened the port since last asked.
+pub fn take_opened() -> bool {
+    // The handler only sets it, and what came in between is the same.
+    let was_opened = WAS_OPENED.load(Ordering::Relaxed);
+    if was_opened {
+        WAS_OPENED.store(false, Ordering::Relaxed);
+    }
+    was_opened
 }
 
 /// All that there is to do. Called by the handler, or where it and that of the other port are masked.
 fn serve() {
     // SAFETY: by the contract above.
     if let (Some(device), Some(inlet)) = unsafe { (DEVICE.get(), ports::inlet()) } {
+        device.frame.look();
         // Polling forgets it.
         let took = device.class.write_ep().address().index();
         let took = USB.read(PACKETS_DONE) & 1 << (2 * took) != 0;
         device.device.poll(&mut [&mut device.class]);
+        device.follow_bus();
         device.follow_state();
+        device.follow_port();
         if took {
             device.welcome_back();
         }
         device.take_in(inlet);
         device.send();
+        IS_WAITED.store(device.awaits_bus || !device.waiting.is_empty(), Ordering::Relaxed);
     }
 }
 
 impl Device {
-    /// Begins anew with each host.
+    /// While the host resets the bus, for some 10 to 50 ms, or for as long as it has no power, the driver waits, and its
+    /// interrupt would come again at once: then the main loop asks instead.
+    fn follow_bus(&mut self) {
+        let is_reset = USB.read(INTERRUPTS) & BUS_RESET != 0;
+        if is_reset != self.awaits_bus {
+            self.awaits_bus = is_reset;
+            USB.write(if is_reset { DISABLE } else { ENABLE }, BUS_RESET);
+        }
+    }
+
+    /// Begins anew with each host. A host that suspends the bus is the same afterwards.
     fn follow_state(&mut self) {
-        let is_up = self.device.state() == UsbDeviceState::Configured;
-        if is_up != self.is_up {
+        let state = self.device.state();
+        let is_up = state == UsbDeviceState::Configured;
+        if is_up != self.is_up && state != UsbDeviceState::Suspend {
             self.is_up = is_up;
             self.forget_sent();
-            self.waiting.clear();
-            HOST_IS_GONE.store(!is_up, Ordering::Relaxed);
+            // Until a program opens the port.
+            HOST_IS_GONE.store(true, Ordering::Relaxed);
+        }
+    }
+
+    /// Follows the program at the host's end of the port.
+    fn follow_port(&mut self) {
+        let is_open = self.class.dtr();
+        if is_open == self.is_open {
+            return;
+        }
+        self.is_open = is_open;
+        if is_open {
+            HOST_IS_GONE.store(false, Ordering::Relaxed);
+            WAS_OPENED.store(true, Ordering::Relaxed);
+            return;
+        }
+        HOST_IS_GONE.store(true, Ordering::Relaxed);
+        self.forget_sent();
+        self.take_packet_back();
+        if self.is_in_line {
+            /// In no text: the line is refused, and the next one is a line of its own.
+            const VOID: u8 = 0xFF;
+            // Packets are read only while there are more places than these.
+            let _ = self.waiting.push_back(VOID);
+            let _ = self.waiting.push_back(b'\n');
+            self.is_in_line = false;
+        }
+        if self.class.line_coding().data_rate() == TOUCH_RATE {
+            emergency::show_drive();
         }
     }
 
@@ -162,9 +265,25 @@ impl Device {
         while self.to_send.dequeue().is_some() {}
     }
 
+    /// Takes a packet back that the controller holds for the host, if the host does not take it just now.
+    fn take_packet_back(&mut self) {
+        let endpoint = self.class.write_ep().address().index();
+        let place = buffer::CONTROLS + 8 * endpoint;
+        let control = BUFFERS.read(place);
+        if control & buffer::AVAILABLE == 0 {
+            return;
+        }
+        BUFFERS.write(place, control & !buffer::AVAILABLE);
+        cortex_m::asm::delay(buffer::CYCLES);
+        if USB.read(PACKETS_DONE) & 1 << (2 * endpoint) == 0 {
+            // The next packet has the number of this one, which never was: the driver turns it.
+            BUFFERS.write(place, control & !(buffer::AVAILABLE | buffer::FULL) ^ buffer::IS_DATA_1);
+        }
+    }
+
     /// The host took a packet. What it missed if it was gone would be half of something.
     fn welcome_back(&mut self) {
-        if HOST_IS_GONE.load(Ordering::Relaxed) {
+        if self.is_open && HOST_IS_GONE.load(Ordering::Relaxed) {
             self.forget_sent();
             HOST_IS_GONE.store(false, Ordering::Relaxed);
         }
@@ -172,34 +291,38 @@ impl Device {
 
     fn take_in(&mut self, inlet: &mut Inlet) {
         loop {
-            let taken = self
-                .waiting
-                .iter()
-                .take_while(|&&byte| inlet.append(Port::Usb, byte).is_ok())
-                .count();
-            self.waiting.drain(..taken);
-            if !self.waiting.is_empty() {
+            while let Some(&byte) = self.waiting.front()
+                && inlet.append(Port::Usb, byte).is_ok()
+            {
+                self.waiting.pop_front();
+            }
+            if self.waiting.capacity() - self.waiting.len() < PACKET + 2 {
                 // The next packet waits in the controller; only its interrupt must not come for ever.
                 let number = self.class.read_ep().address().index();
                 USB.write(PACKETS_DONE, 1 << (2 * number + 1));
-                break;
+                return;
             }
             let mut packet = [0; PACKET];
-            let Ok(count) = self.class.read_packet(&mut packet) else { break };
+            let Ok(count) = self.class.read_packet(&mut packet) else { return };
+            // Who sends is there, also without DTR.
+            if self.is_up && count > 0 {
+                HOST_IS_GONE.store(false, Ordering::Relaxed);
+            }
             for &byte in packet.iter().take(count) {
                 if let Some(byte) = inlet.sort_out(Port::Usb, byte) {
-                    // As many as the packet, so there is a place.
-                    let _ = self.waiting.push(byte);
+                    self.is_in_line = byte != b'\n' && byte != b'\r';
+                    let _ = self.waiting.push_back(byte); // There is a place.
                 } else if byte == ABORT {
+                    self.is_in_line = false;
                     self.waiting.clear();
                 }
             }
         }
-        BYTES_WAIT.store(!self.waiting.is_empty(), Ordering::Relaxed);
     }
 
     fn send(&mut self) {
         if !self.is_up {
+            self.frame.leave();
             return self.forget_sent();
         }
         loop {
@@ -208,7 +331,10 @@ impl Device {
             {
                 let _ = self.packet.push(byte); // There is a place.
             }
-            if self.packet.is_empty() || self.class.write_packet(&self.packet).is_err() {
+            if self.packet.is_empty() {
+                return self.frame.leave();
+            }
+            if !self.frame.lets_send() || self.class.write_packet(&self.packet).is_err() {
                 return;
             }
             self.packet.clear();

@@ -1,0 +1,458 @@
+// The RP2040's USB controller as a device (data sheet, 4.1), and the host at the other end of the cable.
+//
+// Each packet is a transaction of its own time, data toggles are compared, frames begin every millisecond while the
+// host does not suspend the bus, and requests are answered or stalled. Of the errata: E5 (without 800 us of idle bus after
+// a reset the device does not connect; GPIO 15 can stand in for it), and E15 (an IN buffer that becomes available late
+// in a frame may be asked for so late that the hub cuts its acknowledgement off; the controller then hangs until it is
+// reset). Here every such buffer hangs it.
+
+const MICROSECOND = 1000;
+const MILLISECOND = 1000 * MICROSECOND;
+/** Alarms come at cycles of the core. */
+const CYCLE = 8;
+
+const REGISTER = {
+  ADDRESS: 0x00, MAIN: 0x40, SOF: 0x48, SIE: 0x4c, STATUS: 0x50, BUFFERS: 0x58, STALL_ARM: 0x68, MUXING: 0x74,
+  POWER: 0x78, DIRECT: 0x7c, OVERRIDE: 0x80, RAW: 0x8c, ENABLED: 0x90, FORCED: 0x94, MASKED: 0x98,
+};
+const STATUS = {
+  VBUS: 1, LINE: 3 << 2, SUSPENDED: 1 << 4, RESUME: 1 << 11, CONNECTED: 1 << 16, SETUP: 1 << 17, RESET: 1 << 19,
+};
+/** Interrupts that bits of the status raise. */
+const RAISED = [
+  [STATUS.RESET, 1 << 12], [STATUS.CONNECTED, 1 << 13], [STATUS.SUSPENDED, 1 << 14], [STATUS.RESUME, 1 << 15],
+  [STATUS.SETUP, 1 << 16],
+];
+const BUFFER_DONE = 1 << 4;
+const FRAME_BEGAN = 1 << 17;
+const CONTROLLER_ON = 1;
+const PULLED_UP = 1 << 16;
+const TO_PHY = 1;
+const TO_PAD = 1 << 2;
+const J = 1 << 2;
+
+/** Bits of a buffer's control word. */
+const AVAILABLE = 1 << 10;
+const STALL = 1 << 11;
+const IS_DATA_1 = 1 << 13;
+const FULL = 1 << 15;
+const LENGTH = 0x3ff;
+const CONTROLS = 0x80;
+const CONTROLS_END = 0x100;
+const PACKET = 64;
+
+/** In a frame, as the errata and TinyUSB's workaround have it. */
+const CRITICAL_FROM = 800 * MICROSECOND;
+const CRITICAL_TO = 998 * MICROSECOND;
+const IDLE_TO_CONNECT = 800 * MICROSECOND;
+
+const HOST = { PLUGS_IN: 1, STOPS: 2, TAKES: 3, SUSPENDS: 4, RESUMES: 5, UNPLUGS: 6, PLUGS_INTO_BUSY: 7 };
+
+export class Usb {
+  /** What the host is plugged into, takes and holds; outlives the chip's resets. */
+  isPlugged = false;
+  isBusy = false;
+  takes = true;
+  /** The line coding's rate, and whether the port is open: DTR. */
+  rate = 115200;
+  isOpen = true;
+  bytes = [];
+
+  /** `told` is called with what the host gets: `byte`, `serialNumber`. */
+  constructor(told) {
+    this.told = told;
+  }
+
+  /** A new chip is at this end of the cable. */
+  attach(chip) {
+    this.chip = chip;
+    this.generation = (this.generation ?? 0) + 1;
+    chip.usbCtrl = this;
+    chip.peripherals[0x50110] = this;
+    this.resetController();
+    const resets = chip.peripherals[0x4000c];
+    const write = resets.writeUint32.bind(resets);
+    resets.writeUint32 = (offset, value) => {
+      if (offset === 0 && value & (1 << 24)) this.resetController();
+      write(offset, value);
+    };
+  }
+
+  resetController() {
+    Object.assign(this, {
+      address: 0, main: 0, sie: 0, status: 0, buffers: 0, stallArm: 0, muxing: 0, power: 0, direct: 0, override: 0,
+      enabled: 0, forced: 0, frame: 0, frameBegan: false, isHung: false, raised: false,
+    });
+    this.isFramed = false;
+    this.frameAt = 0;
+    this.isConfigured = false;
+    this.transfer = null;
+    this.generation++;
+  }
+
+  now() {
+    return this.chip.clock.nanos;
+  }
+
+  /** Calls `work` later, unless the controller is reset before. */
+  after(nanos, work) {
+    const { generation } = this;
+    this.chip.clock.createAlarm(() => generation === this.generation && work()).schedule(Math.ceil(nanos / CYCLE) * CYCLE);
+  }
+
+  // --- The registers ---
+
+  raw() {
+    let raw = this.buffers ? BUFFER_DONE : 0;
+    for (const [bit, interrupt] of RAISED) if (this.status & bit) raw |= interrupt;
+    return this.frameBegan ? raw | FRAME_BEGAN : raw;
+  }
+
+  interrupt() {
+    this.chip.setInterrupt(5, ((this.raw() & this.enabled) | this.forced) !== 0);
+  }
+
+  line() {
+    if (this.muxing & TO_PAD && !(this.muxing & TO_PHY)) {
+      const { ctrl } = this.chip.gpio[15];
+      return (ctrl & 0x1f) === 8 && ((ctrl >> 16) & 3) === 3 ? J : 0;
+    }
+    return this.isBusReset ? 0 : J;
+  }
+
+  readUint32(offset) {
+    switch (offset) {
+      case REGISTER.ADDRESS: return this.address;
+      case REGISTER.MAIN: return this.main;
+      case REGISTER.SOF:
+        this.frameBegan = false;
+        this.interrupt();
+        return this.frame & 0x7ff;
+      case REGISTER.SIE: return this.sie;
+      case REGISTER.STATUS: return (this.status & ~STATUS.LINE) | this.line() | (this.power & 8 ? STATUS.VBUS : 0);
+      case REGISTER.BUFFERS: return this.buffers;
+      case REGISTER.STALL_ARM: return this.stallArm;
+      case REGISTER.MUXING: return this.muxing;
+      case REGISTER.POWER: return this.power;
+      case REGISTER.DIRECT: return this.direct;
+      case REGISTER.OVERRIDE: return this.override;
+      case REGISTER.RAW: return this.raw();
+      case REGISTER.ENABLED: return this.enabled;
+      case REGISTER.FORCED: return this.forced;
+      case REGISTER.MASKED: return (this.raw() & this.enabled) | this.forced;
+      default: return 0;
+    }
+  }
+
+  writeUint32Atomic(offset, value, type) {
+    const apply = (before) => [value, before ^ value, before | value, before & ~value][type];
+    switch (offset) {
+      case REGISTER.ADDRESS: this.address = apply(this.address); break;
+      case REGISTER.MAIN: this.main = apply(this.main); break;
+      case REGISTER.SIE: {
+        const before = this.sie;
+        this.sie = apply(before);
+        if (this.sie & ~before & PULLED_UP && this.isPlugged) this.after(MILLISECOND, () => this.enumerate());
+        break;
+      }
+      // Written ones clear.
+      case REGISTER.STATUS: this.status &= ~value; break;
+      case REGISTER.BUFFERS: this.buffers &= ~value; break;
+      case REGISTER.STALL_ARM: this.stallArm = apply(this.stallArm); break;
+      case REGISTER.MUXING:
+        this.muxing = apply(this.muxing);
+        if (this.line() === J) this.connectIfIdle();
+        break;
+      case REGISTER.POWER: this.power = apply(this.power); break;
+      case REGISTER.DIRECT: this.direct = apply(this.direct); break;
+      case REGISTER.OVERRIDE: this.override = apply(this.override); break;
+      case REGISTER.ENABLED: this.enabled = apply(this.enabled) & 0xfffff; break;
+      case REGISTER.FORCED: this.forced = apply(this.forced) & 0xfffff; break;
+    }
+    this.interrupt();
+  }
+
+  // --- The buffers ---
+
+  control(endpoint, isOut) {
+    return CONTROLS + 8 * endpoint + (isOut ? 4 : 0);
+  }
+
+  word(endpoint, isOut) {
+    return this.chip.usbDPRAMView.getUint32(this.control(endpoint, isOut), true);
+  }
+
+  place(endpoint, isOut) {
+    if (endpoint === 0) return 0x100;
+    return this.chip.usbDPRAMView.getUint32(8 * endpoint + (isOut ? 4 : 0), true) & 0xffc0;
+  }
+
+  finish(endpoint, isOut, word) {
+    this.chip.usbDPRAMView.setUint32(this.control(endpoint, isOut), word, true);
+    this.buffers |= 1 << (2 * endpoint + (isOut ? 1 : 0));
+    this.interrupt();
+  }
+
+  /** The chip has written a word of the controller's memory. */
+  DPRAMUpdated(offset, value) {
+    if (offset < CONTROLS || offset >= CONTROLS_END) return;
+    const [endpoint, isOut] = [(offset - CONTROLS) >> 3, (offset & 4) !== 0];
+    if (endpoint === 0) this.goOnWithTransfer();
+    else if (value & AVAILABLE && isOut) this.offer();
+    else if (value & AVAILABLE) {
+      const phase = this.now() - this.frameAt;
+      if (this.isFramed && phase >= CRITICAL_FROM && phase <= CRITICAL_TO) {
+        console.error(`erratum E15: endpoint ${endpoint} made available ${phase / MICROSECOND} us after the frame began`);
+        this.isHung = true;
+      }
+      this.take();
+    }
+  }
+
+  /** Whether the device answers at all. */
+  answers() {
+    return !this.isHung && !this.isBusReset && (this.status & STATUS.CONNECTED) !== 0 && this.isPlugged;
+  }
+
+  /** The host asks for the next packet of the device's, if it wants one. */
+  take() {
+    const endpoint = this.inEndpoint;
+    if (this.isTaking || !endpoint || !(this.word(endpoint, false) & AVAILABLE)) return;
+    if (!this.isConfigured || !this.isFramed || !this.takes || !this.isOpen) return;
+    const length = this.word(endpoint, false) & LENGTH;
+    let time = 15 * MICROSECOND + length * 700;
+    const left = this.frameAt + MILLISECOND - this.now();
+    if (time + 10 * MICROSECOND > left) time += left;
+    this.isTaking = true;
+    this.after(time, () => {
+      this.isTaking = false;
+      const word = this.word(endpoint, false);
+      if (!this.answers() || !this.isFramed || !this.isOpen || !this.takes || !(word & AVAILABLE)) return;
+      const from = this.place(endpoint, false);
+      const data = this.chip.usbDPRAM.slice(from, from + (word & LENGTH));
+      if (((word & IS_DATA_1) !== 0) === this.inToggle) {
+        this.inToggle = !this.inToggle;
+        data.forEach((byte) => this.told.byte(byte));
+      } else console.error('the host takes a packet for one that it has already');
+      this.finish(endpoint, false, word & ~(AVAILABLE | FULL));
+    });
+  }
+
+  /** The host sends its next packet, if the device has a place for it. */
+  offer() {
+    const endpoint = this.outEndpoint;
+    if (this.isOffering || !endpoint || !(this.word(endpoint, true) & AVAILABLE)) return;
+    if (!this.isConfigured || !this.isFramed || !this.isOpen || !this.bytes.length) return;
+    this.isOffering = true;
+    this.after(50 * MICROSECOND, () => {
+      this.isOffering = false;
+      const word = this.word(endpoint, true);
+      if (!this.answers() || !this.isFramed || !(word & AVAILABLE)) return;
+      const data = Uint8Array.from(this.bytes.splice(0, Math.min(word & LENGTH, PACKET)));
+      if (((word & IS_DATA_1) !== 0) !== this.outToggle) {
+        console.error('the device takes a packet for one that it has already');
+        return;
+      }
+      this.outToggle = !this.outToggle;
+      this.chip.usbDPRAM.set(data, this.place(endpoint, true));
+      this.finish(endpoint, true, (word & ~(AVAILABLE | LENGTH)) | FULL | data.length);
+    });
+  }
+
+  // --- The bus ---
+
+  beginFrame() {
+    if (!this.isFramed) return;
+    this.frame++;
+    this.frameAt = this.now();
+    if (this.answers()) this.frameBegan = true;
+    this.interrupt();
+    this.after(MILLISECOND, () => this.beginFrame());
+    this.take();
+    this.offer();
+  }
+
+  beginFrames() {
+    if (this.isFramed) return;
+    this.isFramed = true;
+    this.beginFrame();
+  }
+
+  connectIfIdle() {
+    const wasForced = this.muxing & TO_PAD;
+    if (this.status & STATUS.CONNECTED || this.isBusReset || (this.isBusy && !wasForced)) return;
+    this.after(IDLE_TO_CONNECT, () => {
+      if (this.isBusReset || this.line() !== J || (this.muxing & TO_PAD) !== wasForced) return;
+      this.status |= STATUS.CONNECTED;
+      this.interrupt();
+    });
+  }
+
+  suspend() {
+    this.isFramed = false;
+    this.after(3 * MILLISECOND, () => {
+      if (this.isFramed) return;
+      this.status |= STATUS.SUSPENDED;
+      this.interrupt();
+    });
+  }
+
+  resume() {
+    this.status |= STATUS.RESUME;
+    this.interrupt();
+    this.after(20 * MILLISECOND, () => this.beginFrames());
+  }
+
+  /** Finds the device and opens its port. */
+  async enumerate() {
+    const { generation } = this;
+    this.isBusReset = true;
+    this.isConfigured = this.isFramed = this.isTaking = this.isOffering = false;
+    this.status = (this.status & ~STATUS.CONNECTED) | STATUS.RESET;
+    this.interrupt();
+    await this.pause(10 * MILLISECOND);
+    this.isBusReset = false;
+    this.connectIfIdle();
+    await this.pause(MILLISECOND);
+    this.beginFrames();
+    await this.pause(4 * MILLISECOND);
+    this.hostAddress = 0;
+    const device = await this.request([0x80, 6, 0, 1, 0, 0, 64, 0]);
+    if (generation !== this.generation) return;
+    if (!device) {
+      // It did not hear, or is not ready: again.
+      this.isFramed = false;
+      return this.after(10 * MILLISECOND, () => this.enumerate());
+    }
+    await this.request([0, 5, 1, 0, 0, 0, 0, 0]);
+    this.hostAddress = 1;
+    await this.pause(2 * MILLISECOND);
+    const configuration = await this.request([0x80, 6, 0, 2, 0, 0, 255, 0]);
+    const serial = await this.request([0x80, 6, device[16], 3, 9, 4, 255, 0]);
+    if (serial) this.told.serialNumber(Buffer.from(serial.slice(2)).toString('utf16le'));
+    this.findEndpoints(configuration ?? []);
+    await this.request([0, 9, 1, 0, 0, 0, 0, 0]);
+    this.inToggle = this.outToggle = false;
+    this.isConfigured = true;
+    if (this.isOpen) await this.setLine(this.rate, true);
+    this.take();
+    this.offer();
+  }
+
+  findEndpoints(descriptors) {
+    for (let at = 0, isData = false; at < descriptors.length; at += Math.max(descriptors[at], 1)) {
+      if (descriptors[at + 1] === 4) isData = descriptors[at + 5] === 10;
+      if (descriptors[at + 1] !== 5 || !isData) continue;
+      const address = descriptors[at + 2];
+      if (address & 0x80) this.inEndpoint = address & 15;
+      else this.outEndpoint = address & 15;
+    }
+  }
+
+  /** Opens the port or closes it, at a rate: a line coding, then DTR. */
+  async setLine(rate, isOpen) {
+    this.rate = rate;
+    if (isOpen) this.isOpen = true;
+    if (!this.isConfigured) return;
+    const coding = [rate & 255, (rate >> 8) & 255, (rate >> 16) & 255, 0, 0, 0, 8];
+    await this.request([0x21, 0x20, 0, 0, 0, 0, 7, 0], coding);
+    await this.request([0x21, 0x22, isOpen ? 3 : 0, 0, 0, 0, 0, 0]);
+    this.isOpen = isOpen;
+    this.take();
+    this.offer();
+  }
+
+  pause(nanos) {
+    return { then: (resolve) => this.after(nanos, () => resolve()) };
+  }
+
+  // --- Control transfers ---
+
+  /** The answer to a request: bytes, or null if the device stalls it or is silent. */
+  request(setup, data) {
+    return {
+      then: (resolve) => {
+        this.after(100 * MICROSECOND, () => {
+          if (!this.answers() || this.address !== this.hostAddress) return this.after(5 * MILLISECOND, () => resolve(null));
+          this.chip.usbDPRAM.set(setup);
+          this.stallArm &= ~3;
+          this.status |= STATUS.SETUP;
+          const isIn = (setup[0] & 0x80) !== 0;
+          const length = setup[6] | (setup[7] << 8);
+          const transfer = { resolve, isIn, length, data, got: [], toggle: true, isStatus: !isIn && !length };
+          this.transfer = transfer;
+          this.interrupt();
+          this.after(500 * MILLISECOND, () => this.transfer === transfer && this.endTransfer(null));
+        });
+      },
+    };
+  }
+
+  endTransfer(result) {
+    const { resolve } = this.transfer;
+    this.transfer = null;
+    resolve(result);
+  }
+
+  goOnWithTransfer() {
+    if (!this.transfer || this.isStepDue) return;
+    this.isStepDue = true;
+    this.after(20 * MICROSECOND, () => {
+      this.isStepDue = false;
+      if (this.transfer && this.answers()) this.stepTransfer();
+    });
+  }
+
+  stepTransfer() {
+    const { transfer } = this;
+    // Until the setup packet is taken in, what is there is of the transfer before.
+    if (this.status & STATUS.SETUP) return this.goOnWithTransfer();
+    const isOut = transfer.isStatus ? transfer.isIn : !transfer.isIn;
+    const word = this.word(0, isOut);
+    if (word & STALL && this.stallArm & (isOut ? 2 : 1)) return this.endTransfer(null);
+    if (!(word & AVAILABLE)) return;
+    const isData1 = (word & IS_DATA_1) !== 0;
+    if (isData1 !== (transfer.isStatus || transfer.toggle)) {
+      console.error('a packet of a control transfer has the wrong toggle');
+      return this.endTransfer(null);
+    }
+    if (isOut) {
+      const data = transfer.isStatus ? [] : transfer.data;
+      this.chip.usbDPRAM.set(data, 0x100);
+      this.finish(0, true, (word & ~(AVAILABLE | LENGTH)) | FULL | data.length);
+      if (transfer.isStatus) return this.endTransfer(transfer.got);
+      transfer.isStatus = true;
+    } else {
+      const length = word & LENGTH;
+      transfer.got.push(...this.chip.usbDPRAM.slice(0x100, 0x100 + length));
+      this.finish(0, false, word & ~(AVAILABLE | FULL));
+      if (transfer.isStatus) return this.endTransfer(transfer.got);
+      transfer.toggle = !transfer.toggle;
+      if (length < PACKET || transfer.got.length >= transfer.length) transfer.isStatus = true;
+    }
+    this.goOnWithTransfer();
+  }
+
+  // --- What the test says ---
+
+  /** A byte for the device. */
+  send(byte) {
+    this.bytes.push(byte);
+  }
+
+  act(what) {
+    if (what === HOST.PLUGS_IN || what === HOST.PLUGS_INTO_BUSY) {
+      this.isPlugged = true;
+      this.isBusy = what === HOST.PLUGS_INTO_BUSY;
+      if (this.sie & PULLED_UP) this.after(MILLISECOND, () => this.enumerate());
+    } else if (what === HOST.UNPLUGS) {
+      this.isPlugged = this.isConfigured = false;
+      this.suspend();
+    } else if (what === HOST.SUSPENDS) this.suspend();
+    else if (what === HOST.RESUMES) this.resume();
+    else {
+      this.takes = what === HOST.TAKES;
+      this.take();
+    }
+  }
+}
