@@ -155,7 +155,9 @@ impl Board for Pico {
         /// For the last reply, on the slower port, in microseconds.
         const SENDING: u32 = 100_000;
         let began = clock::microseconds();
-        while clock::microseconds().wrapping_sub(began) < SENDING {}
+        while clock::microseconds().wrapping_sub(began) < SENDING {
+            cortex_m::asm::wfe();
+        }
         emergency::show_drive()
     }
 
