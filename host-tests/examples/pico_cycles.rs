@@ -59,7 +59,6 @@ fn measure(scene: &str, eye: &str) -> Result<(String, [u64; 5]), Box<dyn Error>>
     let mut uart = Line::to(Box::new(Pico::start(&image)?))?;
     uart.emulator.plug_usb_in()?;
     let mut line = Line::silent(Box::new(PicoByUsb(*uart.emulator)));
-    line.emulator.send(b"\x18")?;
     line.hear_greeting()?;
     let lines = job_lines(&format!("{scene}.obj"), &[eye]);
     let (plot, model) = lines.split_last().ok_or("an empty scene")?;

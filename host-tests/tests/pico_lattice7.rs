@@ -18,7 +18,6 @@ fn of_343_cubes_the_pins_draw_what_the_host_draws() -> Result<(), Box<dyn Error>
     let mut uart = Line::to(Box::new(Pico::start(&image_path("pico"))?))?;
     uart.emulator.plug_usb_in()?;
     let mut line = Line::silent(Box::new(PicoByUsb(*uart.emulator)));
-    line.emulator.send(b"\x18")?;
     line.hear_greeting()?;
     // USB holds back what finds no place, so nothing waits for answers, which costs the emulator a wait each.
     let (plot, model) = lines.split_last().ok_or("no line")?;

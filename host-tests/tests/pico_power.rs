@@ -56,7 +56,7 @@ impl Watched {
         let mut uart = start()?;
         uart.emulator.plug_usb_in()?;
         let mut watched = Self(Line::silent(Box::new(PicoByUsb(*uart.emulator))));
-        watched.greet()?;
+        watched.0.hear_greeting()?;
         Ok(watched)
     }
 
@@ -113,7 +113,8 @@ impl Watched {
         }
         while self.0.emulator.0.receive(&mut [0; 256], Duration::ZERO)? > 0 {}
         self.0.forget();
-        self.greet()
+        // The host finds the device again and opens its port.
+        self.0.hear_greeting()
     }
 }
 
@@ -198,6 +199,8 @@ fn a_hanging_program_is_started_again_in_alarm() -> TestResult {
     }
     line.emulator.hang()?;
     line.hear_greeting()?;
+    let message = line.hear()?;
+    assert!(message.starts_with("[MSG:started again after a fault: the program hung"), "{message}");
     assert_eq!(line.hear()?, "ALARM:101");
     assert!(line.status()?.contains("|Alarm:101"));
     let mut machine = Machine::default();

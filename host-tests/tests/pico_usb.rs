@@ -17,7 +17,6 @@ fn plugged_in() -> Result<Line<PicoByUsb>, Box<dyn Error>> {
     let mut uart = Line::to(Box::new(Pico::start(&image_path("pico"))?))?;
     uart.emulator.plug_usb_in()?;
     let mut line = Line::silent(Box::new(PicoByUsb(*uart.emulator)));
-    line.emulator.send(b"\x18")?;
     line.hear_greeting()?;
     Ok(line)
 }
@@ -117,4 +116,160 @@ fn a_line_that_the_other_port_interrupts_is_refused() -> TestResult {
     assert!(uart.hear()?.starts_with("error:"));
     assert_eq!(uart.hear()?, "[MODEL:vertices 1 of 4096]");
     Ok(())
+}
+
+fn take_host(line: Line<PicoByUsb>) -> Pico {
+    line.emulator.0
+}
+
+fn by_usb(emulator: Pico) -> Line<PicoByUsb> {
+    Line::silent(Box::new(PicoByUsb(emulator)))
+}
+
+/// Waits so long by the board's own clock.
+fn pass(line: &mut Line<PicoByUsb>, time: Duration) -> TestResult {
+    let end = line.emulator.clock()? + time;
+    while line.emulator.clock()? < end {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    Ok(())
+}
+
+#[test]
+fn the_serial_number_is_that_of_the_flash_chip() -> TestResult {
+    assert_eq!(plugged_in()?.emulator.0.usb_serial_number(), "E6605838835A2B2F");
+    Ok(())
+}
+
+/// Erratum E5: other devices at the hub leave the bus no idle time after its reset.
+#[test]
+fn a_busy_bus_finds_the_board_while_a_job_runs() -> TestResult {
+    let lines = job_lines("lattice2.obj", &["$page=60x80", "$margin=5"]);
+    let mut uart = begin_on(Line::to(Box::new(Pico::start(&image_path("pico"))?))?, &lines)?;
+    uart.emulator.plug_usb_into_busy_bus()?;
+    let mut usb = by_usb(*uart.emulator);
+    usb.hear_greeting()?;
+    // The job has not noticed.
+    let status = usb.status()?;
+    assert!(status.starts_with("<Run") && !status.contains("|Late"), "{status}");
+    let pins = events_until_idle(&mut usb)?;
+    assert_same_as_on_the_host(Board::Pico, &lines, &pins);
+    Ok(())
+}
+
+/// More lines than the line's queue and a packet hold are on their way when the computer goes to sleep.
+#[test]
+fn a_suspended_bus_loses_no_byte() -> TestResult {
+    let mut line = plugged_in()?;
+    // The move keeps the lines behind it waiting.
+    for text in ["G91", "G1 X100 F600", "M0"] {
+        assert_eq!(line.ask(text)?, "ok", "{text}");
+    }
+    let flood: String = (0..40).map(|n| format!("v {n}.125 {n} 0.5\n")).collect();
+    line.emulator.send(b"G1 X1\nG1 X-1\nM0\n")?;
+    line.emulator.send(flood.as_bytes())?;
+    pass(&mut line, Duration::from_millis(300))?;
+    line.emulator.0.suspend_usb(true)?;
+    pass(&mut line, Duration::from_millis(100))?;
+    line.emulator.0.suspend_usb(false)?;
+    pass(&mut line, Duration::from_millis(100))?;
+    line.emulator.send(b"~")?;
+    let mut oks = 0;
+    while oks < 43 {
+        match line.hear()?.as_str() {
+            "ok" => oks += 1,
+            other => assert!(other.starts_with("[MSG:") || other.is_empty(), "{other}"),
+        }
+        line.emulator.send(b"~")?;
+    }
+    line.emulator.send(b"$model\n")?;
+    assert_eq!(hear_all(&mut line)?[0], "[MODEL:vertices 40 of 4096]");
+    Ok(())
+}
+
+/// A program asks much, closes the port without reading and in the middle of a line; another one opens it.
+#[test]
+fn a_port_that_is_opened_again_begins_anew_and_is_greeted_alone() -> TestResult {
+    let lines = job_lines("lattice2.obj", &["$page=60x80", "$margin=5"]);
+    let mut line = begin_on(plugged_in()?, &lines)?;
+    line.emulator.0.let_usb_take(false)?;
+    line.emulator.send(b"$$\n$I\nv 1 2")?;
+    pass(&mut line, Duration::from_millis(50))?;
+    line.emulator.0.open_usb(false, 115_200)?;
+    pass(&mut line, Duration::from_millis(50))?;
+    line.emulator.0.let_usb_take(true)?;
+    line.emulator.0.open_usb(true, 115_200)?;
+    assert_eq!(line.hear()?, "");
+    let greeting = line.hear()?;
+    assert!(greeting.starts_with("Grbl"), "{greeting}");
+    assert!(line.ask("$model")?.starts_with("[MODEL:vertices"));
+    while line.hear()? != "ok" {}
+    // The job goes on, and the other port has heard nothing of it.
+    assert!(line.status()?.starts_with("<Run"));
+    let mut uart = Line::silent(Box::new(take_host(line)));
+    uart.emulator.send(b"?")?;
+    while !uart.hear()?.starts_with('<') {}
+    Ok(())
+}
+
+#[test]
+fn a_stop_acts_behind_all_that_a_sender_may_have_on_its_way() -> TestResult {
+    let lines = job_lines("lattice3.obj", &["$page=60x80", "$margin=5"]);
+    let (plot, before) = lines.split_last().ok_or("no line")?;
+    let mut line = begin_on(plugged_in()?, before)?;
+    line.emulator.send(format!("{plot}\n").as_bytes())?;
+    while !line.status()?.contains("|Stage:") {}
+    // Three times as many as are allowed; none is read while the picture is computed.
+    let flood: String = (0..48).map(|_| "v 1.125 2.0 0.5\n").collect();
+    line.emulator.send(flood.as_bytes())?;
+    line.emulator.send(b"\xFD")?;
+    while line.hear()? != "ALARM:10" {}
+    Ok(())
+}
+
+#[test]
+fn an_open_port_is_told_of_a_fault_too() -> TestResult {
+    let mut line = plugged_in()?;
+    line.emulator.0.jump_to_function(&image_path("pico"), "main", false)?;
+    line.hear_greeting()?;
+    let message = line.hear()?;
+    assert!(message.contains("the board was taken twice"), "{message}");
+    assert_eq!(line.hear()?, "ALARM:101");
+    assert_eq!(line.ask("$X")?, "ok");
+    Ok(())
+}
+
+fn wait_for_drive(line: &mut Line<PicoByUsb>) -> TestResult {
+    for _ in 0..6000 {
+        if line.emulator.0.shows_drive() {
+            return Ok(());
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    Err("the board shows no drive".into())
+}
+
+#[test]
+fn the_command_leads_to_the_drive_and_not_while_the_machine_moves() -> TestResult {
+    let mut line = plugged_in()?;
+    for text in ["G91", "G1 X20 F600"] {
+        assert_eq!(line.ask(text)?, "ok", "{text}");
+    }
+    assert!(line.ask("$UF2")?.starts_with("[MSG:"));
+    assert_eq!(line.hear()?, "error:8");
+    while !line.status()?.starts_with("<Idle") {}
+    assert_eq!(line.ask("$UF2")?, "ok");
+    wait_for_drive(&mut line)?;
+    line.emulator.0.copy_image()?;
+    line.hear_greeting()?;
+    assert!(line.status()?.starts_with("<Idle"));
+    Ok(())
+}
+
+#[test]
+fn so_does_a_touch_at_1200_baud() -> TestResult {
+    let mut line = plugged_in()?;
+    line.emulator.0.open_usb(true, 1200)?;
+    line.emulator.0.open_usb(false, 1200)?;
+    wait_for_drive(&mut line)
 }

@@ -26,6 +26,10 @@ pub trait Board {
     fn speak_aside(&mut self, is_aside: bool) {
         let _ = is_aside;
     }
+    /// Whether the host has asked for that drive since last asked, by other means than the command.
+    fn wants_drive(&mut self) -> bool {
+        false
+    }
     /// Becomes that drive, if there is one: pen up, drivers off. What was written is sent before.
     fn show_drive(&mut self) {}
     /// Where step events go. They begin when the queue is half full, or at [`Board::wait`].

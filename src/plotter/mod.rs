@@ -207,6 +207,9 @@ impl<'m> Plotter<'m> {
 
     fn act<B: Board>(&mut self, asked: RealTime, board: &mut B) {
         report::greet_opened(self.inner.machine.state(), board);
+        if B::HAS_DRIVE && board.wants_drive() && self.inner.machine.stands() {
+            board.show_drive();
+        }
         if asked.has(RealTime::ABORT) {
             self.inner.machine.abort();
             self.reset(board);

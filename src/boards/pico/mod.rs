@@ -151,6 +151,10 @@ impl Board for Pico {
         self.ports.speak_aside(is_aside);
     }
 
+    fn wants_drive(&mut self) -> bool {
+        usb::take_touched()
+    }
+
     fn show_drive(&mut self) {
         /// For the last reply, on the slower port, in microseconds.
         const SENDING: u32 = 100_000;

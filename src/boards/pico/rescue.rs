@@ -1,7 +1,7 @@
 //! What is left of the board when the program faults again and again as soon as it starts.
 //!
 //! Nothing moves, the drivers are off, the pen is up. Both ports answer: each line with the cause and `error:9`, `?`
-//! with a status, ctrl-X with another try.
+//! with a status, ctrl-X with another try. `$UF2` and the 1200-baud touch lead to the drive for another image.
 
 use core::fmt::Write;
 
@@ -9,13 +9,23 @@ use penup::protocol::{RealTime, Refusal};
 
 use super::emergency::{self, Cause};
 use super::ports::Ports;
+use super::usb;
 
 /// Answers for ever.
 pub fn run(mut ports: Ports, cause: &Cause) -> ! {
     tell(&mut ports, cause);
-    let mut is_empty = true;
+    let mut line = heapless::String::<8>::new();
     loop {
         emergency::feed();
+        usb::go_on();
+        if usb::take_touched() {
+            emergency::show_drive();
+        }
+        if usb::take_opened() {
+            ports.speak_aside(true);
+            tell(&mut ports, cause);
+            ports.speak_aside(false);
+        }
         let asked = ports.take_real_time();
         if asked.has(RealTime::ABORT) {
             emergency::restart_fresh();
@@ -24,15 +34,17 @@ pub fn run(mut ports: Ports, cause: &Cause) -> ! {
             ports.write(b"<Alarm|MPos:0.000,0.000,0.000|Alarm:101>\r\n");
         }
         match ports.read_byte() {
-            Some(b'\n' | b'\r') if is_empty => {}
+            Some(b'\n' | b'\r') if line.is_empty() => {}
+            Some(b'\n' | b'\r') if line == "$UF2" => emergency::show_drive(),
             Some(b'\n' | b'\r') => {
-                is_empty = true;
+                line.clear();
                 tell(&mut ports, cause);
-                let mut line = Cause::new();
-                let _ = write!(line, "error:{}\r\n", Refusal::Locked.number());
-                ports.write(line.as_bytes());
+                let mut reply = Cause::new();
+                let _ = write!(reply, "error:{}\r\n", Refusal::Locked.number()); // It is short.
+                ports.write(reply.as_bytes());
             }
-            Some(_) => is_empty = false,
+            // What is longer is no command that counts here.
+            Some(byte) => drop(line.push(char::from(byte))),
             None => cortex_m::asm::wfe(),
         }
     }

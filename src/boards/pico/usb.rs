@@ -33,7 +33,7 @@ use usbd_serial::{CdcAcmClass, USB_CLASS_CDC};
 use self::frame::Frame;
 use super::ports::{self, Inlet, Port};
 use super::registers::USB;
-use super::{clock, critical, emergency};
+use super::{clock, critical};
 use crate::boards::handler::Owned;
 use crate::boards::line::ABORT;
 use crate::boards::peripheral::Peripheral;
@@ -84,6 +84,8 @@ static HOST_IS_GONE: AtomicBool = AtomicBool::new(true);
 static IS_WAITED: AtomicBool = AtomicBool::new(false);
 /// A program has opened the port. The handler sets it, the main loop clears it.
 static WAS_OPENED: AtomicBool = AtomicBool::new(false);
+/// A program has opened the port at [`TOUCH_RATE`] and closed it. The handler sets it, the main loop clears it.
+static WAS_TOUCHED: AtomicBool = AtomicBool::new(false);
 
 struct Device {
     device: UsbDevice<'static, UsbBus>,
@@ -180,12 +182,21 @@ pub fn go_on() {
 
 /// Whether a program has opened the port since last asked.
 pub fn take_opened() -> bool {
-    // The handler only sets it, and what came in between is the same.
-    let was_opened = WAS_OPENED.load(Ordering::Relaxed);
-    if was_opened {
-        WAS_OPENED.store(false, Ordering::Relaxed);
+    take(&WAS_OPENED)
+}
+
+/// Whether the drive for a new image was asked for since last asked.
+pub fn take_touched() -> bool {
+    take(&WAS_TOUCHED)
+}
+
+/// Reads a flag and clears it. The handler only sets it, and what comes in between is the same.
+fn take(flag: &AtomicBool) -> bool {
+    let is_set = flag.load(Ordering::Relaxed);
+    if is_set {
+        flag.store(false, Ordering::Relaxed);
     }
-    was_opened
+    is_set
 }
 
 /// All that there is to do. Called by the handler, or where it and that of the other port are masked.
@@ -256,7 +267,7 @@ impl Device {
             self.is_in_line = false;
         }
         if self.class.line_coding().data_rate() == TOUCH_RATE {
-            emergency::show_drive();
+            WAS_TOUCHED.store(true, Ordering::Relaxed);
         }
     }
 

@@ -349,8 +349,20 @@ export class Usb {
     }
   }
 
-  /** Opens the port or closes it, at a rate: a line coding, then DTR. */
+  /** Opens the port or closes it, at a rate: one after the other. */
   async setLine(rate, isOpen) {
+    const { generation } = this;
+    const before = this.lastSet;
+    let done;
+    this.lastSet = new Promise((resolve) => (done = resolve));
+    this.lastSet.generation = generation;
+    if (before?.generation === generation) await before;
+    await this.changeLine(rate, isOpen);
+    done();
+  }
+
+  /** A line coding, then DTR. */
+  async changeLine(rate, isOpen) {
     this.rate = rate;
     if (isOpen) this.isOpen = true;
     if (!this.isConfigured) return;
