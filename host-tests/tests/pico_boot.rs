@@ -142,7 +142,8 @@ fn travel_is(line: &mut Line<Pico>, wanted: &str) -> Result<bool, Box<dyn Error>
 
 #[test]
 fn a_flash_that_does_not_hold_the_settings_is_reported() -> TestResult {
-    // A bit that is not erased, and one that is not written: the upper byte of the first setting's number.
+    // A bit that is not erased, and one that is not written: the upper byte of the first setting's
+    // number.
     for (place, mask, high) in [(SETTINGS + 900, 4, false), (SETTINGS + 256 + 1, 0x80, true)] {
         let mut line = start()?;
         line.emulator.wear_flash(place, mask, high)?;

@@ -157,7 +157,8 @@ fn a_busy_bus_finds_the_board_while_a_job_runs() -> TestResult {
     Ok(())
 }
 
-/// More lines than the line's queue and a packet hold are on their way when the computer goes to sleep.
+/// More lines than the line's queue and a packet hold are on their way when the computer goes to
+/// sleep.
 #[test]
 fn a_suspended_bus_loses_no_byte() -> TestResult {
     let mut line = plugged_in()?;
@@ -187,7 +188,8 @@ fn a_suspended_bus_loses_no_byte() -> TestResult {
     Ok(())
 }
 
-/// A program asks much, closes the port without reading and in the middle of a line; another one opens it.
+/// A program asks much, closes the port without reading and in the middle of a line; another one
+/// opens it.
 #[test]
 fn a_port_that_is_opened_again_begins_anew_and_is_greeted_alone() -> TestResult {
     let lines = job_lines("lattice2.obj", &["$page=60x80", "$margin=5"]);

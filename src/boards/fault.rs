@@ -1,8 +1,8 @@
 //! What becomes of a panic or a fault: the machine is made safe at once, and the cause is reported.
 //!
-//! How it is reported is the board's choice ([`Fault::report`]). Without a choice of its own it says the cause on its
-//! serial line and waits for ctrl-X, which resets it. A board that can keep the cause through a reset starts
-//! again by itself, and tells the cause then.
+//! How it is reported is the board's choice ([`Fault::report`]). Without a choice of its own it
+//! says the cause on its serial line and waits for ctrl-X, which resets it. A board that can keep
+//! the cause through a reset starts again by itself, and tells the cause then.
 
 use core::fmt::{self, Write};
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -57,7 +57,8 @@ pub fn hard_fault<F: Fault>(address: u32) -> ! {
     wait_for_reset::<F>()
 }
 
-/// Makes the machine safe. Whether there is something to report: not while another fault is reported.
+/// Makes the machine safe. Whether there is something to report: not while another fault is
+/// reported.
 fn begin_report<F: Fault>() -> bool {
     F::make_safe();
     if REPORTING.load(Ordering::Relaxed) {

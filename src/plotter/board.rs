@@ -41,7 +41,8 @@ pub trait Board {
     /// Runs the step interrupt as soon as no pulse is high, although its time has not come: the pins
     /// were halted.
     fn step_now(&mut self) {}
-    /// What ended the program before, if that was a fault after which the board has started again by itself.
+    /// What ended the program before, if that was a fault after which the board has started again
+    /// by itself.
     fn fault(&self) -> Option<&str> {
         None
     }

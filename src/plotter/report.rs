@@ -13,7 +13,8 @@ pub(super) fn greet<B: Board>(board: &mut B) {
     Reply(board).line(format_args!("\r\nGrbl 1.1h [penup {VERSION} '$' for help]"));
 }
 
-/// Greets a program that has opened a port, there alone, and tells it of an alarm that others have heard of.
+/// Greets a program that has opened a port, there alone, and tells it of an alarm that others have
+/// heard of.
 #[inline(never)] // Its frame must not lie under the stages'.
 pub(super) fn greet_opened<B: Board>(state: State, board: &mut B) {
     if !board.take_opened() {

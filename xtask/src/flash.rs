@@ -1,8 +1,10 @@
-//! The image onto the board: by a debug probe, or onto the drive that a Pico shows.
+//! The image onto the board: by a debug probe, or onto the drive that a Pico shows, which a running
+//! penup is asked for.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
 
@@ -13,7 +15,8 @@ const CHIP: &str = "RP2040";
 /// What a Pico in BOOTSEL mode has on its drive.
 const DRIVE_MARK: &str = "INFO_UF2.TXT";
 
-/// Builds the firmware and writes it: by probe-rs if it finds a probe, else onto the Pico's drive.
+/// Builds the firmware and writes it: by probe-rs if it finds a probe, else onto the Pico's drive,
+/// for which a running penup is asked if there is none yet.
 pub fn flash(board: Board) -> Result<()> {
     if board != Board::Pico {
         bail!("{} is emulated only: `cargo plot --board {}` runs it", board.name(), board.name());
@@ -25,7 +28,7 @@ pub fn flash(board: Board) -> Result<()> {
         return run(Command::new("probe-rs").args(["download", "--chip", CHIP]).arg(&image))
             .and_then(|()| run(Command::new("probe-rs").args(["reset", "--chip", CHIP])));
     }
-    if let Some(drive) = drive() {
+    if let Some(drive) = drive().or_else(touched_drive) {
         println!("penup: copying the image to {}", drive.display());
         fs::copy(image.with_extension("uf2"), drive.join("penup.uf2"))
             .with_context(|| format!("cannot write to {}", drive.display()))?;
@@ -36,6 +39,40 @@ pub fn flash(board: Board) -> Result<()> {
         None => "probe-rs is not installed (it is needed for a debug probe only: https://probe.rs)",
     };
     bail!("no board is connected: {probe}, and no Pico shows its drive.\n{}", by_hand(&image))
+}
+
+/// Asks a Pico on which penup runs for its drive: opens its USB port at 1200 baud, closes it, and
+/// waits some seconds.
+fn touched_drive() -> Option<PathBuf> {
+    /// Between two looks, and how many there are.
+    const PAUSE: Duration = Duration::from_millis(250);
+    const LOOKS: u32 = 40;
+    let port = penup_port()?;
+    println!("penup: asking the board at {} for its drive", port.display());
+    // `stty` opens the port, sets the rate and closes it.
+    let option = if cfg!(target_os = "macos") { "-f" } else { "-F" };
+    output("stty", &[option, port.to_str()?, "1200", "hupcl"])?;
+    (0..LOOKS).find_map(|_| {
+        std::thread::sleep(PAUSE);
+        drive()
+    })
+}
+
+/// The USB port of a Pico with penup, as Linux and macOS name it.
+fn penup_port() -> Option<PathBuf> {
+    let by_id = entries("/dev/serial/by-id");
+    let named = by_id.into_iter().find(|path| path.to_string_lossy().contains("penup_pen_plotter"));
+    // macOS tells no names: only if there is one such port.
+    named.or_else(|| {
+        let mut ports = entries("/dev");
+        ports.retain(|path| path.to_string_lossy().starts_with("/dev/cu.usbmodem"));
+        <[PathBuf; 1]>::try_from(ports).ok().map(|[port]| port)
+    })
+}
+
+fn entries(directory: &str) -> Vec<PathBuf> {
+    let entries = fs::read_dir(directory).into_iter().flatten().flatten();
+    entries.map(|entry| entry.path()).collect()
 }
 
 /// What the user does without this program.

@@ -7,14 +7,16 @@
 // not before that cycle; 2 the power goes at that cycle, 3 it goes when so many more bytes of flash
 // have been erased or written (the number in the cycle's place), and comes back at once; 4 the main
 // loop hangs from that cycle on, 5 a byte for USB, 6 the USB host is plugged in (1), takes
-// nothing more (2), takes again (3), suspends the bus (4), resumes it (5), is unplugged (6), is plugged in on a busy
-// bus (7); 7 a switch is fitted to a pin, which closes where its axis has gone to so many
+// nothing more (2), takes again (3), suspends the bus (4), resumes it (5), is unplugged (6), is
+// plugged in on a busy bus (7); 7 a switch is fitted to a pin, which closes where its axis has gone
+// to so many
 // steps (+ 2^40) or below, and bounces; 8 a function (its number, its
 // address in the cycle's place) is timed; 9 how much of the stack is unused is asked; 10 where x has gone to so many steps, the
-// main loop stands still for so many hundredths of a second. 32 the pin RUN is pulled low for a moment, 33 the image is
-// copied onto the drive that the board shows with BOOTSEL held, 34 and 35 bits (the value) of a byte of flash (the
-// cycle) stay low or high from now on, 36 the main loop goes on at an address, with the stack used up (1) or as it is
-// (0), 37 the host opens the USB port (1) or closes it (0) at a rate (the cycle). Out: 0 a byte
+// main loop stands still for so many hundredths of a second. 32 the pin RUN is pulled low for a
+// moment, 33 the image is copied onto the drive that the board shows with BOOTSEL held, 34 and 35
+// bits (the value) of a byte of flash (the cycle) stay low or high from now on, 36 the main loop
+// goes on at an address, with the stack used up (1) or as it is (0), 37 the host opens the USB port
+// (1) or closes it (0) at a rate (the cycle). Out: 0 a byte
 // of the serial line, 1 a pin's new level, 2 the time, 3 a byte of the log, 4 the chip was reset (0 by
 // the loss of power, 1 by the watchdog), 5 a byte of USB, 6 a timed function has
 // returned (its number, the cycles in the cycle's place), 7 so many bytes of the stack have not been used since

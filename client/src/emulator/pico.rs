@@ -195,8 +195,8 @@ impl Pico {
         self.tell(RUN_PIN, 0, 0)
     }
 
-    /// Plugs the board in with BOOTSEL held, and copies the image onto the drive that it shows. The boot ROM then
-    /// restarts the board by the watchdog.
+    /// Plugs the board in with BOOTSEL held, and copies the image onto the drive that it shows. The
+    /// boot ROM then restarts the board by the watchdog.
     ///
     /// # Errors
     /// The emulator has ended.
@@ -204,8 +204,8 @@ impl Pico {
         self.tell(UF2, 0, 0)
     }
 
-    /// Wears a byte of flash out, by its place from the beginning of the flash: the bits of `mask` stay high, or low,
-    /// from the next change on.
+    /// Wears a byte of flash out, by its place from the beginning of the flash: the bits of `mask`
+    /// stay high, or low, from the next change on.
     ///
     /// # Errors
     /// The emulator has ended.
@@ -289,8 +289,8 @@ impl Pico {
         self.tell(USB_HOST, if suspends { 4 } else { 5 }, 0)
     }
 
-    /// Lets a program on the USB host open the port or close it (DTR), at a rate in baud. The host opens it at 115200 baud
-    /// when it has found the device.
+    /// Lets a program on the USB host open the port or close it (DTR), at a rate in baud. The host
+    /// opens it at 115200 baud when it has found the device.
     ///
     /// # Errors
     /// The emulator has ended.
@@ -444,7 +444,8 @@ fn at(cycle: u64) -> Duration {
     Duration::from_nanos(cycle * CYCLE_NANOS)
 }
 
-/// The script with its modules in it: each import by its name becomes one by a `data:` address (RFC 2397).
+/// The script with its modules in it: each import by its name becomes one by a `data:` address (RFC
+/// 2397).
 fn script() -> String {
     let mut script = SCRIPT.to_owned();
     for (name, text) in MODULES {

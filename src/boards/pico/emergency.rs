@@ -1,9 +1,10 @@
 //! The watchdog, why the board started, and what becomes of a panic or a fault (see [`fault`]).
 //!
-//! A panic is not left to stand: the board keeps its message in RAM that no start clears, and starts again by the
-//! watchdog, so that both ports can be told. Pen and drivers are made safe before. If the program panics or hangs
-//! again and again as soon as it has started, [`Start::Rescue`] is what is left: the plotter is not run any more, but both
-//! ports answer (see [`rescue`](super::rescue)). If even that panics, the handler waits for ctrl-X on UART0.
+//! A panic is not left to stand: the board keeps its message in RAM that no start clears, and
+//! starts again by the watchdog, so that both ports can be told. Pen and drivers are made safe
+//! before. If the program panics or hangs again and again as soon as it has started,
+//! [`Start::Rescue`] is what is left: the plotter is not run any more, but both ports answer (see
+//! [`rescue`](super::rescue)). If even that panics, the handler waits for ctrl-X on UART0.
 
 use core::cell::UnsafeCell;
 use core::fmt::{self, Write};
@@ -21,8 +22,9 @@ mod watchdog {
     pub const CONTROL: usize = 0x0;
     pub const LOAD: usize = 0x4;
     pub const REASON: usize = 0x8;
-    /// Keeps its word through a restart by the watchdog; any other reset clears it. The boot ROM writes 0 to it when it
-    /// starts an image that was copied onto its drive, and another word when it is to begin elsewhere.
+    /// Keeps its word through a restart by the watchdog; any other reset clears it. The boot ROM
+    /// writes 0 to it when it starts an image that was copied onto its drive, and another word when
+    /// it is to begin elsewhere.
     pub const SCRATCH_4: usize = 0x1C;
     pub const TRIGGER: u32 = 1 << 31;
     pub const TIMED_OUT: u32 = 1;
@@ -30,8 +32,8 @@ mod watchdog {
     pub const PSM_CHOICE: usize = 0x8;
     pub const ALL_BUT_OSCILLATORS: u32 = 0x1_FFFC;
 }
-/// In the scratch register while this program's watchdog runs. The SDK's own word for it, so that its tools tell the
-/// reason too.
+/// In the scratch register while this program's watchdog runs. The SDK's own word for it, so that
+/// its tools tell the reason too.
 const OURS: u32 = 0x6AB7_3121;
 /// In the scratch register when this program starts itself again.
 const FAULT: u32 = 0x6661_756C;
@@ -76,11 +78,12 @@ struct Kept {
 
 struct KeptPlace(UnsafeCell<MaybeUninit<Kept>>);
 
-// SAFETY: it is used in the main loop and, with interrupts off, by the handler of a fault, after which the main loop
-// does not go on.
+// SAFETY: it is used in the main loop and, with interrupts off, by the handler of a fault, after
+// which the main loop does not go on.
 unsafe impl Sync for KeptPlace {}
 
-/// Not cleared at the start (`.uninit`); the boot ROM does not write there either (see `boards/pico.x`).
+/// Not cleared at the start (`.uninit`); the boot ROM does not write there either (see
+/// `boards/pico.x`).
 #[unsafe(link_section = ".uninit.kept")]
 static KEPT: KeptPlace = KeptPlace(UnsafeCell::new(MaybeUninit::uninit()));
 
@@ -103,7 +106,8 @@ impl Kept {
     }
 
     fn store(self) {
-        // SAFETY: nobody else uses it now (see `KeptPlace`). Volatile, for nothing in this run may read it again.
+        // SAFETY: nobody else uses it now (see `KeptPlace`). Volatile, for nothing in this run may
+        // read it again.
         unsafe { KEPT.0.get().write_volatile(MaybeUninit::new(self)) };
     }
 
@@ -153,7 +157,8 @@ fn text(text: &str) -> Cause {
     cause
 }
 
-/// Notes that the program runs, so many microseconds after its start: the faults so far are not the beginning of it.
+/// Notes that the program runs, so many microseconds after its start: the faults so far are not the
+/// beginning of it.
 pub fn note_running(microseconds: u32) {
     if microseconds > SOON && Kept::load().is_none_or(|kept| kept.faults > 0) {
         Kept::new(0, "").store();
@@ -188,8 +193,8 @@ pub fn restart_fresh() -> ! {
     restart(0)
 }
 
-/// Raises the pen, switches the drivers off and gives the board to the boot ROM, which shows the drive for a new image.
-/// Takes half a second; nothing else goes on.
+/// Raises the pen, switches the drivers off and gives the board to the boot ROM, which shows the
+/// drive for a new image. Takes half a second; nothing else goes on.
 pub fn show_drive() -> ! {
     /// The servo has time to raise the pen: nothing tells it to afterwards. In microseconds.
     const RAISING: u32 = 400_000;
@@ -197,7 +202,8 @@ pub fn show_drive() -> ! {
     feed();
     let began = clock::microseconds();
     while clock::microseconds().wrapping_sub(began) < RAISING {}
-    // The boot ROM restarts itself by the watchdog. It does not show the activity at a pin, and leaves no interface out.
+    // The boot ROM restarts itself by the watchdog. It does not show the activity at a pin, and
+    // leaves no interface out.
     rom_data::reset_to_usb_boot(0, 0)
 }
 

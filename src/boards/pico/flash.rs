@@ -5,8 +5,8 @@
 //! a millisecond for a page, in which bytes of the serial line beyond its FIFO's 32 are lost. Steps
 //! would go on for as long as their words last; callers see to it that nothing moves.
 //!
-//! A worn flash says nothing by itself: its cells no longer change. So what was erased or written is read back, and
-//! [`Worn`] is the error if it is not what it should be.
+//! A worn flash says nothing by itself: its cells no longer change. So what was erased or written
+//! is read back, and [`Worn`] is the error if it is not what it should be.
 
 use core::fmt::Write;
 use core::ptr;
@@ -74,8 +74,10 @@ enum Work<'p> {
 const NUMBER_COMMAND: usize = 1 + 4 + 8;
 const READ_NUMBER: u8 = 0x4B;
 
-/// The serial line to the flash chip (data sheet, 4.10.13), and the pad that selects the chip (2.19.6.2).
-// SAFETY of both: the address map of the data sheet, 2.2. They are used while nothing else reads the flash.
+/// The serial line to the flash chip (data sheet, 4.10.13), and the pad that selects the chip
+/// (2.19.6.2).
+// SAFETY of both: the address map of the data sheet, 2.2. They are used while nothing else reads
+// the flash.
 const SSI: Peripheral = unsafe { Peripheral::at(0x1800_0000) };
 const QSPI_PADS: Peripheral = unsafe { Peripheral::at(0x4001_8000) };
 mod ssi {
@@ -109,7 +111,8 @@ unsafe extern "C" fn carry_out(rom: &Rom, work: &mut Work<'_>) {
             }
             Work::Write { to, page } => (rom.write)(*to, page.as_ptr(), PAGE_BYTES),
             Work::Number { exchanged } => {
-                // The boot ROM has set the line up for single bytes. An answer comes with each of them.
+                // The boot ROM has set the line up for single bytes. An answer comes with each of
+                // them.
                 let select = QSPI_PADS.read(ssi::SELECT) & !ssi::LEVEL;
                 QSPI_PADS.write(ssi::SELECT, select | ssi::LOW);
                 for byte in exchanged.iter_mut() {
@@ -128,8 +131,8 @@ unsafe extern "C" fn carry_out(rom: &Rom, work: &mut Work<'_>) {
 
 /// A byte of the flash as it is now: the cache forgets all when something is written.
 fn byte_at(offset: u32) -> u8 {
-    // SAFETY: the lower 16 MiB are mapped to flash, whatever its size, and reading it has no effect. Volatile, for it
-    // changes behind the compiler's back.
+    // SAFETY: the lower 16 MiB are mapped to flash, whatever its size, and reading it has no
+    // effect. Volatile, for it changes behind the compiler's back.
     unsafe { ptr::read_volatile((MAPPED_AT + (offset as usize & 0xFF_FFFF)) as *const u8) }
 }
 
@@ -209,7 +212,8 @@ impl NorFlash for Flash {
     const WRITE_SIZE: usize = PAGE_BYTES;
     const ERASE_SIZE: usize = SECTOR_BYTES;
 
-    /// Erases sectors that lie in what is left to this module; others stay as they are, which is [`Worn`] too.
+    /// Erases sectors that lie in what is left to this module; others stay as they are, which is
+    /// [`Worn`] too.
     fn erase(&mut self, from: u32, to: u32) -> Result<(), Worn> {
         if from >= START && to <= END {
             self.work(Work::Erase { from, bytes: (to - from) as usize });

@@ -1,7 +1,8 @@
 //! What is left of the board when the program faults again and again as soon as it starts.
 //!
-//! Nothing moves, the drivers are off, the pen is up. Both ports answer: each line with the cause and `error:9`, `?`
-//! with a status, ctrl-X with another try. `$UF2` and the 1200-baud touch lead to the drive for another image.
+//! Nothing moves, the drivers are off, the pen is up. Both ports answer: each line with the cause
+//! and `error:9`, `?` with a status, ctrl-X with another try. `$UF2` and the 1200-baud touch lead
+//! to the drive for another image.
 
 use core::fmt::Write;
 

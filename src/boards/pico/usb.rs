@@ -1,17 +1,18 @@
 //! The second serial port: USB, of the class CDC-ACM, for which every system has a driver.
 //!
-//! Received bytes that find no place in the line's queue wait here, and when this is full too, the controller refuses
-//! further packets, so that the host waits with the rest. None is lost: not when the host suspends the bus, and not when
-//! it closes the port. Bytes that act at once act as their packet comes in.
+//! Received bytes that find no place in the line's queue wait here, and when this is full too, the
+//! controller refuses further packets, so that the host waits with the rest. None is lost: not when
+//! the host suspends the bus, and not when it closes the port. Bytes that act at once act as their
+//! packet comes in.
 //!
 //! What is sent waits in a queue. If the host takes nothing for [`PATIENCE`] although the queue is full, it counts
-//! as gone, and what would be sent is dropped until it takes something again: nobody may keep the steps waiting. The same
-//! holds once a program has closed the port (DTR has fallen): replies that it has not taken are dropped, and so is
-//! the rest of a line that it has not ended. A program that opens the port (DTR rises) is greeted, alone: see
-//! [`take_opened`].
+//! as gone, and what would be sent is dropped until it takes something again: nobody may keep the
+//! steps waiting. The same holds once a program has closed the port (DTR has fallen): replies that
+//! it has not taken are dropped, and so is the rest of a line that it has not ended. A program that
+//! opens the port (DTR rises) is greeted, alone: see [`take_opened`].
 //!
-//! Of the chip's errata, E5 is dealt with by the driver; it takes GPIO 15 for a millisecond when a host resets the bus
-//! (see [`go_on`]). E15 is dealt with here: see [`frame`].
+//! Of the chip's errata, E5 is dealt with by the driver; it takes GPIO 15 for a millisecond when a
+//! host resets the bus (see [`go_on`]). E15 is dealt with here: see [`frame`].
 
 mod frame;
 
@@ -53,17 +54,18 @@ const WAITING_PLACES: usize = 512;
 /// Who opens the port at this rate and closes it wants the drive for a new image, as of an Arduino.
 const TOUCH_RATE: u32 = 1200;
 
-/// Registers of the controller's: interrupts as they are, masked or not; bits to set in their mask, and to clear in it;
-/// filled and emptied packets.
+/// Registers of the controller's: interrupts as they are, masked or not; bits to set in their mask,
+/// and to clear in it; filled and emptied packets.
 const INTERRUPTS: usize = 0x8C;
 const ENABLE: usize = 0x2090;
 const DISABLE: usize = 0x3090;
 const BUS_RESET: u32 = 1 << 12;
 const PACKETS_DONE: usize = 0x58;
 
-/// The controller's memory: the control words of the endpoints' buffers begin at 0x80. Used here only where the driver
-/// has no function, beside it.
-// SAFETY: the address map of the RP2040's data sheet, 4.1.3; the words may be read and written at any time.
+/// The controller's memory: the control words of the endpoints' buffers begin at 0x80. Used here
+/// only where the driver has no function, beside it.
+// SAFETY: the address map of the RP2040's data sheet, 4.1.3; the words may be read and written at
+// any time.
 const BUFFERS: Peripheral = unsafe { Peripheral::at(0x5010_0000) };
 mod buffer {
     pub const CONTROLS: usize = 0x80;
@@ -84,7 +86,8 @@ static HOST_IS_GONE: AtomicBool = AtomicBool::new(true);
 static IS_WAITED: AtomicBool = AtomicBool::new(false);
 /// A program has opened the port. The handler sets it, the main loop clears it.
 static WAS_OPENED: AtomicBool = AtomicBool::new(false);
-/// A program has opened the port at [`TOUCH_RATE`] and closed it. The handler sets it, the main loop clears it.
+/// A program has opened the port at [`TOUCH_RATE`] and closed it. The handler sets it, the main
+/// loop clears it.
 static WAS_TOUCHED: AtomicBool = AtomicBool::new(false);
 
 struct Device {
@@ -108,7 +111,8 @@ struct Device {
 /// The main loop's end of what is sent.
 pub struct Sender(Producer<'static, u8>);
 
-/// Shows the device to the host, with this serial number. `ports` is set up, and the pins are out of their reset.
+/// Shows the device to the host, with this serial number. `ports` is set up, and the pins are out
+/// of their reset.
 ///
 /// # Panics
 /// Never: the strings fit.
@@ -173,7 +177,8 @@ impl Sender {
     }
 }
 
-/// Takes bytes in that found no place, if there are any, and looks whether the bus is ready. Called by the main loop.
+/// Takes bytes in that found no place, if there are any, and looks whether the bus is ready. Called
+/// by the main loop.
 pub fn go_on() {
     if IS_WAITED.load(Ordering::Relaxed) {
         critical_section::with(|_| serve());
@@ -221,8 +226,8 @@ fn serve() {
 }
 
 impl Device {
-    /// While the host resets the bus, for some 10 to 50 ms, or for as long as it has no power, the driver waits, and its
-    /// interrupt would come again at once: then the main loop asks instead.
+    /// While the host resets the bus, for some 10 to 50 ms, or for as long as it has no power, the
+    /// driver waits, and its interrupt would come again at once: then the main loop asks instead.
     fn follow_bus(&mut self) {
         let is_reset = USB.read(INTERRUPTS) & BUS_RESET != 0;
         if is_reset != self.awaits_bus {
@@ -276,7 +281,8 @@ impl Device {
         while self.to_send.dequeue().is_some() {}
     }
 
-    /// Takes a packet back that the controller holds for the host, if the host does not take it just now.
+    /// Takes a packet back that the controller holds for the host, if the host does not take it
+    /// just now.
     fn take_packet_back(&mut self) {
         let endpoint = self.class.write_ep().address().index();
         let place = buffer::CONTROLS + 8 * endpoint;

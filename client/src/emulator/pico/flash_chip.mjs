@@ -1,8 +1,9 @@
-// The flash chip at its own serial line (W25Q16JV data sheet), and the controller in between (RP2040 data sheet, 4.10):
-// what is sent byte by byte, not what is read by way of the memory map.
+// The flash chip at its own serial line (W25Q16JV data sheet), and the controller in between
+// (RP2040 data sheet, 4.10): what is sent byte by byte, not what is read by way of the memory map.
 //
-// Each byte that is sent brings one back. A command begins when the chip is selected, and ends when it is not. The
-// selection is by the pad's override (IO_QSPI); while that is normal, the controller selects as it sends.
+// Each byte that is sent brings one back. A command begins when the chip is selected, and ends when
+// it is not. The selection is by the pad's override (IO_QSPI); while that is normal, the controller
+// selects as it sends.
 
 /** The number that no other chip has. */
 export const UNIQUE_NUMBER = [0xe6, 0x60, 0x58, 0x38, 0x83, 0x5a, 0x2b, 0x2f];
@@ -101,7 +102,8 @@ class Controller extends Registers {
     if (offset === SSI.ENABLED) this.received = [];
     if (offset !== SSI.DATA) return;
     // With the pad high by hand the chip hears nothing.
-    // By itself the controller selects the chip anew for each row of bytes: it waits until all have come back.
+    // By itself the controller selects the chip anew for each row of bytes: it waits until all have
+    // come back.
     if (!this.received.length && this.pads.override() === 0) this.flash.deselect();
     const isHeard = this.pads.override() !== 3;
     const answer = isHeard ? this.flash.exchange(value & 0xff) : 0xff;

@@ -1,8 +1,9 @@
 // What a reset of the RP2040 leaves as it was, and how its boot ROM begins.
 //
-// Source: RP2040 data sheet, 2.8.1 and 2.8.2 (boot sequence), 2.12.8 (CHIP_RESET), 4.7 (watchdog), and the
-// sources of the boot ROM. RAM outlives every reset but a loss of power. The boot ROM itself works in the last
-// bytes of RAM: there lie its copy of the second stage, and its stack below it.
+// Source: RP2040 data sheet, 2.8.1 and 2.8.2 (boot sequence), 2.12.8 (CHIP_RESET), 4.7 (watchdog),
+// and the sources of the boot ROM. RAM outlives every reset but a loss of power. The boot ROM
+// itself works in the last bytes of RAM: there lie its copy of the second stage, and its stack
+// below it.
 
 /** The kinds of reset. */
 export const KIND = { POWER: 0, WATCHDOG: 1, RUN: 2 };

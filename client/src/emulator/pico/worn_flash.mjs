@@ -1,4 +1,5 @@
-// A worn flash: cells that no longer change. A bit that stays low is not erased; one that stays high is not written.
+// A worn flash: cells that no longer change. A bit that stays low is not erased; one that stays
+// high is not written.
 
 /** Masks of such bits, by the byte's place in flash. */
 const low = new Map();
