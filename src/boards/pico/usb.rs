@@ -5,11 +5,11 @@
 //! the host suspends the bus, and not when it closes the port. Bytes that act at once act as their
 //! packet comes in.
 //!
-//! What is sent waits in a queue. If the host takes nothing for [`PATIENCE`] although the queue is full, it counts
-//! as gone, and what would be sent is dropped until it takes something again: nobody may keep the
-//! steps waiting. The same holds once a program has closed the port (DTR has fallen): replies that
-//! it has not taken are dropped, and so is the rest of a line that it has not ended. A program that
-//! opens the port (DTR rises) is greeted, alone: see [`take_opened`].
+//! What is sent waits in a queue. If the host takes nothing for [`PATIENCE`] although the queue is
+//! full, it counts as gone, and what would be sent is dropped until it takes something again:
+//! nobody may keep the steps waiting. The same holds once a program has closed the port (DTR has
+//! fallen): replies that it has not taken are dropped, and so is the rest of a line that it has not
+//! ended. A program that opens the port (DTR rises) is greeted, alone: see [`take_opened`].
 //!
 //! Of the chip's errata, E5 is dealt with by the driver; it takes GPIO 15 for a millisecond when a
 //! host resets the bus (see [`go_on`]). E15 is dealt with here: see [`frame`].
