@@ -4,7 +4,7 @@ use anyhow::Result;
 
 use crate::command::{cargo, run};
 
-/// Measures (some 20 s) and prints each table of his chapter 7 beside his seconds, in instructions
+/// Measures (a minute or two) and prints each table of his chapter 7 beside his seconds, in instructions
 /// if valgrind is installed.
 pub fn repeat() -> Result<()> {
     let program = ["--package", "penup-host-tests", "--example", "experiments"];

@@ -37,16 +37,22 @@ impl Meter {
         counts.map_or(Self::Silent, |counts| Self::Known(counts.into_iter()))
     }
 
-    /// Does `work`, which tells the costs that it finds.
-    pub fn measure<R>(&mut self, work: impl FnOnce(&mut dyn FnMut(u64)) -> R) -> Measured<R> {
+    /// Does `work`, which tells the costs that it finds; with `laps` each of them is counted to.
+    pub fn measure<R>(
+        &mut self,
+        laps: bool,
+        work: impl FnOnce(&mut dyn FnMut(u64)) -> R,
+    ) -> Measured<R> {
         let mut costs = Vec::with_capacity(1 << 12);
         let mut work = Some(work);
         let mut result = None;
         measured(&mut || {
             let work = work.take().expect("done once");
             result = Some(work(&mut |cost| {
-                costs.push(cost);
-                lap();
+                if laps {
+                    costs.push(cost);
+                    lap();
+                }
             }));
         });
         let mut so_far = Some(0);

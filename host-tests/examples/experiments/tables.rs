@@ -1,7 +1,8 @@
 //! The tables of chapter 7, section by section, with what Harrison found.
 
 use crate::meter::Meter;
-use crate::problems::{Problem, Star};
+use crate::problems::{INSTANCES, Problem};
+use crate::sample::Sample;
 use crate::table::Table;
 use penup::order::enumeration::{
     Effort, Options, Reach, Sets, Start, SubProblem, Target, domino_matching, optimum,
@@ -37,14 +38,21 @@ struct Run {
     lower_bound: u64,
     upper_bound: u64,
     effort: Effort,
-    laps: Vec<(u64, Option<u64>)>,
-    price: String,
+    /// What it took until the best matching was found; none if that was the start, or is not counted.
+    to_best: Option<f64>,
+    /// In millions of instructions, or in steps of the search where those cannot be counted.
+    price: f64,
+    is_counted: bool,
 }
 
 fn run(meter: &mut Meter, problem: &Problem, options: Options) -> Run {
+    run_with_laps(meter, problem, options, false)
+}
+
+fn run_with_laps(meter: &mut Meter, problem: &Problem, options: Options, laps: bool) -> Run {
     let mut memory = vec![0; 4096];
     let distances = problem.distances();
-    let measured = meter.measure(|found| {
+    let measured = meter.measure(laps, |found| {
         let scratch = Scratch::new(&mut memory);
         optimum(distances, options, scratch, &mut Undisturbed, found).ok()
     });
@@ -56,17 +64,49 @@ fn run(meter: &mut Meter, problem: &Problem, options: Options) -> Run {
         lower_bound: best.map_or(0, |best| best.lower_bounds.improved),
         upper_bound: best.map_or(0, |best| best.upper_bound),
         effort,
-        laps: measured.laps,
-        price: measured.instructions.map_or_else(|| format!("{steps} steps"), millions),
+        to_best: measured.laps.last().and_then(|lap| lap.1).map(millions),
+        price: measured.instructions.map_or(steps as f64, millions),
+        is_counted: measured.instructions.is_some(),
     }
 }
 
-fn millions(instructions: u64) -> String {
-    format!("{:.3}", instructions as f64 / 1e6)
+fn millions(instructions: u64) -> f64 {
+    instructions as f64 / 1e6
 }
 
-fn counted(instructions: Option<u64>) -> String {
-    instructions.map_or_else(|| "-".into(), millions)
+/// The same run of every instance.
+struct Runs(Vec<Run>);
+
+impl Runs {
+    fn new(mut each: impl FnMut(u32) -> Run) -> Self {
+        Self((0..INSTANCES).map(&mut each).collect())
+    }
+
+    /// Of matrices with distances from 0 to 99.
+    fn of_matrices(meter: &mut Meter, count: usize, options: Options) -> Self {
+        Self::new(|instance| run(meter, &Problem::of_matrix(instance, count, 0, 100), options))
+    }
+
+    fn counts(&self, count: impl Fn(&Run) -> u64) -> Sample {
+        Sample::of_counts(self.0.iter().map(count))
+    }
+
+    fn price(&self) -> Sample {
+        let decimals = if self.0.iter().any(|run| run.is_counted) { 3 } else { 0 };
+        Sample::new(self.0.iter().map(|run| run.price), decimals)
+    }
+
+    fn to_best(&self) -> Sample {
+        Sample::new(self.0.iter().filter_map(|run| run.to_best), 3)
+    }
+
+    fn examined(&self) -> Sample {
+        self.counts(|run| run.effort.examined)
+    }
+
+    fn sub_problems(&self) -> Sample {
+        self.counts(|run| run.effort.sub_problems)
+    }
 }
 
 fn standard(meter: &mut Meter, page: &mut String) -> Result {
@@ -87,7 +127,8 @@ fn standard(meter: &mut Meter, page: &mut String) -> Result {
         "of",
         "MI",
         "to optimum",
-        "bounds",
+        "lower",
+        "upper",
         "optimum",
         "his checked",
         "of",
@@ -97,16 +138,19 @@ fn standard(meter: &mut Meter, page: &mut String) -> Result {
         "optimum",
     ]);
     for (count, checked, subsets, seconds, [lower, upper, least], to_optimum) in HIS {
-        let ours = run(meter, &Problem::of_matrix(count, 0, 100), Options::STANDARD);
-        let last = ours.laps.last().and_then(|lap| lap.1);
+        let ours = Runs::new(|instance| {
+            let problem = Problem::of_matrix(instance, count, 0, 100);
+            run_with_laps(meter, &problem, Options::STANDARD, true)
+        });
         table.row(&[
             &count,
-            &ours.effort.examined,
-            &ours.effort.sub_problems,
-            &ours.price,
-            &counted(last),
-            &format!("{}-{}", ours.lower_bound, ours.upper_bound),
-            &ours.cost.unwrap_or_default(),
+            &ours.examined(),
+            &ours.sub_problems(),
+            &ours.price(),
+            &ours.to_best(),
+            &ours.counts(|run| run.lower_bound),
+            &ours.counts(|run| run.upper_bound),
+            &ours.counts(|run| run.cost.unwrap_or_default()),
             &checked,
             &subsets,
             &seconds,
@@ -118,12 +162,13 @@ fn standard(meter: &mut Meter, page: &mut String) -> Result {
     writeln!(
         page,
         "7.2 The standard algorithm. (He goes through the subsets whose lower ends have no higher\n\
-         ends too; his table has 16 for the 20 of n = 8.)\n\n{table}"
+         ends too; his table has 16 for the 20 of n = 8. \"To optimum\" is over the instances in\n\
+         which the upper bound was not yet the optimum.)\n\n{table}"
     )
 }
 
 fn heuristic(meter: &mut Meter, page: &mut String) -> Result {
-    const HIS: [(u16, f64, Option<[u32; 2]>); 23] = [
+    const HIS: [(usize, f64, Option<[u32; 2]>); 23] = [
         (4, 0.013, Some([52, 52])),
         (6, 0.032, Some([56, 56])),
         (8, 0.051, Some([62, 62])),
@@ -148,35 +193,41 @@ fn heuristic(meter: &mut Meter, page: &mut String) -> Result {
         (360, 56.82, None),
         (400, 66.58, None),
     ];
+    let percent = |cost: u64, least: u64| 100.0 * (cost as f64 / least as f64 - 1.0);
     let mut table = Table::new(&["n", "MI", "over optimum %", "s", "his over optimum %"]);
     for (count, seconds, his) in HIS {
-        let mut star = Star::new(count);
-        let ours = meter.measure(|_| star.order());
-        let percent =
-            |cost: u64, least: u64| format!("{:.1}", 100.0 * (cost as f64 / least as f64 - 1.0));
-        // Not measured here: only the check of the heuristic.
-        let over = (count <= 36).then(|| {
-            let problem = Problem::of_points(usize::from(count));
-            let mut memory = vec![0; 4096];
-            let scratch = Scratch::new(&mut memory);
-            let options = Options::default();
-            optimum(problem.distances(), options, scratch, &mut Undisturbed, &mut |_| {})
-                .map(|best| percent(ours.result.pen_up, best.cost))
-                .expect("an optimum")
-        });
-        let his = his.map(|[cost, least]| percent(u64::from(cost), u64::from(least)));
+        let (mut prices, mut over) = (Vec::new(), Vec::new());
+        for instance in 0..INSTANCES {
+            let problem = Problem::of_matrix(instance, count, 0, 100);
+            let ours = meter.measure(false, |_| problem.cost_by_regret());
+            prices.extend(ours.instructions.map(millions));
+            // Where he has it, too.
+            if his.is_some() {
+                over.push(percent(ours.result, least_cost(&problem)));
+            }
+        }
+        let his = his.map(|[cost, least]| percent(cost.into(), least.into()));
         table.row(&[
             &count,
-            &counted(ours.instructions),
-            &over.unwrap_or_default(),
+            &Sample::new(prices.into_iter(), 3),
+            &Sample::new(over.into_iter(), 1),
             &seconds,
-            &his.unwrap_or_default(),
+            &his.map_or_else(|| "-".into(), |his| format!("{his:.1}")),
         ]);
     }
     writeln!(
         page,
-        "7.3 The heuristic, and the tour. (Ours of points on a page, as it takes no matrix.)\n\n{table}"
+        "7.3 The heuristic alone, without exchanges: the pairs chosen by regret (5.10.1).\n\n{table}"
     )
+}
+
+/// What the best matching costs. Not measured.
+fn least_cost(problem: &Problem) -> u64 {
+    let mut memory = vec![0; 4096];
+    let scratch = Scratch::new(&mut memory);
+    let best =
+        optimum(problem.distances(), Options::default(), scratch, &mut Undisturbed, &mut |_| {});
+    best.map(|best| best.cost).expect("an optimum")
 }
 
 fn range_of_elements(meter: &mut Meter, page: &mut String) -> Result {
@@ -189,8 +240,10 @@ fn range_of_elements(meter: &mut Meter, page: &mut String) -> Result {
     for (count, seconds) in HIS {
         for (range, seconds) in (20..=100).step_by(20).zip(seconds) {
             let options = Options { start: HIGH, ..Options::STANDARD };
-            let ours = run(meter, &Problem::of_matrix(count, 20, range), options);
-            table.row(&[&count, &range, &ours.effort.examined, &ours.price, &seconds]);
+            let ours = Runs::new(|instance| {
+                run(meter, &Problem::of_matrix(instance, count, 20, range), options)
+            });
+            table.row(&[&count, &range, &ours.examined(), &ours.price(), &seconds]);
         }
     }
     writeln!(
@@ -219,17 +272,17 @@ fn direct_solution(meter: &mut Meter, page: &mut String) -> Result {
         "direct",
     ]);
     for (count, seconds, iterations) in HIS {
-        let problem = Problem::of_matrix(count, 0, 100);
         let options = Options { start: HIGH, ..Options::STANDARD };
-        let standard = run(meter, &problem, options);
+        let standard = Runs::of_matrices(meter, count, options);
         let assignment = Options { sub_problem: SubProblem::Assignment, ..options };
-        let direct = run(meter, &problem, assignment);
+        let direct = Runs::of_matrices(meter, count, assignment);
+        let improvements = |run: &Run| run.effort.improvements.into();
         table.row(&[
             &count,
-            &standard.price,
-            &direct.price,
-            &standard.effort.improvements,
-            &direct.effort.improvements,
+            &standard.price(),
+            &direct.price(),
+            &standard.counts(improvements),
+            &direct.counts(improvements),
             &seconds[0],
             &seconds[1],
             &iterations[0],
@@ -261,13 +314,14 @@ fn reduction_of_upper_bound(meter: &mut Meter, page: &mut String) -> Result {
     ];
     let mut table = Table::new(&["n", "above optimum", "checked", "MI", "s"]);
     for ((count, rows), his_optimum) in HIS.into_iter().zip(OPTIMA) {
-        let problem = Problem::of_matrix(count, 0, 100);
-        let least = run(meter, &problem, Options::default()).cost.unwrap_or_default();
         for &(upper_bound, seconds) in rows {
             let above = upper_bound - his_optimum;
-            let start = Start::NoMoreThan(least + above);
-            let ours = run(meter, &problem, Options { start, ..Options::STANDARD });
-            table.row(&[&count, &above, &ours.effort.examined, &ours.price, &seconds]);
+            let ours = Runs::new(|instance| {
+                let problem = Problem::of_matrix(instance, count, 0, 100);
+                let start = Start::NoMoreThan(least_cost(&problem) + above);
+                run(meter, &problem, Options { start, ..Options::STANDARD })
+            });
+            table.row(&[&count, &above, &ours.examined(), &ours.price(), &seconds]);
         }
     }
     writeln!(
@@ -295,20 +349,24 @@ fn upper_bound_algorithm(meter: &mut Meter, page: &mut String) -> Result {
     ];
     let mut table = Table::new(&["n", "lower", "upper", "MI", "his lower", "upper", "s"]);
     for (count, lower, upper, seconds) in HIS {
-        let problem = Problem::of_matrix(count, 0, 100);
-        let mut memory = vec![0; 4096];
-        let mut scratch = Scratch::new(&mut memory);
-        let ours = meter.measure(|_| {
-            let (costs, bounds) = solve_image_problem(problem.distances(), &mut scratch)?;
-            let pairs = domino_matching(&costs, &mut scratch, &mut Undisturbed)?;
-            Ok::<_, penup::order::enumeration::EnumerationError>((
-                bounds.improved,
-                problem.distances().cost(pairs),
-            ))
-        });
-        let (our_lower, our_upper) = ours.result.expect("memory");
-        let price = counted(ours.instructions);
-        table.row(&[&count, &our_lower, &our_upper, &price, &lower, &upper, &seconds]);
+        let (mut bounds, mut prices) = (Vec::new(), Vec::new());
+        for instance in 0..INSTANCES {
+            let problem = Problem::of_matrix(instance, count, 0, 100);
+            let mut memory = vec![0; 4096];
+            let mut scratch = Scratch::new(&mut memory);
+            let ours = meter.measure(false, |_| {
+                let (costs, bounds) = solve_image_problem(problem.distances(), &mut scratch)?;
+                let pairs = domino_matching(&costs, &mut scratch, &mut Undisturbed)?;
+                let upper = problem.distances().cost(pairs);
+                Ok::<_, penup::order::enumeration::EnumerationError>([bounds.improved, upper])
+            });
+            bounds.push(ours.result.expect("memory"));
+            prices.extend(ours.instructions.map(millions));
+        }
+        let [ours_below, ours_above] =
+            [0, 1].map(|side: usize| Sample::of_counts(bounds.iter().map(|bound| bound[side])));
+        let price = Sample::new(prices.into_iter(), 3);
+        table.row(&[&count, &ours_below, &ours_above, &price, &lower, &upper, &seconds]);
     }
     writeln!(page, "7.7 Both bounds. (His seconds of the upper bound alone.)\n\n{table}")
 }
@@ -320,32 +378,28 @@ fn fewer_distances(meter: &mut Meter, page: &mut String) -> Result {
         (14, &[(91, 55.29, 34.12), (74, 51.31, 34.09), (54, 45.03, 34.03), (34, 37.25, 33.98)]),
         (16, &[(120, 380.0, 163.0), (98, 341.0, 162.0), (71, 274.0, 160.0), (47, 206.0, 157.0)]),
     ];
-    let mut table = Table::new(&[
-        "n",
-        "distances",
-        "cost",
-        "MI",
-        "sorted MI",
-        "his distances",
-        "s",
-        "sorted s",
-    ]);
+    let mut table =
+        Table::new(&["n", "distances", "optimum kept, of 20", "MI", "sorted MI", "s", "sorted s"]);
     for (count, rows) in HIS {
-        let problem = Problem::of_matrix(count, 0, 100);
         for &(wanted, seconds, seconds_sorted) in rows {
-            let (longest, kept) = problem.shortest(wanted);
-            let reach = Reach::NoLongerThan(longest);
-            let options = Options { start: HIGH, reach, ..Options::STANDARD };
-            let ours = run(meter, &problem, options);
-            let sorted = run(meter, &problem, Options { sorted: true, ..options });
-            let cost = ours.cost.map_or_else(|| "none".into(), |cost| cost.to_string());
+            let mut of = |sorted: bool| {
+                Runs::new(|instance| {
+                    let problem = Problem::of_matrix(instance, count, 0, 100);
+                    let reach = Reach::NoLongerThan(problem.shortest(wanted));
+                    let options = Options { start: HIGH, reach, sorted, ..Options::STANDARD };
+                    run(meter, &problem, options)
+                })
+            };
+            let (ours, sorted) = (of(false), of(true));
+            let kept = (0..INSTANCES).zip(&ours.0).filter(|(instance, run)| {
+                run.cost == Some(least_cost(&Problem::of_matrix(*instance, count, 0, 100)))
+            });
             table.row(&[
                 &count,
-                &kept,
-                &cost,
-                &ours.price,
-                &sorted.price,
                 &wanted,
+                &kept.count(),
+                &ours.price(),
+                &sorted.price(),
                 &seconds,
                 &seconds_sorted,
             ]);
@@ -353,50 +407,60 @@ fn fewer_distances(meter: &mut Meter, page: &mut String) -> Result {
     }
     writeln!(
         page,
-        "7.8 Fewer distances, as they come and sorted, from a high upper bound.\n\n{table}"
+        "7.8 Fewer distances (the shortest, and those as long as the longest of them), as they come and\n\
+         sorted, from a high upper bound.\n\n{table}"
     )
 }
 
 fn binary_chopping(meter: &mut Meter, page: &mut String) -> Result {
-    const HIS: [(usize, &str, &str); 2] = [
-        (
-            14,
-            "349 at 0, 229 at 0.06, 178 at 0.16, 167 at 0.29, 162 at 0.44, 151 at 0.61, 143 at 0.74, \
-             141 at 4.36, 130 at 4.73, 126 at 4.84, 113 at 6.74, 96 at 16.91, 95 at 17.91; all 58",
-            "349 at 0, 178 at 0.06, 130 at 1.85, 96 at 6.51; all 44",
-        ),
-        (
-            16,
-            "357 at 0, 337 at 0.08, 324 at 0.21, 231 at 0.32, 230 at 0.49, 226 at 0.54, 179 at 0.79, \
-             146 at 0.94, 127 at 1.25, 122 at 1.97, 118 at 8.18, 115 at 8.34, 114 at 22.53, \
-             105 at 87.18, 98 at 100.46; all 371",
-            "357 at 0, 179 at 0.2, 127 at 0.46, 105 at 28.83; all 256",
-        ),
+    // n; solutions found, seconds to the last of them, all seconds: standard, chopping.
+    const HIS: [Rows<(u32, f64, f64)>; 2] = [
+        (14, &[(13, 17.91, 58.0), (4, 6.51, 44.0)]),
+        (16, &[(15, 100.46, 371.0), (4, 28.83, 256.0)]),
     ];
-    writeln!(page, "7.9 Binary chopping: each solution and what it took, in MI and in s.\n")?;
-    for (count, his_standard, his_chopping) in HIS {
-        let problem = Problem::of_matrix(count, 0, 100);
+    let mut table = Table::new(&[
+        "n",
+        "target",
+        "solutions",
+        "MI to the last",
+        "all MI",
+        "optimum found, of 20",
+        "his solutions",
+        "s to the last",
+        "all s",
+    ]);
+    for (count, rows) in HIS {
         let standard = Options { start: HIGH, ..Options::STANDARD };
-        let chopping = Options { target: Target::Chopped, ..standard };
-        for (name, options, his) in
-            [("standard", standard, his_standard), ("chopping", chopping, his_chopping)]
-        {
-            let ours = run(meter, &problem, options);
-            let laps: Vec<String> = ours
-                .laps
-                .iter()
-                .map(|&(cost, instructions)| format!("{cost} at {}", counted(instructions)))
-                .collect();
-            writeln!(page, "- n = {count}, {name}: {}; all {}", laps.join(", "), ours.price)?;
-            writeln!(page, "  - his: {his}")?;
+        for (name, target, his) in [
+            ("better", Target::Better, rows.first()),
+            ("chopped", Target::Chopped, rows.get(1)),
+            ("chopped, backtracked", Target::ChoppedAndBacktracked, None),
+        ] {
+            let options = Options { target, ..standard };
+            let ours = Runs::new(|instance| {
+                let problem = Problem::of_matrix(instance, count, 0, 100);
+                run_with_laps(meter, &problem, options, true)
+            });
+            let optimal = (0..INSTANCES).zip(&ours.0).filter(|(instance, run)| {
+                run.cost == Some(least_cost(&Problem::of_matrix(*instance, count, 0, 100)))
+            });
+            let shown = |value: Option<f64>, otherwise: &str| {
+                value.map_or_else(|| otherwise.to_owned(), |value| value.to_string())
+            };
+            table.row(&[
+                &count,
+                &name,
+                &ours.counts(|run| run.effort.improvements.into()),
+                &ours.to_best(),
+                &ours.price(),
+                &optimal.count(),
+                &shown(his.map(|his| his.0.into()), "-"),
+                &shown(his.map(|his| his.1), "-"),
+                &shown(his.map(|his| his.2), "\"extremely high\""),
+            ]);
         }
-        let target = Target::ChoppedAndBacktracked;
-        let ours = run(meter, &problem, Options { target, ..standard });
-        let cost = ours.cost.unwrap_or_default();
-        writeln!(page, "- n = {count}, with backtracking: {cost}, proved; all {}", ours.price)?;
-        writeln!(page, "  - his: \"extremely high\"")?;
     }
-    writeln!(page)
+    writeln!(page, "7.9 Binary chopping, from a high upper bound.\n\n{table}")
 }
 
 fn sets_of_sub_problems(meter: &mut Meter, page: &mut String) -> Result {
@@ -407,15 +471,14 @@ fn sets_of_sub_problems(meter: &mut Meter, page: &mut String) -> Result {
     ];
     let mut table = Table::new(&["n", "sgd", "sub-problems", "MI", "s"]);
     for (count, rows) in HIS {
-        let problem = Problem::of_matrix(count, 0, 100);
         for (depth, seconds) in (2..).zip(rows) {
             let options = Options { start: HIGH, sets: Sets::AtDepth(depth), ..Options::STANDARD };
-            let ours = run(meter, &problem, options);
-            table.row(&[&count, &depth, &ours.effort.sub_problems, &ours.price, &seconds]);
+            let ours = Runs::of_matrices(meter, count, options);
+            table.row(&[&count, &depth, &ours.sub_problems(), &ours.price(), &seconds]);
         }
         let options = Options { start: HIGH, sets: Sets::FromDepth(1), ..Options::STANDARD };
-        let ours = run(meter, &problem, options);
-        table.row(&[&count, &"all", &ours.effort.sub_problems, &ours.price, &"-"]);
+        let ours = Runs::of_matrices(meter, count, options);
+        table.row(&[&count, &"all", &ours.sub_problems(), &ours.price(), &"-"]);
     }
     writeln!(
         page,
@@ -426,15 +489,17 @@ fn sets_of_sub_problems(meter: &mut Meter, page: &mut String) -> Result {
 
 fn beyond(meter: &mut Meter, page: &mut String) -> Result {
     let mut table = Table::new(&["n", "matrix MI", "sub-problems", "points MI", "sub-problems"]);
-    for count in (14..=36).step_by(2) {
-        let matrix = run(meter, &Problem::of_matrix(count, 0, 100), Options::default());
-        let points = run(meter, &Problem::of_points(count), Options::default());
+    for count in (14..=22).step_by(2) {
+        let matrix = Runs::of_matrices(meter, count, Options::default());
+        let points = Runs::new(|instance| {
+            run(meter, &Problem::of_points(instance, count), Options::default())
+        });
         table.row(&[
             &count,
-            &matrix.price,
-            &matrix.effort.sub_problems,
-            &points.price,
-            &points.effort.sub_problems,
+            &matrix.price(),
+            &matrix.sub_problems(),
+            &points.price(),
+            &points.sub_problems(),
         ]);
     }
     writeln!(

@@ -12,8 +12,9 @@
 //!    best matching. [`Options`] holds his variants.
 //!
 //! The order of strokes does not use it: it is the slow, independent check of the exact matching, and
-//! it repeats Harrison's experiments (chapter 7). His 18 points take a million instructions; 36
-//! took a hundred million, 32 others eight hundred: count on some 40 points, and on an abort beyond.
+//! it repeats Harrison's experiments (chapter 7; docs/experiments.md). 18 points take some million
+//! instructions; 36 took a hundred million, 32 others eight hundred: count on some 40 points, and on an
+//! abort beyond.
 //! Refused: an odd number of points or more than [`Distances::POINT_LIMIT`].
 
 mod division;
