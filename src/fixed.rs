@@ -403,6 +403,10 @@ mod tests {
                 assert_eq!(fine / (1 << (30 - bits)), coarse, "{text}");
             }
         }
+        for (text, units) in [("1.99", 7), ("-1.99", -7), ("0.24", 0), ("-3", -12), ("25e-2", 1)] {
+            let decimal = Decimal::parse(text);
+            assert_eq!(decimal.map(|decimal| decimal.to_binary_truncated(2)), Ok(Ok(units)));
+        }
     }
 
     #[test]

@@ -353,6 +353,34 @@ mod tests {
     }
 
     #[test]
+    fn sides_and_offsets_have_their_values_and_not_only_their_signs() {
+        use Projection::{Parallel, Perspective};
+        let (a, b, c) = (Vertex::new(3, 5, 7), Vertex::new(13, 4, 9), Vertex::new(2, 15, 11));
+        // 10 x 10 - (-1) x (-1), and 3 (44 - 135) - 5 (143 - 18) + 7 (195 - 8).
+        assert_eq!(page_side(Parallel, a, b, c), 99);
+        assert_eq!(page_side(Perspective, a, b, c), 411);
+        assert_eq!(page_side(Parallel, b, a, c), -99);
+        assert_eq!(page_side(Parallel, a, b, Vertex::new(23, 3, 0)), 0);
+        assert_eq!(page_offset(Parallel, Axis::X, a, b), 10);
+        assert_eq!(page_offset(Parallel, Axis::Y, a, b), -1);
+        // 13 x 7 - 3 x 9, and 4 x 7 - 5 x 9.
+        assert_eq!(page_offset(Perspective, Axis::X, a, b), 64);
+        assert_eq!(page_offset(Perspective, Axis::Y, a, b), -17);
+        // On the line beyond b, but deeper by 3 or nearer by 4.
+        let beyond = |dz: i32| Vertex::new(23, 3, 11 + dz);
+        for (projection, axis, dz, side) in [
+            (Parallel, Axis::X, 3, 30),
+            (Parallel, Axis::X, -4, -40),
+            (Parallel, Axis::Y, 3, 3),
+            (Parallel, Axis::Y, -4, -4),
+            (Perspective, Axis::X, 3, 30),
+            (Perspective, Axis::Y, -4, -4),
+        ] {
+            assert_eq!(line_side(projection, axis, a, b, beyond(dz)), side, "{axis:?} {dz}");
+        }
+    }
+
+    #[test]
     fn four_points_of_the_model_lie_in_a_plane_or_not() {
         let points = |x: i32, y: i32, z: i32| [[3, 5, 7], [13, 4, 9], [2, 15, 11], [x, y, z]];
         // (3, 5, 7) + m (10, -1, 2) + n (-1, 10, 4)
@@ -436,6 +464,11 @@ mod tests {
         let near_end = Along { numerator: (1 << 62) - 1, denominator: 1 << 62 };
         let nearer_end = Along { numerator: u64::MAX - 1, denominator: u64::MAX };
         assert!(near_end < nearer_end && nearer_end < Along::END);
+        assert!(near_end != nearer_end && near_end != Along::END && Along::START != Along::END);
+        let along = |numerator, denominator| Along { numerator, denominator };
+        assert_eq!(along(7, 21), along(1, 3));
+        assert_ne!(along(7, 21), along(8, 21));
+        assert!(along(1, 3) < along(2, 5) && along(3, 5) > along(4, 7));
         assert_eq!(Along::zero_between(0, 7), Along::START);
         assert_eq!(Along::zero_between(7, 0), Along::END);
     }

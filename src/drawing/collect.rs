@@ -335,6 +335,14 @@ mod tests {
         ] {
             let packed = Line::new(point(x, y), point(y, x), line_type, pen);
             assert_eq!(packed.unpack(), (point(x, y), point(y, x), line_type.code(), pen));
+            assert_eq!(packed.ends(), [point(x, y), point(y, x)]);
+            assert_eq!(packed.has_length(), x != y);
+            // Only a full line yields, and nothing but its mark changes.
+            let is_full = line_type == LineType::Full;
+            let mark = if is_full { UNDER } else { line_type.code() };
+            assert_eq!(packed.under().unpack(), (point(x, y), point(y, x), mark, pen));
+            let segment = Segment { line_type_code: line_type.code(), ..Segment::default() };
+            assert_eq!(segment.line_type(), line_type);
         }
     }
 

@@ -156,9 +156,18 @@ mod tests {
                     let to = PagePoint { x: 3 + dx, y: dy - 4 };
                     let there = inked_points(from, to, dot);
                     assert_eq!(there, inked_points(to, from, dot));
-                    let moves: Vec<_> = DottedLine::new(from, to, dot).collect();
+                    let line = DottedLine::new(from, to, dot);
+                    let count = from.x.abs_diff(to.x).max(from.y.abs_diff(to.y)) as usize;
+                    assert_eq!(line.size_hint(), (count, Some(count)));
+                    let moves: Vec<_> = line.collect();
+                    assert!(Line::new(from, to).eq(moves.iter().map(|step| step.direction)));
                     assert!(moves.first().is_none_or(|step| step.inked));
                     assert!(moves.last().is_none_or(|step| step.inked));
+                    // The pen changes at the end of each piece, and nowhere else.
+                    let pattern = Pattern::new(count as u32, dot);
+                    let ends = (0..pattern.pieces() - 1).map(|piece| pattern.end_of(piece));
+                    let changes = (1..count).filter(|&at| moves[at].inked != moves[at - 1].inked);
+                    assert!(ends.eq(changes.map(|at| at as u32)), "to {to:?} in {dot}");
                 }
             }
         }
