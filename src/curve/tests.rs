@@ -199,6 +199,7 @@ fn both_recursions_agree() {
         let counted = uniform(&points, &control, order);
         for bits in 0..counted.spans() as u32 * 8 {
             let t = Parameter::from_bits(bits << (Parameter::LOCAL_BITS - 3));
+            assert_eq!(t.to_bits(), bits << (Parameter::LOCAL_BITS - 3));
             assert!(near(listed.at(t), counted.at(t), 1), "order {order}, {t:?}");
         }
     }

@@ -536,5 +536,16 @@ mod tests {
         assert_eq!(refused(at(0, 0), at(0, 0), at(1, 0)), Some(ArcError::NoRadius));
         assert_eq!(refused(at(0, 0), at(9, 0), at(0, 5)), Some(ArcError::EndOffCircle));
         assert_eq!(refused(at(i32::MAX, 0), at(i32::MIN, 0), at(0, 0)), Some(ArcError::TooWide));
+        let far = 1 << 22;
+        assert_eq!(refused(at(0, 0), at(far, 0), at(0, -far)), None);
+        assert_eq!(refused(at(0, 0), at(far + 1, 0), at(0, -far)), Some(ArcError::TooWide));
+        assert_eq!(refused(at(0, 0), at(far, 0), at(0, -far - 1)), Some(ArcError::TooWide));
+        // Two steps off the circle are allowed: of y, where those are twice as long as steps of x.
+        assert_eq!(refused(at(0, 0), at(9, 0), at(0, 11)), None);
+        assert_eq!(refused(at(0, 0), at(9, 0), at(0, 12)), Some(ArcError::EndOffCircle));
+        let steps = [100, 50].map(Millimetres::from_num);
+        let refused = |to| Arc::scaled(steps, at(0, 0), at(8, 0), to, Turn::Clockwise).err();
+        assert_eq!(refused(at(0, 6)), None);
+        assert_eq!(refused(at(0, 7)), Some(ArcError::EndOffCircle));
     }
 }
