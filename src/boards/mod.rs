@@ -9,6 +9,8 @@ mod divide;
 mod fault;
 mod handler;
 mod line;
+#[cfg(feature = "lm3s6965")]
+mod memory;
 mod peripheral;
 mod pl011;
 

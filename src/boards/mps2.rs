@@ -1,6 +1,7 @@
 //! Arm MPS2+ (AN385) in QEMU: a Cortex-M3 that counts what it executes.
 
 mod divide;
+mod memory;
 
 /// Counts down once in 40 ns: QEMU's `-icount shift=0` lets an instruction take 1 ns.
 const TIMER: *mut u32 = 0x4000_0000 as *mut u32;
