@@ -2,7 +2,7 @@
 
 use super::window::Window;
 use super::{PAGE_LIMIT, PagePoint, Title};
-use crate::fixed::{Millimetres, divide, divide_rounding};
+use crate::fixed::{Millimetres, divide, divide_rounding, half};
 use crate::geometry::{Projection, Vertex};
 use crate::model::Position;
 use crate::visibility::Along;
@@ -198,7 +198,7 @@ impl PageMap {
             let side =
                 i128::from(side_steps(page, steps, axis) + foot_steps(page, steps, axis)) << k;
             let middle = i128::from(bounds.low[axis]) + i128::from(bounds.high[axis]);
-            side / 2 - ((i128::from(a[axis]) * middle) >> (unit_bits + 1))
+            half(side) - ((i128::from(a[axis]) * middle) >> (unit_bits + 1))
         });
         Ok(Self { a, b, k: k as u32, window: None })
     }

@@ -1,7 +1,7 @@
 //! What a line of G-code asks for, given what the lines before it have set.
 
 use crate::drawing::{PAGE_LIMIT, PagePoint, StepsPerMillimetre};
-use crate::fixed::{Decimal, Millimetres, divide_rounding};
+use crate::fixed::{Decimal, Millimetres, divide_rounding, half};
 use crate::machine::Machine;
 use crate::protocol::{GCode, Refusal, Word};
 use crate::step::{Arc, ArcError, Turn};
@@ -231,7 +231,7 @@ fn center_of_radius(
     let middle = |axis: usize, across: i64| {
         let offset = divide_rounding(i128::from(across) * i128::from(height), length.into());
         let sum = i128::from(from[axis].to_bits()) + i128::from(to[axis].to_bits()) + 2 * offset;
-        i32::try_from(sum / 2).ok().map(Millimetres::from_bits)
+        i32::try_from(half(sum)).ok().map(Millimetres::from_bits)
     };
     Some([middle(0, dy)?, middle(1, -dx)?])
 }

@@ -44,7 +44,7 @@ impl<'a> GCode<'a> {
 
     /// Whether a line that is none of OBJ may be G-code: it begins with a capital, a comment or `%`.
     pub fn begins(line: &str) -> bool {
-        line.starts_with(|first: char| first.is_ascii_uppercase() || "(;%".contains(first))
+        line.starts_with(|first: char| matches!(first, 'A'..='Z' | '(' | ';' | '%'))
     }
 
     /// The words in order.

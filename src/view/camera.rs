@@ -133,9 +133,8 @@ const EYE_DISTANCE: f64 = 3.5;
 
 /// The middle of the model and about how far it reaches from there.
 ///
-/// The radius is an estimate that only places the automatic eye: `micromath` is enough for it.
+/// The radius is an estimate that only places the automatic eye: a root of 24 bits that is some 5 % off is enough for it.
 pub(super) fn middle_and_radius(model: &Model<'_>) -> Option<(Direction, f64)> {
-    use micromath::F32Ext;
     let (low, high) = model.bounds()?;
     let unit = libm::ldexp(1.0, -(model.fraction_bits() as i32));
     let (low, high) = (low.coordinates().map(f64::from), high.coordinates().map(f64::from));
@@ -146,9 +145,21 @@ pub(super) fn middle_and_radius(model: &Model<'_>) -> Option<(Direction, f64)> {
         return Some((middle, 1.0));
     }
     let squares =
-        largest.iter().map(|half| (half / size) as f32).map(|half| half * half).sum::<f32>();
-    // Named in full: with std at hand, `f32::sqrt` would quietly take its place.
-    Some((middle, size * f64::from(F32Ext::sqrt(squares))))
+        largest.iter().map(|half| to_single(half / size)).map(|half| to_single(half * half));
+    let sum = squares.fold(0.0, |sum, square| to_single(sum + square));
+    Some((middle, size * estimated_root(sum)))
+}
+
+/// The nearest number with the 24 bits of a single-precision float, for 0 and numbers above 2^-126.
+fn to_single(value: f64) -> f64 {
+    let bits = value.to_bits();
+    let half_to_even = 0x0FFF_FFFF + (bits >> 29 & 1);
+    f64::from_bits((bits + half_to_even) & !0x1FFF_FFFF)
+}
+
+/// The square root of a single-precision number above 0, some 5 % off: half the exponent.
+fn estimated_root(square: f64) -> f64 {
+    f64::from_bits(((square.to_bits() + 1f64.to_bits()) >> 1) & !0x1FFF_FFFF)
 }
 
 /// The lines of sight, in units of 2^-fraction_bits of the model; each coordinate within ±2^60.
@@ -272,6 +283,25 @@ mod tests {
 
     fn near(a: Direction, b: Direction) -> bool {
         [0, 1, 2].iter().all(|&axis: &usize| libm::fabs(a[axis] - b[axis]) < 1e-12)
+    }
+
+    #[test]
+    fn single_precision_is_rounded_as_the_language_does() {
+        // The bits of the golden ratio, over and over, as mantissas.
+        let mut bits = 0u64;
+        for exponent in (1023 - 60..1023 + 3).cycle().take(2000) {
+            bits = bits.wrapping_add(0x9E37_79B9_7F4A_7C15);
+            let value = f64::from_bits(exponent << 52 | bits >> 12);
+            let ties = f64::from_bits(value.to_bits() & !0x0FFF_FFFF);
+            for value in [value, ties, 0.0] {
+                let single = to_single(value);
+                assert_eq!(single, f64::from(value as f32), "{value}");
+                if single > 0.0 {
+                    let root = f32::from_bits(((single as f32).to_bits() + 1f32.to_bits()) >> 1);
+                    assert_eq!(estimated_root(single), f64::from(root), "{value}");
+                }
+            }
+        }
     }
 
     #[test]
