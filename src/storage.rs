@@ -258,9 +258,9 @@ impl<F: NorFlash> Writer<'_, F> {
             place.copy_from_slice(&word.to_le_bytes());
         }
         self.flash.write(self.start, &header).map_err(|error| {
-            // The header may be whole although the rest of its page is not: without its mark it
-            // holds nothing. What the flash says to that changes nothing any more.
-            let _ = self.flash.write(self.start, &[0; PAGE_BYTES]);
+            // The header may be whole although the rest of its page is not: erased, it holds
+            // nothing. What the flash says to that changes nothing any more.
+            let _ = self.flash.erase(self.start, self.start + F::ERASE_SIZE as u32);
             StorageError::Flash(error)
         })
     }

@@ -157,6 +157,22 @@ fn a_busy_bus_finds_the_board_while_a_job_runs() -> TestResult {
     Ok(())
 }
 
+/// To the controller that is a reset of the bus that does not end.
+#[test]
+fn a_host_without_power_keeps_nobody_waiting() -> TestResult {
+    let lines = job_lines("cube.obj", &["$page=60x60", "$margin=5"]);
+    let mut uart = Line::to(Box::new(Pico::start(&image_path("pico"))?))?;
+    uart.emulator.plug_usb_into_dead_host()?;
+    // Longer than the watchdog waits.
+    let mut line = begin_on(uart, &lines)?;
+    let end = line.emulator.clock()? + Duration::from_secs(4);
+    while line.emulator.clock()? < end {
+        let status = line.status()?;
+        assert!(status.starts_with("<Run") && !status.contains("|Late"), "{status}");
+    }
+    Ok(())
+}
+
 /// More lines than the line's queue and a packet hold are on their way when the computer goes to
 /// sleep.
 #[test]

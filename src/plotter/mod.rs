@@ -207,7 +207,7 @@ impl<'m> Plotter<'m> {
 
     fn act<B: Board>(&mut self, asked: RealTime, board: &mut B) {
         report::greet_opened(self.inner.machine.state(), board);
-        if B::HAS_DRIVE && board.wants_drive() && self.inner.machine.stands() {
+        if B::HAS_DRIVE && board.wants_drive() && self.inner.is_without_job() {
             board.show_drive();
         }
         if asked.has(RealTime::ABORT) {
@@ -241,6 +241,15 @@ impl Inner<'_> {
         let mut strokes = self.job.strokes(self.words, &mut self.cursor);
         self.machine.fill(&mut strokes, board.queue());
         self.machine.planned_position() != before
+    }
+
+    /// Nothing moves, and no job is held that could go on.
+    fn is_without_job(&self) -> bool {
+        let is_over = matches!(
+            self.machine.state(),
+            State::Idle | State::Alarm(_) | State::Sleep | State::Check
+        );
+        is_over && self.machine.stands()
     }
 
     #[inline(never)] // Its frame must not lie under the stages'.
@@ -292,7 +301,7 @@ impl Inner<'_> {
             Command::Plot => return Ok(Next::Plot),
             Command::Again => return Ok(Next::Again),
             Command::ShowDrive if !B::HAS_DRIVE => return Err(Refusal::UnknownSystemCommand),
-            Command::ShowDrive if !self.machine.stands() => return Err(Refusal::Busy),
+            Command::ShowDrive if !self.is_without_job() => return Err(Refusal::Busy),
             Command::ShowDrive => return Ok(Next::ShowDrive),
             Command::Unlock => self.machine.unlock()?,
             Command::Home => self.home()?,

@@ -3,24 +3,24 @@
 // Usage: node pico.mjs RP2040JS-DIRECTORY IMAGE.uf2
 //
 // Standard input and output carry records of 8 bytes: what, a value, and the core cycle (48 bits,
-// little-endian). In: 0 a byte for the serial line, 1 a level for a pin (its number, + 128 if high),
-// not before that cycle; 2 the power goes at that cycle, 3 it goes when so many more bytes of flash
-// have been erased or written (the number in the cycle's place), and comes back at once; 4 the main
-// loop hangs from that cycle on, 5 a byte for USB, 6 the USB host is plugged in (1), takes
+// little-endian). In: 0 a byte for the serial line, 1 a level for a pin (its number, + 128 if
+// high), not before that cycle; 2 the power goes at that cycle, 3 it goes when so many more bytes
+// of flash have been erased or written (the number in the cycle's place), and comes back at once; 4
+// the main loop hangs from that cycle on, 5 a byte for USB, 6 the USB host is plugged in (1), takes
 // nothing more (2), takes again (3), suspends the bus (4), resumes it (5), is unplugged (6), is
-// plugged in on a busy bus (7); 7 a switch is fitted to a pin, which closes where its axis has gone
-// to so many
-// steps (+ 2^40) or below, and bounces; 8 a function (its number, its
-// address in the cycle's place) is timed; 9 how much of the stack is unused is asked; 10 where x has gone to so many steps, the
-// main loop stands still for so many hundredths of a second. 32 the pin RUN is pulled low for a
-// moment, 33 the image is copied onto the drive that the board shows with BOOTSEL held, 34 and 35
-// bits (the value) of a byte of flash (the cycle) stay low or high from now on, 36 the main loop
-// goes on at an address, with the stack used up (1) or as it is (0), 37 the host opens the USB port
-// (1) or closes it (0) at a rate (the cycle). Out: 0 a byte
-// of the serial line, 1 a pin's new level, 2 the time, 3 a byte of the log, 4 the chip was reset (0 by
-// the loss of power, 1 by the watchdog), 5 a byte of USB, 6 a timed function has
-// returned (its number, the cycles in the cycle's place), 7 so many bytes of the stack have not been used since
-// the chip began (in the cycle's place).
+// plugged in on a busy bus (7), has no power (8); 7 a switch is fitted to a pin, which closes where
+// its axis has gone to so many steps (+ 2^40) or below, and bounces; 8 a function (its number, its
+// address in the cycle's place) is timed; 9 how much of the stack is unused is asked; 10 where x
+// has gone to so many steps, the main loop stands still for so many hundredths of a second. 32 the
+// pin RUN is pulled low for a moment, 33 the image is copied onto the drive that the board shows
+// with BOOTSEL held, 34 and 35 bits (the value) of a byte of flash (the cycle) stay low or high
+// from now on, 36 the main loop goes on at an address, with the stack used up (1) or as it is (0),
+// 37 the host opens the USB port (1) or closes it (0) at a rate (the cycle). Out: 0 a byte of the
+// serial line, 1 a pin's new level, 2 the time, 3 a byte of the log, 4 the chip was reset (0 by the
+// loss of power, 1 by the watchdog, 2 by the pin RUN), 5 a byte of USB, 6 a timed function has
+// returned (its number, the cycles in the cycle's place), 7 so many bytes of the stack have not
+// been used since the chip began (in the cycle's place), 32 the boot ROM shows its drive, 33 a
+// character of the serial number that the USB host reads, after a 0.
 //
 // rp2040js has no boot ROM: here is one, of the functions that the image asks for. Each is a
 // breakpoint that this program serves. Flash takes as long as a Pico's.
@@ -174,7 +174,7 @@ let stamp = -1;
 let cyclesBefore = 0;
 const now = () => (stamp >= 0 ? stamp : cyclesBefore + Math.round(clock.nanosCounter / NANOS));
 
-/** Puts an image into flash: blocks of 512 bytes that say where in flash they go, and how long they are. */
+/** Puts an image into flash: blocks of 512 bytes that say where they go, and how long they are. */
 function flashImage(image, flash) {
   for (let block = 0; block < image.length; block += 512) {
     const target = image.readUInt32LE(block + 12) - FLASH;
@@ -235,7 +235,9 @@ function unusedStack() {
 
 const usb = new Usb({
   byte: (byte) => report(USB, byte, now()),
-  serialNumber: (text) => [0, ...Buffer.from(text)].forEach((byte) => report(USB_SERIAL, byte, now())),
+  serialNumber(text) {
+    for (const byte of [0, ...Buffer.from(text)]) report(USB_SERIAL, byte, now());
+  },
 });
 
 // --- Resets --------------------------------------------------------------------------------------
@@ -265,7 +267,7 @@ function cutPower() {
   resetByHand(resets.KIND.POWER);
 }
 
-/** With BOOTSEL held the boot ROM shows a drive; once an image is on it, it restarts by the watchdog, a second later. */
+/** With BOOTSEL held the boot ROM shows a drive; it restarts by the watchdog once an image is there. */
 function copyImage() {
   cutPower();
   core.PC = FOR_EVER;
@@ -316,7 +318,7 @@ let faultDue = false;
 /** A fault in the handler of faults: only a reset helps. */
 let isLockedUp = false;
 
-/** rp2040js only warns of what faults on the chip: an access where nothing is, an instruction that there is not. */
+/** rp2040js only warns of what is a fault on the chip: no such address, no such instruction. */
 function warn(_, what) {
   if (/invalid memory address|undefined address|is not implemented yet/.test(what)) faultDue = true;
 }

@@ -281,6 +281,14 @@ impl Pico {
         self.tell(USB_HOST, 7, 0)
     }
 
+    /// Plugs the cable into a USB host without power, which pulls both wires low.
+    ///
+    /// # Errors
+    /// The emulator has ended.
+    pub fn plug_usb_into_dead_host(&mut self) -> io::Result<()> {
+        self.tell(USB_HOST, 8, 0)
+    }
+
     /// Lets the USB host suspend the bus, as a computer does that goes to sleep, or resume it.
     ///
     /// # Errors

@@ -10,6 +10,7 @@ use core::cell::UnsafeCell;
 use core::fmt::{self, Write};
 use core::mem::MaybeUninit;
 use core::panic::PanicInfo;
+use core::sync::atomic::{AtomicBool, Ordering};
 
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 use rp2040_hal::rom_data;
@@ -157,10 +158,12 @@ fn text(text: &str) -> Cause {
     cause
 }
 
-/// Notes that the program runs, so many microseconds after its start: the faults so far are not the
-/// beginning of it.
+/// Notes that the program runs, so many microseconds after its start: faults from now on do not count
+/// as faults at the start.
 pub fn note_running(microseconds: u32) {
-    if microseconds > SOON && Kept::load().is_none_or(|kept| kept.faults > 0) {
+    static HAS_STARTED: AtomicBool = AtomicBool::new(false);
+    if microseconds > SOON && !HAS_STARTED.load(Ordering::Relaxed) {
+        HAS_STARTED.store(true, Ordering::Relaxed);
         Kept::new(0, "").store();
     }
 }

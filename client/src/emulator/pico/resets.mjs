@@ -41,7 +41,7 @@ export function watchdogResets(chip) {
   return (chip.peripherals[PSM].wdsel & CORE) !== 0;
 }
 
-/** Makes `chip`, which is new, what such a reset makes of `before`; there is none before the first. */
+/** Makes `chip`, which is new, what such a reset makes of `before`, if there is one. */
 export function carryOver(kind, before, chip) {
   const FLAGS = { [KIND.POWER]: 1 << 8, [KIND.RUN]: 1 << 16, [KIND.WATCHDOG]: 0 };
   const flags = FLAGS[kind] || before?.peripherals[CHIP_RESET].flags || 0;
@@ -58,7 +58,7 @@ export function carryOver(kind, before, chip) {
   }
 }
 
-/** The boot ROM begins: whether it goes on as the drive for an image, and not with what is in flash. */
+/** The boot ROM begins: whether it goes on as the drive for an image, not with what is in flash. */
 export function beginBoot(chip) {
   const end = chip.sram.length;
   const scratch = chip.peripherals[WATCHDOG].scratchData;

@@ -14,15 +14,18 @@ const MILLISECOND = 1000 * MICROSECOND;
 const CYCLE = 8;
 
 const REGISTER = {
-  ADDRESS: 0x00, MAIN: 0x40, SOF: 0x48, SIE: 0x4c, STATUS: 0x50, BUFFERS: 0x58, STALL_ARM: 0x68, MUXING: 0x74,
+  ADDRESS: 0x00, MAIN: 0x40, SOF: 0x48, SIE: 0x4c, STATUS: 0x50, BUFFERS: 0x58, STALL_ARM: 0x68,
+  MUXING: 0x74,
   POWER: 0x78, DIRECT: 0x7c, OVERRIDE: 0x80, RAW: 0x8c, ENABLED: 0x90, FORCED: 0x94, MASKED: 0x98,
 };
 const STATUS = {
-  VBUS: 1, LINE: 3 << 2, SUSPENDED: 1 << 4, RESUME: 1 << 11, CONNECTED: 1 << 16, SETUP: 1 << 17, RESET: 1 << 19,
+  VBUS: 1, LINE: 3 << 2, SUSPENDED: 1 << 4, RESUME: 1 << 11, CONNECTED: 1 << 16, SETUP: 1 << 17,
+  RESET: 1 << 19,
 };
 /** Interrupts that bits of the status raise. */
 const RAISED = [
-  [STATUS.RESET, 1 << 12], [STATUS.CONNECTED, 1 << 13], [STATUS.SUSPENDED, 1 << 14], [STATUS.RESUME, 1 << 15],
+  [STATUS.RESET, 1 << 12], [STATUS.CONNECTED, 1 << 13], [STATUS.SUSPENDED, 1 << 14],
+  [STATUS.RESUME, 1 << 15],
   [STATUS.SETUP, 1 << 16],
 ];
 const BUFFER_DONE = 1 << 4;
@@ -48,7 +51,10 @@ const CRITICAL_FROM = 800 * MICROSECOND;
 const CRITICAL_TO = 998 * MICROSECOND;
 const IDLE_TO_CONNECT = 800 * MICROSECOND;
 
-const HOST = { PLUGS_IN: 1, STOPS: 2, TAKES: 3, SUSPENDS: 4, RESUMES: 5, UNPLUGS: 6, PLUGS_INTO_BUSY: 7 };
+const HOST = {
+  PLUGS_IN: 1, STOPS: 2, TAKES: 3, SUSPENDS: 4, RESUMES: 5, UNPLUGS: 6, PLUGS_INTO_BUSY: 7,
+  HAS_NO_POWER: 8,
+};
 
 export class Usb {
   /** What the host is plugged into, takes and holds; outlives the chip's resets. */
@@ -82,7 +88,8 @@ export class Usb {
 
   resetController() {
     Object.assign(this, {
-      address: 0, main: 0, sie: 0, status: 0, buffers: 0, stallArm: 0, muxing: 0, power: 0, direct: 0, override: 0,
+      address: 0, main: 0, sie: 0, status: 0, buffers: 0, stallArm: 0, muxing: 0, power: 0,
+      direct: 0, override: 0,
       enabled: 0, forced: 0, frame: 0, frameBegan: false, isHung: false, raised: false,
     });
     this.isFramed = false;
@@ -99,7 +106,8 @@ export class Usb {
   /** Calls `work` later, unless the controller is reset before. */
   after(nanos, work) {
     const { generation } = this;
-    this.chip.clock.createAlarm(() => generation === this.generation && work()).schedule(Math.ceil(nanos / CYCLE) * CYCLE);
+    const alarm = this.chip.clock.createAlarm(() => generation === this.generation && work());
+    alarm.schedule(Math.ceil(nanos / CYCLE) * CYCLE);
   }
 
   // --- The registers ---
@@ -131,7 +139,8 @@ export class Usb {
         this.interrupt();
         return this.frame & 0x7ff;
       case REGISTER.SIE: return this.sie;
-      case REGISTER.STATUS: return (this.status & ~STATUS.LINE) | this.line() | (this.power & 8 ? STATUS.VBUS : 0);
+      case REGISTER.STATUS:
+        return (this.status & ~STATUS.LINE) | this.line() | (this.power & 8 ? STATUS.VBUS : 0);
       case REGISTER.BUFFERS: return this.buffers;
       case REGISTER.STALL_ARM: return this.stallArm;
       case REGISTER.MUXING: return this.muxing;
@@ -154,7 +163,8 @@ export class Usb {
       case REGISTER.SIE: {
         const before = this.sie;
         this.sie = apply(before);
-        if (this.sie & ~before & PULLED_UP && this.isPlugged) this.after(MILLISECOND, () => this.enumerate());
+        const isNew = this.sie & ~before & PULLED_UP;
+        if (isNew && this.isPlugged) this.after(MILLISECOND, () => this.enumerate());
         break;
       }
       // Written ones clear.
@@ -204,7 +214,8 @@ export class Usb {
     else if (value & AVAILABLE) {
       const phase = this.now() - this.frameAt;
       if (this.isFramed && phase >= CRITICAL_FROM && phase <= CRITICAL_TO) {
-        console.error(`erratum E15: endpoint ${endpoint} made available ${phase / MICROSECOND} us after the frame began`);
+        const late = phase / MICROSECOND;
+        console.error(`erratum E15: endpoint ${endpoint} available ${late} us into a frame`);
         this.isHung = true;
       }
       this.take();
@@ -213,7 +224,8 @@ export class Usb {
 
   /** Whether the device answers at all. */
   answers() {
-    return !this.isHung && !this.isBusReset && (this.status & STATUS.CONNECTED) !== 0 && this.isPlugged;
+    const isConnected = (this.status & STATUS.CONNECTED) !== 0;
+    return isConnected && this.isPlugged && !this.isHung && !this.isBusReset;
   }
 
   /** The host asks for the next packet of the device's, if it wants one. */
@@ -229,7 +241,8 @@ export class Usb {
     this.after(time, () => {
       this.isTaking = false;
       const word = this.word(endpoint, false);
-      if (!this.answers() || !this.isFramed || !this.isOpen || !this.takes || !(word & AVAILABLE)) return;
+      if (!this.answers() || !this.isFramed || !this.isOpen || !this.takes) return;
+      if (!(word & AVAILABLE)) return;
       const from = this.place(endpoint, false);
       const data = this.chip.usbDPRAM.slice(from, from + (word & LENGTH));
       if (((word & IS_DATA_1) !== 0) === this.inToggle) {
@@ -387,13 +400,16 @@ export class Usb {
     return {
       then: (resolve) => {
         this.after(100 * MICROSECOND, () => {
-          if (!this.answers() || this.address !== this.hostAddress) return this.after(5 * MILLISECOND, () => resolve(null));
+          if (!this.answers() || this.address !== this.hostAddress) {
+            return this.after(5 * MILLISECOND, () => resolve(null));
+          }
           this.chip.usbDPRAM.set(setup);
           this.stallArm &= ~3;
           this.status |= STATUS.SETUP;
           const isIn = (setup[0] & 0x80) !== 0;
           const length = setup[6] | (setup[7] << 8);
-          const transfer = { resolve, isIn, length, data, got: [], toggle: true, isStatus: !isIn && !length };
+          const transfer = { resolve, isIn, length, data, got: [], toggle: true };
+          transfer.isStatus = !isIn && !length;
           this.transfer = transfer;
           this.interrupt();
           this.after(500 * MILLISECOND, () => this.transfer === transfer && this.endTransfer(null));
@@ -462,6 +478,13 @@ export class Usb {
     } else if (what === HOST.UNPLUGS) {
       this.isPlugged = this.isConfigured = false;
       this.suspend();
+    } else if (what === HOST.HAS_NO_POWER) {
+      // It holds both wires low, which the controller takes for a reset that does not end.
+      this.generation++;
+      this.isBusReset = true;
+      this.isConfigured = this.isFramed = false;
+      this.status = (this.status & ~STATUS.CONNECTED) | STATUS.RESET;
+      this.interrupt();
     } else if (what === HOST.SUSPENDS) this.suspend();
     else if (what === HOST.RESUMES) this.resume();
     else {
