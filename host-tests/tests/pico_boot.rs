@@ -1,7 +1,9 @@
 //! How the Raspberry Pi Pico starts: after each kind of reset, after faults, and with a worn flash.
 #![cfg(feature = "emulator")]
 
-use penup_client::emulator::{EmulatedBoard, Machine, MachineEventKind, Pico, image_path};
+use penup_client::emulator::{
+    EmulatedBoard, Machine, MachineEventKind, Pico, PicoByUsb, image_path,
+};
 use penup_host_tests::emulated_jobs::Line;
 use penup_host_tests::whole_jobs::job_lines;
 use std::error::Error;
@@ -120,6 +122,13 @@ fn a_program_that_faults_at_every_start_is_given_up_but_answers() -> TestResult 
     assert_eq!(line.hear()?, "ALARM:101");
     assert_eq!(line.hear()?, "error:9");
     assert_safe(&mut line)?;
+    // So does USB.
+    line.emulator.plug_usb_in()?;
+    let mut usb = Line::silent(Box::new(PicoByUsb(*line.emulator)));
+    assert_eq!(usb.hear()?, "");
+    let message = usb.hear()?;
+    assert!(message.contains("the board was taken twice"), "{message}");
+    let mut line = Line::silent(Box::new(usb.emulator.0));
     line.emulator.send(b"\x18")?;
     assert_fresh(&hear_start(&mut line)?);
     Ok(())

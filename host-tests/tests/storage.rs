@@ -1,5 +1,8 @@
 //! Records in flash whose power goes between any two bytes.
 
+use embedded_storage::nor_flash::{
+    ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
+};
 use penup::storage::{Slots, StorageError};
 use penup_host_tests::cut_flash::{Cut, CutFlash};
 
@@ -93,4 +96,67 @@ fn a_flipped_bit_makes_a_state_invalid() {
         worn.bytes[second + bit / 8] ^= 1 << (bit % 8);
         assert_eq!(latest(&mut worn).as_ref(), Some(&old), "bit {bit}");
     }
+}
+
+/// A flash with a cell that is not erased any more, and which reads back what it has written.
+struct Worn {
+    bytes: Vec<u8>,
+    /// The place of the byte and the bits that stay low.
+    worn: (usize, u8),
+}
+
+#[derive(Debug, PartialEq)]
+struct NotHeld;
+
+impl NorFlashError for NotHeld {
+    fn kind(&self) -> NorFlashErrorKind {
+        NorFlashErrorKind::Other
+    }
+}
+
+impl ErrorType for Worn {
+    type Error = NotHeld;
+}
+
+impl ReadNorFlash for Worn {
+    const READ_SIZE: usize = 1;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), NotHeld> {
+        bytes.copy_from_slice(&self.bytes[offset as usize..][..bytes.len()]);
+        Ok(())
+    }
+
+    fn capacity(&self) -> usize {
+        self.bytes.len()
+    }
+}
+
+impl NorFlash for Worn {
+    const WRITE_SIZE: usize = 256;
+    const ERASE_SIZE: usize = 4096;
+
+    /// The cell wears out between the erasure and the write: the worst instant.
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), NotHeld> {
+        self.bytes[from as usize..to as usize].fill(0xFF);
+        Ok(())
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), NotHeld> {
+        let place = &mut self.bytes[offset as usize..][..bytes.len()];
+        place.copy_from_slice(bytes);
+        let (worn, low) = self.worn;
+        self.bytes[worn] &= !low;
+        if self.bytes[offset as usize..][..bytes.len()] == *bytes { Ok(()) } else { Err(NotHeld) }
+    }
+}
+
+/// The cell lies in the header's page, behind the header: its sum is right, and yet the state is not
+/// kept, for that was said.
+#[test]
+fn a_state_that_is_said_not_to_be_kept_is_not() {
+    let mut flash = Worn { bytes: vec![0xFF; FLASH_BYTES], worn: (SLOTS.start as usize + 200, 1) };
+    let mut writer = SLOTS.write(&mut flash).expect("it is erased");
+    writer.write(b"lost").expect("the page of the payload is sound");
+    assert_eq!(writer.finish(), Err(StorageError::Flash(NotHeld)));
+    assert!(SLOTS.latest(&mut flash).is_none());
 }
