@@ -10,9 +10,6 @@ use penup::drawing::TitleText;
 use penup::protocol::{Command as PlotterCommand, Escape, LINE_LIMIT, Refusal};
 use std::path::PathBuf;
 
-/// The scene that README shows.
-const EXAMPLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/interpen.obj");
-
 /// Draws solids and line drawings with a penup plotter.
 #[derive(Debug, Parser)]
 #[command(name = "penup", version, propagate_version = true)]
@@ -86,8 +83,8 @@ pub struct TapeShowArgs {
 #[derive(Debug, Args)]
 pub struct PlotArgs {
     /// The OBJ file to draw [default: two boxes that pass through each other]
-    #[arg(value_name = "FILE", default_value = EXAMPLE, hide_default_value = true)]
-    pub file: PathBuf,
+    #[arg(value_name = "FILE")]
+    pub file: Option<PathBuf>,
     /// The board to emulate; the picture is drawn from its pins
     #[arg(long, value_enum, default_value = "lm3s6965", help_heading = "Plotter")]
     pub board: Board,

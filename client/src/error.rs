@@ -6,6 +6,7 @@ use crate::source::{JobLine, Origin};
 use crate::words::{asked, explained, told};
 use penup::protocol::Refusal;
 use std::io;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Why there is no drawing.
@@ -111,6 +112,19 @@ pub enum Error {
         /// Why.
         refusal: Refusal,
     },
+    /// The emulator ended in the middle of the work.
+    #[error(
+        "the emulator of the {board} board broke: it {how}\n\
+         Run it once more, and `cargo xtask set-up` if it breaks again{}", kept(details.as_deref())
+    )]
+    EmulatorBroke {
+        /// The board's name.
+        board: String,
+        /// What became of it.
+        how: String,
+        /// The file with what the emulator said last.
+        details: Option<PathBuf>,
+    },
     /// The emulated board or the board in memory could not be started.
     #[error("cannot start the {board} board: {reason}")]
     Board {
@@ -207,6 +221,11 @@ impl Error {
             _ => 1,
         }
     }
+}
+
+fn kept(details: Option<&Path>) -> String {
+    let what = |file: &Path| format!("; what it said last is in {}", file.display());
+    details.map(what).unwrap_or_default()
 }
 
 fn said(text: &str) -> String {

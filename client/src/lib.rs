@@ -27,3 +27,4 @@ pub mod tape;
 pub mod fit;
 pub mod watch;
 pub mod words;
+pub mod workspace;

@@ -6,6 +6,7 @@ use crate::job::JobResult;
 use crate::link::Link;
 use crate::preview::InMemory;
 use crate::watch::{PenRuns, PenWatch};
+use std::fs;
 use std::io;
 use std::time::Duration;
 
@@ -25,6 +26,9 @@ pub trait WatchedPlotter: Link {
     /// # Errors
     /// The emulator ended, or its trace makes no sense.
     fn pen_runs(&mut self) -> Result<PenRuns, Error>;
+
+    /// Turns a broken line into what broke, if it was the emulator.
+    fn explain(&mut self, error: Error) -> Error;
 }
 
 /// The plotter's library on this computer.
@@ -103,7 +107,30 @@ impl Board {
     }
 
     fn error(self, error: &EmulatorError) -> Error {
-        Error::Board { board: self.name().to_owned(), reason: error.to_string() }
+        match error {
+            EmulatorError::Ended { said } => self.broken("ended while it started", said),
+            EmulatorError::NoImage { path } => Error::Board {
+                board: self.name().to_owned(),
+                reason: format!(
+                    "there is no firmware {}: run `cargo xtask build --board {}`",
+                    path.display(),
+                    self.name()
+                ),
+            },
+            error => Error::Board { board: self.name().to_owned(), reason: error.to_string() },
+        }
+    }
+
+    /// The emulator ended; what it `said` last goes into a file, for it is not for the user's eyes.
+    fn broken(self, how: &str, said: &str) -> Error {
+        let file = format!("penup-emulator-{}.log", std::process::id());
+        let file = std::env::temp_dir().join(file);
+        let is_kept = !said.trim().is_empty() && fs::write(&file, said).is_ok();
+        Error::EmulatorBroke {
+            board: self.name().to_owned(),
+            how: how.to_owned(),
+            details: is_kept.then_some(file),
+        }
     }
 }
 
@@ -127,5 +154,14 @@ impl WatchedPlotter for Emulated {
     fn pen_runs(&mut self) -> Result<PenRuns, Error> {
         self.follow_pins().map_err(|error| self.board.error(&error))?;
         Ok(self.pen.runs())
+    }
+
+    fn explain(&mut self, error: Error) -> Error {
+        let how = match (&error, self.emulator.how_it_ended()) {
+            (Error::Link(_), Some(status)) => format!("ended by itself ({status})"),
+            (Error::Link(_), None) => "closed its line".to_owned(),
+            _ => return error,
+        };
+        self.board.broken(&how, &self.emulator.said())
     }
 }

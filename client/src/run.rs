@@ -16,6 +16,7 @@ use crate::progress::{Bar, Progress};
 use crate::sender::{Patience, Sender};
 use crate::source::{Lines, SourceFile};
 use crate::tape;
+use crate::workspace;
 use penup::step::tape::BadCode;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -41,7 +42,10 @@ pub fn run(cli: &Cli, interrupt: &AtomicBool) -> Result<String, Error> {
 
 fn plot(args: &PlotArgs, interrupt: &AtomicBool) -> Result<String, Error> {
     let settings = args.view.settings();
-    let job = Job::new(SourceFile::read(&args.file)?, &settings);
+    // Without a file the scene that README shows.
+    let example = || workspace::root().join("scenes/interpen.obj");
+    let file = args.file.clone().unwrap_or_else(example);
+    let job = Job::new(SourceFile::read(&file)?, &settings);
     let mut bar = Bar::default();
     if let Some(device) = &args.port {
         let mut link = SerialLink::open(device)
@@ -49,14 +53,15 @@ fn plot(args: &PlotArgs, interrupt: &AtomicBool) -> Result<String, Error> {
         let _moving = MovingPlotter::new();
         let report = draw(&mut link, &job, 1, interrupt, &mut bar)?;
         let report = report.map(|report| format!(": {report}")).unwrap_or_default();
-        return Ok(format!("{} is drawn{report}", args.file.display()));
+        return Ok(format!("{} is drawn{report}", file.display()));
     }
     // On Linux the emulator ends with this program; elsewhere it must be ended.
     let booting = (!cfg!(target_os = "linux")).then(MovingPlotter::new);
     let mut board = machines::emulate(args.board)?;
     let moving = MovingPlotter::new();
     drop(booting);
-    let report = draw(board.as_mut(), &job, 1, interrupt, &mut bar)?;
+    let drawn = draw(board.as_mut(), &job, 1, interrupt, &mut bar);
+    let report = drawn.map_err(|error| board.explain(error))?;
     let pen = board.pen_runs()?;
     drop(board);
     drop(moving);

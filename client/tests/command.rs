@@ -321,3 +321,75 @@ fn an_output_that_is_closed_is_no_error_and_a_full_one_is() {
     assert!(said.starts_with("penup: cannot write the standard output: "), "{said}");
     assert_eq!(shell("penup preview none.obj 2> /dev/full").0, Some(1));
 }
+
+/// A copy of a checkout: what tells one from other folders, and the program in its target directory.
+#[test]
+fn a_moved_checkout_is_used_where_it_is() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let target = folder.path().join("target/debug");
+    fs::create_dir_all(&target).expect("a folder");
+    let root = penup_client::workspace::root();
+    for file in ["Cargo.toml", "scenes/interpen.obj", "client/Cargo.toml"] {
+        let copy = folder.path().join(file);
+        fs::create_dir_all(copy.parent().expect("a folder")).expect("a folder");
+        fs::copy(root.join(file), copy).expect("copied");
+    }
+    let program = target.join("penup");
+    fs::copy(env!("CARGO_BIN_EXE_penup"), &program).expect("copied");
+    let output = Command::new(program)
+        .arg("plot")
+        .env_remove("CARGO_MANIFEST_DIR")
+        .current_dir(folder.path())
+        .output()
+        .expect("the program runs");
+    let said = String::from_utf8(output.stderr).expect("text");
+    let image = folder.path().join("target/firmware/lm3s6965.elf").display().to_string();
+    assert!(said.contains(&image), "{said}");
+    assert!(said.contains("run `cargo xtask build --board lm3s6965`"), "{said}");
+}
+
+/// A checkout whose emulators are broken programs.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_broken_emulator_is_told_in_a_sentence() {
+    use std::os::unix::fs::PermissionsExt as _;
+    let folder = tempfile::tempdir().expect("a folder");
+    let root = penup_client::workspace::root();
+    for file in ["Cargo.toml", "scenes/interpen.obj", "client/Cargo.toml"] {
+        let copy = folder.path().join(file);
+        fs::create_dir_all(copy.parent().expect("a folder")).expect("a folder");
+        fs::copy(root.join(file), copy).expect("copied");
+    }
+    // Any ELF file serves as an image.
+    let firmware = folder.path().join("target/firmware");
+    fs::create_dir_all(&firmware).expect("a folder");
+    fs::copy("/bin/true", firmware.join("lm3s6965.elf")).expect("copied");
+    let programs = folder.path().join("bin");
+    fs::create_dir(&programs).expect("a folder");
+    let plot = || {
+        let output = Command::new(env!("CARGO_BIN_EXE_penup"))
+            .arg("plot")
+            .env("CARGO_MANIFEST_DIR", folder.path())
+            .env("PATH", &programs)
+            .env("TMPDIR", folder.path())
+            .current_dir(folder.path())
+            .output()
+            .expect("the program runs");
+        assert_eq!(output.status.code(), Some(1));
+        String::from_utf8(output.stderr).expect("text")
+    };
+    let said = plot();
+    assert!(said.contains("cannot run qemu-system-arm"), "{said}");
+    assert!(said.contains("cargo xtask set-up"), "{said}");
+    let qemu = programs.join("qemu-system-arm");
+    let script = "#!/bin/sh\necho 'Error: at Object.<anonymous> (file:1)' >&2\nexit 3\n";
+    fs::write(&qemu, script).expect("written");
+    fs::set_permissions(&qemu, fs::Permissions::from_mode(0o755)).expect("set");
+    let said = plot();
+    assert!(said.starts_with("penup: the emulator of the lm3s6965 board broke: "), "{said}");
+    assert!(said.contains("cargo xtask set-up") && said.lines().count() == 2, "{said}");
+    assert!(!said.contains("Object.<anonymous>"), "{said}");
+    let details = said.trim().rsplit(' ').next().expect("a file");
+    let details = fs::read_to_string(details).expect("kept");
+    assert!(details.contains("Object.<anonymous>"), "{details}");
+}

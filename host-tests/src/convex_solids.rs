@@ -233,7 +233,8 @@ pub fn any_eye(dice: &mut Dice, points: &[Point]) -> Eye {
 
 /// Vertices and faces (corners from 0) of a scene with whole coordinates.
 pub fn read_scene(name: &str) -> (Vec<Point>, Vec<Vec<u16>>) {
-    let path = format!("{}/../scenes/{name}.obj", env!("CARGO_MANIFEST_DIR"));
+    let path =
+        penup_client::workspace::root().join(format!("scenes/{name}.obj")).display().to_string();
     let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path}: {error}"));
     let numbers = |line: &str| -> Vec<i32> {
         let parse =

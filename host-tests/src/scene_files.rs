@@ -54,7 +54,10 @@ impl Model {
     /// # Errors
     /// The file cannot be read.
     pub fn example(name: &str) -> std::io::Result<Self> {
-        let path = format!("{}/../scenes/{name}.obj", env!("CARGO_MANIFEST_DIR"));
+        let path = penup_client::workspace::root()
+            .join(format!("scenes/{name}.obj"))
+            .display()
+            .to_string();
         Ok(Self::from_obj(&std::fs::read_to_string(path)?))
     }
 
@@ -142,7 +145,8 @@ impl View {
     /// # Errors
     /// The file cannot be read.
     pub fn example(name: &str, model: &Model) -> std::io::Result<Self> {
-        let path = format!("{}/../scenes/cameras.json", env!("CARGO_MANIFEST_DIR"));
+        let path =
+            penup_client::workspace::root().join("scenes/cameras.json").display().to_string();
         let text = std::fs::read_to_string(path)?;
         let entry = &text[text.find(&format!("\"{name}\"")).unwrap_or(0)..];
         let vector = |key: &str| -> Vector {

@@ -74,7 +74,7 @@ pub fn machine_events(changes: &[Stamped]) -> Vec<MachineEventKind> {
 
 /// The lines of a job: a file of `scenes/`, its camera, and what else is to be set.
 pub fn job_lines(scene: &str, settings: &[&str]) -> Vec<String> {
-    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes").join(scene);
+    let path = penup_client::workspace::root().join("scenes").join(scene);
     let text = std::fs::read_to_string(&path).expect("a scene of the project");
     let model = text.lines().filter(|line| !line.starts_with('#')).map(str::to_owned);
     let settings = settings.iter().map(|line| (*line).to_owned());

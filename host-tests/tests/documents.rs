@@ -9,7 +9,7 @@ use penup::machine::SETTINGS;
 use penup::protocol::{HELP, MEANINGS};
 use pulldown_cmark::{Event, Options, Parser, Tag, TagEnd};
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// A table of a document: its heading, then its rows, each a list of cells in plain text.
 type Table = Vec<Vec<String>>;
@@ -62,7 +62,7 @@ fn protocol() -> String {
 }
 
 fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the workspace").to_owned()
+    penup_client::workspace::root()
 }
 
 /// Compares a table of `docs/protocol.md`, found by its heading, with the rows that it is to have.

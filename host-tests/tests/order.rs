@@ -35,7 +35,8 @@ fn orders_everything(sheet: &Sheet) -> Result<(), OrderError> {
 }
 
 fn scene(name: &str) -> Sheet {
-    let path = format!("{}/../scenes/{name}.obj", env!("CARGO_MANIFEST_DIR"));
+    let path =
+        penup_client::workspace::root().join(format!("scenes/{name}.obj")).display().to_string();
     Sheet::from_obj(&std::fs::read_to_string(path).expect("a scene"))
 }
 

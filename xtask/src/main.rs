@@ -13,8 +13,11 @@ mod set_up;
 mod side_by_side;
 mod test;
 mod uf2;
+// The client's: xtask builds the client, and does not wait for it.
+#[path = "../../client/src/workspace.rs"]
+mod workspace;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Command, ExitCode};
 
 use anyhow::{Context, Result};
@@ -172,6 +175,5 @@ fn client(command: &str, arguments: &[String]) -> Command {
 
 /// The workspace's root.
 fn root() -> PathBuf {
-    let xtask = Path::new(env!("CARGO_MANIFEST_DIR"));
-    xtask.parent().unwrap_or(xtask).to_owned()
+    workspace::root()
 }

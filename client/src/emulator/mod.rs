@@ -25,6 +25,7 @@ mod trace;
 use std::io::{self, Read, Write};
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
+use std::process::ExitStatus;
 use std::time::Duration;
 
 pub use pico::{Pico, PicoByUsb};
@@ -56,6 +57,16 @@ pub enum EmulatorError {
         program: &'static str,
         /// What the system says.
         source: io::Error,
+    },
+    /// The emulator is another version than the harness is written for.
+    #[error("there is {program} {found}, and {needed} is needed: run `cargo xtask set-up`")]
+    WrongVersion {
+        /// Its name.
+        program: &'static str,
+        /// The version that is there.
+        found: String,
+        /// The version that is needed.
+        needed: String,
     },
     /// The emulator ended, or does not answer.
     #[error("the emulator ended: {said}")]
@@ -99,9 +110,7 @@ impl Options {
 
 /// The image that `cargo xtask build --board BOARD` leaves.
 pub fn image_path(board: &str) -> PathBuf {
-    let client = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let root = client.parent().unwrap_or(client);
-    root.join("target/firmware").join(format!("{board}.elf"))
+    crate::workspace::root().join("target/firmware").join(format!("{board}.elf"))
 }
 
 /// A running board.
@@ -137,6 +146,9 @@ pub trait EmulatedBoard: std::fmt::Debug {
 
     /// The lines that the emulator itself printed, the last of them.
     fn said(&self) -> String;
+
+    /// How the emulator ended, if it has ended by itself or was killed.
+    fn how_it_ended(&mut self) -> Option<ExitStatus>;
 }
 
 /// A running LM3S6965. Its clock stands still while the board sleeps without a task.
@@ -213,6 +225,10 @@ impl EmulatedBoard for Emulator {
 
     fn said(&self) -> String {
         self.process.said()
+    }
+
+    fn how_it_ended(&mut self) -> Option<ExitStatus> {
+        self.process.how_it_ended()
     }
 }
 

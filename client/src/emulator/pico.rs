@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::io::{self, BufRead, BufReader, PipeWriter, Read, Write};
 use std::path::Path;
-use std::process::{Child, ChildStderr, ChildStdin, ChildStdout, Command, Stdio};
+use std::process::{Child, ChildStderr, ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
 use std::sync::{Arc, mpsc};
 use std::time::Duration;
 use std::{fmt, fs, thread};
@@ -79,6 +79,7 @@ impl Pico {
         if !flashed.exists() {
             return Err(EmulatorError::NoImage { path: flashed });
         }
+        check_version(&crate::workspace::root())?;
         let table = log::table(&elf)?;
         let command = command(&flashed, log_address(&elf)?);
         let shared = Arc::<Shared<State>>::default();
@@ -406,6 +407,10 @@ impl EmulatedBoard for PicoByUsb {
     fn said(&self) -> String {
         self.0.said()
     }
+
+    fn how_it_ended(&mut self) -> Option<ExitStatus> {
+        self.0.how_it_ended()
+    }
 }
 
 impl EmulatedBoard for Pico {
@@ -431,6 +436,10 @@ impl EmulatedBoard for Pico {
 
     fn said(&self) -> String {
         Vec::from(self.shared.lock().said.clone()).join("\n")
+    }
+
+    fn how_it_ended(&mut self) -> Option<ExitStatus> {
+        self.running.how_it_ended()
     }
 }
 
@@ -469,13 +478,30 @@ fn script() -> String {
     script
 }
 
+/// Whether rp2040js is there, in the version that the harness is written for.
+fn check_version(root: &Path) -> Result<(), EmulatorError> {
+    const PROGRAM: &str = "rp2040js";
+    let read = |text: &str, pointer: &str| {
+        let value: serde_json::Value = serde_json::from_str(text).ok()?;
+        value.pointer(pointer)?.as_str().map(str::to_owned)
+    };
+    let text = fs::read_to_string(root.join(RP2040JS).join("package.json"))
+        .map_err(|source| EmulatorError::NotInstalled { program: PROGRAM, source })?;
+    let found = read(&text, "/version").unwrap_or_else(|| "of no version".to_owned());
+    let needed = read(include_str!("rp2040js/package.json"), "/dependencies/rp2040js");
+    match needed {
+        Some(needed) if needed != found => {
+            Err(EmulatorError::WrongVersion { program: PROGRAM, found, needed })
+        }
+        _ => Ok(()),
+    }
+}
+
 /// The command line of the emulator.
 fn command(image: &Path, log_address: u64) -> Command {
-    let client = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let root = client.parent().unwrap_or(client);
     let mut command = quitting_with_parent(PROGRAM);
     command.args(["--input-type=module", "--eval", &script(), "--"]);
-    command.arg(root.join(RP2040JS)).arg(image).arg(log_address.to_string());
+    command.arg(crate::workspace::root().join(RP2040JS)).arg(image).arg(log_address.to_string());
     command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     // Ctrl-C at the terminal is for this process, which ends the emulator when it is done with it.
     #[cfg(unix)]

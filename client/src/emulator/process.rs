@@ -3,7 +3,7 @@
 use std::io::{self, BufRead, BufReader, Read};
 use std::net::{TcpListener, TcpStream};
 use std::path::Path;
-use std::process::{Child, ChildStderr, ChildStdout, Command, Stdio};
+use std::process::{Child, ChildStderr, ChildStdout, Command, ExitStatus, Stdio};
 use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
 use std::{fs, thread};
@@ -135,6 +135,10 @@ impl Process {
 
     pub fn said(&self) -> String {
         self.shared.lock().trace.said()
+    }
+
+    pub fn how_it_ended(&mut self) -> Option<ExitStatus> {
+        self.running.how_it_ended()
     }
 
     pub fn id(&self) -> u32 {

@@ -1,8 +1,8 @@
 //! A process that runs, and what the threads that read from it tell.
 
-use std::process::Child;
+use std::process::{Child, ExitStatus};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
-use std::thread::JoinHandle;
+use std::thread::{self, JoinHandle};
 use std::time::Duration;
 use std::{fmt, io};
 
@@ -66,6 +66,18 @@ impl Running {
             return Err(EmulatorError::NotInstalled { program, source });
         }
         Ok(ended.is_some())
+    }
+
+    /// How it has ended by itself; `None` if it still runs.
+    pub fn how_it_ended(&mut self) -> Option<ExitStatus> {
+        // Its lines close a little before it has ended.
+        for _ in 0..100 {
+            if let Ok(Some(status)) = self.child.try_wait() {
+                return Some(status);
+            }
+            thread::sleep(Duration::from_millis(5));
+        }
+        None
     }
 
     /// Ends it; all that it has said is in then.
