@@ -13,6 +13,7 @@
 #[cfg(any(test, feature = "host"))]
 extern crate std;
 
+pub mod checksum;
 pub mod fixed;
 pub mod stage;
 

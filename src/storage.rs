@@ -11,7 +11,8 @@
 //! A slot begins with a page for the header, four words in little-endian order: a mark, a sequence
 //! number, the length of the payload in bytes, and the sum, CRC-32 of these three and the payload.
 
-use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
+use crate::checksum::CRC_32;
+use crc::{Digest, Table};
 use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
 
 /// What flash writes at once.
@@ -19,8 +20,6 @@ pub const PAGE_BYTES: usize = 256;
 
 const MARK: u32 = u32::from_le_bytes(*b"pen1");
 const HEADER_BYTES: usize = 16;
-
-static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 
 /// Why a state was not kept; the one before still is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -119,7 +118,7 @@ impl Slots {
             length: 0,
             erased: F::ERASE_SIZE as u32,
             page: [0xFF; PAGE_BYTES],
-            digest: CRC.digest(),
+            digest: CRC_32.digest(),
         })
     }
 
@@ -148,7 +147,7 @@ impl Slots {
         }
         let at = self.begin(slot) + PAGE_BYTES as u32;
         let mut payload = Reader { flash, at, left: length };
-        let mut digest = CRC.digest();
+        let mut digest = CRC_32.digest();
         let mut piece = [0; 64];
         loop {
             match payload.read(&mut piece) {

@@ -188,9 +188,39 @@ pub enum Error {
     },
     /// It started again in the middle of the job.
     #[error(
-        "the plotter started again in the middle of the job: is its power supply strong enough?"
+        "the plotter gave up in the middle of the job and started again\nEither it was sent ctrl-X, at another \
+         port or by a byte that was damaged on the line, or it was reset: check the cable and the power supply"
     )]
     Restarted,
+    /// The line damages so many bytes that a line of the job never arrives.
+    #[error(
+        "the line to the plotter damages too many bytes: {times} times a line did not arrive whole{}\nUse a \
+         shorter or better cable, and keep it away from the motors", waiting_for(line.as_deref())
+    )]
+    Damaged {
+        /// The line.
+        line: Option<Box<JobLine>>,
+        /// How often it was sent.
+        times: u32,
+    },
+    /// It answers, but not to lines with numbers and checksums.
+    #[error(
+        "the plotter's firmware is older than this program: it does not know lines with checksums\nWrite the \
+         firmware of this version to the board first: see docs/building.md"
+    )]
+    WithoutNumbers,
+    /// After everything was sent the plotter holds another model, or other options.
+    #[error(
+        "the plotter holds something else than was sent to it, so nothing is drawn\nDoes another program send to \
+         it at the same time, or is its firmware of another version than this program?"
+    )]
+    OtherContents,
+    /// The machine holds, and nobody lets it go on.
+    #[error(
+        "the machine holds in the middle of the drawing, with the pen up: somebody pressed hold at another port, or a \
+         byte was damaged on the line\nSend ~ to the plotter to let it go on, or ctrl-X to give the drawing up"
+    )]
+    Held,
     /// The link broke.
     #[error("the line to the plotter broke: {0}")]
     Link(#[from] io::Error),

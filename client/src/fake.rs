@@ -1,13 +1,19 @@
-//! A plotter made of plain memory, for tests: it answers like the protocol and misbehaves on demand.
+//! A plotter made of plain memory, for tests: it answers like the protocol and misbehaves on
+//! demand.
 //!
-//! It is stricter than a real one: its queue of 256 bytes overflows for good, it takes one line for
-//! each byte-read of the client, and it reports bytes that act at once inside a line.
+//! It is stricter than a real one: its queue of 256 bytes overflows for good, it takes one line
+//! for each byte-read of the client, and it reports bytes that act at once inside a line. Time
+//! passes only while the client waits for bytes.
 
-use crate::link::Link;
-use crate::protocol::{ABORT, PLOT};
+use crate::link::{Answer, Link};
+use crate::protocol::{ABORT, CLEAR, END, MODEL, PLOT};
+use crate::source::JobLine;
+use crate::twin;
+use penup::checksum::CRC_16;
+use penup::protocol::{Label, Named, Numbering, Received, Refusal};
 use std::collections::VecDeque;
 use std::io;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// What a fake plotter does wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -21,10 +27,20 @@ pub enum Fault {
     SilentAfter(usize),
     /// Answers line N, from 1, with this error number.
     ErrorAt(usize, u16),
-    /// Never answers line N, from 1, but is alive.
+    /// Loses line N, from 1, when it comes first.
     LosesLine(usize),
-    /// Starts again instead of answering line N, from 1.
+    /// Loses line N, from 1, whenever it comes.
+    NeverTakesLine(usize),
+    /// Loses its power, and has it again, instead of taking line N, from 1.
     RestartsAt(usize),
+    /// Is told to give up instead of taking line N, from 1, when it comes first.
+    AbortedAt(usize),
+    /// Does not know numbered lines.
+    WithoutNumbers,
+    /// Holds another model than it was sent.
+    HoldsOther,
+    /// Says that it holds another model, the first time that it is asked.
+    SaysOther,
     /// Is another firmware.
     NotPenup,
     /// Sends bytes that are no lines.
@@ -42,7 +58,7 @@ pub enum Fault {
 pub struct FakePlotter {
     /// What it does wrong.
     pub fault: Fault,
-    /// Each line that it took, in order.
+    /// Each line of a job that it took, in order, since it was last cleared.
     pub lines: Vec<String>,
     /// Whether more was sent than its queue holds.
     pub overflowed: bool,
@@ -56,9 +72,18 @@ pub struct FakePlotter {
     pub pen_before: Option<(u64, u8)>,
     /// Each pen that it was asked to change to.
     pub pens_asked: Vec<u8>,
+    /// Before which stroke, from 0, somebody presses hold.
+    pub hold_before: Option<u64>,
+    /// What its user says when asked whether the machine shall go on, one after the other; then
+    /// nobody is there.
+    pub user: VecDeque<Answer>,
     queue: Vec<u8>,
     output: VecDeque<u8>,
     drawn: Option<u64>,
+    numbering: Numbering,
+    clock: Duration,
+    began: Option<Instant>,
+    is_fault_over: bool,
 }
 
 impl FakePlotter {
@@ -66,7 +91,7 @@ impl FakePlotter {
 
     /// A plotter with `fault` that draws three strokes.
     pub fn new(fault: Fault) -> Self {
-        Self { fault, strokes: 3, ..Self::default() }
+        Self { fault, strokes: 3, began: Some(Instant::now()), ..Self::default() }
     }
 
     fn say(&mut self, line: &str) {
@@ -93,6 +118,9 @@ impl FakePlotter {
             return self
                 .say(&format!("<Hold:0|MPos:{place}.000,2.000|Pen:{pen}|Strokes:{drawn}/9>"));
         }
+        if self.hold_before == Some(drawn) {
+            return self.say(&format!("<Hold:0|MPos:3.000,2.000|Strokes:{drawn}/9>"));
+        }
         self.say(&format!("<Run|MPos:1.000,2.000|Strokes:{drawn}/{}>", self.strokes));
         if let Fault::AlarmWhileDrawing(number) = self.fault {
             self.say(&format!("ALARM:{number}"));
@@ -104,6 +132,7 @@ impl FakePlotter {
         self.aborts += 1;
         self.queue.clear();
         self.drawn = None;
+        self.numbering = Numbering::default();
         match self.fault {
             Fault::NotPenup => self.say("Grbl 1.1h ['$' for help]"),
             Fault::IgnoresAbort if self.aborts > 1 => {}
@@ -112,22 +141,84 @@ impl FakePlotter {
     }
 
     fn take_line(&mut self, line: &str) {
-        self.lines.push(line.to_owned());
-        let number = self.lines.len();
+        if matches!(self.fault, Fault::WithoutNumbers | Fault::NotPenup) {
+            return self.say(if line.is_empty() { "ok" } else { "error:1" });
+        }
+        let coming = self.lines.len() + 1;
+        let is_other = |word| line.contains(word);
+        let is_of_job = line.starts_with('N') && !["M110", MODEL, CLEAR].into_iter().any(is_other);
         match self.fault {
-            Fault::ErrorAt(bad, error) if bad == number => {
-                self.say("[MSG:what it thinks of it]");
-                self.say(&format!("error:{error}"));
+            Fault::NeverTakesLine(lost) if is_of_job && lost == coming => return,
+            Fault::LosesLine(lost) if is_of_job && lost == coming && !self.is_fault_over => {
+                self.is_fault_over = true;
                 return;
             }
-            Fault::LosesLine(lost) if lost == number => return,
-            Fault::RestartsAt(bad) if bad == number => return self.abort(),
+            Fault::AbortedAt(bad) if is_of_job && bad == coming && !self.is_fault_over => {
+                self.is_fault_over = true;
+                return self.abort();
+            }
+            Fault::RestartsAt(bad) if is_of_job && bad == coming => {
+                self.lines.clear();
+                return self.abort();
+            }
             _ => {}
         }
-        if line == PLOT {
-            self.drawn = Some(0);
+        match self.numbering.receive(Ok(line)) {
+            Received::Line(MODEL, label) => {
+                self.report_contents();
+                self.reply(Ok(()), label);
+            }
+            Received::Line(CLEAR, label) => {
+                self.lines.clear();
+                self.reply(Ok(()), label);
+            }
+            Received::Line("" | END, label) => self.reply(Ok(()), label),
+            Received::Line(text, label) => {
+                self.lines.push(text.to_owned());
+                let outcome = match self.fault {
+                    Fault::ErrorAt(bad, error) if bad == coming => {
+                        self.say("[MSG:what it thinks of it]");
+                        Err(Refusal::RefusedBefore(error))
+                    }
+                    _ => Ok(()),
+                };
+                if text == PLOT {
+                    self.drawn = Some(0);
+                }
+                self.numbering.note(label, outcome);
+                self.reply(outcome, label);
+            }
+            Received::Answer(outcome, label) => self.reply(outcome, label),
         }
-        self.say("ok");
+    }
+
+    fn report_contents(&mut self) {
+        let is_first = !std::mem::replace(&mut self.is_fault_over, true);
+        let lines: Vec<JobLine> = self.lines.iter().map(JobLine::command).collect();
+        let [mut model, options] = twin::contents(&lines, lines.len()).unwrap_or_default();
+        let is_other = match self.fault {
+            Fault::HoldsOther => true,
+            Fault::SaysOther => is_first,
+            _ => false,
+        };
+        model ^= u32::from(is_other);
+        self.say(&format!("[MODEL:checksum {model:08X}, options {options:08X}]"));
+    }
+
+    /// The reply to a line with a CRC.
+    fn reply(&mut self, outcome: Result<(), Refusal>, label: Label) {
+        let last = match outcome {
+            Ok(()) => "ok".to_owned(),
+            Err(refusal) => format!("error:{}", refusal.number()),
+        };
+        let checked = |text: String| format!("{text}*{:04X}", CRC_16.checksum(text.as_bytes()));
+        match label.named {
+            Named::Line(number) => return self.say(&checked(format!("{last} N{number}"))),
+            Named::Last(number) => self.say(&checked(format!("Line: {number}"))),
+            Named::Expected(number) => self.say(&checked(format!("Resend: {number}"))),
+            Named::Nothing => {}
+        }
+        self.say(&last);
     }
 
     fn work(&mut self) {
@@ -145,7 +236,7 @@ impl Link for FakePlotter {
                 b'?' if self.fault == Fault::Noise => self.output.extend(b"\xFE\x00\x81"),
                 b'?' => self.report(),
                 ABORT => self.abort(),
-                b'~' => self.pen_before = None,
+                b'~' => (self.pen_before, self.hold_before) = (None, None),
                 _ if self.queue.len() < Self::QUEUE => self.queue.push(byte),
                 _ => self.overflowed = true,
             }
@@ -160,7 +251,7 @@ impl Link for FakePlotter {
             self.work();
         }
         if self.output.is_empty() {
-            std::thread::sleep(patience);
+            self.clock += patience;
         }
         let count = buffer.len().min(self.output.len());
         for (slot, byte) in buffer.iter_mut().zip(self.output.drain(..count)) {
@@ -173,5 +264,13 @@ impl Link for FakePlotter {
     fn change_pen(&mut self, pen: u8) -> io::Result<bool> {
         self.pens_asked.push(pen);
         Ok(self.pens_asked.len() == 2)
+    }
+
+    fn ask_to_resume(&mut self, _first: bool) -> io::Result<Answer> {
+        Ok(self.user.pop_front().unwrap_or(Answer::Nobody))
+    }
+
+    fn now(&self) -> Instant {
+        self.began.unwrap_or_else(Instant::now) + self.clock
     }
 }

@@ -23,6 +23,7 @@ pub mod run;
 pub mod sender;
 pub mod source;
 pub mod tape;
+pub mod twin;
 
 pub mod fit;
 pub mod watch;

@@ -4,8 +4,19 @@
 //! emulated board, the library in memory and the tests' fake all take the same road.
 
 use std::io;
-use std::sync::mpsc::{self, Receiver};
-use std::time::Duration;
+use std::sync::mpsc::{self, Receiver, TryRecvError};
+use std::time::{Duration, Instant};
+
+/// What the user says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Answer {
+    /// Yes.
+    Yes,
+    /// Nothing yet.
+    NotYet,
+    /// Nobody is there who could be asked.
+    Nobody,
+}
 
 /// A line to a plotter: bytes in, bytes out.
 pub trait Link {
@@ -26,6 +37,21 @@ pub trait Link {
     /// # Errors
     /// What the port says.
     fn change_pen(&mut self, pen: u8) -> io::Result<bool>;
+
+    /// The machine holds in the middle of a drawing: tells the user, the `first` time, and asks
+    /// whether it shall go on.
+    ///
+    /// # Errors
+    /// What the port says.
+    fn ask_to_resume(&mut self, first: bool) -> io::Result<Answer> {
+        let _ = first;
+        Ok(Answer::Nobody)
+    }
+
+    /// The time, by which the sender waits.
+    fn now(&self) -> Instant {
+        Instant::now()
+    }
 }
 
 /// A plotter at a serial port, 115200 baud, 8 data bits, no parity, 1 stop bit.
@@ -80,17 +106,36 @@ impl Link for SerialLink {
 
     /// Asks the user; the pen is in when a line is typed.
     fn change_pen(&mut self, pen: u8) -> io::Result<bool> {
-        let typed = self.typed.get_or_insert_with(typed_lines);
-        if self.pen_asked != Some(pen) {
-            // What was typed before is no answer.
-            while typed.try_recv().is_ok() {}
-            self.pen_asked = Some(pen);
-            eprintln!("Put in pen {pen}, then press Enter");
-        }
-        let is_in = typed.try_recv().is_ok();
-        if is_in {
+        let first = self.pen_asked.replace(pen) != Some(pen);
+        let answer = self.ask(first, &format!("Put in pen {pen}, then press Enter"));
+        if answer == Answer::Yes {
             self.pen_asked = None;
         }
-        Ok(is_in)
+        Ok(answer == Answer::Yes)
+    }
+
+    fn ask_to_resume(&mut self, first: bool) -> io::Result<Answer> {
+        Ok(self.ask(
+            first,
+            "The machine holds: somebody pressed hold at another port, or a byte was damaged on \
+             the line.\nPress Enter to let it go on, or Ctrl-C to give the plot up",
+        ))
+    }
+}
+
+impl SerialLink {
+    /// Whether the user has typed a line since the question was asked `first`.
+    fn ask(&mut self, first: bool, question: &str) -> Answer {
+        let typed = self.typed.get_or_insert_with(typed_lines);
+        if first {
+            // What was typed before is no answer.
+            while typed.try_recv().is_ok() {}
+            eprintln!("{question}");
+        }
+        match typed.try_recv() {
+            Ok(()) => Answer::Yes,
+            Err(TryRecvError::Empty) => Answer::NotYet,
+            Err(TryRecvError::Disconnected) => Answer::Nobody,
+        }
     }
 }

@@ -68,7 +68,9 @@ impl Default for InMemory {
 
 impl Link for InMemory {
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
-        if bytes.starts_with(PLOT.as_bytes()) {
+        // The command stands between the line's number and its checksum.
+        let plots = |part: &[u8]| part.starts_with(PLOT.as_bytes());
+        if bytes.split(|byte| *byte == b' ').any(plots) {
             self.steps = 0;
             let step = 1.0 / self.steps_per_mm()[0];
             self.pen.get_or_insert_with(|| PenWatch::new(step)).begin_again();

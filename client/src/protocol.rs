@@ -3,12 +3,14 @@
 //! Everything that the client knows by name of the plotter's language stands here.
 //! `docs/protocol.md` describes the language itself.
 
+use penup::checksum::CRC_16;
 use penup::protocol::MEANINGS;
 use std::fmt::Write as _;
 
 /// Forget the model.
 pub const CLEAR: &str = "$clear";
-/// Tell what the model and the last job are.
+/// Tell how large the model is, the checksums of the model and of the options, and what came of the
+/// last job.
 pub const MODEL: &str = "$model";
 /// Draw the model with the present settings.
 pub const PLOT: &str = "$plot";
@@ -60,6 +62,26 @@ pub const TITLE_SIZE: &str = "$title-size";
 /// `on`: scale to the page; `off`: scale solids only and leave plans at true size.
 pub const FIT: &str = "$fit";
 
+/// With a number: sets the number of the last line. Without: asks for it.
+pub const LAST_NUMBER: &str = "M110";
+/// Ends the obligation to send numbers and checksums.
+pub const END: &str = "M2";
+
+/// A line with its number and its checksum, without the line end.
+///
+/// ```
+/// use penup_client::protocol::numbered;
+/// assert_eq!(numbered(Some(17), "v 0 1 0"), "N17 v 0 1 0*D673");
+/// assert_eq!(numbered(None, "M110"), "M110*21B8");
+/// ```
+pub fn numbered(number: Option<i32>, text: &str) -> String {
+    let head = match number {
+        Some(number) => format!("N{number} {text}"),
+        None => text.to_owned(),
+    };
+    format!("{head}*{:04X}", CRC_16.checksum(head.as_bytes()))
+}
+
 /// Asks for a status report; answered at once, between two lines.
 pub const STATUS_QUERY: u8 = b'?';
 /// Go on.
@@ -95,9 +117,20 @@ pub fn meaning(number: u16) -> &'static str {
 /// One line from the plotter.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Reply {
-    /// The oldest line not yet answered was taken.
+    /// The line with this number was carried out, and so were all before it that are not named as
+    /// refused.
+    Done(i32),
+    /// The line with this number was refused with this error.
+    Refused(i32, u16),
+    /// This line is expected; the one that is answered was not accepted.
+    Resend(i32),
+    /// The last line that was accepted.
+    Last(i32),
+    /// The checksums of the model and of the options.
+    Contents([u32; 2]),
+    /// A line without a number was carried out.
     Ok,
-    /// The oldest line not yet answered was refused.
+    /// A line without a number was refused.
     Error(u16),
     /// The machine stopped by itself.
     Alarm(u16),
@@ -118,6 +151,10 @@ pub struct Status {
     pub state: String,
     /// `Strokes:done/all`, while a drawing is drawn.
     pub strokes: Option<(u64, u64)>,
+    /// Whether it computes a picture, and so reads no line.
+    pub is_computing: bool,
+    /// `Alarm:number`, after an alarm.
+    pub alarm: Option<u16>,
     /// `Pen:number`, if it stands and waits for that pen.
     pub pen_wanted: Option<u8>,
     /// Where it is, in its own words.
@@ -125,6 +162,11 @@ pub struct Status {
 }
 
 impl Status {
+    /// Whether the machine holds, or slows down to do so.
+    pub fn is_holding(&self) -> bool {
+        self.state == "Hold"
+    }
+
     /// Whether the plotter waits for work.
     pub fn is_idle(&self) -> bool {
         matches!(self.state.as_str(), "Idle" | "Sleep" | "Check")
@@ -146,7 +188,9 @@ impl Reply {
         let enclosed = |open, close: char| -> Option<&str> {
             line.strip_prefix::<&str>(open)?.strip_suffix(close)
         };
-        if line == "ok" {
+        if let Some(reply) = parse_checked(line) {
+            reply
+        } else if line == "ok" {
             Self::Ok
         } else if let Some(number) = numbered("error:") {
             Self::Error(number)
@@ -156,29 +200,59 @@ impl Reply {
             Self::Greeting(line.to_owned())
         } else if let Some(text) = enclosed("[MSG:", ']') {
             Self::Message(text.to_owned())
-        } else if let Some(report) = enclosed("<", '>') {
-            Self::Status(parse_status(report))
+        } else if let Some(contents) = enclosed("[MODEL:checksum ", ']').and_then(parse_contents) {
+            Self::Contents(contents)
+        } else if let Some(status) = enclosed("<", '>').and_then(parse_status) {
+            Self::Status(status)
         } else {
             Self::Other(line.to_owned())
         }
     }
 }
 
-fn parse_status(report: &str) -> Status {
+/// A reply with a checksum, if it is whole.
+fn parse_checked(line: &str) -> Option<Reply> {
+    let (head, sum) = line.rsplit_once('*')?;
+    if sum.len() != 4 || u16::from_str_radix(sum, 16) != Ok(CRC_16.checksum(head.as_bytes())) {
+        return None;
+    }
+    let number = |prefix| head.strip_prefix(prefix).and_then(|number: &str| number.parse().ok());
+    let done = number("ok N").map(Reply::Done);
+    let other = done.or_else(|| number("Resend: ").map(Reply::Resend));
+    other.or_else(|| number("Line: ").map(Reply::Last)).or_else(|| {
+        let (error, number) = head.strip_prefix("error:")?.split_once(" N")?;
+        Some(Reply::Refused(number.parse().ok()?, error.parse().ok()?))
+    })
+}
+
+/// `12345678, options 12345678`
+fn parse_contents(text: &str) -> Option<[u32; 2]> {
+    let (model, options) = text.split_once(", options ")?;
+    let sum = |text: &str| (text.len() == 8).then(|| u32::from_str_radix(text, 16).ok())?;
+    Some([sum(model)?, sum(options)?])
+}
+
+/// The states that a machine can be in, of Grbl's those that penup has.
+const STATES: &[&str] = &["Idle", "Run", "Hold", "Jog", "Home", "Alarm", "Check", "Sleep", "Door"];
+
+/// A status report; `None` if it was damaged on the line.
+fn parse_status(report: &str) -> Option<Status> {
     let mut fields = report.split('|');
     // Grbl says Hold:0, Door:1.
     let full_state = fields.next().unwrap_or_default();
-    let state = full_state.split(':').next().unwrap_or_default().to_owned();
+    let state = full_state.split(':').next().filter(|state| STATES.contains(state))?.to_owned();
     let field = |name: &str| fields.clone().find_map(|field| field.strip_prefix(name));
     let strokes = field("Strokes:").and_then(|strokes| strokes.split_once('/'));
     let strokes = strokes.and_then(|(done, all)| Some((done.parse().ok()?, all.parse().ok()?)));
     let pen_wanted = field("Pen:").filter(|_| full_state == "Hold:0");
-    Status {
+    Some(Status {
         state,
         strokes,
+        is_computing: field("Stage:").is_some(),
+        alarm: field("Alarm:").and_then(|alarm| alarm.parse().ok()),
         pen_wanted: pen_wanted.and_then(|pen| pen.parse().ok()),
         position: field("MPos:").unwrap_or_default().to_owned(),
-    }
+    })
 }
 
 /// Bytes to replies. Lines that are longer than any reply are cut.

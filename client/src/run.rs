@@ -116,6 +116,7 @@ fn encode_tape(args: &TapeEncodeArgs, interrupt: &AtomicBool) -> Result<String, 
         let mut bar = Bar::default();
         let mut sender = Sender::open(plotter.as_mut(), Patience::default(), interrupt)?;
         sender.stream(&job, &mut bar)?;
+        sender.end();
     }
     let tape = plotter.tape()?;
     let output = args.output.clone().unwrap_or_else(|| args.file.with_extension("tape"));
@@ -153,9 +154,11 @@ pub fn draw(
     progress: &mut dyn Progress,
 ) -> Result<Option<JobReport>, Error> {
     let mut sender = Sender::open(link, Patience::default(), interrupt)?;
-    sender.stream(job, progress)?;
-    (0..times).try_for_each(|_| sender.plot(progress))?;
-    sender.report()
+    let drawn = (sender.stream(job, progress))
+        .and_then(|()| (0..times).try_for_each(|_| sender.plot(progress)))
+        .and_then(|()| sender.report());
+    sender.end();
+    drawn
 }
 
 struct Outputs {

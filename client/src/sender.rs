@@ -1,18 +1,27 @@
 //! Sends lines to a plotter and follows what it does with them.
 //!
-//! Framing as in Grbl 1.1: one reply to each line, in order. [`Sender::open`] makes sure that a
-//! penup answers and is idle, [`Sender::stream`] keeps the plotter's receive queue filled but never
-//! over-filled (counting the bytes that are not yet answered), [`Sender::plot`] draws, changes pens and waits for
-//! the end. If anything goes wrong the sender stops at once and says which line it was at.
+//! Every line has a number and a checksum (see `docs/protocol.md`), and replies are counted by
+//! number, so that bytes that are lost or damaged, there or back, never become another drawing.
+//! [`Sender::open`] makes sure that a penup answers and is idle. [`Sender::stream`] keeps the
+//! plotter's receive queue filled but never over-filled, sends again what did not arrive, and
+//! compares the checksums of the model and of the options with what was sent. [`Sender::plot`]
+//! draws, changes pens and waits for the end. What cannot be mended ends with an error that says
+//! what happened.
+//!
+//! When a line is refused as damaged or out of order, or when replies stop, the sender asks for
+//! the number of the last line that was accepted. The answer also says that everything sent
+//! before it has been read, so the queue is empty then. Sending goes on from that number.
 
 use crate::error::Error;
 use crate::job::JobReport;
-use crate::link::Link;
+use crate::link::{Answer, Link};
 use crate::progress::{Progress, Quiet};
 use crate::protocol::{
-    ABORT, MODEL, PLOT, RECEIVE_WINDOW, RESUME, Reply, ReplyReader, STATUS_QUERY, Status, is_penup,
+    ABORT, END, LAST_NUMBER, MODEL, PLOT, RECEIVE_WINDOW, RESUME, Reply, ReplyReader, STATUS_QUERY,
+    Status, is_penup, numbered,
 };
 use crate::source::{JobLine, Lines};
+use crate::twin;
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -22,12 +31,16 @@ use std::time::{Duration, Instant};
 pub struct Patience {
     /// For any byte at all while it should answer.
     pub silence: Duration,
-    /// For the answer to a line while the plotter is alive.
+    /// For any progress while the plotter is alive.
     pub lost: Duration,
     /// For the greeting after an abort.
     pub greeting: Duration,
+    /// For the reply to a line, before the number of the last line is asked for.
+    pub reply: Duration,
     /// Between two status queries.
     pub query: Duration,
+    /// For somebody to let a machine go on that holds, if the user cannot be asked.
+    pub hold: Duration,
 }
 
 impl Default for Patience {
@@ -36,15 +49,33 @@ impl Default for Patience {
             silence: Duration::from_secs(5),
             lost: Duration::from_secs(15),
             greeting: Duration::from_secs(3),
+            reply: Duration::from_millis(300),
             query: Duration::from_millis(100),
+            hold: Duration::from_secs(60),
         }
     }
 }
 
-/// How often in a row the plotter said that it stands at a place and waits for a pen.
+/// So often the same line is sent again before the sender gives up. A line of 256 bytes of which
+/// one in a hundred is damaged arrives once in 13 times.
+const MOST_RESENDS: u32 = 200;
+
+/// So often a job is begun again because the plotter was told to give it up.
+const MOST_RESTARTS: u32 = 5;
+
+/// So often the checksums are asked for while they do not arrive, or are others.
+const MOST_QUESTIONS: u32 = 30;
+
+/// So many answers must say that the plotter holds something else than was sent.
+const SURE_OF_OTHER_CONTENTS: u32 = 3;
+
+/// So often the report of a job is asked for while it does not arrive.
+const SURE_OF_NO_REPORT: u32 = 3;
+
+/// How often in a row the plotter said the same of itself.
 #[derive(Debug, Default)]
 struct Standing {
-    at: Option<(u8, String)>,
+    at: Option<(Option<u8>, String)>,
     times: u32,
 }
 
@@ -52,11 +83,12 @@ impl Standing {
     /// The first reports may come before the last moves are done; later ones do not.
     const SURE: u32 = 3;
 
-    fn pen_wanted(&mut self, status: &Status) -> Option<u8> {
-        let at = status.pen_wanted.map(|pen| (pen, status.position.clone()));
+    /// Whether the machine surely stands and waits; for which pen, if it waits for one.
+    fn holds(&mut self, status: &Status) -> Option<Option<u8>> {
+        let at = status.is_holding().then(|| (status.pen_wanted, status.position.clone()));
         self.times = if at == self.at { self.times + 1 } else { 1 };
         self.at = at;
-        status.pen_wanted.filter(|_| self.times >= Self::SURE)
+        (self.at.is_some() && self.times >= Self::SURE).then_some(status.pen_wanted)
     }
 }
 
@@ -69,12 +101,51 @@ pub struct Sender<'a> {
     replies: VecDeque<Reply>,
     last_heard: Instant,
     last_query: Instant,
+    /// The number of the last line that is known to be accepted.
+    done: i32,
     /// What it said for people since its last answer.
     messages: Vec<String>,
-    /// What it told of itself when it was asked last.
-    told: Vec<String>,
     /// The strokes of the job that it draws.
     strokes: u64,
+    /// Where the idle machine stood, in its own words.
+    position: String,
+    /// The checksums of the model and of the options that it was sent.
+    contents: Option<[u32; 2]>,
+}
+
+/// The line at which something goes wrong, made when it does.
+type AtLine<'l> = &'l dyn Fn() -> Option<JobLine>;
+
+/// Lines on their way to the plotter.
+struct Delivery<'l> {
+    lines: &'l dyn Lines,
+    /// The number before that of the first line.
+    base: i32,
+    /// The number of the last line that was sent.
+    sent: i32,
+    /// The bytes of each line that is not yet answered, the oldest first.
+    in_queue: VecDeque<(i32, usize)>,
+    /// When the number of the last line was asked for, while no line is sent.
+    asked: Option<Instant>,
+    /// When a line was sent, or one was answered, or the last number came.
+    last_event: Instant,
+    last_progress: Instant,
+    resends: u32,
+}
+
+impl Delivery<'_> {
+    fn line(&self, number: i32) -> Option<JobLine> {
+        line_of(self.lines, self.base, number)
+    }
+
+    fn forget_up_to(&mut self, number: i32) {
+        self.in_queue.retain(|(line, _)| *line > number);
+    }
+}
+
+/// The line with this number, if the first of `lines` has the one after `base`.
+fn line_of(lines: &dyn Lines, base: i32, number: i32) -> Option<JobLine> {
+    lines.line(usize::try_from(number - base - 1).ok()?)
 }
 
 impl<'a> Sender<'a> {
@@ -89,7 +160,7 @@ impl<'a> Sender<'a> {
         patience: Patience,
         interrupt: &'a AtomicBool,
     ) -> Result<Self, Error> {
-        let now = Instant::now();
+        let now = link.now();
         let mut sender = Self {
             link,
             patience,
@@ -98,27 +169,28 @@ impl<'a> Sender<'a> {
             replies: VecDeque::new(),
             last_heard: now,
             last_query: now,
+            done: 0,
             messages: Vec::new(),
-            told: Vec::new(),
             strokes: 0,
+            position: String::new(),
+            contents: None,
         };
         let state = sender.find_state()?;
         if !state.is_idle() {
             return Err(Error::NotReady { state: state.state });
         }
+        sender.position = state.position;
         // It is idle, so an abort loses nothing; it clears what an older sender left half sent.
-        sender.link.send(&[ABORT])?;
-        match sender.await_greeting()? {
-            Some(greeting) if is_penup(&greeting) => Ok(sender),
-            greeting => Err(Error::NotPenup { heard: greeting.unwrap_or_default() }),
-        }
+        let greeting = sender.abort()?;
+        sender.begin_numbers(greeting)?;
+        Ok(sender)
     }
 
     fn find_state(&mut self) -> Result<Status, Error> {
-        let start = Instant::now();
+        let start = self.link.now();
         let mut heard = None;
         self.query()?;
-        while start.elapsed() < self.patience.silence {
+        while self.since(start) < self.patience.silence {
             self.stop_if_interrupted()?;
             match self.listen()? {
                 Some(Reply::Status(status)) => return Ok(status),
@@ -131,49 +203,280 @@ impl<'a> Sender<'a> {
         }
         match heard {
             // Bytes without a line end come from a wrong speed or another device, too.
-            None if self.last_heard <= start => Err(self.silent(None)),
+            None if self.last_heard <= start => Err(self.silent(&|| None)),
             heard => Err(Error::NotPenup { heard: heard.unwrap_or_default() }),
         }
     }
 
-    /// Sends `lines`, keeping the plotter's receive queue full, until each is answered with `ok`.
-    ///
-    /// # Errors
-    /// The first line that is refused or not answered; later lines may have been taken.
-    pub fn stream(&mut self, lines: &dyn Lines, progress: &mut dyn Progress) -> Result<(), Error> {
-        let cost = |line: &JobLine| line.sent.len() + 1;
-        let (mut sent, mut answered, mut in_queue) = (0, 0, 0);
-        let mut last_answer = Instant::now();
-        self.last_heard = last_answer;
-        while let Some(oldest) = lines.line(answered) {
-            while let Some(line) = lines.line(sent)
-                // A line longer than the queue goes alone; the plotter judges its length.
-                && (in_queue == 0 || in_queue + cost(&line) <= RECEIVE_WINDOW)
-            {
-                self.send_line(&line.sent)?;
-                in_queue += cost(&line);
-                sent += 1;
-            }
-            self.stop_if_interrupted()?;
-            match self.listen()? {
-                Some(Reply::Ok) => {
-                    in_queue -= cost(&oldest);
-                    answered += 1;
-                    last_answer = Instant::now();
-                    self.messages.clear();
-                    progress.lines_sent(answered, lines.count());
-                }
-                Some(reply) => self.fail_on(reply, Some(&oldest))?,
-                None => {
-                    self.query_if_due()?;
-                    self.fail_if_silent(Some(&oldest))?;
+    /// Makes line 1 the next one. What is heard until then belongs to an older conversation.
+    fn begin_numbers(&mut self, mut greeting: Option<String>) -> Result<(), Error> {
+        let start = self.link.now();
+        self.last_heard = start;
+        let (mut refused, mut knows_numbers) = (0, false);
+        while self.since(start) < self.patience.lost {
+            // The first line end ends what is left of a damaged line.
+            self.send(&format!("\n{}\n", numbered(Some(0), LAST_NUMBER)))?;
+            let asked = self.link.now();
+            while self.since(asked) < self.patience.reply {
+                self.stop_if_interrupted()?;
+                match self.listen()? {
+                    Some(Reply::Done(0)) => {
+                        self.done = 0;
+                        self.messages.clear();
+                        return Ok(());
+                    }
+                    Some(Reply::Done(_) | Reply::Refused(..) | Reply::Resend(_)) => {
+                        knows_numbers = true;
+                    }
+                    Some(Reply::Error(_)) => {
+                        refused += 1;
+                        break;
+                    }
+                    Some(Reply::Greeting(text)) => greeting = Some(text),
+                    _ => self.query_if_due()?,
                 }
             }
-            if last_answer.elapsed() > self.patience.lost {
-                return Err(Error::LostLine { line: Some(Box::new(oldest)) });
+            self.fail_if_silent(&|| None)?;
+            let is_other = greeting.as_deref().is_some_and(|greeting| !is_penup(greeting));
+            if refused >= 5 && !knows_numbers {
+                let heard = greeting.unwrap_or_default();
+                return Err(if is_other {
+                    Error::NotPenup { heard }
+                } else {
+                    Error::WithoutNumbers
+                });
             }
         }
+        match greeting {
+            Some(heard) if !is_penup(&heard) => Err(Error::NotPenup { heard }),
+            _ => Err(Error::LostLine { line: None }),
+        }
+    }
+
+    /// Sends `lines`, which begin by forgetting what the plotter held and hold every option, and
+    /// makes sure that it holds what they say.
+    ///
+    /// # Errors
+    /// The first line that is refused or not answered, or [`Error::OtherContents`]; later lines
+    /// may have been taken.
+    pub fn stream(&mut self, lines: &dyn Lines, progress: &mut dyn Progress) -> Result<(), Error> {
+        let expected = twin::contents(lines, lines.count());
+        let mut restarts = 0;
+        loop {
+            let sent = self.deliver(lines, progress).and_then(|()| self.compare(expected));
+            match sent {
+                Err(Error::Restarted) if restarts < MOST_RESTARTS => {
+                    restarts += 1;
+                    self.begin_again(lines)?;
+                }
+                result => return result,
+            }
+        }
+    }
+
+    /// After a greeting in the middle of a job: if the plotter was told to give the job up, it
+    /// still holds what it was sent, it has not moved, and the job can begin again.
+    fn begin_again(&mut self, lines: &dyn Lines) -> Result<(), Error> {
+        let taken = usize::try_from(self.done).unwrap_or(0);
+        self.begin_numbers(None)?;
+        let status = self.find_state()?;
+        if !status.is_idle() || status.position != self.position {
+            return Err(Error::Restarted);
+        }
+        // A plotter that lost its power has lost its place and its settings, too.
+        let was_there = twin::contents(lines, taken);
+        let empty = twin::contents(lines, 0);
+        let is_empty = |contents: Option<[u32; 2]>| {
+            contents.zip(empty).is_some_and(|(contents, empty)| contents[0] == empty[0])
+        };
+        if !is_empty(was_there) && is_empty(Some(self.contents()?)) {
+            return Err(Error::Restarted);
+        }
         Ok(())
+    }
+
+    /// Makes sure that the plotter holds what it should.
+    fn compare(&mut self, expected: Option<[u32; 2]>) -> Result<(), Error> {
+        for _ in 0..SURE_OF_OTHER_CONTENTS {
+            if Some(self.contents()?) == expected {
+                self.contents = expected;
+                return Ok(());
+            }
+        }
+        Err(Error::OtherContents)
+    }
+
+    /// The checksums of the model and of the options that the plotter holds.
+    fn contents(&mut self) -> Result<[u32; 2], Error> {
+        for _ in 0..MOST_QUESTIONS {
+            let mut contents = None;
+            self.deliver_watching(&[JobLine::command(MODEL)], &mut Quiet, &mut |reply| {
+                if let Reply::Contents(found) = reply {
+                    contents = Some(*found);
+                }
+            })?;
+            if let Some(contents) = contents {
+                return Ok(contents);
+            }
+        }
+        Err(Error::LostLine { line: Some(Box::new(JobLine::command(MODEL))) })
+    }
+
+    fn deliver(&mut self, lines: &dyn Lines, progress: &mut dyn Progress) -> Result<(), Error> {
+        self.deliver_watching(lines, progress, &mut |_| {})
+    }
+
+    /// Sends `lines` under the next numbers until each is accepted, and shows every reply to
+    /// `watch`.
+    ///
+    /// # Errors
+    /// The first line that is refused; [`Error::Restarted`] if the plotter has forgotten the
+    /// numbers.
+    fn deliver_watching(
+        &mut self,
+        lines: &dyn Lines,
+        progress: &mut dyn Progress,
+        watch: &mut dyn FnMut(&Reply),
+    ) -> Result<(), Error> {
+        let now = self.link.now();
+        self.last_heard = now;
+        let mut delivery = Delivery {
+            lines,
+            base: self.done,
+            sent: self.done,
+            in_queue: VecDeque::new(),
+            asked: None,
+            last_event: now,
+            last_progress: now,
+            resends: 0,
+        };
+        // No plotter holds what comes of so many lines.
+        let end = delivery.base.saturating_add(i32::try_from(lines.count()).unwrap_or(i32::MAX));
+        while self.done < end {
+            self.fill_queue(&mut delivery)?;
+            self.stop_if_interrupted()?;
+            let reply = self.listen()?;
+            if let Some(reply) = &reply {
+                watch(reply);
+            }
+            let oldest = self.done + 1;
+            match reply {
+                Some(Reply::Done(number)) => {
+                    if number > self.done && number <= delivery.sent {
+                        self.advance(number, &mut delivery, progress);
+                    }
+                }
+                Some(Reply::Last(number)) => {
+                    if number < self.done || number > delivery.sent {
+                        return Err(Error::Restarted);
+                    }
+                    if delivery.asked.take().is_some() {
+                        // Everything sent has been read.
+                        delivery.in_queue.clear();
+                        delivery.sent = number;
+                        delivery.last_event = self.link.now();
+                    }
+                    self.advance(number, &mut delivery, progress);
+                }
+                Some(Reply::Resend(number)) => {
+                    if number <= self.done || number > delivery.sent + 1 {
+                        return Err(Error::Restarted);
+                    }
+                    if delivery.asked.is_none() {
+                        self.ask_for_last_number(&mut delivery)?;
+                    }
+                }
+                Some(Reply::Refused(number, error)) => {
+                    self.fail_on(Reply::Error(error), &|| delivery.line(number))?;
+                }
+                Some(Reply::Status(status)) => self.follow(&status, &mut delivery, progress)?,
+                Some(Reply::Ok | Reply::Error(_) | Reply::Contents(_) | Reply::Other(_)) => {}
+                Some(reply) => self.fail_on(reply, &|| delivery.line(oldest))?,
+                None => self.fail_if_silent(&|| delivery.line(oldest))?,
+            }
+            self.query_if_due()?;
+            let since = delivery.asked.unwrap_or(delivery.last_event);
+            if self.since(since) > self.patience.reply {
+                self.ask_for_last_number(&mut delivery)?;
+            }
+            if self.since(delivery.last_progress) > self.patience.lost {
+                return Err(Error::LostLine { line: delivery.line(oldest).map(Box::new) });
+            }
+        }
+        self.confirm(lines, delivery.base)
+    }
+
+    /// Sends what has room in the plotter's receive queue.
+    fn fill_queue(&mut self, delivery: &mut Delivery<'_>) -> Result<(), Error> {
+        while delivery.asked.is_none()
+            && let Some(line) = delivery.line(delivery.sent + 1)
+        {
+            let text = numbered(Some(delivery.sent + 1), &line.sent);
+            let cost = text.len() + 1;
+            let waiting: usize = delivery.in_queue.iter().map(|(_, cost)| cost).sum();
+            // A line longer than the queue goes alone; the plotter reads it as it comes.
+            if waiting > 0 && waiting + cost > RECEIVE_WINDOW {
+                break;
+            }
+            let before = self.link.now();
+            self.send(&format!("{text}\n"))?;
+            // A plotter in memory may work for minutes until it has taken the bytes.
+            delivery.last_progress += self.since(before);
+            delivery.last_event = self.link.now();
+            delivery.sent += 1;
+            delivery.in_queue.push_back((delivery.sent, cost));
+        }
+        Ok(())
+    }
+
+    fn advance(&mut self, number: i32, delivery: &mut Delivery<'_>, progress: &mut dyn Progress) {
+        delivery.forget_up_to(number);
+        if number > self.done {
+            self.done = number;
+            delivery.last_progress = self.link.now();
+            delivery.last_event = delivery.last_progress;
+            delivery.resends = 0;
+            self.messages.clear();
+            progress.lines_sent((number - delivery.base) as usize, delivery.lines.count());
+        }
+    }
+
+    /// Asks for the number of the last line; until it is known, nothing else is sent.
+    fn ask_for_last_number(&mut self, delivery: &mut Delivery<'_>) -> Result<(), Error> {
+        delivery.resends += 1;
+        if delivery.resends > MOST_RESENDS {
+            let line = delivery.line(self.done + 1).map(Box::new);
+            return Err(Error::Damaged { line, times: MOST_RESENDS });
+        }
+        delivery.asked = Some(self.link.now());
+        // The first line end ends a line that has lost its own.
+        self.send(&format!("\n{}\n", numbered(None, LAST_NUMBER)))
+    }
+
+    /// What the state says while lines are sent.
+    fn follow(
+        &mut self,
+        status: &Status,
+        delivery: &mut Delivery<'_>,
+        progress: &mut dyn Progress,
+    ) -> Result<(), Error> {
+        progress.state(&status.state);
+        if status.is_computing {
+            // It reads no line until the picture is computed.
+            delivery.last_progress = self.link.now();
+            delivery.last_event = delivery.last_progress;
+            delivery.asked = delivery.asked.map(|_| delivery.last_progress);
+        }
+        // A hold before anything is drawn was asked for by no user.
+        let nothing_drawn = status.strokes.is_none_or(|(done, _)| done == 0);
+        if status.is_holding()
+            && status.pen_wanted.is_none()
+            && nothing_drawn
+            && status.position == self.position
+        {
+            self.link.send(&[RESUME])?;
+        }
+        self.fail_if_alarm(status)
     }
 
     /// Draws what was sent, and waits until the machine is idle again.
@@ -182,49 +485,130 @@ impl<'a> Sender<'a> {
     /// The drawing is refused, the machine stops, or it falls silent.
     pub fn plot(&mut self, progress: &mut dyn Progress) -> Result<(), Error> {
         let command = JobLine::command(PLOT);
-        self.send_line(PLOT)?;
-        self.last_heard = Instant::now();
-        let mut acknowledged = false;
-        let mut idle_since = None;
+        let lines = [command.clone()];
+        let command = &|| Some(command.clone());
+        self.begin_plot(&lines, progress)?;
         let mut standing = Standing::default();
+        let mut held_since = None;
+        self.last_heard = self.link.now();
+        self.query()?;
         loop {
             self.stop_if_interrupted()?;
             match self.listen()? {
-                Some(Reply::Ok) if !acknowledged => {
-                    acknowledged = true;
-                    self.messages.drain(..).for_each(|note| progress.note(&note));
-                    self.query()?;
-                }
                 Some(Reply::Status(status)) => {
                     progress.state(&status.state);
                     if let Some((done, all)) = status.strokes {
                         progress.strokes_drawn(done, all);
                         self.strokes = all;
                     }
-                    if let Some(pen) = standing.pen_wanted(&status)
-                        && self.link.change_pen(pen)?
-                    {
-                        self.link.send(&[RESUME])?;
-                        standing = Standing::default();
-                    }
-                    if status.state == "Alarm" {
-                        return Err(Error::NotReady { state: status.state });
-                    }
-                    match (status.is_idle(), acknowledged) {
-                        (true, true) => return Ok(()),
-                        (true, false) => {
-                            idle_since.get_or_insert_with(Instant::now);
+                    self.fail_if_alarm(&status)?;
+                    match standing.holds(&status) {
+                        Some(pen) if self.may_resume(pen, &mut held_since)? => {
+                            self.link.send(&[RESUME])?;
+                            standing = Standing::default();
                         }
-                        (false, _) => idle_since = None,
+                        _ if !status.is_holding() => held_since = None,
+                        _ => {}
+                    }
+                    if status.is_idle() {
+                        self.position = status.position;
+                        return self.confirm(&lines, self.done - 1);
                     }
                 }
-                Some(reply) => self.fail_on(reply, Some(&command))?,
-                None => self.fail_if_silent(Some(&command))?,
+                Some(Reply::Done(_) | Reply::Last(_) | Reply::Resend(_) | Reply::Error(_)) => {}
+                Some(Reply::Refused(number, _)) if number != self.done => {}
+                Some(Reply::Refused(_, error)) => {
+                    self.fail_on(Reply::Error(error), command)?;
+                }
+                Some(reply) => self.fail_on(reply, command)?,
+                None => self.fail_if_silent(command)?,
             }
             self.query_if_due()?;
-            if idle_since.is_some_and(|since: Instant| since.elapsed() > self.patience.lost) {
-                return Err(Error::LostLine { line: Some(Box::new(command)) });
+        }
+    }
+
+    /// Sends the command until it is accepted; again if the plotter was told to give up before it
+    /// moved.
+    fn begin_plot(&mut self, lines: &dyn Lines, progress: &mut dyn Progress) -> Result<(), Error> {
+        let mut restarts = 0;
+        loop {
+            let mut notes = Vec::new();
+            let begun = self.deliver_watching(lines, &mut Quiet, &mut |reply| match reply {
+                Reply::Message(note) => notes.push(note.clone()),
+                // It was about a line that was not accepted.
+                Reply::Resend(_) | Reply::Error(_) => notes.clear(),
+                _ => {}
+            });
+            if begun.is_ok() {
+                notes.iter().for_each(|note| progress.note(note));
             }
+            match begun {
+                Err(Error::Restarted) if restarts < MOST_RESTARTS => {
+                    restarts += 1;
+                    self.begin_numbers(None)?;
+                    let status = self.find_state()?;
+                    let has_moved = !status.is_idle() || status.position != self.position;
+                    if has_moved || Some(self.contents()?) != self.contents {
+                        return Err(Error::Restarted);
+                    }
+                }
+                result => return result,
+            }
+        }
+    }
+
+    /// Makes sure that the last line is the last one that was accepted, and that none was
+    /// refused: so no reply was lost that says otherwise, and nobody has told the plotter to give
+    /// up.
+    fn confirm(&mut self, lines: &dyn Lines, base: i32) -> Result<(), Error> {
+        let number = self.done;
+        let last = &|| line_of(lines, base, number);
+        let start = self.link.now();
+        self.last_heard = start;
+        let mut asked = None;
+        while self.since(start) < self.patience.lost {
+            self.stop_if_interrupted()?;
+            if asked.is_none_or(|asked| self.since(asked) > self.patience.reply) {
+                asked = Some(self.link.now());
+                self.send(&format!("\n{}\n", numbered(None, LAST_NUMBER)))?;
+            }
+            match self.listen()? {
+                Some(Reply::Last(number)) if number == self.done => return Ok(()),
+                Some(Reply::Last(_)) => return Err(Error::Restarted),
+                Some(Reply::Refused(number, error)) => {
+                    self.fail_on(Reply::Error(error), &|| line_of(lines, base, number))?;
+                }
+                Some(Reply::Status(status)) => self.fail_if_alarm(&status)?,
+                Some(Reply::Done(_) | Reply::Resend(_) | Reply::Error(_)) => {}
+                Some(reply) => self.fail_on(reply, last)?,
+                None => self.fail_if_silent(last)?,
+            }
+            self.query_if_due()?;
+        }
+        Err(Error::LostLine { line: last().map(Box::new) })
+    }
+
+    /// The machine stands and waits for a pen, or holds because somebody else asked for it. Whether
+    /// the pen is in, or the user lets it go on.
+    fn may_resume(
+        &mut self,
+        pen: Option<u8>,
+        held_since: &mut Option<Instant>,
+    ) -> Result<bool, Error> {
+        if let Some(pen) = pen {
+            return Ok(self.link.change_pen(pen)?);
+        }
+        let now = self.link.now();
+        let is_new = held_since.is_none();
+        let since = *held_since.get_or_insert(now);
+        match self.link.ask_to_resume(is_new)? {
+            Answer::Yes => {
+                *held_since = None;
+                Ok(true)
+            }
+            Answer::NotYet => Ok(false),
+            Answer::Nobody if self.since(since) > self.patience.hold => Err(Error::Held),
+            Answer::Nobody => Ok(false),
         }
     }
 
@@ -233,16 +617,43 @@ impl<'a> Sender<'a> {
     /// # Errors
     /// As [`Sender::stream`].
     pub fn report(&mut self) -> Result<Option<JobReport>, Error> {
-        self.told.clear();
-        self.stream(&[JobLine::command(MODEL)], &mut Quiet)?;
-        let strokes = self.strokes;
-        Ok(self.told.iter().find_map(|line| JobReport::parse(strokes, line)))
+        let (strokes, mut report) = (self.strokes, None);
+        for _ in 0..SURE_OF_NO_REPORT {
+            let ask = [JobLine::command(MODEL)];
+            self.deliver_watching(&ask, &mut Quiet, &mut |reply| {
+                if let Reply::Other(line) = reply {
+                    report = JobReport::parse(strokes, line).or(report.take());
+                }
+            })?;
+            if report.is_some() {
+                break;
+            }
+        }
+        Ok(report)
     }
 
-    fn fail_on(&mut self, reply: Reply, line: Option<&JobLine>) -> Result<(), Error> {
+    /// Ends the conversation: whoever comes next need not send numbers.
+    pub fn end(mut self) {
+        // Nothing depends on it: the next sender's ctrl-X does the same.
+        let _ = self.send(&format!("{}\n", numbered(Some(self.done + 1), END)));
+        let start = self.link.now();
+        while self.since(start) < self.patience.reply {
+            match self.listen() {
+                Ok(Some(Reply::Done(number) | Reply::Refused(number, _)))
+                    if number == self.done + 1 =>
+                {
+                    return;
+                }
+                Ok(_) => {}
+                Err(_) => return,
+            }
+        }
+    }
+
+    fn fail_on(&mut self, reply: Reply, line: AtLine<'_>) -> Result<(), Error> {
         match reply {
             Reply::Error(number) => Err(Error::Refused {
-                line: Box::new(line.cloned().unwrap_or_else(|| JobLine::command(""))),
+                line: Box::new(line().unwrap_or_else(|| JobLine::command(""))),
                 number,
                 messages: std::mem::take(&mut self.messages),
             }),
@@ -254,20 +665,24 @@ impl<'a> Sender<'a> {
                 self.messages.push(text);
                 Ok(())
             }
-            Reply::Other(text) => {
-                self.told.push(text);
-                Ok(())
-            }
-            Reply::Ok | Reply::Status(_) => Ok(()),
+            _ => Ok(()),
         }
     }
 
-    fn silent(&self, line: Option<&JobLine>) -> Error {
-        Error::Silent { patience: self.patience.silence, line: line.cloned().map(Box::new) }
+    fn fail_if_alarm(&mut self, status: &Status) -> Result<(), Error> {
+        match (status.state.as_str(), status.alarm) {
+            ("Alarm", Some(number)) => self.fail_on(Reply::Alarm(number), &|| None),
+            ("Alarm", None) => Err(Error::NotReady { state: status.state.clone() }),
+            _ => Ok(()),
+        }
     }
 
-    fn fail_if_silent(&self, line: Option<&JobLine>) -> Result<(), Error> {
-        if self.last_heard.elapsed() > self.patience.silence {
+    fn silent(&self, line: AtLine<'_>) -> Error {
+        Error::Silent { patience: self.patience.silence, line: line().map(Box::new) }
+    }
+
+    fn fail_if_silent(&self, line: AtLine<'_>) -> Result<(), Error> {
+        if self.since(self.last_heard) > self.patience.silence {
             return Err(self.silent(line));
         }
         Ok(())
@@ -278,41 +693,45 @@ impl<'a> Sender<'a> {
         if !self.interrupt.load(Ordering::Relaxed) {
             return Ok(());
         }
-        self.link.send(&[ABORT])?;
-        Err(match self.await_greeting()? {
+        Err(match self.abort()? {
             Some(_) => Error::Interrupted,
             None => Error::InterruptedUnconfirmed,
         })
     }
 
-    fn await_greeting(&mut self) -> Result<Option<String>, Error> {
-        let start = Instant::now();
-        while start.elapsed() < self.patience.greeting {
-            if let Some(Reply::Greeting(text)) = self.listen()? {
-                return Ok(Some(text));
+    /// Sends ctrl-X, twice more if no greeting comes back. The greeting, if one came.
+    fn abort(&mut self) -> Result<Option<String>, Error> {
+        for _ in 0..3 {
+            self.link.send(&[ABORT])?;
+            let start = self.link.now();
+            while self.since(start) < self.patience.greeting / 3 {
+                if let Some(Reply::Greeting(text)) = self.listen()? {
+                    return Ok(Some(text));
+                }
             }
         }
         Ok(None)
     }
 
-    fn send_line(&mut self, line: &str) -> Result<(), Error> {
+    fn send(&mut self, text: &str) -> Result<(), Error> {
         // One write: a port may send each write as a packet of its own.
-        let mut bytes = Vec::with_capacity(line.len() + 1);
-        bytes.extend_from_slice(line.as_bytes());
-        bytes.push(b'\n');
-        Ok(self.link.send(&bytes)?)
+        Ok(self.link.send(text.as_bytes())?)
     }
 
     fn query(&mut self) -> Result<(), Error> {
-        self.last_query = Instant::now();
+        self.last_query = self.link.now();
         Ok(self.link.send(&[STATUS_QUERY])?)
     }
 
     fn query_if_due(&mut self) -> Result<(), Error> {
-        if self.last_query.elapsed() >= self.patience.query {
+        if self.since(self.last_query) >= self.patience.query {
             self.query()?;
         }
         Ok(())
+    }
+
+    fn since(&self, time: Instant) -> Duration {
+        self.link.now().saturating_duration_since(time)
     }
 
     /// The next reply, or `None` if none came within half the time between two queries.
@@ -321,7 +740,7 @@ impl<'a> Sender<'a> {
             let mut buffer = [0; 256];
             let count = self.link.receive(&mut buffer, self.patience.query / 2)?;
             if count > 0 {
-                self.last_heard = Instant::now();
+                self.last_heard = self.link.now();
             }
             let reader = &mut self.reader;
             let bytes = buffer.get(..count).unwrap_or_default();

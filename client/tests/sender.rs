@@ -4,6 +4,7 @@
 
 use penup_client::error::Error;
 use penup_client::fake::{FakePlotter, Fault};
+use penup_client::link::Answer;
 use penup_client::progress::{Progress, Quiet};
 use penup_client::sender::{Patience, Sender};
 use penup_client::source::{JobLine, Origin};
@@ -14,7 +15,9 @@ const PATIENCE: Patience = Patience {
     silence: Duration::from_millis(600),
     lost: Duration::from_millis(1200),
     greeting: Duration::from_millis(600),
+    reply: Duration::from_millis(100),
     query: Duration::from_millis(40),
+    hold: Duration::from_secs(2),
 };
 
 fn lines(count: usize) -> Vec<JobLine> {
@@ -32,7 +35,9 @@ fn lines(count: usize) -> Vec<JobLine> {
 fn job(plotter: &mut FakePlotter, count: usize) -> Result<(), Error> {
     let interrupt = AtomicBool::new(false);
     let mut sender = Sender::open(plotter, PATIENCE, &interrupt)?;
-    sender.stream(&lines(count), &mut Quiet)?;
+    let mut job = vec![JobLine::command("$clear")];
+    job.extend(lines(count));
+    sender.stream(&job, &mut Quiet)?;
     sender.plot(&mut Quiet)
 }
 
@@ -62,7 +67,7 @@ fn every_line_arrives_once_in_order_and_the_queue_is_kept_full_but_never_overflo
         expected.push("$plot".to_owned());
         assert_eq!(plotter.lines, expected);
         assert!(!plotter.overflowed);
-        assert!(count < 500 || plotter.most_waiting > 10);
+        assert!(count < 500 || plotter.most_waiting > 8);
     }
 }
 
@@ -70,7 +75,7 @@ fn every_line_arrives_once_in_order_and_the_queue_is_kept_full_but_never_overflo
 fn a_line_longer_than_the_window_goes_alone() {
     let mut plotter = FakePlotter::new(Fault::None);
     let interrupt = AtomicBool::new(false);
-    let long = JobLine::command(format!("f{}", " 1".repeat(123)));
+    let long = JobLine::command(format!("o {}", "x".repeat(245)));
     assert_eq!(long.sent.len(), 247);
     let job = [JobLine::command("v 0 0 0"), long.clone(), long];
     let mut sender = Sender::open(&mut plotter, PATIENCE, &interrupt).expect("a plotter");
@@ -112,11 +117,61 @@ fn silence_in_the_middle_names_the_line() {
 }
 
 #[test]
-fn lost_bytes_are_told_from_silence() {
-    let (error, _) = failure(Fault::LosesLine(40));
-    assert!(error.contains("never answered, at line 49"), "{error}");
-    let (error, _) = failure(Fault::LosesLine(41));
-    assert!(error.contains("never answered, asked for the drawing"), "{error}");
+fn a_lost_line_is_sent_again_and_every_line_arrives_once() {
+    for lost in [1, 7, 40, 41] {
+        let (error, plotter) = failure(Fault::LosesLine(lost));
+        assert!(error.contains("went unnoticed"), "{error}");
+        let mut expected: Vec<String> = lines(40).into_iter().map(|line| line.sent).collect();
+        expected.push("$plot".to_owned());
+        assert_eq!(plotter.lines, expected);
+    }
+}
+
+#[test]
+fn a_line_that_never_arrives_is_told_from_silence() {
+    let (error, _) = failure(Fault::NeverTakesLine(40));
+    assert!(error.contains("line 49 of scene.obj"), "{error}");
+    let (error, _) = failure(Fault::NeverTakesLine(41));
+    assert!(error.contains("asked for the drawing"), "{error}");
+}
+
+#[test]
+fn what_was_given_up_by_a_damaged_byte_begins_again() {
+    for aborted in [1, 3, 40, 41] {
+        let (error, plotter) = failure(Fault::AbortedAt(aborted));
+        assert!(error.contains("went unnoticed"), "{aborted}: {error}");
+        assert_eq!(plotter.lines.iter().filter(|line| *line == "$plot").count(), 1);
+    }
+}
+
+#[test]
+fn a_firmware_without_numbers_is_told_to_be_older() {
+    let (error, plotter) = failure(Fault::WithoutNumbers);
+    assert!(error.contains("firmware is older"), "{error}");
+    assert_eq!(plotter.lines.len(), 0);
+}
+
+#[test]
+fn nothing_is_drawn_if_the_plotter_holds_another_model() {
+    let (error, plotter) = failure(Fault::HoldsOther);
+    assert!(error.contains("holds something else than was sent"), "{error}");
+    assert!(!plotter.lines.iter().any(|line| line == "$plot"));
+    let (error, _) = failure(Fault::SaysOther);
+    assert!(error.contains("went unnoticed"), "{error}");
+}
+
+#[test]
+fn a_machine_that_holds_goes_on_when_the_user_says_so() {
+    let mut plotter = FakePlotter::new(Fault::None);
+    plotter.hold_before = Some(1);
+    plotter.user = [Answer::NotYet, Answer::NotYet, Answer::Yes].into();
+    job(&mut plotter, 3).expect("it went on");
+    assert_eq!((plotter.hold_before, plotter.user.len()), (None, 0));
+    let mut plotter = FakePlotter::new(Fault::None);
+    plotter.hold_before = Some(1);
+    let error = job(&mut plotter, 3).expect_err("nobody is there").to_string();
+    assert!(error.contains("the machine holds"), "{error}");
+    assert_eq!((plotter.hold_before, plotter.aborts), (Some(1), 1), "it still holds");
 }
 
 #[test]
@@ -133,7 +188,7 @@ fn strangers_and_busy_plotters_are_left_alone() {
 #[test]
 fn a_restart_or_an_alarm_ends_the_job() {
     let (error, _) = failure(Fault::RestartsAt(3));
-    assert!(error.contains("started again"), "{error}");
+    assert!(error.contains("gave up in the middle of the job"), "{error}");
     let (error, _) = failure(Fault::AlarmWhileDrawing(2));
     assert!(error.contains("alarm 2"), "{error}");
 }
@@ -161,7 +216,8 @@ fn giving_up_stops_the_machine_and_waits_until_it_says_so() {
         let error = sender.plot(&mut GivesUp(&interrupt)).expect_err("it was given up");
         assert!(error.to_string().contains(expected), "{error}");
         assert_eq!(error.exit_code(), 130);
-        assert_eq!(plotter.aborts, 2);
+        // Without a greeting it is sent twice more.
+        assert_eq!(plotter.aborts, if fault == Fault::None { 2 } else { 4 });
     }
 }
 

@@ -8,6 +8,7 @@ pub mod order_reference;
 pub mod event_checker;
 pub mod motion_optimum;
 pub mod motion_paths;
+pub mod noisy_line;
 pub mod pin_machine;
 pub mod camera_scenes;
 pub mod exact_picture;

@@ -5,6 +5,7 @@
 //! it (a face through a vertex that does not exist, more than fits) and is then as it was before. [`Model::edit`]
 //! changes it, [`Model::restore`] takes a change back.
 
+mod checksum;
 mod curves;
 mod edit;
 mod elements;

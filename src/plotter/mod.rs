@@ -30,7 +30,7 @@ use crate::machine::{
     Target, Value,
 };
 use crate::model::Model;
-use crate::protocol::{Command, LineReader, RealTime, Refusal};
+use crate::protocol::{Command, Label, LineReader, Numbering, RealTime, Received, Refusal};
 use crate::stage::{Aborted, Attention, Stage};
 use program::Program;
 use reply::Reply;
@@ -59,6 +59,9 @@ pub fn run<B: Board>(board: &mut B, memory: Lent<'_>, pins: &PulserState) -> ! {
 #[derive(Debug)]
 pub struct Plotter<'m> {
     reader: LineReader,
+    numbering: Numbering,
+    /// What the reply to the line in work names.
+    label: Label,
     inner: Inner<'m>,
 }
 
@@ -102,6 +105,8 @@ impl<'m> Plotter<'m> {
         let Lent { vertices, corners, blocks, words } = memory;
         Self {
             reader: LineReader::default(),
+            numbering: Numbering::default(),
+            label: Label::default(),
             inner: Inner {
                 model: Model::new(vertices, corners),
                 options: PlotOptions::default(),
@@ -131,7 +136,7 @@ impl<'m> Plotter<'m> {
         let planned = self.inner.plan(board);
         if self.inner.task.is_some() {
             match self.inner.proceed(board) {
-                Progress::Done(outcome) => Reply(board).outcome(outcome),
+                Progress::Done(outcome) => self.answer(outcome, board),
                 Progress::More => {}
                 Progress::Waits => return planned || asked != RealTime::default(),
             }
@@ -139,31 +144,41 @@ impl<'m> Plotter<'m> {
         }
         let byte = if self.inner.must_wait() { None } else { board.read_byte() };
         let Some(byte) = byte else { return planned || asked != RealTime::default() };
+        let Some(line) = self.reader.push(byte) else { return true };
         let mut shows_drive = false;
-        let outcome = match self.reader.push(byte) {
-            None => return true,
-            Some(Ok(line)) => match self.inner.carry_out(line, board) {
-                Ok(Next::Plot) => self.inner.plot(board, false),
-                Ok(Next::Again) => self.inner.plot(board, true),
-                Ok(Next::Nothing) => Ok(()),
-                Ok(Next::ShowDrive) => {
-                    shows_drive = true;
-                    Ok(())
-                }
-                Err(refusal) => Err(refusal),
-            },
-            Some(Err(refusal)) => Err(refusal),
+        let (outcome, label) = match self.numbering.receive(line) {
+            Received::Line(line, label) => {
+                let outcome = match self.inner.carry_out(line, board) {
+                    Ok(Next::Plot) => self.inner.plot(board, false),
+                    Ok(Next::Again) => self.inner.plot(board, true),
+                    Ok(Next::Nothing) => Ok(()),
+                    Ok(Next::ShowDrive) => {
+                        shows_drive = true;
+                        Ok(())
+                    }
+                    Err(refusal) => Err(refusal),
+                };
+                (outcome, label)
+            }
+            Received::Answer(outcome, label) => (outcome, label),
         };
         if outcome == Err(Refusal::Aborted) {
             self.reset(board);
         }
+        self.label = label;
         if self.inner.task.is_none() {
-            Reply(board).outcome(outcome);
+            self.answer(outcome, board);
         }
         if shows_drive {
             board.show_drive();
         }
         true
+    }
+
+    #[inline(never)] // Its frame must not lie under the stages'.
+    fn answer<B: Board>(&mut self, outcome: Result<(), Refusal>, board: &mut B) {
+        self.numbering.note(self.label, outcome);
+        Reply(board).outcome(outcome, self.label);
     }
 
     /// What the model holds.
@@ -216,7 +231,7 @@ impl<'m> Plotter<'m> {
         }
         self.inner.act(asked);
         if asked.has(RealTime::BYTES_LOST) {
-            Reply(board).outcome(Err(Refusal::BytesLost));
+            Reply(board).outcome(Err(Refusal::BytesLost), Label::default());
         }
         if asked.has(RealTime::STATUS) {
             // To write it takes 10 ms; so may what was done since the queue was filled last.
@@ -227,6 +242,7 @@ impl<'m> Plotter<'m> {
 
     fn reset<B: Board>(&mut self, board: &mut B) {
         self.reader.clear();
+        self.numbering = Numbering::default();
         self.inner.task = None;
         self.inner.program = Program::default();
         self.greet(board);

@@ -1,5 +1,6 @@
 //! What is drawn and how, as the user set it.
 
+use crate::checksum::CRC_32;
 use crate::drawing::{Page, StepsPerMillimetre, Title, TitleText};
 use crate::fixed::{Decimal, Length, Millimetres, SixDecimals, sin_cos_degrees};
 use crate::geometry::Precision;
@@ -10,6 +11,8 @@ use crate::protocol::{
 };
 use crate::view::{Camera, Direction, Lens, Sight, View};
 use crate::visibility::{self, Crease};
+use core::fmt::{self, Write};
+use crc::{Digest, Table};
 
 /// What is drawn and how.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -194,6 +197,17 @@ impl PlotOptions {
         }
     }
 
+    /// The CRC-32 of what `$options` lists: its lines, each with a line feed.
+    #[inline(never)] // Its frame must not lie under the stages'.
+    pub fn checksum(&self) -> u32 {
+        let mut sum = Sum(CRC_32.digest());
+        self.list(|line| {
+            // A sum cannot fail.
+            let _ = writeln!(sum, "{line}");
+        });
+        sum.0.finalize()
+    }
+
     /// What stands for each option that is set, as `$options` lists it.
     #[inline(never)] // Its frame must not lie under the stages'.
     pub fn list(&self, mut line: impl FnMut(core::fmt::Arguments<'_>)) {
@@ -267,5 +281,15 @@ impl PlotOptions {
         line(format_args!("$cycle={}", on(self.order.shape == order::Shape::ClosedCycle)));
         line(format_args!("$effort={}", self.order.effort));
         line(format_args!("$lift={}", Length(self.lift)));
+    }
+}
+
+/// Text that is only summed up.
+struct Sum(Digest<'static, u32, Table<1>>);
+
+impl Write for Sum {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        self.0.update(text.as_bytes());
+        Ok(())
     }
 }

@@ -1,9 +1,10 @@
 //! Lines that go back to the user.
 
 use super::Board;
+use crate::checksum::CRC_16;
 use crate::fixed::BinaryFraction;
 use crate::machine::Value;
-use crate::protocol::Refusal;
+use crate::protocol::{Checksum, Label, Named, Refusal};
 use core::fmt::{self, Write};
 
 /// Writes whole lines to the board's serial line.
@@ -32,15 +33,70 @@ impl<B: Board + ?Sized> Reply<'_, B> {
         self.part(format_args!("|MPos:{x},{y},0.000"));
     }
 
-    /// The reply that every line gets: `ok`, or why not and `error:N`.
-    pub fn outcome(&mut self, outcome: Result<(), Refusal>) {
-        match outcome {
-            Ok(()) => self.line(format_args!("ok")),
-            Err(refusal) => {
+    /// The reply that every line gets: `ok`, or why not and `error:N`; with the number of a line that
+    /// has one. Before it, if they are to be named, the number that is expected or the last one.
+    pub fn outcome(&mut self, outcome: Result<(), Refusal>, label: Label) {
+        let Label { checksum, named } = label;
+        let with_crc = checksum == Some(Checksum::Crc);
+        if let Err(refusal) = outcome {
+            // A program that sends a CRC wants the number soon, not the reason.
+            let is_expected = matches!(named, Named::Expected(_));
+            if !with_crc || !is_expected || refusal == Refusal::Unnumbered {
                 self.line(format_args!("[MSG:{refusal}]"));
-                self.line(format_args!("error:{}", refusal.number()));
             }
         }
+        let number = match named {
+            Named::Line(number) => Some(number),
+            Named::Nothing => None,
+            Named::Last(last) => {
+                self.checked_line(format_args!("Line: {last}"), with_crc);
+                None
+            }
+            Named::Expected(expected) => {
+                self.checked_line(format_args!("Resend: {expected}"), with_crc);
+                None
+            }
+        };
+        let with_crc = with_crc && number.is_some();
+        let number = Number(number);
+        match outcome {
+            Ok(()) => self.checked_line(format_args!("ok{number}"), with_crc),
+            Err(refusal) => {
+                self.checked_line(format_args!("error:{}{number}", refusal.number()), with_crc)
+            }
+        }
+    }
+
+    /// A line, with its CRC if it is to have one.
+    fn checked_line(&mut self, arguments: fmt::Arguments<'_>, with_crc: bool) {
+        let mut digest = CRC_16.digest();
+        let mut write = |text: &str| {
+            digest.update(text.as_bytes());
+            self.0.write(text.as_bytes());
+        };
+        // The serial line blocks and does not fail.
+        let _ = fmt::write(&mut Pieces(&mut write), arguments);
+        let sum = digest.finalize();
+        if with_crc { self.line(format_args!("*{sum:04X}")) } else { self.line(format_args!("")) }
+    }
+}
+
+/// Text as it is formatted, piece by piece.
+struct Pieces<'w>(&'w mut dyn FnMut(&str));
+
+impl Write for Pieces<'_> {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        (self.0)(text);
+        Ok(())
+    }
+}
+
+/// ` N17`, or nothing.
+struct Number(Option<i32>);
+
+impl fmt::Display for Number {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.map_or(Ok(()), |number| write!(formatter, " N{number}"))
     }
 }
 

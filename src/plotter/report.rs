@@ -69,6 +69,8 @@ impl Inner<'_> {
         Reply(board).line(format_args!(
             "[MODEL:faces {faces}, bars {bars}, curves {curves}, corners {corners} of {limit}]"
         ));
+        let (contents, options) = (model.checksum(), self.options.checksum());
+        Reply(board).line(format_args!("[MODEL:checksum {contents:08X}, options {options:08X}]"));
         let order::Report { odd_points, components, pen_down, pen_up, lifts, bound, optimal } =
             *self.job.report();
         Reply(board)

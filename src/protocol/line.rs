@@ -1,8 +1,9 @@
 //! Bytes to lines, and the bytes that are commands by themselves.
 
 use super::Refusal;
+use super::numbering::NUMBER_LIMIT;
 
-/// The longest line, in bytes without its end.
+/// The longest line, in bytes without its end, its number and its checksum.
 pub const LINE_LIMIT: usize = 256;
 
 /// What was asked for by single bytes, which never wait in a queue.
@@ -136,10 +137,10 @@ impl Sorter {
     }
 }
 
-/// Gathers bytes to lines of at most [`LINE_LIMIT`] bytes.
+/// Gathers bytes to lines of at most [`LINE_LIMIT`] bytes and a number and a checksum.
 #[derive(Debug, Default)]
 pub struct LineReader {
-    bytes: heapless::Vec<u8, LINE_LIMIT>,
+    bytes: heapless::Vec<u8, { LINE_LIMIT + NUMBER_LIMIT }>,
     too_long: bool,
     /// What ended the line before, until the next byte comes.
     ended_by: Option<u8>,

@@ -96,6 +96,17 @@ pub enum Refusal {
     NoJobKept,
     /// The kept job is counted in other steps.
     OtherSteps,
+    /// The checksum of the line is not that of its bytes.
+    Damaged,
+    /// A line with this number must come first.
+    OutOfOrder {
+        /// The number.
+        expected: i32,
+    },
+    /// A line without number or checksum where both are required.
+    Unnumbered,
+    /// The line has this number and was refused with this error when it came first.
+    RefusedBefore(u16),
 }
 
 /// Each `error:N` and what it means, as `docs/protocol.md` lists them.
@@ -152,6 +163,9 @@ pub const MEANINGS: &[(u16, &str)] = &[
     (160, "in force, but not kept: the flash is worn out"),
     (161, "no job is kept"),
     (162, "the kept job is for other steps"),
+    (170, "checksum does not match"),
+    (171, "line out of order"),
+    (172, "line without number and checksum"),
 ];
 
 impl Refusal {
@@ -216,6 +230,10 @@ impl Refusal {
             Self::NotKept => 160,
             Self::NoJobKept => 161,
             Self::OtherSteps => 162,
+            Self::Damaged => 170,
+            Self::OutOfOrder { .. } => 171,
+            Self::Unnumbered => 172,
+            Self::RefusedBefore(number) => *number,
             Self::TooManyLines => 142,
             Self::NothingToUndo => 143,
         }
@@ -323,6 +341,14 @@ impl fmt::Display for Refusal {
             Self::NotKept => formatter.write_str("in force until power is lost: the flash does not keep it"),
             Self::NoJobKept => formatter.write_str("send a model and $plot; only boards with flash for it keep the job"),
             Self::OtherSteps => formatter.write_str("set $100 and $101 as they were, or $plot anew"),
+            Self::Damaged => formatter.write_str("the line was damaged on its way: send it again"),
+            Self::OutOfOrder { expected } => {
+                write!(formatter, "line {expected} comes next; M110 N0 begins again with line 1")
+            }
+            Self::Unnumbered => {
+                formatter.write_str("lines with checksums came before: send ctrl-X to go on without")
+            }
+            Self::RefusedBefore(_) => formatter.write_str("the line was refused when it came first"),
         }
     }
 }

@@ -1,0 +1,127 @@
+//! A checksum of what a model holds, so that a sender can compare it with what it sent.
+
+use super::{Element, FINEST_FRACTION_BITS, Model};
+use crate::checksum::CRC_32;
+
+impl Model<'_> {
+    /// The CRC-32 of the vertices, the bars, faces and whole curves, each with its pen.
+    ///
+    /// It is the same on every machine, however many bits a number takes in memory: the sum is
+    /// over little-endian numbers of 64 bits for coordinates (in units of 2^-30), ends and knots,
+    /// and of 32 bits for everything else. Each part begins with how many there are.
+    ///
+    /// ```
+    /// use penup::model::Model;
+    /// let mut memory = (heapless::Vec::<_, 8>::new(), heapless::Vec::<_, 8>::new());
+    /// let empty = Model::new(&mut memory.0, &mut memory.1);
+    /// // The CRC-32 of three numbers that are 0.
+    /// assert_eq!(empty.checksum(), 0x7BD5_C66F);
+    /// ```
+    #[inline(never)] // Its frame must not lie under the stages'.
+    pub fn checksum(&self) -> u32 {
+        let mut digest = CRC_32.digest();
+        let mut number = |number: u32| digest.update(&number.to_le_bytes());
+        number(self.vertices.len() as u32);
+        let shift = FINEST_FRACTION_BITS - self.fraction_bits;
+        for vertex in self.vertices.iter() {
+            for coordinate in vertex.coordinates() {
+                // Below 2^60.
+                digest.update(&(i64::from(coordinate) << shift).to_le_bytes());
+            }
+        }
+        let mut number = |number: u32| digest.update(&number.to_le_bytes());
+        number((self.faces + self.bars) as u32);
+        for (element, pen) in self.elements().iter_with_pens() {
+            number(pen.into());
+            match element {
+                Element::Bar(from, to) => [2, from.into(), to.into()].map(&mut number),
+                Element::Face(corners) => {
+                    // A face has three corners or more.
+                    number(corners.len() as u32);
+                    corners.iter().for_each(|corner| number(corner.vertex().into()));
+                    [(); 3]
+                }
+            };
+        }
+        number(self.curves.count as u32);
+        for curve in self.curves().iter() {
+            let knots = curve.knots.count().unwrap_or(0);
+            let counts = [curve.control.len(), knots].map(|count| count as u32);
+            for head in [curve.pen.into(), curve.order.into(), counts[0], counts[1]] {
+                digest.update(&u32::to_le_bytes(head));
+            }
+            for control in curve.control {
+                digest.update(&u32::from(*control).to_le_bytes());
+            }
+            let ends = [curve.from, curve.to].map(|end| i64::from(end.to_bits()));
+            for value in ends.into_iter().chain((0..knots).map(|knot| curve.knots.get(knot))) {
+                digest.update(&value.to_le_bytes());
+            }
+        }
+        digest.finalize()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Corner, PenName, Position, unkept};
+    use super::*;
+    use crate::fixed::Decimal;
+    use std::vec::Vec;
+
+    /// Vertices, and then lines of a job as numbers: a face, or a bar for two.
+    fn sum(vertices: &[[&str; 3]], elements: &[(&[i32], u8)]) -> u32 {
+        let mut memory = (heapless::Vec::<Position, 9>::new(), heapless::Vec::<Corner, 64>::new());
+        let mut model = Model::new(&mut memory.0, &mut memory.1);
+        for vertex in vertices {
+            let place = vertex.map(|text| Decimal::parse(text).unwrap());
+            model.add_vertex(place, &mut unkept).unwrap();
+        }
+        for (numbers, pen) in elements {
+            model.choose_pen(true, PenName::Number(*pen), &mut unkept).unwrap();
+            match numbers {
+                [_, _] => model.add_polyline(numbers.iter().copied(), &mut unkept).unwrap(),
+                _ => model.add_face(numbers.iter().copied(), &mut unkept).unwrap(),
+            }
+        }
+        model.checksum()
+    }
+
+    #[test]
+    fn every_part_of_a_model_counts() {
+        const PLACES: [[&str; 3]; 4] =
+            [["0", "0", "0"], ["1", "0", "0"], ["1", "1", "0"], ["0", "1", "0.5"]];
+        let mut other = PLACES;
+        other[3][2] = "0.25";
+        let face: &[i32] = &[1, 2, 3];
+        let sums = [
+            sum(&PLACES, &[]),
+            sum(&PLACES[..3], &[]),
+            sum(&other, &[]),
+            sum(&PLACES, &[(face, 0)]),
+            sum(&PLACES, &[(&[1, 3, 2], 0)]),
+            sum(&PLACES, &[(&[1, 2, 3, 4], 0)]),
+            sum(&PLACES, &[(face, 1)]),
+            sum(&PLACES, &[(&[1, 2], 0), (&[2, 3], 0), (&[3, 1], 0)]),
+            sum(&PLACES, &[(face, 0), (&[1, 2], 0)]),
+            sum(&PLACES, &[(&[1, 2], 0), (face, 0)]),
+        ];
+        let different: std::collections::BTreeSet<u32> = sums.into_iter().collect();
+        assert_eq!(different.len(), sums.len(), "{sums:?}");
+    }
+
+    #[test]
+    fn the_unit_of_the_model_does_not_count() {
+        let near: Vec<[&str; 3]> = std::vec![["1", "0.5", "0"], ["0.25", "0", "1"]];
+        // A vertex far away makes the unit larger, and is taken out again.
+        let mut memory = (heapless::Vec::<Position, 9>::new(), heapless::Vec::<Corner, 64>::new());
+        let mut model = Model::new(&mut memory.0, &mut memory.1);
+        for vertex in near.iter().chain([&["1000", "0", "0"]]) {
+            let place = vertex.map(|text| Decimal::parse(text).unwrap());
+            model.add_vertex(place, &mut unkept).unwrap();
+        }
+        model.vertices.pop();
+        assert!(model.fraction_bits() < FINEST_FRACTION_BITS);
+        assert_eq!(model.checksum(), sum(&near, &[]));
+    }
+}

@@ -1,0 +1,256 @@
+//! Lines with a number and a checksum, so that no line is lost, damaged, repeated or exchanged in
+//! silence.
+//!
+//! A line `N17 v 0 1 0*…` has the number 17; what follows the last `*` is the checksum of all
+//! bytes before it. There are two checksums, which cannot be taken for each other: RepRap's XOR
+//! of the bytes, in one to three decimal digits, and [`CRC_16`], in exactly four hexadecimal
+//! digits (0-9, A-F). A [`Numbering`] takes number and checksum off and says whether the line is
+//! to be carried out. Lines are carried out in the order of their numbers; a line that came
+//! before is acknowledged again. Once lines with a CRC have begun, a line without number and
+//! checksum is refused, as it may be what a damaged line has become; and so is one with an XOR,
+//! which passes one wrong line in 256.
+//!
+//! `M110 N…` sets the number of the last line, `M110` alone with a checksum asks for it, and a
+//! numbered `M2` or `M30` ends the obligation to send numbers, as ctrl-X does.
+
+use super::{LINE_LIMIT, Refusal};
+use crate::checksum::CRC_16;
+
+/// The most bytes that the number and the checksum add to a line: `N-999999999 ` and `*FFFF`.
+pub const NUMBER_LIMIT: usize = 12 + 5;
+
+/// Which checksum stands at the end of a line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Checksum {
+    /// All bytes joined by exclusive or, in decimal: RepRap's.
+    Xor,
+    /// [`CRC_16`] in four hexadecimal digits.
+    Crc,
+}
+
+/// What the reply to a line names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Label {
+    /// How the line was checked: the reply has the same checksum if that is a CRC.
+    pub checksum: Option<Checksum>,
+    /// What is named.
+    pub named: Named,
+}
+
+/// A number in a reply.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Named {
+    /// None: the line had none.
+    #[default]
+    Nothing,
+    /// That of the line, which has been accepted.
+    Line(i32),
+    /// That of the last line that was accepted: the answer to `M110`.
+    Last(i32),
+    /// That of the line that is expected, as this one was not accepted.
+    Expected(i32),
+}
+
+/// What is to be done with a line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Received<'a> {
+    /// It is carried out.
+    Line(&'a str, Label),
+    /// It is only answered.
+    Answer(Result<(), Refusal>, Label),
+}
+
+/// Which lines have come.
+///
+/// ```
+/// use penup::protocol::{Named, Numbering, Received};
+/// let mut numbering = Numbering::default();
+/// let mut receive = |line| match numbering.receive(Ok(line)) {
+///     Received::Line(text, label) => Some((text, label.named)),
+///     Received::Answer(..) => None,
+/// };
+/// assert_eq!(receive("v 0 1 0"), Some(("v 0 1 0", Named::Nothing)));
+/// assert_eq!(receive("N1 v 0 1 0*56"), Some(("v 0 1 0", Named::Line(1))));
+/// assert_eq!(receive("N2 v 0 3 0*56"), None);
+/// ```
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Numbering {
+    /// The number of the last line that was accepted.
+    last: i32,
+    /// Whether a number has come or was set.
+    has_begun: bool,
+    /// What a line must have.
+    required: Option<Checksum>,
+    /// The first line that was accepted and refused since the number was set, and its error.
+    refused: Option<(i32, u16)>,
+}
+
+impl Numbering {
+    /// Checks a line as the reader gave it.
+    #[inline(never)] // Its frame must not lie under the stages'.
+    pub fn receive<'a>(&mut self, line: Result<&'a str, Refusal>) -> Received<'a> {
+        let line = match line {
+            Ok(line) => line,
+            Err(refusal) => return self.refuse(refusal, None),
+        };
+        match Checked::split(line) {
+            Some(checked) => self.receive_checked(checked),
+            None => self.receive_unchecked(line),
+        }
+    }
+
+    /// Notes what came of a line that was carried out.
+    pub fn note(&mut self, label: Label, outcome: Result<(), Refusal>) {
+        if let (Named::Line(number), Err(refusal)) = (label.named, outcome)
+            && number == self.last
+            && self.refused.is_none()
+        {
+            self.refused = Some((number, refusal.number()));
+        }
+    }
+
+    fn receive_checked<'a>(&mut self, line: Checked<'a>) -> Received<'a> {
+        let Checked { checksum, text, .. } = line;
+        let sets_number = number_to_set(text);
+        let by = Some(checksum);
+        if !line.is_whole {
+            return self.refuse(Refusal::Damaged, by);
+        }
+        let label = |number| Label { checksum: by, named: Named::Line(number) };
+        if let Some(number) = sets_number {
+            return match number.or(line.number) {
+                Some(number) => {
+                    let required = Some(checksum);
+                    *self = Self { last: number, has_begun: true, required, refused: None };
+                    Received::Answer(Ok(()), label(line.number.unwrap_or(number)))
+                }
+                None => match self.refused {
+                    Some((number, error)) => {
+                        Received::Answer(Err(Refusal::RefusedBefore(error)), label(number))
+                    }
+                    None => {
+                        let named = Named::Last(self.last);
+                        Received::Answer(Ok(()), Label { checksum: by, named })
+                    }
+                },
+            };
+        }
+        let Some(number) = line.number else { return self.refuse(Refusal::Unnumbered, by) };
+        if self.required == Some(Checksum::Crc) && checksum == Checksum::Xor {
+            return self.refuse(Refusal::Damaged, by);
+        }
+        // A sender that begins without M110 begins at 1, or at 0.
+        if number == self.last + 1 || (number == 0 && !self.has_begun) {
+            (self.last, self.has_begun, self.required) = (number, true, Some(checksum));
+            if matches!(text.trim_ascii(), "M2" | "M30") {
+                self.required = None;
+            }
+            if text.len() > LINE_LIMIT {
+                let outcome = Err(Refusal::LineTooLong { limit: LINE_LIMIT });
+                self.note(label(number), outcome);
+                return Received::Answer(outcome, label(number));
+            }
+            return Received::Line(text, label(number));
+        }
+        if number > self.last || !self.has_begun {
+            return self.refuse(Refusal::OutOfOrder { expected: self.last + 1 }, by);
+        }
+        let again = match self.refused {
+            Some((refused, error)) if refused == number => Err(Refusal::RefusedBefore(error)),
+            _ => Ok(()),
+        };
+        Received::Answer(again, label(number))
+    }
+
+    fn receive_unchecked<'a>(&mut self, line: &'a str) -> Received<'a> {
+        let may_be_damaged = match self.required {
+            None => false,
+            Some(Checksum::Xor) => split_number(line).is_some() || split_checksum(line).is_some(),
+            // What a doubled line end leaves does no harm.
+            Some(Checksum::Crc) => !line.trim_ascii().is_empty(),
+        };
+        if may_be_damaged {
+            return self.refuse(Refusal::Unnumbered, None);
+        }
+        if line.len() > LINE_LIMIT {
+            return self.refuse(Refusal::LineTooLong { limit: LINE_LIMIT }, None);
+        }
+        let (number, text) = split_number(line).map_or((None, line), |(n, text)| (Some(n), text));
+        match number_to_set(text) {
+            Some(to_set) => {
+                if let Some(number) = to_set.or(number) {
+                    *self = Self { last: number, has_begun: true, ..Self::default() };
+                }
+                Received::Answer(Ok(()), Label::default())
+            }
+            None => Received::Line(line, Label::default()),
+        }
+    }
+
+    /// The line is not accepted: the one after the last is expected, if lines are numbered.
+    fn refuse<'a>(&self, refusal: Refusal, by: Option<Checksum>) -> Received<'a> {
+        let is_of_numbers =
+            matches!(refusal, Refusal::Damaged | Refusal::OutOfOrder { .. } | Refusal::Unnumbered);
+        let named = is_of_numbers || self.required.is_some();
+        let named = if named { Named::Expected(self.last + 1) } else { Named::Nothing };
+        let checksum = self.required.filter(|required| *required == Checksum::Crc).or(by);
+        Received::Answer(Err(refusal), Label { checksum, named })
+    }
+}
+
+/// A line with a checksum: one with a number, or `M110`.
+struct Checked<'a> {
+    checksum: Checksum,
+    /// Whether the checksum is right.
+    is_whole: bool,
+    number: Option<i32>,
+    text: &'a str,
+}
+
+impl<'a> Checked<'a> {
+    fn split(line: &'a str) -> Option<Self> {
+        let (head, checksum, value) = split_checksum(line)?;
+        let (number, text) = match split_number(head) {
+            Some((number, text)) => (Some(number), text),
+            None => (None, number_to_set(head).map(|_| head)?),
+        };
+        let right = match checksum {
+            Checksum::Xor => head.bytes().fold(0, |xor, byte| xor ^ byte).into(),
+            Checksum::Crc => CRC_16.checksum(head.as_bytes()),
+        };
+        Some(Self { checksum, is_whole: value == right, number, text })
+    }
+}
+
+/// What stands before the last `*`, and the checksum after it.
+fn split_checksum(line: &str) -> Option<(&str, Checksum, u16)> {
+    let (head, tail) = line.rsplit_once('*')?;
+    let is_hexadecimal = |byte: u8| matches!(byte, b'0'..=b'9' | b'A'..=b'F');
+    if tail.len() == 4 && tail.bytes().all(is_hexadecimal) {
+        return Some((head, Checksum::Crc, u16::from_str_radix(tail, 16).ok()?));
+    }
+    let tail = tail.trim_ascii();
+    let is_decimal = tail.bytes().all(|byte| byte.is_ascii_digit());
+    let value = tail.parse().ok().filter(|_| is_decimal && tail.len() <= 3)?;
+    Some((head, Checksum::Xor, value))
+}
+
+/// The number after `N`, of at most nine digits, and what follows it.
+fn split_number(line: &str) -> Option<(i32, &str)> {
+    let rest = line.trim_ascii_start().strip_prefix('N')?;
+    let digits = rest.strip_prefix('-').unwrap_or(rest);
+    let sign = rest.len() - digits.len();
+    let count = digits.bytes().take_while(u8::is_ascii_digit).count();
+    let (number, text) = rest.split_at_checked(sign + count)?;
+    let number = number.parse().ok().filter(|_| count <= 9)?;
+    Some((number, text.trim_ascii_start()))
+}
+
+/// If the text is `M110`: the number that it sets, if it names one.
+fn number_to_set(text: &str) -> Option<Option<i32>> {
+    let rest = text.trim_ascii().strip_prefix("M110")?.trim_ascii_start();
+    if rest.is_empty() {
+        return Some(None);
+    }
+    split_number(rest).filter(|(_, rest)| rest.is_empty()).map(|(number, _)| Some(number))
+}
