@@ -428,6 +428,17 @@ mod tests {
     }
 
     #[test]
+    fn the_largest_model_and_the_largest_error_do_not_overflow() {
+        let far = 1 << 30;
+        let points = [[-far, -far, -far], [far, -far, far], [-far, far, far], [far, far, -far]];
+        for written in [1, 1 << 20, 1 << 30] {
+            assert!(!are_coplanar(points, Precision { written, unit: 1 }));
+        }
+        let line = [points[0], points[1], points[2]];
+        assert!(!are_in_line(line, Precision { written: 1 << 24, unit: 1 }));
+    }
+
+    #[test]
     fn a_point_off_the_plane_is_off_it() {
         let precision = Precision { written: 500, unit: 1 };
         let side = 1_000_000;

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use penup::convex::{
     Eye, Sight, SinkFull, SolidEdge, SolidSink, from_vertices, scratch_bytes_from_vertices,
 };
-use penup::geometry::{Projection, Vertex};
+use penup::geometry::{Precision, Projection, Vertex};
 use penup::model::{Corner, Elements};
 use penup::stage::{Scratch, Undisturbed};
 use penup::visibility::{Scene, Stretch, Unrounded};
@@ -52,7 +52,9 @@ pub fn is_seen_alike(dice: &mut Dice, stretches: impl Fn(&Scene<'_>) -> Vec<Stre
     let mut words = vec![0; scratch_bytes_from_vertices(points.len()) / 8];
     let mut faces = Faces::default();
     let scratch = Scratch::new(&mut words);
-    if from_vertices(&points, eye, 0, scratch, &mut Undisturbed, &mut faces).is_err() {
+    if from_vertices(&points, eye, Precision::default(), scratch, &mut Undisturbed, &mut faces)
+        .is_err()
+    {
         return false;
     }
     let vertices: Vec<Vertex> = points

@@ -267,6 +267,11 @@ pub fn any_rotation(dice: &mut Dice) -> [[f64; 3]; 3] {
     ]
 }
 
+/// How far what [`as_decimals`] makes may be off, in its unit.
+pub fn half_of_the_last(decimals: i32) -> u32 {
+    (f64::from(1 << 28) / 10f64.powi(decimals)).ceil() as u32 + 1
+}
+
 /// The solid at radius 1, turned, written with so many decimals, and read in units of 2^-29.
 pub fn as_decimals(points: &[Point], rotation: &[[f64; 3]; 3], decimals: i32) -> Vec<Point> {
     let square = |point: &Point| point.iter().map(|part| f64::from(part * part)).sum::<f64>();

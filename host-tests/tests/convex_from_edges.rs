@@ -7,14 +7,18 @@
 use std::collections::BTreeMap;
 
 use penup::convex::{
-    Eye, Sight, SolidError, SolidSummary, default_tolerance, from_edges, from_vertices,
-    scratch_bytes_from_edges, scratch_bytes_from_vertices,
+    Eye, Sight, SolidError, SolidSummary, from_edges, from_vertices, scratch_bytes_from_edges,
+    scratch_bytes_from_vertices,
 };
+use penup::geometry::Precision;
 use penup::stage::{Aborted, Attention, Scratch, Undisturbed};
 use penup_host_tests::convex_model::{Found, Model, Point, model};
 use penup_host_tests::convex_solids::{
-    Dice, any_eye, any_rotation, any_solid, as_decimals, read_scene, roof, solid_count,
+    Dice, any_eye, any_rotation, any_solid, as_decimals, half_of_the_last, read_scene, roof,
+    solid_count,
 };
+
+const EXACT: Precision = Precision { written: 0, unit: 0 };
 
 const SCENES: [&str; 5] = ["cube", "octahedron", "icosahedron", "dodecahedron", "eighteen"];
 
@@ -29,7 +33,8 @@ fn found(
     let mut words = vec![0; scratch_bytes_from_edges(points.len(), edges.len()) / 8];
     let mut sink = Found::default();
     let scratch = Scratch::new(&mut words);
-    let summary = from_edges(points, edges, eye, tolerance, scratch, &mut Undisturbed, &mut sink)?;
+    let precision = Precision { written: tolerance, unit: tolerance.min(1) };
+    let summary = from_edges(points, edges, eye, precision, scratch, &mut Undisturbed, &mut sink)?;
     assert_eq!((summary.faces, summary.edges), (0, sink.edges.len()));
     Ok((summary, sink.edges))
 }
@@ -106,7 +111,8 @@ fn found_from_vertices(points: &[Point], eye: Eye, tolerance: u32) -> Result<Sig
     let mut words = vec![0; scratch_bytes_from_vertices(points.len()) / 8];
     let mut sink = Found::default();
     let scratch = Scratch::new(&mut words);
-    from_vertices(points, eye, tolerance, scratch, &mut Undisturbed, &mut sink)?;
+    let precision = Precision { written: tolerance, unit: tolerance.min(1) };
+    from_vertices(points, eye, precision, scratch, &mut Undisturbed, &mut sink)?;
     Ok(sink.edges)
 }
 
@@ -155,7 +161,7 @@ fn rounded_solids_are_seen_like_exact_ones() {
                     continue;
                 }
             };
-            let tolerance = default_tolerance(&rounded);
+            let tolerance = half_of_the_last(6);
             let seen = found(&rounded, &edges, turned_eye, tolerance);
             assert_eq!(seen.map(|(_, sights)| drawn(sights)).as_ref(), Ok(&exact), "{}", case());
             let seen = found_from_vertices(&rounded, turned_eye, tolerance);
@@ -283,14 +289,29 @@ fn a_word_too_few_or_no_patience_is_an_error() {
     let all = words.len();
     for count in 0..all {
         let scratch = Scratch::new(&mut words[..count]);
-        let result =
-            from_edges(&points, &edges, eye, 0, scratch, &mut Undisturbed, &mut Found::default());
+        let result = from_edges(
+            &points,
+            &edges,
+            eye,
+            EXACT,
+            scratch,
+            &mut Undisturbed,
+            &mut Found::default(),
+        );
         assert!(matches!(result, Err(SolidError::Scratch(_))), "{count} of {all}: {result:?}");
     }
     let mut patience = 0;
     loop {
         let (scratch, mut attention) = (Scratch::new(&mut words), Impatient(patience));
-        match from_edges(&points, &edges, eye, 0, scratch, &mut attention, &mut Found::default()) {
+        match from_edges(
+            &points,
+            &edges,
+            eye,
+            EXACT,
+            scratch,
+            &mut attention,
+            &mut Found::default(),
+        ) {
             Ok(summary) => break assert_eq!(summary.edges, 30),
             Err(error) => assert_eq!(error, SolidError::Aborted),
         }

@@ -8,20 +8,24 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use penup::convex::{
     EYE_LIMIT, Eye, POSITION_LIMIT, Sight, SinkFull, SolidEdge, SolidError, SolidSink,
-    SolidSummary, default_tolerance, from_vertices, scratch_bytes_from_vertices,
+    SolidSummary, from_vertices, scratch_bytes_from_vertices,
 };
+use penup::geometry::Precision;
 use penup::model::Corner;
 use penup::stage::{Aborted, Attention, Scratch, Undisturbed};
 use penup_host_tests::convex_model::{Found, Model, Point, Solid, model};
 use penup_host_tests::convex_solids::{
-    Dice, any_eye, any_rotation, any_solid, as_decimals, read_scene, solid_count,
+    Dice, any_eye, any_rotation, any_solid, as_decimals, half_of_the_last, read_scene, solid_count,
 };
+
+const EXACT: Precision = Precision { written: 0, unit: 0 };
 
 fn found(points: &[Point], eye: Eye, tolerance: u32) -> Result<(SolidSummary, Found), SolidError> {
     let mut words = vec![0; scratch_bytes_from_vertices(points.len()) / 8];
     let mut sink = Found::default();
     let scratch = Scratch::new(&mut words);
-    let summary = from_vertices(points, eye, tolerance, scratch, &mut Undisturbed, &mut sink)?;
+    let precision = Precision { written: tolerance, unit: tolerance.min(1) };
+    let summary = from_vertices(points, eye, precision, scratch, &mut Undisturbed, &mut sink)?;
     assert_eq!((summary.faces, summary.edges), (sink.faces.len(), sink.edges.len()));
     Ok((summary, sink))
 }
@@ -107,7 +111,7 @@ fn rounded_decimals_still_give_whole_faces() {
             for _ in 0..20 {
                 let rounded = as_decimals(&points, &any_rotation(&mut dice), decimals);
                 let eye = Eye::At([0, 1, 2].map(|_| i64::from(dice.throw(-9, 9)) << 32));
-                let tolerance = default_tolerance(&rounded);
+                let tolerance = half_of_the_last(decimals);
                 match found(&rounded, eye, tolerance) {
                     Ok((_, found)) => {
                         let found: BTreeSet<_> =
@@ -148,16 +152,36 @@ const ROOFS: [Point; 12] = [
 ];
 
 #[test]
-fn the_tolerance_is_the_move_of_each_coordinate() {
+fn faces_are_joined_that_may_be_one_plane() {
     let eye = Eye::Towards([1, 2, 3]);
-    let faces = |tolerance| found(&ROOFS, eye, tolerance).map(|(summary, _)| summary.faces);
-    assert_eq!(faces(0), Ok(8));
-    // The larger half of a roof goes down by 10 in 5000; the far edge of the other half is
-    // 10 + 10 × 4000 / 5000 = 18 below its plane, and 18 × 5000 / 5010 coordinate by coordinate.
-    assert_eq!(faces(17), Ok(8));
-    assert_eq!(faces(18), Ok(6));
-    // However large, opposite sides never become one.
-    assert_eq!(faces(9000).map(|faces| faces >= 4), Ok(true));
+    let faces = |written| found(&ROOFS, eye, written).map(|(summary, _)| summary.faces);
+    let joined = |written| found(&ROOFS, eye, written).map(|(summary, _)| summary.joined);
+    assert_eq!((faces(0), joined(0)), (Ok(8), Ok(0)));
+    // The far edge of half a roof is 18 off the plane of the other half. All four corners of that
+    // plane may be off, and reaching out from 5000 to 9000 makes nearly twice as much of it.
+    assert_eq!((faces(4), joined(4)), (Ok(8), Ok(0)));
+    assert_eq!((faces(6), joined(6)), (Ok(6), Ok(2)));
+    // What is less than 64 times the precision wide is as it stands, however large that is.
+    assert_eq!(faces(9000), Ok(8));
+}
+
+#[test]
+fn thin_slabs_and_needles_keep_their_edges() {
+    // 0.002 thick, as a file of three decimals has it, in units of 0.00001: off by up to 50.
+    let (thick, precision) = (200, 51);
+    let slab: Vec<Point> = (0..8)
+        .map(|n| [n & 1, n >> 1 & 1, n >> 2 & 1])
+        .map(|[x, y, z]| [3_000_000 * x + 7000 * y, 2_000_000 * y - 3000 * x, thick * z + 40 * x])
+        .collect();
+    let wedge: Vec<Point> =
+        slab.iter().filter(|point| point[1] > 0 || point[2] < thick).copied().collect();
+    let needle = vec![[0, 0, 0], [thick, 0, 0], [0, thick, 0], [90, 80, 5_000_000]];
+    let eye = Eye::At([9_000_000, 8_000_000, 7_000_000]);
+    for solid in [slab, wedge, needle] {
+        let exact = found(&solid, eye, 0).map(|(summary, _)| summary.edges);
+        let rounded = found(&solid, eye, precision).map(|(summary, _)| summary);
+        assert_eq!(rounded.map(|summary| (summary.edges, summary.joined)), exact.map(|e| (e, 0)));
+    }
 }
 
 #[test]
@@ -180,9 +204,9 @@ fn a_vertex_just_inside_a_face_is_flat_and_one_deeper_is_refused() {
     let eye = Eye::Towards([1, 2, 3]);
     let error = SolidError::VertexInside { vertex: 12, count: 1 };
     assert_eq!(found(&points, eye, 0).map(|_| ()), Err(error));
-    assert_eq!(found(&points, eye, 2).map(|_| ()), Err(error));
+    assert_eq!(found(&points, eye, 1).map(|_| ()), Err(error));
     assert_eq!(
-        found(&points, eye, 3).map(|(summary, _)| (summary.faces, summary.flat)),
+        found(&points, eye, 2).map(|(summary, _)| (summary.faces, summary.flat)),
         Ok((8, 1))
     );
 }
@@ -277,19 +301,27 @@ fn a_word_too_few_is_an_error_and_the_sink_is_given_nothing() {
     for count in 0..words_needed {
         let scratch = Scratch::new(&mut words[..count]);
         let mut sink = Limited(0);
-        let result = from_vertices(&points, FROM_THERE, 0, scratch, &mut Undisturbed, &mut sink);
+        let result =
+            from_vertices(&points, FROM_THERE, EXACT, scratch, &mut Undisturbed, &mut sink);
         assert!(matches!(result, Err(SolidError::Scratch(_))), "{count} {result:?}");
     }
     // 20 faces and 30 edges.
     for room in [0, 19, 20, 49] {
         let scratch = Scratch::new(&mut words);
-        let result =
-            from_vertices(&points, FROM_THERE, 0, scratch, &mut Undisturbed, &mut Limited(room));
+        let result = from_vertices(
+            &points,
+            FROM_THERE,
+            EXACT,
+            scratch,
+            &mut Undisturbed,
+            &mut Limited(room),
+        );
         assert_eq!(result, Err(SolidError::SinkFull));
     }
     let scratch = Scratch::new(&mut words);
     assert!(
-        from_vertices(&points, FROM_THERE, 0, scratch, &mut Undisturbed, &mut Limited(50)).is_ok()
+        from_vertices(&points, FROM_THERE, EXACT, scratch, &mut Undisturbed, &mut Limited(50))
+            .is_ok()
     );
 }
 
@@ -312,9 +344,9 @@ fn the_user_can_give_up_at_any_moment() {
     loop {
         let scratch = Scratch::new(&mut words);
         let mut attention = Impatient(patience);
-        let tolerance = default_tolerance(&rounded);
+        let precision = Precision { written: half_of_the_last(6), unit: 1 };
         let mut sink = Limited(42);
-        match from_vertices(&rounded, FROM_THERE, tolerance, scratch, &mut attention, &mut sink) {
+        match from_vertices(&rounded, FROM_THERE, precision, scratch, &mut attention, &mut sink) {
             Ok(_) => break,
             Err(error) => assert_eq!(error, SolidError::Aborted),
         }

@@ -102,6 +102,34 @@ fn vertices_alone_edges_alone_and_faces_show_the_same_solid() {
 }
 
 #[test]
+fn edges_that_rounding_made_are_left_out_and_counted() {
+    let mut bench = with_scene("dodecahedron", |line| !line.starts_with('f'));
+    let said = bench.say("$rotate=z,33\n$rotate=x,20\n$see=vertices\n$hidden=dotted\n$plot\n");
+    assert!(said.contains(" edges are left out: within the precision"), "{said}");
+    bench.finish();
+    assert_eq!(seen(&mut bench, "").unwrap().len(), 30);
+}
+
+#[test]
+fn a_thin_slab_has_twelve_edges_at_any_precision_that_a_file_tells() {
+    // 0.002 thick and 300 long: within 2^-17 of a plane.
+    let corners = (0..8).map(|n| [n & 1, n >> 1 & 1, n >> 2 & 1]);
+    let vertices: String = corners
+        .map(|[x, y, z]| format!("v {} {} {y}.{}\n", 300 * x, 200 * y + 7 * x, 123 + 2 * z))
+        .collect();
+    for precision in ["auto", "0"] {
+        let mut bench = Bench::new();
+        bench.heard();
+        let said = bench.say(&format!("{vertices}$precision={precision}\n$see=vertices\n"));
+        assert!(!said.contains("error"), "{said}");
+        let edges = seen(&mut bench, "$hidden=dotted\n").unwrap();
+        assert_eq!(edges.len(), 12, "{precision}");
+    }
+    let said = Bench::new().say("$precision=0.010\n$options\n$precision=-1\n");
+    assert!(said.contains("$precision=10e-3\n") && said.contains("error"), "{said}");
+}
+
+#[test]
 fn the_same_strokes_are_drawn_whichever_way_is_chosen() {
     // Seen straight on and along an axis of symmetry, too: what is edge-on is inked once.
     for (scene, eye) in [("cube", "0,-9,0"), ("octahedron", "9,9,9"), ("dodecahedron", "3,7,4")] {

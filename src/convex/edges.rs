@@ -19,6 +19,7 @@ use super::exact::{Plane, Point, Viewpoint};
 use super::points::{self, Span};
 use super::polygon::Polygon;
 use super::{Eye, Sight, SolidEdge, SolidError, SolidSink, SolidSummary};
+use crate::geometry::Precision;
 use crate::stage::{Attention, OutOfScratch, Scratch, heap_sort_by_key};
 
 /// Finds how each edge of a convex solid is seen.
@@ -26,13 +27,14 @@ use crate::stage::{Attention, OutOfScratch, Scratch, heap_sort_by_key};
 /// `edges`: pairs of vertex numbers, from 0, in any order and direction; an edge given twice counts once,
 /// an edge between two vertices at the same place not at all. Vertices without an edge are left out. The
 /// edges are believed: no face is looked for. The sink gets every edge once, lesser vertex first, in order,
-/// and no face. `tolerance`: how far, in units of the positions, a coordinate may be off (see the module).
+/// and no face. `precision`: how far the positions may be off (see the module).
 ///
 /// # Errors
 /// See [`SolidError`].
 ///
 /// ```
 /// use penup::convex::*;
+/// use penup::geometry::Precision;
 /// use penup::model::Corner;
 /// use penup::stage::{Scratch, Undisturbed};
 ///
@@ -56,7 +58,8 @@ use crate::stage::{Attention, OutOfScratch, Scratch, heap_sort_by_key};
 /// let mut hidden = Hidden::default();
 /// let eye = Eye::At([2, 2, -9]);
 /// let scratch = Scratch::new(&mut words);
-/// let summary = from_edges(&pyramid, &edges, eye, 0, scratch, &mut Undisturbed, &mut hidden)?;
+/// let exact = Precision::default();
+/// let summary = from_edges(&pyramid, &edges, eye, exact, scratch, &mut Undisturbed, &mut hidden)?;
 /// assert_eq!((summary.edges, summary.components), (8, 1));
 /// assert_eq!(hidden.0, [(0, 4), (1, 4), (2, 4), (3, 4)]);
 /// # Ok::<(), SolidError>(())
@@ -65,7 +68,7 @@ pub fn from_edges(
     positions: &[[i32; 3]],
     edges: &[[u16; 2]],
     eye: Eye,
-    tolerance: u32,
+    precision: Precision,
     mut scratch: Scratch<'_>,
     attention: &mut dyn Attention,
     sink: &mut dyn SolidSink,
@@ -89,7 +92,7 @@ pub fn from_edges(
         Span::Space(inside) => inside,
     };
     let viewpoint = Viewpoint {
-        eye: points::drawn_in_eye(eye, positions, graph.numbers, tolerance),
+        eye: points::drawn_in_eye(eye, positions, graph.numbers, precision),
         inside: Some(inside.map(|number| positions[usize::from(number)])),
     };
     let outline = graph.find_outline(&viewpoint, inside, &mut scratch, attention)?;
@@ -463,7 +466,8 @@ mod tests {
         let mut words = vec![0; scratch_bytes_from_vertices(points.len()) / 8];
         let mut edges = Edges::default();
         let scratch = Scratch::new(&mut words);
-        let found = from_vertices(points, FROM_ABOVE, 0, scratch, &mut Undisturbed, &mut edges);
+        let exact = Precision::default();
+        let found = from_vertices(points, FROM_ABOVE, exact, scratch, &mut Undisturbed, &mut edges);
         assert_eq!(found.map(|summary| summary.edges), Ok(edges.0.len()));
         edges.0
     }

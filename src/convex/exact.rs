@@ -75,13 +75,6 @@ impl Plane {
     pub(super) fn size(&self) -> u64 {
         self.normal.iter().map(|part| part.unsigned_abs()).sum()
     }
-
-    /// Whether the plane can be made to pass through `point` by moving each of the point's
-    /// coordinates by at most `tolerance`.
-    pub(super) fn is_near(&self, point: Point, tolerance: u32) -> bool {
-        // Of all moves within the tolerance, the one along the signs of the normal reaches farthest.
-        self.height(point).unsigned_abs() <= u128::from(tolerance) * u128::from(self.size())
-    }
 }
 
 /// The eye, drawn in by an infinitely small step towards a point inside the solid.
@@ -121,16 +114,6 @@ mod tests {
         assert!(plane.height_of_eye(Eye::At([-(1 << 61), -(1 << 61), 1 << 61])) > 0);
         assert!(plane.height_of_eye(plane.eye_above()) > 0);
         assert_eq!(plane.size(), 3 << 62);
-        assert!(plane.is_near([FAR, FAR, FAR], u32::MAX));
-    }
-
-    #[test]
-    fn nearness_is_measured_along_the_coordinates() {
-        // x + y + z = 0
-        let plane = Plane::through([0, 0, 0], [1, -1, 0], [1, 0, -1]);
-        assert!(plane.is_near([2, 2, 2], 2));
-        assert!(!plane.is_near([2, 2, 3], 2));
-        assert!(!plane.is_near([1, 0, 0], 0));
     }
 
     #[test]

@@ -21,6 +21,7 @@ use super::joined::Joining;
 use super::points::{self, Span};
 use super::polygon::Polygon;
 use super::{Eye, Sight, SolidEdge, SolidError, SolidSink, SolidSummary};
+use crate::geometry::Precision;
 use crate::model::Corner;
 use crate::stage::{Attention, Scratch};
 
@@ -46,14 +47,14 @@ pub(super) type FaceCorners = [u16; 3];
 
 /// Finds faces and edges of the convex solid that `positions` are the corners of.
 ///
-/// `tolerance`: how far, in units of the positions, a corner may be off the plane of its face (see the
-/// module; [`super::default_tolerance`]).
+/// `precision`: how far the positions may be off (see the module).
 ///
 /// # Errors
 /// See [`SolidError`].
 ///
 /// ```
 /// use penup::convex::*;
+/// use penup::geometry::Precision;
 /// use penup::model::Corner;
 /// use penup::stage::{Scratch, Undisturbed};
 ///
@@ -74,7 +75,8 @@ pub(super) type FaceCorners = [u16; 3];
 /// let mut words = vec![0; scratch_bytes_from_vertices(8) / 8];
 /// let mut count = Count::default();
 /// let eye = Eye::At([5, 4, 3]);
-/// let summary = from_vertices(&cube, eye, 0, Scratch::new(&mut words), &mut Undisturbed, &mut count)?;
+/// let (exact, scratch) = (Precision::default(), Scratch::new(&mut words));
+/// let summary = from_vertices(&cube, eye, exact, scratch, &mut Undisturbed, &mut count)?;
 /// assert_eq!((summary.faces, summary.edges), (6, 12));
 /// assert_eq!((count.visible_faces, count.hidden_edges), (3, 3));
 /// # Ok::<(), SolidError>(())
@@ -82,7 +84,7 @@ pub(super) type FaceCorners = [u16; 3];
 pub fn from_vertices(
     positions: &[[i32; 3]],
     eye: Eye,
-    tolerance: u32,
+    precision: Precision,
     mut scratch: Scratch<'_>,
     attention: &mut dyn Attention,
     sink: &mut dyn SolidSink,
@@ -106,12 +108,12 @@ pub fn from_vertices(
         }
         Span::Space(inside) => {
             let mut scratch = scratch.reborrow();
-            let drawn_in = points::drawn_in_eye(eye, positions, numbers, tolerance);
+            let drawn_in = points::drawn_in_eye(eye, positions, numbers, precision);
             let mut search = Search::new(positions, eye, inside, numbers, &mut scratch, attention)?;
             search.find_all_faces(attention)?;
             let mut joining = Joining::new(search.into_solid(), eye, drawn_in, &mut scratch)?;
-            joining.check_convex(tolerance, attention)?;
-            joining.join_faces(tolerance, attention)?;
+            joining.check_convex(precision, attention)?;
+            joining.join_faces(precision, attention)?;
             joining.hand_over(summary, attention, sink)
         }
     }

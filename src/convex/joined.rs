@@ -1,13 +1,14 @@
 //! Faces that are one but for rounding are joined, and the finished solid is handed over.
 //!
-//! A face takes in its neighbours, and theirs, as long as each of their corners can be brought onto its
-//! plane by moving each coordinate by at most the tolerance, and they look to the same side. The largest
+//! A face takes in its neighbours, and theirs, as long as each of their corners may lie in its plane
+//! ([`are_coplanar`], within the precision), and they look to the same side. The largest
 //! face begins, because its plane is the surest. Nothing chains: every corner is held against the plane of
 //! the face that began. Faces whose union is not one simple polygon stay apart.
 
-use super::exact::Plane;
+use super::exact::{Plane, Point};
 use super::faces::{HullEdge, Solid, UNKNOWN};
 use super::{Eye, Sight, SolidEdge, SolidError, SolidSink, SolidSummary};
+use crate::geometry::{Precision, are_coplanar};
 use crate::model::Corner;
 use crate::stage::{Attention, OutOfScratch, Scratch};
 
@@ -15,7 +16,7 @@ use crate::stage::{Attention, OutOfScratch, Scratch};
 pub(super) struct Joining<'s> {
     solid: Solid<'s>,
     eye: Eye,
-    /// The same, moved as the tolerance asks for: it decides what is visible.
+    /// The same, moved as the precision asks for: it decides what is visible.
     drawn_in: Eye,
     /// For each face the face that took it in, which may be itself.
     joined: &'s mut [u16],
@@ -58,10 +59,10 @@ impl<'s> Joining<'s> {
         Plane::through(a, b, c)
     }
 
-    /// Refuses vertices deeper inside than the tolerance; the others are as good as on a face.
+    /// Refuses vertices deeper inside than the precision; the others are as good as on a face.
     pub(super) fn check_convex(
         &mut self,
-        tolerance: u32,
+        precision: Precision,
         attention: &mut dyn Attention,
     ) -> Result<(), SolidError> {
         let mut deep = 0;
@@ -70,8 +71,8 @@ impl<'s> Joining<'s> {
             attention.check()?;
             let point = self.solid.points[usize::from(*number)];
             let faces = 0..self.solid.faces.len() as u16; // below 2^15
-            let near = tolerance > 0
-                && faces.into_iter().any(|face| self.plane(face).is_near(point, tolerance));
+            let near = precision.written > 0
+                && faces.into_iter().any(|face| self.is_near(face, point, precision));
             if !near {
                 deep += 1;
                 first = first.min(*number);
@@ -84,18 +85,18 @@ impl<'s> Joining<'s> {
         Ok(())
     }
 
-    /// Joins faces that differ by no more than the tolerance.
+    /// Joins faces that differ by no more than the precision.
     pub(super) fn join_faces(
         &mut self,
-        tolerance: u32,
+        precision: Precision,
         attention: &mut dyn Attention,
     ) -> Result<(), SolidError> {
-        if tolerance == 0 {
+        if precision.written == 0 {
             return Ok(());
         }
         for edge in self.solid.edges {
             attention.check()?;
-            if self.is_almost_flat(edge, tolerance) {
+            if self.is_almost_flat(edge, precision) {
                 self.joined[usize::from(edge.left)] = UNKNOWN;
                 self.joined[usize::from(edge.right)] = UNKNOWN;
             }
@@ -103,7 +104,7 @@ impl<'s> Joining<'s> {
         while let Some(first) = self.largest_undecided_face() {
             self.joined[usize::from(first)] = first;
             let plane = self.plane(first);
-            while self.take_in_neighbours(first, &plane, tolerance, attention)? {}
+            while self.take_in_neighbours(first, &plane, precision, attention)? {}
             if self.go_around(first).is_none() {
                 for (joined, face) in self.joined.iter_mut().zip(0..) {
                     if *joined == first && face != first {
@@ -116,15 +117,22 @@ impl<'s> Joining<'s> {
     }
 
     /// Whether one of the two faces might take in the other.
-    fn is_almost_flat(&self, edge: &HullEdge, tolerance: u32) -> bool {
+    fn is_almost_flat(&self, edge: &HullEdge, precision: Precision) -> bool {
         let (left, right) = (self.plane(edge.left), self.plane(edge.right));
-        let near = |plane: &Plane, face: u16| {
-            let corners = self.solid.faces[usize::from(face)];
+        let near = |plane: u16, face: u16| {
+            let corners = self.solid.faces[usize::from(face)].iter();
             corners
-                .iter()
-                .all(|number| plane.is_near(self.solid.points[usize::from(*number)], tolerance))
+                .map(|number| self.solid.points[usize::from(*number)])
+                .all(|point| self.is_near(plane, point, precision))
         };
-        left.is_turned_like(&right) && (near(&left, edge.right) || near(&right, edge.left))
+        left.is_turned_like(&right) && (near(edge.left, edge.right) || near(edge.right, edge.left))
+    }
+
+    /// Whether the plane of a face may hold a point.
+    fn is_near(&self, face: u16, point: Point, precision: Precision) -> bool {
+        let [a, b, c] = self.solid.faces[usize::from(face)]
+            .map(|number| self.solid.points[usize::from(number)]);
+        are_coplanar([a, b, c, point], precision)
     }
 
     fn largest_undecided_face(&self) -> Option<u16> {
@@ -141,7 +149,7 @@ impl<'s> Joining<'s> {
         &mut self,
         first: u16,
         plane: &Plane,
-        tolerance: u32,
+        precision: Precision,
         attention: &mut dyn Attention,
     ) -> Result<bool, SolidError> {
         let mut any = false;
@@ -154,7 +162,7 @@ impl<'s> Joining<'s> {
             };
             attention.check()?;
             if plane.is_turned_like(&self.plane(neighbour))
-                && self.is_all_near(neighbour, plane, tolerance)
+                && self.is_all_near(neighbour, first, precision)
             {
                 self.joined[usize::from(neighbour)] = first;
                 any = true;
@@ -163,8 +171,9 @@ impl<'s> Joining<'s> {
         Ok(any)
     }
 
-    fn is_all_near(&self, face: u16, plane: &Plane, tolerance: u32) -> bool {
-        let near = |number: u16| plane.is_near(self.solid.points[usize::from(number)], tolerance);
+    fn is_all_near(&self, face: u16, plane: u16, precision: Precision) -> bool {
+        let near =
+            |number: u16| self.is_near(plane, self.solid.points[usize::from(number)], precision);
         self.solid
             .edges
             .iter()
@@ -231,6 +240,7 @@ impl<'s> Joining<'s> {
         for edge in self.solid.edges {
             let [left, right] = [edge.left, edge.right].map(|face| self.joined[usize::from(face)]);
             if left == right {
+                summary.joined += 1;
                 continue;
             }
             self.next[usize::from(edge.from)] = edge.to;

@@ -11,17 +11,14 @@
 //! edge-on. The eye is given in the same unit. No page is needed, so the camera's other numbers are not
 //! either, and an eye so near that part of the solid lies behind it is all right.
 //!
-//! Positions that came from decimals are off by the rounding of the decimals: by at most the `tolerance`,
-//! in units of the positions, that both take. Tolerance zero is exact. Otherwise
+//! Positions that came from decimals are off by the rounding of the decimals: by at most the `precision`
+//! that both take. The default is exact. Otherwise
 //! - [`from_vertices`] joins the faces that it found exactly: a face takes in its neighbours if each of
-//!   their corners comes onto its plane by moving each coordinate by at most the tolerance;
+//!   their corners may lie in its plane ([`crate::geometry::are_coplanar`]). Faces narrower than 64
+//!   times the precision stay as they are, so that thin slabs and needles keep their edges;
 //! - the eye is moved towards the middle of the solid: with e the solid's largest extent, the reciprocal of
-//!   its distance grows by 4 tolerance / e². So what is meant to be edge-on, or one behind the other, is
+//!   its distance grows by 64 precisions / e². So what is meant to be edge-on, or one behind the other, is
 //!   hidden beyond doubt, where else it would peep out on one side or the other.
-//!
-//! [`default_tolerance`] is 2^-17 of the largest extent: six decimals of coordinates about 1 are good
-//! enough for it, and on paper it is a thousandth of a millimetre. It turns a parallel view into one from
-//! 32768 times the solid's size away.
 //!
 //! Refused: fewer than four different vertices, vertices all in line, a vertex inside the solid that
 //! the others span, an eye inside. Vertices all in one plane are drawn as the flat polygon that they
@@ -41,7 +38,6 @@ use crate::stage::{Aborted, OutOfScratch};
 pub use edges::{from_edges, scratch_bytes_from_edges};
 pub use eye::{EYE_LIMIT, Eye};
 pub use faces::{from_vertices, scratch_bytes_from_vertices};
-pub use points::default_tolerance;
 
 /// Positions lie within ± this, so that differences fit 32 bits.
 pub const POSITION_LIMIT: i32 = 1 << 30;
@@ -98,6 +94,8 @@ pub struct SolidSummary {
     pub edges: usize,
     /// Vertices left out because an earlier one is at the same place.
     pub welded: usize,
+    /// Edges left out because their faces may be one ([`from_vertices`] only).
+    pub joined: usize,
     /// Vertices that are no corners: in the middle of a face or an edge.
     pub flat: usize,
     /// Parts into which the graph fell without the outline ([`from_edges`] only).
@@ -126,7 +124,7 @@ pub enum SolidError {
     BadEye,
     /// The eye is inside the solid or on its surface.
     EyeInside,
-    /// Not convex: a vertex lies inside the solid that the others span, deeper than the tolerance.
+    /// Not convex: a vertex lies inside the solid that the others span, deeper than the precision.
     VertexInside {
         /// The first such vertex, from 0.
         vertex: u16,

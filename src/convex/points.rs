@@ -2,19 +2,9 @@
 
 use super::exact::{Plane, Point};
 use super::{Eye, POSITION_LIMIT, SolidError};
+use crate::geometry::Precision;
 use crate::model::VERTEX_NUMBER_LIMIT;
 use crate::stage::heap_sort_by_key;
-
-/// The tolerance that takes rounded decimals for what they mean: 2^-17 of the largest extent.
-///
-/// ```
-/// use penup::convex::default_tolerance;
-/// assert_eq!(default_tolerance(&[[0, 0, 0], [1 << 20, 9, 9]]), 8);
-/// assert_eq!(default_tolerance(&[[0, 0, 0], [100_000, 0, 0]]), 0);
-/// ```
-pub fn default_tolerance(positions: &[[i32; 3]]) -> u32 {
-    largest_extent(positions.iter().copied()) >> 17
-}
 
 /// The longest side of the box around the points.
 pub(super) fn largest_extent(points: impl Iterator<Item = Point> + Clone) -> u32 {
@@ -27,8 +17,15 @@ pub(super) fn largest_extent(points: impl Iterator<Item = Point> + Clone) -> u32
     [0, 1, 2].map(extent).into_iter().max().unwrap_or(0)
 }
 
-/// The eye, moved towards the middle of the points at `numbers` as the tolerance asks for.
-pub(super) fn drawn_in_eye(eye: Eye, points: &[Point], numbers: &[u16], tolerance: u32) -> Eye {
+/// The eye, moved towards the middle of the points at `numbers` as the precision asks for: by what an
+/// edge of a tenth of the solid's extent, its ends off by so much, may turn.
+pub(super) fn drawn_in_eye(
+    eye: Eye,
+    points: &[Point],
+    numbers: &[u16],
+    precision: Precision,
+) -> Eye {
+    let tolerance = precision.written.saturating_mul(16);
     let corners = numbers.iter().map(|number| points[usize::from(*number)]);
     let count = numbers.len().max(1) as i64; // at most 2^14
     let mean = |axis: usize| {

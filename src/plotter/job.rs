@@ -43,6 +43,7 @@ pub struct Job {
     legs: usize,
     report: order::Report,
     degenerate_faces: u32,
+    joined_edges: usize,
 }
 
 impl Job {
@@ -65,13 +66,16 @@ impl Job {
             return Err(Refusal::NothingToPlot);
         }
         title::check(options, steps)?;
-        let mut degenerate_faces = 0;
+        let (mut degenerate_faces, mut joined_edges) = (0, 0);
         let lines = if model.is_plan() && options.shows_plans_flat() {
             plan::lay_out(model, options, steps, words, attention, observer)?
         } else {
             match options.see {
                 WayToSee::Vertices | WayToSee::Edges => {
-                    solid::project(model, options, steps, words, attention, observer)?
+                    let lines;
+                    (lines, joined_edges) =
+                        solid::project(model, options, steps, words, attention, observer)?;
+                    lines
                 }
                 WayToSee::Faces | WayToSee::Wire => {
                     let found = project(model, options, steps, words, attention, observer)?;
@@ -90,7 +94,7 @@ impl Job {
         }
         let tour = rest.take::<Leg>(legs).map_err(Refusal::DrawingTooLarge)?;
         let report = order::order(drawing, options.order(steps), rest, attention, tour)?;
-        Ok(Self { stored, legs, report, degenerate_faces })
+        Ok(Self { stored, legs, report, degenerate_faces, joined_edges })
     }
 
     /// How many words of its memory hold it.
@@ -145,6 +149,7 @@ impl Job {
                 bound: length(bound, bound_high),
             },
             degenerate_faces: 0,
+            joined_edges: 0,
         })
     }
 
@@ -161,6 +166,11 @@ impl Job {
     /// Faces of the model that were left out because they have no area.
     pub fn degenerate_faces(&self) -> u32 {
         self.degenerate_faces
+    }
+
+    /// Edges of a convex solid that were left out because the faces beside them may be one.
+    pub fn joined_edges(&self) -> usize {
+        self.joined_edges
     }
 
     /// The strokes, from `cursor` on. `words` are those that hold the job.

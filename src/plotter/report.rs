@@ -49,6 +49,12 @@ impl Inner<'_> {
         if count > 0 {
             Reply(board).line(format_args!("[MSG:{count} faces have no area and are left out]"));
         }
+        let count = self.job.joined_edges();
+        if count > 0 {
+            Reply(board).line(format_args!(
+                "[MSG:{count} edges are left out: within the precision, the faces beside them are one]"
+            ));
+        }
     }
 
     #[inline(never)] // Its frame must not lie under the stages'.

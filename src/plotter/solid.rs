@@ -2,9 +2,7 @@
 
 use super::PlotOptions;
 use super::job::{Collector, Observer, PageSink, grow, look, to_front};
-use crate::convex::{
-    self, Eye, Sight, SinkFull, SolidEdge, SolidError, SolidSink, default_tolerance,
-};
+use crate::convex::{self, Eye, Sight, SinkFull, SolidEdge, SolidError, SolidSink};
 use crate::drawing::{Bounds, PageMap, StepsPerMillimetre};
 use crate::model::{Corner, Model};
 use crate::protocol::{HiddenLines, Refusal, WayToSee};
@@ -12,7 +10,8 @@ use crate::stage::{Attention, Scratch, Stage, items_mut};
 use crate::view::{SightLines, distinct_edges};
 use crate::visibility::{Along, Stretch, StretchSink};
 
-/// Finds what is seen of the solid. Returns how many lines stand in `words`.
+/// Finds what is seen of the solid. Returns how many lines stand in `words`, and how many edges were
+/// left out because the faces beside them may be one.
 #[inline(never)] // Its frame must not lie under the other stages'.
 pub(super) fn project(
     model: &Model<'_>,
@@ -21,7 +20,7 @@ pub(super) fn project(
     words: &mut [u64],
     attention: &mut dyn Attention,
     observer: &mut dyn Observer,
-) -> Result<usize, Refusal> {
+) -> Result<(usize, usize), Refusal> {
     let (camera, view) = look(model, options, attention)?;
     let eye = match camera.sight_lines(model.fraction_bits()).map_err(Refusal::View)? {
         SightLines::Through(place) => Eye::At(place),
@@ -29,7 +28,7 @@ pub(super) fn project(
     };
     attention.enter(Stage::Visibility);
     let positions = bytemuck::cast_slice(model.vertices());
-    let tolerance = default_tolerance(positions);
+    let precision = options.precision_of(model);
     // No solid has more edges than its vertices allow (Euler), nor more than were sent.
     let most = match options.see {
         WayToSee::Edges => model.corner_count(),
@@ -41,11 +40,11 @@ pub(super) fn project(
     let found = if options.see == WayToSee::Edges {
         let sent = distinct_edges(model.elements(), &mut scratch);
         let sent = sent.map_err(Refusal::DrawingTooLarge)?;
-        convex::from_edges(positions, sent, eye, tolerance, scratch, attention, &mut edges)
+        convex::from_edges(positions, sent, eye, precision, scratch, attention, &mut edges)
     } else {
-        convex::from_vertices(positions, eye, tolerance, scratch, attention, &mut edges)
+        convex::from_vertices(positions, eye, precision, scratch, attention, &mut edges)
     };
-    found.map_err(|error| match error {
+    let summary = found.map_err(|error| match error {
         SolidError::Scratch(missing) => Refusal::DrawingTooLarge(missing),
         SolidError::Aborted => Refusal::Aborted,
         error => Refusal::Solid(error),
@@ -80,7 +79,7 @@ pub(super) fn project(
     }
     let count = sink.collector.count;
     to_front(words, Scratch::bytes_for::<[u16; 2]>(most) / 8, count);
-    Ok(count)
+    Ok((count, summary.joined))
 }
 
 /// The edges of the solid: those to be drawn as visible from the front, as hidden from the back.

@@ -24,13 +24,15 @@ impl Crease {
     /// Whether the edge is drawn that ends at `end`, between two faces given by their corners.
     ///
     /// `turned`: the two run along the edge the same way, so one of them is seen from its back when the
-    /// other is seen from its front.
+    /// other is seen from its front. `are_one_plane`: whether the faces lie in one plane in the model.
+    /// Where one goes on as the other the edge is not drawn then, however rounding bends them.
     pub fn keeps(
         &self,
         projection: Projection,
         end: Vertex,
         faces: [&mut dyn Iterator<Item = Vertex>; 2],
         turned: bool,
+        are_one_plane: &dyn Fn() -> bool,
     ) -> bool {
         let [one, other] = faces.map(areas);
         let other = if turned { other.map(|area| -area) } else { other };
@@ -43,8 +45,13 @@ impl Crease {
                 .signum(),
             Projection::Parallel => i128::from(normal[2].signum()),
         };
-        facing(one) * facing(other) <= 0
-            || self.is_sharp(self.unstretched(one), self.unstretched(other))
+        let is_drawn = facing(one) * facing(other) <= 0
+            || self.is_sharp(self.unstretched(one), self.unstretched(other));
+        let is_folded = || {
+            let products = one.into_iter().zip(other).map(|(a, b)| i128::from(a) * i128::from(b));
+            products.sum::<i128>() <= 0
+        };
+        is_drawn && (is_folded() || !are_one_plane())
     }
 
     /// A normal in true proportions, with parts below 2^20.
@@ -84,7 +91,7 @@ mod tests {
         let other = [far, AT, Vertex::new(1000, 0, 1000 - right)];
         let faces: [&mut dyn Iterator<Item = Vertex>; 2] =
             [&mut one.into_iter(), &mut other.into_iter()];
-        crease.keeps(Projection::Parallel, AT, faces, false)
+        crease.keeps(Projection::Parallel, AT, faces, false, &|| false)
     }
 
     #[test]
@@ -101,6 +108,22 @@ mod tests {
     }
 
     #[test]
+    fn one_plane_has_no_crease_unless_it_is_folded() {
+        let crease = Crease { cosine: 1 << 15, depth_stretch: (1, 1) };
+        let far = Vertex::new(0, 500, 1000);
+        for (across, is_one_plane, is_drawn) in
+            [(1000, true, false), (1000, false, true), (-1000, true, true)]
+        {
+            let one = [AT, far, Vertex::new(-1000, 0, 1000)];
+            let other = [far, AT, Vertex::new(across, 0, 1001)];
+            let mut both = (one.into_iter(), other.into_iter());
+            let faces: [&mut dyn Iterator<Item = Vertex>; 2] = [&mut both.0, &mut both.1];
+            let found = crease.keeps(Projection::Parallel, AT, faces, false, &|| is_one_plane);
+            assert_eq!(found, is_drawn, "{across} {is_one_plane}");
+        }
+    }
+
+    #[test]
     fn the_stretch_of_depth_is_undone() {
         assert!(!keeps(23170, (7, 2), 0, 3499) && keeps(23170, (7, 2), 0, 3501));
     }
@@ -113,12 +136,15 @@ mod tests {
         for (tip, is_drawn) in [(-1, true), (0, true), (1, false)] {
             let other = [far, AT, Vertex::new(tip, 0, -5000)];
             let mut both = (one.into_iter(), other.into_iter());
-            let kept = crease.keeps(Projection::Parallel, AT, [&mut both.0, &mut both.1], false);
+            let kept =
+                crease
+                    .keeps(Projection::Parallel, AT, [&mut both.0, &mut both.1], false, &|| false);
             assert_eq!(kept, is_drawn, "{tip}");
             // The same with the second face the other way round.
             let other = [AT, far, Vertex::new(tip, 0, -5000)];
             let mut both = (one.into_iter(), other.into_iter());
-            let kept = crease.keeps(Projection::Parallel, AT, [&mut both.0, &mut both.1], true);
+            let kept =
+                crease.keeps(Projection::Parallel, AT, [&mut both.0, &mut both.1], true, &|| false);
             assert_eq!(kept, is_drawn, "{tip}");
         }
     }

@@ -1,8 +1,8 @@
 //! The distinct edges: which side of which element stands for each edge of the model.
 
-use super::VisibilityError;
 use super::crease::Crease;
 use super::pace::Pace;
+use super::{Unrounded, VisibilityError};
 use crate::geometry::{Projection, Vertex};
 use crate::model::{Corner, Elements, Pens};
 use crate::stage::Scratch;
@@ -86,7 +86,7 @@ impl<'a> ChosenSides<'a> {
         outlines: Outlines<'_>,
         projection: Projection,
         vertices: &[Vertex],
-        crease: Option<Crease>,
+        (crease, unrounded): (Option<Crease>, Unrounded<'_>),
         scratch: &mut Scratch<'a>,
         pace: &mut Pace<'_>,
     ) -> Result<Self, VisibilityError> {
@@ -147,7 +147,9 @@ impl<'a> ChosenSides<'a> {
                 let end = vertices[usize::from(from)];
                 if is_open
                     || is_bar(known_element)
-                    || crease.keeps(projection, end, [&mut one, &mut other], turned)
+                    || crease.keeps(projection, end, [&mut one, &mut other], turned, &|| {
+                        unrounded.are_one_plane([from, to], known_element, element)
+                    })
                 {
                     chosen.insert(best);
                 } else {

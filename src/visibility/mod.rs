@@ -208,7 +208,8 @@ pub fn find_stretches(
     let (vertices, projection) = (scene.vertices, scene.projection);
     let pace = &mut Pace::new(attention);
     let memory = &mut scratch;
-    let chosen = ChosenSides::choose(outlines, projection, vertices, options.crease, memory, pace)?;
+    let creases = (options.crease, scene.unrounded);
+    let chosen = ChosenSides::choose(outlines, projection, vertices, creases, memory, pace)?;
     let ears = Ears::cut(outlines, vertices, memory, pace)?;
     let outlook = Outlook::new(scene, memory, pace)?;
     let faces = Faces::sort(outlines, vertices, memory, pace)?;

@@ -9,6 +9,7 @@
 //! A vertex that is not of the model, such as one where an edge is cut at the eye, lies in no plane.
 
 use crate::geometry::{Precision, are_coplanar, are_in_line};
+use crate::model::Corner;
 
 /// The vertices in the model's own space, as far as known.
 #[derive(Debug, Clone, Copy)]
@@ -54,6 +55,18 @@ impl<'a> Unrounded<'a> {
             [Some(a), Some(b), Some(c)] => are_in_line([a, b, c], self.precision),
             _ => false,
         }
+    }
+
+    /// Whether the two faces at an edge lie in one plane.
+    #[inline(never)] // Only creases ask.
+    pub(super) fn are_one_plane(&self, edge: [u16; 2], one: &[Corner], other: &[Corner]) -> bool {
+        let [from, to] = edge;
+        let is_off = |corner: &&Corner| !self.are_in_line(from, to, corner.vertex());
+        one.iter().find(is_off).is_some_and(|third| {
+            let triangle = [from, to, third.vertex()];
+            let mut corners = other.iter().map(|corner| corner.vertex());
+            corners.all(|corner| triangle.contains(&corner) || self.holds(triangle, corner))
+        })
     }
 
     fn at(&self, number: u16) -> Option<[i32; 3]> {

@@ -22,8 +22,8 @@ pub fn follow_wire(
     let outlines = Outlines::of(scene.elements);
     let (vertices, projection) = (scene.vertices, scene.projection);
     let pace = &mut Pace::new(attention);
-    let chosen =
-        ChosenSides::choose(outlines, projection, vertices, options.crease, &mut scratch, pace)?;
+    let creases = (options.crease, scene.unrounded);
+    let chosen = ChosenSides::choose(outlines, projection, vertices, creases, &mut scratch, pace)?;
     for (first, element) in outlines.elements() {
         pace.spend(500 * element.len())?;
         for (number, p, q) in sides(element) {
