@@ -135,6 +135,21 @@ fn pass(line: &mut Line<PicoByUsb>, time: Duration) -> TestResult {
     Ok(())
 }
 
+/// Erratum E15: the emulated controller hangs for good if a packet becomes available to the host in
+/// the last 200 microseconds of a frame.
+#[test]
+fn no_packet_becomes_available_late_in_a_frame() -> TestResult {
+    let mut line = plugged_in()?;
+    for _ in 0..200 {
+        assert!(line.status()?.starts_with("<Idle"));
+    }
+    for _ in 0..5 {
+        line.emulator.send(b"$$\n")?;
+        assert!(hear_all(&mut line)?.len() > 20);
+    }
+    Ok(())
+}
+
 #[test]
 fn the_serial_number_is_that_of_the_flash_chip() -> TestResult {
     assert_eq!(plugged_in()?.emulator.0.usb_serial_number(), "E6605838835A2B2F");
