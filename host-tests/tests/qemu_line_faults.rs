@@ -1,0 +1,92 @@
+//! The firmware of the LM3S6965 in QEMU behind a line that damages one byte in a hundred, there and
+//! back: the drawing is the one that was sent.
+#![cfg(feature = "emulator")]
+#![allow(clippy::expect_used, reason = "a test fails with the words of what it expected")]
+
+use penup_client::link::Link;
+use penup_client::machines::{Board, WatchedPlotter, emulate};
+use penup_client::picture::Run;
+use penup_client::progress::Quiet;
+use penup_client::sender::{Patience, Sender};
+use penup_client::source::JobLine;
+use penup_host_tests::noisy_line::Random;
+use penup_host_tests::whole_jobs::job_lines;
+use std::error::Error;
+use std::io;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+/// A plotter at the end of a line of which one byte in so many is damaged.
+struct DamagedLine {
+    plotter: Box<dyn WatchedPlotter>,
+    one_in: Option<u64>,
+    random: Random,
+    damaged: u32,
+}
+
+impl DamagedLine {
+    /// The bytes that come out: some are lost, doubled, or others, but none that acts at once.
+    fn damage(&mut self, bytes: &[u8]) -> Vec<u8> {
+        let Some(one_in) = self.one_in else { return bytes.to_vec() };
+        let mut out = Vec::new();
+        for &byte in bytes {
+            if self.random.below(one_in) > 0 {
+                out.push(byte);
+                continue;
+            }
+            self.damaged += 1;
+            match self.random.below(3) {
+                0 => {}
+                1 => out.extend([byte; 2]),
+                _ => out.push(b'0' + self.random.below(10) as u8),
+            }
+        }
+        out
+    }
+}
+
+impl Link for DamagedLine {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        let bytes = self.damage(bytes);
+        self.plotter.send(&bytes)
+    }
+
+    fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize> {
+        // A doubled byte needs a place.
+        let mut heard = vec![0; buffer.len() / 2];
+        let count = self.plotter.receive(&mut heard, patience)?;
+        let bytes = self.damage(&heard[..count]);
+        buffer[..bytes.len()].copy_from_slice(&bytes);
+        Ok(bytes.len())
+    }
+
+    fn change_pen(&mut self, pen: u8) -> io::Result<bool> {
+        self.plotter.change_pen(pen)
+    }
+}
+
+/// What is drawn of a scene over such a line, and how many bytes were damaged.
+fn draw(scene: &str, one_in: Option<u64>) -> Result<(Vec<Run>, u32), Box<dyn Error>> {
+    let plotter = emulate(Board::Lm3s6965)?;
+    let mut line = DamagedLine { plotter, one_in, random: Random(3), damaged: 0 };
+    let mut job = vec!["$clear".to_owned()];
+    job.extend(job_lines(scene, &["$page=60x80", "$margin=5"]));
+    job.pop();
+    let job: Vec<JobLine> = job.into_iter().map(JobLine::command).collect();
+    let interrupt = AtomicBool::new(false);
+    let mut sender = Sender::open(&mut line, Patience::default(), &interrupt)?;
+    sender.stream(&job, &mut Quiet)?;
+    sender.plot(&mut Quiet)?;
+    sender.end();
+    Ok((line.plotter.pen_runs()?.runs, line.damaged))
+}
+
+#[test]
+fn a_job_arrives_although_one_byte_in_a_hundred_is_damaged() -> Result<(), Box<dyn Error>> {
+    let (expected, _) = draw("lattice2.obj", None)?;
+    let (drawn, damaged) = draw("lattice2.obj", Some(100))?;
+    assert!(expected.len() > 20, "{} runs are no drawing", expected.len());
+    assert!(damaged > 30, "{damaged} bytes were damaged");
+    assert!(drawn == expected, "another drawing");
+    Ok(())
+}
