@@ -103,6 +103,7 @@ impl Along {
 }
 
 impl Ord for Along {
+    #[inline(never)] // It is 128 bits wide.
     fn cmp(&self, other: &Self) -> Ordering {
         let left = u128::from(self.numerator) * u128::from(other.denominator);
         let right = u128::from(other.numerator) * u128::from(self.denominator);

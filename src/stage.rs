@@ -58,20 +58,22 @@ impl<'a> Scratch<'a> {
     /// # Errors
     /// [`OutOfScratch`] if they do not fit; nothing is taken then.
     pub fn take<T: Pod>(&mut self, count: usize) -> Result<&'a mut [T], OutOfScratch> {
-        const { assert!(align_of::<T>() <= align_of::<u64>()) };
-        let out_of_scratch = OutOfScratch {
-            needed: count.saturating_mul(size_of::<T>()),
-            available: self.available_bytes(),
-        };
-        if out_of_scratch.needed > out_of_scratch.available {
+        let words = self.take_words(count.saturating_mul(size_of::<T>()))?;
+        Ok(items_mut(words, count).unwrap_or(&mut [])) // It is as long as asked for.
+    }
+
+    #[inline(never)] // Once is enough for every type.
+    fn take_words(&mut self, bytes: usize) -> Result<&'a mut [u64], OutOfScratch> {
+        let out_of_scratch = OutOfScratch { needed: bytes, available: self.available_bytes() };
+        if bytes > out_of_scratch.available {
             return Err(out_of_scratch);
         }
-        let word_count = Self::bytes_for::<T>(count) / size_of::<u64>();
         let words = core::mem::take(&mut self.words);
+        let word_count = bytes.div_ceil(size_of::<u64>());
         let (taken, rest) = words.split_at_mut_checked(word_count).ok_or(out_of_scratch)?;
         self.words = rest;
         taken.fill(0);
-        items_mut(taken, count).ok_or(out_of_scratch)
+        Ok(taken)
     }
 
     /// Takes as many items of `T` as `fill` says that it wrote to the front of all that is left.

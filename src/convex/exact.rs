@@ -6,6 +6,7 @@
 //! 2^126, within `i128`.
 
 use super::Eye;
+use crate::fixed::product;
 
 /// A place in the model's own space, each coordinate within ±2^30.
 pub(super) type Point = [i32; 3];
@@ -15,9 +16,7 @@ fn difference(a: Point, b: Point) -> [i64; 3] {
 }
 
 fn dot(a: [i64; 3], b: [i64; 3]) -> i128 {
-    i128::from(a[0]) * i128::from(b[0])
-        + i128::from(a[1]) * i128::from(b[1])
-        + i128::from(a[2]) * i128::from(b[2])
+    (0..3).map(|axis| product(a[axis], b[axis])).sum()
 }
 
 /// The plane of three points; its normal points to where they turn counter-clockwise.

@@ -6,6 +6,7 @@
 //! another segment has, so no point is new.
 
 use super::PagePoint;
+use crate::fixed::product;
 use crate::stage::{Attention, OutOfScratch, StageError, heap_sort_attentively};
 use core::cmp::Ordering;
 
@@ -61,8 +62,8 @@ impl Key {
                 dx * i64::from(key.from.1) - dy * i64::from(key.from.0)
             };
             let (long_a, long_b) = if ax >= ay.abs() { (ax, bx) } else { (ay.abs(), by.abs()) };
-            let a = i128::from(area(self, (ax, ay))) * i128::from(long_b);
-            a.cmp(&(i128::from(area(other, (bx, by))) * i128::from(long_a)))
+            let a = product(area(self, (ax, ay)), long_b);
+            a.cmp(&(product(area(other, (bx, by)), long_a)))
         })
     }
 }

@@ -2,7 +2,7 @@
 
 use super::window::Window;
 use super::{PAGE_LIMIT, PagePoint, Title};
-use crate::fixed::{Millimetres, divide, divide_rounding, half};
+use crate::fixed::{Millimetres, divide, divide_rounding, half, product};
 use crate::geometry::{Projection, Vertex};
 use crate::model::Position;
 use crate::visibility::Along;
@@ -251,7 +251,7 @@ impl PageMap {
         let [x, y] = [(x, 0), (y, 1)].map(|(c, axis): (i64, usize)| {
             // Below 2^42 2^52 + 2^(44 + 21) 2^52: fits 127 bits with room.
             let steps = divide_rounding(
-                i128::from(self.a[axis]) * i128::from(c) + self.b[axis] * i128::from(w),
+                product(self.a[axis], c) + self.b[axis] * i128::from(w),
                 i128::from(w) << self.k,
             );
             steps.clamp(-i128::from(PAGE_LIMIT), i128::from(PAGE_LIMIT)) as i32
@@ -264,7 +264,7 @@ impl PageMap {
     pub fn fine(&self, x: i64, y: i64, w: i64) -> crate::curve::Fine {
         [(x, 0), (y, 1)].map(|(c, axis): (i64, usize)| {
             // Below 2^118, see `point`: the shift does not overflow.
-            let sum = i128::from(self.a[axis]) * i128::from(c) + self.b[axis] * i128::from(w);
+            let sum = product(self.a[axis], c) + self.b[axis] * i128::from(w);
             let fine = if w & (w - 1) == 0 {
                 // A parallel view: many times faster.
                 let shift = w.trailing_zeros() + self.k;

@@ -2,7 +2,7 @@
 
 use super::{Page, PagePoint, StepsPerMillimetre};
 use crate::curve::Fine;
-use crate::fixed::divide_rounding;
+use crate::fixed::{divide_rounding, product};
 
 /// What the margins leave of a page, in 1/256 steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,9 +30,7 @@ impl Window {
         let along = [0, 1].map(|axis: usize| to[axis] - from[axis]);
         // Where the line enters and leaves, as ratios of numbers below 2^42.
         let (mut enter, mut leave) = ((0, 1), (1, 1));
-        let later = |a: (i64, i64), b: (i64, i64)| {
-            i128::from(a.0) * i128::from(b.1) > i128::from(b.0) * i128::from(a.1)
-        };
+        let later = |a: (i64, i64), b: (i64, i64)| product(a.0, b.1) > product(b.0, a.1);
         for axis in [0, 1] {
             for (way, room) in [
                 (-along[axis], from[axis] - self.low[axis]),
@@ -54,8 +52,7 @@ impl Window {
         }
         let at = |(part, whole): (i64, i64)| {
             let [x, y] = [0, 1].map(|axis: usize| {
-                let moved = i128::from(along[axis]) * i128::from(part)
-                    + i128::from(from[axis]) * i128::from(whole);
+                let moved = product(along[axis], part) + product(from[axis], whole);
                 divide_rounding(moved, i128::from(whole) << 8) as i32
             });
             PagePoint { x, y }

@@ -7,7 +7,7 @@
 
 use super::pens::{PenRun, RUN, close_gap, open_gap};
 use super::{Before, Corner, Model, ModelError, POSITION_LIMIT, Position};
-use crate::fixed::{Decimal, divide_rounding, sin_cos_degrees};
+use crate::fixed::{Decimal, divide_rounding, product, rest_of_periods, sin_cos_degrees};
 use crate::stage::{OutOfScratch, Scratch};
 use core::ops::Range;
 
@@ -108,7 +108,7 @@ impl Map {
         let p = position.coordinates().map(i64::from);
         match self {
             Self::Affine(rows, shift) => [0, 1, 2].map(|row: usize| {
-                let products = rows[row].iter().zip(p).map(|(m, p)| i128::from(*m) * i128::from(p));
+                let products = rows[row].iter().zip(p).map(|(m, p)| product(*m, p));
                 let half = 1 << (UNIT_BITS - 1);
                 within((products.sum::<i128>() + half) >> UNIT_BITS).saturating_add(shift[row])
             }),
@@ -118,7 +118,7 @@ impl Map {
                 let height: i64 = (0..3).map(|k| (p[k] - q[k]) * n[k]).sum();
                 let square: i64 = n.iter().map(|c| c * c).sum();
                 [0, 1, 2].map(|k: usize| {
-                    let product = 2 * i128::from(height) * i128::from(n[k]);
+                    let product = 2 * product(height, n[k]);
                     p[k] - within(divide_rounding(product, square.into()))
                 })
             }
@@ -199,7 +199,7 @@ impl Model<'_> {
             Edit::Rotate(axis, degrees, numbers) => {
                 let range = self.range(Part::Vertices, numbers)?;
                 self.transform(&Map::rotation(axis, degrees), range.clone(), keep)?;
-                if libm::fmod(degrees, 90.0) != 0.0 {
+                if rest_of_periods(degrees, 90.0) != 0.0 {
                     self.turn_errors(&range);
                 }
             }

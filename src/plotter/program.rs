@@ -1,7 +1,7 @@
 //! What a line of G-code asks for, given what the lines before it have set.
 
 use crate::drawing::{PAGE_LIMIT, PagePoint, StepsPerMillimetre};
-use crate::fixed::{Decimal, Millimetres, divide_rounding, half};
+use crate::fixed::{Decimal, Millimetres, divide_rounding, half, product};
 use crate::machine::Machine;
 use crate::protocol::{GCode, Refusal, Word};
 use crate::step::{Arc, ArcError, Turn};
@@ -188,7 +188,7 @@ impl Program {
 
     fn length(&self, number: Decimal) -> Result<Millimetres, Refusal> {
         let bits = number.to_binary(16).map_err(|_| Refusal::NumberOutOfRange)?;
-        let bits = i128::from(bits) * if self.inches { 127 } else { 5 };
+        let bits = product(bits, if self.inches { 127 } else { 5 });
         i32::try_from(divide_rounding(bits, 5))
             .map(Millimetres::from_bits)
             .map_err(|_| Refusal::NumberOutOfRange)
@@ -197,8 +197,8 @@ impl Program {
 
 /// Steps from the page's origin; what is beyond every page stays beyond it.
 fn to_steps(length: Millimetres, per_mm: Millimetres) -> i32 {
-    let product = i128::from(length.to_bits()) * i128::from(per_mm.to_bits());
-    let steps = divide_rounding(product, 1 << 32);
+    let exact = i64::from(length.to_bits()) * i64::from(per_mm.to_bits());
+    let steps = divide_rounding(exact.into(), 1 << 32);
     steps.clamp((-2 * PAGE_LIMIT).into(), (2 * PAGE_LIMIT).into()) as i32
 }
 
@@ -229,7 +229,7 @@ fn center_of_radius(
     let is_right = (turn == Turn::Clockwise) == (radius > 0);
     let height = if is_right { height } else { -height };
     let middle = |axis: usize, across: i64| {
-        let offset = divide_rounding(i128::from(across) * i128::from(height), length.into());
+        let offset = divide_rounding(product(across, height), length.into());
         let sum = i128::from(from[axis].to_bits()) + i128::from(to[axis].to_bits()) + 2 * offset;
         i32::try_from(half(sum)).ok().map(Millimetres::from_bits)
     };

@@ -32,10 +32,16 @@ pub(super) fn direction(text: &str) -> Result<Direction, Refusal> {
 
 /// Exactly N numbers with commas between, for angles and places only.
 pub(super) fn values<const N: usize>(text: &str) -> Result<[f64; N], Refusal> {
-    let wrong_count = Refusal::WrongNumberCount { needed: N };
-    let mut parts = text.split(',').map(number);
     let mut values = [0.0; N];
-    for value in &mut values {
+    read_values(text, &mut values)?;
+    Ok(values)
+}
+
+#[inline(never)] // Once is enough for every count.
+fn read_values(text: &str, values: &mut [f64]) -> Result<(), Refusal> {
+    let wrong_count = Refusal::WrongNumberCount { needed: values.len() };
+    let mut parts = text.split(',').map(number);
+    for value in &mut *values {
         *value = parts.next().unwrap_or(Err(wrong_count))?.to_f64();
     }
     if parts.next().is_some() {
@@ -45,7 +51,7 @@ pub(super) fn values<const N: usize>(text: &str) -> Result<[f64; N], Refusal> {
     if values.iter().any(|value| libm::fabs(*value) > 1e15) {
         return Err(Refusal::NumberOutOfRange);
     }
-    Ok(values)
+    Ok(())
 }
 
 /// x y z, and then the weight or colour that some modellers write, which must be numbers too.

@@ -1,6 +1,7 @@
 //! Which edges between two faces are drawn: silhouettes, and creases sharper than an angle.
 
 use super::triangles::areas;
+use crate::fixed::product;
 use crate::geometry::{Projection, Vertex};
 use core::cmp::Ordering;
 
@@ -40,7 +41,7 @@ impl Crease {
             Projection::Perspective => [end.x, end.y, end.z]
                 .into_iter()
                 .zip(normal)
-                .map(|(at, part)| i128::from(at) * i128::from(part))
+                .map(|(at, part)| product(i64::from(at), part))
                 .sum::<i128>()
                 .signum(),
             Projection::Parallel => i128::from(normal[2].signum()),
@@ -57,7 +58,7 @@ impl Crease {
     /// A normal in true proportions, with parts below 2^20.
     fn unstretched(&self, normal: [i64; 3]) -> [i64; 3] {
         let by = [self.depth_stretch.1, self.depth_stretch.1, self.depth_stretch.0];
-        let exact = [0, 1, 2].map(|n| i128::from(normal[n]) * i128::from(by[n]));
+        let exact = [0, 1, 2].map(|n| product(normal[n], i64::from(by[n])));
         let largest = exact.iter().map(|part| part.unsigned_abs()).max();
         let bits = 128 - largest.unwrap_or(0).leading_zeros();
         exact.map(|part| (part >> bits.saturating_sub(20)) as i64)
