@@ -28,7 +28,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitStatus;
 use std::time::Duration;
 
-pub use pico::{Pico, PicoByUsb};
+pub use pico::{Pico, PicoByUsb, UartError};
 pub use pins::{Machine, MachineEvent, MachineEventKind, Pin, PinChange};
 pub use stack::Stack;
 

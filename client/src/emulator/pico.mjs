@@ -3,15 +3,16 @@
 // Usage: node pico.mjs RP2040JS-DIRECTORY IMAGE.uf2
 //
 // Standard input and output carry records of 8 bytes: what, a value, and the core cycle (48 bits,
-// little-endian). In: 0 a byte for the serial line, 1 a level for a pin (its number, + 128 if
-// high), not before that cycle; 2 the power goes at that cycle, 3 it goes when so many more bytes
+// little-endian). In: 0 a byte for the serial line (its error bits in the cycle's place), 1 a level
+// for a pin (its number, + 128 if high), not before that cycle; 2 the power goes at that cycle, 3 it goes when so many more bytes
 // of flash have been erased or written (the number in the cycle's place), and comes back at once; 4
 // the main loop hangs from that cycle on, 5 a byte for USB, 6 the USB host is plugged in (1), takes
 // nothing more (2), takes again (3), suspends the bus (4), resumes it (5), is unplugged (6), is
 // plugged in on a busy bus (7), has no power (8); 7 a switch is fitted to a pin, which closes where
 // its axis has gone to so many steps (+ 2^40) or below, and bounces; 8 a function (its number, its
 // address in the cycle's place) is timed; 9 how much of the stack is unused is asked; 10 where x
-// has gone to so many steps, the main loop stands still for so many hundredths of a second. 32 the
+// has gone to so many steps, the main loop stands still for so many hundredths of a second, 12 how
+// long a sector of flash takes to be erased, in microseconds (in the cycle's place). 32 the
 // pin RUN is pulled low for a moment, 33 the image is copied onto the drive that the board shows
 // with BOOTSEL held, 34 and 35 bits (the value) of a byte of flash (the cycle) stay low or high
 // from now on, 36 the main loop goes on at an address, with the stack used up (1) or as it is (0),
@@ -33,6 +34,7 @@ import { readFileSync, writeSync } from 'node:fs';
 import { pathToFileURL } from 'node:url';
 import { attachFlashChip } from './pico/flash_chip.mjs';
 import * as resets from './pico/resets.mjs';
+import { Uart } from './pico/uart.mjs';
 import { Usb } from './pico/usb_host.mjs';
 import { settled, wear } from './pico/worn_flash.mjs';
 
@@ -40,7 +42,6 @@ const [directory, imagePath, logAddress] = process.argv.slice(-3);
 const { RP2040 } = await import(pathToFileURL(`${directory}/dist/esm/index.js`));
 
 const NANOS = 8;
-const CYCLES_PER_BYTE = Math.round((125e6 * 10) / 115200);
 const SLICE = 400_000;
 const MILLISECOND = 125_000;
 const HUNDREDTH = 1_250_000;
@@ -69,6 +70,7 @@ const TIMED = 8;
 const RETURNED = 6;
 const STACK = 9;
 const STALL = 10;
+const ERASE_TIME = 12;
 const GO_ON = -1;
 const UNUSED_STACK = 7;
 const RUN_PIN = 32;
@@ -133,7 +135,8 @@ function bootRom() {
   return new Uint32Array(rom.buffer);
 }
 
-const SECTOR_MICROSECONDS = 45_000;
+/** Flash takes 45 ms to erase a sector typically, and 400 ms at most. */
+let sectorMicroseconds = 45_000;
 const PAGE_MICROSECONDS = 400;
 /** Bytes of flash until the power goes. */
 let flashBudget = Infinity;
@@ -154,7 +157,7 @@ function serveRom(number) {
   const [first, second, third] = core.registers;
   if (number === ERASE) {
     changeFlash(first, second, () => 0xff);
-    flashNanos += (second / 4096) * SECTOR_MICROSECONDS * 1000;
+    flashNanos += (second / 4096) * sectorMicroseconds * 1000;
   } else if (number === PROGRAM) {
     changeFlash(first, third, (at, before) => before & chip.readUint8(second + at - first));
     flashNanos += (third / 256) * PAGE_MICROSECONDS * 1000;
@@ -207,8 +210,7 @@ function start(flash, kind) {
   mendVectors();
   faultDue = isLockedUp = false;
   watchPins();
-  uart = chip.uart[0];
-  uart.onByte = (byte) => report(SERIAL, byte, now());
+  uart = new Uart(chip, cable, (byte) => report(SERIAL, byte, now()));
   machines = chip.pio.flatMap((pio) => pio.machines);
   machines.forEach(followQueue);
   chip.pio.forEach(followPio);
@@ -257,7 +259,7 @@ function resetByWatchdog() {
 function resetByHand(kind) {
   flashBudget = Infinity;
   flashNanos = 0;
-  bytes.length = 0;
+  cable.bytes.length = 0;
   usb.bytes.length = 0;
   report(RESET, kind, now());
   start(chip.flash, kind);
@@ -469,10 +471,10 @@ function catchUp(cycle) {
 
 // --- Records in ----------------------------------------------------------------------------------
 
-const bytes = [];
+/** The serial line: whether something is connected, and the bytes that come. */
+const cable = { connected: false, bytes: [] };
 /** Levels of pins and losses of power, in their order. */
 const events = [];
-let byteDue = 0;
 let rest = Buffer.alloc(0);
 
 process.stdin.on('data', (data) => {
@@ -480,7 +482,8 @@ process.stdin.on('data', (data) => {
   let at = 0;
   for (; at + 8 <= rest.length; at += 8) {
     const entry = { value: rest[at + 1], cycle: rest.readUIntLE(at + 2, 6) };
-    if (rest[at] === SERIAL) bytes.push(entry);
+    if (rest[at] === SERIAL) cable.bytes.push({ value: entry.value, errors: entry.cycle });
+    else if (rest[at] === ERASE_TIME) sectorMicroseconds = entry.cycle;
     else if (rest[at] === TIMED) timed.set(entry.cycle, entry.value);
     else if (rest[at] === SWITCH) {
       const axis = entry.value - 8;
@@ -500,14 +503,14 @@ process.stdin.on('data', (data) => {
     else events.push({ what: rest[at], ...entry });
   }
   rest = rest.subarray(at);
+  uart.listen();
   usb.offer();
 });
 process.stdin.on('end', () => process.exit(0));
 
 function inputDue() {
-  const byte = bytes.length ? Math.max(byteDue, bytes[0].cycle) : Infinity;
   const bounce = bounces.length ? bounces[0].cycle : Infinity;
-  return Math.min(byte, bounce, events.length ? events[0].cycle : Infinity);
+  return Math.min(bounce, events.length ? events[0].cycle : Infinity);
 }
 
 function setInput(number, high) {
@@ -547,10 +550,6 @@ function takeInput(cycle) {
       continue;
     }
     setInput(value & 0x7f, value >= 0x80);
-  }
-  if (bytes.length && uart.enabled && Math.max(byteDue, bytes[0].cycle) <= cycle) {
-    uart.feedByte(bytes.shift().value);
-    byteDue = cycle + CYCLES_PER_BYTE;
   }
 }
 
@@ -640,13 +639,13 @@ function run(cycles) {
     } else executeUntil(due);
     cycle = now();
     if (pioDue <= cycle) catchUp(cycle);
-    if (bytes.length || events.length || bounces.length) takeInput(cycle);
+    if (events.length || bounces.length) takeInput(cycle);
     if (watchdogDue) resetByWatchdog();
   }
 }
 
 function idle() {
-  return core.waiting && pioDue === Infinity && !bytes.length && !events.length && !bounces.length;
+  return core.waiting && pioDue === Infinity && !uart.busy && !events.length && !bounces.length;
 }
 
 function turn() {

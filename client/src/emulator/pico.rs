@@ -21,6 +21,7 @@ const SCRIPT: &str = include_str!("pico.mjs");
 const MODULES: &[(&str, &str)] = &[
     ("./pico/flash_chip.mjs", include_str!("pico/flash_chip.mjs")),
     ("./pico/resets.mjs", include_str!("pico/resets.mjs")),
+    ("./pico/uart.mjs", include_str!("pico/uart.mjs")),
     ("./pico/usb_host.mjs", include_str!("pico/usb_host.mjs")),
     ("./pico/worn_flash.mjs", include_str!("pico/worn_flash.mjs")),
 ];
@@ -42,6 +43,19 @@ pub struct Pico {
     shared: Arc<Shared<State>>,
     /// Bytes of the stack.
     stack: usize,
+}
+
+/// What a UART finds wrong with a byte, as the bits above it in the data register of a PL011.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum UartError {
+    /// Its stop bit is missing.
+    Framing = 1 << 8,
+    /// Its parity is wrong.
+    Parity = 1 << 9,
+    /// The line stays low for longer than a byte.
+    Break = 1 << 8 | 1 << 10,
+    /// Bytes before it were lost.
+    Overrun = 1 << 11,
 }
 
 #[derive(Default)]
@@ -328,6 +342,23 @@ impl Pico {
         self.receive_from(|state| &mut state.usb, buffer, patience)
     }
 
+    /// A byte arrives by the serial line in which the UART finds `error`.
+    ///
+    /// # Errors
+    /// The emulator has ended.
+    pub fn send_damaged(&mut self, byte: u8, error: UartError) -> io::Result<()> {
+        self.tell(SERIAL, byte, error as u64)
+    }
+
+    /// Lets each sector of flash that is erased from now on take so long: 45 ms typically, which it
+    /// is at first, and 400 ms at most.
+    ///
+    /// # Errors
+    /// The emulator has ended.
+    pub fn set_erase_time(&mut self, time: Duration) -> io::Result<()> {
+        self.tell(ERASE_TIME, 0, time.as_micros() as u64)
+    }
+
     fn send_to(&mut self, port: u8, bytes: &[u8]) -> io::Result<()> {
         let record = |&byte| Record { what: port, value: byte, cycle: 0 }.to_bytes();
         let records: Vec<u8> = bytes.iter().flat_map(record).collect();
@@ -577,6 +608,7 @@ const RETURNED: u8 = 6;
 const STACK: u8 = 9;
 const UNUSED_STACK: u8 = 7;
 const STALL: u8 = 10;
+const ERASE_TIME: u8 = 12;
 const RESET: u8 = 4;
 const RUN_PIN: u8 = 32;
 const UF2: u8 = 33;
