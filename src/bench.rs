@@ -52,10 +52,10 @@ impl EventQueue for NoSteps {
 impl Board for Line<'_> {
     const NAME: &'static str = "mps2";
 
-    fn read_byte(&mut self) -> Option<u8> {
+    fn read_byte(&mut self) -> Option<(usize, u8)> {
         let (byte, rest) = self.text.split_first()?;
         self.text = rest;
-        Some(*byte)
+        Some((0, *byte))
     }
     fn take_real_time(&mut self) -> RealTime {
         RealTime::default()

@@ -6,6 +6,7 @@ use penup::boards::host::HostBoard;
 use penup::machine::{EventRing, PulserState};
 use penup::model::{Corner, Position, VERTEX_NUMBER_LIMIT};
 use penup::plotter::{Lent, NO_MOVES, Plotter};
+use penup::protocol::LineReader;
 
 /// The checksums of the model and of the options that come of the first `count` of `lines`, sent
 /// to a plotter that was just switched on; `None` if it refuses one of them.
@@ -17,8 +18,9 @@ pub fn contents(lines: &dyn Lines, count: usize) -> Option<[u32; 2]> {
     let mut blocks = NO_MOVES;
     // Without memory to work in, no copy of the model is kept for each line.
     let words = &mut [];
-    let memory =
-        Lent { vertices: &mut *vertices, corners: &mut *corners, blocks: &mut blocks, words };
+    let readers = &mut [LineReader::new()];
+    let blocks = &mut blocks;
+    let memory = Lent { vertices: &mut *vertices, corners: &mut *corners, blocks, words, readers };
     let mut plotter = Plotter::new(memory, &pins);
     for line in (0..count).filter_map(|index| lines.line(index)) {
         board.receive(line.sent.as_bytes());

@@ -7,7 +7,7 @@ use crate::machine::{Contacts, EventRing, Pen, Pins, Pulser, PulserState, StepQu
 use crate::model::{Corner, Position};
 use crate::motion::EventQueue;
 use crate::plotter::{Board, Lent, NO_MOVES};
-use crate::protocol::{RealTime, Sorter};
+use crate::protocol::{LineReader, RealTime, Sorter};
 use core::convert::Infallible;
 use embedded_hal::digital::{ErrorType, OutputPin};
 use std::boxed::Box;
@@ -15,6 +15,9 @@ use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
 use std::rc::Rc;
 use std::vec::Vec;
+
+/// Serial ports.
+pub const PORTS: usize = 2;
 
 /// As many events as the smallest board's queue holds.
 pub const QUEUE_LENGTH: usize = 624;
@@ -30,6 +33,7 @@ pub fn lend_memory() -> Lent<'static> {
         corners: Box::leak(Box::new(heapless::Vec::<Corner, CORNERS>::new())),
         blocks: Box::leak(Box::new(NO_MOVES)),
         words: std::vec![0; WORDS].leak(),
+        readers: Box::leak(Box::new([const { LineReader::new() }; PORTS])),
     }
 }
 
@@ -241,8 +245,9 @@ impl TracedSteps<'_> {
 
 /// The board.
 pub struct HostBoard<'q> {
-    received: VecDeque<u8>,
-    sorter: Sorter,
+    /// Ordinary bytes, each with the number of its port.
+    received: VecDeque<(usize, u8)>,
+    sorters: [Sorter; PORTS],
     asked: RealTime,
     sent: Vec<u8>,
     queue: StepQueue<'q, QUEUE_LENGTH>,
@@ -268,7 +273,7 @@ impl<'q> HostBoard<'q> {
         let (queue, steps) = traced_steps(ring, state);
         Self {
             received: VecDeque::new(),
-            sorter: Sorter::new(),
+            sorters: [Sorter::new(); PORTS],
             asked: RealTime::default(),
             sent: Vec::new(),
             queue,
@@ -279,17 +284,26 @@ impl<'q> HostBoard<'q> {
         }
     }
 
-    /// Bytes come over the line.
+    /// Bytes come by the first serial port. [`DAMAGED`](crate::protocol::DAMAGED) among them stands for
+    /// bytes that were lost or damaged there.
     pub fn receive(&mut self, bytes: &[u8]) {
+        self.receive_by(0, bytes);
+    }
+
+    /// Bytes come by a serial port, by its number from 0 to [`PORTS`] - 1.
+    ///
+    /// # Panics
+    /// If there is no such port.
+    pub fn receive_by(&mut self, port: usize, bytes: &[u8]) {
         for byte in bytes {
-            match self.sorter.sort(*byte) {
+            match self.sorters[port].sort(*byte) {
                 Some(asked) => {
                     if asked.has(RealTime::ABORT) {
                         self.received.clear();
                     }
                     self.asked = self.asked.and(asked);
                 }
-                None => self.received.push_back(*byte),
+                None => self.received.push_back((port, *byte)),
             }
         }
     }
@@ -334,7 +348,7 @@ impl<'q> HostBoard<'q> {
 impl Board for HostBoard<'_> {
     const NAME: &'static str = "host";
 
-    fn read_byte(&mut self) -> Option<u8> {
+    fn read_byte(&mut self) -> Option<(usize, u8)> {
         self.received.pop_front()
     }
 

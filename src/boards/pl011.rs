@@ -1,4 +1,5 @@
-//! The UART of both chips, Arm's PrimeCell PL011: 115200 baud, 8 bits, no parity, one stop bit, both ways by FIFO.
+//! The UART of both chips, Arm's PrimeCell PL011: 115200 baud, 8 bits, no parity, one stop bit, both
+//! ways by FIFO.
 
 use super::peripheral::Peripheral;
 
@@ -13,6 +14,8 @@ mod offset {
     pub const CONTROL: usize = 0x030;
     pub const INTERRUPT_MASK: usize = 0x038;
     pub const INTERRUPT_CLEAR: usize = 0x044;
+    #[cfg(feature = "pico")]
+    pub const DMA: usize = 0x048;
 }
 const RECEIVER_EMPTY: u32 = 1 << 4;
 const SENDER_FULL: u32 = 1 << 5;
@@ -27,7 +30,7 @@ const ENABLE_BOTH_WAYS: u32 = 1 | 1 << 8 | 1 << 9;
 pub struct Uart(pub Peripheral);
 
 impl Uart {
-    /// Readies it, with a clock of so many hertz; what is received interrupts once it is enabled.
+    /// Readies it, with a clock of so many hertz. Nothing interrupts yet.
     #[inline(always)]
     pub fn set_up(self, hertz: u32) {
         // Sixty-fourths of a divider of 16 samples a bit, rounded.
@@ -36,7 +39,7 @@ impl Uart {
         self.0.write(offset::BAUD_INTEGER, divider / 64);
         self.0.write(offset::BAUD_FRACTION, divider % 64);
         self.0.write(offset::LINE_CONTROL, EIGHT_BITS_WITH_FIFO);
-        self.0.write(offset::INTERRUPT_MASK, RECEIVED | RECEIVE_TIMEOUT);
+        self.0.write(offset::INTERRUPT_MASK, 0);
     }
 
     /// From now on it sends and receives.
@@ -62,17 +65,36 @@ impl Uart {
         }
     }
 
-    /// A byte straight from the receiver.
-    pub fn poll(self) -> Option<u8> {
+    /// A byte straight from the receiver with its error bits, as
+    /// [`penup::protocol::Receiver::receive_from_uart`] takes them.
+    pub fn poll(self) -> Option<u32> {
         let empty = self.0.read(offset::FLAGS) & RECEIVER_EMPTY != 0;
-        (!empty).then(|| (self.0.read(offset::DATA) & 0xFF) as u8)
+        (!empty).then(|| self.0.read(offset::DATA))
     }
 
-    /// Whether an emptier FIFO is to interrupt, too.
+    /// Received bytes interrupt.
+    #[cfg(feature = "lm3s6965")]
+    pub fn interrupt_when_received(self) {
+        self.0.write(offset::INTERRUPT_MASK, RECEIVED | RECEIVE_TIMEOUT);
+    }
+
+    /// Whether an emptier FIFO of what is sent is to interrupt. Received bytes do not.
     #[cfg(feature = "pico")]
-    pub fn interrupt_when_sent(self, also: bool) {
-        let sent = if also { SENT } else { 0 };
-        self.0.write(offset::INTERRUPT_MASK, RECEIVED | RECEIVE_TIMEOUT | sent);
+    pub fn interrupt_when_sent(self, interrupts: bool) {
+        self.0.write(offset::INTERRUPT_MASK, if interrupts { SENT } else { 0 });
+    }
+
+    /// Whether received bytes are left to direct memory access, whatever errors they have; else
+    /// [`Uart::poll`] finds them.
+    #[cfg(feature = "pico")]
+    pub fn receive_by_dma(self, by_dma: bool) {
+        self.0.write(offset::DMA, u32::from(by_dma));
+    }
+
+    /// Where a DMA channel reads the next received byte with its error bits, as a half-word.
+    #[cfg(feature = "pico")]
+    pub const fn data_address(self) -> u32 {
+        self.0.address(offset::DATA)
     }
 
     /// The interrupt is being handled.

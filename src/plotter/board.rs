@@ -12,11 +12,20 @@ pub trait Board {
     /// Whether it can become a drive that takes a new image.
     const HAS_DRIVE: bool = false;
 
-    /// The next ordinary byte of the line; none while an abort waits in [`Board::take_real_time`].
-    fn read_byte(&mut self) -> Option<u8>;
+    /// The next ordinary byte, and the number of the serial port that received it, from 0; none
+    /// while an abort waits in [`Board::take_real_time`]. Where bytes were lost or damaged, it is
+    /// [`DAMAGED`](crate::protocol::DAMAGED). A port's bytes are those of its lines, whatever
+    /// comes by others meanwhile.
+    fn read_byte(&mut self) -> Option<(usize, u8)>;
     /// What was asked in real time since last taken.
     fn take_real_time(&mut self) -> RealTime;
-    /// Sends bytes; may block.
+    /// Whether so many bytes, [`REPLY_BYTES`] at most, can be sent without blocking. There will be
+    /// room in a while, whatever becomes of who listens.
+    fn has_room(&mut self, bytes: usize) -> bool {
+        let _ = bytes;
+        true
+    }
+    /// Sends bytes; blocks while there is no room.
     fn write(&mut self, bytes: &[u8]);
     /// Whether a program has opened a port since last asked: it is greeted there alone.
     fn take_opened(&mut self) -> bool {
@@ -62,6 +71,9 @@ pub trait Board {
     /// Sleeps until an interrupt; returns at once if one came since it last returned.
     fn wait(&mut self);
 }
+
+/// No row of a list is longer, nor all that is told of one line which is no list.
+pub const REPLY_BYTES: usize = 512;
 
 /// What a board with flash keeps through a loss of power.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

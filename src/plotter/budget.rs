@@ -51,16 +51,21 @@ pub struct Budget {
 }
 
 impl Budget {
-    const fn new<const VERTICES: usize, const CORNERS: usize, const WORDS: usize>(
+    const fn new<
+        const VERTICES: usize,
+        const CORNERS: usize,
+        const WORDS: usize,
+        const PORTS: usize,
+    >(
         board: &'static str,
-        _: PhantomData<Memory<VERTICES, CORNERS, WORDS>>,
+        _: PhantomData<Memory<VERTICES, CORNERS, WORDS, PORTS>>,
         scene: Scene,
     ) -> Self {
         let budget = Self {
             board,
             vertex_limit: VERTICES,
             corner_limit: CORNERS,
-            model: size_of::<Memory<VERTICES, CORNERS, WORDS>>() - 8 * WORDS,
+            model: size_of::<Memory<VERTICES, CORNERS, 0, 0>>(),
             working: 8 * WORDS,
             view: Scratch::bytes_for::<Vertex>(scene.vertices),
             visibility: visibility::least_bytes(scene.vertices, scene.corners, scene.faces),

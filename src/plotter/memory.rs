@@ -2,6 +2,7 @@
 
 use crate::model::{Corner, Position};
 use crate::motion::Block;
+use crate::protocol::LineReader;
 
 /// The moves planned ahead with 64 KiB of RAM, before any is: see [`crate::motion`].
 pub const NO_MOVES: [Block; 32] = [Block::EMPTY; 32];
@@ -9,28 +10,40 @@ pub const NO_MOVES: [Block; 32] = [Block::EMPTY; 32];
 /// The same for 264 KiB of RAM: at 500 mm/s and 15 m/s² the machine stops within 167 chords of 0.05 mm.
 pub const NO_MOVES_OF_PICO: [Block; 192] = [Block::EMPTY; 192];
 
-/// The large memory of a plotter: a model, and what its jobs are computed in.
+/// The large memory of a plotter: a model, what its jobs are computed in, and the line that each of
+/// its serial ports is sending.
 ///
 /// New, it is all zero bits, so that a static one costs no flash and is never built on the stack.
 #[derive(Debug)]
-pub struct Memory<const VERTICES: usize, const CORNERS: usize, const WORDS: usize> {
+pub struct Memory<
+    const VERTICES: usize,
+    const CORNERS: usize,
+    const WORDS: usize,
+    const PORTS: usize = 1,
+> {
     vertices: heapless::Vec<Position, VERTICES>,
     corners: heapless::Vec<Corner, CORNERS>,
     words: [u64; WORDS],
+    readers: [LineReader; PORTS],
 }
 
 /// For 64 KiB of RAM: a lattice of 125 cubes.
 pub type Lm3s6965Memory = Memory<1000, 3000, 4224>;
 
-/// For 264 KiB of RAM: a lattice of 343 cubes.
-pub type PicoMemory = Memory<4096, 12288, 16384>;
+/// For 264 KiB of RAM: a lattice of 343 cubes. Its ports are the UART and USB.
+pub type PicoMemory = Memory<4096, 12288, 16384, 2>;
 
-impl<const VERTICES: usize, const CORNERS: usize, const WORDS: usize>
-    Memory<VERTICES, CORNERS, WORDS>
+impl<const VERTICES: usize, const CORNERS: usize, const WORDS: usize, const PORTS: usize>
+    Memory<VERTICES, CORNERS, WORDS, PORTS>
 {
     /// Empty.
     pub const fn new() -> Self {
-        Self { vertices: heapless::Vec::new(), corners: heapless::Vec::new(), words: [0; WORDS] }
+        Self {
+            vertices: heapless::Vec::new(),
+            corners: heapless::Vec::new(),
+            words: [0; WORDS],
+            readers: [const { LineReader::new() }; PORTS],
+        }
     }
 
     /// Lends it to a plotter, with memory for the moves planned ahead.
@@ -40,12 +53,13 @@ impl<const VERTICES: usize, const CORNERS: usize, const WORDS: usize>
             corners: &mut self.corners,
             blocks,
             words: &mut self.words,
+            readers: &mut self.readers,
         }
     }
 }
 
-impl<const VERTICES: usize, const CORNERS: usize, const WORDS: usize> Default
-    for Memory<VERTICES, CORNERS, WORDS>
+impl<const VERTICES: usize, const CORNERS: usize, const WORDS: usize, const PORTS: usize> Default
+    for Memory<VERTICES, CORNERS, WORDS, PORTS>
 {
     fn default() -> Self {
         Self::new()
@@ -63,4 +77,6 @@ pub struct Lent<'m> {
     pub blocks: &'m mut [Block],
     /// For the stages of a job and the drawing that comes of it.
     pub words: &'m mut [u64],
+    /// For the line that each serial port is sending, by the port's number.
+    pub readers: &'m mut [LineReader],
 }

@@ -20,7 +20,7 @@ mod solid;
 mod stream;
 mod title;
 
-pub use board::{Board, Kept, NotKept, Record};
+pub use board::{Board, Kept, NotKept, REPLY_BYTES, Record};
 pub use job::{Cursor, Job, Observer, Strokes, Unobserved};
 pub use memory::{Lent, Lm3s6965Memory, Memory, NO_MOVES, NO_MOVES_OF_PICO, PicoMemory};
 pub use options::PlotOptions;
@@ -40,6 +40,9 @@ use stream::{Listing, Progress, Task};
 /// 50 ms. More if the machine could not stop within them.
 const AHEAD_TICKS: u32 = crate::motion::TICKS_PER_SECOND / 20;
 
+/// Serial ports of a board, at most.
+const PORT_LIMIT: usize = 2;
+
 /// Polls the plotter for ever; sleeps when there is nothing to do.
 pub fn run<B: Board>(board: &mut B, memory: Lent<'_>, pins: &PulserState) -> ! {
     let mut plotter = Plotter::with_settings(memory, pins, kept::settings(board));
@@ -58,11 +61,16 @@ pub fn run<B: Board>(board: &mut B, memory: Lent<'_>, pins: &PulserState) -> ! {
 /// The whole plotter but for its pins.
 #[derive(Debug)]
 pub struct Plotter<'m> {
-    reader: LineReader,
-    numbering: Numbering,
-    /// What the reply to the line in work names.
+    /// The line that each port is sending.
+    readers: &'m mut [LineReader],
+    /// What each port has numbered.
+    numberings: [Numbering; PORT_LIMIT],
+    /// The port of the line in work, and what the reply to it names.
+    port: usize,
     label: Label,
     inner: Inner<'m>,
+    /// The status is to be told as soon as there is room.
+    status_due: bool,
 }
 
 /// What is left to do when a line is carried out: a job, whose stages need the stack.
@@ -102,11 +110,13 @@ impl<'m> Plotter<'m> {
     /// The same with other settings than the defaults.
     #[inline(never)] // What it builds the parts in must not lie under the stages' frames.
     pub fn with_settings(memory: Lent<'m>, pins: &'m PulserState, settings: Settings) -> Self {
-        let Lent { vertices, corners, blocks, words } = memory;
+        let Lent { vertices, corners, blocks, words, readers } = memory;
         Self {
-            reader: LineReader::default(),
-            numbering: Numbering::default(),
+            readers,
+            numberings: [Numbering::default(), Numbering::default()],
+            port: 0,
             label: Label::default(),
+            status_due: false,
             inner: Inner {
                 model: Model::new(vertices, corners),
                 options: PlotOptions::default(),
@@ -142,11 +152,15 @@ impl<'m> Plotter<'m> {
             }
             return true;
         }
-        let byte = if self.inner.must_wait() { None } else { board.read_byte() };
-        let Some(byte) = byte else { return planned || asked != RealTime::default() };
-        let Some(line) = self.reader.push(byte) else { return true };
+        // A line is read once its reply finds room, so that no reply keeps the steps waiting.
+        let waits = self.inner.must_wait() || !board.has_room(REPLY_BYTES);
+        let byte = if waits { None } else { board.read_byte() };
+        let Some((port, byte)) = byte else { return planned || asked != RealTime::default() };
+        let reader = self.readers.get_mut(port).zip(self.numberings.get_mut(port));
+        let Some((reader, numbering)) = reader else { return true };
+        let Some(line) = reader.push(byte) else { return true };
         let mut shows_drive = false;
-        let (outcome, label) = match self.numbering.receive(line) {
+        let (outcome, label) = match numbering.receive(line) {
             Received::Line(line, label) => {
                 let outcome = match self.inner.carry_out(line, board) {
                     Ok(Next::Plot) => self.inner.plot(board, false),
@@ -165,7 +179,7 @@ impl<'m> Plotter<'m> {
         if outcome == Err(Refusal::Aborted) {
             self.reset(board);
         }
-        self.label = label;
+        (self.port, self.label) = (port, label);
         if self.inner.task.is_none() {
             self.answer(outcome, board);
         }
@@ -177,7 +191,9 @@ impl<'m> Plotter<'m> {
 
     #[inline(never)] // Its frame must not lie under the stages'.
     fn answer<B: Board>(&mut self, outcome: Result<(), Refusal>, board: &mut B) {
-        self.numbering.note(self.label, outcome);
+        if let Some(numbering) = self.numberings.get_mut(self.port) {
+            numbering.note(self.label, outcome);
+        }
         Reply(board).outcome(outcome, self.label);
     }
 
@@ -230,10 +246,9 @@ impl<'m> Plotter<'m> {
             self.reset(board);
         }
         self.inner.act(asked);
-        if asked.has(RealTime::BYTES_LOST) {
-            Reply(board).outcome(Err(Refusal::BytesLost), Label::default());
-        }
-        if asked.has(RealTime::STATUS) {
+        self.status_due |= asked.has(RealTime::STATUS);
+        if self.status_due && board.has_room(REPLY_BYTES) {
+            self.status_due = false;
             // To write it takes 10 ms; so may what was done since the queue was filled last.
             self.inner.plan(board);
             self.inner.report_status(board);
@@ -241,8 +256,8 @@ impl<'m> Plotter<'m> {
     }
 
     fn reset<B: Board>(&mut self, board: &mut B) {
-        self.reader.clear();
-        self.numbering = Numbering::default();
+        self.readers.iter_mut().for_each(LineReader::clear);
+        self.numberings = [Numbering::default(), Numbering::default()];
         self.inner.task = None;
         self.inner.program = Program::default();
         self.greet(board);

@@ -2,7 +2,7 @@
 //! they asked for is done.
 
 use super::program::{Order, Program};
-use super::{Board, Inner, Reply};
+use super::{Board, Inner, REPLY_BYTES, Reply};
 use crate::drawing::{LineType, PagePoint};
 use crate::fixed::BinaryFraction;
 use crate::machine::{Alarm, MachineError, Setting, State, Target};
@@ -113,7 +113,10 @@ impl Inner<'_> {
     #[inline(never)] // Its frame must not lie under the stages'.
     pub(super) fn proceed<B: Board>(&mut self, board: &mut B) -> Progress {
         if let Some(Task::List(listing, number)) = &mut self.task {
-            // A line takes up to 10 ms: the queue of steps is filled after each.
+            // A row comes as soon as it finds room: it takes up to 10 ms, and steps may be running.
+            if !board.has_room(REPLY_BYTES) {
+                return Progress::Waits;
+            }
             let (listing, this) = (*listing, *number);
             *number += 1;
             if self.list(listing, this, board) {

@@ -1,7 +1,7 @@
 //! Bytes to lines, and the bytes that are commands by themselves.
 
-use super::Refusal;
 use super::numbering::NUMBER_LIMIT;
+use super::{DAMAGED, Refusal};
 
 /// The longest line, in bytes without its end, its number and its checksum.
 pub const LINE_LIMIT: usize = 256;
@@ -22,8 +22,6 @@ impl RealTime {
     pub const RESUME: Self = Self(1 << 2);
     /// ctrl-X: give up the job. Bytes received before it are dropped.
     pub const ABORT: Self = Self(1 << 3);
-    /// No byte: bytes were lost because the sender did not wait for replies.
-    pub const BYTES_LOST: Self = Self(1 << 4);
     /// 0x85: give up the moves by hand.
     pub const CANCEL_JOG: Self = Self(1 << 5);
     /// 0x90: speeds as set.
@@ -142,30 +140,44 @@ impl Sorter {
 pub struct LineReader {
     bytes: heapless::Vec<u8, { LINE_LIMIT + NUMBER_LIMIT }>,
     too_long: bool,
+    /// Bytes of the line were lost.
+    damaged: bool,
     /// What ended the line before, until the next byte comes.
     ended_by: Option<u8>,
 }
 
 impl LineReader {
+    /// Before the first byte.
+    pub const fn new() -> Self {
+        Self { bytes: heapless::Vec::new(), too_long: false, damaged: false, ended_by: None }
+    }
+
     /// Adds a byte. At the end of a line (LF, CR or CR LF) the line is handed out, an empty one too,
     /// so that every line that a sender counts is answered.
     ///
     /// # Errors
-    /// [`Refusal::LineTooLong`] at the end of a line that was; [`Refusal::NotText`] if it is not UTF-8.
+    /// At the end of the line: [`Refusal::BytesLost`] if it held [`DAMAGED`], else
+    /// [`Refusal::LineTooLong`] if it was, [`Refusal::NotText`] if it is not UTF-8.
     pub fn push(&mut self, byte: u8) -> Option<Result<&str, Refusal>> {
         if let Some(end) = self.ended_by.take() {
             self.bytes.clear();
-            self.too_long = false;
+            (self.too_long, self.damaged) = (false, false);
             if end == b'\r' && byte == b'\n' {
                 return None;
             }
+        }
+        if byte == DAMAGED {
+            self.damaged = true;
+            return None;
         }
         if byte != b'\r' && byte != b'\n' {
             self.too_long |= self.bytes.push(byte).is_err();
             return None;
         }
         self.ended_by = Some(byte);
-        Some(if self.too_long {
+        Some(if self.damaged {
+            Err(Refusal::BytesLost)
+        } else if self.too_long {
             Err(Refusal::LineTooLong { limit: LINE_LIMIT })
         } else {
             core::str::from_utf8(&self.bytes).map_err(|_| Refusal::NotText)
@@ -260,6 +272,24 @@ mod tests {
 
     #[test]
     fn bytes_that_are_no_text_are_refused() {
-        assert_eq!(lines(b"\xff\xfe\nok\n"), [Err(Refusal::NotText), Ok("ok".to_string())]);
+        assert_eq!(lines(b"\xfe\xfe\nok\n"), [Err(Refusal::NotText), Ok("ok".to_string())]);
+    }
+
+    #[test]
+    fn a_line_that_lost_bytes_is_refused_once_at_its_end() {
+        let lost = Err(Refusal::BytesLost);
+        assert_eq!(lines(b"v 1\xff\xff 3\nok\n"), [lost.clone(), Ok("ok".to_string())]);
+        // However long it is, and if it holds nothing else.
+        let mut bytes = std::vec![b'x'; LINE_LIMIT + 1];
+        bytes.extend(b"\xff\r\n\xff\n");
+        assert_eq!(lines(&bytes), [lost.clone(), lost]);
+    }
+
+    #[test]
+    fn what_is_forgotten_is_not_refused() {
+        let mut reader = LineReader::default();
+        assert_eq!(reader.push(DAMAGED), None);
+        reader.clear();
+        assert_eq!(reader.push(b'\n'), Some(Ok("")));
     }
 }

@@ -13,6 +13,7 @@ mod gcode;
 mod line;
 mod numbering;
 mod option;
+mod receiver;
 mod refusal;
 mod values;
 
@@ -22,5 +23,6 @@ pub use gcode::{GCode, Word};
 pub use line::{LINE_LIMIT, LineReader, RealTime, Sorter};
 pub use numbering::{Checksum, Label, Named, Numbering, Received};
 pub use option::{HiddenLines, PlotOption, ProjectionChoice, WayToSee};
+pub use receiver::{DAMAGED, Receiver};
 pub use refusal::{MEANINGS, Refusal};
 pub use values::{Decimals, Numbers};

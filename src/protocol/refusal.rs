@@ -122,7 +122,7 @@ pub const MEANINGS: &[(u16, &str)] = &[
     (20, "unsupported G-code"),
     (33, "no such arc"),
     (100, "line is not text"),
-    (101, "bytes were lost: wait for each reply"),
+    (101, "bytes of the line were lost or damaged"),
     (102, "number out of range"),
     (103, "wrong number of values"),
     (104, "not a vertex number"),
@@ -261,8 +261,10 @@ impl fmt::Display for Refusal {
             Self::NotText => {
                 formatter.write_str("a byte of the line is no text: check the baud rate")
             }
-            Self::BytesLost => formatter
-                .write_str("the receive buffer was full: send a line, then wait for its reply"),
+            Self::BytesLost => formatter.write_str(
+                "bytes of the line were lost or damaged, perhaps a line end among them: \
+                 check the cable, and keep fewer than 240 bytes unanswered",
+            ),
             Self::NumberOutOfRange => {
                 formatter.write_str("the number is too large, too small or has the wrong sign")
             }

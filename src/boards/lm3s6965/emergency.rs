@@ -23,7 +23,7 @@ impl Fault for Lm3s6965 {
     }
 
     fn poll() -> Option<u8> {
-        UART0.poll()
+        UART0.poll().map(|data| data as u8)
     }
 
     fn reset() -> ! {

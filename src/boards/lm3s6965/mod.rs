@@ -81,8 +81,8 @@ pub fn take() -> (Lm3s6965, Lent<'static>, &'static PulserState) {
 impl Board for Lm3s6965 {
     const NAME: &'static str = "lm3s6965";
 
-    fn read_byte(&mut self) -> Option<u8> {
-        self.serial.read_byte()
+    fn read_byte(&mut self) -> Option<(usize, u8)> {
+        self.serial.read_byte().map(|byte| (0, byte))
     }
 
     fn take_real_time(&mut self) -> RealTime {

@@ -9,7 +9,7 @@ use penup::protocol::RealTime;
 use super::registers::{GPIO_A, SYSTEM_CONTROL, UART0};
 use super::{HAPPENED, clock, critical};
 use crate::boards::handler::Owned;
-use crate::boards::line::{self, Receiver};
+use crate::boards::line::{self, Inlet, Shared};
 
 mod offset {
     /// In system control.
@@ -26,7 +26,8 @@ const SERIAL_PINS: u32 = 0b11;
 /// When the last `?` came, in cycles modulo 2^24.
 static STATUS_ASKED: AtomicU32 = AtomicU32::new(0);
 
-static RECEIVER: Owned<Receiver> = Owned::empty();
+static SHARED: Shared = Shared::new();
+static INLET: Owned<Inlet> = Owned::empty();
 
 /// The main loop's end of the line.
 pub struct Line(line::Line);
@@ -41,10 +42,11 @@ pub fn set_up(nvic: &mut NVIC) -> Line {
     GPIO_A.set_bits(offset::DIGITAL_ENABLE, SERIAL_PINS);
 
     UART0.set_up(clock::HERTZ);
+    UART0.interrupt_when_received();
 
-    let (receiver, line) = line::ends();
-    // SAFETY: the interrupt is masked since reset, and this runs once (the line's ends see to it).
-    unsafe { RECEIVER.fill(receiver) };
+    let (inlet, line) = SHARED.ends();
+    // SAFETY: the interrupt is masked since reset, and this runs once (its queue's cell sees to it).
+    unsafe { INLET.fill(inlet) };
     critical::enable(nvic, Interrupt::UART0, critical::SERIAL_PRIORITY);
     UART0.enable();
     Line(line)
@@ -56,9 +58,9 @@ impl Line {
         self.0.read_byte()
     }
 
-    /// As [`line::Line::take_real_time`]; logs how long a request for the status has waited.
+    /// As [`line::take_real_time`]; logs how long a request for the status has waited.
     pub fn take_real_time(&mut self) -> RealTime {
-        let asked = self.0.take_real_time();
+        let asked = line::take_real_time(core::slice::from_mut(&mut self.0));
         if asked.has(RealTime::STATUS) {
             let waited = clock::cycles_24().wrapping_sub(STATUS_ASKED.load(Ordering::Relaxed));
             let microseconds = (waited & clock::CYCLE_MASK) / (clock::HERTZ / 1_000_000);
@@ -72,12 +74,13 @@ impl Line {
 fn UART0() {
     UART0.clear_interrupt();
     // SAFETY: this is the handler that owns it.
-    if let Some(receiver) = unsafe { RECEIVER.get() } {
-        while let Some(byte) = UART0.poll() {
-            if byte == b'?' {
+    if let Some(inlet) = unsafe { INLET.get() } {
+        while let Some(data) = UART0.poll() {
+            let asked = inlet.receiver.receive_from_uart(data);
+            if asked.has(RealTime::STATUS) {
                 STATUS_ASKED.store(clock::cycles_24(), Ordering::Relaxed);
             }
-            receiver.receive(byte);
+            line::ask(asked, core::slice::from_mut(inlet));
         }
     }
     HAPPENED.store(true, Ordering::Relaxed);

@@ -4,7 +4,7 @@ use cortex_m::peripheral::NVIC;
 use rp2040_hal::pac::{Interrupt, interrupt};
 
 use super::registers::TIMER;
-use super::{contacts, critical};
+use super::{contacts, critical, serial};
 
 /// Cycles in a second.
 pub const HERTZ: u32 = 125_000_000;
@@ -38,6 +38,7 @@ pub fn microseconds() -> u32 {
 fn TIMER_IRQ_0() {
     TIMER.write(offset::INTERRUPT, ALARM_0);
     contacts::look();
+    serial::look_soon();
     schedule();
 }
 

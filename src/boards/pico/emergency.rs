@@ -176,6 +176,7 @@ pub fn feed() {
 /// No interrupt, no step, pen up, drivers off.
 pub fn make_safe() {
     cortex_m::interrupt::disable();
+    UART0.receive_by_dma(false);
     steps::release();
     pen::set_height(0);
 }
@@ -238,7 +239,7 @@ impl Fault for Pico {
     }
 
     fn poll() -> Option<u8> {
-        UART0.poll()
+        UART0.poll().map(|data| data as u8)
     }
 
     fn reset() -> ! {

@@ -2,7 +2,8 @@
 //!
 //! The code runs from the same flash, which cannot be read while it is erased or written. So this is
 //! done by the boot ROM's functions, called from RAM with interrupts masked: 45 ms for a sector, half
-//! a millisecond for a page, in which bytes of the serial line beyond its FIFO's 32 are lost. Steps
+//! a millisecond for a page. Bytes of the serial lines wait meanwhile: those of the UART in RAM, where DMA
+//! puts them, those of USB at the host. Steps
 //! would go on for as long as their words last; callers see to it that nothing moves.
 //!
 //! A worn flash says nothing by itself: its cells no longer change. So what was erased or written

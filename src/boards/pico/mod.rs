@@ -12,7 +12,7 @@
 //! | settings and last job | the last 288 KiB of flash |
 //! | next block of steps | DMA_IRQ_0, priority 0 |
 //! | pen's heights, and the steps of its motor | PIO0_IRQ_0, priority 1 |
-//! | serial line's bytes | UART0_IRQ, USBCTRL_IRQ, priority 2 |
+//! | serial line's bytes | DMA channels 1 and 2; UART0_IRQ, USBCTRL_IRQ, priority 2 |
 //! | millisecond | TIMER_IRQ_0, priority 3 |
 //!
 //! The watchdog is fed only while the main loop turns, or listens in a long computation, and the steps
@@ -97,14 +97,15 @@ pub fn take() -> (Pico, Lent<'static>, &'static PulserState) {
     pen::set_up();
     lift::set_up();
     let mut flash = flash::Flash::new();
-    let line = ports::set_up();
+    let lines = ports::set_up();
     let uart = serial::set_up(&mut core.NVIC);
     let controller = (chip.USBCTRL_REGS, chip.USBCTRL_DPRAM);
     static NUMBER: StaticCell<heapless::String<16>> = StaticCell::new();
     let number = NUMBER.init(flash.number());
     let usb = usb::set_up(&mut core.NVIC, controller, clocks.usb_clock, &mut chip.RESETS, number);
-    let ports = Ports::new(line, uart, usb);
+    let ports = Ports::new(lines, uart, usb);
     pins::set_up(gpio);
+    serial::open();
     contacts::set_up();
     clock::start(&mut core.NVIC);
     watchdog.start(3.secs());
@@ -126,7 +127,7 @@ impl Board for Pico {
     const NAME: &'static str = "pico";
     const HAS_DRIVE: bool = true;
 
-    fn read_byte(&mut self) -> Option<u8> {
+    fn read_byte(&mut self) -> Option<(usize, u8)> {
         self.ports.read_byte()
     }
 
@@ -137,6 +138,10 @@ impl Board for Pico {
             emergency::feed();
         }
         self.ports.take_real_time()
+    }
+
+    fn has_room(&mut self, bytes: usize) -> bool {
+        self.ports.has_room(bytes)
     }
 
     fn write(&mut self, bytes: &[u8]) {

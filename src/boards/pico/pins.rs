@@ -1,6 +1,6 @@
 //! Which pin does what.
 
-use rp2040_hal::gpio::{FunctionPio0, FunctionPwm, FunctionSioOutput, FunctionUart, Pins};
+use rp2040_hal::gpio::{FunctionPio0, FunctionPwm, FunctionSioOutput, FunctionUart, Pins, PullUp};
 
 /// STEP_X, STEP_Y, DIR_X, DIR_Y and ENABLE are this one and the next four.
 pub const FIRST_MOTOR_PIN: u32 = 2;
@@ -8,7 +8,8 @@ pub const FIRST_MOTOR_PIN: u32 = 2;
 /// Hands the pins over to their peripherals, which must hold the levels to begin with.
 pub fn set_up(pins: Pins) {
     pins.gpio0.into_function::<FunctionUart>();
-    pins.gpio1.into_function::<FunctionUart>();
+    // With nothing connected the line rests, which is high; the pad would pull it down to a break.
+    pins.gpio1.reconfigure::<FunctionUart, PullUp>();
     pins.gpio2.into_function::<FunctionPio0>();
     pins.gpio3.into_function::<FunctionPio0>();
     pins.gpio4.into_function::<FunctionPio0>();

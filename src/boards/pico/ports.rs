@@ -1,124 +1,131 @@
 //! Two serial ports, UART and USB, and one plotter.
 //!
-//! Either port can be the sender. Replies go to every port that has spoken since the start, before the first byte
-//! to both. Real-time bytes count whatever their port, so one port may watch what the other sends. A
-//! line that a byte of the other port interrupts is void: it is refused, and the new one is read from its beginning.
+//! Either port can be the sender, and each has lines of its own: what comes by one does not touch a
+//! line of the other. Replies go to every port that has spoken since the start, before the first byte
+//! to both. Real-time bytes count whatever their port, so one port may watch what the other sends.
 
 use core::sync::atomic::{AtomicU8, Ordering};
 
-use penup::protocol::RealTime;
+use penup::protocol::{RealTime, Receiver};
 
 use super::{serial, usb};
 use crate::boards::handler::Owned;
-use crate::boards::line::{self, Line, Receiver};
+use crate::boards::line::{self, Inlet, Line, Shared};
 
-/// A serial port, by its bit.
+/// A serial port, by its number.
 #[derive(Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
 pub enum Port {
     /// UART0.
-    Uart = 1,
+    Uart = 0,
     /// USB.
-    Usb = 2,
+    Usb = 1,
 }
 
-/// A bit for each port from which a byte has come. The ports' handlers write it, which have one rank.
+const COUNT: usize = 2;
+
+/// A bit for each port from which a sound byte has come. The ports' handlers write it, which have one
+/// rank.
 static SPOKEN: AtomicU8 = AtomicU8::new(0);
 
+static SHARED: [Shared; COUNT] = [const { Shared::new() }; COUNT];
+
 /// What the handlers of both ports share: they have one rank, so none interrupts the other.
-static INLET: Owned<Inlet> = Owned::empty();
+static INLETS: Owned<Inlets> = Owned::empty();
 
 /// Where received bytes go in.
-pub struct Inlet {
-    receiver: Receiver,
-    /// The port of a line that has not ended.
-    line_of: Option<Port>,
+pub struct Inlets {
+    inlets: [Inlet; COUNT],
+    /// How often ctrl-X has come, by either port; wraps.
+    pub aborts: u32,
 }
 
 /// The main loop's end.
 pub struct Ports {
-    line: Line,
+    lines: [Line; COUNT],
+    /// The port whose byte was read last.
+    last: usize,
     /// What is sent goes to USB alone.
     is_aside: bool,
     pub uart: serial::Sender,
     pub usb: usb::Sender,
 }
 
-/// Makes the inlet; returns the main loop's end of it.
-pub fn set_up() -> Line {
-    let (receiver, line) = line::ends();
-    // SAFETY: the ports' interrupts are masked since reset, and this runs once (the line's ends see to it).
-    unsafe { INLET.fill(Inlet { receiver, line_of: None }) };
-    line
+/// Makes the inlets; returns the main loop's ends of them.
+pub fn set_up() -> [Line; COUNT] {
+    let [uart, usb] = &SHARED;
+    let ((uart, uart_line), (usb, usb_line)) = (uart.ends(), usb.ends());
+    // SAFETY: the ports' interrupts are masked since reset, and this runs once (the queues' cells see
+    // to it).
+    unsafe { INLETS.fill(Inlets { inlets: [uart, usb], aborts: 0 }) };
+    [uart_line, usb_line]
 }
 
-/// The inlet.
+/// The inlets.
 ///
 /// # Safety
 /// As [`Owned::get`], for the handlers of both ports.
-pub unsafe fn inlet() -> Option<&'static mut Inlet> {
+pub unsafe fn inlets() -> Option<&'static mut Inlets> {
     // SAFETY: the caller's.
-    unsafe { INLET.get() }
+    unsafe { INLETS.get() }
 }
 
-impl Inlet {
-    /// Takes a byte in; it is lost if there is no place, and a flag says so.
-    pub fn receive(&mut self, port: Port, byte: u8) {
-        self.note(port);
-        self.follow(port, byte);
-        self.receiver.receive(byte);
+impl Inlets {
+    /// Lets a port's receiver take something, and acts on what that asks for in real time.
+    pub fn take(&mut self, port: Port, take: impl FnOnce(&mut Receiver) -> RealTime) {
+        let receiver = &mut self.inlets[port as usize].receiver;
+        let asked = take(receiver);
+        if receiver.has_heard() {
+            SPOKEN.store(SPOKEN.load(Ordering::Relaxed) | 1 << port as u8, Ordering::Relaxed);
+        }
+        if asked != RealTime::default() {
+            self.aborts = self.aborts.wrapping_add(u32::from(asked.has(RealTime::ABORT)));
+            line::ask(asked, &mut self.inlets);
+        }
     }
 
-    /// Notes what a real-time byte asks for, and gives an ordinary byte back.
-    pub fn sort_out(&mut self, port: Port, byte: u8) -> Option<u8> {
-        self.note(port);
-        self.receiver.sort_out(byte)
+    /// Bytes that a port received are lost here.
+    pub fn lose(&mut self, port: Port) {
+        self.inlets[port as usize].receiver.lose();
     }
 
-    /// Takes an ordinary byte in; gives it back if there is no place.
+    /// Puts an ordinary byte into a port's queue; gives it back if there is no place.
     pub fn append(&mut self, port: Port, byte: u8) -> Result<(), u8> {
-        self.follow(port, byte);
-        self.receiver.append(byte)
-    }
-
-    fn note(&mut self, port: Port) {
-        SPOKEN.store(SPOKEN.load(Ordering::Relaxed) | port as u8, Ordering::Relaxed);
-    }
-
-    /// Makes a line void that another port has begun.
-    fn follow(&mut self, port: Port, byte: u8) {
-        /// In no text: the line is refused.
-        const VOID: u8 = 0xFF;
-        if self.line_of.is_some_and(|other| other != port) {
-            self.receiver.receive(VOID);
-            self.receiver.receive(b'\n');
-            self.line_of = None;
-        }
-        match byte {
-            b'\n' | b'\r' => self.line_of = None,
-            _ => self.line_of = Some(port),
-        }
+        self.inlets[port as usize].receiver.append(byte)
     }
 }
 
 impl Ports {
     /// Joins what the ports' set-up gave.
-    pub fn new(line: Line, uart: serial::Sender, usb: usb::Sender) -> Self {
-        Self { line, is_aside: false, uart, usb }
+    pub fn new(lines: [Line; COUNT], uart: serial::Sender, usb: usb::Sender) -> Self {
+        Self { lines, last: 0, is_aside: false, uart, usb }
     }
 
-    /// The next ordinary byte: see [`Line::read_byte`].
-    pub fn read_byte(&mut self) -> Option<u8> {
-        let byte = self.line.read_byte();
-        if byte.is_none() {
-            usb::go_on();
+    /// The next ordinary byte and the number of its port: see [`Line::read_byte`]. A port is read on
+    /// until nothing waits there or its line ends, then it is the other's turn.
+    pub fn read_byte(&mut self) -> Option<(usize, u8)> {
+        for _ in 0..COUNT {
+            let port = self.last;
+            if let Some(byte) = self.lines[port].read_byte() {
+                if byte == b'\n' {
+                    self.last = (port + 1) % COUNT;
+                }
+                return Some((port, byte));
+            }
+            self.last = (port + 1) % COUNT;
         }
-        byte
+        usb::go_on();
+        None
     }
 
-    /// What was asked in real time: see [`Line::take_real_time`].
+    /// What was asked in real time: see [`line::take_real_time`].
     pub fn take_real_time(&mut self) -> RealTime {
-        self.line.take_real_time()
+        line::take_real_time(&mut self.lines)
+    }
+
+    /// Whether so many bytes find room at once where they would be sent.
+    pub fn has_room(&mut self, bytes: usize) -> bool {
+        (!hears(Port::Uart) || self.uart.has_room(bytes))
+            && (!hears(Port::Usb) || self.usb.has_room(bytes))
     }
 
     /// What is sent from now on goes to USB alone, or again to who has spoken.
@@ -131,8 +138,6 @@ impl Ports {
         if self.is_aside {
             return self.usb.write(bytes);
         }
-        let spoken = SPOKEN.load(Ordering::Relaxed);
-        let hears = |port: Port| spoken == 0 || spoken & port as u8 != 0;
         if hears(Port::Uart) {
             self.uart.write(bytes);
         }
@@ -140,4 +145,10 @@ impl Ports {
             self.usb.write(bytes);
         }
     }
+}
+
+/// Whether replies go to a port.
+fn hears(port: Port) -> bool {
+    let spoken = SPOKEN.load(Ordering::Relaxed);
+    spoken == 0 || spoken & 1 << port as u8 != 0
 }

@@ -19,7 +19,7 @@ pub const SIO: Peripheral = unsafe { Peripheral::at(0xD000_0000) };
 pub const PSM: Peripheral = unsafe { Peripheral::at(0x4001_0000) };
 /// The watchdog. Used by `emergency`.
 pub const WATCHDOG: Peripheral = unsafe { Peripheral::at(0x4005_8000) };
-/// Direct memory access; channel 0 is that of `steps`.
+/// Direct memory access; channel 0 is that of `steps`, 1 and 2 are those of `serial`.
 pub const DMA: Peripheral = unsafe { Peripheral::at(0x5000_0000) };
 /// Programmable input and output; its state machine 0 is that of `steps`.
 pub const PIO0: Peripheral = unsafe { Peripheral::at(0x5020_0000) };

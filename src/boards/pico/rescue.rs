@@ -34,7 +34,7 @@ pub fn run(mut ports: Ports, cause: &Cause) -> ! {
         if asked.has(RealTime::STATUS) {
             ports.write(b"<Alarm|MPos:0.000,0.000,0.000|Alarm:101>\r\n");
         }
-        match ports.read_byte() {
+        match ports.read_byte().map(|(_, byte)| byte) {
             Some(b'\n' | b'\r') if line.is_empty() => {}
             Some(b'\n' | b'\r') if line == "$UF2" => emergency::show_drive(),
             Some(b'\n' | b'\r') => {

@@ -21,6 +21,7 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use cortex_m::peripheral::NVIC;
 use heapless::spsc::{Consumer, Producer, Queue};
 use heapless::{Deque, Vec};
+use penup::protocol::{DAMAGED, RealTime};
 use rp2040_hal::clocks::UsbClock;
 use rp2040_hal::pac::{Interrupt, RESETS, USBCTRL_DPRAM, USBCTRL_REGS, interrupt};
 use rp2040_hal::usb::UsbBus;
@@ -32,11 +33,10 @@ use usb_device::device::{
 use usbd_serial::{CdcAcmClass, USB_CLASS_CDC};
 
 use self::frame::Frame;
-use super::ports::{self, Inlet, Port};
+use super::ports::{self, Inlets, Port};
 use super::registers::USB;
 use super::{clock, critical};
 use crate::boards::handler::Owned;
-use crate::boards::line::ABORT;
 use crate::boards::peripheral::Peripheral;
 
 /// For tests and for projects without a number of their own: <https://pid.codes/1209/0001>.
@@ -103,13 +103,19 @@ struct Device {
     waiting: Deque<u8, WAITING_PLACES>,
     /// The last received byte does not end a line.
     is_in_line: bool,
+    /// See [`Inlets::aborts`].
+    aborts: u32,
     to_send: Consumer<'static, u8>,
     /// Bytes that the controller has not taken yet.
     packet: Vec<u8, SENT_PACKET>,
 }
 
 /// The main loop's end of what is sent.
-pub struct Sender(Producer<'static, u8>);
+pub struct Sender {
+    bytes: Producer<'static, u8>,
+    /// Since when there has been no room, in microseconds, and how many bytes waited then.
+    full: Option<(u32, usize)>,
+}
 
 /// Shows the device to the host, with this serial number. `ports` is set up, and the pins are out
 /// of their reset.
@@ -149,6 +155,7 @@ pub fn set_up(
             frame: Frame::new(),
             waiting: Deque::new(),
             is_in_line: false,
+            aborts: 0,
             to_send,
             packet: Vec::new(),
         };
@@ -156,15 +163,35 @@ pub fn set_up(
         unsafe { DEVICE.fill(device) };
         critical::enable(nvic, Interrupt::USBCTRL_IRQ, critical::SERIAL_PRIORITY);
     }
-    Sender(sent)
+    Sender { bytes: sent, full: None }
 }
 
 impl Sender {
+    /// Whether so many bytes find room at once. A host that takes nothing for [`PATIENCE`] although
+    /// they do not counts as gone.
+    pub fn has_room(&mut self, bytes: usize) -> bool {
+        let waiting = self.bytes.len();
+        if HOST_IS_GONE.load(Ordering::Relaxed) || self.bytes.capacity() - waiting >= bytes {
+            self.full = None;
+            return true;
+        }
+        let now = clock::microseconds();
+        match self.full {
+            Some((since, before)) if before == waiting => {
+                if now.wrapping_sub(since) > PATIENCE {
+                    HOST_IS_GONE.store(true, Ordering::Relaxed);
+                }
+            }
+            _ => self.full = Some((now, waiting)),
+        }
+        false
+    }
+
     /// Sends `bytes`; waits while the queue is full, but not for a host that is gone.
     pub fn write(&mut self, bytes: &[u8]) {
         for &byte in bytes {
             let began = clock::microseconds();
-            while !HOST_IS_GONE.load(Ordering::Relaxed) && self.0.enqueue(byte).is_err() {
+            while !HOST_IS_GONE.load(Ordering::Relaxed) && self.bytes.enqueue(byte).is_err() {
                 critical_section::with(|_| serve());
                 if clock::microseconds().wrapping_sub(began) > PATIENCE {
                     HOST_IS_GONE.store(true, Ordering::Relaxed);
@@ -207,7 +234,7 @@ fn take(flag: &AtomicBool) -> bool {
 /// All that there is to do. Called by the handler, or where it and that of the other port are masked.
 fn serve() {
     // SAFETY: by the contract above.
-    if let (Some(device), Some(inlet)) = unsafe { (DEVICE.get(), ports::inlet()) } {
+    if let (Some(device), Some(inlets)) = unsafe { (DEVICE.get(), ports::inlets()) } {
         device.frame.look();
         // Polling forgets it.
         let took = device.class.write_ep().address().index();
@@ -219,7 +246,7 @@ fn serve() {
         if took {
             device.welcome_back();
         }
-        device.take_in(inlet);
+        device.take_in(inlets);
         device.send();
         IS_WAITED.store(device.awaits_bus || !device.waiting.is_empty(), Ordering::Relaxed);
     }
@@ -264,10 +291,8 @@ impl Device {
         self.forget_sent();
         self.take_packet_back();
         if self.is_in_line {
-            /// In no text: the line is refused, and the next one is a line of its own.
-            const VOID: u8 = 0xFF;
-            // Packets are read only while there are more places than these.
-            let _ = self.waiting.push_back(VOID);
+            // The line is refused, and the next one is a line of its own. Packets are read only while there are more places than these.
+            let _ = self.waiting.push_back(DAMAGED);
             let _ = self.waiting.push_back(b'\n');
             self.is_in_line = false;
         }
@@ -306,10 +331,20 @@ impl Device {
         }
     }
 
-    fn take_in(&mut self, inlet: &mut Inlet) {
+    /// Drops what waits if ctrl-X has come since, by either port.
+    fn drop_void(&mut self, inlets: &Inlets) {
+        if self.aborts != inlets.aborts {
+            self.aborts = inlets.aborts;
+            self.is_in_line = false;
+            self.waiting.clear();
+        }
+    }
+
+    fn take_in(&mut self, inlets: &mut Inlets) {
+        self.drop_void(inlets);
         loop {
             while let Some(&byte) = self.waiting.front()
-                && inlet.append(Port::Usb, byte).is_ok()
+                && inlets.append(Port::Usb, byte).is_ok()
             {
                 self.waiting.pop_front();
             }
@@ -326,13 +361,16 @@ impl Device {
                 HOST_IS_GONE.store(false, Ordering::Relaxed);
             }
             for &byte in packet.iter().take(count) {
-                if let Some(byte) = inlet.sort_out(Port::Usb, byte) {
-                    self.is_in_line = byte != b'\n' && byte != b'\r';
-                    let _ = self.waiting.push_back(byte); // There is a place.
-                } else if byte == ABORT {
-                    self.is_in_line = false;
-                    self.waiting.clear();
-                }
+                let (waiting, is_in_line) = (&mut self.waiting, &mut self.is_in_line);
+                inlets.take(Port::Usb, |receiver| match receiver.sort_out(byte) {
+                    Ok(byte) => {
+                        *is_in_line = byte != b'\n' && byte != b'\r';
+                        let _ = waiting.push_back(byte); // There is a place.
+                        RealTime::default()
+                    }
+                    Err(asked) => asked,
+                });
+                self.drop_void(inlets);
             }
         }
     }

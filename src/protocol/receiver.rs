@@ -1,0 +1,305 @@
+//! What a port's receive interrupt does with each byte: real-time bytes act at once, ordinary bytes
+//! wait in a queue for the main loop, and a place where bytes were lost or damaged is marked there.
+//!
+//! The mark is in band: the byte [`DAMAGED`], which UTF-8 never contains, stands in the queue where
+//! the bytes are missing. [`LineReader`](super::LineReader) then refuses the line that holds it, at
+//! its end and once. A damaged byte may have been a line's end. Then two lines are refused as one,
+//! and a sender that counts replies finds one reply too few.
+//!
+//! A port that has not heard a sound byte yet drops damaged ones without a mark: an input that
+//! floats, or a cable that is plugged in, gives such bytes before anybody has spoken. Later, damage
+//! between two lines is marked like any other and refuses the next line, for it may have hit the
+//! beginning of that line, or a whole line. It is never answered by itself.
+
+use super::{RealTime, Sorter};
+use core::fmt;
+use heapless::spsc::Producer;
+
+/// Stands among received bytes where bytes were lost or damaged. UTF-8 never contains it, and a
+/// sender's own byte of this value is taken for damage, too.
+pub const DAMAGED: u8 = 0xFF;
+
+/// The bits of a data register of Arm's UART PL011 beside the byte: its stop bit is missing, its
+/// parity is wrong, it is part of a break.
+const BYTE_IS_DAMAGED: u32 = 0b111 << 8;
+/// Bytes before this one were lost, because the UART's own queue was full.
+const BYTES_WERE_LOST: u32 = 1 << 11;
+
+/// The receive interrupt's end of one port.
+pub struct Receiver<'q> {
+    queue: Producer<'q, u8>,
+    sorter: Sorter,
+    /// Bytes put into the queue since the start, modulo 2^32.
+    count: u32,
+    has_heard: bool,
+    /// Bytes were lost or damaged since the last byte in the queue.
+    damage: Damage,
+}
+
+/// Whether bytes are missing behind the last byte in the queue.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Damage {
+    None,
+    /// The queue had no place for the mark yet.
+    Unmarked,
+    Marked,
+}
+
+impl fmt::Debug for Receiver<'_> {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (count, damage) = (self.count, self.damage);
+        let mut shown = formatter.debug_struct("Receiver");
+        shown.field("count", &count).field("damage", &damage).finish_non_exhaustive()
+    }
+}
+
+impl<'q> Receiver<'q> {
+    /// Puts ordinary bytes into `queue`.
+    pub const fn new(queue: Producer<'q, u8>) -> Self {
+        let sorter = Sorter::new();
+        Self { queue, sorter, count: 0, has_heard: false, damage: Damage::None }
+    }
+
+    /// Takes what a PL011's data register held: the byte and its error bits. Gives what the byte
+    /// asks for in real time, if anything.
+    pub fn receive_from_uart(&mut self, data: u32) -> RealTime {
+        if data & BYTES_WERE_LOST != 0 {
+            self.lose();
+        }
+        if data & BYTE_IS_DAMAGED != 0 {
+            self.lose();
+            return RealTime::default();
+        }
+        self.receive((data & 0xFF) as u8)
+    }
+
+    /// Takes a byte. Gives what it asks for in real time, if anything. An ordinary byte that finds
+    /// the queue full is lost, and the place will be marked.
+    pub fn receive(&mut self, byte: u8) -> RealTime {
+        match self.sort_out(byte) {
+            Err(asked) => asked,
+            Ok(byte) => {
+                if self.append(byte).is_err() {
+                    self.lose();
+                }
+                RealTime::default()
+            }
+        }
+    }
+
+    /// Gives an ordinary byte back.
+    ///
+    /// # Errors
+    /// What the byte asks for in real time. It is not to be queued.
+    pub fn sort_out(&mut self, byte: u8) -> Result<u8, RealTime> {
+        let asked = self.sorter.sort(byte);
+        self.has_heard |= byte != DAMAGED;
+        asked.map_or(Ok(byte), Err)
+    }
+
+    /// Puts an ordinary byte into the queue, behind the mark of what was lost before it.
+    ///
+    /// # Errors
+    /// The byte, if there is no place.
+    pub fn append(&mut self, byte: u8) -> Result<(), u8> {
+        if byte == DAMAGED {
+            self.lose();
+            return Ok(());
+        }
+        if !self.mark() {
+            return Err(byte);
+        }
+        self.queue.enqueue(byte)?;
+        self.count = self.count.wrapping_add(1);
+        self.damage = Damage::None;
+        Ok(())
+    }
+
+    /// Bytes were lost or damaged here. Neighbouring losses share a mark.
+    pub fn lose(&mut self) {
+        // A letter of several bytes that has begun is not gone on with.
+        self.sorter.sort(DAMAGED);
+        if self.has_heard && self.damage == Damage::None {
+            self.damage = Damage::Unmarked;
+            self.mark();
+        }
+    }
+
+    /// Marks what was lost, as soon as there is a place. Whether nothing is left to be marked.
+    pub fn mark(&mut self) -> bool {
+        if self.damage == Damage::Unmarked && self.queue.enqueue(DAMAGED).is_ok() {
+            self.count = self.count.wrapping_add(1);
+            self.damage = Damage::Marked;
+        }
+        self.damage != Damage::Unmarked
+    }
+
+    /// All that came so far is void: ctrl-X came by some port. Gives how many bytes have been put
+    /// into the queue since the start, modulo 2^32; the main loop drops those among them that it
+    /// has not taken.
+    pub fn abort(&mut self) -> u32 {
+        self.damage = Damage::None;
+        self.count
+    }
+
+    /// Whether a sound byte has come since the start.
+    pub fn has_heard(&self) -> bool {
+        self.has_heard
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{LineReader, Refusal};
+    use super::*;
+    use heapless::spsc::{Consumer, Queue};
+    use std::string::{String, ToString};
+    use std::vec::Vec;
+
+    const FRAMING: u32 = 1 << 8;
+    const PARITY: u32 = 1 << 9;
+    const BREAK: u32 = 1 << 10;
+    const OVERRUN: u32 = 1 << 11;
+
+    /// The lines that a reader makes of what is in the queue.
+    fn lines(
+        reader: &mut LineReader,
+        queue: &mut Consumer<'_, u8>,
+    ) -> Vec<Result<String, Refusal>> {
+        let mut lines = Vec::new();
+        while let Some(byte) = queue.dequeue() {
+            lines.extend(reader.push(byte).map(|line| line.map(ToString::to_string)));
+        }
+        lines
+    }
+
+    /// The lines that come of what a PL011's data register holds.
+    fn lines_of(data: impl IntoIterator<Item = u32>) -> Vec<Result<String, Refusal>> {
+        let (mut queue, mut reader) = (Queue::<u8, 256>::new(), LineReader::default());
+        let (producer, mut consumer) = queue.split();
+        let mut receiver = Receiver::new(producer);
+        for data in data {
+            assert_eq!(receiver.receive_from_uart(data), RealTime::default());
+        }
+        lines(&mut reader, &mut consumer)
+    }
+
+    /// The text, with the bits added to its byte at `place`.
+    fn damaged(text: &str, place: usize, bits: u32) -> Vec<u32> {
+        let mut data: Vec<u32> = text.bytes().map(u32::from).collect();
+        data[place] |= bits;
+        data
+    }
+
+    fn ok(line: &str) -> Result<String, Refusal> {
+        Ok(line.to_string())
+    }
+
+    const LOST: Result<String, Refusal> = Err(Refusal::BytesLost);
+
+    #[test]
+    fn every_error_of_the_uart_voids_its_line_and_no_other() {
+        let text = "v 1 2 3\nv 4 5 6\nv 7 8 9\n";
+        for bits in [FRAMING, PARITY, BREAK | FRAMING, OVERRUN] {
+            for place in 8..15 {
+                let found = lines_of(damaged(text, place, bits));
+                assert_eq!(found, [ok("v 1 2 3"), LOST, ok("v 7 8 9")], "{bits:#x} at {place}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_damaged_line_end_makes_one_void_line_of_two() {
+        let found = lines_of(damaged("v 1 2 3\nv 4 5 6\nv 7 8 9\n", 7, FRAMING));
+        assert_eq!(found, [LOST, ok("v 7 8 9")]);
+        // The line end that bytes were lost before is sound.
+        let found = lines_of(damaged("v 1 2 3\nv 4 5 6\n", 7, OVERRUN));
+        assert_eq!(found, [LOST, ok("v 4 5 6")]);
+    }
+
+    #[test]
+    fn noise_before_the_first_byte_is_dropped() {
+        let noise = [BREAK | FRAMING, FRAMING | 0x80, u32::from(DAMAGED)];
+        let found = lines_of(noise.into_iter().chain(damaged("$I\n", 0, 0)));
+        assert_eq!(found, [ok("$I")]);
+    }
+
+    #[test]
+    fn noise_between_lines_is_not_answered_but_voids_the_next_line() {
+        let mut data = damaged("v 1 2 3\nv 4 5 6\nv 7 8 9\n", 0, 0);
+        data.insert(8, BREAK | FRAMING);
+        assert_eq!(lines_of(data[..9].iter().copied()), [ok("v 1 2 3")]);
+        assert_eq!(lines_of(data), [ok("v 1 2 3"), LOST, ok("v 7 8 9")]);
+    }
+
+    #[test]
+    fn a_line_with_much_damage_is_refused_once_and_takes_one_place_of_the_queue() {
+        let noise = core::iter::repeat_n(FRAMING, 1000);
+        let found = lines_of(damaged("v 1", 0, 0).into_iter().chain(noise).chain(damaged(
+            "3\nv 4 5 6\n",
+            0,
+            0,
+        )));
+        assert_eq!(found, [LOST, ok("v 4 5 6")]);
+    }
+
+    #[test]
+    fn a_full_queue_is_marked_before_any_later_byte() {
+        let (mut queue, mut reader) = (Queue::<u8, 8>::new(), LineReader::default());
+        let (producer, mut consumer) = queue.split();
+        let mut receiver = Receiver::new(producer);
+        for byte in *b"$I\n$100=80\n" {
+            receiver.receive(byte);
+        }
+        // It held "$I\n$100", so "=80\n" is lost.
+        assert_eq!(lines(&mut reader, &mut consumer), [ok("$I")]);
+        assert!(receiver.mark());
+        for byte in *b"$$\n$#\n" {
+            receiver.receive(byte);
+        }
+        assert_eq!(lines(&mut reader, &mut consumer), [LOST, ok("$#")]);
+    }
+
+    #[test]
+    fn real_time_bytes_act_however_full_the_queue_is() {
+        let mut queue = Queue::<u8, 2>::new();
+        let (producer, _consumer) = queue.split();
+        let mut receiver = Receiver::new(producer);
+        for byte in *b"v 1" {
+            receiver.receive(byte);
+        }
+        assert_eq!(receiver.receive(b'!'), RealTime::HOLD);
+        assert_eq!(receiver.receive_from_uart(OVERRUN | u32::from(b'?')), RealTime::STATUS);
+    }
+
+    #[test]
+    fn an_abort_voids_what_was_lost_before_it() {
+        let (mut queue, mut reader) = (Queue::<u8, 16>::new(), LineReader::default());
+        let (producer, mut consumer) = queue.split();
+        let mut receiver = Receiver::new(producer);
+        for byte in *b"$100=80" {
+            receiver.receive(byte);
+        }
+        receiver.lose();
+        assert_eq!(receiver.receive(0x18), RealTime::ABORT);
+        for _ in 0..receiver.abort() {
+            consumer.dequeue();
+        }
+        for byte in *b"$I\n" {
+            receiver.receive(byte);
+        }
+        assert_eq!(lines(&mut reader, &mut consumer), [ok("$I")]);
+    }
+
+    #[test]
+    fn a_stray_first_byte_of_a_letter_on_one_port_leaves_the_others_real_time_bytes() {
+        let (mut first, mut second) = (Queue::<u8, 8>::new(), Queue::<u8, 8>::new());
+        let (mut first, mut second) =
+            (Receiver::new(first.split().0), Receiver::new(second.split().0));
+        first.receive(0xF0);
+        assert_eq!(second.receive(0x85), RealTime::CANCEL_JOG);
+        // Damage ends a letter, too.
+        first.lose();
+        assert_eq!(first.receive(0x85), RealTime::CANCEL_JOG);
+    }
+}
