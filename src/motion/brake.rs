@@ -19,16 +19,66 @@ use core::sync::atomic::{AtomicU32, Ordering};
 const INDEX_BITS: u32 = 6;
 const ENTRIES: usize = (1 << INDEX_BITS) + 1;
 /// 2^15/√x, x from 1 to 4, at every 16th; the numbers below 1 are not used.
-const INVERSE_ROOTS: [u16; ENTRIES] = {
-    let mut table = [0; ENTRIES];
+///
+/// Nothing writes it. It is atomic on the Pico because the linker then places it in RAM, where the
+/// step interrupt has to have everything that it reads: its flash may keep it waiting.
+static INVERSE_ROOTS: [Entry; ENTRIES] = {
+    let mut table = [const { entry(0) }; ENTRIES];
     let mut index = ENTRIES / 4;
     while index < ENTRIES {
         // The root of 2^30/(index/16), times √1.
-        table[index] = ((1u64 << 34) / index as u64).isqrt() as u16;
+        table[index] = entry(((1u64 << 34) / index as u64).isqrt() as u16);
         index += 1;
     }
     table
 };
+
+#[cfg(feature = "pico")]
+type Entry = core::sync::atomic::AtomicU16;
+
+#[cfg(feature = "pico")]
+const fn entry(value: u16) -> Entry {
+    Entry::new(value)
+}
+
+#[cfg(feature = "pico")]
+#[inline(always)]
+fn inverse_root(index: usize) -> u32 {
+    u32::from(INVERSE_ROOTS[index].load(Ordering::Relaxed))
+}
+
+#[cfg(not(feature = "pico"))]
+type Entry = u16;
+
+#[cfg(not(feature = "pico"))]
+const fn entry(value: u16) -> Entry {
+    value
+}
+
+#[cfg(not(feature = "pico"))]
+#[inline(always)]
+fn inverse_root(index: usize) -> u32 {
+    u32::from(INVERSE_ROOTS[index])
+}
+
+/// How many of the upper bits are 0, one less if they are odd in number.
+#[inline(always)]
+fn pairs_of_leading_zeros(number: u32) -> u32 {
+    // A Cortex-M0+ has no instruction for it, and the compiler's function lies in the flash that
+    // the step interrupt must not wait for. The others have one, which is shorter.
+    if cfg!(any(feature = "pico", test)) {
+        let (mut number, mut zeros) = (number, 0);
+        for bits in [16, 8, 4, 2] {
+            if number >> (u32::BITS - bits) == 0 {
+                number <<= bits;
+                zeros += bits;
+            }
+        }
+        zeros
+    } else {
+        number.leading_zeros() & !1
+    }
+}
 
 /// Lengths below this many units count as this many: 0 would never move.
 const LEAST_LENGTH: u32 = 64;
@@ -44,11 +94,11 @@ const RECIPROCAL_BITS: u32 = 36;
 fn least_interval(length: u32, reach: u32, exponent: u32) -> u32 {
     // The machine stands half a step behind the last pulse.
     let reach = reach.max(length / 2);
-    let zeros = reach.leading_zeros() & !1;
+    let zeros = pairs_of_leading_zeros(reach);
     // 1 to 4 in units of 2^-30.
     let scaled = reach << zeros;
     let index = (scaled >> (u32::BITS - INDEX_BITS)) as usize;
-    let (here, next) = (u32::from(INVERSE_ROOTS[index]), u32::from(INVERSE_ROOTS[index + 1]));
+    let (here, next) = (inverse_root(index), inverse_root(index + 1));
     let part = (scaled >> 10) & 0xFFFF;
     let inverse_root = here - (((here - next) * part) >> 16);
     (length * inverse_root) >> (30 - zeros / 2 - exponent)
@@ -323,6 +373,7 @@ impl Brake {
 
     /// Takes some steps at once, `around` units in all, if they can go as planned: `longest` is the
     /// longest way behind one, `shortest` are the least ticks to the next.
+    #[inline(always)] // Where the interrupt that asks for it lies.
     pub fn pass(&mut self, around: u32, longest: u32, shortest: u32, orders: &BrakeOrders) -> bool {
         let top = orders.top.load(Ordering::Relaxed);
         let left = orders.waiting().max(0).cast_unsigned().saturating_sub(around);
@@ -341,6 +392,7 @@ impl Brake {
 
     /// Takes some steps at once, `around` units in all, and none with fewer ticks to the next than it says. `None` and nothing
     /// taken near rest, where speed changes more from step to step: within 64 steps of the `longest` way.
+    #[inline(always)] // Where the interrupt that asks for it lies.
     pub fn pass_evenly(&mut self, around: u32, longest: u32, orders: &BrakeOrders) -> Option<u32> {
         let top = orders.top.load(Ordering::Relaxed);
         let left = orders.waiting().max(0).cast_unsigned().saturating_sub(around);
@@ -354,7 +406,7 @@ impl Brake {
     }
 
     /// Takes all steps at once that come before `queued` was the sum, if enough waits behind them.
-    #[inline]
+    #[inline(always)] // As above.
     pub fn pass_far(&mut self, queued: u32, orders: &BrakeOrders) -> bool {
         let top = orders.top.load(Ordering::Relaxed);
         let is_far = self.reach == top && orders.queued().wrapping_sub(queued) >= top;
@@ -509,6 +561,16 @@ mod tests {
 
     /// 0.01 mm.
     const STEP: u64 = (1 << 32) / 100;
+
+    #[test]
+    fn leading_zeros_are_counted_in_pairs() {
+        for shift in 0..32 {
+            for number in [1 << shift, u32::MAX >> shift] {
+                let zeros = pairs_of_leading_zeros(number);
+                assert_eq!(zeros, number.leading_zeros() & !1, "{number}");
+            }
+        }
+    }
 
     #[test]
     fn an_interval_is_that_of_the_speed_that_can_be_shed() {

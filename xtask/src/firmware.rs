@@ -9,7 +9,7 @@ use object::{Object, ObjectSection, SectionFlags, elf};
 
 use crate::command::run;
 use crate::set_up::{self, Toolchain};
-use crate::uf2;
+use crate::{in_ram, uf2};
 
 /// A board that firmware is built for.
 #[derive(Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
@@ -218,7 +218,8 @@ impl fmt::Display for Sizes {
 
 /// Checks that the image links as the board boots: the vector table where it looks for it, the stack
 /// at the start of RAM, the entry in flash, every section within the memory. A wrong memory map or
-/// lost link arguments give no linker error, only such an image.
+/// lost link arguments give no linker error, only such an image. On the Pico, that the steps do not
+/// wait for flash.
 pub fn check(board: Board, image: &Path) -> Result<Sizes> {
     let bytes = fs::read(image).with_context(|| format!("cannot read {}", image.display()))?;
     let elf = object::File::parse(&*bytes)?;
@@ -240,6 +241,11 @@ pub fn check(board: Board, image: &Path) -> Result<Sizes> {
             boot.address() == flash.start && boot.size() == 256,
             "the boot loader is not at the start of flash: wrong memory map"
         );
+        in_ram::check(
+            &elf,
+            ram.start..ram.start + ram.size,
+            flash.start..flash.start + flash.size,
+        )?;
     }
     let table = vectors.data()?;
     let word = |index: usize| -> Result<u64> {

@@ -32,11 +32,13 @@
 
 import { readFileSync, writeSync } from 'node:fs';
 import { pathToFileURL } from 'node:url';
+import { countMissingCycles } from './pico/core_cycles.mjs';
 import { attachFlashChip } from './pico/flash_chip.mjs';
 import * as resets from './pico/resets.mjs';
 import { Uart } from './pico/uart.mjs';
 import { Usb } from './pico/usb_host.mjs';
 import { settled, wear } from './pico/worn_flash.mjs';
+import { XipCache } from './pico/xip_cache.mjs';
 
 const [directory, imagePath, logAddress] = process.argv.slice(-3);
 const { RP2040 } = await import(pathToFileURL(`${directory}/dist/esm/index.js`));
@@ -102,9 +104,10 @@ function report(what, value, cycle) {
 
 const ERASE = 3;
 const PROGRAM = 4;
+const FLUSH_CACHE = 5;
 /** The breakpoints' numbers by the functions' codes. */
 const USB_BOOT = 7;
-const FUNCTIONS = { IF: 1, EX: 2, RE: ERASE, RP: PROGRAM, FC: 5, CX: 6, UB: USB_BOOT };
+const FUNCTIONS = { IF: 1, EX: 2, RE: ERASE, RP: PROGRAM, FC: FLUSH_CACHE, CX: 6, UB: USB_BOOT };
 const LOOK_UP = 0x20;
 const TABLE = 0x40;
 const CODE = 0x80;
@@ -158,6 +161,8 @@ function serveRom(number) {
   if (number === ERASE) {
     changeFlash(first, second, () => 0xff);
     flashNanos += (second / 4096) * sectorMicroseconds * 1000;
+  } else if (number === FLUSH_CACHE) {
+    xip.flush();
   } else if (number === PROGRAM) {
     changeFlash(first, third, (at, before) => before & chip.readUint8(second + at - first));
     flashNanos += (third / 256) * PAGE_MICROSECONDS * 1000;
@@ -170,7 +175,7 @@ function serveRom(number) {
 
 // --- The chip ------------------------------------------------------------------------------------
 
-let chip, clock, core, uart, machines;
+let chip, clock, core, uart, machines, xip;
 /** The cycle at which what happens now happens, while a state machine executes. */
 let stamp = -1;
 /** Cycles before the chip was last reset. */
@@ -209,6 +214,8 @@ function start(flash, kind) {
   mendFlags();
   mendVectors();
   faultDue = isLockedUp = false;
+  xip = new XipCache(chip);
+  countMissingCycles(chip, xip);
   watchPins();
   uart = new Uart(chip, cable, (byte) => report(SERIAL, byte, now()));
   machines = chip.pio.flatMap((pio) => pio.machines);
@@ -620,6 +627,15 @@ function executeUntil(due) {
   const times = timed.size > 0;
   disturbed = false;
   do {
+    if (core.interruptsUpdated && core.checkForInterrupts()) core.waiting = false;
+    if ((core.registers[15] - xip.from) >>> 0 >= 6) xip.fetch(core.registers[15]);
+    if (xip.stalled !== 0) {
+      // Time may bring something before the core goes on.
+      const cycles = xip.stalled;
+      xip.stalled = 0;
+      pass(cycles * NANOS);
+      continue;
+    }
     if (times) timeFunctions();
     pass(core.executeInstruction() * NANOS);
     if (faultDue) takeFault();

@@ -19,11 +19,13 @@ const PROGRAM: &str = "node";
 const SCRIPT: &str = include_str!("pico.mjs");
 /// What the script imports: the name there, and the text.
 const MODULES: &[(&str, &str)] = &[
+    ("./pico/core_cycles.mjs", include_str!("pico/core_cycles.mjs")),
     ("./pico/flash_chip.mjs", include_str!("pico/flash_chip.mjs")),
     ("./pico/resets.mjs", include_str!("pico/resets.mjs")),
     ("./pico/uart.mjs", include_str!("pico/uart.mjs")),
     ("./pico/usb_host.mjs", include_str!("pico/usb_host.mjs")),
     ("./pico/worn_flash.mjs", include_str!("pico/worn_flash.mjs")),
+    ("./pico/xip_cache.mjs", include_str!("pico/xip_cache.mjs")),
 ];
 /// Where `cargo xtask set-up` puts it, from the workspace's root.
 const RP2040JS: &str = "target/rp2040js/node_modules/rp2040js";
@@ -578,6 +580,9 @@ fn spawn(command: &mut Command) -> io::Result<(Child, ChildStdin, ChildStdout, C
 /// Keeps the last lines of what the emulator says.
 fn listen(stderr: ChildStderr, shared: &Shared<State>) {
     for line in BufReader::new(stderr).lines().map_while(Result::ok) {
+        if line.starts_with("idle") {
+            println!("{line}");
+        }
         let mut state = shared.lock();
         if state.said.len() == SAID_LINES {
             state.said.pop_front();

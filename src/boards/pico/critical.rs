@@ -4,13 +4,18 @@
 //! one by one: some, of the USB driver, last longer than the state machine's queue. What shares data
 //! with that interrupt masks it too, by [`with_steps_masked`], and briefly: the queue holds 8 words, 8 µs at the greatest
 //! rate.
+//!
+//! The code runs from flash behind a cache, and 50 cycles go by for each 8 bytes that are not in
+//! it. 8 µs hold 20 of these misses. So the handler of the steps, all that it calls, reads and is
+//! called by way of, and what runs while it is masked, lie in RAM: functions by
+//! `#[unsafe(link_section = ".data.in_ram")]`. `cargo xtask build` checks it on the image.
 
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::sync::atomic::{AtomicU32, Ordering, fence};
 
 use cortex_m::peripheral::NVIC;
 use rp2040_hal::pac::Interrupt;
 
-use super::registers::NVIC_SET;
+use super::registers::SYSTEM;
 
 /// The chip tells four ranks by the upper two bits.
 const fn rank(number: u8) -> u8 {
@@ -39,9 +44,51 @@ pub fn enable(nvic: &mut NVIC, interrupt: Interrupt, priority: u8) {
     }
 }
 
-/// Carries `work` out with every interrupt masked, that of the steps too.
+/// Carries `work` out with every interrupt masked, that of the steps too. The caller lies in RAM,
+/// with all that `work` calls.
+#[inline(always)]
 pub fn with_steps_masked<T>(work: impl FnOnce() -> T) -> T {
     cortex_m::interrupt::free(|_| work())
+}
+
+/// Carries `work` out with the interrupt of the pen's heights masked. Not in a critical section,
+/// which it would break.
+pub fn with_pen_masked<T>(work: impl FnOnce() -> T) -> T {
+    NVIC::mask(Interrupt::PIO0_IRQ_0);
+    // So that it does not come any more.
+    cortex_m::asm::dsb();
+    cortex_m::asm::isb();
+    let done = work();
+    // SAFETY: it was unmasked at set-up, before there was a pen to move.
+    unsafe { NVIC::unmask(Interrupt::PIO0_IRQ_0) };
+    done
+}
+
+/// As many as a Cortex-M0+ has.
+const VECTORS: usize = 16 + 32;
+
+/// The vectors of the exceptions, as they are in flash. The core reads one on each interrupt.
+#[repr(align(256))] // The core ignores the lower bits of its address.
+struct Vectors([AtomicU32; VECTORS]);
+
+static IN_RAM: Vectors = Vectors([const { AtomicU32::new(0) }; VECTORS]);
+
+/// Lets the core read the vectors from RAM. Called at set-up, before any interrupt is unmasked.
+pub fn move_vectors_to_ram() {
+    const VECTOR_TABLE: usize = 0xD08;
+    unsafe extern "C" {
+        static __vector_table: [u32; VECTORS];
+    }
+    // SAFETY: the linker puts the table of so many vectors there (`cortex-m-rt`), and nothing
+    // writes flash now.
+    let in_flash = unsafe { &*(&raw const __vector_table) };
+    for (place, vector) in IN_RAM.0.iter().zip(in_flash) {
+        place.store(*vector, Ordering::Relaxed);
+    }
+    // They are there before the core may look.
+    fence(Ordering::SeqCst);
+    SYSTEM.write(VECTOR_TABLE, IN_RAM.0.as_ptr() as u32);
+    cortex_m::asm::dsb();
 }
 
 /// Every interrupt but that of the next block of steps.
@@ -58,8 +105,8 @@ critical_section::set_impl!(MaskAllButSteps);
 unsafe impl critical_section::Impl for MaskAllButSteps {
     unsafe fn acquire() -> critical_section::RawRestoreState {
         // A handler that comes in between leaves the set as it was.
-        let set = NVIC_SET.read(ENABLED) & OTHERS;
-        NVIC_SET.write(MASK, OTHERS);
+        let set = SYSTEM.read(ENABLED) & OTHERS;
+        SYSTEM.write(MASK, OTHERS);
         cortex_m::asm::dsb();
         cortex_m::asm::isb();
         if set != 0 {
@@ -72,7 +119,7 @@ unsafe impl critical_section::Impl for MaskAllButSteps {
         if outermost != 0 {
             // What the section did must be done before a handler looks.
             core::sync::atomic::compiler_fence(Ordering::SeqCst);
-            NVIC_SET.write(ENABLED, MASKED.load(Ordering::Relaxed));
+            SYSTEM.write(ENABLED, MASKED.load(Ordering::Relaxed));
         }
     }
 }

@@ -78,6 +78,7 @@ pub fn take() -> (Pico, Lent<'static>, &'static PulserState) {
     let (Some(mut core), Some(mut chip)) = (Core::take(), Peripherals::take()) else {
         panic!("the board was taken twice")
     };
+    critical::move_vectors_to_ram();
     let start = emergency::start();
     let mut watchdog = Watchdog::new(chip.WATCHDOG);
     let clocks = init_clocks_and_plls(

@@ -24,8 +24,8 @@ pub const DMA: Peripheral = unsafe { Peripheral::at(0x5000_0000) };
 /// Programmable input and output; its state machine 0 is that of `steps`.
 pub const PIO0: Peripheral = unsafe { Peripheral::at(0x5020_0000) };
 
-/// The interrupts' masks. Used by `critical`.
-pub const NVIC_SET: Peripheral = unsafe { Peripheral::at(0xE000_E000) };
+/// The core's own registers: the interrupts' masks, and where the vectors are. Used by `critical`.
+pub const SYSTEM: Peripheral = unsafe { Peripheral::at(0xE000_E000) };
 /// The USB controller. Used by `usb`, beside its driver.
 pub const USB: Peripheral = unsafe { Peripheral::at(0x5011_0000) };
 

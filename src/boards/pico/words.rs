@@ -1,11 +1,13 @@
 //! The two loops over the words of steps, by hand: the compiler keeps half of what they count on the stack.
+//!
+//! They lie in RAM, with what calls them, so that the flash's cache has room for the planner.
 
 use core::sync::atomic::AtomicU32;
 
 use penup::motion::StepTrain;
 
 core::arch::global_asm!(
-    ".section .text.penup_words, \"ax\"",
+    ".section .data.penup_words, \"ax\"",
     ".balign 4",
     // r0: train, r1: words, r2: their end. 15 cycles a straight move, 17 a diagonal one.
     ".global penup_write_train",

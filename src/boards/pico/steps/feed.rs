@@ -1,11 +1,16 @@
 //! The interrupt that hands the words over to the DMA channel, block by block, and brakes where the ring runs dry.
+//!
+//! It comes when a block has ended, and the state machine lives on the 8 words of its queue until
+//! the next one begins. So all functions here lie in RAM: see [`critical`].
 
-use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering, fence};
 
 use penup::motion::{Brake, StepEvent, TICKS_PER_SECOND};
 use rp2040_hal::pac::interrupt;
 
-use super::engine::{CHANNEL, LEVEL, PULSE_TICKS, TARGETS, WAIT_TICKS, channel, machine, target};
+use super::engine::{
+    BUSY, CHANNEL, LEVEL, PULSE_TICKS, TARGETS, WAIT_TICKS, channel, machine, target,
+};
 use super::word_ring::{GROUP, place, ring_address, sum, unpack, way};
 use super::{BRAKED_TICKS, STATE};
 use crate::boards::handler::Owned;
@@ -43,6 +48,8 @@ pub static GIVEN_UP: AtomicU32 = AtomicU32::new(0);
 pub static FEEDING: AtomicBool = AtomicBool::new(false);
 
 /// How many words have left the channel and the state machine's queue.
+#[inline(never)]
+#[unsafe(link_section = ".data.in_ram")]
 pub fn taken() -> u32 {
     critical::with_steps_masked(|| {
         loop {
@@ -56,8 +63,40 @@ pub fn taken() -> u32 {
     })
 }
 
+/// Lets words that wait begin, unless some are under way.
+#[inline(never)]
+#[unsafe(link_section = ".data.in_ram")]
+pub fn start() {
+    critical::with_steps_masked(|| {
+        if !FEEDING.load(Ordering::Relaxed) {
+            feed();
+        }
+    });
+}
+
+/// Stops state machine and channel at once. The channel's interrupt does not come any more, until
+/// [`let_interrupt_come`].
+#[inline(never)]
+#[unsafe(link_section = ".data.in_ram")]
+pub fn stop() {
+    critical::with_steps_masked(|| {
+        PIO0.write(machine::CONTROL, 0);
+        DMA.write(channel::INTERRUPT_ENABLE, 0);
+        DMA.write(channel::ABORT, CHANNEL);
+        while DMA.read(channel::CONTROL) & BUSY != 0 {}
+        DMA.write(channel::INTERRUPT, CHANNEL);
+    });
+}
+
+/// The channel's interrupt comes again when a block has ended.
+pub fn let_interrupt_come() {
+    DMA.write(channel::INTERRUPT_ENABLE, CHANNEL);
+}
+
 /// Tells the channel what to take next. Called where its interrupt is masked.
-pub fn feed() {
+#[inline(never)]
+#[unsafe(link_section = ".data.in_ram")]
+fn feed() {
     let told = TOLD.load(Ordering::Relaxed);
     let count = WRITTEN.load(Ordering::Acquire).wrapping_sub(told);
     FEEDING.store(count != 0, Ordering::Relaxed);
@@ -83,11 +122,15 @@ pub fn feed() {
     }
     TOLD.store(told.wrapping_add(words), Ordering::Relaxed);
     GIVEN_UP.store(0, Ordering::Relaxed);
+    // The channel reads what was written to the block and to the ring, and the compiler knows of no
+    // reader.
+    fence(Ordering::Release);
     DMA.write(channel::READ_ADDRESS, address);
     DMA.write(channel::START, words);
 }
 
 /// How many of the `count` words from `told` on go as planned, since enough waits behind them, whatever they are.
+#[inline(always)]
 fn far_words(brake: &mut Brake, told: u32, count: u32) -> u32 {
     let group = told / GROUP;
     for groups in [FAR_GROUPS, 1] {
@@ -103,6 +146,7 @@ fn far_words(brake: &mut Brake, told: u32, count: u32) -> u32 {
 /// How many of the `count` words from `told` on go as planned, with one look at all of them; 0 if they
 /// have to be looked at one by one.
 #[inline(never)] // On its own it stays in the core's registers.
+#[unsafe(link_section = ".data.in_ram")]
 fn calm_words(brake: &mut Brake, told: u32, count: u32) -> u32 {
     let (mut words, mut ticks) = (0, 0);
     let (mut around, mut longest, mut shortest) = (0, 0, u32::MAX);
@@ -124,6 +168,7 @@ fn calm_words(brake: &mut Brake, told: u32, count: u32) -> u32 {
 /// Copies a block of the `count` words from `told` on, with the same least ticks for all: far from rest, where there is little
 /// time. Says how many they are; 0 if that will not do.
 #[inline(never)]
+#[unsafe(link_section = ".data.in_ram")]
 fn brake_evenly(brake: &mut Brake, told: u32, count: u32) -> u32 {
     let is_fast = place(told).load(Ordering::Relaxed) >> 8 < FAST_TICKS;
     if count < BRAKED_WORDS || !is_fast {
@@ -156,6 +201,7 @@ fn brake_evenly(brake: &mut Brake, told: u32, count: u32) -> u32 {
 /// Copies the first of the `count` words from `told` on, each step with as many ticks as it takes at
 /// least. Says how many.
 #[inline(never)]
+#[unsafe(link_section = ".data.in_ram")]
 fn brake_words(brake: &mut Brake, told: u32, count: u32) -> u32 {
     let beyond = PULSE_TICKS + STATE.pulse_ticks();
     let (mut words, mut ticks, mut more) = (0, 0, 0);
@@ -188,6 +234,7 @@ fn brake_words(brake: &mut Brake, told: u32, count: u32) -> u32 {
 }
 
 #[interrupt]
+#[unsafe(link_section = ".data.in_ram")]
 fn DMA_IRQ_0() {
     DMA.write(channel::INTERRUPT, CHANNEL);
     feed();

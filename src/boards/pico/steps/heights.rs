@@ -25,7 +25,7 @@ pub static HEIGHTS_DUE: Owned<Consumer<'static, u8>> = Owned::empty();
 /// Two heights that come faster than the interrupt would leave one behind: the last counts. Steps of the pen's
 /// motor are left over only where all was thrown away.
 pub fn heal_pen() {
-    critical::with_steps_masked(|| {
+    critical::with_pen_masked(|| {
         // SAFETY: the handler that owns it is masked.
         if let Some(due) = unsafe { HEIGHTS_DUE.get() } {
             while let Some(height) = due.dequeue() {
@@ -47,6 +47,7 @@ fn set_lift(step: bool, down: bool) {
 }
 
 #[interrupt]
+#[unsafe(link_section = ".data.in_ram")]
 fn PIO0_IRQ_0() {
     PIO0.write(machine::FLAGS, FLAG);
     // SAFETY: this is the handler that owns it.

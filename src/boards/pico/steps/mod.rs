@@ -21,7 +21,7 @@ mod feed;
 mod heights;
 mod word_ring;
 
-use core::sync::atomic::Ordering;
+use core::sync::atomic::{Ordering, compiler_fence};
 
 use cortex_m::peripheral::NVIC;
 use heapless::spsc::{Producer, Queue};
@@ -36,10 +36,10 @@ use super::registers::{DMA, PIO0};
 use super::{clock, critical, pen, words};
 pub use engine::release;
 use engine::{
-    BUSY, CHANNEL, LEVEL, LEVELS, PEN_TICKS, PULSE_TICKS, PULSES, RELEASED, STALLED, TARGETS,
-    WAIT_TICKS, begin, channel, machine, order, set_pins, target,
+    LEVEL, LEVELS, PEN_TICKS, PULSE_TICKS, PULSES, RELEASED, STALLED, TARGETS, WAIT_TICKS, begin,
+    channel, machine, order, set_pins, target,
 };
-use feed::{BRAKE, FEEDING, GIVEN_UP, TOLD, WRITTEN, feed, taken};
+use feed::{BRAKE, FEEDING, GIVEN_UP, TOLD, WRITTEN, taken};
 use heights::{HEIGHT_QUEUE, HEIGHTS, HEIGHTS_DUE, heal_pen, lift_levels};
 use word_ring::{GROUP, WAYS, WORDS, pack, place, row, sum, way};
 
@@ -128,11 +128,7 @@ pub fn set_up(nvic: &mut NVIC) -> Steps {
 impl Steps {
     /// Lets waiting words begin.
     pub fn start(&mut self) {
-        critical::with_steps_masked(|| {
-            if !FEEDING.load(Ordering::Relaxed) {
-                feed();
-            }
-        });
+        feed::start();
     }
 
     /// Whether the state machine gets on: it has nothing to do, or takes its next word before the
@@ -204,6 +200,8 @@ impl Steps {
     }
 
     /// 14 cycles a pulse.
+    #[inline(never)]
+    #[unsafe(link_section = ".data.in_ram")] // So that the flash's cache has room for the planner.
     fn count_to(&mut self, taken: u32) {
         let count = taken.wrapping_sub(self.taken);
         // A word on its way may be counted a moment early, so the count may seem to go back.
@@ -246,30 +244,26 @@ impl Steps {
         if self.drained && self.written == self.taken {
             return;
         }
-        critical::with_steps_masked(|| {
-            PIO0.write(machine::CONTROL, 0);
-            DMA.write(channel::INTERRUPT_ENABLE, 0);
-            DMA.write(channel::ABORT, CHANNEL);
-            while DMA.read(channel::CONTROL) & BUSY != 0 {}
-            DMA.write(channel::INTERRUPT, CHANNEL);
-            DMA.write(channel::INTERRUPT_ENABLE, CHANNEL);
-            let taken = taken();
-            self.count_to(taken);
-            set_pins(self.levels_now() & !PULSES);
-            while PIO0.read(machine::FIFO_LEVEL) & LEVEL != 0 {
-                order(order::PULL_WITHOUT_WAITING);
-            }
-            // SAFETY: the handler that owns it is masked.
-            if let Some(brake) = unsafe { BRAKE.get() } {
-                brake.skip_all(STATE.brake());
-            }
-            self.written = taken;
-            WRITTEN.store(taken, Ordering::Relaxed);
-            TOLD.store(taken, Ordering::Relaxed);
-            GIVEN_UP.store(DMA.read(channel::COUNT), Ordering::Relaxed);
-            FEEDING.store(false, Ordering::Relaxed);
-            begin(self.pulse_ticks);
-        });
+        feed::stop();
+        let taken = taken();
+        self.count_to(taken);
+        set_pins(self.levels_now() & !PULSES);
+        while PIO0.read(machine::FIFO_LEVEL) & LEVEL != 0 {
+            order(order::PULL_WITHOUT_WAITING);
+        }
+        // SAFETY: the interrupt of the handler that owns it does not come now.
+        if let Some(brake) = unsafe { BRAKE.get() } {
+            brake.skip_all(STATE.brake());
+        }
+        self.written = taken;
+        WRITTEN.store(taken, Ordering::Relaxed);
+        TOLD.store(taken, Ordering::Relaxed);
+        GIVEN_UP.store(DMA.read(channel::COUNT), Ordering::Relaxed);
+        FEEDING.store(false, Ordering::Relaxed);
+        begin(self.pulse_ticks);
+        // All of this is written before the handler may look.
+        compiler_fence(Ordering::SeqCst);
+        feed::let_interrupt_come();
         heal_pen();
         self.levels = self.levels_now() & !PULSES;
         self.moving = false;
@@ -334,6 +328,7 @@ impl EventQueue for Steps {
     }
 
     /// 17 cycles a step; more if it may be braked.
+    #[unsafe(link_section = ".data.in_ram")] // As above.
     fn push_train(&mut self, train: &mut StepTrain, count: u32) -> Result<(), StepEvent> {
         let Some(room) = self.room.checked_sub(count) else {
             return train.push_each(count, |event| self.push(event));
@@ -413,6 +408,7 @@ impl Steps {
 
     /// The next words are so many steps, fewer than there are places.
     #[inline(never)] // On its own it stays in the core's registers.
+    #[unsafe(link_section = ".data.in_ram")] // So that the flash's cache has room for the planner.
     fn tell_ways(&mut self, count: u32) {
         if let Some(step) = self.step_length.steady() {
             return self.tell_same_ways(step, count);
@@ -466,6 +462,8 @@ impl Steps {
     /// Shows the words to the channel; lets them begin if they are many.
     fn publish(&mut self) {
         WRITTEN.store(self.written, Ordering::Release);
+        // The handler that finds nothing to feed any more must have seen them, or be seen here.
+        compiler_fence(Ordering::SeqCst);
         if FEEDING.load(Ordering::Relaxed) {
             return;
         }
