@@ -234,8 +234,10 @@ impl Graph<'_> {
             [] => String::new(),
             callers => format!(", called by {}", callers.join(" > ")),
         };
+        let is_intrinsic = name.starts_with("__") && name.contains("div");
+        let divides = is_intrinsic || name.contains("div_rem");
         ensure!(
-            !(name.starts_with("__") && name.contains("div")) && !name.contains("div_rem"),
+            !divides,
             "{name}{by_way_of}: it divides, and the divider may be in the middle of another division. \
             Let a handler of the steps shift or multiply instead."
         );

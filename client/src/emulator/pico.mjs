@@ -16,12 +16,13 @@
 // pin RUN is pulled low for a moment, 33 the image is copied onto the drive that the board shows
 // with BOOTSEL held, 34 and 35 bits (the value) of a byte of flash (the cycle) stay low or high
 // from now on, 36 the main loop goes on at an address, with the stack used up (1) or as it is (0),
-// 37 the host opens the USB port (1) or closes it (0) at a rate (the cycle). Out: 0 a byte of the
-// serial line, 1 a pin's new level, 2 the time, 3 a byte of the log, 4 the chip was reset (0 by the
-// loss of power, 1 by the watchdog, 2 by the pin RUN), 5 a byte of USB, 6 a timed function has
-// returned (its number, the cycles in the cycle's place), 7 so many bytes of the stack have not
-// been used since the chip began (in the cycle's place), 32 the boot ROM shows its drive, 33 a
-// character of the serial number that the USB host reads, after a 0.
+// 37 the host opens the USB port (1) or closes it (0) at a rate (the cycle), 48 the next setting of
+// the clock's alarm is late by so many milliseconds. Out: 0 a byte of the serial line, 1 a pin's
+// new level, 2 the time, 3 a byte of the log, 4 the chip was reset (0 by the loss of power, 1 by
+// the watchdog, 2 by the pin RUN), 5 a byte of USB, 6 a timed function has returned (its number,
+// the cycles in the cycle's place), 7 so many bytes of the stack have not been used since the chip
+// began (in the cycle's place), 32 the boot ROM shows its drive, 33 a character of the serial
+// number that the USB host reads, after a 0.
 //
 // rp2040js has no boot ROM: here is one, of the functions that the image asks for. Each is a
 // breakpoint that this program serves. Flash takes as long as a Pico's.
@@ -34,7 +35,9 @@ import { readFileSync, writeSync } from 'node:fs';
 import { pathToFileURL } from 'node:url';
 import { countMissingCycles } from './pico/core_cycles.mjs';
 import { attachFlashChip } from './pico/flash_chip.mjs';
+import { delayAlarm } from './pico/late_alarm.mjs';
 import * as resets from './pico/resets.mjs';
+import { SlowContacts } from './pico/slow_contacts.mjs';
 import { Uart } from './pico/uart.mjs';
 import { Usb } from './pico/usb_host.mjs';
 import { settled, wear } from './pico/worn_flash.mjs';
@@ -74,6 +77,9 @@ const STACK = 9;
 const STALL = 10;
 const ERASE_TIME = 12;
 const GO_ON = -1;
+const DELAY_ALARM = 48;
+/** Nanoseconds by which the next settings of the clock's alarm are late. */
+const alarmDelays = [];
 const UNUSED_STACK = 7;
 const RUN_PIN = 32;
 const UF2 = 33;
@@ -175,7 +181,7 @@ function serveRom(number) {
 
 // --- The chip ------------------------------------------------------------------------------------
 
-let chip, clock, core, uart, machines, xip;
+let chip, clock, core, uart, machines, xip, contacts;
 /** The cycle at which what happens now happens, while a state machine executes. */
 let stamp = -1;
 /** Cycles before the chip was last reset. */
@@ -216,6 +222,12 @@ function start(flash, kind) {
   faultDue = isLockedUp = false;
   xip = new XipCache(chip);
   countMissingCycles(chip, xip);
+  contacts = new SlowContacts(chip, CONTACTS, now, (pin, cycle) => {
+    bounces.push({ pin, cycle });
+    bounces.sort((one, other) => one.cycle - other.cycle);
+    disturbed = true;
+  });
+  delayAlarm(chip, () => alarmDelays.shift() ?? 0, pass);
   watchPins();
   uart = new Uart(chip, cable, (byte) => report(SERIAL, byte, now()));
   machines = chip.pio.flatMap((pio) => pio.machines);
@@ -344,6 +356,8 @@ const INPUT = 2;
 /** What the inputs are driven to; open ones are pulled up. */
 const inputs = new Map();
 
+/** The pins of the limit switches and of the emergency stop. */
+const CONTACTS = [8, 9, 10];
 const STEP_X = 2;
 const DIR_X = 4;
 const BOUNCE = 5 * 125_000;
@@ -396,7 +410,7 @@ function watchPins() {
       if (number === STEP_X || number === STEP_X + 1) moveAxis(number - STEP_X, level);
       report(PIN, number | (level << 7), now());
     });
-    pin.setInputValue(inputs.get(number) ?? true);
+    setLevel(number);
   });
 }
 
@@ -499,6 +513,7 @@ process.stdin.on('data', (data) => {
     } else if (rest[at] === USB) usb.send(entry.value);
     else if (rest[at] === USB_LINE) usb.setLine(entry.cycle, entry.value !== 0);
     else if (rest[at] === STACK) report(UNUSED_STACK, 0, unusedStack());
+    else if (rest[at] === DELAY_ALARM) alarmDelays.push(entry.value * 1e6);
     else if (rest[at] === STALL) stalls.push({ place: entry.cycle, hundredths: entry.value });
     else if (rest[at] === CUT_FLASH) flashBudget = entry.cycle;
     else if (rest[at] === STAYS_LOW) wear(entry.cycle, entry.value, false);
@@ -522,7 +537,12 @@ function inputDue() {
 
 function setInput(number, high) {
   inputs.set(number, high);
-  chip.gpio[number].setInputValue(high);
+  setLevel(number);
+}
+
+/** A pin takes the level to which it is driven, once it can. */
+function setLevel(number) {
+  chip.gpio[number].setInputValue((inputs.get(number) ?? true) && contacts.hasRisen(number, now()));
 }
 
 /** In a handler, or where it has masked them all, nothing is done to the main loop. */
@@ -533,7 +553,8 @@ function waitsForMainLoop(what) {
 function takeInput(cycle) {
   while (bounces.length && bounces[0].cycle <= cycle) {
     const { pin, high } = bounces.shift();
-    setInput(pin, high);
+    // One without a level has risen.
+    setInput(pin, high ?? inputs.get(pin) ?? true);
   }
   while (events.length && events[0].cycle <= cycle && !waitsForMainLoop(events[0].what)) {
     const { what, value } = events.shift();

@@ -21,7 +21,9 @@ const SCRIPT: &str = include_str!("pico.mjs");
 const MODULES: &[(&str, &str)] = &[
     ("./pico/core_cycles.mjs", include_str!("pico/core_cycles.mjs")),
     ("./pico/flash_chip.mjs", include_str!("pico/flash_chip.mjs")),
+    ("./pico/late_alarm.mjs", include_str!("pico/late_alarm.mjs")),
     ("./pico/resets.mjs", include_str!("pico/resets.mjs")),
+    ("./pico/slow_contacts.mjs", include_str!("pico/slow_contacts.mjs")),
     ("./pico/uart.mjs", include_str!("pico/uart.mjs")),
     ("./pico/usb_host.mjs", include_str!("pico/usb_host.mjs")),
     ("./pico/worn_flash.mjs", include_str!("pico/worn_flash.mjs")),
@@ -272,6 +274,15 @@ impl Pico {
     /// The emulator has ended.
     pub fn stall_at(&mut self, place: u32, hundredths: u8) -> io::Result<()> {
         self.tell(STALL, hundredths, u64::from(place))
+    }
+
+    /// Lets the clock's handler be pre-empted for so many milliseconds just before it sets its next
+    /// alarm.
+    ///
+    /// # Errors
+    /// The emulator has ended.
+    pub fn delay_alarm(&mut self, milliseconds: u8) -> io::Result<()> {
+        self.tell(DELAY_ALARM, milliseconds, 0)
     }
 
     /// Plugs a USB host in, which finds the device.
@@ -614,6 +625,7 @@ const STACK: u8 = 9;
 const UNUSED_STACK: u8 = 7;
 const STALL: u8 = 10;
 const ERASE_TIME: u8 = 12;
+const DELAY_ALARM: u8 = 48;
 const RESET: u8 = 4;
 const RUN_PIN: u8 = 32;
 const UF2: u8 = 33;

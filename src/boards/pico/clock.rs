@@ -25,8 +25,21 @@ pub fn start(nvic: &mut NVIC) {
     schedule();
 }
 
+/// Sets the alarm to a millisecond from now.
+///
+/// It comes when the time is that of the alarm, so an alarm that is set too late comes after 71
+/// minutes. Other interrupts may come between looking at the time and setting the alarm, and last
+/// longer than a millisecond. Then it is set again; should it have come in between, that is an
+/// interrupt too many.
 fn schedule() {
-    TIMER.write(offset::ALARM_0, microseconds().wrapping_add(MILLISECOND));
+    loop {
+        let target = microseconds().wrapping_add(MILLISECOND);
+        TIMER.write(offset::ALARM_0, target);
+        let left = target.wrapping_sub(microseconds());
+        if (1..=MILLISECOND).contains(&left) {
+            return;
+        }
+    }
 }
 
 /// Microseconds since the start; wraps.
