@@ -232,6 +232,20 @@ pub enum Error {
         /// What the system says.
         source: io::Error,
     },
+    /// A result would replace the file that it is made from.
+    #[error("{output} is the file to read: give the result another name, so that it is not overwritten")]
+    OutputIsInput {
+        /// As the user named it.
+        output: String,
+    },
+    /// Two results would go into one file.
+    #[error("{first} and {second} are one file: give each result a file of its own")]
+    OutputTwice {
+        /// As the user named it.
+        first: String,
+        /// As the user named it the second time.
+        second: String,
+    },
     /// A picture cannot be made.
     #[error("cannot make the picture: {0}")]
     Picture(String),

@@ -4,7 +4,63 @@ use crate::error::Error;
 use crate::interrupt::while_unfinished;
 use std::fs;
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf, is_separator};
+
+/// Whether all results can be written, asked before the work that they come from.
+///
+/// No two of the `outputs` may be one file, and none may be the `input`, whatever they are called.
+/// An ordinary output is tried with an empty file beside it, which is gone afterwards.
+///
+/// # Errors
+/// What is wrong with which file.
+pub fn check(input: &Path, outputs: &[&Path]) -> Result<(), Error> {
+    let name = |path: &Path| path.display().to_string();
+    for (index, output) in outputs.iter().enumerate() {
+        let file = identity(output);
+        if file == identity(input) {
+            return Err(Error::OutputIsInput { output: name(output) });
+        }
+        if let Some(first) = outputs[..index].iter().find(|first| identity(first) == file) {
+            return Err(Error::OutputTwice { first: name(first), second: name(output) });
+        }
+        try_to_write(output).map_err(|source| Error::Write { file: name(output), source })?;
+    }
+    Ok(())
+}
+
+/// The path without links and detours, also that of a file that is not there yet.
+fn identity(path: &Path) -> PathBuf {
+    let beside = || {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        let folder = folder.unwrap_or(Path::new(".")).canonicalize().ok()?;
+        Some(folder.join(path.file_name()?))
+    };
+    path.canonicalize().ok().or_else(beside).unwrap_or_else(|| path.to_owned())
+}
+
+fn try_to_write(path: &Path) -> io::Result<()> {
+    if path.is_dir() || path.to_string_lossy().ends_with(is_separator) {
+        return Err(io::ErrorKind::IsADirectory.into());
+    }
+    match fs::metadata(path) {
+        // Opening a pipe would wait for its reader.
+        Ok(there) if !there.is_file() => Ok(()),
+        _ => {
+            let unfinished = unfinished(path)?;
+            while_unfinished(&unfinished, || {
+                fs::write(&unfinished, []).and_then(|()| fs::remove_file(&unfinished))
+            })
+        }
+    }
+}
+
+/// The name of a result that is not complete yet.
+fn unfinished(path: &Path) -> io::Result<PathBuf> {
+    let name = path.file_name().ok_or(io::ErrorKind::InvalidInput)?;
+    let mut unfinished = name.to_owned();
+    unfinished.push(format!(".{}.part", std::process::id()));
+    Ok(path.with_file_name(unfinished))
+}
 
 /// Writes `bytes` to `path`. An older file stays as it was until the new one is complete.
 ///
@@ -21,10 +77,7 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
 }
 
 fn write_beside(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let name = path.file_name().ok_or(io::ErrorKind::InvalidInput)?;
-    let mut unfinished = name.to_owned();
-    unfinished.push(format!(".{}.part", std::process::id()));
-    let unfinished = path.with_file_name(unfinished);
+    let unfinished = unfinished(path)?;
     let result = while_unfinished(&unfinished, || {
         fs::write(&unfinished, bytes).and_then(|()| fs::rename(&unfinished, path))
     });

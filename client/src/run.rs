@@ -45,6 +45,10 @@ fn plot(args: &PlotArgs, interrupt: &AtomicBool) -> Result<String, Error> {
     // Without a file the scene that README shows.
     let example = || workspace::root().join("scenes/interpen.obj");
     let file = args.file.clone().unwrap_or_else(example);
+    let outputs = Outputs::of(&args.pictures, None);
+    if args.port.is_none() {
+        output::check(&file, &outputs.files())?;
+    }
     let job = Job::new(SourceFile::read(&file)?, &settings);
     let mut bar = Bar::default();
     if let Some(device) = &args.port {
@@ -67,20 +71,20 @@ fn plot(args: &PlotArgs, interrupt: &AtomicBool) -> Result<String, Error> {
     drop(moving);
     let picture = Picture { page: settings.page, runs: pen.runs, step: pen.step };
     drop(bar);
-    let outputs = Outputs::of(&args.pictures, None);
     let files = write_pictures(&picture, &outputs)?;
     Ok(summary(&files, report))
 }
 
 fn preview(args: &PreviewArgs, interrupt: &AtomicBool) -> Result<String, Error> {
     let settings = args.view.settings();
+    let outputs = Outputs::of(&args.pictures, args.json.as_deref());
+    output::check(&args.file, &outputs.files())?;
     let job = Job::new(SourceFile::read(&args.file)?, &settings);
     let mut bar = Bar::default();
     let mut plotter = machines::in_memory();
     let report = draw(plotter.as_mut(), &job, args.repeat, interrupt, &mut bar)?;
     let result = plotter.result()?;
     drop(bar);
-    let outputs = Outputs::of(&args.pictures, args.json.as_deref());
     let picture =
         Picture { page: settings.page, runs: result.pen.runs.clone(), step: result.pen.step };
     let mut files = write_pictures(&picture, &outputs)?;
@@ -97,19 +101,22 @@ fn preview(args: &PreviewArgs, interrupt: &AtomicBool) -> Result<String, Error> 
 
 fn fit(args: &FitArgs) -> Result<String, Error> {
     let file = args.file.display().to_string();
+    let stem = args.file.file_stem().unwrap_or_default().to_string_lossy();
+    let beside = || args.file.with_file_name(format!("{stem}-fitted.obj"));
+    let output = args.output.clone().unwrap_or_else(beside);
+    output::check(&args.file, &[&output])?;
     let source = SourceFile::read(&args.file)?;
     let mut bar = Bar::default();
     let fitted = fit_obj(&source, args.tolerance, &mut |done, all| bar.fitted(done, all))
         .map_err(|source| Error::Fit { file: file.clone(), source })?;
     drop(bar);
-    let stem = args.file.file_stem().unwrap_or_default().to_string_lossy();
-    let beside = || args.file.with_file_name(format!("{stem}-fitted.obj"));
-    let output = args.output.clone().unwrap_or_else(beside);
     output::write(&output, fitted.obj.as_bytes())?;
     Ok(format!("{}: {}", output.display(), fitted.saving))
 }
 
 fn encode_tape(args: &TapeEncodeArgs, interrupt: &AtomicBool) -> Result<String, Error> {
+    let output = args.output.clone().unwrap_or_else(|| args.file.with_extension("tape"));
+    output::check(&args.file, &[&output])?;
     let job = Job::new(SourceFile::read(&args.file)?, &args.view.settings());
     let mut plotter = machines::in_memory();
     {
@@ -119,16 +126,16 @@ fn encode_tape(args: &TapeEncodeArgs, interrupt: &AtomicBool) -> Result<String, 
         sender.end();
     }
     let tape = plotter.tape()?;
-    let output = args.output.clone().unwrap_or_else(|| args.file.with_extension("tape"));
     output::write(&output, &tape)?;
     Ok(format!("{}: {} bytes", output.display(), tape.len()))
 }
 
 fn show_tape(args: &TapeShowArgs) -> Result<String, Error> {
+    let outputs = Outputs::of(&args.pictures, None);
+    output::check(&args.file, &outputs.files())?;
     let tape = read_tape(&args.file)?;
     let shown = tape::show(&tape, args.page, args.steps);
     let (picture, moves) = shown.map_err(damaged(&args.file))?;
-    let outputs = Outputs::of(&args.pictures, None);
     let files = write_pictures(&picture, &outputs)?;
     let names: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
     Ok(format!("{}: {moves} moves from {} bytes", names.join(", "), tape.len()))
@@ -180,6 +187,10 @@ impl Outputs {
             }
             named => named,
         }
+    }
+
+    fn files(&self) -> Vec<&Path> {
+        [&self.svg, &self.png, &self.json].into_iter().flatten().map(PathBuf::as_path).collect()
     }
 }
 

@@ -261,6 +261,80 @@ fn a_trace_is_fitted_and_the_curves_are_drawn() {
     assert!(error.contains("no polyline"), "{error}");
 }
 
+const PLAN: &str = "v 0 0 0\nv 10 0 0\nv 10 10 0\nl 1 2 3\n";
+
+#[test]
+fn no_result_replaces_its_file_or_another_result() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::create_dir(folder.path().join("sub")).expect("a folder");
+    fs::write(folder.path().join("b.obj"), PLAN).expect("written");
+    fs::write(folder.path().join("plot.svg"), [0x33; 9]).expect("written");
+    let mut before = files(folder.path());
+    let refused = |arguments: &[&str], reason: &str| {
+        let (code, stdout, stderr) = penup(folder.path(), arguments);
+        assert_eq!((code, stdout.as_str()), (Some(1), ""), "{arguments:?}: {stderr}");
+        assert_eq!(stderr, format!("penup: {reason}\n"), "{arguments:?}");
+    };
+    let read = "is the file to read: give the result another name, so that it is not overwritten";
+    for (arguments, output) in [
+        (&["fit", "b.obj", "--output", "b.obj"][..], "b.obj"),
+        (&["fit", "b.obj", "--output", "./sub/../b.obj"], "./sub/../b.obj"),
+        (&["tape", "encode", "b.obj", "--output", "b.obj"], "b.obj"),
+        (&["tape", "show", "plot.svg"], "plot.svg"),
+        (&["preview", "b.obj", "--svg", "b.obj"], "b.obj"),
+        (&["preview", "b.obj", "--json", "b.obj"], "b.obj"),
+        (&["plot", "b.obj", "--png", "b.obj"], "b.obj"),
+    ] {
+        refused(arguments, &format!("{output} {read}"));
+    }
+    let one = "are one file: give each result a file of its own";
+    refused(&["preview", "b.obj", "--svg", "x", "--png", "x"], &format!("x and x {one}"));
+    refused(&["preview", "b.obj", "--svg", "x", "--json", "./x"], &format!("x and ./x {one}"));
+    refused(&["preview", "b.obj", "--png", "x", "--json", "x"], &format!("x and x {one}"));
+    refused(&["plot", "b.obj", "--svg", "x", "--png", "sub/../x"], &format!("x and sub/../x {one}"));
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink("b.obj", folder.path().join("link.obj")).expect("a link");
+        refused(&["fit", "link.obj", "--output", "b.obj"], &format!("b.obj {read}"));
+        before = [before, vec!["link.obj".to_owned()]].concat();
+        before.sort();
+    }
+    assert_eq!(files(folder.path()), before);
+    assert_eq!(fs::read_to_string(folder.path().join("b.obj")).expect("readable"), PLAN);
+}
+
+/// The file to read is not there either: where the results go is looked at first.
+#[test]
+fn an_output_that_cannot_be_written_is_told_before_any_work() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("file"), "").expect("written");
+    fs::create_dir(folder.path().join("folder")).expect("a folder");
+    let before = files(folder.path());
+    let mut outputs = vec!["no/x", "file/x", "folder", "folder/", "new/"];
+    // Even the system's administrator cannot make a file there.
+    if cfg!(target_os = "linux") {
+        outputs.push("/proc/x");
+    }
+    for output in outputs {
+        for arguments in [
+            &["plot", "none.obj", "--svg", output][..],
+            &["plot", "none.obj", "--png", output],
+            &["preview", "none.obj", "--svg", output],
+            &["preview", "none.obj", "--png", output],
+            &["preview", "none.obj", "--json", output],
+            &["fit", "none.obj", "--output", output],
+            &["tape", "encode", "none.obj", "--output", output],
+            &["tape", "show", "none.tape", "--svg", output],
+        ] {
+            let (code, _, stderr) = penup(folder.path(), arguments);
+            assert_eq!(code, Some(1));
+            let reason = format!("penup: cannot write {output}: ");
+            assert!(stderr.starts_with(&reason), "{arguments:?}: {stderr}");
+        }
+    }
+    assert_eq!(files(folder.path()), before);
+}
+
 /// Every command reads its file from a pipe that never ends, and is given up there.
 #[cfg(unix)]
 #[test]
