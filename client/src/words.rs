@@ -67,6 +67,12 @@ const SENTENCES: &[(u16, &str)] = &[
     (120, "there is nothing to draw: the file has no faces, lines or curves"),
     (161, "the plotter keeps no job"),
     (162, "the kept job is counted in other steps"),
+    (170, "a line was damaged on its way: check the cable, and keep it away from the motors"),
+    (171, "a line was lost on its way: check the cable, and that nothing else uses the port"),
+    (
+        172,
+        "a line lost its number on its way: check the cable, and that nothing else uses the port",
+    ),
 ];
 
 /// Why a plotter refused: the error's number, and what the plotter said before it.

@@ -14,103 +14,128 @@ use penup::view::ViewError;
 
 const MISSING: OutOfScratch = OutOfScratch { needed: 9, available: 8 };
 
+/// A value of each variant of an enum, in the order given.
+///
+/// A variant that is left out does not compile: the match has no other arm.
+macro_rules! every_variant {
+    ($enum:ident: $($variant:ident $({ $($named:tt)* })? $(( $($plain:tt)* ))?),* $(,)?) => {{
+        let _is_complete = |value: &$enum| match value {
+            $($enum::$variant { .. } => (),)*
+        };
+        [$($enum::$variant $({ $($named)* })? $(( $($plain)* ))?),*]
+    }};
+}
+
 /// Every refusal that the library can make, with each of its texts.
 fn refusals() -> Vec<Refusal> {
-    let model = [
-        ModelError::CoordinateTooLarge,
-        ModelError::TooManyVertices { limit: 9 },
-        ModelError::TooManyCorners { limit: 9, needed: 10 },
-        ModelError::UnknownVertex { number: 9, vertices: 8 },
-        ModelError::TooFewCorners { needed: 3 },
-        ModelError::RepeatedVertex { number: 3 },
-        ModelError::NoDegree,
-        ModelError::CurveUnfinished,
-        ModelError::NoCurve,
-        ModelError::KnotTooLarge,
-        ModelError::UnknownElement { part: Part::Faces, number: 9, count: 8 },
-        ModelError::NoPlane,
-        ModelError::TooManyPens,
-        ModelError::Scratch(MISSING),
-    ];
-    let curve = [
-        CurveError::Order,
-        CurveError::TooFewControlPoints { needed: 4 },
-        CurveError::TooManyControlPoints { limit: 9 },
-        CurveError::UnknownPoint { number: 9 },
-        CurveError::WrongKnotCount { needed: 9, given: 8 },
-        CurveError::KnotDecreases { knot: 3 },
-        CurveError::KnotTooLarge { knot: 3 },
-        CurveError::KnotRepeated { knot: 3 },
-        CurveError::OutsideKnots,
-    ];
-    let solid = [
-        SolidError::TooFewVertices { distinct: 3 },
-        SolidError::TooManyVertices,
-        SolidError::PositionOutOfRange { vertex: 1 },
-        SolidError::AllInLine,
-        SolidError::BadEye,
-        SolidError::EyeInside,
-        SolidError::VertexInside { vertex: 1, count: 2 },
-        SolidError::UnknownVertex { edge: 1 },
-        SolidError::OutlineBroken { vertex: 1 },
-    ];
-    let views = [
-        ViewError::NothingToSee,
-        ViewError::EyeAtTarget,
-        ViewError::UpAlongSight,
-        ViewError::NothingInFront,
-        ViewError::BehindEye { vertex: 3 },
-    ];
     let one = Value::from_num(1);
-    let pages = [
-        PageError::NoRoom,
-        PageError::TooManySteps,
-        PageError::DoesNotFit { width: 1 << 16, height: 1 << 16, foot: 1 << 16 },
-        PageError::TitleTooWide { width: one, free: one },
-    ];
-    let machine = [
-        MachineError::State(State::Idle),
-        MachineError::BeyondTravel { target: 1, x: one, y: one },
-        MachineError::MoveTooLong { target: 1 },
-    ];
-    let settings = [
-        SettingError::Unknown,
-        SettingError::OutOfRange(Setting::StepsPerMmX),
-        SettingError::NotWhole(Setting::StepsPerMmX),
-        SettingError::Conflict(LimitsError::StepsPerMillimetre),
-        SettingError::Busy,
-    ];
-    let plain = [
-        Refusal::UnknownCommand,
-        Refusal::NotANumber,
-        Refusal::UnknownSystemCommand,
-        Refusal::HomingOff,
-        Refusal::Busy,
-        Refusal::Locked,
-        Refusal::LineTooLong { limit: 256 },
-        Refusal::NotText,
-        Refusal::BytesLost,
-        Refusal::UnsupportedWord(b'Q'),
-        Refusal::Arc(ArcError::NoRadius),
-        Refusal::NumberOutOfRange,
-        Refusal::WrongNumberCount { needed: 3 },
-        Refusal::NotAVertexNumber,
-        Refusal::NotAChoice { choices: "on or off" },
-        Refusal::NotAPage,
-        Refusal::NotAnEscape,
-        Refusal::NotInTheFont('→'),
-        Refusal::TitleTooLong { limit: 80 },
-        Refusal::NothingToPlot,
-        Refusal::DrawingTooLarge(MISSING),
-        Refusal::TooManyLines,
-        Refusal::NothingToUndo,
-        Refusal::Aborted,
-        Refusal::NotKept,
-        Refusal::NoJobKept,
-        Refusal::OtherSteps,
-    ];
-    plain
-        .into_iter()
+    let all = every_variant!(Refusal:
+        UnknownCommand,
+        NotANumber,
+        UnknownSystemCommand,
+        HomingOff,
+        Busy,
+        Locked,
+        LineTooLong { limit: 256 },
+        NotText,
+        BytesLost,
+        UnsupportedWord(b'Q'),
+        Arc(ArcError::NoRadius),
+        NumberOutOfRange,
+        WrongNumberCount { needed: 3 },
+        NotAVertexNumber,
+        NotAChoice { choices: "on or off" },
+        NotAPage,
+        NotAnEscape,
+        NotInTheFont('→'),
+        TitleTooLong { limit: 80 },
+        Model(ModelError::NoPlane),
+        NothingToPlot,
+        View(ViewError::NothingToSee),
+        Solid(SolidError::AllInLine),
+        Page(PageError::NoRoom),
+        Machine(MachineError::State(State::Idle)),
+        Setting(SettingError::Unknown),
+        DrawingTooLarge(MISSING),
+        TooManyLines,
+        NothingToUndo,
+        Aborted,
+        NotKept,
+        NoJobKept,
+        OtherSteps,
+        Damaged,
+        OutOfOrder { expected: 17 },
+        Unnumbered,
+        RefusedBefore(1),
+    );
+    let model = every_variant!(ModelError:
+        CoordinateTooLarge,
+        TooManyVertices { limit: 9 },
+        TooManyCorners { limit: 9, needed: 10 },
+        UnknownVertex { number: 9, vertices: 8 },
+        TooFewCorners { needed: 3 },
+        RepeatedVertex { number: 3 },
+        NoDegree,
+        Curve(CurveError::Order),
+        CurveUnfinished,
+        NoCurve,
+        KnotTooLarge,
+        UnknownElement { part: Part::Faces, number: 9, count: 8 },
+        NoPlane,
+        TooManyPens,
+        Scratch(MISSING),
+    );
+    let curve = every_variant!(CurveError:
+        Order,
+        TooFewControlPoints { needed: 4 },
+        TooManyControlPoints { limit: 9 },
+        UnknownPoint { number: 9 },
+        WrongKnotCount { needed: 9, given: 8 },
+        KnotDecreases { knot: 3 },
+        KnotTooLarge { knot: 3 },
+        KnotRepeated { knot: 3 },
+        OutsideKnots,
+    );
+    let solid = every_variant!(SolidError:
+        TooFewVertices { distinct: 3 },
+        TooManyVertices,
+        PositionOutOfRange { vertex: 1 },
+        AllInLine,
+        BadEye,
+        EyeInside,
+        VertexInside { vertex: 1, count: 2 },
+        UnknownVertex { edge: 1 },
+        OutlineBroken { vertex: 1 },
+        Scratch(MISSING),
+        SinkFull,
+        Aborted,
+    );
+    let views = every_variant!(ViewError:
+        NothingToSee,
+        EyeAtTarget,
+        UpAlongSight,
+        NothingInFront,
+        BehindEye { vertex: 3 },
+    );
+    let pages = every_variant!(PageError:
+        NoRoom,
+        TooManySteps,
+        DoesNotFit { width: 1 << 16, height: 1 << 16, foot: 1 << 16 },
+        TitleTooWide { width: one, free: one },
+    );
+    let machine = every_variant!(MachineError:
+        State(State::Idle),
+        BeyondTravel { target: 1, x: one, y: one },
+        MoveTooLong { target: 1 },
+    );
+    let settings = every_variant!(SettingError:
+        Unknown,
+        OutOfRange(Setting::StepsPerMmX),
+        NotWhole(Setting::StepsPerMmX),
+        Conflict(LimitsError::StepsPerMillimetre),
+        Busy,
+    );
+    all.into_iter()
         .chain(model.map(Refusal::Model))
         .chain(curve.map(|error| Refusal::Model(ModelError::Curve(error))))
         .chain(solid.map(Refusal::Solid))
