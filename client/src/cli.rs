@@ -3,10 +3,11 @@
 use crate::fit::{FitError, TOLERANCES};
 use crate::job::{Page, Settings};
 use crate::machines::Board;
-use crate::protocol::TITLE;
+use crate::protocol::{TITLE, acts_at_once};
 use crate::words::told;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use penup::drawing::TitleText;
+use penup::machine::Setting;
 use penup::protocol::{Command as PlotterCommand, Escape, LINE_LIMIT, Refusal};
 use std::path::PathBuf;
 
@@ -71,8 +72,8 @@ pub struct TapeShowArgs {
     /// A4, A3, Letter, or width x height in mm
     #[arg(long, value_name = "PAGE", value_parser = page, default_value = "A4")]
     pub page: Page,
-    /// Steps in a millimetre
-    #[arg(long, value_name = "N", default_value = "80")]
+    /// Steps in a millimetre, 2 to 4000
+    #[arg(long, value_name = "N", value_parser = steps, default_value = "80", allow_hyphen_values = true)]
     pub steps: f64,
     /// Where the pictures go.
     #[command(flatten)]
@@ -155,17 +156,17 @@ pub struct PictureArgs {
 #[derive(Debug, Args)]
 pub struct ViewArgs {
     /// Where the eye is [default: a three-quarter view]
-    #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true, help_heading = "Camera")]
-    pub eye: Option<[f64; 3]>,
+    #[arg(long, value_name = "X,Y,Z", value_parser = eye, allow_hyphen_values = true, help_heading = "Camera")]
+    pub eye: Option<String>,
     /// The point that the eye looks at [default: the middle of the model]
-    #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true, help_heading = "Camera")]
-    pub at: Option<[f64; 3]>,
+    #[arg(long, value_name = "X,Y,Z", value_parser = at, allow_hyphen_values = true, help_heading = "Camera")]
+    pub at: Option<String>,
     /// The direction that is up in the picture [default: 0,0,1]
-    #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true, help_heading = "Camera")]
-    pub up: Option<[f64; 3]>,
+    #[arg(long, value_name = "X,Y,Z", value_parser = up, allow_hyphen_values = true, help_heading = "Camera")]
+    pub up: Option<String>,
     /// Harrison's rotation in degrees: look along z after turning by C about z, B about y, A about x
-    #[arg(long, value_name = "A,B,C", value_parser = triple, allow_hyphen_values = true, help_heading = "Camera")]
-    pub angles: Option<[f64; 3]>,
+    #[arg(long, value_name = "A,B,C", value_parser = angles, allow_hyphen_values = true, help_heading = "Camera")]
+    pub angles: Option<String>,
     /// perspective, orthographic, cavalier, cabinet, oblique,ANGLE,RATIO, isometric, dimetric, trimetric
     /// or axonometric,AZIMUTH,ELEVATION
     #[arg(long, value_parser = projection, default_value = "perspective", allow_hyphen_values = true,
@@ -190,11 +191,12 @@ pub struct ViewArgs {
     #[arg(
         long,
         value_name = "DEGREES",
+        value_parser = crease,
         default_value = "0",
         allow_hyphen_values = true,
         help_heading = "Camera"
     )]
-    pub crease: f64,
+    pub crease: String,
     /// How far coordinates may be off, in units of the model: half of the last of three or more
     /// decimals (auto), or a number; 0 takes them as they stand
     #[arg(long, value_name = "LENGTH", value_parser = precision, default_value = "auto",
@@ -213,7 +215,7 @@ pub struct ViewArgs {
     /// What stays free on each side, in mm
     #[arg(long, value_name = "MM", value_parser = margin, default_value = "10", allow_hyphen_values = true,
           help_heading = "Page")]
-    pub margin: f64,
+    pub margin: String,
     /// Write this below the drawing
     #[arg(long, value_name = "TEXT", value_parser = title, default_value = "", hide_default_value = true,
           allow_hyphen_values = true, help_heading = "Page")]
@@ -221,7 +223,7 @@ pub struct ViewArgs {
     /// Height of the title's capitals, 1 to 100 mm
     #[arg(long, value_name = "MM", value_parser = title_size, default_value = "5", allow_hyphen_values = true,
           help_heading = "Page")]
-    pub title_size: f64,
+    pub title_size: String,
     /// Scale a plan to the page, too (solids always are; plans are drawn at true size)
     #[arg(long, help_heading = "Page")]
     pub fit: bool,
@@ -236,15 +238,15 @@ pub struct ViewArgs {
         long,
         value_name = "NUMBER",
         default_value = "4000",
-        value_parser = clap::value_parser!(u32).range(0..1 << 30),
+        value_parser = effort,
         allow_hyphen_values = true,
         help_heading = "Order"
     )]
-    pub effort: u32,
+    pub effort: String,
     /// How much longer the way with the pen up may be for one lift less, 0 to 1000 mm
     #[arg(long, value_name = "MM", value_parser = lift, default_value = "2", allow_hyphen_values = true,
           help_heading = "Order")]
-    pub lift: f64,
+    pub lift: String,
 }
 
 impl ViewArgs {
@@ -257,10 +259,10 @@ impl ViewArgs {
             self.page
         };
         Settings {
-            eye: self.eye,
-            at: self.at,
-            up: self.up,
-            angles: self.angles,
+            eye: self.eye.clone(),
+            at: self.at.clone(),
+            up: self.up.clone(),
+            angles: self.angles.clone(),
             projection: self.projection.clone(),
             behind: match self.behind {
                 Behind::Clip => "clip",
@@ -274,7 +276,7 @@ impl ViewArgs {
                 Blocks::Separate => "separate",
                 Blocks::Merged => "merged",
             },
-            crease: self.crease,
+            crease: self.crease.clone(),
             precision: self.precision.clone(),
             see: match self.see {
                 See::Faces => "faces",
@@ -288,9 +290,9 @@ impl ViewArgs {
                 Pens::One => "one",
             },
             page,
-            margin: self.margin,
+            margin: self.margin.clone(),
             title: self.title.clone(),
-            title_size: self.title_size,
+            title_size: self.title_size.clone(),
             fit: self.fit,
             order: match self.order {
                 Order::Auto => "auto",
@@ -298,23 +300,24 @@ impl ViewArgs {
                 Order::Exact => "exact",
             },
             cycle: self.cycle,
-            effort: self.effort,
-            lift: self.lift,
+            effort: self.effort.clone(),
+            lift: self.lift.clone(),
         }
     }
 }
 
-fn projection(text: &str) -> Result<String, String> {
-    understood("projection", text)
+/// A parser of each option whose value the plotter reads itself.
+macro_rules! read_by_the_plotter {
+    ($($option:ident),*) => {
+        $(fn $option(text: &str) -> Result<String, String> {
+            understood(stringify!($option), text)
+        })*
+    };
 }
 
-fn precision(text: &str) -> Result<String, String> {
-    understood("precision", text)
-}
-
-fn hidden(text: &str) -> Result<String, String> {
-    understood("hidden", text)
-}
+read_by_the_plotter!(
+    eye, at, up, angles, projection, hidden, crease, precision, margin, effort, lift
+);
 
 fn title(text: &str) -> Result<String, String> {
     let line = format!("{TITLE}={}", Escape(text));
@@ -332,16 +335,21 @@ fn title(text: &str) -> Result<String, String> {
     }
 }
 
-fn title_size(text: &str) -> Result<f64, String> {
-    match number(text)? {
-        size if (1.0..=100.0).contains(&size) => Ok(size),
-        _ => Err("a title is 1 to 100 mm high".to_owned()),
-    }
+fn title_size(text: &str) -> Result<String, String> {
+    understood("title-size", text)
 }
 
-/// The plotter's own parser says whether this is a value of the option.
+/// The value as it is sent. The plotter's own parser says whether it is one of the option.
 fn understood(option: &str, text: &str) -> Result<String, String> {
-    match PlotterCommand::parse(&format!("${option}={text}")) {
+    // Not even in a comment.
+    if text.contains(|letter| letter == '#' || acts_at_once(letter)) {
+        return Err("no value has such a letter".to_owned());
+    }
+    let line = format!("${option}={text}");
+    if line.len() > LINE_LIMIT {
+        return Err(Refusal::LineTooLong { limit: LINE_LIMIT }.to_string());
+    }
+    match PlotterCommand::parse(&line) {
         Ok(_) => Ok(text.to_owned()),
         Err(refusal) => Err(told(&refusal.to_string())),
     }
@@ -414,13 +422,6 @@ fn number(text: &str) -> Result<f64, String> {
     }
 }
 
-fn triple(text: &str) -> Result<[f64; 3], String> {
-    let numbers: Result<Vec<f64>, String> = text.split(',').map(number).collect();
-    <[f64; 3]>::try_from(numbers?).map_err(|numbers| {
-        format!("three numbers with commas between them are needed, not {}", numbers.len())
-    })
-}
-
 fn page(text: &str) -> Result<Page, String> {
     let (width, height) = match text.to_ascii_lowercase().as_str() {
         "a4" => (210.0, 297.0),
@@ -430,14 +431,11 @@ fn page(text: &str) -> Result<Page, String> {
             let (width, height) = other
                 .split_once('x')
                 .ok_or("it is none of A4, A3, Letter, or width x height in mm such as 300x200")?;
+            understood("page", other)?;
             (number(width)?, number(height)?)
         }
     };
-    if width > 0.0 && height > 0.0 {
-        Ok(Page { width, height })
-    } else {
-        Err("a page has a width and a height above 0".to_owned())
-    }
+    Ok(Page { width, height })
 }
 
 fn tolerance(text: &str) -> Result<f64, String> {
@@ -447,17 +445,12 @@ fn tolerance(text: &str) -> Result<f64, String> {
     }
 }
 
-fn lift(text: &str) -> Result<f64, String> {
+fn steps(text: &str) -> Result<f64, String> {
+    let limits = Setting::StepsPerMmX.info();
+    let (least, most) = (limits.least.to_num::<f64>(), limits.greatest.to_num::<f64>());
     match number(text)? {
-        lift if (0.0..=1000.0).contains(&lift) => Ok(lift),
-        _ => Err("a lift is worth 0 to 1000 mm".to_owned()),
-    }
-}
-
-fn margin(text: &str) -> Result<f64, String> {
-    match number(text)? {
-        margin if margin >= 0.0 => Ok(margin),
-        _ => Err("a margin cannot be negative".to_owned()),
+        steps if (least..=most).contains(&steps) => Ok(steps),
+        _ => Err(format!("a plotter makes {least} to {most} steps in a millimetre")),
     }
 }
 
@@ -486,9 +479,9 @@ mod tests {
         let joined = settings(&["--eye=-3,-4,2.5", "--at=-.5,0,-1e-1", "--up=-1,-2,-3"]);
         assert_eq!(spaced, joined);
         let settings = spaced.expect("good options");
-        assert_eq!(settings.eye, Some([-3.0, -4.0, 2.5]));
-        assert_eq!(settings.at, Some([-0.5, 0.0, -0.1]));
-        assert_eq!(settings.up, Some([-1.0, -2.0, -3.0]));
+        assert_eq!(settings.eye.as_deref(), Some("-3,-4,2.5"));
+        assert_eq!(settings.at.as_deref(), Some("-.5,0,-1e-1"));
+        assert_eq!(settings.up.as_deref(), Some("-1,-2,-3"));
     }
 
     #[test]
@@ -513,32 +506,82 @@ mod tests {
     fn a_title_may_have_any_letter_of_the_font() {
         let title = "Café – 3 % \\ #1: ¿sí? ~ «ÿ»!";
         let settings = settings(&["--title", title, "--title-size=12.5"]).expect("good options");
-        assert_eq!((settings.title.as_str(), settings.title_size), (title, 12.5));
+        assert_eq!((settings.title.as_str(), settings.title_size.as_str()), (title, "12.5"));
     }
+
+    #[test]
+    fn numbers_may_have_exponents_of_any_size() {
+        let options = ["--eye", "1e-300,2,3", "--effort", "1e3", "--lift=25e-1", "--page=2e2x3e2"];
+        let settings = settings(&options).expect("good options");
+        assert_eq!(settings.eye.as_deref(), Some("1e-300,2,3"));
+        assert_eq!((settings.effort.as_str(), settings.lift.as_str()), ("1e3", "25e-1"));
+        assert_eq!((settings.page.width, settings.page.height), (200.0, 300.0));
+    }
+
+    #[test]
+    fn a_tape_has_steps_that_a_plotter_makes() {
+        let steps = |steps: &str| {
+            Cli::try_parse_from(["penup", "tape", "show", "f.tape", "--steps", steps])
+                .map(drop)
+                .map_err(|error| error.to_string())
+        };
+        for good in ["2", "80", "4000", "88.9"] {
+            assert_eq!(steps(good), Ok(()));
+        }
+        for (bad, reason) in [
+            ("0", "2 to 4000 steps"),
+            ("-80", "2 to 4000 steps"),
+            ("1e300", "2 to 4000 steps"),
+            ("nan", "\"nan\" is not a number"),
+        ] {
+            let error = steps(bad).expect_err("refused");
+            assert!(error.contains(reason) && error.contains("--steps <N>"), "{error}");
+        }
+    }
+
+    const NUMBER: &str = "a number is written like -12.5 or 3e-2";
+    const RANGE: &str = "the number is too large, too small or has the wrong sign";
 
     #[test]
     fn nonsense_is_refused_with_the_reason() {
         for (options, reason) in [
-            (["--eye", "1,2"], "three numbers"),
-            (["--eye", "1,2,3,4"], "three numbers"),
-            (["--eye", "1,,3"], "\"\" is not a number"),
-            (["--at", "1,2,nan"], "\"nan\" is not a number"),
-            (["--up", "--fit"], "\"--fit\" is not a number"),
+            (["--eye", "1,2"], "it takes 3 numbers"),
+            (["--eye", "1,2,3,4"], "it takes 3 numbers"),
+            (["--eye", "1,,3"], NUMBER),
+            (["--eye", "1e308,0,0"], RANGE),
+            (["--eye", "1,2,3#4"], "no value has such a letter"),
+            (["--eye", "1,2,3\n"], "no value has such a letter"),
+            (["--eye", &format!("1,2,{}", "0".repeat(300))], "a line has at most 256 bytes"),
+            (["--at", "1,2,nan"], NUMBER),
+            (["--up", "--fit"], NUMBER),
+            (["--angles", "1e300,0,0"], RANGE),
+            (["--crease", "nan"], NUMBER),
+            (["--crease", "-5"], RANGE),
+            (["--crease", "500"], RANGE),
             (["--page", "B5"], "none of A4"),
-            (["--page", "-10x20"], "above 0"),
-            (["--page", "10xinf"], "\"inf\" is not a number"),
-            (["--margin", "-1"], "cannot be negative"),
+            (["--page", "-10x20"], RANGE),
+            (["--page", "10xinf"], NUMBER),
+            (["--page", "1e9x1e9"], RANGE),
+            (["--page", "1e-9x100"], RANGE),
+            (["--margin", "-1"], RANGE),
+            (["--margin", "1e308"], RANGE),
+            (["--effort", "-1"], RANGE),
+            (["--effort", "1e12"], RANGE),
+            (["--effort", "1.5"], RANGE),
+            (["--effort", "much"], NUMBER),
             (["--title", "a→b"], "the font lacks → (U+2192)"),
             (["--title", "line\nline"], "the font lacks"),
             (["--title", LONG], "at most 80 bytes"),
-            (["--title-size", "0.5"], "1 to 100 mm"),
-            (["--lift", "-1"], "0 to 1000 mm"),
+            (["--title-size", "0.5"], RANGE),
+            (["--lift", "-1"], RANGE),
+            (["--lift", "1001"], RANGE),
             (["--repeat", "0"], "0 is not in 1.."),
             (["--repeat", "-1"], "-1 is not in 1.."),
             (["--hidden", "gone"], "erased, dotted, dashed, shown"),
         ] {
             let error = settings(&options).expect_err("refused");
             assert!(error.contains(reason), "{options:?}: {error}");
+            assert!(error.contains(&format!("'{} ", options[0])), "{options:?}: {error}");
         }
     }
 }

@@ -1,5 +1,6 @@
 //! What can go wrong between a file and its picture, in words that say what to do.
 
+use crate::fit::FitError;
 use crate::interrupt::EXIT_CODE;
 use crate::protocol::RECEIVE_WINDOW;
 use crate::source::{JobLine, Origin};
@@ -27,12 +28,12 @@ pub enum Error {
         file: String,
     },
     /// The file's polylines cannot be fitted.
-    #[error("{file}: {source}")]
+    #[error("{}", not_fitted(file, source))]
     Fit {
         /// As the user named it.
         file: String,
         /// Why.
-        source: crate::fit::FitError,
+        source: FitError,
     },
     /// Four holes of a tape that are no instruction.
     #[error("{file}: row {row} of the tape holds {code}, which is no instruction")]
@@ -233,7 +234,9 @@ pub enum Error {
         source: io::Error,
     },
     /// A result would replace the file that it is made from.
-    #[error("{output} is the file to read: give the result another name, so that it is not overwritten")]
+    #[error(
+        "{output} is the file to read: give the result another name, so that it is not overwritten"
+    )]
     OutputIsInput {
         /// As the user named it.
         output: String,
@@ -270,6 +273,14 @@ impl Error {
 fn kept(details: Option<&Path>) -> String {
     let what = |file: &Path| format!("; what it said last is in {}", file.display());
     details.map(what).unwrap_or_default()
+}
+
+/// A line is named as in every other message.
+fn not_fitted(file: &str, error: &FitError) -> String {
+    match error {
+        FitError::Line { number, reason } => format!("{file}:{number}: {reason}"),
+        error => format!("{file}: {error}"),
+    }
 }
 
 fn said(text: &str) -> String {

@@ -155,16 +155,18 @@ pub struct Page {
 }
 
 /// How to see and place a model. `None` leaves the choice to the plotter.
+///
+/// What is text here is sent as it stands, so it must be something that the plotter understands.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
     /// Where the eye is.
-    pub eye: Option<[f64; 3]>,
+    pub eye: Option<String>,
     /// What it looks at.
-    pub at: Option<[f64; 3]>,
+    pub at: Option<String>,
     /// What is up.
-    pub up: Option<[f64; 3]>,
+    pub up: Option<String>,
     /// Harrison's angles, in degrees.
-    pub angles: Option<[f64; 3]>,
+    pub angles: Option<String>,
     /// How lines of sight run, as the plotter understands it.
     pub projection: String,
     /// `clip` or `refuse`.
@@ -174,7 +176,7 @@ pub struct Settings {
     /// `separate` or `merged`.
     pub blocks: &'static str,
     /// Degrees.
-    pub crease: f64,
+    pub crease: String,
     /// `auto`, or a length in units of the model, as the plotter understands it.
     pub precision: String,
     /// `faces`, `wire`, `vertices` or `edges`.
@@ -186,21 +188,21 @@ pub struct Settings {
     /// The page.
     pub page: Page,
     /// What stays free on each side, in mm.
-    pub margin: f64,
+    pub margin: String,
     /// What stands below the drawing; empty for nothing.
     pub title: String,
     /// Height of its capitals, in mm.
-    pub title_size: f64,
+    pub title_size: String,
     /// Whether a plan, too, is scaled to the page.
     pub fit: bool,
     /// `auto`, `greedy` or `exact`.
     pub order: &'static str,
     /// Whether the pen returns to where it began.
     pub cycle: bool,
-    /// As the plotter understands it.
-    pub effort: u32,
+    /// Work to improve the order, for each move with the pen up.
+    pub effort: String,
     /// How much longer a way with the pen up may be for one lift less, in mm.
-    pub lift: f64,
+    pub lift: String,
 }
 
 /// Every line of a job up to the plot command: forget the old model, how pens are chosen, the file's
@@ -218,28 +220,33 @@ impl<L: Lines> Job<L> {
     /// Each setting is sent, so that nothing of an earlier job remains.
     pub fn new(file: L, settings: &Settings) -> Self {
         let page = settings.page;
-        let points =
-            [(EYE, settings.eye), (AT, settings.at), (UP, settings.up), (ANGLES, settings.angles)];
-        let points =
-            points.into_iter().filter_map(|(name, point)| Some(setting(name, &point?, ',')));
+        let points = [
+            (EYE, &settings.eye),
+            (AT, &settings.at),
+            (UP, &settings.up),
+            (ANGLES, &settings.angles),
+        ];
+        let points = points
+            .into_iter()
+            .filter_map(|(name, point)| Some(format!("{name}={}", point.as_ref()?)));
         let commands = std::iter::once(VIEW_AUTO.to_owned()).chain(points).chain([
             format!("{PROJECTION}={}", settings.projection),
             format!("{BEHIND}={}", settings.behind),
             format!("{SEAMS}={}", settings.seams),
             format!("{BLOCKS}={}", settings.blocks),
-            setting(CREASE, &[settings.crease], ','),
+            format!("{CREASE}={}", settings.crease),
             format!("{PRECISION}={}", settings.precision),
             format!("{SEE}={}", settings.see),
             format!("{HIDDEN}={}", settings.hidden),
             setting(PAGE, &[page.width, page.height], 'x'),
-            setting(MARGIN, &[settings.margin], ','),
+            format!("{MARGIN}={}", settings.margin),
             format!("{TITLE}={}", Escape(&settings.title)),
-            setting(TITLE_SIZE, &[settings.title_size], ','),
+            format!("{TITLE_SIZE}={}", settings.title_size),
             format!("{FIT}={}", if settings.fit { "on" } else { "off" }),
             format!("{ORDER}={}", settings.order),
             format!("{CYCLE}={}", if settings.cycle { "on" } else { "off" }),
             format!("{EFFORT}={}", settings.effort),
-            setting(LIFT, &[settings.lift], ','),
+            format!("{LIFT}={}", settings.lift),
         ]);
         // Before the file, whose names of pens may be too many.
         let before = [CLEAR.to_owned(), format!("{PENS}={}", settings.pens)];
@@ -306,28 +313,28 @@ mod tests {
     #[test]
     fn every_setting_is_sent_after_the_file() {
         let settings = Settings {
-            eye: Some([-3.0, -4.0, 2.5]),
+            eye: Some("-3,-4,2.5".to_owned()),
             at: None,
-            up: Some([0.0, 0.0, 1.0]),
+            up: Some("0,0,1".to_owned()),
             angles: None,
             projection: "perspective".to_owned(),
             behind: "clip",
             seams: "on",
             blocks: "separate",
-            crease: 0.0,
+            crease: "0".to_owned(),
             precision: "auto".to_owned(),
             see: "faces",
             hidden: "dotted".to_owned(),
             pens: "auto",
             page: Page { width: 210.0, height: 297.0 },
-            margin: 7.5,
+            margin: "7.5".to_owned(),
             title: "Für Ada".to_owned(),
-            title_size: 4.5,
+            title_size: "4.5".to_owned(),
             fit: false,
             order: "auto",
             cycle: false,
-            effort: 4000,
-            lift: 2.5,
+            effort: "4000".to_owned(),
+            lift: "2.5".to_owned(),
         };
         let job = Job::new([JobLine::command("v 0 0 0")], &settings);
         let lines = (0..job.count()).filter_map(|index| job.line(index));

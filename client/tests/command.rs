@@ -259,6 +259,38 @@ fn a_trace_is_fitted_and_the_curves_are_drawn() {
     let (code, _, error) = penup(folder.path(), &["fit", "arc-fitted.obj"]);
     assert_eq!(code, Some(1));
     assert!(error.contains("no polyline"), "{error}");
+    fs::write(folder.path().join("far.obj"), "v 0 0 0\nv 1e308 0 0\nl 1 2\n").expect("written");
+    let (code, _, error) = penup(folder.path(), &["fit", "far.obj"]);
+    assert_eq!(code, Some(1));
+    assert_eq!(error, "penup: far.obj:2: coordinates go up to 1073741824\n");
+}
+
+/// The plotter reads the number that the option has, in the form that it was given.
+#[test]
+fn a_far_eye_and_a_near_one_are_drawn_or_refused_with_their_option() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("cube.obj"), include_str!("../../scenes/cube.obj"))
+        .expect("written");
+    let preview = |options: &[&str]| {
+        penup(folder.path(), &[&["preview", "cube.obj", "--svg", "x.svg"], options].concat())
+    };
+    let (code, said, error) = preview(&["--eye", "1e-300,-5,4"]);
+    assert_eq!(code, Some(0), "{error}");
+    assert_eq!(said, preview(&["--eye", "0,-5,4"]).1);
+    for (option, value) in [
+        ("--eye", "1e308,0,0"),
+        ("--angles", "1e300,0,0"),
+        ("--margin", "1e308"),
+        ("--page", "1e9x1e9"),
+        ("--crease", "nan"),
+        ("--crease", "-5"),
+        ("--crease", "500"),
+    ] {
+        let (code, _, error) = preview(&[option, value]);
+        assert_eq!(code, Some(2), "{error}");
+        let first = format!("error: invalid value '{value}' for '{option} <");
+        assert!(error.starts_with(&first) && error.len() < 300, "{error}");
+    }
 }
 
 const PLAN: &str = "v 0 0 0\nv 10 0 0\nv 10 10 0\nl 1 2 3\n";
@@ -291,7 +323,10 @@ fn no_result_replaces_its_file_or_another_result() {
     refused(&["preview", "b.obj", "--svg", "x", "--png", "x"], &format!("x and x {one}"));
     refused(&["preview", "b.obj", "--svg", "x", "--json", "./x"], &format!("x and ./x {one}"));
     refused(&["preview", "b.obj", "--png", "x", "--json", "x"], &format!("x and x {one}"));
-    refused(&["plot", "b.obj", "--svg", "x", "--png", "sub/../x"], &format!("x and sub/../x {one}"));
+    refused(
+        &["plot", "b.obj", "--svg", "x", "--png", "sub/../x"],
+        &format!("x and sub/../x {one}"),
+    );
     #[cfg(unix)]
     {
         std::os::unix::fs::symlink("b.obj", folder.path().join("link.obj")).expect("a link");
