@@ -41,17 +41,16 @@ fn run_in_emulators(boards: &[Board], example: &str) -> Result<()> {
 
 /// Prints the table of scenes of `docs/performance.md`.
 pub fn count() -> Result<()> {
-    print(&run_image("bench")?);
-    Ok(())
+    print(&run_image("bench")?)
 }
 
 /// Prints the table of planning there.
 pub fn count_motion() -> Result<()> {
     let counts = run_image("bench-motion")?;
-    println!("| job | without a jerk | 100 m/s³ | 10 m/s³ | 1 m/s³ |");
-    println!("|---|---|---|---|---|");
+    say!("| job | without a jerk | 100 m/s³ | 10 m/s³ | 1 m/s³ |")?;
+    say!("|---|---|---|---|---|")?;
     for line in counts.lines() {
-        println!("| {} |", line.replace('|', " | "));
+        say!("| {} |", line.replace('|', " | "))?;
     }
     Ok(())
 }
@@ -85,11 +84,11 @@ fn run_image(name: &str) -> Result<String> {
     Ok(String::from_utf8_lossy(&answer.stdout).into_owned())
 }
 
-fn print(counts: &str) {
-    println!(
+fn print(counts: &str) -> Result<()> {
+    say!(
         "| scene | vertices | edges | view | visibility | an edge | view and visibility at 50 MHz, s | Griffith, s | Brown, s | order |"
-    );
-    println!("|---|---|---|---|---|---|---|---|---|---|");
+    )?;
+    say!("|---|---|---|---|---|---|---|---|---|---|")?;
     let papers = PAPERS.iter().copied().chain(std::iter::repeat(["", ""]));
     for (line, [griffith, brown]) in counts.lines().zip(papers) {
         let words: Vec<&str> = line.split(' ').collect();
@@ -97,21 +96,22 @@ fn print(counts: &str) {
         let (Some(name), [vertices, corners, view, visibility, order]) =
             (words.first(), &numbers[..])
         else {
-            println!("{line}");
+            say!("{line}")?;
             continue;
         };
         // An edge has two corners, as of two faces or of one bar.
         let edges = corners / 2;
         // QEMU counts instructions; the core takes some five cycles for four.
         let seconds = (view + visibility) as f64 * 1.25 / 50e6;
-        println!(
+        say!(
             "| {name} | {vertices} | {edges} | {} | {} | {} | {seconds:.3} | {griffith} | {brown} | {} |",
             thousands(*view),
             thousands(*visibility),
             thousands(visibility / edges.max(1)),
             thousands(*order),
-        );
+        )?;
     }
+    Ok(())
 }
 
 /// With a space after each three digits.

@@ -1,6 +1,8 @@
 //! Running other programs.
 
 use std::env;
+use std::fmt;
+use std::io::{self, Write};
 use std::process::{Child, Command, Output, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -59,8 +61,50 @@ pub fn describe(command: &Command) -> String {
     words.join(" ")
 }
 
+/// Prints a line to the standard output. If its reader has gone, as `head` does, the work goes on.
+///
+/// # Errors
+/// The output takes nothing, as that to a full disk.
+pub fn say(text: fmt::Arguments<'_>) -> Result<()> {
+    say_to(&mut io::stdout().lock(), text)
+}
+
+fn say_to(output: &mut dyn Write, text: fmt::Arguments<'_>) -> Result<()> {
+    match writeln!(output, "{text}").and_then(|()| output.flush()) {
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        result => result.context("cannot write the standard output"),
+    }
+}
+
 fn end(child: &mut Child) {
     // Both fail only if it has just ended by itself.
     let _ = child.kill();
     let _ = child.wait();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Failing(io::ErrorKind);
+
+    impl Write for Failing {
+        fn write(&mut self, _: &[u8]) -> io::Result<usize> {
+            Err(self.0.into())
+        }
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_reader_that_has_gone_is_no_error_and_a_full_disk_is() {
+        let said = |kind| say_to(&mut Failing(kind), format_args!("a line"));
+        assert!(said(io::ErrorKind::BrokenPipe).is_ok());
+        let error = said(io::ErrorKind::StorageFull).expect_err("told");
+        assert!(format!("{error:#}").starts_with("cannot write the standard output: "));
+        let mut output = Vec::new();
+        assert!(say_to(&mut output, format_args!("a {}", "line")).is_ok());
+        assert_eq!(output, b"a line\n");
+    }
 }

@@ -22,14 +22,14 @@ pub fn flash(board: Board) -> Result<()> {
         bail!("{} is emulated only: `cargo plot --board {}` runs it", board.name(), board.name());
     }
     let image = firmware::build(board)?;
-    println!("{}", firmware::check(board, &image)?);
+    say!("{}", firmware::check(board, &image)?)?;
     let probes = output("probe-rs", &["list"]);
     if probes.as_ref().is_some_and(|list| list.lines().any(|line| line.trim().starts_with('['))) {
         return run(Command::new("probe-rs").args(["download", "--chip", CHIP]).arg(&image))
             .and_then(|()| run(Command::new("probe-rs").args(["reset", "--chip", CHIP])));
     }
     if let Some(drive) = drive().or_else(touched_drive) {
-        println!("penup: copying the image to {}", drive.display());
+        say!("penup: copying the image to {}", drive.display())?;
         fs::copy(image.with_extension("uf2"), drive.join("penup.uf2"))
             .with_context(|| format!("cannot write to {}", drive.display()))?;
         return Ok(());
@@ -48,7 +48,7 @@ fn touched_drive() -> Option<PathBuf> {
     const PAUSE: Duration = Duration::from_millis(250);
     const LOOKS: u32 = 40;
     let port = penup_port()?;
-    println!("penup: asking the board at {} for its drive", port.display());
+    say!("penup: asking the board at {} for its drive", port.display()).ok()?;
     // `stty` opens the port, sets the rate and closes it.
     let option = if cfg!(target_os = "macos") { "-f" } else { "-F" };
     output("stty", &[option, port.to_str()?, "1200", "hupcl"])?;

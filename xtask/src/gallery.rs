@@ -94,7 +94,7 @@ pub fn make() -> Result<()> {
             for way in ways {
                 let name = [scene, &words(figure.view), way].join("-");
                 let name = format!("{}.svg", name.trim_end_matches('-').replace("--", "-"));
-                println!("penup: docs/gallery/{name}");
+                say!("penup: docs/gallery/{name}")?;
                 draw(figure, way, &folder.join(&name).display().to_string())?;
                 write!(page, " ![{} {way}]({name}) |", figure.title)?;
             }

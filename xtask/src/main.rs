@@ -2,6 +2,14 @@
 //!
 //! Every command sets up what it lacks and says what it installs; what it cannot install it names,
 //! with the command that does. A second run finds everything and installs nothing.
+//!
+//! What it says goes through `say!`: the standard library's macros panic where nobody listens.
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
+/// Prints a line to the standard output; see [`command::say`].
+macro_rules! say {
+    ($($text:tt)*) => { crate::command::say(format_args!($($text)*)) };
+}
 
 mod bench;
 mod command;
@@ -18,6 +26,7 @@ mod uf2;
 #[path = "../../client/src/workspace.rs"]
 mod workspace;
 
+use std::io::Write as _;
 use std::path::PathBuf;
 use std::process::{Command, ExitCode};
 
@@ -102,7 +111,8 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             // Without the backtrace that `Debug` adds: the sentence is for the user.
-            eprintln!("penup: {error:#}");
+            // Where nobody can be told the exit code must do.
+            let _ = writeln!(std::io::stderr(), "penup: {error:#}");
             ExitCode::FAILURE
         }
     }
@@ -110,12 +120,12 @@ fn main() -> ExitCode {
 
 fn carry_out() -> Result<()> {
     match Arguments::parse().task {
-        None => Arguments::command().print_help()?,
+        None => say!("{}", Arguments::command().render_help().to_string().trim_end())?,
         Some(Task::Build { board }) => {
             let image = firmware::build(board)?;
-            println!("{}", firmware::check(board, &image)?);
+            say!("{}", firmware::check(board, &image)?)?;
             if board == Board::Pico {
-                println!("{}", flash::by_hand(&image));
+                say!("{}", flash::by_hand(&image))?;
             }
         }
         Some(Task::Flash { board }) => flash::flash(board)?,
@@ -136,7 +146,7 @@ fn carry_out() -> Result<()> {
                 set_up::emulator(board)?;
             }
             set_up::checkers()?;
-            println!("everything is there");
+            say!("everything is there")?;
         }
         Some(Task::Test) => test::everything()?,
     }

@@ -39,14 +39,14 @@ pub fn toolchain(target: &str) -> Result<Toolchain> {
     }
     let refusal = refusal(target);
     if !refusal.exists() && output("rustup", &["--version"]).is_some() {
-        println!("penup: installing the Rust target {target} by rustup");
+        say!("penup: installing the Rust target {target} by rustup")?;
         let mut rustup = Command::new("rustup");
         // A backtrace of rustup's would hide its one line of reason.
         rustup.args(["target", "add", target]).env("RUST_BACKTRACE", "0");
         match run_within(RUSTUP_LIMIT, &mut rustup) {
             Ok(()) if has_core(target) => return Ok(Toolchain::Rustup),
-            Ok(()) => println!("penup: rustup added {target} to another toolchain than cargo's"),
-            Err(error) => println!("penup: {error:#}"),
+            Ok(()) => say!("penup: rustup added {target} to another toolchain than cargo's")?,
+            Err(error) => say!("penup: {error:#}")?,
         }
     }
     if !debian_is_ready() && output("apt-get", &["--version"]).is_some() {
@@ -58,7 +58,7 @@ pub fn toolchain(target: &str) -> Result<Toolchain> {
          reached, or on Debian `apt-get install rustc-web rust-web-src lld`"
     );
     if !refusal.exists() {
-        println!("penup: from now on Debian's compiler builds for {target}");
+        say!("penup: from now on Debian's compiler builds for {target}")?;
         fs::create_dir_all(refusal.parent().unwrap_or(&refusal))?;
         fs::write(&refusal, [])?;
     }
@@ -159,7 +159,7 @@ fn rp2040js() -> Result<()> {
     if output("npm", &["--version"]).is_none() {
         install(&["npm"], "node")?;
     }
-    println!("penup: installing rp2040js by npm");
+    say!("penup: installing rp2040js by npm")?;
     fs::create_dir_all(&to)?;
     fs::copy(from.join("package.json"), to.join("package.json"))?;
     fs::write(to.join("package-lock.json"), lock)?;
@@ -174,7 +174,7 @@ fn install(debian: &[&str], brew: &str) -> Result<()> {
         return apt_install(debian);
     }
     if output("brew", &["--version"]).is_some() {
-        println!("penup: installing {brew} by brew");
+        say!("penup: installing {brew} by brew")?;
         return run(Command::new("brew").args(["install", brew]));
     }
     Ok(())
@@ -187,7 +187,7 @@ pub fn checkers() -> Result<()> {
         if found() {
             continue;
         }
-        println!("penup: installing {component} by rustup");
+        say!("penup: installing {component} by rustup")?;
         let mut rustup = Command::new("rustup");
         let installed = run_within(RUSTUP_LIMIT, rustup.args(["component", "add", component]));
         if !found() {
@@ -204,7 +204,7 @@ fn cargo_program() -> String {
 
 /// Installs Debian packages; refreshes apt's lists if they are too old or missing.
 fn apt_install(packages: &[&str]) -> Result<()> {
-    println!("penup: installing {} by apt-get", packages.join(" "));
+    say!("penup: installing {} by apt-get", packages.join(" "))?;
     let install = || {
         let mut command = as_root("apt-get");
         command.args(["install", "--yes", "--no-install-recommends"]).args(packages);
@@ -213,7 +213,7 @@ fn apt_install(packages: &[&str]) -> Result<()> {
     if run(&mut install()).is_ok() {
         return Ok(());
     }
-    println!("penup: refreshing apt's package lists, then once more");
+    say!("penup: refreshing apt's package lists, then once more")?;
     let refreshed = run(as_root("apt-get").arg("update"));
     match refreshed.and_then(|()| run(&mut install())) {
         Ok(()) => Ok(()),

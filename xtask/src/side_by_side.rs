@@ -67,7 +67,7 @@ fn run_one(program: &mut Command) -> Result<()> {
     let began = Instant::now();
     let output = program.output().with_context(|| format!("cannot run {name}"))?;
     let said = [&output.stdout, &output.stderr].map(|said| String::from_utf8_lossy(said));
-    println!("penup: {name}: {} s\n{}{}", began.elapsed().as_secs(), said[0], said[1]);
+    say!("penup: {name}: {} s\n{}{}", began.elapsed().as_secs(), said[0], said[1])?;
     ensure!(output.status.success(), "{name}: {}", output.status);
     Ok(())
 }

@@ -20,7 +20,7 @@ pub fn everything() -> Result<()> {
     for &board in Board::ALL {
         lint_firmware(board)?;
         let image = firmware::build(board)?;
-        println!("{}", firmware::check(board, &image)?);
+        say!("{}", firmware::check(board, &image)?)?;
     }
     step(
         workspace("clippy")
@@ -102,7 +102,7 @@ fn lint_firmware(board: Board) -> Result<()> {
                 .args(["--", "-Dwarnings"]),
         ),
         Toolchain::Debian => {
-            println!("penup: no clippy for {}: Debian's compiler has none", board.target());
+            say!("penup: no clippy for {}: Debian's compiler has none", board.target())?;
             step(
                 toolchain
                     .cargo("rustc", board.target())
@@ -114,6 +114,6 @@ fn lint_firmware(board: Board) -> Result<()> {
 }
 
 fn step(command: &mut Command) -> Result<()> {
-    println!("penup: {}", describe(command));
+    say!("penup: {}", describe(command))?;
     run(command)
 }
