@@ -2,9 +2,16 @@
 //! library on the host, one by one.
 #![cfg(feature = "emulator")]
 
+use clap::Parser as _;
+use penup_client::cli::Cli;
 use penup_client::machines::Board::Lm3s6965;
+use penup_client::run::run;
+use penup_client::workspace;
 use penup_host_tests::emulated_jobs::{PEN_ON_A_MOTOR, compare, give_up, stop_at_once};
 use std::error::Error;
+use std::fs;
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
 
 #[test]
 fn a_concave_solid_in_perspective() -> Result<(), Box<dyn Error>> {
@@ -61,4 +68,30 @@ fn a_motor_raises_the_pen_after_an_emergency_stop() -> Result<(), Box<dyn Error>
 #[test]
 fn ctrl_x_stops_the_steps_raises_the_pen_and_knows_the_position() -> Result<(), Box<dyn Error>> {
     give_up(Lm3s6965)
+}
+
+/// Oblique lines, whose single steps are longer than the lines themselves.
+#[test]
+fn preview_and_plot_tell_the_same_lengths() -> Result<(), Box<dyn Error>> {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
+    let scene = workspace::root().join("scenes/interpen.obj").display().to_string();
+    let json = folder.join("lengths.json").display().to_string();
+    let svg = folder.join("lengths.svg").display().to_string();
+    let told = |command: &str, options: &[&str]| -> Result<String, Box<dyn Error>> {
+        let view = ["--svg", &svg, "--page=80x80", "--margin=5", "--projection=isometric"];
+        let line = ["penup", command, &scene].into_iter().chain(view).chain(options.to_vec());
+        let sentence = run(&Cli::try_parse_from(line)?, &AtomicBool::new(false))?;
+        let told = sentence.split_once(": ").ok_or("no files are named")?.1;
+        Ok(told.to_owned())
+    };
+    let preview = told("preview", &["--json", &json])?;
+    assert_eq!(told("plot", &["--board=lm3s6965"])?, preview);
+    // And they are the lengths of the drawing's lines.
+    let drawn = preview.split_once(" strokes, ").and_then(|(_, rest)| rest.split_once(" mm drawn"));
+    let drawn: f64 = drawn.ok_or("no length is told")?.0.parse()?;
+    let json = fs::read_to_string(json)?;
+    let exact = json.split_once("\"pen_down_mm\":").and_then(|(_, rest)| rest.split_once(','));
+    let exact: f64 = exact.ok_or("no length in the file")?.0.parse()?;
+    assert!((drawn - exact).abs() < 0.1 && drawn > 100.0, "{drawn} and {exact}");
+    Ok(())
 }
