@@ -306,18 +306,33 @@ impl ViewArgs {
     }
 }
 
-/// A parser of each option whose value the plotter reads itself.
+/// A parser of each option whose value the plotter reads itself, with the range that it has.
 macro_rules! read_by_the_plotter {
-    ($($option:ident),*) => {
+    ($($option:ident: $range:literal),* $(,)?) => {
         $(fn $option(text: &str) -> Result<String, String> {
-            understood(stringify!($option), text)
+            within($range, understood(stringify!($option), text))
         })*
     };
 }
 
 read_by_the_plotter!(
-    eye, at, up, angles, projection, hidden, crease, precision, margin, effort, lift
+    eye: "three numbers, -1e15 to 1e15",
+    at: "three numbers, -1e15 to 1e15",
+    up: "three numbers, -1e15 to 1e15",
+    angles: "three numbers, -1e15 to 1e15",
+    projection: "angles up to 360 degrees, elevations up to 90, a ratio of 0 to 2",
+    hidden: "pens 1 to 32",
+    crease: "0 to 180 degrees",
+    precision: "auto, or 0 to 1e6",
+    margin: "0 to 32767 mm",
+    effort: "a whole number, 0 to 2147483647",
+    lift: "0 to 1000 mm",
 );
+
+/// A refusal with what would be right.
+fn within(range: &str, value: Result<String, String>) -> Result<String, String> {
+    value.map_err(|reason| format!("{reason} (expected: {range})"))
+}
 
 fn title(text: &str) -> Result<String, String> {
     let line = format!("{TITLE}={}", Escape(text));
@@ -336,7 +351,7 @@ fn title(text: &str) -> Result<String, String> {
 }
 
 fn title_size(text: &str) -> Result<String, String> {
-    understood("title-size", text)
+    within("1 to 100 mm", understood("title-size", text))
 }
 
 /// The value as it is sent. The plotter's own parser says whether it is one of the option.
@@ -431,7 +446,7 @@ fn page(text: &str) -> Result<Page, String> {
             let (width, height) = other
                 .split_once('x')
                 .ok_or("it is none of A4, A3, Letter, or width x height in mm such as 300x200")?;
-            understood("page", other)?;
+            within("each side up to 32767 mm", understood("page", other))?;
             (number(width)?, number(height)?)
         }
     };
@@ -567,8 +582,9 @@ mod tests {
             (["--margin", "1e308"], RANGE),
             (["--effort", "-1"], RANGE),
             (["--effort", "1e12"], RANGE),
-            (["--effort", "1.5"], RANGE),
+            (["--effort", "1.5"], "(expected: a whole number, 0 to 2147483647)"),
             (["--effort", "much"], NUMBER),
+            (["--title-size", "101"], "(expected: 1 to 100 mm)"),
             (["--title", "a→b"], "the font lacks → (U+2192)"),
             (["--title", "line\nline"], "the font lacks"),
             (["--title", LONG], "at most 80 bytes"),
