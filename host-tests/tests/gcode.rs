@@ -310,6 +310,7 @@ fn pauses_wait_for_the_user() {
     assert_eq!(bench.heard(), "ok\n");
     let waited = (bench.board.trace().now() - before) as f64 / 25e6;
     assert!((1.5..1.6).contains(&waited), "{waited}");
+    assert!(bench.say("G4 P-1\n").ends_with("error:102\n"), "there is no time before now");
 }
 
 #[test]

@@ -4,7 +4,8 @@ use super::{Element, FINEST_FRACTION_BITS, Model};
 use crate::checksum::CRC_32;
 
 impl Model<'_> {
-    /// The CRC-32 of the vertices, the bars, faces and whole curves, each with its pen.
+    /// The CRC-32 of the vertices, the bars, faces and whole curves, each with its pen, and of the
+    /// decimals with which the vertices were written, since these say how exact they are.
     ///
     /// It is the same on every machine, however many bits a number takes in memory: the sum is
     /// over little-endian numbers of 64 bits for coordinates (in units of 2^-30), ends and knots,
@@ -14,8 +15,8 @@ impl Model<'_> {
     /// use penup::model::Model;
     /// let mut memory = (heapless::Vec::<_, 8>::new(), heapless::Vec::<_, 8>::new());
     /// let empty = Model::new(&mut memory.0, &mut memory.1);
-    /// // The CRC-32 of three numbers that are 0.
-    /// assert_eq!(empty.checksum(), 0x7BD5_C66F);
+    /// // The CRC-32 of four numbers that are 0.
+    /// assert_eq!(empty.checksum(), 0xECBB_4B55);
     /// ```
     #[inline(never)] // Its frame must not lie under the stages'.
     pub fn checksum(&self) -> u32 {
@@ -58,6 +59,8 @@ impl Model<'_> {
                 digest.update(&value.to_le_bytes());
             }
         }
+        let [decimals, _] = self.rounding.numbers();
+        digest.update(&(decimals as u32).to_le_bytes());
         digest.finalize()
     }
 }
@@ -93,6 +96,9 @@ mod tests {
             [["0", "0", "0"], ["1", "0", "0"], ["1", "1", "0"], ["0", "1", "0.5"]];
         let mut other = PLACES;
         other[3][2] = "0.25";
+        // In the model's unit this is the same place, but its last decimal is a rounded one.
+        let mut rounded = PLACES;
+        rounded[1][0] = "1.0000000000001";
         let face: &[i32] = &[1, 2, 3];
         let sums = [
             sum(&PLACES, &[]),
@@ -105,6 +111,7 @@ mod tests {
             sum(&PLACES, &[(&[1, 2], 0), (&[2, 3], 0), (&[3, 1], 0)]),
             sum(&PLACES, &[(face, 0), (&[1, 2], 0)]),
             sum(&PLACES, &[(&[1, 2], 0), (face, 0)]),
+            sum(&rounded, &[]),
         ];
         let different: std::collections::BTreeSet<u32> = sums.into_iter().collect();
         assert_eq!(different.len(), sums.len(), "{sums:?}");

@@ -112,7 +112,8 @@ impl Program {
             Order::Dwell(_) => {
                 let seconds = numbers.seconds.map(Decimal::to_millimetres).transpose();
                 let seconds = seconds.map_err(|_| Refusal::NumberOutOfRange)?.unwrap_or_default();
-                order = Order::Dwell(u32::try_from(seconds.to_bits()).unwrap_or(0));
+                let units = u32::try_from(seconds.to_bits());
+                order = Order::Dwell(units.map_err(|_| Refusal::NumberOutOfRange)?);
             }
             Order::Park => self.pen_is_down = false,
             Order::Nothing if numbers.xy != [None; 2] || numbers.ij != [None; 2] => {
