@@ -112,8 +112,8 @@ impl Image {
         self.marks.range(..=address).next_back().is_none_or(|(_, is_code)| *is_code)
     }
 
-    /// Where a branch to this address leads, past the linker's veneer: PUSH {r0, r1}; LDR r0, [PC,
-    /// #4]; STR r0, [SP, #4]; POP {r0, PC}; the address.
+    /// Where a branch to this address leads, past the linker's veneer: `PUSH {r0, r1}`,
+    /// `LDR r0, [PC, #4]`, `STR r0, [SP, #4]`, `POP {r0, PC}`, the address.
     fn past_veneer(&self, address: u64) -> u64 {
         const VENEER: [u32; 4] = [0xB403, 0x4801, 0x9001, 0xBD01];
         let is_veneer = (0..)

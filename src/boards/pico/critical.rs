@@ -81,7 +81,7 @@ pub fn move_vectors_to_ram() {
     }
     // SAFETY: the linker puts the table of so many vectors there (`cortex-m-rt`), and nothing
     // writes flash now.
-    let in_flash = unsafe { &*(&raw const __vector_table) };
+    let in_flash = unsafe { &__vector_table };
     for (place, vector) in IN_RAM.0.iter().zip(in_flash) {
         place.store(*vector, Ordering::Relaxed);
     }
