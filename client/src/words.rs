@@ -1,7 +1,7 @@
 //! What the plotter says, in the words of this program.
 //!
 //! The plotter and its library speak of the serial line: `$page`, `send $pens=one`. Whoever typed
-//! `--page` is told of `--page`. [`OPTIONS`] is the one table of the options that are both; [`told`]
+//! `--page` is told of `--page`. `OPTIONS` is the one table of the options that are both; [`told`]
 //! puts a text of the plotter into this program's words by it, [`asked`] a line that was sent, and
 //! [`explained`] a refusal. The number of a refusal says where the plotter's text would not help here.
 
