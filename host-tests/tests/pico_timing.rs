@@ -3,7 +3,7 @@
 #![cfg(feature = "emulator")]
 
 use penup_client::machines::Board::Pico;
-use penup_host_tests::emulated_jobs::begin;
+use penup_host_tests::emulated_jobs::{Line, begin, begin_on};
 use penup_host_tests::spiral;
 use penup_host_tests::step_edges::{Edge, HALF_A_MILLION, assert_in_time, of_changes, planned};
 use penup_host_tests::whole_jobs::job_lines;
@@ -84,5 +84,50 @@ fn a_spiral_of_short_chords_at_the_greatest_speed_keeps_time() -> Result<(), Box
     assert_in_time(&planned(Pico, &lines), &pins, 100_000, Duration::ZERO);
     let rate = events_a_second(&pins);
     assert!(rate > 470_000.0, "{rate} steps a second");
+    Ok(())
+}
+
+/// Lists of settings, commands and options, of some 7 kilobytes: the UART takes 0.6 s to send them.
+const LISTS: [&str; 3] = ["$$", "$", "$options"];
+
+/// How often they are asked for, so that there is always something to send while steps run.
+const TIMES: usize = 4;
+
+/// The rows of the lists, asked for at once, each list with the `ok` that ends it.
+fn hear_lists(line: &mut Line, lists: &[&str]) -> Result<Vec<String>, Box<dyn Error>> {
+    line.emulator.send((lists.join("\n") + "\n").as_bytes())?;
+    let (mut rows, mut ended) = (Vec::new(), 0);
+    while ended < lists.len() {
+        let row = line.hear()?;
+        assert!(!row.starts_with("error"), "{row} after {rows:?}");
+        ended += usize::from(row == "ok");
+        rows.push(row);
+    }
+    Ok(rows)
+}
+
+/// The UART sends a list more slowly than the ring of steps runs dry: the rows wait for room one by
+/// one, and the steps do not wait for them.
+#[test]
+fn lists_at_the_pace_of_the_uart_keep_half_a_million_steps_a_second_in_time()
+-> Result<(), Box<dyn Error>> {
+    let lines = spiral::at_half_a_million();
+    let (plot, before) = lines.split_last().ok_or("an empty job")?;
+    let mut line = begin_on(Line::open(Pico)?, before)?;
+    let at_rest = hear_lists(&mut line, &LISTS)?;
+    let bytes: usize = at_rest.iter().map(|row| row.len() + 2).sum();
+    assert!(at_rest.len() > 80 && bytes > 5_000, "{bytes} bytes in {} rows", at_rest.len());
+
+    assert_eq!(line.ask(plot)?, "ok");
+    let asked_at = line.emulator.clock()?;
+    let rows = hear_lists(&mut line, &LISTS.repeat(TIMES))?;
+    assert_eq!(rows, vec![at_rest; TIMES].concat());
+    let status = line.status()?;
+    assert!(status.starts_with("<Idle") && !status.contains("|Late"), "{status}");
+    let pins = of_changes(&line.emulator.pin_changes()?);
+    assert_in_time(&planned(Pico, &lines), &pins, 400_000, Duration::ZERO);
+    // They were asked for before the first step, and the last step came before they were sent.
+    let sending = Duration::from_secs_f64((TIMES * bytes * 10) as f64 / 115_200.0);
+    assert!(asked_at < pins[0].2 && pins[pins.len() - 1].2 < asked_at + sending);
     Ok(())
 }
