@@ -8,7 +8,7 @@
 //! | PEN (servo) | GP7: PWM slice 3 |
 //! | limit switches of x and y, emergency stop (closed: low) | GP8, GP9, GP10 |
 //! | STEP_Z, DIR_Z of a motor that lifts the pen (high: down) | GP11, GP12 |
-//! | nothing: the driver of USB uses the pin when a host resets the bus | GP15 |
+//! | nothing: `usb` uses the pin when a host resets the bus | GP15 |
 //! | settings and last job | the last 288 KiB of flash |
 //! | next block of steps | DMA_IRQ_0, priority 0 |
 //! | pen's heights, and the steps of its motor | PIO0_IRQ_0, priority 1 |

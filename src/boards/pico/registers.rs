@@ -9,6 +9,10 @@ use crate::boards::pl011::Uart;
 const RESETS: Peripheral = unsafe { Peripheral::at(0x4000_C000) };
 /// The serial line. Used by `serial`.
 pub const UART0: Uart = Uart(unsafe { Peripheral::at(0x4003_4000) });
+/// Which chip this is, the pins' functions and the pins' pads. Used by `usb`, for GPIO 15 alone.
+pub const SYSTEM_INFORMATION: Peripheral = unsafe { Peripheral::at(0x4000_0000) };
+pub const BANK_0_CONTROLS: Peripheral = unsafe { Peripheral::at(0x4001_4000) };
+pub const BANK_0_PADS: Peripheral = unsafe { Peripheral::at(0x4001_C000) };
 /// The servo's pulses. Used by `pen`.
 pub const PWM: Peripheral = unsafe { Peripheral::at(0x4005_0000) };
 /// Microseconds since the start. Used by `clock`.

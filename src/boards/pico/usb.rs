@@ -11,9 +11,10 @@
 //! fallen): replies that it has not taken are dropped, and so is the rest of a line that it has not
 //! ended. A program that opens the port (DTR rises) is greeted, alone: see [`take_opened`].
 //!
-//! Of the chip's errata, E5 is dealt with by the driver; it takes GPIO 15 for a millisecond when a
-//! host resets the bus (see [`go_on`]). E15 is dealt with here: see [`frame`].
+//! Two of the chip's errata are worked around: see [`connection`] for E5, which takes GPIO 15 for a
+//! millisecond when a host resets the bus, and [`frame`] for E15.
 
+mod connection;
 mod frame;
 
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -32,6 +33,7 @@ use usb_device::device::{
 };
 use usbd_serial::{CdcAcmClass, USB_CLASS_CDC};
 
+use self::connection::Connection;
 use self::frame::Frame;
 use super::ports::{self, Inlets, Port};
 use super::registers::USB;
@@ -82,7 +84,7 @@ static DEVICE: Owned<Device> = Owned::empty();
 
 /// The host takes nothing. The main loop sets it, the handler clears it.
 static HOST_IS_GONE: AtomicBool = AtomicBool::new(true);
-/// Received bytes wait for a place, or the driver waits for the bus. The handler writes it.
+/// Received bytes wait for a place, or a reset of the bus for its end. The handler writes it.
 static IS_WAITED: AtomicBool = AtomicBool::new(false);
 /// A program has opened the port. The handler sets it, the main loop clears it.
 static WAS_OPENED: AtomicBool = AtomicBool::new(false);
@@ -96,7 +98,8 @@ struct Device {
     is_up: bool,
     /// A program has the port open: DTR.
     is_open: bool,
-    /// The host resets the bus, and erratum E5 is being worked around.
+    connection: Connection,
+    /// The host resets the bus, and the interrupt that says so is masked.
     awaits_bus: bool,
     frame: Frame,
     /// Received bytes that wait for a place.
@@ -151,6 +154,7 @@ pub fn set_up(
             class,
             is_up: false,
             is_open: false,
+            connection: Connection::new(),
             awaits_bus: false,
             frame: Frame::new(),
             waiting: Deque::new(),
@@ -239,8 +243,12 @@ fn serve() {
         // Polling forgets it.
         let took = device.class.write_ep().address().index();
         let took = USB.read(PACKETS_DONE) & 1 << (2 * took) != 0;
-        device.device.poll(&mut [&mut device.class]);
-        device.follow_bus();
+        if device.connection.is_ready() {
+            // The driver looks at interrupts that are not masked only.
+            device.await_bus(false);
+            device.device.poll(&mut [&mut device.class]);
+        }
+        device.await_bus(USB.read(INTERRUPTS) & BUS_RESET != 0);
         device.follow_state();
         device.follow_port();
         if took {
@@ -254,12 +262,11 @@ fn serve() {
 
 impl Device {
     /// While the host resets the bus, for some 10 to 50 ms, or for as long as it has no power, the
-    /// driver waits, and its interrupt would come again at once: then the main loop asks instead.
-    fn follow_bus(&mut self) {
-        let is_reset = USB.read(INTERRUPTS) & BUS_RESET != 0;
-        if is_reset != self.awaits_bus {
-            self.awaits_bus = is_reset;
-            USB.write(if is_reset { DISABLE } else { ENABLE }, BUS_RESET);
+    /// interrupt would come again at once: then it is masked, and the main loop asks instead.
+    fn await_bus(&mut self, awaits: bool) {
+        if awaits != self.awaits_bus {
+            self.awaits_bus = awaits;
+            USB.write(if awaits { DISABLE } else { ENABLE }, BUS_RESET);
         }
     }
 

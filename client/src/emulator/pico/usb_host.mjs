@@ -4,7 +4,7 @@
 // Each packet is a transaction of its own time, data toggles are compared, frames begin every
 // millisecond while the host does not suspend the bus, and requests are answered or stalled. Of the
 // errata: E5 (without 800 us of idle bus after a reset the device does not connect; GPIO 15 can
-// stand in for it), and E15 (an IN buffer that becomes available late in a frame may be asked for
+// stand in for it), with other devices' packets on a busy bus, and E15 (an IN buffer that becomes available late in a frame may be asked for
 // so late that the hub cuts its acknowledgement off; the controller then hangs until it is reset).
 // Here every such buffer hangs it.
 
@@ -34,6 +34,8 @@ const CONTROLLER_ON = 1;
 const PULLED_UP = 1 << 16;
 const TO_PHY = 1;
 const TO_PAD = 1 << 2;
+/** The bit that overrides it is the next. */
+const DIRECT_PULL_UP = 1 << 1;
 const J = 1 << 2;
 
 /** Bits of a buffer's control word. */
@@ -125,9 +127,19 @@ export class Usb {
   line() {
     if (this.muxing & TO_PAD && !(this.muxing & TO_PHY)) {
       const { ctrl } = this.chip.gpio[15];
-      return (ctrl & 0x1f) === 8 && ((ctrl >> 16) & 3) === 3 ? J : 0;
+      const [output, input] = [(ctrl >> 12) & 3, (ctrl >> 16) & 3];
+      return (ctrl & 0x1f) === 8 && output === 2 && input === 3 ? J : 0;
     }
     return this.isBusReset ? 0 : J;
+  }
+
+  /** The same as the program reads it. On a busy bus packets end, each with both wires low for two
+   * bit times: here every other look falls on such an end. */
+  lineSeen() {
+    const line = this.line();
+    if (!this.isBusy || line !== J || this.muxing & TO_PAD) return line;
+    this.isPacketsEnd = !this.isPacketsEnd;
+    return this.isPacketsEnd ? 0 : J;
   }
 
   readUint32(offset) {
@@ -140,7 +152,7 @@ export class Usb {
         return this.frame & 0x7ff;
       case REGISTER.SIE: return this.sie;
       case REGISTER.STATUS:
-        return (this.status & ~STATUS.LINE) | this.line() | (this.power & 8 ? STATUS.VBUS : 0);
+        return (this.status & ~STATUS.LINE) | this.lineSeen() | (this.power & 8 ? STATUS.VBUS : 0);
       case REGISTER.BUFFERS: return this.buffers;
       case REGISTER.STALL_ARM: return this.stallArm;
       case REGISTER.MUXING: return this.muxing;
@@ -173,6 +185,10 @@ export class Usb {
       case REGISTER.STALL_ARM: this.stallArm = apply(this.stallArm); break;
       case REGISTER.MUXING:
         this.muxing = apply(this.muxing);
+        if (this.muxing & TO_PAD && !(this.direct & this.override / 2 & DIRECT_PULL_UP)) {
+          console.error('the host sees the device leave: nothing pulls D+ up');
+          this.isPlugged = false;
+        }
         if (this.line() === J) this.connectIfIdle();
         break;
       case REGISTER.POWER: this.power = apply(this.power); break;
