@@ -49,6 +49,8 @@ pub fn run<B: Board>(board: &mut B, memory: Lent<'_>, pins: &PulserState) -> ! {
     if board.fault().is_some() {
         plotter.inner.machine.alarm(Alarm::Restarted);
     }
+    // Who has opened a port while the board started hears what all hear, not a second greeting.
+    let _ = board.take_opened();
     plotter.greet(board);
     report::fault(board);
     loop {
