@@ -21,7 +21,7 @@ use static_cell::StaticCell;
 
 use super::ports::{self, Inlets, Port};
 use super::registers::{self, DMA, UART0, reset};
-use super::{clock, critical};
+use super::{clock, critical, divider};
 use crate::boards::handler::Owned;
 
 /// Bytes that wait to be sent, at most; one more place than that, for the queue.
@@ -180,10 +180,12 @@ fn send() {
 /// A place in the FIFO of what is sent, or [`look_soon`].
 #[interrupt]
 fn UART0_IRQ() {
-    UART0.clear_interrupt();
-    send();
-    // SAFETY: this is a handler that owns it.
-    if let Some(inlets) = unsafe { ports::inlets() } {
-        look(inlets);
-    }
+    divider::keep_during(|| {
+        UART0.clear_interrupt();
+        send();
+        // SAFETY: this is a handler that owns it.
+        if let Some(inlets) = unsafe { ports::inlets() } {
+            look(inlets);
+        }
+    });
 }

@@ -37,7 +37,7 @@ use self::connection::Connection;
 use self::frame::Frame;
 use super::ports::{self, Inlets, Port};
 use super::registers::USB;
-use super::{clock, critical};
+use super::{clock, critical, divider};
 use crate::boards::handler::Owned;
 use crate::boards::peripheral::Peripheral;
 
@@ -406,5 +406,5 @@ impl Device {
 
 #[interrupt]
 fn USBCTRL_IRQ() {
-    serve();
+    divider::keep_during(serve);
 }
