@@ -27,8 +27,8 @@ pub struct Memory<
     readers: [LineReader; PORTS],
 }
 
-/// For 64 KiB of RAM: a lattice of 125 cubes, and a stack of 10,160 bytes beside it.
-pub type Lm3s6965Memory = Memory<1000, 3000, 4128>;
+/// For 64 KiB of RAM: a lattice of 125 cubes, and a stack of 9,840 bytes beside it.
+pub type Lm3s6965Memory = Memory<1000, 3000, 4208>;
 
 /// For 264 KiB of RAM: a lattice of 343 cubes. Its ports are the UART and USB.
 pub type PicoMemory = Memory<4096, 12288, 16384, 2>;
