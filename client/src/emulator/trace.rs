@@ -11,7 +11,9 @@
 //! ```
 //!
 //! The board's clock is SysTick, which counts down from 2^24 - 1 and begins again. Whatever reads it
-//! tells the time here, and every new beginning is traced, so no gap is too long.
+//! tells the time here, and every new beginning is traced, so no gap is too long. The count stays at
+//! 0 for one cycle after the new beginning has been traced: such a 0 still belongs to the period
+//! before.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -47,6 +49,8 @@ pub struct Trace {
     /// Cycles before SysTick was last cleared, at a start of the firmware.
     cycles_before_start: u64,
     wraps: u64,
+    /// Whether SysTick began again since a count other than 0 was read.
+    has_just_wrapped: bool,
     cycles: u64,
     sent: u64,
     said: VecDeque<String>,
@@ -62,6 +66,7 @@ impl Trace {
             Some("systick_write") => self.clock_write(words),
             Some("systick_timer_tick") => {
                 self.wraps += 1;
+                self.has_just_wrapped = true;
                 Some(())
             }
             Some("pl011_write") => self.byte(words),
@@ -89,8 +94,10 @@ impl Trace {
     fn clock_read<'a>(&mut self, words: impl Iterator<Item = &'a str>) -> Option<()> {
         let (register, count) = register_and_value(words, "addr", "data")?;
         if register == CURRENT {
+            self.has_just_wrapped &= count == 0;
+            let wraps = self.wraps - u64::from(self.has_just_wrapped);
             let passed = u64::from(!count & ((1 << CLOCK_BITS) - 1));
-            self.cycles = self.cycles_before_start + (self.wraps << CLOCK_BITS) + passed;
+            self.cycles = self.cycles_before_start + (wraps << CLOCK_BITS) + passed;
         }
         Some(())
     }
@@ -100,6 +107,7 @@ impl Trace {
         if register == CURRENT {
             self.cycles_before_start = self.cycles;
             self.wraps = 0;
+            self.has_just_wrapped = false;
         }
         Some(())
     }
@@ -177,6 +185,20 @@ mod tests {
         let step_over = PinChange { pin: Pin::StepX, high: false, at: CYCLE * (1 << 24) };
         assert_eq!(trace.take_pins(), [pen_down, step_over]);
         assert_eq!(trace.take_pins(), []);
+    }
+
+    #[test]
+    fn a_count_of_0_ends_its_period_whether_or_not_the_next_is_traced() {
+        let wrap = "systick_timer_tick systick reload\n";
+        let zero = "systick_read systick read addr 0x8 data 0x0 size 4\n";
+        let last_of_period = CYCLE * ((1 << 24) - 1);
+        assert_eq!(traced(&[zero, wrap].concat()).clock(), last_of_period);
+        assert_eq!(traced(&[wrap, zero].concat()).clock(), last_of_period);
+        assert_eq!(traced(&[wrap, zero, zero].concat()).clock(), last_of_period);
+        let first = "systick_read systick read addr 0x8 data 0xffffff size 4\n";
+        assert_eq!(traced(&[wrap, zero, first].concat()).clock(), CYCLE * (1 << 24));
+        let next_period = traced(&[wrap, first, wrap, zero].concat()).clock();
+        assert_eq!(next_period, CYCLE * ((2 << 24) - 1));
     }
 
     #[test]
