@@ -13,9 +13,9 @@ use mps2::Counter;
 use panic_semihosting as _;
 use penup::machine::PulserState;
 use penup::motion::{EventQueue, StepEvent};
-use penup::plotter::{Board, NO_MOVES, PicoMemory, Plotter, Unobserved};
+use penup::plotter::{Board, EMPTY_LOOKAHEAD, PicoMemory, Plotter, Unobserved};
 use penup::protocol::RealTime;
-use penup::stage::{Aborted, Attention, Stage};
+use penup::stage::{Aborted, Cancel, Stage};
 use static_cell::StaticCell;
 
 /// A scene, and where the eye is; each looks at the middle.
@@ -62,7 +62,7 @@ impl Board for Line<'_> {
     }
     fn write(&mut self, bytes: &[u8]) {
         if bytes.starts_with(b"error") || bytes.starts_with(b"[MSG") {
-            hprintln!("{}", core::str::from_utf8(bytes).unwrap_or("a refusal"));
+            hprintln!("{}", core::str::from_utf8(bytes).unwrap_or("a command_error"));
         }
     }
     fn queue(&mut self) -> &mut dyn EventQueue {
@@ -87,7 +87,7 @@ impl Stages<'_> {
     }
 }
 
-impl Attention for Stages<'_> {
+impl Cancel for Stages<'_> {
     fn check(&mut self) -> Result<(), Aborted> {
         self.counter.read();
         Ok(())
@@ -103,7 +103,7 @@ impl Attention for Stages<'_> {
 fn main() -> ! {
     static MEMORY: StaticCell<PicoMemory> = StaticCell::new();
     static PINS: StaticCell<PulserState> = StaticCell::new();
-    let mut moves = NO_MOVES;
+    let mut moves = EMPTY_LOOKAHEAD;
     let memory = MEMORY.init_with(PicoMemory::new).lend(&mut moves);
     let mut plotter = Plotter::new(memory, PINS.init_with(PulserState::new));
     let mut counter = Counter::start();
@@ -124,7 +124,7 @@ fn main() -> ! {
             Ok(()) => {
                 hprintln!("{} {} {} {} {} {}", name, vertices, corners, view, visibility, order)
             }
-            Err(refusal) => hprintln!("{}: {}", name, refusal),
+            Err(command_error) => hprintln!("{}: {}", name, command_error),
         }
     }
     debug::exit(debug::EXIT_SUCCESS);

@@ -68,21 +68,21 @@ impl Axis {
 /// 0 <= numerator <= denominator, denominator > 0. Two places are equal if the ratios are.
 ///
 /// ```
-/// use penup::geometry::Along;
-/// let third = Along { numerator: 1, denominator: 3 };
-/// assert_eq!(third, Along { numerator: 2, denominator: 6 });
-/// assert!(Along::START < third && third < Along::END);
+/// use penup::geometry::EdgeParameter;
+/// let third = EdgeParameter { numerator: 1, denominator: 3 };
+/// assert_eq!(third, EdgeParameter { numerator: 2, denominator: 6 });
+/// assert!(EdgeParameter::START < third && third < EdgeParameter::END);
 /// ```
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
-pub struct Along {
+pub struct EdgeParameter {
     /// Zero at p.
     pub numerator: u64,
     /// Equal to the numerator at q.
     pub denominator: u64,
 }
 
-impl Along {
+impl EdgeParameter {
     /// At p.
     pub const START: Self = Self { numerator: 0, denominator: 1 };
     /// At q.
@@ -93,8 +93,8 @@ impl Along {
     /// `at_p` and `at_q` have opposite signs, or one of them is zero; each is within ±2^62.
     ///
     /// ```
-    /// use penup::geometry::Along;
-    /// assert_eq!(Along::zero_between(-1, 3), Along { numerator: 1, denominator: 4 });
+    /// use penup::geometry::EdgeParameter;
+    /// assert_eq!(EdgeParameter::zero_between(-1, 3), EdgeParameter { numerator: 1, denominator: 4 });
     /// ```
     pub fn zero_between(at_p: i64, at_q: i64) -> Self {
         let numerator = at_p.unsigned_abs();
@@ -102,7 +102,7 @@ impl Along {
     }
 }
 
-impl Ord for Along {
+impl Ord for EdgeParameter {
     #[inline(never)] // It is 128 bits wide.
     fn cmp(&self, other: &Self) -> Ordering {
         let left = u128::from(self.numerator) * u128::from(other.denominator);
@@ -110,23 +110,23 @@ impl Ord for Along {
         left.cmp(&right)
     }
 }
-impl PartialOrd for Along {
+impl PartialOrd for EdgeParameter {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }
-impl PartialEq for Along {
+impl PartialEq for EdgeParameter {
     fn eq(&self, other: &Self) -> bool {
         self.cmp(other) == Ordering::Equal
     }
 }
-impl Eq for Along {}
+impl Eq for EdgeParameter {}
 
 /// On which side of the line from a to b the point c lies on the page.
 ///
 /// Positive to the left, negative to the right, zero on the line (or if a and b coincide on the
 /// page). Linear in each argument in space, so its values at two points give an
-/// [`Along::zero_between`]. In perspective six products of three numbers: within ±2^60.
+/// [`EdgeParameter::zero_between`]. In perspective six products of three numbers: within ±2^60.
 ///
 /// ```
 /// use penup::geometry::{Projection, Vertex, page_side};
@@ -473,15 +473,19 @@ mod tests {
 
     #[test]
     fn places_far_along_a_long_edge_are_told_apart() {
-        let near_end = Along { numerator: (1 << 62) - 1, denominator: 1 << 62 };
-        let nearer_end = Along { numerator: u64::MAX - 1, denominator: u64::MAX };
-        assert!(near_end < nearer_end && nearer_end < Along::END);
-        assert!(near_end != nearer_end && near_end != Along::END && Along::START != Along::END);
-        let along = |numerator, denominator| Along { numerator, denominator };
+        let near_end = EdgeParameter { numerator: (1 << 62) - 1, denominator: 1 << 62 };
+        let nearer_end = EdgeParameter { numerator: u64::MAX - 1, denominator: u64::MAX };
+        assert!(near_end < nearer_end && nearer_end < EdgeParameter::END);
+        assert!(
+            near_end != nearer_end
+                && near_end != EdgeParameter::END
+                && EdgeParameter::START != EdgeParameter::END
+        );
+        let along = |numerator, denominator| EdgeParameter { numerator, denominator };
         assert_eq!(along(7, 21), along(1, 3));
         assert_ne!(along(7, 21), along(8, 21));
         assert!(along(1, 3) < along(2, 5) && along(3, 5) > along(4, 7));
-        assert_eq!(Along::zero_between(0, 7), Along::START);
-        assert_eq!(Along::zero_between(7, 0), Along::END);
+        assert_eq!(EdgeParameter::zero_between(0, 7), EdgeParameter::START);
+        assert_eq!(EdgeParameter::zero_between(7, 0), EdgeParameter::END);
     }
 }

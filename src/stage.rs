@@ -2,7 +2,7 @@
 //!
 //! The stages (visibility, drawing, order) never run at once, so one [`Scratch`] serves them all:
 //! each takes typed slices from it and gives everything back by ending. A stage that runs for more
-//! than a millisecond calls [`Attention::check`] as it goes, so that status, hold and abort are
+//! than a millisecond calls [`Cancel::check`] as it goes, so that status, hold and abort are
 //! answered while it computes. What is refused: a slice that does not fit, with the figures.
 
 use bytemuck::Pod;
@@ -141,12 +141,12 @@ pub fn heap_sort_by_key<T, K: Ord>(items: &mut [T], key: impl Fn(&T) -> K) {
 ///
 /// # Errors
 /// [`Aborted`] if the user gave up; the items are in some order then.
-pub fn heap_sort_attentively<T, K: Ord>(
+pub fn heap_sort_cancellable<T, K: Ord>(
     items: &mut [T],
     key: impl Fn(&T) -> K,
-    attention: &mut dyn Attention,
+    cancel: &mut dyn Cancel,
 ) -> Result<(), Aborted> {
-    heap_sort(items, key, || attention.check())
+    heap_sort(items, key, || cancel.check())
 }
 
 fn heap_sort<T, K: Ord, E>(
@@ -222,7 +222,7 @@ pub enum Stage {
 }
 
 /// The moment that a long computation gives to the serial line.
-pub trait Attention {
+pub trait Cancel {
     /// Answers what waits (status, hold, resume).
     ///
     /// # Errors
@@ -235,9 +235,9 @@ pub trait Attention {
 
 /// Nobody to answer: for tests and benchmarks.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Undisturbed;
+pub struct NeverCancel;
 
-impl Attention for Undisturbed {
+impl Cancel for NeverCancel {
     fn check(&mut self) -> Result<(), Aborted> {
         Ok(())
     }

@@ -8,7 +8,7 @@ use crate::words::told;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use penup::drawing::TitleText;
 use penup::machine::Setting;
-use penup::protocol::{Command as PlotterCommand, Escape, LINE_LIMIT, Refusal};
+use penup::protocol::{Command as PlotterCommand, CommandError, Escape, LINE_LIMIT};
 use std::path::PathBuf;
 
 /// Draws solids and line drawings with a penup plotter.
@@ -346,7 +346,7 @@ fn title(text: &str) -> Result<String, String> {
         PlotterCommand::Title(letters) if TitleText::new(letters.letters()).is_some() => {
             Ok(text.to_owned())
         }
-        _ => Err(Refusal::TitleTooLong { limit: TitleText::LIMIT }.to_string()),
+        _ => Err(CommandError::TitleTooLong { limit: TitleText::LIMIT }.to_string()),
     }
 }
 
@@ -362,7 +362,7 @@ fn understood(option: &str, text: &str) -> Result<String, String> {
     }
     let line = format!("${option}={text}");
     if line.len() > LINE_LIMIT {
-        return Err(Refusal::LineTooLong { limit: LINE_LIMIT }.to_string());
+        return Err(CommandError::LineTooLong { limit: LINE_LIMIT }.to_string());
     }
     match PlotterCommand::parse(&line) {
         Ok(_) => Ok(text.to_owned()),

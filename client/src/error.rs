@@ -5,7 +5,7 @@ use crate::interrupt::EXIT_CODE;
 use crate::protocol::RECEIVE_WINDOW;
 use crate::source::{JobLine, Origin};
 use crate::words::{asked, explained, told};
-use penup::protocol::Refusal;
+use penup::protocol::CommandError;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -60,7 +60,7 @@ pub enum Error {
         /// Where it stands.
         origin: Origin,
         /// What the plotter would say of it.
-        refusal: Refusal,
+        refusal: CommandError,
     },
     /// A line of the file has more bytes than a plotter takes.
     #[error(
@@ -111,7 +111,7 @@ pub enum Error {
     #[error("cannot draw it: {}", explained(refusal.number(), &[refusal.to_string()]))]
     NotDrawn {
         /// Why.
-        refusal: Refusal,
+        refusal: CommandError,
     },
     /// The emulator ended in the middle of the work.
     #[error(

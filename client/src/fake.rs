@@ -10,7 +10,7 @@ use crate::protocol::{ABORT, CLEAR, END, MODEL, PLOT};
 use crate::source::JobLine;
 use crate::twin;
 use penup::checksum::CRC_16;
-use penup::protocol::{Label, Named, Numbering, Received, Refusal};
+use penup::protocol::{CommandError, Label, Named, Numbering, Received};
 use std::collections::VecDeque;
 use std::io;
 use std::time::{Duration, Instant};
@@ -178,7 +178,7 @@ impl FakePlotter {
                 let outcome = match self.fault {
                     Fault::ErrorAt(bad, error) if bad == coming => {
                         self.say("[MSG:what it thinks of it]");
-                        Err(Refusal::RefusedBefore(error))
+                        Err(CommandError::RefusedBefore(error))
                     }
                     _ => Ok(()),
                 };
@@ -206,7 +206,7 @@ impl FakePlotter {
     }
 
     /// The reply to a line with a CRC.
-    fn reply(&mut self, outcome: Result<(), Refusal>, label: Label) {
+    fn reply(&mut self, outcome: Result<(), CommandError>, label: Label) {
         let last = match outcome {
             Ok(()) => "ok".to_owned(),
             Err(refusal) => format!("error:{}", refusal.number()),

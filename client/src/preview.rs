@@ -13,10 +13,10 @@ use penup::boards::host::{Change, HostBoard, lend_memory};
 use penup::geometry::{Projection, Vertex};
 use penup::machine::{EventRing, Path, PulserState, Setting, Target};
 use penup::plotter::{Observer, Plotter};
-use penup::protocol::Refusal;
-use penup::stage::{Aborted, Attention, Stage};
+use penup::protocol::CommandError;
+use penup::stage::{Aborted, Cancel, Stage};
 use penup::view::View;
-use penup::visibility::{Along, Stretch};
+use penup::visibility::{EdgeParameter, Stretch};
 use std::io;
 use std::time::{Duration, Instant};
 
@@ -117,7 +117,7 @@ impl PreviewPlotter for InMemory {
         computed.map_err(|refusal| Error::NotDrawn { refusal })?;
         let settings = *self.plotter.machine().settings();
         let tape = crate::tape::record(settings, &mut self.plotter.strokes());
-        tape.map_err(|error| Error::NotDrawn { refusal: Refusal::Machine(error) })
+        tape.map_err(|error| Error::NotDrawn { refusal: CommandError::Machine(error) })
     }
 
     fn result(&mut self) -> Result<JobResult, Error> {
@@ -183,7 +183,7 @@ impl StopWatch {
     }
 }
 
-impl Attention for StopWatch {
+impl Cancel for StopWatch {
     fn check(&mut self) -> Result<(), Aborted> {
         Ok(())
     }
@@ -233,7 +233,7 @@ impl Observer for Segments {
 }
 
 /// Where the place `along` the edge from `p` to `q` is on the image plane.
-fn image(view: &View, p: Vertex, q: Vertex, along: Along) -> [f64; 2] {
+fn image(view: &View, p: Vertex, q: Vertex, along: EdgeParameter) -> [f64; 2] {
     let part = along.numerator as f64 / along.denominator as f64;
     let between = |p: i32, q: i32| f64::from(p) * (1.0 - part) + f64::from(q) * part;
     let w = match view.projection() {

@@ -12,7 +12,7 @@
 
 use crate::error::Error;
 use crate::protocol::acts_at_once;
-use penup::protocol::{Command, LINE_LIMIT, Refusal};
+use penup::protocol::{Command, CommandError, LINE_LIMIT};
 use std::borrow::Cow;
 use std::fs::File;
 use std::io::{self, Read as _};
@@ -252,7 +252,7 @@ enum LineFault {
     TooLong { length: usize },
     Command,
     NotText,
-    Refused(Refusal),
+    Refused(CommandError),
 }
 
 fn is_line_end(byte: u8) -> bool {
@@ -365,7 +365,7 @@ fn judged(content: &str) -> Result<bool, LineFault> {
         ) => Ok(true),
         Err(_) if content.starts_with('$') => Err(LineFault::Command),
         // Any other would act on the machine, as G-code does.
-        Ok(_) | Err(Refusal::UnsupportedWord(_)) => Err(LineFault::Command),
+        Ok(_) | Err(CommandError::UnsupportedWord(_)) => Err(LineFault::Command),
         Err(refusal) => Err(LineFault::Refused(refusal)),
     }
 }

@@ -3,7 +3,7 @@
 
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
 use penup::order::{Leg, Method, Options, Shape, order};
-use penup::stage::{Scratch, Undisturbed};
+use penup::stage::{NeverCancel, Scratch};
 use penup_host_tests::order_reference::Sheet;
 use std::time::Instant;
 
@@ -25,7 +25,7 @@ fn main() {
                     .map(|_| {
                         let begin = Instant::now();
                         let scratch = Scratch::new(&mut memory);
-                        order(sheet.drawing(), options, scratch, &mut Undisturbed, &mut tour)
+                        order(sheet.drawing(), options, scratch, &mut NeverCancel, &mut tour)
                             .expect("an order");
                         begin.elapsed()
                     })

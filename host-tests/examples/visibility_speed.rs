@@ -1,7 +1,7 @@
 //! Times visibility on the lattices and a torus: `visibility_speed [NAME [RUNS [BYTES]]]`.
 
 use penup::model::Elements;
-use penup::stage::{Scratch, Undisturbed};
+use penup::stage::{NeverCancel, Scratch};
 use penup::visibility::{Options, Scene, Unrounded, find_stretches, scratch_bytes};
 use penup_host_tests::scene_files::{Model, Stretches, View};
 use std::time::Instant;
@@ -46,7 +46,7 @@ fn main() -> std::io::Result<()> {
                 &scene,
                 Options::default(),
                 Scratch::new(&mut words),
-                &mut Undisturbed,
+                &mut NeverCancel,
                 &mut stretches,
             );
             best = best.min(start.elapsed().as_secs_f64() * 1e3);

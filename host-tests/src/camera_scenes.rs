@@ -10,8 +10,8 @@ use crate::random_scenes::Random;
 use penup::fixed::Decimal;
 use penup::geometry::{Precision, Projection, Vertex};
 use penup::model::{Corner, Model, Position, unkept};
-use penup::stage::{Scratch, Undisturbed};
-use penup::view::{Camera, Lens, Sight, View, see};
+use penup::stage::{NeverCancel, Scratch};
+use penup::view::{Camera, Lens, Pose, View, project_scene};
 
 /// A point of the grid.
 pub type Place = [i32; 3];
@@ -299,11 +299,12 @@ pub fn camera_scene(seed: u64) -> CameraScene {
     let towards = direction(random);
     let eye = [0, 1, 2].map(|n: usize| middle[n] + distance * towards[n]);
     let lens = if random.once_in(3) { Lens::Orthographic } else { Lens::Perspective };
-    let camera = Camera { sight: Sight::Towards { eye, at: middle, up: None }, lens };
+    let camera = Camera { sight: Pose::Towards { eye, at: middle, up: None }, lens };
     let view = View::new(&camera, &model).expect("the eye is outside");
     let mut words = vec![0; 4096];
     let mut scratch = Scratch::new(&mut words);
-    let seen = see(&view, &model, None, &mut scratch, &mut Undisturbed).expect("there is room");
+    let seen =
+        project_scene(&view, &model, None, &mut scratch, &mut NeverCancel).expect("there is room");
     assert!(!seen.is_cut && seen.degenerate_faces == 0, "nothing is behind the eye, or flat");
     let precision = model.precision();
     CameraScene {

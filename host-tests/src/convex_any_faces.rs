@@ -5,11 +5,11 @@
 use std::collections::BTreeMap;
 
 use penup::convex::{
-    Eye, Sight, SinkFull, SolidEdge, SolidSink, from_vertices, scratch_bytes_from_vertices,
+    EdgeVisibility, Eye, SinkFull, SolidEdge, SolidSink, from_vertices, scratch_bytes_from_vertices,
 };
 use penup::geometry::{Precision, Projection, Vertex};
 use penup::model::{Corner, Elements};
-use penup::stage::{Scratch, Undisturbed};
+use penup::stage::{NeverCancel, Scratch};
 use penup::visibility::{Scene, Stretch, Unrounded};
 
 use crate::convex_solids::{Dice, any_solid};
@@ -17,7 +17,7 @@ use crate::convex_solids::{Dice, any_solid};
 #[derive(Default)]
 struct Faces {
     corners: Vec<Corner>,
-    sights: BTreeMap<(u16, u16), Sight>,
+    sights: BTreeMap<(u16, u16), EdgeVisibility>,
 }
 
 impl SolidSink for Faces {
@@ -52,7 +52,7 @@ pub fn is_seen_alike(dice: &mut Dice, stretches: impl Fn(&Scene<'_>) -> Vec<Stre
     let mut words = vec![0; scratch_bytes_from_vertices(points.len()) / 8];
     let mut faces = Faces::default();
     let scratch = Scratch::new(&mut words);
-    if from_vertices(&points, eye, Precision::default(), scratch, &mut Undisturbed, &mut faces)
+    if from_vertices(&points, eye, Precision::default(), scratch, &mut NeverCancel, &mut faces)
         .is_err()
     {
         return false;
@@ -78,10 +78,10 @@ pub fn is_seen_alike(dice: &mut Dice, stretches: impl Fn(&Scene<'_>) -> Vec<Stre
     }
     for (ends, sight) in &faces.sights {
         let expected = match sight {
-            Sight::Outline | Sight::Visible => true,
-            Sight::Hidden => false,
+            EdgeVisibility::Outline | EdgeVisibility::Visible => true,
+            EdgeVisibility::Hidden => false,
             // Which of several lines in one place is drawn is not asked here.
-            Sight::BehindOutline => continue,
+            EdgeVisibility::BehindOutline => continue,
         };
         assert_eq!(
             seen.get(ends).map(Vec::as_slice),

@@ -6,7 +6,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use penup::convex::{Eye, Sight, SinkFull, SolidEdge, SolidSink};
+use penup::convex::{EdgeVisibility, Eye, SinkFull, SolidEdge, SolidSink};
 use penup::model::Corner;
 
 /// A place in space.
@@ -35,7 +35,7 @@ pub struct Solid {
     /// Corners counter-clockwise from outside, beginning with the least, and whether it is visible.
     pub faces: BTreeSet<(Vec<u16>, bool)>,
     /// Lesser end first.
-    pub edges: BTreeMap<(u16, u16), Sight>,
+    pub edges: BTreeMap<(u16, u16), EdgeVisibility>,
     /// Vertices at the place of an earlier one.
     pub welded: usize,
     /// Vertices on the surface that are no corners.
@@ -48,7 +48,7 @@ pub struct Found {
     /// As in [`Solid::faces`].
     pub faces: BTreeSet<(Vec<u16>, bool)>,
     /// As in [`Solid::edges`].
-    pub edges: BTreeMap<(u16, u16), Sight>,
+    pub edges: BTreeMap<(u16, u16), EdgeVisibility>,
 }
 
 impl SolidSink for Found {
@@ -232,10 +232,10 @@ pub fn model(points: &[Point], eye: Eye) -> Model {
             facing.sort_unstable();
             assert_eq!(facing.len(), 2, "an edge has two faces");
             let sight = match (facing[0], facing[1]) {
-                (1, 1) => Sight::Visible,
-                (_, 1) => Sight::Outline,
-                (_, 0) => Sight::BehindOutline,
-                _ => Sight::Hidden,
+                (1, 1) => EdgeVisibility::Visible,
+                (_, 1) => EdgeVisibility::Outline,
+                (_, 0) => EdgeVisibility::BehindOutline,
+                _ => EdgeVisibility::Hidden,
             };
             (ends, sight)
         })

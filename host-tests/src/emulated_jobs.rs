@@ -1,7 +1,7 @@
 //! Whole jobs on emulated boards, and the same jobs on the host.
 
 use crate::whole_jobs::{Bench, job_lines, machine_events};
-use penup::plotter::{Lm3s6965Memory, NO_MOVES, NO_MOVES_OF_PICO, PicoMemory};
+use penup::plotter::{EMPTY_LOOKAHEAD, EMPTY_LOOKAHEAD_OF_PICO, Lm3s6965Memory, PicoMemory};
 use penup_client::emulator::{EmulatedBoard, Machine, MachineEventKind};
 use penup_client::machines::Board;
 use std::error::Error;
@@ -15,11 +15,10 @@ const PATIENCE: Duration = Duration::from_secs(300);
 pub fn bench_like(board: Board) -> Bench {
     let mut bench = Bench::with_memory(match board {
         Board::Lm3s6965 => {
-            Box::leak(Box::new(Lm3s6965Memory::new())).lend(Box::leak(Box::new(NO_MOVES)))
+            Box::leak(Box::new(Lm3s6965Memory::new())).lend(Box::leak(Box::new(EMPTY_LOOKAHEAD)))
         }
-        Board::Pico => {
-            Box::leak(Box::new(PicoMemory::new())).lend(Box::leak(Box::new(NO_MOVES_OF_PICO)))
-        }
+        Board::Pico => Box::leak(Box::new(PicoMemory::new()))
+            .lend(Box::leak(Box::new(EMPTY_LOOKAHEAD_OF_PICO))),
     });
     bench.heard();
     bench

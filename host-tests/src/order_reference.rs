@@ -4,7 +4,7 @@
 
 use penup::drawing::{Drawing, PagePoint, Segment};
 use penup::order::{Leg, Options, OrderError, Report, Shape, order};
-use penup::stage::{Scratch, Undisturbed};
+use penup::stage::{NeverCancel, Scratch};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A drawing with its own memory.
@@ -78,7 +78,7 @@ impl Sheet {
         let mut memory = vec![0; 1 << 15];
         let mut tour = vec![Leg::new(0, false); self.segments.len()];
         let scratch = Scratch::new(&mut memory);
-        let report = order(self.drawing(), options, scratch, &mut Undisturbed, &mut tour)?;
+        let report = order(self.drawing(), options, scratch, &mut NeverCancel, &mut tour)?;
         self.check(options.shape, &tour, &report);
         Ok((tour, report))
     }

@@ -100,7 +100,7 @@ pub fn run_with(
     let mut machine = Machine::new(settings, &mut blocks, &state, 2_500_000);
     loop {
         let now = steps.trace().now();
-        queue.follow();
+        queue.sync_consumed();
         let (x, y) = state.steps();
         let (pins, slack) = (PagePoint { x, y }, state.slack());
         let motors = PagePoint { x: x + slack.0, y: y + slack.1 };

@@ -1,6 +1,6 @@
 //! The example scenes and a plain camera in f64, for tests that need no more.
 
-use penup::geometry::{Along, COORDINATE_LIMIT, Projection, Vertex};
+use penup::geometry::{COORDINATE_LIMIT, EdgeParameter, Projection, Vertex};
 use penup::model::Corner;
 use penup::visibility::{SinkFull, Stretch, StretchSink};
 
@@ -179,7 +179,7 @@ impl View {
     }
 
     /// A place along an edge, on the image plane at distance 1 or in model units.
-    pub fn image(&self, (p, q): (Vertex, Vertex), along: Along) -> [f64; 2] {
+    pub fn image(&self, (p, q): (Vertex, Vertex), along: EdgeParameter) -> [f64; 2] {
         let s = along.numerator as f64 / along.denominator as f64;
         let part = |a: i32, b: i32| f64::from(a) + s * (f64::from(b) - f64::from(a));
         let depth = match self.projection {

@@ -35,7 +35,7 @@ pub fn planned(board: Board, lines: &[String]) -> Vec<Edge> {
     for line in lines {
         bench.say(&format!("{line}\n"));
     }
-    while bench.plotter.poll(&mut bench.board) || !bench.plotter.machine().stands() {
+    while bench.plotter.poll(&mut bench.board) || !bench.plotter.machine().is_stopped() {
         bench.board.pass(TURN_TICKS);
     }
     let (mut x, mut y) = (false, false);

@@ -2,7 +2,7 @@
 
 use penup::boards::host::{HostBoard, Stamped, lend_memory};
 use penup::machine::{EventRing, PulserState};
-use penup::plotter::{Board, Lent, Plotter};
+use penup::plotter::{Board, MemorySlices, Plotter};
 use penup_client::emulator::{Machine, MachineEventKind};
 
 /// A plotter of plain memory at the other end of a serial line.
@@ -15,7 +15,7 @@ pub struct Bench {
 
 impl Bench {
     /// With the capacities of `memory`, switched on and greeted.
-    pub fn with_memory(memory: Lent<'static>) -> Self {
+    pub fn with_memory(memory: MemorySlices<'static>) -> Self {
         // A test's process ends soon; until then the plotter borrows from these.
         let ring = Box::leak(Box::new(EventRing::new()));
         let pins = Box::leak(Box::new(PulserState::new()));
@@ -48,8 +48,8 @@ impl Bench {
             let busy = self.plotter.poll(&mut self.board);
             self.board.wait();
             // What waited for the last event goes on in the turn after it.
-            let stands = !busy && self.plotter.machine().stands();
-            if stands && !self.plotter.poll(&mut self.board) {
+            let is_stopped = !busy && self.plotter.machine().is_stopped();
+            if is_stopped && !self.plotter.poll(&mut self.board) {
                 return;
             }
         }

@@ -1,6 +1,6 @@
 //! Lines with numbers and checksums: what a plotter answers to them, and what it never does.
 
-use penup::protocol::{Label, Named, Numbering, Received, Refusal};
+use penup::protocol::{CommandError, Label, Named, Numbering, Received};
 use penup_client::protocol::numbered;
 use penup_client::source::JobLine;
 use penup_client::twin;
@@ -194,7 +194,7 @@ fn a_number_in_a_line_of_nine_digits_is_read_and_a_longer_one_is_not() {
     let head = "N1000000000 $plot";
     let next = numbered(None, head);
     let received = numbering.receive(Ok(&next));
-    assert!(matches!(received, Received::Answer(Err(Refusal::Unnumbered), _)), "{received:?}");
+    assert!(matches!(received, Received::Answer(Err(CommandError::Unnumbered), _)), "{received:?}");
 }
 
 #[test]

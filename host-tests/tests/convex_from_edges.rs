@@ -7,11 +7,11 @@
 use std::collections::BTreeMap;
 
 use penup::convex::{
-    Eye, Sight, SolidError, SolidSummary, from_edges, from_vertices, scratch_bytes_from_edges,
-    scratch_bytes_from_vertices,
+    EdgeVisibility, Eye, SolidError, SolidSummary, from_edges, from_vertices,
+    scratch_bytes_from_edges, scratch_bytes_from_vertices,
 };
 use penup::geometry::Precision;
-use penup::stage::{Aborted, Attention, Scratch, Undisturbed};
+use penup::stage::{Aborted, Cancel, NeverCancel, Scratch};
 use penup_host_tests::convex_model::{Found, Model, Point, model};
 use penup_host_tests::convex_solids::{
     Dice, any_eye, any_rotation, any_solid, as_decimals, half_of_the_last, read_scene, roof,
@@ -22,7 +22,7 @@ const EXACT: Precision = Precision { written: 0, unit: 0 };
 
 const SCENES: [&str; 5] = ["cube", "octahedron", "icosahedron", "dodecahedron", "eighteen"];
 
-type Sights = BTreeMap<(u16, u16), Sight>;
+type Sights = BTreeMap<(u16, u16), EdgeVisibility>;
 
 fn found(
     points: &[Point],
@@ -34,7 +34,7 @@ fn found(
     let mut sink = Found::default();
     let scratch = Scratch::new(&mut words);
     let precision = Precision { written: tolerance, unit: tolerance.min(1) };
-    let summary = from_edges(points, edges, eye, precision, scratch, &mut Undisturbed, &mut sink)?;
+    let summary = from_edges(points, edges, eye, precision, scratch, &mut NeverCancel, &mut sink)?;
     assert_eq!((summary.faces, summary.edges), (0, sink.edges.len()));
     Ok((summary, sink.edges))
 }
@@ -112,13 +112,13 @@ fn found_from_vertices(points: &[Point], eye: Eye, tolerance: u32) -> Result<Sig
     let mut sink = Found::default();
     let scratch = Scratch::new(&mut words);
     let precision = Precision { written: tolerance, unit: tolerance.min(1) };
-    from_vertices(points, eye, precision, scratch, &mut Undisturbed, &mut sink)?;
+    from_vertices(points, eye, precision, scratch, &mut NeverCancel, &mut sink)?;
     Ok(sink.edges)
 }
 
 /// For each edge whether it is drawn, if hidden lines are not.
 fn drawn(sights: Sights) -> BTreeMap<(u16, u16), bool> {
-    let is_drawn = |sight| !matches!(sight, Sight::Hidden | Sight::BehindOutline);
+    let is_drawn = |sight| !matches!(sight, EdgeVisibility::Hidden | EdgeVisibility::BehindOutline);
     sights.into_iter().map(|(ends, sight)| (ends, is_drawn(sight))).collect()
 }
 
@@ -190,11 +190,11 @@ const ITS_EDGES: [[u16; 2]; 8] = [[0, 1], [1, 2], [2, 3], [3, 0], [0, 4], [1, 4]
 fn a_diagonal_of_a_face_is_seen_like_the_face() {
     let edges = [&ITS_EDGES[..], &[[0, 2]]].concat();
     for (eye, sight) in [
-        (Eye::Towards([0, 0, 1]), Sight::Hidden),
-        (Eye::Towards([0, 0, -1]), Sight::Visible),
-        (Eye::Towards([9, 1, 1]), Sight::Hidden),
-        (Eye::Towards([9, 1, -1]), Sight::Visible),
-        (Eye::Towards([9, 1, 0]), Sight::BehindOutline),
+        (Eye::Towards([0, 0, 1]), EdgeVisibility::Hidden),
+        (Eye::Towards([0, 0, -1]), EdgeVisibility::Visible),
+        (Eye::Towards([9, 1, 1]), EdgeVisibility::Hidden),
+        (Eye::Towards([9, 1, -1]), EdgeVisibility::Visible),
+        (Eye::Towards([9, 1, 0]), EdgeVisibility::BehindOutline),
     ] {
         let (_, sights) = found(&SQUARE_PYRAMID, &edges, eye, 0).expect("a solid");
         assert_eq!(sights[&(0, 2)], sight, "{eye:?}");
@@ -208,10 +208,10 @@ fn a_vertex_in_the_middle_of_an_edge_or_face_is_seen_like_it() {
     let split = [[0, 5], [5, 1], [5, 6], [2, 6], [3, 6]];
     let edges = [&ITS_EDGES[1..], &split].concat();
     for (eye, of_edge, of_face) in [
-        (Eye::Towards([0, 0, 1]), Sight::Outline, Sight::Hidden),
-        (Eye::Towards([0, 0, -1]), Sight::Outline, Sight::Visible),
-        (Eye::Towards([1, -9, -9]), Sight::Visible, Sight::Visible),
-        (Eye::Towards([1, 9, 1]), Sight::Hidden, Sight::Hidden),
+        (Eye::Towards([0, 0, 1]), EdgeVisibility::Outline, EdgeVisibility::Hidden),
+        (Eye::Towards([0, 0, -1]), EdgeVisibility::Outline, EdgeVisibility::Visible),
+        (Eye::Towards([1, -9, -9]), EdgeVisibility::Visible, EdgeVisibility::Visible),
+        (Eye::Towards([1, 9, 1]), EdgeVisibility::Hidden, EdgeVisibility::Hidden),
     ] {
         let (_, sights) = found(&points, &edges, eye, 0).expect("a solid");
         assert_eq!([sights[&(0, 5)], sights[&(1, 5)]], [of_edge; 2], "{eye:?}");
@@ -245,7 +245,7 @@ fn what_is_no_solid_is_refused() {
     // In a plane: nothing hides anything.
     let flat = SQUARE_PYRAMID.map(|[x, y, _]| [x, y, x]);
     let (_, sights) = found(&flat, &ITS_EDGES, eye, 0).expect("a flat thing");
-    assert!(sights.len() == 8 && sights.values().all(|sight| *sight == Sight::Visible));
+    assert!(sights.len() == 8 && sights.values().all(|sight| *sight == EdgeVisibility::Visible));
     // An edge of no length, and the same corner under two numbers.
     let twice = [&SQUARE_PYRAMID[..], &[[0, 0, 0]]].concat();
     let edges = [&ITS_EDGES[..], &[[0, 5], [5, 5], [5, 1]]].concat();
@@ -273,7 +273,7 @@ fn nonsense_does_no_harm() {
 /// Gives up at the n-th question.
 struct Impatient(usize);
 
-impl Attention for Impatient {
+impl Cancel for Impatient {
     fn check(&mut self) -> Result<(), Aborted> {
         self.0 = self.0.checked_sub(1).ok_or(Aborted)?;
         Ok(())
@@ -295,23 +295,15 @@ fn a_word_too_few_or_no_patience_is_an_error() {
             eye,
             EXACT,
             scratch,
-            &mut Undisturbed,
+            &mut NeverCancel,
             &mut Found::default(),
         );
         assert!(matches!(result, Err(SolidError::Scratch(_))), "{count} of {all}: {result:?}");
     }
     let mut patience = 0;
     loop {
-        let (scratch, mut attention) = (Scratch::new(&mut words), Impatient(patience));
-        match from_edges(
-            &points,
-            &edges,
-            eye,
-            EXACT,
-            scratch,
-            &mut attention,
-            &mut Found::default(),
-        ) {
+        let (scratch, mut cancel) = (Scratch::new(&mut words), Impatient(patience));
+        match from_edges(&points, &edges, eye, EXACT, scratch, &mut cancel, &mut Found::default()) {
             Ok(summary) => break assert_eq!(summary.edges, 30),
             Err(error) => assert_eq!(error, SolidError::Aborted),
         }

@@ -7,12 +7,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use penup::convex::{
-    EYE_LIMIT, Eye, POSITION_LIMIT, Sight, SinkFull, SolidEdge, SolidError, SolidSink,
+    EYE_LIMIT, EdgeVisibility, Eye, POSITION_LIMIT, SinkFull, SolidEdge, SolidError, SolidSink,
     SolidSummary, from_vertices, scratch_bytes_from_vertices,
 };
 use penup::geometry::Precision;
 use penup::model::Corner;
-use penup::stage::{Aborted, Attention, Scratch, Undisturbed};
+use penup::stage::{Aborted, Cancel, NeverCancel, Scratch};
 use penup_host_tests::convex_model::{Found, Model, Point, Solid, model};
 use penup_host_tests::convex_solids::{
     Dice, any_eye, any_rotation, any_solid, as_decimals, half_of_the_last, read_scene, solid_count,
@@ -25,7 +25,7 @@ fn found(points: &[Point], eye: Eye, tolerance: u32) -> Result<(SolidSummary, Fo
     let mut sink = Found::default();
     let scratch = Scratch::new(&mut words);
     let precision = Precision { written: tolerance, unit: tolerance.min(1) };
-    let summary = from_vertices(points, eye, precision, scratch, &mut Undisturbed, &mut sink)?;
+    let summary = from_vertices(points, eye, precision, scratch, &mut NeverCancel, &mut sink)?;
     assert_eq!((summary.faces, summary.edges), (sink.faces.len(), sink.edges.len()));
     Ok((summary, sink))
 }
@@ -53,7 +53,7 @@ fn compare(points: &[Point], eye: Eye) -> &'static str {
             assert_eq!(found.faces, solid.faces, "{}", case());
             assert_eq!(found.edges, solid.edges, "{}", case());
             assert_eq!((summary.welded, summary.flat), (solid.welded, solid.flat), "{}", case());
-            if solid.edges.values().any(|sight| *sight == Sight::BehindOutline) {
+            if solid.edges.values().any(|sight| *sight == EdgeVisibility::BehindOutline) {
                 "edge-on"
             } else {
                 "solid"
@@ -302,7 +302,7 @@ fn a_word_too_few_is_an_error_and_the_sink_is_given_nothing() {
         let scratch = Scratch::new(&mut words[..count]);
         let mut sink = Limited(0);
         let result =
-            from_vertices(&points, FROM_THERE, EXACT, scratch, &mut Undisturbed, &mut sink);
+            from_vertices(&points, FROM_THERE, EXACT, scratch, &mut NeverCancel, &mut sink);
         assert!(matches!(result, Err(SolidError::Scratch(_))), "{count} {result:?}");
     }
     // 20 faces and 30 edges.
@@ -313,14 +313,14 @@ fn a_word_too_few_is_an_error_and_the_sink_is_given_nothing() {
             FROM_THERE,
             EXACT,
             scratch,
-            &mut Undisturbed,
+            &mut NeverCancel,
             &mut Limited(room),
         );
         assert_eq!(result, Err(SolidError::SinkFull));
     }
     let scratch = Scratch::new(&mut words);
     assert!(
-        from_vertices(&points, FROM_THERE, EXACT, scratch, &mut Undisturbed, &mut Limited(50))
+        from_vertices(&points, FROM_THERE, EXACT, scratch, &mut NeverCancel, &mut Limited(50))
             .is_ok()
     );
 }
@@ -328,7 +328,7 @@ fn a_word_too_few_is_an_error_and_the_sink_is_given_nothing() {
 /// Gives up at the n-th question.
 struct Impatient(usize);
 
-impl Attention for Impatient {
+impl Cancel for Impatient {
     fn check(&mut self) -> Result<(), Aborted> {
         self.0 = self.0.checked_sub(1).ok_or(Aborted)?;
         Ok(())
@@ -343,10 +343,10 @@ fn the_user_can_give_up_at_any_moment() {
     let mut patience = 0;
     loop {
         let scratch = Scratch::new(&mut words);
-        let mut attention = Impatient(patience);
+        let mut cancel = Impatient(patience);
         let precision = Precision { written: half_of_the_last(6), unit: 1 };
         let mut sink = Limited(42);
-        match from_vertices(&rounded, FROM_THERE, precision, scratch, &mut attention, &mut sink) {
+        match from_vertices(&rounded, FROM_THERE, precision, scratch, &mut cancel, &mut sink) {
             Ok(_) => break,
             Err(error) => assert_eq!(error, SolidError::Aborted),
         }

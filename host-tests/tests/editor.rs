@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used)] // a test may: clippy sees only its `#[test]` functions as tests
 
 use penup::model::Element;
-use penup::plotter::{Memory, NO_MOVES};
+use penup::plotter::{EMPTY_LOOKAHEAD, Memory};
 use penup_host_tests::whole_jobs::Bench;
 use proptest::prelude::*;
 
@@ -309,7 +309,7 @@ proptest! {
         ),
     ) {
         let memory = Box::leak(Box::new(Memory::<60, 400, 400>::new()));
-        let mut bench = Bench::with_memory(memory.lend(Box::leak(Box::new(NO_MOVES))));
+        let mut bench = Bench::with_memory(memory.lend(Box::leak(Box::new(EMPTY_LOOKAHEAD))));
         let mut plain = Plain::default();
         for place in [[0, 0, 0], [4, 0, 0], [0, 5, 0], [0, 0, 6], [4, 5, 6]] {
             bench.say(&format!("v {} {} {}\n", place[0], place[1], place[2]));

@@ -5,7 +5,7 @@ use penup::order::enumeration::{
     Distances, Division, Effort, EnumerationError, ImplicitCosts, Optimum, Options, Reach, Sets,
     Start, SubProblem, Target, division_bound, optimum, solve_image_problem,
 };
-use penup::stage::{Aborted, Attention, Scratch, Undisturbed};
+use penup::stage::{Aborted, Cancel, NeverCancel, Scratch};
 use proptest::prelude::*;
 
 /// What the best matching costs, by the best for every subset of the points.
@@ -86,7 +86,7 @@ fn solve<'a>(
     options: Options,
     memory: &'a mut [u64],
 ) -> Result<Optimum<'a>, EnumerationError> {
-    optimum(distances, options, Scratch::new(memory), &mut Undisturbed, &mut |_| {})
+    optimum(distances, options, Scratch::new(memory), &mut NeverCancel, &mut |_| {})
 }
 
 fn assert_matching(distances: Distances<'_>, best: &Optimum<'_>) {
@@ -239,7 +239,7 @@ struct GivesUp {
     looks: u32,
 }
 
-impl Attention for GivesUp {
+impl Cancel for GivesUp {
     fn check(&mut self) -> Result<(), Aborted> {
         self.looks += 1;
         if self.looks > self.after { Err(Aborted) } else { Ok(()) }
@@ -258,9 +258,9 @@ fn it_can_be_given_up_at_any_look() {
     let distances = Distances::new(16, &below).expect("a problem");
     let mut memory = vec![0; 1000];
     let mut patient = GivesUp { after: u32::MAX, looks: 0 };
-    let ends = |attention: &mut GivesUp, memory: &mut [u64]| {
+    let ends = |cancel: &mut GivesUp, memory: &mut [u64]| {
         let scratch = Scratch::new(memory);
-        optimum(distances, Options::STANDARD, scratch, attention, &mut |_| {}).map(|best| best.cost)
+        optimum(distances, Options::STANDARD, scratch, cancel, &mut |_| {}).map(|best| best.cost)
     };
     ends(&mut patient, &mut memory).expect("an optimum");
     assert!(patient.looks > 100);
@@ -313,7 +313,7 @@ fn each_improvement_is_told_and_the_last_is_the_optimum() {
     let mut told = Vec::new();
     let options = Options { start: Start::NoMoreThan(10_000), ..Options::STANDARD };
     let scratch = Scratch::new(&mut memory);
-    let best = optimum(distances, options, scratch, &mut Undisturbed, &mut |cost| told.push(cost))
+    let best = optimum(distances, options, scratch, &mut NeverCancel, &mut |cost| told.push(cost))
         .expect("an optimum");
     assert!(told.is_sorted_by(|one, next| one > next));
     assert_eq!(told.last(), Some(&best.cost));

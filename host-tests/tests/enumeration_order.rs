@@ -3,7 +3,7 @@
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
 use penup::order::enumeration::{Distances, Options as Variants, optimum};
 use penup::order::{Method, Options, Shape, length};
-use penup::stage::{Scratch, Undisturbed};
+use penup::stage::{NeverCancel, Scratch};
 use penup_host_tests::order_reference::Sheet;
 use proptest::prelude::*;
 
@@ -40,7 +40,7 @@ fn least(sheet: &Sheet, shape: Shape) -> u64 {
     let distances = Distances::new(odd.len(), &below).expect("an even number of odd points");
     let mut memory = vec![0; 2000];
     let scratch = Scratch::new(&mut memory);
-    optimum(distances, Variants::default(), scratch, &mut Undisturbed, &mut |_| {})
+    optimum(distances, Variants::default(), scratch, &mut NeverCancel, &mut |_| {})
         .expect("an optimum")
         .cost
 }

@@ -60,7 +60,7 @@ impl Session {
     fn work(&mut self, milliseconds: u64) -> u64 {
         for passed in 0..milliseconds {
             let busy = self.bench.plotter.poll(&mut self.bench.board);
-            if !busy && self.bench.plotter.machine().stands() {
+            if !busy && self.bench.plotter.machine().is_stopped() {
                 return passed;
             }
             penup::plotter::Board::wait(&mut self.bench.board);
@@ -117,8 +117,8 @@ fn disturb(values: &[(Setting, f64)], count: u64, seed: u64) {
     let mut session = Session::new(values);
     session.order("$plot");
     let duration = session.work(3_600_000);
-    let undisturbed = session.end();
-    assert!(undisturbed.inked.len() > 1000 && duration > 1000, "{duration} ms is no job");
+    let never_cancel = session.end();
+    assert!(never_cancel.inked.len() > 1000 && duration > 1000, "{duration} ms is no job");
     let mut random = Random(seed);
     let mut alarms = 0;
     for case in 0..count {
@@ -174,10 +174,10 @@ fn disturb(values: &[(Setting, f64)], count: u64, seed: u64) {
             session.order("$plot");
         }
         let drawn = session.end();
-        let missing = undisturbed.inked.difference(&drawn.inked).count();
-        let other: Vec<_> = drawn.inked.difference(&undisturbed.inked).take(3).collect();
+        let missing = never_cancel.inked.difference(&drawn.inked).count();
+        let other: Vec<_> = drawn.inked.difference(&never_cancel.inked).take(3).collect();
         assert_eq!((missing, other), (0, vec![]), "case {case}: other ink after fault {fault}");
-        assert_eq!((drawn.pen, drawn.lift), (undisturbed.pen, undisturbed.lift), "case {case}");
+        assert_eq!((drawn.pen, drawn.lift), (never_cancel.pen, never_cancel.lift), "case {case}");
     }
     assert!(alarms > count / 10, "{alarms} alarms of {count}");
 }
@@ -285,7 +285,7 @@ fn home_and_disturb(random: &mut Random) -> Stage {
         wall.follow(turn.motors);
         let machine = turn.machine;
         let mut pressed = Switches { x: wall.belts.x <= switch, y: wall.belts.y <= switch };
-        let ready = machine.state() == State::Idle && machine.stands();
+        let ready = machine.state() == State::Idle && machine.is_stopped();
         if turn.now == 0 {
             machine.home(pressed).expect("ready");
         } else if struck_in.is_none() && turn.now >= instant {
@@ -318,7 +318,8 @@ fn home_and_disturb(random: &mut Random) -> Stage {
                     stage = Stage::Stopped;
                 }
                 Stage::Held
-                    if machine.state() == (State::Hold { standing: true }) && machine.stands() =>
+                    if machine.state() == (State::Hold { standing: true })
+                        && machine.is_stopped() =>
                 {
                     machine.resume();
                     stage = Stage::Drawing;
@@ -342,7 +343,7 @@ fn home_and_disturb(random: &mut Random) -> Stage {
         machine.watch(pressed);
         let path = &mut paths[usize::from(stage == Stage::Last)];
         machine.fill(path, queue);
-        if stage == Stage::Homing && machine.state() == State::Idle && machine.stands() {
+        if stage == Stage::Homing && machine.state() == State::Idle && machine.is_stopped() {
             off = Some((wall.belts.x - homed, wall.belts.y - homed));
         }
         assert!(

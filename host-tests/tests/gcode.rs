@@ -6,7 +6,7 @@ use penup::boards::host::Change;
 use penup::machine::Settings;
 use penup::machine::{Contacts, State};
 use penup::plotter::Board;
-use penup::plotter::{Memory, NO_MOVES};
+use penup::plotter::{EMPTY_LOOKAHEAD, Memory};
 use penup_host_tests::event_checker::{self, Drawn};
 use penup_host_tests::whole_jobs::Bench;
 use proptest::prelude::*;
@@ -420,7 +420,7 @@ enum Disturbance {
 /// pins are and that it can go on from there. Returns what was drawn before that.
 fn disturbed(disturbance: Disturbance, instant: u32) -> Drawn {
     let memory = Box::leak(Box::new(Memory::<4, 4, 16>::new()));
-    let mut bench = Bench::with_memory(memory.lend(Box::leak(Box::new(NO_MOVES))));
+    let mut bench = Bench::with_memory(memory.lend(Box::leak(Box::new(EMPTY_LOOKAHEAD))));
     bench.heard();
     bench.board.receive(PROGRAM.as_bytes());
     work(&mut bench, instant);
@@ -438,7 +438,7 @@ fn disturbed(disturbance: Disturbance, instant: u32) -> Drawn {
     }
     if matches!(disturbance, Disturbance::HoldAndResume) {
         work(&mut bench, 1500);
-        assert!(bench.plotter.machine().stands());
+        assert!(bench.plotter.machine().is_stopped());
         bench.board.receive(b"~");
     }
     bench.finish();

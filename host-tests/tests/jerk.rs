@@ -283,11 +283,11 @@ proptest! {
                 if aborts && turn.now >= last {
                     turn.machine.abort();
                 }
-                if turn.machine.state() == (State::Hold { standing: true }) && turn.machine.stands() {
+                if turn.machine.state() == (State::Hold { standing: true }) && turn.machine.is_stopped() {
                     assert_eq!(turn.machine.planned_position(), turn.pins);
                     turn.machine.resume();
                 }
-                turn.machine.state() != State::Idle || !turn.machine.stands()
+                turn.machine.state() != State::Idle || !turn.machine.is_stopped()
             })
         };
         let drawn = event_checker::check_pins(&trace, &settings);

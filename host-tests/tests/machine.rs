@@ -93,16 +93,16 @@ fn run_job(
 }
 
 fn is_ready(machine: &Machine<'_>) -> bool {
-    machine.state() == State::Idle && machine.stands()
+    machine.state() == State::Idle && machine.is_stopped()
 }
 
-fn undisturbed() -> Drawn {
+fn never_cancel() -> Drawn {
     run_job(Settings::default(), 25_000, &mut |turn| !is_ready(turn.machine))
 }
 
 #[test]
 fn a_job_is_drawn_and_the_pins_end_where_the_path_does() {
-    let drawn = undisturbed();
+    let drawn = never_cancel();
     assert_eq!(drawn.end, point(0, 0));
     // 800 + 600 + 10 + 790 moves, the line from (900, 333) to (20, 1000), and about half the dots.
     assert!(drawn.inked.len() > 800 + 600 + 10 + 790 + 880);
@@ -124,7 +124,7 @@ proptest! {
         loose: bool,
         by_a_motor: bool,
     ) {
-        static UNDISTURBED: LazyLock<Drawn> = LazyLock::new(undisturbed);
+        static UNDISTURBED: LazyLock<Drawn> = LazyLock::new(never_cancel);
         let mut holds = vec![instant + again, instant];
         let settings = lifted(slack(loose), by_a_motor);
         let drawn = run_job(settings, turn_ticks, &mut |turn| {
@@ -132,7 +132,7 @@ proptest! {
                 holds.pop();
                 turn.machine.hold();
             }
-            if turn.machine.state() == (State::Hold { standing: true }) && turn.machine.stands() {
+            if turn.machine.state() == (State::Hold { standing: true }) && turn.machine.is_stopped() {
                 assert_eq!(turn.machine.planned_position(), turn.pins);
                 turn.machine.resume();
             }
@@ -196,7 +196,7 @@ proptest! {
                 return true;
             }
             assert_eq!(turn.machine.planned_position(), pins);
-            assert!(turn.machine.stands());
+            assert!(turn.machine.is_stopped());
             false
         });
         let (time, pins) = alarm_at.zip(stands_at).expect("given");
@@ -270,7 +270,7 @@ fn a_motor_that_slept_looks_for_its_stop_again() {
     let mut path = TargetList::new(&targets);
     let mut jobs = 0;
     let trace = pin_machine::run_with(settings, 25_000, &mut |turn, queue| {
-        if turn.machine.state() == State::Sleep && turn.machine.stands() {
+        if turn.machine.state() == State::Sleep && turn.machine.is_stopped() {
             turn.machine.unlock().expect("asleep");
         } else if is_ready(turn.machine) {
             jobs += 1;
@@ -349,17 +349,17 @@ fn starve(settings: Settings, instant: u64, pause: u64, turn_ticks: u64) -> (Dra
 /// Lets the main loop be late `count` times, each in a job of its own; the acceleration is measured
 /// against that of `allowed`.
 fn starve_often(settings: Settings, allowed: Settings, count: u32) {
-    let undisturbed = starve(settings, 0, 0, 25_000).0;
+    let never_cancel = starve(settings, 0, 0, 25_000).0;
     let mut random = Random(1971);
     let mut underruns = 0;
     for _ in 0..count {
-        let instant = random.below(undisturbed.last_step);
+        let instant = random.below(never_cancel.last_step);
         // 0.05 s to 2 s, and turns of 0.2 ms to 4 ms before and after.
         let pause = 1_250_000 + random.below(48_750_000);
         let (drawn, dry) = starve(settings, instant, pause, 5_000 + random.below(95_000));
         underruns += dry;
-        assert_eq!(drawn.inked, undisturbed.inked);
-        assert_eq!((drawn.end, drawn.pen), (undisturbed.end, 0));
+        assert_eq!(drawn.inked, never_cancel.inked);
+        assert_eq!((drawn.end, drawn.pen), (never_cancel.end, 0));
         // From rest to rest, the acceleration over any 5 ms within 1.05 of the limit.
         event_checker::check_speed(&drawn.runs, &fast_job(), &allowed, false);
     }
@@ -632,7 +632,7 @@ fn a_limit_switch_is_an_alarm_only_if_asked_for() {
                 turn.machine.start(&mut TargetList::new(&targets)).expect("valid");
             }
             turn.machine.watch(Switches { x: turn.pins.x >= 3000, y: false });
-            turn.machine.state() == State::Run || !turn.machine.stands()
+            turn.machine.state() == State::Run || !turn.machine.is_stopped()
         });
         let end = event_checker::check_pins(&trace, &settings).end.x;
         // 8 steps a millisecond: at most two turns after the switch.
@@ -703,7 +703,7 @@ fn the_machine_waits_for_each_change_of_the_pen() {
             let mut again = TwoPens(TargetList::new(&targets), 0);
             turn.machine.start(&mut again).expect("valid");
         }
-        if turn.machine.state() == (State::Hold { standing: true }) && turn.machine.stands() {
+        if turn.machine.state() == (State::Hold { standing: true }) && turn.machine.is_stopped() {
             waits.push((turn.machine.status().pen_wanted, turn.pins));
             turn.machine.resume();
         }
@@ -738,7 +738,8 @@ fn a_pause_comes_at_the_end_of_the_stroke_and_after_so_much_ink() {
             if asked.is_some() && turn.now == 5_000_000 {
                 turn.machine.pause_after_stroke();
             }
-            if turn.machine.state() == (State::Hold { standing: true }) && turn.machine.stands() {
+            if turn.machine.state() == (State::Hold { standing: true }) && turn.machine.is_stopped()
+            {
                 assert_eq!(turn.pins.x, 400);
                 waits.push(turn.pins.y / 10);
                 turn.machine.resume();

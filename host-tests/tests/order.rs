@@ -4,7 +4,7 @@
 
 use penup::drawing::{Drawing, PagePoint, Segment};
 use penup::order::{EXACT_POINTS, Leg, Method, Options, OrderError, Report, Shape, order};
-use penup::stage::{Aborted, Attention, Scratch, Undisturbed};
+use penup::stage::{Aborted, Cancel, NeverCancel, Scratch};
 use penup_host_tests::order_reference::Sheet;
 use proptest::prelude::*;
 
@@ -132,7 +132,7 @@ fn with_less_memory_the_order_is_worse_or_refused_but_never_wrong() {
             sheet.drawing(),
             options,
             Scratch::new(&mut memory),
-            &mut Undisturbed,
+            &mut NeverCancel,
             &mut tour,
         ) {
             Ok(report) => {
@@ -152,7 +152,7 @@ fn with_less_memory_the_order_is_worse_or_refused_but_never_wrong() {
 #[test]
 fn a_job_given_up_ends_at_once() {
     struct GivenUpAfter(u32);
-    impl Attention for GivenUpAfter {
+    impl Cancel for GivenUpAfter {
         fn check(&mut self) -> Result<(), Aborted> {
             self.0 = self.0.checked_sub(1).ok_or(Aborted)?;
             Ok(())
@@ -163,9 +163,9 @@ fn a_job_given_up_ends_at_once() {
         let mut memory = vec![0; 1 << 15];
         let mut tour = vec![Leg::new(0, false); sheet.segments.len()];
         let options = Options { effort: 1 << 20, ..Options::default() };
-        let mut attention = GivenUpAfter(checks);
+        let mut cancel = GivenUpAfter(checks);
         let scratch = Scratch::new(&mut memory);
-        let result = order(sheet.drawing(), options, scratch, &mut attention, &mut tour);
+        let result = order(sheet.drawing(), options, scratch, &mut cancel, &mut tour);
         assert_eq!(result, Err(OrderError::Aborted));
     }
 }
@@ -180,7 +180,7 @@ fn a_drawing_that_is_none_is_refused() {
         let drawing = Drawing { points: &points, segments: &segments };
         let mut memory = [0; 100];
         let scratch = Scratch::new(&mut memory);
-        order(drawing, Options::default(), scratch, &mut Undisturbed, &mut tour)
+        order(drawing, Options::default(), scratch, &mut NeverCancel, &mut tour)
     };
     assert_eq!(attempt(vec![segment(0, 1)], 2), Err(OrderError::TourLength));
     assert_eq!(attempt(vec![segment(0, 1), segment(1, 3)], 2), Err(OrderError::BadSegment(1)));

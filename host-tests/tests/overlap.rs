@@ -2,8 +2,8 @@
 
 #![allow(clippy::expect_used)] // a test fails by panicking
 
-use penup::drawing::{Line, LineType, PagePoint, organise};
-use penup::stage::{Undisturbed, items_mut};
+use penup::drawing::{LineType, PackedLine, PagePoint, build_graph};
+use penup::stage::{NeverCancel, items_mut};
 use proptest::prelude::*;
 
 /// A line of a pen with its line type code: 0 full, 1 dotted, 2 dashed.
@@ -13,14 +13,14 @@ fn organised(lines: &[Drawn]) -> Vec<Drawn> {
     let mut words = vec![0u64; 4000];
     let point = |(x, y): (i64, i64)| PagePoint { x: x as i32, y: y as i32 };
     let types = [LineType::Full, LineType::Dotted, LineType::Dashed];
-    let packed: Vec<Line> = lines
+    let packed: Vec<PackedLine> = lines
         .iter()
         .map(|(from, to, code, pen)| {
-            Line::new(point(*from), point(*to), types[usize::from(*code)], *pen)
+            PackedLine::new(point(*from), point(*to), types[usize::from(*code)], *pen)
         })
         .collect();
     items_mut(&mut words, lines.len()).expect("room").copy_from_slice(&packed);
-    let stored = organise(&mut words, lines.len(), &mut Undisturbed).expect("room");
+    let stored = build_graph(&mut words, lines.len(), &mut NeverCancel).expect("room");
     let (drawing, _) = stored.split(&mut words).expect("the same memory");
     let at = |number: u16| {
         let point = drawing.points[usize::from(number)];

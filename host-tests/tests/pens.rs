@@ -6,7 +6,7 @@ use penup::geometry::Projection;
 use penup::machine::Path;
 use penup::model::{Elements, PenWriter, Pens};
 use penup::plotter::{Board, Observer};
-use penup::stage::{Scratch, Undisturbed};
+use penup::stage::{NeverCancel, Scratch};
 use penup::view::View;
 use penup::visibility::{Options, Scene, Stretch, Unrounded, find_stretches, scratch_bytes};
 use penup_host_tests::random_scenes::{Random, random_scene};
@@ -46,7 +46,7 @@ type Ink = ([i32; 2], [i32; 2], u8);
 /// What is found, and what is inked, in order.
 fn job(bench: &mut Bench) -> (Found, Vec<Ink>) {
     let mut found = Found::default();
-    bench.plotter.compute(&mut Undisturbed, &mut found).unwrap();
+    bench.plotter.compute(&mut NeverCancel, &mut found).unwrap();
     let mut strokes = bench.plotter.strokes();
     let (mut ink, mut at) = (Vec::new(), [0; 2]);
     while let Some(target) = strokes.next_target() {
@@ -353,7 +353,7 @@ fn pens_change_no_line_and_each_edge_has_the_lowest_of_its_own() {
             let mut found = Stretches::default();
             let options = Options { with_hidden: true, ..Options::default() };
             let scratch = Scratch::new(&mut words);
-            find_stretches(&scene, options, scratch, &mut Undisturbed, &mut found).unwrap();
+            find_stretches(&scene, options, scratch, &mut NeverCancel, &mut found).unwrap();
             found.0
         });
         let whole = |stretches: &[Stretch]| -> f64 {

@@ -1,6 +1,6 @@
 //! Transcripts: what is said to the plotter, and what it answers.
 
-use penup::plotter::{Memory, NO_MOVES};
+use penup::plotter::{EMPTY_LOOKAHEAD, Memory};
 use penup::protocol::MEANINGS;
 use penup_host_tests::whole_jobs::Bench;
 
@@ -102,7 +102,7 @@ fn a_refused_arc_asks_for_what_arcs_need() {
 #[test]
 fn a_model_too_large_is_refused_with_the_limit() {
     let memory = Box::leak(Box::new(Memory::<4, 6, 16>::new()));
-    let mut bench = Bench::with_memory(memory.lend(Box::leak(Box::new(NO_MOVES))));
+    let mut bench = Bench::with_memory(memory.lend(Box::leak(Box::new(EMPTY_LOOKAHEAD))));
     bench.heard();
     assert_eq!(bench.say("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"), "ok\n".repeat(4));
     assert_eq!(bench.say("v 2 2 2\n"), "[MSG:the limit is 4 vertices]\nerror:113\n");
@@ -242,7 +242,7 @@ fn hidden_lines_have_their_own_pen_after_a_pause() {
     bench.say("$hidden=pen\n");
     bench
         .plotter
-        .compute(&mut penup::stage::Undisturbed, &mut penup::plotter::Unobserved)
+        .compute(&mut penup::stage::NeverCancel, &mut penup::plotter::Unobserved)
         .expect("a job");
     let mut strokes = bench.plotter.strokes();
     let mut pens = Vec::new();

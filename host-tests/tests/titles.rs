@@ -6,7 +6,7 @@ use penup::drawing::Title;
 use penup::fixed::Millimetres;
 use penup::machine::Path;
 use penup::protocol::Escape;
-use penup::stage::Undisturbed;
+use penup::stage::NeverCancel;
 use penup_host_tests::whole_jobs::Bench;
 
 /// A line in steps, from the lower end or the left one.
@@ -22,7 +22,7 @@ fn bench(text: &str) -> Bench {
 
 /// The lines that the job inks.
 fn ink(bench: &mut Bench) -> Vec<Ink> {
-    bench.plotter.compute(&mut Undisturbed, &mut penup::plotter::Unobserved).unwrap();
+    bench.plotter.compute(&mut NeverCancel, &mut penup::plotter::Unobserved).unwrap();
     let mut strokes = bench.plotter.strokes();
     let (mut ink, mut at) = (Vec::new(), [0; 2]);
     while let Some(target) = strokes.next_target() {

@@ -9,8 +9,10 @@
 
 use penup::geometry::{Projection, Vertex};
 use penup::model::Elements;
-use penup::stage::{Scratch, Undisturbed};
-use penup::visibility::{Along, Options, Scene, Stretch, Unrounded, find_stretches, scratch_bytes};
+use penup::stage::{NeverCancel, Scratch};
+use penup::visibility::{
+    EdgeParameter, Options, Scene, Stretch, Unrounded, find_stretches, scratch_bytes,
+};
 use penup_host_tests::camera_scenes::{CameraScene, KINDS, camera_scene};
 use penup_host_tests::exact_picture::{Picture, Ratio, Seam, compare};
 use penup_host_tests::scene_files::Stretches;
@@ -28,12 +30,12 @@ fn found(scene: &CameraScene, merged_blocks: bool, spare_bytes: usize) -> Vec<St
     let options =
         Options { with_hidden: true, with_seams: true, merged_blocks, ..Options::default() };
     let scratch = Scratch::new(&mut words);
-    let result = find_stretches(&seen, options, scratch, &mut Undisturbed, &mut stretches);
+    let result = find_stretches(&seen, options, scratch, &mut NeverCancel, &mut stretches);
     assert!(result.is_ok(), "{result:?}");
     stretches.0
 }
 
-fn ratio(along: Along) -> Ratio {
+fn ratio(along: EdgeParameter) -> Ratio {
     (along.numerator.into(), along.denominator.into())
 }
 

@@ -4,14 +4,14 @@
 
 use penup::geometry::Precision;
 use penup::model::Elements;
-use penup::stage::{Scratch, Undisturbed};
-use penup::visibility::{Along, Options, Scene, Unrounded, find_stretches, scratch_bytes};
+use penup::stage::{NeverCancel, Scratch};
+use penup::visibility::{EdgeParameter, Options, Scene, Unrounded, find_stretches, scratch_bytes};
 use penup_host_tests::exact_visibility::{Piece, pieces};
 use penup_host_tests::fraction::Fraction;
 use penup_host_tests::random_scenes::{RandomScene, random_scene};
 use penup_host_tests::scene_files::Stretches;
 
-fn fraction(along: Along) -> Fraction {
+fn fraction(along: EdgeParameter) -> Fraction {
     Fraction::new(along.numerator, along.denominator)
 }
 
@@ -34,7 +34,7 @@ fn library_pieces(random: &RandomScene, merged_blocks: bool, spare_bytes: usize)
         &scene,
         Options { with_hidden: true, merged_blocks, ..Options::default() },
         Scratch::new(&mut words),
-        &mut Undisturbed,
+        &mut NeverCancel,
         &mut stretches,
     );
     assert!(result.is_ok(), "{result:?}");

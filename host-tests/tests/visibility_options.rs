@@ -1,8 +1,8 @@
 //! Seams, creases, merged blocks, bent faces, and everything that visibility refuses.
 
-use penup::geometry::{Along, Precision, Projection, Vertex};
+use penup::geometry::{EdgeParameter, Precision, Projection, Vertex};
 use penup::model::{Corner, Elements};
-use penup::stage::{Aborted, Attention, Scratch, Undisturbed};
+use penup::stage::{Aborted, Cancel, NeverCancel, Scratch};
 use penup::visibility::{
     Crease, Options, Report, Scene, SinkFull, Stretch, StretchSink, Unrounded, VisibilityError,
     find_stretches, scratch_bytes,
@@ -34,7 +34,7 @@ fn find_in(
     let mut words = vec![0u64; scratch_bytes(&scene) / 8 + 4096];
     let mut stretches = Stretches::default();
     let scratch = Scratch::new(&mut words);
-    let report = find_stretches(&scene, options, scratch, &mut Undisturbed, &mut stretches)?;
+    let report = find_stretches(&scene, options, scratch, &mut NeverCancel, &mut stretches)?;
     Ok((report, stretches.0))
 }
 
@@ -117,7 +117,7 @@ fn seams_are_seen_where_bars_in_their_place_would_be() -> Result<(), VisibilityE
         .sum();
     let options = Options { with_seams: true, ..Options::default() };
     let (_, stretches) = find(&vertices, &corners, Projection::Parallel, options)?;
-    let share = |along: Along| along.numerator as f64 / along.denominator as f64;
+    let share = |along: EdgeParameter| along.numerator as f64 / along.denominator as f64;
     let found: f64 = stretches
         .iter()
         .filter(|stretch| stretch.edge.is_none())
@@ -246,7 +246,9 @@ fn a_wall_on_a_floor_keeps_its_foot() -> Result<(), VisibilityError> {
         let Some(found) = found else {
             return Err(VisibilityError::SinkFull);
         };
-        assert!(found.visible && found.from == Along::START && found.to == Along::END);
+        assert!(
+            found.visible && found.from == EdgeParameter::START && found.to == EdgeParameter::END
+        );
     }
     Ok(())
 }
@@ -276,7 +278,7 @@ fn rounding_does_not_take_a_block_off_its_floor() -> Result<(), VisibilityError>
             let mut stretches = Stretches::default();
             let scratch = Scratch::new(&mut words);
             let options = Options::default();
-            find_stretches(&scene, options, scratch, &mut Undisturbed, &mut stretches)?;
+            find_stretches(&scene, options, scratch, &mut NeverCancel, &mut stretches)?;
             Ok(stretches.0.iter().map(|stretch| length(&view, stretch)).sum())
         };
         // Lifted by a hair, the block shows its whole foot.
@@ -330,8 +332,8 @@ fn a_bent_face_hides_like_its_triangles() -> Result<(), VisibilityError> {
     Ok(())
 }
 
-fn mirrored(along: Along) -> Along {
-    Along { numerator: along.denominator - along.numerator, denominator: along.denominator }
+fn mirrored(along: EdgeParameter) -> EdgeParameter {
+    EdgeParameter { numerator: along.denominator - along.numerator, denominator: along.denominator }
 }
 
 fn triangle() -> (Vec<Vertex>, Vec<Corner>) {
@@ -393,7 +395,7 @@ fn what_the_arithmetic_cannot_take_is_refused() {
 /// Says no at the given look.
 struct Impatient(usize);
 
-impl Attention for Impatient {
+impl Cancel for Impatient {
     fn check(&mut self) -> Result<(), Aborted> {
         self.0 = self.0.checked_sub(1).ok_or(Aborted)?;
         Ok(())
@@ -425,9 +427,9 @@ fn an_abort_a_full_sink_and_too_little_memory_end_the_search() -> std::io::Resul
         let mut words = vec![0u64; words];
         let scratch = Scratch::new(&mut words);
         let options = Options { with_seams: true, ..Options::default() };
-        let (mut attention, mut sink) = (Impatient(looks), Small(room));
-        let result = find_stretches(&scene, options, scratch, &mut attention, &mut sink);
-        (result, looks - attention.0)
+        let (mut cancel, mut sink) = (Impatient(looks), Small(room));
+        let result = find_stretches(&scene, options, scratch, &mut cancel, &mut sink);
+        (result, looks - cancel.0)
     };
     let (result, looks) = run(least, 1_000_000, 1_000_000);
     assert!(result.is_ok() && looks > 40, "{result:?} after {looks} looks");

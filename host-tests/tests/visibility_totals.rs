@@ -1,7 +1,7 @@
 //! The visible length of the example scenes against figures from an independent program.
 
 use penup::model::Elements;
-use penup::stage::{Scratch, Undisturbed};
+use penup::stage::{NeverCancel, Scratch};
 use penup::visibility::{Options, Scene, Unrounded, find_stretches, scratch_bytes};
 use penup_host_tests::scene_files::{Model, Stretches, View};
 
@@ -50,7 +50,7 @@ fn visible_length(name: &str, spare_bytes: usize) -> std::io::Result<f64> {
         &scene,
         Options::default(),
         Scratch::new(&mut words),
-        &mut Undisturbed,
+        &mut NeverCancel,
         &mut stretches,
     );
     assert!(result.is_ok(), "{result:?}");

@@ -5,8 +5,8 @@
 
 use penup::machine::Path;
 use penup::plotter::Observer;
-use penup::protocol::Refusal;
-use penup::stage::Undisturbed;
+use penup::protocol::CommandError;
+use penup::stage::NeverCancel;
 use penup::view::View;
 use penup::visibility::Stretch;
 use penup_host_tests::whole_jobs::{Bench, job_lines};
@@ -46,10 +46,10 @@ fn with_scene(scene: &str, keep: impl Fn(&str) -> bool) -> Bench {
     bench
 }
 
-fn seen(bench: &mut Bench, settings: &str) -> Result<Seen, Refusal> {
+fn seen(bench: &mut Bench, settings: &str) -> Result<Seen, CommandError> {
     assert!(!bench.say(settings).contains("error"), "{settings}");
     let mut whole = Whole::default();
-    bench.plotter.compute(&mut Undisturbed, &mut whole)?;
+    bench.plotter.compute(&mut NeverCancel, &mut whole)?;
     Ok(whole.0)
 }
 

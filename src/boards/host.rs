@@ -6,7 +6,7 @@
 use crate::machine::{Contacts, EventRing, Pen, Pins, Pulser, PulserState, StepQueue, Tick};
 use crate::model::{Corner, Position};
 use crate::motion::EventQueue;
-use crate::plotter::{Board, Lent, NO_MOVES};
+use crate::plotter::{Board, EMPTY_LOOKAHEAD, MemorySlices};
 use crate::protocol::{LineReader, RealTime, Sorter};
 use core::convert::Infallible;
 use embedded_hal::digital::{ErrorType, OutputPin};
@@ -24,14 +24,14 @@ pub const QUEUE_LENGTH: usize = 624;
 
 /// Memory for a plotter on a computer: as many vertices as an element can name, and as much to work
 /// in as any board's jobs ten times over. It is lent for as long as the process lives.
-pub fn lend_memory() -> Lent<'static> {
+pub fn lend_memory() -> MemorySlices<'static> {
     const VERTICES: usize = crate::model::VERTEX_NUMBER_LIMIT;
     const CORNERS: usize = 1 << 16;
     const WORDS: usize = 1 << 19;
-    Lent {
+    MemorySlices {
         vertices: Box::leak(Box::new(heapless::Vec::<Position, VERTICES>::new())),
         corners: Box::leak(Box::new(heapless::Vec::<Corner, CORNERS>::new())),
-        blocks: Box::leak(Box::new(NO_MOVES)),
+        blocks: Box::leak(Box::new(EMPTY_LOOKAHEAD)),
         words: std::vec![0; WORDS].leak(),
         readers: Box::leak(Box::new([const { LineReader::new() }; PORTS])),
     }
@@ -341,7 +341,7 @@ impl<'q> HostBoard<'q> {
     /// Lets `ticks` pass: the step interrupts that are due in them run.
     pub fn pass(&mut self, ticks: u64) {
         self.steps.pass_until(self.trace().now() + ticks);
-        self.queue.follow();
+        self.queue.sync_consumed();
     }
 }
 
@@ -362,7 +362,7 @@ impl Board for HostBoard<'_> {
     }
 
     fn queue(&mut self) -> &mut dyn EventQueue {
-        self.queue.follow();
+        self.queue.sync_consumed();
         &mut self.queue
     }
 

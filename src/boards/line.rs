@@ -39,7 +39,7 @@ pub struct Line {
 }
 
 /// The handler's end of a port.
-pub struct Inlet {
+pub struct ReceiveMerge {
     pub receiver: Receiver<'static>,
     count_at_abort: &'static AtomicU32,
 }
@@ -54,11 +54,11 @@ impl Shared {
     ///
     /// # Panics
     /// The second time.
-    pub fn ends(&'static self) -> (Inlet, Line) {
+    pub fn ends(&'static self) -> (ReceiveMerge, Line) {
         let (producer, consumer) = self.queue.init(Queue::new()).split();
         let count_at_abort = &self.count_at_abort;
         (
-            Inlet { receiver: Receiver::new(producer), count_at_abort },
+            ReceiveMerge { receiver: Receiver::new(producer), count_at_abort },
             Line { bytes: consumer, count_at_abort, count: 0 },
         )
     }
@@ -66,10 +66,10 @@ impl Shared {
 
 /// Notes what a byte asks for in real time. Called in the handler of a port, with the inlets of all
 /// ports; no handler that could interrupt it does the same.
-pub fn ask(asked: RealTime, inlets: &mut [Inlet]) {
+pub fn ask(asked: RealTime, inlets: &mut [ReceiveMerge]) {
     if asked.has(RealTime::ABORT) {
-        for inlet in inlets {
-            inlet.count_at_abort.store(inlet.receiver.abort(), Ordering::Release);
+        for receive_merge in inlets {
+            receive_merge.count_at_abort.store(receive_merge.receiver.abort(), Ordering::Release);
         }
     }
     // The main loop masks the handler while it takes the bits.

@@ -18,9 +18,9 @@ use bytemuck::{Pod, Zeroable};
 use super::exact::{Plane, Point, Viewpoint};
 use super::points::{self, Span};
 use super::polygon::Polygon;
-use super::{Eye, Sight, SolidEdge, SolidError, SolidSink, SolidSummary};
+use super::{EdgeVisibility, Eye, SolidEdge, SolidError, SolidSink, SolidSummary};
 use crate::geometry::Precision;
-use crate::stage::{Attention, OutOfScratch, Scratch, heap_sort_by_key};
+use crate::stage::{Cancel, OutOfScratch, Scratch, heap_sort_by_key};
 
 /// Finds how each edge of a convex solid is seen.
 ///
@@ -36,7 +36,7 @@ use crate::stage::{Attention, OutOfScratch, Scratch, heap_sort_by_key};
 /// use penup::convex::*;
 /// use penup::geometry::Precision;
 /// use penup::model::Corner;
-/// use penup::stage::{Scratch, Undisturbed};
+/// use penup::stage::{Scratch, NeverCancel};
 ///
 /// #[derive(Default)]
 /// struct Hidden(Vec<(u16, u16)>);
@@ -45,7 +45,7 @@ use crate::stage::{Attention, OutOfScratch, Scratch, heap_sort_by_key};
 ///         Ok(())
 ///     }
 ///     fn edge(&mut self, edge: SolidEdge) -> Result<(), SinkFull> {
-///         if edge.sight == Sight::Hidden {
+///         if edge.sight == EdgeVisibility::Hidden {
 ///             self.0.push(edge.ends);
 ///         }
 ///         Ok(())
@@ -59,7 +59,7 @@ use crate::stage::{Attention, OutOfScratch, Scratch, heap_sort_by_key};
 /// let eye = Eye::At([2, 2, -9]);
 /// let scratch = Scratch::new(&mut words);
 /// let exact = Precision::default();
-/// let summary = from_edges(&pyramid, &edges, eye, exact, scratch, &mut Undisturbed, &mut hidden)?;
+/// let summary = from_edges(&pyramid, &edges, eye, exact, scratch, &mut NeverCancel, &mut hidden)?;
 /// assert_eq!((summary.edges, summary.components), (8, 1));
 /// assert_eq!(hidden.0, [(0, 4), (1, 4), (2, 4), (3, 4)]);
 /// # Ok::<(), SolidError>(())
@@ -70,7 +70,7 @@ pub fn from_edges(
     eye: Eye,
     precision: Precision,
     mut scratch: Scratch<'_>,
-    attention: &mut dyn Attention,
+    cancel: &mut dyn Cancel,
     sink: &mut dyn SolidSink,
 ) -> Result<SolidSummary, SolidError> {
     eye.check()?;
@@ -88,18 +88,18 @@ pub fn from_edges(
     let inside = match points::span(positions, graph.numbers) {
         Span::Line => return Err(SolidError::AllInLine),
         // A flat thing hides nothing.
-        Span::Plane(_) => return graph.hand_over(|_| Sight::Visible, attention, sink),
+        Span::Plane(_) => return graph.hand_over(|_| EdgeVisibility::Visible, cancel, sink),
         Span::Space(inside) => inside,
     };
     let viewpoint = Viewpoint {
         eye: points::drawn_in_eye(eye, positions, graph.numbers, precision),
         inside: Some(inside.map(|number| positions[usize::from(number)])),
     };
-    let outline = graph.find_outline(&viewpoint, inside, &mut scratch, attention)?;
+    let outline = graph.find_outline(&viewpoint, inside, &mut scratch, cancel)?;
     let visible = scratch.take::<u8>(positions.len())?;
     graph.find_components();
-    graph.decide_components(&viewpoint, outline, visible, attention)?;
-    graph.hand_over(|ends| graph.sight(ends, eye, outline, visible), attention, sink)
+    graph.decide_components(&viewpoint, outline, visible, cancel)?;
+    graph.hand_over(|ends| graph.sight(ends, eye, outline, visible), cancel, sink)
 }
 
 /// The working memory that [`from_edges`] takes.
@@ -201,12 +201,12 @@ impl<'s> Graph<'s> {
         viewpoint: &Viewpoint,
         [a, b, c, _]: [u16; 4],
         scratch: &mut Scratch<'s>,
-        attention: &mut dyn Attention,
+        cancel: &mut dyn Cancel,
     ) -> Result<&'s [u16], SolidError> {
         let room = scratch.take::<u16>(self.numbers.len())?;
         let mut enclosing = Polygon::triangle(room, self.points, viewpoint, [a, b, c]);
         for number in self.numbers {
-            attention.check()?;
+            cancel.check()?;
             enclosing
                 .enclose(self.points, viewpoint, *number)
                 .map_err(|_| SolidError::EyeInside)?;
@@ -217,7 +217,7 @@ impl<'s> Graph<'s> {
         let mut count = 0;
         let (mut from, mut at) = (start, start);
         loop {
-            attention.check()?;
+            cancel.check()?;
             let seen_before = self.membership[usize::from(at)].outline_place().is_some();
             let room = outline.get_mut(count).filter(|_| !seen_before);
             *room.ok_or(SolidError::OutlineBroken { vertex: at })? = at;
@@ -287,7 +287,7 @@ impl<'s> Graph<'s> {
         viewpoint: &Viewpoint,
         outline: &[u16],
         visible: &mut [u8],
-        attention: &mut dyn Attention,
+        cancel: &mut dyn Cancel,
     ) -> Result<(), SolidError> {
         for name in self.component_names() {
             // In a rounded solid the vertex farthest from its triangle is the surest witness.
@@ -297,7 +297,7 @@ impl<'s> Graph<'s> {
                 if self.membership[usize::from(*number)] != Membership::component(name) {
                     continue;
                 }
-                attention.check()?;
+                cancel.check()?;
                 let Some(plane) = self.triangle_at(*number, viewpoint, outline) else {
                     continue;
                 };
@@ -341,7 +341,7 @@ impl<'s> Graph<'s> {
         self.numbers.iter().all(|number| plane.height(self.point(*number)) <= 0)
     }
 
-    fn sight(&self, ends: [u16; 2], eye: Eye, outline: &[u16], visible: &[u8]) -> Sight {
+    fn sight(&self, ends: [u16; 2], eye: Eye, outline: &[u16], visible: &[u8]) -> EdgeVisibility {
         let memberships = ends.map(|end| self.membership[usize::from(end)]);
         let is_visible = match memberships.map(Membership::component_name) {
             [Some(name), _] | [None, Some(name)] => visible[usize::from(name)] != 0,
@@ -350,17 +350,17 @@ impl<'s> Graph<'s> {
                     memberships.map(|membership| membership.outline_place().unwrap_or(0));
                 let (first, last) = (one.min(other), one.max(other));
                 if last - first == 1 || last - first == outline.len() - 1 {
-                    return Sight::Outline;
+                    return EdgeVisibility::Outline;
                 }
                 self.is_isolated_edge_visible(first, last, outline)
             }
         };
         if is_visible {
-            Sight::Visible
+            EdgeVisibility::Visible
         } else if self.is_behind_outline(ends, eye, outline) {
-            Sight::BehindOutline
+            EdgeVisibility::BehindOutline
         } else {
-            Sight::Hidden
+            EdgeVisibility::Hidden
         }
     }
 
@@ -408,12 +408,12 @@ impl<'s> Graph<'s> {
 
     fn hand_over(
         &self,
-        sight: impl Fn([u16; 2]) -> Sight,
-        attention: &mut dyn Attention,
+        sight: impl Fn([u16; 2]) -> EdgeVisibility,
+        cancel: &mut dyn Cancel,
         sink: &mut dyn SolidSink,
     ) -> Result<SolidSummary, SolidError> {
         for ends in self.edges {
-            attention.check()?;
+            cancel.check()?;
             sink.edge(SolidEdge { ends: (ends[0], ends[1]), sight: sight(*ends) })?;
         }
         Ok(SolidSummary {
@@ -442,7 +442,7 @@ mod tests {
     use super::super::{SinkFull, from_vertices, scratch_bytes_from_vertices};
     use super::*;
     use crate::model::Corner;
-    use crate::stage::Undisturbed;
+    use crate::stage::NeverCancel;
     use std::vec;
     use std::vec::Vec;
 
@@ -467,7 +467,7 @@ mod tests {
         let mut edges = Edges::default();
         let scratch = Scratch::new(&mut words);
         let exact = Precision::default();
-        let found = from_vertices(points, FROM_ABOVE, exact, scratch, &mut Undisturbed, &mut edges);
+        let found = from_vertices(points, FROM_ABOVE, exact, scratch, &mut NeverCancel, &mut edges);
         assert_eq!(found.map(|summary| summary.edges), Ok(edges.0.len()));
         edges.0
     }
@@ -489,9 +489,9 @@ mod tests {
                 eye: FROM_ABOVE,
                 inside: Some(inside.map(|number| points[usize::from(number)])),
             };
-            let outline = graph.find_outline(&viewpoint, inside, &mut scratch, &mut Undisturbed)?;
+            let outline = graph.find_outline(&viewpoint, inside, &mut scratch, &mut NeverCancel)?;
             graph.find_components();
-            graph.decide_components(&viewpoint, outline, &mut visible, &mut Undisturbed)?;
+            graph.decide_components(&viewpoint, outline, &mut visible, &mut NeverCancel)?;
             parts.0 = outline.iter().map(|number| number + 1).collect();
             for name in graph.component_names() {
                 let of_component = |number: &u16| {

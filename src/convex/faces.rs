@@ -20,10 +20,10 @@ use super::exact::{Plane, Point, Viewpoint};
 use super::joined::Joining;
 use super::points::{self, Span};
 use super::polygon::Polygon;
-use super::{Eye, Sight, SolidEdge, SolidError, SolidSink, SolidSummary};
+use super::{EdgeVisibility, Eye, SolidEdge, SolidError, SolidSink, SolidSummary};
 use crate::geometry::Precision;
 use crate::model::Corner;
-use crate::stage::{Attention, Scratch};
+use crate::stage::{Cancel, Scratch};
 
 /// In place of a face's number: not found yet.
 pub(super) const UNKNOWN: u16 = u16::MAX;
@@ -56,7 +56,7 @@ pub(super) type FaceCorners = [u16; 3];
 /// use penup::convex::*;
 /// use penup::geometry::Precision;
 /// use penup::model::Corner;
-/// use penup::stage::{Scratch, Undisturbed};
+/// use penup::stage::{Scratch, NeverCancel};
 ///
 /// #[derive(Default)]
 /// struct Count { visible_faces: usize, hidden_edges: usize }
@@ -67,7 +67,7 @@ pub(super) type FaceCorners = [u16; 3];
 ///         Ok(())
 ///     }
 ///     fn edge(&mut self, edge: SolidEdge) -> Result<(), SinkFull> {
-///         self.hidden_edges += usize::from(edge.sight == Sight::Hidden);
+///         self.hidden_edges += usize::from(edge.sight == EdgeVisibility::Hidden);
 ///         Ok(())
 ///     }
 /// }
@@ -76,7 +76,7 @@ pub(super) type FaceCorners = [u16; 3];
 /// let mut count = Count::default();
 /// let eye = Eye::At([5, 4, 3]);
 /// let (exact, scratch) = (Precision::default(), Scratch::new(&mut words));
-/// let summary = from_vertices(&cube, eye, exact, scratch, &mut Undisturbed, &mut count)?;
+/// let summary = from_vertices(&cube, eye, exact, scratch, &mut NeverCancel, &mut count)?;
 /// assert_eq!((summary.faces, summary.edges), (6, 12));
 /// assert_eq!((count.visible_faces, count.hidden_edges), (3, 3));
 /// # Ok::<(), SolidError>(())
@@ -86,7 +86,7 @@ pub fn from_vertices(
     eye: Eye,
     precision: Precision,
     mut scratch: Scratch<'_>,
-    attention: &mut dyn Attention,
+    cancel: &mut dyn Cancel,
     sink: &mut dyn SolidSink,
 ) -> Result<SolidSummary, SolidError> {
     eye.check()?;
@@ -109,12 +109,13 @@ pub fn from_vertices(
         Span::Space(inside) => {
             let mut scratch = scratch.reborrow();
             let drawn_in = points::drawn_in_eye(eye, positions, numbers, precision);
-            let mut search = Search::new(positions, eye, inside, numbers, &mut scratch, attention)?;
-            search.find_all_faces(attention)?;
+            let mut search =
+                FaceFinder::new(positions, eye, inside, numbers, &mut scratch, cancel)?;
+            search.find_all_faces(cancel)?;
             let mut joining = Joining::new(search.into_solid(), eye, drawn_in, &mut scratch)?;
-            joining.check_convex(precision, attention)?;
-            joining.join_faces(precision, attention)?;
-            joining.hand_over(summary, attention, sink)
+            joining.check_convex(precision, cancel)?;
+            joining.join_faces(precision, cancel)?;
+            joining.hand_over(summary, cancel, sink)
         }
     }
 }
@@ -169,7 +170,7 @@ fn flat_solid(
     }
     sink.face(marked, true)?;
     for (from, to) in sides(corners) {
-        sink.edge(SolidEdge { ends: (from, to), sight: Sight::Outline })?;
+        sink.edge(SolidEdge { ends: (from, to), sight: EdgeVisibility::Outline })?;
     }
     Ok(SolidSummary {
         faces: 1,
@@ -198,7 +199,7 @@ pub(super) struct Solid<'s> {
 }
 
 /// Harrison's search.
-struct Search<'s> {
+struct FaceFinder<'s> {
     points: &'s [Point],
     /// Vertices that may be corners of faces still to be found: Harrison's vertices list.
     candidates: &'s mut [u16],
@@ -220,7 +221,7 @@ struct Search<'s> {
     flat: usize,
 }
 
-impl<'s> Search<'s> {
+impl<'s> FaceFinder<'s> {
     /// Finds the outline and makes it the perimeter.
     fn new(
         points: &'s [Point],
@@ -228,7 +229,7 @@ impl<'s> Search<'s> {
         inside: [u16; 4],
         candidates: &'s mut [u16],
         scratch: &mut Scratch<'s>,
-        attention: &mut dyn Attention,
+        cancel: &mut dyn Cancel,
     ) -> Result<Self, SolidError> {
         let viewpoint =
             Viewpoint { eye, inside: Some(inside.map(|number| points[usize::from(number)])) };
@@ -242,7 +243,7 @@ impl<'s> Search<'s> {
         let [a, b, c, _] = inside;
         let mut outline = Polygon::triangle(room, points, &viewpoint, [a, b, c]);
         for number in candidates.iter() {
-            attention.check()?;
+            cancel.check()?;
             outline.enclose(points, &viewpoint, *number).map_err(|_| SolidError::EyeInside)?;
         }
         let outline_count = outline.corners().len();
@@ -277,13 +278,13 @@ impl<'s> Search<'s> {
         self.perimeter_count = self.outline_count;
     }
 
-    fn find_all_faces(&mut self, attention: &mut dyn Attention) -> Result<(), SolidError> {
+    fn find_all_faces(&mut self, cancel: &mut dyn Cancel) -> Result<(), SolidError> {
         while self.perimeter_count > 0 {
-            self.find_face(0, attention)?;
+            self.find_face(0, cancel)?;
         }
         self.turn_to_hidden_faces();
         while self.perimeter_count > 0 {
-            self.find_face(0, attention)?;
+            self.find_face(0, cancel)?;
         }
         Ok(())
     }
@@ -318,9 +319,9 @@ impl<'s> Search<'s> {
     }
 
     /// Finds the face to the left of one segment of the perimeter, and brings the perimeter up to date.
-    fn find_face(&mut self, at: usize, attention: &mut dyn Attention) -> Result<(), SolidError> {
+    fn find_face(&mut self, at: usize, cancel: &mut dyn Cancel) -> Result<(), SolidError> {
         let (from, to) = self.segment(at);
-        let on_plane_count = self.find_plane(from, to, attention)?;
+        let on_plane_count = self.find_plane(from, to, cancel)?;
         let third = self.on_plane[2];
         let viewpoint = Viewpoint {
             eye: Plane::through(self.point(from), self.point(to), self.point(third)).eye_above(),
@@ -359,7 +360,7 @@ impl<'s> Search<'s> {
         &mut self,
         from: u16,
         to: u16,
-        attention: &mut dyn Attention,
+        cancel: &mut dyn Cancel,
     ) -> Result<usize, SolidError> {
         let (start, end) = (self.point(from), self.point(to));
         self.on_plane[0] = from;
@@ -370,7 +371,7 @@ impl<'s> Search<'s> {
         let mut at = 0;
         while at < self.candidate_count {
             if at % VERTICES_PER_CHECK == 0 {
-                attention.check()?;
+                cancel.check()?;
             }
             let number = self.candidates[at];
             at += 1;
@@ -435,12 +436,12 @@ impl<'s> Search<'s> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stage::Undisturbed;
+    use crate::stage::NeverCancel;
     use std::vec;
     use std::vec::Vec;
 
     /// Runs `steps` on a search of the solid seen from above, its outline the first perimeter.
-    fn search_from_above(points: &[Point], steps: impl FnOnce(&mut Search<'_>)) {
+    fn search_from_above(points: &[Point], steps: impl FnOnce(&mut FaceFinder<'_>)) {
         let mut words = vec![0; scratch_bytes_from_vertices(points.len()) / 8];
         let mut scratch = Scratch::new(&mut words);
         let mut candidates: Vec<u16> = (0..points.len() as u16).collect();
@@ -450,12 +451,12 @@ mod tests {
         let eye = Eye::Towards([0, 0, 1]);
         let mut scratch = scratch.reborrow();
         let mut search =
-            Search::new(points, eye, inside, &mut candidates, &mut scratch, &mut Undisturbed);
+            FaceFinder::new(points, eye, inside, &mut candidates, &mut scratch, &mut NeverCancel);
         assert_eq!(search.as_mut().map(steps).err(), None);
     }
 
     /// The perimeter in any order, in the paper's numbers (from 1).
-    fn perimeter(search: &Search<'_>) -> Vec<(u16, u16)> {
+    fn perimeter(search: &FaceFinder<'_>) -> Vec<(u16, u16)> {
         let mut segments: Vec<_> = (0..search.perimeter_count)
             .map(|at| search.segment(at))
             .map(|(from, to)| (from + 1, to + 1))
@@ -471,13 +472,13 @@ mod tests {
     }
 
     /// Finds the face at a segment; the edges that are new, and the vertices that drop out.
-    fn step(search: &mut Search<'_>, segment: (u16, u16)) -> (Vec<(u16, u16)>, Vec<u16>) {
+    fn step(search: &mut FaceFinder<'_>, segment: (u16, u16)) -> (Vec<(u16, u16)>, Vec<u16>) {
         let (edges, candidates) =
             (search.edge_count, search.candidates[..search.candidate_count].to_vec());
         let at = (0..search.perimeter_count)
             .find(|at| search.segment(*at) == (segment.0 - 1, segment.1 - 1));
         assert_ne!(at, None, "{segment:?} is in the perimeter");
-        let found = search.find_face(at.unwrap_or(0), &mut Undisturbed);
+        let found = search.find_face(at.unwrap_or(0), &mut NeverCancel);
         assert_eq!(found, Ok(()));
         let new_edges: Vec<_> = search.edges[edges..search.edge_count]
             .iter()

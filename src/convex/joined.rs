@@ -7,10 +7,10 @@
 
 use super::exact::{Plane, Point};
 use super::faces::{HullEdge, Solid, UNKNOWN};
-use super::{Eye, Sight, SolidEdge, SolidError, SolidSink, SolidSummary};
+use super::{EdgeVisibility, Eye, SolidEdge, SolidError, SolidSink, SolidSummary};
 use crate::geometry::{Precision, are_coplanar};
 use crate::model::Corner;
-use crate::stage::{Attention, OutOfScratch, Scratch};
+use crate::stage::{Cancel, OutOfScratch, Scratch};
 
 #[derive(Debug)]
 pub(super) struct Joining<'s> {
@@ -63,12 +63,12 @@ impl<'s> Joining<'s> {
     pub(super) fn check_convex(
         &mut self,
         precision: Precision,
-        attention: &mut dyn Attention,
+        cancel: &mut dyn Cancel,
     ) -> Result<(), SolidError> {
         let mut deep = 0;
         let mut first = UNKNOWN;
         for number in self.solid.inside {
-            attention.check()?;
+            cancel.check()?;
             let point = self.solid.points[usize::from(*number)];
             let faces = 0..self.solid.faces.len() as u16; // below 2^15
             let near = precision.written > 0
@@ -89,13 +89,13 @@ impl<'s> Joining<'s> {
     pub(super) fn join_faces(
         &mut self,
         precision: Precision,
-        attention: &mut dyn Attention,
+        cancel: &mut dyn Cancel,
     ) -> Result<(), SolidError> {
         if precision.written == 0 {
             return Ok(());
         }
         for edge in self.solid.edges {
-            attention.check()?;
+            cancel.check()?;
             if self.is_almost_flat(edge, precision) {
                 self.joined[usize::from(edge.left)] = UNKNOWN;
                 self.joined[usize::from(edge.right)] = UNKNOWN;
@@ -104,7 +104,7 @@ impl<'s> Joining<'s> {
         while let Some(first) = self.largest_undecided_face() {
             self.joined[usize::from(first)] = first;
             let plane = self.plane(first);
-            while self.take_in_neighbours(first, &plane, precision, attention)? {}
+            while self.take_in_neighbours(first, &plane, precision, cancel)? {}
             if self.go_around(first).is_none() {
                 for (joined, face) in self.joined.iter_mut().zip(0..) {
                     if *joined == first && face != first {
@@ -150,7 +150,7 @@ impl<'s> Joining<'s> {
         first: u16,
         plane: &Plane,
         precision: Precision,
-        attention: &mut dyn Attention,
+        cancel: &mut dyn Cancel,
     ) -> Result<bool, SolidError> {
         let mut any = false;
         for edge in self.solid.edges {
@@ -160,7 +160,7 @@ impl<'s> Joining<'s> {
                 [UNKNOWN, inner] if inner == first => edge.left,
                 _ => continue,
             };
-            attention.check()?;
+            cancel.check()?;
             if plane.is_turned_like(&self.plane(neighbour))
                 && self.is_all_near(neighbour, first, precision)
             {
@@ -220,11 +220,11 @@ impl<'s> Joining<'s> {
     pub(super) fn hand_over(
         &mut self,
         mut summary: SolidSummary,
-        attention: &mut dyn Attention,
+        cancel: &mut dyn Cancel,
         sink: &mut dyn SolidSink,
     ) -> Result<SolidSummary, SolidError> {
         for face in 0..self.solid.faces.len() {
-            attention.check()?;
+            cancel.check()?;
             let number = face as u16; // below 2^15
             if self.joined[face] != number {
                 continue;
@@ -258,14 +258,14 @@ impl<'s> Joining<'s> {
         self.plane(face).height_of_eye(self.drawn_in) > 0
     }
 
-    fn sight(&self, left: u16, right: u16) -> Sight {
+    fn sight(&self, left: u16, right: u16) -> EdgeVisibility {
         // Not turned away, but not visible: edge-on.
         let edge_on = |face: u16| self.plane(face).height_of_eye(self.eye) >= 0;
         match (self.is_visible(left), self.is_visible(right)) {
-            (true, true) => Sight::Visible,
-            (false, false) if edge_on(left) || edge_on(right) => Sight::BehindOutline,
-            (false, false) => Sight::Hidden,
-            _ => Sight::Outline,
+            (true, true) => EdgeVisibility::Visible,
+            (false, false) if edge_on(left) || edge_on(right) => EdgeVisibility::BehindOutline,
+            (false, false) => EdgeVisibility::Hidden,
+            _ => EdgeVisibility::Outline,
         }
     }
 }

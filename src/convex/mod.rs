@@ -45,7 +45,7 @@ pub const POSITION_LIMIT: i32 = 1 << 30;
 /// How an edge of a convex solid is seen, from end to end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Sight {
+pub enum EdgeVisibility {
     /// Between a visible face and one that is hidden or edge-on.
     Outline,
     /// Between two visible faces.
@@ -63,7 +63,7 @@ pub struct SolidEdge {
     /// The vertices that it joins.
     pub ends: (u16, u16),
     /// How it is seen.
-    pub sight: Sight,
+    pub sight: EdgeVisibility,
 }
 
 /// Who takes what was found. Nothing is handed over before the whole solid is known to be in order.

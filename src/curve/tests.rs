@@ -243,19 +243,22 @@ fn what_is_cut_off_costs_no_chords() {
 
 #[test]
 fn what_is_no_curve_is_refused() {
-    fn refusal(control: &[u16], order: u8, knots: Knots<'_>) -> CurveError {
+    fn command_error(control: &[u16], order: u8, knots: Knots<'_>) -> CurveError {
         Spline::new(&[[0; 3]; 5], control, order, knots).map(|_| ()).unwrap_err()
     }
-    let listed = |knots: &'static [i32]| refusal(&[0, 1, 2], 3, Knots::Listed(knots));
+    let listed = |knots: &'static [i32]| command_error(&[0, 1, 2], 3, Knots::Listed(knots));
     for order in [0, 1, 7, 255] {
-        assert_eq!(refusal(&[0, 1, 2, 3, 4], order, Knots::Uniform), CurveError::Order);
+        assert_eq!(command_error(&[0, 1, 2, 3, 4], order, Knots::Uniform), CurveError::Order);
     }
     let too_few = CurveError::TooFewControlPoints { needed: 4 };
-    assert_eq!(refusal(&[0, 1, 2], 4, Knots::Uniform), too_few);
-    assert_eq!(refusal(&[], 4, Knots::Uniform), too_few);
-    assert_eq!(refusal(&[0, 1, 5], 3, Knots::Uniform), CurveError::UnknownPoint { number: 5 });
+    assert_eq!(command_error(&[0, 1, 2], 4, Knots::Uniform), too_few);
+    assert_eq!(command_error(&[], 4, Knots::Uniform), too_few);
     assert_eq!(
-        refusal(&vec![0; 4096], 3, Knots::Uniform),
+        command_error(&[0, 1, 5], 3, Knots::Uniform),
+        CurveError::UnknownPoint { number: 5 }
+    );
+    assert_eq!(
+        command_error(&vec![0; 4096], 3, Knots::Uniform),
         CurveError::TooManyControlPoints { limit: 4095 }
     );
     assert_eq!(listed(&[0; 5]), CurveError::WrongKnotCount { needed: 6, given: 5 });
@@ -263,5 +266,5 @@ fn what_is_no_curve_is_refused() {
     assert_eq!(listed(&[i32::MIN, 1, 2, 3, 5, 7]), CurveError::KnotTooLarge { knot: 0 });
     assert_eq!(listed(&[0, 1, 2, 2, 5, 7]), CurveError::OutsideKnots);
     let broken = Knots::Listed(&[0, 0, 0, 4, 4, 4, 9, 9, 9]);
-    assert_eq!(refusal(&[0, 1, 2, 3, 4, 0], 3, broken), CurveError::KnotRepeated { knot: 3 });
+    assert_eq!(command_error(&[0, 1, 2, 3, 4, 0], 3, broken), CurveError::KnotRepeated { knot: 3 });
 }

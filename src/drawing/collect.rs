@@ -1,25 +1,25 @@
 //! From loose lines to a drawing: coincident points merged (Harrison 5.9), nothing twice.
 //!
-//! While visibility runs, lines are packed at 12 bytes each ([`Line`]). Then [`organise`] turns them,
+//! While visibility runs, lines are packed at 12 bytes each ([`PackedLine`]). Then [`build_graph`] turns them,
 //! in the same memory, into points and segments.
 
 use super::overlap::{Loose, ink_once};
 use super::{Drawing, LineType, PAGE_LIMIT, PagePoint, Segment};
 use crate::model::PEN_LIMIT;
 use crate::stage::{
-    Aborted, Attention, OutOfScratch, Scratch, StageError, heap_sort_attentively, items, items_mut,
+    Aborted, Cancel, OutOfScratch, Scratch, StageError, heap_sort_cancellable, items, items_mut,
 };
 use bytemuck::{Pod, Zeroable};
 
 /// A straight line on the page, packed: four coordinates of 21 bits, line type, pen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 #[repr(transparent)]
-pub struct Line([u32; 3]);
+pub struct PackedLine([u32; 3]);
 
 /// The code of a full line that yields to any other: it sorts after them.
 const UNDER: u8 = 3;
 
-impl Line {
+impl PackedLine {
     /// The line from `from` to `to`, both within ±[`PAGE_LIMIT`]; `pen` below [`PEN_LIMIT`].
     pub fn new(from: PagePoint, to: PagePoint, line_type: LineType, pen: u8) -> Self {
         let pack = |c: i32| (c.clamp(1 - PAGE_LIMIT, PAGE_LIMIT - 1) + PAGE_LIMIT) as u128;
@@ -124,20 +124,20 @@ impl Stored {
 
 /// Why lines did not become a drawing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum OrganiseError {
+pub enum GraphError {
     /// The points do not fit beside the lines.
     Scratch(OutOfScratch),
     /// The user gave up.
     Aborted,
 }
 
-impl From<OutOfScratch> for OrganiseError {
+impl From<OutOfScratch> for GraphError {
     fn from(error: OutOfScratch) -> Self {
         Self::Scratch(error)
     }
 }
 
-impl From<StageError> for OrganiseError {
+impl From<StageError> for GraphError {
     fn from(error: StageError) -> Self {
         match error {
             StageError::Scratch(missing) => Self::Scratch(missing),
@@ -146,7 +146,7 @@ impl From<StageError> for OrganiseError {
     }
 }
 
-impl From<Aborted> for OrganiseError {
+impl From<Aborted> for GraphError {
     fn from(_: Aborted) -> Self {
         Self::Aborted
     }
@@ -162,36 +162,36 @@ const LINES_BETWEEN_CHECKS: usize = 32;
 /// lower pen before the higher.
 ///
 /// # Errors
-/// See [`OrganiseError`]; the lines are lost then.
+/// See [`GraphError`]; the lines are lost then.
 #[inline(never)] // Its frame must not lie under the stages'.
-pub fn organise(
+pub fn build_graph(
     words: &mut [u64],
     count: usize,
-    attention: &mut dyn Attention,
-) -> Result<Stored, OrganiseError> {
+    cancel: &mut dyn Cancel,
+) -> Result<Stored, GraphError> {
     // A line inside another that yields to it leaves two pieces of that.
-    let all: &[Line] = items(words, count).unwrap_or(&[]);
-    let marks = |line: &Line| line.0[2] >> (84 - 64);
+    let all: &[PackedLine] = items(words, count).unwrap_or(&[]);
+    let marks = |line: &PackedLine| line.0[2] >> (84 - 64);
     let yields = all.iter().any(|line| Some(marks(line)) != all.first().map(marks));
     let room = if yields { count + count / 4 + 8 } else { count };
-    let line_words = Scratch::bytes_for::<Line>(room) / 8;
+    let line_words = Scratch::bytes_for::<PackedLine>(room) / 8;
     let available = size_of_val(words);
     let missing = OutOfScratch { needed: line_words * 8, available };
     let (line_memory, rest) = words.split_at_mut_checked(line_words).ok_or(missing)?;
-    let lines: &mut [Line] = items_mut(line_memory, room).ok_or(missing)?;
+    let lines: &mut [PackedLine] = items_mut(line_memory, room).ok_or(missing)?;
 
     let (segments, points) = {
         let mut finder = PointFinder::new(Scratch::new(rest), 2 * count)?;
         let mut kept = 0;
         for at in 0..count {
             if at % LINES_BETWEEN_CHECKS == 0 {
-                attention.check()?;
+                cancel.check()?;
             }
             let (from, to, line_type_code, pen) = lines[at].unpack();
             let (from, to) = (finder.number(from)?, finder.number(to)?);
             if from != to {
                 let (from, to) = (from.min(to), from.max(to));
-                lines[kept] = Line([
+                lines[kept] = PackedLine([
                     u32::from(from) << 16 | u32::from(to),
                     u32::from(line_type_code) << 8 | u32::from(pen),
                     0,
@@ -201,13 +201,13 @@ pub fn organise(
         }
         let points = finder.points.get(..finder.count).unwrap_or(&[]);
         let loose: &mut [Loose] = bytemuck::cast_slice_mut(&mut *lines);
-        let segments = ink_once(loose, kept, points, attention)?;
+        let segments = ink_once(loose, kept, points, cancel)?;
         for [ends, ..] in loose.iter_mut().take(segments) {
             let (from, to) = (*ends >> 16, *ends & 0xFFFF);
             *ends = from.min(to) << 16 | from.max(to);
         }
         let segments_found = loose.get_mut(..segments).unwrap_or(&mut []);
-        heap_sort_attentively(segments_found, |segment| *segment, attention)?;
+        heap_sort_cancellable(segments_found, |segment| *segment, cancel)?;
         (segments, points.len())
     };
 
@@ -215,7 +215,7 @@ pub fn organise(
     let halves: &mut [u16] = bytemuck::cast_slice_mut(&mut *line_memory);
     for at in 0..segments {
         let line: [u16; 6] = core::array::from_fn(|half| halves[6 * at + half]);
-        let Line([ends, marks, _]) = bytemuck::cast(line);
+        let PackedLine([ends, marks, _]) = bytemuck::cast(line);
         let segment = Segment {
             from: (ends >> 16) as u16,
             to: ends as u16,
@@ -305,7 +305,7 @@ impl<'a> PointFinder<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stage::Undisturbed;
+    use crate::stage::NeverCancel;
     use std::vec;
     use std::vec::Vec;
 
@@ -313,17 +313,17 @@ mod tests {
         PagePoint { x, y }
     }
 
-    fn drawn(lines: &[Line], words: usize) -> Result<Vec<[(i32, i32); 2]>, OrganiseError> {
+    fn drawn(lines: &[PackedLine], words: usize) -> Result<Vec<[(i32, i32); 2]>, GraphError> {
         let mut memory = vec![0u64; words];
         items_mut(&mut memory, lines.len()).unwrap().copy_from_slice(lines);
-        let stored = organise(&mut memory, lines.len(), &mut Undisturbed)?;
+        let stored = build_graph(&mut memory, lines.len(), &mut NeverCancel)?;
         let (drawing, _) = stored.split(&mut memory)?;
         let at = |number: u16| drawing.points[usize::from(number)];
         Ok(drawing.segments.iter().map(|s| [at(s.from), at(s.to)].map(|p| (p.x, p.y))).collect())
     }
 
-    fn line(from: (i32, i32), to: (i32, i32)) -> Line {
-        Line::new(point(from.0, from.1), point(to.0, to.1), LineType::Full, 0)
+    fn line(from: (i32, i32), to: (i32, i32)) -> PackedLine {
+        PackedLine::new(point(from.0, from.1), point(to.0, to.1), LineType::Full, 0)
     }
 
     #[test]
@@ -333,7 +333,7 @@ mod tests {
             (PAGE_LIMIT - 1, 1 - PAGE_LIMIT, LineType::Dashed, 31),
             (-1, 77, LineType::Dotted, 5),
         ] {
-            let packed = Line::new(point(x, y), point(y, x), line_type, pen);
+            let packed = PackedLine::new(point(x, y), point(y, x), line_type, pen);
             assert_eq!(packed.unpack(), (point(x, y), point(y, x), line_type.code(), pen));
             assert_eq!(packed.ends(), [point(x, y), point(y, x)]);
             assert_eq!(packed.has_length(), x != y);
@@ -366,11 +366,11 @@ mod tests {
 
     #[test]
     fn a_full_line_wins_over_a_dotted_one() {
-        let dotted = Line::new(point(9, 9), point(0, 0), LineType::Dotted, 0);
+        let dotted = PackedLine::new(point(9, 9), point(0, 0), LineType::Dotted, 0);
         let mut memory = vec![0u64; 64];
         let lines = [dotted, line((0, 0), (9, 9))];
         items_mut(&mut memory, 2).unwrap().copy_from_slice(&lines);
-        let stored = organise(&mut memory, 2, &mut Undisturbed).unwrap();
+        let stored = build_graph(&mut memory, 2, &mut NeverCancel).unwrap();
         let (drawing, _) = stored.split(&mut memory).unwrap();
         assert_eq!(drawing.segments.len(), 1);
         assert_eq!(drawing.segments[0].line_type(), LineType::Full);
@@ -378,8 +378,8 @@ mod tests {
 
     #[test]
     fn what_is_seen_wins_over_what_is_hidden_and_the_lower_pen_over_the_higher() {
-        let full = |pen| Line::new(point(0, 0), point(9, 9), LineType::Full, pen);
-        let dotted = Line::new(point(9, 9), point(0, 0), LineType::Dotted, 0);
+        let full = |pen| PackedLine::new(point(0, 0), point(9, 9), LineType::Full, pen);
+        let dotted = PackedLine::new(point(9, 9), point(0, 0), LineType::Dotted, 0);
         for (lines, pen, line_type) in [
             ([full(0).under(), full(5), full(6)], 5, LineType::Full),
             ([full(7), full(1).under(), full(9).under()], 7, LineType::Full),
@@ -389,7 +389,7 @@ mod tests {
         ] {
             let mut memory = vec![0u64; 64];
             items_mut(&mut memory, 3).unwrap().copy_from_slice(&lines);
-            let stored = organise(&mut memory, 3, &mut Undisturbed).unwrap();
+            let stored = build_graph(&mut memory, 3, &mut NeverCancel).unwrap();
             let (drawing, _) = stored.split(&mut memory).unwrap();
             let segments = drawing.segments.iter().map(|s| (s.pen, s.line_type()));
             assert_eq!(segments.collect::<Vec<_>>(), [(pen, line_type)], "{lines:?}");
@@ -398,7 +398,7 @@ mod tests {
 
     #[test]
     fn too_little_memory_is_an_error_and_never_a_panic() {
-        let lines: Vec<Line> = (0..40).map(|i| line((i * 10, 0), (i * 10, 5))).collect();
+        let lines: Vec<PackedLine> = (0..40).map(|i| line((i * 10, 0), (i * 10, 5))).collect();
         assert!(drawn(&lines, 120).is_err());
         let enough = (121..400).find(|words| drawn(&lines, *words).is_ok());
         assert!(enough.is_some());

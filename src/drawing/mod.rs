@@ -2,7 +2,7 @@
 //! points.
 //!
 //! Lines come in as they are found, mapped to steps by a [`PageMap`] that fits the image to the
-//! [`Page`] and packed as [`Line`]s; [`organise`] then makes one [`Drawing`] of them: a graph whose
+//! [`Page`] and packed as [`PackedLine`]s; [`build_graph`] then makes one [`Drawing`] of them: a graph whose
 //! points are all different (Harrison 5.1.1 and 5.9). Refused: what does not fit the page or the
 //! memory.
 
@@ -12,7 +12,7 @@ mod page;
 mod title;
 mod window;
 
-pub use collect::{Line, OrganiseError, Stored, organise};
+pub use collect::{GraphError, PackedLine, Stored, build_graph};
 pub use page::{Bounds, Page, PageError, PageMap, StepsPerMillimetre};
 pub use title::{Title, TitleText, is_in_font};
 

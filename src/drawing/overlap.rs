@@ -7,20 +7,20 @@
 
 use super::PagePoint;
 use crate::fixed::product;
-use crate::stage::{Attention, OutOfScratch, StageError, heap_sort_attentively};
+use crate::stage::{Cancel, OutOfScratch, StageError, heap_sort_cancellable};
 use core::cmp::Ordering;
 
 /// A segment on its way to the drawing: the numbers of its points, line type and pen, a slope.
 pub(super) type Loose = [u32; 3];
 
 /// Which point comes first along a line: the left one, or the lower of a vertical line.
-type Place = (i32, i32);
+type PointKey = (i32, i32);
 
 /// What a segment is sorted by.
 struct Key {
     slope: u32,
-    from: Place,
-    to: Place,
+    from: PointKey,
+    to: PointKey,
     rank: u32,
 }
 
@@ -91,7 +91,7 @@ impl Eq for Key {}
 /// These take some 100,000 instructions.
 const SEGMENTS_BETWEEN_CHECKS: usize = 64;
 
-/// Cuts the first `count` of `segments` until none overlap, and returns how many there are then. More
+/// CutPositions the first `count` of `segments` until none overlap, and returns how many there are then. More
 /// than before only where a line lies inside another that yields to it.
 ///
 /// # Errors
@@ -100,7 +100,7 @@ pub(super) fn ink_once(
     segments: &mut [Loose],
     count: usize,
     points: &[PagePoint],
-    attention: &mut dyn Attention,
+    cancel: &mut dyn Cancel,
 ) -> Result<usize, StageError> {
     let full = OutOfScratch {
         needed: size_of_val(segments) + size_of::<Loose>(),
@@ -111,9 +111,9 @@ pub(super) fn ink_once(
         for segment in segments {
             segment[2] = Key::of(segment, points).slope();
         }
-        attention.check()?;
+        cancel.check()?;
     }
-    heap_sort_attentively(sorted, |segment| Key::of(segment, points), attention)?;
+    heap_sort_cancellable(sorted, |segment| Key::of(segment, points), cancel)?;
 
     // Pieces stand at the front; those that find no room there, from `count` on. On both sides those of the line in
     // hand, from `starts` on, are runs of one rank each, sorted and disjoint.
@@ -122,7 +122,7 @@ pub(super) fn ink_once(
     let mut last: Option<Key> = None;
     for read in 0..count {
         if read % SEGMENTS_BETWEEN_CHECKS == 0 {
-            attention.check()?;
+            cancel.check()?;
         }
         let segment = segments[read];
         let key = Key::of(&segment, points);
@@ -168,7 +168,7 @@ pub(super) fn ink_once(
 /// An end of a segment, with its point's number.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct End {
-    place: Place,
+    place: PointKey,
     number: u32,
 }
 

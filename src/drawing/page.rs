@@ -5,18 +5,18 @@ use super::{PAGE_LIMIT, PagePoint, Title};
 use crate::fixed::{Millimetres, divide, divide_rounding, half, product};
 use crate::geometry::{Projection, Vertex};
 use crate::model::Position;
-use crate::visibility::Along;
+use crate::visibility::EdgeParameter;
 
 /// A sheet of paper, its lower left corner at the plotter's origin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Page {
-    /// Along x.
+    /// EdgeParameter x.
     pub width: Millimetres,
-    /// Along y.
+    /// EdgeParameter y.
     pub height: Millimetres,
-    /// Kept free on all four sides.
+    /// Stored free on all four sides.
     pub margin: Millimetres,
-    /// Kept free below the drawing, for its title; 0 without one.
+    /// Stored free below the drawing, for its title; 0 without one.
     pub foot: Millimetres,
 }
 
@@ -281,7 +281,7 @@ impl PageMap {
     pub fn stretch(
         &self,
         (p, q): (Vertex, Vertex),
-        [from, to]: [Along; 2],
+        [from, to]: [EdgeParameter; 2],
         projection: Projection,
     ) -> Option<[PagePoint; 2]> {
         let [from, to] = [from, to].map(|end| between(p, q, end, projection));
@@ -292,14 +292,20 @@ impl PageMap {
     }
 
     /// The place `along` the edge from `p` to `q` in steps.
-    pub fn along(&self, p: Vertex, q: Vertex, along: Along, projection: Projection) -> PagePoint {
+    pub fn along(
+        &self,
+        p: Vertex,
+        q: Vertex,
+        along: EdgeParameter,
+        projection: Projection,
+    ) -> PagePoint {
         let [x, y, w] = between(p, q, along, projection);
         self.point(x, y, w)
     }
 }
 
 /// The place `along` the edge from `p` to `q`, homogeneous.
-fn between(p: Vertex, q: Vertex, along: Along, projection: Projection) -> [i64; 3] {
+fn between(p: Vertex, q: Vertex, along: EdgeParameter, projection: Projection) -> [i64; 3] {
     // 31 bits of the ratio are 2^-10 steps of the longest edge that a page can hold.
     let shift = (64 - along.denominator.leading_zeros()).saturating_sub(31);
     let denominator = (along.denominator >> shift).max(1) as i64;
@@ -431,15 +437,25 @@ mod tests {
         assert_eq!(map.fine(0, 0, 5), [500 * 256, 1000 * 256]);
         assert_eq!(map.fine(1, -1, 512), [500 * 256 + 250, 1000 * 256 - 500]);
         // Half way in space from z 100 to z 300 is three quarters of the way in the image.
-        let half = Along { numerator: 1 << 60, denominator: 1 << 61 };
+        let half = EdgeParameter { numerator: 1 << 60, denominator: 1 << 61 };
         let (p, q) = (corners[0], corners[1]);
         assert_eq!(map.along(p, q, half, Projection::Perspective), PagePoint { x: 750, y: 1500 });
         assert_eq!(
-            map.along(p, q, Along { numerator: 0, denominator: 1 }, Projection::Perspective),
+            map.along(
+                p,
+                q,
+                EdgeParameter { numerator: 0, denominator: 1 },
+                Projection::Perspective
+            ),
             map.point(-1, -1, 1)
         );
         assert_eq!(
-            map.along(p, q, Along { numerator: 3, denominator: 3 }, Projection::Perspective),
+            map.along(
+                p,
+                q,
+                EdgeParameter { numerator: 3, denominator: 3 },
+                Projection::Perspective
+            ),
             map.point(1, 1, 1)
         );
     }

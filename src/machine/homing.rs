@@ -94,14 +94,14 @@ pub(super) struct Homing {
     /// Where the pins were when the switch was pressed.
     pub(super) pressed_at: Option<PagePoint>,
     /// The move of the phase is planned to its end.
-    pub(super) stands: bool,
+    pub(super) is_stopped: bool,
 }
 
 impl Homing {
     /// The first phase of an axis.
     pub(super) const fn begin(axis: Axis, pressed: bool) -> Self {
         let phase = if pressed { Phase::Leave } else { Phase::Seek };
-        Self { axis, phase, pressed_at: None, stands: false }
+        Self { axis, phase, pressed_at: None, is_stopped: false }
     }
 
     /// Whether the phase is one of the slow ones.
@@ -134,10 +134,12 @@ impl Homing {
             Phase::Seek | Phase::Approach if self.pressed_at.is_none() => return Err(SwitchFault),
             Phase::Leave => Phase::Seek,
             // From where it was pressed, however far the axis ran on.
-            Phase::Seek => return Ok(Some(Self { phase: Phase::Release, stands: false, ..self })),
+            Phase::Seek => {
+                return Ok(Some(Self { phase: Phase::Release, is_stopped: false, ..self }));
+            }
             Phase::Release => Phase::Approach,
             Phase::Approach => {
-                return Ok(Some(Self { phase: Phase::PullOff, stands: false, ..self }));
+                return Ok(Some(Self { phase: Phase::PullOff, is_stopped: false, ..self }));
             }
             Phase::PullOff => {
                 return match self.axis {
@@ -147,7 +149,7 @@ impl Homing {
                 };
             }
         };
-        Ok(Some(Self { axis: self.axis, phase, pressed_at: None, stands: false }))
+        Ok(Some(Self { axis: self.axis, phase, pressed_at: None, is_stopped: false }))
     }
 }
 
@@ -158,7 +160,8 @@ impl Machine<'_> {
     /// # Errors
     /// [`MachineError::State`] unless the machine is idle or in [`Alarm::NotHomed`].
     pub fn home(&mut self, switches: Switches) -> Result<(), MachineError> {
-        if !matches!(self.state, State::Idle | State::Alarm(Alarm::NotHomed)) || !self.stands() {
+        if !matches!(self.state, State::Idle | State::Alarm(Alarm::NotHomed)) || !self.is_stopped()
+        {
             return Err(MachineError::State(self.state));
         }
         self.state = State::Home;
@@ -188,7 +191,7 @@ impl Machine<'_> {
             (State::Run | State::Hold { .. } | State::Jog | State::Abort | State::Idle, _) => {
                 // Idle as soon as all is planned, while the pins still move.
                 let is_limit = switches.any() && self.settings.is_on(Setting::HardLimits);
-                if is_limit && !self.stands() {
+                if is_limit && !self.is_stopped() {
                     self.alarm(Alarm::HardLimit);
                 }
             }
@@ -200,7 +203,7 @@ impl Machine<'_> {
             let pressed_at = Some(self.homing_place(self.motors_now()));
             self.homing = Some(Homing { pressed_at, ..homing });
             self.runner.stop();
-        } else if homing.stands && self.stands() {
+        } else if homing.is_stopped && self.is_stopped() {
             match homing.next(switches) {
                 Ok(next) => {
                     if homing.phase == Phase::PullOff {

@@ -21,7 +21,7 @@ impl Machine<'_> {
         let size = self.measure(path)?;
         if self.state == State::Idle {
             self.job = size;
-            self.fill_pen();
+            self.reset_ink_budget();
             self.before = self.runner.run();
             self.path_ended = false;
             self.state = State::Run;
@@ -82,7 +82,7 @@ impl Machine<'_> {
         matches!(
             self.state,
             State::Run | State::Hold { standing: false } | State::Abort | State::Jog
-        ) || self.homing.is_some_and(|homing| !homing.stands)
+        ) || self.homing.is_some_and(|homing| !homing.is_stopped)
     }
 
     fn is_far_enough(&self, ahead: u32) -> bool {
@@ -98,14 +98,14 @@ impl Machine<'_> {
                 if progress == Progress::Stopped || self.next_pen.is_some() =>
             {
                 if self.state == State::Run {
-                    self.fill_pen();
+                    self.reset_ink_budget();
                 }
                 self.state = State::Hold { standing: true };
             }
             State::Home => {
                 self.forget_path(self.planned_position());
                 if let Some(homing) = &mut self.homing {
-                    homing.stands = true;
+                    homing.is_stopped = true;
                 }
             }
             _ => {
@@ -122,7 +122,7 @@ impl Machine<'_> {
     }
 
     /// The pause after so much ink counts from here.
-    pub(super) fn fill_pen(&mut self) {
+    pub(super) fn reset_ink_budget(&mut self) {
         let metres = u64::from(self.settings.get(Setting::InkBeforePause).to_bits().unsigned_abs());
         // 2^-16 m to 2^-18 mm.
         self.runner.stop_after_ink((metres > 0).then_some(metres * 4000));

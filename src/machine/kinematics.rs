@@ -1,6 +1,6 @@
 //! How the pen's place on the page follows from the two motors.
 
-use super::Cuts;
+use super::CutPositions;
 use crate::drawing::PagePoint;
 use crate::step::Line;
 
@@ -23,7 +23,7 @@ const MOST_BITS: u32 = 14;
 
 /// The end of a piece of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Piece {
+pub struct SegmentEnd {
     /// The motors' steps there.
     pub motors: PagePoint,
     /// The page's.
@@ -78,10 +78,10 @@ impl Kinematics {
         places: [u32; 2],
         length: u32,
         begin: PagePoint,
-    ) -> Piece {
+    ) -> SegmentEnd {
         let to = ends[1];
         let Self::Polargraph(anchors) = self else {
-            return Piece { motors: self.motors(to), page: to, offsets: [0; 2] };
+            return SegmentEnd { motors: self.motors(to), page: to, offsets: [0; 2] };
         };
         let (ends, backward) = in_order(ends);
         let line = FineLine::new(anchors, ends);
@@ -109,7 +109,7 @@ impl Kinematics {
         });
         let [x, down] = end.place.map(|fine| rounded(fine, line.bits));
         let page = PagePoint { x: anchors.left.x + x, y: anchors.left.y - down };
-        Piece { motors, page, offsets }
+        SegmentEnd { motors, page, offsets }
     }
 
     /// The place on the page for the motors' steps; rounded where it lies between two steps.
@@ -133,9 +133,9 @@ impl Kinematics {
     }
 
     /// Where a line of the page is cut into pieces; `None` if it is straight for the motors, too.
-    pub fn cuts(self, from: PagePoint, to: PagePoint) -> Option<Cuts> {
+    pub fn cuts(self, from: PagePoint, to: PagePoint) -> Option<CutPositions> {
         match self {
-            Self::Polargraph(anchors) => Some(Cuts::new(anchors, from, to)),
+            Self::Polargraph(anchors) => Some(CutPositions::new(anchors, from, to)),
             Self::Cartesian | Self::CoreXy => None,
         }
     }

@@ -8,7 +8,7 @@
 //! Refused: orders that the state does not allow, settings that conflict, moves beyond the limits;
 //! each leaves everything as it was.
 
-mod cuts;
+mod cut_positions;
 mod homing;
 mod job;
 mod kinematics;
@@ -16,21 +16,21 @@ mod path;
 mod pulser;
 mod ring;
 mod settings;
-mod slack;
-mod split;
+mod backlash;
+mod segmenter;
 mod status;
 mod stream;
 
-pub use cuts::Cuts;
+use backlash::Backlash;
+pub use cut_positions::CutPositions;
 use homing::Homing;
 pub use homing::{Axis, Contacts, Switches};
-pub use kinematics::{Anchors, Kinematics, Piece};
+pub use kinematics::{Anchors, Kinematics, SegmentEnd};
 pub use path::{JobSize, Path, TapePath, Target, TargetList};
 pub use pulser::{Axes, Pen, PinOrder, Pins, Pulser, PulserState, Solenoid, StepQueue, Tick};
 pub use ring::EventRing;
+use segmenter::Segmenter;
 pub use settings::{SETTING_COUNT, SETTINGS, Setting, SettingError, SettingInfo, Settings, Value};
-use slack::Slack;
-use split::Split;
 pub use status::Status;
 
 use crate::drawing::PagePoint;
@@ -116,8 +116,8 @@ pub struct Machine<'m> {
     /// The runner's lengths and strokes when the job began.
     before: RunLengths,
     /// The move that is being cut into pieces.
-    split: Option<Split>,
-    slack: Slack,
+    split: Option<Segmenter>,
+    slack: Backlash,
     /// Whether the path has been read to its end.
     path_ended: bool,
     /// Whether the drivers are to be switched off once.
@@ -163,7 +163,7 @@ impl<'m> Machine<'m> {
             job: JobSize::default(),
             before: RunLengths::default(),
             split: None,
-            slack: Slack::default(),
+            slack: Backlash::default(),
             path_ended: true,
             sleep_due: false,
             homing: None,
@@ -190,7 +190,8 @@ impl<'m> Machine<'m> {
     /// # Errors
     /// See [`SettingError`]; the old value stays then.
     pub fn set(&mut self, setting: Setting, value: Value) -> Result<(), SettingError> {
-        if !matches!(self.state, State::Idle | State::Check | State::Alarm(_)) || !self.stands() {
+        if !matches!(self.state, State::Idle | State::Check | State::Alarm(_)) || !self.is_stopped()
+        {
             return Err(SettingError::Busy);
         }
         let (page, before) = (self.position(), self.settings.kinematics());
@@ -293,7 +294,7 @@ impl<'m> Machine<'m> {
     /// Stops the pulses at once and raises the pen. The position is where the pins stopped.
     pub fn alarm(&mut self, alarm: Alarm) {
         // What the interrupt has not begun with yet it has still to throw away.
-        let waits = self.pins.is_drained() && !self.stands();
+        let waits = self.pins.is_drained() && !self.is_stopped();
         self.pins.halt();
         if waits {
             self.pins.fill();
@@ -347,7 +348,7 @@ impl<'m> Machine<'m> {
                 self.runner.forget_lift();
             }
             State::Alarm(alarm)
-                if self.stands()
+                if self.is_stopped()
                     && !self.stop_is_pressed
                     && !self.runner.is_pen_held(alarm == Alarm::Restarted) =>
             {
@@ -361,7 +362,7 @@ impl<'m> Machine<'m> {
     }
 
     /// Whether every event has been worked off: the pins stand where the plan does.
-    pub fn stands(&self) -> bool {
+    pub fn is_stopped(&self) -> bool {
         self.pins.is_drained()
             && (self.pins.is_halted() || self.pins.ticks() == self.runner.ticks())
     }

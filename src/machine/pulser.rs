@@ -225,7 +225,7 @@ impl<const N: usize> StepQueue<'_, N> {
 
     /// Counts what the interrupt has taken since, which makes room, and tells the state. After
     /// [`PulserState::halt`] it throws the queue away.
-    pub fn follow(&mut self) {
+    pub fn sync_consumed(&mut self) {
         let stopped = !self.ring.is_running();
         let down = self.state.inverted() << 2;
         let (mut steps, mut slack, mut ticks) = (0u32, 0u32, 0u32);

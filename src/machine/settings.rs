@@ -101,7 +101,7 @@ pub enum Setting {
     AnchorHeight,
     /// `$234` Length of a belt when it is homed.
     HomedBelt,
-    /// `$235` Slack of x: what is lost when its motor turns round.
+    /// `$235` Backlash of x: what is lost when its motor turns round.
     BacklashX,
     /// `$236` The same of y, or of the other motor.
     BacklashY,

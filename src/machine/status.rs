@@ -27,8 +27,8 @@ impl Machine<'_> {
     /// The pen, from 0, that the machine stands and waits for.
     pub fn pen_wanted(&self) -> Option<u8> {
         // It is known earlier, when the path was read; a hold may come in between.
-        let stands = self.state == State::Hold { standing: true } && self.runner.is_at_rest();
-        self.next_pen.filter(|_| stands).map(|(pen, _)| pen)
+        let is_stopped = self.state == State::Hold { standing: true } && self.runner.is_at_rest();
+        self.next_pen.filter(|_| is_stopped).map(|(pen, _)| pen)
     }
 
     /// Where it is, and how far the job is.

@@ -150,7 +150,7 @@ impl Machine<'_> {
             State::Idle => {
                 self.job = JobSize::default();
                 self.before = self.runner.run();
-                self.fill_pen();
+                self.reset_ink_budget();
                 self.streaming = true;
                 self.stream_is_inked = false;
             }

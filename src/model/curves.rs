@@ -11,7 +11,7 @@ use crate::curve::{
     parameter_of,
 };
 use crate::fixed::{Decimal, shift_right_rounding};
-use crate::stage::{Attention, OutOfScratch, StageError};
+use crate::stage::{Cancel, OutOfScratch, StageError};
 use core::ops::Range;
 
 type Memory = heapless::VecView<Corner>;
@@ -84,7 +84,7 @@ impl<'a> Curves<'a> {
         points: &[Point],
         project: &dyn Fn([i64; 3]) -> Option<Fine>,
         tolerance: u16,
-        attention: &mut dyn Attention,
+        cancel: &mut dyn Cancel,
         each: &mut dyn FnMut(Point, bool) -> Result<(), OutOfScratch>,
     ) -> Result<(), StageError> {
         for curve in self.iter() {
@@ -92,7 +92,7 @@ impl<'a> Curves<'a> {
             let Ok(spline) = curve.spline(points) else { continue };
             let mut begins = true;
             for (_, end) in spline.chords(project, tolerance) {
-                attention.check()?;
+                cancel.check()?;
                 each(end, begins)?;
                 begins = false;
             }

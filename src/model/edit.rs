@@ -14,7 +14,7 @@ use core::ops::Range;
 /// The arrays of a model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Part {
+pub enum ElementKind {
     /// Joints.
     Vertices,
     /// Bars.
@@ -32,9 +32,9 @@ pub type Numbers = Option<[i32; 2]>;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Edit {
     /// Takes some out; the numbers above fall.
-    Delete(Part, [i32; 2]),
+    Delete(ElementKind, [i32; 2]),
     /// Takes one out; the last takes its number.
-    Plug(Part, i32),
+    Plug(ElementKind, i32),
     /// Moves a vertex to a place.
     Move(i32, [Decimal; 3]),
     /// Adds to each coordinate.
@@ -154,7 +154,7 @@ impl Model<'_> {
             }
             Edit::Plug(part, number) => {
                 let range = self.range(part, Some([number; 2]))?;
-                if self.runs > 0 && matches!(part, Part::Bars | Part::Faces) {
+                if self.runs > 0 && matches!(part, ElementKind::Bars | ElementKind::Faces) {
                     // The pen may change before and after the element that comes there.
                     self.check_corners(2 * RUN)?;
                 }
@@ -162,14 +162,14 @@ impl Model<'_> {
                 self.delete(part, range, true);
             }
             Edit::Move(number, place) => {
-                let range = self.range(Part::Vertices, Some([number; 2]))?;
+                let range = self.range(ElementKind::Vertices, Some([number; 2]))?;
                 let place = self.place(place, keep)?;
                 for vertex in self.vertices.get_mut(range).unwrap_or(&mut []) {
                     *vertex = place;
                 }
             }
             Edit::Translate(by, numbers) => {
-                let range = self.range(Part::Vertices, numbers)?;
+                let range = self.range(ElementKind::Vertices, numbers)?;
                 let mut shift = Map::NO_SHIFT;
                 for (shift, by) in shift.iter_mut().zip(by) {
                     *shift = by
@@ -182,7 +182,7 @@ impl Model<'_> {
                 self.scale_errors(1 << UNIT_BITS, is_whole, &range);
             }
             Edit::Scale(by, numbers) => {
-                let range = self.range(Part::Vertices, numbers)?;
+                let range = self.range(ElementKind::Vertices, numbers)?;
                 let mut factors = [0; 3];
                 for (factor, by) in factors.iter_mut().zip(by) {
                     let value = by.to_binary(UNIT_BITS).ok();
@@ -197,20 +197,20 @@ impl Model<'_> {
                 self.scale_errors(most, is_whole, &range);
             }
             Edit::Rotate(axis, degrees, numbers) => {
-                let range = self.range(Part::Vertices, numbers)?;
+                let range = self.range(ElementKind::Vertices, numbers)?;
                 self.transform(&Map::rotation(axis, degrees), range.clone(), keep)?;
                 if rest_of_periods(degrees, 90.0) != 0.0 {
                     self.turn_errors(&range);
                 }
             }
             Edit::Reflect(plane, numbers) => {
-                let range = self.range(Part::Vertices, numbers)?;
+                let range = self.range(ElementKind::Vertices, numbers)?;
                 self.transform(&self.reflection(plane)?, range.clone(), keep)?;
                 self.turn_faces(&range);
                 self.turn_errors(&range);
             }
             Edit::Mirror(plane, numbers) => {
-                let range = self.range(Part::Vertices, numbers)?;
+                let range = self.range(ElementKind::Vertices, numbers)?;
                 self.mirror(&self.reflection(plane)?, range, scratch, keep)?;
                 self.turn_errors(&(0..0));
             }
@@ -234,16 +234,17 @@ impl Model<'_> {
     }
 
     fn counts(&self) -> [usize; 4] {
-        [Part::Vertices, Part::Bars, Part::Faces, Part::Curves].map(|part| self.count(part))
+        [ElementKind::Vertices, ElementKind::Bars, ElementKind::Faces, ElementKind::Curves]
+            .map(|part| self.count(part))
     }
 
     /// How many there are.
-    pub fn count(&self, part: Part) -> usize {
+    pub fn count(&self, part: ElementKind) -> usize {
         match part {
-            Part::Vertices => self.vertices.len(),
-            Part::Bars => self.bars,
-            Part::Faces => self.faces,
-            Part::Curves => self.curves.count,
+            ElementKind::Vertices => self.vertices.len(),
+            ElementKind::Bars => self.bars,
+            ElementKind::Faces => self.faces,
+            ElementKind::Curves => self.curves.count,
         }
     }
 
@@ -251,13 +252,13 @@ impl Model<'_> {
     ///
     /// # Errors
     /// [`ModelError::UnknownVertex`], [`ModelError::UnknownElement`].
-    pub fn range(&self, part: Part, numbers: Numbers) -> Result<Range<usize>, ModelError> {
+    pub fn range(&self, part: ElementKind, numbers: Numbers) -> Result<Range<usize>, ModelError> {
         let count = self.count(part);
         let Some(numbers) = numbers else { return Ok(0..count) };
         let mut ends = [0; 2];
         for (end, number) in ends.iter_mut().zip(numbers) {
             *end = super::resolve(number, count).map(usize::from).ok_or(match part {
-                Part::Vertices => ModelError::UnknownVertex { number, vertices: count },
+                ElementKind::Vertices => ModelError::UnknownVertex { number, vertices: count },
                 _ => ModelError::UnknownElement { part, number, count },
             })?;
         }
@@ -265,9 +266,9 @@ impl Model<'_> {
         Ok(first.min(last)..first.max(last) + 1)
     }
 
-    fn delete(&mut self, part: Part, range: Range<usize>, plug: bool) {
+    fn delete(&mut self, part: ElementKind, range: Range<usize>, plug: bool) {
         match part {
-            Part::Vertices => {
+            ElementKind::Vertices => {
                 let gone = range.len();
                 if plug {
                     self.vertices.swap_remove(range.start);
@@ -290,8 +291,10 @@ impl Model<'_> {
                     }
                 });
             }
-            Part::Curves => self.curves.delete(self.corners, range, plug),
-            Part::Bars | Part::Faces => self.delete_elements(part == Part::Bars, range, plug),
+            ElementKind::Curves => self.curves.delete(self.corners, range, plug),
+            ElementKind::Bars | ElementKind::Faces => {
+                self.delete_elements(part == ElementKind::Bars, range, plug)
+            }
         }
     }
 

@@ -1,6 +1,6 @@
 //! Why a model is not changed.
 
-use super::Part;
+use super::ElementKind;
 use crate::curve::CurveError;
 use crate::stage::OutOfScratch;
 
@@ -52,7 +52,7 @@ pub enum ModelError {
     /// An edit names a bar, face or curve that does not exist.
     UnknownElement {
         /// Which of them.
-        part: Part,
+        part: ElementKind,
         /// The number as the user wrote it.
         number: i32,
         /// How many there are.

@@ -15,7 +15,7 @@ mod precision;
 mod undo;
 
 pub use curves::{Curves, StoredCurve};
-pub use edit::{Change, Edit, Numbers, Part};
+pub use edit::{Change, Edit, ElementKind, Numbers};
 pub use elements::{Corner, Element, Elements, VERTEX_NUMBER_LIMIT};
 pub use error::ModelError;
 pub use pens::{PEN_LIMIT, PenName, PenRun, PenWriter, Pens};

@@ -9,7 +9,7 @@ use crate::step::{Line, Pattern};
 
 /// The block in work.
 #[derive(Debug, Clone)]
-pub(super) struct Course {
+pub(super) struct BlockCursor {
     pub(super) line: Line,
     pub(super) ink: Option<LineType>,
     kind: BlockKind,
@@ -31,7 +31,7 @@ pub(super) struct Course {
     pub(super) slice: Option<SliceMoves>,
 }
 
-impl Course {
+impl BlockCursor {
     /// The beginning of a block, its dots about `dot_length` long.
     pub(super) fn new(block: &Block, dot_length: PathLength) -> Self {
         let line = Line::beside(block.dx, block.dy, block.offsets);

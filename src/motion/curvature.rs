@@ -60,7 +60,12 @@ impl Curvature {
 
     /// The path goes on to `point`, the end of the last block of `blocks`. Limits the blocks that
     /// lie on too narrow a curve.
-    pub(super) fn follow(&mut self, limits: &Limits, point: PagePoint, blocks: &mut Lookahead<'_>) {
+    pub(super) fn sync_consumed(
+        &mut self,
+        limits: &Limits,
+        point: PagePoint,
+        blocks: &mut Lookahead<'_>,
+    ) {
         let latest = place(limits, point);
         self.count = self.count.wrapping_add(1);
         for (number, level) in (1u32..).zip(self.levels.iter_mut()) {

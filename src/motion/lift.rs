@@ -84,7 +84,7 @@ impl Lift {
     }
 
     /// The pins have worked off so many ticks.
-    pub(super) fn follow(&mut self, ticks: u32) {
+    pub(super) fn sync_consumed(&mut self, ticks: u32) {
         self.found_at = self.found_at.filter(|at| ticks.wrapping_sub(*at).cast_signed() <= 0);
     }
 

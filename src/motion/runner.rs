@@ -1,6 +1,6 @@
 //! Runs the blocks: pen changes at rest, slices, moves, events.
 
-use super::course::Course;
+use super::course::BlockCursor;
 use super::curvature::Curvature;
 use super::emitter::{Kinds, MoveLevels, whole_ticks};
 use super::junction::{self, Corner, Heading};
@@ -106,7 +106,7 @@ pub struct Runner<'m> {
     lookahead: Lookahead<'m>,
     curvature: Curvature,
     emitter: Emitter,
-    course: Option<Course>,
+    course: Option<BlockCursor>,
     plan: Option<Plan>,
     /// Where the last plan ended.
     pace: Pace,
@@ -303,7 +303,7 @@ impl<'m> Runner<'m> {
 
     /// The pins have worked off so many ticks: they may have found the stop of the pen's motor.
     pub fn follow_lift(&mut self, ticks: u32) {
-        self.lift.follow(ticks);
+        self.lift.sync_consumed(ticks);
     }
 
     /// The pulses of the pen's motor sum up to `place`, and none waits.
@@ -385,7 +385,7 @@ impl<'m> Runner<'m> {
         let block = Block { dx, dy, length, entry_limit, curve_limit, ink, offsets, kind };
         self.lookahead.push(block).map_err(|_| PushError::Full)?;
         if self.limits.centripetal {
-            self.curvature.follow(&self.limits, page, &mut self.lookahead);
+            self.curvature.sync_consumed(&self.limits, page, &mut self.lookahead);
         }
         self.end = motors;
         self.page_end = page;
@@ -688,7 +688,7 @@ impl<'m> Runner<'m> {
             self.run.strokes = self.run.strokes.wrapping_add(1);
         }
         self.in_stroke = block.ink.is_some();
-        let course = self.course.insert(Course::new(&block, self.pen.dot_length));
+        let course = self.course.insert(BlockCursor::new(&block, self.pen.dot_length));
         if self.plan.is_some() {
             // The interval in work goes on with these moves.
             let units = self.brake.step_length(course.move_length);

@@ -6,9 +6,9 @@
 
 use super::incidence::Incidence;
 use super::metric::length;
-use super::near::Near;
+use super::neighbours::Neighbours;
 use super::network::Network;
-use super::pace::Pace;
+use super::work_budget::WorkBudget;
 use super::{EVEN_PART, Leg, NONE, OrderError};
 use crate::drawing::PagePoint;
 use crate::stage::{OutOfScratch, Scratch};
@@ -70,13 +70,13 @@ impl<'s, 'a> Unused<'s, 'a> {
         &mut self,
         start: u16,
         route: &mut [Leg],
-        pace: &mut Pace<'_>,
+        work_budget: &mut WorkBudget<'_>,
     ) -> Result<usize, OrderError> {
         let mut traced = 0;
         let mut finished = route.len();
         let mut here = start;
         loop {
-            pace.work(1)?;
+            work_budget.work(1)?;
             if let Some(leg) = self.take(here) {
                 route[traced] = leg;
                 traced += 1;
@@ -111,13 +111,13 @@ impl<'s, 'a> Unused<'s, 'a> {
     pub fn entrance(
         &mut self,
         far: impl Fn(PagePoint) -> u32,
-        pace: &mut Pace<'_>,
+        work_budget: &mut WorkBudget<'_>,
     ) -> Result<Option<u16>, OrderError> {
         let mut best = None;
         let mut least = u32::MAX;
         for station in 0..self.network.stations() {
             if self.is_entrance(station) {
-                pace.work(1)?;
+                work_budget.work(1)?;
                 let distance = far(self.network.place(station));
                 if distance < least || best.is_none() {
                     (least, best) = (distance, Some(station));
@@ -131,17 +131,17 @@ impl<'s, 'a> Unused<'s, 'a> {
     fn next_entrance(
         &mut self,
         pen: u16,
-        near: Option<Near<'_>>,
-        pace: &mut Pace<'_>,
+        near: Option<Neighbours<'_>>,
+        work_budget: &mut WorkBudget<'_>,
     ) -> Result<Option<u16>, OrderError> {
         for station in near.into_iter().flat_map(|near| near.of(pen)) {
-            pace.work(1)?;
+            work_budget.work(1)?;
             if self.is_entrance(station) {
                 return Ok(Some(station));
             }
         }
         let at = self.network.place(pen);
-        self.entrance(|place| length(at, place), pace)
+        self.entrance(|place| length(at, place), work_budget)
     }
 
     /// Draws everything: from `start` if given, else from the lowest x; each further part from its
@@ -149,25 +149,25 @@ impl<'s, 'a> Unused<'s, 'a> {
     pub fn nearest_first(
         &mut self,
         start: Option<u16>,
-        near: Option<Near<'_>>,
+        near: Option<Neighbours<'_>>,
         route: &mut [Leg],
-        pace: &mut Pace<'_>,
+        work_budget: &mut WorkBudget<'_>,
     ) -> Result<(), OrderError> {
         let network = self.network;
         let from_the_left = |place: PagePoint| place.x.wrapping_sub(i32::MIN) as u32;
         let mut entrance = match start {
             Some(start) => Some(start),
-            None => self.entrance(from_the_left, pace)?,
+            None => self.entrance(from_the_left, work_budget)?,
         };
         let mut done = 0;
         while let Some(start) = entrance {
             // The way in is also the way out: the move that would close the part is not needed.
             self.lift(start);
-            done += self.trace(start, &mut route[done..], pace)?;
+            done += self.trace(start, &mut route[done..], work_budget)?;
             let Some(&last) = route[..done].last() else {
                 break;
             };
-            entrance = self.next_entrance(network.end(last), near, pace)?;
+            entrance = self.next_entrance(network.end(last), near, work_budget)?;
         }
         Ok(())
     }

@@ -11,10 +11,10 @@
 use super::cycle::Cycle;
 use super::distances::Distances;
 use super::incidence::Incidence;
-use super::near::Near;
+use super::neighbours::Neighbours;
 use super::network::Network;
-use super::pace::Pace;
-use super::search::Search;
+use super::search::StepSearch;
+use super::work_budget::WorkBudget;
 use super::{Leg, NONE, OrderError};
 use crate::stage::{OutOfScratch, Scratch};
 
@@ -80,7 +80,7 @@ pub(super) struct Exchanges<'s, 'a> {
     network: Network<'a>,
     distances: Distances<'s, 'a>,
     incidence: Incidence<'s>,
-    near: Near<'s>,
+    neighbours: Neighbours<'s>,
     waiting: Waiting<'s>,
     /// The number of the gap among the legs, if there is one.
     gap: Option<u16>,
@@ -93,7 +93,7 @@ impl<'s, 'a> Exchanges<'s, 'a> {
     /// chains. All stations wait.
     pub fn new(
         network: Network<'a>,
-        near: Near<'s>,
+        neighbours: Neighbours<'s>,
         legs: &'s mut [Leg],
         gap: Option<u16>,
         lift: u32,
@@ -112,7 +112,7 @@ impl<'s, 'a> Exchanges<'s, 'a> {
             network,
             distances: Distances::new(network, scratch)?,
             incidence,
-            near,
+            neighbours,
             waiting,
             gap,
             lift,
@@ -183,11 +183,15 @@ impl<'s, 'a> Exchanges<'s, 'a> {
 
     /// Tries exchanges around all stations that wait, until the work is done or its end has come,
     /// and returns the gain. If `keep`, what was gained stays, else it can be taken back.
-    pub fn exchange_all(&mut self, keep: bool, pace: &mut Pace<'_>) -> Result<i64, OrderError> {
+    pub fn exchange_all(
+        &mut self,
+        keep: bool,
+        work_budget: &mut WorkBudget<'_>,
+    ) -> Result<i64, OrderError> {
         let mut gain = 0;
         while let Some(station) = self.waiting.next() {
-            while !pace.is_over()
-                && let Some(more) = self.exchange_at(station, pace)?
+            while !work_budget.is_over()
+                && let Some(more) = self.exchange_at(station, work_budget)?
             {
                 gain += more;
                 if keep {
@@ -202,13 +206,13 @@ impl<'s, 'a> Exchanges<'s, 'a> {
     fn exchange_at(
         &mut self,
         station: u16,
-        pace: &mut Pace<'_>,
+        work_budget: &mut WorkBudget<'_>,
     ) -> Result<Option<i64>, OrderError> {
         let mut from = self.incidence.first(station);
         while let Some(leg) = from {
             if self.move_after(leg.flipped()) > 0
                 && self.cycle.can_turn()
-                && let Some(gain) = self.exchange(leg.flipped(), pace)?
+                && let Some(gain) = self.exchange(leg.flipped(), work_budget)?
             {
                 return Ok(Some(gain));
             }
@@ -217,19 +221,23 @@ impl<'s, 'a> Exchanges<'s, 'a> {
         Ok(None)
     }
 
-    /// Cuts the move after `a` and changes two moves more at a time while that leaves something in
+    /// CutPositions the move after `a` and changes two moves more at a time while that leaves something in
     /// hand, until joining the ends leaves a gain; returns it. Else all is as it was.
-    fn exchange(&mut self, a: Leg, pace: &mut Pace<'_>) -> Result<Option<i64>, OrderError> {
+    fn exchange(
+        &mut self,
+        a: Leg,
+        work_budget: &mut WorkBudget<'_>,
+    ) -> Result<Option<i64>, OrderError> {
         let turned = self.cycle.turned();
         let mut a = a;
         let mut hand = self.move_after(a);
         let mut touched = [[NONE; 6]; STEPS];
         for touched_now in 0..STEPS {
-            let Some(step) = Search::best_step(self, a, hand, pace)? else {
+            let Some(step) = StepSearch::best_step(self, a, hand, work_budget)? else {
                 break;
             };
             touched[touched_now] = self.ends_of(a, step);
-            a = self.make(a, step, pace)?;
+            a = self.make(a, step, work_budget)?;
             if step.gain > 0 {
                 for station in touched.into_iter().flatten() {
                     self.waiting.add(station);
@@ -245,7 +253,7 @@ impl<'s, 'a> Exchanges<'s, 'a> {
     /// Where a move from `station` may go: by the gap, if that is wanted, to itself, and to those near it.
     pub fn candidates(&self, station: u16, by_gap: bool) -> impl Iterator<Item = u16> + use<'s> {
         let own = [NONE, station].into_iter().skip(usize::from(!by_gap));
-        own.chain(self.near.of(station))
+        own.chain(self.neighbours.of(station))
     }
 
     /// How far `station` is from the nearer end of the path; far if it is a cycle.
@@ -269,12 +277,17 @@ impl<'s, 'a> Exchanges<'s, 'a> {
     }
 
     /// Makes a step from the cut after `a`. Returns the leg after which the ends are joined.
-    fn make(&mut self, a: Leg, step: Step, pace: &mut Pace<'_>) -> Result<Leg, OrderError> {
+    fn make(
+        &mut self,
+        a: Leg,
+        step: Step,
+        work_budget: &mut WorkBudget<'_>,
+    ) -> Result<Leg, OrderError> {
         let c = step.c;
         let (b, d) = (self.cycle.next(a), self.cycle.next(c));
         let Some((e, third_onward)) = step.third else {
             let moved = self.cycle.turn(a, c);
-            pace.work(1 + moved as u32 / 32)?;
+            work_budget.work(1 + moved as u32 / 32)?;
             return Ok(d.flipped());
         };
         let f = self.cycle.next(e);
@@ -288,7 +301,7 @@ impl<'s, 'a> Exchanges<'s, 'a> {
             // … a, c … f, b … e, d … with `c … f` flipped.
             (false, false) => self.cycle.turn(a, c) + self.cycle.turn(f.flipped(), b.flipped()),
         };
-        pace.work(1 + moved as u32 / 32)?;
+        work_budget.work(1 + moved as u32 / 32)?;
         Ok(if third_onward { e } else { f.flipped() })
     }
 

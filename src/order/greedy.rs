@@ -6,7 +6,7 @@
 //! are passed over without a square root.
 
 use super::odd::OddPoints;
-use super::pace::Pace;
+use super::work_budget::WorkBudget;
 use super::{NONE, OrderError};
 use crate::stage::{OutOfScratch, Scratch};
 use bytemuck::{Pod, Zeroable};
@@ -28,11 +28,11 @@ const FIRST_REACH: u32 = 256 << 8;
 pub(super) fn pair(
     odd: &OddPoints<'_>,
     scratch: &mut Scratch<'_>,
-    pace: &mut Pace<'_>,
+    work_budget: &mut WorkBudget<'_>,
     mate: &mut [u16],
 ) -> Result<(), OrderError> {
     mate.fill(NONE);
-    with_regret(odd, scratch.reborrow(), pace, mate)?;
+    with_regret(odd, scratch.reborrow(), work_budget, mate)?;
     if odd.has_free_ends() {
         free_the_longest(odd, mate);
     }
@@ -40,7 +40,7 @@ pub(super) fn pair(
     for (point, (length, &partner)) in (0..).zip(lengths.iter_mut().zip(mate.iter())) {
         *length = odd.distance(point, partner);
     }
-    while exchange(odd, lengths, pace, mate)? {}
+    while exchange(odd, lengths, work_budget, mate)? {}
     Ok(())
 }
 
@@ -48,13 +48,13 @@ fn choose(
     odd: &OddPoints<'_>,
     mate: &[u16],
     chooser: u16,
-    pace: &mut Pace<'_>,
+    work_budget: &mut WorkBudget<'_>,
 ) -> Result<Choice, OrderError> {
     let mut reach = FIRST_REACH;
     loop {
         let among = odd.around(chooser, reach);
         let is_everyone = among.len() == usize::from(odd.real_count());
-        pace.work(1 + among.len() as u32 / 32)?;
+        work_budget.work(1 + among.len() as u32 / 32)?;
         let [mut first, mut second] = [(u32::MAX, NONE); 2];
         for other in among {
             if other == chooser
@@ -63,7 +63,7 @@ fn choose(
             {
                 continue;
             }
-            pace.work(1)?;
+            work_budget.work(1)?;
             let distance = odd.distance(chooser, other);
             if distance < first.0 {
                 second = first;
@@ -83,13 +83,13 @@ fn choose(
 fn with_regret(
     odd: &OddPoints<'_>,
     mut scratch: Scratch<'_>,
-    pace: &mut Pace<'_>,
+    work_budget: &mut WorkBudget<'_>,
     mate: &mut [u16],
 ) -> Result<(), OrderError> {
     let count = odd.real_count();
     let choices: &mut [Choice] = scratch.take(usize::from(count))?;
     for (chooser, choice) in (0..).zip(choices.iter_mut()) {
-        *choice = choose(odd, mate, chooser, pace)?;
+        *choice = choose(odd, mate, chooser, work_budget)?;
     }
     for _ in 0..count / 2 {
         let unmatched = |&point: &u16| mate[usize::from(point)] == NONE;
@@ -104,12 +104,12 @@ fn with_regret(
         let chosen = choices[usize::from(chooser)].first;
         mate[usize::from(chooser)] = chosen;
         mate[usize::from(chosen)] = chooser;
-        pace.work(u32::from(count) / 32)?;
+        work_budget.work(u32::from(count) / 32)?;
         for point in 0..count {
             let Choice { first, second, .. } = choices[usize::from(point)];
             let lost = |choice| choice == chooser || choice == chosen;
             if mate[usize::from(point)] == NONE && (lost(first) || lost(second)) {
-                choices[usize::from(point)] = choose(odd, mate, point, pace)?;
+                choices[usize::from(point)] = choose(odd, mate, point, work_budget)?;
             }
         }
     }
@@ -140,7 +140,7 @@ fn join(mate: &mut [u16], a: u16, b: u16) {
 fn exchange(
     odd: &OddPoints<'_>,
     lengths: &mut [u32],
-    pace: &mut Pace<'_>,
+    work_budget: &mut WorkBudget<'_>,
     mate: &mut [u16],
 ) -> Result<bool, OrderError> {
     let count = odd.count();
@@ -173,7 +173,7 @@ fn exchange(
             }
             improved = true;
         }
-        pace.work(1 + looked_at / 16)?;
+        work_budget.work(1 + looked_at / 16)?;
     }
     Ok(improved)
 }

@@ -11,11 +11,11 @@
 
 use super::euler::Unused;
 use super::exchange::Exchanges;
-use super::mend::mend;
-use super::near::Near;
+use super::neighbours::Neighbours;
 use super::network::Network;
 use super::orient::orient;
-use super::pace::Pace;
+use super::patch_cycles::patch_cycles;
+use super::work_budget::WorkBudget;
 use super::{EVEN_PART, Leg, NONE, OrderError, mark_parts};
 use crate::drawing::PagePoint;
 use crate::stage::Scratch;
@@ -60,7 +60,7 @@ pub(super) fn improve(
     network: Network<'_>,
     tour: Tour<'_>,
     mut scratch: Scratch<'_>,
-    pace: &mut Pace<'_>,
+    work_budget: &mut WorkBudget<'_>,
 ) -> Result<(), OrderError> {
     let Tour { route, open, bound, mate, start, strokes_only, effort, lift } = tour;
     let legs = route.len() + usize::from(open);
@@ -73,7 +73,7 @@ pub(super) fn improve(
     if route_moves(network, route, open).sum::<u64>() == bound {
         return Ok(());
     }
-    let near = Near::new(network, per_station, &mut scratch, pace)?;
+    let neighbours = Neighbours::new(network, per_station, &mut scratch, work_budget)?;
     let moves = route_moves(network, route, open).filter(|&length| length > 0).count() as u32;
     let budget = u64::from(moves) * u64::from(effort);
     let first_tours = if strokes_only { 2 + CORNERS.len() as u64 } else { 2 };
@@ -82,7 +82,7 @@ pub(super) fn improve(
     let cycle: &mut [Leg] = scratch.take(legs)?;
     let mut best = Best {
         network,
-        near,
+        neighbours,
         open,
         lift: 0,
         patience,
@@ -91,10 +91,10 @@ pub(super) fn improve(
         kicks: Kicks { random: SEED },
     };
     best.restore(cycle);
-    best.work_on(cycle, share, scratch.reborrow(), pace)?;
-    mend(network, near, mate, scratch.reborrow(), pace)?;
-    best.follow(mate, start, None, cycle, scratch.reborrow(), pace)?;
-    best.work_on(cycle, share, scratch.reborrow(), pace)?;
+    best.work_on(cycle, share, scratch.reborrow(), work_budget)?;
+    patch_cycles(network, neighbours, mate, scratch.reborrow(), work_budget)?;
+    best.follow(mate, start, None, cycle, scratch.reborrow(), work_budget)?;
+    best.work_on(cycle, share, scratch.reborrow(), work_budget)?;
     if strokes_only {
         // Each part as one stroke, without any move.
         mark_parts(network, scratch.reborrow(), mate)?;
@@ -102,14 +102,14 @@ pub(super) fn improve(
             *mate = EVEN_PART;
         }
         for corner in CORNERS {
-            best.follow(mate, None, Some(corner), cycle, scratch.reborrow(), pace)?;
-            best.work_on(cycle, share, scratch.reborrow(), pace)?;
+            best.follow(mate, None, Some(corner), cycle, scratch.reborrow(), work_budget)?;
+            best.work_on(cycle, share, scratch.reborrow(), work_budget)?;
         }
     }
     // Not before: a price on lifts bars the ways by which the moves become short.
     (best.lift, best.cost) = (lift, u64::MAX);
     best.restore(cycle);
-    best.work_on(cycle, budget - first_tours * share, scratch, pace)
+    best.work_on(cycle, budget - first_tours * share, scratch, work_budget)
 }
 
 /// The corners of the page: on which side of it in x and y.
@@ -124,7 +124,7 @@ fn from_corner(place: PagePoint, (x, y): (i32, i32)) -> u32 {
 /// The shortest tour so far.
 struct Best<'b, 'a> {
     network: Network<'a>,
-    near: Near<'b>,
+    neighbours: Neighbours<'b>,
     open: bool,
     /// What a move costs besides its length, in 1/256 steps.
     lift: u32,
@@ -145,17 +145,17 @@ impl Best<'_, '_> {
         corner: Option<(i32, i32)>,
         cycle: &mut [Leg],
         mut scratch: Scratch<'_>,
-        pace: &mut Pace<'_>,
+        work_budget: &mut WorkBudget<'_>,
     ) -> Result<(), OrderError> {
         let moves: &mut [u16] = scratch.take(mate.len())?;
         moves.copy_from_slice(mate);
         let mut unused = Unused::new(self.network, moves, &mut scratch)?;
         let start = match corner {
-            Some(corner) => unused.entrance(|place| from_corner(place, corner), pace)?,
+            Some(corner) => unused.entrance(|place| from_corner(place, corner), work_budget)?,
             None => start,
         };
         let (route, _) = cycle.split_at_mut(self.route.len());
-        unused.nearest_first(start, Some(self.near), route, pace)
+        unused.nearest_first(start, Some(self.neighbours), route, work_budget)
     }
 
     /// Puts the shortest tour into `cycle`.
@@ -170,7 +170,7 @@ impl Best<'_, '_> {
         cycle: &mut [Leg],
         budget: u64,
         mut scratch: Scratch<'_>,
-        pace: &mut Pace<'_>,
+        work_budget: &mut WorkBudget<'_>,
     ) -> Result<(), OrderError> {
         let mut scratch = scratch.reborrow();
         let chains = self.network.chains();
@@ -179,18 +179,18 @@ impl Best<'_, '_> {
         let gap = self.open.then_some(chains);
         let ways: &mut [u8] = scratch.take(cycle.len())?;
         let mut tour =
-            Exchanges::new(self.network, self.near, cycle, gap, self.lift, &mut scratch)?;
-        pace.grant(budget);
-        shorten(&mut tour, ways, pace)?;
+            Exchanges::new(self.network, self.neighbours, cycle, gap, self.lift, &mut scratch)?;
+        work_budget.grant(budget);
+        shorten(&mut tour, ways, work_budget)?;
         let kicks = &mut self.kicks;
         let mut in_vain = 0;
         for count in 1.. {
-            if in_vain >= self.patience || pace.is_over() {
+            if in_vain >= self.patience || work_budget.is_over() {
                 break;
             }
-            let mut gain = kicks.kick(&mut tour, pace)?;
+            let mut gain = kicks.kick(&mut tour, work_budget)?;
             if count % KICKS_BETWEEN_TURNS == 0 {
-                gain += shorten(&mut tour, ways, pace)?;
+                gain += shorten(&mut tour, ways, work_budget)?;
             }
             in_vain = if gain > 0 { 0 } else { in_vain + 1 };
         }
@@ -219,15 +219,15 @@ impl Best<'_, '_> {
 fn shorten(
     tour: &mut Exchanges<'_, '_>,
     ways: &mut [u8],
-    pace: &mut Pace<'_>,
+    work_budget: &mut WorkBudget<'_>,
 ) -> Result<i64, OrderError> {
-    let mut gain = tour.exchange_all(true, pace)?;
-    while !pace.is_over() {
-        let more = orient(tour, ways, pace)?;
+    let mut gain = tour.exchange_all(true, work_budget)?;
+    while !work_budget.is_over() {
+        let more = orient(tour, ways, work_budget)?;
         if more == 0 {
             break;
         }
-        gain += more + tour.exchange_all(true, pace)?;
+        gain += more + tour.exchange_all(true, work_budget)?;
     }
     Ok(gain)
 }
@@ -235,11 +235,11 @@ fn shorten(
 /// The most scratch that is taken at a time, in bytes.
 fn scratch_bytes(network: Network<'_>, legs: usize, per_station: usize) -> usize {
     let (stations, chains) = (usize::from(network.stations()), usize::from(network.chains()));
-    let lists = Near::bytes(stations, per_station);
+    let lists = Neighbours::bytes(stations, per_station);
     let exchanges = Scratch::bytes_for::<u16>(legs)
         + Scratch::bytes_for::<u8>(legs)
         + Exchanges::bytes(stations, chains, legs);
-    lists + exchanges.max(Near::bytes_to_find(stations))
+    lists + exchanges.max(Neighbours::bytes_to_find(stations))
 }
 
 /// The lengths of the moves of a route, with the one back if it is not open; 0 where there is none.
@@ -261,7 +261,7 @@ impl Kicks {
     fn kick(
         &mut self,
         tour: &mut Exchanges<'_, '_>,
-        pace: &mut Pace<'_>,
+        work_budget: &mut WorkBudget<'_>,
     ) -> Result<i64, OrderError> {
         tour.cycle.settle();
         let begin = self.below(tour.cycle.len() as u32) as usize;
@@ -269,7 +269,7 @@ impl Kicks {
         let mut cuts = [at; 4];
         for cut in &mut cuts {
             for _ in 0..=self.below(KICK_REACH) {
-                let Some(leg) = next_move(tour, at, pace)? else {
+                let Some(leg) = next_move(tour, at, work_budget)? else {
                     return Ok(0);
                 };
                 at = leg;
@@ -288,9 +288,9 @@ impl Kicks {
         let loss = costs[4..].iter().sum::<i64>() - costs[..4].iter().sum::<i64>();
         // … a, f … g, d … e, b … c, h …
         let moved = tour.cycle.swap(a, d, g) + tour.cycle.swap(a, f, g);
-        pace.work(8 + moved as u32 / 32)?;
+        work_budget.work(8 + moved as u32 / 32)?;
         tour.wake(&[a, b.flipped(), c, d.flipped(), e, f.flipped(), g, h.flipped()]);
-        let gain = tour.exchange_all(false, pace)? - loss;
+        let gain = tour.exchange_all(false, work_budget)? - loss;
         if gain < 0 {
             tour.cycle.take_back(0);
         }
@@ -310,11 +310,11 @@ impl Kicks {
 fn next_move(
     tour: &Exchanges<'_, '_>,
     from: Leg,
-    pace: &mut Pace<'_>,
+    work_budget: &mut WorkBudget<'_>,
 ) -> Result<Option<Leg>, OrderError> {
     let mut leg = from;
     for _ in 0..tour.cycle.len() {
-        pace.work(1)?;
+        work_budget.work(1)?;
         leg = tour.cycle.next(leg);
         if tour.move_after(leg) > 0 {
             return Ok(Some(leg));

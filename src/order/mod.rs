@@ -8,7 +8,7 @@
 //! 1. `network`: the segments of one pen become stations and chains;
 //! 2. `matching` pairs the odd stations at the least length, or `greedy` in less memory;
 //! 3. `euler` traces the strokes, part by part, nearest first;
-//! 4. `improve` shortens the tour of several parts: `mend` joins them by their own moves, `exchange`
+//! 4. `improve` shortens the tour of several parts: `patch_cycles` joins them by their own moves, `exchange`
 //!    changes moves while that helps (`search` finds how), `orient` turns strokes around.
 //!
 //! Call [`order`] with a [`Drawing`], [`Options`] and memory. Refused: a drawing whose segments name
@@ -23,13 +23,13 @@ mod greedy;
 mod improve;
 mod incidence;
 mod matching;
-mod mend;
+mod patch_cycles;
 mod metric;
-mod near;
+mod neighbours;
 mod network;
 mod odd;
 mod orient;
-mod pace;
+mod work_budget;
 mod partition;
 mod search;
 
@@ -37,13 +37,13 @@ pub use matching::scratch_bytes as matching_bytes;
 pub use metric::length;
 
 use crate::drawing::{Drawing, PAGE_LIMIT, PagePoint};
-use crate::stage::{Attention, OutOfScratch, Scratch};
+use crate::stage::{Cancel, OutOfScratch, Scratch};
 use bytemuck::{Pod, Zeroable};
 use euler::Unused;
 use improve::{Tour, improve};
 use network::{Network, start_point};
 use odd::OddPoints;
-use pace::Pace;
+use work_budget::WorkBudget;
 
 /// Points beyond so many have no number of their own: [`NONE`] is not one.
 const POINT_LIMIT: usize = NONE as usize;
@@ -181,13 +181,13 @@ pub fn order(
     drawing: Drawing<'_>,
     options: Options,
     mut scratch: Scratch<'_>,
-    attention: &mut dyn Attention,
+    cancel: &mut dyn Cancel,
     tour: &mut [Leg],
 ) -> Result<Report, OrderError> {
     let drawing =
         Drawing { points: drawing.points.get(..POINT_LIMIT).unwrap_or(drawing.points), ..drawing };
     check(drawing, tour.len())?;
-    let mut pace = Pace::new(attention);
+    let mut work_budget = WorkBudget::new(cancel);
     let mut report = Report::default();
     let mut rest = &mut *tour;
     let pens = || drawing.segments.iter().map(|segment| segment.pen);
@@ -200,7 +200,7 @@ pub fn order(
         let (legs, others) = rest.split_at_mut(count);
         rest = others;
         let options = Options { shape, ..options };
-        order_pen(drawing, pen, options, scratch.reborrow(), &mut pace, legs, &mut report)?;
+        order_pen(drawing, pen, options, scratch.reborrow(), &mut work_budget, legs, &mut report)?;
         let place = |leg: Leg| drawing.points[usize::from(start_point(drawing.segments, leg))];
         if let (Some(at), Some(&first), Some(&last)) = (pen_at, legs.first(), legs.last())
             && length(at, place(last.flipped())) < length(at, place(first))
@@ -239,13 +239,13 @@ fn order_pen<'a>(
     pen: u8,
     options: Options,
     mut scratch: Scratch<'a>,
-    pace: &mut Pace<'_>,
+    work_budget: &mut WorkBudget<'_>,
     tour: &mut [Leg],
     report: &mut Report,
 ) -> Result<(), OrderError> {
-    pace.answer()?;
+    work_budget.answer()?;
     let network = Network::new(drawing, pen, &mut scratch)?;
-    pace.answer()?;
+    work_budget.answer()?;
     let route: &mut [Leg] = scratch.take(usize::from(network.chains()))?;
     let bound = report.bound;
     {
@@ -253,13 +253,18 @@ fn order_pen<'a>(
         let mate: &mut [u16] = scratch.take(usize::from(network.stations()))?;
         let Parts { count: parts, odd: odd_parts } = mark_parts(network, scratch.reborrow(), mate)?;
         let odd_before = report.odd_points;
-        pace.answer()?;
-        let start = pair_odd(network, options, scratch.reborrow(), pace, mate, report)?;
+        work_budget.answer()?;
+        let start = pair_odd(network, options, scratch.reborrow(), work_budget, mate, report)?;
         {
             let mut scratch = scratch.reborrow();
             let unused: &mut [u16] = scratch.take(mate.len())?;
             unused.copy_from_slice(mate);
-            Unused::new(network, unused, &mut scratch)?.nearest_first(start, None, route, pace)?;
+            Unused::new(network, unused, &mut scratch)?.nearest_first(
+                start,
+                None,
+                route,
+                work_budget,
+            )?;
         }
         report.components += parts;
         if parts > 1 && options.effort > 0 {
@@ -276,7 +281,7 @@ fn order_pen<'a>(
                 effort: options.effort,
                 lift: options.lift,
             };
-            improve(network, tour, scratch, pace)?;
+            improve(network, tour, scratch, work_budget)?;
         }
     }
     turn(network, options.shape, route);
@@ -333,7 +338,7 @@ fn pair_odd(
     network: Network<'_>,
     options: Options,
     mut scratch: Scratch<'_>,
-    pace: &mut Pace<'_>,
+    work_budget: &mut WorkBudget<'_>,
     mate: &mut [u16],
     report: &mut Report,
 ) -> Result<Option<u16>, OrderError> {
@@ -342,11 +347,11 @@ fn pair_odd(
     for (place, (station, _)) in stations.iter_mut().zip(odd_stations()) {
         *place = station;
     }
-    pace.sort(stations, |&station| (network.place(station).x, station))?;
+    work_budget.sort(stations, |&station| (network.place(station).x, station))?;
     let odd = OddPoints::new(network, stations, options.shape == Shape::OpenPath);
     report.odd_points += u32::from(odd.real_count());
     let partners: &mut [u16] = scratch.take(usize::from(odd.count()))?;
-    report.bound += pair_points(&odd, options.method, scratch, pace, partners)?;
+    report.bound += pair_points(&odd, options.method, scratch, work_budget, partners)?;
     for (&station, &partner) in stations.iter().zip(partners.iter()) {
         mate[usize::from(station)] = odd.station(partner).unwrap_or(NONE);
     }
@@ -364,7 +369,7 @@ fn pair_points(
     odd: &OddPoints<'_>,
     method: Method,
     mut scratch: Scratch<'_>,
-    pace: &mut Pace<'_>,
+    work_budget: &mut WorkBudget<'_>,
     partners: &mut [u16],
 ) -> Result<u64, OrderError> {
     let exact = match method {
@@ -376,9 +381,9 @@ fn pair_points(
         }
     };
     if exact {
-        return matching::pair(odd, scratch, pace, partners);
+        return matching::pair(odd, scratch, work_budget, partners);
     }
-    greedy::pair(odd, &mut scratch, pace, partners)?;
+    greedy::pair(odd, &mut scratch, work_budget, partners)?;
     Ok(0)
 }
 

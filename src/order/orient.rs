@@ -6,7 +6,7 @@
 //! up to a stroke depends only on which way that stroke is drawn (Bellman's principle).
 
 use super::exchange::Exchanges;
-use super::pace::Pace;
+use super::work_budget::WorkBudget;
 use super::{Leg, NONE, OrderError};
 
 /// Turns strokes (legs between two moves) around where that makes the tour shorter. Returns the
@@ -14,7 +14,7 @@ use super::{Leg, NONE, OrderError};
 pub(super) fn orient(
     tour: &mut Exchanges<'_, '_>,
     ways: &mut [u8],
-    pace: &mut Pace<'_>,
+    work_budget: &mut WorkBudget<'_>,
 ) -> Result<i64, OrderError> {
     let Some(begin) = tour.first_of_a_stroke() else {
         return Ok(0);
@@ -25,7 +25,7 @@ pub(super) fn orient(
     let mut strokes = 0;
     let mut leg = begin;
     loop {
-        pace.work(4)?;
+        work_budget.work(4)?;
         let last = tour.last_of_stroke(leg, begin);
         let (start, end) = (tour.start(leg), tour.end(last));
         if strokes == 0 {
@@ -62,7 +62,7 @@ pub(super) fn orient(
         if stroke > 0 && way == 1 {
             tour.wake(&[before, leg.flipped(), last, after.flipped()]);
             let moved = tour.cycle.turn(before, last);
-            pace.work(moved as u32 / 32)?;
+            work_budget.work(moved as u32 / 32)?;
         }
         leg = after;
     }

@@ -6,7 +6,7 @@
 
 use super::cycle::Stand;
 use super::exchange::{Exchanges, Step};
-use super::pace::Pace;
+use super::work_budget::WorkBudget;
 use super::{Leg, NONE, OrderError};
 
 /// What became of trying a station.
@@ -43,7 +43,7 @@ struct Cut {
 }
 
 /// A search for a step from the cut after `a`.
-pub(super) struct Search<'e, 's, 'a> {
+pub(super) struct StepSearch<'e, 's, 'a> {
     tour: &'e Exchanges<'s, 'a>,
     a: Leg,
     b: Leg,
@@ -56,13 +56,13 @@ pub(super) struct Search<'e, 's, 'a> {
     best: Option<Step>,
 }
 
-impl<'e, 's, 'a> Search<'e, 's, 'a> {
+impl<'e, 's, 'a> StepSearch<'e, 's, 'a> {
     /// The first step found that leaves a gain, else the one that leaves the most of `hand`.
     pub fn best_step(
         tour: &'e Exchanges<'s, 'a>,
         a: Leg,
         hand: i64,
-        pace: &mut Pace<'_>,
+        work_budget: &mut WorkBudget<'_>,
     ) -> Result<Option<Step>, OrderError> {
         let end = tour.end(a);
         if end == NONE {
@@ -73,9 +73,9 @@ impl<'e, 's, 'a> Search<'e, 's, 'a> {
         let a_stands = tour.cycle.stand(a);
         let to_ends = tour.distance_to_path_ends(first);
         let mut search = Self { tour, a, b, a_stands, first, to_ends, best: None };
-        pace.work(2)?;
+        work_budget.work(2)?;
         for second in tour.candidates(end, tour.is_open()) {
-            if search.second_cut(hand, end, second, pace)? != Outcome::GoOn {
+            if search.second_cut(hand, end, second, work_budget)? != Outcome::GoOn {
                 break;
             }
         }
@@ -88,9 +88,9 @@ impl<'e, 's, 'a> Search<'e, 's, 'a> {
         hand: i64,
         end: u16,
         second: u16,
-        pace: &mut Pace<'_>,
+        work_budget: &mut WorkBudget<'_>,
     ) -> Result<Outcome, OrderError> {
-        pace.work(1)?;
+        work_budget.work(1)?;
         let tour = self.tour;
         let hand = tour.left(hand, end, second);
         if hand == 0 {
@@ -101,7 +101,7 @@ impl<'e, 's, 'a> Search<'e, 's, 'a> {
                 continue;
             }
             let cut = self.cut(leg, self.before(leg));
-            pace.work(2)?;
+            work_budget.work(2)?;
             let hand = hand + tour.distance(cut.far, second);
             let gain = tour.left(hand, cut.far, self.first);
             if !cut.onward && gain > 0 {
@@ -112,7 +112,7 @@ impl<'e, 's, 'a> Search<'e, 's, 'a> {
             // What a longer step by the gap can do is found from its other end.
             if cut.far != NONE
                 && second != NONE
-                && self.third_cuts(hand, &cut, pace)? == Outcome::Found
+                && self.third_cuts(hand, &cut, work_budget)? == Outcome::Found
             {
                 return Ok(Outcome::Found);
             }
@@ -125,11 +125,11 @@ impl<'e, 's, 'a> Search<'e, 's, 'a> {
         &mut self,
         hand: i64,
         second: &Cut,
-        pace: &mut Pace<'_>,
+        work_budget: &mut WorkBudget<'_>,
     ) -> Result<Outcome, OrderError> {
         let by_gap = self.tour.is_open() && hand > self.to_ends;
         for third in self.tour.candidates(second.far, by_gap) {
-            match self.third_cut(hand, second, third, pace)? {
+            match self.third_cut(hand, second, third, work_budget)? {
                 Outcome::GoOn => {}
                 Outcome::TooFar => break,
                 Outcome::Found => return Ok(Outcome::Found),
@@ -144,9 +144,9 @@ impl<'e, 's, 'a> Search<'e, 's, 'a> {
         hand: i64,
         second: &Cut,
         third: u16,
-        pace: &mut Pace<'_>,
+        work_budget: &mut WorkBudget<'_>,
     ) -> Result<Outcome, OrderError> {
-        pace.work(1)?;
+        work_budget.work(1)?;
         let tour = self.tour;
         let hand = tour.left(hand, second.far, third);
         if hand == 0 {
@@ -160,7 +160,7 @@ impl<'e, 's, 'a> Search<'e, 's, 'a> {
             if within == onward || before.way == 0 || before.way == second.way {
                 continue;
             }
-            pace.work(2)?;
+            work_budget.work(2)?;
             let cut = self.cut(leg, before);
             let hand = hand + tour.distance(cut.far, third);
             let gain = tour.left(hand, cut.far, self.first);

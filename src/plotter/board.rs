@@ -60,12 +60,12 @@ pub trait Board {
     ///
     /// # Errors
     /// The last state is still kept.
-    fn keep(&mut self, record: Record, parts: &[&[u8]]) -> Result<(), NotKept> {
+    fn save(&mut self, record: Record, parts: &[&[u8]]) -> Result<(), NotStored> {
         let _ = (record, parts);
         Ok(())
     }
     /// Hands the kept state of `record` to `take`, if there is one.
-    fn recall(&mut self, record: Record, take: &mut dyn FnMut(&mut dyn Kept)) {
+    fn load(&mut self, record: Record, take: &mut dyn FnMut(&mut dyn Stored)) {
         let _ = (record, take);
     }
     /// Sleeps until an interrupt; returns at once if one came since it last returned.
@@ -87,15 +87,15 @@ pub enum Record {
 
 /// The board cannot keep something.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct NotKept;
+pub struct NotStored;
 
 /// A kept state, from its beginning on.
-pub trait Kept {
+pub trait Stored {
     /// The next bytes, as many as there are and `into` holds; says how many.
     fn read(&mut self, into: &mut [u8]) -> usize;
 }
 
-impl<F: embedded_storage::nor_flash::ReadNorFlash> Kept for crate::storage::Reader<'_, F> {
+impl<F: embedded_storage::nor_flash::ReadNorFlash> Stored for crate::storage::Reader<'_, F> {
     fn read(&mut self, into: &mut [u8]) -> usize {
         Self::read(self, into)
     }

@@ -1,7 +1,7 @@
 //! What each stage of a job takes of a board's working memory, checked when the library is compiled.
 
 use super::memory::{Lm3s6965Memory, Memory, PicoMemory};
-use crate::drawing::{Line, PagePoint, Segment};
+use crate::drawing::{PackedLine, PagePoint, Segment};
 use crate::geometry::Vertex;
 use crate::order::{self, Leg};
 use crate::stage::Scratch;
@@ -69,7 +69,7 @@ impl Budget {
             working: 8 * WORDS,
             view: Scratch::bytes_for::<Vertex>(scene.vertices),
             visibility: visibility::least_bytes(scene.vertices, scene.corners, scene.faces),
-            lines: Scratch::bytes_for::<Line>(scene.lines),
+            lines: Scratch::bytes_for::<PackedLine>(scene.lines),
             // A line has at most two points of its own.
             drawing: Scratch::bytes_for::<Segment>(scene.lines)
                 + Scratch::bytes_for::<PagePoint>(2 * scene.lines),

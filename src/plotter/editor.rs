@@ -4,8 +4,8 @@ use super::stream::{Listing, Task};
 use super::{Board, Inner, Job, Reply};
 use crate::fixed::BinaryFraction;
 use crate::machine::State;
-use crate::model::{Change, Edit, Element, Model, Numbers, Part};
-use crate::protocol::Refusal;
+use crate::model::{Change, Edit, Element, ElementKind, Model, Numbers};
+use crate::protocol::CommandError;
 use crate::stage::Scratch;
 use core::fmt;
 
@@ -20,7 +20,7 @@ pub(super) struct Keeper<'k> {
 impl Keeper<'_> {
     /// Copies the model in place of the last copy: it is about to change.
     #[inline(never)] // Once is enough.
-    pub(super) fn keep(&mut self, model: &Model<'_>) {
+    pub(super) fn save(&mut self, model: &Model<'_>) {
         *self.kept_words = 0;
         if self.is_idle {
             self.job.release();
@@ -45,13 +45,13 @@ impl<'m> Inner<'m> {
     }
 
     #[inline(never)] // Its frame must not lie under the stages'.
-    pub(super) fn edit<B: Board>(&mut self, edit: Edit, board: &mut B) -> Result<(), Refusal> {
+    pub(super) fn edit<B: Board>(&mut self, edit: Edit, board: &mut B) -> Result<(), CommandError> {
         if self.machine.state() != State::Idle {
-            return Err(Refusal::Busy);
+            return Err(CommandError::Busy);
         }
         self.job.release();
         let (model, mut keeper, scratch) = self.split();
-        match model.edit(edit, scratch, &mut |model| keeper.keep(model)) {
+        match model.edit(edit, scratch, &mut |model| keeper.save(model)) {
             Ok(Change { vertices, bars, faces, curves }) => {
                 Reply(board).line(format_args!(
                     "[EDIT:vertices {vertices:+}, bars {bars:+}, faces {faces:+}, curves {curves:+}]"
@@ -61,34 +61,38 @@ impl<'m> Inner<'m> {
                 }
                 Ok(())
             }
-            Err(error) => Err(Refusal::Model(error)),
+            Err(error) => Err(CommandError::Model(error)),
         }
     }
 
     #[inline(never)] // Its frame must not lie under the stages'.
-    pub(super) fn undo(&mut self) -> Result<(), Refusal> {
+    pub(super) fn undo(&mut self) -> Result<(), CommandError> {
         if core::mem::take(&mut self.kept_words) == 0 {
-            return Err(Refusal::NothingToUndo);
+            return Err(CommandError::NothingToUndo);
         }
         self.model.restore(self.words);
         Ok(())
     }
 
     /// Begins to list what has these numbers.
-    pub(super) fn begin_list(&mut self, part: Part, numbers: Numbers) -> Result<(), Refusal> {
-        let range = self.model.range(part, numbers).map_err(Refusal::Model)?;
+    pub(super) fn begin_list(
+        &mut self,
+        part: ElementKind,
+        numbers: Numbers,
+    ) -> Result<(), CommandError> {
+        let range = self.model.range(part, numbers).map_err(CommandError::Model)?;
         self.task = Some(Task::List(Listing::Model(part, range.end), range.start));
         Ok(())
     }
 
     /// Lists the element at a place in its array.
     #[inline(never)] // Its frame must not lie under the stages'.
-    pub(super) fn list_one<B: Board>(&self, part: Part, at: usize, board: &mut B) {
+    pub(super) fn list_one<B: Board>(&self, part: ElementKind, at: usize, board: &mut B) {
         let mut reply = Reply(board);
         let number = at + 1;
         let elements = self.model.elements().iter();
         match part {
-            Part::Vertices => {
+            ElementKind::Vertices => {
                 let Some(vertex) = self.model.vertices().get(at) else { return };
                 let fraction_bits = self.model.fraction_bits();
                 let [x, y, z] = vertex.coordinates().map(|c| BinaryFraction {
@@ -98,18 +102,18 @@ impl<'m> Inner<'m> {
                 });
                 reply.line(format_args!("[v {number}: {x} {y} {z}]"));
             }
-            Part::Bars => {
+            ElementKind::Bars => {
                 let mut bars = elements.filter(|element| matches!(element, Element::Bar(..)));
                 let Some(Element::Bar(from, to)) = bars.nth(at) else { return };
                 reply.line(format_args!("[l {number}:{}]", List([from, to].into_iter())));
             }
-            Part::Faces => {
+            ElementKind::Faces => {
                 let mut faces = elements.filter(|face| matches!(face, Element::Face(_)));
                 let Some(Element::Face(corners)) = faces.nth(at) else { return };
                 let numbers = List(corners.iter().map(|corner| corner.vertex()));
                 reply.line(format_args!("[f {number}:{numbers}]"));
             }
-            Part::Curves => {
+            ElementKind::Curves => {
                 let Some(curve) = self.model.curves().iter().nth(at) else { return };
                 let numbers = List(curve.control.iter().copied());
                 reply.line(format_args!("[c {number} of degree {}:{numbers}]", curve.order - 1));

@@ -2,17 +2,16 @@
 
 use super::{PlotOptions, plan, solid, title};
 use crate::drawing::{
-    Bounds, Drawing, Line, LineType, OrganiseError, PageMap, StepsPerMillimetre, Stored, organise,
+    Bounds, Drawing, GraphError, LineType, PackedLine, PageMap, StepsPerMillimetre, Stored,
+    build_graph,
 };
 use crate::geometry::{Projection, Vertex};
 use crate::machine::{Path, Target};
 use crate::model::{Elements, Model, ModelError, Position};
 use crate::order::{self, Leg, OrderError};
-use crate::protocol::{HiddenLines, Refusal, WayToSee};
-use crate::stage::{
-    Aborted, Attention, OutOfScratch, Scratch, Stage, StageError, items, items_mut,
-};
-use crate::view::{Camera, Flattening, Seen, View, see};
+use crate::protocol::{CommandError, HiddenLines, VisibilityMode};
+use crate::stage::{Aborted, Cancel, OutOfScratch, Scratch, Stage, StageError, items, items_mut};
+use crate::view::{Camera, Flattening, Seen, View, project_scene};
 use crate::visibility::{self, Scene, SinkFull, Stretch, StretchSink, Unrounded, VisibilityError};
 
 /// Who is shown each stretch as it is found, in view coordinates: the preview.
@@ -50,50 +49,50 @@ impl Job {
     /// Computes the job for `model` in `words`, which then hold it.
     ///
     /// # Errors
-    /// The [`Refusal`] to reply with; `words` hold no job then, the model is untouched.
+    /// The [`CommandError`] to reply with; `words` hold no job then, the model is untouched.
     pub fn compute(
         model: &Model<'_>,
         options: &PlotOptions,
         steps: StepsPerMillimetre,
         words: &mut [u64],
-        attention: &mut dyn Attention,
+        cancel: &mut dyn Cancel,
         observer: &mut dyn Observer,
-    ) -> Result<Self, Refusal> {
+    ) -> Result<Self, CommandError> {
         if model.elements().corners().is_empty()
             && model.curves().is_empty()
-            && options.see != WayToSee::Vertices
+            && options.see != VisibilityMode::Vertices
         {
-            return Err(Refusal::NothingToPlot);
+            return Err(CommandError::NothingToPlot);
         }
         title::check(options, steps)?;
         let (mut degenerate_faces, mut joined_edges) = (0, 0);
         let lines = if model.is_plan() && options.shows_plans_flat() {
-            plan::lay_out(model, options, steps, words, attention, observer)?
+            plan::lay_out(model, options, steps, words, cancel, observer)?
         } else {
             match options.see {
-                WayToSee::Vertices | WayToSee::Edges => {
+                VisibilityMode::Vertices | VisibilityMode::Edges => {
                     let lines;
                     (lines, joined_edges) =
-                        solid::project(model, options, steps, words, attention, observer)?;
+                        solid::project(model, options, steps, words, cancel, observer)?;
                     lines
                 }
-                WayToSee::Faces | WayToSee::Wire => {
-                    let found = project(model, options, steps, words, attention, observer)?;
+                VisibilityMode::Faces | VisibilityMode::Wire => {
+                    let found = project(model, options, steps, words, cancel, observer)?;
                     degenerate_faces = found.degenerate_faces;
                     found.lines
                 }
             }
         };
-        let lines = title::write(options, steps, words, lines, attention)?;
-        attention.enter(Stage::Order);
-        let stored = organise(words, lines, attention)?;
-        let (drawing, mut rest) = stored.split(words).map_err(Refusal::DrawingTooLarge)?;
+        let lines = title::write(options, steps, words, lines, cancel)?;
+        cancel.enter(Stage::Order);
+        let stored = build_graph(words, lines, cancel)?;
+        let (drawing, mut rest) = stored.split(words).map_err(CommandError::DrawingTooLarge)?;
         let legs = drawing.segments.len();
         if legs == 0 {
-            return Err(Refusal::NothingToPlot);
+            return Err(CommandError::NothingToPlot);
         }
-        let tour = rest.take::<Leg>(legs).map_err(Refusal::DrawingTooLarge)?;
-        let report = order::order(drawing, options.order(steps), rest, attention, tour)?;
+        let tour = rest.take::<Leg>(legs).map_err(CommandError::DrawingTooLarge)?;
+        let report = order::order(drawing, options.order(steps), rest, cancel, tour)?;
         Ok(Self { stored, legs, report, degenerate_faces, joined_edges })
     }
 
@@ -236,7 +235,7 @@ pub(super) const FOR_BOUNDS: u16 = 32;
 const CORNERS_BETWEEN_CHECKS: usize = 128;
 
 /// Of lines for each corner: a lattice of cubes shows half of its edges, and has two corners to an edge.
-const LIKELY_BYTES: usize = size_of::<Line>() / 3;
+const LIKELY_BYTES: usize = size_of::<PackedLine>() / 3;
 
 /// What stands in the memory after the hidden lines are found.
 struct Found {
@@ -246,18 +245,18 @@ struct Found {
 
 /// Looks at the model through the camera that the options choose.
 #[inline(never)] // Its frame must not lie under the stages'.
-pub(super) fn look(
+pub(super) fn camera_view(
     model: &Model<'_>,
     options: &PlotOptions,
-    attention: &mut dyn Attention,
-) -> Result<(Camera, View), Refusal> {
-    attention.enter(Stage::View);
-    let camera = options.camera(model).ok_or(Refusal::NothingToPlot)?;
-    attention.check()?;
-    let view = View::new(&camera, model).map_err(Refusal::View)?;
-    attention.check()?;
+    cancel: &mut dyn Cancel,
+) -> Result<(Camera, View), CommandError> {
+    cancel.enter(Stage::View);
+    let camera = options.camera(model).ok_or(CommandError::NothingToPlot)?;
+    cancel.check()?;
+    let view = View::new(&camera, model).map_err(CommandError::View)?;
+    cancel.check()?;
     if !options.clip_behind {
-        view.refuse_behind(model).map_err(Refusal::View)?;
+        view.refuse_behind(model).map_err(CommandError::View)?;
     }
     Ok((camera, view))
 }
@@ -268,33 +267,33 @@ fn project(
     options: &PlotOptions,
     steps: StepsPerMillimetre,
     words: &mut [u64],
-    attention: &mut dyn Attention,
+    cancel: &mut dyn Cancel,
     observer: &mut dyn Observer,
-) -> Result<Found, Refusal> {
+) -> Result<Found, CommandError> {
     let total = size_of_val(words);
-    let (_, view) = look(model, options, attention)?;
+    let (_, view) = camera_view(model, options, cancel)?;
     let projection = view.projection();
     let mut scratch = Scratch::new(words);
     let curves_map = if model.curves().is_empty() {
         None
     } else {
         let scratch = scratch.reborrow();
-        Some(map_with_curves(&view, model, options, steps, scratch, attention)?)
+        Some(map_with_curves(&view, model, options, steps, scratch, cancel)?)
     };
     let on_page = curves_map.as_ref().map(|map| |x, y, w| map.fine(x, y, w));
     let curves = on_page.as_ref().map(|on_page| Flattening { on_page, tolerance: HALF_A_STEP });
     let Seen { vertices, elements, degenerate_faces, is_cut } =
-        see(&view, model, curves, &mut scratch, attention)?;
+        project_scene(&view, model, curves, &mut scratch, cancel)?;
     let map = match curves_map {
         Some(map) => map,
         None => {
-            let bounds = bounds_of(vertices, elements, projection, attention)?;
-            let bounds = bounds.ok_or(Refusal::NothingToPlot)?;
+            let bounds = bounds_of(vertices, elements, projection, cancel)?;
+            let bounds = bounds.ok_or(CommandError::NothingToPlot)?;
             fit(&view, is_cut, &bounds, options, steps)?
         }
     };
 
-    attention.enter(Stage::Visibility);
+    cancel.enter(Stage::Visibility);
     let precision = options.precision_of(model);
     let positions = bytemuck::cast_slice(model.vertices());
     let unrounded = Unrounded::new(positions, precision, view.doubt(precision.written));
@@ -305,24 +304,23 @@ fn project(
     let available = scratch.available_bytes();
     let needed = visibility::scratch_bytes(&scene);
     let spare = available.checked_sub(needed).ok_or(OutOfScratch { needed, available });
-    let spare = spare.map_err(Refusal::DrawingTooLarge)?;
+    let spare = spare.map_err(CommandError::DrawingTooLarge)?;
     let wanted = options.visibility(&view);
     let likely = elements.corners().len() * LIKELY_BYTES * if wanted.with_hidden { 2 } else { 1 };
     let finest = (3 * needed).min(spare.saturating_sub(likely).max(spare / 4));
     let grids = [finest, finest.min(spare / 4), finest.min(spare / 8), finest.min(spare / 16)];
-    let mut lines = Err(Refusal::NothingToPlot);
+    let mut lines = Err(CommandError::NothingToPlot);
     for (at, grid) in grids.iter().enumerate() {
         let (stage_memory, mut line_memory) = scratch.reborrow().split(needed + grid);
         let lines_at = (total - line_memory.available_bytes()) / size_of::<u64>();
-        let room = line_memory.available_bytes() / size_of::<Line>();
-        let collected = line_memory.take(room).map_err(Refusal::DrawingTooLarge)?;
+        let room = line_memory.available_bytes() / size_of::<PackedLine>();
+        let collected = line_memory.take(room).map_err(CommandError::DrawingTooLarge)?;
         let collector = Collector { lines: collected, count: 0 };
         let mut sink = PageSink { collector, map: &map, view: &view, options, observer };
-        let found = if options.see == WayToSee::Wire {
-            visibility::follow_wire(&scene, wanted, stage_memory, attention, &mut sink)
+        let found = if options.see == VisibilityMode::Wire {
+            visibility::follow_wire(&scene, wanted, stage_memory, cancel, &mut sink)
         } else {
-            visibility::find_stretches(&scene, wanted, stage_memory, attention, &mut sink)
-                .map(|_| ())
+            visibility::find_stretches(&scene, wanted, stage_memory, cancel, &mut sink).map(|_| ())
         };
         lines = match found {
             Ok(()) => Ok((lines_at, sink.collector.count)),
@@ -344,12 +342,12 @@ fn bounds_of(
     vertices: &[Vertex],
     elements: Elements<'_>,
     projection: Projection,
-    attention: &mut dyn Attention,
+    cancel: &mut dyn Cancel,
 ) -> Result<Option<Bounds>, Aborted> {
     // Two divisions a corner: some at a time, so that the line is answered.
     let mut bounds: Option<Bounds> = None;
     for corners in elements.corners().chunks(CORNERS_BETWEEN_CHECKS) {
-        attention.check()?;
+        cancel.check()?;
         let used = corners.iter().filter_map(|c| vertices.get(usize::from(c.vertex()))).copied();
         bounds = grow(bounds, Bounds::around(used, projection));
     }
@@ -364,8 +362,8 @@ fn map_with_curves(
     options: &PlotOptions,
     steps: StepsPerMillimetre,
     mut scratch: Scratch<'_>,
-    attention: &mut dyn Attention,
-) -> Result<PageMap, Refusal> {
+    cancel: &mut dyn Cancel,
+) -> Result<PageMap, CommandError> {
     let projection = view.projection();
     let near = view.near().unwrap_or(i32::MIN);
     let in_front = |position: &Position| {
@@ -374,21 +372,21 @@ fn map_with_curves(
     };
     let mut all = None;
     for positions in model.vertices().chunks(CORNERS_BETWEEN_CHECKS) {
-        attention.check()?;
+        cancel.check()?;
         all = grow(all, Bounds::around(positions.iter().map(in_front), projection));
     }
-    let all = all.ok_or(Refusal::NothingToPlot)?;
-    let rough = PageMap::fit(&all, &options.sheet(), steps).map_err(Refusal::Page)?;
+    let all = all.ok_or(CommandError::NothingToPlot)?;
+    let rough = PageMap::fit(&all, &options.sheet(), steps).map_err(CommandError::Page)?;
     let (mut bounds, is_cut) = {
         let mut scratch = scratch.reborrow();
-        let seen = see(view, model, None, &mut scratch, attention)?;
-        (bounds_of(seen.vertices, seen.elements, projection, attention)?, seen.is_cut)
+        let seen = project_scene(view, model, None, &mut scratch, cancel)?;
+        (bounds_of(seen.vertices, seen.elements, projection, cancel)?, seen.is_cut)
     };
     let flattening = Flattening { on_page: &|x, y, w| rough.fine(x, y, w), tolerance: FOR_BOUNDS };
-    flattening.each_chord(view, model, scratch, attention, &mut |chord| {
+    flattening.each_chord(view, model, scratch, cancel, &mut |chord| {
         bounds = grow(bounds, Bounds::around(chord.into_iter(), projection));
     })?;
-    let bounds = bounds.ok_or(Refusal::NothingToPlot)?;
+    let bounds = bounds.ok_or(CommandError::NothingToPlot)?;
     fit(view, is_cut, &bounds, options, steps)
 }
 
@@ -399,25 +397,25 @@ fn fit(
     bounds: &Bounds,
     options: &PlotOptions,
     steps: StepsPerMillimetre,
-) -> Result<PageMap, Refusal> {
+) -> Result<PageMap, CommandError> {
     match view.field(Bounds::FRACTION_BITS).filter(|_| is_cut) {
         Some(field) => PageMap::fit_field(bounds, field, &options.sheet(), steps),
         None => PageMap::fit(bounds, &options.sheet(), steps),
     }
-    .map_err(Refusal::Page)
+    .map_err(CommandError::Page)
 }
 
-fn refused(error: VisibilityError, corners: usize) -> Refusal {
+fn refused(error: VisibilityError, corners: usize) -> CommandError {
     match error {
-        VisibilityError::Scratch(missing) => Refusal::DrawingTooLarge(missing),
-        VisibilityError::Aborted => Refusal::Aborted,
+        VisibilityError::Scratch(missing) => CommandError::DrawingTooLarge(missing),
+        VisibilityError::Aborted => CommandError::Aborted,
         VisibilityError::TooManyCorners(limit) => {
-            Refusal::Model(ModelError::TooManyCorners { limit, needed: corners })
+            CommandError::Model(ModelError::TooManyCorners { limit, needed: corners })
         }
         // The model and the view see to it that neither of the first two can be; the sink speaks for itself.
         VisibilityError::UnknownVertex(_)
         | VisibilityError::OutOfRange(_)
-        | VisibilityError::SinkFull => Refusal::NothingToPlot,
+        | VisibilityError::SinkFull => CommandError::NothingToPlot,
     }
 }
 
@@ -426,19 +424,19 @@ pub(super) fn grow(bounds: Option<Bounds>, more: Option<Bounds>) -> Option<Bound
     bounds.zip(more).map(|(a, b)| a.union(b)).or(bounds).or(more)
 }
 
-/// Moves `count` lines from word `at` to the front, where [`organise`] looks for them.
+/// Moves `count` lines from word `at` to the front, where [`build_graph`] looks for them.
 pub(super) fn to_front(words: &mut [u64], at: usize, count: usize) {
-    let line_words = Scratch::bytes_for::<Line>(count) / size_of::<u64>();
+    let line_words = Scratch::bytes_for::<PackedLine>(count) / size_of::<u64>();
     words.copy_within(at..at + line_words, 0);
 }
 
-impl From<Aborted> for Refusal {
+impl From<Aborted> for CommandError {
     fn from(_: Aborted) -> Self {
         Self::Aborted
     }
 }
 
-impl From<StageError> for Refusal {
+impl From<StageError> for CommandError {
     fn from(error: StageError) -> Self {
         match error {
             StageError::Scratch(missing) => Self::DrawingTooLarge(missing),
@@ -447,16 +445,16 @@ impl From<StageError> for Refusal {
     }
 }
 
-impl From<OrganiseError> for Refusal {
-    fn from(error: OrganiseError) -> Self {
+impl From<GraphError> for CommandError {
+    fn from(error: GraphError) -> Self {
         match error {
-            OrganiseError::Scratch(missing) => Self::DrawingTooLarge(missing),
-            OrganiseError::Aborted => Self::Aborted,
+            GraphError::Scratch(missing) => Self::DrawingTooLarge(missing),
+            GraphError::Aborted => Self::Aborted,
         }
     }
 }
 
-impl From<OrderError> for Refusal {
+impl From<OrderError> for CommandError {
     fn from(error: OrderError) -> Self {
         match error {
             OrderError::Scratch(missing) => Self::DrawingTooLarge(missing),
@@ -470,17 +468,17 @@ impl From<OrderError> for Refusal {
 
 /// Packs lines at the front of the memory.
 pub(super) struct Collector<'a> {
-    lines: &'a mut [Line],
+    lines: &'a mut [PackedLine],
     pub(super) count: usize,
 }
 
 impl<'a> Collector<'a> {
     pub(super) fn new(words: &'a mut [u64]) -> Self {
-        let room = size_of_val(words) / size_of::<Line>();
+        let room = size_of_val(words) / size_of::<PackedLine>();
         Self { lines: items_mut(words, room).unwrap_or(&mut []), count: 0 }
     }
 
-    pub(super) fn line(&mut self, line: Line) -> Result<(), SinkFull> {
+    pub(super) fn line(&mut self, line: PackedLine) -> Result<(), SinkFull> {
         if line.has_length() {
             *self.lines.get_mut(self.count).ok_or(SinkFull)? = line;
             self.count += 1;
@@ -490,11 +488,11 @@ impl<'a> Collector<'a> {
 
     pub(super) fn missing(&self) -> OutOfScratch {
         let available = size_of_val(self.lines);
-        OutOfScratch { needed: available + size_of::<Line>(), available }
+        OutOfScratch { needed: available + size_of::<PackedLine>(), available }
     }
 
-    pub(super) fn out_of_memory(&self) -> Refusal {
-        Refusal::DrawingTooLarge(self.missing())
+    pub(super) fn out_of_memory(&self) -> CommandError {
+        CommandError::DrawingTooLarge(self.missing())
     }
 }
 
@@ -533,7 +531,7 @@ impl StretchSink for PageSink<'_> {
         let along = [stretch.from, stretch.to];
         match self.map.stretch((p, q), along, self.view.projection()) {
             Some([from, to]) => {
-                let line = Line::new(from, to, line_type, stretch.pen);
+                let line = PackedLine::new(from, to, line_type, stretch.pen);
                 self.collector.line(if stretch.visible { line } else { line.under() })
             }
             None => Ok(()),

@@ -1,8 +1,8 @@
 //! What outlives a loss of power.
 
-use super::{Board, Job, NotKept, Record};
+use super::{Board, Job, NotStored, Record};
 use crate::machine::{SETTING_COUNT, Setting, Settings, Value};
-use crate::protocol::Refusal;
+use crate::protocol::CommandError;
 
 /// A setting: its number, its value.
 const SETTING_BYTES: usize = 6;
@@ -11,7 +11,7 @@ const SETTING_BYTES: usize = 6;
 #[inline(never)] // Its frame must not lie under the stages'.
 pub(super) fn settings<B: Board>(board: &mut B) -> Settings {
     let mut values = heapless::Vec::<(u16, Value), SETTING_COUNT>::new();
-    board.recall(Record::Settings, &mut |kept| {
+    board.load(Record::Settings, &mut |kept| {
         let mut bytes = [0; SETTING_BYTES];
         // More than there are settings would be of another version: its last ones are not known here.
         while kept.read(&mut bytes) == SETTING_BYTES && !values.is_full() {
@@ -26,15 +26,18 @@ pub(super) fn settings<B: Board>(board: &mut B) -> Settings {
 /// Keeps them.
 ///
 /// # Errors
-/// [`Refusal::NotKept`]: they are in force, but those before will be after a loss of power.
+/// [`CommandError::NotStored`]: they are in force, but those before will be after a loss of power.
 #[inline(never)] // Its frame must not lie under the stages'.
-pub(super) fn keep_settings<B: Board>(settings: &Settings, board: &mut B) -> Result<(), Refusal> {
+pub(super) fn keep_settings<B: Board>(
+    settings: &Settings,
+    board: &mut B,
+) -> Result<(), CommandError> {
     let mut bytes = [0; SETTING_COUNT * SETTING_BYTES];
     for (place, (info, value)) in bytes.chunks_exact_mut(SETTING_BYTES).zip(settings.iter()) {
         place[..2].copy_from_slice(&info.number.to_le_bytes());
         place[2..].copy_from_slice(&value.to_bits().to_le_bytes());
     }
-    board.keep(Record::Settings, &[&bytes]).map_err(|_| Refusal::NotKept)
+    board.save(Record::Settings, &[&bytes]).map_err(|_| CommandError::NotStored)
 }
 
 /// Tells a kept job from one of another layout.
@@ -51,36 +54,36 @@ fn steps(settings: &Settings) -> [u32; 2] {
 /// Keeps a job, which lies in `words`.
 ///
 /// # Errors
-/// [`NotKept`]: the job before still is.
+/// [`NotStored`]: the job before still is.
 #[inline(never)] // Its frame must not lie under the stages'.
 pub(super) fn keep_job<B: Board>(
     job: &Job,
     settings: &Settings,
     words: &[u64],
     board: &mut B,
-) -> Result<(), NotKept> {
+) -> Result<(), NotStored> {
     let [x, y] = steps(settings);
     let numbers = [JOB_LAYOUT, x, y].into_iter().chain(job.figures());
     let mut header = [[0; 4]; JOB_HEADER];
     for (place, number) in header.iter_mut().zip(numbers) {
         *place = number.to_le_bytes();
     }
-    let memory = words.get(..job.words()).ok_or(NotKept)?;
-    board.keep(Record::Job, &[header.as_flattened(), bytemuck::cast_slice(memory)])
+    let memory = words.get(..job.words()).ok_or(NotStored)?;
+    board.save(Record::Job, &[header.as_flattened(), bytemuck::cast_slice(memory)])
 }
 
 /// The job that was kept last; its memory is then in `words`.
 ///
 /// # Errors
-/// [`Refusal::NoJobKept`], [`Refusal::OtherSteps`]; `words` hold no job then.
+/// [`CommandError::NoJobKept`], [`CommandError::OtherSteps`]; `words` hold no job then.
 #[inline(never)] // Its frame must not lie under the stages'.
 pub(super) fn job<B: Board>(
     settings: &Settings,
     words: &mut [u64],
     board: &mut B,
-) -> Result<Job, Refusal> {
-    let mut found = Err(Refusal::NoJobKept);
-    board.recall(Record::Job, &mut |kept| {
+) -> Result<Job, CommandError> {
+    let mut found = Err(CommandError::NoJobKept);
+    board.load(Record::Job, &mut |kept| {
         let mut header = [[0; 4]; JOB_HEADER];
         if kept.read(header.as_flattened_mut()) != size_of_val(&header) {
             return;
@@ -92,7 +95,7 @@ pub(super) fn job<B: Board>(
             return;
         };
         if [x, y] != steps(settings) {
-            found = Err(Refusal::OtherSteps);
+            found = Err(CommandError::OtherSteps);
         } else if kept.read(bytemuck::cast_slice_mut(memory)) == size_of_val(memory) {
             found = Ok(job);
         }

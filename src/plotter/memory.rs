@@ -5,10 +5,10 @@ use crate::motion::Block;
 use crate::protocol::LineReader;
 
 /// The moves planned ahead with 64 KiB of RAM, before any is: see [`crate::motion`].
-pub const NO_MOVES: [Block; 32] = [Block::EMPTY; 32];
+pub const EMPTY_LOOKAHEAD: [Block; 32] = [Block::EMPTY; 32];
 
 /// The same for 264 KiB of RAM: at 500 mm/s and 15 m/s² the machine stops within 167 chords of 0.05 mm.
-pub const NO_MOVES_OF_PICO: [Block; 192] = [Block::EMPTY; 192];
+pub const EMPTY_LOOKAHEAD_OF_PICO: [Block; 192] = [Block::EMPTY; 192];
 
 /// The large memory of a plotter: a model, what its jobs are computed in, and the line that each of
 /// its serial ports is sending.
@@ -47,8 +47,8 @@ impl<const VERTICES: usize, const CORNERS: usize, const WORDS: usize, const PORT
     }
 
     /// Lends it to a plotter, with memory for the moves planned ahead.
-    pub fn lend<'m>(&'m mut self, blocks: &'m mut [Block]) -> Lent<'m> {
-        Lent {
+    pub fn lend<'m>(&'m mut self, blocks: &'m mut [Block]) -> MemorySlices<'m> {
+        MemorySlices {
             vertices: &mut self.vertices,
             corners: &mut self.corners,
             blocks,
@@ -68,7 +68,7 @@ impl<const VERTICES: usize, const CORNERS: usize, const WORDS: usize, const PORT
 
 /// Memory lent to a plotter, of whatever size.
 #[derive(Debug)]
-pub struct Lent<'m> {
+pub struct MemorySlices<'m> {
     /// For the model's vertices.
     pub vertices: &'m mut heapless::VecView<Position>,
     /// For the corners of its faces and the ends of its bars.

@@ -2,7 +2,7 @@
 //!
 //! A [`Plotter`] is polled by the board's main loop ([`run`] is that loop). Each poll answers what was
 //! asked in real time, carries out the lines that came, and keeps the step queue full. A `$plot`
-//! computes the whole [`Job`] first ([`Attention`] answers the line meanwhile), then the strokes go
+//! computes the whole [`Job`] first ([`Cancel`] answers the line meanwhile), then the strokes go
 //! to the machine. This is the only module that knows all the others.
 
 mod board;
@@ -20,9 +20,11 @@ mod solid;
 mod stream;
 mod title;
 
-pub use board::{Board, Kept, NotKept, REPLY_BYTES, Record};
+pub use board::{Board, NotStored, REPLY_BYTES, Record, Stored};
 pub use job::{Cursor, Job, Observer, Strokes, Unobserved};
-pub use memory::{Lent, Lm3s6965Memory, Memory, NO_MOVES, NO_MOVES_OF_PICO, PicoMemory};
+pub use memory::{
+    EMPTY_LOOKAHEAD, EMPTY_LOOKAHEAD_OF_PICO, Lm3s6965Memory, Memory, MemorySlices, PicoMemory,
+};
 pub use options::PlotOptions;
 
 use crate::machine::{
@@ -30,8 +32,8 @@ use crate::machine::{
     Target, Value,
 };
 use crate::model::Model;
-use crate::protocol::{Command, Label, LineReader, Numbering, RealTime, Received, Refusal};
-use crate::stage::{Aborted, Attention, Stage};
+use crate::protocol::{Command, CommandError, Label, LineReader, Numbering, RealTime, Received};
+use crate::stage::{Aborted, Cancel, Stage};
 use program::Program;
 use reply::Reply;
 use stream::{Listing, Progress, Task};
@@ -44,7 +46,7 @@ const AHEAD_TICKS: u32 = crate::motion::TICKS_PER_SECOND / 20;
 const PORT_LIMIT: usize = 2;
 
 /// Polls the plotter for ever; sleeps when there is nothing to do.
-pub fn run<B: Board>(board: &mut B, memory: Lent<'_>, pins: &PulserState) -> ! {
+pub fn run<B: Board>(board: &mut B, memory: MemorySlices<'_>, pins: &PulserState) -> ! {
     let mut plotter = Plotter::with_settings(memory, pins, kept::settings(board));
     if board.fault().is_some() {
         plotter.inner.machine.alarm(Alarm::Restarted);
@@ -105,14 +107,18 @@ struct Inner<'m> {
 impl<'m> Plotter<'m> {
     /// An idle plotter at the page's origin with an empty model. `pins` is what the board's step
     /// interrupt counts in.
-    pub fn new(memory: Lent<'m>, pins: &'m PulserState) -> Self {
+    pub fn new(memory: MemorySlices<'m>, pins: &'m PulserState) -> Self {
         Self::with_settings(memory, pins, Settings::default())
     }
 
     /// The same with other settings than the defaults.
     #[inline(never)] // What it builds the parts in must not lie under the stages' frames.
-    pub fn with_settings(memory: Lent<'m>, pins: &'m PulserState, settings: Settings) -> Self {
-        let Lent { vertices, corners, blocks, words, readers } = memory;
+    pub fn with_settings(
+        memory: MemorySlices<'m>,
+        pins: &'m PulserState,
+        settings: Settings,
+    ) -> Self {
+        let MemorySlices { vertices, corners, blocks, words, readers } = memory;
         Self {
             readers,
             numberings: [Numbering::default(), Numbering::default()],
@@ -172,13 +178,13 @@ impl<'m> Plotter<'m> {
                         shows_drive = true;
                         Ok(())
                     }
-                    Err(refusal) => Err(refusal),
+                    Err(command_error) => Err(command_error),
                 };
                 (outcome, label)
             }
             Received::Answer(outcome, label) => (outcome, label),
         };
-        if outcome == Err(Refusal::Aborted) {
+        if outcome == Err(CommandError::Aborted) {
             self.reset(board);
         }
         (self.port, self.label) = (port, label);
@@ -192,7 +198,7 @@ impl<'m> Plotter<'m> {
     }
 
     #[inline(never)] // Its frame must not lie under the stages'.
-    fn answer<B: Board>(&mut self, outcome: Result<(), Refusal>, board: &mut B) {
+    fn answer<B: Board>(&mut self, outcome: Result<(), CommandError>, board: &mut B) {
         if let Some(numbering) = self.numberings.get_mut(self.port) {
             numbering.note(self.label, outcome);
         }
@@ -222,13 +228,13 @@ impl<'m> Plotter<'m> {
     /// Computes the job of `$plot` without drawing it.
     ///
     /// # Errors
-    /// The [`Refusal`] that `$plot` would reply with.
+    /// The [`CommandError`] that `$plot` would reply with.
     pub fn compute(
         &mut self,
-        attention: &mut dyn Attention,
+        cancel: &mut dyn Cancel,
         observer: &mut dyn Observer,
-    ) -> Result<&Job, Refusal> {
-        self.inner.compute(attention, observer)?;
+    ) -> Result<&Job, CommandError> {
+        self.inner.compute(cancel, observer)?;
         Ok(&self.inner.job)
     }
 
@@ -282,37 +288,37 @@ impl Inner<'_> {
             self.machine.state(),
             State::Idle | State::Alarm(_) | State::Sleep | State::Check
         );
-        is_over && self.machine.stands()
+        is_over && self.machine.is_stopped()
     }
 
     #[inline(never)] // Its frame must not lie under the stages'.
-    fn carry_out<B: Board>(&mut self, line: &str, board: &mut B) -> Result<Next, Refusal> {
+    fn carry_out<B: Board>(&mut self, line: &str, board: &mut B) -> Result<Next, CommandError> {
         let command = Command::parse(line)?;
         let one_pen = self.options.one_pen;
         let (model, mut keeper, _) = self.split();
-        let keep = &mut |model: &Model<'_>| keeper.keep(model);
+        let keep = &mut |model: &Model<'_>| keeper.save(model);
         match command {
             Command::Nothing => {}
             Command::Vertex(coordinates) => {
-                model.add_vertex(coordinates, keep).map_err(Refusal::Model)?
+                model.add_vertex(coordinates, keep).map_err(CommandError::Model)?
             }
             Command::Face(numbers) => {
-                model.add_face(numbers.iter(), keep).map_err(Refusal::Model)?
+                model.add_face(numbers.iter(), keep).map_err(CommandError::Model)?
             }
             Command::Polyline(numbers) => {
-                model.add_polyline(numbers.iter(), keep).map_err(Refusal::Model)?
+                model.add_polyline(numbers.iter(), keep).map_err(CommandError::Model)?
             }
-            Command::Degree(degree) => model.set_degree(degree).map_err(Refusal::Model)?,
+            Command::Degree(degree) => model.set_degree(degree).map_err(CommandError::Model)?,
             Command::Curve { ends, control } => {
-                model.begin_curve(ends, control.iter()).map_err(Refusal::Model)?
+                model.begin_curve(ends, control.iter()).map_err(CommandError::Model)?
             }
-            Command::Knots(knots) => model.add_knots(knots.iter()).map_err(Refusal::Model)?,
+            Command::Knots(knots) => model.add_knots(knots.iter()).map_err(CommandError::Model)?,
             // So that no file has too many.
             Command::Pen { .. } if one_pen => {}
             Command::Pen { by_material, name } => {
-                model.choose_pen(by_material, name, keep).map_err(Refusal::Model)?
+                model.choose_pen(by_material, name, keep).map_err(CommandError::Model)?
             }
-            Command::EndCurve => model.end_curve(keep).map_err(Refusal::Model)?,
+            Command::EndCurve => model.end_curve(keep).map_err(CommandError::Model)?,
             Command::Help => self.task = Some(Task::List(Listing::Help, 0)),
             Command::BuildInfo => self.report_build(board),
             Command::Settings => self.task = Some(Task::List(Listing::Settings, 0)),
@@ -333,8 +339,8 @@ impl Inner<'_> {
             Command::Undo => self.undo()?,
             Command::Plot => return Ok(Next::Plot),
             Command::Again => return Ok(Next::Again),
-            Command::ShowDrive if !B::HAS_DRIVE => return Err(Refusal::UnknownSystemCommand),
-            Command::ShowDrive if !self.is_without_job() => return Err(Refusal::Busy),
+            Command::ShowDrive if !B::HAS_DRIVE => return Err(CommandError::UnknownSystemCommand),
+            Command::ShowDrive if !self.is_without_job() => return Err(CommandError::Busy),
             Command::ShowDrive => return Ok(Next::ShowDrive),
             Command::Unlock => self.machine.unlock()?,
             Command::Home => self.home()?,
@@ -347,20 +353,20 @@ impl Inner<'_> {
     }
 
     #[inline(never)] // Its frame must not lie under the stages'.
-    fn plot<B: Board>(&mut self, board: &mut B, again: bool) -> Result<(), Refusal> {
+    fn plot<B: Board>(&mut self, board: &mut B, again: bool) -> Result<(), CommandError> {
         if !matches!(self.machine.state(), State::Idle | State::Check) {
             return Err(match self.machine.state() {
-                State::Alarm(_) | State::Sleep => Refusal::Locked,
-                _ => Refusal::Busy,
+                State::Alarm(_) | State::Sleep => CommandError::Locked,
+                _ => CommandError::Busy,
             });
         }
         let position = self.machine.position_mm();
         let asked = RealTime::default();
         let mut listener = Listener { board, position, stage: Stage::View, asked };
         let computed = if again {
-            self.recall(listener.board)
+            self.load(listener.board)
         } else {
-            self.compute(&mut listener, &mut Unobserved).map(|()| self.keep(listener.board))
+            self.compute(&mut listener, &mut Unobserved).map(|()| self.save(listener.board))
         };
         let begun = computed.and_then(|()| self.begin(&mut listener));
         let asked = listener.asked;
@@ -375,7 +381,7 @@ impl Inner<'_> {
 
     /// Keeps the job, before anything moves: flash cannot be read meanwhile.
     #[inline(never)] // Its frame must not lie under the stages'.
-    fn keep<B: Board>(&self, board: &mut B) {
+    fn save<B: Board>(&self, board: &mut B) {
         if kept::keep_job(&self.job, self.machine.settings(), self.words, board).is_err() {
             Reply(board)
                 .line(format_args!("[MSG:$again will not draw this: the flash is worn out]"));
@@ -384,7 +390,7 @@ impl Inner<'_> {
 
     /// Takes the kept job in place of the last one.
     #[inline(never)] // Its frame must not lie under the stages'.
-    fn recall<B: Board>(&mut self, board: &mut B) -> Result<(), Refusal> {
+    fn load<B: Board>(&mut self, board: &mut B) -> Result<(), CommandError> {
         self.kept_words = 0;
         self.job = Job::default();
         self.cursor = Cursor::default();
@@ -394,13 +400,13 @@ impl Inner<'_> {
 
     /// Hands the job to the machine, which measures it first.
     #[inline(never)] // Its frame must not lie under the stages'.
-    fn begin(&mut self, attention: &mut dyn Attention) -> Result<(), Refusal> {
+    fn begin(&mut self, cancel: &mut dyn Cancel) -> Result<(), CommandError> {
         let strokes = self.job.strokes(self.words, &mut self.cursor);
-        let mut strokes = Attended { strokes, attention, targets: 0, given_up: false };
+        let mut strokes = MeasuredStrokes { strokes, cancel, targets: 0, given_up: false };
         self.machine.start(&mut strokes)?;
         if strokes.given_up {
             self.machine.abort();
-            return Err(Refusal::Aborted);
+            return Err(CommandError::Aborted);
         }
         self.cursor = Cursor::default();
         Ok(())
@@ -409,9 +415,9 @@ impl Inner<'_> {
     #[inline(never)] // Its frame must not lie under that of `plot`.
     fn compute(
         &mut self,
-        attention: &mut dyn Attention,
+        cancel: &mut dyn Cancel,
         observer: &mut dyn Observer,
-    ) -> Result<(), Refusal> {
+    ) -> Result<(), CommandError> {
         // The memory of the last job is used again, so it ends here even if this one fails.
         self.kept_words = 0;
         self.job = Job::default();
@@ -419,34 +425,36 @@ impl Inner<'_> {
         let settings = self.machine.settings();
         let steps =
             [Setting::StepsPerMmX, Setting::StepsPerMmY].map(|setting| settings.get(setting));
-        self.job =
-            Job::compute(&self.model, &self.options, steps, self.words, attention, observer)?;
+        self.job = Job::compute(&self.model, &self.options, steps, self.words, cancel, observer)?;
         Ok(())
     }
 
     #[inline(never)] // Its frame must not lie under the stages'.
-    fn change_setting(&mut self, name: &str, value: &str) -> Result<(), Refusal> {
-        let setting =
-            name.parse().ok().and_then(Setting::numbered).ok_or(Refusal::UnknownSystemCommand)?;
-        let value = crate::fixed::Decimal::parse(value).map_err(|_| Refusal::NotANumber)?;
-        let value: Value = value.to_millimetres().map_err(|_| Refusal::NumberOutOfRange)?;
-        self.machine.set(setting, value).map_err(Refusal::Setting)
+    fn change_setting(&mut self, name: &str, value: &str) -> Result<(), CommandError> {
+        let setting = name
+            .parse()
+            .ok()
+            .and_then(Setting::numbered)
+            .ok_or(CommandError::UnknownSystemCommand)?;
+        let value = crate::fixed::Decimal::parse(value).map_err(|_| CommandError::NotANumber)?;
+        let value: Value = value.to_millimetres().map_err(|_| CommandError::NumberOutOfRange)?;
+        self.machine.set(setting, value).map_err(CommandError::Setting)
     }
 }
 
 /// Strokes that are measured while the line is answered.
-struct Attended<'s, 'a> {
+struct MeasuredStrokes<'s, 'a> {
     strokes: Strokes<'s>,
-    attention: &'a mut dyn Attention,
+    cancel: &'a mut dyn Cancel,
     targets: usize,
     given_up: bool,
 }
 
-impl Path for Attended<'_, '_> {
+impl Path for MeasuredStrokes<'_, '_> {
     fn next_target(&mut self) -> Option<Target> {
         self.targets += 1;
         // These take some 100,000 instructions.
-        if self.targets.is_multiple_of(64) && self.attention.check().is_err() {
+        if self.targets.is_multiple_of(64) && self.cancel.check().is_err() {
             self.given_up = true;
         }
         self.strokes.next_target().filter(|_| !self.given_up)
@@ -470,7 +478,7 @@ struct Listener<'b, B: Board> {
     asked: RealTime,
 }
 
-impl<B: Board> Attention for Listener<'_, B> {
+impl<B: Board> Cancel for Listener<'_, B> {
     fn check(&mut self) -> Result<(), Aborted> {
         report::greet_opened(State::Run, self.board);
         let asked = self.board.take_real_time();
@@ -498,7 +506,7 @@ impl<B: Board> Attention for Listener<'_, B> {
     }
 }
 
-impl From<MachineError> for Refusal {
+impl From<MachineError> for CommandError {
     fn from(error: MachineError) -> Self {
         match error {
             MachineError::State(State::Alarm(_) | State::Sleep) => Self::Locked,
@@ -508,7 +516,7 @@ impl From<MachineError> for Refusal {
     }
 }
 
-impl From<SettingError> for Refusal {
+impl From<SettingError> for CommandError {
     fn from(error: SettingError) -> Self {
         Self::Setting(error)
     }

@@ -7,9 +7,9 @@ use crate::geometry::Precision;
 use crate::model::Model;
 use crate::order;
 use crate::protocol::{
-    Escape, EscapedText, HiddenLines, PlotOption, ProjectionChoice, Refusal, WayToSee,
+    CommandError, Escape, EscapedText, HiddenLines, PlotOption, ProjectionChoice, VisibilityMode,
 };
-use crate::view::{Camera, Direction, Lens, Sight, View};
+use crate::view::{Camera, Direction, Lens, Pose, View};
 use crate::visibility::{self, Crease};
 use core::fmt::{self, Write};
 use crc::{Digest, Table};
@@ -25,7 +25,7 @@ pub struct PlotOptions {
     /// Whether what is behind the eye is cut off; else it is an error.
     pub clip_behind: bool,
     /// How it is found out what is seen.
-    pub see: WayToSee,
+    pub see: VisibilityMode,
     /// What becomes of hidden lines.
     pub hidden: HiddenLines,
     /// Whether the lines are drawn where faces pass through each other.
@@ -64,7 +64,7 @@ impl Default for PlotOptions {
             angles: None,
             projection: ProjectionChoice::default(),
             clip_behind: true,
-            see: WayToSee::Faces,
+            see: VisibilityMode::Faces,
             hidden: HiddenLines::Erased,
             seams: true,
             merged_blocks: false,
@@ -118,11 +118,11 @@ impl PlotOptions {
     /// Changes the title; an empty one is none.
     ///
     /// # Errors
-    /// [`Refusal::TitleTooLong`]; the title is as it was.
+    /// [`CommandError::TitleTooLong`]; the title is as it was.
     #[inline(never)] // Its frame must not lie under the stages'.
-    pub fn set_title(&mut self, text: EscapedText<'_>) -> Result<(), Refusal> {
+    pub fn set_title(&mut self, text: EscapedText<'_>) -> Result<(), CommandError> {
         let limit = TitleText::LIMIT;
-        self.title = TitleText::new(text.letters()).ok_or(Refusal::TitleTooLong { limit })?;
+        self.title = TitleText::new(text.letters()).ok_or(CommandError::TitleTooLong { limit })?;
         Ok(())
     }
 
@@ -145,7 +145,7 @@ impl PlotOptions {
         self.eye.is_none()
             && self.angles.is_none()
             && matches!(self.projection, ProjectionChoice::Lens(_))
-            && matches!(self.see, WayToSee::Faces | WayToSee::Wire)
+            && matches!(self.see, VisibilityMode::Faces | VisibilityMode::Wire)
     }
 
     /// How strokes are ordered on a machine of so many steps.
@@ -175,7 +175,7 @@ impl PlotOptions {
             return Camera::turned(model, lens, angles, self.eye);
         }
         let mut camera = Camera::automatic(model, lens, self.at, self.up)?;
-        if let (Sight::Towards { eye, .. }, Some(chosen)) = (&mut camera.sight, self.eye) {
+        if let (Pose::Towards { eye, .. }, Some(chosen)) = (&mut camera.sight, self.eye) {
             *eye = chosen;
         }
         Some(camera)
@@ -238,10 +238,10 @@ impl PlotOptions {
             }
         }
         let see = match self.see {
-            WayToSee::Faces => "faces",
-            WayToSee::Wire => "wire",
-            WayToSee::Vertices => "vertices",
-            WayToSee::Edges => "edges",
+            VisibilityMode::Faces => "faces",
+            VisibilityMode::Wire => "wire",
+            VisibilityMode::Vertices => "vertices",
+            VisibilityMode::Edges => "edges",
         };
         let hidden = match self.hidden {
             HiddenLines::Erased => "erased",

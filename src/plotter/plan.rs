@@ -3,10 +3,10 @@
 use super::PlotOptions;
 use super::job::{Collector, FOR_BOUNDS, HALF_A_STEP, Observer, grow};
 use crate::curve::{FRACTION_BITS, Point};
-use crate::drawing::{Bounds, Line, LineType, PageMap, StepsPerMillimetre};
+use crate::drawing::{Bounds, LineType, PackedLine, PageMap, StepsPerMillimetre};
 use crate::model::{Element, Model, Position};
-use crate::protocol::Refusal;
-use crate::stage::Attention;
+use crate::protocol::CommandError;
+use crate::stage::Cancel;
 use crate::visibility::SinkFull;
 
 /// Packs the lines of the plan at the front of `words`. Returns how many.
@@ -16,9 +16,9 @@ pub(super) fn lay_out(
     options: &PlotOptions,
     steps: StepsPerMillimetre,
     words: &mut [u64],
-    attention: &mut dyn Attention,
+    cancel: &mut dyn Cancel,
     observer: &mut dyn Observer,
-) -> Result<usize, Refusal> {
+) -> Result<usize, CommandError> {
     let (vertices, curves) = (model.vertices(), model.curves());
     let points: &[Point] = bytemuck::cast_slice(vertices);
     let unit = libm::ldexp(1.0, -(model.fraction_bits() as i32));
@@ -29,20 +29,21 @@ pub(super) fn lay_out(
     let used = corners.filter_map(|c| vertices.get(usize::from(c.vertex()))).copied();
     let mut bounds = Bounds::around_plan(used);
     if !curves.is_empty() {
-        let all = Bounds::around_plan(vertices.iter().copied()).ok_or(Refusal::NothingToPlot)?;
-        let rough = PageMap::fit_plan(&all, bits, page, steps).map_err(Refusal::Page)?;
-        curves.flatten(points, &on_page(rough), FOR_BOUNDS, attention, &mut |[x, y, z], _| {
+        let all =
+            Bounds::around_plan(vertices.iter().copied()).ok_or(CommandError::NothingToPlot)?;
+        let rough = PageMap::fit_plan(&all, bits, page, steps).map_err(CommandError::Page)?;
+        curves.flatten(points, &on_page(rough), FOR_BOUNDS, cancel, &mut |[x, y, z], _| {
             bounds = grow(bounds, Bounds::around_plan([Position { x, y, z }].into_iter()));
             Ok(())
         })?;
     }
-    let bounds = bounds.ok_or(Refusal::NothingToPlot)?;
+    let bounds = bounds.ok_or(CommandError::NothingToPlot)?;
     let map = if options.fit {
         PageMap::fit_plan(&bounds, bits, page, steps)
     } else {
         PageMap::true_size(&bounds, bits, page, steps)
     };
-    let map = map.map_err(Refusal::Page)?;
+    let map = map.map_err(CommandError::Page)?;
     let mut collector = Collector::new(words);
     let mut draw = |from: Point, to: Point, pen: u8| {
         let pen = if options.one_pen { 0 } else { pen };
@@ -50,18 +51,18 @@ pub(super) fn lay_out(
         observer.plan_bar(on_plan(from), on_plan(to), pen);
         let [from, to] = [from, to].map(|[x, y, _]| map.point(x.into(), y.into(), 1));
         collector
-            .line(Line::new(from, to, LineType::Full, pen))
+            .line(PackedLine::new(from, to, LineType::Full, pen))
             .map_err(|SinkFull| collector.missing())
     };
     for (element, pen) in model.elements().iter_with_pens() {
         let Element::Bar(from, to) = element else { continue };
         if let [Some(from), Some(to)] = [from, to].map(|number| points.get(usize::from(number))) {
-            draw(*from, *to, pen).map_err(Refusal::DrawingTooLarge)?;
+            draw(*from, *to, pen).map_err(CommandError::DrawingTooLarge)?;
         }
     }
     let mut before = None;
     let (mut pens, mut pen) = (curves.iter().map(|curve| curve.pen), 0);
-    curves.flatten(points, &on_page(map), HALF_A_STEP, attention, &mut |end, begins| {
+    curves.flatten(points, &on_page(map), HALF_A_STEP, cancel, &mut |end, begins| {
         if begins {
             pen = pens.next().unwrap_or(pen);
         }

@@ -3,7 +3,7 @@
 use crate::drawing::{PAGE_LIMIT, PagePoint, StepsPerMillimetre};
 use crate::fixed::{Decimal, Millimetres, divide_rounding, half, product};
 use crate::machine::Machine;
-use crate::protocol::{GCode, Refusal, Word};
+use crate::protocol::{CommandError, GCode, Word};
 use crate::step::{Arc, ArcError, Turn};
 
 /// What the lines so far have set. Lengths are in millimetres, from the page's origin.
@@ -32,7 +32,7 @@ pub(super) enum Order {
     Nothing,
     /// A straight move.
     Line(PagePoint),
-    /// Along an arc.
+    /// EdgeParameter an arc.
     Arc(Arc),
     /// The pen goes down where it is.
     Lower,
@@ -81,13 +81,13 @@ impl Program {
     /// The program after `line`, and what is to be done.
     ///
     /// # Errors
-    /// [`Refusal::UnsupportedWord`] for what it does not know, [`Refusal::NumberOutOfRange`],
-    /// [`Refusal::Arc`].
+    /// [`CommandError::UnsupportedWord`] for what it does not know, [`CommandError::NumberOutOfRange`],
+    /// [`CommandError::Arc`].
     pub(super) fn after(
         mut self,
         line: GCode<'_>,
         steps: StepsPerMillimetre,
-    ) -> Result<(Self, Order), Refusal> {
+    ) -> Result<(Self, Order), CommandError> {
         let mut numbers = Numbers::default();
         let mut order = Order::Nothing;
         let pen_was_down = self.pen_is_down;
@@ -105,15 +105,16 @@ impl Program {
                 b'Z' => self.pen_is_down = self.length(number)? <= 0,
                 b'F' => self.feed = Some(self.length(number)?).filter(|feed| *feed > 0),
                 b'N' | b'S' | b'T' => {}
-                _ => return Err(Refusal::UnsupportedWord(letter)),
+                _ => return Err(CommandError::UnsupportedWord(letter)),
             }
         }
         match order {
             Order::Dwell(_) => {
                 let seconds = numbers.seconds.map(Decimal::to_millimetres).transpose();
-                let seconds = seconds.map_err(|_| Refusal::NumberOutOfRange)?.unwrap_or_default();
+                let seconds =
+                    seconds.map_err(|_| CommandError::NumberOutOfRange)?.unwrap_or_default();
                 let units = u32::try_from(seconds.to_bits());
-                order = Order::Dwell(units.map_err(|_| Refusal::NumberOutOfRange)?);
+                order = Order::Dwell(units.map_err(|_| CommandError::NumberOutOfRange)?);
             }
             Order::Park => self.pen_is_down = false,
             Order::Nothing if numbers.xy != [None; 2] || numbers.ij != [None; 2] => {
@@ -125,7 +126,7 @@ impl Program {
         Ok((self, order))
     }
 
-    fn take_g(&mut self, number: Decimal, order: &mut Order) -> Result<(), Refusal> {
+    fn take_g(&mut self, number: Decimal, order: &mut Order) -> Result<(), CommandError> {
         match number.to_whole() {
             Ok(0) => self.motion = Motion::Rapid,
             Ok(1) => self.motion = Motion::Line,
@@ -140,29 +141,33 @@ impl Program {
             // Plane xy, no compensation, no offsets, units a minute: there is nothing else here.
             Ok(17 | 40 | 49 | 54 | 80 | 94) => {}
             _ if Decimal::parse("91.1") == Ok(number) => {}
-            _ => return Err(Refusal::UnsupportedWord(b'G')),
+            _ => return Err(CommandError::UnsupportedWord(b'G')),
         }
         Ok(())
     }
 
-    fn take_m(&mut self, number: Decimal, order: &mut Order) -> Result<(), Refusal> {
+    fn take_m(&mut self, number: Decimal, order: &mut Order) -> Result<(), CommandError> {
         match number.to_whole() {
             Ok(0 | 1 | 6) => *order = Order::Pause,
             Ok(2 | 30) => *self = Self { at: self.at, ..Self::default() },
             Ok(3 | 4) => self.pen_is_down = true,
             Ok(5) => self.pen_is_down = false,
-            _ => return Err(Refusal::UnsupportedWord(b'M')),
+            _ => return Err(CommandError::UnsupportedWord(b'M')),
         }
         Ok(())
     }
 
-    fn motion(&mut self, numbers: &Numbers, steps: StepsPerMillimetre) -> Result<Order, Refusal> {
+    fn motion(
+        &mut self,
+        numbers: &Numbers,
+        steps: StepsPerMillimetre,
+    ) -> Result<Order, CommandError> {
         let from = self.at;
         for (axis, number) in numbers.xy.into_iter().enumerate() {
             let Some(number) = number else { continue };
             let base = if self.relative { from[axis] } else { Millimetres::ZERO };
             self.at[axis] =
-                base.checked_add(self.length(number)?).ok_or(Refusal::NumberOutOfRange)?;
+                base.checked_add(self.length(number)?).ok_or(CommandError::NumberOutOfRange)?;
         }
         let to = steps_at(self.at, steps);
         let Motion::Arc(turn) = self.motion else { return Ok(Order::Line(to)) };
@@ -171,7 +176,7 @@ impl Program {
             Some(radius) => {
                 let radius = self.length(radius)?;
                 let center = center_of_radius(from, self.at, radius, turn);
-                steps_at(center.ok_or(Refusal::Arc(ArcError::NoRadius))?, steps)
+                steps_at(center.ok_or(CommandError::Arc(ArcError::NoRadius))?, steps)
             }
             None => {
                 let mut center = from;
@@ -179,20 +184,20 @@ impl Program {
                     let Some(number) = number else { continue };
                     let offset = self.length(number)?;
                     center[axis] =
-                        center[axis].checked_add(offset).ok_or(Refusal::NumberOutOfRange)?;
+                        center[axis].checked_add(offset).ok_or(CommandError::NumberOutOfRange)?;
                 }
                 steps_at(center, steps)
             }
         };
-        Arc::scaled(steps, center, start, to, turn).map(Order::Arc).map_err(Refusal::Arc)
+        Arc::scaled(steps, center, start, to, turn).map(Order::Arc).map_err(CommandError::Arc)
     }
 
-    fn length(&self, number: Decimal) -> Result<Millimetres, Refusal> {
-        let bits = number.to_binary(16).map_err(|_| Refusal::NumberOutOfRange)?;
+    fn length(&self, number: Decimal) -> Result<Millimetres, CommandError> {
+        let bits = number.to_binary(16).map_err(|_| CommandError::NumberOutOfRange)?;
         let bits = product(bits, if self.inches { 127 } else { 5 });
         i32::try_from(divide_rounding(bits, 5))
             .map(Millimetres::from_bits)
-            .map_err(|_| Refusal::NumberOutOfRange)
+            .map_err(|_| CommandError::NumberOutOfRange)
     }
 }
 

@@ -4,7 +4,7 @@ use super::Board;
 use crate::checksum::CRC_16;
 use crate::fixed::BinaryFraction;
 use crate::machine::Value;
-use crate::protocol::{Checksum, Label, Named, Refusal};
+use crate::protocol::{Checksum, CommandError, Label, Named};
 use core::fmt::{self, Write};
 
 /// Writes whole lines to the board's serial line.
@@ -35,14 +35,14 @@ impl<B: Board + ?Sized> Reply<'_, B> {
 
     /// The reply that every line gets: `ok`, or why not and `error:N`; with the number of a line that
     /// has one. Before it, if they are to be named, the number that is expected or the last one.
-    pub fn outcome(&mut self, outcome: Result<(), Refusal>, label: Label) {
+    pub fn outcome(&mut self, outcome: Result<(), CommandError>, label: Label) {
         let Label { checksum, named } = label;
         let with_crc = checksum == Some(Checksum::Crc);
-        if let Err(refusal) = outcome {
+        if let Err(command_error) = outcome {
             // A program that sends a CRC wants the number soon, not the reason.
             let is_expected = matches!(named, Named::Expected(_));
-            if !with_crc || !is_expected || refusal == Refusal::Unnumbered {
-                self.line(format_args!("[MSG:{refusal}]"));
+            if !with_crc || !is_expected || command_error == CommandError::Unnumbered {
+                self.line(format_args!("[MSG:{command_error}]"));
             }
         }
         let number = match named {
@@ -61,9 +61,8 @@ impl<B: Board + ?Sized> Reply<'_, B> {
         let number = Number(number);
         match outcome {
             Ok(()) => self.checked_line(format_args!("ok{number}"), with_crc),
-            Err(refusal) => {
-                self.checked_line(format_args!("error:{}{number}", refusal.number()), with_crc)
-            }
+            Err(command_error) => self
+                .checked_line(format_args!("error:{}{number}", command_error.number()), with_crc),
         }
     }
 

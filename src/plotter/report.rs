@@ -105,7 +105,7 @@ impl Inner<'_> {
     pub fn report_status<B: Board>(&self, board: &mut B) {
         let status = self.machine.status();
         let state = match status.state {
-            State::Idle if self.machine.stands() => "Idle",
+            State::Idle if self.machine.is_stopped() => "Idle",
             State::Idle | State::Run | State::Abort => "Run",
             State::Hold { standing: true } => "Hold:0",
             State::Hold { standing: false } => "Hold:1",

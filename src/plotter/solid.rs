@@ -1,14 +1,14 @@
 //! A convex solid seen without faces: from its vertices, or its edges, to lines on the page.
 
 use super::PlotOptions;
-use super::job::{Collector, Observer, PageSink, grow, look, to_front};
-use crate::convex::{self, Eye, Sight, SinkFull, SolidEdge, SolidError, SolidSink};
+use super::job::{Collector, Observer, PageSink, camera_view, grow, to_front};
+use crate::convex::{self, EdgeVisibility, Eye, SinkFull, SolidEdge, SolidError, SolidSink};
 use crate::drawing::{Bounds, PageMap, StepsPerMillimetre};
 use crate::model::{Corner, Model};
-use crate::protocol::{HiddenLines, Refusal, WayToSee};
-use crate::stage::{Attention, Scratch, Stage, items_mut};
+use crate::protocol::{CommandError, HiddenLines, VisibilityMode};
+use crate::stage::{Cancel, Scratch, Stage, items_mut};
 use crate::view::{SightLines, distinct_edges};
-use crate::visibility::{Along, Stretch, StretchSink};
+use crate::visibility::{EdgeParameter, Stretch, StretchSink};
 
 /// Finds what is seen of the solid. Returns how many lines stand in `words`, and how many edges were
 /// left out because the faces beside them may be one.
@@ -18,36 +18,36 @@ pub(super) fn project(
     options: &PlotOptions,
     steps: StepsPerMillimetre,
     words: &mut [u64],
-    attention: &mut dyn Attention,
+    cancel: &mut dyn Cancel,
     observer: &mut dyn Observer,
-) -> Result<(usize, usize), Refusal> {
-    let (camera, view) = look(model, options, attention)?;
-    let eye = match camera.sight_lines(model.fraction_bits()).map_err(Refusal::View)? {
+) -> Result<(usize, usize), CommandError> {
+    let (camera, view) = camera_view(model, options, cancel)?;
+    let eye = match camera.sight_lines(model.fraction_bits()).map_err(CommandError::View)? {
         SightLines::Through(place) => Eye::At(place),
-        SightLines::Along(direction) => Eye::Towards(direction),
+        SightLines::EdgeParameter(direction) => Eye::Towards(direction),
     };
-    attention.enter(Stage::Visibility);
+    cancel.enter(Stage::Visibility);
     let positions = bytemuck::cast_slice(model.vertices());
     let precision = options.precision_of(model);
     // No solid has more edges than its vertices allow (Euler), nor more than were sent.
     let most = match options.see {
-        WayToSee::Edges => model.corner_count(),
+        VisibilityMode::Edges => model.corner_count(),
         _ => 3 * model.vertices().len(),
     };
     let mut scratch = Scratch::new(words);
-    let kept = scratch.take(most).map_err(Refusal::DrawingTooLarge)?;
+    let kept = scratch.take(most).map_err(CommandError::DrawingTooLarge)?;
     let mut edges = Edges { kept, shown: 0, hidden: 0, wanted: options.hidden };
-    let found = if options.see == WayToSee::Edges {
+    let found = if options.see == VisibilityMode::Edges {
         let sent = distinct_edges(model.elements(), &mut scratch);
-        let sent = sent.map_err(Refusal::DrawingTooLarge)?;
-        convex::from_edges(positions, sent, eye, precision, scratch, attention, &mut edges)
+        let sent = sent.map_err(CommandError::DrawingTooLarge)?;
+        convex::from_edges(positions, sent, eye, precision, scratch, cancel, &mut edges)
     } else {
-        convex::from_vertices(positions, eye, precision, scratch, attention, &mut edges)
+        convex::from_vertices(positions, eye, precision, scratch, cancel, &mut edges)
     };
     let summary = found.map_err(|error| match error {
-        SolidError::Scratch(missing) => Refusal::DrawingTooLarge(missing),
-        SolidError::Aborted => Refusal::Aborted,
-        error => Refusal::Solid(error),
+        SolidError::Scratch(missing) => CommandError::DrawingTooLarge(missing),
+        SolidError::Aborted => CommandError::Aborted,
+        error => CommandError::Solid(error),
     })?;
     let (shown, hidden) = (edges.shown, edges.hidden);
     let (edge_words, line_words) = words.split_at_mut(Scratch::bytes_for::<[u16; 2]>(most) / 8);
@@ -62,17 +62,17 @@ pub(super) fn project(
     };
     let mut bounds: Option<Bounds> = None;
     for ends in all().filter_map(|(ends, _)| on_view(ends)) {
-        attention.check()?;
+        cancel.check()?;
         bounds = grow(bounds, Bounds::around(ends.into_iter(), view.projection()));
     }
-    let bounds = bounds.ok_or(Refusal::NothingToPlot)?;
-    let map = PageMap::fit(&bounds, &options.sheet(), steps).map_err(Refusal::Page)?;
+    let bounds = bounds.ok_or(CommandError::NothingToPlot)?;
+    let map = PageMap::fit(&bounds, &options.sheet(), steps).map_err(CommandError::Page)?;
     let collector = Collector::new(line_words);
     let mut sink = PageSink { collector, map: &map, view: &view, options, observer };
     for (numbers, visible) in all() {
-        attention.check()?;
+        cancel.check()?;
         let Some([p, q]) = on_view(numbers) else { continue };
-        let (from, to) = (Along::START, Along::END);
+        let (from, to) = (EdgeParameter::START, EdgeParameter::END);
         let edge = Some((numbers[0], numbers[1]));
         sink.stretch(Stretch { edge, ends: (p, q), from, to, visible, pen: 0 })
             .map_err(|SinkFull| sink.collector.out_of_memory())?;
@@ -97,12 +97,14 @@ impl SolidSink for Edges<'_> {
 
     fn edge(&mut self, edge: SolidEdge) -> Result<(), SinkFull> {
         let at = match (edge.sight, self.wanted) {
-            (Sight::Outline | Sight::Visible, _) => {
+            (EdgeVisibility::Outline | EdgeVisibility::Visible, _) => {
                 self.shown += 1;
                 self.shown - 1
             }
-            (Sight::BehindOutline, _) | (Sight::Hidden, HiddenLines::Erased) => return Ok(()),
-            (Sight::Hidden, _) => {
+            (EdgeVisibility::BehindOutline, _) | (EdgeVisibility::Hidden, HiddenLines::Erased) => {
+                return Ok(());
+            }
+            (EdgeVisibility::Hidden, _) => {
                 self.hidden += 1;
                 self.kept.len().checked_sub(self.hidden).ok_or(SinkFull)?
             }

@@ -6,9 +6,9 @@ use super::{Board, Inner, REPLY_BYTES, Reply};
 use crate::drawing::{LineType, PagePoint};
 use crate::fixed::BinaryFraction;
 use crate::machine::{Alarm, MachineError, Setting, State, Target};
-use crate::model::Part;
+use crate::model::ElementKind;
 use crate::motion::{StepEvent, TICKS_PER_SECOND};
-use crate::protocol::{GCode, HELP, RealTime, Refusal};
+use crate::protocol::{CommandError, GCode, HELP, RealTime};
 use crate::step::{Arc, Chords, Line};
 use core::fmt;
 
@@ -34,13 +34,13 @@ pub(super) enum Listing {
     Settings,
     Options,
     /// Of the model, up to this place.
-    Model(Part, usize),
+    Model(ElementKind, usize),
 }
 
 /// How far [`Inner::proceed`] came.
 pub(super) enum Progress {
     /// The line is done.
-    Done(Result<(), Refusal>),
+    Done(Result<(), CommandError>),
     /// Something was done.
     More,
     /// It waits for the machine.
@@ -126,8 +126,8 @@ impl Inner<'_> {
             return Progress::Done(Ok(()));
         }
         let progress = match self.machine.state() {
-            State::Alarm(_) | State::Sleep => Progress::Done(Err(Refusal::Locked)),
-            State::Abort => Progress::Done(Err(Refusal::Aborted)),
+            State::Alarm(_) | State::Sleep => Progress::Done(Err(CommandError::Locked)),
+            State::Abort => Progress::Done(Err(CommandError::Aborted)),
             _ => self.advance(board).unwrap_or_else(|error| Progress::Done(Err(error.into()))),
         };
         if matches!(progress, Progress::Done(_)) {
@@ -138,7 +138,7 @@ impl Inner<'_> {
 
     fn advance<B: Board>(&mut self, board: &mut B) -> Result<Progress, MachineError> {
         let machine = &mut self.machine;
-        let stands = machine.state() == State::Idle && machine.stands();
+        let is_stopped = machine.state() == State::Idle && machine.is_stopped();
         match &mut self.task {
             Some(Task::Arc(from, arc)) if machine.has_room() => {
                 // To keep the points that a chord reads ahead would cost the stages' stack.
@@ -152,14 +152,14 @@ impl Inner<'_> {
                 }
                 Ok(Progress::More)
             }
-            Some(Task::Dwell(left)) if stands && *left > 0 => {
+            Some(Task::Dwell(left)) if is_stopped && *left > 0 => {
                 let ticks = (*left).min(StepEvent::MAX_TICKS.into());
                 *left -= ticks;
                 machine.dwell(ticks as u32, board.queue());
                 Ok(Progress::More)
             }
-            Some(Task::Pause) if stands => machine.pause().map(|()| Progress::Done(Ok(()))),
-            Some(Task::Dwell(_) | Task::Home) if stands => Ok(Progress::Done(Ok(()))),
+            Some(Task::Pause) if is_stopped => machine.pause().map(|()| Progress::Done(Ok(()))),
+            Some(Task::Dwell(_) | Task::Home) if is_stopped => Ok(Progress::Done(Ok(()))),
             Some(_) => Ok(Progress::Waits),
             None => Ok(Progress::Done(Ok(()))),
         }
@@ -201,9 +201,9 @@ impl Inner<'_> {
     }
 
     #[inline(never)] // Its frame must not lie under the stages'.
-    pub(super) fn home(&mut self) -> Result<(), Refusal> {
+    pub(super) fn home(&mut self) -> Result<(), CommandError> {
         if !self.machine.settings().is_on(Setting::Homing) {
-            return Err(Refusal::HomingOff);
+            return Err(CommandError::HomingOff);
         }
         self.machine.home(self.machine.switches())?;
         self.task = Some(Task::Home);
@@ -211,10 +211,10 @@ impl Inner<'_> {
     }
 
     #[inline(never)] // Its frame must not lie under the stages'.
-    pub(super) fn run_gcode(&mut self, line: GCode<'_>) -> Result<(), Refusal> {
+    pub(super) fn run_gcode(&mut self, line: GCode<'_>) -> Result<(), CommandError> {
         let steps = self.machine.settings().page_steps();
         let checking = match self.machine.state() {
-            State::Alarm(_) | State::Sleep => return Err(Refusal::Locked),
+            State::Alarm(_) | State::Sleep => return Err(CommandError::Locked),
             state => state == State::Check,
         };
         let (program, order) = self.program.at(&self.machine, checking).after(line, steps)?;
@@ -246,10 +246,10 @@ impl Inner<'_> {
 
     /// A line of its own: what it sets is forgotten.
     #[inline(never)] // Its frame must not lie under the stages'.
-    pub(super) fn jog(&mut self, line: GCode<'_>) -> Result<(), Refusal> {
+    pub(super) fn jog(&mut self, line: GCode<'_>) -> Result<(), CommandError> {
         let steps = self.machine.settings().page_steps();
         let (program, order) = Program::default().at(&self.machine, false).after(line, steps)?;
-        let Order::Line(point) = order else { return Err(Refusal::UnsupportedWord(b'J')) };
+        let Order::Line(point) = order else { return Err(CommandError::UnsupportedWord(b'J')) };
         Ok(self.machine.jog(point, program.feed)?)
     }
 

@@ -2,9 +2,9 @@
 
 use super::PlotOptions;
 use super::job::Collector;
-use crate::drawing::{Line, LineType, StepsPerMillimetre};
-use crate::protocol::Refusal;
-use crate::stage::{Attention, StageError, items};
+use crate::drawing::{LineType, PackedLine, StepsPerMillimetre};
+use crate::protocol::CommandError;
+use crate::stage::{Cancel, StageError, items};
 use crate::visibility::SinkFull;
 
 /// These take some 50,000 instructions.
@@ -12,9 +12,9 @@ const LINES_BETWEEN_CHECKS: usize = 64;
 
 /// Refuses a title that is too wide before the work begins: what is drawn above it does not matter.
 #[inline(never)] // Its frame must not lie under the other stages'.
-pub(super) fn check(options: &PlotOptions, steps: StepsPerMillimetre) -> Result<(), Refusal> {
+pub(super) fn check(options: &PlotOptions, steps: StepsPerMillimetre) -> Result<(), CommandError> {
     let Some(title) = options.title() else { return Ok(()) };
-    options.page.place_title(&title, [0; 3], steps).map(|_| ()).map_err(Refusal::Page)
+    options.page.place_title(&title, [0; 3], steps).map(|_| ()).map_err(CommandError::Page)
 }
 
 /// Adds the lines of the title to the `count` lines at the front of `words`, below them, for the first
@@ -25,13 +25,13 @@ pub(super) fn write(
     steps: StepsPerMillimetre,
     words: &mut [u64],
     count: usize,
-    attention: &mut dyn Attention,
-) -> Result<usize, Refusal> {
+    cancel: &mut dyn Cancel,
+) -> Result<usize, CommandError> {
     let Some(title) = options.title() else { return Ok(count) };
     // Left, right, bottom.
     let mut around: Option<[i32; 3]> = None;
-    for lines in items::<Line>(words, count).unwrap_or(&[]).chunks(LINES_BETWEEN_CHECKS) {
-        attention.check()?;
+    for lines in items::<PackedLine>(words, count).unwrap_or(&[]).chunks(LINES_BETWEEN_CHECKS) {
+        cancel.check()?;
         for point in lines.iter().flat_map(|line| line.ends()) {
             let [left, right, bottom] = around.unwrap_or([point.x, point.x, point.y]);
             around = Some([left.min(point.x), right.max(point.x), bottom.min(point.y)]);
@@ -39,19 +39,19 @@ pub(super) fn write(
     }
     let Some(around) = around else { return Ok(count) };
     let placed = options.page.place_title(&title, around, steps);
-    let [left, baseline] = placed.map_err(Refusal::Page)?;
+    let [left, baseline] = placed.map_err(CommandError::Page)?;
     let mut collector = Collector::new(words);
     collector.count = count;
     let mut drawn = 0usize;
     title
         .draw(left, baseline, steps, &mut |[from, to]| {
             if drawn.is_multiple_of(LINES_BETWEEN_CHECKS) {
-                attention.check()?;
+                cancel.check()?;
             }
             drawn += 1;
-            let added = collector.line(Line::new(from, to, LineType::Full, 0));
+            let added = collector.line(PackedLine::new(from, to, LineType::Full, 0));
             added.map_err(|SinkFull| collector.missing().into())
         })
-        .map_err(|error: StageError| Refusal::from(error))?;
+        .map_err(|error: StageError| CommandError::from(error))?;
     Ok(collector.count)
 }

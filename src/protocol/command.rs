@@ -2,10 +2,10 @@
 
 use super::edit::parse_edit;
 use super::values::{Decimals, PENS, coordinates, number, split_word, whole};
-use super::{EscapedText, GCode, Numbers, PlotOption, Refusal};
+use super::{CommandError, EscapedText, GCode, Numbers, PlotOption};
 use crate::curve::CurveError;
 use crate::fixed::Decimal;
-use crate::model::{self, Edit, ModelError, Part, PenName};
+use crate::model::{self, Edit, ElementKind, ModelError, PenName};
 
 /// What a line asks for.
 #[derive(Debug, Clone, PartialEq)]
@@ -64,7 +64,7 @@ pub enum Command<'a> {
     /// `$delete=…` and others: changes the model.
     Edit(Edit),
     /// `$list=PART,FIRST,LAST`
-    List(Part, model::Numbers),
+    List(ElementKind, model::Numbers),
     /// `$undo`
     Undo,
     /// `$plot`
@@ -170,7 +170,7 @@ impl<'a> Command<'a> {
     /// Understands one line.
     ///
     /// # Errors
-    /// A [`Refusal`] that names the word at fault.
+    /// A [`CommandError`] that names the word at fault.
     ///
     /// ```
     /// use penup::protocol::Command;
@@ -179,7 +179,7 @@ impl<'a> Command<'a> {
     /// assert!(Command::parse("v 1 2").is_err());
     /// ```
     #[inline(never)] // Its frame must not lie under the stages'.
-    pub fn parse(line: &'a str) -> Result<Self, Refusal> {
+    pub fn parse(line: &'a str) -> Result<Self, CommandError> {
         if let Some(text) = title(line) {
             return EscapedText::new(text).map(Self::Title);
         }
@@ -200,23 +200,23 @@ impl<'a> Command<'a> {
             "f" => Numbers::new(rest).map(Self::Face),
             "l" => Numbers::new(rest).map(Self::Polyline),
             "cstype" if rest.trim() == "bspline" => Ok(Self::Nothing),
-            "cstype" => Err(Refusal::NotAChoice { choices: "bspline" }),
+            "cstype" => Err(CommandError::NotAChoice { choices: "bspline" }),
             "deg" => match whole(rest)? {
                 degree @ 1..=5 => Ok(Self::Degree(degree as u8)),
-                _ => Err(Refusal::Model(ModelError::Curve(CurveError::Order))),
+                _ => Err(CommandError::Model(ModelError::Curve(CurveError::Order))),
             },
             "curv" => curve(rest),
             "parm" => match split_word(rest) {
                 ("u", knots) => Decimals::new(knots).map(Self::Knots),
-                _ => Err(Refusal::NotAChoice { choices: "u" }),
+                _ => Err(CommandError::NotAChoice { choices: "u" }),
             },
             "end" => Ok(Self::EndCurve),
-            _ => Err(Refusal::UnknownCommand),
+            _ => Err(CommandError::UnknownCommand),
         }
     }
 
     #[inline(never)] // Its frame must not lie under the stages'.
-    fn parse_dollar(text: &'a str) -> Result<Self, Refusal> {
+    fn parse_dollar(text: &'a str) -> Result<Self, CommandError> {
         if let Some((name, value)) = text.split_once('=') {
             let (name, value) = (name.trim(), value.trim());
             if let Some(command) = parse_edit(name, value)? {
@@ -245,7 +245,7 @@ impl<'a> Command<'a> {
             "undo" => Ok(Self::Undo),
             "plot" => Ok(Self::Plot),
             "again" => Ok(Self::Again),
-            _ => Err(Refusal::UnknownSystemCommand),
+            _ => Err(CommandError::UnknownSystemCommand),
         }
     }
 }
@@ -288,7 +288,7 @@ fn pen_name(text: &str) -> PenName {
 }
 
 /// u0 u1 a b …
-fn curve(text: &str) -> Result<Command<'_>, Refusal> {
+fn curve(text: &str) -> Result<Command<'_>, CommandError> {
     let (from, rest) = split_word(text);
     let (to, rest) = split_word(rest);
     Ok(Command::Curve { ends: [number(from)?, number(to)?], control: Numbers::new(rest)? })
@@ -299,7 +299,7 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
-    fn numbers(line: &str) -> Result<Vec<i32>, Refusal> {
+    fn numbers(line: &str) -> Result<Vec<i32>, CommandError> {
         match Command::parse(line)? {
             Command::Face(numbers) | Command::Polyline(numbers) => Ok(numbers.iter().collect()),
             other => panic!("{other:?}"),
@@ -314,7 +314,7 @@ mod tests {
         for word in ["1/", "1//", "/1", "1/2/3/4", "1.5", "x", "1/x", "99999999999", "1/2/"] {
             assert_eq!(
                 numbers(&std::format!("f 1 2 {word}")),
-                Err(Refusal::NotAVertexNumber),
+                Err(CommandError::NotAVertexNumber),
                 "{word}"
             );
         }
@@ -325,10 +325,10 @@ mod tests {
         for line in ["v 1 2 3", "v  1 2 3 1.0", "v 1 2 3 0.5 0.5 0.5", " v 1 2 3 "] {
             assert!(matches!(Command::parse(line), Ok(Command::Vertex(_))), "{line}");
         }
-        assert_eq!(Command::parse("v 1 2"), Err(Refusal::WrongNumberCount { needed: 3 }));
-        assert_eq!(Command::parse("v 1 2 z"), Err(Refusal::NotANumber));
-        assert_eq!(Command::parse("v 1 2 3 z"), Err(Refusal::NotANumber));
-        assert_eq!(Command::parse("v"), Err(Refusal::WrongNumberCount { needed: 3 }));
+        assert_eq!(Command::parse("v 1 2"), Err(CommandError::WrongNumberCount { needed: 3 }));
+        assert_eq!(Command::parse("v 1 2 z"), Err(CommandError::NotANumber));
+        assert_eq!(Command::parse("v 1 2 3 z"), Err(CommandError::NotANumber));
+        assert_eq!(Command::parse("v"), Err(CommandError::WrongNumberCount { needed: 3 }));
     }
 
     #[test]
@@ -363,10 +363,10 @@ mod tests {
     #[test]
     fn what_is_no_command_is_refused() {
         for line in ["vv 1 2 3", "hello", "G1 = 2", "ff"] {
-            assert_eq!(Command::parse(line), Err(Refusal::UnknownCommand), "{line}");
+            assert_eq!(Command::parse(line), Err(CommandError::UnknownCommand), "{line}");
         }
         for line in ["$nothing", "$plo", "$ plot it"] {
-            assert_eq!(Command::parse(line), Err(Refusal::UnknownSystemCommand), "{line}");
+            assert_eq!(Command::parse(line), Err(CommandError::UnknownSystemCommand), "{line}");
         }
     }
 

@@ -1,8 +1,8 @@
 //! The edits of the model, `$name=value`.
 
 use super::values::{number, whole};
-use super::{Command, Refusal};
-use crate::model::{self, Edit, Part};
+use super::{Command, CommandError};
+use crate::model::{self, Edit, ElementKind};
 
 /// The values of an edit, with commas between.
 struct Values<'a> {
@@ -11,8 +11,8 @@ struct Values<'a> {
 }
 
 impl<'a> Values<'a> {
-    fn text(&mut self) -> Result<&'a str, Refusal> {
-        let rest = self.rest.ok_or(Refusal::WrongNumberCount { needed: self.needed })?;
+    fn text(&mut self) -> Result<&'a str, CommandError> {
+        let rest = self.rest.ok_or(CommandError::WrongNumberCount { needed: self.needed })?;
         let (value, rest) = match rest.split_once(',') {
             Some((value, rest)) => (value, Some(rest)),
             None => (rest, None),
@@ -23,8 +23,8 @@ impl<'a> Values<'a> {
 
     fn three<T: Copy + Default>(
         &mut self,
-        read: impl Fn(&str) -> Result<T, Refusal>,
-    ) -> Result<[T; 3], Refusal> {
+        read: impl Fn(&str) -> Result<T, CommandError>,
+    ) -> Result<[T; 3], CommandError> {
         let mut values = [T::default(); 3];
         for value in &mut values {
             *value = read(self.text()?)?;
@@ -32,31 +32,31 @@ impl<'a> Values<'a> {
         Ok(values)
     }
 
-    fn part(&mut self) -> Result<Part, Refusal> {
+    fn part(&mut self) -> Result<ElementKind, CommandError> {
         match self.text()? {
-            "v" => Ok(Part::Vertices),
-            "l" => Ok(Part::Bars),
-            "f" => Ok(Part::Faces),
-            "c" => Ok(Part::Curves),
-            _ => Err(Refusal::NotAChoice { choices: "v, l, f or c" }),
+            "v" => Ok(ElementKind::Vertices),
+            "l" => Ok(ElementKind::Bars),
+            "f" => Ok(ElementKind::Faces),
+            "c" => Ok(ElementKind::Curves),
+            _ => Err(CommandError::NotAChoice { choices: "v, l, f or c" }),
         }
     }
 
     /// First and last, or one number for both.
-    fn numbers(&mut self) -> Result<[i32; 2], Refusal> {
+    fn numbers(&mut self) -> Result<[i32; 2], CommandError> {
         let first = whole(self.text()?)?;
         let last = if self.rest.is_some() { whole(self.text()?)? } else { first };
         Ok([first, last])
     }
 
-    fn numbers_or_all(&mut self) -> Result<model::Numbers, Refusal> {
+    fn numbers_or_all(&mut self) -> Result<model::Numbers, CommandError> {
         if self.rest.is_some() { self.numbers().map(Some) } else { Ok(None) }
     }
 }
 
 /// `None` if no edit has this name.
 #[inline(never)] // Its frame must not lie under the stages'.
-pub(super) fn parse_edit<'a>(name: &str, value: &str) -> Result<Option<Command<'a>>, Refusal> {
+pub(super) fn parse_edit<'a>(name: &str, value: &str) -> Result<Option<Command<'a>>, CommandError> {
     let mut values = Values { rest: Some(value), needed: 3 };
     let edit = match name {
         "list" => {
@@ -77,12 +77,12 @@ pub(super) fn parse_edit<'a>(name: &str, value: &str) -> Result<Option<Command<'
                 "x" => 0,
                 "y" => 1,
                 "z" => 2,
-                _ => return Err(Refusal::NotAChoice { choices: "x, y or z" }),
+                _ => return Err(CommandError::NotAChoice { choices: "x, y or z" }),
             };
             values.needed = 2;
             let degrees = number(values.text()?)?.to_f64();
             if libm::fabs(degrees) > 36000.0 {
-                return Err(Refusal::NumberOutOfRange);
+                return Err(CommandError::NumberOutOfRange);
             }
             Edit::Rotate(axis, degrees, values.numbers_or_all()?)
         }
@@ -92,6 +92,6 @@ pub(super) fn parse_edit<'a>(name: &str, value: &str) -> Result<Option<Command<'
     };
     match values.rest {
         None => Ok(Some(Command::Edit(edit))),
-        Some(_) => Err(Refusal::WrongNumberCount { needed: values.needed }),
+        Some(_) => Err(CommandError::WrongNumberCount { needed: values.needed }),
     }
 }

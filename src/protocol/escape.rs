@@ -3,7 +3,7 @@
 //! `\xE9` is the letter with this number, two hexadecimal digits; `\u{2013}` one with up to six; `\\\\` is a backslash.
 //! Other letters stand for themselves, so UTF-8 may be sent as it is, too.
 
-use super::Refusal;
+use super::CommandError;
 use crate::drawing::is_in_font;
 use core::fmt::{self, Write};
 use core::str::Chars;
@@ -18,14 +18,14 @@ impl<'a> EscapedText<'a> {
     /// Checks every letter, so that [`EscapedText::letters`] cannot fail.
     ///
     /// # Errors
-    /// [`Refusal::NotAnEscape`], [`Refusal::NotInTheFont`].
+    /// [`CommandError::NotAnEscape`], [`CommandError::NotInTheFont`].
     #[inline(never)] // Its frame must not lie under the stages'.
-    pub(super) fn new(text: &'a str) -> Result<Self, Refusal> {
+    pub(super) fn new(text: &'a str) -> Result<Self, CommandError> {
         let mut rest = text.chars();
         while let Some(letter) = next(&mut rest) {
-            let letter = letter.ok_or(Refusal::NotAnEscape)?;
+            let letter = letter.ok_or(CommandError::NotAnEscape)?;
             if !is_in_font(letter) {
-                return Err(Refusal::NotInTheFont(letter));
+                return Err(CommandError::NotInTheFont(letter));
             }
         }
         Ok(Self { text })
@@ -89,7 +89,7 @@ mod tests {
     use super::*;
     use std::string::{String, ToString};
 
-    fn read(text: &str) -> Result<String, Refusal> {
+    fn read(text: &str) -> Result<String, CommandError> {
         EscapedText::new(text).map(|text| text.letters().collect())
     }
 
@@ -120,11 +120,11 @@ mod tests {
             r"\u{d800}",
             r"\u{20",
         ] {
-            assert_eq!(read(text), Err(Refusal::NotAnEscape), "{text}");
+            assert_eq!(read(text), Err(CommandError::NotAnEscape), "{text}");
         }
-        assert_eq!(read("a→b"), Err(Refusal::NotInTheFont('→')));
-        assert_eq!(read(r"\x0A"), Err(Refusal::NotInTheFont('\n')));
-        assert_eq!(read(r"\u{1f600}"), Err(Refusal::NotInTheFont('\u{1F600}')));
+        assert_eq!(read("a→b"), Err(CommandError::NotInTheFont('→')));
+        assert_eq!(read(r"\x0A"), Err(CommandError::NotInTheFont('\n')));
+        assert_eq!(read(r"\u{1f600}"), Err(CommandError::NotInTheFont('\u{1F600}')));
         assert_eq!(read(""), Ok(String::new()));
     }
 }

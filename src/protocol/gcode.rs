@@ -1,6 +1,6 @@
 //! A line of G-code as letters with numbers.
 
-use super::Refusal;
+use super::CommandError;
 use crate::fixed::Decimal;
 
 /// One letter and its number: `G1`, `X-2.5`.
@@ -23,7 +23,7 @@ impl<'a> GCode<'a> {
     /// Reads `text`.
     ///
     /// # Errors
-    /// [`Refusal::NotANumber`] if a letter has no number, or anything else stands there.
+    /// [`CommandError::NotANumber`] if a letter has no number, or anything else stands there.
     ///
     /// ```
     /// use penup::protocol::GCode;
@@ -31,9 +31,9 @@ impl<'a> GCode<'a> {
     /// let letters: Vec<_> = line.words().map(|word| char::from(word.letter)).collect();
     /// assert_eq!(letters, ['G', 'X', 'Y', 'F']);
     /// assert!(GCode::new("G1 X").is_err());
-    /// # Ok::<(), penup::protocol::Refusal>(())
+    /// # Ok::<(), penup::protocol::CommandError>(())
     /// ```
-    pub fn new(text: &'a str) -> Result<Self, Refusal> {
+    pub fn new(text: &'a str) -> Result<Self, CommandError> {
         let text = text.split(';').next().unwrap_or("");
         let mut rest = text;
         while let Some(word) = next_word(&mut rest) {
@@ -55,7 +55,7 @@ impl<'a> GCode<'a> {
 }
 
 /// Takes the next word off `rest`.
-fn next_word(rest: &mut &str) -> Option<Result<Word, Refusal>> {
+fn next_word(rest: &mut &str) -> Option<Result<Word, CommandError>> {
     loop {
         *rest = rest.trim_start_matches([' ', '\t', '%']);
         let Some(comment) = rest.strip_prefix('(') else { break };
@@ -64,14 +64,14 @@ fn next_word(rest: &mut &str) -> Option<Result<Word, Refusal>> {
     let letter = *rest.as_bytes().first()?;
     if !letter.is_ascii_alphabetic() {
         *rest = "";
-        return Some(Err(Refusal::UnknownCommand));
+        return Some(Err(CommandError::UnknownCommand));
     }
     let after = rest.split_at_checked(1).map_or("", |(_, after)| after).trim_start();
     let is_part = |c: char| c.is_ascii_digit() || matches!(c, '.' | '-' | '+');
     let end = after.find(|c| !is_part(c)).unwrap_or(after.len());
     let (number, after) = after.split_at_checked(end).unwrap_or((after, ""));
     *rest = after;
-    let number = Decimal::parse(number).map_err(|_| Refusal::NotANumber);
+    let number = Decimal::parse(number).map_err(|_| CommandError::NotANumber);
     Some(number.map(|number| Word { letter: letter.to_ascii_uppercase(), number }))
 }
 

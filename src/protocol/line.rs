@@ -1,7 +1,7 @@
 //! Bytes to lines, and the bytes that are commands by themselves.
 
 use super::numbering::NUMBER_LIMIT;
-use super::{DAMAGED, Refusal};
+use super::{CommandError, DAMAGED};
 
 /// The longest line, in bytes without its end, its number and its checksum.
 pub const LINE_LIMIT: usize = 256;
@@ -156,9 +156,9 @@ impl LineReader {
     /// so that every line that a sender counts is answered.
     ///
     /// # Errors
-    /// At the end of the line: [`Refusal::BytesLost`] if it held [`DAMAGED`], else
-    /// [`Refusal::LineTooLong`] if it was, [`Refusal::NotText`] if it is not UTF-8.
-    pub fn push(&mut self, byte: u8) -> Option<Result<&str, Refusal>> {
+    /// At the end of the line: [`CommandError::BytesLost`] if it held [`DAMAGED`], else
+    /// [`CommandError::LineTooLong`] if it was, [`CommandError::NotText`] if it is not UTF-8.
+    pub fn push(&mut self, byte: u8) -> Option<Result<&str, CommandError>> {
         if let Some(end) = self.ended_by.take() {
             self.bytes.clear();
             (self.too_long, self.damaged) = (false, false);
@@ -176,11 +176,11 @@ impl LineReader {
         }
         self.ended_by = Some(byte);
         Some(if self.damaged {
-            Err(Refusal::BytesLost)
+            Err(CommandError::BytesLost)
         } else if self.too_long {
-            Err(Refusal::LineTooLong { limit: LINE_LIMIT })
+            Err(CommandError::LineTooLong { limit: LINE_LIMIT })
         } else {
-            core::str::from_utf8(&self.bytes).map_err(|_| Refusal::NotText)
+            core::str::from_utf8(&self.bytes).map_err(|_| CommandError::NotText)
         })
     }
 
@@ -196,7 +196,7 @@ mod tests {
     use std::string::{String, ToString};
     use std::vec::Vec;
 
-    fn lines(bytes: &[u8]) -> Vec<Result<String, Refusal>> {
+    fn lines(bytes: &[u8]) -> Vec<Result<String, CommandError>> {
         let mut reader = LineReader::default();
         bytes
             .iter()
@@ -219,7 +219,7 @@ mod tests {
         bytes.extend(b"\r\nok\n");
         assert_eq!(
             lines(&bytes),
-            [Err(Refusal::LineTooLong { limit: LINE_LIMIT }), Ok("ok".to_string())]
+            [Err(CommandError::LineTooLong { limit: LINE_LIMIT }), Ok("ok".to_string())]
         );
         let mut bytes = std::vec![b'x'; ROOM];
         bytes.push(b'\n');
@@ -274,12 +274,12 @@ mod tests {
 
     #[test]
     fn bytes_that_are_no_text_are_refused() {
-        assert_eq!(lines(b"\xfe\xfe\nok\n"), [Err(Refusal::NotText), Ok("ok".to_string())]);
+        assert_eq!(lines(b"\xfe\xfe\nok\n"), [Err(CommandError::NotText), Ok("ok".to_string())]);
     }
 
     #[test]
     fn a_line_that_lost_bytes_is_refused_once_at_its_end() {
-        let lost = Err(Refusal::BytesLost);
+        let lost = Err(CommandError::BytesLost);
         assert_eq!(lines(b"v 1\xff\xff 3\nok\n"), [lost.clone(), Ok("ok".to_string())]);
         // However long it is, and if it holds nothing else.
         let mut bytes = std::vec![b'x'; LINE_LIMIT + 1];

@@ -13,7 +13,7 @@
 //! `M110 N…` sets the number of the last line, `M110` alone with a checksum asks for it, and a
 //! numbered `M2` or `M30` ends the obligation to send numbers, as ctrl-X does.
 
-use super::{LINE_LIMIT, Refusal};
+use super::{CommandError, LINE_LIMIT};
 use crate::checksum::CRC_16;
 
 /// The most bytes that the number and the checksum add to a line: `N-999999999 ` and `*FFFF`.
@@ -57,7 +57,7 @@ pub enum Received<'a> {
     /// It is carried out.
     Line(&'a str, Label),
     /// It is only answered.
-    Answer(Result<(), Refusal>, Label),
+    Answer(Result<(), CommandError>, Label),
 }
 
 /// Which lines have come.
@@ -88,10 +88,10 @@ pub struct Numbering {
 impl Numbering {
     /// Checks a line as the reader gave it.
     #[inline(never)] // Its frame must not lie under the stages'.
-    pub fn receive<'a>(&mut self, line: Result<&'a str, Refusal>) -> Received<'a> {
+    pub fn receive<'a>(&mut self, line: Result<&'a str, CommandError>) -> Received<'a> {
         let line = match line {
             Ok(line) => line,
-            Err(refusal) => return self.refuse(refusal, None),
+            Err(command_error) => return self.refuse(command_error, None),
         };
         match Checked::split(line) {
             Some(checked) => self.receive_checked(checked),
@@ -100,12 +100,12 @@ impl Numbering {
     }
 
     /// Notes what came of a line that was carried out.
-    pub fn note(&mut self, label: Label, outcome: Result<(), Refusal>) {
-        if let (Named::Line(number), Err(refusal)) = (label.named, outcome)
+    pub fn note(&mut self, label: Label, outcome: Result<(), CommandError>) {
+        if let (Named::Line(number), Err(command_error)) = (label.named, outcome)
             && number == self.last
             && self.refused.is_none()
         {
-            self.refused = Some((number, refusal.number()));
+            self.refused = Some((number, command_error.number()));
         }
     }
 
@@ -114,7 +114,7 @@ impl Numbering {
         let sets_number = number_to_set(text);
         let by = Some(checksum);
         if !line.is_whole {
-            return self.refuse(Refusal::Damaged, by);
+            return self.refuse(CommandError::Damaged, by);
         }
         let label = |number| Label { checksum: by, named: Named::Line(number) };
         if let Some(number) = sets_number {
@@ -126,7 +126,7 @@ impl Numbering {
                 }
                 None => match self.refused {
                     Some((number, error)) => {
-                        Received::Answer(Err(Refusal::RefusedBefore(error)), label(number))
+                        Received::Answer(Err(CommandError::RefusedBefore(error)), label(number))
                     }
                     None => {
                         let named = Named::Last(self.last);
@@ -135,9 +135,9 @@ impl Numbering {
                 },
             };
         }
-        let Some(number) = line.number else { return self.refuse(Refusal::Unnumbered, by) };
+        let Some(number) = line.number else { return self.refuse(CommandError::Unnumbered, by) };
         if self.required == Some(Checksum::Crc) && checksum == Checksum::Xor {
-            return self.refuse(Refusal::Damaged, by);
+            return self.refuse(CommandError::Damaged, by);
         }
         // A sender that begins without M110 begins at 1, or at 0.
         if number == self.last + 1 || (number == 0 && !self.has_begun) {
@@ -146,17 +146,17 @@ impl Numbering {
                 self.required = None;
             }
             if text.len() > LINE_LIMIT {
-                let outcome = Err(Refusal::LineTooLong { limit: LINE_LIMIT });
+                let outcome = Err(CommandError::LineTooLong { limit: LINE_LIMIT });
                 self.note(label(number), outcome);
                 return Received::Answer(outcome, label(number));
             }
             return Received::Line(text, label(number));
         }
         if number > self.last || !self.has_begun {
-            return self.refuse(Refusal::OutOfOrder { expected: self.last + 1 }, by);
+            return self.refuse(CommandError::OutOfOrder { expected: self.last + 1 }, by);
         }
         let again = match self.refused {
-            Some((refused, error)) if refused == number => Err(Refusal::RefusedBefore(error)),
+            Some((refused, error)) if refused == number => Err(CommandError::RefusedBefore(error)),
             _ => Ok(()),
         };
         Received::Answer(again, label(number))
@@ -170,10 +170,10 @@ impl Numbering {
             Some(Checksum::Crc) => !line.trim_ascii().is_empty(),
         };
         if may_be_damaged {
-            return self.refuse(Refusal::Unnumbered, None);
+            return self.refuse(CommandError::Unnumbered, None);
         }
         if line.len() > LINE_LIMIT {
-            return self.refuse(Refusal::LineTooLong { limit: LINE_LIMIT }, None);
+            return self.refuse(CommandError::LineTooLong { limit: LINE_LIMIT }, None);
         }
         let (number, text) = split_number(line).map_or((None, line), |(n, text)| (Some(n), text));
         match number_to_set(text) {
@@ -188,13 +188,15 @@ impl Numbering {
     }
 
     /// The line is not accepted: the one after the last is expected, if lines are numbered.
-    fn refuse<'a>(&self, refusal: Refusal, by: Option<Checksum>) -> Received<'a> {
-        let is_of_numbers =
-            matches!(refusal, Refusal::Damaged | Refusal::OutOfOrder { .. } | Refusal::Unnumbered);
+    fn refuse<'a>(&self, command_error: CommandError, by: Option<Checksum>) -> Received<'a> {
+        let is_of_numbers = matches!(
+            command_error,
+            CommandError::Damaged | CommandError::OutOfOrder { .. } | CommandError::Unnumbered
+        );
         let named = is_of_numbers || self.required.is_some();
         let named = if named { Named::Expected(self.last + 1) } else { Named::Nothing };
         let checksum = self.required.filter(|required| *required == Checksum::Crc).or(by);
-        Received::Answer(Err(refusal), Label { checksum, named })
+        Received::Answer(Err(command_error), Label { checksum, named })
     }
 }
 

@@ -1,6 +1,6 @@
 //! The options of a plot, `$name=value`.
 
-use super::Refusal;
+use super::CommandError;
 use super::values::{PENS, direction, number, on_or_off, positive, values, whole};
 use crate::fixed::{Decimal, Millimetres};
 use crate::order;
@@ -24,7 +24,7 @@ pub enum PlotOption {
     /// `$behind=clip|refuse`: what is behind the eye is cut off (`true`), or an error.
     ClipBehind(bool),
     /// `$see=faces|wire|vertices|edges`
-    See(WayToSee),
+    See(VisibilityMode),
     /// `$hidden=erased|dotted|dashed|shown|pen|pen,NUMBER`
     Hidden(HiddenLines),
     /// `$seams=on|off`: where faces pass through each other.
@@ -39,9 +39,9 @@ pub enum PlotOption {
     OnePen(bool),
     /// `$page=WIDTHxHEIGHT` in mm
     Page {
-        /// Along x.
+        /// EdgeParameter x.
         width: Millimetres,
-        /// Along y.
+        /// EdgeParameter y.
         height: Millimetres,
     },
     /// `$margin=MM`
@@ -84,7 +84,7 @@ impl ProjectionChoice {
     const CHOICES: &str = "perspective, orthographic, cavalier, cabinet, oblique,ANGLE,RATIO, isometric, \
                            dimetric, trimetric or axonometric,AZIMUTH,ELEVATION";
 
-    fn parse(value: &str) -> Result<Self, Refusal> {
+    fn parse(value: &str) -> Result<Self, CommandError> {
         let (name, numbers) = match value.split_once(',') {
             Some((name, numbers)) => (name.trim(), Some(numbers)),
             None => (value, None),
@@ -99,7 +99,7 @@ impl ProjectionChoice {
             ("oblique", Some(numbers)) => {
                 let [angle, ratio] = values(numbers)?;
                 if !(0.0..=2.0).contains(&ratio) || libm::fabs(angle) > 360.0 {
-                    return Err(Refusal::NumberOutOfRange);
+                    return Err(CommandError::NumberOutOfRange);
                 }
                 oblique(angle, ratio)
             }
@@ -111,11 +111,11 @@ impl ProjectionChoice {
             ("dimetric" | "trimetric" | "axonometric", Some(numbers)) => {
                 let [azimuth, elevation] = values(numbers)?;
                 if libm::fabs(azimuth) > 360.0 || libm::fabs(elevation) > 90.0 {
-                    return Err(Refusal::NumberOutOfRange);
+                    return Err(CommandError::NumberOutOfRange);
                 }
                 axonometric(azimuth, elevation)
             }
-            _ => return Err(Refusal::NotAChoice { choices: Self::CHOICES }),
+            _ => return Err(CommandError::NotAChoice { choices: Self::CHOICES }),
         })
     }
 }
@@ -123,7 +123,7 @@ impl ProjectionChoice {
 /// How it is found out what is seen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum WayToSee {
+pub enum VisibilityMode {
     /// Any faces hide what is behind them.
     #[default]
     Faces,
@@ -155,7 +155,7 @@ pub enum HiddenLines {
 impl HiddenLines {
     const CHOICES: &str = "erased, dotted, dashed, shown, pen or pen,NUMBER";
 
-    fn parse(value: &str) -> Result<Self, Refusal> {
+    fn parse(value: &str) -> Result<Self, CommandError> {
         Ok(match value {
             "erased" => Self::Erased,
             "dotted" => Self::Dotted,
@@ -165,10 +165,10 @@ impl HiddenLines {
             "pen" => Self::Pen(1),
             _ => {
                 let number = value.strip_prefix("pen,");
-                let number = number.ok_or(Refusal::NotAChoice { choices: Self::CHOICES })?;
+                let number = number.ok_or(CommandError::NotAChoice { choices: Self::CHOICES })?;
                 match whole(number)? {
                     number @ 1..=PENS => Self::Pen(number as u8 - 1),
-                    _ => return Err(Refusal::NumberOutOfRange),
+                    _ => return Err(CommandError::NumberOutOfRange),
                 }
             }
         })
@@ -177,29 +177,31 @@ impl HiddenLines {
 
 impl PlotOption {
     /// `None` if no option has this name.
-    pub(super) fn parse(name: &str, value: &str) -> Result<Option<Self>, Refusal> {
+    pub(super) fn parse(name: &str, value: &str) -> Result<Option<Self>, CommandError> {
         let option = match name {
             "eye" => Self::Eye(direction(value)?),
             "at" => Self::At(direction(value)?),
             "up" => Self::Up(direction(value)?),
             "view" => match value {
                 "auto" => Self::AutomaticView,
-                _ => return Err(Refusal::NotAChoice { choices: "auto" }),
+                _ => return Err(CommandError::NotAChoice { choices: "auto" }),
             },
             "angles" => Self::Angles(direction(value)?),
             "projection" => Self::Projection(ProjectionChoice::parse(value)?),
             "behind" => Self::ClipBehind(match value {
                 "clip" => true,
                 "refuse" => false,
-                _ => return Err(Refusal::NotAChoice { choices: "clip or refuse" }),
+                _ => return Err(CommandError::NotAChoice { choices: "clip or refuse" }),
             }),
             "see" => Self::See(match value {
-                "faces" => WayToSee::Faces,
-                "wire" => WayToSee::Wire,
-                "vertices" => WayToSee::Vertices,
-                "edges" => WayToSee::Edges,
+                "faces" => VisibilityMode::Faces,
+                "wire" => VisibilityMode::Wire,
+                "vertices" => VisibilityMode::Vertices,
+                "edges" => VisibilityMode::Edges,
                 _ => {
-                    return Err(Refusal::NotAChoice { choices: "faces, wire, vertices or edges" });
+                    return Err(CommandError::NotAChoice {
+                        choices: "faces, wire, vertices or edges",
+                    });
                 }
             }),
             "hidden" => Self::Hidden(HiddenLines::parse(value)?),
@@ -207,33 +209,33 @@ impl PlotOption {
             "precision" => {
                 let precision = number(value)?;
                 if !(0.0..=1e6).contains(&precision.to_f64()) {
-                    return Err(Refusal::NumberOutOfRange);
+                    return Err(CommandError::NumberOutOfRange);
                 }
                 Self::Precision(Some(precision))
             }
             "pens" => Self::OnePen(match value {
                 "one" => true,
                 "auto" => false,
-                _ => return Err(Refusal::NotAChoice { choices: "auto or one" }),
+                _ => return Err(CommandError::NotAChoice { choices: "auto or one" }),
             }),
             "page" => {
-                let (width, height) = value.split_once(['x', 'X']).ok_or(Refusal::NotAPage)?;
+                let (width, height) = value.split_once(['x', 'X']).ok_or(CommandError::NotAPage)?;
                 Self::Page { width: positive(width)?, height: positive(height)? }
             }
             "margin" | "lift" => {
                 let length =
-                    number(value)?.to_millimetres().map_err(|_| Refusal::NumberOutOfRange)?;
+                    number(value)?.to_millimetres().map_err(|_| CommandError::NumberOutOfRange)?;
                 match name {
-                    _ if length < 0 => return Err(Refusal::NumberOutOfRange),
+                    _ if length < 0 => return Err(CommandError::NumberOutOfRange),
                     "margin" => Self::Margin(length),
-                    _ if length > 1000 => return Err(Refusal::NumberOutOfRange),
+                    _ if length > 1000 => return Err(CommandError::NumberOutOfRange),
                     _ => Self::Lift(length),
                 }
             }
             "title-size" => {
                 let size = positive(value)?;
                 if !(1..=100).contains(&size) {
-                    return Err(Refusal::NumberOutOfRange);
+                    return Err(CommandError::NumberOutOfRange);
                 }
                 Self::TitleSize(size)
             }
@@ -242,22 +244,22 @@ impl PlotOption {
                 "auto" => order::Method::Auto,
                 "greedy" => order::Method::Greedy,
                 "exact" => order::Method::Exact,
-                _ => return Err(Refusal::NotAChoice { choices: "auto, greedy or exact" }),
+                _ => return Err(CommandError::NotAChoice { choices: "auto, greedy or exact" }),
             }),
             "cycle" => Self::Cycle(on_or_off(value)?),
-            "effort" => {
-                Self::Effort(u32::try_from(whole(value)?).map_err(|_| Refusal::NumberOutOfRange)?)
-            }
+            "effort" => Self::Effort(
+                u32::try_from(whole(value)?).map_err(|_| CommandError::NumberOutOfRange)?,
+            ),
             "seams" => Self::Seams(on_or_off(value)?),
             "blocks" => Self::MergedBlocks(match value {
                 "merged" => true,
                 "separate" => false,
-                _ => return Err(Refusal::NotAChoice { choices: "separate or merged" }),
+                _ => return Err(CommandError::NotAChoice { choices: "separate or merged" }),
             }),
             "crease" => {
                 let [degrees] = values(value)?;
                 if !(0.0..=180.0).contains(&degrees) {
-                    return Err(Refusal::NumberOutOfRange);
+                    return Err(CommandError::NumberOutOfRange);
                 }
                 Self::Crease(degrees)
             }
@@ -277,29 +279,32 @@ mod tests {
         let option = |line| match Command::parse(line) {
             Ok(Command::Option(option)) => Ok(option),
             Ok(other) => panic!("{other:?}"),
-            Err(refusal) => Err(refusal),
+            Err(command_error) => Err(command_error),
         };
         assert_eq!(option("$eye=-1, 2.5 ,3e1"), Ok(PlotOption::Eye([-1.0, 2.5, 30.0])));
         let projection = |value| match option(value) {
             Ok(PlotOption::Projection(choice)) => Ok(choice),
             Ok(other) => panic!("{other:?}"),
-            Err(refusal) => Err(refusal),
+            Err(command_error) => Err(command_error),
         };
         assert_eq!(
             projection("$projection = orthographic"),
             Ok(ProjectionChoice::Lens(Lens::Orthographic))
         );
         assert_eq!(projection("$projection=cabinet"), projection("$projection=oblique, 45,0.5"));
-        assert_eq!(projection("$projection=oblique,45,3"), Err(Refusal::NumberOutOfRange));
+        assert_eq!(projection("$projection=oblique,45,3"), Err(CommandError::NumberOutOfRange));
         assert_eq!(
             projection("$projection=oblique,45"),
-            Err(Refusal::WrongNumberCount { needed: 2 })
+            Err(CommandError::WrongNumberCount { needed: 2 })
         );
         assert_eq!(
             projection("$projection=trimetric,10,20"),
             projection("$projection=axonometric,10,20")
         );
-        assert!(matches!(projection("$projection=isometric,1,2"), Err(Refusal::NotAChoice { .. })));
+        assert!(matches!(
+            projection("$projection=isometric,1,2"),
+            Err(CommandError::NotAChoice { .. })
+        ));
         assert_eq!(
             option("$page=210x297"),
             Ok(PlotOption::Page {
@@ -307,16 +312,16 @@ mod tests {
                 height: Millimetres::from_num(297)
             })
         );
-        assert_eq!(option("$eye=1,2"), Err(Refusal::WrongNumberCount { needed: 3 }));
-        assert_eq!(option("$eye=1,2,3,4"), Err(Refusal::WrongNumberCount { needed: 3 }));
-        assert_eq!(option("$eye=1,2,"), Err(Refusal::NotANumber));
-        assert_eq!(option("$eye=1,2,1e300"), Err(Refusal::NumberOutOfRange));
-        assert_eq!(option("$page=210"), Err(Refusal::NotAPage));
-        assert_eq!(option("$page=0x297"), Err(Refusal::NumberOutOfRange));
-        assert_eq!(option("$margin=-1"), Err(Refusal::NumberOutOfRange));
+        assert_eq!(option("$eye=1,2"), Err(CommandError::WrongNumberCount { needed: 3 }));
+        assert_eq!(option("$eye=1,2,3,4"), Err(CommandError::WrongNumberCount { needed: 3 }));
+        assert_eq!(option("$eye=1,2,"), Err(CommandError::NotANumber));
+        assert_eq!(option("$eye=1,2,1e300"), Err(CommandError::NumberOutOfRange));
+        assert_eq!(option("$page=210"), Err(CommandError::NotAPage));
+        assert_eq!(option("$page=0x297"), Err(CommandError::NumberOutOfRange));
+        assert_eq!(option("$margin=-1"), Err(CommandError::NumberOutOfRange));
         assert_eq!(
             option("$hidden=gone"),
-            Err(Refusal::NotAChoice {
+            Err(CommandError::NotAChoice {
                 choices: "erased, dotted, dashed, shown, pen or pen,NUMBER"
             })
         );

@@ -150,7 +150,7 @@ impl<'q> Receiver<'q> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{LineReader, Refusal};
+    use super::super::{CommandError, LineReader};
     use super::*;
     use heapless::spsc::{Consumer, Queue};
     use std::string::{String, ToString};
@@ -165,7 +165,7 @@ mod tests {
     fn lines(
         reader: &mut LineReader,
         queue: &mut Consumer<'_, u8>,
-    ) -> Vec<Result<String, Refusal>> {
+    ) -> Vec<Result<String, CommandError>> {
         let mut lines = Vec::new();
         while let Some(byte) = queue.dequeue() {
             lines.extend(reader.push(byte).map(|line| line.map(ToString::to_string)));
@@ -174,7 +174,7 @@ mod tests {
     }
 
     /// The lines that come of what a PL011's data register holds.
-    fn lines_of(data: impl IntoIterator<Item = u32>) -> Vec<Result<String, Refusal>> {
+    fn lines_of(data: impl IntoIterator<Item = u32>) -> Vec<Result<String, CommandError>> {
         let (mut queue, mut reader) = (Queue::<u8, 256>::new(), LineReader::default());
         let (producer, mut consumer) = queue.split();
         let mut receiver = Receiver::new(producer);
@@ -191,11 +191,11 @@ mod tests {
         data
     }
 
-    fn ok(line: &str) -> Result<String, Refusal> {
+    fn ok(line: &str) -> Result<String, CommandError> {
         Ok(line.to_string())
     }
 
-    const LOST: Result<String, Refusal> = Err(Refusal::BytesLost);
+    const LOST: Result<String, CommandError> = Err(CommandError::BytesLost);
 
     #[test]
     fn every_error_of_the_uart_voids_its_line_and_no_other() {

@@ -1,6 +1,6 @@
 //! The numbers and words of a line.
 
-use super::Refusal;
+use super::CommandError;
 use crate::fixed::{Decimal, Millimetres};
 use crate::model::PEN_LIMIT;
 use crate::view::Direction;
@@ -8,38 +8,38 @@ use crate::view::Direction;
 /// How many pens there are.
 pub(super) const PENS: i32 = PEN_LIMIT as i32;
 
-pub(super) fn on_or_off(text: &str) -> Result<bool, Refusal> {
+pub(super) fn on_or_off(text: &str) -> Result<bool, CommandError> {
     match text {
         "on" => Ok(true),
         "off" => Ok(false),
-        _ => Err(Refusal::NotAChoice { choices: "on or off" }),
+        _ => Err(CommandError::NotAChoice { choices: "on or off" }),
     }
 }
 
-pub(super) fn number(text: &str) -> Result<Decimal, Refusal> {
-    Decimal::parse(text.trim()).map_err(|_| Refusal::NotANumber)
+pub(super) fn number(text: &str) -> Result<Decimal, CommandError> {
+    Decimal::parse(text.trim()).map_err(|_| CommandError::NotANumber)
 }
 
 #[inline(never)] // Once is enough.
-pub(super) fn positive(text: &str) -> Result<Millimetres, Refusal> {
-    let length = number(text)?.to_millimetres().map_err(|_| Refusal::NumberOutOfRange)?;
-    if length > 0 { Ok(length) } else { Err(Refusal::NumberOutOfRange) }
+pub(super) fn positive(text: &str) -> Result<Millimetres, CommandError> {
+    let length = number(text)?.to_millimetres().map_err(|_| CommandError::NumberOutOfRange)?;
+    if length > 0 { Ok(length) } else { Err(CommandError::NumberOutOfRange) }
 }
 
-pub(super) fn direction(text: &str) -> Result<Direction, Refusal> {
+pub(super) fn direction(text: &str) -> Result<Direction, CommandError> {
     values(text)
 }
 
 /// Exactly N numbers with commas between, for angles and places only.
-pub(super) fn values<const N: usize>(text: &str) -> Result<[f64; N], Refusal> {
+pub(super) fn values<const N: usize>(text: &str) -> Result<[f64; N], CommandError> {
     let mut values = [0.0; N];
     read_values(text, &mut values)?;
     Ok(values)
 }
 
 #[inline(never)] // Once is enough for every count.
-fn read_values(text: &str, values: &mut [f64]) -> Result<(), Refusal> {
-    let wrong_count = Refusal::WrongNumberCount { needed: values.len() };
+fn read_values(text: &str, values: &mut [f64]) -> Result<(), CommandError> {
+    let wrong_count = CommandError::WrongNumberCount { needed: values.len() };
     let mut parts = text.split(',').map(number);
     for value in &mut *values {
         *value = parts.next().unwrap_or(Err(wrong_count))?.to_f64();
@@ -49,15 +49,15 @@ fn read_values(text: &str, values: &mut [f64]) -> Result<(), Refusal> {
     }
     // Past this range squares and quotients of lengths would overflow.
     if values.iter().any(|value| libm::fabs(*value) > 1e15) {
-        return Err(Refusal::NumberOutOfRange);
+        return Err(CommandError::NumberOutOfRange);
     }
     Ok(())
 }
 
 /// x y z, and then the weight or colour that some modellers write, which must be numbers too.
-pub(super) fn coordinates(text: &str) -> Result<[Decimal; 3], Refusal> {
+pub(super) fn coordinates(text: &str) -> Result<[Decimal; 3], CommandError> {
     let mut words = text.split_ascii_whitespace().map(number);
-    let mut next = || words.next().unwrap_or(Err(Refusal::WrongNumberCount { needed: 3 }));
+    let mut next = || words.next().unwrap_or(Err(CommandError::WrongNumberCount { needed: 3 }));
     let coordinates = [next()?, next()?, next()?];
     for rest in words {
         rest?;
@@ -72,8 +72,8 @@ pub(super) fn split_word(text: &str) -> (&str, &str) {
 }
 
 /// One whole number.
-pub(super) fn whole(text: &str) -> Result<i32, Refusal> {
-    number(text)?.to_whole().map_err(|_| Refusal::NumberOutOfRange)
+pub(super) fn whole(text: &str) -> Result<i32, CommandError> {
+    number(text)?.to_whole().map_err(|_| CommandError::NumberOutOfRange)
 }
 
 /// Numbers with spaces between.
@@ -84,7 +84,7 @@ pub struct Decimals<'a> {
 
 impl<'a> Decimals<'a> {
     /// Checks every word, so that [`Decimals::iter`] cannot fail.
-    pub(super) fn new(text: &'a str) -> Result<Self, Refusal> {
+    pub(super) fn new(text: &'a str) -> Result<Self, CommandError> {
         for word in text.split_ascii_whitespace() {
             number(word)?;
         }
@@ -105,9 +105,9 @@ pub struct Numbers<'a> {
 
 impl<'a> Numbers<'a> {
     /// Checks every word, so that [`Numbers::iter`] cannot fail.
-    pub(super) fn new(text: &'a str) -> Result<Self, Refusal> {
+    pub(super) fn new(text: &'a str) -> Result<Self, CommandError> {
         for word in text.split_ascii_whitespace() {
-            vertex_number(word).ok_or(Refusal::NotAVertexNumber)?;
+            vertex_number(word).ok_or(CommandError::NotAVertexNumber)?;
         }
         Ok(Self { text })
     }

@@ -14,14 +14,14 @@ pub type Direction = [f64; 3];
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Camera {
     /// Where the eye is and which way it looks.
-    pub sight: Sight,
+    pub sight: Pose,
     /// How lines of sight run.
     pub lens: Lens,
 }
 
 /// Where the eye is and which way it looks.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Sight {
+pub enum Pose {
     /// From one point to another (Brown IV).
     Towards {
         /// The eye, in model units.
@@ -99,7 +99,7 @@ impl Camera {
         Self::from_direction(model, from, Lens::Orthographic, at, up)
     }
 
-    /// Harrison's view: along the z axis of the turned model (see [`Sight::Turned`]), from `eye`, or
+    /// Harrison's view: along the z axis of the turned model (see [`Pose::Turned`]), from `eye`, or
     /// else from so far away that the whole model is well inside the field.
     pub fn turned(
         model: &Model<'_>,
@@ -111,7 +111,7 @@ impl Camera {
         let [_, _, forward] = turned(angles);
         let eye = eye
             .unwrap_or([0, 1, 2].map(|axis| middle[axis] - EYE_DISTANCE * radius * forward[axis]));
-        Some(Self { sight: Sight::Turned { eye, angles }, lens })
+        Some(Self { sight: Pose::Turned { eye, angles }, lens })
     }
 
     fn from_direction(
@@ -124,7 +124,7 @@ impl Camera {
         let (middle, radius) = middle_and_radius(model)?;
         let at = at.unwrap_or(middle);
         let eye = [0, 1, 2].map(|axis| at[axis] + EYE_DISTANCE * radius * from[axis]);
-        Some(Self { sight: Sight::Towards { eye, at, up }, lens })
+        Some(Self { sight: Pose::Towards { eye, at, up }, lens })
     }
 }
 
@@ -168,7 +168,7 @@ pub enum SightLines {
     /// They meet here.
     Through([i64; 3]),
     /// They are parallel; this points to the user, and is not zero.
-    Along([i64; 3]),
+    EdgeParameter([i64; 3]),
 }
 
 impl Camera {
@@ -187,7 +187,7 @@ impl Camera {
         let sight = cross(right, up);
         let away = if dot(sight, forward) < 0.0 { 1.0 } else { -1.0 };
         let scale = away * limit / largest_component(sight);
-        Ok(SightLines::Along(sight.map(|part| libm::round(part * scale) as i64)))
+        Ok(SightLines::EdgeParameter(sight.map(|part| libm::round(part * scale) as i64)))
     }
 }
 
@@ -203,8 +203,8 @@ pub(super) struct Axes {
 impl Axes {
     pub fn new(camera: &Camera) -> Result<Self, ViewError> {
         let (eye, at, [right, up, forward]) = match camera.sight {
-            Sight::Towards { eye, at, up } => (eye, at, towards(eye, at, up)?),
-            Sight::Turned { eye, angles } => (eye, eye, turned(angles)),
+            Pose::Towards { eye, at, up } => (eye, at, towards(eye, at, up)?),
+            Pose::Turned { eye, angles } => (eye, eye, turned(angles)),
         };
         let directions = match camera.lens {
             Lens::Oblique { angle, ratio } => {

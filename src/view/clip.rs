@@ -6,10 +6,10 @@
 
 use super::View;
 use super::curves::Flattening;
-use super::tidy::tidy;
+use super::weld::weld;
 use crate::geometry::Vertex;
 use crate::model::{Corner, Element, Elements, Model, PenWriter, VERTEX_NUMBER_LIMIT};
-use crate::stage::{Attention, OutOfScratch, Scratch, StageError, heap_sort_by_key};
+use crate::stage::{Cancel, OutOfScratch, Scratch, StageError, heap_sort_by_key};
 
 /// A model as the camera sees it.
 #[derive(Debug, Clone, Copy)]
@@ -31,19 +31,19 @@ pub struct Seen<'a> {
 /// # Errors
 /// [`StageError::Scratch`] if the vertices, or the cut faces, do not fit.
 #[inline(never)] // Its frame must not lie under the stages'.
-pub fn see<'a>(
+pub fn project_scene<'a>(
     view: &View,
     model: &'a Model<'_>,
     curves: Option<Flattening<'_>>,
     scratch: &mut Scratch<'a>,
-    attention: &mut dyn Attention,
+    cancel: &mut dyn Cancel,
 ) -> Result<Seen<'a>, StageError> {
-    let (elements, degenerate_faces) = tidy(model, scratch, attention)?;
+    let (elements, degenerate_faces) = weld(model, scratch, cancel)?;
     let (vertices, elements) = match curves {
-        Some(curves) => curves.add(view, model, elements, scratch, attention)?,
+        Some(curves) => curves.add(view, model, elements, scratch, cancel)?,
         None => {
             let vertices = scratch.take::<Vertex>(model.vertices().len())?;
-            view.fill(model, vertices, attention)?;
+            view.fill(model, vertices, cancel)?;
             (&*vertices, elements)
         }
     };

@@ -8,7 +8,7 @@ use super::clip::clip_edge;
 use crate::curve::{FRACTION_BITS, Fine, Point};
 use crate::geometry::{Projection, Vertex};
 use crate::model::{Corner, Elements, Model, PenWriter, VERTEX_NUMBER_LIMIT};
-use crate::stage::{Attention, OutOfScratch, Scratch, StageError};
+use crate::stage::{Cancel, OutOfScratch, Scratch, StageError};
 
 /// How curves become straight lines: as few as stay within a tolerance on the page.
 #[derive(Clone, Copy)]
@@ -25,7 +25,7 @@ impl Flattening<'_> {
         view: &View,
         model: &Model<'_>,
         points: &[Vertex],
-        attention: &mut dyn Attention,
+        cancel: &mut dyn Cancel,
         each: &mut dyn FnMut(Point, bool) -> Result<(), OutOfScratch>,
     ) -> Result<(), StageError> {
         let near = i64::from(view.near().unwrap_or(0)) << FRACTION_BITS;
@@ -34,7 +34,7 @@ impl Flattening<'_> {
             Projection::Parallel => Some((self.on_page)(x, y, 1 << FRACTION_BITS)),
         };
         let points: &[Point] = bytemuck::cast_slice(points);
-        model.curves().flatten(points, &project, self.tolerance, attention, each)
+        model.curves().flatten(points, &project, self.tolerance, cancel, each)
     }
 
     /// Hands over each chord of the model's curves in view coordinates, what is nearer than the near
@@ -47,14 +47,14 @@ impl Flattening<'_> {
         view: &View,
         model: &Model<'_>,
         mut scratch: Scratch<'_>,
-        attention: &mut dyn Attention,
+        cancel: &mut dyn Cancel,
         each: &mut dyn FnMut([Vertex; 2]),
     ) -> Result<(), StageError> {
         let points = scratch.take::<Vertex>(model.vertices().len())?;
-        view.fill(model, points, attention)?;
+        view.fill(model, points, cancel)?;
         let near = view.near().unwrap_or(i32::MIN);
         let mut before = None;
-        self.flatten(view, model, points, attention, &mut |[x, y, z], begins| {
+        self.flatten(view, model, points, cancel, &mut |[x, y, z], begins| {
             let end = Vertex { x, y, z };
             if let Some(before) = before.replace(end).filter(|_| !begins)
                 && let Some(chord) = clip_edge([before, end], near)
@@ -72,7 +72,7 @@ impl Flattening<'_> {
         model: &Model<'_>,
         elements: Elements<'_>,
         scratch: &mut Scratch<'a>,
-        attention: &mut dyn Attention,
+        cancel: &mut dyn Cancel,
     ) -> Result<(&'a [Vertex], Elements<'a>), StageError> {
         // The number after the last end of each curve.
         let curve_ends = scratch.take::<u16>(model.curve_count())?;
@@ -81,11 +81,11 @@ impl Flattening<'_> {
             let available = size_of_val(room);
             let full = OutOfScratch { needed: available + size_of::<Vertex>(), available };
             let (points, room) = room.split_at_mut_checked(first).ok_or(full)?;
-            view.fill(model, points, attention)?;
+            view.fill(model, points, cancel)?;
             let limit = VERTEX_NUMBER_LIMIT.saturating_sub(first);
             let mut rest = room.iter_mut().take(limit);
             let (mut number, mut curve) = (first, 0);
-            self.flatten(view, model, points, attention, &mut |[x, y, z], begins| {
+            self.flatten(view, model, points, cancel, &mut |[x, y, z], begins| {
                 *rest.next().ok_or(full)? = Vertex { x, y, z };
                 number += 1;
                 curve += usize::from(begins);

@@ -12,15 +12,15 @@
 mod camera;
 mod clip;
 mod curves;
-mod tidy;
+mod weld;
 
-pub use camera::{Camera, Direction, Lens, Sight, SightLines};
-pub use clip::{Seen, distinct_edges, see};
+pub use camera::{Camera, Direction, Lens, Pose, SightLines};
+pub use clip::{Seen, distinct_edges, project_scene};
 pub use curves::Flattening;
 
 use crate::geometry::{COORDINATE_LIMIT, Projection, Vertex};
 use crate::model::{Model, Position};
-use crate::stage::{Aborted, Attention};
+use crate::stage::{Aborted, Cancel};
 use camera::{Axes, dot, largest_component};
 
 /// Why there is no view.
@@ -186,14 +186,14 @@ impl View {
         &self,
         model: &Model<'_>,
         vertices: &mut [Vertex],
-        attention: &mut dyn Attention,
+        cancel: &mut dyn Cancel,
     ) -> Result<(), Aborted> {
         let chunks = vertices.chunks_mut(VERTICES_BETWEEN_CHECKS);
         for (vertices, positions) in chunks.zip(model.vertices().chunks(VERTICES_BETWEEN_CHECKS)) {
             for (vertex, position) in vertices.iter_mut().zip(positions) {
                 *vertex = self.vertex(*position);
             }
-            attention.check()?;
+            cancel.check()?;
         }
         Ok(())
     }
@@ -300,7 +300,7 @@ mod tests {
     ];
 
     fn camera(eye: Direction, at: Direction) -> Camera {
-        Camera { sight: Sight::Towards { eye, at, up: None }, lens: Lens::Perspective }
+        Camera { sight: Pose::Towards { eye, at, up: None }, lens: Lens::Perspective }
     }
 
     #[test]
@@ -359,7 +359,7 @@ mod tests {
             let (eye, at) = ([0.5, 0.5, 5.0], [0.5, 0.5, 0.5]);
             assert_eq!(View::new(&camera(at, at), model), Err(ViewError::EyeAtTarget));
             for up in [[0.0, 0.0, -2.0], [0.0; 3]] {
-                let sight = Sight::Towards { eye, at, up: Some(up) };
+                let sight = Pose::Towards { eye, at, up: Some(up) };
                 let upright = Camera { sight, lens: Lens::Perspective };
                 assert_eq!(View::new(&upright, model), Err(ViewError::UpAlongSight));
             }

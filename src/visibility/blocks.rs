@@ -8,10 +8,10 @@
 //! Blocks touch in the model; in the view each corner was rounded on its own. So "in one plane" and "on
 //! one line" are asked of the model.
 
+use super::coarse_projection::CoarseProjection;
+use super::edge_query::{CrossedPolygon, EdgeQuery, SceneIndex};
 use super::faces::Face;
-use super::outlook::Outlook;
-use super::profile::{Part, Profile};
-use super::sight::{Piece, Sight, Surroundings};
+use super::profile::{EdgeInterval, Profile};
 
 /// A side of an edge, and where its profile keeps the nearest face that begins there: the rank and one.
 #[derive(Clone, Copy)]
@@ -50,31 +50,33 @@ impl Touching {
     }
 
     /// Whether a vertex lies behind this triangle (positive), before it, or in its plane.
-    fn height(&self, outlook: &Outlook<'_>, vertex: u16) -> i64 {
-        outlook.height(self.corners, outlook.end(vertex)) * i64::from(self.facing)
+    fn height(&self, coarse_projection: &CoarseProjection<'_>, vertex: u16) -> i64 {
+        coarse_projection.height(self.corners, coarse_projection.end(vertex))
+            * i64::from(self.facing)
     }
 }
 
-impl Sight {
+impl EdgeQuery {
     /// Notes where `face` begins at this edge, where it is the nearest to do so.
     pub fn touch(
         &self,
-        around: &Surroundings<'_>,
+        around: &SceneIndex<'_>,
         face: Face,
         rank: usize,
         profile: &mut Profile<'_>,
     ) {
         for triangle in around.triangles(face) {
-            let Some(touching) = self.touching(&around.outlook, triangle) else {
+            let Some(touching) = self.touching(&around.coarse_projection, triangle) else {
                 continue;
             };
-            let piece = Piece::new(&touching.corners, &touching.sides);
+            let piece = CrossedPolygon::new(&touching.corners, &touching.sides);
             for bank in [LEFT, RIGHT] {
                 let crossings =
                     piece.crossings(if bank.is_left { piece.left } else { piece.left_or_on });
-                let passage = self.passage(&around.outlook, piece, crossings, touching.facing);
+                let passage =
+                    self.passage(&around.coarse_projection, piece, crossings, touching.facing);
                 if let Some(passage) = passage {
-                    let part: Part = self.part(&around.outlook, passage);
+                    let part: EdgeInterval = self.part(&around.coarse_projection, passage);
                     profile.update(part, |marks| {
                         let known = bank.get(marks);
                         if known.is_none_or(|known| self.is_nearer(around, &touching, known, bank))
@@ -90,53 +92,52 @@ impl Sight {
     }
 
     /// Whether what is noted for a piece of this edge is one plane on both sides.
-    pub fn is_within_plane(&self, around: &Surroundings<'_>, marks: u64) -> bool {
+    pub fn is_within_plane(&self, around: &SceneIndex<'_>, marks: u64) -> bool {
         let beside = |bank: Bank| self.find_touching(around, bank.get(marks)?, bank);
         let (Some(left), Some(right)) = (beside(LEFT), beside(RIGHT)) else {
             return false;
         };
-        let outlook = &around.outlook;
-        left.corner(LEFT).is_some_and(|corner| right.height(outlook, corner) == 0)
+        let coarse_projection = &around.coarse_projection;
+        left.corner(LEFT).is_some_and(|corner| right.height(coarse_projection, corner) == 0)
     }
 
     /// Whether a triangle is nearer on one side of this edge than the face of a rank.
     fn is_nearer(
         &self,
-        around: &Surroundings<'_>,
+        around: &SceneIndex<'_>,
         touching: &Touching,
         than: usize,
         bank: Bank,
     ) -> bool {
-        let outlook = &around.outlook;
+        let coarse_projection = &around.coarse_projection;
         match (self.find_touching(around, than, bank), touching.corner(bank)) {
-            (Some(other), Some(corner)) => other.height(outlook, corner) < 0,
+            (Some(other), Some(corner)) => other.height(coarse_projection, corner) < 0,
             _ => false,
         }
     }
 
     /// The triangle of a face that holds this edge and has a corner on one side of it.
-    fn find_touching(
-        &self,
-        around: &Surroundings<'_>,
-        rank: usize,
-        bank: Bank,
-    ) -> Option<Touching> {
+    fn find_touching(&self, around: &SceneIndex<'_>, rank: usize, bank: Bank) -> Option<Touching> {
         around
             .triangles(around.faces.get(rank))
-            .filter_map(|triangle| self.touching(&around.outlook, triangle))
+            .filter_map(|triangle| self.touching(&around.coarse_projection, triangle))
             .find(|touching| touching.corner(bank).is_some())
     }
 
-    fn touching(&self, outlook: &Outlook<'_>, triangle: [u16; 3]) -> Option<Touching> {
+    fn touching(
+        &self,
+        coarse_projection: &CoarseProjection<'_>,
+        triangle: [u16; 3],
+    ) -> Option<Touching> {
         let [a, b, c] = triangle;
-        let facing = outlook.side(a, b, c);
-        (facing != 0 && self.lies_in_plane_of(outlook, triangle)).then(|| Touching {
+        let facing = coarse_projection.side(a, b, c);
+        (facing != 0 && self.lies_in_plane_of(coarse_projection, triangle)).then(|| Touching {
             corners: triangle,
             sides: triangle.map(|corner| {
-                if self.is_in_line_with(outlook, corner) {
+                if self.is_in_line_with(coarse_projection, corner) {
                     0
                 } else {
-                    self.side_of(outlook, corner)
+                    self.side_of(coarse_projection, corner)
                 }
             }),
             facing,
@@ -145,19 +146,29 @@ impl Sight {
 
     /// Whether the plane of a triangle holds this edge. That of a seam is held by every plane of
     /// either of its faces.
-    pub fn lies_in_plane_of(&self, outlook: &Outlook<'_>, triangle: [u16; 3]) -> bool {
+    pub fn lies_in_plane_of(
+        &self,
+        coarse_projection: &CoarseProjection<'_>,
+        triangle: [u16; 3],
+    ) -> bool {
         match self.seam {
-            Some(seam) => seam.iter().any(|of| outlook.heights(triangle, *of) == [0; 3]),
-            None => [self.p, self.q].iter().all(|end| outlook.height(triangle, *end) == 0),
+            Some(seam) => seam.iter().any(|of| coarse_projection.heights(triangle, *of) == [0; 3]),
+            None => {
+                [self.p, self.q].iter().all(|end| coarse_projection.height(triangle, *end) == 0)
+            }
         }
     }
 
     /// Whether a vertex lies on the line of this edge, or of this seam, in the model.
-    fn is_in_line_with(&self, outlook: &Outlook<'_>, vertex: u16) -> bool {
+    fn is_in_line_with(&self, coarse_projection: &CoarseProjection<'_>, vertex: u16) -> bool {
         let [p, q] = [self.p.number, self.q.number];
         match self.seam {
-            Some(seam) => seam.iter().all(|of| outlook.height(*of, outlook.end(vertex)) == 0),
-            None => vertex == p || vertex == q || outlook.unrounded.are_in_line(p, q, vertex),
+            Some(seam) => seam
+                .iter()
+                .all(|of| coarse_projection.height(*of, coarse_projection.end(vertex)) == 0),
+            None => {
+                vertex == p || vertex == q || coarse_projection.unrounded.are_in_line(p, q, vertex)
+            }
         }
     }
 }

@@ -1,7 +1,7 @@
 //! The distinct edges: which side of which element stands for each edge of the model.
 
 use super::crease::Crease;
-use super::pace::Pace;
+use super::yield_counter::YieldCounter;
 use super::{Unrounded, VisibilityError};
 use crate::geometry::{Projection, Vertex};
 use crate::model::{Corner, Elements, Pens};
@@ -88,7 +88,7 @@ impl<'a> ChosenSides<'a> {
         vertices: &[Vertex],
         (crease, unrounded): (Option<Crease>, Unrounded<'_>),
         scratch: &mut Scratch<'a>,
-        pace: &mut Pace<'_>,
+        yield_counter: &mut YieldCounter<'_>,
     ) -> Result<Self, VisibilityError> {
         let corners = outlines.corners;
         let word_count = corners.len().div_ceil(32);
@@ -117,7 +117,7 @@ impl<'a> ChosenSides<'a> {
                     }
                     before = known;
                     known = next[usize::from(known)];
-                    pace.spend(30)?;
+                    yield_counter.spend(30)?;
                 }
                 if known == NONE {
                     next[side] = *head;
@@ -156,7 +156,7 @@ impl<'a> ChosenSides<'a> {
                     chosen.remove(best);
                 }
             }
-            pace.spend(100 * element.len())?;
+            yield_counter.spend(100 * element.len())?;
         }
         Ok(chosen)
     }

@@ -2,8 +2,8 @@
 
 use super::VisibilityError;
 use super::edges::{Outlines, is_bar};
-use super::pace::Pace;
 use super::triangles::{Cut, cut_of};
+use super::yield_counter::YieldCounter;
 use crate::geometry::{COORDINATE_LIMIT, Vertex};
 use crate::stage::{Scratch, heap_sort_by_key};
 
@@ -33,12 +33,12 @@ impl<'a> Faces<'a> {
         outlines: Outlines<'_>,
         vertices: &[Vertex],
         scratch: &mut Scratch<'a>,
-        pace: &mut Pace<'_>,
+        yield_counter: &mut YieldCounter<'_>,
     ) -> Result<Self, VisibilityError> {
         let mut degenerate = 0;
         let order: &mut [u32] = scratch.take(outlines.elements().count())?;
         for (key, (first, corners)) in order.iter_mut().zip(outlines.elements()) {
-            pace.spend(200 * corners.len())?;
+            yield_counter.spend(200 * corners.len())?;
             let near = corners
                 .iter()
                 .map(|corner| vertices[usize::from(corner.vertex())].z)
@@ -56,7 +56,7 @@ impl<'a> Faces<'a> {
             *key = depth.min(0x3FFF) << 18 | cut << 16 | first as u32;
         }
         // Not looked up from: some 500 instructions for each of 2000 faces.
-        pace.spend(500 * order.len())?;
+        yield_counter.spend(500 * order.len())?;
         heap_sort_by_key(order, |key| *key);
         Ok(Self { order, degenerate })
     }

@@ -5,11 +5,11 @@
 //! way is hidden without another look.
 
 use super::VisibilityError;
+use super::coarse_projection::{CoarsePoint, CoarseProjection};
 use super::edges::Outlines;
 use super::faces::Faces;
-use super::outlook::{Outlook, Place};
-use super::pace::Pace;
 use super::raster::{Bounds, Raster, Shape};
+use super::yield_counter::YieldCounter;
 use crate::geometry::COORDINATE_LIMIT;
 use crate::stage::Scratch;
 use bytemuck::{Pod, Zeroable};
@@ -59,14 +59,14 @@ impl<'a> Grid<'a> {
 
     /// Sorts the faces into the finest grid that fits what is left of `scratch`, not finer than is useful.
     pub fn new(
-        outlook: &Outlook<'_>,
+        coarse_projection: &CoarseProjection<'_>,
         outlines: Outlines<'_>,
         faces: &Faces<'_>,
         mut scratch: Scratch<'a>,
-        pace: &mut Pace<'_>,
+        yield_counter: &mut YieldCounter<'_>,
     ) -> Result<Self, VisibilityError> {
         let wanted_cells = (faces.len() * CELLS_FOR_EACH_FACE).min(usize::from(u16::MAX));
-        let mut shape = Shape::finest(outlook);
+        let mut shape = Shape::finest(coarse_projection);
         while shape.cells() > 1 {
             let fits = |entries: usize| {
                 let bytes =
@@ -75,16 +75,16 @@ impl<'a> Grid<'a> {
             };
             if shape.cells() <= wanted_cells
                 && fits(faces.len())
-                && fits(shape.most_entries(outlook, outlines, faces, pace)?)
+                && fits(shape.most_entries(coarse_projection, outlines, faces, yield_counter)?)
             {
                 break;
             }
             shape.coarsen();
         }
         let mut raster = Raster::new(shape, scratch.take(shape.cells())?);
-        let entry_count = raster.count(outlook, outlines, faces, pace)?;
+        let entry_count = raster.count(coarse_projection, outlines, faces, yield_counter)?;
         let entries: &mut [u16] = scratch.take(entry_count)?;
-        raster.fill(outlook, outlines, faces, entries, pace)?;
+        raster.fill(coarse_projection, outlines, faces, entries, yield_counter)?;
         Ok(Self { shape, columns: shape.columns(), cells: raster.cells(), entries })
     }
 
@@ -108,7 +108,7 @@ impl<'a> Grid<'a> {
     }
 
     /// The way of an edge from `p` to `q` that is nowhere nearer than the coarse depth `near`.
-    pub fn way(&self, p: Place, q: Place, near: u16) -> Way<'_> {
+    pub fn way(&self, p: CoarsePoint, q: CoarsePoint, near: u16) -> Way<'_> {
         let (low, high) = if p.y <= q.y { (p, q) } else { (q, p) };
         let dx = i32::from(high.x) - i32::from(low.x);
         let dy = i32::from(high.y) - i32::from(low.y);
@@ -121,8 +121,8 @@ impl<'a> Grid<'a> {
 pub struct Way<'g> {
     grid: &'g Grid<'g>,
     near: u16,
-    low: Place,
-    high: Place,
+    low: CoarsePoint,
+    high: CoarsePoint,
     /// Steps to the right for each step up, in units of 2^-16.
     slope: i32,
 }

@@ -14,9 +14,9 @@
 //! * An edge that the eye sees end-on has no length on the page and no stretch.
 //!
 //! The way: choose one side of a face for each edge (`edges`, `crease`), cut concave faces into
-//! triangles (`triangles`), place the vertices on a coarse grid of the page (`outlook`), sort the faces by
+//! triangles (`triangles`), place the vertices on a coarse grid of the page (`coarse_projection`), sort the faces by
 //! depth (`faces`) and into cells (`grid`, `raster`); then follow each edge through the cells (`search`) and
-//! mark on its `profile` what each face hides (`sight`). On request, find the lines where faces pass
+//! mark on its `profile` what each face hides (`edge_query`). On request, find the lines where faces pass
 //! through each other (`seams`) and leave out those within one plane (`blocks`).
 //!
 //! # Memory
@@ -42,29 +42,29 @@ mod crease;
 mod edges;
 mod faces;
 mod grid;
-mod outlook;
-mod pace;
+mod coarse_projection;
+mod yield_counter;
 mod profile;
 mod raster;
 mod seams;
 mod search;
-mod sight;
+mod edge_query;
 mod triangles;
 mod unrounded;
 mod wire;
 
 use crate::geometry::{COORDINATE_LIMIT, Projection, Vertex};
 use crate::model::Elements;
-use crate::stage::{Aborted, Attention, OutOfScratch, Scratch};
+use crate::stage::{Aborted, Cancel, OutOfScratch, Scratch};
+use coarse_projection::{CoarsePoint, CoarseProjection};
+use edge_query::SceneIndex;
 use edges::{ChosenSides, MOST_CORNERS, Outlines};
 use faces::Faces;
-use outlook::{Outlook, Place};
-use pace::Pace;
-use search::Search;
-use sight::Surroundings;
+use search::StretchFinder;
 use triangles::Ears;
+use yield_counter::YieldCounter;
 
-pub use crate::geometry::Along;
+pub use crate::geometry::EdgeParameter;
 pub use crease::Crease;
 pub use unrounded::Unrounded;
 pub use wire::follow_wire;
@@ -112,9 +112,9 @@ pub struct Stretch {
     /// Those vertices, or the ends of the seam, rounded.
     pub ends: (Vertex, Vertex),
     /// Where it begins.
-    pub from: Along,
+    pub from: EdgeParameter,
     /// Where it ends, after `from`.
-    pub to: Along,
+    pub to: EdgeParameter,
     /// Whether it is seen.
     pub visible: bool,
     /// The pen that draws it, from 0.
@@ -186,9 +186,9 @@ pub fn scratch_bytes(scene: &Scene<'_>) -> usize {
 /// The same for faces that are convex, or are covered by one fan of triangles, by numbers alone.
 pub const fn least_bytes(vertices: usize, corners: usize, faces: usize) -> usize {
     let choosing = ChosenSides::bytes_while_choosing(vertices, corners);
-    let searching = Scratch::bytes_for::<Place>(vertices)
+    let searching = Scratch::bytes_for::<CoarsePoint>(vertices)
         + Scratch::bytes_for::<u32>(faces)
-        + Search::least_bytes(faces);
+        + StretchFinder::least_bytes(faces);
     ChosenSides::bytes(corners) + if choosing > searching { choosing } else { searching }
 }
 
@@ -200,24 +200,25 @@ pub fn find_stretches(
     scene: &Scene<'_>,
     options: Options,
     mut scratch: Scratch<'_>,
-    attention: &mut dyn Attention,
+    cancel: &mut dyn Cancel,
     sink: &mut dyn StretchSink,
 ) -> Result<Report, VisibilityError> {
     check(scene)?;
     let outlines = Outlines::of(scene.elements);
     let (vertices, projection) = (scene.vertices, scene.projection);
-    let pace = &mut Pace::new(attention);
+    let yield_counter = &mut YieldCounter::new(cancel);
     let memory = &mut scratch;
     let creases = (options.crease, scene.unrounded);
-    let chosen = ChosenSides::choose(outlines, projection, vertices, creases, memory, pace)?;
-    let ears = Ears::cut(outlines, vertices, memory, pace)?;
-    let outlook = Outlook::new(scene, memory, pace)?;
-    let faces = Faces::sort(outlines, vertices, memory, pace)?;
-    let around = Surroundings { outlook, outlines, ears, chosen, faces };
-    let mut search = Search::new(around, options, scratch, pace)?;
-    search.follow_edges(pace, sink)?;
+    let chosen =
+        ChosenSides::choose(outlines, projection, vertices, creases, memory, yield_counter)?;
+    let ears = Ears::cut(outlines, vertices, memory, yield_counter)?;
+    let coarse_projection = CoarseProjection::new(scene, memory, yield_counter)?;
+    let faces = Faces::sort(outlines, vertices, memory, yield_counter)?;
+    let around = SceneIndex { coarse_projection, outlines, ears, chosen, faces };
+    let mut search = StretchFinder::new(around, options, scratch, yield_counter)?;
+    search.follow_edges(yield_counter, sink)?;
     if options.with_seams {
-        search.follow_seams(pace, sink)?;
+        search.follow_seams(yield_counter, sink)?;
     }
     Ok(Report { degenerate_faces: search.degenerate_faces() })
 }

@@ -1,6 +1,6 @@
 //! What is known of one edge so far: its pieces from p to q and what covers each.
 
-use crate::geometry::Along;
+use crate::geometry::EdgeParameter;
 use bytemuck::{Pod, Zeroable};
 
 /// What covers a piece of an edge, as a set of these marks.
@@ -17,27 +17,29 @@ pub mod mark {
 
 /// A part of an edge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Part {
+pub struct EdgeInterval {
     /// `None` at p.
-    pub from: Option<Along>,
+    pub from: Option<EdgeParameter>,
     /// `None` at q.
-    pub to: Option<Along>,
+    pub to: Option<EdgeParameter>,
 }
 
-impl Part {
+impl EdgeInterval {
     /// All of the edge.
     pub const WHOLE: Self = Self { from: None, to: None };
 
     /// What both have in common.
     pub fn and(self, other: Self) -> Self {
         let both =
-            |a: Option<Along>, b: Option<Along>, choose: fn(Along, Along) -> Along| match (a, b) {
+            |a: Option<EdgeParameter>,
+             b: Option<EdgeParameter>,
+             choose: fn(EdgeParameter, EdgeParameter) -> EdgeParameter| match (a, b) {
                 (Some(a), Some(b)) => Some(choose(a, b)),
                 (a, b) => a.or(b),
             };
         Self {
-            from: both(self.from, other.from, Along::max),
-            to: both(self.to, other.to, Along::min),
+            from: both(self.from, other.from, EdgeParameter::max),
+            to: both(self.to, other.to, EdgeParameter::min),
         }
     }
 
@@ -49,8 +51,8 @@ impl Part {
 /// A piece of an edge: from here to where the next piece begins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
-pub struct Piece {
-    pub from: Along,
+pub struct ProfilePiece {
+    pub from: EdgeParameter,
     pub marks: u64,
 }
 
@@ -60,9 +62,9 @@ pub struct Piece {
 /// ends where the last piece began, and the rest of the edge waits for another window.
 #[derive(Debug)]
 pub struct Profile<'a> {
-    memory: &'a mut [Piece],
+    memory: &'a mut [ProfilePiece],
     count: usize,
-    end: Along,
+    end: EdgeParameter,
 }
 
 /// A profile needs room for this many pieces to make headway: the piece that is being marked, what is
@@ -71,21 +73,21 @@ pub const FEWEST_PIECES: usize = 4;
 
 impl<'a> Profile<'a> {
     /// A profile that keeps its pieces in `memory`, at least [`FEWEST_PIECES`].
-    pub fn new(memory: &'a mut [Piece]) -> Self {
-        let mut profile = Self { memory, count: 0, end: Along::END };
-        profile.open(Along::START);
+    pub fn new(memory: &'a mut [ProfilePiece]) -> Self {
+        let mut profile = Self { memory, count: 0, end: EdgeParameter::END };
+        profile.open(EdgeParameter::START);
         profile
     }
 
     /// Opens the window from `start` to the end of the edge, nothing covered.
-    pub fn open(&mut self, start: Along) {
-        self.memory[0] = Piece { from: start, marks: 0 };
+    pub fn open(&mut self, start: EdgeParameter) {
+        self.memory[0] = ProfilePiece { from: start, marks: 0 };
         self.count = 1;
-        self.end = Along::END;
+        self.end = EdgeParameter::END;
     }
 
     /// Where the window ends.
-    pub fn end(&self) -> Along {
+    pub fn end(&self) -> EdgeParameter {
         self.end
     }
 
@@ -95,17 +97,17 @@ impl<'a> Profile<'a> {
     }
 
     /// The pieces, in order.
-    pub fn pieces(&self) -> &[Piece] {
+    pub fn pieces(&self) -> &[ProfilePiece] {
         &self.memory[..self.count]
     }
 
     /// Adds `marks` to a part of the edge.
-    pub fn mark(&mut self, part: Part, marks: u64) {
+    pub fn mark(&mut self, part: EdgeInterval, marks: u64) {
         self.update(part, |known| known | marks);
     }
 
     /// Changes the marks of a part of the edge.
-    pub fn update(&mut self, part: Part, change: impl Fn(u64) -> u64) {
+    pub fn update(&mut self, part: EdgeInterval, change: impl Fn(u64) -> u64) {
         if part.is_empty() || part.to.is_some_and(|to| to <= self.memory[0].from) {
             return;
         }
@@ -122,7 +124,7 @@ impl<'a> Profile<'a> {
 
     /// The number of the first piece that begins at `place` or later; one is made to begin there if it
     /// lies in the window.
-    fn split(&mut self, place: Along) -> usize {
+    fn split(&mut self, place: EdgeParameter) -> usize {
         if place >= self.end {
             return self.count;
         }
@@ -139,7 +141,7 @@ impl<'a> Profile<'a> {
         }
         let marks = self.memory[after - 1].marks;
         self.memory.copy_within(after..self.count, after + 1);
-        self.memory[after] = Piece { from: place, marks };
+        self.memory[after] = ProfilePiece { from: place, marks };
         self.count += 1;
         after
     }

@@ -1,10 +1,12 @@
 //! Which cells of the page a face lies on, and which it covers.
 
+use super::coarse_projection::{
+    COARSE_BITS, CoarseLine, CoarsePoint, CoarseProjection, coarse_side,
+};
 use super::edges::Outlines;
 use super::faces::Faces;
 use super::grid::{Cell, coarse_depth};
-use super::outlook::{CoarseLine, Outlook, PLACE_BITS, Place, coarse_side};
-use super::pace::Pace;
+use super::yield_counter::YieldCounter;
 use crate::model::Corner;
 use crate::stage::Aborted;
 
@@ -16,13 +18,16 @@ pub struct Shape {
     /// A cell is 2^this high.
     pub shift_y: u32,
     /// The upper right end of the page.
-    far: Place,
+    far: CoarsePoint,
 }
 
 impl Shape {
     /// A cell for every place.
-    pub fn finest(outlook: &Outlook<'_>) -> Self {
-        let far = outlook.places.iter().fold(Place::LOWEST, |far, &place| far.high(place));
+    pub fn finest(coarse_projection: &CoarseProjection<'_>) -> Self {
+        let far = coarse_projection
+            .places
+            .iter()
+            .fold(CoarsePoint::LOWEST, |far, &place| far.high(place));
         Self { shift_x: 0, shift_y: 0, far }
     }
 
@@ -60,18 +65,18 @@ impl Shape {
     /// At least as many as the faces have entries in all cells together.
     pub fn most_entries(
         &self,
-        outlook: &Outlook<'_>,
+        coarse_projection: &CoarseProjection<'_>,
         outlines: Outlines<'_>,
         faces: &Faces<'_>,
-        pace: &mut Pace<'_>,
+        yield_counter: &mut YieldCounter<'_>,
     ) -> Result<usize, Aborted> {
         let cells_of = |rank: usize| {
-            let bounds = Bounds::of(outlook, outlines.element(faces.get(rank).first));
+            let bounds = Bounds::of(coarse_projection, outlines.element(faces.get(rank).first));
             let [column0, column1, row0, row1] = self.span(&bounds).map(usize::from);
             (column1 - column0 + 1) * (row1 - row0 + 1)
         };
         (0..faces.len()).try_fold(0, |sum, rank| {
-            pace.spend(200)?;
+            yield_counter.spend(200)?;
             Ok(sum + cells_of(rank))
         })
     }
@@ -79,15 +84,15 @@ impl Shape {
 
 /// The rectangle around a face on the page.
 pub struct Bounds {
-    low: Place,
-    high: Place,
+    low: CoarsePoint,
+    high: CoarsePoint,
 }
 
 impl Bounds {
-    pub fn of(outlook: &Outlook<'_>, corners: &[Corner]) -> Self {
-        let none = Self { low: Place::HIGHEST, high: Place::LOWEST };
+    pub fn of(coarse_projection: &CoarseProjection<'_>, corners: &[Corner]) -> Self {
+        let none = Self { low: CoarsePoint::HIGHEST, high: CoarsePoint::LOWEST };
         corners.iter().fold(none, |bounds, corner| {
-            let place = outlook.place(corner.vertex());
+            let place = coarse_projection.place(corner.vertex());
             Self { low: bounds.low.low(place), high: bounds.high.high(place) }
         })
     }
@@ -113,7 +118,7 @@ struct HalfPlane {
     within: i32,
 }
 
-const _: () = assert!(PLACE_BITS == 14);
+const _: () = assert!(COARSE_BITS == 14);
 
 /// The depth that nothing has: no face covers the cell.
 const NO_COVER: u16 = u16::MAX;
@@ -137,14 +142,14 @@ impl<'c> Raster<'c> {
     /// Leaves in each cell where its list begins, and returns how many entries there are.
     pub fn count(
         &mut self,
-        outlook: &Outlook<'_>,
+        coarse_projection: &CoarseProjection<'_>,
         outlines: Outlines<'_>,
         faces: &Faces<'_>,
-        pace: &mut Pace<'_>,
+        yield_counter: &mut YieldCounter<'_>,
     ) -> Result<usize, Aborted> {
         let empty = |end: u16| Cell { end, cover_depth: NO_COVER, cover: 0 };
         self.cells.fill(empty(0));
-        self.visit(outlook, outlines, faces, pace, |cell, _| cell.end += 1)?;
+        self.visit(coarse_projection, outlines, faces, yield_counter, |cell, _| cell.end += 1)?;
         let mut begin = 0;
         for cell in self.cells.iter_mut() {
             let count = cell.end;
@@ -157,13 +162,13 @@ impl<'c> Raster<'c> {
     /// Writes the lists; then each cell says where its list ends.
     pub fn fill(
         &mut self,
-        outlook: &Outlook<'_>,
+        coarse_projection: &CoarseProjection<'_>,
         outlines: Outlines<'_>,
         faces: &Faces<'_>,
         entries: &mut [u16],
-        pace: &mut Pace<'_>,
+        yield_counter: &mut YieldCounter<'_>,
     ) -> Result<(), Aborted> {
-        self.visit(outlook, outlines, faces, pace, |cell, rank| {
+        self.visit(coarse_projection, outlines, faces, yield_counter, |cell, rank| {
             entries[usize::from(cell.end)] = rank;
             cell.end += 1;
         })
@@ -172,10 +177,10 @@ impl<'c> Raster<'c> {
     /// Calls `enter` for each face and each cell where it may be seen; notes the covering faces.
     fn visit(
         &mut self,
-        outlook: &Outlook<'_>,
+        coarse_projection: &CoarseProjection<'_>,
         outlines: Outlines<'_>,
         faces: &Faces<'_>,
-        pace: &mut Pace<'_>,
+        yield_counter: &mut YieldCounter<'_>,
         mut enter: impl FnMut(&mut Cell, u16),
     ) -> Result<(), Aborted> {
         for rank in 0..faces.len() {
@@ -183,19 +188,19 @@ impl<'c> Raster<'c> {
             let corners = outlines.element(face.first);
             let (mut near, mut far) = (i32::MAX, i32::MIN);
             for corner in corners {
-                let z = outlook.vertex(corner.vertex()).z;
+                let z = coarse_projection.vertex(corner.vertex()).z;
                 (near, far) = (near.min(z), far.max(z));
             }
             // One more: what rounding puts just behind the face may lie on it.
             let (near, far) = (coarse_depth(near), coarse_depth(far + 1));
-            let bounds = Bounds::of(outlook, corners);
+            let bounds = Bounds::of(coarse_projection, corners);
             let mut sides = [HalfPlane::default(); MOST_SIDES];
-            let side_count = self.half_planes(outlook, corners, &bounds, &mut sides);
+            let side_count = self.half_planes(coarse_projection, corners, &bounds, &mut sides);
             let sides = &sides[..side_count];
             let may_cover = face.is_fan && side_count > 0;
             let [column0, column1, row0, row1] = self.shape.span(&bounds);
             for row in row0..=row1 {
-                pace.spend(200 + 50 * usize::from(column1 - column0))?;
+                yield_counter.spend(200 + 50 * usize::from(column1 - column0))?;
                 let first = usize::from(row) * self.columns;
                 let cells = first + usize::from(column0)..=first + usize::from(column1);
                 let mut values = [0; MOST_SIDES];
@@ -229,7 +234,7 @@ impl<'c> Raster<'c> {
     /// not be convex or has too many.
     fn half_planes(
         &self,
-        outlook: &Outlook<'_>,
+        coarse_projection: &CoarseProjection<'_>,
         corners: &[Corner],
         bounds: &Bounds,
         sides: &mut [HalfPlane; MOST_SIDES],
@@ -240,7 +245,7 @@ impl<'c> Raster<'c> {
         }
         let place = |n: usize| {
             let n = if n < count { n } else { n - count };
-            outlook.place(corners[n].vertex())
+            coarse_projection.place(corners[n].vertex())
         };
         let (width, height) = (1 << self.shape.shift_x, 1 << self.shape.shift_y);
         // No corner of a cell in question lies farther than this from a corner of the face.
@@ -259,13 +264,13 @@ impl<'c> Raster<'c> {
             let dx = (i32::from(b.x) - i32::from(a.x)) * turn;
             let dy = (i32::from(b.y) - i32::from(a.y)) * turn;
             let (right, up) = (-dy * width, dx * height);
-            let doubt = dx.abs() + dy.abs() + reach + 2;
+            let error_bound = dx.abs() + dy.abs() + reach + 2;
             *side = HalfPlane {
                 right,
                 up,
                 constant: dy * i32::from(a.x) - dx * i32::from(a.y),
-                outside: -doubt - right.max(0) - up.max(0),
-                within: doubt - right.min(0) - up.min(0),
+                outside: -error_bound - right.max(0) - up.max(0),
+                within: error_bound - right.min(0) - up.min(0),
             };
             (a, b) = (b, place(n + 1));
         }

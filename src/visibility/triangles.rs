@@ -5,7 +5,7 @@
 
 use super::VisibilityError;
 use super::edges::{Outlines, is_bar};
-use super::pace::Pace;
+use super::yield_counter::YieldCounter;
 use crate::geometry::Vertex;
 use crate::model::Corner;
 use crate::stage::Scratch;
@@ -67,15 +67,15 @@ impl<'a> Ears<'a> {
             + Scratch::bytes_for::<u16>(needs.most_corners)
     }
 
-    /// Cuts every face that no fan covers.
+    /// CutPositions every face that no fan covers.
     pub fn cut(
         outlines: Outlines<'_>,
         vertices: &[Vertex],
         scratch: &mut Scratch<'a>,
-        pace: &mut Pace<'_>,
+        yield_counter: &mut YieldCounter<'_>,
     ) -> Result<Self, VisibilityError> {
         let needs = Needs::of(outlines, vertices);
-        pace.spend(200 * outlines.corners.len())?;
+        yield_counter.spend(200 * outlines.corners.len())?;
         let entries: &mut [Entry] = scratch.take(needs.faces)?;
         let ears: &mut [[u16; 3]] = scratch.take(needs.ears)?;
         let mut meantime = scratch.reborrow();
@@ -88,7 +88,12 @@ impl<'a> Ears<'a> {
             for (place, corner) in remaining.iter_mut().zip(corners) {
                 *place = corner.vertex();
             }
-            used += cut_ears(&mut remaining[..corners.len()], vertices, &mut ears[used..], pace)?;
+            used += cut_ears(
+                &mut remaining[..corners.len()],
+                vertices,
+                &mut ears[used..],
+                yield_counter,
+            )?;
         }
         Ok(Self { entries, ears: &mut ears[..used] })
     }
@@ -177,7 +182,7 @@ pub fn cut_of(corners: &[Corner], vertices: &[Vertex]) -> Cut {
     if is_fan { Cut::Fan } else { Cut::Ears }
 }
 
-/// Cuts ear after ear off a polygon and returns how many triangles there are.
+/// CutPositions ear after ear off a polygon and returns how many triangles there are.
 ///
 /// A corner is an ear if it is convex and no other corner lies in its triangle. Corners without a
 /// turn are dropped. A polygon that crosses itself can have no ear: then a convex corner is cut all
@@ -186,7 +191,7 @@ fn cut_ears(
     polygon: &mut [u16],
     vertices: &[Vertex],
     ears: &mut [[u16; 3]],
-    pace: &mut Pace<'_>,
+    yield_counter: &mut YieldCounter<'_>,
 ) -> Result<usize, VisibilityError> {
     let at = |number: u16| vertices[usize::from(number)];
     let Some(plane) = Plane::of(polygon.iter().map(|&number| at(number))) else {
@@ -195,7 +200,7 @@ fn cut_ears(
     let mut count = 0;
     let mut left = polygon.len();
     while left >= 3 {
-        pace.spend(100 * left * left)?;
+        yield_counter.spend(100 * left * left)?;
         let rest = &polygon[..left];
         let around = |middle: usize| {
             [rest[(middle + left - 1) % left], rest[middle], rest[(middle + 1) % left]]

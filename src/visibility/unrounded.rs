@@ -16,26 +16,26 @@ use crate::model::Corner;
 pub struct Unrounded<'a> {
     positions: &'a [[i32; 3]],
     precision: Precision,
-    doubt: u32,
+    error_bound: u32,
 }
 
 impl<'a> Unrounded<'a> {
     /// Nothing is known: view coordinates are taken to be the model's.
     pub const UNKNOWN: Unrounded<'static> =
-        Unrounded { positions: &[], precision: Precision { written: 0, unit: 0 }, doubt: 1 };
+        Unrounded { positions: &[], precision: Precision { written: 0, unit: 0 }, error_bound: 1 };
 
     /// Each vertex by its number, within ±2^30, with a precision in the same unit.
     ///
     /// `doubt`: twice what a view coordinate may be off, by the precision and by its own rounding;
     /// at least 1.
-    pub const fn new(positions: &'a [[i32; 3]], precision: Precision, doubt: u32) -> Self {
-        Self { positions, precision, doubt }
+    pub const fn new(positions: &'a [[i32; 3]], precision: Precision, error_bound: u32) -> Self {
+        Self { positions, precision, error_bound }
     }
 
     /// Twice what a view coordinate may be off.
     #[inline]
-    pub(super) fn doubt(&self) -> u32 {
-        self.doubt
+    pub(super) fn error_bound(&self) -> u32 {
+        self.error_bound
     }
 
     /// Whether the plane of a triangle holds a vertex.

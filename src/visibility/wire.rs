@@ -1,10 +1,10 @@
 //! The wire frame: every edge from end to end.
 
 use super::edges::{ChosenSides, Outlines, sides};
-use super::pace::Pace;
+use super::yield_counter::YieldCounter;
 use super::{Options, Scene, Stretch, StretchSink, VisibilityError, check};
-use crate::geometry::Along;
-use crate::stage::{Attention, Scratch};
+use crate::geometry::EdgeParameter;
+use crate::stage::{Cancel, Scratch};
 
 /// Hands over every distinct edge and bar whole and visible, in the order of the model, as if no face hid anything.
 /// Of `options` only the crease counts.
@@ -15,21 +15,22 @@ pub fn follow_wire(
     scene: &Scene<'_>,
     options: Options,
     mut scratch: Scratch<'_>,
-    attention: &mut dyn Attention,
+    cancel: &mut dyn Cancel,
     sink: &mut dyn StretchSink,
 ) -> Result<(), VisibilityError> {
     check(scene)?;
     let outlines = Outlines::of(scene.elements);
     let (vertices, projection) = (scene.vertices, scene.projection);
-    let pace = &mut Pace::new(attention);
+    let yield_counter = &mut YieldCounter::new(cancel);
     let creases = (options.crease, scene.unrounded);
-    let chosen = ChosenSides::choose(outlines, projection, vertices, creases, &mut scratch, pace)?;
+    let chosen =
+        ChosenSides::choose(outlines, projection, vertices, creases, &mut scratch, yield_counter)?;
     for (first, element) in outlines.elements() {
-        pace.spend(500 * element.len())?;
+        yield_counter.spend(500 * element.len())?;
         for (number, p, q) in sides(element) {
             if chosen.contains(first + number) {
                 let ends = (vertices[usize::from(p)], vertices[usize::from(q)]);
-                let (from, to) = (Along::START, Along::END);
+                let (from, to) = (EdgeParameter::START, EdgeParameter::END);
                 let pen = outlines.pens.at(first);
                 sink.stretch(Stretch { edge: Some((p, q)), ends, from, to, visible: true, pen })?;
             }

@@ -5,9 +5,9 @@ use penup::convex::SolidError;
 use penup::curve::CurveError;
 use penup::drawing::PageError;
 use penup::machine::{MachineError, Setting, SettingError, State, Value};
-use penup::model::{ModelError, Part};
+use penup::model::{ElementKind, ModelError};
 use penup::motion::LimitsError;
-use penup::protocol::{HELP, MEANINGS, Refusal};
+use penup::protocol::{CommandError, HELP, MEANINGS};
 use penup::stage::OutOfScratch;
 use penup::step::ArcError;
 use penup::view::ViewError;
@@ -27,9 +27,9 @@ macro_rules! every_variant {
 }
 
 /// Every refusal that the library can make, with each of its texts.
-fn refusals() -> Vec<Refusal> {
+fn refusals() -> Vec<CommandError> {
     let one = Value::from_num(1);
-    let all = every_variant!(Refusal:
+    let all = every_variant!(CommandError:
         UnknownCommand,
         NotANumber,
         UnknownSystemCommand,
@@ -60,7 +60,7 @@ fn refusals() -> Vec<Refusal> {
         TooManyLines,
         NothingToUndo,
         Aborted,
-        NotKept,
+        NotStored,
         NoJobKept,
         OtherSteps,
         Damaged,
@@ -80,7 +80,7 @@ fn refusals() -> Vec<Refusal> {
         CurveUnfinished,
         NoCurve,
         KnotTooLarge,
-        UnknownElement { part: Part::Faces, number: 9, count: 8 },
+        UnknownElement { part: ElementKind::Faces, number: 9, count: 8 },
         NoPlane,
         TooManyPens,
         Scratch(MISSING),
@@ -136,13 +136,13 @@ fn refusals() -> Vec<Refusal> {
         Busy,
     );
     all.into_iter()
-        .chain(model.map(Refusal::Model))
-        .chain(curve.map(|error| Refusal::Model(ModelError::Curve(error))))
-        .chain(solid.map(Refusal::Solid))
-        .chain(views.map(Refusal::View))
-        .chain(pages.map(Refusal::Page))
-        .chain(machine.map(Refusal::Machine))
-        .chain(settings.map(Refusal::Setting))
+        .chain(model.map(CommandError::Model))
+        .chain(curve.map(|error| CommandError::Model(ModelError::Curve(error))))
+        .chain(solid.map(CommandError::Solid))
+        .chain(views.map(CommandError::View))
+        .chain(pages.map(CommandError::Page))
+        .chain(machine.map(CommandError::Machine))
+        .chain(settings.map(CommandError::Setting))
         .collect()
 }
 

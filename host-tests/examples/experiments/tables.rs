@@ -8,7 +8,7 @@ use penup::order::enumeration::{
     Effort, Options, Reach, Sets, Start, SubProblem, Target, domino_matching, optimum,
     solve_image_problem,
 };
-use penup::stage::{Scratch, Undisturbed};
+use penup::stage::{NeverCancel, Scratch};
 use std::fmt::{Result, Write};
 
 /// "Fairly high", so that there is something to improve (7.5, 7.8, 7.9).
@@ -54,7 +54,7 @@ fn run_with_laps(meter: &mut Meter, problem: &Problem, options: Options, laps: b
     let distances = problem.distances();
     let measured = meter.measure(laps, |found| {
         let scratch = Scratch::new(&mut memory);
-        optimum(distances, options, scratch, &mut Undisturbed, found).ok()
+        optimum(distances, options, scratch, &mut NeverCancel, found).ok()
     });
     let best = measured.result;
     let effort = best.map(|best| best.effort).unwrap_or_default();
@@ -226,7 +226,7 @@ fn least_cost(problem: &Problem) -> u64 {
     let mut memory = vec![0; 4096];
     let scratch = Scratch::new(&mut memory);
     let best =
-        optimum(problem.distances(), Options::default(), scratch, &mut Undisturbed, &mut |_| {});
+        optimum(problem.distances(), Options::default(), scratch, &mut NeverCancel, &mut |_| {});
     best.map(|best| best.cost).expect("an optimum")
 }
 
@@ -356,7 +356,7 @@ fn upper_bound_algorithm(meter: &mut Meter, page: &mut String) -> Result {
             let mut scratch = Scratch::new(&mut memory);
             let ours = meter.measure(false, |_| {
                 let (costs, bounds) = solve_image_problem(problem.distances(), &mut scratch)?;
-                let pairs = domino_matching(&costs, &mut scratch, &mut Undisturbed)?;
+                let pairs = domino_matching(&costs, &mut scratch, &mut NeverCancel)?;
                 let upper = problem.distances().cost(pairs);
                 Ok::<_, penup::order::enumeration::EnumerationError>([bounds.improved, upper])
             });

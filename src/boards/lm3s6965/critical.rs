@@ -5,16 +5,16 @@ use cortex_m::register::basepri;
 use lm3s6965::Interrupt;
 
 /// The chip tells eight ranks by the upper three bits.
-const fn rank(number: u8) -> u8 {
+const fn priority(number: u8) -> u8 {
     number << 5
 }
 
 /// Steps: above everything, critical sections too.
-pub const STEP_PRIORITY: u8 = rank(0);
+pub const STEP_PRIORITY: u8 = priority(0);
 /// Bytes of the serial line.
-pub const SERIAL_PRIORITY: u8 = rank(1);
+pub const SERIAL_PRIORITY: u8 = priority(1);
 /// The clock's wraps.
-pub const CLOCK_PRIORITY: u8 = rank(2);
+pub const CLOCK_PRIORITY: u8 = priority(2);
 
 /// Ranks and unmasks an interrupt, at set-up.
 pub fn enable(nvic: &mut NVIC, interrupt: Interrupt, priority: u8) {

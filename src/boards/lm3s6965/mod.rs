@@ -40,7 +40,7 @@ use cortex_m::interrupt;
 use cortex_m::peripheral::Peripherals;
 use penup::machine::{Contacts, PulserState};
 use penup::motion::{Block, EventQueue};
-use penup::plotter::{Board, Lent, Lm3s6965Memory, NO_MOVES};
+use penup::plotter::{Board, EMPTY_LOOKAHEAD, Lm3s6965Memory, MemorySlices};
 use penup::protocol::RealTime;
 use static_cell::{ConstStaticCell, StaticCell};
 
@@ -59,7 +59,7 @@ pub struct Lm3s6965 {
 ///
 /// # Panics
 /// If the board was taken before.
-pub fn take() -> (Lm3s6965, Lent<'static>, &'static PulserState) {
+pub fn take() -> (Lm3s6965, MemorySlices<'static>, &'static PulserState) {
     let Some(mut core) = Peripherals::take() else {
         #[allow(clippy::panic)] // A programming error, found at the first start.
         {
@@ -73,8 +73,8 @@ pub fn take() -> (Lm3s6965, Lent<'static>, &'static PulserState) {
     let steps = steps::set_up(pins, &mut core.NVIC);
     defmt::info!("lm3s6965 at {=u32} Hz", clock::HERTZ);
     static MEMORY: ConstStaticCell<Lm3s6965Memory> = ConstStaticCell::new(Lm3s6965Memory::new());
-    static BLOCKS: StaticCell<[Block; NO_MOVES.len()]> = StaticCell::new();
-    let memory = MEMORY.take().lend(BLOCKS.init(NO_MOVES));
+    static BLOCKS: StaticCell<[Block; EMPTY_LOOKAHEAD.len()]> = StaticCell::new();
+    let memory = MEMORY.take().lend(BLOCKS.init(EMPTY_LOOKAHEAD));
     (Lm3s6965 { clock, serial, steps }, memory, &steps::STATE)
 }
 
@@ -94,7 +94,7 @@ impl Board for Lm3s6965 {
     }
 
     fn queue(&mut self) -> &mut dyn EventQueue {
-        self.steps.follow();
+        self.steps.sync_consumed();
         &mut self.steps
     }
 

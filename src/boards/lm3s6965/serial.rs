@@ -9,7 +9,7 @@ use penup::protocol::RealTime;
 use super::registers::{GPIO_A, SYSTEM_CONTROL, UART0};
 use super::{HAPPENED, clock, critical};
 use crate::boards::handler::Owned;
-use crate::boards::line::{self, Inlet, Shared};
+use crate::boards::line::{self, ReceiveMerge, Shared};
 
 mod offset {
     /// In system control.
@@ -27,7 +27,7 @@ const SERIAL_PINS: u32 = 0b11;
 static STATUS_ASKED: AtomicU32 = AtomicU32::new(0);
 
 static SHARED: Shared = Shared::new();
-static INLET: Owned<Inlet> = Owned::empty();
+static INLET: Owned<ReceiveMerge> = Owned::empty();
 
 /// The main loop's end of the line.
 pub struct Line(line::Line);
@@ -44,9 +44,9 @@ pub fn set_up(nvic: &mut NVIC) -> Line {
     UART0.set_up(clock::HERTZ);
     UART0.interrupt_when_received();
 
-    let (inlet, line) = SHARED.ends();
+    let (receive_merge, line) = SHARED.ends();
     // SAFETY: the interrupt is masked since reset, and this runs once (its queue's cell sees to it).
-    unsafe { INLET.fill(inlet) };
+    unsafe { INLET.fill(receive_merge) };
     critical::enable(nvic, Interrupt::UART0, critical::SERIAL_PRIORITY);
     UART0.enable();
     Line(line)
@@ -74,13 +74,13 @@ impl Line {
 fn UART0() {
     UART0.clear_interrupt();
     // SAFETY: this is the handler that owns it.
-    if let Some(inlet) = unsafe { INLET.get() } {
+    if let Some(receive_merge) = unsafe { INLET.get() } {
         while let Some(data) = UART0.poll() {
-            let asked = inlet.receiver.receive_from_uart(data);
+            let asked = receive_merge.receiver.receive_from_uart(data);
             if asked.has(RealTime::STATUS) {
                 STATUS_ASKED.store(clock::cycles_24(), Ordering::Relaxed);
             }
-            line::ask(asked, core::slice::from_mut(inlet));
+            line::ask(asked, core::slice::from_mut(receive_merge));
         }
     }
     HAPPENED.store(true, Ordering::Relaxed);

@@ -116,8 +116,8 @@ impl Steps {
     }
 
     /// Tells the main loop what has been done.
-    pub fn follow(&mut self) {
-        self.events.follow();
+    pub fn sync_consumed(&mut self) {
+        self.events.sync_consumed();
     }
 
     /// The main loop has had its turn.

@@ -18,18 +18,18 @@ use rp2040_hal::pac::Interrupt;
 use super::registers::SYSTEM;
 
 /// The chip tells four ranks by the upper two bits.
-const fn rank(number: u8) -> u8 {
+const fn priority(number: u8) -> u8 {
     number << 6
 }
 
 /// The next block of steps.
-pub const STEP_PRIORITY: u8 = rank(0);
+pub const STEP_PRIORITY: u8 = priority(0);
 /// The pen's heights, which come in with the steps.
-pub const PEN_PRIORITY: u8 = rank(1);
+pub const PEN_PRIORITY: u8 = priority(1);
 /// Bytes of the serial line.
-pub const SERIAL_PRIORITY: u8 = rank(2);
+pub const SERIAL_PRIORITY: u8 = priority(2);
 /// The clock's millisecond.
-pub const CLOCK_PRIORITY: u8 = rank(3);
+pub const CLOCK_PRIORITY: u8 = priority(3);
 
 /// Registers of the interrupts' masks: those that are enabled, by a write too; a write to the other disables.
 const ENABLED: usize = 0x100;

@@ -68,7 +68,7 @@ pub enum Start {
 /// What outlives a reset.
 #[derive(Clone, Copy)]
 #[repr(C)]
-struct Kept {
+struct Stored {
     /// Over all that follows: RAM holds anything after a loss of power.
     sum: u32,
     /// Faults in a row.
@@ -77,7 +77,7 @@ struct Kept {
     text: [u8; TEXT_BYTES],
 }
 
-struct KeptPlace(UnsafeCell<MaybeUninit<Kept>>);
+struct KeptPlace(UnsafeCell<MaybeUninit<Stored>>);
 
 // SAFETY: it is used in the main loop and, with interrupts off, by the handler of a fault, after
 // which the main loop does not go on.
@@ -88,7 +88,7 @@ unsafe impl Sync for KeptPlace {}
 #[unsafe(link_section = ".uninit.kept")]
 static KEPT: KeptPlace = KeptPlace(UnsafeCell::new(MaybeUninit::uninit()));
 
-impl Kept {
+impl Stored {
     fn new(faults: u8, cause: &str) -> Self {
         let mut kept = Self { sum: 0, faults, length: cause.len() as u8, text: [0; TEXT_BYTES] };
         for (place, byte) in kept.text.iter_mut().zip(cause.bytes()) {
@@ -131,7 +131,7 @@ impl Kept {
 /// Why the board started. Called once, before the watchdog is started.
 pub fn start() -> Start {
     let (reason, word) = (WATCHDOG.read(watchdog::REASON), WATCHDOG.read(watchdog::SCRATCH_4));
-    let kept = Kept::load();
+    let kept = Stored::load();
     let (faults, cause) = match word {
         FAULT if reason != 0 => match kept {
             Some(kept) => (kept.faults, kept.cause()),
@@ -143,7 +143,7 @@ pub fn start() -> Start {
         }
         _ => (0, Cause::new()),
     };
-    Kept::new(faults, "").store();
+    Stored::new(faults, "").store();
     WATCHDOG.write(watchdog::SCRATCH_4, OURS);
     match faults {
         0 => Start::Fresh,
@@ -164,7 +164,7 @@ pub fn note_running(microseconds: u32) {
     static HAS_STARTED: AtomicBool = AtomicBool::new(false);
     if microseconds > SOON && !HAS_STARTED.load(Ordering::Relaxed) {
         HAS_STARTED.store(true, Ordering::Relaxed);
-        Kept::new(0, "").store();
+        Stored::new(0, "").store();
     }
 }
 
@@ -222,9 +222,9 @@ impl Fault for Pico {
     fn report(cause: fmt::Arguments) {
         let mut line = OneLine(Cause::new());
         let _ = line.write_fmt(cause); // Fails never.
-        let faults = Kept::load().map_or(0, |kept| kept.faults).saturating_add(1);
+        let faults = Stored::load().map_or(0, |kept| kept.faults).saturating_add(1);
         if faults < LAST_FAULT {
-            Kept::new(faults, &line.0).store();
+            Stored::new(faults, &line.0).store();
             restart(FAULT)
         }
         fault::say::<Self>(cause);

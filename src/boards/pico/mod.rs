@@ -41,7 +41,9 @@ mod words;
 use cortex_m::peripheral::Peripherals as Core;
 use penup::machine::{Contacts, PulserState};
 use penup::motion::{Block, EventQueue};
-use penup::plotter::{Board, Kept, Lent, NO_MOVES_OF_PICO, NotKept, PicoMemory, Record};
+use penup::plotter::{
+    Board, EMPTY_LOOKAHEAD_OF_PICO, MemorySlices, NotStored, PicoMemory, Record, Stored,
+};
 use penup::protocol::RealTime;
 use rp2040_hal::clocks::init_clocks_and_plls;
 use rp2040_hal::fugit::ExtU32;
@@ -74,7 +76,7 @@ pub struct Pico {
 /// # Panics
 /// If the board was taken before, or its crystal does not swing.
 #[allow(clippy::panic)] // Without clocks there is nothing to go on with.
-pub fn take() -> (Pico, Lent<'static>, &'static PulserState) {
+pub fn take() -> (Pico, MemorySlices<'static>, &'static PulserState) {
     let (Some(mut core), Some(mut chip)) = (Core::take(), Peripherals::take()) else {
         panic!("the board was taken twice")
     };
@@ -112,8 +114,8 @@ pub fn take() -> (Pico, Lent<'static>, &'static PulserState) {
     watchdog.start(3.secs());
     defmt::info!("pico at {=u32} Hz", clock::HERTZ);
     static MEMORY: ConstStaticCell<PicoMemory> = ConstStaticCell::new(PicoMemory::new());
-    static BLOCKS: ConstStaticCell<[Block; NO_MOVES_OF_PICO.len()]> =
-        ConstStaticCell::new(NO_MOVES_OF_PICO);
+    static BLOCKS: ConstStaticCell<[Block; EMPTY_LOOKAHEAD_OF_PICO.len()]> =
+        ConstStaticCell::new(EMPTY_LOOKAHEAD_OF_PICO);
     let fault = match start {
         Start::Fresh => None,
         Start::AfterFault(cause) => Some(cause),
@@ -135,7 +137,7 @@ impl Board for Pico {
     fn take_real_time(&mut self) -> RealTime {
         usb::go_on();
         emergency::note_running(clock::microseconds());
-        if self.steps.gets_on() {
+        if self.steps.is_progressing() {
             emergency::feed();
         }
         self.ports.take_real_time()
@@ -172,7 +174,7 @@ impl Board for Pico {
     }
 
     fn queue(&mut self) -> &mut dyn EventQueue {
-        self.steps.follow();
+        self.steps.sync_consumed();
         &mut self.steps
     }
 
@@ -181,22 +183,22 @@ impl Board for Pico {
     }
 
     fn step_now(&mut self) {
-        self.steps.follow();
+        self.steps.sync_consumed();
     }
 
     fn fault(&self) -> Option<&str> {
         self.fault.as_deref()
     }
 
-    fn keep(&mut self, record: Record, parts: &[&[u8]]) -> Result<(), NotKept> {
-        let mut writer = flash::slots(record).write(&mut self.flash).map_err(|_| NotKept)?;
+    fn save(&mut self, record: Record, parts: &[&[u8]]) -> Result<(), NotStored> {
+        let mut writer = flash::slots(record).write(&mut self.flash).map_err(|_| NotStored)?;
         for part in parts {
-            writer.write(part).map_err(|_| NotKept)?;
+            writer.write(part).map_err(|_| NotStored)?;
         }
-        writer.finish().map_err(|_| NotKept)
+        writer.finish().map_err(|_| NotStored)
     }
 
-    fn recall(&mut self, record: Record, take: &mut dyn FnMut(&mut dyn Kept)) {
+    fn load(&mut self, record: Record, take: &mut dyn FnMut(&mut dyn Stored)) {
         if let Some(mut state) = flash::slots(record).latest(&mut self.flash) {
             take(&mut state);
         }

@@ -10,7 +10,7 @@ use penup::protocol::{RealTime, Receiver};
 
 use super::{serial, usb};
 use crate::boards::handler::Owned;
-use crate::boards::line::{self, Inlet, Line, Shared};
+use crate::boards::line::{self, Line, ReceiveMerge, Shared};
 
 /// A serial port, by its number.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -34,7 +34,7 @@ static INLETS: Owned<Inlets> = Owned::empty();
 
 /// Where received bytes go in.
 pub struct Inlets {
-    inlets: [Inlet; COUNT],
+    inlets: [ReceiveMerge; COUNT],
     /// How often ctrl-X has come, by either port; wraps.
     pub aborts: u32,
 }

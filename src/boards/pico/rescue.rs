@@ -6,7 +6,7 @@
 
 use core::fmt::Write;
 
-use penup::protocol::{RealTime, Refusal};
+use penup::protocol::{CommandError, RealTime};
 
 use super::emergency::{self, Cause};
 use super::ports::Ports;
@@ -41,7 +41,7 @@ pub fn run(mut ports: Ports, cause: &Cause) -> ! {
                 line.clear();
                 tell(&mut ports, cause);
                 let mut reply = Cause::new();
-                let _ = write!(reply, "error:{}\r\n", Refusal::Locked.number()); // It is short.
+                let _ = write!(reply, "error:{}\r\n", CommandError::Locked.number()); // It is short.
                 ports.write(reply.as_bytes());
             }
             // What is longer is no command that counts here.

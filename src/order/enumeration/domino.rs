@@ -6,8 +6,8 @@
 
 use super::EnumerationError;
 use super::image::{ImplicitCosts, members};
-use crate::order::pace::Pace;
-use crate::stage::{Aborted, Attention, OutOfScratch, Scratch};
+use crate::order::work_budget::WorkBudget;
+use crate::stage::{Aborted, Cancel, OutOfScratch, Scratch};
 
 /// No partner, no predecessor.
 const NONE: u8 = u8::MAX;
@@ -41,13 +41,13 @@ impl<'a> GrowingGraph<'a> {
     }
 
     /// Matches as many points as can be; says whether all are.
-    fn is_domino(&mut self, pace: &mut Pace<'_>) -> Result<bool, Aborted> {
+    fn is_domino(&mut self, work_budget: &mut WorkBudget<'_>) -> Result<bool, Aborted> {
         for root in 0..self.mate.len() {
             if self.mate[root] != NONE {
                 continue;
             }
             // A point that no path leads from now stays unmatched in some greatest matching.
-            let Some(end) = self.free_point_reached_from(root, pace)? else {
+            let Some(end) = self.free_point_reached_from(root, work_budget)? else {
                 return Ok(false);
             };
             self.swap_along_the_path_to(end);
@@ -59,7 +59,7 @@ impl<'a> GrowingGraph<'a> {
     fn free_point_reached_from(
         &mut self,
         root: usize,
-        pace: &mut Pace<'_>,
+        work_budget: &mut WorkBudget<'_>,
     ) -> Result<Option<usize>, Aborted> {
         self.parent.fill(NONE);
         for (point, base) in self.base.iter_mut().enumerate() {
@@ -71,7 +71,7 @@ impl<'a> GrowingGraph<'a> {
         while taken < queued {
             let point = usize::from(self.queue[taken]);
             taken += 1;
-            pace.work(self.mate.len() as u32 / 4)?;
+            work_budget.work(self.mate.len() as u32 / 4)?;
             for other in members(self.near[point]) {
                 let partner = self.mate[other];
                 if self.base[point] == self.base[other] || usize::from(partner) == point {
@@ -164,15 +164,15 @@ impl<'a> GrowingGraph<'a> {
     fn add_until_domino(
         &mut self,
         segments: &[[u8; 2]],
-        pace: &mut Pace<'_>,
+        work_budget: &mut WorkBudget<'_>,
     ) -> Result<usize, Aborted> {
         for (added, &segment) in segments.iter().enumerate() {
-            if self.is_domino(pace)? {
+            if self.is_domino(work_budget)? {
                 return Ok(added);
             }
             self.add(segment);
         }
-        self.is_domino(pace)?;
+        self.is_domino(work_budget)?;
         Ok(segments.len())
     }
 }
@@ -187,25 +187,25 @@ impl<'a> GrowingGraph<'a> {
 ///
 /// # Errors
 /// [`EnumerationError::Scratch`] if n² + 13 n bytes do not fit,
-/// [`EnumerationError::Aborted`] if `attention` says so.
+/// [`EnumerationError::Aborted`] if `cancel` says so.
 ///
 /// ```
 /// use penup::order::enumeration::{Distances, domino_matching, solve_image_problem};
-/// use penup::stage::{Scratch, Undisturbed};
+/// use penup::stage::{Scratch, NeverCancel};
 /// let distances = Distances::new(4, &[1, 5, 6, 7, 8, 1]).unwrap();
 /// let mut memory = [0; 64];
 /// let mut scratch = Scratch::new(&mut memory);
 /// let (costs, _) = solve_image_problem(distances, &mut scratch).unwrap();
-/// let pairs = domino_matching(&costs, &mut scratch, &mut Undisturbed).unwrap();
+/// let pairs = domino_matching(&costs, &mut scratch, &mut NeverCancel).unwrap();
 /// assert_eq!(distances.cost(pairs), 2);
 /// ```
 pub fn domino_matching<'a>(
     costs: &ImplicitCosts<'_>,
     scratch: &mut Scratch<'a>,
-    attention: &mut dyn Attention,
+    cancel: &mut dyn Cancel,
 ) -> Result<&'a [[u8; 2]], EnumerationError> {
     let pairs = scratch.take(costs.distances().count() / 2)?;
-    match_by_domino_graph(costs, scratch.reborrow(), &mut Pace::new(attention), pairs)?;
+    match_by_domino_graph(costs, scratch.reborrow(), &mut WorkBudget::new(cancel), pairs)?;
     Ok(pairs)
 }
 
@@ -213,7 +213,7 @@ pub fn domino_matching<'a>(
 pub(super) fn match_by_domino_graph(
     costs: &ImplicitCosts<'_>,
     mut scratch: Scratch<'_>,
-    pace: &mut Pace<'_>,
+    work_budget: &mut WorkBudget<'_>,
     pairs: &mut [[u8; 2]],
 ) -> Result<(), EnumerationError> {
     let count = costs.distances().count();
@@ -230,11 +230,11 @@ pub(super) fn match_by_domino_graph(
     segments.sort_unstable_by_key(|&[a, b]| (costs.reduced(usize::from(a), usize::from(b)), a, b));
     let mut graph = GrowingGraph::new(count, &mut scratch)?;
     graph.begin_with(costs);
-    let needed = graph.add_until_domino(segments, pace)?;
+    let needed = graph.add_until_domino(segments, work_budget)?;
     if let Some((&last, before)) = segments.get(..needed).and_then(<[_]>::split_last) {
         graph.begin_with(costs);
         graph.add(last);
-        graph.add_until_domino(before, pace)?;
+        graph.add_until_domino(before, work_budget)?;
     }
     let ends = (0..).zip(graph.mate.iter()).filter(|&(point, &mate)| point < mate);
     for (pair, (point, &mate)) in pairs.iter_mut().zip(ends) {
@@ -246,18 +246,18 @@ pub(super) fn match_by_domino_graph(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stage::Undisturbed;
+    use crate::stage::NeverCancel;
     use std::vec::Vec;
 
     fn is_domino(count: usize, segments: &[[u8; 2]]) -> bool {
         let mut memory = [0; 200];
-        let mut attention = Undisturbed;
+        let mut cancel = NeverCancel;
         let mut graph = GrowingGraph::new(count, &mut Scratch::new(&mut memory)).unwrap();
         graph.mate.fill(NONE);
         for &segment in segments {
             graph.add(segment);
         }
-        let all = graph.is_domino(&mut Pace::new(&mut attention)).unwrap();
+        let all = graph.is_domino(&mut WorkBudget::new(&mut cancel)).unwrap();
         for (point, &mate) in graph.mate.iter().enumerate().filter(|&(_, &mate)| mate != NONE) {
             assert_eq!(usize::from(graph.mate[usize::from(mate)]), point);
             assert_ne!(graph.near[point] >> mate & 1, 0, "only segments of the graph");

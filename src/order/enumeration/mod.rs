@@ -26,8 +26,8 @@ pub use division::{Division, division_bound};
 pub use domino::domino_matching;
 pub use image::ImplicitCosts;
 
-use super::pace::Pace;
-use crate::stage::{Aborted, Attention, OutOfScratch, Scratch};
+use super::work_budget::WorkBudget;
+use crate::stage::{Aborted, Cancel, OutOfScratch, Scratch};
 use division::SubProblems;
 use search::{Known, Search};
 
@@ -278,12 +278,12 @@ impl From<Aborted> for EnumerationError {
 ///
 /// ```
 /// use penup::order::enumeration::{Distances, Options, optimum};
-/// use penup::stage::{Scratch, Undisturbed};
+/// use penup::stage::{Scratch, NeverCancel};
 /// let distances = Distances::new(4, &[1, 5, 6, 7, 8, 1]).unwrap();
 /// let mut memory = [0; 128];
 /// let scratch = Scratch::new(&mut memory);
 /// let options = Options::default();
-/// let best = optimum(distances, options, scratch, &mut Undisturbed, &mut |_| {}).unwrap();
+/// let best = optimum(distances, options, scratch, &mut NeverCancel, &mut |_| {}).unwrap();
 /// assert_eq!((best.pairs, best.cost), (&[[0, 1], [2, 3]][..], 2));
 /// assert!(best.is_proved());
 /// ```
@@ -291,13 +291,13 @@ pub fn optimum<'a>(
     distances: Distances<'a>,
     options: Options,
     mut scratch: Scratch<'a>,
-    attention: &mut dyn Attention,
+    cancel: &mut dyn Cancel,
     improved: &mut dyn FnMut(u64),
 ) -> Result<Optimum<'a>, EnumerationError> {
-    let mut pace = Pace::new(attention);
+    let mut work_budget = WorkBudget::new(cancel);
     let pairs: &mut [[u8; 2]] = scratch.take(distances.count() / 2)?;
     let (costs, lower_bounds) = solve_image_problem(distances, &mut scratch)?;
-    domino::match_by_domino_graph(&costs, scratch.reborrow(), &mut pace, pairs)?;
+    domino::match_by_domino_graph(&costs, scratch.reborrow(), &mut work_budget, pairs)?;
     let upper_bound = distances.cost(pairs);
     let best = match options.start {
         Start::NoMoreThan(cost) if !pairs.is_empty() => cost.saturating_add(1).min(WORST),
@@ -322,8 +322,15 @@ pub fn optimum<'a>(
             false
         }
     };
-    let search =
-        Search::new(sub_problems, known, options, &mut *pairs, &mut scratch, &mut pace, improved)?;
+    let search = Search::new(
+        sub_problems,
+        known,
+        options,
+        &mut *pairs,
+        &mut scratch,
+        &mut work_budget,
+        improved,
+    )?;
     let (proved, cost, effort) = search.run()?;
     if options.start != Start::DominoGraph && effort.improvements == 0 && !pairs.is_empty() {
         return Err(EnumerationError::NoneSoCheap);

@@ -5,7 +5,7 @@
 //! settled when it is opened, and an augmenting path passes through it in one step.
 
 use super::{Label, Matching};
-use crate::order::pace::Pace;
+use crate::order::work_budget::WorkBudget;
 use crate::order::{NONE, OrderError};
 use bytemuck::{Pod, Zeroable};
 
@@ -249,7 +249,7 @@ impl Matching<'_, '_> {
     pub(super) fn open_inner(
         &mut self,
         blossom: u16,
-        pace: &mut Pace<'_>,
+        work_budget: &mut WorkBudget<'_>,
     ) -> Result<(), OrderError> {
         let entry = self.node(blossom).link;
         self.freeze(blossom);
@@ -261,7 +261,7 @@ impl Matching<'_, '_> {
         for index in 0.. {
             let Node { next, link, .. } = *self.node(node);
             let vertices = self.candidates(node).len();
-            self.charge(vertices, pace)?;
+            self.charge(vertices, work_budget)?;
             self.set_label(node, Label::Outside);
             // The pairs matched are 1 and 2, 3 and 4 and so on, so the way from the entrance by its
             // partner to the base goes back from an even position and forward from an odd one.
@@ -279,7 +279,7 @@ impl Matching<'_, '_> {
             } else if (index < position) == back {
                 self.enter(node, Label::Fresh);
             } else {
-                self.look_from_each(node, pace)?;
+                self.look_from_each(node, work_budget)?;
             }
             if next == first {
                 if !back {
@@ -304,13 +304,16 @@ impl Matching<'_, '_> {
     }
 
     /// Settles every blossom, so that every vertex has its mate.
-    pub(super) fn settle_all(&mut self, pace: &mut Pace<'_>) -> Result<(), OrderError> {
+    pub(super) fn settle_all(
+        &mut self,
+        work_budget: &mut WorkBudget<'_>,
+    ) -> Result<(), OrderError> {
         let mut settled = true;
         while core::mem::take(&mut settled) {
             for blossom in self.blossoms() {
                 if self.node(blossom).is_outermost() {
                     settled = true;
-                    self.charge(0, pace)?;
+                    self.charge(0, work_budget)?;
                     self.settle(blossom);
                 }
             }

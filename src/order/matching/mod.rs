@@ -18,7 +18,7 @@ mod blossom;
 mod start;
 
 use super::odd::OddPoints;
-use super::pace::Pace;
+use super::work_budget::WorkBudget;
 use super::{NONE, OrderError};
 use crate::stage::{OutOfScratch, Scratch};
 use blossom::Node;
@@ -61,17 +61,17 @@ pub const fn scratch_bytes(count: usize) -> usize {
 pub(super) fn pair<'s>(
     odd: &'s OddPoints<'s>,
     mut scratch: Scratch<'s>,
-    pace: &mut Pace<'_>,
+    work_budget: &mut WorkBudget<'_>,
     mate: &'s mut [u16],
 ) -> Result<u64, OrderError> {
     let mut matching = Matching::new(odd, &mut scratch, mate)?;
-    matching.start(pace)?;
+    matching.start(work_budget)?;
     for root in 0..odd.count() {
         if matching.mate[usize::from(root)] == NONE {
-            matching.grow_tree(root, pace)?;
+            matching.grow_tree(root, work_budget)?;
         }
     }
-    matching.settle_all(pace)?;
+    matching.settle_all(work_budget)?;
     Ok(matching.length())
 }
 
@@ -192,8 +192,8 @@ impl<'s, 'a> Matching<'s, 'a> {
     }
 
     /// Charges the square roots since the last time, and so many vertices looked at.
-    fn charge(&self, vertices: usize, pace: &mut Pace<'_>) -> Result<(), OrderError> {
-        pace.work(1 + self.roots.take() + vertices as u32 / 12)?;
+    fn charge(&self, vertices: usize, work_budget: &mut WorkBudget<'_>) -> Result<(), OrderError> {
+        work_budget.work(1 + self.roots.take() + vertices as u32 / 12)?;
         Ok(())
     }
 
@@ -247,7 +247,7 @@ impl<'s, 'a> Matching<'s, 'a> {
     }
 
     /// Grows a tree from the free vertex `root` until it reaches another one, and matches both.
-    fn grow_tree(&mut self, root: u16, pace: &mut Pace<'_>) -> Result<(), OrderError> {
+    fn grow_tree(&mut self, root: u16, work_budget: &mut WorkBudget<'_>) -> Result<(), OrderError> {
         self.now = 0;
         self.widest = self.radius.iter().copied().max().unwrap_or(0);
         self.limit = NEVER;
@@ -256,15 +256,15 @@ impl<'s, 'a> Matching<'s, 'a> {
         self.reached = NOTHING;
         self.enter(root, Label::Fresh);
         loop {
-            self.look_around(pace)?;
-            self.charge(self.reached.len(), pace)?;
+            self.look_around(work_budget)?;
+            self.charge(self.reached.len(), work_budget)?;
             let (time, vertex) = self.next_touch();
             if self.inner_blossoms > 0
                 && let Some((empty, blossom)) = self.next_opening()
                 && empty <= time
             {
                 self.now = empty;
-                self.open_inner(blossom, pace)?;
+                self.open_inner(blossom, work_budget)?;
                 continue;
             }
             self.now = time;
@@ -272,7 +272,7 @@ impl<'s, 'a> Matching<'s, 'a> {
             let node = self.top_of(vertex);
             if self.label(vertex) == Label::Outer {
                 if self.top_of(outer) == node {
-                    self.look_from(vertex, pace)?;
+                    self.look_from(vertex, work_budget)?;
                 } else {
                     self.shrink(outer, vertex);
                 }
@@ -306,11 +306,11 @@ impl<'s, 'a> Matching<'s, 'a> {
     }
 
     /// Looks at the pairs of every fresh vertex.
-    fn look_around(&mut self, pace: &mut Pace<'_>) -> Result<(), OrderError> {
+    fn look_around(&mut self, work_budget: &mut WorkBudget<'_>) -> Result<(), OrderError> {
         for vertex in core::mem::replace(&mut self.fresh, NOTHING) {
             if self.label(vertex) == Label::Fresh {
                 self.label[usize::from(vertex)] = Label::Outer as u8;
-                self.look_from_outer(vertex, pace)?;
+                self.look_from_outer(vertex, work_budget)?;
             }
         }
         Ok(())
@@ -318,10 +318,14 @@ impl<'s, 'a> Matching<'s, 'a> {
 
     /// Notes at all other vertices when their pair with the outer vertex `from` will touch, if that
     /// is sooner than what they know.
-    fn look_from_outer(&mut self, from: u16, pace: &mut Pace<'_>) -> Result<(), OrderError> {
+    fn look_from_outer(
+        &mut self,
+        from: u16,
+        work_budget: &mut WorkBudget<'_>,
+    ) -> Result<(), OrderError> {
         let own = self.radius_now(from);
         let node = self.top_of(from);
-        for others in self.within_limit(from, own, pace)? {
+        for others in self.within_limit(from, own, work_budget)? {
             for other in others {
                 let label = self.label(other);
                 if label != Label::Inner && self.top_of(other) != node {
@@ -365,12 +369,12 @@ impl<'s, 'a> Matching<'s, 'a> {
         &self,
         vertex: u16,
         own: i32,
-        pace: &mut Pace<'_>,
+        work_budget: &mut WorkBudget<'_>,
     ) -> Result<[Range<u16>; 2], OrderError> {
         // The gap closes from both sides at most; no radius has grown by more than `now`.
         let closing = 2 * i64::from(self.limit - self.now);
         let weight = closing + i64::from(own) + i64::from(self.widest) + i64::from(self.now);
-        self.up_to(vertex, weight, pace)
+        self.up_to(vertex, weight, work_budget)
     }
 
     /// No other odd points have a pair with `vertex` of at most this weight; and the free ends. They are
@@ -379,11 +383,11 @@ impl<'s, 'a> Matching<'s, 'a> {
         &self,
         vertex: u16,
         weight: i64,
-        pace: &mut Pace<'_>,
+        work_budget: &mut WorkBudget<'_>,
     ) -> Result<[Range<u16>; 2], OrderError> {
         let reach = (weight.max(0).unsigned_abs() / 2) << self.shortened;
         let others = self.odd.around(vertex, u32::try_from(reach).unwrap_or(u32::MAX));
-        self.charge(others.len(), pace)?;
+        self.charge(others.len(), work_budget)?;
         Ok([others, self.odd.free_numbers()])
     }
 
@@ -394,12 +398,16 @@ impl<'s, 'a> Matching<'s, 'a> {
 
     /// Finds anew when the first pair of `vertex`, outside or outer, with an outer vertex of
     /// another node will touch.
-    fn look_from(&mut self, vertex: u16, pace: &mut Pace<'_>) -> Result<(), OrderError> {
+    fn look_from(
+        &mut self,
+        vertex: u16,
+        work_budget: &mut WorkBudget<'_>,
+    ) -> Result<(), OrderError> {
         let index = usize::from(vertex);
         let (now, own) = (self.now, self.radius_now(vertex));
         let sides = if self.label(vertex) == Label::Outside { 1 } else { 2 };
         self.when[index] = NEVER;
-        for others in self.within_limit(vertex, own, pace)? {
+        for others in self.within_limit(vertex, own, work_budget)? {
             for other in others {
                 if self.label(other) != Label::Outer || self.top_of(other) == self.top_of(vertex) {
                     continue;
@@ -415,10 +423,14 @@ impl<'s, 'a> Matching<'s, 'a> {
     }
 
     /// The same for each vertex of a node.
-    fn look_from_each(&mut self, node: u16, pace: &mut Pace<'_>) -> Result<(), OrderError> {
+    fn look_from_each(
+        &mut self,
+        node: u16,
+        work_budget: &mut WorkBudget<'_>,
+    ) -> Result<(), OrderError> {
         for vertex in self.candidates(node) {
             if self.top_of(vertex) == node {
-                self.look_from(vertex, pace)?;
+                self.look_from(vertex, work_budget)?;
             }
         }
         Ok(())

@@ -2,16 +2,16 @@
 //! the pairs that touch then.
 
 use super::Matching;
-use crate::order::pace::Pace;
+use crate::order::work_budget::WorkBudget;
 use crate::order::{NONE, OrderError};
 
 impl Matching<'_, '_> {
     /// Sets the duals and matches what touches.
-    pub(super) fn start(&mut self, pace: &mut Pace<'_>) -> Result<(), OrderError> {
+    pub(super) fn start(&mut self, work_budget: &mut WorkBudget<'_>) -> Result<(), OrderError> {
         let real = self.odd.real_count();
         for vertex in 0..real {
-            let nearest = self.nearest(&mut (0..vertex).rev(), vertex, i32::MAX, pace)?;
-            let nearest = self.nearest(&mut (vertex + 1..real), vertex, nearest, pace)?;
+            let nearest = self.nearest(&mut (0..vertex).rev(), vertex, i32::MAX, work_budget)?;
+            let nearest = self.nearest(&mut (vertex + 1..real), vertex, nearest, work_budget)?;
             // Half the weight each: no two discs overlap.
             self.radius[usize::from(vertex)] = nearest / 2;
         }
@@ -20,7 +20,7 @@ impl Matching<'_, '_> {
         self.widest = self.end_weight;
         for vertex in 0..self.odd.count() {
             if self.mate[usize::from(vertex)] == NONE {
-                self.widen(vertex, pace)?;
+                self.widen(vertex, work_budget)?;
             }
         }
         Ok(())
@@ -33,7 +33,7 @@ impl Matching<'_, '_> {
         others: &mut dyn Iterator<Item = u16>,
         vertex: u16,
         bound: i32,
-        pace: &mut Pace<'_>,
+        work_budget: &mut WorkBudget<'_>,
     ) -> Result<i32, OrderError> {
         let mut nearest = bound;
         let mut looked_at = 0;
@@ -46,19 +46,19 @@ impl Matching<'_, '_> {
                 nearest = weight;
             }
         }
-        self.charge(looked_at, pace)?;
+        self.charge(looked_at, work_budget)?;
         Ok(nearest)
     }
 
     /// Lets the disc of a free vertex grow until it touches another, and matches them if that one
     /// is free too.
-    fn widen(&mut self, vertex: u16, pace: &mut Pace<'_>) -> Result<(), OrderError> {
+    fn widen(&mut self, vertex: u16, work_budget: &mut WorkBudget<'_>) -> Result<(), OrderError> {
         let own = self.radius[usize::from(vertex)];
         let mut gap = i32::MAX / 2;
         let mut touched = NONE;
         // Its nearest neighbour is no farther than twice its radius, and one.
         let weight = 2 * i64::from(own) + 1 + i64::from(self.widest);
-        for others in self.up_to(vertex, weight, pace)? {
+        for others in self.up_to(vertex, weight, work_budget)? {
             for other in others.filter(|&other| other != vertex) {
                 let reach = own + self.radius[usize::from(other)];
                 let free = self.mate[usize::from(other)] == NONE;

@@ -133,7 +133,7 @@ impl Steps {
 
     /// Whether the state machine gets on: it has nothing to do, or takes its next word before the
     /// longest event could be over twice.
-    pub fn gets_on(&mut self) -> bool {
+    pub fn is_progressing(&mut self) -> bool {
         const LONGEST: u32 = 2 * (StepEvent::MAX_TICKS / (TICKS_PER_SECOND / 1_000_000));
         let now = clock::microseconds();
         let taken = taken();
@@ -146,7 +146,7 @@ impl Steps {
 
     /// Counts what the state machine has taken since, and tells the main loop's state.
     #[inline(never)]
-    pub fn follow(&mut self) {
+    pub fn sync_consumed(&mut self) {
         if STATE.is_halted() {
             self.throw_away();
             pen::set_height(0);

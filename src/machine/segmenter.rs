@@ -1,13 +1,13 @@
 //! A move to pieces that are straight for the motors, too.
 
-use super::{Machine, Piece, Target};
+use super::{Machine, SegmentEnd, Target};
 use crate::drawing::{LineType, PagePoint};
 use crate::motion::{Move, PathLength, PushError};
 use crate::step::Pattern;
 
 /// What is left of a move.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Split {
+pub(super) struct Segmenter {
     from: PagePoint,
     to: PagePoint,
     length: PathLength,
@@ -21,7 +21,7 @@ pub(super) struct Split {
     limit: PathLength,
 }
 
-impl Split {
+impl Segmenter {
     /// Where the last piece ends.
     pub(super) fn end(&self) -> PagePoint {
         self.to
@@ -46,7 +46,7 @@ impl Machine<'_> {
         let (dx, dy) = (to.x - from.x, to.y - from.y);
         let length = self.runner.limits().length(dx, dy).ok_or(PushError::TooLong)?;
         let place = PathLength::ZERO;
-        self.split = Some(Split { from, to, length, place, cut: 0, dot: 0, ink, limit });
+        self.split = Some(Segmenter { from, to, length, place, cut: 0, dot: 0, ink, limit });
         self.push_pieces();
         Ok(length)
     }
@@ -56,7 +56,7 @@ impl Machine<'_> {
         while let Some(split) = self.split
             && !self.runner.is_full()
         {
-            let Split { from, to, length, place, mut cut, dot, mut ink, limit } = split;
+            let Segmenter { from, to, length, place, mut cut, dot, mut ink, limit } = split;
             let mut next_dot = dot;
             let way = (to.x - from.x, to.y - from.y);
             let build = self.settings.kinematics();
@@ -86,7 +86,7 @@ impl Machine<'_> {
             let end = PathLength::from_bits(end);
             let places = [place.to_bits(), end.to_bits()];
             let begin = self.runner.end();
-            let Piece { motors, page, offsets } =
+            let SegmentEnd { motors, page, offsets } =
                 build.piece([from, to], places, length.to_bits(), begin);
             let piece =
                 Move { motors, offsets, page, way, whole: length, length: end - place, is_gap };
@@ -94,7 +94,7 @@ impl Machine<'_> {
             let pushed = self.push_motors(&piece, ink, limit);
             debug_assert!(pushed.is_ok());
             if pushed != Ok(false) {
-                let rest = Split { place: end, cut, dot: next_dot, ..split };
+                let rest = Segmenter { place: end, cut, dot: next_dot, ..split };
                 self.split = (end < length).then_some(rest);
             }
         }

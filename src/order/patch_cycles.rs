@@ -5,10 +5,10 @@
 //! the allowance doubles from round to round (after Karp, "A patching algorithm for the
 //! nonsymmetric traveling-salesman problem", 1979).
 
-use super::near::Near;
+use super::neighbours::Neighbours;
 use super::network::Network;
-use super::pace::Pace;
 use super::partition::Partition;
+use super::work_budget::WorkBudget;
 use super::{EVEN_PART, NONE, OrderError};
 use crate::stage::Scratch;
 
@@ -16,12 +16,12 @@ use crate::stage::Scratch;
 const FIRST_ALLOWANCE: i64 = 8 << 8;
 
 /// Changes the moves `mate` between odd stations until no two of `near` can join two parts.
-pub(super) fn mend(
+pub(super) fn patch_cycles(
     network: Network<'_>,
-    near: Near<'_>,
+    near: Neighbours<'_>,
     mate: &mut [u16],
     mut scratch: Scratch<'_>,
-    pace: &mut Pace<'_>,
+    work_budget: &mut WorkBudget<'_>,
 ) -> Result<(), OrderError> {
     let mut parts = Partition::singletons(scratch.take(mate.len())?);
     for chain in 0..network.chains() {
@@ -40,11 +40,11 @@ pub(super) fn mend(
         for a in 0..network.stations() {
             for c in near.of(a) {
                 let (b, d) = (mate[usize::from(a)], mate[usize::from(c)]);
-                pace.work(1)?;
+                work_budget.work(1)?;
                 if !is_move(b) || !is_move(d) || parts.find(a) == parts.find(c) {
                     continue;
                 }
-                pace.work(4)?;
+                work_budget.work(4)?;
                 let length = |from, to| i64::from(network.distance(from, to));
                 let longer = length(a, c) + length(b, d) - length(a, b) - length(c, d);
                 if longer <= allowance {

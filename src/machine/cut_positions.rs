@@ -11,7 +11,7 @@ const NEAR: i32 = 2;
 
 /// The cuts of a line, in steps from its beginning: the same ones forward and backward.
 ///
-/// Along a line a belt of length a bends by 1/a at most, so a chord of length h is off by h²/8a: 1/64 of a step
+/// EdgeParameter a line a belt of length a bends by 1/a at most, so a chord of length h is off by h²/8a: 1/64 of a step
 /// for the longest. Of the half step that a point may lie off the line, rounding needs less the more the other belt moves: where
 /// this one makes s steps for each of that, s/2 is to spare. But t steps from the foot of its anchor's
 /// perpendicular s may be t/a only, so there pieces are √(2t) long, which takes s/4. The foot itself is a cut, for the
@@ -19,16 +19,16 @@ const NEAR: i32 = 2;
 ///
 /// ```
 /// use penup::drawing::PagePoint;
-/// use penup::machine::{Anchors, Cuts};
+/// use penup::machine::{Anchors, CutPositions};
 /// let anchors = Anchors { left: PagePoint { x: -100, y: 60_000 }, width: 64_000 };
 /// let [from, to] = [0, 1000].map(|x| PagePoint { x, y: 0 });
-/// let walk = |cuts: Cuts| {
+/// let walk = |cuts: CutPositions| {
 ///     core::iter::successors(Some(0), move |&cut| Some(cuts.next(cut))).take(9).collect::<Vec<_>>()
 /// };
-/// assert_eq!(walk(Cuts::new(anchors, from, to)), [0, 13, 28, 45, 62, 81, 100, 121, 142]);
+/// assert_eq!(walk(CutPositions::new(anchors, from, to)), [0, 13, 28, 45, 62, 81, 100, 121, 142]);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Cuts {
+pub struct CutPositions {
     /// The feet of both perpendiculars, the one that comes first, and what lies between them.
     feet: [i32; 2],
     middle: i32,
@@ -38,7 +38,7 @@ pub struct Cuts {
     backward: bool,
 }
 
-impl Cuts {
+impl CutPositions {
     /// Those of a line below the anchors.
     pub fn new(anchors: Anchors, from: PagePoint, to: PagePoint) -> Self {
         let Anchors { left, width } = anchors;
@@ -108,7 +108,7 @@ mod tests {
     use std::vec::Vec;
 
     fn walk(anchors: Anchors, from: PagePoint, to: PagePoint) -> Vec<i32> {
-        let cuts = Cuts::new(anchors, from, to);
+        let cuts = CutPositions::new(anchors, from, to);
         let mut all = std::vec![0];
         while let Some(&cut) = all.last().filter(|cut| **cut != cuts.length) {
             all.push(cuts.next(cut));
@@ -134,7 +134,7 @@ mod tests {
                         .iter())
                 );
                 assert!(there.is_sorted_by(|a, b| a < b), "{there:?}");
-                let cuts = Cuts::new(anchors, from, to);
+                let cuts = CutPositions::new(anchors, from, to);
                 assert!(there.windows(2).all(|ends| ends[1] - ends[0] <= cuts.longest + 2));
                 for foot in cuts.feet {
                     assert!(!(NEAR..=cuts.length - NEAR).contains(&foot) || there.contains(&foot));

@@ -1,22 +1,22 @@
 //! A computation that answers the line as it goes, and knows when to end.
 
-use crate::stage::{Aborted, Attention, heap_sort_attentively};
+use crate::stage::{Aborted, Cancel, heap_sort_cancellable};
 
-/// Counts work and calls [`Attention::check`] in time.
-pub(super) struct Pace<'a> {
-    attention: &'a mut dyn Attention,
+/// Counts work and calls [`Cancel::check`] in time.
+pub(super) struct WorkBudget<'a> {
+    cancel: &'a mut dyn Cancel,
     /// Units since the last answer.
     done: u32,
     /// Units left at the last answer.
     budget: u64,
 }
 
-impl<'a> Pace<'a> {
+impl<'a> WorkBudget<'a> {
     /// Distances between two answers: each takes up to 500 instructions on the smallest core.
     const UNITS: u32 = 256;
 
-    pub fn new(attention: &'a mut dyn Attention) -> Self {
-        Self { attention, done: 0, budget: 0 }
+    pub fn new(cancel: &'a mut dyn Cancel) -> Self {
+        Self { cancel, done: 0, budget: 0 }
     }
 
     /// Answers now: between two passes over the whole drawing.
@@ -30,7 +30,7 @@ impl<'a> Pace<'a> {
         if self.done >= Self::UNITS {
             self.budget = self.budget.saturating_sub(self.done.into());
             self.done = 0;
-            self.attention.check()?;
+            self.cancel.check()?;
         }
         Ok(())
     }
@@ -41,7 +41,7 @@ impl<'a> Pace<'a> {
         items: &mut [T],
         key: impl Fn(&T) -> K,
     ) -> Result<(), Aborted> {
-        heap_sort_attentively(items, key, self.attention)
+        heap_sort_cancellable(items, key, self.cancel)
     }
 
     /// Sets how many units may be worked from now until it [is over](Self::is_over).

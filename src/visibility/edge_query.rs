@@ -5,25 +5,25 @@
 //! the right of the edge: a corner on the line of the edge counts as lying to the right in the first
 //! question and to the left in the second. So every degenerate case falls to one side or the other.
 
+use super::coarse_projection::{CoarseLine, CoarsePoint, CoarseProjection, End};
 use super::edges::{ChosenSides, Outlines, sides};
 use super::faces::{Face, Faces};
-use super::outlook::{CoarseLine, End, Outlook, Place};
-use super::profile::{Part, Profile, mark};
+use super::profile::{EdgeInterval, Profile, mark};
 use super::seams::Extent;
 use super::triangles::Ears;
-use crate::geometry::{Along, line_side, page_offset, page_side};
+use crate::geometry::{EdgeParameter, line_side, page_offset, page_side};
 use crate::model::Corner;
 
 /// What the search knows of the scene.
-pub struct Surroundings<'a> {
-    pub outlook: Outlook<'a>,
+pub struct SceneIndex<'a> {
+    pub coarse_projection: CoarseProjection<'a>,
     pub outlines: Outlines<'a>,
     pub ears: Ears<'a>,
     pub chosen: ChosenSides<'a>,
     pub faces: Faces<'a>,
 }
 
-impl Surroundings<'_> {
+impl SceneIndex<'_> {
     /// One of the triangles of a face, from 0.
     pub fn triangle(&self, face: Face, number: usize) -> Option<[u16; 3]> {
         if face.has_ears {
@@ -39,12 +39,12 @@ impl Surroundings<'_> {
     /// The box around the face of a rank.
     pub fn extent(&self, rank: usize) -> Extent {
         let corners = self.outlines.element(self.faces.get(rank).first);
-        Extent::around(corners.iter().map(|corner| self.outlook.vertex(corner.vertex())))
+        Extent::around(corners.iter().map(|corner| self.coarse_projection.vertex(corner.vertex())))
     }
 
     /// Whether two faces have two corners in common, by their places; such faces do not cross elsewhere.
     pub fn share_edge(&self, one: Face, other: Face) -> bool {
-        let at = |corner: &Corner| self.outlook.vertex(corner.vertex());
+        let at = |corner: &Corner| self.coarse_projection.vertex(corner.vertex());
         let other = self.outlines.element(other.first);
         let shared = |corner: &&Corner| other.iter().any(|there| at(there) == at(corner));
         let corners = self.outlines.element(one.first);
@@ -56,7 +56,9 @@ impl Surroundings<'_> {
     pub fn passes_through(&self, face: Face, triangle: [u16; 3]) -> bool {
         let (mut before, mut behind) = (false, false);
         self.outlines.element(face.first).iter().any(|corner| {
-            let height = self.outlook.height(triangle, self.outlook.end(corner.vertex()));
+            let height = self
+                .coarse_projection
+                .height(triangle, self.coarse_projection.end(corner.vertex()));
             before |= height < 0;
             behind |= height > 0;
             before && behind
@@ -71,7 +73,7 @@ impl Surroundings<'_> {
 
 /// An edge that is being looked at, or a seam.
 #[derive(Debug, Clone, Copy)]
-pub struct Sight {
+pub struct EdgeQuery {
     /// The side that stands for it; none for a seam.
     pub side: usize,
     pub p: End,
@@ -82,8 +84,8 @@ pub struct Sight {
     pub far: i32,
     /// The two triangles that pass through each other there, if it is a seam.
     pub seam: Option<[[u16; 3]; 2]>,
-    low: Place,
-    high: Place,
+    low: CoarsePoint,
+    high: CoarsePoint,
     line: CoarseLine,
 }
 
@@ -95,7 +97,7 @@ type Side = (u16, u16);
 /// For the points just to the left of the edge a corner on its line lies to the right, and the other
 /// way round; so each corner is left of the line or not, twice.
 #[derive(Clone, Copy)]
-pub struct Piece<'c> {
+pub struct CrossedPolygon<'c> {
     corners: &'c [u16],
     /// One bit for each corner: whether it lies to the left.
     pub left: u32,
@@ -103,7 +105,7 @@ pub struct Piece<'c> {
     pub left_or_on: u32,
 }
 
-impl<'c> Piece<'c> {
+impl<'c> CrossedPolygon<'c> {
     /// From the corners, at most [`FEW_CORNERS`], and the side of the line on which each lies.
     pub fn new(corners: &'c [u16], sides: &[i32]) -> Self {
         let (mut left, mut left_or_on) = (0, 0);
@@ -159,12 +161,12 @@ enum Depth {
     /// The edge does not lie behind it.
     Before,
     /// This part of the edge lies behind it.
-    Behind(Part),
+    Behind(EdgeInterval),
     /// That differs from triangle to triangle.
     Mixed,
 }
 
-impl Sight {
+impl EdgeQuery {
     /// The side of a seam, after those of all edges.
     pub const NO_SIDE: usize = usize::MAX;
 
@@ -189,32 +191,33 @@ impl Sight {
     }
 
     /// On which side of this edge's line a vertex lies on the page.
-    pub fn side_of(&self, outlook: &Outlook<'_>, number: u16) -> i32 {
-        let coarse = self.line.side(outlook.place(number));
-        if coarse != 0 { coarse } else { self.exact_side_of(outlook, number) }
+    pub fn side_of(&self, coarse_projection: &CoarseProjection<'_>, number: u16) -> i32 {
+        let coarse = self.line.side(coarse_projection.place(number));
+        if coarse != 0 { coarse } else { self.exact_side_of(coarse_projection, number) }
     }
 
     /// [`Self::side_of`] without a look at the places.
     #[cold]
-    fn exact_side_of(&self, outlook: &Outlook<'_>, number: u16) -> i32 {
+    fn exact_side_of(&self, coarse_projection: &CoarseProjection<'_>, number: u16) -> i32 {
         if number == self.p.number || number == self.q.number {
             return 0;
         }
-        let vertex = outlook.vertex(number);
-        page_side(outlook.projection, self.p.vertex, self.q.vertex, vertex).signum() as i32
+        let vertex = coarse_projection.vertex(number);
+        page_side(coarse_projection.projection, self.p.vertex, self.q.vertex, vertex).signum()
+            as i32
     }
 
     /// Marks what `face` does to this edge.
-    pub fn look_at(&self, around: &Surroundings<'_>, face: Face, profile: &mut Profile<'_>) {
-        let outlook = &around.outlook;
+    pub fn look_at(&self, around: &SceneIndex<'_>, face: Face, profile: &mut Profile<'_>) {
+        let coarse_projection = &around.coarse_projection;
         let corners = around.outlines.element(face.first);
         let mut numbers = [0; FEW_CORNERS];
         let mut sides = [0; FEW_CORNERS];
         let (mut left, mut right) = (true, true);
-        let (mut low, mut high) = (Place::HIGHEST, Place::LOWEST);
+        let (mut low, mut high) = (CoarsePoint::HIGHEST, CoarsePoint::LOWEST);
         for (n, corner) in corners.iter().enumerate() {
             let number = corner.vertex();
-            let place = outlook.place(number);
+            let place = coarse_projection.place(number);
             (low, high) = (low.low(place), high.high(place));
             let mut side = 0;
             if number != self.p.number && number != self.q.number {
@@ -236,11 +239,11 @@ impl Sight {
         if count <= FEW_CORNERS {
             for (side, &number) in sides.iter_mut().zip(&numbers).take(count) {
                 if *side == 0 {
-                    *side = self.exact_side_of(outlook, number);
+                    *side = self.exact_side_of(coarse_projection, number);
                 }
             }
-            let piece = Piece::new(&numbers[..count], &sides);
-            if !face.is_fan || !self.pass(outlook, piece, profile) {
+            let piece = CrossedPolygon::new(&numbers[..count], &sides);
+            if !face.is_fan || !self.pass(coarse_projection, piece, profile) {
                 self.pass_triangles(around, face, profile);
             }
             if piece.sides_on_line() == 0 {
@@ -252,20 +255,30 @@ impl Sight {
         self.pass_sides(around, face.first, corners, profile);
     }
 
-    fn pass_triangles(&self, around: &Surroundings<'_>, face: Face, profile: &mut Profile<'_>) {
+    fn pass_triangles(&self, around: &SceneIndex<'_>, face: Face, profile: &mut Profile<'_>) {
         for triangle in around.triangles(face) {
-            self.pass_triangle(&around.outlook, &triangle, profile);
+            self.pass_triangle(&around.coarse_projection, &triangle, profile);
         }
     }
 
-    fn pass_triangle(&self, outlook: &Outlook<'_>, triangle: &[u16; 3], profile: &mut Profile<'_>) {
-        let sides = triangle.map(|corner| self.side_of(outlook, corner));
-        self.pass(outlook, Piece::new(triangle, &sides), profile);
+    fn pass_triangle(
+        &self,
+        coarse_projection: &CoarseProjection<'_>,
+        triangle: &[u16; 3],
+        profile: &mut Profile<'_>,
+    ) {
+        let sides = triangle.map(|corner| self.side_of(coarse_projection, corner));
+        self.pass(coarse_projection, CrossedPolygon::new(triangle, &sides), profile);
     }
 
     /// Marks what a piece of a face does to this edge. False, and nothing marked, if its triangles
     /// must be asked one by one; a triangle never must.
-    fn pass(&self, outlook: &Outlook<'_>, piece: Piece<'_>, profile: &mut Profile<'_>) -> bool {
+    fn pass(
+        &self,
+        coarse_projection: &CoarseProjection<'_>,
+        piece: CrossedPolygon<'_>,
+        profile: &mut Profile<'_>,
+    ) -> bool {
         let corners = piece.corners;
         let left = piece.crossings(piece.left);
         let right = piece.crossings(piece.left_or_on);
@@ -275,7 +288,7 @@ impl Sight {
         if is_many(left) || is_many(right) {
             return false;
         }
-        let depth = |number: &u16| outlook.vertex(*number).z;
+        let depth = |number: &u16| coarse_projection.vertex(*number).z;
         let (mut near, mut far) = (i32::MAX, i32::MIN);
         for z in corners.iter().map(depth) {
             (near, far) = (near.min(z), far.max(z));
@@ -285,7 +298,7 @@ impl Sight {
         }
         let mut facing = 0;
         for pair in corners[1..].windows(2) {
-            let turn = outlook.side(corners[0], pair[0], pair[1]);
+            let turn = coarse_projection.side(corners[0], pair[0], pair[1]);
             if facing * turn < 0 {
                 return false;
             }
@@ -294,16 +307,19 @@ impl Sight {
         if facing == 0 {
             return true;
         }
-        let on_left = self.passage(outlook, piece, left, facing);
-        let on_right =
-            if left == right { on_left } else { self.passage(outlook, piece, right, facing) };
+        let on_left = self.passage(coarse_projection, piece, left, facing);
+        let on_right = if left == right {
+            on_left
+        } else {
+            self.passage(coarse_projection, piece, right, facing)
+        };
         if on_left.is_none() && on_right.is_none() {
             return true;
         }
         let behind = if far + 1 < self.near {
-            Part::WHOLE
+            EdgeInterval::WHOLE
         } else {
-            match self.depth_behind(outlook, corners, facing) {
+            match self.depth_behind(coarse_projection, corners, facing) {
                 Depth::Before => return true,
                 Depth::Behind(part) => part,
                 Depth::Mixed => return false,
@@ -311,7 +327,7 @@ impl Sight {
         };
         let mut cover = |passage: Option<Passage>, marks: u64| {
             if let Some(passage) = passage {
-                profile.mark(self.part(outlook, passage).and(behind), marks);
+                profile.mark(self.part(coarse_projection, passage).and(behind), marks);
             }
         };
         if left == right {
@@ -324,18 +340,24 @@ impl Sight {
     }
 
     /// How the edge lies to the planes of a fan of triangles, all of which turn as `facing` says.
-    fn depth_behind(&self, outlook: &Outlook<'_>, corners: &[u16], facing: i32) -> Depth {
+    fn depth_behind(
+        &self,
+        coarse_projection: &CoarseProjection<'_>,
+        corners: &[u16],
+        facing: i32,
+    ) -> Depth {
         let mut depth = None;
         for pair in corners[1..].windows(2) {
             let triangle = [corners[0], pair[0], pair[1]];
-            let here = if self.seam.is_some() && self.lies_in_plane_of(outlook, triangle) {
+            let here = if self.seam.is_some() && self.lies_in_plane_of(coarse_projection, triangle)
+            {
                 None
             } else {
-                let height = |end: End| outlook.height(triangle, end) * i64::from(facing);
+                let height = |end: End| coarse_projection.height(triangle, end) * i64::from(facing);
                 behind_between(height(self.p), height(self.q))
             };
             if corners.len() > 3 {
-                let is_all = here == Some(Part::WHOLE);
+                let is_all = here == Some(EdgeInterval::WHOLE);
                 if here.is_some() && !is_all || depth.is_some_and(|depth| depth != here) {
                     return Depth::Mixed;
                 }
@@ -352,8 +374,8 @@ impl Sight {
     /// the piece turns.
     pub fn passage(
         &self,
-        outlook: &Outlook<'_>,
-        piece: Piece<'_>,
+        coarse_projection: &CoarseProjection<'_>,
+        piece: CrossedPolygon<'_>,
         crossings: u32,
         facing: i32,
     ) -> Option<Passage> {
@@ -366,7 +388,7 @@ impl Sight {
                 continue;
             }
             let side = piece.side(end);
-            let line = outlook.line(side.0, side.1);
+            let line = coarse_projection.line(side.0, side.1);
             let p_inside = line.side(self.p) * facing;
             let q_inside = line.side(self.q) * facing;
             if p_inside <= 0 && q_inside <= 0 {
@@ -382,21 +404,21 @@ impl Sight {
     }
 
     /// The part of the edge within a piece of a face.
-    pub fn part(&self, outlook: &Outlook<'_>, passage: Passage) -> Part {
-        let place = |(a, b): Side| outlook.crossing(a, b, self.p, self.q);
-        Part { from: passage.entry.map(place), to: passage.exit.map(place) }
+    pub fn part(&self, coarse_projection: &CoarseProjection<'_>, passage: Passage) -> EdgeInterval {
+        let place = |(a, b): Side| coarse_projection.crossing(a, b, self.p, self.q);
+        EdgeInterval { from: passage.entry.map(place), to: passage.exit.map(place) }
     }
 
     /// Marks what the sides of an element do that lie on the line of this edge.
     #[cold]
     fn pass_sides(
         &self,
-        around: &Surroundings<'_>,
+        around: &SceneIndex<'_>,
         first: usize,
         corners: &[Corner],
         profile: &mut Profile<'_>,
     ) {
-        let is_on_line = |corner: u16| self.side_of(&around.outlook, corner) == 0;
+        let is_on_line = |corner: u16| self.side_of(&around.coarse_projection, corner) == 0;
         for (number, a, b) in sides(corners) {
             let side = first + number;
             if side != self.side && around.chosen.contains(side) && is_on_line(a) && is_on_line(b) {
@@ -409,16 +431,16 @@ impl Sight {
     /// it is nearer, or as near and of a lower pen, or of the same and before it in the model.
     fn pass_side(
         &self,
-        around: &Surroundings<'_>,
+        around: &SceneIndex<'_>,
         side: usize,
         (a, b): Side,
         profile: &mut Profile<'_>,
     ) {
-        let outlook = &around.outlook;
-        let projection = outlook.projection;
-        let (va, vb) = (outlook.vertex(a), outlook.vertex(b));
+        let coarse_projection = &around.coarse_projection;
+        let projection = coarse_projection.projection;
+        let (va, vb) = (coarse_projection.vertex(a), coarse_projection.vertex(b));
         let (vp, vq) = (self.p.vertex, self.q.vertex);
-        let Some((axis, ahead)) = outlook.direction(vp, vq) else {
+        let Some((axis, ahead)) = coarse_projection.direction(vp, vq) else {
             return;
         };
         if page_offset(projection, axis, va, vb) == 0 {
@@ -428,11 +450,11 @@ impl Sight {
             let beyond_p = page_offset(projection, axis, vp, vertex) * ahead;
             let before_q = page_offset(projection, axis, vertex, vq) * ahead;
             if beyond_p <= 0 {
-                Along::START
+                EdgeParameter::START
             } else if before_q <= 0 {
-                Along::END
+                EdgeParameter::END
             } else {
-                Along::zero_between(beyond_p, before_q)
+                EdgeParameter::zero_between(beyond_p, before_q)
             }
         };
         let height = |vertex| line_side(projection, axis, va, vb, vertex);
@@ -441,28 +463,28 @@ impl Sight {
             let pens = around.outlines.pens;
             let is_first = self.side == Self::NO_SIDE
                 || (pens.at(side), side) < (pens.at(self.side), self.side);
-            is_first.then_some(Part::WHOLE)
+            is_first.then_some(EdgeInterval::WHOLE)
         } else {
             behind_between(heights.0, heights.1)
         };
         if let Some(behind) = behind {
             let (at_a, at_b) = (place(va), place(vb));
-            let beside = Part { from: Some(at_a.min(at_b)), to: Some(at_a.max(at_b)) };
+            let beside = EdgeInterval { from: Some(at_a.min(at_b)), to: Some(at_a.max(at_b)) };
             profile.mark(beside.and(behind), mark::STOOD_IN);
         }
     }
 }
 
 /// The part of an edge that lies behind something flat, from how far behind it p and q lie.
-fn behind_between(at_p: i64, at_q: i64) -> Option<Part> {
+fn behind_between(at_p: i64, at_q: i64) -> Option<EdgeInterval> {
     if at_p <= 0 && at_q <= 0 {
         return None;
     }
-    let mut part = Part::WHOLE;
+    let mut part = EdgeInterval::WHOLE;
     if at_p < 0 {
-        part.from = Some(Along::zero_between(at_p, at_q));
+        part.from = Some(EdgeParameter::zero_between(at_p, at_q));
     } else if at_q < 0 {
-        part.to = Some(Along::zero_between(at_p, at_q));
+        part.to = Some(EdgeParameter::zero_between(at_p, at_q));
     }
     Some(part)
 }

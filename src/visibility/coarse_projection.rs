@@ -2,26 +2,26 @@
 //! "on which side" answered from those places where they suffice, exactly where they do not.
 
 use super::Scene;
-use super::pace::Pace;
+use super::yield_counter::YieldCounter;
 use super::{Unrounded, VisibilityError};
 use crate::geometry::{
-    Along, Axis, Projection, Vertex, page_offset, page_side, plane_side, plane_side_margin,
+    Axis, EdgeParameter, Projection, Vertex, page_offset, page_side, plane_side, plane_side_margin,
 };
 use crate::stage::{Aborted, Scratch};
 use bytemuck::{Pod, Zeroable};
 
 /// Places on the coarse grid are below 2^this, so that a product of two differences fits 29 bits.
-pub const PLACE_BITS: u32 = 14;
+pub const COARSE_BITS: u32 = 14;
 
 /// A vertex on the coarse grid, rounded down: the vertex itself lies less than one unit right and up.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
-pub struct Place {
+pub struct CoarsePoint {
     pub x: u16,
     pub y: u16,
 }
 
-impl Place {
+impl CoarsePoint {
     pub const LOWEST: Self = Self { x: 0, y: 0 };
     pub const HIGHEST: Self = Self { x: u16::MAX, y: u16::MAX };
 
@@ -51,15 +51,15 @@ pub struct CoarseLine {
     y: i32,
     along_x: i32,
     along_y: i32,
-    doubt: i32,
+    error_bound: i32,
 }
 
 impl CoarseLine {
     #[inline]
-    pub fn new(a: Place, b: Place) -> Self {
+    pub fn new(a: CoarsePoint, b: CoarsePoint) -> Self {
         let (x, y) = (i32::from(a.x), i32::from(a.y));
         let (along_x, along_y) = (i32::from(b.x) - x, i32::from(b.y) - y);
-        Self { x, y, along_x, along_y, doubt: along_x.abs() + along_y.abs() + 2 }
+        Self { x, y, along_x, along_y, error_bound: along_x.abs() + along_y.abs() + 2 }
     }
 
     /// The sign of [`page_side`] for a vertex at `place`, or zero if the places are too coarse to tell.
@@ -67,30 +67,30 @@ impl CoarseLine {
     /// Each true difference is within one unit of the difference of the places, which moves the
     /// determinant by less than the sum of the differences and two.
     #[inline]
-    pub fn side(&self, place: Place) -> i32 {
+    pub fn side(&self, place: CoarsePoint) -> i32 {
         let (to_x, to_y) = (i32::from(place.x) - self.x, i32::from(place.y) - self.y);
         let side = self.along_x * to_y - self.along_y * to_x;
-        let doubt = self.doubt + to_x.abs() + to_y.abs();
-        i32::from(side >= doubt) - i32::from(side <= -doubt)
+        let error_bound = self.error_bound + to_x.abs() + to_y.abs();
+        i32::from(side >= error_bound) - i32::from(side <= -error_bound)
     }
 }
 
 /// [`CoarseLine::side`] of the line from `a` to `b`.
 #[inline]
-pub fn coarse_side(a: Place, b: Place, c: Place) -> i32 {
+pub fn coarse_side(a: CoarsePoint, b: CoarsePoint, c: CoarsePoint) -> i32 {
     CoarseLine::new(a, b).side(c)
 }
 
-/// The line through two vertices of an [`Outlook`].
+/// The line through two vertices of an [`CoarseProjection`].
 #[derive(Debug, Clone, Copy)]
-pub struct Line<'o> {
-    outlook: &'o Outlook<'o>,
+pub struct VertexLine<'o> {
+    coarse_projection: &'o CoarseProjection<'o>,
     a: u16,
     b: u16,
     coarse: CoarseLine,
 }
 
-impl Line<'_> {
+impl VertexLine<'_> {
     /// The sign of [`page_side`] for an end of an edge.
     #[inline]
     pub fn side(&self, end: End) -> i32 {
@@ -104,7 +104,7 @@ impl Line<'_> {
         if end.number == self.a || end.number == self.b {
             return 0;
         }
-        self.outlook.side_value(self.a, self.b, end).signum() as i32
+        self.coarse_projection.side_value(self.a, self.b, end).signum() as i32
     }
 }
 
@@ -123,27 +123,30 @@ impl Mapping {
     fn new(
         projection: Projection,
         vertices: &[Vertex],
-        pace: &mut Pace<'_>,
+        yield_counter: &mut YieldCounter<'_>,
     ) -> Result<Self, Aborted> {
         let (mut low, mut high) = ((i64::MAX, i64::MAX), (i64::MIN, i64::MIN));
         for (x, y) in vertices.iter().map(|&vertex| fine(projection, vertex)) {
             low = (low.0.min(x), low.1.min(y));
             high = (high.0.max(x), high.1.max(y));
-            pace.spend(TWO_DIVISIONS)?;
+            yield_counter.spend(TWO_DIVISIONS)?;
         }
         let shift_for = |low: i64, high: i64| {
             let extent = high.saturating_sub(low).max(0);
-            (64 - extent.leading_zeros()).saturating_sub(PLACE_BITS)
+            (64 - extent.leading_zeros()).saturating_sub(COARSE_BITS)
         };
         Ok(Self { projection, low, shift: (shift_for(low.0, high.0), shift_for(low.1, high.1)) })
     }
 
-    fn place(&self, vertex: Vertex) -> Place {
+    fn place(&self, vertex: Vertex) -> CoarsePoint {
         let (x, y) = fine(self.projection, vertex);
         let coarse = |fine: i64, low: i64, shift: u32| {
-            ((fine - low) >> shift).clamp(0, (1 << PLACE_BITS) - 1) as u16
+            ((fine - low) >> shift).clamp(0, (1 << COARSE_BITS) - 1) as u16
         };
-        Place { x: coarse(x, self.low.0, self.shift.0), y: coarse(y, self.low.1, self.shift.1) }
+        CoarsePoint {
+            x: coarse(x, self.low.0, self.shift.0),
+            y: coarse(y, self.low.1, self.shift.1),
+        }
     }
 }
 
@@ -165,7 +168,7 @@ pub struct End {
     /// The number of the vertex there; no vertex has [`End::FREE`].
     pub number: u16,
     pub vertex: Vertex,
-    pub place: Place,
+    pub place: CoarsePoint,
 }
 
 impl End {
@@ -175,27 +178,27 @@ impl End {
 
 /// The vertices, in view space and on the page.
 #[derive(Debug, Clone, Copy)]
-pub struct Outlook<'a> {
+pub struct CoarseProjection<'a> {
     pub projection: Projection,
     pub vertices: &'a [Vertex],
-    pub places: &'a [Place],
+    pub places: &'a [CoarsePoint],
     pub unrounded: Unrounded<'a>,
     mapping: Mapping,
 }
 
-impl<'a> Outlook<'a> {
+impl<'a> CoarseProjection<'a> {
     /// Places every vertex on the coarse grid.
     pub fn new<'s: 'a>(
         scene: &Scene<'a>,
         scratch: &mut Scratch<'s>,
-        pace: &mut Pace<'_>,
+        yield_counter: &mut YieldCounter<'_>,
     ) -> Result<Self, VisibilityError> {
         let Scene { projection, vertices, .. } = *scene;
-        let places: &mut [Place] = scratch.take(vertices.len())?;
-        let mapping = Mapping::new(projection, vertices, pace)?;
+        let places: &mut [CoarsePoint] = scratch.take(vertices.len())?;
+        let mapping = Mapping::new(projection, vertices, yield_counter)?;
         for (place, &vertex) in places.iter_mut().zip(vertices) {
             *place = mapping.place(vertex);
-            pace.spend(TWO_DIVISIONS)?;
+            yield_counter.spend(TWO_DIVISIONS)?;
         }
         Ok(Self { projection, vertices, places, unrounded: scene.unrounded, mapping })
     }
@@ -216,14 +219,19 @@ impl<'a> Outlook<'a> {
     }
 
     #[inline]
-    pub fn place(&self, number: u16) -> Place {
+    pub fn place(&self, number: u16) -> CoarsePoint {
         self.places[usize::from(number)]
     }
 
     /// The line through two vertices.
     #[inline]
-    pub fn line(&self, a: u16, b: u16) -> Line<'_> {
-        Line { outlook: self, a, b, coarse: CoarseLine::new(self.place(a), self.place(b)) }
+    pub fn line(&self, a: u16, b: u16) -> VertexLine<'_> {
+        VertexLine {
+            coarse_projection: self,
+            a,
+            b,
+            coarse: CoarseLine::new(self.place(a), self.place(b)),
+        }
     }
 
     /// The sign of [`page_side`] of three vertices.
@@ -238,8 +246,8 @@ impl<'a> Outlook<'a> {
     }
 
     /// Where the line through a and b crosses the line from p to q. It crosses between them.
-    pub fn crossing(&self, a: u16, b: u16, p: End, q: End) -> Along {
-        Along::zero_between(self.side_value(a, b, p), self.side_value(a, b, q))
+    pub fn crossing(&self, a: u16, b: u16, p: End, q: End) -> EdgeParameter {
+        EdgeParameter::zero_between(self.side_value(a, b, p), self.side_value(a, b, q))
     }
 
     /// How far an end lies behind the plane of a triangle that turns anticlockwise on the page, and before
@@ -252,7 +260,7 @@ impl<'a> Outlook<'a> {
         }
         let [a, b, c] = triangle.map(|number| self.vertex(number));
         let height = plane_side(a, b, c, end.vertex);
-        let margin = plane_side_margin(a, b, c, end.vertex, self.unrounded.doubt());
+        let margin = plane_side_margin(a, b, c, end.vertex, self.unrounded.error_bound());
         if height.abs() <= margin && self.unrounded.holds(triangle, end.number) {
             0
         } else {
@@ -280,7 +288,7 @@ impl<'a> Outlook<'a> {
 mod tests {
     use super::*;
     use crate::model::Elements;
-    use crate::stage::Undisturbed;
+    use crate::stage::NeverCancel;
 
     fn scene(projection: Projection, vertices: &[Vertex]) -> Scene<'_> {
         Scene { vertices, elements: Elements::new(&[]), projection, unrounded: Unrounded::UNKNOWN }
@@ -296,12 +304,13 @@ mod tests {
         for projection in [Projection::Perspective, Projection::Parallel] {
             let mut words = [0u64; 4];
             let mut scratch = Scratch::new(&mut words);
-            let mut undisturbed = Undisturbed;
-            let pace = &mut Pace::new(&mut undisturbed);
-            let outlook = Outlook::new(&scene(projection, &vertices), &mut scratch, pace)?;
-            let xs: [u16; 3] = [0, 1, 2].map(|n| outlook.place(n).x);
+            let mut never_cancel = NeverCancel;
+            let yield_counter = &mut YieldCounter::new(&mut never_cancel);
+            let coarse_projection =
+                CoarseProjection::new(&scene(projection, &vertices), &mut scratch, yield_counter)?;
+            let xs: [u16; 3] = [0, 1, 2].map(|n| coarse_projection.place(n).x);
             assert!(xs[0] == 0 && xs[0] < xs[1] && xs[1] <= xs[2], "{xs:?}");
-            assert!(xs[2] >= 1 << (PLACE_BITS - 1) && xs[2] < 1 << PLACE_BITS);
+            assert!(xs[2] >= 1 << (COARSE_BITS - 1) && xs[2] < 1 << COARSE_BITS);
         }
         Ok(())
     }
@@ -313,17 +322,22 @@ mod tests {
             .map(|n| Vertex::new(n % 4 * 70_001, n / 4 % 4 * 69_997, 100_000 + n / 16 * 100_003))
             .collect();
         let mut words = [0u64; 64];
-        let outlook = Outlook::new(
+        let coarse_projection = CoarseProjection::new(
             &scene(Projection::Perspective, &vertices),
             &mut Scratch::new(&mut words),
-            &mut Pace::new(&mut Undisturbed),
+            &mut YieldCounter::new(&mut NeverCancel),
         )?;
         let mut undecided = 0;
         for (a, b, c) in (0..64u16)
             .flat_map(|a| (0..64u16).flat_map(move |b| (0..64u16).map(move |c| (a, b, c))))
         {
-            let coarse = coarse_side(outlook.place(a), outlook.place(b), outlook.place(c));
-            let exact = outlook.side_value(a, b, outlook.end(c)).signum() as i32;
+            let coarse = coarse_side(
+                coarse_projection.place(a),
+                coarse_projection.place(b),
+                coarse_projection.place(c),
+            );
+            let exact =
+                coarse_projection.side_value(a, b, coarse_projection.end(c)).signum() as i32;
             assert!(coarse == 0 || coarse == exact, "{a} {b} {c}");
             undecided += u32::from(coarse == 0 && exact != 0);
         }

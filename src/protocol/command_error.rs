@@ -5,7 +5,7 @@ use crate::curve::CurveError;
 use crate::drawing::PageError;
 use crate::fixed::{BinaryFraction, Length, Millimetres};
 use crate::machine::{MachineError, SettingError, Value};
-use crate::model::{ModelError, PEN_LIMIT, Part};
+use crate::model::{ElementKind, ModelError, PEN_LIMIT};
 use crate::order::Leg;
 use crate::stage::OutOfScratch;
 use crate::step::ArcError;
@@ -14,10 +14,10 @@ use core::fmt;
 
 /// A line that was not carried out; what was there before is untouched.
 ///
-/// [`Refusal::number`] is what `error:N` says; the text ([`fmt::Display`]) goes before it as a
+/// [`CommandError::number`] is what `error:N` says; the text ([`fmt::Display`]) goes before it as a
 /// message and says what to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Refusal {
+pub enum CommandError {
     /// No command begins like this.
     UnknownCommand,
     /// A number was expected.
@@ -91,7 +91,7 @@ pub enum Refusal {
     /// The user gave the job up while it was computed.
     Aborted,
     /// The flash does not keep it.
-    NotKept,
+    NotStored,
     /// No job is kept.
     NoJobKept,
     /// The kept job is counted in other steps.
@@ -168,7 +168,7 @@ pub const MEANINGS: &[(u16, &str)] = &[
     (172, "line without number and checksum"),
 ];
 
-impl Refusal {
+impl CommandError {
     /// The number in `error:N`; numbers below 100 mean what they mean in Grbl 1.1.
     pub const fn number(&self) -> u16 {
         match self {
@@ -227,7 +227,7 @@ impl Refusal {
             Self::Machine(MachineError::MoveTooLong { .. }) => 152,
             Self::DrawingTooLarge(_) => 140,
             Self::Aborted => 141,
-            Self::NotKept => 160,
+            Self::NotStored => 160,
             Self::NoJobKept => 161,
             Self::OtherSteps => 162,
             Self::Damaged => 170,
@@ -240,7 +240,7 @@ impl Refusal {
     }
 }
 
-impl fmt::Display for Refusal {
+impl fmt::Display for CommandError {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::UnknownCommand => formatter.write_str(
@@ -340,7 +340,7 @@ impl fmt::Display for Refusal {
                 formatter.write_str("only the last change can be taken back, and not after a plot")
             }
             Self::Aborted => formatter.write_str("the job was given up"),
-            Self::NotKept => formatter.write_str("in force until power is lost: the flash does not keep it"),
+            Self::NotStored => formatter.write_str("in force until power is lost: the flash does not keep it"),
             Self::NoJobKept => formatter.write_str("send a model and $plot; only boards with flash for it keep the job"),
             Self::OtherSteps => formatter.write_str("set $100 and $101 as they were, or $plot anew"),
             Self::Damaged => formatter.write_str("the line was damaged on its way: send it again"),
@@ -379,10 +379,10 @@ fn write_model_error(formatter: &mut fmt::Formatter<'_>, error: &ModelError) -> 
         ModelError::Curve(error) => write_curve_error(formatter, error),
         ModelError::UnknownElement { part, number, count } => {
             let name = match part {
-                Part::Vertices => "vertex",
-                Part::Bars => "bar",
-                Part::Faces => "face",
-                Part::Curves => "curve",
+                ElementKind::Vertices => "vertex",
+                ElementKind::Bars => "bar",
+                ElementKind::Faces => "face",
+                ElementKind::Curves => "curve",
             };
             write!(formatter, "there is no {name} {number}: the model has {count}")
         }

@@ -13,12 +13,12 @@ use crate::motion::{Move, PathLength, PushError};
 
 /// How the motors lie in their slack, once all blocks are run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct Slack {
+pub(super) struct Backlash {
     /// Steps until the motor takes the pen along if it turns up; `None` if that is not known.
     ahead: [Option<i32>; 2],
 }
 
-impl Slack {
+impl Backlash {
     /// The steps to take up before a move by (`dx`, `dy`) steps of motors that have `slack`; they are
     /// taken up from here on.
     fn take_up(&mut self, slack: [i32; 2], way: [i32; 2]) -> [i32; 2] {
@@ -118,7 +118,7 @@ mod tests {
 
     #[test]
     fn slack_is_taken_up_once_each_way() {
-        let mut slack = Slack::default();
+        let mut slack = Backlash::default();
         let mut take = |x, y| slack.take_up([10, 4], [x, y]);
         assert_eq!(take(5, 0), [0, 0]);
         assert_eq!(take(1, -7), [0, 0]);
@@ -129,7 +129,7 @@ mod tests {
 
     #[test]
     fn what_was_not_taken_up_is_taken_up_later() {
-        let mut slack = Slack::default();
+        let mut slack = Backlash::default();
         slack.take_up([10, 4], [1, 1]);
         assert_eq!(slack.take_up([10, 4], [-1, 1]), [-10, 0]);
         // 7 of the 10 steps were never made.

@@ -1,19 +1,19 @@
 //! How often a long computation looks up from its work.
 
-use crate::stage::{Aborted, Attention};
+use crate::stage::{Aborted, Cancel};
 
 /// Instructions between two looks, as near as the callers' estimates go (for thumbv6m).
 const BETWEEN_LOOKS: usize = 50_000;
 
 /// Counts work and gives attention when enough has been done.
-pub struct Pace<'t> {
-    attention: &'t mut dyn Attention,
+pub struct YieldCounter<'t> {
+    cancel: &'t mut dyn Cancel,
     done: usize,
 }
 
-impl<'t> Pace<'t> {
-    pub fn new(attention: &'t mut dyn Attention) -> Self {
-        Self { attention, done: 0 }
+impl<'t> YieldCounter<'t> {
+    pub fn new(cancel: &'t mut dyn Cancel) -> Self {
+        Self { cancel, done: 0 }
     }
 
     /// Notes that about so many instructions were spent.
@@ -24,6 +24,6 @@ impl<'t> Pace<'t> {
             return Ok(());
         }
         self.done = 0;
-        self.attention.check()
+        self.cancel.check()
     }
 }

@@ -4,33 +4,33 @@
 //! cell in square rings until nothing nearer can come.
 
 use super::network::Network;
-use super::pace::Pace;
+use super::work_budget::WorkBudget;
 use super::{NONE, OrderError};
 use crate::drawing::PagePoint;
 use crate::stage::{OutOfScratch, Scratch};
 
 /// For each station the same number of others, the nearest first.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Near<'a> {
+pub(super) struct Neighbours<'a> {
     stations: &'a [u16],
     per_station: usize,
 }
 
-impl<'a> Near<'a> {
+impl<'a> Neighbours<'a> {
     /// Finds up to `per_station` neighbours of each station, a quarter of them in each quadrant: what
     /// crowds on one side, as the ends of a hatching, must not hide what is on the other.
     pub fn new(
         network: Network<'_>,
         per_station: usize,
         scratch: &mut Scratch<'a>,
-        pace: &mut Pace<'_>,
+        work_budget: &mut WorkBudget<'_>,
     ) -> Result<Self, OrderError> {
         let stations = scratch.take(usize::from(network.stations()) * per_station)?;
         stations.fill(NONE);
         let mut lent = scratch.reborrow();
         let grid = Grid::new(network, &mut lent)?;
         for (station, near) in (0..).zip(stations.chunks_exact_mut(per_station)) {
-            grid.search(station, near, pace)?;
+            grid.search(station, near, work_budget)?;
         }
         Ok(Self { stations, per_station })
     }
@@ -132,7 +132,7 @@ impl<'s, 'a> Grid<'s, 'a> {
         &self,
         station: u16,
         near: &mut [u16],
-        pace: &mut Pace<'_>,
+        work_budget: &mut WorkBudget<'_>,
     ) -> Result<(), OrderError> {
         let place = self.network.place(station);
         let (column, row) = self.cell(place);
@@ -165,7 +165,7 @@ impl<'s, 'a> Grid<'s, 'a> {
                     [column - ring, column + ring].map(|side| self.stretch(line, side, side))
                 };
                 for &other in sides.into_iter().flatten().filter(|&&other| other != station) {
-                    pace.work(1)?;
+                    work_budget.work(1)?;
                     let there = self.network.place(other);
                     let quadrant =
                         2 * usize::from(there.y < place.y) + usize::from(there.x < place.x);

@@ -1,30 +1,30 @@
 //! What modellers leave behind: vertices at the same place made one, faces without an area left out.
 
 use crate::model::{Corner, Element, Elements, Model, PenWriter, Position};
-use crate::stage::{Attention, OutOfScratch, Scratch, StageError};
+use crate::stage::{Cancel, OutOfScratch, Scratch, StageError};
 
 /// The elements of the model with each vertex replaced by the first one at the same place, without the faces that
 /// have no area, and how many those are. The model's own elements if there is nothing to do. Other faces may
 /// come to have the same corner twice in a row; visibility lives with that.
 ///
 /// Memory: 2 bytes for each corner and 4 for each change of the pen if there is something to do; 4 to 8 for each vertex meanwhile.
-pub(super) fn tidy<'a>(
+pub(super) fn weld<'a>(
     model: &'a Model<'_>,
     scratch: &mut Scratch<'a>,
-    attention: &mut dyn Attention,
+    cancel: &mut dyn Cancel,
 ) -> Result<(Elements<'a>, u32), StageError> {
     let positions = model.vertices();
     let elements = model.elements();
     let degenerate = elements.iter().filter(|element| !has_extent(element, positions)).count();
-    attention.check()?;
+    cancel.check()?;
     if degenerate == 0 && Places::new(positions, &mut scratch.reborrow())?.1 == 0 {
         return Ok((elements, 0));
     }
     let corners: &mut [Corner] = scratch.take(elements.corners().len())?;
     let mut pens = PenWriter::new(scratch, elements.pens().changes())?;
-    attention.check()?;
+    cancel.check()?;
     let (places, _) = Places::new(positions, &mut scratch.reborrow())?;
-    attention.check()?;
+    cancel.check()?;
     let mut kept = 0;
     let with_extent =
         elements.iter_with_pens().filter(|(element, _)| has_extent(element, positions));
@@ -127,7 +127,7 @@ mod tests {
     use super::*;
     use crate::fixed::Decimal;
     use crate::model::unkept;
-    use crate::stage::Undisturbed;
+    use crate::stage::NeverCancel;
     use std::vec::Vec;
 
     fn decimals(place: [&str; 3]) -> [Decimal; 3] {
@@ -148,7 +148,7 @@ mod tests {
             }
         }
         let mut words = [0; 64];
-        let (elements, _) = tidy(&model, &mut Scratch::new(&mut words), &mut Undisturbed).unwrap();
+        let (elements, _) = weld(&model, &mut Scratch::new(&mut words), &mut NeverCancel).unwrap();
         elements.corners().iter().map(|c| (c.vertex(), c.of_bar(), c.is_last())).collect()
     }
 
@@ -187,11 +187,11 @@ mod tests {
         model.add_face([1, 2, 3].into_iter(), &mut unkept).unwrap();
         let mut words = [0; 2];
         let mut scratch = Scratch::new(&mut words);
-        let (elements, degenerate) = tidy(&model, &mut scratch, &mut Undisturbed).unwrap();
+        let (elements, degenerate) = weld(&model, &mut scratch, &mut NeverCancel).unwrap();
         assert_eq!(degenerate, 0);
         assert!(core::ptr::eq(elements.corners(), model.elements().corners()));
         assert_eq!(scratch.available_bytes(), 16);
-        assert!(tidy(&model, &mut Scratch::new(&mut [0]), &mut Undisturbed).is_err());
+        assert!(weld(&model, &mut Scratch::new(&mut [0]), &mut NeverCancel).is_err());
     }
 
     #[test]
