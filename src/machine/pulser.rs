@@ -218,7 +218,7 @@ impl<const N: usize> StepQueue<'_, N> {
         !self.ring.is_running()
     }
 
-    /// How many events were taken since [`StepQueue::follow`] was called.
+    /// How many events were taken since [`StepQueue::sync_consumed`] was called.
     pub fn taken(&self) -> usize {
         self.ring.taken_behind(self.counted) as usize
     }

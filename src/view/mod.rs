@@ -4,7 +4,7 @@
 //! in fixed point that takes every position to view coordinates within ±2^19. This rounding, once
 //! per vertex and view, is the only one before the page. Square roots and angles happen once per
 //! view, in `libm`, so every machine gets the same map. What lies behind the eye or level with it is
-//! cut off by [`see`], vertices at the same place become one. Refused: an eye at the point looked at, an up direction along the line of
+//! cut off by [`project_scene`], vertices at the same place become one. Refused: an eye at the point looked at, an up direction along the line of
 //! sight, a model wholly behind the eye.
 //!
 //! Sources: Harrison 2.2 and 2.3 (equations 1 to 10) and Brown IV (the view from two points).
