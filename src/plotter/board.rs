@@ -1,97 +1,110 @@
-//! What the plotter needs of a board.
+//! The interface between the plotter and a board.
+//!
+//! The plotter is the same for every board. A board implements [`Board`]: it receives and sends
+//! bytes, pulses the pins from a queue of step events, and may keep records in flash.
 
 use crate::machine::Contacts;
 use crate::motion::EventQueue;
 use crate::protocol::RealTime;
 
-/// A board: a serial line, and the interrupt that turns step events into pin levels.
+/// A board: its serial ports, and the interrupt that turns step events into pin levels.
 pub trait Board {
-    /// Its name, as `$I` tells it.
+    /// The board's name, which `$I` reports.
     const NAME: &'static str;
 
-    /// Whether it can become a drive that takes a new image.
+    /// Whether the board can become a USB drive onto which a new firmware image is copied.
     const HAS_DRIVE: bool = false;
 
-    /// The next ordinary byte, and the number of the serial port that received it, from 0; none
-    /// while an abort waits in [`Board::take_real_time`]. Where bytes were lost or damaged, it is
-    /// [`DAMAGED`](crate::protocol::DAMAGED). A port's bytes are those of its lines, whatever
-    /// comes by others meanwhile.
+    /// The next ordinary byte, with the number of the serial port that received it, counted from 0.
+    ///
+    /// Returns `None` while an abort waits in [`Board::take_real_time`]. Where bytes were lost or
+    /// damaged, the byte is [`DAMAGED`](crate::protocol::DAMAGED). Each port has its own lines:
+    /// bytes from other ports never become part of them.
     fn read_byte(&mut self) -> Option<(usize, u8)>;
-    /// What was asked in real time since last taken.
+    /// Takes the real-time requests received since the last call.
     fn take_real_time(&mut self) -> RealTime;
-    /// Whether so many bytes, [`REPLY_BYTES`] at most, can be sent without blocking. There will be
-    /// room in a while, whatever becomes of who listens.
+    /// Whether `bytes` bytes can be sent without blocking. Callers ask for [`REPLY_BYTES`] at most.
+    /// The board must make room after some time even if nobody reads from it.
     fn has_room(&mut self, bytes: usize) -> bool {
         let _ = bytes;
         true
     }
-    /// Sends bytes; blocks while there is no room.
+    /// Sends bytes. Blocks while there is no room for them.
     fn write(&mut self, bytes: &[u8]);
-    /// Whether a program has opened a port since last asked: it is greeted there alone.
+    /// Whether a program has opened a port since the last call. The greeting then goes to that port
+    /// alone.
     fn take_opened(&mut self) -> bool {
         false
     }
-    /// What is written from now on goes to the port opened last alone, or again to all.
+    /// Chooses where replies go from now on: if `is_aside`, only to the port that was opened last,
+    /// else to all ports again.
     fn speak_aside(&mut self, is_aside: bool) {
         let _ = is_aside;
     }
-    /// Whether the host has asked for that drive since last asked, by other means than the command.
+    /// Whether the host has asked for the drive since the last call, in another way than by
+    /// command.
     fn wants_drive(&mut self) -> bool {
         false
     }
-    /// Becomes that drive, if there is one: pen up, drivers off. What was written is sent before.
+    /// Becomes the USB drive, if the board has one. It first sends what was written; it then raises
+    /// the pen and switches the motor drivers off.
     fn show_drive(&mut self) {}
-    /// Where step events go. They begin when the queue is half full, or at [`Board::wait`].
+    /// The queue for step events. The board begins to execute them when the queue is half full, or
+    /// at the next [`Board::wait`].
     fn queue(&mut self) -> &mut dyn EventQueue;
-    /// Which contacts are closed; none where there are none. A change ends [`Board::wait`].
+    /// The contacts that are closed. A board without contacts reports none. A change ends
+    /// [`Board::wait`].
     fn contacts(&mut self) -> Contacts {
         Contacts::default()
     }
-    /// Runs the step interrupt as soon as no pulse is high, although its time has not come: the pins
-    /// were halted.
+    /// Runs the step interrupt early, as soon as no pulse is high. It is called after an alarm has
+    /// halted the pins, so that they stop at once.
     fn step_now(&mut self) {}
-    /// What ended the program before, if that was a fault after which the board has started again
-    /// by itself.
+    /// The message of the fault that ended the previous run, if the board has restarted itself
+    /// after a fault.
     fn fault(&self) -> Option<&str> {
         None
     }
-    /// Keeps what `parts` hold, one after the other, through a loss of power: as the new state of
-    /// `record`, in place of the last one. May block, so only while the machine stands.
+    /// Writes the concatenation of `parts` to flash as the new state of `record`, in place of the
+    /// last one. The state survives a loss of power. The call may block, so it is only made while
+    /// the machine is stopped.
     ///
     /// # Errors
-    /// The last state is still kept.
+    /// [`NotStored`] if the flash does not take it; the last state is still kept.
     fn save(&mut self, record: Record, parts: &[&[u8]]) -> Result<(), NotStored> {
         let _ = (record, parts);
         Ok(())
     }
-    /// Hands the kept state of `record` to `take`, if there is one.
+    /// Passes the kept state of `record` to `take`, if there is one.
     fn load(&mut self, record: Record, take: &mut dyn FnMut(&mut dyn Stored)) {
         let _ = (record, take);
     }
-    /// Sleeps until an interrupt; returns at once if one came since it last returned.
+    /// Sleeps until an interrupt. Returns at once if an interrupt came since the last return.
     fn wait(&mut self);
 }
 
-/// No row of a list is longer, nor all that is told of one line which is no list.
+/// The upper limit, in bytes, of one row of a list, and of the whole reply to a line that is not a
+/// list.
 pub const REPLY_BYTES: usize = 512;
 
-/// What a board with flash keeps through a loss of power.
+/// A record that a board with flash keeps through a loss of power.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Record {
     /// The settings of the machine.
     Settings,
-    /// The strokes of the last job in the order in which they are drawn, and the steps per millimetre
-    /// that they are counted in. Neither the model nor the options are kept.
+    /// The strokes of the last job in drawing order, and the steps per millimetre in which they are
+    /// measured. The model and the options are not kept.
     Job,
 }
 
-/// The board cannot keep something.
+/// The board could not keep a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NotStored;
 
-/// A kept state, from its beginning on.
+/// A kept state of a record, read from its beginning on.
 pub trait Stored {
-    /// The next bytes, as many as there are and `into` holds; says how many.
+    /// Copies the next bytes to the front of `into`, as many as are left and fit. Returns their
+    /// number.
     fn read(&mut self, into: &mut [u8]) -> usize;
 }
 

@@ -1,4 +1,7 @@
-//! What each stage of a job takes of a board's working memory, checked when the library is compiled.
+//! The memory budget of each board, checked at compile time.
+//!
+//! For the largest scene that a board must be able to draw, a [`Budget`] adds up what the stages of
+//! a job need. The library does not compile if that exceeds the board's working memory.
 
 use super::memory::{Lm3s6965Memory, Memory, PicoMemory};
 use crate::drawing::{PackedLine, PagePoint, Segment};
@@ -8,45 +11,47 @@ use crate::stage::Scratch;
 use crate::visibility;
 use core::marker::PhantomData;
 
-/// The largest scene that a board must hold, and what comes of it.
+/// The largest scene that a board must be able to draw, and the size of the drawing that results
+/// from it.
 #[derive(Debug, Clone, Copy)]
 pub struct Scene {
-    /// Its vertices.
+    /// Number of vertices of the model.
     pub vertices: usize,
-    /// Corners of its faces.
+    /// Number of corners of all faces together.
     pub corners: usize,
-    /// Its faces, each cut by a fan.
+    /// Number of faces; each is triangulated as a fan.
     pub faces: usize,
-    /// Lines of its drawing, hidden ones erased.
+    /// Number of lines of the drawing, with hidden lines erased.
     pub lines: usize,
-    /// Odd points for which the pen-up moves are the best there are.
+    /// Number of odd points (of odd degree) of a drawing for which the exact matching must still
+    /// fit.
     pub odd_points: usize,
 }
 
-/// What a board has, and what its largest scene takes, in bytes.
+/// The capacities of a board, and the memory in bytes that its largest scene needs.
 #[derive(Debug, Clone, Copy)]
 pub struct Budget {
     /// The board's name.
     pub board: &'static str,
-    /// Vertices that the model can have.
+    /// Number of vertices that the model can hold.
     pub vertex_limit: usize,
-    /// Corners of faces and ends of bars that the model can have.
+    /// Number of face corners and bar ends that the model can hold.
     pub corner_limit: usize,
-    /// All of the model.
+    /// Size of the model's memory, in bytes.
     pub model: usize,
-    /// All of the working memory, which the stages use one after the other.
+    /// Size of the working memory, in bytes. The stages use it one after the other.
     pub working: usize,
-    /// Vertices in view coordinates: stay while hidden lines are found.
+    /// Bytes for the vertices in view coordinates. They are held while hidden lines are found.
     pub view: usize,
-    /// The least with which hidden lines are found; what is left makes it faster.
+    /// The fewest bytes with which hidden lines can be found. More memory makes the search faster.
     pub visibility: usize,
-    /// Lines as they are found.
+    /// Bytes for the lines that the search finds.
     pub lines: usize,
-    /// The drawing on the page: stays until it is drawn.
+    /// Bytes for the drawing on the page. It is held until it has been drawn.
     pub drawing: usize,
-    /// The order of its strokes: stays, too.
+    /// Bytes for the order of the strokes. It is held until the drawing has been drawn, too.
     pub tour: usize,
-    /// The exact matching of the odd points.
+    /// Bytes for the exact matching of the odd points.
     pub matching: usize,
 }
 
@@ -70,7 +75,7 @@ impl Budget {
             view: Scratch::bytes_for::<Vertex>(scene.vertices),
             visibility: visibility::least_bytes(scene.vertices, scene.corners, scene.faces),
             lines: Scratch::bytes_for::<PackedLine>(scene.lines),
-            // A line has at most two points of its own.
+            // A line adds at most two new points.
             drawing: Scratch::bytes_for::<Segment>(scene.lines)
                 + Scratch::bytes_for::<PagePoint>(2 * scene.lines),
             tour: Scratch::bytes_for::<Leg>(scene.lines),
@@ -85,7 +90,7 @@ impl Budget {
     }
 }
 
-/// Every board's.
+/// The budgets of all boards.
 pub const BUDGETS: [Budget; 2] = [
     Budget::new(
         "lm3s6965",

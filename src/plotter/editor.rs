@@ -1,4 +1,7 @@
-//! Changes of the model over the line, listed and taken back.
+//! The commands that edit the model: `$list`, `$undo`, and edits such as `$move`.
+//!
+//! Before a change, a copy of the model is saved at the front of the working memory, if it fits.
+//! `$undo` restores that copy.
 
 use super::stream::{Listing, Task};
 use super::{Board, Inner, Job, Reply};
@@ -9,17 +12,22 @@ use crate::protocol::CommandError;
 use crate::stage::Scratch;
 use core::fmt;
 
-/// Keeps a copy of the model, where there is room for one.
+/// Saves the copy of the model that `$undo` restores.
 pub(super) struct Keeper<'k> {
+    /// The front of the working memory, where the copy goes.
     words: &'k mut [u64],
+    /// Length of the copy in words; 0 if there is none.
     kept_words: &'k mut usize,
+    /// The last job; its memory is given up to the copy.
     job: &'k mut Job,
+    /// Whether the machine is idle. Otherwise the job may still be drawing, and no copy is made.
     is_idle: bool,
 }
 
 impl Keeper<'_> {
-    /// Copies the model in place of the last copy: it is about to change.
-    #[inline(never)] // Once is enough.
+    /// Saves `model`, which is about to change, in place of the last copy. Keeps no copy if it does
+    /// not fit or the machine is not idle.
+    #[inline(never)] // Several callers share one copy of the code.
     pub(super) fn save(&mut self, model: &Model<'_>) {
         *self.kept_words = 0;
         if self.is_idle {
@@ -32,9 +40,11 @@ impl Keeper<'_> {
 }
 
 impl<'m> Inner<'m> {
-    /// The model, and who keeps a copy of it at the front of the working memory, which `edit` may use only behind.
+    /// Borrows the model, the keeper of its copy, and the working memory behind the copy, which an
+    /// edit may use.
     pub(super) fn split(&mut self) -> (&mut Model<'m>, Keeper<'_>, Scratch<'_>) {
-        // A change that is refused must leave the last copy.
+        // A refused change must not overwrite the last copy, so room is left for the longer of
+        // both.
         let next = Some(self.model.saved_words()).filter(|words| *words <= self.words.len());
         let copies = self.kept_words.max(next.unwrap_or(0));
         let (words, free) = self.words.split_at_mut(copies.min(self.words.len()));
@@ -44,7 +54,7 @@ impl<'m> Inner<'m> {
         (&mut self.model, keeper, Scratch::new(free))
     }
 
-    #[inline(never)] // Its frame must not lie under the stages'.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub(super) fn edit<B: Board>(&mut self, edit: Edit, board: &mut B) -> Result<(), CommandError> {
         if self.machine.state() != State::Idle {
             return Err(CommandError::Busy);
@@ -65,7 +75,7 @@ impl<'m> Inner<'m> {
         }
     }
 
-    #[inline(never)] // Its frame must not lie under the stages'.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub(super) fn undo(&mut self) -> Result<(), CommandError> {
         if core::mem::take(&mut self.kept_words) == 0 {
             return Err(CommandError::NothingToUndo);
@@ -74,7 +84,7 @@ impl<'m> Inner<'m> {
         Ok(())
     }
 
-    /// Begins to list what has these numbers.
+    /// Begins to list the elements of one kind that have these numbers.
     pub(super) fn begin_list(
         &mut self,
         part: ElementKind,
@@ -85,8 +95,8 @@ impl<'m> Inner<'m> {
         Ok(())
     }
 
-    /// Lists the element at a place in its array.
-    #[inline(never)] // Its frame must not lie under the stages'.
+    /// Writes the row of the element at index `at` among those of its kind.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub(super) fn list_one<B: Board>(&self, part: ElementKind, at: usize, board: &mut B) {
         let mut reply = Reply(board);
         let number = at + 1;
@@ -122,7 +132,7 @@ impl<'m> Inner<'m> {
     }
 }
 
-/// Numbers from 1, each after a space.
+/// Indices from 0, shown as numbers from 1 with a space before each.
 struct List<I>(I);
 
 impl<I: Iterator<Item = u16> + Clone> fmt::Display for List<I> {

@@ -1,4 +1,8 @@
-//! From the model to ordered strokes: the way of the data, in one place.
+//! Computes a job: from the model to ordered strokes.
+//!
+//! [`Job::compute`] runs the stages one after the other. It projects the model, finds the visible
+//! lines, maps them to the page, adds the title, builds the graph of the drawing and orders its
+//! strokes. All of them share one working memory, which then holds the job.
 
 use super::{PlotOptions, plan, solid, title};
 use crate::drawing::{
@@ -14,19 +18,21 @@ use crate::stage::{Aborted, Cancel, OutOfScratch, Scratch, Stage, StageError, it
 use crate::view::{Camera, Flattening, Seen, View, project_scene};
 use crate::visibility::{self, Scene, SinkFull, Stretch, StretchSink, Unrounded, VisibilityError};
 
-/// Who is shown each stretch as it is found, in view coordinates: the preview.
+/// Receives each stretch as soon as it is found, in view coordinates. A preview is drawn with it.
 pub trait Observer {
-    /// One stretch, seen through `view`.
+    /// A stretch, as seen through `view`.
     fn stretch(&mut self, view: &View, stretch: &Stretch);
 
-    /// What was shown so far counts no more: the job begins again in other memory.
+    /// Everything shown so far is void, because the search begins again with another division of
+    /// the memory.
     fn start_again(&mut self) {}
 
-    /// One bar of a plan, as it lies on the page, and its pen, from 0.
+    /// A bar of a plan from `from` to `to`, in the plan's own coordinates, and its pen, counted
+    /// from 0.
     fn plan_bar(&mut self, from: [f64; 2], to: [f64; 2], pen: u8);
 }
 
-/// Nobody looks on.
+/// An observer that ignores everything.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Unobserved;
 
@@ -35,21 +41,27 @@ impl Observer for Unobserved {
     fn plan_bar(&mut self, _: [f64; 2], _: [f64; 2], _: u8) {}
 }
 
-/// A drawing in the working memory with the order of its strokes.
+/// A drawing and the order of its strokes, both of which lie in the working memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Job {
+    /// Where the drawing lies in the working memory.
     stored: Stored,
+    /// Number of legs of the tour; they lie behind the drawing.
     legs: usize,
+    /// Result of the ordering.
     report: order::Report,
+    /// Number of faces that were left out because they have no area.
     degenerate_faces: u32,
+    /// Number of edges of a convex solid that were left out because the faces beside them may be
+    /// coplanar.
     joined_edges: usize,
 }
 
 impl Job {
-    /// Computes the job for `model` in `words`, which then hold it.
+    /// Computes the job for `model`. `words` is the working memory, which then holds the job.
     ///
     /// # Errors
-    /// The [`CommandError`] to reply with; `words` hold no job then, the model is untouched.
+    /// The [`CommandError`] to reply with. `words` then hold no job; the model is unchanged.
     pub fn compute(
         model: &Model<'_>,
         options: &PlotOptions,
@@ -96,12 +108,12 @@ impl Job {
         Ok(Self { stored, legs, report, degenerate_faces, joined_edges })
     }
 
-    /// How many words of its memory hold it.
+    /// Number of words of the working memory that the job occupies.
     pub(super) fn words(&self) -> usize {
         (self.stored.bytes() + Scratch::bytes_for::<Leg>(self.legs)) / size_of::<u64>()
     }
 
-    /// All of it but its memory, as numbers: see [`Job::from_figures`].
+    /// The job without its memory, as numbers. [`Job::from_figures`] reads them.
     pub(super) fn figures(&self) -> [u32; Self::FIGURES] {
         let [segments, points] = self.stored.counts().map(|count| count as u32);
         let report = &self.report;
@@ -124,11 +136,11 @@ impl Job {
         ]
     }
 
-    /// How many numbers it takes.
+    /// Number of the figures of a job.
     pub(super) const FIGURES: usize = 13;
 
-    /// The job that these numbers stand for; `None` if its memory would be larger than any. No number
-    /// makes [`Job::strokes`] leave its memory.
+    /// The job with these figures, or `None` if its memory would be larger than any board's.
+    /// Whatever the figures are, [`Job::strokes`] stays within its memory.
     pub(super) fn from_figures(figures: [u32; Self::FIGURES]) -> Option<Self> {
         let [segments, points, legs, odd_points, components, lifts, optimal, lengths @ ..] =
             figures;
@@ -152,29 +164,30 @@ impl Job {
         })
     }
 
-    /// Gives its memory up; what came of the order stays.
+    /// Gives up the memory of the job. [`Job::report`] remains valid.
     pub fn release(&mut self) {
         (self.stored, self.legs) = (Stored::default(), 0);
     }
 
-    /// What came of the order.
+    /// The result of the ordering: number of pen lifts, lengths, and whether it is proved optimal.
     pub fn report(&self) -> &order::Report {
         &self.report
     }
 
-    /// Faces of the model that were left out because they have no area.
+    /// Number of faces of the model that were left out because they have no area.
     pub fn degenerate_faces(&self) -> u32 {
         self.degenerate_faces
     }
 
-    /// Edges of a convex solid that were left out because the faces beside them may be one.
+    /// Number of edges of a convex solid that were left out because the faces beside them may be
+    /// coplanar.
     pub fn joined_edges(&self) -> usize {
         self.joined_edges
     }
 
-    /// The strokes, from `cursor` on. `words` are those that hold the job.
+    /// The strokes from `cursor` on. `words` is the working memory that holds the job.
     pub fn strokes<'a>(&self, words: &'a mut [u64], cursor: &'a mut Cursor) -> Strokes<'a> {
-        // The memory is the one that `compute` filled, so both reads succeed; else there is no stroke.
+        // `compute` filled this memory, so both reads succeed. Otherwise there are no strokes.
         let nothing = Drawing { points: &[], segments: &[] };
         let leg_words = self.stored.bytes() / size_of::<u64>();
         let words: &'a [u64] = words;
@@ -185,16 +198,19 @@ impl Job {
     }
 }
 
-/// How far the strokes of a job have been handed to the machine.
+/// Position in the strokes of a job: how far they have been handed to the machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Cursor {
+    /// Index of the leg that is being handed over.
     leg: usize,
+    /// Number of the point at which the pen is, if any.
     at: Option<u16>,
+    /// The pen of that leg, from 0.
     pen: u8,
 }
 
-/// The strokes of a job as the machine asks for them: a pen-up move wherever a leg does not begin
-/// where the one before ended.
+/// The strokes of a job, as the [`Path`] that the machine follows. A pen-up move is inserted
+/// wherever a leg does not begin where the previous one ended.
 #[derive(Debug)]
 pub struct Strokes<'a> {
     drawing: Drawing<'a>,
@@ -226,25 +242,32 @@ impl Path for Strokes<'_> {
     }
 }
 
-/// How far the chords of a curve may stray from it: half a step, in 1/256 step.
+/// Tolerance for the chords of a curve on the page, in 1/256 step: half a step.
 pub(super) const HALF_A_STEP: u16 = 128;
-/// Finer, where only the bounds of curves are sought, before the scale of the page is known.
+/// A finer tolerance, used to find the bounds of curves before the scale of the page is known.
 pub(super) const FOR_BOUNDS: u16 = 32;
 
-/// These take some 100,000 instructions.
+/// Corners handled between two checks for cancelling: some 100,000 instructions.
 const CORNERS_BETWEEN_CHECKS: usize = 128;
 
-/// Of lines for each corner: a lattice of cubes shows half of its edges, and has two corners to an edge.
+/// Expected bytes of lines for each corner. A lattice of cubes shows half of its edges and has two
+/// corners per edge.
 const LIKELY_BYTES: usize = size_of::<PackedLine>() / 3;
 
-/// What stands in the memory after the hidden lines are found.
+/// The result of the search for hidden lines.
 struct Found {
+    /// Number of lines at the front of the working memory.
     lines: usize,
+    /// Number of faces left out because they have no area.
     degenerate_faces: u32,
 }
 
-/// Looks at the model through the camera that the options choose.
-#[inline(never)] // Its frame must not lie under the stages'.
+/// The camera that the options choose, and the view of the model through it.
+///
+/// # Errors
+/// [`CommandError::NothingToPlot`] if there is no vertex, [`CommandError::View`] if the camera
+/// cannot show the model, [`CommandError::Aborted`].
+#[inline(never)] // Keeps its frame off the stack while the stages run.
 pub(super) fn camera_view(
     model: &Model<'_>,
     options: &PlotOptions,
@@ -261,7 +284,8 @@ pub(super) fn camera_view(
     Ok((camera, view))
 }
 
-/// Anything else: through the camera, hidden lines found.
+/// Projects the model through the camera and finds its visible lines. Handles every model that is
+/// neither a flat plan nor a convex solid without faces.
 fn project(
     model: &Model<'_>,
     options: &PlotOptions,
@@ -298,9 +322,11 @@ fn project(
     let positions = bytemuck::cast_slice(model.vertices());
     let unrounded = Unrounded::new(positions, precision, view.doubt(precision.written));
     let scene = Scene { vertices, elements, projection, unrounded };
-    // Memory: what is taken, then visibility's, then the lines as they are found. Thrice what visibility
-    // needs makes a grid as fine as is of any use; lines that are likely come before that. If
-    // there turn out to be more, less and less of what is to spare must do for the grid.
+    // The memory is divided into three parts: what is already taken, the memory of the visibility
+    // stage, and the lines that it finds. Beyond its minimum, up to three times as much again makes
+    // that stage's grid usefully finer. Memory for the expected number of lines takes precedence
+    // over this. If the lines still do not fit, the search is repeated with ever less memory for
+    // the grid.
     let available = scratch.available_bytes();
     let needed = visibility::scratch_bytes(&scene);
     let spare = available.checked_sub(needed).ok_or(OutOfScratch { needed, available });
@@ -337,14 +363,14 @@ fn project(
     Ok(Found { lines, degenerate_faces })
 }
 
-/// Around all that is drawn of the elements.
+/// The bounds of all elements on the view plane; `None` if there are none.
 fn bounds_of(
     vertices: &[Vertex],
     elements: Elements<'_>,
     projection: Projection,
     cancel: &mut dyn Cancel,
 ) -> Result<Option<Bounds>, Aborted> {
-    // Two divisions a corner: some at a time, so that the line is answered.
+    // Each corner costs two divisions, so the check for cancelling comes after some of them.
     let mut bounds: Option<Bounds> = None;
     for corners in elements.corners().chunks(CORNERS_BETWEEN_CHECKS) {
         cancel.check()?;
@@ -354,8 +380,8 @@ fn bounds_of(
     Ok(bounds)
 }
 
-/// Fits all that is drawn of elements and curves to the page, not the control points.
-#[inline(never)] // Its frame must not lie under the stages'.
+/// Fits elements and curves to the page. The curves' control points do not count, only the chords.
+#[inline(never)] // Keeps its frame off the stack while the stages run.
 fn map_with_curves(
     view: &View,
     model: &Model<'_>,
@@ -390,7 +416,8 @@ fn map_with_curves(
     fit(view, is_cut, &bounds, options, steps)
 }
 
-/// Fits what is seen to the page; with an eye among it, what is within 45 degrees of the line of sight.
+/// Fits the view to the page. If the near plane cuts the model, only what lies within 45 degrees of
+/// the line of sight is fitted.
 fn fit(
     view: &View,
     is_cut: bool,
@@ -412,14 +439,14 @@ fn refused(error: VisibilityError, corners: usize) -> CommandError {
         VisibilityError::TooManyCorners(limit) => {
             CommandError::Model(ModelError::TooManyCorners { limit, needed: corners })
         }
-        // The model and the view see to it that neither of the first two can be; the sink speaks for itself.
+        // The model and the view exclude the first two errors; the caller handles the third.
         VisibilityError::UnknownVertex(_)
         | VisibilityError::OutOfRange(_)
         | VisibilityError::SinkFull => CommandError::NothingToPlot,
     }
 }
 
-/// The bounds of both.
+/// The union of both bounds, where either may be missing.
 pub(super) fn grow(bounds: Option<Bounds>, more: Option<Bounds>) -> Option<Bounds> {
     bounds.zip(more).map(|(a, b)| a.union(b)).or(bounds).or(more)
 }
@@ -460,15 +487,16 @@ impl From<OrderError> for CommandError {
             OrderError::Scratch(missing) => Self::DrawingTooLarge(missing),
             OrderError::Aborted => Self::Aborted,
             OrderError::TooManySegments => Self::TooManyLines,
-            // Of a drawing that `organise` made neither can be.
+            // A drawing made by `build_graph` causes neither error.
             OrderError::TourLength | OrderError::BadSegment(_) => Self::TooManyLines,
         }
     }
 }
 
-/// Packs lines at the front of the memory.
+/// Collects lines, packed, at the front of the memory. Lines without length are dropped.
 pub(super) struct Collector<'a> {
     lines: &'a mut [PackedLine],
+    /// Number of lines collected so far.
     pub(super) count: usize,
 }
 
@@ -496,7 +524,7 @@ impl<'a> Collector<'a> {
     }
 }
 
-/// Puts each stretch on the page.
+/// Maps each stretch that is to be drawn to the page and collects it as a line.
 pub(super) struct PageSink<'a> {
     pub(super) collector: Collector<'a>,
     pub(super) map: &'a PageMap,
@@ -508,7 +536,7 @@ pub(super) struct PageSink<'a> {
 impl StretchSink for PageSink<'_> {
     fn stretch(&mut self, stretch: Stretch) -> Result<(), SinkFull> {
         let (p, q) = stretch.ends;
-        // The cut along the near plane is no edge of the model.
+        // The intersection of a face with the near plane is not an edge of the model.
         let is_cut = |near| p.z == near && q.z == near && stretch.edge.is_some();
         if self.view.near().is_some_and(is_cut) {
             return Ok(());

@@ -8,7 +8,7 @@ use crate::protocol::CommandError;
 const SETTING_BYTES: usize = 6;
 
 /// The settings as they were kept, else the defaults.
-#[inline(never)] // Its frame must not lie under the stages'.
+#[inline(never)] // Keeps its frame off the stack while the stages run.
 pub(super) fn settings<B: Board>(board: &mut B) -> Settings {
     let mut values = heapless::Vec::<(u16, Value), SETTING_COUNT>::new();
     board.load(Record::Settings, &mut |kept| {
@@ -27,7 +27,7 @@ pub(super) fn settings<B: Board>(board: &mut B) -> Settings {
 ///
 /// # Errors
 /// [`CommandError::NotStored`]: they are in force, but those before will be after a loss of power.
-#[inline(never)] // Its frame must not lie under the stages'.
+#[inline(never)] // Keeps its frame off the stack while the stages run.
 pub(super) fn keep_settings<B: Board>(
     settings: &Settings,
     board: &mut B,
@@ -55,7 +55,7 @@ fn steps(settings: &Settings) -> [u32; 2] {
 ///
 /// # Errors
 /// [`NotStored`]: the job before still is.
-#[inline(never)] // Its frame must not lie under the stages'.
+#[inline(never)] // Keeps its frame off the stack while the stages run.
 pub(super) fn keep_job<B: Board>(
     job: &Job,
     settings: &Settings,
@@ -76,7 +76,7 @@ pub(super) fn keep_job<B: Board>(
 ///
 /// # Errors
 /// [`CommandError::NoJobKept`], [`CommandError::OtherSteps`]; `words` hold no job then.
-#[inline(never)] // Its frame must not lie under the stages'.
+#[inline(never)] // Keeps its frame off the stack while the stages run.
 pub(super) fn job<B: Board>(
     settings: &Settings,
     words: &mut [u64],

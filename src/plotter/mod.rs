@@ -197,7 +197,7 @@ impl<'m> Plotter<'m> {
         true
     }
 
-    #[inline(never)] // Its frame must not lie under the stages'.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
     fn answer<B: Board>(&mut self, outcome: Result<(), CommandError>, board: &mut B) {
         if let Some(numbering) = self.numberings.get_mut(self.port) {
             numbering.note(self.label, outcome);
@@ -274,7 +274,7 @@ impl<'m> Plotter<'m> {
 
 impl Inner<'_> {
     /// Keeps the step queue full. Whether the machine still has something to plan.
-    #[inline(never)] // Its frame must not lie under the stages'.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
     fn plan<B: Board>(&mut self, board: &mut B) -> bool {
         let before = self.machine.planned_position();
         let mut strokes = self.job.strokes(self.words, &mut self.cursor);
@@ -291,7 +291,7 @@ impl Inner<'_> {
         is_over && self.machine.is_stopped()
     }
 
-    #[inline(never)] // Its frame must not lie under the stages'.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
     fn carry_out<B: Board>(&mut self, line: &str, board: &mut B) -> Result<Next, CommandError> {
         let command = Command::parse(line)?;
         let one_pen = self.options.one_pen;
@@ -352,7 +352,7 @@ impl Inner<'_> {
         Ok(Next::Nothing)
     }
 
-    #[inline(never)] // Its frame must not lie under the stages'.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
     fn plot<B: Board>(&mut self, board: &mut B, again: bool) -> Result<(), CommandError> {
         if !matches!(self.machine.state(), State::Idle | State::Check) {
             return Err(match self.machine.state() {
@@ -380,7 +380,7 @@ impl Inner<'_> {
     }
 
     /// Keeps the job, before anything moves: flash cannot be read meanwhile.
-    #[inline(never)] // Its frame must not lie under the stages'.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
     fn save<B: Board>(&self, board: &mut B) {
         if kept::keep_job(&self.job, self.machine.settings(), self.words, board).is_err() {
             Reply(board)
@@ -389,7 +389,7 @@ impl Inner<'_> {
     }
 
     /// Takes the kept job in place of the last one.
-    #[inline(never)] // Its frame must not lie under the stages'.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
     fn load<B: Board>(&mut self, board: &mut B) -> Result<(), CommandError> {
         self.kept_words = 0;
         self.job = Job::default();
@@ -399,7 +399,7 @@ impl Inner<'_> {
     }
 
     /// Hands the job to the machine, which measures it first.
-    #[inline(never)] // Its frame must not lie under the stages'.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
     fn begin(&mut self, cancel: &mut dyn Cancel) -> Result<(), CommandError> {
         let strokes = self.job.strokes(self.words, &mut self.cursor);
         let mut strokes = MeasuredStrokes { strokes, cancel, targets: 0, given_up: false };
@@ -429,7 +429,7 @@ impl Inner<'_> {
         Ok(())
     }
 
-    #[inline(never)] // Its frame must not lie under the stages'.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
     fn change_setting(&mut self, name: &str, value: &str) -> Result<(), CommandError> {
         let setting = name
             .parse()

@@ -119,7 +119,7 @@ impl PlotOptions {
     ///
     /// # Errors
     /// [`CommandError::TitleTooLong`]; the title is as it was.
-    #[inline(never)] // Its frame must not lie under the stages'.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub fn set_title(&mut self, text: EscapedText<'_>) -> Result<(), CommandError> {
         let limit = TitleText::LIMIT;
         self.title = TitleText::new(text.letters()).ok_or(CommandError::TitleTooLong { limit })?;
@@ -134,7 +134,7 @@ impl PlotOptions {
     }
 
     /// The sheet with the room for the title.
-    #[inline(never)] // Its frame must not lie under the stages'.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub fn sheet(&self) -> Page {
         let foot = self.title().map(|title| title.rise() + title.depth());
         Page { foot: foot.unwrap_or_default(), ..self.page }
@@ -163,7 +163,7 @@ impl PlotOptions {
     }
 
     /// The camera for `model`; what the user did not choose is chosen here. `None` without vertices.
-    #[inline(never)] // Its frame must not lie under the stages'.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub fn camera(&self, model: &Model<'_>) -> Option<Camera> {
         let lens = match self.projection {
             ProjectionChoice::Axonometric { azimuth, elevation } => {
@@ -182,7 +182,7 @@ impl PlotOptions {
     }
 
     /// What visibility is to find through `view`.
-    #[inline(never)] // Its frame must not lie under the stages'.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub fn visibility(&self, view: &View) -> visibility::Options {
         let crease = (self.crease > 0.0).then(|| Crease {
             cosine: libm::round(sin_cos_degrees(self.crease).1 * 32768.0) as i32,
@@ -198,7 +198,7 @@ impl PlotOptions {
     }
 
     /// The CRC-32 of what `$options` lists: its lines, each with a line feed.
-    #[inline(never)] // Its frame must not lie under the stages'.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub fn checksum(&self) -> u32 {
         let mut sum = Sum(CRC_32.digest());
         self.list(|line| {
@@ -209,7 +209,7 @@ impl PlotOptions {
     }
 
     /// What stands for each option that is set, as `$options` lists it.
-    #[inline(never)] // Its frame must not lie under the stages'.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub fn list(&self, mut line: impl FnMut(core::fmt::Arguments<'_>)) {
         let places = [("eye", self.eye), ("at", self.at), ("up", self.up), ("angles", self.angles)];
         for (name, place) in places {

@@ -10,7 +10,7 @@ use crate::stage::Cancel;
 use crate::visibility::SinkFull;
 
 /// Packs the lines of the plan at the front of `words`. Returns how many.
-#[inline(never)] // Its frame must not lie under the other stages'.
+#[inline(never)] // Keeps its frame off the stack while the stages run.
 pub(super) fn lay_out(
     model: &Model<'_>,
     options: &PlotOptions,

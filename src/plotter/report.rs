@@ -15,7 +15,7 @@ pub(super) fn greet<B: Board>(board: &mut B) {
 
 /// Greets a program that has opened a port, there alone, and tells it of an alarm that others have
 /// heard of.
-#[inline(never)] // Its frame must not lie under the stages'.
+#[inline(never)] // Keeps its frame off the stack while the stages run.
 pub(super) fn greet_opened<B: Board>(state: State, board: &mut B) {
     if !board.take_opened() {
         return;
@@ -32,7 +32,7 @@ pub(super) fn greet_opened<B: Board>(state: State, board: &mut B) {
 }
 
 /// What ended the program before, if it was a fault.
-#[inline(never)] // Its frame must not lie under the stages'.
+#[inline(never)] // Keeps its frame off the stack while the stages run.
 pub(super) fn fault<B: Board>(board: &mut B) {
     // The board has cut longer messages.
     let mut text = heapless::String::<192>::new();
@@ -43,7 +43,7 @@ pub(super) fn fault<B: Board>(board: &mut B) {
 }
 
 impl Inner<'_> {
-    #[inline(never)] // Its frame must not lie under the stages'.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub fn report_degenerate<B: Board>(&self, board: &mut B) {
         let count = self.job.degenerate_faces();
         if count > 0 {
@@ -57,7 +57,7 @@ impl Inner<'_> {
         }
     }
 
-    #[inline(never)] // Its frame must not lie under the stages'.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub fn report_build<B: Board>(&self, board: &mut B) {
         const VERSION: &str = env!("CARGO_PKG_VERSION");
         Reply(board).line(format_args!("[VER:1.1h.penup {VERSION}:{}]", B::NAME));
@@ -65,7 +65,7 @@ impl Inner<'_> {
         Reply(board).line(format_args!("[OPT:,{blocks},{LINE_LIMIT}]"));
     }
 
-    #[inline(never)] // Its frame must not lie under the stages'.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub fn report_model<B: Board>(&self, board: &mut B) {
         let model = &self.model;
         let (vertices, limit) = (model.vertices().len(), model.vertex_limit());
@@ -101,7 +101,7 @@ impl Inner<'_> {
         Reply(board).line(format_args!("[MEM:{} bytes to work in]", size_of_val(self.words)));
     }
 
-    #[inline(never)] // Its frame must not lie under the stages'.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub fn report_status<B: Board>(&self, board: &mut B) {
         let status = self.machine.status();
         let state = match status.state {

@@ -12,7 +12,7 @@ use crate::visibility::{EdgeParameter, Stretch, StretchSink};
 
 /// Finds what is seen of the solid. Returns how many lines stand in `words`, and how many edges were
 /// left out because the faces beside them may be one.
-#[inline(never)] // Its frame must not lie under the other stages'.
+#[inline(never)] // Keeps its frame off the stack while the stages run.
 pub(super) fn project(
     model: &Model<'_>,
     options: &PlotOptions,

@@ -49,7 +49,7 @@ pub(super) enum Progress {
 
 impl Inner<'_> {
     /// What was asked by single bytes, but for status and abort.
-    #[inline(never)] // Its frame must not lie under the stages'.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub(super) fn act(&mut self, asked: RealTime) {
         if asked == RealTime::default() {
             return;
@@ -86,7 +86,7 @@ impl Inner<'_> {
 
     /// Looks at the contacts; tells of an alarm once, and lets the board carry it out at once. Asks for the next pen,
     /// once, when the machine stands and waits for it.
-    #[inline(never)] // Its frame must not lie under the stages'.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub(super) fn watch<B: Board>(&mut self, board: &mut B) {
         self.machine.observe(board.contacts());
         let alarm = match self.machine.state() {
@@ -110,7 +110,7 @@ impl Inner<'_> {
     }
 
     /// Goes on with the line in work.
-    #[inline(never)] // Its frame must not lie under the stages'.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub(super) fn proceed<B: Board>(&mut self, board: &mut B) -> Progress {
         if let Some(Task::List(listing, number)) = &mut self.task {
             // A row comes as soon as it finds room: it takes up to 10 ms, and steps may be running.
@@ -200,7 +200,7 @@ impl Inner<'_> {
         number < lines
     }
 
-    #[inline(never)] // Its frame must not lie under the stages'.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub(super) fn home(&mut self) -> Result<(), CommandError> {
         if !self.machine.settings().is_on(Setting::Homing) {
             return Err(CommandError::HomingOff);
@@ -210,7 +210,7 @@ impl Inner<'_> {
         Ok(())
     }
 
-    #[inline(never)] // Its frame must not lie under the stages'.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub(super) fn run_gcode(&mut self, line: GCode<'_>) -> Result<(), CommandError> {
         let steps = self.machine.settings().page_steps();
         let checking = match self.machine.state() {
@@ -245,7 +245,7 @@ impl Inner<'_> {
     }
 
     /// A line of its own: what it sets is forgotten.
-    #[inline(never)] // Its frame must not lie under the stages'.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub(super) fn jog(&mut self, line: GCode<'_>) -> Result<(), CommandError> {
         let steps = self.machine.settings().page_steps();
         let (program, order) = Program::default().at(&self.machine, false).after(line, steps)?;

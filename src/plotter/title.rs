@@ -11,7 +11,7 @@ use crate::visibility::SinkFull;
 const LINES_BETWEEN_CHECKS: usize = 64;
 
 /// Refuses a title that is too wide before the work begins: what is drawn above it does not matter.
-#[inline(never)] // Its frame must not lie under the other stages'.
+#[inline(never)] // Keeps its frame off the stack while the stages run.
 pub(super) fn check(options: &PlotOptions, steps: StepsPerMillimetre) -> Result<(), CommandError> {
     let Some(title) = options.title() else { return Ok(()) };
     options.page.place_title(&title, [0; 3], steps).map(|_| ()).map_err(CommandError::Page)
@@ -19,7 +19,7 @@ pub(super) fn check(options: &PlotOptions, steps: StepsPerMillimetre) -> Result<
 
 /// Adds the lines of the title to the `count` lines at the front of `words`, below them, for the first
 /// pen. Returns how many there are then; a page without a drawing has no title.
-#[inline(never)] // Its frame must not lie under the other stages'.
+#[inline(never)] // Keeps its frame off the stack while the stages run.
 pub(super) fn write(
     options: &PlotOptions,
     steps: StepsPerMillimetre,

@@ -178,7 +178,7 @@ impl<'a> Command<'a> {
     /// assert_eq!(Command::parse("$plot"), Ok(Command::Plot));
     /// assert!(Command::parse("v 1 2").is_err());
     /// ```
-    #[inline(never)] // Its frame must not lie under the stages'.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub fn parse(line: &'a str) -> Result<Self, CommandError> {
         if let Some(text) = title(line) {
             return EscapedText::new(text).map(Self::Title);
@@ -215,7 +215,7 @@ impl<'a> Command<'a> {
         }
     }
 
-    #[inline(never)] // Its frame must not lie under the stages'.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
     fn parse_dollar(text: &'a str) -> Result<Self, CommandError> {
         if let Some((name, value)) = text.split_once('=') {
             let (name, value) = (name.trim(), value.trim());
@@ -251,7 +251,7 @@ impl<'a> Command<'a> {
 }
 
 /// The text of a `$title=` line as it stands, with its spaces and whatever else a title may hold.
-#[inline(never)] // Its frame must not lie under the stages'.
+#[inline(never)] // Keeps its frame off the stack while the stages run.
 fn title(line: &str) -> Option<&str> {
     let (name, text) = line.trim_start().strip_prefix('$')?.split_once('=')?;
     (name.trim() == "title").then_some(text)
@@ -259,7 +259,7 @@ fn title(line: &str) -> Option<&str> {
 
 /// The pen that one of the words numbers, as in `pen3` or `3`, else all of the text by a hash. Without a
 /// name it is the first pen.
-#[inline(never)] // Its frame must not lie under the stages'.
+#[inline(never)] // Keeps its frame off the stack while the stages run.
 fn pen_name(text: &str) -> PenName {
     let mut words = text.split_ascii_whitespace();
     let numbered = words.find_map(|word| {

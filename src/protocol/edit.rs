@@ -55,7 +55,7 @@ impl<'a> Values<'a> {
 }
 
 /// `None` if no edit has this name.
-#[inline(never)] // Its frame must not lie under the stages'.
+#[inline(never)] // Keeps its frame off the stack while the stages run.
 pub(super) fn parse_edit<'a>(name: &str, value: &str) -> Result<Option<Command<'a>>, CommandError> {
     let mut values = Values { rest: Some(value), needed: 3 };
     let edit = match name {

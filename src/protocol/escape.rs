@@ -19,7 +19,7 @@ impl<'a> EscapedText<'a> {
     ///
     /// # Errors
     /// [`CommandError::NotAnEscape`], [`CommandError::NotInTheFont`].
-    #[inline(never)] // Its frame must not lie under the stages'.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub(super) fn new(text: &'a str) -> Result<Self, CommandError> {
         let mut rest = text.chars();
         while let Some(letter) = next(&mut rest) {

@@ -87,7 +87,7 @@ pub struct Numbering {
 
 impl Numbering {
     /// Checks a line as the reader gave it.
-    #[inline(never)] // Its frame must not lie under the stages'.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub fn receive<'a>(&mut self, line: Result<&'a str, CommandError>) -> Received<'a> {
         let line = match line {
             Ok(line) => line,
