@@ -1,5 +1,9 @@
-//! The scene as it lies on the page: each vertex by its place on a coarse grid of 2^14 by 2^14, and
-//! "on which side" answered from those places where they suffice, exactly where they do not.
+//! The projection of the vertices onto a coarse grid of the page, which makes most geometric tests
+//! cheap.
+//!
+//! Each vertex gets a cell on a grid of 2^14 by 2^14. The question on which side of a line a vertex
+//! lies is answered from the coarse grid where its resolution suffices, and exactly where it does
+//! not.
 
 use super::Scene;
 use super::yield_counter::YieldCounter;
@@ -10,10 +14,12 @@ use crate::geometry::{
 use crate::stage::{Aborted, Scratch};
 use bytemuck::{Pod, Zeroable};
 
-/// Places on the coarse grid are below 2^this, so that a product of two differences fits 29 bits.
+/// The coordinates on the coarse grid are below 2^`COARSE_BITS`, so that the product of two
+/// differences fits in 29 bits.
 pub const COARSE_BITS: u32 = 14;
 
-/// A vertex on the coarse grid, rounded down: the vertex itself lies less than one unit right and up.
+/// A vertex on the coarse grid, rounded down. The vertex itself lies less than one unit to the
+/// right of this point and less than one unit above it.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub struct CoarsePoint {
@@ -25,26 +31,27 @@ impl CoarsePoint {
     pub const LOWEST: Self = Self { x: 0, y: 0 };
     pub const HIGHEST: Self = Self { x: u16::MAX, y: u16::MAX };
 
-    /// The lower left corner of the two.
+    /// Returns the lower left corner of the rectangle around both points.
     #[inline]
     pub fn low(self, other: Self) -> Self {
         Self { x: self.x.min(other.x), y: self.y.min(other.y) }
     }
 
-    /// The upper right corner of the two.
+    /// Returns the upper right corner of the rectangle around both points.
     #[inline]
     pub fn high(self, other: Self) -> Self {
         Self { x: self.x.max(other.x), y: self.y.max(other.y) }
     }
 
-    /// Whether everything up to here is surely left of or below everything from `other` on.
+    /// Whether a rectangle whose upper right corner is `self` lies certainly to the left of, or
+    /// below, a rectangle whose lower left corner is `other`.
     #[inline]
     pub fn is_before(self, other: Self) -> bool {
         self.x < other.x || self.y < other.y
     }
 }
 
-/// The line through two places.
+/// The line through two points of the coarse grid.
 #[derive(Debug, Clone, Copy)]
 pub struct CoarseLine {
     x: i32,
@@ -62,10 +69,11 @@ impl CoarseLine {
         Self { x, y, along_x, along_y, error_bound: along_x.abs() + along_y.abs() + 2 }
     }
 
-    /// The sign of [`page_side`] for a vertex at `place`, or zero if the places are too coarse to tell.
+    /// Returns the sign of [`page_side`] for a vertex at the coarse point `place`, or zero if the
+    /// coarse grid cannot decide it.
     ///
-    /// Each true difference is within one unit of the difference of the places, which moves the
-    /// determinant by less than the sum of the differences and two.
+    /// Each true difference of coordinates is within one unit of the difference on the coarse grid.
+    /// So the determinant changes by less than the sum of the absolute differences plus two.
     #[inline]
     pub fn side(&self, place: CoarsePoint) -> i32 {
         let (to_x, to_y) = (i32::from(place.x) - self.x, i32::from(place.y) - self.y);
@@ -75,13 +83,13 @@ impl CoarseLine {
     }
 }
 
-/// [`CoarseLine::side`] of the line from `a` to `b`.
+/// Returns [`CoarseLine::side`] of `c` for the line from `a` to `b`.
 #[inline]
 pub fn coarse_side(a: CoarsePoint, b: CoarsePoint, c: CoarsePoint) -> i32 {
     CoarseLine::new(a, b).side(c)
 }
 
-/// The line through two vertices of an [`CoarseProjection`].
+/// The line through two vertices of a [`CoarseProjection`].
 #[derive(Debug, Clone, Copy)]
 pub struct VertexLine<'o> {
     coarse_projection: &'o CoarseProjection<'o>,
@@ -91,14 +99,14 @@ pub struct VertexLine<'o> {
 }
 
 impl VertexLine<'_> {
-    /// The sign of [`page_side`] for an end of an edge.
+    /// Returns the sign of [`page_side`] for an end of an edge.
     #[inline]
     pub fn side(&self, end: End) -> i32 {
         let coarse = self.coarse.side(end.place);
         if coarse != 0 { coarse } else { self.exact_side(end) }
     }
 
-    /// [`Self::side`] without a look at the places.
+    /// Answers [`Self::side`] exactly, without the coarse grid.
     #[cold]
     fn exact_side(&self, end: End) -> i32 {
         if end.number == self.a || end.number == self.b {
@@ -108,10 +116,10 @@ impl VertexLine<'_> {
     }
 }
 
-/// Instructions for two divisions of 64 bits on a core without a divider.
+/// The number of instructions that two 64-bit divisions take on a core without a divider.
 const TWO_DIVISIONS: usize = 1500;
 
-/// How the page is laid on the coarse grid.
+/// The map from the page to the coarse grid.
 #[derive(Debug, Clone, Copy)]
 struct Mapping {
     projection: Projection,
@@ -150,7 +158,7 @@ impl Mapping {
     }
 }
 
-/// A vertex on the page in units of 2^-20, rounded down.
+/// Projects a vertex onto the page, in units of 2^-20, rounded down.
 fn fine(projection: Projection, vertex: Vertex) -> (i64, i64) {
     let fine = |coordinate: i32| i64::from(coordinate) << 20;
     match projection {
@@ -162,21 +170,21 @@ fn fine(projection: Projection, vertex: Vertex) -> (i64, i64) {
     }
 }
 
-/// An end of an edge that is looked at.
+/// An end of an edge that is being tested.
 #[derive(Debug, Clone, Copy)]
 pub struct End {
-    /// The number of the vertex there; no vertex has [`End::FREE`].
+    /// The number of the vertex at this end, or [`End::FREE`], which is the number of no vertex.
     pub number: u16,
     pub vertex: Vertex,
     pub place: CoarsePoint,
 }
 
 impl End {
-    /// The number of an end that is no vertex of the model.
+    /// The number of an end that is not a vertex of the model.
     pub const FREE: u16 = u16::MAX;
 }
 
-/// The vertices, in view space and on the page.
+/// The vertices in view coordinates and on the coarse grid.
 #[derive(Debug, Clone, Copy)]
 pub struct CoarseProjection<'a> {
     pub projection: Projection,
@@ -187,7 +195,7 @@ pub struct CoarseProjection<'a> {
 }
 
 impl<'a> CoarseProjection<'a> {
-    /// Places every vertex on the coarse grid.
+    /// Projects every vertex onto the coarse grid.
     pub fn new<'s: 'a>(
         scene: &Scene<'a>,
         scratch: &mut Scratch<'s>,
@@ -203,12 +211,12 @@ impl<'a> CoarseProjection<'a> {
         Ok(Self { projection, vertices, places, unrounded: scene.unrounded, mapping })
     }
 
-    /// A vertex as the end of an edge.
+    /// Returns a vertex as the end of an edge.
     pub fn end(&self, number: u16) -> End {
         End { number, vertex: self.vertex(number), place: self.place(number) }
     }
 
-    /// Any point between the vertices as the end of an edge.
+    /// Returns any point within the extent of the vertices as the end of an edge.
     pub fn free_end(&self, vertex: Vertex) -> End {
         End { number: End::FREE, vertex, place: self.mapping.place(vertex) }
     }
@@ -223,7 +231,7 @@ impl<'a> CoarseProjection<'a> {
         self.places[usize::from(number)]
     }
 
-    /// The line through two vertices.
+    /// Returns the line through two vertices.
     #[inline]
     pub fn line(&self, a: u16, b: u16) -> VertexLine<'_> {
         VertexLine {
@@ -234,26 +242,29 @@ impl<'a> CoarseProjection<'a> {
         }
     }
 
-    /// The sign of [`page_side`] of three vertices.
+    /// Returns the sign of [`page_side`] for three vertices.
     #[inline]
     pub fn side(&self, a: u16, b: u16, c: u16) -> i32 {
         self.line(a, b).side(self.end(c))
     }
 
-    /// [`page_side`] of an end from the line through two vertices.
+    /// Returns the exact [`page_side`] of an end, for the line through two vertices.
     pub fn side_value(&self, a: u16, b: u16, end: End) -> i64 {
         page_side(self.projection, self.vertex(a), self.vertex(b), end.vertex)
     }
 
-    /// Where the line through a and b crosses the line from p to q. It crosses between them.
+    /// Returns where on the edge from p to q the line through a and b crosses it. The caller
+    /// guarantees that it crosses between p and q.
     pub fn crossing(&self, a: u16, b: u16, p: End, q: End) -> EdgeParameter {
         EdgeParameter::zero_between(self.side_value(a, b, p), self.side_value(a, b, q))
     }
 
-    /// How far an end lies behind the plane of a triangle that turns anticlockwise on the page, and before
-    /// that of one that turns clockwise.
+    /// Returns a signed measure, proportional to the distance, of how far an end lies behind the
+    /// plane of a triangle. For a triangle that turns anticlockwise on the page, positive means
+    /// behind the plane; for one that turns clockwise, positive means in front of it.
     ///
-    /// Zero if it lies in the plane in the model, where that is known: rounding takes it out of it.
+    /// The result is zero if the end lies in the plane in the model, as far as that is known;
+    /// rounding alone would move it out of the plane.
     pub fn height(&self, triangle: [u16; 3], end: End) -> i64 {
         if triangle.contains(&end.number) {
             return 0;
@@ -268,14 +279,14 @@ impl<'a> CoarseProjection<'a> {
         }
     }
 
-    /// How far the corners of one triangle lie behind another, each as [`Self::height`] says.
+    /// Returns [`Self::height`] over `triangle` for each corner of the triangle `of`.
     pub fn heights(&self, triangle: [u16; 3], of: [u16; 3]) -> [i64; 3] {
         of.map(|corner| self.height(triangle, self.end(corner)))
     }
 
-    /// An axis of the page along which p and q differ, and the sign of their difference.
+    /// Returns an axis of the page along which p and q differ, and the sign of their difference.
     ///
-    /// `None` if the eye sees them in line.
+    /// Returns `None` if the eye sees both points at the same place.
     pub fn direction(&self, p: Vertex, q: Vertex) -> Option<(Axis, i64)> {
         [Axis::X, Axis::Y].into_iter().find_map(|axis| {
             let sign = page_offset(self.projection, axis, p, q).signum();

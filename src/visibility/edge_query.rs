@@ -1,9 +1,10 @@
-//! One edge against one face: which stretch of it the face hides, exactly.
+//! Tests one edge against one face and finds exactly which part of the edge the face hides.
 //!
-//! A triangle hides an edge where the edge lies behind the triangle's plane and, on the page, within
-//! the triangle. "Within" is asked twice, for the points of the page just to the left and just to
-//! the right of the edge: a corner on the line of the edge counts as lying to the right in the first
-//! question and to the left in the second. So every degenerate case falls to one side or the other.
+//! A triangle hides an edge where the edge lies behind the plane of the triangle and, on the page,
+//! inside the triangle. "Inside" is decided twice: for the points of the page just to the left of
+//! the edge and for those just to the right. A corner that lies on the line of the edge counts as
+//! lying to the right in the first decision and to the left in the second. So every degenerate case
+//! falls on one side or the other.
 
 use super::coarse_projection::{CoarseLine, CoarsePoint, CoarseProjection, End};
 use super::edges::{ChosenSides, Outlines, sides};
@@ -14,7 +15,7 @@ use super::triangles::Ears;
 use crate::geometry::{EdgeParameter, line_side, page_offset, page_side};
 use crate::model::Corner;
 
-/// What the search knows of the scene.
+/// Everything that the search needs to know about the scene.
 pub struct SceneIndex<'a> {
     pub coarse_projection: CoarseProjection<'a>,
     pub outlines: Outlines<'a>,
@@ -24,7 +25,8 @@ pub struct SceneIndex<'a> {
 }
 
 impl SceneIndex<'_> {
-    /// One of the triangles of a face, from 0.
+    /// Returns the triangle with this number, counted from 0, of a face. Returns `None` if the face
+    /// has fewer.
     pub fn triangle(&self, face: Face, number: usize) -> Option<[u16; 3]> {
         if face.has_ears {
             return self.ears.of(face.first).get(number).copied();
@@ -36,13 +38,14 @@ impl SceneIndex<'_> {
         }
     }
 
-    /// The box around the face of a rank.
+    /// Returns the bounding box of the face with this rank.
     pub fn extent(&self, rank: usize) -> Extent {
         let corners = self.outlines.element(self.faces.get(rank).first);
         Extent::around(corners.iter().map(|corner| self.coarse_projection.vertex(corner.vertex())))
     }
 
-    /// Whether two faces have two corners in common, by their places; such faces do not cross elsewhere.
+    /// Whether two faces have two corners with the same view coordinates. Such faces do not cross
+    /// anywhere else.
     pub fn share_edge(&self, one: Face, other: Face) -> bool {
         let at = |corner: &Corner| self.coarse_projection.vertex(corner.vertex());
         let other = self.outlines.element(other.first);
@@ -51,8 +54,8 @@ impl SceneIndex<'_> {
         corners.iter().filter(shared).count() >= 2
     }
 
-    /// Whether a face has corners on both sides of the plane of a triangle. One that only touches it ends
-    /// there, with an edge or a corner.
+    /// Whether a face has corners on both sides of the plane of a triangle. A face that only
+    /// touches the plane ends there, with an edge or a corner.
     pub fn passes_through(&self, face: Face, triangle: [u16; 3]) -> bool {
         let (mut before, mut behind) = (false, false);
         self.outlines.element(face.first).iter().any(|corner| {
@@ -65,48 +68,50 @@ impl SceneIndex<'_> {
         })
     }
 
-    /// The triangles of a face.
+    /// Iterates over the triangles of a face.
     pub fn triangles(&self, face: Face) -> impl Iterator<Item = [u16; 3]> {
         (0..).map_while(move |number| self.triangle(face, number))
     }
 }
 
-/// An edge that is being looked at, or a seam.
+/// An edge, or a seam, that is being tested against faces.
 #[derive(Debug, Clone, Copy)]
 pub struct EdgeQuery {
-    /// The side that stands for it; none for a seam.
+    /// The side of a face that represents this edge; [`Self::NO_SIDE`] for a seam.
     pub side: usize,
     pub p: End,
     pub q: End,
-    /// Depth of its nearer end.
+    /// The depth of the nearer end.
     pub near: i32,
-    /// Depth of its farther end.
+    /// The depth of the farther end.
     pub far: i32,
-    /// The two triangles that pass through each other there, if it is a seam.
+    /// The two triangles that pass through each other along it, if this is a seam.
     pub seam: Option<[[u16; 3]; 2]>,
     low: CoarsePoint,
     high: CoarsePoint,
     line: CoarseLine,
 }
 
-/// A side of a face, from corner to corner.
+/// A side of a face, as the numbers of the vertices at its two ends.
 type Side = (u16, u16);
 
-/// A face, or a triangle of one, as the edge meets it.
+/// A face, or one of its triangles, with the sides of the edge's line on which its corners lie.
 ///
-/// For the points just to the left of the edge a corner on its line lies to the right, and the other
-/// way round; so each corner is left of the line or not, twice.
+/// The points just to the left of the edge see a corner on its line as lying to the right; the
+/// points just to the right see it as lying to the left. So there are two masks of the corners that
+/// count as lying to the left.
 #[derive(Clone, Copy)]
 pub struct CrossedPolygon<'c> {
     corners: &'c [u16],
-    /// One bit for each corner: whether it lies to the left.
+    /// One bit for each corner: whether it lies to the left of the line.
     pub left: u32,
-    /// The same, with those on the line.
+    /// One bit for each corner: whether it lies to the left of the line or on it.
     pub left_or_on: u32,
 }
 
 impl<'c> CrossedPolygon<'c> {
-    /// From the corners, at most [`FEW_CORNERS`], and the side of the line on which each lies.
+    /// Builds it from the corners, of which there are at most [`FEW_CORNERS`], and the side of the
+    /// line on which each lies: positive is left, negative is right, zero is on the line.
     pub fn new(corners: &'c [u16], sides: &[i32]) -> Self {
         let (mut left, mut left_or_on) = (0, 0);
         for (n, &side) in sides.iter().enumerate().take(corners.len()) {
@@ -116,24 +121,26 @@ impl<'c> CrossedPolygon<'c> {
         Self { corners, left, left_or_on }
     }
 
-    /// The mask of the corners, each put where the next one is.
+    /// Moves the bit of each corner to the position of the next corner around the polygon.
     fn shifted(&self, mask: u32) -> u32 {
         let count = self.corners.len();
         (mask << 1 | mask >> (count - 1)) & ((1 << count) - 1)
     }
 
-    /// One bit for each side that crosses the line, at the corner where the side ends.
+    /// Returns one bit for each side of the polygon that crosses the line. The bit is at the corner
+    /// where the side ends. `left` is one of the two masks.
     pub fn crossings(&self, left: u32) -> u32 {
         left ^ self.shifted(left)
     }
 
-    /// One bit for each side that lies on the line, at the corner where the side ends.
+    /// Returns one bit for each side of the polygon that lies on the line, at the corner where the
+    /// side ends.
     fn sides_on_line(&self) -> u32 {
         let on = self.left ^ self.left_or_on;
         on & self.shifted(on)
     }
 
-    /// The side that ends at a corner.
+    /// Returns the side that ends at a corner.
     fn side(&self, end: usize) -> Side {
         let begin = end.checked_sub(1).unwrap_or(self.corners.len() - 1);
         (self.corners[begin], self.corners[end])
@@ -146,36 +153,38 @@ fn is_many(mask: u32) -> bool {
     without_one & without_one.wrapping_sub(1) != 0
 }
 
-/// Faces with more corners are looked at triangle by triangle.
+/// The most corners with which a face is tested as a whole. A face with more is tested triangle by
+/// triangle.
 const FEW_CORNERS: usize = 8;
 
-/// The sides at which the edge enters and leaves a piece of a face, if it does so between its ends.
+/// The sides through which the edge enters and leaves a polygon on the page. Each is `None` if the
+/// edge begins or ends inside the polygon.
 #[derive(Clone, Copy, Default)]
 pub struct Passage {
     entry: Option<Side>,
     exit: Option<Side>,
 }
 
-/// What a face does to an edge.
+/// How an edge lies in depth relative to a face.
 enum Depth {
-    /// The edge does not lie behind it.
+    /// No part of the edge lies behind the face.
     Before,
-    /// This part of the edge lies behind it.
+    /// This part of the edge lies behind the face.
     Behind(EdgeInterval),
-    /// That differs from triangle to triangle.
+    /// The answer differs between the triangles of the face.
     Mixed,
 }
 
 impl EdgeQuery {
-    /// The side of a seam, after those of all edges.
+    /// The value of `side` for a seam. It sorts after the sides of all edges.
     pub const NO_SIDE: usize = usize::MAX;
 
-    /// The seam of two triangles, from p to q.
+    /// Creates the query for the seam of two triangles, which runs from p to q.
     pub fn of_seam(triangles: [[u16; 3]; 2], p: End, q: End) -> Self {
         Self { seam: Some(triangles), ..Self::new(Self::NO_SIDE, p, q) }
     }
 
-    /// The edge between two ends, for which `side` stands.
+    /// Creates the query for the edge between two ends that `side` represents.
     pub fn new(side: usize, p: End, q: End) -> Self {
         Self {
             side,
@@ -190,13 +199,14 @@ impl EdgeQuery {
         }
     }
 
-    /// On which side of this edge's line a vertex lies on the page.
+    /// Returns the side of this edge's line on which a vertex lies on the page: positive for left,
+    /// negative for right, zero on the line.
     pub fn side_of(&self, coarse_projection: &CoarseProjection<'_>, number: u16) -> i32 {
         let coarse = self.line.side(coarse_projection.place(number));
         if coarse != 0 { coarse } else { self.exact_side_of(coarse_projection, number) }
     }
 
-    /// [`Self::side_of`] without a look at the places.
+    /// Answers [`Self::side_of`] exactly, without the coarse grid.
     #[cold]
     fn exact_side_of(&self, coarse_projection: &CoarseProjection<'_>, number: u16) -> i32 {
         if number == self.p.number || number == self.q.number {
@@ -207,7 +217,8 @@ impl EdgeQuery {
             as i32
     }
 
-    /// Marks what `face` does to this edge.
+    /// Marks on `profile` the parts of this edge that `face` hides or that one of its sides
+    /// replaces.
     pub fn look_at(&self, around: &SceneIndex<'_>, face: Face, profile: &mut Profile<'_>) {
         let coarse_projection = &around.coarse_projection;
         let corners = around.outlines.element(face.first);
@@ -230,8 +241,8 @@ impl EdgeQuery {
                 sides[n] = side;
             }
         }
-        // With all other corners on one side, a face that holds p or q meets the edge nowhere else,
-        // and where it holds both, it is not nearer.
+        // If all other corners lie on one side of the line, a face that contains p or q meets the
+        // edge nowhere else; a face that contains both is not nearer than the edge.
         if left || right || high.is_before(self.low) || self.high.is_before(low) {
             return;
         }
@@ -271,8 +282,9 @@ impl EdgeQuery {
         self.pass(coarse_projection, CrossedPolygon::new(triangle, &sides), profile);
     }
 
-    /// Marks what a piece of a face does to this edge. False, and nothing marked, if its triangles
-    /// must be asked one by one; a triangle never must.
+    /// Marks the parts of this edge that a polygon hides. Returns `false`, and marks nothing, if
+    /// the triangles of the face must be tested one by one. For a single triangle it always returns
+    /// `true`.
     fn pass(
         &self,
         coarse_projection: &CoarseProjection<'_>,
@@ -339,7 +351,8 @@ impl EdgeQuery {
         true
     }
 
-    /// How the edge lies to the planes of a fan of triangles, all of which turn as `facing` says.
+    /// Finds which part of the edge lies behind the planes of a fan of triangles. All the triangles
+    /// turn on the page in the sense that the sign of `facing` gives.
     fn depth_behind(
         &self,
         coarse_projection: &CoarseProjection<'_>,
@@ -370,8 +383,9 @@ impl EdgeQuery {
         }
     }
 
-    /// How the edge passes a piece of a face on the page, `None` if it does not meet it. `facing` is how
-    /// the piece turns.
+    /// Finds the sides through which the edge enters and leaves a polygon on the page. Returns
+    /// `None` if the edge does not meet the polygon. `crossings` are the sides that cross its line.
+    /// The sign of `facing` says in which sense the polygon turns: positive is anticlockwise.
     pub fn passage(
         &self,
         coarse_projection: &CoarseProjection<'_>,
@@ -403,13 +417,14 @@ impl EdgeQuery {
         Some(passage)
     }
 
-    /// The part of the edge within a piece of a face.
+    /// Returns the part of the edge that lies within a polygon on the page.
     pub fn part(&self, coarse_projection: &CoarseProjection<'_>, passage: Passage) -> EdgeInterval {
         let place = |(a, b): Side| coarse_projection.crossing(a, b, self.p, self.q);
         EdgeInterval { from: passage.entry.map(place), to: passage.exit.map(place) }
     }
 
-    /// Marks what the sides of an element do that lie on the line of this edge.
+    /// Marks the parts of this edge that are replaced by sides of an element that lie on the same
+    /// line of the page.
     #[cold]
     fn pass_sides(
         &self,
@@ -427,8 +442,9 @@ impl EdgeQuery {
         }
     }
 
-    /// Marks where the side (a, b) of a face, on the line of this edge, is drawn in its place: where
-    /// it is nearer, or as near and of a lower pen, or of the same and before it in the model.
+    /// Marks the part of this edge where the side (a, b) of a face, which lies on the same line of
+    /// the page, is drawn in its stead. That is where the side is nearer than this edge, or equally
+    /// near with a lower pen, or equally near with the same pen and earlier in the model.
     fn pass_side(
         &self,
         around: &SceneIndex<'_>,
@@ -475,7 +491,8 @@ impl EdgeQuery {
     }
 }
 
-/// The part of an edge that lies behind something flat, from how far behind it p and q lie.
+/// Returns the part of an edge that lies behind a plane or a line, from the heights of its ends p
+/// and q: positive is behind. Returns `None` if no part lies behind.
 fn behind_between(at_p: i64, at_q: i64) -> Option<EdgeInterval> {
     if at_p <= 0 && at_q <= 0 {
         return None;

@@ -1,26 +1,36 @@
-//! For each edge, the visible stretches.
+//! Hidden-line removal: finds the visible stretches of every edge of a scene.
 //!
-//! [`find_stretches`] takes a [`Scene`], any faces at all (convex or concave, closed or open, touching,
-//! sharing planes, passing through each other) and any bars, and hands over the visible stretches
-//! of each distinct edge, and the hidden ones if asked. The result is exact for the rounded vertices; only
-//! whether a vertex lies in the plane of a face is asked of the model, if its positions are known.
+//! [`find_stretches`] takes a [`Scene`] of faces and bars. The faces may be convex or concave,
+//! closed or open; they may touch, share a plane or pass through each other. It hands the visible
+//! stretches of each distinct edge to a sink, and the hidden ones if the options ask for them. The
+//! result is exact for the rounded vertices. Only one question is answered from the model instead,
+//! if the positions of its vertices are known: whether a vertex lies in the plane of a face.
 //!
-//! * Both sides of a face hide. A face counts as its triangles.
-//! * The rule for ties: a point of an edge is hidden if the points of the page just to its left *and* just
-//!   to its right along the edge are covered by a nearer face. A face that touches the edge there is
-//!   not nearer.
-//! * Of edges that coincide on the page, the nearest is drawn; of those that coincide in space, that of the
-//!   lowest pen, and of one pen the first of the model. An edge has the lowest pen of its faces, a seam too.
-//! * An edge that the eye sees end-on has no length on the page and no stretch.
+//! * A face hides what lies behind it from both of its sides. A face is treated as the triangles
+//!   that it is cut into.
+//! * The rule for ties: a point of an edge is hidden if nearer faces cover the points of the page
+//!   just to the left *and* just to the right of the edge there. A face that touches the edge there
+//!   is not nearer.
+//! * Of several edges that coincide on the page, the nearest is drawn. Of edges that coincide in
+//!   space, the one with the lowest pen is drawn, and of those with the same pen the first in the
+//!   model. An edge has the lowest pen of the faces that share it; a seam has the
+//!   lower pen of its two faces.
+//! * An edge that the eye sees end-on has no length on the page and therefore no stretch.
 //!
-//! The way: choose one side of a face for each edge (`edges`, `crease`), cut concave faces into
-//! triangles (`triangles`), place the vertices on a coarse grid of the page (`coarse_projection`), sort the faces by
-//! depth (`faces`) and into cells (`grid`, `raster`); then follow each edge through the cells (`search`) and
-//! mark on its `profile` what each face hides (`edge_query`). On request, find the lines where faces pass
-//! through each other (`seams`) and leave out those within one plane (`blocks`).
+//! The search runs in these steps:
+//!
+//! * Choose one side of a face to represent each edge (`edges`, `crease`).
+//! * Cut concave faces into triangles (`triangles`).
+//! * Place the vertices on a coarse grid of the page (`coarse_projection`).
+//! * Sort the faces by depth (`faces`) and into the cells of the page (`grid`, `raster`).
+//! * Follow each edge through the cells (`search`) and mark on its `profile` which part each face
+//!   hides (`edge_query`).
+//! * If the options ask for it, find the lines where faces pass through each other (`seams`) and
+//!   omit the edges between two faces of one plane (`blocks`).
 //!
 //! # Memory
-//! [`scratch_bytes`] is the least; with more, the grid is finer and fewer faces are tried for each edge.
+//! [`scratch_bytes`] returns the smallest working memory that is enough. With more memory the grid
+//! is finer, and fewer faces are tested against each edge.
 //!
 //! | scene | vertices | faces | least bytes |
 //! |---|---|---|---|
@@ -28,14 +38,17 @@
 //! | lattice7 | 2744 | 2058 | 24992 |
 //! | torus of 2400 quads | 2400 | 2400 | 26400 |
 //!
-//! The least means one cell, and every face is tried for every edge. A tenth more makes it several times
-//! faster; twice as much is as good as any.
+//! With the least memory the grid has a single cell, and every face is tested against every edge. A
+//! tenth more memory makes the search several times faster. More than twice the least brings no
+//! further gain.
 //!
-//! For each vertex 4 bytes; for each corner 1/8; for each element 4 and 1/4; for each entry of the grid 2 and for
-//! each cell 6. Before that, while edges are chosen, 2 for each vertex and 2 1/8 for each corner. Faces that no fan
-//! of triangles covers take 4 bytes and 6 for each of their triangles.
+//! The search takes 4 bytes for each vertex, 1/8 for each corner, 4 1/4 for each element, 2 for
+//! each entry of the grid and 6 for each cell. Before that, the choice of the edges takes 2 bytes
+//! for each vertex and 2 1/8 for each corner. Each face that no fan of triangles covers takes 4
+//! bytes, and 6 for each of its triangles.
 //!
-//! Refused: vertices out of range, a model too large, too little memory.
+//! # Limits
+//! Refused are vertices out of range, a model that is too large and too little working memory.
 
 mod blocks;
 mod crease;
@@ -72,82 +85,88 @@ pub use wire::follow_wire;
 /// A scene as the camera sees it: rounded vertices, and the faces and bars between them.
 #[derive(Debug, Clone, Copy)]
 pub struct Scene<'a> {
-    /// View coordinates of every vertex of the model.
+    /// The rounded view coordinates of every vertex of the model.
     pub vertices: &'a [Vertex],
-    /// Faces and bars, by vertex number.
+    /// The faces and bars. Each corner is the number of a vertex in `vertices`.
     pub elements: Elements<'a>,
-    /// Perspective or parallel.
+    /// Whether the view is perspective or parallel.
     pub projection: Projection,
-    /// The same vertices before they were rounded, as far as known: what lies in one plane in the model
-    /// lies there in the view, too.
+    /// The positions of the same vertices in the model, before rounding, as far as they are known.
+    /// With them, vertices that lie in one plane in the model also count as lying in one plane in
+    /// the view.
     pub unrounded: Unrounded<'a>,
 }
 
-/// What the user may choose.
+/// The choices that the user has about which lines are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Options {
-    /// Also hand over the hidden stretches (dotted or shown).
+    /// Also hand over the hidden stretches, which may be drawn dotted or solid.
     pub with_hidden: bool,
-    /// Also hand over what is seen of the seams, where faces pass through each other.
+    /// Also hand over the visible parts of the seams, the lines where faces pass through each
+    /// other.
     pub with_seams: bool,
-    /// Draw blocks that touch as one shape: no visible line between two faces that lie in one plane.
+    /// Draw blocks that touch as one shape: no visible line is drawn between two faces that lie in
+    /// one plane.
     pub merged_blocks: bool,
-    /// Draw only silhouettes, open edges and edges sharper than this; `None` draws every edge.
+    /// Draw only silhouettes, open edges and edges that are sharper than this. With `None` every
+    /// edge is drawn.
     pub crease: Option<Crease>,
 }
 
-/// What was found on the way.
+/// What [`find_stretches`] noticed about the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Report {
-    /// Faces without an area, which hide nothing; their edges are drawn.
+    /// The number of faces without an area. Such faces hide nothing, but their edges are drawn.
     pub degenerate_faces: u32,
 }
 
-/// A longest piece of one edge that is all visible or all hidden, or a visible piece of a seam.
+/// A maximal piece of one edge that is entirely visible or entirely hidden, or a visible piece of a
+/// seam.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stretch {
     /// The numbers of the vertices that the edge joins; `None` for a seam.
     pub edge: Option<(u16, u16)>,
-    /// Those vertices, or the ends of the seam, rounded.
+    /// The view coordinates of those two vertices, or the rounded ends of the seam.
     pub ends: (Vertex, Vertex),
-    /// Where it begins.
+    /// Where on the edge the stretch begins.
     pub from: EdgeParameter,
-    /// Where it ends, after `from`.
+    /// Where on the edge the stretch ends; always after `from`.
     pub to: EdgeParameter,
-    /// Whether it is seen.
+    /// Whether the stretch is visible.
     pub visible: bool,
-    /// The pen that draws it, from 0.
+    /// The pen that draws the stretch, counted from 0.
     pub pen: u8,
 }
 
-/// Who takes the stretches as they are found.
+/// Receives the stretches as they are found.
 pub trait StretchSink {
-    /// Takes one stretch.
+    /// Receives one stretch.
     ///
     /// # Errors
-    /// [`SinkFull`] ends the search.
+    /// An implementation returns [`SinkFull`] to end the search.
     fn stretch(&mut self, stretch: Stretch) -> Result<(), SinkFull>;
 }
 
-/// The sink has no room for another stretch.
+/// The error of a sink that has no room for another stretch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SinkFull;
 
-/// Why visibility ended without a picture.
+/// The reasons why hidden-line removal ended early.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum VisibilityError {
-    /// Not enough working memory.
+    /// There is not enough working memory.
     Scratch(OutOfScratch),
-    /// The sink took no more.
+    /// The sink had no room for another stretch.
     SinkFull,
-    /// The user gave up.
+    /// The user cancelled the search.
     Aborted,
-    /// The elements have more corners together than can be numbered; this is the limit.
+    /// The elements together have more corners than can be numbered. The value is the limit.
     TooManyCorners(usize),
-    /// An element names a vertex that does not exist.
+    /// An element refers to a vertex that does not exist. The value is the number of that vertex.
     UnknownVertex(u16),
-    /// A coordinate beyond [`COORDINATE_LIMIT`], or a vertex not before the eye in perspective.
+    /// A coordinate is beyond [`COORDINATE_LIMIT`], or, in perspective, a vertex is not in front of
+    /// the eye. The value is the number of the vertex.
     OutOfRange(u16),
 }
 
@@ -167,11 +186,12 @@ impl From<Aborted> for VisibilityError {
     }
 }
 
-/// The least working memory with which [`find_stretches`] does a scene of this size.
+/// Returns the smallest number of bytes of working memory with which [`find_stretches`] can process
+/// this scene.
 ///
-/// It uses more where it is given more: a finer grid, so that fewer faces are tried for each edge.
+/// With more memory the search uses a finer grid, so that fewer faces are tested against each edge.
 ///
-/// Zero for a scene that is refused for what it is.
+/// Returns zero for a scene that [`find_stretches`] refuses however much memory there is.
 pub fn scratch_bytes(scene: &Scene<'_>) -> usize {
     if check(scene).is_err() {
         return 0;
@@ -183,7 +203,8 @@ pub fn scratch_bytes(scene: &Scene<'_>) -> usize {
     least_bytes(vertices, corners, faces) + Ears::bytes(outlines, scene.vertices)
 }
 
-/// The same for faces that are convex, or are covered by one fan of triangles, by numbers alone.
+/// Returns the same as [`scratch_bytes`], from the numbers of vertices, corners and faces alone. It
+/// is valid if each face is convex or can be covered by one fan of triangles.
 pub const fn least_bytes(vertices: usize, corners: usize, faces: usize) -> usize {
     let choosing = ChosenSides::bytes_while_choosing(vertices, corners);
     let searching = Scratch::bytes_for::<CoarsePoint>(vertices)
@@ -192,10 +213,11 @@ pub const fn least_bytes(vertices: usize, corners: usize, faces: usize) -> usize
     ChosenSides::bytes(corners) + if choosing > searching { choosing } else { searching }
 }
 
-/// Finds the stretches of every edge and bar of the scene, in the order of the model.
+/// Finds the stretches of every edge and bar of the scene and hands them to `sink` in the order of
+/// the model.
 ///
 /// # Errors
-/// See [`VisibilityError`]. The sink has then been handed a part of the stretches.
+/// See [`VisibilityError`]. By then the sink may already have received some of the stretches.
 pub fn find_stretches(
     scene: &Scene<'_>,
     options: Options,
@@ -223,7 +245,7 @@ pub fn find_stretches(
     Ok(Report { degenerate_faces: search.degenerate_faces() })
 }
 
-/// Refuses what the arithmetic cannot take.
+/// Refuses a scene whose numbers would overflow the arithmetic or that refers to unknown vertices.
 fn check(scene: &Scene<'_>) -> Result<(), VisibilityError> {
     let corners = scene.elements.corners();
     if corners.len() > MOST_CORNERS {

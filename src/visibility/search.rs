@@ -1,4 +1,8 @@
-//! Each edge, and each seam, through the cells of the page and past the faces there.
+//! Follows each edge and each seam through the cells of the page and tests it against the faces
+//! there.
+//!
+//! The tests leave marks on the profile of the edge. Runs of pieces with the same outcome become
+//! the stretches that the sink receives.
 
 use super::edge_query::{EdgeQuery, SceneIndex};
 use super::edges::sides;
@@ -11,33 +15,35 @@ use super::{Options, Stretch, StretchSink, VisibilityError};
 use crate::geometry::{COORDINATE_LIMIT, EdgeParameter};
 use crate::stage::{Aborted, Scratch};
 
-/// Pieces that the profile of an edge may have before the edge is done in parts.
+/// The most pieces that the profile of an edge may have. An edge that needs more is processed in
+/// several parts.
 const MOST_PIECES: usize = 24;
 
-/// Instructions for a look at one face, on the average.
+/// The average number of instructions for testing an edge against one face.
 const LOOK: usize = 1000;
 
-/// The search for the stretches of one edge after the other.
+/// Finds the stretches of one edge after the other.
 pub struct StretchFinder<'a> {
     around: SceneIndex<'a>,
     grid: Grid<'a>,
-    /// One bit for each rank: whether the edge has met this face.
+    /// One bit for each rank: whether the current edge has been tested against this face.
     seen: &'a mut [u32],
-    /// The same: whether a face has met this one, for seams.
+    /// One bit for each rank: whether this face shares a cell with the face whose seams are being
+    /// found.
     met: &'a mut [u32],
     profile: Profile<'a>,
     options: Options,
 }
 
 impl<'a> StretchFinder<'a> {
-    /// Bytes with which it does its work, slowly.
+    /// The least number of bytes that are enough, with the slowest search.
     pub const fn least_bytes(faces: usize) -> usize {
         2 * Scratch::bytes_for::<u32>(faces.div_ceil(32))
             + Scratch::bytes_for::<ProfilePiece>(FEWEST_PIECES)
             + Grid::least_bytes(faces)
     }
 
-    /// Makes ready, with all of `scratch`.
+    /// Prepares the search. It uses as much of `scratch` as is useful.
     pub fn new(
         around: SceneIndex<'a>,
         options: Options,
@@ -60,12 +66,15 @@ impl<'a> StretchFinder<'a> {
         Ok(Self { around, grid, seen, met, profile: Profile::new(pieces), options })
     }
 
-    /// How many faces have no area.
+    /// Returns the number of faces that have no area.
     pub fn degenerate_faces(&self) -> u32 {
         self.around.faces.degenerate()
     }
 
-    /// Finds the stretches of every edge.
+    /// Finds the stretches of every edge, in the order of the model.
+    ///
+    /// # Errors
+    /// Returns an error if the sink is full or the user cancels.
     pub fn follow_edges(
         &mut self,
         yield_counter: &mut YieldCounter<'_>,
@@ -85,7 +94,10 @@ impl<'a> StretchFinder<'a> {
         Ok(())
     }
 
-    /// Finds the seams and what is seen of them.
+    /// Finds the seams and hands over their visible stretches.
+    ///
+    /// # Errors
+    /// Returns an error if the sink is full or the user cancels.
     pub fn follow_seams(
         &mut self,
         yield_counter: &mut YieldCounter<'_>,
@@ -151,7 +163,7 @@ impl<'a> StretchFinder<'a> {
         Ok(())
     }
 
-    /// Leaves in `met` the faces after `one` that may pass through it where something is seen.
+    /// Sets in `met` the bits of the faces with a higher rank than `one` that may pass through it.
     fn meet(&mut self, one: usize) {
         let Self { around, grid, met, .. } = self;
         met.fill(0);
@@ -171,7 +183,8 @@ impl<'a> StretchFinder<'a> {
         });
     }
 
-    /// Finds the stretches of an edge, or of the seam of two faces.
+    /// Finds the stretches of an edge or of a seam and hands them to the sink. `seam_of` holds the
+    /// ranks of the two faces of a seam.
     fn follow(
         &mut self,
         edge_query: &EdgeQuery,
@@ -230,7 +243,8 @@ impl<'a> StretchFinder<'a> {
         Ok(())
     }
 
-    /// Marks on the profile what every face along the way does to the edge.
+    /// Tests the edge against the faces in all cells that it passes and marks the outcome on its
+    /// profile.
     fn look_around(
         &mut self,
         edge_query: &EdgeQuery,
@@ -273,7 +287,8 @@ impl<'a> StretchFinder<'a> {
             spent = spent.and_then(|()| yield_counter.spend(LOOK));
             spent.is_ok() && !profile.is_hidden()
         };
-        // Covering faces first: they hide most, and what they leave may need no other cell.
+        // The covering faces come first: they hide most, and what they leave visible may need no
+        // other cell.
         let _ = (!any_covered || way.visit(|cell| cell.cover.is_none_or(&mut look_at)))
             && way.visit(|cell| {
                 let faces = if cell.cover.is_some() { &[] } else { cell.faces };
