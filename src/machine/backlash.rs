@@ -1,26 +1,28 @@
-//! Backlash: when a motor turns round, its slack is taken up before the move goes on.
+//! Backlash compensation: when a motor reverses, the slack of its drive is taken up before the next
+//! move begins.
 //!
-//! That is done by steps of their own, from rest to rest. The pen stays where it is, so they count as
-//! no way: position, limits and ink know nothing of them. The slack is that of each motor, whatever
-//! the build.
+//! The slack is taken up by separate steps that begin and end at rest. The pen does not move during
+//! these steps. So they change neither position nor ink length, and the travel limits ignore them.
+//! The slack is a property of each motor, in every kind of kinematics.
 //!
-//! On which side a motor lies is not known until it has moved: the first move takes up nothing, so the
-//! pen may be off by the slack until the machine is homed.
+//! Until a motor has moved, it is unknown on which side of its slack it is. The first move
+//! therefore takes up nothing, and the pen may be off by the slack until the machine is homed.
 
 use super::{Machine, Setting};
 use crate::drawing::{LineType, PagePoint};
 use crate::motion::{Move, PathLength, PushError};
 
-/// How the motors lie in their slack, once all blocks are run.
+/// Where each motor is within its slack once all planned blocks have run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct Backlash {
-    /// Steps until the motor takes the pen along if it turns up; `None` if that is not known.
+    /// For each motor, the steps that it must make upward before it moves the pen; `None` if this
+    /// is not known.
     ahead: [Option<i32>; 2],
 }
 
 impl Backlash {
-    /// The steps to take up before a move by (`dx`, `dy`) steps of motors that have `slack`; they are
-    /// taken up from here on.
+    /// The steps that take up the slack before a move by `way` motor steps, for motors that have
+    /// `slack` steps of it. From now on these steps count as taken up.
     fn take_up(&mut self, slack: [i32; 2], way: [i32; 2]) -> [i32; 2] {
         let mut take = |axis: usize| {
             if way[axis] == 0 {
@@ -35,28 +37,29 @@ impl Backlash {
         [take(0), take(1)]
     }
 
-    /// So much of it was not taken up after all.
+    /// Records that `steps` of those returned by `take_up` were not made after all.
     fn give_back(&mut self, steps: PagePoint) {
         for (ahead, steps) in self.ahead.iter_mut().zip([steps.x, steps.y]) {
             *ahead = ahead.map(|ahead| ahead.wrapping_add(steps));
         }
     }
 
-    /// The slack itself changes.
+    /// Adapts the state to a change of the slack from `before` to `after` steps.
     fn resize(&mut self, before: [i32; 2], after: [i32; 2]) {
         for ((ahead, before), after) in self.ahead.iter_mut().zip(before).zip(after) {
             *ahead = ahead.map(|now| if now == before { after } else { now.clamp(0, after) });
         }
     }
 
-    /// Motors that were moved by hand, or are homed now.
+    /// Forgets on which side of its slack each motor is, because the motors may have been moved by
+    /// hand or are about to be homed.
     pub(super) fn forget(&mut self) {
         *self = Self::default();
     }
 }
 
 impl Machine<'_> {
-    /// Steps of slack of each motor.
+    /// The slack of each motor, in steps.
     pub(super) fn slack_steps(&self) -> [i32; 2] {
         let steps = |slack: Setting, steps_per_mm: Setting| {
             self.settings.millimetres_as_steps(slack, steps_per_mm)
@@ -67,11 +70,12 @@ impl Machine<'_> {
         ]
     }
 
-    /// Appends a move of the motors, or first one that takes up their slack: then the other is still to
-    /// come. Whether it was the move.
+    /// Appends a move of the motors. If the move needs slack to be taken up, only the move that
+    /// does this is appended, and the caller has to push `piece` again. Returns whether `piece`
+    /// itself was appended.
     ///
     /// # Errors
-    /// See [`PushError`]; nothing is appended then.
+    /// See [`PushError`]. On an error nothing is appended.
     pub(super) fn push_motors(
         &mut self,
         piece: &Move,
@@ -90,13 +94,14 @@ impl Machine<'_> {
         Ok((x, y) == (0, 0))
     }
 
-    /// Gives up what waits; the pen stands at `page`.
+    /// Discards the moves that are still waiting. The pen is at `page`.
     pub(super) fn forget_path(&mut self, page: PagePoint) {
         self.slack.give_back(self.runner.slack_ahead());
         self.runner.forget_path(page);
     }
 
-    /// What the pins did not take up of the slack, as they were halted.
+    /// Corrects the state by the slack steps that were planned but never made because the pins were
+    /// halted. Returns the slack steps that the pins have counted.
     pub(super) fn find_slack(&mut self) -> PagePoint {
         let (x, y) = self.pins.slack();
         let planned = self.runner.slack();
@@ -105,7 +110,7 @@ impl Machine<'_> {
         PagePoint { x, y }
     }
 
-    /// The slack was so many steps.
+    /// Adapts to changed settings; the slack was `before` steps until now.
     pub(super) fn resize_slack(&mut self, before: [i32; 2]) {
         let after = self.slack_steps();
         self.slack.resize(before, after);

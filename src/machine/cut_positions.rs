@@ -1,21 +1,26 @@
-//! Where a line of the page is cut on a polargraph, so that the belts run nearly straight in between.
+//! Chooses the points at which a line on the page is cut into segments on a polargraph, so that the
+//! belt lengths change almost linearly within each segment.
 
 use super::Anchors;
 use super::kinematics::{in_order, length_of};
 use crate::drawing::PagePoint;
 
-/// Beyond every line.
+/// A position beyond the end of every line, in steps.
 const FAR: i32 = 1 << 24;
-/// Nearer to an end is no cut: the belts' step next to it could lie beyond the end.
+/// The least distance of a cut from the ends of the line, in steps. A belt step next to a closer
+/// cut could lie beyond the end.
 const NEAR: i32 = 2;
 
-/// The cuts of a line, in steps from its beginning: the same ones forward and backward.
+/// The cuts of a line, in steps from its beginning. The cuts are the same points when the line is
+/// drawn backward.
 ///
-/// EdgeParameter a line a belt of length a bends by 1/a at most, so a chord of length h is off by h²/8a: 1/64 of a step
-/// for the longest. Of the half step that a point may lie off the line, rounding needs less the more the other belt moves: where
-/// this one makes s steps for each of that, s/2 is to spare. But t steps from the foot of its anchor's
-/// perpendicular s may be t/a only, so there pieces are √(2t) long, which takes s/4. The foot itself is a cut, for the
-/// belt turns round there.
+/// Along a line, the length of a belt of length a has a curvature of at most 1/a, so a chord of
+/// length h is off by at most h²/8a. The longest segment is chosen so that this is 1/64 of a step.
+/// A point may lie at most half a step off the line, and rounding uses less of this half step the
+/// more the other belt moves: where this belt makes s steps for each step of the other, s/2 steps
+/// remain. But at a distance of t steps from the foot of the perpendicular from its anchor, s may
+/// be as small as t/a. Segments there are √(2t) long, which uses s/4. The foot itself is a cut,
+/// because the belt reverses there.
 ///
 /// ```
 /// use penup::drawing::PagePoint;
@@ -29,17 +34,20 @@ const NEAR: i32 = 2;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CutPositions {
-    /// The feet of both perpendiculars, the one that comes first, and what lies between them.
+    /// The feet of the perpendiculars from both anchors, the first along the line first, and
+    /// (`middle`) the point halfway between them.
     feet: [i32; 2],
     middle: i32,
+    /// The length of the line, in steps.
     length: i32,
-    /// Of a piece; even.
+    /// The length of the longest segment, in steps; an even number.
     longest: i32,
+    /// Whether the line runs from its greater end to its lesser one.
     backward: bool,
 }
 
 impl CutPositions {
-    /// Those of a line below the anchors.
+    /// The cuts of the line from `from` to `to`, which lies below the anchors.
     pub fn new(anchors: Anchors, from: PagePoint, to: PagePoint) -> Self {
         let Anchors { left, width } = anchors;
         let ([first, last], backward) = in_order([from, to]);
@@ -48,13 +56,13 @@ impl CutPositions {
         let product = |a: i32, b: i32| i64::from(a) * i64::from(b);
         let foot = |x: i32| {
             let foot = product(x - first.x, dx) + product(left.y - first.y, dy);
-            // No farther than the anchor.
+            // The foot is no farther away than the anchor.
             foot.checked_div(length.into()).unwrap_or(0) as i32
         };
-        // The lesser end lies to the left, as the left anchor does.
+        // The lesser end is the left one, so the foot of the left anchor comes first.
         let (low, high) = (foot(left.x), foot(left.x + width));
         let middle = low + (high - low) / 2;
-        // No belt is shorter than the line lies below the anchors.
+        // No belt is shorter than the vertical distance of the line from the anchors.
         let least = (left.y - first.y.max(last.y)).max(1).unsigned_abs();
         let longest = ((least / 8).isqrt() as i32 & !1).max(2);
         let (feet, middle) = if backward {
@@ -65,7 +73,7 @@ impl CutPositions {
         Self { feet, middle, length, longest, backward }
     }
 
-    /// The cut behind the one at `cut` (0 where the line begins), or the line's end.
+    /// The next cut after `cut` (0 is the beginning of the line), or the end of the line.
     pub fn next(&self, cut: i32) -> i32 {
         let from = cut.max(NEAR - 1);
         let [first, second] = self.feet;
@@ -74,7 +82,7 @@ impl CutPositions {
         if next > self.length - NEAR { self.length } else { next }
     }
 
-    /// How much of the line is done at a cut if all of it is `whole`.
+    /// The length of the line up to a cut, in units in which the whole line is `whole` long.
     pub fn place(&self, cut: i32, whole: u32) -> u32 {
         let from_lesser = if self.backward { self.length - cut } else { cut };
         let product = u64::from(whole) * u64::from(from_lesser.unsigned_abs());
@@ -82,11 +90,12 @@ impl CutPositions {
         if self.backward { whole - place } else { place }
     }
 
-    /// The least cut that lies more than `way` behind the foot; they lie the same before it.
-    #[inline(never)] // Not in each of its places: flash is short.
+    /// The least cut that lies more than `way` steps beyond the foot. The cuts before the foot
+    /// mirror those after it.
+    #[inline(never)] // Inlining it at every call would cost too much flash.
     fn beyond(&self, way: i32) -> i32 {
         let longest = self.longest;
-        // Where pieces grow no more.
+        // From this distance on, all segments have the same length.
         let even = longest * (longest / 2);
         let last_within = |way: i32| {
             if way < even {

@@ -1,6 +1,8 @@
-//! Finding the corner of the travel: each axis runs to its switch, backs off, comes again slowly,
-//! backs off for good. There its position is 0. A polargraph winds one belt after the other; there
-//! its length is a setting.
+//! Homing: finds the corner of the travel by the limit switches.
+//!
+//! Each axis in turn runs to its switch, backs off, approaches the switch again slowly, and backs
+//! off to its final position. The position of the axis there becomes 0. A polargraph winds one belt
+//! after the other; the length of a homed belt is a setting.
 
 use super::{Alarm, Kinematics, Machine, MachineError, Setting, State, Target};
 use crate::drawing::{PAGE_LIMIT, PagePoint};
@@ -10,19 +12,19 @@ use crate::motion::{Move, PathLength, PushError};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Axis {
-    /// To the right.
+    /// The axis that counts to the right.
     X,
-    /// Up.
+    /// The axis that counts upward.
     Y,
 }
 
-/// The limit switches: whether each is pressed.
+/// The state of the limit switches: `true` where a switch is pressed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Switches {
-    /// At the low end of x.
+    /// The switch at the low end of x.
     pub x: bool,
-    /// At the low end of y.
+    /// The switch at the low end of y.
     pub y: bool,
 }
 
@@ -35,26 +37,27 @@ impl Switches {
         }
     }
 
-    /// Whether any is pressed.
+    /// Whether any switch is pressed.
     pub const fn any(self) -> bool {
         self.x || self.y
     }
 }
 
-/// The contacts at the board's inputs: whether each is closed.
+/// The state of the contacts at the board's inputs: `true` where a contact is closed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Contacts {
-    /// The limit switch of x.
+    /// The contact of the limit switch of x.
     pub x: bool,
-    /// The limit switch of y.
+    /// The contact of the limit switch of y.
     pub y: bool,
-    /// The emergency stop.
+    /// The contact of the emergency stop.
     pub stop: bool,
 }
 
 impl Contacts {
-    /// Those that are pressed if those of `mask` (bit 0 x, bit 1 y, bit 2 stop) are closed at rest.
+    /// The contacts that are pressed. `mask` says which contacts are closed when they are not
+    /// pressed: bit 0 for x, bit 1 for y, bit 2 for the emergency stop.
     #[must_use]
     pub const fn pressed(self, mask: u8) -> Self {
         Self {
@@ -65,51 +68,53 @@ impl Contacts {
     }
 }
 
-/// What the axis does.
+/// The phases of homing one axis, in order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) enum Phase {
-    /// Leaves a switch that was pressed at the start.
+    /// Backs off from a switch that was already pressed at the start.
     Leave,
-    /// Runs to the switch.
+    /// Runs quickly to the switch.
     Seek,
-    /// Backs off.
+    /// Backs off from the switch.
     Release,
-    /// Runs to it again, slowly.
+    /// Runs slowly to the switch again.
     Approach,
-    /// Backs off for good.
+    /// Backs off to the final position, where the switch must be released.
     PullOff,
 }
 
-/// A switch was not found within the travel, or not left by backing off.
+/// The error when a switch was not found within the travel, or was still pressed after backing off.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct SwitchFault;
 
-/// Where the homing is.
+/// The progress of homing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Homing {
     pub(super) axis: Axis,
     pub(super) phase: Phase,
-    /// Where the pins were when the switch was pressed.
+    /// The position of the pins when the switch was pressed during this phase or the one before;
+    /// `None` if it was not.
     pub(super) pressed_at: Option<PagePoint>,
-    /// The move of the phase is planned to its end.
+    /// Whether the move of this phase has been planned to its end.
     pub(super) is_stopped: bool,
 }
 
 impl Homing {
-    /// The first phase of an axis.
+    /// The first phase of an axis whose switch is `pressed` or not.
     pub(super) const fn begin(axis: Axis, pressed: bool) -> Self {
         let phase = if pressed { Phase::Leave } else { Phase::Seek };
         Self { axis, phase, pressed_at: None, is_stopped: false }
     }
 
-    /// Whether the phase is one of the slow ones.
+    /// Whether the axis moves slowly in this phase.
     pub(super) const fn is_slow(self) -> bool {
         matches!(self.phase, Phase::Approach | Phase::PullOff)
     }
 
-    /// How far the axis is to go: whole travels, and pull-offs.
+    /// The signed distance that the axis may go in this phase, in the unit of `travel` and
+    /// `pull_off`.
     pub(super) const fn distance(self, travel: i32, pull_off: i32) -> i32 {
         match self.phase {
             Phase::Leave | Phase::Release | Phase::PullOff => pull_off,
@@ -118,22 +123,23 @@ impl Homing {
         }
     }
 
-    /// Whether the phase ends at the switch.
+    /// Whether the phase ends when the switch is pressed.
     pub(super) const fn seeks(self) -> bool {
         matches!(self.phase, Phase::Seek | Phase::Approach)
     }
 
-    /// What follows when the machine stands; `None` at the end.
+    /// The phase that follows once the machine has stopped; `None` after the last one.
     ///
     /// # Errors
-    /// The switch was not found, or not left.
+    /// [`SwitchFault`] if the switch was not found, or is still pressed.
     pub(super) const fn next(self, switches: Switches) -> Result<Option<Self>, SwitchFault> {
         let pressed = switches.of(self.axis);
         let phase = match self.phase {
             Phase::Leave | Phase::Release if pressed => return Err(SwitchFault),
             Phase::Seek | Phase::Approach if self.pressed_at.is_none() => return Err(SwitchFault),
             Phase::Leave => Phase::Seek,
-            // From where it was pressed, however far the axis ran on.
+            // The next phase measures from where the switch was pressed, however far the axis ran
+            // on.
             Phase::Seek => {
                 return Ok(Some(Self { phase: Phase::Release, is_stopped: false, ..self }));
             }
@@ -154,8 +160,8 @@ impl Homing {
 }
 
 impl Machine<'_> {
-    /// Looks for the switches, x first, then y. Afterwards the machine stands at (0, 0), a pull-off
-    /// from each. [`Machine::watch`] must be called often.
+    /// Homes x first, then y. Afterwards the machine is at (0, 0), one pull-off away from each
+    /// switch. [`Machine::watch`] must be called often meanwhile.
     ///
     /// # Errors
     /// [`MachineError::State`] unless the machine is idle or in [`Alarm::NotHomed`].
@@ -170,8 +176,9 @@ impl Machine<'_> {
         Ok(())
     }
 
-    /// What the contacts say now, every turn of the main loop: the emergency stop is an alarm in any
-    /// state, the limit switches see [`Machine::watch`].
+    /// Reports the present state of the contacts. Call it in every turn of the main loop. A pressed
+    /// emergency stop raises an alarm in any state. The limit switches are passed on to
+    /// [`Machine::watch`].
     pub fn observe(&mut self, contacts: Contacts) {
         let pressed = contacts.pressed(self.settings.get(Setting::InvertContacts).to_num());
         self.switches = Switches { x: pressed.x, y: pressed.y };
@@ -182,14 +189,15 @@ impl Machine<'_> {
         self.watch(self.switches);
     }
 
-    /// What the limit switches say now. A pressed one ends an approach while the machine homes, and
-    /// is an alarm in any other motion if [`Setting::HardLimits`] is on.
+    /// Reports the present state of the limit switches. During homing, a pressed switch ends the
+    /// approach. In any other motion it raises an alarm if [`Setting::HardLimits`] is on.
     pub fn watch(&mut self, switches: Switches) {
         match (self.state, self.homing) {
             (State::Home, Some(homing)) => self.watch_homing(homing, switches),
             (State::Home | State::Check | State::Sleep | State::Alarm(_), _) => {}
             (State::Run | State::Hold { .. } | State::Jog | State::Abort | State::Idle, _) => {
-                // Idle as soon as all is planned, while the pins still move.
+                // The state becomes idle as soon as all events are planned, while the pins still
+                // move.
                 let is_limit = switches.any() && self.settings.is_on(Setting::HardLimits);
                 if is_limit && !self.is_stopped() {
                     self.alarm(Alarm::HardLimit);
@@ -222,13 +230,14 @@ impl Machine<'_> {
         }
     }
 
-    /// Gives the machine back its speed.
+    /// Ends homing, if it is in progress, and restores the normal limits.
     pub(super) fn end_homing(&mut self) {
         if self.homing.take().is_some() {
             self.take_settings();
         }
     }
 
+    /// Plans the move of a phase. Raises an alarm if the move cannot be planned.
     fn begin_phase(&mut self, homing: Homing) {
         let speed = if homing.is_slow() { Setting::HomingFeed } else { Setting::HomingSeek };
         self.runner.set_limits(self.settings.limits_at(speed), self.settings.pen_positions());
@@ -249,7 +258,8 @@ impl Machine<'_> {
         }
         self.homing = Some(homing);
         let pushed = if polargraph {
-            // A belt alone: where that leads the pen does not matter, only how far.
+            // Only one belt moves. Where that leads the pen does not matter, only how far the belt
+            // moves.
             let (end, page) = (self.runner.end(), self.runner.page_end());
             let page = PagePoint { x: page.x + point.x - end.x, y: page.y + point.y - end.y };
             let way = (page.x - self.runner.page_end().x, page.y - self.runner.page_end().y);
@@ -257,7 +267,7 @@ impl Machine<'_> {
             length.ok_or(PushError::TooLong).and_then(|length| {
                 let (motors, offsets, is_gap) = (point, [0; 2], false);
                 let belt = Move { motors, offsets, page, way, whole: length, length, is_gap };
-                // Its slack first, if there is any to take up.
+                // The first call may only take up the slack; then the move itself follows.
                 if !self.push_motors(&belt, None, PathLength::MAX)? {
                     self.push_motors(&belt, None, PathLength::MAX)?;
                 }
@@ -271,7 +281,8 @@ impl Machine<'_> {
         }
     }
 
-    /// What homing counts in: the belts of a polargraph, else the page.
+    /// The position in the coordinates that homing uses: the belt lengths of a polargraph,
+    /// otherwise the page.
     fn homing_place(&self, motors: PagePoint) -> PagePoint {
         match self.settings.kinematics() {
             Kinematics::Polargraph(_) => motors,
@@ -279,6 +290,8 @@ impl Machine<'_> {
         }
     }
 
+    /// Sets the position of an axis after its last phase: to 0, or to the homed length of a
+    /// polargraph's belt.
     fn set_zero(&mut self, axis: Axis) {
         let build = self.settings.kinematics();
         let mut place = self.homing_place(self.runner.position());

@@ -1,19 +1,21 @@
-//! From a path to events: measuring it, reading it, filling the queue, standing where it asks.
+//! Runs a job: measures the path, reads its targets, fills the event queue, and stops where the
+//! path or the user demands it.
 
 use super::status::Estimate;
 use super::{Alarm, JobSize, Kinematics, Machine, MachineError, Path, Setting, State, Target};
 use crate::drawing::{PAGE_LIMIT, PagePoint};
 use crate::motion::{EventQueue, PathLength, Progress, Runner};
 
-/// A turn of the main loop may take so long: 20 ms, while it writes to the serial line.
+/// The longest time that one turn of the main loop may take: 20 ms, while it writes to the serial
+/// line.
 const LATE_TICKS: u32 = crate::motion::TICKS_PER_SECOND / 50;
 
 impl Machine<'_> {
-    /// Measures the path from where the machine stands, and begins to draw it if all of it can be
-    /// drawn (in [`State::Check`] it is only measured).
+    /// Measures the path from the machine's present position. If all of it can be drawn, the
+    /// machine begins to draw it. In [`State::Check`] the path is only measured.
     ///
     /// # Errors
-    /// See [`MachineError`]; nothing moves then.
+    /// See [`MachineError`]. On an error nothing moves.
     pub fn start(&mut self, path: &mut dyn Path) -> Result<JobSize, MachineError> {
         if !matches!(self.state, State::Idle | State::Check) {
             return Err(MachineError::State(self.state));
@@ -29,8 +31,8 @@ impl Machine<'_> {
         Ok(size)
     }
 
-    /// Keeps the queue filled: reads targets while the look-ahead has room, hands over events while
-    /// the queue has room and the plan is not too far ahead. Call it often.
+    /// Keeps the queue filled. It reads targets while the look-ahead has room, and appends events
+    /// while the queue has room and the plan is not too far ahead of the pins. Call it often.
     pub fn fill(&mut self, path: &mut dyn Path, queue: &mut dyn EventQueue) {
         self.runner.follow_lift(self.pins.ticks());
         if let State::Alarm(alarm) = self.state {
@@ -56,8 +58,8 @@ impl Machine<'_> {
         }
     }
 
-    /// In an alarm a motor that holds the pen raises it, as soon as the queue is empty; after a restart, when the
-    /// motors had no current, they have none afterwards.
+    /// During an alarm, a motor that holds the pen down raises it as soon as the queue is empty.
+    /// After a restart the motors had no current, so they are switched off again afterwards.
     fn raise_pen(&mut self, alarm: Alarm, queue: &mut dyn EventQueue) {
         let restarted = alarm == Alarm::Restarted;
         if self.pins.is_halted() {
@@ -78,6 +80,7 @@ impl Machine<'_> {
         }
     }
 
+    /// Whether there may be events to plan.
     fn is_moving(&self) -> bool {
         matches!(
             self.state,
@@ -85,13 +88,17 @@ impl Machine<'_> {
         ) || self.homing.is_some_and(|homing| !homing.is_stopped)
     }
 
+    /// Whether a plan that is `ahead` ticks ahead of the pins is long enough for now.
     fn is_far_enough(&self, ahead: u32) -> bool {
-        // A switch is to stop the machine soon.
+        // During homing, a switch must stop the machine soon, so little is planned ahead.
         let enough = if self.homing.is_some() { LATE_TICKS } else { self.ahead_ticks };
-        // Less than it takes to stop would slow the machine whenever the main loop is late by that much.
+        // If the plan covered less than the time to stop, the machine would slow down whenever the
+        // main loop is late by that much.
         ahead >= enough && ahead >= self.runner.stopping_ticks().saturating_add(LATE_TICKS)
     }
 
+    /// Changes the state after the runner has planned the machine to a stop, for the reason
+    /// `progress`.
     fn stand(&mut self, progress: Progress) {
         match self.state {
             State::Hold { .. } | State::Run
@@ -121,13 +128,14 @@ impl Machine<'_> {
         }
     }
 
-    /// The pause after so much ink counts from here.
+    /// Restarts the count of the ink after which the machine pauses.
     pub(super) fn reset_ink_budget(&mut self) {
         let metres = u64::from(self.settings.get(Setting::InkBeforePause).to_bits().unsigned_abs());
-        // 2^-16 m to 2^-18 mm.
+        // Converts units of 2^-16 m to units of 2^-18 mm.
         self.runner.stop_after_ink((metres > 0).then_some(metres * 4000));
     }
 
+    /// Reads targets from the path while the look-ahead has room for their moves.
     fn read_targets(&mut self, path: &mut dyn Path) {
         if self.split.is_some() {
             self.push_pieces();
@@ -138,7 +146,7 @@ impl Machine<'_> {
                     self.next_pen = Some((path.pen(), target));
                     self.runner.end_path();
                 }
-                // Measured at the start, so it fits.
+                // The whole path was measured at the start, so every move fits.
                 Some(target) => {
                     if self.push(target, PathLength::MAX).is_err() {
                         self.abort();
@@ -152,11 +160,12 @@ impl Machine<'_> {
         }
     }
 
+    /// Computes the size of the job and checks every target against the travel.
     fn measure(&self, path: &mut dyn Path) -> Result<JobSize, MachineError> {
         path.rewind();
         let mut size = JobSize::default();
         let mut at = self.runner.page_end();
-        // Another pen begins another stroke, where the last one ended too.
+        // A change of the pen begins a new stroke, even at the point where the last stroke ended.
         let (mut inked, mut pen) = (false, self.pen);
         let mut estimate = Estimate::default();
         let mut number = 0u32;
@@ -185,12 +194,14 @@ impl Machine<'_> {
         Ok(size)
     }
 
-    /// Whether the pen may go to `point`.
+    /// Checks whether the pen may move to `point`. `target` is the index of the target, for the
+    /// error.
     ///
     /// # Errors
-    /// [`MachineError::BeyondTravel`] with this number of the target.
+    /// [`MachineError::BeyondTravel`] with the index `target`.
     pub fn check_travel(&self, target: u32, point: PagePoint) -> Result<(), MachineError> {
-        // Belts are no use above their anchors.
+        // A polargraph is always limited, because its belts cannot hold the pen above their
+        // anchors.
         let limited = self.settings.is_on(Setting::SoftLimits)
             || matches!(self.settings.kinematics(), Kinematics::Polargraph(_));
         let beyond = |at: i32, travel: Setting, steps_per_mm: Setting| {

@@ -1,49 +1,55 @@
-//! How the pen's place on the page follows from the two motors.
+//! Kinematics: converts between the position of the pen on the page and the positions of the two
+//! motors.
 
 use super::CutPositions;
 use crate::drawing::PagePoint;
 use crate::step::Line;
 
-/// The build of the machine.
+/// The kind of kinematics of the machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Kinematics {
-    /// One motor for x, one for y.
+    /// One motor moves x, the other moves y.
     #[default]
     Cartesian,
-    /// Two motors at one belt: the first turns by x + y, the second by x - y.
+    /// Two motors drive one belt: the first turns by x + y, the second by x - y.
     CoreXy,
-    /// The pen hangs on two belts; each motor counts the steps of its belt's length.
+    /// The pen hangs on two belts. The position of each motor is the length of its belt, in steps.
     Polargraph(Anchors),
 }
 
-/// Of a step: the walls that there may be allow so many, and what is finer changes nothing.
+/// The least and the most fraction bits of a step in which a line on a polargraph is computed. The
+/// greatest polargraph that the settings allow leaves room for the least; more than the most would
+/// not change the result.
 const LEAST_BITS: u32 = 8;
 const MOST_BITS: u32 = 14;
 
-/// The end of a piece of a line.
+/// The end of a segment of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SegmentEnd {
-    /// The motors' steps there.
+    /// The positions of the motors there, in steps.
     pub motors: PagePoint,
-    /// The page's.
+    /// The position on the page there, in steps.
     pub page: PagePoint,
-    /// How far start and end lie beside the motors' steps: see [`Line::beside`](crate::step::Line::beside).
+    /// How far the exact start and the exact end of the segment lie beside the rounded motor
+    /// positions: see [`Line::beside`](crate::step::Line::beside).
     pub offsets: [i8; 2],
 }
 
-/// Where the belts of a polargraph leave their motors: both at the same height, above the page.
+/// Where the belts of a polargraph leave their motors. Both anchors are at the same height, above
+/// the page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Anchors {
-    /// The left one, in steps from the page's origin; at most 2^21 each way.
+    /// The left anchor, in steps from the page's origin; each coordinate is within ±2^21.
     pub left: PagePoint,
-    /// From it to the right one, in steps: 1 to 2^21.
+    /// The distance from the left anchor to the right one, in steps: 1 to 2^21.
     pub width: i32,
 }
 
 impl Kinematics {
-    /// The motors' steps for a place on the page, which is below the anchors.
+    /// The motor positions, in steps, for a position on the page. On a polargraph the position must
+    /// be below the anchors.
     ///
     /// ```
     /// use penup::drawing::PagePoint;
@@ -68,10 +74,12 @@ impl Kinematics {
         }
     }
 
-    /// The piece of a straight line on the page between two `places` along it, counted such that the line is
-    /// `length` long. It begins where the motors stand in the end of the piece before, at `begin`.
+    /// The segment of a straight line on the page between two positions `places` along it, in units
+    /// in which the whole line is `length` long. `begin` is the position of the motors at the end
+    /// of the previous segment, where this segment begins.
     ///
-    /// All is reckoned from the line's lesser end, so drawn backward it has the same points.
+    /// Everything is computed from the lesser end of the line, so a line drawn backward has the
+    /// same points.
     pub fn piece(
         self,
         ends: [PagePoint; 2],
@@ -101,7 +109,8 @@ impl Kinematics {
         let more = usize::from((motors.x - begin.x).abs() <= (motors.y - begin.y).abs());
         let offsets = [(start, begin), (end, motors)].map(|(place, PagePoint { x, y })| {
             let (steps, others) = if more == 0 { (x, y) } else { (y, x) };
-            // At the ends of a line both belts are rounded, so it may be more than half of a step.
+            // At the ends of a line the lengths of both belts are rounded, so the offset may be
+            // more than half a step.
             let step = 1 << line.bits;
             let beside = line.beside(place, steps, more) - (others << line.bits);
             let units = beside.clamp(-step, step) * Line::OFFSET_UNIT;
@@ -112,7 +121,8 @@ impl Kinematics {
         SegmentEnd { motors, page, offsets }
     }
 
-    /// The place on the page for the motors' steps; rounded where it lies between two steps.
+    /// The position on the page for motor positions in steps. It is rounded where it lies between
+    /// two steps.
     pub fn page(self, motors: PagePoint) -> PagePoint {
         match self {
             Self::Cartesian => motors,
@@ -123,7 +133,7 @@ impl Kinematics {
             Self::Polargraph(Anchors { left, width }) => {
                 let square = |steps: i32| i64::from(steps) * i64::from(steps);
                 let [a, b, w] = [motors.x, motors.y, width].map(square);
-                // Belts of up to 2^23 steps: squares below 2^46.
+                // Belts have up to 2^23 steps, so the squares are at most 2^46.
                 let twice = 2 * i64::from(width).max(1);
                 let x = (a - b + w + twice / 2).div_euclid(twice);
                 let down = (a - x * x).max(0).unsigned_abs();
@@ -132,7 +142,8 @@ impl Kinematics {
         }
     }
 
-    /// Where a line of the page is cut into pieces; `None` if it is straight for the motors, too.
+    /// Where a line on the page is cut into segments; `None` if the line is also straight for the
+    /// motors.
     pub fn cuts(self, from: PagePoint, to: PagePoint) -> Option<CutPositions> {
         match self {
             Self::Polargraph(anchors) => Some(CutPositions::new(anchors, from, to)),
@@ -141,29 +152,30 @@ impl Kinematics {
     }
 }
 
-/// The ends of a line, the lesser first, and whether that turns it round.
+/// Returns the ends of a line with the lesser one first, and whether this reverses the line.
 pub(super) fn in_order([a, b]: [PagePoint; 2]) -> ([PagePoint; 2], bool) {
     let backward = (b.x, b.y) < (a.x, a.y);
     (if backward { [b, a] } else { [a, b] }, backward)
 }
 
-/// A line on a wall, in 2^-`bits` steps from the left anchor, to the right and down.
+/// A line on the page of a polargraph, in units of 2^-`bits` steps. Coordinates count from the left
+/// anchor, to the right and downward.
 struct FineLine {
     bits: u32,
     from: [i32; 2],
     way: [i32; 2],
     width: i32,
-    /// The way again, made as long as 32 bits allow: only its direction counts.
+    /// The same vector as `way`, scaled up as far as 32 bits allow. Only its direction matters.
     direction: [i32; 2],
 }
 
-/// A place on it.
+/// A point on a [`FineLine`].
 #[derive(Clone, Copy)]
 struct FinePlace {
     place: [i32; 2],
-    /// The lengths of both belts.
+    /// The lengths of both belts, in units of 2^-`bits` steps.
     belts: [i32; 2],
-    /// How fast they change along the line, one against the other.
+    /// The rates at which the belt lengths change along the line. Only their ratio matters.
     ways: [i32; 2],
 }
 
@@ -171,22 +183,22 @@ impl FineLine {
     fn new(Anchors { left, width }: Anchors, ends: [PagePoint; 2]) -> Self {
         let [from, to] = ends.map(|end| [end.x - left.x, left.y - end.y]);
         let greatest = [from, to].map(|[x, y]| x.abs().max((width - x).abs()).max(y.abs()));
-        // Below 2^22, so that all stays below 2^30.
+        // The greatest coordinate is below 2^22, so everything stays below 2^30.
         let bits = (greatest[0].max(greatest[1]) | 1).leading_zeros() - 2;
         let bits = bits.clamp(LEAST_BITS, MOST_BITS);
         let way = [to[0] - from[0], to[1] - from[1]];
-        // Below 2^21.
+        // The components are below 2^21.
         let longer = (way[0].abs().max(way[1].abs()) | 1).leading_zeros().saturating_sub(10);
         let direction = way.map(|way| way << longer);
         let [from, way] = [from, way].map(|point| point.map(|steps| steps << bits));
         Self { bits, from, way, width: width << bits, direction }
     }
 
-    /// The place at `done` of a `length`.
-    #[inline(never)] // Not in each of its places: flash is short.
+    /// The point on the line after `done` of `length` units.
+    #[inline(never)] // Inlining it at every call would cost too much flash.
     fn at(&self, done: u32, length: u32) -> FinePlace {
         let along = |axis: usize| {
-            // Below 2^62.
+            // The product is below 2^62.
             let way = i64::from(self.way[axis]) * i64::from(done);
             self.from[axis] + way.checked_div(length.into()).unwrap_or(0) as i32
         };
@@ -194,39 +206,40 @@ impl FineLine {
         let beside = [x, x - self.width];
         let belts = beside.map(|x| length_of(x, y));
         let way = |axis: usize| {
-            // Below 2^54.
+            // The sum is below 2^54.
             let [right, down] = self.direction.map(i64::from);
             let way = i64::from(beside[axis]) * right + i64::from(y) * down;
-            // Below 2^23, as the direction.
+            // The quotient is below 2^23, as the direction is.
             way.checked_div(belts[axis].into()).unwrap_or(0) as i32
         };
         FinePlace { place, belts, ways: [way(0), way(1)] }
     }
 
-    /// The length of the other belt where, beside a place on the line, the belt `more` is `steps` long.
-    #[inline(never)] // Not in each of its places: flash is short.
+    /// The length of the other belt at the point near `place` where belt `more` is `steps` steps
+    /// long. The result is in units of 2^-`bits` steps.
+    #[inline(never)] // Inlining it at every call would cost too much flash.
     fn beside(&self, place: FinePlace, steps: i32, more: usize) -> i32 {
         let ahead = i64::from((steps << self.bits) - place.belts[more]);
         let ahead = ahead * i64::from(place.ways[1 - more]);
-        // A step or two, unless the belts nearly stand still.
+        // The extrapolation covers a step or two, unless the belt lengths hardly change.
         let ahead = ahead.checked_div(place.ways[more].into()).unwrap_or(0);
         place.belts[1 - more].saturating_add(ahead as i32)
     }
 }
 
-/// √(x² + y²), rounded.
-#[inline(never)] // Not in each of its places: flash is short.
+/// √(x² + y²), rounded to the nearest integer.
+#[inline(never)] // Inlining it at every call would cost too much flash.
 pub(super) fn length_of(x: i32, y: i32) -> i32 {
     let square = |steps: i32| i64::from(steps).unsigned_abs() * i64::from(steps).unsigned_abs();
     rounded_root(square(x) + square(y))
 }
 
-/// A number of 2^-`bits`, one bit at least, rounded.
+/// Rounds a number in units of 2^-`bits` to the nearest integer; `bits` is at least 1.
 fn rounded(fine: i32, bits: u32) -> i32 {
     (fine + (1 << (bits - 1))) >> bits
 }
 
-/// The root of a number below 2^62, rounded.
+/// The square root of a number below 2^62, rounded to the nearest integer.
 fn rounded_root(squared: u64) -> i32 {
     (4 * squared).isqrt().div_ceil(2) as i32
 }

@@ -1,12 +1,14 @@
-//! Axes, kinematics, pen, limits, homing, hold, abort: a state machine.
+//! The plotter as a state machine: axes, kinematics, pen, travel limits, homing, feed hold and
+//! abort.
 //!
-//! [`Machine`] is the main loop's side. It takes a [`Path`], refuses it before anything moves if it
-//! leads beyond the travel, and keeps the interrupt's queue filled. [`Pulser`] is the interrupt's
-//! side; [`PulserState`] joins the two. The events are a function of path and settings, and of the
-//! call of [`Machine::fill`] at which an order arrives: time is never read.
+//! [`Machine`] runs in the main loop. It takes a [`Path`] and measures it first, so that a path
+//! that leaves the travel is refused before anything moves. Then it keeps the queue of the step
+//! interrupt filled. [`Pulser`] runs in the step interrupt, and [`PulserState`] holds what the two
+//! share. No code here reads a clock: the events depend only on the path, the settings, and the
+//! call of [`Machine::fill`] at which a command arrives.
 //!
-//! Refused: orders that the state does not allow, settings that conflict, moves beyond the limits;
-//! each leaves everything as it was.
+//! The machine refuses commands that its state does not allow, settings that conflict, and moves
+//! beyond the limits. A refused command changes nothing.
 
 mod cut_positions;
 mod homing;
@@ -36,113 +38,120 @@ pub use status::Status;
 use crate::drawing::PagePoint;
 use crate::motion::{Block, PathLength, RunLengths, Runner};
 
-/// What the machine does.
+/// What the machine is doing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum State {
-    /// Ready.
+    /// The machine is at rest and ready for a command.
     Idle,
-    /// Draws.
+    /// The machine draws a path, or moves that are sent one by one.
     Run,
-    /// Slows down on the path, or stands there with the pen raised.
+    /// A feed hold: the machine slows down along the path, or it has stopped with the pen raised.
     Hold {
-        /// Whether it stands.
+        /// Whether the machine has stopped. `false` while it still slows down.
         standing: bool,
     },
-    /// Slows down to give the job up; then [`State::Idle`].
+    /// The machine slows down to cancel the job; [`State::Idle`] follows.
     Abort,
-    /// Moves by hand.
+    /// The machine makes moves that the user commands by hand (jogging).
     Jog,
-    /// Looks for the switches.
+    /// The machine is homing: it searches for the limit switches.
     Home,
-    /// Jobs are measured, not drawn.
+    /// Check mode: jobs are measured, but not drawn.
     Check,
-    /// Stopped; needs [`Machine::unlock`].
+    /// The machine has stopped because of an alarm. [`Machine::unlock`] ends the alarm.
     Alarm(Alarm),
-    /// Motors off; needs [`Machine::unlock`].
+    /// The motors are switched off. [`Machine::unlock`] ends this state.
     Sleep,
 }
 
-/// Why the machine stopped.
+/// The reason for an alarm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Alarm {
-    /// The emergency stop.
+    /// The emergency stop was pressed.
     EmergencyStop,
-    /// A limit switch.
+    /// A limit switch was pressed during a move.
     HardLimit,
-    /// The machine starts without knowing where it is; [`Machine::home`] finds out.
+    /// The machine has just started and does not know its position. [`Machine::home`] finds the
+    /// position.
     NotHomed,
-    /// A switch was not found, or stayed pressed.
+    /// Homing did not find the switch of this axis, or the switch stayed pressed.
     HomingFailed(Axis),
-    /// The queue refused an event although it had room: a fault of the program.
+    /// The queue refused an event although it had reported room. This is a bug in the firmware.
     Queue,
-    /// The watchdog started the board again: a fault of the program.
+    /// The watchdog restarted the board. This is a bug in the firmware.
     Restarted,
 }
 
-/// Why an order was refused.
+/// Why a command was refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MachineError {
-    /// The state does not allow it.
+    /// The command is not allowed in this state.
     State(State),
     /// A target lies beyond the travel.
     BeyondTravel {
-        /// Which target, from 0.
+        /// The index of the target, counted from 0.
         target: u32,
-        /// Millimetres beyond x (negative: below 0).
+        /// How far the target lies beyond the travel of x, in millimetres; negative if it lies
+        /// below 0.
         x: Value,
-        /// Millimetres beyond y.
+        /// How far the target lies beyond the travel of y, in millimetres; negative if it lies
+        /// below 0.
         y: Value,
     },
-    /// A move is longer than motion can plan: 16 m.
+    /// A move is longer than the motion planner can plan: 16 m.
     MoveTooLong {
-        /// Which target, from 0.
+        /// The index of the target, counted from 0.
         target: u32,
     },
 }
 
-/// The main loop's side of the plotter.
+/// The state of the plotter that the main loop owns.
 #[derive(Debug)]
 pub struct Machine<'m> {
     settings: Settings,
     state: State,
     runner: Runner<'m>,
     pins: &'m PulserState,
-    /// The motors' position where the pins' count is 0.
+    /// The position of the motors, in steps, at which the step counters of `pins` are 0.
     origin: PagePoint,
     ahead_ticks: u32,
     job: JobSize,
-    /// The runner's lengths and strokes when the job began.
+    /// The runner's totals of lengths and strokes when the job began.
     before: RunLengths,
-    /// The move that is being cut into pieces.
+    /// The move that is being cut into segments, if any.
     split: Option<Segmenter>,
     slack: Backlash,
     /// Whether the path has been read to its end.
     path_ended: bool,
-    /// Whether the drivers are to be switched off once.
+    /// Whether the drivers are still to be switched off because of [`Machine::sleep`].
     sleep_due: bool,
     homing: Option<Homing>,
-    /// What was pressed when last observed.
+    /// The limit switches that were pressed when they were last observed.
     switches: Switches,
     stop_is_pressed: bool,
-    /// Whether the moves come one by one, and whether the last of them was inked.
+    /// Whether the moves are sent one by one, and (`stream_is_inked`) whether the last of them was
+    /// drawn with the pen down.
     streaming: bool,
     stream_is_inked: bool,
-    /// Speeds in percent of the settings.
+    /// The speed override, in percent of the speeds in the settings.
     percent: u8,
-    /// The pen in the holder.
+    /// The number of the pen in the holder, counted from 0.
     pen: u8,
-    /// The pen that comes next, and the first target that it draws.
+    /// The pen to be inserted next, and the first target that it draws.
     next_pen: Option<(u8, Target)>,
 }
 
 impl<'m> Machine<'m> {
-    /// A machine at rest at the page's origin, pen raised; in alarm if it must be homed first.
+    /// A machine at rest at the page's origin with the pen raised. If the settings require homing,
+    /// it starts in the alarm [`Alarm::NotHomed`].
     ///
-    /// `blocks` is the look-ahead (24 bytes each; one at least, 100 or more serve well). `ahead_ticks` is how far
-    /// the queue is planned ahead of the pins, or further if the machine could not stop within that
-    /// should the main loop be late; so late a hold takes effect. `u32::MAX` for no bound but the queue's.
+    /// `blocks` is the memory of the look-ahead, at 24 bytes per block. It needs at least one
+    /// block; 100 or more work well. `ahead_ticks` is how far the queue is planned ahead of the
+    /// pins. The machine plans further ahead if it could otherwise not stop in time when the main
+    /// loop is late. A feed hold takes effect after that delay. With `u32::MAX` only the size of
+    /// the queue limits the planning.
     pub fn new(
         settings: Settings,
         blocks: &'m mut [Block],
@@ -188,7 +197,7 @@ impl<'m> Machine<'m> {
     /// Changes a setting.
     ///
     /// # Errors
-    /// See [`SettingError`]; the old value stays then.
+    /// See [`SettingError`]. On an error the setting keeps its old value.
     pub fn set(&mut self, setting: Setting, value: Value) -> Result<(), SettingError> {
         if !matches!(self.state, State::Idle | State::Check | State::Alarm(_)) || !self.is_stopped()
         {
@@ -199,7 +208,7 @@ impl<'m> Machine<'m> {
         self.settings.set(setting, value)?;
         self.resize_slack(slack);
         if self.settings.kinematics() != before {
-            // The pen stays where it is; the motors count otherwise.
+            // The pen stays where it is, but the motors' coordinates for that position change.
             self.set_position(page);
         }
         self.take_settings();
@@ -207,21 +216,25 @@ impl<'m> Machine<'m> {
         Ok(())
     }
 
+    /// Passes the limits, the pen positions and the override to the motion planner.
     fn take_settings(&mut self) {
         self.runner.set_limits(self.settings.limits(), self.settings.pen_positions());
         self.runner.set_override(self.percent);
     }
 
-    /// What it does.
+    /// What the machine is doing.
     pub fn state(&self) -> State {
         self.state
     }
 
-    /// The machine stands at `page`, whatever it thought: the pins' count starts from there.
+    /// Declares that the machine is at `page`, whatever position it had. The step counters of the
+    /// pins keep their values; only their origin changes.
     fn set_position(&mut self, page: PagePoint) {
         self.set_motors(self.settings.kinematics().motors(page), page);
     }
 
+    /// Does the same as [`Machine::set_position`], with the position given both for the motors and
+    /// on the page.
     fn set_motors(&mut self, motors: PagePoint, page: PagePoint) {
         let (x, y) = self.pins.steps();
         self.origin = PagePoint { x: motors.x.wrapping_sub(x), y: motors.y.wrapping_sub(y) };
@@ -231,7 +244,8 @@ impl<'m> Machine<'m> {
         self.runner.set_position(motors, slack, page, self.pins.ticks());
     }
 
-    /// Slows down on the path and raises the pen. Ends moves by hand; nothing happens in other states.
+    /// Slows down along the path and raises the pen. A jog is ended instead. In other states
+    /// nothing happens.
     pub fn hold(&mut self) {
         match self.state {
             State::Run => {
@@ -243,15 +257,16 @@ impl<'m> Machine<'m> {
         }
     }
 
-    /// Pauses as soon as the stroke in work ends; [`Machine::resume`] goes on.
+    /// Pauses at the end of the current stroke. [`Machine::resume`] continues the job.
     pub fn pause_after_stroke(&mut self) {
         if self.state == State::Run {
             self.runner.stop_after_stroke();
         }
     }
 
-    /// Scales the speeds to `percent` of the settings, 10 to 200, at once; never above the greater
-    /// of the two.
+    /// Scales the speeds to `percent` of the settings, with immediate effect. The value is clamped
+    /// to 10 to 200. Neither speed is raised above the greater of the two speeds in the settings,
+    /// those with the pen down and up.
     pub fn set_override(&mut self, percent: u8) {
         self.percent = percent.clamp(10, 200);
         if self.homing.is_none() {
@@ -259,8 +274,8 @@ impl<'m> Machine<'m> {
         }
     }
 
-    /// Lowers the pen where it was raised and goes on; with the next pen, if the machine waited for
-    /// it.
+    /// Lowers the pen where it was raised and continues the job. If the machine waited for a pen
+    /// change, it continues with the next pen.
     pub fn resume(&mut self) {
         if matches!(self.state, State::Hold { .. }) {
             if self.state == (State::Hold { standing: true })
@@ -278,7 +293,8 @@ impl<'m> Machine<'m> {
         }
     }
 
-    /// Slows down, raises the pen, forgets the job, keeps the position. Ends a hold and a jog, too.
+    /// Slows down, raises the pen and cancels the job. The position stays known. This also ends a
+    /// feed hold, a jog and homing.
     pub fn abort(&mut self) {
         if matches!(self.state, State::Run | State::Hold { .. } | State::Jog | State::Home) {
             self.end_homing();
@@ -291,9 +307,10 @@ impl<'m> Machine<'m> {
         }
     }
 
-    /// Stops the pulses at once and raises the pen. The position is where the pins stopped.
+    /// Stops the pulses at once, raises the pen and enters the alarm. The position is where the
+    /// pins stopped.
     pub fn alarm(&mut self, alarm: Alarm) {
-        // What the interrupt has not begun with yet it has still to throw away.
+        // Events that the interrupt has not begun to process must still be discarded by it.
         let waits = self.pins.is_drained() && !self.is_stopped();
         self.pins.halt();
         if waits {
@@ -310,7 +327,7 @@ impl<'m> Machine<'m> {
         self.state = State::Alarm(alarm);
     }
 
-    /// Switches the motors off.
+    /// Switches the motors off. [`Machine::unlock`] ends this state.
     ///
     /// # Errors
     /// [`MachineError::State`] unless the machine is idle.
@@ -323,10 +340,10 @@ impl<'m> Machine<'m> {
         Ok(())
     }
 
-    /// Whether jobs are measured only.
+    /// Switches check mode on or off. In check mode, jobs are measured but not drawn.
     ///
     /// # Errors
-    /// [`MachineError::State`] unless the machine is idle or checks.
+    /// [`MachineError::State`] unless the machine is idle or in check mode.
     pub fn check(&mut self, on: bool) -> Result<(), MachineError> {
         if !matches!(self.state, State::Idle | State::Check) {
             return Err(MachineError::State(self.state));
@@ -335,14 +352,15 @@ impl<'m> Machine<'m> {
         Ok(())
     }
 
-    /// Leaves alarm and sleep. After an alarm the position is what the pins counted.
+    /// Ends an alarm or sleep. After an alarm, the position is the one that the step counters of
+    /// the pins give.
     ///
     /// # Errors
-    /// [`MachineError::State`] in other states, while the interrupt still empties its queue, while a
-    /// motor still raises the pen, and while the emergency stop is pressed.
+    /// [`MachineError::State`] in other states, while the interrupt still empties its queue, while
+    /// a motor still raises the pen, and while the emergency stop is pressed.
     pub fn unlock(&mut self) -> Result<(), MachineError> {
         match self.state {
-            // The motors were off.
+            // The motors had no current, so the slack and the height of the pen are unknown.
             State::Sleep => {
                 self.slack.forget();
                 self.runner.forget_lift();
@@ -361,13 +379,14 @@ impl<'m> Machine<'m> {
         Ok(())
     }
 
-    /// Whether every event has been worked off: the pins stand where the plan does.
+    /// Whether every event has been processed, so that the pins are where the plan ends.
     pub fn is_stopped(&self) -> bool {
         self.pins.is_drained()
             && (self.pins.is_halted() || self.pins.ticks() == self.runner.ticks())
     }
 
-    /// While nothing moves.
+    /// Passes pulse width, pin inversion and braking rule to the interrupt. Call it only while
+    /// nothing moves.
     fn configure_pulser(&mut self) {
         self.pins.configure(
             self.settings.microseconds_as_ticks(Setting::StepPulse),

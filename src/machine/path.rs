@@ -1,31 +1,32 @@
-//! The ordered drawing, as the machine asks for it, and what it will take.
+//! The interface through which the machine reads an ordered drawing, and the measured size of a
+//! job.
 
 use crate::drawing::{LineType, PagePoint};
 use crate::step::tape::{Decoder, TapeLines};
 
-/// Where the pen goes next, and whether it draws on the way.
+/// Where the pen moves next, and whether it draws on the way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Target {
     /// The end of the move.
     pub point: PagePoint,
-    /// `None` with the pen up, else how the line is inked.
+    /// The line type of the stroke; `None` if the pen is raised during the move.
     pub ink: Option<LineType>,
 }
 
-/// The ordered drawing, as the machine asks for it: once to measure it, once to draw it.
+/// An ordered drawing. The machine reads it twice: once to measure it and once to draw it.
 pub trait Path {
-    /// The next target, `None` at the end.
+    /// Returns the next target, or `None` at the end.
     fn next_target(&mut self) -> Option<Target>;
-    /// Begins again with the first target.
+    /// Restarts the path at the first target.
     fn rewind(&mut self);
-    /// The pen that the last target given wants, from 0. The machine stands and waits for
-    /// [`Machine::resume`](super::Machine::resume) where it changes.
+    /// The number of the pen, from 0, for the target that was returned last. Where the number
+    /// changes, the machine stops and waits for [`Machine::resume`](super::Machine::resume).
     fn pen(&self) -> u8 {
         0
     }
 }
 
-/// A path of targets in memory.
+/// A path given by a slice of targets.
 ///
 /// ```
 /// use penup::drawing::PagePoint;
@@ -62,7 +63,7 @@ impl Path for TargetList<'_> {
     }
 }
 
-/// A tape as a path from where the machine stands: its moves, and full lines where its pen is down.
+/// A tape as a path: its moves, drawn as full lines where its pen is down.
 #[derive(Debug, Clone)]
 pub struct TapePath<I> {
     start: PagePoint,
@@ -71,7 +72,7 @@ pub struct TapePath<I> {
 }
 
 impl<I: Iterator<Item = u8> + Clone> TapePath<I> {
-    /// The path of a tape whose first move is made from `start`.
+    /// The path of the tape `rows`, whose first move starts at `start`.
     pub fn new(start: PagePoint, rows: I) -> Self {
         let lines = TapeLines::new(start, Decoder::new(rows.clone()));
         Self { start, rows, lines }
@@ -88,16 +89,17 @@ impl<I: Iterator<Item = u8> + Clone> Path for TapePath<I> {
     }
 }
 
-/// What a path amounts to. Lengths in units of 2^-18 mm.
+/// The size of a job. Lengths are in units of 2^-18 mm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct JobSize {
-    /// Strokes: runs of inked targets.
+    /// The number of strokes. A stroke is a sequence of consecutive targets drawn with the pen
+    /// down.
     pub strokes: u32,
-    /// Length with the pen down.
+    /// The total length with the pen down.
     pub drawn: u64,
-    /// Length with the pen up.
+    /// The total length with the pen up.
     pub travelled: u64,
-    /// How long it takes, about, with the speeds as set.
+    /// The estimated duration at the speeds in the settings, in milliseconds.
     pub milliseconds: u64,
 }

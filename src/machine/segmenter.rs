@@ -1,38 +1,39 @@
-//! A move to pieces that are straight for the motors, too.
+//! Cuts a move into segments that are straight for the motors too, and appends them to the plan.
 
 use super::{Machine, SegmentEnd, Target};
 use crate::drawing::{LineType, PagePoint};
 use crate::motion::{Move, PathLength, PushError};
 use crate::step::Pattern;
 
-/// What is left of a move.
+/// The remaining part of a move that is being cut into segments.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Segmenter {
     from: PagePoint,
     to: PagePoint,
     length: PathLength,
-    /// How much of its length is done.
+    /// The length that has been appended already.
     place: PathLength,
-    /// The last of its cuts behind it; 0 at the beginning.
+    /// The last cut that has been passed, in steps; 0 at the beginning.
     cut: i32,
-    /// The dot or gap in work.
+    /// The index of the current dot or gap of the line type.
     dot: u32,
     ink: Option<LineType>,
     limit: PathLength,
 }
 
 impl Segmenter {
-    /// Where the last piece ends.
+    /// Where the last segment ends, on the page.
     pub(super) fn end(&self) -> PagePoint {
         self.to
     }
 }
 
 impl Machine<'_> {
-    /// Appends a move, not faster than a stopping distance, in pieces. Says how long it is.
+    /// Appends a move in segments and returns its length. `limit` bounds its speed, given as a
+    /// stopping distance.
     ///
     /// # Errors
-    /// See [`PushError`]; nothing is appended then.
+    /// See [`PushError`]. On an error nothing is appended.
     pub(super) fn push(
         &mut self,
         target: Target,
@@ -51,7 +52,7 @@ impl Machine<'_> {
         Ok(length)
     }
 
-    /// Appends the pieces for which there is room.
+    /// Appends as many of the remaining segments as there is room for.
     pub(super) fn push_pieces(&mut self) {
         while let Some(split) = self.split
             && !self.runner.is_full()
@@ -63,7 +64,8 @@ impl Machine<'_> {
             let (mut end, mut is_gap) = (length.to_bits(), false);
             if let Some(cuts) = build.cuts(from, to) {
                 let next = cuts.next(cut);
-                // Dots and gaps are cut here: each piece is shorter than the pattern.
+                // Dots and gaps are cut here, because each segment is shorter than the pattern of a
+                // whole line.
                 let pattern = match ink.replace(LineType::Full) {
                     Some(line_type @ (LineType::Dotted | LineType::Dashed)) => {
                         let dot_length = self.settings.pen_positions().dot_length;
@@ -90,7 +92,7 @@ impl Machine<'_> {
                 build.piece([from, to], places, length.to_bits(), begin);
             let piece =
                 Move { motors, offsets, page, way, whole: length, length: end - place, is_gap };
-            // There is room, and it is no longer than the move that was measured.
+            // There is room, and the segment is no longer than the move, whose length was accepted.
             let pushed = self.push_motors(&piece, ink, limit);
             debug_assert!(pushed.is_ok());
             if pushed != Ok(false) {

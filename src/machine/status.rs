@@ -1,37 +1,39 @@
-//! What the machine says of itself.
+//! Reports the state and the progress of the machine, and estimates the duration of a job.
 
 use super::{JobSize, Machine, Setting, Settings, State, Value};
 use crate::drawing::PagePoint;
 
-/// A report for the status line.
+/// The contents of the status line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Status {
-    /// What the machine does.
+    /// What the machine is doing.
     pub state: State,
-    /// Where the pins are, in steps.
+    /// The present position of the pins on the page, in steps.
     pub position: PagePoint,
-    /// The job's size; zero if none was started.
+    /// The size of the job; zero if none was started.
     pub job: JobSize,
-    /// What of it is planned already: at most the queue ahead of the pins.
+    /// The part of the job that has been planned. It is ahead of the pins by at most the contents
+    /// of the queue.
     pub done: JobSize,
-    /// How long the rest takes, about.
+    /// The estimated time for the rest of the job, in seconds.
     pub seconds_left: u32,
-    /// Speeds in percent of the settings.
+    /// The speed override, in percent of the speeds in the settings.
     pub percent: u8,
-    /// The pen that the machine waits for, if it does.
+    /// The number of the pen that the machine waits for, if it does.
     pub pen_wanted: Option<u8>,
 }
 
 impl Machine<'_> {
-    /// The pen, from 0, that the machine stands and waits for.
+    /// The number of the pen, from 0, that the machine has stopped for and is waiting for.
     pub fn pen_wanted(&self) -> Option<u8> {
-        // It is known earlier, when the path was read; a hold may come in between.
+        // The next pen is known as soon as the path was read, and a feed hold may come before the
+        // pen change. So the machine must have finished the strokes of the present pen.
         let is_stopped = self.state == State::Hold { standing: true } && self.runner.is_at_rest();
         self.next_pen.filter(|_| is_stopped).map(|(pen, _)| pen)
     }
 
-    /// Where it is, and how far the job is.
+    /// The position of the machine and the progress of its job.
     pub fn status(&self) -> Status {
         let run = self.runner.run();
         let done = JobSize {
@@ -51,7 +53,8 @@ impl Machine<'_> {
         }
     }
 
-    /// The job's time, shared out by the time of the lengths and strokes that are left.
+    /// The remaining time of the job, in seconds. The duration of the job is multiplied by the
+    /// fraction that remains, which is measured by lengths and strokes at constant speed.
     fn seconds_left(&self, done: JobSize) -> u32 {
         let bare = |size: JobSize| {
             bare_milliseconds(&self.settings, size.drawn, Setting::DrawSpeed)
@@ -66,37 +69,40 @@ impl Machine<'_> {
         };
         let all = bare(self.job);
         let time = self.job.milliseconds.max(all);
-        // Days of milliseconds stay below 2^30.
+        // The times stay below 2^30 milliseconds, which is several days.
         let left = (time.min(1 << 31) * bare(left).min(1 << 31)).checked_div(all).unwrap_or(0);
         u32::try_from(left / 10 / u64::from(self.percent)).unwrap_or(u32::MAX)
     }
 
-    /// How often the queue ran dry while the machine moved: the main loop was late; wraps.
+    /// How often the queue ran empty while the machine moved because the main loop was late; the
+    /// count wraps.
     pub fn underruns(&self) -> u32 {
         self.pins.underruns()
     }
 
-    /// Where the pins are, in steps of the page.
+    /// The present position of the pins on the page, in steps.
     pub fn position(&self) -> PagePoint {
         self.settings.kinematics().page(self.motors_now())
     }
 
+    /// The present positions of the motors, in steps.
     pub(super) fn motors_now(&self) -> PagePoint {
         let (x, y) = self.pins.steps();
         PagePoint { x: self.origin.x.wrapping_add(x), y: self.origin.y.wrapping_add(y) }
     }
 
-    /// Where the events planned so far lead, in steps of the page.
+    /// The position on the page where the events planned so far end, in steps.
     pub fn planned_position(&self) -> PagePoint {
         self.settings.kinematics().page(self.runner.position())
     }
 
-    /// The length of a step of x and of y is its setting; this is the position in millimetres.
+    /// The present position of the pins in millimetres, converted by the steps per millimetre in
+    /// the settings.
     pub fn position_mm(&self) -> [Value; 2] {
         self.millimetres(self.position())
     }
 
-    /// A place on the page in millimetres.
+    /// Converts a position on the page from steps to millimetres.
     pub fn millimetres(&self, point: PagePoint) -> [Value; 2] {
         [
             self.settings.steps_as_millimetres(point.x, Setting::StepsPerMmX),
@@ -105,14 +111,15 @@ impl Machine<'_> {
     }
 }
 
-/// How long a length (2^-18 mm) takes at the speed of a setting.
+/// The time, in milliseconds, that a length (in 2^-18 mm) takes at the speed in a setting.
 fn bare_milliseconds(settings: &Settings, length: u64, speed: Setting) -> u64 {
-    // 2^-18 mm over 2^-16 mm/min.
+    // The length is in 2^-18 mm and the speed in 2^-16 mm/min.
     let speed = u64::from(settings.get(speed).to_bits().unsigned_abs());
     (length >> 2).saturating_mul(60_000) / speed.max(1)
 }
 
-/// What the pen costs a stroke, in milliseconds: its dwells, and the ways down and up of a motor.
+/// The time, in milliseconds, that lowering and raising the pen adds to each stroke: the dwells,
+/// and the moves down and up if a motor lifts the pen.
 fn pen_milliseconds(settings: &Settings) -> u64 {
     let whole = |setting| settings.get(setting).saturating_to_num::<u64>();
     let dwells = whole(Setting::PenDownDwell) + whole(Setting::PenUpDwell);
@@ -125,15 +132,15 @@ fn pen_milliseconds(settings: &Settings) -> u64 {
     dwells + 2 * rest_to_rest(way, per_second, bits(settings, Setting::AccelerationZ))
 }
 
-/// A setting above 0, in 2^-16 of its unit.
+/// The value of a setting in units of 2^-16 of its unit; at least 1.
 fn bits(settings: &Settings, setting: Setting) -> u64 {
     u64::from(settings.get(setting).to_bits().unsigned_abs()).max(1)
 }
 
-/// The milliseconds of a way (2^-16 mm) from rest to rest, at most at a speed (2^-16 mm/s, above 0) and by an
-/// acceleration (2^-16 mm/s²).
+/// The time, in milliseconds, of a move from rest to rest over a distance `way` (2^-16 mm). `speed`
+/// is the greatest speed (2^-16 mm/s, above 0), and `acceleration` is in 2^-16 mm/s².
 fn rest_to_rest(way: u64, speed: u64, acceleration: u64) -> u64 {
-    // The way until the speed is reached and shed.
+    // This is the distance in which the speed is reached and lost again.
     if way >= speed * speed / acceleration {
         way.saturating_mul(1000) / speed + speed * 1000 / acceleration
     } else {
@@ -141,22 +148,24 @@ fn rest_to_rest(way: u64, speed: u64, acceleration: u64) -> u64 {
     }
 }
 
-/// The time of a job, about: each piece between two sharp corners from rest to rest.
+/// Estimates the duration of a job. Each part between two sharp corners is assumed to be drawn from
+/// rest to rest.
 #[derive(Debug, Default)]
 pub(super) struct Estimate {
     milliseconds: u64,
-    /// Of the piece in work: its length, the way it runs, whether it is inked.
+    /// The current part between two corners: its length (2^-18 mm), its direction at the end, and
+    /// whether it is drawn with the pen down.
     piece: u64,
     way: (i32, i32),
     inked: bool,
 }
 
 impl Estimate {
-    /// A move by so many steps.
+    /// Adds a move by `way` steps that is `length` long (2^-18 mm).
     pub(super) fn add(&mut self, settings: &Settings, way: (i32, i32), inked: bool, length: u64) {
         let [(ax, ay), (bx, by)] = [self.way, way].map(|(x, y)| (i64::from(x), i64::from(y)));
         let (along, across) = (ax * bx + ay * by, ax * by - ay * bx);
-        // A turn of more than 20 degrees is a corner.
+        // A turn by more than 20 degrees counts as a corner.
         if self.inked != inked || 8 * across.abs() > 3 * along {
             self.end_piece(settings);
         }
@@ -167,12 +176,13 @@ impl Estimate {
         self.piece += length;
     }
 
-    /// The time of all moves.
+    /// The estimated time of all moves, in milliseconds.
     pub(super) fn end(mut self, settings: &Settings) -> u64 {
         self.end_piece(settings);
         self.milliseconds
     }
 
+    /// Adds the time of the current part and begins a new one.
     fn end_piece(&mut self, settings: &Settings) {
         let speed = if self.inked { Setting::DrawSpeed } else { Setting::TravelSpeed };
         let acceleration = [Setting::AccelerationX, Setting::AccelerationY];
@@ -180,7 +190,7 @@ impl Estimate {
         let acceleration = acceleration[0].min(acceleration[1]);
         let per_second = bits(settings, speed) / 60;
         self.milliseconds += rest_to_rest(self.piece >> 2, per_second, acceleration);
-        // Each change of speed takes as long as acceleration takes to be built up, about.
+        // Each change of speed takes longer by about the time in which the acceleration builds up.
         let jerk = u64::from(settings.get(Setting::Jerk).to_bits().unsigned_abs());
         if let Some(ramp) = acceleration.checked_div(jerk) {
             self.milliseconds += ramp.min((per_second * 1000 / jerk).isqrt());

@@ -1,16 +1,16 @@
-//! Moves that come one by one: G-code, moves by hand, parking, and waits between them.
+//! Commands that are sent one by one: moves of G-code, jogging, parking, dwells and pauses.
 
 use super::{JobSize, Machine, MachineError, Setting, State, Switches, Target, Value};
 use crate::drawing::PagePoint;
 use crate::motion::{EventQueue, PathLength, PushError};
 
 impl Machine<'_> {
-    /// Appends a move, at most `feed` mm/min fast. The first of them begins a job that lasts until
-    /// no more come. In [`State::Check`] it is only checked.
+    /// Appends a move at a speed of at most `feed` mm/min. The first such move begins a job, which
+    /// lasts until no more moves come. In [`State::Check`] the move is only checked.
     ///
     /// # Errors
-    /// See [`MachineError`], and [`MachineError::State`] without [`Machine::has_room`]; nothing is
-    /// appended then.
+    /// See [`MachineError`]. If [`Machine::has_room`] is false, the error is
+    /// [`MachineError::State`]. On an error nothing is appended.
     pub fn draw_to(&mut self, target: Target, feed: Option<Value>) -> Result<(), MachineError> {
         self.check_travel(0, target.point)?;
         self.begin_stream()?;
@@ -30,7 +30,7 @@ impl Machine<'_> {
         Ok(())
     }
 
-    /// Lowers the pen where it is, until the next move with the pen up.
+    /// Lowers the pen where it is. It stays down until the next move with the pen up.
     ///
     /// # Errors
     /// See [`Machine::draw_to`].
@@ -47,11 +47,11 @@ impl Machine<'_> {
         Ok(())
     }
 
-    /// Moves to `point` with the pen raised, at most `feed` mm/min fast.
+    /// Jogs: moves to `point` with the pen raised, at a speed of at most `feed` mm/min.
     ///
     /// # Errors
-    /// See [`MachineError`], and [`MachineError::State`] without [`Machine::has_room`]; nothing is
-    /// appended then.
+    /// See [`MachineError`]. If [`Machine::has_room`] is false, the error is
+    /// [`MachineError::State`]. On an error nothing is appended.
     pub fn jog(&mut self, point: PagePoint, feed: Option<Value>) -> Result<(), MachineError> {
         if !matches!(self.state, State::Idle | State::Jog) {
             return Err(MachineError::State(self.state));
@@ -62,14 +62,14 @@ impl Machine<'_> {
         Ok(())
     }
 
-    /// Gives the moves by hand up.
+    /// Cancels the jog, if there is one.
     pub fn cancel_jog(&mut self) {
         if self.state == State::Jog {
             self.abort();
         }
     }
 
-    /// How many moves are planned ahead, at most.
+    /// The greatest number of moves that are planned ahead.
     pub fn moves_ahead(&self) -> usize {
         self.runner.capacity()
     }
@@ -79,7 +79,7 @@ impl Machine<'_> {
         self.split.is_none() && !self.runner.is_full()
     }
 
-    /// Whether a move that comes now has to wait for [`Machine::has_room`].
+    /// Whether a move that is sent now has to wait until [`Machine::has_room`] is true.
     pub fn is_streaming(&self) -> bool {
         match self.state {
             State::Run | State::Hold { .. } => self.streaming,
@@ -87,12 +87,12 @@ impl Machine<'_> {
         }
     }
 
-    /// Where all moves known lead, in steps of the page.
+    /// The position where all moves known so far end, in steps of the page.
     pub fn end(&self) -> PagePoint {
         self.split.map_or(self.runner.page_end(), |split| split.end())
     }
 
-    /// Where the pen is parked, in steps of the page.
+    /// The position where the pen is parked, in steps of the page.
     pub fn park(&self) -> PagePoint {
         let y = self.settings.steps_per_mm_y();
         PagePoint {
@@ -101,7 +101,7 @@ impl Machine<'_> {
         }
     }
 
-    /// Waits for [`Machine::resume`].
+    /// Pauses until [`Machine::resume`] is called.
     ///
     /// # Errors
     /// [`MachineError::State`] unless the machine is idle.
@@ -114,8 +114,10 @@ impl Machine<'_> {
         Ok(())
     }
 
-    /// Lets `ticks` pass at rest, at most [`StepEvent::MAX_TICKS`](crate::motion::StepEvent::MAX_TICKS).
-    /// Nothing happens unless the machine is idle and the queue has room.
+    /// Dwells: lets `ticks` pass at rest, at most
+    /// [`StepEvent::MAX_TICKS`](crate::motion::StepEvent::MAX_TICKS). Nothing happens unless the
+    /// machine is idle. A dwell that the queue refuses raises
+    /// [`Alarm::Queue`](super::Alarm::Queue).
     pub fn dwell(&mut self, ticks: u32, queue: &mut dyn EventQueue) {
         let refused = self.state == State::Idle && self.runner.dwell(ticks, queue).is_err();
         if refused {
@@ -123,12 +125,12 @@ impl Machine<'_> {
         }
     }
 
-    /// Speeds in percent of the settings.
+    /// The speed override, in percent of the speeds in the settings.
     pub fn percent(&self) -> u8 {
         self.percent
     }
 
-    /// The limit switches when last observed.
+    /// The state of the limit switches when they were last observed.
     pub fn switches(&self) -> Switches {
         self.switches
     }
@@ -138,12 +140,13 @@ impl Machine<'_> {
         self.stop_is_pressed
     }
 
+    /// Counts a new stroke of the job where the pen goes down.
     fn count_stroke(&mut self, inked: bool) {
         self.job.strokes += u32::from(inked && !self.stream_is_inked);
         self.stream_is_inked = inked;
     }
 
-    /// Whether moves may come now; the first of them begins the job.
+    /// Checks whether moves are accepted in this state. The first of them begins the job.
     fn begin_stream(&mut self) -> Result<(), MachineError> {
         match self.state {
             State::Check => {}
@@ -160,7 +163,7 @@ impl Machine<'_> {
         Ok(())
     }
 
-    /// Its length, 2^-18 mm.
+    /// Appends a move and returns its length in units of 2^-18 mm.
     fn append(&mut self, target: Target, feed: Option<Value>) -> Result<u64, MachineError> {
         let limit = feed.map_or(PathLength::MAX, |feed| self.runner.limits().feed(feed));
         match self.push(target, limit) {
