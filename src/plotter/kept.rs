@@ -1,19 +1,21 @@
-//! What outlives a loss of power.
+//! The formats in which settings and jobs are kept in the board's flash, so that they outlive a
+//! loss of power.
 
 use super::{Board, Job, NotStored, Record};
 use crate::machine::{SETTING_COUNT, Setting, Settings, Value};
 use crate::protocol::CommandError;
 
-/// A setting: its number, its value.
+/// Size of a kept setting: two bytes for its number, four for its value.
 const SETTING_BYTES: usize = 6;
 
-/// The settings as they were kept, else the defaults.
+/// The settings kept by the board; those that are not kept have their default values.
 #[inline(never)] // Keeps its frame off the stack while the stages run.
 pub(super) fn settings<B: Board>(board: &mut B) -> Settings {
     let mut values = heapless::Vec::<(u16, Value), SETTING_COUNT>::new();
     board.load(Record::Settings, &mut |kept| {
         let mut bytes = [0; SETTING_BYTES];
-        // More than there are settings would be of another version: its last ones are not known here.
+        // A record with more entries than there are settings was written by another version. Its
+        // last entries are unknown to this one.
         while kept.read(&mut bytes) == SETTING_BYTES && !values.is_full() {
             let [a, b, c, d, e, f] = bytes;
             let value = Value::from_bits(i32::from_le_bytes([c, d, e, f]));
@@ -23,10 +25,11 @@ pub(super) fn settings<B: Board>(board: &mut B) -> Settings {
     Settings::restored(values)
 }
 
-/// Keeps them.
+/// Keeps the settings in the board's flash.
 ///
 /// # Errors
-/// [`CommandError::NotStored`]: they are in force, but those before will be after a loss of power.
+/// [`CommandError::NotStored`]: the settings are in force, but after a loss of power the previous
+/// ones return.
 #[inline(never)] // Keeps its frame off the stack while the stages run.
 pub(super) fn keep_settings<B: Board>(
     settings: &Settings,
@@ -40,21 +43,22 @@ pub(super) fn keep_settings<B: Board>(
     board.save(Record::Settings, &[&bytes]).map_err(|_| CommandError::NotStored)
 }
 
-/// Tells a kept job from one of another layout.
+/// A mark at the beginning of a kept job; a job with another layout has another mark.
 const JOB_LAYOUT: u32 = u32::from_le_bytes(*b"job1");
-/// The layout, the steps of a millimetre, the job's figures; then its memory.
+/// Number of words before a job's memory: the layout, the steps per millimetre of x and y, and the
+/// job's figures.
 const JOB_HEADER: usize = 3 + Job::FIGURES;
 
-/// The steps of a millimetre, which a job is counted in.
+/// The steps per millimetre of x and y, as bits. A job's coordinates are measured in these steps.
 fn steps(settings: &Settings) -> [u32; 2] {
     [Setting::StepsPerMmX, Setting::StepsPerMmY]
         .map(|setting| settings.get(setting).to_bits().cast_unsigned())
 }
 
-/// Keeps a job, which lies in `words`.
+/// Keeps a job, which lies in `words`, in the board's flash.
 ///
 /// # Errors
-/// [`NotStored`]: the job before still is.
+/// [`NotStored`]: the previous job is still kept.
 #[inline(never)] // Keeps its frame off the stack while the stages run.
 pub(super) fn keep_job<B: Board>(
     job: &Job,
@@ -72,10 +76,11 @@ pub(super) fn keep_job<B: Board>(
     board.save(Record::Job, &[header.as_flattened(), bytemuck::cast_slice(memory)])
 }
 
-/// The job that was kept last; its memory is then in `words`.
+/// Loads the job that was kept last. Its memory is then in `words`.
 ///
 /// # Errors
-/// [`CommandError::NoJobKept`], [`CommandError::OtherSteps`]; `words` hold no job then.
+/// [`CommandError::NoJobKept`] if there is none, [`CommandError::OtherSteps`] if the steps per
+/// millimetre have changed since. `words` then hold no job.
 #[inline(never)] // Keeps its frame off the stack while the stages run.
 pub(super) fn job<B: Board>(
     settings: &Settings,

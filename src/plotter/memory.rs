@@ -1,19 +1,22 @@
-//! The one place that owns memory: capacities are chosen here, by the board.
+//! The large memory of a plotter. Each board chooses its capacities here and nowhere else.
 
 use crate::model::{Corner, Position};
 use crate::motion::Block;
 use crate::protocol::LineReader;
 
-/// The moves planned ahead with 64 KiB of RAM, before any is: see [`crate::motion`].
+/// Memory for the moves planned ahead on a board with 64 KiB of RAM, before any is planned; see
+/// [`crate::motion`].
 pub const EMPTY_LOOKAHEAD: [Block; 32] = [Block::EMPTY; 32];
 
-/// The same for 264 KiB of RAM: at 500 mm/s and 15 m/s² the machine stops within 167 chords of 0.05 mm.
+/// The same for 264 KiB of RAM. At 500 mm/s and 15 m/s² the machine stops within 167 chords of
+/// 0.05 mm, so this is enough to keep that speed.
 pub const EMPTY_LOOKAHEAD_OF_PICO: [Block; 192] = [Block::EMPTY; 192];
 
-/// The large memory of a plotter: a model, what its jobs are computed in, and the line that each of
-/// its serial ports is sending.
+/// The large memory of a plotter: the model, the working memory of its jobs, and the line that each
+/// serial port is receiving.
 ///
-/// New, it is all zero bits, so that a static one costs no flash and is never built on the stack.
+/// A new one consists of zero bits only. As a static variable, it therefore takes no flash and is
+/// never built on the stack.
 #[derive(Debug)]
 pub struct Memory<
     const VERTICES: usize,
@@ -27,16 +30,18 @@ pub struct Memory<
     readers: [LineReader; PORTS],
 }
 
-/// For 64 KiB of RAM: a lattice of 125 cubes, and a stack of 9,840 bytes beside it.
+/// The memory for 64 KiB of RAM: enough for a lattice of 125 cubes, and for a stack of 9,840 bytes
+/// besides.
 pub type Lm3s6965Memory = Memory<1000, 3000, 4208>;
 
-/// For 264 KiB of RAM: a lattice of 343 cubes. Its ports are the UART and USB.
+/// The memory for 264 KiB of RAM: enough for a lattice of 343 cubes. The board's two ports are the
+/// UART and USB.
 pub type PicoMemory = Memory<4096, 12288, 16384, 2>;
 
 impl<const VERTICES: usize, const CORNERS: usize, const WORDS: usize, const PORTS: usize>
     Memory<VERTICES, CORNERS, WORDS, PORTS>
 {
-    /// Empty.
+    /// An empty memory.
     pub const fn new() -> Self {
         Self {
             vertices: heapless::Vec::new(),
@@ -46,7 +51,7 @@ impl<const VERTICES: usize, const CORNERS: usize, const WORDS: usize, const PORT
         }
     }
 
-    /// Lends it to a plotter, with memory for the moves planned ahead.
+    /// Lends this memory to a plotter, together with `blocks` for the moves planned ahead.
     pub fn lend<'m>(&'m mut self, blocks: &'m mut [Block]) -> MemorySlices<'m> {
         MemorySlices {
             vertices: &mut self.vertices,
@@ -66,17 +71,17 @@ impl<const VERTICES: usize, const CORNERS: usize, const WORDS: usize, const PORT
     }
 }
 
-/// Memory lent to a plotter, of whatever size.
+/// The memory lent to a plotter, independent of its capacities.
 #[derive(Debug)]
 pub struct MemorySlices<'m> {
-    /// For the model's vertices.
+    /// Memory for the model's vertices.
     pub vertices: &'m mut heapless::VecView<Position>,
-    /// For the corners of its faces and the ends of its bars.
+    /// Memory for the corners of its faces and the ends of its bars.
     pub corners: &'m mut heapless::VecView<Corner>,
-    /// For the moves planned ahead.
+    /// Memory for the moves planned ahead.
     pub blocks: &'m mut [Block],
-    /// For the stages of a job and the drawing that comes of it.
+    /// Working memory for the stages of a job and the drawing that they compute.
     pub words: &'m mut [u64],
-    /// For the line that each serial port is sending, by the port's number.
+    /// The line that each serial port is receiving, indexed by the port's number.
     pub readers: &'m mut [LineReader],
 }

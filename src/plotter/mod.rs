@@ -1,9 +1,10 @@
-//! Owns the memory and joins the rest: bytes in, step events and replies out.
+//! The plotter: it joins all other modules and borrows the large memory. Bytes go in; step events
+//! and replies come out.
 //!
-//! A [`Plotter`] is polled by the board's main loop ([`run`] is that loop). Each poll answers what was
-//! asked in real time, carries out the lines that came, and keeps the step queue full. A `$plot`
-//! computes the whole [`Job`] first ([`Cancel`] answers the line meanwhile), then the strokes go
-//! to the machine. This is the only module that knows all the others.
+//! A [`Plotter`] is polled by the board's main loop ([`run`] is that loop). Each poll answers
+//! real-time requests, carries out received lines, and keeps the step queue full. `$plot` first
+//! computes the whole [`Job`], during which [`Cancel`] still answers the serial line. The strokes
+//! then go to the machine. This is the only module that knows all the others.
 
 mod board;
 pub mod budget;
@@ -38,20 +39,21 @@ use program::Program;
 use reply::Reply;
 use stream::{Listing, Progress, Task};
 
-/// How far step events are planned ahead of the pins at least, and so how late a hold takes effect:
-/// 50 ms. More if the machine could not stop within them.
+/// The least time by which step events are planned ahead of the pins, and so the delay until a hold
+/// takes effect: 50 ms. The machine plans further ahead if it could not stop within that time.
 const AHEAD_TICKS: u32 = crate::motion::TICKS_PER_SECOND / 20;
 
-/// Serial ports of a board, at most.
+/// The largest number of serial ports of a board.
 const PORT_LIMIT: usize = 2;
 
-/// Polls the plotter for ever; sleeps when there is nothing to do.
+/// Polls the plotter forever, and sleeps while there is nothing to do.
 pub fn run<B: Board>(board: &mut B, memory: MemorySlices<'_>, pins: &PulserState) -> ! {
     let mut plotter = Plotter::with_settings(memory, pins, kept::settings(board));
     if board.fault().is_some() {
         plotter.inner.machine.alarm(Alarm::Restarted);
     }
-    // Who has opened a port while the board started hears what all hear, not a second greeting.
+    // A program that opened a port while the board started gets the greeting that goes to all
+    // ports. It needs no second one.
     let _ = board.take_opened();
     plotter.greet(board);
     report::fault(board);
@@ -62,22 +64,24 @@ pub fn run<B: Board>(board: &mut B, memory: MemorySlices<'_>, pins: &PulserState
     }
 }
 
-/// The whole plotter but for its pins.
+/// The whole plotter except its pins, which the board pulses.
 #[derive(Debug)]
 pub struct Plotter<'m> {
-    /// The line that each port is sending.
+    /// The line that each port is receiving.
     readers: &'m mut [LineReader],
-    /// What each port has numbered.
+    /// The state of the line numbers of each port.
     numberings: [Numbering; PORT_LIMIT],
-    /// The port of the line in work, and what the reply to it names.
+    /// The port of the line that is being carried out.
     port: usize,
+    /// What the reply to that line names.
     label: Label,
     inner: Inner<'m>,
-    /// The status is to be told as soon as there is room.
+    /// Whether a status report was asked for and waits for room in the output.
     status_due: bool,
 }
 
-/// What is left to do when a line is carried out: a job, whose stages need the stack.
+/// What is left to do after a line has been carried out. Jobs are left to the caller, because their
+/// stages need the stack.
 enum Next {
     Nothing,
     Plot,
@@ -85,7 +89,7 @@ enum Next {
     ShowDrive,
 }
 
-/// All but the line being read, which is borrowed while it is carried out.
+/// The plotter without the line being read: that line stays borrowed while it is carried out.
 #[derive(Debug)]
 struct Inner<'m> {
     model: Model<'m>,
@@ -94,25 +98,27 @@ struct Inner<'m> {
     machine: Machine<'m>,
     job: Job,
     cursor: Cursor,
-    /// How many of the `words`, from the first on, hold the model as it was before the last change; 0 for none.
+    /// How many of the first `words` hold the copy of the model before its last change; 0 if there
+    /// is no copy.
     kept_words: usize,
     program: Program,
-    /// The line that is answered when it is done.
+    /// The task of a line that takes longer. The line is answered when the task is done.
     task: Option<Task>,
+    /// The alarm that was last reported, while it lasts.
     alarm_told: Option<Alarm>,
-    /// The pen that the user was asked for.
+    /// The pen that the user was last asked to insert, from 0.
     pen_told: Option<u8>,
 }
 
 impl<'m> Plotter<'m> {
-    /// An idle plotter at the page's origin with an empty model. `pins` is what the board's step
-    /// interrupt counts in.
+    /// An idle plotter at the page's origin with an empty model and default settings. `pins` is the
+    /// state that the plotter shares with the board's step interrupt.
     pub fn new(memory: MemorySlices<'m>, pins: &'m PulserState) -> Self {
         Self::with_settings(memory, pins, Settings::default())
     }
 
-    /// The same with other settings than the defaults.
-    #[inline(never)] // What it builds the parts in must not lie under the stages' frames.
+    /// Like [`Plotter::new`], with the given settings.
+    #[inline(never)] // Its temporaries must not lie on the stack below the stages.
     pub fn with_settings(
         memory: MemorySlices<'m>,
         pins: &'m PulserState,
@@ -141,12 +147,13 @@ impl<'m> Plotter<'m> {
         }
     }
 
-    /// The first line that a sender sees, and what it sees after ctrl-X.
+    /// Writes the greeting: the first line that a sender sees. It is also the reply to ctrl-X.
     pub fn greet<B: Board>(&self, board: &mut B) {
         report::greet(board);
     }
 
-    /// Answers the line, and keeps the step queue full. Whether anything was done.
+    /// Answers the serial line, and keeps the step queue full. Returns whether there was anything
+    /// to do.
     pub fn poll<B: Board>(&mut self, board: &mut B) -> bool {
         let asked = board.take_real_time();
         self.act(asked, board);
@@ -160,7 +167,8 @@ impl<'m> Plotter<'m> {
             }
             return true;
         }
-        // A line is read once its reply finds room, so that no reply keeps the steps waiting.
+        // A byte is read only when the output has room for a reply, so that no reply blocks and
+        // delays the steps.
         let waits = self.inner.must_wait() || !board.has_room(REPLY_BYTES);
         let byte = if waits { None } else { board.read_byte() };
         let Some((port, byte)) = byte else { return planned || asked != RealTime::default() };
@@ -205,22 +213,22 @@ impl<'m> Plotter<'m> {
         Reply(board).outcome(outcome, self.label);
     }
 
-    /// What the model holds.
+    /// The model.
     pub fn model(&self) -> &Model<'m> {
         &self.inner.model
     }
 
-    /// What is drawn and how.
+    /// The options: what is drawn and how.
     pub fn options(&self) -> &PlotOptions {
         &self.inner.options
     }
 
-    /// The machine's side.
+    /// The machine, which draws the strokes.
     pub fn machine(&self) -> &Machine<'m> {
         &self.inner.machine
     }
 
-    /// The job drawn last, or being drawn.
+    /// The job that is being drawn or was drawn last.
     pub fn job(&self) -> &Job {
         &self.inner.job
     }
@@ -257,7 +265,8 @@ impl<'m> Plotter<'m> {
         self.status_due |= asked.has(RealTime::STATUS);
         if self.status_due && board.has_room(REPLY_BYTES) {
             self.status_due = false;
-            // To write it takes 10 ms; so may what was done since the queue was filled last.
+            // Writing the report takes 10 ms, and so may what was done since the queue was last
+            // filled.
             self.inner.plan(board);
             self.inner.report_status(board);
         }
@@ -273,7 +282,7 @@ impl<'m> Plotter<'m> {
 }
 
 impl Inner<'_> {
-    /// Keeps the step queue full. Whether the machine still has something to plan.
+    /// Keeps the step queue full. Returns whether the planned position has changed.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     fn plan<B: Board>(&mut self, board: &mut B) -> bool {
         let before = self.machine.planned_position();
@@ -282,7 +291,7 @@ impl Inner<'_> {
         self.machine.planned_position() != before
     }
 
-    /// Nothing moves, and no job is held that could go on.
+    /// Whether nothing moves and there is no interrupted job that could continue.
     fn is_without_job(&self) -> bool {
         let is_over = matches!(
             self.machine.state(),
@@ -313,7 +322,7 @@ impl Inner<'_> {
                 model.begin_curve(ends, control.iter()).map_err(CommandError::Model)?
             }
             Command::Knots(knots) => model.add_knots(knots.iter()).map_err(CommandError::Model)?,
-            // So that no file has too many.
+            // With a single pen, choices of a pen are ignored: no file can then use too many pens.
             Command::Pen { .. } if one_pen => {}
             Command::Pen { by_material, name } => {
                 model.choose_pen(by_material, name, keep).map_err(CommandError::Model)?
@@ -379,7 +388,8 @@ impl Inner<'_> {
         Ok(())
     }
 
-    /// Keeps the job, before anything moves: flash cannot be read meanwhile.
+    /// Writes the job to flash before anything moves, because flash cannot be read during the
+    /// write.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     fn save<B: Board>(&self, board: &mut B) {
         if kept::keep_job(&self.job, self.machine.settings(), self.words, board).is_err() {
@@ -388,7 +398,7 @@ impl Inner<'_> {
         }
     }
 
-    /// Takes the kept job in place of the last one.
+    /// Loads the kept job in place of the last one.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     fn load<B: Board>(&mut self, board: &mut B) -> Result<(), CommandError> {
         self.kept_words = 0;
@@ -398,7 +408,7 @@ impl Inner<'_> {
         Ok(())
     }
 
-    /// Hands the job to the machine, which measures it first.
+    /// Hands the job to the machine, which first measures its strokes.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     fn begin(&mut self, cancel: &mut dyn Cancel) -> Result<(), CommandError> {
         let strokes = self.job.strokes(self.words, &mut self.cursor);
@@ -412,13 +422,13 @@ impl Inner<'_> {
         Ok(())
     }
 
-    #[inline(never)] // Its frame must not lie under that of `plot`.
+    #[inline(never)] // Keeps its frame out of that of `plot`.
     fn compute(
         &mut self,
         cancel: &mut dyn Cancel,
         observer: &mut dyn Observer,
     ) -> Result<(), CommandError> {
-        // The memory of the last job is used again, so it ends here even if this one fails.
+        // This overwrites the memory of the last job, so that job ends here even if this one fails.
         self.kept_words = 0;
         self.job = Job::default();
         self.cursor = Cursor::default();
@@ -442,7 +452,7 @@ impl Inner<'_> {
     }
 }
 
-/// Strokes that are measured while the line is answered.
+/// The strokes of a job while the machine measures them. They check for cancelling as they go.
 struct MeasuredStrokes<'s, 'a> {
     strokes: Strokes<'s>,
     cancel: &'a mut dyn Cancel,
@@ -453,7 +463,7 @@ struct MeasuredStrokes<'s, 'a> {
 impl Path for MeasuredStrokes<'_, '_> {
     fn next_target(&mut self) -> Option<Target> {
         self.targets += 1;
-        // These take some 100,000 instructions.
+        // 64 targets take some 100,000 instructions.
         if self.targets.is_multiple_of(64) && self.cancel.check().is_err() {
             self.given_up = true;
         }
@@ -469,12 +479,15 @@ impl Path for MeasuredStrokes<'_, '_> {
     }
 }
 
-/// Answers the line while a job is computed.
+/// Answers the serial line while a job is computed.
 struct Listener<'b, B: Board> {
     board: &'b mut B,
+    /// The position for the status report, in mm.
     position: [Value; 2],
+    /// The stage for the status report.
     stage: Stage,
-    /// What is to be done when it ends.
+    /// The hold or emergency stop that was requested meanwhile. It is carried out when the
+    /// computation ends.
     asked: RealTime,
 }
 

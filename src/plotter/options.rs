@@ -1,4 +1,4 @@
-//! What is drawn and how, as the user set it.
+//! The options of a plot: what is drawn and how, as the user has set it with `$name=value`.
 
 use crate::checksum::CRC_32;
 use crate::drawing::{Page, StepsPerMillimetre, Title, TitleText};
@@ -14,46 +14,54 @@ use crate::visibility::{self, Crease};
 use core::fmt::{self, Write};
 use crc::{Digest, Table};
 
-/// What is drawn and how.
+/// The options of a plot. `None` leaves the choice to penup.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlotOptions {
+    /// Position of the eye, in units of the model.
     eye: Option<Direction>,
+    /// The point looked at, in units of the model.
     at: Option<Direction>,
+    /// The direction that is upward on the page.
     up: Option<Direction>,
+    /// Rotation of the view in degrees about x, y and z. The eye then looks along z.
     angles: Option<Direction>,
+    /// The kind of projection.
     projection: ProjectionChoice,
-    /// Whether what is behind the eye is cut off; else it is an error.
+    /// Whether parts of the model behind the eye are clipped. Otherwise they are an error.
     pub clip_behind: bool,
-    /// How it is found out what is seen.
+    /// How visibility is determined.
     pub see: VisibilityMode,
-    /// What becomes of hidden lines.
+    /// How hidden lines are drawn, if at all.
     pub hidden: HiddenLines,
-    /// Whether the lines are drawn where faces pass through each other.
+    /// Whether the lines are drawn along which faces intersect each other.
     pub seams: bool,
-    /// Whether blocks that touch are one shape: no line between two faces that lie in one plane.
+    /// Whether touching blocks are drawn as one shape, without lines between two coplanar faces.
     pub merged_blocks: bool,
-    /// Edges between faces that bend less, in degrees, are not drawn; 0 draws every edge.
+    /// An edge is not drawn if its two faces bend by less than this angle, in degrees. 0 draws
+    /// every edge.
     pub crease: f64,
-    /// How far coordinates may be off, in units of the model; `None` goes by their decimals.
+    /// The largest error of the coordinates, in units of the model. `None` derives it from their
+    /// decimal places.
     precision: Option<Decimal>,
-    /// Whether one pen draws all, whatever the model says.
+    /// Whether one pen draws everything, whatever pens the model names.
     pub one_pen: bool,
-    /// The sheet.
+    /// The sheet of paper.
     pub page: Page,
-    /// What stands below the drawing, if it is not empty.
+    /// The text below the drawing. If it is empty, there is no title.
     title: TitleText,
-    /// Height of its capitals.
+    /// Height of the title's capital letters, in mm.
     title_size: Millimetres,
-    /// Whether a plan is scaled to the page.
+    /// Whether a plan is scaled to the page. Otherwise it is drawn at true size.
     pub fit: bool,
-    /// How strokes are ordered; its lift is not used.
+    /// How strokes are ordered. Its `lift` is not used: see the next field.
     order: order::Options,
-    /// How much longer a way with the pen up may be for one lift less.
+    /// Extra pen-up travel, in mm, that is accepted to save one pen lift.
     lift: Millimetres,
 }
 
 impl Default for PlotOptions {
-    /// An automatic view in perspective, hidden lines erased, on A4 upright with a margin of 10 mm, without a title.
+    /// An automatic view in perspective with hidden lines erased, on A4 in portrait format with a
+    /// margin of 10 mm, without a title.
     fn default() -> Self {
         let [width, height, margin, title_size, lift] =
             [210, 297, 10, 5, 2].map(Millimetres::from_num);
@@ -82,7 +90,7 @@ impl Default for PlotOptions {
 }
 
 impl PlotOptions {
-    /// Changes one.
+    /// Sets one option.
     pub fn set(&mut self, option: PlotOption) {
         match option {
             PlotOption::Eye(eye) => self.eye = Some(eye),
@@ -115,10 +123,10 @@ impl PlotOptions {
         }
     }
 
-    /// Changes the title; an empty one is none.
+    /// Sets the title. An empty text removes it.
     ///
     /// # Errors
-    /// [`CommandError::TitleTooLong`]; the title is as it was.
+    /// [`CommandError::TitleTooLong`]; the title is then unchanged.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub fn set_title(&mut self, text: EscapedText<'_>) -> Result<(), CommandError> {
         let limit = TitleText::LIMIT;
@@ -126,21 +134,22 @@ impl PlotOptions {
         Ok(())
     }
 
-    /// The title, if there is one to be seen.
-    #[inline(never)] // Once is enough: it is asked for everywhere.
+    /// The title, unless it is empty or consists of spaces only.
+    #[inline(never)] // Its many callers share one copy of the code.
     pub fn title(&self) -> Option<Title<'_>> {
         let text = self.title.as_str();
         text.bytes().any(|byte| byte != b' ').then_some(Title { text, height: self.title_size })
     }
 
-    /// The sheet with the room for the title.
+    /// The sheet, with the space at its foot that the title needs.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub fn sheet(&self) -> Page {
         let foot = self.title().map(|title| title.rise() + title.depth());
         Page { foot: foot.unwrap_or_default(), ..self.page }
     }
 
-    /// Whether a plan is drawn as it lies: not if the user chose a view for it.
+    /// Whether a plan is laid on the page as it is. This is not the case if the user has chosen a
+    /// view for it.
     pub fn shows_plans_flat(&self) -> bool {
         self.eye.is_none()
             && self.angles.is_none()
@@ -148,13 +157,15 @@ impl PlotOptions {
             && matches!(self.see, VisibilityMode::Faces | VisibilityMode::Wire)
     }
 
-    /// How strokes are ordered on a machine of so many steps.
+    /// The options of the ordering, with lengths in 1/256 step for a machine with `steps` per
+    /// millimetre.
     pub fn order(&self, steps: StepsPerMillimetre) -> order::Options {
         let lift = self.lift.wide_mul(steps[0]).saturating_mul_int(256);
         order::Options { lift: lift.saturating_to_num(), ..self.order }
     }
 
-    /// How far the coordinates of `model` may be off.
+    /// The precision of the coordinates of `model`: as the user has set it, or as derived from the
+    /// model.
     pub fn precision_of(&self, model: &Model<'_>) -> Precision {
         match self.precision {
             Some(chosen) => model.chosen_precision(chosen),
@@ -162,7 +173,8 @@ impl PlotOptions {
         }
     }
 
-    /// The camera for `model`; what the user did not choose is chosen here. `None` without vertices.
+    /// The camera for `model`, with automatic choices for all that the user has not set. `None` if
+    /// the model has no vertices.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub fn camera(&self, model: &Model<'_>) -> Option<Camera> {
         let lens = match self.projection {
@@ -181,7 +193,7 @@ impl PlotOptions {
         Some(camera)
     }
 
-    /// What visibility is to find through `view`.
+    /// The options of the visibility stage for `view`.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub fn visibility(&self, view: &View) -> visibility::Options {
         let crease = (self.crease > 0.0).then(|| Crease {
@@ -197,18 +209,19 @@ impl PlotOptions {
         }
     }
 
-    /// The CRC-32 of what `$options` lists: its lines, each with a line feed.
+    /// The CRC-32 of the lines that `$options` lists, each followed by a line feed. Equal options
+    /// have equal checksums.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub fn checksum(&self) -> u32 {
         let mut sum = Sum(CRC_32.digest());
         self.list(|line| {
-            // A sum cannot fail.
+            // Writing to a checksum cannot fail.
             let _ = writeln!(sum, "{line}");
         });
         sum.0.finalize()
     }
 
-    /// What stands for each option that is set, as `$options` lists it.
+    /// Passes to `line` the text of each option and its value, in the order of `$options`.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub fn list(&self, mut line: impl FnMut(core::fmt::Arguments<'_>)) {
         let places = [("eye", self.eye), ("at", self.at), ("up", self.up), ("angles", self.angles)];
@@ -284,7 +297,7 @@ impl PlotOptions {
     }
 }
 
-/// Text that is only summed up.
+/// A writer that only computes the checksum of its text.
 struct Sum(Digest<'static, u32, Table<1>>);
 
 impl Write for Sum {

@@ -1,4 +1,6 @@
-//! A plan in millimetres: bars and curves at one height, laid on the page as they are.
+//! Plans: models of bars and curves at one height, in millimetres.
+//!
+//! A plan needs no projection. It is laid on the page as it is, at true size or scaled to fit.
 
 use super::PlotOptions;
 use super::job::{Collector, FOR_BOUNDS, HALF_A_STEP, Observer, grow};
@@ -9,7 +11,12 @@ use crate::protocol::CommandError;
 use crate::stage::Cancel;
 use crate::visibility::SinkFull;
 
-/// Packs the lines of the plan at the front of `words`. Returns how many.
+/// Maps the lines of the plan to the page and packs them at the front of `words`. Returns their
+/// number.
+///
+/// # Errors
+/// [`CommandError::Page`] if the plan does not go on the page, [`CommandError::DrawingTooLarge`] if
+/// its lines do not fit in `words`, [`CommandError::Aborted`].
 #[inline(never)] // Keeps its frame off the stack while the stages run.
 pub(super) fn lay_out(
     model: &Model<'_>,

@@ -1,4 +1,5 @@
-//! What a line of G-code asks for, given what the lines before it have set.
+//! The G-code interpreter: it turns a line of G-code into an order for the machine, given the modes
+//! that earlier lines have set.
 
 use crate::drawing::{PAGE_LIMIT, PagePoint, StepsPerMillimetre};
 use crate::fixed::{Decimal, Millimetres, divide_rounding, half, product};
@@ -6,15 +7,22 @@ use crate::machine::Machine;
 use crate::protocol::{CommandError, GCode, Word};
 use crate::step::{Arc, ArcError, Turn};
 
-/// What the lines so far have set. Lengths are in millimetres, from the page's origin.
+/// The modes and the position that the lines so far have set. Lengths are in millimetres, from the
+/// page's origin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Program {
+    /// The kind of move that coordinates ask for: G0, G1, G2 or G3.
     motion: Motion,
+    /// Whether lengths are in inches (G20). Otherwise they are in millimetres (G21).
     inches: bool,
+    /// Whether coordinates are relative to the last position (G91). Otherwise they are absolute
+    /// (G90).
     relative: bool,
+    /// Whether the next moves are drawn.
     pub(super) pen_is_down: bool,
-    /// mm/min
+    /// The feed in mm/min, if one is set.
     pub(super) feed: Option<Millimetres>,
+    /// The end of the last move, as the lines give it.
     at: [Millimetres; 2],
 }
 
@@ -25,31 +33,35 @@ enum Motion {
     Arc(Turn),
 }
 
-/// What is to be done now.
+/// The order of a line: what the machine is to do now.
 #[derive(Debug, Clone)]
 pub(super) enum Order {
     /// Nothing moves.
     Nothing,
     /// A straight move.
     Line(PagePoint),
-    /// EdgeParameter an arc.
+    /// A move along an arc.
     Arc(Arc),
-    /// The pen goes down where it is.
+    /// The pen goes down where it stands.
     Lower,
-    /// Wait so many units of 2^-16 s.
+    /// A dwell, in units of 2^-16 s.
     Dwell(u32),
-    /// Wait for the user.
+    /// A pause until the user resumes.
     Pause,
-    /// To where the pen is parked.
+    /// A pen-up move to the park position.
     Park,
 }
 
-/// The numbers of one line.
+/// The coordinates and parameters of one line.
 #[derive(Default)]
 struct Numbers {
+    /// The end of the move: X and Y.
     xy: [Option<Decimal>; 2],
+    /// The centre of an arc, relative to its start: I and J.
     ij: [Option<Decimal>; 2],
+    /// The radius of an arc: R.
     radius: Option<Decimal>,
+    /// The length of a dwell: P.
     seconds: Option<Decimal>,
 }
 
@@ -67,8 +79,8 @@ impl Default for Program {
 }
 
 impl Program {
-    /// A program that goes on where `machine` will stand. While it only checks, nothing moves, so
-    /// that place does not count.
+    /// The program, continued from the position where `machine` will stop. While the machine only
+    /// checks G-code (`checking`), it does not move, so the program keeps its own position.
     pub(super) fn at(self, machine: &Machine<'_>, checking: bool) -> Self {
         let steps = machine.settings().page_steps();
         if checking || steps_at(self.at, steps) == machine.end() {
@@ -78,11 +90,11 @@ impl Program {
         Self { at: machine.millimetres(point), ..self }
     }
 
-    /// The program after `line`, and what is to be done.
+    /// The program after `line`, and the order of that line.
     ///
     /// # Errors
-    /// [`CommandError::UnsupportedWord`] for what it does not know, [`CommandError::NumberOutOfRange`],
-    /// [`CommandError::Arc`].
+    /// [`CommandError::UnsupportedWord`] for a word that is not known,
+    /// [`CommandError::NumberOutOfRange`], [`CommandError::Arc`] if there is no such arc.
     pub(super) fn after(
         mut self,
         line: GCode<'_>,
@@ -101,7 +113,7 @@ impl Program {
                 b'J' => numbers.ij[1] = Some(number),
                 b'R' => numbers.radius = Some(number),
                 b'P' => numbers.seconds = Some(number),
-                // Below the page's height the pen is down.
+                // The pen is down at Z0 and below.
                 b'Z' => self.pen_is_down = self.length(number)? <= 0,
                 b'F' => self.feed = Some(self.length(number)?).filter(|feed| *feed > 0),
                 b'N' | b'S' | b'T' => {}
@@ -138,7 +150,8 @@ impl Program {
             Ok(28) => *order = Order::Park,
             Ok(90) => self.relative = false,
             Ok(91) => self.relative = true,
-            // Plane xy, no compensation, no offsets, units a minute: there is nothing else here.
+            // These choose the xy plane, no compensation, no offsets, and units per minute, which
+            // are all that there is here.
             Ok(17 | 40 | 49 | 54 | 80 | 94) => {}
             _ if Decimal::parse("91.1") == Ok(number) => {}
             _ => return Err(CommandError::UnsupportedWord(b'G')),
@@ -201,7 +214,8 @@ impl Program {
     }
 }
 
-/// Steps from the page's origin; what is beyond every page stays beyond it.
+/// The length in steps from the page's origin, clamped to a value that still lies beyond every
+/// page.
 fn to_steps(length: Millimetres, per_mm: Millimetres) -> i32 {
     let exact = i64::from(length.to_bits()) * i64::from(per_mm.to_bits());
     let steps = divide_rounding(exact.into(), 1 << 32);
@@ -212,25 +226,27 @@ fn steps_at([x, y]: [Millimetres; 2], steps: StepsPerMillimetre) -> PagePoint {
     PagePoint { x: to_steps(x, steps[0]), y: to_steps(y, steps[1]) }
 }
 
-/// The centre of the arc of less than half a turn (more, if `radius` is negative) between two
-/// points; `None` if they are further apart than the circle is wide.
+/// The centre of the arc from `from` to `to` that turns less than half a turn, or more if `radius`
+/// is negative. `None` if the points are further apart than the diameter.
 fn center_of_radius(
     from: [Millimetres; 2],
     to: [Millimetres; 2],
     radius: Millimetres,
     turn: Turn,
 ) -> Option<[Millimetres; 2]> {
-    // In units of 2^-15 mm within 2^30, so differences within 2^31 and squares within 2^62.
+    // Lengths are in units of 2^-15 mm, below 2^30; so differences are below 2^31 and squares below
+    // 2^62.
     let halved = |length: Millimetres| i64::from(length.to_bits()) / 2;
     let [dx, dy] = [0, 1].map(|axis| halved(to[axis]) - halved(from[axis]));
     let distance = (dx * dx + dy * dy).unsigned_abs();
     let wide = 2 * halved(radius).unsigned_abs();
     let length = distance.isqrt();
-    // Rounded ends may lie a step apart from it.
+    // With rounded ends, the points may be up to a step further apart than the diameter.
     if length == 0 || length > wide + (1 << 15) / 20 {
         return None;
     }
-    // Twice the distance from the chord to the centre, which lies on its right for a clockwise arc.
+    // Twice the distance from the chord to the centre. The centre lies to the right of the chord
+    // for a clockwise arc.
     let height = (wide * wide).saturating_sub(distance).isqrt() as i64;
     let is_right = (turn == Turn::Clockwise) == (radius > 0);
     let height = if is_right { height } else { -height };

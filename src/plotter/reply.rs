@@ -1,4 +1,4 @@
-//! Lines that go back to the user.
+//! The replies to the user, written to the board as lines.
 
 use super::Board;
 use crate::checksum::CRC_16;
@@ -7,23 +7,23 @@ use crate::machine::Value;
 use crate::protocol::{Checksum, CommandError, Label, Named};
 use core::fmt::{self, Write};
 
-/// Writes whole lines to the board's serial line.
+/// Writes lines to the board's serial line.
 pub(super) struct Reply<'b, B: Board + ?Sized>(pub &'b mut B);
 
 impl<B: Board + ?Sized> Reply<'_, B> {
-    /// One line.
+    /// Writes a line and its end.
     pub fn line(&mut self, arguments: fmt::Arguments<'_>) {
         self.part(arguments);
         self.0.write(b"\r\n");
     }
 
-    /// A part of a line.
+    /// Writes a part of a line.
     pub fn part(&mut self, arguments: fmt::Arguments<'_>) {
-        // The serial line blocks and does not fail.
+        // Writing to the serial line may block, but it does not fail.
         let _ = self.write_fmt(arguments);
     }
 
-    /// The position as Grbl's status report gives it, in mm.
+    /// Writes the position, in mm, as Grbl's status report gives it.
     pub fn position(&mut self, position: [Value; 2]) {
         let [x, y] = position.map(|mm| BinaryFraction {
             units: mm.to_bits().into(),
@@ -33,13 +33,15 @@ impl<B: Board + ?Sized> Reply<'_, B> {
         self.part(format_args!("|MPos:{x},{y},0.000"));
     }
 
-    /// The reply that every line gets: `ok`, or why not and `error:N`; with the number of a line that
-    /// has one. Before it, if they are to be named, the number that is expected or the last one.
+    /// Writes the reply that every line gets: `ok`, or the reason of a refusal and `error:N`. The
+    /// reply names the number of a numbered line. If the label asks for it, a line with the
+    /// expected number or the last number comes first.
     pub fn outcome(&mut self, outcome: Result<(), CommandError>, label: Label) {
         let Label { checksum, named } = label;
         let with_crc = checksum == Some(Checksum::Crc);
         if let Err(command_error) = outcome {
-            // A program that sends a CRC wants the number soon, not the reason.
+            // After a line with a CRC that must be resent, the reason is left out, so that the
+            // sender gets the expected number sooner.
             let is_expected = matches!(named, Named::Expected(_));
             if !with_crc || !is_expected || command_error == CommandError::Unnumbered {
                 self.line(format_args!("[MSG:{command_error}]"));
@@ -66,21 +68,21 @@ impl<B: Board + ?Sized> Reply<'_, B> {
         }
     }
 
-    /// A line, with its CRC if it is to have one.
+    /// Writes a line, followed by its CRC if `with_crc`.
     fn checked_line(&mut self, arguments: fmt::Arguments<'_>, with_crc: bool) {
         let mut digest = CRC_16.digest();
         let mut write = |text: &str| {
             digest.update(text.as_bytes());
             self.0.write(text.as_bytes());
         };
-        // The serial line blocks and does not fail.
+        // Writing to the serial line may block, but it does not fail.
         let _ = fmt::write(&mut Pieces(&mut write), arguments);
         let sum = digest.finalize();
         if with_crc { self.line(format_args!("*{sum:04X}")) } else { self.line(format_args!("")) }
     }
 }
 
-/// Text as it is formatted, piece by piece.
+/// Passes on formatted text piece by piece.
 struct Pieces<'w>(&'w mut dyn FnMut(&str));
 
 impl Write for Pieces<'_> {
@@ -90,7 +92,7 @@ impl Write for Pieces<'_> {
     }
 }
 
-/// ` N17`, or nothing.
+/// Shown as ` N17` for the number 17, or as nothing.
 struct Number(Option<i32>);
 
 impl fmt::Display for Number {

@@ -1,4 +1,4 @@
-//! What the plotter tells of itself: its build, the model, the job, the status.
+//! The reports of the plotter: greeting, build, model, job and status.
 
 use super::reply::Reply;
 use super::{Board, Inner, stream};
@@ -7,14 +7,14 @@ use crate::machine::{Alarm, Setting, State};
 use crate::order;
 use crate::protocol::LINE_LIMIT;
 
-/// The first line that a sender sees, and what it sees after ctrl-X.
+/// Writes the greeting: the first line that a sender sees. It is also the reply to ctrl-X.
 pub(super) fn greet<B: Board>(board: &mut B) {
     const VERSION: &str = env!("CARGO_PKG_VERSION");
     Reply(board).line(format_args!("\r\nGrbl 1.1h [penup {VERSION} '$' for help]"));
 }
 
-/// Greets a program that has opened a port, there alone, and tells it of an alarm that others have
-/// heard of.
+/// If a program has opened a port, writes the greeting to that port alone, with the current alarm,
+/// which the other ports have already heard of.
 #[inline(never)] // Keeps its frame off the stack while the stages run.
 pub(super) fn greet_opened<B: Board>(state: State, board: &mut B) {
     if !board.take_opened() {
@@ -31,10 +31,10 @@ pub(super) fn greet_opened<B: Board>(state: State, board: &mut B) {
     board.speak_aside(false);
 }
 
-/// What ended the program before, if it was a fault.
+/// Reports the fault that ended the previous run, if there was one.
 #[inline(never)] // Keeps its frame off the stack while the stages run.
 pub(super) fn fault<B: Board>(board: &mut B) {
-    // The board has cut longer messages.
+    // The board truncates longer messages.
     let mut text = heapless::String::<192>::new();
     if let Some(fault) = board.fault() {
         let _ = text.push_str(fault);
@@ -43,6 +43,7 @@ pub(super) fn fault<B: Board>(board: &mut B) {
 }
 
 impl Inner<'_> {
+    /// Reports the faces and edges that the job has left out, if any.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub fn report_degenerate<B: Board>(&self, board: &mut B) {
         let count = self.job.degenerate_faces();
@@ -57,6 +58,7 @@ impl Inner<'_> {
         }
     }
 
+    /// Writes the reply to `$I`: version, board, moves planned ahead and longest line.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub fn report_build<B: Board>(&self, board: &mut B) {
         const VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -65,6 +67,8 @@ impl Inner<'_> {
         Reply(board).line(format_args!("[OPT:,{blocks},{LINE_LIMIT}]"));
     }
 
+    /// Writes the reply to `$model`: the size of the model, its checksums, the result of the last
+    /// job's ordering, and the size of the working memory.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub fn report_model<B: Board>(&self, board: &mut B) {
         let model = &self.model;
@@ -81,7 +85,7 @@ impl Inner<'_> {
             *self.job.report();
         Reply(board)
             .line(format_args!("[JOB:odd points {odd_points}, parts {components}, lifts {lifts}]"));
-        // From 1/256 steps to 1/256 mm; below 2^56.
+        // This converts from 1/256 step to 1/256 mm. Lengths are below 2^56.
         let steps = self.machine.settings().get(Setting::StepsPerMmX).to_bits().max(1);
         let mm = |length: u64| BinaryFraction {
             units: ((length << 16) / u64::from(steps.unsigned_abs())) as i64,
@@ -101,6 +105,7 @@ impl Inner<'_> {
         Reply(board).line(format_args!("[MEM:{} bytes to work in]", size_of_val(self.words)));
     }
 
+    /// Writes Grbl's status report, with penup's own fields at its end.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub fn report_status<B: Board>(&self, board: &mut B) {
         let status = self.machine.status();

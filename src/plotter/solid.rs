@@ -1,4 +1,5 @@
-//! A convex solid seen without faces: from its vertices, or its edges, to lines on the page.
+//! Draws a convex solid that is given without faces: by its vertices alone, or by its vertices and
+//! edges. The visible edges become lines on the page.
 
 use super::PlotOptions;
 use super::job::{Collector, Observer, PageSink, camera_view, grow, to_front};
@@ -10,8 +11,8 @@ use crate::stage::{Cancel, Scratch, Stage, items_mut};
 use crate::view::{SightLines, distinct_edges};
 use crate::visibility::{EdgeParameter, Stretch, StretchSink};
 
-/// Finds what is seen of the solid. Returns how many lines stand in `words`, and how many edges were
-/// left out because the faces beside them may be one.
+/// Finds the visible edges of the solid. Returns how many lines stand at the front of `words`, and
+/// how many edges were left out because the faces beside them may be coplanar.
 #[inline(never)] // Keeps its frame off the stack while the stages run.
 pub(super) fn project(
     model: &Model<'_>,
@@ -29,7 +30,8 @@ pub(super) fn project(
     cancel.enter(Stage::Visibility);
     let positions = bytemuck::cast_slice(model.vertices());
     let precision = options.precision_of(model);
-    // No solid has more edges than its vertices allow (Euler), nor more than were sent.
+    // A solid has no more edges than its number of vertices allows (Euler), nor more than were
+    // sent.
     let most = match options.see {
         VisibilityMode::Edges => model.corner_count(),
         _ => 3 * model.vertices().len(),
@@ -82,11 +84,16 @@ pub(super) fn project(
     Ok((count, summary.joined))
 }
 
-/// The edges of the solid: those to be drawn as visible from the front, as hidden from the back.
+/// The edges of the solid that are to be drawn. Visible edges fill the array from the front, hidden
+/// ones from the back.
 struct Edges<'a> {
+    /// The vertex numbers of the ends of each edge.
     kept: &'a mut [[u16; 2]],
+    /// Number of visible edges.
     shown: usize,
+    /// Number of hidden edges that are kept.
     hidden: usize,
+    /// Whether hidden edges are kept at all.
     wanted: HiddenLines,
 }
 

@@ -1,5 +1,8 @@
-//! Lines of G-code and moves by hand, as they come; and the lines that are answered only when what
-//! they asked for is done.
+//! Lines that are not answered at once.
+//!
+//! This module carries out G-code, jogs, homing and lists. Some of these lines take longer. They
+//! become a [`Task`], and are answered only when it is done. It also handles real-time requests and
+//! reports alarms.
 
 use super::program::{Order, Program};
 use super::{Board, Inner, REPLY_BYTES, Reply};
@@ -12,43 +15,43 @@ use crate::protocol::{CommandError, GCode, HELP, RealTime};
 use crate::step::{Arc, Chords, Line};
 use core::fmt;
 
-/// A line that is being carried out.
+/// The task of a line that is being carried out.
 #[derive(Debug)]
 pub(super) enum Task {
-    /// The rest of an arc, from a point.
+    /// The rest of an arc, from the point reached so far.
     Arc(PagePoint, Arc),
-    /// So many ticks, once everything stands.
+    /// A dwell of so many ticks, which begins once the machine has stopped.
     Dwell(u64),
-    /// Waits until everything stands, then for the user.
+    /// Waits until the machine has stopped, then for the user.
     Pause,
-    /// Looks for the switches.
+    /// Homing: looks for the limit switches.
     Home,
-    /// Writes a list, from this line on.
+    /// Writes a list, from the row with this index on.
     List(Listing, usize),
 }
 
-/// A list of many lines.
+/// A list of many rows.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Listing {
     Help,
     Settings,
     Options,
-    /// Of the model, up to this place.
+    /// Elements of the model of one kind, up to this index, which is excluded.
     Model(ElementKind, usize),
 }
 
-/// How far [`Inner::proceed`] came.
+/// The result of [`Inner::proceed`].
 pub(super) enum Progress {
     /// The line is done.
     Done(Result<(), CommandError>),
-    /// Something was done.
+    /// A part of the task was done; call again.
     More,
-    /// It waits for the machine.
+    /// The task waits for the machine or for room in the output.
     Waits,
 }
 
 impl Inner<'_> {
-    /// What was asked by single bytes, but for status and abort.
+    /// Carries out real-time requests, except status and abort.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub(super) fn act(&mut self, asked: RealTime) {
         if asked == RealTime::default() {
@@ -84,8 +87,8 @@ impl Inner<'_> {
         }
     }
 
-    /// Looks at the contacts; tells of an alarm once, and lets the board carry it out at once. Asks for the next pen,
-    /// once, when the machine stands and waits for it.
+    /// Reads the contacts. Reports an alarm once, and lets the board carry it out at once. Asks for
+    /// the next pen, once, when the machine has stopped and waits for it.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub(super) fn watch<B: Board>(&mut self, board: &mut B) {
         self.machine.observe(board.contacts());
@@ -109,11 +112,12 @@ impl Inner<'_> {
         }
     }
 
-    /// Goes on with the line in work.
+    /// Continues the task of the line that is being carried out.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub(super) fn proceed<B: Board>(&mut self, board: &mut B) -> Progress {
         if let Some(Task::List(listing, number)) = &mut self.task {
-            // A row comes as soon as it finds room: it takes up to 10 ms, and steps may be running.
+            // Writing a row takes up to 10 ms. It waits for room in the output rather than block,
+            // because steps may be running.
             if !board.has_room(REPLY_BYTES) {
                 return Progress::Waits;
             }
@@ -141,12 +145,13 @@ impl Inner<'_> {
         let is_stopped = machine.state() == State::Idle && machine.is_stopped();
         match &mut self.task {
             Some(Task::Arc(from, arc)) if machine.has_room() => {
-                // To keep the points that a chord reads ahead would cost the stages' stack.
+                // The chord iterator is made anew for each chord. Keeping it, with the points that
+                // it reads ahead, would cost stack that the stages need.
                 let Some(to) = Chords::new(*from, arc.clone()).next() else {
                     return Ok(Progress::Done(Ok(())));
                 };
                 machine.draw_to(self.program.target(to), self.program.feed)?;
-                // The chord's moves are as many points of the arc.
+                // The chord replaces as many points of the arc as it has moves.
                 for _ in Line::new(core::mem::replace(from, to), to) {
                     arc.next();
                 }
@@ -165,7 +170,7 @@ impl Inner<'_> {
         }
     }
 
-    /// Writes one line of a list; `false` past its end.
+    /// Writes row `number` of a list. Returns `false` past its end.
     fn list<B: Board>(&self, listing: Listing, number: usize, board: &mut B) -> bool {
         if let Listing::Model(part, end) = listing {
             if number < end {
@@ -200,6 +205,10 @@ impl Inner<'_> {
         number < lines
     }
 
+    /// Begins to look for the limit switches.
+    ///
+    /// # Errors
+    /// [`CommandError::HomingOff`] if homing is switched off, or the machine's refusal.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub(super) fn home(&mut self) -> Result<(), CommandError> {
         if !self.machine.settings().is_on(Setting::Homing) {
@@ -210,6 +219,11 @@ impl Inner<'_> {
         Ok(())
     }
 
+    /// Carries out a line of G-code, or begins a task for it.
+    ///
+    /// # Errors
+    /// [`CommandError::Locked`] in alarm or sleep, or the interpreter's or the machine's refusal.
+    /// The program's modes are then unchanged.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub(super) fn run_gcode(&mut self, line: GCode<'_>) -> Result<(), CommandError> {
         let steps = self.machine.settings().page_steps();
@@ -244,7 +258,7 @@ impl Inner<'_> {
         Ok(())
     }
 
-    /// A line of its own: what it sets is forgotten.
+    /// Carries out a jog. The line stands alone: the modes that it sets do not affect later lines.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub(super) fn jog(&mut self, line: GCode<'_>) -> Result<(), CommandError> {
         let steps = self.machine.settings().page_steps();
@@ -253,7 +267,8 @@ impl Inner<'_> {
         Ok(self.machine.jog(point, program.feed)?)
     }
 
-    /// Whether the next line must wait: one is being carried out, or there is no room for a move.
+    /// Whether the next line must wait, because a line is being carried out or there is no room for
+    /// a move.
     pub(super) fn must_wait(&self) -> bool {
         self.task.is_some() || (self.machine.is_streaming() && !self.machine.has_room())
     }
@@ -265,7 +280,7 @@ impl Program {
     }
 }
 
-/// As Grbl and its successors number them.
+/// The number of an alarm, as in Grbl and its successors.
 pub(super) const fn number(alarm: Alarm) -> u8 {
     match alarm {
         Alarm::HardLimit => 1,

@@ -1,4 +1,4 @@
-//! The title below the drawing.
+//! Places the title below the drawing and adds its lines.
 
 use super::PlotOptions;
 use super::job::Collector;
@@ -7,18 +7,20 @@ use crate::protocol::CommandError;
 use crate::stage::{Cancel, StageError, items};
 use crate::visibility::SinkFull;
 
-/// These take some 50,000 instructions.
+/// Lines handled between two checks for cancelling: some 50,000 instructions.
 const LINES_BETWEEN_CHECKS: usize = 64;
 
-/// Refuses a title that is too wide before the work begins: what is drawn above it does not matter.
+/// Refuses a title that is too wide for the page. Its width does not depend on the drawing, so this
+/// is checked before the computation begins.
 #[inline(never)] // Keeps its frame off the stack while the stages run.
 pub(super) fn check(options: &PlotOptions, steps: StepsPerMillimetre) -> Result<(), CommandError> {
     let Some(title) = options.title() else { return Ok(()) };
     options.page.place_title(&title, [0; 3], steps).map(|_| ()).map_err(CommandError::Page)
 }
 
-/// Adds the lines of the title to the `count` lines at the front of `words`, below them, for the first
-/// pen. Returns how many there are then; a page without a drawing has no title.
+/// Adds the lines of the title, for the first pen, to the `count` lines at the front of `words`,
+/// and places them below those lines. Returns the total number of lines. A page without a drawing
+/// has no title.
 #[inline(never)] // Keeps its frame off the stack while the stages run.
 pub(super) fn write(
     options: &PlotOptions,
@@ -28,7 +30,7 @@ pub(super) fn write(
     cancel: &mut dyn Cancel,
 ) -> Result<usize, CommandError> {
     let Some(title) = options.title() else { return Ok(count) };
-    // Left, right, bottom.
+    // The left, right and bottom edges of the drawing.
     let mut around: Option<[i32; 3]> = None;
     for lines in items::<PackedLine>(words, count).unwrap_or(&[]).chunks(LINES_BETWEEN_CHECKS) {
         cancel.check()?;
