@@ -1,4 +1,5 @@
-//! The step interrupt's work, and what it tells the main loop.
+//! The step interrupt: takes events from the queue, sets the pins, and reports the counts to the
+//! main loop.
 
 use super::ring::EventRing;
 use crate::motion::{
@@ -8,9 +9,11 @@ use core::convert::Infallible;
 use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 use embedded_hal::digital::{OutputPin, PinState};
 
-/// What the interrupt and the main loop share. Only loads and stores, so a Cortex-M0+ has it too.
+/// The state that the interrupt and the main loop share. It needs only atomic loads and stores, so
+/// a Cortex-M0+ supports it.
 ///
-/// The main loop alone writes the orders, and the counts of what it finds to be taken.
+/// Only the main loop writes the commands, and it also writes the counts of the events that it
+/// finds to be taken.
 #[derive(Debug, Default)]
 pub struct PulserState {
     x: AtomicU32,
@@ -31,7 +34,7 @@ pub struct PulserState {
 }
 
 impl PulserState {
-    /// Nothing counted, nothing ordered.
+    /// The state with all counts at 0 and no commands.
     pub const fn new() -> Self {
         Self {
             x: AtomicU32::new(0),
@@ -52,51 +55,53 @@ impl PulserState {
         }
     }
 
-    /// The sum of the steps at the pins, x and y, as counted last; wraps.
+    /// The sum of the steps made at the pins so far, for x and y, as last counted; it wraps.
     pub fn steps(&self) -> (i32, i32) {
         let [x, y] = [&self.x, &self.y].map(|sum| sum.load(Ordering::Relaxed).cast_signed());
         (x, y)
     }
 
-    /// The sum of the steps that took up slack, which [`PulserState::steps`] leaves out; wraps.
+    /// The sum of the steps that took up slack, which [`PulserState::steps`] does not include; it
+    /// wraps.
     pub fn slack(&self) -> (i32, i32) {
         let [x, y] =
             [&self.slack_x, &self.slack_y].map(|sum| sum.load(Ordering::Relaxed).cast_signed());
         (x, y)
     }
 
-    /// The sum of the steps of the pen's motor, down is up; wraps.
+    /// The position of the pen's motor, in steps downward; it wraps.
     pub fn lift(&self) -> i32 {
         self.lift.load(Ordering::Relaxed).cast_signed()
     }
 
-    /// The pen's motor made a step. For whoever counts them.
+    /// Counts a step of the pen's motor. For the code that counts the steps.
     pub fn count_lift(&self, down: bool) {
         add(&self.lift, if down { 1 } else { u32::MAX });
     }
 
-    /// Ticks of the events taken from the queue; wraps.
+    /// The sum of the ticks of the events that were taken from the queue; it wraps.
     pub fn ticks(&self) -> u32 {
         self.ticks.load(Ordering::Relaxed)
     }
 
-    /// How often the queue ran dry while the machine moved; wraps.
+    /// How often the queue ran empty while the machine moved; the count wraps.
     pub fn underruns(&self) -> u32 {
         self.underruns.load(Ordering::Relaxed)
     }
 
-    /// Whether the last event has been worked off and its time is over.
+    /// Whether the last event has been processed and its time is over.
     pub fn is_drained(&self) -> bool {
         self.drained.load(Ordering::Acquire)
     }
 
-    /// No pulse leaves from now on; the interrupt raises the pen, and the main loop throws the queue away.
-    /// Call [`Pulser::tick`] at once, or the pen stays down until the event in work ends.
+    /// Stops all pulses from now on. The interrupt raises the pen, and the main loop discards the
+    /// queue. Call [`Pulser::tick`] at once; otherwise the pen stays down until the current event
+    /// ends.
     pub fn halt(&self) {
         self.halt.store(true, Ordering::Release);
     }
 
-    /// Events wait that the interrupt does not know of.
+    /// Records that events are waiting that the interrupt does not know of.
     pub(super) fn fill(&self) {
         self.drained.store(false, Ordering::Release);
     }
@@ -106,12 +111,13 @@ impl PulserState {
         self.halt.load(Ordering::Acquire)
     }
 
-    /// Allows pulses again. Only after [`PulserState::is_drained`].
+    /// Allows pulses again. Call it only after [`PulserState::is_drained`] is true.
     pub fn release(&self) {
         self.halt.store(false, Ordering::Release);
     }
 
-    /// Adds what was taken from the queue, steps packed as in [`PACKED_STEPS`], less than 2^15 each.
+    /// Adds the steps and ticks of the events that were taken from the queue. Steps are packed as
+    /// in [`PACKED_STEPS`], with less than 2^15 for each motor.
     fn count(&self, steps: u32, slack: u32, ticks: u32) {
         for (x, y, packed) in [(&self.x, &self.y, steps), (&self.slack_x, &self.slack_y, slack)] {
             let dx = i32::from(packed as u16 as i16).cast_unsigned();
@@ -121,7 +127,8 @@ impl PulserState {
         add(&self.ticks, ticks);
     }
 
-    /// For a board whose steps are not pulsed by [`Pulser`]: what its hardware has done.
+    /// Reports what the hardware has done, for a board whose steps are not pulsed by [`Pulser`]:
+    /// the sums of the steps and ticks, and whether the queue is drained.
     pub fn report(&self, (x, y): (i32, i32), ticks: u32, drained: bool) {
         self.x.store(x.cast_unsigned(), Ordering::Relaxed);
         self.y.store(y.cast_unsigned(), Ordering::Relaxed);
@@ -129,24 +136,24 @@ impl PulserState {
         self.drained.store(drained, Ordering::Release);
     }
 
-    /// The same for steps that take up slack.
+    /// Reports the sums of the steps that took up slack, for such a board.
     pub fn report_slack(&self, (x, y): (i32, i32)) {
         self.slack_x.store(x.cast_unsigned(), Ordering::Relaxed);
         self.slack_y.store(y.cast_unsigned(), Ordering::Relaxed);
     }
 
-    /// The queue ran dry while the machine moved.
+    /// Counts that the queue ran empty while the machine moved.
     pub fn note_underrun(&self) {
         let underruns = self.underruns.load(Ordering::Relaxed);
         self.underruns.store(underruns.wrapping_add(1), Ordering::Relaxed);
     }
 
-    /// Width of a pulse.
+    /// The width of a step pulse, in ticks.
     pub fn pulse_ticks(&self) -> u32 {
         self.pulse_ticks.load(Ordering::Relaxed)
     }
 
-    /// Which direction pins are inverted (bit 0 x, bit 1 y).
+    /// The mask of inverted direction pins: bit 0 for x, bit 1 for y.
     pub fn inverted(&self) -> u8 {
         self.inverted.load(Ordering::Relaxed)
     }
@@ -156,20 +163,21 @@ impl PulserState {
         self.lift_inverted.load(Ordering::Relaxed)
     }
 
-    /// Width of a pulse, and which direction pins are inverted (bit 0 x, bit 1 y, bit 2 the pen's motor).
+    /// Sets the width of a pulse in ticks, and the mask of inverted direction pins: bit 0 for x,
+    /// bit 1 for y, bit 2 for the pen's motor.
     pub(super) fn configure(&self, pulse_ticks: u32, inverted: u8) {
         self.pulse_ticks.store(pulse_ticks, Ordering::Relaxed);
         self.inverted.store(inverted & 3, Ordering::Relaxed);
         self.lift_inverted.store(inverted & 4 != 0, Ordering::Relaxed);
     }
 
-    /// What the board's queue holds; before the machine asks.
+    /// Sets the size of the board's queue. Call it before the machine asks for the size.
     pub fn set_queue(&self, queue: QueueSize) {
         self.queue_steps.store(queue.steps, Ordering::Relaxed);
         self.queue_full.store(queue.full, Ordering::Relaxed);
     }
 
-    /// The same; without a board it has no end.
+    /// The size of the board's queue. Without a board it is unlimited.
     pub(super) fn queue(&self) -> QueueSize {
         QueueSize {
             steps: self.queue_steps.load(Ordering::Relaxed),
@@ -177,7 +185,7 @@ impl PulserState {
         }
     }
 
-    /// How a queue that runs dry brakes.
+    /// How the interrupt brakes when its queue runs empty.
     pub fn brake(&self) -> &BrakeOrders {
         &self.brake
     }
@@ -189,18 +197,18 @@ pub struct StepQueue<'q, const N: usize> {
     ring: &'q EventRing<N>,
     state: &'q PulserState,
     order: &'static PinOrder,
-    /// Of the steps put in last, in units of the brake's rule.
+    /// The length of the steps that were put in last, in units of the brake's rule.
     step_length: StepLength,
-    /// The place behind the word counted last.
+    /// The slot after the word that was counted last.
     counted: u32,
-    /// Something follows the event counted last.
+    /// Whether the machine is in motion after the event that was counted last.
     moving: bool,
 }
 
 impl<const N: usize> StepQueue<'_, N> {
-    /// Room for what is told of some of the events.
+    /// Slots that are reserved for words that only carry information about some of the events.
     const RESERVED: usize = Runner::ROOM;
-    /// Events that fit.
+    /// The number of events that fit.
     const EVENTS: usize = N - 1 - Self::RESERVED;
 
     /// Whether no event waits.
@@ -208,23 +216,23 @@ impl<const N: usize> StepQueue<'_, N> {
         self.ring.is_empty()
     }
 
-    /// Whether half of the places are taken.
+    /// Whether at least half of the slots are taken.
     pub fn is_half_full(&self) -> bool {
         self.ring.waiting() as usize >= N / 2
     }
 
-    /// Whether the last event is over, and [`Pulser::begin`] is to be called for the next.
+    /// Whether the last event is over, so that [`Pulser::begin`] must be called for the next one.
     pub fn is_stopped(&self) -> bool {
         !self.ring.is_running()
     }
 
-    /// How many events were taken since [`StepQueue::sync_consumed`] was called.
+    /// The number of words that were taken since [`StepQueue::sync_consumed`] was last called.
     pub fn taken(&self) -> usize {
         self.ring.taken_behind(self.counted) as usize
     }
 
-    /// Counts what the interrupt has taken since, which makes room, and tells the state. After
-    /// [`PulserState::halt`] it throws the queue away.
+    /// Counts the events that the interrupt has taken since the last call, which frees their slots,
+    /// and updates the shared state. After [`PulserState::halt`] it discards the queue.
     pub fn sync_consumed(&mut self) {
         let stopped = !self.ring.is_running();
         let down = self.state.inverted() << 2;
@@ -303,43 +311,44 @@ impl<const N: usize> EventQueue for StepQueue<'_, N> {
     }
 }
 
-/// The pins of a machine. High steps, high direction counts up (unless inverted), high enable
-/// switches the drivers on; a board that needs it otherwise wraps its pin.
+/// The pins of a machine, one by one. A high step pin makes a step, a high direction pin counts up
+/// (unless it is inverted), and a high enable pin switches the drivers on. A board with other
+/// levels wraps the pin.
 #[derive(Debug)]
 pub struct Pins<SX, DX, SY, DY, E, SZ, DZ> {
-    /// Steps of x.
+    /// The step pin of x.
     pub step_x: SX,
-    /// Direction of x.
+    /// The direction pin of x.
     pub direction_x: DX,
-    /// Steps of y.
+    /// The step pin of y.
     pub step_y: SY,
-    /// Direction of y.
+    /// The direction pin of y.
     pub direction_y: DY,
-    /// All drivers.
+    /// The enable pin of all drivers.
     pub enable: E,
-    /// Steps of the pen's motor.
+    /// The step pin of the pen's motor.
     pub step_z: SZ,
-    /// Its direction: high lowers the pen.
+    /// The direction pin of the pen's motor; a high level lowers the pen.
     pub direction_z: DZ,
 }
 
-/// Which of the axes' pins has which bit where they are written: at most 5 of them.
+/// The order in which the axes' pins, at most 5, are written: which pin has which bit.
 #[derive(Debug)]
 pub struct PinOrder {
-    /// The pins' levels for those of a [`StepEvent`].
+    /// The levels of the pins for each combination of the levels of a [`StepEvent`].
     pins: [u8; 32],
-    /// And the other way round.
+    /// The levels of a [`StepEvent`] for each combination of the levels of the pins.
     levels: [u8; 32],
-    /// The step pins.
+    /// The mask of the step pins.
     pulses: u8,
 }
 
 impl PinOrder {
-    /// As in a [`StepEvent`].
+    /// The order of the bits in a [`StepEvent`].
     pub const OF_EVENTS: Self = Self::new([0, 1, 2, 3, 4], 0);
 
-    /// Where the event's bits 0 to 4 are among the pins, each a different one of 0 to 4, and which of the pins are
-    /// inverted.
+    /// Creates the order in which bit i of an event, for i from 0 to 4, is pin number `places[i]`.
+    /// The numbers are a permutation of 0 to 4. `inverted` is the mask of inverted pins.
     pub const fn new(places: [u8; 5], inverted: u8) -> Self {
         let (mut pins, mut levels, mut pulses) = ([0; 32], [0; 32], 0);
         let mut event = 0u8;
@@ -360,18 +369,19 @@ impl PinOrder {
     }
 }
 
-/// The axes' pins, set all at once.
+/// The axes' pins, which are all set at once.
 pub trait Axes {
-    /// How they lie; steps are not inverted.
+    /// The order of the pins. Step pins are not inverted.
     const ORDER: &'static PinOrder = &PinOrder::OF_EVENTS;
-    /// The pins take `levels`, in bits 0 to 4 as [`Axes::ORDER`] says, the others mean nothing. In a
-    /// [`StepEvent`]'s order: a high pulse for each step, the level of each direction pin where a motor
-    /// runs down, drivers on. Called from the interrupt, so brief.
+    /// Sets the pins to `levels`, in bits 0 to 4 in the order of [`Axes::ORDER`]; the other bits
+    /// have no meaning. In the order of a [`StepEvent`] they are a high pulse for each step, the
+    /// level of each direction pin where a motor runs down, and whether the drivers are on. It is
+    /// called from the interrupt, so it must be brief.
     fn set(&mut self, levels: u32);
-    /// The pen's motor takes a direction, high to lower the pen, and a step if asked. Called from the
-    /// interrupt, too.
+    /// Sets the direction pin of the pen's motor, high to lower the pen, and makes a step if `step`
+    /// is true. It is called from the interrupt, too.
     fn set_lift(&mut self, step: bool, down: bool);
-    /// The pulses end. Called from the interrupt, too.
+    /// Ends the pulses. It is called from the interrupt, too.
     fn end_pulses(&mut self);
 }
 
@@ -406,13 +416,14 @@ where
     }
 }
 
-/// The pen: a solenoid's pin or a servo.
+/// The actuator of the pen: a solenoid's pin or a servo.
 pub trait Pen {
-    /// Goes to `height`, 0 (fully raised) to 127. Called from the interrupt, so brief.
+    /// Moves the pen to `height`, from 0 (fully raised) to 127. It is called from the interrupt, so
+    /// it must be brief.
     fn set_height(&mut self, height: u8);
 }
 
-/// A pen with two positions at one pin: high is down, from height 64 on.
+/// A pen with two positions at one pin. The pin is high, and the pen down, from height 64 on.
 #[derive(Debug)]
 pub struct Solenoid<P>(pub P);
 
@@ -425,18 +436,19 @@ impl<P: OutputPin<Error = Infallible>> Pen for Solenoid<P> {
 
 /// The work of the step interrupt.
 ///
-/// A move takes two calls, [`Pulser::tick`] that raises the step pins and [`Pulser::end_pulses`], and some
-/// more of [`Pulser::brake`] where the queue may run dry at speed. No division, no loop, no lock. What the
-/// interrupt costs is said and measured where the board has it.
+/// A step takes two calls: [`Pulser::tick`] raises the step pins, and [`Pulser::end_pulses`] lowers
+/// them. Some more calls of [`Pulser::brake`] follow where the queue may run empty at speed. There
+/// is no division, no loop and no lock. The time that the interrupt takes is documented and
+/// measured in the boards' modules.
 #[derive(Debug)]
 pub struct Pulser<'q, A, P, const N: usize> {
     axes: A,
     pen: P,
     ring: &'q EventRing<N>,
     state: &'q PulserState,
-    /// Ticks of the event in work.
+    /// The ticks of the current event.
     ticks: u32,
-    /// Keeps a queue that runs dry from stopping the machine with a jerk.
+    /// Prevents an abrupt stop at speed when the queue runs empty.
     brake: StepBrake,
 }
 
@@ -445,20 +457,21 @@ pub struct Pulser<'q, A, P, const N: usize> {
 pub enum Tick {
     /// An event has begun.
     Begun {
-        /// When the next is due, from the time on at which this one was.
+        /// The time at which the next event is due, in ticks after this event was due.
         ticks: u32,
-        /// Whether [`Pulser::end_pulses`] is due [`PulserState::pulse_ticks`] from now.
+        /// Whether [`Pulser::end_pulses`] must be called [`PulserState::pulse_ticks`] from now.
         pulses: bool,
     },
-    /// No event: first [`Pulser::brake`] is due at once, then the next tick.
+    /// The word was no event, but information about later ones. [`Pulser::brake`] is due at once,
+    /// then the next tick.
     Told,
-    /// Nothing, or no more is wanted: the event in work was the last.
+    /// The queue is empty or the machine is halted. The current event was the last.
     Over,
 }
 
 impl<'q, A: Axes, P: Pen, const N: usize> Pulser<'q, A, P, N> {
-    /// A pulser at rest, and the other end of its queue. The pins stay as they are until the first
-    /// event.
+    /// Creates a pulser at rest, and the main loop's end of its queue. The pins do not change until
+    /// the first event.
     pub fn new(
         axes: A,
         pen: P,
@@ -473,7 +486,8 @@ impl<'q, A: Axes, P: Pen, const N: usize> Pulser<'q, A, P, N> {
         (pulser, StepQueue { ring, state, order: A::ORDER, step_length, counted, moving: false })
     }
 
-    /// Before the first event, and again after [`Tick::Over`]. Whether there is anything to do.
+    /// Call it before the first event, and again after [`Tick::Over`]. Returns whether there is
+    /// anything to do.
     pub fn begin(&mut self) -> bool {
         let has_work = !self.ring.is_empty() || self.is_halted();
         if has_work {
@@ -482,7 +496,7 @@ impl<'q, A: Axes, P: Pen, const N: usize> Pulser<'q, A, P, N> {
         has_work
     }
 
-    /// The next event.
+    /// Begins the next event.
     #[inline(always)]
     pub fn tick(&mut self) -> Tick {
         const RARE: u32 = (StepEvent::LENGTH | StepEvent::PEN) as u32;
@@ -511,34 +525,37 @@ impl<'q, A: Axes, P: Pen, const N: usize> Pulser<'q, A, P, N> {
                 self.axes.set_lift(step, down != self.state.lift_is_inverted());
                 return Tick::Begun { ticks, pulses: step };
             }
-            // Done above.
+            // These events were handled above.
             EventKind::Levels(_) => {}
         }
         Tick::Begun { ticks, pulses: false }
     }
 
-    /// Nothing else is read by it, so it needs no order.
+    /// Whether the pulses are halted. No other data is read because of this flag, so it needs no
+    /// memory ordering.
     #[inline(always)]
     pub fn is_halted(&self) -> bool {
         self.state.halt.load(Ordering::Relaxed)
     }
 
-    /// The pulses of an event end. Whether [`Pulser::brake`] is due at once.
+    /// Ends the pulses of an event. Returns whether [`Pulser::brake`] is due at once.
     #[inline(always)]
     pub fn end_pulses(&mut self) -> bool {
         self.axes.end_pulses();
         self.brake.step(&self.state.brake)
     }
 
-    /// Whether this is due once more, and by how many ticks the event in work must last longer than was planned: with fewer
-    /// steps waiting the machine would be too fast to stop within them.
+    /// Does a part of the brake's work. Returns whether another call is due, and by how many ticks
+    /// the current event must last longer than planned. With fewer steps waiting, the machine would
+    /// otherwise be too fast to stop within them.
     #[inline(always)]
     pub fn brake(&mut self) -> (bool, u32) {
         let (is_due, least) = self.brake.work(&self.state.brake);
         (is_due, least.saturating_sub(self.ticks))
     }
 
-    /// The ticks of what comes between the event in work and the next step, which count where the first is lengthened.
+    /// The ticks of the event between the current one and the next step, or 0. They count as well
+    /// where the current event is lengthened.
     pub fn wait_behind(&self) -> u32 {
         let others = A::ORDER.pulses | StepEvent::AT_REST | StepEvent::LENGTH | StepEvent::PEN;
         match self.ring.peek() {
@@ -547,7 +564,7 @@ impl<'q, A: Axes, P: Pen, const N: usize> Pulser<'q, A, P, N> {
         }
     }
 
-    /// Raises the pen; the event in work was the last.
+    /// Raises the pen. The current event was the last.
     #[cold]
     #[inline(never)]
     pub fn stop(&mut self) {
@@ -556,6 +573,7 @@ impl<'q, A: Axes, P: Pen, const N: usize> Pulser<'q, A, P, N> {
         self.ring.set_running(false);
     }
 
+    /// Ends the work because the queue is empty.
     #[cold]
     #[inline(never)]
     fn run_dry(&mut self) {
@@ -569,13 +587,14 @@ fn write(pin: &mut impl OutputPin<Error = Infallible>, high: bool) {
     let Ok(()) = pin.set_state(PinState::from(high));
 }
 
-/// All that an event says of the axes' pins.
+/// The bits of an event that are levels of the axes' pins.
 const LEVELS: u8 = (1 << 5) - 1;
 
-/// Pulses and directions of the levels.
+/// The bits of the levels that are pulses and directions.
 const STEPS: u8 = StepEvent::STEP_X | StepEvent::STEP_Y | StepEvent::DOWN_X | StepEvent::DOWN_Y;
 
-/// What they add to x in the lower half and to y in the upper one.
+/// The steps for each combination of these bits: those of x are added in the lower half of a word,
+/// those of y in the upper half.
 const PACKED_STEPS: [u32; 16] = {
     let mut table = [0; 16];
     let mut levels = 0;
@@ -587,7 +606,8 @@ const PACKED_STEPS: [u32; 16] = {
     table
 };
 
-/// Only for the one that writes it: a load and a store, so that a Cortex-M0+ can.
+/// Adds to a sum. Only its single writer may call this: it is a load and a store, so that a
+/// Cortex-M0+ supports it.
 #[inline]
 fn add(sum: &AtomicU32, more: u32) {
     sum.store(sum.load(Ordering::Relaxed).wrapping_add(more), Ordering::Relaxed);

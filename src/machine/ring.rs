@@ -1,22 +1,22 @@
-//! The ring in which events wait for the step interrupt.
+//! The ring buffer in which events wait for the step interrupt.
 //!
-//! The main loop puts words in, the interrupt takes them out, and does nothing else with them: what was
-//! taken stays in its place until the main loop has counted it. Loads and stores only, so a Cortex-M0+
-//! has it too; interrupt and main loop are of one core, so their order needs no barrier but the
-//! compiler's.
+//! The main loop puts words in, and the interrupt takes them out and does nothing else with them. A
+//! word that was taken stays in its slot until the main loop has counted it. All accesses are loads
+//! and stores, so a Cortex-M0+ supports them. Interrupt and main loop run on the same core, so
+//! compiler fences are enough to order the accesses.
 
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering, compiler_fence};
 
-/// A ring of `N` places, all but one of which can be filled.
+/// A ring buffer of `N` slots, of which all but one can be filled.
 #[derive(Debug)]
-#[repr(C)] // The words last: the interrupt reaches the others by a short offset.
+#[repr(C)] // The words come last, so that the other fields have short offsets.
 pub struct EventRing<const N: usize> {
-    /// The place behind the word taken last, which is the place of the next: 0 to `N`, and `N` stands for
-    /// the first. Of the interrupt.
+    /// The slot after the word that was taken last, which is the slot of the next word: 0 to `N`,
+    /// where `N` means slot 0. Only the interrupt writes it.
     taken: AtomicU32,
-    /// The place behind the word put in last. Of the main loop.
+    /// The slot after the word that was put in last. Only the main loop writes it.
     filled: AtomicU32,
-    /// The interrupt takes one word after the other. Of the interrupt.
+    /// Whether the interrupt is taking one word after the other. Only the interrupt writes it.
     running: AtomicBool,
     words: [AtomicU32; N],
 }
@@ -28,7 +28,7 @@ impl<const N: usize> Default for EventRing<N> {
 }
 
 impl<const N: usize> EventRing<N> {
-    /// Nothing in it.
+    /// Creates an empty ring.
     pub const fn new() -> Self {
         assert!(N > 1, "a ring of one place holds nothing");
         Self {
@@ -39,19 +39,19 @@ impl<const N: usize> EventRing<N> {
         }
     }
 
-    /// The word at `place`, and what comes behind it.
+    /// The word in the slot `place`, and the slot after it.
     #[inline(always)]
     fn at(&self, place: u32) -> (&AtomicU32, u32) {
         let place = if place < N as u32 { place } else { 0 };
         (&self.words[place as usize], place + 1)
     }
 
-    /// How many words lie between two places.
+    /// The number of words from slot `from` up to, but not including, slot `to`.
     fn between(from: u32, to: u32) -> u32 {
         if to >= from { to - from } else { to + N as u32 - from }
     }
 
-    /// The next word. For the interrupt.
+    /// Takes the next word. For the interrupt only.
     #[inline(always)]
     pub(super) fn take(&self) -> Option<u32> {
         let taken = self.taken.load(Ordering::Relaxed);
@@ -65,7 +65,7 @@ impl<const N: usize> EventRing<N> {
         Some(word)
     }
 
-    /// The next word, which stays. For the interrupt.
+    /// Returns the next word without taking it. For the interrupt only.
     pub(super) fn peek(&self) -> Option<u32> {
         let taken = self.taken.load(Ordering::Relaxed);
         let is_empty = taken == self.filled.load(Ordering::Relaxed);
@@ -73,45 +73,48 @@ impl<const N: usize> EventRing<N> {
         (!is_empty).then(|| self.at(taken).0.load(Ordering::Relaxed))
     }
 
-    /// The interrupt begins to take words, or takes no more. For the interrupt.
+    /// Records that the interrupt begins to take words, or stops taking them. For the interrupt
+    /// only.
     pub(super) fn set_running(&self, running: bool) {
         compiler_fence(Ordering::Release);
         self.running.store(running, Ordering::Relaxed);
     }
 
-    /// Whether it does. For the main loop: if not, it sees all that was taken.
+    /// Whether the interrupt takes words. For the main loop: if not, the main loop sees everything
+    /// that was taken.
     pub(super) fn is_running(&self) -> bool {
         let running = self.running.load(Ordering::Relaxed);
         compiler_fence(Ordering::Acquire);
         running
     }
 
-    /// Whether all words were taken.
+    /// Whether all words have been taken.
     pub(super) fn is_empty(&self) -> bool {
         self.taken.load(Ordering::Relaxed) == self.filled.load(Ordering::Relaxed)
     }
 
-    /// How many words wait to be taken.
+    /// The number of words that wait to be taken.
     pub(super) fn waiting(&self) -> u32 {
         Self::between(self.taken.load(Ordering::Relaxed), self.filled.load(Ordering::Relaxed))
     }
 
-    /// The place behind the word taken last, to count from.
+    /// The slot after the word that was taken last, from which counting can begin.
     pub(super) fn taken_place(&self) -> u32 {
         self.taken.load(Ordering::Relaxed)
     }
 
-    /// How many words were taken behind `place`. For the main loop.
+    /// The number of words that were taken from slot `place` on. For the main loop only.
     pub(super) fn taken_behind(&self, place: u32) -> u32 {
         Self::between(place, self.taken.load(Ordering::Relaxed))
     }
 
-    /// How many words have room, if those behind `counted` still need theirs. For the main loop.
+    /// The number of free slots if the words from slot `counted` on still need theirs. For the main
+    /// loop only.
     pub(super) fn room(&self, counted: u32) -> usize {
         N - 1 - Self::between(counted, self.filled.load(Ordering::Relaxed)) as usize
     }
 
-    /// Puts a word in; there is room. For the main loop.
+    /// Puts a word in. The caller makes sure that there is room. For the main loop only.
     pub(super) fn put(&self, word: u32) {
         let (place, next) = self.at(self.filled.load(Ordering::Relaxed));
         place.store(word, Ordering::Relaxed);
@@ -119,7 +122,8 @@ impl<const N: usize> EventRing<N> {
         self.filled.store(next, Ordering::Relaxed);
     }
 
-    /// The words taken since `counted`, which moves on. For the main loop.
+    /// Passes the words that were taken since `counted` to `each`, and advances `counted` past
+    /// them. For the main loop only.
     pub(super) fn count(&self, counted: &mut u32, mut each: impl FnMut(u32)) {
         let taken = self.taken.load(Ordering::Relaxed);
         while *counted != taken {
@@ -129,7 +133,7 @@ impl<const N: usize> EventRing<N> {
         }
     }
 
-    /// Throws away what waits. For the main loop, while the interrupt does not run.
+    /// Discards the waiting words. For the main loop only, while the interrupt does not run.
     pub(super) fn clear(&self) {
         self.filled.store(self.taken.load(Ordering::Relaxed), Ordering::Relaxed);
     }

@@ -1,8 +1,9 @@
-//! The numbered settings: names, units, ranges.
+//! The numbered settings: their names, units and ranges.
 //!
-//! Numbers up to 132 mean what they mean in Grbl 1.1, but for 5, which is a mask here and covers the
-//! emergency stop too; those from 200 on are penup's own. A value is checked when it is entered,
-//! alone and together with the others; a refused value changes nothing.
+//! Numbers up to 132 have the meaning that they have in Grbl 1.1, with one exception: 5 is a mask
+//! here, and it also covers the emergency stop. Numbers from 200 on are penup's own. A value is
+//! checked when it is entered, both alone and together with the other values. A refused value
+//! changes nothing.
 
 use super::{Anchors, Kinematics};
 use crate::drawing::{PAGE_LIMIT, PagePoint};
@@ -12,130 +13,137 @@ use crate::motion::{
     TICKS_PER_SECOND,
 };
 
-/// A value of any setting: ±32768 in units of 2^-16 of the setting's unit.
+/// A value of any setting, between -32768 and 32768 with a resolution of 2^-16, in the unit of the
+/// setting.
 pub type Value = Millimetres;
 
-/// One setting, in the order of the listing.
+/// The settings, in the order in which they are listed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum Setting {
-    /// `$0` Width of a step pulse.
+    /// `$0` The width of a step pulse.
     StepPulse,
-    /// `$3` Which motors run the other way: bit 0 x, bit 1 y, bit 2 that of the pen.
+    /// `$3` The mask of motors whose direction is inverted: bit 0 for x, bit 1 for y, bit 2 for the
+    /// pen's motor.
     InvertDirections,
-    /// `$5` Which contacts are closed at rest: bit 0 x, bit 1 y, bit 2 the emergency stop.
+    /// `$5` The mask of contacts that are closed when they are not pressed: bit 0 for x, bit 1 for
+    /// y, bit 2 for the emergency stop.
     InvertContacts,
-    /// `$11` How far a rounded corner would leave the true one.
+    /// `$11` Junction deviation: how far a rounded corner would be from the true one. It determines
+    /// the speed in corners.
     JunctionDeviation,
-    /// `$20` Whether moves beyond the travel are refused.
+    /// `$20` Whether moves that leave the travel are refused.
     SoftLimits,
-    /// `$21` Whether a limit switch stops the machine.
+    /// `$21` Whether a pressed limit switch stops the machine.
     HardLimits,
     /// `$22` Whether the machine must be homed before it draws.
     Homing,
-    /// `$24` Speed of the second approach to a switch.
+    /// `$24` The speed of the second, slow approach to a switch.
     HomingFeed,
-    /// `$25` Speed of the first.
+    /// `$25` The speed of the first approach to a switch.
     HomingSeek,
-    /// `$27` How far from its switch an axis is homed.
+    /// `$27` The distance from its switch at which an axis is homed.
     HomingPullOff,
     /// `$100` Steps per millimetre of x.
     StepsPerMmX,
-    /// `$101` The same of y.
+    /// `$101` Steps per millimetre of y.
     StepsPerMmY,
-    /// `$102` The same of the motor that lifts the pen.
+    /// `$102` Steps per millimetre of the motor that lifts the pen.
     StepsPerMmZ,
-    /// `$110` Greatest speed of x.
+    /// `$110` The greatest speed of x.
     MaxRateX,
-    /// `$111` The same of y.
+    /// `$111` The greatest speed of y.
     MaxRateY,
-    /// `$112` Greatest speed of the pen's motor.
+    /// `$112` The greatest speed of the pen's motor.
     MaxRateZ,
-    /// `$120` Acceleration of x.
+    /// `$120` The acceleration of x.
     AccelerationX,
-    /// `$121` The same of y.
+    /// `$121` The acceleration of y.
     AccelerationY,
-    /// `$122` The same of the pen's motor.
+    /// `$122` The acceleration of the pen's motor.
     AccelerationZ,
-    /// `$130` Travel of x, from 0.
+    /// `$130` The travel of x, from 0.
     TravelX,
-    /// `$131` The same of y.
+    /// `$131` The travel of y, from 0.
     TravelY,
-    /// `$132` From the upper stop of the pen's motor to height 127.
+    /// `$132` The travel of the pen's motor from its upper stop to height 127.
     TravelZ,
-    /// `$200` From a change of direction to the pulse.
+    /// `$200` The time from a change of a direction pin to the step pulse.
     DirectionSetup,
-    /// `$201` Speed along the path with the pen down.
+    /// `$201` The speed along the path with the pen down.
     DrawSpeed,
-    /// `$202` Speed along the path with the pen up.
+    /// `$202` The speed along the path with the pen up.
     TravelSpeed,
-    /// `$203` Whether bends of dense polylines are slowed to the acceleration limit.
+    /// `$203` Whether the machine slows down in the bends of dense polylines so that the
+    /// centripetal acceleration stays within the limit.
     Centripetal,
-    /// `$204` The most by which acceleration along the path changes in a second, at least 0.1; 0 for no limit.
+    /// `$204` The greatest jerk along the path, which is the rate of change of the acceleration; at
+    /// least 0.1, or 0 for no limit.
     Jerk,
     /// `$209` How the pen is lifted: 0 by a servo or a solenoid, 1 by a motor.
     PenLift,
-    /// `$210` Height of the raised pen.
+    /// `$210` The height of the raised pen, from 0 (highest) to 127.
     PenUpHeight,
-    /// `$211` Height of the lowered pen.
+    /// `$211` The height of the lowered pen, from 0 (highest) to 127.
     PenDownHeight,
-    /// `$212` From the order to raise the pen to the first move.
+    /// `$212` The dwell from the command to raise the pen to the first move.
     PenUpDwell,
-    /// `$213` From the order to lower the pen to the first move.
+    /// `$213` The dwell from the command to lower the pen to the first move.
     PenDownDwell,
-    /// `$214` Time in which the pen goes from one end of its heights to the other, step by step; 0
-    /// for at once.
+    /// `$214` The time in which the pen moves in small steps from one end of its range of heights
+    /// to the other; 0 if it moves at once.
     PenRamp,
-    /// `$215` How much ink the pen draws before the machine pauses after a stroke; 0 for never.
+    /// `$215` The length of ink after which the machine pauses at the end of a stroke; 0 for never.
     InkBeforePause,
-    /// `$220` Length of the dots and gaps of a dotted line; a dash is three dots.
+    /// `$220` The length of the dots and gaps of a dotted line. A dash is three dots long.
     DotLength,
-    /// `$230` Build of the machine: 0 Cartesian, 1 CoreXY, 2 polargraph.
+    /// `$230` The kinematics of the machine: 0 Cartesian, 1 CoreXY, 2 polargraph.
     Kinematics,
-    /// `$231` From the left anchor of the belts to the right one.
+    /// `$231` The distance from the left anchor of the belts to the right one.
     AnchorWidth,
-    /// `$232` From the left anchor to the page's origin, to the right.
+    /// `$232` The horizontal distance from the left anchor to the page's origin, which is to the
+    /// right of it.
     AnchorLeft,
-    /// `$233` Height of the anchors above the page's origin.
+    /// `$233` The height of the anchors above the page's origin.
     AnchorHeight,
-    /// `$234` Length of a belt when it is homed.
+    /// `$234` The length of a belt when it is homed.
     HomedBelt,
-    /// `$235` Backlash of x: what is lost when its motor turns round.
+    /// `$235` The backlash of x: the travel that is lost when its motor reverses.
     BacklashX,
-    /// `$236` The same of y, or of the other motor.
+    /// `$236` The backlash of y, or of the second motor.
     BacklashY,
-    /// `$240` Where the pen is parked (G28): x.
+    /// `$240` The x coordinate at which the pen is parked (G28).
     ParkX,
-    /// `$241` The same of y.
+    /// `$241` The y coordinate at which the pen is parked (G28).
     ParkY,
 }
 
-/// What there is to know about a setting.
+/// The description of a setting.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SettingInfo {
-    /// Which.
+    /// The setting that is described.
     pub setting: Setting,
-    /// Its number after the `$`.
+    /// The number after the `$`.
     pub number: u16,
-    /// Its name.
+    /// The name in the listing.
     pub name: &'static str,
-    /// Its unit; empty for a plain number.
+    /// The unit; empty for a plain number.
     pub unit: &'static str,
     /// The least value allowed.
     pub least: Value,
     /// The greatest value allowed.
     pub greatest: Value,
-    /// The value of a new machine.
+    /// The default value.
     pub default: Value,
     /// Whether only whole numbers are allowed.
     pub whole: bool,
 }
 
-/// Steps a second of the pen's motor, at most: every board keeps up with it.
+/// The greatest step rate of the pen's motor, in steps per second. Every board can keep up with it.
 const GREATEST_LIFT_RATE: u32 = 10_000;
 
-/// How many settings there are.
+/// The number of settings.
 pub const SETTING_COUNT: usize = 44;
 
 const fn info(
@@ -146,7 +154,7 @@ const fn info(
     (least, greatest, default): (f64, f64, f64),
     whole: bool,
 ) -> SettingInfo {
-    // Rounded to nearest, as a sent value is; none is negative.
+    // A value is rounded to the nearest one, as a value that is sent is. No value is negative.
     const fn value(number: f64) -> Value {
         Value::from_bits((number * 65536.0 + 0.5) as i32)
     }
@@ -162,7 +170,7 @@ const fn info(
     }
 }
 
-/// All settings, by number.
+/// The descriptions of all settings, sorted by number.
 #[rustfmt::skip] // a table
 pub const SETTINGS: [SettingInfo; SETTING_COUNT] = {
     use Setting::*;
@@ -215,12 +223,12 @@ pub const SETTINGS: [SettingInfo; SETTING_COUNT] = {
 };
 
 impl Setting {
-    /// What there is to know about it.
+    /// The description of this setting.
     pub const fn info(self) -> &'static SettingInfo {
         &SETTINGS[self as usize]
     }
 
-    /// The setting with that number.
+    /// The setting with this number, or `None` if there is none.
     ///
     /// ```
     /// use penup::machine::Setting;
@@ -233,23 +241,24 @@ impl Setting {
     }
 }
 
-/// Why a setting keeps its value.
+/// Why a change of a setting was refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum SettingError {
     /// No setting has this number.
     Unknown,
-    /// Below `least` or above `greatest` of [`Setting::info`].
+    /// The value is below `least` or above `greatest` of [`Setting::info`].
     OutOfRange(Setting),
-    /// A whole number is needed.
+    /// The setting needs a whole number.
     NotWhole(Setting),
-    /// It does not go together with the others.
+    /// The value conflicts with the values of other settings.
     Conflict(LimitsError),
-    /// Not while the machine moves.
+    /// Settings cannot be changed while the machine moves.
     Busy,
 }
 
-/// The values of all settings: within their ranges, and such that motion can keep them together.
+/// The values of all settings. Each value is within its range, and the motion planner can honour
+/// all of them together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Settings {
     values: [Value; SETTING_COUNT],
@@ -270,7 +279,7 @@ impl Settings {
     /// Changes a setting.
     ///
     /// # Errors
-    /// See [`SettingError`]; the old value stays then.
+    /// See [`SettingError`]. On an error the setting keeps its old value.
     ///
     /// ```
     /// use penup::machine::{Setting, SettingError, Settings, Value};
@@ -296,9 +305,10 @@ impl Settings {
         Ok(())
     }
 
-    /// The defaults, but for `values` by their numbers: as they were once read from
-    /// [`Settings::iter`]. Numbers that there are no more are passed over; a value out of its range,
-    /// or values that conflict, give the defaults.
+    /// Restores settings that were read from [`Settings::iter`] before. `values` are pairs of
+    /// number and value; settings that are not among them get their defaults. Numbers that no
+    /// longer exist are ignored. If a value is out of its range, or if values conflict, all
+    /// settings get their defaults.
     pub fn restored(values: impl IntoIterator<Item = (u16, Value)>) -> Self {
         let mut restored = Self::default();
         for (setting, value) in values.into_iter().filter_map(|(number, value)| {
@@ -315,29 +325,29 @@ impl Settings {
         if restored.checked_limits().is_ok() { restored } else { Self::default() }
     }
 
-    /// All settings with their values, by number.
+    /// All settings with their values, sorted by number.
     pub fn iter(&self) -> impl Iterator<Item = (&'static SettingInfo, Value)> {
         SETTINGS.iter().zip(self.values)
     }
 
-    /// Whether a setting of 0 or 1 is 1.
+    /// Whether a setting whose value is 0 or 1 is 1.
     pub fn is_on(&self, setting: Setting) -> bool {
         self.get(setting) != 0
     }
 
-    /// A setting in microseconds, as ticks.
+    /// Converts a setting in microseconds to ticks.
     pub fn microseconds_as_ticks(&self, setting: Setting) -> u32 {
         self.as_ticks(setting, TICKS_PER_SECOND / 1_000_000)
     }
 
-    /// A setting in milliseconds, as ticks.
+    /// Converts a setting in milliseconds to ticks.
     pub fn milliseconds_as_ticks(&self, setting: Setting) -> u32 {
         self.as_ticks(setting, TICKS_PER_SECOND / 1000)
     }
 
     fn as_ticks(&self, setting: Setting, ticks_per_unit: u32) -> u32 {
         let bits = u64::from(self.get(setting).to_bits().max(0).unsigned_abs());
-        // Ranges keep it below 2^27 ticks.
+        // The ranges of the settings keep the result below 2^27 ticks.
         ((bits * u64::from(ticks_per_unit)) >> Value::FRAC_NBITS) as u32
     }
 
@@ -345,16 +355,16 @@ impl Settings {
         self.get(setting).saturating_to_num::<u8>().min(127)
     }
 
-    /// What motion needs to know.
+    /// The limits that the motion planner needs.
     ///
-    /// Speed and acceleration count along the path, so the slower axis sets both.
+    /// Speed and acceleration are measured along the path, so the slower axis determines both.
     pub fn limits(&self) -> Limits {
-        // `set` lets nothing in that motion refuses, so the default never shows.
+        // `set` refuses whatever the motion planner would refuse, so the default is never used.
         self.checked_limits().unwrap_or_default()
     }
 
-    /// The same, but for the speed with the pen up, which is that of `travel`, and without a limit on
-    /// jerk: at a switch the machine is to brake soon.
+    /// The same limits with two differences: the speed with the pen up is that of the setting
+    /// `travel`, and the jerk is not limited, because the machine must brake soon at a switch.
     pub(super) fn limits_at(&self, travel: Setting) -> Limits {
         let settings = MotionSettings {
             travel_mm_per_min: self.get(travel).min(self.axes_rate()),
@@ -364,11 +374,11 @@ impl Settings {
         Limits::new(&settings).unwrap_or_else(|_| self.limits())
     }
 
-    /// How a queue brakes if it runs dry.
+    /// The rule by which the interrupt brakes if its `queue` runs empty.
     pub(super) fn brake(&self, queue: QueueSize) -> BrakeRule {
         let limits = self.limits();
         let fastest = limits.fastest().max(self.limits_at(Setting::HomingSeek).fastest());
-        // The belts of a wall may run much slower than the pen.
+        // The belts of a polargraph may change their lengths much more slowly than the pen moves.
         let longer = if matches!(self.kinematics(), Kinematics::Polargraph(_)) { 8 } else { 1 };
         limits.brake(fastest, longer, queue)
     }
@@ -382,8 +392,8 @@ impl Settings {
         Limits::new(&self.motion_settings())
     }
 
-    /// How the motor lifts the pen, if one does.
-    #[inline(never)] // Not in each of its places: flash is short.
+    /// How the pen's motor lifts the pen; `None` if no motor does.
+    #[inline(never)] // Inlining it at every call would cost too much flash.
     fn checked_lift(&self) -> Result<Option<LiftRule>, LimitsError> {
         if !self.is_on(Setting::PenLift) {
             return Ok(None);
@@ -391,7 +401,7 @@ impl Settings {
         let per_second = |setting, seconds| {
             let product = u64::from(self.get(setting).to_bits().unsigned_abs())
                 * u64::from(self.get(Setting::StepsPerMmZ).to_bits().unsigned_abs());
-            // Below 2^27 steps.
+            // The result is below 2^27 steps.
             ((product >> (2 * Value::FRAC_NBITS)) / seconds) as u32
         };
         let asked = per_second(Setting::MaxRateZ, 60);
@@ -412,9 +422,9 @@ impl Settings {
             steps_per_mm: steps,
             motor_steps_per_mm: match self.kinematics() {
                 Kinematics::Cartesian => steps[0].max(steps[1]),
-                // A diagonal of the page is √2 as long for one of the motors.
+                // A diagonal move on the page is √2 times as long for one of the motors.
                 Kinematics::CoreXy => steps[0].saturating_mul(Value::SQRT_2),
-                // A belt is never faster than the pen.
+                // A belt never moves faster than the pen.
                 Kinematics::Polargraph(_) => steps[0],
             },
             draw_mm_per_min: self.get(Setting::DrawSpeed).min(self.axes_rate()),
@@ -430,8 +440,8 @@ impl Settings {
         }
     }
 
-    /// The build of the machine. But for the Cartesian one, the steps per millimetre of x are those
-    /// of both motors.
+    /// The kinematics of the machine. With CoreXY and polargraph kinematics, the steps per
+    /// millimetre of x apply to both motors.
     pub fn kinematics(&self) -> Kinematics {
         let steps =
             |setting| self.millimetres_as_steps(setting, Setting::StepsPerMmX).min(2 * PAGE_LIMIT);
@@ -445,32 +455,33 @@ impl Settings {
         }
     }
 
-    /// Steps of the page per millimetre of x and y.
+    /// The steps per millimetre on the page, for x and y.
     pub fn page_steps(&self) -> [Value; 2] {
         [self.get(Setting::StepsPerMmX), self.get(self.steps_per_mm_y())]
     }
 
-    /// Steps of the page per millimetre of y: those of x where belts move both.
+    /// The setting that holds the steps per millimetre of y on the page. It is that of x where
+    /// belts move both axes.
     pub(super) fn steps_per_mm_y(&self) -> Setting {
         if self.get(Setting::Kinematics) == 0 { Setting::StepsPerMmY } else { Setting::StepsPerMmX }
     }
 
-    /// A setting in millimetres, as steps of the page.
+    /// Converts a setting in millimetres to steps of the page, rounded down.
     pub(super) fn millimetres_as_steps(&self, setting: Setting, steps_per_mm: Setting) -> i32 {
         let steps =
             i64::from(self.get(setting).to_bits()) * i64::from(self.get(steps_per_mm).to_bits());
-        // At most 8000 mm of 4000 steps.
+        // The result is at most 8000 mm times 4000 steps per millimetre.
         (steps >> (2 * Value::FRAC_NBITS)) as i32
     }
 
-    /// The other way.
+    /// Converts steps of the page to millimetres, clamped to the range of a value.
     pub(super) fn steps_as_millimetres(&self, steps: i32, steps_per_mm: Setting) -> Value {
         let per_mm = i64::from(self.get(steps_per_mm).to_bits()).max(1);
         let bits = (i64::from(steps) << (2 * Value::FRAC_NBITS)) / per_mm;
         Value::from_bits(bits.clamp(i32::MIN.into(), i32::MAX.into()) as i32)
     }
 
-    #[inline(never)] // Not in each of its places: flash is short.
+    #[inline(never)] // Inlining it at every call would cost too much flash.
     pub(super) fn pen_positions(&self) -> PenPositions {
         PenPositions {
             up_height: self.height(Setting::PenUpHeight),
@@ -479,7 +490,7 @@ impl Settings {
             down_ticks: self.milliseconds_as_ticks(Setting::PenDownDwell),
             ramp_ticks: self.milliseconds_as_ticks(Setting::PenRamp) / 127,
             dot_length: self.get(Setting::DotLength).saturating_to_num(),
-            // `set` lets nothing in that is refused here.
+            // `set` refuses whatever would be refused here.
             lift: self.checked_lift().unwrap_or_default(),
         }
     }
