@@ -1,4 +1,4 @@
-//! What can go wrong between a file and its picture, in words that say what to do.
+//! The errors of the `penup` command. Each message also tells the user what to do about it.
 
 use crate::fit::FitError;
 use crate::interrupt::EXIT_CODE;
@@ -10,110 +10,110 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Why there is no drawing.
+/// The reason why a command failed.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The file cannot be read.
     #[error("cannot read {file}: {source}")]
     File {
-        /// As the user named it.
+        /// The path or device as the user wrote it.
         file: String,
-        /// What the system says.
+        /// The operating system's error.
         source: io::Error,
     },
-    /// The file's name does not say that it is one that penup reads.
+    /// The file name does not end in `.obj`.
     #[error("{file}: penup reads Wavefront OBJ files, whose names end in .obj")]
     Extension {
-        /// As the user named it.
+        /// The path or device as the user wrote it.
         file: String,
     },
     /// The file's polylines cannot be fitted.
     #[error("{}", not_fitted(file, source))]
     Fit {
-        /// As the user named it.
+        /// The path or device as the user wrote it.
         file: String,
-        /// Why.
+        /// The reason why fitting failed.
         source: FitError,
     },
-    /// Four holes of a tape that are no instruction.
+    /// A tape contains a four-bit code that is no instruction.
     #[error("{file}: row {row} of the tape holds {code}, which is no instruction")]
     Tape {
-        /// As the user named it.
+        /// The path or device as the user wrote it.
         file: String,
-        /// The row, from 0.
+        /// The row of the tape, counted from 0.
         row: u32,
-        /// 12 to 15.
+        /// The invalid code, 12 to 15.
         code: u8,
     },
-    /// A file must not command the machine.
+    /// The file contains a command for the machine, which is not allowed in a file.
     #[error("{}:{}: a file cannot hold commands for the plotter\n    {}", origin.file, origin.line, origin.shown())]
     CommandInFile {
-        /// Where it stands.
+        /// The offending line.
         origin: Origin,
     },
-    /// A line that no plotter takes.
+    /// The plotter's parser rejects a line of the file.
     #[error(
         "{}:{}: {}\n    {}", origin.file, origin.line,
         explained(refusal.number(), &[refusal.to_string()]), origin.shown()
     )]
     BadLine {
-        /// Where it stands.
+        /// The offending line.
         origin: Origin,
-        /// What the plotter would say of it.
+        /// The error that the plotter would report for it.
         refusal: CommandError,
     },
-    /// A line of the file has more bytes than a plotter takes.
+    /// A line of the file is longer than the plotter accepts.
     #[error(
         "{}:{}: the line has {length} bytes, and a line may have at most {limit}\n    {}",
         origin.file, origin.line, origin.shown()
     )]
     LineTooLong {
-        /// Where it stands.
+        /// The offending line.
         origin: Origin,
-        /// Bytes of the line.
+        /// The length of the line in bytes.
         length: usize,
-        /// The most that it may have.
+        /// The maximum length in bytes.
         limit: usize,
     },
-    /// A line of the file holds a NUL byte.
+    /// A line of the file contains a NUL byte, so the file is not text.
     #[error(
         "{}:{}: this is no text, and an OBJ file is: is it another file under this name?",
         origin.file, origin.line
     )]
     NotText {
-        /// Where it stands.
+        /// The offending line.
         origin: Origin,
     },
-    /// The file is UTF-16.
+    /// The file is UTF-16 text, which penup does not read.
     #[error("{file}: this is UTF-16 text: save it as UTF-8")]
     Utf16 {
-        /// As the user named it.
+        /// The path or device as the user wrote it.
         file: String,
     },
-    /// The file has more bytes than penup counts.
+    /// The file is 4 GiB or larger.
     #[error("{file}: the file is larger than 4 GB, which is more than any plotter takes")]
     FileTooLarge {
-        /// As the user named it.
+        /// The path or device as the user wrote it.
         file: String,
     },
-    /// The port cannot be opened.
+    /// The serial port cannot be opened.
     #[error(
         "cannot open {device}: {source}\nIs it the right port, is the plotter plugged in, may you use the port \
          (on Linux: group dialout), and does no other program hold it?"
     )]
     Port {
-        /// As the user named it.
+        /// The path or device as the user wrote it.
         device: String,
-        /// What the system says.
+        /// The error of the serial port library.
         source: serialport::Error,
     },
-    /// The library refuses the drawing on this computer.
+    /// The plotter's library, running on this computer, refuses to draw the model.
     #[error("cannot draw it: {}", explained(refusal.number(), &[refusal.to_string()]))]
     NotDrawn {
-        /// Why.
+        /// The error that the library reports.
         refusal: CommandError,
     },
-    /// The emulator ended in the middle of the work.
+    /// The emulator ended, or closed its connection, in the middle of the work.
     #[error(
         "the emulator of the {board} board broke: it {how}\n\
          Run it once more, and `cargo xtask set-up` if it breaks again{}", kept(details.as_deref())
@@ -121,46 +121,46 @@ pub enum Error {
     EmulatorBroke {
         /// The board's name.
         board: String,
-        /// What became of it.
+        /// How it ended, as part of a sentence.
         how: String,
-        /// The file with what the emulator said last.
+        /// The file that holds the last output of the emulator, if that could be saved.
         details: Option<PathBuf>,
     },
-    /// The emulated board or the board in memory could not be started.
+    /// The emulated board could not be started.
     #[error("cannot start the {board} board: {reason}")]
     Board {
-        /// Its name.
+        /// The board's name.
         board: String,
-        /// Why.
+        /// The reason.
         reason: String,
     },
-    /// Nothing was heard.
+    /// The plotter sent no byte at all.
     #[error(
         "the plotter does not answer ({} s without a byte{})\nIs it powered, is it the right port, and does it run \
          penup at 115200 baud?", patience.as_secs_f32(), waiting_for(line.as_deref())
     )]
     Silent {
-        /// How long was waited.
+        /// How long the sender waited.
         patience: Duration,
-        /// The line that it did not answer, if it had been answering before.
+        /// The line that was not answered; `None` if the plotter had not answered anything yet.
         line: Option<Box<JobLine>>,
     },
-    /// Bytes come, but not penup's.
+    /// Something answers, but not with the messages of penup firmware.
     #[error(
         "what answers is not penup{}\nIs it the right port, and does the plotter run penup at 115200 baud?",
         said(heard)
     )]
     NotPenup {
-        /// The last thing that it said.
+        /// The last line that was received; may be empty.
         heard: String,
     },
-    /// It is doing something else.
+    /// The plotter is in a state in which it cannot start a job.
     #[error("the plotter is not ready: it reports {state}\n{}", remedy(state))]
     NotReady {
-        /// Its state.
+        /// The state that it reports.
         state: String,
     },
-    /// It answers status queries, but a line's answer never came.
+    /// The plotter answers status queries but did not answer a line.
     #[error(
         "the plotter is alive but never answered{}: bytes were lost on the line\nCheck the cable, and that nothing \
          else uses the port; a penup plotter takes {RECEIVE_WINDOW} bytes without a pause", waiting_for(line.as_deref())
@@ -169,99 +169,101 @@ pub enum Error {
         /// The line that was not answered.
         line: Option<Box<JobLine>>,
     },
-    /// It refused a line.
+    /// The plotter refused a line.
     #[error("{}", refusal(line, *number, messages))]
     Refused {
-        /// The line.
+        /// The refused line.
         line: Box<JobLine>,
-        /// Its `error:N`.
+        /// The `N` of its `error:N`.
         number: u16,
-        /// What it said just before.
+        /// The messages that it sent just before.
         messages: Vec<String>,
     },
-    /// The machine stopped by itself.
+    /// The machine stopped with an alarm.
     #[error("the plotter stopped with alarm {number}{}\nSee docs/protocol.md for the alarm's meaning", said(&told(&messages.join("; "))))]
     Alarm {
-        /// Its `ALARM:N`.
+        /// The `N` of its `ALARM:N`.
         number: u16,
-        /// What it said just before.
+        /// The messages that it sent just before.
         messages: Vec<String>,
     },
-    /// It started again in the middle of the job.
+    /// The plotter was reset or aborted in the middle of the job.
     #[error(
         "the plotter gave up in the middle of the job and started again\nEither it was sent ctrl-X, at another \
          port or by a byte that was damaged on the line, or it was reset: check the cable and the power supply"
     )]
     Restarted,
-    /// The line damages so many bytes that a line of the job never arrives.
+    /// The serial line corrupts so many bytes that a line of the job never arrives intact.
     #[error(
         "the line to the plotter damages too many bytes: {times} times a line did not arrive whole{}\nUse a \
          shorter or better cable, and keep it away from the motors", waiting_for(line.as_deref())
     )]
     Damaged {
-        /// The line.
+        /// The line that did not arrive.
         line: Option<Box<JobLine>>,
-        /// How often it was sent.
+        /// How often it was sent again.
         times: u32,
     },
-    /// It answers, but not to lines with numbers and checksums.
+    /// The plotter answers, but its firmware does not support line numbers and checksums.
     #[error(
         "the plotter's firmware is older than this program: it does not know lines with checksums\nWrite the \
          firmware of this version to the board first: see docs/building.md"
     )]
     WithoutNumbers,
-    /// After everything was sent the plotter holds another model, or other options.
+    /// After the whole job was sent, the plotter reports a different checksum of the model or of
+    /// the options.
     #[error(
         "the plotter holds something else than was sent to it, so nothing is drawn\nDoes another program send to \
          it at the same time, or is its firmware of another version than this program?"
     )]
     OtherContents,
-    /// The machine holds, and nobody lets it go on.
+    /// The machine is in feed hold, and nobody resumed it in time.
     #[error(
         "the machine holds in the middle of the drawing, with the pen up: somebody pressed hold at another port, or a \
          byte was damaged on the line\nSend ~ to the plotter to let it go on, or ctrl-X to give the drawing up"
     )]
     Held,
-    /// The link broke.
+    /// Reading from or writing to the link failed.
     #[error("the line to the plotter broke: {0}")]
     Link(#[from] io::Error),
-    /// A result cannot be written.
+    /// An output file cannot be written.
     #[error("cannot write {file}: {source}")]
     Write {
-        /// As the user named it.
+        /// The path or device as the user wrote it.
         file: String,
-        /// What the system says.
+        /// The operating system's error.
         source: io::Error,
     },
-    /// A result would replace the file that it is made from.
+    /// An output file is the same file as the input.
     #[error(
         "{output} is the file to read: give the result another name, so that it is not overwritten"
     )]
     OutputIsInput {
-        /// As the user named it.
+        /// The path or device as the user wrote it.
         output: String,
     },
-    /// Two results would go into one file.
+    /// Two outputs name the same file.
     #[error("{first} and {second} are one file: give each result a file of its own")]
     OutputTwice {
-        /// As the user named it.
+        /// The path or device as the user wrote it.
         first: String,
         /// As the user named it the second time.
         second: String,
     },
-    /// A picture cannot be made.
+    /// The picture cannot be rendered.
     #[error("cannot make the picture: {0}")]
     Picture(String),
-    /// The user gave the job up.
+    /// The user cancelled the job, and the plotter confirmed that it stopped.
     #[error("given up: the plot was stopped and the pen is up")]
     Interrupted,
-    /// The user gave the job up, and the plotter did not confirm that it stopped.
+    /// The user cancelled the job, but the plotter did not confirm that it stopped.
     #[error("given up, but the plotter did not confirm that it stopped: look after it")]
     InterruptedUnconfirmed,
 }
 
 impl Error {
-    /// What the process ends with: 130, as shells have it, after Ctrl-C, else 1.
+    /// The exit code of the process: 130 after Ctrl-C, as shells report it, and 1 for every other
+    /// error.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Interrupted | Self::InterruptedUnconfirmed => EXIT_CODE,
@@ -275,7 +277,7 @@ fn kept(details: Option<&Path>) -> String {
     details.map(what).unwrap_or_default()
 }
 
-/// A line is named as in every other message.
+/// Formats a fitting error; a line is cited as `file:number`, as in every other message.
 fn not_fitted(file: &str, error: &FitError) -> String {
     match error {
         FitError::Line { number, reason } => format!("{file}:{number}: {reason}"),

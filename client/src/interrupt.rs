@@ -1,8 +1,9 @@
-//! Ctrl-C: at once, but for a plotter that must be stopped first.
+//! Handling of Ctrl-C, which ends the program at once unless a plotter must be stopped first.
 //!
-//! While a [`MovingPlotter`] lives, [`ctrl_c`] only sets the flag that [`Sender`](crate::sender::Sender)
-//! looks at: the sender stops the machine with the pen up and ends the program. At every other place,
-//! and at the second Ctrl-C, [`ctrl_c`] ends the program itself, whatever it computes or waits for.
+//! While a [`MovingPlotter`] exists, the first Ctrl-C only sets a flag.
+//! [`Sender`](crate::sender::Sender) polls this flag, stops the machine with the pen up and makes
+//! the program end with an error. At any other time, and at the second Ctrl-C, [`ctrl_c`] exits the
+//! process itself, even in the middle of a computation or a wait.
 
 use std::fs;
 use std::io::{self, IsTerminal as _, Write as _};
@@ -10,18 +11,19 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-/// What a shell says of a program that Ctrl-C ended.
+/// The exit code that shells report for a program that Ctrl-C ended.
 pub const EXIT_CODE: u8 = 130;
 
 static MOVING: AtomicUsize = AtomicUsize::new(0);
 static UNFINISHED: Mutex<Option<PathBuf>> = Mutex::new(None);
 
-/// As long as it lives a plotter may be moving.
+/// A guard: while at least one exists, a plotter may be moving and must be stopped before the
+/// program ends.
 #[derive(Debug)]
 pub struct MovingPlotter(());
 
 impl MovingPlotter {
-    /// From now on.
+    /// Marks a plotter as possibly moving until the guard is dropped.
     pub fn new() -> Self {
         MOVING.fetch_add(1, Ordering::SeqCst);
         Self(())
@@ -40,8 +42,8 @@ impl Drop for MovingPlotter {
     }
 }
 
-/// Does `work`, which writes `file` and renames it; if Ctrl-C ends the program meanwhile, no part of the
-/// file stays.
+/// Runs `work`, which writes the temporary `file` and then renames or removes it. If Ctrl-C ends
+/// the program meanwhile, the temporary file is deleted.
 pub fn while_unfinished<T>(file: &Path, work: impl FnOnce() -> T) -> T {
     let note = |file| *UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner) = file;
     note(Some(file.to_owned()));
@@ -50,20 +52,20 @@ pub fn while_unfinished<T>(file: &Path, work: impl FnOnce() -> T) -> T {
     result
 }
 
-/// What Ctrl-C does; `interrupt` is the flag that the sender looks at.
+/// The handler of Ctrl-C. `interrupt` is the flag that the sender polls.
 pub fn ctrl_c(interrupt: &AtomicBool) {
     let is_first = !interrupt.swap(true, Ordering::SeqCst);
     if is_first && MOVING.load(Ordering::SeqCst) > 0 {
         return;
     }
-    // Kept to the end, so that no other file is begun.
+    // The lock is held until the process exits, so that no other file can be started.
     let unfinished = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(file) = &*unfinished {
-        // It may have got its name just now.
+        // The error is ignored: the file may just have been renamed.
         let _ = fs::remove_file(file);
     }
     let mut stderr = io::stderr();
-    // In place of a progress bar.
+    // The message overwrites a progress bar.
     let clear = if stderr.is_terminal() { "\r\x1b[2K" } else { "" };
     let _ = writeln!(stderr, "{clear}penup: given up");
     std::process::exit(i32::from(EXIT_CODE));

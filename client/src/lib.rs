@@ -1,10 +1,14 @@
-//! What the `penup` command is made of: sending, emulating, previewing, picturing.
+//! The library of the `penup` command, which sends files to a plotter, emulates plotters and
+//! previews drawings.
 //!
-//! In the order in which a job passes through: [`cli`] reads the command line, [`source`] the file,
-//! [`job`] joins both into lines, [`sender`] sends them over a [`link`] and follows the plotter's
-//! replies ([`protocol`], [`progress`]); behind the link are the plotters of [`machines`], an
-//! [`emulator`] and the [`preview`] among them; [`picture`] shows what the pen did, [`output`] writes it.
-//! [`tape`] keeps a job as single steps. [`words`] turns what the plotter says into this program's words.
+//! A job passes through the modules in this order. [`cli`] reads the command line, [`source`] reads
+//! the file, and [`job`] joins both into the lines to send. [`sender`] sends these lines over a
+//! [`link`] and follows the plotter's replies with [`protocol`] and [`progress`]. Behind the link
+//! is a serial port or one of the plotters of [`machines`]: an [`emulator`], or the [`preview`] in
+//! memory. [`picture`] renders what the pen drew, and [`output`] writes the files.
+//!
+//! [`tape`] records a job as single motor steps. [`words`] translates the plotter's messages into
+//! the terms of the command line.
 
 pub mod cli;
 pub mod emulator;

@@ -1,54 +1,59 @@
-//! Bytes to and from a plotter.
+//! The byte stream to and from a plotter.
 //!
-//! A [`Link`] is all that [`Sender`](crate::sender::Sender) knows of a plotter, so a serial port, an
-//! emulated board, the library in memory and the tests' fake all take the same road.
+//! [`Sender`](crate::sender::Sender) knows a plotter only through the trait [`Link`]. A serial
+//! port, an emulated board, the library in memory and the fake plotter of the tests are therefore
+//! all driven by the same code.
 
 use std::io;
 use std::sync::mpsc::{self, Receiver, TryRecvError};
 use std::time::{Duration, Instant};
 
-/// What the user says.
+/// The user's answer to a question.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Answer {
     /// Yes.
     Yes,
-    /// Nothing yet.
+    /// The user has not answered yet.
     NotYet,
-    /// Nobody is there who could be asked.
+    /// There is nobody to ask, for instance because the standard input is closed.
     Nobody,
 }
 
-/// A line to a plotter: bytes in, bytes out.
+/// A connection to a plotter that carries bytes in both directions.
 pub trait Link {
     /// Sends all of `bytes`.
     ///
     /// # Errors
-    /// What the port says, for instance that the plotter was unplugged.
+    /// The error that the port reports, for instance that the plotter was unplugged.
     fn send(&mut self, bytes: &[u8]) -> io::Result<()>;
 
-    /// Waits up to `patience` for bytes and says how many it put into `buffer`: 0 if none came.
+    /// Waits up to `patience` for bytes and writes them to the start of `buffer`. Returns how many
+    /// there are: 0 if none arrived in time.
     ///
     /// # Errors
-    /// What the port says; an expired patience is no error.
+    /// The error that the port reports. A timeout is not an error.
     fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize>;
 
-    /// The machine stands and waits for this pen, from 1: changes it if it can, and says whether it is in.
+    /// Called repeatedly while the stopped machine waits for pen number `pen`, counted from 1.
+    /// Starts or awaits the change of the pen and returns whether the pen is in the holder now.
     ///
     /// # Errors
-    /// What the port says.
+    /// The error that the port reports.
     fn change_pen(&mut self, pen: u8) -> io::Result<bool>;
 
-    /// The machine holds in the middle of a drawing: tells the user, the `first` time, and asks
-    /// whether it shall go on.
+    /// Called repeatedly while the machine is in feed hold in the middle of a drawing. Informs the
+    /// user if this is the `first` call of this hold, and returns whether the user wants the
+    /// machine to resume.
     ///
     /// # Errors
-    /// What the port says.
+    /// The error that the port reports.
     fn ask_to_resume(&mut self, first: bool) -> io::Result<Answer> {
         let _ = first;
         Ok(Answer::Nobody)
     }
 
-    /// The time, by which the sender waits.
+    /// The current time, which the sender uses for all its timeouts. A simulated plotter may return
+    /// simulated time.
     fn now(&self) -> Instant {
         Instant::now()
     }
@@ -58,11 +63,13 @@ pub trait Link {
 pub struct SerialLink {
     port: Box<dyn serialport::SerialPort>,
     pen_asked: Option<u8>,
-    /// A line that the user typed, once it was asked for.
+    /// Receives a message for each line that the user types; created when the user is asked for the
+    /// first time.
     typed: Option<Receiver<()>>,
 }
 
-/// Tells of each line that the user types: a thread waits for them, as long as the process lives.
+/// Starts a thread that sends a message for each line on the standard input. The thread runs until
+/// the process or the input ends.
 fn typed_lines() -> Receiver<()> {
     let (sender, receiver) = mpsc::channel();
     std::thread::spawn(move || {
@@ -72,14 +79,14 @@ fn typed_lines() -> Receiver<()> {
     receiver
 }
 
-/// The speed of the line, in bits a second.
+/// The speed of the serial line in bits per second.
 pub const BAUD: u32 = 115_200;
 
 impl SerialLink {
     /// Opens `device`, for instance `/dev/ttyUSB0` or `COM3`.
     ///
     /// # Errors
-    /// There is no such port, it is in use, or the user may not open it.
+    /// There is no such port, another program uses it, or the user has no permission to open it.
     pub fn open(device: &str) -> Result<Self, serialport::Error> {
         let port = serialport::new(device, BAUD).open()?;
         Ok(Self { port, pen_asked: None, typed: None })
@@ -88,7 +95,7 @@ impl SerialLink {
 
 impl Link for SerialLink {
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
-        // Generous: a window of lines takes 25 ms at this speed.
+        // This is a generous limit: sending a full receive window takes about 25 ms at this speed.
         self.port.set_timeout(Duration::from_secs(2))?;
         self.port.write_all(bytes)
     }
@@ -98,13 +105,13 @@ impl Link for SerialLink {
         match self.port.read(buffer) {
             Err(error) if error.kind() == io::ErrorKind::TimedOut => Ok(0),
             Err(error) if error.kind() == io::ErrorKind::Interrupted => Ok(0),
-            // A port that is ready and has nothing has lost its other end.
+            // A port that is ready to be read but has no data is disconnected.
             Ok(0) => Err(io::ErrorKind::BrokenPipe.into()),
             result => result,
         }
     }
 
-    /// Asks the user; the pen is in when a line is typed.
+    /// Asks the user to change the pen, and assumes that it is in when the user has pressed Enter.
     fn change_pen(&mut self, pen: u8) -> io::Result<bool> {
         let first = self.pen_asked.replace(pen) != Some(pen);
         let answer = self.ask(first, &format!("Put in pen {pen}, then press Enter"));
@@ -124,11 +131,12 @@ impl Link for SerialLink {
 }
 
 impl SerialLink {
-    /// Whether the user has typed a line since the question was asked `first`.
+    /// Returns whether the user has pressed Enter since the `first` call for this question, which
+    /// prints it.
     fn ask(&mut self, first: bool, question: &str) -> Answer {
         let typed = self.typed.get_or_insert_with(typed_lines);
         if first {
-            // What was typed before is no answer.
+            // Lines that were typed before the question do not count.
             while typed.try_recv().is_ok() {}
             eprintln!("{question}");
         }

@@ -13,12 +13,12 @@ static INTERRUPT: AtomicBool = AtomicBool::new(false);
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    // Without a handler Ctrl-C still ends the process.
+    // A failure is ignored: without a handler, Ctrl-C still ends the process.
     let _ = ctrlc::set_handler(|| interrupt::ctrl_c(&INTERRUPT));
     match run(&cli, &INTERRUPT).and_then(|sentence| say(&sentence)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            // Where nobody can be told the exit code must do.
+            // If the standard error cannot be written to, the exit code still reports the failure.
             let _ = writeln!(io::stderr(), "penup: {error}");
             ExitCode::from(error.exit_code())
         }
@@ -28,7 +28,7 @@ fn main() -> ExitCode {
 fn say(sentence: &str) -> Result<(), Error> {
     let mut stdout = io::stdout();
     match writeln!(stdout, "{sentence}").and_then(|()| stdout.flush()) {
-        // Whoever listened has heard enough, as `head` does.
+        // The reader of the pipe closed it early, as `head` does. This is no error.
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
         result => {
             result.map_err(|source| Error::Write { file: "the standard output".to_owned(), source })

@@ -1,22 +1,23 @@
-//! Tells the user how far a job is: lines sent, then strokes drawn.
+//! Reports the progress of a job to the user: lines sent, then strokes drawn.
 
 use crate::words::told;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::{self, Write as _};
 
-/// Who is told how far a job is.
+/// A receiver of progress reports.
 pub trait Progress {
-    /// `done` of `all` lines are with the plotter.
+    /// The plotter has accepted `done` of `all` lines.
     fn lines_sent(&mut self, done: usize, all: usize);
-    /// `done` of `all` strokes are on the paper.
+    /// The plotter has drawn `done` of `all` strokes.
     fn strokes_drawn(&mut self, done: u64, all: u64);
-    /// The plotter's state, whenever it reports it.
+    /// Called with the plotter's state whenever it reports one.
     fn state(&mut self, state: &str);
-    /// What the plotter says of a job that it draws all the same, for instance what it leaves out.
+    /// A remark of the plotter on a job that it draws nevertheless, for instance that it leaves
+    /// something out.
     fn note(&mut self, _note: &str) {}
 }
 
-/// Tells nobody.
+/// Ignores all reports.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Quiet;
 
@@ -26,7 +27,7 @@ impl Progress for Quiet {
     fn state(&mut self, _: &str) {}
 }
 
-/// A bar on the terminal; nothing if the error output is no terminal.
+/// A progress bar on the standard error; invisible if that is not a terminal.
 #[derive(Debug)]
 pub struct Bar {
     bar: ProgressBar,
@@ -36,7 +37,7 @@ pub struct Bar {
 impl Default for Bar {
     fn default() -> Self {
         let bar = ProgressBar::new(0);
-        // The template is a constant: were it wrong, the plain bar would serve.
+        // The template is a constant. If it were invalid, the default style would be used.
         if let Ok(style) = ProgressStyle::with_template(
             "{msg:>9} {bar:40.cyan/black.bright} {human_pos}/{human_len} {prefix} {elapsed:.dim}",
         ) {
@@ -47,7 +48,7 @@ impl Default for Bar {
 }
 
 impl Bar {
-    /// `done` of `all` vertices have their curve.
+    /// Curves have been fitted to `done` of `all` vertices.
     pub fn fitted(&mut self, done: usize, all: usize) {
         self.show("Fitting", "vertices", done as u64, all as u64);
     }
@@ -75,7 +76,7 @@ impl Progress for Bar {
 
     fn note(&mut self, note: &str) {
         self.bar.suspend(|| {
-            // Where nobody reads it, nobody is told.
+            // A closed standard error is no reason to fail.
             let _ = writeln!(io::stderr(), "penup: note: {}", told(note));
         });
     }

@@ -1,4 +1,4 @@
-//! The commands.
+//! Runs the commands of the command line.
 
 use crate::cli::{
     Cli, Command, FitArgs, PictureArgs, PlotArgs, PreviewArgs, TapeCommand, TapeEncodeArgs,
@@ -21,12 +21,12 @@ use penup::step::tape::BadCode;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-/// Does what the command line says; returns the sentence for the user.
+/// Runs the command and returns the sentence to print for the user.
 ///
-/// `interrupt` set by a signal stops the machine with the pen up.
+/// When a signal handler sets `interrupt`, the machine stops with the pen up.
 ///
 /// # Errors
-/// See [`Error`]; no result is written then.
+/// See [`Error`]. No output file is written if the command fails before the writing.
 pub fn run(cli: &Cli, interrupt: &AtomicBool) -> Result<String, Error> {
     match &cli.command {
         Command::Plot(args) => plot(args, interrupt),
@@ -42,7 +42,7 @@ pub fn run(cli: &Cli, interrupt: &AtomicBool) -> Result<String, Error> {
 
 fn plot(args: &PlotArgs, interrupt: &AtomicBool) -> Result<String, Error> {
     let settings = args.view.settings();
-    // Without a file the scene that README shows.
+    // The default is the scene that the README shows.
     let example = || workspace::root().join("scenes/interpen.obj");
     let file = args.file.clone().unwrap_or_else(example);
     let outputs = Outputs::of(&args.pictures, None);
@@ -59,7 +59,8 @@ fn plot(args: &PlotArgs, interrupt: &AtomicBool) -> Result<String, Error> {
         let report = report.map(|report| format!(": {report}")).unwrap_or_default();
         return Ok(format!("{} is drawn{report}", file.display()));
     }
-    // On Linux the emulator ends with this program; elsewhere it must be ended.
+    // On Linux the kernel ends the emulator together with this program. On other systems this
+    // program must end it, so Ctrl-C must not exit at once.
     let booting = (!cfg!(target_os = "linux")).then(MovingPlotter::new);
     let mut board = machines::emulate(args.board)?;
     let moving = MovingPlotter::new();
@@ -149,7 +150,8 @@ fn damaged(file: &Path) -> impl Fn(BadCode) -> Error {
     move |BadCode { row, code }| Error::Tape { file: file.display().to_string(), row, code }
 }
 
-/// Sends a whole job over `link`, draws it `times` times and asks what came of it.
+/// Sends a whole job over `link`, draws it `times` times and returns the plotter's report on it, if
+/// it gives one.
 ///
 /// # Errors
 /// See [`Sender`].
@@ -194,7 +196,7 @@ impl Outputs {
     }
 }
 
-/// Makes all pictures before it writes the first.
+/// Renders all pictures before it writes the first file. Returns the names of the files written.
 fn write_pictures<'a>(picture: &Picture, outputs: &'a Outputs) -> Result<Vec<&'a Path>, Error> {
     let svg = picture.svg();
     let png = match outputs.png.as_deref() {

@@ -1,5 +1,5 @@
-//! What the plotter must hold after a job was sent: the same lines, read by the same library
-//! here.
+//! Computes what the plotter must contain after a job was sent, by feeding the same lines to the
+//! same plotter library on this computer.
 
 use crate::source::Lines;
 use penup::boards::host::HostBoard;
@@ -8,15 +8,16 @@ use penup::model::{Corner, Position, VERTEX_NUMBER_LIMIT};
 use penup::plotter::{EMPTY_LOOKAHEAD, MemorySlices, Plotter};
 use penup::protocol::LineReader;
 
-/// The checksums of the model and of the options that come of the first `count` of `lines`, sent
-/// to a plotter that was just switched on; `None` if it refuses one of them.
+/// Returns the checksums of the model and of the options that a freshly started plotter has after
+/// the first `count` of `lines`. Returns `None` if the library refuses one of these lines.
 pub fn contents(lines: &dyn Lines, count: usize) -> Option<[u32; 2]> {
     let (mut ring, pins) = (EventRing::new(), PulserState::new());
     let mut board = HostBoard::new(&mut ring, &pins);
     let mut vertices = Box::new(heapless::Vec::<Position, VERTEX_NUMBER_LIMIT>::new());
     let mut corners = Box::new(heapless::Vec::<Corner, { 1 << 16 }>::new());
     let mut blocks = EMPTY_LOOKAHEAD;
-    // Without memory to work in, no copy of the model is kept for each line.
+    // Without working memory, the plotter does not copy the model after each line, which saves
+    // time.
     let words = &mut [];
     let readers = &mut [LineReader::new()];
     let blocks = &mut blocks;

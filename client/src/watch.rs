@@ -1,51 +1,51 @@
-//! The ways of the pen, from what the pins did.
+//! Reconstructs the path of the pen from the changes of the output pins.
 
 use crate::emulator::{Machine, MachineEvent, MachineEventKind, PinChange};
 use crate::picture::Run;
 
-/// What the pins did.
+/// The path of the pen.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PenRuns {
-    /// Every way of the pen, in mm.
+    /// The runs of the pen in order, in mm.
     pub runs: Vec<Run>,
-    /// The length of a step, in mm.
+    /// The length of a motor step in mm.
     pub step: f64,
 }
 
-/// Follows the pins of a plotter that begins at the origin with the pen up.
+/// Follows the pins of a plotter that starts at the origin with the pen up.
 #[derive(Debug)]
 pub struct PenWatch {
     machine: Machine,
     runs: Vec<Run>,
     step: f64,
-    /// From 1.
+    /// The number of the current pen, counted from 1.
     pen: u8,
 }
 
 impl PenWatch {
-    /// `step` is the length of a step in mm.
+    /// Starts at the origin with pen 1 up. `step` is the length of a motor step in mm.
     pub fn new(step: f64) -> Self {
         Self { machine: Machine::default(), runs: vec![start([0.0; 2])], step, pen: 1 }
     }
 
-    /// Takes in one change of a pin.
+    /// Processes the next change of a pin.
     pub fn change(&mut self, change: PinChange) {
         let event = self.machine.change(change);
         self.follow(event);
     }
 
-    /// Another pen, from 1, draws what comes.
+    /// Sets the number of the pen, counted from 1, that draws the following runs.
     pub fn change_pen(&mut self, pen: u8) {
         self.pen = pen;
     }
 
-    /// Forgets the ways, not the place: another job begins.
+    /// Discards the recorded runs but keeps the position, because another job begins.
     pub fn begin_again(&mut self) {
         let last = self.runs.last().and_then(|run| run.points.last());
         self.runs = vec![start(last.copied().unwrap_or_default())];
     }
 
-    /// Every way that led anywhere.
+    /// All runs that contain at least one step.
     pub fn runs(&mut self) -> PenRuns {
         let last = self.machine.last();
         self.follow(last);
@@ -58,7 +58,8 @@ impl PenWatch {
         let Some(&[x, y]) = run.points.last() else { return };
         match event.map(|event| event.kind) {
             Some(MachineEventKind::Step { x: dx, y: dy }) => {
-                // Whole steps, so that no error adds up.
+                // The position is rounded to whole steps, so that rounding errors do not
+                // accumulate.
                 let step = self.step;
                 let moved = |from: f64, by: i8| ((from / step).round() + f64::from(by)) * step;
                 run.points.push([moved(x, dx), moved(y, dy)]);

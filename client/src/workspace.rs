@@ -1,13 +1,14 @@
-//! Where the checkout is, whose firmware, scenes and emulators are used.
+//! Finds the checkout whose firmware, scenes and emulators the program uses.
 //!
-//! It is looked for when the program runs: a checkout that was moved or copied with its target
-//! directory must not go on in its old place, which the compiler once knew.
+//! The search happens at run time: if a checkout is moved or copied with its target directory, the
+//! program must use the new location and not the one that was compiled in.
 
 use std::env;
 use std::path::{Path, PathBuf};
 
-/// The root of the workspace that cargo runs this program for, else of the one in whose target
-/// directory the program lies, else of the one that it was compiled in.
+/// The root of the workspace. The first of these that exists is used: the workspace for which cargo
+/// runs this program, the one whose target directory contains the program, the one in which the
+/// program was compiled.
 pub fn root() -> PathBuf {
     let by_cargo = env::var_os("CARGO_MANIFEST_DIR").map(PathBuf::from);
     let by_program = env::current_exe().ok();
