@@ -1,19 +1,21 @@
-//! Building blocks that touch, drawn as one shape: no line between two faces of one plane.
+//! Draws building blocks that touch as one shape: no line appears between two faces that lie in one
+//! plane.
 //!
-//! What counts is what is seen on both sides of an edge: if the nearest face that begins at the edge
-//! on its left and the nearest on its right lie in one plane, the edge is not drawn there. So the line where
-//! a wall stands on a floor stays, though the wall's underside and the floor lie in one plane. Which
-//! faces those are is noted on the edge's profile, by rank.
+//! What counts is what is visible on both sides of an edge. If the nearest face that begins at the
+//! edge on its left and the nearest one on its right lie in one plane, the edge is not drawn there.
+//! So the line where a wall stands on a floor is kept, although the underside of the wall and the
+//! floor lie in one plane. The ranks of these two faces are recorded on the profile of the edge.
 //!
-//! Blocks touch in the model; in the view each corner was rounded on its own. So "in one plane" and "on
-//! one line" are asked of the model.
+//! The blocks touch in the model, but in the view each corner was rounded separately. Therefore the
+//! tests "in one plane" and "on one line" use the positions of the model.
 
 use super::coarse_projection::CoarseProjection;
 use super::edge_query::{CrossedPolygon, EdgeQuery, SceneIndex};
 use super::faces::Face;
 use super::profile::{EdgeInterval, Profile};
 
-/// A side of an edge, and where its profile keeps the nearest face that begins there: the rank and one.
+/// One of the two sides of an edge, and the bits of the profile's marks that hold the nearest face
+/// that begins there. They hold the rank plus one; zero means none.
 #[derive(Clone, Copy)]
 struct Bank {
     shift: u32,
@@ -33,23 +35,27 @@ impl Bank {
     }
 }
 
-/// A triangle whose plane holds an edge.
+/// A triangle whose plane contains an edge.
 struct Touching {
+    /// The numbers of the vertices.
     corners: [u16; 3],
-    /// On which side of the edge's line each corner lies.
+    /// The side of the edge's line on which each corner lies: 1 is left, -1 is right, 0 is on the
+    /// line.
     sides: [i32; 3],
+    /// The sense in which the triangle turns on the page: positive is anticlockwise.
     facing: i32,
 }
 
 impl Touching {
-    /// A corner on one side of the edge.
+    /// Returns a corner that lies on the given side of the edge.
     fn corner(&self, bank: Bank) -> Option<u16> {
         let wanted = if bank.is_left { 1 } else { -1 };
         let found = self.sides.iter().position(|&side| side == wanted)?;
         Some(self.corners[found])
     }
 
-    /// Whether a vertex lies behind this triangle (positive), before it, or in its plane.
+    /// Returns a positive number if a vertex lies behind the plane of this triangle, a negative one
+    /// if it lies in front, and zero if it lies in the plane.
     fn height(&self, coarse_projection: &CoarseProjection<'_>, vertex: u16) -> i64 {
         coarse_projection.height(self.corners, coarse_projection.end(vertex))
             * i64::from(self.facing)
@@ -57,7 +63,8 @@ impl Touching {
 }
 
 impl EdgeQuery {
-    /// Notes where `face` begins at this edge, where it is the nearest to do so.
+    /// Records where `face` begins at this edge, for the parts of the edge where it is the nearest
+    /// face to do so.
     pub fn touch(
         &self,
         around: &SceneIndex<'_>,
@@ -91,7 +98,7 @@ impl EdgeQuery {
         }
     }
 
-    /// Whether what is noted for a piece of this edge is one plane on both sides.
+    /// Whether the faces recorded on both sides of a piece of this edge lie in one plane.
     pub fn is_within_plane(&self, around: &SceneIndex<'_>, marks: u64) -> bool {
         let beside = |bank: Bank| self.find_touching(around, bank.get(marks)?, bank);
         let (Some(left), Some(right)) = (beside(LEFT), beside(RIGHT)) else {
@@ -101,7 +108,7 @@ impl EdgeQuery {
         left.corner(LEFT).is_some_and(|corner| right.height(coarse_projection, corner) == 0)
     }
 
-    /// Whether a triangle is nearer on one side of this edge than the face of a rank.
+    /// Whether a triangle is nearer than the face with rank `than` on the given side of this edge.
     fn is_nearer(
         &self,
         around: &SceneIndex<'_>,
@@ -116,7 +123,8 @@ impl EdgeQuery {
         }
     }
 
-    /// The triangle of a face that holds this edge and has a corner on one side of it.
+    /// Returns the triangle of a face whose plane contains this edge and that has a corner on the
+    /// given side of it.
     fn find_touching(&self, around: &SceneIndex<'_>, rank: usize, bank: Bank) -> Option<Touching> {
         around
             .triangles(around.faces.get(rank))
@@ -144,8 +152,8 @@ impl EdgeQuery {
         })
     }
 
-    /// Whether the plane of a triangle holds this edge. That of a seam is held by every plane of
-    /// either of its faces.
+    /// Whether the plane of a triangle contains this edge. A seam is contained in each plane in
+    /// which either of its two faces lies.
     pub fn lies_in_plane_of(
         &self,
         coarse_projection: &CoarseProjection<'_>,
@@ -159,7 +167,7 @@ impl EdgeQuery {
         }
     }
 
-    /// Whether a vertex lies on the line of this edge, or of this seam, in the model.
+    /// Whether a vertex lies, in the model, on the line of this edge or seam.
     fn is_in_line_with(&self, coarse_projection: &CoarseProjection<'_>, vertex: u16) -> bool {
         let [p, q] = [self.p.number, self.q.number];
         match self.seam {

@@ -1,32 +1,37 @@
-//! Which edges between two faces are drawn: silhouettes, and creases sharper than an angle.
+//! Decides which edges between two faces are drawn: silhouettes, and creases that are sharper than
+//! a given angle.
 
 use super::triangles::areas;
 use crate::fixed::product;
 use crate::geometry::{Projection, Vertex};
 use core::cmp::Ordering;
 
-/// How sharp an edge must be to be drawn for its own sake.
+/// The sharpness that an edge between two faces must have to be drawn.
 ///
-/// Edges of one face only, of more than two, between a face that the eye sees from its front and one that
-/// it sees from its back, and bars are drawn in any case.
+/// Some edges are drawn in any case: bars, edges of one face only, edges of more than two faces,
+/// and edges between a face that the eye sees from its front and one that it sees from its back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Crease {
-    /// Cosine of the angle that the faces' normals must exceed, in units of 2^-15, within ±2^15.
+    /// The cosine of the limit angle, in units of 2^-15, within ±2^15. An edge is drawn if the
+    /// angle between the normals of its two faces exceeds the limit.
     ///
-    /// 2^15 draws every edge that is not flat, 0 those sharper than a right angle.
+    /// A value of 2^15 draws every edge that is not flat; 0 draws those that are sharper than a
+    /// right angle.
     pub cosine: i32,
-    /// How much the view stretches depth over width and height: (7, 2) if what is 2 units long across
-    /// is 7 units long in depth. Each above zero and at most 2^20.
+    /// The factor by which the view stretches depth relative to width and height, as a ratio. It is
+    /// (7, 2) if what is 2 units long across the view is 7 units long in depth. Each number is from
+    /// 1 to 2^20.
     pub depth_stretch: (u32, u32),
 }
 
 impl Crease {
-    /// Whether the edge is drawn that ends at `end`, between two faces given by their corners.
+    /// Whether the edge that ends at `end`, between two faces given by their corners, is drawn.
     ///
-    /// `turned`: the two run along the edge the same way, so one of them is seen from its back when the
-    /// other is seen from its front. `are_one_plane`: whether the faces lie in one plane in the model.
-    /// Where one goes on as the other the edge is not drawn then, however rounding bends them.
+    /// `turned` says that both faces run along the edge in the same direction, so that the eye sees
+    /// one from its back when it sees the other from its front. `are_one_plane` tells whether the
+    /// faces lie in one plane in the model. If they do and one face continues the other across the
+    /// edge, the edge is not drawn, however much rounding has bent them.
     pub fn keeps(
         &self,
         projection: Projection,
@@ -55,7 +60,7 @@ impl Crease {
         is_drawn && (is_folded() || !are_one_plane())
     }
 
-    /// A normal in true proportions, with parts below 2^20.
+    /// Returns a normal in the proportions of the model, with components below 2^20.
     fn unstretched(&self, normal: [i64; 3]) -> [i64; 3] {
         let by = [self.depth_stretch.1, self.depth_stretch.1, self.depth_stretch.0];
         let exact = [0, 1, 2].map(|n| product(normal[n], i64::from(by[n])));
@@ -64,14 +69,15 @@ impl Crease {
         exact.map(|part| (part >> bits.saturating_sub(20)) as i64)
     }
 
-    /// Whether the angle between two normals with parts below 2^20 exceeds the limit.
+    /// Whether the angle between two normals with components below 2^20 exceeds the limit.
     fn is_sharp(&self, one: [i64; 3], other: [i64; 3]) -> bool {
         let dot = |a: [i64; 3], b: [i64; 3]| -> i128 {
             let products = a.into_iter().zip(b).map(|(a, b)| i128::from(a * b));
             products.sum()
         };
         let signed_square = |value: i128| value * value * value.signum();
-        // The cosine of the normals against the limit, both squared with their signs: below 2^115.
+        // Compares the cosine of the angle between the normals with the limit. Both are squared and
+        // keep their signs; they stay below 2^115.
         let found = signed_square(dot(one, other) << 15);
         let limit = signed_square(i128::from(self.cosine)) * dot(one, one) * dot(other, other);
         found.cmp(&limit) == Ordering::Less
@@ -84,7 +90,8 @@ mod tests {
 
     const AT: Vertex = Vertex::new(0, 0, 1000);
 
-    /// Two triangles that share an edge along y and rise by `left` and `right` over 1000 units across.
+    /// Whether a crease keeps the edge along y that two triangles share; they rise by `left` and
+    /// `right` over 1000 units across.
     fn keeps(cosine: i32, depth_stretch: (u32, u32), left: i32, right: i32) -> bool {
         let crease = Crease { cosine, depth_stretch };
         let far = Vertex::new(0, 500, 1000);

@@ -1,4 +1,5 @@
-//! The distinct edges: which side of which element stands for each edge of the model.
+//! Finds the distinct edges of the model: chooses for each edge one side of one element to
+//! represent it.
 
 use super::crease::Crease;
 use super::yield_counter::YieldCounter;
@@ -7,7 +8,7 @@ use crate::geometry::{Projection, Vertex};
 use crate::model::{Corner, Elements, Pens};
 use crate::stage::Scratch;
 
-/// The corners of the elements, addressed by the number of an element's first corner.
+/// The corners of the elements. An element is addressed by the number of its first corner.
 #[derive(Debug, Clone, Copy)]
 pub struct Outlines<'a> {
     pub corners: &'a [Corner],
@@ -19,7 +20,7 @@ impl<'a> Outlines<'a> {
         Self { corners: elements.corners(), pens: elements.pens() }
     }
 
-    /// The element that begins at corner `first`.
+    /// Returns the corners of the element that begins at corner `first`.
     #[inline]
     pub fn element(&self, first: usize) -> &'a [Corner] {
         let rest = &self.corners[first..];
@@ -27,7 +28,7 @@ impl<'a> Outlines<'a> {
         &rest[..last.map_or(0, |last| last + 1)]
     }
 
-    /// Each element with the number of its first corner.
+    /// Iterates over the elements, each with the number of its first corner.
     pub fn elements(&self) -> impl Iterator<Item = (usize, &'a [Corner])> + use<'a> {
         let mut next = 0;
         self.corners.split_inclusive(|corner| corner.is_last()).map(move |corners| {
@@ -38,12 +39,13 @@ impl<'a> Outlines<'a> {
     }
 }
 
-/// Whether the element is a bar, which has one side and no inside.
+/// Whether the element is a bar, which has a single side and no interior.
 pub fn is_bar(corners: &[Corner]) -> bool {
     corners.len() == 2
 }
 
-/// The sides of an element, each from the corner of its number to the next one.
+/// Iterates over the sides of an element: the number of the corner within the element at which the
+/// side begins, and the vertex numbers of its two ends.
 pub fn sides(corners: &[Corner]) -> impl Iterator<Item = (usize, u16, u16)> + '_ {
     let count = if is_bar(corners) { 1 } else { corners.len() };
     let ends = corners.iter().skip(1).chain(corners.first());
@@ -55,33 +57,39 @@ pub fn sides(corners: &[Corner]) -> impl Iterator<Item = (usize, u16, u16)> + '_
         .map(|(number, (from, to))| (number, from.vertex(), to.vertex()))
 }
 
-/// One bit for each corner: whether the side that begins there stands for its edge.
+/// One bit for each corner: whether the side that begins there represents its edge.
 #[derive(Debug)]
 pub struct ChosenSides<'a> {
     bits: &'a mut [u32],
 }
 
-/// No side: the end of a chain.
+/// Stands for "no side" and marks the end of a chain.
 const NONE: u16 = u16::MAX;
 
-/// Sides are chained by 16-bit numbers, one of which means "none".
+/// The most corners that a scene may have. Sides are chained by 16-bit numbers, one of which means
+/// "none".
 pub const MOST_CORNERS: usize = NONE as usize;
 
 impl<'a> ChosenSides<'a> {
-    /// Bytes that stay taken.
+    /// Returns the bytes that stay in use after the choice.
     pub const fn bytes(corners: usize) -> usize {
         Scratch::bytes_for::<u32>(corners.div_ceil(32))
     }
 
-    /// Bytes taken while the sides are being chosen.
+    /// Returns the bytes that are in use while the sides are being chosen, in addition to
+    /// [`Self::bytes`].
     pub const fn bytes_while_choosing(vertices: usize, corners: usize) -> usize {
         Scratch::bytes_for::<u16>(vertices)
             + Scratch::bytes_for::<u16>(corners)
             + Self::bytes(corners)
     }
 
-    /// Chooses the first side of each edge among those of the lowest pen, whoever shares it; with a crease, only of
-    /// edges that it keeps.
+    /// Chooses one side to represent each edge. Of the sides of all elements that share the edge,
+    /// it is the first one with the lowest pen. If a crease is given, only edges that it keeps are
+    /// chosen.
+    ///
+    /// # Errors
+    /// Returns an error if the memory is too small or the user cancels.
     pub fn choose(
         outlines: Outlines<'_>,
         projection: Projection,
@@ -96,7 +104,7 @@ impl<'a> ChosenSides<'a> {
         let mut meantime = scratch.reborrow();
         let heads: &mut [u16] = meantime.take(vertices.len())?;
         let next: &mut [u16] = meantime.take(corners.len())?;
-        // Edges that have met a second side.
+        // The sides whose edges have been found to have a second side.
         let mut shared = ChosenSides { bits: meantime.take(word_count)? };
         heads.fill(NONE);
         for (first, element) in outlines.elements() {
@@ -129,7 +137,7 @@ impl<'a> ChosenSides<'a> {
                 let is_open = is_bar(element) || shared.contains(known);
                 let mut best = known;
                 if outlines.pens.at(side) < outlines.pens.at(known) {
-                    // It stands for the edge from now on.
+                    // The new side represents the edge from now on.
                     best = side;
                     next[side] = next[known];
                     *(if before == NONE { head } else { &mut next[usize::from(before)] }) =
@@ -169,20 +177,20 @@ impl<'a> ChosenSides<'a> {
         self.bits[side / 32] &= !(1 << (side % 32));
     }
 
-    /// Whether the side that begins at corner `side` stands for its edge.
+    /// Whether the side that begins at corner `side` represents its edge.
     #[inline]
     pub fn contains(&self, side: usize) -> bool {
         self.bits[side / 32] >> (side % 32) & 1 != 0
     }
 }
 
-/// The first corner of the element to which a corner belongs.
+/// Returns the number of the first corner of the element to which a corner belongs.
 fn start_of(corners: &[Corner], corner: usize) -> usize {
     let before = corners[..corner].iter().rposition(|corner| corner.is_last());
     before.map_or(0, |last| last + 1)
 }
 
-/// The two ends of the side that begins at a corner.
+/// Returns the vertex numbers of the two ends of the side that begins at a corner.
 fn side_at(corners: &[Corner], side: usize) -> (u16, u16) {
     let from = corners[side];
     let to = if from.is_last() { corners[start_of(corners, side)] } else { corners[side + 1] };

@@ -1,4 +1,5 @@
-//! The faces in order of their nearest point.
+//! Sorts the faces by the depth of their nearest point, so that the search can stop at the first
+//! face that is too far away.
 
 use super::VisibilityError;
 use super::edges::{Outlines, is_bar};
@@ -7,28 +8,32 @@ use super::yield_counter::YieldCounter;
 use crate::geometry::{COORDINATE_LIMIT, Vertex};
 use crate::stage::{Scratch, heap_sort_by_key};
 
-/// The elements, nearest first. The place of an element in this order is its rank.
+/// The elements, nearest first. The position of an element in this order is its rank.
 ///
-/// 32 bits each: nearest depth (14 bits, rounded down), cut (2), first corner (16).
+/// Each is 32 bits: the nearest depth (14 bits, rounded down), the way of cutting it (2 bits) and
+/// the number of its first corner (16 bits).
 #[derive(Debug)]
 pub struct Faces<'a> {
     order: &'a mut [u32],
     degenerate: u32,
 }
 
-/// One element.
+/// One element, as the search needs it.
 #[derive(Debug, Clone, Copy)]
 pub struct Face {
-    /// The number of its first corner.
+    /// The number of the first corner of the element.
     pub first: usize,
-    /// Whether its triangles are a fan.
+    /// Whether a fan of triangles from the first corner covers it.
     pub is_fan: bool,
-    /// Whether its triangles are ears.
+    /// Whether its triangles are stored in [`super::triangles::Ears`].
     pub has_ears: bool,
 }
 
 impl<'a> Faces<'a> {
     /// Sorts the elements.
+    ///
+    /// # Errors
+    /// Returns an error if the memory is too small or the user cancels.
     pub fn sort(
         outlines: Outlines<'_>,
         vertices: &[Vertex],
@@ -55,23 +60,24 @@ impl<'a> Faces<'a> {
             };
             *key = depth.min(0x3FFF) << 18 | cut << 16 | first as u32;
         }
-        // Not looked up from: some 500 instructions for each of 2000 faces.
+        // The sort itself does not check for cancelling. It takes some 500 instructions for each of
+        // 2000 faces.
         yield_counter.spend(500 * order.len())?;
         heap_sort_by_key(order, |key| *key);
         Ok(Self { order, degenerate })
     }
 
-    /// How many of the faces have no area.
+    /// Returns the number of faces that have no area.
     pub fn degenerate(&self) -> u32 {
         self.degenerate
     }
 
-    /// How many there are.
+    /// Returns the number of elements.
     pub fn len(&self) -> usize {
         self.order.len()
     }
 
-    /// The element of a rank.
+    /// Returns the element with this rank.
     #[inline]
     pub fn get(&self, rank: usize) -> Face {
         let key = self.order[rank];
@@ -82,7 +88,8 @@ impl<'a> Faces<'a> {
         }
     }
 
-    /// Whether the element of this rank, and so all that follow, is surely farther than `far`.
+    /// Whether the element with this rank, and therefore each one after it, is certainly farther
+    /// than the depth `far`.
     #[inline]
     pub fn begins_behind(&self, rank: usize, far: i32) -> bool {
         self.order[rank] >> 18 > ((far + COORDINATE_LIMIT) >> 7) as u32

@@ -1,8 +1,10 @@
-//! The page in cells, each with the faces that lie on it, nearest first (Griffith, Brown III).
+//! Divides the page into cells, each with a list of the faces that lie on it, nearest first
+//! (Griffith, Brown III). An edge is then tested only against the faces in the cells that it
+//! passes.
 //!
-//! A cell that one face covers wholly needs no face that lies behind that one: whatever such a face
-//! hides there is hidden already. An edge that lies behind the covering face of every cell on its
-//! way is hidden without another look.
+//! A cell that one face covers entirely does not list the faces that lie behind it: whatever they
+//! hide there is hidden already. An edge that lies behind the covering face of every cell on its
+//! path is hidden without a further test.
 
 use super::VisibilityError;
 use super::coarse_projection::{CoarsePoint, CoarseProjection};
@@ -18,20 +20,23 @@ use bytemuck::{Pod, Zeroable};
 #[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct Cell {
-    /// Where its faces end in the list of entries; they begin where those of the cell before end.
+    /// The index at which the list of its faces ends. The list begins where that of the previous
+    /// cell ends.
     pub end: u16,
-    /// Nothing at this depth or farther is seen in this cell.
+    /// The coarse depth of the covering face. Nothing at this depth or farther is visible in this
+    /// cell.
     pub cover_depth: u16,
-    /// The face that covers it at that depth, by rank.
+    /// The rank of the covering face.
     pub cover: u16,
 }
 
-/// A depth on a scale of 2^15, rounded down. Monotonic, so that a greater one is surely farther.
+/// Returns a depth on a scale of 2^15, rounded down. The map is monotonic: a greater result means a
+/// greater depth.
 pub fn coarse_depth(z: i32) -> u16 {
     ((z + COORDINATE_LIMIT) >> 5) as u16
 }
 
-/// The cells and their lists.
+/// The cells and their lists of faces.
 #[derive(Debug)]
 pub struct Grid<'a> {
     shape: Shape,
@@ -40,24 +45,28 @@ pub struct Grid<'a> {
     entries: &'a mut [u16],
 }
 
-/// What an edge meets in one cell.
+/// The faces that an edge meets in one cell.
 pub struct CellView<'g> {
-    /// The covering face, if it is nearer than the whole edge.
+    /// The rank of the covering face, if that face is nearer than the whole edge.
     pub cover: Option<u16>,
-    /// The faces, nearest first.
+    /// The ranks of the faces on the cell, nearest first.
     pub faces: &'g [u16],
 }
 
-/// More cells cost memory and time to fill, fewer make longer lists.
+/// The wanted number of cells for each face. More cells cost memory and time to fill; fewer make
+/// the lists longer.
 const CELLS_FOR_EACH_FACE: usize = 2;
 
 impl<'a> Grid<'a> {
-    /// Bytes for the coarsest grid.
+    /// Returns the bytes that the coarsest grid, a single cell, needs.
     pub const fn least_bytes(faces: usize) -> usize {
         Scratch::bytes_for::<Cell>(1) + Scratch::bytes_for::<u16>(faces)
     }
 
-    /// Sorts the faces into the finest grid that fits what is left of `scratch`, not finer than is useful.
+    /// Sorts the faces into the finest grid that fits into `scratch` and is still useful.
+    ///
+    /// # Errors
+    /// Returns an error if the memory is too small or the user cancels.
     pub fn new(
         coarse_projection: &CoarseProjection<'_>,
         outlines: Outlines<'_>,
@@ -97,7 +106,7 @@ impl<'a> Grid<'a> {
         }
     }
 
-    /// Visits the faces of every cell within a rectangle.
+    /// Calls `visit` with the faces of every cell that touches a rectangle.
     pub fn within(&self, bounds: &Bounds, mut visit: impl FnMut(&[u16])) {
         let [column0, column1, row0, row1] = self.shape.span(bounds).map(usize::from);
         for row in row0..=row1 {
@@ -107,7 +116,8 @@ impl<'a> Grid<'a> {
         }
     }
 
-    /// The way of an edge from `p` to `q` that is nowhere nearer than the coarse depth `near`.
+    /// Returns the cells on the path of an edge from `p` to `q`. No point of the edge is nearer
+    /// than the coarse depth `near`.
     pub fn way(&self, p: CoarsePoint, q: CoarsePoint, near: u16) -> Way<'_> {
         let (low, high) = if p.y <= q.y { (p, q) } else { (q, p) };
         let dx = i32::from(high.x) - i32::from(low.x);
@@ -116,21 +126,22 @@ impl<'a> Grid<'a> {
     }
 }
 
-/// The cells that an edge passes or touches.
+/// The cells on the path of an edge: those that it crosses or touches.
 #[derive(Debug, Clone, Copy)]
 pub struct Way<'g> {
     grid: &'g Grid<'g>,
     near: u16,
     low: CoarsePoint,
     high: CoarsePoint,
-    /// Steps to the right for each step up, in units of 2^-16.
+    /// The steps to the right for each step up, in units of 2^-16.
     slope: i32,
 }
 
 impl<'g> Way<'g> {
-    /// Visits each cell until the visitor says no; returns whether it never did.
+    /// Calls `visit` for each cell until it returns `false`. Returns whether it never did.
     ///
-    /// The edge lies less than one unit right and up of the line between the places.
+    /// The edge lies less than one unit to the right of the line between the coarse points, and
+    /// less than one unit above it.
     pub fn visit(&self, mut visit: impl FnMut(CellView<'g>) -> bool) -> bool {
         let Shape { shift_x, shift_y, .. } = self.grid.shape;
         let (low_x, low_y) = (i32::from(self.low.x), i32::from(self.low.y));
@@ -140,7 +151,8 @@ impl<'g> Way<'g> {
         for row in self.low.y >> shift_y..=self.high.y >> shift_y {
             let (mut from, mut to) = (left, right);
             if dy > 0 {
-                // Rounded towards the lower end; below 2^30, as the slope is at most 2^30 / dy.
+                // The product is rounded down, towards the lower end. It is below 2^30, as the
+                // slope is at most 2^30 / dy.
                 let x_at = |y: i32| low_x + ((self.slope * (y - low_y).clamp(0, dy)) >> 16);
                 let x_below = x_at((i32::from(row) << shift_y) - 1);
                 let x_above = x_at((i32::from(row) + 1) << shift_y);

@@ -1,34 +1,35 @@
-//! What is known of one edge so far: its pieces from p to q and what covers each.
+//! The profile of one edge: its pieces from p to q and, for each piece, what covers it, as far as
+//! the search has got.
 
 use crate::geometry::EdgeParameter;
 use bytemuck::{Pod, Zeroable};
 
-/// What covers a piece of an edge, as a set of these marks.
+/// The marks of a piece of an edge, which can be combined.
 pub mod mark {
     /// A nearer face covers the points of the page just to the left.
     pub const LEFT: u64 = 1;
     /// A nearer face covers the points of the page just to the right.
     pub const RIGHT: u64 = 2;
-    /// Both: the piece is hidden.
+    /// Nearer faces cover the points on both sides, so the piece is hidden.
     pub const HIDDEN: u64 = LEFT | RIGHT;
-    /// Another edge on the same line of the page is drawn in its place.
+    /// Another edge on the same line of the page is drawn instead of this one.
     pub const STOOD_IN: u64 = 4;
 }
 
 /// A part of an edge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct EdgeInterval {
-    /// `None` at p.
+    /// The start of the part; `None` if it begins at p.
     pub from: Option<EdgeParameter>,
-    /// `None` at q.
+    /// The end of the part; `None` if it ends at q.
     pub to: Option<EdgeParameter>,
 }
 
 impl EdgeInterval {
-    /// All of the edge.
+    /// The whole edge.
     pub const WHOLE: Self = Self { from: None, to: None };
 
-    /// What both have in common.
+    /// Returns the intersection of both parts.
     pub fn and(self, other: Self) -> Self {
         let both =
             |a: Option<EdgeParameter>,
@@ -48,7 +49,7 @@ impl EdgeInterval {
     }
 }
 
-/// A piece of an edge: from here to where the next piece begins.
+/// A piece of an edge. It extends from `from` to where the next piece begins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub struct ProfilePiece {
@@ -56,10 +57,11 @@ pub struct ProfilePiece {
     pub marks: u64,
 }
 
-/// The pieces of the part of an edge between two places, the window.
+/// The pieces of a part of an edge, called the window.
 ///
-/// Neighbours have different marks. Memory for the pieces is bounded: when it is full the window
-/// ends where the last piece began, and the rest of the edge waits for another window.
+/// Adjacent pieces have different marks. The memory for the pieces is limited: when it is full, the
+/// window is shortened to where the last piece began, and the rest of the edge is processed in
+/// another window.
 #[derive(Debug)]
 pub struct Profile<'a> {
     memory: &'a mut [ProfilePiece],
@@ -67,36 +69,38 @@ pub struct Profile<'a> {
     end: EdgeParameter,
 }
 
-/// A profile needs room for this many pieces to make headway: the piece that is being marked, what is
-/// before it and what is behind it.
+/// The fewest pieces for which a profile must have room in order to make progress: the piece that
+/// is being marked, what is before it and what is behind it.
 pub const FEWEST_PIECES: usize = 4;
 
 impl<'a> Profile<'a> {
-    /// A profile that keeps its pieces in `memory`, at least [`FEWEST_PIECES`].
+    /// Creates a profile that stores its pieces in `memory`, which must have room for at least
+    /// [`FEWEST_PIECES`].
     pub fn new(memory: &'a mut [ProfilePiece]) -> Self {
         let mut profile = Self { memory, count: 0, end: EdgeParameter::END };
         profile.open(EdgeParameter::START);
         profile
     }
 
-    /// Opens the window from `start` to the end of the edge, nothing covered.
+    /// Restarts the window so that it extends from `start` to the end of the edge and nothing in it
+    /// is covered.
     pub fn open(&mut self, start: EdgeParameter) {
         self.memory[0] = ProfilePiece { from: start, marks: 0 };
         self.count = 1;
         self.end = EdgeParameter::END;
     }
 
-    /// Where the window ends.
+    /// Returns where on the edge the window ends.
     pub fn end(&self) -> EdgeParameter {
         self.end
     }
 
-    /// Whether nothing can change any more.
+    /// Whether the whole window is hidden, so that no further mark can change it.
     pub fn is_hidden(&self) -> bool {
         self.count == 1 && self.memory[0].marks == mark::HIDDEN
     }
 
-    /// The pieces, in order.
+    /// Returns the pieces of the window, in order from p to q.
     pub fn pieces(&self) -> &[ProfilePiece] {
         &self.memory[..self.count]
     }
@@ -106,7 +110,7 @@ impl<'a> Profile<'a> {
         self.update(part, |known| known | marks);
     }
 
-    /// Changes the marks of a part of the edge.
+    /// Applies `change` to the marks of a part of the edge.
     pub fn update(&mut self, part: EdgeInterval, change: impl Fn(u64) -> u64) {
         if part.is_empty() || part.to.is_some_and(|to| to <= self.memory[0].from) {
             return;
@@ -122,8 +126,8 @@ impl<'a> Profile<'a> {
         self.join(first);
     }
 
-    /// The number of the first piece that begins at `place` or later; one is made to begin there if it
-    /// lies in the window.
+    /// Returns the index of the first piece that begins at `place` or later. If `place` lies within
+    /// the window, a piece is split so that one begins there.
     fn split(&mut self, place: EdgeParameter) -> usize {
         if place >= self.end {
             return self.count;
@@ -146,7 +150,7 @@ impl<'a> Profile<'a> {
         after
     }
 
-    /// Joins neighbours with the same marks, from the one before `first` on.
+    /// Joins adjacent pieces with the same marks, starting with the piece before `first`.
     fn join(&mut self, first: usize) {
         let mut kept = first.saturating_sub(1);
         for next in kept + 1..self.count {

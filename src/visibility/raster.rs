@@ -1,4 +1,5 @@
-//! Which cells of the page a face lies on, and which it covers.
+//! Sorts the faces into the cells of the page: finds which cells each face overlaps and which it
+//! covers entirely.
 
 use super::coarse_projection::{
     COARSE_BITS, CoarseLine, CoarsePoint, CoarseProjection, coarse_side,
@@ -10,19 +11,19 @@ use super::yield_counter::YieldCounter;
 use crate::model::Corner;
 use crate::stage::Aborted;
 
-/// How the page is cut into cells.
+/// The division of the page into cells of equal size.
 #[derive(Debug, Clone, Copy)]
 pub struct Shape {
-    /// A cell is 2^this wide.
+    /// A cell is 2^`shift_x` units of the coarse grid wide.
     pub shift_x: u32,
-    /// A cell is 2^this high.
+    /// A cell is 2^`shift_y` units of the coarse grid high.
     pub shift_y: u32,
-    /// The upper right end of the page.
+    /// The upper right corner of the page.
     far: CoarsePoint,
 }
 
 impl Shape {
-    /// A cell for every place.
+    /// Returns the finest division: one cell for each point of the coarse grid.
     pub fn finest(coarse_projection: &CoarseProjection<'_>) -> Self {
         let far = coarse_projection
             .places
@@ -31,7 +32,7 @@ impl Shape {
         Self { shift_x: 0, shift_y: 0, far }
     }
 
-    /// Half as many cells, by joining neighbours.
+    /// Halves the number of columns or of rows, whichever are more, by joining neighbouring cells.
     pub fn coarsen(&mut self) {
         if self.columns() > self.rows() {
             self.shift_x += 1;
@@ -52,7 +53,7 @@ impl Shape {
         self.columns() * self.rows()
     }
 
-    /// The first and the last column, the first and the last row that a face touches.
+    /// Returns the first and the last column and the first and the last row that a face touches.
     pub fn span(&self, bounds: &Bounds) -> [u16; 4] {
         [
             bounds.low.x >> self.shift_x,
@@ -62,7 +63,7 @@ impl Shape {
         ]
     }
 
-    /// At least as many as the faces have entries in all cells together.
+    /// Returns an upper bound of the number of entries that the faces have in all cells together.
     pub fn most_entries(
         &self,
         coarse_projection: &CoarseProjection<'_>,
@@ -82,7 +83,7 @@ impl Shape {
     }
 }
 
-/// The rectangle around a face on the page.
+/// The bounding rectangle of a face on the coarse grid.
 pub struct Bounds {
     low: CoarsePoint,
     high: CoarsePoint,
@@ -98,29 +99,31 @@ impl Bounds {
     }
 }
 
-/// Corners of a face up to which its shape is compared with each cell; beyond, its bounding box is.
+/// The most corners with which a face is compared with each cell by its exact shape. For a face
+/// with more corners only the bounding rectangle is used.
 const MOST_SIDES: usize = 8;
 
 /// A side of a convex face on the page, as a linear function of the lower left corner of a cell.
+/// The function is greater farther inside.
 ///
-/// A product of a side and a place is below 2^28, and there are four at most.
+/// Each product of a side and a coordinate is below 2^28, and there are at most four of them.
 #[derive(Clone, Copy, Default)]
 struct HalfPlane {
-    /// What the function gains from column to column.
+    /// The increase of the function from one column to the next.
     right: i32,
-    /// What it gains from row to row.
+    /// The increase of the function from one row to the next.
     up: i32,
-    /// Its value at the lower left corner of the page.
+    /// The value of the function at the lower left corner of the page.
     constant: i32,
-    /// At or below this, the cell lies outside.
+    /// At this value or below, the whole cell lies outside.
     outside: i32,
-    /// From this on, the cell lies within.
+    /// At this value or above, the whole cell lies inside.
     within: i32,
 }
 
 const _: () = assert!(COARSE_BITS == 14);
 
-/// The depth that nothing has: no face covers the cell.
+/// A depth that no face has. It means that no face covers the cell.
 const NO_COVER: u16 = u16::MAX;
 
 /// The cells while the faces are being sorted into them.
@@ -139,7 +142,8 @@ impl<'c> Raster<'c> {
         self.cells
     }
 
-    /// Leaves in each cell where its list begins, and returns how many entries there are.
+    /// Computes for each cell the index at which its list of faces begins, stores it as `end`, and
+    /// returns the total number of entries.
     pub fn count(
         &mut self,
         coarse_projection: &CoarseProjection<'_>,
@@ -159,7 +163,7 @@ impl<'c> Raster<'c> {
         Ok(usize::from(begin))
     }
 
-    /// Writes the lists; then each cell says where its list ends.
+    /// Writes the list of each cell. Afterwards `end` is the index at which the list ends.
     pub fn fill(
         &mut self,
         coarse_projection: &CoarseProjection<'_>,
@@ -174,7 +178,8 @@ impl<'c> Raster<'c> {
         })
     }
 
-    /// Calls `enter` for each face and each cell where it may be seen; notes the covering faces.
+    /// Calls `enter` for each face and each cell in which the face may be visible, and records the
+    /// faces that cover cells.
     fn visit(
         &mut self,
         coarse_projection: &CoarseProjection<'_>,
@@ -191,7 +196,8 @@ impl<'c> Raster<'c> {
                 let z = coarse_projection.vertex(corner.vertex()).z;
                 (near, far) = (near.min(z), far.max(z));
             }
-            // One more: what rounding puts just behind the face may lie on it.
+            // One is added to the far depth because a point that rounding moved just behind the
+            // face may lie on it.
             let (near, far) = (coarse_depth(near), coarse_depth(far + 1));
             let bounds = Bounds::of(coarse_projection, corners);
             let mut sides = [HalfPlane::default(); MOST_SIDES];
@@ -230,8 +236,8 @@ impl<'c> Raster<'c> {
         Ok(())
     }
 
-    /// Finds the sides of a face that is surely convex on the page, and returns how many; 0 if it may
-    /// not be convex or has too many.
+    /// Computes the sides of a face that is certainly convex on the page and returns their number.
+    /// Returns 0 if the face may not be convex or has too many sides.
     fn half_planes(
         &self,
         coarse_projection: &CoarseProjection<'_>,
@@ -248,12 +254,13 @@ impl<'c> Raster<'c> {
             coarse_projection.place(corners[n].vertex())
         };
         let (width, height) = (1 << self.shape.shift_x, 1 << self.shape.shift_y);
-        // No corner of a cell in question lies farther than this from a corner of the face.
+        // No corner of a cell under test lies farther than this from a corner of the face.
         let reach = i32::from(bounds.high.x - bounds.low.x)
             + i32::from(bounds.high.y - bounds.low.y)
             + 2 * (width + height);
         let turn = coarse_side(place(0), place(1), place(2));
-        // Every other corner lies on the inner side; of three or four the next one is enough.
+        // Every other corner must lie on the inner side. For three or four corners it is enough to
+        // check the next one.
         let others = if count <= 4 { 1 } else { count - 2 };
         let (mut a, mut b) = (place(count - 1), place(0));
         for (n, side) in sides.iter_mut().enumerate().take(count) {

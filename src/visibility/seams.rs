@@ -1,9 +1,10 @@
-//! Where two faces pass through each other: the segment that two triangles have in common.
+//! Computes the seam of two faces that pass through each other: the segment that two of their
+//! triangles have in common.
 
 use crate::fixed::divide_down;
 use crate::geometry::{Vertex, plane_side};
 
-/// The box around a face in view coordinates.
+/// The bounding box of a face in view coordinates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Extent {
     low: Vertex,
@@ -11,7 +12,7 @@ pub struct Extent {
 }
 
 impl Extent {
-    /// Around all of `corners`.
+    /// Returns the bounding box of `corners`.
     pub fn around(corners: impl Iterator<Item = Vertex>) -> Self {
         let none = Self {
             low: Vertex::new(i32::MAX, i32::MAX, i32::MAX),
@@ -23,7 +24,7 @@ impl Extent {
         })
     }
 
-    /// Whether they have a point in common; else what they hold does not cross.
+    /// Whether both boxes have a point in common. If they have none, their faces do not cross.
     pub fn meets(&self, other: &Self) -> bool {
         let (low, high) = (other.low, other.high);
         self.low.x <= high.x
@@ -35,13 +36,14 @@ impl Extent {
     }
 }
 
-/// The segment where two triangles cross, its ends rounded to whole coordinates. `of_one`: how far the
-/// corners of the first lie behind the plane of the second, zero if it holds them; `of_other`: the
-/// same the other way round.
+/// Returns the segment where two triangles cross, with its ends rounded to whole coordinates.
+/// `of_one` says how far the corners of the first triangle lie behind the plane of the second, zero
+/// for a corner in the plane. `of_other` says the same for the corners of the second triangle and
+/// the plane of the first.
 ///
-/// `None` if they do not reach through each other, or only by less than rounding shows. A corner in the
-/// plane of the other triangle counts as lying on one fixed side of it, so that a seam along a diagonal,
-/// where two triangles of a face meet, is found once.
+/// Returns `None` if the triangles do not cross, or cross only in a segment that rounding shrinks
+/// to a point. A corner in the plane of the other triangle counts as lying on one fixed side of it,
+/// so that a seam along a diagonal, where two triangles of one face meet, is found exactly once.
 pub fn seam(
     one: [Vertex; 3],
     other: [Vertex; 3],
@@ -72,14 +74,16 @@ pub fn seam(
     ends.filter(|(p, q)| p != q)
 }
 
-/// Whether the segment from a to b, which crosses the plane of a triangle, crosses the triangle.
+/// Whether the segment from a to b, which crosses the plane of a triangle, passes through the
+/// triangle itself.
 fn pierces(a: Vertex, b: Vertex, triangle: [Vertex; 3]) -> bool {
     let [c, d, e] = triangle;
     let turns = [(c, d), (d, e), (e, c)].map(|(from, to)| plane_side(a, b, from, to));
     turns.iter().all(|&turn| turn >= 0) || turns.iter().all(|&turn| turn <= 0)
 }
 
-/// The point between a and b where a height is zero, rounded to the nearest whole coordinates.
+/// Returns the point between a and b where the height is zero, rounded to the nearest whole
+/// coordinates.
 fn between(a: Vertex, b: Vertex, height_a: i64, height_b: i64) -> Vertex {
     let (from, to) = (i128::from(height_a).abs(), i128::from(height_b).abs());
     let mixed = |a: i32, b: i32| {
@@ -110,12 +114,12 @@ mod tests {
     const FLOOR: [Vertex; 3] =
         [Vertex::new(-10, -10, 0), Vertex::new(10, -10, 0), Vertex::new(0, 20, 0)];
 
-    /// A wall across the floor, from `bottom` to `top`.
+    /// Returns a wall that stands across the floor from `bottom` to `top`.
     fn wall(left: i32, right: i32, bottom: i32, top: i32) -> [Vertex; 3] {
         [Vertex::new(left, 0, bottom), Vertex::new(right, 0, bottom), Vertex::new(right, 0, top)]
     }
 
-    /// The seam of triangles that were never rounded.
+    /// Returns the seam of two triangles that were never rounded.
     fn seam(one: [Vertex; 3], other: [Vertex; 3]) -> Option<(Vertex, Vertex)> {
         let heights =
             |[a, b, c]: [Vertex; 3], of: [Vertex; 3]| of.map(|corner| plane_side(a, b, c, corner));

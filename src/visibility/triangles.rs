@@ -1,7 +1,9 @@
-//! Every face as triangles: a fan from its first corner where that serves, else ears.
+//! Cuts every face into triangles: a fan from its first corner if that covers the face, otherwise
+//! ears.
 //!
-//! Rounding bends a face of more than three corners; its triangles are what hides. They are found
-//! in the coordinate plane that the face leans to most, exactly.
+//! Rounding bends a face of more than three corners, so its triangles are what hides. They are
+//! computed exactly, in the projection of the face onto the coordinate plane to which it is most
+//! nearly parallel.
 
 use super::VisibilityError;
 use super::edges::{Outlines, is_bar};
@@ -11,18 +13,18 @@ use crate::model::Corner;
 use crate::stage::Scratch;
 use bytemuck::{Pod, Zeroable};
 
-/// How a face becomes triangles.
+/// The way in which a face is cut into triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Cut {
-    /// It has no area, or is a bar.
+    /// The element has no triangles because it has no area or is a bar.
     None,
-    /// Each triangle joins the first corner to one of the other sides.
+    /// Each triangle joins the first corner to one of the sides that do not touch it.
     Fan,
-    /// The triangles are kept in [`Ears`].
+    /// The triangles are stored in [`Ears`].
     Ears,
 }
 
-/// Where the triangles of a face begin that is no fan.
+/// The start of the triangles of one face that no fan covers.
 #[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
 #[repr(C)]
 struct Entry {
@@ -30,14 +32,14 @@ struct Entry {
     first_ear: u16,
 }
 
-/// The triangles of the faces that no fan covers, by vertex number.
+/// The triangles of all faces that no fan covers, as vertex numbers.
 #[derive(Debug)]
 pub struct Ears<'a> {
     entries: &'a mut [Entry],
     ears: &'a mut [[u16; 3]],
 }
 
-/// How many there are of the faces that no fan covers.
+/// Counts of the faces that no fan covers, which give the memory that their triangles need.
 #[derive(Debug, Clone, Copy, Default)]
 struct Needs {
     faces: usize,
@@ -59,7 +61,8 @@ impl Needs {
 }
 
 impl<'a> Ears<'a> {
-    /// Bytes taken, with those for the corners of a face while it is being cut.
+    /// Returns the bytes that [`Self::cut`] takes, including those for the corners of a face while
+    /// it is being cut.
     pub fn bytes(outlines: Outlines<'_>, vertices: &[Vertex]) -> usize {
         let needs = Needs::of(outlines, vertices);
         Scratch::bytes_for::<Entry>(needs.faces)
@@ -67,7 +70,10 @@ impl<'a> Ears<'a> {
             + Scratch::bytes_for::<u16>(needs.most_corners)
     }
 
-    /// CutPositions every face that no fan covers.
+    /// Cuts every face that no fan covers into triangles.
+    ///
+    /// # Errors
+    /// Returns an error if the memory is too small or the user cancels.
     pub fn cut(
         outlines: Outlines<'_>,
         vertices: &[Vertex],
@@ -98,7 +104,8 @@ impl<'a> Ears<'a> {
         Ok(Self { entries, ears: &mut ears[..used] })
     }
 
-    /// The triangles of the face that begins at corner `first`.
+    /// Returns the triangles of the face that begins at corner `first`. The slice is empty if a fan
+    /// covers the face.
     pub fn of(&self, first: usize) -> &[[u16; 3]] {
         let begins = |entry: &Entry| usize::from(entry.first_ear);
         match self.entries.binary_search_by_key(&first, |entry| usize::from(entry.first_corner)) {
@@ -111,9 +118,10 @@ impl<'a> Ears<'a> {
     }
 }
 
-/// Twice the areas of a polygon projected along x, y and z (Newell): the direction is that of its normal.
+/// Returns twice the signed areas of a polygon projected along x, y and z (Newell). As a vector
+/// they point along the normal of the polygon.
 ///
-/// A sum of 2^16 products of 2^20 and 2^21 at most.
+/// Each area is a sum of at most 2^16 products of a factor within 2^20 and one within 2^21.
 pub fn areas(polygon: &mut dyn Iterator<Item = Vertex>) -> [i64; 3] {
     let mut areas = [0i64; 3];
     let Some(first) = polygon.next() else {
@@ -136,7 +144,7 @@ pub fn areas(polygon: &mut dyn Iterator<Item = Vertex>) -> [i64; 3] {
     areas
 }
 
-/// A coordinate plane, seen from the side from which a face runs anticlockwise.
+/// A coordinate plane, seen from the side from which a given face runs anticlockwise.
 #[derive(Debug, Clone, Copy)]
 struct Plane {
     leans_to: usize,
@@ -144,14 +152,16 @@ struct Plane {
 }
 
 impl Plane {
-    /// The plane that a polygon leans to most; `None` if it has no area.
+    /// Returns the coordinate plane to which a polygon is most nearly parallel. Returns `None` if
+    /// the polygon has no area.
     fn of(mut polygon: impl Iterator<Item = Vertex>) -> Option<Self> {
         let areas = areas(&mut polygon);
         let leans_to = (0..3).rev().max_by_key(|&axis| areas[axis].abs())?;
         (areas[leans_to] != 0).then_some(Self { leans_to, flipped: areas[leans_to] < 0 })
     }
 
-    /// Twice the area of a triangle in the plane, positive if anticlockwise; within ±2^42.
+    /// Returns twice the signed area of a triangle projected onto the plane: positive if it runs
+    /// anticlockwise. The result is within ±2^42.
     fn turn(self, a: Vertex, b: Vertex, c: Vertex) -> i64 {
         let flat = |vertex: Vertex| {
             let (x, y) = match self.leans_to {
@@ -167,7 +177,7 @@ impl Plane {
     }
 }
 
-/// How a face must be cut.
+/// Returns how a face must be cut.
 pub fn cut_of(corners: &[Corner], vertices: &[Vertex]) -> Cut {
     if is_bar(corners) {
         return Cut::None;
@@ -182,11 +192,11 @@ pub fn cut_of(corners: &[Corner], vertices: &[Vertex]) -> Cut {
     if is_fan { Cut::Fan } else { Cut::Ears }
 }
 
-/// CutPositions ear after ear off a polygon and returns how many triangles there are.
+/// Cuts one ear after the other off a polygon and returns the number of triangles.
 ///
-/// A corner is an ear if it is convex and no other corner lies in its triangle. Corners without a
-/// turn are dropped. A polygon that crosses itself can have no ear: then a convex corner is cut all
-/// the same, so that it always ends.
+/// A corner is an ear if it is convex and no other corner lies in its triangle. Corners where the
+/// polygon goes straight on are dropped. A polygon that crosses itself may have no ear; then a
+/// convex corner is cut off nevertheless, so that the loop always ends.
 fn cut_ears(
     polygon: &mut [u16],
     vertices: &[Vertex],

@@ -1,17 +1,18 @@
-//! What lies in one plane, or in one line, before the camera rounded it.
+//! Tells which vertices lay in one plane, or on one line, before the camera rounded them.
 //!
-//! Rounding each vertex to view coordinates takes a block's foot off the floor on which it stands and
-//! bends every face of more than three corners. So whoever asks whether things are coplanar asks
-//! here, on the coordinates of the model and within their precision: whether an edge lies in the
-//! plane of a face that would hide it, whether two faces pass through each other, whether two
-//! blocks are flush, whether the faces at an edge are one plane.
+//! Rounding each vertex to view coordinates lifts the foot of a block off the floor on which it
+//! stands and bends every face of more than three corners. Every test for coplanarity therefore
+//! uses the coordinates of the model, within their precision: whether an edge lies in the plane of
+//! a face that would hide it, whether two faces pass through each other, whether two blocks are
+//! flush, and whether the faces at an edge lie in one plane.
 //!
-//! A vertex that is not of the model, such as one where an edge is cut at the eye, lies in no plane.
+//! A vertex that does not belong to the model, such as one where the near plane cuts an edge, lies
+//! in no plane.
 
 use crate::geometry::{Precision, are_coplanar, are_in_line};
 use crate::model::Corner;
 
-/// The vertices in the model's own space, as far as known.
+/// The positions of the vertices in the model's own coordinates, as far as they are known.
 #[derive(Debug, Clone, Copy)]
 pub struct Unrounded<'a> {
     positions: &'a [[i32; 3]],
@@ -20,25 +21,27 @@ pub struct Unrounded<'a> {
 }
 
 impl<'a> Unrounded<'a> {
-    /// Nothing is known: view coordinates are taken to be the model's.
+    /// No positions are known. Then the view coordinates are taken to be those of the model.
     pub const UNKNOWN: Unrounded<'static> =
         Unrounded { positions: &[], precision: Precision { written: 0, unit: 0 }, error_bound: 1 };
 
-    /// Each vertex by its number, within ±2^30, with a precision in the same unit.
+    /// The positions of the vertices by vertex number, each coordinate within ±2^30, and their
+    /// precision in the same unit.
     ///
-    /// `doubt`: twice what a view coordinate may be off, by the precision and by its own rounding;
-    /// at least 1.
+    /// `error_bound` is twice the possible error of a view coordinate, from both the precision of
+    /// the model and the rounding of the view. It is at least 1.
     pub const fn new(positions: &'a [[i32; 3]], precision: Precision, error_bound: u32) -> Self {
         Self { positions, precision, error_bound }
     }
 
-    /// Twice what a view coordinate may be off.
+    /// Returns twice the possible error of a view coordinate.
     #[inline]
     pub(super) fn error_bound(&self) -> u32 {
         self.error_bound
     }
 
-    /// Whether the plane of a triangle holds a vertex.
+    /// Whether a vertex lies in the plane of a triangle in the model. The answer is no if one of
+    /// the positions is unknown.
     #[cold]
     pub(super) fn holds(&self, triangle: [u16; 3], vertex: u16) -> bool {
         let [a, b, c] = triangle;
@@ -48,7 +51,8 @@ impl<'a> Unrounded<'a> {
         }
     }
 
-    /// Whether the line through a and b holds a vertex.
+    /// Whether a vertex lies on the line through a and b in the model. The answer is no if one of
+    /// the positions is unknown.
     #[cold]
     pub(super) fn are_in_line(&self, a: u16, b: u16, vertex: u16) -> bool {
         match [a, b, vertex].map(|number| self.at(number)) {
@@ -57,7 +61,7 @@ impl<'a> Unrounded<'a> {
         }
     }
 
-    /// Whether the two faces at an edge lie in one plane.
+    /// Whether the two faces that share an edge lie in one plane in the model.
     #[inline(never)] // Only creases ask.
     pub(super) fn are_one_plane(&self, edge: [u16; 2], one: &[Corner], other: &[Corner]) -> bool {
         let [from, to] = edge;

@@ -1,4 +1,4 @@
-//! The wire frame: every edge from end to end.
+//! The wire frame: draws every edge from end to end, without removing hidden lines.
 
 use super::edges::{ChosenSides, Outlines, sides};
 use super::yield_counter::YieldCounter;
@@ -6,11 +6,11 @@ use super::{Options, Scene, Stretch, StretchSink, VisibilityError, check};
 use crate::geometry::EdgeParameter;
 use crate::stage::{Cancel, Scratch};
 
-/// Hands over every distinct edge and bar whole and visible, in the order of the model, as if no face hid anything.
-/// Of `options` only the crease counts.
+/// Hands over every distinct edge and bar as one visible stretch, in the order of the model, as if
+/// no face hid anything. Of `options` only the crease is used.
 ///
 /// # Errors
-/// See [`VisibilityError`]. [`super::scratch_bytes`] are enough.
+/// See [`VisibilityError`]. Working memory of [`super::scratch_bytes`] is enough.
 pub fn follow_wire(
     scene: &Scene<'_>,
     options: Options,

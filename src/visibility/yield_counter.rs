@@ -1,11 +1,12 @@
-//! How often a long computation looks up from its work.
+//! Decides how often a long computation checks whether the user has cancelled it.
 
 use crate::stage::{Aborted, Cancel};
 
-/// Instructions between two looks, as near as the callers' estimates go (for thumbv6m).
+/// The number of instructions between two checks, as accurate as the estimates of the callers are
+/// (for thumbv6m).
 const BETWEEN_LOOKS: usize = 50_000;
 
-/// Counts work and gives attention when enough has been done.
+/// Counts the instructions spent and checks for cancelling whenever enough have been spent.
 pub struct YieldCounter<'t> {
     cancel: &'t mut dyn Cancel,
     done: usize,
@@ -16,7 +17,11 @@ impl<'t> YieldCounter<'t> {
         Self { cancel, done: 0 }
     }
 
-    /// Notes that about so many instructions were spent.
+    /// Adds an estimate of the instructions spent, and checks for cancelling if enough have
+    /// accumulated.
+    ///
+    /// # Errors
+    /// Returns [`Aborted`] if the user has cancelled.
     #[inline]
     pub fn spend(&mut self, instructions: usize) -> Result<(), Aborted> {
         self.done += instructions;
