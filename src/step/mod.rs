@@ -16,7 +16,7 @@ pub mod tape;
 
 pub use arc::{Arc, ArcError, Chords, Turn};
 pub use line::Line;
-pub use pattern::{DottedLine, InkedMove, Pattern};
+pub use pattern::Pattern;
 
 use crate::drawing::PagePoint;
 

@@ -1,7 +1,6 @@
 //! Dotted and dashed lines (Harrison, procedure LINEDOT of appendix 1).
 
-use super::{Direction, Line};
-use crate::drawing::{LineType, PagePoint};
+use crate::drawing::LineType;
 
 /// How the moves of one line divide into inked and bare pieces.
 ///
@@ -61,62 +60,6 @@ impl Pattern {
     }
 }
 
-/// A move and whether the pen is down during it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct InkedMove {
-    /// The move.
-    pub direction: Direction,
-    /// Whether it is inked.
-    pub inked: bool,
-}
-
-/// The moves of a dotted or dashed line, each with the state of the pen.
-///
-/// ```
-/// use penup::drawing::PagePoint;
-/// use penup::step::DottedLine;
-/// let to = PagePoint { x: 9, y: 0 };
-/// let inked: String = DottedLine::new(PagePoint::default(), to, 3)
-///     .map(|step| if step.inked { '-' } else { ' ' })
-///     .collect();
-/// assert_eq!(inked, "---   ---");
-/// ```
-#[derive(Debug, Clone)]
-pub struct DottedLine {
-    line: Line,
-    pattern: Pattern,
-    piece: u32,
-    done: u32,
-}
-
-impl DottedLine {
-    /// The line from `from` to `to` in dots and gaps of about `piece_moves` moves.
-    pub const fn new(from: PagePoint, to: PagePoint, piece_moves: u32) -> Self {
-        let line = Line::new(from, to);
-        let pattern = Pattern::new(line.remaining(), piece_moves);
-        Self { line, pattern, piece: 0, done: 0 }
-    }
-}
-
-impl Iterator for DottedLine {
-    type Item = InkedMove;
-
-    fn next(&mut self) -> Option<InkedMove> {
-        let direction = self.line.next()?;
-        if self.done == self.pattern.end_of(self.piece) {
-            self.piece += 1;
-        }
-        self.done += 1;
-        Some(InkedMove { direction, inked: Pattern::inked(self.piece) })
-    }
-
-    fn size_hint(&self) -> (usize, Option<usize>) {
-        self.line.size_hint()
-    }
-}
-
-impl ExactSizeIterator for DottedLine {}
-
 impl Pattern {
     /// The pattern of a line of `moves` moves; a dash is three dots long.
     pub const fn of(line_type: LineType, moves: u32, dot_moves: u32) -> Self {
@@ -131,44 +74,38 @@ impl Pattern {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::vec::Vec;
+    use std::string::String;
 
-    fn inked_points(from: PagePoint, to: PagePoint, dot: u32) -> Vec<(PagePoint, PagePoint)> {
-        let mut at = from;
-        let mut inked = Vec::new();
-        for step in DottedLine::new(from, to, dot) {
-            let next = step.direction.from_point(at);
-            if step.inked {
-                inked.push((at.min(next), at.max(next)));
-            }
-            at = next;
+    /// Draws the pattern of a horizontal line: a dash for an inked move, a space for a bare one.
+    fn picture(pattern: Pattern) -> String {
+        let mut drawn = String::new();
+        for piece in 0..pattern.pieces() {
+            let ink = if Pattern::inked(piece) { "-" } else { " " };
+            drawn += &ink.repeat(pattern.end_of(piece) as usize - drawn.len());
         }
-        inked.sort_unstable();
-        inked
+        drawn
     }
 
     #[test]
-    fn the_same_moves_are_inked_from_either_end_and_both_ends_are_inked() {
-        for dx in -40..=40 {
-            for dy in [-37, -8, 0, 5, 12, 40] {
-                for dot in [0, 1, 2, 3, 8, 1000] {
-                    let from = PagePoint { x: 3, y: -4 };
-                    let to = PagePoint { x: 3 + dx, y: dy - 4 };
-                    let there = inked_points(from, to, dot);
-                    assert_eq!(there, inked_points(to, from, dot));
-                    let line = DottedLine::new(from, to, dot);
-                    let count = from.x.abs_diff(to.x).max(from.y.abs_diff(to.y)) as usize;
-                    assert_eq!(line.size_hint(), (count, Some(count)));
-                    let moves: Vec<_> = line.collect();
-                    assert!(Line::new(from, to).eq(moves.iter().map(|step| step.direction)));
-                    assert!(moves.first().is_none_or(|step| step.inked));
-                    assert!(moves.last().is_none_or(|step| step.inked));
-                    // The pen changes at the end of each piece, and nowhere else.
-                    let pattern = Pattern::new(count as u32, dot);
-                    let ends = (0..pattern.pieces() - 1).map(|piece| pattern.end_of(piece));
-                    let changes = (1..count).filter(|&at| moves[at].inked != moves[at - 1].inked);
-                    assert!(ends.eq(changes.map(|at| at as u32)), "to {to:?} in {dot}");
-                }
+    fn dots_and_dashes_look_the_same_from_either_end_and_have_inked_ends() {
+        assert_eq!(picture(Pattern::new(9, 3)), "---   ---");
+        assert_eq!(picture(Pattern::new(25, 5)), "-----     -----     -----");
+        assert_eq!(picture(Pattern::new(11, 2)), "--  ---  --");
+        assert_eq!(picture(Pattern::new(7, 1)), "- - - -");
+        assert_eq!(picture(Pattern::new(8, 0)), "- -  - -");
+        assert_eq!(picture(Pattern::new(4, 1000)), "----");
+        assert_eq!(picture(Pattern::new(0, 3)), "");
+        assert_eq!(picture(Pattern::of(LineType::Dashed, 9, 1)), "---   ---");
+    }
+
+    #[test]
+    fn every_length_is_symmetric_and_inked_to_its_end() {
+        for moves in 0..80 {
+            for dot in [0, 1, 2, 3, 8, 1000] {
+                let drawn = picture(Pattern::new(moves, dot));
+                assert_eq!(drawn.len(), moves as usize);
+                assert!(drawn.chars().rev().eq(drawn.chars()), "{moves} of {dot}: {drawn}");
+                assert!(moves == 0 || drawn.starts_with('-'), "{moves} of {dot}: {drawn}");
             }
         }
     }
