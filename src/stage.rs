@@ -187,6 +187,10 @@ fn heap_sort<T, K: Ord, E>(
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Aborted;
 
+/// The caller's sink has no room for what a stage hands to it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SinkFull;
+
 /// Why a stage ended early.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -82,7 +82,7 @@ pub trait SolidSink {
     fn edge(&mut self, edge: SolidEdge) -> Result<(), SinkFull>;
 }
 
-pub use crate::visibility::SinkFull;
+pub use crate::stage::SinkFull;
 
 /// What was found, in numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -68,6 +68,7 @@ mod wire;
 
 use crate::geometry::{COORDINATE_LIMIT, Projection, Vertex};
 use crate::model::Elements;
+pub use crate::stage::SinkFull;
 use crate::stage::{Aborted, Cancel, OutOfScratch, Scratch};
 use coarse_projection::{CoarsePoint, CoarseProjection};
 use edge_query::SceneIndex;
@@ -147,10 +148,6 @@ pub trait StretchSink {
     /// An implementation returns [`SinkFull`] to end the search.
     fn stretch(&mut self, stretch: Stretch) -> Result<(), SinkFull>;
 }
-
-/// The error of a sink that has no room for another stretch.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct SinkFull;
 
 /// The reasons why hidden-line removal ended early.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
