@@ -4,6 +4,7 @@
 #![allow(clippy::panic, clippy::expect_used)]
 
 pub mod curve_reference;
+pub mod enumeration;
 pub mod order_reference;
 pub mod event_checker;
 pub mod motion_optimum;

@@ -1,11 +1,11 @@
 //! The implicit enumeration against all matchings there are.
 
 #![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
-use penup::order::enumeration::{
+use penup::stage::{Aborted, Cancel, NeverCancel, Scratch};
+use penup_host_tests::enumeration::{
     Distances, Division, Effort, EnumerationError, ImplicitCosts, Optimum, Options, Reach, Sets,
     Start, SubProblem, Target, division_bound, optimum, solve_image_problem,
 };
-use penup::stage::{Aborted, Cancel, NeverCancel, Scratch};
 use proptest::prelude::*;
 
 /// What the best matching costs, by the best for every subset of the points.

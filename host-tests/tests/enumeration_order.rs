@@ -1,9 +1,9 @@
 //! The pen-up moves that `order` chooses against the enumeration.
 
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
-use penup::order::enumeration::{Distances, Options as Variants, optimum};
 use penup::order::{Method, Options, Shape, length};
 use penup::stage::{NeverCancel, Scratch};
+use penup_host_tests::enumeration::{Distances, Options as Variants, optimum};
 use penup_host_tests::order_reference::Sheet;
 use proptest::prelude::*;
 

@@ -16,7 +16,6 @@
 
 mod cycle;
 mod distances;
-pub mod enumeration;
 mod euler;
 mod exchange;
 mod greedy;

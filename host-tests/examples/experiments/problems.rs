@@ -1,8 +1,8 @@
 //! The data: as random as Harrison's.
 
 use penup::drawing::PagePoint;
-use penup::order::enumeration::Distances;
 use penup::order::length;
+use penup_host_tests::enumeration::Distances;
 
 /// How many instances of each problem there are.
 pub const INSTANCES: u32 = 20;

@@ -4,11 +4,11 @@ use crate::meter::Meter;
 use crate::problems::{INSTANCES, Problem};
 use crate::sample::Sample;
 use crate::table::Table;
-use penup::order::enumeration::{
+use penup::stage::{NeverCancel, Scratch};
+use penup_host_tests::enumeration::{
     Effort, Options, Reach, Sets, Start, SubProblem, Target, domino_matching, optimum,
     solve_image_problem,
 };
-use penup::stage::{NeverCancel, Scratch};
 use std::fmt::{Result, Write};
 
 /// "Fairly high", so that there is something to improve (7.5, 7.8, 7.9).
@@ -358,7 +358,7 @@ fn upper_bound_algorithm(meter: &mut Meter, page: &mut String) -> Result {
                 let (costs, bounds) = solve_image_problem(problem.distances(), &mut scratch)?;
                 let pairs = domino_matching(&costs, &mut scratch, &mut NeverCancel)?;
                 let upper = problem.distances().cost(pairs);
-                Ok::<_, penup::order::enumeration::EnumerationError>([bounds.improved, upper])
+                Ok::<_, penup_host_tests::enumeration::EnumerationError>([bounds.improved, upper])
             });
             bounds.push(ours.result.expect("memory"));
             prices.extend(ours.instructions.map(millions));

@@ -6,7 +6,7 @@
 //! sets.
 
 use super::{Distances, set_of};
-use crate::stage::{OutOfScratch, Scratch};
+use penup::stage::{OutOfScratch, Scratch};
 
 /// A feasible solution of the image problem: implicit costs of the points of `distances`.
 ///
@@ -14,7 +14,7 @@ use crate::stage::{OutOfScratch, Scratch};
 /// distances' unit, for the best solutions have halves in them.
 ///
 /// ```
-/// use penup::order::enumeration::{Distances, ImplicitCosts};
+/// use penup_host_tests::enumeration::{Distances, ImplicitCosts};
 /// use penup::stage::Scratch;
 /// let distances = Distances::new(4, &[4, 3, 3, 3, 3, 4]).unwrap();
 /// let mut memory = [0; 8];

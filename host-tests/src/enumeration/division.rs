@@ -2,9 +2,9 @@
 //! division is an assignment problem of half the order (Harrison 6.3, 6.4, 6.16).
 
 use super::image::{ImplicitCosts, members};
+use super::work_counter::WorkCounter;
 use super::{EnumerationError, set_of};
-use crate::order::work_budget::WorkBudget;
-use crate::stage::{OutOfScratch, Scratch};
+use penup::stage::{OutOfScratch, Scratch};
 
 /// A set of matchings: those in which the points of `p` are the lower ends of their pairs and those
 /// of `q` the higher ends. One bit for each point.
@@ -50,7 +50,7 @@ impl Division {
 /// [`OutOfScratch`] if 8 n² + 16 n bytes do not fit.
 ///
 /// ```
-/// use penup::order::enumeration::{Distances, Division, ImplicitCosts, division_bound};
+/// use penup_host_tests::enumeration::{Distances, Division, ImplicitCosts, division_bound};
 /// use penup::stage::Scratch;
 /// let distances = Distances::new(4, &[1, 5, 6, 7, 8, 1]).unwrap();
 /// let mut memory = [0; 32];
@@ -163,7 +163,7 @@ impl<'a> Assignment<'a> {
         sub_problems: &SubProblems<'_>,
         division: Division,
         limit: i64,
-        work_budget: &mut WorkBudget<'_>,
+        work_counter: &mut WorkCounter<'_>,
         pairs: &mut [[u8; 2]],
     ) -> Result<Option<i64>, EnumerationError> {
         let too_much = limit + 1;
@@ -180,7 +180,7 @@ impl<'a> Assignment<'a> {
             self.slack.fill(i64::MAX);
             let (mut place, mut tree) = (0usize, 1u64);
             while self.holder[place] != 0 {
-                work_budget.work(pairs.len() as u32 / 4)?;
+                work_counter.work(pairs.len() as u32 / 4)?;
                 let holder = self.holder[place];
                 let p = nth(division.p, holder);
                 let (mut step, mut next) = (i64::MAX, 0);
@@ -231,7 +231,7 @@ impl<'a> Assignment<'a> {
 mod tests {
     use super::super::Distances;
     use super::*;
-    use crate::stage::NeverCancel;
+    use penup::stage::NeverCancel;
 
     const EXAMPLE_6_4_1: [[u32; 4]; 4] = [[2, 2, 1, 3], [4, 3, 6, 5], [3, 2, 1, 8], [1, 4, 3, 5]];
     const HALVES: Division = Division { p: 0b0000_1111, q: 0b1111_0000 };
@@ -271,12 +271,12 @@ mod tests {
         let sub_problems = SubProblems::new(&costs, &mut scratch).unwrap();
         let mut assignment = Assignment::new(8, &mut scratch).unwrap();
         let mut cancel = NeverCancel;
-        let mut work_budget = WorkBudget::new(&mut cancel);
+        let mut work_counter = WorkCounter::new(&mut cancel);
         let mut pairs = [[0; 2]; 4];
-        let cost = assignment.solve(&sub_problems, HALVES, 16, &mut work_budget, &mut pairs);
+        let cost = assignment.solve(&sub_problems, HALVES, 16, &mut work_counter, &mut pairs);
         assert_eq!(cost, Ok(Some(16)), "3 + 3 + 1 + 1, as little as the bound");
         assert_eq!(pairs, [[0, 7], [1, 5], [2, 6], [3, 4]]);
-        let cost = assignment.solve(&sub_problems, HALVES, 15, &mut work_budget, &mut pairs);
+        let cost = assignment.solve(&sub_problems, HALVES, 15, &mut work_counter, &mut pairs);
         assert_eq!(cost, Ok(None));
     }
 

@@ -3,15 +3,15 @@
 
 use super::division::{Assignment, Division, SubProblems};
 use super::image::members;
+use super::work_counter::WorkCounter;
 use super::{Effort, EnumerationError, Options, Sets, SubProblem, Target, set_of};
-use crate::order::work_budget::WorkBudget;
-use crate::stage::{OutOfScratch, Scratch};
+use penup::stage::{OutOfScratch, Scratch};
 
 /// The search for better and better matchings.
 pub(super) struct Search<'a, 's, 'p> {
     sub_problems: SubProblems<'a>,
     options: Options,
-    work_budget: &'s mut WorkBudget<'p>,
+    work_counter: &'s mut WorkCounter<'p>,
     improved: &'s mut dyn FnMut(u64),
     /// The sum of the implicit costs of the image problem, in halves.
     base: i64,
@@ -49,7 +49,7 @@ impl<'a, 's, 'p> Search<'a, 's, 'p> {
         options: Options,
         pairs: &'s mut [[u8; 2]],
         scratch: &mut Scratch<'a>,
-        work_budget: &'s mut WorkBudget<'p>,
+        work_counter: &'s mut WorkCounter<'p>,
         improved: &'s mut dyn FnMut(u64),
     ) -> Result<Self, OutOfScratch> {
         let Known { base, floor, best } = known;
@@ -67,7 +67,7 @@ impl<'a, 's, 'p> Search<'a, 's, 'p> {
         }
         Ok(Self {
             options,
-            work_budget,
+            work_counter,
             improved,
             base,
             floor,
@@ -164,7 +164,7 @@ impl<'a, 's, 'p> Search<'a, 's, 'p> {
             return Ok(true);
         }
         self.effort.sets += 1;
-        self.work_budget.work(self.sub_problems.count() as u32)?;
+        self.work_counter.work(self.sub_problems.count() as u32)?;
         let promising = self.sub_problems.bound(set, self.limit).is_some();
         self.effort.sets_skipped += u64::from(!promising);
         Ok(promising)
@@ -172,7 +172,7 @@ impl<'a, 's, 'p> Search<'a, 's, 'p> {
 
     fn examine(&mut self, division: Division) -> Result<(), EnumerationError> {
         self.effort.sub_problems += 1;
-        self.work_budget.work(self.sub_problems.count() as u32)?;
+        self.work_counter.work(self.sub_problems.count() as u32)?;
         if self.sub_problems.bound(division, self.limit).is_none() {
             return Ok(());
         }
@@ -185,8 +185,9 @@ impl<'a, 's, 'p> Search<'a, 's, 'p> {
 
     fn assign(&mut self, division: Division) -> Result<(), EnumerationError> {
         self.effort.nodes += 1;
-        let Self { sub_problems, work_budget, trial, .. } = self;
-        let cost = self.assignment.solve(sub_problems, division, self.limit, work_budget, trial)?;
+        let Self { sub_problems, work_counter, trial, .. } = self;
+        let cost =
+            self.assignment.solve(sub_problems, division, self.limit, work_counter, trial)?;
         if let Some(cost) = cost {
             self.take(cost);
         }
@@ -219,7 +220,7 @@ impl<'a, 's, 'p> Search<'a, 's, 'p> {
                 continue;
             }
             self.effort.nodes += 1;
-            self.work_budget.work(1)?;
+            self.work_counter.work(1)?;
             let total = self.total[level] + self.sub_problems.reduced(point, other);
             if total > self.limit {
                 if self.options.sorted {

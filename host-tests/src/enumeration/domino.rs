@@ -6,8 +6,8 @@
 
 use super::EnumerationError;
 use super::image::{ImplicitCosts, members};
-use crate::order::work_budget::WorkBudget;
-use crate::stage::{Aborted, Cancel, OutOfScratch, Scratch};
+use super::work_counter::WorkCounter;
+use penup::stage::{Aborted, Cancel, OutOfScratch, Scratch};
 
 /// No partner, no predecessor.
 const NONE: u8 = u8::MAX;
@@ -41,13 +41,13 @@ impl<'a> GrowingGraph<'a> {
     }
 
     /// Matches as many points as can be; says whether all are.
-    fn is_domino(&mut self, work_budget: &mut WorkBudget<'_>) -> Result<bool, Aborted> {
+    fn is_domino(&mut self, work_counter: &mut WorkCounter<'_>) -> Result<bool, Aborted> {
         for root in 0..self.mate.len() {
             if self.mate[root] != NONE {
                 continue;
             }
             // A point that no path leads from now stays unmatched in some greatest matching.
-            let Some(end) = self.free_point_reached_from(root, work_budget)? else {
+            let Some(end) = self.free_point_reached_from(root, work_counter)? else {
                 return Ok(false);
             };
             self.swap_along_the_path_to(end);
@@ -59,7 +59,7 @@ impl<'a> GrowingGraph<'a> {
     fn free_point_reached_from(
         &mut self,
         root: usize,
-        work_budget: &mut WorkBudget<'_>,
+        work_counter: &mut WorkCounter<'_>,
     ) -> Result<Option<usize>, Aborted> {
         self.parent.fill(NONE);
         for (point, base) in self.base.iter_mut().enumerate() {
@@ -71,7 +71,7 @@ impl<'a> GrowingGraph<'a> {
         while taken < queued {
             let point = usize::from(self.queue[taken]);
             taken += 1;
-            work_budget.work(self.mate.len() as u32 / 4)?;
+            work_counter.work(self.mate.len() as u32 / 4)?;
             for other in members(self.near[point]) {
                 let partner = self.mate[other];
                 if self.base[point] == self.base[other] || usize::from(partner) == point {
@@ -164,15 +164,15 @@ impl<'a> GrowingGraph<'a> {
     fn add_until_domino(
         &mut self,
         segments: &[[u8; 2]],
-        work_budget: &mut WorkBudget<'_>,
+        work_counter: &mut WorkCounter<'_>,
     ) -> Result<usize, Aborted> {
         for (added, &segment) in segments.iter().enumerate() {
-            if self.is_domino(work_budget)? {
+            if self.is_domino(work_counter)? {
                 return Ok(added);
             }
             self.add(segment);
         }
-        self.is_domino(work_budget)?;
+        self.is_domino(work_counter)?;
         Ok(segments.len())
     }
 }
@@ -190,7 +190,7 @@ impl<'a> GrowingGraph<'a> {
 /// [`EnumerationError::Aborted`] if `cancel` says so.
 ///
 /// ```
-/// use penup::order::enumeration::{Distances, domino_matching, solve_image_problem};
+/// use penup_host_tests::enumeration::{Distances, domino_matching, solve_image_problem};
 /// use penup::stage::{Scratch, NeverCancel};
 /// let distances = Distances::new(4, &[1, 5, 6, 7, 8, 1]).unwrap();
 /// let mut memory = [0; 64];
@@ -205,7 +205,7 @@ pub fn domino_matching<'a>(
     cancel: &mut dyn Cancel,
 ) -> Result<&'a [[u8; 2]], EnumerationError> {
     let pairs = scratch.take(costs.distances().count() / 2)?;
-    match_by_domino_graph(costs, scratch.reborrow(), &mut WorkBudget::new(cancel), pairs)?;
+    match_by_domino_graph(costs, scratch.reborrow(), &mut WorkCounter::new(cancel), pairs)?;
     Ok(pairs)
 }
 
@@ -213,7 +213,7 @@ pub fn domino_matching<'a>(
 pub(super) fn match_by_domino_graph(
     costs: &ImplicitCosts<'_>,
     mut scratch: Scratch<'_>,
-    work_budget: &mut WorkBudget<'_>,
+    work_counter: &mut WorkCounter<'_>,
     pairs: &mut [[u8; 2]],
 ) -> Result<(), EnumerationError> {
     let count = costs.distances().count();
@@ -230,11 +230,11 @@ pub(super) fn match_by_domino_graph(
     segments.sort_unstable_by_key(|&[a, b]| (costs.reduced(usize::from(a), usize::from(b)), a, b));
     let mut graph = GrowingGraph::new(count, &mut scratch)?;
     graph.begin_with(costs);
-    let needed = graph.add_until_domino(segments, work_budget)?;
+    let needed = graph.add_until_domino(segments, work_counter)?;
     if let Some((&last, before)) = segments.get(..needed).and_then(<[_]>::split_last) {
         graph.begin_with(costs);
         graph.add(last);
-        graph.add_until_domino(before, work_budget)?;
+        graph.add_until_domino(before, work_counter)?;
     }
     let ends = (0..).zip(graph.mate.iter()).filter(|&(point, &mate)| point < mate);
     for (pair, (point, &mate)) in pairs.iter_mut().zip(ends) {
@@ -246,8 +246,7 @@ pub(super) fn match_by_domino_graph(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stage::NeverCancel;
-    use std::vec::Vec;
+    use penup::stage::NeverCancel;
 
     fn is_domino(count: usize, segments: &[[u8; 2]]) -> bool {
         let mut memory = [0; 200];
@@ -257,7 +256,7 @@ mod tests {
         for &segment in segments {
             graph.add(segment);
         }
-        let all = graph.is_domino(&mut WorkBudget::new(&mut cancel)).unwrap();
+        let all = graph.is_domino(&mut WorkCounter::new(&mut cancel)).unwrap();
         for (point, &mate) in graph.mate.iter().enumerate().filter(|&(_, &mate)| mate != NONE) {
             assert_eq!(usize::from(graph.mate[usize::from(mate)]), point);
             assert_ne!(graph.near[point] >> mate & 1, 0, "only segments of the graph");

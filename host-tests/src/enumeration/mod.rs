@@ -21,15 +21,16 @@ mod division;
 mod domino;
 mod image;
 mod search;
+mod work_counter;
 
 pub use division::{Division, division_bound};
 pub use domino::domino_matching;
 pub use image::ImplicitCosts;
 
-use super::work_budget::WorkBudget;
-use crate::stage::{Aborted, Cancel, OutOfScratch, Scratch};
 use division::SubProblems;
+use penup::stage::{Aborted, Cancel, OutOfScratch, Scratch};
 use search::{Known, Search};
+use work_counter::WorkCounter;
 
 /// The distances between an even number of points.
 #[derive(Debug, Clone, Copy)]
@@ -60,7 +61,7 @@ impl<'a> Distances<'a> {
     /// See [`DistancesError`].
     ///
     /// ```
-    /// use penup::order::enumeration::{Distances, DistancesError};
+    /// use penup_host_tests::enumeration::{Distances, DistancesError};
     /// assert_eq!(Distances::new(4, &[1, 2, 3, 4, 5, 6])?.get(1, 3), 5);
     /// assert_eq!(Distances::new(4, &[1]).unwrap_err(), DistancesError::WrongLength(6));
     /// # Ok::<(), DistancesError>(())
@@ -277,7 +278,7 @@ impl From<Aborted> for EnumerationError {
 /// See [`EnumerationError`].
 ///
 /// ```
-/// use penup::order::enumeration::{Distances, Options, optimum};
+/// use penup_host_tests::enumeration::{Distances, Options, optimum};
 /// use penup::stage::{Scratch, NeverCancel};
 /// let distances = Distances::new(4, &[1, 5, 6, 7, 8, 1]).unwrap();
 /// let mut memory = [0; 128];
@@ -294,10 +295,10 @@ pub fn optimum<'a>(
     cancel: &mut dyn Cancel,
     improved: &mut dyn FnMut(u64),
 ) -> Result<Optimum<'a>, EnumerationError> {
-    let mut work_budget = WorkBudget::new(cancel);
+    let mut work_counter = WorkCounter::new(cancel);
     let pairs: &mut [[u8; 2]] = scratch.take(distances.count() / 2)?;
     let (costs, lower_bounds) = solve_image_problem(distances, &mut scratch)?;
-    domino::match_by_domino_graph(&costs, scratch.reborrow(), &mut work_budget, pairs)?;
+    domino::match_by_domino_graph(&costs, scratch.reborrow(), &mut work_counter, pairs)?;
     let upper_bound = distances.cost(pairs);
     let best = match options.start {
         Start::NoMoreThan(cost) if !pairs.is_empty() => cost.saturating_add(1).min(WORST),
@@ -328,7 +329,7 @@ pub fn optimum<'a>(
         options,
         &mut *pairs,
         &mut scratch,
-        &mut work_budget,
+        &mut work_counter,
         improved,
     )?;
     let (proved, cost, effort) = search.run()?;
