@@ -1,35 +1,36 @@
-//! A tour as a cycle of legs that can be cut, turned and joined again, and back.
+//! A tour as a cycle of legs in which stretches can be reversed and swapped, and these changes
+//! undone.
 //!
-//! The cycle has no direction of its own: every leg of it may be named as it is drawn or flipped,
-//! and what comes [next](Cycle::next) follows from that. An open path is a cycle with one leg more,
-//! the *gap*, from nowhere to nowhere, no distance from anywhere.
+//! The cycle has no direction of its own: each leg of it may be named as it is drawn or flipped,
+//! and [the next leg](Cycle::next) follows from that. An open path is a cycle with one leg more,
+//! the *gap*. It has no stations; its distance from everything is 0.
 
 use super::Leg;
 
-/// The cycle and how it came to be since it was last [settled](Cycle::settle).
+/// The cycle, and how it changed since it was last [settled](Cycle::settle).
 pub(super) struct Cycle<'s> {
     legs: &'s mut [Leg],
-    /// Where each chain (or the gap) stands.
+    /// The index in `legs` of each chain, and of the gap.
     place: &'s mut [u16],
-    /// The turns since: where they begin, and how many legs they turn.
+    /// The stretches reversed since then: the index of the first leg, and the number of legs.
     turns: &'s mut [[u16; 2]],
     turned: usize,
 }
 
-/// How a leg stands in a cycle: until the next turn.
+/// The position and the direction of a leg in a cycle. It is valid until the next turn.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Stand {
     place: usize,
-    /// Whether the leg goes the way in which the cycle is stored.
+    /// Whether the leg has the direction in which the cycle is stored.
     pub forward: bool,
 }
 
 impl<'s> Cycle<'s> {
-    /// Turns that can be taken back.
+    /// The number of turns that can be undone.
     pub const MEMORY: usize = 256;
 
-    /// The cycle of `legs`, which number all of `0..legs.len()`; `place` is as long, `turns` has
-    /// place for [`Cycle::MEMORY`].
+    /// Makes the cycle of `legs`, which contain each of the numbers `0..legs.len()` once. `place`
+    /// must be as long as `legs`, and `turns` must have [`Cycle::MEMORY`] entries.
     pub fn new(legs: &'s mut [Leg], place: &'s mut [u16], turns: &'s mut [[u16; 2]]) -> Self {
         for (at, leg) in (0..).zip(legs.iter()) {
             place[leg.segment()] = at;
@@ -37,12 +38,12 @@ impl<'s> Cycle<'s> {
         Self { legs, place, turns, turned: 0 }
     }
 
-    /// How many legs there are.
+    /// Returns the number of legs.
     pub fn len(&self) -> usize {
         self.legs.len()
     }
 
-    /// The leg that stands at `index`.
+    /// Returns the leg at `index`.
     pub fn leg(&self, index: usize) -> Leg {
         self.legs[index]
     }
@@ -51,13 +52,13 @@ impl<'s> Cycle<'s> {
         usize::from(self.place[leg.segment()])
     }
 
-    /// How `leg` stands in the cycle.
+    /// Returns the position and the direction of `leg` in the cycle.
     pub fn stand(&self, leg: Leg) -> Stand {
         let place = self.place(leg);
         Stand { place, forward: self.legs[place] == leg }
     }
 
-    /// The leg after the one that stands there, the way that it goes.
+    /// Returns the leg after the one at `stand`, in the direction of that leg.
     pub fn after(&self, stand: Stand) -> Leg {
         let last = self.legs.len() - 1;
         let place = stand.place;
@@ -68,41 +69,43 @@ impl<'s> Cycle<'s> {
         }
     }
 
-    /// The leg before the one that stands there, the way that it goes.
+    /// Returns the leg before the one at `stand`, in the direction of that leg.
     pub fn before(&self, stand: Stand) -> Leg {
         self.after(Stand { forward: !stand.forward, ..stand }).flipped()
     }
 
-    /// The leg after `leg`, the way that `leg` goes.
+    /// Returns the leg after `leg`, in the direction of `leg`.
     pub fn next(&self, leg: Leg) -> Leg {
         self.after(self.stand(leg))
     }
 
-    /// The leg before `leg`, the way that `leg` goes.
+    /// Returns the leg before `leg`, in the direction of `leg`.
     pub fn previous(&self, leg: Leg) -> Leg {
         self.before(self.stand(leg))
     }
 
-    /// How many legs after `from` the place of `to` comes, the way that the leg of `from` goes.
+    /// Returns how many legs after `from` the position of `to` comes, in the direction of `from`.
     pub fn way(&self, from: Stand, to: Stand) -> usize {
         let (begin, end) =
             if from.forward { (from.place, to.place) } else { (to.place, from.place) };
         if end >= begin { end - begin } else { end + self.legs.len() - begin }
     }
 
-    /// How many legs after `from` the leg `to` comes, the way that `from` goes.
+    /// Returns how many legs after `from` the leg `to` comes, in the direction of `from`.
     pub fn steps(&self, from: Leg, to: Leg) -> usize {
         self.way(self.stand(from), self.stand(to))
     }
 
-    /// From `… a, b … c, d …` makes `… a, c … b, d …`, `b` to `c` flipped. `a` and `c` go the same
-    /// way. Returns how many legs it moved.
+    /// Reverses the stretch after `a` up to `c`: makes `… a, c … b, d …` from `… a, b … c, d …`,
+    /// with the legs `b` to `c` flipped. `a` and `c` must have the same direction. Returns the
+    /// number of legs that were moved.
     pub fn turn(&mut self, a: Leg, c: Leg) -> usize {
         let inner = self.steps(a, c);
         let (place_a, place_c) = (self.place(a), self.place(c));
         let outer = self.legs.len() - inner;
         let after = |place: usize| if place + 1 == self.legs.len() { 0 } else { place + 1 };
-        // Turning the rest instead gives the same cycle.
+        // To reverse the rest of the cycle instead gives the same cycle, so the shorter stretch is
+        // reversed.
         let (begin, count) = match (self.stand(a).forward, inner <= outer) {
             (true, true) => (after(place_a), inner),
             (true, false) => (after(place_c), outer),
@@ -117,8 +120,9 @@ impl<'s> Cycle<'s> {
         count
     }
 
-    /// From `… a, b … c, d … e, f …` makes `… a, d … e, b … c, f …`. `a`, `d` and `e` go the same
-    /// way. Returns how many legs it moved.
+    /// Swaps two neighbouring stretches: makes `… a, d … e, b … c, f …` from `… a, b … c, d … e, f
+    /// …`. `a`, `d` and `e` must have the same direction. Returns the number of legs that were
+    /// moved.
     pub fn swap(&mut self, a: Leg, d: Leg, e: Leg) -> usize {
         let b = self.next(a);
         self.turn(a, e) + self.turn(a, d.flipped()) + self.turn(e, b.flipped())
@@ -147,17 +151,17 @@ impl<'s> Cycle<'s> {
         self.place[leg.segment()] = place as u16;
     }
 
-    /// How many turns have been taken since it was settled.
+    /// Returns the number of turns since the cycle was last settled.
     pub fn turned(&self) -> usize {
         self.turned
     }
 
-    /// Whether a few more turns can be remembered.
+    /// Whether there is memory for the turns of one more exchange.
     pub fn can_turn(&self) -> bool {
         self.turned + 16 <= self.turns.len()
     }
 
-    /// Takes back the turns after the first `count`.
+    /// Undoes all turns after the first `count`.
     pub fn take_back(&mut self, count: usize) {
         while self.turned > count {
             self.turned -= 1;
@@ -166,7 +170,7 @@ impl<'s> Cycle<'s> {
         }
     }
 
-    /// The cycle is good as it is: the turns need not be remembered.
+    /// Accepts the cycle as it is: earlier turns can no longer be undone.
     pub fn settle(&mut self) {
         self.turned = 0;
     }

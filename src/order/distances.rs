@@ -1,9 +1,10 @@
-//! Distances between stations, remembered.
+//! Caches the distances between stations in a table.
 //!
-//! Exchanges ask for the same few distances again and again, and a root costs a small core far more
-//! than a look into a table. A pair of stations has one place in the table, where the last pair that
-//! fell there is found; how large the table is changes the work and nothing else. After Helsgaun, "An
-//! effective implementation of the Lin–Kernighan traveling salesman heuristic" (2000), 4.2.
+//! Exchanges ask for the same few distances again and again, and on a small core a square root
+//! costs far more than a table lookup. Each pair of stations has one entry in the table, which
+//! holds the last of the pairs that share it. The size of the table changes the work and never the
+//! result. After Helsgaun, "An effective implementation of the Lin–Kernighan traveling salesman
+//! heuristic" (2000), 4.2.
 
 use super::NONE;
 use super::network::Network;
@@ -11,7 +12,8 @@ use crate::stage::{OutOfScratch, Scratch};
 use bytemuck::{Pod, Zeroable};
 use core::cell::Cell;
 
-/// A pair of stations, the lower first, and how far they are from each other in 1/256 steps.
+/// An entry of the table: a pair of stations, the lower first, and the distance between them in
+/// 1/256 steps.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct Known {
@@ -19,20 +21,20 @@ struct Known {
     length: u32,
 }
 
-/// The distances of a network.
+/// The distances of a network, with their cache.
 pub(super) struct Distances<'s, 'a> {
     network: Network<'a>,
-    /// As many as a power of two, or none.
+    /// The table. Its length is a power of two, or 0.
     known: &'s [Cell<Known>],
-    /// What is left of a pair's 32 mixed bits is its place.
+    /// The hash of a pair, of 32 bits, is shifted right by this to give its index in the table.
     shift: u32,
 }
 
 impl<'s, 'a> Distances<'s, 'a> {
-    /// More places would not be worth the time that it takes to clear them.
+    /// The table has at most 2^13 entries: to clear more would take longer than they save.
     const MOST_BITS: u32 = 13;
 
-    /// Remembers as much as there is memory for.
+    /// Makes an empty table, as large as the memory allows.
     pub fn new(network: Network<'a>, scratch: &mut Scratch<'s>) -> Result<Self, OutOfScratch> {
         let places = scratch.available_bytes() / size_of::<Known>();
         let bits = places.checked_ilog2().unwrap_or(0).min(Self::MOST_BITS);
@@ -45,15 +47,16 @@ impl<'s, 'a> Distances<'s, 'a> {
         })
     }
 
-    /// The distance between two stations in 1/256 steps.
+    /// Returns the distance between two stations in 1/256 steps.
     pub fn between(&self, from: u16, to: u16) -> u32 {
         self.below(u32::MAX, from, to).unwrap_or(u32::MAX)
     }
 
-    /// The distance between two stations in 1/256 steps, if it is below `bound`.
+    /// Returns the distance between two stations in 1/256 steps, or `None` if it is not below
+    /// `bound`.
     pub fn below(&self, bound: u32, from: u16, to: u16) -> Option<u32> {
         let pair = if from < to { [from, to] } else { [to, from] };
-        // Knuth's multiplicative hashing, by a prime near 2^32 times the golden section.
+        // Knuth's multiplicative hashing, with a prime near 2^32 times the golden ratio.
         let mixed = (u32::from(pair[0]) << 16 | u32::from(pair[1])).wrapping_mul(2_654_435_761);
         let place = self.known.get((mixed >> self.shift) as usize);
         let known = place.map(Cell::get).filter(|known| known.pair == pair);

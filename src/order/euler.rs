@@ -1,8 +1,9 @@
-//! Eulerian trails (Harrison 5.11 and appendix 5.2) and the joining of the separate parts.
+//! Traces Eulerian trails (Harrison 5.11 and appendix 5.2), and joins those of the separate parts
+//! into one tour.
 //!
 //! Harrison traces a cycle, looks along it for a point with unused segments, and splices in the
 //! cycle traced from there. Here the trail that is being traced and the finished one share one
-//! slice, growing towards each other: linear time, no list besides.
+//! slice and grow towards each other. This takes linear time and no further list.
 
 use super::incidence::Incidence;
 use super::metric::length;
@@ -13,18 +14,18 @@ use super::{EVEN_PART, Leg, NONE, OrderError};
 use crate::drawing::PagePoint;
 use crate::stage::{OutOfScratch, Scratch};
 
-/// The chains and the moves not yet used by a trail.
+/// The chains and the pen-up moves that no trail has used yet.
 pub(super) struct Unused<'s, 'a> {
     network: Network<'a>,
-    /// Those not yet found to be used.
+    /// The legs from each station, without those at the front that were found to be used.
     legs: Incidence<'s>,
     used: &'s mut [u8],
-    /// The other end of the pen-up move of each station: [`NONE`], [`EVEN_PART`] or a station.
+    /// For each station, the other end of its pen-up move; or [`NONE`] or [`EVEN_PART`].
     mate: &'s mut [u16],
 }
 
 impl<'s, 'a> Unused<'s, 'a> {
-    /// All chains of `network`, and a move from each station to its `mate`.
+    /// Makes all chains of `network` unused, and a move from each station to its `mate`.
     pub fn new(
         network: Network<'a>,
         mate: &'s mut [u16],
@@ -35,7 +36,7 @@ impl<'s, 'a> Unused<'s, 'a> {
         Ok(Self { network, legs, used, mate })
     }
 
-    /// The next unused leg from `station`.
+    /// Returns the next unused leg from `station`.
     fn peek(&mut self, station: u16) -> Option<Leg> {
         while let Some(leg) = self.legs.first(station) {
             if self.used[leg.segment()] == 0 {
@@ -52,7 +53,7 @@ impl<'s, 'a> Unused<'s, 'a> {
         Some(leg)
     }
 
-    /// Uses up the move from `station`; says where it leads.
+    /// Marks the move from `station` as used and returns the station to which it leads.
     fn lift(&mut self, station: u16) -> Option<u16> {
         let mate = self.mate[usize::from(station)];
         if mate == NONE || mate == EVEN_PART {
@@ -63,9 +64,9 @@ impl<'s, 'a> Unused<'s, 'a> {
         Some(mate)
     }
 
-    /// Traces everything that hangs together with `start` into the front of `route`, and says how
-    /// many legs that took. If one station but `start` is left with an odd number of uses, the
-    /// trail ends there, else where it began.
+    /// Traces all chains and moves that are connected with `start`, and writes the legs to the
+    /// front of `route`. Returns the number of legs. If one station other than `start` has an odd
+    /// number of uses left, the trail ends there, otherwise where it began.
     fn trace(
         &mut self,
         start: u16,
@@ -90,7 +91,7 @@ impl<'s, 'a> Unused<'s, 'a> {
                     route[finished] = last;
                     here = self.network.start(last);
                 } else {
-                    // The pen came here by a move: back along it.
+                    // The pen came here by a pen-up move: go back along it.
                     here = self.network.end(last);
                 }
             } else {
@@ -101,13 +102,13 @@ impl<'s, 'a> Unused<'s, 'a> {
         }
     }
 
-    /// Whether a part not yet drawn may be entered at `station`: it has a move to save, or no part
-    /// of it has.
+    /// Whether an undrawn part may be entered at `station`. It may if the station has a move, which
+    /// the entrance then replaces, or if no station of the part has one.
     fn is_entrance(&mut self, station: u16) -> bool {
         self.mate[usize::from(station)] != NONE && self.peek(station).is_some()
     }
 
-    /// The entrance for which `far` is least.
+    /// Returns the entrance for which `far` is least.
     pub fn entrance(
         &mut self,
         far: impl Fn(PagePoint) -> u32,
@@ -127,7 +128,8 @@ impl<'s, 'a> Unused<'s, 'a> {
         Ok(best)
     }
 
-    /// The entrance nearest to the station `pen`: if `near` knows any, the first of those.
+    /// Returns the entrance nearest to the station `pen`. If `near` lists any entrance, it is the
+    /// first of those.
     fn next_entrance(
         &mut self,
         pen: u16,
@@ -144,8 +146,9 @@ impl<'s, 'a> Unused<'s, 'a> {
         self.entrance(|place| length(at, place), work_budget)
     }
 
-    /// Draws everything: from `start` if given, else from the lowest x; each further part from its
-    /// entrance nearest to the pen, nearly so if it may be one of those that `near` knows.
+    /// Traces all parts, from `start` if it is given and otherwise from the entrance with the
+    /// lowest x. Each further part is entered at the entrance nearest to the pen, or nearly so: the
+    /// neighbours listed in `near` come first.
     pub fn nearest_first(
         &mut self,
         start: Option<u16>,
@@ -161,7 +164,8 @@ impl<'s, 'a> Unused<'s, 'a> {
         };
         let mut done = 0;
         while let Some(start) = entrance {
-            // The way in is also the way out: the move that would close the part is not needed.
+            // The part is left at the other end of the move that would close it, so that move is
+            // not needed.
             self.lift(start);
             done += self.trace(start, &mut route[done..], work_budget)?;
             let Some(&last) = route[..done].last() else {

@@ -1,17 +1,18 @@
-//! Which legs begin at which station.
+//! For each station, the list of the legs that begin there, in little memory: linked lists over the
+//! codes of the legs.
 
 use super::network::Network;
 use super::{Leg, NONE};
 use crate::stage::{OutOfScratch, Scratch};
 
-/// For each station a list of the legs that begin there, the lowest first.
+/// The lists of the legs that begin at each station, in ascending order of their codes.
 pub(super) struct Incidence<'s> {
     first: &'s mut [u16],
     next: &'s mut [u16],
 }
 
 impl<'s> Incidence<'s> {
-    /// All legs of `network`.
+    /// Makes the lists of all legs of `network`.
     pub fn new(network: Network<'_>, scratch: &mut Scratch<'s>) -> Result<Self, OutOfScratch> {
         let first: &mut [u16] = scratch.take(usize::from(network.stations()))?;
         let next: &mut [u16] = scratch.take(2 * usize::from(network.chains()))?;
@@ -24,22 +25,22 @@ impl<'s> Incidence<'s> {
         Ok(Self { first, next })
     }
 
-    /// Bytes of scratch for so many stations and chains.
+    /// Returns the scratch memory needed for so many stations and chains, in bytes.
     pub const fn bytes(stations: usize, chains: usize) -> usize {
         Scratch::bytes_for::<u16>(stations) + Scratch::bytes_for::<u16>(2 * chains)
     }
 
-    /// The first leg from `station`.
+    /// Returns the first leg that begins at `station`.
     pub fn first(&self, station: u16) -> Option<Leg> {
         leg(self.first[usize::from(station)])
     }
 
-    /// The leg after `after` from the same station.
+    /// Returns the leg that follows `after` in the list of the same station.
     pub fn next(&self, after: Leg) -> Option<Leg> {
         leg(self.next[usize::from(after.code())])
     }
 
-    /// Takes the first leg from `station` off its list.
+    /// Removes the first leg from the list of `station`.
     pub fn drop_first(&mut self, station: u16) {
         let first = &mut self.first[usize::from(station)];
         if *first != NONE {

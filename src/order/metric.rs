@@ -1,11 +1,14 @@
-//! How far it is.
+//! Computes the distance between two points of the page, exactly and with integers only.
+//!
+//! All later stages compare lengths of pen moves, so this is the most frequent computation of the
+//! ordering. The square root avoids divisions, which small cores do not have.
 
 use crate::drawing::PagePoint;
 
-/// The distance between two points of the page in 1/256 steps, rounded down.
+/// Returns the distance between two points of the page in 1/256 steps, rounded down.
 ///
-/// Points within ±[`PAGE_LIMIT`](crate::drawing::PAGE_LIMIT): the square fits 43 bits, the distance
-/// 30.
+/// The points must be within ±[`PAGE_LIMIT`](crate::drawing::PAGE_LIMIT): then the square fits 43
+/// bits and the distance 30.
 ///
 /// ```
 /// use penup::{drawing::PagePoint, order::length};
@@ -17,27 +20,28 @@ pub fn length(a: PagePoint, b: PagePoint) -> u32 {
     root(square(a, b) << 16)
 }
 
-/// No more than their distance, quickly, in 1/256 steps.
+/// Returns a lower bound of the distance in 1/256 steps, without a square root: the greater of the
+/// differences in x and in y.
 pub(super) fn least_length(a: PagePoint, b: PagePoint) -> u32 {
     a.x.abs_diff(b.x).max(a.y.abs_diff(b.y)) << 8
 }
 
-/// The square of the distance between two such points, in steps.
+/// Returns the square of the distance between two points of the page, in square steps.
 pub(super) fn square(a: PagePoint, b: PagePoint) -> u64 {
     let (dx, dy) = (a.x.abs_diff(b.x), a.y.abs_diff(b.y));
     if (dx | dy) >> 16 == 0 {
-        // A core without long products is spared them on most pages.
+        // Most pages need only 32-bit products here, which are faster on a core without long ones.
         return u64::from(dx * dx) + u64::from(dy * dy);
     }
     u64::from(dx) * u64::from(dx) + u64::from(dy) * u64::from(dy)
 }
 
-/// The first guess at 2^15 / √x for x in 32nds from 1 to 4.
+/// The first guess of 2^15 / √x, for x from 1 to 4 in steps of 1/32.
 const RECIPROCAL_ROOTS: [u16; 96] = {
     let mut table = [0; 96];
     let mut index = 0;
     while index < table.len() {
-        // Of the middle: x = (2 (index + 32) + 1) / 64.
+        // The guess is for the middle of the interval: x = (2 (index + 32) + 1) / 64.
         let middle = 2 * (index as u64 + 32) + 1;
         table[index] = ((1 << 36) / middle).isqrt() as u16;
         index += 1;
@@ -45,20 +49,20 @@ const RECIPROCAL_ROOTS: [u16; 96] = {
     table
 };
 
-/// The square root of `square`, below 2^60, rounded down.
+/// Returns the square root of `square`, which must be below 2^60, rounded down.
 ///
-/// Two of Newton's steps towards the reciprocal root, which need no division: a third of the
-/// instructions of the general `isqrt` on a core that has none.
+/// Two Newton steps approximate the reciprocal root, which needs no division. On a core that has no
+/// division this takes a third of the instructions of the general `isqrt`.
 fn root(square: u64) -> u32 {
     if square == 0 {
         return 0;
     }
     let shift = square.leading_zeros() & !1;
     let multiply = |a: u32, b: u32| u64::from(a) * u64::from(b);
-    // From 1 to 4 with 30 bits after the point.
+    // A value from 1 to 4, with 30 bits after the binary point.
     let x = ((square << shift) >> 32) as u32;
     let guess = u32::from(RECIPROCAL_ROOTS[(x >> 25) as usize - 32]);
-    // g' = g (3 - x g²) / 2, first with 15 bits, then with 31.
+    // Newton's step is g' = g (3 - x g²) / 2; the first gives 15 bits, the second 31.
     let squared = (multiply(x, guess * guess) >> 32) as u32;
     let guess = (multiply(guess, (3 << 28) - squared) >> 13) as u32;
     let squared = (multiply(x, (multiply(guess, guess) >> 32) as u32) >> 32) as u32;

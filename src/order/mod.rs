@@ -1,18 +1,22 @@
-//! In which order, and which way, the segments are drawn: odd points, pen-up matching, Eulerian
-//! tour, joining of the separate parts.
+//! Orders the segments of a drawing and chooses the direction of each, so that the pen travels as
+//! little as possible while it is up.
 //!
-//! A pen draws a connected drawing without a lift if no more than two of its points are *odd*
-//! (an odd number of segments meet there). Else the odd points are paired, and the pen is lifted
-//! from one of a pair to the other (Harrison 5.6). The way of the data:
+//! A pen draws a connected drawing without a lift if at most two of its points are *odd* (an odd
+//! number of segments meet there). Otherwise the odd points are paired, and the pen moves, lifted,
+//! from one point of a pair to the other (Harrison 5.6). The steps are:
 //!
-//! 1. `network`: the segments of one pen become stations and chains;
-//! 2. `matching` pairs the odd stations at the least length, or `greedy` in less memory;
-//! 3. `euler` traces the strokes, part by part, nearest first;
-//! 4. `improve` shortens the tour of several parts: `patch_cycles` joins them by their own moves, `exchange`
-//!    changes moves while that helps (`search` finds how), `orient` turns strokes around.
+//! 1. `network` turns the segments of one pen into a graph of stations and chains.
+//! 2. `matching` pairs the odd stations so that the total length is the least. `greedy` pairs them
+//!    in less memory, without that guarantee.
+//! 3. `euler` traces the strokes along Eulerian tours, one connected part after another, the
+//!    nearest part first.
+//! 4. `improve` shortens the tour of several parts: `patch_cycles` changes pen-up moves so that
+//!    they join the parts, `exchange` exchanges moves while that helps (`search` finds the
+//!    exchanges), and `orient` chooses the direction of each stroke.
 //!
-//! Call [`order`] with a [`Drawing`], [`Options`] and memory. Refused: a drawing whose segments name
-//! points that are not there, too many segments, too little memory; the tour is then worth nothing.
+//! Call [`order`] with a [`Drawing`], [`Options`] and working memory. It refuses a drawing whose
+//! segments name points that do not exist, too many segments, and too little memory. On an error
+//! the contents of the tour are unspecified.
 
 mod cycle;
 mod distances;
@@ -44,35 +48,37 @@ use network::{Network, start_point};
 use odd::OddPoints;
 use work_budget::WorkBudget;
 
-/// Points beyond so many have no number of their own: [`NONE`] is not one.
+/// The greatest number of points that can be numbered, because [`NONE`] is not the number of a
+/// point.
 const POINT_LIMIT: usize = NONE as usize;
-/// No station, no partner.
+/// In the place of a station or a partner: there is none.
 const NONE: u16 = u16::MAX;
-/// In the place of a partner: a station of a part that has no odd point.
+/// In the place of a partner: the station belongs to a part that has no odd point.
 const EVEN_PART: u16 = u16::MAX - 1;
 
-/// One segment of the tour and the way it is drawn. At most [`Leg::LIMIT`] segments.
+/// One segment of the tour and the direction in which it is drawn. There are at most [`Leg::LIMIT`]
+/// segments.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 #[repr(transparent)]
 pub struct Leg(u16);
 
 impl Leg {
-    /// As many segments can be numbered.
+    /// The greatest number of segments that can be numbered.
     pub const LIMIT: usize = (1 << 15) - 1;
 
-    /// Segment `segment`, drawn from its `to` end if `reversed`.
+    /// Makes the leg of segment `segment`, which is drawn from its `to` end if `reversed`.
     pub fn new(segment: u16, reversed: bool) -> Self {
         Self(segment << 1 | u16::from(reversed))
     }
-    /// The number of the segment in the drawing.
+    /// Returns the number of the segment in the drawing.
     pub fn segment(self) -> usize {
         usize::from(self.0 >> 1)
     }
-    /// Whether it is drawn from its `to` end to its `from` end.
+    /// Whether the segment is drawn from its `to` end to its `from` end.
     pub fn reversed(self) -> bool {
         self.0 & 1 != 0
     }
-    /// The same segment drawn the other way.
+    /// Returns the same segment, drawn in the opposite direction.
     pub fn flipped(self) -> Self {
         Self(self.0 ^ 1)
     }
@@ -84,98 +90,101 @@ impl Leg {
     }
 }
 
-/// How the pen-up moves are chosen.
+/// The method that pairs the odd points, and so chooses the pen-up moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Method {
-    /// Exact where it fits in memory and is worth its time ([`EXACT_POINTS`]), else greedy.
+    /// Exact if it fits in memory and there are at most [`EXACT_POINTS`] odd points, otherwise
+    /// greedy.
     #[default]
     Auto,
-    /// Greedy with regret (Harrison 5.10.1), then pair exchange.
+    /// Greedy with regret (Harrison 5.10.1), followed by pair exchange.
     Greedy,
     /// Minimum-weight perfect matching.
     Exact,
 }
 
-/// [`Method::Auto`] pairs more odd points than this by greed. The exact pairing's work grows faster than their square: a
-/// Cortex-M0+ would take minutes for 2000, and move the pen a hundredth less.
+/// The greatest number of odd points of one pen that [`Method::Auto`] pairs exactly; more are
+/// paired by the greedy method. The work of the exact method grows faster than the square of the
+/// number of points: a Cortex-M0+ would take minutes for 2000 points, to make the pen-up travel one
+/// hundredth shorter.
 pub const EXACT_POINTS: u16 = 1000;
 
 /// Whether the pen returns to where it began.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Shape {
-    /// From the first stroke's start to the last stroke's end.
+    /// The path goes from the start of the first stroke to the end of the last.
     #[default]
     OpenPath,
-    /// And back to the first stroke's start.
+    /// After the last stroke the pen returns to the start of the first.
     ClosedCycle,
 }
 
-/// What the user may choose.
+/// The settings that the user may choose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Options {
-    /// How the pen-up moves are chosen.
+    /// The method that pairs the odd points.
     pub method: Method,
-    /// Open or closed.
+    /// Whether the path is open or closed. A drawing with several pens has an open path for each
+    /// pen.
     pub shape: Shape,
-    /// How much work may go into improving the first tour of separate parts, in distances for each
-    /// move: a budget in work and not in time, so that every machine gives the same tour. With 0
-    /// the parts are drawn nearest first.
+    /// The work that may be spent on improving the first tour of several parts, in distance
+    /// computations for each pen-up move. The limit counts work, not time, so that every machine
+    /// gives the same tour. With 0 the tour is not improved: the parts are drawn nearest first.
     pub effort: u32,
-    /// How much longer a way with the pen up may be for one lift less, in 1/256 steps, up to 2^30: each
-    /// takes its time, and shows where it is within a stroke.
+    /// Extra pen-up travel that is accepted to save one pen lift, in 1/256 steps, at most 2^30.
+    /// Each lift takes time, and leaves a visible mark if it lies within a stroke.
     pub lift: u32,
 }
 
 impl Default for Options {
-    /// The exact open path where it fits, and as much effort as brings a page of some hundred strokes
-    /// within 3 % of the best known.
+    /// An open path, exact where that fits, with enough effort to bring a page of some hundred
+    /// strokes within 3 % of the best tour known.
     fn default() -> Self {
         Self { method: Method::default(), shape: Shape::default(), effort: 4000, lift: 0 }
     }
 }
 
-/// What came of it. Lengths in 1/256 steps.
+/// The measures of the resulting tour. Lengths are in 1/256 steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Report {
-    /// Points where an odd number of segments meet.
+    /// Number of points where an odd number of segments meet, added over all pens.
     pub odd_points: u32,
-    /// Separate parts.
+    /// Number of connected parts, added over all pens.
     pub components: u32,
-    /// Length drawn.
+    /// Total length drawn with the pen down.
     pub pen_down: u64,
-    /// Length of the moves between strokes.
+    /// Total length of the moves between strokes, with the pen up.
     pub pen_up: u64,
-    /// Moves between strokes.
+    /// Number of moves between strokes.
     pub lifts: u32,
-    /// Lower bound of the pen-up length.
+    /// Lower bound of the pen-up length; 0 if none is known.
     pub bound: u64,
-    /// Whether `pen_up` is proved the least.
+    /// Whether `pen_up` is proved to be the least possible: it equals `bound`.
     pub optimal: bool,
 }
 
-/// Why there is no order.
+/// The reasons why a drawing cannot be ordered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OrderError {
-    /// Not enough working memory.
+    /// There is not enough working memory.
     Scratch(OutOfScratch),
-    /// The user gave up.
+    /// The user aborted the job.
     Aborted,
-    /// More segments than a tour can number ([`Leg::LIMIT`]).
+    /// The drawing has more segments than a tour can number ([`Leg::LIMIT`]).
     TooManySegments,
-    /// The tour has not as many places as the drawing has segments.
+    /// The tour's length is not the number of segments in the drawing.
     TourLength,
-    /// This segment names a point that is not there or beyond [`PAGE_LIMIT`], or twice the same.
+    /// This segment names a point that does not exist or lies beyond [`PAGE_LIMIT`], or both its
+    /// ends are the same point.
     BadSegment(u16),
 }
 
-/// Orders `drawing` into `tour` (as long as `drawing.segments`).
+/// Orders the segments of `drawing` and writes the result to `tour`, which must be as long as
+/// `drawing.segments`.
 ///
-/// Each segment stands in the tour once; the pen goes up where a leg does not begin where the one
-/// before it ended. The segments of one pen stand together, the lowest pen first; each pen after it
-/// begins at that end of its path that is nearer.
-///
-/// # Errors
-/// See [`OrderError`].
+/// Each segment occurs in the tour once. The pen is lifted wherever a leg does not begin where the
+/// leg before it ended. The segments of one pen follow each other, those of the lowest pen first.
+/// Each later pen begins at that end of its path that is nearer to where the pen before it ended.
 pub fn order(
     drawing: Drawing<'_>,
     options: Options,
@@ -190,7 +199,7 @@ pub fn order(
     let mut report = Report::default();
     let mut rest = &mut *tour;
     let pens = || drawing.segments.iter().map(|segment| segment.pen);
-    // Of several pens none returns to its own beginning.
+    // With several pens, none returns to its own start.
     let shape = if pens().min() == pens().max() { options.shape } else { Shape::OpenPath };
     let mut next_pen = pens().min();
     let mut pen_at = None;
@@ -288,14 +297,14 @@ fn order_pen<'a>(
     Ok(())
 }
 
-/// How many parts there are, and how many of them have odd points.
+/// The number of connected parts, and how many of them have odd points.
 struct Parts {
     count: u32,
     odd: u32,
 }
 
-/// Marks each station: an odd one by its own number, an even one by [`NONE`], or by [`EVEN_PART`] if
-/// its part has no odd one.
+/// Marks each station. An odd station is marked by its own number. An even one is marked by
+/// [`NONE`], or by [`EVEN_PART`] if its part has no odd station.
 fn mark_parts(
     network: Network<'_>,
     mut scratch: Scratch<'_>,
@@ -318,7 +327,8 @@ fn mark_parts(
             parts.count += 1;
             parts.odd += u32::from(marks[usize::from(station)] == NONE);
         }
-        // The lowest comes first, and its mark is asked for until the part's last station.
+        // The lowest station of a part comes first. Its mark must stay until the last station of
+        // the part has read it, so it gets its own number only in the next loop.
         marks[usize::from(station)] = marks[usize::from(lowest)];
         if odd == 1 && lowest != station {
             marks[usize::from(station)] = station;
@@ -332,7 +342,8 @@ fn mark_parts(
     Ok(parts)
 }
 
-/// Pairs the odd stations of `mate` (marked by themselves). Returns where an open path begins.
+/// Pairs the odd stations, which `mate` marks by their own numbers, and writes each one's partner
+/// to `mate`. Returns the station where an open path begins.
 fn pair_odd(
     network: Network<'_>,
     options: Options,
@@ -362,8 +373,11 @@ fn pair_odd(
     Ok(ends.min_by_key(|&station| (network.place(station).x, station)))
 }
 
-/// Pairs odd points. Returns a lower bound of the length of their moves in 1/256 steps, 0 if none is known.
-#[inline(never)] // Its frame is gone before the tour is improved; and its cycles can be counted.
+/// Pairs the odd points. Returns a lower bound of the total length of their moves in 1/256 steps,
+/// or 0 if none is known.
+// Not inlined, so that its stack frame is gone before the tour is improved and its cycles can be
+// counted.
+#[inline(never)]
 fn pair_points(
     odd: &OddPoints<'_>,
     method: Method,
@@ -386,7 +400,8 @@ fn pair_points(
     Ok(0)
 }
 
-/// Makes a closed cycle begin at the lowest x, and an open path at the lower of its ends.
+/// Makes a closed cycle begin at its lowest x, and an open path at that of its ends that has the
+/// lower x.
 fn turn(network: Network<'_>, shape: Shape, route: &mut [Leg]) {
     let x_of = |leg: &Leg| network.place(network.start(*leg)).x;
     match shape {
@@ -404,7 +419,7 @@ fn turn(network: Network<'_>, shape: Shape, route: &mut [Leg]) {
     }
 }
 
-/// The same tour from its end to its start.
+/// Reverses the tour, so that it goes from its end to its start.
 fn reverse(tour: &mut [Leg]) {
     tour.reverse();
     for leg in tour {
@@ -412,7 +427,7 @@ fn reverse(tour: &mut [Leg]) {
     }
 }
 
-/// Measures `tour` into `report`.
+/// Adds the lengths and lifts of `tour` to `report`.
 fn measure(drawing: Drawing<'_>, tour: &[Leg], shape: Shape, report: &mut Report) {
     let place = |leg: Leg| drawing.points[usize::from(start_point(drawing.segments, leg))];
     let closing = match shape {

@@ -1,11 +1,12 @@
-//! The strokes of one pen as a network: *stations*, where the pen may stop or turn, joined by
-//! *chains* of segments that it draws in one go.
+//! The strokes of one pen as a graph: *stations*, where the pen may stop or turn, are joined by
+//! *chains* of segments that the pen draws without stopping.
 //!
-//! A point where two segments meet is only passed through, unless its part has no odd point at
-//! all: such a part (a circle, a square) may be entered anywhere, so all its points are stations.
-//! A polyline of a hundred segments is thus one chain, and the work that follows counts strokes,
-//! not segments. Where polylines are short and there is memory, every point is a station: the pen
-//! may leave a corner for what lies near it, and come back. Refused: more memory than there is.
+//! A point where two segments meet is usually inside a chain. The exception is a part without any
+//! odd point (a circle, a square): it may be entered anywhere, so all its points are stations. A
+//! polyline of a hundred segments is thus one chain, and the work of the later stages depends on
+//! the number of strokes, not of segments. Where polylines are short and there is memory, every
+//! point is a station. The pen may then leave a corner for something near it and come back. Fails
+//! if there is not enough memory.
 
 use super::metric::{least_length, length, square};
 use super::partition::Partition;
@@ -13,39 +14,41 @@ use super::{Leg, NONE};
 use crate::drawing::{Drawing, PagePoint, Segment};
 use crate::stage::{OutOfScratch, Scratch};
 
-/// Marks, in the degree of a part's lowest point, that the part has an odd point.
+/// A flag in the degree of the lowest point of a part: the part has an odd point.
 const HAS_ODD: u16 = 1 << 15;
 
-/// Every point is a station if that makes at most so many chains of one...
+/// Every point becomes a station if the number of chains then grows at most by this factor, and if
+/// [`BYTES_A_STOP`] allows it.
 const MOST_STOPS: usize = 3;
-/// ...and if there are so many bytes for each: enough for all that comes after.
+/// Every point becomes a station only if this many bytes are available for each: enough for all
+/// later stages.
 const BYTES_A_STOP: usize = 64;
 
-/// Which of the points where two segments meet are stations.
+/// Selects which of the points where two segments meet become stations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Stops {
-    /// Those of parts that have no odd point.
+    /// Only those of parts that have no odd point.
     Few,
-    /// All.
+    /// All of them.
     All,
 }
 
-/// Stations and chains of one pen. A chain is numbered like a segment: a [`Leg`] over chains says
-/// which chain and which way.
+/// The stations and chains of one pen. A chain is numbered like a segment: a [`Leg`] of a chain
+/// holds the number of the chain and the direction in which it is drawn.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Network<'a> {
     points: &'a [PagePoint],
     segments: &'a [Segment],
-    /// The point of each station.
+    /// The number of the point at which each station lies.
     at: &'a [u16],
     /// The stations at which each chain begins and ends.
     ends: &'a [[u16; 2]],
-    /// The first and the last segment of each chain, both in its direction.
+    /// The first and the last segment of each chain, both as legs in the direction of the chain.
     outer: &'a [[Leg; 2]],
 }
 
 impl<'a> Network<'a> {
-    /// The network of the segments of `pen`.
+    /// Makes the network of the segments that `pen` draws.
     pub fn new(
         drawing: Drawing<'a>,
         pen: u8,
@@ -71,52 +74,52 @@ impl<'a> Network<'a> {
         Ok(Self { points: drawing.points, segments: drawing.segments, at, ends, outer })
     }
 
-    /// How many stations there are.
+    /// Returns the number of stations.
     pub fn stations(&self) -> u16 {
         self.at.len() as u16
     }
 
-    /// How many chains there are.
+    /// Returns the number of chains.
     pub fn chains(&self) -> u16 {
         self.ends.len() as u16
     }
 
-    /// Where a station lies.
+    /// Returns the page position of a station.
     pub fn place(&self, station: u16) -> PagePoint {
         self.points[usize::from(self.at[usize::from(station)])]
     }
 
-    /// The way from one station to another, in 1/256 steps.
+    /// Returns the distance between two stations in 1/256 steps.
     pub fn distance(&self, from: u16, to: u16) -> u32 {
         length(self.place(from), self.place(to))
     }
 
-    /// No more than that way, quickly, in 1/256 steps.
+    /// Returns a lower bound of that distance in 1/256 steps, without a square root.
     pub fn least_distance(&self, from: u16, to: u16) -> u32 {
         least_length(self.place(from), self.place(to))
     }
 
-    /// The square of the way from one station to another, in steps.
+    /// Returns the square of the distance between two stations, in square steps.
     pub fn square(&self, from: u16, to: u16) -> u64 {
         square(self.place(from), self.place(to))
     }
 
-    /// The stations that a chain joins.
+    /// Returns the stations at the start and at the end of a chain.
     pub fn ends(&self, chain: u16) -> [u16; 2] {
         self.ends[usize::from(chain)]
     }
 
-    /// The station at which the leg of a chain begins.
+    /// Returns the station at which the leg of a chain begins.
     pub fn start(&self, leg: Leg) -> u16 {
         self.ends[leg.segment()][usize::from(leg.reversed())]
     }
 
-    /// The station at which the leg of a chain ends.
+    /// Returns the station at which the leg of a chain ends.
     pub fn end(&self, leg: Leg) -> u16 {
         self.start(leg.flipped())
     }
 
-    /// For each station the lowest of its part.
+    /// Returns, for each station, the lowest station of its connected part.
     pub fn parts<'s>(&self, scratch: &mut Scratch<'s>) -> Result<&'s mut [u16], OutOfScratch> {
         let lowest = scratch.take(usize::from(self.stations()))?;
         let mut parts = Partition::singletons(lowest);
@@ -127,7 +130,7 @@ impl<'a> Network<'a> {
         Ok(lowest)
     }
 
-    /// Puts the segments of the chains of `route`, in turn, into `tour`.
+    /// Writes the segments of the chains of `route`, in this order, to `tour`.
     pub fn expand(
         &self,
         route: &[Leg],
@@ -159,33 +162,34 @@ impl<'a> Network<'a> {
     }
 }
 
-/// The segments of `pen` with their numbers.
+/// Returns the segments of `pen` with their numbers.
 pub(super) fn pen_segments(segments: &[Segment], pen: u8) -> impl Iterator<Item = (u16, &Segment)> {
     (0..=u16::MAX).zip(segments).filter(move |(_, segment)| segment.pen == pen)
 }
 
-/// The point at which the leg of a segment begins.
+/// Returns the point at which the leg of a segment begins.
 pub(super) fn start_point(segments: &[Segment], leg: Leg) -> u16 {
     let segment = &segments[leg.segment()];
     if leg.reversed() { segment.to } else { segment.from }
 }
 
-/// The leg that goes on where `leg` ends, at a point of two segments. `across` holds for each point
-/// the exclusive or of its segments, so that one of two gives the other.
+/// Returns the leg that begins where `leg` ends, at a point where exactly two segments meet.
+/// `across` holds, for each point, the exclusive or of the numbers of its segments, so that one of
+/// two segments gives the other.
 fn next_leg(segments: &[Segment], across: &[u16], leg: Leg) -> Leg {
     let point = start_point(segments, leg.flipped());
     let number = across[usize::from(point)] ^ leg.segment() as u16;
     Leg::new(number, segments[usize::from(number)].from != point)
 }
 
-/// What must be known of each point before the chains can be laid.
+/// The facts about each point that are needed to build the chains.
 struct Survey<'s, 'a> {
     segments: &'a [Segment],
     pen: u8,
     stops: Stops,
     degree: &'s mut [u16],
     across: &'s mut [u16],
-    /// The lowest point of the part of each point.
+    /// For each point, the lowest point of its connected part.
     part: &'s mut [u16],
 }
 

@@ -1,13 +1,13 @@
-//! The odd points, where the pen must be lifted, and how far they are from each other.
+//! The odd points, between which the pen must be lifted, and the distances between them.
 
 use super::metric::length;
 use super::network::Network;
 use crate::drawing::PagePoint;
 use core::ops::Range;
 
-/// The odd stations of a network, numbered from 0, and after them, for an open path, two *free
-/// ends*: each is no distance away from any odd point, so that whatever is paired with them begins
-/// and ends the path.
+/// The odd stations of a network, numbered from 0. For an open path two *free ends* follow them.
+/// Each free end is at distance 0 from every odd point, so that the stations paired with the free
+/// ends are the start and the end of the path.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct OddPoints<'a> {
     network: Network<'a>,
@@ -16,44 +16,45 @@ pub(super) struct OddPoints<'a> {
 }
 
 impl<'a> OddPoints<'a> {
-    /// `stations` are the odd ones of `network`, from the lowest x on.
+    /// Makes the odd points of `network` from its odd `stations`, which must be sorted by x. If
+    /// `open`, free ends are added.
     pub fn new(network: Network<'a>, stations: &'a [u16], open: bool) -> Self {
         let free_ends = open && !stations.is_empty();
         Self { network, stations, free_ends }
     }
 
-    /// How many odd stations there are.
+    /// Returns the number of odd stations, without the free ends.
     pub fn real_count(&self) -> u16 {
         self.stations.len() as u16
     }
 
-    /// How many there are with the free ends.
+    /// Returns the number of odd stations and free ends.
     pub fn count(&self) -> u16 {
         self.real_count() + 2 * u16::from(self.free_ends)
     }
 
-    /// Whether two free ends are among them.
+    /// Whether there are two free ends.
     pub fn has_free_ends(&self) -> bool {
         self.free_ends
     }
 
-    /// The numbers that the two free ends have if there are any.
+    /// Returns the numbers that the two free ends have if there are any.
     pub fn free_ends(&self) -> [u16; 2] {
         [self.real_count(), self.real_count() + 1]
     }
 
-    /// The same as a range, empty if there are none.
+    /// Returns the numbers of the free ends as a range, which is empty if there are none.
     pub fn free_numbers(&self) -> Range<u16> {
         self.real_count()..self.count()
     }
 
-    /// The station of an odd point, none for a free end.
+    /// Returns the station of an odd point, or `None` for a free end.
     pub fn station(&self, odd: u16) -> Option<u16> {
         self.stations.get(usize::from(odd)).copied()
     }
 
-    /// The length of the move between two odd points in 1/256 steps. The two free ends may not be
-    /// paired with each other.
+    /// Returns the length of the move between two odd points in 1/256 steps. It is very large
+    /// between the two free ends, which may not be paired with each other.
     pub fn distance(&self, a: u16, b: u16) -> u32 {
         match (self.station(a), self.station(b)) {
             (Some(a), Some(b)) => self.network.distance(a, b),
@@ -62,7 +63,8 @@ impl<'a> OddPoints<'a> {
         }
     }
 
-    /// No less than this is the length of the move between two odd points, in 1/256 steps; quick.
+    /// Returns a lower bound of the length of the move between two odd points in 1/256 steps,
+    /// without a square root.
     pub fn least_distance(&self, a: u16, b: u16) -> u32 {
         match (self.station(a), self.station(b)) {
             (Some(a), Some(b)) => self.network.least_distance(a, b),
@@ -70,14 +72,15 @@ impl<'a> OddPoints<'a> {
         }
     }
 
-    /// How far apart two odd points are along x, in 1/256 steps; 0 for a free end.
+    /// Returns the distance between two odd points along x in 1/256 steps; 0 for a free end.
     pub fn distance_along_x(&self, a: u16, b: u16) -> u32 {
         let x = |odd| self.station(odd).map(|station| self.network.place(station).x);
         x(a).zip(x(b)).map_or(0, |(a, b)| a.abs_diff(b) << 8)
     }
 
-    /// The odd stations whose x is at most `reach` 1/256 steps from that of `odd`: no other is nearer than
-    /// that. All of them, for a free end.
+    /// Returns a range that holds all odd stations whose x is at most `reach` 1/256 steps from that
+    /// of `odd`; all other stations are farther from it than `reach`. For a free end it holds all
+    /// of them.
     pub fn around(&self, odd: u16, reach: u32) -> Range<u16> {
         let x_of = |station: &u16| self.network.place(*station).x;
         let Some(x) = self.stations.get(usize::from(odd)).map(x_of) else {
@@ -89,7 +92,8 @@ impl<'a> OddPoints<'a> {
         begin as u16..end as u16
     }
 
-    /// No move is longer than this, in 1/256 steps.
+    /// Returns an upper bound of the length of any move in 1/256 steps: the diagonal of the box
+    /// around the stations.
     pub fn extent(&self) -> u32 {
         let places = || self.stations.iter().map(|&station| self.network.place(station));
         let corner =

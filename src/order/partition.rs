@@ -1,16 +1,17 @@
-//! Disjoint sets: which points, or which stations, hang together.
+//! Disjoint sets (union-find), which tell which points or stations are connected.
 
-/// A partition of `0..len` into sets, each known by one of its members.
+/// A partition of `0..len` into sets, each identified by its lowest member.
 ///
-/// A parent never has a higher number than its child, so the result does not depend on the order
-/// of the unions within a set: its representative is its lowest member.
+/// A parent never has a higher number than its child, so the representative does not depend on the
+/// order of the unions.
 #[derive(Debug)]
 pub(super) struct Partition<'a> {
     parent: &'a mut [u16],
 }
 
 impl<'a> Partition<'a> {
-    /// Every member in a set of its own; `parent` gives the memory.
+    /// Puts every member into a set of its own. `parent` is the memory, with one entry for each
+    /// member.
     pub fn singletons(parent: &'a mut [u16]) -> Self {
         for (member, parent) in (0..=u16::MAX).zip(parent.iter_mut()) {
             *parent = member;
@@ -18,7 +19,7 @@ impl<'a> Partition<'a> {
         Self { parent }
     }
 
-    /// The lowest member of the set that holds `member`.
+    /// Returns the lowest member of the set that holds `member`.
     pub fn find(&mut self, member: u16) -> u16 {
         let mut member = member;
         loop {
@@ -33,16 +34,16 @@ impl<'a> Partition<'a> {
         }
     }
 
-    /// Lets every member's parent be the lowest of its set.
+    /// Makes the lowest member of each set the parent of all its members.
     pub fn flatten(&mut self) {
-        // Parents are lower, so each has been flattened before its children.
+        // Parents have lower numbers, so each parent is flattened before its children.
         for member in 0..self.parent.len() {
             let parent = self.parent[member];
             self.parent[member] = self.parent[usize::from(parent)];
         }
     }
 
-    /// Makes one set of those of `a` and `b`; says whether they were two.
+    /// Unites the sets of `a` and `b`. Returns whether they were different sets.
     pub fn unite(&mut self, a: u16, b: u16) -> bool {
         let (a, b) = (self.find(a), self.find(b));
         self.parent[usize::from(a.max(b))] = a.min(b);

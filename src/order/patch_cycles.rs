@@ -1,9 +1,9 @@
-//! Pen-up moves changed so that they join the parts.
+//! Changes pen-up moves so that they join the parts of the tour.
 //!
-//! The shortest moves often leave the tour in many cycles. Two moves of different parts that give
-//! up their ends for each other's make one part of two; those that lengthen least go first, nearly:
-//! the allowance doubles from round to round (after Karp, "A patching algorithm for the
-//! nonsymmetric traveling-salesman problem", 1979).
+//! The shortest moves often leave the tour in many cycles. If two moves of different parts exchange
+//! their ends, the two parts become one. The exchanges that add the least length should come first;
+//! this is approximated by an allowance that doubles from round to round (after Karp, "A patching
+//! algorithm for the nonsymmetric traveling-salesman problem", 1979).
 
 use super::neighbours::Neighbours;
 use super::network::Network;
@@ -12,10 +12,11 @@ use super::work_budget::WorkBudget;
 use super::{EVEN_PART, NONE, OrderError};
 use crate::stage::Scratch;
 
-/// The first allowance: 8 steps.
+/// The length that an exchange may add in the first round, in 1/256 steps: 8 steps.
 const FIRST_ALLOWANCE: i64 = 8 << 8;
 
-/// Changes the moves `mate` between odd stations until no two of `near` can join two parts.
+/// Changes the moves `mate` between odd stations until no exchange between two neighbours in `near`
+/// can join two more parts.
 pub(super) fn patch_cycles(
     network: Network<'_>,
     near: Neighbours<'_>,

@@ -1,30 +1,32 @@
-//! A computation that answers the line as it goes, and knows when to end.
+//! Counts the work of a long computation, so that it answers the serial line regularly and ends
+//! when its budget is used up.
 
 use crate::stage::{Aborted, Cancel, heap_sort_cancellable};
 
-/// Counts work and calls [`Cancel::check`] in time.
+/// Counts units of work, and calls [`Cancel::check`] at regular intervals.
 pub(super) struct WorkBudget<'a> {
     cancel: &'a mut dyn Cancel,
-    /// Units since the last answer.
+    /// Units of work since the last call of [`Cancel::check`].
     done: u32,
-    /// Units left at the last answer.
+    /// Units of the budget that were left at that call.
     budget: u64,
 }
 
 impl<'a> WorkBudget<'a> {
-    /// Distances between two answers: each takes up to 500 instructions on the smallest core.
+    /// Units of work between two calls of [`Cancel::check`]. A unit is the computation of one
+    /// distance, up to 500 instructions on the smallest core.
     const UNITS: u32 = 256;
 
     pub fn new(cancel: &'a mut dyn Cancel) -> Self {
         Self { cancel, done: 0, budget: 0 }
     }
 
-    /// Answers now: between two passes over the whole drawing.
+    /// Calls [`Cancel::check`] now. Used between two passes over the whole drawing.
     pub fn answer(&mut self) -> Result<(), Aborted> {
         self.work(Self::UNITS)
     }
 
-    /// Notes `units` of work, each as much as a distance costs.
+    /// Counts `units` of work, each as much as the computation of one distance.
     pub fn work(&mut self, units: u32) -> Result<(), Aborted> {
         self.done += units;
         if self.done >= Self::UNITS {
@@ -35,7 +37,7 @@ impl<'a> WorkBudget<'a> {
         Ok(())
     }
 
-    /// Sorts by a key, answering as it goes.
+    /// Sorts `items` by a key, and calls [`Cancel::check`] meanwhile.
     pub fn sort<T, K: Ord>(
         &mut self,
         items: &mut [T],
@@ -44,7 +46,7 @@ impl<'a> WorkBudget<'a> {
         heap_sort_cancellable(items, key, self.cancel)
     }
 
-    /// Sets how many units may be worked from now until it [is over](Self::is_over).
+    /// Sets how many units of work may be done from now until the budget [is over](Self::is_over).
     pub fn grant(&mut self, units: u64) {
         self.budget = units.saturating_add(self.done.into());
     }
