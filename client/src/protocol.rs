@@ -1,73 +1,75 @@
-//! The words of the line: what is sent to a plotter and what may come back.
+//! The vocabulary of the serial protocol: the commands for a plotter and the replies that it may
+//! send.
 //!
-//! Everything that the client knows by name of the plotter's language stands here.
-//! `docs/protocol.md` describes the language itself.
+//! All names of commands and settings that the client uses are defined here. `docs/protocol.md`
+//! describes the protocol itself.
 
 use penup::checksum::CRC_16;
 use penup::protocol::MEANINGS;
 use std::fmt::Write as _;
 
-/// Forget the model.
+/// Deletes the model.
 pub const CLEAR: &str = "$clear";
-/// Tell how large the model is, the checksums of the model and of the options, and what came of the
-/// last job.
+/// Queries the size of the model, the checksums of the model and of the options, and the report on
+/// the last job.
 pub const MODEL: &str = "$model";
-/// Draw the model with the present settings.
+/// Draws the model with the current settings.
 pub const PLOT: &str = "$plot";
 
-/// Let the plotter choose the camera. Later camera settings replace its choice one by one.
+/// Lets the plotter choose the camera. Later camera settings override its choice one by one.
 pub const VIEW_AUTO: &str = "$view=auto";
-/// The point that the eye is at.
+/// The position of the eye.
 pub const EYE: &str = "$eye";
 /// The point that the eye looks at.
 pub const AT: &str = "$at";
 /// The direction that is up in the picture.
 pub const UP: &str = "$up";
-/// Harrison's rotation.
+/// The rotation angles of Harrison's program.
 pub const ANGLES: &str = "$angles";
-/// What becomes of what is behind the eye.
+/// What to do with parts of the model that are behind the eye.
 pub const BEHIND: &str = "$behind";
-/// Whether faces that pass through each other show where.
+/// Whether the intersection lines of faces that pass through each other are drawn.
 pub const SEAMS: &str = "$seams";
-/// Whether blocks that touch are one shape.
+/// Whether blocks that touch are drawn as one shape.
 pub const BLOCKS: &str = "$blocks";
-/// Edges that bend less are left out.
+/// The crease angle in degrees: an edge between two faces that bend less is not drawn.
 pub const CREASE: &str = "$crease";
-/// How far coordinates may be off.
+/// The error bound of the coordinates of the model.
 pub const PRECISION: &str = "$precision";
-/// Perspective or another.
+/// The kind of projection.
 pub const PROJECTION: &str = "$projection";
-/// How it is found out what is seen.
+/// The method of determining visibility.
 pub const SEE: &str = "$see";
-/// How the moves between strokes are chosen.
+/// The method of ordering the strokes.
 pub const ORDER: &str = "$order";
-/// Whether the pen returns to where it began.
+/// Whether the pen returns to its starting point at the end.
 pub const CYCLE: &str = "$cycle";
-/// Work to improve the order.
+/// The amount of work to spend on improving the order.
 pub const EFFORT: &str = "$effort";
-/// What a lift is worth, in millimetres.
+/// The extra pen-up travel, in millimetres, that is accepted to save one pen lift.
 pub const LIFT: &str = "$lift";
-/// What is done with hidden lines.
+/// How hidden lines are drawn.
 pub const HIDDEN: &str = "$hidden";
-/// Width x height of the page in millimetres.
+/// The width and the height of the page, in millimetres.
 pub const PAGE: &str = "$page";
-/// What stays free on each side, in millimetres.
+/// The margin on each side of the page, in millimetres.
 pub const MARGIN: &str = "$margin";
-/// Whether the file chooses pens.
+/// Whether the file chooses the pens, or one pen draws everything.
 pub const PENS: &str = "$pens";
-/// What stands below the drawing.
+/// The title below the drawing.
 pub const TITLE: &str = "$title";
-/// Height of its capitals, in millimetres.
+/// The height of the title's capital letters, in millimetres.
 pub const TITLE_SIZE: &str = "$title-size";
-/// `on`: scale to the page; `off`: scale solids only and leave plans at true size.
+/// `on` scales plans and solids to the page; `off` scales solids only and draws plans at true size.
 pub const FIT: &str = "$fit";
 
-/// With a number: sets the number of the last line. Without: asks for it.
+/// With a line number of its own, sets the number of the last line to that; without one, queries
+/// the number of the last accepted line.
 pub const LAST_NUMBER: &str = "M110";
-/// Ends the obligation to send numbers and checksums.
+/// Ends the conversation with numbers and checksums, after which plain lines are accepted again.
 pub const END: &str = "M2";
 
-/// A line with its number and its checksum, without the line end.
+/// Formats a line with its number, if it has one, and its checksum, without the line end.
 ///
 /// ```
 /// use penup_client::protocol::numbered;
@@ -82,28 +84,30 @@ pub fn numbered(number: Option<i32>, text: &str) -> String {
     format!("{head}*{:04X}", CRC_16.checksum(head.as_bytes()))
 }
 
-/// Asks for a status report; answered at once, between two lines.
+/// Queries a status report. The plotter answers at once, even between two lines.
 pub const STATUS_QUERY: u8 = b'?';
-/// Go on.
+/// Resumes after a feed hold.
 pub const RESUME: u8 = b'~';
-/// Give up whatever is going on, pen up, answer with the greeting.
+/// Aborts whatever is going on, raises the pen and makes the plotter answer with its greeting.
 pub const ABORT: u8 = 0x18;
 
-/// Bytes that the plotter may be sent before it has answered for them: a little less than its
-/// receive queue of 256 holds, so that a status query always fits.
+/// The maximum number of bytes that may be sent before the plotter has answered them. It is a
+/// little less than the 256 bytes of its receive queue, so that a status query always fits.
 pub const RECEIVE_WINDOW: usize = 240;
 
-/// Whether `letter` acts at once wherever it stands, or ends a line, so that no line may hold it.
+/// Whether `letter` is a real-time command, which acts wherever it occurs, or ends a line. No line
+/// may contain such a letter.
 pub fn acts_at_once(letter: char) -> bool {
     matches!(letter, '?' | '!' | '~') || letter.is_ascii_control() && letter != '\t'
 }
 
-/// Whether the greeting, Grbl's with the firmware's own name in brackets, is that of a penup.
+/// Whether a greeting comes from penup firmware: it is Grbl's greeting with the firmware's own name
+/// in brackets.
 pub fn is_penup(greeting: &str) -> bool {
     greeting.starts_with("Grbl ") && greeting.contains("[penup ")
 }
 
-/// What `error:number` means.
+/// The meaning of `error:number`.
 ///
 /// ```
 /// use penup_client::protocol::meaning;
@@ -114,67 +118,67 @@ pub fn meaning(number: u16) -> &'static str {
     known.map_or("a reason that this client does not know", |(_, text)| text)
 }
 
-/// One line from the plotter.
+/// A line that the plotter sent.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Reply {
-    /// The line with this number was carried out, and so were all before it that are not named as
-    /// refused.
+    /// The line with this number was executed, and so were all earlier lines that are not reported
+    /// as refused.
     Done(i32),
-    /// The line with this number was refused with this error.
+    /// The line with this number was refused with this error number.
     Refused(i32, u16),
-    /// This line is expected; the one that is answered was not accepted.
+    /// The plotter expects the line with this number; the line that it answers was not accepted.
     Resend(i32),
-    /// The last line that was accepted.
+    /// The number of the last line that was accepted.
     Last(i32),
-    /// The checksums of the model and of the options.
+    /// The checksums of the model and of the options that the plotter holds.
     Contents([u32; 2]),
-    /// A line without a number was carried out.
+    /// A line without a number was executed.
     Ok,
-    /// A line without a number was refused.
+    /// A line without a number was refused with this error number.
     Error(u16),
-    /// The machine stopped by itself.
+    /// The machine stopped with this alarm number.
     Alarm(u16),
-    /// It has started, or started again.
+    /// The greeting, which the plotter sends when it starts and after an abort.
     Greeting(String),
-    /// Answer to a status query.
+    /// The answer to a status query.
     Status(Status),
-    /// `[MSG:text]`, for people.
+    /// The text of `[MSG:text]`, a message for the user.
     Message(String),
-    /// Anything else.
+    /// Any other line.
     Other(String),
 }
 
-/// `<State|Key:value|...>`
+/// A status report, `<State|Key:value|...>`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Status {
-    /// Idle, Run, Hold, Alarm and so on.
+    /// The state without its sub-state: Idle, Run, Hold, Alarm and so on.
     pub state: String,
-    /// `Strokes:done/all`, while a drawing is drawn.
+    /// The numbers of `Strokes:done/all`, which is reported during a drawing.
     pub strokes: Option<(u64, u64)>,
-    /// Whether it computes a picture, and so reads no line.
+    /// Whether the plotter is computing a picture, during which it reads no lines.
     pub is_computing: bool,
-    /// `Alarm:number`, after an alarm.
+    /// The number of `Alarm:number`, which is reported after an alarm.
     pub alarm: Option<u16>,
-    /// `Pen:number`, if it stands and waits for that pen.
+    /// The number of `Pen:number`, if the machine has stopped and waits for that pen.
     pub pen_wanted: Option<u8>,
-    /// Where it is, in its own words.
+    /// The machine position as the plotter wrote it.
     pub position: String,
 }
 
 impl Status {
-    /// Whether the machine holds, or slows down to do so.
+    /// Whether the machine is in feed hold or decelerates for one.
     pub fn is_holding(&self) -> bool {
         self.state == "Hold"
     }
 
-    /// Whether the plotter waits for work.
+    /// Whether the plotter is ready for a job.
     pub fn is_idle(&self) -> bool {
         matches!(self.state.as_str(), "Idle" | "Sleep" | "Check")
     }
 }
 
 impl Reply {
-    /// Reads a line without its line end.
+    /// Parses a line without its line end.
     ///
     /// ```
     /// use penup_client::protocol::Reply;
@@ -210,7 +214,7 @@ impl Reply {
     }
 }
 
-/// A reply with a checksum, if it is whole.
+/// Parses a reply that carries a checksum; `None` if it has none or was corrupted.
 fn parse_checked(line: &str) -> Option<Reply> {
     let (head, sum) = line.rsplit_once('*')?;
     if sum.len() != 4 || u16::from_str_radix(sum, 16) != Ok(CRC_16.checksum(head.as_bytes())) {
@@ -225,20 +229,20 @@ fn parse_checked(line: &str) -> Option<Reply> {
     })
 }
 
-/// `12345678, options 12345678`
+/// Parses two checksums of the form `12345678, options 12345678`.
 fn parse_contents(text: &str) -> Option<[u32; 2]> {
     let (model, options) = text.split_once(", options ")?;
     let sum = |text: &str| (text.len() == 8).then(|| u32::from_str_radix(text, 16).ok())?;
     Some([sum(model)?, sum(options)?])
 }
 
-/// The states that a machine can be in, of Grbl's those that penup has.
+/// The machine states: those of Grbl that penup uses.
 const STATES: &[&str] = &["Idle", "Run", "Hold", "Jog", "Home", "Alarm", "Check", "Sleep", "Door"];
 
-/// A status report; `None` if it was damaged on the line.
+/// Parses a status report; `None` if it was corrupted on the line.
 fn parse_status(report: &str) -> Option<Status> {
     let mut fields = report.split('|');
-    // Grbl says Hold:0, Door:1.
+    // Grbl reports states with sub-states, such as `Hold:0` and `Door:1`.
     let full_state = fields.next().unwrap_or_default();
     let state = full_state.split(':').next().filter(|state| STATES.contains(state))?.to_owned();
     let field = |name: &str| fields.clone().find_map(|field| field.strip_prefix(name));
@@ -255,7 +259,7 @@ fn parse_status(report: &str) -> Option<Status> {
     })
 }
 
-/// Bytes to replies. Lines that are longer than any reply are cut.
+/// Assembles received bytes into replies. Lines that are longer than any reply are truncated.
 #[derive(Debug, Default)]
 pub struct ReplyReader {
     partial: Vec<u8>,
@@ -264,7 +268,7 @@ pub struct ReplyReader {
 impl ReplyReader {
     const LONGEST: usize = 512;
 
-    /// Takes one byte; gives a reply if it ended a line that was not empty.
+    /// Processes one byte; returns a reply if the byte ended a line that is not empty.
     pub fn push(&mut self, byte: u8) -> Option<Reply> {
         if byte != b'\n' && byte != b'\r' {
             if self.partial.len() < Self::LONGEST {
@@ -279,7 +283,7 @@ impl ReplyReader {
     }
 }
 
-/// `name=a,b,c` with plain decimals: the plotter reads no exponents.
+/// Formats a setting as `name=a,b,c` with plain decimals, because the plotter reads no exponents.
 ///
 /// ```
 /// let line = penup_client::protocol::setting("$eye", &[-3.0, 1e-3, 2.5], ',');

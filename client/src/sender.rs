@@ -1,16 +1,17 @@
-//! Sends lines to a plotter and follows what it does with them.
+//! Sends the lines of a job to a plotter and processes the replies.
 //!
-//! Every line has a number and a checksum (see `docs/protocol.md`), and replies are counted by
-//! number, so that bytes that are lost or damaged, there or back, never become another drawing.
-//! [`Sender::open`] makes sure that a penup answers and is idle. [`Sender::stream`] keeps the
-//! plotter's receive queue filled but never over-filled, sends again what did not arrive, and
-//! compares the checksums of the model and of the options with what was sent. [`Sender::plot`]
-//! draws, changes pens and waits for the end. What cannot be mended ends with an error that says
-//! what happened.
+//! Every line carries a number and a checksum (see `docs/protocol.md`), and replies are matched by
+//! number. Bytes that are lost or corrupted in either direction therefore never lead to a different
+//! drawing. [`Sender::open`] makes sure that penup firmware answers and is idle. [`Sender::stream`]
+//! keeps the plotter's receive queue filled without overflowing it, resends lines that did not
+//! arrive, and compares the checksums of the model and of the options with what was sent.
+//! [`Sender::plot`] starts the drawing, handles changes of pens and waits for the end. A failure
+//! that cannot be repaired ends with an error that says what happened.
 //!
-//! When a line is refused as damaged or out of order, or when replies stop, the sender asks for
-//! the number of the last line that was accepted. The answer also says that everything sent
-//! before it has been read, so the queue is empty then. Sending goes on from that number.
+//! When a line is refused as corrupted or out of order, or when replies stop, the sender asks for
+//! the number of the last accepted line. The answer also proves that the plotter has read
+//! everything that was sent before the question, so its queue is empty. Sending resumes after that
+//! number.
 
 use crate::error::Error;
 use crate::job::JobReport;
@@ -26,20 +27,21 @@ use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// How long to wait for what.
+/// The timeouts of a sender.
 #[derive(Debug, Clone, Copy)]
 pub struct Patience {
-    /// For any byte at all while it should answer.
+    /// The longest time without any byte from the plotter while it should answer.
     pub silence: Duration,
-    /// For any progress while the plotter is alive.
+    /// The longest time without progress while the plotter still answers status queries.
     pub lost: Duration,
-    /// For the greeting after an abort.
+    /// The total time to wait for the greeting after an abort, retries included.
     pub greeting: Duration,
-    /// For the reply to a line, before the number of the last line is asked for.
+    /// The time to wait for the reply to a line before the sender asks for the number of the last
+    /// accepted line.
     pub reply: Duration,
-    /// Between two status queries.
+    /// The time between two status queries.
     pub query: Duration,
-    /// For somebody to let a machine go on that holds, if the user cannot be asked.
+    /// The time for which a machine may stay in feed hold if the user cannot be asked.
     pub hold: Duration,
 }
 
@@ -56,23 +58,26 @@ impl Default for Patience {
     }
 }
 
-/// So often the same line is sent again before the sender gives up. A line of 256 bytes of which
-/// one in a hundred is damaged arrives once in 13 times.
+/// The maximum number of resends of the same line. If one byte in a hundred is corrupted, a line of
+/// 256 bytes arrives intact once in 13 attempts.
 const MOST_RESENDS: u32 = 200;
 
-/// So often a job is begun again because the plotter was told to give it up.
+/// The maximum number of times that a job is started again because the plotter was told to abort
+/// it.
 const MOST_RESTARTS: u32 = 5;
 
-/// So often the checksums are asked for while they do not arrive, or are others.
+/// The maximum number of queries for the checksums while no answer to them arrives.
 const MOST_QUESTIONS: u32 = 30;
 
-/// So many answers must say that the plotter holds something else than was sent.
+/// The number of differing answers after which the sender reports that the plotter holds something
+/// else than was sent.
 const SURE_OF_OTHER_CONTENTS: u32 = 3;
 
-/// So often the report of a job is asked for while it does not arrive.
+/// The maximum number of queries for the report of a job while it does not arrive.
 const SURE_OF_NO_REPORT: u32 = 3;
 
-/// How often in a row the plotter said the same of itself.
+/// Counts how often in a row the plotter reported the same state of waiting, to decide whether the
+/// machine has come to rest.
 #[derive(Debug, Default)]
 struct Standing {
     at: Option<(Option<u8>, String)>,
@@ -80,10 +85,12 @@ struct Standing {
 }
 
 impl Standing {
-    /// The first reports may come before the last moves are done; later ones do not.
+    /// The number of equal reports that prove a standstill. The first reports may come before the
+    /// last moves are done; later ones do not.
     const SURE: u32 = 3;
 
-    /// Whether the machine surely stands and waits; for which pen, if it waits for one.
+    /// Processes a status report. Returns `Some` if the machine has certainly stopped and waits;
+    /// the inner value is the pen that it waits for, if any.
     fn holds(&mut self, status: &Status) -> Option<Option<u8>> {
         let at = status.is_holding().then(|| (status.pen_wanted, status.position.clone()));
         self.times = if at == self.at { self.times + 1 } else { 1 };
@@ -92,7 +99,7 @@ impl Standing {
     }
 }
 
-/// A plotter that answered and was idle.
+/// A conversation with a plotter that answered and was idle when it began.
 pub struct Sender<'a> {
     link: &'a mut dyn Link,
     patience: Patience,
@@ -101,33 +108,34 @@ pub struct Sender<'a> {
     replies: VecDeque<Reply>,
     last_heard: Instant,
     last_query: Instant,
-    /// The number of the last line that is known to be accepted.
+    /// The number of the last line that is known to have been accepted.
     done: i32,
-    /// What it said for people since its last answer.
+    /// The messages for the user that the plotter sent since its last accepted line.
     messages: Vec<String>,
-    /// The strokes of the job that it draws.
+    /// The total number of strokes of the current drawing.
     strokes: u64,
-    /// Where the idle machine stood, in its own words.
+    /// The position that the machine reported when it was last idle, as text.
     position: String,
-    /// The checksums of the model and of the options that it was sent.
+    /// The checksums of the model and of the options, once the plotter has confirmed them.
     contents: Option<[u32; 2]>,
 }
 
-/// The line at which something goes wrong, made when it does.
+/// Computes the line to cite in an error; it is called only if there is an error.
 type AtLine<'l> = &'l dyn Fn() -> Option<JobLine>;
 
-/// Lines on their way to the plotter.
+/// The state of sending a sequence of lines.
 struct Delivery<'l> {
     lines: &'l dyn Lines,
-    /// The number before that of the first line.
+    /// The number of the line before the first one.
     base: i32,
     /// The number of the last line that was sent.
     sent: i32,
-    /// The bytes of each line that is not yet answered, the oldest first.
+    /// The number and the size in bytes of each line that is not yet answered, the oldest first.
     in_queue: VecDeque<(i32, usize)>,
-    /// When the number of the last line was asked for, while no line is sent.
+    /// When the number of the last accepted line was asked for. While this is `Some`, no line is
+    /// sent.
     asked: Option<Instant>,
-    /// When a line was sent, or one was answered, or the last number came.
+    /// When a line was last sent or answered, or the number of the last accepted line arrived.
     last_event: Instant,
     last_progress: Instant,
     resends: u32,
@@ -143,18 +151,20 @@ impl Delivery<'_> {
     }
 }
 
-/// The line with this number, if the first of `lines` has the one after `base`.
+/// The line with number `number`, where the first of `lines` has number `base + 1`.
 fn line_of(lines: &dyn Lines, base: i32, number: i32) -> Option<JobLine> {
     lines.line(usize::try_from(number - base - 1).ok()?)
 }
 
 impl<'a> Sender<'a> {
-    /// Waits until a penup answers, idle, with nothing of an older conversation left.
+    /// Waits until an idle plotter with penup firmware answers, and discards what is left of an
+    /// earlier conversation.
     ///
-    /// `interrupt` set at any time later ends the job with the pen up and [`Error::Interrupted`].
+    /// If `interrupt` is set at any later time, the job stops with the pen up and
+    /// [`Error::Interrupted`].
     ///
     /// # Errors
-    /// Nobody answers, something else answers, or it is busy.
+    /// Nothing answers, something other than penup answers, or the plotter is busy.
     pub fn open(
         link: &'a mut dyn Link,
         patience: Patience,
@@ -180,7 +190,8 @@ impl<'a> Sender<'a> {
             return Err(Error::NotReady { state: state.state });
         }
         sender.position = state.position;
-        // It is idle, so an abort loses nothing; it clears what an older sender left half sent.
+        // The plotter is idle, so an abort loses nothing. It clears what an earlier sender left
+        // half sent.
         let greeting = sender.abort()?;
         sender.begin_numbers(greeting)?;
         Ok(sender)
@@ -202,19 +213,20 @@ impl<'a> Sender<'a> {
             }
         }
         match heard {
-            // Bytes without a line end come from a wrong speed or another device, too.
+            // A wrong baud rate or another device also produces bytes without a line end.
             None if self.last_heard <= start => Err(self.silent(&|| None)),
             heard => Err(Error::NotPenup { heard: heard.unwrap_or_default() }),
         }
     }
 
-    /// Makes line 1 the next one. What is heard until then belongs to an older conversation.
+    /// Sets the plotter's line counter so that the next line is number 1. Any other reply until
+    /// then belongs to an earlier conversation.
     fn begin_numbers(&mut self, mut greeting: Option<String>) -> Result<(), Error> {
         let start = self.link.now();
         self.last_heard = start;
         let (mut refused, mut knows_numbers) = (0, false);
         while self.since(start) < self.patience.lost {
-            // The first line end ends what is left of a damaged line.
+            // The first line end terminates what is left of a corrupted line.
             self.send(&format!("\n{}\n", numbered(Some(0), LAST_NUMBER)))?;
             let asked = self.link.now();
             while self.since(asked) < self.patience.reply {
@@ -253,12 +265,12 @@ impl<'a> Sender<'a> {
         }
     }
 
-    /// Sends `lines`, which begin by forgetting what the plotter held and hold every option, and
-    /// makes sure that it holds what they say.
+    /// Sends `lines` and checks that the plotter then holds what they describe. The lines must
+    /// begin by clearing the model and must set every option.
     ///
     /// # Errors
-    /// The first line that is refused or not answered, or [`Error::OtherContents`]; later lines
-    /// may have been taken.
+    /// Fails at the first line that is refused or not answered, or with [`Error::OtherContents`] if
+    /// the plotter holds something else. Later lines may have been accepted.
     pub fn stream(&mut self, lines: &dyn Lines, progress: &mut dyn Progress) -> Result<(), Error> {
         let expected = twin::contents(lines, lines.count());
         let mut restarts = 0;
@@ -274,8 +286,9 @@ impl<'a> Sender<'a> {
         }
     }
 
-    /// After a greeting in the middle of a job: if the plotter was told to give the job up, it
-    /// still holds what it was sent, it has not moved, and the job can begin again.
+    /// Prepares to send the job again after a greeting in the middle of it. This is possible if the
+    /// plotter was only told to abort: it still holds what it was sent and has not moved. Otherwise
+    /// it fails with [`Error::Restarted`].
     fn begin_again(&mut self, lines: &dyn Lines) -> Result<(), Error> {
         let taken = usize::try_from(self.done).unwrap_or(0);
         self.begin_numbers(None)?;
@@ -283,7 +296,7 @@ impl<'a> Sender<'a> {
         if !status.is_idle() || status.position != self.position {
             return Err(Error::Restarted);
         }
-        // A plotter that lost its power has lost its place and its settings, too.
+        // A plotter that lost its power has also lost its position and its settings.
         let was_there = twin::contents(lines, taken);
         let empty = twin::contents(lines, 0);
         let is_empty = |contents: Option<[u32; 2]>| {
@@ -295,7 +308,7 @@ impl<'a> Sender<'a> {
         Ok(())
     }
 
-    /// Makes sure that the plotter holds what it should.
+    /// Checks that the plotter's checksums are `expected`.
     fn compare(&mut self, expected: Option<[u32; 2]>) -> Result<(), Error> {
         for _ in 0..SURE_OF_OTHER_CONTENTS {
             if Some(self.contents()?) == expected {
@@ -306,7 +319,7 @@ impl<'a> Sender<'a> {
         Err(Error::OtherContents)
     }
 
-    /// The checksums of the model and of the options that the plotter holds.
+    /// Queries the checksums of the model and of the options that the plotter holds.
     fn contents(&mut self) -> Result<[u32; 2], Error> {
         for _ in 0..MOST_QUESTIONS {
             let mut contents = None;
@@ -326,12 +339,12 @@ impl<'a> Sender<'a> {
         self.deliver_watching(lines, progress, &mut |_| {})
     }
 
-    /// Sends `lines` under the next numbers until each is accepted, and shows every reply to
+    /// Sends `lines` with the next line numbers until each is accepted, and passes every reply to
     /// `watch`.
     ///
     /// # Errors
-    /// The first line that is refused; [`Error::Restarted`] if the plotter has forgotten the
-    /// numbers.
+    /// Fails at the first line that is refused, and with [`Error::Restarted`] if the plotter has
+    /// lost its line counter.
     fn deliver_watching(
         &mut self,
         lines: &dyn Lines,
@@ -350,7 +363,8 @@ impl<'a> Sender<'a> {
             last_progress: now,
             resends: 0,
         };
-        // No plotter holds what comes of so many lines.
+        // The number of lines cannot overflow in practice: no plotter can hold the model of so many
+        // lines.
         let end = delivery.base.saturating_add(i32::try_from(lines.count()).unwrap_or(i32::MAX));
         while self.done < end {
             self.fill_queue(&mut delivery)?;
@@ -371,7 +385,7 @@ impl<'a> Sender<'a> {
                         return Err(Error::Restarted);
                     }
                     if delivery.asked.take().is_some() {
-                        // Everything sent has been read.
+                        // The plotter has read everything that was sent.
                         delivery.in_queue.clear();
                         delivery.sent = number;
                         delivery.last_event = self.link.now();
@@ -406,7 +420,7 @@ impl<'a> Sender<'a> {
         self.confirm(lines, delivery.base)
     }
 
-    /// Sends what has room in the plotter's receive queue.
+    /// Sends as many lines as fit into the plotter's receive queue.
     fn fill_queue(&mut self, delivery: &mut Delivery<'_>) -> Result<(), Error> {
         while delivery.asked.is_none()
             && let Some(line) = delivery.line(delivery.sent + 1)
@@ -414,13 +428,15 @@ impl<'a> Sender<'a> {
             let text = numbered(Some(delivery.sent + 1), &line.sent);
             let cost = text.len() + 1;
             let waiting: usize = delivery.in_queue.iter().map(|(_, cost)| cost).sum();
-            // A line longer than the queue goes alone; the plotter reads it as it comes.
+            // A line that is longer than the queue is sent alone; the plotter reads it while it
+            // arrives.
             if waiting > 0 && waiting + cost > RECEIVE_WINDOW {
                 break;
             }
             let before = self.link.now();
             self.send(&format!("{text}\n"))?;
-            // A plotter in memory may work for minutes until it has taken the bytes.
+            // Sending to a plotter in memory may take minutes, because it processes the bytes at
+            // once.
             delivery.last_progress += self.since(before);
             delivery.last_event = self.link.now();
             delivery.sent += 1;
@@ -441,7 +457,7 @@ impl<'a> Sender<'a> {
         }
     }
 
-    /// Asks for the number of the last line; until it is known, nothing else is sent.
+    /// Asks for the number of the last accepted line. Nothing else is sent until it arrives.
     fn ask_for_last_number(&mut self, delivery: &mut Delivery<'_>) -> Result<(), Error> {
         delivery.resends += 1;
         if delivery.resends > MOST_RESENDS {
@@ -449,11 +465,11 @@ impl<'a> Sender<'a> {
             return Err(Error::Damaged { line, times: MOST_RESENDS });
         }
         delivery.asked = Some(self.link.now());
-        // The first line end ends a line that has lost its own.
+        // The first line end terminates a line that has lost its own.
         self.send(&format!("\n{}\n", numbered(None, LAST_NUMBER)))
     }
 
-    /// What the state says while lines are sent.
+    /// Processes a status report that arrives while lines are sent.
     fn follow(
         &mut self,
         status: &Status,
@@ -462,12 +478,12 @@ impl<'a> Sender<'a> {
     ) -> Result<(), Error> {
         progress.state(&status.state);
         if status.is_computing {
-            // It reads no line until the picture is computed.
+            // The plotter reads no line until it has computed the picture.
             delivery.last_progress = self.link.now();
             delivery.last_event = delivery.last_progress;
             delivery.asked = delivery.asked.map(|_| delivery.last_progress);
         }
-        // A hold before anything is drawn was asked for by no user.
+        // No user asks for a feed hold before anything is drawn, so the machine is resumed.
         let nothing_drawn = status.strokes.is_none_or(|(done, _)| done == 0);
         if status.is_holding()
             && status.pen_wanted.is_none()
@@ -479,10 +495,10 @@ impl<'a> Sender<'a> {
         self.fail_if_alarm(status)
     }
 
-    /// Draws what was sent, and waits until the machine is idle again.
+    /// Starts the drawing of what was sent, and waits until the machine is idle again.
     ///
     /// # Errors
-    /// The drawing is refused, the machine stops, or it falls silent.
+    /// The plotter refuses the drawing, stops with an alarm, stays in feed hold, or falls silent.
     pub fn plot(&mut self, progress: &mut dyn Progress) -> Result<(), Error> {
         let command = JobLine::command(PLOT);
         let lines = [command.clone()];
@@ -527,15 +543,15 @@ impl<'a> Sender<'a> {
         }
     }
 
-    /// Sends the command until it is accepted; again if the plotter was told to give up before it
-    /// moved.
+    /// Sends the plot command until it is accepted. It is sent again if the plotter was told to
+    /// abort before it moved.
     fn begin_plot(&mut self, lines: &dyn Lines, progress: &mut dyn Progress) -> Result<(), Error> {
         let mut restarts = 0;
         loop {
             let mut notes = Vec::new();
             let begun = self.deliver_watching(lines, &mut Quiet, &mut |reply| match reply {
                 Reply::Message(note) => notes.push(note.clone()),
-                // It was about a line that was not accepted.
+                // The messages so far were about a line that was not accepted.
                 Reply::Resend(_) | Reply::Error(_) => notes.clear(),
                 _ => {}
             });
@@ -557,9 +573,8 @@ impl<'a> Sender<'a> {
         }
     }
 
-    /// Makes sure that the last line is the last one that was accepted, and that none was
-    /// refused: so no reply was lost that says otherwise, and nobody has told the plotter to give
-    /// up.
+    /// Checks that the last line sent is the last one that the plotter accepted, and that none was
+    /// refused. This detects a refusal whose reply was lost, and an abort that somebody else sent.
     fn confirm(&mut self, lines: &dyn Lines, base: i32) -> Result<(), Error> {
         let number = self.done;
         let last = &|| line_of(lines, base, number);
@@ -588,8 +603,8 @@ impl<'a> Sender<'a> {
         Err(Error::LostLine { line: last().map(Box::new) })
     }
 
-    /// The machine stands and waits for a pen, or holds because somebody else asked for it. Whether
-    /// the pen is in, or the user lets it go on.
+    /// Decides whether a stopped machine may resume: if it waits for `pen`, whether that pen is in;
+    /// otherwise, in a feed hold that somebody else caused, whether the user allows it.
     fn may_resume(
         &mut self,
         pen: Option<u8>,
@@ -612,7 +627,7 @@ impl<'a> Sender<'a> {
         }
     }
 
-    /// What came of the job that was drawn; `None` if the plotter's firmware does not tell.
+    /// The plotter's report on the last drawing; `None` if its firmware does not send one.
     ///
     /// # Errors
     /// As [`Sender::stream`].
@@ -632,9 +647,9 @@ impl<'a> Sender<'a> {
         Ok(report)
     }
 
-    /// Ends the conversation: whoever comes next need not send numbers.
+    /// Ends the conversation, after which the plotter accepts lines without numbers again.
     pub fn end(mut self) {
-        // Nothing depends on it: the next sender's ctrl-X does the same.
+        // A failure is ignored: the abort of the next sender has the same effect.
         let _ = self.send(&format!("{}\n", numbered(Some(self.done + 1), END)));
         let start = self.link.now();
         while self.since(start) < self.patience.reply {
@@ -688,7 +703,7 @@ impl<'a> Sender<'a> {
         Ok(())
     }
 
-    /// Stops the machine, pen up, if the user gave the job up.
+    /// Stops the machine with the pen up if the user cancelled the job.
     fn stop_if_interrupted(&mut self) -> Result<(), Error> {
         if !self.interrupt.load(Ordering::Relaxed) {
             return Ok(());
@@ -699,7 +714,8 @@ impl<'a> Sender<'a> {
         })
     }
 
-    /// Sends ctrl-X, twice more if no greeting comes back. The greeting, if one came.
+    /// Sends ctrl-X, and repeats it up to twice if no greeting arrives. Returns the greeting, if
+    /// there is one.
     fn abort(&mut self) -> Result<Option<String>, Error> {
         for _ in 0..3 {
             self.link.send(&[ABORT])?;
@@ -714,7 +730,8 @@ impl<'a> Sender<'a> {
     }
 
     fn send(&mut self, text: &str) -> Result<(), Error> {
-        // One write: a port may send each write as a packet of its own.
+        // There is one write for each call, because a port may send each write as a separate
+        // packet.
         Ok(self.link.send(text.as_bytes())?)
     }
 
@@ -734,7 +751,8 @@ impl<'a> Sender<'a> {
         self.link.now().saturating_duration_since(time)
     }
 
-    /// The next reply, or `None` if none came within half the time between two queries.
+    /// Returns the next reply, or `None` if none arrives within half the interval of status
+    /// queries.
     fn listen(&mut self) -> Result<Option<Reply>, Error> {
         if self.replies.is_empty() {
             let mut buffer = [0; 256];

@@ -1,14 +1,16 @@
-//! A file, line by line, as it is sent.
+//! Reads an OBJ file and turns it into the lines that are sent to a plotter.
 //!
-//! [`SourceFile::read`] reads an OBJ file and checks every line with the plotter's own parser, before
-//! anything is sent: a line that no plotter would take is refused with its number and its text. The
-//! bytes of the file stay as they are, and the lines are made from them as they are asked for
-//! ([`Lines::line`]), so that a job takes little more memory than its file.
+//! [`SourceFile::read`] checks every line with the plotter's own parser before anything is sent. A
+//! line that no plotter accepts is refused with its number and its text. The bytes of the file are
+//! kept as they are, and each line is generated when [`Lines::line`] asks for it, so a job needs
+//! little more memory than its file.
 //!
-//! Blank lines, comments and keywords that change nothing for a plotter are not sent. A line that ends
-//! in a backslash goes on in the next one. A polyline that is longer than a line may be is sent as
-//! several, which share a vertex. Refused: what is not OBJ by its name, what is no text, lines of other
-//! kinds that are too long, and commands for the machine inside a file.
+//! Blank lines, comments and keywords that have no effect on a plotter are not sent. A line that
+//! ends in a backslash continues in the next one. A polyline that is longer than the maximum line
+//! length is sent as several polylines, each of which starts at the last vertex of the one before.
+//!
+//! The reader refuses files whose name does not end in `.obj`, files that are not text, other lines
+//! that are too long, and machine commands inside a file.
 
 use crate::error::Error;
 use crate::protocol::acts_at_once;
@@ -18,12 +20,12 @@ use std::fs::File;
 use std::io::{self, Read as _};
 use std::path::Path;
 
-/// One line to send.
+/// A line to send.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct JobLine {
-    /// What is sent, without the line end.
+    /// The text to send, without the line end.
     pub sent: String,
-    /// Where in the user's file it stands; `None` for the client's own commands.
+    /// The line of the user's file that it comes from; `None` for the client's own commands.
     pub origin: Option<Origin>,
 }
 
@@ -32,17 +34,18 @@ pub struct JobLine {
 pub struct Origin {
     /// The file, as the user named it.
     pub file: String,
-    /// The line's number, from 1.
+    /// The line number, counted from 1.
     pub line: usize,
-    /// The line as it stands there, or its first [`Origin::MOST_SHOWN`] characters and more.
+    /// The text of the line; of a long line, at least its first [`Origin::MOST_SHOWN`] characters.
     pub text: String,
 }
 
 impl Origin {
-    /// How much of a line is shown, in characters.
+    /// The maximum number of characters of a line that an error message shows.
     pub const MOST_SHOWN: usize = 100;
 
-    /// The beginning of the line, in characters that a terminal only shows.
+    /// The beginning of the line with control characters replaced, so that it is safe to print on a
+    /// terminal.
     pub fn shown(&self) -> String {
         let is_shown = |character: &char| !character.is_control() && *character != '\u{FFFD}';
         let mut shown: String = (self.text.chars())
@@ -57,15 +60,15 @@ impl Origin {
 }
 
 impl JobLine {
-    /// A command of the client itself.
+    /// A command of the client itself, which comes from no file.
     pub fn command(text: impl Into<String>) -> Self {
         Self { sent: text.into(), origin: None }
     }
 }
 
-/// Lines to send, numbered from 0, made as they are asked for.
+/// A sequence of lines to send, numbered from 0 and generated on demand.
 pub trait Lines {
-    /// How many there are.
+    /// The number of lines.
     fn count(&self) -> usize;
 
     /// Line number `index`; `None` past the last one.
@@ -92,33 +95,33 @@ impl Lines for Vec<JobLine> {
     }
 }
 
-/// The largest file that is read, in bytes. At 11 kB/s it would take days to send.
+/// The file size in bytes from which a file is refused. At 11 kB/s it would take days to send.
 const SIZE_LIMIT: u64 = 1 << 32;
 
-/// After how many lines the next place is kept from which lines can be made again. Fewer would make
-/// lines quicker, and take more memory: 12 bytes for each place.
+/// The distance, in lines, between stored positions from which lines can be generated. A smaller
+/// value makes [`Lines::line`] faster and takes more memory: 12 bytes for each position.
 const PLACE_EVERY: usize = 16;
 
 /// A file whose every line has been checked.
 #[derive(Debug)]
 pub struct SourceFile {
-    /// As the user named it.
+    /// The file, as the user named it.
     name: String,
     bytes: Vec<u8>,
-    /// The place of every line whose number is a multiple of [`PLACE_EVERY`].
+    /// The position of every line whose number is a multiple of [`PLACE_EVERY`].
     places: Vec<Place>,
     count: usize,
 }
 
-/// Where a reader stands in the bytes of a file.
+/// A position of the reader in the bytes of a file.
 #[derive(Debug, Clone, Copy, Default)]
 struct Place {
-    /// Bytes before it, below [`SIZE_LIMIT`].
+    /// The number of bytes before it, less than [`SIZE_LIMIT`].
     at: u32,
-    /// Ends of lines before it.
+    /// The number of line ends before it.
     line: u32,
-    /// Whether it stands inside a polyline of which an earlier part was sent: before the vertex that
-    /// both parts share.
+    /// Whether it is inside a polyline of which an earlier part was already generated. The position
+    /// is then before the vertex that both parts share.
     in_polyline: bool,
 }
 
@@ -126,7 +129,8 @@ impl SourceFile {
     /// Reads the file at `path` and checks its lines.
     ///
     /// # Errors
-    /// The file cannot be read, its name does not end in `.obj`, or it holds what no plotter takes.
+    /// The file cannot be read, its name does not end in `.obj`, or it contains something that no
+    /// plotter accepts.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let name = path.display().to_string();
         let unreadable = |source| Error::File { file: name.clone(), source };
@@ -141,17 +145,18 @@ impl SourceFile {
         }
         let mut bytes = Vec::new();
         if about.len() < SIZE_LIMIT {
-            // One more byte, lest the buffer grows only to find the end of the file.
+            // One more byte is reserved, so that the buffer does not grow only to detect the end of
+            // the file.
             bytes.reserve_exact(about.len() as usize + 1);
         }
         file.take(SIZE_LIMIT).read_to_end(&mut bytes).map_err(unreadable)?;
         Self::new(name, bytes)
     }
 
-    /// Checks the lines of a file called `name`.
+    /// Checks the lines of `bytes`, the contents of a file called `name`.
     ///
     /// # Errors
-    /// It holds what no plotter takes.
+    /// The file contains something that no plotter accepts.
     pub fn new(name: String, bytes: Vec<u8>) -> Result<Self, Error> {
         if bytes.len() as u64 >= SIZE_LIMIT {
             return Err(Error::FileTooLarge { file: name });
@@ -181,17 +186,17 @@ impl SourceFile {
         }
     }
 
-    /// Its size in bytes.
+    /// The size of the file in bytes.
     pub fn size(&self) -> usize {
         self.bytes.len()
     }
 
-    /// All lines in order; quicker than [`Lines::line`] for each.
+    /// Iterates over all lines in order, which is faster than calling [`Lines::line`] for each.
     pub fn lines(&self) -> impl Iterator<Item = JobLine> {
         let mut place = self.places.first().copied().unwrap_or_default();
         (0..self.count).map_while(move |_| {
             let mut sent = String::new();
-            // Every line was read once without a fault.
+            // This cannot fail: every line was already read once without an error.
             let from = place.read(&self.bytes, &mut sent).ok()??;
             Some(JobLine { sent, origin: Some(self.origin(from)) })
         })
@@ -209,14 +214,15 @@ impl SourceFile {
         }
     }
 
-    /// The line of the file in which `place` is.
+    /// The line of the file that contains `place`.
     fn origin(&self, place: Place) -> Origin {
         let at = place.at as usize;
         let before = self.bytes.get(..at).unwrap_or_default();
         let begin = before.iter().rposition(|byte| is_line_end(*byte)).map_or(0, |end| end + 1);
         let line = self.bytes.get(begin..).unwrap_or_default();
         let line = line.split(|byte| is_line_end(*byte)).next().unwrap_or_default();
-        // No character is longer than four bytes, and none is shown in part.
+        // No character is longer than four bytes. A character that the limit would split is left
+        // out.
         let shown = line.get(..4 * (Origin::MOST_SHOWN + 1)).map_or(line, |head| {
             let whole = std::str::from_utf8(head).map_err(|error| error.valid_up_to());
             whole.map_or_else(
@@ -240,14 +246,14 @@ impl Lines for SourceFile {
         let mut content = String::new();
         let mut from = place;
         for _ in 0..=index % PLACE_EVERY {
-            // Every line was read once without a fault.
+            // This cannot fail: every line was already read once without an error.
             from = place.read(&self.bytes, &mut content).ok()??;
         }
         Some(JobLine { sent: content, origin: Some(self.origin(from)) })
     }
 }
 
-/// What is wrong with a line.
+/// The reason why a line is refused.
 enum LineFault {
     TooLong { length: usize },
     Command,
@@ -263,7 +269,8 @@ fn is_space(byte: u8) -> bool {
     matches!(byte, b' ' | b'\t' | 0x0B | 0x0C)
 }
 
-/// As UTF-8, or what is not as Latin-1: names that differ stay different.
+/// Decodes bytes as UTF-8 or, if they are not UTF-8, as Latin-1, so that different names stay
+/// different.
 fn decoded(bytes: &[u8]) -> Cow<'_, str> {
     match std::str::from_utf8(bytes) {
         Ok(text) => Cow::Borrowed(text),
@@ -271,17 +278,18 @@ fn decoded(bytes: &[u8]) -> Cow<'_, str> {
     }
 }
 
-/// A `!` in a name would hold the machine; a name only tells pens apart, so another letter serves.
+/// Replaces letters that are real-time commands: a `!` in a name would cause a feed hold. A name
+/// only distinguishes pens, so another letter serves as well.
 fn sendable(letter: char) -> char {
     if acts_at_once(letter) { '_' } else { letter }
 }
 
 impl Place {
-    /// Puts the next line to send into `content` and stands behind it; gives where that line begins,
-    /// or `None` at the end of the file.
+    /// Writes the next line to send into `content` and moves behind it. Returns the position where
+    /// that line begins, or `None` at the end of the file.
     ///
     /// # Errors
-    /// What is wrong with the line, and where it is.
+    /// The reason why the line is refused, and where it begins.
     fn read(
         &mut self,
         bytes: &[u8],
@@ -298,7 +306,8 @@ impl Place {
         Ok(None)
     }
 
-    /// Reads one line, its words with single spaces between them; `true` if it is to be sent.
+    /// Reads one line and joins its words with single spaces. Returns `true` if the line must be
+    /// sent.
     fn read_line(&mut self, bytes: &[u8], content: &mut String) -> Result<bool, LineFault> {
         content.clear();
         if self.in_polyline {
@@ -306,10 +315,12 @@ impl Place {
         }
         let mut words = Words { bytes, at: self.at as usize, line: self.line };
         let mut vertices = 0;
-        // Where the last word of `content` begins, should it be the last that fits.
+        // The position before the last word of `content`, which may turn out to be the last one
+        // that fits.
         let mut last = *self;
         while let Some(word) = words.next() {
-            // A word that is too long is not decoded: it may be as long as the file.
+            // Only the start of a word that is too long is decoded, because the word may be as long
+            // as the file.
             let head = &word[..word.len().min(LINE_LIMIT + 1)];
             if head.contains(&0) {
                 return Err(LineFault::NotText);
@@ -326,14 +337,14 @@ impl Place {
                     break;
                 }
                 if !content.starts_with("l ") || vertices < 3 {
-                    // What is no UTF-8 becomes longer.
+                    // Bytes that are not UTF-8 become longer when they are decoded as Latin-1.
                     let length = self.line_length(bytes).max(LINE_LIMIT + 1);
                     return Err(LineFault::TooLong { length });
                 }
                 *self = Self { in_polyline: true, ..last };
                 return judged(content);
             }
-            // Both are below the size of the file.
+            // The casts are safe: both numbers are less than the size limit.
             last.at = (words.at - word.len()) as u32;
             last.line = words.line;
         }
@@ -342,14 +353,14 @@ impl Place {
         judged(content)
     }
 
-    /// From here to the end of the line, in bytes.
+    /// The number of bytes from here to the end of the line.
     fn line_length(&self, bytes: &[u8]) -> usize {
         let rest = bytes.get(self.at as usize..).unwrap_or_default();
         rest.iter().position(|byte| is_line_end(*byte)).unwrap_or(rest.len())
     }
 }
 
-/// What the plotter's own parser says of a line: `true` if it is to be sent.
+/// Checks a line with the plotter's own parser. Returns `true` if the line must be sent.
 fn judged(content: &str) -> Result<bool, LineFault> {
     match Command::parse(content) {
         Ok(Command::Nothing) => Ok(false),
@@ -364,17 +375,17 @@ fn judged(content: &str) -> Result<bool, LineFault> {
             | Command::Pen { .. },
         ) => Ok(true),
         Err(_) if content.starts_with('$') => Err(LineFault::Command),
-        // Any other would act on the machine, as G-code does.
+        // Any other command would act on the machine, as G-code does.
         Ok(_) | Err(CommandError::UnsupportedWord(_)) => Err(LineFault::Command),
         Err(refusal) => Err(LineFault::Refused(refusal)),
     }
 }
 
-/// The words of a line, up to a comment or its end.
+/// An iterator over the words of a line, up to a comment or the end of the line.
 struct Words<'a> {
     bytes: &'a [u8],
     at: usize,
-    /// Ends of lines before it.
+    /// The number of line ends before the current position.
     line: u32,
 }
 
@@ -410,7 +421,7 @@ impl<'a> Words<'a> {
         }
     }
 
-    /// Stands behind the end of this line.
+    /// Moves behind the end of this line.
     fn end_line(&mut self) {
         let rest = self.bytes.get(self.at..).unwrap_or_default();
         self.at += rest.iter().position(|byte| is_line_end(*byte)).unwrap_or(rest.len());
@@ -427,9 +438,11 @@ impl<'a> Words<'a> {
     }
 }
 
-/// Whether `rest` begins with a backslash that joins this line and the next.
+/// Whether `rest` begins with a backslash at the end of a line, which continues the line in the
+/// next one.
 ///
-/// It does after a space or a number only: a Windows path may end in one.
+/// The callers accept a continuation only after a space or a number, because a Windows path may end
+/// in a backslash.
 fn goes_on(rest: &[u8]) -> bool {
     matches!(rest, [b'\\'] | [b'\\', b'\n' | b'\r', ..])
 }
