@@ -1,12 +1,13 @@
-//! Exchanges of moves that make a tour shorter (Lin and Kernighan).
+//! Shortens a tour by exchanges of pen-up moves (Lin and Kernighan).
 //!
-//! The tour is a cycle of chains; the moves between them cost, staying at a station costs nothing.
-//! An exchange cuts a move, goes to a station nearer than that move was long, cuts the tour there,
-//! and so on while there is still gain in hand, until the ends are joined with some gain left. A
-//! step of it changes two moves, in any of the ways that leave the tour whole, found by their places
-//! in the cycle alone; only when no step joins with a gain is the best of them made and the next one
-//! sought from there. After Lin and Kernighan, "An effective heuristic algorithm for the
-//! traveling-salesman problem" (1973), and Helsgaun's implementation of it (2000).
+//! The tour is a cycle of chains. The moves between them have a cost; to stay at a station costs
+//! nothing. An exchange cuts a move, adds one to a station that is nearer than the cut move was
+//! long, cuts the tour there, and so on while there is gain in hand, until the open ends can be
+//! joined with some gain left. One step of an exchange changes two moves, in any of the ways that
+//! keep the tour in one piece; these are found from positions in the cycle alone. Only if no step
+//! joins the ends with a gain is the best step made, and the next one sought from there. After Lin
+//! and Kernighan, "An effective heuristic algorithm for the traveling-salesman problem" (1973), and
+//! Helsgaun's implementation of it (2000).
 
 use super::cycle::Cycle;
 use super::distances::Distances;
@@ -18,25 +19,26 @@ use super::work_budget::WorkBudget;
 use super::{Leg, NONE, OrderError};
 use crate::stage::{OutOfScratch, Scratch};
 
-/// How many steps an exchange may take.
+/// The greatest number of steps in one exchange.
 const STEPS: usize = 2;
 
-/// A part of an exchange: which moves are cut after the first.
+/// One step of an exchange: which moves are cut after the first.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Step {
-    /// What joining the ends after it leaves, 0 if nothing.
+    /// The gain of the exchange if the ends are joined after this step; 0 if there is none.
     pub gain: i64,
-    /// What is left before that.
+    /// The gain in hand before the ends are joined.
     pub hand: i64,
     /// The leg before the second cut.
     pub c: Leg,
-    /// Whether the way goes on from the first cut to the leg after `c`, else to the end of `c`.
+    /// Whether the new move from the first cut leads to the start of the leg after `c`; otherwise
+    /// it leads to the end of `c`.
     pub onward: bool,
-    /// The same for the third cut, if there is one.
+    /// The same two values for the third cut, if there is one.
     pub third: Option<(Leg, bool)>,
 }
 
-/// Stations around which an exchange may help, each once, first come first served.
+/// A queue of the stations around which an exchange may help. Each station is in it at most once.
 struct Waiting<'s> {
     queue: &'s mut [u16],
     is_waiting: &'s mut [u8],
@@ -50,7 +52,7 @@ impl<'s> Waiting<'s> {
     }
 
     fn add(&mut self, station: u16) {
-        // Nowhere, the end of the gap, is no station.
+        // The end of the gap is not a station.
         let Some(is_waiting) = self.is_waiting.get_mut(usize::from(station)) else {
             return;
         };
@@ -74,7 +76,7 @@ impl<'s> Waiting<'s> {
     }
 }
 
-/// The tour, and what is needed to exchange its moves.
+/// The tour, and the tables that are needed to exchange its moves.
 pub(super) struct Exchanges<'s, 'a> {
     pub cycle: Cycle<'s>,
     network: Network<'a>,
@@ -82,15 +84,15 @@ pub(super) struct Exchanges<'s, 'a> {
     incidence: Incidence<'s>,
     neighbours: Neighbours<'s>,
     waiting: Waiting<'s>,
-    /// The number of the gap among the legs, if there is one.
+    /// The number of the gap among the legs, if the tour has a gap.
     gap: Option<u16>,
-    /// What a move costs besides its length, in 1/256 steps.
+    /// The cost of a move besides its length, in 1/256 steps.
     lift: u32,
 }
 
 impl<'s, 'a> Exchanges<'s, 'a> {
-    /// The tour of `legs`, in which `gap`, if there is one, has the number after those of the
-    /// chains. All stations wait.
+    /// Makes the tour of `legs`. The gap, if there is one, has the number after those of the
+    /// chains. All stations are put into the queue.
     pub fn new(
         network: Network<'a>,
         neighbours: Neighbours<'s>,
@@ -119,7 +121,8 @@ impl<'s, 'a> Exchanges<'s, 'a> {
         })
     }
 
-    /// Bytes of scratch for so many stations, chains, and legs with the gap.
+    /// Returns the scratch memory needed for so many stations, chains, and legs including the gap,
+    /// in bytes. The cache of distances takes whatever else there is.
     pub const fn bytes(stations: usize, chains: usize, legs: usize) -> usize {
         Incidence::bytes(stations, chains)
             + Scratch::bytes_for::<u16>(legs)
@@ -128,28 +131,28 @@ impl<'s, 'a> Exchanges<'s, 'a> {
             + Scratch::bytes_for::<u8>(stations)
     }
 
-    /// Whether the tour has a gap, and so two ends.
+    /// Whether the tour has a gap, so that it is an open path.
     pub fn is_open(&self) -> bool {
         self.gap.is_some()
     }
 
-    /// The station where a leg ends; [`NONE`] of the gap.
+    /// Returns the station where a leg ends; [`NONE`] for the gap.
     pub fn end(&self, leg: Leg) -> u16 {
         if self.is_gap(leg) { NONE } else { self.network.end(leg) }
     }
 
-    /// Whether a leg is the gap.
+    /// Whether `leg` is the gap.
     pub fn is_gap(&self, leg: Leg) -> bool {
         self.gap == Some(leg.segment() as u16)
     }
 
-    /// The station where a leg begins; [`NONE`] of the gap.
+    /// Returns the station where a leg begins; [`NONE`] for the gap.
     pub fn start(&self, leg: Leg) -> u16 {
         self.end(leg.flipped())
     }
 
-    /// What a move costs: its length and the lift, and a little more, lest two moves be better than
-    /// one because their lengths are rounded down.
+    /// Returns the cost of a move in 1/256 steps: its length, the cost of the lift, and 1 more.
+    /// Lengths are rounded down; without the 1, two moves might seem shorter than one.
     pub fn distance(&self, from: u16, to: u16) -> i64 {
         if from == NONE || to == NONE || from == to {
             0
@@ -158,31 +161,32 @@ impl<'s, 'a> Exchanges<'s, 'a> {
         }
     }
 
-    /// What a move leaves of `hand`: 0 if nothing is left, mostly seen without a root.
+    /// Returns what remains of the gain `hand` after the cost of a move, or 0 if nothing remains.
+    /// In most cases nothing remains, and a bound shows this without a square root.
     pub fn left(&self, hand: i64, from: u16, to: u16) -> i64 {
         if from == NONE || to == NONE || from == to {
             return hand.max(0);
         }
         let hand = hand - i64::from(self.lift);
         let bound = u32::try_from(hand.clamp(0, i64::from(u32::MAX))).unwrap_or(u32::MAX);
-        // A little more than the length is taken: see `distance`.
+        // 1 more than the length is subtracted: see `distance`.
         self.distances.below(bound, from, to).map_or(0, |length| hand - i64::from(length) - 1)
     }
 
-    /// What all moves cost.
+    /// Returns the cost of all moves of the tour.
     pub fn cost(&self) -> u64 {
         (0..self.cycle.len())
             .map(|index| self.move_after(self.cycle.leg(index)).max(0) as u64)
             .sum()
     }
 
-    /// The cost of the move after `leg`.
+    /// Returns the cost of the move after `leg`; 0 if `leg` ends where the next leg begins.
     pub fn move_after(&self, leg: Leg) -> i64 {
         self.distance(self.end(leg), self.start(self.cycle.next(leg)))
     }
 
-    /// Tries exchanges around all stations that wait, until the work is done or its end has come,
-    /// and returns the gain. If `keep`, what was gained stays, else it can be taken back.
+    /// Tries exchanges around all stations in the queue, until it is empty or the budget is used
+    /// up. Returns the gain. If `keep`, the exchanges are final, otherwise they can be undone.
     pub fn exchange_all(
         &mut self,
         keep: bool,
@@ -202,7 +206,8 @@ impl<'s, 'a> Exchanges<'s, 'a> {
         Ok(gain)
     }
 
-    /// Makes one exchange that cuts a move at `station`, if one helps.
+    /// Makes one exchange that cuts a move at `station`, if there is one with a gain. Returns the
+    /// gain.
     fn exchange_at(
         &mut self,
         station: u16,
@@ -221,8 +226,9 @@ impl<'s, 'a> Exchanges<'s, 'a> {
         Ok(None)
     }
 
-    /// CutPositions the move after `a` and changes two moves more at a time while that leaves something in
-    /// hand, until joining the ends leaves a gain; returns it. Else all is as it was.
+    /// Cuts the move after `a`, and changes two more moves at a time while there is gain in hand,
+    /// until joining the ends leaves a gain. Returns that gain. If none is found, the tour is
+    /// unchanged.
     fn exchange(
         &mut self,
         a: Leg,
@@ -250,13 +256,15 @@ impl<'s, 'a> Exchanges<'s, 'a> {
         Ok(None)
     }
 
-    /// Where a move from `station` may go: by the gap, if that is wanted, to itself, and to those near it.
+    /// Returns the stations to which a new move from `station` may lead: [`NONE`] for the gap, if
+    /// `by_gap`, then `station` itself, then its neighbours.
     pub fn candidates(&self, station: u16, by_gap: bool) -> impl Iterator<Item = u16> + use<'s> {
         let own = [NONE, station].into_iter().skip(usize::from(!by_gap));
         own.chain(self.neighbours.of(station))
     }
 
-    /// How far `station` is from the nearer end of the path; far if it is a cycle.
+    /// Returns the cost of a move from `station` to the nearer end of the path, or a very large
+    /// number if the tour is a closed cycle.
     pub fn distance_to_path_ends(&self, station: u16) -> i64 {
         let Some(gap) = self.gap.map(|gap| Leg::new(gap, false)) else {
             return i64::MAX;
@@ -266,7 +274,7 @@ impl<'s, 'a> Exchanges<'s, 'a> {
         a.min(b)
     }
 
-    /// The ends of the moves that a step cuts.
+    /// Returns the ends of the moves that a step cuts.
     fn ends_of(&self, a: Leg, step: Step) -> [u16; 6] {
         let third = step.third.map_or(step.c, |(e, _)| e);
         let mut ends = [NONE; 6];
@@ -276,7 +284,7 @@ impl<'s, 'a> Exchanges<'s, 'a> {
         ends
     }
 
-    /// Makes a step from the cut after `a`. Returns the leg after which the ends are joined.
+    /// Makes a step from the cut after `a`. Returns the leg before the cut that is still open.
     fn make(
         &mut self,
         a: Leg,
@@ -305,7 +313,7 @@ impl<'s, 'a> Exchanges<'s, 'a> {
         Ok(if third_onward { e } else { f.flipped() })
     }
 
-    /// The legs from a station; from nowhere, the gap both ways.
+    /// Returns the legs that begin at a station; for [`NONE`], the gap in both directions.
     pub fn legs_from(&self, station: u16) -> impl Iterator<Item = Leg> + '_ {
         let first = if station == NONE {
             self.gap.map(|gap| Leg::new(gap, false))
@@ -321,7 +329,7 @@ impl<'s, 'a> Exchanges<'s, 'a> {
         })
     }
 
-    /// Lets the ends of `legs` wait for exchanges.
+    /// Puts the stations where `legs` end into the queue.
     pub fn wake(&mut self, legs: &[Leg]) {
         for &leg in legs {
             let station = self.end(leg);

@@ -1,9 +1,11 @@
-//! Pen-up moves by greed with regret (Harrison 5.10.1), then by the exchange of pairs.
+//! Pairs the odd points greedily with regret (Harrison 5.10.1), and then improves the pairs by
+//! exchanges.
 //!
-//! The point whose second choice is so much worse than its first is given its first choice; so to
-//! the end. Then any two moves give up their ends for each other's while that shortens them.
-//! Nothing is proved of the result. Points are numbered by their x; those too far off by x or y alone
-//! are passed over without a square root.
+//! The regret of a point is how much farther its second choice is than its first. The point with
+//! the greatest regret is given its first choice; this is repeated until all are paired. Then any
+//! two pairs exchange partners while that shortens them. The result has no proved bound. Points are
+//! numbered in the order of their x. Those that are too far apart by x or y alone are skipped
+//! without computing a square root.
 
 use super::odd::OddPoints;
 use super::work_budget::WorkBudget;
@@ -11,20 +13,21 @@ use super::{NONE, OrderError};
 use crate::stage::{OutOfScratch, Scratch};
 use bytemuck::{Pod, Zeroable};
 
-/// What an unmatched point would choose.
+/// The two nearest unpaired points of an unpaired point.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct Choice {
-    /// How much farther the second choice is.
+    /// How much farther the second choice is than the first, in 1/256 steps.
     regret: u32,
     first: u16,
     second: u16,
 }
 
-/// A point first chooses among those within so far by x, 256 steps, then within twice that, and so on.
+/// A point first searches among those whose x differs by at most this many 1/256 steps (256 steps),
+/// then within twice that, and so on.
 const FIRST_REACH: u32 = 256 << 8;
 
-/// Pairs all of `odd`: `mate[i]` is the partner of odd point `i`.
+/// Pairs all of `odd`: `mate[i]` becomes the partner of odd point `i`.
 pub(super) fn pair(
     odd: &OddPoints<'_>,
     scratch: &mut Scratch<'_>,
@@ -72,7 +75,7 @@ fn choose(
                 second = (distance, other);
             }
         }
-        // All others are farther off than `reach`.
+        // All points not yet looked at are farther than `reach`.
         if is_everyone || second.0 <= reach {
             return Ok(Choice { regret: second.0 - first.0, first: first.1, second: second.1 });
         }
@@ -93,7 +96,7 @@ fn with_regret(
     }
     for _ in 0..count / 2 {
         let unmatched = |&point: &u16| mate[usize::from(point)] == NONE;
-        // The lowest number among equals.
+        // Among points of equal regret, the one with the lowest number is taken.
         let Some(chooser) = (0..count)
             .rev()
             .filter(unmatched)
@@ -116,7 +119,7 @@ fn with_regret(
     Ok(())
 }
 
-/// Gives the ends of the longest move to the two free ends of the path.
+/// Pairs the ends of the longest move with the two free ends of the path.
 fn free_the_longest(odd: &OddPoints<'_>, mate: &mut [u16]) {
     let [start, end] = odd.free_ends();
     let longest = (0..odd.real_count()).max_by_key(|&point| {
@@ -135,8 +138,8 @@ fn join(mate: &mut [u16], a: u16, b: u16) {
     mate[usize::from(b)] = a;
 }
 
-/// One round of exchanges over all pairs of moves, whose `lengths` stand with both of their points; says
-/// whether it shortened anything.
+/// Tries once to exchange the partners of each two pairs. `lengths` holds the length of each move
+/// at both of its points. Returns whether anything became shorter.
 fn exchange(
     odd: &OddPoints<'_>,
     lengths: &mut [u32],
@@ -149,7 +152,8 @@ fn exchange(
     for a in 0..count {
         let mut looked_at = 0;
         for c in a + 1..count {
-            // From here on either new move from `a` is as long as both old ones, by its x alone.
+            // From this `c` on, the difference in x alone makes each new move from `a` as long as
+            // both old moves together.
             if odd.distance_along_x(a, c) >= lengths[usize::from(a)].saturating_add(longest) {
                 break;
             }
@@ -178,8 +182,9 @@ fn exchange(
     Ok(improved)
 }
 
-/// The length of two moves, first to second and third to fourth point; any large number if it is not below
-/// `bound`, which is mostly seen without a square root.
+/// Returns the total length of two moves, from `a` to `b` and from `c` to `d`. If it is not below
+/// `bound`, the result may be any number from `bound` on; in most cases this is found without a
+/// square root.
 fn sum_below(odd: &OddPoints<'_>, [a, b, c, d]: [u16; 4], bound: u32) -> u32 {
     if odd.least_distance(a, b) + odd.least_distance(c, d) >= bound {
         return u32::MAX;

@@ -1,13 +1,15 @@
-//! A shorter tour of all parts, within a budget of work.
+//! Shortens the tour of several parts within a budget of work.
 //!
-//! Several first tours are shortened until no exchange of moves and no turning of strokes helps any
-//! more, and the shortest is kept: that from the matched moves, part by part; that from the same
-//! moves, mended; and where each part is one stroke, as in hatching and writing, those that take the
-//! nearest next from each corner of the drawing. From here on a lift has its price. Then four moves
-//! near each other are changed at random, the exchanges are tried again around them, and all is taken
-//! back unless it came out no dearer: a tour only ever gets better. The same budget gives the same
-//! tour on every machine. After Martin, Otto and Felten, "Large-step Markov chains for the traveling
-//! salesman problem" (1991).
+//! Several first tours are made. Each is shortened until neither an exchange of moves nor a
+//! reversal of strokes helps any more, and the shortest tour is kept. The first tours are: the tour
+//! of the matched moves, part by part; the tour of the same moves after they were changed to join
+//! the parts; and, where each part is one stroke, as in hatching and lettering, the tours that
+//! start at each corner of the page and always take the nearest part next.
+//!
+//! Then lifts are given their cost. Four moves near each other are changed at random (a kick), the
+//! exchanges are tried again around them, and everything is undone unless the result costs no more:
+//! a tour never gets worse. The same budget gives the same tour on every machine. After Martin,
+//! Otto and Felten, "Large-step Markov chains for the traveling salesman problem" (1991).
 
 use super::euler::Unused;
 use super::exchange::Exchanges;
@@ -20,42 +22,43 @@ use super::{EVEN_PART, Leg, NONE, OrderError, mark_parts};
 use crate::drawing::PagePoint;
 use crate::stage::Scratch;
 
-/// Neighbours of each station that are worth the memory, and what will do with less.
+/// The number of neighbours of each station, and the number to use where memory is short.
 const NEIGHBOURS: [usize; 2] = [8, 4];
-/// A kick changes moves that are at most so many moves apart.
+/// The moves that a kick changes are at most this many moves apart.
 const KICK_REACH: u32 = 6;
-/// So many kicks in vain for each move of the tour are enough.
+/// The search ends after this many successive kicks without a gain for each move of the tour.
 const PATIENCE: u32 = 50;
-/// After so many kicks the strokes are turned where that helps.
+/// The directions of the strokes are improved after each so many kicks.
 const KICKS_BETWEEN_TURNS: u32 = 64;
-/// Of the work, what goes into choosing the tour that the rest is spent on.
+/// Percentage of the work that is spent on the first tours, of which the best gets the rest.
 const FIRST_TOURS_PERCENT: u64 = 48;
 
-/// Where the kicks' random numbers begin: anywhere but at 0; this is no worse than others on a dozen drawings.
+/// The seed of the kicks' random numbers. It must not be 0; on a dozen drawings this one was no
+/// worse than others.
 const SEED: u32 = 23_757;
 
-/// A tour to be improved.
+/// A tour to be improved, and the limits for it.
 pub(super) struct Tour<'t> {
-    /// All chains of the network.
+    /// The tour: all chains of the network.
     pub route: &'t mut [Leg],
-    /// The way back from the end to the start does not count.
+    /// Whether the tour is an open path, so that the move from its end to its start does not count.
     pub open: bool,
-    /// No tour is shorter.
+    /// A lower bound of the pen-up length of any tour, in 1/256 steps.
     pub bound: u64,
-    /// The pen-up moves from odd station to odd station that are the shortest by themselves.
+    /// The partner of each odd station by the pairs with the least total length, and the marks of
+    /// the others.
     pub mate: &'t mut [u16],
-    /// Where a route with these moves begins.
+    /// The station where a route with these moves begins; `None` if it may begin anywhere.
     pub start: Option<u16>,
     /// Whether no part has more than two odd stations.
     pub strokes_only: bool,
-    /// Distances that may be worked for each move.
+    /// The budget of work for each move, in distance computations.
     pub effort: u32,
-    /// What a move costs besides its length, in 1/256 steps.
+    /// The cost of a move besides its length, in 1/256 steps.
     pub lift: u32,
 }
 
-/// Shortens `tour.route`, if it can, while the effort lasts. Does nothing where there is too little
-/// memory.
+/// Shortens `tour.route` as far as the budget allows. Does nothing if there is too little memory.
 pub(super) fn improve(
     network: Network<'_>,
     tour: Tour<'_>,
@@ -96,7 +99,7 @@ pub(super) fn improve(
     best.follow(mate, start, None, cycle, scratch.reborrow(), work_budget)?;
     best.work_on(cycle, share, scratch.reborrow(), work_budget)?;
     if strokes_only {
-        // Each part as one stroke, without any move.
+        // Each part becomes one stroke without any move inside it.
         mark_parts(network, scratch.reborrow(), mate)?;
         for mate in mate.iter_mut().filter(|mate| **mate != NONE) {
             *mate = EVEN_PART;
@@ -106,29 +109,32 @@ pub(super) fn improve(
             best.work_on(cycle, share, scratch.reborrow(), work_budget)?;
         }
     }
-    // Not before: a price on lifts bars the ways by which the moves become short.
+    // Lifts get their cost only now: with a cost from the start, the exchanges that shorten the
+    // moves would be rejected.
     (best.lift, best.cost) = (lift, u64::MAX);
     best.restore(cycle);
     best.work_on(cycle, budget - first_tours * share, scratch, work_budget)
 }
 
-/// The corners of the page: on which side of it in x and y.
+/// The corners of the page. A sign of 1 stands for the side of low x or y, -1 for the side of high
+/// x or y.
 const CORNERS: [(i32, i32); 4] = [(1, 1), (1, -1), (-1, 1), (-1, -1)];
 
-/// How far a place is from a corner far outside the page, in steps along x and y.
+/// Returns the distance of a point from a corner far outside the page, in steps, measured along x
+/// and y.
 fn from_corner(place: PagePoint, (x, y): (i32, i32)) -> u32 {
-    // A place is within ±2^20.
+    // A coordinate is within ±2^20, so the sum is positive.
     (x * place.x + y * place.y + (1 << 22)).cast_unsigned()
 }
 
-/// The shortest tour so far.
+/// The shortest tour found so far, and the settings of the search.
 struct Best<'b, 'a> {
     network: Network<'a>,
     neighbours: Neighbours<'b>,
     open: bool,
-    /// What a move costs besides its length, in 1/256 steps.
+    /// The cost of a move besides its length, in 1/256 steps.
     lift: u32,
-    /// So many kicks in vain are enough.
+    /// The search ends after this many successive kicks without a gain.
     patience: u32,
     cost: u64,
     route: &'b mut [Leg],
@@ -136,8 +142,8 @@ struct Best<'b, 'a> {
 }
 
 impl Best<'_, '_> {
-    /// Makes a tour of the moves `mate`, part by part, the nearest part next, from `corner` or else
-    /// from `start`.
+    /// Makes a tour of the moves `mate`, part by part, the nearest part next. It starts at the
+    /// entrance nearest to `corner`, if one is given, and otherwise at `start`.
     fn follow(
         &self,
         mate: &[u16],
@@ -158,13 +164,14 @@ impl Best<'_, '_> {
         unused.nearest_first(start, Some(self.neighbours), route, work_budget)
     }
 
-    /// Puts the shortest tour into `cycle`.
+    /// Copies the shortest tour into `cycle`.
     fn restore(&self, cycle: &mut [Leg]) {
         let (route, _) = cycle.split_at_mut(self.route.len());
         route.copy_from_slice(self.route);
     }
 
-    /// Shortens the tour of `cycle` with `budget` distances, and keeps it if it is the shortest.
+    /// Shortens the tour in `cycle` with a budget of `budget` distance computations, and keeps it
+    /// if it is the shortest so far.
     fn work_on(
         &mut self,
         cycle: &mut [Leg],
@@ -215,7 +222,7 @@ impl Best<'_, '_> {
     }
 }
 
-/// Exchanges moves and turns strokes until neither helps any more. Returns the gain.
+/// Exchanges moves and reverses strokes until neither helps any more. Returns the gain.
 fn shorten(
     tour: &mut Exchanges<'_, '_>,
     ways: &mut [u8],
@@ -232,7 +239,7 @@ fn shorten(
     Ok(gain)
 }
 
-/// The most scratch that is taken at a time, in bytes.
+/// Returns the most scratch memory that is in use at any time, in bytes.
 fn scratch_bytes(network: Network<'_>, legs: usize, per_station: usize) -> usize {
     let (stations, chains) = (usize::from(network.stations()), usize::from(network.chains()));
     let lists = Neighbours::bytes(stations, per_station);
@@ -242,7 +249,8 @@ fn scratch_bytes(network: Network<'_>, legs: usize, per_station: usize) -> usize
     lists + exchanges.max(Neighbours::bytes_to_find(stations))
 }
 
-/// The lengths of the moves of a route, with the one back if it is not open; 0 where there is none.
+/// Returns the lengths of the moves between the legs of a route, 0 where there is no move. Unless
+/// the route is `open`, the move from its end to its start is included.
 fn route_moves(network: Network<'_>, route: &[Leg], open: bool) -> impl Iterator<Item = u64> {
     let pairs = route.iter().zip(route.iter().cycle().skip(1));
     pairs
@@ -250,14 +258,14 @@ fn route_moves(network: Network<'_>, route: &[Leg], open: bool) -> impl Iterator
         .map(move |(&from, &to)| u64::from(network.distance(network.end(from), network.start(to))))
 }
 
-/// A source of kicks.
+/// A source of random changes to a tour.
 struct Kicks {
     random: u32,
 }
 
 impl Kicks {
-    /// Changes four moves near each other at random (a double bridge), and what follows from that;
-    /// keeps it if the tour is no longer for it. Returns the gain.
+    /// Changes four moves near each other at random (a double bridge), and then exchanges moves
+    /// around them. The result is kept if it costs no more than before. Returns the gain.
     fn kick(
         &mut self,
         tour: &mut Exchanges<'_, '_>,
@@ -277,7 +285,7 @@ impl Kicks {
             *cut = at;
         }
         let [a, c, e, g] = cuts;
-        // The walk may have gone all the way around a short tour.
+        // On a short tour the walk may have gone all the way around.
         let [to_c, to_e, to_g] = [c, e, g].map(|cut| tour.cycle.steps(a, cut));
         if to_c == 0 || to_e <= to_c || to_g <= to_e {
             return Ok(0);
@@ -297,7 +305,7 @@ impl Kicks {
         Ok(gain.max(0))
     }
 
-    /// A number below `limit` (Marsaglia's xorshift).
+    /// Returns a random number below `limit` (Marsaglia's xorshift).
     fn below(&mut self, limit: u32) -> u32 {
         self.random ^= self.random << 13;
         self.random ^= self.random >> 17;
@@ -306,7 +314,7 @@ impl Kicks {
     }
 }
 
-/// The next leg after `from` at whose end the pen is lifted, if there is any.
+/// Returns the next leg after `from` at whose end the pen is lifted, if there is one.
 fn next_move(
     tour: &Exchanges<'_, '_>,
     from: Leg,

@@ -1,7 +1,7 @@
-//! The nearest stations of each station.
+//! Finds the nearest stations of each station, among which the exchanges choose their new moves.
 //!
-//! A grid of cells about as many as half the stations is filled once; each search goes around the
-//! cell in square rings until nothing nearer can come.
+//! The stations are sorted into a grid of about half as many cells as there are stations. Each
+//! search visits square rings of cells around the station until no nearer station can follow.
 
 use super::network::Network;
 use super::work_budget::WorkBudget;
@@ -9,7 +9,7 @@ use super::{NONE, OrderError};
 use crate::drawing::PagePoint;
 use crate::stage::{OutOfScratch, Scratch};
 
-/// For each station the same number of others, the nearest first.
+/// For each station the same number of other stations, the nearest first.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Neighbours<'a> {
     stations: &'a [u16],
@@ -17,8 +17,9 @@ pub(super) struct Neighbours<'a> {
 }
 
 impl<'a> Neighbours<'a> {
-    /// Finds up to `per_station` neighbours of each station, a quarter of them in each quadrant: what
-    /// crowds on one side, as the ends of a hatching, must not hide what is on the other.
+    /// Finds up to `per_station` neighbours of each station, a quarter of them in each quadrant. A
+    /// crowd of stations on one side, such as the ends of a hatching, must not hide those on the
+    /// other sides.
     pub fn new(
         network: Network<'_>,
         per_station: usize,
@@ -35,17 +36,17 @@ impl<'a> Neighbours<'a> {
         Ok(Self { stations, per_station })
     }
 
-    /// Bytes of scratch that stay taken for so many stations.
+    /// Returns the scratch memory that the result occupies for so many stations, in bytes.
     pub const fn bytes(stations: usize, per_station: usize) -> usize {
         Scratch::bytes_for::<u16>(stations * per_station)
     }
 
-    /// Bytes of scratch besides while they are found.
+    /// Returns the further scratch memory that the search needs for so many stations, in bytes.
     pub const fn bytes_to_find(stations: usize) -> usize {
         Scratch::bytes_for::<u16>(stations / 2 + 2) + Scratch::bytes_for::<u16>(stations)
     }
 
-    /// The neighbours of `station`, the nearest first.
+    /// Returns the neighbours of `station`, the nearest first.
     pub fn of(&self, station: u16) -> impl Iterator<Item = u16> + use<'a> {
         let begin = usize::from(station) * self.per_station;
         let near = self.stations.get(begin..begin + self.per_station).unwrap_or(&[]);
@@ -60,7 +61,7 @@ struct Grid<'s, 'a> {
     cell_bits: u32,
     columns: i32,
     rows: i32,
-    /// Where the stations of each cell begin, and where the last one's end.
+    /// For each cell, where its stations begin in `stations`; then the end of the last cell.
     begin: &'s [u16],
     stations: &'s [u16],
 }
@@ -101,7 +102,8 @@ impl<'s, 'a> Grid<'s, 'a> {
             sum += *begin;
             *begin = sum;
         }
-        // Filled from behind, each cell's end comes down to its begin.
+        // The cells are filled from the back, so that the end of each cell is counted down to its
+        // begin.
         for station in (0..count).rev() {
             let begin = &mut begin[cell_of(station)];
             *begin -= 1;
@@ -116,7 +118,7 @@ impl<'s, 'a> Grid<'s, 'a> {
         (along(place.x, self.corner.x), along(place.y, self.corner.y))
     }
 
-    /// The stations of the cells from `from` to `to` of a row.
+    /// Returns the stations of the cells from column `from` to column `to` of a row.
     fn stretch(&self, row: i32, from: i32, to: i32) -> &'s [u16] {
         let (from, to) = (from.max(0), to.min(self.columns - 1));
         if row < 0 || row >= self.rows || from > to {
@@ -126,8 +128,8 @@ impl<'s, 'a> Grid<'s, 'a> {
         &self.stations[begin(from)..begin(to + 1)]
     }
 
-    /// Fills `near` with the nearest stations around `station`, as many from each quadrant, the
-    /// nearest first.
+    /// Fills `near` with the nearest stations around `station`, the same number from each quadrant,
+    /// the nearest first.
     fn search(
         &self,
         station: u16,
@@ -143,8 +145,8 @@ impl<'s, 'a> Grid<'s, 'a> {
         let per_quadrant = near.len() / 4;
         let mut enough = None;
         for ring in 0..self.columns.max(self.rows) {
-            // Whatever is in this ring or beyond is farther than the cells within are wide. Where
-            // a quadrant is all but empty the search ends at twice the width that was enough.
+            // All stations in this ring or beyond are at least `reach` away. Where a quadrant has
+            // too few stations, the search ends at twice the ring at which two quadrants were full.
             let reach = ((ring - 1).max(0) as u64) << self.cell_bits;
             let last = near.chunks_exact(per_quadrant).filter_map(|quadrant| quadrant.last());
             if last.clone().filter(|&&last| last != NONE).count() >= 2 && enough.is_none() {
@@ -182,7 +184,7 @@ impl<'s, 'a> Grid<'s, 'a> {
     }
 }
 
-/// Puts `station` into its place in a sorted list; the last one leaves.
+/// Inserts `station` into a list sorted by distance; the last station of the list is dropped.
 fn insert(list: &mut [u16], station: u16, distance: impl Fn(u16) -> u64) {
     let Some((last, _)) = list.split_last_mut() else {
         return;

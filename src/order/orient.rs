@@ -1,16 +1,17 @@
-//! Which way each stroke is best drawn, their order left as it is.
+//! Chooses the best direction of each stroke and leaves the order of the strokes as it is.
 //!
-//! Exchanges shift a fault slowly: where a hatching is drawn to and fro, and two lines one after the
-//! other come from the same side, every line between this fault and the next must be turned. For a
-//! given order the best way of all strokes is found at once, from the first to the last: what is best
-//! up to a stroke depends only on which way that stroke is drawn (Bellman's principle).
+//! Exchanges repair some faults only slowly. For example, in a hatching drawn to and fro, two
+//! successive lines may start from the same side; then every line from this fault to the next must
+//! be reversed. For a given order, dynamic programming finds the best directions of all strokes at
+//! once: the best cost up to a stroke depends only on the direction of that stroke (Bellman's
+//! principle).
 
 use super::exchange::Exchanges;
 use super::work_budget::WorkBudget;
 use super::{Leg, NONE, OrderError};
 
-/// Turns strokes (legs between two moves) around where that makes the tour shorter. Returns the
-/// gain. `ways` has a place for each leg of the tour.
+/// Reverses strokes (the legs between two moves) where that makes the tour shorter. Returns the
+/// gain. `ways` must have an entry for each leg of the tour.
 pub(super) fn orient(
     tour: &mut Exchanges<'_, '_>,
     ways: &mut [u8],
@@ -19,7 +20,8 @@ pub(super) fn orient(
     let Some(begin) = tour.first_of_a_stroke() else {
         return Ok(0);
     };
-    // The least cost up to a stroke that is drawn as it is, and turned: then it ends where it began.
+    // The least cost up to a stroke that is drawn as it is, and that of the same stroke reversed,
+    // which then ends where it began. The first stroke is not reversed.
     let mut least = [0, i64::MAX / 2];
     let (mut ends, mut first_start, mut old) = ([NONE; 2], NONE, 0);
     let mut strokes = 0;
@@ -50,7 +52,7 @@ pub(super) fn orient(
     if gain <= 0 {
         return Ok(0);
     }
-    // Back from the last stroke: which way each must be drawn for the best end.
+    // Go back from the last stroke, and find for each stroke the direction that gives the best end.
     let mut way = u8::from(closed[1] < closed[0]);
     for stroke in (1..strokes).rev() {
         way = core::mem::replace(&mut ways[stroke], way) >> way & 1;
@@ -71,15 +73,15 @@ pub(super) fn orient(
 }
 
 impl Exchanges<'_, '_> {
-    /// A leg before which the pen is lifted; the gap of an open path.
+    /// Returns a leg before which the pen is lifted; for an open path, the gap.
     fn first_of_a_stroke(&self) -> Option<Leg> {
         let legs = || (0..self.cycle.len()).map(|index| self.cycle.leg(index));
         let begins = |leg: &Leg| self.move_after(self.cycle.previous(*leg)) > 0;
         legs().find(|&leg| self.is_gap(leg)).or_else(|| legs().find(begins))
     }
 
-    /// The last leg drawn without a lift from `leg` on; the gap is a stroke by itself, and a stroke
-    /// ends before `begin`.
+    /// Returns the last leg that is drawn without a lift from `leg` on. The gap is a stroke by
+    /// itself, and a stroke ends before `begin`.
     fn last_of_stroke(&self, leg: Leg, begin: Leg) -> Leg {
         let mut last = leg;
         while !self.is_gap(last) && self.move_after(last) == 0 {

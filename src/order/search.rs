@@ -1,63 +1,67 @@
-//! The search for the next step of an exchange.
+//! Searches the next step of an exchange.
 //!
-//! From the first cut the way goes on to the stations near it, each move there is cut in turn, and the same
-//! again from the other side of that cut. It is the innermost of all loops of the order: what a way leaves
-//! in hand is mostly seen without a distance, and a cut is looked up only where the tour would stay one.
+//! From the first cut, new moves are tried to the stations near it. Each move there is cut in turn,
+//! and the same is repeated from the far side of that cut. This is the innermost loop of the
+//! ordering. Therefore what remains of the gain is mostly found without computing a distance, and a
+//! cut is looked up only where the tour would stay in one piece.
 
 use super::cycle::Stand;
 use super::exchange::{Exchanges, Step};
 use super::work_budget::WorkBudget;
 use super::{Leg, NONE, OrderError};
 
-/// What became of trying a station.
+/// The result of trying a station.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Outcome {
-    /// Others may do better.
+    /// Other stations may give a better step.
     GoOn,
-    /// It is too far away, and so are those after it.
+    /// The station is too far away, and so are those after it.
     TooFar,
-    /// A step with a gain is found.
+    /// A step with a gain has been found.
     Found,
 }
 
-/// Where the move at the start of a leg is.
+/// The position of the move at the start of a leg.
 struct Before {
-    /// How the leg stands.
+    /// The position and the direction of the leg.
     stand: Stand,
-    /// Whether the leg goes the way of the first cut.
+    /// Whether the leg has the direction of the leg before the first cut.
     onward: bool,
-    /// How many legs the move is after the first cut, that way.
+    /// The number of legs between the first cut and this move, in the direction of the first cut.
     way: usize,
 }
 
-/// A move that is cut.
+/// A move that the step cuts.
 struct Cut {
-    /// The leg before it, the way of the first cut.
+    /// The leg before the cut, in the direction of the first cut.
     leg: Leg,
-    /// Whether the leg after it was sought, else that before it.
+    /// Whether the new move leads to the start of the leg after the cut; otherwise it leads to the
+    /// end of the leg before the cut.
     onward: bool,
-    /// The station on the other side of it.
+    /// The station on the other side of the cut.
     far: u16,
-    /// How many legs it is after the first cut.
+    /// The number of legs between the first cut and this one.
     way: usize,
 }
 
-/// A search for a step from the cut after `a`.
+/// A search for a step that begins with the cut after `a`.
 pub(super) struct StepSearch<'e, 's, 'a> {
     tour: &'e Exchanges<'s, 'a>,
     a: Leg,
     b: Leg,
     a_stands: Stand,
-    /// The station after the first cut, where the tour is to be joined again.
+    /// The station after the first cut, where the tour will be joined again.
     first: u16,
-    /// From there to the nearer end of the path; far if it is a cycle.
+    /// The cost from `first` to the nearer end of the path; very large if the tour is a closed
+    /// cycle.
     to_ends: i64,
-    /// The step that leaves a gain, or the most in hand.
+    /// The best step found: one with a gain, or else the one that leaves the most gain in hand.
     best: Option<Step>,
 }
 
 impl<'e, 's, 'a> StepSearch<'e, 's, 'a> {
-    /// The first step found that leaves a gain, else the one that leaves the most of `hand`.
+    /// Returns the first step found that leaves a gain, or else the one that leaves the most of
+    /// `hand`; `None` if no step is possible.
     pub fn best_step(
         tour: &'e Exchanges<'s, 'a>,
         a: Leg,
@@ -82,7 +86,7 @@ impl<'e, 's, 'a> StepSearch<'e, 's, 'a> {
         Ok(search.best)
     }
 
-    /// Goes from `end` to `second` and cuts each move there.
+    /// Tries a new move from `end` to `second`, and cuts each move there in turn.
     fn second_cut(
         &mut self,
         hand: i64,
@@ -109,7 +113,7 @@ impl<'e, 's, 'a> StepSearch<'e, 's, 'a> {
                 self.best = Some(Step { gain, hand, c, onward, third: None });
                 return Ok(Outcome::Found);
             }
-            // What a longer step by the gap can do is found from its other end.
+            // A longer step through the gap is found from its other end.
             if cut.far != NONE
                 && second != NONE
                 && self.third_cuts(hand, &cut, work_budget)? == Outcome::Found
@@ -120,7 +124,7 @@ impl<'e, 's, 'a> StepSearch<'e, 's, 'a> {
         Ok(Outcome::GoOn)
     }
 
-    /// Goes on from the far side of the second cut to the stations near it.
+    /// Tries new moves from the far side of the second cut to the stations near it.
     fn third_cuts(
         &mut self,
         hand: i64,
@@ -138,7 +142,8 @@ impl<'e, 's, 'a> StepSearch<'e, 's, 'a> {
         Ok(Outcome::GoOn)
     }
 
-    /// Goes from the far side of the second cut to `third` and cuts each move there.
+    /// Tries a new move from the far side of the second cut to `third`, and cuts each move there in
+    /// turn.
     fn third_cut(
         &mut self,
         hand: i64,
@@ -154,7 +159,8 @@ impl<'e, 's, 'a> StepSearch<'e, 's, 'a> {
         }
         for leg in tour.legs_from(third) {
             let before = self.before(leg);
-            // Where the third cut may be for the tour to stay one; not at the first two.
+            // Only some positions of the third cut keep the tour in one piece, and it must differ
+            // from the first two cuts.
             let within = before.way <= second.way;
             let onward = second.onward || before.onward;
             if within == onward || before.way == 0 || before.way == second.way {
@@ -176,7 +182,7 @@ impl<'e, 's, 'a> StepSearch<'e, 's, 'a> {
         Ok(Outcome::GoOn)
     }
 
-    /// Where the move at the start of `leg` is.
+    /// Returns the position of the move at the start of `leg`.
     fn before(&self, leg: Leg) -> Before {
         let cycle = &self.tour.cycle;
         let stand = cycle.stand(leg);
@@ -189,7 +195,7 @@ impl<'e, 's, 'a> StepSearch<'e, 's, 'a> {
         Before { stand, onward, way }
     }
 
-    /// The cut of the move at the start of `leg`.
+    /// Returns the cut of the move at the start of `leg`.
     fn cut(&self, leg: Leg, Before { stand, onward, way }: Before) -> Cut {
         let previous = self.tour.cycle.before(stand);
         let far = self.tour.end(previous);

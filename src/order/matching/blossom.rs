@@ -1,26 +1,29 @@
-//! Nodes of the matching: a vertex, or a blossom, an odd ring of nodes shrunk to one.
+//! The nodes of the matching: vertices, and blossoms, which are odd rings of nodes shrunk to one
+//! node.
 //!
-//! Which vertex of a blossom is matched outside, its *base*, is all that is kept of the matching
-//! within while it is shut: whichever it is, the others pair up around the ring. So a blossom is
-//! settled when it is opened, and an augmenting path passes through it in one step.
+//! While a blossom is shrunk, only its *base* is kept of the matching inside it: the vertex that is
+//! matched outside. Whichever vertex that is, the other nodes pair up around the ring. So the
+//! matching inside is decided when the blossom is expanded, and an augmenting path passes through a
+//! blossom in one step.
 
 use super::{Label, Matching};
 use crate::order::work_budget::WorkBudget;
 use crate::order::{NONE, OrderError};
 use bytemuck::{Pod, Zeroable};
 
-/// A vertex or a blossom.
+/// A node: a vertex or a blossom.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct Node {
-    /// The blossom that it is part of, or [`NONE`].
+    /// The blossom that contains this node, or [`NONE`].
     pub parent: u16,
-    /// The next in the ring of its parent; of a blossom not in use, the next such.
+    /// The next node in the ring of the parent; for a blossom not in use, the next such blossom.
     next: u16,
-    /// The pair of vertices, this node's and the other's, by which the ring goes on to `next`. Of
-    /// an inner outermost node: the pair, the other's and this node's, by which the tree came.
+    /// The pair of vertices (the one in this node first) that connects this node with `next` in the
+    /// ring. For an inner outermost node: the pair (the one in this node second) by which the tree
+    /// reached it.
     pub link: [u16; 2],
-    /// The vertex that is matched outside; [`NONE`] of a blossom not in use.
+    /// The vertex that is matched outside the node; [`NONE`] for a blossom not in use.
     pub base: u16,
 }
 
@@ -35,7 +38,7 @@ impl Node {
 }
 
 impl Matching<'_, '_> {
-    /// Chains the blossoms, none in use yet, together.
+    /// Links the blossoms, none of which is in use yet, in a list.
     pub(super) fn lay_out_spares(&mut self) {
         let vertices = self.top.len();
         for (number, node) in (0..).zip(self.nodes.iter_mut()).skip(vertices) {
@@ -48,12 +51,12 @@ impl Matching<'_, '_> {
         usize::from(node) >= self.top.len()
     }
 
-    /// The dual of a blossom, as stored.
+    /// Returns the stored dual of a blossom.
     fn inside(&mut self, blossom: u16) -> &mut i32 {
         &mut self.slack_inside[usize::from(blossom) - self.top.len()]
     }
 
-    /// Takes an outermost node without a label into the tree.
+    /// Adds an outermost node that has no label to the tree.
     pub(super) fn enter(&mut self, node: u16, label: Label) {
         self.set_label(node, label);
         if self.is_blossom(node) {
@@ -67,7 +70,8 @@ impl Matching<'_, '_> {
         }
     }
 
-    /// Makes the dual of an outermost blossom what it is now, to stay so without a label.
+    /// Stores the current dual of an outermost blossom, so that it no longer depends on a label and
+    /// on `now`.
     pub(super) fn freeze(&mut self, blossom: u16) {
         let twice = 2 * self.now;
         match self.label(self.node(blossom).base) {
@@ -80,7 +84,7 @@ impl Matching<'_, '_> {
         }
     }
 
-    /// The inner blossom whose dual will be the first to come to nothing, and when.
+    /// Returns the inner blossom whose dual will be the first to reach 0, and the time of that.
     pub(super) fn next_opening(&self) -> Option<(i32, u16)> {
         let vertices = self.top.len();
         self.blossoms()
@@ -92,8 +96,8 @@ impl Matching<'_, '_> {
             .min()
     }
 
-    /// From an outer node towards the root: the matched pair and the pair beyond it, each lower end
-    /// first.
+    /// Returns the step from an outer node towards the root: the matched pair and the pair beyond
+    /// it, each with the vertex farther from the root first. `None` at the root.
     fn step_up(&self, outer: u16) -> Option<[[u16; 2]; 2]> {
         let base = self.node(outer).base;
         let mate = self.mate[usize::from(base)];
@@ -112,12 +116,12 @@ impl Matching<'_, '_> {
         &mut self.nodes[usize::from(node)]
     }
 
-    /// The outermost node of a vertex.
+    /// Returns the outermost node that contains a vertex.
     pub(super) fn top_of(&self, vertex: u16) -> u16 {
         self.top[usize::from(vertex)]
     }
 
-    /// How many steps it is up to the root.
+    /// Returns the number of steps from an outer node to the root.
     fn depth(&self, outer: u16) -> u16 {
         let mut depth = 0;
         let mut node = outer;
@@ -128,7 +132,7 @@ impl Matching<'_, '_> {
         depth
     }
 
-    /// The lowest node above both outer nodes.
+    /// Returns the lowest common ancestor of two outer nodes.
     fn meeting(&self, a: u16, b: u16) -> u16 {
         let (mut a, mut b) = (a, b);
         let (mut depth_a, mut depth_b) = (self.depth(a), self.depth(b));
@@ -148,13 +152,13 @@ impl Matching<'_, '_> {
         a
     }
 
-    /// Makes one outer blossom of the ring that the touching pair of two outer vertices closes.
+    /// Shrinks the ring that the touching pair of two outer vertices closes to one outer blossom.
     pub(super) fn shrink(&mut self, left: u16, right: u16) {
         let meeting = self.meeting(self.top_of(left), self.top_of(right));
         let blossom = self.spare;
         self.unused = self.unused.max(blossom + 1);
         let (mut node, mut onward) = (self.top_of(left), [left, right]);
-        // Down the left side: each node leads to the one below it.
+        // The left side of the ring is linked downwards: each node to the one below it.
         loop {
             let up = self.step_up(node);
             self.chain(node, onward, blossom);
@@ -164,7 +168,7 @@ impl Matching<'_, '_> {
             self.chain(self.top_of(mate), [mate, base], blossom);
             (node, onward) = (self.top_of(above), [above, below]);
         }
-        // Up the right side.
+        // The right side is linked upwards.
         let mut node = self.top_of(right);
         while node != meeting
             && let Some([matched, beyond]) = self.step_up(node)
@@ -188,7 +192,7 @@ impl Matching<'_, '_> {
         }
     }
 
-    /// Puts `node` into the ring of `blossom`, which goes on by the pair `onward`.
+    /// Adds `node` to the ring of `blossom`. The pair `onward` leads to the next node of the ring.
     fn chain(&mut self, node: u16, onward: [u16; 2], blossom: u16) {
         if self.is_blossom(node) {
             self.freeze(node);
@@ -200,7 +204,7 @@ impl Matching<'_, '_> {
         node.parent = blossom;
     }
 
-    /// The node of the ring of `blossom` that holds `vertex`.
+    /// Returns the node of the ring of `blossom` that contains `vertex`.
     fn within(&self, blossom: u16, vertex: u16) -> u16 {
         let mut node = vertex;
         while self.node(node).parent != blossom {
@@ -209,8 +213,8 @@ impl Matching<'_, '_> {
         node
     }
 
-    /// Dissolves an outermost blossom: the nodes of its ring become outermost. Returns the one that
-    /// holds the base.
+    /// Expands an outermost blossom: the nodes of its ring become outermost. Returns the one that
+    /// contains the base.
     fn open(&mut self, blossom: u16) -> u16 {
         for vertex in 0..self.top.len() as u16 {
             if self.top_of(vertex) == blossom {
@@ -220,8 +224,8 @@ impl Matching<'_, '_> {
         self.settle(blossom)
     }
 
-    /// Matches the nodes of an outermost blossom around its ring, from the one that holds the base,
-    /// which is returned. The blossom is no more.
+    /// Matches the nodes of an outermost blossom around its ring, starting after the one that
+    /// contains the base. Returns that node, and frees the blossom.
     fn settle(&mut self, blossom: u16) -> u16 {
         let base = self.node(blossom).base;
         let first = self.within(blossom, base);
@@ -244,8 +248,8 @@ impl Matching<'_, '_> {
         first
     }
 
-    /// Dissolves an inner blossom whose dual has come to nothing. The part of its ring between the
-    /// tree above and the tree below takes its place, the rest leaves the tree.
+    /// Expands an inner blossom whose dual has reached 0. The part of its ring that connects the
+    /// tree above with the tree below replaces it; the rest leaves the tree.
     pub(super) fn open_inner(
         &mut self,
         blossom: u16,
@@ -263,8 +267,9 @@ impl Matching<'_, '_> {
             let vertices = self.candidates(node).len();
             self.charge(vertices, work_budget)?;
             self.set_label(node, Label::Outside);
-            // The pairs matched are 1 and 2, 3 and 4 and so on, so the way from the entrance by its
-            // partner to the base goes back from an even position and forward from an odd one.
+            // The nodes 1 and 2, 3 and 4, and so on are matched. So the path from the entrance
+            // through its partner to the base goes backwards from an even position and forwards
+            // from an odd one.
             let back = position.is_multiple_of(2);
             if index == 0
                 || (index % 2 == position % 2 && (index < position) == back)
@@ -292,7 +297,7 @@ impl Matching<'_, '_> {
         Ok(())
     }
 
-    /// How many places in the ring `node` is after `first`.
+    /// Returns how many nodes after `first` in the ring `node` is.
     fn position(&self, first: u16, node: u16) -> u16 {
         let mut position = 0;
         let mut at = first;
@@ -303,7 +308,7 @@ impl Matching<'_, '_> {
         position
     }
 
-    /// Settles every blossom, so that every vertex has its mate.
+    /// Expands every blossom, so that every vertex has its partner.
     pub(super) fn settle_all(
         &mut self,
         work_budget: &mut WorkBudget<'_>,

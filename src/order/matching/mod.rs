@@ -1,18 +1,20 @@
-//! Pen-up moves of the least total length: minimum-weight perfect matching, proved by its duals.
+//! Pairs the odd points with the least total length: minimum-weight perfect matching, proved by its
+//! duals.
 //!
-//! Edmonds' blossom algorithm in its primal-dual form, one alternating tree at a time. Every
-//! vertex has a dual (think of a disc around it), every blossom, an odd set shrunk to one node, a
-//! dual that lets the discs within overlap. No two discs of different nodes overlap; the pairs of
-//! the matching touch. So the duals add up to the weight of the matching, and no matching can
-//! weigh less. From a free vertex a tree grows over touching pairs, and the duals move, until it
-//! reaches another free vertex; the matching then changes along the path between them.
+//! This is Edmonds' blossom algorithm in its primal-dual form, with one alternating tree at a time.
+//! Every vertex has a dual, which can be pictured as the radius of a disc around it. A blossom is
+//! an odd set of vertices shrunk to one node; its dual lets the discs inside it overlap. No two
+//! discs of different nodes overlap, and the discs of each matched pair touch. So the sum of the
+//! duals equals the weight of the matching, and no matching can weigh less. A tree grows from an
+//! unmatched vertex over touching pairs, while the duals change, until it reaches another unmatched
+//! vertex. Then the matching is changed along the path between them.
 //!
-//! Distances come from the coordinates when they are asked for, and seldom: vertices are numbered by
-//! their x, those too far to touch by that alone are not looked at, and a pair whose boxes already keep
-//! it too far apart is passed over. Weights are twice the distances, so that all
-//! duals stay whole numbers. Memory: [`scratch_bytes`], a few dozen bytes for each vertex.
-//! After Edmonds, "Paths, trees, and flowers" (1965), and Galil, "Efficient algorithms for finding
-//! maximum matching in graphs" (1986).
+//! Distances are computed from the coordinates when they are needed, which is seldom. Vertices are
+//! numbered in the order of their x, so that those too far away along x are not looked at, and
+//! pairs too far apart by the greater of their differences in x and y are skipped. Weights are
+//! twice the distances, so that all duals are whole numbers. The memory is a few dozen bytes for
+//! each vertex: [`scratch_bytes`]. After Edmonds, "Paths, trees, and flowers" (1965), and Galil,
+//! "Efficient algorithms for finding maximum matching in graphs" (1986).
 
 mod blossom;
 mod start;
@@ -25,28 +27,28 @@ use blossom::Node;
 use core::cell::Cell;
 use core::ops::Range;
 
-/// Later than anything that happens.
+/// A time later than any event.
 const NEVER: i32 = 1 << 30;
-/// No vertex.
+/// A range without vertices.
 const NOTHING: Range<u16> = Range { start: NONE, end: 0 };
-/// Distances are shortened by bits until they stay below this, so that sums of four weights fit.
+/// Distances are shifted right until they are below this, so that a sum of four weights fits.
 const DISTANCE_LIMIT: u32 = 1 << 27;
 
-/// What the tree says of a vertex, and so of the node it belongs to.
+/// The role of a vertex in the tree, which is that of its outermost node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 enum Label {
-    /// Not in the tree.
+    /// The node is not in the tree.
     Outside = 0,
-    /// In the tree, an even number of pairs from the root: its disc grows.
+    /// The node is in the tree, an even number of pairs from the root: its disc grows.
     Outer = 1,
-    /// As `Outer`, but its pairs have not been looked at yet.
+    /// As `Outer`, but the pairs of the vertex have not been examined yet.
     Fresh = 2,
-    /// In the tree, an odd number of pairs from the root: its disc shrinks.
+    /// The node is in the tree, an odd number of pairs from the root: its disc shrinks.
     Inner = 3,
 }
 
-/// Bytes of scratch for `count` vertices (odd points and free ends).
+/// Returns the scratch memory needed for `count` vertices (odd points and free ends), in bytes.
 pub const fn scratch_bytes(count: usize) -> usize {
     Scratch::bytes_for::<Node>(count + count / 2)
         + Scratch::bytes_for::<i32>(count / 2)
@@ -55,9 +57,10 @@ pub const fn scratch_bytes(count: usize) -> usize {
         + Scratch::bytes_for::<u8>(count)
 }
 
-/// Pairs all of `odd` with the least total length: `mate[i]` is the partner of odd point `i`.
-/// Returns a lower bound of that length in 1/256 steps: the length itself, unless the drawing is so
-/// large (above 2^19 steps) that the lengths had to be rounded further.
+/// Pairs all of `odd` with the least total length: `mate[i]` becomes the partner of odd point `i`.
+///
+/// Returns a lower bound of that length in 1/256 steps. The bound is the length itself, unless the
+/// drawing is so large (above 2^19 steps) that the lengths had to be rounded further.
 pub(super) fn pair<'s>(
     odd: &'s OddPoints<'s>,
     mut scratch: Scratch<'s>,
@@ -77,42 +80,47 @@ pub(super) fn pair<'s>(
 
 struct Matching<'s, 'a> {
     odd: &'s OddPoints<'a>,
-    /// Vertices, then blossoms.
+    /// The vertices, followed by the blossoms.
     nodes: &'s mut [Node],
-    /// The outermost node of each vertex.
+    /// The outermost node that contains each vertex.
     top: &'s mut [u16],
-    /// The partner of each vertex that is the base of an outermost node; of no worth for others.
+    /// The partner of each vertex that is the base of an outermost node; meaningless for other
+    /// vertices.
     mate: &'s mut [u16],
     label: &'s mut [u8],
-    /// The dual of each vertex: plus `now` if its node is outer, minus `now` if inner.
+    /// The dual of each vertex. The current value is this plus `now` if its node is outer, and
+    /// minus `now` if it is inner.
     radius: &'s mut [i32],
-    /// The dual of each blossom: plus or minus twice `now` if it is outermost.
+    /// The dual of each blossom. If it is outermost and in the tree, the current value is this plus
+    /// twice `now` (outer) or minus twice `now` (inner).
     slack_inside: &'s mut [i32],
-    /// No other vertices are fresh.
+    /// A range that contains all fresh vertices.
     fresh: Range<u16>,
-    /// When the best pair of each vertex with an outer vertex will touch.
+    /// The time at which the best known pair of each vertex with an outer vertex will touch. Times
+    /// are values of `now`.
     when: &'s mut [i32],
-    /// That outer vertex.
+    /// The outer vertex of that pair.
     best: &'s mut [u16],
-    /// Of the odd points, no others know such a pair.
+    /// A range that contains all odd points for which such a pair is known.
     reached: Range<u16>,
-    /// How far the duals of the tree have moved since it was planted.
+    /// The time: how far the duals of the tree have moved since it was started.
     now: i32,
-    /// The greatest radius when it was planted.
+    /// The greatest radius when the tree was started.
     widest: i32,
-    /// When the tree will reach a free vertex by the best pair known.
+    /// The time at which the tree will reach an unmatched vertex by the best pair known.
     limit: i32,
-    /// The first of the blossoms not in use.
+    /// The first blossom in the list of those not in use.
     spare: u16,
-    /// No blossom from this on has ever been in use.
+    /// The blossoms from this number on have never been in use.
     unused: u16,
-    /// How many inner blossoms there are.
+    /// The number of inner blossoms.
     inner_blossoms: u16,
-    /// How many bits the distances are shortened by.
+    /// The number of bits by which the distances are shifted right.
     shortened: u32,
-    /// The weight of a pair with a free end: the same for all, so that it does not matter.
+    /// The weight of a pair of an odd point and a free end. It is the same for all, so it does not
+    /// change which matching is the best.
     end_weight: i32,
-    /// Square roots not yet charged to the pace.
+    /// The number of square roots not yet counted in the work budget.
     roots: Cell<u32>,
 }
 
@@ -164,7 +172,7 @@ impl<'s, 'a> Matching<'s, 'a> {
         Ok(matching)
     }
 
-    /// Twice the distance.
+    /// Returns the weight of a pair: twice the distance of two odd points.
     fn weight(&self, a: u16, b: u16) -> i32 {
         let real = self.odd.real_count();
         if a < real && b < real {
@@ -176,12 +184,13 @@ impl<'s, 'a> Matching<'s, 'a> {
         }
     }
 
-    /// No less than this is the weight of a pair of odd points, by their x alone.
+    /// Returns a lower bound of the weight of a pair of odd points, from their x alone.
     fn weight_along_x(&self, a: u16, b: u16) -> i32 {
         2 * (self.odd.distance_along_x(a, b) >> self.shortened) as i32
     }
 
-    /// The weight if it is less than `bound`; most are seen not to be without a square root.
+    /// Returns the weight if it is less than `bound`. Most pairs that weigh more are rejected
+    /// without a square root.
     fn weight_below(&self, a: u16, b: u16, bound: i32) -> Option<i32> {
         if bound <= 0 || (self.odd.least_distance(a, b) >> self.shortened) as i32 * 2 >= bound {
             return None;
@@ -191,7 +200,8 @@ impl<'s, 'a> Matching<'s, 'a> {
         (weight < bound).then_some(weight)
     }
 
-    /// Charges the square roots since the last time, and so many vertices looked at.
+    /// Counts in the work budget the square roots since the last call, and that `vertices` vertices
+    /// were looked at.
     fn charge(&self, vertices: usize, work_budget: &mut WorkBudget<'_>) -> Result<(), OrderError> {
         work_budget.work(1 + self.roots.take() + vertices as u32 / 12)?;
         Ok(())
@@ -206,7 +216,7 @@ impl<'s, 'a> Matching<'s, 'a> {
         }
     }
 
-    /// The dual of `vertex` as it is now.
+    /// Returns the current dual of `vertex`.
     fn radius_now(&self, vertex: u16) -> i32 {
         let radius = self.radius[usize::from(vertex)];
         match self.label(vertex) {
@@ -216,7 +226,7 @@ impl<'s, 'a> Matching<'s, 'a> {
         }
     }
 
-    /// Gives all vertices of an outermost node a label; their duals stay what they are.
+    /// Gives all vertices of an outermost node a label. Their current duals do not change.
     fn set_label(&mut self, node: u16, label: Label) {
         for vertex in self.candidates(node) {
             if self.top_of(vertex) == node {
@@ -225,7 +235,7 @@ impl<'s, 'a> Matching<'s, 'a> {
         }
     }
 
-    /// The vertices that may be in an outermost node.
+    /// Returns a range that contains all vertices of an outermost node.
     fn candidates(&self, node: u16) -> Range<u16> {
         let all = self.top.len() as u16;
         if node < all { node..node + 1 } else { 0..all }
@@ -246,7 +256,8 @@ impl<'s, 'a> Matching<'s, 'a> {
         };
     }
 
-    /// Grows a tree from the free vertex `root` until it reaches another one, and matches both.
+    /// Grows a tree from the unmatched vertex `root` until it reaches another one, and matches
+    /// both.
     fn grow_tree(&mut self, root: u16, work_budget: &mut WorkBudget<'_>) -> Result<(), OrderError> {
         self.now = 0;
         self.widest = self.radius.iter().copied().max().unwrap_or(0);
@@ -291,7 +302,8 @@ impl<'s, 'a> Matching<'s, 'a> {
         }
     }
 
-    /// The first pair with an outer vertex that will touch: when, and its other vertex.
+    /// Returns the first pair with an outer vertex that will touch: the time, and the vertex that
+    /// is not the outer one in `best`.
     fn next_touch(&self) -> (i32, u16) {
         let mut first = (NEVER, 0);
         for Range { start, end } in [self.reached.clone(), self.odd.free_numbers()] {
@@ -305,7 +317,7 @@ impl<'s, 'a> Matching<'s, 'a> {
         first
     }
 
-    /// Looks at the pairs of every fresh vertex.
+    /// Examines the pairs of every fresh vertex.
     fn look_around(&mut self, work_budget: &mut WorkBudget<'_>) -> Result<(), OrderError> {
         for vertex in core::mem::replace(&mut self.fresh, NOTHING) {
             if self.label(vertex) == Label::Fresh {
@@ -316,8 +328,8 @@ impl<'s, 'a> Matching<'s, 'a> {
         Ok(())
     }
 
-    /// Notes at all other vertices when their pair with the outer vertex `from` will touch, if that
-    /// is sooner than what they know.
+    /// Records at all other vertices when their pair with the outer vertex `from` will touch, if
+    /// that is sooner than the time recorded there.
     fn look_from_outer(
         &mut self,
         from: u16,
@@ -336,10 +348,12 @@ impl<'s, 'a> Matching<'s, 'a> {
         Ok(())
     }
 
-    /// Notes when the pair of `other` with the outer vertex `from`, of radius `own`, will touch.
+    /// Records when the pair of `other` with the outer vertex `from`, whose current radius is
+    /// `own`, will touch, if that is sooner than the time recorded.
     fn look_at(&mut self, other: u16, label: Label, from: u16, own: i32) {
         let (now, index) = (self.now, usize::from(other));
-        // Outside, the gap closes from one side; between outer vertices, from both.
+        // If `other` is outside the tree, only the disc of `from` grows; between two outer vertices
+        // both discs grow.
         let left = self.when[index].min(self.limit) - now;
         let (sides, reach) = match label {
             Label::Outside => (1, self.radius[index]),
@@ -355,7 +369,7 @@ impl<'s, 'a> Matching<'s, 'a> {
         }
     }
 
-    /// Notes when the pair of `vertex` with the outer vertex `best` will touch.
+    /// Records when the pair of `vertex` with the outer vertex `best` will touch.
     fn note(&mut self, vertex: u16, when: i32, best: u16) {
         self.when[usize::from(vertex)] = when;
         self.best[usize::from(vertex)] = best;
@@ -364,21 +378,22 @@ impl<'s, 'a> Matching<'s, 'a> {
         }
     }
 
-    /// The vertices that may touch one whose radius is now `own` before the tree reaches a free one.
+    /// Returns the vertices that may touch `vertex`, whose current radius is `own`, before the tree
+    /// reaches an unmatched vertex.
     fn within_limit(
         &self,
         vertex: u16,
         own: i32,
         work_budget: &mut WorkBudget<'_>,
     ) -> Result<[Range<u16>; 2], OrderError> {
-        // The gap closes from both sides at most; no radius has grown by more than `now`.
+        // At most, both discs grow; no radius has grown by more than `now`.
         let closing = 2 * i64::from(self.limit - self.now);
         let weight = closing + i64::from(own) + i64::from(self.widest) + i64::from(self.now);
         self.up_to(vertex, weight, work_budget)
     }
 
-    /// No other odd points have a pair with `vertex` of at most this weight; and the free ends. They are
-    /// about to be looked at.
+    /// Returns a range that contains all odd points whose pair with `vertex` weighs at most
+    /// `weight`, and the range of the free ends. Counts the work of looking at them.
     fn up_to(
         &self,
         vertex: u16,
@@ -396,7 +411,7 @@ impl<'s, 'a> Matching<'s, 'a> {
         self.mate[usize::from(base)] == NONE
     }
 
-    /// Finds anew when the first pair of `vertex`, outside or outer, with an outer vertex of
+    /// Computes again when the first pair of `vertex` (outside or outer) with an outer vertex of
     /// another node will touch.
     fn look_from(
         &mut self,
@@ -422,7 +437,7 @@ impl<'s, 'a> Matching<'s, 'a> {
         Ok(())
     }
 
-    /// The same for each vertex of a node.
+    /// Does the same for each vertex of a node.
     fn look_from_each(
         &mut self,
         node: u16,
@@ -436,7 +451,8 @@ impl<'s, 'a> Matching<'s, 'a> {
         Ok(())
     }
 
-    /// Matches the path from the root to `outer`, and `outer` with the free vertex `free`.
+    /// Changes the matching along the path from the root to `outer`, and matches `outer` with the
+    /// unmatched vertex `free`.
     fn augment(&mut self, outer: u16, free: u16) {
         let mut pair = [outer, free];
         loop {
@@ -455,12 +471,12 @@ impl<'s, 'a> Matching<'s, 'a> {
         }
     }
 
-    /// The blossoms that are or were in use.
+    /// Returns the blossoms that are or were in use.
     fn blossoms(&self) -> Range<u16> {
         self.odd.count()..self.unused
     }
 
-    /// Takes all labels off.
+    /// Removes all labels, after the duals have been stored.
     fn fell_tree(&mut self) {
         for blossom in self.blossoms() {
             if self.node(blossom).is_outermost() {
@@ -472,7 +488,8 @@ impl<'s, 'a> Matching<'s, 'a> {
         }
     }
 
-    /// The length of the matching, without the free ends, in 1/256 steps, rounded as the weights.
+    /// Returns the length of the matching without the free ends, in 1/256 steps, rounded as the
+    /// weights are.
     fn length(&self) -> u64 {
         let twice: u64 = (0..self.odd.real_count())
             .filter_map(|vertex| {
@@ -485,7 +502,7 @@ impl<'s, 'a> Matching<'s, 'a> {
     }
 }
 
-/// Takes `vertex` into the range.
+/// Extends `range` so that it contains `vertex`.
 fn cover(range: &mut Range<u16>, vertex: u16) {
     *range = range.start.min(vertex)..range.end.max(vertex + 1);
 }

@@ -1,21 +1,21 @@
-//! A start that leaves few vertices free: duals as large as the nearest neighbours let them be, and
-//! the pairs that touch then.
+//! Makes a starting solution that leaves few vertices unmatched: the duals are as large as the
+//! nearest neighbours allow, and the pairs that then touch are matched.
 
 use super::Matching;
 use crate::order::work_budget::WorkBudget;
 use crate::order::{NONE, OrderError};
 
 impl Matching<'_, '_> {
-    /// Sets the duals and matches what touches.
+    /// Sets the duals and matches the pairs that touch.
     pub(super) fn start(&mut self, work_budget: &mut WorkBudget<'_>) -> Result<(), OrderError> {
         let real = self.odd.real_count();
         for vertex in 0..real {
             let nearest = self.nearest(&mut (0..vertex).rev(), vertex, i32::MAX, work_budget)?;
             let nearest = self.nearest(&mut (vertex + 1..real), vertex, nearest, work_budget)?;
-            // Half the weight each: no two discs overlap.
+            // Each gets half the weight of its lightest pair, so that no two discs overlap.
             self.radius[usize::from(vertex)] = nearest / 2;
         }
-        // With this weight the free ends, of no radius, overlap none either.
+        // With this weight the free ends, whose radius is 0, overlap no disc either.
         self.end_weight = self.radius.iter().copied().max().unwrap_or(0);
         self.widest = self.end_weight;
         for vertex in 0..self.odd.count() {
@@ -26,8 +26,9 @@ impl Matching<'_, '_> {
         Ok(())
     }
 
-    /// The weight of the lightest pair of `vertex` with any of `others`, which lie ever farther from it
-    /// along x, if that is below `bound`, else `bound`.
+    /// Returns the weight of the lightest pair of `vertex` with any of `others`, or `bound` if none
+    /// is below it. The distance along x from `vertex` must increase from each of `others` to the
+    /// next.
     fn nearest(
         &self,
         others: &mut dyn Iterator<Item = u16>,
@@ -50,13 +51,13 @@ impl Matching<'_, '_> {
         Ok(nearest)
     }
 
-    /// Lets the disc of a free vertex grow until it touches another, and matches them if that one
-    /// is free too.
+    /// Grows the disc of an unmatched vertex until it touches another, and matches them if that one
+    /// is unmatched too.
     fn widen(&mut self, vertex: u16, work_budget: &mut WorkBudget<'_>) -> Result<(), OrderError> {
         let own = self.radius[usize::from(vertex)];
         let mut gap = i32::MAX / 2;
         let mut touched = NONE;
-        // Its nearest neighbour is no farther than twice its radius, and one.
+        // Its nearest neighbour is at most twice its radius and 1 away.
         let weight = 2 * i64::from(own) + 1 + i64::from(self.widest);
         for others in self.up_to(vertex, weight, work_budget)? {
             for other in others.filter(|&other| other != vertex) {
