@@ -1,64 +1,67 @@
-//! What the user chose to look through, and the axes that follow from it.
+//! The camera that the user chose, and the image axes that follow from it.
 //!
-//! The one place for angles, square roots and binary floats: once per view, in `libm`.
+//! This is the only module of the view with angles, square roots and binary floating-point numbers.
+//! They are computed once per view, in `libm`.
 
 use super::ViewError;
 use crate::fixed::sin_cos_degrees;
 use crate::geometry::Projection;
 use crate::model::Model;
 
-/// A point or direction of the model's space, for angles only.
+/// A point or direction in model space. It is used only to set up the camera.
 pub type Direction = [f64; 3];
 
-/// Where the user looks from, and through what.
+/// The pose and the lens that the user chose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Camera {
-    /// Where the eye is and which way it looks.
+    /// The position of the eye and the direction in which it looks.
     pub sight: Pose,
-    /// How lines of sight run.
+    /// The kind of projection.
     pub lens: Lens,
 }
 
-/// Where the eye is and which way it looks.
+/// The position of the eye and the direction in which it looks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Pose {
-    /// From one point to another (Brown IV).
+    /// The eye looks from one point towards another (Brown IV).
     Towards {
         /// The eye, in model units.
         eye: Direction,
-        /// The point looked at; its image is the origin.
+        /// The point looked at, in model units. Its image is the origin of the page.
         at: Direction,
-        /// What is up; `None`: z, or y where the line of sight is along z.
+        /// The up direction. With `None` it is z, or y if the line of sight runs along z.
         up: Option<Direction>,
     },
-    /// Harrison's viewpoint and rotation (2.3, equations 1 to 6): after turning the model by γ about
-    /// z, β about y and α about x, the line of sight is z, y is up.
+    /// Harrison's viewpoint and rotation (2.3, equations 1 to 6). The model is turned by γ about z,
+    /// β about y and α about x; after that the line of sight is z, and y is up.
     Turned {
         /// The viewpoint, in model units.
         eye: Direction,
-        /// α, β, γ in degrees.
+        /// The angles α, β and γ, in degrees.
         angles: [f64; 3],
     },
 }
 
-/// How lines of sight run (Harrison 2.2).
+/// The kind of projection: how the lines of sight run (Harrison 2.2).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Lens {
-    /// They meet in the eye.
+    /// The lines of sight meet in the eye.
     Perspective,
-    /// They are parallel, at right angles to the page.
+    /// The lines of sight are parallel, at right angles to the page.
     Orthographic,
-    /// They are parallel, at a slant: what recedes is drawn towards `angle`, `ratio` times as long.
+    /// The lines of sight are parallel and slanted: a depth is drawn in the direction `angle`,
+    /// `ratio` times as long.
     Oblique {
-        /// Degrees from the page's x axis.
+        /// The direction in which depth is drawn, in degrees from the x axis of the page.
         angle: f64,
-        /// 1 cavalier, 0.5 cabinet; 0 to 2.
+        /// The factor by which depth is scaled, from 0 to 2: 1 for a cavalier, 0.5 for a cabinet
+        /// projection.
         ratio: f64,
     },
 }
 
 impl Lens {
-    /// Perspective or parallel.
+    /// Returns whether the projection is perspective or parallel.
     pub fn projection(self) -> Projection {
         match self {
             Self::Perspective => Projection::Perspective,
@@ -68,9 +71,10 @@ impl Lens {
 }
 
 impl Camera {
-    /// The three-quarter view that a model gets if the user chooses none: from the right, in front
-    /// and above (an oblique view: from in front), so far away that the whole model is well inside
-    /// the field. It looks at `at`, or else at the middle. `None` without vertices.
+    /// Returns the three-quarter view that a model gets if the user chooses none. It looks from the
+    /// right, from in front and from above; an oblique view looks from in front. The eye is so far
+    /// away that the whole model is well inside the field of view. The camera looks at `at`, or at
+    /// the middle of the model if that is `None`. Returns `None` for a model without vertices.
     pub fn automatic(
         model: &Model<'_>,
         lens: Lens,
@@ -84,8 +88,9 @@ impl Camera {
         Self::from_direction(model, from, lens, at, up)
     }
 
-    /// An axonometric view: from `azimuth` degrees (0 along x, -90 in front) and `elevation` degrees
-    /// above the xy plane. Isometric is (-45, 35.264…).
+    /// Returns an axonometric view from an azimuth of `azimuth` degrees (0 is along the x axis, -90
+    /// is in front) and an elevation of `elevation` degrees above the xy plane. An isometric view
+    /// is (-45, 35.264…). Returns `None` for a model without vertices.
     pub fn axonometric(
         model: &Model<'_>,
         azimuth: f64,
@@ -99,8 +104,9 @@ impl Camera {
         Self::from_direction(model, from, Lens::Orthographic, at, up)
     }
 
-    /// Harrison's view: along the z axis of the turned model (see [`Pose::Turned`]), from `eye`, or
-    /// else from so far away that the whole model is well inside the field.
+    /// Returns Harrison's view, along the z axis of the turned model (see [`Pose::Turned`]). It
+    /// looks from `eye`, or, if that is `None`, from so far away that the whole model is well
+    /// inside the field of view. Returns `None` for a model without vertices.
     pub fn turned(
         model: &Model<'_>,
         lens: Lens,
@@ -128,12 +134,15 @@ impl Camera {
     }
 }
 
-/// In radii of the model: a sphere around it fills at most 33 degrees.
+/// The distance of the automatic eye, in radii of the model. At this distance a sphere around the
+/// model fills at most 33 degrees.
 const EYE_DISTANCE: f64 = 3.5;
 
-/// The middle of the model and about how far it reaches from there.
+/// Returns the middle of the model and an estimate of its radius, both in model units. Returns
+/// `None` without vertices.
 ///
-/// The radius is an estimate that only places the automatic eye: a root of 24 bits that is some 5 % off is enough for it.
+/// The radius is used only to place the automatic eye, so a square root of 24 bits that is some 5 %
+/// off is accurate enough.
 pub(super) fn middle_and_radius(model: &Model<'_>) -> Option<(Direction, f64)> {
     let (low, high) = model.bounds()?;
     let unit = libm::ldexp(1.0, -(model.fraction_bits() as i32));
@@ -150,29 +159,33 @@ pub(super) fn middle_and_radius(model: &Model<'_>) -> Option<(Direction, f64)> {
     Some((middle, size * estimated_root(sum)))
 }
 
-/// The nearest number with the 24 bits of a single-precision float, for 0 and numbers above 2^-126.
+/// Rounds to the nearest number with the 24 bits of a single-precision float, for 0 and numbers
+/// above 2^-126.
 fn to_single(value: f64) -> f64 {
     let bits = value.to_bits();
     let half_to_even = 0x0FFF_FFFF + (bits >> 29 & 1);
     f64::from_bits((bits + half_to_even) & !0x1FFF_FFFF)
 }
 
-/// The square root of a single-precision number above 0, some 5 % off: half the exponent.
+/// Estimates the square root of a single-precision number above 0 by halving its exponent. The
+/// result is some 5 % off.
 fn estimated_root(square: f64) -> f64 {
     f64::from_bits(((square.to_bits() + 1f64.to_bits()) >> 1) & !0x1FFF_FFFF)
 }
 
-/// The lines of sight, in units of 2^-fraction_bits of the model; each coordinate within ±2^60.
+/// The lines of sight of a camera, in units of 2^-fraction_bits of the model. Each coordinate is
+/// within ±2^60.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SightLines {
-    /// They meet here.
+    /// The lines of sight meet at this point, the eye.
     Through([i64; 3]),
-    /// They are parallel; this points to the user, and is not zero.
+    /// The lines of sight are parallel. This direction points to the user and is not zero.
     EdgeParameter([i64; 3]),
 }
 
 impl Camera {
-    /// The lines of sight in units of 2^-`fraction_bits` of the model.
+    /// Returns the lines of sight of this camera, in units of 2^-`fraction_bits` of the model. An
+    /// eye too far away for these units gives parallel lines of sight.
     ///
     /// # Errors
     /// See [`ViewError`].
@@ -183,7 +196,8 @@ impl Camera {
         if self.lens.projection() == Projection::Perspective && largest_component(place) <= limit {
             return Ok(SightLines::Through(place.map(|coordinate| libm::round(coordinate) as i64)));
         }
-        // What is neither right nor up on the page; an eye too far away for numbers looks straight on.
+        // The direction that shows as a point on the page. An eye too far away for the range of
+        // numbers is treated as looking straight on.
         let sight = cross(right, up);
         let away = if dot(sight, forward) < 0.0 { 1.0 } else { -1.0 };
         let scale = away * limit / largest_component(sight);
@@ -191,12 +205,13 @@ impl Camera {
     }
 }
 
-/// The axes of the image and the point they are measured from.
+/// The axes of the image and the point from which they are measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Axes {
-    /// Right, up, away from the eye; of length 1 but for the slant of an oblique lens.
+    /// The directions right, up and away from the eye. They have length 1, except for the slant of
+    /// an oblique lens.
     pub directions: [Direction; 3],
-    /// The eye in perspective, else the point looked at.
+    /// The eye in perspective; otherwise the point looked at.
     pub origin: Direction,
 }
 
@@ -239,8 +254,8 @@ fn towards(
     Ok([right, cross(right, forward), forward])
 }
 
-/// The rows of Harrison's R = Rx Ry Rz (equation 5). His x axis is turned round: with y up and z away
-/// from the eye his axes are right-handed, and the picture would be a mirror image.
+/// Returns the rows of Harrison's R = Rx Ry Rz (equation 5), with his x axis reversed. With y up
+/// and z away from the eye his axes are right-handed, and the picture would be a mirror image.
 fn turned([alpha, beta, gamma]: [f64; 3]) -> [Direction; 3] {
     let [(sa, ca), (sb, cb), (sg, cg)] = [alpha, beta, gamma].map(sin_cos_degrees);
     let up = [sa * sb * cg + ca * sg, ca * cg - sa * sb * sg, -sa * cb];
@@ -248,7 +263,7 @@ fn turned([alpha, beta, gamma]: [f64; 3]) -> [Direction; 3] {
     [cross(forward, up), up, forward]
 }
 
-/// forward × up, of length 1, unless they are parallel but for rounding.
+/// Returns forward × up, scaled to length 1. Returns `None` if both are parallel within rounding.
 fn sideways(forward: Direction, up: Direction) -> Option<Direction> {
     let right = cross(forward, up);
     if dot(right, right) < 1e-20 { None } else { normalized(right) }
@@ -267,7 +282,7 @@ pub(super) fn largest_component(a: Direction) -> f64 {
 }
 
 fn normalized(a: Direction) -> Option<Direction> {
-    // Scaled first, so that neither huge nor tiny vectors leave the range of the squares.
+    // The vector is scaled first so that its squares neither overflow nor underflow.
     let largest = largest_component(a);
     if largest == 0.0 || !largest.is_finite() {
         return None;

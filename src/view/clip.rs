@@ -1,8 +1,8 @@
-//! The model through the view: every vertex, and what lies behind the eye cut off.
+//! Transforms a whole model to view coordinates and cuts off what is nearer than the near plane.
 //!
-//! A face that reaches behind the near plane is cut along it (Sutherland & Hodgman, one plane); edges
-//! of neighbours that are cut get the same new vertex. The cut itself is no edge of the model:
-//! no edge whose ends both lie on the near plane is to be drawn.
+//! A face that reaches behind the near plane is cut along it (Sutherland & Hodgman, with one
+//! plane). Neighbouring faces that share a cut edge get the same new vertex. The cut itself is not
+//! an edge of the model: an edge whose ends both lie on the near plane must not be drawn.
 
 use super::View;
 use super::curves::Flattening;
@@ -14,22 +14,24 @@ use crate::stage::{Cancel, OutOfScratch, Scratch, StageError, heap_sort_by_key};
 /// A model as the camera sees it.
 #[derive(Debug, Clone, Copy)]
 pub struct Seen<'a> {
-    /// The vertices of the model, and those where an edge is cut.
+    /// The vertices of the model, the ends of its flattened curves, and the points where edges are
+    /// cut.
     pub vertices: &'a [Vertex],
-    /// What is in front of the eye.
+    /// The faces and bars, or their parts, that are in front of the near plane.
     pub elements: Elements<'a>,
-    /// Faces of the model that were left out because they have no area.
+    /// The number of faces of the model that were left out because they have no area.
     pub degenerate_faces: u32,
-    /// Whether something was nearer than the near plane.
+    /// Whether any vertex was nearer than the near plane.
     pub is_cut: bool,
 }
 
-/// Takes every vertex of `model` to view coordinates, makes one of those at the same place, leaves
-/// out faces without an area, and cuts off what is nearer than the near plane. With `curves` its curves
-/// are there too, as bars between vertices of their own.
+/// Transforms every vertex of `model` to view coordinates, welds vertices at the same position,
+/// leaves out faces without an area, and cuts off what is nearer than the near plane. With
+/// `curves`, the curves of the model are included too, as bars between vertices of their own.
 ///
 /// # Errors
-/// [`StageError::Scratch`] if the vertices, or the cut faces, do not fit.
+/// [`StageError::Scratch`] if the vertices or the cut faces do not fit in the memory, and the error
+/// of `cancel` if the user cancels.
 #[inline(never)] // Its frame must not lie under the stages'.
 pub fn project_scene<'a>(
     view: &View,
@@ -56,7 +58,7 @@ pub fn project_scene<'a>(
     Ok(Seen { vertices, elements, degenerate_faces, is_cut: near.is_some() })
 }
 
-/// What of an edge is at `near` or beyond; `None` if nothing is.
+/// Returns the part of an edge at the depth `near` or beyond. Returns `None` if no part is.
 pub(super) fn clip_edge([p, q]: [Vertex; 2], near: i32) -> Option<[Vertex; 2]> {
     match (p.z >= near, q.z >= near) {
         (true, true) => Some([p, q]),
@@ -66,11 +68,11 @@ pub(super) fn clip_edge([p, q]: [Vertex; 2], near: i32) -> Option<[Vertex; 2]> {
     }
 }
 
-/// The edges of faces, and bars, each once, as numbers of vertices. Memory: 4 bytes for each side of a face and
-/// each bar.
+/// Returns the edges of the faces, and the bars, each once, as pairs of vertex numbers. It takes 4
+/// bytes of memory for each side of a face and each bar.
 ///
 /// # Errors
-/// [`OutOfScratch`] if that is not there.
+/// [`OutOfScratch`] if that memory is not available.
 pub fn distinct_edges<'a>(
     elements: Elements<'_>,
     scratch: &mut Scratch<'a>,
@@ -110,7 +112,8 @@ fn cut<'a>(
     let all = scratch.take::<Vertex>(vertices.len() + keys.len())?;
     let (same, new) = all.split_at_mut(vertices.len());
     for (vertex, original) in same.iter_mut().zip(vertices) {
-        // Vertices behind the plane have no edge any more; visibility wants them before the eye.
+        // Vertices behind the near plane no longer belong to any edge, but visibility requires
+        // every vertex to be in front of the eye.
         *vertex = Vertex { z: original.z.max(near), ..*original };
     }
     for (vertex, key) in new.iter_mut().zip(keys) {
@@ -124,7 +127,7 @@ fn cut<'a>(
         (vertices.len() + at) as u16 // below VERTEX_NUMBER_LIMIT, see above
     };
 
-    // Each cut adds at most one corner.
+    // Each edge that is cut adds at most one corner.
     let corners = scratch.take::<u16>(elements.corners().len() + count)?;
     let mut pens = PenWriter::new(scratch, elements.pens().changes())?;
     let mut length = 0;
@@ -171,13 +174,13 @@ fn cut<'a>(
 struct Edge(u16, u16);
 
 impl Edge {
-    /// The same for both directions.
+    /// Returns a key that is the same for both directions of the edge.
     fn key(self) -> u32 {
         u32::from(self.0.min(self.1)) << 16 | u32::from(self.0.max(self.1))
     }
 }
 
-/// The edges around a face, or the one of a bar.
+/// Iterates over the edges around a face, or over the single edge of a bar.
 fn edges(element: Element<'_>) -> impl Iterator<Item = Edge> + Clone {
     let (face, bar) = match element {
         Element::Face(corners) => (corners, None),
@@ -198,11 +201,12 @@ fn without_repeats(sorted: &mut [u32]) -> &[u32] {
     &sorted[..kept]
 }
 
-/// Where the line from `p` to `q`, of which one is nearer than `near`, meets the near plane.
+/// Returns the point where the edge from `p` to `q`, one end of which is nearer than `near`, meets
+/// the near plane.
 fn on_plane(p: Vertex, q: Vertex, near: i32) -> Vertex {
     let depth = i64::from(q.z) - i64::from(p.z); // not zero
     let part = i64::from(near) - i64::from(p.z);
-    // Coordinates are within 2^20: products below 2^41.
+    // Differences of coordinates are within 2^20, so products are below 2^41.
     let between = |p: i32, q: i32| {
         let rise = (i64::from(q) - i64::from(p)) * part;
         p + crate::fixed::divide_rounding(

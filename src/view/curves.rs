@@ -1,7 +1,7 @@
-//! The curves of a model through the view, as straight lines.
+//! Flattens the curves of a model, as the view shows them, into straight lines.
 //!
-//! A linear map of the control points is the same map of the curve, so a curve is evaluated in view
-//! coordinates; its chords are then bars like others.
+//! A linear map of the control points is the same map of the whole curve. So a curve is evaluated
+//! in view coordinates, and its chords are then bars like any others.
 
 use super::View;
 use super::clip::clip_edge;
@@ -10,12 +10,12 @@ use crate::geometry::{Projection, Vertex};
 use crate::model::{Corner, Elements, Model, PenWriter, VERTEX_NUMBER_LIMIT};
 use crate::stage::{Cancel, OutOfScratch, Scratch, StageError};
 
-/// How curves become straight lines: as few as stay within a tolerance on the page.
+/// The flattening of curves into as few straight lines as stay within a tolerance on the page.
 #[derive(Clone, Copy)]
 pub struct Flattening<'f> {
-    /// Where the image (x/w, y/w) is on the page in fine units, usually 1/256 step.
+    /// Maps the image point (x/w, y/w) to the page, in fine units, usually 1/256 step.
     pub on_page: &'f dyn Fn(i64, i64, i64) -> Fine,
-    /// In the same units.
+    /// The greatest deviation of a chord from its curve on the page, in the same units.
     pub tolerance: u16,
 }
 
@@ -37,8 +37,8 @@ impl Flattening<'_> {
         model.curves().flatten(points, &project, self.tolerance, cancel, each)
     }
 
-    /// Hands over each chord of the model's curves in view coordinates, what is nearer than the near
-    /// plane cut off. Memory: 12 bytes for each vertex of the model.
+    /// Hands each chord of the curves of the model to `each`, in view coordinates. What is nearer
+    /// than the near plane is cut off. It takes 12 bytes of memory for each vertex of the model.
     ///
     /// # Errors
     /// See [`StageError`].
@@ -65,7 +65,8 @@ impl Flattening<'_> {
         })
     }
 
-    /// The vertices of the model and the ends of the chords of its curves; `elements` and a bar for each chord.
+    /// Returns the vertices of the model together with the ends of the chords of its curves, and
+    /// `elements` together with a bar for each chord.
     pub(super) fn add<'a>(
         &self,
         view: &View,
@@ -74,7 +75,7 @@ impl Flattening<'_> {
         scratch: &mut Scratch<'a>,
         cancel: &mut dyn Cancel,
     ) -> Result<(&'a [Vertex], Elements<'a>), StageError> {
-        // The number after the last end of each curve.
+        // For each curve, the vertex number after that of its last chord end.
         let curve_ends = scratch.take::<u16>(model.curve_count())?;
         let first = model.vertices().len();
         let vertices = scratch.take_filled::<Vertex, StageError>(|room| {

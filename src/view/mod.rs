@@ -1,11 +1,15 @@
-//! The camera: two points or three angles to integers (x, y, z), z the depth; clip at the eye.
+//! The camera: transforms the vertices of a model to integer view coordinates (x, y, z), where z is
+//! the depth, and clips what lies behind the eye.
 //!
-//! A [`Camera`] is what the user chose; a [`View`] is that camera looking at one model: a linear map
-//! in fixed point that takes every position to view coordinates within ±2^19. This rounding, once
-//! per vertex and view, is the only one before the page. Square roots and angles happen once per
-//! view, in `libm`, so every machine gets the same map. What lies behind the eye or level with it is
-//! cut off by [`project_scene`], vertices at the same place become one. Refused: an eye at the point looked at, an up direction along the line of
-//! sight, a model wholly behind the eye.
+//! A [`Camera`] is what the user chose: two points or three angles, and a lens. A [`View`] is that
+//! camera applied to one model: a linear map in fixed point that takes every position to view
+//! coordinates within ±2^19. This rounding, once per vertex and view, is the only one before the
+//! page. Square roots and angles are computed once per view, in `libm`, so every machine gets the
+//! same map. [`project_scene`] cuts off what lies behind the eye or level with it, and welds
+//! vertices at the same position.
+//!
+//! Refused are an eye at the point looked at, an up direction along the line of sight, and a model
+//! that lies entirely behind the eye.
 //!
 //! Sources: Harrison 2.2 and 2.3 (equations 1 to 10) and Brown IV (the view from two points).
 
@@ -23,7 +27,7 @@ use crate::model::{Model, Position};
 use crate::stage::{Aborted, Cancel};
 use camera::{Axes, dot, largest_component};
 
-/// Why there is no view.
+/// The reasons why a camera has no view of a model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ViewError {
@@ -33,26 +37,30 @@ pub enum ViewError {
     EyeAtTarget,
     /// The up direction is along the line of sight, or zero.
     UpAlongSight,
-    /// The whole model is level with the eye or behind it.
+    /// The whole model lies level with the eye or behind it.
     NothingInFront,
-    /// A vertex is level with the eye or behind it, and the user wants no clipping.
+    /// A vertex lies level with the eye or behind it, and the user does not want clipping.
     BehindEye {
-        /// The vertex, from 1.
+        /// The number of the vertex, counted from 1.
         vertex: usize,
     },
 }
 
-/// A camera that looks at one model: the map from its positions to view coordinates.
+/// A camera applied to one model: the map from positions to view coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct View {
+    /// The rows of the map, for x, y and z.
     rows: [Row; 3],
     projection: Projection,
+    /// See [`Self::image_unit`].
     image_unit: f64,
+    /// See [`Self::depth_stretch`].
     depth_stretch: (u32, u32),
+    /// See [`Self::near`].
     near: Option<i32>,
 }
 
-/// One row of the map: (m · position + offset) >> shift, rounded.
+/// One row of the map. Its result is (m · position + offset) >> shift, rounded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Row {
     m: [i32; 3],
@@ -62,7 +70,8 @@ struct Row {
 
 impl Row {
     fn apply(&self, position: Position) -> i32 {
-        // |m| <= 2^30 and |position| <= 2^30: each product below 2^60; `Row::new` keeps the sum below 2^62.
+        // Both |m| and |position| are at most 2^30, so each product is at most 2^60; `Row::new`
+        // keeps the sum below 2^62.
         let sum = self
             .m
             .iter()
@@ -73,9 +82,12 @@ impl Row {
         ((sum + (1 << (self.shift - 1))) >> self.shift) as i32
     }
 
-    /// scale (direction · p) + offset for p = position × 2^-fraction_bits, |result| < 2^20.
+    /// Creates the row that computes scale (direction · p) + offset, where p = position ×
+    /// 2^-fraction_bits. The absolute value of the result is below 2^20. `reach` is an upper bound
+    /// of |p|.
     fn new(direction: Direction, scale: f64, offset: f64, fraction_bits: u32, reach: f64) -> Self {
-        // `reach` bounds |direction · p|. Both limits keep the sum and each factor in range.
+        // Since `reach` times the length bounds |direction · p|, these two limits on the shift keep
+        // the sum and each factor in range.
         let length = libm::sqrt(dot(direction, direction));
         let largest = scale * reach * length + libm::fabs(offset) + 1.0;
         let steepest = scale * largest_component(direction);
@@ -91,19 +103,20 @@ impl Row {
     }
 }
 
-/// The least e with |value| < 2^e, for a positive finite value.
+/// Returns the least e with |value| < 2^e, for a positive finite value.
 fn exponent(value: f64) -> i32 {
     libm::frexp(value).1
 }
 
-/// Vertices taken through the camera between two looks up from the work: some 100,000 instructions.
+/// The number of vertices that are transformed between two checks for cancelling. They take some
+/// 100,000 instructions.
 const VERTICES_BETWEEN_CHECKS: usize = 256;
 
-/// The near plane is at this fraction of the greatest depth: 2^-10.
+/// The near plane is at 2^-`NEAR_SHIFT` of the greatest depth.
 const NEAR_SHIFT: u32 = 10;
 
 impl View {
-    /// Looks at `model` through `camera`.
+    /// Computes the view of `model` through `camera`.
     ///
     /// # Errors
     /// See [`ViewError`].
@@ -121,7 +134,7 @@ impl View {
             .flat_map(|&row: &usize| [extents[row].0 + shift[row], extents[row].1 + shift[row]])
             .fold(0.0, |most, value| f64::max(most, libm::fabs(value)));
         let (nearest, farthest) = (extents[2].0 + shift[2], extents[2].1 + shift[2]);
-        // What is narrower than some units of 2^-30 is rounding noise of the directions.
+        // An extent of only a few units of 2^-30 is rounding noise of the directions.
         let noise = if reach > 0.0 { reach * 6e-8 } else { 1.0 };
         let scale = limit / f64::max(width, noise);
         let (depth_scale, depth_offset) = match projection {
@@ -131,7 +144,7 @@ impl View {
                 }
                 (limit / f64::max(f64::max(farthest, -nearest), noise), 0.0)
             }
-            // Only differences of depth matter: centre them.
+            // Only differences of depth matter, so the depths are centred on zero.
             Projection::Parallel => {
                 let half = (farthest - nearest) / 2.0;
                 (limit / f64::max(half, noise), -(nearest + farthest) / 2.0)
@@ -153,35 +166,38 @@ impl View {
         Ok(Self { rows, projection, image_unit, depth_stretch, near })
     }
 
-    /// A position in view coordinates.
+    /// Transforms a position to view coordinates.
     pub fn vertex(&self, position: Position) -> Vertex {
         let [x, y, z] = self.rows.each_ref().map(|row| row.apply(position));
         Vertex { x, y, z }
     }
 
-    /// What x/w and y/w are 45 degrees off the line of sight, in units of 2^-`fraction_bits`; `None` in a parallel view.
+    /// Returns the value of x/w and y/w at 45 degrees from the line of sight, in units of
+    /// 2^-`fraction_bits`. Returns `None` in a parallel view.
     pub fn field(&self, fraction_bits: u32) -> Option<i64> {
         self.near.map(|_| libm::ldexp(1.0 / self.image_unit, fraction_bits as i32) as i64)
     }
 
-    /// What of an edge is in front of the near plane; `None` if nothing is.
+    /// Returns the part of an edge that lies in front of the near plane. Returns `None` if no part
+    /// does.
     pub fn clip_edge(&self, ends: [Vertex; 2]) -> Option<[Vertex; 2]> {
         clip::clip_edge(ends, self.near.unwrap_or(i32::MIN))
     }
 
-    /// Twice what a view coordinate may be off if positions may be off by so many of their units, with
-    /// its own rounding; at least 1.
+    /// Returns an error bound of the view coordinates: twice the possible error of a coordinate if
+    /// positions may be off by `units` of their units, including the rounding of the view itself.
+    /// The result is at least 1.
     pub fn doubt(&self, units: u32) -> u32 {
         let most = |row: &Row| {
             let steepness: u64 = row.m.iter().map(|m| u64::from(m.unsigned_abs())).sum();
-            // 3 2^30 and 2^30.
+            // The steepness is at most 3 × 2^30, and `units` is at most 2^30.
             ((steepness * u64::from(units)) >> (row.shift - 1)).saturating_add(1)
         };
         let doubt = self.rows.iter().map(most).max().unwrap_or(1) + u64::from(units > 0);
         u32::try_from(doubt).unwrap_or(u32::MAX)
     }
 
-    /// Takes every vertex of `model` to view coordinates.
+    /// Transforms every vertex of `model` to view coordinates.
     fn fill(
         &self,
         model: &Model<'_>,
@@ -198,10 +214,10 @@ impl View {
         Ok(())
     }
 
-    /// Makes sure that every vertex is in front of the eye.
+    /// Checks that every vertex is in front of the near plane.
     ///
     /// # Errors
-    /// [`ViewError::BehindEye`] with the first that is not.
+    /// Returns [`ViewError::BehindEye`] with the first vertex that is not.
     pub fn refuse_behind(&self, model: &Model<'_>) -> Result<(), ViewError> {
         let near = self.near.unwrap_or(i32::MIN);
         let is_behind = |position: &Position| self.vertex(*position).z < near;
@@ -211,49 +227,52 @@ impl View {
         }
     }
 
-    /// Perspective or parallel.
+    /// Returns whether the view is perspective or parallel.
     pub fn projection(&self) -> Projection {
         self.projection
     }
 
-    /// The least depth that is drawn, in view units; `None` in a parallel view, which has no eye.
+    /// Returns the least depth that is drawn, in view units. Returns `None` in a parallel view,
+    /// which has no eye.
     pub fn near(&self) -> Option<i32> {
         self.near
     }
 
-    /// How much depth is stretched over width and height, as a ratio of numbers from 1 to 2^20: angles
-    /// between faces need it.
+    /// Returns the factor by which depth is stretched relative to width and height, as a ratio of
+    /// two numbers from 1 to 2^20. It is needed to compute the angles between faces.
     pub fn depth_stretch(&self) -> (u32, u32) {
         self.depth_stretch
     }
 
-    /// What x/w and y/w are multiplied by to give the image plane at distance 1 (perspective) or
-    /// model units (parallel, w = 1). For reports; no decision depends on it.
+    /// Returns the factor by which x/w and y/w are multiplied to give coordinates on the image
+    /// plane at distance 1 (perspective) or in model units (parallel, where w = 1). It is for
+    /// reports; no decision depends on it.
     pub fn image_unit(&self) -> f64 {
         self.image_unit
     }
 }
 
-/// A positive number as a ratio of two whole numbers, each from 1 to 2^20.
+/// Returns a positive number as a ratio of two whole numbers, each from 1 to 2^20.
 fn as_ratio(value: f64) -> (u32, u32) {
     const LARGEST: f64 = 1_048_576.0;
     let part = |value: f64| libm::round(value * LARGEST).max(1.0) as u32;
     if value < 1.0 { (part(value), LARGEST as u32) } else { (LARGEST as u32, part(1.0 / value)) }
 }
 
-/// A bound of |direction · position| for directions of length 1, in model units.
+/// Returns an upper bound of |direction · position| for directions of length 1, in model units.
 fn reach(model: &Model<'_>) -> f64 {
     let largest = model.bounds().map_or(0, |(low, high)| {
         let corners = [low.coordinates(), high.coordinates()];
         corners.iter().flatten().map(|c| c.unsigned_abs()).max().unwrap_or(0)
     });
-    // The square root of 3 and a little.
+    // The factor is slightly more than the square root of 3.
     1.75 * libm::ldexp(f64::from(largest), -(model.fraction_bits() as i32))
 }
 
-/// Least and greatest of axis · position over all vertices, for each axis.
+/// Returns, for each axis, the least and the greatest value of axis · position over all vertices.
 fn extents(axes: &[Direction; 3], model: &Model<'_>) -> Option<[(f64, f64); 3]> {
-    // In integers, with 30 bits of each direction, so that no vertex costs a float.
+    // The sums use integers, with 30 bits of each direction, so that no vertex needs floating
+    // point.
     let fixed_axes = axes.map(|axis| axis.map(|d| libm::round(libm::ldexp(d, 30)) as i64));
     let along = |axis: &[i64; 3], vertex: &Position| -> i64 {
         axis.iter().zip(vertex.coordinates()).map(|(d, coordinate)| d * i64::from(coordinate)).sum()
@@ -365,7 +384,7 @@ mod tests {
             }
             let away = camera([0.5, 0.5, 5.0], [0.5, 0.5, 6.0]);
             assert_eq!(View::new(&away, model), Err(ViewError::NothingInFront));
-            // An orthographic eye only gives the direction.
+            // The eye of an orthographic camera only gives the direction.
             assert!(View::new(&Camera { lens: Lens::Orthographic, ..away }, model).is_ok());
         });
         with_model(&[], |model| {

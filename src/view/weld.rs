@@ -1,13 +1,16 @@
-//! What modellers leave behind: vertices at the same place made one, faces without an area left out.
+//! Repairs two common defects of models: welds vertices at the same position, and leaves out faces
+//! without an area.
 
 use crate::model::{Corner, Element, Elements, Model, PenWriter, Position};
 use crate::stage::{Cancel, OutOfScratch, Scratch, StageError};
 
-/// The elements of the model with each vertex replaced by the first one at the same place, without the faces that
-/// have no area, and how many those are. The model's own elements if there is nothing to do. Other faces may
-/// come to have the same corner twice in a row; visibility lives with that.
+/// Returns the elements of the model with each vertex replaced by the first one at the same
+/// position and without the faces that have no area, and the number of these faces. Returns the
+/// model's own elements if there is nothing to do. A remaining face may then have the same corner
+/// twice in a row; visibility can process that.
 ///
-/// Memory: 2 bytes for each corner and 4 for each change of the pen if there is something to do; 4 to 8 for each vertex meanwhile.
+/// If there is something to do, it takes 2 bytes of memory for each corner and 4 for each change of
+/// the pen. While it runs it takes 4 to 8 more bytes for each vertex.
 pub(super) fn weld<'a>(
     model: &'a Model<'_>,
     scratch: &mut Scratch<'a>,
@@ -49,7 +52,7 @@ pub(super) fn weld<'a>(
     Ok((Elements::with_pens(corners, pens.finish()), degenerate as u32))
 }
 
-/// Whether a face has an area. Bars need none.
+/// Whether an element is a bar or a face with an area.
 fn has_extent(element: &Element<'_>, positions: &[Position]) -> bool {
     let Element::Face(corners) = element else { return true };
     let mut sides = corners.iter().filter_map(|corner| {
@@ -59,21 +62,23 @@ fn has_extent(element: &Element<'_>, positions: &[Position]) -> bool {
         (side != [0; 3]).then_some(side)
     });
     let Some(a) = sides.next() else { return false };
-    // Below 2^31 each, so that a product is below 2^62 and compares without a difference.
+    // Each difference is below 2^31, so a product is below 2^62. Products are compared without
+    // being subtracted.
     sides.any(|b| {
         a[0] * b[1] != a[1] * b[0] || a[1] * b[2] != a[2] * b[1] || a[2] * b[0] != a[0] * b[2]
     })
 }
 
-/// A hash table of the places that have a vertex, with open addressing.
+/// A hash table of the positions that have a vertex, with open addressing.
 struct Places<'a> {
     positions: &'a [Position],
-    /// Numbers of vertices from 1; 0 is free. A power of two, at least twice the vertices.
+    /// Vertex numbers counted from 1; 0 marks a free slot. The length is a power of two and at
+    /// least twice the number of vertices.
     slots: &'a mut [u16],
 }
 
 impl<'a> Places<'a> {
-    /// All places, and how many vertices are at the place of an earlier one.
+    /// Builds the table, and counts the vertices that are at the position of an earlier one.
     fn new(
         positions: &'a [Position],
         scratch: &mut Scratch<'a>,
@@ -91,13 +96,13 @@ impl<'a> Places<'a> {
         Ok((places, repeated))
     }
 
-    /// The least number of a vertex at the place of vertex `number`.
+    /// Returns the least number of a vertex at the position of vertex `number`.
     fn first_at(&self, number: u16) -> Option<u16> {
         let slot = self.slot(self.positions.get(usize::from(number))?);
         self.slots.get(slot)?.checked_sub(1)
     }
 
-    /// The slot of this place, or the free one where it belongs.
+    /// Returns the slot that holds this position, or the free one where it belongs.
     fn slot(&self, position: &Position) -> usize {
         let mask = self.slots.len() - 1; // there is always one
         let mut slot = hash(position) as usize & mask;
@@ -111,7 +116,8 @@ impl<'a> Places<'a> {
     }
 }
 
-/// Multiplies by odd constants (Knuth, 6.4) and folds the better upper half down.
+/// Hashes a position: multiplies by odd constants (Knuth, 6.4) and mixes the better upper half into
+/// the lower.
 fn hash(position: &Position) -> u32 {
     let [x, y, z] = position.coordinates().map(|coordinate| coordinate as u32);
     let mixed = [(y, 0x85EB_CA6B), (z, 0xC2B2_AE35)]
