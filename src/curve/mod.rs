@@ -1,14 +1,15 @@
-//! B-splines: a smooth curve from few control points (Allard & Bown 1978).
+//! B-splines: smooth curves defined by few control points (Allard & Bown 1978).
 //!
-//! A [`Spline`] looks at control points in memory that others own; it copies none. [`Spline::at`] gives a
-//! place on it, [`Spline::chords`] the fewest straight lines that stay within a tolerance on the page.
-//! An affine map of the control points is the same map of the curve, so a curve may be evaluated in the
-//! model's space or in view coordinates alike.
+//! A [`Spline`] borrows its control points and copies none. [`Spline::at`] returns a point on the
+//! curve, and [`Spline::chords`] returns few straight lines that stay within a tolerance of the
+//! curve on the page. An affine map of the control points maps the curve in the same way, so a
+//! curve can be evaluated in model space or in view coordinates.
 //!
-//! Order m is degree m - 1: order 2 is the polygon itself, 3 the paper's quadratic, 4 the common cubic.
-//! Multiplicity is a control point named several times: the first and the last one m - 1 times make the
-//! curve begin and end there; naming the first m - 1 ones again at the end closes it. Refused: what is
-//! no curve (see [`CurveError`]).
+//! A curve of order m has degree m - 1: order 2 is the polygon itself, order 3 the paper's
+//! quadratic, order 4 the usual cubic. The multiplicity of a control point is the number of times
+//! that it is listed in a row. If the first and the last point are listed m - 1 times, the curve
+//! begins and ends there. If the first m - 1 points are listed again at the end, the curve is
+//! closed. Input that gives no curve is refused (see [`CurveError`]).
 
 mod chords;
 mod span;
@@ -17,34 +18,36 @@ pub use chords::{Chords, Fine};
 
 use span::Span;
 
-/// The lowest order: straight lines.
+/// The lowest order, which gives straight lines.
 pub const LEAST_ORDER: u8 = 2;
-/// The highest order: degree 5.
+/// The highest order, which has degree 5.
 pub const GREATEST_ORDER: u8 = 6;
 
-/// Knots stay within ± this, in any unit: then 64 bits hold every product.
+/// The greatest absolute value of a knot, in any unit. With this limit, 64 bits hold every product.
 pub const KNOT_LIMIT: i32 = 1 << 22;
 
-/// Between whole units of a coordinate, places on a curve have this many bits more.
+/// The number of additional fraction bits that points on a curve have over the units of the
+/// coordinates.
 pub const FRACTION_BITS: u32 = 8;
 
-/// Three coordinates of a control point, each within ±2^30; a plane curve leaves the third zero.
+/// The coordinates of a control point, each within ±2^30. A plane curve sets the third to zero.
 pub type Point = [i32; 3];
 
-/// Where the polynomials of a spline meet.
+/// The knots, which are the parameter values where the polynomials of a spline meet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Knots<'a> {
-    /// 0, 1, 2, …: control point i acts from knot i to knot i + order, as in the paper.
+    /// The knots are 0, 1, 2, …. Control point i has an effect from knot i to knot i + order, as in
+    /// the paper.
     Uniform,
-    /// As many as control points and order together, never decreasing, in any unit,
-    /// within ±[`KNOT_LIMIT`].
+    /// A list of as many knots as the number of control points plus the order. The knots never
+    /// decrease and are within ±[`KNOT_LIMIT`], in any unit.
     Listed(&'a [i32]),
-    /// The same, each in two halves as it lies in memory.
+    /// The same list, with each knot stored as two halves in memory order.
     Packed(&'a [[u16; 2]]),
 }
 
 impl Knots<'_> {
-    /// Knot `index`; past the end the last one.
+    /// The knot number `index`, or the last knot if there are fewer.
     pub(crate) fn get(&self, index: usize) -> i64 {
         match self {
             Self::Uniform => index as i64,
@@ -58,7 +61,7 @@ impl Knots<'_> {
         }
     }
 
-    /// How many the user listed; `None` if they are uniform.
+    /// The number of listed knots; `None` if the knots are uniform.
     pub(crate) fn count(&self) -> Option<usize> {
         match self {
             Self::Uniform => None,
@@ -68,62 +71,64 @@ impl Knots<'_> {
     }
 }
 
-/// Why there is no such curve.
+/// Why a curve was refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum CurveError {
-    /// The order is not 2 to 6 (the degree 1 to 5).
+    /// The order is not 2 to 6 (degree 1 to 5).
     Order,
     /// A curve of this order needs more control points.
     TooFewControlPoints {
-        /// How many it needs.
+        /// The number of control points that the order needs.
         needed: usize,
     },
-    /// More control points than a [`Parameter`] can tell apart.
+    /// There are more control points than a [`Parameter`] can tell apart.
     TooManyControlPoints {
-        /// How many there can be.
+        /// The greatest possible number of control points.
         limit: usize,
     },
-    /// A control point that does not exist.
+    /// The curve refers to a control point that does not exist.
     UnknownPoint {
-        /// Its number, from 0.
+        /// The number of the missing point, from 0.
         number: u16,
     },
-    /// There must be as many knots as control points and order together.
+    /// The number of knots must be the number of control points plus the order.
     WrongKnotCount {
-        /// How many there must be.
+        /// The number of knots that is needed.
         needed: usize,
-        /// How many there are.
+        /// The number of knots that was given.
         given: usize,
     },
     /// A knot is less than the one before it.
     KnotDecreases {
-        /// Which, from 0.
+        /// The number of the knot, from 0.
         knot: usize,
     },
-    /// A knot is past ±[`KNOT_LIMIT`].
+    /// The absolute value of a knot is greater than [`KNOT_LIMIT`].
     KnotTooLarge {
-        /// Which, from 0.
+        /// The number of the knot, from 0.
         knot: usize,
     },
-    /// A knot inside the curve is repeated more often than the degree: the curve would break there.
+    /// A knot inside the curve is repeated more often than the degree, so the curve would be
+    /// discontinuous there.
     KnotRepeated {
-        /// The first of them, from 0.
+        /// The number of the first of these knots, from 0.
         knot: usize,
     },
-    /// The curve's ends are not in order, or lie outside the knots number order - 1 to number of control
-    /// points (from 0).
+    /// The ends of the curve are not in order, or they are outside the range from knot number
+    /// (order - 1) to the knot whose number is the number of control points. Numbers count from 0.
     OutsideKnots,
 }
 
-/// A place along a spline: which polynomial, and where along it in units of 2^-20 of its length.
+/// A position along a spline: the number of the polynomial, and the position on it in units of
+/// 2^-20 of its length.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Parameter(u32);
 
 impl Parameter {
     const LOCAL_BITS: u32 = 20;
     const ONE: u32 = 1 << Self::LOCAL_BITS;
-    /// So many polynomials that 32 bits hold the end of the last.
+    /// The greatest number of polynomials for which 32 bits hold the end of the last one.
     const SPAN_LIMIT: usize = (1 << (32 - Self::LOCAL_BITS)) - 1;
 
     fn start_of(span: usize) -> Self {
@@ -138,20 +143,22 @@ impl Parameter {
         self.0 & (Self::ONE - 1)
     }
 
-    /// As 32 bits, to be kept in little memory.
+    /// The position as 32 bits, for compact storage.
     pub const fn to_bits(self) -> u32 {
         self.0
     }
 
-    /// What [`Parameter::to_bits`] gave. A spline takes any other bits for its nearest end.
+    /// Restores a position from the result of [`Parameter::to_bits`]. A spline treats any other
+    /// bits as its nearest end.
     pub const fn from_bits(bits: u32) -> Self {
         Self(bits)
     }
 }
 
-/// A B-spline over control points, or a part of one.
+/// A B-spline with its control points and knots, or a part of one.
 ///
-/// Guarantees: every control point exists, every knot is in range and in order.
+/// A value of this type guarantees that every control point exists and that every knot is in range
+/// and in order.
 ///
 /// ```
 /// use penup::curve::{Knots, Spline};
@@ -175,7 +182,8 @@ pub struct Spline<'a> {
 impl<'a> Spline<'a> {
     /// The spline of `order` over the control points numbered `control` in `points`.
     ///
-    /// It runs over all of its knots: from number order - 1 to number of control points, from 0.
+    /// The curve covers its whole range: from knot number order - 1 to the knot whose number is the
+    /// number of control points, counted from 0.
     ///
     /// # Errors
     /// See [`CurveError`].
@@ -197,7 +205,8 @@ impl<'a> Spline<'a> {
         Ok(whole)
     }
 
-    /// The part of it between two parameters, each moved to the curve's nearest end if outside.
+    /// The part of the curve between two positions. Each of them is moved to the nearest end of the
+    /// curve if it is outside.
     #[must_use]
     pub fn between(self, from: Parameter, to: Parameter) -> Self {
         let end = Parameter::start_of(self.spans());
@@ -205,39 +214,40 @@ impl<'a> Spline<'a> {
         Self { from, to: to.clamp(from, end), ..self }
     }
 
-    /// Where it begins and ends.
+    /// The positions at which the curve begins and ends.
     pub fn ends(&self) -> (Parameter, Parameter) {
         (self.from, self.to)
     }
 
-    /// How many polynomials it is made of, those of no length included.
+    /// The number of polynomials of the spline, including those of zero length.
     fn spans(&self) -> usize {
         self.control.len() + 1 - usize::from(self.order)
     }
 
-    /// The knot where polynomial `span` begins.
+    /// The knot at which polynomial number `span` begins.
     fn knot(&self, span: usize) -> i64 {
         self.knots.get(span + usize::from(self.order) - 1)
     }
 
-    /// The parameter of the knot value `u` × 2^-`fraction_bits` in the knots' unit; the nearest end of
-    /// the whole spline if it is outside. `fraction_bits` at most 16.
+    /// The position for the knot value `u` × 2^-`fraction_bits`, in the unit of the knots. A value
+    /// outside the whole spline gives its nearest end. `fraction_bits` is at most 16.
     pub fn parameter(&self, u: i64, fraction_bits: u32) -> Parameter {
         parameter_of(self.control.len(), self.order, self.knots, u, fraction_bits)
     }
 
-    /// The place at `t`, rounded to whole units.
+    /// The point at `t`, rounded to whole units.
     ///
-    /// Before that last rounding it is within 1/16 unit of the exact place.
+    /// Before this rounding the result is within 1/16 unit of the exact point.
     pub fn at(&self, t: Parameter) -> Point {
         rounded(self.exactly_at(t))
     }
 
-    /// The place at `t` in units of 2^-[`FRACTION_BITS`].
+    /// The point at `t` in units of 2^-[`FRACTION_BITS`].
     fn exactly_at(&self, t: Parameter) -> [i64; 3] {
         let t = t.min(Parameter::start_of(self.spans()));
         let mut span = Span::default();
-        // The polynomial that `t` lies on, or else the next that has a length, or else the one before.
+        // Use the polynomial on which `t` lies. If it has zero length, use the next one that has a
+        // length, otherwise the previous one.
         match (t.span()..self.spans()).find(|number| self.load(*number, &mut span)) {
             Some(number) => span.at(if number == t.span() { t.local() } else { 0 }),
             None => {
@@ -247,11 +257,13 @@ impl<'a> Spline<'a> {
         }
     }
 
-    /// Chord ends, from the curve's beginning to its end: see [`Chords`].
+    /// The ends of the chords that approximate the curve, from its beginning to its end: see
+    /// [`Chords`].
     ///
-    /// `project` takes a place (in units of 2^-[`FRACTION_BITS`] of the control points' unit) to the page
-    /// in fine units, usually 1/256 step; `None` for a place that is cut off because it is nearer than
-    /// the near plane. It must take straight lines to straight lines. `tolerance` in the same fine units.
+    /// `project` maps a point (in units of 2^-[`FRACTION_BITS`] of the unit of the control points)
+    /// to the page in fine units, usually 1/256 step. It returns `None` for a point that is clipped
+    /// because it is nearer than the near plane. It must map straight lines to straight lines.
+    /// `tolerance` is in the same fine units.
     pub fn chords<F>(&self, project: F, tolerance: u16) -> Chords<'a, F>
     where
         F: Fn([i64; 3]) -> Option<Fine>,
@@ -259,20 +271,21 @@ impl<'a> Spline<'a> {
         Chords::new(*self, project, tolerance)
     }
 
-    /// Makes `span` polynomial `number`. `false` if that has no length or does not exist.
-    #[inline(never)] // Its frame must not lie under that of a search.
+    /// Loads polynomial number `number` into `span`. Returns `false` if it has zero length or does
+    /// not exist.
+    #[inline(never)] // Its stack frame must not add to that of a search.
     fn load(&self, number: usize, span: &mut Span) -> bool {
         let degree = usize::from(self.order) - 1;
         let Some(numbers) = self.control.get(number..number + degree + 1) else { return false };
         span.hold(numbers.iter().map(|number| {
-            // `new` has made sure that it exists.
+            // `new` has checked that the point exists.
             self.points.get(usize::from(*number)).map_or([0; 3], |point| point.map(i64::from))
         }));
         if self.knots == Knots::Uniform {
             span.turn_by_recursion();
             return true;
         }
-        // The 2 m - 2 knots around the polynomial: it lies between the middle two.
+        // These are the 2 m - 2 knots around the polynomial, which lies between the middle two.
         let mut around = [0; 2 * (GREATEST_ORDER as usize - 1)];
         for (knot, index) in around.iter_mut().take(2 * degree).zip(number + 1..) {
             *knot = self.knots.get(index) as i32; // within KNOT_LIMIT
@@ -281,12 +294,13 @@ impl<'a> Spline<'a> {
     }
 }
 
-/// To whole units. The curve stays within the box around its control points, so it fits.
+/// Rounds to whole units. The result fits, because the curve stays within the bounding box of its
+/// control points.
 fn rounded(place: [i64; 3]) -> Point {
     place.map(|c| ((c + (1 << (FRACTION_BITS - 1))) >> FRACTION_BITS) as i32)
 }
 
-/// See [`Spline::parameter`].
+/// Implements [`Spline::parameter`] without a spline.
 pub(crate) fn parameter_of(
     control_points: usize,
     order: u8,
@@ -304,12 +318,12 @@ pub(crate) fn parameter_of(
     if length == 0 || u >= knot(span + 1) {
         return Parameter::start_of(spans);
     }
-    // Below 2^(23 + 16 + 21).
+    // The product is below 2^(23 + 16 + 21).
     let local = (((u - knot(span)) << (Parameter::LOCAL_BITS + 1)) / length + 1) >> 1;
     Parameter(Parameter::start_of(span).0 + local as u32)
 }
 
-/// Checks what does not depend on where the points are.
+/// Checks order, number of control points and knots, which do not depend on where the points are.
 pub(crate) fn check_shape(
     control_points: usize,
     order: u8,
@@ -341,7 +355,7 @@ pub(crate) fn check_shape(
     Ok(())
 }
 
-/// Checks that the curve has a length and hangs together from one knot value to the other.
+/// Checks that the curve has a length and is continuous between the knot values `from` and `to`.
 pub(crate) fn check_interior(
     order: u8,
     knots: Knots<'_>,

@@ -1,19 +1,19 @@
-//! One polynomial of a spline, held by its Bézier points, so that it can be cut anywhere.
+//! One polynomial of a spline, stored by its Bézier points, so that it can be cut anywhere.
 
 use super::{FRACTION_BITS, GREATEST_ORDER, Parameter};
 
 const POINTS: usize = GREATEST_ORDER as usize;
 
-/// A polynomial of degree 1 to 5 by its Bézier points, in units of 2^-[`FRACTION_BITS`].
+/// A polynomial of degree 1 to 5, given by its Bézier points in units of 2^-[`FRACTION_BITS`].
 ///
-/// |coordinate| <= 2^38, so a difference times a ratio of 23 bits fits 62 bits.
+/// Coordinates are within ±2^38, so a difference times a number of 23 bits fits in 62 bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct Span {
     points: [[i64; 3]; POINTS],
     degree: usize,
 }
 
-/// Binomial coefficients up to those of order 6.
+/// The binomial coefficients C(n, k) for n up to 6.
 const BINOMIAL: [[i64; 7]; 7] = {
     let mut rows = [[0; 7]; 7];
     let mut n = 0;
@@ -30,21 +30,24 @@ const BINOMIAL: [[i64; 7]; 7] = {
 };
 
 impl Span {
-    /// By the recursion of Allard & Bown, equations 15 and 16, for knots one apart.
+    /// Converts control points to Bézier points by the recursion of Allard & Bown, equations 15 and
+    /// 16, for knots at unit distance.
     ///
-    /// `self` holds the degree + 1 control points that act on this polynomial. From one knot to the next
-    /// the polynomial changes by a correction (t - k)^(m-1) Σ (-1)^i C(m, i) P(k-i) / (m-1)!. Points
-    /// that came before act no longer, so the recursion may begin with nothing at the first of these.
-    /// (m-1)! times each coefficient is a whole number: nothing is rounded before the last line.
+    /// `self` holds the degree + 1 control points that affect this polynomial. From one knot to the
+    /// next the polynomial changes by a correction (t - k)^(m-1) Σ (-1)^i C(m, i) P(k-i) / (m-1)!.
+    /// Earlier points no longer have an effect, so the recursion can start from zero at the first
+    /// of these points. (m-1)! times each coefficient is an integer, so nothing is rounded before
+    /// the last line.
     pub(super) fn turn_by_recursion(&mut self) {
         let degree = self.degree;
         let order = degree + 1;
         let factorial: i64 = (1..=degree as i64).product();
         for axis in 0..3 {
-            // (m-1)! R(t) by powers of the distance from the knot; below 2^51.
+            // These are the coefficients of (m-1)! R(t) in powers of the distance from the knot;
+            // they are below 2^51.
             let mut powers = [0i64; POINTS];
             for k in 0..order {
-                // From the knot before to this one: t - (k - 1) = (t - k) + 1.
+                // Moves from the previous knot to this one: t - (k - 1) = (t - k) + 1.
                 for low in 0..degree {
                     for power in (low..degree).rev() {
                         powers[power] += powers[power + 1];
@@ -57,8 +60,9 @@ impl Span {
                     })
                     .sum::<i64>();
             }
-            // Bézier point j is Σ C(j, i) / C(degree, i) times coefficient i; 60 is a multiple of every
-            // C(degree, i). The coefficients are now below 2^5 5! C(degree, i) 2^30: no sum passes 2^54.
+            // Bézier point j is the sum of C(j, i) / C(degree, i) times coefficient i, where 60 is
+            // a multiple of every C(degree, i). The coefficients are now below 2^5 5! C(degree, i)
+            // 2^30, so no sum exceeds 2^54.
             for (j, point) in self.points.iter_mut().enumerate().take(order) {
                 let sum: i64 =
                     (0..=j).map(|i| BINOMIAL[j][i] * (60 / BINOMIAL[degree][i]) * powers[i]).sum();
@@ -67,11 +71,14 @@ impl Span {
         }
     }
 
-    /// By de Boor's recursion (the paper's reference 6), for knots at any distance.
+    /// Converts control points to Bézier points by de Boor's recursion (the paper's reference 6),
+    /// for knots at any distance.
     ///
-    /// `self` holds the control points as before. `around`: the `degree` knots up to the polynomial's
-    /// beginning, and as many from its end on. `false` if the polynomial has no length. Inserts first its beginning, then its end, until each is
-    /// a knot `degree` times: then the control points are the Bézier points.
+    /// `self` holds the control points as in the other conversion. `around` holds the `degree`
+    /// knots up to the beginning of the polynomial and as many from its end on. Returns `false` if
+    /// the polynomial has zero length. The method inserts the knot at the beginning, then the one
+    /// at the end, until each has multiplicity `degree`. Then the control points are the Bézier
+    /// points.
     pub(super) fn turn_by_de_boor(&mut self, around: &[i32]) -> bool {
         let degree = self.degree;
         let knot = |index: usize| i64::from(around[index]);
@@ -99,7 +106,7 @@ impl Span {
         true
     }
 
-    /// Holds control points, to be turned into Bézier points.
+    /// Stores control points, which are then to be converted to Bézier points.
     pub(super) fn hold(&mut self, control: impl ExactSizeIterator<Item = [i64; 3]>) {
         self.degree = control.len() - 1;
         for (point, control) in self.points.iter_mut().zip(control) {
@@ -107,19 +114,19 @@ impl Span {
         }
     }
 
-    /// Its Bézier points; the first and the last lie on the curve.
+    /// The Bézier points; the first and the last are on the curve.
     pub(super) fn points(&self) -> &[[i64; 3]] {
         &self.points[..=self.degree]
     }
 
-    /// The place at `local` × 2^-20 of the way (de Casteljau).
+    /// The point at the position `local` × 2^-20 (de Casteljau).
     pub(super) fn at(&self, local: u32) -> [i64; 3] {
         let mut rest = *self;
         rest.keep_from(local);
         rest.points[0]
     }
 
-    /// The part from `from` to `to` × 2^-20 of the way.
+    /// The part between the positions `from` × 2^-20 and `to` × 2^-20.
     pub(super) fn part(&self, from: u32, to: u32) -> Self {
         let mut part = *self;
         if from > 0 {
@@ -133,7 +140,7 @@ impl Span {
         part
     }
 
-    /// Leaves what comes after `local` × 2^-20 of the way.
+    /// Keeps only the part after the position `local` × 2^-20.
     fn keep_from(&mut self, local: u32) {
         for level in 1..=self.degree {
             for i in 0..=self.degree - level {
@@ -142,7 +149,7 @@ impl Span {
         }
     }
 
-    /// Leaves what comes before `local` × 2^-20 of the way.
+    /// Keeps only the part before the position `local` × 2^-20.
     fn keep_to(&mut self, local: u32) {
         for level in 1..=self.degree {
             for i in (level..=self.degree).rev() {
@@ -152,7 +159,8 @@ impl Span {
     }
 }
 
-/// p + (q - p) numerator / denominator, rounded. Both below 2^23, the ratio within 0 to 1.
+/// p + (q - p) numerator / denominator, rounded. Numerator and denominator are below 2^23, and
+/// their ratio is within 0 to 1.
 fn between(p: [i64; 3], q: [i64; 3], numerator: i64, denominator: i64) -> [i64; 3] {
     core::array::from_fn(|axis| {
         p[axis] + divide_rounding((q[axis] - p[axis]) * numerator, denominator)
@@ -167,7 +175,7 @@ fn along(p: [i64; 3], q: [i64; 3], local: u32) -> [i64; 3] {
     })
 }
 
-/// Divides, rounding half away from zero. `divisor` > 0.
+/// Divides and rounds half away from zero. `divisor` must be positive.
 fn divide_rounding(dividend: i64, divisor: i64) -> i64 {
     let half = divisor / 2;
     if dividend < 0 { -((half - dividend) / divisor) } else { (dividend + half) / divisor }

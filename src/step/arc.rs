@@ -1,37 +1,39 @@
-//! Arcs and circles on the grid, and the fewest lines that draw exactly their points.
+//! Arcs and circles on the step grid, and the joining of their points into long lines that draw
+//! exactly these points.
 
 use super::{Direction, Line};
 use crate::drawing::PagePoint;
 use crate::fixed::Millimetres;
 
-/// Which way an arc turns, y up.
+/// The direction in which an arc turns, with y upward.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Turn {
-    /// As the hands of a clock (G2).
+    /// Clockwise (G2).
     Clockwise,
-    /// The other way (G3).
+    /// Counterclockwise (G3).
     Counterclockwise,
 }
 
-/// Why there is no such arc.
+/// Why an arc was refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ArcError {
-    /// An end is the centre.
+    /// The start or the end is the centre.
     NoRadius,
-    /// The centre lies more than 2^22 steps from an end, or so far that steps of different length in x and y
-    /// cannot be told apart.
+    /// The centre lies more than 2^22 steps from an end, or so far away that steps of different
+    /// lengths in x and y cannot be told apart.
     TooWide,
-    /// The ends are not equally far from the centre: more than two steps apart.
+    /// The distances of the two ends from the centre differ by more than two steps.
     EndOffCircle,
 }
 
-/// The points of an arc after its first, each nearest to the circle along the axis on which the arc
-/// is steeper: off the circle by half a step at most.
+/// The points of an arc, without the first. Each point is the one nearest to the circle along x
+/// where the circle is steeper in y, otherwise along y. So it is off the circle by at most half a
+/// step.
 ///
-/// The same points whichever way it is drawn. The circle's squared radius is the mean of those of
-/// both ends, as rounding may have moved them; equal ends make a full circle.
+/// The points are the same in both drawing directions. The squared radius of the circle is the mean
+/// of those of both ends, because the ends may have been rounded. Equal ends make a full circle.
 ///
 /// ```
 /// use penup::drawing::PagePoint;
@@ -45,22 +47,24 @@ pub enum ArcError {
 pub struct Arc {
     center: PagePoint,
     to: PagePoint,
-    /// How much a step of x and of y counts, so that the arc is part of a circle.
+    /// The lengths of a step of x and of y as relative weights, so that the arc is part of a
+    /// circle.
     weights: [u16; 2],
-    /// Four times the squared radius, weighted.
+    /// Four times the squared radius, in weighted units.
     radius: u64,
-    /// Of the right and left side, and of the others: how far they go both ways from their middle.
+    /// Half the length of the right and left sides, and half that of the other two: how far each
+    /// extends both ways from its middle, in steps.
     half: [i32; 2],
-    /// Whether a side ends where the next one begins.
+    /// Whether a side ends at the point where the next side begins.
     corner_is_shared: bool,
-    /// Place on the circle, in moves counterclockwise.
+    /// The current position on the circle, counted in moves counterclockwise.
     place: i32,
     step: i8,
     remaining: u32,
 }
 
 impl Arc {
-    /// The arc around `center` from `from` to `to`, steps of x as long as those of y.
+    /// The arc around `center` from `from` to `to`. Steps of x and y have the same length.
     ///
     /// # Errors
     /// See [`ArcError`].
@@ -73,8 +77,8 @@ impl Arc {
         Self::weighted([1; 2], center, from, to, turn)
     }
 
-    /// The same if there are so many steps of x and of y in a millimetre: a circle on the page, but for r²/2^31
-    /// steps of one r steps wide.
+    /// The same arc for different numbers of steps per millimetre in x and y. It is a circle on the
+    /// page, except that an arc of r steps width is off by up to r²/2^31 steps.
     ///
     /// ```
     /// use penup::drawing::PagePoint;
@@ -119,7 +123,7 @@ impl Arc {
             }
             let [x, y] = [(x, weights[0]), (y, weights[1])]
                 .map(|(steps, weight)| u64::from(steps) * u64::from(weight));
-            // Squares of 2^30, four of them doubled: below 2^63.
+            // The squares are at most 2^60; four of them doubled are below 2^63.
             if x.max(y) > 1 << 30 {
                 return Err(ArcError::TooWide);
             }
@@ -153,14 +157,16 @@ impl Arc {
         Ok(arc)
     }
 
-    /// Where the right side ends above, and the upper one on the right: where the circle runs more along the other
-    /// axis.
+    /// Finds the upper end of the right side and the right end of the upper side. There the circle
+    /// begins to run more along the other axis.
     fn find_corner(&mut self) {
         let [x, y] = self.weights.map(|weight| i64::from(weight) * i64::from(weight));
-        // Where it is as steep along both, found to the step.
+        // This estimates the point at which the circle is equally steep along both axes; the loops
+        // below correct it to the exact step.
         let place = |mine: i64, others: i64| {
             let (mine, others) = (mine.unsigned_abs(), others.unsigned_abs());
-            // Four times the square; at most a quarter of the radius over the weight.
+            // This is the square of the position, at most `radius` / 4 over the square of the
+            // axis's weight.
             let square = self.radius / 4 / (mine + others) * others / mine;
             square.isqrt() as i32 + 1
         };
@@ -180,12 +186,12 @@ impl Arc {
         self.corner_is_shared = half[1] == corner && half[0] == self.across(1, half[1]);
     }
 
-    /// Moves along a side: 0 the right or left one, 1 the others.
+    /// The number of moves along a side: 0 for the right and left sides, 1 for the others.
     fn moves_of(&self, side: usize) -> i32 {
         (2 * self.half[side] + i32::from(!self.corner_is_shared)).max(1)
     }
 
-    /// The least and the greatest coordinates of its points; those already passed do not count.
+    /// The least and the greatest coordinates of the points that are still to come.
     ///
     /// ```
     /// use penup::drawing::PagePoint;
@@ -205,7 +211,7 @@ impl Arc {
         if self.remaining > 1 {
             include(self.point_at(self.place + step));
         }
-        // Where a side is crossed in its middle, the circle is furthest out.
+        // In the middle of each side the circle is farthest out.
         let half_turn = self.moves_of(0) + self.moves_of(1);
         for side in 0..4 {
             let middle = self.begin_of(side) + self.half[side % 2];
@@ -217,13 +223,14 @@ impl Arc {
         (least, most)
     }
 
-    /// The place where a side begins: the right side runs up from 0, the top left, and so on.
+    /// The position on the circle where a side begins. The right side begins at 0 and runs upward,
+    /// then the top side runs to the left, and so on.
     fn begin_of(&self, side: usize) -> i32 {
         let half_turn = self.moves_of(0) + self.moves_of(1);
         half_turn * (side / 2) as i32 + self.moves_of(0) * (side % 2) as i32
     }
 
-    /// The place on the circle nearest to `point`.
+    /// The position on the circle nearest to `point`.
     fn place_of(&self, point: PagePoint) -> i32 {
         let (x, y) = (point.x - self.center.x, point.y - self.center.y);
         let [weighted_x, weighted_y] = [(x, self.weights[0]), (y, self.weights[1])]
@@ -239,6 +246,7 @@ impl Arc {
         self.begin_of(side) + along.clamp(-half, half) + half
     }
 
+    /// The point at a position on the circle.
     fn point_at(&self, place: i32) -> PagePoint {
         let [mut place, half_turn] = [place, self.moves_of(0) + self.moves_of(1)];
         place = place.rem_euclid(2 * half_turn);
@@ -252,27 +260,31 @@ impl Arc {
         PagePoint { x: self.center.x + x, y: self.center.y + y }
     }
 
-    /// How far out the circle is nearest to at `along` of such a side.
+    /// The distance from the centre, rounded to whole steps, at which the circle crosses the offset
+    /// `along` of a side.
     fn across(&self, side: usize, along: i32) -> i32 {
         let out = u32::from(self.weights[side]);
         let along = u64::from(along.unsigned_abs()) * u64::from(self.weights[1 - side]);
-        // The root of 63 bits.
+        // The number has at most 63 bits, so its root fits.
         let doubled = self.radius.saturating_sub(4 * along * along).isqrt() as u32;
         ((doubled + out) / (2 * out)) as i32
     }
 }
 
-/// Weights of a step of x and of y, none above `most`, in the ratio of their lengths as nearly as can be: to
-/// half of 1 / `most`, or better. `None` if one is longer than so many of the other.
+/// Finds the weights of a step of x and of y, neither above `most`, whose ratio is as near as
+/// possible to the ratio of the step lengths: to half of 1 / `most`, or better. Returns `None` if
+/// one step is more than `most` times as long as the other.
 fn weights(steps_per_mm: [Millimetres; 2], most: u16) -> Option<[u16; 2]> {
     let most = u32::from(most);
     let [mut x, mut y] = steps_per_mm.map(|steps| steps.to_bits().unsigned_abs());
-    // Convergents of the continued fraction of y / x: a step of x is as long as there are steps of y.
+    // The loop computes the convergents of the continued fraction of y / x, because the length of a
+    // step of x is proportional to the steps per millimetre of y.
     let (mut before, mut ratio) = ([0u32, 1], [1u32, 0]);
     while let Some(whole) = y.checked_div(x) {
         let room = |part: usize| (most - before[part]).checked_div(ratio[part]);
         let times = whole.min(room(0).unwrap_or(whole)).min(room(1).unwrap_or(whole));
-        // Fewer times than whole is nearer from half of it on.
+        // A semiconvergent is nearer to the ratio only if it takes at least half of the partial
+        // quotient.
         if times < whole && 2 * u64::from(times) <= u64::from(whole) {
             break;
         }
@@ -298,13 +310,14 @@ impl Iterator for Arc {
     }
 }
 
-/// The most moves of one chord.
+/// The greatest number of moves of one chord.
 const CHORD_MOVES: usize = 64;
 
-/// Joins points into lines: yields the ends of long lines, one after another, whose moves lead
-/// through every point.
+/// Joins points into lines. It yields the ends of long consecutive lines whose moves lead through
+/// every point.
 ///
-/// A point that is not one move from the one before it becomes the end of a line of its own.
+/// A point that cannot be reached by one move from the previous point becomes the end of a line of
+/// its own.
 ///
 /// ```
 /// use penup::drawing::PagePoint;
@@ -317,21 +330,22 @@ const CHORD_MOVES: usize = 64;
 #[derive(Debug, Clone)]
 pub struct Chords<I> {
     pub(super) points: I,
-    /// Where the next line begins.
+    /// The point where the next line begins.
     from: PagePoint,
-    /// The moves read ahead, and where they lead.
+    /// The moves that were read ahead, and (`ahead`) the point to which they lead.
     moves: heapless::Deque<Direction, CHORD_MOVES>,
     ahead: PagePoint,
-    /// A point that no single move reaches.
+    /// A point that was read but cannot be reached by a single move.
     beyond: Option<PagePoint>,
 }
 
 impl<I: Iterator<Item = PagePoint>> Chords<I> {
-    /// The lines from `from` through `points`.
+    /// The lines that start at `from` and lead through `points`.
     pub fn new(from: PagePoint, points: I) -> Self {
         Self { points, from, moves: heapless::Deque::new(), ahead: from, beyond: None }
     }
 
+    /// Reads points ahead while there is room for their moves.
     fn read_ahead(&mut self) {
         while self.beyond.is_none() && !self.moves.is_full() {
             let Some(point) = self.points.next() else {
@@ -341,7 +355,7 @@ impl<I: Iterator<Item = PagePoint>> Chords<I> {
             match Direction::from_delta(delta.0, delta.1) {
                 Some(direction) if direction.delta() == delta => {
                     self.ahead = point;
-                    // Not full, so it fits.
+                    // The queue is not full, so the move fits.
                     self.moves.push_back(direction).ok();
                 }
                 Some(_) => self.beyond = Some(point),
@@ -350,7 +364,7 @@ impl<I: Iterator<Item = PagePoint>> Chords<I> {
         }
     }
 
-    /// The end of the longest line whose moves are those read ahead, and how many.
+    /// The end of the longest line whose moves are those read ahead, and the number of its moves.
     fn longest_line(&self) -> (PagePoint, usize) {
         let mut longest = (self.from, 0);
         let mut point = self.from;

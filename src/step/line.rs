@@ -1,4 +1,5 @@
-//! The incremental line with the Knight's move rule (Harrison 1.6, procedure LINE of appendix 1).
+//! The incremental line algorithm with the Knight's move rule (Harrison 1.6, procedure LINE of
+//! appendix 1).
 
 use super::Direction;
 use crate::drawing::PagePoint;
@@ -17,21 +18,26 @@ use crate::drawing::PagePoint;
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Line {
+    /// The direction of the straight moves.
     straight: Direction,
+    /// The direction of the diagonal moves.
     diagonal: Direction,
-    /// Harrison's B: above zero the diagonal move is the better one, below zero the straight one.
+    /// Harrison's B: if it is positive, the diagonal move is nearer to the line; if it is negative,
+    /// the straight move is.
     balance: i32,
-    /// Added to `balance` by a straight move.
+    /// The amount that a straight move adds to `balance`.
     straight_gain: i32,
-    /// Taken from `balance` by a diagonal move.
+    /// The amount that a diagonal move subtracts from `balance`.
     diagonal_loss: i32,
-    /// Whether a tie takes the diagonal: so it does if x increases.
+    /// Whether a tie is resolved by the diagonal move. This is so if x increases.
     ties_diagonal: bool,
+    /// The number of moves still to come.
     remaining: u32,
 }
 
 impl Line {
-    /// Offsets of [`Line::beside`] in a step: 127 of them are just less than half of one.
+    /// The number of offset units of [`Line::beside`] in one step. An offset of 127 units is just
+    /// less than half a step.
     pub const OFFSET_UNIT: i32 = 255;
 
     /// The moves from `from` to `to`, both within the page.
@@ -43,7 +49,8 @@ impl Line {
     pub const fn by(dx: i32, dy: i32) -> Self {
         let (width, height) = (dx.abs(), dy.abs());
         let (more, fewer) = if width > height { (width, height) } else { (height, width) };
-        // Of no use to a line without the kind of move, hence any direction will do there.
+        // A line without diagonal moves, or without straight ones, never uses that direction, so
+        // any direction will do.
         let diagonal = match Direction::from_delta(dx, if dy == 0 { 1 } else { dy }) {
             Some(direction) => direction,
             None => Direction::Up,
@@ -69,11 +76,13 @@ impl Line {
         }
     }
 
-    /// The same for a piece of a line or curve whose ends lie beside the grid's points: by `offsets`, in units of
-    /// 1/255 of a step within ±127, at the start and at the end, along the axis of fewer moves (that of x if both
-    /// have as many). So pieces join to a line that is nowhere off by more than half a step.
+    /// The moves by `dx`, `dy` steps of a segment of a line or curve whose exact ends lie beside
+    /// the grid points. `offsets` says how far they lie beside them at the start and at the end, in
+    /// units of 1/255 of a step within ±127, along the axis of fewer moves (x if both axes have
+    /// equally many). Segments made this way join to a line that is nowhere off by more than half a
+    /// step.
     ///
-    /// `dx` and `dy` are within ±2^21.
+    /// `dx` and `dy` must be within ±2^21.
     ///
     /// ```
     /// use penup::step::{Direction::{Right, UpRight}, Line};
@@ -91,8 +100,9 @@ impl Line {
         let (more, fewer, way) =
             if dx.abs() > dy.abs() { (dx.abs(), dy.abs(), dy) } else { (dy.abs(), dx.abs(), dx) };
         let [start, end] = offsets.map(|offset| i32::from(offset) * way.signum());
-        // Twice by how much a straight move falls behind, times the moves; never below 0, and where a
-        // line of diagonals alone gains a little more, that changes none of them.
+        // Measured in offset units, a straight move falls behind the line by `gain` over the number
+        // of moves. `gain` is never below 0. On a line of diagonal moves alone it can be a little
+        // too great, but that changes none of the moves.
         let gain = UNIT * fewer + end - start;
         line.straight_gain = 2 * gain;
         line.diagonal_loss = 2 * (UNIT * more - gain);
@@ -100,7 +110,7 @@ impl Line {
         line
     }
 
-    /// The two moves that it is made of, the straight and the diagonal one.
+    /// The two kinds of moves of the line: the straight one and the diagonal one.
     #[inline]
     pub const fn moves(&self) -> [Direction; 2] {
         [self.straight, self.diagonal]
@@ -118,7 +128,7 @@ impl Line {
         (0..count).filter(|_| line.next_is_diagonal()).count()
     }
 
-    /// Makes the next move; whether it is diagonal.
+    /// Makes the next move and returns whether it is diagonal.
     pub(crate) fn next_is_diagonal(&mut self) -> bool {
         let [balance, gain, loss] = self.rule();
         let is_diagonal = balance > 0;
@@ -126,20 +136,21 @@ impl Line {
         is_diagonal
     }
 
-    /// The next move is diagonal if the first of these is above zero; a straight move adds the second to it, a
-    /// diagonal one takes the third.
+    /// Returns the numbers of the rule that chooses the moves. The next move is diagonal if the
+    /// first number is positive. A straight move adds the second number to it, and a diagonal move
+    /// subtracts the third.
     pub(crate) fn rule(&self) -> [i32; 3] {
         let balance = self.balance + i32::from(self.ties_diagonal);
         [balance, self.straight_gain, self.diagonal_loss]
     }
 
-    /// So many moves were made by that rule, which left this balance.
+    /// Records that `moves` moves were made by that rule, which left the first number at `balance`.
     pub(crate) fn go_on(&mut self, balance: i32, moves: usize) {
         self.balance = balance - i32::from(self.ties_diagonal);
         self.remaining = self.remaining.saturating_sub(moves as u32);
     }
 
-    /// Moves still to come.
+    /// The number of moves still to come.
     pub const fn remaining(&self) -> u32 {
         self.remaining
     }

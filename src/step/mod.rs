@@ -1,13 +1,14 @@
-//! A line, a dotted line, an arc as single moves of the plotter in eight directions.
+//! Turns lines, dotted lines and arcs into single moves of the plotter in eight directions.
 //!
 //! Harrison 1.6: of the two moves that may follow, a line takes the one that ends nearer to the
-//! true line. Where both are as near (the Knight's move condition, 1.6.1) the choice depends on the
-//! way the line runs, so that the moves from A to B are those from B to A reversed and a line drawn
-//! twice is no thicker. [`Line`] yields the moves; [`Pattern`] says which of them are inked; [`Arc`]
-//! yields the points of an arc, and [`Chords`] the lines that draw exactly those.
+//! true line. If both are equally near (the Knight's move condition, 1.6.1), the choice depends on
+//! the direction of the line. So the moves from A to B are the moves from B to A reversed, and a
+//! line that is drawn twice is no thicker. [`Line`] yields the moves, and [`Pattern`] says which of
+//! them are drawn with the pen down. [`Arc`] yields the points of an arc, and [`Chords`] joins
+//! these points into lines that draw exactly the same points.
 //!
-//! Not done here: speed, pen, limits. A line of more than 2^21 moves is beyond the page and is
-//! refused where the page is checked.
+//! This module does not handle speed, pen or limits. A line of more than 2^21 moves leaves the
+//! page; it is refused where the page is checked.
 
 mod arc;
 mod line;
@@ -52,7 +53,7 @@ pub enum Direction {
 }
 
 impl Direction {
-    /// All eight, in the order of their numbers.
+    /// All eight directions, in the order of their numbers.
     pub const ALL: [Self; 8] = [
         Self::Up,
         Self::UpRight,
@@ -64,7 +65,7 @@ impl Direction {
         Self::UpLeft,
     ];
 
-    /// The direction of a move by the signs of (`dx`, `dy`); `None` for no move.
+    /// The direction given by the signs of `dx` and `dy`; `None` if both are 0.
     pub const fn from_delta(dx: i32, dy: i32) -> Option<Self> {
         Some(match (dx.signum(), dy.signum()) {
             (0, 1) => Self::Up,
@@ -79,16 +80,16 @@ impl Direction {
         })
     }
 
-    /// What the move adds to x and y, each -1, 0 or 1.
+    /// The changes of x and y by the move, each -1, 0 or 1.
     pub const fn delta(self) -> (i32, i32) {
-        /// By their numbers.
+        /// The changes, indexed by the number of the direction.
         const DELTAS: [(i8, i8); 9] =
             [(0, 0), (0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1)];
         let (dx, dy) = DELTAS[self as usize];
         (dx as i32, dy as i32)
     }
 
-    /// The way back.
+    /// The opposite direction.
     pub const fn reversed(self) -> Self {
         match self {
             Self::Up => Self::Down,
@@ -102,7 +103,7 @@ impl Direction {
         }
     }
 
-    /// Where the move leads from `point`.
+    /// The point to which the move leads from `point`.
     pub const fn from_point(self, point: PagePoint) -> PagePoint {
         let (dx, dy) = self.delta();
         PagePoint { x: point.x + dx, y: point.y + dy }

@@ -2,11 +2,12 @@
 
 use crate::drawing::LineType;
 
-/// How the moves of one line divide into inked and bare pieces.
+/// Divides the moves of one line into dots and gaps.
 ///
-/// Harrison counts a fixed number of moves from the start and lets the end fall where it may. Here
-/// the line divides into an odd number of pieces, each as near to the wished length as that allows,
-/// so that both ends are inked and the same points are inked from either end.
+/// Harrison counts a fixed number of moves from the start, so the line may end anywhere in a dot or
+/// gap. Here the line is divided into an odd number of pieces, each as near to the desired length
+/// as that allows. So both ends are drawn with the pen down, and the same points are inked
+/// whichever end the line starts from.
 ///
 /// ```
 /// use penup::step::Pattern;
@@ -22,46 +23,51 @@ pub struct Pattern {
 }
 
 impl Pattern {
-    /// A line of `moves` moves in pieces of about `piece_moves` (0 counts as 1), dots and gaps alike.
+    /// Divides a line of `moves` moves into dots and gaps of about `piece_moves` each (0 counts as
+    /// 1).
     pub const fn new(moves: u32, piece_moves: u32) -> Self {
         let length = if piece_moves == 0 { 1 } else { piece_moves };
-        // The odd number nearest to moves / length, and at least 1.
+        // This is the odd number nearest to moves / length, but at least 1.
         let pieces = moves / length;
         let pieces = if pieces.is_multiple_of(2) { pieces + 1 } else { pieces };
-        // Never more pieces than moves: each piece holds one at least.
+        // There are never more pieces than moves, because each piece has at least one move.
         let most = if moves == 0 { 1 } else { moves - (1 - moves % 2) };
         Self { moves, pieces: if pieces > most { most } else { pieces } }
     }
 
-    /// A line of one piece, all inked.
+    /// A line that is a single inked piece.
     pub const fn full(moves: u32) -> Self {
         Self { moves, pieces: 1 }
     }
 
-    /// How many pieces; odd.
+    /// The number of pieces, which is odd.
     pub const fn pieces(self) -> u32 {
         self.pieces
     }
 
-    /// Moves from the start of the line to the end of piece number `piece`, counted from 0.
+    /// The number of moves from the start of the line to the end of piece number `piece`, counted
+    /// from 0.
     pub const fn end_of(self, piece: u32) -> u32 {
         if self.pieces == 1 {
             return self.moves;
         }
-        // Rounded to nearest. No tie: an odd number of pieces never halves a move.
+        // The result is rounded to the nearest number. There is no tie, because an odd number of
+        // pieces never divides at half a move.
         let pieces = self.pieces as u64;
         let doubled = 2 * (piece as u64 + 1) * self.moves as u64 + pieces;
         (doubled / (2 * pieces)) as u32
     }
 
-    /// Whether piece number `piece` is inked: the first is, then every other one.
+    /// Whether piece number `piece`, counted from 0, is inked. The first piece is, then every other
+    /// one.
     pub const fn inked(piece: u32) -> bool {
         piece.is_multiple_of(2)
     }
 }
 
 impl Pattern {
-    /// The pattern of a line of `moves` moves; a dash is three dots long.
+    /// The pattern for a line of `moves` moves and this line type. Dots are `dot_moves` long, and a
+    /// dash is three dots long.
     pub const fn of(line_type: LineType, moves: u32, dot_moves: u32) -> Self {
         match line_type {
             LineType::Full => Self::full(moves),

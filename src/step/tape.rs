@@ -1,32 +1,33 @@
 //! The plotter's tape of Harrison 1.4: twelve instructions, two to a row of eight holes.
 //!
-//! The most compact store of a job, half a byte a move. After pen up, pen down and stop three
-//! do-nothing instructions give the pen time; [`encode`] inserts them, [`Decoder`] passes over them.
+//! The tape is the most compact form of a job, with half a byte for each move. Three do-nothing
+//! instructions after each pen up, pen down and stop give the pen time to move. [`encode`] inserts
+//! them, and [`Decoder`] skips them.
 
 use super::{Chords, Direction};
 use crate::drawing::PagePoint;
 
-/// One instruction of four bits.
+/// One instruction of the tape, coded in four bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Instruction {
-    /// 0: one instruction's time passes.
+    /// Code 0: does nothing for the time of one instruction.
     Nothing,
-    /// 1 to 8: one move, by its number.
+    /// Codes 1 to 8: one move; the code is the number of its direction.
     Move(Direction),
-    /// 9
+    /// Code 9: raises the pen.
     PenUp,
-    /// 10
+    /// Code 10: lowers the pen.
     PenDown,
-    /// 11: the tape ends.
+    /// Code 11: the tape ends.
     Stop,
 }
 
-/// Do-nothing instructions after pen up, pen down and stop.
+/// The number of do-nothing instructions after pen up, pen down and stop.
 const PAUSE: u8 = 3;
 
 impl Instruction {
-    /// Its four bits.
+    /// The four-bit code of the instruction.
     pub const fn code(self) -> u8 {
         match self {
             Self::Nothing => 0,
@@ -37,7 +38,7 @@ impl Instruction {
         }
     }
 
-    /// The instruction of four bits; `None` for 12 to 15 and more.
+    /// The instruction with this code; `None` for 12 and more.
     pub fn from_code(code: u8) -> Option<Self> {
         match code {
             0 => Some(Self::Nothing),
@@ -52,8 +53,8 @@ impl Instruction {
     }
 }
 
-/// The rows of a tape with these instructions, a stop at its end if they have none. The first
-/// instruction of a row is in the high four bits.
+/// Encodes instructions as the rows of a tape. A stop is added at the end if the instructions
+/// contain none. The first instruction of a row is in the high four bits.
 ///
 /// ```
 /// use penup::step::tape::{Instruction, encode};
@@ -88,19 +89,19 @@ pub fn encode(instructions: impl IntoIterator<Item = Instruction>) -> impl Itera
     })
 }
 
-/// Four holes that are no instruction: the tape is damaged.
+/// A code that is no instruction, because the tape is damaged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BadCode {
-    /// The row, from 0.
+    /// The index of the row, from 0.
     pub row: u32,
     /// The code, 12 to 15.
     pub code: u8,
 }
 
-/// Reads a tape: yields its moves and pen instructions up to the stop or the end.
+/// Reads a tape. It yields the moves and pen instructions up to the stop or the end of the tape.
 ///
-/// A bad code ends it, too; [`Decoder::damage`] tells.
+/// A bad code ends the tape, too; [`Decoder::damage`] reports it.
 #[derive(Debug, Clone)]
 pub struct Decoder<I> {
     rows: I,
@@ -111,16 +112,17 @@ pub struct Decoder<I> {
 }
 
 impl<I: Iterator<Item = u8>> Decoder<I> {
-    /// Reads `rows`.
+    /// Creates a decoder that reads `rows`.
     pub const fn new(rows: I) -> Self {
         Self { rows, row: 0, second: None, ended: false, damage: None }
     }
 
-    /// What ended the tape too early, if anything did.
+    /// The bad code that ended the tape too early, if there was one.
     pub const fn damage(&self) -> Option<BadCode> {
         self.damage
     }
 
+    /// The next four-bit code, or `None` at the end of the rows.
     fn next_code(&mut self) -> Option<u8> {
         if let Some(second) = self.second.take() {
             return Some(second);
@@ -152,14 +154,15 @@ impl<I: Iterator<Item = u8>> Iterator for Decoder<I> {
     }
 }
 
-/// The lines of a tape: their ends and whether they are inked. Drawn, they give the tape's moves.
+/// The lines of a tape. Each item is the end of a line and whether the pen is down. Drawn, the
+/// lines give the moves of the tape.
 #[derive(Debug, Clone)]
 pub struct TapeLines<I> {
     chords: Chords<Run<I>>,
     inked: bool,
 }
 
-/// The points up to the next change of the pen.
+/// The points of the tape up to the next change of the pen.
 #[derive(Debug, Clone)]
 struct Run<I> {
     instructions: I,
@@ -187,7 +190,7 @@ impl<I: Iterator<Item = Instruction>> Iterator for Run<I> {
 }
 
 impl<I: Iterator<Item = Instruction>> TapeLines<I> {
-    /// The lines of `instructions`, from `from` on, with the pen up at first.
+    /// The lines of `instructions`, starting at `from` with the pen up.
     pub fn new(from: PagePoint, instructions: I) -> Self {
         let run = Run { instructions, at: from, change: None };
         Self { chords: Chords::new(from, run), inked: false }
