@@ -1,7 +1,7 @@
 //! The picture of a scene that a camera rounded, by definition: what lies in one plane is taken from
 //! the grid on which the scene was made, everything else from the rounded vertices.
 //!
-//! EdgeParameter an edge everything is linear in space: on which side of a line of the page a point lies, how
+//! Along an edge everything is linear in space: on which side of a line of the page a point lies, how
 //! far it lies behind a plane. So each such quantity is two whole numbers, its values at the ends.
 //! The edge is cut wherever any of them changes its sign, and between two cuts the mediant of the
 //! two speaks for the whole piece. Every triangle is asked about every edge; there is no short cut.

@@ -91,7 +91,7 @@ impl Eq for Key {}
 /// These take some 100,000 instructions.
 const SEGMENTS_BETWEEN_CHECKS: usize = 64;
 
-/// CutPositions the first `count` of `segments` until none overlap, and returns how many there are then. More
+/// Cuts the first `count` of `segments` until none overlap, and returns how many there are then. More
 /// than before only where a line lies inside another that yields to it.
 ///
 /// # Errors

@@ -10,13 +10,13 @@ use crate::visibility::EdgeParameter;
 /// A sheet of paper, its lower left corner at the plotter's origin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Page {
-    /// EdgeParameter x.
+    /// Along x.
     pub width: Millimetres,
-    /// EdgeParameter y.
+    /// Along y.
     pub height: Millimetres,
-    /// Stored free on all four sides.
+    /// Kept free on all four sides.
     pub margin: Millimetres,
-    /// Stored free below the drawing, for its title; 0 without one.
+    /// Kept free below the drawing, for its title; 0 without one.
     pub foot: Millimetres,
 }
 

@@ -285,7 +285,7 @@ pub(super) struct Stepped {
     pub(super) diagonals: usize,
 }
 
-/// CutPositions the sixteenths.
+/// Cuts the sixteenths.
 pub(super) const fn whole_ticks(time: u32) -> u32 {
     time >> FRACTION_BITS << FRACTION_BITS
 }

@@ -12,11 +12,11 @@ pub struct MotionSettings {
     pub steps_per_mm: [Millimetres; 2],
     /// The most steps that a motor makes in a millimetre of the path.
     pub motor_steps_per_mm: Millimetres,
-    /// EdgeParameter the path with the pen down, mm/min, 1 to 32767.
+    /// Along the path with the pen down, mm/min, 1 to 32767.
     pub draw_mm_per_min: Millimetres,
-    /// EdgeParameter the path with the pen up, mm/min, 1 to 32767.
+    /// Along the path with the pen up, mm/min, 1 to 32767.
     pub travel_mm_per_min: Millimetres,
-    /// EdgeParameter the path, mm/s², 10 to 32767.
+    /// Along the path, mm/s², 10 to 32767.
     pub acceleration_mm_per_s2: Millimetres,
     /// The most by which acceleration changes, m/s³, 0.1 to 1000; 0 for no limit.
     pub jerk_m_per_s3: Millimetres,

@@ -39,9 +39,9 @@ pub enum PlotOption {
     OnePen(bool),
     /// `$page=WIDTHxHEIGHT` in mm
     Page {
-        /// EdgeParameter x.
+        /// Along x.
         width: Millimetres,
-        /// EdgeParameter y.
+        /// Along y.
         height: Millimetres,
     },
     /// `$margin=MM`

@@ -454,7 +454,7 @@ mod tests {
                 let (wide, high) = (f64::from(radius), f64::from(radius) / x * y);
                 for p in &there {
                     let (px, py) = (f64::from(p.x - 7).abs(), f64::from(p.y + 3).abs());
-                    // EdgeParameter the axis on which it is nearer.
+                    // Along the axis on which it is nearer.
                     let across = |a: f64, b: f64, along: f64| {
                         a * (1.0 - (along / b).powi(2)).max(0.0).sqrt()
                     };
