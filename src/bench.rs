@@ -1,7 +1,8 @@
-//! Counts the instructions of each stage of a job on a Cortex-M3: `cargo xtask bench` runs it in QEMU.
+//! Counts the instructions of each stage of a job on a Cortex-M3. `cargo xtask bench` runs this in
+//! QEMU.
 //!
-//! The scenes are sent through the library's own protocol, line by line, into the memory of the largest
-//! board; then their jobs are computed as `$plot` does it, and not drawn.
+//! The scenes are sent line by line through the library's own protocol, into the memory of the
+//! largest board. Their jobs are then computed as by `$plot`, but not drawn.
 #![no_std]
 #![no_main]
 
@@ -18,7 +19,7 @@ use penup::protocol::RealTime;
 use penup::stage::{Aborted, Cancel, Stage};
 use static_cell::StaticCell;
 
-/// A scene, and where the eye is; each looks at the middle.
+/// The name, model and eye of each scene; the eye looks at the middle of the model.
 const SCENES: [(&str, &str, &str); 9] = [
     ("lattice1", include_str!("../scenes/lattice1.obj"), "$eye=-3.37,-4.71,5.13\n"),
     ("lattice2", include_str!("../scenes/lattice2.obj"), "$eye=-6.37,-8.71,10.13\n"),
@@ -31,13 +32,13 @@ const SCENES: [(&str, &str, &str); 9] = [
     ("text300", include_str!("../scenes/text300.obj"), ""),
 ];
 
-/// A serial line that says what it is given and hears nothing but refusals.
+/// A board that receives `text` and prints only refusals.
 struct Line<'t> {
     text: &'t [u8],
     queue: NoSteps,
 }
 
-/// A job that is only computed has no steps.
+/// A queue that takes no steps: the jobs are only computed.
 struct NoSteps;
 
 impl EventQueue for NoSteps {
@@ -71,9 +72,10 @@ impl Board for Line<'_> {
     fn wait(&mut self) {}
 }
 
-/// The instructions of view, visibility and order.
+/// Counts the instructions of the stages view, visibility and order.
 struct Stages<'c> {
     counter: &'c mut Counter,
+    /// The current stage and the count at its beginning.
     begun: Option<(Stage, u64)>,
     counts: [u64; 3],
 }

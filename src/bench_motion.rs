@@ -1,8 +1,8 @@
-//! Counts the instructions of planning for each step event on a Cortex-M3: `cargo xtask bench --motion` runs it
-//! in QEMU.
+//! Counts the instructions of motion planning per step event on a Cortex-M3. `cargo xtask bench
+//! --motion` runs this in QEMU.
 //!
-//! All that the main loop does from a target to the queue is counted, and nothing that the interrupt does. Targets
-//! are free, and so is the way to the first.
+//! Everything that the main loop does from a target to the queue is counted, and nothing that the
+//! interrupt does. The computation of the targets and the move to the first one are not counted.
 #![no_std]
 #![no_main]
 
@@ -19,7 +19,7 @@ use penup::motion::{Block, EventQueue, StepEvent};
 use penup::step::{Arc, Turn};
 use static_cell::StaticCell;
 
-/// A queue that is never full and counts.
+/// A queue that is never full and counts its events.
 struct Count(u64);
 
 impl EventQueue for Count {
@@ -32,7 +32,8 @@ impl EventQueue for Count {
     }
 }
 
-/// Steps per millimetre and mm/s of a job, and how many points of a circle are a target.
+/// A job: its name, its steps per millimetre and its speed in mm/s. `stride` is the number of
+/// points of a circle from one target to the next; `None` is a straight line.
 struct Job {
     name: &'static str,
     steps: u16,
@@ -52,13 +53,13 @@ const JOBS: [Job; 4] = [
     },
 ];
 
-/// m/s³
+/// The jerk limits to measure with, in m/s³; 0 is no limit.
 const JERKS: [u16; 4] = [0, 100, 10, 1];
 
-/// The job's targets.
+/// The targets of a job.
 #[derive(Clone)]
 enum Way {
-    /// To a point, if not there yet.
+    /// A straight move to a point; `None` once it has been handed out.
     Line(Option<Target>),
     Circle(Arc, usize),
 }
@@ -68,7 +69,7 @@ impl Way {
         Self::Line(None)
     }
 
-    /// With the pen up to where the job begins, and the job.
+    /// The pen-up move to the start of the job, and the job itself.
     fn of(job: &Job) -> [Self; 2] {
         let line = |point, ink| Self::Line(Some(Target { point, ink }));
         let ink = Some(LineType::Full);
@@ -94,7 +95,7 @@ impl Path for Way {
     fn rewind(&mut self) {}
 }
 
-/// Makes all events of `way`, which is not measured before.
+/// Plans all events of `way`. The machine does not measure the strokes beforehand.
 fn run(machine: &mut Machine, way: &mut Way) -> Count {
     let mut queue = Count(0);
     if machine.start(&mut Way::nowhere()).is_err() {

@@ -1,12 +1,12 @@
-//! penup: a pen plotter's firmware that does the thinking itself.
+//! penup: firmware for a pen plotter that computes the whole drawing itself.
 //!
-//! It is sent a solid, a frame of bars, a curve or a line drawing over a serial line. On the
-//! microcontroller it projects it, removes the hidden lines, chooses the pen-up moves, orders the
-//! strokes, plans the speed and pulses the steppers and the pen. No heap, no floating point in any
-//! decision, the same bits on every machine.
+//! It receives a solid, a frame of bars, a curve or a line drawing over a serial line. On the
+//! microcontroller it projects the model, removes hidden lines, chooses the pen-up moves, orders
+//! the strokes, plans the speeds, and pulses the stepper motors and the pen. It uses no heap, and
+//! no floating point in any decision. It computes the same bits on every machine.
 //!
-//! The modules stand in the order in which the data passes through them. Each may use those above
-//! it, never those below it.
+//! The modules are listed in the order in which the data passes through them. Each may use those
+//! above it, never those below it.
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -32,7 +32,8 @@ pub mod storage;
 pub mod protocol;
 pub mod plotter;
 
-/// The board made of plain memory. Those made of silicon belong to the firmware binary.
+/// The board that consists of memory only, for programs on a host. The boards for real hardware
+/// belong to the firmware binary.
 #[cfg(feature = "host")]
 pub mod boards {
     pub mod host;

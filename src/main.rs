@@ -1,4 +1,4 @@
-//! The firmware's entry, the same for every board.
+//! The entry point of the firmware, which is the same for every board.
 #![no_std]
 #![no_main]
 

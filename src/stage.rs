@@ -1,17 +1,18 @@
-//! What every stage of a job is lent: working memory, and a moment now and then to answer the line.
+//! What every stage of a job borrows: working memory, and a way to answer the serial line while it
+//! computes.
 //!
-//! The stages (visibility, drawing, order) never run at once, so one [`Scratch`] serves them all:
-//! each takes typed slices from it and gives everything back by ending. A stage that runs for more
-//! than a millisecond calls [`Cancel::check`] as it goes, so that status, hold and abort are
-//! answered while it computes. What is refused: a slice that does not fit, with the figures.
+//! The stages (visibility, drawing, order) never run at the same time, so one [`Scratch`] serves
+//! them all. Each takes typed slices from it and gives all of them back when it ends. A stage that
+//! runs for more than a millisecond calls [`Cancel::check`] regularly, so that status, hold and
+//! abort are answered during the computation. A slice that does not fit is refused, with the sizes.
 
 use bytemuck::Pod;
 use core::convert::Infallible;
 
-/// A piece of working memory from which a stage takes its slices.
+/// Working memory from which a stage takes its slices.
 ///
-/// Dropping the slices gives nothing back; the owner of the memory makes a new `Scratch` for the
-/// next stage. Borrow rules keep two stages from holding the same bytes.
+/// Dropping the slices returns nothing: the owner of the memory makes a new `Scratch` for the next
+/// stage. The borrow rules keep two stages from holding the same bytes.
 ///
 /// ```
 /// use penup::stage::Scratch;
@@ -24,6 +25,7 @@ use core::convert::Infallible;
 /// ```
 #[derive(Debug)]
 pub struct Scratch<'a> {
+    /// The memory that has not been taken yet.
     words: &'a mut [u64],
 }
 
@@ -31,24 +33,24 @@ pub struct Scratch<'a> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct OutOfScratch {
-    /// Bytes that the slice needed.
+    /// Number of bytes that the slice needs.
     pub needed: usize,
-    /// Bytes that were left.
+    /// Number of bytes that are left.
     pub available: usize,
 }
 
 impl<'a> Scratch<'a> {
-    /// All of `words` as working memory.
+    /// Makes all of `words` available as working memory.
     pub fn new(words: &'a mut [u64]) -> Self {
         Self { words }
     }
 
-    /// Bytes not yet taken.
+    /// Number of bytes that have not been taken yet.
     pub fn available_bytes(&self) -> usize {
         size_of_val(self.words)
     }
 
-    /// The bytes that [`Scratch::take`] uses up for `count` items of `T`.
+    /// Number of bytes that [`Scratch::take`] uses for `count` items of `T`.
     pub const fn bytes_for<T>(count: usize) -> usize {
         (count * size_of::<T>()).next_multiple_of(8)
     }
@@ -59,10 +61,10 @@ impl<'a> Scratch<'a> {
     /// [`OutOfScratch`] if they do not fit; nothing is taken then.
     pub fn take<T: Pod>(&mut self, count: usize) -> Result<&'a mut [T], OutOfScratch> {
         let words = self.take_words(count.saturating_mul(size_of::<T>()))?;
-        Ok(items_mut(words, count).unwrap_or(&mut [])) // It is as long as asked for.
+        Ok(items_mut(words, count).unwrap_or(&mut [])) // It has the length asked for.
     }
 
-    #[inline(never)] // Once is enough for every type.
+    #[inline(never)] // All types share one copy of the code.
     fn take_words(&mut self, bytes: usize) -> Result<&'a mut [u64], OutOfScratch> {
         let out_of_scratch = OutOfScratch { needed: bytes, available: self.available_bytes() };
         if bytes > out_of_scratch.available {
@@ -76,10 +78,11 @@ impl<'a> Scratch<'a> {
         Ok(taken)
     }
 
-    /// Takes as many items of `T` as `fill` says that it wrote to the front of all that is left.
+    /// Lets `fill` write items of `T` to the front of all the memory that is left, and takes as
+    /// many as it says it has written.
     ///
     /// # Errors
-    /// What `fill` returns; nothing is taken then.
+    /// The error that `fill` returns; nothing is taken then.
     pub fn take_filled<T: Pod, E>(
         &mut self,
         fill: impl FnOnce(&mut [T]) -> Result<usize, E>,
@@ -87,18 +90,18 @@ impl<'a> Scratch<'a> {
         let room = self.available_bytes() / size_of::<T>();
         let count = fill(items_mut(self.words, room).unwrap_or(&mut []))?.min(room);
         let words = core::mem::take(&mut self.words);
-        // At most what there is, since `count` items fit.
+        // `count` items fit, so this is at most what is left.
         let (taken, rest) = words.split_at_mut(Self::bytes_for::<T>(count) / size_of::<u64>());
         self.words = rest;
         Ok(items_mut(taken, count).unwrap_or(&mut []))
     }
 
-    /// Lends what is left to a stage within this stage.
+    /// Lends the memory that is left to a stage within this stage.
     pub fn reborrow(&mut self) -> Scratch<'_> {
         Scratch { words: self.words }
     }
 
-    /// Splits off the first `bytes` (rounded down to words) as one memory, the rest as another.
+    /// Splits the memory into its first `bytes` (rounded down to words) and the rest.
     pub fn split(self, bytes: usize) -> (Scratch<'a>, Scratch<'a>) {
         let word_count = (bytes / size_of::<u64>()).min(self.words.len());
         let (first, second) = self.words.split_at_mut(word_count);
@@ -114,7 +117,7 @@ pub fn items_mut<T: Pod>(words: &mut [u64], count: usize) -> Option<&mut [T]> {
     bytemuck::try_cast_slice_mut(exact).ok()
 }
 
-/// Like [`items_mut`], to read only.
+/// Like [`items_mut`], but for reading only.
 pub fn items<T: Pod>(words: &[u64], count: usize) -> Option<&[T]> {
     const { assert!(align_of::<T>() <= align_of::<u64>()) };
     let bytes: &[u8] = bytemuck::cast_slice(words);
@@ -122,8 +125,9 @@ pub fn items<T: Pod>(words: &[u64], count: usize) -> Option<&[T]> {
     bytemuck::try_cast_slice(exact).ok()
 }
 
-/// Sorts by a key, in place and without recursion (Williams' heapsort): the library's own sorts take
-/// kilobytes of a board's stack, and may order equal keys otherwise in another version.
+/// Sorts by a key, in place and without recursion, by Williams' heapsort. The standard library's
+/// sorts take kilobytes of a board's stack, and another version of it may order equal keys
+/// differently.
 ///
 /// ```
 /// let mut items = [3, 1, 2];
@@ -137,10 +141,11 @@ pub fn heap_sort_by_key<T, K: Ord>(items: &mut [T], key: impl Fn(&T) -> K) {
     }
 }
 
-/// [`heap_sort_by_key`] for keys that take long to compare: looks up from the work for each item.
+/// Like [`heap_sort_by_key`], for keys that take long to compare: checks for cancelling before each
+/// item.
 ///
 /// # Errors
-/// [`Aborted`] if the user gave up; the items are in some order then.
+/// [`Aborted`] if the user cancelled the job; the order of the items is then undefined.
 pub fn heap_sort_cancellable<T, K: Ord>(
     items: &mut [T],
     key: impl Fn(&T) -> K,
@@ -182,7 +187,7 @@ fn heap_sort<T, K: Ord, E>(
     Ok(())
 }
 
-/// The user asked for the job to be given up.
+/// The user has cancelled the job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Aborted;
@@ -195,9 +200,9 @@ pub struct SinkFull;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum StageError {
-    /// Not enough working memory.
+    /// There is not enough working memory.
     Scratch(OutOfScratch),
-    /// The user gave up.
+    /// The user has cancelled the job.
     Aborted,
 }
 
@@ -213,31 +218,31 @@ impl From<Aborted> for StageError {
     }
 }
 
-/// What a job computes before it moves.
+/// The stages of computing a job, before anything moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Stage {
-    /// The camera, and every vertex through it.
+    /// Choosing the camera and projecting every vertex.
     View,
-    /// Which stretches are seen.
+    /// Finding the visible stretches of the edges.
     Visibility,
-    /// The drawing organised (Harrison 5), and in which order its strokes are drawn.
+    /// Organising the drawing as a graph (Harrison 5) and ordering its strokes.
     Order,
 }
 
-/// The moment that a long computation gives to the serial line.
+/// How a long computation lets the serial line be answered.
 pub trait Cancel {
-    /// Answers what waits (status, hold, resume).
+    /// Answers pending requests (status, hold, resume).
     ///
     /// # Errors
-    /// [`Aborted`] if the user gave the job up; the stage then ends at once.
+    /// [`Aborted`] if the user has cancelled the job; the stage then ends at once.
     fn check(&mut self) -> Result<(), Aborted>;
 
-    /// Told when a stage begins.
+    /// Called when a stage begins.
     fn enter(&mut self, _stage: Stage) {}
 }
 
-/// Nobody to answer: for tests and benchmarks.
+/// Never cancels and answers nobody, for tests and benchmarks.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct NeverCancel;
 

@@ -1,32 +1,34 @@
-//! Records that outlive a loss of power, whenever it comes.
+//! Records in flash that survive a loss of power at any time.
 //!
-//! A record has two [`Slots`] in flash. It is written to the one that does not hold its latest state,
-//! the payload first and the header last, whose sum over both makes it valid. So what is read is the
-//! old state or the new one, never a mixture, though the power went between any two bytes. A state is
-//! read whole, by [`Reader`], and written whole, by [`Writer`], in pieces of any size.
+//! A record has two [`Slots`] in flash. A new state is written to the slot that does not hold the
+//! latest state: first the payload, then the header, whose checksum over both makes it valid. A
+//! reader therefore finds either the old state or the new one, never a mixture, even if the power
+//! fails between any two bytes. A state is read whole, by [`Reader`], and written whole, by
+//! [`Writer`], in pieces of any size.
 //!
-//! The flash is any [`NorFlash`]: what is erased is all ones, and writing makes zeros of ones. Refused:
-//! a state longer than a slot.
+//! The flash is any [`NorFlash`]: erasing sets all bits to ones, and writing turns ones into zeros.
+//! A state that is longer than a slot is refused.
 //!
-//! A slot begins with a page for the header, four words in little-endian order: a mark, a sequence
-//! number, the length of the payload in bytes, and the sum, CRC-32 of these three and the payload.
+//! A slot begins with a page for the header. The header consists of four words in little-endian
+//! order: a mark, a sequence number, the length of the payload in bytes, and the CRC-32 of these
+//! three and the payload.
 
 use crate::checksum::CRC_32;
 use crc::{Digest, Table};
 use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
 
-/// What flash writes at once.
+/// The unit in which flash is written, in bytes.
 pub const PAGE_BYTES: usize = 256;
 
 const MARK: u32 = u32::from_le_bytes(*b"pen1");
 const HEADER_BYTES: usize = 16;
 
-/// Why a state was not kept; the one before still is.
+/// Why a state was not kept. The previous one still is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StorageError<E> {
-    /// It is longer than a slot.
+    /// The state is longer than a slot.
     TooLong,
-    /// What the flash says.
+    /// The flash reported an error.
     Flash(E),
 }
 
@@ -36,7 +38,7 @@ impl<E> From<E> for StorageError<E> {
     }
 }
 
-/// The two places of a record in flash, one behind the other.
+/// The two slots of a record, one directly after the other in flash.
 ///
 /// ```
 /// # use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
@@ -76,13 +78,13 @@ impl<E> From<E> for StorageError<E> {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Slots {
-    /// Where the first one begins: a multiple of what the flash erases at once.
+    /// Offset of the first slot in bytes: a multiple of the flash's erase size.
     pub start: u32,
-    /// The size of each: another such multiple.
+    /// Size of each slot in bytes: also a multiple of the erase size.
     pub bytes: u32,
 }
 
-/// A slot's valid header.
+/// The content of a valid header.
 #[derive(Clone, Copy)]
 struct Valid {
     slot: u32,
@@ -91,17 +93,17 @@ struct Valid {
 }
 
 impl Slots {
-    /// The latest state; `None` if there is none.
+    /// Opens the latest state for reading; `None` if there is none.
     pub fn latest<F: ReadNorFlash>(self, flash: &mut F) -> Option<Reader<'_, F>> {
         let valid = self.find(flash)?;
         let at = self.begin(valid.slot) + PAGE_BYTES as u32;
         Some(Reader { flash, at, left: valid.length })
     }
 
-    /// Begins a new state.
+    /// Begins to write a new state.
     ///
     /// # Errors
-    /// What the flash says; the latest state is untouched.
+    /// The error of the flash; the latest state is unchanged.
     pub fn write<F: NorFlash>(
         self,
         flash: &mut F,
@@ -122,10 +124,12 @@ impl Slots {
         })
     }
 
+    /// The offset at which a slot begins.
     fn begin(self, slot: u32) -> u32 {
         self.start + slot * self.bytes
     }
 
+    /// The header of the latest state.
     fn find<F: ReadNorFlash>(self, flash: &mut F) -> Option<Valid> {
         let [first, second] = [0, 1].map(|slot| self.check(flash, slot));
         match (first, second) {
@@ -137,7 +141,7 @@ impl Slots {
         }
     }
 
-    /// The slot's header, if its sum is right.
+    /// The slot's header, if its checksum matches.
     fn check<F: ReadNorFlash>(self, flash: &mut F, slot: u32) -> Option<Valid> {
         let mut header = [0; HEADER_BYTES];
         flash.read(self.begin(slot), &mut header).ok()?;
@@ -168,7 +172,7 @@ fn words(header: [u8; HEADER_BYTES]) -> [u32; 4] {
     [[a, b, c, d], [e, f, g, h], [i, j, k, l], [m, n, o, p]].map(u32::from_le_bytes)
 }
 
-/// The sum of a payload and its header.
+/// The checksum of a payload and its header. `digest` has processed the payload.
 fn total(mut digest: Digest<'_, u32, Table<1>>, sequence: u32, length: u32) -> u32 {
     for word in [MARK, sequence, length] {
         digest.update(&word.to_le_bytes());
@@ -176,7 +180,7 @@ fn total(mut digest: Digest<'_, u32, Table<1>>, sequence: u32, length: u32) -> u
     digest.finalize()
 }
 
-/// A state that is read, from its beginning on.
+/// Reads a state from its beginning on.
 #[derive(Debug)]
 pub struct Reader<'f, F> {
     flash: &'f mut F,
@@ -185,7 +189,8 @@ pub struct Reader<'f, F> {
 }
 
 impl<F: ReadNorFlash> Reader<'_, F> {
-    /// The next bytes, as many as there are and `into` holds; says how many.
+    /// Copies the next bytes to the front of `into`, as many as are left and fit. Returns their
+    /// number, which is 0 if the flash fails.
     pub fn read(&mut self, into: &mut [u8]) -> usize {
         let count = into.len().min(self.left as usize);
         match self.flash.read(self.at, &mut into[..count]) {
@@ -198,21 +203,22 @@ impl<F: ReadNorFlash> Reader<'_, F> {
         }
     }
 
-    /// How many are left.
+    /// Number of bytes that are left.
     pub fn left(&self) -> usize {
         self.left as usize
     }
 }
 
-/// A state that is written. Given up before [`Writer::finish`], it never was.
+/// Writes a new state. If it is dropped before [`Writer::finish`], the previous state remains the
+/// latest.
 pub struct Writer<'f, F> {
     flash: &'f mut F,
     slots: Slots,
     start: u32,
     sequence: u32,
-    /// Bytes taken, of which the last are in `page`.
+    /// Number of payload bytes so far; the last of them may still be in `page`.
     length: u32,
-    /// Bytes from the slot's beginning that are erased.
+    /// Number of bytes that are erased, from the slot's beginning on.
     erased: u32,
     page: [u8; PAGE_BYTES],
     digest: Digest<'static, u32, Table<1>>,
@@ -228,7 +234,7 @@ impl<F: NorFlash> Writer<'_, F> {
     /// Appends bytes.
     ///
     /// # Errors
-    /// See [`StorageError`]; the latest state is still the one before.
+    /// See [`StorageError`]; the latest state is still the previous one.
     pub fn write(&mut self, bytes: &[u8]) -> Result<(), StorageError<F::Error>> {
         for &byte in bytes {
             let place = self.length as usize % PAGE_BYTES;
@@ -242,10 +248,10 @@ impl<F: NorFlash> Writer<'_, F> {
         Ok(())
     }
 
-    /// Makes it the latest state.
+    /// Completes the new state and makes it the latest one.
     ///
     /// # Errors
-    /// See [`StorageError`]; the latest state is still the one before.
+    /// See [`StorageError`]; the latest state is still the previous one.
     pub fn finish(mut self) -> Result<(), StorageError<F::Error>> {
         if !(self.length as usize).is_multiple_of(PAGE_BYTES) {
             self.put_page()?;
@@ -257,16 +263,16 @@ impl<F: NorFlash> Writer<'_, F> {
             place.copy_from_slice(&word.to_le_bytes());
         }
         self.flash.write(self.start, &header).map_err(|error| {
-            // The header may be whole although the rest of its page is not: erased, it holds
-            // nothing. What the flash says to that changes nothing any more.
+            // Although the write failed, the header itself may be complete. Erasing the slot makes
+            // sure that it is not valid. An error of that changes nothing any more.
             let _ = self.flash.erase(self.start, self.start + F::ERASE_SIZE as u32);
             StorageError::Flash(error)
         })
     }
 
-    /// Writes the page that the payload has come to.
+    /// Writes the current page of the payload.
     fn put_page(&mut self) -> Result<(), StorageError<F::Error>> {
-        // Behind the header's.
+        // The payload's pages follow the header's.
         let page = self.length.div_ceil(PAGE_BYTES as u32);
         let (from, to) = (page * PAGE_BYTES as u32, (page + 1) * PAGE_BYTES as u32);
         if to > self.slots.bytes {

@@ -1,4 +1,4 @@
-//! Lines to typed commands.
+//! Parses lines into typed commands.
 
 use super::edit::parse_edit;
 use super::values::{Decimals, PENS, coordinates, number, split_word, whole};
@@ -7,87 +7,88 @@ use crate::curve::CurveError;
 use crate::fixed::Decimal;
 use crate::model::{self, Edit, ElementKind, ModelError, PenName};
 
-/// What a line asks for.
+/// A command: what a line asks for.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Command<'a> {
     /// An empty line, a comment, or a keyword of OBJ that changes nothing here.
     Nothing,
-    /// `v x y z`
+    /// `v x y z`: adds a vertex.
     Vertex([Decimal; 3]),
-    /// `f a b c …`
+    /// `f a b c …`: adds a face.
     Face(Numbers<'a>),
-    /// `l a b …`
+    /// `l a b …`: adds a polyline of bars.
     Polyline(Numbers<'a>),
-    /// `deg n`
+    /// `deg n`: sets the degree of the curves that follow.
     Degree(u8),
-    /// `curv u0 u1 a b …`
+    /// `curv u0 u1 a b …`: begins a curve.
     Curve {
-        /// Where it begins and ends.
+        /// The parameters at which the curve begins and ends.
         ends: [Decimal; 2],
-        /// Its control points.
+        /// The vertex numbers of its control points.
         control: Numbers<'a>,
     },
-    /// `parm u k1 k2 …`
+    /// `parm u k1 k2 …`: adds knots to the curve that has begun.
     Knots(Decimals<'a>),
-    /// `end`
+    /// `end`: completes the curve.
     EndCurve,
-    /// `usemtl NAME` or `g NAME …`
+    /// `usemtl NAME` or `g NAME …`: chooses the pen of what follows.
     Pen {
-        /// Whether it is `usemtl`.
+        /// Whether the keyword is `usemtl`.
         by_material: bool,
-        /// What it names; a number may be past the last pen.
+        /// The pen or name that follows the keyword. A number may be greater than that of the last
+        /// pen.
         name: PenName,
     },
-    /// `$`
+    /// `$`: lists the commands.
     Help,
-    /// `$I`
+    /// `$I`: reports version, board and limits.
     BuildInfo,
-    /// `$$`
+    /// `$$`: lists the settings of the machine.
     Settings,
     /// `$number=value` for a setting of the machine, or a name that no option has.
     Setting {
-        /// What stands before the equals sign; only a setting's number is accepted later.
+        /// The text before the equals sign. Anything but the number of a setting is refused later.
         name: &'a str,
-        /// What it shall be.
+        /// The text of the new value.
         value: &'a str,
     },
-    /// `$name=value` for what is drawn and how.
+    /// `$name=value`: sets an option of the plot.
     Option(PlotOption),
-    /// `$title=TEXT`
+    /// `$title=TEXT`: sets the title below the drawing.
     Title(EscapedText<'a>),
-    /// `$options`
+    /// `$options`: lists the options of the plot.
     Options,
-    /// `$model`
+    /// `$model`: reports the size of the model.
     Model,
-    /// `$clear`
+    /// `$clear`: removes the whole model.
     Clear,
-    /// `$delete=…` and others: changes the model.
+    /// `$delete=…` and others: edits the model.
     Edit(Edit),
-    /// `$list=PART,FIRST,LAST`
+    /// `$list=PART,FIRST,LAST`: lists elements of the model.
     List(ElementKind, model::Numbers),
-    /// `$undo`
+    /// `$undo`: takes back the last change of the model.
     Undo,
-    /// `$plot`
+    /// `$plot`: computes and draws the model.
     Plot,
-    /// `$again`
+    /// `$again`: draws the last job again.
     Again,
-    /// `$X`
+    /// `$X`: unlocks the plotter after an alarm, or wakes it.
     Unlock,
-    /// `$H`
+    /// `$H`: looks for the limit switches.
     Home,
-    /// `$C`
+    /// `$C`: begins or ends check mode, in which nothing moves.
     Check,
-    /// `$SLP`
+    /// `$SLP`: switches the motors off.
     Sleep,
-    /// `$UF2`
+    /// `$UF2`: becomes the drive onto which a new image is copied.
     ShowDrive,
-    /// `$J=…`: a move by hand.
+    /// `$J=…`: a jog, which moves with the pen up.
     Jog(GCode<'a>),
-    /// `G…`, `M…`, `X…`
+    /// `G…`, `M…`, `X…`: a line of G-code.
     GCode(GCode<'a>),
 }
 
-/// The `$` commands, options and words of G-code, and what each does, as `$` lists them.
+/// The `$` commands, options and G-code words, each with its meaning, as `$` lists them.
 pub const HELP: &[(&str, &str)] = &[
     ("$", "this list"),
     ("$I", "version, board and limits"),
@@ -167,7 +168,7 @@ pub const HELP: &[(&str, &str)] = &[
 ];
 
 impl<'a> Command<'a> {
-    /// Understands one line.
+    /// Parses one line.
     ///
     /// # Errors
     /// A [`CommandError`] that names the word at fault.
@@ -250,15 +251,16 @@ impl<'a> Command<'a> {
     }
 }
 
-/// The text of a `$title=` line as it stands, with its spaces and whatever else a title may hold.
+/// The text of a `$title=` line, unchanged, with its spaces and any other characters. `None` for
+/// other lines.
 #[inline(never)] // Keeps its frame off the stack while the stages run.
 fn title(line: &str) -> Option<&str> {
     let (name, text) = line.trim_start().strip_prefix('$')?.split_once('=')?;
     (name.trim() == "title").then_some(text)
 }
 
-/// The pen that one of the words numbers, as in `pen3` or `3`, else all of the text by a hash. Without a
-/// name it is the first pen.
+/// The pen that one of the words gives by number, as in `pen3` or `3`. If there is none, the whole
+/// text counts as a name, represented by its hash. An empty text means the first pen.
 #[inline(never)] // Keeps its frame off the stack while the stages run.
 fn pen_name(text: &str) -> PenName {
     let mut words = text.split_ascii_whitespace();
@@ -270,7 +272,8 @@ fn pen_name(text: &str) -> PenName {
         let number = digits.parse::<i32>().ok().filter(|number| (1..=PENS).contains(number));
         match number {
             Some(number) if is_number => Some(number as u8 - 1),
-            // No pen has this number; without the word it is a name like others.
+            // No pen has this number. Without the word `pen`, such a number is a name like any
+            // other.
             None if is_number && is_pen => Some(u8::MAX),
             _ => None,
         }
@@ -279,7 +282,7 @@ fn pen_name(text: &str) -> PenName {
     match numbered {
         Some(pen) => PenName::Number(pen),
         None if text.is_empty() => PenName::Number(0),
-        // Fowler, Noll and Vo's, 32 bits.
+        // The hash of Fowler, Noll and Vo (FNV-1a), 32 bits.
         None => PenName::Other(
             text.bytes()
                 .fold(0x811C_9DC5, |hash, byte| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193)),
@@ -287,7 +290,7 @@ fn pen_name(text: &str) -> PenName {
     }
 }
 
-/// u0 u1 a b …
+/// Parses `u0 u1 a b …`.
 fn curve(text: &str) -> Result<Command<'_>, CommandError> {
     let (from, rest) = split_word(text);
     let (to, rest) = split_word(rest);

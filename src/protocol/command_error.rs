@@ -1,4 +1,5 @@
-//! Why a line was not carried out: a number for programs, a sentence for people.
+//! The reasons why a line is not carried out: each has a number for programs and a sentence for
+//! people.
 
 use crate::convex::SolidError;
 use crate::curve::CurveError;
@@ -12,104 +13,105 @@ use crate::step::ArcError;
 use crate::view::ViewError;
 use core::fmt;
 
-/// A line that was not carried out; what was there before is untouched.
+/// Why a line was not carried out. The plotter's state is then unchanged, except where an error
+/// says otherwise.
 ///
-/// [`CommandError::number`] is what `error:N` says; the text ([`fmt::Display`]) goes before it as a
-/// message and says what to do.
+/// [`CommandError::number`] is the number in `error:N`. The text ([`fmt::Display`]) is sent before
+/// it as a message and says what to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CommandError {
-    /// No command begins like this.
+    /// No command begins like this line.
     UnknownCommand,
-    /// A number was expected.
+    /// The text is not a number where one was expected.
     NotANumber,
     /// No `$` command has this name.
     UnknownSystemCommand,
-    /// `$H` while homing is switched off (`$22=0`).
+    /// `$H` was sent while homing is switched off (`$22=0`).
     HomingOff,
-    /// The command needs an idle plotter.
+    /// The plotter is not idle, as the command requires.
     Busy,
-    /// The plotter is in alarm.
+    /// The plotter is in alarm or asleep.
     Locked,
-    /// More bytes than a line may have.
+    /// The line has too many bytes.
     LineTooLong {
-        /// The longest line.
+        /// The length of the longest line, in bytes.
         limit: usize,
     },
     /// The line is not UTF-8.
     NotText,
-    /// Bytes were lost because the sender did not wait.
+    /// Bytes of the line were lost or damaged.
     BytesLost,
-    /// G-code with this letter, or its number, that is not known.
+    /// A word of G-code with this letter is not known: either the letter or its number.
     UnsupportedWord(u8),
-    /// There is no such arc.
+    /// There is no such arc, for example because its ends are not equally far from its centre.
     Arc(ArcError),
-    /// A number past what can be stored.
+    /// A number is outside the range that is allowed or can be stored.
     NumberOutOfRange,
-    /// Too few or too many numbers.
+    /// There are too few or too many numbers.
     WrongNumberCount {
-        /// How many it takes.
+        /// How many numbers are needed.
         needed: usize,
     },
-    /// A corner is not `v`, `v/vt`, `v//vn` or `v/vt/vn` in whole numbers.
+    /// A corner is not written as `v`, `v/vt`, `v//vn` or `v/vt/vn` with whole numbers.
     NotAVertexNumber,
-    /// The value is none of those that there are.
+    /// The value is not one of the choices.
     NotAChoice {
-        /// Which there are.
+        /// The list of choices.
         choices: &'static str,
     },
-    /// A page is WIDTHxHEIGHT.
+    /// The size of a page is not written as WIDTHxHEIGHT.
     NotAPage,
-    /// A backslash of a title begins no escape.
+    /// A backslash in a title does not begin an escape.
     NotAnEscape,
-    /// A title with a letter that the font lacks.
+    /// A title has a letter that the font lacks.
     NotInTheFont(char),
-    /// More letters than a title may have.
+    /// The title is too long.
     TitleTooLong {
-        /// The longest title, in bytes of UTF-8.
+        /// The length of the longest title, in bytes of UTF-8.
         limit: usize,
     },
-    /// The model refused it.
+    /// The model refused the change.
     Model(ModelError),
-    /// No face and no bar to plot.
+    /// There is nothing to draw.
     NothingToPlot,
-    /// The camera sees nothing that can be drawn.
+    /// The camera cannot show the model.
     View(ViewError),
-    /// The vertices, or the edges, are not those of a convex solid.
+    /// The vertices or edges are not those of a convex solid, or the eye is inside it.
     Solid(SolidError),
-    /// The drawing does not go on the page.
+    /// The drawing or its title does not fit on the page.
     Page(PageError),
-    /// The machine refused it.
+    /// The machine refused the move or command.
     Machine(MachineError),
-    /// The setting was refused.
+    /// The value of the setting was refused.
     Setting(SettingError),
-    /// Not enough working memory for this drawing.
+    /// There is not enough working memory for this drawing.
     DrawingTooLarge(OutOfScratch),
-    /// More lines than a tour can number.
+    /// The drawing has more lines than a tour can number.
     TooManyLines,
-    /// No change of the model, or a plot came after it.
+    /// There is no change of the model to take back, or a plot came after it.
     NothingToUndo,
-    /// The user gave the job up while it was computed.
+    /// The user cancelled the job while it was computed.
     Aborted,
-    /// The flash does not keep it.
+    /// The settings are in force, but the flash does not keep them.
     NotStored,
     /// No job is kept.
     NoJobKept,
-    /// The kept job is counted in other steps.
+    /// The kept job was computed for other steps per millimetre.
     OtherSteps,
-    /// The checksum of the line is not that of its bytes.
+    /// The line's checksum does not match its bytes.
     Damaged,
-    /// A line with this number must come first.
+    /// Another line must come first.
     OutOfOrder {
-        /// The number.
+        /// The number of that line.
         expected: i32,
     },
-    /// A line without number or checksum where both are required.
+    /// The line has no number or no checksum where both are required.
     Unnumbered,
-    /// The line has this number and was refused with this error when it came first.
+    /// A line with the same number was accepted before and then refused with this error.
     RefusedBefore(u16),
 }
 
-/// Each `error:N` and what it means, as `docs/protocol.md` lists them.
+/// The number N of each `error:N` and its meaning, as `docs/protocol.md` lists them.
 pub const MEANINGS: &[(u16, &str)] = &[
     (1, "unknown command"),
     (2, "not a number"),
@@ -169,7 +171,7 @@ pub const MEANINGS: &[(u16, &str)] = &[
 ];
 
 impl CommandError {
-    /// The number in `error:N`; numbers below 100 mean what they mean in Grbl 1.1.
+    /// The number in `error:N`. Numbers below 100 have the same meaning as in Grbl 1.1.
     pub const fn number(&self) -> u16 {
         match self {
             Self::UnknownCommand => 1,

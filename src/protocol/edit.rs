@@ -1,16 +1,19 @@
-//! The edits of the model, `$name=value`.
+//! Parses the edits of the model and `$list`, all of the form `$name=value`.
 
 use super::values::{number, whole};
 use super::{Command, CommandError};
 use crate::model::{self, Edit, ElementKind};
 
-/// The values of an edit, with commas between.
+/// Reads the values of an edit one after the other. They are separated by commas.
 struct Values<'a> {
+    /// The text not yet read; `None` after the last value.
     rest: Option<&'a str>,
+    /// The number of values that an error reports as needed.
     needed: usize,
 }
 
 impl<'a> Values<'a> {
+    /// The text of the next value.
     fn text(&mut self) -> Result<&'a str, CommandError> {
         let rest = self.rest.ok_or(CommandError::WrongNumberCount { needed: self.needed })?;
         let (value, rest) = match rest.split_once(',') {
@@ -21,6 +24,7 @@ impl<'a> Values<'a> {
         Ok(value.trim())
     }
 
+    /// The next three values, each parsed by `read`.
     fn three<T: Copy + Default>(
         &mut self,
         read: impl Fn(&str) -> Result<T, CommandError>,
@@ -32,6 +36,7 @@ impl<'a> Values<'a> {
         Ok(values)
     }
 
+    /// The next value as a kind of element.
     fn part(&mut self) -> Result<ElementKind, CommandError> {
         match self.text()? {
             "v" => Ok(ElementKind::Vertices),
@@ -42,19 +47,20 @@ impl<'a> Values<'a> {
         }
     }
 
-    /// First and last, or one number for both.
+    /// Reads the first and the last number of a range, or one number for both.
     fn numbers(&mut self) -> Result<[i32; 2], CommandError> {
         let first = whole(self.text()?)?;
         let last = if self.rest.is_some() { whole(self.text()?)? } else { first };
         Ok([first, last])
     }
 
+    /// Like [`Values::numbers`]; without values, `None`, which means all.
     fn numbers_or_all(&mut self) -> Result<model::Numbers, CommandError> {
         if self.rest.is_some() { self.numbers().map(Some) } else { Ok(None) }
     }
 }
 
-/// `None` if no edit has this name.
+/// Parses the edit with this name. `None` if no edit has this name.
 #[inline(never)] // Keeps its frame off the stack while the stages run.
 pub(super) fn parse_edit<'a>(name: &str, value: &str) -> Result<Option<Command<'a>>, CommandError> {
     let mut values = Values { rest: Some(value), needed: 3 };

@@ -1,14 +1,15 @@
-//! Any text in ASCII: letters that a line cannot hold are written as numbers.
+//! Escapes that represent any text in ASCII, for letters that a line cannot contain directly.
 //!
-//! `\xE9` is the letter with this number, two hexadecimal digits; `\u{2013}` one with up to six; `\\\\` is a backslash.
-//! Other letters stand for themselves, so UTF-8 may be sent as it is, too.
+//! `\xE9` is the letter with this Unicode number in two hexadecimal digits. `\u{2013}` has up to
+//! six digits. `\\` is a backslash. Other letters represent themselves, so UTF-8 may also be sent
+//! directly.
 
 use super::CommandError;
 use crate::drawing::is_in_font;
 use core::fmt::{self, Write};
 use core::str::Chars;
 
-/// Text of a line for a title: every escape is one, and the font has every letter.
+/// The escaped text of a title. Every escape in it is valid, and the font has every letter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct EscapedText<'a> {
     text: &'a str,
@@ -18,7 +19,8 @@ impl<'a> EscapedText<'a> {
     /// Checks every letter, so that [`EscapedText::letters`] cannot fail.
     ///
     /// # Errors
-    /// [`CommandError::NotAnEscape`], [`CommandError::NotInTheFont`].
+    /// [`CommandError::NotAnEscape`] if a backslash does not begin an escape,
+    /// [`CommandError::NotInTheFont`] if the font lacks a letter.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub(super) fn new(text: &'a str) -> Result<Self, CommandError> {
         let mut rest = text.chars();
@@ -31,14 +33,14 @@ impl<'a> EscapedText<'a> {
         Ok(Self { text })
     }
 
-    /// The letters that it stands for.
+    /// The letters that the text represents.
     pub fn letters(&self) -> impl Iterator<Item = char> + use<'a> {
         let mut rest = self.text.chars();
         core::iter::from_fn(move || next(&mut rest)?)
     }
 }
 
-/// The next letter; `Some(None)` if it is no escape.
+/// The next letter; `Some(None)` if its escape is not valid; `None` at the end.
 fn next(rest: &mut Chars<'_>) -> Option<Option<char>> {
     let first = rest.next()?;
     if first != '\\' {
@@ -47,7 +49,7 @@ fn next(rest: &mut Chars<'_>) -> Option<Option<char>> {
     Some(escaped(rest).and_then(char::from_u32))
 }
 
-/// The number after a backslash.
+/// The Unicode number that the escape after a backslash gives.
 fn escaped(rest: &mut Chars<'_>) -> Option<u32> {
     let (digits, after) = match rest.next()? {
         '\\' => return Some('\\'.into()),
@@ -60,7 +62,7 @@ fn escaped(rest: &mut Chars<'_>) -> Option<u32> {
     u32::from_str_radix(digits, 16).ok().filter(|_| is_number)
 }
 
-/// Any text as a line takes it, in ASCII without bytes that act at once.
+/// Shows any text in the escaped form, in ASCII and without bytes that act at once.
 ///
 /// ```
 /// use penup::protocol::{Command, Escape};

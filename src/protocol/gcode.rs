@@ -1,4 +1,4 @@
-//! A line of G-code as letters with numbers.
+//! Parses a line of G-code into words: letters, each with a number.
 
 use super::CommandError;
 use crate::fixed::Decimal;
@@ -6,24 +6,25 @@ use crate::fixed::Decimal;
 /// One letter and its number: `G1`, `X-2.5`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Word {
-    /// In upper case.
+    /// The letter, in upper case.
     pub letter: u8,
-    /// What follows it.
+    /// The number after the letter.
     pub number: Decimal,
 }
 
-/// The words of a line. Whoever has one has words only: comments in parentheses and after a
-/// semicolon are passed over.
+/// The words of a line, which has been checked to be well-formed. Comments in parentheses and after
+/// a semicolon are skipped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct GCode<'a> {
     text: &'a str,
 }
 
 impl<'a> GCode<'a> {
-    /// Reads `text`.
+    /// Checks all of `text`.
     ///
     /// # Errors
-    /// [`CommandError::NotANumber`] if a letter has no number, or anything else stands there.
+    /// [`CommandError::NotANumber`] if a letter has no number, [`CommandError::UnknownCommand`] if
+    /// there is anything else but words and comments.
     ///
     /// ```
     /// use penup::protocol::GCode;
@@ -42,7 +43,8 @@ impl<'a> GCode<'a> {
         Ok(Self { text })
     }
 
-    /// Whether a line that is none of OBJ may be G-code: it begins with a capital, a comment or `%`.
+    /// Whether a line that is not OBJ may be G-code: it begins with a capital letter, a comment or
+    /// `%`.
     pub fn begins(line: &str) -> bool {
         line.starts_with(|first: char| matches!(first, 'A'..='Z' | '(' | ';' | '%'))
     }
@@ -54,7 +56,7 @@ impl<'a> GCode<'a> {
     }
 }
 
-/// Takes the next word off `rest`.
+/// Removes the next word from `rest` and returns it. `None` at the end.
 fn next_word(rest: &mut &str) -> Option<Result<Word, CommandError>> {
     loop {
         *rest = rest.trim_start_matches([' ', '\t', '%']);

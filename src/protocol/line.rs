@@ -1,77 +1,78 @@
-//! Bytes to lines, and the bytes that are commands by themselves.
+//! Assembles lines from bytes, and recognises the bytes that are commands by themselves.
 
 use super::numbering::NUMBER_LIMIT;
 use super::{CommandError, DAMAGED};
 
-/// The longest line, in bytes without its end, its number and its checksum.
+/// The length of the longest line in bytes, without its end, its number and its checksum.
 pub const LINE_LIMIT: usize = 256;
 
-/// What was asked for by single bytes, which never wait in a queue.
+/// A set of real-time requests: commands of a single byte, which never wait in a queue.
 ///
-/// A board's receive interrupt collects these; the main loop and every long computation look at them.
+/// A board's receive interrupt collects these requests. The main loop and every long computation
+/// check them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RealTime(u16);
 
 impl RealTime {
-    /// `?`: report the status.
+    /// `?`: reports the status.
     pub const STATUS: Self = Self(1);
-    /// `!`: stop on the path, pen up.
+    /// `!`: stops on the path and raises the pen.
     pub const HOLD: Self = Self(1 << 1);
-    /// `~`: go on.
+    /// `~`: resumes.
     pub const RESUME: Self = Self(1 << 2);
-    /// ctrl-X: give up the job. Bytes received before it are dropped.
+    /// ctrl-X: cancels the job. Bytes received before it are dropped.
     pub const ABORT: Self = Self(1 << 3);
-    /// 0x85: give up the moves by hand.
+    /// 0x85: cancels jogs.
     pub const CANCEL_JOG: Self = Self(1 << 5);
-    /// 0x90: speeds as set.
+    /// 0x90: resets the feed override to 100 %.
     pub const FEED_RESET: Self = Self(1 << 6);
-    /// 0x91: speeds 10 % up.
+    /// 0x91: raises the feed override by 10 %.
     pub const FEED_PLUS_10: Self = Self(1 << 7);
-    /// 0x92: speeds 10 % down.
+    /// 0x92: lowers the feed override by 10 %.
     pub const FEED_MINUS_10: Self = Self(1 << 8);
-    /// 0x93: speeds 1 % up.
+    /// 0x93: raises the feed override by 1 %.
     pub const FEED_PLUS_1: Self = Self(1 << 9);
-    /// 0x94: speeds 1 % down.
+    /// 0x94: lowers the feed override by 1 %.
     pub const FEED_MINUS_1: Self = Self(1 << 10);
-    /// 0xFB: pause at the end of the stroke.
+    /// 0xFB: pauses at the end of the stroke.
     pub const PAUSE: Self = Self(1 << 11);
-    /// 0xFD: stop the pins at once.
+    /// 0xFD: emergency stop, which halts the pins at once.
     pub const EMERGENCY: Self = Self(1 << 12);
 
-    /// Whether all of `asked` was asked for.
+    /// Whether this set contains all of `asked`.
     pub const fn has(self, asked: Self) -> bool {
         self.0 & asked.0 == asked.0
     }
 
-    /// Both.
+    /// The union of both sets.
     #[must_use]
     pub const fn and(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
 
-    /// What of it is in `mask`.
+    /// The intersection with `mask`.
     #[must_use]
     pub const fn only(self, mask: Self) -> Self {
         Self(self.0 & mask.0)
     }
 
-    /// The bits, for a board that collects them in an atomic.
+    /// The set as bits, for a board that collects them in an atomic.
     pub const fn to_bits(self) -> u16 {
         self.0
     }
 
-    /// What the bits of [`RealTime::to_bits`] stand for.
+    /// The set with the bits of [`RealTime::to_bits`].
     pub const fn from_bits(bits: u16) -> Self {
         Self(bits)
     }
 }
 
-/// Tells the bytes that act at once from those of lines, one by one as they come.
+/// Separates the bytes that act at once from the bytes of lines, one by one as they come.
 ///
-/// The bytes 0x85 and 0x90 to 0x94, which are Grbl's, are also inner bytes of letters in UTF-8; there
-/// they are text. All others act wherever they stand, whatever came before them: 0xFB and 0xFD, which
-/// are penup's own, are never part of UTF-8.
+/// The bytes 0x85 and 0x90 to 0x94, which Grbl defines, are also continuation bytes of letters in
+/// UTF-8. Within a letter, they are text. All other commands act anywhere, whatever came before
+/// them: 0xFB and 0xFD, which are penup's own, never occur in UTF-8.
 ///
 /// ```
 /// use penup::protocol::{RealTime, Sorter};
@@ -84,19 +85,19 @@ impl RealTime {
 /// ```
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Sorter {
-    /// Inner bytes of a letter that are still to come.
+    /// Number of continuation bytes of the current letter that are still to come.
     inner: u8,
-    /// The byte before.
+    /// The previous byte.
     last: u8,
 }
 
 impl Sorter {
-    /// Before the first byte.
+    /// A sorter before the first byte.
     pub const fn new() -> Self {
         Self { inner: 0, last: 0 }
     }
 
-    /// What the byte asks for; `None` for a byte of a line.
+    /// The request that the byte makes. `None` for a byte of a line.
     pub const fn sort(&mut self, byte: u8) -> Option<RealTime> {
         // The second byte of a well-formed letter (Unicode, table 3-7).
         let is_inner = match self.last {
@@ -135,29 +136,31 @@ impl Sorter {
     }
 }
 
-/// Gathers bytes to lines of at most [`LINE_LIMIT`] bytes and a number and a checksum.
+/// Assembles bytes into lines of at most [`LINE_LIMIT`] bytes besides a number and a checksum.
 #[derive(Debug, Default)]
 pub struct LineReader {
     bytes: heapless::Vec<u8, { LINE_LIMIT + NUMBER_LIMIT }>,
+    /// Whether the line does not fit.
     too_long: bool,
-    /// Bytes of the line were lost.
+    /// Whether bytes of the line were lost or damaged.
     damaged: bool,
-    /// What ended the line before, until the next byte comes.
+    /// The byte that ended the previous line, until the next byte comes.
     ended_by: Option<u8>,
 }
 
 impl LineReader {
-    /// Before the first byte.
+    /// A reader before the first byte.
     pub const fn new() -> Self {
         Self { bytes: heapless::Vec::new(), too_long: false, damaged: false, ended_by: None }
     }
 
-    /// Adds a byte. At the end of a line (LF, CR or CR LF) the line is handed out, an empty one too,
+    /// Adds a byte. At the end of a line (LF, CR or CR LF), returns the line, even if it is empty,
     /// so that every line that a sender counts is answered.
     ///
     /// # Errors
-    /// At the end of the line: [`CommandError::BytesLost`] if it held [`DAMAGED`], else
-    /// [`CommandError::LineTooLong`] if it was, [`CommandError::NotText`] if it is not UTF-8.
+    /// All at the end of the line: [`CommandError::BytesLost`] if it contains [`DAMAGED`],
+    /// [`CommandError::LineTooLong`] if it is too long, [`CommandError::NotText`] if it is not
+    /// UTF-8.
     pub fn push(&mut self, byte: u8) -> Option<Result<&str, CommandError>> {
         if let Some(end) = self.ended_by.take() {
             self.bytes.clear();
@@ -184,7 +187,7 @@ impl LineReader {
         })
     }
 
-    /// Forgets what has come of the line.
+    /// Discards what has been received of the line.
     pub fn clear(&mut self) {
         *self = Self::default();
     }

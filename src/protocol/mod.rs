@@ -1,10 +1,11 @@
-//! Bytes to lines to typed commands, and replies.
+//! The serial protocol: from bytes to lines, from lines to typed commands, and the errors that
+//! replies name.
 //!
 //! The framing is that of Grbl 1.1, for which senders exist: a greeting, one `ok` or `error:N` for
-//! each line, `?` `!` `~` ctrl-X and others acted on at once. A [`LineReader`] makes lines of bytes,
-//! [`Command::parse`] makes a typed command of a line, a [`CommandError`] says why a line was not carried
-//! out. Anything that is no command is refused with a number and the reason; nothing here changes
-//! any state.
+//! each line, and single bytes (`?`, `!`, `~`, ctrl-X and others) that act at once. A
+//! [`LineReader`] makes lines from bytes, and [`Command::parse`] makes a typed command from a line.
+//! A [`CommandError`] says why a line was not carried out. Anything that is not a command is
+//! refused with a number and the reason. Nothing here changes the state of the plotter.
 
 mod command;
 mod edit;

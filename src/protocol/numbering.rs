@@ -1,66 +1,66 @@
-//! Lines with a number and a checksum, so that no line is lost, damaged, repeated or exchanged in
-//! silence.
+//! Lines with a number and a checksum, so that lost, damaged, repeated or reordered lines are
+//! detected.
 //!
-//! A line `N17 v 0 1 0*…` has the number 17; what follows the last `*` is the checksum of all
-//! bytes before it. There are two checksums, which cannot be taken for each other: RepRap's XOR
-//! of the bytes, in one to three decimal digits, and [`CRC_16`], in exactly four hexadecimal
-//! digits (0-9, A-F). A [`Numbering`] takes number and checksum off and says whether the line is
-//! to be carried out. Lines are carried out in the order of their numbers; a line that came
-//! before is acknowledged again. Once lines with a CRC have begun, a line without number and
-//! checksum is refused, as it may be what a damaged line has become; and so is one with an XOR,
-//! which passes one wrong line in 256.
+//! A line `N17 v 0 1 0*…` has the number 17. The text after the last `*` is the checksum of all
+//! bytes before it. There are two checksums, which cannot be confused: RepRap's XOR of the bytes,
+//! in one to three decimal digits, and [`CRC_16`], in exactly four hexadecimal digits (0-9, A-F). A
+//! [`Numbering`] removes number and checksum and decides whether the line is to be carried out.
+//! Lines are carried out in the order of their numbers. A line that came before is only
+//! acknowledged again. After the first line with a CRC, a line without number and checksum is
+//! refused, because it may be the remainder of a damaged line. So is a line with an XOR, which lets
+//! one wrong line in 256 pass.
 //!
-//! `M110 N…` sets the number of the last line, `M110` alone with a checksum asks for it, and a
-//! numbered `M2` or `M30` ends the obligation to send numbers, as ctrl-X does.
+//! `M110 N…` sets the number of the last line. `M110` alone, with a checksum, asks for it. A
+//! numbered `M2` or `M30` ends the obligation to send numbers, as does ctrl-X.
 
 use super::{CommandError, LINE_LIMIT};
 use crate::checksum::CRC_16;
 
-/// The most bytes that the number and the checksum add to a line: `N-999999999 ` and `*FFFF`.
+/// The largest number of bytes that number and checksum add to a line: `N-999999999 ` and `*FFFF`.
 pub const NUMBER_LIMIT: usize = 12 + 5;
 
-/// Which checksum stands at the end of a line.
+/// The kind of checksum at the end of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Checksum {
-    /// All bytes joined by exclusive or, in decimal: RepRap's.
+    /// The exclusive or of all bytes, in decimal, as RepRap defines it.
     Xor,
     /// [`CRC_16`] in four hexadecimal digits.
     Crc,
 }
 
-/// What the reply to a line names.
+/// What the reply to a line contains besides its outcome.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Label {
-    /// How the line was checked: the reply has the same checksum if that is a CRC.
+    /// The kind of checksum of the line. If it is a CRC, the reply has one, too.
     pub checksum: Option<Checksum>,
-    /// What is named.
+    /// The number that the reply names.
     pub named: Named,
 }
 
 /// A number in a reply.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Named {
-    /// None: the line had none.
+    /// No number, because the line had none.
     #[default]
     Nothing,
-    /// That of the line, which has been accepted.
+    /// The number of the line, which has been accepted.
     Line(i32),
-    /// That of the last line that was accepted: the answer to `M110`.
+    /// The number of the last accepted line, in reply to `M110`.
     Last(i32),
-    /// That of the line that is expected, as this one was not accepted.
+    /// The number of the expected line, because this line was not accepted.
     Expected(i32),
 }
 
-/// What is to be done with a line.
+/// What to do with a received line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Received<'a> {
-    /// It is carried out.
+    /// Carry it out.
     Line(&'a str, Label),
-    /// It is only answered.
+    /// Only answer it.
     Answer(Result<(), CommandError>, Label),
 }
 
-/// Which lines have come.
+/// Keeps track of which numbered lines have come.
 ///
 /// ```
 /// use penup::protocol::{Named, Numbering, Received};
@@ -77,16 +77,17 @@ pub enum Received<'a> {
 pub struct Numbering {
     /// The number of the last line that was accepted.
     last: i32,
-    /// Whether a number has come or was set.
+    /// Whether a number has been received or set.
     has_begun: bool,
-    /// What a line must have.
+    /// The checksum that a line must have, if any.
     required: Option<Checksum>,
-    /// The first line that was accepted and refused since the number was set, and its error.
+    /// The number of the first line that was accepted and then refused since the number was last
+    /// set, with its error.
     refused: Option<(i32, u16)>,
 }
 
 impl Numbering {
-    /// Checks a line as the reader gave it.
+    /// Checks a line as the reader has returned it.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub fn receive<'a>(&mut self, line: Result<&'a str, CommandError>) -> Received<'a> {
         let line = match line {
@@ -99,7 +100,7 @@ impl Numbering {
         }
     }
 
-    /// Notes what came of a line that was carried out.
+    /// Notes the outcome of a line that was carried out, so that it can be repeated.
     pub fn note(&mut self, label: Label, outcome: Result<(), CommandError>) {
         if let (Named::Line(number), Err(command_error)) = (label.named, outcome)
             && number == self.last
@@ -139,7 +140,7 @@ impl Numbering {
         if self.required == Some(Checksum::Crc) && checksum == Checksum::Xor {
             return self.refuse(CommandError::Damaged, by);
         }
-        // A sender that begins without M110 begins at 1, or at 0.
+        // Without M110, a sender begins at 1 or at 0.
         if number == self.last + 1 || (number == 0 && !self.has_begun) {
             (self.last, self.has_begun, self.required) = (number, true, Some(checksum));
             if matches!(text.trim_ascii(), "M2" | "M30") {
@@ -166,7 +167,7 @@ impl Numbering {
         let may_be_damaged = match self.required {
             None => false,
             Some(Checksum::Xor) => split_number(line).is_some() || split_checksum(line).is_some(),
-            // What a doubled line end leaves does no harm.
+            // Empty lines, as doubled line ends produce them, are harmless.
             Some(Checksum::Crc) => !line.trim_ascii().is_empty(),
         };
         if may_be_damaged {
@@ -187,7 +188,8 @@ impl Numbering {
         }
     }
 
-    /// The line is not accepted: the one after the last is expected, if lines are numbered.
+    /// Refuses the line. If lines are numbered, the reply names the number after that of the last
+    /// line.
     fn refuse<'a>(&self, command_error: CommandError, by: Option<Checksum>) -> Received<'a> {
         let is_of_numbers = matches!(
             command_error,
@@ -200,10 +202,10 @@ impl Numbering {
     }
 }
 
-/// A line with a checksum: one with a number, or `M110`.
+/// A line with a checksum: a numbered line, or `M110`.
 struct Checked<'a> {
     checksum: Checksum,
-    /// Whether the checksum is right.
+    /// Whether the checksum matches.
     is_whole: bool,
     number: Option<i32>,
     text: &'a str,
@@ -224,7 +226,7 @@ impl<'a> Checked<'a> {
     }
 }
 
-/// What stands before the last `*`, and the checksum after it.
+/// The text before the last `*`, and the checksum after it.
 fn split_checksum(line: &str) -> Option<(&str, Checksum, u16)> {
     let (head, tail) = line.rsplit_once('*')?;
     let is_hexadecimal = |byte: u8| matches!(byte, b'0'..=b'9' | b'A'..=b'F');
@@ -237,7 +239,7 @@ fn split_checksum(line: &str) -> Option<(&str, Checksum, u16)> {
     Some((head, Checksum::Xor, value))
 }
 
-/// The number after `N`, of at most nine digits, and what follows it.
+/// The number after `N`, of at most nine digits, and the text after it.
 fn split_number(line: &str) -> Option<(i32, &str)> {
     let rest = line.trim_ascii_start().strip_prefix('N')?;
     let digits = rest.strip_prefix('-').unwrap_or(rest);
@@ -248,7 +250,7 @@ fn split_number(line: &str) -> Option<(i32, &str)> {
     Some((number, text.trim_ascii_start()))
 }
 
-/// If the text is `M110`: the number that it sets, if it names one.
+/// `Some` if the text is `M110`, with the number that it sets, if it has one.
 fn number_to_set(text: &str) -> Option<Option<i32>> {
     let rest = text.trim_ascii().strip_prefix("M110")?.trim_ascii_start();
     if rest.is_empty() {

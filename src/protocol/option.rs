@@ -1,4 +1,4 @@
-//! The options of a plot, `$name=value`.
+//! Parses the options of a plot, `$name=value`.
 
 use super::CommandError;
 use super::values::{PENS, direction, number, on_or_off, positive, values, whole};
@@ -6,70 +6,73 @@ use crate::fixed::{Decimal, Millimetres};
 use crate::order;
 use crate::view::{Direction, Lens};
 
-/// What is drawn, and how.
+/// One option of a plot, with its value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum PlotOption {
-    /// `$eye=x,y,z`
+    /// `$eye=x,y,z`: the position of the eye, in units of the model.
     Eye(Direction),
-    /// `$at=x,y,z`
+    /// `$at=x,y,z`: the point looked at, in units of the model.
     At(Direction),
-    /// `$up=x,y,z`
+    /// `$up=x,y,z`: the direction that is upward on the page.
     Up(Direction),
-    /// `$angles=α,β,γ`: Harrison's rotation, in degrees.
+    /// `$angles=α,β,γ`: the rotation of the view as in Harrison, in degrees.
     Angles(Direction),
-    /// `$view=auto`: forget eye, at, up and angles.
+    /// `$view=auto`: forgets eye, at, up and angles.
     AutomaticView,
-    /// `$projection=…`
+    /// `$projection=…`: the kind of projection.
     Projection(ProjectionChoice),
-    /// `$behind=clip|refuse`: what is behind the eye is cut off (`true`), or an error.
+    /// `$behind=clip|refuse`: whether parts of the model behind the eye are clipped (`true`) or an
+    /// error.
     ClipBehind(bool),
-    /// `$see=faces|wire|vertices|edges`
+    /// `$see=faces|wire|vertices|edges`: how visibility is determined.
     See(VisibilityMode),
-    /// `$hidden=erased|dotted|dashed|shown|pen|pen,NUMBER`
+    /// `$hidden=erased|dotted|dashed|shown|pen|pen,NUMBER`: how hidden lines are drawn, if at all.
     Hidden(HiddenLines),
-    /// `$seams=on|off`: where faces pass through each other.
+    /// `$seams=on|off`: whether lines are drawn where faces intersect each other.
     Seams(bool),
-    /// `$blocks=separate|merged`: whether blocks that touch are one shape (`true`).
+    /// `$blocks=separate|merged`: whether touching blocks are drawn as one shape (`true`).
     MergedBlocks(bool),
-    /// `$crease=DEGREES`: edges less sharp are not drawn.
+    /// `$crease=DEGREES`: edges whose faces bend by less are not drawn.
     Crease(f64),
-    /// `$precision=auto|LENGTH`: how far coordinates may be off; `None` goes by their decimals.
+    /// `$precision=auto|LENGTH`: the largest error of the coordinates, in units of the model.
+    /// `None` derives it from their decimal places.
     Precision(Option<Decimal>),
-    /// `$pens=auto|one`: whether one pen draws all (`true`).
+    /// `$pens=auto|one`: whether one pen draws everything (`true`).
     OnePen(bool),
-    /// `$page=WIDTHxHEIGHT` in mm
+    /// `$page=WIDTHxHEIGHT`: the size of the sheet, in mm.
     Page {
-        /// Along x.
+        /// Size along x, in mm.
         width: Millimetres,
-        /// Along y.
+        /// Size along y, in mm.
         height: Millimetres,
     },
-    /// `$margin=MM`
+    /// `$margin=MM`: the margin on each side of the sheet.
     Margin(Millimetres),
-    /// `$title-size=MM`
+    /// `$title-size=MM`: the height of the title's capital letters.
     TitleSize(Millimetres),
-    /// `$fit=on|off`
+    /// `$fit=on|off`: whether a plan is scaled to the page.
     Fit(bool),
-    /// `$order=auto|greedy|exact`
+    /// `$order=auto|greedy|exact`: how the order of the strokes is computed.
     Order(order::Method),
-    /// `$cycle=on|off`: whether the pen returns to where it began.
+    /// `$cycle=on|off`: whether the pen returns to its starting point.
     Cycle(bool),
-    /// `$effort=N`
+    /// `$effort=N`: how many distances are tried per pen-up move to improve the order.
     Effort(u32),
-    /// `$lift=MM`
+    /// `$lift=MM`: extra pen-up travel that is accepted to save one pen lift.
     Lift(Millimetres),
 }
 
-/// How the model comes onto the page.
+/// How the model is projected onto the page.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ProjectionChoice {
-    /// From the eye, through a lens.
+    /// A projection from the eye, through a lens.
     Lens(Lens),
-    /// Parallel, from a direction in degrees; eye and angles are not used.
+    /// A parallel projection along a given direction, in degrees. The options eye and angles are
+    /// not used.
     Axonometric {
-        /// From the x axis towards y: -90 is in front.
+        /// Angle from the x axis towards the y axis, in degrees. -90 is the view from the front.
         azimuth: f64,
-        /// Above the xy plane.
+        /// Angle above the xy plane, in degrees.
         elevation: f64,
     },
 }
@@ -103,9 +106,10 @@ impl ProjectionChoice {
                 }
                 oblique(angle, ratio)
             }
-            // All three axes are foreshortened alike: the elevation is atan(1 / sqrt 2).
+            // All three axes are foreshortened equally: the elevation is atan(1 / sqrt 2).
             ("isometric", None) => axonometric(-45.0, 35.264_389_682_754_654),
-            // The two axes that are foreshortened alike lie at 7 and 42 degrees: 1, 1 and 1/2.
+            // The x, y and z axes are foreshortened in the ratio 1 : 1/2 : 1. On the page, x and y lie
+            // at some 7 and 41 degrees to the horizontal.
             ("dimetric", None) => axonometric(-69.295_188_945_364_57, 19.471_220_634_490_69),
             ("trimetric", None) => axonometric(-60.0, 25.0),
             ("dimetric" | "trimetric" | "axonometric", Some(numbers)) => {
@@ -120,35 +124,35 @@ impl ProjectionChoice {
     }
 }
 
-/// How it is found out what is seen.
+/// How visibility is determined.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum VisibilityMode {
-    /// Any faces hide what is behind them.
+    /// Faces of any kind hide what is behind them.
     #[default]
     Faces,
-    /// Nothing hides anything: a wire frame.
+    /// Nothing hides anything: the model is drawn as a wire frame.
     Wire,
-    /// The vertices alone are those of one convex solid.
+    /// The vertices are those of one convex solid. Faces and edges are derived from them.
     Vertices,
-    /// The vertices and edges are those of one convex solid.
+    /// The vertices and edges are those of one convex solid. Its faces are derived from them.
     Edges,
 }
 
-/// What becomes of the hidden lines.
+/// How hidden lines are drawn, if at all.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum HiddenLines {
-    /// Left out.
+    /// They are not drawn.
     #[default]
     Erased,
-    /// Drawn dotted.
+    /// They are drawn dotted.
     Dotted,
-    /// Drawn dashed.
+    /// They are drawn dashed.
     Dashed,
-    /// Drawn like visible ones: a wire frame.
+    /// They are drawn like visible ones, which gives a wire frame.
     Shown,
-    /// Drawn with this pen, from 0.
+    /// They are drawn with this pen, counted from 0.
     Pen(u8),
 }
 
@@ -161,7 +165,7 @@ impl HiddenLines {
             "dotted" => Self::Dotted,
             "dashed" => Self::Dashed,
             "shown" => Self::Shown,
-            // The first pen draws what is seen.
+            // The first pen draws the visible lines, so this is the second.
             "pen" => Self::Pen(1),
             _ => {
                 let number = value.strip_prefix("pen,");
@@ -176,7 +180,7 @@ impl HiddenLines {
 }
 
 impl PlotOption {
-    /// `None` if no option has this name.
+    /// Parses the value of the option with this name. `None` if no option has this name.
     pub(super) fn parse(name: &str, value: &str) -> Result<Option<Self>, CommandError> {
         let option = match name {
             "eye" => Self::Eye(direction(value)?),

@@ -1,46 +1,48 @@
-//! What a port's receive interrupt does with each byte: real-time bytes act at once, ordinary bytes
-//! wait in a queue for the main loop, and a place where bytes were lost or damaged is marked there.
+//! Handles each byte in a port's receive interrupt. Real-time bytes act at once. Ordinary bytes
+//! wait in a queue for the main loop. Where bytes were lost or damaged, the queue holds a mark.
 //!
-//! The mark is in band: the byte [`DAMAGED`], which UTF-8 never contains, stands in the queue where
-//! the bytes are missing. [`LineReader`](super::LineReader) then refuses the line that holds it, at
-//! its end and once. A damaged byte may have been a line's end. Then two lines are refused as one,
-//! and a sender that counts replies finds one reply too few.
+//! The mark is in band: the byte [`DAMAGED`], which UTF-8 never contains, takes the place of the
+//! missing bytes in the queue. [`LineReader`](super::LineReader) then refuses the line that holds
+//! it, once, at its end. The damaged byte may have been the end of a line. Two lines are then
+//! refused as one, and a sender that counts replies misses one reply.
 //!
-//! A port that has not heard a sound byte yet drops damaged ones without a mark: an input that
-//! floats, or a cable that is plugged in, gives such bytes before anybody has spoken. Later, damage
-//! between two lines is marked like any other and refuses the next line, for it may have hit the
-//! beginning of that line, or a whole line. It is never answered by itself.
+//! Until a port has received its first undamaged byte, it drops damaged ones without a mark. A
+//! floating input or a cable that is being plugged in produces such bytes before anybody has sent a
+//! line. Later, damage between two lines is marked like any other damage and causes the next line
+//! to be refused, because it may have hit the beginning of that line or a whole line. Damage alone
+//! never causes a reply.
 
 use super::{RealTime, Sorter};
 use core::fmt;
 use heapless::spsc::Producer;
 
-/// Stands among received bytes where bytes were lost or damaged. UTF-8 never contains it, and a
-/// sender's own byte of this value is taken for damage, too.
+/// Marks the place among received bytes where bytes were lost or damaged. UTF-8 never contains it.
+/// If a sender itself sends this byte, it counts as damage, too.
 pub const DAMAGED: u8 = 0xFF;
 
-/// The bits of a data register of Arm's UART PL011 beside the byte: its stop bit is missing, its
-/// parity is wrong, it is part of a break.
+/// Error bits beside the byte in the data register of Arm's PL011 UART: the stop bit is missing,
+/// the parity is wrong, or the byte is part of a break.
 const BYTE_IS_DAMAGED: u32 = 0b111 << 8;
-/// Bytes before this one were lost, because the UART's own queue was full.
+/// The error bit for bytes lost before this one because the UART's own FIFO was full.
 const BYTES_WERE_LOST: u32 = 1 << 11;
 
-/// The receive interrupt's end of one port.
+/// The part of a serial port that its receive interrupt uses.
 pub struct Receiver<'q> {
     queue: Producer<'q, u8>,
     sorter: Sorter,
     /// Bytes put into the queue since the start, modulo 2^32.
     count: u32,
+    /// Whether an undamaged byte has come since the start.
     has_heard: bool,
-    /// Bytes were lost or damaged since the last byte in the queue.
+    /// Whether bytes were lost or damaged after the last byte in the queue.
     damage: Damage,
 }
 
-/// Whether bytes are missing behind the last byte in the queue.
+/// Whether bytes are missing after the last byte in the queue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Damage {
     None,
-    /// The queue had no place for the mark yet.
+    /// They are, but the queue has had no room for the mark yet.
     Unmarked,
     Marked,
 }
@@ -54,14 +56,14 @@ impl fmt::Debug for Receiver<'_> {
 }
 
 impl<'q> Receiver<'q> {
-    /// Puts ordinary bytes into `queue`.
+    /// A receiver that puts ordinary bytes into `queue`.
     pub const fn new(queue: Producer<'q, u8>) -> Self {
         let sorter = Sorter::new();
         Self { queue, sorter, count: 0, has_heard: false, damage: Damage::None }
     }
 
-    /// Takes what a PL011's data register held: the byte and its error bits. Gives what the byte
-    /// asks for in real time, if anything.
+    /// Handles the content of a PL011's data register: the byte and its error bits. Returns the
+    /// real-time request that the byte makes, if any.
     pub fn receive_from_uart(&mut self, data: u32) -> RealTime {
         if data & BYTES_WERE_LOST != 0 {
             self.lose();
@@ -73,8 +75,8 @@ impl<'q> Receiver<'q> {
         self.receive((data & 0xFF) as u8)
     }
 
-    /// Takes a byte. Gives what it asks for in real time, if anything. An ordinary byte that finds
-    /// the queue full is lost, and the place will be marked.
+    /// Handles a byte. Returns the real-time request that it makes, if any. If the queue is full,
+    /// an ordinary byte is lost, and its place will be marked.
     pub fn receive(&mut self, byte: u8) -> RealTime {
         match self.sort_out(byte) {
             Err(asked) => asked,
@@ -87,20 +89,20 @@ impl<'q> Receiver<'q> {
         }
     }
 
-    /// Gives an ordinary byte back.
+    /// Returns the byte if it is an ordinary one.
     ///
     /// # Errors
-    /// What the byte asks for in real time. It is not to be queued.
+    /// The real-time request that the byte makes. Such a byte must not be queued.
     pub fn sort_out(&mut self, byte: u8) -> Result<u8, RealTime> {
         let asked = self.sorter.sort(byte);
         self.has_heard |= byte != DAMAGED;
         asked.map_or(Ok(byte), Err)
     }
 
-    /// Puts an ordinary byte into the queue, behind the mark of what was lost before it.
+    /// Puts an ordinary byte into the queue, after the mark of any loss before it.
     ///
     /// # Errors
-    /// The byte, if there is no place.
+    /// The byte, if there is no room for it.
     pub fn append(&mut self, byte: u8) -> Result<(), u8> {
         if byte == DAMAGED {
             self.lose();
@@ -115,9 +117,9 @@ impl<'q> Receiver<'q> {
         Ok(())
     }
 
-    /// Bytes were lost or damaged here. Neighbouring losses share a mark.
+    /// Notes that bytes were lost or damaged here. Adjacent losses share one mark.
     pub fn lose(&mut self) {
-        // A letter of several bytes that has begun is not gone on with.
+        // A multi-byte letter of UTF-8 that has begun is not continued after the loss.
         self.sorter.sort(DAMAGED);
         if self.has_heard && self.damage == Damage::None {
             self.damage = Damage::Unmarked;
@@ -125,7 +127,7 @@ impl<'q> Receiver<'q> {
         }
     }
 
-    /// Marks what was lost, as soon as there is a place. Whether nothing is left to be marked.
+    /// Puts a pending mark into the queue if there is room. Returns whether no mark is pending.
     pub fn mark(&mut self) -> bool {
         if self.damage == Damage::Unmarked && self.queue.enqueue(DAMAGED).is_ok() {
             self.count = self.count.wrapping_add(1);
@@ -134,15 +136,15 @@ impl<'q> Receiver<'q> {
         self.damage != Damage::Unmarked
     }
 
-    /// All that came so far is void: ctrl-X came by some port. Gives how many bytes have been put
-    /// into the queue since the start, modulo 2^32; the main loop drops those among them that it
-    /// has not taken.
+    /// Discards everything received so far, because ctrl-X came by some port. Returns the number of
+    /// bytes put into the queue since the start, modulo 2^32. The main loop drops those of them
+    /// that it has not taken.
     pub fn abort(&mut self) -> u32 {
         self.damage = Damage::None;
         self.count
     }
 
-    /// Whether a sound byte has come since the start.
+    /// Whether an undamaged byte has come since the start.
     pub fn has_heard(&self) -> bool {
         self.has_heard
     }

@@ -1,13 +1,14 @@
-//! The numbers and words of a line.
+//! Parsers for the numbers and words of a line.
 
 use super::CommandError;
 use crate::fixed::{Decimal, Millimetres};
 use crate::model::PEN_LIMIT;
 use crate::view::Direction;
 
-/// How many pens there are.
+/// The number of pens.
 pub(super) const PENS: i32 = PEN_LIMIT as i32;
 
+/// Parses `on` (`true`) or `off`.
 pub(super) fn on_or_off(text: &str) -> Result<bool, CommandError> {
     match text {
         "on" => Ok(true),
@@ -16,28 +17,32 @@ pub(super) fn on_or_off(text: &str) -> Result<bool, CommandError> {
     }
 }
 
+/// Parses a decimal number, exactly.
 pub(super) fn number(text: &str) -> Result<Decimal, CommandError> {
     Decimal::parse(text.trim()).map_err(|_| CommandError::NotANumber)
 }
 
-#[inline(never)] // Once is enough.
+/// Parses a positive length.
+#[inline(never)] // Its callers share one copy of the code.
 pub(super) fn positive(text: &str) -> Result<Millimetres, CommandError> {
     let length = number(text)?.to_millimetres().map_err(|_| CommandError::NumberOutOfRange)?;
     if length > 0 { Ok(length) } else { Err(CommandError::NumberOutOfRange) }
 }
 
+/// Parses three numbers with commas between them.
 pub(super) fn direction(text: &str) -> Result<Direction, CommandError> {
     values(text)
 }
 
-/// Exactly N numbers with commas between, for angles and places only.
+/// Parses exactly N numbers with commas between them. They lose precision, so this is for angles
+/// and positions of the camera only.
 pub(super) fn values<const N: usize>(text: &str) -> Result<[f64; N], CommandError> {
     let mut values = [0.0; N];
     read_values(text, &mut values)?;
     Ok(values)
 }
 
-#[inline(never)] // Once is enough for every count.
+#[inline(never)] // All counts share one copy of the code.
 fn read_values(text: &str, values: &mut [f64]) -> Result<(), CommandError> {
     let wrong_count = CommandError::WrongNumberCount { needed: values.len() };
     let mut parts = text.split(',').map(number);
@@ -47,14 +52,15 @@ fn read_values(text: &str, values: &mut [f64]) -> Result<(), CommandError> {
     if parts.next().is_some() {
         return Err(wrong_count);
     }
-    // Past this range squares and quotients of lengths would overflow.
+    // Beyond this range, squares and quotients of lengths would overflow.
     if values.iter().any(|value| libm::fabs(*value) > 1e15) {
         return Err(CommandError::NumberOutOfRange);
     }
     Ok(())
 }
 
-/// x y z, and then the weight or colour that some modellers write, which must be numbers too.
+/// Parses `x y z`, and then the weight or colour that some modellers write. These must be numbers,
+/// too, and are ignored.
 pub(super) fn coordinates(text: &str) -> Result<[Decimal; 3], CommandError> {
     let mut words = text.split_ascii_whitespace().map(number);
     let mut next = || words.next().unwrap_or(Err(CommandError::WrongNumberCount { needed: 3 }));
@@ -65,18 +71,18 @@ pub(super) fn coordinates(text: &str) -> Result<[Decimal; 3], CommandError> {
     Ok(coordinates)
 }
 
-/// The first word, and what comes after it.
+/// Splits off the first word. Returns it and the rest.
 pub(super) fn split_word(text: &str) -> (&str, &str) {
     let text = text.trim_start();
     text.split_once([' ', '\t']).unwrap_or((text, ""))
 }
 
-/// One whole number.
+/// Parses a whole number.
 pub(super) fn whole(text: &str) -> Result<i32, CommandError> {
     number(text)?.to_whole().map_err(|_| CommandError::NumberOutOfRange)
 }
 
-/// Numbers with spaces between.
+/// Decimal numbers with spaces between them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Decimals<'a> {
     text: &'a str,
