@@ -1,4 +1,4 @@
-//! The command line.
+//! Defines the command line and turns its options into settings of a job.
 
 use crate::fit::{FitError, TOLERANCES};
 use crate::job::{Page, Settings};
@@ -250,7 +250,7 @@ pub struct ViewArgs {
 }
 
 impl ViewArgs {
-    /// What they say, for the plotter.
+    /// The settings that these options select.
     pub fn settings(&self) -> Settings {
         let Page { width, height } = self.page;
         let page = if self.landscape {
@@ -306,7 +306,8 @@ impl ViewArgs {
     }
 }
 
-/// A parser of each option whose value the plotter reads itself, with the range that it has.
+/// Defines a parser for each option whose value the plotter's own parser checks. The text is the
+/// valid range, for the error message.
 macro_rules! read_by_the_plotter {
     ($($option:ident: $range:literal),* $(,)?) => {
         $(fn $option(text: &str) -> Result<String, String> {
@@ -329,7 +330,7 @@ read_by_the_plotter!(
     lift: "0 to 1000 mm",
 );
 
-/// A refusal with what would be right.
+/// Adds the valid range to the error message.
 fn within(range: &str, value: Result<String, String>) -> Result<String, String> {
     value.map_err(|reason| format!("{reason} (expected: {range})"))
 }
@@ -342,7 +343,7 @@ fn title(text: &str) -> Result<String, String> {
         );
     }
     match PlotterCommand::parse(&line).map_err(|refusal| told(&refusal.to_string()))? {
-        // It fits.
+        // The title is short enough.
         PlotterCommand::Title(letters) if TitleText::new(letters.letters()).is_some() => {
             Ok(text.to_owned())
         }
@@ -354,9 +355,9 @@ fn title_size(text: &str) -> Result<String, String> {
     within("1 to 100 mm", understood("title-size", text))
 }
 
-/// The value as it is sent. The plotter's own parser says whether it is one of the option.
+/// Checks the value of an option with the plotter's own parser and returns it unchanged.
 fn understood(option: &str, text: &str) -> Result<String, String> {
-    // Not even in a comment.
+    // These letters are refused even in a comment.
     if text.contains(|letter| letter == '#' || acts_at_once(letter)) {
         return Err("no value has such a letter".to_owned());
     }
@@ -513,7 +514,7 @@ mod tests {
         assert_eq!(size(&["--page", "60X80", "--landscape"]), (80.0, 60.0));
     }
 
-    /// One letter more than a title may have.
+    /// A title with one letter more than allowed.
     const LONG: &str =
         "0123456789 123456789 123456789 123456789 123456789 123456789 123456789 1234567890";
 

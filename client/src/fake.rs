@@ -1,9 +1,8 @@
-//! A plotter made of plain memory, for tests: it answers like the protocol and misbehaves on
-//! demand.
+//! A simulated plotter for tests, which follows the protocol and misbehaves on demand.
 //!
-//! It is stricter than a real one: its queue of 256 bytes overflows for good, it takes one line
-//! for each byte-read of the client, and it reports bytes that act at once inside a line. Time
-//! passes only while the client waits for bytes.
+//! It is stricter than a real plotter. Bytes that overflow its queue of 256 bytes are lost and
+//! reported, it executes at most one line for each read of the client, and it acts on real-time
+//! bytes even inside a line. Time passes only while the client waits for bytes.
 
 use crate::link::{Answer, Link};
 use crate::protocol::{ABORT, CLEAR, END, MODEL, PLOT};
@@ -15,67 +14,68 @@ use std::collections::VecDeque;
 use std::io;
 use std::time::{Duration, Instant};
 
-/// What a fake plotter does wrong.
+/// The way in which a fake plotter misbehaves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Fault {
-    /// Nothing.
+    /// It behaves correctly.
     #[default]
     None,
-    /// Says nothing, ever.
+    /// Never sends anything.
     Silent,
-    /// Says nothing after so many lines.
+    /// Sends nothing after it has accepted this number of lines.
     SilentAfter(usize),
-    /// Answers line N, from 1, with this error number.
+    /// Answers line N, counted from 1, with this error number.
     ErrorAt(usize, u16),
-    /// Loses line N, from 1, when it comes first.
+    /// Loses line N, counted from 1, when it arrives for the first time.
     LosesLine(usize),
-    /// Loses line N, from 1, whenever it comes.
+    /// Loses line N, counted from 1, whenever it arrives.
     NeverTakesLine(usize),
-    /// Loses its power, and has it again, instead of taking line N, from 1.
+    /// Loses and regains its power instead of accepting line N, counted from 1.
     RestartsAt(usize),
-    /// Is told to give up instead of taking line N, from 1, when it comes first.
+    /// Is aborted instead of accepting line N, counted from 1, when that arrives for the first
+    /// time.
     AbortedAt(usize),
-    /// Does not know numbered lines.
+    /// Does not support numbered lines, as older firmware.
     WithoutNumbers,
-    /// Holds another model than it was sent.
+    /// Holds a different model than it was sent.
     HoldsOther,
-    /// Says that it holds another model, the first time that it is asked.
+    /// Reports a wrong checksum of the model the first time that it is asked.
     SaysOther,
-    /// Is another firmware.
+    /// Runs firmware other than penup.
     NotPenup,
-    /// Sends bytes that are no lines.
+    /// Sends bytes that form no lines.
     Noise,
-    /// Is in the middle of another job.
+    /// Is busy with another job.
     Busy,
-    /// Stops with this alarm in the middle of the drawing.
+    /// Stops with this alarm number in the middle of the drawing.
     AlarmWhileDrawing(u16),
-    /// Does not confirm an abort, from the second on (the first opens the conversation).
+    /// Does not confirm the second and later aborts; the first opens the conversation.
     IgnoresAbort,
 }
 
-/// See the [module](self).
+/// The state of a simulated plotter; see the [module](self).
 #[derive(Debug, Default)]
 pub struct FakePlotter {
-    /// What it does wrong.
+    /// The way in which it misbehaves.
     pub fault: Fault,
-    /// Each line of a job that it took, in order, since it was last cleared.
+    /// The lines of a job that it accepted, in order, since the last clearing.
     pub lines: Vec<String>,
-    /// Whether more was sent than its queue holds.
+    /// Whether more bytes were sent than its queue holds.
     pub overflowed: bool,
-    /// The most lines that waited in its queue.
+    /// The maximum number of lines that waited in its queue at once.
     pub most_waiting: usize,
-    /// How often it was aborted.
+    /// The number of aborts.
     pub aborts: usize,
-    /// How many strokes a drawing has.
+    /// The number of strokes of every drawing.
     pub strokes: u64,
-    /// Before which stroke, from 0, it waits for which pen.
+    /// The stroke, counted from 0, before which it waits for a pen, and the number of that pen.
     pub pen_before: Option<(u64, u8)>,
-    /// Each pen that it was asked to change to.
+    /// The pens that the client was asked to change to, in order.
     pub pens_asked: Vec<u8>,
-    /// Before which stroke, from 0, somebody presses hold.
+    /// The stroke, counted from 0, before which a feed hold occurs.
     pub hold_before: Option<u64>,
-    /// What its user says when asked whether the machine shall go on, one after the other; then
-    /// nobody is there.
+    /// The user's successive answers to the question whether to resume. When they are used up,
+    /// nobody answers.
     pub user: VecDeque<Answer>,
     queue: Vec<u8>,
     output: VecDeque<u8>,
@@ -89,7 +89,7 @@ pub struct FakePlotter {
 impl FakePlotter {
     const QUEUE: usize = 256;
 
-    /// A plotter with `fault` that draws three strokes.
+    /// Creates a plotter with `fault` whose drawings have three strokes.
     pub fn new(fault: Fault) -> Self {
         Self { fault, strokes: 3, began: Some(Instant::now()), ..Self::default() }
     }
@@ -205,7 +205,7 @@ impl FakePlotter {
         self.say(&format!("[MODEL:checksum {model:08X}, options {options:08X}]"));
     }
 
-    /// The reply to a line with a CRC.
+    /// Sends the reply to a line with a checksum.
     fn reply(&mut self, outcome: Result<(), CommandError>, label: Label) {
         let last = match outcome {
             Ok(()) => "ok".to_owned(),
@@ -260,7 +260,7 @@ impl Link for FakePlotter {
         Ok(count)
     }
 
-    /// The second time that it is asked for.
+    /// The pen is in when the client is asked for the second time.
     fn change_pen(&mut self, pen: u8) -> io::Result<bool> {
         self.pens_asked.push(pen);
         Ok(self.pens_asked.len() == 2)

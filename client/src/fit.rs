@@ -1,14 +1,15 @@
-//! Traced polylines to few B-spline control points (what Allard & Bown left to a man at a screen).
+//! Fits B-splines with few control points to traced polylines. Allard & Bown left this work to an
+//! operator at a screen.
 //!
-//! [`fit_obj`] reads the `l` elements of a plan in millimetres and writes the same plan with `curv`
-//! elements, and says what was saved. [`fit`] does the work on polylines: it cuts each at its corners,
-//! fits every piece by least squares with knots where they are needed, takes away the knots that are
-//! not, and keeps the order, 2 to 4, that takes the fewest control points. The ends of every polyline
-//! and its corners stay where they are.
+//! [`fit_obj`] reads the `l` elements of a plan in millimetres, writes the same plan with `curv`
+//! elements, and reports what was saved. [`fit`] works on polylines. It cuts each at its corners,
+//! fits every piece by least squares, inserts knots where the error is too large, and then removes
+//! the knots that are not needed. Of the orders 2 to 4 it keeps the one with the fewest control
+//! points. The ends and the corners of every polyline stay where they are.
 //!
-//! The curve stays within the tolerance of the polyline, and the polyline of the curve. Refused: a
-//! tolerance that makes no sense on paper, a file without polylines or with faces or curves, one that is
-//! not flat, coordinates that no plotter takes.
+//! The curve stays within the tolerance of the polyline, and the polyline within that of the curve.
+//! The following is refused: a tolerance that makes no sense on paper, a file without polylines or
+//! with faces or curves, a plan that is not flat, and coordinates that no plotter accepts.
 
 mod least_squares;
 mod obj;
@@ -18,39 +19,43 @@ pub use obj::{FitError, Fitted, Saving, TOLERANCES, fit_obj, write_obj};
 
 use piece::Piece;
 
-/// A place on the plan in millimetres.
+/// A point of the plan in millimetres.
 pub type Place = [f64; 2];
 
-/// A polynomial's degree + 1: cubics, parabolas, straight lines.
+/// The orders to try (polynomial degree + 1): cubics, parabolas, straight lines.
 const ORDERS: [usize; 3] = [4, 3, 2];
 
-/// An order that needs so many times more knots than another did is not looked into further.
+/// An order is abandoned when it needs more knots than this multiple of the best control point
+/// count so far.
 const HOPELESS: usize = 3;
 
-/// What the rounding of control points in the file may take of the tolerance.
+/// The share of the tolerance that is reserved for rounding the control points in the file.
 const ROUNDING_SHARE: f64 = 0.03;
 
-/// What leaving out places that are almost the same may take of it.
+/// The share of the tolerance that is reserved for removing vertices that almost coincide.
 const THINNING_SHARE: f64 = 1.0 / 64.0;
 
-/// How many places before and after one are looked at to see whether it is a corner.
+/// The maximum number of vertices before and after a vertex that are examined to decide whether it
+/// is a corner.
 const NEIGHBOURS: usize = 1024;
 
-/// A clamped B-spline that stands for one traced polyline.
+/// A clamped B-spline that replaces one traced polyline.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FittedCurve {
-    /// Degree + 1, 2 to 4.
+    /// The order, which is the degree + 1: 2 to 4.
     pub order: usize,
-    /// In millimetres; the first and last are the polyline's ends.
+    /// The control points in millimetres. The first and the last are the ends of the polyline.
     pub control: Vec<Place>,
-    /// As many as control points and order together, whole numbers from 0.
+    /// The knots: whole numbers that begin at 0. Their number is the number of control points plus
+    /// the order.
     pub knots: Vec<i32>,
 }
 
-/// Fits a curve to each polyline, within `tolerance` mm. Those without a length are left out. `progress`
-/// is told from time to time how many of all vertices are done.
+/// Fits a curve to each polyline within `tolerance` mm. Polylines without a length are left out.
+/// From time to time it calls `progress` with the number of vertices done and the number of all
+/// vertices.
 ///
-/// The time grows little faster than the number of vertices.
+/// The running time grows little faster than the number of vertices.
 ///
 /// ```
 /// use penup_client::fit::fit;
@@ -69,7 +74,8 @@ pub fn fit(
     fit_each(polylines, tolerance, progress).into_iter().flatten().collect()
 }
 
-/// The same, with a place in the result for each polyline, also for those without a length.
+/// Does the same as [`fit`] but returns an entry for every polyline: `None` for those without a
+/// length.
 fn fit_each(
     polylines: &[Vec<Place>],
     tolerance: f64,
@@ -86,7 +92,8 @@ fn fit_each(
     curves
 }
 
-/// `progress` is told which part of the work is done, 0 to 1.
+/// Fits one polyline; `None` if it has no length. Calls `progress` with the share of the work that
+/// is done, 0 to 1.
 fn fit_one(
     polyline: &[Place],
     tolerance: f64,
@@ -114,8 +121,8 @@ fn fit_one(
     Some(fewest)
 }
 
-/// The polyline without places that are closer than `close` to the one before; its end stays. Places so
-/// close say nothing, and thousands of them would all be looked at around each corner.
+/// Removes the vertices that are closer than `close` to the one before; the last vertex is kept.
+/// Such vertices carry no information, and thousands of them would be examined around each corner.
 fn thinned(polyline: &[Place], close: f64) -> Vec<Place> {
     let mut places: Vec<Place> = Vec::new();
     for place in polyline {
@@ -133,15 +140,15 @@ fn thinned(polyline: &[Place], close: f64) -> Vec<Place> {
     places
 }
 
-/// The polyline itself as a curve of order 2.
+/// Converts the polyline itself into a curve of order 2.
 fn as_it_is(places: &[Place]) -> FittedCurve {
     let last = places.len() as i32 - 1;
     let knots = std::iter::once(0).chain(0..=last).chain([last]).collect();
     FittedCurve { order: 2, control: places.to_vec(), knots }
 }
 
-/// The curves of all pieces as one, which may turn sharply where they join; `None` if one of them needs
-/// more than `most` knots at first, or cannot be fitted.
+/// Fits all pieces and joins them to one curve, which may have corners at the joints. Returns
+/// `None` if one of the pieces needs more than `most` knots at first, or cannot be fitted.
 fn joined(
     pieces: &[Vec<Place>],
     order: usize,
@@ -170,10 +177,10 @@ fn joined(
     Some(FittedCurve { order, control, knots })
 }
 
-/// Cuts a polyline where it turns sharply.
+/// Cuts a polyline at its corners.
 ///
-/// The turn is taken between what lies a few tolerances before and after, so that the steps of a
-/// scanner are no corners.
+/// The angle is measured between points a few tolerances before and after the vertex, so that the
+/// staircase of a scanner does not count as corners.
 fn cut_at_corners(places: &[Place], tolerance: f64) -> Vec<Vec<Place>> {
     const SHARP_DEGREES: f64 = 50.0;
     let reach = 4.0 * tolerance;
@@ -197,7 +204,8 @@ fn cut_at_corners(places: &[Place], tolerance: f64) -> Vec<Vec<Place>> {
     pieces
 }
 
-/// By how many radians the polyline turns at place number `at`; zero at its ends.
+/// The turning angle of the polyline at vertex number `at` in radians, measured to the vertices at
+/// distance `reach`; zero at the ends.
 fn turn(places: &[Place], at: usize, reach: f64) -> f64 {
     let here = places[at];
     let far = |place: &&Place| distance(**place, here) >= reach;

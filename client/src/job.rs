@@ -1,4 +1,4 @@
-//! What came of a job, and the settings that it was done with.
+//! A job to send to a plotter, its settings, and its results.
 
 use crate::protocol::{
     ANGLES, AT, BEHIND, BLOCKS, CLEAR, CREASE, CYCLE, EFFORT, EYE, FIT, HIDDEN, LIFT, MARGIN,
@@ -12,49 +12,53 @@ use serde::Serialize;
 use std::fmt;
 use std::ops::Add;
 
-/// A point of the page in mm: x right, y up from the lower left corner.
+/// A point on the page in mm: x to the right and y up from the lower left corner.
 pub type PagePoint = [f64; 2];
 
-/// What `penup preview --json` writes. Fields are added, never changed.
+/// The output of `penup preview --json`. Fields may be added but are never changed.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct JobResult {
-    /// The visible stretches, x1, y1, x2, y2: on the image plane at distance 1 (perspective) or in
-    /// model units (parallel); x right, y up, origin on the line of sight.
+    /// The visible segments as x1, y1, x2, y2: on the image plane at distance 1 for a perspective
+    /// projection, in model units for a parallel one. x points right and y up; the origin is on the
+    /// line of sight.
     pub segments: Vec<[f64; 4]>,
-    /// The pen of each segment, from 1.
+    /// The pen of each segment, counted from 1.
     pub segment_pens: Vec<u8>,
-    /// What the pen draws without being lifted, in the order drawn, in mm on the page.
+    /// The strokes in drawing order, in mm on the page. A stroke is what the pen draws without
+    /// being lifted.
     pub strokes: Vec<Vec<PagePoint>>,
-    /// The pen of each stroke, from 1.
+    /// The pen of each stroke, counted from 1.
     pub stroke_pens: Vec<u8>,
-    /// Length drawn.
+    /// The length drawn, in mm.
     pub pen_down_mm: f64,
-    /// Length of the moves between strokes, from the first stroke's start to the last one's end.
+    /// The length of the moves between strokes in mm, from the start of the first stroke to the end
+    /// of the last one.
     pub pen_up_mm: f64,
-    /// Harrison's drawing efficiency (5.7, equation 7): the drawn part of the whole way, 0 to 1.
+    /// Harrison's drawing efficiency (5.7, equation 7): the length drawn divided by the length of
+    /// all moves, 0 to 1.
     pub efficiency: f64,
-    /// Steps of the motors.
+    /// The number of motor steps. A simultaneous step of both axes counts once.
     pub steps: u64,
-    /// How long the stages took.
+    /// The computing time of each stage.
     pub timings_ms: Timings,
-    /// What the pins did, for the picture.
+    /// The path of the pen according to the pins, for the picture.
     #[serde(skip)]
     pub pen: PenRuns,
 }
 
-/// Milliseconds.
+/// The computing times of the stages, in milliseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Timings {
-    /// Camera and projection.
+    /// The choice of the camera and the projection.
     pub view: f64,
-    /// Hidden lines.
+    /// The removal of hidden lines.
     pub visibility: f64,
-    /// The drawing without repeats, and the order of its strokes.
+    /// The removal of repeated lines and the ordering of the strokes.
     pub order: f64,
 }
 
 impl Timings {
-    /// The shorter time of each stage.
+    /// For each stage, the shorter time of the two.
     pub fn best(self, other: Self) -> Self {
         Self {
             view: self.view.min(other.view),
@@ -64,17 +68,17 @@ impl Timings {
     }
 }
 
-/// The ways of a pen.
+/// The lengths of a drawing, drawn and between strokes.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Lengths {
-    /// Length drawn.
+    /// The length drawn, in mm.
     pub pen_down_mm: f64,
-    /// Length of the moves from each stroke's end to the next one's start.
+    /// The length of the moves from each stroke's end to the next one's start, in mm.
     pub pen_up_mm: f64,
 }
 
 impl Lengths {
-    /// Measures `strokes`.
+    /// Measures `strokes`, which are in mm and in drawing order.
     ///
     /// ```
     /// use penup_client::job::Lengths;
@@ -87,37 +91,40 @@ impl Lengths {
         let down = strokes.iter().flat_map(|stroke| stroke.windows(2));
         let up = strokes.windows(2);
         let up = up.filter_map(|pair| Some(length(pair[0].last()?, pair[1].first()?)));
-        // The sum of no lengths at all would be -0.
+        // The sum is folded from 0.0, because the `sum` of an empty iterator is -0.0.
         Self {
             pen_down_mm: down.map(|ends| length(&ends[0], &ends[1])).fold(0.0, Add::add),
             pen_up_mm: up.fold(0.0, Add::add),
         }
     }
 
-    /// Harrison's drawing efficiency, 0 to 1; 1 if nothing moves.
+    /// Harrison's drawing efficiency: the length drawn divided by the length of all moves, 0 to 1.
+    /// It is 1 if nothing moves.
     pub fn efficiency(self) -> f64 {
         let whole = self.pen_down_mm + self.pen_up_mm;
         if whole > 0.0 { self.pen_down_mm / whole } else { 1.0 }
     }
 }
 
-/// What the plotter itself tells of a job that it has drawn, whichever plotter it is.
+/// The report that a plotter, real or emulated, sends about a job that it has drawn.
 ///
-/// Lengths are those of the drawing's lines, not of the single steps that the motors make of them.
+/// The lengths are those of the lines of the drawing, not those of the motor steps that approximate
+/// them.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct JobReport {
-    /// How often the pen goes down, but for the pieces of dotted lines.
+    /// How often the pen is lowered, except for the dashes of dotted lines.
     pub strokes: u64,
-    /// The length drawn in mm, as told: with one decimal.
+    /// The length drawn in mm, as the plotter reports it: with one decimal.
     pub pen_down_mm: String,
-    /// The length of the moves between strokes in mm.
+    /// The length of the moves between strokes in mm, with one decimal.
     pub pen_up_mm: String,
-    /// The drawn part of the whole way, in %.
+    /// The length drawn divided by the length of all moves, in %.
     pub efficiency: String,
 }
 
 impl JobReport {
-    /// Reads it from one of the lines that answer `$model`; `None` if it is another one.
+    /// Parses one of the lines that answer `$model`; `None` if it is not the line with the lengths.
+    /// `strokes` comes from the status reports.
     ///
     /// ```
     /// use penup_client::job::JobReport;
@@ -145,68 +152,70 @@ impl fmt::Display for JobReport {
     }
 }
 
-/// A page, in mm.
+/// The size of a page, in mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Page {
-    /// From left to right.
+    /// The width of the page.
     pub width: f64,
-    /// From bottom to top.
+    /// The height of the page.
     pub height: f64,
 }
 
-/// How to see and place a model. `None` leaves the choice to the plotter.
+/// The camera, the page and the drawing options of a job. `None` leaves a choice to the plotter.
 ///
-/// What is text here is sent as it stands, so it must be something that the plotter understands.
+/// Fields that are text are sent unchanged, so they must be valid for the plotter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
-    /// Where the eye is.
+    /// The position of the eye.
     pub eye: Option<String>,
-    /// What it looks at.
+    /// The point that the eye looks at.
     pub at: Option<String>,
-    /// What is up.
+    /// The direction that is up in the picture.
     pub up: Option<String>,
-    /// Harrison's angles, in degrees.
+    /// The rotation angles of Harrison's program, in degrees.
     pub angles: Option<String>,
-    /// How lines of sight run, as the plotter understands it.
+    /// The kind of projection, in the plotter's syntax.
     pub projection: String,
-    /// `clip` or `refuse`.
+    /// What to do with parts behind the eye: `clip` or `refuse`.
     pub behind: &'static str,
-    /// `on` or `off`.
+    /// Whether the intersection lines of faces that pass through each other are drawn: `on` or
+    /// `off`.
     pub seams: &'static str,
-    /// `separate` or `merged`.
+    /// How blocks that touch are drawn: `separate` or `merged`.
     pub blocks: &'static str,
-    /// Degrees.
+    /// Edges between faces that bend less than this angle, in degrees, are not drawn.
     pub crease: String,
-    /// `auto`, or a length in units of the model, as the plotter understands it.
+    /// The error bound of the coordinates: `auto`, or a length in model units in the plotter's
+    /// syntax.
     pub precision: String,
-    /// `faces`, `wire`, `vertices` or `edges`.
+    /// The method of determining visibility: `faces`, `wire`, `vertices` or `edges`.
     pub see: &'static str,
-    /// What becomes of hidden lines, as the plotter understands it.
+    /// How hidden lines are drawn, in the plotter's syntax.
     pub hidden: String,
-    /// `auto` or `one`.
+    /// Whether the file chooses the pens: `auto` or `one`.
     pub pens: &'static str,
-    /// The page.
+    /// The size of the page.
     pub page: Page,
-    /// What stays free on each side, in mm.
+    /// The margin on each side of the page, in mm.
     pub margin: String,
-    /// What stands below the drawing; empty for nothing.
+    /// The title below the drawing; empty for none.
     pub title: String,
-    /// Height of its capitals, in mm.
+    /// The height of the title's capital letters, in mm.
     pub title_size: String,
-    /// Whether a plan, too, is scaled to the page.
+    /// Whether plans, too, are scaled to the page; solids always are.
     pub fit: bool,
-    /// `auto`, `greedy` or `exact`.
+    /// The method of ordering the strokes: `auto`, `greedy` or `exact`.
     pub order: &'static str,
-    /// Whether the pen returns to where it began.
+    /// Whether the pen returns to its starting point at the end.
     pub cycle: bool,
-    /// Work to improve the order, for each move with the pen up.
+    /// The amount of work to improve the order, for each pen-up move.
     pub effort: String,
-    /// How much longer a way with the pen up may be for one lift less, in mm.
+    /// The extra pen-up travel, in mm, that is accepted to save one pen lift.
     pub lift: String,
 }
 
-/// Every line of a job up to the plot command: forget the old model, how pens are chosen, the file's
-/// lines, the settings.
+/// Every line of a job before the plot command: clear the old model, choose how pens are assigned,
+/// the lines of the file, the other settings.
 #[derive(Debug)]
 pub struct Job<L> {
     before: Vec<JobLine>,
@@ -215,9 +224,9 @@ pub struct Job<L> {
 }
 
 impl<L: Lines> Job<L> {
-    /// The job that draws `file` as `settings` say.
+    /// Creates the job that draws `file` with `settings`.
     ///
-    /// Each setting is sent, so that nothing of an earlier job remains.
+    /// Every setting is sent, so that no setting of an earlier job remains in effect.
     pub fn new(file: L, settings: &Settings) -> Self {
         let page = settings.page;
         let points = [
@@ -248,7 +257,7 @@ impl<L: Lines> Job<L> {
             format!("{EFFORT}={}", settings.effort),
             format!("{LIFT}={}", settings.lift),
         ]);
-        // Before the file, whose names of pens may be too many.
+        // The pen setting must precede the file, which may name more pens than there are.
         let before = [CLEAR.to_owned(), format!("{PENS}={}", settings.pens)];
         Self {
             before: before.into_iter().map(JobLine::command).collect(),

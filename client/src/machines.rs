@@ -1,4 +1,4 @@
-//! The plotters that are no hardware: an emulated board, and the library in this process.
+//! The simulated plotters: emulated boards, and the plotter's library in this process.
 
 use crate::emulator::{EmulatedBoard, Emulator, EmulatorError, Options, Pico, image_path};
 use crate::error::Error;
@@ -21,36 +21,36 @@ pub enum Board {
 
 /// A plotter whose pins are watched.
 pub trait WatchedPlotter: Link {
-    /// What the pins did to the pen since the start.
+    /// The path of the pen since the start, reconstructed from the pins.
     ///
     /// # Errors
-    /// The emulator ended, or its trace makes no sense.
+    /// The emulator ended, or its trace cannot be parsed.
     fn pen_runs(&mut self) -> Result<PenRuns, Error>;
 
-    /// Turns a broken line into what broke, if it was the emulator.
+    /// Replaces an error of the link by one that says how the emulator ended. Returns other errors
+    /// unchanged.
     fn explain(&mut self, error: Error) -> Error;
 }
 
-/// The plotter's library on this computer.
+/// A plotter that runs the plotter's library on this computer.
 pub trait PreviewPlotter: Link {
-    /// What came of the last plot command, with the best time of each stage in all of them
-    /// ([`Timings::best`](crate::job::Timings::best)).
+    /// The results of the last plot command.
     ///
     /// # Errors
-    /// There was none.
+    /// The plotter refuses the drawing.
     fn result(&mut self) -> Result<JobResult, Error>;
 
-    /// The job of the model that was sent, as a tape ([`crate::tape`]).
+    /// Records the drawing of the model that was sent as a tape ([`crate::tape`]).
     ///
     /// # Errors
-    /// What the plotter refuses.
+    /// The plotter refuses the drawing.
     fn tape(&mut self) -> Result<Vec<u8>, Error>;
 }
 
 /// Starts the emulated `board`.
 ///
 /// # Errors
-/// The emulator or the firmware's image is missing.
+/// The emulator or the firmware image is missing, or the emulator does not start.
 pub fn emulate(board: Board) -> Result<Box<dyn WatchedPlotter>, Error> {
     Ok(Box::new(Emulated::start(board)?))
 }
@@ -60,14 +60,14 @@ pub fn in_memory() -> Box<dyn PreviewPlotter> {
     Box::new(InMemory::new())
 }
 
-/// A board in the emulator, with what its pins have done so far.
+/// An emulated board and the path of its pen.
 struct Emulated {
     board: Board,
     emulator: Box<dyn EmulatedBoard>,
     pen: PenWatch,
 }
 
-/// The firmware's default, in mm: see setting `$100`.
+/// The firmware's default step length in mm; see setting `$100`.
 const STEP: f64 = 1.0 / 80.0;
 
 impl Emulated {
@@ -86,7 +86,7 @@ impl Emulated {
 }
 
 impl Board {
-    /// Its name, as `--board` takes it.
+    /// The name of the board, as the option `--board` accepts it.
     pub fn name(self) -> &'static str {
         match self {
             Self::Lm3s6965 => "lm3s6965",
@@ -94,7 +94,7 @@ impl Board {
         }
     }
 
-    /// Boots its firmware in its emulator.
+    /// Boots the board's firmware in its emulator.
     ///
     /// # Errors
     /// See [`EmulatorError`].
@@ -121,7 +121,8 @@ impl Board {
         }
     }
 
-    /// The emulator ended; what it `said` last goes into a file, for it is not for the user's eyes.
+    /// Creates the error of an emulator that ended. Its last output, `said`, is written to a file,
+    /// because it is too technical for the message.
     fn broken(self, how: &str, said: &str) -> Error {
         let file = format!("penup-emulator-{}.log", std::process::id());
         let file = std::env::temp_dir().join(file);

@@ -1,4 +1,4 @@
-//! Results into files, whole or not at all.
+//! Writes output files atomically: completely or not at all.
 
 use crate::error::Error;
 use crate::interrupt::while_unfinished;
@@ -6,13 +6,13 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf, is_separator};
 
-/// Whether all results can be written, asked before the work that they come from.
+/// Checks that all outputs can be written, before the work that produces them.
 ///
-/// No two of the `outputs` may be one file, and none may be the `input`, whatever they are called.
-/// An ordinary output is tried with an empty file beside it, which is gone afterwards.
+/// No two of the `outputs` may be the same file, and none may be the `input`, even under different
+/// names. An ordinary output is tested by writing an empty file beside it, which is removed again.
 ///
 /// # Errors
-/// What is wrong with which file.
+/// The first problem that is found, with the name of the file.
 pub fn check(input: &Path, outputs: &[&Path]) -> Result<(), Error> {
     let name = |path: &Path| path.display().to_string();
     for (index, output) in outputs.iter().enumerate() {
@@ -28,7 +28,7 @@ pub fn check(input: &Path, outputs: &[&Path]) -> Result<(), Error> {
     Ok(())
 }
 
-/// The path without links and detours, also that of a file that is not there yet.
+/// The canonical path of a file, which need not exist yet.
 fn identity(path: &Path) -> PathBuf {
     let beside = || {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
@@ -43,7 +43,7 @@ fn try_to_write(path: &Path) -> io::Result<()> {
         return Err(io::ErrorKind::IsADirectory.into());
     }
     match fs::metadata(path) {
-        // Opening a pipe would wait for its reader.
+        // Pipes are not tested, because opening one would wait for its reader.
         Ok(there) if !there.is_file() => Ok(()),
         _ => {
             let unfinished = unfinished(path)?;
@@ -54,7 +54,7 @@ fn try_to_write(path: &Path) -> io::Result<()> {
     }
 }
 
-/// The name of a result that is not complete yet.
+/// The temporary name of an output that is not complete yet.
 fn unfinished(path: &Path) -> io::Result<PathBuf> {
     let name = path.file_name().ok_or(io::ErrorKind::InvalidInput)?;
     let mut unfinished = name.to_owned();
@@ -62,12 +62,12 @@ fn unfinished(path: &Path) -> io::Result<PathBuf> {
     Ok(path.with_file_name(unfinished))
 }
 
-/// Writes `bytes` to `path`. An older file stays as it was until the new one is complete.
+/// Writes `bytes` to `path`. An existing file stays unchanged until the new one is complete.
 ///
-/// What is no ordinary file, such as `/dev/stdout`, is written directly.
+/// A file that is not an ordinary one, such as `/dev/stdout`, is written directly.
 ///
 /// # Errors
-/// What the system says, with the file's name.
+/// The operating system's error, with the name of the file.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     let result = match fs::metadata(path) {
         Ok(there) if !there.is_file() => fs::write(path, bytes),

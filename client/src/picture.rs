@@ -1,8 +1,9 @@
-//! The page with what the pen did to it, as SVG and PNG.
+//! Renders the page with the path of the pen as SVG and PNG.
 //!
-//! One unit of the SVG is one millimetre and the page has its true size. Pen-down lines are dark, or in colour
-//! from the second pen on, and as wide as a pen, pen-up moves faint and thin; a green disc marks the start of the ink and a red
-//! ring its end. The PNG is made from that very SVG.
+//! One unit of the SVG is one millimetre, and the page has its true size. Pen-down lines have the
+//! width of a pen; those of the first pen are dark and those of the others are coloured. Pen-up
+//! moves are faint and thin. A green disc marks the start of the first stroke and a red ring the
+//! end of the last one. The PNG is rendered from this SVG.
 
 use crate::error::Error;
 use crate::job::{Page, PagePoint};
@@ -11,25 +12,25 @@ use std::collections::BTreeSet;
 use std::f64::consts::{PI, TAU};
 use std::fmt::{self, Write as _};
 
-/// A way of the pen without lifting or lowering it, in mm.
+/// A section of the pen's path during which the pen is neither lifted nor lowered.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Run {
-    /// Whether it draws.
+    /// Whether the pen is down.
     pub pen_down: bool,
-    /// Which pen, from 1.
+    /// The number of the pen, counted from 1.
     pub pen: u8,
-    /// Where it goes.
+    /// The vertices of the path, in mm.
     pub points: Vec<PagePoint>,
 }
 
-/// What the pen did, in order.
+/// The path of the pen on a page.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Picture {
-    /// The page that it is on.
+    /// The size of the page.
     pub page: Page,
-    /// Every way of the pen.
+    /// All runs in order.
     pub runs: Vec<Run>,
-    /// The plotter's step in mm. Where single steps stay within half of it of a straight line, the
+    /// The plotter's step in mm. Where single steps stay within half a step of a straight line, the
     /// picture shows the line. 0 if the runs are exact.
     pub step: f64,
 }
@@ -38,20 +39,20 @@ const PEN_WIDTH: f64 = 0.3;
 const TRAVEL_WIDTH: f64 = 0.15;
 const PAPER: &str = "#ffffff";
 const INK: &str = "#1b1f3b";
-/// The inks of the other pens, in turn.
+/// The colours of the other pens, which repeat after the last one.
 const INKS: [&str; 7] =
     ["#c1121f", "#0077b6", "#2d6a4f", "#e07a00", "#7b2cbf", "#8a5a2b", "#d81b84"];
 const TRAVEL: &str = "#3d7edb";
 const START: &str = "#2a9d5c";
 const END: &str = "#d7433b";
 
-/// Dots of the PNG for each mm (203 dots per inch).
+/// The resolution of the PNG in dots per mm (203 dots per inch).
 const DOTS_PER_MM: f64 = 8.0;
-/// Larger pages get fewer dots for each mm.
+/// The maximum width and height of the PNG in dots. Larger pages get a lower resolution.
 const MOST_DOTS: f64 = 4096.0;
 
 impl Picture {
-    /// `strokes` in order, and straight moves between them.
+    /// Creates a picture of `strokes` in this order, with straight pen-up moves between them.
     pub fn of_strokes(page: Page, strokes: &[Vec<PagePoint>]) -> Self {
         let mut runs: Vec<Run> = Vec::with_capacity(2 * strokes.len());
         let mut pen: Option<PagePoint> = None;
@@ -68,7 +69,7 @@ impl Picture {
         Self { page, runs, step: 0.0 }
     }
 
-    /// As an SVG document.
+    /// Renders the picture as an SVG document.
     pub fn svg(&self) -> String {
         let mut text = String::new();
         // Writing to a string cannot fail.
@@ -114,7 +115,7 @@ impl Picture {
             Number(width)
         )?;
         for run in self.runs.iter().filter(|run| of(run)) {
-            // Half a step, and a little for the rounding of the numbers.
+            // The tolerance is half a step and a little more, because the numbers are rounded.
             let points = straightened(&run.points, self.step * 0.501);
             let Some((first, rest)) = points.split_first() else {
                 continue;
@@ -124,7 +125,7 @@ impl Picture {
                 write!(out, "L{}", self.place(*point))?;
             }
             if rest.is_empty() {
-                // A dot: round caps draw a line of no length.
+                // This is a dot: round caps make a line without a length visible.
                 write!(out, "h0")?;
             }
             writeln!(out, "\"/>")?;
@@ -158,7 +159,7 @@ impl Picture {
         Ok(())
     }
 
-    /// SVG counts y downwards.
+    /// Converts a point to SVG coordinates, whose y axis points down.
     fn place(&self, point: PagePoint) -> Place {
         Place(Number(point[0]), Number(self.page.height - point[1]))
     }
@@ -167,13 +168,13 @@ impl Picture {
 /// Renders an SVG that [`Picture::svg`] wrote as PNG.
 ///
 /// # Errors
-/// The page is too small for a dot, or too large.
+/// The SVG cannot be parsed, or the page is too large.
 pub fn png(svg: &str) -> Result<Vec<u8>, Error> {
     let broken = |error: &dyn fmt::Display| Error::Picture(error.to_string());
     let tree = usvg::Tree::from_str(svg, &usvg::Options::default()).map_err(|e| broken(&e))?;
     let size = tree.size();
     let longest = f64::from(size.width().max(size.height()));
-    // usvg counts 96 dots to the inch.
+    // usvg assumes 96 dots per inch.
     let scale = (DOTS_PER_MM * 25.4 / 96.0).min(MOST_DOTS / longest) as f32;
     let dots = |length: f32| ((length * scale).round() as u32).max(1);
     let mut pixels = tiny_skia::Pixmap::new(dots(size.width()), dots(size.height()))
@@ -183,14 +184,14 @@ pub fn png(svg: &str) -> Result<Vec<u8>, Error> {
     pixels.encode_png().map_err(|e| broken(&e))
 }
 
-/// A number with at most three decimals: a thousandth of a mm.
+/// A number that is written with at most three decimals, a resolution of a thousandth of a mm.
 #[derive(Clone, Copy)]
 struct Number(f64);
 
 impl fmt::Display for Number {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let rounded = (self.0 * 1000.0).round() / 1000.0;
-        // Without a negative zero.
+        // Adding zero turns a negative zero into a positive one.
         write!(f, "{}", rounded + 0.0)
     }
 }
@@ -204,10 +205,12 @@ impl fmt::Display for Place {
     }
 }
 
-/// Leaves out points, from front to back as many as it can, such that every point stays within
-/// `tolerance` of the line that replaces it. Ends stay, and so do the places where it turns back.
+/// Simplifies a polyline: it removes points, from front to back as many as it can, such that every
+/// point stays within `tolerance` of the line that replaces it. The end points are kept, and so are
+/// the points where the polyline reverses.
 ///
-/// A line of single steps between two grid points becomes one line if the tolerance is half a step.
+/// With a tolerance of half a step, the single steps of a line between two grid points become one
+/// line.
 ///
 /// ```
 /// use penup_client::picture::straightened;
@@ -227,12 +230,14 @@ pub fn straightened(points: &[PagePoint], tolerance: f64) -> Vec<PagePoint> {
     kept
 }
 
-/// How many of the points `ahead` a straight line from `start` can pass by: to the last point that
-/// lies in the directions that pass every earlier one, and farther away than those.
+/// How many of the points `ahead` a straight line from `start` can skip. The line goes to the last
+/// point that is in the range of directions that pass every earlier point and is at least as far
+/// away as all of them.
 fn reach(start: PagePoint, ahead: &[PagePoint], tolerance: f64) -> usize {
     let mut passed = 0;
     let mut farthest = 0.0;
-    // The directions that pass all points so far, as angles from the first direction.
+    // The range of directions that pass all points so far, as angles relative to the first
+    // direction.
     let mut first = None;
     let (mut lowest, mut highest) = (-PI, PI);
     for (i, point) in ahead.iter().enumerate() {
@@ -311,7 +316,7 @@ mod tests {
         assert!(!svg.contains("path") && !svg.contains("circle"));
         let png = png(&svg).expect("a white page");
         assert_eq!(png.get(..8), Some(b"\x89PNG\r\n\x1a\n".as_slice()));
-        // Width and height stand in the header.
+        // The header contains the width and the height.
         assert_eq!(png.get(16..24), Some([0, 0, 1, 64, 0, 0, 0, 240].as_slice()));
     }
 
@@ -335,7 +340,7 @@ mod tests {
         assert_eq!(straightened(&[[1.0, 2.0]], 0.1), [[1.0, 2.0]]);
     }
 
-    /// The grid points of a line, as a plotter steps it.
+    /// The grid points of a line, as a plotter steps through them.
     fn steps(from: [i32; 2], to: [i32; 2]) -> Vec<PagePoint> {
         let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
         let count = dx.abs().max(dy.abs());
@@ -381,7 +386,7 @@ mod tests {
         assert!(spans.next().is_none(), "a line that no step is near");
     }
 
-    /// From `p` to the nearest point of a line, not beyond its ends.
+    /// The distance from `p` to the nearest point of a line segment.
     fn distance(p: PagePoint, line: &[PagePoint]) -> f64 {
         let [a, b] = [line[0], line[1]];
         let (dx, dy) = (b[0] - a[0], b[1] - a[1]);

@@ -1,7 +1,8 @@
-//! The plotter's library on this computer, behind the same serial line as a real one.
+//! A plotter in memory: the plotter's library on this computer, behind the same interface as a
+//! serial line.
 //!
-//! Every line goes through the library's own protocol, and the job through its own interrupt code on
-//! a [`HostBoard`], so a preview shows what a plotter would do, refusals included.
+//! Every line passes through the library's own protocol, and the job through its own interrupt code
+//! on a [`HostBoard`]. A preview therefore shows what a plotter would do, including its refusals.
 
 use crate::error::Error;
 use crate::job::{JobResult, Lengths, Timings};
@@ -20,7 +21,7 @@ use penup::visibility::{EdgeParameter, Stretch};
 use std::io;
 use std::time::{Duration, Instant};
 
-/// A plotter in memory.
+/// A plotter in this process.
 pub struct InMemory {
     board: HostBoard<'static>,
     plotter: Plotter<'static>,
@@ -29,9 +30,10 @@ pub struct InMemory {
 }
 
 impl InMemory {
-    /// Switches it on.
+    /// Starts the plotter.
     pub fn new() -> Self {
-        // Plotter and board borrow from these for as long as the process lives; there is one a run.
+        // The memory is leaked because the plotter and the board borrow from it as long as the
+        // process lives; there is only one per run.
         let ring = Box::leak(Box::new(EventRing::new()));
         let pins = Box::leak(Box::new(PulserState::new()));
         let mut board = HostBoard::new(ring, pins);
@@ -53,9 +55,10 @@ impl InMemory {
         }
     }
 
-    /// Polls until every byte is answered; a plot that began goes on in [`Link::receive`].
+    /// Polls the plotter until it has read every byte and has no more work. A plot that began
+    /// continues in [`Link::receive`].
     fn answer(&mut self) {
-        // What waits for the machine goes on in `receive`.
+        // Work that waits for the machine continues in `receive`.
         while !self.board.has_read_all() && self.plotter.poll(&mut self.board) {}
     }
 }
@@ -68,7 +71,7 @@ impl Default for InMemory {
 
 impl Link for InMemory {
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
-        // The command stands between the line's number and its checksum.
+        // The command is between the line's number and its checksum.
         let plots = |part: &[u8]| part.starts_with(PLOT.as_bytes());
         if bytes.split(|byte| *byte == b' ').any(plots) {
             self.steps = 0;
@@ -81,7 +84,7 @@ impl Link for InMemory {
     }
 
     fn receive(&mut self, buffer: &mut [u8], _patience: Duration) -> io::Result<usize> {
-        // Each turn lets a tenth of a second of the plotter's time pass.
+        // Each iteration lets a tenth of a second of the plotter's time pass.
         for _ in 0..100 {
             self.plotter.poll(&mut self.board);
             penup::plotter::Board::wait(&mut self.board);
@@ -103,7 +106,7 @@ impl Link for InMemory {
     }
 }
 
-/// Moves at the pins: rising edges of both axes at one instant are one.
+/// Counts the steps at the pins. Simultaneous rising edges of both axes count as one step.
 fn count_steps(changes: &[penup::boards::host::Stamped]) -> u64 {
     let rises = |change: Change| matches!(change, Change::StepX(true) | Change::StepY(true));
     let mut times: Vec<u64> = changes.iter().filter(|c| rises(c.change)).map(|c| c.time).collect();
@@ -135,7 +138,7 @@ impl PreviewPlotter for InMemory {
             let pen = path.pen() + 1;
             match (ink, strokes.last_mut(), stroke_pens.last()) {
                 (Some(_), Some(stroke), Some(last)) if *last == pen => stroke.push(point),
-                // Another pen goes on where the last one ended.
+                // Another pen continues where the last one ended.
                 (Some(_), Some(stroke), _) => {
                     let from = stroke.last().copied().unwrap_or(point);
                     strokes.push(vec![from, point]);
@@ -163,7 +166,7 @@ impl PreviewPlotter for InMemory {
     }
 }
 
-/// How long each stage takes.
+/// Measures the computing time of each stage.
 struct StopWatch {
     began: Instant,
     stage: Stage,
@@ -200,7 +203,7 @@ impl Cancel for StopWatch {
     }
 }
 
-/// The visible stretches on the image plane, and the pen of each.
+/// Collects the visible segments on the image plane and the pen of each.
 #[derive(Default)]
 struct Segments {
     ends: Vec<[f64; 4]>,
@@ -232,7 +235,7 @@ impl Observer for Segments {
     }
 }
 
-/// Where the place `along` the edge from `p` to `q` is on the image plane.
+/// The image of the point with parameter `along` on the edge from `p` to `q`.
 fn image(view: &View, p: Vertex, q: Vertex, along: EdgeParameter) -> [f64; 2] {
     let part = along.numerator as f64 / along.denominator as f64;
     let between = |p: i32, q: i32| f64::from(p) * (1.0 - part) + f64::from(q) * part;

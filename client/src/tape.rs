@@ -1,4 +1,4 @@
-//! Harrison's tape: a job as instructions of four bits, two to a byte.
+//! Harrison's tape: a job encoded as instructions of four bits, two to a byte.
 
 use crate::job::Page;
 use crate::picture::{Picture, Run};
@@ -8,10 +8,11 @@ use penup::motion::{Block, EventQueue, StepEvent};
 use penup::step::tape::{BadCode, Decoder, Instruction, TapeLines, encode};
 use std::fmt::Write as _;
 
-/// Moves planned ahead: as many as a computer likes, the tape is the same.
+/// The number of moves that are planned ahead. It is limited only by memory and does not change the
+/// tape.
 const BLOCKS: usize = 128;
 
-/// A queue that keeps what a tape keeps.
+/// An event queue that records the instructions of a tape.
 #[derive(Default)]
 struct Recorder(Vec<Instruction>);
 
@@ -25,10 +26,10 @@ impl EventQueue for Recorder {
     }
 }
 
-/// The tape of a job from the page's origin.
+/// Records a job, which starts at the page's origin, as a tape.
 ///
 /// # Errors
-/// What the machine refuses.
+/// The machine refuses the job.
 pub fn record(settings: Settings, path: &mut dyn Path) -> Result<Vec<u8>, MachineError> {
     let pins = PulserState::new();
     let mut blocks = vec![Block::EMPTY; BLOCKS];
@@ -39,10 +40,10 @@ pub fn record(settings: Settings, path: &mut dyn Path) -> Result<Vec<u8>, Machin
     Ok(encode(recorder.0).collect())
 }
 
-/// Its instructions as text: one run of equal ones a line.
+/// Decodes a tape into text, with one line for each run of equal instructions.
 ///
 /// # Errors
-/// Where the tape is damaged.
+/// The tape contains an invalid code; the error says where.
 ///
 /// ```
 /// let text = penup_client::tape::decode(&[0xA0, 0x00, 0x33, 0x23, 0xB0, 0x00])?;
@@ -69,10 +70,10 @@ pub fn decode(tape: &[u8]) -> Result<String, BadCode> {
     Ok(text)
 }
 
-/// What it draws, from the page's origin, and how many moves it has.
+/// Returns the picture that a tape draws from the page's origin, and the number of its moves.
 ///
 /// # Errors
-/// Where the tape is damaged.
+/// The tape contains an invalid code; the error says where.
 pub fn show(tape: &[u8], page: Page, steps_per_mm: f64) -> Result<(Picture, usize), BadCode> {
     let instructions = instructions(tape)?;
     let moves = instructions.iter().filter(|one| matches!(one, Instruction::Move(_))).count();
@@ -95,7 +96,7 @@ fn instructions(tape: &[u8]) -> Result<Vec<Instruction>, BadCode> {
     decoder.damage().map_or(Ok(instructions), Err)
 }
 
-/// `UpRight` as `up right`.
+/// Converts a name such as `UpRight` into `up right`.
 fn words(name: &str) -> String {
     let mut words = String::new();
     for letter in name.chars() {

@@ -1,24 +1,25 @@
-//! What the plotter says, in the words of this program.
+//! Translates the plotter's messages into the terms of this program.
 //!
-//! The plotter and its library speak of the serial line: `$page`, `send $pens=one`. Whoever typed
-//! `--page` is told of `--page`. `OPTIONS` is the one table of the options that are both; [`told`]
-//! puts a text of the plotter into this program's words by it, [`asked`] a line that was sent, and
-//! [`explained`] a refusal. The number of a refusal says where the plotter's text would not help here.
+//! The messages of the plotter and its library refer to the serial protocol, such as `$page` or
+//! `send $pens=one`. A user who typed `--page` must read `--page`. `OPTIONS` is the single table of
+//! the options that exist in both forms. [`told`] translates a message of the plotter with it,
+//! [`asked`] a line that was sent, and [`explained`] a refusal. For refusals whose text would not
+//! help here, the number of the error selects another text.
 
 use crate::protocol::meaning;
 
-/// How an option of the plotter is given here.
+/// The form of a plotter setting on the command line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Form {
     /// `$name=value` is `--name value`.
     Value,
     /// `$name=on` is `--name`.
     Switch,
-    /// There is no option for it: it is told in these words.
+    /// There is no such option; messages use these words instead.
     Words(&'static str),
 }
 
-/// Each `$` word that the plotter's texts hold or that this program sends, without its `$`.
+/// Each `$` word that occurs in the plotter's messages or that this program sends, without its `$`.
 const OPTIONS: &[(&str, Form)] = &[
     ("eye", Form::Value),
     ("at", Form::Value),
@@ -52,7 +53,8 @@ const OPTIONS: &[(&str, Form)] = &[
     ("131", Form::Words("along y (setting 131)")),
 ];
 
-/// Refusals whose text speaks of the serial line alone, by their numbers.
+/// Texts for refusals whose own text refers to the serial line only, with the numbers of the
+/// errors.
 const SENTENCES: &[(u16, &str)] = &[
     (
         1,
@@ -75,9 +77,10 @@ const SENTENCES: &[(u16, &str)] = &[
     ),
 ];
 
-/// Why a plotter refused: the error's number, and what the plotter said before it.
+/// The reason for a refusal, from the number of the error and the messages that the plotter sent
+/// before it.
 ///
-/// What it said itself is more exact than the number's meaning, so it comes with it.
+/// The messages are more precise than the meaning of the number, so they are included.
 pub fn explained(number: u16, messages: &[String]) -> String {
     if let Some((_, sentence)) = SENTENCES.iter().find(|(own, _)| *own == number) {
         return format!("{sentence} (error {number})");
@@ -90,7 +93,7 @@ pub fn explained(number: u16, messages: &[String]) -> String {
     format!("{reason} (error {number})")
 }
 
-/// A line that was sent, as the option that it came from.
+/// Describes a line that was sent by the option that it came from.
 ///
 /// ```
 /// use penup_client::words::asked;
@@ -107,7 +110,7 @@ pub fn asked(line: &str) -> String {
     named(name, value)
 }
 
-/// A text of the plotter.
+/// Translates a message of the plotter into the terms of the command line.
 ///
 /// ```
 /// use penup_client::words::told;
@@ -126,7 +129,7 @@ pub fn told(text: &str) -> String {
             }
             None => (None, rest),
         };
-        // An option is not sent here.
+        // On the command line an option is used, not sent.
         if told.ends_with("send ") {
             told.truncate(told.len() - "send ".len());
             told.push_str("use ");
@@ -137,7 +140,7 @@ pub fn told(text: &str) -> String {
     told
 }
 
-/// The letters and digits at the beginning, and what `else` accepts.
+/// Splits `text` after its leading letters, digits and the characters that `or` accepts.
 fn split_after(text: &str, or: impl Fn(char) -> bool) -> (&str, &str) {
     let is_in = |letter: char| letter.is_ascii_alphanumeric() || or(letter);
     text.split_at(text.find(|letter| !is_in(letter)).unwrap_or(text.len()))
@@ -149,7 +152,7 @@ fn named(name: &str, value: Option<&str>) -> String {
         (Some(Form::Switch), Some("off")) => format!("no --{name}"),
         (Some(Form::Switch), _) | (Some(Form::Value), None) => format!("--{name}"),
         (Some(Form::Value), Some(value)) => format!("--{name} {value}"),
-        // A firmware of another version: better a word of it than none.
+        // The firmware is of another version; its own word is better than nothing.
         (None, None) => name.to_owned(),
         (None, Some(value)) => format!("{name} {value}"),
     }

@@ -1,15 +1,16 @@
-//! The spline with given knots, some of its control points fixed, that comes nearest to given places
-//! at given parameters.
+//! Least-squares fitting of a B-spline with given knots, of which some control points are fixed, to
+//! points with given parameters.
 
 use super::Place;
 use std::ops::Range;
 
-/// The highest order, 4.
+/// The highest order.
 const MOST: usize = 4;
 
 #[cfg(test)]
 thread_local! {
-    /// How often basis functions were computed in this thread: the work of fitting.
+    /// The number of evaluations of basis functions in this thread, which measures the work of
+    /// fitting.
     static EVALUATIONS: std::cell::Cell<u64> = const { std::cell::Cell::new(0) };
 }
 
@@ -18,19 +19,20 @@ pub fn evaluations() -> u64 {
     EVALUATIONS.get()
 }
 
-/// The basis functions that act at one parameter.
+/// The values and derivatives of the basis functions that are not zero at one parameter.
 #[derive(Debug, Clone, Copy)]
 pub struct Basis {
-    /// The first control point that acts.
+    /// The index of the first control point with a nonzero basis function.
     pub first: usize,
     weights: [f64; MOST],
-    /// By how much each weight grows with the parameter.
+    /// The derivative of each weight with respect to the parameter.
     slopes: [f64; MOST],
     order: usize,
 }
 
 impl Basis {
-    /// At parameter `t`, which lies between the first and the last knot.
+    /// Evaluates the basis functions at parameter `t`, which lies between the first and the last
+    /// knot.
     pub fn at(knots: &[f64], order: usize, t: f64) -> Self {
         #[cfg(test)]
         EVALUATIONS.with(|count| count.set(count.get() + 1));
@@ -56,12 +58,12 @@ impl Basis {
         Self { first: span + 1 - order, weights, slopes, order }
     }
 
-    /// The place on the curve.
+    /// The point on the curve.
     pub fn place(&self, control: &[Place]) -> Place {
         self.sum(&self.weights, control)
     }
 
-    /// By how much that place moves with the parameter.
+    /// The derivative of that point with respect to the parameter.
     pub fn slope(&self, control: &[Place]) -> Place {
         self.sum(&self.slopes, control)
     }
@@ -76,14 +78,15 @@ impl Basis {
     }
 }
 
-/// Moves the control points numbered `free` to where the spline comes nearest to `places`; the others
-/// stay. `bases` are those of the places.
+/// Moves the control points with the indices `free` to minimise the sum of the squared distances
+/// between the spline and `places`; the others stay. Each place comes with its basis.
 pub fn least_squares<'a>(
     places: impl Iterator<Item = (&'a Place, &'a Basis)>,
     control: &mut [Place],
     free: Range<usize>,
 ) {
-    // Normal equations for the free ones; each row holds what is left of the diagonal, and it.
+    // The normal equations for the free control points. Each row contains the entries of the band
+    // to the left of the diagonal, and the diagonal.
     let mut rows = vec![[0.0; MOST]; free.len()];
     let mut sides = vec![[0.0; 2]; free.len()];
     for (place, basis) in places {
@@ -114,11 +117,11 @@ pub fn least_squares<'a>(
     control[free].copy_from_slice(&sides);
 }
 
-/// Cholesky for a symmetric band; `sides` becomes the solution.
+/// Solves a symmetric band system by Cholesky factorisation; `sides` becomes the solution.
 fn solve(rows: &mut [[f64; MOST]], sides: &mut [Place]) {
     const DIAGONAL: usize = MOST - 1;
     for i in 0..rows.len() {
-        // A control point on which no place depends stays near zero instead of nowhere.
+        // This keeps a control point on which no place depends near zero instead of undefined.
         rows[i][DIAGONAL] += 1e-9;
         for j in i.saturating_sub(DIAGONAL)..=i {
             let mut rest = rows[i][DIAGONAL - (i - j)];
@@ -142,7 +145,7 @@ fn solve(rows: &mut [[f64; MOST]], sides: &mut [Place]) {
     }
 }
 
-/// Number `i` of a triangular system, once the others that act on it are known.
+/// Computes unknown number `i` of a triangular system from the unknowns that are already `known`.
 fn rest(
     sides: &[Place],
     i: usize,

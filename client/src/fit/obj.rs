@@ -1,4 +1,4 @@
-//! The file: polylines in, curves out, and what was saved.
+//! Reads the polylines of an OBJ file and writes the fitted curves as OBJ.
 
 use super::{FittedCurve, Place, fit_each};
 use crate::source::SourceFile;
@@ -6,16 +6,16 @@ use penup::protocol::Command;
 use std::fmt::{self, Write};
 use std::rc::Rc;
 
-/// Why a file was not fitted.
+/// The reason why a file could not be fitted.
 #[derive(Debug, Clone, PartialEq)]
 pub enum FitError {
     /// The tolerance is not within [`TOLERANCES`].
     Tolerance,
     /// A line of the file cannot be fitted.
     Line {
-        /// From 1.
+        /// The line number, counted from 1.
         number: usize,
-        /// What is wrong with it.
+        /// What is wrong with the line.
         reason: &'static str,
     },
     /// There is no `l` element.
@@ -45,20 +45,20 @@ impl fmt::Display for FitError {
 
 impl std::error::Error for FitError {}
 
-/// What fitting saved.
+/// The sizes before and after fitting.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Saving {
-    /// How many polylines were read.
+    /// The number of polylines in the file.
     pub polylines: usize,
-    /// Their vertices.
+    /// The number of their vertices.
     pub vertices_before: usize,
-    /// The control points of the curves.
+    /// The number of control points of the curves.
     pub vertices_after: usize,
-    /// Bytes of the file read.
+    /// The size of the input in bytes.
     pub bytes_before: usize,
-    /// Bytes of the file written.
+    /// The size of the output in bytes.
     pub bytes_after: usize,
-    /// Polylines that are not written because they have no length.
+    /// The number of polylines that are not written because they have no length.
     pub left_out: usize,
 }
 
@@ -86,17 +86,17 @@ impl fmt::Display for Saving {
     }
 }
 
-/// A fitted file.
+/// The result of fitting a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fitted {
-    /// The new file.
+    /// The text of the new OBJ file.
     pub obj: String,
-    /// What it saves.
+    /// How much it saves.
     pub saving: Saving,
 }
 
-/// Fits every polyline of an OBJ plan within `tolerance` mm; each keeps its pen. `progress` is told from
-/// time to time how many of all vertices are done.
+/// Fits every polyline of an OBJ plan within `tolerance` mm; each keeps its pen. From time to time
+/// it calls `progress` with the number of vertices done and the number of all vertices.
 ///
 /// # Errors
 /// See [`FitError`].
@@ -125,13 +125,15 @@ pub fn fit_obj(
     Ok(Fitted { obj, saving })
 }
 
-/// Control points on one `curv` line: with numbers of six digits it stays below 256 bytes.
+/// The maximum number of control points on one `curv` line. With numbers of six digits such a line
+/// stays below 256 bytes.
 const CONTROL_LIMIT: usize = 30;
 
-/// Writes curves as OBJ, `height` the z of all, rounded to a hundredth of `tolerance` or finer.
+/// Writes curves as OBJ. All vertices get the z coordinate `height`, and coordinates are rounded to
+/// a hundredth of `tolerance` or finer.
 ///
-/// A long curve is written as several, which share control points: each polynomial depends on `order`
-/// of them only. `pens` are the lines that choose the pen of each.
+/// A long curve is written as several curves that share control points, because each polynomial
+/// depends on only `order` of them. `pens` contains the line that chooses the pen of each curve.
 pub fn write_obj(
     curves: &[FittedCurve],
     pens: &[Option<Rc<str>>],
@@ -180,7 +182,7 @@ pub fn write_obj(
     obj
 }
 
-/// With at most `places` decimals, without zeros that say nothing.
+/// Formats `value` with at most `places` decimals and without trailing zeros.
 fn shortest(value: f64, places: usize) -> String {
     let text = format!("{value:.places$}");
     let text = match text.contains('.') {
@@ -190,10 +192,10 @@ fn shortest(value: f64, places: usize) -> String {
     if text == "-0" { "0".into() } else { text.into() }
 }
 
-/// The polylines of a file, all at one height.
+/// The polylines of a file, all of which have the same z.
 struct Plan {
     polylines: Vec<Vec<Place>>,
-    /// The line that chooses the pen of each; none before the first such line.
+    /// The line that chooses the pen of each polyline; `None` before the first such line.
     pens: Vec<Option<Rc<str>>>,
     height: f64,
 }
@@ -229,7 +231,8 @@ impl Plan {
                         return Err(refused("a polyline needs two vertices"));
                     }
                     match chains.last_mut() {
-                        // A trace that comes as one element for each side.
+                        // A trace may be written with one element for each side, which are joined
+                        // here.
                         Some(before)
                             if before.last() == chain.first() && pens.last() == Some(&pen) =>
                         {
@@ -248,7 +251,8 @@ impl Plan {
                 Ok(Command::Curve { .. }) => {
                     first_curve.get_or_insert(number);
                 }
-                // What belongs to a curve. The reader of the file lets nothing else pass.
+                // Keywords that belong to a curve are ignored. The reader of the file accepts
+                // nothing else.
                 _ => {}
             }
         }
@@ -266,7 +270,7 @@ impl Plan {
     }
 }
 
-/// The vertex that an OBJ number means, from 0.
+/// The index, counted from 0, of the vertex that an OBJ index refers to.
 fn vertex(number: i32, count: usize) -> Option<usize> {
     let number = i64::from(number);
     let at = if number < 0 { count as i64 + number } else { number - 1 };

@@ -1,67 +1,69 @@
-//! The curve for one piece of a polyline, which has no sharp corner inside.
+//! Fits a curve to one piece of a polyline, which has no corner inside.
 
 use super::least_squares::{Basis, least_squares};
 use super::{Place, distance, dot, minus};
 use std::ops::Range;
 
-/// Fits at most, after each of which the parameters follow the curve: from nothing, and from a curve
-/// almost as good.
+/// The maximum number of rounds of a fit from scratch and of one from an almost equal curve. After
+/// each round the parameters are adapted to the curve.
 const ROUNDS: usize = 40;
 const MORE_ROUNDS: usize = 10;
-/// Passes over the knots to see which may go.
+/// The maximum number of passes over the knots to remove those that are not needed.
 const PASSES: usize = 3;
 
-/// A fitted piece.
+/// The curve of a fitted piece.
 #[derive(Debug, Clone)]
 pub struct Piece {
-    /// Its control points.
+    /// The control points.
     pub control: Vec<Place>,
-    /// The knots inside, increasing.
+    /// The inner knots in increasing order.
     pub inner: Vec<i32>,
-    /// The knot at its end.
+    /// The knot at the end of the piece.
     pub end: i32,
 }
 
-/// Knots on either side of one that may go, up to which the curve is fitted again to see whether it
-/// may. A spline hardly changes farther away than some knots, so that all of the curve need not be
-/// fitted for each of its knots, which would take a time quadratic in their number.
+/// The number of knots on either side of a candidate for removal up to which the curve is fitted
+/// again. A spline hardly changes more than a few knots away. Fitting the whole curve for each of
+/// its knots would take time quadratic in their number.
 const REACH: usize = 12;
 
-/// Places along the piece, close together, and the frame that all tries share.
+/// Closely spaced samples along the piece, and the parameters that all attempts share.
 struct Samples {
     places: Vec<Place>,
-    /// The parameter of each by its distance along the piece.
+    /// The initial parameter of each sample, proportional to its distance along the piece.
     at: Vec<f64>,
     order: usize,
     ends: [i32; 2],
     tolerance: f64,
 }
 
-/// One try: the control points for some inner knots, and how far each sample is from the curve.
+/// One attempt: the control points for some inner knots, and the distance of each sample from the
+/// curve.
 struct Try {
     control: Vec<Place>,
     at: Vec<f64>,
     errors: Vec<f64>,
 }
 
-/// A part of the curve between two of its knots, to be fitted while the rest stays.
+/// A part of the curve between two of its knots that is fitted while the rest stays fixed.
 struct Part {
-    /// The knots that act in it, also those before and after it.
+    /// The knots that affect the part, including those before and after it.
     knots: Vec<f64>,
-    /// Its control points, of which some act outside it, too.
+    /// The control points that affect the part; some of them also affect the curve outside it.
     control: Vec<Place>,
-    /// Those that do not.
+    /// The indices of the control points that affect only this part and may move.
     free: Range<usize>,
-    /// Where it begins and ends.
+    /// The parameters at the two ends of the part.
     ends: [f64; 2],
-    /// Its samples, and one before and one after it.
+    /// The indices of its samples, including one before and one after it.
     samples: Range<usize>,
 }
 
 impl Piece {
-    /// Fits `places` with a curve of `order` whose first knot is `begin`; `None` if no number of knots
-    /// does it, or only more than `most` before those that are not needed are taken away. `progress` is
-    /// told from time to time which part of the work is done, 0 to 1.
+    /// Fits a curve of `order`, whose first knot is `begin`, to `places`. Returns `None` if no
+    /// number of knots suffices, or if more than `most` knots are needed before superfluous ones
+    /// are removed. From time to time it calls `progress` with the share of the work that is done,
+    /// 0 to 1.
     pub fn fit(
         places: &[Place],
         order: usize,
@@ -137,7 +139,7 @@ impl Samples {
         begin.chain(inner.iter().copied()).chain(end).map(f64::from).collect()
     }
 
-    /// Fits all of the curve.
+    /// Fits the whole curve.
     fn fit(&self, inner: &[i32]) -> Try {
         let mut control = vec![[0.0; 2]; self.order + inner.len()];
         let last = control.len() - 1;
@@ -153,8 +155,8 @@ impl Samples {
         self.fit_part(whole, &self.at, ROUNDS)
     }
 
-    /// Takes knot number `at` away, or puts one in place of it and the next, if the curve stays within
-    /// the tolerance; says whether it does.
+    /// Removes knot number `at`, or replaces it and the next one by one in the middle, if the curve
+    /// stays within the tolerance. Returns whether it did.
     fn spares(&self, inner: &mut Vec<i32>, at: usize, found: &mut Try) -> bool {
         let knots_before = inner[at.saturating_sub(REACH)..at].to_vec();
         let (last, after) = (inner.len() - 1, at + 1);
@@ -179,8 +181,8 @@ impl Samples {
         }
         false
     }
-    /// The part of a curve in which the inner knots numbered `replaced` become `fewer`, and the numbers
-    /// of the control points that it replaces.
+    /// Creates the part of a curve in which the inner knots with the indices `replaced` become
+    /// `fewer`. Also returns the indices of the control points that it replaces.
     fn part(
         &self,
         inner: &[i32],
@@ -193,12 +195,13 @@ impl Samples {
             None => self.ends[0],
             Some(number) => inner.get(number).copied().unwrap_or(self.ends[1]),
         };
-        // The knots between which it lies, by their numbers among all.
+        // The indices, among all knots, of the knots between which the part lies.
         let (left, right) = (order + replaced.start - 1, order + replaced.end);
         let before = (left + 1 - order..=left).map(knot);
         let after = (right..right + order).map(knot);
         let points = left + 1 - order..right;
-        // Those at its ends act beyond them, but for the ends of the curve.
+        // The control points at its ends also affect the curve beyond the part, except at the ends
+        // of the curve.
         let shared = |is_end| if is_end { 1 } else { order - 1 };
         let (head, tail) = (shared(replaced.start == 0), shared(replaced.end == inner.len()));
         let free = head..order + fewer.len() - tail;
@@ -212,8 +215,9 @@ impl Samples {
         (Part { knots, control, free, ends, samples: first..last + 1 }, points)
     }
 
-    /// Fits, lets each sample's parameter go where the curve is nearest to it, and fits again, until all
-    /// is within the tolerance or that is out of reach. `start` are the parameters of all samples.
+    /// Alternates between fitting and moving each sample's parameter to the nearest point of the
+    /// curve, until all errors are within the tolerance or that cannot be reached. `start` contains
+    /// the parameters of all samples.
     fn fit_part(&self, part: Part, start: &[f64], rounds: usize) -> Try {
         let Part { knots, mut control, free, ends, samples } = part;
         let places = &self.places[samples.clone()];
@@ -230,7 +234,7 @@ impl Samples {
             let found = Try { control, at, errors };
             let gained = worst - found.worst();
             worst = found.worst();
-            // At this rate.
+            // The error that the remaining rounds can reach at the present rate.
             let reach = worst - gained.max(0.0) * rounds.saturating_sub(round) as f64;
             if worst <= self.tolerance || reach > self.tolerance || round >= rounds {
                 return found;
@@ -240,7 +244,8 @@ impl Samples {
         unreachable!("the last round returns")
     }
 
-    /// `inner` with another knot in every polynomial that is too far off; `None` if one is too short.
+    /// Adds a knot to every polynomial whose error is too large; `None` if one of them is too
+    /// short.
     fn divided(&self, inner: &[i32], found: &Try, tolerance: f64) -> Option<Vec<i32>> {
         let mut knots = vec![self.ends[0]];
         knots.extend(inner);
@@ -260,13 +265,13 @@ impl Samples {
             divided.push(pair[1]);
         }
         divided.pop();
-        // An error just at a knot may be seen on neither side.
+        // An error exactly at a knot may be attributed to neither side.
         (divided.len() > inner.len()).then_some(divided)
     }
 }
 
-/// Moves each parameter to the nearest place on the curve, by one step, never past the one before; the
-/// first and the last stay, and so do those outside.
+/// Moves each parameter by one step towards the nearest point of the curve, but never past
+/// the one before. The first and the last parameter stay, and so do those outside `ends`.
 fn follow(places: &[Place], at: &mut [f64], bases: &[Basis], control: &[Place], ends: [f64; 2]) {
     let between = 1..at.len() - 1;
     let [mut reached, end] = ends;
@@ -285,8 +290,9 @@ fn follow(places: &[Place], at: &mut [f64], bases: &[Basis], control: &[Place], 
     }
 }
 
-/// How far each sample is from its place on the curve, and the curve before it from the polyline; 0 where
-/// there is no `place`.
+/// The error of each sample: its distance from its point on the curve, or the distance from the
+/// curve to the polyline halfway to the sample before, whichever is larger. It is 0 where there is
+/// no `place`.
 fn errors(places: &[Place], at: &[f64], place: impl Fn(f64) -> Option<Place>) -> Vec<f64> {
     let from = |t, to| place(t).map_or(0.0, |place| distance(place, to));
     let mut errors = vec![0.0];

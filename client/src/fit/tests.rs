@@ -4,13 +4,13 @@ use penup::curve::{FRACTION_BITS, Point};
 use penup::model::{Corner, Model, Position, unkept};
 use penup::protocol::Command;
 
-/// Fits the text of a file.
+/// Fits the polylines of an OBJ text.
 fn fit_text(text: &str, tolerance: f64) -> Result<Fitted, FitError> {
     let file = SourceFile::new("f.obj".to_owned(), text.into()).expect("lines of OBJ");
     fit_obj(&file, tolerance, &mut |_, _| ())
 }
 
-/// In the flattening of a test, 1/256 mm.
+/// The tolerance of flattening in the tests, 1/256 mm.
 const FLATTENING: u16 = 1;
 
 fn trace(count: usize, place: impl Fn(f64) -> Place) -> Vec<Place> {
@@ -80,7 +80,7 @@ fn flattened(obj: &str) -> Vec<Vec<Place>> {
     chains
 }
 
-/// How far the farthest place of `from`, its sides included, is from `to`.
+/// The largest distance of a point of `from`, its sides included, from `to`.
 fn stray(from: &[Place], to: &[Place]) -> f64 {
     let to_side = |place: Place, pair: &[Place]| {
         let (along, away) = (minus(pair[1], pair[0]), minus(place, pair[0]));
@@ -101,7 +101,7 @@ fn stray(from: &[Place], to: &[Place]) -> f64 {
     worst
 }
 
-/// Fits, writes, reads and flattens; returns what was saved.
+/// Fits a plan, writes it, reads it back, flattens it and compares both. Returns what was saved.
 fn checked(polylines: &[Vec<Place>], tolerance: f64) -> Saving {
     let Fitted { obj, saving } = fit_text(&obj_of(polylines), tolerance).unwrap();
     let chains = flattened(&obj);
@@ -224,7 +224,7 @@ fn what_cannot_be_fitted_is_refused() {
     assert_eq!(line("v 0 0 0\nl 0 1\n"), Some(2));
     assert_eq!(line("v 0 0 0\nl 1\n"), Some(2));
     assert_eq!(line("v 0 0 0\nv 1 1 0\nv 2 1 0\nf 1 2 3\n"), Some(4));
-    // It would be lost.
+    // The fitted file would lose the curve.
     assert_eq!(
         line("v 0 0 0\nv 1 1 0\nl 1 2\ndeg 1\ncurv 0 1 1 2\nparm u 0 0 1 1\nend\n"),
         Some(5)
