@@ -1,26 +1,27 @@
-//! GDB's remote protocol, as much of it as reads and writes QEMU's memory.
+//! The part of GDB's remote protocol that reads and writes the memory of QEMU's board.
 //!
-//! A packet is `$`, text, `#` and two hexadecimal digits of its sum; each is answered by `+`.
+//! A packet consists of `$`, the text, `#` and two hexadecimal digits of the checksum. Each packet
+//! is acknowledged with `+`.
 
 use std::io::{self, BufRead, BufReader, Write};
 use std::net::TcpStream;
 
-/// Bytes of memory in a packet; QEMU takes some two thousand.
+/// The number of bytes of memory in a packet; QEMU accepts about two thousand.
 const CHUNK: usize = 1024;
 
-/// A QEMU whose processor stands still, but for [`Debugger::run`].
+/// A debugger connection to QEMU, whose processor is stopped except after [`Debugger::run`].
 #[derive(Debug)]
 pub struct Debugger {
     stream: BufReader<TcpStream>,
 }
 
 impl Debugger {
-    /// At the other end of QEMU's `-gdb`.
+    /// Takes over `stream`, the connection that QEMU's option `-gdb` opened.
     pub fn new(stream: TcpStream) -> Self {
         Self { stream: BufReader::new(stream) }
     }
 
-    /// Writes `bytes` to memory from `address` on.
+    /// Writes `bytes` to memory, starting at `address`.
     pub fn write(&mut self, address: u32, bytes: &[u8]) -> io::Result<()> {
         for (at, chunk) in (address..).step_by(CHUNK).zip(bytes.chunks(CHUNK)) {
             let digits: String = chunk.iter().map(|byte| format!("{byte:02x}")).collect();
@@ -32,7 +33,7 @@ impl Debugger {
         Ok(())
     }
 
-    /// Reads `count` bytes of memory from `address` on.
+    /// Reads `count` bytes of memory, starting at `address`.
     pub fn read(&mut self, address: u32, count: usize) -> io::Result<Vec<u8>> {
         let mut bytes = Vec::with_capacity(count);
         while bytes.len() < count {
@@ -51,12 +52,12 @@ impl Debugger {
         Ok(bytes)
     }
 
-    /// Lets the processor run.
+    /// Starts the processor.
     pub fn run(&mut self) -> io::Result<()> {
         self.tell("c")
     }
 
-    /// Stops it again.
+    /// Stops the processor.
     pub fn stop(&mut self) -> io::Result<()> {
         self.stream.get_mut().write_all(b"\x03")?;
         self.hear().map(drop)
@@ -67,12 +68,12 @@ impl Debugger {
         self.stream.get_mut().write_all(format!("+${text}#{sum:02x}").as_bytes())
     }
 
-    /// The text of the next packet.
+    /// Reads the text of the next packet.
     fn hear(&mut self) -> io::Result<String> {
         self.stream.skip_until(b'$')?;
         let mut text = Vec::new();
         self.stream.read_until(b'#', &mut text)?;
-        // Without it the connection has ended.
+        // A packet without its end means that the connection was closed.
         if text.pop() != Some(b'#') {
             return Err(io::ErrorKind::BrokenPipe.into());
         }

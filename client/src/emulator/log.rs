@@ -1,4 +1,4 @@
-//! The board's log: defmt frames, decoded with the table in the image.
+//! Decodes the board's log, which consists of defmt frames, with the table in the image.
 
 use std::io::Read;
 
@@ -6,12 +6,12 @@ use defmt_decoder::{DecodeError, Table};
 
 use super::EmulatorError;
 
-/// The table of `image`, the bytes of an ELF file; `None` if it logs nothing.
+/// Reads the log table of `image`, the bytes of an ELF file; `None` if the firmware logs nothing.
 pub fn table(image: &[u8]) -> Result<Option<Table>, EmulatorError> {
     Table::parse(image).map_err(|error| EmulatorError::BadImage { reason: format!("{error:#}") })
 }
 
-/// Decodes frames as they come in, until `input` ends.
+/// Decodes the frames from `input` until it ends, and passes each as text to `line`.
 pub fn decode(table: &Table, mut input: impl Read, mut line: impl FnMut(String)) {
     let mut decoder = table.new_stream_decoder();
     let mut buffer = [0; 1024];
@@ -23,7 +23,7 @@ pub fn decode(table: &Table, mut input: impl Read, mut line: impl FnMut(String))
             match decoder.decode() {
                 Ok(frame) => line(frame.display(false).to_string()),
                 Err(DecodeError::UnexpectedEof) => break,
-                // The decoder has skipped the frame.
+                // The decoder has already skipped the frame.
                 Err(DecodeError::Malformed) => line("(a malformed log frame)".to_owned()),
             }
         }

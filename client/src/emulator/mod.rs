@@ -1,17 +1,20 @@
-//! An emulated board: its serial line, its pins as they really moved, its log.
+//! Emulated boards, with access to their serial line, the timed changes of their pins, and their
+//! log.
 //!
-//! [`Emulator::start`] boots an image of the LM3S6965 in QEMU, [`Pico::start`] one of the Raspberry Pi
-//! Pico in rp2040js. [`EmulatedBoard::send`] and [`EmulatedBoard::receive`] are the serial line.
-//! [`EmulatedBoard::pin_changes`] gives every change of every pin, in order, with the time on the
-//! board's own clock; [`Machine`] folds them into steps and moves of the pen. Dropping the emulator
-//! ends its process, and on Linux so does the death of this process, whatever its cause.
+//! [`Emulator::start`] boots an image of the LM3S6965 in QEMU, and [`Pico::start`] boots one of the
+//! Raspberry Pi Pico in rp2040js. [`EmulatedBoard::send`] and [`EmulatedBoard::receive`] access the
+//! serial line. [`EmulatedBoard::pin_changes`] returns every change of every pin in order, with the
+//! time on the board's own clock. [`Machine`] combines these changes into steps and pen moves.
+//! Dropping the emulator ends its process; on Linux so does the death of this process, whatever its
+//! cause.
 //!
-//! Emulated time counts instructions in QEMU, each taking [`Options::nanoseconds_per_instruction`],
-//! and core cycles in rp2040js; while the core sleeps it leaps to the next timer. It has no relation
-//! to the time on the wall, so the instant at which a sent byte arrives is not under control.
+//! Emulated time is derived from the number of instructions in QEMU, each of which takes
+//! [`Options::nanoseconds_per_instruction`], and from the number of core cycles in rp2040js. While
+//! the core sleeps, the time jumps to the next timer event. It is unrelated to real time, so the
+//! emulated instant at which a sent byte arrives cannot be controlled.
 //!
-//! What is refused: an image that does not exist, an emulator that does not start or ends by itself, a
-//! trace that makes no sense. Each error carries what the emulator said.
+//! Errors are an image that does not exist, an emulator that does not start or ends by itself, and
+//! a trace that cannot be parsed. Where the emulator ran, the error contains its last output.
 
 mod debugger;
 mod log;
@@ -35,63 +38,63 @@ pub use stack::Stack;
 use process::Process;
 use trace::{Trace, TraceError};
 
-/// Why an emulated board does not run.
+/// The reason why an emulated board does not run.
 #[derive(Debug, thiserror::Error)]
 pub enum EmulatorError {
-    /// The firmware is not built.
+    /// The firmware image does not exist.
     #[error("there is no firmware image {path}: run `cargo xtask build --board BOARD`")]
     NoImage {
-        /// Where it was looked for.
+        /// The expected path of the image.
         path: PathBuf,
     },
-    /// The image's log table cannot be read.
+    /// The image cannot be parsed: its log table or a symbol is missing or invalid.
     #[error("the image's log table: {reason}")]
     BadImage {
-        /// What the decoder says.
+        /// The reason.
         reason: String,
     },
-    /// The emulator is not there.
+    /// The emulator is not installed.
     #[error("cannot run {program} ({source}): run `cargo xtask set-up`")]
     NotInstalled {
-        /// Its program.
+        /// The name of the program.
         program: &'static str,
-        /// What the system says.
+        /// The operating system's error.
         source: io::Error,
     },
-    /// The emulator is another version than the harness is written for.
+    /// The emulator has a different version than this program needs.
     #[error("there is {program} {found}, and {needed} is needed: run `cargo xtask set-up`")]
     WrongVersion {
-        /// Its name.
+        /// The name of the program.
         program: &'static str,
-        /// The version that is there.
+        /// The installed version.
         found: String,
-        /// The version that is needed.
+        /// The required version.
         needed: String,
     },
-    /// The emulator ended, or does not answer.
+    /// The emulator ended or does not answer.
     #[error("the emulator ended: {said}")]
     Ended {
         /// The last lines that it printed.
         said: String,
     },
-    /// A line of QEMU's trace that is unlike what its version 7.2 prints.
+    /// A line of QEMU's trace does not have the format of version 7.2.
     #[error("the emulator's trace has an unknown line: {line}")]
     BadTrace {
         /// The line.
         line: String,
     },
-    /// The operating system's reason why a socket or a thread cannot be had.
+    /// The operating system could not provide a socket or a thread.
     #[error("cannot connect to the emulator: {0}")]
     Connection(#[from] io::Error),
 }
 
-/// How a board is emulated.
+/// The options of an emulated LM3S6965.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Options {
-    /// The time of each instruction is 2 to this power, in nanoseconds. 4 is 16 ns: the LM3S6965 at
-    /// 50 MHz with four instructions in five cycles.
+    /// Each instruction takes 2 to this power nanoseconds. 4 is 16 ns, which corresponds to the
+    /// LM3S6965 at 50 MHz with four instructions in five cycles.
     pub instruction_shift: u8,
-    /// Whether [`Emulator::stack`] is to be known.
+    /// Whether [`Emulator::stack`] is available, for which the stack is painted before the boot.
     pub paints_stack: bool,
 }
 
@@ -102,18 +105,18 @@ impl Default for Options {
 }
 
 impl Options {
-    /// Emulated nanoseconds that an instruction takes.
+    /// The emulated time of an instruction in nanoseconds.
     pub const fn nanoseconds_per_instruction(self) -> u64 {
         1 << self.instruction_shift
     }
 }
 
-/// The image that `cargo xtask build --board BOARD` leaves.
+/// The path of the image that `cargo xtask build --board BOARD` produces.
 pub fn image_path(board: &str) -> PathBuf {
     crate::workspace::root().join("target/firmware").join(format!("{board}.elf"))
 }
 
-/// A running board.
+/// A running emulated board.
 pub trait EmulatedBoard: std::fmt::Debug {
     /// Sends all of `bytes` to the board's serial line.
     ///
@@ -121,60 +124,61 @@ pub trait EmulatedBoard: std::fmt::Debug {
     /// The emulator has ended.
     fn send(&mut self, bytes: &[u8]) -> io::Result<()>;
 
-    /// Waits up to `patience` for bytes of the board and says how many it put into `buffer`: 0 if
-    /// none came.
+    /// Waits up to `patience` for bytes from the board and writes them to the start of `buffer`.
+    /// Returns how many there are: 0 if none arrived in time.
     ///
     /// # Errors
     /// [`io::ErrorKind::BrokenPipe`] if the emulator has ended.
     fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize>;
 
-    /// The changes of pins since last asked: all that came before the last byte that
-    /// [`EmulatedBoard::receive`] gave, and perhaps some after it.
+    /// Returns the changes of pins since the last call: all that preceded the last byte that
+    /// [`EmulatedBoard::receive`] returned, and perhaps some later ones.
     ///
     /// # Errors
-    /// The emulator has ended, or its trace makes no sense.
+    /// The emulator has ended, or its trace cannot be parsed.
     fn pin_changes(&mut self) -> Result<Vec<PinChange>, EmulatorError>;
 
-    /// The latest instant on the board's clock that is known.
+    /// The latest known time of the board's clock.
     ///
     /// # Errors
     /// As [`EmulatedBoard::pin_changes`].
     fn clock(&mut self) -> Result<Duration, EmulatorError>;
 
-    /// What the board has logged since last asked, a line each: time, level, message.
+    /// The lines that the board has logged since the last call, each with time, level and message.
     fn log_lines(&mut self) -> Vec<String>;
 
-    /// The lines that the emulator itself printed, the last of them.
+    /// The last lines that the emulator itself printed.
     fn said(&self) -> String;
 
-    /// How the emulator ended, if it has ended by itself or was killed.
+    /// The exit status of the emulator, if it has ended by itself or was killed.
     fn how_it_ended(&mut self) -> Option<ExitStatus>;
 }
 
-/// A running LM3S6965. Its clock stands still while the board sleeps without a task.
+/// A running LM3S6965. Its clock stops while the board sleeps without a task.
 #[derive(Debug)]
 pub struct Emulator {
     process: Process,
     line: TcpStream,
-    /// Bytes that [`Emulator::receive`] has given.
+    /// The number of bytes that `receive` has returned.
     received: u64,
 }
 
-/// How long a started QEMU may take to connect, and the trace to catch up with the serial line.
+/// How long QEMU may take to connect after its start, and the trace to catch up with the serial
+/// line.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 impl Emulator {
     /// Boots `image`, an ELF file.
     ///
     /// # Errors
-    /// See [`EmulatorError`]; no process is left then.
+    /// See [`EmulatorError`]. No process is left running after an error.
     pub fn start(image: &Path, options: Options) -> Result<Self, EmulatorError> {
         let (process, line) = Process::start(image, options, PATIENCE)?;
         line.set_nodelay(true)?;
         Ok(Self { process, line, received: 0 })
     }
 
-    /// The deepest stack since the boot; none unless [`Options::paints_stack`].
+    /// The deepest use of the stack since the boot; `None` unless [`Options::paints_stack`] is set.
     ///
     /// # Errors
     /// QEMU has ended.
@@ -182,7 +186,7 @@ impl Emulator {
         self.process.stack()
     }
 
-    /// The process number of QEMU.
+    /// The process id of QEMU.
     pub fn process_id(&self) -> u32 {
         self.process.id()
     }

@@ -1,4 +1,5 @@
-//! A Raspberry Pi Pico in rp2040js, by way of `pico.mjs`, which tells how both talk.
+//! Emulates a Raspberry Pi Pico in rp2040js through the script `pico.mjs`, which describes the
+//! protocol between both.
 
 use std::collections::VecDeque;
 use std::io::{self, BufRead, BufReader, PipeWriter, Read, Write};
@@ -17,7 +18,7 @@ use super::{EmulatedBoard, EmulatorError, Pin, PinChange, log};
 
 const PROGRAM: &str = "node";
 const SCRIPT: &str = include_str!("pico.mjs");
-/// What the script imports: the name there, and the text.
+/// The modules that the script imports: the name in the import, and the text.
 const MODULES: &[(&str, &str)] = &[
     ("./pico/core_cycles.mjs", include_str!("pico/core_cycles.mjs")),
     ("./pico/flash_chip.mjs", include_str!("pico/flash_chip.mjs")),
@@ -29,32 +30,34 @@ const MODULES: &[(&str, &str)] = &[
     ("./pico/worn_flash.mjs", include_str!("pico/worn_flash.mjs")),
     ("./pico/xip_cache.mjs", include_str!("pico/xip_cache.mjs")),
 ];
-/// Where `cargo xtask set-up` puts it, from the workspace's root.
+/// The directory in which `cargo xtask set-up` installs rp2040js, relative to the workspace's root.
 const RP2040JS: &str = "target/rp2040js/node_modules/rp2040js";
-/// A cycle of the core, at 125 MHz.
+/// The length of a core cycle in nanoseconds, at 125 MHz.
 const CYCLE_NANOS: u64 = 8;
-/// Turns of a contact that bounces.
+/// The number of level changes of a bouncing contact.
 const BOUNCES: u64 = 16;
-/// How far the emulator's clock may be ahead of what it has told: 20 ms.
+/// The number of cycles by which the emulator's clock may be ahead of the last record received: 20
+/// ms.
 const CYCLES_AHEAD: u64 = 2_500_000;
-/// Lines of the emulator itself that are kept.
+/// The number of the emulator's own lines that are kept.
 const SAID_LINES: usize = 20;
 
-/// A running Pico. Dropping it ends its process.
+/// A running Pico. Dropping this ends the emulator's process.
 pub struct Pico {
     running: Running,
     input: ChildStdin,
     shared: Arc<Shared<State>>,
-    /// Bytes of the stack.
+    /// The size of the stack in bytes.
     stack: usize,
 }
 
-/// What a UART finds wrong with a byte, as the bits above it in the data register of a PL011.
+/// The errors that a UART can detect in a byte, as the bits above the byte in the data register of
+/// a PL011.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum UartError {
-    /// Its stop bit is missing.
+    /// The stop bit is missing.
     Framing = 1 << 8,
-    /// Its parity is wrong.
+    /// The parity is wrong.
     Parity = 1 << 9,
     /// The line stays low for longer than a byte.
     Break = 1 << 8 | 1 << 10,
@@ -69,11 +72,11 @@ struct State {
     timed: Vec<(u8, u64)>,
     pins: Vec<PinChange>,
     cycles: u64,
-    /// Bytes of the stack that are not used, as last asked.
+    /// The number of unused bytes of the stack, the answer to the last query.
     unused_stack: Option<u64>,
-    /// The boot ROM waits for an image.
+    /// Whether the boot ROM shows its drive and waits for an image.
     shows_drive: bool,
-    /// As the USB host has read it.
+    /// The serial number that the USB host has read.
     usb_serial_number: String,
     log: Vec<String>,
     said: VecDeque<String>,
@@ -87,10 +90,11 @@ impl fmt::Debug for Pico {
 }
 
 impl Pico {
-    /// Boots `image`, an ELF file; what runs is the UF2 file beside it.
+    /// Boots the UF2 file beside `image`. The ELF file `image` itself provides the log table and
+    /// the addresses.
     ///
     /// # Errors
-    /// See [`EmulatorError`]; no process is left then.
+    /// See [`EmulatorError`]. No process is left running after an error.
     pub fn start(image: &Path) -> Result<Self, EmulatorError> {
         let flashed = image.with_extension("uf2");
         let elf = fs::read(image).map_err(|_| EmulatorError::NoImage { path: image.into() })?;
@@ -111,7 +115,8 @@ impl Pico {
 
         let (sender, started) = mpsc::channel();
         let told = Arc::clone(&shared);
-        // Linux ends the process with the thread that started it, so that is the one that outlives it.
+        // Linux ends the process together with the thread that started it, so that thread must
+        // outlive the process.
         let reader = thread::spawn(move || spawn_and_read(command, &sender, &told, log_writer));
         let (child, input, stderr) = match started.recv() {
             Ok(Ok(spawned)) => spawned,
@@ -128,7 +133,7 @@ impl Pico {
         Ok(pico)
     }
 
-    /// Drives an input of the chip from now on.
+    /// Sets the level of input pin `number` of the chip.
     ///
     /// # Errors
     /// The emulator has ended.
@@ -136,12 +141,13 @@ impl Pico {
         self.tell(PIN, number | u8::from(high) << 7, 0)
     }
 
-    /// The same, with the level changing to and fro in between.
+    /// Sets the level of an input pin as [`Pico::drive`] does, but lets it bounce for `time` first.
     ///
     /// # Errors
     /// The emulator has ended.
     pub fn bounce(&mut self, number: u8, high: bool, time: Duration) -> io::Result<()> {
-        // After all that has been told so far, the emulator's clock being ahead of this.
+        // The bouncing starts after everything that was received so far, because the emulator's
+        // clock is ahead of it.
         let start = self.shared.lock().cycles + CYCLES_AHEAD;
         let cycles = time.as_nanos() as u64 / CYCLE_NANOS;
         for turn in 0..BOUNCES {
@@ -151,8 +157,8 @@ impl Pico {
         self.tell(PIN, number | u8::from(high) << 7, start + cycles)
     }
 
-    /// Fits a limit switch to pin 8 (x) or 9 (y): it closes where the axis, which began at 0 when the emulator
-    /// started, has come to `place`, in steps, or lies below. It bounces for 5 ms.
+    /// Attaches a limit switch to pin 8 (x) or 9 (y). It is closed while the axis is at `place` or
+    /// below, in steps from its position when the emulator started. It bounces for 5 ms.
     ///
     /// # Errors
     /// The emulator has ended.
@@ -160,7 +166,7 @@ impl Pico {
         self.tell(SWITCH, number, (SWITCH_ZERO + i64::from(place)) as u64)
     }
 
-    /// Takes the power away and gives it back: what flash holds is left.
+    /// Cuts the power and restores it. The contents of the flash are preserved.
     ///
     /// # Errors
     /// The emulator has ended.
@@ -168,7 +174,7 @@ impl Pico {
         self.tell(CUT_POWER, 0, 0)
     }
 
-    /// The same, so much later.
+    /// Cuts the power as [`Pico::cut_power`] does, after `time` has passed.
     ///
     /// # Errors
     /// The emulator has ended.
@@ -178,7 +184,8 @@ impl Pico {
         self.tell(CUT_POWER, 0, cycle)
     }
 
-    /// The same, when so many more bytes of flash have been erased or written.
+    /// Cuts the power as [`Pico::cut_power`] does, when `bytes` more bytes of flash have been
+    /// erased or written.
     ///
     /// # Errors
     /// The emulator has ended.
@@ -186,11 +193,13 @@ impl Pico {
         self.tell(CUT_FLASH, 0, bytes)
     }
 
-    /// Counts the cycles of each call of a function of `image` from now on, interrupts counted in: the first function whose
-    /// mangled name contains `name`. What [`Pico::take_timed`] gives bears `number`.
+    /// From now on, measures the cycles of each call of a function of `image`, including
+    /// interrupts: the first function whose mangled name contains `name`. [`Pico::take_timed`]
+    /// returns the results together with `number`.
     ///
     /// # Errors
-    /// [`EmulatorError::BadImage`] if there is none, or the emulator has ended.
+    /// [`EmulatorError::BadImage`] if there is no such function, or another error if the emulator
+    /// has ended.
     pub fn time_function(
         &mut self,
         image: &Path,
@@ -201,12 +210,13 @@ impl Pico {
         Ok(self.tell(TIMED, number, address)?)
     }
 
-    /// Each call of a function that is timed and has returned since last asked: its number, its cycles.
+    /// Returns the calls of measured functions that have returned since the last call: the
+    /// function's number and its cycles.
     pub fn take_timed(&mut self) -> Vec<(u8, u64)> {
         std::mem::take(&mut self.shared.lock().timed)
     }
 
-    /// Pulls the pin RUN low for a moment: the chip is reset, the power stays.
+    /// Pulls the pin RUN low for a moment, which resets the chip while the power stays on.
     ///
     /// # Errors
     /// The emulator has ended.
@@ -214,7 +224,7 @@ impl Pico {
         self.tell(RUN_PIN, 0, 0)
     }
 
-    /// Plugs the board in with BOOTSEL held, and copies the image onto the drive that it shows. The
+    /// Connects the board with BOOTSEL held and copies the image onto the drive that it shows. The
     /// boot ROM then restarts the board by the watchdog.
     ///
     /// # Errors
@@ -223,8 +233,8 @@ impl Pico {
         self.tell(UF2, 0, 0)
     }
 
-    /// Wears a byte of flash out, by its place from the beginning of the flash: the bits of `mask`
-    /// stay high, or low, from the next change on.
+    /// Makes bits of a byte of flash defective. From its next change on, the bits in `mask` of the
+    /// byte at offset `place` stay high or low.
     ///
     /// # Errors
     /// The emulator has ended.
@@ -232,7 +242,8 @@ impl Pico {
         self.tell(if high { STAYS_HIGH } else { STAYS_LOW }, mask, u64::from(place))
     }
 
-    /// Lets the firmware's main loop go on at another address, with its stack as it is or used up.
+    /// Makes the firmware's main loop continue at another address, with its stack as it is or
+    /// exhausted.
     ///
     /// # Errors
     /// The emulator has ended.
@@ -240,7 +251,8 @@ impl Pico {
         self.tell(JUMP, u8::from(uses_stack_up), u64::from(address))
     }
 
-    /// Lets it go on at the function of `image` that has this name.
+    /// Makes the main loop continue, as [`Pico::jump_to`] does, at the function of `image` that has
+    /// exactly this name.
     ///
     /// # Errors
     /// As [`Pico::time_function`].
@@ -254,12 +266,12 @@ impl Pico {
         Ok(self.jump_to(address as u32, uses_stack_up)?)
     }
 
-    /// Whether the board shows the drive of its boot ROM now.
+    /// Whether the board currently shows the drive of its boot ROM.
     pub fn shows_drive(&self) -> bool {
         self.shared.lock().shows_drive
     }
 
-    /// Lets the firmware's main loop hang.
+    /// Makes the firmware's main loop hang.
     ///
     /// # Errors
     /// The emulator has ended.
@@ -267,8 +279,9 @@ impl Pico {
         self.tell(HANG, 0, 0)
     }
 
-    /// Lets the firmware's main loop stand still for so many hundredths of a second, its interrupts going on, where x, which
-    /// began at 0 when the emulator started, has come to `place`, in steps. Further places follow in the order of the way.
+    /// Stalls the firmware's main loop for `hundredths` of a second, while interrupts continue,
+    /// when x reaches `place`, in steps from its position when the emulator started. Several
+    /// positions are used in the order in which they are given.
     ///
     /// # Errors
     /// The emulator has ended.
@@ -276,8 +289,7 @@ impl Pico {
         self.tell(STALL, hundredths, u64::from(place))
     }
 
-    /// Lets the clock's handler be pre-empted for so many milliseconds just before it sets its next
-    /// alarm.
+    /// Pre-empts the clock's interrupt handler for this time just before it sets its next alarm.
     ///
     /// # Errors
     /// The emulator has ended.
@@ -285,7 +297,7 @@ impl Pico {
         self.tell(DELAY_ALARM, milliseconds, 0)
     }
 
-    /// Plugs a USB host in, which finds the device.
+    /// Connects a USB host, which enumerates the device.
     ///
     /// # Errors
     /// The emulator has ended.
@@ -293,7 +305,7 @@ impl Pico {
         self.tell(USB_HOST, 1, 0)
     }
 
-    /// Lets the USB host take what the board sends, or not.
+    /// Sets whether the USB host accepts the data that the board sends.
     ///
     /// # Errors
     /// The emulator has ended.
@@ -301,7 +313,7 @@ impl Pico {
         self.tell(USB_HOST, if takes { 3 } else { 2 }, 0)
     }
 
-    /// Plugs it in where the bus is never idle: other devices at the same hub are busy.
+    /// Connects a USB host whose bus is never idle, because other devices at the same hub are busy.
     ///
     /// # Errors
     /// The emulator has ended.
@@ -309,7 +321,7 @@ impl Pico {
         self.tell(USB_HOST, 7, 0)
     }
 
-    /// Plugs the cable into a USB host without power, which pulls both wires low.
+    /// Connects a USB host without power, which pulls both wires low.
     ///
     /// # Errors
     /// The emulator has ended.
@@ -317,7 +329,7 @@ impl Pico {
         self.tell(USB_HOST, 8, 0)
     }
 
-    /// Lets the USB host suspend the bus, as a computer does that goes to sleep, or resume it.
+    /// Makes the USB host suspend the bus, as a computer that goes to sleep does, or resume it.
     ///
     /// # Errors
     /// The emulator has ended.
@@ -325,8 +337,8 @@ impl Pico {
         self.tell(USB_HOST, if suspends { 4 } else { 5 }, 0)
     }
 
-    /// Lets a program on the USB host open the port or close it (DTR), at a rate in baud. The host
-    /// opens it at 115200 baud when it has found the device.
+    /// Makes a program on the USB host open or close the port (DTR) at `rate` baud. The host opens
+    /// it at 115200 baud after it has enumerated the device.
     ///
     /// # Errors
     /// The emulator has ended.
@@ -334,12 +346,12 @@ impl Pico {
         self.tell(USB_LINE, u8::from(opens), u64::from(rate))
     }
 
-    /// The serial number that the USB host has read from the device; empty before.
+    /// The serial number that the USB host has read from the device; empty before that.
     pub fn usb_serial_number(&self) -> String {
         self.shared.lock().usb_serial_number.clone()
     }
 
-    /// [`EmulatedBoard::send`] by USB.
+    /// Does the same as [`EmulatedBoard::send`], over USB.
     ///
     /// # Errors
     /// The emulator has ended.
@@ -347,7 +359,7 @@ impl Pico {
         self.send_to(USB, bytes)
     }
 
-    /// [`EmulatedBoard::receive`] by USB.
+    /// Does the same as [`EmulatedBoard::receive`], over USB.
     ///
     /// # Errors
     /// [`io::ErrorKind::BrokenPipe`] if the emulator has ended.
@@ -355,7 +367,7 @@ impl Pico {
         self.receive_from(|state| &mut state.usb, buffer, patience)
     }
 
-    /// A byte arrives by the serial line in which the UART finds `error`.
+    /// Sends a byte over the serial line in which the UART detects `error`.
     ///
     /// # Errors
     /// The emulator has ended.
@@ -363,8 +375,8 @@ impl Pico {
         self.tell(SERIAL, byte, error as u64)
     }
 
-    /// Lets each sector of flash that is erased from now on take so long: 45 ms typically, which it
-    /// is at first, and 400 ms at most.
+    /// Sets the time that erasing a sector of flash takes from now on. It is 45 ms at first, the
+    /// typical value; the maximum is 400 ms.
     ///
     /// # Errors
     /// The emulator has ended.
@@ -398,7 +410,7 @@ impl Pico {
         self.input.flush()
     }
 
-    /// Waits for the first sign of life.
+    /// Waits until the emulator's clock runs.
     fn wait_for_boot(&mut self) -> Result<(), EmulatorError> {
         let waits = |state: &mut State| state.cycles == 0 && !state.ended;
         if self.shared.wait_while(super::PATIENCE, waits).cycles > 0 {
@@ -409,7 +421,7 @@ impl Pico {
         Err(EmulatorError::Ended { said: self.said() })
     }
 
-    /// The deepest stack since the board last started.
+    /// The deepest use of the stack since the board last started.
     ///
     /// # Errors
     /// The emulator has ended.
@@ -423,7 +435,7 @@ impl Pico {
     }
 }
 
-/// The same board, its line being USB.
+/// A Pico whose serial line as an [`EmulatedBoard`] is the USB port.
 #[derive(Debug)]
 pub struct PicoByUsb(pub Pico);
 
@@ -487,7 +499,8 @@ impl EmulatedBoard for Pico {
     }
 }
 
-/// The address of the first function of `image` that has such a name.
+/// The address of the first function of `image` whose name satisfies `is_wanted`. `name` is for the
+/// error message.
 fn function(
     image: &Path,
     is_wanted: impl Fn(&str) -> bool,
@@ -505,8 +518,7 @@ fn at(cycle: u64) -> Duration {
     Duration::from_nanos(cycle * CYCLE_NANOS)
 }
 
-/// The script with its modules in it: each import by its name becomes one by a `data:` address (RFC
-/// 2397).
+/// Embeds the modules in the script: each import by name becomes one by a `data:` URL (RFC 2397).
 fn script() -> String {
     let mut script = SCRIPT.to_owned();
     for (name, text) in MODULES {
@@ -522,7 +534,7 @@ fn script() -> String {
     script
 }
 
-/// Whether rp2040js is there, in the version that the harness is written for.
+/// Checks that rp2040js is installed in the version that this program needs.
 fn check_version(root: &Path) -> Result<(), EmulatorError> {
     const PROGRAM: &str = "rp2040js";
     let read = |text: &str, pointer: &str| {
@@ -541,19 +553,20 @@ fn check_version(root: &Path) -> Result<(), EmulatorError> {
     }
 }
 
-/// The command line of the emulator.
+/// Creates the command line of the emulator.
 fn command(image: &Path, log_address: u64) -> Command {
     let mut command = quitting_with_parent(PROGRAM);
     command.args(["--input-type=module", "--eval", &script(), "--"]);
     command.arg(crate::workspace::root().join(RP2040JS)).arg(image).arg(log_address.to_string());
     command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
-    // Ctrl-C at the terminal is for this process, which ends the emulator when it is done with it.
+    // The emulator gets its own process group, so that Ctrl-C at the terminal reaches only this
+    // process, which ends the emulator when it is done with it.
     #[cfg(unix)]
     std::os::unix::process::CommandExt::process_group(&mut command, 0);
     command
 }
 
-/// Where the image keeps its log; 0 if it has none.
+/// The address of the log buffer in the image; 0 if there is none.
 fn log_address(elf: &[u8]) -> Result<u64, EmulatorError> {
     let elf = object::File::parse(elf)
         .map_err(|error| EmulatorError::BadImage { reason: error.to_string() })?;
@@ -588,7 +601,7 @@ fn spawn(command: &mut Command) -> io::Result<(Child, ChildStdin, ChildStdout, C
     }
 }
 
-/// Keeps the last lines of what the emulator says.
+/// Keeps the last lines that the emulator prints.
 fn listen(stderr: ChildStderr, shared: &Shared<State>) {
     for line in BufReader::new(stderr).lines().map_while(Result::ok) {
         if line.starts_with("idle") {
@@ -602,7 +615,7 @@ fn listen(stderr: ChildStderr, shared: &Shared<State>) {
     }
 }
 
-/// What the emulator tells or is told.
+/// A message from or to the emulator. The meaning of `value` and `cycle` depends on `what`.
 struct Record {
     what: u8,
     value: u8,
@@ -635,7 +648,7 @@ const JUMP: u8 = 36;
 const USB_LINE: u8 = 37;
 const BOOTSEL: u8 = 32;
 const USB_SERIAL: u8 = 33;
-/// Where the emulator's axes begin.
+/// The emulator's number for the starting position of an axis.
 const SWITCH_ZERO: i64 = 1 << 40;
 
 impl Record {
@@ -650,7 +663,7 @@ impl Record {
     }
 }
 
-/// Takes in what the emulator tells until it ends.
+/// Reads the emulator's messages until it ends.
 fn read(mut stdout: ChildStdout, shared: &Shared<State>, mut log: PipeWriter) {
     let mut buffer = vec![0; 1 << 16];
     let mut filled = 0;
@@ -683,7 +696,7 @@ fn read(mut stdout: ChildStdout, shared: &Shared<State>, mut log: PipeWriter) {
         }
         drop(state);
         shared.tell();
-        // The log's reader ends with this writer, not before.
+        // The write cannot fail: the reader of the log ends only when this writer is dropped.
         let _ = log.write_all(&logged);
         if count == 0 {
             return;
@@ -693,7 +706,7 @@ fn read(mut stdout: ChildStdout, shared: &Shared<State>, mut log: PipeWriter) {
     }
 }
 
-/// Reads the pen's place off the width of the servo's pulses.
+/// Derives from the width of the servo's pulses whether the pen is down.
 #[derive(Default)]
 struct Servo {
     rose_at: u64,
@@ -702,10 +715,10 @@ struct Servo {
 
 impl Servo {
     const PIN: u8 = 7;
-    /// The pulse at half height: 1.5 ms.
+    /// The length in cycles of the pulse at half of the pen's height, about 1.5 ms.
     const HALF: u64 = 1_508_000 / CYCLE_NANOS;
 
-    /// What a pin's new level means. The pen changes as its pulse ends.
+    /// Translates a new level of a pin. The state of the pen changes at the end of a pulse.
     fn pin_change(&mut self, record: &Record) -> Option<PinChange> {
         let (number, high) = (record.value & 0x7F, record.value >= 0x80);
         let at = at(record.cycle);

@@ -1,31 +1,31 @@
-//! The board's pins, and what their changes mean for the machine.
+//! The output pins of a board, and how their changes translate into actions of the machine.
 
 use penup::boards::host::{Change, Stamped};
 use std::time::Duration;
 
-/// A pin of the plotter.
+/// An output pin of the plotter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Pin {
     /// A rising edge steps x.
     StepX,
-    /// High: x counts up.
+    /// The direction of x: high means that x increases.
     DirX,
     /// A rising edge steps y.
     StepY,
-    /// High: y counts up.
+    /// The direction of y: high means that y increases.
     DirY,
-    /// Low: the motors have current.
+    /// The enable pin of the motor drivers: low means that the motors have current.
     Enable,
     /// High: the pen is down.
     Pen,
     /// A rising edge steps the motor that lifts the pen.
     StepZ,
-    /// High: it lowers the pen.
+    /// The direction of that motor: high lowers the pen.
     DirZ,
 }
 
 impl Pin {
-    /// The pin with this number on the board's port.
+    /// Returns the pin with this number on the GPIO port of the LM3S6965.
     pub(super) fn of_port(number: u32) -> Option<Self> {
         Some(match number {
             0 => Self::StepX,
@@ -41,35 +41,35 @@ impl Pin {
     }
 }
 
-/// A pin took another level.
+/// A change of a pin's level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PinChange {
-    /// Which.
+    /// The pin.
     pub pin: Pin,
-    /// To which level.
+    /// The new level.
     pub high: bool,
-    /// When, on the board's clock: its last reading before the change. The step interrupt reads it
-    /// as it begins, so all changes of one interrupt have one time, exact to a cycle of 20 ns, and
-    /// the pins follow it by the same few instructions each time.
+    /// The time on the board's clock: its last reading before the change. The step interrupt reads
+    /// the clock when it begins, so all changes of one interrupt have the same time, exact to a
+    /// cycle of 20 ns, and the pins follow it by the same few instructions each time.
     pub at: Duration,
 }
 
 impl PinChange {
-    /// Whether it is a rising edge that steps.
+    /// Whether this is a rising edge that makes x or y step.
     pub fn is_step(self) -> bool {
         self.high && matches!(self.pin, Pin::StepX | Pin::StepY)
     }
 }
 
 impl From<&Stamped> for PinChange {
-    /// What a pin of the board of plain memory did; its ticks are 40 ns long.
+    /// Converts a change of the board in memory, whose ticks are 40 ns long.
     fn from(Stamped { time, change }: &Stamped) -> Self {
         let (pin, high) = match *change {
             Change::StepX(high) => (Pin::StepX, high),
             Change::StepY(high) => (Pin::StepY, high),
             Change::UpX(high) => (Pin::DirX, high),
             Change::UpY(high) => (Pin::DirY, high),
-            // Drivers are on while the pin is low.
+            // The drivers are on while the pin is low.
             Change::Enable(on) => (Pin::Enable, !on),
             Change::Pen(height) => (Pin::Pen, height >= 64),
             Change::StepZ(high) => (Pin::StepZ, high),
@@ -79,46 +79,46 @@ impl From<&Stamped> for PinChange {
     }
 }
 
-/// Something that the machine did.
+/// An action of the machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MachineEvent {
-    /// What.
+    /// The kind of action.
     pub kind: MachineEventKind,
-    /// When, as in [`PinChange::at`].
+    /// The time, as in [`PinChange::at`].
     pub at: Duration,
 }
 
-/// What a machine does, by its pins.
+/// The kinds of actions that the pins show.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MachineEventKind {
-    /// A single step on one axis or both at once, each -1, 0 or 1.
+    /// A single step of one axis or of both at once. Each component is -1, 0 or 1.
     Step {
-        /// To the right.
+        /// The step in x, positive to the right.
         x: i8,
-        /// Up.
+        /// The step in y, positive upwards.
         y: i8,
     },
     /// The pen was lowered or raised.
     Pen {
-        /// Lowered.
+        /// Whether it was lowered.
         down: bool,
     },
     /// A step of the motor that lifts the pen.
     Lift {
-        /// Towards the paper.
+        /// Whether the step moves the pen towards the paper.
         down: bool,
     },
     /// The motors' current was turned on or off.
     Drivers {
-        /// On.
+        /// Whether the current was turned on.
         on: bool,
     },
 }
 
-/// Folds changes of pins into what the machine did.
+/// Converts changes of pins into actions of the machine.
 ///
-/// Both axes' steps at one instant are one event, so an event is out when the next one begins:
-/// [`Machine::change`] gives the event before, [`Machine::last`] the last.
+/// Simultaneous steps of both axes are one event, so an event is complete only when the next one
+/// begins. [`Machine::change`] returns the event before, and [`Machine::last`] the last one.
 ///
 /// ```
 /// use penup_client::emulator::{Machine, MachineEventKind::Step, Pin, PinChange};
@@ -140,12 +140,12 @@ pub struct Machine {
     down_z: bool,
     pen_down: bool,
     position: (i32, i32),
-    /// The last event, which may still gain the step of the other axis.
+    /// The last event, which may still be combined with a step of the other axis.
     waiting: Option<MachineEvent>,
 }
 
 impl Machine {
-    /// Takes the next change; gives the event before the one that it belongs to.
+    /// Processes the next change. If it starts a new event, returns the event before it.
     pub fn change(&mut self, change: PinChange) -> Option<MachineEvent> {
         let PinChange { pin, high, at } = change;
         let kind = match pin {
@@ -166,7 +166,7 @@ impl Machine {
             Pin::StepX => self.step(direction(self.up_x), 0),
             Pin::StepY => self.step(0, direction(self.up_y)),
             Pin::Enable => MachineEventKind::Drivers { on: !high },
-            // Another height on the same side of the middle.
+            // The pen has a new height on the same side of the middle.
             Pin::Pen if high == self.pen_down => return None,
             Pin::Pen => {
                 self.pen_down = high;
@@ -189,12 +189,12 @@ impl Machine {
         MachineEventKind::Step { x, y }
     }
 
-    /// The last event, when no more changes come.
+    /// Returns the last event, once there are no more changes.
     pub fn last(&mut self) -> Option<MachineEvent> {
         self.waiting.take()
     }
 
-    /// The sum of all steps, x and y.
+    /// The position: the sums of all steps in x and in y.
     pub fn position(&self) -> (i32, i32) {
         self.position
     }
@@ -209,7 +209,7 @@ fn direction(up: bool) -> i8 {
     if up { 1 } else { -1 }
 }
 
-/// The diagonal step of two steps on different axes.
+/// Combines two steps of different axes into a diagonal step; `None` for any other pair.
 fn joined(first: MachineEventKind, second: MachineEventKind) -> Option<MachineEventKind> {
     let (MachineEventKind::Step { x: x1, y: y1 }, MachineEventKind::Step { x: x2, y: y2 }) =
         (first, second)
@@ -225,7 +225,7 @@ mod tests {
     use super::*;
     use MachineEventKind::{Drivers, Pen, Step};
 
-    /// The events of changes, each at a number of microseconds.
+    /// The events of a list of changes, with all times in microseconds.
     fn folded(changes: &[(u64, Pin, bool)]) -> Vec<(u64, MachineEventKind)> {
         let mut machine = Machine::default();
         let mut events: Vec<_> = changes

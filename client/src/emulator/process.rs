@@ -1,4 +1,4 @@
-//! The QEMU process, and the threads that read what it prints.
+//! Runs the QEMU process and the threads that read its output.
 
 use std::io::{self, BufRead, BufReader, Read};
 use std::net::{TcpListener, TcpStream};
@@ -14,11 +14,11 @@ use super::stack::{self, Stack};
 use super::trace::{EVENTS, Trace, TraceError};
 use super::{EmulatorError, Options, log};
 
-/// A running QEMU. Dropping it ends it.
+/// A running QEMU, which ends when this is dropped.
 pub struct Process {
     running: Running,
     shared: Arc<Shared<State>>,
-    /// With the size of the stack, if that is painted.
+    /// The debugger connection and the size of the stack in bytes, if the stack is painted.
     debugger: Option<(Debugger, usize)>,
 }
 
@@ -37,7 +37,7 @@ impl std::fmt::Debug for Process {
 }
 
 impl Process {
-    /// Boots `image`; gives the process and the board's serial line.
+    /// Boots `image`. Returns the process and the connection to the board's serial line.
     pub fn start(
         image: &Path,
         options: Options,
@@ -52,7 +52,8 @@ impl Process {
         let (sender, started) = mpsc::channel();
         let command = command(image, options, port);
         let traced = Arc::clone(&shared);
-        // Linux ends QEMU with the thread that started it, so that is the one that outlives it.
+        // Linux ends QEMU together with the thread that started it, so that thread must outlive
+        // QEMU.
         let tracer = thread::spawn(move || spawn_and_trace(command, &sender, &traced));
         let (child, stdout) = match started.recv() {
             Ok(Ok(spawned)) => spawned,
@@ -63,7 +64,7 @@ impl Process {
         let logger = thread::spawn(move || read_log(table.as_ref(), stdout, &logged));
         let running = Running::new(child, vec![tracer, logger]);
         let mut process = Self { running, shared, debugger: None };
-        // In the order in which QEMU is told of them.
+        // The connections arrive in the order in which the command line names them.
         let line = process.connect(&listener, patience)?;
         if options.paints_stack {
             let mut debugger = Debugger::new(process.connect(&listener, patience)?);
@@ -75,7 +76,8 @@ impl Process {
         Ok((process, line))
     }
 
-    /// The deepest stack since the boot; none if it was not painted. The board stands while it is looked at.
+    /// The deepest use of the stack since the boot; `None` if the stack was not painted. The board
+    /// is stopped while its memory is read.
     pub fn stack(&mut self) -> Result<Option<Stack>, EmulatorError> {
         let Some((debugger, size)) = &mut self.debugger else { return Ok(None) };
         debugger.stop()?;
@@ -84,7 +86,7 @@ impl Process {
         Ok(Some(Stack::of(&bytes)))
     }
 
-    /// Waits for QEMU to open a line.
+    /// Waits until QEMU opens a connection.
     fn connect(
         &mut self,
         listener: &TcpListener,
@@ -109,7 +111,7 @@ impl Process {
         }
     }
 
-    /// Waits until `ready`, then does `work` on the trace.
+    /// Waits up to `patience` until `ready` is true of the trace, then runs `work` on it.
     pub fn with_trace<T>(
         &self,
         patience: Duration,
@@ -152,8 +154,8 @@ fn not_installed(source: io::Error) -> EmulatorError {
     EmulatorError::NotInstalled { program: PROGRAM, source }
 }
 
-/// QEMU's command line: serial line to `port`, log to its standard output, trace to its standard
-/// error.
+/// Creates QEMU's command line: the serial line is connected to `port`, the log goes to the
+/// standard output and the trace to the standard error.
 fn command(image: &Path, options: Options, port: u16) -> Command {
     let mut command = quitting_with_parent(PROGRAM);
     command
@@ -170,7 +172,7 @@ fn command(image: &Path, options: Options, port: u16) -> Command {
     }
     command.arg("-kernel").arg(image);
     if options.paints_stack {
-        // It stands until the debugger lets it run.
+        // The processor is stopped until the debugger starts it.
         command
             .arg("-S")
             .arg("-chardev")
@@ -178,13 +180,14 @@ fn command(image: &Path, options: Options, port: u16) -> Command {
             .args(["-gdb", "chardev:gdb"]);
     }
     command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
-    // Ctrl-C at the terminal is for this process, which ends QEMU when it is done with it.
+    // QEMU gets its own process group, so that Ctrl-C at the terminal reaches only this process,
+    // which ends QEMU when it is done with it.
     #[cfg(unix)]
     std::os::unix::process::CommandExt::process_group(&mut command, 0);
     command
 }
 
-/// On Linux, a command that the kernel ends with the thread that started it.
+/// Creates a command that on Linux the kernel kills when the thread that started it ends.
 pub(super) fn quitting_with_parent(program: &str) -> Command {
     const SETPRIV: &str = "/usr/bin/setpriv";
     if cfg!(target_os = "linux") && Path::new(SETPRIV).exists() {
@@ -195,7 +198,7 @@ pub(super) fn quitting_with_parent(program: &str) -> Command {
     Command::new(program)
 }
 
-/// What setpriv, as a shell, exits with when there is no such program.
+/// The exit code of setpriv, as of a shell, if there is no such program.
 pub(super) const NOT_FOUND: i32 = 127;
 
 type Spawned = io::Result<(Child, ChildStdout)>;
@@ -220,13 +223,13 @@ fn spawn(command: &mut Command) -> io::Result<(Child, ChildStdout, ChildStderr)>
     }
 }
 
-/// Takes the trace in until QEMU ends.
+/// Reads the trace until QEMU ends.
 fn read_trace(stderr: ChildStderr, shared: &Shared<State>) {
     let mut lines = BufReader::with_capacity(1 << 16, stderr);
     let mut line = String::new();
     loop {
         line.clear();
-        // A line that is no UTF-8 ends the trace as the end of QEMU does.
+        // A line that is not UTF-8 ends the trace, as the end of QEMU does.
         let count = lines.read_line(&mut line).unwrap_or(0);
         let mut state = shared.lock();
         if count == 0 {
@@ -235,7 +238,8 @@ fn read_trace(stderr: ChildStderr, shared: &Shared<State>) {
             state.error.get_or_insert(error);
         }
         drop(state);
-        // Waking at every line would cost more than reading it; the last one read wakes.
+        // Waiting threads are woken only when no further complete line is buffered, because waking
+        // them at every line would cost more than reading it.
         if count == 0 || !lines.buffer().contains(&b'\n') {
             shared.tell();
         }
@@ -245,7 +249,8 @@ fn read_trace(stderr: ChildStderr, shared: &Shared<State>) {
     }
 }
 
-/// Takes the log in until QEMU ends. Without a table it is only read away, lest QEMU waits.
+/// Reads the log until QEMU ends. Without a table the log is read and discarded, because QEMU would
+/// block otherwise.
 fn read_log(table: Option<&defmt_decoder::Table>, mut stdout: ChildStdout, shared: &Shared<State>) {
     match table {
         Some(table) => log::decode(table, stdout, |line| shared.lock().log.push(line)),

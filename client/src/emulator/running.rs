@@ -1,4 +1,4 @@
-//! A process that runs, and what the threads that read from it tell.
+//! A running child process, and the state that its reader threads share with it.
 
 use std::process::{Child, ExitStatus};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -9,7 +9,8 @@ use std::{fmt, io};
 use super::EmulatorError;
 use super::process::NOT_FOUND;
 
-/// What reading threads tell, whole records or lines at a time.
+/// State that reader threads update with whole records or lines, and that other threads can wait
+/// for.
 #[derive(Default)]
 pub struct Shared<S> {
     state: Mutex<S>,
@@ -17,12 +18,13 @@ pub struct Shared<S> {
 }
 
 impl<S> Shared<S> {
-    /// A reader that panicked has left nothing half done.
+    /// Locks the state. A poisoned lock is accepted, because a reader that panicked leaves no
+    /// partial update.
     pub fn lock(&self) -> MutexGuard<'_, S> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Waits while `waits`, up to `patience`.
+    /// Waits while `waits` returns true, but at most for `patience`, and returns the locked state.
     pub fn wait_while(
         &self,
         patience: Duration,
@@ -32,33 +34,33 @@ impl<S> Shared<S> {
         waited.unwrap_or_else(PoisonError::into_inner).0
     }
 
-    /// Wakes who waits.
+    /// Wakes all waiting threads.
     pub fn tell(&self) {
         self.changed.notify_all();
     }
 }
 
-/// A process and the threads that read what it prints. Dropping it ends them.
+/// A process and the threads that read its output. Dropping this ends the process.
 pub struct Running {
     child: Child,
     readers: Vec<JoinHandle<()>>,
 }
 
 impl Running {
-    /// The threads end when the process does.
+    /// Takes over `child` and its `readers`. These threads must end when the process does.
     pub fn new(child: Child, readers: Vec<JoinHandle<()>>) -> Self {
         Self { child, readers }
     }
 
-    /// The process number.
+    /// The process id.
     pub fn id(&self) -> u32 {
         self.child.id()
     }
 
-    /// Whether it has ended by itself.
+    /// Whether the process has ended by itself.
     ///
     /// # Errors
-    /// [`EmulatorError::NotInstalled`] if that was because there is no such program.
+    /// [`EmulatorError::NotInstalled`] if it ended because there is no such program.
     pub fn has_ended(&mut self, program: &'static str) -> Result<bool, EmulatorError> {
         let ended = self.child.try_wait()?;
         if ended.is_some_and(|status| status.code() == Some(NOT_FOUND)) {
@@ -68,9 +70,10 @@ impl Running {
         Ok(ended.is_some())
     }
 
-    /// How it has ended by itself; `None` if it still runs.
+    /// The exit status of a process that ended by itself; `None` if it still runs after half a
+    /// second.
     pub fn how_it_ended(&mut self) -> Option<ExitStatus> {
-        // Its lines close a little before it has ended.
+        // The pipes and sockets of a process close shortly before it has ended.
         for _ in 0..100 {
             if let Ok(Some(status)) = self.child.try_wait() {
                 return Some(status);
@@ -80,13 +83,14 @@ impl Running {
         None
     }
 
-    /// Ends it; all that it has said is in then.
+    /// Ends the process and waits until all its output has been read.
     pub fn end(&mut self) {
-        // Both fail only if it has ended by itself.
+        // Both calls fail only if the process has already ended by itself.
         let _ = self.child.kill();
         let _ = self.child.wait();
         for reader in self.readers.drain(..) {
-            // A reader's panic has been printed, and there is nothing left to read.
+            // If a reader panicked, the panic was already printed and there is nothing left to
+            // read.
             let _ = reader.join();
         }
     }

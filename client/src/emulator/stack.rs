@@ -1,34 +1,37 @@
-//! The deepest stack of a board, by the pattern that its boot does not find there any more.
+//! Measures the deepest use of a board's stack, by painting it with a pattern and looking for the
+//! bytes that no longer contain it.
 //!
-//! All of the stack, which lies at the start of RAM on every board, is painted before the first instruction.
+//! The whole stack, which is at the start of RAM on every board, is painted before the first
+//! instruction.
 
 use object::{Object, ObjectSection};
 
 use super::EmulatorError;
 
-/// Where RAM begins, on every board, and with it the stack.
+/// The address of the start of RAM, and of the lower end of the stack, on every board.
 pub const RAM: u32 = 0x2000_0000;
-/// What an unused byte of the stack is painted with.
+/// The value of an unused byte of the stack.
 pub const PAINT: u8 = 0xA5;
 
-/// How much of a stack is in use at most.
+/// The size of a stack and its maximum use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stack {
-    /// Its bytes.
+    /// The size in bytes.
     pub size: usize,
-    /// From its beginning to the deepest byte that was written.
+    /// The number of bytes from the stack's beginning to the deepest byte that was written.
     pub deepest: usize,
 }
 
 impl Stack {
-    /// By what all of it holds, the lowest address first.
+    /// Measures a stack from its contents, the lowest address first.
     pub fn of(bytes: &[u8]) -> Self {
         let untouched = bytes.iter().take_while(|&&byte| byte == PAINT).count();
         Self { size: bytes.len(), deepest: bytes.len() - untouched }
     }
 }
 
-/// The size of the stack of an ELF image: the first word of its vectors is where it begins.
+/// Reads the size of the stack from an ELF image: the first word of the vector table is the initial
+/// stack pointer.
 pub fn size(elf: &[u8]) -> Result<usize, EmulatorError> {
     let bad = |reason: String| EmulatorError::BadImage { reason };
     let elf = object::File::parse(elf).map_err(|error| bad(error.to_string()))?;

@@ -1,6 +1,7 @@
-//! QEMU's trace, line by line: pins, the clock, the bytes that the board sent.
+//! Parses QEMU's trace line by line to follow the pins, the clock and the bytes that the board
+//! sent.
 //!
-//! The events and how QEMU 7.2 prints them:
+//! These are the events in the format of QEMU 7.2:
 //!
 //! ```text
 //! pl061_set_output /machine/unattached/device[9] setting output 4 to 1
@@ -10,46 +11,46 @@
 //! pl011_write addr 0x000 value 0x0000006f
 //! ```
 //!
-//! The board's clock is SysTick, which counts down from 2^24 - 1 and begins again. Whatever reads it
-//! tells the time here, and every new beginning is traced, so no gap is too long. The count stays at
-//! 0 for one cycle after the new beginning has been traced: such a 0 still belongs to the period
-//! before.
+//! The board's clock is SysTick, which counts down from 2^24 - 1 and wraps around. Every read of
+//! the counter by the firmware updates the time here. Every wrap-around is traced, so no gap
+//! between two reads is too long. The count stays at 0 for one cycle after the wrap-around has been
+//! traced, so such a 0 still belongs to the period before.
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
 use super::pins::{Pin, PinChange};
 
-/// The events to trace.
+/// The trace events that QEMU is asked for.
 pub const EVENTS: [&str; 5] =
     ["pl061_set_output", "systick_read", "systick_write", "systick_timer_tick", "pl011_write"];
 
 const CLOCK_BITS: u32 = 24;
 const CYCLE: Duration = Duration::from_nanos(20);
-/// SysTick's register for the present count.
+/// The address of SysTick's current value register.
 const CURRENT: u32 = 0x8;
-/// The serial line's data register.
+/// The address of the UART's data register.
 const DATA: u32 = 0;
-/// Lines of QEMU itself that are kept.
+/// The number of QEMU's own lines that are kept.
 const SAID_LINES: usize = 20;
 
-/// A line of the trace that cannot be read.
+/// A line of the trace cannot be parsed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TraceError {
     /// The line.
     pub line: String,
 }
 
-/// What the trace has told.
+/// The state of the board according to the trace so far.
 #[derive(Debug, Default)]
 pub struct Trace {
     pins: Vec<PinChange>,
-    /// The port of the first change: the board uses one.
+    /// The GPIO port of the first change; the board uses only one.
     port: Option<String>,
-    /// Cycles before SysTick was last cleared, at a start of the firmware.
+    /// The number of cycles before SysTick was last cleared, which a start of the firmware does.
     cycles_before_start: u64,
     wraps: u64,
-    /// Whether SysTick began again since a count other than 0 was read.
+    /// Whether SysTick wrapped around and only counts of 0 have been read since.
     has_just_wrapped: bool,
     cycles: u64,
     sent: u64,
@@ -57,7 +58,7 @@ pub struct Trace {
 }
 
 impl Trace {
-    /// Takes a line in.
+    /// Processes a line.
     pub fn line(&mut self, line: &str) -> Result<(), TraceError> {
         let mut words = line.split_ascii_whitespace();
         let understood = match words.next() {
@@ -125,28 +126,28 @@ impl Trace {
         self.said.push_back(line.into());
     }
 
-    /// The changes since last taken.
+    /// Returns the pin changes since the last call.
     pub fn take_pins(&mut self) -> Vec<PinChange> {
         std::mem::take(&mut self.pins)
     }
 
-    /// The last reading of the clock.
+    /// The time of the last reading of the clock.
     pub fn clock(&self) -> Duration {
         Duration::from_nanos(self.cycles * CYCLE.as_nanos() as u64)
     }
 
-    /// Bytes that the board has sent.
+    /// The number of bytes that the board has sent.
     pub fn sent(&self) -> u64 {
         self.sent
     }
 
-    /// What QEMU itself printed last.
+    /// The last lines that QEMU itself printed.
     pub fn said(&self) -> String {
         Vec::from(self.said.clone()).join("\n")
     }
 }
 
-/// The two hexadecimal numbers that follow the words `register` and `value`.
+/// Parses the two hexadecimal numbers that follow the words `register` and `value`.
 fn register_and_value<'a>(
     mut words: impl Iterator<Item = &'a str>,
     register: &str,
