@@ -1,7 +1,8 @@
-//! From loose lines to a drawing: coincident points merged (Harrison 5.9), nothing twice.
+//! Turns separate lines into a drawing: merges coincident points (Harrison 5.9) and removes
+//! duplicate segments.
 //!
-//! While visibility runs, lines are packed at 12 bytes each ([`PackedLine`]). Then [`build_graph`] turns them,
-//! in the same memory, into points and segments.
+//! While visibility is computed, lines are packed at 12 bytes each ([`PackedLine`]). Then
+//! [`build_graph`] turns them into points and segments, in the same memory.
 
 use super::overlap::{Loose, ink_once};
 use super::{Drawing, LineType, PAGE_LIMIT, PagePoint, Segment};
@@ -11,16 +12,18 @@ use crate::stage::{
 };
 use bytemuck::{Pod, Zeroable};
 
-/// A straight line on the page, packed: four coordinates of 21 bits, line type, pen.
+/// A straight line on the page, packed into 12 bytes: four coordinates of 21 bits, the line style
+/// and the pen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 #[repr(transparent)]
 pub struct PackedLine([u32; 3]);
 
-/// The code of a full line that yields to any other: it sorts after them.
+/// The code of a full line that yields to any other line; it sorts after all other styles.
 const UNDER: u8 = 3;
 
 impl PackedLine {
-    /// The line from `from` to `to`, both within ±[`PAGE_LIMIT`]; `pen` below [`PEN_LIMIT`].
+    /// Packs the line from `from` to `to`. Both must be within ±[`PAGE_LIMIT`], and `pen` below
+    /// [`PEN_LIMIT`].
     pub fn new(from: PagePoint, to: PagePoint, line_type: LineType, pen: u8) -> Self {
         let pack = |c: i32| (c.clamp(1 - PAGE_LIMIT, PAGE_LIMIT - 1) + PAGE_LIMIT) as u128;
         let marks = (pen % PEN_LIMIT) as u128 * 4 + line_type.code() as u128;
@@ -29,7 +32,8 @@ impl PackedLine {
         Self([packed as u32, (packed >> 32) as u32, (packed >> 64) as u32])
     }
 
-    /// The same, if it is a full line, yielding to any other in its place: what is hidden may not win over what is seen.
+    /// Returns the same line. A full line is marked to yield to any other line at the same place,
+    /// so that a hidden line never replaces a visible one.
     #[must_use]
     pub fn under(self) -> Self {
         let Self([low, middle, high]) = self;
@@ -44,13 +48,13 @@ impl PackedLine {
         from != to
     }
 
-    /// Its ends.
+    /// Returns its ends.
     pub fn ends(self) -> [PagePoint; 2] {
         let (from, to, ..) = self.unpack();
         [from, to]
     }
 
-    /// Its ends, line type code and pen.
+    /// Returns its ends, the code of its line style, and its pen.
     fn unpack(self) -> (PagePoint, PagePoint, u8, u8) {
         let [low, middle, high] = self.0.map(u128::from);
         let packed = low | middle << 32 | high << 64;
@@ -65,7 +69,7 @@ impl PackedLine {
     }
 }
 
-/// Where a drawing lies in the working memory: segments first, then points.
+/// The layout of a drawing in the working memory: first the segments, then the points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Stored {
     segments: usize,
@@ -73,17 +77,17 @@ pub struct Stored {
 }
 
 impl Stored {
-    /// How many segments and points there are.
+    /// Returns the number of segments and the number of points.
     pub fn counts(&self) -> [usize; 2] {
         [self.segments, self.points]
     }
 
-    /// What has these [`Stored::counts`].
+    /// Makes the layout that has these [`Stored::counts`].
     pub fn of_counts([segments, points]: [usize; 2]) -> Self {
         Self { segments, points }
     }
 
-    /// Bytes from the beginning of the memory to the end of the drawing.
+    /// Returns the number of bytes from the beginning of the memory to the end of the drawing.
     pub fn bytes(&self) -> usize {
         self.segment_bytes() + Scratch::bytes_for::<PagePoint>(self.points)
     }
@@ -92,7 +96,7 @@ impl Stored {
         Scratch::bytes_for::<Segment>(self.segments)
     }
 
-    /// The drawing, to read only; `None` if this is not the memory in which it was stored.
+    /// Returns the drawing stored in `words`, or `None` if `words` is too short for it.
     pub fn drawing<'a>(&self, words: &'a [u64]) -> Option<Drawing<'a>> {
         let points = words.get(self.segment_bytes() / 8..)?;
         Some(Drawing {
@@ -101,10 +105,10 @@ impl Stored {
         })
     }
 
-    /// The drawing, and the memory after it.
+    /// Returns the drawing stored in `words`, and the memory after it.
     ///
     /// # Errors
-    /// [`OutOfScratch`] if this is not the memory in which it was stored.
+    /// [`OutOfScratch`] if `words` is too short for the drawing.
     pub fn split<'a>(
         &self,
         words: &'a mut [u64],
@@ -122,12 +126,12 @@ impl Stored {
     }
 }
 
-/// Why lines did not become a drawing.
+/// The reasons why lines did not become a drawing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GraphError {
-    /// The points do not fit beside the lines.
+    /// The points do not fit in the memory beside the lines.
     Scratch(OutOfScratch),
-    /// The user gave up.
+    /// The user aborted the job.
     Aborted,
 }
 
@@ -152,24 +156,27 @@ impl From<Aborted> for GraphError {
     }
 }
 
-/// Each line looks for its points at up to 18 places: these are about 50,000 instructions.
+/// The number of lines between two calls of [`Cancel::check`]. Each line searches for its points at
+/// up to 18 positions, so this many lines take about 50,000 instructions.
 const LINES_BETWEEN_CHECKS: usize = 32;
 
 /// Turns the `count` lines at the beginning of `words` into a drawing at the beginning of `words`.
 ///
-/// Points less than two steps apart along both axes count as one, the first of them; lines that
-/// shrink to a point are dropped; where segments overlap one is kept: a full line before a dotted one, then the
-/// lower pen before the higher.
+/// Points less than two steps apart along both axes become one, the first of them. Lines that
+/// shrink to a point are dropped. Where segments overlap, one is kept: a full line before a dotted
+/// one, then the lower pen before the higher.
 ///
 /// # Errors
-/// See [`GraphError`]; the lines are lost then.
-#[inline(never)] // Its frame must not lie under the stages'.
+/// See [`GraphError`]; on an error the lines are lost.
+// Not inlined, so that its stack frame is not below those of the stages.
+#[inline(never)]
 pub fn build_graph(
     words: &mut [u64],
     count: usize,
     cancel: &mut dyn Cancel,
 ) -> Result<Stored, GraphError> {
-    // A line inside another that yields to it leaves two pieces of that.
+    // A line inside another one that yields to it splits that one into two pieces, so there may be
+    // more segments than lines.
     let all: &[PackedLine] = items(words, count).unwrap_or(&[]);
     let marks = |line: &PackedLine| line.0[2] >> (84 - 64);
     let yields = all.iter().any(|line| Some(marks(line)) != all.first().map(marks));
@@ -211,7 +218,7 @@ pub fn build_graph(
         (segments, points.len())
     };
 
-    // Shrink each line (12 bytes) to its segment (6 bytes) in place, front to back.
+    // Shrink each line (12 bytes) to its segment (6 bytes) in place, from front to back.
     let halves: &mut [u16] = bytemuck::cast_slice_mut(&mut *line_memory);
     for at in 0..segments {
         let line: [u16; 6] = core::array::from_fn(|half| halves[6 * at + half]);
@@ -219,7 +226,8 @@ pub fn build_graph(
         let segment = Segment {
             from: (ends >> 16) as u16,
             to: ends as u16,
-            line_type_code: ((marks >> 8) % u32::from(UNDER)) as u8, // a full line like others
+            // A full line that yields becomes an ordinary full line.
+            line_type_code: ((marks >> 8) % u32::from(UNDER)) as u8,
             pen: marks as u8,
         };
         let packed: [u16; 3] = bytemuck::cast(segment);
@@ -232,19 +240,22 @@ pub fn build_graph(
     Ok(stored)
 }
 
-/// Numbers points, giving coincident points the same number: a hash table over the steps.
+/// Numbers points with a hash table of their positions, and gives coincident points the same
+/// number.
 struct PointFinder<'a> {
     points: &'a mut [PagePoint],
     count: usize,
-    /// Point numbers + 1, 0 if free; a power of two long.
+    /// For each slot the point number + 1, or 0 if it is free. The length is a power of two.
     table: &'a mut [u16],
 }
 
 impl<'a> PointFinder<'a> {
-    /// For at most `most` points; takes a table of twice that if there is room, else what there is.
+    /// Makes a finder for at most `most` points. Its table has twice as many slots, or fewer if
+    /// memory is short.
     fn new(scratch: Scratch<'a>, most: usize) -> Result<Self, OutOfScratch> {
         let available = scratch.available_bytes();
-        // A third of the memory at most: a point takes 8 bytes, a full enough table 2 to 4 for each.
+        // The table takes at most a third of the memory: a point takes 8 bytes, and the table 2 to
+        // 4 bytes for each point.
         let longest = (available / 3 / size_of::<u16>()).max(1);
         let longest = 1 << (usize::BITS - 1 - longest.leading_zeros());
         let length = (2 * most).next_power_of_two().clamp(8, 1 << 17).min(longest);
@@ -272,7 +283,7 @@ impl<'a> PointFinder<'a> {
 
     fn find(&self, point: PagePoint) -> Option<u16> {
         let mut slot = self.slot(point);
-        // A free slot is always left, so this ends.
+        // The table always has a free slot, so this loop ends.
         loop {
             let number = self.table[slot].checked_sub(1)?;
             if self.points[usize::from(number)] == point {

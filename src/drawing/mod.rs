@@ -1,10 +1,10 @@
-//! The line drawing on the page: points, segments, pen, line type; fit to the page; merge coincident
-//! points.
+//! The line drawing on the page: it is fitted to the page, and coincident points and overlapping
+//! segments are merged.
 //!
-//! Lines come in as they are found, mapped to steps by a [`PageMap`] that fits the image to the
-//! [`Page`] and packed as [`PackedLine`]s; [`build_graph`] then makes one [`Drawing`] of them: a graph whose
-//! points are all different (Harrison 5.1.1 and 5.9). Refused: what does not fit the page or the
-//! memory.
+//! Lines arrive one at a time. A [`PageMap`] that fits the image to the [`Page`] maps each to
+//! steps, and it is packed as a [`PackedLine`]. [`build_graph`] then makes one [`Drawing`] of all
+//! lines: a graph whose points are all different (Harrison 5.1.1 and 5.9). A drawing that does not
+//! fit the page or the memory is refused.
 
 mod collect;
 mod overlap;
@@ -18,7 +18,8 @@ pub use title::{Title, TitleText, is_in_font};
 
 use bytemuck::{Pod, Zeroable};
 
-/// A point of the page in steps of the plotter, x right, y up; each within ±2^20.
+/// A point of the page in plotter steps, with x to the right and y up. Each coordinate is within
+/// ±2^20.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Pod, Zeroable)]
 #[repr(C)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -29,38 +30,40 @@ pub struct PagePoint {
     pub y: i32,
 }
 
-/// Page coordinates stay within ± this: squared distances fit 43 bits.
+/// The limit of the absolute value of page coordinates, in steps. With it, squared distances fit 43
+/// bits.
 pub const PAGE_LIMIT: i32 = 1 << 20;
 
-/// How a segment is inked.
+/// The line style of a segment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum LineType {
-    /// Without a gap.
+    /// A solid line.
     #[default]
     Full,
     /// Harrison's dotted line.
     Dotted,
-    /// Longer dashes than dots.
+    /// A line of dashes, which are longer than the dots.
     Dashed,
 }
 
-/// A straight piece of the drawing between two different points, by point number.
+/// A straight line of the drawing between two different points, given by their numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct Segment {
-    /// One end.
+    /// The number of the point at one end.
     pub from: u16,
-    /// The other.
+    /// The number of the point at the other end.
     pub to: u16,
-    /// 0 full, 1 dotted, 2 dashed: see [`Segment::line_type`].
+    /// The line style: 0 full, 1 dotted, 2 dashed; see [`Segment::line_type`].
     pub line_type_code: u8,
     /// The pen that draws it, from 0.
     pub pen: u8,
 }
 
 impl LineType {
-    /// The code by which a [`Segment`] stores it: a full line sorts before the others.
+    /// Returns the code by which a [`Segment`] stores the style. A full line sorts before the
+    /// others.
     pub const fn code(self) -> u8 {
         match self {
             Self::Full => 0,
@@ -71,7 +74,7 @@ impl LineType {
 }
 
 impl Segment {
-    /// How it is inked.
+    /// Returns the line style.
     pub fn line_type(&self) -> LineType {
         match self.line_type_code {
             1 => LineType::Dotted,
@@ -81,7 +84,8 @@ impl Segment {
     }
 }
 
-/// A drawing: no two points equal, no segment twice, every segment between two different points.
+/// A drawing. No two points are equal, no segment occurs twice, and every segment joins two
+/// different points.
 #[derive(Debug, Clone, Copy)]
 pub struct Drawing<'a> {
     /// The points.

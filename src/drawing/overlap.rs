@@ -1,22 +1,26 @@
-//! No stretch of paper is inked twice: collinear segments that overlap are drawn once.
+//! Removes overlaps, so that no stretch of paper is drawn twice: collinear segments that overlap
+//! are drawn once.
 //!
-//! Segments are sorted by the straight line that they lie on, then by rank (full before dotted before dashed
-//! before a full one that yields, the lower pen before the higher), then by where they begin. Each is then cut to what
-//! those before it in that order leave free. All is exact on the points of the page, and every cut is at a point that
-//! another segment has, so no point is new.
+//! Segments are sorted by the straight line on which they lie, then by rank, then by where they
+//! begin. The rank puts full lines first, then dotted, dashed, and full lines that yield; within
+//! each style the lower pen comes first. Each segment is then cut to what the segments before it in
+//! that order leave free. All computations are exact, and every cut is at the end of another
+//! segment, so no new points are needed.
 
 use super::PagePoint;
 use crate::fixed::product;
 use crate::stage::{Cancel, OutOfScratch, StageError, heap_sort_cancellable};
 use core::cmp::Ordering;
 
-/// A segment on its way to the drawing: the numbers of its points, line type and pen, a slope.
+/// A segment before it becomes part of the drawing: the numbers of its two points, its line style
+/// and pen, and its slope.
 pub(super) type Loose = [u32; 3];
 
-/// Which point comes first along a line: the left one, or the lower of a vertical line.
+/// A sort key for points along a line: x, then y. The first point is the left one, or the lower one
+/// of a vertical line.
 type PointKey = (i32, i32);
 
-/// What a segment is sorted by.
+/// The sort key of a segment.
 struct Key {
     slope: u32,
     from: PointKey,
@@ -34,7 +38,7 @@ impl Key {
         }
     }
 
-    /// Each within ±2^21.
+    /// Returns the vector from the first end to the second; each component is within ±2^21.
     fn direction(&self) -> (i64, i64) {
         (
             i64::from(self.to.0) - i64::from(self.from.0),
@@ -42,7 +46,8 @@ impl Key {
         )
     }
 
-    /// The same for parallel segments; mostly another for others.
+    /// Returns a number for the direction, which is equal for parallel segments and in most cases
+    /// different for others.
     fn slope(&self) -> u32 {
         let (dx, dy) = self.direction();
         if dx >= dy.abs() {
@@ -52,12 +57,15 @@ impl Key {
         }
     }
 
-    /// Direction and distance from the origin.
+    /// Compares the lines on which two segments lie: by direction, then by distance from the
+    /// origin.
     fn compare_line(&self, other: &Self) -> Ordering {
         let ((ax, ay), (bx, by)) = (self.direction(), other.direction());
         let fast = self.slope.cmp(&other.slope);
         fast.then_with(|| (ay * bx).cmp(&(by * ax))).then_with(|| {
-            // Twice the area with the origin, below 2^43, by the length along the longer axis.
+            // Twice the area of the triangle with the origin is below 2^43. Dividing it by the
+            // length along the longer axis gives the distance; the division is replaced by cross
+            // multiplication.
             let area = |key: &Self, (dx, dy): (i64, i64)| {
                 dx * i64::from(key.from.1) - dy * i64::from(key.from.0)
             };
@@ -88,14 +96,16 @@ impl PartialEq for Key {
 }
 impl Eq for Key {}
 
-/// These take some 100,000 instructions.
+/// The number of segments between two calls of [`Cancel::check`]; they take some 100,000
+/// instructions.
 const SEGMENTS_BETWEEN_CHECKS: usize = 64;
 
-/// Cuts the first `count` of `segments` until none overlap, and returns how many there are then. More
-/// than before only where a line lies inside another that yields to it.
+/// Cuts the first `count` of `segments` until none overlap. Returns the number of segments then. It
+/// is greater than `count` only if a line lies inside another that yields to it.
 ///
 /// # Errors
-/// [`StageError::Scratch`] if those do not fit.
+/// [`StageError::Scratch`] if the result does not fit into `segments`;
+/// [`StageError::Aborted`] if the user aborted the job.
 pub(super) fn ink_once(
     segments: &mut [Loose],
     count: usize,
@@ -115,8 +125,9 @@ pub(super) fn ink_once(
     }
     heap_sort_cancellable(sorted, |segment| Key::of(segment, points), cancel)?;
 
-    // Pieces stand at the front; those that find no room there, from `count` on. On both sides those of the line in
-    // hand, from `starts` on, are runs of one rank each, sorted and disjoint.
+    // The finished pieces are stored at the front of `segments`, and those for which there is no
+    // room there, from `count` on. In both areas the pieces of the current line begin at `starts`.
+    // They form runs of one rank each, which are sorted and disjoint.
     let mut ends = [0, count];
     let mut starts = ends;
     let mut last: Option<Key> = None;
@@ -131,7 +142,8 @@ pub(super) fn ink_once(
         }
         let (mut from, to) = (End::first(&segment, points), End::second(&segment, points));
         while from.place < to.place {
-            // How far this place is covered; else where the next cover begins.
+            // `reach` is how far the line is already drawn at this point. If it is not, `next` is
+            // where the next piece begins.
             let (mut reach, mut next) = (from, to);
             for side in 0..2 {
                 let mut pieces = segments.get(starts[side]..ends[side]).unwrap_or(&[]);
@@ -165,7 +177,7 @@ pub(super) fn ink_once(
     Ok(ends[0] + ends[1] - count)
 }
 
-/// An end of a segment, with its point's number.
+/// An end of a segment: its position, and the number of its point.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct End {
     place: PointKey,
@@ -180,7 +192,7 @@ impl End {
         })
     }
 
-    /// That which comes first along the line.
+    /// Returns the end that comes first along the line.
     fn first(segment: &Loose, points: &[PagePoint]) -> Self {
         let [a, b] = Self::both(segment, points);
         a.min(b)

@@ -1,4 +1,5 @@
-//! The sheet: where on it the drawing goes, and the map from the image to steps.
+//! The sheet of paper: where on it the drawing is placed, and the map from image coordinates to
+//! plotter steps.
 
 use super::window::Window;
 use super::{PAGE_LIMIT, PagePoint, Title};
@@ -7,25 +8,25 @@ use crate::geometry::{Projection, Vertex};
 use crate::model::Position;
 use crate::visibility::EdgeParameter;
 
-/// A sheet of paper, its lower left corner at the plotter's origin.
+/// A sheet of paper, whose lower left corner is at the plotter's origin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Page {
-    /// Along x.
+    /// Size along x, in mm.
     pub width: Millimetres,
-    /// Along y.
+    /// Size along y, in mm.
     pub height: Millimetres,
-    /// Kept free on all four sides.
+    /// Width that is kept free along all four sides, in mm.
     pub margin: Millimetres,
-    /// Kept free below the drawing, for its title; 0 without one.
+    /// Height that is kept free below the drawing for its title, in mm; 0 if there is none.
     pub foot: Millimetres,
 }
 
-/// Why the drawing does not go on the page.
+/// The reasons why the drawing cannot be placed on the page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PageError {
-    /// The margins leave nothing free.
+    /// The margins leave no free area.
     NoRoom,
-    /// The page has more than 2^20 steps.
+    /// A side of the page is longer than 2^20 steps.
     TooManySteps,
     /// A plan at true size is larger than the free part of the page.
     DoesNotFit {
@@ -33,24 +34,24 @@ pub enum PageError {
         width: i64,
         /// Size of the plan along y, in units of 2^-16 mm.
         height: i64,
-        /// What its title takes along y, in units of 2^-16 mm.
+        /// Size of the area for its title along y, in units of 2^-16 mm.
         foot: i64,
     },
     /// The title is wider than the free part of the page.
     TitleTooWide {
-        /// Its width.
+        /// Width of the title, in mm.
         width: Millimetres,
-        /// What there is.
+        /// Width of the free part of the page, in mm.
         free: Millimetres,
     },
 }
 
-/// Steps in a millimetre along x and along y.
+/// Steps per millimetre along x and along y.
 pub type StepsPerMillimetre = [Millimetres; 2];
 
-/// A box on the image: least and greatest of x/w and of y/w.
+/// A bounding box of the image: the least and the greatest x/w and y/w.
 ///
-/// In units of 2^-[`Bounds::FRACTION_BITS`], |value| < 2^46.
+/// The values are in units of 2^-[`Bounds::FRACTION_BITS`], with |value| < 2^46.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Bounds {
     low: [i64; 2],
@@ -58,10 +59,11 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// See [`Bounds`].
+    /// The unit of the bounds of an image is 2^-this.
     pub const FRACTION_BITS: u32 = 24;
 
-    /// Around the images of `vertices`, w > 0; `None` without any.
+    /// Returns the box around the images of `vertices`, which must have w > 0, or `None` if there
+    /// are no vertices.
     pub fn around(vertices: impl Iterator<Item = Vertex>, projection: Projection) -> Option<Self> {
         vertices
             .map(|vertex| {
@@ -75,9 +77,10 @@ impl Bounds {
             .reduce(Self::union)
     }
 
-    /// Around plan positions in units of 2^-`fraction_bits` mm; `None` without any.
+    /// Returns the box around plan positions in units of 2^-`fraction_bits` mm, or `None` if there
+    /// are none.
     ///
-    /// These bounds are in that unit, for [`PageMap::true_size`] and [`PageMap::fit_plan`].
+    /// These bounds are in the same unit, for [`PageMap::true_size`] and [`PageMap::fit_plan`].
     pub fn around_plan(positions: impl Iterator<Item = Position>) -> Option<Self> {
         positions
             .map(|position| {
@@ -87,7 +90,7 @@ impl Bounds {
             .reduce(Self::union)
     }
 
-    /// Around both.
+    /// Returns the box around both boxes.
     #[must_use]
     pub fn union(self, other: Self) -> Self {
         Self {
@@ -106,22 +109,25 @@ pub struct PageMap {
     window: Option<Window>,
 }
 
-/// The map's scale keeps this many bits; its unit is never finer than 2^-`FINEST`.
+/// The map's scale has this many bits, and its unit is never finer than 2^-[`FINEST`].
 const SCALE_BITS: u32 = 41;
 const FINEST: u32 = 44;
 
 impl PageMap {
-    /// Scales what is within `bounds` to the free part of the page and centres it.
+    /// Makes the map that scales what is within `bounds` to the free part of the page and centres
+    /// it.
     ///
     /// # Errors
     /// [`PageError::NoRoom`], [`PageError::TooManySteps`].
-    #[inline(never)] // Its frame must not lie under the stages'.
+    // Not inlined, so that its stack frame is not below those of the stages.
+    #[inline(never)]
     pub fn fit(bounds: &Bounds, page: &Page, steps: StepsPerMillimetre) -> Result<Self, PageError> {
         Self::fit_unit(bounds, Bounds::FRACTION_BITS, page, steps)
     }
 
-    /// As [`PageMap::fit`], but what is farther than `field` from the middle of the image (in units of
-    /// 2^-[`Bounds::FRACTION_BITS`]) may fall off the page: what is nearly beside the eye is nearly endless.
+    /// As [`PageMap::fit`], but what is farther than `field` from the middle of the image may fall
+    /// off the page. `field` is in units of 2^-[`Bounds::FRACTION_BITS`]. In a perspective view the
+    /// image of a point nearly beside the eye is nearly infinitely far away.
     ///
     /// # Errors
     /// [`PageError::NoRoom`], [`PageError::TooManySteps`].
@@ -142,7 +148,8 @@ impl PageMap {
         Ok(map)
     }
 
-    /// Scales a plan (bounds in units of 2^-`fraction_bits` mm) to the page like [`PageMap::fit`].
+    /// Makes the map that scales a plan to the page like [`PageMap::fit`]. `bounds` is in units of
+    /// 2^-`fraction_bits` mm.
     ///
     /// # Errors
     /// [`PageError::NoRoom`], [`PageError::TooManySteps`].
@@ -153,12 +160,13 @@ impl PageMap {
         steps: StepsPerMillimetre,
     ) -> Result<Self, PageError> {
         let mut map = Self::fit_unit(bounds, fraction_bits, page, steps)?;
-        // Image coordinates of a plan are the positions themselves, w = 1: move the unit into the map.
+        // The image coordinates of a plan are its positions, with w = 1, so the unit becomes part
+        // of the map.
         map.coarsen(fraction_bits);
         Ok(map)
     }
 
-    /// `bounds` in units of 2^-`unit_bits`.
+    /// As [`PageMap::fit`], with `bounds` in units of 2^-`unit_bits`.
     fn fit_unit(
         bounds: &Bounds,
         unit_bits: u32,
@@ -168,7 +176,8 @@ impl PageMap {
         let free = page.free()?;
         page.check_steps(steps)?;
         let size = [0, 1].map(|axis: usize| (bounds.high[axis] - bounds.low[axis]).unsigned_abs());
-        // The tighter axis decides: millimetres for each unit of the image, as free / size.
+        // The tighter axis decides the scale, in millimetres for each unit of the image: free /
+        // size.
         let (length, extent) = match size {
             [0, 0] => (1, 1),
             [width, 0] => (free[0], width),
@@ -182,7 +191,7 @@ impl PageMap {
         let numerator =
             [0, 1].map(|axis: usize| u128::from(length) * steps[axis].to_bits() as u128);
         let denominator = u128::from(extent);
-        // a = numerator / extent 2^-32 2^unit_bits 2^k with k as fine as SCALE_BITS allow.
+        // a = numerator / extent 2^-32 2^unit_bits 2^k, with k as great as SCALE_BITS allow.
         let largest = numerator[0].max(numerator[1]).max(1);
         let bits = |value: u128| (128 - value.leading_zeros()) as i32;
         let shift = SCALE_BITS as i32 + bits(denominator) - bits(largest);
@@ -194,7 +203,7 @@ impl PageMap {
             divide(numerator << up, denominator << down) as i64
         });
         let b = [0, 1].map(|axis: usize| {
-            // The drawing and what is below it are centred together.
+            // The drawing and the foot below it are centred together.
             let side =
                 i128::from(side_steps(page, steps, axis) + foot_steps(page, steps, axis)) << k;
             let middle = i128::from(bounds.low[axis]) + i128::from(bounds.high[axis]);
@@ -209,9 +218,10 @@ impl PageMap {
         self.k += bits;
     }
 
-    /// Draws a plan at true size: where it lies if that is on the page, else moved just inside.
+    /// Makes the map that draws a plan at true size. The plan keeps its position if that is on the
+    /// page, otherwise it is moved just inside.
     ///
-    /// `bounds` in units of 2^-`fraction_bits` mm.
+    /// `bounds` is in units of 2^-`fraction_bits` mm.
     ///
     /// # Errors
     /// See [`PageError`].
@@ -246,10 +256,11 @@ impl PageMap {
         })
     }
 
-    /// The image (x/w, y/w) in steps. |x|, |y| < 2^52, 0 < w < 2^52.
+    /// Returns the image point (x/w, y/w) in steps. |x| and |y| must be below 2^52, and 0 < w <
+    /// 2^52.
     pub fn point(&self, x: i64, y: i64, w: i64) -> PagePoint {
         let [x, y] = [(x, 0), (y, 1)].map(|(c, axis): (i64, usize)| {
-            // Below 2^42 2^52 + 2^(44 + 21) 2^52: fits 127 bits with room.
+            // The sum is below 2^42 2^52 + 2^(44 + 21) 2^52, so it fits 127 bits.
             let steps = divide_rounding(
                 product(self.a[axis], c) + self.b[axis] * i128::from(w),
                 i128::from(w) << self.k,
@@ -259,14 +270,15 @@ impl PageMap {
         PagePoint { x, y }
     }
 
-    /// The image (x/w, y/w) in 1/256 step, for [`crate::curve::Spline::chords`]. As [`PageMap::point`], but
-    /// not kept to the page.
+    /// Returns the image point (x/w, y/w) in 1/256 steps, for [`crate::curve::Spline::chords`]. As
+    /// [`PageMap::point`], but not limited to the page.
     pub fn fine(&self, x: i64, y: i64, w: i64) -> crate::curve::Fine {
         [(x, 0), (y, 1)].map(|(c, axis): (i64, usize)| {
-            // Below 2^118, see `point`: the shift does not overflow.
+            // The sum is below 2^118, see `point`, so the shift does not overflow.
             let sum = product(self.a[axis], c) + self.b[axis] * i128::from(w);
             let fine = if w & (w - 1) == 0 {
-                // A parallel view: many times faster.
+                // In a parallel view w is a power of two, and a shift is many times faster than a
+                // division.
                 let shift = w.trailing_zeros() + self.k;
                 ((sum << 9 >> shift) + 1) >> 1
             } else {
@@ -277,7 +289,8 @@ impl PageMap {
         })
     }
 
-    /// A stretch of the edge from `p` to `q` in steps; `None` if none of it is on the page.
+    /// Returns the part of the edge from `p` to `q` between two parameters, in steps, or `None` if
+    /// no part of it is on the page.
     pub fn stretch(
         &self,
         (p, q): (Vertex, Vertex),
@@ -291,7 +304,7 @@ impl PageMap {
         }
     }
 
-    /// The place `along` the edge from `p` to `q` in steps.
+    /// Returns the point at parameter `along` of the edge from `p` to `q`, in steps.
     pub fn along(
         &self,
         p: Vertex,
@@ -304,9 +317,11 @@ impl PageMap {
     }
 }
 
-/// The place `along` the edge from `p` to `q`, homogeneous.
+/// Returns the point at parameter `along` of the edge from `p` to `q`, in homogeneous image
+/// coordinates.
 fn between(p: Vertex, q: Vertex, along: EdgeParameter, projection: Projection) -> [i64; 3] {
-    // 31 bits of the ratio are 2^-10 steps of the longest edge that a page can hold.
+    // Of the ratio 31 bits are kept. They are exact to 2^-10 steps on the longest edge that a page
+    // can hold.
     let shift = (64 - along.denominator.leading_zeros()).saturating_sub(31);
     let denominator = (along.denominator >> shift).max(1) as i64;
     let numerator = ((along.numerator >> shift) as i64).min(denominator);
@@ -320,7 +335,7 @@ fn between(p: Vertex, q: Vertex, along: EdgeParameter, projection: Projection) -
 }
 
 impl Page {
-    /// What the margins and the title leave, in units of 2^-16 mm.
+    /// Returns the size of the page without its margins and its foot, in units of 2^-16 mm.
     fn free(&self) -> Result<[u64; 2], PageError> {
         let margin = i64::from(self.margin.to_bits());
         let free = [(self.width, 0), (self.height, 1)]
@@ -331,14 +346,16 @@ impl Page {
         }
     }
 
-    /// Where along an axis the drawing may begin, in units of 2^-16 mm.
+    /// Returns the least coordinate along an axis at which the drawing may begin, in units of 2^-16
+    /// mm.
     pub(super) fn first(&self, axis: usize) -> i64 {
         let foot = if axis == 0 { 0 } else { self.foot.to_bits() };
         i64::from(self.margin.to_bits()) + i64::from(foot)
     }
 
-    /// Where a title goes on the page: left end and baseline, below a drawing in the middle between
-    /// `left` and `right`, and down to `bottom` (steps); moved to be within the margins.
+    /// Returns the position of a title on the page: its left end and its baseline, in mm. The title
+    /// is placed below a drawing that reaches from `left` to `right` and down to `bottom` (in
+    /// steps), centred under it, and then moved to be within the margins.
     ///
     /// # Errors
     /// [`PageError::TitleTooWide`], [`PageError::NoRoom`].
@@ -356,7 +373,8 @@ impl Page {
         if width > free {
             return Err(PageError::TitleTooWide { width, free });
         }
-        // Steps within 2^21, by millimetres of 2^16: the page has less than 2^20 steps.
+        // Steps are within 2^21, and steps per millimetre have 16 fraction bits: the page has less
+        // than 2^20 steps.
         let millimetres = |steps: i64, per_millimetre: Millimetres| {
             Millimetres::from_bits(
                 ((steps << 32) / i64::from(per_millimetre.to_bits()).max(1)) as i32,
@@ -377,13 +395,13 @@ impl Page {
     }
 }
 
-/// The length of the page along an axis, in steps.
+/// Returns the length of the page along an axis, in steps.
 fn side_steps(page: &Page, steps: StepsPerMillimetre, axis: usize) -> i64 {
     let side = if axis == 0 { page.width } else { page.height };
     (i64::from(side.to_bits()) * i64::from(steps[axis].to_bits())) >> 32
 }
 
-/// What is kept free below the drawing, in steps.
+/// Returns the height that is kept free below the drawing, in steps; 0 along x.
 fn foot_steps(page: &Page, steps: StepsPerMillimetre, axis: usize) -> i64 {
     if axis == 0 {
         0

@@ -1,13 +1,14 @@
-//! A title in a vector font: the Hershey Roman Simplex, with all letters of Latin-1 and Latin-9.
+//! Draws a title in a vector font: Hershey Roman Simplex, with all letters of Latin-1 and Latin-9.
 //!
-//! A [`Title`] is a text and its size; it gives its width, so that it can be centred, and its pen-down
-//! lines on the page, one after the other. A [`TitleText`] keeps a text of its own. The font stays in flash (5 KB, see
-//! `font/LICENCE.txt`) and is read as it is drawn. A character that the font lacks becomes a box, and
-//! [`Title::unknown`] tells it.
+//! A [`Title`] is a text and its size. It computes its width, so that it can be centred, and its
+//! pen-down lines on the page, one after another. A [`TitleText`] owns a text. The font is stored
+//! in flash (5 KB, see `font/LICENCE.txt`) and parsed while it is drawn. A character that is not in
+//! the font is drawn as a box, and [`Title::unknown`] returns it.
 //!
-//! The font's file has a line for each letter: the letter, its left and right side, then points two
-//! characters each, x right and y *down*, counted from `R`; ` R` lifts the pen (James Hurt's format).
-//! Capitals reach from 12 above to 9 below the letter's middle.
+//! The font's file has a line for each letter: the letter, its left and its right side, and then
+//! its points of two characters each, with x to the right and y *down*, counted from `R`. ` R`
+//! lifts the pen (James Hurt's format). Capitals reach from 12 units above to 9 units below the
+//! middle of the letter.
 
 use super::{PAGE_LIMIT, PagePoint, StepsPerMillimetre};
 use crate::fixed::{Millimetres, divide_rounding};
@@ -15,7 +16,8 @@ use core::cmp::Ordering;
 
 const FONT: &str = include_str!("font/simplex.txt");
 
-/// Where each line of the font begins, and its end: they stand in the order of their letters.
+/// The offset at which each line of the font begins, and the end of the last. The lines are sorted
+/// by their letters.
 const STARTS: [u16; GLYPHS + 1] = starts();
 const GLYPHS: usize = 158;
 
@@ -26,7 +28,8 @@ const fn starts() -> [u16; GLYPHS + 1] {
         at += 1;
         if font[at - 1] == b'\n' {
             line += 1;
-            starts[line] = at as u16; // the font has 5 KB
+            // The font has 5 KB, so the offset fits.
+            starts[line] = at as u16;
         }
     }
     assert!(line == GLYPHS, "another number of letters");
@@ -35,15 +38,15 @@ const fn starts() -> [u16; GLYPHS + 1] {
 
 /// Height of the capitals in the font's units.
 const CAPITAL_HEIGHT: i32 = 21;
-/// From a letter's middle down to the baseline, in the font's units.
+/// Distance from the middle of a letter down to the baseline, in the font's units.
 const BASELINE: i32 = 9;
 /// How much higher an accent sits on a capital than on a small letter, in the font's units.
 const ACCENT_RISE: i32 = 6;
 
-/// What stands for a character that the font lacks.
+/// The character that is drawn in place of one that is not in the font.
 const BOX: char = '\u{FFFD}';
 
-/// Letters that are another letter with an accent: three characters for each.
+/// Letters with an accent: for each three characters, the letter, its base letter and the accent.
 const ACCENTED: &str = "\
     ÀA\u{300}ÁA\u{301}ÂA\u{302}ÃA\u{303}ÄA\u{308}ÅA\u{30A}ÇC\u{327}ÈE\u{300}ÉE\u{301}ÊE\u{302}ËE\u{308}\
     ÌI\u{300}ÍI\u{301}ÎI\u{302}ÏI\u{308}ÑN\u{303}ÒO\u{300}ÓO\u{301}ÔO\u{302}ÕO\u{303}ÖO\u{308}ÙU\u{300}\
@@ -70,14 +73,15 @@ const ACCENTED: &str = "\
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Title<'t> {
-    /// What it says, in composed letters or with combining accents.
+    /// The text, in composed letters or with combining accents.
     pub text: &'t str,
-    /// Of the capitals.
+    /// Height of the capitals, in mm.
     pub height: Millimetres,
 }
 
 impl Title<'_> {
-    /// How wide it is, the space beside the first and last letter included; at most the largest length.
+    /// Returns the width in mm, including the space beside the first and the last letter; at most
+    /// the greatest representable length.
     pub fn width(&self) -> Millimetres {
         let mut line = TypeLine::default();
         for letter in self.text.chars() {
@@ -88,27 +92,30 @@ impl Title<'_> {
         Millimetres::from_bits(i32::try_from(bits).unwrap_or(i32::MAX))
     }
 
-    /// How far its lowest letters reach below the baseline.
+    /// Returns how far its lowest letters reach below the baseline, in mm.
     pub fn depth(&self) -> Millimetres {
         self.height / 3
     }
 
-    /// From the baseline up to the drawing: the capitals, and as much again for accents and a gap.
+    /// Returns the distance from the baseline up to the drawing, in mm: the height of the capitals,
+    /// and as much again for accents and a gap.
     pub fn rise(&self) -> Millimetres {
         self.height * 2
     }
 
-    /// The first character that the font lacks.
+    /// Returns the first character that is not in the font.
     pub fn unknown(&self) -> Option<char> {
         self.text.chars().find(|letter| !is_in_font(*letter))
     }
 
-    /// Hands over its straight lines on the page, letter by letter, each stroke's in order.
+    /// Calls `each` with each of its straight lines on the page, letter by letter, and in order
+    /// within each stroke.
     ///
-    /// The text begins at `left` and stands on `baseline`. What passes ±2^20 steps is moved there.
+    /// The text begins at `left`, and `baseline` is its baseline, both in mm. Coordinates beyond
+    /// ±2^20 steps are moved to that limit.
     ///
     /// # Errors
-    /// What `each` returns.
+    /// Returns the first error that `each` returns.
     pub fn draw<E>(
         &self,
         left: Millimetres,
@@ -116,9 +123,9 @@ impl Title<'_> {
         steps: StepsPerMillimetre,
         each: &mut dyn FnMut([PagePoint; 2]) -> Result<(), E>,
     ) -> Result<(), E> {
-        // Millimetres times steps for each are units of 2^-32 step.
+        // A product of millimetres and steps per millimetre is in units of 2^-32 steps.
         let on_axis = |origin: Millimetres, units: i32, axis: usize| {
-            // Below 2^63; what is saturated lies beyond the page as well.
+            // The length is below 2^63. A product that saturates is beyond the page anyway.
             let length = i64::from(origin.to_bits()) * i64::from(CAPITAL_HEIGHT)
                 + i64::from(units) * i64::from(self.height.to_bits());
             let steps = length.saturating_mul(steps[axis].to_bits().into());
@@ -150,13 +157,13 @@ impl Title<'_> {
     }
 }
 
-/// Whether the font has a letter, with its accent.
+/// Whether the font has a letter, and its accent if it has one.
 pub fn is_in_font(letter: char) -> bool {
     let (base, accent) = decomposed(letter);
     Glyph::find(base).is_some() && accent.is_none_or(|accent| Glyph::find(accent).is_some())
 }
 
-/// A text of a few words, kept with its owner.
+/// A short text that is stored in the value itself.
 ///
 /// ```
 /// use penup::drawing::TitleText;
@@ -166,7 +173,7 @@ pub fn is_in_font(letter: char) -> bool {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TitleText {
-    /// UTF-8.
+    /// The text in UTF-8.
     bytes: [u8; TitleText::LIMIT],
     length: u8,
 }
@@ -175,8 +182,10 @@ impl TitleText {
     /// The longest text, in bytes of UTF-8.
     pub const LIMIT: usize = 80;
 
-    /// These letters; `None` if they are too many.
-    #[inline(never)] // Its frame must not lie under the stages'.
+    /// Makes a text of `letters`, or returns `None` if they need more than [`TitleText::LIMIT`]
+    /// bytes.
+    // Not inlined, so that its stack frame is not below those of the stages.
+    #[inline(never)]
     pub fn new(letters: impl Iterator<Item = char>) -> Option<Self> {
         let mut text = Self::default();
         for letter in letters {
@@ -187,16 +196,16 @@ impl TitleText {
         Some(text)
     }
 
-    /// What it says.
+    /// Returns the text.
     pub fn as_str(&self) -> &str {
-        // Whole letters were put in, so it is UTF-8.
+        // Only whole letters were stored, so the bytes are valid UTF-8.
         let bytes = self.bytes.get(..usize::from(self.length)).unwrap_or(&[]);
         core::str::from_utf8(bytes).unwrap_or("")
     }
 }
 
 impl Default for TitleText {
-    /// No text.
+    /// Returns the empty text.
     fn default() -> Self {
         Self { bytes: [0; Self::LIMIT], length: 0 }
     }
@@ -241,29 +250,30 @@ fn offset(byte: u8) -> i32 {
     i32::from(byte) - i32::from(b'R')
 }
 
-/// A letter in its place, in the font's units.
+/// A letter at its position in the text, in the font's units.
 #[derive(Debug, Clone, Copy)]
 struct Placed {
     glyph: Glyph,
-    /// Of its middle line, from the beginning of the text.
+    /// Distance of its vertical middle line from the beginning of the text.
     x: i32,
-    /// Above where it would be by itself.
+    /// How far it is raised above its normal height.
     rise: i32,
 }
 
-/// The letters set so far, side by side, each accent over the letter before it.
+/// The state after the letters laid out so far, side by side, each accent above the letter before
+/// it.
 #[derive(Debug, Default)]
 struct TypeLine {
-    /// Where the next letter begins.
+    /// The x at which the next letter begins.
     end: i32,
-    /// The middle of the last letter.
+    /// The x of the middle of the last letter.
     middle: i32,
-    /// By how much an accent on it is raised.
+    /// How far an accent on the last letter is raised.
     rise: i32,
 }
 
 impl TypeLine {
-    /// Sets a letter, or a box if the font lacks it, and its accent.
+    /// Lays out a letter and its accent, or a box if the letter is not in the font.
     fn set(&mut self, letter: char, each: &mut dyn FnMut(Placed)) {
         let (base, accent) = decomposed(letter);
         for letter in [Some(base), accent].into_iter().flatten() {
@@ -281,7 +291,7 @@ impl TypeLine {
     }
 }
 
-/// The letter without its accent, and the accent.
+/// Returns the letter without its accent, and the accent.
 fn decomposed(letter: char) -> (char, Option<char>) {
     let mut rest = if letter.is_ascii() { "" } else { ACCENTED }.chars();
     while let (Some(composed), Some(base), accent) = (rest.next(), rest.next(), rest.next()) {

@@ -1,10 +1,13 @@
-//! The part of the page that may be drawn on, and what of a line is in it.
+//! Clips lines to the part of the page that may be drawn on.
+//!
+//! It is used where parts of the image may lie far off the page; see
+//! [`PageMap::fit_field`](super::PageMap::fit_field).
 
 use super::{Page, PagePoint, StepsPerMillimetre};
 use crate::curve::Fine;
 use crate::fixed::{divide_rounding, product};
 
-/// What the margins leave of a page, in 1/256 steps.
+/// The part of a page inside its margins (and above its foot), in 1/256 steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Window {
     low: Fine,
@@ -14,7 +17,8 @@ pub(super) struct Window {
 impl Window {
     pub fn new(page: &Page, steps: StepsPerMillimetre) -> Self {
         let to_fine = |bits: i64, axis: usize| {
-            (bits * i64::from(steps[axis].to_bits())) >> 24 // 32 fraction bits, 8 stay
+            // The product has 32 fraction bits, of which 8 are kept.
+            (bits * i64::from(steps[axis].to_bits())) >> 24
         };
         let far = [page.width, page.height]
             .map(|side| i64::from(side.to_bits()) - i64::from(page.margin.to_bits()));
@@ -24,11 +28,11 @@ impl Window {
         }
     }
 
-    /// The part of a line that is inside, in steps (Liang and Barsky, 1984); `None` if nothing is.
-    /// Coordinates within ±2^40.
+    /// Returns the part of a line that is inside the window, in steps (Liang and Barsky, 1984), or
+    /// `None` if no part is. Coordinates must be within ±2^40.
     pub fn clip(&self, [from, to]: [Fine; 2]) -> Option<[PagePoint; 2]> {
         let along = [0, 1].map(|axis: usize| to[axis] - from[axis]);
-        // Where the line enters and leaves, as ratios of numbers below 2^42.
+        // The parameters at which the line enters and leaves, as ratios of numbers below 2^42.
         let (mut enter, mut leave) = ((0, 1), (1, 1));
         let later = |a: (i64, i64), b: (i64, i64)| product(a.0, b.1) > product(b.0, a.1);
         for axis in [0, 1] {

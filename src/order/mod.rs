@@ -185,6 +185,9 @@ pub enum OrderError {
 /// Each segment occurs in the tour once. The pen is lifted wherever a leg does not begin where the
 /// leg before it ended. The segments of one pen follow each other, those of the lowest pen first.
 /// Each later pen begins at that end of its path that is nearer to where the pen before it ended.
+///
+/// # Errors
+/// See [`OrderError`].
 pub fn order(
     drawing: Drawing<'_>,
     options: Options,
