@@ -108,8 +108,8 @@ impl ProjectionChoice {
             }
             // All three axes are foreshortened equally: the elevation is atan(1 / sqrt 2).
             ("isometric", None) => axonometric(-45.0, 35.264_389_682_754_654),
-            // The x, y and z axes are foreshortened in the ratio 1 : 1/2 : 1. On the page, x and y lie
-            // at some 7 and 41 degrees to the horizontal.
+            // The x, y and z axes are foreshortened in the ratio 1 : 1/2 : 1. On the page, x and y
+            // lie at some 7 and 41 degrees to the horizontal.
             ("dimetric", None) => axonometric(-69.295_188_945_364_57, 19.471_220_634_490_69),
             ("trimetric", None) => axonometric(-60.0, 25.0),
             ("dimetric" | "trimetric" | "axonometric", Some(numbers)) => {

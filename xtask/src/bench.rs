@@ -1,4 +1,5 @@
-//! Instructions of each stage on a Cortex-M3, beside the times of the papers.
+//! Counts the instructions of each stage on a Cortex-M3, and prints them beside the times of the
+//! papers.
 
 use std::process::{Command, Stdio};
 
@@ -8,7 +9,8 @@ use crate::command::{cargo, describe, run};
 use crate::firmware::{self, Board};
 use crate::set_up;
 
-/// Seconds for a lattice of 1, 8, 27 … cubes: Griffith on an ICL 1904S, Brown on a PDP-11/34.
+/// Seconds for a lattice of 1, 8, 27 … cubes: Griffith's on an ICL 1904S, and Brown's on a
+/// PDP-11/34.
 const PAPERS: [[&str; 2]; 7] = [
     ["0.257", "2.73"],
     ["2.28", "13.88"],
@@ -19,17 +21,18 @@ const PAPERS: [[&str; 2]; 7] = [
     ["161", "did not fit"],
 ];
 
-/// Builds the Pico's image, runs it in its emulator, and prints the cycles of each stage (some 10 minutes).
+/// Builds the Pico's image, runs it in its emulator, and prints the cycles of each stage. This
+/// takes some 10 minutes.
 pub fn count_cycles() -> Result<()> {
     run_in_emulators(&[Board::Pico], "pico_cycles")
 }
 
-/// Builds both images and prints how deep their stacks become.
+/// Builds the images of all boards, and prints the greatest stack depth of each.
 pub fn deepest_stack() -> Result<()> {
     run_in_emulators(Board::ALL, "deepest_stack")
 }
 
-/// Builds what `example` runs in emulators, and runs it.
+/// Builds the images that `example` runs in emulators, and runs it.
 fn run_in_emulators(boards: &[Board], example: &str) -> Result<()> {
     for &board in boards {
         set_up::emulator(board)?;
@@ -39,12 +42,12 @@ fn run_in_emulators(boards: &[Board], example: &str) -> Result<()> {
     run(cargo().current_dir(crate::root()).args(["run", "--quiet", "--release"]).args(program))
 }
 
-/// Prints the table of scenes of `docs/performance.md`.
+/// Prints the table of scenes for `docs/performance.md`.
 pub fn count() -> Result<()> {
     print(&run_image("bench")?)
 }
 
-/// Prints the table of planning there.
+/// Prints the table of motion planning for the same document.
 pub fn count_motion() -> Result<()> {
     let counts = run_image("bench-motion")?;
     say!("| job | without a jerk | 100 m/s³ | 10 m/s³ | 1 m/s³ |")?;
@@ -55,13 +58,14 @@ pub fn count_motion() -> Result<()> {
     Ok(())
 }
 
-/// Builds a counting image and runs it: what it says.
+/// Builds a benchmark image, runs it in QEMU, and returns its output.
 fn run_image(name: &str) -> Result<String> {
     let target = Board::Lm3s6965.target();
     set_up::emulator(Board::Lm3s6965)?;
     let mut cargo = set_up::toolchain(target)?.cargo("build", target);
     let options = ["--package=penup", "--bin", name, "--profile=firmware", "--no-default-features"];
-    // Apart from the firmware's, so that neither is built anew for the other.
+    // A target directory of its own keeps the benchmark and the firmware from causing rebuilds of
+    // each other.
     let folder = crate::root().join("target/bench");
     run(cargo.arg("--quiet").args(options).args(["--features=mps2", "--target-dir"]).arg(&folder))?;
     let mut qemu = Command::new("qemu-system-arm");
@@ -99,9 +103,9 @@ fn print(counts: &str) -> Result<()> {
             say!("{line}")?;
             continue;
         };
-        // An edge has two corners, as of two faces or of one bar.
+        // Each edge accounts for two corners, of its two faces or of a bar.
         let edges = corners / 2;
-        // QEMU counts instructions; the core takes some five cycles for four.
+        // QEMU counts instructions; the core takes some five cycles for four of them.
         let seconds = (view + visibility) as f64 * 1.25 / 50e6;
         say!(
             "| {name} | {vertices} | {edges} | {} | {} | {} | {seconds:.3} | {griffith} | {brown} | {} |",
@@ -114,7 +118,7 @@ fn print(counts: &str) -> Result<()> {
     Ok(())
 }
 
-/// With a space after each three digits.
+/// The number in groups of three digits with spaces between them.
 fn thousands(number: u64) -> String {
     let digits = number.to_string();
     let groups: Vec<&str> = digits

@@ -1,4 +1,4 @@
-//! Running other programs.
+//! Runs other programs and prints messages.
 
 use std::env;
 use std::fmt;
@@ -14,7 +14,10 @@ pub fn cargo() -> Command {
     Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
 }
 
-/// Runs to the end; what it prints is shown.
+/// Runs a command to its end and shows its output.
+///
+/// # Errors
+/// The command cannot be run, or it fails.
 pub fn run(command: &mut Command) -> Result<()> {
     let name = describe(command);
     let status = command.status().with_context(|| format!("cannot run {name}"))?;
@@ -24,7 +27,7 @@ pub fn run(command: &mut Command) -> Result<()> {
     Ok(())
 }
 
-/// Runs to the end, but no longer than `limit`; what it prints is shown.
+/// Like [`run`], but kills the command after `limit`, which is an error.
 pub fn run_within(limit: Duration, command: &mut Command) -> Result<()> {
     let name = describe(command);
     let mut child = command.spawn().with_context(|| format!("cannot run {name}"))?;
@@ -42,7 +45,7 @@ pub fn run_within(limit: Duration, command: &mut Command) -> Result<()> {
     bail!("{name}: gave up after {} s", limit.as_secs())
 }
 
-/// What a program prints, trimmed; `None` if it is not there or fails.
+/// The standard output of a program, trimmed. `None` if the program does not exist or fails.
 pub fn output(program: &str, arguments: &[&str]) -> Option<String> {
     let Output { status, stdout, .. } = Command::new(program)
         .args(arguments)
@@ -61,10 +64,11 @@ pub fn describe(command: &Command) -> String {
     words.join(" ")
 }
 
-/// Prints a line to the standard output. If its reader has gone, as `head` does, the work goes on.
+/// Prints a line to the standard output. If the reader of the output has gone, as `head` may have,
+/// it does nothing and work continues.
 ///
 /// # Errors
-/// The output takes nothing, as that to a full disk.
+/// The output cannot be written, for example because the disk is full.
 pub fn say(text: fmt::Arguments<'_>) -> Result<()> {
     say_to(&mut io::stdout().lock(), text)
 }
@@ -77,7 +81,7 @@ fn say_to(output: &mut dyn Write, text: fmt::Arguments<'_>) -> Result<()> {
 }
 
 fn end(child: &mut Child) {
-    // Both fail only if it has just ended by itself.
+    // Both calls fail only if the child has just ended by itself.
     let _ = child.kill();
     let _ = child.wait();
 }

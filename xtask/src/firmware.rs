@@ -1,4 +1,4 @@
-//! A board's image: built, checked, measured.
+//! Builds, checks and measures the firmware image of a board.
 
 use std::path::{Path, PathBuf};
 use std::{fmt, fs};
@@ -21,7 +21,7 @@ pub enum Board {
     Pico,
 }
 
-/// A range of addresses: where it begins, how many bytes.
+/// A range of addresses: its start, and its size in bytes.
 #[derive(Clone, Copy)]
 struct Region {
     start: u64,
@@ -29,16 +29,20 @@ struct Region {
 }
 
 impl Region {
+    /// Whether the region contains `size` bytes from `start` on.
     fn holds(self, start: u64, size: u64) -> bool {
         start >= self.start && start + size <= self.start + self.size
     }
 }
 
 impl Board {
-    /// Every board.
+    /// All boards.
     pub const ALL: &[Self] = &[Self::Lm3s6965, Self::Pico];
 
-    /// The board that `--board` names among the options of another program, else the default one.
+    /// The board that `--board` names among the options of another program, or the default board.
+    ///
+    /// # Errors
+    /// There is no board of that name.
     pub fn from_options(options: &[String]) -> Result<Self> {
         let mut options = options.iter();
         while let Some(option) = options.next() {
@@ -60,7 +64,7 @@ impl Board {
         names.join(", ")
     }
 
-    /// Its name, which is its cargo feature too.
+    /// The board's name, which is also that of its cargo feature.
     pub fn name(self) -> &'static str {
         match self {
             Self::Lm3s6965 => "lm3s6965",
@@ -68,7 +72,7 @@ impl Board {
         }
     }
 
-    /// Its compiler target.
+    /// The compiler's name of the board's target.
     pub fn target(self) -> &'static str {
         match self {
             Self::Lm3s6965 => "thumbv7m-none-eabi",
@@ -76,7 +80,7 @@ impl Board {
         }
     }
 
-    /// How cargo builds its firmware, a profile of the workspace.
+    /// The cargo profile with which the board's firmware is built.
     fn profile(self) -> &'static str {
         match self {
             Self::Lm3s6965 => "firmware",
@@ -84,7 +88,8 @@ impl Board {
         }
     }
 
-    /// Where its log goes, a cargo feature. The Pico's image is the one that is flashed.
+    /// The cargo feature that chooses where the log goes. On the Pico it is the one for the real
+    /// board, because the same image is flashed.
     fn log(self) -> &'static str {
         match self {
             Self::Lm3s6965 => "log-semihosting",
@@ -92,7 +97,7 @@ impl Board {
         }
     }
 
-    /// The options by which cargo builds its firmware.
+    /// The options with which cargo builds the board's firmware.
     pub fn cargo_options(self) -> [String; 6] {
         let features = format!("{},{}", self.name(), self.log());
         let profile = format!("--profile={}", self.profile());
@@ -107,7 +112,7 @@ impl Board {
         .map(str::to_owned)
     }
 
-    /// Where the image goes.
+    /// The path of the image.
     pub fn image(self) -> PathBuf {
         crate::root().join(format!("target/firmware/{}.elf", self.name()))
     }
@@ -119,7 +124,8 @@ impl Board {
         }
     }
 
-    /// Where the vector table lies: on the Pico, behind what its boot ROM runs first.
+    /// The address of the vector table. On the Pico, it follows the boot loader that the boot ROM
+    /// runs first.
     fn vectors(self) -> u64 {
         match self {
             Self::Lm3s6965 => self.flash().start,
@@ -135,7 +141,8 @@ impl Board {
     }
 }
 
-/// Sets up the compiler, builds, and returns the image's path.
+/// Sets up the compiler, builds the firmware, and returns the path of the image. For the Pico, it
+/// also writes the image as UF2.
 pub fn build(board: Board) -> Result<PathBuf> {
     let toolchain = set_up::toolchain(board.target())?;
     let directory = match toolchain {
@@ -144,7 +151,7 @@ pub fn build(board: Board) -> Result<PathBuf> {
     };
     let mut cargo = toolchain.cargo("build", board.target());
     if toolchain == Toolchain::Rustup {
-        // So that the image is found whatever the user's configuration says.
+        // The image is then found whatever the user's configuration says.
         cargo.args(["--target-dir", directory]);
     }
     run(cargo.arg("--quiet").args(board.cargo_options()))?;
@@ -159,37 +166,38 @@ pub fn build(board: Board) -> Result<PathBuf> {
     Ok(image)
 }
 
-/// What an image may take of a board, in bytes. Whoever needs more raises it here, and says why.
+/// The memory that an image may use on a board, in bytes. A change that needs more raises the limit
+/// here and gives the reason.
 struct Budget {
     flash: u64,
     ram: u64,
-    /// At least.
+    /// The least size of the stack.
     stack: u64,
 }
 
 impl Board {
     fn budget(self) -> Budget {
         match self {
-            // All that the linker leaves: it refuses what is beyond.
+            // All that the linker leaves beside the stack. The linker itself refuses larger images.
             Self::Lm3s6965 => Budget { flash: 256 << 10, ram: 55_696, stack: 9_792 },
-            // As much as the memory map leaves beside the records and the stack (boards/pico.x).
+            // All that the memory map leaves beside the records and the stack (boards/pico.x).
             Self::Pico => Budget { flash: 1760 << 10, ram: 252 << 10, stack: 12 << 10 },
         }
     }
 }
 
-/// What an image takes of the board.
+/// The memory that an image uses on its board, in bytes.
 pub struct Sizes {
     board: Board,
     flash: u64,
     ram: u64,
     stack: u64,
-    /// Each section: its name, its bytes.
+    /// The name and size of each section.
     sections: Vec<(String, u64)>,
 }
 
 impl Sizes {
-    /// Refuses what takes more than its budget.
+    /// Refuses an image that exceeds its budget.
     fn keep_budget(&self) -> Result<()> {
         let Budget { flash, ram, stack } = self.board.budget();
         let name = self.board.name();
@@ -216,10 +224,13 @@ impl fmt::Display for Sizes {
     }
 }
 
-/// Checks that the image links as the board boots: the vector table where it looks for it, the stack
-/// at the start of RAM, the entry in flash, every section within the memory. A wrong memory map or
-/// lost link arguments give no linker error, only such an image. On the Pico, that the steps do not
-/// wait for flash.
+/// Checks that the image is linked as the board boots it. The vector table must be where the board
+/// looks for it, the stack at the start of RAM, the entry in flash, and every section within the
+/// memory. A wrong memory map or missing link arguments cause no linker error, only such an image.
+/// For the Pico, this also checks that the step interrupt never waits for flash.
+///
+/// # Errors
+/// The image fails a check or exceeds the board's budget.
 pub fn check(board: Board, image: &Path) -> Result<Sizes> {
     let bytes = fs::read(image).with_context(|| format!("cannot read {}", image.display()))?;
     let elf = object::File::parse(&*bytes)?;
@@ -252,7 +263,7 @@ pub fn check(board: Board, image: &Path) -> Result<Sizes> {
         let bytes = table.get(4 * index..4 * index + 4).context("the vector table is cut off")?;
         Ok(u64::from(u32::from_le_bytes(bytes.try_into()?)))
     };
-    // The stack lies at the start of RAM, so that running over is a fault.
+    // The stack lies at the start of RAM, so that an overflow causes a fault.
     let (stack, entry) = (word(0)?, word(1)?);
     ensure!(
         stack > ram.start && stack < ram.start + ram.size,
@@ -274,7 +285,7 @@ pub fn check(board: Board, image: &Path) -> Result<Sizes> {
             continue;
         }
         let (start, size) = (section.address(), section.size());
-        // The log's strings stay on the host.
+        // The strings of the log are not part of the image; they stay on the host.
         if section.name()? == ".defmt" {
             continue;
         }
@@ -283,7 +294,7 @@ pub fn check(board: Board, image: &Path) -> Result<Sizes> {
             sizes.flash += size;
         } else if ram.holds(start, size) {
             sizes.ram += size;
-            // Initial values are copied from flash.
+            // Initial values are copied from flash, so they take space there, too.
             if section.file_range().is_some() {
                 sizes.flash += size;
             }

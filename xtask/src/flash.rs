@@ -1,5 +1,5 @@
-//! The image onto the board: by a debug probe, or onto the drive that a Pico shows, which a running
-//! penup is asked for.
+//! Writes the image to a board: by a debug probe, or by copying it to the drive that a Pico shows.
+//! A Pico on which penup runs is first asked to show this drive.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,11 +12,15 @@ use crate::command::{output, run};
 use crate::firmware::{self, Board};
 
 const CHIP: &str = "RP2040";
-/// What a Pico in BOOTSEL mode has on its drive.
+/// The file that identifies the drive of a Pico in BOOTSEL mode.
 const DRIVE_MARK: &str = "INFO_UF2.TXT";
 
-/// Builds the firmware and writes it: by probe-rs if it finds a probe, else onto the Pico's drive,
-/// for which a running penup is asked if there is none yet.
+/// Builds the firmware and writes it to the board. If probe-rs finds a probe, that is used.
+/// Otherwise the image is copied to the Pico's drive. If there is no drive yet, a running penup is
+/// asked for it.
+///
+/// # Errors
+/// The board is emulated only, no board is connected, or writing fails.
 pub fn flash(board: Board) -> Result<()> {
     if board != Board::Pico {
         bail!("{} is emulated only: `cargo plot --board {}` runs it", board.name(), board.name());
@@ -41,10 +45,10 @@ pub fn flash(board: Board) -> Result<()> {
     bail!("no board is connected: {probe}, and no Pico shows its drive.\n{}", by_hand(&image))
 }
 
-/// Asks a Pico on which penup runs for its drive: opens its USB port at 1200 baud, closes it, and
-/// waits some seconds.
+/// Asks a Pico on which penup runs to show its drive. This opens its USB port at 1200 baud, closes
+/// it, and waits some seconds for the drive.
 fn touched_drive() -> Option<PathBuf> {
-    /// Between two looks, and how many there are.
+    /// The pause between two looks for the drive; `LOOKS` is their number.
     const PAUSE: Duration = Duration::from_millis(250);
     const LOOKS: u32 = 40;
     let port = penup_port()?;
@@ -58,11 +62,11 @@ fn touched_drive() -> Option<PathBuf> {
     })
 }
 
-/// The USB port of a Pico with penup, as Linux and macOS name it.
+/// The USB port of a Pico on which penup runs, found by its name on Linux and macOS.
 fn penup_port() -> Option<PathBuf> {
     let by_id = entries("/dev/serial/by-id");
     let named = by_id.into_iter().find(|path| path.to_string_lossy().contains("penup_pen_plotter"));
-    // macOS tells no names: only if there is one such port.
+    // macOS does not show the device's name, so a port is accepted only if it is the only one.
     named.or_else(|| {
         let mut ports = entries("/dev");
         ports.retain(|path| path.to_string_lossy().starts_with("/dev/cu.usbmodem"));
@@ -70,12 +74,13 @@ fn penup_port() -> Option<PathBuf> {
     })
 }
 
+/// The paths of all entries of a directory.
 fn entries(directory: &str) -> Vec<PathBuf> {
     let entries = fs::read_dir(directory).into_iter().flatten().flatten();
     entries.map(|entry| entry.path()).collect()
 }
 
-/// What the user does without this program.
+/// Instructions for flashing `image` without this program.
 pub fn by_hand(image: &Path) -> String {
     format!(
         "To flash by hand: hold BOOTSEL on the Pico while you plug it in, then copy {} onto the drive \
@@ -84,7 +89,7 @@ pub fn by_hand(image: &Path) -> String {
     )
 }
 
-/// The drive of a Pico in BOOTSEL mode, where systems mount drives.
+/// The drive of a Pico in BOOTSEL mode, in the directories where operating systems mount drives.
 fn drive() -> Option<PathBuf> {
     let user = std::env::var("USER").unwrap_or_default();
     let places = [format!("/media/{user}"), format!("/run/media/{user}"), "/Volumes".to_owned()];

@@ -1,4 +1,4 @@
-//! The pictures of the papers, drawn by penup, on one page.
+//! Makes the gallery: a page with the figures of the papers, drawn by penup.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -7,24 +7,30 @@ use anyhow::{Context, Result};
 
 use crate::command::run;
 
-/// A figure: the paper's number and words, a scene, and how it is seen.
+/// A figure of the page.
 struct Figure {
+    /// The figure's number and caption in the paper.
     title: &'static str,
+    /// The name of the scene's file, without its ending.
     scene: &'static str,
+    /// The options with which it is drawn.
     view: &'static [&'static str],
-    /// Drawn once like this; else once with hidden lines dotted and once erased.
+    /// Whether the figure is drawn once, with only these options. Otherwise it is drawn twice: with
+    /// hidden lines dotted, and erased.
     alone: bool,
 }
 
+/// A figure that is drawn with hidden lines dotted, and again with hidden lines erased.
 const fn hidden(title: &'static str, scene: &'static str, view: &'static [&'static str]) -> Figure {
     Figure { title, scene, view, alone: false }
 }
 
+/// A figure that is drawn once.
 const fn plain(title: &'static str, scene: &'static str, view: &'static [&'static str]) -> Figure {
     Figure { title, scene, view, alone: true }
 }
 
-/// The chapters of the page.
+/// The chapters of the page, with their figures.
 const CHAPTERS: [(&str, &[Figure]); 6] = [
     (
         "Projections (Harrison, chapter 2)",
@@ -114,7 +120,7 @@ fn draw(figure: &Figure, hidden: &str, to: &str) -> Result<()> {
     run(&mut crate::client("preview", &options))
 }
 
-/// What of the options goes into a file's name.
+/// The part of a file's name that the options give.
 fn words(view: &[&str]) -> String {
     let text = view.join("-").replace(['=', ',', ' '], "-");
     let plain = |letter: &char| letter.is_ascii_alphanumeric() || ".-".contains(*letter);

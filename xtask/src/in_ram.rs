@@ -1,15 +1,15 @@
-//! Checks on the Pico's image that the step interrupt never waits for flash, and divides nothing.
+//! Checks that in the Pico's image the step interrupt never waits for flash and never divides.
 //!
-//! The RP2040 runs code from flash behind a cache, and each miss takes some 50 cycles. Between two
-//! blocks of steps the state machine lives on a queue of 8 words, which lasts 2000 cycles at the
-//! greatest rate. So the handlers of the steps, the functions that mask all interrupts, and
-//! everything that these call must lie in RAM, with the constants that they read. The handlers must
-//! not divide either, because the chip's divider holds the state of the division that they
-//! interrupt (`src/boards/pico/divider.rs`).
+//! The RP2040 runs code from flash through a cache, and each miss costs some 50 cycles. Between two
+//! blocks of steps, the state machine is fed from a queue of 8 words, which lasts 2000 cycles at
+//! the highest rate. Therefore the handlers of the steps, the functions that mask all interrupts,
+//! and everything that these call must lie in RAM, together with the constants that they read. In
+//! addition, the handlers must not divide, because the chip's divider holds the state of the
+//! division that they interrupt (`src/boards/pico/divider.rs`).
 //!
-//! The check reads the linked image: it decodes the branches of each function, follows them through
-//! the linker's veneers, and looks at the addresses that lie among the code. Calls by pointer
-//! cannot be followed; they are refused unless [`INDIRECT`] names what they may reach.
+//! The check reads the linked image. It decodes the branches of each function, follows them through
+//! the linker's veneers, and looks at the addresses that lie among the code. It cannot follow calls
+//! by pointer; they are refused unless [`INDIRECT`] lists their possible targets.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -18,44 +18,50 @@ use anyhow::{Context, Result, bail, ensure};
 use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
 use rustc_demangle::demangle;
 
-/// The handlers of the steps and of what shares their queue.
+/// The interrupt handlers of the steps and of the events that share their queue.
 const HANDLERS: [&str; 2] = ["DMA_IRQ_0", "PIO0_IRQ_0"];
 
-/// Parts of the names of functions that may mask all interrupts although they lie in flash: nothing
-/// moves then.
+/// Parts of the names of functions that may mask all interrupts although they lie in flash, because
+/// nothing moves while they run.
 const MASK_AT_REST: [&str; 6] = [
-    // Set-up, before any interrupt.
+    // Set-up, before interrupts are enabled.
     "pico::take",
-    // Erasing and writing, which callers do only at rest; the flash cannot be read at all then.
+    // Erasing and writing flash. Callers do so only while the machine is stopped, because flash
+    // cannot be read meanwhile.
     "pico::flash",
     "NorFlash>",
-    // The end of everything.
+    // Handlers of emergencies and faults, after which nothing moves.
     "pico::emergency",
     "fault::hard_fault",
     "fault::panic",
 ];
 
-/// Parts of the names of functions that call by pointer, and of those that they may reach so.
+/// Parts of the names of functions that call by pointer, each with parts of the names of the
+/// functions that it may reach that way.
 type Indirect<'l> = &'l [(&'l str, &'l [&'l str])];
 const INDIRECT: Indirect = &[];
 
 const ADVICE: &str = "The step interrupt must not wait for flash. Place the function in RAM, by \
     #[unsafe(link_section = \".data.in_ram\")], or let it be inlined into its caller, by #[inline(always)].";
 
-/// Checks the image of a Pico whose RAM and flash are these.
+/// Checks the image of a Pico whose RAM and flash have these addresses.
+///
+/// # Errors
+/// A function or constant that must lie in RAM lies in flash, a handler divides, or a call by
+/// pointer is not listed.
 pub fn check(elf: &object::File, ram: Range<u64>, flash: Range<u64>) -> Result<()> {
     let image = Image::read(elf)?;
     Graph { image: &image, ram, flash, indirect: INDIRECT }.check()
 }
 
-/// What of an image is needed.
+/// The parts of an image that the check needs.
 #[derive(Default)]
 struct Image {
-    /// The bytes of each section, by where it begins.
+    /// The bytes of each section, by its address.
     memory: BTreeMap<u64, Vec<u8>>,
-    /// Each function's name and end, by where it begins.
+    /// The name and end address of each function, by its address.
     functions: BTreeMap<u64, (String, u64)>,
-    /// From each of these addresses on there is code (true) or data.
+    /// The addresses from which on there is code (`true`) or data.
     marks: BTreeMap<u64, bool>,
 }
 
@@ -81,8 +87,8 @@ impl Image {
         Ok(image)
     }
 
-    /// Functions in assembly tell no size: they end where the next one begins, or with their
-    /// section.
+    /// Gives functions written in assembly, which have no size, an end: the start of the next
+    /// function, or the end of their section.
     fn end_functions(&mut self) {
         let starts: Vec<u64> = self.functions.keys().copied().collect();
         for (index, start) in starts.iter().enumerate() {
@@ -97,6 +103,7 @@ impl Image {
         }
     }
 
+    /// The half word at an address.
     fn half(&self, address: u64) -> Option<u32> {
         let (start, bytes) = self.memory.range(..=address).next_back()?;
         let at = usize::try_from(address - start).ok()?;
@@ -104,16 +111,18 @@ impl Image {
         Some(u32::from(u16::from_le_bytes(half.try_into().ok()?)))
     }
 
+    /// The word at an address.
     fn word(&self, address: u64) -> Option<u64> {
         Some(u64::from(self.half(address)? | self.half(address + 2)? << 16))
     }
 
+    /// Whether there is code, not data, at an address.
     fn is_code(&self, address: u64) -> bool {
         self.marks.range(..=address).next_back().is_none_or(|(_, is_code)| *is_code)
     }
 
-    /// Where a branch to this address leads, past the linker's veneer: `PUSH {r0, r1}`,
-    /// `LDR r0, [PC, #4]`, `STR r0, [SP, #4]`, `POP {r0, PC}`, the address.
+    /// The target of a branch to this address, which may be a veneer of the linker: `PUSH {r0,
+    /// r1}`, `LDR r0, [PC, #4]`, `STR r0, [SP, #4]`, `POP {r0, PC}`, and the target.
     fn past_veneer(&self, address: u64) -> u64 {
         const VENEER: [u32; 4] = [0xB403, 0x4801, 0x9001, 0xBD01];
         let is_veneer = (0..)
@@ -125,6 +134,7 @@ impl Image {
         }
     }
 
+    /// The name of the function at an address, or the address.
     fn name(&self, address: u64) -> String {
         match self.functions.range(..=address).next_back() {
             Some((_, (name, end))) if address < *end => name.clone(),
@@ -133,22 +143,22 @@ impl Image {
     }
 }
 
-/// What an instruction does that matters here.
+/// The effects of an instruction that matter to the check.
 #[derive(Debug, PartialEq, Eq)]
 enum Effect {
     Nothing,
     /// A branch or a call to this address.
     Branch(u64),
-    /// A call or a jump to where a register points.
+    /// A call or a jump to the address in a register.
     Indirect,
-    /// All interrupts are masked.
+    /// The instruction masks all interrupts.
     Mask,
 }
 
-/// The instruction at this address, of one or two half words (ARMv6-M Architecture Reference
-/// Manual, A5): its length, and what it does.
+/// Decodes the instruction at this address, of one or two half words (ARMv6-M Architecture
+/// Reference Manual, A5). Returns its length in bytes and its effect.
 fn decode(address: u64, first: u32, second: u32) -> (u64, Effect) {
-    /// The lower `bits` with their sign.
+    /// The lower `bits` of a value, sign-extended.
     fn signed(value: u32, bits: u32) -> i64 {
         i64::from((value << (32 - bits)).cast_signed() >> (32 - bits))
     }
@@ -166,7 +176,7 @@ fn decode(address: u64, first: u32, second: u32) -> (u64, Effect) {
     const LINK: u32 = 14;
     let effect = match first {
         0xB672 => Effect::Mask,
-        // BX and BLX, MOV and ADD to the program counter.
+        // BX, BLX, and MOV and ADD to the program counter. BX to the link register is a return.
         _ if first & 0xFF87 == 0x4700 && first >> 3 & 15 == LINK => Effect::Nothing,
         _ if [0x4700, 0x4780, 0x4687, 0x4487].contains(&(first & 0xFF87)) => Effect::Indirect,
         _ if first >> 11 == 0b11100 => target(signed(first << 1, 12)),
@@ -176,6 +186,7 @@ fn decode(address: u64, first: u32, second: u32) -> (u64, Effect) {
     (2, effect)
 }
 
+/// The call graph of an image, with the rules for it.
 struct Graph<'i> {
     image: &'i Image,
     ram: Range<u64>,
@@ -203,7 +214,7 @@ impl Graph<'_> {
         Ok(())
     }
 
-    /// Of each instruction of a function.
+    /// The effect of each instruction of a function.
     fn effects(&self, start: u64, end: u64) -> impl Iterator<Item = Effect> {
         let mut at = start;
         std::iter::from_fn(move || {
@@ -302,7 +313,8 @@ mod tests {
     const FLASH: u64 = 0x1000_0000;
     const RETURN: u16 = 0x4770;
 
-    /// Functions by name, address and half words; behind the first word of 0 there is data.
+    /// An image of functions given by name, address and half words. Data begins at the first half
+    /// word that is 0.
     fn image(functions: &[(&str, u64, &[u16])]) -> Image {
         let mut image = Image::default();
         let idle = ("PIO0_IRQ_0", RAM + 0xF00, &[RETURN][..]);

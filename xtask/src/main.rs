@@ -1,9 +1,11 @@
-//! Set-up, build, emulate, flash, size: `cargo xtask` lists what it can do.
+//! The development tool of penup: it sets up, builds, tests, emulates and flashes. `cargo xtask`
+//! lists its commands.
 //!
-//! Every command sets up what it lacks and says what it installs; what it cannot install it names,
+//! Every command installs what it lacks and says so. If it cannot install something, it names it,
 //! with the command that does. A second run finds everything and installs nothing.
 //!
-//! What it says goes through `say!`: the standard library's macros panic where nobody listens.
+//! Messages go through `say!`, because the standard library's macros panic if the output has been
+//! closed.
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
 /// Prints a line to the standard output; see [`command::say`].
@@ -22,7 +24,8 @@ mod set_up;
 mod side_by_side;
 mod test;
 mod uf2;
-// The client's: xtask builds the client, and does not wait for it.
+// This file belongs to the client. xtask builds the client as a command, so it does not depend on
+// it as a crate.
 #[path = "../../client/src/workspace.rs"]
 mod workspace;
 
@@ -110,8 +113,8 @@ fn main() -> ExitCode {
     match carry_out() {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            // Without the backtrace that `Debug` adds: the sentence is for the user.
-            // Where nobody can be told the exit code must do.
+            // `Display` adds no backtrace: the message is for the user. If it cannot be written,
+            // the exit code must suffice.
             let _ = writeln!(std::io::stderr(), "penup: {error:#}");
             ExitCode::FAILURE
         }
@@ -153,7 +156,7 @@ fn carry_out() -> Result<()> {
     Ok(())
 }
 
-/// Runs the client, and for an emulated board builds its firmware first.
+/// Runs the client. For an emulated board, it first builds the board's firmware.
 fn plot(arguments: &[String]) -> Result<()> {
     let mut client = client("plot", arguments);
     let at_a_port = arguments.iter().any(|argument| argument.starts_with("--port"));
@@ -166,13 +169,13 @@ fn plot(arguments: &[String]) -> Result<()> {
     }
     let status = client.status().with_context(|| format!("cannot run {}", describe(&client)))?;
     if !status.success() {
-        // It has said why itself.
+        // The client has reported the reason itself.
         std::process::exit(status.code().unwrap_or(1));
     }
     Ok(())
 }
 
-/// The client's command, run where the user stands.
+/// The command that runs the client, in the user's current directory.
 fn client(command: &str, arguments: &[String]) -> Command {
     let mut client = cargo();
     client
@@ -184,7 +187,7 @@ fn client(command: &str, arguments: &[String]) -> Command {
     client
 }
 
-/// The workspace's root.
+/// The root directory of the workspace.
 fn root() -> PathBuf {
     workspace::root()
 }

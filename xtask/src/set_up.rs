@@ -1,4 +1,4 @@
-//! What building and testing need, found or installed.
+//! Finds or installs what building and testing need.
 //!
 //! | what | found as | installed by |
 //! |---|---|---|
@@ -17,22 +17,25 @@ use anyhow::{Result, bail, ensure};
 use crate::command::{cargo, describe, output, run, run_within};
 use crate::firmware::Board;
 
-/// Who compiles for a target.
+/// The compiler that builds for a target.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Toolchain {
-    /// The compiler in use, with `core` from rustup.
+    /// The Rust compiler in use, with `core` from rustup.
     Rustup,
     /// Debian's compiler, which builds `core` from Debian's sources.
     Debian,
 }
 
-/// rustup takes seconds where it can fetch, and may hang where it cannot.
+/// Time limit for rustup. It takes seconds if the network can be reached, and may hang otherwise.
 const RUSTUP_LIMIT: Duration = Duration::from_secs(120);
 
 const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
 const DEBIAN_CORE: &str = "lib/rustlib/src/rust/library/core/Cargo.toml";
 
-/// A compiler for `target`.
+/// Finds or installs a compiler for `target`.
+///
+/// # Errors
+/// There is none, and none can be installed.
 pub fn toolchain(target: &str) -> Result<Toolchain> {
     if has_core(target) {
         return Ok(Toolchain::Rustup);
@@ -41,7 +44,7 @@ pub fn toolchain(target: &str) -> Result<Toolchain> {
     if !refusal.exists() && output("rustup", &["--version"]).is_some() {
         say!("penup: installing the Rust target {target} by rustup")?;
         let mut rustup = Command::new("rustup");
-        // A backtrace of rustup's would hide its one line of reason.
+        // A backtrace would hide the one line in which rustup gives its reason.
         rustup.args(["target", "add", target]).env("RUST_BACKTRACE", "0");
         match run_within(RUSTUP_LIMIT, &mut rustup) {
             Ok(()) if has_core(target) => return Ok(Toolchain::Rustup),
@@ -65,14 +68,16 @@ pub fn toolchain(target: &str) -> Result<Toolchain> {
     Ok(Toolchain::Debian)
 }
 
-/// A file that says that rustup could not give `target` to the compiler in use, so that the next
-/// run does not wait for it again. A new compiler or `cargo clean` forgets it.
+/// The path of a file that records that rustup could not install `target` for the compiler in use,
+/// so that the next run does not wait for it again. A new compiler has another file, and `cargo
+/// clean` deletes it.
 fn refusal(target: &str) -> PathBuf {
     let version = output("rustc", &["--version"]).unwrap_or_default();
     let number = version.split(' ').nth(1).unwrap_or("unknown");
     crate::root().join(format!("target/set-up/rustc-{number}-without-{target}"))
 }
 
+/// Whether the compiler in use has `core` for `target`.
 fn has_core(target: &str) -> bool {
     let Some(directory) = output("rustc", &["--print", "target-libdir", "--target", target]) else {
         return false;
@@ -81,6 +86,7 @@ fn has_core(target: &str) -> bool {
     files.map(|file| file.file_name()).any(|name| name.to_string_lossy().starts_with("libcore-"))
 }
 
+/// Whether Debian's compiler, its sources of `core` and its linker are installed.
 fn debian_is_ready() -> bool {
     output("ld.lld", &["--version"]).is_some()
         && output(DEBIAN_RUSTC, &["--print", "sysroot"])
@@ -88,12 +94,13 @@ fn debian_is_ready() -> bool {
 }
 
 impl Toolchain {
-    /// A cargo command, as `build`, `check` or `clippy`, that compiles for `target`.
+    /// A cargo command (such as `build`, `check` or `clippy`) that compiles for `target`.
     pub fn cargo(self, command: &str, target: &str) -> Command {
         let mut cargo = cargo();
         cargo.current_dir(crate::root()).args([command, "--target", target]);
         if self == Self::Debian {
-            // Debian's std for proc macros and build scripts stays apart from rustup's.
+            // Its own target directory keeps Debian's std for proc macros and build scripts apart
+            // from rustup's.
             cargo
                 .args(["-Zbuild-std=core", "--target-dir", "target/debian"])
                 .env("RUSTC", DEBIAN_RUSTC)
@@ -104,12 +111,12 @@ impl Toolchain {
     }
 }
 
-/// The variable by which cargo is told a target's linker.
+/// The environment variable that tells cargo the linker of a target.
 fn linker_variable(target: &str) -> String {
     format!("CARGO_TARGET_{}_LINKER", target.to_uppercase().replace('-', "_"))
 }
 
-/// What emulates `board`.
+/// Finds or installs the emulator of `board`.
 pub fn emulator(board: Board) -> Result<()> {
     match board {
         Board::Lm3s6965 => qemu(),
@@ -117,7 +124,7 @@ pub fn emulator(board: Board) -> Result<()> {
     }
 }
 
-/// QEMU for Arm.
+/// Finds or installs QEMU for Arm.
 fn qemu() -> Result<()> {
     const PROGRAM: &str = "qemu-system-arm";
     let found = || output(PROGRAM, &["--version"]).is_some();
@@ -130,11 +137,12 @@ fn qemu() -> Result<()> {
     Ok(())
 }
 
-/// npm takes seconds where it can fetch, and may hang where it cannot.
+/// Time limit for npm. It takes seconds if the network can be reached, and may hang otherwise.
 const NPM_LIMIT: Duration = Duration::from_secs(120);
 const LEAST_NODE: u32 = 18;
 
-/// Node, and rp2040js as the lock file beside the client's emulator has it.
+/// Finds or installs Node, and rp2040js in the version of the lock file beside the client's
+/// emulator.
 fn rp2040js() -> Result<()> {
     let node = || -> Option<u32> {
         let version = output("node", &["--version"])?;
@@ -151,7 +159,7 @@ fn rp2040js() -> Result<()> {
     let from = crate::root().join("client/src/emulator/rp2040js");
     let to = crate::root().join("target/rp2040js");
     let lock = fs::read(from.join("package-lock.json"))?;
-    // npm writes this last.
+    // npm writes this file last, so if it exists, the installation is complete.
     let done = to.join("node_modules/.package-lock.json");
     if done.exists() && fs::read(to.join("package-lock.json")).is_ok_and(|found| found == lock) {
         return Ok(());
@@ -168,7 +176,7 @@ fn rp2040js() -> Result<()> {
     run_within(NPM_LIMIT, npm.current_dir(&to))
 }
 
-/// Installs Debian packages, or elsewhere brew's.
+/// Installs Debian packages if there is apt, else a package of Homebrew if there is brew.
 fn install(debian: &[&str], brew: &str) -> Result<()> {
     if output("apt-get", &["--version"]).is_some() {
         return apt_install(debian);
@@ -180,7 +188,7 @@ fn install(debian: &[&str], brew: &str) -> Result<()> {
     Ok(())
 }
 
-/// rustfmt and clippy, which a minimal Rust lacks.
+/// Finds or installs rustfmt and clippy, which a minimal Rust installation lacks.
 pub fn checkers() -> Result<()> {
     for (command, component) in [("fmt", "rustfmt"), ("clippy", "clippy")] {
         let found = || output(&cargo_program(), &[command, "--version"]).is_some();
@@ -202,7 +210,8 @@ fn cargo_program() -> String {
     cargo().get_program().to_string_lossy().into_owned()
 }
 
-/// Installs Debian packages; refreshes apt's lists if they are too old or missing.
+/// Installs Debian packages. If that fails, it refreshes apt's package lists, which may be outdated
+/// or missing, and tries once more.
 fn apt_install(packages: &[&str]) -> Result<()> {
     say!("penup: installing {} by apt-get", packages.join(" "))?;
     let install = || {
@@ -224,7 +233,8 @@ fn apt_install(packages: &[&str]) -> Result<()> {
     }
 }
 
-/// A command run as root: directly by root, else through sudo, which may ask for the password.
+/// A command that runs as root: directly if the user is root, else through sudo, which may ask for
+/// the password.
 fn as_root(program: &str) -> Command {
     let is_root = output("id", &["-u"]).is_some_and(|user| user == "0");
     let mut command = if is_root {

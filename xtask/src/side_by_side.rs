@@ -1,5 +1,5 @@
-//! Test programs side by side. Cargo runs one after the other, and while the longest test of one ends, the other
-//! cores wait.
+//! Runs test programs in parallel. Cargo runs them one after the other, so that the other cores are
+//! idle while the longest test of each program ends.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -12,10 +12,11 @@ use serde_json::Value;
 
 use crate::command::describe;
 
-/// Test programs whose names begin so are the longest, and run first.
+/// The prefixes of the names of the longest test programs, which run first.
 const LONGEST: [&str; 2] = ["pico_", "qemu_"];
 
-/// Builds what the command `cargo test …` would run, but for the doctests: each program, to be run in its package's directory.
+/// Builds what the command `cargo test …` would run, except the doctests. Returns a command for
+/// each test program, with its package's directory as the current one.
 pub fn built_by(cargo_test: &mut Command) -> Result<Vec<Command>> {
     cargo_test.args(["--no-run", "--message-format=json-render-diagnostics"]);
     let name = describe(cargo_test);
@@ -40,8 +41,8 @@ pub fn built_by(cargo_test: &mut Command) -> Result<Vec<Command>> {
     Ok(programs.into_iter().map(|(_, command)| command).collect())
 }
 
-/// Runs as many at once as there are cores, in their order; what each prints is shown when it ends. After a failure none is
-/// begun.
+/// Runs the programs in the given order, as many at a time as there are cores. The output of each
+/// is shown when it ends. After a failure, no further program is started.
 pub fn run(programs: Vec<Command>) -> Result<()> {
     let cores = thread::available_parallelism().map_or(1, usize::from);
     let waiting = Mutex::new(programs.into_iter());

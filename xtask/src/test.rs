@@ -1,4 +1,4 @@
-//! Every check there is, in the order of what fails fastest.
+//! Runs all checks, those first that fail fastest.
 
 use std::process::Command;
 
@@ -9,7 +9,7 @@ use crate::firmware::{self, Board};
 use crate::set_up::{self, Toolchain};
 use crate::side_by_side;
 
-/// Sets up, then runs everything; ends at the first failure.
+/// Installs what is missing, then runs all checks. It stops at the first failure.
 pub fn everything() -> Result<()> {
     set_up::checkers()?;
     for &board in Board::ALL {
@@ -33,7 +33,7 @@ pub fn everything() -> Result<()> {
             .args(["--workspace", "--no-deps", "--document-private-items"])
             .env("RUSTDOCFLAGS", "-Dwarnings"),
     )?;
-    // With the emulator's tests, and every doctest.
+    // The tests include those in the emulators, and all doctests.
     let mut tests = side_by_side::built_by(workspace("test").arg("--workspace").args(EMULATOR))?;
     let mut doctests = workspace("test");
     doctests.args(["--workspace", "--doc"]).args(EMULATOR);
@@ -41,10 +41,10 @@ pub fn everything() -> Result<()> {
     side_by_side::run(tests)
 }
 
-/// The tests that need the emulators and the firmware.
+/// The options that enable the tests that need the emulators and the firmware.
 const EMULATOR: [&str; 2] = ["--features", "penup-host-tests/emulator"];
 
-/// As many random scenes as wanted, where `everything` has 2,000.
+/// Compares `count` random scenes with an exact model; `everything` does 2,000.
 pub fn random_scenes(count: u32) -> Result<()> {
     step(
         workspace("test")
@@ -54,7 +54,7 @@ pub fn random_scenes(count: u32) -> Result<()> {
     )
 }
 
-/// As many random convex solids of each kind as wanted, where `everything` has 4,000.
+/// Compares `count` random convex solids of each kind with an exact model; `everything` does 4,000.
 pub fn random_solids(count: u32) -> Result<()> {
     step(
         workspace("test")
@@ -65,18 +65,18 @@ pub fn random_solids(count: u32) -> Result<()> {
     )
 }
 
-/// As many losses of power as wanted, where `everything` has 200 of each kind; from 4864 on, before every byte of
-/// flash that a save changes.
+/// Simulates `count` power failures of each kind; `everything` does 200. From 4864 on, the power
+/// fails before every byte of flash that a save changes.
 pub fn power_cuts(count: u32) -> Result<()> {
     step(on_the_pico("pico_power")?.env("PENUP_CUTS", count.to_string()))
 }
 
-/// The largest scene of the Pico, from its upload to the last step.
+/// Runs the largest scene of the Pico on its emulator, from the upload to the last step.
 pub fn lattice7() -> Result<()> {
     step(on_the_pico("pico_lattice7")?.args(["--", "--ignored"]))
 }
 
-/// Builds the Pico's image; the command of a test that runs it.
+/// Builds the Pico's image, and returns the command of a test that runs it.
 fn on_the_pico(test: &str) -> Result<Command> {
     set_up::emulator(Board::Pico)?;
     firmware::check(Board::Pico, &firmware::build(Board::Pico)?)?;
@@ -85,13 +85,15 @@ fn on_the_pico(test: &str) -> Result<Command> {
     Ok(cargo)
 }
 
+/// A cargo command that runs in the root of the workspace.
 fn workspace(command: &str) -> Command {
     let mut cargo = cargo();
     cargo.current_dir(crate::root()).arg(command);
     cargo
 }
 
-/// Lints as the board's compiler allows.
+/// Lints a board's firmware: with clippy if the board's compiler has it, else by the compiler's own
+/// warnings.
 fn lint_firmware(board: Board) -> Result<()> {
     let toolchain = set_up::toolchain(board.target())?;
     match toolchain {
@@ -113,6 +115,7 @@ fn lint_firmware(board: Board) -> Result<()> {
     }
 }
 
+/// Prints a command, then runs it.
 fn step(command: &mut Command) -> Result<()> {
     say!("penup: {}", describe(command))?;
     run(command)

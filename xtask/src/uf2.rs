@@ -1,5 +1,6 @@
-//! Images for the boot loader that a Pico shows as a drive: UF2, blocks of 512 bytes, each with its
-//! place in flash. Format: Microsoft's UF2 specification.
+//! Converts images to UF2, for the boot loader that a Pico shows as a drive. A UF2 file consists of
+//! blocks of 512 bytes, each with its address in flash. The format is that of Microsoft's UF2
+//! specification.
 
 use anyhow::{Result, ensure};
 use object::read::elf::{FileHeader, ProgramHeader};
@@ -9,10 +10,14 @@ const PAYLOAD: usize = 256;
 const MAGIC: [u32; 2] = [0x0A32_4655, 0x9E5D_5157];
 const MAGIC_END: u32 = 0x0AB1_6F30;
 const FAMILY_PRESENT: u32 = 0x2000;
-/// The RP2040.
+/// The family number of the RP2040.
 const FAMILY: u32 = 0xE48B_FF56;
 
-/// The image of an ELF file whose flash begins at `start`: every page that it fills a byte of.
+/// The UF2 image of an ELF file whose flash begins at `start`. It contains everything from there to
+/// the last byte that the file loads.
+///
+/// # Errors
+/// The file is not a valid ELF file, or it loads something outside the flash, or nothing.
 pub fn of_elf(image: &[u8], start: u64) -> Result<Vec<u8>> {
     let header = elf::FileHeader32::<Endianness>::parse(image)?;
     let endian = header.endian()?;
