@@ -1,17 +1,20 @@
-//! A convex solid from its vertices and edges: Zámožík & Zaťková.
+//! Finds the visibility of the edges of a convex solid from its vertices and edges (Zámožík &
+//! Zaťková).
 //!
-//! The outline is a closed walk along edges. Without its vertices the graph falls into components, and
-//! an edge that does not cross the outline cannot lead from the near side to the far one: each component
-//! is visible as a whole or hidden as a whole.
+//! The outline is a closed walk along edges. Without the vertices of the outline the graph falls
+//! into components. An edge that does not cross the outline cannot lead from the near side to the
+//! far side, so each component is either visible as a whole or hidden as a whole.
 //!
-//! What the paper leaves open is settled by comparing depths exactly:
-//! - There may be more than two components, as an edge between two vertices of the outline cuts a side in
-//!   two. So each component is decided by itself, by a vertex of it and the triangle of outline vertices in
-//!   front of or behind it: both belong to the solid, and a corner is at one end of what the line of sight
-//!   has in common with the solid. No component on a side, note 4 (a), or none at all, (b), is no case of its own.
-//! - *Isolated edges*, note 4 (c), join two vertices of the outline. On either side of such an edge there is
-//!   another outline vertex; the line between those two belongs to the solid and crosses the edge on the
-//!   page. The edge is visible if it is nearer at the crossing.
+//! The paper leaves some cases open. They are settled by comparing depths exactly:
+//! * There may be more than two components, because an edge between two vertices of the outline
+//!   cuts a side in two. So each component is decided by itself, from one of its vertices and the
+//!   triangle of outline vertices in front of or behind that vertex. Both belong to the solid, and
+//!   a corner is at one end of the part of the line of sight that lies in the solid. A side without
+//!   a component, note 4 (a), and no component at all, (b), need no special treatment.
+//! * *Isolated edges*, note 4 (c), join two vertices of the outline. On either side of such an edge
+//!   there is another outline vertex. The line between those two vertices belongs to the solid and
+//!   crosses the edge on the page. The edge is visible if it is nearer than that line at the
+//!   crossing.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -22,12 +25,13 @@ use super::{EdgeVisibility, Eye, SolidEdge, SolidError, SolidSink, SolidSummary}
 use crate::geometry::Precision;
 use crate::stage::{Cancel, OutOfScratch, Scratch, heap_sort_by_key};
 
-/// Finds how each edge of a convex solid is seen.
+/// Finds the visibility of each edge of a convex solid.
 ///
-/// `edges`: pairs of vertex numbers, from 0, in any order and direction; an edge given twice counts once,
-/// an edge between two vertices at the same place not at all. Vertices without an edge are left out. The
-/// edges are believed: no face is looked for. The sink gets every edge once, lesser vertex first, in order,
-/// and no face. `precision`: how far the positions may be off (see the module).
+/// `edges` are pairs of vertex numbers, counted from 0, in any order and direction. An edge that is
+/// given twice counts once; an edge between two vertices at the same position is ignored. Vertices
+/// without an edge are left out. The edges are trusted: no faces are computed to check them. The
+/// sink receives every edge once, sorted, with the lesser vertex first, and no face. `precision`
+/// says how far the positions may be off (see the module documentation).
 ///
 /// # Errors
 /// See [`SolidError`].
@@ -87,7 +91,7 @@ pub fn from_edges(
     }
     let inside = match points::span(positions, graph.numbers) {
         Span::Line => return Err(SolidError::AllInLine),
-        // A flat thing hides nothing.
+        // A flat polygon hides nothing.
         Span::Plane(_) => return graph.hand_over(|_| EdgeVisibility::Visible, cancel, sink),
         Span::Space(inside) => inside,
     };
@@ -102,14 +106,14 @@ pub fn from_edges(
     graph.hand_over(|ends| graph.sight(ends, eye, outline, visible), cancel, sink)
 }
 
-/// The working memory that [`from_edges`] takes.
+/// Returns the bytes of working memory that [`from_edges`] takes.
 pub const fn scratch_bytes_from_edges(vertices: usize, edges: usize) -> usize {
     3 * Scratch::bytes_for::<u16>(vertices)
         + Scratch::bytes_for::<u8>(vertices)
         + Scratch::bytes_for::<[u16; 2]>(edges)
 }
 
-/// Where a vertex is in the graph.
+/// The part of the graph to which a vertex belongs: a component, the outline, or neither.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 #[repr(transparent)]
 struct Membership(u16);
@@ -118,12 +122,12 @@ impl Membership {
     const NO_EDGE: Self = Self(u16::MAX);
     const OUTLINE: u16 = 1 << 15;
 
-    /// In the component that is called after vertex `name`.
+    /// Membership in the component that is named after vertex `name`.
     const fn component(name: u16) -> Self {
         Self(name)
     }
 
-    /// The corner of this number of the outline.
+    /// Membership in the outline, as its corner number `at`.
     const fn outline(at: usize) -> Self {
         Self(Self::OUTLINE | at as u16) // fewer than 2^14
     }
@@ -138,12 +142,13 @@ impl Membership {
     }
 }
 
-/// The vertices that have edges, at different places, and the edges between them.
+/// The vertices that have edges, each position once, and the edges between them.
 struct Graph<'s> {
     points: &'s [Point],
     numbers: &'s [u16],
     edges: &'s [[u16; 2]],
-    /// For each vertex; a vertex of no component and not on the outline has no edge.
+    /// The membership of each vertex. A vertex that is in no component and not on the outline has
+    /// no edge.
     membership: &'s mut [Membership],
     welded: usize,
 }
@@ -195,7 +200,8 @@ impl<'s> Graph<'s> {
         self.points[usize::from(number)]
     }
 
-    /// Walks around the outline, counter-clockwise on the page, and marks its vertices.
+    /// Walks around the outline, counter-clockwise on the page, and marks its vertices. Returns the
+    /// vertices in this order.
     fn find_outline(
         &mut self,
         viewpoint: &Viewpoint,
@@ -237,7 +243,8 @@ impl<'s> Graph<'s> {
         Ok(&outline[..count])
     }
 
-    /// Of the neighbours of `at`, other than the one it is reached from, that with all others to the left.
+    /// Returns the neighbour of `at` that has all other neighbours to its left, not counting the
+    /// one from which `at` was reached.
     fn rightmost_neighbour(&self, from: u16, at: u16, viewpoint: &Viewpoint) -> Option<u16> {
         let origin = self.point(at);
         self.edges
@@ -261,7 +268,8 @@ impl<'s> Graph<'s> {
             };
             self.membership[usize::from(a.max(b))] = Membership::component(a.min(b));
         }
-        // A name is never greater than the vertex, so that one pass in order reaches the last name.
+        // A name is never greater than the number of the vertex, so one pass in ascending order
+        // reaches the final name.
         for number in 0..self.membership.len() {
             if let Some(name) = self.membership[number].component_name() {
                 self.membership[number] = self.membership[usize::from(name)];
@@ -269,7 +277,8 @@ impl<'s> Graph<'s> {
         }
     }
 
-    /// The name of a vertex's component as far as it is known; `None` on the outline.
+    /// Returns the name of the component of a vertex, as far as it is known. Returns `None` for a
+    /// vertex on the outline.
     fn component(&self, number: u16) -> Option<u16> {
         let mut at = number;
         loop {
@@ -281,7 +290,7 @@ impl<'s> Graph<'s> {
         }
     }
 
-    /// Sets `visible` to 1 for each component, by its name, that is on the near side.
+    /// Sets `visible` to 1 at the name of each component that is on the near side.
     fn decide_components(
         &self,
         viewpoint: &Viewpoint,
@@ -290,7 +299,8 @@ impl<'s> Graph<'s> {
         cancel: &mut dyn Cancel,
     ) -> Result<(), SolidError> {
         for name in self.component_names() {
-            // In a rounded solid the vertex farthest from its triangle is the surest witness.
+            // If the positions are rounded, the vertex farthest from its triangle decides most
+            // reliably.
             let mut height_of_witness = 0i128;
             let mut plane_of_witness = None;
             for number in self.numbers {
@@ -324,8 +334,8 @@ impl<'s> Graph<'s> {
         })
     }
 
-    /// The plane, upper side to the eye, of the triangle of outline vertices that has the vertex before or
-    /// behind it on the page.
+    /// Returns the plane of the triangle of outline vertices in front of or behind which the vertex
+    /// lies on the page. The upper side of the plane faces the eye.
     fn triangle_at(&self, number: u16, viewpoint: &Viewpoint, outline: &[u16]) -> Option<Plane> {
         let (first, rest) = outline.split_first()?;
         let apex = self.point(*first);
@@ -336,7 +346,8 @@ impl<'s> Graph<'s> {
             .find(|plane| !plane.is_degenerate())
     }
 
-    /// Whether a plane is the plane of a face turned to the eye, if it is that of a face.
+    /// Whether a plane is that of a face turned to the eye, provided that it is the plane of a
+    /// face.
     fn is_nothing_above(&self, plane: &Plane) -> bool {
         self.numbers.iter().all(|number| plane.height(self.point(*number)) <= 0)
     }
@@ -364,17 +375,20 @@ impl<'s> Graph<'s> {
         }
     }
 
-    /// An edge between two corners of the outline, by their places there, that are not neighbours.
+    /// Whether an edge between two corners of the outline that are not neighbours is visible. The
+    /// corners are given by their indices.
     fn is_isolated_edge_visible(&self, first: usize, last: usize, outline: &[u16]) -> bool {
         let [start, end] = [first, last].map(|place| self.point(outline[place]));
         let right = &outline[first + 1..last];
         let left = || outline[last + 1..].iter().chain(&outline[..first]);
-        // With its upper side to the eye, since the outline runs counter-clockwise. What crosses the edge
-        // from right to left rises above this plane if its left end does.
+        // The upper side of this plane faces the eye, since the outline runs counter-clockwise. The
+        // line that crosses the edge from right to left rises above this plane if its left end
+        // does.
         let height = |right: u16, left: u16| {
             Plane::through(start, self.point(right), end).height(self.point(left))
         };
-        // One pair would do, were the solid not rounded: the surest of those with one end fixed.
+        // One pair would be enough if the positions were not rounded. Here the most reliable pair
+        // is used among those that have one end fixed.
         let (mut surest, mut best_left) = (0i128, None);
         for number in left() {
             let height = height(right[0], *number);
@@ -389,13 +403,13 @@ impl<'s> Graph<'s> {
             }
         }
         match surest {
-            // A diagonal of a face whose plane has the whole outline.
+            // The edge is a diagonal of a face whose plane contains the whole outline.
             0 => self.is_nothing_above(&Plane::through(start, self.point(right[0]), end)),
             _ => surest < 0,
         }
     }
 
-    /// Whether both ends are on the line of one side of the outline, exactly.
+    /// Whether both ends lie exactly on the line of one side of the outline.
     fn is_behind_outline(&self, ends: [u16; 2], eye: Eye, outline: &[u16]) -> bool {
         let eye_itself = Viewpoint { eye, inside: None };
         let next = outline.iter().skip(1).chain(outline.first());
@@ -425,7 +439,7 @@ impl<'s> Graph<'s> {
     }
 }
 
-/// Keeps the first of equal neighbours; returns how many are left.
+/// Keeps the first of each run of equal edges and returns how many are left.
 fn remove_repeated(edges: &mut [[u16; 2]]) -> usize {
     let mut kept = 0;
     for at in 0..edges.len() {
@@ -472,7 +486,8 @@ mod tests {
         edges.0
     }
 
-    /// Outline, visible and hidden components as seen from above, in the paper's numbers (from 1).
+    /// The outline and the visible and hidden components as seen from above, in the numbers of the
+    /// paper (from 1).
     fn parts(points: &[Point]) -> (Vec<u16>, Vec<Vec<u16>>, Vec<Vec<u16>>) {
         let edges = edges_of(points);
         let mut words = vec![0; scratch_bytes_from_edges(points.len(), edges.len()) / 8];
@@ -545,8 +560,9 @@ mod tests {
         assert_eq!(matrix, [(1, 2), (1, 6), (2, 7), (6, 7), (9, 14)]);
     }
 
-    /// A rhombic dodecahedron with two faces edge-on: its outline has eight vertices too, and two of its
-    /// vertices lie right behind vertices of the outline. Nothing joins the two visible vertices.
+    /// A rhombic dodecahedron with two faces edge-on. Its outline has eight vertices too, and two
+    /// of its vertices lie exactly behind vertices of the outline. No edge joins the two visible
+    /// vertices.
     #[test]
     fn edge_on_faces_and_vertices_behind_vertices() {
         // Turned so that the face between (2, 0, 0) and (0, 2, 0) is on top: x - y, z, x + y.

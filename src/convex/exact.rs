@@ -1,14 +1,15 @@
-//! Exact predicates on unrounded positions: planes, heights above them, turns as seen from the eye.
+//! Exact predicates on unrounded positions: planes, heights above them, and turns as seen from the
+//! eye.
 //!
-//! Positions stay within ±2^30, so a difference of two fits 32 bits. A component of a normal is twice
-//! the area of a triangle inside a square of side 2^31, so at most 2^62. A height multiplies it by a
-//! difference (or by the eye, within ±2^61, or by another normal) and adds three such products: below
-//! 2^126, within `i128`.
+//! Positions stay within ±2^30, so the difference of two fits in 32 bits. A component of a normal
+//! is twice the area of a triangle inside a square of side 2^31, so it is at most 2^62. A height
+//! multiplies the normal by a difference (or by the eye, within ±2^61, or by another normal) and
+//! adds three such products. So it is below 2^126 and fits in `i128`.
 
 use super::Eye;
 use crate::fixed::product;
 
-/// A place in the model's own space, each coordinate within ±2^30.
+/// A position in model coordinates, each within ±2^30.
 pub(super) type Point = [i32; 3];
 
 fn difference(a: Point, b: Point) -> [i64; 3] {
@@ -19,7 +20,8 @@ fn dot(a: [i64; 3], b: [i64; 3]) -> i128 {
     (0..3).map(|axis| product(a[axis], b[axis])).sum()
 }
 
-/// The plane of three points; its normal points to where they turn counter-clockwise.
+/// The plane of three points. Its normal points to the side from which they turn counter-clockwise,
+/// the upper side.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Plane {
     origin: Point,
@@ -40,17 +42,19 @@ impl Plane {
         }
     }
 
-    /// Whether the three points are in line, so that there is no plane.
+    /// Whether the three points lie on one line, so that they define no plane.
     pub(super) fn is_degenerate(&self) -> bool {
         self.normal == [0; 3]
     }
 
-    /// Positive above the plane, zero on it. The unit is the length of the normal.
+    /// Returns the height of a point: positive above the plane, zero on it. The unit is the length
+    /// of the normal.
     pub(super) fn height(&self, point: Point) -> i128 {
         dot(self.normal, difference(point, self.origin))
     }
 
-    /// Positive if the upper side of the plane is turned to the eye, zero if the plane is edge-on.
+    /// Returns a positive number if the upper side of the plane is turned to the eye, and zero if
+    /// the plane is edge-on.
     pub(super) fn height_of_eye(&self, eye: Eye) -> i128 {
         match eye {
             Eye::At(place) => {
@@ -60,36 +64,40 @@ impl Plane {
         }
     }
 
-    /// Looking straight down on the plane.
+    /// Returns the eye that looks straight down on the plane.
     pub(super) fn eye_above(&self) -> Eye {
         Eye::Towards(self.normal)
     }
 
-    /// Whether the upper sides of both look to the same half of space.
+    /// Whether the upper sides of both planes face the same half of space.
     pub(super) fn is_turned_like(&self, other: &Plane) -> bool {
         dot(self.normal, other.normal) > 0
     }
 
-    /// |x| + |y| + |z| of the normal: a measure of the triangle's area, at most 3 × 2^62.
+    /// Returns the sum of the absolute components of the normal: a measure of the area of the
+    /// triangle, at most 3 × 2^62.
     pub(super) fn size(&self) -> u64 {
         self.normal.iter().map(|part| part.unsigned_abs()).sum()
     }
 }
 
-/// The eye, drawn in by an infinitely small step towards a point inside the solid.
+/// The eye, moved by an infinitely small step towards a point inside the solid.
 ///
 /// From there every face that is edge-on counts as hidden (Harrison 3.2.1), the outline follows the
 /// near side of such a face (3.2.2), and of two vertices on one line of sight the nearer is on the
-/// outline: one rule for all of his special cases. The step decides only what the eye itself leaves open.
+/// outline. So one rule replaces all of his special cases. The step decides only what the position
+/// of the eye itself leaves undecided.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Viewpoint {
     pub(super) eye: Eye,
-    /// Four vertices that span the solid: the step leads to their centre. `None`: no step.
+    /// Four vertices that span the solid. The step leads towards their centre. With `None` there is
+    /// no step.
     pub(super) inside: Option<[Point; 4]>,
 }
 
 impl Viewpoint {
-    /// Positive if a, b, c turn counter-clockwise as seen from here, zero if they are in line.
+    /// Returns a positive number if a, b and c turn counter-clockwise as seen from here, and zero
+    /// if they are in line.
     pub(super) fn turn(&self, a: Point, b: Point, c: Point) -> i128 {
         let plane = Plane::through(a, b, c);
         match (plane.height_of_eye(self.eye), self.inside) {

@@ -1,18 +1,18 @@
-//! Where the user looks from.
+//! The point or direction from which the user looks at a convex solid.
 
 use super::SolidError;
 use super::exact::Point;
 
-/// Where the user looks from, in units of the model's positions.
+/// The eye, in units of the positions of the model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Eye {
-    /// Perspective: the lines of sight meet here.
+    /// Perspective projection: the lines of sight meet at this point.
     At([i64; 3]),
     /// Parallel projection: the direction from the solid to the user, not zero, of any length.
     Towards([i64; 3]),
 }
 
-/// The coordinates of an [`Eye`] lie within ± this.
+/// The coordinates of an [`Eye`] lie within ± this limit.
 pub const EYE_LIMIT: i64 = 1 << 61;
 
 impl Eye {
@@ -23,10 +23,12 @@ impl Eye {
         if in_range && self != Self::Towards([0; 3]) { Ok(()) } else { Err(SolidError::BadEye) }
     }
 
-    /// The eye moved straight towards `centre`, so that the reciprocal of its distance (measured along the
-    /// axis on which it is greatest) grows by 4 `tolerance` / `extent`².
+    /// Returns the eye moved straight towards `centre`, so that the reciprocal of its distance
+    /// grows by 4 `tolerance` / `extent`². The distance is measured along the axis on which it is
+    /// greatest.
     pub(super) fn drawn_in(self, centre: Point, extent: u32, tolerance: u32) -> Self {
-        // Beyond a 1024th of the solid the eye would come too near to see it from the same side.
+        // With a tolerance of more than 1/1024 of the solid the eye would come too near to see it
+        // from the same side.
         let step = 4 * i128::from(tolerance.min(extent >> 10));
         if step == 0 {
             return self;
@@ -40,7 +42,7 @@ impl Eye {
             }
             Self::Towards(direction) => (direction, step * greatest(direction)),
         };
-        // The ray is below 2^62, and what is left of it below 2^61 in either case.
+        // The ray is below 2^62, and the part of it that remains is below 2^61 in either case.
         Self::At(
             [0, 1, 2].map(|axis| centre[axis] + (i128::from(ray[axis]) * square / divisor) as i64),
         )

@@ -1,18 +1,21 @@
-//! A convex solid from its vertices alone: Harrison, chapter 3.
+//! Finds the faces and edges of a convex solid from its vertices alone (Harrison, chapter 3).
 //!
-//! The outline comes first. Its segments are the first *perimeter*: the list of directed segments each
-//! of which has one face still to be found, on its left as seen from outside. One segment is taken, its
-//! face found, the face's sides cancel what they meet in the perimeter and the others join it, reversed
-//! (3.2.5). The perimeter may fall into several loops (3.6). When it is empty, all visible faces are
-//! found; the outline the other way round then leads to the hidden ones (3.2.6).
+//! The outline is found first. Its segments are the first *perimeter*: the list of directed
+//! segments that each have one face still to be found, on their left as seen from outside. One
+//! segment is taken and its face found. The sides of the face cancel the equal segments of the
+//! perimeter; the other sides join the perimeter, reversed (3.2.5). The perimeter may fall into
+//! several loops (3.6). When it is empty, all visible faces are found; the reversed outline then
+//! leads to the hidden ones (3.2.6).
 //!
-//! What differs from the programs of his appendix 3:
-//! - *Valid third vertices* (3.3): he asks for vertices to the left of the segment on the page. No vertex of
-//!   an edge-on face is, so that his program misses such a face. All vertices lie in a wedge about the edge,
-//!   whose two sides are its two faces; turning counter-clockwise about the directed edge ends on the face
-//!   that is sought, whatever the page shows.
-//! - *Vertices that drop out* (3.4): he drops a vertex when two of its segments cancel. A vertex where two
-//!   loops of the perimeter touch would be lost for the second. Here a vertex drops out with its last segment.
+//! This differs from the programs in Harrison's appendix 3 in two points:
+//! * *Valid third vertices* (3.3): he requires vertices to the left of the segment on the page. No
+//!   vertex of an edge-on face is, so his program misses such a face. Here the search uses that all
+//!   vertices lie in a wedge about the edge whose two sides are its two faces. Turning a plane
+//!   counter-clockwise about the directed edge ends on the face that is sought, whatever the page
+//!   shows.
+//! * *Vertices that drop out* (3.4): he drops a vertex when two of its segments cancel. A vertex
+//!   where two loops of the perimeter touch would then be missing from the second loop. Here a
+//!   vertex drops out with its last segment.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -25,10 +28,10 @@ use crate::geometry::Precision;
 use crate::model::Corner;
 use crate::stage::{Cancel, Scratch};
 
-/// In place of a face's number: not found yet.
+/// Stands for the number of a face that has not been found yet.
 pub(super) const UNKNOWN: u16 = u16::MAX;
 
-/// How many vertices are looked at between two looks at the serial line.
+/// The number of vertices that are tested between two checks for cancelling.
 const VERTICES_PER_CHECK: usize = 64;
 
 /// An edge with its two faces.
@@ -37,17 +40,20 @@ const VERTICES_PER_CHECK: usize = 64;
 pub(super) struct HullEdge {
     pub(super) from: u16,
     pub(super) to: u16,
-    /// The face on the left, seen from outside.
+    /// The face on the left, as seen from outside, or [`UNKNOWN`].
     pub(super) left: u16,
+    /// The face on the right, as seen from outside, or [`UNKNOWN`].
     pub(super) right: u16,
 }
 
-/// A face by three of its corners, counter-clockwise from outside, well spread around it.
+/// A face, as three of its corners, which are counter-clockwise from outside and well spread around
+/// it.
 pub(super) type FaceCorners = [u16; 3];
 
-/// Finds faces and edges of the convex solid that `positions` are the corners of.
+/// Finds the faces and edges of the convex solid whose corners are `positions`, and hands them to
+/// `sink`.
 ///
-/// `precision`: how far the positions may be off (see the module).
+/// `precision` says how far the positions may be off (see the module documentation).
 ///
 /// # Errors
 /// See [`SolidError`].
@@ -120,7 +126,7 @@ pub fn from_vertices(
     }
 }
 
-/// The working memory that [`from_vertices`] takes for so many vertices.
+/// Returns the bytes of working memory that [`from_vertices`] takes for this number of vertices.
 pub const fn scratch_bytes_from_vertices(vertices: usize) -> usize {
     let edges = most_edges(vertices);
     let faces = most_faces(vertices);
@@ -131,7 +137,8 @@ pub const fn scratch_bytes_from_vertices(vertices: usize) -> usize {
         + Joining::scratch_bytes(vertices, faces)
 }
 
-/// Euler: v - e + f = 2, and every face has three edges or more.
+/// Returns the greatest possible number of edges. By Euler v - e + f = 2, and every face has at
+/// least three edges.
 const fn most_edges(vertices: usize) -> usize {
     (3 * vertices).saturating_sub(6)
 }
@@ -140,7 +147,8 @@ const fn most_faces(vertices: usize) -> usize {
     (2 * vertices).saturating_sub(4)
 }
 
-/// All vertices in one plane: one polygon, which hides nothing.
+/// Handles vertices that all lie in one plane: hands over the one polygon that they form, which
+/// hides nothing.
 fn flat_solid(
     points: &[Point],
     numbers: &[u16],
@@ -180,49 +188,52 @@ fn flat_solid(
     })
 }
 
-/// From each corner to the next, and from the last to the first.
+/// Iterates over the sides: from each corner to the next, and from the last to the first.
 fn sides(corners: &[u16]) -> impl Iterator<Item = (u16, u16)> + Clone {
     let next = corners.iter().skip(1).chain(corners.first());
     corners.iter().copied().zip(next.copied())
 }
 
-/// The solid as found exactly, before faces are joined.
+/// The solid as it was found exactly, before faces are joined.
 #[derive(Debug)]
 pub(super) struct Solid<'s> {
     pub(super) points: &'s [Point],
     pub(super) edges: &'s [HullEdge],
     pub(super) faces: &'s [FaceCorners],
-    /// Vertices that are on no face.
+    /// The vertices that lie on no face.
     pub(super) inside: &'s [u16],
-    /// How many vertices are in the middle of a face or an edge.
+    /// The number of vertices in the middle of a face or an edge.
     pub(super) flat: usize,
 }
 
-/// Harrison's search.
+/// The state of Harrison's search for faces.
 struct FaceFinder<'s> {
     points: &'s [Point],
-    /// Vertices that may be corners of faces still to be found: Harrison's vertices list.
+    /// The vertices that may be corners of faces still to be found. This is Harrison's vertices
+    /// list.
     candidates: &'s mut [u16],
     candidate_count: usize,
-    /// Numbers of the edges with one face still to be found in this pass: the current perimeter list.
+    /// The numbers of the edges with one face still to be found in this pass. This is Harrison's
+    /// current perimeter list.
     perimeter: &'s mut [u16],
     perimeter_count: usize,
-    /// For each vertex, how many segments of the perimeter begin there (as many end there).
+    /// For each vertex, the number of segments of the perimeter that begin there. As many end
+    /// there.
     segments_from: &'s mut [u16],
     edges: &'s mut [HullEdge],
     edge_count: usize,
     outline_count: usize,
     faces: &'s mut [FaceCorners],
     face_count: usize,
-    /// Vertices on the plane in hand.
+    /// The vertices on the current plane.
     on_plane: &'s mut [u16],
-    /// Room for a polygon.
+    /// The memory for the corners of a polygon.
     room: &'s mut [u16],
     flat: usize,
 }
 
 impl<'s> FaceFinder<'s> {
-    /// Finds the outline and makes it the perimeter.
+    /// Finds the outline and makes it the first perimeter.
     fn new(
         points: &'s [Point],
         eye: Eye,
@@ -289,7 +300,8 @@ impl<'s> FaceFinder<'s> {
         Ok(())
     }
 
-    /// All visible faces are found, so of their corners only those of the outline have more faces.
+    /// Makes the outline the perimeter again, to find the hidden faces. All visible faces are
+    /// found, so of their corners only those on the outline belong to more faces.
     fn turn_to_hidden_faces(&mut self) {
         for edge in &self.edges[..self.outline_count] {
             self.candidates[self.candidate_count] = edge.from;
@@ -308,7 +320,8 @@ impl<'s> FaceFinder<'s> {
         }
     }
 
-    /// A segment of the perimeter, so directed that the face still to be found is on its left.
+    /// Returns a segment of the perimeter, directed so that the face still to be found is on its
+    /// left.
     fn segment(&self, at: usize) -> (u16, u16) {
         let edge = self.edges[usize::from(self.perimeter[at])];
         if edge.left == UNKNOWN { (edge.from, edge.to) } else { (edge.to, edge.from) }
@@ -318,7 +331,7 @@ impl<'s> FaceFinder<'s> {
         self.points[usize::from(number)]
     }
 
-    /// Finds the face to the left of one segment of the perimeter, and brings the perimeter up to date.
+    /// Finds the face to the left of one segment of the perimeter and updates the perimeter.
     fn find_face(&mut self, at: usize, cancel: &mut dyn Cancel) -> Result<(), SolidError> {
         let (from, to) = self.segment(at);
         let on_plane_count = self.find_plane(from, to, cancel)?;
@@ -327,7 +340,7 @@ impl<'s> FaceFinder<'s> {
             eye: Plane::through(self.point(from), self.point(to), self.point(third)).eye_above(),
             inside: None,
         };
-        // The room is taken out while the perimeter changes.
+        // The memory is moved out of `self` while the perimeter changes.
         let room = core::mem::take(&mut self.room);
         let mut polygon = Polygon::triangle(room, self.points, &viewpoint, [from, to, third]);
         for number in &self.on_plane[3..on_plane_count] {
@@ -344,7 +357,8 @@ impl<'s> FaceFinder<'s> {
             self.cancel_or_add(from, to, face);
         }
         self.room = polygon.into_room();
-        // Neither a corner without a segment nor a vertex in the middle of the face is on another face.
+        // Neither a corner that has no segment left nor a vertex in the middle of the face belongs
+        // to another face.
         for at in 0..on_plane_count {
             let number = self.on_plane[at];
             if self.segments_from[usize::from(number)] == 0 {
@@ -354,8 +368,9 @@ impl<'s> FaceFinder<'s> {
         Ok(())
     }
 
-    /// Turns the plane about the directed edge until no vertex is above it; leaves its vertices in
-    /// `on_plane`, the two ends and a third corner first, and returns how many they are.
+    /// Turns the plane about the directed edge until no vertex is above it. Writes the vertices on
+    /// it to `on_plane`, the two ends of the edge and a third corner first, and returns how many
+    /// they are.
     fn find_plane(
         &mut self,
         from: u16,
@@ -366,7 +381,7 @@ impl<'s> FaceFinder<'s> {
         self.on_plane[0] = from;
         self.on_plane[1] = to;
         let mut count = 2;
-        // Degenerate until a third vertex is there; every height is zero then.
+        // The plane is degenerate until a third vertex is found. Until then every height is zero.
         let mut plane = Plane::through(start, end, end);
         let mut at = 0;
         while at < self.candidate_count {
@@ -385,7 +400,7 @@ impl<'s> FaceFinder<'s> {
             }
             let turned = Plane::through(start, end, point);
             if turned.is_degenerate() {
-                // In the middle of this edge: no corner of any face.
+                // The vertex lies in the middle of this edge, so it is not a corner of any face.
                 at -= 1;
                 self.candidate_count -= 1;
                 self.candidates.swap(at, self.candidate_count);
@@ -402,7 +417,8 @@ impl<'s> FaceFinder<'s> {
         Ok(count)
     }
 
-    /// A side of a new face: it cancels its like in the perimeter, or joins the perimeter reversed.
+    /// Processes a side of a new face: it cancels the equal segment of the perimeter, or joins the
+    /// perimeter reversed.
     fn cancel_or_add(&mut self, from: u16, to: u16, face: u16) {
         let met = (0..self.perimeter_count).find(|at| self.segment(*at) == (from, to));
         if let Some(at) = met {
@@ -440,7 +456,8 @@ mod tests {
     use std::vec;
     use std::vec::Vec;
 
-    /// Runs `steps` on a search of the solid seen from above, its outline the first perimeter.
+    /// Runs `steps` on a search of the solid as seen from above, with its outline as the first
+    /// perimeter.
     fn search_from_above(points: &[Point], steps: impl FnOnce(&mut FaceFinder<'_>)) {
         let mut words = vec![0; scratch_bytes_from_vertices(points.len()) / 8];
         let mut scratch = Scratch::new(&mut words);
@@ -455,7 +472,7 @@ mod tests {
         assert_eq!(search.as_mut().map(steps).err(), None);
     }
 
-    /// The perimeter in any order, in the paper's numbers (from 1).
+    /// Returns the perimeter, sorted, in the numbers of the paper (from 1).
     fn perimeter(search: &FaceFinder<'_>) -> Vec<(u16, u16)> {
         let mut segments: Vec<_> = (0..search.perimeter_count)
             .map(|at| search.segment(at))
@@ -471,7 +488,7 @@ mod tests {
         items
     }
 
-    /// Finds the face at a segment; the edges that are new, and the vertices that drop out.
+    /// Finds the face at a segment. Returns the new edges and the vertices that drop out.
     fn step(search: &mut FaceFinder<'_>, segment: (u16, u16)) -> (Vec<(u16, u16)>, Vec<u16>) {
         let (edges, candidates) =
             (search.edge_count, search.candidates[..search.candidate_count].to_vec());
@@ -493,8 +510,9 @@ mod tests {
         (sorted(&new_edges), sorted(&dropped))
     }
 
-    /// Harrison 3.5. His solid is given by its numbering alone; a triangular cupola has it. His list of
-    /// rejected vertices forgets vertex 4, both of whose segments cancel in the second step.
+    /// The example of Harrison 3.5. He gives the solid only by its numbering; a triangular cupola
+    /// has that numbering. His list of rejected vertices omits vertex 4, although both of its
+    /// segments cancel in the second step.
     #[test]
     fn the_general_example() {
         let cupola = [
@@ -539,7 +557,7 @@ mod tests {
                 );
                 assert_eq!(perimeter(search), new_perimeter, "{segment:?}");
             }
-            // As many as his final draw list has.
+            // His final draw list has the same number of edges.
             assert_eq!(search.edge_count, 15);
             search.turn_to_hidden_faces();
             assert_eq!(perimeter(search), [(1, 2), (2, 3), (3, 4), (4, 5), (5, 6), (6, 1)]);
@@ -548,8 +566,8 @@ mod tests {
         });
     }
 
-    /// Harrison 3.6: the perimeter falls into loops that touch in vertex 1, which must not drop out
-    /// when the loop of face 1, 3, 4 closes.
+    /// The example of Harrison 3.6: the perimeter falls into loops that touch in vertex 1. This
+    /// vertex must not drop out when the loop of face 1, 3, 4 closes.
     #[test]
     fn the_perimeter_splits() {
         let fan = [[3, 0, 0], [3, 3, 0], [0, 3, 2], [-3, 0, 3], [-3, -3, 2], [0, -3, 0]];

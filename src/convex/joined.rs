@@ -1,9 +1,10 @@
-//! Faces that are one but for rounding are joined, and the finished solid is handed over.
+//! Joins faces that differ only by rounding, and hands over the finished solid.
 //!
-//! A face takes in its neighbours, and theirs, as long as each of their corners may lie in its plane
-//! ([`are_coplanar`], within the precision), and they look to the same side. The largest
-//! face begins, because its plane is the surest. Nothing chains: every corner is held against the plane of
-//! the face that began. Faces whose union is not one simple polygon stay apart.
+//! A face takes in its neighbours, and their neighbours, as long as each of their corners may lie
+//! in its plane ([`are_coplanar`], within the precision) and they face the same way. The largest
+//! face begins, because its plane is the most accurate. Errors do not accumulate along a chain of
+//! faces: every corner is compared with the plane of the face that began. Faces whose union is not
+//! one simple polygon stay separate.
 
 use super::exact::{Plane, Point};
 use super::faces::{HullEdge, Solid, UNKNOWN};
@@ -12,17 +13,18 @@ use crate::geometry::{Precision, are_coplanar};
 use crate::model::Corner;
 use crate::stage::{Cancel, OutOfScratch, Scratch};
 
+/// The joining of the faces of one solid.
 #[derive(Debug)]
 pub(super) struct Joining<'s> {
     solid: Solid<'s>,
     eye: Eye,
-    /// The same, moved as the precision asks for: it decides what is visible.
+    /// The eye, moved as the precision requires. It decides what is visible.
     drawn_in: Eye,
-    /// For each face the face that took it in, which may be itself.
+    /// For each face, the face that took it in, which may be the face itself.
     joined: &'s mut [u16],
-    /// For each vertex the one after it around the face in hand.
+    /// For each vertex, the one after it around the current face.
     next: &'s mut [u16],
-    /// The corners of the face in hand.
+    /// The corners of the current face.
     corners: &'s mut [Corner],
 }
 
@@ -59,7 +61,8 @@ impl<'s> Joining<'s> {
         Plane::through(a, b, c)
     }
 
-    /// Refuses vertices deeper inside than the precision; the others are as good as on a face.
+    /// Refuses vertices that lie deeper inside the solid than the precision. The others count as
+    /// lying on a face.
     pub(super) fn check_convex(
         &mut self,
         precision: Precision,
@@ -128,7 +131,7 @@ impl<'s> Joining<'s> {
         left.is_turned_like(&right) && (near(edge.left, edge.right) || near(edge.right, edge.left))
     }
 
-    /// Whether the plane of a face may hold a point.
+    /// Whether a point may lie in the plane of a face, within the precision.
     fn is_near(&self, face: u16, point: Point, precision: Precision) -> bool {
         let [a, b, c] = self.solid.faces[usize::from(face)]
             .map(|number| self.solid.points[usize::from(number)]);
@@ -144,7 +147,7 @@ impl<'s> Joining<'s> {
             .max_by_key(|face| self.plane(*face).size())
     }
 
-    /// One round over the edges; whether any face was taken in.
+    /// Makes one pass over the edges and returns whether any face was taken in.
     fn take_in_neighbours(
         &mut self,
         first: u16,
@@ -181,8 +184,8 @@ impl<'s> Joining<'s> {
             .all(|edge| near(edge.from) && near(edge.to))
     }
 
-    /// Puts the corners of a face into `corners` and returns how many; `None` if its boundary is not one
-    /// simple polygon.
+    /// Writes the corners of a face to `corners` and returns their number. Returns `None` if the
+    /// boundary of the face is not one simple polygon.
     fn go_around(&mut self, face: u16) -> Option<usize> {
         self.next.fill(UNKNOWN);
         let mut count = 0;
@@ -216,7 +219,7 @@ impl<'s> Joining<'s> {
         (closed_at == Some(count - 1)).then_some(count)
     }
 
-    /// Gives faces and edges to the sink.
+    /// Hands the faces and edges to the sink.
     pub(super) fn hand_over(
         &mut self,
         mut summary: SolidSummary,
@@ -229,13 +232,14 @@ impl<'s> Joining<'s> {
             if self.joined[face] != number {
                 continue;
             }
-            // Always some: exact faces are simple, and joined ones were tried.
+            // There is always a boundary: exact faces are simple polygons, and the joined ones have
+            // been checked.
             if let Some(count) = self.go_around(number) {
                 sink.face(&self.corners[..count], self.is_visible(number))?;
                 summary.faces += 1;
             }
         }
-        // From here on `next` tells which vertices are still corners.
+        // From here on `next` records which vertices are still corners.
         self.next.fill(UNKNOWN);
         for edge in self.solid.edges {
             let [left, right] = [edge.left, edge.right].map(|face| self.joined[usize::from(face)]);
@@ -259,7 +263,7 @@ impl<'s> Joining<'s> {
     }
 
     fn sight(&self, left: u16, right: u16) -> EdgeVisibility {
-        // Not turned away, but not visible: edge-on.
+        // A face that is neither visible nor turned away from the eye is edge-on.
         let edge_on = |face: u16| self.plane(face).height_of_eye(self.eye) >= 0;
         match (self.is_visible(left), self.is_visible(right)) {
             (true, true) => EdgeVisibility::Visible,

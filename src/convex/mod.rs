@@ -1,28 +1,35 @@
-//! The two ways to see a convex solid for which no faces are needed.
+//! Hidden-line removal for a convex solid that is given without faces. There are two methods.
 //!
-//! [`from_vertices`] takes vertices alone (Harrison, chapter 3): it finds the outline, then from its
-//! segments the visible and the hidden faces, each once, and hands over faces and edges.
-//! [`from_edges`] takes vertices and edges (Zámožík & Zaťková): it walks the outline along the edges,
-//! takes it out of the graph and decides each component that is left.
+//! [`from_vertices`] takes vertices alone (Harrison, chapter 3). It finds the outline, then,
+//! starting from the segments of the outline, the visible and the hidden faces, each once, and
+//! hands over faces and edges.
 //!
-//! Both work on the *positions of the model*, not on the rounded vertices of the view. A square whose
-//! corners are rounded one by one is no longer flat, and the solid that the user means would fall into
-//! triangles; in the model its corners are exactly coplanar, and a face that is edge-on is exactly
-//! edge-on. The eye is given in the same unit. No page is needed, so the camera's other numbers are not
-//! either, and an eye so near that part of the solid lies behind it is all right.
+//! [`from_edges`] takes vertices and edges (Zámožík & Zaťková). It walks the outline along the
+//! edges, removes it from the graph and decides for each remaining component whether it is visible.
 //!
-//! Positions that came from decimals are off by the rounding of the decimals: by at most the `precision`
-//! that both take. The default is exact. Otherwise
-//! - [`from_vertices`] joins the faces that it found exactly: a face takes in its neighbours if each of
-//!   their corners may lie in its plane ([`crate::geometry::are_coplanar`]). Faces narrower than 64
-//!   times the precision stay as they are, so that thin slabs and needles keep their edges;
-//! - the eye is moved towards the middle of the solid: with e the solid's largest extent, the reciprocal of
-//!   its distance grows by 64 precisions / e². So what is meant to be edge-on, or one behind the other, is
-//!   hidden beyond doubt, where else it would peep out on one side or the other.
+//! Both methods work on the *positions of the model*, not on the rounded vertices of the view. A
+//! square whose corners are rounded one by one is no longer flat, and the solid that the user means
+//! would break up into triangles. In the model its corners are exactly coplanar, and a face that is
+//! edge-on is exactly edge-on. The eye is given in the same unit. The methods need no page, and
+//! therefore none of the other numbers of the camera. The eye may be so near that part of the solid
+//! lies behind it.
 //!
-//! Refused: fewer than four different vertices, vertices all in line, a vertex inside the solid that
-//! the others span, an eye inside. Vertices all in one plane are drawn as the flat polygon that they
-//! are. Vertices at the same place count as one, under the least of their numbers.
+//! Positions that were read from decimals are off by the rounding of the decimals: by at most the
+//! `precision` that both methods take. The default precision is exact. Otherwise two corrections
+//! apply:
+//! * [`from_vertices`] joins faces that it found exactly. A face takes in a neighbour if each
+//!   corner of the neighbour may lie in the plane of the face ([`crate::geometry::are_coplanar`]).
+//!   Faces narrower than 64 times the precision stay as they are, so that thin slabs and needles
+//!   keep their edges.
+//! * The eye is moved towards the middle of the solid. With e the largest extent of the solid, the
+//!   reciprocal of the eye's distance grows by 64 precisions / e². So a face that is meant to be
+//!   edge-on, or a vertex that is meant to be behind another, is reliably hidden; otherwise it
+//!   would show on one side or the other.
+//!
+//! Refused are fewer than four different vertices, vertices that are all in line, a vertex inside
+//! the solid that the others span, and an eye inside the solid. Vertices that all lie in one plane
+//! are drawn as the flat polygon that they form. Vertices at the same position count as one, which
+//! has the least of their numbers.
 
 mod edges;
 mod exact;
@@ -39,113 +46,119 @@ pub use edges::{from_edges, scratch_bytes_from_edges};
 pub use eye::{EYE_LIMIT, Eye};
 pub use faces::{from_vertices, scratch_bytes_from_vertices};
 
-/// Positions lie within ± this, so that differences fit 32 bits.
+/// The coordinates of positions lie within ± this limit, so that their differences fit in 32 bits.
 pub const POSITION_LIMIT: i32 = 1 << 30;
 
-/// How an edge of a convex solid is seen, from end to end.
+/// The visibility of an edge of a convex solid. It is the same along the whole edge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum EdgeVisibility {
-    /// Between a visible face and one that is hidden or edge-on.
+    /// The edge lies between a visible face and one that is hidden or edge-on.
     Outline,
-    /// Between two visible faces.
+    /// The edge lies between two visible faces.
     Visible,
-    /// On the far side of a face that is edge-on: on the page it coincides with the outline, so to
-    /// draw it is to ink the same line again.
+    /// The edge is on the far side of a face that is edge-on. On the page it coincides with the
+    /// outline, so drawing it would ink the same line again.
     BehindOutline,
-    /// Hidden.
+    /// The edge is hidden.
     Hidden,
 }
 
-/// An edge of the solid.
+/// An edge of the solid, with its visibility.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SolidEdge {
-    /// The vertices that it joins.
+    /// The numbers of the vertices that it joins.
     pub ends: (u16, u16),
-    /// How it is seen.
+    /// Whether and how the edge is visible.
     pub sight: EdgeVisibility,
 }
 
-/// Who takes what was found. Nothing is handed over before the whole solid is known to be in order.
+/// Receives the faces and edges that were found. Nothing is handed over before the whole solid is
+/// known to be valid.
 pub trait SolidSink {
-    /// Takes one face: its corners counter-clockwise as seen from outside, the last one marked, so that
-    /// they can be appended to the elements of a model. A face that is edge-on is not visible.
+    /// Receives one face. Its corners run counter-clockwise as seen from outside, and the last one
+    /// is marked, so that they can be appended to the elements of a model. A face that is edge-on
+    /// is not visible.
     ///
     /// # Errors
-    /// [`SinkFull`] ends the job.
+    /// An implementation returns [`SinkFull`] to end the search.
     fn face(&mut self, corners: &[Corner], visible: bool) -> Result<(), SinkFull>;
 
-    /// Takes one edge. Every edge comes once, after the faces.
+    /// Receives one edge. Every edge comes once, after the faces.
     ///
     /// # Errors
-    /// [`SinkFull`] ends the job.
+    /// An implementation returns [`SinkFull`] to end the search.
     fn edge(&mut self, edge: SolidEdge) -> Result<(), SinkFull>;
 }
 
 pub use crate::stage::SinkFull;
 
-/// What was found, in numbers.
+/// The counts of what was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SolidSummary {
-    /// Faces handed over (none by [`from_edges`]).
+    /// The number of faces handed over. It is zero for [`from_edges`].
     pub faces: usize,
-    /// Edges handed over.
+    /// The number of edges handed over.
     pub edges: usize,
-    /// Vertices left out because an earlier one is at the same place.
+    /// The number of vertices left out because an earlier one is at the same position.
     pub welded: usize,
-    /// Edges left out because their faces may be one ([`from_vertices`] only).
+    /// The number of edges left out because their two faces may be one face ([`from_vertices`]
+    /// only).
     pub joined: usize,
-    /// Vertices that are no corners: in the middle of a face or an edge.
+    /// The number of vertices that are not corners: they lie in the middle of a face or an edge.
     pub flat: usize,
-    /// Parts into which the graph fell without the outline ([`from_edges`] only).
+    /// The number of components into which the graph falls without the outline ([`from_edges`]
+    /// only).
     pub components: usize,
 }
 
-/// Why nothing was drawn. The sink has been given nothing, except after [`SolidError::SinkFull`].
+/// The reasons why a solid is not drawn. The sink has received nothing, unless the error is
+/// [`SolidError::SinkFull`] or [`SolidError::Aborted`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum SolidError {
-    /// A solid needs four vertices at different places.
+    /// There are fewer than the four vertices at different positions that a solid needs.
     TooFewVertices {
-        /// How many there are.
+        /// The number of different positions that there are.
         distinct: usize,
     },
-    /// More vertices than elements can name: [`crate::model::VERTEX_NUMBER_LIMIT`].
+    /// There are more vertices than elements can refer to: [`crate::model::VERTEX_NUMBER_LIMIT`].
     TooManyVertices,
-    /// A coordinate is past ±2^30.
+    /// A coordinate is beyond ±2^30.
     PositionOutOfRange {
-        /// The vertex, from 0.
+        /// The number of the vertex, counted from 0.
         vertex: u16,
     },
-    /// All vertices are in line.
+    /// All vertices lie on one line.
     AllInLine,
-    /// The eye's coordinates pass [`EYE_LIMIT`], or its direction is zero.
+    /// A coordinate of the eye is beyond [`EYE_LIMIT`], or its direction is zero.
     BadEye,
     /// The eye is inside the solid or on its surface.
     EyeInside,
-    /// Not convex: a vertex lies inside the solid that the others span, deeper than the precision.
+    /// The solid is not convex: a vertex lies inside the solid that the others span, deeper than
+    /// the precision.
     VertexInside {
-        /// The first such vertex, from 0.
+        /// The first such vertex, counted from 0.
         vertex: u16,
-        /// How many there are.
+        /// The number of such vertices.
         count: usize,
     },
-    /// An edge names a vertex that does not exist.
+    /// An edge refers to a vertex that does not exist.
     UnknownVertex {
-        /// The number of the edge, from 0.
+        /// The number of the edge, counted from 0.
         edge: usize,
     },
-    /// The edges do not go around the solid: at this vertex of the outline none leads on.
+    /// The edges do not lead around the solid: at this vertex of the outline no edge leads on.
     OutlineBroken {
-        /// The vertex, from 0.
+        /// The number of the vertex, counted from 0.
         vertex: u16,
     },
-    /// Not enough working memory.
+    /// There is not enough working memory.
     Scratch(OutOfScratch),
-    /// The sink took no more.
+    /// The sink had no room for another face or edge.
     SinkFull,
-    /// The user gave up.
+    /// The user cancelled the search.
     Aborted,
 }
 

@@ -1,4 +1,4 @@
-//! The vertices as points: range, welding, what they span.
+//! Checks the vertices as points: their range, which of them coincide, and what they span.
 
 use super::exact::{Plane, Point};
 use super::{Eye, POSITION_LIMIT, SolidError};
@@ -6,7 +6,7 @@ use crate::geometry::Precision;
 use crate::model::VERTEX_NUMBER_LIMIT;
 use crate::stage::heap_sort_by_key;
 
-/// The longest side of the box around the points.
+/// Returns the longest side of the bounding box of the points.
 pub(super) fn largest_extent(points: impl Iterator<Item = Point> + Clone) -> u32 {
     let extent = |axis: usize| {
         let along = points.clone().map(|point| point[axis]);
@@ -17,8 +17,9 @@ pub(super) fn largest_extent(points: impl Iterator<Item = Point> + Clone) -> u32
     [0, 1, 2].map(extent).into_iter().max().unwrap_or(0)
 }
 
-/// The eye, moved towards the middle of the points at `numbers` as the precision asks for: by what an
-/// edge of a tenth of the solid's extent, its ends off by so much, may turn.
+/// Returns the eye moved towards the middle of the points at `numbers`, as the precision requires:
+/// by the angle that an edge of a tenth of the extent of the solid may turn if its ends are off by
+/// the precision.
 pub(super) fn drawn_in_eye(
     eye: Eye,
     points: &[Point],
@@ -35,7 +36,7 @@ pub(super) fn drawn_in_eye(
     eye.drawn_in([0, 1, 2].map(mean), largest_extent(corners.clone()), tolerance)
 }
 
-/// What a set of different points spans, with points that show it.
+/// What a set of different points spans, with the numbers of points that prove it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Span {
     Line,
@@ -43,7 +44,7 @@ pub(super) enum Span {
     Space([u16; 4]),
 }
 
-/// Checks the range of every position.
+/// Checks that there are not too many points and that every position is in range.
 pub(super) fn check(points: &[Point]) -> Result<(), SolidError> {
     if points.len() > VERTEX_NUMBER_LIMIT {
         return Err(SolidError::TooManyVertices);
@@ -59,7 +60,8 @@ pub(super) fn check(points: &[Point]) -> Result<(), SolidError> {
     }
 }
 
-/// Orders `numbers` by place and keeps, of those at the same place, the least; returns how many are left.
+/// Sorts `numbers` by position and keeps only the least of those at the same position. Returns how
+/// many are left.
 pub(super) fn weld(points: &[Point], numbers: &mut [u16]) -> usize {
     heap_sort_by_key(numbers, |number| (points[usize::from(*number)], *number));
     let mut kept = 0;
@@ -75,7 +77,7 @@ pub(super) fn weld(points: &[Point], numbers: &mut [u16]) -> usize {
     kept
 }
 
-/// What the points at `numbers`, all different and at least four, span.
+/// Returns what the points at `numbers` span. They are all different, and there are at least four.
 pub(super) fn span(points: &[Point], numbers: &[u16]) -> Span {
     let point = |number: u16| points[usize::from(number)];
     let (a, b) = (numbers[0], numbers[1]);
@@ -94,7 +96,7 @@ pub(super) fn span(points: &[Point], numbers: &[u16]) -> Span {
     }
 }
 
-/// The vertex that stands for `number` among the welded ones.
+/// Returns the vertex that represents `number` among the welded ones.
 pub(super) fn first_at_place(points: &[Point], welded: &[u16], number: u16) -> u16 {
     let place = points[usize::from(number)];
     welded

@@ -1,26 +1,27 @@
-//! The convex polygon that encloses points as seen from a viewpoint: the outline of the solid, or the
-//! outline of the points of one face as seen from straight above it.
+//! Computes the convex polygon that encloses points as seen from a viewpoint. It is used for the
+//! outline of the solid and for the outline of the points of one face as seen from straight above
+//! it.
 //!
-//! Harrison turns a line of sight around the page (3.2.1), starting from the point with the least y.
-//! Here the polygon grows point by point instead, which needs no page: it works for an eye so near that
-//! part of the solid is behind it, and it finds out whether the eye is inside.
+//! Harrison turns a line of sight around the page (3.2.1), starting from the point with the least
+//! y. Here the polygon grows point by point instead, which needs no page. So it works for an eye so
+//! near that part of the solid is behind it, and it detects whether the eye is inside the solid.
 
 use super::exact::{Point, Viewpoint};
 
-/// Corners in counter-clockwise order, no three of them in line on the page.
+/// The corners of the polygon in counter-clockwise order, no three of them in line on the page.
 #[derive(Debug)]
 pub(super) struct Polygon<'s> {
     corners: &'s mut [u16],
     count: usize,
 }
 
-/// There are points on all sides of the viewpoint, so they have no outline.
+/// The error that there are points on all sides of the viewpoint, so that they have no outline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Surrounded;
 
 impl<'s> Polygon<'s> {
-    /// A triangle of three points that are not in line on the page. `room` holds as many corners as
-    /// there can be, at least three.
+    /// Creates the triangle of three points that are not in line on the page. `room` must hold as
+    /// many corners as the polygon can ever have, at least three.
     pub(super) fn triangle(
         room: &'s mut [u16],
         points: &[Point],
@@ -37,12 +38,12 @@ impl<'s> Polygon<'s> {
         &self.corners[..self.count]
     }
 
-    /// Gives the room back.
+    /// Returns the memory of the corners.
     pub(super) fn into_room(self) -> &'s mut [u16] {
         self.corners
     }
 
-    /// Turns the polygon so that it begins with `corner`, if that is a corner.
+    /// Rotates the list of corners so that it begins with `corner`, if that is a corner.
     pub(super) fn begin_with(&mut self, corner: u16) {
         let corners = &mut self.corners[..self.count];
         if let Some(at) = corners.iter().position(|number| *number == corner) {
@@ -50,7 +51,10 @@ impl<'s> Polygon<'s> {
         }
     }
 
-    /// Grows the polygon, if need be, so that it encloses one more point.
+    /// Extends the polygon, if necessary, so that it encloses one more point.
+    ///
+    /// # Errors
+    /// Returns [`Surrounded`] if there are points on all sides of the viewpoint.
     pub(super) fn enclose(
         &mut self,
         points: &[Point],
@@ -65,7 +69,8 @@ impl<'s> Polygon<'s> {
             let to = points[usize::from(corners[(edge + 1) % count])];
             viewpoint.turn(from, to, new)
         };
-        // The sides that the point is beyond follow one another: `start` up to `end`, around the polygon.
+        // The sides beyond which the point lies are consecutive: from `start` up to `end`, around
+        // the polygon.
         let (mut start, mut end) = (None, None);
         let first_is_beyond = side(0) < 0;
         let mut last_is_beyond = first_is_beyond;
@@ -82,7 +87,8 @@ impl<'s> Polygon<'s> {
             return if first_is_beyond { Err(Surrounded) } else { Ok(()) };
         }
         let (mut start, mut end) = (start.unwrap_or(0), end.unwrap_or(count));
-        // A neighbouring side in line with the point would leave a corner in the middle of a side.
+        // A neighbouring side in line with the point is replaced too, as otherwise a corner would
+        // remain in the middle of a side.
         let before = (start + count - 1) % count;
         let mut replaced = (end + count - start) % count;
         if side(before) == 0 {
@@ -98,7 +104,7 @@ impl<'s> Polygon<'s> {
             return Err(Surrounded);
         }
         corners[..count].rotate_left(start);
-        // Sides 0 to `replaced` - 1 give way to two sides that meet in the new point.
+        // Sides 0 to `replaced` - 1 are replaced by two sides that meet in the new point.
         corners.copy_within(replaced..count, 2);
         corners[1] = number;
         self.count = count - replaced + 2;
