@@ -1,11 +1,14 @@
-//! Division of 64 bits by 32 on a Cortex-M3, which divides 32 by 32.
+//! Division of 64 bits by 32 bits on a Cortex-M3, whose own instruction divides 32 bits by 32.
 //!
-//! The names are those by which the compiler calls division. Two digits of 16 bits (Knuth's algorithm D): 45
-//! instructions, where the compiler's own takes up to 250. A greater divisor takes some 35 more.
+//! The symbols have the names by which the compiler calls division. The quotient is computed in two
+//! digits of 16 bits (Knuth's algorithm D). That takes 45 instructions, where the compiler's own
+//! routine takes up to 250. A divisor of more than 32 bits takes some 35 more.
 
 core::arch::global_asm!(
-    // r1, below r2 and r5 its upper half, and the upper half of r0 over r2, whose top bit is set: quotient in r3,
-    // remainder in r1. r0 moves up.
+    // Computes one digit. In: r1, which is less than r2; r2, whose top bit is set; r5, the upper
+    // half of r2; the upper half of r0. The dividend is r1 followed by the upper half of r0, and
+    // the divisor is r2. Out: the quotient in r3 and the remainder in r1. r0 is shifted up by one
+    // digit.
     ".macro penup_digit",
     "udiv r3, r1, r5",
     "mls r1, r3, r5, r1",
@@ -35,13 +38,13 @@ core::arch::global_asm!(
     "cmp r1, #0",
     "beq 2f",
     "push {{r4-r6, lr}}",
-    "udiv r12, r1, r2", // the quotient's upper half
+    "udiv r12, r1, r2", // the upper half of the quotient
     "mls r1, r12, r2, r1",
     "clz r6, r2",
     "lsls r2, r6",
     "lsls r1, r6",
     "rsb r3, r6, #32",
-    "lsr r4, r0, r3", // by 32 it is 0
+    "lsr r4, r0, r3", // a shift by 32 gives 0
     "orrs r1, r4",
     "lsls r0, r6",
     "lsrs r5, r2, #16",
@@ -58,8 +61,8 @@ core::arch::global_asm!(
     "movs r0, r3",
     "movs r3, #0",
     "bx lr",
-    // A divisor of more than 32 bits: its upper 32 give the quotient or one more, or one less after the
-    // correction by 1 (Warren, Hacker's Delight, chapter 9).
+    // For a divisor of more than 32 bits, its upper 32 bits give the quotient or one more; after
+    // subtracting 1, the quotient or one less (Warren, Hacker's Delight, chapter 9).
     "3: push {{r4-r10, lr}}",
     "mov r4, r0",
     "mov r5, r1",
@@ -68,7 +71,7 @@ core::arch::global_asm!(
     "clz r8, r3",
     "lsl r3, r3, r8",
     "rsb r9, r8, #32",
-    "lsr r2, r2, r9", // by 32 it is 0
+    "lsr r2, r2, r9", // a shift by 32 gives 0
     "orrs r2, r3",
     "lsrs r1, r1, #1",
     "rrx r0, r0",

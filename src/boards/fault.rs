@@ -1,40 +1,41 @@
-//! What becomes of a panic or a fault: the machine is made safe at once, and the cause is reported.
+//! Handling of panics and faults: the machine is made safe at once, and the cause is reported.
 //!
-//! How it is reported is the board's choice ([`Fault::report`]). Without a choice of its own it
-//! says the cause on its serial line and waits for ctrl-X, which resets it. A board that can keep
-//! the cause through a reset starts again by itself, and tells the cause then.
+//! Each board chooses how the cause is reported ([`Fault::report`]). By default the board writes
+//! the cause to its serial line and waits for ctrl-X, which resets it. A board that can keep the
+//! cause through a reset restarts by itself and reports the cause afterwards.
 
 use core::fmt::{self, Write};
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use super::line;
 
-/// What a board does then. No handler runs any more.
+/// What a board does after a panic or a fault. No interrupt handler runs any more.
 pub trait Fault {
-    /// No interrupt, no step, pen up, drivers off.
+    /// Disables interrupts and steps, raises the pen and switches the drivers off.
     fn make_safe();
-    /// Reports the cause, or starts again and reports it then.
+    /// Reports the cause, or restarts the board, which then reports it.
     fn report(cause: fmt::Arguments) {
         say::<Self>(cause);
     }
-    /// Sends bytes past any queue.
+    /// Sends bytes directly, without any queue.
     fn write(bytes: &[u8]);
-    /// From here on it only waits: nothing feeds a watchdog.
+    /// Prepares for waiting: from now on nothing feeds a watchdog.
     fn begin_to_wait() {}
-    /// A byte straight from the receiver.
+    /// Reads a byte directly from the receiver, if there is one.
     fn poll() -> Option<u8>;
-    /// Starts again, because the user has asked for it.
+    /// Restarts the board because the user has asked for it.
     fn reset() -> !;
 }
 
-/// Stands for the address of a fault for which the stack had no place left.
+/// Used in place of the address of a fault if the stack had no room left for it.
 pub const STACK_USED_UP: u32 = u32::MAX;
 
-/// A second fault while the first is reported ends the report. Read and written with interrupts off.
+/// Whether a fault is being reported. A second fault during a report ends the report. It is read
+/// and written with interrupts off.
 static REPORTING: AtomicBool = AtomicBool::new(false);
 
-/// What a panic comes to. `cause` says where it came from: the `PanicInfo` itself, or less where
-/// the flash has no room for its text.
+/// Handles a panic. `cause` is the `PanicInfo` itself, or something shorter where the flash has no
+/// room for its text.
 pub fn panic<F: Fault>(cause: impl fmt::Display) -> ! {
     if begin_report::<F>() {
         defmt::error!("{}", defmt::Display2Format(&cause));
@@ -43,7 +44,7 @@ pub fn panic<F: Fault>(cause: impl fmt::Display) -> ! {
     wait_for_reset::<F>()
 }
 
-/// What a fault at this address comes to, or at [`STACK_USED_UP`].
+/// Handles a fault at `address`, or at [`STACK_USED_UP`].
 pub fn hard_fault<F: Fault>(address: u32) -> ! {
     if begin_report::<F>() {
         if address == STACK_USED_UP {
@@ -57,8 +58,8 @@ pub fn hard_fault<F: Fault>(address: u32) -> ! {
     wait_for_reset::<F>()
 }
 
-/// Makes the machine safe. Whether there is something to report: not while another fault is
-/// reported.
+/// Makes the machine safe. Returns whether the fault is to be reported, which is not so while
+/// another fault is being reported.
 fn begin_report<F: Fault>() -> bool {
     F::make_safe();
     if REPORTING.load(Ordering::Relaxed) {
@@ -68,10 +69,10 @@ fn begin_report<F: Fault>() -> bool {
     true
 }
 
-/// Says the cause on the serial line.
+/// Writes the cause to the serial line.
 pub fn say<F: Fault + ?Sized>(cause: fmt::Arguments) {
     F::write(b"\r\n");
-    // Fails never: `OneLine` takes every byte.
+    // This never fails, because `OneLine` accepts every byte.
     let _ = write!(OneLine(F::write), "[MSG:stopped by a fault, ctrl-X resets: {cause}]");
     F::write(b"\r\n");
 }
@@ -82,7 +83,7 @@ fn wait_for_reset<F: Fault>() -> ! {
     F::reset()
 }
 
-/// Writes to the serial line, with line ends as spaces.
+/// Writes to the serial line and replaces line ends by spaces.
 struct OneLine(fn(&[u8]));
 
 impl Write for OneLine {

@@ -1,8 +1,8 @@
-//! What an interrupt handler owns.
+//! Data that an interrupt handler owns.
 
 use core::cell::UnsafeCell;
 
-/// A place that is filled once and from then on belongs to one interrupt handler.
+/// A cell that is filled once and belongs to one interrupt handler from then on.
 pub struct Owned<T>(UnsafeCell<Option<T>>);
 
 // SAFETY: `fill` and `get` are never called at once, by their contracts; the value moves from the
@@ -10,7 +10,7 @@ pub struct Owned<T>(UnsafeCell<Option<T>>);
 unsafe impl<T: Send> Sync for Owned<T> {}
 
 impl<T> Owned<T> {
-    /// Not yet filled.
+    /// Creates an empty cell.
     pub const fn empty() -> Self {
         Self(UnsafeCell::new(None))
     }
@@ -22,24 +22,24 @@ impl<T> Owned<T> {
         unsafe { *self.0.get() = Some(value) };
     }
 
-    /// What was filled in, `None` before.
+    /// Returns the value, or `None` before the cell was filled.
     ///
     /// # Safety
     /// Called by the handler itself, or while its interrupt is masked; the reference ends before
     /// the handler can run again.
-    #[allow(clippy::mut_from_ref)] // One user at a time, by the contract.
+    #[allow(clippy::mut_from_ref)] // The contract allows only one user at a time.
     #[inline(always)]
     pub unsafe fn get(&self) -> Option<&mut T> {
         // SAFETY: no other reference lives, by the contract.
         unsafe { (*self.0.get()).as_mut() }
     }
 
-    /// The same without a check.
+    /// Returns the value without a check.
     ///
     /// # Safety
     /// As for [`Owned::get`], and it was filled before.
     #[cfg(feature = "lm3s6965")]
-    #[allow(clippy::mut_from_ref)] // One user at a time, by the contract.
+    #[allow(clippy::mut_from_ref)] // The contract allows only one user at a time.
     #[inline(always)]
     pub unsafe fn get_filled(&self) -> &mut T {
         // SAFETY: no other reference lives and there is a value, by the contract.

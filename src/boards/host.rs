@@ -1,7 +1,8 @@
-//! A board of plain memory, for tests and preview: the library's own interrupt code on pins that
-//! remember what they did, and a serial line that is two buffers.
+//! A simulated board for tests and previews. It runs the library's own interrupt code on pins that
+//! record their changes, and its serial line consists of two buffers.
 //!
-//! Time passes only in [`Board::wait`] and [`HostBoard::pass`], so a run is the same every time.
+//! Time passes only in [`Board::wait`] and [`HostBoard::pass`], and while bytes are sent at a set
+//! baud rate. So a run gives the same result every time.
 
 use crate::machine::{Contacts, EventRing, Pen, Pins, Pulser, PulserState, StepQueue, Tick};
 use crate::model::{Corner, Position};
@@ -16,14 +17,15 @@ use std::collections::VecDeque;
 use std::rc::Rc;
 use std::vec::Vec;
 
-/// Serial ports.
+/// The number of serial ports.
 pub const PORTS: usize = 2;
 
-/// As many events as the smallest board's queue holds.
+/// The number of slots in the queue, as many as in the smallest board's queue.
 pub const QUEUE_LENGTH: usize = 624;
 
-/// Memory for a plotter on a computer: as many vertices as an element can name, and as much to work
-/// in as any board's jobs ten times over. It is lent for as long as the process lives.
+/// Allocates memory for a plotter on a computer: as many vertices as an element can name, and ten
+/// times the working memory that any board's jobs use. The memory is leaked, so it lasts as long as
+/// the process.
 pub fn lend_memory() -> MemorySlices<'static> {
     const VERTICES: usize = crate::model::VERTEX_NUMBER_LIMIT;
     const CORNERS: usize = 1 << 16;
@@ -37,37 +39,37 @@ pub fn lend_memory() -> MemorySlices<'static> {
     }
 }
 
-/// What a pin did.
+/// A change of a pin or of the pen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Change {
-    /// Step pin of x.
+    /// The step pin of x.
     StepX(bool),
-    /// Step pin of y.
+    /// The step pin of y.
     StepY(bool),
-    /// Direction pin of x; high counts up.
+    /// The direction pin of x; high counts up.
     UpX(bool),
-    /// Direction pin of y; high counts up.
+    /// The direction pin of y; high counts up.
     UpY(bool),
-    /// Enable pin of the drivers.
+    /// The enable pin of the drivers.
     Enable(bool),
-    /// Height of the pen, 0 raised to 127 lowered.
+    /// The height of the pen, from 0 (raised) to 127 (lowered).
     Pen(u8),
-    /// Step pin of the pen's motor.
+    /// The step pin of the pen's motor.
     StepZ(bool),
-    /// Its direction pin; high lowers the pen.
+    /// The direction pin of the pen's motor; high lowers the pen.
     DownZ(bool),
 }
 
-/// A change and its time in ticks from the start.
+/// A change and the time at which it happened.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stamped {
-    /// Ticks from the start.
+    /// The time in ticks from the start.
     pub time: u64,
     /// What changed.
     pub change: Change,
 }
 
-/// What all pins did, in order. Writes that change nothing leave no trace.
+/// The changes of all pins, in order. Writes that change nothing are not recorded.
 #[derive(Debug, Default)]
 pub struct Trace {
     now: Cell<u64>,
@@ -94,13 +96,13 @@ impl Trace {
         self.changes.borrow().clone()
     }
 
-    /// The changes so far, which are forgotten here.
+    /// Returns the changes so far and removes them from the trace.
     pub fn take_changes(&self) -> Vec<Stamped> {
         self.changes.take()
     }
 }
 
-/// A pin that notes its changes.
+/// A pin that records its changes.
 #[derive(Debug)]
 pub struct TracedPin {
     trace: Rc<Trace>,
@@ -131,7 +133,7 @@ impl OutputPin for TracedPin {
     }
 }
 
-/// A pen that notes its heights.
+/// A pen that records its heights.
 #[derive(Debug)]
 pub struct TracedPen {
     trace: Rc<Trace>,
@@ -154,19 +156,20 @@ type TracedPulser<'q> = Pulser<
     QUEUE_LENGTH,
 >;
 
-/// The interrupt's calls at their times.
+/// Calls the interrupt code at the times at which it is due.
 #[derive(Debug)]
 pub struct TracedSteps<'q> {
     pulser: TracedPulser<'q>,
     state: &'q PulserState,
     trace: Rc<Trace>,
-    /// When the next event is due, in ticks from the start.
+    /// The time at which the next event is due, in ticks from the start.
     due: Option<u64>,
-    /// When the pulses end that are high.
+    /// The time at which the present pulses end, in ticks from the start.
     pulses_end: Option<u64>,
 }
 
-/// Pins that note their changes in a trace, the interrupt that writes them, and its queue's other end.
+/// Creates pins that record their changes in a trace, the interrupt code that writes them, and the
+/// main loop's end of its queue.
 pub fn traced_steps<'q>(
     ring: &'q mut EventRing<QUEUE_LENGTH>,
     state: &'q PulserState,
@@ -188,17 +191,18 @@ pub fn traced_steps<'q>(
 }
 
 impl TracedSteps<'_> {
-    /// What the pins did.
+    /// The recorded changes of the pins.
     pub fn trace(&self) -> &Trace {
         &self.trace
     }
 
-    /// The next event is due now.
+    /// Makes the next event due now.
     pub fn step_now(&mut self) {
         self.due = Some(self.trace.now());
     }
 
-    /// Lets time pass until `end`, in ticks from the start: what is due before it happens.
+    /// Advances the time to `end`, in ticks from the start. Everything that is due before it
+    /// happens.
     pub fn pass_until(&mut self, end: u64) {
         if self.due.is_none() && self.trace.now() < end && self.pulser.begin() {
             self.step_now();
@@ -243,9 +247,9 @@ impl TracedSteps<'_> {
     }
 }
 
-/// The board.
+/// The simulated board.
 pub struct HostBoard<'q> {
-    /// Ordinary bytes, each with the number of its port.
+    /// The ordinary bytes that were received, each with the number of its port.
     received: VecDeque<(usize, u8)>,
     sorters: [Sorter; PORTS],
     asked: RealTime,
@@ -254,7 +258,7 @@ pub struct HostBoard<'q> {
     steps: TracedSteps<'q>,
     contacts: Contacts,
     state: &'q PulserState,
-    /// Ticks that sending a byte takes.
+    /// The number of ticks that sending a byte takes.
     byte_ticks: u64,
 }
 
@@ -268,7 +272,7 @@ impl core::fmt::Debug for HostBoard<'_> {
 }
 
 impl<'q> HostBoard<'q> {
-    /// A board at rest.
+    /// Creates a board at rest.
     pub fn new(ring: &'q mut EventRing<QUEUE_LENGTH>, state: &'q PulserState) -> Self {
         let (queue, steps) = traced_steps(ring, state);
         Self {
@@ -284,16 +288,16 @@ impl<'q> HostBoard<'q> {
         }
     }
 
-    /// Bytes come by the first serial port. [`DAMAGED`](crate::protocol::DAMAGED) among them stands for
-    /// bytes that were lost or damaged there.
+    /// Receives bytes by the first serial port. [`DAMAGED`](crate::protocol::DAMAGED) among them
+    /// represents bytes that were lost or damaged.
     pub fn receive(&mut self, bytes: &[u8]) {
         self.receive_by(0, bytes);
     }
 
-    /// Bytes come by a serial port, by its number from 0 to [`PORTS`] - 1.
+    /// Receives bytes by the serial port with this number, from 0 to [`PORTS`] - 1.
     ///
     /// # Panics
-    /// If there is no such port.
+    /// When there is no such port.
     pub fn receive_by(&mut self, port: usize, bytes: &[u8]) {
         for byte in bytes {
             match self.sorters[port].sort(*byte) {
@@ -308,37 +312,37 @@ impl<'q> HostBoard<'q> {
         }
     }
 
-    /// Sends at this speed from now on; at first bytes take no time.
+    /// Sets the baud rate for sending. Without it, sending takes no time.
     pub fn set_baud(&mut self, baud: u32) {
         self.byte_ticks = u64::from(10 * crate::motion::TICKS_PER_SECOND / baud);
     }
 
-    /// Closes and opens contacts.
+    /// Sets which contacts are closed.
     pub fn set_contacts(&mut self, contacts: Contacts) {
         self.contacts = contacts;
     }
 
-    /// How often the queue of steps ran dry while the machine moved.
+    /// How often the queue of steps ran empty while the machine moved.
     pub fn underruns(&self) -> u32 {
         self.state.underruns()
     }
 
-    /// Whether all bytes received have been read, and real-time ones acted on.
+    /// Whether all received bytes have been read, and all real-time requests have been taken.
     pub fn has_read_all(&self) -> bool {
         self.received.is_empty() && self.asked == RealTime::default()
     }
 
-    /// What was sent back; it is forgotten here.
+    /// Returns the bytes that were sent and removes them.
     pub fn take_sent(&mut self) -> Vec<u8> {
         core::mem::take(&mut self.sent)
     }
 
-    /// What the pins did.
+    /// The recorded changes of the pins.
     pub fn trace(&self) -> &Trace {
         self.steps.trace()
     }
 
-    /// Lets `ticks` pass: the step interrupts that are due in them run.
+    /// Advances the time by `ticks`. The step interrupts that are due in this time run.
     pub fn pass(&mut self, ticks: u64) {
         self.steps.pass_until(self.trace().now() + ticks);
         self.queue.sync_consumed();

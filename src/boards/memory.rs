@@ -1,8 +1,8 @@
-//! Copying and filling memory on a Cortex-M3, in little flash.
+//! Routines that copy and fill memory on a Cortex-M3 in little flash.
 //!
-//! The names are those by which the compiler calls these. Its own versions take over 3 KiB, because they
-//! treat addresses that are not whole words apart; this core reads and writes words at any address.
-//! Four instructions a word, as a plain loop takes.
+//! The symbols have the names by which the compiler calls these routines. Its own versions take
+//! over 3 KiB, because they treat unaligned addresses separately; this core reads and writes words
+//! at any address. The loops take four instructions per word, as a plain loop does.
 
 core::arch::global_asm!(
     ".section .text.penup_copy, \"ax\"",
@@ -20,7 +20,7 @@ core::arch::global_asm!(
     "__aeabi_memcpy4:",
     ".thumb_func",
     "__aeabi_memcpy8:",
-    // r0 to where, and so it returns; r1 from where; r2 how many bytes.
+    // In: r0, the destination, which is also returned; r1, the source; r2, the number of bytes.
     "mov r12, r0",
     "subs r2, #4",
     "blo 2f",
@@ -50,7 +50,7 @@ core::arch::global_asm!(
     "__aeabi_memmove4:",
     ".thumb_func",
     "__aeabi_memmove8:",
-    // Forwards unless it goes to within what it comes from.
+    // Copies forward unless the destination begins within the source.
     "subs r3, r0, r1",
     "cmp r3, r2",
     "bhs memcpy",
@@ -80,14 +80,14 @@ core::arch::global_asm!(
     ".type __aeabi_memclr, %function",
     ".type __aeabi_memclr4, %function",
     ".type __aeabi_memclr8, %function",
-    // r0 where, and so it returns; r1 with which byte; r2 how many.
+    // In: r0, the destination, which is also returned; r1, the byte; r2, the number of bytes.
     ".thumb_func",
     "memset:",
     "mov r3, r1",
     "mov r1, r2",
     "mov r2, r3",
     "b 1f",
-    // r0 where; r1 how many bytes.
+    // In: r0, the destination; r1, the number of bytes.
     ".thumb_func",
     "__aeabi_memclr:",
     ".thumb_func",
@@ -95,7 +95,7 @@ core::arch::global_asm!(
     ".thumb_func",
     "__aeabi_memclr8:",
     "movs r2, #0",
-    // r0 where; r1 how many; r2 with which byte.
+    // In: r0, the destination; r1, the number of bytes; r2, the byte.
     ".thumb_func",
     "__aeabi_memset:",
     ".thumb_func",

@@ -1,8 +1,8 @@
-//! Pins, timer, serial line and storage of each board.
+//! The boards: pins, timers, serial lines and storage of each.
 //!
-//! A board implements [`penup::plotter::Board`], and its module is the only place for `unsafe`:
-//! each block there states the contract that it meets. `take` gives the board that the firmware is
-//! built for, once.
+//! Each board implements [`penup::plotter::Board`]. The boards' modules are the only ones with
+//! `unsafe` code, and each such block states the contract that it meets. `take` returns the board
+//! that the firmware is built for; it works only once.
 
 #[cfg(feature = "lm3s6965")]
 mod divide;

@@ -1,13 +1,14 @@
-//! Arm MPS2+ (AN385) in QEMU: a Cortex-M3 that counts what it executes.
+//! Arm MPS2+ (AN385) in QEMU: a Cortex-M3 that counts the instructions that it executes.
 
 mod divide;
 mod memory;
 
-/// Counts down once in 40 ns: QEMU's `-icount shift=0` lets an instruction take 1 ns.
+/// A timer that counts down once every 40 ns. With `-icount shift=0`, QEMU takes 1 ns for an
+/// instruction.
 const TIMER: *mut u32 = 0x4000_0000 as *mut u32;
 const INSTRUCTIONS_PER_TICK: u64 = 40;
 
-/// The instructions executed since it was made.
+/// Counts the instructions that were executed since it was created.
 pub struct Counter {
     last: u32,
     ticks: u64,
@@ -16,8 +17,8 @@ pub struct Counter {
 impl Counter {
     /// Starts the timer.
     pub fn start() -> Self {
-        // SAFETY: CMSDK APB timer 0 (Arm DDI 0479): VALUE, RELOAD and CTRL are words at 4, 8 and 0, and
-        // nothing else uses it.
+        // SAFETY: CMSDK APB timer 0 (Arm DDI 0479): VALUE, RELOAD and CTRL are words at 4, 8 and 0,
+        // and nothing else uses it.
         unsafe {
             TIMER.add(1).write_volatile(u32::MAX);
             TIMER.add(2).write_volatile(u32::MAX);
@@ -26,7 +27,7 @@ impl Counter {
         Self { last: u32::MAX, ticks: 0 }
     }
 
-    /// To be asked at least once in 171 s of the timer.
+    /// Returns the number of instructions so far. Call it at least once in 171 s of the timer.
     pub fn read(&mut self) -> u64 {
         // SAFETY: as above; VALUE may be read at any time.
         let value = unsafe { TIMER.add(1).read_volatile() };

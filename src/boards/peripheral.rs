@@ -1,4 +1,4 @@
-//! A chip's registers.
+//! Access to the registers of a chip's peripherals.
 
 use core::ptr;
 
@@ -36,7 +36,8 @@ impl Peripheral {
         unsafe { ptr::write_volatile((self.base + offset) as *mut u32, value) }
     }
 
-    /// Sets `bits` of the register at `offset`. Not for a register that an interrupt changes too.
+    /// Sets `bits` of the register at `offset`. Do not use it for a register that an interrupt
+    /// changes too.
     #[cfg(feature = "lm3s6965")]
     pub fn set_bits(self, offset: usize, bits: u32) {
         self.write(offset, self.read(offset) | bits);

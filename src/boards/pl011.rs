@@ -1,5 +1,5 @@
-//! The UART of both chips, Arm's PrimeCell PL011: 115200 baud, 8 bits, no parity, one stop bit, both
-//! ways by FIFO.
+//! The UART of both chips, Arm's PrimeCell PL011: 115200 baud, 8 bits, no parity, one stop bit,
+//! with FIFOs in both directions.
 
 use super::peripheral::Peripheral;
 
@@ -30,10 +30,10 @@ const ENABLE_BOTH_WAYS: u32 = 1 | 1 << 8 | 1 << 9;
 pub struct Uart(pub Peripheral);
 
 impl Uart {
-    /// Readies it, with a clock of so many hertz. Nothing interrupts yet.
+    /// Configures the UART for a clock of `hertz`. No interrupt is enabled yet.
     #[inline(always)]
     pub fn set_up(self, hertz: u32) {
-        // Sixty-fourths of a divider of 16 samples a bit, rounded.
+        // The divider counts sixty-fourths of 16 samples per bit, rounded.
         let divider = (hertz * 4 + BAUD / 2) / BAUD;
         self.0.write(offset::CONTROL, 0);
         self.0.write(offset::BAUD_INTEGER, divider / 64);
@@ -42,22 +42,22 @@ impl Uart {
         self.0.write(offset::INTERRUPT_MASK, 0);
     }
 
-    /// From now on it sends and receives.
+    /// Enables sending and receiving.
     pub fn enable(self) {
         self.0.write(offset::CONTROL, ENABLE_BOTH_WAYS);
     }
 
-    /// Whether the sender's FIFO has a place.
+    /// Whether the FIFO of the sender has room for a byte.
     pub fn has_place(self) -> bool {
         self.0.read(offset::FLAGS) & SENDER_FULL == 0
     }
 
-    /// Sends a byte, for which there is a place.
+    /// Sends a byte. The FIFO must have room for it.
     pub fn put(self, byte: u8) {
         self.0.write(offset::DATA, u32::from(byte));
     }
 
-    /// Sends `bytes`; returns when the last is in the FIFO.
+    /// Sends `bytes`. It returns when the last byte is in the FIFO.
     pub fn write(self, bytes: &[u8]) {
         for &byte in bytes {
             while !self.has_place() {}
@@ -65,39 +65,41 @@ impl Uart {
         }
     }
 
-    /// A byte straight from the receiver with its error bits, as
+    /// Reads a byte with its error bits directly from the receiver, as
     /// [`penup::protocol::Receiver::receive_from_uart`] takes them.
     pub fn poll(self) -> Option<u32> {
         let empty = self.0.read(offset::FLAGS) & RECEIVER_EMPTY != 0;
         (!empty).then(|| self.0.read(offset::DATA))
     }
 
-    /// Received bytes interrupt.
+    /// Enables the interrupt for received bytes.
     #[cfg(feature = "lm3s6965")]
     pub fn interrupt_when_received(self) {
         self.0.write(offset::INTERRUPT_MASK, RECEIVED | RECEIVE_TIMEOUT);
     }
 
-    /// Whether an emptier FIFO of what is sent is to interrupt. Received bytes do not.
+    /// Enables or disables the interrupt that comes when the FIFO of the sender gets emptier.
+    /// Received bytes cause no interrupt.
     #[cfg(feature = "pico")]
     pub fn interrupt_when_sent(self, interrupts: bool) {
         self.0.write(offset::INTERRUPT_MASK, if interrupts { SENT } else { 0 });
     }
 
-    /// Whether received bytes are left to direct memory access, whatever errors they have; else
-    /// [`Uart::poll`] finds them.
+    /// Sets whether DMA fetches the received bytes, whatever errors they have. Otherwise
+    /// [`Uart::poll`] returns them.
     #[cfg(feature = "pico")]
     pub fn receive_by_dma(self, by_dma: bool) {
         self.0.write(offset::DMA, u32::from(by_dma));
     }
 
-    /// Where a DMA channel reads the next received byte with its error bits, as a half-word.
+    /// The address at which a DMA channel reads the next received byte with its error bits, as a
+    /// half-word.
     #[cfg(feature = "pico")]
     pub const fn data_address(self) -> u32 {
         self.0.address(offset::DATA)
     }
 
-    /// The interrupt is being handled.
+    /// Clears the interrupt in its handler.
     pub fn clear_interrupt(self) {
         self.0.write(offset::INTERRUPT_CLEAR, RECEIVED | RECEIVE_TIMEOUT | SENT);
     }

@@ -1,4 +1,4 @@
-//! Where a panic came from, told by addresses.
+//! Reports by addresses where a panic came from.
 //!
 //! The text of a panic costs some 19 KiB of flash: messages, file names, line numbers, and the code
 //! that passes them on. The compiler leaves all of that out if the panic handler does not read it.
@@ -7,21 +7,21 @@
 
 use core::{arch, fmt};
 
-/// How many calls are reported, from the innermost outwards.
+/// The greatest number of calls that are reported, from the innermost outward.
 const MOST: usize = 12;
 
-/// What every function that calls another one pushes on entry, on this target, before it points
-/// register 7 at it.
+/// The data that every function that calls another one pushes on entry, on this target, before it
+/// points register 7 at it.
 #[derive(Clone, Copy)]
 #[repr(C)]
 struct Frame {
     /// The address of the caller's frame.
     caller: usize,
-    /// Where the caller goes on, with bit 0 set.
+    /// The address at which the caller continues, with bit 0 set.
     return_address: usize,
 }
 
-/// The chain of calls that led to where it was made.
+/// The chain of calls that led to the place where this value was created.
 #[derive(Clone, Copy)]
 pub struct Callers {
     innermost: usize,
@@ -29,7 +29,7 @@ pub struct Callers {
 }
 
 impl Callers {
-    /// Those of the function that calls this one. The stack grows down from `stack_start`.
+    /// The callers of the function that calls this one. The stack grows down from `stack_start`.
     #[inline(always)] // So that register 7 is the caller's.
     pub fn new(stack_start: usize) -> Self {
         let innermost;
@@ -49,10 +49,11 @@ impl fmt::Display for Callers {
             if !at.is_multiple_of(4) || at > self.stack_start - size_of::<Frame>() {
                 break;
             }
-            // SAFETY: it lies on the stack, aligned: the first frame is the running function's, and each
-            // further one lies above the one before and below the stack's start. Nobody writes it now.
+            // SAFETY: the address lies on the stack and is aligned. The first frame is the running
+            // function's, and each further one lies above the one before and below the start of the
+            // stack. Nobody writes it now.
             let frame = unsafe { *(at as *const Frame) };
-            // Within the instruction that called.
+            // This address is within the call instruction.
             write!(formatter, " {:#x}", (frame.return_address & !1).wrapping_sub(2))?;
             if frame.caller <= at {
                 break;

@@ -1,8 +1,8 @@
-//! The core's clock, and the time that has passed.
+//! The clock of the core, and the time since the start.
 //!
-//! Time is counted in the core's cycles by SysTick, 24 bits that an interrupt extends. It stands
-//! still while the machine sleeps without a task, so that an emulator whose time leaps to the next
-//! timer has none to leap to.
+//! SysTick counts time in cycles of the core with 24 bits, which an interrupt extends. Time is
+//! stopped while the machine sleeps without a task, so that an emulator that jumps in time to the
+//! next timer has nothing to jump to.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -14,10 +14,10 @@ use cortex_m_rt::exception;
 use super::critical;
 use super::registers::SYSTEM_CONTROL;
 
-/// Cycles in a second.
+/// The clock frequency in cycles per second.
 pub const HERTZ: u32 = 50_000_000;
 
-/// SysTick counts this many cycles, less one, and begins again.
+/// The mask of a SysTick count. SysTick counts one cycle more than this number and then restarts.
 pub const CYCLE_MASK: u32 = 0x00FF_FFFF;
 
 mod offset {
@@ -36,7 +36,7 @@ const PLL_LOCKED: u32 = 1 << 6;
 /// The PLL's 200 MHz divided by 4.
 const DIVIDE_BY_4: u32 = 3 << 23;
 
-/// Times that SysTick began again.
+/// The number of times that SysTick has restarted.
 static WRAPS: AtomicU32 = AtomicU32::new(0);
 
 /// The running clock.
@@ -44,11 +44,12 @@ pub struct Clock {
     systick: SYST,
 }
 
-/// Sets the core to [`HERTZ`] and lets time begin. Called first of all.
+/// Sets the core to [`HERTZ`] and starts the time. It must be called first of all.
 pub fn start(mut systick: SYST, scb: &mut SCB) -> Clock {
     let set = |value| SYSTEM_CONTROL.write(offset::RUN_MODE_CLOCK, value);
     let mut run_mode = SYSTEM_CONTROL.read(offset::RUN_MODE_CLOCK);
-    // The order of the data sheet, 6.1.5: off the PLL, crystal, PLL, divider, onto the PLL.
+    // This is the order of the data sheet, 6.1.5: leave the PLL, set the crystal, the PLL and the
+    // divider, return to the PLL.
     run_mode = (run_mode | PLL_BYPASS) & !(USE_SYSTEM_DIVIDER | MAIN_OSCILLATOR_OFF);
     set(run_mode);
     run_mode &= !(CRYSTAL | OSCILLATOR_SOURCE | PLL_POWER_DOWN);
@@ -70,7 +71,7 @@ pub fn start(mut systick: SYST, scb: &mut SCB) -> Clock {
 }
 
 impl Clock {
-    /// Sleeps until an interrupt, with time standing still. The caller has masked interrupts.
+    /// Sleeps until an interrupt comes, with the time stopped. The caller has masked interrupts.
     pub fn sleep_stopped(&mut self) {
         self.systick.disable_counter();
         cortex_m::asm::wfi();
@@ -78,24 +79,25 @@ impl Clock {
     }
 }
 
-/// Cycles since the start, modulo 2^24.
+/// The cycles since the start, modulo 2^24.
 #[inline(always)]
 pub fn cycles_24() -> u32 {
     !count_down() & CYCLE_MASK
 }
 
-/// The same counted down: what the step interrupt counts by.
+/// The same count, counted down. The step interrupt uses it.
 #[inline(always)]
 pub fn count_down() -> u32 {
     SYST::get_current()
 }
 
-/// Microseconds of time awake since the start.
+/// The time awake since the start, in microseconds.
 pub fn microseconds() -> u64 {
     loop {
         let wraps = WRAPS.load(Ordering::Relaxed);
         let cycles = cycles_24();
-        // A wrap that no interrupt has counted yet, because this code runs above it.
+        // SysTick may have restarted without being counted yet, because this code runs at a higher
+        // priority than its interrupt.
         let uncounted = SCB::is_pendst_pending() && cycles < CYCLE_MASK / 2;
         if wraps == WRAPS.load(Ordering::Relaxed) {
             let wraps = u64::from(wraps) + u64::from(uncounted);
@@ -106,7 +108,7 @@ pub fn microseconds() -> u64 {
 
 #[exception]
 fn SysTick() {
-    // The only writer, so load and store are as good as an increment.
+    // This is the only writer, so a load and a store are as good as an increment.
     WRAPS.store(WRAPS.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
 }
 

@@ -1,4 +1,5 @@
-//! The contacts, on port C: its interrupt wakes the main loop when one changes.
+//! The contacts, which are on port C. The interrupt of the port wakes the main loop when a contact
+//! changes.
 
 use core::sync::atomic::Ordering;
 
@@ -24,10 +25,10 @@ const LIMIT_Y: u32 = 1 << 5;
 const STOP: u32 = 1 << 6;
 const ALL: u32 = LIMIT_X | LIMIT_Y | STOP;
 
-/// Makes the pins inputs, pulled down.
+/// Makes the pins inputs with pull-down resistors.
 pub fn set_up(nvic: &mut NVIC) {
     SYSTEM_CONTROL.set_bits(offset::GPIO_CLOCKS, PORT_C_CLOCK);
-    // The port answers three cycles after its clock is on; a read takes longer.
+    // The port responds three cycles after its clock is on; this read takes longer.
     SYSTEM_CONTROL.read(offset::GPIO_CLOCKS);
     GPIO_C.set_bits(offset::PULL_DOWN, ALL);
     GPIO_C.set_bits(offset::DIGITAL_ENABLE, ALL);
@@ -37,9 +38,9 @@ pub fn set_up(nvic: &mut NVIC) {
     critical::enable(nvic, Interrupt::GPIOC, critical::CLOCK_PRIORITY);
 }
 
-/// Which contacts are closed: their pins are high.
+/// The contacts that are closed; their pins are high.
 pub fn read() -> Contacts {
-    // Address bits 2 to 9 of the data register are its mask.
+    // Bits 2 to 9 of the address of the data register are its mask.
     let closed = GPIO_C.read((ALL << 2) as usize);
     Contacts { x: closed & LIMIT_X != 0, y: closed & LIMIT_Y != 0, stop: closed & STOP != 0 }
 }

@@ -1,22 +1,22 @@
-//! The ranks of the interrupts, and a critical section that the step interrupt does not wait for.
+//! The priorities of the interrupts, and a critical section that does not delay the step interrupt.
 
 use cortex_m::peripheral::NVIC;
 use cortex_m::register::basepri;
 use lm3s6965::Interrupt;
 
-/// The chip tells eight ranks by the upper three bits.
+/// The chip distinguishes eight priorities by the upper three bits.
 const fn priority(number: u8) -> u8 {
     number << 5
 }
 
-/// Steps: above everything, critical sections too.
+/// The priority of the steps, above everything else, including critical sections.
 pub const STEP_PRIORITY: u8 = priority(0);
-/// Bytes of the serial line.
+/// The priority of the serial line.
 pub const SERIAL_PRIORITY: u8 = priority(1);
-/// The clock's wraps.
+/// The priority of the clock.
 pub const CLOCK_PRIORITY: u8 = priority(2);
 
-/// Ranks and unmasks an interrupt, at set-up.
+/// Sets the priority of an interrupt and unmasks it, during set-up.
 pub fn enable(nvic: &mut NVIC, interrupt: Interrupt, priority: u8) {
     // SAFETY: no critical section is held at set-up that this could break.
     unsafe {

@@ -1,4 +1,4 @@
-//! What becomes of a panic or a fault: see [`fault`].
+//! Handling of panics and faults on this board: see [`fault`].
 
 use core::panic::PanicInfo;
 
@@ -41,8 +41,8 @@ unsafe extern "C" {
     static _stack_end: u32;
 }
 
-/// Goes to [`report_fault`] with the address of the fault, on a fresh stack: the fault may be that
-/// the stack is used up, and then nothing can be put onto it.
+/// Calls [`report_fault`] with the address of the fault and a fresh stack. The fault may be a stack
+/// overflow, and then nothing can be pushed onto the old stack.
 ///
 /// # Safety
 /// Called by the core alone, on a fault.
@@ -55,7 +55,7 @@ unsafe extern "C" fn HardFault() -> ! {
         "cmp r0, r1",
         "mvn r2, #0", // fault::STACK_USED_UP
         "it hs",
-        "ldrhs r2, [r0, #24]", // the program counter that the core has put there
+        "ldrhs r2, [r0, #24]", // the program counter that the core has stored there
         "mov r0, r2",
         "ldr r1, ={start}",
         "msr msp, r1",

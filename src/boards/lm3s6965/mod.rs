@@ -13,15 +13,16 @@
 //! | contacts | port C, priority 2: wakes the main loop |
 //! | clock | SysTick, priority 2; stands still while the machine sleeps without a task |
 //!
-//! What is refused: to be taken twice.
+//! The board can be taken only once.
 //!
-//! This board is for the emulator only: it is QEMU's machine `lm3s6965evb`, a Cortex-M3 whose pins
-//! can be watched. Do not flash the image on an EK-LM3S6965 board. Three things would go wrong there:
+//! This board is for the emulator only. It is QEMU's machine `lm3s6965evb`, a Cortex-M3 whose pins
+//! can be observed. Do not flash the image onto an EK-LM3S6965 board. Three things would go wrong
+//! there:
 //!
 //! - The log goes out by semihosting. Without a debugger each `bkpt` of it is a fault.
 //! - The chip's first revisions need their LDO at 2.75 V before the PLL runs (erratum of the PLL);
 //!   the image leaves it at 2.5 V.
-//! - PC6, here the emergency stop, switches the 15 V supply of the board's OLED display on, and PA2 to
+//! - PC6, the emergency stop here, switches on the 15 V supply of the board's OLED display. PA2 to
 //!   PA5 and PC7 belong to that display too.
 
 mod callers;
@@ -44,8 +45,8 @@ use penup::plotter::{Board, EMPTY_LOOKAHEAD, Lm3s6965Memory, MemorySlices};
 use penup::protocol::RealTime;
 use static_cell::{ConstStaticCell, StaticCell};
 
-/// An interrupt came since [`Board::wait`] last returned: the Cortex-M event register, in software,
-/// because QEMU's `wfe` does not sleep.
+/// Whether an interrupt has come since [`Board::wait`] last returned. It replaces the Cortex-M
+/// event register in software, because QEMU's `wfe` does not sleep.
 static HAPPENED: AtomicBool = AtomicBool::new(false);
 
 /// The board, as the plotter sees it.
@@ -55,10 +56,11 @@ pub struct Lm3s6965 {
     steps: steps::Steps,
 }
 
-/// Sets up clock, pins, serial line and timer: drivers off, pen up, nothing moving.
+/// Sets up the clock, the pins, the serial line and the timers. Afterwards the drivers are off, the
+/// pen is up and nothing moves.
 ///
 /// # Panics
-/// If the board was taken before.
+/// When the board was taken before.
 pub fn take() -> (Lm3s6965, MemorySlices<'static>, &'static PulserState) {
     let Some(mut core) = Peripherals::take() else {
         #[allow(clippy::panic)] // A programming error, found at the first start.
@@ -109,7 +111,7 @@ impl Board for Lm3s6965 {
     fn wait(&mut self) {
         self.steps.start();
         self.steps.end_turn();
-        // Most step interrupts need no turn of the main loop.
+        // Most step interrupts do not need a turn of the main loop.
         while !interrupt::free(|_| {
             let happened = HAPPENED.swap(false, Ordering::Relaxed) || self.steps.wants_turn();
             if happened {

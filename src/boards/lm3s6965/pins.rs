@@ -19,7 +19,7 @@ mod offset {
 const PORT_B_CLOCK: u32 = 1 << 1;
 /// PB0 to PB7.
 const ALL: u32 = 0xFF;
-/// Opens the register that lets PB7 be something else than JTAG's reset.
+/// The key that unlocks the register that lets PB7 be used for something else than JTAG's reset.
 const UNLOCK: u32 = 0x1ACC_E551;
 
 /// Pin `NUMBER` of port B as an output.
@@ -44,7 +44,8 @@ const STEP_Z: u32 = 1 << 6;
 const DIRECTION_Z: u32 = 1 << 7;
 
 impl Axes for AxisPins {
-    /// STEP_X, STEP_Y, DIR_X, DIR_Y, ENABLE of an event; high direction counts up, low enable is on.
+    /// The bits STEP_X, STEP_Y, DIR_X, DIR_Y and ENABLE of an event. A high direction pin counts
+    /// up, and a low enable pin switches the drivers on.
     const ORDER: &'static PinOrder = &PinOrder::new([0, 2, 1, 3, 4], 0b11010);
 
     #[inline(always)]
@@ -88,7 +89,8 @@ fn write(mask: u32, levels: u32) {
     GPIO_B.write((mask << 2) as usize, levels);
 }
 
-/// Drivers off, pen up, steps low. Safe at any time, in a fault too.
+/// Switches the drivers off, raises the pen and sets the step pins low. It is safe at any time,
+/// including in a fault.
 pub fn release() {
     write(ALL, 1 << 4);
 }
@@ -96,7 +98,7 @@ pub fn release() {
 /// Makes the pins outputs, with the levels of [`release`].
 pub fn set_up() -> MotorPins {
     SYSTEM_CONTROL.set_bits(offset::GPIO_CLOCKS, PORT_B_CLOCK);
-    // The port answers three cycles after its clock is on; a read takes longer.
+    // The port responds three cycles after its clock is on; this read takes longer.
     SYSTEM_CONTROL.read(offset::GPIO_CLOCKS);
     GPIO_B.write(offset::LOCK, UNLOCK);
     GPIO_B.write(offset::COMMIT, ALL);

@@ -23,7 +23,7 @@ mod offset {
 }
 const SERIAL_PINS: u32 = 0b11;
 
-/// When the last `?` came, in cycles modulo 2^24.
+/// The time at which the last `?` came, in cycles modulo 2^24.
 static STATUS_ASKED: AtomicU32 = AtomicU32::new(0);
 
 static SHARED: Shared = Shared::new();
@@ -36,7 +36,7 @@ pub struct Line(line::Line);
 pub fn set_up(nvic: &mut NVIC) -> Line {
     SYSTEM_CONTROL.set_bits(offset::UART_CLOCKS, 1);
     SYSTEM_CONTROL.set_bits(offset::GPIO_CLOCKS, 1);
-    // The port answers three cycles after its clock is on; a read takes longer.
+    // The port responds three cycles after its clock is on; this read takes longer.
     SYSTEM_CONTROL.read(offset::GPIO_CLOCKS);
     GPIO_A.set_bits(offset::ALTERNATE_FUNCTION, SERIAL_PINS);
     GPIO_A.set_bits(offset::DIGITAL_ENABLE, SERIAL_PINS);
@@ -45,7 +45,8 @@ pub fn set_up(nvic: &mut NVIC) -> Line {
     UART0.interrupt_when_received();
 
     let (receive_merge, line) = SHARED.ends();
-    // SAFETY: the interrupt is masked since reset, and this runs once (its queue's cell sees to it).
+    // SAFETY: the interrupt is masked since reset, and this runs once (the queue's cell ensures
+    // it).
     unsafe { INLET.fill(receive_merge) };
     critical::enable(nvic, Interrupt::UART0, critical::SERIAL_PRIORITY);
     UART0.enable();
@@ -53,12 +54,13 @@ pub fn set_up(nvic: &mut NVIC) -> Line {
 }
 
 impl Line {
-    /// As [`line::Line::read_byte`].
+    /// Does the same as [`line::Line::read_byte`].
     pub fn read_byte(&mut self) -> Option<u8> {
         self.0.read_byte()
     }
 
-    /// As [`line::take_real_time`]; logs how long a request for the status has waited.
+    /// Does the same as [`line::take_real_time`], and logs how long a request for the status has
+    /// waited.
     pub fn take_real_time(&mut self) -> RealTime {
         let asked = line::take_real_time(core::slice::from_mut(&mut self.0));
         if asked.has(RealTime::STATUS) {

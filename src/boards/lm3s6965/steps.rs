@@ -1,13 +1,15 @@
-//! The step interrupt: pops an event, writes pins, sets the next compare.
+//! The step interrupt: takes an event from the queue, writes the pins, and sets the timer for the
+//! next event.
 //!
-//! Timer 1 runs one shot at a time, from one event to the next. Each shot is shortened by how late its start is
-//! against the planned instant, read from SysTick, so that delays never add up: the planned time between
-//! two events holds over any number of them. Timer 2 ends the pulses, and its handler counts the steps that
-//! wait. Where they are few it sets a third one off that lengthens the event in work, if the machine would else be
-//! too fast. All have one priority, so none comes in between another.
+//! Timer 1 runs in one-shot mode from one event to the next. Each shot is shortened by the delay of
+//! its start after the planned instant, which is read from SysTick. So delays never add up: the
+//! planned time between two events holds over any number of events. Timer 2 ends the pulses, and
+//! its handler counts the steps that wait. Where there are few, it triggers a third interrupt,
+//! which lengthens the current event if the machine would otherwise be too fast. All three
+//! interrupts have the same priority, so none interrupts another.
 //!
-//! Events wait until the queue is half full or the planner has nothing to add and sleeps, so that
-//! a motion does not begin with one event and starve.
+//! Events wait until the queue is half full, or until the planner has nothing to add and sleeps, so
+//! that a motion does not begin with one event and then lack the next.
 
 use core::sync::atomic::Ordering;
 
@@ -22,15 +24,15 @@ use super::registers::{SYSTEM_CONTROL, TIMER1, TIMER2};
 use super::{HAPPENED, clock, critical};
 use crate::boards::handler::Owned;
 
-/// Events that wait for the interrupt, at most; one more place than that, for the queue. 4 bytes
-/// each. At the default speed of travel, 100 mm/s, the machine stops within 500 steps.
+/// The number of slots in the queue, one of which stays empty; each takes 4 bytes. At the default
+/// travel speed, 100 mm/s, the machine stops within 500 steps.
 const EVENT_PLACES: usize = 624;
 
 const CYCLES_PER_TICK: u32 = clock::HERTZ / TICKS_PER_SECOND;
 const _: () = assert!(clock::HERTZ.is_multiple_of(TICKS_PER_SECOND));
 
-/// The main loop turns after this many cycles (2.5 ms) or events, so that it does not for every step
-/// and yet keeps the queue full.
+/// The main loop runs one turn after this many cycles (2.5 ms) or events. So it does not run for
+/// every step, and yet it keeps the queue full.
 const TURN_CYCLES: u32 = clock::HERTZ / 400;
 const TURN_EVENTS: usize = 30;
 
@@ -50,39 +52,41 @@ const ONE_SHOT: u32 = 1;
 const ENABLE: u32 = 1;
 const TIMED_OUT: u32 = 1;
 
-/// Those of the handlers. That of no timer has the least number: it comes before the others.
+/// The interrupts of the handlers. The one that belongs to no timer has the lowest number, so that
+/// it is served before the others.
 const STEP: Interrupt = Interrupt::TIMER_1A;
 const PULSE: Interrupt = Interrupt::TIMER_2A;
 const BRAKE: Interrupt = Interrupt::TIMER_0B;
 const _: () = assert!((BRAKE as u16) < (STEP as u16) && (BRAKE as u16) < (PULSE as u16));
 
-/// An event is never lengthened by more, 0.15 s, so that early can be told from late.
+/// The greatest number of ticks by which an event is lengthened, 0.15 s. With this bound an early
+/// call can be told from a late one.
 const MOST_MORE_TICKS: u32 = TICKS_PER_SECOND * 3 / 20;
 
 static RING: ConstStaticCell<EventRing<EVENT_PLACES>> = ConstStaticCell::new(EventRing::new());
 static STEPPER: Owned<Stepper> = Owned::empty();
 
-/// What the interrupt has done, for the main loop.
+/// The state that the interrupt shares with the main loop.
 pub static STATE: PulserState = PulserState::new();
 
-/// The handlers' end.
+/// The handlers' end of the queue.
 struct Stepper {
     pulser: Pulser<'static, AxisPins, Solenoid<PenPin>, EVENT_PLACES>,
-    /// What SysTick, counting down, is to show when the event in work ends; modulo 2^24.
+    /// The value that SysTick, which counts down, shows when the current event ends; modulo 2^24.
     due: u32,
 }
 
-/// The main loop's end.
+/// The main loop's end of the queue.
 pub struct Steps {
     events: StepQueue<'static, EVENT_PLACES>,
-    /// When the main loop's last turn was over, in cycles modulo 2^24.
+    /// The time at which the last turn of the main loop ended, in cycles modulo 2^24.
     turned: u32,
 }
 
-/// Readies the timers; they start with the first events.
+/// Sets up the timers. They start with the first events.
 pub fn set_up(pins: MotorPins, nvic: &mut NVIC) -> Steps {
     SYSTEM_CONTROL.set_bits(offset::TIMER_CLOCKS, TIMER_CLOCKS);
-    // The timers answer three cycles after their clock is on; a read takes longer.
+    // The timers respond three cycles after their clock is on; this read takes longer.
     SYSTEM_CONTROL.read(offset::TIMER_CLOCKS);
     for timer in [TIMER1, TIMER2] {
         timer.write(offset::CONTROL, 0);
@@ -93,7 +97,8 @@ pub fn set_up(pins: MotorPins, nvic: &mut NVIC) -> Steps {
 
     let (pulser, events) = Pulser::new(pins.axes, Solenoid(pins.pen), RING.take(), &STATE);
     let stepper = Stepper { pulser, due: 0 };
-    // SAFETY: the interrupts are masked since reset, and this runs once (the ring's cell sees to it).
+    // SAFETY: the interrupts are masked since reset, and this runs once (the ring's cell ensures
+    // it).
     unsafe { STEPPER.fill(stepper) };
     for interrupt in [STEP, PULSE, BRAKE] {
         critical::enable(nvic, interrupt, critical::STEP_PRIORITY);
@@ -102,7 +107,7 @@ pub fn set_up(pins: MotorPins, nvic: &mut NVIC) -> Steps {
 }
 
 impl Steps {
-    /// Lets waiting events begin.
+    /// Starts the interrupt if events wait and it does not run.
     pub fn start(&mut self) {
         if !self.events.is_empty() && self.events.is_stopped() {
             // SAFETY: no handler is active, and none is wanted: there is nothing to do for them.
@@ -110,28 +115,28 @@ impl Steps {
         }
     }
 
-    /// Lets the interrupt run before the event in work is over: the pins were halted.
+    /// Makes the interrupt run before the current event ends, because the pins were halted.
     pub fn start_now(&mut self) {
         NVIC::pend(STEP);
     }
 
-    /// Tells the main loop what has been done.
+    /// Passes the counts of what was done to the main loop.
     pub fn sync_consumed(&mut self) {
         self.events.sync_consumed();
     }
 
-    /// The main loop has had its turn.
+    /// Records the end of a turn of the main loop.
     pub fn end_turn(&mut self) {
         self.turned = clock::cycles_24();
     }
 
-    /// Whether enough has passed since for another.
+    /// Whether enough time or enough events have passed since the last turn for another one.
     pub fn wants_turn(&self) -> bool {
         let passed = clock::cycles_24().wrapping_sub(self.turned) & clock::CYCLE_MASK;
         self.events.taken() > TURN_EVENTS || passed > TURN_CYCLES
     }
 
-    /// No event waits, and the last is over.
+    /// Whether no event waits and the last one is over.
     pub fn idle(&self) -> bool {
         self.events.is_empty() && self.events.is_stopped()
     }
@@ -156,7 +161,7 @@ impl EventQueue for Steps {
 }
 
 impl Stepper {
-    /// The first event is due.
+    /// Starts the timers, because the first event is due.
     fn begin(&mut self) {
         if self.pulser.begin() {
             TIMER2.write(offset::INTERVAL_LOAD_A, STATE.pulse_ticks() * CYCLES_PER_TICK);
@@ -165,17 +170,19 @@ impl Stepper {
         }
     }
 
-    /// One event. No loop, no division, no lock.
+    /// Processes one event, without a loop, a division or a lock.
     ///
-    /// The worst of each handler, counted in QEMU from its first instruction to its last, built for size: 58 for an event of a
-    /// move (59 of the pen, 76 where a motor lifts it), 51 for the end of its pulses (28 while the queue holds the stopping
-    /// distance), 59 for a piece of the brake (47 at each step where the queue does not hold it). So a move takes 86, and at
-    /// most some 160 where few steps wait; that its steps get another length is an event more, and three pieces.
-    /// `host-tests/tests/qemu_interrupt.rs` holds these figures.
+    /// The worst case of each handler, in instructions counted in QEMU from its first instruction
+    /// to its last in a build for size, is: 58 for an event of a move (59 for the pen, 76 where a
+    /// motor lifts it); 51 for the end of its pulses (28 while the queue holds the stopping
+    /// distance); 59 for one part of the brake's work (47 at each step where the queue does not
+    /// hold the stopping distance). So a step takes 86, and at most some 160 where few steps wait.
+    /// A change of the length of the steps takes one more event and three parts of the brake's
+    /// work. `host-tests/tests/qemu_interrupt.rs` checks these figures.
     #[inline(always)]
     fn step(&mut self) {
         let now = clock::count_down();
-        // Late by less than 0.16 s, so the top bit of 24 tells early from late.
+        // The delay is less than 0.16 s, so the top bit of 24 tells early from late.
         let late = self.due.wrapping_sub(now) << 8;
         if late.cast_signed() < 0 {
             return self.wait_on(now);
@@ -197,7 +204,8 @@ impl Stepper {
         }
     }
 
-    /// It is early: the event in work was lengthened, or an alarm calls.
+    /// Handles a call before the current event ends: the event was lengthened, or an alarm has
+    /// stopped the pulses.
     #[cold]
     #[inline(never)]
     fn wait_on(&mut self, now: u32) {
@@ -211,11 +219,11 @@ impl Stepper {
         run_for((left - behind).max(1));
     }
 
-    /// A piece of what keeps a queue that runs dry from stopping the machine with a jerk.
+    /// Does one part of the brake's work, which prevents an abrupt stop when the queue runs empty.
     #[inline(always)]
     fn brake(&mut self) {
         let (is_due, more) = self.pulser.brake();
-        // The timer goes on as it was set, and is set again when it is over.
+        // The timer keeps its setting; when it expires, it is set again.
         self.due = self.due.wrapping_sub(more.min(MOST_MORE_TICKS) * CYCLES_PER_TICK);
         if is_due {
             NVIC::pend(BRAKE);
@@ -230,14 +238,14 @@ fn rest() {
     HAPPENED.store(true, Ordering::Relaxed);
 }
 
-/// Calls for the next event after so many cycles, at least 1.
+/// Sets the timer so that the next event comes after `cycles`, at least 1.
 #[inline(always)]
 fn run_for(cycles: u32) {
     TIMER1.write(offset::INTERVAL_LOAD_A, cycles);
     TIMER1.write(offset::CONTROL, ENABLE);
 }
 
-/// Stops the timers for good, in a fault.
+/// Stops the timers for good, after a fault.
 pub fn halt() {
     for timer in [TIMER1, TIMER2] {
         timer.write(offset::CONTROL, 0);
@@ -245,7 +253,7 @@ pub fn halt() {
     NVIC::mask(STEP);
 }
 
-/// The next event.
+/// The interrupt for the next event.
 #[interrupt]
 fn TIMER_1A() {
     TIMER1.write(offset::INTERRUPT_CLEAR, TIMED_OUT);
@@ -254,11 +262,12 @@ fn TIMER_1A() {
     unsafe { STEPPER.get_filled() }.step();
 }
 
-/// The pulses end.
+/// The interrupt for the end of the pulses.
 #[interrupt]
 fn TIMER_2A() {
     TIMER2.write(offset::INTERRUPT_CLEAR, TIMED_OUT);
-    // An emulator's trace tells the time of the pins by what was read here last.
+    // This read has no effect on the machine. An emulator's trace takes the time of the pin changes
+    // from it.
     clock::count_down();
     // SAFETY: as above.
     if unsafe { STEPPER.get_filled() }.pulser.end_pulses() {
@@ -266,7 +275,7 @@ fn TIMER_2A() {
     }
 }
 
-/// Few steps wait, or they get another length.
+/// The interrupt for the brake's work: few steps wait, or the length of the steps changes.
 #[interrupt]
 fn TIMER_0B() {
     // SAFETY: as above.
