@@ -1,17 +1,18 @@
-//! Number formats, rounding, overflow: said once.
+//! The number formats of the firmware, with their rules for rounding and overflow, in one place.
 //!
-//! Lengths on the page are [`Millimetres`]; on the pins, steps (`i32`). Numbers come in as
-//! [`Decimal`] text and are rounded once, half away from zero, into the format that needs them. What
-//! does not fit is refused, never wrapped.
+//! Lengths on the page are [`Millimetres`]; positions of the motors are steps (`i32`). Numbers
+//! arrive as [`Decimal`] text and are rounded once, half away from zero, into the format that needs
+//! them. A number that does not fit is refused, never wrapped.
 
 use core::fmt;
 
-/// A length on the page: ±32768 mm in units of 2^-16 mm.
+/// A length on the page, within ±32768 mm, in units of 2^-16 mm.
 pub type Millimetres = ::fixed::types::I16F16;
 
-/// A number as the user wrote it: `mantissa` × 10^`exponent`, exactly.
+/// A number exactly as the user wrote it: `mantissa` × 10^`exponent`.
 ///
-/// |mantissa| < 10^18; further digits of a longer text are cut off (they are below 10^-17 of the value).
+/// The absolute value of the mantissa is below 10^18. Further digits of a longer text are cut off
+/// (they are below 10^-17 of the value).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Decimal {
     mantissa: i64,
@@ -19,7 +20,7 @@ pub struct Decimal {
 }
 
 impl fmt::Display for Decimal {
-    /// So that it is read again as it is: `5e-4`.
+    /// Writes the number so that parsing the text gives the same number, for example `5e-4`.
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.exponent {
             0 => write!(formatter, "{}", self.mantissa),
@@ -28,22 +29,22 @@ impl fmt::Display for Decimal {
     }
 }
 
-/// The text is no number.
+/// The error that a text is not a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NotANumber;
 
-/// The number does not fit the format that it is meant for.
+/// The error that a number does not fit the format for which it is meant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OutOfRange;
 
 const MANTISSA_LIMIT: i64 = 1_000_000_000_000_000_000;
 
 impl Decimal {
-    /// Reads `-12`, `+3.5`, `.5`, `6.02e-3`.
+    /// Parses a number such as `-12`, `+3.5`, `.5` or `6.02e-3`.
     ///
     /// # Errors
-    /// [`NotANumber`] for anything else: no digit, a second point, `inf`, `nan`, trailing text, an
-    /// exponent past ±9999.
+    /// [`NotANumber`] for anything else: no digit, a second point, `inf`, `nan`, trailing text, or
+    /// an exponent beyond ±9999.
     ///
     /// ```
     /// use penup::fixed::Decimal;
@@ -89,24 +90,27 @@ impl Decimal {
         Ok(Self { mantissa, exponent })
     }
 
-    /// The nearest multiple of 2^-`fraction_bits`, half away from zero, as that many units.
+    /// Converts to the nearest multiple of 2^-`fraction_bits`, rounded half away from zero. Returns
+    /// the number of these units.
     ///
     /// # Errors
-    /// [`OutOfRange`] if it does not fit 62 bits.
+    /// [`OutOfRange`] if the result does not fit in 62 bits.
     pub fn to_binary(self, fraction_bits: u32) -> Result<i64, OutOfRange> {
         self.binary(fraction_bits, |power| power / 2)
     }
 
-    /// The multiple of 2^-`fraction_bits` next towards zero, as that many units. Taken again in a coarser
-    /// unit, it is the same as if it had been taken in that unit at once.
+    /// Converts to a multiple of 2^-`fraction_bits`, rounded towards zero. Returns the number of
+    /// these units. Truncating the result again to a coarser unit gives the same as converting to
+    /// that unit at once.
     ///
     /// # Errors
-    /// [`OutOfRange`] if it does not fit 62 bits.
+    /// [`OutOfRange`] if the result does not fit in 62 bits.
     pub fn to_binary_truncated(self, fraction_bits: u32) -> Result<i64, OutOfRange> {
         self.binary(fraction_bits, |_| 0)
     }
 
-    /// `more` is what is added before the division by a power of ten.
+    /// Converts to binary units. `more` gives, for the power of ten that divides, the number that
+    /// is added before the division.
     fn binary(self, fraction_bits: u32, more: fn(u128) -> u128) -> Result<i64, OutOfRange> {
         if self.mantissa == 0 {
             return Ok(0);
@@ -119,12 +123,12 @@ impl Decimal {
         };
         let rounded = if self.exponent >= 0 {
             let power = power_of_ten(self.exponent.unsigned_abs()).ok_or(OutOfRange)?;
-            // A factor of more than 64 bits makes a product of more than 62.
+            // If a factor has more than 64 bits, the product has more than 62.
             let [shifted, power] =
                 [u64::try_from(shifted), u64::try_from(power)].map(|factor| factor.ok());
             u128::from(shifted.ok_or(OutOfRange)?) * u128::from(power.ok_or(OutOfRange)?)
         } else {
-            // Past 10^38 the quotient is zero whatever the mantissa.
+            // Beyond 10^38 the quotient is zero whatever the mantissa is.
             power_of_ten(self.exponent.unsigned_abs())
                 .map_or(0, |power| divide(shifted + more(power), power))
         };
@@ -133,7 +137,7 @@ impl Decimal {
         Ok(if self.mantissa < 0 { -value } else { value })
     }
 
-    /// How many decimals it has, without the zeros at its end.
+    /// Returns the number of decimals, not counting the zeros at the end.
     ///
     /// ```
     /// use penup::fixed::Decimal;
@@ -154,18 +158,20 @@ impl Decimal {
         if exponent < 0 { u32::from(exponent.unsigned_abs()) } else { 0 }
     }
 
-    /// The nearest length in millimetres.
+    /// Converts to the nearest length, taking the number as millimetres.
     ///
     /// # Errors
-    /// [`OutOfRange`] past ±32768 mm.
+    /// [`OutOfRange`] beyond ±32768 mm.
     pub fn to_millimetres(self) -> Result<Millimetres, OutOfRange> {
         let bits = self.to_binary(16)?;
         i32::try_from(bits).map(Millimetres::from_bits).map_err(|_| OutOfRange)
     }
 
-    /// For the camera, whose angles are the one place for binary floats.
+    /// Converts to a binary floating-point number. It is for the camera, whose angles are the only
+    /// place for such numbers.
     ///
-    /// Exactly rounded for up to 15 digits and |exponent| <= 22, so the same on every machine.
+    /// The result is exactly rounded for up to 15 digits and |exponent| <= 22, so it is the same on
+    /// every machine.
     pub fn to_f64(self) -> f64 {
         let mut value = self.mantissa as f64;
         for _ in 0..self.exponent.unsigned_abs().min(400) / 22 {
@@ -176,10 +182,10 @@ impl Decimal {
         if self.exponent < 0 { value / rest } else { value * rest }
     }
 
-    /// The nearest `i32`, if the text was a whole number.
+    /// Converts to an `i32`, if the number is whole.
     ///
     /// # Errors
-    /// [`OutOfRange`] for a fraction or a number past 32 bits.
+    /// [`OutOfRange`] for a fraction or a number beyond 32 bits.
     pub fn to_whole(self) -> Result<i32, OutOfRange> {
         let value = self.to_binary(0)?;
         if self.exponent < 0 {
@@ -199,45 +205,48 @@ fn parse_power(text: &str) -> Result<i16, NotANumber> {
 }
 
 fn power_of_ten(exponent: u16) -> Option<u128> {
-    // 10^38 is the greatest below 2^128.
+    // 10^38 is the greatest power of ten below 2^128.
     (exponent <= 38).then(|| (0..exponent).fold(1, |power, _| 10 * power))
 }
 
-/// Shifts right, rounding half away from zero: a block of coordinates moves to a coarser unit.
+/// Divides by 2^`bits`, rounding half away from zero. It is used to move a block of coordinates to
+/// a coarser unit.
 pub fn shift_right_rounding(value: i32, bits: u32) -> i32 {
     match bits {
         0 => value,
         1..=31 => {
             let rounded = (i64::from(value).abs() + (1 << (bits - 1))) >> bits;
-            // At most 2^31 / 2.
+            // The absolute value is at most 2^31 / 2.
             (if value < 0 { -rounded } else { rounded }) as i32
         }
         _ => 0,
     }
 }
 
-/// Divides, rounding half away from zero. `divisor` > 0.
+/// Divides, rounding half away from zero. The divisor must be positive.
 pub fn divide_rounding(dividend: i128, divisor: i128) -> i128 {
     let half = divisor >> 1;
-    let quotient = |dividend: i128| divide(dividend as u128, divisor as u128) as i128; // neither is negative
+    // Neither operand of the unsigned division is negative.
+    let quotient = |dividend: i128| divide(dividend as u128, divisor as u128) as i128;
     if dividend < 0 { -quotient(half - dividend) } else { quotient(dividend + half) }
 }
 
-/// The quotient, rounded towards minus infinity. `divisor` > 0.
+/// Divides, rounding towards minus infinity. The divisor must be positive.
 ///
 /// ```
 /// use penup::fixed::divide_down;
 /// assert_eq!([-7, -6, -1, 0, 5, 6].map(|dividend| divide_down(dividend, 3)), [-3, -2, -1, 0, 1, 2]);
 /// ```
 pub fn divide_down(dividend: i128, divisor: i128) -> i128 {
-    let quotient = |dividend: i128| divide(dividend as u128, divisor as u128) as i128; // neither is negative
+    // Neither operand of the unsigned division is negative.
+    let quotient = |dividend: i128| divide(dividend as u128, divisor as u128) as i128;
     if dividend < 0 { -quotient(divisor - 1 - dividend) } else { quotient(dividend) }
 }
 
-/// The quotient, rounded down. `divisor` > 0.
+/// Divides, rounding down. The divisor must be positive.
 ///
-/// One bit of the quotient after the other. The compiler's own division of 128 bits takes five times
-/// the flash, and more time where the quotient is short.
+/// The quotient is computed bit by bit. The compiler's own 128-bit division takes five times the
+/// flash, and more time if the quotient is short.
 #[inline(never)] // 128 bits by 128 are long.
 pub fn divide(dividend: u128, divisor: u128) -> u128 {
     if let (Ok(dividend), Ok(divisor)) = (u64::try_from(dividend), u64::try_from(divisor)) {
@@ -257,19 +266,21 @@ pub fn divide(dividend: u128, divisor: u128) -> u128 {
     quotient
 }
 
-/// The product of two numbers of 64 bits, exactly. Out of line it takes a tenth of the flash.
+/// Returns the exact product of two 64-bit numbers. Kept out of line, it takes a tenth of the flash
+/// that inlined products would.
 #[inline(never)]
 pub fn product(a: i64, b: i64) -> i128 {
     i128::from(a) * i128::from(b)
 }
 
-/// Half of it, rounded towards zero.
+/// Halves a number, rounding towards zero.
 pub fn half(value: i128) -> i128 {
     (value - (value >> 127)) >> 1
 }
 
-/// What is left of a number after as many whole `period`s as fit in it, exactly, with the sign of the
-/// number: `libm::fmod` for numbers of less than 2^60 periods, in a twentieth of its flash.
+/// Returns the remainder of a number after subtracting as many whole `period`s as fit into it. The
+/// result is exact and has the sign of the number. It equals `libm::fmod` for numbers of less than
+/// 2^60 periods, and takes a twentieth of the flash.
 ///
 /// ```
 /// use penup::fixed::rest_of_periods;
@@ -279,7 +290,7 @@ pub fn rest_of_periods(number: f64, period: f64) -> f64 {
     let mut rest = libm::fabs(number);
     for power in (0..60).rev() {
         let part = libm::ldexp(period, power);
-        // Exact, because the rest is less than twice the part.
+        // The subtraction is exact, because the remainder is less than twice the part.
         if rest >= part {
             rest -= part;
         }
@@ -287,7 +298,8 @@ pub fn rest_of_periods(number: f64, period: f64) -> f64 {
     rest.copysign(number)
 }
 
-/// Sine and cosine of an angle in degrees, within ±10^15; exact for multiples of 90.
+/// Returns the sine and cosine of an angle in degrees. The angle must be within ±10^15. The result
+/// is exact for multiples of 90.
 ///
 /// ```
 /// use penup::fixed::sin_cos_degrees;
@@ -298,7 +310,8 @@ pub fn sin_cos_degrees(degrees: f64) -> (f64, f64) {
     let degrees = rest_of_periods(degrees, 360.0); // exact, so what follows is within 45 degrees
     let quarters = libm::round(degrees / 90.0);
     let radians = (degrees - 90.0 * quarters).to_radians();
-    // At most π/4. Said in libm's way, this spares the device the reduction of larger angles: 3 KB.
+    // The angle is at most π/4. Limiting it in terms of the bits that libm tests lets the compiler
+    // leave out the reduction of larger angles, which saves 3 KB on the device.
     let [high, low] = [radians.to_bits() >> 32, radians.to_bits()].map(|word| word as u32);
     let high = (high & 0x7FFF_FFFF).min(0x3FE9_21FB) | high & 0x8000_0000;
     let (sin, cos) = libm::sincos(f64::from_bits(u64::from(high) << 32 | u64::from(low)));
@@ -310,8 +323,8 @@ pub fn sin_cos_degrees(degrees: f64) -> (f64, f64) {
     }
 }
 
-/// Writes a number of the camera with up to six decimals, and no zeros at the end. Far smaller than the
-/// shortest form that the standard library finds.
+/// Formats a number of the camera with up to six decimals and without trailing zeros. The code is
+/// far smaller than that of the standard library, which finds the shortest form.
 ///
 /// ```
 /// use penup::fixed::SixDecimals;
@@ -324,7 +337,7 @@ impl fmt::Display for SixDecimals {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         let magnitude = libm::fabs(self.0);
         let (mut whole, mut millionths) = (magnitude as u64, 0);
-        // Past this a double has no six decimals.
+        // Beyond this limit a double does not have six decimals.
         if magnitude < 1e9 {
             let all = libm::round(magnitude * 1e6) as u64;
             (whole, millionths) = (all / 1_000_000, all % 1_000_000);
@@ -342,7 +355,8 @@ impl fmt::Display for SixDecimals {
     }
 }
 
-/// Writes a length with as few decimals as tell it from others. Far smaller than what its type brings along.
+/// Formats a length with as few decimals as distinguish it from all other lengths. The code is far
+/// smaller than the formatting of its own type.
 ///
 /// ```
 /// use penup::fixed::{Length, Millimetres};
@@ -367,7 +381,7 @@ impl fmt::Display for Length {
     }
 }
 
-/// Writes `units` × 2^-`fraction_bits` with `places` decimals (at most 9), rounded half away from zero.
+/// Formats `units` × 2^-`fraction_bits` with `places` decimals, rounded half away from zero.
 ///
 /// ```
 /// use penup::fixed::BinaryFraction;
@@ -375,11 +389,11 @@ impl fmt::Display for Length {
 /// ```
 #[derive(Debug, Clone, Copy)]
 pub struct BinaryFraction {
-    /// How many units.
+    /// The number of units.
     pub units: i64,
-    /// The unit is 2^-this, at most 60.
+    /// The unit is 2^-`fraction_bits`. The value is at most 60.
     pub fraction_bits: u32,
-    /// Digits after the point, at most 9.
+    /// The number of digits after the point, at most 9.
     pub places: u32,
 }
 

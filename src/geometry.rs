@@ -1,56 +1,59 @@
-//! Exact predicates on integers: on which side of a line, before or behind a plane, where along a line.
+//! Exact geometric predicates on integers: on which side of a line a point lies, whether it is
+//! behind or in front of a plane, and where along an edge a crossing is.
 //!
-//! Everything here is the sign of a determinant of integers, or a ratio of two of them, and so has no
-//! rounding and no epsilon. A projected point stays homogeneous, (x, y, w): w is the depth in
-//! perspective and 1 in a parallel projection, so one formula serves both.
+//! Every result is the sign of a determinant of integers or the ratio of two of them, so there is
+//! no rounding and no epsilon. A projected point stays homogeneous, (x, y, w), where w is the depth
+//! in perspective and 1 in a parallel projection. So one formula serves both.
 //!
-//! What is refused: nothing. The caller keeps every coordinate within ±[`COORDINATE_LIMIT`] and, in
-//! perspective, every depth above zero; then no product overflows. The bound stands at each function.
+//! Nothing is refused. The caller keeps every coordinate within ±[`COORDINATE_LIMIT`] and, in
+//! perspective, every depth above zero. Then no product overflows. Each function documents its
+//! bound.
 
 use bytemuck::{Pod, Zeroable};
 use core::cmp::Ordering;
 
-/// View coordinates lie within ± this: products of three stay below 2^60.
+/// View coordinates lie within ± this limit, so that products of three stay below 2^60.
 pub const COORDINATE_LIMIT: i32 = 1 << 19;
 
-/// A vertex in view coordinates: x right, y up, z the depth away from the eye.
+/// A vertex in view coordinates: x to the right, y up, and z the depth away from the eye.
 ///
-/// Each within ±[`COORDINATE_LIMIT`]; in perspective z > 0 and the eye is the origin. The scales of
-/// x, y and of z may differ (a linear map keeps every incidence).
+/// Each coordinate is within ±[`COORDINATE_LIMIT`]. In perspective z is above zero and the eye is
+/// the origin. The scale of z may differ from that of x and y (a linear map preserves every
+/// incidence).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct Vertex {
-    /// To the right.
+    /// The coordinate to the right.
     pub x: i32,
-    /// Up.
+    /// The coordinate upwards.
     pub y: i32,
-    /// Away from the eye.
+    /// The depth, away from the eye.
     pub z: i32,
 }
 
 impl Vertex {
-    /// The vertex at (x, y, z).
+    /// Creates the vertex at (x, y, z).
     pub const fn new(x: i32, y: i32, z: i32) -> Self {
         Self { x, y, z }
     }
 }
 
-/// How a vertex gets onto the page: (x, y, w) with w = z, or w constant.
+/// The projection of vertices onto the page: (x, y, w), where w is z or constant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Projection {
-    /// Lines of sight meet in the eye (the origin): w = z.
+    /// The lines of sight meet in the eye (the origin): w = z.
     Perspective,
-    /// Lines of sight are parallel to z: w = 1.
+    /// The lines of sight are parallel to z: w = 1.
     Parallel,
 }
 
 /// One of the two directions of the page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Axis {
-    /// To the right.
+    /// The axis to the right.
     X,
-    /// Up.
+    /// The axis upwards.
     Y,
 }
 
@@ -63,9 +66,9 @@ impl Axis {
     }
 }
 
-/// A place along an edge from p to q: p + (numerator / denominator)(q - p) in view *space*.
+/// A point of an edge from p to q: p + (numerator / denominator)(q - p) in view *space*.
 ///
-/// 0 <= numerator <= denominator, denominator > 0. Two places are equal if the ratios are.
+/// 0 <= numerator <= denominator, and denominator > 0. Two values are equal if their ratios are.
 ///
 /// ```
 /// use penup::geometry::EdgeParameter;
@@ -76,21 +79,22 @@ impl Axis {
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 pub struct EdgeParameter {
-    /// Zero at p.
+    /// The numerator of the ratio, zero at p.
     pub numerator: u64,
-    /// Equal to the numerator at q.
+    /// The denominator of the ratio, which equals the numerator at q.
     pub denominator: u64,
 }
 
 impl EdgeParameter {
-    /// At p.
+    /// The end p of the edge.
     pub const START: Self = Self { numerator: 0, denominator: 1 };
-    /// At q.
+    /// The end q of the edge.
     pub const END: Self = Self { numerator: 1, denominator: 1 };
 
-    /// Where a quantity that varies linearly along the edge in space is zero.
+    /// Returns where a quantity that varies linearly along the edge in space is zero.
     ///
-    /// `at_p` and `at_q` have opposite signs, or one of them is zero; each is within ±2^62.
+    /// `at_p` and `at_q` are its values at the two ends. They have opposite signs, or one of them
+    /// is zero; each is within ±2^62.
     ///
     /// ```
     /// use penup::geometry::EdgeParameter;
@@ -122,11 +126,12 @@ impl PartialEq for EdgeParameter {
 }
 impl Eq for EdgeParameter {}
 
-/// On which side of the line from a to b the point c lies on the page.
+/// Returns the side of the line from a to b on which the point c lies on the page.
 ///
-/// Positive to the left, negative to the right, zero on the line (or if a and b coincide on the
-/// page). Linear in each argument in space, so its values at two points give an
-/// [`EdgeParameter::zero_between`]. In perspective six products of three numbers: within ±2^60.
+/// The result is positive to the left, negative to the right, and zero on the line (or if a and b
+/// coincide on the page). It is linear in each argument in space, so its values at two points can
+/// be passed to [`EdgeParameter::zero_between`]. In perspective it is a sum of six products of
+/// three numbers, within ±2^60.
 ///
 /// ```
 /// use penup::geometry::{Projection, Vertex, page_side};
@@ -144,12 +149,13 @@ pub fn page_side(projection: Projection, a: Vertex, b: Vertex, c: Vertex) -> i64
     }
 }
 
-/// On which side of the plane through a, b and c the point d lies in space.
+/// Returns the side of the plane through a, b and c on which the point d lies in space.
 ///
-/// If a, b, c run anticlockwise on the page ([`page_side`] positive), positive means that d lies
-/// behind the plane as the eye sees it; if clockwise, before it. Zero in the plane. Linear in d.
-/// Differences are within ±2^20, so a sum of three products is within ±2^62 and no part of it
-/// passes 3 x 2^61.
+/// If a, b and c run anticlockwise on the page ([`page_side`] is positive), a positive result means
+/// that d lies behind the plane as the eye sees it. If they run clockwise, it means that d lies in
+/// front of the plane. The result is zero in the plane, and linear in d. Differences of coordinates
+/// are within ±2^20, so the sum of three products is within ±2^62, and no partial sum exceeds 3 ×
+/// 2^61.
 ///
 /// ```
 /// use penup::geometry::{Vertex, plane_side};
@@ -162,12 +168,14 @@ pub fn plane_side(a: Vertex, b: Vertex, c: Vertex, d: Vertex) -> i64 {
     determinant(from_a(b), from_a(c), from_a(d))
 }
 
-/// What [`plane_side`] surely exceeds if d lies off the plane by more than rounding can hide, where no
-/// coordinate is off by more than half of `doubt`.
+/// Returns an error bound for [`plane_side`]. If the absolute value of [`plane_side`] is greater, d
+/// lies off the plane by more than rounding can explain. `doubt` is twice the greatest possible
+/// error of a coordinate.
 ///
-/// With M the largest difference and D the doubt: nine minors of two products each are within
-/// 18 D M^2 together, the products of two doubts within 18 D^2 M, those of three within 6 D^3.
-/// Saturates, which means that nothing is sure.
+/// Let M be the largest difference of coordinates and D the value of `doubt`. Nine minors of two
+/// products each contribute at most 18 D M^2 together, the products of two errors at most 18 D^2 M,
+/// and those of three errors at most 6 D^3. The result saturates; then no point is certain to lie
+/// off the plane.
 ///
 /// ```
 /// use penup::geometry::{Vertex, plane_side_margin};
@@ -188,29 +196,33 @@ pub fn plane_side_margin(a: Vertex, b: Vertex, c: Vertex, d: Vertex, doubt: u32)
     }
 }
 
-/// How far the coordinates of a model may be off, in the unit in which they are whole numbers.
+/// The greatest possible error of the coordinates of a model, in the unit in which they are whole
+/// numbers.
 ///
 /// The default is exact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Precision {
-    /// By the rounding of whoever wrote the numbers, and by that to whole numbers; at most 2^30.
+    /// The error from the rounding of the decimals as they were written plus the rounding to whole
+    /// numbers. It is at most 2^30.
     pub written: u32,
-    /// By the rounding to whole numbers alone; at most `written`.
+    /// The error from the rounding to whole numbers alone. It is at most `written`.
     pub unit: u32,
 }
 
-/// A triangle that is less than so many times the precision wide is too small to tell from its rounded
-/// corners in which plane it lies. Its plane is then taken to be exact.
+/// The least width of a triangle, in multiples of the precision, at which its rounded corners still
+/// determine its plane. The plane of a narrower triangle is taken to be exact.
 const WIDTHS: u128 = 64;
 
-/// Whether four points of the model may lie in one plane, each coordinate being off by at most what
-/// `precision` says. The first three are a triangle whose plane is meant. Coordinates within ±2^30.
+/// Whether four points of the model may lie in one plane, if each coordinate may be off by what
+/// `precision` says. The first three points are the triangle that defines the plane. Coordinates
+/// are within ±2^30.
 ///
 /// The determinant of the four points is zero if they lie in one plane. Its twelve derivatives are
-/// the minors of its rows; so with E the precision it is at most E times the sum of their sizes,
-/// and a little more for products of two and three errors. Where the triangle is narrower than 64 E
-/// that bound would let nearly any point pass, and the precision of the unit counts alone.
+/// the minors of its rows. So, with E the precision, the determinant is at most E times the sum of
+/// the absolute values of the derivatives, plus a little for the products of two and three errors.
+/// If the triangle is narrower than 64 E, this bound would accept nearly any point, so only the
+/// precision of the unit is used.
 ///
 /// ```
 /// use penup::geometry::{Precision, are_coplanar};
@@ -235,15 +247,17 @@ pub fn are_coplanar(points: [[i32; 3]; 4], precision: Precision) -> bool {
     let off = [precision.written, precision.unit].into_iter().find(|off| is_wide(*off));
     let off = u128::from(off.unwrap_or(0));
     let size = |parts: [i128; 3]| parts.iter().map(|part| part.unsigned_abs()).sum::<u128>();
+    // The derivatives together are below 2^69, the lengths below 2^33.
     let derivatives =
-        size(uv) + size(vw) + size(wu) + size([0, 1, 2].map(|n| uv[n] + vw[n] + wu[n])); // below 2^69
-    let lengths = size([u, v, w].map(|to| i128::from(largest(to)))); // below 2^33
-    // At most 2^30 2^69, 2^60 2^38 and 2^96.
+        size(uv) + size(vw) + size(wu) + size([0, 1, 2].map(|n| uv[n] + vw[n] + wu[n]));
+    let lengths = size([u, v, w].map(|to| i128::from(largest(to))));
+    // The three terms are at most 2^30 × 2^69, 2^60 × 2^38 and 2^96.
     height.unsigned_abs() <= off * derivatives + 24 * off * off * lengths + 48 * off * off * off
 }
 
-/// Whether three points of the model may lie in one line, as [`are_coplanar`] says of four. The first
-/// two are the line that is meant.
+/// Whether three points of the model may lie on one line, if each coordinate may be off by what
+/// `precision` says. The first two points define the line. See [`are_coplanar`] for the role of
+/// `precision`.
 ///
 /// ```
 /// use penup::geometry::{Precision, are_in_line};
@@ -259,12 +273,12 @@ pub fn are_in_line(points: [[i32; 3]; 3], precision: Precision) -> bool {
     let is_long = |off: &u32| u128::from(largest(u)) >= WIDTHS * u128::from(*off);
     let off = [precision.written, precision.unit].into_iter().find(is_long);
     let off = i128::from(off.unwrap_or(0));
-    // Each minor has four factors, each off by two errors.
+    // Each minor has four factors, each of which contains two errors.
     let most = 4 * i128::from(largest(u)) + 4 * i128::from(largest(v)) + 8 * off;
     turn.iter().all(|part| part.abs() <= off * most)
 }
 
-/// From a to `to`; each part within ±2^31.
+/// Returns the vector from a to `to`; each component is within ±2^31.
 fn difference(to: [i32; 3], a: [i32; 3]) -> [i64; 3] {
     [0, 1, 2].map(|n| i64::from(to[n]) - i64::from(a[n]))
 }
@@ -287,10 +301,11 @@ fn determinant(a: Vertex, b: Vertex, c: Vertex) -> i64 {
         + i64::from(a.z) * minor(b.x, b.y, c.x, c.y)
 }
 
-/// How far the point b lies beyond the point a on the page in the direction of `axis`.
+/// Returns a measure of how far the point b lies beyond the point a on the page, in the direction
+/// of `axis`.
 ///
-/// Only the sign and the ratio of two values with the same b or the same a mean something. Linear
-/// in each argument in space; within ±2^39.
+/// Only its sign is meaningful, and the ratio of two values with the same a or the same b. It is
+/// linear in each argument in space, and within ±2^39.
 ///
 /// ```
 /// use penup::geometry::{Axis, Projection, Vertex, page_offset};
@@ -305,10 +320,12 @@ pub fn page_offset(projection: Projection, axis: Axis, a: Vertex, b: Vertex) -> 
     }
 }
 
-/// Whether the point c lies behind (positive) or before (negative) the line from a to b, where all
-/// three lie on one line of the page that is not at right angles to `axis`.
+/// Returns a positive number if the point c lies behind the line from a to b, and a negative one if
+/// it lies in front of it. All three points must lie on one line of the page that is not at right
+/// angles to `axis`.
 ///
-/// Zero if the three lie on one line in space. Linear in c; within ±2^42.
+/// The result is zero if the three points lie on one line in space. It is linear in c, and within
+/// ±2^42.
 ///
 /// ```
 /// use penup::geometry::{Axis, Projection, Vertex, line_side};
@@ -367,7 +384,7 @@ mod tests {
         // 13 x 7 - 3 x 9, and 4 x 7 - 5 x 9.
         assert_eq!(page_offset(Perspective, Axis::X, a, b), 64);
         assert_eq!(page_offset(Perspective, Axis::Y, a, b), -17);
-        // On the line beyond b, but deeper by 3 or nearer by 4.
+        // A point on the line beyond b, but deeper by 3 or nearer by 4.
         let beyond = |dz: i32| Vertex::new(23, 3, 11 + dz);
         for (projection, axis, dz, side) in [
             (Parallel, Axis::X, 3, 30),
@@ -395,7 +412,7 @@ mod tests {
         }
     }
 
-    /// Numbers as if they were random.
+    /// Returns a source of pseudo-random numbers.
     fn scattered(n: i64) -> impl Fn(i64) -> i64 {
         move |k| (n * 7919 + k * 104_729) * (n * 31 + k * 17 + 5) % 1_000_003
     }
@@ -446,7 +463,8 @@ mod tests {
         let of_plane = |z| [[0, 0, 0], [side, 0, 0], [0, side, 0], [side / 3, side / 3, z]];
         assert!(are_coplanar(of_plane(999), precision));
         assert!(!are_coplanar(of_plane(1300), precision));
-        // Of a triangle hardly larger than the precision nothing is known but what it says.
+        // If a triangle is hardly larger than the precision, its plane is taken from its corners as
+        // they are.
         let side = 20_000;
         let of_small = |z| [[0, 0, 0], [side, 0, 0], [0, side, 0], [side, side, z]];
         assert!(are_coplanar(of_small(1), precision) && !are_coplanar(of_small(20), precision));
@@ -459,7 +477,7 @@ mod tests {
             let doubt = 1 + (n % 9) as i32;
             let reach = 1 << (n % 17 + 2);
             let part = |k: i64| number(k) as i32 % reach;
-            // Four points of the plane z = x, each moved by up to half of the doubt.
+            // Four points of the plane z = x, each moved by up to half of `doubt`.
             let point = |k: i64| {
                 let off = |m: i64| number(k + m) as i32 % (doubt / 2 + 1);
                 let (x, y) = (part(k), part(k + 1));
