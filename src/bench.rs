@@ -81,6 +81,7 @@ struct Stages<'c> {
 }
 
 impl Stages<'_> {
+    /// Ends the current stage and adds its instructions to its count.
     fn end(&mut self) {
         let now = self.counter.read();
         if let Some((stage, begun)) = self.begun.take() {

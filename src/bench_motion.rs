@@ -41,6 +41,7 @@ struct Job {
     stride: Option<usize>,
 }
 
+/// The jobs to measure.
 const JOBS: [Job; 4] = [
     Job { name: "a line, 5 000 moves a second", steps: 100, speed: 50, stride: None },
     Job { name: "a line, 100 000 moves a second", steps: 200, speed: 500, stride: None },
@@ -65,6 +66,7 @@ enum Way {
 }
 
 impl Way {
+    /// No targets at all.
     const fn nowhere() -> Self {
         Self::Line(None)
     }

@@ -20,7 +20,9 @@ use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
 /// The unit in which flash is written, in bytes.
 pub const PAGE_BYTES: usize = 256;
 
+/// The mark at the beginning of a header.
 const MARK: u32 = u32::from_le_bytes(*b"pen1");
+/// The size of a header in bytes. The rest of its page is empty.
 const HEADER_BYTES: usize = 16;
 
 /// Why a state was not kept. The previous one still is.
@@ -167,6 +169,7 @@ impl Slots {
     }
 }
 
+/// The four words of a header.
 fn words(header: [u8; HEADER_BYTES]) -> [u32; 4] {
     let [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p] = header;
     [[a, b, c, d], [e, f, g, h], [i, j, k, l], [m, n, o, p]].map(u32::from_le_bytes)

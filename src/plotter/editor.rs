@@ -54,6 +54,10 @@ impl<'m> Inner<'m> {
         (&mut self.model, keeper, Scratch::new(free))
     }
 
+    /// Edits the model and reports how many elements have been added or removed.
+    ///
+    /// # Errors
+    /// [`CommandError::Busy`] unless the machine is idle, or the model's refusal.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub(super) fn edit<B: Board>(&mut self, edit: Edit, board: &mut B) -> Result<(), CommandError> {
         if self.machine.state() != State::Idle {
@@ -75,6 +79,10 @@ impl<'m> Inner<'m> {
         }
     }
 
+    /// Restores the copy of the model.
+    ///
+    /// # Errors
+    /// [`CommandError::NothingToUndo`] if there is no copy.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub(super) fn undo(&mut self) -> Result<(), CommandError> {
         if core::mem::take(&mut self.kept_words) == 0 {

@@ -432,6 +432,7 @@ fn fit(
     .map_err(CommandError::Page)
 }
 
+/// Converts an error of the visibility stage. `corners` is the number of corners of the model.
 fn refused(error: VisibilityError, corners: usize) -> CommandError {
     match error {
         VisibilityError::Scratch(missing) => CommandError::DrawingTooLarge(missing),
@@ -501,11 +502,16 @@ pub(super) struct Collector<'a> {
 }
 
 impl<'a> Collector<'a> {
+    /// Collects lines at the front of `words`.
     pub(super) fn new(words: &'a mut [u64]) -> Self {
         let room = size_of_val(words) / size_of::<PackedLine>();
         Self { lines: items_mut(words, room).unwrap_or(&mut []), count: 0 }
     }
 
+    /// Adds a line.
+    ///
+    /// # Errors
+    /// [`SinkFull`] if there is no room for it.
     pub(super) fn line(&mut self, line: PackedLine) -> Result<(), SinkFull> {
         if line.has_length() {
             *self.lines.get_mut(self.count).ok_or(SinkFull)? = line;
@@ -514,11 +520,13 @@ impl<'a> Collector<'a> {
         Ok(())
     }
 
+    /// The error for one line too many, with the sizes.
     pub(super) fn missing(&self) -> OutOfScratch {
         let available = size_of_val(self.lines);
         OutOfScratch { needed: available + size_of::<PackedLine>(), available }
     }
 
+    /// The same as an error to reply with.
     pub(super) fn out_of_memory(&self) -> CommandError {
         CommandError::DrawingTooLarge(self.missing())
     }
@@ -526,10 +534,13 @@ impl<'a> Collector<'a> {
 
 /// Maps each stretch that is to be drawn to the page and collects it as a line.
 pub(super) struct PageSink<'a> {
+    /// Where the lines go.
     pub(super) collector: Collector<'a>,
+    /// From the view to the page.
     pub(super) map: &'a PageMap,
     pub(super) view: &'a View,
     pub(super) options: &'a PlotOptions,
+    /// Is shown each stretch that is drawn.
     pub(super) observer: &'a mut dyn Observer,
 }
 

@@ -94,6 +94,7 @@ enum Next {
 struct Inner<'m> {
     model: Model<'m>,
     options: PlotOptions,
+    /// The working memory. It holds the job, or the copy of the model for `$undo`.
     words: &'m mut [u64],
     machine: Machine<'m>,
     job: Job,
@@ -205,6 +206,7 @@ impl<'m> Plotter<'m> {
         true
     }
 
+    /// Replies to the line that has been carried out, and notes its outcome for repeated lines.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     fn answer<B: Board>(&mut self, outcome: Result<(), CommandError>, board: &mut B) {
         if let Some(numbering) = self.numberings.get_mut(self.port) {
@@ -252,6 +254,7 @@ impl<'m> Plotter<'m> {
         self.inner.job.strokes(self.inner.words, &mut self.inner.cursor)
     }
 
+    /// Handles the real-time requests `asked`, and whatever else does not come by a line.
     fn act<B: Board>(&mut self, asked: RealTime, board: &mut B) {
         report::greet_opened(self.inner.machine.state(), board);
         if B::HAS_DRIVE && board.wants_drive() && self.inner.is_without_job() {
@@ -272,6 +275,7 @@ impl<'m> Plotter<'m> {
         }
     }
 
+    /// Forgets unfinished lines, line numbers, and the modes of G-code, and greets the user.
     fn reset<B: Board>(&mut self, board: &mut B) {
         self.readers.iter_mut().for_each(LineReader::clear);
         self.numberings = [Numbering::default(), Numbering::default()];
@@ -300,6 +304,7 @@ impl Inner<'_> {
         is_over && self.machine.is_stopped()
     }
 
+    /// Carries out a line. Returns what is left to the caller to do.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     fn carry_out<B: Board>(&mut self, line: &str, board: &mut B) -> Result<Next, CommandError> {
         let command = Command::parse(line)?;
@@ -361,6 +366,11 @@ impl Inner<'_> {
         Ok(Next::Nothing)
     }
 
+    /// Computes and begins a job, or begins the kept job if `again`.
+    ///
+    /// # Errors
+    /// [`CommandError::Locked`] or [`CommandError::Busy`] if the state does not allow it, or the
+    /// reason why there is no job.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     fn plot<B: Board>(&mut self, board: &mut B, again: bool) -> Result<(), CommandError> {
         if !matches!(self.machine.state(), State::Idle | State::Check) {
@@ -422,6 +432,7 @@ impl Inner<'_> {
         Ok(())
     }
 
+    /// Computes the job of `$plot`, in place of the last one.
     #[inline(never)] // Keeps its frame out of that of `plot`.
     fn compute(
         &mut self,
@@ -439,6 +450,7 @@ impl Inner<'_> {
         Ok(())
     }
 
+    /// Sets the setting with the number `name`.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     fn change_setting(&mut self, name: &str, value: &str) -> Result<(), CommandError> {
         let setting = name

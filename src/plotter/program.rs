@@ -26,6 +26,7 @@ pub(super) struct Program {
     at: [Millimetres; 2],
 }
 
+/// The kind of move that coordinates ask for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Motion {
     Rapid,
@@ -138,6 +139,7 @@ impl Program {
         Ok((self, order))
     }
 
+    /// Handles a word G: a mode or an order.
     fn take_g(&mut self, number: Decimal, order: &mut Order) -> Result<(), CommandError> {
         match number.to_whole() {
             Ok(0) => self.motion = Motion::Rapid,
@@ -159,6 +161,7 @@ impl Program {
         Ok(())
     }
 
+    /// Handles a word M: the pen, a pause or the end of the program.
     fn take_m(&mut self, number: Decimal, order: &mut Order) -> Result<(), CommandError> {
         match number.to_whole() {
             Ok(0 | 1 | 6) => *order = Order::Pause,
@@ -170,6 +173,7 @@ impl Program {
         Ok(())
     }
 
+    /// The order for the coordinates of a line. Moves the position to their end.
     fn motion(
         &mut self,
         numbers: &Numbers,
@@ -205,6 +209,7 @@ impl Program {
         Arc::scaled(steps, center, start, to, turn).map(Order::Arc).map_err(CommandError::Arc)
     }
 
+    /// A length as given in the current unit, in millimetres.
     fn length(&self, number: Decimal) -> Result<Millimetres, CommandError> {
         let bits = number.to_binary(16).map_err(|_| CommandError::NumberOutOfRange)?;
         let bits = product(bits, if self.inches { 127 } else { 5 });
@@ -222,6 +227,7 @@ fn to_steps(length: Millimetres, per_mm: Millimetres) -> i32 {
     steps.clamp((-2 * PAGE_LIMIT).into(), (2 * PAGE_LIMIT).into()) as i32
 }
 
+/// A position in steps.
 fn steps_at([x, y]: [Millimetres; 2], steps: StepsPerMillimetre) -> PagePoint {
     PagePoint { x: to_steps(x, steps[0]), y: to_steps(y, steps[1]) }
 }

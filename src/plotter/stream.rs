@@ -140,6 +140,7 @@ impl Inner<'_> {
         progress
     }
 
+    /// Does the next part of the task, as far as the machine is ready for it.
     fn advance<B: Board>(&mut self, board: &mut B) -> Result<Progress, MachineError> {
         let machine = &mut self.machine;
         let is_stopped = machine.state() == State::Idle && machine.is_stopped();
@@ -275,6 +276,7 @@ impl Inner<'_> {
 }
 
 impl Program {
+    /// The target at a point, with the pen up or down as the program has set it.
     fn target(&self, point: PagePoint) -> Target {
         Target { point, ink: self.pen_is_down.then_some(LineType::Full) }
     }

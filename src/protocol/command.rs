@@ -216,6 +216,7 @@ impl<'a> Command<'a> {
         }
     }
 
+    /// Parses the text after `$`.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     fn parse_dollar(text: &'a str) -> Result<Self, CommandError> {
         if let Some((name, value)) = text.split_once('=') {

@@ -418,6 +418,7 @@ fn write_solid_error(formatter: &mut fmt::Formatter<'_>, error: &SolidError) -> 
     }
 }
 
+/// Writes how much working memory is missing.
 fn write_missing(formatter: &mut fmt::Formatter<'_>, missing: &OutOfScratch) -> fmt::Result {
     let OutOfScratch { needed, available } = missing;
     write!(formatter, "{needed} bytes are needed where {available} are free: send a smaller model")

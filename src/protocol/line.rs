@@ -229,7 +229,7 @@ mod tests {
         assert_eq!(lines(&bytes), [Ok("x".repeat(ROOM))]);
     }
 
-    /// What the bytes ask for, one after the other.
+    /// The requests that the bytes make, in order.
     fn asked(bytes: &[u8]) -> Vec<RealTime> {
         let mut sorter = Sorter::new();
         bytes.iter().filter_map(|byte| sorter.sort(*byte)).collect()
@@ -284,7 +284,7 @@ mod tests {
     fn a_line_that_lost_bytes_is_refused_once_at_its_end() {
         let lost = Err(CommandError::BytesLost);
         assert_eq!(lines(b"v 1\xff\xff 3\nok\n"), [lost.clone(), Ok("ok".to_string())]);
-        // However long it is, and if it holds nothing else.
+        // This holds whatever the length of the line, and even if it contains nothing else.
         let mut bytes = std::vec![b'x'; LINE_LIMIT + 1];
         bytes.extend(b"\xff\r\n\xff\n");
         assert_eq!(lines(&bytes), [lost.clone(), lost]);

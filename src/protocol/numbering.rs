@@ -110,6 +110,7 @@ impl Numbering {
         }
     }
 
+    /// Handles a line with a checksum.
     fn receive_checked<'a>(&mut self, line: Checked<'a>) -> Received<'a> {
         let Checked { checksum, text, .. } = line;
         let sets_number = number_to_set(text);
@@ -163,6 +164,7 @@ impl Numbering {
         Received::Answer(again, label(number))
     }
 
+    /// Handles a line without a checksum.
     fn receive_unchecked<'a>(&mut self, line: &'a str) -> Received<'a> {
         let may_be_damaged = match self.required {
             None => false,
@@ -212,6 +214,7 @@ struct Checked<'a> {
 }
 
 impl<'a> Checked<'a> {
+    /// Splits a line with a checksum that has a number or is `M110`. `None` for other lines.
     fn split(line: &'a str) -> Option<Self> {
         let (head, checksum, value) = split_checksum(line)?;
         let (number, text) = match split_number(head) {

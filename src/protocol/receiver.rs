@@ -163,7 +163,7 @@ mod tests {
     const BREAK: u32 = 1 << 10;
     const OVERRUN: u32 = 1 << 11;
 
-    /// The lines that a reader makes of what is in the queue.
+    /// The lines that a reader makes from the bytes in the queue.
     fn lines(
         reader: &mut LineReader,
         queue: &mut Consumer<'_, u8>,
@@ -175,7 +175,7 @@ mod tests {
         lines
     }
 
-    /// The lines that come of what a PL011's data register holds.
+    /// The lines that result from the values of a PL011's data register.
     fn lines_of(data: impl IntoIterator<Item = u32>) -> Vec<Result<String, CommandError>> {
         let (mut queue, mut reader) = (Queue::<u8, 256>::new(), LineReader::default());
         let (producer, mut consumer) = queue.split();
@@ -214,7 +214,7 @@ mod tests {
     fn a_damaged_line_end_makes_one_void_line_of_two() {
         let found = lines_of(damaged("v 1 2 3\nv 4 5 6\nv 7 8 9\n", 7, FRAMING));
         assert_eq!(found, [LOST, ok("v 7 8 9")]);
-        // The line end that bytes were lost before is sound.
+        // The line end itself is undamaged; bytes before it were lost.
         let found = lines_of(damaged("v 1 2 3\nv 4 5 6\n", 7, OVERRUN));
         assert_eq!(found, [LOST, ok("v 4 5 6")]);
     }
@@ -253,7 +253,7 @@ mod tests {
         for byte in *b"$I\n$100=80\n" {
             receiver.receive(byte);
         }
-        // It held "$I\n$100", so "=80\n" is lost.
+        // The queue held "$I\n$100", so "=80\n" is lost.
         assert_eq!(lines(&mut reader, &mut consumer), [ok("$I")]);
         assert!(receiver.mark());
         for byte in *b"$$\n$#\n" {

@@ -88,6 +88,7 @@ fn run_image(name: &str) -> Result<String> {
     Ok(String::from_utf8_lossy(&answer.stdout).into_owned())
 }
 
+/// Prints the counts of the benchmark image as a table.
 fn print(counts: &str) -> Result<()> {
     say!(
         "| scene | vertices | edges | view | visibility | an edge | view and visibility at 50 MHz, s | Griffith, s | Brown, s | order |"

@@ -80,6 +80,7 @@ fn say_to(output: &mut dyn Write, text: fmt::Arguments<'_>) -> Result<()> {
     }
 }
 
+/// Kills a child process and waits for its end.
 fn end(child: &mut Child) {
     // Both calls fail only if the child has just ended by itself.
     let _ = child.kill();

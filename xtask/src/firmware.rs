@@ -59,6 +59,7 @@ impl Board {
         Ok(Self::default())
     }
 
+    /// The names of all boards, with commas between them.
     fn names() -> String {
         let names: Vec<_> = Self::ALL.iter().map(|board| board.name()).collect();
         names.join(", ")
@@ -117,6 +118,7 @@ impl Board {
         crate::root().join(format!("target/firmware/{}.elf", self.name()))
     }
 
+    /// The board's flash.
     fn flash(self) -> Region {
         match self {
             Self::Lm3s6965 => Region { start: 0, size: 256 << 10 },
@@ -133,6 +135,7 @@ impl Board {
         }
     }
 
+    /// The board's RAM.
     fn ram(self) -> Region {
         match self {
             Self::Lm3s6965 => Region { start: 0x2000_0000, size: 64 << 10 },

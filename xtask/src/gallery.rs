@@ -110,6 +110,7 @@ pub fn make() -> Result<()> {
     fs::write(folder.join("README.md"), page).context("cannot write the page")
 }
 
+/// Draws a figure into the file `to`, with hidden lines drawn as `hidden` says, if it is not empty.
 fn draw(figure: &Figure, hidden: &str, to: &str) -> Result<()> {
     let file = crate::root().join(format!("scenes/{}.obj", figure.scene)).display().to_string();
     let mut options = vec![file, format!("--svg={to}"), "--page=80x80".into(), "--margin=3".into()];
@@ -127,6 +128,7 @@ fn words(view: &[&str]) -> String {
     text.trim_start_matches('-').chars().filter(plain).collect()
 }
 
+/// The number of vertices of a scene.
 fn count_vertices(scene: &str) -> Result<usize> {
     let path = crate::root().join(format!("scenes/{scene}.obj"));
     let text =

@@ -41,6 +41,7 @@ const MASK_AT_REST: [&str; 6] = [
 type Indirect<'l> = &'l [(&'l str, &'l [&'l str])];
 const INDIRECT: Indirect = &[];
 
+/// What to do about a function or constant in flash; the end of several messages.
 const ADVICE: &str = "The step interrupt must not wait for flash. Place the function in RAM, by \
     #[unsafe(link_section = \".data.in_ram\")], or let it be inlined into its caller, by #[inline(always)].";
 
@@ -66,6 +67,7 @@ struct Image {
 }
 
 impl Image {
+    /// Reads the sections, functions and marks of an ELF file.
     fn read(elf: &object::File) -> Result<Self> {
         let mut image = Self::default();
         for section in elf.sections().filter(|section| section.address() != 0) {
@@ -195,6 +197,7 @@ struct Graph<'i> {
 }
 
 impl Graph<'_> {
+    /// Checks the handlers, and every function that masks all interrupts.
     fn check(&self) -> Result<()> {
         let mut done = BTreeSet::new();
         let functions = &self.image.functions;
@@ -280,6 +283,7 @@ impl Graph<'_> {
         Ok(())
     }
 
+    /// Checks everything that [`INDIRECT`] lists as reachable by pointer from the function `name`.
     fn follow_indirect(
         &self,
         name: &str,

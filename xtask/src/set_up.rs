@@ -30,6 +30,7 @@ pub enum Toolchain {
 const RUSTUP_LIMIT: Duration = Duration::from_secs(120);
 
 const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
+/// The path of the sources of `core`, from Debian's sysroot.
 const DEBIAN_CORE: &str = "lib/rustlib/src/rust/library/core/Cargo.toml";
 
 /// Finds or installs a compiler for `target`.
@@ -139,6 +140,7 @@ fn qemu() -> Result<()> {
 
 /// Time limit for npm. It takes seconds if the network can be reached, and may hang otherwise.
 const NPM_LIMIT: Duration = Duration::from_secs(120);
+/// The oldest version of Node that rp2040js works with.
 const LEAST_NODE: u32 = 18;
 
 /// Finds or installs Node, and rp2040js in the version of the lock file beside the client's

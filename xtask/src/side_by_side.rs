@@ -63,6 +63,7 @@ pub fn run(programs: Vec<Command>) -> Result<()> {
     })
 }
 
+/// Runs a program, then shows its output and how long it took.
 fn run_one(program: &mut Command) -> Result<()> {
     let name = describe(program);
     let began = Instant::now();

@@ -6,9 +6,11 @@ use anyhow::{Result, ensure};
 use object::read::elf::{FileHeader, ProgramHeader};
 use object::{Endianness, elf};
 
+/// Bytes of the image in each block.
 const PAYLOAD: usize = 256;
 const MAGIC: [u32; 2] = [0x0A32_4655, 0x9E5D_5157];
 const MAGIC_END: u32 = 0x0AB1_6F30;
+/// The flag that the header contains the family number.
 const FAMILY_PRESENT: u32 = 0x2000;
 /// The family number of the RP2040.
 const FAMILY: u32 = 0xE48B_FF56;
@@ -39,6 +41,7 @@ pub fn of_elf(image: &[u8], start: u64) -> Result<Vec<u8>> {
     Ok(blocks(&flash, u32::try_from(start)?))
 }
 
+/// The blocks with the content of the flash from `start` on.
 fn blocks(flash: &[u8], start: u32) -> Vec<u8> {
     let count = flash.len().div_ceil(PAYLOAD) as u32;
     let mut blocks = Vec::new();
