@@ -1,4 +1,5 @@
-//! The faces that are found from vertices alone, seen as any faces are seen.
+//! Compares the faces that are found from vertices alone with the visibility of the same faces as
+//! ordinary faces.
 
 #![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on stops")]
 
@@ -33,15 +34,16 @@ impl SolidSink for Faces {
     }
 }
 
-/// Throws a solid and an eye for which view coordinates are whole, finds its faces, and asks `stretches`
-/// for the visible and hidden stretches of a scene of these faces. Visible edges must be visible from end
-/// to end, hidden ones hidden. `false` if the throw was no solid.
+/// Generates a random solid and an eye for which view coordinates are whole numbers, finds the
+/// faces of the solid, and calls `stretches` for the visible and hidden stretches of a scene of
+/// these faces. Visible edges must be completely visible and hidden ones completely hidden. Returns
+/// `false` if the random points form no solid.
 pub fn is_seen_alike(dice: &mut Dice, stretches: impl Fn(&Scene<'_>) -> Vec<Stretch>) -> bool {
     let points = any_solid(dice);
     if points.iter().flatten().any(|part| part.abs() > 100) {
         return false;
     }
-    // The camera looks along y, x to the right, z up.
+    // The camera looks along y, with x to the right and z up.
     let nearest = points.iter().map(|point| point[1]).min().expect("points");
     let place = [dice.throw(-9, 9), nearest - dice.throw(1, 9), dice.throw(-9, 9)];
     let (eye, projection) = if dice.throw(0, 1) == 0 {
@@ -80,7 +82,7 @@ pub fn is_seen_alike(dice: &mut Dice, stretches: impl Fn(&Scene<'_>) -> Vec<Stre
         let expected = match sight {
             EdgeVisibility::Outline | EdgeVisibility::Visible => true,
             EdgeVisibility::Hidden => false,
-            // Which of several lines in one place is drawn is not asked here.
+            // It does not matter here which of several coinciding lines is drawn.
             EdgeVisibility::BehindOutline => continue,
         };
         assert_eq!(

@@ -1,11 +1,12 @@
-//! B-splines in floats by the Cox-de Boor basis, and the fewest chords by exhaustive search.
+//! A reference for curves: B-splines in floats by the Cox-de Boor basis, and the minimum number of
+//! chords by exhaustive search.
 
-/// The place at `u` on the spline of `order` over `control` with these knots.
+/// The point at parameter `u` on the spline of `order` with these control points and knots.
 ///
-/// A sum over all basis functions, which shares nothing with the library's recursions.
+/// It is the sum over all basis functions, which shares nothing with the recursions of the library.
 pub fn spline_at(control: &[[f64; 3]], knots: &[f64], order: usize, u: f64) -> [f64; 3] {
     let end = knots[control.len()];
-    // The last point belongs to the last polynomial that has a length.
+    // The last point belongs to the last polynomial with a length.
     let span = if u >= end {
         (0..control.len()).rev().find(|&at| knots[at] < knots[at + 1]).unwrap_or(0)
     } else {
@@ -37,7 +38,7 @@ fn basis(knots: &[f64], number: usize, order: usize, u: f64, span: usize) -> f64
     sum
 }
 
-/// How far `place` is from the straight line between `a` and `b`.
+/// The distance of `place` from the line segment between `a` and `b`.
 pub fn distance(place: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
     let along = [b[0] - a[0], b[1] - a[1]];
     let away = [place[0] - a[0], place[1] - a[1]];
@@ -50,8 +51,8 @@ pub fn distance(place: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
     (away[0] - part * along[0]).hypot(away[1] - part * along[1])
 }
 
-/// The fewest chords between some of `samples`, first to last, from which no sample strays by more
-/// than `tolerance`.
+/// The minimum number of chords between some of `samples`, including the first and the last, such
+/// that no sample is farther than `tolerance` from its chord.
 pub fn fewest_chords(samples: &[[f64; 2]], tolerance: f64) -> usize {
     let mut fewest = vec![usize::MAX; samples.len()];
     fewest[0] = 0;

@@ -1,19 +1,20 @@
-//! Flash whose power may go between any two bytes.
+//! A simulated flash memory whose power may fail between any two bytes.
 
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
 };
 
-/// Stricter than the chip: a write is refused unless it is whole pages of erased bytes.
+/// A flash memory that is stricter than the chip: it refuses every write that is not whole pages of
+/// erased bytes.
 #[derive(Debug, Clone)]
 pub struct CutFlash {
-    /// What it holds.
+    /// The contents.
     pub bytes: Vec<u8>,
-    /// So many more bytes are erased or written before the power goes.
+    /// The number of bytes that can still be erased or written before the power fails.
     pub budget: usize,
 }
 
-/// The power is gone.
+/// The error of an operation during which the power fails.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Cut;
 
@@ -27,12 +28,12 @@ impl CutFlash {
     const PAGE: usize = 256;
     const SECTOR: usize = 4096;
 
-    /// Erased, with power for ever.
+    /// Creates an erased flash memory of this size whose power does not fail.
     pub fn new(bytes: usize) -> Self {
         Self { bytes: vec![0xFF; bytes], budget: usize::MAX }
     }
 
-    /// Does `change` to each byte in turn, as long as there is power.
+    /// Applies `change` to one byte after the other until the power fails.
     fn each(
         &mut self,
         from: usize,

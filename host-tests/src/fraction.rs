@@ -1,4 +1,5 @@
-//! Exact fractions that are reduced only when they grow long, several times faster than always.
+//! Exact fractions that are reduced only when they become long, which is several times faster than
+//! reducing them always.
 
 use num_bigint::BigInt;
 use num_integer::Integer;
@@ -6,18 +7,18 @@ use num_traits::{Signed, ToPrimitive, Zero};
 use std::cmp::Ordering;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// A fraction; the denominator is above zero.
+/// A fraction whose denominator is positive.
 #[derive(Debug, Clone)]
 pub struct Fraction {
     numerator: BigInt,
     denominator: BigInt,
 }
 
-/// Denominators longer than this are reduced.
+/// The length in bits above which denominators are reduced.
 const LONG_BITS: u64 = 160;
 
 impl Fraction {
-    /// `numerator / denominator`; the denominator is not zero.
+    /// Creates `numerator / denominator`; the denominator must not be zero.
     pub fn new(numerator: impl Into<BigInt>, denominator: impl Into<BigInt>) -> Self {
         let (mut numerator, mut denominator) = (numerator.into(), denominator.into());
         assert!(!denominator.is_zero(), "division by zero");
@@ -32,7 +33,7 @@ impl Fraction {
         Self { numerator, denominator }
     }
 
-    /// A whole number.
+    /// Creates a whole number.
     pub fn whole(value: i32) -> Self {
         Self::new(value, 1)
     }
@@ -52,28 +53,28 @@ impl Fraction {
         self.numerator.is_zero()
     }
 
-    /// Whether it is above zero.
+    /// Whether it is positive.
     pub fn is_positive(&self) -> bool {
         self.numerator.is_positive()
     }
 
-    /// Whether it is below zero.
+    /// Whether it is negative.
     pub fn is_negative(&self) -> bool {
         self.numerator.is_negative()
     }
 
-    /// One divided by it.
+    /// The reciprocal.
     pub fn recip(&self) -> Self {
         Self::new(self.denominator.clone(), self.numerator.clone())
     }
 
-    /// The nearest float, or nearly.
+    /// The nearest float, or one close to it.
     pub fn to_f64(&self) -> f64 {
         let scaled: BigInt = (&self.numerator << 60u32) / &self.denominator;
         scaled.to_f64().unwrap_or(f64::NAN) / (1u64 << 60) as f64
     }
 
-    /// Its size without its sign.
+    /// The absolute value.
     pub fn abs(&self) -> Self {
         Self { numerator: self.numerator.abs(), denominator: self.denominator.clone() }
     }

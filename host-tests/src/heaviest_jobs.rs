@@ -1,4 +1,4 @@
-//! The jobs that need the most of a board's stack, and how much they leave of it.
+//! Runs the jobs that use the most stack of a board, and measures how much they leave.
 
 use crate::emulated_jobs::Line;
 use crate::whole_jobs::job_lines;
@@ -9,10 +9,11 @@ use std::error::Error;
 use std::thread::sleep;
 use std::time::Duration;
 
-/// What a job is called, and its lines.
+/// The name of a job, and its lines.
 type Job = (&'static str, Vec<String>);
 
-/// `lattice` is as large a lattice as the board is to see. Little effort: more of it is longer, not deeper.
+/// The jobs. `lattice` is the largest lattice scene for the board. The effort is small, because
+/// more of it takes longer but no more stack.
 fn jobs(lattice: &str) -> Vec<Job> {
     let page = "$page=40x40";
     let of = |scene: &str, settings: &[&str]| {
@@ -47,7 +48,7 @@ fn jobs(lattice: &str) -> Vec<Job> {
     ]
 }
 
-/// Runs all jobs on the LM3S6965; tells how deep its stack was after each.
+/// Runs all jobs on the LM3S6965, and reports the deepest use of the stack after each.
 ///
 /// # Errors
 /// The emulator fails.
@@ -62,7 +63,7 @@ pub fn on_the_lm3s6965(tell: impl FnMut(&str, Stack)) -> Result<(), Box<dyn Erro
     run_all(line, "lattice5.obj", |_| Ok(()), stack, tell)
 }
 
-/// Runs all jobs on the Pico, whose USB host asks for the status all the time.
+/// Runs all jobs on the Pico, whose USB host queries the status all the time.
 ///
 /// # Errors
 /// The emulator fails.
@@ -100,7 +101,7 @@ fn run_all<E: EmulatedBoard>(
                 }
             }
         }
-        // Draws some of it, held once, and gives the rest up.
+        // Draws a part of it with one feed hold, and aborts the rest.
         for byte in [b'?', b'?', b'!', b'?', b'~', b'?', b'?', 0x18] {
             line.emulator.send(&[byte])?;
             meanwhile(&mut line.emulator)?;

@@ -1,6 +1,7 @@
-//! The simulated machine, the exact reference models and the tests of whole jobs.
+//! Tools for the tests of the library: simulated machines, exact reference models, and helpers for
+//! whole jobs.
 
-// A test fails by panicking, and this is what tests are made of.
+// Tests fail by panicking, and this crate contains only parts of tests.
 #![allow(clippy::panic, clippy::expect_used)]
 
 pub mod curve_reference;

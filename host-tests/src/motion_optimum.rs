@@ -1,18 +1,18 @@
-//! The fastest motion that the limits allow, in `f64`: an exact forward and backward pass over the
-//! whole path, for comparison with what the events do.
+//! A reference for the speed of a motion: the fastest motion within the limits, computed in `f64`
+//! by an exact forward and backward pass over the whole path.
 
-/// The limits, in mm and s.
+/// The limits of a motion.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
-    /// mm/s along the path.
+    /// The maximum speed along the path, in mm/s.
     pub speed: f64,
-    /// mm/s² along the path.
+    /// The maximum acceleration along the path, in mm/s².
     pub acceleration: f64,
-    /// mm
+    /// The junction deviation in mm.
     pub junction_deviation: f64,
-    /// Whether bends count.
+    /// Whether the speed is limited in curves.
     pub centripetal: bool,
-    /// mm of one step, the same for both axes.
+    /// The length of a step in mm, the same for both axes.
     pub step: f64,
 }
 
@@ -30,9 +30,10 @@ fn norm(a: Point) -> f64 {
     a.0.hypot(a.1)
 }
 
-/// Squared speed allowed at each point of `points` (mm) and on each line between two, as the limits
-/// of `motion` say: corners by junction deviation, bends by the circle through points 1, 2, 4, … 64
-/// apart, each less what rounding to steps can explain.
+/// The squared maximum speed at each point of `points` (mm) and on each line between two points, by
+/// the rules of the module `motion`. Corners are limited by junction deviation. Curves are limited
+/// by the circle through points that are 1, 2, 4, … 64 apart. In both cases, what rounding to steps
+/// can explain is subtracted.
 pub fn squared_limits(points: &[Point], limits: Limits) -> (Vec<f64>, Vec<f64>) {
     let rounding = 23.0 / 16.0 * limits.step;
     let mut radius = vec![f64::INFINITY; points.len()];
@@ -59,7 +60,8 @@ pub fn squared_limits(points: &[Point], limits: Limits) -> (Vec<f64>, Vec<f64>) 
     if limits.centripetal {
         for ends in sharp.windows(2) {
             for stride in [2usize, 4, 8, 16, 32, 64] {
-                // The circle stands for half of its arc; at the ends of a curve for all of it.
+                // The circle applies to half of its arc; at the ends of a curve it applies to all
+                // of it.
                 let mut last = ends[0] + 2 * stride;
                 while last <= ends[1] {
                     let middle = last - stride;
@@ -91,7 +93,8 @@ pub fn squared_limits(points: &[Point], limits: Limits) -> (Vec<f64>, Vec<f64>) 
 }
 
 fn circle(first: Point, middle: Point, last: Point, rounding: f64) -> Option<f64> {
-    // Whether a circle counts is a matter of a threshold, so places are rounded as `motion` does.
+    // Whether a circle applies depends on a threshold, so points are rounded exactly as `motion`
+    // does.
     let place = |p: Point| ((p.0 * 4096.0).floor() / 4096.0, (p.1 * 4096.0).floor() / 4096.0);
     let (first, middle, last) = (place(first), place(middle), place(last));
     let (a, b, c) = (minus(middle, first), minus(last, middle), minus(last, first));
@@ -102,7 +105,8 @@ fn circle(first: Point, middle: Point, last: Point, rounding: f64) -> Option<f64
     (height > 0.0).then(|| norm(a) * norm(b) / (2.0 * height))
 }
 
-/// Seconds from rest at the first point to rest at the last. Successive points differ.
+/// The time in seconds from rest at the first point to rest at the last one. Successive points must
+/// differ.
 pub fn seconds(points: &[Point], limits: Limits) -> f64 {
     let (mut squares, tops) = squared_limits(points, limits);
     let lengths: Vec<f64> = points.windows(2).map(|pair| norm(minus(pair[1], pair[0]))).collect();
@@ -126,7 +130,8 @@ pub fn seconds(points: &[Point], limits: Limits) -> f64 {
         .sum()
 }
 
-/// Seconds of a straight line of `length` mm from rest to rest with a limit on jerk, mm/s³.
+/// The time in seconds for a straight line of `length` mm from rest to rest with a jerk limit, in
+/// mm/s³.
 pub fn straight_seconds(length: f64, limits: Limits, jerk: f64) -> f64 {
     let ramp = |speed: f64| {
         let full = limits.acceleration.powi(2) / jerk;
@@ -136,7 +141,8 @@ pub fn straight_seconds(length: f64, limits: Limits, jerk: f64) -> f64 {
             speed / limits.acceleration + limits.acceleration / jerk
         }
     };
-    // A ramp from rest is as long as half its speed all the time; two of them fit.
+    // The length of a ramp from rest is its duration times half of its final speed; two ramps must
+    // fit into the line.
     let (mut slow, mut fast) = (0.0, limits.speed);
     if fast * ramp(fast) > length {
         for _ in 0..100 {

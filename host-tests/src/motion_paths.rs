@@ -1,4 +1,4 @@
-//! Paths of which speed is measured, and the one stroke that draws them.
+//! Paths on which speed is measured, and a function that draws each in one stroke.
 
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
 
@@ -7,13 +7,14 @@ use penup::drawing::{LineType, PagePoint};
 use penup::machine::{Setting, Settings, Target, TargetList, Value};
 use penup::step::Line;
 
-/// Steps per millimetre of both axes.
+/// The steps per millimetre of both axes.
 pub const STEPS_PER_MM: f64 = 100.0;
 
-/// A Cartesian machine: both speeds (mm/s), acceleration (mm/s²), junction deviation (mm), bends slowed.
+/// The settings of a Cartesian machine with this maximum speed (mm/s) of both axes, acceleration
+/// (mm/s²) and junction deviation (mm). `centripetal` tells whether curves are slowed down.
 ///
 /// # Panics
-/// The machine refuses them.
+/// Panics if the machine refuses the settings.
 pub fn settings(speed: f64, acceleration: f64, deviation: f64, centripetal: bool) -> Settings {
     let mut settings = Settings::default();
     let values = [
@@ -34,7 +35,7 @@ pub fn settings(speed: f64, acceleration: f64, deviation: f64, centripetal: bool
     settings
 }
 
-/// Millimetres rounded to steps; points that coincide become one.
+/// Rounds points in millimetres to steps, and merges successive points that coincide.
 pub fn steps(points: &[(f64, f64)]) -> Vec<PagePoint> {
     let mut rounded: Vec<_> = points
         .iter()
@@ -47,10 +48,10 @@ pub fn steps(points: &[(f64, f64)]) -> Vec<PagePoint> {
     rounded
 }
 
-/// Draws the points, checks the events, and returns the one run with the pen down.
+/// Draws the points, checks the events, and returns the single run with the pen down.
 ///
 /// # Panics
-/// The machine refuses the path, or the events break a rule.
+/// Panics if the machine refuses the path or the events violate a rule.
 pub fn draw(points: &[PagePoint], settings: Settings, blocks: usize) -> Run {
     let targets: Vec<_> = points
         .iter()
@@ -76,7 +77,7 @@ pub fn draw(points: &[PagePoint], settings: Settings, blocks: usize) -> Run {
     run
 }
 
-/// Where the plan is when each move of the lines through `points` leaves, mm.
+/// The path length in mm at which the plan is when each move of the lines through `points` begins.
 pub fn places(points: &[PagePoint]) -> Vec<f64> {
     let mut start = 0.0;
     let mut places = Vec::new();
@@ -90,7 +91,7 @@ pub fn places(points: &[PagePoint]) -> Vec<f64> {
     places
 }
 
-/// A circle around (50, 50), mm.
+/// A circle around (50, 50), in mm.
 pub fn circle(radius: f64, chords: u32) -> Vec<(f64, f64)> {
     (0..=chords)
         .map(|k| {
@@ -100,14 +101,14 @@ pub fn circle(radius: f64, chords: u32) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// Ten lines, x from 10 to 60 and back, 5 up each.
+/// A zigzag of ten lines in mm: x alternates between 10 and 60, and y grows by 5 for each line.
 pub fn zigzag() -> Vec<(f64, f64)> {
     (0..=10)
         .map(|line| (if line % 2 == 0 { 10.0 } else { 60.0 }, 10.0 + 5.0 * f64::from(line)))
         .collect()
 }
 
-/// A five-pointed star, R 30, drawn in one stroke.
+/// A five-pointed star of radius 30 mm, drawn in one stroke.
 pub fn star() -> Vec<(f64, f64)> {
     (0..=5)
         .map(|k| {
@@ -117,7 +118,7 @@ pub fn star() -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// 10,000 points 0.05 mm apart along a slow spiral.
+/// A slowly growing spiral of 10,000 points at distances of 0.05 mm.
 pub fn dense() -> Vec<(f64, f64)> {
     let mut angle = 0.0f64;
     (0..10_000)

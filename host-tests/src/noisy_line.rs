@@ -1,8 +1,8 @@
-//! A serial line at 115200 baud that damages bytes, between the client and a plotter of plain
+//! A simulated serial line at 115200 baud that corrupts bytes, between the client and a plotter in
 //! memory.
 //!
-//! Time passes only in [`NoisyLine::receive`](Link::receive), so what the client waits for costs
-//! no time of the test, and a run is the same every time.
+//! Time passes only in [`NoisyLine::receive`](Link::receive). The waits of the client therefore
+//! take no real time, and every run is the same.
 
 use crate::event_checker;
 use crate::whole_jobs::Bench;
@@ -13,59 +13,60 @@ use std::collections::{BTreeSet, VecDeque};
 use std::io;
 use std::time::{Duration, Instant};
 
-/// Numbers that look random, the same in every run.
+/// Pseudo-random numbers that are the same in every run.
 #[derive(Debug, Clone)]
 pub struct Random(pub u64);
 
 impl Random {
-    /// One of 0 to `bound` - 1.
+    /// Returns a number from 0 to `bound` - 1.
     pub fn below(&mut self, bound: u64) -> u64 {
-        // Knuth's MMIX.
+        // This is the linear congruential generator of Knuth's MMIX.
         self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (self.0 >> 33) % bound
     }
 }
 
-/// What becomes of a byte.
+/// A fault that affects a byte.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fault {
-    /// It and as many after it as make up this number are lost.
+    /// The byte and the following ones are lost, this many in total.
     Lost(usize),
-    /// It comes twice.
+    /// The byte arrives twice.
     Doubled,
-    /// Another byte comes in its place.
+    /// This byte arrives instead.
     Replaced(u8),
-    /// One of its bits, from 0, is another one.
+    /// This bit, counted from 0, is inverted.
     Flipped(u8),
-    /// It and all after it come so many milliseconds later.
+    /// The byte and all following ones arrive this many milliseconds later.
     Late(u64),
 }
 
-/// Which bytes of one direction are damaged.
+/// The faults of one direction.
 #[derive(Debug, Clone, Default)]
 pub struct Damage {
-    /// Single faults: the number of the byte, from 0, and what becomes of it.
+    /// Single faults: the number of the byte, counted from 0, and its fault.
     pub faults: Vec<(usize, Fault)>,
-    /// Of so many bytes one is damaged, chosen by these numbers; `None` for no such damage.
+    /// Random faults: one in this many bytes is affected, chosen by these numbers; `None` for no
+    /// random faults.
     pub one_in: Option<(u64, Random)>,
 }
 
-/// Microseconds that a byte takes, rounded up: ten bits at 115200 baud.
+/// The duration of a byte in microseconds, rounded up: ten bits at 115200 baud.
 const BYTE_TIME: u64 = 87;
 
-/// A job that has not ended after so many microseconds hangs.
+/// The time in microseconds after which a job counts as hanging.
 const LONGEST: u64 = 3600 * 1_000_000;
 
-/// One direction.
+/// One direction of the line.
 #[derive(Debug, Default)]
 struct Wire {
     damage: Damage,
-    /// All bytes that were sent, as they were sent.
+    /// All bytes that were sent, before any fault.
     sent: Vec<u8>,
     lost: usize,
-    /// Bytes on their way, with the time in microseconds when they come out.
+    /// The bytes in transit, each with its arrival time in microseconds.
     on_the_way: VecDeque<(u64, u8)>,
-    /// When the last of them comes out.
+    /// The arrival time of the last of them.
     busy_until: u64,
 }
 
@@ -99,7 +100,7 @@ impl Wire {
         }
     }
 
-    /// A byte that does not act at once, now and then.
+    /// Now and then chooses a random fault; real-time commands are not created.
     fn chance(&mut self) -> Option<Fault> {
         let (one_in, random) = self.damage.one_in.as_mut()?;
         (random.below(*one_in) == 0).then(|| match random.below(256) as u8 {
@@ -114,20 +115,19 @@ impl Wire {
     }
 }
 
-/// A plotter at the other end of a line that damages bytes.
+/// A plotter at the other end of a line that corrupts bytes.
 pub struct NoisyLine {
     /// The plotter.
     pub bench: Bench,
     towards: Wire,
     back: Wire,
-    /// Microseconds since it was switched on.
+    /// The time since the start in microseconds.
     now: u64,
     began: Instant,
 }
 
 impl NoisyLine {
-    /// A plotter that was switched on and greeted, behind a line with this damage on the way
-    /// there and back.
+    /// Puts a plotter that has sent its greeting behind a line with these faults in each direction.
     pub fn new(mut bench: Bench, towards: Damage, back: Damage) -> Self {
         bench.heard();
         let wire = |damage| Wire { damage, ..Wire::default() };
@@ -135,17 +135,17 @@ impl NoisyLine {
         Self { bench, towards, back, now: 0, began: Instant::now() }
     }
 
-    /// All bytes that the client sent, and all that the plotter did, as they were sent.
+    /// All bytes that the client and the plotter sent, before any fault.
     pub fn sent(&self) -> [&[u8]; 2] {
         [&self.towards.sent, &self.back.sent]
     }
 
-    /// Seconds of the line's time since it was switched on.
+    /// The simulated time since the start in seconds.
     pub fn seconds(&self) -> f64 {
         self.now as f64 / 1e6
     }
 
-    /// Every move with the pen down so far.
+    /// All moves with the pen down so far.
     pub fn inked(&self) -> BTreeSet<(PagePoint, PagePoint)> {
         let settings = *self.bench.plotter.machine().settings();
         event_checker::check_pins_in_alarms(&self.bench.board.trace().changes(), &settings).inked
@@ -166,7 +166,7 @@ impl NoisyLine {
     }
 
     fn work(&mut self) {
-        // What waits for the machine goes on when time has passed.
+        // Work that waits for the machine continues when time has passed.
         for _ in 0..8 {
             if !self.bench.plotter.poll(&mut self.bench.board) {
                 break;

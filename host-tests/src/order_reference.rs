@@ -1,4 +1,4 @@
-//! What an order of strokes must be, said slowly; and drawings to order.
+//! A slow reference check of stroke orders, and drawings to order.
 
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
 
@@ -7,18 +7,18 @@ use penup::order::{Leg, Options, OrderError, Report, Shape, order};
 use penup::stage::{NeverCancel, Scratch};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// A drawing with its own memory.
+/// A drawing that owns its memory.
 #[derive(Debug, Clone, Default)]
 pub struct Sheet {
-    /// The points, all different.
+    /// The points, which are all different.
     pub points: Vec<PagePoint>,
     /// The segments between them.
     pub segments: Vec<Segment>,
 }
 
 impl Sheet {
-    /// The drawing of polylines; equal points become one, a segment that is there already or has
-    /// no length is left out.
+    /// Creates the drawing of polylines. Equal points are merged; segments that are repeated or
+    /// have no length are left out.
     pub fn from_polylines(polylines: &[Vec<(i32, i32)>]) -> Self {
         let mut sheet = Self::default();
         let mut numbers = BTreeMap::new();
@@ -44,7 +44,7 @@ impl Sheet {
         sheet
     }
 
-    /// The plan in an OBJ text, in millimetres, at 80 steps to each.
+    /// Reads a plan in millimetres from an OBJ text, with 80 steps to the millimetre.
     pub fn from_obj(text: &str) -> Self {
         let mut vertices = Vec::new();
         let mut polylines = Vec::new();
@@ -68,12 +68,12 @@ impl Sheet {
         Self::from_polylines(&polylines)
     }
 
-    /// As the library takes it.
+    /// The drawing as the library's type.
     pub fn drawing(&self) -> Drawing<'_> {
         Drawing { points: &self.points, segments: &self.segments }
     }
 
-    /// The tour that the library finds, with plenty of memory, checked.
+    /// The tour that the library finds with plenty of memory; it is checked.
     pub fn order(&self, options: Options) -> Result<(Vec<Leg>, Report), OrderError> {
         let mut memory = vec![0; 1 << 15];
         let mut tour = vec![Leg::new(0, false); self.segments.len()];
@@ -95,7 +95,7 @@ impl Sheet {
         self.start(Leg::new(leg.segment() as u16, !leg.reversed()))
     }
 
-    /// How many points are odd.
+    /// The number of points with an odd degree.
     pub fn odd_points(&self) -> usize {
         let mut degree = vec![0; self.points.len()];
         for segment in &self.segments {
@@ -105,7 +105,7 @@ impl Sheet {
         degree.iter().filter(|&degree| degree % 2 == 1).count()
     }
 
-    /// How many separate parts there are (by flooding).
+    /// The number of connected components, found by flood filling.
     pub fn components(&self) -> usize {
         let mut left: BTreeSet<usize> = (0..self.segments.len()).collect();
         let mut count = 0;
@@ -134,7 +134,7 @@ impl Sheet {
         count
     }
 
-    /// Panics unless `tour` draws each segment once and `report` tells the truth about it.
+    /// Panics unless `tour` draws each segment exactly once and `report` describes it correctly.
     pub fn check(&self, shape: Shape, tour: &[Leg], report: &Report) {
         let drawn: BTreeSet<usize> = tour.iter().map(|leg| leg.segment()).collect();
         assert_eq!(drawn.len(), tour.len(), "a segment is drawn twice");

@@ -1,11 +1,11 @@
-//! A plotter made of pins: the library's own interrupt code on pins that remember what they did.
+//! Runs the library's own interrupt code on simulated pins that record their changes.
 
 use penup::boards::host::{Stamped, traced_steps};
 use penup::drawing::PagePoint;
 use penup::machine::{EventRing, Machine, MachineError, Path, PulserState, Settings};
 use penup::motion::{Block, EventQueue, StepEvent};
 
-/// A queue that never fills and remembers everything.
+/// An event queue that never fills and records everything.
 #[derive(Debug, Default)]
 pub struct Recorder(pub Vec<StepEvent>);
 
@@ -19,10 +19,10 @@ impl EventQueue for Recorder {
     }
 }
 
-/// All events of one job from the page's origin, without pins.
+/// Records all events of one job, which starts at the page's origin, without pins.
 ///
 /// # Errors
-/// What the machine refuses.
+/// The machine refuses the job.
 pub fn record(
     settings: Settings,
     path: &mut dyn Path,
@@ -37,7 +37,8 @@ pub fn record(
     Ok(recorder.0)
 }
 
-/// The time of each move of `events` in ticks, and where it leads from the origin.
+/// The time of each move of `events` in ticks, and the point that it leads to, relative to the
+/// origin.
 pub fn moves(events: &[StepEvent]) -> Vec<(u64, PagePoint)> {
     let mut at = PagePoint::default();
     let mut time = 0;
@@ -53,26 +54,26 @@ pub fn moves(events: &[StepEvent]) -> Vec<(u64, PagePoint)> {
     moves
 }
 
-/// How long all events take, in ticks.
+/// The duration of all events, in ticks.
 pub fn duration(events: &[StepEvent]) -> u64 {
     events.iter().map(|event| u64::from(event.ticks())).sum()
 }
 
-/// What [`run`] gives its visitor at each turn of the main loop.
+/// What [`run`] passes to its visitor at each iteration of the main loop.
 pub struct Turn<'a, 'm> {
-    /// To give orders to.
+    /// The machine, to which the visitor may give commands.
     pub machine: &'a mut Machine<'m>,
-    /// Ticks since the start.
+    /// The time since the start in ticks.
     pub now: u64,
-    /// The sum of the steps at the pins so far, without those that take up slack.
+    /// The sum of the steps at the pins so far, without those that take up backlash.
     pub pins: PagePoint,
-    /// The sum of all steps.
+    /// The sum of all steps so far.
     pub motors: PagePoint,
 }
 
-/// Runs a job through the interrupt's code: a main loop turn every `turn_ticks`, interrupts when
-/// they are due. `visit` is called before each turn and may give orders; the run ends when it
-/// returns `false`.
+/// Runs a job through the interrupt code, with a main loop iteration every `turn_ticks` and
+/// interrupts when they are due. `visit` is called before each iteration and may give commands; the
+/// run ends when it returns `false`.
 pub fn run(
     settings: Settings,
     path: &mut dyn Path,
@@ -87,7 +88,7 @@ pub fn run(
     })
 }
 
-/// The same, but each turn fills the queue itself.
+/// Does the same as [`run`], but lets the visitor fill the queue itself.
 pub fn run_with(
     settings: Settings,
     turn_ticks: u64,

@@ -1,4 +1,4 @@
-//! The example scenes and a plain camera in f64, for tests that need no more.
+//! The example scenes and a simple camera in `f64`, for tests that need no more than that.
 
 use penup::geometry::{COORDINATE_LIMIT, EdgeParameter, Projection, Vertex};
 use penup::model::Corner;
@@ -7,17 +7,17 @@ use penup::visibility::{SinkFull, Stretch, StretchSink};
 /// A point or direction in space.
 pub type Vector = [f64; 3];
 
-/// Vertices and elements of an OBJ file.
+/// The vertices and elements of an OBJ file.
 #[derive(Debug, Clone, Default)]
 pub struct Model {
-    /// Positions in space.
+    /// The positions of the vertices.
     pub vertices: Vec<Vector>,
-    /// Corners of every face and bar.
+    /// The corners of every face and bar.
     pub corners: Vec<Corner>,
 }
 
 impl Model {
-    /// Adds a face or (two vertices) a bar.
+    /// Adds a face or, if there are two vertices, a bar.
     pub fn add(&mut self, element: &[usize]) {
         let of_bar = element.len() == 2;
         for (n, &vertex) in element.iter().enumerate() {
@@ -26,7 +26,7 @@ impl Model {
         }
     }
 
-    /// Reads the `v`, `f` and `l` lines of an OBJ text with plain positive numbers.
+    /// Reads the `v`, `f` and `l` lines of an OBJ text whose indices are plain positive numbers.
     pub fn from_obj(text: &str) -> Self {
         let mut model = Self::default();
         for line in text.lines() {
@@ -49,7 +49,7 @@ impl Model {
         model
     }
 
-    /// A scene of the `scenes` directory.
+    /// Reads a scene of the `scenes` directory.
     ///
     /// # Errors
     /// The file cannot be read.
@@ -61,7 +61,7 @@ impl Model {
         Ok(Self::from_obj(&std::fs::read_to_string(path)?))
     }
 
-    /// `around` by `across` quads on a torus of radii 2 and 1.
+    /// A torus of radii 2 and 1, made of `around` by `across` quadrilaterals.
     pub fn torus(around: usize, across: usize) -> Self {
         let mut model = Self::default();
         for n in 0..around * across {
@@ -80,12 +80,12 @@ impl Model {
     }
 }
 
-/// A camera from two points, and what its view was scaled by.
+/// A view of a model, and the scales that it was made with.
 #[derive(Debug, Clone)]
 pub struct View {
-    /// Rounded vertices.
+    /// The vertices in view coordinates, rounded.
     pub vertices: Vec<Vertex>,
-    /// How they get onto the page.
+    /// The projection onto the page.
     pub projection: Projection,
     scale: f64,
     depth_scale: f64,
@@ -107,7 +107,7 @@ fn unit(a: Vector) -> Vector {
 }
 
 impl View {
-    /// The model as seen from `eye` towards `at`.
+    /// Creates the view of the model from `eye` towards `at`.
     pub fn new(model: &Model, eye: Vector, at: Vector, up: Vector, projection: Projection) -> Self {
         let forward = unit(minus(at, eye));
         let right = unit(cross(forward, up));
@@ -140,7 +140,7 @@ impl View {
         }
     }
 
-    /// The camera of `scenes/cameras.json` for an example.
+    /// Creates the view of an example with its camera in `scenes/cameras.json`.
     ///
     /// # Errors
     /// The file cannot be read.
@@ -167,18 +167,18 @@ impl View {
         ))
     }
 
-    /// How much depth is stretched over width and height.
+    /// The ratio of the scale of depth to that of width and height.
     pub fn depth_stretch(&self) -> (u32, u32) {
         let ratio = self.depth_scale / self.scale;
         ((ratio * 4096.0).round() as u32, 4096)
     }
 
-    /// Where the origin of a parallel view's model lies.
+    /// The image of the model's origin in a parallel view.
     pub fn image_of_origin(&self) -> [f64; 2] {
         self.origin
     }
 
-    /// A place along an edge, on the image plane at distance 1 or in model units.
+    /// The image of a point along an edge, on the image plane at distance 1 or in model units.
     pub fn image(&self, (p, q): (Vertex, Vertex), along: EdgeParameter) -> [f64; 2] {
         let s = along.numerator as f64 / along.denominator as f64;
         let part = |a: i32, b: i32| f64::from(a) + s * (f64::from(b) - f64::from(a));
@@ -190,7 +190,7 @@ impl View {
     }
 }
 
-/// A sink that keeps everything.
+/// A sink that records all stretches.
 #[derive(Debug, Clone, Default)]
 pub struct Stretches(pub Vec<Stretch>);
 

@@ -1,7 +1,8 @@
-//! A spiral of short chords: the drawing that asks most of the planning.
+//! A spiral of short chords, the most demanding drawing for the motion planner.
 
-/// The lines that draw a spiral of so many chords of 0.05 mm around (20, 20) mm. It begins with this
-/// radius, in mm, and grows by a millimetre a turn. `settings` are sent before it is drawn.
+/// The protocol lines that draw a spiral of `chords` chords of 0.05 mm around (20, 20) mm. It
+/// begins with `radius`, in mm, and grows by a millimetre per turn. `settings` are sent before it
+/// is drawn.
 pub fn lines(chords: u16, radius: f64, settings: &[&str]) -> Vec<String> {
     let (mut angle, mut lines) = (0.0f64, Vec::new());
     for _ in 0..=chords {
@@ -21,8 +22,8 @@ pub fn lines(chords: u16, radius: f64, settings: &[&str]) -> Vec<String> {
     lines
 }
 
-/// 2800 chords a second, of 180 moves on average: 510,000 steps a second, 564,000 where one axis goes
-/// straight.
+/// A spiral drawn at 2800 chords per second, of 180 moves on average: 510,000 steps per second, and
+/// 564,000 where one axis moves alone.
 pub fn at_half_a_million() -> Vec<String> {
     let settings = ["$100=4000", "$101=4000", "$120=20000", "$121=20000", "$201=8460", "$202=8460"];
     lines(1200, 4.0, &settings)

@@ -1,4 +1,4 @@
-//! When the step pins rise and fall: as planned, and on an emulated board.
+//! The times at which the step pins rise and fall, as planned and on an emulated board.
 
 use crate::emulated_jobs::bench_like;
 use penup::boards::host::{Change, Stamped};
@@ -6,10 +6,10 @@ use penup_client::emulator::{Pin, PinChange};
 use penup_client::machines::Board;
 use std::time::Duration;
 
-/// A level of a step pin, and when it came.
+/// A step pin, its new level, and the time of the change.
 pub type Edge = (Pin, bool, Duration);
 
-/// With these a diagonal is drawn at 502,000 steps a second.
+/// Settings with which a diagonal is drawn at 502,000 steps per second.
 pub const HALF_A_MILLION: [&str; 11] = [
     "$0=0.5",
     "$100=1300",
@@ -26,10 +26,11 @@ pub const HALF_A_MILLION: [&str; 11] = [
 
 const TICK: Duration = Duration::from_nanos(40);
 
-/// A turn of the host's main loop: its queue is short.
+/// The duration in ticks of an iteration of the host's main loop, which is short because the queue
+/// is.
 const TURN_TICKS: u64 = 2_500;
 
-/// As planned, with the capacities of a board.
+/// The planned edges of a job, with the capacities of `board`.
 pub fn planned(board: Board, lines: &[String]) -> Vec<Edge> {
     let mut bench = bench_like(board);
     for line in lines {
@@ -51,17 +52,17 @@ pub fn planned(board: Board, lines: &[String]) -> Vec<Edge> {
     bench.board.trace().changes().iter().filter_map(&mut edge).collect()
 }
 
-/// Of what the pins did.
+/// The edges of the step pins among `changes`.
 pub fn of_changes(changes: &[PinChange]) -> Vec<Edge> {
     let is_step = |pin| matches!(pin, Pin::StepX | Pin::StepY);
     changes.iter().filter(|c| is_step(c.pin)).map(|c| (c.pin, c.high, c.at)).collect()
 }
 
-/// Checks that there are at least so many edges, and that each has its planned time since the first
-/// one, within `tolerance`.
+/// Checks that there are more than `least` planned edges, and that each edge has its planned time
+/// since the first one, within `tolerance`.
 ///
 /// # Panics
-/// At the first that has not.
+/// Panics at the first edge that does not.
 pub fn assert_in_time(planned: &[Edge], pins: &[Edge], least: usize, tolerance: Duration) {
     assert!(planned.len() > least, "{} edges", planned.len());
     assert_eq!(planned.len(), pins.len());

@@ -1,11 +1,11 @@
-//! Whole jobs on the board of plain memory, over its serial line.
+//! Runs whole jobs on the board in memory, over its serial line.
 
 use penup::boards::host::{HostBoard, Stamped, lend_memory};
 use penup::machine::{EventRing, PulserState};
 use penup::plotter::{Board, MemorySlices, Plotter};
 use penup_client::emulator::{Machine, MachineEventKind};
 
-/// A plotter of plain memory at the other end of a serial line.
+/// A plotter in memory at the other end of a serial line.
 pub struct Bench {
     /// Its board.
     pub board: HostBoard<'static>,
@@ -14,9 +14,10 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// With the capacities of `memory`, switched on and greeted.
+    /// Starts a plotter with the capacities of `memory` and waits for its greeting.
     pub fn with_memory(memory: MemorySlices<'static>) -> Self {
-        // A test's process ends soon; until then the plotter borrows from these.
+        // The memory is leaked: the plotter borrows it until the test's process ends, which is
+        // soon.
         let ring = Box::leak(Box::new(EventRing::new()));
         let pins = Box::leak(Box::new(PulserState::new()));
         let mut board = HostBoard::new(ring, pins);
@@ -25,29 +26,29 @@ impl Bench {
         Self { board, plotter }
     }
 
-    /// With the capacities of a computer.
+    /// Starts a plotter with the capacities of a computer.
     pub fn new() -> Self {
         Self::with_memory(lend_memory())
     }
 
-    /// Sends `text` and returns what comes back until everything is read.
+    /// Sends `text`, runs the plotter until it has read all of it, and returns its output.
     pub fn say(&mut self, text: &str) -> String {
         self.board.receive(text.as_bytes());
         while self.plotter.poll(&mut self.board) || !self.board.has_read_all() {}
         self.heard()
     }
 
-    /// What came back since last asked.
+    /// Returns the output since the last call.
     pub fn heard(&mut self) -> String {
         String::from_utf8_lossy(&self.board.take_sent()).replace("\r\n", "\n")
     }
 
-    /// Lets the plotter work until nothing moves any more; at most an hour of its time.
+    /// Runs the plotter until nothing moves any more, at most for an hour of its time.
     pub fn finish(&mut self) {
         for _ in 0..3_600_000 {
             let busy = self.plotter.poll(&mut self.board);
             self.board.wait();
-            // What waited for the last event goes on in the turn after it.
+            // Work that waited for the last event continues in the iteration after it.
             let is_stopped = !busy && self.plotter.machine().is_stopped();
             if is_stopped && !self.plotter.poll(&mut self.board) {
                 return;
@@ -63,7 +64,7 @@ impl Default for Bench {
     }
 }
 
-/// What the machine did, by the changes of its pins, in order.
+/// The actions of the machine, in order, according to the changes of its pins.
 pub fn machine_events(changes: &[Stamped]) -> Vec<MachineEventKind> {
     let mut machine = Machine::default();
     let mut events: Vec<_> =
@@ -72,7 +73,7 @@ pub fn machine_events(changes: &[Stamped]) -> Vec<MachineEventKind> {
     events.iter().map(|event| event.kind).collect()
 }
 
-/// The lines of a job: a file of `scenes/`, its camera, and what else is to be set.
+/// The protocol lines of a job: a file of `scenes/`, its camera, and additional settings.
 pub fn job_lines(scene: &str, settings: &[&str]) -> Vec<String> {
     let path = penup_client::workspace::root().join("scenes").join(scene);
     let text = std::fs::read_to_string(&path).expect("a scene of the project");
