@@ -277,7 +277,7 @@ impl PageMap {
             // The sum is below 2^118, see `point`, so the shift does not overflow.
             let sum = product(self.a[axis], c) + self.b[axis] * i128::from(w);
             let fine = if w & (w - 1) == 0 {
-                // In a parallel view w is a power of two, and a shift is many times faster than a
+                // The case of a parallel view: a shift is many times faster than a
                 // division.
                 let shift = w.trailing_zeros() + self.k;
                 ((sum << 9 >> shift) + 1) >> 1

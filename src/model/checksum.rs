@@ -1,15 +1,17 @@
-//! A checksum of what a model holds, so that a sender can compare it with what it sent.
+//! Computes a checksum of a model, so that a sender can compare it with what it sent.
 
 use super::{Element, FINEST_FRACTION_BITS, Model};
 use crate::checksum::CRC_32;
 
 impl Model<'_> {
-    /// The CRC-32 of the vertices, the bars, faces and whole curves, each with its pen, and of the
-    /// decimals with which the vertices were written, since these say how exact they are.
+    /// Returns the CRC-32 of the model: of the vertices; of the bars, faces and completed curves,
+    /// each with its pen; and of the number of decimals with which the vertices were written, since
+    /// it says how exact they are.
     ///
-    /// It is the same on every machine, however many bits a number takes in memory: the sum is
-    /// over little-endian numbers of 64 bits for coordinates (in units of 2^-30), ends and knots,
-    /// and of 32 bits for everything else. Each part begins with how many there are.
+    /// It is the same on every machine, however many bits a number takes in memory. Coordinates (in
+    /// units of 2^-30), the ends of curves and knots enter as little-endian numbers of 64 bits,
+    /// everything else as little-endian numbers of 32 bits. Each part begins with the number of its
+    /// items.
     ///
     /// ```
     /// use penup::model::Model;
@@ -18,7 +20,8 @@ impl Model<'_> {
     /// // The CRC-32 of four numbers that are 0.
     /// assert_eq!(empty.checksum(), 0xECBB_4B55);
     /// ```
-    #[inline(never)] // Its frame must not lie under the stages'.
+    // Not inlined, so that its stack frame is not below those of the stages.
+    #[inline(never)]
     pub fn checksum(&self) -> u32 {
         let mut digest = CRC_32.digest();
         let mut number = |number: u32| digest.update(&number.to_le_bytes());
@@ -26,7 +29,7 @@ impl Model<'_> {
         let shift = FINEST_FRACTION_BITS - self.fraction_bits;
         for vertex in self.vertices.iter() {
             for coordinate in vertex.coordinates() {
-                // Below 2^60.
+                // The shifted coordinate is below 2^60.
                 digest.update(&(i64::from(coordinate) << shift).to_le_bytes());
             }
         }

@@ -1,15 +1,15 @@
-//! Faces and bars, as the model stores them.
+//! The compact encoding in which the model stores faces and bars.
 
 use super::Pens;
 use bytemuck::{Pod, Zeroable};
 
-/// One more than the largest vertex number that an element can hold.
+/// One more than the greatest vertex number that an element can hold.
 pub const VERTEX_NUMBER_LIMIT: usize = 1 << 14;
 
-/// A vertex number as an element stores it, with two marks.
+/// A vertex number as an element stores it, with two flags.
 ///
-/// Bits 0 to 13 the vertex, from 0; bit 14 set in the corners of a bar; bit 15 set in the last
-/// corner of an element. So a face of n corners costs n half-words and no header.
+/// Bits 0 to 13 are the vertex number, from 0. Bit 14 is set in the corners of a bar. Bit 15 is set
+/// in the last corner of an element. So a face of n corners takes n half-words and needs no header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 #[repr(transparent)]
 pub struct Corner(pub(super) u16);
@@ -19,14 +19,15 @@ impl Corner {
     const BAR: u16 = 0x4000;
     const LAST: u16 = 0x8000;
 
-    /// The corner at `vertex`, which must be below [`VERTEX_NUMBER_LIMIT`] (higher bits are cut off).
+    /// Makes the corner at `vertex`, which must be below [`VERTEX_NUMBER_LIMIT`] (higher bits are
+    /// discarded).
     pub const fn new(vertex: u16, of_bar: bool, last: bool) -> Self {
         let bar = if of_bar { Self::BAR } else { 0 };
         let last = if last { Self::LAST } else { 0 };
         Self(vertex & Self::VERTEX | bar | last)
     }
 
-    /// The vertex number, from 0.
+    /// Returns the vertex number, from 0.
     pub const fn vertex(self) -> u16 {
         self.0 & Self::VERTEX
     }
@@ -36,7 +37,7 @@ impl Corner {
         self.0 & Self::BAR != 0
     }
 
-    /// Whether the element ends here.
+    /// Whether this is the last corner of its element.
     pub const fn is_last(self) -> bool {
         self.0 & Self::LAST != 0
     }
@@ -52,7 +53,7 @@ pub enum Element<'a> {
 }
 
 impl Element<'_> {
-    /// How many corners it takes.
+    /// Returns the number of its corners.
     pub fn corner_count(&self) -> usize {
         match self {
             Self::Face(corners) => corners.len(),
@@ -63,8 +64,8 @@ impl Element<'_> {
 
 /// Faces and bars in the order in which they were sent.
 ///
-/// Guarantees, if it comes from a model: every vertex number exists, every face has at least three
-/// corners, every bar two, the last corner of each is marked.
+/// If they come from a model, every vertex number exists, every face has at least three corners and
+/// every bar two, and the last corner of each is marked.
 #[derive(Debug, Clone, Copy)]
 pub struct Elements<'a> {
     pub(super) corners: &'a [Corner],
@@ -72,28 +73,29 @@ pub struct Elements<'a> {
 }
 
 impl<'a> Elements<'a> {
-    /// The elements that `corners` encode, of the first pen. Corners after the last mark are left out.
+    /// Makes the elements that `corners` encode, all with the first pen. Corners after the last
+    /// mark are ignored.
     pub fn new(corners: &'a [Corner]) -> Self {
         Self::with_pens(corners, Pens::default())
     }
 
-    /// The same with their pens.
+    /// As [`Elements::new`], with the pens of the elements.
     pub fn with_pens(corners: &'a [Corner], pens: Pens<'a>) -> Self {
         let whole = corners.iter().rposition(|corner| corner.is_last()).map_or(0, |last| last + 1);
         Self { corners: &corners[..whole], pens }
     }
 
-    /// Every corner of every element.
+    /// Returns every corner of every element.
     pub fn corners(&self) -> &'a [Corner] {
         self.corners
     }
 
-    /// The pens of the elements, by their corners.
+    /// Returns the pens of the elements, which are found by the index of a corner.
     pub fn pens(&self) -> Pens<'a> {
         self.pens
     }
 
-    /// Each element in turn.
+    /// Returns each element in turn.
     pub fn iter(&self) -> impl Iterator<Item = Element<'a>> + Clone + use<'a> {
         self.corners.split_inclusive(|corner| corner.is_last()).map(|corners| match corners {
             [a, b] if a.of_bar() => Element::Bar(a.vertex(), b.vertex()),
@@ -101,7 +103,7 @@ impl<'a> Elements<'a> {
         })
     }
 
-    /// Each element in turn with its pen.
+    /// Returns each element in turn, with its pen.
     pub fn iter_with_pens(&self) -> impl Iterator<Item = (Element<'a>, u8)> + use<'a> {
         let (pens, mut first) = (self.pens, 0);
         self.iter().map(move |element| {

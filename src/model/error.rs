@@ -1,67 +1,68 @@
-//! Why a model is not changed.
+//! The errors that leave a model unchanged.
 
 use super::ElementKind;
 use crate::curve::CurveError;
 use crate::stage::OutOfScratch;
 
-/// Why the model was not changed.
+/// The reasons why the model was not changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ModelError {
-    /// A coordinate is past ±2^30.
+    /// A coordinate is beyond ±2^30.
     CoordinateTooLarge,
     /// There is no room for another vertex.
     TooManyVertices {
-        /// How many there can be.
+        /// The greatest number of vertices.
         limit: usize,
     },
     /// There is no room for the corners of this element.
     TooManyCorners {
-        /// How many there can be.
+        /// The greatest number of corners.
         limit: usize,
-        /// How many there would have been.
+        /// The number of corners there would have been.
         needed: usize,
     },
     /// An element names a vertex that does not exist.
     UnknownVertex {
         /// The number as the user wrote it: from 1, or negative and counted from the last.
         number: i32,
-        /// How many vertices there are.
+        /// The number of vertices.
         vertices: usize,
     },
-    /// A face needs three corners, a bar two.
+    /// An element has too few corners: a face needs three, a bar two.
     TooFewCorners {
-        /// How many it needs.
+        /// The number of corners that it needs.
         needed: usize,
     },
-    /// The same vertex twice in a row, or at both ends.
+    /// A vertex occurs twice in a row, or at both ends of a face.
     RepeatedVertex {
-        /// The vertex, from 1.
+        /// The number of the vertex as the user wrote it.
         number: i32,
     },
-    /// A curve needs its degree first.
+    /// A curve begins before its degree was set.
     NoDegree,
-    /// The curve before has no end.
+    /// The curve before has not been completed.
     CurveUnfinished,
-    /// Knots or an end without a curve.
+    /// Knots or an end came without a curve.
     NoCurve,
-    /// A parameter or knot is past ±2^22.
+    /// A parameter or knot is beyond ±2^22.
     KnotTooLarge,
-    /// It is no curve.
+    /// The degree, the knots or the ends do not form a curve.
     Curve(CurveError),
     /// An edit names a bar, face or curve that does not exist.
     UnknownElement {
-        /// Which of them.
+        /// The kind of the element.
         part: ElementKind,
         /// The number as the user wrote it.
         number: i32,
-        /// How many there are.
+        /// The number of elements of this kind.
         count: usize,
     },
-    /// The three vertices of a plane are in line.
+    /// The three vertices that should define a plane are collinear.
     NoPlane,
-    /// More names than pens, or a pen past [`PEN_LIMIT`](super::PEN_LIMIT).
+    /// There are more names than pens, or a pen number is not below
+    /// [`PEN_LIMIT`](super::PEN_LIMIT).
     TooManyPens,
-    /// Not enough working memory for the edit.
+    /// There is not enough working memory for the edit.
     Scratch(OutOfScratch),
 }

@@ -1,9 +1,10 @@
-//! Vertices, bars, faces, curves: the thing that the user sent, and how it is edited.
+//! The model that the user sent: its vertices, bars, faces and curves, and the edits of them.
 //!
-//! A [`Model`] holds vertices in one array and faces and bars in another, in the order in which they
-//! came (Cárdenas & Seeley's joints and bars in two sequential arrays). It refuses what would break
-//! it (a face through a vertex that does not exist, more than fits) and is then as it was before. [`Model::edit`]
-//! changes it, [`Model::restore`] takes a change back.
+//! A [`Model`] holds vertices in one array and faces and bars in another, in the order in which
+//! they came (Cárdenas & Seeley's joints and bars in two sequential arrays). It refuses whatever
+//! would make it invalid, such as a face through a vertex that does not exist or more than fits in
+//! the memory; it is then unchanged. [`Model::edit`] changes it, and [`Model::restore`] undoes a
+//! change.
 
 mod checksum;
 mod curves;
@@ -27,7 +28,8 @@ use curves::CurveList;
 use pens::{PenBook, RUN};
 use precision::Rounding;
 
-/// A place in the model's own space: each coordinate × 2^-[`Model::fraction_bits`], |value| <= 2^30.
+/// A position in the model's own space. Each coordinate is in units of 2^-[`Model::fraction_bits`],
+/// and its absolute value is at most 2^30.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct Position {
@@ -40,46 +42,47 @@ pub struct Position {
 }
 
 impl Position {
-    /// The coordinates in order.
+    /// Returns the coordinates in order.
     pub fn coordinates(self) -> [i32; 3] {
         [self.x, self.y, self.z]
     }
 }
 
-/// Coordinates are stored within ± this, so that differences fit 32 bits.
+/// The limit of the absolute value of stored coordinates, so that their differences fit 32 bits.
 pub const POSITION_LIMIT: i32 = 1 << 30;
 
-/// The finest unit of a model, 2^-30, which holds |coordinate| <= 1.
+/// The finest unit of a model is 2^-30, with which |coordinate| is at most 1.
 const FINEST_FRACTION_BITS: u32 = 30;
 
-/// Who is shown the model just before it changes, and never when a change is refused: [`Model::save`] may
-/// copy it then.
+/// A callback that gets the model just before a change that will succeed, and is never called when
+/// a change is refused. It may copy the model with [`Model::save`].
 pub type Before<'b> = &'b mut dyn FnMut(&Model<'_>);
 
-/// For a [`Before`]: no copy is kept.
+/// A [`Before`] that does nothing: no copy is kept.
 pub fn unkept(_: &Model<'_>) {}
 
-/// The vertices, faces and bars that the user sent, in memory lent by the owner.
+/// The vertices, faces, bars and curves that the user sent, in memory lent by the owner.
 ///
-/// All coordinates share one binary unit. It begins at 2^-30 and grows when a larger coordinate
-/// comes, so that a model of any size keeps 30 bits of its largest coordinate.
+/// All coordinates share one binary unit. It is 2^-30 at first and becomes coarser when a larger
+/// coordinate comes, so that a model of any size keeps 30 bits of its largest coordinate.
 #[derive(Debug)]
 pub struct Model<'m> {
     vertices: &'m mut heapless::VecView<Position>,
-    /// The corners of elements, then their [`PenRun`]s, then curves.
+    /// The corners of the elements, followed by their [`PenRun`]s and by the curves.
     corners: &'m mut heapless::VecView<Corner>,
     fraction_bits: u32,
     rounding: Rounding,
     faces: usize,
     bars: usize,
     curves: CurveList,
-    /// How many [`PenRun`]s there are.
+    /// The number of [`PenRun`]s.
     runs: usize,
     pens: PenBook,
 }
 
 impl<'m> Model<'m> {
-    /// An empty model that can hold what the two vectors can; what they hold is forgotten.
+    /// Makes an empty model that can hold as much as the two vectors can. Their contents are
+    /// discarded.
     pub fn new(
         vertices: &'m mut heapless::VecView<Position>,
         corners: &'m mut heapless::VecView<Corner>,
@@ -99,7 +102,7 @@ impl<'m> Model<'m> {
         model
     }
 
-    /// Forgets everything.
+    /// Removes everything from the model.
     pub fn clear(&mut self) {
         self.vertices.clear();
         self.corners.clear();
@@ -112,39 +115,41 @@ impl<'m> Model<'m> {
         self.pens = PenBook::default();
     }
 
-    /// The vertices, in units of 2^-[`Model::fraction_bits`].
+    /// Returns the vertices, in units of 2^-[`Model::fraction_bits`].
     pub fn vertices(&self) -> &[Position] {
         self.vertices
     }
 
-    /// The unit of every coordinate is 2^-this, 0 to 30.
+    /// Returns the number of fraction bits, 0 to 30: the unit of every coordinate is 2^-this.
     pub fn fraction_bits(&self) -> u32 {
         self.fraction_bits
     }
 
-    /// The faces and bars.
+    /// Returns the faces and bars.
     pub fn elements(&self) -> Elements<'_> {
         let corners = self.corners.get(..self.elements_end()).unwrap_or(&[]);
         Elements { corners, pens: self.pens() }
     }
 
-    /// Where the corners of the elements end.
+    /// Returns the index at which the corners of the elements end.
     fn elements_end(&self) -> usize {
         self.curves.start - RUN * self.runs
     }
 
-    /// The pens of the elements.
+    /// Returns the pens of the elements.
     fn pens(&self) -> Pens<'_> {
         let runs = self.corners.get(self.elements_end()..self.curves.start).unwrap_or(&[]);
         Pens::new(bytemuck::cast_slice(runs))
     }
 
-    /// Chooses the pen of the elements and curves that follow, by `usemtl` or by `g`. Once `usemtl` has come, `g`
-    /// chooses no more, and what it chose before is the first pen's again.
+    /// Chooses the pen of the elements and curves that follow, by a `usemtl` or a `g` statement.
+    /// The first `usemtl` makes all `g` statements void: later ones are ignored, and elements whose
+    /// pen an earlier one chose get the first pen again.
     ///
     /// # Errors
     /// [`ModelError::TooManyPens`]; the model is unchanged.
-    #[inline(never)] // Its frame must not lie under the stages'.
+    // Not inlined, so that its stack frame is not below those of the stages.
+    #[inline(never)]
     pub fn choose_pen(
         &mut self,
         by_material: bool,
@@ -171,43 +176,44 @@ impl<'m> Model<'m> {
         Ok(())
     }
 
-    /// The curves.
+    /// Returns the curves.
     pub fn curves(&self) -> Curves<'_> {
         self.curves.curves(self.corners)
     }
 
-    /// How many faces there are.
+    /// Returns the number of faces.
     pub fn face_count(&self) -> usize {
         self.faces
     }
 
-    /// How many bars there are.
+    /// Returns the number of bars.
     pub fn bar_count(&self) -> usize {
         self.bars
     }
 
-    /// How many curves there are.
+    /// Returns the number of curves.
     pub fn curve_count(&self) -> usize {
         self.curves.count
     }
 
-    /// How many vertices there can be.
+    /// Returns the greatest number of vertices.
     pub fn vertex_limit(&self) -> usize {
         self.vertices.capacity().min(VERTEX_NUMBER_LIMIT)
     }
 
-    /// How many corners of elements there are; half-words of curves and changes of the pen count as such.
+    /// Returns the number of 16-bit units in use: corners of elements, and the half-words of curves
+    /// and of pen changes.
     pub fn corner_count(&self) -> usize {
         self.corners.len()
     }
 
-    /// How many corners there can be.
+    /// Returns the greatest number of these units.
     pub fn corner_limit(&self) -> usize {
         self.corners.capacity()
     }
 
-    /// Adds a vertex. Its coordinates are rounded towards zero to 30 bits of the model's largest, so
-    /// that equal coordinates stay equal whatever comes between them.
+    /// Adds a vertex. Its coordinates are rounded towards zero to 30 bits of the model's largest
+    /// coordinate, so that equal coordinates stay equal whatever comes between them.
     ///
     /// # Errors
     /// [`ModelError::TooManyVertices`], [`ModelError::CoordinateTooLarge`]; the model is unchanged.
@@ -224,7 +230,7 @@ impl<'m> Model<'m> {
         self.vertices.push(place).map_err(|_| ModelError::TooManyVertices { limit })
     }
 
-    /// A place in the model's unit, which grows if it must.
+    /// Converts coordinates to the model's unit, which is made coarser if necessary.
     fn place(
         &mut self,
         coordinates: [Decimal; 3],
@@ -241,7 +247,7 @@ impl<'m> Model<'m> {
             })
             .ok_or(ModelError::CoordinateTooLarge)?;
         let [x, y, z] = coordinates.map(|coordinate| {
-            // In range: the search above tried it.
+            // It is in range, because the search above tried it.
             coordinate
                 .to_binary_truncated(fraction_bits)
                 .ok()
@@ -266,9 +272,10 @@ impl<'m> Model<'m> {
         self.fraction_bits -= bits;
     }
 
-    /// Adds a face through vertices numbered as in OBJ: from 1, or from -1 for the last one.
+    /// Adds a face through vertices numbered as in OBJ: from 1, or from -1 backwards for the last
+    /// ones.
     ///
-    /// Corners repeated in a row are an error; the first corner repeated at the end too.
+    /// It is an error if a corner is repeated immediately, or if the last corner repeats the first.
     ///
     /// # Errors
     /// See [`ModelError`]; the model is unchanged.
@@ -316,7 +323,7 @@ impl<'m> Model<'m> {
         Ok(())
     }
 
-    /// How many numbers there are, if each names a vertex and differs from the one before.
+    /// Returns how many numbers there are, if each names a vertex and differs from the one before.
     fn check_numbers(
         &self,
         numbers: impl Iterator<Item = i32>,
@@ -350,12 +357,12 @@ impl<'m> Model<'m> {
         self.insert(Corner::new(vertex, of_bar, last))
     }
 
-    /// Adds a corner after those of the elements.
+    /// Inserts a corner after those of the elements.
     fn insert(&mut self, corner: Corner) -> Result<(), ModelError> {
         self.insert_half(self.elements_end(), corner.0)
     }
 
-    /// Adds a half-word before the curves.
+    /// Inserts a half-word at a position before the curves.
     fn insert_half(&mut self, at: usize, half: u16) -> Result<(), ModelError> {
         let limit = self.corner_limit();
         self.corners
@@ -366,7 +373,7 @@ impl<'m> Model<'m> {
         Ok(())
     }
 
-    /// Takes half-words out that stand before the curves.
+    /// Removes half-words that are before the curves.
     fn remove_halves(&mut self, gone: Range<usize>) {
         let count = self.corners.len();
         self.corners.copy_within(gone.end..count, gone.start);
@@ -374,12 +381,12 @@ impl<'m> Model<'m> {
         self.curves.start -= gone.len();
     }
 
-    /// How many half-words it takes that elements with this pen follow.
+    /// Returns how many half-words are needed so that elements with this pen can follow.
     fn run_for(&self, pen: u8) -> usize {
         if pen == self.pens().last() { 0 } else { RUN }
     }
 
-    /// Elements with this pen follow. There is room.
+    /// Records that elements with this pen follow. There must be room.
     fn begin_run(&mut self, pen: u8) {
         if pen != self.pens().last() {
             let first = self.elements_end() as u16; // the memory has fewer half-words than 2^16
@@ -398,7 +405,7 @@ impl<'m> Model<'m> {
         self.curves.set_degree(degree)
     }
 
-    /// Begins a curve between two knot values over control points numbered as in OBJ.
+    /// Begins a curve between two parameter values (`ends`) over control points numbered as in OBJ.
     ///
     /// # Errors
     /// See [`ModelError`]; the model is unchanged.
@@ -415,7 +422,7 @@ impl<'m> Model<'m> {
         self.curves.begin(self.corners, ends, numbers.filter_map(resolve), self.pens.current)
     }
 
-    /// Adds knots to the curve in hand.
+    /// Adds knots to the unfinished curve.
     ///
     /// # Errors
     /// See [`ModelError`]; the model is unchanged.
@@ -426,7 +433,7 @@ impl<'m> Model<'m> {
         self.curves.add_knots(self.corners, knots)
     }
 
-    /// Ends the curve in hand. If it is refused it is forgotten.
+    /// Completes the unfinished curve. If it is refused it is discarded.
     ///
     /// # Errors
     /// [`ModelError::NoCurve`], [`ModelError::KnotTooLarge`], [`ModelError::Curve`].
@@ -437,12 +444,13 @@ impl<'m> Model<'m> {
         Ok(())
     }
 
-    /// The vertex that an OBJ number means.
+    /// Returns the vertex that an OBJ number names.
     fn resolve(&self, number: i32) -> Option<u16> {
         resolve(number, self.vertices.len())
     }
 
-    /// The smallest box around all vertices: least and greatest of each coordinate; `None` if empty.
+    /// Returns the smallest box around all vertices (the least and the greatest of each
+    /// coordinate), or `None` if there are none.
     pub fn bounds(&self) -> Option<(Position, Position)> {
         let first = *self.vertices.first()?;
         Some(self.vertices.iter().fold((first, first), |(low, high), vertex| {
@@ -457,7 +465,7 @@ impl<'m> Model<'m> {
         }))
     }
 
-    /// Whether this is a plan: bars and curves only, all at one height.
+    /// Whether this is a plan: it has only bars and curves, and all vertices are at one height.
     pub fn is_plan(&self) -> bool {
         self.faces == 0
             && self.bars + self.curves.count > 0
@@ -465,7 +473,7 @@ impl<'m> Model<'m> {
     }
 }
 
-/// The vertex that an OBJ number means in a model with so many.
+/// Returns the vertex that an OBJ number names in a model with so many vertices.
 fn resolve(number: i32, vertices: usize) -> Option<u16> {
     let count = vertices as i64; // at most VERTEX_NUMBER_LIMIT
     let index = if number < 0 { count + i64::from(number) } else { i64::from(number) - 1 };

@@ -1,22 +1,23 @@
-//! Which pen draws each element.
+//! Stores which pen draws each element.
 //!
-//! Neighbours mostly have the same pen, so what is stored is where another one begins: a [`PenRun`] each, in the
-//! half-words after the corners. A model of one pen stores none. Pens are chosen by `usemtl` and `g`: a name with a
-//! number is that pen, any other takes the first pen that no name has. Of those names a hash is kept.
+//! Neighbouring elements mostly have the same pen. Therefore only the changes are stored, one
+//! [`PenRun`] for each, in the half-words after the corners. A model with one pen stores none. Pens
+//! are chosen by `usemtl` and `g`: a name with a number is the pen of that number, and any other
+//! name gets the first pen without a name. Of such a name a hash is kept.
 
 use super::ModelError;
 use crate::stage::{OutOfScratch, Scratch};
 use bytemuck::{Pod, Zeroable};
 use core::ops::Range;
 
-/// How many pens there are.
+/// The number of pens.
 pub const PEN_LIMIT: u8 = 32;
 
-/// From an element on, another pen than before.
+/// A change of the pen: the elements from this one on have another pen than those before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub struct PenRun {
-    /// The element's first corner.
+    /// The index of the element's first corner.
     first: u16,
     /// The pen, from 0.
     pen: u16,
@@ -28,13 +29,13 @@ impl PenRun {
     }
 }
 
-/// Half-words of a [`PenRun`].
+/// The number of half-words of a [`PenRun`].
 pub(super) const RUN: usize = 2;
 
-/// The pens of elements; the first pen has those before the first run.
+/// The pens of elements. Elements before the first run have the first pen.
 ///
-/// Guarantees, if they come from a model or a [`PenWriter`]: runs are in order, none is empty, each has another
-/// pen than the one before.
+/// If they come from a model or a [`PenWriter`], the runs are in order, none is empty, and each has
+/// another pen than the one before.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Pens<'a> {
     runs: &'a [PenRun],
@@ -45,25 +46,25 @@ impl<'a> Pens<'a> {
         Self { runs }
     }
 
-    /// The pen, from 0, of the element to which a corner belongs.
+    /// Returns the pen, from 0, of the element to which a corner belongs.
     #[inline]
     pub fn at(&self, corner: usize) -> u8 {
         let after = self.runs.partition_point(|run| usize::from(run.first) <= corner);
         after.checked_sub(1).and_then(|last| self.runs.get(last)).map_or(0, |run| run.pen as u8)
     }
 
-    /// How many times the pen changes.
+    /// Returns how many times the pen changes.
     pub fn changes(&self) -> usize {
         self.runs.len()
     }
 
-    /// The pen of the last element.
+    /// Returns the pen of the last element.
     pub(super) fn last(&self) -> u8 {
         self.runs.last().map_or(0, |run| run.pen as u8)
     }
 }
 
-/// Notes the pens of elements as they are written one after the other.
+/// Records the pens of elements while these are written one after the other.
 #[derive(Debug)]
 pub struct PenWriter<'a> {
     runs: &'a mut [PenRun],
@@ -71,7 +72,7 @@ pub struct PenWriter<'a> {
 }
 
 impl<'a> PenWriter<'a> {
-    /// For at most so many changes of the pen.
+    /// Makes a writer for at most so many changes of the pen.
     ///
     /// # Errors
     /// [`OutOfScratch`] if there is no room for them.
@@ -79,7 +80,8 @@ impl<'a> PenWriter<'a> {
         Ok(Self { runs: scratch.take(changes)?, count: 0 })
     }
 
-    /// An element with this first corner follows; corners only grow.
+    /// Records the pen of the next element, which begins at corner `first`. The first corners must
+    /// be in ascending order.
     pub fn element(&mut self, first: usize, pen: u8) {
         let last = Pens { runs: self.runs.get(..self.count).unwrap_or(&[]) }.last();
         if let Some(run) = self.runs.get_mut(self.count).filter(|_| pen != last) {
@@ -88,23 +90,24 @@ impl<'a> PenWriter<'a> {
         }
     }
 
-    /// The pens of all of them.
+    /// Returns the pens of all recorded elements.
     pub fn finish(self) -> Pens<'a> {
         let runs: &'a [PenRun] = self.runs;
         Pens { runs: runs.get(..self.count).unwrap_or(runs) }
     }
 }
 
-/// Takes the corners in `gone` out of the first `count` of `runs`, and returns how many runs are left.
-/// The last may be empty then.
+/// Removes the corners in `gone` from the first `count` of `runs`, and returns how many runs are
+/// left. The last of them may then be empty.
 pub(super) fn close_gap(runs: &mut [PenRun], count: usize, gone: Range<usize>) -> usize {
     let (mut kept, mut last) = (0usize, 0);
     for at in 0..count.min(runs.len()) {
         let PenRun { first, pen } = runs[at];
         let before = usize::from(first);
         let first =
-            if before >= gone.end { before - gone.len() } else { before.min(gone.start) } as u16; // it does not grow
-        // What an earlier run has lost wholly is this one's.
+            // It only becomes less, so it fits.
+            if before >= gone.end { before - gone.len() } else { before.min(gone.start) } as u16;
+        // If the run before has lost all its corners, this run replaces it.
         if kept > 0 && runs[kept - 1].first == first {
             kept -= 1;
             last = if kept > 0 { runs[kept - 1].pen } else { 0 };
@@ -117,8 +120,8 @@ pub(super) fn close_gap(runs: &mut [PenRun], count: usize, gone: Range<usize>) -
     kept
 }
 
-/// Puts `length` corners with `pen` where `at` is into the first `count` of `runs`, which have at least
-/// two more places, and returns how many runs there are then.
+/// Inserts `length` corners with `pen` at `at` into the first `count` of `runs`, which must have
+/// room for two more. Returns how many runs there are then.
 pub(super) fn open_gap(
     runs: &mut [PenRun],
     mut count: usize,
@@ -149,23 +152,23 @@ pub(super) fn open_gap(
     count
 }
 
-/// What `usemtl` or `g` names.
+/// The pen that a `usemtl` or `g` statement names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PenName {
-    /// A pen, from 0, below [`PEN_LIMIT`].
+    /// The number of a pen, from 0, below [`PEN_LIMIT`].
     Number(u8),
-    /// Anything else, by a hash.
+    /// The hash of any other name.
     Other(u32),
 }
 
-/// Which pen is chosen, and which names have which.
+/// The current pen, and the names of the pens.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct PenBook {
-    /// The hash of the name that has the pen, [`FREE`] or [`BY_NUMBER`].
+    /// For each pen the hash of its name, or [`FREE`] or [`BY_NUMBER`].
     pub(super) names: [u32; PEN_LIMIT as usize],
-    /// The pen of elements that follow.
+    /// The pen of the elements that follow.
     pub(super) current: u8,
-    /// Whether `usemtl` came: then `g` chooses no more.
+    /// Whether a `usemtl` statement has come. Then `g` statements are ignored.
     pub(super) by_material: bool,
 }
 
@@ -173,7 +176,7 @@ const FREE: u32 = 0;
 const BY_NUMBER: u32 = 1;
 
 impl PenBook {
-    /// Chooses the pen of a name.
+    /// Chooses the pen that a name stands for.
     ///
     /// # Errors
     /// [`ModelError::TooManyPens`]; nothing is changed.

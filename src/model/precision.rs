@@ -1,29 +1,32 @@
-//! How far the coordinates may be off: what was written rounded, and what every edit adds to that.
+//! Computes the error bound of the coordinates: the rounding of the numbers that were sent, and
+//! what each edit adds to it.
 
 use super::{FINEST_FRACTION_BITS, Model};
 use crate::fixed::Decimal;
 use crate::geometry::Precision;
 
-/// Numbers with fewer decimals are meant as they stand: `0.25`, or a grid of steps of 0.1.
+/// Numbers with fewer decimals than this are taken to be exact, such as `0.25`, or a grid in steps
+/// of 0.1.
 const FEWEST_ROUNDED: u32 = 3;
 
-/// What is known of the rounding of a model's coordinates.
+/// The facts about the rounding of a model's coordinates.
 ///
-/// The greatest number of decimals in the model counts, without zeros at the end: whether a modeller
-/// writes those zeros makes no difference. From three decimals on, the last one is taken to be
-/// rounded. Fewer are taken to be exact, and so are whole numbers.
+/// What counts is the greatest number of decimals in the model without zeros at the end, so it
+/// makes no difference whether a program writes those zeros. From three decimals on, the last one
+/// is taken to be rounded. Numbers with fewer decimals are taken to be exact, and so are whole
+/// numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct Rounding {
     /// The greatest number of decimals of the coordinates that were sent.
     decimals: u8,
-    /// Whether an error along one axis may since have been turned into all three.
+    /// Whether an edit may have turned an error along one axis into errors along all three.
     turned: bool,
-    /// What edits have made of the errors, in the model's unit.
+    /// The error bound after edits, in the model's unit.
     edited: u32,
 }
 
 impl Rounding {
-    /// Takes note of coordinates that were sent.
+    /// Takes into account coordinates that were sent.
     pub(super) fn write(&mut self, coordinates: &[Decimal]) {
         for coordinate in coordinates {
             let decimals = coordinate.decimals().min(u8::MAX.into()) as u8;
@@ -31,7 +34,7 @@ impl Rounding {
         }
     }
 
-    /// What each coordinate may be off, in units of 2^-`fraction_bits`.
+    /// Returns the error bound of each coordinate, in units of 2^-`fraction_bits`.
     fn precision(&self, fraction_bits: u32) -> Precision {
         let unit = u32::from(self.decimals > 0);
         let decimals = u32::from(self.decimals);
@@ -44,18 +47,19 @@ impl Rounding {
         Precision { written, unit: written.min(1) }
     }
 
-    /// As the unit grows by `bits`.
+    /// Updates the error bound when the unit becomes coarser by `bits`.
     pub(super) fn coarsen(&mut self, bits: u32) {
         if self.edited > 0 && bits > 0 {
             self.edited = (self.edited >> bits) + 2;
         }
     }
 
-    /// As coordinates are multiplied by a number, in units of 2^-30, and rounded if it is not whole.
+    /// Updates the error bound when coordinates are multiplied by a number in units of 2^-30, and
+    /// rounded if it is not whole. `all` tells whether all vertices are.
     pub(super) fn scale(&mut self, fraction_bits: u32, by: u64, is_whole: bool, all: bool) {
         const BITS: u32 = FINEST_FRACTION_BITS;
         let written = u64::from(self.precision(fraction_bits).written);
-        // Below 2^31 2^51; what is larger than the model is large enough.
+        // The product is below 2^31 2^51. An error larger than the model needs no exact value.
         let scaled = (u128::from(written) * u128::from(by)) >> BITS;
         let scaled = u32::try_from(scaled).unwrap_or(u32::MAX).min(1 << BITS);
         let more = u32::from(written > 0) + u32::from(!is_whole);
@@ -65,8 +69,9 @@ impl Rounding {
         self.edited = self.edited.max(scaled.saturating_add(more));
     }
 
-    /// As coordinates are turned. An error within a cube lies within the sphere around it, and stays
-    /// there however often it is turned: 7/4 is more than the square root of 3.
+    /// Updates the error bound when coordinates are rotated or reflected. An error within a cube
+    /// lies within the sphere around the cube, and stays there however often it is rotated: 7/4 is
+    /// more than the square root of 3.
     pub(super) fn turn(&mut self, fraction_bits: u32, all: bool) {
         const WHOLE: u64 = 1 << FINEST_FRACTION_BITS;
         let by = if self.turned { WHOLE } else { WHOLE / 4 * 7 };
@@ -74,20 +79,21 @@ impl Rounding {
         self.turned = true;
     }
 
-    /// The same as two numbers, to be kept.
+    /// Returns these facts as two numbers, to be stored.
     pub(super) fn numbers(&self) -> [usize; 2] {
         [usize::from(self.decimals) << 1 | usize::from(self.turned), self.edited as usize]
     }
 
-    /// What these numbers stand for.
+    /// Restores the facts from these numbers.
     pub(super) fn from_numbers([decimals, edited]: [u32; 2]) -> Self {
         Self { decimals: (decimals >> 1) as u8, turned: decimals & 1 != 0, edited }
     }
 }
 
 impl Model<'_> {
-    /// How far each coordinate may be off, in the model's unit: by half of the last decimal that was
-    /// written if there are three or more, and by what the unit and edits have added.
+    /// Returns the error bound of each coordinate, in the model's unit. It is half a unit of the
+    /// last decimal that was written if there are three or more, and what the rounding to the
+    /// model's unit and edits have added.
     ///
     /// ```
     /// use penup::fixed::Decimal;
@@ -105,8 +111,8 @@ impl Model<'_> {
         self.rounding.precision(self.fraction_bits)
     }
 
-    /// The precision where the user says how far coordinates may be off, in units of the model; zero
-    /// means that they are meant as they stand.
+    /// Returns the precision when the user states the error bound, as `chosen` in the model's own
+    /// coordinates. Zero means that the coordinates are exact.
     pub fn chosen_precision(&self, chosen: Decimal) -> Precision {
         let known = self.precision();
         let units = chosen.to_binary(self.fraction_bits).unwrap_or(i64::MAX);

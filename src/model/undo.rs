@@ -1,27 +1,28 @@
-//! The whole model in memory that is idle, to take back an edit.
+//! Copies the whole model to unused memory, so that an edit can be undone.
 
 use super::pens::PenBook;
 use super::precision::Rounding;
 use super::{Corner, Model, PEN_LIMIT, Position};
 use crate::stage::{Scratch, items};
 
-/// Numbers before the vertices.
+/// The number of 32-bit values stored before the vertices.
 const HEAD: usize = 13 + PEN_LIMIT as usize;
 
 impl Model<'_> {
-    /// Copies the model to `words`, without a curve that has no end yet. `false` if it does not fit.
+    /// Copies the model to `words`, without an unfinished curve. Returns `false` if it does not
+    /// fit.
     pub fn save(&self, words: &mut [u64]) -> bool {
         self.copy_to(Scratch::new(words)).is_some()
     }
 
-    /// How many words [`Model::save`] uses of those that it is given.
+    /// Returns how many of the words given to it [`Model::save`] uses.
     pub fn saved_words(&self) -> usize {
         let vertices = Scratch::bytes_for::<Position>(self.vertices.len());
         let corners = Scratch::bytes_for::<Corner>(self.whole_corners().len());
         (Scratch::bytes_for::<u32>(HEAD) + vertices + corners) / size_of::<u64>()
     }
 
-    /// Corners of elements and whole curves.
+    /// Returns the half-words of the elements, of the pens and of the completed curves.
     fn whole_corners(&self) -> &[Corner] {
         let end = self.curves.start + self.curves.whole();
         self.corners.get(..end).unwrap_or(self.corners)
@@ -55,9 +56,11 @@ impl Model<'_> {
         Some(())
     }
 
-    /// Makes the model what it was when [`Model::save`] copied it to `words`, which nobody has changed.
+    /// Restores the model that [`Model::save`] copied to `words`. The contents of `words` must be
+    /// unchanged since then.
     pub fn restore(&mut self, words: &[u64]) {
-        let _ = self.copy_from(words); // it fits where it was
+        // It always fits, because it was there before.
+        let _ = self.copy_from(words);
     }
 
     fn copy_from(&mut self, words: &[u64]) -> Option<()> {
