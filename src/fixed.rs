@@ -37,6 +37,7 @@ pub struct NotANumber;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OutOfRange;
 
+/// The mantissa of a [`Decimal`] stays below this limit.
 const MANTISSA_LIMIT: i64 = 1_000_000_000_000_000_000;
 
 impl Decimal {
@@ -199,11 +200,13 @@ impl Decimal {
     }
 }
 
+/// Parses the exponent of ten of a decimal.
 fn parse_power(text: &str) -> Result<i16, NotANumber> {
     let power: i16 = text.parse().map_err(|_| NotANumber)?;
     if (-9999..=9999).contains(&power) { Ok(power) } else { Err(NotANumber) }
 }
 
+/// Returns a power of ten, or `None` if it does not fit.
 fn power_of_ten(exponent: u16) -> Option<u128> {
     // 10^38 is the greatest power of ten below 2^128.
     (exponent <= 38).then(|| (0..exponent).fold(1, |power, _| 10 * power))
@@ -247,7 +250,7 @@ pub fn divide_down(dividend: i128, divisor: i128) -> i128 {
 ///
 /// The quotient is computed bit by bit. The compiler's own 128-bit division takes five times the
 /// flash, and more time if the quotient is short.
-#[inline(never)] // 128 bits by 128 are long.
+#[inline(never)] // The code of a 128-bit division is long.
 pub fn divide(dividend: u128, divisor: u128) -> u128 {
     if let (Ok(dividend), Ok(divisor)) = (u64::try_from(dividend), u64::try_from(divisor)) {
         return u128::from(dividend / divisor);
@@ -307,7 +310,8 @@ pub fn rest_of_periods(number: f64, period: f64) -> f64 {
 /// assert_eq!(sin_cos_degrees(1e15), sin_cos_degrees(280.0));
 /// ```
 pub fn sin_cos_degrees(degrees: f64) -> (f64, f64) {
-    let degrees = rest_of_periods(degrees, 360.0); // exact, so what follows is within 45 degrees
+    // The remainder is exact, so the angle to the nearest quarter turn is within 45 degrees.
+    let degrees = rest_of_periods(degrees, 360.0);
     let quarters = libm::round(degrees / 90.0);
     let radians = (degrees - 90.0 * quarters).to_radians();
     // The angle is at most π/4. Limiting it in terms of the bits that libm tests lets the compiler

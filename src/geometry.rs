@@ -107,7 +107,7 @@ impl EdgeParameter {
 }
 
 impl Ord for EdgeParameter {
-    #[inline(never)] // It is 128 bits wide.
+    #[inline(never)] // Its 128-bit arithmetic is long.
     fn cmp(&self, other: &Self) -> Ordering {
         let left = u128::from(self.numerator) * u128::from(other.denominator);
         let right = u128::from(other.numerator) * u128::from(self.denominator);
@@ -232,7 +232,7 @@ const WIDTHS: u128 = 64;
 /// assert!(!are_coplanar(near, exact));
 /// assert!(are_coplanar(near, Precision { written: 1, unit: 1 }));
 /// ```
-#[inline(never)] // It is 128 bits wide.
+#[inline(never)] // Its 128-bit arithmetic is long.
 pub fn are_coplanar(points: [[i32; 3]; 4], precision: Precision) -> bool {
     let [a, points @ ..] = points;
     let [u, v, w] = points.map(|to| difference(to, a));
@@ -265,7 +265,7 @@ pub fn are_coplanar(points: [[i32; 3]; 4], precision: Precision) -> bool {
 /// assert!(!are_in_line(points, Precision::default()));
 /// assert!(are_in_line(points, Precision { written: 1, unit: 1 }));
 /// ```
-#[inline(never)] // It is 128 bits wide.
+#[inline(never)] // Its 128-bit arithmetic is long.
 pub fn are_in_line(points: [[i32; 3]; 3], precision: Precision) -> bool {
     let [a, b, c] = points;
     let (u, v) = (difference(b, a), difference(c, a));
@@ -283,6 +283,7 @@ fn difference(to: [i32; 3], a: [i32; 3]) -> [i64; 3] {
     [0, 1, 2].map(|n| i64::from(to[n]) - i64::from(a[n]))
 }
 
+/// Returns the cross product of two vectors.
 fn cross(u: [i64; 3], v: [i64; 3]) -> [i128; 3] {
     let minor = |m: usize, n: usize| {
         i128::from(u[m]) * i128::from(v[n]) - i128::from(u[n]) * i128::from(v[m])
@@ -290,10 +291,12 @@ fn cross(u: [i64; 3], v: [i64; 3]) -> [i128; 3] {
     [minor(1, 2), minor(2, 0), minor(0, 1)]
 }
 
+/// Returns the largest absolute value of the components.
 fn largest(parts: [i64; 3]) -> u64 {
     parts.iter().fold(0, |most, part| most.max(part.unsigned_abs()))
 }
 
+/// Returns the determinant of the matrix with the rows a, b and c.
 fn determinant(a: Vertex, b: Vertex, c: Vertex) -> i64 {
     let minor =
         |p: i32, q: i32, r: i32, s: i32| i64::from(p) * i64::from(s) - i64::from(q) * i64::from(r);

@@ -150,6 +150,7 @@ struct Graph<'s> {
     /// The membership of each vertex. A vertex that is in no component and not on the outline has
     /// no edge.
     membership: &'s mut [Membership],
+    /// The number of vertices left out because an earlier one is at the same position.
     welded: usize,
 }
 
@@ -217,7 +218,8 @@ impl<'s> Graph<'s> {
                 .enclose(self.points, viewpoint, *number)
                 .map_err(|_| SolidError::EyeInside)?;
         }
-        // Its other corners need not be joined by the given edges: positions may be rounded.
+        // Only this corner is taken from the polygon. Its other corners need not be joined by the
+        // given edges, as positions may be rounded.
         let start = enclosing.corners()[0];
         let outline = enclosing.into_room();
         let mut count = 0;
@@ -328,6 +330,7 @@ impl<'s> Graph<'s> {
         Ok(())
     }
 
+    /// Iterates over the names of the components.
     fn component_names(&self) -> impl Iterator<Item = u16> {
         self.numbers.iter().copied().filter(|number| {
             self.membership[usize::from(*number)] == Membership::component(*number)
@@ -352,6 +355,7 @@ impl<'s> Graph<'s> {
         self.numbers.iter().all(|number| plane.height(self.point(*number)) <= 0)
     }
 
+    /// Returns the visibility of an edge.
     fn sight(&self, ends: [u16; 2], eye: Eye, outline: &[u16], visible: &[u8]) -> EdgeVisibility {
         let memberships = ends.map(|end| self.membership[usize::from(end)]);
         let is_visible = match memberships.map(Membership::component_name) {
@@ -420,6 +424,7 @@ impl<'s> Graph<'s> {
         })
     }
 
+    /// Hands the edges, each with its visibility, to the sink.
     fn hand_over(
         &self,
         sight: impl Fn([u16; 2]) -> EdgeVisibility,
@@ -527,7 +532,8 @@ mod tests {
         parts
     }
 
-    /// Figure 1 is known by its numbers alone; this solid has the same outline and matrix G*.
+    /// The paper gives Figure 1 only by its numbers; this solid has the same outline and the same
+    /// matrix G*.
     #[test]
     fn the_papers_example() {
         let points = [

@@ -38,7 +38,9 @@ const VERTICES_PER_CHECK: usize = 64;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct HullEdge {
+    /// The vertex at which the edge begins.
     pub(super) from: u16,
+    /// The vertex at which the edge ends.
     pub(super) to: u16,
     /// The face on the left, as seen from outside, or [`UNKNOWN`].
     pub(super) left: u16,
@@ -143,6 +145,7 @@ const fn most_edges(vertices: usize) -> usize {
     (3 * vertices).saturating_sub(6)
 }
 
+/// Returns the greatest possible number of faces, by the same formula.
 const fn most_faces(vertices: usize) -> usize {
     (2 * vertices).saturating_sub(4)
 }
@@ -281,6 +284,7 @@ impl<'s> FaceFinder<'s> {
         Ok(search)
     }
 
+    /// Makes the outline the perimeter.
     fn begin_with_outline(&mut self) {
         for number in 0..self.outline_count {
             self.perimeter[number] = number as u16; // fewer than there are vertices
@@ -289,6 +293,7 @@ impl<'s> FaceFinder<'s> {
         self.perimeter_count = self.outline_count;
     }
 
+    /// Finds the visible faces and then the hidden ones.
     fn find_all_faces(&mut self, cancel: &mut dyn Cancel) -> Result<(), SolidError> {
         while self.perimeter_count > 0 {
             self.find_face(0, cancel)?;
@@ -440,6 +445,7 @@ impl<'s> FaceFinder<'s> {
         }
     }
 
+    /// Removes a vertex that is not a corner of any face still to be found.
     fn drop_candidate(&mut self, number: u16) {
         let candidates = &self.candidates[..self.candidate_count];
         if let Some(at) = candidates.iter().position(|other| *other == number) {

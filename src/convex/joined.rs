@@ -119,7 +119,7 @@ impl<'s> Joining<'s> {
         Ok(())
     }
 
-    /// Whether one of the two faces might take in the other.
+    /// Whether one of the two faces at an edge might take in the other.
     fn is_almost_flat(&self, edge: &HullEdge, precision: Precision) -> bool {
         let (left, right) = (self.plane(edge.left), self.plane(edge.right));
         let near = |plane: u16, face: u16| {
@@ -138,6 +138,7 @@ impl<'s> Joining<'s> {
         are_coplanar([a, b, c, point], precision)
     }
 
+    /// Returns the largest of the faces that still have to be joined or kept.
     fn largest_undecided_face(&self) -> Option<u16> {
         self.joined
             .iter()
@@ -174,6 +175,7 @@ impl<'s> Joining<'s> {
         Ok(any)
     }
 
+    /// Whether all corners of a face may lie in the plane of the face `plane`.
     fn is_all_near(&self, face: u16, plane: u16, precision: Precision) -> bool {
         let near =
             |number: u16| self.is_near(plane, self.solid.points[usize::from(number)], precision);
@@ -258,10 +260,12 @@ impl<'s> Joining<'s> {
         Ok(summary)
     }
 
+    /// Whether the eye, moved as the precision requires, sees the face from outside.
     fn is_visible(&self, face: u16) -> bool {
         self.plane(face).height_of_eye(self.drawn_in) > 0
     }
 
+    /// Returns the visibility of the edge between two faces.
     fn sight(&self, left: u16, right: u16) -> EdgeVisibility {
         // A face that is neither visible nor turned away from the eye is edge-on.
         let edge_on = |face: u16| self.plane(face).height_of_eye(self.eye) >= 0;

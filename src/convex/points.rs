@@ -39,8 +39,11 @@ pub(super) fn drawn_in_eye(
 /// What a set of different points spans, with the numbers of points that prove it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Span {
+    /// All points lie on one line.
     Line,
+    /// All points lie in one plane; these three are not in line.
     Plane([u16; 3]),
+    /// The points span a solid; these four are not in one plane.
     Space([u16; 4]),
 }
 

@@ -120,6 +120,8 @@ impl Camera {
         Some(Self { sight: Pose::Turned { eye, angles }, lens })
     }
 
+    /// Returns the camera that looks from the direction `from` at `at` or at the middle of the
+    /// model.
     fn from_direction(
         model: &Model<'_>,
         from: Direction,
@@ -239,6 +241,7 @@ impl Axes {
     }
 }
 
+/// Returns the directions right, up and forward of an eye that looks from `eye` at `at`.
 fn towards(
     eye: Direction,
     at: Direction,

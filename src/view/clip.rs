@@ -32,7 +32,8 @@ pub struct Seen<'a> {
 /// # Errors
 /// [`StageError::Scratch`] if the vertices or the cut faces do not fit in the memory, and the error
 /// of `cancel` if the user cancels.
-#[inline(never)] // Its frame must not lie under the stages'.
+// Not inlined, so that its stack frame is released before the stages run.
+#[inline(never)]
 pub fn project_scene<'a>(
     view: &View,
     model: &'a Model<'_>,
@@ -86,6 +87,8 @@ pub fn distinct_edges<'a>(
     Ok(bytemuck::cast_slice(without_repeats(keys)))
 }
 
+/// Cuts off what is nearer than `near`: returns the vertices, with those of the cuts after them,
+/// and the elements that are left.
 fn cut<'a>(
     vertices: &[Vertex],
     elements: Elements<'_>,
@@ -170,6 +173,7 @@ fn cut<'a>(
     Ok((all, Elements::with_pens(corners, pens.finish())))
 }
 
+/// An edge, as the numbers of the vertices at its ends.
 #[derive(Clone, Copy)]
 struct Edge(u16, u16);
 
@@ -190,6 +194,7 @@ fn edges(element: Element<'_>) -> impl Iterator<Item = Edge> + Clone {
     face.iter().zip(nexts).map(|(a, b)| Edge(a.vertex(), b.vertex())).chain(bar)
 }
 
+/// Keeps each of the sorted numbers once.
 fn without_repeats(sorted: &mut [u32]) -> &[u32] {
     let mut kept = 0;
     for at in 0..sorted.len() {

@@ -20,6 +20,8 @@ pub struct Flattening<'f> {
 }
 
 impl Flattening<'_> {
+    /// Flattens the curves of the model. `points` are its vertices in view coordinates. `each`
+    /// receives the end of each chord, and whether a curve begins there.
     fn flatten(
         &self,
         view: &View,

@@ -120,7 +120,8 @@ impl View {
     ///
     /// # Errors
     /// See [`ViewError`].
-    #[inline(never)] // Its frame must not lie under the stages'.
+    // Not inlined, so that its stack frame is released before the stages run.
+    #[inline(never)]
     pub fn new(camera: &Camera, model: &Model<'_>) -> Result<Self, ViewError> {
         let Axes { directions, origin } = Axes::new(camera)?;
         let fraction_bits = model.fraction_bits();

@@ -23,12 +23,16 @@ pub const COARSE_BITS: u32 = 14;
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub struct CoarsePoint {
+    /// The coordinate to the right.
     pub x: u16,
+    /// The coordinate upwards.
     pub y: u16,
 }
 
 impl CoarsePoint {
+    /// The point with the least coordinates.
     pub const LOWEST: Self = Self { x: 0, y: 0 };
+    /// The point with the greatest coordinates.
     pub const HIGHEST: Self = Self { x: u16::MAX, y: u16::MAX };
 
     /// Returns the lower left corner of the rectangle around both points.
@@ -58,6 +62,7 @@ pub struct CoarseLine {
     y: i32,
     along_x: i32,
     along_y: i32,
+    /// The part of the error bound of a determinant that depends on the line alone.
     error_bound: i32,
 }
 
@@ -123,7 +128,9 @@ const TWO_DIVISIONS: usize = 1500;
 #[derive(Debug, Clone, Copy)]
 struct Mapping {
     projection: Projection,
+    /// The least x and y of all vertices on the page, in units of 2^-20.
     low: (i64, i64),
+    /// The number of bits by which x and y are shifted right to give coarse coordinates.
     shift: (u32, u32),
 }
 
@@ -175,7 +182,9 @@ fn fine(projection: Projection, vertex: Vertex) -> (i64, i64) {
 pub struct End {
     /// The number of the vertex at this end, or [`End::FREE`], which is the number of no vertex.
     pub number: u16,
+    /// The position in view coordinates.
     pub vertex: Vertex,
+    /// The position on the coarse grid.
     pub place: CoarsePoint,
 }
 
@@ -187,9 +196,13 @@ impl End {
 /// The vertices in view coordinates and on the coarse grid.
 #[derive(Debug, Clone, Copy)]
 pub struct CoarseProjection<'a> {
+    /// Whether the view is perspective or parallel.
     pub projection: Projection,
+    /// The view coordinates of each vertex.
     pub vertices: &'a [Vertex],
+    /// The position of each vertex on the coarse grid.
     pub places: &'a [CoarsePoint],
+    /// The positions in the model, as far as they are known.
     pub unrounded: Unrounded<'a>,
     mapping: Mapping,
 }
@@ -221,11 +234,13 @@ impl<'a> CoarseProjection<'a> {
         End { number: End::FREE, vertex, place: self.mapping.place(vertex) }
     }
 
+    /// Returns the view coordinates of a vertex.
     #[inline]
     pub fn vertex(&self, number: u16) -> Vertex {
         self.vertices[usize::from(number)]
     }
 
+    /// Returns the position of a vertex on the coarse grid.
     #[inline]
     pub fn place(&self, number: u16) -> CoarsePoint {
         self.places[usize::from(number)]

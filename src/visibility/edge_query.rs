@@ -17,10 +17,15 @@ use crate::model::Corner;
 
 /// Everything that the search needs to know about the scene.
 pub struct SceneIndex<'a> {
+    /// The vertices, in view coordinates and on the coarse grid.
     pub coarse_projection: CoarseProjection<'a>,
+    /// The corners of the elements.
     pub outlines: Outlines<'a>,
+    /// The triangles of the faces that no fan covers.
     pub ears: Ears<'a>,
+    /// The sides that represent their edges.
     pub chosen: ChosenSides<'a>,
+    /// The elements, nearest first.
     pub faces: Faces<'a>,
 }
 
@@ -79,7 +84,9 @@ impl SceneIndex<'_> {
 pub struct EdgeQuery {
     /// The side of a face that represents this edge; [`Self::NO_SIDE`] for a seam.
     pub side: usize,
+    /// The end at which the edge begins.
     pub p: End,
+    /// The end at which the edge stops.
     pub q: End,
     /// The depth of the nearer end.
     pub near: i32,
@@ -87,8 +94,11 @@ pub struct EdgeQuery {
     pub far: i32,
     /// The two triangles that pass through each other along it, if this is a seam.
     pub seam: Option<[[u16; 3]; 2]>,
+    /// The lower left corner of the rectangle around the edge on the coarse grid.
     low: CoarsePoint,
+    /// The upper right corner of that rectangle.
     high: CoarsePoint,
+    /// The line of the edge on the coarse grid.
     line: CoarseLine,
 }
 
@@ -102,6 +112,7 @@ type Side = (u16, u16);
 /// count as lying to the left.
 #[derive(Clone, Copy)]
 pub struct CrossedPolygon<'c> {
+    /// The numbers of the vertices of the polygon.
     corners: &'c [u16],
     /// One bit for each corner: whether it lies to the left of the line.
     pub left: u32,
@@ -266,12 +277,14 @@ impl EdgeQuery {
         self.pass_sides(around, face.first, corners, profile);
     }
 
+    /// Marks the parts of this edge that the triangles of a face hide.
     fn pass_triangles(&self, around: &SceneIndex<'_>, face: Face, profile: &mut Profile<'_>) {
         for triangle in around.triangles(face) {
             self.pass_triangle(&around.coarse_projection, &triangle, profile);
         }
     }
 
+    /// Marks the part of this edge that one triangle hides.
     fn pass_triangle(
         &self,
         coarse_projection: &CoarseProjection<'_>,

@@ -11,11 +11,14 @@ use crate::stage::Scratch;
 /// The corners of the elements. An element is addressed by the number of its first corner.
 #[derive(Debug, Clone, Copy)]
 pub struct Outlines<'a> {
+    /// The corners of all elements, one element after the other.
     pub corners: &'a [Corner],
+    /// The pen of each element, by corner number.
     pub pens: Pens<'a>,
 }
 
 impl<'a> Outlines<'a> {
+    /// Takes the corners and pens of the elements of a model.
     pub fn of(elements: Elements<'a>) -> Self {
         Self { corners: elements.corners(), pens: elements.pens() }
     }

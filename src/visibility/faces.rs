@@ -14,7 +14,9 @@ use crate::stage::{Scratch, heap_sort_by_key};
 /// the number of its first corner (16 bits).
 #[derive(Debug)]
 pub struct Faces<'a> {
+    /// The packed elements, sorted.
     order: &'a mut [u32],
+    /// The number of faces that have no area.
     degenerate: u32,
 }
 

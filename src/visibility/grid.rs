@@ -39,9 +39,12 @@ pub fn coarse_depth(z: i32) -> u16 {
 /// The cells and their lists of faces.
 #[derive(Debug)]
 pub struct Grid<'a> {
+    /// The division of the page into cells.
     shape: Shape,
     columns: usize,
+    /// The cells, row by row from the lower left.
     cells: &'a mut [Cell],
+    /// The lists of all cells: ranks of faces.
     entries: &'a mut [u16],
 }
 
@@ -97,6 +100,8 @@ impl<'a> Grid<'a> {
         Ok(Self { shape, columns: shape.columns(), cells: raster.cells(), entries })
     }
 
+    /// Returns what an edge meets in a cell if no point of the edge is nearer than the coarse depth
+    /// `near`.
     fn view(&self, cell: usize, near: u16) -> CellView<'_> {
         let begin = cell.checked_sub(1).map_or(0, |before| self.cells[before].end);
         let Cell { end, cover_depth, cover } = self.cells[cell];

@@ -44,6 +44,7 @@ impl EdgeInterval {
         }
     }
 
+    /// Whether the part has no length.
     fn is_empty(self) -> bool {
         matches!((self.from, self.to), (Some(from), Some(to)) if from >= to)
     }
@@ -53,7 +54,9 @@ impl EdgeInterval {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub struct ProfilePiece {
+    /// Where on the edge the piece begins.
     pub from: EdgeParameter,
+    /// The marks of the piece, see [`mark`]. The higher bits hold the ranks that `blocks` records.
     pub marks: u64,
 }
 
@@ -64,8 +67,10 @@ pub struct ProfilePiece {
 /// another window.
 #[derive(Debug)]
 pub struct Profile<'a> {
+    /// The memory for the pieces, the first `count` of which are in use.
     memory: &'a mut [ProfilePiece],
     count: usize,
+    /// Where on the edge the window ends.
     end: EdgeParameter,
 }
 

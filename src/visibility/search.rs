@@ -122,6 +122,7 @@ impl<'a> StretchFinder<'a> {
         Ok(())
     }
 
+    /// Finds the seams of the triangles of two faces and hands over their visible stretches.
     fn follow_seams_of(
         &mut self,
         one: usize,

@@ -147,7 +147,10 @@ pub fn areas(polygon: &mut dyn Iterator<Item = Vertex>) -> [i64; 3] {
 /// A coordinate plane, seen from the side from which a given face runs anticlockwise.
 #[derive(Debug, Clone, Copy)]
 struct Plane {
+    /// The axis at right angles to the plane: 0 for x, 1 for y, 2 for z.
     leans_to: usize,
+    /// Whether the plane is seen from the positive end of that axis (`false`) or from the negative
+    /// end.
     flipped: bool,
 }
 

@@ -62,7 +62,7 @@ impl<'a> Unrounded<'a> {
     }
 
     /// Whether the two faces that share an edge lie in one plane in the model.
-    #[inline(never)] // Only creases ask.
+    #[inline(never)] // Only the choice of creases calls it.
     pub(super) fn are_one_plane(&self, edge: [u16; 2], one: &[Corner], other: &[Corner]) -> bool {
         let [from, to] = edge;
         let is_off = |corner: &&Corner| !self.are_in_line(from, to, corner.vertex());
