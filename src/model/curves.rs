@@ -1,9 +1,9 @@
-//! The curves of a model, in the half-words that its faces and bars leave free.
+//! Stores the curves of a model, in the half-words that its faces and bars leave free.
 //!
-//! They come as OBJ writes them: `deg 3`, `curv u0 u1 i1 i2 …`, `parm u k1 k2 …` (none, or as many lines
-//! as it takes), `end`. Without `parm` the knots are 0, 1, 2, … Each curve lies in half-words: eight of
-//! header, its control points, its knots two to each if it has any of its own. They stand after the corners of
-//! the elements, and move up when another element comes.
+//! They arrive as in OBJ: `deg 3`, `curv u0 u1 i1 i2 …`, `parm u k1 k2 …` (no such line, or as many
+//! as needed), `end`. Without `parm` the knots are 0, 1, 2, … Each curve is stored in half-words: a
+//! header of eight, its control points, and two for each knot if it has knots of its own. The
+//! curves follow the corners of the elements, and are moved up when another element comes.
 
 use super::{Corner, ModelError};
 use crate::curve::{
@@ -16,30 +16,30 @@ use core::ops::Range;
 
 type Memory = heapless::VecView<Corner>;
 
-/// One stored curve.
+/// A stored curve.
 #[derive(Debug, Clone, Copy)]
 pub struct StoredCurve<'a> {
-    /// Degree + 1.
+    /// The degree plus 1.
     pub order: u8,
     /// The pen that draws it, from 0.
     pub pen: u8,
-    /// The numbers of its control points, from 0.
+    /// The vertex numbers of its control points, from 0.
     pub control: &'a [u16],
     /// Its knots.
     pub knots: Knots<'a>,
-    /// Where it begins.
+    /// The parameter at which it begins.
     pub from: Parameter,
-    /// Where it ends.
+    /// The parameter at which it ends.
     pub to: Parameter,
 }
 
 impl<'a> StoredCurve<'a> {
-    /// Half-words of the model's memory that it takes.
+    /// Returns how many half-words of the model's memory it takes.
     pub fn half_words(&self) -> usize {
         HEADER + self.control.len() + 2 * self.knots.count().unwrap_or(0)
     }
 
-    /// The curve over these points.
+    /// Returns the curve over these points.
     ///
     /// # Errors
     /// [`CurveError::UnknownPoint`] if `points` has not all of its control points.
@@ -49,16 +49,16 @@ impl<'a> StoredCurve<'a> {
     }
 }
 
-/// The whole curves of a model, in the order in which they came.
+/// The completed curves of a model, in the order in which they came.
 ///
-/// Guarantees, if they come from a model: every control point exists, every curve is one.
+/// If they come from a model, every control point exists and every curve is valid.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Curves<'a> {
     halves: &'a [u16],
 }
 
 impl<'a> Curves<'a> {
-    /// Each curve in turn.
+    /// Returns each curve in turn.
     pub fn iter(&self) -> impl Iterator<Item = StoredCurve<'a>> + Clone + use<'a> {
         let mut rest = self.halves;
         core::iter::from_fn(move || {
@@ -68,17 +68,19 @@ impl<'a> Curves<'a> {
         })
     }
 
-    /// Whether there are none.
+    /// Whether there are no curves.
     pub fn is_empty(&self) -> bool {
         self.halves.is_empty()
     }
 
-    /// Hands over the ends of the chords of the curves over `points`, and whether another curve begins
-    /// there; the chords leave the curves by `tolerance` at most: see [`Spline::chords`].
+    /// Calls `each` with the end of each chord of the curves over `points`, and with whether
+    /// another curve begins there. The chords deviate from the curves by at most `tolerance`: see
+    /// [`Spline::chords`].
     ///
     /// # Errors
     /// [`StageError::Aborted`], or what `each` returns.
-    #[inline(never)] // Its frame must not lie under the stages'.
+    // Not inlined, so that its stack frame is not below those of the stages.
+    #[inline(never)]
     pub fn flatten(
         &self,
         points: &[Point],
@@ -88,7 +90,7 @@ impl<'a> Curves<'a> {
         each: &mut dyn FnMut(Point, bool) -> Result<(), OutOfScratch>,
     ) -> Result<(), StageError> {
         for curve in self.iter() {
-            // A model's curves have all their points.
+            // All control points of a model's curves exist.
             let Ok(spline) = curve.spline(points) else { continue };
             let mut begins = true;
             for (_, end) in spline.chords(project, tolerance) {
@@ -101,48 +103,49 @@ impl<'a> Curves<'a> {
     }
 }
 
-/// Where the curves of a model stand in its memory.
+/// The position of the curves in the model's memory, and the state of the unfinished one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct CurveList {
-    /// Half-words before the first: the corners of the elements.
+    /// The number of half-words before the first curve: those of the elements and their pens.
     pub(super) start: usize,
-    /// Half-words of whole curves; those of the curve in hand follow.
+    /// The number of half-words of completed curves. Those of the unfinished curve follow.
     whole: usize,
     pub(super) count: usize,
     degree: Option<u8>,
     in_hand: Option<InHand>,
 }
 
-/// A curve whose `end` has not come.
+/// An unfinished curve: its `end` has not come yet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct InHand {
     order: u8,
     control_points: u16,
-    /// In units of 2^-[`FINEST`], |value| <= 2^44.
+    /// The two parameters of `curv`, in units of 2^-[`FINEST`], with |value| <= 2^44.
     ends: [i64; 2],
-    /// The unit of its knots is 2^-this; `None` while it has none of its own.
+    /// The number of fraction bits of its knots, or `None` while it has no knots of its own.
     fraction_bits: Option<u8>,
 }
 
-/// Half-words before the control points: how many control points, order, how many knots, pen, both ends.
+/// The number of half-words before the control points. They hold the number of control points, the
+/// order, the number of knots, the pen, and both ends.
 const HEADER: usize = 8;
-/// Which of them is the pen.
+/// The index of the pen in the header.
 const PEN: usize = 3;
 
-/// The finest unit of a knot, 2^-22, which holds |knot| <= 1.
+/// The finest unit of a knot is 2^-22, with which |knot| is at most 1.
 const FINEST: u32 = 22;
 
-/// Without knots of its own, a curve's ends are kept to 2^-16 of the distance between knots.
+/// If a curve has no knots of its own, its ends are kept to 2^-16 of the distance between knots.
 const UNIFORM_BITS: u32 = 16;
 
 impl CurveList {
-    /// The whole curves.
+    /// Returns the completed curves.
     pub(super) fn curves<'a>(&self, memory: &'a Memory) -> Curves<'a> {
         let halves = memory.get(self.start..self.start + self.whole).unwrap_or(&[]);
         Curves { halves: bytemuck::cast_slice(halves) }
     }
 
-    /// `deg`: the degree of the curves that follow, 1 to 5.
+    /// `deg`: sets the degree of the curves that follow, 1 to 5.
     pub(super) fn set_degree(&mut self, degree: u8) -> Result<(), ModelError> {
         if !(1..=5).contains(&degree) {
             return Err(ModelError::Curve(CurveError::Order));
@@ -151,7 +154,8 @@ impl CurveList {
         Ok(())
     }
 
-    /// `curv`: begins a curve between two `ends` over the points numbered `control`, from 0, which exist.
+    /// `curv`: begins a curve between two parameters over the points numbered `control`, from 0.
+    /// The points must exist.
     pub(super) fn begin(
         &mut self,
         memory: &mut Memory,
@@ -179,10 +183,10 @@ impl CurveList {
         Ok(())
     }
 
-    /// `parm u`: more knots of the curve in hand.
+    /// `parm u`: adds knots to the unfinished curve.
     ///
-    /// All share one binary unit, which grows when a larger knot comes; each keeps 22 bits of the
-    /// largest.
+    /// All knots share one binary unit, which becomes coarser when a larger knot comes. Each keeps
+    /// 22 bits of the largest.
     pub(super) fn add_knots(
         &mut self,
         memory: &mut Memory,
@@ -209,8 +213,8 @@ impl CurveList {
         Ok(())
     }
 
-    /// `end`: completes the curve in hand, which [`CurveList::count_in`] then makes one of the model's. If it is
-    /// refused it is forgotten.
+    /// `end`: completes the unfinished curve, which [`CurveList::count_in`] then adds to the model.
+    /// If it is refused it is discarded.
     pub(super) fn end(&mut self, memory: &mut Memory) -> Result<(), ModelError> {
         let in_hand = self.in_hand.take().ok_or(ModelError::NoCurve)?;
         let closed = self.close(memory, &in_hand);
@@ -220,13 +224,13 @@ impl CurveList {
         closed
     }
 
-    /// The memory up to `end` holds whole curves, one more than before.
+    /// Records that the memory up to `end` holds completed curves, one more than before.
     pub(super) fn count_in(&mut self, end: usize) {
         self.whole = end - self.start;
         self.count += 1;
     }
 
-    /// Checks the curve in hand and completes its header.
+    /// Checks the unfinished curve and completes its header.
     fn close(&self, memory: &mut Memory, in_hand: &InHand) -> Result<(), ModelError> {
         let InHand { order, control_points, .. } = *in_hand;
         let control_points = usize::from(control_points);
@@ -243,7 +247,7 @@ impl CurveList {
         check_shape(control_points, order, knots).map_err(ModelError::Curve)?;
         let shift = FINEST - bits - fraction_bits;
         let [from, to] = in_hand.ends.map(|end| (end + (1 << shift >> 1)) >> shift);
-        // The same number may be a unit apart as an end and as a knot that was rounded twice.
+        // The same number may differ by one unit as an end and as a knot that was rounded twice.
         let first = knots.get(usize::from(order) - 1) << fraction_bits;
         let last = knots.get(control_points) << fraction_bits;
         if from < first - 1 || to > last + 1 {
@@ -255,26 +259,28 @@ impl CurveList {
             [from, to].map(|u| parameter_of(control_points, order, knots, u, fraction_bits));
         let ends: [u16; 4] = bytemuck::cast([from.to_bits(), to.to_bits()]);
         if let [_, _, count, _, stored_ends @ ..] = header {
-            *count = knot_count as u16; // it fits: the memory has fewer half-words than vertex numbers
+            // It fits, because the memory has fewer half-words than there are vertex numbers.
+            *count = knot_count as u16;
             stored_ends.copy_from_slice(&ends);
         }
         Ok(())
     }
 
-    /// Whether a curve has no end yet.
+    /// Whether there is an unfinished curve.
     pub(super) fn is_in_hand(&self) -> bool {
         self.in_hand.is_some()
     }
 
-    /// Gives control points new numbers, as the model does with its vertices. A curve with a control
-    /// point that `new` maps to `None` goes.
+    /// Gives control points new numbers, as the model does with its vertices. A curve with a
+    /// control point for which `new` returns `None` is removed.
     pub(super) fn renumber(&mut self, memory: &mut Memory, new: &dyn Fn(u16) -> Option<u16>) {
         self.retain(memory, &mut |control| {
             control.iter_mut().all(|number| new(*number).inspect(|new| *number = *new).is_some())
         });
     }
 
-    /// Deletes the curves in `range`. With `plug` the last one takes the place of the first of them.
+    /// Deletes the curves in `range`. If `plug`, the last curve moves to the position of the first
+    /// of them.
     pub(super) fn delete(&mut self, memory: &mut Memory, range: Range<usize>, plug: bool) {
         let length =
             |number| self.curves(memory).iter().nth(number).map(|curve| curve.half_words());
@@ -294,7 +300,7 @@ impl CurveList {
         });
     }
 
-    /// Keeps the curves for which `stays` says so; it may change their control points.
+    /// Keeps the curves for which `stays` returns `true`; it may change their control points.
     fn retain(&mut self, memory: &mut Memory, stays: &mut dyn FnMut(&mut [u16]) -> bool) {
         let halves: &mut [u16] =
             bytemuck::cast_slice_mut(memory.get_mut(self.start..).unwrap_or(&mut []));
@@ -312,7 +318,8 @@ impl CurveList {
         (self.whole, self.count) = (write, kept);
     }
 
-    /// Adds a copy of each curve that `is_copied`, with new control points. There is room.
+    /// Adds a copy of each curve for which `is_copied` returns `true`, with new control points.
+    /// There must be room.
     pub(super) fn copy(
         &mut self,
         memory: &mut Memory,
@@ -339,25 +346,26 @@ impl CurveList {
         self.whole = memory.len() - self.start;
     }
 
-    /// All are the first pen's, the curve in hand too.
+    /// Gives all curves the first pen, including the unfinished one.
     pub(super) fn forget_pens(&mut self, memory: &mut Memory) {
         let mut at = self.start;
         while let Some(header) = memory.get_mut(at..).and_then(|rest| rest.get_mut(..HEADER)) {
             header[PEN] = Corner(0);
             match lengths(bytemuck::cast_slice(header)) {
-                // The count of knots of the curve in hand is not yet known: it is the last one.
+                // The header of the unfinished curve has no number of knots yet, but it is the last
+                // curve.
                 Some((length, _)) if at < self.start + self.whole => at += length,
                 _ => break,
             }
         }
     }
 
-    /// How many half-words of whole curves there are.
+    /// Returns the number of half-words of completed curves.
     pub(super) fn whole(&self) -> usize {
         self.whole
     }
 
-    /// So many curves in so many half-words after `start`, as they were once.
+    /// Restores `count` curves in `whole` half-words after `start`, as they once were.
     pub(super) fn restore(&mut self, start: usize, whole: usize, count: usize) {
         *self = Self { start, whole, count, degree: self.degree, in_hand: None };
     }
@@ -369,14 +377,14 @@ fn check_room(memory: &Memory, more: usize) -> Result<(), ModelError> {
     if needed > limit { Err(ModelError::TooManyCorners { limit, needed }) } else { Ok(()) }
 }
 
-/// How many half-words the first curve takes, and how many control points it has.
+/// Returns how many half-words the first curve takes, and how many control points it has.
 fn lengths(halves: &[u16]) -> Option<(usize, usize)> {
     let [control_points, _, knots, ..] = *halves else { return None };
     let control_points = usize::from(control_points);
     Some((HEADER + control_points + 2 * usize::from(knots), control_points))
 }
 
-/// The first curve, and the half-words after it.
+/// Returns the first curve, and the half-words after it.
 fn read(halves: &[u16]) -> Option<(StoredCurve<'_>, &[u16])> {
     let (length, control_points) = lengths(halves)?;
     let (curve, after) = halves.split_at_checked(length)?;
@@ -392,7 +400,7 @@ fn read(halves: &[u16]) -> Option<(StoredCurve<'_>, &[u16])> {
     Some((StoredCurve { order: order as u8, pen: pen as u8, control, knots, from, to }, after))
 }
 
-/// A knot in units of 2^-`fraction_bits`, if it fits.
+/// Returns a knot in units of 2^-`fraction_bits`, or `None` if it does not fit.
 fn in_unit(knot: Decimal, fraction_bits: u32) -> Option<i32> {
     let value = i32::try_from(knot.to_binary(fraction_bits).ok()?).ok()?;
     (value.unsigned_abs() <= KNOT_LIMIT.unsigned_abs()).then_some(value)

@@ -1,9 +1,11 @@
-//! The editor of Cárdenas & Seeley: sequential arrays of joints and bars, and of faces and curves.
+//! Edits a model, after Cárdenas & Seeley: sequential arrays of joints and bars, and here of faces
+//! and curves too.
 //!
-//! [`Model::edit`] does one [`Edit`]. Deletion closes the hole by compaction, so that all numbers above
-//! fall, or plugs it with the last element, so that only that one's number changes. What hangs on a
-//! deleted vertex goes too. Refused, and the model is as it was: numbers that do not exist, a plane
-//! through vertices in line, coordinates or a copy that do not fit.
+//! [`Model::edit`] makes one [`Edit`]. A deletion either closes the gap by compaction, so that all
+//! higher numbers decrease, or plugs it with the last element, so that only the number of that one
+//! changes. Elements that use a deleted vertex are deleted too. An edit is refused, and the model
+//! is unchanged, if numbers do not exist, if a plane is defined by collinear vertices, or if
+//! coordinates or a copy do not fit.
 
 use super::pens::{PenRun, RUN, close_gap, open_gap};
 use super::{Before, Corner, Model, ModelError, POSITION_LIMIT, Position};
@@ -11,74 +13,79 @@ use crate::fixed::{Decimal, divide_rounding, product, rest_of_periods, sin_cos_d
 use crate::stage::{OutOfScratch, Scratch};
 use core::ops::Range;
 
-/// The arrays of a model.
+/// The kinds of elements of a model, each with its own numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ElementKind {
-    /// Joints.
+    /// The vertices (joints).
     Vertices,
-    /// Bars.
+    /// The bars.
     Bars,
-    /// Faces.
+    /// The faces.
     Faces,
-    /// Curves.
+    /// The curves.
     Curves,
 }
 
-/// First and last number, from 1 or from -1 backwards; `None` for all.
+/// The first and the last number of a range, from 1, or from -1 backwards; `None` for all elements.
 pub type Numbers = Option<[i32; 2]>;
 
-/// One change. Numbers are those of OBJ: from 1, or from -1 for the last.
+/// A change of a model. Numbers are as in OBJ: from 1, or from -1 backwards for the last ones.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Edit {
-    /// Takes some out; the numbers above fall.
+    /// Deletes a range of elements; the higher numbers decrease.
     Delete(ElementKind, [i32; 2]),
-    /// Takes one out; the last takes its number.
+    /// Deletes one element; the last one gets its number.
     Plug(ElementKind, i32),
-    /// Moves a vertex to a place.
+    /// Moves a vertex to a position.
     Move(i32, [Decimal; 3]),
-    /// Adds to each coordinate.
+    /// Adds a vector to the vertices.
     Translate([Decimal; 3], Numbers),
     /// Multiplies each coordinate by its factor.
     Scale([Decimal; 3], Numbers),
-    /// Turns about an axis (0 to 2) through the origin by degrees, counter-clockwise seen against it.
+    /// Rotates about an axis (0 to 2) through the origin by an angle in degrees, counter-clockwise
+    /// as seen from the positive end of the axis.
     Rotate(u8, f64, Numbers),
-    /// Adds the image about the plane of three vertices; those on the plane are in both.
+    /// Adds the mirror image about the plane of three vertices. Vertices on the plane belong to
+    /// both halves.
     Mirror([i32; 3], Numbers),
-    /// Moves to the image about the plane of three vertices.
+    /// Replaces vertices by their mirror image about the plane of three vertices.
     Reflect([i32; 3], Numbers),
 }
 
-/// How many an edit added, or took away if negative.
+/// How many elements of each kind an edit added, or removed if negative.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Change {
-    /// Joints.
+    /// The change of the number of vertices (joints).
     pub vertices: i32,
-    /// Bars.
+    /// The change of the number of bars.
     pub bars: i32,
-    /// Faces.
+    /// The change of the number of faces.
     pub faces: i32,
-    /// Curves.
+    /// The change of the number of curves.
     pub curves: i32,
 }
 
-/// A matrix entry of 1 is 2^this.
+/// The number of fraction bits of a matrix entry.
 const UNIT_BITS: u32 = 30;
 
-/// Factors of scale stay within ± this.
+/// The limit of the absolute value of a scale factor, in units of 2^-[`UNIT_BITS`].
 const SCALE_LIMIT: i64 = 1 << (20 + UNIT_BITS);
 
-/// Of a normal: then a product with a difference of positions fits 64 bits.
+/// The number of bits of a normal's component. With it, a product with a difference of positions
+/// fits 64 bits.
 const NORMAL_BITS: u32 = 28;
 
-/// A vertex this near to its image, in units of the model, counts as on the plane: rounding.
+/// A vertex that differs from its image by at most this many units in each coordinate counts as on
+/// the plane, because of rounding.
 const ON_PLANE: u64 = 16;
 
-/// A map of positions.
+/// A map of positions to positions.
 enum Map {
-    /// Rows of a matrix in units of 2^-[`UNIT_BITS`], and what is added.
+    /// The rows of a matrix in units of 2^-[`UNIT_BITS`], and the vector that is added.
     Affine([[i64; 3]; 3], [i64; 3]),
-    /// About the plane through a position with this normal, each component within ±2^[`NORMAL_BITS`].
+    /// The reflection about the plane through a position with this normal, each component within
+    /// ±2^[`NORMAL_BITS`].
     Reflection(Position, [i64; 3]),
 }
 
@@ -89,7 +96,7 @@ impl Map {
         [0, 1, 2].map(|row| [0, 1, 2].map(|column| if row == column { entries[row] } else { 0 }))
     }
 
-    /// Counter-clockwise about an axis, seen from its far end.
+    /// Makes the rotation about an axis, counter-clockwise as seen from its positive end.
     fn rotation(axis: u8, degrees: f64) -> Self {
         let entry = |value: f64| libm::round(libm::ldexp(value, UNIT_BITS as i32)) as i64;
         let (sine, cosine) = sin_cos_degrees(degrees);
@@ -102,8 +109,9 @@ impl Map {
         Self::Affine(rows, Self::NO_SHIFT)
     }
 
-    /// Where a position goes, rounded; kept within ±2^62.
-    #[inline(never)] // Once is enough: it is 128 bits wide.
+    /// Returns the image of a position, rounded and limited to ±2^62.
+    // Not inlined, so that its 128-bit arithmetic is in the program only once.
+    #[inline(never)]
     fn apply(&self, position: Position) -> [i64; 3] {
         let p = position.coordinates().map(i64::from);
         match self {
@@ -114,7 +122,7 @@ impl Map {
             }),
             Self::Reflection(on_plane, n) => {
                 let q = on_plane.coordinates().map(i64::from);
-                // Below 3 2^31 2^28.
+                // The sum is below 3 2^31 2^28.
                 let height: i64 = (0..3).map(|k| (p[k] - q[k]) * n[k]).sum();
                 let square: i64 = n.iter().map(|c| c * c).sum();
                 [0, 1, 2].map(|k: usize| {
@@ -132,7 +140,8 @@ fn within(value: i128) -> i64 {
 }
 
 impl Model<'_> {
-    /// Does one change. `scratch`: 2 bytes for each vertex. `keep` is shown the model before it changes.
+    /// Makes one change. `scratch` must have 2 bytes for each vertex that is mirrored. `keep` is
+    /// called with the model just before it changes.
     ///
     /// # Errors
     /// See [`ModelError`]; the model is unchanged.
@@ -155,7 +164,7 @@ impl Model<'_> {
             Edit::Plug(part, number) => {
                 let range = self.range(part, Some([number; 2]))?;
                 if self.runs > 0 && matches!(part, ElementKind::Bars | ElementKind::Faces) {
-                    // The pen may change before and after the element that comes there.
+                    // The pen may change before and after the element that is moved.
                     self.check_corners(2 * RUN)?;
                 }
                 keep(self);
@@ -221,13 +230,14 @@ impl Model<'_> {
         Ok(Change { vertices, bars, faces, curves })
     }
 
-    /// The errors of the vertices in `range` were multiplied, in units of 2^-30.
+    /// Updates the error bound after the vertices in `range` were multiplied by a factor in units
+    /// of 2^-30.
     fn scale_errors(&mut self, by: u64, is_whole: bool, range: &Range<usize>) {
         let all = range.len() == self.vertices.len();
         self.rounding.scale(self.fraction_bits, by, is_whole, all);
     }
 
-    /// The errors of the vertices in `range` were turned.
+    /// Updates the error bound after the vertices in `range` were rotated or reflected.
     fn turn_errors(&mut self, range: &Range<usize>) {
         let all = range.len() == self.vertices.len();
         self.rounding.turn(self.fraction_bits, all);
@@ -238,7 +248,7 @@ impl Model<'_> {
             .map(|part| self.count(part))
     }
 
-    /// How many there are.
+    /// Returns the number of elements of a kind.
     pub fn count(&self, part: ElementKind) -> usize {
         match part {
             ElementKind::Vertices => self.vertices.len(),
@@ -248,7 +258,8 @@ impl Model<'_> {
         }
     }
 
-    /// The indices of the elements with these numbers; never empty but for `None` of nothing.
+    /// Returns the indices of the elements with these numbers. The range is empty only if `numbers`
+    /// is `None` and there are no elements.
     ///
     /// # Errors
     /// [`ModelError::UnknownVertex`], [`ModelError::UnknownElement`].
@@ -298,10 +309,10 @@ impl Model<'_> {
         }
     }
 
-    /// Deletes those of the bars, or faces, whose places among them are in `range`.
+    /// Deletes the bars, or faces, whose positions among their kind are in `range`.
     fn delete_elements(&mut self, bars: bool, range: Range<usize>, plug: bool) {
         if plug {
-            // The last one before the one that goes.
+            // Move the last element to just before the one that is deleted.
             let end = self.elements_end();
             let corners = self.corners.get_mut(..end).unwrap_or(&mut []);
             let (mut at, mut number, mut hole) = (0, 0, 0);
@@ -326,7 +337,7 @@ impl Model<'_> {
         self.keep_elements(bars, range);
     }
 
-    /// Takes out those of the bars, or faces, whose places among them are in `gone`.
+    /// Removes the bars, or faces, whose positions among their kind are in `gone`.
     fn keep_elements(&mut self, bars: bool, gone: Range<usize>) {
         let mut number = 0;
         self.retain(&mut |element| {
@@ -336,7 +347,8 @@ impl Model<'_> {
         });
     }
 
-    /// Gives every corner and control point its new number. What has one that maps to `None` goes.
+    /// Gives every corner and control point its new number. Elements and curves with a vertex for
+    /// which `new` returns `None` are removed.
     fn renumber(&mut self, new: &dyn Fn(u16) -> Option<u16>) {
         self.retain(&mut |element| {
             element.iter_mut().all(|corner| match new(corner.vertex()) {
@@ -350,7 +362,7 @@ impl Model<'_> {
         self.curves.renumber(self.corners, new);
     }
 
-    /// Keeps the elements for which `stays` says so; it may change them.
+    /// Keeps the elements for which `stays` returns `true`; it may change them.
     fn retain(&mut self, stays: &mut dyn FnMut(&mut [Corner]) -> bool) {
         let (end, mut runs) = (self.elements_end(), self.runs);
         let (mut read, mut write, mut bars, mut faces) = (0, 0, 0, 0);
@@ -372,7 +384,8 @@ impl Model<'_> {
         (self.bars, self.faces) = (bars, faces);
     }
 
-    /// The corners in `from` were moved to `to`, before them: so is their pen. There is room for two more runs.
+    /// Updates the pens after the corners in `from` were moved to `to`, which is before them. There
+    /// must be room for two more runs.
     fn move_pen(&mut self, from: Range<usize>, to: usize) {
         if self.runs == 0 {
             return;
@@ -388,17 +401,17 @@ impl Model<'_> {
         self.set_runs(end, count, end);
     }
 
-    /// So many of the runs after `start` are left, of elements up to `end`.
+    /// Keeps `count` of the runs after `start`, which belong to elements up to `end`.
     fn set_runs(&mut self, start: usize, count: usize, end: usize) {
         let list = self.corners.get(start..self.curves.start).unwrap_or(&[]);
         let runs: &[PenRun] = bytemuck::cast_slice(list);
-        // One that begins at the end is empty.
+        // A run that begins at the end is empty.
         let is_empty = count > 0 && runs.get(count - 1).is_some_and(|run| run.begins_at(end));
         self.runs = count - usize::from(is_empty);
         self.remove_halves(start + RUN * self.runs..self.curves.start);
     }
 
-    /// The reflection about the plane of three vertices.
+    /// Returns the reflection about the plane of three vertices.
     fn reflection(&self, numbers: [i32; 3]) -> Result<Map, ModelError> {
         let vertices = self.vertices.len();
         let mut corners = [Position::default(); 3];
@@ -413,7 +426,7 @@ impl Model<'_> {
             [b, c].map(|end| [0, 1, 2].map(|k: usize| i64::from(end[k]) - i64::from(a[k])));
         let cross = [0, 1, 2].map(|k: usize| {
             let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-            // At most 2^63.
+            // Each component is at most 2^63.
             (u[i] * v[j]).saturating_sub(u[j] * v[i])
         });
         let divisor = cross.iter().fold(0, |divisor, part| gcd(divisor, part.unsigned_abs()));
@@ -427,7 +440,7 @@ impl Model<'_> {
         Ok(Map::Reflection(corners[0], normal.map(|part| part >> excess)))
     }
 
-    /// Takes some vertices through a map, in a coarser unit if it must be.
+    /// Maps the vertices in `range`, and makes the unit coarser if necessary.
     fn transform(
         &mut self,
         map: &Map,
@@ -444,7 +457,7 @@ impl Model<'_> {
         Ok(())
     }
 
-    /// By how many bits the unit must grow so that these positions fit.
+    /// Returns by how many bits the unit must become coarser so that these positions fit.
     fn coarser_for(&self, positions: impl Iterator<Item = [i64; 3]>) -> Result<u32, ModelError> {
         let largest = positions.flatten().map(i64::unsigned_abs).max().unwrap_or(0);
         (0..=self.fraction_bits)
@@ -452,7 +465,7 @@ impl Model<'_> {
             .ok_or(ModelError::CoordinateTooLarge)
     }
 
-    /// All but `range` to a coarser unit.
+    /// Converts all vertices except those in `range` to a unit that is coarser by `bits`.
     fn coarsen_others(&mut self, bits: u32, range: Range<usize>) {
         if bits > 0 {
             for (at, position) in self.vertices.iter_mut().enumerate() {
@@ -465,7 +478,8 @@ impl Model<'_> {
         }
     }
 
-    /// Turns faces round that have all their vertices in `range`, so that they face outwards again.
+    /// Reverses the faces that have all their vertices in `range`, so that they face outwards
+    /// again.
     fn turn_faces(&mut self, range: &Range<usize>) {
         self.retain(&mut |element| {
             let inside = element.iter().all(|corner| range.contains(&usize::from(corner.vertex())));
@@ -476,7 +490,8 @@ impl Model<'_> {
         });
     }
 
-    /// Adds the image of the vertices in `range` and of what has all its vertices there.
+    /// Adds the image of the vertices in `range`, and of the elements and curves that have all
+    /// their vertices there.
     fn mirror(
         &mut self,
         map: &Map,
@@ -491,7 +506,7 @@ impl Model<'_> {
             let Some(position) = self.vertices.get(at) else { continue };
             let near = |(image, c): (i64, i32)| (image - i64::from(c)).unsigned_abs() <= ON_PLANE;
             let stays = map.apply(*position).into_iter().zip(position.coordinates()).all(near);
-            // Below VERTEX_NUMBER_LIMIT, or refused below.
+            // The number is below VERTEX_NUMBER_LIMIT, otherwise the edit is refused below.
             *image = if stays { at } else { count } as u16;
             count += usize::from(!stays);
         }
@@ -502,7 +517,7 @@ impl Model<'_> {
             let at = usize::from(number).checked_sub(range.start)?;
             images.get(at).copied()
         };
-        // What lies in the plane is its own image.
+        // What lies in the plane is its own image and is not copied.
         let is_copied = |mut numbers: &mut dyn Iterator<Item = u16>| {
             let mut moves = false;
             Iterator::all(&mut numbers, |number| {
@@ -533,7 +548,7 @@ impl Model<'_> {
             let Some(position) = self.vertices.get(at) else { continue };
             if image(at as u16) != Some(at as u16) {
                 let position = in_unit(map.apply(*position), coarser);
-                // There is room: it was counted.
+                // There is room, because it was counted.
                 let _ = self.vertices.push(position);
             }
         }
@@ -569,12 +584,12 @@ impl Model<'_> {
     }
 }
 
-/// The corners of the first element.
+/// Returns the number of corners of the first element.
 fn element_length(corners: &[Corner]) -> Option<usize> {
     corners.iter().position(|corner| corner.is_last()).map(|last| last + 1)
 }
 
-/// The other way round, beginning at the same vertex.
+/// Reverses the order of a face's corners, beginning at the same vertex.
 fn reverse(face: &mut [Corner]) {
     let Some((_, rest)) = face.split_first_mut() else { return };
     rest.reverse();
@@ -584,7 +599,8 @@ fn reverse(face: &mut [Corner]) {
     }
 }
 
-/// Towards zero, as when the unit grows.
+/// Converts a position to a coarser unit. It is rounded towards zero, as when the unit of the model
+/// changes.
 fn in_unit(position: [i64; 3], coarser: u32) -> Position {
     // It fits: see `coarser_for`.
     let [x, y, z] = position.map(|c| ((c.abs() >> coarser) * c.signum()) as i32);
