@@ -1,10 +1,10 @@
-//! Random scenes that are seen through a real camera from a generic eye point: houses with windows,
-//! boxes that overlap, boxes that touch.
+//! Random scenes, seen through a real camera from a generic eye point: houses with windows, boxes
+//! that overlap, boxes that touch.
 //!
-//! Each scene is made on a grid of whole numbers, where it is decided exactly what lies in one plane.
-//! Then it is written as a file would be: as whole numbers, with one or two decimals, or turned in
-//! space by a rational rotation and rounded to four or more decimals. The library reads those texts,
-//! so it sees numbers that were rounded, as any modeller rounds them.
+//! Each scene is made on a grid of whole numbers, on which coplanarity is decided exactly. It is
+//! then written as a file would be: as whole numbers, with one or two decimals, or rotated in space
+//! by a rational rotation and rounded to four or more decimals. The library reads these texts, so
+//! it sees rounded numbers such as any modeller writes.
 
 use crate::random_scenes::Random;
 use penup::fixed::Decimal;
@@ -16,33 +16,33 @@ use penup::view::{Camera, Lens, Pose, View, project_scene};
 /// A point of the grid.
 pub type Place = [i32; 3];
 
-/// How many kinds of scenes there are; the seed modulo this chooses.
+/// The number of kinds of scenes; the seed modulo this number chooses one.
 pub const KINDS: u64 = 5;
 
-/// A scene on the grid, and the same in view coordinates.
+/// A scene on the grid and in view coordinates.
 #[derive(Debug, Clone)]
 pub struct CameraScene {
-    /// Where each vertex lies on the grid, before anything was rounded.
+    /// The exact position of each vertex on the grid, before any rounding.
     pub grid: Vec<Place>,
-    /// The `v` lines as a file has them.
+    /// The coordinates of the `v` lines as a file contains them.
     pub texts: Vec<[String; 3]>,
-    /// Corners of each face, as numbers of vertices from 0.
+    /// The corners of each face, as indices of vertices from 0.
     pub faces: Vec<Vec<usize>>,
-    /// What the camera made of the vertices.
+    /// The vertices in view coordinates.
     pub vertices: Vec<Vertex>,
-    /// The faces as the library welded them.
+    /// The corners of the faces after the library welded the vertices.
     pub corners: Vec<Corner>,
     /// The vertices in the model's unit.
     pub positions: Vec<[i32; 3]>,
-    /// How far those may be off.
+    /// The error bound of these positions.
     pub precision: Precision,
-    /// Twice what a view coordinate may be off.
+    /// Twice the error bound of a view coordinate.
     pub doubt: u32,
-    /// Perspective or parallel.
+    /// The kind of projection.
     pub projection: Projection,
 }
 
-/// Faces between places of the grid.
+/// Collects faces between points of the grid.
 #[derive(Debug, Default)]
 struct Builder {
     grid: Vec<Place>,
@@ -69,7 +69,8 @@ impl Builder {
         }
     }
 
-    /// A rectangle with sides along `u` and `v` in the plane through `origin`, its lengths in parts.
+    /// Adds a rectangle with sides along `u` and `v` in the plane through `origin`. `from` and `to`
+    /// are its corners as fractions of these vectors.
     fn add_window(&mut self, origin: Place, u: Place, v: Place, from: [i32; 2], to: [i32; 2]) {
         let at =
             |i: i32, j: i32| [0, 1, 2].map(|axis: usize| origin[axis] + u[axis] * i + v[axis] * j);
@@ -79,13 +80,13 @@ impl Builder {
     }
 }
 
-/// Two different numbers from 0 to `most`, in order.
+/// Two different numbers from 0 to `most` in increasing order.
 fn span(random: &mut Random, most: i32) -> [i32; 2] {
     let from = random.between(0, most - 1);
     [from, random.between(from + 1, most)]
 }
 
-/// A house with a gabled roof, and windows as faces in its walls and in its roof.
+/// Adds a house with a gabled roof, and windows as faces in its walls and in its roof.
 fn house(random: &mut Random, builder: &mut Builder) {
     let (length, width, height, rise) = (
         16 * random.between(3, 9),
@@ -131,7 +132,7 @@ fn house(random: &mut Random, builder: &mut Builder) {
         };
         builder.add_window(origin, u, v, [i[0], j[0]], [i[1], j[1]]);
     }
-    // A chimney that passes through the roof, or a porch that stands against the wall.
+    // Some houses have a chimney that passes through the roof, or a porch against the wall.
     match random.between(0, 3) {
         0 => {
             let (x, y) = (random.between(1, length - 9), random.between(1, width - 9));
@@ -207,7 +208,7 @@ fn fill(random: &mut Random, builder: &mut Builder, kind: u64) {
     }
 }
 
-/// A whole number divided by another, written with so many decimals.
+/// Writes the quotient of two whole numbers with this number of decimals.
 fn text(numerator: i64, denominator: i64, decimals: u32) -> String {
     let power = 10i64.pow(decimals);
     let scaled = (2 * numerator.abs() * power + denominator) / (2 * denominator);
@@ -217,11 +218,12 @@ fn text(numerator: i64, denominator: i64, decimals: u32) -> String {
     }
     let width = decimals as usize;
     let text = format!("{sign}{}.{:0width$}", scaled / power, scaled % power);
-    // As some modellers do, and others do not: the answer must not change.
+    // Some modellers omit trailing zeros and others do not; the result must be the same.
     if scaled % 3 == 0 { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
-/// The rows of a rotation times their common divisor, and the divisor (Euler, Rodrigues).
+/// A random rational rotation: the rows times their common divisor, and the divisor (Euler,
+/// Rodrigues).
 fn rotation(random: &mut Random) -> ([[i64; 3]; 3], i64) {
     let [a, b, c, d] = [0; 4].map(|_| i64::from(random.between(-9, 9)));
     let norm = a * a + b * b + c * c + d * d;
@@ -236,14 +238,14 @@ fn rotation(random: &mut Random) -> ([[i64; 3]; 3], i64) {
     (rows, norm)
 }
 
-/// The coordinates of the `v` lines.
+/// Writes the coordinates of the `v` lines.
 fn write(random: &mut Random, grid: &[Place]) -> Vec<[String; 3]> {
     let upright = ([[1, 0, 0], [0, 1, 0], [0, 0, 1]], 1);
     let (divisor, decimals, (rows, norm)) = match random.between(0, 5) {
         0 => (1, 0, upright),
         1 => (10, 1, upright),
         2 => (100, 2, upright),
-        // Sixteen units of the grid are one of the model.
+        // Sixteen units of the grid are one unit of the model.
         3 => (16, random.between(4, 7) as u32, rotation(random)),
         _ => (16, 6, rotation(random)),
     };
@@ -257,7 +259,7 @@ fn write(random: &mut Random, grid: &[Place]) -> Vec<[String; 3]> {
         .collect()
 }
 
-/// A direction of length 1, more or less: anywhere, and never along an axis.
+/// A random direction of approximately length 1, which is never parallel to an axis.
 fn direction(random: &mut Random) -> [f64; 3] {
     loop {
         let at = [0; 3].map(|_| f64::from(random.between(-99_991, 99_991)) / 100_003.0);
@@ -268,10 +270,10 @@ fn direction(random: &mut Random) -> [f64; 3] {
     }
 }
 
-/// The scene of a seed, read and seen by the library.
+/// Generates the scene of a seed and lets the library read and project it.
 ///
 /// # Panics
-/// If the library refuses the scene.
+/// Panics if the library refuses the scene.
 pub fn camera_scene(seed: u64) -> CameraScene {
     let mut random = Random::new(seed ^ 0x0CA3_E2A5);
     let random = &mut random;

@@ -1,7 +1,8 @@
-//! A convex solid by brute force: every plane through three vertices, every side of every face.
+//! A reference model of a convex solid by brute force: it tests every plane through three vertices
+//! and every side of every face.
 //!
-//! Shares nothing with the library: no search, no outline, no joining. All in 128 bits, which hold
-//! every determinant of coordinates within ±2^30 and an eye within ±2^61.
+//! It shares nothing with the library: no search, no outline, no joining. All numbers have 128
+//! bits, which suffices for every determinant of coordinates within ±2^30 and an eye within ±2^61.
 #![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on stops")]
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -9,40 +10,41 @@ use std::collections::{BTreeMap, BTreeSet};
 use penup::convex::{EdgeVisibility, Eye, SinkFull, SolidEdge, SolidSink};
 use penup::model::Corner;
 
-/// A place in space.
+/// A point in space.
 pub type Point = [i32; 3];
 
-/// What the vertices are the corners of.
+/// The shape that the vertices span.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Model {
-    /// Fewer than four different places.
+    /// There are fewer than four different points.
     TooFew,
-    /// All in one line.
+    /// All points are on one line.
     InLine,
-    /// All in one plane: the corners of the polygon.
+    /// All points are in one plane; these are the corners of the polygon.
     Flat(BTreeSet<u16>),
-    /// The eye is inside or on the surface.
+    /// The eye is inside the solid or on its surface.
     EyeInside,
     /// These vertices are inside the solid.
     NotConvex(BTreeSet<u16>),
-    /// A solid in order.
+    /// A valid solid.
     Solid(Solid),
 }
 
-/// Faces and edges of a solid.
+/// The faces and edges of a solid.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Solid {
-    /// Corners counter-clockwise from outside, beginning with the least, and whether it is visible.
+    /// The corners of each face, counter-clockwise as seen from outside and beginning with the
+    /// smallest index, and whether the face is visible.
     pub faces: BTreeSet<(Vec<u16>, bool)>,
-    /// Lesser end first.
+    /// The edges, with the smaller index first.
     pub edges: BTreeMap<(u16, u16), EdgeVisibility>,
-    /// Vertices at the place of an earlier one.
+    /// The number of vertices that coincide with an earlier one.
     pub welded: usize,
-    /// Vertices on the surface that are no corners.
+    /// The number of vertices on the surface that are no corners.
     pub flat: usize,
 }
 
-/// Takes what the library finds, in the same form.
+/// Collects the results of the library in the same form.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Found {
     /// As in [`Solid::faces`].
@@ -81,7 +83,8 @@ fn det(a: [i128; 3], b: [i128; 3], c: [i128; 3]) -> i128 {
         - a[0] * b[2] * c[1]
 }
 
-/// Six times the volume, positive if `d` is above a, b, c counter-clockwise.
+/// Six times the volume of a tetrahedron. It is positive if `d` is above the triangle a, b, c,
+/// which is counter-clockwise.
 fn volume(a: Point, b: Point, c: Point, d: Point) -> i128 {
     det(minus(b, a), minus(c, a), minus(d, a))
 }
@@ -99,13 +102,13 @@ fn in_line(a: Point, b: Point, c: Point) -> bool {
     u[1] * v[2] == u[2] * v[1] && u[2] * v[0] == u[0] * v[2] && u[0] * v[1] == u[1] * v[0]
 }
 
-/// Whether `c`, in line with a and b, is between them.
+/// Whether `c`, which is on one line with a and b, is between them.
 fn between(a: Point, b: Point, c: Point) -> bool {
     (0..3).all(|k| a[k].min(b[k]) <= c[k] && c[k] <= a[k].max(b[k]))
 }
 
-/// The sides of the convex polygon of coplanar points, counter-clockwise as seen from a point for which
-/// `outward(p, q, r)` is positive where p, q, r turn counter-clockwise.
+/// The sides of the convex polygon of coplanar points, counter-clockwise as seen from a point for
+/// which `outward(p, q, r)` is positive if p, q, r turn counter-clockwise.
 fn sides(
     points: &[Point],
     on_plane: &[u16],
@@ -133,7 +136,7 @@ fn sides(
     sides
 }
 
-/// The sides one after the other, from the least corner.
+/// The corners of the polygon in the order of its sides, starting with the smallest index.
 fn chain(sides: &[(u16, u16)]) -> Vec<u16> {
     let next: BTreeMap<u16, u16> = sides.iter().copied().collect();
     assert_eq!(next.len(), sides.len(), "each corner begins one side");
@@ -149,7 +152,7 @@ fn chain(sides: &[(u16, u16)]) -> Vec<u16> {
     }
 }
 
-/// The solid that `points` span, as seen from `eye`.
+/// Computes the solid that `points` span, as seen from `eye`.
 pub fn model(points: &[Point], eye: Eye) -> Model {
     let mut first_at = BTreeMap::new();
     for (number, point) in points.iter().enumerate() {
@@ -167,7 +170,7 @@ pub fn model(points: &[Point], eye: Eye) -> Model {
         return Model::InLine;
     };
     let Some(d) = distinct.iter().map(|v| at(*v)).find(|d| volume(a, b, c, *d) != 0) else {
-        // In a plane: any direction off the plane tells left from right.
+        // All points are in a plane. Any direction out of the plane distinguishes left from right.
         let u = minus(b, a);
         let v = minus(c, a);
         let normal =
@@ -205,7 +208,8 @@ pub fn model(points: &[Point], eye: Eye) -> Model {
     let mut on_surface = BTreeSet::new();
     for on_plane in &planes {
         on_surface.extend(on_plane.iter().copied());
-        // Outward: the four points of the frame, not all of them on this plane, are below.
+        // The four points of the frame are not all on this plane, so outward is the direction away
+        // from them.
         let polygon = chain(&sides(points, on_plane, |p, q, r| {
             -centre.iter().map(|inner| volume(p, q, r, *inner)).sum::<i128>()
         }));

@@ -1,16 +1,17 @@
-//! Random convex solids with small integer coordinates, so that ties are common, and eyes to see them from.
+//! Random convex solids with small integer coordinates, so that degenerate cases are common, and
+//! eyes to see them from.
 #![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on stops")]
 
 use penup::convex::Eye;
 
 use crate::convex_model::Point;
 
-/// A small generator of reproducible randomness (xorshift).
+/// A small generator of reproducible pseudo-random numbers (xorshift).
 #[derive(Debug, Clone)]
 pub struct Dice(u64);
 
 impl Dice {
-    /// The same seed gives the same throws.
+    /// Creates a generator; the same seed gives the same numbers.
     pub fn new(seed: u64) -> Self {
         Self(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1)
     }
@@ -22,17 +23,17 @@ impl Dice {
         self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 32
     }
 
-    /// From `low` to `high`, both included.
+    /// A number from `low` to `high`, both inclusive.
     pub fn throw(&mut self, low: i32, high: i32) -> i32 {
         low + (self.next() % (high - low + 1) as u64) as i32
     }
 
-    /// One of them.
+    /// One of the items.
     pub fn pick<T: Copy>(&mut self, items: &[T]) -> T {
         items[self.throw(0, items.len() as i32 - 1) as usize]
     }
 
-    /// In any order.
+    /// Puts the items into a random order.
     pub fn shuffle<T>(&mut self, items: &mut [T]) {
         for at in (1..items.len()).rev() {
             items.swap(at, self.throw(0, at as i32) as usize);
@@ -40,7 +41,7 @@ impl Dice {
     }
 }
 
-/// Points of a sphere with whole coordinates: every one is a corner.
+/// Points of a sphere with whole coordinates. Each of them is a corner.
 pub fn on_sphere(dice: &mut Dice) -> Vec<Point> {
     let square = dice.pick(&[3, 5, 6, 9, 14, 17, 21, 26, 29, 41]);
     let mut points = vec![];
@@ -58,16 +59,16 @@ pub fn on_sphere(dice: &mut Dice) -> Vec<Point> {
     points
 }
 
-/// A box along the axes.
+/// A box parallel to the axes.
 pub fn cuboid(dice: &mut Dice) -> Vec<Point> {
     let low = [0, 1, 2].map(|_| dice.throw(-3, 0));
     let high = [0, 1, 2].map(|_| dice.throw(1, 3));
     (0..8).map(|i| [0, 1, 2].map(|k| if i >> k & 1 == 0 { low[k] } else { high[k] })).collect()
 }
 
-/// A convex polygon in the plane z = 0 with whole coordinates, three corners or more.
+/// A convex polygon in the plane z = 0 with whole coordinates and at least three corners.
 pub fn polygon(dice: &mut Dice) -> Vec<Point> {
-    // Directions around the clock: their sums are the corners of a convex polygon.
+    // Directions sorted by their angle; their partial sums are the corners of a convex polygon.
     let clock = [
         [1, 0],
         [2, 1],
@@ -90,7 +91,7 @@ pub fn polygon(dice: &mut Dice) -> Vec<Point> {
         let steps: Vec<i32> = clock[..8].iter().map(|_| dice.throw(0, 2) / 2).collect();
         let mut at = [0, 0];
         let mut corners = vec![];
-        // Each direction and its opposite, so that the polygon closes.
+        // Each direction and its opposite are used equally often, so that the polygon closes.
         for (k, direction) in clock.iter().enumerate() {
             if steps[k % 8] > 0 {
                 corners.push([at[0], at[1], 0]);
@@ -106,7 +107,7 @@ pub fn polygon(dice: &mut Dice) -> Vec<Point> {
     }
 }
 
-/// A prism over a polygon, straight or slanted.
+/// A right or oblique prism over a polygon.
 pub fn prism(dice: &mut Dice) -> Vec<Point> {
     let base = polygon(dice);
     let shift = [dice.throw(-1, 1), dice.throw(-1, 1), dice.throw(1, 3)];
@@ -133,7 +134,7 @@ pub fn octahedron(dice: &mut Dice) -> Vec<Point> {
         .collect()
 }
 
-/// A cube with edges or corners cut: all signs and orders of (a, b, c).
+/// A cube with truncated edges or corners: all signs and orders of (a, b, c).
 pub fn cut_cube(dice: &mut Dice) -> Vec<Point> {
     let [a, b, c] = dice.pick(&[[1, 1, 2], [0, 1, 2], [2, 2, 1], [0, 1, 1], [3, 3, 1], [1, 1, 3]]);
     let orders: &[[i32; 3]] = &[[a, b, c], [b, c, a], [c, a, b]];
@@ -149,7 +150,8 @@ pub fn cut_cube(dice: &mut Dice) -> Vec<Point> {
     points
 }
 
-/// A roof over a pit, often with vertices on both slopes that, from above, only its ridge parts.
+/// A roof over a pit, often with vertices on both slopes that, seen from above, only its ridge
+/// separates.
 pub fn roof(dice: &mut Dice) -> Vec<Point> {
     let mut points = vec![[-6, 0, 4], [6, 0, 4], [0, 0, -8]];
     for side in [-1, 1] {
@@ -163,13 +165,13 @@ pub fn roof(dice: &mut Dice) -> Vec<Point> {
     points
 }
 
-/// Any points: most are not convex.
+/// Random points, most of which are not in convex position.
 pub fn any_points(dice: &mut Dice) -> Vec<Point> {
     let reach = dice.throw(1, 3);
     (0..dice.throw(1, 14)).map(|_| [0, 1, 2].map(|_| dice.throw(-reach, reach))).collect()
 }
 
-/// How many random solids a test compares: 4,000, or as many as `PENUP_SOLIDS` says.
+/// The number of random solids that a test compares: `PENUP_SOLIDS`, or else 4,000.
 pub fn solid_count() -> u32 {
     match std::env::var("PENUP_SOLIDS") {
         Ok(count) => count.parse().expect("PENUP_SOLIDS is a whole number"),
@@ -177,7 +179,8 @@ pub fn solid_count() -> u32 {
     }
 }
 
-/// A solid of any kind in any order, now and then with corners repeated, now and then as large as can be.
+/// A random solid of any kind with its vertices in any order. Sometimes vertices are repeated, and
+/// sometimes the coordinates are as large as possible.
 pub fn any_solid(dice: &mut Dice) -> Vec<Point> {
     let kinds = [on_sphere, cuboid, prism, pyramid, octahedron, cut_cube, roof, any_points];
     let mut points = dice.pick(&kinds[..])(dice);
@@ -187,14 +190,15 @@ pub fn any_solid(dice: &mut Dice) -> Vec<Point> {
     }
     dice.shuffle(&mut points);
     if dice.throw(0, 5) == 0 {
-        // |coordinate| <= 11, so this stays within 2^30.
+        // No coordinate is larger than 11, so the product stays within 2^30.
         let scale = dice.throw(50_000_000, 90_000_000);
         points.iter_mut().flatten().for_each(|part| *part *= scale);
     }
     points
 }
 
-/// An eye: along an axis, a diagonal or anyhow; or a place, often level with vertices, now and then inside.
+/// A random eye: a direction along an axis, a diagonal or any other, or a point that is often level
+/// with vertices and sometimes inside.
 pub fn any_eye(dice: &mut Dice, points: &[Point]) -> Eye {
     let largest = points.iter().flatten().map(|part| part.abs()).max().unwrap_or(1).max(1);
     let unit = i64::from(if largest > 100 { largest / 11 } else { 1 });
@@ -212,7 +216,7 @@ pub fn any_eye(dice: &mut Dice, points: &[Point]) -> Eye {
         },
         2 => Eye::At([0, 1, 2].map(|_| i64::from(dice.throw(-12, 12)) * unit)),
         3 => {
-            // Level with vertices in one or two coordinates.
+            // The eye is level with vertices in one or two coordinates.
             let mut place = [0, 1, 2].map(|_| i64::from(dice.throw(-9, 9)) * unit);
             for _ in 0..2 {
                 let axis = dice.throw(0, 2) as usize;
@@ -221,7 +225,7 @@ pub fn any_eye(dice: &mut Dice, points: &[Point]) -> Eye {
             Eye::At(place)
         }
         _ => {
-            // On the line through two vertices.
+            // The eye is on the line through two vertices.
             let (a, b) = (dice.pick(points), dice.pick(points));
             let times = i64::from(dice.throw(2, 4));
             Eye::At(
@@ -231,7 +235,7 @@ pub fn any_eye(dice: &mut Dice, points: &[Point]) -> Eye {
     }
 }
 
-/// Vertices and faces (corners from 0) of a scene with whole coordinates.
+/// Reads the vertices and faces of a scene with whole coordinates. Indices of corners count from 0.
 pub fn read_scene(name: &str) -> (Vec<Point>, Vec<Vec<u16>>) {
     let path =
         penup_client::workspace::root().join(format!("scenes/{name}.obj")).display().to_string();
@@ -251,7 +255,7 @@ pub fn read_scene(name: &str) -> (Vec<Point>, Vec<Vec<u16>>) {
     )
 }
 
-/// Three perpendicular directions of length 1, at random.
+/// A random rotation: three perpendicular directions of length 1.
 pub fn any_rotation(dice: &mut Dice) -> [[f64; 3]; 3] {
     let [w, x, y, z] = loop {
         let q = [0; 4].map(|_| f64::from(dice.throw(-1000, 1000)) / 1000.0);
@@ -267,12 +271,13 @@ pub fn any_rotation(dice: &mut Dice) -> [[f64; 3]; 3] {
     ]
 }
 
-/// How far what [`as_decimals`] makes may be off, in its unit.
+/// The error bound of the coordinates that [`as_decimals`] returns, in its unit.
 pub fn half_of_the_last(decimals: i32) -> u32 {
     (f64::from(1 << 28) / 10f64.powi(decimals)).ceil() as u32 + 1
 }
 
-/// The solid at radius 1, turned, written with so many decimals, and read in units of 2^-29.
+/// The solid scaled to radius 1, rotated, written with this number of decimals, and read in units
+/// of 2^-29.
 pub fn as_decimals(points: &[Point], rotation: &[[f64; 3]; 3], decimals: i32) -> Vec<Point> {
     let square = |point: &Point| point.iter().map(|part| f64::from(part * part)).sum::<f64>();
     let radius = points.iter().map(square).fold(0.0, f64::max).sqrt();

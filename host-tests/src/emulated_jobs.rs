@@ -1,4 +1,4 @@
-//! Whole jobs on emulated boards, and the same jobs on the host.
+//! Runs whole jobs on emulated boards and the same jobs on the host.
 
 use crate::whole_jobs::{Bench, job_lines, machine_events};
 use penup::plotter::{EMPTY_LOOKAHEAD, EMPTY_LOOKAHEAD_OF_PICO, Lm3s6965Memory, PicoMemory};
@@ -7,11 +7,11 @@ use penup_client::machines::Board;
 use std::error::Error;
 use std::time::Duration;
 
-/// How long a board may compute without a word: minutes, on a machine with much else to do.
+/// How long a board may compute without output. It may take minutes on a busy computer.
 const PATIENCE: Duration = Duration::from_secs(300);
 
-/// A board of plain memory with the capacities of `board`: memory decides how far the order of
-/// strokes is improved.
+/// A board in memory with the capacities of `board`. The amount of memory affects how far the order
+/// of strokes is improved.
 pub fn bench_like(board: Board) -> Bench {
     let mut bench = Bench::with_memory(match board {
         Board::Lm3s6965 => {
@@ -24,7 +24,7 @@ pub fn bench_like(board: Board) -> Bench {
     bench
 }
 
-/// What its pins do in a job.
+/// The machine events of a job on the host.
 fn on_the_host(board: Board, lines: &[String]) -> Vec<MachineEventKind> {
     let mut bench = bench_like(board);
     for line in lines {
@@ -32,7 +32,7 @@ fn on_the_host(board: Board, lines: &[String]) -> Vec<MachineEventKind> {
         assert_eq!(answer.lines().last(), Some("ok"), "{line}: {answer}");
     }
     bench.finish();
-    // Each pen is put in at once.
+    // Each change of pen is confirmed at once.
     while bench.heard().contains("then send ~") {
         bench.say("~");
         bench.finish();
@@ -48,49 +48,49 @@ pub struct Line<E: ?Sized = dyn EmulatedBoard> {
 }
 
 impl Line {
-    /// A board that has greeted.
+    /// Boots a board and waits for its greeting.
     ///
     /// # Errors
-    /// It does not start.
+    /// The board does not start.
     pub fn open(board: Board) -> Result<Self, Box<dyn Error>> {
         Self::to(board.boot()?)
     }
 }
 
 impl<E: EmulatedBoard + ?Sized> Line<E> {
-    /// A line to a board that is starting.
+    /// Connects to a board that is starting, and waits for its greeting.
     ///
     /// # Errors
-    /// It does not greet.
+    /// No greeting arrives.
     pub fn to(emulator: Box<E>) -> Result<Self, Box<dyn Error>> {
         let mut line = Self::silent(emulator);
         line.hear_greeting()?;
         Ok(line)
     }
 
-    /// A line to a board that has not spoken.
+    /// Connects to a board that has not sent anything.
     pub fn silent(emulator: Box<E>) -> Self {
         Self { heard: Vec::new(), emulator }
     }
 
-    /// Forgets half a line: the board has started again.
+    /// Discards a partial line, because the board was restarted.
     pub fn forget(&mut self) {
         self.heard.clear();
     }
 
-    /// Listens until the board greets.
+    /// Waits for the board's greeting.
     ///
     /// # Errors
-    /// It does not.
+    /// No greeting arrives.
     pub fn hear_greeting(&mut self) -> Result<(), Box<dyn Error>> {
         while !self.hear()?.starts_with("Grbl") {}
         Ok(())
     }
 
-    /// The next line that comes back.
+    /// Returns the next line that the board sends.
     ///
     /// # Errors
-    /// None comes.
+    /// No line arrives in time, or the emulator has ended.
     pub fn hear(&mut self) -> Result<String, Box<dyn Error>> {
         loop {
             if let Some(end) = self.heard.iter().position(|byte| *byte == b'\n') {
@@ -106,7 +106,7 @@ impl<E: EmulatedBoard + ?Sized> Line<E> {
         }
     }
 
-    /// Sends a line and returns the next that comes back.
+    /// Sends a line and returns the next line that the board sends.
     ///
     /// # Errors
     /// The emulator has ended, or is silent.
@@ -115,7 +115,7 @@ impl<E: EmulatedBoard + ?Sized> Line<E> {
         self.hear()
     }
 
-    /// The status.
+    /// Queries the status report.
     ///
     /// # Errors
     /// The emulator has ended, or is silent.
@@ -125,18 +125,18 @@ impl<E: EmulatedBoard + ?Sized> Line<E> {
     }
 }
 
-/// A board that has begun the job.
+/// Boots a board and starts the job.
 ///
 /// # Errors
-/// It does not start.
+/// The board does not start.
 pub fn begin(board: Board, lines: &[String]) -> Result<Line, Box<dyn Error>> {
     begin_on(Line::open(board)?, lines)
 }
 
-/// The same on a board that has greeted.
+/// Starts the job on a board that has sent its greeting.
 ///
 /// # Errors
-/// It falls silent.
+/// The board stops answering.
 pub fn begin_on<E: EmulatedBoard + ?Sized>(
     mut line: Line<E>,
     lines: &[String],
@@ -151,7 +151,7 @@ pub fn begin_on<E: EmulatedBoard + ?Sized>(
     Ok(line)
 }
 
-/// What the pins of an emulated board do in a job.
+/// The machine events of a job according to the pins of an emulated board.
 ///
 /// # Errors
 /// The emulator fails.
@@ -162,7 +162,7 @@ pub fn at_the_pins(
     events_until_idle(&mut begin(board, lines)?)
 }
 
-/// What the pins do until the job that has begun is done.
+/// The machine events until the job that was started has ended.
 ///
 /// # Errors
 /// The emulator fails.
@@ -179,12 +179,12 @@ pub fn events_until_idle<E: EmulatedBoard + ?Sized>(
             events.extend(machine.last().map(|event| event.kind));
             return Ok(events);
         }
-        // Each question costs the emulator a wait.
+        // Each query delays the emulator.
         std::thread::sleep(Duration::from_millis(200));
     }
 }
 
-/// Without what the pins do at boot, before the first job.
+/// Removes the events at boot, before the first job.
 fn job_of(events: &[MachineEventKind]) -> &[MachineEventKind] {
     let is_boot = |event: &&MachineEventKind| {
         matches!(
@@ -196,14 +196,14 @@ fn job_of(events: &[MachineEventKind]) -> &[MachineEventKind] {
     &events[boot..]
 }
 
-/// Runs a job of `scenes/` on an emulated board and on the host: the steps and pen moves are the
-/// same, one by one.
+/// Runs a job of `scenes/` on an emulated board and on the host, and checks that the steps and pen
+/// moves are identical, one by one.
 ///
 /// # Errors
 /// The emulator fails.
 ///
 /// # Panics
-/// If they are not.
+/// Panics if they differ.
 pub fn compare(board: Board, scene: &str, settings: &[&str]) -> Result<(), Box<dyn Error>> {
     let lines = job_lines(scene, settings);
     let pins = at_the_pins(board, &lines)?;
@@ -211,10 +211,10 @@ pub fn compare(board: Board, scene: &str, settings: &[&str]) -> Result<(), Box<d
     Ok(())
 }
 
-/// The job of `lines` on the host has these steps and pen moves, one by one.
+/// Checks that the job of `lines` on the host has exactly these steps and pen moves.
 ///
 /// # Panics
-/// If it has not.
+/// Panics if they differ.
 pub fn assert_same_as_on_the_host(board: Board, lines: &[String], pins: &[MachineEventKind]) {
     let host = on_the_host(board, lines);
     let (host, pins) = (job_of(&host), job_of(pins));
@@ -230,14 +230,14 @@ pub fn assert_same_as_on_the_host(board: Board, lines: &[String], pins: &[Machin
     assert_eq!(host.len(), pins.len());
 }
 
-/// Gives a job up with the pen down, and plots it again: the steps stop, the pen is raised, the
-/// position is that of the pins.
+/// Aborts a job with the pen down, and plots it again. The steps must stop, the pen must be raised,
+/// and the reported position must be that of the pins.
 ///
 /// # Errors
 /// The emulator fails.
 ///
 /// # Panics
-/// If they do not.
+/// Panics if one of these conditions is violated.
 pub fn give_up(board: Board) -> Result<(), Box<dyn Error>> {
     let lines = job_lines("lattice2.obj", &["$page=60x80", "$margin=5"]);
     let mut line = begin(board, &lines)?;
@@ -260,30 +260,31 @@ pub fn give_up(board: Board) -> Result<(), Box<dyn Error>> {
         machine.change(change);
     }
     assert!(!machine.pen_is_down());
-    // 80 steps a millimetre: the reported position is that of the pins.
+    // With 80 steps per millimetre, the reported position must be that of the pins.
     let (x, y) = machine.position();
     let reported = status.split("MPos:").nth(1).unwrap_or_default().split(',');
     let reported: Vec<f64> = reported.take(2).map(str::parse).collect::<Result<_, _>>()?;
     for (reported, steps) in reported.iter().zip([x, y]) {
         assert!((reported - f64::from(steps) / 80.0).abs() <= 0.001, "{status} {x} {y}");
     }
-    // Nothing more moves, and it is ready: the model is still there.
+    // Nothing moves any more, and the board is ready: the model is still there.
     assert_eq!(line.emulator.pin_changes()?, []);
     assert_eq!(line.ask("$plot")?, "ok");
     Ok(())
 }
 
-/// Settings of a machine whose pen a motor lifts: 400 steps, of which 62 when it is raised.
+/// Settings of a machine whose pen is lifted by a motor. It has 400 steps, and 62 of them remain
+/// below the upper stop when the pen is raised.
 pub const PEN_ON_A_MOTOR: [&str; 5] = ["$132=1", "$112=900", "$122=500", "$210=20", "$209=1"];
 
-/// An emergency stop with the pen down: no step of x and y comes after it, and a motor raises the pen
-/// before the board can be unlocked.
+/// An emergency stop with the pen down. No step of x and y may follow it, and a motor must raise
+/// the pen before the board can be unlocked.
 ///
 /// # Errors
 /// The emulator fails.
 ///
 /// # Panics
-/// If it does not.
+/// Panics if one of these conditions is violated.
 pub fn stop_at_once(board: Board) -> Result<(), Box<dyn Error>> {
     let settings = [&PEN_ON_A_MOTOR[..], &["$page=60x80", "$margin=5"]].concat();
     let mut line = begin(board, &job_lines("lattice2.obj", &settings))?;
@@ -300,14 +301,14 @@ pub fn stop_at_once(board: Board) -> Result<(), Box<dyn Error>> {
     }
     let stopped_at = events.len();
     while line.ask("$X")? != "ok" {
-        // A refusal is two lines.
+        // A refusal consists of two lines.
         line.hear()?;
     }
     for change in line.emulator.pin_changes()? {
         events.extend(machine.change(change).map(|event| event.kind));
     }
     events.extend(machine.last().map(|event| event.kind));
-    // It began as low as it can be, and the stop holds it.
+    // The motor began at the lowest position, and the upper stop limits it.
     let place = |events: &[MachineEventKind]| {
         events.iter().fold(400, |place: i32, event| match event {
             MachineEventKind::Lift { down } => (place + if *down { 1 } else { -1 }).max(0),

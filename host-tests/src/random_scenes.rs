@@ -1,21 +1,21 @@
-//! Random scenes with small whole coordinates, so that ties are common.
+//! Random scenes with small whole coordinates, so that degenerate cases are common.
 //!
-//! Every face is plane and does not cross itself. The same seed gives the same scene.
+//! Every face is plane and does not intersect itself. The same seed gives the same scene.
 
 use penup::geometry::{COORDINATE_LIMIT, Projection, Vertex};
 use penup::model::Corner;
 
-/// A small generator of random numbers (SplitMix64).
+/// A small generator of pseudo-random numbers (SplitMix64).
 #[derive(Debug, Clone)]
 pub struct Random(u64);
 
 impl Random {
-    /// The sequence of a seed.
+    /// Creates the generator of a seed.
     pub fn new(seed: u64) -> Self {
         Self(seed)
     }
 
-    /// The next number.
+    /// Returns the next number.
     pub fn next_number(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut mixed = self.0;
@@ -24,23 +24,23 @@ impl Random {
         mixed ^ (mixed >> 31)
     }
 
-    /// A number between two, both possible.
+    /// A number from `low` to `high`, both inclusive.
     pub fn between(&mut self, low: i32, high: i32) -> i32 {
         low + (self.next_number() % (high - low + 1) as u64) as i32
     }
 
-    /// True once in `times`.
+    /// Returns true with a probability of one in `times`.
     pub fn once_in(&mut self, times: i32) -> bool {
         self.between(1, times) == 1
     }
 
-    /// One of several.
+    /// One of the choices.
     pub fn one_of<T: Copy>(&mut self, choices: &[T]) -> T {
         choices[self.between(0, choices.len() as i32 - 1) as usize]
     }
 }
 
-/// A point or step in space.
+/// A point or vector in space.
 pub type Triple = [i32; 3];
 
 fn plus(a: Triple, b: Triple) -> Triple {
@@ -51,18 +51,18 @@ fn times(a: Triple, by: i32) -> Triple {
     a.map(|part| part * by)
 }
 
-/// A scene in view space.
+/// A scene in view coordinates.
 #[derive(Debug, Clone)]
 pub struct RandomScene {
-    /// Vertices in range of the library.
+    /// The vertices, within the coordinate range of the library.
     pub vertices: Vec<Vertex>,
-    /// Corners of all faces and bars.
+    /// The corners of all faces and bars.
     pub corners: Vec<Corner>,
-    /// Perspective or parallel.
+    /// The kind of projection.
     pub projection: Projection,
 }
 
-/// Polygons in the plane whose corners run round once, convex and concave.
+/// Simple polygons in the plane, convex and concave.
 const SHAPES: [&[[i32; 2]]; 8] = [
     &[[0, 0], [2, 0], [2, 2], [0, 2]],
     &[[0, 0], [2, 0], [0, 2]],
@@ -95,7 +95,8 @@ impl Builder {
         }
     }
 
-    /// A prism over one of the shapes, between two directions and along a third.
+    /// Adds a prism over one of the shapes, whose base lies in the plane of two directions and
+    /// which extends along a third.
     fn add_prism(
         &mut self,
         random: &mut Random,
@@ -115,7 +116,7 @@ impl Builder {
             .collect();
         faces.push((0..count).rev().collect());
         faces.push((count..2 * count).collect());
-        // Sometimes open: a face is missing.
+        // Sometimes a face is missing, so that the prism is open.
         if random.once_in(5) {
             let missing = random.between(0, faces.len() as i32 - 1) as usize;
             faces.remove(missing);
@@ -140,7 +141,7 @@ impl Builder {
         }
     }
 
-    /// Makes equal points one vertex.
+    /// Merges equal points into one vertex.
     fn weld(&mut self) {
         let points = self.points.clone();
         let first = |n: usize| points.iter().position(|point| *point == points[n]).unwrap_or(n);
@@ -165,7 +166,7 @@ fn step(random: &mut Random, reach: i32) -> Triple {
     }
 }
 
-/// Directions that are at right angles or in line with the axes, or all over the place.
+/// Three independent directions: parallel to the axes, perpendicular to each other, or oblique.
 fn frame(random: &mut Random) -> [Triple; 3] {
     random.one_of(&[
         [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
@@ -179,13 +180,13 @@ fn frame(random: &mut Random) -> [Triple; 3] {
     ])
 }
 
-/// The scene of a seed.
+/// Generates the scene of a seed.
 pub fn random_scene(seed: u64) -> RandomScene {
     let mut random = Random::new(seed);
     let random = &mut random;
     let mut builder = Builder::default();
     match seed % 10 {
-        // Boxes anywhere, through each other or not.
+        // Boxes at random positions, which may pass through each other.
         0 => {
             for _ in 0..random.between(1, 3) {
                 let base = triple(random, 4);
@@ -193,7 +194,7 @@ pub fn random_scene(seed: u64) -> RandomScene {
                 builder.add_box(random, base, size);
             }
         }
-        // Triangles and four-sided faces anywhere.
+        // Triangles and quadrilaterals at random positions.
         1 => {
             for _ in 0..random.between(2, 8) {
                 let (a, b, c) = (triple(random, 4), step(random, 4), step(random, 4));
@@ -204,7 +205,7 @@ pub fn random_scene(seed: u64) -> RandomScene {
                 builder.add_face(random, &face);
             }
         }
-        // A lattice of cubes along the axes or not.
+        // A lattice of cubes, parallel to the axes or oblique.
         2 => {
             let frame = frame(random);
             let counts = [random.between(1, 2), random.between(1, 2), random.between(1, 3)];
@@ -233,7 +234,7 @@ pub fn random_scene(seed: u64) -> RandomScene {
                 builder.add_prism(random, base, frame, shape);
             }
         }
-        // Walls one behind the other, many of them seen edge-on.
+        // Walls one behind the other, many of which are seen edge-on.
         6 => {
             for _ in 0..random.between(2, 6) {
                 let base = triple(random, 2);
@@ -263,7 +264,7 @@ pub fn random_scene(seed: u64) -> RandomScene {
                 builder.add(random, &points, &faces);
             }
         }
-        // Flat shapes in one plane or in parallel planes, one upon the other.
+        // Flat shapes in one plane or in parallel planes, one on top of the other.
         8 => {
             let frame = frame(random);
             for _ in 0..random.between(2, 4) {
@@ -282,7 +283,7 @@ pub fn random_scene(seed: u64) -> RandomScene {
                 builder.add_face(random, &face);
             }
         }
-        // A bit of everything.
+        // A mixture of everything.
         _ => {
             let size = [0; 3].map(|_| random.between(1, 3));
             builder.add_box(random, [0, 0, 0], size);
@@ -304,7 +305,8 @@ pub fn random_scene(seed: u64) -> RandomScene {
     finish(random, &builder)
 }
 
-/// Puts the scene before the eye and makes it as large as the range allows, or leaves it small.
+/// Places the scene in front of the eye, and scales it to the full coordinate range or leaves it
+/// small.
 fn finish(random: &mut Random, builder: &Builder) -> RandomScene {
     let projection = random.one_of(&[Projection::Perspective, Projection::Parallel]);
     let nearest = builder.points.iter().map(|point| point[2]).min().unwrap_or(0);
