@@ -1,4 +1,4 @@
-//! The time, and the millisecond that wakes the main loop and looks at the contacts.
+//! The time, and the millisecond interrupt that wakes the main loop and samples the contacts.
 
 use cortex_m::peripheral::NVIC;
 use rp2040_hal::pac::{Interrupt, interrupt};
@@ -6,7 +6,7 @@ use rp2040_hal::pac::{Interrupt, interrupt};
 use super::registers::TIMER;
 use super::{contacts, critical, serial};
 
-/// Cycles in a second.
+/// The clock frequency in cycles per second.
 pub const HERTZ: u32 = 125_000_000;
 
 mod offset {
@@ -18,19 +18,20 @@ mod offset {
 const ALARM_0: u32 = 1;
 const MILLISECOND: u32 = 1000;
 
-/// Wakes the main loop every millisecond from now on: it keeps the steps' queue full.
+/// Starts the millisecond interrupt. From now on it wakes the main loop, which keeps the queue of
+/// steps full.
 pub fn start(nvic: &mut NVIC) {
     TIMER.write(offset::INTERRUPT_ENABLE, ALARM_0);
     critical::enable(nvic, Interrupt::TIMER_IRQ_0, critical::CLOCK_PRIORITY);
     schedule();
 }
 
-/// Sets the alarm to a millisecond from now.
+/// Sets the alarm to one millisecond from now.
 ///
-/// It comes when the time is that of the alarm, so an alarm that is set too late comes after 71
-/// minutes. Other interrupts may come between looking at the time and setting the alarm, and last
-/// longer than a millisecond. Then it is set again; should it have come in between, that is an
-/// interrupt too many.
+/// The alarm comes when the time equals its target, so an alarm that is set too late comes after 71
+/// minutes. Other interrupts may come between reading the time and setting the alarm, and last
+/// longer than a millisecond. Then the alarm is set again. If the first one came in between, there
+/// is one interrupt too many.
 fn schedule() {
     loop {
         let target = microseconds().wrapping_add(MILLISECOND);
@@ -42,7 +43,7 @@ fn schedule() {
     }
 }
 
-/// Microseconds since the start; wraps.
+/// The microseconds since the start; the count wraps.
 pub fn microseconds() -> u32 {
     TIMER.read(offset::TIME_LOW)
 }

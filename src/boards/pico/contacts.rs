@@ -1,12 +1,13 @@
-//! Limit switches and emergency stop: each closes its input to ground.
+//! The limit switches and the emergency stop; each closes its input to ground.
 //!
-//! They are looked at every millisecond. A change counts when two of the last three looks have
-//! shown it: what motors and cables induce in a single look is no switch. After it the contact may
-//! bounce for [`BOUNCE_MILLISECONDS`], then it is looked at again.
+//! The contacts are sampled every millisecond. A change counts when two of the last three samples
+//! have shown it, so interference from motors and cables in a single sample is not taken for a
+//! switch. After a change the contact may bounce for [`BOUNCE_MILLISECONDS`]; then it is sampled
+//! again.
 //!
 //! At power-up an open contact reads as closed until the pull-up of 50 to 80 kΩ has charged the
-//! filter at the switch: 8 ms for 100 nF. So for [`SETTLE_MICROSECONDS`] nothing is looked at,
-//! which is enough for 470 nF.
+//! filter at the switch, which takes 8 ms for 100 nF. So nothing is sampled for
+//! [`SETTLE_MICROSECONDS`], which is enough for 470 nF.
 
 use core::sync::atomic::{AtomicU8, Ordering};
 
@@ -17,30 +18,31 @@ use super::registers::SIO;
 use crate::boards::handler::Owned;
 
 const BOUNCE_MILLISECONDS: u8 = 10;
-/// The limit switch of x; those of y and of the emergency stop follow.
+/// The pin of the limit switch of x. Those of y and of the emergency stop follow.
 const FIRST_PIN: u32 = 8;
 const COUNT: usize = 3;
 const ALL: u8 = (1 << COUNT) - 1;
 const LEVELS: usize = 0x004;
 
-/// What follows the pull-ups until the contacts are looked at.
+/// The time from switching the pull-ups on to the first sample, in microseconds.
 const SETTLE_MICROSECONDS: u32 = 50_000;
 const LOOK_MICROSECONDS: u32 = 1000;
 
-/// A bit for each contact that counts as closed.
+/// One bit for each contact that counts as closed.
 static CLOSED: AtomicU8 = AtomicU8::new(0);
 static LOOKS: Owned<Looks> = Owned::empty();
 
-/// What the clock's handler remembers of the contacts.
+/// The samples that the clock's handler remembers.
 struct Looks {
-    /// A bit for each contact that was closed at the last two looks.
+    /// One bit for each contact that was closed in the last two samples.
     last: [u8; 2],
-    /// For how many looks each may bounce.
+    /// The number of samples for which each contact may still bounce.
     bounces: [u8; COUNT],
 }
 
 impl Looks {
-    /// What two of three looks have shown, this being the third.
+    /// Takes a sample. Returns the contacts that at least two of the last three samples have shown
+    /// closed.
     fn look(&mut self) -> u8 {
         let ([last, before], now) = (self.last, closed_now());
         self.last = [now, last];
@@ -49,7 +51,7 @@ impl Looks {
 }
 
 fn closed_now() -> u8 {
-    // Open inputs are pulled up.
+    // Open inputs are pulled up, so they read high.
     !(SIO.read(LEVELS) >> FIRST_PIN) as u8 & ALL
 }
 
@@ -58,8 +60,8 @@ fn wait(time: u32) {
     while clock::microseconds().wrapping_sub(began) < time {}
 }
 
-/// Looks at the contacts for the first time, before the clock calls. The pins are pulled up since
-/// just now.
+/// Samples the contacts for the first time, before the clock's interrupt runs. It expects the
+/// pull-ups to have been switched on just now.
 pub fn set_up() {
     wait(SETTLE_MICROSECONDS);
     let mut looks = Looks { last: [0; 2], bounces: [0; COUNT] };
@@ -71,7 +73,7 @@ pub fn set_up() {
     unsafe { LOOKS.fill(looks) };
 }
 
-/// Looks at the contacts: in the clock's interrupt, every millisecond.
+/// Samples the contacts. The clock's interrupt calls it every millisecond.
 pub fn look() {
     // SAFETY: the clock's handler owns it, and is the only caller.
     let Some(looks) = (unsafe { LOOKS.get() }) else { return };
@@ -89,7 +91,7 @@ pub fn look() {
     CLOSED.store(closed, Ordering::Relaxed);
 }
 
-/// Which count as closed.
+/// The contacts that count as closed.
 pub fn closed() -> Contacts {
     let closed = CLOSED.load(Ordering::Relaxed);
     Contacts { x: closed & 1 != 0, y: closed & 2 != 0, stop: closed & 4 != 0 }

@@ -1,14 +1,16 @@
-//! The ranks of the interrupts, and a critical section that the steps do not wait for.
+//! The priorities of the interrupts, and a critical section that does not delay the steps.
 //!
-//! A Cortex-M0+ can mask all interrupts at once or each by itself. Sections mask all but the next block of steps
-//! one by one: some, of the USB driver, last longer than the state machine's queue. What shares data
-//! with that interrupt masks it too, by [`with_steps_masked`], and briefly: the queue holds 8 words, 8 µs at the greatest
-//! rate.
+//! A Cortex-M0+ can mask all interrupts at once or each one separately. Critical sections mask all
+//! interrupts separately except the one for the next block of steps, because some sections, those
+//! of the USB driver, last longer than the queue of the state machine. Code that shares data with
+//! that interrupt masks it too, by [`with_steps_masked`], and only briefly: the queue holds 8
+//! words, which last 8 µs at the greatest rate.
 //!
-//! The code runs from flash behind a cache, and 50 cycles go by for each 8 bytes that are not in
-//! it. 8 µs hold 20 of these misses. So the handler of the steps, all that it calls, reads and is
-//! called by way of, and what runs while it is masked, lie in RAM: functions by
-//! `#[unsafe(link_section = ".data.in_ram")]`. `cargo xtask build` checks it on the image.
+//! The code runs from flash behind a cache, and each 8 bytes that are not in the cache cost 50
+//! cycles. 20 of these misses take 8 µs. So the handler of the steps, everything that it calls or
+//! reads, whatever leads to its call, and everything that runs while it is masked are in RAM:
+//! functions by `#[unsafe(link_section = ".data.in_ram")]`. `cargo xtask build` checks this on the
+//! image.
 
 use core::sync::atomic::{AtomicU32, Ordering, fence};
 
@@ -17,25 +19,26 @@ use rp2040_hal::pac::Interrupt;
 
 use super::registers::SYSTEM;
 
-/// The chip tells four ranks by the upper two bits.
+/// The chip distinguishes four priorities by the upper two bits.
 const fn priority(number: u8) -> u8 {
     number << 6
 }
 
-/// The next block of steps.
+/// The priority of the next block of steps.
 pub const STEP_PRIORITY: u8 = priority(0);
-/// The pen's heights, which come in with the steps.
+/// The priority of the pen's heights, which come with the steps.
 pub const PEN_PRIORITY: u8 = priority(1);
-/// Bytes of the serial line.
+/// The priority of the serial lines.
 pub const SERIAL_PRIORITY: u8 = priority(2);
-/// The clock's millisecond.
+/// The priority of the millisecond interrupt.
 pub const CLOCK_PRIORITY: u8 = priority(3);
 
-/// Registers of the interrupts' masks: those that are enabled, by a write too; a write to the other disables.
+/// The registers of the interrupt masks. The first shows the enabled interrupts, and a write to it
+/// enables more. A write to the second disables interrupts.
 const ENABLED: usize = 0x100;
 const MASK: usize = 0x180;
 
-/// Ranks and unmasks an interrupt, at set-up.
+/// Sets the priority of an interrupt and unmasks it, during set-up.
 pub fn enable(nvic: &mut NVIC, interrupt: Interrupt, priority: u8) {
     // SAFETY: no critical section is held at set-up that this could break.
     unsafe {
@@ -44,18 +47,18 @@ pub fn enable(nvic: &mut NVIC, interrupt: Interrupt, priority: u8) {
     }
 }
 
-/// Carries `work` out with every interrupt masked, that of the steps too. The caller lies in RAM,
-/// with all that `work` calls.
+/// Runs `work` with every interrupt masked, including that of the steps. The caller must be in RAM,
+/// with everything that `work` calls.
 #[inline(always)]
 pub fn with_steps_masked<T>(work: impl FnOnce() -> T) -> T {
     cortex_m::interrupt::free(|_| work())
 }
 
-/// Carries `work` out with the interrupt of the pen's heights masked. Not in a critical section,
-/// which it would break.
+/// Runs `work` with the interrupt of the pen's heights masked. It must not be called in a critical
+/// section, because it would unmask the interrupt there.
 pub fn with_pen_masked<T>(work: impl FnOnce() -> T) -> T {
     NVIC::mask(Interrupt::PIO0_IRQ_0);
-    // So that it does not come any more.
+    // These barriers ensure that the interrupt does not come any more.
     cortex_m::asm::dsb();
     cortex_m::asm::isb();
     let done = work();
@@ -64,16 +67,17 @@ pub fn with_pen_masked<T>(work: impl FnOnce() -> T) -> T {
     done
 }
 
-/// As many as a Cortex-M0+ has.
+/// The number of vectors of a Cortex-M0+.
 const VECTORS: usize = 16 + 32;
 
-/// The vectors of the exceptions, as they are in flash. The core reads one on each interrupt.
+/// A copy of the exception vectors in flash. The core reads one of them on each interrupt.
 #[repr(align(256))] // The core ignores the lower bits of its address.
 struct Vectors([AtomicU32; VECTORS]);
 
 static IN_RAM: Vectors = Vectors([const { AtomicU32::new(0) }; VECTORS]);
 
-/// Lets the core read the vectors from RAM. Called at set-up, before any interrupt is unmasked.
+/// Makes the core read the vectors from RAM. It is called during set-up, before any interrupt is
+/// unmasked.
 pub fn move_vectors_to_ram() {
     const VECTOR_TABLE: usize = 0xD08;
     unsafe extern "C" {
@@ -85,26 +89,27 @@ pub fn move_vectors_to_ram() {
     for (place, vector) in IN_RAM.0.iter().zip(in_flash) {
         place.store(*vector, Ordering::Relaxed);
     }
-    // They are there before the core may look.
+    // The vectors must be in RAM before the core may read them.
     fence(Ordering::SeqCst);
     SYSTEM.write(VECTOR_TABLE, IN_RAM.0.as_ptr() as u32);
     cortex_m::asm::dsb();
 }
 
-/// Every interrupt but that of the next block of steps.
+/// The mask of every interrupt except the one for the next block of steps.
 const OTHERS: u32 = !(1 << Interrupt::DMA_IRQ_0 as u32);
 
-/// Those that the outermost section has masked.
+/// The interrupts that the outermost critical section has masked.
 static MASKED: AtomicU32 = AtomicU32::new(0);
 
 struct MaskAllButSteps;
 critical_section::set_impl!(MaskAllButSteps);
 
 // SAFETY: one core runs, and `acquire` masks each of its interrupts but one until the outermost
-// `release`. The handler of that one takes no critical section, logs nothing, and shares only atomics.
+// `release`. The handler of that one takes no critical section, logs nothing, and shares only
+// atomics.
 unsafe impl critical_section::Impl for MaskAllButSteps {
     unsafe fn acquire() -> critical_section::RawRestoreState {
-        // A handler that comes in between leaves the set as it was.
+        // A handler that runs in between leaves the set as it was.
         let set = SYSTEM.read(ENABLED) & OTHERS;
         SYSTEM.write(MASK, OTHERS);
         cortex_m::asm::dsb();
@@ -117,7 +122,7 @@ unsafe impl critical_section::Impl for MaskAllButSteps {
 
     unsafe fn release(outermost: critical_section::RawRestoreState) {
         if outermost != 0 {
-            // What the section did must be done before a handler looks.
+            // The work of the section must be finished before a handler runs.
             core::sync::atomic::compiler_fence(Ordering::SeqCst);
             SYSTEM.write(ENABLED, MASKED.load(Ordering::Relaxed));
         }

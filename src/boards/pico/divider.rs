@@ -1,30 +1,31 @@
-//! Division by the chip's divider, of 32 bits: a Cortex-M0+ has none.
+//! Division by the chip's 32-bit divider, because a Cortex-M0+ has no division instruction.
 //!
-//! The names are those by which the compiler calls division. A handler that divides, or whose queues
-//! do, gives the divider back as it was: see [`keep_during`]. The others divide nothing.
+//! The symbols have the names by which the compiler calls division. A handler that divides, itself
+//! or in its queues, must restore the divider afterwards: see [`keep_during`]. The other handlers
+//! do not divide.
 //!
-//! 64 bits are divided by 32 in two digits of 16 bits (Knuth's algorithm D): 120 cycles, where the compiler's own
-//! takes 390. Greater divisors are left to that.
+//! 64 bits are divided by 32 in two digits of 16 bits (Knuth's algorithm D). This takes 120 cycles,
+//! where the compiler's own routine takes 390. Greater divisors are left to that routine.
 
 use super::registers::SIO;
 
-/// Registers of the divider's.
+/// The registers of the divider.
 const DIVIDEND: usize = 0x60;
 const DIVISOR: usize = 0x64;
 const QUOTIENT: usize = 0x70;
 const REMAINDER: usize = 0x74;
 
-/// Carries out what a handler does. It may have come in the middle of a division of the main loop's,
-/// and may itself divide: the divider is then as it was before.
+/// Runs the work of a handler and then restores the divider. The handler may have interrupted a
+/// division of the main loop, and it may divide itself.
 ///
 /// It costs some 40 cycles.
 #[inline(always)]
 pub fn keep_during(work: impl FnOnce()) {
-    // A division takes 8 cycles, and to enter a handler takes 15: it is over.
+    // A division takes 8 cycles, and entering a handler takes 15, so the division is finished.
     let operands = (SIO.read(DIVIDEND), SIO.read(DIVISOR));
     let results = (SIO.read(REMAINDER), SIO.read(QUOTIENT));
     work();
-    // An operand begins a division; a result that is written ends it.
+    // Writing an operand starts a division, and writing a result ends it.
     SIO.write(DIVIDEND, operands.0);
     SIO.write(DIVISOR, operands.1);
     SIO.write(REMAINDER, results.0);
@@ -45,7 +46,7 @@ core::arch::global_asm!(
     "lsls r2, r2, #24",
     "str r0, [r2, #\\dividend]",
     "str r1, [r2, #\\divisor]",
-    // The result takes 8 cycles: four branches of 2.
+    // The result takes 8 cycles, which four branches of 2 cycles fill.
     "b 1f",
     "1: b 1f",
     "1: b 1f",
@@ -61,8 +62,10 @@ core::arch::global_asm!(
 );
 
 core::arch::global_asm!(
-    // r1, below r2 and r5 its upper half, and the upper half of r0 over r2, whose top bit is set: quotient in r3,
-    // remainder in r1. r0 moves up.
+    // Computes one digit. In: r1, which is less than r2; r2, whose top bit is set; r5, the upper
+    // half of r2; the upper half of r0. The dividend is r1 followed by the upper half of r0, and
+    // the divisor is r2. Out: the quotient in r3 and the remainder in r1. r0 is shifted up by one
+    // digit.
     ".macro penup_digit",
     "str r1, [r7, #0x60]",
     "str r5, [r7, #0x64]",
@@ -87,7 +90,7 @@ core::arch::global_asm!(
     "adds r1, r1, r2",
     "1:",
     ".endm",
-    // Lets the top bits of r2, so many, hold something; counts in r6.
+    // Shifts r2 up by `bits` if its top `bits` bits are 0, and adds the shift to r6.
     ".macro penup_shift_up bits",
     "lsrs r3, r2, #(32 - \\bits)",
     "bne 1f",
@@ -95,7 +98,7 @@ core::arch::global_asm!(
     "lsls r2, r2, #\\bits",
     "1:",
     ".endm",
-    // r1 over r2: quotient in r3, remainder in r1.
+    // Divides r1 by r2: quotient in r3, remainder in r1.
     ".macro penup_short_digit",
     "str r1, [r7, #0x60]",
     "str r2, [r7, #0x64]",
@@ -131,7 +134,7 @@ core::arch::global_asm!(
     "cmp r1, r2",
     "blo 2f",
     "penup_short_digit",
-    "2: mov r12, r3", // the quotient's upper half
+    "2: mov r12, r3", // the upper half of the quotient
     "movs r6, #0",
     "lsrs r3, r2, #16",
     "beq 4f",
@@ -158,7 +161,7 @@ core::arch::global_asm!(
     "mov r1, r12",
     "movs r3, #0",
     "pop {{r4-r7, pc}}",
-    // A divisor below 2^16: its remainders take a digit more as they are.
+    // With a divisor below 2^16, its remainders can take one more digit unshifted.
     "4: lsls r1, r1, #16",
     "lsrs r4, r0, #16",
     "orrs r1, r4",

@@ -1,9 +1,10 @@
-//! The watchdog, why the board started, and what becomes of a panic or a fault (see [`fault`]).
+//! The watchdog, the reason for the board's start, and the handling of panics and faults (see
+//! [`fault`]).
 //!
-//! A panic is not left to stand: the board keeps its message in RAM that no start clears, and
-//! starts again by the watchdog, so that both ports can be told. Pen and drivers are made safe
-//! before. If the program panics or hangs again and again as soon as it has started,
-//! [`Start::Rescue`] is what is left: the plotter is not run any more, but both ports answer (see
+//! After a panic, the pen and the drivers are made safe first. Then the board keeps the message in
+//! RAM that no start clears, and restarts by the watchdog, so that both ports can be told. If the
+//! program panics or hangs again and again as soon as it has started, the result is
+//! [`Start::Rescue`]: the plotter no longer runs, but both ports answer (see
 //! [`rescue`](super::rescue)). If even that panics, the handler waits for ctrl-X on UART0.
 
 use core::cell::UnsafeCell;
@@ -23,55 +24,58 @@ mod watchdog {
     pub const CONTROL: usize = 0x0;
     pub const LOAD: usize = 0x4;
     pub const REASON: usize = 0x8;
-    /// Keeps its word through a restart by the watchdog; any other reset clears it. The boot ROM
-    /// writes 0 to it when it starts an image that was copied onto its drive, and another word when
-    /// it is to begin elsewhere.
+    /// The register that keeps its word through a restart by the watchdog; any other reset clears
+    /// it. The boot ROM writes 0 to it when it starts an image that was copied onto its drive, and
+    /// another word when it is to begin elsewhere.
     pub const SCRATCH_4: usize = 0x1C;
     pub const TRIGGER: u32 = 1 << 31;
     pub const TIMED_OUT: u32 = 1;
-    /// What a restart by the watchdog resets: everything but the two oscillators.
+    /// The register that selects what a restart by the watchdog resets: everything but the two
+    /// oscillators.
     pub const PSM_CHOICE: usize = 0x8;
     pub const ALL_BUT_OSCILLATORS: u32 = 0x1_FFFC;
 }
-/// In the scratch register while this program's watchdog runs. The SDK's own word for it, so that
-/// its tools tell the reason too.
+/// The word in the scratch register while this program's watchdog runs. It is the SDK's own word
+/// for this, so that its tools show the reason too.
 const OURS: u32 = 0x6AB7_3121;
-/// In the scratch register when this program starts itself again.
+/// The word in the scratch register when this program restarts itself.
 const FAULT: u32 = 0x6661_756C;
-/// Longer than the longest event, 0.67 s, and than erasing a sector; the chip counts two in a
-/// microsecond.
+/// The timeout of the watchdog. It is longer than the longest event, 0.67 s, and than erasing a
+/// sector. The chip counts two per microsecond.
 const PATIENCE: u32 = 2 * 3_000_000;
 
-/// Faults in a row, each soon after the start, after which the plotter is not run again.
+/// The number of consecutive faults, each soon after the start, after which the plotter is not run
+/// again.
 const FAULTS: u8 = 3;
-/// After so many the board is not started again at all.
+/// The number of consecutive faults after which the board is not restarted at all.
 const LAST_FAULT: u8 = 2 * FAULTS;
-/// A program that runs so long, in microseconds, has started.
+/// The time in microseconds after which a program counts as started.
 const SOON: u32 = 5_000_000;
 
-/// Bytes of a message; what is longer is cut.
+/// The greatest length of a message in bytes; a longer one is cut.
 const TEXT_BYTES: usize = 192;
-/// The message of a fault: letters, digits and the like, in one line.
+/// The message of a fault: one line of printable ASCII characters.
 pub type Cause = heapless::String<TEXT_BYTES>;
 
 /// Why the board started.
 #[derive(Debug)]
 pub enum Start {
-    /// Power, the pin RUN, a new image, or the user's own wish.
+    /// The board was started by power, the pin RUN, a new image, or a command of the user.
     Fresh,
-    /// A fault ended the program before; this is its message.
+    /// A fault ended the previous run of the program; this is its message.
     AfterFault(Cause),
-    /// The same too often: the plotter is not to be run.
+    /// Faults have ended the program too often, so the plotter must not be run.
     Rescue(Cause),
 }
 
-/// What outlives a reset.
+/// The data that survives a reset.
 #[derive(Clone, Copy)]
 #[repr(C)]
 struct Stored {
-    /// Over all that follows: RAM holds anything after a loss of power.
+    /// The checksum over everything that follows, because RAM holds arbitrary data after a loss of
+    /// power.
     sum: u32,
-    /// Faults in a row.
+    /// The number of consecutive faults.
     faults: u8,
     length: u8,
     text: [u8; TEXT_BYTES],
@@ -83,8 +87,8 @@ struct KeptPlace(UnsafeCell<MaybeUninit<Stored>>);
 // which the main loop does not go on.
 unsafe impl Sync for KeptPlace {}
 
-/// Not cleared at the start (`.uninit`); the boot ROM does not write there either (see
-/// `boards/pico.x`).
+/// The data is not cleared at the start (`.uninit`), and the boot ROM does not write there either
+/// (see `boards/pico.x`).
 #[unsafe(link_section = ".uninit.kept")]
 static KEPT: KeptPlace = KeptPlace(UnsafeCell::new(MaybeUninit::uninit()));
 
@@ -112,7 +116,7 @@ impl Stored {
         unsafe { KEPT.0.get().write_volatile(MaybeUninit::new(self)) };
     }
 
-    /// What was stored, if it is whole.
+    /// Returns what was stored, if its checksum is right.
     fn load() -> Option<Self> {
         // SAFETY: nobody else uses it now, and every pattern of bits is a value of these integers.
         let kept = unsafe { KEPT.0.get().read_volatile().assume_init() };
@@ -122,13 +126,13 @@ impl Stored {
     fn cause(&self) -> Cause {
         let mut cause = Cause::new();
         for &byte in self.text.iter().take(self.length.into()) {
-            let _ = cause.push(char::from(byte)); // ASCII, and as long as the text at most.
+            let _ = cause.push(char::from(byte)); // It is ASCII, and at most as long as the text.
         }
         cause
     }
 }
 
-/// Why the board started. Called once, before the watchdog is started.
+/// Returns why the board started. It is called once, before the watchdog is started.
 pub fn start() -> Start {
     let (reason, word) = (WATCHDOG.read(watchdog::REASON), WATCHDOG.read(watchdog::SCRATCH_4));
     let kept = Stored::load();
@@ -154,12 +158,12 @@ pub fn start() -> Start {
 
 fn text(text: &str) -> Cause {
     let mut cause = Cause::new();
-    let _ = cause.push_str(text); // There is a place: the texts are short.
+    let _ = cause.push_str(text); // There is room, because the texts are short.
     cause
 }
 
-/// Notes that the program runs, so many microseconds after its start: faults from now on do not count
-/// as faults at the start.
+/// Records that the program runs, `microseconds` after its start. Faults after [`SOON`] do not
+/// count as faults at the start.
 pub fn note_running(microseconds: u32) {
     static HAS_STARTED: AtomicBool = AtomicBool::new(false);
     if microseconds > SOON && !HAS_STARTED.load(Ordering::Relaxed) {
@@ -173,7 +177,7 @@ pub fn feed() {
     WATCHDOG.write(watchdog::LOAD, PATIENCE);
 }
 
-/// No interrupt, no step, pen up, drivers off.
+/// Disables interrupts and steps, raises the pen and switches the drivers off.
 pub fn make_safe() {
     cortex_m::interrupt::disable();
     UART0.receive_by_dma(false);
@@ -181,7 +185,8 @@ pub fn make_safe() {
     pen::set_height(0);
 }
 
-/// Starts the board again. The core's own request would leave its peripherals as they are.
+/// Restarts the board by the watchdog. A reset request of the core would leave its peripherals as
+/// they are.
 fn restart(word: u32) -> ! {
     WATCHDOG.write(watchdog::SCRATCH_4, word);
     PSM.write(watchdog::PSM_CHOICE, watchdog::ALL_BUT_OSCILLATORS);
@@ -191,23 +196,24 @@ fn restart(word: u32) -> ! {
     }
 }
 
-/// Starts the board as the user has asked for it: nothing is to be reported then.
+/// Restarts the board because the user has asked for it. Nothing is reported then.
 pub fn restart_fresh() -> ! {
     make_safe();
     restart(0)
 }
 
-/// Raises the pen, switches the drivers off and gives the board to the boot ROM, which shows the
-/// drive for a new image. Takes half a second; nothing else goes on.
+/// Raises the pen, switches the drivers off and hands the board over to the boot ROM, which shows
+/// the drive for a new image. It takes half a second, in which nothing else runs.
 pub fn show_drive() -> ! {
-    /// The servo has time to raise the pen: nothing tells it to afterwards. In microseconds.
+    /// The time in which the servo raises the pen, in microseconds. Afterwards nothing controls the
+    /// servo.
     const RAISING: u32 = 400_000;
     make_safe();
     feed();
     let began = clock::microseconds();
     while clock::microseconds().wrapping_sub(began) < RAISING {}
-    // The boot ROM restarts itself by the watchdog. It does not show the activity at a pin, and
-    // leaves no interface out.
+    // The boot ROM restarts itself by the watchdog. The arguments mean that it shows no activity at
+    // a pin and disables no interface.
     rom_data::reset_to_usb_boot(0, 0)
 }
 
@@ -218,10 +224,10 @@ impl Fault for Pico {
         make_safe();
     }
 
-    /// Keeps the cause and starts again, but for a program that cannot even report.
+    /// Keeps the cause and restarts the board, unless the program faults before it can even report.
     fn report(cause: fmt::Arguments) {
         let mut line = OneLine(Cause::new());
-        let _ = line.write_fmt(cause); // Fails never.
+        let _ = line.write_fmt(cause); // This never fails.
         let faults = Stored::load().map_or(0, |kept| kept.faults).saturating_add(1);
         if faults < LAST_FAULT {
             Stored::new(faults, &line.0).store();
@@ -247,7 +253,8 @@ impl Fault for Pico {
     }
 }
 
-/// Takes what is printable ASCII, with other characters as spaces; leaves the rest when it is full.
+/// Accepts printable ASCII characters and replaces others by spaces. It ignores the rest when it is
+/// full.
 struct OneLine(Cause);
 
 impl Write for OneLine {
@@ -270,8 +277,8 @@ unsafe extern "C" {
     static _stack_end: u32;
 }
 
-/// Goes to [`report_fault`] with the address of the fault, on a fresh stack: the fault may be that
-/// the stack is used up, and then nothing can be put onto it.
+/// Calls [`report_fault`] with the address of the fault and a fresh stack. The fault may be a stack
+/// overflow, and then nothing can be pushed onto the old stack.
 ///
 /// # Safety
 /// Called by the core alone, on a fault.
@@ -285,7 +292,7 @@ unsafe extern "C" fn HardFault() -> ! {
         "mvns r0, r0", // fault::STACK_USED_UP
         "cmp r1, r2",
         "blo 1f",
-        "ldr r0, [r1, #24]", // the program counter that the core has put there
+        "ldr r0, [r1, #24]", // the program counter that the core has stored there
         "1: ldr r1, ={start}",
         "msr msp, r1",
         "ldr r1, ={report_fault}",

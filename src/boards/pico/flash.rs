@@ -1,13 +1,13 @@
-//! The end of the flash, where records outlive a loss of power.
+//! The end of the flash, where records survive a loss of power.
 //!
-//! The code runs from the same flash, which cannot be read while it is erased or written. So this is
-//! done by the boot ROM's functions, called from RAM with interrupts masked: 45 ms for a sector, half
-//! a millisecond for a page. Bytes of the serial lines wait meanwhile: those of the UART in RAM, where DMA
-//! puts them, those of USB at the host. Steps
-//! would go on for as long as their words last; callers see to it that nothing moves.
+//! The code runs from the same flash, which cannot be read while it is erased or written. So the
+//! functions of the boot ROM do this work, called from RAM with interrupts masked: 45 ms for a
+//! sector, half a millisecond for a page. Meanwhile the bytes of the serial lines wait: those of
+//! the UART in RAM, where DMA stores them, and those of USB at the host. Steps would continue only
+//! as long as their words last, so callers ensure that nothing moves.
 //!
-//! A worn flash says nothing by itself: its cells no longer change. So what was erased or written
-//! is read back, and [`Worn`] is the error if it is not what it should be.
+//! A worn flash reports no error; its cells simply no longer change. So what was erased or written
+//! is read back, and the error is [`Worn`] if it is not as expected.
 
 use core::fmt::Write;
 use core::ptr;
@@ -23,16 +23,16 @@ use rp2040_hal::rom_data;
 use super::{BOOT_2, critical, emergency};
 use crate::boards::peripheral::Peripheral;
 
-/// Where the flash is read.
+/// The address at which the flash is read.
 const MAPPED_AT: usize = 0x1000_0000;
-/// The memory map leaves what follows to this module.
+/// The memory map reserves the flash from here on for this module.
 const START: u32 = 1760 << 10;
 const END: u32 = 2048 << 10;
 const SECTOR_BYTES: usize = 4096;
-/// For all of the working memory, with a page before it and less than a sector of figures.
+/// Room for all of the working memory, with a page before it and less than a sector of figures.
 const JOB_BYTES: u32 = (128 << 10) + SECTOR_BYTES as u32;
 
-/// Where a record lies.
+/// The place of a record in the flash.
 pub const fn slots(record: Record) -> Slots {
     match record {
         Record::Settings => Slots { start: START, bytes: SECTOR_BYTES as u32 },
@@ -41,10 +41,11 @@ pub const fn slots(record: Record) -> Slots {
 }
 const _: () = assert!(slots(Record::Job).start + 2 * slots(Record::Job).bytes <= END);
 
-/// The flash. Addresses are from its beginning.
+/// The flash. Addresses count from its beginning.
 pub struct Flash(());
 
-/// The boot ROM's functions, and what sets the flash up for reading at full speed.
+/// The functions of the boot ROM, and the boot loader that sets up the flash for reading at full
+/// speed.
 struct Rom {
     connect: unsafe extern "C" fn(),
     leave_mapping: unsafe extern "C" fn(),
@@ -54,24 +55,24 @@ struct Rom {
     boot_2: unsafe extern "C" fn(),
 }
 
-/// What is to be done.
+/// An operation on the flash.
 enum Work<'p> {
     Erase {
         from: u32,
         bytes: usize,
     },
-    /// The page is in RAM.
+    /// Writes a page, which is in RAM.
     Write {
         to: u32,
         page: &'p [u8; PAGE_BYTES],
     },
-    /// Asks the chip for its number, which comes behind the command's own bytes.
+    /// Asks the chip for its unique number, which follows the bytes of the command.
     Number {
         exchanged: &'p mut [u8; NUMBER_COMMAND],
     },
 }
 
-/// The command, four bytes without meaning, and the answer.
+/// The length of the exchange: the command, four bytes without meaning, and the answer.
 const NUMBER_COMMAND: usize = 1 + 4 + 8;
 const READ_NUMBER: u8 = 0x4B;
 
@@ -87,13 +88,13 @@ mod ssi {
     pub const HAS_BYTE: u32 = 1 << 3;
     pub const DATA: usize = 0x60;
     pub const SELECT: usize = 0x0C;
-    /// The pad's level by hand: low is selected.
+    /// The override of the pad's level; low selects the chip.
     pub const LEVEL: u32 = 3 << 8;
     pub const LOW: u32 = 2 << 8;
     pub const HIGH: u32 = 3 << 8;
 }
 
-/// Does it, out of RAM.
+/// Carries out the operation. It runs from RAM.
 ///
 /// # Safety
 /// Interrupts are masked, and nothing else reads the flash; the work is within it.
@@ -112,8 +113,8 @@ unsafe extern "C" fn carry_out(rom: &Rom, work: &mut Work<'_>) {
             }
             Work::Write { to, page } => (rom.write)(*to, page.as_ptr(), PAGE_BYTES),
             Work::Number { exchanged } => {
-                // The boot ROM has set the line up for single bytes. An answer comes with each of
-                // them.
+                // The boot ROM has set up the line for single bytes. Each byte sent brings one byte
+                // of the answer.
                 let select = QSPI_PADS.read(ssi::SELECT) & !ssi::LEVEL;
                 QSPI_PADS.write(ssi::SELECT, select | ssi::LOW);
                 for byte in exchanged.iter_mut() {
@@ -130,7 +131,7 @@ unsafe extern "C" fn carry_out(rom: &Rom, work: &mut Work<'_>) {
     }
 }
 
-/// A byte of the flash as it is now: the cache forgets all when something is written.
+/// Reads a byte of the flash as it is now. The cache is emptied whenever something is written.
 fn byte_at(offset: u32) -> u8 {
     // SAFETY: the lower 16 MiB are mapped to flash, whatever its size, and reading it has no
     // effect. Volatile, for it changes behind the compiler's back.
@@ -138,30 +139,30 @@ fn byte_at(offset: u32) -> u8 {
 }
 
 impl Flash {
-    /// The flash of the board, which is taken once.
+    /// Creates the flash of the board, which is taken once.
     pub const fn new() -> Self {
         Self(())
     }
 
-    /// The number of the chip, which no other has: 16 hexadecimal digits.
+    /// The unique number of the flash chip, as 16 hexadecimal digits.
     pub fn number(&mut self) -> String<16> {
         let mut exchanged = [0; NUMBER_COMMAND];
         exchanged[0] = READ_NUMBER;
         self.work(Work::Number { exchanged: &mut exchanged });
         let [.., a, b, c, d, e, f, g, h] = exchanged;
         let mut digits = String::new();
-        // Fails never: it is as long as that.
+        // This never fails, because the string is long enough.
         let _ = write!(digits, "{:016X}", u64::from_be_bytes([a, b, c, d, e, f, g, h]));
         digits
     }
 
-    #[inline(never)] // `cargo xtask build` knows by its name that nothing moves meanwhile.
+    #[inline(never)] // `cargo xtask build` recognises it by its name: nothing moves meanwhile.
     fn work(&mut self, mut work: Work<'_>) {
         emergency::feed();
-        // The boot loader's code, where it can be run while the flash cannot.
+        // A copy of the boot loader's code in RAM, where it can run while the flash cannot be read.
         let boot_2: [u32; 64] = bytemuck::cast(BOOT_2);
-        // SAFETY: it is Thumb code that begins with its first word, takes nothing, gives nothing back
-        // and returns to its caller if that is not the boot ROM.
+        // SAFETY: it is Thumb code that begins with its first word, has no parameters and no
+        // result, and returns to its caller if that is not the boot ROM.
         let boot_2 = unsafe {
             core::mem::transmute::<usize, unsafe extern "C" fn()>(boot_2.as_ptr() as usize | 1)
         };
@@ -174,14 +175,14 @@ impl Flash {
             boot_2,
         };
         critical::with_steps_masked(|| {
-            // SAFETY: interrupts are masked, one core runs, and the channel of the steps reads RAM; the
-            // callers check the place.
+            // SAFETY: interrupts are masked, one core runs, and the channel of the steps reads RAM;
+            // the callers check that the place is within the flash.
             unsafe { carry_out(&rom, &mut work) };
         });
     }
 }
 
-/// The flash does not hold what was written to it.
+/// The error when the flash does not hold what was written to it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Worn;
 
@@ -214,8 +215,8 @@ impl NorFlash for Flash {
     const WRITE_SIZE: usize = PAGE_BYTES;
     const ERASE_SIZE: usize = SECTOR_BYTES;
 
-    /// Erases sectors that lie in what is left to this module; others stay as they are, which is
-    /// [`Worn`] too.
+    /// Erases sectors in the part of the flash that is reserved for this module. Other sectors stay
+    /// as they are, which normally gives [`Worn`].
     fn erase(&mut self, from: u32, to: u32) -> Result<(), Worn> {
         if from >= START && to <= END {
             self.work(Work::Erase { from, bytes: (to - from) as usize });
@@ -223,7 +224,7 @@ impl NorFlash for Flash {
         if (from..to).all(|at| byte_at(at) == 0xFF) { Ok(()) } else { Err(Worn) }
     }
 
-    /// Writes whole pages, with the same condition.
+    /// Writes whole pages in the same part of the flash.
     fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Worn> {
         for (to, bytes) in (offset..).step_by(PAGE_BYTES).zip(bytes.chunks_exact(PAGE_BYTES)) {
             if (START..END).contains(&to) {

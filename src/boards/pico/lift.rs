@@ -1,5 +1,5 @@
-//! The motor that lifts the pen, beside or instead of the servo: the handler of the pen's heights pulses it, a few
-//! thousand steps a second at most.
+//! The motor that lifts the pen, in addition to the servo or instead of it. The interrupt handler
+//! of the pen's heights pulses it, at most a few thousand times a second.
 
 use super::registers::SIO;
 
@@ -12,20 +12,20 @@ mod offset {
     pub const ENABLE_OUTPUT: usize = 0x24;
 }
 
-/// Both pins low, and outputs once they are handed over.
+/// Sets both pins low. They are outputs once they are handed over.
 pub fn set_up() {
     SIO.write(offset::CLEAR, STEP | DIRECTION);
     SIO.write(offset::ENABLE_OUTPUT, STEP | DIRECTION);
 }
 
-/// A direction, high to lower the pen; a pulse begins or ends.
+/// Sets the direction pin, high to lower the pen, and begins or ends a pulse.
 pub fn set(step: bool, down: bool) {
     let level = |pin, high| SIO.write(if high { offset::SET } else { offset::CLEAR }, pin);
     level(DIRECTION, down);
     level(STEP, step);
 }
 
-/// No pulse.
+/// Ends the pulse.
 pub fn end_pulse() {
     SIO.write(offset::CLEAR, STEP);
 }

@@ -15,10 +15,10 @@
 //! | serial line's bytes | DMA channels 1 and 2; UART0_IRQ, USBCTRL_IRQ, priority 2 |
 //! | millisecond | TIMER_IRQ_0, priority 3 |
 //!
-//! The watchdog is fed only while the main loop turns, or listens in a long computation, and the steps
-//! get on.
+//! The watchdog is fed only while the main loop turns, or reads real-time requests during a long
+//! computation, and the steps make progress.
 //!
-//! What is refused: to be taken twice.
+//! The board can be taken only once.
 
 mod clock;
 mod contacts;
@@ -55,7 +55,7 @@ use static_cell::{ConstStaticCell, StaticCell};
 use self::emergency::Start;
 use self::ports::Ports;
 
-/// What the boot ROM runs to set the flash up.
+/// The second-stage boot loader, which the boot ROM runs to set up the flash.
 #[unsafe(link_section = ".boot2")]
 #[used]
 static BOOT_2: [u8; 256] = rp2040_boot2::BOOT_LOADER_W25Q080;
@@ -67,15 +67,16 @@ pub struct Pico {
     ports: Ports,
     steps: steps::Steps,
     flash: flash::Flash,
-    /// The fault after which the board started again.
+    /// The fault after which the board restarted, if any.
     fault: Option<emergency::Cause>,
 }
 
-/// Sets up clock, pins, serial line, state machine and timer: drivers off, pen up, nothing moving.
+/// Sets up the clock, the pins, the serial lines, the state machine and the timer. Afterwards the
+/// drivers are off, the pen is up and nothing moves.
 ///
 /// # Panics
-/// If the board was taken before, or its crystal does not swing.
-#[allow(clippy::panic)] // Without clocks there is nothing to go on with.
+/// When the board was taken before, or when its crystal does not oscillate.
+#[allow(clippy::panic)] // Without clocks the program cannot continue.
 pub fn take() -> (Pico, MemorySlices<'static>, &'static PulserState) {
     let (Some(mut core), Some(mut chip)) = (Core::take(), Peripherals::take()) else {
         panic!("the board was taken twice")
@@ -164,7 +165,7 @@ impl Board for Pico {
     }
 
     fn show_drive(&mut self) {
-        /// For the last reply, on the slower port, in microseconds.
+        /// The time in which the last reply is sent on the slower port, in microseconds.
         const SENDING: u32 = 100_000;
         let began = clock::microseconds();
         while clock::microseconds().wrapping_sub(began) < SENDING {
@@ -206,7 +207,7 @@ impl Board for Pico {
 
     fn wait(&mut self) {
         self.steps.start();
-        // An interrupt since the last wait makes this return at once.
+        // If an interrupt has come since the last wait, this returns at once.
         cortex_m::asm::wfe();
     }
 }

@@ -1,7 +1,9 @@
-//! 64-bit multiplication: a Cortex-M0+ multiplies 32 bits to 32.
+//! Multiplication of 64 bits. A Cortex-M0+ multiplies 32 bits and keeps only the lower 32 bits of
+//! the product.
 //!
-//! The name is that by which the compiler calls it. 27 cycles with the return; the compiler's own takes 55, and
-//! the search for hidden lines multiplies more than anything else.
+//! The symbol has the name by which the compiler calls the multiplication. It takes 27 cycles with
+//! the return, where the compiler's own takes 55. The search for hidden lines multiplies more than
+//! anything else.
 
 core::arch::global_asm!(
     ".section .text.penup_multiply, \"ax\"",
@@ -10,12 +12,12 @@ core::arch::global_asm!(
     ".type __aeabi_lmul, %function",
     ".thumb_func",
     "__aeabi_lmul:",
-    // The cross products count modulo 2^32, in the upper half.
+    // The cross products go into the upper half, modulo 2^32.
     "muls r1, r2",
     "muls r3, r0",
     "adds r1, r3",
     "mov r12, r1",
-    // The lower halves in full: four products of 16 bits.
+    // The product of the lower halves is computed in full, as four products of 16 bits.
     "push {{r4}}",
     "lsrs r1, r2, #16",
     "lsrs r4, r0, #16",

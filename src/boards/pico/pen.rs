@@ -1,8 +1,9 @@
-//! The pen's servo: a pulse every 20 ms, of 1 ms when the pen is raised to 2 ms when it is lowered.
+//! The servo of the pen. It gets a pulse every 20 ms, from 1 ms when the pen is raised to 2 ms when
+//! it is lowered.
 
 use super::registers::{self, PWM, reset};
 
-/// Of slice 3, whose output B is GPIO 7.
+/// The registers of slice 3, whose output B is GPIO 7.
 mod offset {
     const SLICE: usize = 3 * 0x14;
     pub const CONTROL: usize = SLICE;
@@ -10,13 +11,13 @@ mod offset {
     pub const COMPARE: usize = SLICE + 0xC;
     pub const TOP: usize = SLICE + 0x10;
 }
-/// Makes the unit a microsecond; the register counts sixteenths.
+/// The divider that makes the unit a microsecond; the register counts sixteenths.
 const DIVIDER: u32 = (super::clock::HERTZ / 1_000_000) << 4;
 const PERIOD: u32 = 20_000;
 const RAISED: u32 = 1000;
 const ENABLE: u32 = 1;
 
-/// Begins with the pen raised.
+/// Starts the pulses with the pen raised.
 pub fn set_up() {
     registers::restart(reset::PWM);
     PWM.write(offset::DIVIDER, DIVIDER);
@@ -25,9 +26,9 @@ pub fn set_up() {
     PWM.write(offset::CONTROL, ENABLE);
 }
 
-/// The pen goes to `height`, 0 (fully raised) to 127, with the next pulse.
+/// Moves the pen to `height`, from 0 (fully raised) to 127, with the next pulse.
 pub fn set_height(height: u8) {
-    // 8 µs each: 2016 µs at the lowest.
+    // Each unit of height takes 8 µs, so the lowest height takes 2016 µs.
     let pulse = RAISED + 8 * u32::from(height);
     PWM.write(offset::COMPARE, pulse << 16);
 }

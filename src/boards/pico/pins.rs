@@ -1,14 +1,15 @@
-//! Which pin does what.
+//! Assigns the pins to their functions.
 
 use rp2040_hal::gpio::{FunctionPio0, FunctionPwm, FunctionSioOutput, FunctionUart, Pins, PullUp};
 
-/// STEP_X, STEP_Y, DIR_X, DIR_Y and ENABLE are this one and the next four.
+/// The first of five consecutive pins: STEP_X, STEP_Y, DIR_X, DIR_Y and ENABLE.
 pub const FIRST_MOTOR_PIN: u32 = 2;
 
-/// Hands the pins over to their peripherals, which must hold the levels to begin with.
+/// Hands the pins over to their peripherals, which must already hold the initial levels.
 pub fn set_up(pins: Pins) {
     pins.gpio0.into_function::<FunctionUart>();
-    // With nothing connected the line rests, which is high; the pad would pull it down to a break.
+    // If nothing is connected, the pull-up keeps the line at rest, which is high. The default of
+    // the pad would pull it low, which is a break.
     pins.gpio1.reconfigure::<FunctionUart, PullUp>();
     pins.gpio2.into_function::<FunctionPio0>();
     pins.gpio3.into_function::<FunctionPio0>();
@@ -20,7 +21,7 @@ pub fn set_up(pins: Pins) {
     // the bus, which needs GPIO 16 not to have the function 8.
     pins.gpio11.into_function::<FunctionSioOutput>();
     pins.gpio12.into_function::<FunctionSioOutput>();
-    // The contacts.
+    // The contacts are inputs with pull-up resistors.
     pins.gpio8.into_pull_up_input();
     pins.gpio9.into_pull_up_input();
     pins.gpio10.into_pull_up_input();

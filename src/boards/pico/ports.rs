@@ -1,8 +1,9 @@
-//! Two serial ports, UART and USB, and one plotter.
+//! The two serial ports, UART and USB, of one plotter.
 //!
-//! Either port can be the sender, and each has lines of its own: what comes by one does not touch a
-//! line of the other. Replies go to every port that has spoken since the start, before the first byte
-//! to both. Real-time bytes count whatever their port, so one port may watch what the other sends.
+//! Either port can be the sender, and each has lines of its own: what comes by one port does not
+//! affect a line of the other. Replies go to every port that has sent something since the start,
+//! and to both before the first byte. Real-time bytes act whatever their port, so one port can
+//! monitor what the other sends.
 
 use core::sync::atomic::{AtomicU8, Ordering};
 
@@ -23,54 +24,55 @@ pub enum Port {
 
 const COUNT: usize = 2;
 
-/// A bit for each port from which a sound byte has come. The ports' handlers write it, which have one
-/// rank.
+/// One bit for each port that has received an undamaged byte. The handlers of the ports write it;
+/// they have the same priority.
 static SPOKEN: AtomicU8 = AtomicU8::new(0);
 
 static SHARED: [Shared; COUNT] = [const { Shared::new() }; COUNT];
 
-/// What the handlers of both ports share: they have one rank, so none interrupts the other.
+/// The data that the handlers of both ports share. They have the same priority, so neither
+/// interrupts the other.
 static INLETS: Owned<Inlets> = Owned::empty();
 
-/// Where received bytes go in.
+/// The receiving ends of both ports.
 pub struct Inlets {
     inlets: [ReceiveMerge; COUNT],
-    /// How often ctrl-X has come, by either port; wraps.
+    /// The number of times that ctrl-X has come by either port; it wraps.
     pub aborts: u32,
 }
 
-/// The main loop's end.
+/// The main loop's end of the ports.
 pub struct Ports {
     lines: [Line; COUNT],
     /// The port whose byte was read last.
     last: usize,
-    /// What is sent goes to USB alone.
+    /// Whether replies go to USB alone.
     is_aside: bool,
     pub uart: serial::Sender,
     pub usb: usb::Sender,
 }
 
-/// Makes the inlets; returns the main loop's ends of them.
+/// Creates the receiving ends for the handlers; returns the main loop's ends.
 pub fn set_up() -> [Line; COUNT] {
     let [uart, usb] = &SHARED;
     let ((uart, uart_line), (usb, usb_line)) = (uart.ends(), usb.ends());
-    // SAFETY: the ports' interrupts are masked since reset, and this runs once (the queues' cells see
-    // to it).
+    // SAFETY: the ports' interrupts are masked since reset, and this runs once (the queues' cells
+    // ensure it).
     unsafe { INLETS.fill(Inlets { inlets: [uart, usb], aborts: 0 }) };
     [uart_line, usb_line]
 }
 
-/// The inlets.
+/// Returns the receiving ends.
 ///
 /// # Safety
 /// As [`Owned::get`], for the handlers of both ports.
 pub unsafe fn inlets() -> Option<&'static mut Inlets> {
-    // SAFETY: the caller's.
+    // SAFETY: the caller meets the contract.
     unsafe { INLETS.get() }
 }
 
 impl Inlets {
-    /// Lets a port's receiver take something, and acts on what that asks for in real time.
+    /// Passes a port's receiver to `take`, and acts on the real-time requests that it returns.
     pub fn take(&mut self, port: Port, take: impl FnOnce(&mut Receiver) -> RealTime) {
         let receiver = &mut self.inlets[port as usize].receiver;
         let asked = take(receiver);
@@ -83,25 +85,25 @@ impl Inlets {
         }
     }
 
-    /// Bytes that a port received are lost here.
+    /// Records that bytes received by a port were lost.
     pub fn lose(&mut self, port: Port) {
         self.inlets[port as usize].receiver.lose();
     }
 
-    /// Puts an ordinary byte into a port's queue; gives it back if there is no place.
+    /// Appends an ordinary byte to the queue of a port; returns it if there is no room.
     pub fn append(&mut self, port: Port, byte: u8) -> Result<(), u8> {
         self.inlets[port as usize].receiver.append(byte)
     }
 }
 
 impl Ports {
-    /// Joins what the ports' set-up gave.
+    /// Combines the parts that the set-up of the ports has returned.
     pub fn new(lines: [Line; COUNT], uart: serial::Sender, usb: usb::Sender) -> Self {
         Self { lines, last: 0, is_aside: false, uart, usb }
     }
 
-    /// The next ordinary byte and the number of its port: see [`Line::read_byte`]. A port is read on
-    /// until nothing waits there or its line ends, then it is the other's turn.
+    /// Returns the next ordinary byte and the number of its port: see [`Line::read_byte`]. It keeps
+    /// reading a port until nothing waits there or its line ends, then it is the other port's turn.
     pub fn read_byte(&mut self) -> Option<(usize, u8)> {
         for _ in 0..COUNT {
             let port = self.last;
@@ -117,23 +119,23 @@ impl Ports {
         None
     }
 
-    /// What was asked in real time: see [`line::take_real_time`].
+    /// Takes the real-time requests: see [`line::take_real_time`].
     pub fn take_real_time(&mut self) -> RealTime {
         line::take_real_time(&mut self.lines)
     }
 
-    /// Whether so many bytes find room at once where they would be sent.
+    /// Whether there is room at once for this many bytes at every port to which they would be sent.
     pub fn has_room(&mut self, bytes: usize) -> bool {
         (!hears(Port::Uart) || self.uart.has_room(bytes))
             && (!hears(Port::Usb) || self.usb.has_room(bytes))
     }
 
-    /// What is sent from now on goes to USB alone, or again to who has spoken.
+    /// Sends replies to USB alone from now on, or again to all ports that have sent something.
     pub fn speak_aside(&mut self, is_aside: bool) {
         self.is_aside = is_aside;
     }
 
-    /// Sends `bytes` to who has spoken.
+    /// Sends `bytes` to the ports that have sent something.
     pub fn write(&mut self, bytes: &[u8]) {
         if self.is_aside {
             return self.usb.write(bytes);

@@ -1,8 +1,9 @@
-//! What is left of the board when the program faults again and again as soon as it starts.
+//! The rescue mode, which runs instead of the plotter when the program faults again and again as
+//! soon as it starts.
 //!
-//! Nothing moves, the drivers are off, the pen is up. Both ports answer: each line with the cause
-//! and `error:9`, `?` with a status, ctrl-X with another try. `$UF2` and the 1200-baud touch lead
-//! to the drive for another image.
+//! Nothing moves, the drivers are off and the pen is up. Both ports answer: each line with the
+//! cause of the fault and `error:9`, `?` with a status, and ctrl-X with another attempt to start.
+//! `$UF2` and the 1200-baud touch open the drive for a new image.
 
 use core::fmt::Write;
 
@@ -12,7 +13,7 @@ use super::emergency::{self, Cause};
 use super::ports::Ports;
 use super::usb;
 
-/// Answers for ever.
+/// Answers the ports forever.
 pub fn run(mut ports: Ports, cause: &Cause) -> ! {
     tell(&mut ports, cause);
     let mut line = heapless::String::<8>::new();
@@ -44,7 +45,7 @@ pub fn run(mut ports: Ports, cause: &Cause) -> ! {
                 let _ = write!(reply, "error:{}\r\n", CommandError::Locked.number()); // It is short.
                 ports.write(reply.as_bytes());
             }
-            // What is longer is no command that counts here.
+            // A longer line is no command that matters here, so its end is dropped.
             Some(byte) => drop(line.push(char::from(byte))),
             None => cortex_m::asm::wfe(),
         }

@@ -1,16 +1,17 @@
 //! The first serial port: UART0.
 //!
-//! What is received goes by DMA into a ring in RAM, each byte with its error bits, so that nothing is
-//! lost while flash is erased or written and every interrupt is masked. The ring is looked at every
-//! millisecond, and so real-time bytes act within about a millisecond. Flash masks interrupts for 400 ms
-//! at most, the time of one sector. In that time a sender may send its window, 240 bytes, and the
-//! other 784 places are for real-time bytes: two in a millisecond. What is overwritten all the same
-//! is noticed by the channels' counts, and marked as lost bytes are.
+//! Received bytes are written by DMA into a ring buffer in RAM, each with its error bits. So
+//! nothing is lost while flash is erased or written and every interrupt is masked. The ring is read
+//! every millisecond, so real-time bytes act within about a millisecond. Flash operations mask
+//! interrupts for at most 400 ms, the time of one sector. In that time a sender may send its window
+//! of 240 bytes, and the other 784 slots are for real-time bytes: two per millisecond. If bytes are
+//! overwritten nevertheless, this is detected by the counts of the channels and marked like lost
+//! bytes.
 //!
-//! Two DMA channels take turns for ever: each, when its count has run down, starts the other, which goes
-//! on at the same place of the ring, because a count is a whole number of rings.
+//! Two DMA channels take turns forever. When the count of one has run down, it starts the other,
+//! which continues at the same position of the ring, because a count is a whole number of rings.
 //!
-//! What is sent waits in a queue, so that an answer does not keep the main loop from the steps.
+//! Sent bytes wait in a queue, so that a reply does not delay the main loop's work for the steps.
 
 use core::sync::atomic::{AtomicU16, Ordering};
 
@@ -24,18 +25,18 @@ use super::registers::{self, DMA, UART0, reset};
 use super::{clock, critical, divider};
 use crate::boards::handler::Owned;
 
-/// Bytes that wait to be sent, at most; one more place than that, for the queue.
+/// The number of slots in the queue of bytes to send, one of which stays empty.
 const SENT_PLACES: usize = 1024;
 
-/// Bytes in the ring, each with its error bits.
+/// The number of bytes in the ring, each with its error bits.
 const RING_PLACES: u32 = 1024;
-/// Places that the channel may fill while the ring is looked at.
+/// The number of slots that the channel may fill while the ring is read.
 const MARGIN: u32 = 64;
-/// Bytes that a channel takes in before it is the other's turn: whole rings.
+/// The number of bytes that a channel receives in its turn; a multiple of the ring.
 const TURN: u32 = 1 << 14;
 const _: () = assert!(TURN.is_multiple_of(RING_PLACES));
 
-#[repr(align(2048))] // Its size, or the channels would not find around.
+#[repr(align(2048))] // The channels wrap around only if the ring is aligned to its size.
 struct Ring([AtomicU16; RING_PLACES as usize]);
 const _: () = assert!(align_of::<Ring>() == size_of::<Ring>());
 
@@ -43,13 +44,13 @@ static RING: Ring = Ring([const { AtomicU16::new(0) }; RING_PLACES as usize]);
 
 static QUEUE: StaticCell<Queue<u8, SENT_PLACES>> = StaticCell::new();
 static SENDER: Owned<Consumer<'static, u8>> = Owned::empty();
-/// How many bytes of the ring have been looked at, modulo two turns.
+/// The number of bytes of the ring that have been read, modulo two turns.
 static LOOKED_AT: Owned<u32> = Owned::empty();
 
-/// The channels that receive; that of the steps has the number 0 and goes first.
+/// The channels that receive. The channel of the steps has number 0 and takes precedence.
 const CHANNELS: [usize; 2] = [1, 2];
 
-/// Registers of a channel of the direct memory access.
+/// The registers of a DMA channel and their bits.
 mod channel {
     pub const BYTES: usize = 0x40;
     pub const READ_ADDRESS: usize = 0x00;
@@ -60,7 +61,7 @@ mod channel {
     pub const BUSY: u32 = 1 << 24;
     pub const REQUEST_OF_UART0_RECEIVER: u32 = 21 << 15;
     pub const QUIET: u32 = 1 << 21;
-    /// Enabled, half-words, writing on around the ring.
+    /// Enabled, half-words, writing around the ring.
     pub const RECEIVE: u32 = 1
         | 1 << 2
         | 1 << 5
@@ -70,17 +71,19 @@ mod channel {
         | QUIET;
 }
 
-/// The main loop's end of what is sent.
+/// The main loop's end of the queue of bytes to send.
 pub struct Sender(Producer<'static, u8>);
 
-/// Readies the port; [`open`] opens it. `ports` is set up, and the steps, who restart the DMA.
+/// Sets up the port; [`open`] opens it. Both `ports` and `steps` must be set up before, because
+/// `steps` resets the DMA.
 pub fn set_up(nvic: &mut NVIC) -> Sender {
     registers::restart(reset::UART0);
     UART0.set_up(clock::HERTZ);
     UART0.receive_by_dma(true);
 
     let (sent, to_send) = QUEUE.init(Queue::new()).split();
-    // SAFETY: the interrupt is masked since reset, and this runs once (the queue's cell sees to it).
+    // SAFETY: the interrupt is masked since reset, and this runs once (the queue's cell ensures
+    // it).
     unsafe {
         SENDER.fill(to_send);
         LOOKED_AT.fill(0);
@@ -89,7 +92,8 @@ pub fn set_up(nvic: &mut NVIC) -> Sender {
     Sender(sent)
 }
 
-/// Opens the port. Its pins are routed to it: an input that is not would be low, which is a break.
+/// Opens the port. Its pins must be connected to it before: an unconnected input would be low,
+/// which is a break.
 pub fn open() {
     let [first, second] = CHANNELS;
     for (this, next, control) in
@@ -104,13 +108,14 @@ pub fn open() {
     UART0.enable();
 }
 
-/// Lets the port's handler look at what has been received. Called every millisecond.
+/// Triggers the port's handler so that it reads what has been received. It is called every
+/// millisecond.
 pub fn look_soon() {
     NVIC::pend(Interrupt::UART0_IRQ);
 }
 
-/// How many bytes have come into the ring since the start, modulo two turns; `None` just while one
-/// channel hands over to the other.
+/// The number of bytes that have been written to the ring since the start, modulo two turns; `None`
+/// while one channel hands over to the other.
 fn received() -> Option<u32> {
     let is_busy =
         |number: usize| DMA.read(channel::BYTES * number + channel::CONTROL) & channel::BUSY != 0;
@@ -120,7 +125,7 @@ fn received() -> Option<u32> {
     (is_busy(number) && left != 0).then(|| before + TURN - left)
 }
 
-/// Takes in what has come into the ring. Called by the port's handler.
+/// Reads what has been written to the ring. It is called by the port's handler.
 fn look(inlets: &mut Inlets) {
     // SAFETY: this is the handler that owns it.
     let Some(looked_at) = (unsafe { LOOKED_AT.get() }) else { return };
@@ -138,12 +143,12 @@ fn look(inlets: &mut Inlets) {
 }
 
 impl Sender {
-    /// Whether so many bytes find room at once.
+    /// Whether there is room at once for this many bytes.
     pub fn has_room(&self, bytes: usize) -> bool {
         self.0.capacity() - self.0.len() >= bytes
     }
 
-    /// Sends `bytes`; waits only while the queue is full.
+    /// Sends `bytes`. It waits only while the queue is full.
     pub fn write(&mut self, bytes: &[u8]) {
         for &byte in bytes {
             let mut rest = self.0.enqueue(byte);
@@ -156,7 +161,7 @@ impl Sender {
     }
 }
 
-/// Lets the line's handler send: its interrupt comes only when the FIFO gets emptier.
+/// Sends from the main loop, because the interrupt comes only when the FIFO gets emptier.
 fn pump() {
     NVIC::mask(Interrupt::UART0_IRQ);
     send();
@@ -164,8 +169,8 @@ fn pump() {
     unsafe { NVIC::unmask(Interrupt::UART0_IRQ) };
 }
 
-/// Fills the FIFO, and asks for an interrupt if more waits. Called by the line's handler, or where it
-/// is masked.
+/// Fills the FIFO, and requests an interrupt if more bytes wait. It is called by the port's
+/// handler, or where the handler is masked.
 fn send() {
     // SAFETY: this is the handler that owns it, or the handler is masked.
     let Some(bytes) = (unsafe { SENDER.get() }) else { return };
@@ -177,7 +182,7 @@ fn send() {
     UART0.interrupt_when_sent(!bytes.is_empty());
 }
 
-/// A place in the FIFO of what is sent, or [`look_soon`].
+/// The interrupt for room in the sender's FIFO, and for [`look_soon`].
 #[interrupt]
 fn UART0_IRQ() {
     divider::keep_during(|| {

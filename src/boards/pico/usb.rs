@@ -1,15 +1,16 @@
-//! The second serial port: USB, of the class CDC-ACM, for which every system has a driver.
+//! The second serial port: USB of the class CDC-ACM, for which every operating system has a driver.
 //!
-//! Received bytes that find no place in the line's queue wait here, and when this is full too, the
-//! controller refuses further packets, so that the host waits with the rest. None is lost: not when
-//! the host suspends the bus, and not when it closes the port. Bytes that act at once act as their
-//! packet comes in.
+//! Received bytes that find no room in the line's queue wait in a queue of this module. When that
+//! is full too, the controller refuses further packets, so that the host waits with the rest. No
+//! byte is lost, even when the host suspends the bus or closes the port. Real-time bytes act as
+//! soon as their packet is received.
 //!
-//! What is sent waits in a queue. If the host takes nothing for [`PATIENCE`] although the queue is
-//! full, it counts as gone, and what would be sent is dropped until it takes something again:
-//! nobody may keep the steps waiting. The same holds once a program has closed the port (DTR has
-//! fallen): replies that it has not taken are dropped, and so is the rest of a line that it has not
-//! ended. A program that opens the port (DTR rises) is greeted, alone: see [`take_opened`].
+//! Sent bytes wait in a queue. If the host takes nothing for [`PATIENCE`] although the queue is
+//! full, it counts as gone. Then bytes to be sent are discarded until it takes something again,
+//! because nothing may delay the steps. The same holds after a program has closed the port (DTR has
+//! fallen): replies that it has not taken are discarded, and so is the rest of a line that it has
+//! not ended. A program that opens the port (DTR rises) gets a greeting, which goes only to it: see
+//! [`take_opened`].
 //!
 //! Two of the chip's errata are worked around: see [`connection`] for E5, which takes GPIO 15 for a
 //! millisecond when a host resets the bus, and [`frame`] for E15.
@@ -41,31 +42,35 @@ use super::{clock, critical, divider};
 use crate::boards::handler::Owned;
 use crate::boards::peripheral::Peripheral;
 
-/// For tests and for projects without a number of their own: <https://pid.codes/1209/0001>.
+/// The USB number for tests and for projects without a number of their own:
+/// <https://pid.codes/1209/0001>.
 const VENDOR_AND_PRODUCT: UsbVidPid = UsbVidPid(0x1209, 0x0001);
 const PACKET: usize = 64;
-/// A full packet would need an empty one after it, for the host to see the end.
+/// The size of a sent packet. After a full packet, an empty one would be needed for the host to see
+/// the end.
 const SENT_PACKET: usize = PACKET - 1;
-/// Bytes that wait to be sent, at most; one more place than that, for the queue.
+/// The number of slots in the queue of bytes to send, one of which stays empty.
 const SENT_PLACES: usize = 2048;
-/// In microseconds. A host takes a packet a millisecond when it is busy.
+/// The time, in microseconds, after which a host that takes nothing counts as gone. A busy host
+/// takes a packet every millisecond.
 const PATIENCE: u32 = 20_000;
 
-/// Received bytes that wait for a place in the line's queue, at most.
+/// The greatest number of received bytes that wait for room in the line's queue.
 const WAITING_PLACES: usize = 512;
-/// Who opens the port at this rate and closes it wants the drive for a new image, as of an Arduino.
+/// The baud rate of the touch: whoever opens the port at this rate and closes it asks for the drive
+/// for a new image, as with an Arduino.
 const TOUCH_RATE: u32 = 1200;
 
-/// Registers of the controller's: interrupts as they are, masked or not; bits to set in their mask,
-/// and to clear in it; filled and emptied packets.
+/// Registers of the controller: the interrupts before masking; the bits to set in their mask, and
+/// to clear in it; and the packets that were filled and emptied.
 const INTERRUPTS: usize = 0x8C;
 const ENABLE: usize = 0x2090;
 const DISABLE: usize = 0x3090;
 const BUS_RESET: u32 = 1 << 12;
 const PACKETS_DONE: usize = 0x58;
 
-/// The controller's memory: the control words of the endpoints' buffers begin at 0x80. Used here
-/// only where the driver has no function, beside it.
+/// The controller's memory, in which the control words of the endpoints' buffers begin at 0x80. It
+/// is used here, in addition to the driver, only where the driver has no function.
 // SAFETY: the address map of the RP2040's data sheet, 4.1.3; the words may be read and written at
 // any time.
 const BUFFERS: Peripheral = unsafe { Peripheral::at(0x5010_0000) };
@@ -74,7 +79,8 @@ mod buffer {
     pub const AVAILABLE: u32 = 1 << 10;
     pub const IS_DATA_1: u32 = 1 << 13;
     pub const FULL: u32 = 1 << 15;
-    /// Cycles of the core in which a packet of 64 bytes, begun before, is over: 60 microseconds.
+    /// Cycles of the core after which a packet of 64 bytes that has already begun is over: 60
+    /// microseconds.
     pub const CYCLES: u32 = 7500;
 }
 
@@ -82,46 +88,47 @@ static BUS: StaticCell<UsbBusAllocator<UsbBus>> = StaticCell::new();
 static QUEUE: StaticCell<Queue<u8, SENT_PLACES>> = StaticCell::new();
 static DEVICE: Owned<Device> = Owned::empty();
 
-/// The host takes nothing. The main loop sets it, the handler clears it.
+/// Whether the host takes nothing. The main loop sets it, and the handler clears it.
 static HOST_IS_GONE: AtomicBool = AtomicBool::new(true);
-/// Received bytes wait for a place, or a reset of the bus for its end. The handler writes it.
+/// Whether received bytes wait for room, or a bus reset has not ended yet. The handler writes it.
 static IS_WAITED: AtomicBool = AtomicBool::new(false);
-/// A program has opened the port. The handler sets it, the main loop clears it.
+/// Whether a program has opened the port. The handler sets it, and the main loop clears it.
 static WAS_OPENED: AtomicBool = AtomicBool::new(false);
-/// A program has opened the port at [`TOUCH_RATE`] and closed it. The handler sets it, the main
-/// loop clears it.
+/// Whether a program has opened the port at [`TOUCH_RATE`] and closed it. The handler sets it, and
+/// the main loop clears it.
 static WAS_TOUCHED: AtomicBool = AtomicBool::new(false);
 
 struct Device {
     device: UsbDevice<'static, UsbBus>,
     class: CdcAcmClass<'static, UsbBus>,
     is_up: bool,
-    /// A program has the port open: DTR.
+    /// Whether a program has the port open, according to DTR.
     is_open: bool,
     connection: Connection,
-    /// The host resets the bus, and the interrupt that says so is masked.
+    /// Whether the host resets the bus and the interrupt that reports it is masked.
     awaits_bus: bool,
     frame: Frame,
-    /// Received bytes that wait for a place.
+    /// The received bytes that wait for room.
     waiting: Deque<u8, WAITING_PLACES>,
-    /// The last received byte does not end a line.
+    /// Whether the last received byte does not end a line.
     is_in_line: bool,
-    /// See [`Inlets::aborts`].
+    /// The value of [`Inlets::aborts`] when it was last read.
     aborts: u32,
     to_send: Consumer<'static, u8>,
-    /// Bytes that the controller has not taken yet.
+    /// The bytes that the controller has not taken yet.
     packet: Vec<u8, SENT_PACKET>,
 }
 
-/// The main loop's end of what is sent.
+/// The main loop's end of the queue of bytes to send.
 pub struct Sender {
     bytes: Producer<'static, u8>,
-    /// Since when there has been no room, in microseconds, and how many bytes waited then.
+    /// The time since which there has been no room, in microseconds, and the number of bytes that
+    /// waited then.
     full: Option<(u32, usize)>,
 }
 
-/// Shows the device to the host, with this serial number. `ports` is set up, and the pins are out
-/// of their reset.
+/// Connects the device to the host, with this serial number. `ports` must be set up, and the pins
+/// must be out of reset.
 ///
 /// # Panics
 /// Never: the strings fit.
@@ -132,7 +139,7 @@ pub fn set_up(
     resets: &mut RESETS,
     number: &'static str,
 ) -> Sender {
-    const POWERED: bool = true; // The Pico's power comes from there; the pin that would tell is in use.
+    const POWERED: bool = true; // USB powers the Pico; the pin that would show it is in use.
     let bus: &UsbBusAllocator<_> = BUS.init(UsbBusAllocator::new(UsbBus::new(
         controller.0,
         controller.1,
@@ -163,7 +170,8 @@ pub fn set_up(
             to_send,
             packet: Vec::new(),
         };
-        // SAFETY: the interrupt is masked since reset, and this runs once (the queue's cell sees to it).
+        // SAFETY: the interrupt is masked since reset, and this runs once (the queue's cell ensures
+        // it).
         unsafe { DEVICE.fill(device) };
         critical::enable(nvic, Interrupt::USBCTRL_IRQ, critical::SERIAL_PRIORITY);
     }
@@ -171,8 +179,8 @@ pub fn set_up(
 }
 
 impl Sender {
-    /// Whether so many bytes find room at once. A host that takes nothing for [`PATIENCE`] although
-    /// they do not counts as gone.
+    /// Whether there is room at once for this many bytes. If there is not, and the host takes
+    /// nothing for [`PATIENCE`], the host counts as gone.
     pub fn has_room(&mut self, bytes: usize) -> bool {
         let waiting = self.bytes.len();
         if HOST_IS_GONE.load(Ordering::Relaxed) || self.bytes.capacity() - waiting >= bytes {
@@ -191,7 +199,7 @@ impl Sender {
         false
     }
 
-    /// Sends `bytes`; waits while the queue is full, but not for a host that is gone.
+    /// Sends `bytes`. It waits while the queue is full, but not for a host that is gone.
     pub fn write(&mut self, bytes: &[u8]) {
         for &byte in bytes {
             let began = clock::microseconds();
@@ -208,25 +216,26 @@ impl Sender {
     }
 }
 
-/// Takes bytes in that found no place, if there are any, and looks whether the bus is ready. Called
-/// by the main loop.
+/// Moves waiting bytes on, if there are any, and checks whether the bus is ready. The main loop
+/// calls it.
 pub fn go_on() {
     if IS_WAITED.load(Ordering::Relaxed) {
         critical_section::with(|_| serve());
     }
 }
 
-/// Whether a program has opened the port since last asked.
+/// Whether a program has opened the port since the last call.
 pub fn take_opened() -> bool {
     take(&WAS_OPENED)
 }
 
-/// Whether the drive for a new image was asked for since last asked.
+/// Whether the drive for a new image has been requested since the last call.
 pub fn take_touched() -> bool {
     take(&WAS_TOUCHED)
 }
 
-/// Reads a flag and clears it. The handler only sets it, and what comes in between is the same.
+/// Reads a flag and clears it. The handler only sets it, so nothing is lost if the handler runs in
+/// between.
 fn take(flag: &AtomicBool) -> bool {
     let is_set = flag.load(Ordering::Relaxed);
     if is_set {
@@ -235,16 +244,17 @@ fn take(flag: &AtomicBool) -> bool {
     is_set
 }
 
-/// All that there is to do. Called by the handler, or where it and that of the other port are masked.
+/// Does all the work of the port. It is called by the handler, or where it and the handler of the
+/// other port are masked.
 fn serve() {
     // SAFETY: by the contract above.
     if let (Some(device), Some(inlets)) = unsafe { (DEVICE.get(), ports::inlets()) } {
         device.frame.look();
-        // Polling forgets it.
+        // This must be read before polling, which clears it.
         let took = device.class.write_ep().address().index();
         let took = USB.read(PACKETS_DONE) & 1 << (2 * took) != 0;
         if device.connection.is_ready() {
-            // The driver looks at interrupts that are not masked only.
+            // The driver sees only interrupts that are not masked.
             device.await_bus(false);
             device.device.poll(&mut [&mut device.class]);
         }
@@ -261,8 +271,9 @@ fn serve() {
 }
 
 impl Device {
-    /// While the host resets the bus, for some 10 to 50 ms, or for as long as it has no power, the
-    /// interrupt would come again at once: then it is masked, and the main loop asks instead.
+    /// Masks or unmasks the interrupt of a bus reset. While the host resets the bus, for some 10 to
+    /// 50 ms or for as long as the host has no power, the interrupt would come again at once. So it
+    /// is masked, and the main loop checks instead.
     fn await_bus(&mut self, awaits: bool) {
         if awaits != self.awaits_bus {
             self.awaits_bus = awaits;
@@ -270,19 +281,20 @@ impl Device {
         }
     }
 
-    /// Begins anew with each host. A host that suspends the bus is the same afterwards.
+    /// Resets the port for each new host. A host that suspends the bus is still the same
+    /// afterwards.
     fn follow_state(&mut self) {
         let state = self.device.state();
         let is_up = state == UsbDeviceState::Configured;
         if is_up != self.is_up && state != UsbDeviceState::Suspend {
             self.is_up = is_up;
             self.forget_sent();
-            // Until a program opens the port.
+            // The host counts as gone until a program opens the port.
             HOST_IS_GONE.store(true, Ordering::Relaxed);
         }
     }
 
-    /// Follows the program at the host's end of the port.
+    /// Follows whether a program at the host has the port open.
     fn follow_port(&mut self) {
         let is_open = self.class.dtr();
         if is_open == self.is_open {
@@ -298,7 +310,8 @@ impl Device {
         self.forget_sent();
         self.take_packet_back();
         if self.is_in_line {
-            // The line is refused, and the next one is a line of its own. Packets are read only while there are more places than these.
+            // The unfinished line is refused, and the next one is a separate line. There is room,
+            // because packets are read only while there are two slots more than they need.
             let _ = self.waiting.push_back(DAMAGED);
             let _ = self.waiting.push_back(b'\n');
             self.is_in_line = false;
@@ -313,7 +326,7 @@ impl Device {
         while self.to_send.dequeue().is_some() {}
     }
 
-    /// Takes a packet back that the controller holds for the host, if the host does not take it
+    /// Takes back a packet that the controller holds for the host, unless the host is taking it
     /// just now.
     fn take_packet_back(&mut self) {
         let endpoint = self.class.write_ep().address().index();
@@ -325,12 +338,14 @@ impl Device {
         BUFFERS.write(place, control & !buffer::AVAILABLE);
         cortex_m::asm::delay(buffer::CYCLES);
         if USB.read(PACKETS_DONE) & 1 << (2 * endpoint) == 0 {
-            // The next packet has the number of this one, which never was: the driver turns it.
+            // The next packet must have the data toggle of this one, which was never sent; the
+            // driver will flip it.
             BUFFERS.write(place, control & !(buffer::AVAILABLE | buffer::FULL) ^ buffer::IS_DATA_1);
         }
     }
 
-    /// The host took a packet. What it missed if it was gone would be half of something.
+    /// Handles a packet that the host has taken. If it counted as gone, what it missed is
+    /// discarded, because it would be incomplete.
     fn welcome_back(&mut self) {
         if self.is_open && HOST_IS_GONE.load(Ordering::Relaxed) {
             self.forget_sent();
@@ -338,7 +353,7 @@ impl Device {
         }
     }
 
-    /// Drops what waits if ctrl-X has come since, by either port.
+    /// Discards the waiting bytes if ctrl-X has come by either port since the last call.
     fn drop_void(&mut self, inlets: &Inlets) {
         if self.aborts != inlets.aborts {
             self.aborts = inlets.aborts;
@@ -356,14 +371,15 @@ impl Device {
                 self.waiting.pop_front();
             }
             if self.waiting.capacity() - self.waiting.len() < PACKET + 2 {
-                // The next packet waits in the controller; only its interrupt must not come for ever.
+                // The next packet waits in the controller. Its interrupt is cleared so that it does
+                // not come again and again.
                 let number = self.class.read_ep().address().index();
                 USB.write(PACKETS_DONE, 1 << (2 * number + 1));
                 return;
             }
             let mut packet = [0; PACKET];
             let Ok(count) = self.class.read_packet(&mut packet) else { return };
-            // Who sends is there, also without DTR.
+            // A host that sends is present, even without DTR.
             if self.is_up && count > 0 {
                 HOST_IS_GONE.store(false, Ordering::Relaxed);
             }
@@ -372,7 +388,7 @@ impl Device {
                 inlets.take(Port::Usb, |receiver| match receiver.sort_out(byte) {
                     Ok(byte) => {
                         *is_in_line = byte != b'\n' && byte != b'\r';
-                        let _ = waiting.push_back(byte); // There is a place.
+                        let _ = waiting.push_back(byte); // There is room.
                         RealTime::default()
                     }
                     Err(asked) => asked,
@@ -391,7 +407,7 @@ impl Device {
             while !self.packet.is_full()
                 && let Some(byte) = self.to_send.dequeue()
             {
-                let _ = self.packet.push(byte); // There is a place.
+                let _ = self.packet.push(byte); // There is room.
             }
             if self.packet.is_empty() {
                 return self.frame.leave();

@@ -1,6 +1,7 @@
-//! The two loops over the words of steps, by hand: the compiler keeps half of what they count on the stack.
+//! The two loops over the words of the steps, in assembly, because the compiler would keep half of
+//! their counters on the stack.
 //!
-//! They lie in RAM, with what calls them, so that the flash's cache has room for the planner.
+//! They are in RAM, with their callers, so that the cache of the flash has room for the planner.
 
 use core::sync::atomic::AtomicU32;
 
@@ -9,7 +10,8 @@ use penup::motion::StepTrain;
 core::arch::global_asm!(
     ".section .data.penup_words, \"ax\"",
     ".balign 4",
-    // r0: train, r1: words, r2: their end. 15 cycles a straight move, 17 a diagonal one.
+    // In: r0, the train; r1, the words; r2, their end. It takes 15 cycles for a straight step and
+    // 17 for a diagonal one.
     ".global penup_write_train",
     ".type penup_write_train, %function",
     ".thumb_func",
@@ -68,7 +70,8 @@ core::arch::global_asm!(
     "mov r10, r6",
     "mov r11, r7",
     "pop {{r0, r4-r7, pc}}",
-    // r0: words, r1: their end, r2: what each pulse adds, r3: sums. 14 cycles a word.
+    // In: r0, the words; r1, their end; r2, the table of what each pulse adds; r3, the sums. It
+    // takes 14 cycles per word.
     ".global penup_count_pulses",
     ".type penup_count_pulses, %function",
     ".thumb_func",
@@ -105,14 +108,14 @@ unsafe extern "C" {
     ) -> *const u32;
 }
 
-/// Writes the next steps of the train, one for each of the `words`.
+/// Writes the next steps of the train, one into each of the `words`.
 pub fn write_train(train: &mut StepTrain, words: &[AtomicU32]) {
     if words.is_empty() {
         return;
     }
     let words = words.as_ptr_range();
-    // SAFETY: it reads and writes the ten fields of the train, in their order (`repr(C)`), and writes the words,
-    // which are atomic and so may change, of which there is one at least.
+    // SAFETY: it reads and writes the ten fields of the train, in their order (`repr(C)`), and it
+    // writes the words. The words are atomic and so may change, and there is at least one.
     unsafe {
         penup_write_train(
             train,
@@ -122,16 +125,18 @@ pub fn write_train(train: &mut StepTrain, words: &[AtomicU32]) {
     }
 }
 
-/// Counts the pulses up to the first word that is none: adds `moves` of the levels of each to the first of the
-/// `sums`, and its ticks to the second. Says how many they are.
+/// Counts the pulses up to the first word that is no pulse, and returns their number. For each
+/// pulse it adds the entry of `moves` for its levels to the first of the `sums`, and its ticks to
+/// the second.
 pub fn count_pulses(words: &[AtomicU32], moves: &[u32; 32], sums: &mut [u32; 2]) -> usize {
     if words.is_empty() {
         return 0;
     }
     let words = words.as_ptr_range();
     let start = words.start.cast::<u32>();
-    // SAFETY: it reads the words, of which there is one at least, and of the 32 moves that of the five bits above
-    // which a pulse has no more than its mark; it adds to the two sums.
+    // SAFETY: it reads the words, of which there is at least one. Of the 32 moves it reads that of
+    // the five level bits, because a pulse has no other bits set but its mark. It adds to the two
+    // sums.
     let counted =
         unsafe { penup_count_pulses(start, words.end.cast::<u32>(), moves.as_ptr(), sums) };
     (counted as usize - start as usize) / size_of::<u32>()

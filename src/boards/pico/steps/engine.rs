@@ -1,4 +1,5 @@
-//! The state machine and the DMA channel: their registers, the program, orders to them.
+//! The PIO state machine and the DMA channel of the steps: their registers, the program, and the
+//! commands to them.
 
 use penup::motion::{StepEvent, TICKS_PER_SECOND};
 
@@ -7,21 +8,22 @@ use crate::boards::pico::clock;
 use crate::boards::pico::pins::FIRST_MOTOR_PIN;
 use crate::boards::pico::registers::{self, DMA, PIO0, reset};
 
-/// A pass of the counting loop is a tick.
+/// The cycles of one pass of the counting loop, which is one tick.
 const CYCLES_PER_TICK: u32 = clock::HERTZ / TICKS_PER_SECOND;
 const _: () = assert!(CYCLES_PER_TICK == 5 && clock::HERTZ.is_multiple_of(TICKS_PER_SECOND));
-/// Where the program goes on, in a word's place for it.
+/// The address at which the program continues, in the bits of a word that hold it.
 pub mod target {
     pub const MOVE_PEN: u32 = 0;
     pub const WAIT: u32 = 1 << 5;
     pub const PULSE: u32 = 6 << 5;
 }
 pub const TARGETS: u32 = 7 << 5;
-/// Ticks that a word takes beyond its count, by its target; a pulse takes its width, too.
+/// The ticks that a word takes beyond its count, by its target. A pulse takes its width in
+/// addition.
 pub const WAIT_TICKS: u32 = 2;
 pub const PEN_TICKS: u32 = 3;
 pub const PULSE_TICKS: u32 = 2;
-/// Ticks of a pulse beyond its count.
+/// The ticks of a pulse beyond its count.
 const WIDTH_TICKS: u32 = 2;
 
 /// Registers of the PIO block and its state machine 0.
@@ -43,17 +45,17 @@ const ENABLE: u32 = 1;
 const RESTART: u32 = 1 << 4;
 pub const STALLED: u32 = 1 << 24;
 pub const LEVEL: u32 = 0xF;
-/// Flag 0, in the flags and among the interrupts.
+/// Flag 0, in the register of flags and in that of interrupts.
 pub const FLAG: u32 = 1;
 const FLAG_INTERRUPT: u32 = 1 << 8;
 const SHIFT_RIGHT_BOTH: u32 = 0b11 << 18;
-/// The receiver's places are the sender's: 8 words.
+/// Joins the slots of the receiver to those of the sender, which gives 8 words.
 const JOIN_SENDER: u32 = 1 << 30;
 
-/// Instructions that the core hands to the state machine.
+/// Instructions that the core makes the state machine execute.
 pub mod order {
     pub const JUMP_TO_START: u32 = super::START;
-    /// The width of the pulses, from the queue to where the program looks for it.
+    /// Moves the width of the pulses from the queue to where the program reads it.
     pub const PULL: u32 = 0x80A0;
     pub const KEEP_WIDTH: u32 = 0xA0C7;
     pub const PULL_WITHOUT_WAITING: u32 = 0x8080;
@@ -61,14 +63,14 @@ pub mod order {
     pub const SET_DIRECTIONS: u32 = 0xE080;
 }
 
-/// Registers of channel 0 of the direct memory access, and of all.
+/// The registers of DMA channel 0, and those common to all channels.
 pub mod channel {
     pub const READ_ADDRESS: usize = 0x00;
     pub const WRITE_ADDRESS: usize = 0x04;
     pub const COUNT: usize = 0x08;
-    /// Without a start.
+    /// Writing this register does not start the channel.
     pub const CONTROL: usize = 0x10;
-    /// Count, and starts.
+    /// Writing the count here starts the channel.
     pub const START: usize = 0x1C;
     pub const INTERRUPT_ENABLE: usize = 0x404;
     pub const INTERRUPT: usize = 0x40C;
@@ -76,17 +78,18 @@ pub mod channel {
 }
 pub const CHANNEL: u32 = 1;
 pub const BUSY: u32 = 1 << 24;
-/// Enabled, before other channels, words, reading on around the ring, no chain, paced by `SEND`.
+/// Enabled, high priority, words, reading around the ring, no chain, paced by `SEND`.
 const FEED: u32 = 1 | 1 << 1 | 2 << 2 | 1 << 4 | size_of::<Ring>().trailing_zeros() << 6;
 
-/// Where the program waits for the next word.
+/// The address at which the program waits for the next word.
 const START: u32 = 3;
 pub const LEVELS: u32 = 0x1F;
 pub const PULSES: u32 = (StepEvent::STEP_X | StepEvent::STEP_Y) as u32;
-/// Nothing pulsed, drivers off: their pin is active low.
+/// The levels without pulses and with the drivers off; their pin is active low.
 pub const RELEASED: u32 = StepEvent::DRIVERS_ON as u32;
 
-/// Readies state machine and channel. The pins are outputs afterwards, drivers off.
+/// Sets up the state machine and the channel. Afterwards the pins are outputs and the drivers are
+/// off.
 pub fn set_up() {
     registers::restart(reset::PIO0 | reset::DMA);
     let program = pio::pio_asm!(
@@ -124,11 +127,13 @@ pub fn set_up() {
     DMA.write(channel::INTERRUPT_ENABLE, CHANNEL);
 }
 
+/// Makes the state machine execute an instruction at once.
 pub fn order(instruction: u32) {
     PIO0.write(machine::INSTRUCTION, instruction);
 }
 
-/// Makes the pins outputs of these levels, at once. The program sets pulses only.
+/// Makes the pins outputs with these levels, at once. The program's `set` instruction affects only
+/// the pulse pins.
 pub fn set_pins(levels: u32) {
     let first = FIRST_MOTOR_PIN;
     let pins = |set: u32| set.count_ones() << 26 | LEVELS.count_ones() << 20 | first << 5 | first;
@@ -138,7 +143,7 @@ pub fn set_pins(levels: u32) {
     PIO0.write(machine::PINS, pins(PULSES));
 }
 
-/// Lets the state machine begin, with pulses of that width. Its queue is empty.
+/// Starts the state machine with pulses of this width. Its queue must be empty.
 pub fn begin(pulse_ticks: u32) {
     PIO0.write(machine::CONTROL, RESTART);
     PIO0.write(machine::SEND, pulse_ticks.saturating_sub(WIDTH_TICKS));
@@ -148,7 +153,7 @@ pub fn begin(pulse_ticks: u32) {
     PIO0.write(machine::CONTROL, ENABLE);
 }
 
-/// Stops for good with the drivers off, in a fault.
+/// Stops the state machine for good with the drivers off, after a fault.
 pub fn release() {
     PIO0.write(machine::CONTROL, 0);
     set_pins(RELEASED);

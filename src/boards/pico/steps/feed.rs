@@ -1,7 +1,8 @@
-//! The interrupt that hands the words over to the DMA channel, block by block, and brakes where the ring runs dry.
+//! The interrupt that hands the words to the DMA channel, block by block, and brakes the machine
+//! where the ring runs empty.
 //!
-//! It comes when a block has ended, and the state machine lives on the 8 words of its queue until
-//! the next one begins. So all functions here lie in RAM: see [`critical`].
+//! The interrupt comes when a block has ended. Until the next block begins, the state machine has
+//! only the 8 words of its queue. So all functions here are in RAM: see [`critical`].
 
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering, fence};
 
@@ -17,37 +18,38 @@ use crate::boards::handler::Owned;
 use crate::boards::pico::critical;
 use crate::boards::pico::registers::{DMA, PIO0};
 
-/// Words in a block that goes as planned, at most: the state machine's queue lasts while they are
-/// looked at, some 45 cycles each.
+/// The greatest number of words in a block that is sent as planned. The queue of the state machine
+/// lasts while they are examined, which takes some 45 cycles each.
 const CALM_WORDS: u32 = 16;
-/// Words in a block that is braked, at most: some 100 cycles each. The state machine's queue is as long, and
-/// lasts 2000 cycles at 500,000 steps a second.
+/// The greatest number of words in a block that is braked, which takes some 100 cycles per word.
+/// The queue of the state machine is as long, and it lasts 2000 cycles at 500,000 steps per second.
 const BRAKED_WORDS: u32 = 8;
-/// Groups in a block behind which enough waits, at most.
+/// The greatest number of groups in a block after which enough steps wait.
 const FAR_GROUPS: u32 = 8;
-/// Steps with fewer ticks are braked some at a time: above 200,000 a second.
+/// Steps with fewer ticks than this are braked several at a time: above 200,000 per second.
 const FAST_TICKS: u32 = TICKS_PER_SECOND / 200_000;
 
-#[repr(align(64))] // Its size, so that the channel finds no end of a ring in it.
+#[repr(align(64))] // Aligned to its size, it does not cross the end of a ring.
 struct Block([AtomicU32; BRAKED_WORDS as usize]);
 const _: () = assert!(align_of::<Block>() == size_of::<Block>());
 
-/// The block that is braked.
+/// The copy of a block that is braked.
 static BRAKED: Block = Block([const { AtomicU32::new(0) }; BRAKED_WORDS as usize]);
 pub static BRAKE: Owned<Brake> = Owned::empty();
-/// The last block was braked. Written where the channel's interrupt is masked.
+/// Whether the last block was braked. It is written where the channel's interrupt is masked.
 static BRAKING: AtomicBool = AtomicBool::new(false);
-/// Words put into the ring; wraps. The main loop alone writes it.
+/// The number of words put into the ring; it wraps. Only the main loop writes it.
 pub static WRITTEN: AtomicU32 = AtomicU32::new(0);
-/// Words that the channel was told to take; wraps. Written where the channel's interrupt is masked.
+/// The number of words that the channel was told to take; it wraps. It is written where the
+/// channel's interrupt is masked.
 pub static TOLD: AtomicU32 = AtomicU32::new(0);
-/// Words of a block that was given up, which the channel's count still shows. Written where the channel's interrupt
-/// is masked.
+/// The number of words of an abandoned block that the channel's count still shows. It is written
+/// where the channel's interrupt is masked.
 pub static GIVEN_UP: AtomicU32 = AtomicU32::new(0);
-/// A block is under way. Written where the channel's interrupt is masked.
+/// Whether a block is being transferred. It is written where the channel's interrupt is masked.
 pub static FEEDING: AtomicBool = AtomicBool::new(false);
 
-/// How many words have left the channel and the state machine's queue.
+/// The number of words that have left the channel and the queue of the state machine.
 #[inline(never)]
 #[unsafe(link_section = ".data.in_ram")]
 pub fn taken() -> u32 {
@@ -63,7 +65,7 @@ pub fn taken() -> u32 {
     })
 }
 
-/// Lets words that wait begin, unless some are under way.
+/// Starts the transfer of waiting words, unless one is in progress.
 #[inline(never)]
 #[unsafe(link_section = ".data.in_ram")]
 pub fn start() {
@@ -74,8 +76,8 @@ pub fn start() {
     });
 }
 
-/// Stops state machine and channel at once. The channel's interrupt does not come any more, until
-/// [`let_interrupt_come`].
+/// Stops the state machine and the channel at once. The channel's interrupt does not come again
+/// until [`let_interrupt_come`].
 #[inline(never)]
 #[unsafe(link_section = ".data.in_ram")]
 pub fn stop() {
@@ -88,12 +90,12 @@ pub fn stop() {
     });
 }
 
-/// The channel's interrupt comes again when a block has ended.
+/// Enables the channel's interrupt at the end of a block again.
 pub fn let_interrupt_come() {
     DMA.write(channel::INTERRUPT_ENABLE, CHANNEL);
 }
 
-/// Tells the channel what to take next. Called where its interrupt is masked.
+/// Tells the channel what to transfer next. It is called where the channel's interrupt is masked.
 #[inline(never)]
 #[unsafe(link_section = ".data.in_ram")]
 fn feed() {
@@ -108,7 +110,7 @@ fn feed() {
     let (mut address, mut words) = (ring_address(told), count);
     if STATE.brake().is_on() {
         words = far_words(brake, told, count);
-        // What had to be braked goes on so, and is not looked at twice.
+        // If the last block had to be braked, this one is braked without another examination first.
         if words == 0 && !BRAKING.load(Ordering::Relaxed) {
             words = calm_words(brake, told, count);
         }
@@ -122,14 +124,15 @@ fn feed() {
     }
     TOLD.store(told.wrapping_add(words), Ordering::Relaxed);
     GIVEN_UP.store(0, Ordering::Relaxed);
-    // The channel reads what was written to the block and to the ring, and the compiler knows of no
-    // reader.
+    // The fence is needed because the channel reads what was written to the block and to the ring,
+    // and the compiler does not know of this reader.
     fence(Ordering::Release);
     DMA.write(channel::READ_ADDRESS, address);
     DMA.write(channel::START, words);
 }
 
-/// How many of the `count` words from `told` on go as planned, since enough waits behind them, whatever they are.
+/// The number of the `count` words from `told` on that can be sent as planned because enough steps
+/// wait after them, whatever these words are.
 #[inline(always)]
 fn far_words(brake: &mut Brake, told: u32, count: u32) -> u32 {
     let group = told / GROUP;
@@ -143,9 +146,9 @@ fn far_words(brake: &mut Brake, told: u32, count: u32) -> u32 {
     0
 }
 
-/// How many of the `count` words from `told` on go as planned, with one look at all of them; 0 if they
-/// have to be looked at one by one.
-#[inline(never)] // On its own it stays in the core's registers.
+/// The number of the `count` words from `told` on that can be sent as planned according to one
+/// check of all of them; 0 if they must be examined one by one.
+#[inline(never)] // As a function of its own it needs only the core's registers.
 #[unsafe(link_section = ".data.in_ram")]
 fn calm_words(brake: &mut Brake, told: u32, count: u32) -> u32 {
     let (mut words, mut ticks) = (0, 0);
@@ -165,8 +168,9 @@ fn calm_words(brake: &mut Brake, told: u32, count: u32) -> u32 {
     if brake.pass(around, longest, shortest, STATE.brake()) { words } else { 0 }
 }
 
-/// Copies a block of the `count` words from `told` on, with the same least ticks for all: far from rest, where there is little
-/// time. Says how many they are; 0 if that will not do.
+/// Copies a block of the `count` words from `told` on and applies the same least ticks to all. This
+/// is used at high speed, where there is little time. Returns the number of words; 0 if it is not
+/// possible.
 #[inline(never)]
 #[unsafe(link_section = ".data.in_ram")]
 fn brake_evenly(brake: &mut Brake, told: u32, count: u32) -> u32 {
@@ -198,8 +202,8 @@ fn brake_evenly(brake: &mut Brake, told: u32, count: u32) -> u32 {
     BRAKED_WORDS
 }
 
-/// Copies the first of the `count` words from `told` on, each step with as many ticks as it takes at
-/// least. Says how many.
+/// Copies the first of the `count` words from `told` on, and lengthens each step to the least ticks
+/// that it needs. Returns the number of words.
 #[inline(never)]
 #[unsafe(link_section = ".data.in_ram")]
 fn brake_words(brake: &mut Brake, told: u32, count: u32) -> u32 {
@@ -213,7 +217,7 @@ fn brake_words(brake: &mut Brake, told: u32, count: u32) -> u32 {
             let mut least = brake.step(unpack(step), STATE.brake());
             let planned = (word >> 8) + beyond;
             if least > planned && number + 1 < count {
-                // What follows may be a wait between two steps.
+                // The next word may be a wait between two steps, whose ticks count as well.
                 let next = place(at.wrapping_add(1)).load(Ordering::Relaxed);
                 if next & TARGETS == target::WAIT {
                     least = least.saturating_sub((next >> 8) + WAIT_TICKS);

@@ -1,4 +1,5 @@
-//! The pen's heights and the steps of its motor, which wait beside the words.
+//! The heights of the pen and the steps of its motor, which wait in a queue of their own beside the
+//! words.
 
 use heapless::spsc::{Consumer, Queue};
 use rp2040_hal::pac::interrupt;
@@ -10,9 +11,10 @@ use crate::boards::handler::Owned;
 use crate::boards::pico::registers::PIO0;
 use crate::boards::pico::{critical, lift, pen};
 
-/// Heights of the pen that wait, or two for each step of its motor, at most; one more place than that, for the queue.
+/// The number of slots in the queue, one of which stays empty. A height of the pen takes one slot,
+/// and a step of its motor takes two.
 pub const HEIGHTS: usize = 1024;
-/// In the place of a height: the pins of the pen's motor take levels.
+/// The bits of an entry that sets the pins of the pen's motor instead of a height.
 pub mod lift_levels {
     pub const MARK: u8 = 1 << 7;
     pub const STEP: u8 = 1;
@@ -22,8 +24,9 @@ pub mod lift_levels {
 pub static HEIGHT_QUEUE: StaticCell<Queue<u8, HEIGHTS>> = StaticCell::new();
 pub static HEIGHTS_DUE: Owned<Consumer<'static, u8>> = Owned::empty();
 
-/// Two heights that come faster than the interrupt would leave one behind: the last counts. Steps of the pen's
-/// motor are left over only where all was thrown away.
+/// Processes the entries that are left in the queue. If two heights come faster than the interrupt,
+/// one is left over, and the last one counts. Steps of the pen's motor are left over only where
+/// everything was discarded.
 pub fn heal_pen() {
     critical::with_pen_masked(|| {
         // SAFETY: the handler that owns it is masked.
@@ -38,7 +41,7 @@ pub fn heal_pen() {
     });
 }
 
-/// The pen's motor takes a direction, and a step if asked.
+/// Sets the direction of the pen's motor, and makes a step if `step` is true.
 fn set_lift(step: bool, down: bool) {
     lift::set(step, down != STATE.lift_is_inverted());
     if step {

@@ -1,20 +1,24 @@
-//! Steps by a PIO state machine that DMA feeds: no interrupt for a step, and no jitter.
+//! Generates steps by a PIO state machine that DMA feeds. There is no interrupt for each step, and
+//! no jitter.
 //!
-//! A word for the state machine is laid out as a step event: the levels of five neighbouring pins
-//! in bits 0 to 4, where its program goes on in bits 5 to 7, the ticks from bit 8 on. The state
-//! machine sets the pins, ends the pulse if there is one, and counts the ticks; every event takes its
-//! ticks to the cycle.
+//! A word for the state machine is laid out like a step event: the levels of five adjacent pins in
+//! bits 0 to 4, the address at which its program continues in bits 5 to 7, and the ticks from bit 8
+//! on. The state machine sets the pins, ends the pulse if there is one, and counts the ticks. Every
+//! event takes exactly its ticks.
 //!
-//! The words wait in a ring that the DMA channel reads in blocks: all that is there when the last
-//! block ends is the next. Between two blocks the state machine lives on the words in its own queue.
+//! The words wait in a ring that the DMA channel reads in blocks. When a block ends, all words that
+//! wait then form the next one. Between two blocks the state machine runs on the words in its own
+//! queue.
 //!
-//! Should the main loop be late, the ring runs dry at speed. So the interrupt that hands the blocks
-//! over looks at them: where [`Brake`] asks for more ticks, it hands over a copy with those, and the ring
-//! keeps the planned ones. As long as enough waits behind a group of words, one look at the group will do.
+//! If the main loop is late, the ring runs empty at speed. So the interrupt that hands over the
+//! blocks examines them. Where [`Brake`] asks for more ticks, it hands over a copy with more ticks,
+//! and the ring keeps the planned ones. As long as enough steps wait after a group of words, one
+//! check for the group is enough.
 //!
-//! What the state machine has taken is read off the channel and told to the main loop's
-//! [`PulserState`] whenever that loop turns. The pen's heights, and the steps of a motor that lifts it, wait in a
-//! queue of their own, for a word has no place for them; an interrupt sets servo and pins.
+//! The progress of the state machine is read from the channel and reported to the main loop's
+//! [`PulserState`] in every turn of that loop. The heights of the pen, and the steps of a motor
+//! that lifts it, wait in a queue of their own, because a word has no room for them. An interrupt
+//! sets the servo and the pins.
 
 mod engine;
 mod feed;
@@ -45,58 +49,64 @@ use word_ring::{GROUP, WAYS, WORDS, pack, place, row, sum, way};
 
 pub(super) use target::PULSE;
 
-/// Words that may still be on their way from the ring to the state machine, and those that waits may
-/// take beyond one each.
+/// The words that may still be on their way from the ring to the state machine, and the additional
+/// words that waits may take.
 const RESERVED: u32 = 16 + Runner::ROOM as u32 * WAIT_WORDS;
-/// The machine is to stop within as many steps as are held by a ring half full: on long paths it is
-/// always fuller.
+/// The number of steps within which the machine must be able to stop: a half full ring. On long
+/// paths the ring is always fuller.
 const STOPPING_STEPS: u32 = WORDS / 2;
-/// A block ends before its steps are known too early, when more may come: 2 ms.
+/// The duration, 2 ms, after which a block ends. A longer block would fix the times of its steps
+/// too early, when more steps may still come.
 const BRAKED_TICKS: u32 = TICKS_PER_SECOND / 500;
-/// A wait is so many words at most, of 2 ms if that is enough, for the same reason.
+/// The greatest number of words of a wait. Each word lasts 2 ms if that is enough, for the same
+/// reason.
 const WAIT_WORDS: u32 = 64;
 
-/// What the state machine has done, for the main loop.
+/// The state that the state machine's progress is reported to, for the main loop.
 pub static STATE: PulserState = PulserState::new();
 
-/// The main loop's end.
+/// The main loop's end of the queue.
 pub struct Steps {
     heights: Producer<'static, u8>,
     step_length: StepLength,
-    /// As [`WRITTEN`].
+    /// The same number as [`WRITTEN`].
     written: u32,
-    /// How many more events fit: so many did when the state machine was last followed, less those
-    /// that have come.
+    /// The number of events that still fit: the number when the state machine's progress was last
+    /// read, less the events that have come since.
     room: u32,
-    /// As [`flips`] and [`PulserState::pulse_ticks`], which hold while anything moves.
+    /// The values of [`flips`] and [`PulserState::pulse_ticks`], which do not change while anything
+    /// moves.
     flips: u32,
     pulse_ticks: u32,
-    /// What a pulse at each of the levels adds to x (in the lower half) and to y.
+    /// For each combination of levels, what a pulse adds to x (in the lower half) and to y (in the
+    /// upper half).
     moves: [u32; LEVELS as usize + 1],
-    /// The pins' levels after the last word.
+    /// The levels of the pins after the last word.
     levels: u32,
-    /// The sum of the words counted so far; all wrap.
+    /// The totals of the words counted so far: words, steps, slack steps and ticks. All wrap.
     taken: u32,
     steps: (i32, i32),
     slack: (i32, i32),
     ticks: u32,
-    /// Something follows the last event.
+    /// Whether the machine is in motion after the last event.
     moving: bool,
     drained: bool,
-    /// It has taken nothing since it was drained, or since an underrun.
+    /// Whether the state machine has taken nothing since it was drained, or since an underrun.
     resting: bool,
-    /// How many words were taken, and when that was first seen, in microseconds.
+    /// The number of words taken, and (`seen_at`) the time at which this number was first seen, in
+    /// microseconds.
     taken_seen: u32,
     seen_at: u32,
 }
 
-/// Readies state machine and channel; they start with the first events. The pins are outputs
-/// afterwards, drivers off.
+/// Sets up the state machine and the channel; they start with the first events. Afterwards the pins
+/// are outputs and the drivers are off.
 pub fn set_up(nvic: &mut NVIC) -> Steps {
     engine::set_up();
 
     let (heights, due) = HEIGHT_QUEUE.init(Queue::new()).split();
-    // SAFETY: the interrupt is masked since reset, and this runs once (the queue's cell sees to it).
+    // SAFETY: the interrupt is masked since reset, and this runs once (the queue's cell ensures
+    // it).
     unsafe {
         HEIGHTS_DUE.fill(due);
         BRAKE.fill(Brake::default());
@@ -126,13 +136,13 @@ pub fn set_up(nvic: &mut NVIC) -> Steps {
 }
 
 impl Steps {
-    /// Lets waiting words begin.
+    /// Starts the transfer of waiting words.
     pub fn start(&mut self) {
         feed::start();
     }
 
-    /// Whether the state machine gets on: it has nothing to do, or takes its next word before the
-    /// longest event could be over twice.
+    /// Whether the state machine makes progress: it has nothing to do, or it takes its next word
+    /// within twice the duration of the longest event.
     pub fn is_progressing(&mut self) -> bool {
         const LONGEST: u32 = 2 * (StepEvent::MAX_TICKS / (TICKS_PER_SECOND / 1_000_000));
         let now = clock::microseconds();
@@ -144,7 +154,8 @@ impl Steps {
         now.wrapping_sub(self.seen_at) <= LONGEST
     }
 
-    /// Counts what the state machine has taken since, and tells the main loop's state.
+    /// Counts what the state machine has taken since the last call, and updates the state for the
+    /// main loop.
     #[inline(never)]
     pub fn sync_consumed(&mut self) {
         if STATE.is_halted() {
@@ -169,7 +180,8 @@ impl Steps {
             PIO0.write(machine::FIFO_DEBUG, STALLED);
         }
         self.resting = self.drained || (was_resting && !began);
-        // Until it begins, and when that is first seen, the flag may be from before.
+        // Before the state machine begins, and when its beginning is first seen, the flag may be
+        // left from before.
         if stalled && !was_resting && (self.moving || !self.drained) {
             STATE.note_underrun();
             self.moving = false;
@@ -182,7 +194,7 @@ impl Steps {
         self.room = words.min((HEIGHTS - 1 - self.heights.len()) as u32);
     }
 
-    /// Takes the settings over; they change only while nothing moves.
+    /// Adopts the settings, which change only while nothing moves.
     fn configure(&mut self) {
         let flips = flips();
         if flips != self.flips {
@@ -199,12 +211,12 @@ impl Steps {
         }
     }
 
-    /// 14 cycles a pulse.
+    /// Counts the words up to number `taken`. It takes 14 cycles per pulse.
     #[inline(never)]
-    #[unsafe(link_section = ".data.in_ram")] // So that the flash's cache has room for the planner.
+    #[unsafe(link_section = ".data.in_ram")] // This leaves the flash's cache to the planner.
     fn count_to(&mut self, taken: u32) {
         let count = taken.wrapping_sub(self.taken);
-        // A word on its way may be counted a moment early, so the count may seem to go back.
+        // A word in transit may be counted a moment early, so the count may seem to go back.
         if count > WORDS {
             return;
         }
@@ -239,7 +251,7 @@ impl Steps {
         self.taken = taken;
     }
 
-    /// Stops at once, and forgets what waits.
+    /// Stops at once, and discards the words that wait.
     fn throw_away(&mut self) {
         if self.drained && self.written == self.taken {
             return;
@@ -261,7 +273,7 @@ impl Steps {
         GIVEN_UP.store(DMA.read(channel::COUNT), Ordering::Relaxed);
         FEEDING.store(false, Ordering::Relaxed);
         begin(self.pulse_ticks);
-        // All of this is written before the handler may look.
+        // All of this must be written before the handler may run.
         compiler_fence(Ordering::SeqCst);
         feed::let_interrupt_come();
         heal_pen();
@@ -271,7 +283,7 @@ impl Steps {
         self.resting = true;
     }
 
-    /// The levels of the last word counted.
+    /// The levels of the pins in the last word counted.
     fn levels_now(&self) -> u32 {
         place(self.taken.wrapping_sub(1)).load(Ordering::Relaxed) & LEVELS
     }
@@ -308,7 +320,7 @@ impl EventQueue for Steps {
                 }
             }
         };
-        // Without a rule nothing is told, and nothing counted.
+        // Without a braking rule, no lengths are passed on or counted.
         let is_told = event.is_step() && STATE.brake().is_on();
         let step = if is_told { self.step_length.step() } else { StepWay::default() };
         if word & TARGETS == target::PULSE {
@@ -327,7 +339,7 @@ impl EventQueue for Steps {
         Ok(())
     }
 
-    /// 17 cycles a step; more if it may be braked.
+    /// Appends steps of a train. It takes 17 cycles per step, or more if the step may be braked.
     #[unsafe(link_section = ".data.in_ram")] // As above.
     fn push_train(&mut self, train: &mut StepTrain, count: u32) -> Result<(), StepEvent> {
         let Some(room) = self.room.checked_sub(count) else {
@@ -357,7 +369,8 @@ impl EventQueue for Steps {
 }
 
 impl Steps {
-    /// A word that takes `beyond` ticks beside its count, and waits behind it: `ticks` in all.
+    /// Appends a word that takes `beyond` ticks besides its count, followed by waits, so that it
+    /// takes `ticks` in all.
     fn put_wait(&mut self, word: u32, beyond: u32, mut ticks: u32) {
         let step = StepWay::default();
         if ticks <= BRAKED_TICKS {
@@ -374,7 +387,8 @@ impl Steps {
         }
     }
 
-    /// The pen's motor: its pulse lasts half of the event, so that the handler is never two levels behind.
+    /// Appends an event of the pen's motor. The pulse lasts half of the event, so that the handler
+    /// is never two levels behind.
     fn push_lift(&mut self, step: bool, down: bool, event: StepEvent) -> Result<(), StepEvent> {
         use lift_levels::{DOWN, MARK, STEP};
         let pins = MARK | if down { DOWN } else { 0 };
@@ -393,8 +407,8 @@ impl Steps {
         Ok(())
     }
 
-    /// A pulse that is none for the state machine, so that it is counted apart: a wait while the pins
-    /// are high, and one while they are low.
+    /// Appends a pulse that takes up slack. For the state machine it is not a pulse, so that it is
+    /// counted separately: it is a wait while the pins are high and another while they are low.
     fn push_slack(&mut self, pins: u32, ticks: u32) -> Result<(), StepEvent> {
         self.room = self.room.saturating_sub(1);
         let low = ticks.saturating_sub(self.pulse_ticks);
@@ -406,9 +420,10 @@ impl Steps {
         Ok(())
     }
 
-    /// The next words are so many steps, fewer than there are places.
-    #[inline(never)] // On its own it stays in the core's registers.
-    #[unsafe(link_section = ".data.in_ram")] // So that the flash's cache has room for the planner.
+    /// Records the lengths of the next `count` words, which are steps. `count` is less than the
+    /// size of the ring.
+    #[inline(never)] // As a function of its own it needs only the core's registers.
+    #[unsafe(link_section = ".data.in_ram")] // This leaves the flash's cache to the planner.
     fn tell_ways(&mut self, count: u32) {
         if let Some(step) = self.step_length.steady() {
             return self.tell_same_ways(step, count);
@@ -427,7 +442,7 @@ impl Steps {
         STATE.brake().set_queued(queued);
     }
 
-    /// The same where all have the same way: a few cycles a step.
+    /// Does the same where all steps have the same length, in a few cycles per step.
     fn tell_same_ways(&self, step: StepWay, count: u32) {
         let packed = pack(step);
         let first = (self.written % WORDS) as usize;
@@ -459,29 +474,31 @@ impl Steps {
         }
     }
 
-    /// Shows the words to the channel; lets them begin if they are many.
+    /// Makes the words visible to the channel, and starts the transfer if there are many.
     fn publish(&mut self) {
         WRITTEN.store(self.written, Ordering::Release);
-        // The handler that finds nothing to feed any more must have seen them, or be seen here.
+        // A handler that finds nothing more to transfer must either have seen these words, or its
+        // result must be seen here.
         compiler_fence(Ordering::SeqCst);
         if FEEDING.load(Ordering::Relaxed) {
             return;
         }
-        // What has begun goes on at once.
+        // If the state machine is already running, it continues at once.
         if !self.drained || self.written.wrapping_sub(self.taken) >= WORDS / 2 {
             self.start();
         }
     }
 }
 
-/// The bits in which the pins' levels differ from an event's: drivers are on while their pin is low,
-/// and high direction counts up, unless inverted.
+/// The bits in which the levels of the pins differ from those of an event. Drivers are on while
+/// their pin is low, and a high direction pin counts up unless it is inverted.
 fn flips() -> u32 {
     const DOWN: u8 = StepEvent::DOWN_X | StepEvent::DOWN_Y;
     RELEASED | u32::from(DOWN ^ STATE.inverted() << 2)
 }
 
-/// Adds the halves, each within ±2^11, so that they part again.
+/// Adds the two halves of `packed` to the sums. Each half is within ±2^11, so that they can be
+/// separated again.
 fn add_packed((x, y): &mut (i32, i32), packed: u32) {
     let dx = i32::from(packed as u16 as i16);
     *x = x.wrapping_add(dx);

@@ -1,32 +1,33 @@
-//! The ring of words that wait, and what its steps are in lengths.
+//! The ring buffer of the words that wait, and the lengths of their steps.
 
 use core::sync::atomic::AtomicU32;
 
 use penup::motion::StepWay;
 
-/// Words of the ring, a power of two.
+/// The number of words in the ring, a power of two.
 pub const WORDS: u32 = 2048;
-/// Of so many words, from a multiple of it on, there is a sum.
+/// The number of words in a group, which begins at a multiple of this number and has one sum.
 pub const GROUP: u32 = 16;
 
-#[repr(align(8192))] // Its size, or the channel would not find around.
+#[repr(align(8192))] // The channel wraps around only if the ring is aligned to its size.
 pub struct Ring([AtomicU32; WORDS as usize]);
 const _: () = assert!(align_of::<Ring>() == size_of::<Ring>());
 
 static RING: Ring = Ring([const { AtomicU32::new(0) }; WORDS as usize]);
-/// Of each word of the ring that is a step: `around` of [`StepWay`] in the lower half, `behind` in the
-/// upper one; 0 for other words.
+/// For each word of the ring that is a step: `around` of [`StepWay`] in the lower half and `behind`
+/// in the upper one. For other words: 0.
 pub static WAYS: [AtomicU32; WORDS as usize] = [const { AtomicU32::new(0) }; WORDS as usize];
 
-/// For each group of words how many units were queued up to its end; wraps.
+/// For each group of words, the number of length units that were queued up to its end; it wraps.
 static SUMS: [AtomicU32; (WORDS / GROUP) as usize] =
     [const { AtomicU32::new(0) }; (WORDS / GROUP) as usize];
 
+/// The slot of word number `word`.
 pub fn place(word: u32) -> &'static AtomicU32 {
     &RING.0[(word % WORDS) as usize]
 }
 
-/// Up to `count` words from `word` on, as far as they lie in a row.
+/// Up to `count` consecutive slots from `word` on, cut off at the end of the ring.
 pub fn row(word: u32, count: u32) -> &'static [AtomicU32] {
     let start = word % WORDS;
     &RING.0[start as usize..(start + count).min(WORDS) as usize]

@@ -1,34 +1,36 @@
-//! Where in a frame of the bus we are, for erratum RP2040-E15.
+//! Tracks the position within a frame of the bus, for erratum RP2040-E15.
 //!
-//! A frame lasts a millisecond. If the host asks for a packet so late in it that the hub cuts the
-//! acknowledgement off, the chip's USB controller may hang until it is reset. That is why no buffer
-//! is made available to the host in the last 200 microseconds of a frame; TinyUSB keeps to the same
-//! rule. The instant at which a frame begins is known only from the controller's interrupt, which
-//! is on only while something waits to be sent: that costs a packet some 0.5 ms at most when
-//! nothing was sent before, and nothing later.
+//! A frame lasts a millisecond. If the host asks for a packet so late in the frame that the hub
+//! cuts off the acknowledgement, the chip's USB controller may hang until it is reset. So no buffer
+//! is made available to the host at the end of a frame; TinyUSB does not do so in the last 200
+//! microseconds either. The beginning of a frame is known only from the controller's interrupt,
+//! which is on only while something waits to be sent. This delays a packet by at most some 0.5 ms
+//! when nothing was sent before, and later packets not at all.
 
 use super::super::clock;
 use super::super::registers::USB;
 
-/// The frame's number; reading it clears the interrupt.
+/// The register of the frame number. Reading it clears the interrupt.
 const NUMBER: usize = 0x48;
-/// The interrupts as they are, masked or not.
+/// The register of the interrupts before masking.
 const RAW: usize = 0x8C;
-/// Bits that are written here are set in the mask of interrupts, or cleared in it.
+/// Bits that are written to the first register are set in the mask of interrupts, and bits written
+/// to the second are cleared in it.
 const ENABLE: usize = 0x2090;
 const DISABLE: usize = 0x3090;
 const BEGAN: u32 = 1 << 17;
 
-/// In microseconds.
+/// The length of a frame, in microseconds.
 const LENGTH: u32 = 1000;
-/// What a buffer may be made available in. 100 microseconds are for the time between the look at
-/// the clock and the write to the buffer, and for an interrupt that came late.
+/// The part of a frame, in microseconds, in which a buffer may be made available. 100 microseconds
+/// allow for the time between reading the clock and writing to the buffer, and for a late
+/// interrupt.
 const SAFE: u32 = 700;
 
-/// Follows the frames.
+/// Tracks the frames.
 pub struct Frame {
     is_followed: bool,
-    /// When the last one began, by the clock of microseconds; none if that is not known.
+    /// The time at which the last frame began, in microseconds; `None` if it is not known.
     began: Option<u32>,
 }
 
@@ -37,8 +39,8 @@ impl Frame {
         Self { is_followed: false, began: None }
     }
 
-    /// Takes the beginning of a frame in, if there was one. To be called whenever the controller
-    /// may have an interrupt.
+    /// Records the beginning of a frame, if there was one. Call it whenever the controller may have
+    /// an interrupt.
     pub fn look(&mut self) {
         if !self.is_followed || USB.read(RAW) & BEGAN == 0 {
             return;
@@ -51,17 +53,18 @@ impl Frame {
             Some(last) if now.wrapping_sub(last) < 2 * LENGTH - LENGTH / 10 => {
                 Some(last.wrapping_add(now.wrapping_sub(last).min(LENGTH + 1)))
             }
-            // Interrupts were masked for long: this one is of a frame that nobody knows.
+            // Interrupts were masked for a long time, so it is unknown to which frame this one
+            // belongs.
             Some(_) => None,
             None => Some(now),
         };
     }
 
-    /// Whether a buffer may be made available now. If not, the next interrupt asks again.
+    /// Whether a buffer may be made available now. If not, the next interrupt will ask again.
     pub fn lets_send(&mut self) -> bool {
         if !self.is_followed {
             self.is_followed = true;
-            // What came before the interrupt was on says nothing of the time.
+            // An interrupt flag from before the interrupt was enabled says nothing about the time.
             self.began = None;
             USB.read(NUMBER);
             USB.write(ENABLE, BEGAN);
@@ -69,7 +72,7 @@ impl Frame {
         self.began.is_some_and(|began| clock::microseconds().wrapping_sub(began) < SAFE)
     }
 
-    /// Nothing waits to be sent: no interrupts of frames any more.
+    /// Switches the frame interrupts off, because nothing waits to be sent.
     pub fn leave(&mut self) {
         if self.is_followed {
             self.is_followed = false;
