@@ -1,12 +1,40 @@
-//! penup: firmware for a pen plotter that computes the whole drawing itself.
+//! penup is the firmware of a pen plotter that does the thinking itself.
 //!
-//! It receives a solid, a frame of bars, a curve or a line drawing over a serial line. On the
-//! microcontroller it projects the model, removes hidden lines, chooses the pen-up moves, orders
-//! the strokes, plans the speeds, and pulses the stepper motors and the pen. It uses no heap, and
-//! no floating point in any decision. It computes the same bits on every machine.
+//! A computer sends it a solid, a frame of bars, a curve or a line drawing over a serial line. On
+//! the microcontroller it projects the model, removes the hidden lines, chooses the pen-up moves,
+//! orders the strokes, plans the speed, and pulses the stepper motors and the pen. It needs no heap,
+//! it decides nothing in floating point, and it gives the same bits on every machine.
 //!
-//! The modules are listed in the order in which the data passes through them. Each may use those
-//! above it, never those below it.
+//! The modules are listed in the order in which the data passes through them. A module uses only
+//! modules that are listed above it.
+//!
+//! # Examples
+//! Each stage can be used by itself. It borrows its working memory from the caller, and it asks the
+//! caller at short intervals whether it is to end. This orders the two parts of a drawing so that
+//! the pen is lifted once:
+//!
+//! ```
+//! use penup::drawing::{Drawing, PagePoint, Segment};
+//! use penup::order::{Leg, Options, order};
+//! use penup::stage::{NeverCancel, Scratch};
+//!
+//! let points = [(0, 0), (800, 0), (0, 400), (800, 400)].map(|(x, y)| PagePoint { x, y });
+//! let segments = [[0, 1], [2, 3]].map(|[from, to]| Segment { from, to, ..Segment::default() });
+//! let drawing = Drawing { points: &points, segments: &segments };
+//!
+//! let mut memory = vec![0; 1024];
+//! let mut tour = [Leg::new(0, false); 2];
+//! let scratch = Scratch::new(&mut memory);
+//! let report = order(drawing, Options::default(), scratch, &mut NeverCancel, &mut tour)?;
+//!
+//! assert_eq!(report.lifts, 1);
+//! assert_eq!(report.pen_up, 256 * 400); // in 1/256 of a motor step
+//! assert_ne!(tour[0].reversed(), tour[1].reversed());
+//! # Ok::<(), penup::order::OrderError>(())
+//! ```
+//!
+//! The folder `examples` has three more: `hidden_lines` draws a cube as an SVG, `order_drawing`
+//! prints the strokes of a drawing in their order, `plan_path` plans the motion along a path.
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -32,8 +60,7 @@ pub mod storage;
 pub mod protocol;
 pub mod plotter;
 
-/// The board that consists of memory only, for programs on a host. The boards for real hardware
-/// belong to the firmware binary.
+/// The board made of plain memory. Those made of silicon belong to the firmware binary.
 #[cfg(feature = "host")]
 pub mod boards {
     pub mod host;
