@@ -48,8 +48,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         model.add_face(face.into_iter(), &mut unkept).map_err(|error| refused(&error))?;
     }
 
-    let sight = Pose::Towards { eye: [4.0, -5.0, 3.0], at: [0.5; 3], up: None };
-    let camera = Camera { sight, lens: Lens::Perspective };
+    let pose = Pose::Towards { eye: [4.0, -5.0, 3.0], at: [0.5; 3], up: None };
+    let camera = Camera { pose, lens: Lens::Perspective };
     let view = View::new(&camera, &model).map_err(|error| refused(&error))?;
     let mut memory = vec![0; 1 << 16];
     let mut scratch = Scratch::new(&mut memory);

@@ -63,7 +63,7 @@ impl Board for Line<'_> {
     }
     fn write(&mut self, bytes: &[u8]) {
         if bytes.starts_with(b"error") || bytes.starts_with(b"[MSG") {
-            hprintln!("{}", core::str::from_utf8(bytes).unwrap_or("a command_error"));
+            hprintln!("{}", core::str::from_utf8(bytes).unwrap_or("a refusal"));
         }
     }
     fn queue(&mut self) -> &mut dyn EventQueue {

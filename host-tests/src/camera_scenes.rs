@@ -301,7 +301,7 @@ pub fn camera_scene(seed: u64) -> CameraScene {
     let towards = direction(random);
     let eye = [0, 1, 2].map(|n: usize| middle[n] + distance * towards[n]);
     let lens = if random.once_in(3) { Lens::Orthographic } else { Lens::Perspective };
-    let camera = Camera { sight: Pose::Towards { eye, at: middle, up: None }, lens };
+    let camera = Camera { pose: Pose::Towards { eye, at: middle, up: None }, lens };
     let view = View::new(&camera, &model).expect("the eye is outside");
     let mut words = vec![0; 4096];
     let mut scratch = Scratch::new(&mut words);

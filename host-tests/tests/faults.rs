@@ -215,13 +215,13 @@ fn so_does_a_polargraph_with_slack() {
 }
 
 /// The belts of a polargraph, in steps, seen from the gondola: with slack.
-struct Wall {
+struct PolargraphMachine {
     plays: [Play; 2],
     motors: PagePoint,
     belts: PagePoint,
 }
 
-impl Wall {
+impl PolargraphMachine {
     fn follow(&mut self, motors: PagePoint) {
         self.belts.x += self.plays[0].turn(motors.x - self.motors.x);
         self.belts.y += self.plays[1].turn(motors.y - self.motors.y);
@@ -269,7 +269,7 @@ fn home_and_disturb(random: &mut Random) -> Stage {
     ];
     let last = [target(200, -300, full), target(0, 0, None)];
     let mut paths = [TargetList::new(&job), TargetList::new(&last)];
-    let mut wall = Wall {
+    let mut polargraph = PolargraphMachine {
         plays: event_checker::slack_steps(&settings).map(Play::in_the_middle),
         motors: PagePoint::default(),
         belts: PagePoint {
@@ -282,9 +282,10 @@ fn home_and_disturb(random: &mut Random) -> Stage {
     let (mut stage, mut struck_in) = (Stage::Homing, None);
     let mut off = None;
     pin_machine::run_with(settings, 25_000, &mut |turn, queue| {
-        wall.follow(turn.motors);
+        polargraph.follow(turn.motors);
         let machine = turn.machine;
-        let mut pressed = Switches { x: wall.belts.x <= switch, y: wall.belts.y <= switch };
+        let mut pressed =
+            Switches { x: polargraph.belts.x <= switch, y: polargraph.belts.y <= switch };
         let ready = machine.state() == State::Idle && machine.is_stopped();
         if turn.now == 0 {
             machine.home(pressed).expect("ready");
@@ -344,18 +345,18 @@ fn home_and_disturb(random: &mut Random) -> Stage {
         let path = &mut paths[usize::from(stage == Stage::Last)];
         machine.fill(path, queue);
         if stage == Stage::Homing && machine.state() == State::Idle && machine.is_stopped() {
-            off = Some((wall.belts.x - homed, wall.belts.y - homed));
+            off = Some((polargraph.belts.x - homed, polargraph.belts.y - homed));
         }
         assert!(
             turn.now < 25_000_000 * 60,
             "{stage:?} takes more than a minute: {:?} {struck_in:?} {fault} {:?}",
             machine.state(),
-            wall.belts
+            polargraph.belts
         );
         true
     });
     let end = build.motors(middle);
-    let (x, y) = (wall.belts.x - end.x, wall.belts.y - end.y);
+    let (x, y) = (polargraph.belts.x - end.x, polargraph.belts.y - end.y);
     assert!(x.abs() <= 2 && y.abs() <= 2, "off by {x}, {y} after fault {fault} in {struck_in:?}");
     struck_in.unwrap_or(Stage::Last)
 }

@@ -827,8 +827,8 @@ fn a_change_of_kinematics_leaves_the_pen_where_it_is() {
     assert!(checked);
 }
 
-/// A wall: belts of 40 steps a millimetre from anchors 900 mm apart.
-fn wall() -> Settings {
+/// A polargraph with belts of 40 steps a millimetre from anchors 900 mm apart.
+fn polargraph() -> Settings {
     let mut settings = Settings::default();
     for (setting, value) in [
         (Setting::StepsPerMmX, 40.0),
@@ -843,10 +843,10 @@ fn wall() -> Settings {
 }
 
 #[test]
-fn a_wall_draws_in_the_time_of_any_machine() {
+fn a_polargraph_draws_in_the_time_of_any_machine() {
     let targets =
         [to(1000, 2000), ink(15_000, 14_000), ink(15_000, 500), ink(1000, 2000), ink(9000, 2100)];
-    let settings = wall();
+    let settings = polargraph();
     let events = pin_machine::record(settings, &mut TargetList::new(&targets), 64).expect("fits");
     // The same lengths at the same speeds on the page.
     let mut plain = Settings::default();
@@ -859,8 +859,8 @@ fn a_wall_draws_in_the_time_of_any_machine() {
 }
 
 #[test]
-fn a_wall_is_homed_belt_by_belt() {
-    let mut settings = wall();
+fn a_polargraph_is_homed_belt_by_belt() {
+    let mut settings = polargraph();
     settings.set(Setting::Homing, Value::ONE).expect("valid");
     // The belts are this long at the start; the switches press at 480 mm.
     let start = point(26_000, 25_000);

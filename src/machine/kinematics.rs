@@ -58,10 +58,10 @@ impl Kinematics {
     /// let motors = Kinematics::CoreXy.motors(place);
     /// assert_eq!(motors, PagePoint { x: 26, y: 34 });
     /// assert_eq!(Kinematics::CoreXy.page(motors), place);
-    /// let wall = Kinematics::Polargraph(Anchors { left: PagePoint { x: 0, y: 300 }, width: 800 });
-    /// let belts = wall.motors(PagePoint { x: 400, y: 0 });
+    /// let polargraph = Kinematics::Polargraph(Anchors { left: PagePoint { x: 0, y: 300 }, width: 800 });
+    /// let belts = polargraph.motors(PagePoint { x: 400, y: 0 });
     /// assert_eq!(belts, PagePoint { x: 500, y: 500 });
-    /// assert_eq!(wall.page(belts), PagePoint { x: 400, y: 0 });
+    /// assert_eq!(polargraph.page(belts), PagePoint { x: 400, y: 0 });
     /// ```
     pub fn motors(self, page: PagePoint) -> PagePoint {
         match self {
@@ -249,13 +249,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_wall_knows_its_page() {
+    fn a_polargraph_knows_its_page() {
         let anchors = Anchors { left: PagePoint { x: -15_000, y: 60_000 }, width: 64_000 };
-        let wall = Kinematics::Polargraph(anchors);
+        let polargraph = Kinematics::Polargraph(anchors);
         for x in (0..34_000).step_by(1711) {
             for y in (0..42_000).step_by(2213) {
                 let page = PagePoint { x, y };
-                let again = wall.page(wall.motors(page));
+                let again = polargraph.page(polargraph.motors(page));
                 assert!(again.x.abs_diff(x) <= 2 && again.y.abs_diff(y) <= 2, "{page:?} {again:?}");
             }
         }

@@ -187,7 +187,7 @@ impl PlotOptions {
             return Camera::turned(model, lens, angles, self.eye);
         }
         let mut camera = Camera::automatic(model, lens, self.at, self.up)?;
-        if let (Pose::Towards { eye, .. }, Some(chosen)) = (&mut camera.sight, self.eye) {
+        if let (Pose::Towards { eye, .. }, Some(chosen)) = (&mut camera.pose, self.eye) {
             *eye = chosen;
         }
         Some(camera)

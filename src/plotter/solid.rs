@@ -25,7 +25,7 @@ pub(super) fn project(
     let (camera, view) = camera_view(model, options, cancel)?;
     let eye = match camera.sight_lines(model.fraction_bits()).map_err(CommandError::View)? {
         SightLines::Through(place) => Eye::At(place),
-        SightLines::EdgeParameter(direction) => Eye::Towards(direction),
+        SightLines::Along(direction) => Eye::Towards(direction),
     };
     cancel.enter(Stage::Visibility);
     let positions = bytemuck::cast_slice(model.vertices());

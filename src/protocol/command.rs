@@ -132,7 +132,7 @@ pub const HELP: &[(&str, &str)] = &[
         "$effort=NUMBER",
         "distances tried for each move with the pen up to improve it; 0 takes the nearest next",
     ),
-    ("$lift=MM", "how much longer a way with the pen up may be for one lift less, 0 to 1000"),
+    ("$lift=MM", "extra pen-up travel in mm that is accepted to save one lift, 0 to 1000"),
     ("$model", "size of the model against the limits"),
     ("$clear", "forget the model"),
     (

@@ -242,6 +242,8 @@ impl CommandError {
     }
 }
 
+impl core::error::Error for CommandError {}
+
 impl fmt::Display for CommandError {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

@@ -15,7 +15,7 @@ pub type Direction = [f64; 3];
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Camera {
     /// The position of the eye and the direction in which it looks.
-    pub sight: Pose,
+    pub pose: Pose,
     /// The kind of projection.
     pub lens: Lens,
 }
@@ -117,7 +117,7 @@ impl Camera {
         let [_, _, forward] = turned(angles);
         let eye = eye
             .unwrap_or([0, 1, 2].map(|axis| middle[axis] - EYE_DISTANCE * radius * forward[axis]));
-        Some(Self { sight: Pose::Turned { eye, angles }, lens })
+        Some(Self { pose: Pose::Turned { eye, angles }, lens })
     }
 
     /// Returns the camera that looks from the direction `from` at `at` or at the middle of the
@@ -132,7 +132,7 @@ impl Camera {
         let (middle, radius) = middle_and_radius(model)?;
         let at = at.unwrap_or(middle);
         let eye = [0, 1, 2].map(|axis| at[axis] + EYE_DISTANCE * radius * from[axis]);
-        Some(Self { sight: Pose::Towards { eye, at, up }, lens })
+        Some(Self { pose: Pose::Towards { eye, at, up }, lens })
     }
 }
 
@@ -182,7 +182,7 @@ pub enum SightLines {
     /// The lines of sight meet at this point, the eye.
     Through([i64; 3]),
     /// The lines of sight are parallel. This direction points to the user and is not zero.
-    EdgeParameter([i64; 3]),
+    Along([i64; 3]),
 }
 
 impl Camera {
@@ -203,7 +203,7 @@ impl Camera {
         let sight = cross(right, up);
         let away = if dot(sight, forward) < 0.0 { 1.0 } else { -1.0 };
         let scale = away * limit / largest_component(sight);
-        Ok(SightLines::EdgeParameter(sight.map(|part| libm::round(part * scale) as i64)))
+        Ok(SightLines::Along(sight.map(|part| libm::round(part * scale) as i64)))
     }
 }
 
@@ -219,7 +219,7 @@ pub(super) struct Axes {
 
 impl Axes {
     pub fn new(camera: &Camera) -> Result<Self, ViewError> {
-        let (eye, at, [right, up, forward]) = match camera.sight {
+        let (eye, at, [right, up, forward]) = match camera.pose {
             Pose::Towards { eye, at, up } => (eye, at, towards(eye, at, up)?),
             Pose::Turned { eye, angles } => (eye, eye, turned(angles)),
         };

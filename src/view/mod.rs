@@ -320,7 +320,7 @@ mod tests {
     ];
 
     fn camera(eye: Direction, at: Direction) -> Camera {
-        Camera { sight: Pose::Towards { eye, at, up: None }, lens: Lens::Perspective }
+        Camera { pose: Pose::Towards { eye, at, up: None }, lens: Lens::Perspective }
     }
 
     #[test]
@@ -379,8 +379,8 @@ mod tests {
             let (eye, at) = ([0.5, 0.5, 5.0], [0.5, 0.5, 0.5]);
             assert_eq!(View::new(&camera(at, at), model), Err(ViewError::EyeAtTarget));
             for up in [[0.0, 0.0, -2.0], [0.0; 3]] {
-                let sight = Pose::Towards { eye, at, up: Some(up) };
-                let upright = Camera { sight, lens: Lens::Perspective };
+                let pose = Pose::Towards { eye, at, up: Some(up) };
+                let upright = Camera { pose, lens: Lens::Perspective };
                 assert_eq!(View::new(&upright, model), Err(ViewError::UpAlongSight));
             }
             let away = camera([0.5, 0.5, 5.0], [0.5, 0.5, 6.0]);

@@ -10,7 +10,7 @@ use std::collections::BTreeSet;
 
 /// Two anchors above the page.
 #[derive(Debug, Clone, Copy)]
-struct Wall {
+struct PolargraphMachine {
     settings: Settings,
     steps_per_mm: f64,
     /// From one anchor to the other, steps.
@@ -20,7 +20,7 @@ struct Wall {
     height: f64,
 }
 
-impl Wall {
+impl PolargraphMachine {
     /// Lengths in mm.
     fn new(steps_per_mm: f64, width: f64, left: f64, height: f64) -> Self {
         let mut settings = Settings::default();
@@ -87,9 +87,9 @@ impl Wall {
     }
 }
 
-fn walls() -> impl Strategy<Value = Wall> {
+fn polargraphs() -> impl Strategy<Value = PolargraphMachine> {
     (10.0f64..80.0, 600.0f64..2000.0, 100.0f64..150.0, 430.0f64..900.0)
-        .prop_map(|(steps, width, left, height)| Wall::new(steps, width, left, height))
+        .prop_map(|(steps, width, left, height)| PolargraphMachine::new(steps, width, left, height))
 }
 
 fn places() -> impl Strategy<Value = Vec<(f64, f64)>> {
@@ -99,15 +99,15 @@ fn places() -> impl Strategy<Value = Vec<(f64, f64)>> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
     #[test]
-    fn lines_are_straight_within_half_a_step_of_the_belts(wall in walls(), places in places()) {
-        let settings = wall.settings;
+    fn lines_are_straight_within_half_a_step_of_the_belts(polargraph in polargraphs(), places in places()) {
+        let settings = polargraph.settings;
         let targets: Vec<_> = places
             .iter()
             .enumerate()
             .map(|(index, &(x, y))| Target {
                 point: PagePoint {
-                    x: (x * wall.steps_per_mm) as i32,
-                    y: (y * wall.steps_per_mm) as i32,
+                    x: (x * polargraph.steps_per_mm) as i32,
+                    y: (y * polargraph.steps_per_mm) as i32,
                 },
                 ink: (index > 0).then_some(LineType::Full),
             })
@@ -125,7 +125,7 @@ proptest! {
             let mut belts = settings.kinematics().motors(from);
             while belts != end {
                 let at = moves.next().expect("every corner is reached");
-                let off = wall.off(at, from, target.point);
+                let off = polargraph.off(at, from, target.point);
                 // Half of the 1/255 in which pieces lie beside the steps, and a bow of 1/1024.
                 prop_assert!(off <= 0.503, "{} steps at {:?} from {:?} to {:?}, begins {:?} ends {:?}", off, at, from, target.point, settings.kinematics().motors(from), end);
                 belts = at;
@@ -137,13 +137,13 @@ proptest! {
 
     #[test]
     fn the_same_steps_are_inked_forward_and_backward(
-        wall in walls(),
+        polargraph in polargraphs(),
         ends in ((0.0f64..400.0, 0.0f64..420.0), (0.0f64..400.0, 0.0f64..420.0)),
         short: bool,
         build in 0..3,
         line_type in prop::sample::select(vec![LineType::Full, LineType::Dotted, LineType::Dashed]),
     ) {
-        let mut settings = wall.settings;
+        let mut settings = polargraph.settings;
         settings.set(Setting::Kinematics, Value::from_num(build)).expect("valid");
         let steps = settings.page_steps().map(|steps| steps.to_num::<f64>());
         let point = |(x, y): (f64, f64)| PagePoint { x: (x * steps[0]) as i32, y: (y * steps[1]) as i32 };
@@ -176,14 +176,14 @@ proptest! {
 
     #[test]
     fn dots_are_as_long_as_on_any_machine(
-        wall in walls(),
+        polargraph in polargraphs(),
         ends in ((0.0f64..400.0, 0.0f64..420.0), (0.0f64..400.0, 0.0f64..420.0)),
         dot in 0.5f64..20.0,
         dashed: bool,
     ) {
-        let mut settings = wall.settings;
+        let mut settings = polargraph.settings;
         settings.set(Setting::DotLength, Value::from_num(dot)).expect("valid");
-        let step = 1.0 / wall.steps_per_mm;
+        let step = 1.0 / polargraph.steps_per_mm;
         let point = |(x, y): (f64, f64)| PagePoint { x: (x / step) as i32, y: (y / step) as i32 };
         let ink = if dashed { LineType::Dashed } else { LineType::Dotted };
         let (from, to) = (point(ends.0), point(ends.1));
@@ -199,7 +199,7 @@ proptest! {
             at = PagePoint { x: at.x + dx, y: at.y + dy };
             if let penup::motion::EventKind::Pen { height } = event.kind() {
                 if down && height < 64 {
-                    let (a, b) = (wall.page(begun), wall.page(at));
+                    let (a, b) = (polargraph.page(begun), polargraph.page(at));
                     strokes.push((b.0 - a.0).hypot(b.1 - a.1) * step);
                 }
                 (down, begun) = (height >= 64, at);
