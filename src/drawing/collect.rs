@@ -264,6 +264,8 @@ impl<'a> PointFinder<'a> {
         Ok(Self { points: points.take(point_limit)?, count: 0, table: table.take(length)? })
     }
 
+    /// Returns the number of a point. It is that of a known point at the same position or one step
+    /// away from it, or else a new number.
     fn number(&mut self, point: PagePoint) -> Result<u16, OutOfScratch> {
         const SAME_THEN_AROUND: [(i32, i32); 9] =
             [(0, 0), (-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (1, -1), (-1, 1), (1, 1)];
@@ -275,12 +277,14 @@ impl<'a> PointFinder<'a> {
         self.add(point)
     }
 
+    /// Returns the slot of the table at which the search for a point begins.
     fn slot(&self, point: PagePoint) -> usize {
         let mixed =
             (point.x as u32).wrapping_mul(0x9E37_79B1) ^ (point.y as u32).wrapping_mul(0x85EB_CA77);
         (mixed ^ mixed >> 15) as usize & (self.table.len() - 1)
     }
 
+    /// Returns the number of the known point at exactly this position.
     fn find(&self, point: PagePoint) -> Option<u16> {
         let mut slot = self.slot(point);
         // The table always has a free slot, so this loop ends.
@@ -293,6 +297,7 @@ impl<'a> PointFinder<'a> {
         }
     }
 
+    /// Adds a new point and returns its number.
     fn add(&mut self, point: PagePoint) -> Result<u16, OutOfScratch> {
         let full = OutOfScratch {
             needed: (self.count + 1) * size_of::<PagePoint>(),

@@ -88,8 +88,8 @@ impl Segment {
 /// different points.
 #[derive(Debug, Clone, Copy)]
 pub struct Drawing<'a> {
-    /// The points.
+    /// The points, all of them different.
     pub points: &'a [PagePoint],
-    /// The segments between them.
+    /// The segments between the points.
     pub segments: &'a [Segment],
 }

@@ -103,9 +103,13 @@ impl Bounds {
 /// The map from homogeneous image coordinates to steps: (a x + b w) / (w 2^k), rounded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PageMap {
+    /// The scale along x and y.
     a: [i64; 2],
+    /// The offset along x and y.
     b: [i128; 2],
+    /// The number of fraction bits of `a` and `b`.
     k: u32,
+    /// The part of the page to which lines are clipped, if the image may reach beyond the page.
     window: Option<Window>,
 }
 
@@ -212,6 +216,7 @@ impl PageMap {
         Ok(Self { a, b, k: k as u32, window: None })
     }
 
+    /// Makes the map take coordinates that are greater by a factor of 2^`bits`.
     fn coarsen(&mut self, bits: u32) {
         // (a p 2^-bits + b) / 2^k = (a p + b 2^bits) / 2^(k + bits)
         self.b = self.b.map(|b| b << bits);

@@ -214,12 +214,16 @@ impl Default for TitleText {
 /// The shape of one letter.
 #[derive(Debug, Clone, Copy)]
 struct Glyph {
+    /// From its middle to its left side, in the font's units; negative to the left.
     left: i32,
+    /// From its middle to its right side, in the font's units.
     right: i32,
+    /// Its points, two characters each.
     points: &'static [u8],
 }
 
 impl Glyph {
+    /// Finds a letter in the font by binary search.
     fn find(letter: char) -> Option<Self> {
         let line = |at: usize| {
             let [start, end] = [STARTS.get(at)?, STARTS.get(at + 1)?].map(|at| usize::from(*at));
@@ -246,6 +250,7 @@ impl Glyph {
     }
 }
 
+/// Decodes a coordinate, in the font's units.
 fn offset(byte: u8) -> i32 {
     i32::from(byte) - i32::from(b'R')
 }

@@ -15,6 +15,7 @@ pub(super) struct Window {
 }
 
 impl Window {
+    /// Makes the window of a page.
     pub fn new(page: &Page, steps: StepsPerMillimetre) -> Self {
         let to_fine = |bits: i64, axis: usize| {
             // The product has 32 fraction bits, of which 8 are kept.

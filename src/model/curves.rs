@@ -54,6 +54,7 @@ impl<'a> StoredCurve<'a> {
 /// If they come from a model, every control point exists and every curve is valid.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Curves<'a> {
+    /// The half-words of the curves, one curve after another.
     halves: &'a [u16],
 }
 
@@ -110,8 +111,11 @@ pub(super) struct CurveList {
     pub(super) start: usize,
     /// The number of half-words of completed curves. Those of the unfinished curve follow.
     whole: usize,
+    /// The number of completed curves.
     pub(super) count: usize,
+    /// The degree of the curves that follow, once it is set.
     degree: Option<u8>,
+    /// The unfinished curve.
     in_hand: Option<InHand>,
 }
 

@@ -277,6 +277,8 @@ impl Model<'_> {
         Ok(first.min(last)..first.max(last) + 1)
     }
 
+    /// Deletes the elements of a kind in `range`. If `plug`, the last element replaces the deleted
+    /// one.
     fn delete(&mut self, part: ElementKind, range: Range<usize>, plug: bool) {
         match part {
             ElementKind::Vertices => {

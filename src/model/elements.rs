@@ -15,8 +15,11 @@ pub const VERTEX_NUMBER_LIMIT: usize = 1 << 14;
 pub struct Corner(pub(super) u16);
 
 impl Corner {
+    /// The bits of the vertex number.
     const VERTEX: u16 = 0x3FFF;
+    /// The flag of a corner of a bar.
     const BAR: u16 = 0x4000;
+    /// The flag of the last corner of an element.
     const LAST: u16 = 0x8000;
 
     /// Makes the corner at `vertex`, which must be below [`VERTEX_NUMBER_LIMIT`] (higher bits are

@@ -71,6 +71,7 @@ pub struct Model<'m> {
     /// The corners of the elements, followed by their [`PenRun`]s and by the curves.
     corners: &'m mut heapless::VecView<Corner>,
     fraction_bits: u32,
+    /// The error bound of the coordinates.
     rounding: Rounding,
     faces: usize,
     bars: usize,
@@ -260,6 +261,7 @@ impl<'m> Model<'m> {
         Ok(Position { x, y, z })
     }
 
+    /// Makes the unit coarser by a factor of 2^`bits`, and converts all vertices to it.
     fn coarsen(&mut self, bits: u32) {
         if bits == 0 {
             return;
@@ -344,12 +346,14 @@ impl<'m> Model<'m> {
         if count < needed { Err(ModelError::TooFewCorners { needed }) } else { Ok(count) }
     }
 
+    /// Checks that there is room for `count` more half-words.
     fn check_corners(&self, count: usize) -> Result<(), ModelError> {
         let limit = self.corner_limit();
         let needed = self.corners.len().saturating_add(count);
         if needed > limit { Err(ModelError::TooManyCorners { limit, needed }) } else { Ok(()) }
     }
 
+    /// Appends a corner to the elements, by its OBJ number.
     fn push_corner(&mut self, number: i32, of_bar: bool, last: bool) -> Result<(), ModelError> {
         let vertex = self
             .resolve(number)

@@ -24,6 +24,7 @@ pub struct PenRun {
 }
 
 impl PenRun {
+    /// Whether the run begins at this corner.
     pub(super) fn begins_at(self, corner: usize) -> bool {
         usize::from(self.first) == corner
     }
@@ -172,7 +173,9 @@ pub(super) struct PenBook {
     pub(super) by_material: bool,
 }
 
+/// Marks a pen that no name has.
 const FREE: u32 = 0;
+/// Marks a pen that was chosen by its number.
 const BY_NUMBER: u32 = 1;
 
 impl PenBook {

@@ -9,17 +9,20 @@ use super::Leg;
 
 /// The cycle, and how it changed since it was last [settled](Cycle::settle).
 pub(super) struct Cycle<'s> {
+    /// The legs, in the order of the cycle.
     legs: &'s mut [Leg],
     /// The index in `legs` of each chain, and of the gap.
     place: &'s mut [u16],
     /// The stretches reversed since then: the index of the first leg, and the number of legs.
     turns: &'s mut [[u16; 2]],
+    /// The number of turns in `turns`. Further turns are made but cannot be undone.
     turned: usize,
 }
 
 /// The position and the direction of a leg in a cycle. It is valid until the next turn.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Stand {
+    /// The index of the leg in the cycle.
     place: usize,
     /// Whether the leg has the direction in which the cycle is stored.
     pub forward: bool,
@@ -48,6 +51,7 @@ impl<'s> Cycle<'s> {
         self.legs[index]
     }
 
+    /// Returns the index of `leg` in the cycle.
     fn place(&self, leg: Leg) -> usize {
         usize::from(self.place[leg.segment()])
     }
@@ -128,6 +132,7 @@ impl<'s> Cycle<'s> {
         self.turn(a, e) + self.turn(a, d.flipped()) + self.turn(e, b.flipped())
     }
 
+    /// Reverses `count` legs from index `begin` on, and flips each.
     fn turn_around(&mut self, begin: usize, count: usize) {
         let all = self.legs.len();
         let (mut low, mut high) = (begin, begin + count - 1);
@@ -146,6 +151,7 @@ impl<'s> Cycle<'s> {
         }
     }
 
+    /// Stores `leg` at an index.
     fn set(&mut self, place: usize, leg: Leg) {
         self.legs[place] = leg;
         self.place[leg.segment()] = place as u16;

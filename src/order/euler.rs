@@ -19,6 +19,7 @@ pub(super) struct Unused<'s, 'a> {
     network: Network<'a>,
     /// The legs from each station, without those at the front that were found to be used.
     legs: Incidence<'s>,
+    /// 1 for each chain that has been used, otherwise 0.
     used: &'s mut [u8],
     /// For each station, the other end of its pen-up move; or [`NONE`] or [`EVEN_PART`].
     mate: &'s mut [u16],
@@ -47,6 +48,7 @@ impl<'s, 'a> Unused<'s, 'a> {
         None
     }
 
+    /// Returns the next unused leg from `station`, and marks it as used.
     fn take(&mut self, station: u16) -> Option<Leg> {
         let leg = self.peek(station)?;
         self.used[leg.segment()] = 1;

@@ -40,9 +40,13 @@ pub(super) struct Step {
 
 /// A queue of the stations around which an exchange may help. Each station is in it at most once.
 struct Waiting<'s> {
+    /// The stations, in a ring buffer with room for all.
     queue: &'s mut [u16],
+    /// 1 for each station that is in the queue, otherwise 0.
     is_waiting: &'s mut [u8],
+    /// The index of the station that comes next.
     first: usize,
+    /// The number of stations in the queue.
     count: usize,
 }
 
@@ -51,6 +55,7 @@ impl<'s> Waiting<'s> {
         Self { queue, is_waiting, first: 0, count: 0 }
     }
 
+    /// Puts a station at the end of the queue, unless it is in it already.
     fn add(&mut self, station: u16) {
         // The end of the gap is not a station.
         let Some(is_waiting) = self.is_waiting.get_mut(usize::from(station)) else {
@@ -64,6 +69,7 @@ impl<'s> Waiting<'s> {
         }
     }
 
+    /// Takes the next station from the queue.
     fn next(&mut self) -> Option<u16> {
         if self.count == 0 {
             return None;
@@ -78,6 +84,7 @@ impl<'s> Waiting<'s> {
 
 /// The tour, and the tables that are needed to exchange its moves.
 pub(super) struct Exchanges<'s, 'a> {
+    /// The tour.
     pub cycle: Cycle<'s>,
     network: Network<'a>,
     distances: Distances<'s, 'a>,

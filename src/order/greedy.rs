@@ -19,7 +19,9 @@ use bytemuck::{Pod, Zeroable};
 struct Choice {
     /// How much farther the second choice is than the first, in 1/256 steps.
     regret: u32,
+    /// The nearest unpaired point.
     first: u16,
+    /// The second nearest unpaired point, or [`NONE`].
     second: u16,
 }
 
@@ -47,6 +49,7 @@ pub(super) fn pair(
     Ok(())
 }
 
+/// Finds the two nearest unpaired points of `chooser`.
 fn choose(
     odd: &OddPoints<'_>,
     mate: &[u16],
@@ -83,6 +86,7 @@ fn choose(
     }
 }
 
+/// Pairs the odd points in the order of their regret.
 fn with_regret(
     odd: &OddPoints<'_>,
     mut scratch: Scratch<'_>,
@@ -133,6 +137,7 @@ fn free_the_longest(odd: &OddPoints<'_>, mate: &mut [u16]) {
     }
 }
 
+/// Makes `a` and `b` partners.
 fn join(mate: &mut [u16], a: u16, b: u16) {
     mate[usize::from(a)] = b;
     mate[usize::from(b)] = a;

@@ -136,7 +136,9 @@ struct Best<'b, 'a> {
     lift: u32,
     /// The search ends after this many successive kicks without a gain.
     patience: u32,
+    /// The cost of the shortest tour, with the present cost of a lift.
     cost: u64,
+    /// The shortest tour.
     route: &'b mut [Leg],
     kicks: Kicks,
 }

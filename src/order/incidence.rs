@@ -7,7 +7,9 @@ use crate::stage::{OutOfScratch, Scratch};
 
 /// The lists of the legs that begin at each station, in ascending order of their codes.
 pub(super) struct Incidence<'s> {
+    /// For each station the code of the first leg of its list, or [`NONE`].
     first: &'s mut [u16],
+    /// For each leg, by its code, the next leg of the same list, or [`NONE`].
     next: &'s mut [u16],
 }
 

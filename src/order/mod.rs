@@ -82,9 +82,11 @@ impl Leg {
     pub fn flipped(self) -> Self {
         Self(self.0 ^ 1)
     }
+    /// Returns the leg as a number: twice the segment's number, plus 1 if it is reversed.
     fn code(self) -> u16 {
         self.0
     }
+    /// Makes the leg that has this code.
     fn from_code(code: u16) -> Self {
         Self(code)
     }
@@ -225,6 +227,8 @@ pub fn order(
     Ok(report)
 }
 
+/// Checks that the tour has the right length and that every segment joins two different points of
+/// the page.
 fn check(drawing: Drawing<'_>, tour_length: usize) -> Result<(), OrderError> {
     if drawing.segments.len() > Leg::LIMIT {
         return Err(OrderError::TooManySegments);
@@ -245,6 +249,7 @@ fn check(drawing: Drawing<'_>, tour_length: usize) -> Result<(), OrderError> {
     }
 }
 
+/// Orders the segments of one pen into `tour`, and adds its numbers to `report`.
 fn order_pen<'a>(
     drawing: Drawing<'a>,
     pen: u8,
@@ -302,7 +307,9 @@ fn order_pen<'a>(
 
 /// The number of connected parts, and how many of them have odd points.
 struct Parts {
+    /// The number of connected parts.
     count: u32,
+    /// The number of those that have odd points.
     odd: u32,
 }
 

@@ -12,7 +12,9 @@ use crate::stage::{OutOfScratch, Scratch};
 /// For each station the same number of other stations, the nearest first.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Neighbours<'a> {
+    /// The neighbours of each station in turn; [`NONE`] fills unused entries.
     stations: &'a [u16],
+    /// The number of entries for each station.
     per_station: usize,
 }
 
@@ -54,8 +56,10 @@ impl<'a> Neighbours<'a> {
     }
 }
 
+/// The stations, sorted into the cells of a grid.
 struct Grid<'s, 'a> {
     network: Network<'a>,
+    /// The lower left corner of the grid.
     corner: PagePoint,
     /// Cells are squares of 2^`cell_bits` steps.
     cell_bits: u32,
@@ -113,6 +117,7 @@ impl<'s, 'a> Grid<'s, 'a> {
         Ok(grid)
     }
 
+    /// Returns the column and the row of the cell that contains a point.
     fn cell(&self, place: PagePoint) -> (i32, i32) {
         let along = |at: i32, corner: i32| (at - corner) >> self.cell_bits;
         (along(place.x, self.corner.x), along(place.y, self.corner.y))

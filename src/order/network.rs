@@ -187,7 +187,9 @@ struct Survey<'s, 'a> {
     segments: &'a [Segment],
     pen: u8,
     stops: Stops,
+    /// For each point the number of its segments, with the flag [`HAS_ODD`].
     degree: &'s mut [u16],
+    /// For each point the exclusive or of the numbers of its segments.
     across: &'s mut [u16],
     /// For each point, the lowest point of its connected part.
     part: &'s mut [u16],
@@ -225,6 +227,7 @@ impl<'s, 'a> Survey<'s, 'a> {
         usize::from(self.degree[usize::from(point)] & !HAS_ODD)
     }
 
+    /// Whether a point is a station.
     fn is_station(&self, point: u16) -> bool {
         let lowest = self.part[usize::from(point)];
         match self.degree(point) {
@@ -238,6 +241,8 @@ impl<'s, 'a> Survey<'s, 'a> {
         (0..self.degree.len() as u16).filter(|&point| self.is_station(point))
     }
 
+    /// Builds the chains: fills `at` with the points of the stations, and `ends` and `outer` with
+    /// the stations and the outermost segments of each chain.
     fn lay_chains(
         self,
         scratch: &mut Scratch<'_>,

@@ -11,6 +11,7 @@ use core::ops::Range;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct OddPoints<'a> {
     network: Network<'a>,
+    /// The odd stations, sorted by x.
     stations: &'a [u16],
     free_ends: bool,
 }

@@ -6,6 +6,7 @@
 /// order of the unions.
 #[derive(Debug)]
 pub(super) struct Partition<'a> {
+    /// The parent of each member; a representative is its own parent.
     parent: &'a mut [u16],
 }
 

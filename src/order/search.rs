@@ -47,8 +47,11 @@ struct Cut {
 /// A search for a step that begins with the cut after `a`.
 pub(super) struct StepSearch<'e, 's, 'a> {
     tour: &'e Exchanges<'s, 'a>,
+    /// The leg before the first cut.
     a: Leg,
+    /// The leg after the first cut.
     b: Leg,
+    /// The position and the direction of `a`.
     a_stands: Stand,
     /// The station after the first cut, where the tour will be joined again.
     first: u16,

@@ -17,6 +17,7 @@ impl<'a> WorkBudget<'a> {
     /// distance, up to 500 instructions on the smallest core.
     const UNITS: u32 = 256;
 
+    /// Makes a counter that calls `cancel`, with no budget yet.
     pub fn new(cancel: &'a mut dyn Cancel) -> Self {
         Self { cancel, done: 0, budget: 0 }
     }

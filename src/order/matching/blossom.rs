@@ -28,10 +28,12 @@ pub(super) struct Node {
 }
 
 impl Node {
+    /// Makes the node of a single vertex.
     pub fn vertex(vertex: u16) -> Self {
         Self { parent: NONE, next: NONE, link: [NONE; 2], base: vertex }
     }
 
+    /// Whether the node is in use and not part of a blossom.
     pub fn is_outermost(&self) -> bool {
         self.base != NONE && self.parent == NONE
     }

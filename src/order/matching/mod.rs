@@ -78,6 +78,7 @@ pub(super) fn pair<'s>(
     Ok(matching.length())
 }
 
+/// The state of the algorithm: the matching so far, its duals, and the present tree.
 struct Matching<'s, 'a> {
     odd: &'s OddPoints<'a>,
     /// The vertices, followed by the blossoms.
@@ -87,6 +88,7 @@ struct Matching<'s, 'a> {
     /// The partner of each vertex that is the base of an outermost node; meaningless for other
     /// vertices.
     mate: &'s mut [u16],
+    /// The [`Label`] of each vertex, as a number.
     label: &'s mut [u8],
     /// The dual of each vertex. The current value is this plus `now` if its node is outer, and
     /// minus `now` if it is inner.
@@ -241,6 +243,7 @@ impl<'s, 'a> Matching<'s, 'a> {
         if node < all { node..node + 1 } else { 0..all }
     }
 
+    /// Gives a vertex a label, and stores its dual so that its current value does not change.
     fn set_vertex_label(&mut self, vertex: u16, label: Label) {
         let radius = self.radius_now(vertex);
         let index = usize::from(vertex);
@@ -406,6 +409,7 @@ impl<'s, 'a> Matching<'s, 'a> {
         Ok([others, self.odd.free_numbers()])
     }
 
+    /// Whether the outermost node of `vertex` is unmatched.
     fn is_free(&self, vertex: u16) -> bool {
         let base = self.node(self.top_of(vertex)).base;
         self.mate[usize::from(base)] == NONE
@@ -476,7 +480,7 @@ impl<'s, 'a> Matching<'s, 'a> {
         self.odd.count()..self.unused
     }
 
-    /// Removes all labels, after the duals have been stored.
+    /// Removes the tree: stores all current duals and removes all labels.
     fn fell_tree(&mut self) {
         for blossom in self.blossoms() {
             if self.node(blossom).is_outermost() {
