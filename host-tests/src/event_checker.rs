@@ -1,5 +1,5 @@
-//! One strict checker for every event stream and for the pins: what a real driver, motor and pen
-//! would not forgive.
+//! A strict checker for event streams and for pins: it rejects everything that a real driver, motor
+//! or pen would not tolerate.
 
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
 
@@ -10,36 +10,37 @@ use penup::motion::{EventKind, LiftRule, StepEvent, TICKS_PER_SECOND};
 use penup::step::Line;
 use std::collections::BTreeSet;
 
-/// What the events of a job came to.
+/// The motion that the events of a job amount to.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Verdict {
-    /// Time (s), place along the path (mm) of each move, by run of the pen's height.
+    /// The runs between changes of the pen's height.
     pub runs: Vec<Run>,
-    /// Where the steps lead.
+    /// The final position.
     pub end: PagePoint,
 }
 
-/// What happens between two moves of the pen.
+/// The motion between two moves of the pen.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Run {
     /// The pen's height.
     pub height: u8,
-    /// Seconds from the first event of the run to the end of the last.
+    /// The time in seconds from the first event of the run to the end of the last one.
     pub seconds: f64,
-    /// Seconds of each move from the start of the run.
+    /// The time of each move in seconds from the start of the run.
     pub times: Vec<f64>,
-    /// Where each move leads.
+    /// The position after each move.
     pub points: Vec<PagePoint>,
 }
 
 /// Checks the events against the settings.
 ///
 /// # Panics
-/// At the first event that breaks a rule, with its number: pulses closer than twice their width, a
-/// pulse too soon after the change of its direction, a direction that changes during a pulse, a
-/// step beyond the soft limits, a step while the pen's dwell runs, while its motor moves, or with the drivers
-/// off, an event of no time, a pen that is not at the height that its motor's steps lead to, or moves faster or
-/// accelerates more than is set, a stream that does not end at rest with the pen up.
+/// Panics at the first event that violates a rule, with its number. The rules forbid: pulses closer
+/// than twice their width, a pulse too soon after a change of its direction, a change of direction
+/// during a pulse, a step beyond the soft limits, a step during the pen's dwell, while the pen's
+/// motor moves, or with the drivers off, an event without duration, a pen height that differs from
+/// the steps of the pen's motor, a pen that moves faster or accelerates more than set, and a stream
+/// that does not end at rest with the pen up.
 pub fn check(events: &[StepEvent], settings: &Settings) -> Verdict {
     let pulse = u64::from(settings.microseconds_as_ticks(Setting::StepPulse));
     let setup = u64::from(settings.microseconds_as_ticks(Setting::DirectionSetup));
@@ -59,7 +60,8 @@ pub fn check(events: &[StepEvent], settings: &Settings) -> Verdict {
     let mut time = 0u64;
     let mut run_start = 0u64;
     let mut pen_ready = 0u64;
-    // Of x and y: the level, when it changed, when the axis was last pulsed.
+    // For x and y: the direction level, the time of its last change, and the time of the axis's
+    // last pulse.
     let mut axes = [(false, None::<u64>, None::<u64>); 2];
     let mut lift = LiftWatch::new(settings, false);
     let mut runs = vec![Run::default()];
@@ -72,13 +74,13 @@ pub fn check(events: &[StepEvent], settings: &Settings) -> Verdict {
                 if step {
                     lift.step(down, time);
                 }
-                // Until it is at its height.
+                // The pen is not ready until it has reached its height.
                 pen_ready = u64::MAX;
             }
             EventKind::Pen { height } => {
                 lift.assert_at(height, "an event of the pen");
                 pen_ready = time + dwell(height);
-                // On a ramp the pen moves on before its dwell.
+                // On a ramp, the pen moves again before its dwell.
                 let run = runs.last_mut().expect("never empty");
                 run.seconds = time.saturating_sub(run_start) as f64 / second;
                 runs.push(Run { height, ..Run::default() });
@@ -139,16 +141,16 @@ pub fn check(events: &[StepEvent], settings: &Settings) -> Verdict {
     Verdict { runs, end: at }
 }
 
-/// The motor that lifts the pen, as it stands: the upper stop holds it.
+/// The true position of the motor that lifts the pen; the upper stop limits it.
 #[derive(Debug)]
 struct LiftWatch {
     rule: Option<LiftRule>,
     acceleration: f64,
-    /// An alarm may stop it at once.
+    /// Whether an alarm may stop it at once.
     may_be_cut: bool,
-    /// Steps below the stop; it began as low as it can be.
+    /// The number of steps below the upper stop. It began at the lowest position.
     place: i32,
-    /// When it last stepped, which way, at how many steps a second.
+    /// The time, direction and speed (steps per second) of the last step.
     last: Option<(u64, bool, f64)>,
 }
 
@@ -167,7 +169,8 @@ impl LiftWatch {
     }
 
     /// # Panics
-    /// Without such a motor; at a step too soon; at too great an acceleration.
+    /// Panics if there is no such motor, at a step that comes too soon, and at too great an
+    /// acceleration.
     fn step(&mut self, down: bool, time: u64) {
         let rule = self.rule.expect("a motor lifts the pen");
         self.place = (self.place + if down { 1 } else { -1 }).max(0);
@@ -183,7 +186,8 @@ impl LiftWatch {
                 let jerks = speed.max(slower) > 1.42 * slowest;
                 assert!(!jerks || self.may_be_cut, "{time}: the pen jerks to {speed} steps/s");
             } else {
-                // From the middle of one interval to that of the next; pulses are at whole ticks.
+                // The time between the middles of two successive intervals. Pulses are at whole
+                // ticks.
                 let change = (speed - slower).abs() * 2.0 / (1.0 / speed + 1.0 / slower);
                 let rounding = 2.0 * speed.max(slower).powi(3) / second;
                 assert!(change <= 1.02 * self.acceleration + rounding, "{time}: {change} steps/s2");
@@ -193,7 +197,7 @@ impl LiftWatch {
     }
 
     /// # Panics
-    /// If the pen is not at `height`.
+    /// Panics if the pen is not at `height`.
     fn assert_at(&self, height: u8, what: &str) {
         if let Some(rule) = self.rule {
             assert_eq!(self.place, rule.steps(height), "{what} at height {height}");
@@ -201,11 +205,11 @@ impl LiftWatch {
     }
 }
 
-/// The greatest change of speed along the path, mm/s², over windows of at least `window` seconds.
+/// The maximum acceleration along the path, in mm/s², over windows of at least `window` seconds.
 ///
-/// `places` are the path lengths (mm) that the plan has when each move leaves, `times` when it does.
-/// The speed between two moves belongs to the time in the middle between them, which is exact for
-/// constant acceleration.
+/// `places` are the path lengths (mm) of the plan at the start of each move, and `times` are the
+/// times of these starts. The speed between two moves is assigned to the time midway between them,
+/// which is exact for constant acceleration.
 pub fn greatest_acceleration(times: &[f64], places: &[f64], window: f64) -> f64 {
     let speeds: Vec<(f64, f64)> = times
         .windows(2)
@@ -226,14 +230,15 @@ pub fn greatest_acceleration(times: &[f64], places: &[f64], window: f64) -> f64 
     greatest
 }
 
-/// The greatest jerk along the path, mm/s³, over windows in which `about` (mm/s³) can be told to 8 % from the
-/// places' errors: 4 nm each, which is a tick at 100 mm/s.
+/// The maximum jerk along the path, in mm/s³. The windows are so long that a jerk of `about`
+/// (mm/s³) can be determined to 8 % in spite of the errors of the places: 4 nm each, which is a
+/// tick at 100 mm/s.
 ///
-/// `places` and `times` as in [`greatest_acceleration`]. Six times the third divided difference of places
-/// over four times is a weighted mean of the jerk between the first and the last, whatever lies between; the four are at least
-/// a third of the window apart.
+/// `places` and `times` are as in [`greatest_acceleration`]. Six times the third divided difference
+/// of the places at four times is a weighted mean of the jerk between the first and the last of
+/// them. The four times are at least a third of the window apart.
 pub fn greatest_jerk(times: &[f64], places: &[f64], about: f64) -> f64 {
-    // The weights of the places add up to 8 over a third of the window cubed.
+    // The weights of the places add up to 8 divided by the cube of a third of the window.
     let third = (8.0 * 4e-6 / (0.08 * about)).cbrt();
     let mut greatest = 0.0f64;
     let mut knots = [0; 4];
@@ -260,8 +265,8 @@ pub fn greatest_jerk(times: &[f64], places: &[f64], about: f64) -> f64 {
     greatest
 }
 
-/// Where a plan along `targets` from the origin is when each move leaves (mm), and where the move
-/// leads. The build is Cartesian.
+/// The path length (mm) of the plan along `targets` from the origin at the start of each move, and
+/// the point that the move leads to. The machine must be Cartesian.
 fn plan(targets: &[Target], settings: &Settings) -> Vec<(f64, PagePoint)> {
     let [x, y] = settings.page_steps().map(|steps| steps.to_num::<f64>());
     let (mut at, mut start) = (PagePoint::default(), 0.0);
@@ -282,11 +287,12 @@ fn plan(targets: &[Target], settings: &Settings) -> Vec<(f64, PagePoint)> {
 }
 
 /// Checks that `runs` follow `targets` from the origin, from rest to rest between two moves of the
-/// pen; `cut` if an alarm ended the last of them.
+/// pen. `cut` tells that an alarm ended the last run.
 ///
 /// # Panics
-/// Off the path; more than 1.05 times the acceleration over any 5 ms, or as long as it takes to tell it to 4 %;
-/// more than 1.1 times the jerk, if it is limited; a run that begins or ends faster than from or to rest.
+/// Panics if a run leaves the path; if the acceleration over any 5 ms, or over the time needed to
+/// determine it to 4 %, exceeds 1.05 times the limit; if the jerk, where it is limited, exceeds 1.1
+/// times the limit; and if a run does not begin or end at rest.
 pub fn check_speed(runs: &[Run], targets: &[Target], settings: &Settings, cut: bool) {
     let acceleration: f64 =
         settings.get(Setting::AccelerationX).min(settings.get(Setting::AccelerationY)).to_num();
@@ -298,7 +304,8 @@ pub fn check_speed(runs: &[Run], targets: &[Target], settings: &Settings, cut: b
         rest = later;
         let (places, points): (Vec<f64>, Vec<PagePoint>) = moves.iter().copied().unzip();
         assert_eq!(run.points, points, "off the path");
-        // Two speeds, each of a step of 12.5 um at 50 mm/s between places that are right to 4 nm.
+        // The window suits two speeds, each of a step of 12.5 µm at 50 mm/s between places that are
+        // exact to 4 nm.
         let window = f64::max(0.005, 0.064 / (0.04 * acceleration));
         let measured = greatest_acceleration(&run.times, &places, window);
         assert!(measured <= 1.05 * acceleration, "run {number}: {measured} mm/s2");
@@ -309,7 +316,7 @@ pub fn check_speed(runs: &[Run], targets: &[Target], settings: &Settings, cut: b
         let from_rest = |times: [f64; 2], places: [f64; 2]| {
             let length = places[1] - places[0];
             let speed = length / (times[1] - times[0]);
-            // The rest lies at most a move before the first of them.
+            // The standstill is at most one move before the first of them.
             let most = (2.0 * acceleration * 2.0 * length).sqrt();
             assert!(speed <= 1.05 * most, "run {number}: {speed} mm/s beside a rest, not {most}");
         };
@@ -323,27 +330,27 @@ pub fn check_speed(runs: &[Run], targets: &[Target], settings: &Settings, cut: b
     }
 }
 
-/// The slack of a motor: it takes the pen along at either end of it only.
+/// A model of the backlash of a motor, which moves the pen only at either end of the backlash.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Play {
     slack: i32,
-    /// How far the motor is beyond the pen at the lower end; `None` before it has moved.
+    /// The offset of the motor relative to the pen at the lower end; `None` before it has moved.
     low: Option<i32>,
     beyond: i32,
 }
 
 impl Play {
-    /// Of a motor that lies at the end at which its first move finds it.
+    /// A motor at the end of its backlash at which its first move finds it.
     pub fn new(slack: i32) -> Self {
         Self { slack, low: None, beyond: 0 }
     }
 
-    /// Of a motor that lies in the middle of its slack.
+    /// A motor in the middle of its backlash.
     pub fn in_the_middle(slack: i32) -> Self {
         Self { slack, low: Some(-slack / 2), beyond: 0 }
     }
 
-    /// The motor moves by so many steps; how far it takes the pen.
+    /// Moves the motor by `steps` and returns by how many steps the pen moves.
     pub fn turn(&mut self, steps: i32) -> i32 {
         if steps == 0 {
             return 0;
@@ -356,49 +363,50 @@ impl Play {
     }
 }
 
-/// Steps of slack of each motor.
+/// The backlash of each motor in steps.
 pub fn slack_steps(settings: &Settings) -> [i32; 2] {
     let [x, y] = settings.page_steps();
     [(Setting::BacklashX, x), (Setting::BacklashY, y)]
         .map(|(slack, steps)| (settings.get(slack).to_num::<f64>() * steps.to_num::<f64>()) as i32)
 }
 
-/// What the pins drew.
+/// The result of the changes of the pins.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Drawn {
-    /// The moves made with the pen down, the lesser point first.
+    /// The moves made with the pen down, with the smaller point first.
     pub inked: BTreeSet<(PagePoint, PagePoint)>,
     /// The sum of the steps.
     pub end: PagePoint,
-    /// When the last pulse began, ticks.
+    /// The time of the start of the last pulse, in ticks.
     pub last_step: u64,
     /// The pen's height at the end.
     pub pen: u8,
-    /// Steps of the motor that lifts it, from its upper stop.
+    /// The steps of the motor that lifts the pen, from its upper stop.
     pub lift: i32,
-    /// The moves between two moves of the pen.
+    /// The runs between changes of the pen's height.
     pub runs: Vec<Run>,
-    /// Where motors took up their slack in one go, by the motors' steps.
+    /// The moves in which motors took up their backlash in one go, in steps of the motors.
     pub slack: Vec<Run>,
 }
 
-/// Checks what the pins did against the settings.
+/// Checks the changes of the pins against the settings.
 ///
 /// # Panics
-/// At the first change that breaks a rule: a pulse shorter or a pause shorter than a pulse, a
-/// direction that changes during a pulse or too shortly before one, a step with the drivers off, a
-/// step before the pen's dwell is over, a step that leads out of the soft limits or further beyond
-/// them (the origin is where the pins began), a motor that takes up its slack while the other one
-/// moves the pen, a step while the pen's motor moves or is not at the pen's height.
+/// Panics at the first change that violates a rule. The rules forbid: a pulse, or a pause between
+/// pulses, shorter than the pulse width, a change of direction during a pulse or too shortly before
+/// one, a step with the drivers off, a step before the pen's dwell is over, a step that leaves the
+/// soft limits or leads further beyond them (the origin is where the pins began), a motor that
+/// takes up its backlash while the other one moves the pen, and a step while the pen's motor moves
+/// or is not at the pen's height.
 pub fn check_pins(trace: &[Stamped], settings: &Settings) -> Drawn {
     follow_pins(trace, settings, false)
 }
 
-/// The same where an alarm may come at any time: the pen then rises at once, be it during a pulse, which ends
-/// by itself.
+/// Does the same as [`check_pins`] for a job that an alarm may interrupt at any time. The pen then
+/// rises at once, even during a pulse, which ends by itself.
 ///
 /// # Panics
-/// As [`check_pins`].
+/// Panics as [`check_pins`] does.
 pub fn check_pins_in_alarms(trace: &[Stamped], settings: &Settings) -> Drawn {
     follow_pins(trace, settings, true)
 }
@@ -409,7 +417,8 @@ fn follow_pins(trace: &[Stamped], settings: &Settings, alarms: bool) -> Drawn {
     let mut drawn = Drawn { runs: vec![Run::default()], ..Drawn::default() };
     let build = settings.kinematics();
     let second = f64::from(TICKS_PER_SECOND);
-    // Of x and y: pulse high, since when, up, since when.
+    // For x, y and z: whether the pulse is high, since when, whether the direction is up, and since
+    // when.
     let mut axes = [(false, None::<u64>, true, None::<u64>); 3];
     let mut lift = LiftWatch::new(settings, true);
     let (mut enabled, mut pen_ready) = (false, 0);
@@ -419,7 +428,7 @@ fn follow_pins(trace: &[Stamped], settings: &Settings, alarms: bool) -> Drawn {
     let mut index = 0;
     while let Some(&Stamped { time, .. }) = trace.get(index) {
         let mut delta = (0, 0);
-        // All that one interrupt did.
+        // All changes of one interrupt.
         while let Some(stamped) = trace.get(index).filter(|stamped| stamped.time == time) {
             index += 1;
             match stamped.change {
@@ -490,7 +499,7 @@ fn follow_pins(trace: &[Stamped], settings: &Settings, alarms: bool) -> Drawn {
     drawn
 }
 
-/// Steps beyond the travel.
+/// The number of steps beyond the travel.
 fn beyond(page: PagePoint, settings: &Settings) -> i64 {
     let [x, y] = settings.page_steps();
     let over = |at: i32, travel: Setting, steps: Value| {

@@ -1,38 +1,40 @@
-//! The picture of a scene that a camera rounded, by definition: what lies in one plane is taken from
-//! the grid on which the scene was made, everything else from the rounded vertices.
+//! A reference for the picture of a scene whose view coordinates are rounded. Coplanarity is taken
+//! from the grid on which the scene was made, everything else from the rounded vertices.
 //!
-//! Along an edge everything is linear in space: on which side of a line of the page a point lies, how
-//! far it lies behind a plane. So each such quantity is two whole numbers, its values at the ends.
-//! The edge is cut wherever any of them changes its sign, and between two cuts the mediant of the
-//! two speaks for the whole piece. Every triangle is asked about every edge; there is no short cut.
+//! Along an edge, every relevant quantity is linear in space, such as the signed distance from a
+//! line of the page or the distance behind a plane. Each such quantity is therefore represented by
+//! two whole numbers, its values at the ends. The edge is cut wherever one of them changes its
+//! sign, and between two cuts their mediant decides for the whole piece. Every triangle is tested
+//! against every edge, without shortcuts.
 //!
-//! A face counts as the triangles of the fan from its first corner, so faces must be convex.
+//! A face counts as the fan of triangles from its first corner, so faces must be convex.
 
 use crate::camera_scenes::{CameraScene, Place};
 use penup::geometry::{Projection, Vertex};
 use std::cmp::Ordering;
 
-/// A place along an edge: a numerator and a denominator above zero.
+/// A point along an edge as a fraction: a numerator and a positive denominator.
 pub type Ratio = (u128, u128);
 
-/// A piece of an edge, from and to as fractions of its length in space, and whether it is seen.
+/// A piece of an edge: the indices of the edge's ends, the start and end of the piece as fractions
+/// of the edge's length in space, and whether the piece is visible.
 pub type Piece = ((u16, u16), Ratio, Ratio, bool);
 
-/// A seam: its ends, and its visible pieces.
+/// A seam, which is the intersection line of two faces, and its visible pieces.
 #[derive(Debug, Clone)]
 pub struct Seam {
-    /// Its ends, rounded to whole coordinates.
+    /// The ends, rounded to whole coordinates.
     pub ends: [Vertex; 2],
-    /// What is seen of it.
+    /// The visible pieces, as fractions of the seam.
     pub visible: Vec<(Ratio, Ratio)>,
 }
 
-/// Which is less.
+/// Compares two fractions.
 pub fn compare(a: Ratio, b: Ratio) -> Ordering {
     (a.0 * b.1).cmp(&(b.0 * a.1))
 }
 
-/// A quantity that is linear along an edge, by its values at the two ends; below 2^62.
+/// A quantity that is linear along an edge, given by its values at the two ends; below 2^62.
 type Linear = (i128, i128);
 
 fn zero_of(linear: Linear) -> Option<Ratio> {
@@ -62,7 +64,7 @@ fn dot(a: Vector, b: Vector) -> i128 {
     (0..3).map(|n| a[n] * b[n]).sum()
 }
 
-/// The plane through three points: its normal, and a point in it.
+/// A plane through three points: its normal, and a point in it.
 #[derive(Debug, Clone, Copy)]
 struct Plane {
     normal: Vector,
@@ -78,7 +80,7 @@ impl Plane {
         dot(self.normal, minus(point, self.at))
     }
 
-    /// The same where the eye is.
+    /// The height of the eye over the plane.
     fn height_of_eye(&self, projection: Projection) -> i128 {
         match projection {
             Projection::Perspective => -dot(self.normal, self.at),
@@ -92,13 +94,13 @@ struct Triangle {
     corners: [u16; 3],
     face: usize,
     plane: Plane,
-    /// The sign of the eye's height over the plane; zero if it is seen edge-on.
+    /// The sign of the eye's height over the plane; zero if the plane is seen edge-on.
     eye: i128,
-    /// In which sense the corners run on the page.
+    /// The orientation of the corners on the page.
     turn: i128,
 }
 
-/// A line to be looked at: an edge, or the seam of two faces.
+/// A line whose visibility is computed: an edge, or the seam of two faces.
 #[derive(Debug, Clone, Copy)]
 struct Sight {
     ends: [Vector; 2],
@@ -111,20 +113,22 @@ enum Of {
     Seam([usize; 2]),
 }
 
-/// What is known of one triangle along one line.
+/// The relation of one triangle to one line.
 struct Passing {
     triangle: Triangle,
-    /// Which side of each of its sides, positive within.
+    /// The signed distance of the line's points from each side of the triangle on the page,
+    /// positive inside.
     sides: [Linear; 3],
-    /// On which side of the line each corner lies on the page.
+    /// The side of the line on which each corner lies on the page.
     corners: [i128; 3],
-    /// How far behind its plane.
+    /// The distance of the line's points behind the triangle's plane.
     behind: Linear,
-    /// Whether its plane holds the line, and then on which side each corner lies, zero if on it.
+    /// If the triangle's plane contains the line: the side of the line on which each corner lies,
+    /// zero if on it.
     holds: Option<[i128; 3]>,
 }
 
-/// A scene with its triangles and distinct edges.
+/// A scene with its triangles and its distinct edges.
 pub struct Picture<'s> {
     scene: &'s CameraScene,
     faces: Vec<Vec<u16>>,
@@ -137,7 +141,7 @@ fn on_grid(place: Place) -> Vector {
 }
 
 impl<'s> Picture<'s> {
-    /// Gets ready.
+    /// Collects the triangles and edges of the scene.
     pub fn new(scene: &'s CameraScene) -> Self {
         let faces: Vec<Vec<u16>> = scene
             .corners
@@ -177,7 +181,7 @@ impl<'s> Picture<'s> {
         on_grid(self.scene.grid[usize::from(number)])
     }
 
-    /// Whether the plane of a triangle holds a vertex before anything was rounded.
+    /// Whether the plane of a triangle contains a vertex, exactly, before any rounding.
     fn is_in_plane(&self, triangle: [u16; 3], vertex: u16) -> bool {
         Plane::through(triangle.map(|number| self.grid(number))).height(self.grid(vertex)) == 0
     }
@@ -191,7 +195,8 @@ impl<'s> Picture<'s> {
         self.faces[face].iter().all(|corner| self.is_in_plane(triangle, *corner))
     }
 
-    /// On which side of the line from a to b the point c lies on the page: positive to the left.
+    /// The side of the line from a to b on which the point c lies on the page: positive to the
+    /// left.
     fn side(&self, a: Vector, b: Vector, c: Vector) -> i128 {
         match self.scene.projection {
             Projection::Perspective => dot(a, cross(b, c)),
@@ -199,7 +204,7 @@ impl<'s> Picture<'s> {
         }
     }
 
-    /// How far a vertex lies behind a triangle as the eye sees it; zero if they lie in one plane.
+    /// The distance of a vertex behind a triangle as seen from the eye; zero if they are coplanar.
     fn behind(&self, triangle: &Triangle, vertex: u16) -> i128 {
         if self.is_in_plane(triangle.corners, vertex) {
             return 0;
@@ -247,7 +252,8 @@ impl<'s> Picture<'s> {
         Passing { triangle, sides, corners, behind, holds }
     }
 
-    /// Other edges that lie on the same line of the page: before, after, and behind them.
+    /// The other edges that lie on the same line of the page, with three linear quantities: before,
+    /// after, and behind them.
     fn shadows(&self, sight: &Sight) -> Vec<(usize, [Linear; 3])> {
         let [p, q] = sight.ends;
         let projection = self.scene.projection;
@@ -281,7 +287,7 @@ impl<'s> Picture<'s> {
         shadows
     }
 
-    /// The pieces of a line: from, to, whether it is hidden and whether it is drawn.
+    /// The pieces of a line: start, end, whether the piece is hidden, and whether it is drawn.
     fn look(&self, sight: &Sight, merged: bool) -> Vec<(Ratio, Ratio, bool, bool)> {
         let passings: Vec<Passing> = self
             .triangles
@@ -328,7 +334,7 @@ impl<'s> Picture<'s> {
         })
     }
 
-    /// Whether the nearest triangles that lie beside the line, in a plane with it, are one plane.
+    /// Whether the nearest triangles beside the line whose planes contain it are coplanar.
     fn is_flat(&self, passings: &[Passing], at: Ratio) -> bool {
         let nearest = |beside: i128| {
             let mut best: Option<(&Triangle, u16)> = None;
@@ -355,7 +361,7 @@ impl<'s> Picture<'s> {
         }
     }
 
-    /// The visible and the hidden pieces of every edge, in the order of the elements.
+    /// Computes the visible and the hidden pieces of every edge, in the order of the elements.
     pub fn pieces(&self, merged: bool) -> Vec<Piece> {
         let mut pieces: Vec<Piece> = Vec::new();
         for (number, &vertices) in self.edges.iter().enumerate() {
@@ -391,7 +397,7 @@ impl<'s> Picture<'s> {
         }
     }
 
-    /// Every seam with what is seen of it.
+    /// Computes every seam and its visible pieces.
     pub fn seams(&self, merged: bool) -> Vec<Seam> {
         let mut seams = Vec::new();
         for other in 0..self.faces.len() {
@@ -431,13 +437,13 @@ impl<'s> Picture<'s> {
         seams
     }
 
-    /// How many corners two faces have in common.
+    /// The number of corners that two faces share.
     fn shared(&self, one: usize, other: usize) -> usize {
         let is_there = |corner: &&u16| self.faces[other].contains(corner);
         self.faces[one].iter().filter(is_there).count()
     }
 
-    /// Whether a face has corners on both sides of the plane of another.
+    /// Whether a face has corners on both sides of the plane of another face.
     fn is_through(&self, face: usize, plane: usize) -> bool {
         let [a, b, c] = [0, 1, 2].map(|n: usize| self.grid(self.faces[plane][n]));
         let plane = Plane::through([a, b, c]);
@@ -446,12 +452,13 @@ impl<'s> Picture<'s> {
         (low, high) == (-1, 1)
     }
 
-    /// The segment that two triangles have in common, rounded; a corner in the plane of the other
-    /// triangle counts as lying on the positive side of it.
+    /// The rounded intersection of two triangles. A corner in the plane of the other triangle
+    /// counts as lying on its positive side.
     fn crossing(&self, one: &Triangle, other: &Triangle) -> Option<[Vertex; 2]> {
         let along = cross(one.plane.normal, other.plane.normal);
         let axis = (0..3).max_by_key(|axis| along[*axis].abs())?;
-        // Where the border of a triangle passes a plane: points as fractions of one denominator.
+        // The points where the border of a triangle passes through a plane, as fractions with a
+        // common denominator.
         let passes = |triangle: &Triangle, plane: &Triangle| -> Option<[(Vector, i128); 2]> {
             let height = |corner: u16| match self.is_in_plane(plane.corners, corner) {
                 true => 0,
@@ -484,18 +491,20 @@ impl<'s> Picture<'s> {
     }
 }
 
-/// Which of two points, each given as a sum and what to divide it by, is less along an axis.
+/// Compares two points along an axis, each given as a sum and its divisor.
 fn compare_along(a: &(Vector, i128), b: &(Vector, i128), axis: usize) -> Ordering {
-    // Below 2^20 2^62 2^62: too long to multiply, so whole parts first.
+    // The products would be as large as 2^144, which does not fit, so the whole parts are compared
+    // first.
     let whole = |(sum, by): &(Vector, i128)| (sum[axis].div_euclid(*by), sum[axis].rem_euclid(*by));
     let ((whole_a, rest_a), (whole_b, rest_b)) = (whole(a), whole(b));
     whole_a.cmp(&whole_b).then((rest_a * b.1).cmp(&(rest_b * a.1)))
 }
 
-/// Whether the page just beside a line, to the left (1) or right (-1), lies within a triangle.
+/// Whether the part of the page immediately next to a line, to the left (1) or right (-1), lies
+/// within a triangle.
 fn covers(passing: &Passing, at: Ratio, beside: i128) -> bool {
     (0..3).all(|n| match passing.sides[n] {
-        // The line of the page that is looked along: the third corner tells.
+        // This side lies on the line itself, so the third corner decides.
         (0, 0) => passing.corners[(n + 2) % 3] * beside > 0,
         side => sign_at(side, at) > 0,
     })

@@ -1,9 +1,11 @@
-//! Visibility by definition: exact fractions, every edge against everything, no short cut.
+//! A reference for visibility by definition: exact fractions, and every edge against everything
+//! without shortcuts.
 //!
-//! An edge is cut at every place of the page where anything can change: where a side of a face
-//! or another edge crosses or touches it, where it passes through the plane of a face. Between two
-//! such places the midpoint speaks for the whole piece. A face counts as the plane polygon that it is
-//! (inside by the parity of crossings), so faces must be plane and must not cross themselves.
+//! An edge is cut at every point of the page where anything can change: where a side of a face or
+//! another edge crosses or touches it, and where it passes through the plane of a face. Between two
+//! such points, the midpoint decides for the whole piece. A face counts as the plane polygon that
+//! it is (inside by the parity of crossings), so faces must be plane and must not intersect
+//! themselves.
 
 use crate::fraction::Fraction;
 use num_bigint::BigInt;
@@ -11,7 +13,8 @@ use num_traits::Zero;
 use penup::geometry::{Projection, Vertex};
 use penup::model::Corner;
 
-/// A piece of an edge: its ends, from and to as fractions of its length in space, whether it is seen.
+/// A piece of an edge: the indices of the edge's ends, the start and end of the piece as fractions
+/// of the edge's length in space, and whether the piece is visible.
 pub type Piece = ((u16, u16), Fraction, Fraction, bool);
 
 type Number = Fraction;
@@ -34,7 +37,8 @@ struct Polygon {
     page: Vec<Point>,
     low: Point,
     high: Point,
-    /// (a, b, c, d) with a x + b y + c z = d in space; `None` if the polygon has no area.
+    /// The plane as (a, b, c, d) with a x + b y + c z = d in space; `None` if the polygon has no
+    /// area.
     plane: Option<[Number; 4]>,
 }
 
@@ -43,7 +47,8 @@ struct Polygon {
 struct Edge {
     ends: (u16, u16),
     page: [Point; 2],
-    /// 1 / z in perspective, z in parallel: linear on the page.
+    /// The depth at both ends in a form that is linear on the page: 1 / z in a perspective
+    /// projection, z in a parallel one.
     linear_depth: [Number; 2],
 }
 
@@ -103,8 +108,8 @@ impl World {
         Self { projection, polygons, edges }
     }
 
-    /// The polygons that the edge can have anything to do with: those that are not beside, above or
-    /// below it on the page.
+    /// The polygons that can affect the edge: those whose bounding rectangle on the page meets that
+    /// of the edge.
     fn about<'w>(&'w self, edge: &Edge) -> Vec<&'w Polygon> {
         let [p, q] = &edge.page;
         let apart = |polygon: &&Polygon| {
@@ -115,12 +120,12 @@ impl World {
         self.polygons.iter().filter(|polygon| !apart(polygon)).collect()
     }
 
-    /// Depth of a plane at a point of the page; `None` if it is seen edge-on.
+    /// The depth of a plane at a point of the page; `None` if the plane is seen edge-on.
     fn depth_at(&self, plane: &[Number; 4], page: &Point) -> Option<Number> {
         let [a, b, c, d] = plane;
         let across = a * &page[0] + b * &page[1];
         match self.projection {
-            // (x z, y z, z) lies in the plane.
+            // The point (x z, y z, z) lies in the plane.
             Projection::Perspective => {
                 let rate = across + c;
                 (!rate.is_zero()).then(|| d / rate)
@@ -137,7 +142,7 @@ impl World {
         }
     }
 
-    /// Everywhere on the page that something can change along the edge, in order.
+    /// All points along the edge on the page where something can change, in order.
     fn cuts(&self, edge: &Edge, about: &[&Polygon]) -> Vec<Number> {
         let [p, q] = &edge.page;
         let mut cuts = vec![Number::zero(), Number::one()];
@@ -159,7 +164,8 @@ impl World {
                 cut_at_line(&polygon.page[n], &polygon.page[next]);
             }
         }
-        // Where the edge passes a plane: a linear function of the point in space.
+        // The points where the edge passes through a plane. The distance is a linear function of
+        // the point in space.
         for plane in about.iter().filter_map(|polygon| polygon.plane.as_ref()) {
             let height = |t: &Number| {
                 let page = at_fraction(&edge.page, t);
@@ -176,7 +182,7 @@ impl World {
                 cuts.push(self.page_fraction(edge, &(&at_p / (&at_p - &at_q))));
             }
         }
-        // Where it passes before another edge that lies on the same line of the page.
+        // The ends of the overlap with another edge that lies on the same line of the page.
         for other in &self.edges {
             if let Some((from, to)) = self.shadow(edge, other) {
                 cuts.extend([from.clone(), to.clone()]);
@@ -200,14 +206,14 @@ impl World {
         cuts
     }
 
-    /// The fraction of `edge` on the page where a point of its line lies.
+    /// The fraction of `edge` on the page at which a point of its line lies.
     fn fraction_of(&self, edge: &Edge, point: &Point) -> Number {
         let [p, q] = &edge.page;
         let axis = usize::from(p[0] == q[0]);
         (&point[axis] - &p[axis]) / (&q[axis] - &p[axis])
     }
 
-    /// Which part of `edge` coincides on the page with `other`, if both lie on one line there.
+    /// The part of `edge` that coincides with `other` on the page, if both lie on one line there.
     fn shadow(&self, edge: &Edge, other: &Edge) -> Option<(Number, Number)> {
         let [p, q] = &edge.page;
         let [a, b] = &other.page;
@@ -220,7 +226,7 @@ impl World {
         (from < to).then_some((from, to))
     }
 
-    /// From a fraction in space to one on the page.
+    /// Converts a fraction of the edge in space to one on the page.
     fn page_fraction(&self, edge: &Edge, s: &Number) -> Number {
         match self.projection {
             Projection::Parallel => s.clone(),
@@ -231,7 +237,7 @@ impl World {
         }
     }
 
-    /// From a fraction on the page to one in space.
+    /// Converts a fraction of the edge on the page to one in space.
     fn space_fraction(&self, edge: &Edge, t: &Number) -> Number {
         match self.projection {
             Projection::Parallel => t.clone(),
@@ -242,12 +248,13 @@ impl World {
         }
     }
 
-    /// Whether the page just beside `point`, in the direction `beside`, lies within the polygon.
+    /// Whether the part of the page immediately next to `point`, in the direction `beside`, lies
+    /// within the polygon.
     fn covers(&self, polygon: &Polygon, point: &Point, beside: &Point) -> bool {
         if (0..2).any(|n| point[n] < polygon.low[n] || point[n] > polygon.high[n]) {
             return false;
         }
-        // So small a step that it does not reach any line that does not pass through the point.
+        // The step is so small that it reaches no line that does not pass through the point.
         let count = polygon.page.len();
         let sides = || (0..count).map(|n| (&polygon.page[n], &polygon.page[(n + 1) % count]));
         let mut step = Number::one();
@@ -258,14 +265,14 @@ impl World {
             if !distance.is_zero() && !rate.is_zero() {
                 step = step.min(half((distance / rate).abs()));
             } else if distance.is_zero() && rate.is_zero() {
-                // Straight ahead: stop short of its ends.
+                // The side is straight ahead: the step must end before the ends of the side.
                 let axis = usize::from(beside[0].is_zero());
                 for end in [a, b] {
                     step = step.min(half(((&end[axis] - &point[axis]) / &beside[axis]).abs()));
                 }
             }
         }
-        // A ray to the right, a hair above the height of any corner on its way.
+        // A ray to the right, infinitesimally above the height of any corner on its way.
         let from: Point = [0, 1].map(|n| &point[n] + &step * &beside[n]);
         let mut inside = false;
         for (a, b) in sides() {
@@ -317,7 +324,7 @@ impl World {
         })
     }
 
-    /// Whether the nearest faces that begin at the edge on both sides lie in one plane.
+    /// Whether the nearest faces that begin at the edge on both sides are coplanar.
     fn is_within_plane(&self, edge: &Edge, about: &[&Polygon], t: &Number) -> bool {
         let [p, q] = &edge.page;
         let point = at_fraction(&edge.page, t);
@@ -374,7 +381,7 @@ impl World {
     }
 }
 
-/// The plane through three corners that are not in line.
+/// The plane through three corners that are not on one line.
 fn plane_of(corners: &[&Vertex]) -> Option<[Number; 4]> {
     let big = |value: i32| BigInt::from(value);
     let a = corners[0];
@@ -404,12 +411,12 @@ fn plane_of(corners: &[&Vertex]) -> Option<[Number; 4]> {
     None
 }
 
-/// The visible and the hidden pieces of every edge, in the order of the elements.
+/// Computes the visible and the hidden pieces of every edge, in the order of the elements.
 ///
-/// `merged_blocks`: without the visible pieces between two faces of one plane.
+/// With `merged_blocks`, the visible pieces between two coplanar faces are omitted.
 ///
 /// # Panics
-/// If a face is not plane.
+/// Panics if a face is not plane.
 pub fn pieces(
     projection: Projection,
     vertices: &[Vertex],
