@@ -459,7 +459,7 @@ mod tests {
         assert_eq!(map.point(0, 0, 5), PagePoint { x: 500, y: 1000 });
         assert_eq!(map.fine(0, 0, 5), [500 * 256, 1000 * 256]);
         assert_eq!(map.fine(1, -1, 512), [500 * 256 + 250, 1000 * 256 - 500]);
-        // Half way in space from z 100 to z 300 is three quarters of the way in the image.
+        // The middle of the edge in space, from z 100 to z 300, is at three quarters of its image.
         let half = EdgeParameter { numerator: 1 << 60, denominator: 1 << 61 };
         let (p, q) = (corners[0], corners[1]);
         assert_eq!(map.along(p, q, half, Projection::Perspective), PagePoint { x: 750, y: 1500 });

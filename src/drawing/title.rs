@@ -333,7 +333,7 @@ mod tests {
         lines
     }
 
-    /// One step to a unit of the font, the baseline at 0.
+    /// The lines of `text` with one step for each unit of the font and the baseline at 0.
     fn drawn(text: &str) -> Vec<[(i32, i32); 2]> {
         let title = Title { text, height: mm(CAPITAL_HEIGHT) };
         let lines = lines(title, mm(0), mm(0), [mm(1); 2]);
@@ -344,7 +344,7 @@ mod tests {
         Title { text, height: mm(CAPITAL_HEIGHT) }.width().to_num()
     }
 
-    /// Rows of the letter's lines, `#` where one passes.
+    /// A picture of the text in rows, with `#` where a line passes.
     fn picture(text: &str) -> String {
         let mut dots = BTreeSet::new();
         for [from, to] in drawn(text) {

@@ -100,7 +100,7 @@ mod tests {
         let ends = [[-700, 300], [1_000_900, 300]];
         assert_eq!(clipped(ends), Some([[100, 300], [900, 300]]));
         assert_eq!(clipped([ends[1], ends[0]]), Some([[900, 300], [100, 300]]));
-        // From the corner, up the diagonal of a far away place.
+        // From the corner of the page along the diagonal to a point far away.
         assert_eq!(
             clipped([[0, 0], [4_000_000_000, 2_000_000_000]]),
             Some([[200, 100], [900, 450]])

@@ -75,7 +75,8 @@ mod tests {
     use crate::fixed::Decimal;
     use std::vec::Vec;
 
-    /// Vertices, and then lines of a job as numbers: a face, or a bar for two.
+    /// The checksum of a model with these vertices and elements: a face, or a bar if there are two
+    /// numbers.
     fn sum(vertices: &[[&str; 3]], elements: &[(&[i32], u8)]) -> u32 {
         let mut memory = (heapless::Vec::<Position, 9>::new(), heapless::Vec::<Corner, 64>::new());
         let mut model = Model::new(&mut memory.0, &mut memory.1);
@@ -99,7 +100,8 @@ mod tests {
             [["0", "0", "0"], ["1", "0", "0"], ["1", "1", "0"], ["0", "1", "0.5"]];
         let mut other = PLACES;
         other[3][2] = "0.25";
-        // In the model's unit this is the same place, but its last decimal is a rounded one.
+        // In the model's unit this is the same position, but its last decimal is taken to be
+        // rounded.
         let mut rounded = PLACES;
         rounded[1][0] = "1.0000000000001";
         let face: &[i32] = &[1, 2, 3];
@@ -123,7 +125,7 @@ mod tests {
     #[test]
     fn the_unit_of_the_model_does_not_count() {
         let near: Vec<[&str; 3]> = std::vec![["1", "0.5", "0"], ["0.25", "0", "1"]];
-        // A vertex far away makes the unit larger, and is taken out again.
+        // A vertex far away makes the unit coarser, and is removed again.
         let mut memory = (heapless::Vec::<Position, 9>::new(), heapless::Vec::<Corner, 64>::new());
         let mut model = Model::new(&mut memory.0, &mut memory.1);
         for vertex in near.iter().chain([&["1000", "0", "0"]]) {

@@ -211,7 +211,7 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
-    /// The pen of each corner.
+    /// Returns the pen of each corner.
     fn of(runs: &[PenRun], corners: usize) -> Vec<u8> {
         (0..corners).map(|corner| Pens { runs }.at(corner)).collect()
     }
@@ -239,7 +239,7 @@ mod tests {
             let in_order = |two: &[PenRun]| two[0].first < two[1].first && two[0].pen != two[1].pen;
             assert!(used.windows(2).all(in_order), "{used:?}");
             assert_eq!(of(used, end), list);
-            // The model drops a run that begins at its end.
+            // The model removes a run that begins at the end.
             if used.last().is_some_and(|run| usize::from(run.first) >= end) {
                 count -= 1;
             }

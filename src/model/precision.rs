@@ -219,7 +219,7 @@ mod tests {
                 assert!((1.7e-4..1.8e-4).contains(&turned), "{turned}");
             }
             assert!(edit(model, Edit::Scale(decimals(["9", "1", "1"]), Some([1, 1]))) > 15e-4);
-            // What is sent afterwards has its own.
+            // What is sent afterwards has its own error bound.
             model.clear();
             model.add_vertex(decimals(place), &mut unkept).unwrap();
             assert!(is_about(written(model), 5e-4));

@@ -186,7 +186,7 @@ impl<'s> Cycle<'s> {
 mod tests {
     use super::*;
 
-    /// The cycle from leg 0 on, drawn as it was at first, flipped legs negative.
+    /// The numbers of the legs from leg 0 on, in its original direction; flipped legs are negative.
     fn picture(cycle: &Cycle<'_>) -> [i8; 6] {
         let mut leg = Leg::new(0, false);
         [(); 6].map(|()| {

@@ -2,8 +2,9 @@
 //!
 //! The tour is a cycle of chains. The moves between them have a cost; to stay at a station costs
 //! nothing. An exchange cuts a move, adds one to a station that is nearer than the cut move was
-//! long, cuts the tour there, and so on while there is gain in hand, until the open ends can be
-//! joined with some gain left. One step of an exchange changes two moves, in any of the ways that
+//! long, cuts the tour there, and so on, until the open ends can be joined with a gain. The *gain
+//! in hand* is the cost of the moves cut so far minus that of the moves added; the exchange goes on
+//! only while it is positive. One step of an exchange changes two moves, in any of the ways that
 //! keep the tour in one piece; these are found from positions in the cycle alone. Only if no step
 //! joins the ends with a gain is the best step made, and the next one sought from there. After Lin
 //! and Kernighan, "An effective heuristic algorithm for the traveling-salesman problem" (1973), and
