@@ -72,7 +72,9 @@ pub struct Stamped {
 /// The changes of all pins, in order. Writes that change nothing are not recorded.
 #[derive(Debug, Default)]
 pub struct Trace {
+    /// The present time in ticks from the start.
     now: Cell<u64>,
+    /// The changes so far.
     changes: RefCell<Vec<Stamped>>,
 }
 
@@ -105,8 +107,11 @@ impl Trace {
 /// A pin that records its changes.
 #[derive(Debug)]
 pub struct TracedPin {
+    /// The trace that records the changes.
     trace: Rc<Trace>,
+    /// The present level; `None` before the first write.
     level: Option<bool>,
+    /// Makes the change that is recorded for a level.
     change: fn(bool) -> Change,
 }
 
@@ -136,7 +141,9 @@ impl OutputPin for TracedPin {
 /// A pen that records its heights.
 #[derive(Debug)]
 pub struct TracedPen {
+    /// The trace that records the heights.
     trace: Rc<Trace>,
+    /// The present height; `None` before the first one.
     height: Option<u8>,
 }
 
@@ -159,8 +166,11 @@ type TracedPulser<'q> = Pulser<
 /// Calls the interrupt code at the times at which it is due.
 #[derive(Debug)]
 pub struct TracedSteps<'q> {
+    /// The library's interrupt code.
     pulser: TracedPulser<'q>,
+    /// The state shared with the main loop.
     state: &'q PulserState,
+    /// The trace of the pins, with the clock.
     trace: Rc<Trace>,
     /// The time at which the next event is due, in ticks from the start.
     due: Option<u64>,
@@ -251,12 +261,19 @@ impl TracedSteps<'_> {
 pub struct HostBoard<'q> {
     /// The ordinary bytes that were received, each with the number of its port.
     received: VecDeque<(usize, u8)>,
+    /// Each separates the real-time bytes of one port from the ordinary ones.
     sorters: [Sorter; PORTS],
+    /// The real-time requests that were not taken yet.
     asked: RealTime,
+    /// The bytes that were sent.
     sent: Vec<u8>,
+    /// The main loop's end of the queue of events.
     queue: StepQueue<'q, QUEUE_LENGTH>,
+    /// The interrupt code and its pins.
     steps: TracedSteps<'q>,
+    /// The contacts that are closed.
     contacts: Contacts,
+    /// The state shared with the interrupt code.
     state: &'q PulserState,
     /// The number of ticks that sending a byte takes.
     byte_ticks: u64,

@@ -25,6 +25,7 @@ static ASKED: AtomicU16 = AtomicU16::new(0);
 
 /// The data that both ends of a port share.
 pub struct Shared {
+    /// The queue of received bytes.
     queue: StaticCell<Queue<u8, RECEIVED_PLACES>>,
     /// The number of bytes that had been queued when the last abort came.
     count_at_abort: AtomicU32,
@@ -32,7 +33,9 @@ pub struct Shared {
 
 /// The main loop's end of a port.
 pub struct Line {
+    /// The main loop's end of the queue.
     bytes: Consumer<'static, u8>,
+    /// The number of bytes that had been queued when the last abort came.
     count_at_abort: &'static AtomicU32,
     /// The number of bytes taken since the start, modulo 2^32.
     count: u32,
@@ -40,7 +43,9 @@ pub struct Line {
 
 /// The handler's end of a port.
 pub struct ReceiveMerge {
+    /// Sorts the received bytes and queues the ordinary ones.
     pub receiver: Receiver<'static>,
+    /// The number of bytes that had been queued when the last abort came.
     count_at_abort: &'static AtomicU32,
 }
 

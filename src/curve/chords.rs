@@ -40,26 +40,33 @@ const TRIED: usize = 32;
 /// It uses about 2 KiB of stack.
 #[derive(Debug, Clone)]
 pub struct Chords<'a, F> {
+    /// The spline that is approximated.
     spline: Spline<'a>,
+    /// Maps points of the curve to the page: see [`Spline::chords`].
     project: F,
+    /// The tolerance in fine units.
     tolerance: u16,
     /// The end of the previous chord; `None` before the first.
     last: Option<End>,
     /// The length of the previous chord, in units of [`Parameter`].
     length: u32,
-    /// The polynomial that was used last, and (`used`) its number.
+    /// The polynomial that was used last.
     span: Span,
+    /// The number of that polynomial; `None` if none is loaded.
     used: Option<usize>,
 }
 
 /// An end of a chord: the position on the curve, and the point in units of 2^-[`FRACTION_BITS`].
 #[derive(Debug, Clone, Copy)]
 struct End {
+    /// The position on the curve.
     at: Parameter,
+    /// The point.
     place: [i64; 3],
 }
 
 impl<'a, F: Fn([i64; 3]) -> Option<Fine>> Chords<'a, F> {
+    /// Starts at the beginning of the spline: see [`Spline::chords`].
     pub(super) fn new(spline: Spline<'a>, project: F, tolerance: u16) -> Self {
         let (from, to) = spline.ends();
         Self {
@@ -181,6 +188,7 @@ impl<'a, F: Fn([i64; 3]) -> Option<Fine>> Chords<'a, F> {
         self.used.is_some()
     }
 
+    /// The point at `t`, in units of 2^-[`FRACTION_BITS`].
     fn place(&self, t: Parameter) -> [i64; 3] {
         if self.used == Some(t.span()) {
             self.span.at(t.local())
@@ -253,6 +261,7 @@ fn knot_between(low: u32, high: u32) -> Option<u32> {
     (low < knot && knot < high).then_some(knot)
 }
 
+/// Whether all of the polynomial is within one unit of `place` in each coordinate.
 fn is_within_a_unit(span: &Span, place: [i64; 3]) -> bool {
     let near =
         |point: &[i64; 3]| point.iter().zip(place).all(|(a, b)| a.abs_diff(b) < 1 << FRACTION_BITS);
@@ -265,6 +274,7 @@ struct Cone {
     /// The two sides of the cone. The second is counter-clockwise of the first by less than half a
     /// turn, and each component is within ±2^30. `None` while the cone contains every direction.
     sides: Option<(Fine, Fine)>,
+    /// Whether the cone contains no direction.
     empty: bool,
 }
 
@@ -315,10 +325,13 @@ fn shortened(direction: Fine) -> Fine {
 
 /// The set of all points within the tolerance of a straight line, which is convex.
 struct Strip {
+    /// The start of the line.
     from: Fine,
+    /// The end of the line.
     to: Fine,
     /// The vector from `from` to `to`; each component is within ±2^30.
     along: Fine,
+    /// The greatest distance from the line.
     tolerance: i64,
     /// The length of `along`, rounded down.
     length: i64,

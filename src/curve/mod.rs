@@ -171,11 +171,17 @@ impl Parameter {
 /// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Spline<'a> {
+    /// All points, from which `control` selects.
     points: &'a [Point],
+    /// The numbers of the control points, in order.
     control: &'a [u16],
+    /// The order of the spline, which is its degree plus 1.
     order: u8,
+    /// The knots.
     knots: Knots<'a>,
+    /// The position at which the curve begins.
     from: Parameter,
+    /// The position at which the curve ends.
     to: Parameter,
 }
 

@@ -9,7 +9,9 @@ const POINTS: usize = GREATEST_ORDER as usize;
 /// Coordinates are within ±2^38, so a difference times a number of 23 bits fits in 62 bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct Span {
+    /// The Bézier points, of which the first `degree` + 1 are used.
     points: [[i64; 3]; POINTS],
+    /// The degree of the polynomial.
     degree: usize,
 }
 

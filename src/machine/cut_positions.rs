@@ -34,9 +34,9 @@ const NEAR: i32 = 2;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CutPositions {
-    /// The feet of the perpendiculars from both anchors, the first along the line first, and
-    /// (`middle`) the point halfway between them.
+    /// The feet of the perpendiculars from both anchors, the first along the line first.
     feet: [i32; 2],
+    /// The point halfway between the feet.
     middle: i32,
     /// The length of the line, in steps.
     length: i32,

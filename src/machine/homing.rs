@@ -92,7 +92,9 @@ pub(super) struct SwitchFault;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Homing {
+    /// The axis that is being homed.
     pub(super) axis: Axis,
+    /// The present phase.
     pub(super) phase: Phase,
     /// The position of the pins when the switch was pressed during this phase or the one before;
     /// `None` if it was not.

@@ -58,7 +58,8 @@ impl Kinematics {
     /// let motors = Kinematics::CoreXy.motors(place);
     /// assert_eq!(motors, PagePoint { x: 26, y: 34 });
     /// assert_eq!(Kinematics::CoreXy.page(motors), place);
-    /// let polargraph = Kinematics::Polargraph(Anchors { left: PagePoint { x: 0, y: 300 }, width: 800 });
+    /// let anchors = Anchors { left: PagePoint { x: 0, y: 300 }, width: 800 };
+    /// let polargraph = Kinematics::Polargraph(anchors);
     /// let belts = polargraph.motors(PagePoint { x: 400, y: 0 });
     /// assert_eq!(belts, PagePoint { x: 500, y: 500 });
     /// assert_eq!(polargraph.page(belts), PagePoint { x: 400, y: 0 });
@@ -161,9 +162,13 @@ pub(super) fn in_order([a, b]: [PagePoint; 2]) -> ([PagePoint; 2], bool) {
 /// A line on the page of a polargraph, in units of 2^-`bits` steps. Coordinates count from the left
 /// anchor, to the right and downward.
 struct FineLine {
+    /// The number of fraction bits of a step.
     bits: u32,
+    /// The start of the line.
     from: [i32; 2],
+    /// The vector from the start of the line to its end.
     way: [i32; 2],
+    /// The distance between the anchors.
     width: i32,
     /// The same vector as `way`, scaled up as far as 32 bits allow. Only its direction matters.
     direction: [i32; 2],
@@ -172,6 +177,7 @@ struct FineLine {
 /// A point on a [`FineLine`].
 #[derive(Clone, Copy)]
 struct FinePlace {
+    /// Its coordinates.
     place: [i32; 2],
     /// The lengths of both belts, in units of 2^-`bits` steps.
     belts: [i32; 2],

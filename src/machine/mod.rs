@@ -110,30 +110,39 @@ pub enum MachineError {
 /// The state of the plotter that the main loop owns.
 #[derive(Debug)]
 pub struct Machine<'m> {
+    /// The settings in force.
     settings: Settings,
+    /// What the machine is doing.
     state: State,
+    /// The motion planner, which produces the events.
     runner: Runner<'m>,
+    /// The state that is shared with the interrupt.
     pins: &'m PulserState,
     /// The position of the motors, in steps, at which the step counters of `pins` are 0.
     origin: PagePoint,
+    /// How far the queue is planned ahead of the pins, in ticks.
     ahead_ticks: u32,
+    /// The size of the present job, or of the last one.
     job: JobSize,
     /// The runner's totals of lengths and strokes when the job began.
     before: RunLengths,
     /// The move that is being cut into segments, if any.
     split: Option<Segmenter>,
+    /// Where the motors are within their slack.
     slack: Backlash,
     /// Whether the path has been read to its end.
     path_ended: bool,
     /// Whether the drivers are still to be switched off because of [`Machine::sleep`].
     sleep_due: bool,
+    /// The progress of homing; `None` if the machine is not homing.
     homing: Option<Homing>,
     /// The limit switches that were pressed when they were last observed.
     switches: Switches,
+    /// Whether the emergency stop was pressed when it was last observed.
     stop_is_pressed: bool,
-    /// Whether the moves are sent one by one, and (`stream_is_inked`) whether the last of them was
-    /// drawn with the pen down.
+    /// Whether the moves are sent one by one.
     streaming: bool,
+    /// Whether the last of these moves was drawn with the pen down.
     stream_is_inked: bool,
     /// The speed override, in percent of the speeds in the settings.
     percent: u8,

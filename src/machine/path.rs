@@ -41,7 +41,9 @@ pub trait Path {
 /// ```
 #[derive(Debug, Clone)]
 pub struct TargetList<'a> {
+    /// All targets of the path.
     targets: &'a [Target],
+    /// The index of the next target.
     next: usize,
 }
 
@@ -66,8 +68,11 @@ impl Path for TargetList<'_> {
 /// A tape as a path: its moves, drawn as full lines where its pen is down.
 #[derive(Debug, Clone)]
 pub struct TapePath<I> {
+    /// The point where the first move starts.
     start: PagePoint,
+    /// The rows of the tape, kept for a restart.
     rows: I,
+    /// The lines of the tape that are still to come.
     lines: TapeLines<Decoder<I>>,
 }
 

@@ -16,20 +16,35 @@ use embedded_hal::digital::{OutputPin, PinState};
 /// finds to be taken.
 #[derive(Debug, Default)]
 pub struct PulserState {
+    /// The sum of the steps of x, as a wrapping `i32`.
     x: AtomicU32,
+    /// The sum of the steps of y, as a wrapping `i32`.
     y: AtomicU32,
+    /// The sum of the steps of x that took up slack, as a wrapping `i32`.
     slack_x: AtomicU32,
+    /// The sum of the steps of y that took up slack, as a wrapping `i32`.
     slack_y: AtomicU32,
+    /// The position of the pen's motor in steps downward, as a wrapping `i32`.
     lift: AtomicU32,
+    /// The sum of the ticks of the events taken from the queue; it wraps.
     ticks: AtomicU32,
+    /// The number of underruns: the queue ran empty while the machine moved; it wraps.
     underruns: AtomicU32,
+    /// Whether the last event has been processed and its time is over.
     drained: AtomicBool,
+    /// Whether the main loop has halted the pulses.
     halt: AtomicBool,
+    /// The width of a step pulse, in ticks.
     pulse_ticks: AtomicU32,
+    /// The mask of inverted direction pins: bit 0 for x, bit 1 for y.
     inverted: AtomicU8,
+    /// Whether the direction pin of the pen's motor is inverted.
     lift_inverted: AtomicBool,
+    /// The field `steps` of the size of the board's queue.
     queue_steps: AtomicU32,
+    /// The field `full` of the size of the board's queue.
     queue_full: AtomicU32,
+    /// How the interrupt brakes when its queue runs empty.
     brake: BrakeOrders,
 }
 
@@ -194,8 +209,11 @@ impl PulserState {
 /// The main loop's end of the interrupt's queue.
 #[derive(Debug)]
 pub struct StepQueue<'q, const N: usize> {
+    /// The ring buffer of the events.
     ring: &'q EventRing<N>,
+    /// The state shared with the interrupt.
     state: &'q PulserState,
+    /// The order of the axes' pins in the words of the ring.
     order: &'static PinOrder,
     /// The length of the steps that were put in last, in units of the brake's rule.
     step_length: StepLength,
@@ -442,9 +460,13 @@ impl<P: OutputPin<Error = Infallible>> Pen for Solenoid<P> {
 /// measured in the boards' modules.
 #[derive(Debug)]
 pub struct Pulser<'q, A, P, const N: usize> {
+    /// The axes' pins.
     axes: A,
+    /// The actuator of the pen.
     pen: P,
+    /// The ring buffer of the events.
     ring: &'q EventRing<N>,
+    /// The state shared with the main loop.
     state: &'q PulserState,
     /// The ticks of the current event.
     ticks: u32,

@@ -18,6 +18,7 @@ pub struct EventRing<const N: usize> {
     filled: AtomicU32,
     /// Whether the interrupt is taking one word after the other. Only the interrupt writes it.
     running: AtomicBool,
+    /// The slots of the ring.
     words: [AtomicU32; N],
 }
 

@@ -8,8 +8,11 @@ use crate::step::Pattern;
 /// The remaining part of a move that is being cut into segments.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Segmenter {
+    /// The start of the move on the page.
     from: PagePoint,
+    /// The end of the move on the page.
     to: PagePoint,
+    /// The length of the move.
     length: PathLength,
     /// The length that has been appended already.
     place: PathLength,
@@ -17,7 +20,9 @@ pub(super) struct Segmenter {
     cut: i32,
     /// The index of the current dot or gap of the line type.
     dot: u32,
+    /// The line type of the move; `None` with the pen up.
     ink: Option<LineType>,
+    /// The limit of the speed, given as a stopping distance.
     limit: PathLength,
 }
 

@@ -261,6 +261,7 @@ pub enum SettingError {
 /// all of them together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Settings {
+    /// The values, in the order of [`SETTINGS`].
     values: [Value; SETTING_COUNT],
 }
 
@@ -481,6 +482,7 @@ impl Settings {
         Value::from_bits(bits.clamp(i32::MIN.into(), i32::MAX.into()) as i32)
     }
 
+    /// The heights, dwells and other settings of the pen that the motion planner needs.
     #[inline(never)] // Inlining it at every call would cost too much flash.
     pub(super) fn pen_positions(&self) -> PenPositions {
         PenPositions {

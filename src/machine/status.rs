@@ -152,11 +152,13 @@ fn rest_to_rest(way: u64, speed: u64, acceleration: u64) -> u64 {
 /// rest to rest.
 #[derive(Debug, Default)]
 pub(super) struct Estimate {
+    /// The time of the parts that are complete.
     milliseconds: u64,
-    /// The current part between two corners: its length (2^-18 mm), its direction at the end, and
-    /// whether it is drawn with the pen down.
+    /// The length of the present part between two corners, in 2^-18 mm.
     piece: u64,
+    /// The last move of the present part, in steps.
     way: (i32, i32),
+    /// Whether the present part is drawn with the pen down.
     inked: bool,
 }
 

@@ -45,7 +45,9 @@ pub enum ArcError {
 /// ```
 #[derive(Debug, Clone)]
 pub struct Arc {
+    /// The centre of the circle.
     center: PagePoint,
+    /// The end of the arc.
     to: PagePoint,
     /// The lengths of a step of x and of y as relative weights, so that the arc is part of a
     /// circle.
@@ -59,7 +61,9 @@ pub struct Arc {
     corner_is_shared: bool,
     /// The current position on the circle, counted in moves counterclockwise.
     place: i32,
+    /// The direction: 1 counterclockwise, -1 clockwise.
     step: i8,
+    /// The number of points still to come.
     remaining: u32,
 }
 
@@ -329,11 +333,13 @@ const CHORD_MOVES: usize = 64;
 /// ```
 #[derive(Debug, Clone)]
 pub struct Chords<I> {
+    /// The points still to be read.
     pub(super) points: I,
     /// The point where the next line begins.
     from: PagePoint,
-    /// The moves that were read ahead, and (`ahead`) the point to which they lead.
+    /// The moves that were read ahead.
     moves: heapless::Deque<Direction, CHORD_MOVES>,
+    /// The point to which the moves read ahead lead.
     ahead: PagePoint,
     /// A point that was read but cannot be reached by a single move.
     beyond: Option<PagePoint>,

@@ -18,7 +18,9 @@ use crate::drawing::LineType;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Pattern {
+    /// The number of moves of the line.
     moves: u32,
+    /// The number of dots and gaps, which is odd.
     pieces: u32,
 }
 

@@ -104,10 +104,15 @@ pub struct BadCode {
 /// A bad code ends the tape, too; [`Decoder::damage`] reports it.
 #[derive(Debug, Clone)]
 pub struct Decoder<I> {
+    /// The rows still to be read.
     rows: I,
+    /// The number of rows read so far; it wraps.
     row: u32,
+    /// The second code of the last row, if it is still to be used.
     second: Option<u8>,
+    /// Whether a stop or a bad code has ended the tape.
     ended: bool,
+    /// The bad code that ended the tape, if there was one.
     damage: Option<BadCode>,
 }
 
@@ -158,15 +163,20 @@ impl<I: Iterator<Item = u8>> Iterator for Decoder<I> {
 /// lines give the moves of the tape.
 #[derive(Debug, Clone)]
 pub struct TapeLines<I> {
+    /// The lines up to the next change of the pen.
     chords: Chords<Run<I>>,
+    /// Whether the pen is down.
     inked: bool,
 }
 
 /// The points of the tape up to the next change of the pen.
 #[derive(Debug, Clone)]
 struct Run<I> {
+    /// The instructions still to be read.
     instructions: I,
+    /// The present point.
     at: PagePoint,
+    /// The new state of the pen, after an instruction that changes it; `true` is down.
     change: Option<bool>,
 }
 

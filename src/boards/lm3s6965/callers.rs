@@ -24,7 +24,9 @@ struct Frame {
 /// The chain of calls that led to the place where this value was created.
 #[derive(Clone, Copy)]
 pub struct Callers {
+    /// The address of the innermost frame.
     innermost: usize,
+    /// The address at which the stack starts; it grows down from there.
     stack_start: usize,
 }
 

@@ -25,6 +25,7 @@ const UNLOCK: u32 = 0x1ACC_E551;
 /// Pin `NUMBER` of port B as an output.
 pub struct Pin<const NUMBER: u8>(());
 
+/// The pin of the pen.
 pub type PenPin = Pin<5>;
 
 /// The pins of the axes.
@@ -32,7 +33,9 @@ pub struct AxisPins(());
 
 /// The pins that the step interrupt moves.
 pub struct MotorPins {
+    /// The pins of the axes and of the pen's motor.
     pub axes: AxisPins,
+    /// The pin of the pen.
     pub pen: PenPin,
 }
 

@@ -77,7 +77,9 @@ struct Stored {
     sum: u32,
     /// The number of consecutive faults.
     faults: u8,
+    /// The length of the message, in bytes.
     length: u8,
+    /// The message.
     text: [u8; TEXT_BYTES],
 }
 

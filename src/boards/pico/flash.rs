@@ -47,11 +47,17 @@ pub struct Flash(());
 /// The functions of the boot ROM, and the boot loader that sets up the flash for reading at full
 /// speed.
 struct Rom {
+    /// Connects the flash to its serial line.
     connect: unsafe extern "C" fn(),
+    /// Ends the mode in which the flash is mapped to memory.
     leave_mapping: unsafe extern "C" fn(),
+    /// Erases a range.
     erase: unsafe extern "C" fn(u32, usize, u32, u8),
+    /// Writes a range.
     write: unsafe extern "C" fn(u32, *const u8, usize),
+    /// Empties the flash's cache.
     flush_cache: unsafe extern "C" fn(),
+    /// Sets up the flash for reading at full speed.
     boot_2: unsafe extern "C" fn(),
 }
 

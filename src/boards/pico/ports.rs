@@ -36,6 +36,7 @@ static INLETS: Owned<Inlets> = Owned::empty();
 
 /// The receiving ends of both ports.
 pub struct Inlets {
+    /// The receiving end of each port, by its number.
     inlets: [ReceiveMerge; COUNT],
     /// The number of times that ctrl-X has come by either port; it wraps.
     pub aborts: u32,
@@ -43,12 +44,15 @@ pub struct Inlets {
 
 /// The main loop's end of the ports.
 pub struct Ports {
+    /// The main loop's ends of the receiving queues.
     lines: [Line; COUNT],
     /// The port whose byte was read last.
     last: usize,
     /// Whether replies go to USB alone.
     is_aside: bool,
+    /// The sender of UART0.
     pub uart: serial::Sender,
+    /// The sender of USB.
     pub usb: usb::Sender,
 }
 

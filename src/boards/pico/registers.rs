@@ -10,10 +10,11 @@ use crate::boards::pl011::Uart;
 const RESETS: Peripheral = unsafe { Peripheral::at(0x4000_C000) };
 /// The serial line. Used by `serial`.
 pub const UART0: Uart = Uart(unsafe { Peripheral::at(0x4003_4000) });
-/// The chip's identification, the functions of the pins, and their pads. Used by `usb`, for GPIO 15
-/// only.
+/// The chip's identification. Used by `usb`.
 pub const SYSTEM_INFORMATION: Peripheral = unsafe { Peripheral::at(0x4000_0000) };
+/// The functions of the pins. Used by `usb`, for GPIO 15 only.
 pub const BANK_0_CONTROLS: Peripheral = unsafe { Peripheral::at(0x4001_4000) };
+/// The pads of the pins. Used by `usb`, for GPIO 15 only.
 pub const BANK_0_PADS: Peripheral = unsafe { Peripheral::at(0x4001_C000) };
 /// The PWM unit for the servo. Used by `pen`.
 pub const PWM: Peripheral = unsafe { Peripheral::at(0x4005_0000) };

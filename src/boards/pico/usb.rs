@@ -99,14 +99,19 @@ static WAS_OPENED: AtomicBool = AtomicBool::new(false);
 static WAS_TOUCHED: AtomicBool = AtomicBool::new(false);
 
 struct Device {
+    /// The USB device of the driver.
     device: UsbDevice<'static, UsbBus>,
+    /// The serial port of the driver.
     class: CdcAcmClass<'static, UsbBus>,
+    /// Whether the host has configured the device.
     is_up: bool,
     /// Whether a program has the port open, according to DTR.
     is_open: bool,
+    /// The workaround for erratum E5.
     connection: Connection,
     /// Whether the host resets the bus and the interrupt that reports it is masked.
     awaits_bus: bool,
+    /// The workaround for erratum E15.
     frame: Frame,
     /// The received bytes that wait for room.
     waiting: Deque<u8, WAITING_PLACES>,
@@ -114,6 +119,7 @@ struct Device {
     is_in_line: bool,
     /// The value of [`Inlets::aborts`] when it was last read.
     aborts: u32,
+    /// The handler's end of the queue of bytes to send.
     to_send: Consumer<'static, u8>,
     /// The bytes that the controller has not taken yet.
     packet: Vec<u8, SENT_PACKET>,
@@ -121,6 +127,7 @@ struct Device {
 
 /// The main loop's end of the queue of bytes to send.
 pub struct Sender {
+    /// The main loop's end of the queue of bytes to send.
     bytes: Producer<'static, u8>,
     /// The time since which there has been no room, in microseconds, and the number of bytes that
     /// waited then.

@@ -35,6 +35,7 @@ const _: () = assert!(align_of::<Block>() == size_of::<Block>());
 
 /// The copy of a block that is braked.
 static BRAKED: Block = Block([const { AtomicU32::new(0) }; BRAKED_WORDS as usize]);
+/// The brake, which belongs to the channel's interrupt.
 pub static BRAKE: Owned<Brake> = Owned::empty();
 /// Whether the last block was braked. It is written where the channel's interrupt is masked.
 static BRAKING: AtomicBool = AtomicBool::new(false);

@@ -21,7 +21,9 @@ pub mod lift_levels {
     pub const DOWN: u8 = 1 << 1;
 }
 
+/// The queue of the entries.
 pub static HEIGHT_QUEUE: StaticCell<Queue<u8, HEIGHTS>> = StaticCell::new();
+/// The handler's end of the queue.
 pub static HEIGHTS_DUE: Owned<Consumer<'static, u8>> = Owned::empty();
 
 /// Processes the entries that are left in the queue. If two heights come faster than the interrupt,

@@ -67,35 +67,41 @@ pub static STATE: PulserState = PulserState::new();
 
 /// The main loop's end of the queue.
 pub struct Steps {
+    /// The queue of the heights of the pen and the steps of its motor.
     heights: Producer<'static, u8>,
+    /// The lengths of the steps to come.
     step_length: StepLength,
     /// The same number as [`WRITTEN`].
     written: u32,
     /// The number of events that still fit: the number when the state machine's progress was last
     /// read, less the events that have come since.
     room: u32,
-    /// The values of [`flips`] and [`PulserState::pulse_ticks`], which do not change while anything
-    /// moves.
+    /// The value of [`flips`], which does not change while anything moves.
     flips: u32,
+    /// The value of [`PulserState::pulse_ticks`], which does not change while anything moves.
     pulse_ticks: u32,
     /// For each combination of levels, what a pulse adds to x (in the lower half) and to y (in the
     /// upper half).
     moves: [u32; LEVELS as usize + 1],
     /// The levels of the pins after the last word.
     levels: u32,
-    /// The totals of the words counted so far: words, steps, slack steps and ticks. All wrap.
+    /// The number of words counted so far; it wraps.
     taken: u32,
+    /// The sum of the steps counted so far; it wraps.
     steps: (i32, i32),
+    /// The sum of the steps counted so far that took up slack; it wraps.
     slack: (i32, i32),
+    /// The sum of the ticks counted so far; it wraps.
     ticks: u32,
     /// Whether the machine is in motion after the last event.
     moving: bool,
+    /// Whether the state machine has processed all words.
     drained: bool,
     /// Whether the state machine has taken nothing since it was drained, or since an underrun.
     resting: bool,
-    /// The number of words taken, and (`seen_at`) the time at which this number was first seen, in
-    /// microseconds.
+    /// The number of words taken when progress was last seen.
     taken_seen: u32,
+    /// The time at which this number was first seen, in microseconds.
     seen_at: u32,
 }
 

@@ -9,6 +9,7 @@ pub const WORDS: u32 = 2048;
 /// The number of words in a group, which begins at a multiple of this number and has one sum.
 pub const GROUP: u32 = 16;
 
+/// The words, in the order in which the channel reads them.
 #[repr(align(8192))] // The channel wraps around only if the ring is aligned to its size.
 pub struct Ring([AtomicU32; WORDS as usize]);
 const _: () = assert!(align_of::<Ring>() == size_of::<Ring>());
@@ -33,10 +34,12 @@ pub fn row(word: u32, count: u32) -> &'static [AtomicU32] {
     &RING.0[start as usize..(start + count).min(WORDS) as usize]
 }
 
+/// The address of the slot of word number `word`.
 pub fn ring_address(word: u32) -> u32 {
     place(word).as_ptr() as u32
 }
 
+/// The packed lengths of the step in word number `word`.
 pub fn way(word: u32) -> &'static AtomicU32 {
     &WAYS[(word % WORDS) as usize]
 }
@@ -46,10 +49,12 @@ pub fn sum(word: u32) -> &'static AtomicU32 {
     &SUMS[(word / GROUP) as usize % SUMS.len()]
 }
 
+/// Packs the lengths of a step into one word.
 pub fn pack(way: StepWay) -> u32 {
     way.around | way.behind << 16
 }
 
+/// Unpacks the lengths of a step.
 pub fn unpack(way: u32) -> StepWay {
     StepWay { around: way & 0xFFFF, behind: way >> 16 }
 }

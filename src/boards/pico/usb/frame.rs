@@ -29,6 +29,7 @@ const SAFE: u32 = 700;
 
 /// Tracks the frames.
 pub struct Frame {
+    /// Whether the frame interrupt is on.
     is_followed: bool,
     /// The time at which the last frame began, in microseconds; `None` if it is not known.
     began: Option<u32>,
