@@ -1,4 +1,5 @@
-//! Lines with numbers and checksums: what a plotter answers to them, and what it never does.
+//! Tests of lines with numbers and checksums: how a plotter answers them, and what it must never
+//! do.
 
 use penup::protocol::{CommandError, Label, Named, Numbering, Received};
 use penup_client::protocol::numbered;
@@ -6,24 +7,24 @@ use penup_client::source::JobLine;
 use penup_client::twin;
 use penup_host_tests::whole_jobs::{Bench, job_lines};
 
-/// A plotter that has greeted.
+/// Starts a plotter and reads its greeting.
 fn bench() -> Bench {
     let mut bench = Bench::new();
     bench.heard();
     bench
 }
 
-/// The line with RepRap's checksum.
+/// Adds RepRap's checksum to a line.
 fn xored(line: &str) -> String {
     format!("{line}*{}\n", line.bytes().fold(0, |xor, byte| xor ^ byte))
 }
 
-/// The line with a CRC.
+/// Adds a CRC to a line.
 fn line(number: i32, text: &str) -> String {
     format!("{}\n", numbered(Some(number), text))
 }
 
-/// A reply with its CRC.
+/// Adds the CRC to a reply.
 fn reply(text: &str) -> String {
     format!("{}\n", numbered(None, text))
 }
@@ -35,7 +36,7 @@ fn vertices(bench: &Bench) -> usize {
 #[test]
 fn a_reprap_sender_is_answered_by_number() {
     let mut bench = bench();
-    // As in use: pronsole and gscrib begin like this.
+    // Real programs such as pronsole and gscrib begin like this.
     assert_eq!(bench.say("N-1 M110 N-1*125\n"), "ok N-1\n");
     assert_eq!(bench.say(&xored("N0 v 0 0 0")), "ok N0\n");
     assert_eq!(bench.say(&xored("N1 v 1 0 0 ")), "ok N1\n");
@@ -49,7 +50,7 @@ fn a_reprap_sender_is_answered_by_number() {
     assert_eq!(vertices(&bench), 2);
     assert_eq!(bench.say(&xored("N0 v 0 0 0")), "ok N0\n", "acknowledged again");
     assert_eq!(vertices(&bench), 2, "and not carried out again");
-    // Refused for what it says: its number is used up.
+    // The content of the line is refused, so its number is used up.
     let refused = "[MSG:there is no vertex 9: the model has 2]\nerror:110 N2\n";
     assert_eq!(bench.say(&xored("N2 f 1 2 9")), refused);
     assert_eq!(
@@ -57,7 +58,7 @@ fn a_reprap_sender_is_answered_by_number() {
         "[MSG:the line was refused when it came first]\nerror:110 N2\n"
     );
     assert_eq!(bench.say(&xored("N3 $page=80x60")), "ok N3\n");
-    // A line that may have lost its checksum, or its number, is not carried out.
+    // A line that may have lost its checksum or its number is not executed.
     for damaged in ["N4 v 1 2 3\n", "N4 v 1 2 3 12\n", "v 1 2 3*12\n"] {
         assert!(bench.say(damaged).ends_with("Resend: 4\nerror:172\n"), "{damaged}");
     }
@@ -100,7 +101,7 @@ fn lines_with_a_crc_are_answered_with_a_crc() {
     let answer = bench.say(&line(2, "f 1 2 3"));
     assert!(answer.ends_with(&reply("error:110 N2")), "{answer}");
     assert_eq!(bench.say(&line(3, "$title=a*B")), reply("ok N3"));
-    // What was refused is told to whoever asks for the last number, in case the reply was lost.
+    // A refusal is repeated when the last number is queried, in case the reply was lost.
     let last = format!("{}\n", numbered(None, "M110"));
     assert!(bench.say(&last).ends_with(&reply("error:110 N2")));
     assert_eq!(bench.say(&line(3, "M110 N0")), reply("ok N3"));
@@ -144,7 +145,7 @@ fn number_and_checksum_do_not_count_in_the_length_of_a_line() {
     assert!(answer.ends_with(&reply("error:11 N1")), "{answer}");
 }
 
-/// What becomes of a line by every single fault, and by every run of bytes that is lost from it.
+/// All variants of a line with a single fault or with one run of lost bytes.
 fn damaged(line: &[u8]) -> Vec<Vec<u8>> {
     let mut all = Vec::new();
     for at in 0..line.len() {
@@ -168,14 +169,14 @@ fn no_single_fault_makes_another_line_of_one_with_a_crc() {
     for text in texts {
         let whole = numbered(Some(1), text);
         let next = numbered(Some(2), "v 7 8 9");
-        // A line that has lost its end comes together with the next one.
+        // A line that has lost its end arrives joined to the next one.
         let both = format!("{whole}{next}");
         for bytes in damaged(whole.as_bytes()).into_iter().chain(damaged(both.as_bytes())) {
             let Ok(line) = core::str::from_utf8(&bytes) else { continue };
             count += 1;
             let mut after = numbering;
             let received = after.receive(Ok(line));
-            // What is left may be the whole line.
+            // The rest may still be the whole line.
             let is_right = line == whole || line == next;
             let is_refused = matches!(received, Received::Answer(Err(_), _));
             let is_empty = line.is_empty() && received == Received::Line("", label);
@@ -190,7 +191,7 @@ fn a_number_in_a_line_of_nine_digits_is_read_and_a_longer_one_is_not() {
     let mut numbering = Numbering::default();
     let longest = numbered(Some(999_999_999), "M110");
     assert!(matches!(numbering.receive(Ok(&longest)), Received::Answer(Ok(()), _)));
-    // The number after it cannot be written, so nothing is carried out.
+    // The number after it cannot be represented, so nothing is executed.
     let head = "N1000000000 $plot";
     let next = numbered(None, head);
     let received = numbering.receive(Ok(&next));

@@ -1,6 +1,7 @@
-//! Convex solids from vertices and edges, against every plane through three vertices.
+//! Tests of convex solids from vertices and edges against a reference that tries every plane
+//! through three vertices.
 //!
-//! `PENUP_SOLIDS` sets how many random solids there are; 4,000 if it is not set.
+//! `PENUP_SOLIDS` sets the number of random solids; the default is 4,000.
 
 #![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on stops")]
 
@@ -39,7 +40,7 @@ fn found(
     Ok((summary, sink.edges))
 }
 
-/// The edges in any order and direction, some twice.
+/// The edges in random order and direction, some of them twice.
 fn shuffled(dice: &mut Dice, sights: &Sights) -> Vec<[u16; 2]> {
     let mut edges: Vec<[u16; 2]> = sights.keys().map(|(a, b)| [*a, *b]).collect();
     edges.push(dice.pick(&edges));
@@ -50,7 +51,7 @@ fn shuffled(dice: &mut Dice, sights: &Sights) -> Vec<[u16; 2]> {
     edges
 }
 
-/// Compares with the model where there is one; what kind of case it was.
+/// Compares with the reference model where there is one. Returns the kind of case.
 fn compare(dice: &mut Dice, points: &[Point], eye: Eye) -> Option<&'static str> {
     // From an eye inside, the edges are those seen from elsewhere.
     let outside =
@@ -99,7 +100,7 @@ fn random_solids_are_seen_exactly() {
     }
 }
 
-/// The edges that the faces of a scene have.
+/// The edges of the faces of a scene.
 fn edges_of(faces: &[Vec<u16>]) -> Vec<[u16; 2]> {
     let next = |face: &Vec<u16>, at: usize| face[(at + 1) % face.len()];
     let sides =
@@ -116,15 +117,15 @@ fn found_from_vertices(points: &[Point], eye: Eye, tolerance: u32) -> Result<Sig
     Ok(sink.edges)
 }
 
-/// For each edge whether it is drawn, if hidden lines are not.
+/// For each edge, whether it is drawn when hidden lines are omitted.
 fn drawn(sights: Sights) -> BTreeMap<(u16, u16), bool> {
     let is_drawn = |sight| !matches!(sight, EdgeVisibility::Hidden | EdgeVisibility::BehindOutline);
     sights.into_iter().map(|(ends, sight)| (ends, is_drawn(sight))).collect()
 }
 
-/// The dodecahedron and the other scenes turned and rounded, seen along their axes too and level with
-/// their faces, where faces are edge-on and vertices behind vertices but for the rounding: drawn like the
-/// exact solid, both ways.
+/// The dodecahedron and the other scenes are rotated and rounded, and also seen along their axes
+/// and level with their faces. There, faces are edge-on and vertices behind vertices except for the
+/// rounding. Both methods must draw them like the exact solid.
 #[test]
 fn rounded_solids_are_seen_like_exact_ones() {
     let mut dice = Dice::new(12);
@@ -253,7 +254,7 @@ fn what_is_no_solid_is_refused() {
     assert_eq!((summary.welded, sights.len()), (1, 8));
 }
 
-/// Whatever the edges, an answer or an error.
+/// For any edges, the library returns a result or an error and does not panic.
 #[test]
 fn nonsense_does_no_harm() {
     let mut dice = Dice::new(99);
@@ -270,7 +271,7 @@ fn nonsense_does_no_harm() {
     }
 }
 
-/// Gives up at the n-th question.
+/// Cancels the computation at the n-th check.
 struct Impatient(usize);
 
 impl Cancel for Impatient {

@@ -1,6 +1,7 @@
-//! Convex solids from vertices alone, against every plane through three vertices.
+//! Tests of convex solids from vertices alone against a reference that tries every plane through
+//! three vertices.
 //!
-//! `PENUP_SOLIDS` sets how many random solids there are; 4,000 if it is not set.
+//! `PENUP_SOLIDS` sets the number of random solids; the default is 4,000.
 
 #![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on stops")]
 
@@ -30,7 +31,7 @@ fn found(points: &[Point], eye: Eye, tolerance: u32) -> Result<(SolidSummary, Fo
     Ok((summary, sink))
 }
 
-/// Compares with the model; what kind of case it was.
+/// Compares with the reference model. Returns the kind of case.
 fn compare(points: &[Point], eye: Eye) -> &'static str {
     let found = found(points, eye, 0);
     let case = || format!("{points:?} {eye:?}");
@@ -81,7 +82,7 @@ fn random_solids_are_found_exactly() {
 
 const SCENES: [&str; 5] = ["cube", "octahedron", "icosahedron", "dodecahedron", "eighteen"];
 
-/// The faces that the scene's file lists.
+/// The faces that the scene's file contains.
 fn listed_faces(faces: &[Vec<u16>]) -> BTreeSet<Vec<u16>> {
     let from_least = |face: &Vec<u16>| {
         let mut face = face.clone();
@@ -277,7 +278,7 @@ fn what_is_no_solid_is_refused() {
     assert_eq!(error(&vec![[0; 3]; 20_000], FROM_THERE), Some(SolidError::TooManyVertices));
 }
 
-/// Takes so many items, and must not be given one if there is to be an error.
+/// A sink for a limited number of items. It must receive none if the result is an error.
 struct Limited(usize);
 
 impl SolidSink for Limited {
@@ -325,7 +326,7 @@ fn a_word_too_few_is_an_error_and_the_sink_is_given_nothing() {
     );
 }
 
-/// Gives up at the n-th question.
+/// Cancels the computation at the n-th check.
 struct Impatient(usize);
 
 impl Cancel for Impatient {

@@ -1,17 +1,17 @@
-//! B-splines against the Cox-de Boor basis in floats, and chords against dense sampling and the fewest
-//! chords that there can be.
+//! Tests of B-splines against the Cox-de Boor basis in floats, and of their chords against dense
+//! sampling and the minimum number of chords.
 #![allow(clippy::unwrap_used)] // a test may: clippy sees only its `#[test]` functions as tests
 
 use penup::curve::{FRACTION_BITS, Fine, Knots, Parameter, Point, Spline};
 use penup_host_tests::curve_reference::{distance, fewest_chords, spline_at};
 use proptest::prelude::*;
 
-/// A curve as a test makes it up.
+/// A curve as a test generates it.
 #[derive(Debug, Clone)]
 struct Sketch {
     points: Vec<Point>,
     order: u8,
-    /// Empty: uniform.
+    /// The knots; empty for uniform ones.
     knots: Vec<i32>,
 }
 

@@ -1,10 +1,11 @@
-//! Curves over the line: read, flattened, hidden and drawn like any edge.
+//! Tests of curves that are sent over the serial line: they are read, flattened, hidden and drawn
+//! like any edge.
 
 use penup::machine::{Path, Target};
 use penup_host_tests::curve_reference::{distance, spline_at};
 use penup_host_tests::whole_jobs::{Bench, job_lines};
 
-/// What the pen draws for these lines, in steps.
+/// The strokes that the pen draws for these lines, in steps.
 fn drawn(lines: &[String]) -> Vec<[[f64; 2]; 2]> {
     let mut bench = Bench::new();
     bench.heard();

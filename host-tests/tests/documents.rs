@@ -1,6 +1,7 @@
-//! The tables of the documents, read as Markdown, against the tables of the source.
+//! Compares the tables of the documents, parsed as Markdown, with the tables of the source.
 //!
-//! A row that is missing, out of date or too many is told with the row to write in its place.
+//! For a row that is missing, out of date or superfluous, the failure shows the row to write
+//! instead.
 
 #![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on stops")]
 
@@ -11,10 +12,10 @@ use pulldown_cmark::{Event, Options, Parser, Tag, TagEnd};
 use std::ops::Range;
 use std::path::PathBuf;
 
-/// A table of a document: its heading, then its rows, each a list of cells in plain text.
+/// A table of a document: its heading, and its rows as lists of cells in plain text.
 type Table = Vec<Vec<String>>;
 
-/// All tables of a document, with the place of each row in its text.
+/// All tables of a document, with the position of each row in its text.
 fn tables_of(text: &str) -> Vec<(Table, Vec<Range<usize>>)> {
     let mut tables: Vec<(Table, Vec<Range<usize>>)> = Vec::new();
     for (event, place) in Parser::new_ext(text, Options::ENABLE_TABLES).into_offset_iter() {
@@ -51,7 +52,7 @@ fn push_text(rows: &mut Table, text: &str) {
     }
 }
 
-/// One row, as it is to be written.
+/// Formats a row as it must be written.
 fn written(cells: &[String]) -> String {
     let cells: Vec<String> = cells.iter().map(|cell| cell.replace('|', "\\|")).collect();
     format!("| {} |", cells.join(" | "))
@@ -65,7 +66,7 @@ fn root() -> PathBuf {
     penup_client::workspace::root()
 }
 
-/// Compares a table of `docs/protocol.md`, found by its heading, with the rows that it is to have.
+/// Compares a table of `docs/protocol.md`, found by its heading, with the expected rows.
 fn assert_table(heading: &[&str], rows: &[Vec<String>]) {
     let text = protocol();
     let tables = tables_of(&text);
@@ -113,7 +114,7 @@ fn the_commands_and_options_are_those_of_the_source() {
     assert_table(&["command", "what it does"], &rows);
 }
 
-/// How many cells a row has been written with: a reader drops those that are too many.
+/// The number of cells in the text of a row. A Markdown parser drops superfluous cells.
 fn cells_written(row: &str) -> usize {
     let row = row.trim().trim_start_matches('|');
     let bars = row.match_indices('|').filter(|(at, _)| !row[..*at].ends_with('\\')).count();

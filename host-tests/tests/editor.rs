@@ -1,4 +1,4 @@
-//! The editor over the line against plain vectors, and whole sessions.
+//! Tests of the model editor over the serial line against plain vectors, and of whole sessions.
 #![allow(clippy::unwrap_used)] // a test may: clippy sees only its `#[test]` functions as tests
 
 use penup::model::Element;
@@ -6,10 +6,10 @@ use penup::plotter::{EMPTY_LOOKAHEAD, Memory};
 use penup_host_tests::whole_jobs::Bench;
 use proptest::prelude::*;
 
-/// The vertices of a bar, face or curve, and its pen.
+/// The vertices and the pen of a bar, face or curve.
 type Drawn = (Vec<usize>, u8);
 
-/// What the plotter's model should be, from vectors.
+/// The expected model of the plotter, made of vectors.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 struct Plain {
     vertices: Vec<[i64; 3]>,
@@ -19,12 +19,12 @@ struct Plain {
     pens: Pens,
 }
 
-/// How pens are chosen; the model does not show it.
+/// How pens are chosen; the model does not show this.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 struct Pens {
     current: u8,
     by_material: bool,
-    /// Which name has which pen; one with a number has an empty name.
+    /// The pen of each name; a pen that was chosen by number has an empty name.
     names: Vec<(u8, String)>,
 }
 
@@ -81,7 +81,7 @@ impl Plain {
         [&mut self.bars, &mut self.faces, &mut self.curves]
     }
 
-    /// All that the model shows.
+    /// Everything that the model shows.
     fn shown(&self) -> Self {
         Self { pens: Pens::default(), ..self.clone() }
     }
@@ -137,7 +137,7 @@ impl Plain {
     }
 }
 
-/// One change in the user's words, and the same to the vectors; `None` if it makes no sense here.
+/// A random change as a command, applied also to the vectors; `None` if it makes no sense here.
 fn change(plain: &mut Plain, kind: u8, a: usize, b: usize, c: i64) -> Option<String> {
     let count = plain.vertices.len();
     let c = c % 50;
@@ -276,7 +276,7 @@ fn change(plain: &mut Plain, kind: u8, a: usize, b: usize, c: i64) -> Option<Str
     }
 }
 
-/// Changes that are refused whatever the model is.
+/// Changes that are refused for every model.
 const REFUSED: [&str; 12] = [
     "v 1e12 0 0",
     "f 1 2 9999",

@@ -1,4 +1,4 @@
-//! The implicit enumeration against all matchings there are.
+//! Tests of the implicit enumeration against all possible matchings.
 
 #![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 use penup::stage::{Aborted, Cancel, NeverCancel, Scratch};
@@ -8,7 +8,7 @@ use penup_host_tests::enumeration::{
 };
 use proptest::prelude::*;
 
-/// What the best matching costs, by the best for every subset of the points.
+/// The cost of the best matching, computed from the best one for every subset of the points.
 fn least_cost(distances: Distances<'_>) -> u64 {
     let count = distances.count();
     let mut least = vec![u64::MAX; 1 << count];
@@ -50,7 +50,8 @@ fn is_in(division: Division, pairs: &[[u8; 2]]) -> bool {
     pairs.iter().all(|&[a, b]| division.q >> a & 1 == 0 && division.p >> b & 1 == 0)
 }
 
-/// Even counts up to `most`, distances among few values or many.
+/// Random problems with an even number of points up to `most`, and distances with few or many
+/// different values.
 fn problem(most: usize) -> impl Strategy<Value = (usize, Vec<u32>)> {
     let range = prop_oneof![Just(2u32), Just(5), Just(100), Just(1 << 20), Just(u32::MAX)];
     (0..=most / 2, range).prop_flat_map(|(half, range)| {
@@ -233,7 +234,7 @@ proptest! {
     }
 }
 
-/// Gives the job up at the `after`th look.
+/// Cancels the computation at the `after`th check.
 struct GivesUp {
     after: u32,
     looks: u32,
@@ -246,7 +247,7 @@ impl Cancel for GivesUp {
     }
 }
 
-/// Two kinds of points, an odd number of each, and far between: a hard proof.
+/// Two clusters with an odd number of points each, far apart: a hard proof.
 fn hard() -> Vec<u32> {
     let place = |point: usize| point as u32 * 7919 % 101;
     (0..16).flat_map(|a| (0..a).map(move |b| 50 + (place(a) * place(b)) % 20)).collect()

@@ -1,4 +1,4 @@
-//! The pen-up moves that `order` chooses against the enumeration.
+//! Tests of the pen-up moves that `order` chooses against the enumeration.
 
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
 use penup::order::{Method, Options, Shape, length};
@@ -7,15 +7,15 @@ use penup_host_tests::enumeration::{Distances, Options as Variants, optimum};
 use penup_host_tests::order_reference::Sheet;
 use proptest::prelude::*;
 
-/// A star: points joined to one in the middle. It has one part, so nothing but the matching of the
-/// odd points decides how far the pen moves up.
+/// A star: points that are connected to one in the middle. It has one component, so the pen-up
+/// length depends only on the matching of the odd points.
 fn star(points: &[(i32, i32)], side: i32) -> Sheet {
     let middle = (side / 2, side / 2);
     let rays: Vec<_> = points.iter().map(|&point| vec![middle, point]).collect();
     Sheet::from_polylines(&rays)
 }
 
-/// The least pen-up length, with two ends for nothing if the path is open.
+/// The minimum pen-up length; if the path is open, two ends cost nothing.
 fn least(sheet: &Sheet, shape: Shape) -> u64 {
     let mut degrees = vec![0; sheet.points.len()];
     for segment in &sheet.segments {

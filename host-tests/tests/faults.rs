@@ -1,5 +1,5 @@
-//! Orders, alarms and switches at random instants: of a whole plotter that draws over its line, and of a
-//! polargraph with slack that homes.
+//! Tests of commands, alarms and switches at random instants: on a whole plotter that draws over
+//! its serial line, and on a homing polargraph with backlash.
 
 #![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -13,7 +13,7 @@ use penup_host_tests::pin_machine;
 use penup_host_tests::whole_jobs::{Bench, job_lines};
 use std::mem::discriminant;
 
-/// Numbers that look random, the same in every run.
+/// Pseudo-random numbers that are the same in every run.
 struct Random(u64);
 
 impl Random {
@@ -24,7 +24,7 @@ impl Random {
     }
 }
 
-/// A plotter that draws one picture over and over, without ever losing its place.
+/// A plotter that draws one picture repeatedly and must never lose its position.
 struct Session {
     bench: Bench,
     settings: Settings,
@@ -56,7 +56,7 @@ impl Session {
         self.bench.plotter.machine().state()
     }
 
-    /// Works for so many milliseconds; says how many it was before nothing moved any more.
+    /// Runs for this many milliseconds. Returns how many passed before nothing moved any more.
     fn work(&mut self, milliseconds: u64) -> u64 {
         for passed in 0..milliseconds {
             let busy = self.bench.plotter.poll(&mut self.bench.board);
@@ -76,7 +76,7 @@ impl Session {
         self.bench.board.set_contacts(contacts);
     }
 
-    /// Leaves an alarm as soon as that is allowed, if there is one.
+    /// Clears an alarm, if there is one, as soon as that is allowed.
     fn unlock(&mut self) {
         for _ in 0..2000 {
             if !matches!(self.state(), State::Alarm(_)) {
@@ -88,7 +88,8 @@ impl Session {
         panic!("the alarm cannot be left: {}", self.bench.say("$X\n"));
     }
 
-    /// What was drawn; the pen is back at the origin, or the plotter has lost its place.
+    /// Returns what was drawn. Afterwards the pen is at the origin, or the plotter has lost its
+    /// position.
     fn end(&mut self) -> Drawn {
         self.bench.finish();
         self.order("G28");
@@ -112,7 +113,7 @@ impl Session {
     }
 }
 
-/// Draws the picture `count` times, each time with another disturbance at a random instant.
+/// Draws the picture `count` times, each time with a different disturbance at a random instant.
 fn disturb(values: &[(Setting, f64)], count: u64, seed: u64) {
     let mut session = Session::new(values);
     session.order("$plot");
@@ -214,7 +215,7 @@ fn so_does_a_polargraph_with_slack() {
     disturb(&values, 300, 1978);
 }
 
-/// The belts of a polargraph, in steps, seen from the gondola: with slack.
+/// The lengths of a polargraph's belts in steps, seen from the gondola, with backlash.
 struct PolargraphMachine {
     plays: [Play; 2],
     motors: PagePoint,
@@ -229,7 +230,7 @@ impl PolargraphMachine {
     }
 }
 
-/// What the main loop of the next test does.
+/// The actions of the main loop in the next test.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Stage {
     Homing,
@@ -239,8 +240,8 @@ enum Stage {
     Last,
 }
 
-/// Homes a polargraph with slack and draws; something comes in between at an instant. Then the belts are still as
-/// long as the machine takes them for.
+/// Homes a polargraph with backlash and draws, with a disturbance at some instant. The true lengths
+/// of the belts must then still be those that the machine assumes.
 fn home_and_disturb(random: &mut Random) -> Stage {
     let mut settings = Settings::default();
     for (setting, value) in [

@@ -1,4 +1,4 @@
-//! The machine at the line: G-code, moves by hand, homing, contacts, real-time bytes.
+//! Tests of the machine over the serial line: G-code, jogging, homing, contacts, real-time bytes.
 
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
 
@@ -26,7 +26,7 @@ fn work(bench: &mut Bench, milliseconds: u32) {
     }
 }
 
-/// The field of the status that begins so.
+/// The field of the status report that begins with this text.
 fn field(bench: &mut Bench, name: &str) -> String {
     let answers = bench.say("?");
     let status = answers.lines().find(|line| line.starts_with('<')).unwrap_or_default();
@@ -40,7 +40,7 @@ fn place(bench: &mut Bench) -> String {
     place.expect("a status").to_owned()
 }
 
-/// Millimetres moved with the pen down, by the pins, and where they end.
+/// The length in mm moved with the pen down according to the pins, and the final position.
 fn inked(bench: &Bench) -> f64 {
     let (mut up, mut pen, mut length) = ([false; 2], 0, 0.0);
     let mut at = (0u64, [0.0f64; 2]);
@@ -98,7 +98,7 @@ fn arcs_by_centre_and_by_radius_inches_and_bounds() {
     assert_eq!(place(&mut bench), "5.000,5.000");
 }
 
-/// Where the pins' steps lead with the pen down, in steps from where they began.
+/// The positions with the pen down according to the pins, in steps from the start.
 fn inked_points(bench: &Bench) -> Vec<[i32; 2]> {
     let (mut up, mut pen, mut at) = ([true; 2], 0, [0; 2]);
     let mut points = Vec::new();
@@ -401,11 +401,11 @@ fn no_talk_starves_the_steps() {
     assert_eq!(quiet.end, busy.end);
 }
 
-/// A few strokes, an arc, a dot.
+/// A program with a few strokes, an arc and a dot.
 const PROGRAM: &str = "$21=1\nG0 X5 Y5\nM3\nG1 X14 Y6\nX15 Y12\nG2 X9 Y18 I-6 J0\nG1 X9.5 Y12 F1200\nM5\n\
                        G0 X2 Y2\nM3\nM5\nG0 X3 Y9\nM3\nG1 Y10 F3000\nX12 Y10.5\nM5\nG0 X1 Y1\n";
 
-/// What is done to the plotter in the midst of it.
+/// A disturbance of the running program.
 #[derive(Debug, Clone, Copy)]
 enum Disturbance {
     Nothing,
@@ -416,8 +416,9 @@ enum Disturbance {
     StopByte,
 }
 
-/// Runs the program, disturbed after so many milliseconds; checks that the plotter knows where its
-/// pins are and that it can go on from there. Returns what was drawn before that.
+/// Runs the program and disturbs it after this many milliseconds. Checks that the plotter's
+/// position agrees with its pins and that it can continue from there. Returns what was drawn before
+/// the disturbance.
 fn disturbed(disturbance: Disturbance, instant: u32) -> Drawn {
     let memory = Box::leak(Box::new(Memory::<4, 4, 16>::new()));
     let mut bench = Bench::with_memory(memory.lend(Box::leak(Box::new(EMPTY_LOOKAHEAD))));

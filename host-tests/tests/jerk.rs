@@ -1,4 +1,4 @@
-//! S-curves: the jerk limit, measured from the events.
+//! Tests of S-curves: the jerk, measured from the events, stays within its limit.
 
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
 
@@ -22,7 +22,7 @@ fn events(points: &[PagePoint], ink: LineType, settings: Settings) -> Vec<StepEv
     pin_machine::record(settings, &mut TargetList::new(&targets), 128).expect("within the travel")
 }
 
-/// FNV-1a of all words.
+/// The FNV-1a hash of all words.
 fn digest(events: &[StepEvent]) -> u64 {
     let bytes = events.iter().flat_map(|event| event.to_bits().to_le_bytes());
     bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
@@ -30,7 +30,8 @@ fn digest(events: &[StepEvent]) -> u64 {
     })
 }
 
-/// The digests are those of the plotter since the moves of a slice are evenly spaced.
+/// The expected hashes are those of the plotter since the version in which the moves of a slice are
+/// evenly spaced.
 #[test]
 fn without_a_jerk_limit_the_events_are_what_they_were() {
     let cases = [
@@ -51,13 +52,13 @@ fn without_a_jerk_limit_the_events_are_what_they_were() {
     assert!(differing.is_empty(), "{differing:#?}");
 }
 
-/// mm/s³
+/// Sets the jerk limit, in mm/s³.
 fn with_jerk(mut settings: Settings, jerk: f64) -> Settings {
     settings.set(Setting::Jerk, Value::from_num(jerk / 1000.0)).expect("valid");
     settings
 }
 
-/// What a plotter is set to.
+/// The settings of a plotter.
 #[derive(Debug, Clone, Copy)]
 struct Case {
     speed: f64,
@@ -81,7 +82,7 @@ impl Case {
         }
     }
 
-    /// Checks jerk, acceleration, and the speed at each corner and on each line.
+    /// Checks the jerk, the acceleration, and the speed at each corner and on each line.
     fn check(self, name: &str, points: &[PagePoint], run: &Run) {
         let case = format!("{name} {self:?}");
         let places = places(points);
@@ -173,7 +174,7 @@ fn dense_points_never_stop_it_with_a_short_look_ahead() {
     }
 }
 
-/// A straight, in chords or at once, into a half circle and back.
+/// A straight, as several chords or as one line, into a half circle and back.
 fn bend(radius: f64, chord: f64, straight_in_chords: bool) -> Vec<(f64, f64)> {
     let mut path = vec![(10.0, 10.0)];
     let count = if straight_in_chords { (40.0 / chord) as usize } else { 1 };
@@ -187,7 +188,8 @@ fn bend(radius: f64, chord: f64, straight_in_chords: bool) -> Vec<(f64, f64)> {
     path
 }
 
-/// Whether a curve bends is known when some of its points are; a cruise must not last until then.
+/// The planner knows that a curve bends only after some of its points; a cruise must not last until
+/// then.
 #[test]
 fn bends_behind_straights_are_seen_in_time() {
     for (radius, chord) in [(0.3, 0.05), (0.5, 0.05), (0.8, 0.1)] {
@@ -233,7 +235,7 @@ proptest! {
     }
 }
 
-/// Strokes with corners, a curve and dashes, and moves with the pen up.
+/// Strokes with corners, a curve and dashes, and pen-up moves.
 fn job() -> Vec<Target> {
     let line = |points: Vec<(f64, f64)>, ink: LineType| {
         let points = steps(&points);

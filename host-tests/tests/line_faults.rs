@@ -1,5 +1,6 @@
-//! The client and the plotter over a line that loses, doubles, changes and delays bytes, there
-//! and back: the drawing is the one that was sent, or the client says what is wrong.
+//! Tests of the client and the plotter over a line that loses, doubles, changes and delays bytes in
+//! both directions. Either the drawing is the one that was sent, or the client reports what is
+//! wrong.
 
 #![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -13,13 +14,13 @@ use penup_host_tests::whole_jobs::{Bench, job_lines};
 use std::collections::BTreeSet;
 use std::sync::atomic::AtomicBool;
 
-/// Moves with the pen down.
+/// The moves with the pen down.
 type Ink = BTreeSet<(PagePoint, PagePoint)>;
 
-/// Sends a scene, on a small page, over a line with this damage there and back, and draws it.
+/// Sends a scene on a small page over a line with these faults in each direction, and draws it.
 fn draw(scene: &str, towards: Damage, back: Damage) -> (NoisyLine, Result<(), Error>) {
     let mut bench = Bench::new();
-    // As quick as it goes: the drawing is not what is tested.
+    // The speed is the maximum, because the drawing itself is not tested.
     bench.say("$201=20000\n$202=20000\n$120=30000\n$121=30000\n$212=1\n$213=1\n");
     let mut line = NoisyLine::new(bench, towards, back);
     let settings = ["$page=14x14", "$margin=2", "$seams=off", "$title=a b", "$title-size=1"];
@@ -36,7 +37,8 @@ fn draw(scene: &str, towards: Damage, back: Damage) -> (NoisyLine, Result<(), Er
     (line, drawn)
 }
 
-/// The same over a line without damage: what it draws, and the bytes there and back.
+/// Does the same over a line without faults. Returns what it draws, and the bytes in each
+/// direction.
 fn draw_undisturbed(scene: &str) -> (Ink, [Vec<u8>; 2]) {
     let (line, drawn) = draw(scene, Damage::default(), Damage::default());
     drawn.expect("a line without damage");
@@ -45,7 +47,7 @@ fn draw_undisturbed(scene: &str) -> (Ink, [Vec<u8>; 2]) {
     (ink, line.sent().map(<[u8]>::to_vec))
 }
 
-/// One of all kinds of faults at one of the bytes.
+/// One fault of any kind at one of the bytes.
 fn some_fault(random: &mut Random, bytes: &[u8]) -> (usize, Fault) {
     let at = random.below(bytes.len() as u64) as usize;
     let newlines = bytes.iter().enumerate().skip(at).filter(|(_, byte)| **byte == b'\n');

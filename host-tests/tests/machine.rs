@@ -1,4 +1,4 @@
-//! Jobs through the interrupt's own code: hold, resume, abort, alarm, sleep.
+//! Tests of jobs that run through the real interrupt code: hold, resume, abort, alarm, sleep.
 
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
 
@@ -53,13 +53,13 @@ fn with(values: &[(Setting, f64)]) -> Settings {
     settings
 }
 
-/// A machine with 23 and 15 steps of slack, or none.
+/// The settings of a machine with 23 and 15 steps of backlash, or without any.
 fn slack(loose: bool) -> Settings {
     let slack = f64::from(u8::from(loose));
     with(&[(Setting::BacklashX, 0.3 * slack), (Setting::BacklashY, 0.2 * slack)])
 }
 
-/// A machine whose pen a motor lifts, or not.
+/// The settings of a machine whose pen is lifted by a motor, or by a servo.
 fn lifted(mut settings: Settings, by_a_motor: bool) -> Settings {
     for (setting, value) in [
         (Setting::TravelZ, 1.0),
@@ -73,8 +73,8 @@ fn lifted(mut settings: Settings, by_a_motor: bool) -> Settings {
     settings
 }
 
-/// Draws the job in a pin machine; `visit` is called at each turn of the main loop, which takes
-/// `turn_ticks`, and ends the run by returning `false`.
+/// Draws the job in a pin machine. `visit` is called at each iteration of the main loop, which
+/// takes `turn_ticks`, and ends the run by returning `false`.
 fn run_job(
     settings: Settings,
     turn_ticks: u64,
@@ -109,7 +109,7 @@ fn a_job_is_drawn_and_the_pins_end_where_the_path_does() {
     assert_eq!(drawn.pen, 0);
 }
 
-/// An instant of the job and the length of a main loop turn, in ticks.
+/// An instant of the job and the length of a main loop iteration, both in ticks.
 fn instants() -> impl Strategy<Value = (u64, u64)> {
     (1u64..100_000_000, 5_000u64..200_000)
 }
@@ -212,7 +212,7 @@ proptest! {
     }
 }
 
-/// The pen's height and the steps of its motor when it is raised.
+/// The pen's height and the steps of its motor when the pen is raised.
 fn raised(by_a_motor: bool) -> (u8, i32) {
     // 20 of 127 heights, 400 steps.
     if by_a_motor { (20, 62) } else { (0, 0) }
@@ -301,7 +301,7 @@ fn a_motor_of_the_pen_that_steps_too_fast_is_refused() {
     assert_eq!(refused, Err(SettingError::Conflict(too_many)));
 }
 
-/// Numbers that look random, the same in every run.
+/// Pseudo-random numbers that are the same in every run.
 struct Random(u64);
 
 impl Random {
@@ -312,7 +312,7 @@ impl Random {
     }
 }
 
-/// Long moves, a dense circle and a zigzag: at every instant something else is fast.
+/// Long moves, a dense circle and a zigzag, so that at every instant something different is fast.
 fn fast_job() -> Vec<Target> {
     let mut targets = vec![to(9000, 500)];
     for chord in 0..=180 {
@@ -326,8 +326,8 @@ fn fast_job() -> Vec<Target> {
     targets
 }
 
-/// Draws the fast job; the main loop stands still from `instant` on for `pause` ticks. Returns how
-/// often the queue ran dry, too.
+/// Draws the fast job while the main loop is stalled for `pause` ticks from `instant` on. Also
+/// returns how often the queue ran dry.
 fn starve(settings: Settings, instant: u64, pause: u64, turn_ticks: u64) -> (Drawn, u32) {
     let targets = fast_job();
     let mut path = TargetList::new(&targets);
@@ -346,7 +346,7 @@ fn starve(settings: Settings, instant: u64, pause: u64, turn_ticks: u64) -> (Dra
     (event_checker::check_pins(&trace, &settings), underruns)
 }
 
-/// Lets the main loop be late `count` times, each in a job of its own; the acceleration is measured
+/// Delays the main loop `count` times, each in a job of its own, and measures the acceleration
 /// against that of `allowed`.
 fn starve_often(settings: Settings, allowed: Settings, count: u32) {
     let never_cancel = starve(settings, 0, 0, 25_000).0;
@@ -532,8 +532,8 @@ fn what_leads_beyond_the_travel_is_refused_before_anything_moves() {
     assert!(machine.unlock().is_err());
 }
 
-/// Homes a machine that stands `start` steps from its switches; `press` says what they do.
-/// Returns the final state and where the machine then is, in steps from the switches.
+/// Homes a machine that is `start` steps away from its switches; `press` simulates these. Returns
+/// the final state and the final position, in steps from the switches.
 fn home(
     start: PagePoint,
     kinematics: i32,

@@ -1,4 +1,4 @@
-//! What docs/memory.md says is what the library has.
+//! Checks that docs/memory.md agrees with the library.
 
 use penup::plotter::budget::{BUDGETS, Budget};
 

@@ -1,4 +1,5 @@
-//! Speed, measured from the events: against the optimum, the table of known plotters, the limits.
+//! Tests of the speed, measured from the events, against the optimum, published results of known
+//! plotters, and the limits.
 
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
 
@@ -174,7 +175,7 @@ proptest! {
     }
 }
 
-/// The greatest speed over any 5 ms, mm/s.
+/// The maximum speed over any 5 ms, in mm/s.
 fn fastest(run: &Run, places: &[f64]) -> f64 {
     let mut fastest = 0.0f64;
     let mut first = 0;

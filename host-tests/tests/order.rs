@@ -1,4 +1,5 @@
-//! Orders of strokes: each segment once, and not farther than it must be.
+//! Tests of stroke orders: each segment is drawn once, and the pen-up moves are no longer than they
+//! must be.
 
 #![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -63,7 +64,8 @@ fn separate_parts_are_drawn_within_three_hundredths_of_the_best_known() {
     }
 }
 
-/// 500 lines in two columns, the best known by LKH: to and fro, down one column and up the other.
+/// The best known tour of 500 lines in two columns was found by LKH: back and forth, down one column
+/// and up the other.
 #[test]
 fn a_hatching_is_drawn_within_three_hundredths_of_the_best_known() {
     let lines = (0..250).flat_map(|row| {

@@ -1,4 +1,4 @@
-//! Exact pen-up moves against a published solver and against the trial of every pairing.
+//! Tests of exact pen-up moves against a published solver and against all pairings.
 
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
 
@@ -9,7 +9,7 @@ use penup_host_tests::order_reference::Sheet;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
-/// A star to a hub: its tips are the odd points, so the pen-up moves match them.
+/// A star around a hub. Its tips are the odd points, so the pen-up moves are a matching of them.
 fn star(tips: &[PagePoint]) -> Sheet {
     let hub = PagePoint { x: -7, y: 3 };
     let points = tips.iter().copied().chain([hub]).collect();
@@ -18,7 +18,7 @@ fn star(tips: &[PagePoint]) -> Sheet {
     Sheet { points, segments }
 }
 
-/// The lengths of all moves; for an open path, with two free ends after the points.
+/// The lengths of all possible moves. For an open path, two free ends follow the points.
 fn costs(points: &[PagePoint], shape: Shape) -> Vec<Vec<i64>> {
     let free = if shape == Shape::OpenPath { 2 } else { 0 };
     let count = points.len() + free;
@@ -36,7 +36,7 @@ fn published(costs: &[Vec<i64>]) -> i64 {
     twice / 2
 }
 
-/// The least over all pairings, by subsets of the points.
+/// The minimum over all pairings, computed over subsets of the points.
 fn by_trial(costs: &[Vec<i64>]) -> i64 {
     let mut least = vec![i64::MAX / 2; 1 << costs.len()];
     least[0] = 0;

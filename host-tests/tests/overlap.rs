@@ -1,4 +1,5 @@
-//! No stretch of paper is inked twice, and none is lost: against every pair of lines, one by one.
+//! Tests that no part of the paper is drawn twice and none is lost, by comparing every pair of
+//! lines.
 
 #![allow(clippy::expect_used)] // a test fails by panicking
 
@@ -6,7 +7,7 @@ use penup::drawing::{LineType, PackedLine, PagePoint, build_graph};
 use penup::stage::{NeverCancel, items_mut};
 use proptest::prelude::*;
 
-/// A line of a pen with its line type code: 0 full, 1 dotted, 2 dashed.
+/// A line with its line type code: 0 full, 1 dotted, 2 dashed.
 type Drawn = ((i64, i64), (i64, i64), u8, u8);
 
 fn organised(lines: &[Drawn]) -> Vec<Drawn> {
@@ -30,13 +31,15 @@ fn organised(lines: &[Drawn]) -> Vec<Drawn> {
     segments.map(|s| (at(s.from), at(s.to), s.line_type_code, s.pen)).collect()
 }
 
-/// Where a place lies along a line, in units of its length squared; `None` if it is beside it.
+/// The position of a point along a line, in units of the line's squared length; `None` if the point
+/// is not on it.
 fn along(place: (i64, i64), (from, to, ..): &Drawn) -> Option<i64> {
     let (d, w) = ((to.0 - from.0, to.1 - from.1), (place.0 - from.0, place.1 - from.1));
     (d.0 * w.1 == d.1 * w.0).then_some(d.0 * w.0 + d.1 * w.1)
 }
 
-/// The stretch of `line` that `other` covers, from 0 to the square of its length; `None` if no length.
+/// The stretch of `line` that `other` covers, from 0 to the square of its length; `None` if it has
+/// no length.
 fn covered(line: &Drawn, other: &Drawn) -> Option<(i64, i64)> {
     let whole = along(line.1, line)?;
     let (a, b) = (along(other.0, line)?, along(other.1, line)?);

@@ -1,4 +1,5 @@
-//! Several pens: who draws which line, over the line from `usemtl` and `g` to the strokes.
+//! Tests of several pens: which pen draws which line, from `usemtl` and `g` on the serial line to
+//! the strokes.
 
 #![allow(clippy::unwrap_used)] // a test may: clippy sees only its `#[test]` functions as tests
 
@@ -22,7 +23,7 @@ fn bench(text: &str) -> Bench {
     bench
 }
 
-/// The stretches with their pens, from 1.
+/// The stretches with their pens, counted from 1.
 #[derive(Default)]
 struct Found {
     stretches: Vec<(Option<(u16, u16)>, u8)>,
@@ -40,10 +41,10 @@ impl Observer for Found {
     }
 }
 
-/// A line in steps, and its pen, from 1.
+/// A line in steps, and its pen, counted from 1.
 type Ink = ([i32; 2], [i32; 2], u8);
 
-/// What is found, and what is inked, in order.
+/// The lines that are found and the lines that are drawn, in order.
 fn job(bench: &mut Bench) -> (Found, Vec<Ink>) {
     let mut found = Found::default();
     bench.plotter.compute(&mut NeverCancel, &mut found).unwrap();
@@ -73,7 +74,7 @@ fn cube(pens: [u8; 6]) -> String {
     text
 }
 
-/// The lowest pen of the faces at each edge, numbers from 0.
+/// The lowest pen of the faces at each edge, with indices from 0.
 fn lowest(pens: [u8; 6]) -> BTreeMap<(u16, u16), u8> {
     let mut lowest = BTreeMap::new();
     for (face, pen) in FACES.iter().zip(pens) {
@@ -86,7 +87,7 @@ fn lowest(pens: [u8; 6]) -> BTreeMap<(u16, u16), u8> {
     lowest
 }
 
-/// All orders of pens matter: which face comes first must not.
+/// All orders of pens are tested, because the order of the faces must not matter.
 const PENS: [[u8; 6]; 4] = [[1, 2, 3, 4, 5, 6], [6, 5, 4, 3, 2, 1], [9, 2, 2, 32, 2, 9], [3; 6]];
 
 #[test]
@@ -310,7 +311,7 @@ fn materials_rule_over_groups_and_names_are_counted() {
     assert_eq!(job(&mut bench).0.bars[0].2, 7);
 }
 
-/// How long a stretch is on the image plane.
+/// The length of a stretch on the image plane.
 fn length(projection: Projection, stretch: &Stretch) -> f64 {
     let (p, q) = stretch.ends;
     let [from, to] = [stretch.from, stretch.to].map(|along| {

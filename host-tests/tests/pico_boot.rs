@@ -1,4 +1,5 @@
-//! How the Raspberry Pi Pico starts: after each kind of reset, after faults, and with a worn flash.
+//! Tests how the Raspberry Pi Pico starts: after each kind of reset, after faults, and with a worn
+//! flash.
 #![cfg(feature = "emulator")]
 
 use penup_client::emulator::{
@@ -14,7 +15,8 @@ fn start() -> Result<Line<Pico>, Box<dyn Error>> {
     Line::to(Box::new(Pico::start(&image_path("pico"))?))
 }
 
-/// What the board says on its serial line before it answers a status request, and the answer.
+/// The output of the board on its serial line until it answers a status query, including the
+/// answer.
 fn hear_start(line: &mut Line<Pico>) -> Result<Vec<String>, Box<dyn Error>> {
     line.hear_greeting()?;
     line.emulator.send(b"?")?;
@@ -38,7 +40,7 @@ fn assert_fault(heard: &[String], cause: &str) {
     assert!(heard[2].contains("|Alarm:101"), "{heard:?}");
 }
 
-/// Drivers off, pen up.
+/// Checks that the drivers are off and the pen is up.
 fn assert_safe(line: &mut Line<Pico>) -> TestResult {
     let (mut machine, mut drivers_on) = (Machine::default(), false);
     let changes = line.emulator.pin_changes()?;
@@ -134,7 +136,7 @@ fn a_program_that_faults_at_every_start_is_given_up_but_answers() -> TestResult 
     Ok(())
 }
 
-/// Where the settings are kept, and where the job, from the beginning of the flash.
+/// The offsets of the settings and of the job in the flash.
 const SETTINGS: u32 = 0x1B_8000;
 const JOB: u32 = 0x1B_A000;
 

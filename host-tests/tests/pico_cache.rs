@@ -1,4 +1,4 @@
-//! The emulator's model of the cache before the Pico's flash, asked by itself.
+//! Tests the emulator's model of the cache in front of the Pico's flash in isolation.
 #![cfg(feature = "emulator")]
 
 use std::error::Error;
@@ -6,7 +6,7 @@ use std::process::Command;
 
 const MODEL: &str = include_str!("../../client/src/emulator/pico/xip_cache.mjs");
 
-/// Reads of the addresses in their order, on a chip without flash: how many cycles each waits.
+/// Reads the addresses in order on a chip without flash. Returns the wait cycles of each read.
 const READS: &str = "
 const chip = { core: {}, flash16: new Uint16Array(1 << 20) };
 const cache = new XipCache(chip);

@@ -1,5 +1,5 @@
-//! The Raspberry Pi Pico's limit switches and emergency stop, each with 5 ms of bounce: the right state, the right
-//! report, and no step after the stop.
+//! Tests the Raspberry Pi Pico's limit switches and emergency stop, each with 5 ms of contact
+//! bounce: the state and the report must be right, and no step may follow the stop.
 #![cfg(feature = "emulator")]
 
 use penup_client::emulator::{EmulatedBoard, Machine, Pico, image_path};
@@ -16,7 +16,7 @@ const LIMIT_Y: u8 = 9;
 const STOP: u8 = 10;
 const BOUNCE: Duration = Duration::from_millis(5);
 
-/// A board with these settings.
+/// Starts a board with these settings.
 fn start(settings: &[&str]) -> Result<Line<Pico>, Box<dyn Error>> {
     let mut line = Line::to(Box::new(Pico::start(&image_path("pico"))?))?;
     for setting in settings {
@@ -35,8 +35,8 @@ fn wait_for_steps(line: &mut Line<Pico>) -> TestResult {
     Ok(())
 }
 
-/// Hears the alarm once; the state is that of an alarm and its number is in the report. From when it is
-/// told on, there is no step.
+/// Checks that the alarm is reported once, that the state is that of an alarm and that the report
+/// contains its number. After the report, there must be no step.
 fn stands_in_alarm(line: &mut Line<Pico>, number: u8) -> TestResult {
     assert_eq!(line.hear()?, format!("ALARM:{number}"));
     let told_at = line.emulator.clock()?;
@@ -58,7 +58,7 @@ fn stands_in_alarm(line: &mut Line<Pico>, number: u8) -> TestResult {
     Ok(())
 }
 
-/// Presses a contact in the middle of a job.
+/// Closes a contact in the middle of a job.
 fn stops_a_job(pin: u8, number: u8, settings: &[&str]) -> TestResult {
     let mut line = start(settings)?;
     for text in job_lines("lattice2.obj", &["$page=60x80", "$margin=5"]) {
@@ -121,7 +121,7 @@ fn a_switch_within_the_way_of_a_move_by_hand_stops_it_there() -> TestResult {
 
 const HOMING: [&str; 3] = ["$22=1", "$130=60", "$131=60"];
 
-/// Homes with switches at these places: where the machine stands afterwards.
+/// Homes with switches at these positions. Returns the final position of the machine.
 fn home(x: i32, y: i32) -> Result<(i32, i32), Box<dyn Error>> {
     let mut line = start(&HOMING)?;
     line.emulator.fit_switch(LIMIT_X, x)?;
@@ -139,7 +139,8 @@ fn home(x: i32, y: i32) -> Result<(i32, i32), Box<dyn Error>> {
     Ok(machine.position())
 }
 
-/// A pull-off, 160 steps, from the switches, whether they are open or pressed at the start.
+/// Homing ends one pull-off, 160 steps, away from the switches, whether they are open or pressed at
+/// the start.
 #[test]
 fn homing_finds_switches_that_bounce_from_either_side() -> TestResult {
     for (x, y) in [(-400, -240), (100, -200), (-300, 60)] {
@@ -182,7 +183,7 @@ fn the_emergency_stop_before_homing_and_during_it() -> TestResult {
     Ok(())
 }
 
-/// The filters at the switches rise slowly: until then the contacts read as closed.
+/// The filters at the switches rise slowly; until then, the contacts read as closed.
 #[test]
 fn twenty_power_ups_with_slow_contacts_give_no_alarm() -> TestResult {
     let mut line = start(&[])?;
@@ -224,7 +225,8 @@ fn noise_that_a_single_look_sees_is_no_contact() -> TestResult {
     Ok(())
 }
 
-/// Pre-empted for longer than a millisecond, the clock would set its alarm to a time that is over.
+/// If it were pre-empted for longer than a millisecond, the clock would set its alarm to a time in
+/// the past.
 #[test]
 fn a_clock_that_is_late_still_sees_the_stop() -> TestResult {
     let mut line = start(&[])?;

@@ -1,4 +1,4 @@
-//! The largest scene that the Raspberry Pi Pico must hold, from its upload to the last step.
+//! Tests the largest scene that the Raspberry Pi Pico must hold, from its upload to the last step.
 #![cfg(feature = "emulator")]
 
 use penup_client::emulator::{EmulatedBoard, Pico, PicoByUsb, image_path};
@@ -9,7 +9,8 @@ use penup_host_tests::emulated_jobs::{
 use penup_host_tests::whole_jobs::job_lines;
 use std::error::Error;
 
-/// 343 cubes by USB; little effort for the order, for its length in the emulator.
+/// 343 cubes are sent over USB. The effort for the order is small, because more takes too long in
+/// the emulator.
 #[test]
 #[ignore = "takes minutes: `cargo xtask lattice7` runs it"]
 fn of_343_cubes_the_pins_draw_what_the_host_draws() -> Result<(), Box<dyn Error>> {

@@ -1,4 +1,4 @@
-//! The Raspberry Pi Pico through a loss of power and a hanging program.
+//! Tests the Raspberry Pi Pico through a loss of power and with a hanging program.
 #![cfg(feature = "emulator")]
 
 use penup_client::emulator::{
@@ -16,7 +16,7 @@ fn start() -> Result<Line<Pico>, Box<dyn Error>> {
     Line::to(Box::new(Pico::start(&image_path("pico"))?))
 }
 
-/// The value of setting 130.
+/// Reads the value of setting 130.
 fn travel(line: &mut Line<Pico>) -> Result<String, Box<dyn Error>> {
     line.emulator.send(b"$$\n")?;
     let mut travel = None;
@@ -42,13 +42,15 @@ fn settings_outlive_the_power() -> TestResult {
     Ok(())
 }
 
-/// A board with a USB host, which is much faster than the other port. That one hears when the board starts again: nothing
-/// is said to it.
+/// A board with a USB host, which is much faster than the other port. The UART is only read, to
+/// detect a restart of the board; nothing is sent to it.
 struct Watched(Line<PicoByUsb>);
 
-/// Bytes of flash that change when settings are kept: a sector is erased, two pages of payload and the header's are written.
+/// The number of flash bytes that change when settings are saved: a sector is erased, and two pages
+/// of payload and the header's page are written.
 const SAVE_BYTES: u64 = 4096 + 2 * 256 + 256;
-/// The payload is written, and the header up to the last byte of its sum.
+/// The number of bytes after which the payload is written, and the header up to the last byte of
+/// its checksum.
 const VALID_FROM: u64 = 4096 + 2 * 256 + 16;
 
 impl Watched {
@@ -65,14 +67,14 @@ impl Watched {
         self.0.hear_greeting()
     }
 
-    /// Gives the job up.
+    /// Aborts the job.
     fn give_up(&mut self) -> TestResult {
         self.greet()?;
         while !self.0.status()?.starts_with("<Idle") {}
         Ok(())
     }
 
-    /// Every setting, by its line.
+    /// All settings, as the lines that list them.
     fn settings(&mut self) -> Result<Vec<String>, Box<dyn Error>> {
         self.0.emulator.send(b"$$\n")?;
         let mut lines = Vec::new();
@@ -84,10 +86,11 @@ impl Watched {
         }
     }
 
-    /// Waits for the power to be cut while a setting is changed, and says which of the two states is there afterwards.
+    /// Waits until the power is cut while a setting is changed, and returns which of the two states
+    /// exists afterwards.
     ///
     /// # Panics
-    /// If it is neither.
+    /// Panics if it is neither.
     fn survive(&mut self, old: &[String], travel: u32) -> Result<bool, Box<dyn Error>> {
         self.0.emulator.send(format!("$130={travel}\n").as_bytes())?;
         self.hear_restart()?;
@@ -100,7 +103,7 @@ impl Watched {
         Ok(true)
     }
 
-    /// Waits until the board has started again, and for the host to find it.
+    /// Waits until the board has restarted and the host has enumerated it.
     fn hear_restart(&mut self) -> TestResult {
         let mut heard = Vec::new();
         while !heard.windows(4).any(|four| four == b"Grbl") {
@@ -118,7 +121,7 @@ impl Watched {
     }
 }
 
-/// The line of a setting when the travel of x is changed.
+/// The line that changes the travel of x.
 fn changed(line: &str, travel: u32) -> String {
     match line.strip_prefix("$130=").and_then(|rest| rest.split_once(' ')) {
         Some((_, meaning)) => format!("$130={travel}.000 {meaning}"),
@@ -126,12 +129,12 @@ fn changed(line: &str, travel: u32) -> String {
     }
 }
 
-/// How many cuts: `PENUP_CUTS`, else 200.
+/// The number of power cuts: `PENUP_CUTS`, or else 200.
 fn cut_count() -> u64 {
     std::env::var("PENUP_CUTS").ok().and_then(|count| count.parse().ok()).unwrap_or(200)
 }
 
-/// Marsaglia's xorshift.
+/// A pseudo-random number by Marsaglia's xorshift.
 fn next_random(state: &mut u64) -> u64 {
     *state ^= *state << 13;
     *state ^= *state >> 7;
@@ -159,8 +162,8 @@ fn after_a_cut_at_any_instant_the_settings_are_the_old_or_the_new_ones() -> Test
     Ok(())
 }
 
-/// At the ends of every erasure and every page, around the last byte that counts, and at random bytes; with as many cuts as
-/// bytes, before every byte.
+/// The power is cut at the ends of every erasure and every page, around the last byte that matters,
+/// and at random bytes. With as many cuts as bytes, it is cut before every byte.
 #[test]
 fn after_a_cut_in_any_write_of_the_flash_the_settings_are_the_old_or_the_new_ones() -> TestResult {
     let mut watched = Watched::start()?;
@@ -220,7 +223,7 @@ fn a_hanging_program_is_started_again_in_alarm() -> TestResult {
     Ok(())
 }
 
-/// The board's answer to a question of one line, up to `ok` or the error.
+/// The board's answer to a query of one line, up to `ok` or the error.
 fn ask_all(line: &mut Line<PicoByUsb>, text: &str) -> Result<Vec<String>, Box<dyn Error>> {
     line.emulator.send(format!("{text}\n").as_bytes())?;
     let mut heard = Vec::new();
@@ -232,7 +235,7 @@ fn ask_all(line: &mut Line<PicoByUsb>, text: &str) -> Result<Vec<String>, Box<dy
     }
 }
 
-/// What the job is, by its lengths.
+/// Identifies the job by its lengths.
 fn job(line: &mut Line<PicoByUsb>) -> Result<Vec<String>, Box<dyn Error>> {
     let answer = ask_all(line, "$model")?;
     Ok(answer.into_iter().filter(|line| line.starts_with("[JOB:")).collect())

@@ -1,5 +1,5 @@
-//! What the Raspberry Pi Pico receives by its UART: nothing is lost while flash is written, and no
-//! line is carried out that lost a byte.
+//! Tests reception by the Raspberry Pi Pico's UART: nothing is lost while flash is written, and no
+//! line that lost a byte is executed.
 #![cfg(feature = "emulator")]
 
 use penup_client::emulator::{EmulatedBoard, Pico, PicoByUsb, UartError, image_path};
@@ -11,16 +11,16 @@ use std::time::Duration;
 
 type TestResult = Result<(), Box<dyn Error>>;
 
-/// Bytes that a sender may have unanswered.
+/// The number of unanswered bytes that a sender may have sent.
 const WINDOW: usize = 240;
-/// A sector of flash takes no longer to be erased.
+/// The maximum time to erase a sector of flash.
 const SLOWEST_ERASE: Duration = Duration::from_millis(400);
 
 fn start() -> Result<Line<Pico>, Box<dyn Error>> {
     Line::to(Box::new(Pico::start(&image_path("pico"))?))
 }
 
-/// What is said before the reply to a line, and the reply.
+/// The output before the reply to a line, and the reply.
 fn hear_all<E: EmulatedBoard>(line: &mut Line<E>) -> Result<Vec<String>, Box<dyn Error>> {
     let mut heard = Vec::new();
     loop {
@@ -39,7 +39,8 @@ fn ask_all<E: EmulatedBoard>(
     hear_all(line)
 }
 
-/// Sends the lines with a full window, and asks for the status in between. Each is answered `ok`.
+/// Sends the lines with a full window and queries the status in between. Each line must be answered
+/// with `ok`.
 fn stream(line: &mut Line<Pico>, lines: &[String]) -> TestResult {
     let (mut unanswered, mut bytes) = (VecDeque::new(), 0);
     let hear = |line: &mut Line<Pico>, unanswered: &mut VecDeque<String>| loop {
@@ -69,7 +70,8 @@ fn stream(line: &mut Line<Pico>, lines: &[String]) -> TestResult {
     Ok(())
 }
 
-/// Settings and a job are kept while a full window is on its way, each sector of flash taking 400 ms.
+/// Settings and a job are saved while a full window is in transit, and erasing each sector of flash
+/// takes 400 ms.
 #[test]
 fn a_full_window_across_every_flash_write_loses_no_byte() -> TestResult {
     let mut line = start()?;
@@ -89,7 +91,7 @@ fn a_full_window_across_every_flash_write_loses_no_byte() -> TestResult {
     Ok(())
 }
 
-/// A sender that keeps to no window overruns the ring of the DMA and the queue.
+/// A sender that ignores the window overruns the ring of the DMA and the queue.
 #[test]
 fn bytes_beyond_every_window_are_refused_not_mistaken() -> TestResult {
     const LINES: usize = 1200;
@@ -143,8 +145,8 @@ fn every_error_of_the_uart_voids_its_line_which_gets_one_reply() -> TestResult {
     Ok(())
 }
 
-/// With nothing connected to the UART, USB hears what it asked for and nothing else, and nothing is
-/// said on the UART behind the greeting. A byte that floats there changes nothing.
+/// With nothing connected to the UART, USB receives what it asked for and nothing else, and nothing
+/// is sent on the UART after the greeting. A stray byte on the floating input changes nothing.
 #[test]
 fn an_open_uart_input_is_no_sender() -> TestResult {
     let mut uart = start()?;
@@ -162,8 +164,8 @@ fn an_open_uart_input_is_no_sender() -> TestResult {
     Ok(())
 }
 
-/// Each port has its own state: a letter that has begun on one is not gone on with on the other, and
-/// neither is a line.
+/// Each port has its own state: neither a multi-byte letter nor a line that began on one port is
+/// continued on the other.
 #[test]
 fn a_stray_byte_on_one_port_leaves_the_other_port_alone() -> TestResult {
     let mut uart = start()?;
@@ -188,7 +190,8 @@ fn a_stray_byte_on_one_port_leaves_the_other_port_alone() -> TestResult {
     Ok(())
 }
 
-/// Two channels take turns, each for 16,384 bytes: nothing is lost where one hands over to the other.
+/// Two DMA channels take turns, each for 16,384 bytes. Nothing is lost at the change from one to
+/// the other.
 #[test]
 fn more_bytes_than_a_turn_of_a_dma_channel_come_one_by_one() -> TestResult {
     const TURNS: usize = 2 * 16_384 + 4_096;

@@ -1,5 +1,5 @@
-//! The same bits everywhere: a job's steps and pen moves from the Raspberry Pi Pico's pins are those
-//! of the library on the host, one by one.
+//! Tests that a job's steps and pen moves at the Raspberry Pi Pico's pins are identical, one by
+//! one, to those of the library on the host.
 #![cfg(feature = "emulator")]
 
 use penup_client::machines::Board::Pico;

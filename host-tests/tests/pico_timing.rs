@@ -1,5 +1,5 @@
-//! The Raspberry Pi Pico's steps in time: each pulse rises and falls when it was planned to, to the
-//! cycle, at any speed.
+//! Tests the timing of the Raspberry Pi Pico's steps: each pulse rises and falls at its planned
+//! time, exact to the cycle, at any speed.
 #![cfg(feature = "emulator")]
 
 use penup_client::machines::Board::Pico;
@@ -10,10 +10,10 @@ use penup_host_tests::whole_jobs::job_lines;
 use std::error::Error;
 use std::time::Duration;
 
-/// How often the board is asked whether it is done.
+/// The interval at which the board is asked whether it has finished.
 const PATIENCE: Duration = Duration::from_millis(50);
 
-/// No event came late.
+/// The edges of the step pins in a job on the board, in which no event may be late.
 fn at_the_pins(lines: &[String]) -> Result<Vec<Edge>, Box<dyn Error>> {
     let mut line = begin(Pico, lines)?;
     let mut status = line.status()?;
@@ -31,7 +31,7 @@ fn at_the_pins(lines: &[String]) -> Result<Vec<Edge>, Box<dyn Error>> {
     Ok(of_changes(&line.emulator.pin_changes()?))
 }
 
-/// From the first edge on, every edge has its planned time.
+/// Checks that every edge from the first on has its planned time.
 fn keeps_time(scene: &str, settings: &[&str], least: usize) -> Result<(), Box<dyn Error>> {
     let lines = job_lines(scene, settings);
     assert_in_time(&planned(Pico, &lines), &at_the_pins(&lines)?, least, Duration::ZERO);
@@ -48,7 +48,8 @@ fn a_long_diagonal_at_half_a_million_steps_a_second_keeps_time() -> Result<(), B
     keeps_time("diagonal.obj", &HALF_A_MILLION, 300_000)
 }
 
-/// The drawn events a second, without the tenths at the beginning and the end, where the speed changes.
+/// The number of drawn events per second, without the tenths at the beginning and the end, in which
+/// the speed changes.
 fn events_a_second(edges: &[Edge]) -> f64 {
     let mut rises: Vec<_> = edges.iter().filter(|edge| edge.1).map(|edge| edge.2).collect();
     rises.dedup();
@@ -62,7 +63,8 @@ fn events_a_second(edges: &[Edge]) -> f64 {
     (steady.len() - 1) as f64 / (last - first).as_secs_f64()
 }
 
-/// 2800 chords a second, of 180 moves on average: 510,000 steps a second, 564,000 where one axis goes straight.
+/// 2800 chords per second, of 180 moves on average: 510,000 steps per second, and 564,000 where one
+/// axis moves alone.
 #[test]
 fn a_spiral_of_short_chords_at_half_a_million_steps_a_second_keeps_time()
 -> Result<(), Box<dyn Error>> {
@@ -74,7 +76,7 @@ fn a_spiral_of_short_chords_at_half_a_million_steps_a_second_keeps_time()
     Ok(())
 }
 
-/// The greatest speed that can be set: 10,900 chords a second, of 45 moves on average.
+/// The maximum speed that can be set: 10,900 chords per second, of 45 moves on average.
 #[test]
 fn a_spiral_of_short_chords_at_the_greatest_speed_keeps_time() -> Result<(), Box<dyn Error>> {
     let settings =
@@ -87,13 +89,15 @@ fn a_spiral_of_short_chords_at_the_greatest_speed_keeps_time() -> Result<(), Box
     Ok(())
 }
 
-/// Lists of settings, commands and options, of some 7 kilobytes: the UART takes 0.6 s to send them.
+/// Queries of the lists of settings, commands and options, about 7 kilobytes: the UART takes 0.6 s
+/// to send them.
 const LISTS: [&str; 3] = ["$$", "$", "$options"];
 
-/// How often they are asked for, so that there is always something to send while steps run.
+/// The number of times that they are queried, so that there is always something to send while steps
+/// run.
 const TIMES: usize = 4;
 
-/// The rows of the lists, asked for at once, each list with the `ok` that ends it.
+/// The rows of the lists, queried at once, each list with the `ok` that ends it.
 fn hear_lists(line: &mut Line, lists: &[&str]) -> Result<Vec<String>, Box<dyn Error>> {
     line.emulator.send((lists.join("\n") + "\n").as_bytes())?;
     let (mut rows, mut ended) = (Vec::new(), 0);
@@ -106,8 +110,8 @@ fn hear_lists(line: &mut Line, lists: &[&str]) -> Result<Vec<String>, Box<dyn Er
     Ok(rows)
 }
 
-/// The UART sends a list more slowly than the ring of steps runs dry: the rows wait for room one by
-/// one, and the steps do not wait for them.
+/// Sending a list over the UART takes longer than the ring of steps lasts. The rows wait for room
+/// one by one, and the steps do not wait for them.
 #[test]
 fn lists_at_the_pace_of_the_uart_keep_half_a_million_steps_a_second_in_time()
 -> Result<(), Box<dyn Error>> {

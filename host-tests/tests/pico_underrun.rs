@@ -1,4 +1,4 @@
-//! A main loop that is late: the Pico loses no step, brakes along the path, and goes on.
+//! Tests a delayed main loop: the Pico loses no step, brakes along the path, and continues.
 #![cfg(feature = "emulator")]
 
 use penup_client::emulator::{self, EmulatedBoard, Pin, PinChange, image_path};
@@ -9,17 +9,20 @@ use penup_host_tests::step_edges::{HALF_A_MILLION, of_changes, planned};
 use penup_host_tests::whole_jobs::job_lines;
 use std::error::Error;
 
-/// Steps over which the speed is measured: a tick counts for little then.
+/// The number of steps over which the speed is measured, so that the length of a tick matters
+/// little.
 const SPAN: usize = 32;
-/// From here on it stands, in seconds; and the steps before it, over which it came to rest.
+/// The time in seconds from which the machine stands still, and the number of steps before it over
+/// which it stopped.
 const PAUSE: f64 = 0.0002;
 const LAST: usize = 8;
 
-/// Draws the diagonal while the main loop stands still for so many hundredths of a second at each of these places, in
-/// steps of x, and the board is sent `disturbance`. Gives what the pins did, and the last status.
+/// Draws the diagonal while the main loop is stalled for this many hundredths of a second at each
+/// of these positions, in steps of x, and `disturbance` is sent to the board. Returns the changes
+/// of the pins and the last status.
 ///
 /// # Panics
-/// If the steps are not those that were planned, one by one.
+/// Panics if the steps differ from the planned ones.
 fn disturbed(
     settings: &[&str],
     stalls: &[(u32, u8)],
@@ -48,13 +51,14 @@ fn disturbed(
     Ok((changes, status))
 }
 
-/// When x steps, in seconds.
+/// The times of the steps of x, in seconds.
 fn steps_of_x(changes: &[PinChange]) -> Vec<f64> {
     let rises = changes.iter().filter(|change| change.pin == Pin::StepX && change.high);
     rises.map(|change| change.at.as_secs_f64()).collect()
 }
 
-/// The hardest braking or speeding up over 32 steps, or to rest over 8, in steps/s², and how often it came to rest.
+/// The maximum acceleration over 32 steps, or the maximum deceleration to rest over 8, in steps/s²,
+/// and the number of standstills.
 fn hardest(x: &[f64]) -> (f64, usize) {
     let square = |from: usize, to: usize| ((to - from) as f64 / (x[to] - x[from])).powi(2);
     let pause = |from: usize, to: usize| (from..to).any(|at| x[at + 1] - x[at] > PAUSE);
@@ -73,8 +77,8 @@ fn hardest(x: &[f64]) -> (f64, usize) {
     (worst, pauses)
 }
 
-/// What the settings of [`HALF_A_MILLION`] brake with where the queue runs dry: 546 mm/s within 13/16 of a quarter of the ring,
-/// 444 steps of 1/1300 mm; each axis has 1/√2 of it.
+/// The deceleration with the settings of [`HALF_A_MILLION`] when the queue runs dry: 546 mm/s
+/// within 13/16 of a quarter of the ring, 444 steps of 1/1300 mm. Each axis has 1/√2 of it.
 fn hardest_allowed() -> f64 {
     546.1 * 546.1 / (2.0 * 360.75 / 1300.0) * 1300.0 / 2f64.sqrt()
 }
@@ -90,7 +94,7 @@ fn lists_do_not_stop_half_a_million_steps_a_second_with_a_jerk() -> Result<(), B
     Ok(())
 }
 
-/// The ring lasts 4 ms, the stop takes a millisecond and a half.
+/// The ring lasts 4 ms, and the stop takes 1.5 ms.
 #[test]
 fn half_a_million_steps_a_second_are_braked_within_what_the_ring_holds()
 -> Result<(), Box<dyn Error>> {
@@ -105,7 +109,7 @@ fn half_a_million_steps_a_second_are_braked_within_what_the_ring_holds()
     Ok(())
 }
 
-/// 150 mm/s, 2000 mm/s²: it stops within 5.6 mm, of which the ring holds the triple.
+/// At 150 mm/s and 2000 mm/s², the machine stops within 5.6 mm; the ring holds three times as much.
 #[test]
 fn a_main_loop_that_stands_still_brakes_within_the_acceleration_set() -> Result<(), Box<dyn Error>>
 {

@@ -1,4 +1,4 @@
-//! The Raspberry Pi Pico's second serial port: USB.
+//! Tests USB, the Raspberry Pi Pico's second serial port.
 #![cfg(feature = "emulator")]
 
 use penup_client::emulator::{EmulatedBoard, Pico, PicoByUsb, image_path};
@@ -12,7 +12,7 @@ use std::time::Duration;
 
 type TestResult = Result<(), Box<dyn Error>>;
 
-/// A board that answers by USB.
+/// Starts a board that answers over USB.
 fn plugged_in() -> Result<Line<PicoByUsb>, Box<dyn Error>> {
     let mut uart = Line::to(Box::new(Pico::start(&image_path("pico"))?))?;
     uart.emulator.plug_usb_in()?;
@@ -21,7 +21,7 @@ fn plugged_in() -> Result<Line<PicoByUsb>, Box<dyn Error>> {
     Ok(line)
 }
 
-/// All lines up to the reply to the one that was sent.
+/// Returns all lines up to the reply to the line that was sent.
 fn hear_all(line: &mut Line<PicoByUsb>) -> Result<Vec<String>, Box<dyn Error>> {
     let mut heard = Vec::new();
     loop {
@@ -81,8 +81,8 @@ fn real_time_bytes_act_while_a_job_computes_and_runs() -> TestResult {
     Ok(())
 }
 
-/// The host stops taking what is sent in the middle of a job, with more asked than any queue holds:
-/// the job goes on, the other port answers, and so does USB when the host is back.
+/// The host stops accepting data in the middle of a job, while more output is requested than any
+/// queue holds. The job continues, the other port answers, and so does USB when the host is back.
 #[test]
 fn a_host_that_is_gone_keeps_nobody_waiting() -> TestResult {
     let lines = job_lines("lattice2.obj", &["$page=60x80", "$margin=5"]);
@@ -127,7 +127,7 @@ fn by_usb(emulator: Pico) -> Line<PicoByUsb> {
     Line::silent(Box::new(PicoByUsb(emulator)))
 }
 
-/// Waits so long by the board's own clock.
+/// Waits for this time on the board's own clock.
 fn pass(line: &mut Line<PicoByUsb>, time: Duration) -> TestResult {
     let end = line.emulator.clock()? + time;
     while line.emulator.clock()? < end {
@@ -173,7 +173,7 @@ fn a_busy_bus_finds_the_board_while_a_job_runs() -> TestResult {
     Ok(())
 }
 
-/// To the controller that is a reset of the bus that does not end.
+/// To the controller, this looks like a reset of the bus that does not end.
 #[test]
 fn a_host_without_power_keeps_nobody_waiting() -> TestResult {
     let lines = job_lines("cube.obj", &["$page=60x60", "$margin=5"]);
@@ -189,7 +189,7 @@ fn a_host_without_power_keeps_nobody_waiting() -> TestResult {
     Ok(())
 }
 
-/// More lines than the line's queue and a packet hold are on their way when the computer goes to
+/// More lines than the port's queue and a packet hold are in transit when the computer goes to
 /// sleep.
 #[test]
 fn a_suspended_bus_loses_no_byte() -> TestResult {
@@ -220,8 +220,8 @@ fn a_suspended_bus_loses_no_byte() -> TestResult {
     Ok(())
 }
 
-/// A program asks much, closes the port without reading and in the middle of a line; another one
-/// opens it.
+/// A program requests much output and closes the port without reading it, in the middle of a line.
+/// Another program then opens the port.
 #[test]
 fn a_port_that_is_opened_again_begins_anew_and_is_greeted_alone() -> TestResult {
     let lines = job_lines("lattice2.obj", &["$page=60x80", "$margin=5"]);
