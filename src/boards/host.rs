@@ -83,12 +83,12 @@ impl Trace {
         self.changes.borrow_mut().push(Stamped { time: self.now.get(), change });
     }
 
-    /// Ticks from the start.
+    /// The present time in ticks from the start.
     pub fn now(&self) -> u64 {
         self.now.get()
     }
 
-    /// Sets the clock.
+    /// Sets the present time, in ticks from the start.
     pub fn set_now(&self, now: u64) {
         self.now.set(now);
     }
@@ -155,7 +155,7 @@ impl Pen for TracedPen {
     }
 }
 
-/// The library's interrupt code on traced pins.
+/// The library's interrupt code, running on traced pins.
 type TracedPulser<'q> = Pulser<
     'q,
     Pins<TracedPin, TracedPin, TracedPin, TracedPin, TracedPin, TracedPin, TracedPin>,

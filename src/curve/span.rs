@@ -169,7 +169,7 @@ fn between(p: [i64; 3], q: [i64; 3], numerator: i64, denominator: i64) -> [i64; 
     })
 }
 
-/// p + (q - p) local 2^-20, rounded.
+/// p + (q - p) × `local` × 2^-20, rounded.
 fn along(p: [i64; 3], q: [i64; 3], local: u32) -> [i64; 3] {
     const HALF: i64 = 1 << (Parameter::LOCAL_BITS - 1);
     core::array::from_fn(|axis| {

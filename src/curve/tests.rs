@@ -11,7 +11,7 @@ fn uniform<'a>(points: &'a [Point], control: &'a [u16], order: u8) -> Spline<'a>
     Spline::new(points, control, order, Knots::Uniform).unwrap()
 }
 
-/// `tenths` tenths of a knot after the first end.
+/// The point at `tenths` tenths of a knot after the beginning.
 fn at_tenths(spline: &Spline<'_>, tenths: i64) -> Point {
     let degree = i64::from(spline.order) - 1;
     spline.at(spline.parameter(((degree * 10 + tenths) << 16) / 10, 16))
@@ -32,8 +32,8 @@ fn chord_ends(spline: &Spline<'_>, tolerance: u16) -> Vec<Point> {
 
 #[test]
 fn the_worked_table_of_section_2_4() {
-    // x and y as printed, t from 1 to 5 by fifths, but for the second x: the scan has .02 where the
-    // polynomial beside it, 1.5 (t - 1)^2, gives .06.
+    // The values of x and y as printed, for t from 1 to 5 in fifths. The second x is corrected: the
+    // scan has .02, where the polynomial next to it, 1.5 (t - 1)^2, gives .06.
     #[rustfmt::skip]
     let table = [
         (0.0, 0.0), (0.06, 0.18), (0.24, 0.72), (0.54, 1.6), (0.96, 2.9), (1.5, 4.5),
@@ -44,7 +44,7 @@ fn the_worked_table_of_section_2_4() {
     let spline = uniform(&PAPER, &[0, 0, 1, 2, 3, 3], 3);
     for (fifth, (x, y)) in table.into_iter().enumerate() {
         let place = at_tenths(&spline, 2 * fifth as i64);
-        // Printed to a tenth.
+        // The values are printed to a tenth.
         let printed = [x, y].map(|c: f64| (c * f64::from(UNIT)) as i32);
         let allowed = UNIT.unsigned_abs() / 20 + 2;
         assert!(near(place, [printed[0], printed[1], 0], allowed), "{fifth}: {place:?}");
@@ -53,7 +53,8 @@ fn the_worked_table_of_section_2_4() {
 
 #[test]
 fn the_polynomials_beside_the_table_come_out() {
-    // Coefficients of 1, t, t² by halves; the minus signs of the leading terms are lost in the scan.
+    // The coefficients of 1, t and t², in halves. The minus signs of the leading terms are lost in
+    // the scan.
     let polynomials = [
         ([3, -6, 3], [9, -18, 9]),
         ([-9, 6, 0], [-87, 78, -15]),
@@ -75,18 +76,19 @@ fn the_polynomials_beside_the_table_come_out() {
 
 #[test]
 fn a_quadratic_passes_the_midpoints_along_the_polygon() {
-    // Equation 25, and the slope of equation 24.
+    // This tests equation 25 and the slope of equation 24.
     let spline = uniform(&PAPER, &[0, 1, 2, 3], 3);
     for (knot, pair) in PAPER.windows(2).enumerate() {
         let middle: Point = core::array::from_fn(|axis| (pair[0][axis] + pair[1][axis]) / 2);
         assert_eq!(at_tenths(&spline, 10 * knot as i64), middle);
-        let step = 1 << 12; // of 2^16 to a knot
+        let step = 1 << 12; // A knot is 2^16 long.
         let t = ((2 + knot as i64) << 16) + if knot == 2 { -step } else { step };
         let beside = spline.at(spline.parameter(t, 16));
         let (dx, dy) = (beside[0] - middle[0], beside[1] - middle[1]);
         let (along_x, along_y) = (pair[1][0] - pair[0][0], pair[1][1] - pair[0][1]);
         let turn = i64::from(dx) * i64::from(along_y) - i64::from(dy) * i64::from(along_x);
-        // The curve turns away with the square of the distance: at 1/16, by less than 1/256 of a polygon side.
+        // The curve turns away with the square of the distance: at 1/16 of a knot, by less than
+        // 1/256 of a polygon side.
         let side = i64::from(along_x).pow(2) + i64::from(along_y).pow(2);
         assert!(turn.abs() * 128 < side, "knot {knot}");
     }
@@ -97,7 +99,8 @@ fn equation_18_for_the_quadratic() {
     let spline = uniform(&PAPER, &[0, 1, 2, 3], 3);
     for (i, p) in PAPER.windows(3).enumerate() {
         for s in 0..16i64 {
-            // With s in sixteenths: 512 R = p2 s² + p1 ((s+16)² - 3 s²) + p0 ((s+32)² - 3 (s+16)² + 3 s²).
+            // With s in sixteenths: 512 R = p2 s² + p1 ((s+16)² - 3 s²) + p0 ((s+32)² - 3 (s+16)² +
+            // 3 s²).
             let (a, b, c) = (s * s, (s + 16) * (s + 16), (s + 32) * (s + 32));
             let expected = core::array::from_fn(|axis| {
                 let [p0, p1, p2] = [0, 1, 2].map(|at: usize| i64::from(p[at][axis]));
@@ -124,7 +127,7 @@ fn order_2_is_the_polygon() {
 
 #[test]
 fn a_repeated_point_draws_the_curve_nearer() {
-    // Figure 5, order 4: the second vertex once and twice.
+    // Figure 5, order 4, has the second vertex once and twice.
     let nearest = |control: &[u16]| {
         let spline = uniform(&PAPER, control, 4);
         let [x, y, _] = PAPER[1];
@@ -138,20 +141,20 @@ fn a_repeated_point_draws_the_curve_nearer() {
     let twice = nearest(&[0, 0, 0, 1, 1, 2, 3, 3, 3]);
     let thrice = nearest(&[0, 0, 0, 1, 1, 1, 2, 3, 3, 3]);
     assert!(twice < once);
-    // Order - 1 times: the curve passes through it.
+    // With multiplicity order - 1 the curve passes through the point.
     assert_eq!(thrice, Some(0));
 }
 
 #[test]
 fn a_moved_point_moves_only_what_is_near() {
-    // Figure 6, order 4: the fifth vertex moved.
+    // Figure 6, order 4, has the fifth vertex moved.
     let points: Vec<Point> = (0..9).map(|i| [i * UNIT, (i % 3) * UNIT, i * i * 999]).collect();
     let mut moved = points.clone();
     moved[4][1] += 5 * UNIT;
     let control: Vec<u16> = (0..9).collect();
     let (before, after) = (uniform(&points, &control, 4), uniform(&moved, &control, 4));
     for tenth in 0..=60 {
-        // Point 4 acts from knot 4 to 8; the curve begins at knot 3.
+        // Point 4 has an effect from knot 4 to 8, and the curve begins at knot 3.
         let acts = 10 < tenth && tenth < 50;
         let same = at_tenths(&before, tenth) == at_tenths(&after, tenth);
         assert_eq!(same, !acts, "{tenth}");
@@ -176,11 +179,11 @@ fn points_in_line_give_one_chord() {
     for order in LEAST_ORDER..=GREATEST_ORDER {
         assert_eq!(chord_ends(&uniform(&points, &control, order), 1).len(), 2, "order {order}");
     }
-    // Past a double knot too.
+    // One chord is enough across double knots too.
     let knots: Vec<i32> = (0..43).map(|knot| knot / 2).collect();
     let doubled = Spline::new(&points, &control, 3, Knots::Listed(&knots)).unwrap();
     assert_eq!(chord_ends(&doubled, 1).len(), 2);
-    // All at one place, and there and back along a line.
+    // One curve has all points at one place, and the other runs there and back along a line.
     let still = [0u16; 9];
     assert_eq!(chord_ends(&uniform(&points, &still, 4), 1), [[0; 3]]);
     let back = chord_ends(&uniform(&points, &[0, 20, 39, 20, 0], 2), 128);
@@ -212,7 +215,8 @@ fn every_parameter_is_on_the_curve() {
     let spline = Spline::new(&points, &[0, 1, 2, 3, 4], 3, Knots::Listed(&knots)).unwrap();
     assert_eq!(spline.at(Parameter::from_bits(0)), [0, 0, 0]);
     assert_eq!(spline.at(Parameter::from_bits(u32::MAX)), [9, 9, 9]);
-    // A double knot of a quadratic: through the point, from both sides, by any of its names.
+    // At a double knot, a quadratic passes through the point, from both sides and by each parameter
+    // of the knot.
     for t in [spline.parameter(5, 0), Parameter::start_of(1), Parameter::start_of(2)] {
         assert_eq!(spline.at(t), [200, 0, 0]);
     }
@@ -225,7 +229,7 @@ fn every_parameter_is_on_the_curve() {
 
 #[test]
 fn what_is_cut_off_costs_no_chords() {
-    // A curve that dips behind the near plane z = 1 in the middle, in perspective.
+    // The curve goes behind the near plane z = 1 in the middle, in perspective.
     let points = [[-9000, 0, 9000], [-3000, 9000, -90_000], [3000, 9, -90_000], [9000, 0, 9000]];
     let spline =
         Spline::new(&points, &[0, 1, 2, 3], 4, Knots::Listed(&[0, 0, 0, 0, 1, 1, 1, 1])).unwrap();

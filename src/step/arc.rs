@@ -415,7 +415,7 @@ mod tests {
         PagePoint { x, y }
     }
 
-    /// All points of an arc, its first included.
+    /// All points of an arc, including the first.
     fn points(center: PagePoint, from: PagePoint, to: PagePoint, turn: Turn) -> Vec<PagePoint> {
         let arc = Arc::new(center, from, to, turn).expect("an arc");
         core::iter::once(from).chain(arc).collect()
@@ -469,7 +469,8 @@ mod tests {
                         .min((across(high, wide, px) - py).abs());
                     assert!(off <= 0.51, "{x} {y}, radius {radius} at {p:?}: {off}");
                 }
-                // Bends of less than a step are no moves from point to point.
+                // Where the arc turns within less than a step, consecutive points need not be one
+                // move apart.
                 if wide * wide > 2.0 * high && high * high > 2.0 * wide {
                     assert!(are_moves(&there), "{x} {y}, radius {radius}");
                 }
@@ -518,7 +519,8 @@ mod tests {
                     assert_eq!(there, back);
                     assert!(are_moves(&there), "{from:?} {to:?}");
                     let moves = (j as i32 - i as i32).rem_euclid(circle.len() as i32 - 1);
-                    // Both ends lie off the circle, so theirs is a little wider or narrower.
+                    // Both given ends are off the circle, so the circle of the arc is a little
+                    // wider or narrower.
                     assert!((there.len() as i32 - moves).abs() <= 9, "{from:?} {to:?}");
                 }
             }
@@ -560,7 +562,8 @@ mod tests {
         assert_eq!(refused(at(0, 0), at(far, 0), at(0, -far)), None);
         assert_eq!(refused(at(0, 0), at(far + 1, 0), at(0, -far)), Some(ArcError::TooWide));
         assert_eq!(refused(at(0, 0), at(far, 0), at(0, -far - 1)), Some(ArcError::TooWide));
-        // Two steps off the circle are allowed: of y, where those are twice as long as steps of x.
+        // The end may be two steps off the circle, measured in steps of y where these are twice as
+        // long as steps of x.
         assert_eq!(refused(at(0, 0), at(9, 0), at(0, 11)), None);
         assert_eq!(refused(at(0, 0), at(9, 0), at(0, 12)), Some(ArcError::EndOffCircle));
         let steps = [100, 50].map(Millimetres::from_num);

@@ -224,7 +224,7 @@ mod tests {
     fn harrison_figures_1_and_2() {
         assert_eq!(digits(2, 1), [2, 3]);
         assert_eq!(digits(-2, -1), [7, 6]);
-        // (0,0) to (14,9): the tie stands at the middle, (7, 4.5).
+        // From (0,0) to (14,9) the tie is at the middle, (7, 4.5).
         assert_eq!(digits(14, 9), [2, 3, 2, 2, 3, 2, 2, 3, 2, 3, 2, 2, 3, 2]);
         assert_eq!(digits(-14, -9), [6, 7, 6, 6, 7, 6, 7, 6, 6, 7, 6, 6, 7, 6]);
     }
@@ -238,7 +238,7 @@ mod tests {
                     let mut at = PagePoint::default();
                     for (index, direction) in Line::beside(dx, dy, offsets).enumerate() {
                         at = direction.from_point(at);
-                        // In units of an offset times the moves in all.
+                        // The unit is an offset unit over the number of moves.
                         let [start, end] = offsets.map(i32::from);
                         let rise = Line::OFFSET_UNIT * fewer + end - start;
                         let line = start * more.abs() + rise * (index as i32 + 1);

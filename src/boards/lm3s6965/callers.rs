@@ -1,9 +1,9 @@
 //! Reports by addresses where a panic came from.
 //!
 //! The text of a panic costs some 19 KiB of flash: messages, file names, line numbers, and the code
-//! that passes them on. The compiler leaves all of that out if the panic handler does not read it.
-//! What remains is the chain of calls on the stack. To turn its addresses into functions and lines:
-//! `addr2line -f -i -e target/firmware/lm3s6965.elf ADDRESS …`.
+//! that passes them on. The compiler omits all of that if the panic handler does not read it. What
+//! remains is the chain of calls on the stack. This command turns its addresses into functions and
+//! lines: `addr2line -f -i -e target/firmware/lm3s6965.elf ADDRESS …`.
 
 use core::{arch, fmt};
 

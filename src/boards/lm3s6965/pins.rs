@@ -85,8 +85,8 @@ impl<const NUMBER: u8> OutputPin for Pin<NUMBER> {
     }
 }
 
-/// Sets the pins of `mask` to `levels`, in one store, the others untouched: address bits 2 to 9 of
-/// the data register are its mask.
+/// Sets the pins of `mask` to `levels` in one store and leaves the others unchanged. Bits 2 to 9 of
+/// the address of the data register are its mask.
 #[inline(always)]
 fn write(mask: u32, levels: u32) {
     GPIO_B.write((mask << 2) as usize, levels);

@@ -17,8 +17,8 @@ pub fn set_up(pins: Pins) {
     pins.gpio5.into_function::<FunctionPio0>();
     pins.gpio6.into_function::<FunctionPio0>();
     pins.gpio7.into_function::<FunctionPwm>();
-    // GPIO 15 is left as it is: `usb` uses it for a millisecond (erratum E5) when a host resets
-    // the bus, which needs GPIO 16 not to have the function 8.
+    // GPIO 15 is left unchanged. `usb` uses it for a millisecond (erratum E5) when a host resets
+    // the bus. For this, GPIO 16 must not have function 8.
     pins.gpio11.into_function::<FunctionSioOutput>();
     pins.gpio12.into_function::<FunctionSioOutput>();
     // The contacts are inputs with pull-up resistors.
