@@ -84,14 +84,15 @@ fn arcs_by_centre_and_by_radius_inches_and_bounds() {
     bench.say("M5\nG20 G0 X1 Y1\n");
     bench.finish();
     assert_eq!(place(&mut bench), "25.400,25.400");
-    // A quarter to the left from (60, 50) around (50, 50), and three quarters around (60, 60).
+    // A quarter circle counter-clockwise from (60, 50) around (50, 50), and three quarters around
+    // (60, 60).
     bench.say("G21 G0 X60 Y50\nM3\nG3 X50 Y60 R10\n");
     bench.finish();
     assert_eq!(place(&mut bench), "50.000,60.000");
     bench.say("G0 X10 Y10\nG3 X30 Y10 I10 J1\n");
     bench.finish();
     assert_eq!(place(&mut bench), "30.000,10.000");
-    // Its ends lie within the travel, its lowest point does not.
+    // The ends of the arc are within the travel, but its lowest point is not.
     let answer = bench.say("G0 X5 Y5\nG3 X25 Y5 I10 J0\n");
     assert!(answer.contains("beyond") && answer.ends_with("error:15\n"), "{answer}");
     bench.finish();
@@ -146,7 +147,7 @@ fn circles_are_round_on_the_page_whatever_the_steps() {
                     .min((across(high, wide, dx) - dy.abs()).abs())
             };
             let [whole, part] = [off(50.0, 50.0, 30.0), off(50.0, 20.0, 15.0)];
-            // Half a step, and what rounding of the ends adds to the radius.
+            // The tolerance is half a step plus the effect of the rounded ends on the radius.
             assert!(whole.min(part) <= 0.75, "{x} {y}: {whole} and {part} steps off at {px},{py}");
             full += u32::from(whole <= 0.75);
             half += u32::from(part <= 0.75);
@@ -201,7 +202,7 @@ fn homing_answers_when_it_is_done() {
         bench.plotter.poll(&mut bench.board);
         let pins = bench.plotter.machine().position();
         let home = bench.plotter.machine().state() == State::Home;
-        // The switches stand at 5 mm from where the machine began, while it looks for them.
+        // The switches are 5 mm from where the machine began, while it searches for them.
         let contacts = Contacts { x: home && pins.x <= 400, y: home && pins.y <= 400, stop: false };
         bench.board.set_contacts(contacts);
         seen.push(bench.plotter.machine().state());
@@ -303,7 +304,7 @@ fn pauses_wait_for_the_user() {
     bench.say("~");
     bench.finish();
     assert_eq!(place(&mut bench), "60.000,0.000");
-    // A wait by the pins' own clock.
+    // The dwell is measured by the pins' own clock.
     let before = bench.board.trace().now();
     assert_eq!(bench.say("G4 P1.5\n"), "");
     bench.finish();
@@ -323,7 +324,7 @@ fn checking_refuses_what_would_be_refused_and_moves_nothing() {
     bench.finish();
     assert!(bench.board.trace().changes().is_empty());
     assert_eq!(bench.say("?"), "<Idle|MPos:0.000,0.000,0.000|Strokes:0/0|Ink:0/0|Left:0>\n");
-    // What was checked is not where the next line begins.
+    // A line that was only checked does not change where the next line begins.
     bench.say("G91 G0 X1\n");
     bench.finish();
     assert_eq!(place(&mut bench), "1.000,0.000");
@@ -449,7 +450,7 @@ fn disturbed(disturbance: Disturbance, instant: u32) -> Drawn {
     assert_eq!(drawn.pen, 0);
     assert_eq!(bench.plotter.machine().position(), drawn.end);
     bench.heard();
-    // An alarm also refuses the lines that were still to come.
+    // An alarm also causes the lines that follow to be refused.
     if matches!(bench.plotter.machine().state(), State::Alarm(_)) {
         assert_eq!(bench.say("$X\n"), "ok\n");
     }
@@ -478,7 +479,7 @@ proptest! {
             Disturbance::StopContact,
             Disturbance::StopByte,
         ]),
-        // A hold of nothing does nothing.
+        // A feed hold while nothing moves has no effect.
         instant in 1u32..3500,
     ) {
         static UNDISTURBED: LazyLock<Drawn> =

@@ -164,7 +164,7 @@ proptest! {
         prop_assert_eq!(Some(drawn.end), stood_at);
         prop_assert_eq!((drawn.pen, drawn.lift), raised(by_a_motor));
         event_checker::check_speed(&drawn.runs, &job(), &Settings::default(), false);
-        // The next job begins where this one was given up.
+        // The next job begins where this one was aborted.
         prop_assert!(drawn.last_step < instant + turn_ticks + 10_000_000);
     }
 
@@ -186,12 +186,12 @@ proptest! {
                 }
                 return true;
             };
-            // A pulse that was high counts when it ends, before this turn.
+            // A pulse that was high counts when it ends, which is before this iteration.
             let pins = *stands_at.get_or_insert(turn.pins);
             assert_eq!(turn.pins, pins);
             assert_eq!(turn.machine.state(), State::Alarm(alarm));
             if turn.machine.unlock().is_err() {
-                // The event in work may be a dwell, and a motor raises the pen.
+                // The current event may be a dwell, and a motor raises the pen.
                 assert!(turn.now < time + 5_000_000 + u64::from(by_a_motor) * 8_000_000);
                 return true;
             }
@@ -206,7 +206,7 @@ proptest! {
         if by_a_motor && drawn.runs.iter().any(|run| run.height == 20) {
             prop_assert_eq!((drawn.pen, drawn.lift), raised(true));
         } else {
-            // Where a motor has the pen was not known yet, or nobody has one.
+            // The position of the pen's motor was not known yet, or there is no such motor.
             prop_assert_eq!(drawn.pen, 0);
         }
     }
@@ -214,7 +214,7 @@ proptest! {
 
 /// The pen's height and the steps of its motor when the pen is raised.
 fn raised(by_a_motor: bool) -> (u8, i32) {
-    // 20 of 127 heights, 400 steps.
+    // The height is 20 of 127, and the motor has 400 steps.
     if by_a_motor { (20, 62) } else { (0, 0) }
 }
 
@@ -237,7 +237,8 @@ fn a_motor_lowers_the_pen_on_the_same_moves_and_tape() {
     let heights = by_motor.iter().filter(|instruction| {
         matches!(instruction, tape::Instruction::PenUp | tape::Instruction::PenDown)
     });
-    // 451 to find the stop, 62 down from it, 338 and a direction for each change.
+    // There are 451 steps to find the stop, 62 down from it, and 338 and a direction for each
+    // change.
     assert_eq!((none, steps), (0, 452 + 63 + 339 * (heights.count() - 1)));
 }
 
@@ -254,7 +255,7 @@ fn after_a_restart_a_motor_raises_the_pen_and_then_has_no_current() {
             _ => {}
         }
         stage += 1;
-        // 451 steps at 1500 a second, 62 at 6000, 150 ms.
+        // There are 451 steps at 1500 per second and 62 at 6000, and 150 ms of dwell.
         turn.now < 25_000_000
     });
     let drawn = event_checker::check_pins(&trace, &settings);
@@ -354,16 +355,16 @@ fn starve_often(settings: Settings, allowed: Settings, count: u32) {
     let mut underruns = 0;
     for _ in 0..count {
         let instant = random.below(never_cancel.last_step);
-        // 0.05 s to 2 s, and turns of 0.2 ms to 4 ms before and after.
+        // The delay is 0.05 s to 2 s, and iterations before and after it take 0.2 ms to 4 ms.
         let pause = 1_250_000 + random.below(48_750_000);
         let (drawn, dry) = starve(settings, instant, pause, 5_000 + random.below(95_000));
         underruns += dry;
         assert_eq!(drawn.inked, never_cancel.inked);
         assert_eq!((drawn.end, drawn.pen), (never_cancel.end, 0));
-        // From rest to rest, the acceleration over any 5 ms within 1.05 of the limit.
+        // From rest to rest, the acceleration over any 5 ms must be within 1.05 of the limit.
         event_checker::check_speed(&drawn.runs, &fast_job(), &allowed, false);
     }
-    // The others were late while the pen moved, or by less than the queue held.
+    // In the other jobs, the delay came while the pen moved, or was shorter than the queue lasted.
     assert!((count / 2..=count).contains(&underruns), "{underruns} of {count}");
 }
 
@@ -385,7 +386,7 @@ fn steps_of_any_length_and_slow_drivers_are_braked_as_well() {
 
 #[test]
 fn an_underrun_keeps_the_acceleration_where_jerk_is_limited() {
-    // Jerk itself is not kept: the interrupt knows nothing of it.
+    // The jerk limit is not respected here, because the interrupt does not know it.
     let allowed = with(&[(Setting::StepsPerMmX, 100.0), (Setting::TravelSpeed, 4000.0)]);
     let mut settings = allowed;
     settings.set(Setting::Jerk, Value::from_num(20)).expect("valid");
@@ -430,7 +431,7 @@ fn in_time_is_not_slowed(settings: Settings) {
 
 #[test]
 fn after_abort_and_alarm_the_next_job_starts_from_there() {
-    // The second job would be off by what the first took up of its slack, or did not.
+    // The second job would be offset by the backlash that the first one took up or did not take up.
     for (alarm, loose, instant) in
         (0..400).map(|case| (case % 2 == 1, case % 4 > 1, 1_000_000 + 220_000 * case))
     {
@@ -480,7 +481,7 @@ fn slack_is_taken_up_at_rest_and_leaves_the_same_ink() {
     let [tight, loose] = [false, true].map(|loose| starve(slack(loose), 0, 0, 25_000).0);
     assert_eq!((&loose.inked, loose.end, loose.pen), (&tight.inked, tight.end, 0));
     event_checker::check_speed(&loose.runs, &fast_job(), &slack(true), false);
-    // The circle alone turns x twice and y twice, the zigzag y at each corner.
+    // The circle alone reverses x twice and y twice, and the zigzag reverses y at each corner.
     assert!(loose.slack.len() > 12 && tight.slack.is_empty());
     for run in &loose.slack {
         let places: Vec<f64> = (0..run.times.len()).map(|step| step as f64 / 80.0).collect();
@@ -635,7 +636,7 @@ fn a_limit_switch_is_an_alarm_only_if_asked_for() {
             turn.machine.state() == State::Run || !turn.machine.is_stopped()
         });
         let end = event_checker::check_pins(&trace, &settings).end.x;
-        // 8 steps a millisecond: at most two turns after the switch.
+        // At 8 steps per millisecond, the machine stops at most two iterations after the switch.
         assert!(if hard { (3000..3020).contains(&end) } else { end == 8000 }, "{end}");
     }
 }
@@ -654,7 +655,7 @@ fn a_core_xy_machine_draws_the_same_page() {
         assert!(corners.contains(&target.point));
     }
     assert_eq!(corners.last(), Some(&point(0, 0)));
-    // As fast as the other build: the same lengths, but for rounding.
+    // It is as fast as the other build: the lengths are the same except for rounding.
     let cartesian =
         pin_machine::record(Settings::default(), &mut TargetList::new(&targets), 64).expect("fits");
     let (a, b) = (pin_machine::duration(&events), pin_machine::duration(&cartesian));
@@ -764,7 +765,7 @@ fn the_time_left_counts_the_ways_of_a_pen_on_a_motor() {
     for line in 1..=20 {
         targets.extend([to(0, 10 * line), ink(400, 10 * line)]);
     }
-    // The whole way in a ramp, and at the greatest speed.
+    // The whole travel in a ramp, and at the maximum speed.
     for (travel, rate) in [(1.0, 1200.0), (4.0, 300.0)] {
         let mut settings = Settings::default();
         settings.set(Setting::PenLift, Value::ONE).expect("valid");
@@ -781,7 +782,7 @@ fn the_time_left_counts_the_ways_of_a_pen_on_a_motor() {
             time = turn.now;
             !is_ready(turn.machine)
         });
-        // The search for the upper stop, before all, is not counted.
+        // The search for the upper stop, which comes before everything else, is not included.
         let search = 1.125 * travel * 4.0 / (rate / 60.0);
         let truth = (time as f64 / 25e6 - search) as u32;
         assert!(truth > 10 && told.abs_diff(truth) <= 1 + truth / 20, "{told} s, not {truth}");
@@ -827,7 +828,7 @@ fn a_change_of_kinematics_leaves_the_pen_where_it_is() {
     assert!(checked);
 }
 
-/// A polargraph with belts of 40 steps a millimetre from anchors 900 mm apart.
+/// A polargraph with belts of 40 steps per millimetre from anchors 900 mm apart.
 fn polargraph() -> Settings {
     let mut settings = Settings::default();
     for (setting, value) in [
@@ -862,7 +863,7 @@ fn a_polargraph_draws_in_the_time_of_any_machine() {
 fn a_polargraph_is_homed_belt_by_belt() {
     let mut settings = polargraph();
     settings.set(Setting::Homing, Value::ONE).expect("valid");
-    // The belts are this long at the start; the switches press at 480 mm.
+    // The belts have these lengths at the start; the switches close at 480 mm.
     let start = point(26_000, 25_000);
     let mut belts = start;
     pin_machine::run_with(settings, 25_000, &mut |turn, queue| {

@@ -65,7 +65,7 @@ fn each_kind_of_reset_is_told_from_the_others() -> TestResult {
     line.emulator.hang()?;
     assert_fault(&hear_start(&mut line)?, "the watchdog");
     assert_eq!(line.ask("$X")?, "ok");
-    // Neither takes the watchdog's word for its own.
+    // Neither reset is mistaken for one by the watchdog.
     line.emulator.copy_image()?;
     assert_fresh(&hear_start(&mut line)?);
     line.emulator.hang()?;
@@ -83,12 +83,12 @@ fn a_panic_in_a_job_makes_the_machine_safe_and_is_told_after_the_restart() -> Te
     for text in job_lines("lattice2.obj", &["$page=60x80", "$margin=5"]) {
         assert_eq!(line.ask(&text)?, "ok", "{text}");
     }
-    // The entry runs a second time: the board is taken twice.
+    // The entry point runs a second time, so the board is initialised twice.
     line.emulator.jump_to_function(&image_path("pico"), "main", false)?;
     assert_fault(&hear_start(&mut line)?, "the board was taken twice");
     assert_safe(&mut line)?;
     assert_eq!(line.ask("$X")?, "ok");
-    // It is told once.
+    // The fault is reported once.
     line.emulator.pull_run_low()?;
     assert_fresh(&hear_start(&mut line)?);
     Ok(())
@@ -97,7 +97,7 @@ fn a_panic_in_a_job_makes_the_machine_safe_and_is_told_after_the_restart() -> Te
 #[test]
 fn so_are_a_hard_fault_and_a_stack_that_is_used_up() -> TestResult {
     let mut line = start()?;
-    // Nothing lies there.
+    // There is no memory at this address.
     line.emulator.jump_to(0x3000_0000, false)?;
     assert_fault(&hear_start(&mut line)?, "hard fault at 0x3000000");
     assert_safe(&mut line)?;
@@ -124,7 +124,7 @@ fn a_program_that_faults_at_every_start_is_given_up_but_answers() -> TestResult 
     assert_eq!(line.hear()?, "ALARM:101");
     assert_eq!(line.hear()?, "error:9");
     assert_safe(&mut line)?;
-    // So does USB.
+    // USB answers, too.
     line.emulator.plug_usb_in()?;
     let mut usb = Line::silent(Box::new(PicoByUsb(*line.emulator)));
     assert_eq!(usb.hear()?, "");

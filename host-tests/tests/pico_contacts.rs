@@ -40,7 +40,7 @@ fn wait_for_steps(line: &mut Line<Pico>) -> TestResult {
 fn stands_in_alarm(line: &mut Line<Pico>, number: u8) -> TestResult {
     assert_eq!(line.hear()?, format!("ALARM:{number}"));
     let told_at = line.emulator.clock()?;
-    // A line in work is refused.
+    // A line that is being processed is refused.
     let mut status = line.status()?;
     while !status.starts_with('<') {
         status = line.hear()?;
@@ -82,7 +82,7 @@ fn the_emergency_stop_stops_a_job_and_is_reported_until_it_is_released() -> Test
     line.emulator.bounce(STOP, false, BOUNCE)?;
     stands_in_alarm(&mut line, 10)?;
     assert!(line.status()?.contains("|Pn:E|"));
-    // Pressed, it cannot be unlocked.
+    // The board cannot be unlocked while the contact is pressed.
     assert!(line.ask("$X")?.starts_with("[MSG:"));
     assert!(line.hear()?.starts_with("error:"));
     line.emulator.bounce(STOP, true, BOUNCE)?;
@@ -90,7 +90,7 @@ fn the_emergency_stop_stops_a_job_and_is_reported_until_it_is_released() -> Test
     assert_eq!(line.ask("$X")?, "ok");
     assert!(line.status()?.starts_with("<Idle"));
     assert!(!line.emulator.pin_changes()?.iter().any(|change| change.is_step()));
-    // It goes on from where the pins stand.
+    // It continues from the position of the pins.
     assert_eq!(line.ask("$J=X0F6000")?, "ok");
     while !line.status()?.starts_with("<Idle|MPos:0.000,0.000,") {}
     Ok(())
@@ -110,8 +110,9 @@ fn a_switch_within_the_way_of_a_move_by_hand_stops_it_there() -> TestResult {
             machine.change(change);
         }
         let (x, y) = machine.position();
-        // The switch bounces for 5 ms, and two of three looks, a millisecond apart, must have shown
-        // it closed: at the latest 7 ms after it began, which is 28 steps at 4000 a second.
+        // The switch bounces for 5 ms, and two of three samples, a millisecond apart, must show it
+        // closed. The stop is therefore at most 7 ms after the switch began to close, which is 28
+        // steps at 4000 per second.
         assert!((-828..=-800).contains(&(x + y)), "{x} {y}");
         sleep(Duration::from_millis(100));
         assert!(!line.emulator.pin_changes()?.iter().any(|change| change.is_step()));
@@ -126,7 +127,7 @@ fn home(x: i32, y: i32) -> Result<(i32, i32), Box<dyn Error>> {
     let mut line = start(&HOMING)?;
     line.emulator.fit_switch(LIMIT_X, x)?;
     line.emulator.fit_switch(LIMIT_Y, y)?;
-    // Past their first bounce, if they are pressed.
+    // If the switches are pressed, their first bounce is over.
     sleep(Duration::from_millis(200));
     line.status()?;
     assert_eq!(line.ask("$H")?, "ok");
@@ -159,7 +160,7 @@ fn a_switch_that_is_stuck_or_never_found_fails_the_homing() -> TestResult {
     while !line.status()?.contains("|Pn:X|") {}
     line.emulator.send(b"$H\n")?;
     stands_in_alarm(&mut line, 9)?;
-    // Never found: the way is one and a half travels.
+    // The switch is never found: the search covers one and a half travels.
     let mut line = start(&HOMING)?;
     line.emulator.send(b"$H\n")?;
     stands_in_alarm(&mut line, 9)
@@ -172,7 +173,7 @@ fn the_emergency_stop_before_homing_and_during_it() -> TestResult {
     wait_for_steps(&mut line)?;
     line.emulator.bounce(STOP, false, BOUNCE)?;
     stands_in_alarm(&mut line, 10)?;
-    // The line is answered, as refused; and so is another try.
+    // The line is refused, and so is another attempt.
     let mut line = start(&HOMING)?;
     line.emulator.bounce(STOP, false, BOUNCE)?;
     stands_in_alarm(&mut line, 10)?;

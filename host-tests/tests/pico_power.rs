@@ -149,7 +149,7 @@ fn after_a_cut_at_any_instant_the_settings_are_the_old_or_the_new_ones() -> Test
     let mut random = 1971;
     let mut kept = 0;
     for number in 0..cut_count() {
-        // A line takes microseconds, a save 46 ms.
+        // A line takes microseconds to transmit, and saving takes 46 ms.
         let after = Duration::from_micros(next_random(&mut random) % 120_000);
         watched.0.emulator.0.cut_power_after(after)?;
         let travel = 100 + (number % 300) as u32;
@@ -167,7 +167,7 @@ fn after_a_cut_at_any_instant_the_settings_are_the_old_or_the_new_ones() -> Test
 #[test]
 fn after_a_cut_in_any_write_of_the_flash_the_settings_are_the_old_or_the_new_ones() -> TestResult {
     let mut watched = Watched::start()?;
-    // Both slots are used.
+    // Both slots are in use.
     for line in ["$131=300\n", "$131=301\n"] {
         watched.0.emulator.send(line.as_bytes())?;
         assert_eq!(watched.0.hear()?, "ok");
@@ -254,7 +254,7 @@ fn the_last_job_is_drawn_again_after_a_loss_of_power() -> TestResult {
     watched.0.emulator.0.cut_power()?;
     watched.hear_restart()?;
     let mut line = watched.0;
-    // Not while the steps are others: it would be drawn at another size.
+    // The job cannot be drawn while the steps per mm differ, because its size would be different.
     assert_eq!(ask_all(&mut line, "$100=160")?, ["ok"]);
     assert_eq!(ask_all(&mut line, "$again")?.last().map(String::as_str), Some("error:162"));
     assert_eq!(ask_all(&mut line, "$100=80")?, ["ok"]);

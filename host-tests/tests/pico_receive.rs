@@ -78,7 +78,7 @@ fn a_full_window_across_every_flash_write_loses_no_byte() -> TestResult {
     line.emulator.set_erase_time(SLOWEST_ERASE)?;
     let mut lines: Vec<String> = (0..3).map(|number| format!("$130={}", 300 + number)).collect();
     lines.extend(job_lines("cube.obj", &["$page=60x60", "$margin=5", "$100=160", "$101=160"]));
-    // Behind the job's own line, which computes it and keeps it in flash.
+    // These lines follow the job's own line, which computes the job and saves it in flash.
     lines.extend((0..60).map(|number| format!("v {number}.125 {number} 0.5")));
     stream(&mut line, &lines)?;
     let settings = ask_all(&mut line, "$$")?;
@@ -99,7 +99,8 @@ fn bytes_beyond_every_window_are_refused_not_mistaken() -> TestResult {
     line.emulator.set_erase_time(SLOWEST_ERASE)?;
     let mut flood = String::from("$130=300\n");
     (0..LINES).for_each(|number| flood.push_str(&format!("v {number:04}\n")));
-    // Wrong lines are refused each with its own number, so what is mended of two would be, too.
+    // Each wrong line is refused with its own number, so two lines that were merged are detected,
+    // too.
     line.emulator.send(flood.as_bytes())?;
     assert_eq!(line.hear()?, "ok");
     let (mut lost, mut whole) = (0, 0);
@@ -110,7 +111,7 @@ fn bytes_beyond_every_window_are_refused_not_mistaken() -> TestResult {
             other => return Err(format!("{other:?}").into()),
         }
     }
-    // At rest again, it is as good as new.
+    // When the line is idle again, everything works normally.
     while line.emulator.receive(&mut [0; 256], Duration::from_millis(500))? > 0 {}
     line.forget();
     line.emulator.send(b"\x18")?;

@@ -52,7 +52,7 @@ fn replies_longer_than_a_packet_and_floods_lose_no_byte() -> TestResult {
         "{settings:?}"
     );
     assert!(settings.iter().map(String::len).sum::<usize>() > 1000);
-    // Far more than any queue holds, and nobody counts.
+    // This is far more than any queue holds, and the sender ignores the window.
     let flood: String = (0..400).map(|n| format!("v {n}.125 {n} 0.5\n")).collect();
     line.emulator.send(flood.as_bytes())?;
     for _ in 0..400 {
@@ -98,7 +98,7 @@ fn a_host_that_is_gone_keeps_nobody_waiting() -> TestResult {
     while !uart.hear()?.starts_with("[VER") {}
     uart.emulator.let_usb_take(true)?;
     let mut usb = Line::silent(Box::new(PicoByUsb(*uart.emulator)));
-    // What was on its way comes first.
+    // The data that was in transit arrives first.
     while usb.emulator.receive(&mut [0; 256], Duration::from_millis(500))? > 0 {}
     usb.emulator.send(b"?")?;
     while !usb.hear()?.starts_with("<Idle") {}
@@ -165,7 +165,7 @@ fn a_busy_bus_finds_the_board_while_a_job_runs() -> TestResult {
     uart.emulator.plug_usb_into_busy_bus()?;
     let mut usb = by_usb(*uart.emulator);
     usb.hear_greeting()?;
-    // The job has not noticed.
+    // The job was not affected.
     let status = usb.status()?;
     assert!(status.starts_with("<Run") && !status.contains("|Late"), "{status}");
     let pins = events_until_idle(&mut usb)?;
@@ -179,7 +179,7 @@ fn a_host_without_power_keeps_nobody_waiting() -> TestResult {
     let lines = job_lines("cube.obj", &["$page=60x60", "$margin=5"]);
     let mut uart = Line::to(Box::new(Pico::start(&image_path("pico"))?))?;
     uart.emulator.plug_usb_into_dead_host()?;
-    // Longer than the watchdog waits.
+    // This is longer than the timeout of the watchdog.
     let mut line = begin_on(uart, &lines)?;
     let end = line.emulator.clock()? + Duration::from_secs(4);
     while line.emulator.clock()? < end {
@@ -238,7 +238,7 @@ fn a_port_that_is_opened_again_begins_anew_and_is_greeted_alone() -> TestResult 
     assert!(greeting.starts_with("Grbl"), "{greeting}");
     assert!(line.ask("$model")?.starts_with("[MODEL:vertices"));
     while line.hear()? != "ok" {}
-    // The job goes on, and the other port has heard nothing of it.
+    // The job continues, and the other port has received nothing of it.
     assert!(line.status()?.starts_with("<Run"));
     let mut uart = Line::silent(Box::new(take_host(line)));
     uart.emulator.send(b"?")?;

@@ -1,4 +1,4 @@
-//! Polargraphs: lines of the page, seen through the true lengths of both belts.
+//! Tests of polargraphs: the lines on the page, computed from the true lengths of both belts.
 
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
 

@@ -1,4 +1,4 @@
-//! Transcripts: what is said to the plotter, and what it answers.
+//! Tests of the protocol by transcripts: the lines that are sent to the plotter, and its answers.
 
 use penup::plotter::{EMPTY_LOOKAHEAD, Memory};
 use penup::protocol::MEANINGS;

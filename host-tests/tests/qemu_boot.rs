@@ -1,4 +1,5 @@
-//! The firmware in QEMU, from boot to fault: the serial line, the pins, the clock, the log.
+//! Tests of the LM3S6965's firmware in QEMU from boot to fault: the serial line, the pins, the
+//! clock, the log.
 #![cfg(feature = "emulator")]
 
 use std::error::Error;
@@ -17,7 +18,7 @@ fn start() -> Result<Emulator, Box<dyn Error>> {
     Ok(Emulator::start(&image_path("lm3s6965"), Options::default())?)
 }
 
-/// What the board says, until it has said `end`.
+/// The output of the board up to and including `end`.
 fn heard_until(emulator: &mut Emulator, end: &str) -> io::Result<String> {
     let mut heard = Vec::new();
     while !heard.ends_with(end.as_bytes()) {

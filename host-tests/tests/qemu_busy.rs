@@ -1,5 +1,5 @@
-//! A job goes on in time whatever the serial line brings: the steps have their planned times at the
-//! pins of the LM3S6965.
+//! Tests that a job keeps its timing whatever arrives on the serial line: the steps at the pins of
+//! the LM3S6965 have their planned times.
 #![cfg(feature = "emulator")]
 
 use penup_client::machines::Board::Lm3s6965;
@@ -9,8 +9,8 @@ use penup_host_tests::whole_jobs::job_lines;
 use std::error::Error;
 use std::time::Duration;
 
-/// The interrupt is late by one of its own calls where it is told of another length of the steps; by
-/// nothing else.
+/// The interrupt is late only when the length of the steps changes, and then by one of its own
+/// calls.
 const JITTER: Duration = Duration::from_micros(5);
 
 #[test]

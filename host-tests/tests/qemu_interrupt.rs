@@ -1,7 +1,8 @@
-//! The step interrupt of the LM3S6965 takes no more instructions than it says (`src/boards/lm3s6965/steps.rs`).
+//! Tests that the step interrupt of the LM3S6965 takes no more instructions than documented
+//! (`src/boards/lm3s6965/steps.rs`).
 //!
-//! QEMU runs the firmware instruction by instruction and logs each of them, and the exceptions. A count is no time: it
-//! is the same on every machine.
+//! QEMU runs the firmware instruction by instruction and logs each of them, and the exceptions. A
+//! count of instructions is not a time, but it is the same on every computer.
 #![cfg(feature = "emulator")]
 
 use penup_client::emulator::image_path;
@@ -16,18 +17,18 @@ use std::time::{Duration, Instant};
 
 type TestResult = Result<(), Box<dyn Error>>;
 
-/// Its handlers, by the numbers of their exceptions.
+/// The interrupt handlers, by the numbers of their exceptions.
 const EVENT: u32 = 37;
 const END_OF_PULSES: u32 = 39;
 const PIECE_OF_BRAKE: u32 = 36;
 
-/// How long the board may be silent, on a machine with much else to do.
+/// How long the board may be silent on a busy computer.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// The calls of a handler: how many took so many instructions.
+/// The calls of a handler: the number of calls for each number of instructions.
 type Calls = BTreeMap<usize, usize>;
 
-/// Counts the instructions of each exception, those that come in between apart.
+/// Counts the instructions of each exception, without those of exceptions that interrupt it.
 fn count(mut log: impl BufRead) -> io::Result<BTreeMap<u32, Calls>> {
     let (mut counts, mut active) = (BTreeMap::<u32, Calls>::new(), Vec::<(u32, usize)>::new());
     let mut line = Vec::new();
@@ -53,7 +54,7 @@ fn count(mut log: impl BufRead) -> io::Result<BTreeMap<u32, Calls>> {
     Ok(counts)
 }
 
-/// A process that ends with its owner.
+/// A process that is ended when its owner is dropped.
 struct Qemu(Child);
 
 impl Drop for Qemu {
@@ -115,7 +116,7 @@ impl Counted {
         self.line.get_mut().write_all(bytes)
     }
 
-    /// Waits for a line that begins so.
+    /// Waits for a line that begins with `begin`.
     fn hear_until(&mut self, begin: &str) -> TestResult {
         loop {
             let line = self.hear()?;
@@ -131,7 +132,7 @@ impl Counted {
         self.hear_until("ok")
     }
 
-    /// Sends what is obeyed at once, and waits for a line that begins so.
+    /// Sends a real-time command and waits for a line that begins with `begin`.
     fn order(&mut self, byte: u8, begin: &str) -> TestResult {
         self.send(&[byte])?;
         self.hear_until(begin)
@@ -148,7 +149,7 @@ impl Counted {
         }
     }
 
-    /// Ends it. What was counted.
+    /// Ends the emulator and returns the counts.
     fn end(self) -> Result<BTreeMap<u32, Calls>, Box<dyn Error>> {
         drop(self.qemu);
         Ok(self.counter.join().map_err(|_| "the log makes no sense")??)
@@ -157,7 +158,8 @@ impl Counted {
 
 const CHORDS: [&str; 6] = ["M3", "G1X8Y3F15000", "G1X8.05Y3.02", "G1X8.1Y3.06", "G1X8.1Y0", "M5"];
 
-/// Draws chords with these settings, a line in part, and stops at once. An event may take so much.
+/// Draws chords with these settings, sends a part of a line, and stops at once. No call for an
+/// event may take more than `event` instructions.
 fn no_call_takes_more(settings: &[&str], event: usize) -> TestResult {
     let mut board = Counted::boot()?;
     for line in settings.iter().chain(&CHORDS) {

@@ -1,5 +1,5 @@
-//! The firmware of the LM3S6965 in QEMU behind a line that damages one byte in a hundred, there and
-//! back: the drawing is the one that was sent.
+//! Tests the firmware of the LM3S6965 in QEMU behind a line that corrupts one byte in a hundred in
+//! both directions: the drawing must be the one that was sent.
 #![cfg(feature = "emulator")]
 #![allow(clippy::expect_used, reason = "a test fails with the words of what it expected")]
 
@@ -16,7 +16,7 @@ use std::io;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-/// A plotter at the end of a line of which one byte in so many is damaged.
+/// A plotter at the end of a line that corrupts one byte in this many.
 struct DamagedLine {
     plotter: Box<dyn WatchedPlotter>,
     one_in: Option<u64>,
@@ -25,7 +25,7 @@ struct DamagedLine {
 }
 
 impl DamagedLine {
-    /// The bytes that come out: some are lost, doubled, or others, but none that acts at once.
+    /// The bytes that arrive: some are lost, doubled or replaced, but never by a real-time command.
     fn damage(&mut self, bytes: &[u8]) -> Vec<u8> {
         let Some(one_in) = self.one_in else { return bytes.to_vec() };
         let mut out = Vec::new();
@@ -65,7 +65,7 @@ impl Link for DamagedLine {
     }
 }
 
-/// What is drawn of a scene over such a line, and how many bytes were damaged.
+/// The drawing of a scene over such a line, and the number of corrupted bytes.
 fn draw(scene: &str, one_in: Option<u64>) -> Result<(Vec<Run>, u32), Box<dyn Error>> {
     let plotter = emulate(Board::Lm3s6965)?;
     let mut line = DamagedLine { plotter, one_in, random: Random(3), damaged: 0 };

@@ -1,5 +1,5 @@
-//! What the LM3S6965 reports after a panic. No input makes the firmware panic, so an image is
-//! changed: its serial interrupt goes straight to the panic handler.
+//! Tests what the LM3S6965 reports after a panic. No input makes the firmware panic, so the test
+//! modifies an image: its serial interrupt goes directly to the panic handler.
 #![cfg(feature = "emulator")]
 
 use std::error::Error;
@@ -11,11 +11,11 @@ use penup_client::emulator::{EmulatedBoard, Emulator, Options, image_path};
 
 type TestResult<T = ()> = Result<T, Box<dyn Error>>;
 
-/// Where the vector table holds the handler of UART0: behind the 16 exceptions of the core, after
+/// The offset of UART0's handler in the vector table: it follows the 16 exceptions of the core and
 /// five ports.
 const UART0_VECTOR: u64 = 4 * (16 + 5);
 
-/// The image whose serial interrupt is a panic.
+/// Creates the image whose serial interrupt causes a panic.
 fn panicking_image() -> TestResult<Vec<u8>> {
     let mut bytes = fs::read(image_path("lm3s6965"))?;
     let elf = object::File::parse(&*bytes)?;
@@ -32,7 +32,7 @@ fn panicking_image() -> TestResult<Vec<u8>> {
     Ok(bytes)
 }
 
-/// What the board says until `end` comes, or says no more.
+/// The output of the board until `end` arrives or nothing more does.
 fn heard_until(emulator: &mut Emulator, end: &str) -> TestResult<String> {
     let mut heard = Vec::new();
     while !heard.ends_with(end.as_bytes()) {

@@ -1,4 +1,4 @@
-//! The emulated board asks for each pen and waits for it.
+//! Tests that the emulated board asks for each pen and waits for it.
 #![cfg(feature = "emulator")]
 
 use penup_client::machines::Board;

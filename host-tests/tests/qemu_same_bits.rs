@@ -1,5 +1,5 @@
-//! The same bits everywhere: a job's steps and pen moves from the LM3S6965's pins are those of the
-//! library on the host, one by one.
+//! Tests that a job's steps and pen moves at the LM3S6965's pins are identical, one by one, to
+//! those of the library on the host.
 #![cfg(feature = "emulator")]
 
 use clap::Parser as _;
@@ -70,7 +70,7 @@ fn ctrl_x_stops_the_steps_raises_the_pen_and_knows_the_position() -> Result<(), 
     give_up(Lm3s6965)
 }
 
-/// Oblique lines, whose single steps are longer than the lines themselves.
+/// Oblique lines, whose single steps are together longer than the lines themselves.
 #[test]
 fn preview_and_plot_tell_the_same_lengths() -> Result<(), Box<dyn Error>> {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));

@@ -1,4 +1,5 @@
-//! The line is answered while a hidden-line job is computed: `?` within 20 ms of the board's time.
+//! Tests that the serial line is served while hidden lines are computed: `?` is answered within 20
+//! ms of the board's time.
 #![cfg(feature = "emulator")]
 
 use penup_client::emulator::{EmulatedBoard, Emulator, Options, image_path};

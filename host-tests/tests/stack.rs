@@ -1,11 +1,12 @@
-//! The deepest stack over the heaviest jobs leaves a margin.
+//! Tests that the heaviest jobs leave a margin of the stack.
 #![cfg(feature = "emulator")]
 
 use penup_client::emulator::Stack;
 use penup_host_tests::heaviest_jobs::{on_the_lm3s6965, on_the_pico};
 use std::error::Error;
 
-/// What no job may use: an interrupt may find the stack deeper than these jobs have it.
+/// The number of bytes that no job may use, because an interrupt may occur when the stack is deeper
+/// than in these jobs.
 const MARGIN: usize = 1024;
 
 fn leaves_a_margin(job: &str, Stack { size, deepest }: Stack) {

@@ -1,4 +1,4 @@
-//! Records in flash whose power goes between any two bytes.
+//! Tests of the records in flash when the power fails between any two bytes.
 
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
@@ -6,11 +6,11 @@ use embedded_storage::nor_flash::{
 use penup::storage::{Slots, StorageError};
 use penup_host_tests::cut_flash::{Cut, CutFlash};
 
-/// Not at the beginning of the flash, and of more than one sector.
+/// The slots are not at the beginning of the flash, and each has more than one sector.
 const SLOTS: Slots = Slots { start: 4096, bytes: 8192 };
 const FLASH_BYTES: usize = 5 * 4096;
 
-/// A state that tells itself from others, of that length.
+/// A state of this length that differs from the others.
 fn state(number: u8, length: usize) -> Vec<u8> {
     (0..length).map(|at| (at as u8).wrapping_mul(7) ^ number).collect()
 }
@@ -98,10 +98,10 @@ fn a_flipped_bit_makes_a_state_invalid() {
     }
 }
 
-/// A flash with a cell that is not erased any more, and which reads back what it has written.
+/// A flash with a cell that can no longer be erased, and that verifies what it has written.
 struct Worn {
     bytes: Vec<u8>,
-    /// The place of the byte and the bits that stay low.
+    /// The offset of the byte, and the bits that stay low.
     worn: (usize, u8),
 }
 
@@ -135,7 +135,7 @@ impl NorFlash for Worn {
     const WRITE_SIZE: usize = 256;
     const ERASE_SIZE: usize = 4096;
 
-    /// The cell wears out between the erasure and the write: the worst instant.
+    /// The cell fails between the erasure and the write, which is the worst instant.
     fn erase(&mut self, from: u32, to: u32) -> Result<(), NotHeld> {
         self.bytes[from as usize..to as usize].fill(0xFF);
         Ok(())
@@ -150,8 +150,8 @@ impl NorFlash for Worn {
     }
 }
 
-/// The cell lies in the header's page, behind the header: its sum is right, and yet the state is not
-/// kept, for that was said.
+/// The cell is in the header's page, behind the header. The checksum is right, and yet the state
+/// does not count as saved, because an error was reported.
 #[test]
 fn a_state_that_is_said_not_to_be_kept_is_not() {
     let mut flash = Worn { bytes: vec![0xFF; FLASH_BYTES], worn: (SLOTS.start as usize + 200, 1) };

@@ -1,4 +1,4 @@
-//! Titles, from the line to the strokes.
+//! Tests of titles, from the serial line to the strokes.
 
 #![allow(clippy::unwrap_used)] // a test may: clippy sees only its `#[test]` functions as tests
 
@@ -9,7 +9,7 @@ use penup::protocol::Escape;
 use penup::stage::NeverCancel;
 use penup_host_tests::whole_jobs::Bench;
 
-/// A line in steps, from the lower end or the left one.
+/// A line in steps, starting at its lower or left end.
 type Ink = [[i32; 2]; 2];
 
 fn bench(text: &str) -> Bench {
@@ -20,7 +20,7 @@ fn bench(text: &str) -> Bench {
     bench
 }
 
-/// The lines that the job inks.
+/// The lines that the job draws.
 fn ink(bench: &mut Bench) -> Vec<Ink> {
     bench.plotter.compute(&mut NeverCancel, &mut penup::plotter::Unobserved).unwrap();
     let mut strokes = bench.plotter.strokes();
@@ -53,7 +53,8 @@ fn written(text: &str, size: f64, left: Millimetres, baseline: f64) -> Vec<Ink> 
     lines
 }
 
-/// Each line of a title is inked, by one segment or more: points nearer than two steps are one.
+/// Whether a line of a title is drawn, by one segment or more. Points closer than two steps are
+/// merged.
 fn is_inked(line: &Ink, ink: &[Ink]) -> bool {
     let near = |a: [i32; 2], b: [i32; 2]| (a[0] - b[0]).abs() < 3 && (a[1] - b[1]).abs() < 3;
     let short = near(line[0], line[1]);
@@ -61,7 +62,7 @@ fn is_inked(line: &Ink, ink: &[Ink]) -> bool {
     short || end(line[0]) && end(line[1])
 }
 
-/// A frame that is higher than wide, so that it takes all the height that there is.
+/// A frame that is higher than wide, so that it uses all the available height.
 const TALL: &str = "v 0 0 0\nv 1 0 0\nv 1 0 9\nv 0 0 9\nl 1 2 3 4 1\n\
                     $eye=0.5,-9,4.5\n$at=0.5,0,4.5\n$projection=orthographic\n$page=100x100\n$margin=10\n";
 

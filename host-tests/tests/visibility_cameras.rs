@@ -1,8 +1,9 @@
-//! The library against the exact picture of random scenes that a real camera sees.
+//! Tests of visibility against the exact picture of random scenes that a real camera sees.
 //!
-//! Houses with windows as faces in their walls, boxes of equal height that overlap, boxes of unequal
-//! sizes that stand on each other or side by side; each as whole numbers, as hundredths, and turned
-//! in space and written with a few decimals. `PENUP_SCENES` sets how many; 2,000 if it is not set.
+//! The scenes are houses with windows as faces in their walls, boxes of equal height that overlap,
+//! and boxes of unequal sizes that stand on each other or side by side. Each is written as whole
+//! numbers, as hundredths, or rotated in space with a few decimals. `PENUP_SCENES` sets the number
+//! of scenes; the default is 2,000.
 
 // A test fails by panicking.
 #![allow(clippy::panic, clippy::expect_used)]
@@ -39,7 +40,7 @@ fn ratio(along: EdgeParameter) -> Ratio {
     (along.numerator.into(), along.denominator.into())
 }
 
-/// A place along a line on the page, in units of the view's scale.
+/// The position on the page of a point along a line, in units of the view's scale.
 fn on_page(scene: &CameraScene, ends: [Vertex; 2], at: Ratio) -> [f64; 2] {
     let share = at.0 as f64 / at.1 as f64;
     let part = |of: fn(&Vertex) -> i32| {
@@ -57,7 +58,7 @@ fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
 }
 
-/// What is wrong with the seams, in words.
+/// Describes how the seams differ from the expected ones, if they do.
 fn seams_differ(scene: &CameraScene, found: &[Stretch], expected: &[Seam]) -> Option<String> {
     let found: Vec<[[f64; 2]; 2]> = found
         .iter()
@@ -92,7 +93,7 @@ fn seams_differ(scene: &CameraScene, found: &[Stretch], expected: &[Seam]) -> Op
     Some(format!("a seam where none is: {stray:?}"))
 }
 
-/// What is wrong with the picture of a seed, in words.
+/// Describes how the picture of a seed differs from the expected one, if it does.
 fn differs(seed: u64, merged: bool) -> Option<String> {
     let scene = camera_scene(seed);
     let picture = Picture::new(&scene);
@@ -127,7 +128,7 @@ fn scene_count() -> u64 {
     given.and_then(|count| count.parse().ok()).unwrap_or(2000)
 }
 
-/// Compares every second scene, blocks separate and merged by turns.
+/// Compares every second scene, with separate and merged blocks alternately.
 fn agree(odd: u64) {
     let mut wrong = vec![(0, 0); 2 * KINDS as usize];
     let mut first = None;

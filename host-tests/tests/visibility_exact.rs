@@ -1,6 +1,6 @@
-//! The library against visibility by definition, on random scenes full of ties.
+//! Tests of visibility against its definition, on random scenes full of degenerate cases.
 //!
-//! `PENUP_SCENES` sets how many scenes there are; 2,000 if it is not set.
+//! `PENUP_SCENES` sets the number of scenes; the default is 2,000.
 
 use penup::geometry::Precision;
 use penup::model::Elements;

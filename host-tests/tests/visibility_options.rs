@@ -1,4 +1,5 @@
-//! Seams, creases, merged blocks, bent faces, and everything that visibility refuses.
+//! Tests of seams, creases, merged blocks, non-planar faces, and everything that the visibility
+//! module refuses.
 
 use penup::geometry::{EdgeParameter, Precision, Projection, Vertex};
 use penup::model::{Corner, Elements};
@@ -67,7 +68,8 @@ fn add_box(model: &mut Model, low: [f64; 3], high: [f64; 3]) {
     }
 }
 
-/// Two boxes that pass through each other, in skew directions in which every seam has whole ends.
+/// Two boxes that pass through each other, in oblique directions in which every seam has whole
+/// ends.
 fn crossing_boxes() -> (Vec<Vertex>, Vec<Corner>, Vec<[Vertex; 2]>) {
     let skew = |[u, v, w]: [i32; 3]| {
         let x = 90 * u + 31 * v;
@@ -392,7 +394,7 @@ fn what_the_arithmetic_cannot_take_is_refused() {
     );
 }
 
-/// Says no at the given look.
+/// Cancels the computation at the given check.
 struct Impatient(usize);
 
 impl Cancel for Impatient {
@@ -402,7 +404,7 @@ impl Cancel for Impatient {
     }
 }
 
-/// Takes so many stretches and no more.
+/// A sink that accepts only this many stretches.
 struct Small(usize);
 
 impl StretchSink for Small {

@@ -1,4 +1,4 @@
-//! The visible length of the example scenes against figures from an independent program.
+//! Tests the visible length of the example scenes against the results of an independent program.
 
 use penup::model::Elements;
 use penup::stage::{NeverCancel, Scratch};

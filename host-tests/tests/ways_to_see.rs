@@ -1,4 +1,5 @@
-//! The ways to see, over the line, each against the others where they overlap.
+//! Tests of the methods of determining visibility over the serial line, each against the others
+//! where they overlap.
 
 // A test fails by panicking.
 #![allow(clippy::panic, clippy::expect_used)]
@@ -14,7 +15,7 @@ use std::collections::BTreeSet;
 
 const CONVEX: [&str; 5] = ["cube", "octahedron", "icosahedron", "dodecahedron", "eighteen"];
 
-/// The numbers of the vertices that an edge joins, and whether it is visible.
+/// The indices of the vertices that an edge joins, and whether the edge is visible.
 type Seen = BTreeSet<((u16, u16), bool)>;
 
 #[derive(Default)]
@@ -53,7 +54,7 @@ fn seen(bench: &mut Bench, settings: &str) -> Result<Seen, CommandError> {
     Ok(whole.0)
 }
 
-/// Eyes outside a solid whose greatest coordinate is 1, in no symmetry with it.
+/// Positions of the eye outside a solid whose largest coordinate is 1, without any symmetry to it.
 const EYES: [[f64; 3]; 6] = [
     [6.0, 3.1, 2.3],
     [-5.3, 4.7, 1.9],
