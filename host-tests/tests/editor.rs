@@ -297,7 +297,7 @@ proptest! {
 
     #[test]
     fn any_changes_do_what_they_do_to_plain_vectors_and_are_taken_back(
-        // More comes than goes, and pens change often.
+        // More elements are added than removed, and pens change often.
         changes in prop::collection::vec(
             (
                 prop_oneof![4 => 0u8..4, 2 => 6u8..16, 1 => 4u8..6, 2 => 14u8..16],
@@ -318,7 +318,7 @@ proptest! {
         for (kind, a, b, c) in changes {
             let before = plain.clone();
             let Some(line) = change(&mut plain, kind, a.into(), b.into(), c) else { continue };
-            // Scaled and scaled again, numbers grow; the vectors would follow for ever.
+            // Numbers grow with repeated scaling; the vectors would have no limit.
             let is_large = plain.vertices.iter().flatten().any(|c| c.abs() > 1 << 20);
             let answer = bench.say(&format!("{line}\n"));
             if answer.contains("error:") || is_large {
@@ -331,7 +331,8 @@ proptest! {
             prop_assert_eq!(of(&bench), plain.shown(), "{}", line);
             // To choose the same pen again is no change.
             if b % 3 == 0 && (kind < 14 || plain != before) {
-                // What is refused in between changes nothing, nor what is taken back.
+                // Commands that are refused in between change nothing, and neither do commands that
+                // are undone.
                 let refused = REFUSED[usize::from(a) % REFUSED.len()];
                 let answer = bench.say(&format!("{refused}\n"));
                 prop_assert!(answer.contains("error:"), "{}: {}", refused, answer);

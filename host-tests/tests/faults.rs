@@ -127,7 +127,7 @@ fn disturb(values: &[(Setting, f64)], count: u64, seed: u64) {
         session.work(random.below(duration));
         let fault = random.below(8);
         match fault {
-            // Hold, and again while it slows down or stands.
+            // Hold, and hold again while the machine decelerates or stands still.
             0 | 1 => {
                 session.send(b'!');
                 session.work(random.below(600));
@@ -295,9 +295,9 @@ fn home_and_disturb(random: &mut Random) -> Stage {
             match fault {
                 0 => machine.hold(),
                 1 => machine.abort(),
-                // In homing it would be what is looked for.
+                // During homing, it would be the switch that is searched for.
                 _ if fault == 2 || stage == Stage::Homing => machine.alarm(Alarm::EmergencyStop),
-                // By another switch.
+                // The alarm is caused by another switch.
                 _ => pressed = Switches { x: true, y: true },
             }
             if fault > 0 {
@@ -313,7 +313,8 @@ fn home_and_disturb(random: &mut Random) -> Stage {
                     off = None;
                     stage = Stage::Drawing;
                 }
-                // Far from where it takes itself for, if the switches were pressed at a wrong place.
+                // The machine is far from its assumed position if the switches were pressed at a
+                // wrong position.
                 Stage::Homing | Stage::Stopped
                     if matches!(machine.state(), State::Alarm(_)) && machine.unlock().is_ok() =>
                 {

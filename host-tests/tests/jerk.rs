@@ -103,7 +103,7 @@ impl Case {
             let speed = |index: usize| {
                 (places[index] - places[index - 1]) / (run.times[index] - run.times[index - 1])
             };
-            // At 0.4 mm/s, times are a slice apart.
+            // At 0.4 mm/s, successive times are one slice apart.
             let most = 1.03 * limit.sqrt() + 0.1;
             for index in first + 1..after {
                 assert!(
@@ -113,7 +113,7 @@ impl Case {
                 );
             }
             if line > 0 {
-                // Between the last move of one line and the first of the next the corner is passed.
+                // The corner is passed between the last move of one line and the first of the next.
                 let way = places[first] - places[first - 1];
                 let most = 1.03 * (corners[line] + self.acceleration * 2.0 * way).sqrt() + 0.1;
                 assert!(
@@ -151,7 +151,8 @@ fn known_paths_keep_every_limit_and_take_a_sane_time() {
                 let curve = (acceleration * radius).sqrt().min(speed);
                 let least =
                     straight_seconds(length, Limits { speed: curve, ..case.limits() }, jerk);
-                // Braking is reckoned with 16/18 of the jerk, and begins and ends with an interval.
+                // Braking is planned with 16/18 of the jerk limit, and begins and ends with an
+                // interval.
                 let ramp = (acceleration / jerk).min((speed / jerk).sqrt());
                 let most = count * (1.06 * least + 3.0 * (ramp / 16.0).max(0.0013));
                 assert!(run.seconds <= most, "{name} {case:?}: {} s, not {most}", run.seconds);

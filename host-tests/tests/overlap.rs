@@ -48,7 +48,8 @@ fn covered(line: &Drawn, other: &Drawn) -> Option<(i64, i64)> {
 }
 
 fn drawn() -> impl Strategy<Value = Drawn> {
-    // Ten steps apart, so that no points are made one; few slopes, so that many lie in line.
+    // Points are ten steps apart, so that none are merged; there are few slopes, so that many lines
+    // coincide.
     let place = || (0i64..7, 0i64..7).prop_map(|(x, y)| (10 * x, 10 * y));
     let slope = prop_oneof![Just((1, 0)), Just((0, 1)), Just((1, 1)), Just((2, -1)), Just((3, 2))];
     let sloped = (place(), slope, 1i64..6, any::<bool>()).prop_map(|(from, (dx, dy), by, back)| {
@@ -72,7 +73,8 @@ proptest! {
             }
         }
         for line in &lines {
-            // Between the ends of all that lies on it, each stretch is drawn as the best of those that want it.
+            // Between the ends of all lines that overlap it, each stretch is drawn as the best type
+            // that any of them requires.
             let on_it = || lines.iter().chain(&found);
             let mut cuts: Vec<i64> =
                 on_it().filter_map(|other| covered(line, other)).flat_map(|(a, b)| [a, b]).collect();

@@ -122,7 +122,8 @@ fn an_edge_has_the_lowest_pen_of_its_faces_and_pens_come_in_turn() {
 #[test]
 fn loose_triangles_and_faces_without_an_area_keep_the_pens_of_the_others() {
     for pens in PENS {
-        // Each face as two triangles with vertices of their own, and one that has no area before them.
+        // Each face is written as two triangles with vertices of their own, and is preceded by one
+        // without an area.
         let at = |number: u16| {
             let n = number - 1;
             let x = u16::from(n % 4 == 1 || n % 4 == 2);
@@ -154,7 +155,7 @@ fn what_is_cut_at_the_eye_keeps_its_pen() {
     for pens in PENS {
         let (found, ink) =
             job(&mut bench(&format!("{}$eye=.5,.45,.5\n$at=2,.6,.7\n$hidden=shown\n", cube(pens))));
-        // The edges at the far face are whole and have their numbers still.
+        // The edges at the far face are whole and still have their indices.
         let expected = lowest(pens);
         let whole: Vec<_> = found
             .stretches
@@ -162,7 +163,7 @@ fn what_is_cut_at_the_eye_keeps_its_pen() {
             .filter_map(|(edge, pen)| Some((expected.get(&(*edge)?)?, pen)))
             .collect();
         assert!(whole.len() >= 4 && whole.iter().all(|(a, b)| a == b), "{whole:?}");
-        // Those that are cut have the pens of the faces around the far one.
+        // The edges that are cut have the pens of the faces around the far one.
         let all: BTreeSet<u8> = ink.iter().map(|(.., pen)| *pen).collect();
         let around = [(1, 0), (2, 3), (5, 4), (6, 7)]
             .map(|(a, b): (u16, u16)| expected[&(a.min(b), a.max(b))]);
@@ -219,7 +220,7 @@ fn bars_and_curves_have_pens_on_a_plan_and_in_space() {
     let [red, green, five] = counts(&ink);
     assert!(red >= 2 && green > 10 && five > 10, "{red} {green} {five}");
     assert_eq!(red + green + five, ink.len());
-    // The bars have the numbers of their vertices.
+    // The bars have the indices of their vertices.
     let pen_of = |edge| found.stretches.iter().find(|(of, _)| *of == Some(edge)).unwrap().1;
     assert_eq!([(0, 1), (1, 2), (2, 3), (0, 3)].map(pen_of), [1, 5, 5, 1]);
 }
@@ -264,7 +265,7 @@ fn a_stretch_of_paper_is_inked_by_the_lower_pen_alone() {
     let mm = |from: i32, to: i32, pen| ([80 * from, 1600], [80 * to, 1600], pen);
     assert_eq!(job(&mut bench(&plan(1, 2))).1, [mm(20, 60, 1), mm(60, 80, 2)]);
     assert_eq!(job(&mut bench(&plan(2, 1))).1, [mm(40, 80, 1), mm(20, 40, 2)]);
-    // The lower of two edges in one place in space, whichever came first.
+    // Of two edges that coincide in space, the lower pen wins, whichever came first.
     for (first, second) in [(4, 7), (7, 4)] {
         let text = plan(first, second).replace("v 80 20 0", "v 80 20 0\nv 0 0 9");
         let (_, ink) = job(&mut bench(&format!("{text}$eye=50,-90,40\n$at=50,20,0\n")));
@@ -377,7 +378,7 @@ fn pens_change_no_line_and_each_edge_has_the_lowest_of_its_own() {
 fn a_hold_before_the_last_stroke_asks_for_no_pen_yet() {
     let mut bench = bench("v 10 10 0\nv 200 10 0\nv 200 20 0\nl 1 2\nusemtl pen2\nl 2 3\n");
     assert_eq!(bench.say("$plot\n"), "ok\n");
-    // In the middle of the first stroke; the path has been read to its end.
+    // This is in the middle of the first stroke; the path has been read to its end.
     while bench.plotter.machine().position_mm()[0] < 100 {
         bench.plotter.poll(&mut bench.board);
         bench.board.wait();
@@ -411,7 +412,7 @@ fn the_machine_asks_for_each_pen_once() {
     bench.finish();
     assert_eq!(bench.heard(), "");
     assert!(bench.say("?").starts_with("<Idle|"));
-    // The last pen is still in.
+    // The last pen is still in the holder.
     assert_eq!(bench.say("$plot\n"), "ok\n");
     bench.finish();
     assert_eq!(bench.heard(), "[MSG:put in pen 1, then send ~]\n");

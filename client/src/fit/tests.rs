@@ -70,7 +70,7 @@ fn flattened(obj: &str) -> Vec<Vec<Place>> {
     let mut chains: Vec<Vec<Place>> = Vec::new();
     for chain in model.curves().iter().map(chords) {
         match chains.last_mut() {
-            // Written as several for the length of a line.
+            // A long curve is written as several because the length of a line is limited.
             Some(before) if distance(before[before.len() - 1], chain[0]) < 2.0 / units => {
                 before.extend(&chain[1..]);
             }
@@ -281,10 +281,10 @@ fn curves_keep_the_pens_of_their_polylines() {
     assert!(curves[1] < at("usemtl blue") && at("usemtl blue") < curves[2]);
 }
 
-/// Work is counted in evaluations of the basis functions, which is nearly all of it.
+/// The work is measured in evaluations of the basis functions, which take nearly all of the time.
 #[test]
 fn a_long_trace_takes_work_in_proportion_to_its_length() {
-    // Without corners, and nowhere the same.
+    // The path has no corners and does not repeat.
     let wanders = |count: usize| {
         let (mut state, mut bend, mut angle, mut place) = (1u64, 0.0, 0.0_f64, [0.0; 2]);
         let mut step = || {

@@ -90,7 +90,7 @@ fn a_line_that_is_too_long_is_named_with_its_length_and_the_limit() {
         let expected = "f.obj:2: the line has 401 bytes, and a line may have at most 256";
         assert!(error.starts_with(expected), "{error}");
     }
-    // The longest that is sent.
+    // The longest line that is sent.
     let fits = format!("f 11{}", " 1".repeat(126));
     assert_eq!((fits.len(), sent(fits.as_bytes()).len()), (256, 1));
     assert!(read(format!("{fits} ").as_bytes()).is_ok());

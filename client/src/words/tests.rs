@@ -14,9 +14,9 @@ use penup::view::ViewError;
 
 const MISSING: OutOfScratch = OutOfScratch { needed: 9, available: 8 };
 
-/// A value of each variant of an enum, in the order given.
+/// Lists a value of each variant of an enum, in the order given.
 ///
-/// A variant that is left out does not compile: the match has no other arm.
+/// If a variant is missing, this does not compile, because the match has no other arm.
 macro_rules! every_variant {
     ($enum:ident: $($variant:ident $({ $($named:tt)* })? $(( $($plain:tt)* ))?),* $(,)?) => {{
         let _is_complete = |value: &$enum| match value {
@@ -26,7 +26,7 @@ macro_rules! every_variant {
     }};
 }
 
-/// Every refusal that the library can make, with each of its texts.
+/// Every refusal that the library can return, with each of its texts.
 fn refusals() -> Vec<CommandError> {
     let one = Value::from_num(1);
     let all = every_variant!(CommandError:
