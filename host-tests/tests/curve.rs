@@ -55,7 +55,8 @@ fn sketch(limit: i32, points: std::ops::Range<usize>) -> impl Strategy<Value = S
     })
 }
 
-/// Each end `order` times, inner knots at `gaps` (0 repeats one, at most order - 1 times).
+/// Creates clamped knots: each end occurs `order` times, and inner knots are at `gaps`, where 0
+/// repeats a knot, at most order - 1 times.
 fn clamped_knots(order: usize, gaps: &[i32]) -> Vec<i32> {
     let mut knots = vec![-1000; order];
     let mut repeats = order - 1;
@@ -137,10 +138,10 @@ fn in_steps(fine: Fine) -> [f64; 2] {
 }
 
 struct Flattened {
-    /// Places on the page in steps, evenly along each polynomial.
+    /// Points on the page in steps, at even parameters along each polynomial.
     samples: Vec<[f64; 2]>,
     chords: usize,
-    /// In steps.
+    /// The largest distance between the curve and its chords, in steps.
     worst: f64,
 }
 
@@ -220,7 +221,7 @@ fn a_chord_may_stay_by_a_bend_where_shorter_ones_do_not() {
     for (points, most) in [(&loops[..], 11), (&turning[..], 7)] {
         let order = points.len() as u8;
         let sketch = Sketch { points: points.to_vec(), order, knots: vec![] };
-        // One polynomial by its Bézier points.
+        // One polynomial, given by its Bézier points.
         let knots = [-1000, -999].into_iter().flat_map(|knot| vec![knot; points.len()]).collect();
         let found = flattened(&Sketch { knots, ..sketch }, parallel, 128, 300);
         assert!(found.chords <= most, "{} for {most}", found.chords);

@@ -52,7 +52,7 @@ fn the_isobars_of_figure_11_are_drawn_where_they_are() {
                 for sample in 0..=1000 {
                     let u = ends[0] + (ends[1] - ends[0]) * f64::from(sample) / 1000.0;
                     let [x, y, _] = spline_at(&control, &numbers, 3, u);
-                    // Half a step, and the rounding of the chord's ends to steps.
+                    // The tolerance is half a step plus the rounding of the chord's ends to steps.
                     let stray = nearest([80.0 * x, 80.0 * y], &ink);
                     assert!(stray <= 0.5 + 0.5f64.sqrt() + 0.01, "{line}: {stray} steps");
                 }
@@ -99,7 +99,7 @@ fn control_points_do_not_make_the_page_larger() {
     assert!((top(&ink) - 80.0 * 270.0).abs() <= 1.0, "{}", top(&ink));
     let fitted = drawn(&sent(bow, &["$fit=on", "$page=400x270", "$margin=10"]));
     assert!((top(&fitted) - 80.0 * 260.0).abs() <= 1.0, "{}", top(&fitted));
-    // Through the camera too: bottom to top of the free page.
+    // Through the camera, too, the curve goes from the bottom to the top of the free page.
     let seen = drawn(&sent(
         bow,
         &[

@@ -257,7 +257,8 @@ proptest! {
     fn holds_overrides_and_aborts_keep_the_limits_too(
         mut orders in prop::collection::vec((0u64..150_000_000, 0u8..3, 10u8..200), 1..6),
         aborts: bool,
-        // A main loop later than 2 ms may be braked for, harder than the limits where a queue is too short.
+        // If the main loop is later than 2 ms, the machine may have to brake, and harder than the
+        // limits if the queue is too short.
         turn_ticks in 5_000u64..50_000,
         jerk in 500.0f64..100_000.0,
         acceleration in 50.0f64..5000.0,

@@ -249,7 +249,8 @@ fn hidden_lines_have_the_pen_that_was_asked_for() {
     let (_, ink) = job(&mut bench(&format!("{}$hidden=pen,9\n", cube([3; 6]))));
     let count = |wanted: u8| ink.iter().filter(|(.., pen)| *pen == wanted).count();
     assert_eq!((count(3), count(9), ink.len()), (9, 3, 12));
-    // From straight ahead what is behind is exactly behind: what is seen wins, although its pen is higher.
+    // Seen from straight ahead, the far edges are exactly behind the near ones. The visible edge
+    // wins, although its pen is higher.
     let ahead = "$eye=.5,-9,.5\n$at=.5,.5,.5\n$projection=orthographic\n$hidden=pen,1\n";
     let (_, ink) = job(&mut bench(&(cube([3; 6]) + ahead)));
     assert_eq!(ink.iter().map(|(.., pen)| *pen).collect::<Vec<_>>(), [3; 4]);

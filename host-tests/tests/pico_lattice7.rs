@@ -20,7 +20,8 @@ fn of_343_cubes_the_pins_draw_what_the_host_draws() -> Result<(), Box<dyn Error>
     uart.emulator.plug_usb_in()?;
     let mut line = Line::silent(Box::new(PicoByUsb(*uart.emulator)));
     line.hear_greeting()?;
-    // USB holds back what finds no place, so nothing waits for answers, which costs the emulator a wait each.
+    // USB holds back data for which there is no room, so the test need not wait for answers, each
+    // of which delays the emulator.
     let (plot, model) = lines.split_last().ok_or("no line")?;
     line.emulator
         .send(model.iter().map(|text| format!("{text}\n")).collect::<String>().as_bytes())?;

@@ -20,7 +20,8 @@ fn at_the_pins(lines: &[String]) -> Result<Vec<Edge>, Box<dyn Error>> {
     let mut asked_at = line.emulator.clock()?;
     while !status.starts_with("<Idle") {
         std::thread::sleep(Duration::from_millis(20));
-        // By the board's clock: on a slow computer it would have to answer more often, which costs it time.
+        // The interval is measured by the board's clock. On a slow computer, the board would
+        // otherwise have to answer more often, which costs it time.
         let now = line.emulator.clock()?;
         if now >= asked_at + PATIENCE {
             asked_at = now;

@@ -88,8 +88,8 @@ fn lists_do_not_stop_half_a_million_steps_a_second_with_a_jerk() -> Result<(), B
     let (changes, _) = disturbed(&HALF_A_MILLION, &[], b"$\n$\n")?;
     let (worst, pauses) = hardest(&steps_of_x(&changes));
     println!("{pauses} pauses, {:.3} of the limit", worst / hardest_allowed());
-    // Eight steps at a time are braked alike there, which is a stair: up to 1.7 where the main loop is late. A stop
-    // between two steps would be 30.
+    // There, eight steps at a time are decelerated equally, which makes a staircase: up to 1.7
+    // where the main loop is late. A stop between two steps would be 30.
     assert!(worst <= 2.5 * hardest_allowed(), "{worst:.0} steps/s²");
     Ok(())
 }
@@ -102,9 +102,9 @@ fn half_a_million_steps_a_second_are_braked_within_what_the_ring_holds()
     let (worst, pauses) = hardest(&steps_of_x(&changes));
     println!("{pauses} pauses, {:.3} of the limit, {status}", worst / hardest_allowed());
     assert!(status.contains("|Late:2"), "{status}");
-    // With the one in which the pen goes down.
+    // This includes the standstill in which the pen is lowered.
     assert_eq!(pauses, 3);
-    // As above.
+    // As above, this includes the standstill in which the pen is lowered.
     assert!(worst <= 2.5 * hardest_allowed(), "{worst:.0} steps/s²");
     Ok(())
 }
@@ -131,12 +131,12 @@ fn a_main_loop_that_stands_still_brakes_within_the_acceleration_set() -> Result<
     let down = pen(true).ok_or("the pen is never down")?;
     let up = changes.iter().rposition(|change| change.pin == Pin::Pen && !change.high);
     let times = steps_of_x(&changes[down..up.ok_or("the pen is never raised")?]);
-    // A step of x and one of y at once, of 1/80 mm each.
+    // x and y step at once, by 1/80 mm each.
     let places: Vec<f64> = (0..times.len()).map(|step| step as f64 * 2f64.sqrt() / 80.0).collect();
     assert_eq!(times.len(), 8_000);
     let pauses = times.windows(2).filter(|pair| pair[1] - pair[0] > 0.1).count();
     assert_eq!(pauses, 2);
-    // From rest to rest, over any 5 ms.
+    // The acceleration from rest to rest, over any 5 ms.
     let measured = greatest_acceleration(&times, &places, 0.005);
     println!("{measured:.0} mm/s²");
     assert!(measured > 1_000.0 && measured <= 1.05 * 2_000.0, "{measured} mm/s²");
