@@ -5,9 +5,11 @@
 
 #![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on stops")]
 
+use clap::CommandFactory;
 use penup::fixed::Length;
 use penup::machine::SETTINGS;
 use penup::protocol::{HELP, MEANINGS};
+use penup_client::cli::Cli;
 use pulldown_cmark::{Event, Options, Parser, Tag, TagEnd};
 use std::ops::Range;
 use std::path::PathBuf;
@@ -166,4 +168,37 @@ fn the_licences_that_are_declared_have_their_texts() {
         assert!(read(name).contains(words), "{name}");
         assert!(readme.contains(&format!("]({name})")), "README.md does not lead to {name}");
     }
+}
+
+/// Behind this line of `docs/client.md` stands what the client's own help says.
+const END_OF_INTRODUCTION: &str = "<!-- What follows is printed by the client. -->\n";
+
+/// The help of `command` and of its subcommands, each as a section.
+fn push_help(command: &mut clap::Command, path: &str, text: &mut String) {
+    let help = command.clone().bin_name(path).term_width(96).render_long_help().to_string();
+    let lines: Vec<&str> = help.trim().lines().map(str::trim_end).collect();
+    *text += &format!("\n## {path}\n\n```text\n{}\n```\n", lines.join("\n"));
+    for subcommand in command.get_subcommands_mut().filter(|command| command.get_name() != "help") {
+        let path = format!("{path} {}", subcommand.get_name());
+        push_help(subcommand, &path, text);
+    }
+}
+
+/// `PENUP_WRITE_DOCUMENTS=1` writes the document instead of comparing it.
+#[test]
+fn the_help_of_the_client_is_its_document() {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../docs/client.md");
+    let text = std::fs::read_to_string(&path).expect("docs/client.md");
+    let (introduction, body) = text.split_once(END_OF_INTRODUCTION).expect("the line before it");
+    let mut help = String::new();
+    push_help(&mut Cli::command(), "penup", &mut help);
+    if std::env::var_os("PENUP_WRITE_DOCUMENTS").is_some() {
+        let text = format!("{introduction}{END_OF_INTRODUCTION}{help}");
+        return std::fs::write(&path, text).expect("docs/client.md can be written");
+    }
+    assert!(
+        body == help,
+        "docs/client.md is out of date; write it anew with \
+         PENUP_WRITE_DOCUMENTS=1 cargo test -p penup-host-tests --test documents"
+    );
 }

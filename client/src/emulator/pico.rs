@@ -604,9 +604,6 @@ fn spawn(command: &mut Command) -> io::Result<(Child, ChildStdin, ChildStdout, C
 /// Keeps the last lines that the emulator prints.
 fn listen(stderr: ChildStderr, shared: &Shared<State>) {
     for line in BufReader::new(stderr).lines().map_while(Result::ok) {
-        if line.starts_with("idle") {
-            println!("{line}");
-        }
         let mut state = shared.lock();
         if state.said.len() == SAID_LINES {
             state.said.pop_front();
