@@ -55,7 +55,7 @@ fn plot(args: &PlotArgs, interrupt: &AtomicBool) -> Result<String, Error> {
         let mut link = SerialLink::open(device)
             .map_err(|source| Error::Port { device: device.clone(), source })?;
         let _moving = MovingPlotter::new();
-        let report = draw(&mut link, &job, 1, interrupt, &mut bar)?;
+        let report = draw(&mut link, &job, interrupt, &mut bar)?;
         let report = report.map(|report| format!(": {report}")).unwrap_or_default();
         return Ok(format!("{} is drawn{report}", file.display()));
     }
@@ -65,7 +65,7 @@ fn plot(args: &PlotArgs, interrupt: &AtomicBool) -> Result<String, Error> {
     let mut board = machines::emulate(args.board)?;
     let moving = MovingPlotter::new();
     drop(booting);
-    let drawn = draw(board.as_mut(), &job, 1, interrupt, &mut bar);
+    let drawn = draw(board.as_mut(), &job, interrupt, &mut bar);
     let report = drawn.map_err(|error| board.explain(error))?;
     let pen = board.pen_runs()?;
     drop(board);
@@ -83,7 +83,7 @@ fn preview(args: &PreviewArgs, interrupt: &AtomicBool) -> Result<String, Error> 
     let job = Job::new(SourceFile::read(&args.file)?, &settings);
     let mut bar = Bar::default();
     let mut plotter = machines::in_memory();
-    let report = draw(plotter.as_mut(), &job, 1, interrupt, &mut bar)?;
+    let report = draw(plotter.as_mut(), &job, interrupt, &mut bar)?;
     let mut result = plotter.result()?;
     for _ in 1..args.repeat {
         result.timings_ms = result.timings_ms.best(plotter.result()?.timings_ms);
@@ -153,7 +153,7 @@ fn damaged(file: &Path) -> impl Fn(BadCode) -> Error {
     move |BadCode { row, code }| Error::Tape { file: file.display().to_string(), row, code }
 }
 
-/// Sends a whole job over `link`, draws it `times` times and returns the plotter's report on it, if
+/// Sends a whole job over `link`, draws it and returns the plotter's report on it, if
 /// it gives one.
 ///
 /// # Errors
@@ -161,13 +161,12 @@ fn damaged(file: &Path) -> impl Fn(BadCode) -> Error {
 pub fn draw(
     link: &mut dyn Link,
     job: &dyn Lines,
-    times: u32,
     interrupt: &AtomicBool,
     progress: &mut dyn Progress,
 ) -> Result<Option<JobReport>, Error> {
     let mut sender = Sender::open(link, Patience::default(), interrupt)?;
     let drawn = (sender.stream(job, progress))
-        .and_then(|()| (0..times).try_for_each(|_| sender.plot(progress)))
+        .and_then(|()| sender.plot(progress))
         .and_then(|()| sender.report());
     sender.end();
     drawn
