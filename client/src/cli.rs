@@ -243,7 +243,7 @@ pub struct ViewArgs {
         help_heading = "Order"
     )]
     pub effort: String,
-    /// How much longer the way with the pen up may be for one lift less, 0 to 1000 mm
+    /// Extra pen-up travel that is accepted to save one pen lift, 0 to 1000 mm
     #[arg(long, value_name = "MM", value_parser = lift, default_value = "2", allow_hyphen_values = true,
           help_heading = "Order")]
     pub lift: String,
