@@ -19,7 +19,7 @@ impl Path for Zigzag {
     }
 }
 
-/// A queue that is never full. On a board, the step interrupt takes the events out at the other end.
+/// A queue that is never full. On a board, the step interrupt takes the events out again.
 #[derive(Default)]
 struct Events(Vec<StepEvent>);
 

@@ -1,8 +1,11 @@
 //! Tools for the tests of the library: simulated machines, exact reference models, and helpers for
 //! whole jobs.
 
-// Tests fail by panicking, and this crate contains only parts of tests.
-#![allow(clippy::panic, clippy::expect_used)]
+#![allow(
+    clippy::panic,
+    clippy::expect_used,
+    reason = "tests fail by panicking, and this crate contains only parts of tests"
+)]
 
 pub mod curve_reference;
 pub mod enumeration;

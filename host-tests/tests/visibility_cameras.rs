@@ -5,8 +5,7 @@
 //! numbers, as hundredths, or rotated in space with a few decimals. `PENUP_SCENES` sets the number
 //! of scenes; the default is 2,000.
 
-// A test fails by panicking.
-#![allow(clippy::panic, clippy::expect_used)]
+#![allow(clippy::panic, clippy::expect_used, reason = "a test fails by panicking")]
 
 use penup::geometry::{Projection, Vertex};
 use penup::model::Elements;
