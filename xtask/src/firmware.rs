@@ -1,5 +1,10 @@
 //! Builds, checks and measures the firmware image of a board.
 
+mod divider;
+mod hot;
+mod image;
+mod in_ram;
+
 use std::path::{Path, PathBuf};
 use std::{fmt, fs};
 
@@ -9,7 +14,8 @@ use object::{Object, ObjectSection, SectionFlags, elf};
 
 use crate::command::run;
 use crate::set_up::{self, Toolchain};
-use crate::{in_ram, uf2};
+use crate::uf2;
+use image::Image;
 
 /// A board that firmware is built for.
 #[derive(Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
@@ -230,7 +236,8 @@ impl fmt::Display for Sizes {
 /// Checks that the image is linked as the board boots it. The vector table must be where the board
 /// looks for it, the stack at the start of RAM, the entry in flash, and every section within the
 /// memory. A wrong memory map or missing link arguments cause no linker error, only such an image.
-/// For the Pico, this also checks that the step interrupt never waits for flash.
+/// For the Pico, this also checks that the step interrupt never waits for flash, that no handler
+/// disturbs a division of the main loop, and that `boards/pico.x` names functions that exist.
 ///
 /// # Errors
 /// The image fails a check or exceeds the board's budget.
@@ -255,11 +262,14 @@ pub fn check(board: Board, image: &Path) -> Result<Sizes> {
             boot.address() == flash.start && boot.size() == 256,
             "the boot loader is not at the start of flash: wrong memory map"
         );
+        let code = Image::read(&elf)?;
         in_ram::check(
-            &elf,
+            &code,
             ram.start..ram.start + ram.size,
             flash.start..flash.start + flash.size,
         )?;
+        divider::check(&code, vectors.data()?)?;
+        hot::check(&elf, &fs::read_to_string(crate::root().join("boards/pico.x"))?)?;
     }
     let table = vectors.data()?;
     let word = |index: usize| -> Result<u64> {

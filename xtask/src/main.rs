@@ -19,7 +19,6 @@ mod experiments;
 mod flash;
 mod firmware;
 mod gallery;
-mod in_ram;
 mod set_up;
 mod side_by_side;
 mod test;

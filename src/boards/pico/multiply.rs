@@ -6,7 +6,7 @@
 //! anything else.
 
 core::arch::global_asm!(
-    ".section .text.penup_multiply, \"ax\"",
+    ".section .text.__aeabi_lmul, \"ax\"",
     ".balign 4",
     ".global __aeabi_lmul",
     ".type __aeabi_lmul, %function",

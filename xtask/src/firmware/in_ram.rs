@@ -7,19 +7,19 @@
 //! addition, the handlers must not divide, because the chip's divider holds the state of the
 //! division that they interrupt (`src/boards/pico/divider.rs`).
 //!
-//! The check reads the linked image. It decodes the branches of each function, follows them through
-//! the linker's veneers, and looks at the addresses that lie among the code. It cannot follow calls
-//! by pointer; they are refused unless [`INDIRECT`] lists their possible targets.
+//! The check follows the branches of each function, and looks at the addresses that lie among the
+//! code. It cannot follow calls by pointer; they are refused unless [`INDIRECT`] lists their
+//! possible targets.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 use anyhow::{Context, Result, bail, ensure};
-use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
-use rustc_demangle::demangle;
+
+use super::image::{Effect, Image, divides};
 
 /// The interrupt handlers of the steps and of the events that share their queue.
-const HANDLERS: [&str; 2] = ["DMA_IRQ_0", "PIO0_IRQ_0"];
+pub const HANDLERS: [&str; 2] = ["DMA_IRQ_0", "PIO0_IRQ_0"];
 
 /// Parts of the names of functions that may mask all interrupts although they lie in flash, because
 /// nothing moves while they run.
@@ -50,142 +50,8 @@ const ADVICE: &str = "The step interrupt must not wait for flash. Place the func
 /// # Errors
 /// A function or constant that must lie in RAM lies in flash, a handler divides, or a call by
 /// pointer is not listed.
-pub fn check(elf: &object::File, ram: Range<u64>, flash: Range<u64>) -> Result<()> {
-    let image = Image::read(elf)?;
-    Graph { image: &image, ram, flash, indirect: INDIRECT }.check()
-}
-
-/// The parts of an image that the check needs.
-#[derive(Default)]
-struct Image {
-    /// The bytes of each section, by its address.
-    memory: BTreeMap<u64, Vec<u8>>,
-    /// The name and end address of each function, by its address.
-    functions: BTreeMap<u64, (String, u64)>,
-    /// The addresses from which on there is code (`true`) or data.
-    marks: BTreeMap<u64, bool>,
-}
-
-impl Image {
-    /// Reads the sections, functions and marks of an ELF file.
-    fn read(elf: &object::File) -> Result<Self> {
-        let mut image = Self::default();
-        for section in elf.sections().filter(|section| section.address() != 0) {
-            image.memory.insert(section.address(), section.data().unwrap_or_default().to_vec());
-        }
-        for symbol in elf.symbols() {
-            let (name, address) = (symbol.name()?, symbol.address());
-            match name.as_bytes() {
-                [b'$', b't', ..] => _ = image.marks.insert(address & !1, true),
-                [b'$', b'd', ..] => _ = image.marks.insert(address, false),
-                _ if symbol.kind() == SymbolKind::Text => {
-                    let (start, name) = (address & !1, format!("{:#}", demangle(name)));
-                    image.functions.insert(start, (name, start + symbol.size()));
-                }
-                _ => {}
-            }
-        }
-        image.end_functions();
-        Ok(image)
-    }
-
-    /// Gives functions written in assembly, which have no size, an end: the start of the next
-    /// function, or the end of their section.
-    fn end_functions(&mut self) {
-        let starts: Vec<u64> = self.functions.keys().copied().collect();
-        for (index, start) in starts.iter().enumerate() {
-            let section = self.memory.range(..=*start).next_back();
-            let end = section.map_or(*start, |(from, bytes)| from + bytes.len() as u64);
-            let next = starts.get(index + 1).copied().unwrap_or(end).min(end);
-            if let Some((_, end)) = self.functions.get_mut(start)
-                && end == start
-            {
-                *end = next;
-            }
-        }
-    }
-
-    /// The half word at an address.
-    fn half(&self, address: u64) -> Option<u32> {
-        let (start, bytes) = self.memory.range(..=address).next_back()?;
-        let at = usize::try_from(address - start).ok()?;
-        let half = bytes.get(at..at + 2)?;
-        Some(u32::from(u16::from_le_bytes(half.try_into().ok()?)))
-    }
-
-    /// The word at an address.
-    fn word(&self, address: u64) -> Option<u64> {
-        Some(u64::from(self.half(address)? | self.half(address + 2)? << 16))
-    }
-
-    /// Whether there is code, not data, at an address.
-    fn is_code(&self, address: u64) -> bool {
-        self.marks.range(..=address).next_back().is_none_or(|(_, is_code)| *is_code)
-    }
-
-    /// The target of a branch to this address, which may be a veneer of the linker: `PUSH {r0,
-    /// r1}`, `LDR r0, [PC, #4]`, `STR r0, [SP, #4]`, `POP {r0, PC}`, and the target.
-    fn past_veneer(&self, address: u64) -> u64 {
-        const VENEER: [u32; 4] = [0xB403, 0x4801, 0x9001, 0xBD01];
-        let is_veneer = (0..)
-            .zip(VENEER)
-            .all(|(index, half)| self.half(address + 2 * index).is_some_and(|found| found == half));
-        match self.word(address + 8) {
-            Some(target) if is_veneer => target & !1,
-            _ => address,
-        }
-    }
-
-    /// The name of the function at an address, or the address.
-    fn name(&self, address: u64) -> String {
-        match self.functions.range(..=address).next_back() {
-            Some((_, (name, end))) if address < *end => name.clone(),
-            _ => format!("{address:#010x}"),
-        }
-    }
-}
-
-/// The effects of an instruction that matter to the check.
-#[derive(Debug, PartialEq, Eq)]
-enum Effect {
-    Nothing,
-    /// A branch or a call to this address.
-    Branch(u64),
-    /// A call or a jump to the address in a register.
-    Indirect,
-    /// The instruction masks all interrupts.
-    Mask,
-}
-
-/// Decodes the instruction at this address, of one or two half words (ARMv6-M Architecture
-/// Reference Manual, A5). Returns its length in bytes and its effect.
-fn decode(address: u64, first: u32, second: u32) -> (u64, Effect) {
-    /// The lower `bits` of a value, sign-extended.
-    fn signed(value: u32, bits: u32) -> i64 {
-        i64::from((value << (32 - bits)).cast_signed() >> (32 - bits))
-    }
-    let target = |offset: i64| Effect::Branch((address + 4).wrapping_add_signed(offset));
-    if first >> 11 >= 0b11101 {
-        let is_call = first >> 11 == 0b11110 && second & 0xD000 == 0xD000;
-        if !is_call {
-            return (4, Effect::Nothing);
-        }
-        let sign = first >> 10 & 1;
-        let [high, low] = [second >> 13, second >> 11].map(|bit| !(bit ^ sign) & 1);
-        let upper = sign << 24 | high << 23 | low << 22;
-        return (4, target(signed(upper | (first & 0x3FF) << 12 | (second & 0x7FF) << 1, 25)));
-    }
-    const LINK: u32 = 14;
-    let effect = match first {
-        0xB672 => Effect::Mask,
-        // BX, BLX, and MOV and ADD to the program counter. BX to the link register is a return.
-        _ if first & 0xFF87 == 0x4700 && first >> 3 & 15 == LINK => Effect::Nothing,
-        _ if [0x4700, 0x4780, 0x4687, 0x4487].contains(&(first & 0xFF87)) => Effect::Indirect,
-        _ if first >> 11 == 0b11100 => target(signed(first << 1, 12)),
-        _ if first >> 12 == 0b1101 && first >> 9 & 7 != 0b111 => target(signed(first << 1, 9)),
-        _ => Effect::Nothing,
-    };
-    (2, effect)
+pub fn check(image: &Image, ram: Range<u64>, flash: Range<u64>) -> Result<()> {
+    Graph { image, ram, flash, indirect: INDIRECT }.check()
 }
 
 /// The call graph of an image, with the rules for it.
@@ -208,27 +74,13 @@ impl Graph<'_> {
         }
         for (start, (name, end)) in functions {
             let may = MASK_AT_REST.iter().any(|part| name.contains(part));
-            if !may && self.effects(*start, *end).any(|effect| effect == Effect::Mask) {
+            if !may && self.image.effects(*start, *end).any(|effect| effect == Effect::Mask) {
                 self.follow(*start, &mut Vec::new(), &mut done).with_context(|| {
                     format!("{name} masks all interrupts, that of the steps too")
                 })?;
             }
         }
         Ok(())
-    }
-
-    /// The effect of each instruction of a function.
-    fn effects(&self, start: u64, end: u64) -> impl Iterator<Item = Effect> {
-        let mut at = start;
-        std::iter::from_fn(move || {
-            while at < end && !self.image.is_code(at) {
-                at += 2;
-            }
-            let first = self.image.half(at).filter(|_| at < end)?;
-            let (length, effect) = decode(at, first, self.image.half(at + 2).unwrap_or(0));
-            at += length;
-            Some(effect)
-        })
     }
 
     /// Checks the function at this address, which the last of `callers` calls, and all that it
@@ -248,10 +100,8 @@ impl Graph<'_> {
             [] => String::new(),
             callers => format!(", called by {}", callers.join(" > ")),
         };
-        let is_intrinsic = name.starts_with("__") && name.contains("div");
-        let divides = is_intrinsic || name.contains("div_rem");
         ensure!(
-            !divides,
+            !divides(&name),
             "{name}{by_way_of}: it divides, and the divider may be in the middle of another division. \
             Let a handler of the steps shift or multiply instead."
         );
@@ -270,7 +120,7 @@ impl Graph<'_> {
             }
         }
         callers.push(name.clone());
-        for effect in self.effects(start, *end) {
+        for effect in self.image.effects(start, *end) {
             match effect {
                 Effect::Branch(target) if !(start..*end).contains(&target) => {
                     self.follow(target, callers, done)?;
@@ -294,7 +144,7 @@ impl Graph<'_> {
         let (_, targets) = listed.with_context(|| {
             format!(
                 "{} calls or jumps by a pointer, so that nobody knows whether that leads to flash. \
-                Call directly, or list what it may reach in xtask/src/in_ram.rs.",
+                Call directly, or list what it may reach in xtask/src/firmware/in_ram.rs.",
                 callers.join(" > ")
             )
         })?;
@@ -312,27 +162,7 @@ impl Graph<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    const RAM: u64 = 0x2000_0000;
-    const FLASH: u64 = 0x1000_0000;
-    const RETURN: u16 = 0x4770;
-
-    /// An image of functions given by name, address and half words. Data begins at the first half
-    /// word that is 0.
-    fn image(functions: &[(&str, u64, &[u16])]) -> Image {
-        let mut image = Image::default();
-        let idle = ("PIO0_IRQ_0", RAM + 0xF00, &[RETURN][..]);
-        for (name, start, halves) in functions.iter().chain([&idle]) {
-            let bytes: Vec<u8> = halves.iter().flat_map(|half| half.to_le_bytes()).collect();
-            image.functions.insert(*start, ((*name).to_owned(), start + bytes.len() as u64));
-            image.marks.insert(*start, true);
-            if let Some(data) = halves.iter().position(|half| *half == 0) {
-                image.marks.insert(start + 2 * data as u64, false);
-            }
-            image.memory.insert(*start, bytes);
-        }
-        image
-    }
+    use crate::firmware::image::by_hand::{FLASH, RAM, RETURN, call, image};
 
     fn checked_with(functions: &[(&str, u64, &[u16])], indirect: Indirect) -> Result<(), String> {
         let (ram, flash) = (RAM..RAM + 0x1000, FLASH..FLASH + 0x1000);
@@ -343,33 +173,6 @@ mod tests {
 
     fn checked(functions: &[(&str, u64, &[u16])]) -> Result<(), String> {
         checked_with(functions, &[])
-    }
-
-    /// Half words of a call from one address to another.
-    fn call(from: u64, to: u64) -> [u16; 2] {
-        let offset = (to.wrapping_sub(from + 4) as u32) >> 1;
-        let sign = offset >> 23 & 1;
-        let [high, low] = [offset >> 22, offset >> 21].map(|bit| !(bit ^ sign) & 1);
-        let first = 0xF000 | sign << 10 | offset >> 11 & 0x3FF;
-        [first as u16, (0xD000 | high << 13 | low << 11 | offset & 0x7FF) as u16]
-    }
-
-    #[test]
-    fn branches_lead_where_the_manual_says() {
-        // As assembled by LLVM: BL forwards and backwards, B, BNE.
-        let cases = [
-            (0x1000_043A, 0xF00F, 0xFFE5, 0x1001_0408),
-            (0x1001_04C0, 0xF7FF, 0xFE42, 0x1001_0148),
-            (0x2000_0010, 0xE7FE, 0, 0x2000_0010),
-            (0x2000_0010, 0xD1FB, 0, 0x2000_000A),
-        ];
-        for (address, first, second, target) in cases {
-            assert_eq!(decode(address, first, second).1, Effect::Branch(target));
-        }
-        let [first, second] = call(0x1000_043A, 0x1001_0408);
-        assert_eq!((first, second), (0xF00F, 0xFFE5));
-        assert_eq!(decode(0, 0xDF00, 0), (2, Effect::Nothing), "SVC is no branch");
-        assert_eq!(decode(0, 0xF3BF, 0x8F5F), (4, Effect::Nothing), "nor is DMB");
     }
 
     #[test]
