@@ -1,8 +1,9 @@
 //! Defines the command line and turns its options into settings of a job.
 
 use crate::fit::{FitError, TOLERANCES};
-use crate::job::{Page, Settings};
+use crate::job::Settings;
 use crate::machines::Board;
+use crate::page::Page;
 use crate::protocol::{TITLE, acts_at_once};
 use crate::words::told;
 use clap::{Args, Parser, Subcommand, ValueEnum};

@@ -1,9 +1,10 @@
 //! The errors of the `penup` command. Each message also tells the user what to do about it.
 
 use crate::fit::FitError;
+use crate::formats::ReadError;
 use crate::interrupt::EXIT_CODE;
+use crate::lines::{JobLine, Origin};
 use crate::protocol::RECEIVE_WINDOW;
-use crate::source::{JobLine, Origin};
 use crate::words::{asked, explained, told};
 use penup::protocol::CommandError;
 use std::io;
@@ -13,20 +14,9 @@ use std::time::Duration;
 /// The reason why a command failed.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The file cannot be read.
-    #[error("cannot read {file}: {source}")]
-    File {
-        /// The path or device as the user wrote it.
-        file: String,
-        /// The operating system's error.
-        source: io::Error,
-    },
-    /// The file name does not end in `.obj`.
-    #[error("{file}: penup reads Wavefront OBJ files, whose names end in .obj")]
-    Extension {
-        /// The path or device as the user wrote it.
-        file: String,
-    },
+    /// The file to draw cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
     /// The file's polylines cannot be fitted.
     #[error("{}", not_fitted(file, source))]
     Fit {
@@ -44,57 +34,6 @@ pub enum Error {
         row: u32,
         /// The invalid code, 12 to 15.
         code: u8,
-    },
-    /// The file contains a command for the machine, which is not allowed in a file.
-    #[error("{}:{}: a file cannot hold commands for the plotter\n    {}", origin.file, origin.line, origin.shown())]
-    CommandInFile {
-        /// The offending line.
-        origin: Origin,
-    },
-    /// The plotter's parser rejects a line of the file.
-    #[error(
-        "{}:{}: {}\n    {}", origin.file, origin.line,
-        explained(refusal.number(), &[refusal.to_string()]), origin.shown()
-    )]
-    BadLine {
-        /// The offending line.
-        origin: Origin,
-        /// The error that the plotter would report for it.
-        refusal: CommandError,
-    },
-    /// A line of the file is longer than the plotter accepts.
-    #[error(
-        "{}:{}: the line has {length} bytes, and a line may have at most {limit}\n    {}",
-        origin.file, origin.line, origin.shown()
-    )]
-    LineTooLong {
-        /// The offending line.
-        origin: Origin,
-        /// The length of the line in bytes.
-        length: usize,
-        /// The maximum length in bytes.
-        limit: usize,
-    },
-    /// A line of the file contains a NUL byte, so the file is not text.
-    #[error(
-        "{}:{}: this is no text, and an OBJ file is: is it another file under this name?",
-        origin.file, origin.line
-    )]
-    NotText {
-        /// The offending line.
-        origin: Origin,
-    },
-    /// The file is UTF-16 text, which penup does not read.
-    #[error("{file}: this is UTF-16 text: save it as UTF-8")]
-    Utf16 {
-        /// The path or device as the user wrote it.
-        file: String,
-    },
-    /// The file is 4 GiB or larger.
-    #[error("{file}: the file is larger than 4 GB, which is more than any plotter takes")]
-    FileTooLarge {
-        /// The path or device as the user wrote it.
-        file: String,
     },
     /// The serial port cannot be opened.
     #[error(

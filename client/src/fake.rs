@@ -4,9 +4,9 @@
 //! reported, it executes at most one line for each read of the client, and it acts on real-time
 //! bytes even inside a line. Time passes only while the client waits for bytes.
 
+use crate::lines::JobLine;
 use crate::link::{Answer, Link};
 use crate::protocol::{ABORT, CLEAR, END, MODEL, PLOT};
-use crate::source::JobLine;
 use crate::twin;
 use penup::checksum::CRC_16;
 use penup::protocol::{CommandError, Label, Named, Numbering, Received};

@@ -1,11 +1,12 @@
 //! The library of the `penup` command, which sends files to a plotter, emulates plotters and
 //! previews drawings.
 //!
-//! A job passes through the modules in this order. [`cli`] reads the command line, [`source`] reads
-//! the file, and [`job`] joins both into the lines to send. [`sender`] sends these lines over a
-//! [`link`] and follows the plotter's replies with [`protocol`] and [`progress`]. Behind the link
-//! is a serial port or one of the plotters of [`machines`]: an [`emulator`], or the [`preview`] in
-//! memory. [`picture`] renders what the pen drew, and [`output`] writes the files.
+//! A job passes through the modules in this order. [`cli`] reads the command line, [`formats`] reads
+//! the file, and [`job`] joins both into the [`lines`] to send. [`sender`] sends these lines over a
+//! [`link`] and follows the plotter's replies with [`protocol`] and [`progress`]. Behind the link is
+//! a serial port, an [`emulator`] of one of the [`machines`], or the [`preview`] in memory.
+//! [`watch`] follows the pen, [`picture`] renders its path on the [`page`], and [`output`] writes
+//! the files. [`results`] are what is known about a job afterwards.
 //!
 //! [`tape`] records a job as single motor steps. [`words`] translates the plotter's messages into
 //! the terms of the command line.
@@ -14,22 +15,24 @@ pub mod cli;
 pub mod emulator;
 pub mod error;
 pub mod fake;
+pub mod fit;
+pub mod formats;
 pub mod interrupt;
 pub mod job;
+pub mod lines;
 pub mod link;
 pub mod machines;
 pub mod output;
+pub mod page;
 pub mod picture;
 pub mod preview;
 pub mod progress;
 pub mod protocol;
+pub mod results;
 pub mod run;
 pub mod sender;
-pub mod source;
 pub mod tape;
 pub mod twin;
-
-pub mod fit;
 pub mod watch;
 pub mod words;
 pub mod workspace;

@@ -1,11 +1,10 @@
-//! The simulated plotters: emulated boards, and the plotter's library in this process.
+//! The emulated boards as plotters whose pins are watched.
 
 use crate::emulator::{EmulatedBoard, Emulator, EmulatorError, Options, Pico, image_path};
 use crate::error::Error;
-use crate::job::JobResult;
 use crate::link::Link;
-use crate::preview::InMemory;
-use crate::watch::{PenRuns, PenWatch};
+use crate::page::PenRuns;
+use crate::watch::PenWatch;
 use std::fs;
 use std::io;
 use std::time::Duration;
@@ -32,32 +31,12 @@ pub trait WatchedPlotter: Link {
     fn explain(&mut self, error: Error) -> Error;
 }
 
-/// A plotter that runs the plotter's library on this computer.
-pub trait PreviewPlotter: Link {
-    /// The results of the last plot command.
-    ///
-    /// # Errors
-    /// The plotter refuses the drawing.
-    fn result(&mut self) -> Result<JobResult, Error>;
-
-    /// Records the drawing of the model that was sent as a tape ([`crate::tape`]).
-    ///
-    /// # Errors
-    /// The plotter refuses the drawing.
-    fn tape(&mut self) -> Result<Vec<u8>, Error>;
-}
-
 /// Starts the emulated `board`.
 ///
 /// # Errors
 /// The emulator or the firmware image is missing, or the emulator does not start.
 pub fn emulate(board: Board) -> Result<Box<dyn WatchedPlotter>, Error> {
     Ok(Box::new(Emulated::start(board)?))
-}
-
-/// Starts the plotter in memory.
-pub fn in_memory() -> Box<dyn PreviewPlotter> {
-    Box::new(InMemory::new())
 }
 
 /// An emulated board and the path of its pen.

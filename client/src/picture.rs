@@ -6,22 +6,11 @@
 //! end of the last one. The PNG is rendered from this SVG.
 
 use crate::error::Error;
-use crate::job::{Page, PagePoint};
+use crate::page::{Page, PagePoint, Run};
 use resvg::{tiny_skia, usvg};
 use std::collections::BTreeSet;
 use std::f64::consts::{PI, TAU};
 use std::fmt::{self, Write as _};
-
-/// A section of the pen's path during which the pen is neither lifted nor lowered.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Run {
-    /// Whether the pen is down.
-    pub pen_down: bool,
-    /// The number of the pen, counted from 1.
-    pub pen: u8,
-    /// The vertices of the path, in mm.
-    pub points: Vec<PagePoint>,
-}
 
 /// The path of the pen on a page.
 #[derive(Debug, Clone, PartialEq)]

@@ -5,10 +5,9 @@
 //! on a [`HostBoard`]. A preview therefore shows what a plotter would do, including its refusals.
 
 use crate::error::Error;
-use crate::job::{JobResult, Lengths, Timings};
 use crate::link::Link;
-use crate::machines::PreviewPlotter;
 use crate::protocol::PLOT;
+use crate::results::{JobResult, Lengths, Timings};
 use crate::watch::PenWatch;
 use penup::boards::host::{Change, HostBoard, lend_memory};
 use penup::geometry::{Projection, Vertex};
@@ -61,6 +60,64 @@ impl InMemory {
         // Work that waits for the machine continues in `receive`.
         while !self.board.has_read_all() && self.plotter.poll(&mut self.board) {}
     }
+
+    /// Records the drawing of the model that was sent as a tape ([`crate::tape`]).
+    ///
+    /// # Errors
+    /// The plotter refuses the drawing.
+    pub fn tape(&mut self) -> Result<Vec<u8>, Error> {
+        let computed = self.plotter.compute(&mut StopWatch::default(), &mut Segments::default());
+        computed.map_err(|refusal| Error::NotDrawn { refusal })?;
+        let settings = *self.plotter.machine().settings();
+        let tape = crate::tape::record(settings, &mut self.plotter.strokes());
+        tape.map_err(|error| Error::NotDrawn { refusal: CommandError::Machine(error) })
+    }
+
+    /// The results of the last plot command.
+    ///
+    /// # Errors
+    /// The plotter refuses the drawing.
+    pub fn result(&mut self) -> Result<JobResult, Error> {
+        let mut watch = StopWatch::default();
+        let mut segments = Segments::default();
+        let computed = self.plotter.compute(&mut watch, &mut segments);
+        computed.map_err(|refusal| Error::NotDrawn { refusal })?;
+        let timings_ms = watch.stop();
+        let steps = self.steps_per_mm();
+        let mut strokes: Vec<Vec<[f64; 2]>> = Vec::new();
+        let mut stroke_pens: Vec<u8> = Vec::new();
+        let mut path = self.plotter.strokes();
+        while let Some(Target { point, ink }) = path.next_target() {
+            let point = [f64::from(point.x) / steps[0], f64::from(point.y) / steps[1]];
+            let pen = path.pen() + 1;
+            match (ink, strokes.last_mut(), stroke_pens.last()) {
+                (Some(_), Some(stroke), Some(last)) if *last == pen => stroke.push(point),
+                // Another pen continues where the last one ended.
+                (Some(_), Some(stroke), _) => {
+                    let from = stroke.last().copied().unwrap_or(point);
+                    strokes.push(vec![from, point]);
+                    stroke_pens.push(pen);
+                }
+                _ => {
+                    strokes.push(vec![point]);
+                    stroke_pens.push(pen);
+                }
+            }
+        }
+        let lengths = Lengths::of(&strokes);
+        Ok(JobResult {
+            segments: segments.ends,
+            segment_pens: segments.pens,
+            strokes,
+            stroke_pens,
+            pen_down_mm: lengths.pen_down_mm,
+            pen_up_mm: lengths.pen_up_mm,
+            efficiency: lengths.efficiency(),
+            steps: core::mem::take(&mut self.steps),
+            timings_ms,
+            pen: self.pen.as_mut().map(PenWatch::runs).unwrap_or_default(),
+        })
+    }
 }
 
 impl Default for InMemory {
@@ -112,58 +169,6 @@ fn count_steps(changes: &[penup::boards::host::Stamped]) -> u64 {
     let mut times: Vec<u64> = changes.iter().filter(|c| rises(c.change)).map(|c| c.time).collect();
     times.dedup();
     times.len() as u64
-}
-
-impl PreviewPlotter for InMemory {
-    fn tape(&mut self) -> Result<Vec<u8>, Error> {
-        let computed = self.plotter.compute(&mut StopWatch::default(), &mut Segments::default());
-        computed.map_err(|refusal| Error::NotDrawn { refusal })?;
-        let settings = *self.plotter.machine().settings();
-        let tape = crate::tape::record(settings, &mut self.plotter.strokes());
-        tape.map_err(|error| Error::NotDrawn { refusal: CommandError::Machine(error) })
-    }
-
-    fn result(&mut self) -> Result<JobResult, Error> {
-        let mut watch = StopWatch::default();
-        let mut segments = Segments::default();
-        let computed = self.plotter.compute(&mut watch, &mut segments);
-        computed.map_err(|refusal| Error::NotDrawn { refusal })?;
-        let timings_ms = watch.stop();
-        let steps = self.steps_per_mm();
-        let mut strokes: Vec<Vec<[f64; 2]>> = Vec::new();
-        let mut stroke_pens: Vec<u8> = Vec::new();
-        let mut path = self.plotter.strokes();
-        while let Some(Target { point, ink }) = path.next_target() {
-            let point = [f64::from(point.x) / steps[0], f64::from(point.y) / steps[1]];
-            let pen = path.pen() + 1;
-            match (ink, strokes.last_mut(), stroke_pens.last()) {
-                (Some(_), Some(stroke), Some(last)) if *last == pen => stroke.push(point),
-                // Another pen continues where the last one ended.
-                (Some(_), Some(stroke), _) => {
-                    let from = stroke.last().copied().unwrap_or(point);
-                    strokes.push(vec![from, point]);
-                    stroke_pens.push(pen);
-                }
-                _ => {
-                    strokes.push(vec![point]);
-                    stroke_pens.push(pen);
-                }
-            }
-        }
-        let lengths = Lengths::of(&strokes);
-        Ok(JobResult {
-            segments: segments.ends,
-            segment_pens: segments.pens,
-            strokes,
-            stroke_pens,
-            pen_down_mm: lengths.pen_down_mm,
-            pen_up_mm: lengths.pen_up_mm,
-            efficiency: lengths.efficiency(),
-            steps: core::mem::take(&mut self.steps),
-            timings_ms,
-            pen: self.pen.as_mut().map(PenWatch::runs).unwrap_or_default(),
-        })
-    }
 }
 
 /// Measures the computing time of each stage.

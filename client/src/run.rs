@@ -6,15 +6,18 @@ use crate::cli::{
 };
 use crate::error::Error;
 use crate::fit::fit_obj;
+use crate::formats::{ReadError, SourceFile};
 use crate::interrupt::MovingPlotter;
-use crate::job::{Job, JobReport};
+use crate::job::Job;
+use crate::lines::Lines;
 use crate::link::{Link, SerialLink};
 use crate::machines;
 use crate::output;
 use crate::picture::{self, Picture};
+use crate::preview::InMemory;
 use crate::progress::{Bar, Progress};
+use crate::results::JobReport;
 use crate::sender::{Patience, Sender};
-use crate::source::{Lines, SourceFile};
 use crate::tape;
 use crate::workspace;
 use penup::step::tape::BadCode;
@@ -82,8 +85,8 @@ fn preview(args: &PreviewArgs, interrupt: &AtomicBool) -> Result<String, Error> 
     output::check(&args.file, &outputs.files())?;
     let job = Job::new(SourceFile::read(&args.file)?, &settings);
     let mut bar = Bar::default();
-    let mut plotter = machines::in_memory();
-    let report = draw(plotter.as_mut(), &job, interrupt, &mut bar)?;
+    let mut plotter = InMemory::new();
+    let report = draw(&mut plotter, &job, interrupt, &mut bar)?;
     let mut result = plotter.result()?;
     for _ in 1..args.repeat {
         result.timings_ms = result.timings_ms.best(plotter.result()?.timings_ms);
@@ -111,8 +114,9 @@ fn fit(args: &FitArgs) -> Result<String, Error> {
     output::check(&args.file, &[&output])?;
     let source = SourceFile::read(&args.file)?;
     let mut bar = Bar::default();
-    let fitted = fit_obj(&source, args.tolerance, &mut |done, all| bar.fitted(done, all))
-        .map_err(|source| Error::Fit { file: file.clone(), source })?;
+    let fitted =
+        fit_obj(&source, source.size(), args.tolerance, &mut |done, all| bar.fitted(done, all))
+            .map_err(|source| Error::Fit { file: file.clone(), source })?;
     drop(bar);
     output::write(&output, fitted.obj.as_bytes())?;
     Ok(format!("{}: {}", output.display(), fitted.saving))
@@ -122,10 +126,10 @@ fn encode_tape(args: &TapeEncodeArgs, interrupt: &AtomicBool) -> Result<String, 
     let output = args.output.clone().unwrap_or_else(|| args.file.with_extension("tape"));
     output::check(&args.file, &[&output])?;
     let job = Job::new(SourceFile::read(&args.file)?, &args.view.settings());
-    let mut plotter = machines::in_memory();
+    let mut plotter = InMemory::new();
     {
         let mut bar = Bar::default();
-        let mut sender = Sender::open(plotter.as_mut(), Patience::default(), interrupt)?;
+        let mut sender = Sender::open(&mut plotter, Patience::default(), interrupt)?;
         sender.stream(&job, &mut bar)?;
         sender.end();
     }
@@ -146,7 +150,8 @@ fn show_tape(args: &TapeShowArgs) -> Result<String, Error> {
 }
 
 fn read_tape(file: &Path) -> Result<Vec<u8>, Error> {
-    std::fs::read(file).map_err(|source| Error::File { file: file.display().to_string(), source })
+    let unreadable = |source| ReadError::File { file: file.display().to_string(), source };
+    Ok(std::fs::read(file).map_err(unreadable)?)
 }
 
 fn damaged(file: &Path) -> impl Fn(BadCode) -> Error {

@@ -14,14 +14,14 @@
 //! number.
 
 use crate::error::Error;
-use crate::job::JobReport;
+use crate::lines::{JobLine, Lines};
 use crate::link::{Answer, Link};
 use crate::progress::{Progress, Quiet};
 use crate::protocol::{
     ABORT, END, LAST_NUMBER, MODEL, PLOT, RECEIVE_WINDOW, RESUME, Reply, ReplyReader, STATUS_QUERY,
     Status, is_penup, numbered,
 };
-use crate::source::{JobLine, Lines};
+use crate::results::JobReport;
 use crate::twin;
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};

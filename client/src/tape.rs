@@ -1,7 +1,7 @@
 //! Harrison's tape: a job encoded as instructions of four bits, two to a byte.
 
-use crate::job::Page;
-use crate::picture::{Picture, Run};
+use crate::page::{Page, Run};
+use crate::picture::Picture;
 use penup::drawing::PagePoint;
 use penup::machine::{Machine, MachineError, Path, PulserState, Settings};
 use penup::motion::{Block, EventQueue, StepEvent};

@@ -1,7 +1,7 @@
 //! Computes what the plotter must contain after a job was sent, by feeding the same lines to the
 //! same plotter library on this computer.
 
-use crate::source::Lines;
+use crate::lines::Lines;
 use penup::boards::host::HostBoard;
 use penup::machine::{EventRing, PulserState};
 use penup::model::{Corner, Position, VERTEX_NUMBER_LIMIT};

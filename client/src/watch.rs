@@ -1,16 +1,7 @@
 //! Reconstructs the path of the pen from the changes of the output pins.
 
 use crate::emulator::{Machine, MachineEvent, MachineEventKind, PinChange};
-use crate::picture::Run;
-
-/// The path of the pen.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct PenRuns {
-    /// The runs of the pen in order, in mm.
-    pub runs: Vec<Run>,
-    /// The length of a motor step in mm.
-    pub step: f64,
-}
+use crate::page::{PenRuns, Run};
 
 /// Follows the pins of a plotter that starts at the origin with the pen up.
 #[derive(Debug)]

@@ -4,10 +4,10 @@
 
 use penup_client::error::Error;
 use penup_client::fake::{FakePlotter, Fault};
+use penup_client::lines::{JobLine, Origin};
 use penup_client::link::Answer;
 use penup_client::progress::{Progress, Quiet};
 use penup_client::sender::{Patience, Sender};
-use penup_client::source::{JobLine, Origin};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 

@@ -3,7 +3,7 @@
 
 use penup::protocol::{CommandError, Label, Named, Numbering, Received};
 use penup_client::protocol::numbered;
-use penup_client::source::JobLine;
+use penup_client::lines::JobLine;
 use penup_client::twin;
 use penup_host_tests::whole_jobs::{Bench, job_lines};
 

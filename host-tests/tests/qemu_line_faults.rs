@@ -5,10 +5,10 @@
 
 use penup_client::link::Link;
 use penup_client::machines::{Board, WatchedPlotter, emulate};
-use penup_client::picture::Run;
+use penup_client::page::Run;
 use penup_client::progress::Quiet;
 use penup_client::sender::{Patience, Sender};
-use penup_client::source::JobLine;
+use penup_client::lines::JobLine;
 use penup_host_tests::noisy_line::Random;
 use penup_host_tests::whole_jobs::job_lines;
 use std::error::Error;

@@ -1,7 +1,7 @@
-//! Reads the polylines of an OBJ file and writes the fitted curves as OBJ.
+//! Finds the polylines of a plan and writes the fitted curves as OBJ.
 
 use super::{FittedCurve, Place, fit_each};
-use crate::source::SourceFile;
+use crate::lines::Lines;
 use penup::protocol::Command;
 use std::fmt::{self, Write};
 use std::rc::Rc;
@@ -95,20 +95,22 @@ pub struct Fitted {
     pub saving: Saving,
 }
 
-/// Fits every polyline of an OBJ plan within `tolerance` mm; each keeps its pen. From time to time
-/// it calls `progress` with the number of vertices done and the number of all vertices.
+/// Fits every polyline of a plan within `tolerance` mm; each keeps its pen. `lines` are those of a
+/// file of `size` bytes. From time to time it calls `progress` with the number of vertices done and
+/// the number of all vertices.
 ///
 /// # Errors
 /// See [`FitError`].
 pub fn fit_obj(
-    file: &SourceFile,
+    lines: &dyn Lines,
+    size: usize,
     tolerance: f64,
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<Fitted, FitError> {
     if !TOLERANCES.contains(&tolerance) {
         return Err(FitError::Tolerance);
     }
-    let Plan { polylines, pens, height } = Plan::read(file)?;
+    let Plan { polylines, pens, height } = Plan::read(lines)?;
     let fitted = fit_each(&polylines, tolerance, progress);
     let left_out = fitted.iter().filter(|curve| curve.is_none()).count();
     let penned = |(curve, pen): (Option<FittedCurve>, _)| Some((pen, curve?));
@@ -118,7 +120,7 @@ pub fn fit_obj(
         polylines: polylines.len(),
         vertices_before: polylines.iter().map(Vec::len).sum(),
         vertices_after: curves.iter().map(|curve| curve.control.len()).sum(),
-        bytes_before: file.size(),
+        bytes_before: size,
         bytes_after: obj.len(),
         left_out,
     };
@@ -201,14 +203,14 @@ struct Plan {
 }
 
 impl Plan {
-    fn read(file: &SourceFile) -> Result<Self, FitError> {
+    fn read(lines: &dyn Lines) -> Result<Self, FitError> {
         let mut vertices: Vec<Place> = Vec::new();
         let mut height = None;
         let mut chains: Vec<Vec<usize>> = Vec::new();
         let mut pens = Vec::new();
         let mut pen: Option<Rc<str>> = None;
         let mut first_curve = None;
-        for line in file.lines() {
+        for line in lines.in_order() {
             let number = line.origin.map_or(0, |origin| origin.line);
             let refused = |reason| FitError::Line { number, reason };
             match Command::parse(&line.sent) {

@@ -1,5 +1,5 @@
 use super::*;
-use crate::source::SourceFile;
+use crate::formats::SourceFile;
 use penup::curve::{FRACTION_BITS, Point};
 use penup::model::{Corner, Model, Position, unkept};
 use penup::protocol::Command;
@@ -7,7 +7,7 @@ use penup::protocol::Command;
 /// Fits the polylines of an OBJ text.
 fn fit_text(text: &str, tolerance: f64) -> Result<Fitted, FitError> {
     let file = SourceFile::new("f.obj".to_owned(), text.into()).expect("lines of OBJ");
-    fit_obj(&file, tolerance, &mut |_, _| ())
+    fit_obj(&file, file.size(), tolerance, &mut |_, _| ())
 }
 
 /// The tolerance of flattening in the tests, 1/256 mm.
@@ -241,7 +241,7 @@ fn numbers_that_no_plotter_takes_are_refused_with_their_line() {
         let text = format!("v 0 0 0\nv {number} 1 0\nv 1 {number} 0\nl 1 2 3\n");
         let expected = FitError::Line { number: 2, reason: "coordinates go up to 1073741824" };
         match SourceFile::new("f.obj".to_owned(), text.into()) {
-            Ok(file) => assert_eq!(fit_obj(&file, 0.1, &mut |_, _| ()), Err(expected)),
+            Ok(file) => assert_eq!(fit_obj(&file, file.size(), 0.1, &mut |_, _| ()), Err(expected)),
             Err(error) => assert!(error.to_string().starts_with("f.obj:2: "), "{error}"),
         }
     }

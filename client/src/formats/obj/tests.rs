@@ -1,14 +1,14 @@
 use super::*;
 
-fn read(bytes: &[u8]) -> Result<SourceFile, Error> {
-    SourceFile::new("f.obj".to_owned(), bytes.to_owned())
+fn read(bytes: &[u8]) -> Result<ObjLines, ReadError> {
+    ObjLines::new("f.obj".to_owned(), bytes.to_owned())
 }
 
 fn sent(bytes: &[u8]) -> Vec<(usize, String)> {
     let file = read(bytes).expect("a file that can be sent");
     let lines: Vec<JobLine> = (0..file.count()).filter_map(|index| file.line(index)).collect();
     assert_eq!((lines.len(), file.line(file.count())), (file.count(), None));
-    assert!(file.lines().eq(lines.iter().cloned()));
+    assert!(file.in_order().eq(lines.iter().cloned()));
     let number = |line: &JobLine| line.origin.as_ref().expect("from the file").line;
     lines.into_iter().map(|line| (number(&line), line.sent)).collect()
 }
@@ -74,7 +74,7 @@ fn a_command_in_a_file_is_refused() {
 #[test]
 fn a_line_is_shown_without_what_acts_on_a_terminal() {
     let shown = |bytes: &[u8]| match read(bytes) {
-        Err(Error::BadLine { origin, .. }) => origin.shown(),
+        Err(ReadError::Line { origin, .. }) => origin.shown(),
         other => panic!("{other:?}"),
     };
     assert_eq!(shown(b"f \x1b[2J\x07 Z\xff\n"), "f ·[2J· Zÿ");

@@ -1,122 +1,72 @@
-//! Reads an OBJ file and turns it into the lines that are sent to a plotter.
+//! Reads Wavefront OBJ files, whose lines a plotter understands as they are.
 //!
-//! [`SourceFile::read`] checks every line with the plotter's own parser before anything is sent. A
-//! line that no plotter accepts is refused with its number and its text. The bytes of the file are
-//! kept as they are, and each line is generated when [`Lines::line`] asks for it, so a job needs
-//! little more memory than its file.
+//! Every line is checked with the plotter's own parser before anything is sent. A line that no
+//! plotter accepts is refused with its number and its text. The bytes of the file are kept as they
+//! are, and each line is generated when [`Lines::line`] asks for it, so a job needs little more
+//! memory than its file.
 //!
 //! Blank lines, comments and keywords that have no effect on a plotter are not sent. A line that
 //! ends in a backslash continues in the next one. A polyline that is longer than the maximum line
 //! length is sent as several polylines, each of which starts at the last vertex of the one before.
 //!
-//! The reader refuses files whose name does not end in `.obj`, files that are not text, other lines
-//! that are too long, and machine commands inside a file.
+//! The reader refuses files that are not text, other lines that are too long, and machine commands
+//! inside a file.
 
-use crate::error::Error;
+use super::error::ReadError;
+use super::format::Format;
+use crate::lines::{JobLine, Lines, Origin};
 use crate::protocol::acts_at_once;
+use crate::words::explained;
 use penup::protocol::{Command, CommandError, LINE_LIMIT};
 use std::borrow::Cow;
-use std::fs::File;
-use std::io::{self, Read as _};
-use std::path::Path;
 
-/// A line to send.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct JobLine {
-    /// The text to send, without the line end.
-    pub sent: String,
-    /// The line of the user's file that it comes from; `None` for the client's own commands.
-    pub origin: Option<Origin>,
-}
+/// The format itself.
+#[derive(Debug)]
+pub(super) struct Obj;
 
-/// A line of the user's file.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Origin {
-    /// The file, as the user named it.
-    pub file: String,
-    /// The line number, counted from 1.
-    pub line: usize,
-    /// The text of the line; of a long line, at least its first [`Origin::MOST_SHOWN`] characters.
-    pub text: String,
-}
-
-impl Origin {
-    /// The maximum number of characters of a line that an error message shows.
-    pub const MOST_SHOWN: usize = 100;
-
-    /// The beginning of the line with control characters replaced, so that it is safe to print on a
-    /// terminal.
-    pub fn shown(&self) -> String {
-        let is_shown = |character: &char| !character.is_control() && *character != '\u{FFFD}';
-        let mut shown: String = (self.text.chars())
-            .map(|character| if is_shown(&character) { character } else { '·' })
-            .take(Self::MOST_SHOWN)
-            .collect();
-        if self.text.chars().nth(Self::MOST_SHOWN).is_some() {
-            shown.push('…');
-        }
-        shown
-    }
-}
-
-impl JobLine {
-    /// A command of the client itself, which comes from no file.
-    pub fn command(text: impl Into<String>) -> Self {
-        Self { sent: text.into(), origin: None }
-    }
-}
-
-/// A sequence of lines to send, numbered from 0 and generated on demand.
-pub trait Lines {
-    /// The number of lines.
-    fn count(&self) -> usize;
-
-    /// Line number `index`; `None` past the last one.
-    fn line(&self, index: usize) -> Option<JobLine>;
-}
-
-impl<const COUNT: usize> Lines for [JobLine; COUNT] {
-    fn count(&self) -> usize {
-        COUNT
+impl Format for Obj {
+    fn name(&self) -> &'static str {
+        "Wavefront OBJ"
     }
 
-    fn line(&self, index: usize) -> Option<JobLine> {
-        self.get(index).cloned()
+    fn extensions(&self) -> &'static [&'static str] {
+        &["obj"]
+    }
+
+    /// The file begins with lines of OBJ, at least one of which is a vertex.
+    fn recognises(&self, beginning: &[u8]) -> bool {
+        // The last line may be cut.
+        let last_end = beginning.iter().rposition(|byte| is_line_end(*byte)).unwrap_or(0);
+        [beginning, &beginning[..last_end]].into_iter().any(|lines| {
+            ObjLines::new(String::new(), lines.to_vec())
+                .is_ok_and(|lines| lines.in_order().any(|line| line.sent.starts_with("v ")))
+        })
+    }
+
+    fn read(&self, file: String, bytes: Vec<u8>) -> Result<Box<dyn Lines>, ReadError> {
+        Ok(Box::new(ObjLines::new(file, bytes)?))
     }
 }
-
-impl Lines for Vec<JobLine> {
-    fn count(&self) -> usize {
-        self.len()
-    }
-
-    fn line(&self, index: usize) -> Option<JobLine> {
-        self.get(index).cloned()
-    }
-}
-
-/// The file size in bytes from which a file is refused. At 11 kB/s it would take days to send.
-const SIZE_LIMIT: u64 = 1 << 32;
 
 /// The distance, in lines, between stored positions from which lines can be generated. A smaller
 /// value makes [`Lines::line`] faster and takes more memory: 12 bytes for each position.
-const PLACE_EVERY: usize = 16;
+const CURSOR_EVERY: usize = 16;
 
-/// A file whose every line has been checked.
+/// An OBJ file whose every line has been checked.
 #[derive(Debug)]
-pub struct SourceFile {
+pub(super) struct ObjLines {
     /// The file, as the user named it.
     name: String,
     bytes: Vec<u8>,
-    /// The position of every line whose number is a multiple of [`PLACE_EVERY`].
-    places: Vec<Place>,
+    /// The position of every line whose number is a multiple of [`CURSOR_EVERY`].
+    cursors: Vec<Cursor>,
     count: usize,
 }
 
 /// A position of the reader in the bytes of a file.
 #[derive(Debug, Clone, Copy, Default)]
-struct Place {
-    /// The number of bytes before it, less than [`SIZE_LIMIT`].
+struct Cursor {
+    /// The number of bytes before it, less than 2^32.
     at: u32,
     /// The number of line ends before it.
     line: u32,
@@ -125,98 +75,53 @@ struct Place {
     in_polyline: bool,
 }
 
-impl SourceFile {
-    /// Reads the file at `path` and checks its lines.
-    ///
-    /// # Errors
-    /// The file cannot be read, its name does not end in `.obj`, or it contains something that no
-    /// plotter accepts.
-    pub fn read(path: &Path) -> Result<Self, Error> {
-        let name = path.display().to_string();
-        let unreadable = |source| Error::File { file: name.clone(), source };
-        let file = File::open(path).map_err(unreadable)?;
-        let about = file.metadata().map_err(unreadable)?;
-        if about.is_dir() {
-            return Err(unreadable(io::ErrorKind::IsADirectory.into()));
-        }
-        let extension = path.extension().unwrap_or_default().to_string_lossy();
-        if !extension.eq_ignore_ascii_case("obj") {
-            return Err(Error::Extension { file: name });
-        }
-        let mut bytes = Vec::new();
-        if about.len() < SIZE_LIMIT {
-            // One more byte is reserved, so that the buffer does not grow only to detect the end of
-            // the file.
-            bytes.reserve_exact(about.len() as usize + 1);
-        }
-        file.take(SIZE_LIMIT).read_to_end(&mut bytes).map_err(unreadable)?;
-        Self::new(name, bytes)
-    }
-
+impl ObjLines {
     /// Checks the lines of `bytes`, the contents of a file called `name`.
     ///
     /// # Errors
     /// The file contains something that no plotter accepts.
-    pub fn new(name: String, bytes: Vec<u8>) -> Result<Self, Error> {
-        if bytes.len() as u64 >= SIZE_LIMIT {
-            return Err(Error::FileTooLarge { file: name });
-        }
+    pub(super) fn new(name: String, bytes: Vec<u8>) -> Result<Self, ReadError> {
         if bytes.starts_with(b"\xFF\xFE") || bytes.starts_with(b"\xFE\xFF") {
-            return Err(Error::Utf16 { file: name });
+            return Err(ReadError::Utf16 { file: name });
         }
-        let mut file = Self { name, bytes, places: Vec::new(), count: 0 };
-        let mut place = Place::default();
+        let mut file = Self { name, bytes, cursors: Vec::new(), count: 0 };
+        let mut cursor = Cursor::default();
         if file.bytes.starts_with(b"\xEF\xBB\xBF") {
-            place.at = 3;
+            cursor.at = 3;
         }
         let mut content = String::new();
         loop {
-            let mut next = place;
+            let mut next = cursor;
             match next.read(&file.bytes, &mut content) {
                 Ok(None) => return Ok(file),
                 Ok(Some(from)) => {
-                    if file.count.is_multiple_of(PLACE_EVERY) {
-                        file.places.push(from);
+                    if file.count.is_multiple_of(CURSOR_EVERY) {
+                        file.cursors.push(from);
                     }
                     file.count += 1;
                 }
                 Err((from, fault)) => return Err(file.refused(from, fault)),
             }
-            place = next;
+            cursor = next;
         }
     }
 
-    /// The size of the file in bytes.
-    pub fn size(&self) -> usize {
-        self.bytes.len()
-    }
-
-    /// Iterates over all lines in order, which is faster than calling [`Lines::line`] for each.
-    pub fn lines(&self) -> impl Iterator<Item = JobLine> {
-        let mut place = self.places.first().copied().unwrap_or_default();
-        (0..self.count).map_while(move |_| {
-            let mut sent = String::new();
-            // This cannot fail: every line was already read once without an error.
-            let from = place.read(&self.bytes, &mut sent).ok()??;
-            Some(JobLine { sent, origin: Some(self.origin(from)) })
-        })
-    }
-
-    fn refused(&self, place: Place, fault: LineFault) -> Error {
-        let origin = self.origin(place);
-        match fault {
+    fn refused(&self, cursor: Cursor, fault: LineFault) -> ReadError {
+        let origin = self.origin(cursor);
+        let reason = match fault {
+            LineFault::NotText => return ReadError::NotText { origin, kind: "an OBJ file" },
             LineFault::TooLong { length } => {
-                Error::LineTooLong { origin, length, limit: LINE_LIMIT }
+                format!("the line has {length} bytes, and a line may have at most {LINE_LIMIT}")
             }
-            LineFault::Command => Error::CommandInFile { origin },
-            LineFault::NotText => Error::NotText { origin },
-            LineFault::Refused(refusal) => Error::BadLine { origin, refusal },
-        }
+            LineFault::Command => "a file cannot hold commands for the plotter".to_owned(),
+            LineFault::Refused(refusal) => explained(refusal.number(), &[refusal.to_string()]),
+        };
+        ReadError::Line { origin, reason }
     }
 
-    /// The line of the file that contains `place`.
-    fn origin(&self, place: Place) -> Origin {
-        let at = place.at as usize;
+    /// The line of the file that contains `cursor`.
+    fn origin(&self, cursor: Cursor) -> Origin {
+        let at = cursor.at as usize;
         let before = self.bytes.get(..at).unwrap_or_default();
         let begin = before.iter().rposition(|byte| is_line_end(*byte)).map_or(0, |end| end + 1);
         let line = self.bytes.get(begin..).unwrap_or_default();
@@ -232,24 +137,34 @@ impl SourceFile {
         });
         let text = decoded(shown.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(shown));
         let text = text.trim().to_owned();
-        Origin { file: self.name.clone(), line: place.line as usize + 1, text }
+        Origin { file: self.name.clone(), line: cursor.line as usize + 1, text }
     }
 }
 
-impl Lines for SourceFile {
+impl Lines for ObjLines {
     fn count(&self) -> usize {
         self.count
     }
 
     fn line(&self, index: usize) -> Option<JobLine> {
-        let mut place = *self.places.get(index / PLACE_EVERY)?;
+        let mut cursor = *self.cursors.get(index / CURSOR_EVERY)?;
         let mut content = String::new();
-        let mut from = place;
-        for _ in 0..=index % PLACE_EVERY {
+        let mut from = cursor;
+        for _ in 0..=index % CURSOR_EVERY {
             // This cannot fail: every line was already read once without an error.
-            from = place.read(&self.bytes, &mut content).ok()??;
+            from = cursor.read(&self.bytes, &mut content).ok()??;
         }
         Some(JobLine { sent: content, origin: Some(self.origin(from)) })
+    }
+
+    fn in_order(&self) -> Box<dyn Iterator<Item = JobLine> + '_> {
+        let mut cursor = self.cursors.first().copied().unwrap_or_default();
+        Box::new((0..self.count).map_while(move |_| {
+            let mut sent = String::new();
+            // This cannot fail: every line was already read once without an error.
+            let from = cursor.read(&self.bytes, &mut sent).ok()??;
+            Some(JobLine { sent, origin: Some(self.origin(from)) })
+        }))
     }
 }
 
@@ -284,7 +199,7 @@ fn sendable(letter: char) -> char {
     if acts_at_once(letter) { '_' } else { letter }
 }
 
-impl Place {
+impl Cursor {
     /// Writes the next line to send into `content` and moves behind it. Returns the position where
     /// that line begins, or `None` at the end of the file.
     ///
@@ -342,15 +257,15 @@ impl Place {
                     return Err(LineFault::TooLong { length });
                 }
                 *self = Self { in_polyline: true, ..last };
-                return judged(content);
+                return is_sent(content);
             }
-            // The casts are safe: both numbers are less than the size limit.
+            // The casts are safe: both numbers are less than 2^32, the limit of every file.
             last.at = (words.at - word.len()) as u32;
             last.line = words.line;
         }
         words.end_line();
         *self = Self { at: words.at as u32, line: words.line, in_polyline: false };
-        judged(content)
+        is_sent(content)
     }
 
     /// The number of bytes from here to the end of the line.
@@ -361,7 +276,7 @@ impl Place {
 }
 
 /// Checks a line with the plotter's own parser. Returns `true` if the line must be sent.
-fn judged(content: &str) -> Result<bool, LineFault> {
+fn is_sent(content: &str) -> Result<bool, LineFault> {
     match Command::parse(content) {
         Ok(Command::Nothing) => Ok(false),
         Ok(
@@ -398,7 +313,7 @@ impl<'a> Words<'a> {
             && !is_space(byte)
             && !is_line_end(byte)
             && byte != b'#'
-            && !(length > 0 && rest[length - 1].is_ascii_digit() && goes_on(&rest[length..]))
+            && !(length > 0 && rest[length - 1].is_ascii_digit() && is_continued(&rest[length..]))
         {
             length += 1;
         }
@@ -412,7 +327,7 @@ impl<'a> Words<'a> {
         {
             if is_space(byte) {
                 self.at += 1;
-            } else if goes_on(rest) {
+            } else if is_continued(rest) {
                 self.at += 1;
                 self.pass_line_end();
             } else {
@@ -443,7 +358,7 @@ impl<'a> Words<'a> {
 ///
 /// The callers accept a continuation only after a space or a number, because a Windows path may end
 /// in a backslash.
-fn goes_on(rest: &[u8]) -> bool {
+fn is_continued(rest: &[u8]) -> bool {
     matches!(rest, [b'\\'] | [b'\\', b'\n' | b'\r', ..])
 }
 

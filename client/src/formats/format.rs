@@ -1,0 +1,30 @@
+//! What each file format implements.
+
+use super::error::ReadError;
+use crate::lines::Lines;
+use std::fmt::Debug;
+
+/// The size in bytes from which a file is refused, whatever its format. At 11 kB/s it would take
+/// days to send.
+pub(super) const SIZE_LIMIT: u64 = 1 << 32;
+
+/// A file format.
+pub(super) trait Format: Debug + Sync {
+    /// The name of the format in messages, for example `Wavefront OBJ`.
+    fn name(&self) -> &'static str;
+
+    /// The extensions of the names of such files, in lower case and without the dot.
+    fn extensions(&self) -> &'static [&'static str];
+
+    /// Whether a file with this `beginning` has this format. The beginning is the whole file, or
+    /// its first 64 KiB. It is asked only where the extension leaves the format open.
+    fn recognises(&self, beginning: &[u8]) -> bool;
+
+    /// Turns `bytes`, the contents of the file that the user calls `file`, into lines to send.
+    /// There are fewer bytes than [`SIZE_LIMIT`]. The lines hold geometry and pens, but no command
+    /// that acts on the machine.
+    ///
+    /// # Errors
+    /// The file contains something that no plotter accepts, or that this format does not allow.
+    fn read(&self, file: String, bytes: Vec<u8>) -> Result<Box<dyn Lines>, ReadError>;
+}

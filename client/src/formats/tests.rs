@@ -1,0 +1,53 @@
+//! Tests of how the format of a file is found.
+
+use super::*;
+use std::fs;
+
+/// Reads a file with this name and content; returns the number of its lines, or the message.
+fn read(name: &str, content: &[u8]) -> Result<usize, String> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join(name);
+    fs::write(&path, content).expect("written");
+    let file = SourceFile::read(&path);
+    let here = format!("{}/", folder.path().display());
+    file.map(|file| file.count()).map_err(|error| error.to_string().replace(&here, ""))
+}
+
+const UNKNOWN: &str = "penup reads Wavefront OBJ files, whose names end in .obj";
+
+#[test]
+fn the_extension_decides_in_capitals_as_well() {
+    assert_eq!(read("a.obj", b""), Ok(0));
+    assert_eq!(read("A.OBJ", b"# v\nv 0 0 0"), Ok(1));
+    let error = read("a.obj", b"\x89PNG\r\n\x1a\n\0\0\0").expect_err("no text");
+    assert!(error.starts_with("a.obj:1: "), "{error}");
+}
+
+#[test]
+fn the_content_decides_where_the_extension_does_not() {
+    assert_eq!(read("cube", b"# a cube\nmtllib c.mtl\nv 0 0 0\nv 1 0 0\nl 1 2\n"), Ok(3));
+    assert_eq!(read("point", b"v 0 0 0"), Ok(1));
+    let long = [b"v 0 0 0 # long\n".repeat(100_000), b"v 1 2 3".to_vec()].concat();
+    assert_eq!(read("long.txt", &long), Ok(100_001));
+}
+
+#[test]
+fn a_file_of_no_known_format_is_refused_with_those_that_are_read() {
+    let png = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR";
+    let contents: [&[u8]; 5] = [b"", b"Dear Ada,\n", png, b"solid cube\n", b"l 1 2\n"];
+    for content in contents {
+        assert_eq!(read("a.stl", content), Err(format!("a.stl: {UNKNOWN}")));
+        assert_eq!(read("a", content), Err(format!("a: {UNKNOWN}")));
+    }
+}
+
+#[test]
+fn every_format_has_extensions_in_lower_case() {
+    for format in FORMATS {
+        assert!(!format.extensions().is_empty(), "{format:?}");
+        for extension in format.extensions() {
+            assert_eq!(*extension, extension.to_lowercase(), "{format:?}");
+            assert!(!extension.starts_with('.'), "{format:?}");
+        }
+    }
+}

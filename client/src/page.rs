@@ -1,0 +1,33 @@
+//! The page, and the path of the pen on it.
+
+/// A point on the page in mm: x to the right and y up from the lower left corner.
+pub type PagePoint = [f64; 2];
+
+/// The size of a page, in mm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Page {
+    /// The width of the page.
+    pub width: f64,
+    /// The height of the page.
+    pub height: f64,
+}
+
+/// A section of the pen's path during which the pen is neither lifted nor lowered.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Run {
+    /// Whether the pen is down.
+    pub pen_down: bool,
+    /// The number of the pen, counted from 1.
+    pub pen: u8,
+    /// The vertices of the path, in mm.
+    pub points: Vec<PagePoint>,
+}
+
+/// The path of the pen, as its pins told it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PenRuns {
+    /// The runs of the pen in order, in mm.
+    pub runs: Vec<Run>,
+    /// The length of a motor step in mm.
+    pub step: f64,
+}
