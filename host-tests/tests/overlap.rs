@@ -7,17 +7,16 @@ use penup::drawing::{LineType, PackedLine, PagePoint, build_graph};
 use penup::stage::{NeverCancel, items_mut};
 use proptest::prelude::*;
 
-/// A line with its line type code: 0 full, 1 dotted, 2 dashed.
+/// A line with the code of its line type and its pen.
 type Drawn = ((i64, i64), (i64, i64), u8, u8);
 
 fn organised(lines: &[Drawn]) -> Vec<Drawn> {
     let mut words = vec![0u64; 4000];
     let point = |(x, y): (i64, i64)| PagePoint { x: x as i32, y: y as i32 };
-    let types = [LineType::Full, LineType::Dotted, LineType::Dashed];
     let packed: Vec<PackedLine> = lines
         .iter()
         .map(|(from, to, code, pen)| {
-            PackedLine::new(point(*from), point(*to), types[usize::from(*code)], *pen)
+            PackedLine::new(point(*from), point(*to), LineType::from_code(*code), *pen)
         })
         .collect();
     items_mut(&mut words, lines.len()).expect("room").copy_from_slice(&packed);
@@ -57,7 +56,7 @@ fn drawn() -> impl Strategy<Value = Drawn> {
         if back { (to, from) } else { (from, to) }
     });
     let any = (place(), place()).prop_filter("a length", |(from, to)| from != to);
-    (prop_oneof![4 => sloped, 1 => any], 0u8..3, 0u8..4)
+    (prop_oneof![4 => sloped, 1 => any], 0..LineType::ALL.len() as u8, 0u8..4)
         .prop_map(|((from, to), code, pen)| (from, to, code, pen))
 }
 

@@ -141,7 +141,7 @@ proptest! {
         ends in ((0.0f64..400.0, 0.0f64..420.0), (0.0f64..400.0, 0.0f64..420.0)),
         short: bool,
         build in 0..3,
-        line_type in prop::sample::select(vec![LineType::Full, LineType::Dotted, LineType::Dashed]),
+        line_type in prop::sample::select(LineType::ALL.to_vec()),
     ) {
         let mut settings = polargraph.settings;
         settings.set(Setting::Kinematics, Value::from_num(build)).expect("valid");

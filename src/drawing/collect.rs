@@ -4,7 +4,7 @@
 //! While visibility is computed, lines are packed at 12 bytes each ([`PackedLine`]). Then
 //! [`build_graph`] turns them into points and segments, in the same memory.
 
-use super::overlap::{Loose, ink_once};
+use super::overlap::{NumberedLine, Rank, ink_once};
 use super::{Drawing, LineType, PAGE_LIMIT, PagePoint, Segment};
 use crate::model::PEN_LIMIT;
 use crate::stage::{
@@ -12,24 +12,59 @@ use crate::stage::{
 };
 use bytemuck::{Pod, Zeroable};
 
-/// A straight line on the page, packed into 12 bytes: four coordinates of 21 bits, the line style
-/// and the pen.
+/// A straight line on the page, packed into 12 bytes.
+///
+/// | bits | contents |
+/// |---|---|
+/// | 0 to 83 | x and y of one end, then of the other, each [`PAGE_LIMIT`] plus the coordinate |
+/// | 84 to 87 | the code of the line type, so there may be 16 types |
+/// | 88 | whether the line yields to any other at the same position |
+/// | 89 to 93 | the pen, from 0 |
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 #[repr(transparent)]
 pub struct PackedLine([u32; 3]);
 
-/// The code of a full line that yields to any other line; it sorts after all other styles.
-const UNDER: u8 = 3;
+/// The position, in the last word of a packed line, of what it keeps besides its ends.
+const MARKS: u32 = 84 - 64;
+
+/// What a packed line keeps besides its ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Marks {
+    line_type: LineType,
+    /// Whether the line yields to any other at the same position.
+    yields: bool,
+    /// The pen, from 0.
+    pen: u8,
+}
+
+impl Marks {
+    /// The bit of a line that yields.
+    const YIELDS: u32 = 1 << LineType::CODE_BITS;
+
+    /// Returns the marks in ten bits.
+    fn bits(self) -> u32 {
+        let yields = if self.yields { Self::YIELDS } else { 0 };
+        let pen = u32::from(self.pen % PEN_LIMIT) << (LineType::CODE_BITS + 1);
+        u32::from(self.line_type.code()) | yields | pen
+    }
+
+    fn from_bits(bits: u32) -> Self {
+        Self {
+            line_type: LineType::from_code((bits & (Self::YIELDS - 1)) as u8),
+            yields: bits & Self::YIELDS != 0,
+            pen: (bits >> (LineType::CODE_BITS + 1)) as u8 % PEN_LIMIT,
+        }
+    }
+}
 
 impl PackedLine {
     /// Packs the line from `from` to `to`. Both must be within ±[`PAGE_LIMIT`], and `pen` below
     /// [`PEN_LIMIT`].
     pub fn new(from: PagePoint, to: PagePoint, line_type: LineType, pen: u8) -> Self {
         let pack = |c: i32| (c.clamp(1 - PAGE_LIMIT, PAGE_LIMIT - 1) + PAGE_LIMIT) as u128;
-        let marks = (pen % PEN_LIMIT) as u128 * 4 + line_type.code() as u128;
-        let packed =
-            pack(from.x) | pack(from.y) << 21 | pack(to.x) << 42 | pack(to.y) << 63 | marks << 84;
-        Self([packed as u32, (packed >> 32) as u32, (packed >> 64) as u32])
+        let ends = pack(from.x) | pack(from.y) << 21 | pack(to.x) << 42 | pack(to.y) << 63;
+        let marks = Marks { line_type, yields: false, pen }.bits();
+        Self([ends as u32, (ends >> 32) as u32, (ends >> 64) as u32 | marks << MARKS])
     }
 
     /// Returns the same line. A full line is marked to yield to any other line at the same place,
@@ -37,9 +72,8 @@ impl PackedLine {
     #[must_use]
     pub fn under(self) -> Self {
         let Self([low, middle, high]) = self;
-        let code = high >> (84 - 64) & 3;
-        let mark = if code == u32::from(LineType::Full.code()) { u32::from(UNDER) } else { 0 };
-        Self([low, middle, high | mark << (84 - 64)])
+        let yields = if self.marks().line_type == LineType::Full { Marks::YIELDS } else { 0 };
+        Self([low, middle, high | yields << MARKS])
     }
 
     /// Whether its ends differ.
@@ -50,22 +84,17 @@ impl PackedLine {
 
     /// Returns its ends.
     pub fn ends(self) -> [PagePoint; 2] {
-        let (from, to, ..) = self.unpack();
-        [from, to]
-    }
-
-    /// Returns its ends, the code of its line style, and its pen.
-    fn unpack(self) -> (PagePoint, PagePoint, u8, u8) {
         let [low, middle, high] = self.0.map(u128::from);
         let packed = low | middle << 32 | high << 64;
         let coordinate = |shift: u32| ((packed >> shift) as i32 & 0x1F_FFFF) - PAGE_LIMIT;
-        let marks = (packed >> 84) as u32;
-        (
+        [
             PagePoint { x: coordinate(0), y: coordinate(21) },
             PagePoint { x: coordinate(42), y: coordinate(63) },
-            (marks & 3) as u8,
-            (marks >> 2) as u8 % PEN_LIMIT,
-        )
+        ]
+    }
+
+    fn marks(self) -> Marks {
+        Marks::from_bits(self.0[2] >> MARKS)
     }
 }
 
@@ -178,9 +207,9 @@ pub fn build_graph(
     // A line inside another one that yields to it splits that one into two pieces, so there may be
     // more segments than lines.
     let all: &[PackedLine] = items(words, count).unwrap_or(&[]);
-    let marks = |line: &PackedLine| line.0[2] >> (84 - 64);
-    let yields = all.iter().any(|line| Some(marks(line)) != all.first().map(marks));
-    let room = if yields { count + count / 4 + 8 } else { count };
+    let marks = |line: &PackedLine| line.0[2] >> MARKS;
+    let differ = all.iter().any(|line| Some(marks(line)) != all.first().map(marks));
+    let room = if differ { count + count / 4 + 8 } else { count };
     let line_words = Scratch::bytes_for::<PackedLine>(room) / 8;
     let available = size_of_val(words);
     let missing = OutOfScratch { needed: line_words * 8, available };
@@ -194,27 +223,25 @@ pub fn build_graph(
             if at % LINES_BETWEEN_CHECKS == 0 {
                 cancel.check()?;
             }
-            let (from, to, line_type_code, pen) = lines[at].unpack();
-            let (from, to) = (finder.number(from)?, finder.number(to)?);
-            if from != to {
-                let (from, to) = (from.min(to), from.max(to));
-                lines[kept] = PackedLine([
-                    u32::from(from) << 16 | u32::from(to),
-                    u32::from(line_type_code) << 8 | u32::from(pen),
-                    0,
-                ]);
+            let line = lines[at];
+            let [from, to] = line.ends();
+            let ends = [finder.number(from)?, finder.number(to)?];
+            if ends[0] != ends[1] {
+                let Marks { line_type, yields, pen } = line.marks();
+                let rank = Rank::new(line_type, yields, pen);
+                lines[kept] = bytemuck::cast(NumberedLine::new(ends, rank));
                 kept += 1;
             }
         }
         let points = finder.points.get(..finder.count).unwrap_or(&[]);
-        let loose: &mut [Loose] = bytemuck::cast_slice_mut(&mut *lines);
-        let segments = ink_once(loose, kept, points, cancel)?;
-        for [ends, ..] in loose.iter_mut().take(segments) {
-            let (from, to) = (*ends >> 16, *ends & 0xFFFF);
-            *ends = from.min(to) << 16 | from.max(to);
+        let numbered: &mut [NumberedLine] = bytemuck::cast_slice_mut(&mut *lines);
+        let segments = ink_once(numbered, kept, points, cancel)?;
+        let found = numbered.get_mut(..segments).unwrap_or(&mut []);
+        for line in found.iter_mut() {
+            *line = NumberedLine::new(line.ends(), line.rank);
         }
-        let segments_found = loose.get_mut(..segments).unwrap_or(&mut []);
-        heap_sort_cancellable(segments_found, |segment| *segment, cancel)?;
+        // No two have the same ends.
+        heap_sort_cancellable(found, NumberedLine::ends, cancel)?;
         (segments, points.len())
     };
 
@@ -222,14 +249,9 @@ pub fn build_graph(
     let halves: &mut [u16] = bytemuck::cast_slice_mut(&mut *line_memory);
     for at in 0..segments {
         let line: [u16; 6] = core::array::from_fn(|half| halves[6 * at + half]);
-        let PackedLine([ends, marks, _]) = bytemuck::cast(line);
-        let segment = Segment {
-            from: (ends >> 16) as u16,
-            to: ends as u16,
-            // A full line that yields becomes an ordinary full line.
-            line_type_code: ((marks >> 8) % u32::from(UNDER)) as u8,
-            pen: marks as u8,
-        };
+        let line: NumberedLine = bytemuck::cast(line);
+        let ([from, to], (line_type_code, pen)) = (line.ends(), line.rank.line_type_code_and_pen());
+        let segment = Segment { from, to, line_type_code, pen };
         let packed: [u16; 3] = bytemuck::cast(segment);
         halves[3 * at..3 * at + 3].copy_from_slice(&packed);
     }
@@ -350,13 +372,12 @@ mod tests {
             (-1, 77, LineType::Dotted, 5),
         ] {
             let packed = PackedLine::new(point(x, y), point(y, x), line_type, pen);
-            assert_eq!(packed.unpack(), (point(x, y), point(y, x), line_type.code(), pen));
-            assert_eq!(packed.ends(), [point(x, y), point(y, x)]);
+            let marks = Marks { line_type, yields: false, pen };
+            assert_eq!((packed.ends(), packed.marks()), ([point(x, y), point(y, x)], marks));
             assert_eq!(packed.has_length(), x != y);
             // Only a full line yields, and nothing but its mark changes.
-            let is_full = line_type == LineType::Full;
-            let mark = if is_full { UNDER } else { line_type.code() };
-            assert_eq!(packed.under().unpack(), (point(x, y), point(y, x), mark, pen));
+            let (under, yields) = (packed.under(), line_type == LineType::Full);
+            assert_eq!((under.ends(), under.marks()), (packed.ends(), Marks { yields, ..marks }));
             let segment = Segment { line_type_code: line_type.code(), ..Segment::default() };
             assert_eq!(segment.line_type(), line_type);
         }

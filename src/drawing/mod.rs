@@ -7,12 +7,14 @@
 //! fit the page or the memory is refused.
 
 mod collect;
+mod line_type;
 mod overlap;
 mod page;
 mod title;
 mod window;
 
 pub use collect::{GraphError, PackedLine, Stored, build_graph};
+pub use line_type::LineType;
 pub use page::{Bounds, Page, PageError, PageMap, StepsPerMillimetre};
 pub use title::{Title, TitleText, is_in_font};
 
@@ -34,19 +36,6 @@ pub struct PagePoint {
 /// bits.
 pub const PAGE_LIMIT: i32 = 1 << 20;
 
-/// The line style of a segment.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum LineType {
-    /// A solid line.
-    #[default]
-    Full,
-    /// Harrison's dotted line.
-    Dotted,
-    /// A line of dashes, which are longer than the dots.
-    Dashed,
-}
-
 /// A straight line of the drawing between two different points, given by their numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
 #[repr(C)]
@@ -55,32 +44,16 @@ pub struct Segment {
     pub from: u16,
     /// The number of the point at the other end.
     pub to: u16,
-    /// The line style: 0 full, 1 dotted, 2 dashed; see [`Segment::line_type`].
+    /// The [code](LineType::code) of its line type.
     pub line_type_code: u8,
     /// The pen that draws it, from 0.
     pub pen: u8,
 }
 
-impl LineType {
-    /// Returns the code by which a [`Segment`] stores the style. A full line sorts before the
-    /// others.
-    pub const fn code(self) -> u8 {
-        match self {
-            Self::Full => 0,
-            Self::Dotted => 1,
-            Self::Dashed => 2,
-        }
-    }
-}
-
 impl Segment {
-    /// Returns the line style.
+    /// Returns the line type.
     pub fn line_type(&self) -> LineType {
-        match self.line_type_code {
-            1 => LineType::Dotted,
-            2 => LineType::Dashed,
-            _ => LineType::Full,
-        }
+        LineType::from_code(self.line_type_code)
     }
 }
 

@@ -2,19 +2,59 @@
 //! are drawn once.
 //!
 //! Segments are sorted by the straight line on which they lie, then by rank, then by where they
-//! begin. The rank puts full lines first, then dotted, dashed, and full lines that yield; within
-//! each style the lower pen comes first. Each segment is then cut to what the segments before it in
-//! that order leave free. All computations are exact, and every cut is at the end of another
-//! segment, so no new points are needed.
+//! begin. Each segment is then cut to what the segments before it in that order leave free. All
+//! computations are exact, and every cut is at the end of another segment, so no new points are
+//! needed.
 
-use super::PagePoint;
+use super::{LineType, PagePoint};
 use crate::fixed::product;
 use crate::stage::{Cancel, OutOfScratch, StageError, heap_sort_cancellable};
+use bytemuck::{Pod, Zeroable};
 use core::cmp::Ordering;
 
-/// A segment before it becomes part of the drawing: the numbers of its two points, its line style
-/// and pen, and its slope.
-pub(super) type Loose = [u32; 3];
+/// A line between two numbered points, before it becomes a segment of the drawing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct NumberedLine {
+    /// The number of the point at one end, in the upper half, and at the other.
+    ends: u32,
+    pub(super) rank: Rank,
+    /// See [`Key::slope`].
+    slope: u32,
+}
+
+impl NumberedLine {
+    /// Makes the line between two different points, the one with the lower number first.
+    pub(super) fn new([a, b]: [u16; 2], rank: Rank) -> Self {
+        Self { ends: u32::from(a.min(b)) << 16 | u32::from(a.max(b)), rank, slope: 0 }
+    }
+
+    /// Returns the numbers of the points at its ends.
+    pub(super) fn ends(&self) -> [u16; 2] {
+        [(self.ends >> 16) as u16, self.ends as u16]
+    }
+}
+
+/// The rank of a line: where lines overlap, that of the lowest rank is drawn. A line that yields
+/// ranks behind those that do not, then counts the precedence of the line type, then the pen.
+///
+/// Bit 24 is set if the line yields. Below it are eight bits each for the precedence, the code of
+/// the line type and the pen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Pod, Zeroable)]
+#[repr(transparent)]
+pub(super) struct Rank(u32);
+
+impl Rank {
+    pub(super) fn new(line_type: LineType, yields: bool, pen: u8) -> Self {
+        let [precedence, code, pen] =
+            [line_type.precedence(), line_type.code(), pen].map(u32::from);
+        Self(u32::from(yields) << 24 | precedence << 16 | code << 8 | pen)
+    }
+
+    pub(super) fn line_type_code_and_pen(self) -> (u8, u8) {
+        ((self.0 >> 8) as u8, self.0 as u8)
+    }
+}
 
 /// A sort key for points along a line: x, then y. The first point is the left one, or the lower one
 /// of a vertical line.
@@ -25,16 +65,16 @@ struct Key {
     slope: u32,
     from: PointKey,
     to: PointKey,
-    rank: u32,
+    rank: Rank,
 }
 
 impl Key {
-    fn of(segment: &Loose, points: &[PagePoint]) -> Self {
+    fn of(segment: &NumberedLine, points: &[PagePoint]) -> Self {
         Self {
-            slope: segment[2],
-            from: End::first(segment, points).place,
-            to: End::second(segment, points).place,
-            rank: segment[1],
+            slope: segment.slope,
+            from: End::first(segment, points).position,
+            to: End::second(segment, points).position,
+            rank: segment.rank,
         }
     }
 
@@ -64,7 +104,7 @@ impl Key {
         let fast = self.slope.cmp(&other.slope);
         fast.then_with(|| (ay * bx).cmp(&(by * ax))).then_with(|| {
             // Twice the area of the triangle with the origin is below 2^43. Dividing it by the
-            // length along the longer axis gives the distance; the division is replaced by cross
+            // length along the longer axis gives the distance; the division is repositiond by cross
             // multiplication.
             let area = |key: &Self, (dx, dy): (i64, i64)| {
                 dx * i64::from(key.from.1) - dy * i64::from(key.from.0)
@@ -107,19 +147,19 @@ const SEGMENTS_BETWEEN_CHECKS: usize = 64;
 /// [`StageError::Scratch`] if the result does not fit into `segments`;
 /// [`StageError::Aborted`] if the user aborted the job.
 pub(super) fn ink_once(
-    segments: &mut [Loose],
+    segments: &mut [NumberedLine],
     count: usize,
     points: &[PagePoint],
     cancel: &mut dyn Cancel,
 ) -> Result<usize, StageError> {
     let full = OutOfScratch {
-        needed: size_of_val(segments) + size_of::<Loose>(),
+        needed: size_of_val(segments) + size_of::<NumberedLine>(),
         available: size_of_val(segments),
     };
     let (sorted, _) = segments.split_at_mut_checked(count).ok_or(full)?;
     for segments in sorted.chunks_mut(SEGMENTS_BETWEEN_CHECKS) {
         for segment in segments {
-            segment[2] = Key::of(segment, points).slope();
+            segment.slope = Key::of(segment, points).slope();
         }
         cancel.check()?;
     }
@@ -141,17 +181,18 @@ pub(super) fn ink_once(
             starts = ends;
         }
         let (mut from, to) = (End::first(&segment, points), End::second(&segment, points));
-        while from.place < to.place {
+        while from.position < to.position {
             // `reach` is how far the line is already drawn at this point. If it is not, `next` is
             // where the next piece begins.
             let (mut reach, mut next) = (from, to);
             for side in 0..2 {
                 let mut pieces = segments.get(starts[side]..ends[side]).unwrap_or(&[]);
-                while let Some(&[_, rank, _]) = pieces.first() {
-                    let of_rank = pieces.partition_point(|piece| piece[1] <= rank);
+                while let Some(rank) = pieces.first().map(|piece| piece.rank) {
+                    let of_rank = pieces.partition_point(|piece| piece.rank <= rank);
                     let (run, rest) = pieces.split_at(of_rank);
                     pieces = rest;
-                    let begun = |piece: &Loose| End::first(piece, points).place <= from.place;
+                    let begun =
+                        |piece: &NumberedLine| End::first(piece, points).position <= from.position;
                     let after = run.partition_point(begun);
                     if let Some(piece) = after.checked_sub(1).and_then(|at| run.get(at)) {
                         reach = reach.max(End::second(piece, points));
@@ -161,11 +202,11 @@ pub(super) fn ink_once(
                     }
                 }
             }
-            if reach.place > from.place {
+            if reach.position > from.position {
                 from = reach;
                 continue;
             }
-            let piece = [from.number << 16 | next.number, segment[1], segment[2]];
+            let piece = NumberedLine { ends: from.number << 16 | next.number, ..segment };
             let at = &mut ends[usize::from(ends[0] > read)];
             *segments.get_mut(*at).ok_or(full)? = piece;
             *at += 1;
@@ -180,25 +221,25 @@ pub(super) fn ink_once(
 /// An end of a segment: its position, and the number of its point.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct End {
-    place: PointKey,
+    position: PointKey,
     number: u32,
 }
 
 impl End {
-    fn both(segment: &Loose, points: &[PagePoint]) -> [Self; 2] {
-        [segment[0] >> 16, segment[0] & 0xFFFF].map(|number| {
-            let place = points.get(number as usize).map_or((0, 0), |point| (point.x, point.y));
-            Self { place, number }
+    fn both(segment: &NumberedLine, points: &[PagePoint]) -> [Self; 2] {
+        [segment.ends >> 16, segment.ends & 0xFFFF].map(|number| {
+            let position = points.get(number as usize).map_or((0, 0), |point| (point.x, point.y));
+            Self { position, number }
         })
     }
 
     /// Returns the end that comes first along the line.
-    fn first(segment: &Loose, points: &[PagePoint]) -> Self {
+    fn first(segment: &NumberedLine, points: &[PagePoint]) -> Self {
         let [a, b] = Self::both(segment, points);
         a.min(b)
     }
 
-    fn second(segment: &Loose, points: &[PagePoint]) -> Self {
+    fn second(segment: &NumberedLine, points: &[PagePoint]) -> Self {
         let [a, b] = Self::both(segment, points);
         a.max(b)
     }

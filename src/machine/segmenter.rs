@@ -72,7 +72,7 @@ impl Machine<'_> {
                 // Dots and gaps are cut here, because each segment is shorter than the pattern of a
                 // whole line.
                 let pattern = match ink.replace(LineType::Full) {
-                    Some(line_type @ (LineType::Dotted | LineType::Dashed)) => {
+                    Some(line_type) if line_type != LineType::Full => {
                         let dot_length = self.settings.pen_positions().dot_length;
                         Pattern::of(line_type, length.to_bits(), dot_length.to_bits())
                     }

@@ -2,16 +2,17 @@
 
 use crate::drawing::LineType;
 
-/// Divides the moves of one line into dots and gaps.
+/// Divides the moves of one line into dashes and gaps, as its line type says.
 ///
-/// Harrison counts a fixed number of moves from the start, so the line may end anywhere in a dot or
-/// gap. Here the line is divided into an odd number of pieces, each as near to the desired length
-/// as that allows. So both ends are drawn with the pen down, and the same points are inked
-/// whichever end the line starts from.
+/// Harrison counts a fixed number of moves from the start, so the line may end anywhere in a dash
+/// or gap. Here the dashes and gaps of the type are repeated as often as brings each nearest to the
+/// desired length, and its first dash ends the line. So both ends are drawn with the pen down, and
+/// the same points are inked whichever end the line starts from.
 ///
 /// ```
+/// use penup::drawing::LineType;
 /// use penup::step::Pattern;
-/// let dots = Pattern::new(25, 5);
+/// let dots = Pattern::of(LineType::Dotted, 25, 5);
 /// let ends: Vec<_> = (0..dots.pieces()).map(|piece| dots.end_of(piece)).collect();
 /// assert_eq!(ends, [5, 10, 15, 20, 25]);
 /// assert!(Pattern::inked(0) && !Pattern::inked(1) && Pattern::inked(4));
@@ -20,44 +21,50 @@ use crate::drawing::LineType;
 pub struct Pattern {
     /// The number of moves of the line.
     moves: u32,
-    /// The number of dots and gaps, which is odd.
-    pieces: u32,
+    /// How many times the dashes and gaps of the line type are repeated before the last dash.
+    repeats: u32,
+    line_type: LineType,
 }
 
 impl Pattern {
-    /// Divides a line of `moves` moves into dots and gaps of about `piece_moves` each (0 counts as
-    /// 1).
-    pub const fn new(moves: u32, piece_moves: u32) -> Self {
-        let length = if piece_moves == 0 { 1 } else { piece_moves };
-        // This is the odd number nearest to moves / length, but at least 1.
-        let pieces = moves / length;
-        let pieces = if pieces.is_multiple_of(2) { pieces + 1 } else { pieces };
-        // There are never more pieces than moves, because each piece has at least one move.
-        let most = if moves == 0 { 1 } else { moves - (1 - moves % 2) };
-        Self { moves, pieces: if pieces > most { most } else { pieces } }
+    /// The pattern for a line of `moves` moves and this line type. Dots are about `dot_moves` long
+    /// (0 counts as 1).
+    pub const fn of(line_type: LineType, moves: u32, dot_moves: u32) -> Self {
+        let dashes = line_type.dashes();
+        let Some(first) = dashes.first() else { return Self::full(moves) };
+        let (first, period) = (*first as u32, sum(dashes, dashes.len()));
+        let dots = moves / if dot_moves == 0 { 1 } else { dot_moves };
+        // The line is first + repeats * period dots long; this is nearest to what fits.
+        let repeats = dots.saturating_add(period / 2).saturating_sub(first) / period;
+        // Each dash and gap has at least one move.
+        let most = moves.saturating_mul(shortest(dashes)).saturating_sub(first) / period;
+        Self { moves, repeats: if repeats > most { most } else { repeats }, line_type }
     }
 
     /// A line that is a single inked piece.
     pub const fn full(moves: u32) -> Self {
-        Self { moves, pieces: 1 }
+        Self { moves, repeats: 0, line_type: LineType::Full }
     }
 
-    /// The number of pieces, which is odd.
+    /// The number of dashes and gaps, which is odd.
     pub const fn pieces(self) -> u32 {
-        self.pieces
+        self.repeats * self.line_type.dashes().len() as u32 + 1
     }
 
     /// The number of moves from the start of the line to the end of piece number `piece`, counted
     /// from 0.
     pub const fn end_of(self, piece: u32) -> u32 {
-        if self.pieces == 1 {
+        if self.repeats == 0 {
             return self.moves;
         }
-        // The result is rounded to the nearest number. There is no tie, because an odd number of
-        // pieces never divides at half a move.
-        let pieces = self.pieces as u64;
-        let doubled = 2 * (piece as u64 + 1) * self.moves as u64 + pieces;
-        (doubled / (2 * pieces)) as u32
+        let dashes = self.line_type.dashes();
+        let (count, period) = (dashes.len() as u32, sum(dashes, dashes.len()));
+        let (ended, before) = (piece / count, piece % count);
+        let dots = (ended * period + sum(dashes, before as usize + 1)) as u64;
+        let all = (self.repeats * period + dashes[0] as u32) as u64;
+        // The result is rounded to the nearest number. There is no tie, because a line is an odd
+        // number of dots long, which never divides at half a move.
+        ((2 * dots * self.moves as u64 + all) / (2 * all)) as u32
     }
 
     /// Whether piece number `piece`, counted from 0, is inked. The first piece is, then every other
@@ -67,16 +74,26 @@ impl Pattern {
     }
 }
 
-impl Pattern {
-    /// The pattern for a line of `moves` moves and this line type. Dots are `dot_moves` long, and a
-    /// dash is three dots long.
-    pub const fn of(line_type: LineType, moves: u32, dot_moves: u32) -> Self {
-        match line_type {
-            LineType::Full => Self::full(moves),
-            LineType::Dotted => Self::new(moves, dot_moves),
-            LineType::Dashed => Self::new(moves, dot_moves.saturating_mul(3)),
-        }
+/// The sum of the first `count` lengths.
+const fn sum(lengths: &[u8], count: usize) -> u32 {
+    let (mut at, mut sum) = (0, 0);
+    while at < count {
+        sum += lengths[at] as u32;
+        at += 1;
     }
+    sum
+}
+
+/// The least of the lengths.
+const fn shortest(lengths: &[u8]) -> u32 {
+    let (mut at, mut least) = (0, u32::MAX);
+    while at < lengths.len() {
+        if least > lengths[at] as u32 {
+            least = lengths[at] as u32;
+        }
+        at += 1;
+    }
+    least
 }
 
 #[cfg(test)]
@@ -94,15 +111,19 @@ mod tests {
         drawn
     }
 
+    fn dots(moves: u32, dot_moves: u32) -> Pattern {
+        Pattern::of(LineType::Dotted, moves, dot_moves)
+    }
+
     #[test]
     fn dots_and_dashes_look_the_same_from_either_end_and_have_inked_ends() {
-        assert_eq!(picture(Pattern::new(9, 3)), "---   ---");
-        assert_eq!(picture(Pattern::new(25, 5)), "-----     -----     -----");
-        assert_eq!(picture(Pattern::new(11, 2)), "--  ---  --");
-        assert_eq!(picture(Pattern::new(7, 1)), "- - - -");
-        assert_eq!(picture(Pattern::new(8, 0)), "- -  - -");
-        assert_eq!(picture(Pattern::new(4, 1000)), "----");
-        assert_eq!(picture(Pattern::new(0, 3)), "");
+        assert_eq!(picture(dots(9, 3)), "---   ---");
+        assert_eq!(picture(dots(25, 5)), "-----     -----     -----");
+        assert_eq!(picture(dots(11, 2)), "--  ---  --");
+        assert_eq!(picture(dots(7, 1)), "- - - -");
+        assert_eq!(picture(dots(8, 0)), "- -  - -");
+        assert_eq!(picture(dots(4, 1000)), "----");
+        assert_eq!(picture(dots(0, 3)), "");
         assert_eq!(picture(Pattern::of(LineType::Dashed, 9, 1)), "---   ---");
     }
 
@@ -110,7 +131,7 @@ mod tests {
     fn every_length_is_symmetric_and_inked_to_its_end() {
         for moves in 0..80 {
             for dot in [0, 1, 2, 3, 8, 1000] {
-                let drawn = picture(Pattern::new(moves, dot));
+                let drawn = picture(dots(moves, dot));
                 assert_eq!(drawn.len(), moves as usize);
                 assert!(drawn.chars().rev().eq(drawn.chars()), "{moves} of {dot}: {drawn}");
                 assert!(moves == 0 || drawn.starts_with('-'), "{moves} of {dot}: {drawn}");
@@ -122,7 +143,7 @@ mod tests {
     fn pieces_are_as_near_to_the_wish_as_an_odd_number_allows() {
         for moves in 1..300_u32 {
             for dot in 1..20_u32 {
-                let pattern = Pattern::new(moves, dot);
+                let pattern = dots(moves, dot);
                 // How far the line would be from its length if each piece had the wished length.
                 let error = |pieces: u32| (pieces * dot).abs_diff(moves);
                 let least = (1..=moves).step_by(2).map(error).min();
@@ -139,9 +160,9 @@ mod tests {
                 }
                 assert_eq!(start, moves);
             }
-            assert_eq!(Pattern::new(moves, 0), Pattern::new(moves, 1));
+            assert_eq!(dots(moves, 0), dots(moves, 1));
         }
-        assert_eq!(Pattern::new(0, 5).pieces(), 1);
+        assert_eq!(dots(0, 5).pieces(), 1);
     }
 
     #[test]
