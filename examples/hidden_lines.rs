@@ -2,7 +2,7 @@
 
 use penup::fixed::Decimal;
 use penup::geometry::Projection;
-use penup::model::{Corner, Model, Position, unkept};
+use penup::model::{Corner, Model, Position, no_undo};
 use penup::stage::{NeverCancel, Scratch, SinkFull};
 use penup::view::{Camera, Lens, Pose, View, project_scene};
 use penup::visibility::{
@@ -34,18 +34,18 @@ impl StretchSink for Svg<'_> {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut vertices = heapless::Vec::<Position, 8>::new();
-    let mut corners = heapless::Vec::<Corner, 24>::new();
+    let mut corners = [Corner::new(0, false, false); 24];
     let mut model = Model::new(&mut vertices, &mut corners);
     let refused = |error: &dyn std::fmt::Debug| format!("{error:?}");
     for z in ["0", "1"] {
         for [x, y] in [["0", "0"], ["1", "0"], ["1", "1"], ["0", "1"]] {
             let position = [Decimal::parse(x), Decimal::parse(y), Decimal::parse(z)];
             let [Ok(x), Ok(y), Ok(z)] = position else { return Err("not a number".into()) };
-            model.add_vertex([x, y, z], &mut unkept).map_err(|error| refused(&error))?;
+            model.add_vertex([x, y, z], &mut no_undo).map_err(|error| refused(&error))?;
         }
     }
     for face in FACES {
-        model.add_face(face.into_iter(), &mut unkept).map_err(|error| refused(&error))?;
+        model.add_face(face.into_iter(), &mut no_undo).map_err(|error| refused(&error))?;
     }
 
     let pose = Pose::Towards { eye: [4.0, -5.0, 3.0], at: [0.5; 3], up: None };

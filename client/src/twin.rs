@@ -14,7 +14,7 @@ pub fn contents(lines: &dyn Lines, count: usize) -> Option<[u32; 2]> {
     let (mut ring, pins) = (EventRing::new(), PulserState::new());
     let mut board = HostBoard::new(&mut ring, &pins);
     let mut vertices = Box::new(heapless::Vec::<Position, VERTEX_NUMBER_LIMIT>::new());
-    let mut corners = Box::new(heapless::Vec::<Corner, { 1 << 16 }>::new());
+    let mut corners = vec![Corner::new(0, false, false); 1 << 16];
     let mut blocks = EMPTY_LOOKAHEAD;
     // Without working memory, the plotter does not copy the model after each line, which saves
     // time.
@@ -22,7 +22,7 @@ pub fn contents(lines: &dyn Lines, count: usize) -> Option<[u32; 2]> {
     let readers = &mut [LineReader::new()];
     let blocks = &mut blocks;
     let memory =
-        MemorySlices { vertices: &mut *vertices, corners: &mut *corners, blocks, words, readers };
+        MemorySlices { vertices: &mut *vertices, corners: &mut corners, blocks, words, readers };
     let mut plotter = Plotter::new(memory, &pins);
     for line in (0..count).filter_map(|index| lines.line(index)) {
         board.receive(line.sent.as_bytes());

@@ -9,7 +9,7 @@
 use crate::random_scenes::Random;
 use penup::fixed::Decimal;
 use penup::geometry::{Precision, Projection, Vertex};
-use penup::model::{Corner, Model, Position, unkept};
+use penup::model::{Corner, Model, Position, no_undo};
 use penup::stage::{NeverCancel, Scratch};
 use penup::view::{Camera, Lens, Pose, View, project_scene};
 
@@ -281,16 +281,16 @@ pub fn camera_scene(seed: u64) -> CameraScene {
     fill(random, &mut builder, seed % KINDS);
     let texts = write(random, &builder.grid);
     let (mut vertices, mut corners) =
-        (heapless::Vec::<Position, 200>::new(), heapless::Vec::<Corner, 400>::new());
+        (heapless::Vec::<Position, 200>::new(), [Corner::new(0, false, false); 400]);
     let mut model = Model::new(&mut vertices, &mut corners);
     for place in &texts {
         let place = [0, 1, 2]
             .map(|n: usize| Decimal::parse(&place[n]).expect("it was written as a number"));
-        model.add_vertex(place, &mut unkept).expect("there is room");
+        model.add_vertex(place, &mut no_undo).expect("there is room");
     }
     for face in &builder.faces {
         let numbers = face.iter().map(|number| *number as i32 + 1);
-        model.add_face(numbers, &mut unkept).expect("there is room");
+        model.add_face(numbers, &mut no_undo).expect("there is room");
     }
     let unit = (-f64::from(model.fraction_bits())).exp2();
     let (low, high) = model.bounds().expect("there are vertices");

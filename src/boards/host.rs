@@ -32,7 +32,7 @@ pub fn lend_memory() -> MemorySlices<'static> {
     const WORDS: usize = 1 << 19;
     MemorySlices {
         vertices: Box::leak(Box::new(heapless::Vec::<Position, VERTICES>::new())),
-        corners: Box::leak(Box::new(heapless::Vec::<Corner, CORNERS>::new())),
+        corners: std::vec![Corner::new(0, false, false); CORNERS].leak(),
         blocks: Box::leak(Box::new(EMPTY_LOOKAHEAD)),
         words: std::vec![0; WORDS].leak(),
         readers: Box::leak(Box::new([const { LineReader::new() }; PORTS])),

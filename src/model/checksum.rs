@@ -15,7 +15,7 @@ impl Model<'_> {
     ///
     /// ```
     /// use penup::model::Model;
-    /// let mut memory = (heapless::Vec::<_, 8>::new(), heapless::Vec::<_, 8>::new());
+    /// let mut memory = (heapless::Vec::<_, 8>::new(), []);
     /// let empty = Model::new(&mut memory.0, &mut memory.1);
     /// // The CRC-32 of four numbers that are 0.
     /// assert_eq!(empty.checksum(), 0xECBB_4B55);
@@ -70,25 +70,26 @@ impl Model<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Corner, PenName, Position, unkept};
+    use super::super::{Corner, PenName, Position, no_undo};
     use super::*;
     use crate::fixed::Decimal;
+    use bytemuck::Zeroable;
     use std::vec::Vec;
 
     /// The checksum of a model with these vertices and elements: a face, or a bar if there are two
     /// numbers.
     fn sum(vertices: &[[&str; 3]], elements: &[(&[i32], u8)]) -> u32 {
-        let mut memory = (heapless::Vec::<Position, 9>::new(), heapless::Vec::<Corner, 64>::new());
+        let mut memory = (heapless::Vec::<Position, 9>::new(), [Corner::zeroed(); 64]);
         let mut model = Model::new(&mut memory.0, &mut memory.1);
         for vertex in vertices {
             let place = vertex.map(|text| Decimal::parse(text).unwrap());
-            model.add_vertex(place, &mut unkept).unwrap();
+            model.add_vertex(place, &mut no_undo).unwrap();
         }
         for (numbers, pen) in elements {
-            model.choose_pen(true, PenName::Number(*pen), &mut unkept).unwrap();
+            model.choose_pen(true, PenName::Number(*pen), &mut no_undo).unwrap();
             match numbers {
-                [_, _] => model.add_polyline(numbers.iter().copied(), &mut unkept).unwrap(),
-                _ => model.add_face(numbers.iter().copied(), &mut unkept).unwrap(),
+                [_, _] => model.add_polyline(numbers.iter().copied(), &mut no_undo).unwrap(),
+                _ => model.add_face(numbers.iter().copied(), &mut no_undo).unwrap(),
             }
         }
         model.checksum()
@@ -126,11 +127,11 @@ mod tests {
     fn the_unit_of_the_model_does_not_count() {
         let near: Vec<[&str; 3]> = std::vec![["1", "0.5", "0"], ["0.25", "0", "1"]];
         // A vertex far away makes the unit coarser, and is removed again.
-        let mut memory = (heapless::Vec::<Position, 9>::new(), heapless::Vec::<Corner, 64>::new());
+        let mut memory = (heapless::Vec::<Position, 9>::new(), [Corner::zeroed(); 64]);
         let mut model = Model::new(&mut memory.0, &mut memory.1);
         for vertex in near.iter().chain([&["1000", "0", "0"]]) {
             let place = vertex.map(|text| Decimal::parse(text).unwrap());
-            model.add_vertex(place, &mut unkept).unwrap();
+            model.add_vertex(place, &mut no_undo).unwrap();
         }
         model.vertices.pop();
         assert!(model.fraction_bits() < FINEST_FRACTION_BITS);

@@ -1,7 +1,8 @@
 //! The model that the user sent: its vertices, bars, faces and curves, and the edits of them.
 //!
 //! A [`Model`] holds vertices in one array and faces and bars in another, in the order in which
-//! they came (Cárdenas & Seeley's joints and bars in two sequential arrays). It refuses whatever
+//! they came (Cárdenas & Seeley's joints and bars in two sequential arrays); the second also holds
+//! the pens and the curves. It refuses whatever
 //! would make it invalid, such as a face through a vertex that does not exist or more than fits in
 //! the memory; it is then unchanged. [`Model::edit`] changes it, and [`Model::restore`] undoes a
 //! change.
@@ -13,6 +14,7 @@ mod elements;
 mod error;
 mod pens;
 mod precision;
+mod store;
 mod undo;
 
 pub use curves::{Curves, StoredCurve};
@@ -23,10 +25,10 @@ pub use pens::{PEN_LIMIT, PenName, PenRun, PenWriter, Pens};
 
 use crate::fixed::Decimal;
 use bytemuck::{Pod, Zeroable};
-use core::ops::Range;
 use curves::CurveList;
 use pens::{PenBook, RUN};
 use precision::Rounding;
+use store::Store;
 
 /// A position in the model's own space. Each coordinate is in units of 2^-[`Model::fraction_bits`],
 /// and its absolute value is at most 2^30.
@@ -56,10 +58,10 @@ const FINEST_FRACTION_BITS: u32 = 30;
 
 /// A callback that gets the model just before a change that will succeed, and is never called when
 /// a change is refused. It may copy the model with [`Model::save`].
-pub type Before<'b> = &'b mut dyn FnMut(&Model<'_>);
+pub type BeforeChange<'b> = &'b mut dyn FnMut(&Model<'_>);
 
-/// A [`Before`] that does nothing: no copy is kept.
-pub fn unkept(_: &Model<'_>) {}
+/// A [`BeforeChange`] that does nothing: the change cannot be undone.
+pub fn no_undo(_: &Model<'_>) {}
 
 /// The vertices, faces, bars and curves that the user sent, in memory lent by the owner.
 ///
@@ -68,51 +70,43 @@ pub fn unkept(_: &Model<'_>) {}
 #[derive(Debug)]
 pub struct Model<'m> {
     vertices: &'m mut heapless::VecView<Position>,
-    /// The corners of the elements, followed by their [`PenRun`]s and by the curves.
-    corners: &'m mut heapless::VecView<Corner>,
+    /// The corners of the elements, their [`PenRun`]s and the curves.
+    store: Store<'m>,
     fraction_bits: u32,
     /// The error bound of the coordinates.
     rounding: Rounding,
     faces: usize,
     bars: usize,
     curves: CurveList,
-    /// The number of [`PenRun`]s.
-    runs: usize,
     pens: PenBook,
 }
 
 impl<'m> Model<'m> {
-    /// Makes an empty model that can hold as much as the two vectors can. Their contents are
-    /// discarded.
-    pub fn new(
-        vertices: &'m mut heapless::VecView<Position>,
-        corners: &'m mut heapless::VecView<Corner>,
-    ) -> Self {
-        let mut model = Self {
+    /// Makes an empty model that can hold as many vertices as the vector can, and as many corners
+    /// as the slice has. Their contents are discarded.
+    pub fn new(vertices: &'m mut heapless::VecView<Position>, corners: &'m mut [Corner]) -> Self {
+        vertices.clear();
+        Self {
             vertices,
-            corners,
+            store: Store::new(corners),
             fraction_bits: FINEST_FRACTION_BITS,
             rounding: Rounding::default(),
             faces: 0,
             bars: 0,
             curves: CurveList::default(),
-            runs: 0,
             pens: PenBook::default(),
-        };
-        model.clear();
-        model
+        }
     }
 
     /// Removes everything from the model.
     pub fn clear(&mut self) {
         self.vertices.clear();
-        self.corners.clear();
+        self.store.clear();
         self.fraction_bits = FINEST_FRACTION_BITS;
         self.rounding = Rounding::default();
         self.faces = 0;
         self.bars = 0;
         self.curves = CurveList::default();
-        self.runs = 0;
         self.pens = PenBook::default();
     }
 
@@ -128,19 +122,12 @@ impl<'m> Model<'m> {
 
     /// Returns the faces and bars.
     pub fn elements(&self) -> Elements<'_> {
-        let corners = self.corners.get(..self.elements_end()).unwrap_or(&[]);
-        Elements { corners, pens: self.pens() }
-    }
-
-    /// Returns the index at which the corners of the elements end.
-    fn elements_end(&self) -> usize {
-        self.curves.start - RUN * self.runs
+        Elements { corners: self.store.corners(), pens: self.pens() }
     }
 
     /// Returns the pens of the elements.
     fn pens(&self) -> Pens<'_> {
-        let runs = self.corners.get(self.elements_end()..self.curves.start).unwrap_or(&[]);
-        Pens::new(bytemuck::cast_slice(runs))
+        Pens::new(self.store.pen_runs())
     }
 
     /// Chooses the pen of the elements and curves that follow, by a `usemtl` or a `g` statement.
@@ -155,7 +142,7 @@ impl<'m> Model<'m> {
         &mut self,
         by_material: bool,
         name: PenName,
-        before: Before<'_>,
+        before: BeforeChange<'_>,
     ) -> Result<(), ModelError> {
         if self.pens.by_material && !by_material {
             return Ok(());
@@ -168,9 +155,8 @@ impl<'m> Model<'m> {
         if book != self.pens {
             before(self);
             if book.by_material != self.pens.by_material {
-                self.remove_halves(self.elements_end()..self.curves.start);
-                self.runs = 0;
-                self.curves.forget_pens(self.corners);
+                self.store.truncate_pen_runs(0);
+                self.curves.forget_pens(&mut self.store);
             }
             self.pens = book;
         }
@@ -179,7 +165,7 @@ impl<'m> Model<'m> {
 
     /// Returns the curves.
     pub fn curves(&self) -> Curves<'_> {
-        self.curves.curves(self.corners)
+        self.curves.curves(&self.store)
     }
 
     /// Returns the number of faces.
@@ -205,12 +191,12 @@ impl<'m> Model<'m> {
     /// Returns the number of 16-bit units in use: corners of elements, and the half-words of curves
     /// and of pen changes.
     pub fn corner_count(&self) -> usize {
-        self.corners.len()
+        self.store.used()
     }
 
     /// Returns the greatest number of these units.
     pub fn corner_limit(&self) -> usize {
-        self.corners.capacity()
+        self.store.capacity()
     }
 
     /// Adds a vertex. Its coordinates are rounded towards zero to 30 bits of the model's largest
@@ -221,21 +207,21 @@ impl<'m> Model<'m> {
     pub fn add_vertex(
         &mut self,
         coordinates: [Decimal; 3],
-        before: Before<'_>,
+        before: BeforeChange<'_>,
     ) -> Result<(), ModelError> {
         let limit = self.vertex_limit();
         if self.vertices.len() >= limit {
             return Err(ModelError::TooManyVertices { limit });
         }
-        let place = self.place(coordinates, before)?;
-        self.vertices.push(place).map_err(|_| ModelError::TooManyVertices { limit })
+        let position = self.position(coordinates, before)?;
+        self.vertices.push(position).map_err(|_| ModelError::TooManyVertices { limit })
     }
 
     /// Converts coordinates to the model's unit, which is made coarser if necessary.
-    fn place(
+    fn position(
         &mut self,
         coordinates: [Decimal; 3],
-        before: Before<'_>,
+        before: BeforeChange<'_>,
     ) -> Result<Position, ModelError> {
         let fraction_bits = (0..=self.fraction_bits)
             .rev()
@@ -284,7 +270,7 @@ impl<'m> Model<'m> {
     pub fn add_face(
         &mut self,
         numbers: impl Iterator<Item = i32> + Clone,
-        before: Before<'_>,
+        before: BeforeChange<'_>,
     ) -> Result<(), ModelError> {
         let count = self.check_numbers(numbers.clone(), 3)?;
         let first = numbers.clone().next();
@@ -294,12 +280,10 @@ impl<'m> Model<'m> {
         {
             return Err(ModelError::RepeatedVertex { number: last });
         }
-        self.check_corners(count + self.run_for(self.pens.current))?;
+        self.store.check_room(count + self.run_for(self.pens.current))?;
         before(self);
-        self.begin_run(self.pens.current);
-        for (at, number) in numbers.enumerate() {
-            self.push_corner(number, false, at + 1 == count)?;
-        }
+        self.begin_run(self.pens.current)?;
+        self.add_corners(count, numbers.enumerate().map(|(at, n)| (n, false, at + 1 == count)))?;
         self.faces += 1;
         Ok(())
     }
@@ -311,17 +295,17 @@ impl<'m> Model<'m> {
     pub fn add_polyline(
         &mut self,
         numbers: impl Iterator<Item = i32> + Clone,
-        before: Before<'_>,
+        before: BeforeChange<'_>,
     ) -> Result<(), ModelError> {
         let count = self.check_numbers(numbers.clone(), 2)?;
-        self.check_corners(2 * (count - 1) + self.run_for(self.pens.current))?;
+        let bars = count - 1;
+        self.store.check_room(2 * bars + self.run_for(self.pens.current))?;
         before(self);
-        self.begin_run(self.pens.current);
-        for (from, to) in numbers.clone().zip(numbers.skip(1)) {
-            self.push_corner(from, true, false)?;
-            self.push_corner(to, true, true)?;
-            self.bars += 1;
-        }
+        self.begin_run(self.pens.current)?;
+        let ends = numbers.clone().zip(numbers.skip(1));
+        let corners = ends.flat_map(|(from, to)| [(from, true, false), (to, true, true)]);
+        self.add_corners(2 * bars, corners)?;
+        self.bars += bars;
         Ok(())
     }
 
@@ -346,43 +330,21 @@ impl<'m> Model<'m> {
         if count < needed { Err(ModelError::TooFewCorners { needed }) } else { Ok(count) }
     }
 
-    /// Checks that there is room for `count` more half-words.
-    fn check_corners(&self, count: usize) -> Result<(), ModelError> {
-        let limit = self.corner_limit();
-        let needed = self.corners.len().saturating_add(count);
-        if needed > limit { Err(ModelError::TooManyCorners { limit, needed }) } else { Ok(()) }
-    }
-
-    /// Appends a corner to the elements, by its OBJ number.
-    fn push_corner(&mut self, number: i32, of_bar: bool, last: bool) -> Result<(), ModelError> {
-        let vertex = self
-            .resolve(number)
-            .ok_or(ModelError::UnknownVertex { number, vertices: self.vertices.len() })?;
-        self.insert(Corner::new(vertex, of_bar, last))
-    }
-
-    /// Inserts a corner after those of the elements.
-    fn insert(&mut self, corner: Corner) -> Result<(), ModelError> {
-        self.insert_half(self.elements_end(), corner.0)
-    }
-
-    /// Inserts a half-word at a position before the curves.
-    fn insert_half(&mut self, at: usize, half: u16) -> Result<(), ModelError> {
-        let limit = self.corner_limit();
-        self.corners
-            .push(Corner(half))
-            .map_err(|_| ModelError::TooManyCorners { limit, needed: limit + 1 })?;
-        self.corners.get_mut(at..).unwrap_or(&mut []).rotate_right(1);
-        self.curves.start += 1;
+    /// Adds `count` corners behind those of the elements. Each is given by the OBJ number of its
+    /// vertex, which exists, and by whether it belongs to a bar and is the last of its element.
+    fn add_corners(
+        &mut self,
+        count: usize,
+        corners: impl Iterator<Item = (i32, bool, bool)>,
+    ) -> Result<(), ModelError> {
+        let vertices = self.vertices.len();
+        let added = self.store.add_corners(count)?;
+        for (corner, (number, of_bar, last)) in added.iter_mut().zip(corners) {
+            let vertex = resolve(number, vertices);
+            let vertex = vertex.ok_or(ModelError::UnknownVertex { number, vertices })?;
+            *corner = Corner::new(vertex, of_bar, last);
+        }
         Ok(())
-    }
-
-    /// Removes half-words that are before the curves.
-    fn remove_halves(&mut self, gone: Range<usize>) {
-        let count = self.corners.len();
-        self.corners.copy_within(gone.end..count, gone.start);
-        self.corners.truncate(count - gone.len());
-        self.curves.start -= gone.len();
     }
 
     /// Returns how many half-words are needed so that elements with this pen can follow.
@@ -390,15 +352,16 @@ impl<'m> Model<'m> {
         if pen == self.pens().last() { 0 } else { RUN }
     }
 
-    /// Records that elements with this pen follow. There must be room.
-    fn begin_run(&mut self, pen: u8) {
+    /// Records that elements with this pen follow.
+    ///
+    /// # Errors
+    /// [`ModelError::TooManyCorners`]; nothing is changed.
+    fn begin_run(&mut self, pen: u8) -> Result<(), ModelError> {
         if pen != self.pens().last() {
-            let first = self.elements_end() as u16; // the memory has fewer half-words than 2^16
-            for half in [first, pen.into()] {
-                let _ = self.insert_half(self.curves.start, half);
-            }
-            self.runs += 1;
+            let run = PenRun::new(self.store.corners().len(), pen);
+            self.store.add_pen_runs(1)?.fill(run);
         }
+        Ok(())
     }
 
     /// Sets the degree of the curves that follow, 1 to 5.
@@ -423,7 +386,7 @@ impl<'m> Model<'m> {
         if let Some(number) = numbers.clone().find(|number| resolve(*number).is_none()) {
             return Err(ModelError::UnknownVertex { number, vertices });
         }
-        self.curves.begin(self.corners, ends, numbers.filter_map(resolve), self.pens.current)
+        self.curves.begin(&mut self.store, ends, numbers.filter_map(resolve), self.pens.current)
     }
 
     /// Adds knots to the unfinished curve.
@@ -434,17 +397,17 @@ impl<'m> Model<'m> {
         &mut self,
         knots: impl Iterator<Item = Decimal> + Clone,
     ) -> Result<(), ModelError> {
-        self.curves.add_knots(self.corners, knots)
+        self.curves.add_knots(&mut self.store, knots)
     }
 
     /// Completes the unfinished curve. If it is refused it is discarded.
     ///
     /// # Errors
     /// [`ModelError::NoCurve`], [`ModelError::KnotTooLarge`], [`ModelError::Curve`].
-    pub fn end_curve(&mut self, before: Before<'_>) -> Result<(), ModelError> {
-        self.curves.end(self.corners)?;
+    pub fn end_curve(&mut self, before: BeforeChange<'_>) -> Result<(), ModelError> {
+        self.curves.end(&mut self.store)?;
         before(self);
-        self.curves.count_in(self.corners.len());
+        self.curves.count_completed(&self.store);
         Ok(())
     }
 
@@ -485,126 +448,4 @@ fn resolve(number: i32, vertices: usize) -> Option<u16> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    type Vertices = heapless::Vec<Position, 4>;
-    type Corners = heapless::Vec<Corner, 8>;
-
-    fn decimals(texts: [&str; 3]) -> [Decimal; 3] {
-        texts.map(|text| Decimal::parse(text).unwrap())
-    }
-
-    fn with_vertices(count: usize, test: impl FnOnce(&mut Model<'_>)) {
-        let (mut vertices, mut corners) = (Vertices::new(), Corners::new());
-        let mut model = Model::new(&mut vertices, &mut corners);
-        for _ in 0..count {
-            model.add_vertex(decimals(["0.25", "-0.5", "0"]), &mut unkept).unwrap();
-        }
-        test(&mut model);
-    }
-
-    #[test]
-    fn a_larger_coordinate_coarsens_the_unit_for_all() {
-        with_vertices(1, |model| {
-            assert_eq!(model.fraction_bits(), 30);
-            model.add_vertex(decimals(["100", "0", "0.1"]), &mut unkept).unwrap();
-            assert_eq!(model.fraction_bits(), 23);
-            assert_eq!(model.vertices()[0], Position { x: 1 << 21, y: -(1 << 22), z: 0 });
-            assert_eq!(model.vertices()[1].x, 100 << 23);
-        });
-    }
-
-    #[test]
-    fn equal_coordinates_stay_equal_when_the_unit_coarsens() {
-        with_vertices(0, |model| {
-            let place = ["0.123456789", "-0.7", "0.3"];
-            for place in [place, ["9", "0", "0"], ["-700", "0", "0"], place] {
-                model.add_vertex(decimals(place), &mut unkept).unwrap();
-            }
-            assert_eq!(model.vertices()[0], model.vertices()[3]);
-        });
-    }
-
-    #[test]
-    fn refused_vertices_change_nothing() {
-        with_vertices(3, |model| {
-            assert_eq!(
-                model.add_vertex(decimals(["1e10", "0", "0"]), &mut unkept),
-                Err(ModelError::CoordinateTooLarge)
-            );
-            assert_eq!((model.vertices().len(), model.fraction_bits()), (3, 30));
-            model.add_vertex(decimals(["0", "0", "0"]), &mut unkept).unwrap();
-            assert_eq!(
-                model.add_vertex(decimals(["9", "0", "0"]), &mut unkept),
-                Err(ModelError::TooManyVertices { limit: 4 })
-            );
-            assert_eq!((model.vertices().len(), model.fraction_bits()), (4, 30));
-        });
-    }
-
-    #[test]
-    fn refused_elements_change_nothing() {
-        with_vertices(4, |model| {
-            let unknown = |number| Err(ModelError::UnknownVertex { number, vertices: 4 });
-            for number in [0, 5, -5, i32::MIN, i32::MAX] {
-                assert_eq!(
-                    model.add_face([1, 2, number].into_iter(), &mut unkept),
-                    unknown(number)
-                );
-                assert_eq!(
-                    model.add_polyline([1, number].into_iter(), &mut unkept),
-                    unknown(number)
-                );
-            }
-            assert_eq!(
-                model.add_face([1, 2].into_iter(), &mut unkept),
-                Err(ModelError::TooFewCorners { needed: 3 })
-            );
-            assert_eq!(
-                model.add_polyline([1].into_iter(), &mut unkept),
-                Err(ModelError::TooFewCorners { needed: 2 })
-            );
-            assert_eq!(
-                model.add_face([1, 2, 2].into_iter(), &mut unkept),
-                Err(ModelError::RepeatedVertex { number: 2 })
-            );
-            assert_eq!(
-                model.add_face([1, 2, 3, -4].into_iter(), &mut unkept),
-                Err(ModelError::RepeatedVertex { number: -4 })
-            );
-            assert_eq!(
-                model.add_face([1, 2, 3, 1, 2, 3, 1, 2, 3].into_iter(), &mut unkept),
-                Err(ModelError::TooManyCorners { limit: 8, needed: 9 })
-            );
-            assert_eq!((model.corner_count(), model.face_count(), model.bar_count()), (0, 0, 0));
-        });
-    }
-
-    #[test]
-    fn elements_come_back_as_they_were_sent() {
-        with_vertices(4, |model| {
-            model.add_polyline([1, 2, -1].into_iter(), &mut unkept).unwrap();
-            model.add_face([-4, -3, -2, -1].into_iter(), &mut unkept).unwrap();
-            let mut elements = model.elements().iter();
-            assert_eq!(elements.next(), Some(Element::Bar(0, 1)));
-            assert_eq!(elements.next(), Some(Element::Bar(1, 3)));
-            let Some(Element::Face(corners)) = elements.next() else { panic!("a face was sent") };
-            assert!(corners.iter().map(|corner| corner.vertex()).eq(0..4));
-            assert_eq!(elements.next(), None);
-            assert_eq!((model.face_count(), model.bar_count()), (1, 2));
-            assert!(!model.is_plan());
-        });
-    }
-
-    #[test]
-    fn bars_at_one_height_are_a_plan() {
-        with_vertices(2, |model| {
-            assert!(!model.is_plan());
-            model.add_polyline([1, 2].into_iter(), &mut unkept).unwrap();
-            assert!(model.is_plan());
-            model.add_vertex(decimals(["0", "0", "1"]), &mut unkept).unwrap();
-            assert!(!model.is_plan());
-        });
-    }
-}
+mod tests;

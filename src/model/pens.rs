@@ -1,7 +1,7 @@
 //! Stores which pen draws each element.
 //!
 //! Neighbouring elements mostly have the same pen. Therefore only the changes are stored, one
-//! [`PenRun`] for each, in the half-words after the corners. A model with one pen stores none. Pens
+//! [`PenRun`] for each, in a region of the [store](super::store). A model with one pen stores none. Pens
 //! are chosen by `usemtl` and `g`: a name with a number is the pen of that number, and any other
 //! name gets the first pen without a name. Of such a name a hash is kept.
 
@@ -24,6 +24,12 @@ pub struct PenRun {
 }
 
 impl PenRun {
+    /// Makes the change to `pen` at an element whose first corner has the index `first`, below
+    /// 2^16.
+    pub(super) fn new(first: usize, pen: u8) -> Self {
+        Self { first: first as u16, pen: pen.into() }
+    }
+
     /// Whether the run begins at this corner.
     pub(super) fn begins_at(self, corner: usize) -> bool {
         usize::from(self.first) == corner
@@ -86,7 +92,7 @@ impl<'a> PenWriter<'a> {
     pub fn element(&mut self, first: usize, pen: u8) {
         let last = Pens { runs: self.runs.get(..self.count).unwrap_or(&[]) }.last();
         if let Some(run) = self.runs.get_mut(self.count).filter(|_| pen != last) {
-            *run = PenRun { first: first as u16, pen: pen.into() }; // corners are fewer than 2^16
+            *run = PenRun::new(first, pen); // corners are fewer than 2^16
             self.count += 1;
         }
     }
@@ -144,11 +150,11 @@ pub(super) fn open_gap(
     }
     let new = [PenRun { first: at, pen }, PenRun { first: end, pen: after }];
     let is_new = [pen != before, after != pen];
-    let mut place = next;
+    let mut index = next;
     for run in new.into_iter().zip(is_new).filter_map(|(run, is_new)| is_new.then_some(run)) {
-        runs.copy_within(place..count, place + 1);
-        runs[place] = run;
-        (place, count) = (place + 1, count + 1);
+        runs.copy_within(index..count, index + 1);
+        runs[index] = run;
+        (index, count) = (index + 1, count + 1);
     }
     count
 }
@@ -186,9 +192,9 @@ impl PenBook {
     pub(super) fn choose(&mut self, name: PenName) -> Result<(), ModelError> {
         let pen = match name {
             PenName::Number(pen) => {
-                let place = self.names.get_mut(usize::from(pen)).ok_or(ModelError::TooManyPens)?;
-                if *place == FREE {
-                    *place = BY_NUMBER;
+                let name = self.names.get_mut(usize::from(pen)).ok_or(ModelError::TooManyPens)?;
+                if *name == FREE {
+                    *name = BY_NUMBER;
                 }
                 pen
             }

@@ -97,12 +97,12 @@ impl Model<'_> {
     ///
     /// ```
     /// use penup::fixed::Decimal;
-    /// use penup::model::{Model, unkept};
-    /// let (mut vertices, mut corners) = (heapless::Vec::<_, 2>::new(), heapless::Vec::<_, 2>::new());
+    /// use penup::model::{Model, no_undo};
+    /// let (mut vertices, mut corners) = (heapless::Vec::<_, 2>::new(), []);
     /// let mut model = Model::new(&mut vertices, &mut corners);
-    /// model.add_vertex(["8", "2.5", "0"].map(|text| Decimal::parse(text).unwrap()), &mut unkept)?;
+    /// model.add_vertex(["8", "2.5", "0"].map(|text| Decimal::parse(text).unwrap()), &mut no_undo)?;
     /// assert_eq!(model.precision().written, 1); // Exact but for the unit.
-    /// model.add_vertex(["1", "2.540", "0.125"].map(|text| Decimal::parse(text).unwrap()), &mut unkept)?;
+    /// model.add_vertex(["1", "2.540", "0.125"].map(|text| Decimal::parse(text).unwrap()), &mut no_undo)?;
     /// let half = model.precision().written as f64 / (1 << model.fraction_bits()) as f64;
     /// assert!((half - 0.0005).abs() < 1e-7);
     /// # Ok::<(), penup::model::ModelError>(())
@@ -126,6 +126,7 @@ mod tests {
     use super::super::*;
     use super::*;
     use crate::stage::Scratch;
+    use bytemuck::Zeroable;
 
     fn decimals(texts: [&str; 3]) -> [Decimal; 3] {
         texts.map(|text| Decimal::parse(text).unwrap())
@@ -133,10 +134,10 @@ mod tests {
 
     fn with_vertices(places: &[[&str; 3]], test: impl FnOnce(&mut Model<'_>)) {
         let mut vertices = heapless::Vec::<Position, 8>::new();
-        let mut corners = heapless::Vec::<Corner, 4>::new();
+        let mut corners = [Corner::zeroed(); 4];
         let mut model = Model::new(&mut vertices, &mut corners);
         for place in places {
-            model.add_vertex(decimals(*place), &mut unkept).unwrap();
+            model.add_vertex(decimals(*place), &mut no_undo).unwrap();
         }
         test(&mut model);
     }
@@ -160,7 +161,7 @@ mod tests {
                 Edit::Translate(decimals(["5", "0", "-7"]), None),
             ];
             for edit in edits {
-                model.edit(edit, Scratch::new(&mut []), &mut unkept).unwrap();
+                model.edit(edit, Scratch::new(&mut []), &mut no_undo).unwrap();
                 assert_eq!(model.precision(), Precision::default(), "{edit:?}");
             }
         });
@@ -190,9 +191,9 @@ mod tests {
             assert!(is_about(written(model), 5e-5));
             let mut words = [0; 64];
             assert!(model.save(&mut words));
-            model.add_vertex(decimals(["1000", "0", "0"]), &mut unkept).unwrap();
+            model.add_vertex(decimals(["1000", "0", "0"]), &mut no_undo).unwrap();
             assert!((written(model) - 5e-5).abs() < 3e-6);
-            model.edit(Edit::Rotate(0, 10.0, None), Scratch::new(&mut []), &mut unkept).unwrap();
+            model.edit(Edit::Rotate(0, 10.0, None), Scratch::new(&mut []), &mut no_undo).unwrap();
             assert!(written(model) > 8e-5);
             model.restore(&words);
             assert!(is_about(written(model), 5e-5));
@@ -206,7 +207,7 @@ mod tests {
         let place = ["0.123", "0.5", "0"];
         with_vertices(&[place, ["7", "7", "7"]], |model| {
             let edit = |model: &mut Model<'_>, edit| {
-                model.edit(edit, Scratch::new(&mut [0; 4]), &mut unkept).unwrap();
+                model.edit(edit, Scratch::new(&mut [0; 4]), &mut no_undo).unwrap();
                 written(model)
             };
             assert!(is_about(
@@ -221,7 +222,7 @@ mod tests {
             assert!(edit(model, Edit::Scale(decimals(["9", "1", "1"]), Some([1, 1]))) > 15e-4);
             // What is sent afterwards has its own error bound.
             model.clear();
-            model.add_vertex(decimals(place), &mut unkept).unwrap();
+            model.add_vertex(decimals(place), &mut no_undo).unwrap();
             assert!(is_about(written(model), 5e-4));
             assert_eq!(model.chosen_precision(Decimal::parse("0").unwrap()).written, 1);
             let chosen = model.chosen_precision(Decimal::parse("0.25").unwrap()).written;

@@ -2,11 +2,14 @@
 
 use super::pens::PenBook;
 use super::precision::Rounding;
-use super::{Corner, Model, PEN_LIMIT, Position};
+use super::{Model, PEN_LIMIT, Position};
 use crate::stage::{Scratch, items};
 
 /// The number of 32-bit values stored before the vertices.
-const HEAD: usize = 13 + PEN_LIMIT as usize;
+const HEAD: usize = NUMBERS + PEN_LIMIT as usize;
+
+/// How many of them are not the names of the pens.
+const NUMBERS: usize = 12;
 
 impl Model<'_> {
     /// Copies the model to `words`, without an unfinished curve. Returns `false` if it does not
@@ -18,32 +21,30 @@ impl Model<'_> {
     /// Returns how many of the words given to it [`Model::save`] uses.
     pub fn saved_words(&self) -> usize {
         let vertices = Scratch::bytes_for::<Position>(self.vertices.len());
-        let corners = Scratch::bytes_for::<Corner>(self.whole_corners().len());
+        let corners = Scratch::bytes_for::<u16>(self.stored_halves().len());
         (Scratch::bytes_for::<u32>(HEAD) + vertices + corners) / size_of::<u64>()
     }
 
     /// Returns the half-words of the elements, of the pens and of the completed curves.
-    fn whole_corners(&self) -> &[Corner] {
-        let end = self.curves.start + self.curves.whole();
-        self.corners.get(..end).unwrap_or(self.corners)
+    fn stored_halves(&self) -> &[u16] {
+        self.store.all_but(self.curves.unfinished_length(&self.store))
     }
 
     fn copy_to(&self, mut scratch: Scratch<'_>) -> Option<()> {
-        let corners = self.whole_corners();
-        let (curves, lengths) = (&self.curves, [self.vertices.len(), corners.len()]);
+        let halves = self.stored_halves();
+        let [corners, pen_runs, _] = self.store.lengths();
         let PenBook { names, current, by_material } = self.pens;
         let [decimals, edited] = self.rounding.numbers();
         let (numbers, rest) = scratch.take::<u32>(HEAD).ok()?.split_first_chunk_mut()?;
         *numbers = [
             self.fraction_bits as usize,
-            lengths[0],
-            lengths[1],
+            self.vertices.len(),
             self.faces,
             self.bars,
-            curves.start,
-            curves.whole(),
-            curves.count,
-            self.runs,
+            corners,
+            pen_runs,
+            self.curves.completed(),
+            self.curves.count,
             current.into(),
             by_material.into(),
             decimals,
@@ -51,8 +52,8 @@ impl Model<'_> {
         ]
         .map(|number| number as u32);
         *rest.first_chunk_mut()? = names;
-        scratch.take::<Position>(lengths[0]).ok()?.copy_from_slice(self.vertices);
-        scratch.take::<Corner>(lengths[1]).ok()?.copy_from_slice(corners);
+        scratch.take::<Position>(self.vertices.len()).ok()?.copy_from_slice(self.vertices);
+        scratch.take::<u16>(halves.len()).ok()?.copy_from_slice(halves);
         Some(())
     }
 
@@ -65,36 +66,23 @@ impl Model<'_> {
 
     fn copy_from(&mut self, words: &[u64]) -> Option<()> {
         let head: &[u32] = items(words, HEAD)?;
-        let (numbers, names) = head.split_first_chunk()?;
-        let [
-            fraction_bits,
-            vertices,
-            corners,
-            faces,
-            bars,
-            start,
-            whole,
-            count,
-            runs,
-            pen,
-            by,
-            decimals,
-            edited,
-        ] = *numbers;
+        let (numbers, names) = head.split_first_chunk::<NUMBERS>()?;
+        let [fraction_bits, rest @ .., decimals, edited] = *numbers;
+        let [vertices, faces, bars, corners, pen_runs, completed, count, pen, by] =
+            rest.map(|number| number as usize);
         let positions_at = Scratch::bytes_for::<u32>(HEAD) / 8;
-        let corners_at = positions_at + Scratch::bytes_for::<Position>(vertices as usize) / 8;
+        let halves_at = positions_at + Scratch::bytes_for::<Position>(vertices) / 8;
         self.vertices.clear();
-        let saved = items(words.get(positions_at..)?, vertices as usize)?;
-        self.vertices.extend_from_slice(saved).ok()?;
-        self.corners.clear();
-        self.corners.extend_from_slice(items(words.get(corners_at..)?, corners as usize)?).ok()?;
+        self.vertices.extend_from_slice(items(words.get(positions_at..)?, vertices)?).ok()?;
+        let lengths = [corners, pen_runs, completed];
+        let halves = items(words.get(halves_at..)?, lengths.iter().sum())?;
+        self.store.replace(lengths, halves)?;
         self.fraction_bits = fraction_bits;
         self.rounding = Rounding::from_numbers([decimals, edited]);
-        (self.faces, self.bars) = (faces as usize, bars as usize);
-        self.runs = runs as usize;
+        (self.faces, self.bars) = (faces, bars);
         let names = names.try_into().ok()?;
         self.pens = PenBook { names, current: pen as u8, by_material: by != 0 };
-        self.curves.restore(start as usize, whole as usize, count as usize);
+        self.curves.restore(completed, count);
         Some(())
     }
 }

@@ -25,7 +25,7 @@ pub struct Memory<
     const PORTS: usize = 1,
 > {
     vertices: heapless::Vec<Position, VERTICES>,
-    corners: heapless::Vec<Corner, CORNERS>,
+    corners: [Corner; CORNERS],
     words: [u64; WORDS],
     readers: [LineReader; PORTS],
 }
@@ -45,7 +45,7 @@ impl<const VERTICES: usize, const CORNERS: usize, const WORDS: usize, const PORT
     pub const fn new() -> Self {
         Self {
             vertices: heapless::Vec::new(),
-            corners: heapless::Vec::new(),
+            corners: [Corner::new(0, false, false); CORNERS],
             words: [0; WORDS],
             readers: [const { LineReader::new() }; PORTS],
         }
@@ -77,7 +77,7 @@ pub struct MemorySlices<'m> {
     /// Memory for the model's vertices.
     pub vertices: &'m mut heapless::VecView<Position>,
     /// Memory for the corners of its faces and the ends of its bars.
-    pub corners: &'m mut heapless::VecView<Corner>,
+    pub corners: &'m mut [Corner],
     /// Memory for the moves planned ahead.
     pub blocks: &'m mut [Block],
     /// Working memory for the stages of a job and the drawing that they compute.

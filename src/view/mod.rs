@@ -295,14 +295,14 @@ mod tests {
     use super::*;
     use crate::fixed::Decimal;
     use crate::model::Corner;
-    use crate::model::unkept;
+    use crate::model::no_undo;
 
     fn with_model(vertices: &[[&str; 3]], test: impl FnOnce(&Model<'_>)) {
-        let mut memory = (heapless::Vec::<Position, 16>::new(), heapless::Vec::<Corner, 16>::new());
+        let mut memory = (heapless::Vec::<Position, 16>::new(), [Corner::new(0, false, false); 16]);
         let mut model = Model::new(&mut memory.0, &mut memory.1);
         for vertex in vertices {
             model
-                .add_vertex(vertex.map(|text| Decimal::parse(text).unwrap()), &mut unkept)
+                .add_vertex(vertex.map(|text| Decimal::parse(text).unwrap()), &mut no_undo)
                 .unwrap();
         }
         test(&model);

@@ -132,7 +132,7 @@ fn hash(position: &Position) -> u32 {
 mod tests {
     use super::*;
     use crate::fixed::Decimal;
-    use crate::model::unkept;
+    use crate::model::no_undo;
     use crate::stage::NeverCancel;
     use std::vec::Vec;
 
@@ -142,15 +142,15 @@ mod tests {
 
     fn welded(places: &[[&str; 3]], faces: &[&[i32]]) -> Vec<(u16, bool, bool)> {
         let mut vertices = heapless::Vec::<Position, 16>::new();
-        let mut corners = heapless::Vec::<Corner, 64>::new();
+        let mut corners = [Corner::new(0, false, false); 64];
         let mut model = Model::new(&mut vertices, &mut corners);
         for place in places {
-            model.add_vertex(decimals(*place), &mut unkept).unwrap();
+            model.add_vertex(decimals(*place), &mut no_undo).unwrap();
         }
         for face in faces {
             match face.len() {
-                2 => model.add_polyline(face.iter().copied(), &mut unkept).unwrap(),
-                _ => model.add_face(face.iter().copied(), &mut unkept).unwrap(),
+                2 => model.add_polyline(face.iter().copied(), &mut no_undo).unwrap(),
+                _ => model.add_face(face.iter().copied(), &mut no_undo).unwrap(),
             }
         }
         let mut words = [0; 64];
@@ -185,12 +185,12 @@ mod tests {
     #[test]
     fn what_has_no_repeats_is_untouched_and_takes_no_memory() {
         let mut vertices = heapless::Vec::<Position, 4>::new();
-        let mut corners = heapless::Vec::<Corner, 4>::new();
+        let mut corners = [Corner::new(0, false, false); 4];
         let mut model = Model::new(&mut vertices, &mut corners);
         for [x, y] in [["0", "0"], ["1", "0"], ["0.5", "1"]] {
-            model.add_vertex(decimals([x, y, "0"]), &mut unkept).unwrap();
+            model.add_vertex(decimals([x, y, "0"]), &mut no_undo).unwrap();
         }
-        model.add_face([1, 2, 3].into_iter(), &mut unkept).unwrap();
+        model.add_face([1, 2, 3].into_iter(), &mut no_undo).unwrap();
         let mut words = [0; 2];
         let mut scratch = Scratch::new(&mut words);
         let (elements, degenerate) = weld(&model, &mut scratch, &mut NeverCancel).unwrap();

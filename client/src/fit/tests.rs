@@ -1,7 +1,7 @@
 use super::*;
 use crate::formats::SourceFile;
 use penup::curve::{FRACTION_BITS, Point};
-use penup::model::{Corner, Model, Position, unkept};
+use penup::model::{Corner, Model, Position, no_undo};
 use penup::protocol::Command;
 
 /// Fits the polylines of an OBJ text.
@@ -42,17 +42,17 @@ fn obj_of(polylines: &[Vec<Place>]) -> String {
 /// The chords of every curve of a file, as the plotter would read and flatten it.
 fn flattened(obj: &str) -> Vec<Vec<Place>> {
     let mut vertices = Box::new(heapless::Vec::<Position, 16_000>::new());
-    let mut corners = Box::new(heapless::Vec::<Corner, 40_000>::new());
-    let mut model = Model::new(&mut *vertices, &mut *corners);
+    let mut corners = vec![Corner::new(0, false, false); 40_000];
+    let mut model = Model::new(&mut *vertices, &mut corners);
     for line in obj.lines() {
         assert!(line.len() <= 256, "{line}");
         let done = match Command::parse(line).unwrap() {
             Command::Nothing => Ok(()),
-            Command::Vertex(place) => model.add_vertex(place, &mut unkept),
+            Command::Vertex(place) => model.add_vertex(place, &mut no_undo),
             Command::Degree(degree) => model.set_degree(degree),
             Command::Curve { ends, control } => model.begin_curve(ends, control.iter()),
             Command::Knots(knots) => model.add_knots(knots.iter()),
-            Command::EndCurve => model.end_curve(&mut unkept),
+            Command::EndCurve => model.end_curve(&mut no_undo),
             other => panic!("{other:?}"),
         };
         done.unwrap();

@@ -1,0 +1,110 @@
+//! Edits of the completed curves of a model.
+
+use super::{CurveList, HEADER, PEN, lengths};
+use crate::model::ModelError;
+use crate::model::store::Store;
+use core::ops::Range;
+
+impl CurveList {
+    /// Gives control points new numbers, as the model does with its vertices. A curve with a
+    /// control point for which `new` returns `None` is removed.
+    pub(in crate::model) fn renumber(
+        &mut self,
+        store: &mut Store<'_>,
+        new: &dyn Fn(u16) -> Option<u16>,
+    ) {
+        self.retain(store, &mut |control| {
+            control.iter_mut().all(|number| new(*number).inspect(|new| *number = *new).is_some())
+        });
+    }
+
+    /// Deletes the curves in `range`. If `plug`, the last curve moves to the position of the first
+    /// of them.
+    pub(in crate::model) fn delete(
+        &mut self,
+        store: &mut Store<'_>,
+        range: Range<usize>,
+        plug: bool,
+    ) {
+        let length = |number| self.curves(store).iter().nth(number).map(|curve| curve.half_words());
+        let mut gone = range.clone();
+        let last = self.count - 1; // the range is not empty
+        if plug && range.start < last {
+            let before: usize = (0..range.start).filter_map(length).sum();
+            let last = length(last).unwrap_or(0);
+            let curves = store.curves_mut().get_mut(before..self.completed);
+            curves.unwrap_or(&mut []).rotate_right(last);
+            gone = range.start + 1..range.start + 2;
+        }
+        let mut number = 0;
+        self.retain(store, &mut |_| {
+            number += 1;
+            !gone.contains(&(number - 1))
+        });
+    }
+
+    /// Keeps the curves for which `stays` returns `true`; it may change their control points.
+    fn retain(&mut self, store: &mut Store<'_>, stays: &mut dyn FnMut(&mut [u16]) -> bool) {
+        let halves = store.curves_mut();
+        let (mut read, mut write, mut kept) = (0, 0, 0);
+        while let Some((length, control_points)) =
+            halves.get(read..self.completed).and_then(lengths)
+        {
+            let control = read + HEADER..read + HEADER + control_points;
+            if stays(halves.get_mut(control).unwrap_or(&mut [])) {
+                halves.copy_within(read..read + length, write);
+                write += length;
+                kept += 1;
+            }
+            read += length;
+        }
+        store.truncate_curves(write);
+        (self.completed, self.count) = (write, kept);
+    }
+
+    /// Adds a copy of each curve for which `is_copied` returns `true`, with new control points.
+    ///
+    /// # Errors
+    /// [`ModelError::TooManyCorners`], once there is no room for another copy.
+    pub(in crate::model) fn copy(
+        &mut self,
+        store: &mut Store<'_>,
+        is_copied: &dyn Fn(&mut dyn Iterator<Item = u16>) -> bool,
+        new: &dyn Fn(u16) -> Option<u16>,
+    ) -> Result<(), ModelError> {
+        let (mut at, end) = (0, self.completed);
+        while let Some((length, control_points)) = store.curves().get(at..end).and_then(lengths) {
+            let (control, curve) = (HEADER..HEADER + control_points, at..at + length);
+            at += length;
+            let numbers =
+                store.curves().get(curve.clone()).and_then(|all| all.get(control.clone()));
+            if !is_copied(&mut numbers.unwrap_or(&[]).iter().copied()) {
+                continue;
+            }
+            let start = store.curves().len();
+            store.add_to_curves(length)?;
+            let curves = store.curves_mut();
+            curves.copy_within(curve, start);
+            let copy = curves.get_mut(start..).and_then(|copy| copy.get_mut(control));
+            for number in copy.unwrap_or(&mut []) {
+                *number = new(*number).unwrap_or(*number);
+            }
+            (self.completed, self.count) = (start + length, self.count + 1);
+        }
+        Ok(())
+    }
+
+    /// Gives all curves the first pen, including the unfinished one.
+    pub(in crate::model) fn forget_pens(&mut self, store: &mut Store<'_>) {
+        let (curves, mut at) = (store.curves_mut(), 0);
+        while let Some(header) = curves.get_mut(at..).and_then(|rest| rest.get_mut(..HEADER)) {
+            header[PEN] = 0;
+            match lengths(header) {
+                // The header of the unfinished curve has no number of knots yet, but it is the last
+                // curve.
+                Some((length, _)) if at < self.completed => at += length,
+                _ => break,
+            }
+        }
+    }
+}

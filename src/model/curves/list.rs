@@ -1,0 +1,196 @@
+//! The curves of a model while they are sent: an unfinished curve becomes a completed one.
+
+use super::{Curves, HEADER};
+use crate::curve::{CurveError, KNOT_LIMIT, Knots, check_interior, check_shape, parameter_of};
+use crate::fixed::{Decimal, shift_right_rounding};
+use crate::model::ModelError;
+use crate::model::store::Store;
+
+/// The curves of a model: which half-words of the store are complete curves, and the state of the
+/// unfinished one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(in crate::model) struct CurveList {
+    /// The number of half-words of completed curves. Those of the unfinished curve follow.
+    pub(super) completed: usize,
+    /// The number of completed curves.
+    pub(in crate::model) count: usize,
+    /// The degree of the curves that follow, once it is set.
+    degree: Option<u8>,
+    /// The unfinished curve.
+    unfinished: Option<Unfinished>,
+}
+
+/// An unfinished curve: its `end` has not come yet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Unfinished {
+    order: u8,
+    control_points: u16,
+    /// The two parameters of `curv`, in units of 2^-[`FINEST`], with |value| <= 2^44.
+    ends: [i64; 2],
+    /// The number of fraction bits of its knots, or `None` while it has no knots of its own.
+    fraction_bits: Option<u8>,
+}
+
+/// The finest unit of a knot is 2^-22, with which |knot| is at most 1.
+const FINEST: u32 = 22;
+
+/// If a curve has no knots of its own, its ends are kept to 2^-16 of the distance between knots.
+const UNIFORM_BITS: u32 = 16;
+
+impl CurveList {
+    /// Returns the completed curves.
+    pub(in crate::model) fn curves<'a>(&self, store: &'a Store<'_>) -> Curves<'a> {
+        Curves { halves: store.curves().get(..self.completed).unwrap_or(&[]) }
+    }
+
+    /// `deg`: sets the degree of the curves that follow, 1 to 5.
+    pub(in crate::model) fn set_degree(&mut self, degree: u8) -> Result<(), ModelError> {
+        if !(1..=5).contains(&degree) {
+            return Err(ModelError::Curve(CurveError::Order));
+        }
+        self.degree = Some(degree);
+        Ok(())
+    }
+
+    /// `curv`: begins a curve between two parameters over the points numbered `control`, from 0.
+    /// The points must exist.
+    pub(in crate::model) fn begin(
+        &mut self,
+        store: &mut Store<'_>,
+        ends: [Decimal; 2],
+        control: impl Iterator<Item = u16> + Clone,
+        pen: u8,
+    ) -> Result<(), ModelError> {
+        if self.unfinished.is_some() {
+            return Err(ModelError::CurveUnfinished);
+        }
+        let order = self.degree.ok_or(ModelError::NoDegree)? + 1;
+        let control_points = control.clone().count();
+        check_shape(control_points, order, Knots::Uniform).map_err(ModelError::Curve)?;
+        store.check_room(HEADER + control_points)?;
+        let limit = i64::from(KNOT_LIMIT) << FINEST;
+        let value = |end: Decimal| end.to_binary(FINEST).ok().filter(|end| end.abs() <= limit);
+        let ends = match ends.map(value) {
+            [Some(from), Some(to)] => [from, to],
+            _ => return Err(ModelError::KnotTooLarge),
+        };
+        let curve = store.add_to_curves(HEADER + control_points)?;
+        let control_points = control_points as u16; // at most 2^12
+        let header = [control_points, u16::from(order), 0, u16::from(pen), 0, 0, 0, 0];
+        for (half, new) in curve.iter_mut().zip(header.into_iter().chain(control)) {
+            *half = new;
+        }
+        self.unfinished = Some(Unfinished { order, control_points, ends, fraction_bits: None });
+        Ok(())
+    }
+
+    /// `parm u`: adds knots to the unfinished curve.
+    ///
+    /// All knots share one binary unit, which becomes coarser when a larger knot comes. Each keeps
+    /// 22 bits of the largest.
+    pub(in crate::model) fn add_knots(
+        &mut self,
+        store: &mut Store<'_>,
+        knots: impl Iterator<Item = Decimal> + Clone,
+    ) -> Result<(), ModelError> {
+        let unfinished = self.unfinished.ok_or(ModelError::NoCurve)?;
+        let before = unfinished.fraction_bits.map_or(FINEST, u32::from);
+        let fraction_bits = (0..=before)
+            .rev()
+            .find(|bits| knots.clone().all(|knot| in_unit(knot, *bits).is_some()))
+            .ok_or(ModelError::KnotTooLarge)?;
+        let count = knots.clone().count();
+        store.check_room(2 * count)?;
+        let start = self.completed + HEADER + usize::from(unfinished.control_points);
+        let listed = store.curves_mut().get_mut(start..).unwrap_or(&mut []);
+        for knot in bytemuck::cast_slice_mut::<u16, [u16; 2]>(listed) {
+            *knot =
+                bytemuck::cast(shift_right_rounding(bytemuck::cast(*knot), before - fraction_bits));
+        }
+        let new = knots.filter_map(|knot| in_unit(knot, fraction_bits));
+        let added = bytemuck::cast_slice_mut::<u16, [u16; 2]>(store.add_to_curves(2 * count)?);
+        for (halves, knot) in added.iter_mut().zip(new) {
+            *halves = bytemuck::cast(knot);
+        }
+        self.unfinished =
+            Some(Unfinished { fraction_bits: Some(fraction_bits as u8), ..unfinished });
+        Ok(())
+    }
+
+    /// `end`: completes the unfinished curve, which [`CurveList::count_completed`] then adds to the model.
+    /// If it is refused it is discarded.
+    pub(in crate::model) fn end(&mut self, store: &mut Store<'_>) -> Result<(), ModelError> {
+        let unfinished = self.unfinished.take().ok_or(ModelError::NoCurve)?;
+        let closed = self.close(store, &unfinished);
+        if closed.is_err() {
+            store.truncate_curves(self.completed);
+        }
+        closed
+    }
+
+    /// Records that the store holds completed curves only, one more than before.
+    pub(in crate::model) fn count_completed(&mut self, store: &Store<'_>) {
+        self.completed = store.curves().len();
+        self.count += 1;
+    }
+
+    /// Checks the unfinished curve and completes its header.
+    fn close(&self, store: &mut Store<'_>, unfinished: &Unfinished) -> Result<(), ModelError> {
+        let Unfinished { order, control_points, .. } = *unfinished;
+        let control_points = usize::from(control_points);
+        let halves = store.curves_mut().get_mut(self.completed..).unwrap_or(&mut []);
+        let (header, rest) = halves.split_at_mut_checked(HEADER).ok_or(ModelError::NoCurve)?;
+        let knots: &[[u16; 2]] = bytemuck::cast_slice(rest.get(control_points..).unwrap_or(&[]));
+        let knot_count = knots.len();
+        let (knots, bits, fraction_bits) = match unfinished.fraction_bits {
+            Some(bits) => (Knots::Packed(knots), u32::from(bits), 0),
+            None => (Knots::Uniform, 0, UNIFORM_BITS),
+        };
+        check_shape(control_points, order, knots).map_err(ModelError::Curve)?;
+        let shift = FINEST - bits - fraction_bits;
+        let [from, to] = unfinished.ends.map(|end| (end + (1 << shift >> 1)) >> shift);
+        // The same number may differ by one unit as an end and as a knot that was rounded twice.
+        let first = knots.get(usize::from(order) - 1) << fraction_bits;
+        let last = knots.get(control_points) << fraction_bits;
+        if from < first - 1 || to > last + 1 {
+            return Err(ModelError::Curve(CurveError::OutsideKnots));
+        }
+        let (from, to) = (from.max(first), to.min(last));
+        check_interior(order, knots, from, to).map_err(ModelError::Curve)?;
+        let [from, to] =
+            [from, to].map(|u| parameter_of(control_points, order, knots, u, fraction_bits));
+        let ends: [u16; 4] = bytemuck::cast([from.to_bits(), to.to_bits()]);
+        if let [_, _, count, _, stored_ends @ ..] = header {
+            // It fits, because the memory has fewer half-words than there are vertex numbers.
+            *count = knot_count as u16;
+            stored_ends.copy_from_slice(&ends);
+        }
+        Ok(())
+    }
+
+    /// Whether there is an unfinished curve.
+    pub(in crate::model) fn is_unfinished(&self) -> bool {
+        self.unfinished.is_some()
+    }
+
+    /// Returns the number of half-words of completed curves.
+    pub(in crate::model) fn completed(&self) -> usize {
+        self.completed
+    }
+
+    /// Returns the number of half-words of the unfinished curve.
+    pub(in crate::model) fn unfinished_length(&self, store: &Store<'_>) -> usize {
+        store.curves().len() - self.completed
+    }
+
+    /// Restores `count` curves in `completed` half-words, as they once were.
+    pub(in crate::model) fn restore(&mut self, completed: usize, count: usize) {
+        *self = Self { completed, count, degree: self.degree, unfinished: None };
+    }
+}
+
+/// Returns a knot in units of 2^-`fraction_bits`, or `None` if it does not fit.
+fn in_unit(knot: Decimal, fraction_bits: u32) -> Option<i32> {
+    let value = i32::try_from(knot.to_binary(fraction_bits).ok()?).ok()?;
+    (value.unsigned_abs() <= KNOT_LIMIT.unsigned_abs()).then_some(value)
+}

@@ -1,0 +1,134 @@
+//! Stores the curves of a model, in a region of the [store](super::store).
+//!
+//! They arrive as in OBJ: `deg 3`, `curv u0 u1 i1 i2 …`, `parm u k1 k2 …` (no such line, or as many
+//! as needed), `end`. Without `parm` the knots are 0, 1, 2, … Each curve is stored in half-words: a
+//! header of eight, its control points, and two for each knot if it has knots of its own.
+//! [`CurveList`] changes them, [`Curves`] reads them.
+
+mod edit;
+mod list;
+
+pub(super) use list::CurveList;
+
+use crate::curve::{CurveError, Fine, Knots, Parameter, Point, Spline};
+use crate::stage::{Cancel, OutOfScratch, StageError};
+
+/// A stored curve.
+#[derive(Debug, Clone, Copy)]
+pub struct StoredCurve<'a> {
+    /// The degree plus 1.
+    pub order: u8,
+    /// The pen that draws it, from 0.
+    pub pen: u8,
+    /// The vertex numbers of its control points, from 0.
+    pub control: &'a [u16],
+    /// Its knots.
+    pub knots: Knots<'a>,
+    /// The parameter at which it begins.
+    pub from: Parameter,
+    /// The parameter at which it ends.
+    pub to: Parameter,
+}
+
+impl<'a> StoredCurve<'a> {
+    /// Returns how many half-words of the model's memory it takes.
+    pub fn half_words(&self) -> usize {
+        HEADER + self.control.len() + 2 * self.knots.count().unwrap_or(0)
+    }
+
+    /// Returns the curve over these points.
+    ///
+    /// # Errors
+    /// [`CurveError::UnknownPoint`] if `points` has not all of its control points.
+    pub fn spline(&self, points: &'a [Point]) -> Result<Spline<'a>, CurveError> {
+        Spline::new(points, self.control, self.order, self.knots)
+            .map(|whole| whole.between(self.from, self.to))
+    }
+}
+
+/// The completed curves of a model, in the order in which they came.
+///
+/// If they come from a model, every control point exists and every curve is valid.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Curves<'a> {
+    /// The half-words of the curves, one curve after another.
+    halves: &'a [u16],
+}
+
+impl<'a> Curves<'a> {
+    /// Returns each curve in turn.
+    pub fn iter(&self) -> impl Iterator<Item = StoredCurve<'a>> + Clone + use<'a> {
+        let mut rest = self.halves;
+        core::iter::from_fn(move || {
+            let (curve, after) = read(rest)?;
+            rest = after;
+            Some(curve)
+        })
+    }
+
+    /// Whether there are no curves.
+    pub fn is_empty(&self) -> bool {
+        self.halves.is_empty()
+    }
+
+    /// Calls `each` with the end of each chord of the curves over `points`, and with whether
+    /// another curve begins there. The chords deviate from the curves by at most `tolerance`: see
+    /// [`Spline::chords`].
+    ///
+    /// # Errors
+    /// [`StageError::Aborted`], or what `each` returns.
+    // Not inlined, so that its stack frame is not below those of the stages.
+    #[inline(never)]
+    pub fn flatten(
+        &self,
+        points: &[Point],
+        project: &dyn Fn([i64; 3]) -> Option<Fine>,
+        tolerance: u16,
+        cancel: &mut dyn Cancel,
+        each: &mut dyn FnMut(Point, bool) -> Result<(), OutOfScratch>,
+    ) -> Result<(), StageError> {
+        for curve in self.iter() {
+            // All control points of a model's curves exist.
+            let Ok(spline) = curve.spline(points) else { continue };
+            let mut begins = true;
+            for (_, end) in spline.chords(project, tolerance) {
+                cancel.check()?;
+                each(end, begins)?;
+                begins = false;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The number of half-words before the control points. They hold the number of control points, the
+/// order, the number of knots, the pen, and both ends.
+const HEADER: usize = 8;
+/// The index of the pen in the header.
+const PEN: usize = 3;
+
+/// Returns how many half-words the first curve takes, and how many control points it has.
+fn lengths(halves: &[u16]) -> Option<(usize, usize)> {
+    let [control_points, _, knots, ..] = *halves else { return None };
+    let control_points = usize::from(control_points);
+    Some((HEADER + control_points + 2 * usize::from(knots), control_points))
+}
+
+/// Returns the first curve, and the half-words after it.
+fn read(halves: &[u16]) -> Option<(StoredCurve<'_>, &[u16])> {
+    let (length, control_points) = lengths(halves)?;
+    let (curve, after) = halves.split_at_checked(length)?;
+    let (header, rest) = curve.split_at_checked(HEADER)?;
+    let (control, knots) = rest.split_at_checked(control_points)?;
+    let knots = match knots {
+        [] => Knots::Uniform,
+        knots => Knots::Packed(bytemuck::cast_slice(knots)),
+    };
+    let [_, order, _, pen, a, b, c, d] = *header else { return None };
+    let ends: [u32; 2] = bytemuck::cast([a, b, c, d]);
+    let [from, to] = ends.map(Parameter::from_bits);
+    Some((StoredCurve { order: order as u8, pen: pen as u8, control, knots, from, to }, after))
+}
+
+#[cfg(test)]
+mod tests;

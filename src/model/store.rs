@@ -1,0 +1,255 @@
+//! The model's memory of half-words (16 bits): the corners of the elements, the changes of the pen
+//! and the curves.
+//!
+//! The three [`Region`]s lie one after the other from the beginning of the memory, and the free
+//! half-words behind them. So each may grow as long as any half-word is free. Only this file knows
+//! where a region begins.
+
+use super::pens::{PenRun, RUN};
+use super::{Corner, ModelError};
+use core::ops::Range;
+
+/// A part of the memory, in the order in which they lie there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Region {
+    /// The [`Corner`]s of faces and bars, one half-word each.
+    Corners,
+    /// The [`PenRun`]s, two half-words each.
+    PenRuns,
+    /// The curves; see [`super::Curves`].
+    Curves,
+}
+
+/// The number of regions.
+const REGIONS: usize = 3;
+
+/// The half-words of a model, in three regions.
+///
+/// The lengths of the regions add up to no more than the memory has. A change that does not fit is
+/// refused and changes nothing.
+#[derive(Debug)]
+pub(super) struct Store<'m> {
+    memory: &'m mut [u16],
+    /// The number of half-words of each region.
+    lengths: [usize; REGIONS],
+}
+
+impl<'m> Store<'m> {
+    /// Makes an empty store. What the memory contains is discarded.
+    pub(super) fn new(memory: &'m mut [Corner]) -> Self {
+        Self { memory: bytemuck::cast_slice_mut(memory), lengths: [0; REGIONS] }
+    }
+
+    /// Empties all regions.
+    pub(super) fn clear(&mut self) {
+        self.lengths = [0; REGIONS];
+    }
+
+    /// Returns how many half-words there are.
+    pub(super) fn capacity(&self) -> usize {
+        self.memory.len()
+    }
+
+    /// Returns how many half-words are in use.
+    pub(super) fn used(&self) -> usize {
+        self.lengths.iter().sum()
+    }
+
+    /// Checks that so many half-words are free.
+    ///
+    /// # Errors
+    /// [`ModelError::TooManyCorners`].
+    pub(super) fn check_room(&self, count: usize) -> Result<(), ModelError> {
+        let (limit, needed) = (self.capacity(), self.used().saturating_add(count));
+        if needed > limit { Err(ModelError::TooManyCorners { limit, needed }) } else { Ok(()) }
+    }
+
+    fn range(&self, region: Region) -> Range<usize> {
+        let start = self.lengths[..region as usize].iter().sum();
+        start..start + self.lengths[region as usize]
+    }
+
+    fn region(&self, region: Region) -> &[u16] {
+        self.memory.get(self.range(region)).unwrap_or(&[])
+    }
+
+    fn region_mut(&mut self, region: Region) -> &mut [u16] {
+        let range = self.range(region);
+        self.memory.get_mut(range).unwrap_or(&mut [])
+    }
+
+    /// Returns the corners of the elements.
+    pub(super) fn corners(&self) -> &[Corner] {
+        bytemuck::cast_slice(self.region(Region::Corners))
+    }
+
+    /// As [`Store::corners`], to be changed.
+    pub(super) fn corners_mut(&mut self) -> &mut [Corner] {
+        bytemuck::cast_slice_mut(self.region_mut(Region::Corners))
+    }
+
+    /// Returns the changes of the pen.
+    pub(super) fn pen_runs(&self) -> &[PenRun] {
+        bytemuck::cast_slice(self.region(Region::PenRuns))
+    }
+
+    /// As [`Store::pen_runs`], to be changed.
+    pub(super) fn pen_runs_mut(&mut self) -> &mut [PenRun] {
+        bytemuck::cast_slice_mut(self.region_mut(Region::PenRuns))
+    }
+
+    /// Returns the half-words of the curves.
+    pub(super) fn curves(&self) -> &[u16] {
+        self.region(Region::Curves)
+    }
+
+    /// As [`Store::curves`], to be changed.
+    pub(super) fn curves_mut(&mut self) -> &mut [u16] {
+        self.region_mut(Region::Curves)
+    }
+
+    /// Adds corners behind those of the elements and returns them, to be filled.
+    ///
+    /// # Errors
+    /// [`ModelError::TooManyCorners`]; nothing is changed.
+    pub(super) fn add_corners(&mut self, count: usize) -> Result<&mut [Corner], ModelError> {
+        self.grow(Region::Corners, count).map(bytemuck::cast_slice_mut)
+    }
+
+    /// Adds changes of the pen behind the others and returns them, to be filled.
+    ///
+    /// # Errors
+    /// [`ModelError::TooManyCorners`]; nothing is changed.
+    pub(super) fn add_pen_runs(&mut self, count: usize) -> Result<&mut [PenRun], ModelError> {
+        self.grow(Region::PenRuns, RUN * count).map(bytemuck::cast_slice_mut)
+    }
+
+    /// Adds half-words behind those of the curves and returns them, to be filled.
+    ///
+    /// # Errors
+    /// [`ModelError::TooManyCorners`]; nothing is changed.
+    pub(super) fn add_to_curves(&mut self, count: usize) -> Result<&mut [u16], ModelError> {
+        self.grow(Region::Curves, count)
+    }
+
+    /// Removes all corners but the first `count`.
+    pub(super) fn truncate_corners(&mut self, count: usize) {
+        self.truncate(Region::Corners, count);
+    }
+
+    /// Removes all changes of the pen but the first `count`.
+    pub(super) fn truncate_pen_runs(&mut self, count: usize) {
+        self.truncate(Region::PenRuns, RUN * count);
+    }
+
+    /// Removes all half-words of the curves but the first `count`.
+    pub(super) fn truncate_curves(&mut self, count: usize) {
+        self.truncate(Region::Curves, count);
+    }
+
+    /// Lengthens a region by `count` half-words and returns them; their contents are left over from
+    /// before. The regions behind it are moved.
+    // Not inlined: the three ways to it share one copy of the code.
+    #[inline(never)]
+    fn grow(&mut self, region: Region, count: usize) -> Result<&mut [u16], ModelError> {
+        self.check_room(count)?;
+        let (end, used) = (self.range(region).end, self.used());
+        self.memory.copy_within(end..used, end + count);
+        self.lengths[region as usize] += count;
+        Ok(self.memory.get_mut(end..end + count).unwrap_or(&mut []))
+    }
+
+    /// Shortens a region to its first `length` half-words, if it is longer. The regions behind it
+    /// are moved.
+    #[inline(never)]
+    fn truncate(&mut self, region: Region, length: usize) {
+        let (Range { start, end }, used) = (self.range(region), self.used());
+        let length = length.min(end - start);
+        self.memory.copy_within(end..used, start + length);
+        self.lengths[region as usize] = length;
+    }
+
+    /// Returns the half-words of all regions in turn, without the last `without` of them.
+    pub(super) fn all_but(&self, without: usize) -> &[u16] {
+        self.memory.get(..self.used().saturating_sub(without)).unwrap_or(&[])
+    }
+
+    /// Returns the number of half-words of each region.
+    pub(super) fn lengths(&self) -> [usize; REGIONS] {
+        self.lengths
+    }
+
+    /// Replaces all regions: `halves` are those of all in turn, and `lengths` says how many each
+    /// has. Returns `None`, and changes nothing, if that is not so or they do not fit.
+    pub(super) fn replace(&mut self, lengths: [usize; REGIONS], halves: &[u16]) -> Option<()> {
+        if lengths.iter().sum::<usize>() != halves.len() {
+            return None;
+        }
+        self.memory.get_mut(..halves.len())?.copy_from_slice(halves);
+        self.lengths = lengths;
+        Some(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bytemuck::Zeroable;
+    use std::vec::Vec;
+
+    const ALL: [Region; REGIONS] = [Region::Corners, Region::PenRuns, Region::Curves];
+
+    #[test]
+    fn regions_grow_and_shrink_as_three_separate_lists() {
+        let mut memory = [Corner::zeroed(); 40];
+        let mut store = Store::new(&mut memory);
+        let mut lists: [Vec<u16>; REGIONS] = Default::default();
+        let mut state = 1u32;
+        let mut random = |below: usize| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 16) as usize % below
+        };
+        for step in 0..20_000u16 {
+            let (region, used) = (ALL[random(REGIONS)], lists.iter().map(Vec::len).sum::<usize>());
+            let list = &mut lists[region as usize];
+            if random(2) == 0 {
+                let count = 2 * random(5);
+                match store.grow(region, count) {
+                    Ok(new) => {
+                        new.fill(step);
+                        list.extend((0..count).map(|_| step));
+                    }
+                    Err(error) => {
+                        let needed = used + count;
+                        assert_eq!(error, ModelError::TooManyCorners { limit: 40, needed });
+                        assert!(needed > 40);
+                    }
+                }
+            } else {
+                let length = 2 * random(10);
+                store.truncate(region, length);
+                list.truncate(length);
+            }
+            for region in ALL {
+                assert_eq!(store.region(region), lists[region as usize]);
+                assert_eq!(store.region_mut(region), lists[region as usize]);
+            }
+            let all = lists.concat();
+            assert_eq!((store.used(), store.all_but(0)), (all.len(), &all[..]));
+        }
+    }
+
+    #[test]
+    fn what_was_copied_comes_back() {
+        let (mut memory, mut other) = ([Corner::zeroed(); 8], [Corner::zeroed(); 8]);
+        let (mut store, mut copy) = (Store::new(&mut memory), Store::new(&mut other));
+        for (region, half) in ALL.into_iter().zip([1, 2, 3]) {
+            store.grow(region, 2).unwrap().fill(half);
+        }
+        copy.replace([2, 2, 1], store.all_but(1)).unwrap();
+        assert_eq!([copy.region(ALL[0]), copy.region(ALL[1])], [[1, 1], [2, 2]]);
+        assert_eq!(copy.curves(), [3]);
+        assert_eq!(copy.replace([9, 0, 0], &[7; 9]), None);
+        assert_eq!(copy.used(), 5);
+    }
+}
