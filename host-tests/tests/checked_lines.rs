@@ -2,8 +2,8 @@
 //! do.
 
 use penup::protocol::{CommandError, Label, Named, Numbering, Received};
-use penup_client::protocol::numbered;
 use penup_client::lines::JobLine;
+use penup_client::protocol::numbered;
 use penup_client::twin;
 use penup_host_tests::whole_jobs::{Bench, job_lines};
 

@@ -6,9 +6,9 @@
 
 use penup::drawing::PagePoint;
 use penup_client::error::Error;
+use penup_client::lines::JobLine;
 use penup_client::progress::Quiet;
 use penup_client::sender::{Patience, Sender};
-use penup_client::lines::JobLine;
 use penup_host_tests::noisy_line::{Damage, Fault, NoisyLine, Random};
 use penup_host_tests::whole_jobs::{Bench, job_lines};
 use std::collections::BTreeSet;

@@ -3,12 +3,12 @@
 #![cfg(feature = "emulator")]
 #![allow(clippy::expect_used, reason = "a test fails with the words of what it expected")]
 
+use penup_client::lines::JobLine;
 use penup_client::link::Link;
 use penup_client::machines::{Board, WatchedPlotter, emulate};
 use penup_client::page::Run;
 use penup_client::progress::Quiet;
 use penup_client::sender::{Patience, Sender};
-use penup_client::lines::JobLine;
 use penup_host_tests::noisy_line::Random;
 use penup_host_tests::whole_jobs::job_lines;
 use std::error::Error;
