@@ -1,6 +1,6 @@
 //! Reads the files that a job can draw.
 //!
-//! Each file format is one module here and one row of [`FORMATS`]. It turns the contents of a file
+//! Each file format is one module here and one row of `FORMATS`. It turns the contents of a file
 //! into the lines that are sent to a plotter; everything else in the client works on these
 //! [`Lines`], whatever file they come from.
 //!
