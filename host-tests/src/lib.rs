@@ -28,5 +28,6 @@ pub mod cut_flash;
 pub mod heaviest_jobs;
 pub mod whole_jobs;
 pub mod emulated_jobs;
+pub mod gear_train;
 pub mod spiral;
 pub mod step_edges;

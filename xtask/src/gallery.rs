@@ -1,11 +1,25 @@
-//! Makes the gallery: a page with the figures of the papers, drawn by penup.
+//! Makes the gallery: a page with the figures of the papers, drawn by penup, and the picture that
+//! README begins with.
 
 use std::fmt::Write as _;
 use std::fs;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 
-use crate::command::run;
+use crate::command::{cargo, run};
+
+/// The scene of README's picture, and the options with which it is drawn.
+const GEARS: [&str; 9] = [
+    "scenes/gears.obj",
+    "--eye=-22.3,-118.7,88.9",
+    "--at=0,-3,4",
+    "--crease",
+    "40",
+    "--page",
+    "240x158",
+    "--margin",
+    "6",
+];
 
 /// A figure of the page.
 struct Figure {
@@ -79,14 +93,46 @@ const CHAPTERS: [(&str, &[Figure]); 6] = [
     ),
 ];
 
-/// Draws every figure into `docs/gallery` and writes the page.
+/// Draws every figure into `docs/gallery` and writes the page, and draws README's picture.
 pub fn make() -> Result<()> {
+    draw_figures()?;
+    draw_gears()
+}
+
+/// Writes `scenes/gears.obj`, and draws it into `docs/gears.svg`.
+fn draw_gears() -> Result<()> {
+    let mut example = cargo();
+    example.args(["run", "--quiet", "--package", "penup-host-tests", "--example", "gears"]);
+    let made = example.current_dir(crate::root()).output().context("cannot run cargo")?;
+    if !made.status.success() {
+        bail!("the scene cannot be made: {}", String::from_utf8_lossy(&made.stderr).trim());
+    }
+    let [scene, options @ ..] = GEARS;
+    let path = crate::root().join(scene);
+    fs::write(&path, made.stdout).with_context(|| format!("cannot write {}", path.display()))?;
+    say!("penup: docs/gears.svg")?;
+    let picture = crate::root().join("docs/gears.svg");
+    let words = [path.display().to_string(), format!("--svg={}", picture.display())];
+    let words: Vec<_> = words.into_iter().chain(options.map(str::to_owned)).collect();
+    run(&mut crate::client("preview", &words))
+}
+
+/// Draws every figure into `docs/gallery` and writes the page.
+fn draw_figures() -> Result<()> {
     let folder = crate::root().join("docs/gallery");
     fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
     let mut page = String::from(
         "# Gallery\n\nThe figures of the papers, or their like, as penup draws them. Ink is dark, moves with the pen up are \
-         faint. `cargo xtask gallery` makes this page.\n",
+         faint. `cargo xtask gallery` makes this page.\n\n\
+         ## A scene of our own\n\n\
+         ![A train of gears that a crank turns](../gears.svg)\n\n",
     );
+    let scene = count_vertices("gears")?;
+    writeln!(
+        page,
+        "[gears.obj](../../scenes/gears.obj), {scene} vertices, which `host-tests/src/gear_train` \
+         makes."
+    )?;
     for (chapter, figures) in CHAPTERS {
         write!(page, "\n## {chapter}\n\n| | | |\n|---|---|---|\n")?;
         for figure in figures {
@@ -134,4 +180,16 @@ fn count_vertices(scene: &str) -> Result<usize> {
     let text =
         fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
     Ok(text.lines().filter(|line| line.starts_with("v ")).count())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::GEARS;
+
+    #[test]
+    fn readme_says_how_its_picture_was_drawn() {
+        let readme = include_str!("../../README.md");
+        let words = readme.split_whitespace().filter(|&word| word != "\\").collect::<Vec<_>>();
+        assert!(words.windows(GEARS.len()).any(|part| part == GEARS), "not {GEARS:?}");
+    }
 }

@@ -78,7 +78,7 @@ enum Task {
     },
     /// Prints how deep the stacks of the emulated boards become over the heaviest jobs (some 2 minutes).
     Stack,
-    /// Draws the figures of the papers into docs/gallery.
+    /// Draws the figures of the papers into docs/gallery, and README's picture.
     Gallery,
     /// Repeats Harrison's experiments (his chapter 7), counted in instructions.
     Experiments,
