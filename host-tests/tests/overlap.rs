@@ -92,13 +92,3 @@ proptest! {
         }
     }
 }
-
-#[test]
-fn a_long_line_keeps_what_a_crossing_full_one_leaves() {
-    let dotted = ((0, 0), (100, 50), 1, 0);
-    let full = ((40, 20), (60, 30), 0, 0);
-    let mut found = organised(&[dotted, full]);
-    found.sort_unstable_by_key(|line| line.0.min(line.1));
-    let ends = found.iter().map(|(a, b, code, _)| (*a.min(b), *a.max(b), *code));
-    assert!(ends.eq([((0, 0), (40, 20), 1), ((40, 20), (60, 30), 0), ((60, 30), (100, 50), 1)]));
-}

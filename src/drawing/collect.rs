@@ -241,7 +241,7 @@ pub fn build_graph(
             *line = NumberedLine::new(line.ends(), line.rank);
         }
         // No two have the same ends.
-        heap_sort_cancellable(found, NumberedLine::ends, cancel)?;
+        heap_sort_cancellable(found, |line| line.ends, cancel)?;
         (segments, points.len())
     };
 
@@ -399,38 +399,6 @@ mod tests {
         ];
         let found = drawn(&lines, 64).unwrap();
         assert_eq!(found, [[(0, 0), (100, 0)], [(0, 0), (50, 80)], [(100, 0), (50, 80)]]);
-    }
-
-    #[test]
-    fn a_full_line_wins_over_a_dotted_one() {
-        let dotted = PackedLine::new(point(9, 9), point(0, 0), LineType::Dotted, 0);
-        let mut memory = vec![0u64; 64];
-        let lines = [dotted, line((0, 0), (9, 9))];
-        items_mut(&mut memory, 2).unwrap().copy_from_slice(&lines);
-        let stored = build_graph(&mut memory, 2, &mut NeverCancel).unwrap();
-        let (drawing, _) = stored.split(&mut memory).unwrap();
-        assert_eq!(drawing.segments.len(), 1);
-        assert_eq!(drawing.segments[0].line_type(), LineType::Full);
-    }
-
-    #[test]
-    fn what_is_seen_wins_over_what_is_hidden_and_the_lower_pen_over_the_higher() {
-        let full = |pen| PackedLine::new(point(0, 0), point(9, 9), LineType::Full, pen);
-        let dotted = PackedLine::new(point(9, 9), point(0, 0), LineType::Dotted, 0);
-        for (lines, pen, line_type) in [
-            ([full(0).under(), full(5), full(6)], 5, LineType::Full),
-            ([full(7), full(1).under(), full(9).under()], 7, LineType::Full),
-            ([full(3).under(), full(2).under(), full(4).under()], 2, LineType::Full),
-            ([dotted, full(8), full(9).under()], 8, LineType::Full),
-            ([dotted.under(), dotted, full(0).under()], 0, LineType::Dotted),
-        ] {
-            let mut memory = vec![0u64; 64];
-            items_mut(&mut memory, 3).unwrap().copy_from_slice(&lines);
-            let stored = build_graph(&mut memory, 3, &mut NeverCancel).unwrap();
-            let (drawing, _) = stored.split(&mut memory).unwrap();
-            let segments = drawing.segments.iter().map(|s| (s.pen, s.line_type()));
-            assert_eq!(segments.collect::<Vec<_>>(), [(pen, line_type)], "{lines:?}");
-        }
     }
 
     #[test]

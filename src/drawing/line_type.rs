@@ -26,18 +26,59 @@ struct Row {
     line_type: LineType,
     /// The name by which a user chooses the type.
     name: &'static str,
-    /// The lengths, in dots, of a dash, a gap, a dash, a gap and so on, which repeat along the
-    /// line. The first dash is drawn once more at the end. A solid line has none.
-    dashes: &'static [u8],
+    dashes: Dashes,
     /// Where lines overlap, the type with the lower number is drawn.
     precedence: u8,
 }
 
+/// The dashes and gaps of a line type, which repeat along a line.
+///
+/// They are chosen so that a line looks the same from both ends; see [`crate::step::Pattern`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Dashes {
+    /// The lengths of a dash, a gap, a dash, a gap and so on, in dots. After the last repetition
+    /// the first dash ends the line. A solid line has none.
+    pub lengths: &'static [u8],
+    /// The sum of the lengths, which is even.
+    pub period: u8,
+    /// The least of the lengths.
+    pub shortest: u8,
+}
+
+impl Dashes {
+    /// Checks the lengths when the library is compiled.
+    const fn new(lengths: &'static [u8]) -> Self {
+        let (mut at, mut period, mut shortest) = (0, 0, u8::MAX);
+        while at < lengths.len() {
+            let length = lengths[at];
+            assert!(length > 0, "a dash or gap has no length");
+            assert!(length == lengths[(lengths.len() - at) % lengths.len()], "not symmetric");
+            period += length;
+            shortest = if length < shortest { length } else { shortest };
+            at += 1;
+        }
+        assert!(lengths.len() % 2 == 0, "there are not as many gaps as dashes");
+        // So that the ends of dashes and gaps are never halfway between two moves.
+        assert!(period % 2 == 0 && (at == 0 || lengths[0] % 2 == 1), "a line has an even length");
+        Self { lengths, period, shortest }
+    }
+}
+
 /// The line types, in the order of their codes.
 const ROWS: [Row; 3] = [
-    Row { line_type: LineType::Full, name: "full", dashes: &[], precedence: 0 },
-    Row { line_type: LineType::Dotted, name: "dotted", dashes: &[1, 1], precedence: 1 },
-    Row { line_type: LineType::Dashed, name: "dashed", dashes: &[3, 3], precedence: 2 },
+    Row { line_type: LineType::Full, name: "full", dashes: Dashes::new(&[]), precedence: 0 },
+    Row {
+        line_type: LineType::Dotted,
+        name: "dotted",
+        dashes: Dashes::new(&[1, 1]),
+        precedence: 1,
+    },
+    Row {
+        line_type: LineType::Dashed,
+        name: "dashed",
+        dashes: Dashes::new(&[3, 3]),
+        precedence: 2,
+    },
 ];
 
 impl LineType {
@@ -81,12 +122,8 @@ impl LineType {
         Self::ALL.into_iter().find(|line_type| line_type.name() == name)
     }
 
-    /// Returns the lengths of a dash, a gap, a dash, a gap and so on, in dots. They repeat along
-    /// the line, which ends with the first dash. A full line has none.
-    ///
-    /// Their sum is even, the first of them is odd, and those after the first read the same
-    /// backwards. So a line looks the same from both ends; see [`crate::step::Pattern`].
-    pub const fn dashes(self) -> &'static [u8] {
+    /// Returns the dashes and gaps of the type.
+    pub const fn dashes(self) -> Dashes {
         ROWS[self as usize].dashes
     }
 
@@ -101,22 +138,13 @@ const _: () = {
     assert!(ROWS.len() <= 1 << LineType::CODE_BITS, "a code does not fit into a packed line");
     let mut code = 0;
     while code < ROWS.len() {
-        let Row { line_type, dashes, precedence, .. } = ROWS[code];
+        let Row { line_type, precedence, .. } = ROWS[code];
         assert!(line_type as usize == code, "the rows are in the order of their codes");
         let mut other = 0;
         while other < code {
             assert!(ROWS[other].precedence != precedence, "two types have one precedence");
             other += 1;
         }
-        let (mut at, mut sum) = (0, 0);
-        while at < dashes.len() {
-            assert!(dashes[at] > 0, "a dash or gap has no length");
-            assert!(dashes[at] == dashes[(dashes.len() - at) % dashes.len()], "not symmetric");
-            sum += dashes[at] as u32;
-            at += 1;
-        }
-        assert!(sum % 2 == 0 && dashes.len() % 2 == 0, "there are as many gaps as dashes");
-        assert!(dashes.is_empty() || dashes[0] % 2 == 1, "the first dash is an odd length");
         code += 1;
     }
 };

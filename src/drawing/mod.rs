@@ -10,12 +10,14 @@ mod collect;
 mod line_type;
 mod overlap;
 mod page;
+mod page_map;
 mod title;
 mod window;
 
 pub use collect::{GraphError, PackedLine, Stored, build_graph};
-pub use line_type::LineType;
-pub use page::{Bounds, Page, PageError, PageMap, StepsPerMillimetre};
+pub use line_type::{Dashes, LineType};
+pub use page::{Page, PageError, StepsPerMillimetre};
+pub use page_map::{Bounds, PageMap};
 pub use title::{Title, TitleText, is_in_font};
 
 use bytemuck::{Pod, Zeroable};

@@ -17,7 +17,7 @@ use core::cmp::Ordering;
 #[repr(C)]
 pub(super) struct NumberedLine {
     /// The number of the point at one end, in the upper half, and at the other.
-    ends: u32,
+    pub(super) ends: u32,
     pub(super) rank: Rank,
     /// See [`Key::slope`].
     slope: u32,
@@ -242,5 +242,171 @@ impl End {
     fn second(segment: &NumberedLine, points: &[PagePoint]) -> Self {
         let [a, b] = Self::both(segment, points);
         a.max(b)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::drawing::{PackedLine, build_graph};
+    use crate::stage::{NeverCancel, items_mut};
+    use std::string::String;
+    use std::vec;
+    use std::vec::Vec;
+
+    /// The line types as they are drawn in a strip. A digit is a full line of that pen, and a
+    /// letter is one that yields: `a` has pen 0, `b` pen 1 and so on.
+    const TYPES: [(char, LineType); 3] =
+        [('-', LineType::Full), ('.', LineType::Dotted), ('=', LineType::Dashed)];
+
+    /// The line that a strip such as `"  +--+"` shows. The strip lies along `direction`, whose x
+    /// or else y is positive; a character is ten steps long, so that no two points become one.
+    fn line(strip: &str, direction: [i32; 2], reversed: bool) -> PackedLine {
+        let mut ends = [strip.find('+'), strip.rfind('+')];
+        if reversed {
+            ends.reverse();
+        }
+        let [from, to] = ends.map(|end| {
+            let [x, y] = direction.map(|step| step * 10 * end.unwrap() as i32);
+            PagePoint { x, y }
+        });
+        let ink = strip.trim_start().chars().nth(1).unwrap();
+        let pen = |first: char| ink as u8 - first as u8;
+        match ink {
+            '0'..='9' => PackedLine::new(from, to, LineType::Full, pen('0')),
+            'a'..='z' => PackedLine::new(from, to, LineType::Full, pen('a')).under(),
+            ',' => PackedLine::new(from, to, LineType::Dotted, 0).under(),
+            _ => {
+                let (_, line_type) = TYPES.into_iter().find(|(shown, _)| *shown == ink).unwrap();
+                PackedLine::new(from, to, line_type, 0)
+            }
+        }
+    }
+
+    /// What is drawn of these lines, as one strip: `+` at the ends of each segment, and between
+    /// them the line type, or the pen if that is not the first.
+    fn drawn(lines: &[PackedLine], direction: [i32; 2]) -> String {
+        let mut words = vec![0; 400];
+        items_mut(&mut words, lines.len()).unwrap().copy_from_slice(lines);
+        let stored = build_graph(&mut words, lines.len(), &mut NeverCancel).unwrap();
+        let drawing = stored.drawing(&words).unwrap();
+        let mut strip = Vec::new();
+        for segment in drawing.segments {
+            let [from, to] = [segment.from, segment.to].map(|number| {
+                let PagePoint { x, y } = drawing.points[usize::from(number)];
+                let at = if direction[0] != 0 { x / direction[0] } else { y / direction[1] } / 10;
+                assert_eq!([x, y], direction.map(|step| step * 10 * at));
+                at as usize
+            });
+            let (from, to) = (from.min(to), from.max(to));
+            strip.resize(strip.len().max(to + 1), ' ');
+            let (ink, line_type) = TYPES[usize::from(segment.line_type_code)];
+            assert_eq!(segment.line_type(), line_type);
+            for at in from + 1..to {
+                assert_eq!(strip[at], ' ', "drawn twice");
+                strip[at] = if segment.pen == 0 { ink } else { (b'0' + segment.pen) as char };
+            }
+            (strip[from], strip[to]) = ('+', '+');
+        }
+        strip.into_iter().collect()
+    }
+
+    /// Asserts that `strips`, which lie one over the other, are drawn as `expected`, whatever their
+    /// slope, their order and the ends at which they begin.
+    #[track_caller]
+    fn assert_drawn(strips: &[&str], expected: &str) {
+        for direction in [[1, 0], [0, 1], [2, 1], [3, -2], [5, 7]] {
+            for first in 0..strips.len() {
+                for reversed in 0..1 << strips.len() {
+                    let lines = (0..strips.len()).map(|at| {
+                        let at = (first + at) % strips.len();
+                        line(strips[at], direction, reversed >> at & 1 != 0)
+                    });
+                    let found = drawn(&lines.collect::<Vec<_>>(), direction);
+                    assert_eq!(found, expected, "{strips:?} {direction:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_full_line_replaces_others_where_they_overlap() {
+        assert_drawn(&["+......+", "+------+"], "+------+");
+        assert_drawn(
+            &[
+                "+.............+", //
+                "     +---+     ",
+            ],
+            "+....+---+....+",
+        );
+        assert_drawn(
+            &[
+                "+========+     ", //
+                "     +---------+",
+            ],
+            "+====+---------+",
+        );
+    }
+
+    #[test]
+    fn a_dotted_line_replaces_a_dashed_one() {
+        assert_drawn(
+            &[
+                "   +======+    ", //
+                "+....+         ",
+                "        +.....+",
+            ],
+            "+....+==+.....+",
+        );
+    }
+
+    #[test]
+    fn lines_of_one_type_are_drawn_once() {
+        assert_drawn(&["+----+", "+----+", "+----+"], "+----+");
+        assert_drawn(
+            &[
+                "+-------+      ", //
+                "    +--------+ ",
+                "      +--------+",
+            ],
+            "+-------+----+-+",
+        );
+        assert_drawn(
+            &[
+                "+--------------+", //
+                "   +--+         ",
+                "         +--+   ",
+            ],
+            "+--------------+",
+        );
+    }
+
+    #[test]
+    fn the_lower_pen_replaces_the_higher() {
+        assert_drawn(
+            &[
+                "+3333333333333+", //
+                "   +1111111+   ",
+                "      +22222222222+",
+            ],
+            "+33+1111111+222222+",
+        );
+    }
+
+    #[test]
+    fn a_hidden_line_yields_to_whatever_is_seen() {
+        assert_drawn(&["+aaaa+", "+5555+", "+6666+"], "+5555+");
+        assert_drawn(&["+7777+", "+bbbb+", "+jjjj+"], "+7777+");
+        assert_drawn(&["+dddd+", "+cccc+", "+eeee+"], "+2222+");
+        assert_drawn(&["+....+", "+8888+", "+jjjj+"], "+8888+");
+        assert_drawn(&["+,,,,+", "+....+", "+aaaa+"], "+....+");
+        assert_drawn(
+            &[
+                "+aaaaaaaaaaaaa+", //
+                "   +===+       ",
+                "         +4444444+",
+            ],
+            "+--+===+-+4444444+",
+        );
     }
 }

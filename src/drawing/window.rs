@@ -37,18 +37,19 @@ impl Window {
         let (mut enter, mut leave) = ((0, 1), (1, 1));
         let later = |a: (i64, i64), b: (i64, i64)| product(a.0, b.1) > product(b.0, a.1);
         for axis in [0, 1] {
-            for (way, room) in [
+            // How far the line runs outwards across a border, and how far inside its start lies.
+            for (outward, inside) in [
                 (-along[axis], from[axis] - self.low[axis]),
                 (along[axis], self.high[axis] - from[axis]),
             ] {
-                if way == 0 && room < 0 {
+                if outward == 0 && inside < 0 {
                     return None;
                 }
-                if way < 0 && later((-room, -way), enter) {
-                    enter = (-room, -way);
+                if outward < 0 && later((-inside, -outward), enter) {
+                    enter = (-inside, -outward);
                 }
-                if way > 0 && later(leave, (room, way)) {
-                    leave = (room, way);
+                if outward > 0 && later(leave, (inside, outward)) {
+                    leave = (inside, outward);
                 }
             }
         }
@@ -70,41 +71,143 @@ impl Window {
 mod tests {
     use super::*;
     use crate::fixed::Millimetres;
+    use std::string::String;
+    use std::vec::Vec;
 
     fn window() -> Window {
         let [width, height, margin, steps] = [100, 60, 10, 10].map(Millimetres::from_num);
         Window::new(&Page { width, height, margin, foot: Millimetres::ZERO }, [steps; 2])
     }
 
-    fn clipped(ends: [[i64; 2]; 2]) -> Option<[[i32; 2]; 2]> {
-        let fine = ends.map(|end| end.map(|steps| steps * 256));
-        window().clip(fine).map(|ends| ends.map(|PagePoint { x, y }| [x, y]))
+    /// The sides of a character of a picture, in steps. The window has 17 by 9 characters; its
+    /// corners are at the first and the last of them.
+    const CELL: i32 = 50;
+
+    /// What is left of the line between two points, in steps: `a` where it begins, `b` where it
+    /// ends, and `*` between them. A line that is a point is an `o`.
+    fn picture(ends: [[i64; 2]; 2]) -> String {
+        let mut rows = [[' '; 17]; 9];
+        if let Some(clipped) = window().clip(ends.map(|end| end.map(|steps| steps * 256))) {
+            let [a, b] = clipped.map(|PagePoint { x, y }| {
+                assert_eq!([x % CELL, y % CELL], [0, 0], "an end between two characters");
+                [x / CELL - 2, y / CELL - 2]
+            });
+            let length = (b[0] - a[0]).abs().max((b[1] - a[1]).abs());
+            for at in 0..=length {
+                let [x, y] = [0, 1].map(|axis: usize| {
+                    let moved = 2 * at * (b[axis] - a[axis]) + length;
+                    a[axis] + moved.checked_div_euclid(2 * length).unwrap_or(0)
+                });
+                let ink = match at {
+                    0 if length == 0 => 'o',
+                    0 => 'a',
+                    _ if at == length => 'b',
+                    _ => '*',
+                };
+                rows[8 - y as usize][x as usize] = ink;
+            }
+        }
+        let text: Vec<String> = rows.iter().map(|row| row.iter().collect()).collect();
+        text.iter().map(|row| row.trim_end()).collect::<Vec<_>>().join("\n")
+    }
+
+    /// Asserts that clipping a line leaves what the picture shows of the window.
+    #[track_caller]
+    fn assert_clipped(ends: [[i64; 2]; 2], expected: [&str; 9]) {
+        assert_eq!(picture(ends), expected.map(str::trim_end).join("\n"), "{ends:?}");
     }
 
     #[test]
-    fn what_is_inside_stays_and_what_is_outside_goes() {
-        assert_eq!(clipped([[100, 100], [900, 500]]), Some([[100, 100], [900, 500]]));
-        assert_eq!(clipped([[300, 200], [300, 200]]), Some([[300, 200], [300, 200]]));
+    fn what_is_inside_stays() {
+        let whole = [
+            "               *b",
+            "             **  ",
+            "           **    ",
+            "         **      ",
+            "       **        ",
+            "     **          ",
+            "   **            ",
+            " **              ",
+            "a                ",
+        ];
+        assert_clipped([[100, 100], [900, 500]], whole);
+        assert_clipped(
+            [[300, 200], [300, 200]],
+            [
+                "                 ",
+                "                 ",
+                "                 ",
+                "                 ",
+                "                 ",
+                "                 ",
+                "    o            ",
+                "                 ",
+                "                 ",
+            ],
+        );
+    }
+
+    #[test]
+    fn what_is_outside_goes() {
         for outside in [
             [[99, 0], [99, 600]],
             [[0, 501], [1000, 501]],
             [[0, 300], [90, 590]],
             [[950, 400], [900, 600]],
         ] {
-            assert_eq!(clipped(outside), None, "{outside:?}");
+            assert_clipped(outside, [""; 9]);
         }
     }
 
     #[test]
     fn a_line_across_is_cut_at_both_borders_either_way() {
         let ends = [[-700, 300], [1_000_900, 300]];
-        assert_eq!(clipped(ends), Some([[100, 300], [900, 300]]));
-        assert_eq!(clipped([ends[1], ends[0]]), Some([[900, 300], [100, 300]]));
+        let across = [
+            "                 ",
+            "                 ",
+            "                 ",
+            "                 ",
+            "a***************b",
+            "                 ",
+            "                 ",
+            "                 ",
+            "                 ",
+        ];
+        assert_clipped(ends, across);
+        let back = across.map(|row| row.chars().rev().collect::<String>());
+        assert_clipped([ends[1], ends[0]], back.each_ref().map(String::as_str));
+    }
+
+    #[test]
+    fn a_line_that_leaves_by_another_border_is_cut_there() {
         // From the corner of the page along the diagonal to a point far away.
-        assert_eq!(
-            clipped([[0, 0], [4_000_000_000, 2_000_000_000]]),
-            Some([[200, 100], [900, 450]])
+        assert_clipped(
+            [[0, 0], [4_000_000_000, 2_000_000_000]],
+            [
+                "                 ",
+                "               *b",
+                "             **  ",
+                "           **    ",
+                "         **      ",
+                "       **        ",
+                "     **          ",
+                "   **            ",
+                "  a              ",
+            ],
         );
-        assert_eq!(clipped([[500, 300], [500, -9000]]), Some([[500, 300], [500, 100]]));
+        assert_clipped(
+            [[500, 300], [500, -9000]],
+            [
+                "                 ",
+                "                 ",
+                "                 ",
+                "                 ",
+                "        a        ",
+                "        *        ",
+                "        *        ",
+                "        *        ",
+                "        b        ",
+            ],
+        );
     }
 }

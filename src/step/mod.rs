@@ -11,11 +11,13 @@
 //! page; it is refused where the page is checked.
 
 mod arc;
+mod chords;
 mod line;
 mod pattern;
 pub mod tape;
 
-pub use arc::{Arc, ArcError, Chords, Turn};
+pub use arc::{Arc, ArcError, Turn};
+pub use chords::Chords;
 pub use line::Line;
 pub use pattern::Pattern;
 

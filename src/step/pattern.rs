@@ -1,6 +1,6 @@
 //! Dotted and dashed lines (Harrison, procedure LINEDOT of appendix 1).
 
-use crate::drawing::LineType;
+use crate::drawing::{Dashes, LineType};
 
 /// Divides the moves of one line into dashes and gaps, as its line type says.
 ///
@@ -30,14 +30,14 @@ impl Pattern {
     /// The pattern for a line of `moves` moves and this line type. Dots are about `dot_moves` long
     /// (0 counts as 1).
     pub const fn of(line_type: LineType, moves: u32, dot_moves: u32) -> Self {
-        let dashes = line_type.dashes();
-        let Some(first) = dashes.first() else { return Self::full(moves) };
-        let (first, period) = (*first as u32, sum(dashes, dashes.len()));
+        let Dashes { lengths, period, shortest } = line_type.dashes();
+        let Some(first) = lengths.first() else { return Self::full(moves) };
+        let (first, period) = (*first as u32, period as u32);
         let dots = moves / if dot_moves == 0 { 1 } else { dot_moves };
         // The line is first + repeats * period dots long; this is nearest to what fits.
         let repeats = dots.saturating_add(period / 2).saturating_sub(first) / period;
         // Each dash and gap has at least one move.
-        let most = moves.saturating_mul(shortest(dashes)).saturating_sub(first) / period;
+        let most = moves.saturating_mul(shortest as u32).saturating_sub(first) / period;
         Self { moves, repeats: if repeats > most { most } else { repeats }, line_type }
     }
 
@@ -48,7 +48,7 @@ impl Pattern {
 
     /// The number of dashes and gaps, which is odd.
     pub const fn pieces(self) -> u32 {
-        self.repeats * self.line_type.dashes().len() as u32 + 1
+        self.repeats * self.line_type.dashes().lengths.len() as u32 + 1
     }
 
     /// The number of moves from the start of the line to the end of piece number `piece`, counted
@@ -57,11 +57,16 @@ impl Pattern {
         if self.repeats == 0 {
             return self.moves;
         }
-        let dashes = self.line_type.dashes();
-        let (count, period) = (dashes.len() as u32, sum(dashes, dashes.len()));
-        let (ended, before) = (piece / count, piece % count);
-        let dots = (ended * period + sum(dashes, before as usize + 1)) as u64;
-        let all = (self.repeats * period + dashes[0] as u32) as u64;
+        let Dashes { lengths, period, .. } = self.line_type.dashes();
+        let (count, period) = (lengths.len() as u32, period as u32);
+        let mut dots = piece / count * period;
+        let (mut at, before) = (0, piece % count);
+        while at <= before {
+            dots += lengths[at as usize] as u32;
+            at += 1;
+        }
+        let dots = dots as u64;
+        let all = (self.repeats * period + lengths[0] as u32) as u64;
         // The result is rounded to the nearest number. There is no tie, because a line is an odd
         // number of dots long, which never divides at half a move.
         ((2 * dots * self.moves as u64 + all) / (2 * all)) as u32
@@ -72,28 +77,6 @@ impl Pattern {
     pub const fn inked(piece: u32) -> bool {
         piece.is_multiple_of(2)
     }
-}
-
-/// The sum of the first `count` lengths.
-const fn sum(lengths: &[u8], count: usize) -> u32 {
-    let (mut at, mut sum) = (0, 0);
-    while at < count {
-        sum += lengths[at] as u32;
-        at += 1;
-    }
-    sum
-}
-
-/// The least of the lengths.
-const fn shortest(lengths: &[u8]) -> u32 {
-    let (mut at, mut least) = (0, u32::MAX);
-    while at < lengths.len() {
-        if least > lengths[at] as u32 {
-            least = lengths[at] as u32;
-        }
-        at += 1;
-    }
-    least
 }
 
 #[cfg(test)]

@@ -1,0 +1,426 @@
+//! The map from image coordinates to plotter steps, by which a drawing is placed on the page.
+
+use super::page::{foot_steps, side_steps};
+use super::window::Window;
+use super::{PAGE_LIMIT, Page, PageError, PagePoint, StepsPerMillimetre};
+use crate::fixed::{divide, divide_rounding, half, product};
+use crate::geometry::{Projection, Vertex};
+use crate::model::Position;
+use crate::visibility::EdgeParameter;
+
+/// A bounding box of the image: the least and the greatest x/w and y/w.
+///
+/// The values are in units of 2^-[`Bounds::FRACTION_BITS`], with |value| < 2^46.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Bounds {
+    low: [i64; 2],
+    high: [i64; 2],
+}
+
+impl Bounds {
+    /// The unit of the bounds of an image is 2^-this.
+    pub const FRACTION_BITS: u32 = 24;
+
+    /// Returns the box around the images of `vertices`, which must have w > 0, or `None` if there
+    /// are no vertices.
+    pub fn around(vertices: impl Iterator<Item = Vertex>, projection: Projection) -> Option<Self> {
+        vertices
+            .map(|vertex| {
+                let w = match projection {
+                    Projection::Perspective => i64::from(vertex.z.max(1)),
+                    Projection::Parallel => 1,
+                };
+                let image = [vertex.x, vertex.y].map(|c| (i64::from(c) << Self::FRACTION_BITS) / w);
+                Self { low: image, high: image }
+            })
+            .reduce(Self::union)
+    }
+
+    /// Returns the box around plan positions in units of 2^-`fraction_bits` mm, or `None` if there
+    /// are none.
+    ///
+    /// These bounds are in the same unit, for [`PageMap::true_size`] and [`PageMap::fit_plan`].
+    pub fn around_plan(positions: impl Iterator<Item = Position>) -> Option<Self> {
+        positions
+            .map(|position| {
+                let point = [i64::from(position.x), i64::from(position.y)];
+                Self { low: point, high: point }
+            })
+            .reduce(Self::union)
+    }
+
+    /// Returns the box around both boxes.
+    #[must_use]
+    pub fn union(self, other: Self) -> Self {
+        Self {
+            low: [0, 1].map(|axis: usize| self.low[axis].min(other.low[axis])),
+            high: [0, 1].map(|axis: usize| self.high[axis].max(other.high[axis])),
+        }
+    }
+}
+
+/// The map from homogeneous image coordinates to steps: (a x + b w) / (w 2^k), rounded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PageMap {
+    /// The scale along x and y.
+    a: [i64; 2],
+    /// The offset along x and y.
+    b: [i128; 2],
+    /// The number of fraction bits of `a` and `b`.
+    k: u32,
+    /// The part of the page to which lines are clipped, if the image may reach beyond the page.
+    window: Option<Window>,
+}
+
+/// The map's scale has this many bits, and its unit is never finer than 2^-[`FINEST`].
+const SCALE_BITS: u32 = 41;
+const FINEST: u32 = 44;
+
+impl PageMap {
+    /// Makes the map that scales what is within `bounds` to the free part of the page and centres
+    /// it.
+    ///
+    /// # Errors
+    /// [`PageError::NoRoom`], [`PageError::TooManySteps`].
+    // Not inlined, so that its stack frame is not below those of the stages.
+    #[inline(never)]
+    pub fn fit(bounds: &Bounds, page: &Page, steps: StepsPerMillimetre) -> Result<Self, PageError> {
+        Self::fit_unit(bounds, Bounds::FRACTION_BITS, page, steps)
+    }
+
+    /// As [`PageMap::fit`], but what is farther than `field` from the middle of the image may fall
+    /// off the page. `field` is in units of 2^-[`Bounds::FRACTION_BITS`]. In a perspective view the
+    /// image of a point nearly beside the eye is nearly infinitely far away.
+    ///
+    /// # Errors
+    /// [`PageError::NoRoom`], [`PageError::TooManySteps`].
+    pub fn fit_field(
+        bounds: &Bounds,
+        field: i64,
+        page: &Page,
+        steps: StepsPerMillimetre,
+    ) -> Result<Self, PageError> {
+        let limited = Bounds {
+            low: bounds.low.map(|low| low.clamp(-field, field)),
+            high: bounds.high.map(|high| high.clamp(-field, field)),
+        };
+        let mut map = Self::fit(&limited, page, steps)?;
+        if limited != *bounds {
+            map.window = Some(Window::new(page, steps));
+        }
+        Ok(map)
+    }
+
+    /// Makes the map that scales a plan to the page like [`PageMap::fit`]. `bounds` is in units of
+    /// 2^-`fraction_bits` mm.
+    ///
+    /// # Errors
+    /// [`PageError::NoRoom`], [`PageError::TooManySteps`].
+    pub fn fit_plan(
+        bounds: &Bounds,
+        fraction_bits: u32,
+        page: &Page,
+        steps: StepsPerMillimetre,
+    ) -> Result<Self, PageError> {
+        let mut map = Self::fit_unit(bounds, fraction_bits, page, steps)?;
+        // The image coordinates of a plan are its positions, with w = 1, so the unit becomes part
+        // of the map.
+        map.coarsen(fraction_bits);
+        Ok(map)
+    }
+
+    /// As [`PageMap::fit`], with `bounds` in units of 2^-`unit_bits`.
+    fn fit_unit(
+        bounds: &Bounds,
+        unit_bits: u32,
+        page: &Page,
+        steps: StepsPerMillimetre,
+    ) -> Result<Self, PageError> {
+        let free = page.free()?;
+        page.check_steps(steps)?;
+        let size = [0, 1].map(|axis: usize| (bounds.high[axis] - bounds.low[axis]).unsigned_abs());
+        // The tighter axis decides the scale, in millimetres for each unit of the image: free /
+        // size.
+        let (length, extent) = match size {
+            [0, 0] => (1, 1),
+            [width, 0] => (free[0], width),
+            [0, height] => (free[1], height),
+            [width, height] => {
+                let by_width = u128::from(free[0]) * u128::from(height);
+                let by_height = u128::from(free[1]) * u128::from(width);
+                if by_width <= by_height { (free[0], width) } else { (free[1], height) }
+            }
+        };
+        let numerator =
+            [0, 1].map(|axis: usize| u128::from(length) * steps[axis].to_bits() as u128);
+        let denominator = u128::from(extent);
+        // a = numerator / extent 2^-32 2^unit_bits 2^k, with k as great as SCALE_BITS allow.
+        let largest = numerator[0].max(numerator[1]).max(1);
+        let bits = |value: u128| (128 - value.leading_zeros()) as i32;
+        let shift = SCALE_BITS as i32 + bits(denominator) - bits(largest);
+        let k = (shift + 32 - unit_bits as i32).clamp(0, FINEST as i32);
+        let shift = k - 32 + unit_bits as i32;
+        let (up, down) = (shift.max(0), (-shift).max(0));
+        let a = numerator.map(|numerator| {
+            // Below 2^42 by the choice of k.
+            divide(numerator << up, denominator << down) as i64
+        });
+        let b = [0, 1].map(|axis: usize| {
+            // The drawing and the foot below it are centred together.
+            let side =
+                i128::from(side_steps(page, steps, axis) + foot_steps(page, steps, axis)) << k;
+            let middle = i128::from(bounds.low[axis]) + i128::from(bounds.high[axis]);
+            half(side) - ((i128::from(a[axis]) * middle) >> (unit_bits + 1))
+        });
+        Ok(Self { a, b, k: k as u32, window: None })
+    }
+
+    /// Makes the map take coordinates that are greater by a factor of 2^`bits`.
+    fn coarsen(&mut self, bits: u32) {
+        // (a p 2^-bits + b) / 2^k = (a p + b 2^bits) / 2^(k + bits)
+        self.b = self.b.map(|b| b << bits);
+        self.k += bits;
+    }
+
+    /// Makes the map that draws a plan at true size. The plan keeps its position if that is on the
+    /// page, otherwise it is moved just inside.
+    ///
+    /// `bounds` is in units of 2^-`fraction_bits` mm.
+    ///
+    /// # Errors
+    /// See [`PageError`].
+    pub fn true_size(
+        bounds: &Bounds,
+        fraction_bits: u32,
+        page: &Page,
+        steps: StepsPerMillimetre,
+    ) -> Result<Self, PageError> {
+        let free = page.free()?;
+        page.check_steps(steps)?;
+        let to_page = |value: i64| (i128::from(value) << 16) >> fraction_bits;
+        let size = [0, 1].map(|axis: usize| to_page(bounds.high[axis] - bounds.low[axis]));
+        if size[0] > i128::from(free[0]) || size[1] > i128::from(free[1]) {
+            let [width, height] = size.map(|size| size as i64);
+            let foot = page.foot.to_bits().into();
+            return Err(PageError::DoesNotFit { width, height, foot });
+        }
+        let moved = [0, 1].map(|axis: usize| {
+            let (low, high) = (to_page(bounds.low[axis]), to_page(bounds.high[axis]));
+            let first = i128::from(page.first(axis));
+            let last = first + i128::from(free[axis]);
+            if low < first { first - low } else { (last - high).min(0) }
+        });
+        let bits = steps.map(|steps| i64::from(steps.to_bits()));
+        Ok(Self {
+            a: bits,
+            b: [0, 1]
+                .map(|axis: usize| (moved[axis] * i128::from(bits[axis])) << fraction_bits >> 16),
+            k: 16 + fraction_bits,
+            window: None,
+        })
+    }
+
+    /// Returns the image point (x/w, y/w) in steps. |x| and |y| must be below 2^52, and 0 < w <
+    /// 2^52.
+    pub fn point(&self, x: i64, y: i64, w: i64) -> PagePoint {
+        let [x, y] = [(x, 0), (y, 1)].map(|(c, axis): (i64, usize)| {
+            // The sum is below 2^42 2^52 + 2^(44 + 21) 2^52, so it fits 127 bits.
+            let steps = divide_rounding(
+                product(self.a[axis], c) + self.b[axis] * i128::from(w),
+                i128::from(w) << self.k,
+            );
+            steps.clamp(-i128::from(PAGE_LIMIT), i128::from(PAGE_LIMIT)) as i32
+        });
+        PagePoint { x, y }
+    }
+
+    /// Returns the image point (x/w, y/w) in 1/256 steps, for [`crate::curve::Spline::chords`]. As
+    /// [`PageMap::point`], but not limited to the page.
+    pub fn fine(&self, x: i64, y: i64, w: i64) -> crate::curve::Fine {
+        [(x, 0), (y, 1)].map(|(c, axis): (i64, usize)| {
+            // The sum is below 2^118, see `point`, so the shift does not overflow.
+            let sum = product(self.a[axis], c) + self.b[axis] * i128::from(w);
+            let fine = if w & (w - 1) == 0 {
+                // The case of a parallel view: a shift is many times faster than a
+                // division.
+                let shift = w.trailing_zeros() + self.k;
+                ((sum << 9 >> shift) + 1) >> 1
+            } else {
+                divide_rounding(sum << 8, i128::from(w) << self.k)
+            };
+            const LIMIT: i128 = 1 << 40;
+            fine.clamp(-LIMIT, LIMIT) as i64
+        })
+    }
+
+    /// Returns the part of the edge from `p` to `q` between two parameters, in steps, or `None` if
+    /// no part of it is on the page.
+    pub fn stretch(
+        &self,
+        (p, q): (Vertex, Vertex),
+        [from, to]: [EdgeParameter; 2],
+        projection: Projection,
+    ) -> Option<[PagePoint; 2]> {
+        let [from, to] = [from, to].map(|end| between(p, q, end, projection));
+        match &self.window {
+            None => Some([from, to].map(|[x, y, w]| self.point(x, y, w))),
+            Some(window) => window.clip([from, to].map(|[x, y, w]| self.fine(x, y, w))),
+        }
+    }
+
+    /// Returns the point at parameter `along` of the edge from `p` to `q`, in steps.
+    pub fn along(
+        &self,
+        p: Vertex,
+        q: Vertex,
+        along: EdgeParameter,
+        projection: Projection,
+    ) -> PagePoint {
+        let [x, y, w] = between(p, q, along, projection);
+        self.point(x, y, w)
+    }
+}
+
+/// Returns the point at parameter `along` of the edge from `p` to `q`, in homogeneous image
+/// coordinates.
+fn between(p: Vertex, q: Vertex, along: EdgeParameter, projection: Projection) -> [i64; 3] {
+    // Of the ratio 31 bits are kept. They are exact to 2^-10 steps on the longest edge that a page
+    // can hold.
+    let shift = (64 - along.denominator.leading_zeros()).saturating_sub(31);
+    let denominator = (along.denominator >> shift).max(1) as i64;
+    let numerator = ((along.numerator >> shift) as i64).min(denominator);
+    let between =
+        |p: i32, q: i32| i64::from(p) * (denominator - numerator) + i64::from(q) * numerator;
+    let w = match projection {
+        Projection::Perspective => between(p.z, q.z).max(1),
+        Projection::Parallel => denominator,
+    };
+    [between(p.x, q.x), between(p.y, q.y), w]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixed::Millimetres;
+
+    fn page(width: i32, height: i32, margin: i32) -> Page {
+        let [width, height, margin] = [width, height, margin].map(Millimetres::from_num);
+        Page { width, height, margin, foot: Millimetres::ZERO }
+    }
+
+    fn steps(x: i32, y: i32) -> StepsPerMillimetre {
+        [x, y].map(Millimetres::from_num)
+    }
+
+    const A4: [i32; 3] = [210, 297, 10];
+
+    fn a4() -> Page {
+        page(A4[0], A4[1], A4[2])
+    }
+
+    fn vertex(x: i32, y: i32, z: i32) -> Vertex {
+        Vertex { x, y, z }
+    }
+
+    #[test]
+    fn what_is_wide_fills_the_width_and_is_centred() {
+        let corners = [vertex(-400_000, -100_000, 9), vertex(200_000, 100_000, 7)];
+        let bounds = Bounds::around(corners.into_iter(), Projection::Parallel).unwrap();
+        let map = PageMap::fit(&bounds, &a4(), steps(80, 80)).unwrap();
+        let [low, high] = corners.map(|v| map.point(v.x.into(), v.y.into(), 1));
+        assert_eq!((low.x, high.x), (800, 16000));
+        // 63.333 mm high about the middle of 148.5 mm
+        assert_eq!((low.y, high.y), (11880 - 2533, 11880 + 2533));
+    }
+
+    #[test]
+    fn perspective_divides_by_the_depth() {
+        let corners = [vertex(-100, -100, 100), vertex(300, 300, 300), vertex(50, 50, 100)];
+        let bounds = Bounds::around(corners.into_iter(), Projection::Perspective).unwrap();
+        let map = PageMap::fit(&bounds, &page(100, 100, 0), steps(10, 20)).unwrap();
+        assert_eq!(map.point(-100, -100, 100), PagePoint { x: 0, y: 0 });
+        assert_eq!(map.point(300, 300, 300), PagePoint { x: 1000, y: 2000 });
+        assert_eq!(map.point(0, 0, 5), PagePoint { x: 500, y: 1000 });
+        assert_eq!(map.fine(0, 0, 5), [500 * 256, 1000 * 256]);
+        assert_eq!(map.fine(1, -1, 512), [500 * 256 + 250, 1000 * 256 - 500]);
+        // The middle of the edge in space, from z 100 to z 300, is at three quarters of its image.
+        let half = EdgeParameter { numerator: 1 << 60, denominator: 1 << 61 };
+        let (p, q) = (corners[0], corners[1]);
+        assert_eq!(map.along(p, q, half, Projection::Perspective), PagePoint { x: 750, y: 1500 });
+        assert_eq!(
+            map.along(
+                p,
+                q,
+                EdgeParameter { numerator: 0, denominator: 1 },
+                Projection::Perspective
+            ),
+            map.point(-1, -1, 1)
+        );
+        assert_eq!(
+            map.along(
+                p,
+                q,
+                EdgeParameter { numerator: 3, denominator: 3 },
+                Projection::Perspective
+            ),
+            map.point(1, 1, 1)
+        );
+    }
+
+    #[test]
+    fn points_and_lines_have_a_place_too() {
+        for (corners, low, high) in [
+            ([vertex(7, 7, 7), vertex(7, 7, 7)], (8400, 11880), (8400, 11880)),
+            ([vertex(-5, 0, 7), vertex(5, 0, 7)], (800, 11880), (16000, 11880)),
+            ([vertex(0, -5, 7), vertex(0, 5, 7)], (8400, 800), (8400, 22960)),
+        ] {
+            let bounds = Bounds::around(corners.into_iter(), Projection::Parallel).unwrap();
+            let map = PageMap::fit(&bounds, &a4(), steps(80, 80)).unwrap();
+            let found = corners.map(|v| map.point(v.x.into(), v.y.into(), 1)).map(|p| (p.x, p.y));
+            assert_eq!(found, [low, high]);
+        }
+        assert_eq!(Bounds::around([].into_iter(), Projection::Parallel), None);
+    }
+
+    fn plan(points: [[i32; 2]; 2]) -> [Position; 2] {
+        points.map(|[x, y]| Position { x: x << 8, y: y << 8, z: 0 })
+    }
+
+    fn true_size(points: [[i32; 2]; 2], page: &Page) -> Result<[(i32, i32); 2], PageError> {
+        let positions = plan(points);
+        let bounds = Bounds::around_plan(positions.into_iter()).unwrap();
+        let map = PageMap::true_size(&bounds, 8, page, steps(100, 80))?;
+        Ok(positions.map(|p| map.point(p.x.into(), p.y.into(), 1)).map(|p| (p.x, p.y)))
+    }
+
+    #[test]
+    fn a_plan_on_the_page_stays_where_it_is() {
+        assert_eq!(true_size([[10, 20], [200, 30]], &a4()), Ok([(1000, 1600), (20000, 2400)]));
+    }
+
+    #[test]
+    fn a_plan_off_the_page_is_moved_just_inside() {
+        assert_eq!(true_size([[-50, 290], [-40, 400]], &a4()), Ok([(1000, 14160), (2000, 22960)]));
+    }
+
+    #[test]
+    fn a_plan_too_large_is_refused_with_its_size() {
+        let size = |mm: i64| mm << 16;
+        assert_eq!(
+            true_size([[0, 0], [191, 5]], &a4()),
+            Err(PageError::DoesNotFit { width: size(191), height: size(5), foot: 0 })
+        );
+        let positions = plan([[0, 0], [380, 5]]);
+        let bounds = Bounds::around_plan(positions.into_iter()).unwrap();
+        let map = PageMap::fit_plan(&bounds, 8, &a4(), steps(100, 80)).unwrap();
+        let ends = positions.map(|p| map.point(p.x.into(), p.y.into(), 1));
+        assert_eq!(ends.map(|p| p.x), [1000, 20000]);
+        assert_eq!(ends[1].y - ends[0].y, 200); // 2.5 mm: the same scale on both axes
+    }
+
+    #[test]
+    fn impossible_pages_are_refused() {
+        assert_eq!(true_size([[0, 0], [1, 1]], &page(20, 50, 10)), Err(PageError::NoRoom));
+        assert_eq!(true_size([[0, 0], [1, 1]], &page(20000, 50, 10)), Err(PageError::TooManySteps));
+    }
+}
