@@ -273,17 +273,18 @@ impl<'m> Model<'m> {
         before: BeforeChange<'_>,
     ) -> Result<(), ModelError> {
         let count = self.check_numbers(numbers.clone(), 3)?;
-        let first = numbers.clone().next();
-        let last = numbers.clone().last();
-        if let (Some(first), Some(last)) = (first, last)
-            && self.resolve(first) == self.resolve(last)
-        {
-            return Err(ModelError::RepeatedVertex { number: last });
-        }
         self.store.check_room(count + self.run_for(self.pens.current))?;
         before(self);
         self.begin_run(self.pens.current)?;
-        self.add_corners(count, numbers.enumerate().map(|(at, n)| (n, false, at + 1 == count)))?;
+        let vertices = self.vertices.len();
+        let corners = self.store.add_corners(count)?;
+        for (corner, vertex) in corners.iter_mut().zip(numbers.filter_map(|n| resolve(n, vertices)))
+        {
+            *corner = Corner::new(vertex, false, false);
+        }
+        if let Some(last) = corners.last_mut() {
+            *last = Corner::new(last.vertex(), false, true);
+        }
         self.faces += 1;
         Ok(())
     }
@@ -302,49 +303,45 @@ impl<'m> Model<'m> {
         self.store.check_room(2 * bars + self.run_for(self.pens.current))?;
         before(self);
         self.begin_run(self.pens.current)?;
-        let ends = numbers.clone().zip(numbers.skip(1));
-        let corners = ends.flat_map(|(from, to)| [(from, true, false), (to, true, true)]);
-        self.add_corners(2 * bars, corners)?;
+        let vertices = self.vertices.len();
+        let mut corners = self.store.add_corners(2 * bars)?.chunks_exact_mut(2);
+        let mut last = None;
+        for to in numbers.filter_map(|number| resolve(number, vertices)) {
+            if let Some(from) = last.replace(to)
+                && let Some(bar) = corners.next()
+            {
+                bar.copy_from_slice(&[Corner::new(from, true, false), Corner::new(to, true, true)]);
+            }
+        }
         self.bars += bars;
         Ok(())
     }
 
     /// Returns how many numbers there are, if each names a vertex and differs from the one before.
+    /// Where three are `needed`, for a face, the last must also differ from the first.
     fn check_numbers(
         &self,
         numbers: impl Iterator<Item = i32>,
         needed: usize,
     ) -> Result<usize, ModelError> {
-        let mut count = 0;
-        let mut previous = None;
+        let vertices = self.vertices.len();
+        let (mut count, mut first, mut last) = (0, None, None);
         for number in numbers {
-            let vertex = self
-                .resolve(number)
-                .ok_or(ModelError::UnknownVertex { number, vertices: self.vertices.len() })?;
-            if previous == Some(vertex) {
+            let vertex =
+                resolve(number, vertices).ok_or(ModelError::UnknownVertex { number, vertices })?;
+            if last.replace((vertex, number)).is_some_and(|(before, _)| before == vertex) {
                 return Err(ModelError::RepeatedVertex { number });
             }
-            previous = Some(vertex);
+            first = first.or(Some(vertex));
             count += 1;
         }
-        if count < needed { Err(ModelError::TooFewCorners { needed }) } else { Ok(count) }
-    }
-
-    /// Adds `count` corners behind those of the elements. Each is given by the OBJ number of its
-    /// vertex, which exists, and by whether it belongs to a bar and is the last of its element.
-    fn add_corners(
-        &mut self,
-        count: usize,
-        corners: impl Iterator<Item = (i32, bool, bool)>,
-    ) -> Result<(), ModelError> {
-        let vertices = self.vertices.len();
-        let added = self.store.add_corners(count)?;
-        for (corner, (number, of_bar, last)) in added.iter_mut().zip(corners) {
-            let vertex = resolve(number, vertices);
-            let vertex = vertex.ok_or(ModelError::UnknownVertex { number, vertices })?;
-            *corner = Corner::new(vertex, of_bar, last);
+        match last {
+            _ if count < needed => Err(ModelError::TooFewCorners { needed }),
+            Some((vertex, number)) if needed > 2 && first == Some(vertex) => {
+                Err(ModelError::RepeatedVertex { number })
+            }
+            _ => Ok(count),
         }
-        Ok(())
     }
 
     /// Returns how many half-words are needed so that elements with this pen can follow.
@@ -409,11 +406,6 @@ impl<'m> Model<'m> {
         before(self);
         self.curves.count_completed(&self.store);
         Ok(())
-    }
-
-    /// Returns the vertex that an OBJ number names.
-    fn resolve(&self, number: i32) -> Option<u16> {
-        resolve(number, self.vertices.len())
     }
 
     /// Returns the smallest box around all vertices (the least and the greatest of each

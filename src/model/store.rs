@@ -25,24 +25,24 @@ const REGIONS: usize = 3;
 
 /// The half-words of a model, in three regions.
 ///
-/// The lengths of the regions add up to no more than the memory has. A change that does not fit is
-/// refused and changes nothing.
+/// Each region ends where the next begins, and the last ends within the memory. A change that does
+/// not fit is refused and changes nothing.
 #[derive(Debug)]
 pub(super) struct Store<'m> {
     memory: &'m mut [u16],
-    /// The number of half-words of each region.
-    lengths: [usize; REGIONS],
+    /// Where the first region begins, which is at 0, and where each ends.
+    bounds: [usize; REGIONS + 1],
 }
 
 impl<'m> Store<'m> {
     /// Makes an empty store. What the memory contains is discarded.
     pub(super) fn new(memory: &'m mut [Corner]) -> Self {
-        Self { memory: bytemuck::cast_slice_mut(memory), lengths: [0; REGIONS] }
+        Self { memory: bytemuck::cast_slice_mut(memory), bounds: [0; REGIONS + 1] }
     }
 
     /// Empties all regions.
     pub(super) fn clear(&mut self) {
-        self.lengths = [0; REGIONS];
+        self.bounds = [0; REGIONS + 1];
     }
 
     /// Returns how many half-words there are.
@@ -52,7 +52,7 @@ impl<'m> Store<'m> {
 
     /// Returns how many half-words are in use.
     pub(super) fn used(&self) -> usize {
-        self.lengths.iter().sum()
+        self.bounds[REGIONS]
     }
 
     /// Checks that so many half-words are free.
@@ -65,8 +65,7 @@ impl<'m> Store<'m> {
     }
 
     fn range(&self, region: Region) -> Range<usize> {
-        let start = self.lengths[..region as usize].iter().sum();
-        start..start + self.lengths[region as usize]
+        self.bounds[region as usize]..self.bounds[region as usize + 1]
     }
 
     fn region(&self, region: Region) -> &[u16] {
@@ -155,7 +154,9 @@ impl<'m> Store<'m> {
         self.check_room(count)?;
         let (end, used) = (self.range(region).end, self.used());
         self.memory.copy_within(end..used, end + count);
-        self.lengths[region as usize] += count;
+        for bound in &mut self.bounds[region as usize + 1..] {
+            *bound += count;
+        }
         Ok(self.memory.get_mut(end..end + count).unwrap_or(&mut []))
     }
 
@@ -164,9 +165,11 @@ impl<'m> Store<'m> {
     #[inline(never)]
     fn truncate(&mut self, region: Region, length: usize) {
         let (Range { start, end }, used) = (self.range(region), self.used());
-        let length = length.min(end - start);
-        self.memory.copy_within(end..used, start + length);
-        self.lengths[region as usize] = length;
+        let gone = (end - start).saturating_sub(length);
+        self.memory.copy_within(end..used, end - gone);
+        for bound in &mut self.bounds[region as usize + 1..] {
+            *bound -= gone;
+        }
     }
 
     /// Returns the half-words of all regions in turn, without the last `without` of them.
@@ -174,19 +177,20 @@ impl<'m> Store<'m> {
         self.memory.get(..self.used().saturating_sub(without)).unwrap_or(&[])
     }
 
-    /// Returns the number of half-words of each region.
-    pub(super) fn lengths(&self) -> [usize; REGIONS] {
-        self.lengths
+    /// Returns where the corners and the changes of the pen end among the half-words of all
+    /// regions.
+    pub(super) fn ends(&self) -> [usize; 2] {
+        [self.bounds[1], self.bounds[2]]
     }
 
-    /// Replaces all regions: `halves` are those of all in turn, and `lengths` says how many each
-    /// has. Returns `None`, and changes nothing, if that is not so or they do not fit.
-    pub(super) fn replace(&mut self, lengths: [usize; REGIONS], halves: &[u16]) -> Option<()> {
-        if lengths.iter().sum::<usize>() != halves.len() {
+    /// Replaces all regions: `halves` are those of all in turn, and `ends` is as [`Store::ends`]
+    /// returned it. Returns `None`, and changes nothing, if they do not fit.
+    pub(super) fn replace(&mut self, ends: [usize; 2], halves: &[u16]) -> Option<()> {
+        if ends[0] > ends[1] || ends[1] > halves.len() {
             return None;
         }
         self.memory.get_mut(..halves.len())?.copy_from_slice(halves);
-        self.lengths = lengths;
+        self.bounds = [0, ends[0], ends[1], halves.len()];
         Some(())
     }
 }
@@ -246,10 +250,12 @@ mod tests {
         for (region, half) in ALL.into_iter().zip([1, 2, 3]) {
             store.grow(region, 2).unwrap().fill(half);
         }
-        copy.replace([2, 2, 1], store.all_but(1)).unwrap();
+        copy.replace(store.ends(), store.all_but(1)).unwrap();
         assert_eq!([copy.region(ALL[0]), copy.region(ALL[1])], [[1, 1], [2, 2]]);
         assert_eq!(copy.curves(), [3]);
-        assert_eq!(copy.replace([9, 0, 0], &[7; 9]), None);
+        for (ends, count) in [([1, 2], 9), ([2, 1], 4), ([1, 5], 4)] {
+            assert_eq!(copy.replace(ends, &[7; 9][..count]), None);
+        }
         assert_eq!(copy.used(), 5);
     }
 }

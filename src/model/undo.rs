@@ -32,7 +32,7 @@ impl Model<'_> {
 
     fn copy_to(&self, mut scratch: Scratch<'_>) -> Option<()> {
         let halves = self.stored_halves();
-        let [corners, pen_runs, _] = self.store.lengths();
+        let [corners_end, pens_end] = self.store.ends();
         let PenBook { names, current, by_material } = self.pens;
         let [decimals, edited] = self.rounding.numbers();
         let (numbers, rest) = scratch.take::<u32>(HEAD).ok()?.split_first_chunk_mut()?;
@@ -41,9 +41,9 @@ impl Model<'_> {
             self.vertices.len(),
             self.faces,
             self.bars,
-            corners,
-            pen_runs,
-            self.curves.completed(),
+            corners_end,
+            pens_end,
+            halves.len(),
             self.curves.count,
             current.into(),
             by_material.into(),
@@ -68,21 +68,20 @@ impl Model<'_> {
         let head: &[u32] = items(words, HEAD)?;
         let (numbers, names) = head.split_first_chunk::<NUMBERS>()?;
         let [fraction_bits, rest @ .., decimals, edited] = *numbers;
-        let [vertices, faces, bars, corners, pen_runs, completed, count, pen, by] =
+        let [vertices, faces, bars, corners_end, pens_end, halves, curves, pen, by] =
             rest.map(|number| number as usize);
         let positions_at = Scratch::bytes_for::<u32>(HEAD) / 8;
         let halves_at = positions_at + Scratch::bytes_for::<Position>(vertices) / 8;
         self.vertices.clear();
         self.vertices.extend_from_slice(items(words.get(positions_at..)?, vertices)?).ok()?;
-        let lengths = [corners, pen_runs, completed];
-        let halves = items(words.get(halves_at..)?, lengths.iter().sum())?;
-        self.store.replace(lengths, halves)?;
+        let halves = items(words.get(halves_at..)?, halves)?;
+        self.store.replace([corners_end, pens_end], halves)?;
         self.fraction_bits = fraction_bits;
         self.rounding = Rounding::from_numbers([decimals, edited]);
         (self.faces, self.bars) = (faces, bars);
         let names = names.try_into().ok()?;
         self.pens = PenBook { names, current: pen as u8, by_material: by != 0 };
-        self.curves.restore(completed, count);
+        self.curves.restore(&self.store, curves);
         Some(())
     }
 }

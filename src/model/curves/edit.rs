@@ -8,11 +8,7 @@ use core::ops::Range;
 impl CurveList {
     /// Gives control points new numbers, as the model does with its vertices. A curve with a
     /// control point for which `new` returns `None` is removed.
-    pub(in crate::model) fn renumber(
-        &mut self,
-        store: &mut Store<'_>,
-        new: &dyn Fn(u16) -> Option<u16>,
-    ) {
+    pub fn renumber(&mut self, store: &mut Store<'_>, new: &dyn Fn(u16) -> Option<u16>) {
         self.retain(store, &mut |control| {
             control.iter_mut().all(|number| new(*number).inspect(|new| *number = *new).is_some())
         });
@@ -20,12 +16,7 @@ impl CurveList {
 
     /// Deletes the curves in `range`. If `plug`, the last curve moves to the position of the first
     /// of them.
-    pub(in crate::model) fn delete(
-        &mut self,
-        store: &mut Store<'_>,
-        range: Range<usize>,
-        plug: bool,
-    ) {
+    pub fn delete(&mut self, store: &mut Store<'_>, range: Range<usize>, plug: bool) {
         let length = |number| self.curves(store).iter().nth(number).map(|curve| curve.half_words());
         let mut gone = range.clone();
         let last = self.count - 1; // the range is not empty
@@ -66,7 +57,7 @@ impl CurveList {
     ///
     /// # Errors
     /// [`ModelError::TooManyCorners`], once there is no room for another copy.
-    pub(in crate::model) fn copy(
+    pub fn copy(
         &mut self,
         store: &mut Store<'_>,
         is_copied: &dyn Fn(&mut dyn Iterator<Item = u16>) -> bool,
@@ -95,7 +86,7 @@ impl CurveList {
     }
 
     /// Gives all curves the first pen, including the unfinished one.
-    pub(in crate::model) fn forget_pens(&mut self, store: &mut Store<'_>) {
+    pub fn forget_pens(&mut self, store: &mut Store<'_>) {
         let (curves, mut at) = (store.curves_mut(), 0);
         while let Some(header) = curves.get_mut(at..).and_then(|rest| rest.get_mut(..HEADER)) {
             header[PEN] = 0;

@@ -13,7 +13,7 @@ pub(in crate::model) struct CurveList {
     /// The number of half-words of completed curves. Those of the unfinished curve follow.
     pub(super) completed: usize,
     /// The number of completed curves.
-    pub(in crate::model) count: usize,
+    pub count: usize,
     /// The degree of the curves that follow, once it is set.
     degree: Option<u8>,
     /// The unfinished curve.
@@ -39,12 +39,12 @@ const UNIFORM_BITS: u32 = 16;
 
 impl CurveList {
     /// Returns the completed curves.
-    pub(in crate::model) fn curves<'a>(&self, store: &'a Store<'_>) -> Curves<'a> {
+    pub fn curves<'a>(&self, store: &'a Store<'_>) -> Curves<'a> {
         Curves { halves: store.curves().get(..self.completed).unwrap_or(&[]) }
     }
 
     /// `deg`: sets the degree of the curves that follow, 1 to 5.
-    pub(in crate::model) fn set_degree(&mut self, degree: u8) -> Result<(), ModelError> {
+    pub fn set_degree(&mut self, degree: u8) -> Result<(), ModelError> {
         if !(1..=5).contains(&degree) {
             return Err(ModelError::Curve(CurveError::Order));
         }
@@ -54,7 +54,7 @@ impl CurveList {
 
     /// `curv`: begins a curve between two parameters over the points numbered `control`, from 0.
     /// The points must exist.
-    pub(in crate::model) fn begin(
+    pub fn begin(
         &mut self,
         store: &mut Store<'_>,
         ends: [Decimal; 2],
@@ -88,7 +88,7 @@ impl CurveList {
     ///
     /// All knots share one binary unit, which becomes coarser when a larger knot comes. Each keeps
     /// 22 bits of the largest.
-    pub(in crate::model) fn add_knots(
+    pub fn add_knots(
         &mut self,
         store: &mut Store<'_>,
         knots: impl Iterator<Item = Decimal> + Clone,
@@ -117,9 +117,9 @@ impl CurveList {
         Ok(())
     }
 
-    /// `end`: completes the unfinished curve, which [`CurveList::count_completed`] then adds to the model.
-    /// If it is refused it is discarded.
-    pub(in crate::model) fn end(&mut self, store: &mut Store<'_>) -> Result<(), ModelError> {
+    /// `end`: completes the unfinished curve, which [`CurveList::count_completed`] then adds to the
+    /// model. If it is refused it is discarded.
+    pub fn end(&mut self, store: &mut Store<'_>) -> Result<(), ModelError> {
         let unfinished = self.unfinished.take().ok_or(ModelError::NoCurve)?;
         let closed = self.close(store, &unfinished);
         if closed.is_err() {
@@ -129,7 +129,7 @@ impl CurveList {
     }
 
     /// Records that the store holds completed curves only, one more than before.
-    pub(in crate::model) fn count_completed(&mut self, store: &Store<'_>) {
+    pub fn count_completed(&mut self, store: &Store<'_>) {
         self.completed = store.curves().len();
         self.count += 1;
     }
@@ -169,22 +169,18 @@ impl CurveList {
     }
 
     /// Whether there is an unfinished curve.
-    pub(in crate::model) fn is_unfinished(&self) -> bool {
+    pub fn is_unfinished(&self) -> bool {
         self.unfinished.is_some()
     }
 
-    /// Returns the number of half-words of completed curves.
-    pub(in crate::model) fn completed(&self) -> usize {
-        self.completed
-    }
-
     /// Returns the number of half-words of the unfinished curve.
-    pub(in crate::model) fn unfinished_length(&self, store: &Store<'_>) -> usize {
+    pub fn unfinished_length(&self, store: &Store<'_>) -> usize {
         store.curves().len() - self.completed
     }
 
-    /// Restores `count` curves in `completed` half-words, as they once were.
-    pub(in crate::model) fn restore(&mut self, completed: usize, count: usize) {
+    /// Restores `count` curves, which are all that the store holds, as they once were.
+    pub fn restore(&mut self, store: &Store<'_>, count: usize) {
+        let completed = store.curves().len();
         *self = Self { completed, count, degree: self.degree, unfinished: None };
     }
 }
