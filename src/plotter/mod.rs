@@ -35,6 +35,7 @@ use crate::machine::{
 use crate::model::Model;
 use crate::protocol::{Command, CommandError, Label, LineReader, Numbering, RealTime, Received};
 use crate::stage::{Aborted, Cancel, Stage};
+use job::Pipeline;
 use program::Program;
 use reply::Reply;
 use stream::{Listing, Progress, Task};
@@ -446,7 +447,8 @@ impl Inner<'_> {
         let settings = self.machine.settings();
         let steps =
             [Setting::StepsPerMmX, Setting::StepsPerMmY].map(|setting| settings.get(setting));
-        self.job = Job::compute(&self.model, &self.options, steps, self.words, cancel, observer)?;
+        let (model, options, words) = (&self.model, &self.options, &mut *self.words);
+        self.job = Pipeline { model, options, steps, words, cancel, observer }.run()?;
         Ok(())
     }
 

@@ -2,30 +2,22 @@
 //!
 //! A plan needs no projection. It is laid on the page as it is, at true size or scaled to fit.
 
-use super::PlotOptions;
-use super::job::{Collector, FOR_BOUNDS, HALF_A_STEP, Observer, grow};
+use super::job::{Collector, FOR_BOUNDS, Found, HALF_A_STEP, Pipeline, union};
 use crate::curve::{FRACTION_BITS, Point};
-use crate::drawing::{Bounds, LineType, PackedLine, PageMap, StepsPerMillimetre};
-use crate::model::{Element, Model, Position};
+use crate::drawing::{Bounds, LineType, PackedLine, PageMap};
+use crate::model::{Element, Position};
 use crate::protocol::CommandError;
-use crate::stage::Cancel;
 use crate::visibility::SinkFull;
 
-/// Maps the lines of the plan to the page and packs them at the front of `words`. Returns their
-/// number.
+/// Maps the lines of the plan to the page and packs them at the front of the working memory.
 ///
 /// # Errors
 /// [`CommandError::Page`] if the plan does not go on the page, [`CommandError::DrawingTooLarge`] if
-/// its lines do not fit in `words`, [`CommandError::Aborted`].
+/// its lines do not fit in the memory, [`CommandError::Aborted`].
 #[inline(never)] // Keeps its frame off the stack while the stages run.
-pub(super) fn lay_out(
-    model: &Model<'_>,
-    options: &PlotOptions,
-    steps: StepsPerMillimetre,
-    words: &mut [u64],
-    cancel: &mut dyn Cancel,
-    observer: &mut dyn Observer,
-) -> Result<usize, CommandError> {
+pub(super) fn lay_out(pipeline: &mut Pipeline<'_>) -> Result<Found, CommandError> {
+    let Pipeline { model, options, steps, words, cancel, observer } = pipeline;
+    let steps = *steps;
     let (vertices, curves) = (model.vertices(), model.curves());
     let points: &[Point] = bytemuck::cast_slice(vertices);
     let unit = libm::ldexp(1.0, -(model.fraction_bits() as i32));
@@ -39,8 +31,8 @@ pub(super) fn lay_out(
         let all =
             Bounds::around_plan(vertices.iter().copied()).ok_or(CommandError::NothingToPlot)?;
         let rough = PageMap::fit_plan(&all, bits, page, steps).map_err(CommandError::Page)?;
-        curves.flatten(points, &on_page(rough), FOR_BOUNDS, cancel, &mut |[x, y, z], _| {
-            bounds = grow(bounds, Bounds::around_plan([Position { x, y, z }].into_iter()));
+        curves.flatten(points, &on_page(rough), FOR_BOUNDS, *cancel, &mut |[x, y, z], _| {
+            bounds = union(bounds, Bounds::around_plan([Position { x, y, z }].into_iter()));
             Ok(())
         })?;
     }
@@ -69,7 +61,7 @@ pub(super) fn lay_out(
     }
     let mut before = None;
     let (mut pens, mut pen) = (curves.iter().map(|curve| curve.pen), 0);
-    curves.flatten(points, &on_page(map), HALF_A_STEP, cancel, &mut |end, begins| {
+    curves.flatten(points, &on_page(map), HALF_A_STEP, *cancel, &mut |end, begins| {
         if begins {
             pen = pens.next().unwrap_or(pen);
         }
@@ -78,5 +70,5 @@ pub(super) fn lay_out(
             _ => Ok(()),
         }
     })?;
-    Ok(collector.count)
+    Ok(Found { lines: collector.count, ..Found::default() })
 }

@@ -1,30 +1,27 @@
 //! Draws a convex solid that is given without faces: by its vertices alone, or by its vertices and
 //! edges. The visible edges become lines on the page.
 
-use super::PlotOptions;
-use super::job::{Collector, Observer, PageSink, camera_view, grow, to_front};
+use super::job::{Collector, Found, PageSink, Pipeline, move_to_front, union};
 use crate::convex::{self, EdgeVisibility, Eye, SinkFull, SolidEdge, SolidError, SolidSink};
-use crate::drawing::{Bounds, PageMap, StepsPerMillimetre};
-use crate::model::{Corner, Model};
+use crate::drawing::{Bounds, PageMap};
+use crate::model::Corner;
 use crate::protocol::{CommandError, HiddenLines, VisibilityMode};
-use crate::stage::{Cancel, Scratch, Stage, items_mut};
+use crate::stage::{Scratch, Stage, items_mut};
 use crate::view::{SightLines, distinct_edges};
 use crate::visibility::{EdgeParameter, Stretch, StretchSink};
 
-/// Finds the visible edges of the solid. Returns how many lines stand at the front of `words`, and
-/// how many edges were left out because the faces beside them may be coplanar.
+/// Finds the visible edges of the solid, whose lines are then at the front of the working memory.
+///
+/// # Errors
+/// [`CommandError::Solid`] if this is no convex solid, [`CommandError::View`],
+/// [`CommandError::Page`], [`CommandError::DrawingTooLarge`], [`CommandError::Aborted`].
 #[inline(never)] // Keeps its frame off the stack while the stages run.
-pub(super) fn project(
-    model: &Model<'_>,
-    options: &PlotOptions,
-    steps: StepsPerMillimetre,
-    words: &mut [u64],
-    cancel: &mut dyn Cancel,
-    observer: &mut dyn Observer,
-) -> Result<(usize, usize), CommandError> {
-    let (camera, view) = camera_view(model, options, cancel)?;
+pub(super) fn project(pipeline: &mut Pipeline<'_>) -> Result<Found, CommandError> {
+    let (camera, view) = pipeline.camera_view()?;
+    let Pipeline { model, options, steps, words, cancel, observer } = pipeline;
+    let (model, options, words) = (*model, *options, &mut **words);
     let eye = match camera.sight_lines(model.fraction_bits()).map_err(CommandError::View)? {
-        SightLines::Through(place) => Eye::At(place),
+        SightLines::Through(position) => Eye::At(position),
         SightLines::Along(direction) => Eye::Towards(direction),
     };
     cancel.enter(Stage::Visibility);
@@ -42,9 +39,9 @@ pub(super) fn project(
     let found = if options.see == VisibilityMode::Edges {
         let sent = distinct_edges(model.elements(), &mut scratch);
         let sent = sent.map_err(CommandError::DrawingTooLarge)?;
-        convex::from_edges(positions, sent, eye, precision, scratch, cancel, &mut edges)
+        convex::from_edges(positions, sent, eye, precision, scratch, *cancel, &mut edges)
     } else {
-        convex::from_vertices(positions, eye, precision, scratch, cancel, &mut edges)
+        convex::from_vertices(positions, eye, precision, scratch, *cancel, &mut edges)
     };
     let summary = found.map_err(|error| match error {
         SolidError::Scratch(missing) => CommandError::DrawingTooLarge(missing),
@@ -65,12 +62,13 @@ pub(super) fn project(
     let mut bounds: Option<Bounds> = None;
     for ends in all().filter_map(|(ends, _)| on_view(ends)) {
         cancel.check()?;
-        bounds = grow(bounds, Bounds::around(ends.into_iter(), view.projection()));
+        bounds = union(bounds, Bounds::around(ends.into_iter(), view.projection()));
     }
     let bounds = bounds.ok_or(CommandError::NothingToPlot)?;
-    let map = PageMap::fit(&bounds, &options.sheet(), steps).map_err(CommandError::Page)?;
+    let map = PageMap::fit(&bounds, &options.sheet(), *steps).map_err(CommandError::Page)?;
     let collector = Collector::new(line_words);
-    let mut sink = PageSink { collector, map: &map, view: &view, options, observer };
+    let mut sink =
+        PageSink { collector, map: &map, view: &view, options, observer: &mut **observer };
     for (numbers, visible) in all() {
         cancel.check()?;
         let Some([p, q]) = on_view(numbers) else { continue };
@@ -80,8 +78,8 @@ pub(super) fn project(
             .map_err(|SinkFull| sink.collector.out_of_memory())?;
     }
     let count = sink.collector.count;
-    to_front(words, Scratch::bytes_for::<[u16; 2]>(most) / 8, count);
-    Ok((count, summary.joined))
+    move_to_front(words, Scratch::bytes_for::<[u16; 2]>(most) / 8, count);
+    Ok(Found { lines: count, joined_edges: summary.joined, degenerate_faces: 0 })
 }
 
 /// The edges of the solid that are to be drawn. Visible edges fill the array from the front, hidden

@@ -1,10 +1,10 @@
 //! Places the title below the drawing and adds its lines.
 
 use super::PlotOptions;
-use super::job::Collector;
+use super::job::{Collector, Pipeline};
 use crate::drawing::{LineType, PackedLine, StepsPerMillimetre};
 use crate::protocol::CommandError;
-use crate::stage::{Cancel, StageError, items};
+use crate::stage::{StageError, items};
 use crate::visibility::SinkFull;
 
 /// Lines handled between two checks for cancelling: some 50,000 instructions.
@@ -18,17 +18,16 @@ pub(super) fn check(options: &PlotOptions, steps: StepsPerMillimetre) -> Result<
     options.page.place_title(&title, [0; 3], steps).map(|_| ()).map_err(CommandError::Page)
 }
 
-/// Adds the lines of the title, for the first pen, to the `count` lines at the front of `words`,
-/// and places them below those lines. Returns the total number of lines. A page without a drawing
-/// has no title.
+/// Adds the lines of the title, for the first pen, to the `count` lines at the front of the working
+/// memory, and places them below those lines. Returns the total number of lines. A page without a
+/// drawing has no title.
+///
+/// # Errors
+/// [`CommandError::Page`], [`CommandError::DrawingTooLarge`], [`CommandError::Aborted`].
 #[inline(never)] // Keeps its frame off the stack while the stages run.
-pub(super) fn write(
-    options: &PlotOptions,
-    steps: StepsPerMillimetre,
-    words: &mut [u64],
-    count: usize,
-    cancel: &mut dyn Cancel,
-) -> Result<usize, CommandError> {
+pub(super) fn write(pipeline: &mut Pipeline<'_>, count: usize) -> Result<usize, CommandError> {
+    let Pipeline { options, steps, words, cancel, .. } = pipeline;
+    let steps = *steps;
     let Some(title) = options.title() else { return Ok(count) };
     // The left, right and bottom edges of the drawing.
     let mut around: Option<[i32; 3]> = None;

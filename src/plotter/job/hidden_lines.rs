@@ -1,0 +1,111 @@
+//! The stage that finds the visible lines of a model.
+
+use super::pipeline::Found;
+use super::scale::{bounds_of, fit, map_with_curves};
+use super::{Collector, HALF_A_STEP, PageSink, Pipeline, move_to_front};
+use crate::drawing::PackedLine;
+use crate::model::ModelError;
+use crate::protocol::{CommandError, VisibilityMode};
+use crate::stage::{OutOfScratch, Scratch, Stage};
+use crate::view::{Flattening, Seen, project_scene};
+use crate::visibility::{self, Scene, Unrounded, VisibilityError};
+
+/// Expected bytes of lines for each corner. A lattice of cubes shows half of its edges and has two
+/// corners per edge.
+const LIKELY_BYTES: usize = size_of::<PackedLine>() / 3;
+
+impl Pipeline<'_> {
+    /// Projects the model through the camera and finds its visible lines. Handles every model that
+    /// is neither a flat plan nor a convex solid without faces.
+    #[inline(never)] // Keeps its frame off the stack while the other stages run.
+    pub(super) fn find_visible_lines(&mut self) -> Result<Found, CommandError> {
+        let (_, view) = self.camera_view()?;
+        let Self { model, options, steps, words, cancel, observer } = self;
+        let (model, options, steps, words) = (*model, *options, *steps, &mut **words);
+        let cancel = &mut **cancel;
+        let total = size_of_val(words);
+        let projection = view.projection();
+        let mut scratch = Scratch::new(words);
+        let curves_map = if model.curves().is_empty() {
+            None
+        } else {
+            let scratch = scratch.reborrow();
+            Some(map_with_curves(&view, model, options, steps, scratch, cancel)?)
+        };
+        let on_page = curves_map.as_ref().map(|map| |x, y, w| map.fine(x, y, w));
+        let curves = on_page.as_ref().map(|on_page| Flattening { on_page, tolerance: HALF_A_STEP });
+        let Seen { vertices, elements, degenerate_faces, is_cut } =
+            project_scene(&view, model, curves, &mut scratch, cancel)?;
+        let map = match curves_map {
+            Some(map) => map,
+            None => {
+                let bounds = bounds_of(vertices, elements, projection, cancel)?;
+                let bounds = bounds.ok_or(CommandError::NothingToPlot)?;
+                fit(&view, is_cut, &bounds, options, steps)?
+            }
+        };
+
+        cancel.enter(Stage::Visibility);
+        let precision = options.precision_of(model);
+        let positions = bytemuck::cast_slice(model.vertices());
+        let unrounded = Unrounded::new(positions, precision, view.doubt(precision.written));
+        let scene = Scene { vertices, elements, projection, unrounded };
+        // The memory is divided into three parts: what is already taken, the memory of the
+        // visibility stage, and the lines that it finds. Beyond its minimum, up to three times as
+        // much again makes that stage's grid usefully finer. Memory for the expected number of
+        // lines takes precedence over this. If the lines still do not fit, the search is repeated
+        // with ever less memory for the grid.
+        let available = scratch.available_bytes();
+        let needed = visibility::scratch_bytes(&scene);
+        let spare = available.checked_sub(needed).ok_or(OutOfScratch { needed, available });
+        let spare = spare.map_err(CommandError::DrawingTooLarge)?;
+        let wanted = options.visibility(&view);
+        let likely =
+            elements.corners().len() * LIKELY_BYTES * if wanted.with_hidden { 2 } else { 1 };
+        let finest = (3 * needed).min(spare.saturating_sub(likely).max(spare / 4));
+        let grids = [finest, finest.min(spare / 4), finest.min(spare / 8), finest.min(spare / 16)];
+        let mut lines = Err(CommandError::NothingToPlot);
+        for (at, grid) in grids.iter().enumerate() {
+            let (stage_memory, mut line_memory) = scratch.reborrow().split(needed + grid);
+            let lines_at = (total - line_memory.available_bytes()) / size_of::<u64>();
+            let room = line_memory.available_bytes() / size_of::<PackedLine>();
+            let collected = line_memory.take(room).map_err(CommandError::DrawingTooLarge)?;
+            let collector = Collector { lines: collected, count: 0 };
+            let mut sink =
+                PageSink { collector, map: &map, view: &view, options, observer: &mut **observer };
+            let found = if options.see == VisibilityMode::Wire {
+                visibility::follow_wire(&scene, wanted, stage_memory, cancel, &mut sink)
+            } else {
+                visibility::find_stretches(&scene, wanted, stage_memory, cancel, &mut sink)
+                    .map(|_| ())
+            };
+            lines = match found {
+                Ok(()) => Ok((lines_at, sink.collector.count)),
+                Err(VisibilityError::SinkFull) => Err(sink.collector.out_of_memory()),
+                Err(error) => Err(refused(error, elements.corners().len())),
+            };
+            if found != Err(VisibilityError::SinkFull) || at + 1 == grids.len() {
+                break;
+            }
+            sink.observer.start_again();
+        }
+        let (lines_at, lines) = lines?;
+        move_to_front(words, lines_at, lines);
+        Ok(Found { lines, degenerate_faces, joined_edges: 0 })
+    }
+}
+
+/// Converts an error of the visibility stage. `corners` is the number of corners of the model.
+fn refused(error: VisibilityError, corners: usize) -> CommandError {
+    match error {
+        VisibilityError::Scratch(missing) => CommandError::DrawingTooLarge(missing),
+        VisibilityError::Aborted => CommandError::Aborted,
+        VisibilityError::TooManyCorners(limit) => {
+            CommandError::Model(ModelError::TooManyCorners { limit, needed: corners })
+        }
+        // The model and the view exclude the first two errors; the caller handles the third.
+        VisibilityError::UnknownVertex(_)
+        | VisibilityError::OutOfRange(_)
+        | VisibilityError::SinkFull => CommandError::NothingToPlot,
+    }
+}

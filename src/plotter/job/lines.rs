@@ -1,0 +1,100 @@
+//! Collects the lines that a stage finds, at the front of the working memory.
+
+use super::super::PlotOptions;
+use super::Observer;
+use crate::drawing::{LineType, PackedLine, PageMap};
+use crate::protocol::{CommandError, HiddenLines};
+use crate::stage::{OutOfScratch, Scratch, items_mut};
+use crate::view::View;
+use crate::visibility::{SinkFull, Stretch, StretchSink};
+
+/// Moves `count` lines from word `at` to the front, where
+/// [`build_graph`](crate::drawing::build_graph) looks for them.
+pub(in crate::plotter) fn move_to_front(words: &mut [u64], at: usize, count: usize) {
+    let line_words = Scratch::bytes_for::<PackedLine>(count) / size_of::<u64>();
+    words.copy_within(at..at + line_words, 0);
+}
+
+/// Collects lines, packed, at the front of the memory. Lines without length are dropped.
+pub(in crate::plotter) struct Collector<'a> {
+    pub(super) lines: &'a mut [PackedLine],
+    /// Number of lines collected so far.
+    pub count: usize,
+}
+
+impl<'a> Collector<'a> {
+    /// Collects lines at the front of `words`.
+    pub fn new(words: &'a mut [u64]) -> Self {
+        let room = size_of_val(words) / size_of::<PackedLine>();
+        Self { lines: items_mut(words, room).unwrap_or(&mut []), count: 0 }
+    }
+
+    /// Adds a line.
+    ///
+    /// # Errors
+    /// [`SinkFull`] if there is no room for it.
+    pub fn line(&mut self, line: PackedLine) -> Result<(), SinkFull> {
+        if line.has_length() {
+            *self.lines.get_mut(self.count).ok_or(SinkFull)? = line;
+            self.count += 1;
+        }
+        Ok(())
+    }
+
+    /// The error for one line too many, with the sizes.
+    pub fn missing(&self) -> OutOfScratch {
+        let available = size_of_val(self.lines);
+        OutOfScratch { needed: available + size_of::<PackedLine>(), available }
+    }
+
+    /// The same as an error to reply with.
+    pub fn out_of_memory(&self) -> CommandError {
+        CommandError::DrawingTooLarge(self.missing())
+    }
+}
+
+/// Maps each stretch that is to be drawn to the page and collects it as a line.
+pub(in crate::plotter) struct PageSink<'a> {
+    /// Where the lines go.
+    pub collector: Collector<'a>,
+    /// From the view to the page.
+    pub map: &'a PageMap,
+    pub view: &'a View,
+    pub options: &'a PlotOptions,
+    /// Is shown each stretch that is drawn.
+    pub observer: &'a mut dyn Observer,
+}
+
+impl StretchSink for PageSink<'_> {
+    fn stretch(&mut self, stretch: Stretch) -> Result<(), SinkFull> {
+        let (p, q) = stretch.ends;
+        // The intersection of a face with the near plane is not an edge of the model.
+        let is_cut = |near| p.z == near && q.z == near && stretch.edge.is_some();
+        if self.view.near().is_some_and(is_cut) {
+            return Ok(());
+        }
+        let mut stretch = stretch;
+        if self.options.one_pen {
+            stretch.pen = 0;
+        }
+        let line_type = match (stretch.visible, self.options.hidden) {
+            (true, _) | (false, HiddenLines::Shown) => LineType::Full,
+            (false, HiddenLines::Dotted) => LineType::Dotted,
+            (false, HiddenLines::Dashed) => LineType::Dashed,
+            (false, HiddenLines::Pen(pen)) => {
+                stretch.pen = pen;
+                LineType::Full
+            }
+            (false, HiddenLines::Erased) => return Ok(()),
+        };
+        self.observer.stretch(self.view, &stretch);
+        let along = [stretch.from, stretch.to];
+        match self.map.stretch((p, q), along, self.view.projection()) {
+            Some([from, to]) => {
+                let line = PackedLine::new(from, to, line_type, stretch.pen);
+                self.collector.line(if stretch.visible { line } else { line.under() })
+            }
+            None => Ok(()),
+        }
+    }
+}

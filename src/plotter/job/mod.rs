@@ -1,0 +1,153 @@
+//! A job: a drawing and the order of its strokes, ready to be drawn.
+//!
+//! A [`Pipeline`] computes it from the model, in the working memory, where it then lies. The files
+//! of this folder are the stages and what they share; [`plan`](super::plan),
+//! [`solid`](super::solid) and [`title`](super::title) are stages, too.
+
+mod errors;
+mod hidden_lines;
+mod lines;
+mod pipeline;
+mod scale;
+mod strokes;
+
+pub(super) use lines::{Collector, PageSink, move_to_front};
+pub(super) use pipeline::{Found, Pipeline};
+pub(super) use scale::{FOR_BOUNDS, HALF_A_STEP, union};
+pub use strokes::{Cursor, Strokes};
+
+use crate::drawing::{Drawing, Stored};
+use crate::order::{self, Leg};
+use crate::stage::{Scratch, items};
+use crate::view::View;
+use crate::visibility::Stretch;
+
+/// Receives each stretch as soon as it is found, in view coordinates. A preview is drawn with it.
+pub trait Observer {
+    /// A stretch, as seen through `view`.
+    fn stretch(&mut self, view: &View, stretch: &Stretch);
+
+    /// Everything shown so far is void, because the search begins again with another division of
+    /// the memory.
+    fn start_again(&mut self) {}
+
+    /// A bar of a plan from `from` to `to`, in the plan's own coordinates, and its pen, counted
+    /// from 0.
+    fn plan_bar(&mut self, from: [f64; 2], to: [f64; 2], pen: u8);
+}
+
+/// An observer that ignores everything.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Unobserved;
+
+impl Observer for Unobserved {
+    fn stretch(&mut self, _: &View, _: &Stretch) {}
+    fn plan_bar(&mut self, _: [f64; 2], _: [f64; 2], _: u8) {}
+}
+
+/// A drawing and the order of its strokes, both of which lie in the working memory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Job {
+    /// Where the drawing lies in the working memory.
+    stored: Stored,
+    /// Number of legs of the tour; they lie behind the drawing.
+    legs: usize,
+    /// Result of the ordering.
+    report: order::Report,
+    /// Number of faces that were left out because they have no area.
+    degenerate_faces: u32,
+    /// Number of edges of a convex solid that were left out because the faces beside them may be
+    /// coplanar.
+    joined_edges: usize,
+}
+
+impl Job {
+    /// Number of words of the working memory that the job occupies.
+    pub(super) fn words(&self) -> usize {
+        (self.stored.bytes() + Scratch::bytes_for::<Leg>(self.legs)) / size_of::<u64>()
+    }
+
+    /// The job without its memory, as numbers. [`Job::from_figures`] reads them.
+    pub(super) fn figures(&self) -> [u32; Self::FIGURES] {
+        let [segments, points] = self.stored.counts().map(|count| count as u32);
+        let report = &self.report;
+        let low = |length: u64| length as u32;
+        let high = |length: u64| (length >> 32) as u32;
+        [
+            segments,
+            points,
+            self.legs as u32,
+            report.odd_points,
+            report.components,
+            report.lifts,
+            u32::from(report.optimal),
+            low(report.pen_down),
+            high(report.pen_down),
+            low(report.pen_up),
+            high(report.pen_up),
+            low(report.bound),
+            high(report.bound),
+        ]
+    }
+
+    /// Number of the figures of a job.
+    pub(super) const FIGURES: usize = 13;
+
+    /// The job with these figures, or `None` if its memory would be larger than any board's.
+    /// Whatever the figures are, [`Job::strokes`] stays within its memory.
+    pub(super) fn from_figures(figures: [u32; Self::FIGURES]) -> Option<Self> {
+        let [segments, points, legs, odd_points, components, lifts, optimal, lengths @ ..] =
+            figures;
+        let [down, down_high, up, up_high, bound, bound_high] = lengths;
+        let count = |count: u32| u16::try_from(count).ok().map(usize::from);
+        let length = |low: u32, high: u32| u64::from(high) << 32 | u64::from(low);
+        Some(Self {
+            stored: Stored::of_counts([count(segments)?, count(points)?]),
+            legs: count(legs)?,
+            report: order::Report {
+                odd_points,
+                components,
+                lifts,
+                optimal: optimal != 0,
+                pen_down: length(down, down_high),
+                pen_up: length(up, up_high),
+                bound: length(bound, bound_high),
+            },
+            degenerate_faces: 0,
+            joined_edges: 0,
+        })
+    }
+
+    /// Gives up the memory of the job. [`Job::report`] remains valid.
+    pub fn release(&mut self) {
+        (self.stored, self.legs) = (Stored::default(), 0);
+    }
+
+    /// The result of the ordering: number of pen lifts, lengths, and whether it is proved optimal.
+    pub fn report(&self) -> &order::Report {
+        &self.report
+    }
+
+    /// Number of faces of the model that were left out because they have no area.
+    pub fn degenerate_faces(&self) -> u32 {
+        self.degenerate_faces
+    }
+
+    /// Number of edges of a convex solid that were left out because the faces beside them may be
+    /// coplanar.
+    pub fn joined_edges(&self) -> usize {
+        self.joined_edges
+    }
+
+    /// The strokes from `cursor` on. `words` is the working memory that holds the job.
+    pub fn strokes<'a>(&self, words: &'a mut [u64], cursor: &'a mut Cursor) -> Strokes<'a> {
+        // `compute` filled this memory, so both reads succeed. Otherwise there are no strokes.
+        let nothing = Drawing { points: &[], segments: &[] };
+        let leg_words = self.stored.bytes() / size_of::<u64>();
+        let words: &'a [u64] = words;
+        let tour =
+            words.get(leg_words..).and_then(|rest| items::<Leg>(rest, self.legs)).unwrap_or(&[]);
+        let drawing = self.stored.drawing(words).unwrap_or(nothing);
+        Strokes { drawing, tour, cursor }
+    }
+}

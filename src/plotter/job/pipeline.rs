@@ -1,0 +1,102 @@
+//! The stages of a job, one after the other.
+
+use super::super::{PlotOptions, plan, solid, title};
+use super::{Job, Observer};
+use crate::drawing::{StepsPerMillimetre, build_graph};
+use crate::model::Model;
+use crate::order::{self, Leg};
+use crate::protocol::{CommandError, VisibilityMode};
+use crate::stage::{Cancel, Stage};
+use crate::view::{Camera, View};
+
+/// What a job is computed from, and the working memory in which that is done. Each stage borrows
+/// it.
+pub(in crate::plotter) struct Pipeline<'p> {
+    /// The model, which is not changed.
+    pub model: &'p Model<'p>,
+    /// What is drawn and how.
+    pub options: &'p PlotOptions,
+    pub steps: StepsPerMillimetre,
+    /// The working memory. A stage leaves its result at the front.
+    pub words: &'p mut [u64],
+    /// Is asked in every stage whether the user aborts the job.
+    pub cancel: &'p mut dyn Cancel,
+    /// Is shown what will be drawn.
+    pub observer: &'p mut dyn Observer,
+}
+
+/// The lines that a stage has left at the front of the working memory, and what it left out.
+#[derive(Debug, Default)]
+pub(in crate::plotter) struct Found {
+    /// Number of lines.
+    pub lines: usize,
+    /// Number of faces without an area.
+    pub degenerate_faces: u32,
+    /// Number of edges of a convex solid whose faces may be coplanar.
+    pub joined_edges: usize,
+}
+
+impl Pipeline<'_> {
+    /// Computes the job. The working memory then holds it.
+    ///
+    /// # Errors
+    /// The [`CommandError`] to reply with. The working memory then holds no job.
+    pub fn run(mut self) -> Result<Job, CommandError> {
+        self.check()?;
+        let found = if self.model.is_plan() && self.options.shows_plans_flat() {
+            plan::lay_out(&mut self)?
+        } else {
+            match self.options.see {
+                VisibilityMode::Vertices | VisibilityMode::Edges => solid::project(&mut self)?,
+                VisibilityMode::Faces | VisibilityMode::Wire => self.find_visible_lines()?,
+            }
+        };
+        let lines = title::write(&mut self, found.lines)?;
+        self.order(&Found { lines, ..found })
+    }
+
+    /// Refuses what is known to fail before anything is computed.
+    fn check(&self) -> Result<(), CommandError> {
+        let is_empty = self.model.elements().corners().is_empty() && self.model.curves().is_empty();
+        if is_empty && self.options.see != VisibilityMode::Vertices {
+            return Err(CommandError::NothingToPlot);
+        }
+        title::check(self.options, self.steps)
+    }
+
+    /// Makes one drawing of the lines and orders its strokes.
+    #[inline(never)] // Keeps its frame off the stack while the other stages run.
+    fn order(self, found: &Found) -> Result<Job, CommandError> {
+        let Self { options, steps, words, cancel, .. } = self;
+        cancel.enter(Stage::Order);
+        let stored = build_graph(words, found.lines, cancel)?;
+        let (drawing, mut rest) = stored.split(words).map_err(CommandError::DrawingTooLarge)?;
+        let legs = drawing.segments.len();
+        if legs == 0 {
+            return Err(CommandError::NothingToPlot);
+        }
+        let tour = rest.take::<Leg>(legs).map_err(CommandError::DrawingTooLarge)?;
+        let report = order::order(drawing, options.order(steps), rest, cancel, tour)?;
+        let Found { degenerate_faces, joined_edges, .. } = *found;
+        Ok(Job { stored, legs, report, degenerate_faces, joined_edges })
+    }
+
+    /// The camera that the options choose, and the view of the model through it.
+    ///
+    /// # Errors
+    /// [`CommandError::NothingToPlot`] if there is no vertex, [`CommandError::View`] if the camera
+    /// cannot show the model, [`CommandError::Aborted`].
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    pub fn camera_view(&mut self) -> Result<(Camera, View), CommandError> {
+        let Self { model, options, cancel, .. } = self;
+        cancel.enter(Stage::View);
+        let camera = options.camera(model).ok_or(CommandError::NothingToPlot)?;
+        cancel.check()?;
+        let view = View::new(&camera, model).map_err(CommandError::View)?;
+        cancel.check()?;
+        if !options.clip_behind {
+            view.refuse_behind(model).map_err(CommandError::View)?;
+        }
+        Ok((camera, view))
+    }
+}
