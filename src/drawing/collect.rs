@@ -61,13 +61,14 @@ impl PackedLine {
     /// Packs the line from `from` to `to`. Both must be within ±[`PAGE_LIMIT`], and `pen` below
     /// [`PEN_LIMIT`].
     pub fn new(from: PagePoint, to: PagePoint, line_type: LineType, pen: u8) -> Self {
-        let pack = |c: i32| (c.clamp(1 - PAGE_LIMIT, PAGE_LIMIT - 1) + PAGE_LIMIT) as u128;
-        let ends = pack(from.x) | pack(from.y) << 21 | pack(to.x) << 42 | pack(to.y) << 63;
+        let pack = |c: i32| (c.clamp(1 - PAGE_LIMIT, PAGE_LIMIT - 1) + PAGE_LIMIT) as u64;
+        let low = pack(from.x) | pack(from.y) << 21 | pack(to.x) << 42 | pack(to.y) << 63;
+        let high = (pack(to.y) >> 1) as u32;
         let marks = Marks { line_type, yields: false, pen }.bits();
-        Self([ends as u32, (ends >> 32) as u32, (ends >> 64) as u32 | marks << MARKS])
+        Self([low as u32, (low >> 32) as u32, high | marks << MARKS])
     }
 
-    /// Returns the same line. A full line is marked to yield to any other line at the same place,
+    /// Returns the same line. A full line is marked to yield to any other line at the same position,
     /// so that a hidden line never replaces a visible one.
     #[must_use]
     pub fn under(self) -> Self {
@@ -84,13 +85,12 @@ impl PackedLine {
 
     /// Returns its ends.
     pub fn ends(self) -> [PagePoint; 2] {
-        let [low, middle, high] = self.0.map(u128::from);
-        let packed = low | middle << 32 | high << 64;
-        let coordinate = |shift: u32| ((packed >> shift) as i32 & 0x1F_FFFF) - PAGE_LIMIT;
-        [
-            PagePoint { x: coordinate(0), y: coordinate(21) },
-            PagePoint { x: coordinate(42), y: coordinate(63) },
-        ]
+        let [low, middle, high] = self.0.map(u64::from);
+        let low = low | middle << 32;
+        [low, low >> 42 | high << 22].map(|packed| {
+            let coordinate = |shift: u32| ((packed >> shift) as i32 & 0x1F_FFFF) - PAGE_LIMIT;
+            PagePoint { x: coordinate(0), y: coordinate(21) }
+        })
     }
 
     fn marks(self) -> Marks {

@@ -57,9 +57,12 @@ impl Dashes {
             shortest = if length < shortest { length } else { shortest };
             at += 1;
         }
-        assert!(lengths.len() % 2 == 0, "there are not as many gaps as dashes");
+        assert!(lengths.len().is_multiple_of(2), "there are not as many gaps as dashes");
         // So that the ends of dashes and gaps are never halfway between two moves.
-        assert!(period % 2 == 0 && (at == 0 || lengths[0] % 2 == 1), "a line has an even length");
+        assert!(
+            period.is_multiple_of(2) && (at == 0 || lengths[0] % 2 == 1),
+            "a line has an even length"
+        );
         Self { lengths, period, shortest }
     }
 }

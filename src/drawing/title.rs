@@ -139,17 +139,17 @@ impl Title<'_> {
             line.set(letter, &mut |Placed { glyph, x, rise }| {
                 let mut before = None;
                 for point in glyph.points.chunks_exact(2) {
-                    let here = match *point {
+                    let point_on_page = match *point {
                         [right, down] if right != b' ' => Some(PagePoint {
                             x: on_axis(left, x + offset(right), 0),
                             y: on_axis(baseline, rise + BASELINE - offset(down), 1),
                         }),
                         _ => None,
                     };
-                    if let (Some(from), Some(to), Ok(())) = (before, here, &outcome) {
+                    if let (Some(from), Some(to), Ok(())) = (before, point_on_page, &outcome) {
                         outcome = each([from, to]);
                     }
-                    before = here;
+                    before = point_on_page;
                 }
             });
         }
@@ -190,8 +190,8 @@ impl TitleText {
         let mut text = Self::default();
         for letter in letters {
             let start = usize::from(text.length);
-            let place = text.bytes.get_mut(start..start + letter.len_utf8())?;
-            text.length += letter.encode_utf8(place).len() as u8;
+            let free = text.bytes.get_mut(start..start + letter.len_utf8())?;
+            text.length += letter.encode_utf8(free).len() as u8;
         }
         Some(text)
     }

@@ -82,8 +82,8 @@ mod tests {
         let mut memory = (heapless::Vec::<Position, 9>::new(), [Corner::zeroed(); 64]);
         let mut model = Model::new(&mut memory.0, &mut memory.1);
         for vertex in vertices {
-            let place = vertex.map(|text| Decimal::parse(text).unwrap());
-            model.add_vertex(place, &mut no_undo).unwrap();
+            let position = vertex.map(|text| Decimal::parse(text).unwrap());
+            model.add_vertex(position, &mut no_undo).unwrap();
         }
         for (numbers, pen) in elements {
             model.choose_pen(true, PenName::Number(*pen), &mut no_undo).unwrap();
@@ -130,8 +130,8 @@ mod tests {
         let mut memory = (heapless::Vec::<Position, 9>::new(), [Corner::zeroed(); 64]);
         let mut model = Model::new(&mut memory.0, &mut memory.1);
         for vertex in near.iter().chain([&["1000", "0", "0"]]) {
-            let place = vertex.map(|text| Decimal::parse(text).unwrap());
-            model.add_vertex(place, &mut no_undo).unwrap();
+            let position = vertex.map(|text| Decimal::parse(text).unwrap());
+            model.add_vertex(position, &mut no_undo).unwrap();
         }
         model.vertices.pop();
         assert!(model.fraction_bits() < FINEST_FRACTION_BITS);

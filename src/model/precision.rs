@@ -19,8 +19,8 @@ const FEWEST_ROUNDED: u32 = 3;
 pub(super) struct Rounding {
     /// The greatest number of decimals of the coordinates that were sent.
     decimals: u8,
-    /// Whether an edit may have turned an error along one axis into errors along all three.
-    turned: bool,
+    /// Whether an edit may have made errors along all three axes of an error along one.
+    rotated: bool,
     /// The error bound after edits, in the model's unit.
     edited: u32,
 }
@@ -72,21 +72,21 @@ impl Rounding {
     /// Updates the error bound when coordinates are rotated or reflected. An error within a cube
     /// lies within the sphere around the cube, and stays there however often it is rotated: 7/4 is
     /// more than the square root of 3.
-    pub(super) fn turn(&mut self, fraction_bits: u32, all: bool) {
+    pub(super) fn rotate(&mut self, fraction_bits: u32, all: bool) {
         const WHOLE: u64 = 1 << FINEST_FRACTION_BITS;
-        let by = if self.turned { WHOLE } else { WHOLE / 4 * 7 };
+        let by = if self.rotated { WHOLE } else { WHOLE / 4 * 7 };
         self.scale(fraction_bits, by, false, all);
-        self.turned = true;
+        self.rotated = true;
     }
 
     /// Returns these facts as two numbers, to be stored.
     pub(super) fn numbers(&self) -> [usize; 2] {
-        [usize::from(self.decimals) << 1 | usize::from(self.turned), self.edited as usize]
+        [usize::from(self.decimals) << 1 | usize::from(self.rotated), self.edited as usize]
     }
 
     /// Restores the facts from these numbers.
     pub(super) fn from_numbers([decimals, edited]: [u32; 2]) -> Self {
-        Self { decimals: (decimals >> 1) as u8, turned: decimals & 1 != 0, edited }
+        Self { decimals: (decimals >> 1) as u8, rotated: decimals & 1 != 0, edited }
     }
 }
 
@@ -132,12 +132,12 @@ mod tests {
         texts.map(|text| Decimal::parse(text).unwrap())
     }
 
-    fn with_vertices(places: &[[&str; 3]], test: impl FnOnce(&mut Model<'_>)) {
+    fn with_vertices(positions: &[[&str; 3]], test: impl FnOnce(&mut Model<'_>)) {
         let mut vertices = heapless::Vec::<Position, 8>::new();
         let mut corners = [Corner::zeroed(); 4];
         let mut model = Model::new(&mut vertices, &mut corners);
-        for place in places {
-            model.add_vertex(decimals(*place), &mut no_undo).unwrap();
+        for position in positions {
+            model.add_vertex(decimals(*position), &mut no_undo).unwrap();
         }
         test(&mut model);
     }
@@ -169,8 +169,9 @@ mod tests {
 
     #[test]
     fn few_decimals_are_meant_as_they_stand() {
-        for place in [["0.1", "0.2", "0"], ["0.25", "1.75", "2.50"], ["0.100", "0.2000", "1e-2"]] {
-            with_vertices(&[place, ["100", "1", "1"]], |model| {
+        for position in [["0.1", "0.2", "0"], ["0.25", "1.75", "2.50"], ["0.100", "0.2000", "1e-2"]]
+        {
+            with_vertices(&[position, ["100", "1", "1"]], |model| {
                 assert_eq!(model.precision(), Precision { written: 1, unit: 1 });
             });
         }
@@ -204,8 +205,8 @@ mod tests {
 
     #[test]
     fn edits_carry_the_error_along() {
-        let place = ["0.123", "0.5", "0"];
-        with_vertices(&[place, ["7", "7", "7"]], |model| {
+        let position = ["0.123", "0.5", "0"];
+        with_vertices(&[position, ["7", "7", "7"]], |model| {
             let edit = |model: &mut Model<'_>, edit| {
                 model.edit(edit, Scratch::new(&mut [0; 4]), &mut no_undo).unwrap();
                 written(model)
@@ -214,15 +215,15 @@ mod tests {
                 edit(model, Edit::Scale(decimals(["0.1", "0.1", "0.2"]), None)),
                 1e-4
             ));
-            // However often it is turned, the error lies in the same sphere.
+            // However often it is rotated, the error lies in the same sphere.
             for _ in 0..40 {
-                let turned = edit(model, Edit::Rotate(1, 33.0, None));
-                assert!((1.7e-4..1.8e-4).contains(&turned), "{turned}");
+                let rotated = edit(model, Edit::Rotate(1, 33.0, None));
+                assert!((1.7e-4..1.8e-4).contains(&rotated), "{rotated}");
             }
             assert!(edit(model, Edit::Scale(decimals(["9", "1", "1"]), Some([1, 1]))) > 15e-4);
             // What is sent afterwards has its own error bound.
             model.clear();
-            model.add_vertex(decimals(place), &mut no_undo).unwrap();
+            model.add_vertex(decimals(position), &mut no_undo).unwrap();
             assert!(is_about(written(model), 5e-4));
             assert_eq!(model.chosen_precision(Decimal::parse("0").unwrap()).written, 1);
             let chosen = model.chosen_precision(Decimal::parse("0.25").unwrap()).written;

@@ -13,7 +13,7 @@ use crate::stage::Scratch;
 use core::fmt;
 
 /// Saves the copy of the model that `$undo` restores.
-pub(super) struct Keeper<'k> {
+pub(super) struct UndoCopy<'k> {
     /// The front of the working memory, where the copy goes.
     words: &'k mut [u64],
     /// Length of the copy in words; 0 if there is none.
@@ -24,7 +24,7 @@ pub(super) struct Keeper<'k> {
     is_idle: bool,
 }
 
-impl Keeper<'_> {
+impl UndoCopy<'_> {
     /// Saves `model`, which is about to change, in place of the last copy. Keeps no copy if it does
     /// not fit or the machine is not idle.
     #[inline(never)] // Several callers share one copy of the code.
@@ -40,18 +40,18 @@ impl Keeper<'_> {
 }
 
 impl<'m> Inner<'m> {
-    /// Borrows the model, the keeper of its copy, and the working memory behind the copy, which an
+    /// Borrows the model, the undo_copy of its copy, and the working memory behind the copy, which an
     /// edit may use.
-    pub(super) fn split(&mut self) -> (&mut Model<'m>, Keeper<'_>, Scratch<'_>) {
+    pub(super) fn split(&mut self) -> (&mut Model<'m>, UndoCopy<'_>, Scratch<'_>) {
         // A refused change must not overwrite the last copy, so room is left for the longer of
         // both.
         let next = Some(self.model.saved_words()).filter(|words| *words <= self.words.len());
         let copies = self.kept_words.max(next.unwrap_or(0));
         let (words, free) = self.words.split_at_mut(copies.min(self.words.len()));
         let is_idle = self.machine.state() == State::Idle;
-        let keeper =
-            Keeper { words, kept_words: &mut self.kept_words, job: &mut self.job, is_idle };
-        (&mut self.model, keeper, Scratch::new(free))
+        let undo_copy =
+            UndoCopy { words, kept_words: &mut self.kept_words, job: &mut self.job, is_idle };
+        (&mut self.model, undo_copy, Scratch::new(free))
     }
 
     /// Edits the model and reports how many elements have been added or removed.
@@ -64,8 +64,8 @@ impl<'m> Inner<'m> {
             return Err(CommandError::Busy);
         }
         self.job.release();
-        let (model, mut keeper, scratch) = self.split();
-        match model.edit(edit, scratch, &mut |model| keeper.save(model)) {
+        let (model, mut undo_copy, scratch) = self.split();
+        match model.edit(edit, scratch, &mut |model| undo_copy.save(model)) {
             Ok(Change { vertices, bars, faces, curves }) => {
                 Reply(board).line(format_args!(
                     "[EDIT:vertices {vertices:+}, bars {bars:+}, faces {faces:+}, curves {curves:+}]"

@@ -10,11 +10,11 @@ mod board;
 pub mod budget;
 mod editor;
 mod job;
-mod kept;
 mod memory;
 mod options;
 mod plan;
 mod program;
+mod records;
 mod reply;
 mod report;
 mod solid;
@@ -49,7 +49,7 @@ const PORT_LIMIT: usize = 2;
 
 /// Polls the plotter forever, and sleeps while there is nothing to do.
 pub fn run<B: Board>(board: &mut B, memory: MemorySlices<'_>, pins: &PulserState) -> ! {
-    let mut plotter = Plotter::with_settings(memory, pins, kept::settings(board));
+    let mut plotter = Plotter::with_settings(memory, pins, records::load_settings(board));
     if board.fault().is_some() {
         plotter.inner.machine.alarm(Alarm::Restarted);
     }
@@ -339,7 +339,7 @@ impl Inner<'_> {
             Command::Settings => self.task = Some(Task::List(Listing::Settings, 0)),
             Command::Setting { name, value } => {
                 self.change_setting(name, value)?;
-                kept::keep_settings(self.machine.settings(), board)?;
+                records::save_settings(self.machine.settings(), board)?;
             }
             Command::Option(option) => self.options.set(option),
             Command::Title(text) => self.options.set_title(text)?,
@@ -403,7 +403,7 @@ impl Inner<'_> {
     /// write.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     fn save<B: Board>(&self, board: &mut B) {
-        if kept::keep_job(&self.job, self.machine.settings(), self.words, board).is_err() {
+        if records::save_job(&self.job, self.machine.settings(), self.words, board).is_err() {
             Reply(board)
                 .line(format_args!("[MSG:$again will not draw this: the flash is worn out]"));
         }
@@ -415,7 +415,7 @@ impl Inner<'_> {
         self.kept_words = 0;
         self.job = Job::default();
         self.cursor = Cursor::default();
-        self.job = kept::job(self.machine.settings(), self.words, board)?;
+        self.job = records::load_job(self.machine.settings(), self.words, board)?;
         Ok(())
     }
 

@@ -34,8 +34,8 @@ pub(super) fn project(pipeline: &mut Pipeline<'_>) -> Result<Found, CommandError
         _ => 3 * model.vertices().len(),
     };
     let mut scratch = Scratch::new(words);
-    let kept = scratch.take(most).map_err(CommandError::DrawingTooLarge)?;
-    let mut edges = Edges { kept, shown: 0, hidden: 0, wanted: options.hidden };
+    let pairs = scratch.take(most).map_err(CommandError::DrawingTooLarge)?;
+    let mut edges = Edges { pairs, shown: 0, hidden: 0, wanted: options.hidden };
     let found = if options.see == VisibilityMode::Edges {
         let sent = distinct_edges(model.elements(), &mut scratch);
         let sent = sent.map_err(CommandError::DrawingTooLarge)?;
@@ -86,7 +86,7 @@ pub(super) fn project(pipeline: &mut Pipeline<'_>) -> Result<Found, CommandError
 /// ones from the back.
 struct Edges<'a> {
     /// The vertex numbers of the ends of each edge.
-    kept: &'a mut [[u16; 2]],
+    pairs: &'a mut [[u16; 2]],
     /// Number of visible edges.
     shown: usize,
     /// Number of hidden edges that are kept.
@@ -111,10 +111,10 @@ impl SolidSink for Edges<'_> {
             }
             (EdgeVisibility::Hidden, _) => {
                 self.hidden += 1;
-                self.kept.len().checked_sub(self.hidden).ok_or(SinkFull)?
+                self.pairs.len().checked_sub(self.hidden).ok_or(SinkFull)?
             }
         };
-        *self.kept.get_mut(at).ok_or(SinkFull)? = [edge.ends.0, edge.ends.1];
+        *self.pairs.get_mut(at).ok_or(SinkFull)? = [edge.ends.0, edge.ends.1];
         Ok(())
     }
 }

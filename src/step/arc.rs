@@ -59,7 +59,7 @@ pub struct Arc {
     /// Whether a side ends at the point where the next side begins.
     corner_is_shared: bool,
     /// The current position on the circle, counted in moves counterclockwise.
-    place: i32,
+    position: i32,
     /// The direction: 1 counterclockwise, -1 clockwise.
     step: i8,
     /// The number of points still to come.
@@ -147,13 +147,13 @@ impl Arc {
             radius: 2 * (first + last),
             half: [0; 2],
             corner_is_shared: false,
-            place: 0,
+            position: 0,
             step: if turn == Turn::Clockwise { -1 } else { 1 },
             remaining: 0,
         };
         arc.find_corner();
-        arc.place = arc.place_of(from);
-        let ahead = (arc.place_of(to) - arc.place) * i32::from(arc.step);
+        arc.position = arc.position_of(from);
+        let ahead = (arc.position_of(to) - arc.position) * i32::from(arc.step);
         let whole = 2 * (arc.moves_of(0) + arc.moves_of(1));
         let moves = ahead.rem_euclid(whole);
         arc.remaining = if from == to { whole } else { moves }.unsigned_abs().max(1);
@@ -166,14 +166,14 @@ impl Arc {
         let [x, y] = self.weights.map(|weight| i64::from(weight) * i64::from(weight));
         // This estimates the point at which the circle is equally steep along both axes; the loops
         // below correct it to the exact step.
-        let place = |mine: i64, others: i64| {
+        let position = |mine: i64, others: i64| {
             let (mine, others) = (mine.unsigned_abs(), others.unsigned_abs());
             // This is the square of the position, at most `radius` / 4 over the square of the
             // axis's weight.
             let square = self.radius / 4 / (mine + others) * others / mine;
             square.isqrt() as i32 + 1
         };
-        let mut half = [place(y, x), place(x, y)];
+        let mut half = [position(y, x), position(x, y)];
         while half[0] > 0 && y * i64::from(half[0]) > x * i64::from(self.across(0, half[0])) {
             half[0] -= 1;
         }
@@ -212,13 +212,13 @@ impl Arc {
         };
         let step = i32::from(self.step);
         if self.remaining > 1 {
-            include(self.point_at(self.place + step));
+            include(self.point_at(self.position + step));
         }
         // In the middle of each side the circle is farthest out.
         let half_turn = self.moves_of(0) + self.moves_of(1);
         for side in 0..4 {
             let middle = self.begin_of(side) + self.half[side % 2];
-            let ahead = ((middle - self.place) * step).rem_euclid(2 * half_turn);
+            let ahead = ((middle - self.position) * step).rem_euclid(2 * half_turn);
             if ahead.unsigned_abs() < self.remaining {
                 include(self.point_at(middle));
             }
@@ -234,7 +234,7 @@ impl Arc {
     }
 
     /// The position on the circle nearest to `point`.
-    fn place_of(&self, point: PagePoint) -> i32 {
+    fn position_of(&self, point: PagePoint) -> i32 {
         let (x, y) = (point.x - self.center.x, point.y - self.center.y);
         let [weighted_x, weighted_y] = [(x, self.weights[0]), (y, self.weights[1])]
             .map(|(steps, weight)| i64::from(steps) * i64::from(weight) * i64::from(weight));
@@ -250,13 +250,13 @@ impl Arc {
     }
 
     /// The point at a position on the circle.
-    fn point_at(&self, place: i32) -> PagePoint {
-        let [mut place, half_turn] = [place, self.moves_of(0) + self.moves_of(1)];
-        place = place.rem_euclid(2 * half_turn);
-        let is_second = place >= half_turn;
-        place -= if is_second { half_turn } else { 0 };
-        let side = usize::from(place >= self.moves_of(0));
-        let along = place - self.begin_of(side) - self.half[side];
+    fn point_at(&self, position: i32) -> PagePoint {
+        let [mut position, half_turn] = [position, self.moves_of(0) + self.moves_of(1)];
+        position = position.rem_euclid(2 * half_turn);
+        let is_second = position >= half_turn;
+        position -= if is_second { half_turn } else { 0 };
+        let side = usize::from(position >= self.moves_of(0));
+        let along = position - self.begin_of(side) - self.half[side];
         let out = self.across(side, along);
         let (x, y) = if side == 0 { (out, along) } else { (-along, out) };
         let (x, y) = if is_second { (-x, -y) } else { (x, y) };
@@ -308,8 +308,8 @@ impl Iterator for Arc {
         if self.remaining == 0 {
             return Some(self.to);
         }
-        self.place += i32::from(self.step);
-        Some(self.point_at(self.place))
+        self.position += i32::from(self.step);
+        Some(self.point_at(self.position))
     }
 }
 

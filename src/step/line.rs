@@ -97,9 +97,9 @@ impl Line {
         if offsets == [0; 2] {
             return line;
         }
-        let (more, fewer, way) =
-            if dx.abs() > dy.abs() { (dx.abs(), dy.abs(), dy) } else { (dy.abs(), dx.abs(), dx) };
-        let [start, end] = offsets.map(|offset| i32::from(offset) * way.signum());
+        let (more, fewer) = if dx.abs() > dy.abs() { (dx, dy) } else { (dy, dx) };
+        let [start, end] = offsets.map(|offset| i32::from(offset) * fewer.signum());
+        let (more, fewer) = (more.abs(), fewer.abs());
         // Measured in offset units, a straight move falls behind the line by `gain` over the number
         // of moves. `gain` is never below 0. On a line of diagonal moves alone it can be a little
         // too great, but that changes none of the moves.

@@ -60,15 +60,15 @@ impl Model<'_> {
             if let Some(between) = corners.get_mut(hole..last.end).filter(|_| last.start > hole) {
                 between.rotate_right(last.len());
                 self.move_pen(last, hole);
-                self.keep_elements(bars, range.start + 1..range.end + 1);
+                self.remove_elements(bars, range.start + 1..range.end + 1);
                 return;
             }
         }
-        self.keep_elements(bars, range);
+        self.remove_elements(bars, range);
     }
 
     /// Removes the bars, or faces, whose positions among their kind are in `gone`.
-    fn keep_elements(&mut self, bars: bool, gone: Range<usize>) {
+    fn remove_elements(&mut self, bars: bool, gone: Range<usize>) {
         let mut number = 0;
         self.retain(&mut |element| {
             let counts = element.first().is_some_and(|corner| corner.of_bar() == bars);
@@ -137,7 +137,7 @@ impl Model<'_> {
 
     /// Reverses the faces that have all their vertices in `range`, so that they face outwards
     /// again.
-    pub(super) fn turn_faces(&mut self, range: &Range<usize>) {
+    pub(super) fn reverse_faces(&mut self, range: &Range<usize>) {
         self.retain(&mut |element| {
             let inside = element.iter().all(|corner| range.contains(&usize::from(corner.vertex())));
             if inside && element.first().is_some_and(|corner| !corner.of_bar()) {

@@ -143,19 +143,19 @@ impl Model<'_> {
                 let range = self.range(ElementKind::Vertices, numbers)?;
                 self.transform(&Map::rotation(axis, degrees), range.clone(), before)?;
                 if rest_of_periods(degrees, 90.0) != 0.0 {
-                    self.turn_errors(&range);
+                    self.rotate_errors(&range);
                 }
             }
             Edit::Reflect(plane, numbers) => {
                 let range = self.range(ElementKind::Vertices, numbers)?;
                 self.transform(&self.reflection(plane)?, range.clone(), before)?;
-                self.turn_faces(&range);
-                self.turn_errors(&range);
+                self.reverse_faces(&range);
+                self.rotate_errors(&range);
             }
             Edit::Mirror(plane, numbers) => {
                 let range = self.range(ElementKind::Vertices, numbers)?;
                 self.mirror(&self.reflection(plane)?, range, scratch, before)?;
-                self.turn_errors(&(0..0));
+                self.rotate_errors(&(0..0));
             }
         }
         let after = self.counts();
@@ -172,9 +172,9 @@ impl Model<'_> {
     }
 
     /// Updates the error bound after the vertices in `range` were rotated or reflected.
-    fn turn_errors(&mut self, range: &Range<usize>) {
+    fn rotate_errors(&mut self, range: &Range<usize>) {
         let all = range.len() == self.vertices.len();
-        self.rounding.turn(self.fraction_bits, all);
+        self.rounding.rotate(self.fraction_bits, all);
     }
 
     fn counts(&self) -> [usize; 4] {

@@ -1,5 +1,5 @@
-//! The formats in which settings and jobs are kept in the board's flash, so that they outlive a
-//! loss of power.
+//! The records of settings and jobs in the board's flash, which outlive a loss of power: their
+//! formats, and how they are saved and loaded.
 
 use super::{Board, Job, NotStored, Record};
 use crate::machine::{SETTING_COUNT, Setting, Settings, Value};
@@ -10,13 +10,13 @@ const SETTING_BYTES: usize = 6;
 
 /// The settings kept by the board; those that are not kept have their default values.
 #[inline(never)] // Keeps its frame off the stack while the stages run.
-pub(super) fn settings<B: Board>(board: &mut B) -> Settings {
+pub(super) fn load_settings<B: Board>(board: &mut B) -> Settings {
     let mut values = heapless::Vec::<(u16, Value), SETTING_COUNT>::new();
-    board.load(Record::Settings, &mut |kept| {
+    board.load(Record::Settings, &mut |record| {
         let mut bytes = [0; SETTING_BYTES];
         // A record with more entries than there are settings was written by another version. Its
         // last entries are unknown to this one.
-        while kept.read(&mut bytes) == SETTING_BYTES && !values.is_full() {
+        while record.read(&mut bytes) == SETTING_BYTES && !values.is_full() {
             let [a, b, c, d, e, f] = bytes;
             let value = Value::from_bits(i32::from_le_bytes([c, d, e, f]));
             let _ = values.push((u16::from_le_bytes([a, b]), value));
@@ -31,14 +31,14 @@ pub(super) fn settings<B: Board>(board: &mut B) -> Settings {
 /// [`CommandError::NotStored`]: the settings are in force, but after a loss of power the previous
 /// ones return.
 #[inline(never)] // Keeps its frame off the stack while the stages run.
-pub(super) fn keep_settings<B: Board>(
+pub(super) fn save_settings<B: Board>(
     settings: &Settings,
     board: &mut B,
 ) -> Result<(), CommandError> {
     let mut bytes = [0; SETTING_COUNT * SETTING_BYTES];
-    for (place, (info, value)) in bytes.chunks_exact_mut(SETTING_BYTES).zip(settings.iter()) {
-        place[..2].copy_from_slice(&info.number.to_le_bytes());
-        place[2..].copy_from_slice(&value.to_bits().to_le_bytes());
+    for (entry, (info, value)) in bytes.chunks_exact_mut(SETTING_BYTES).zip(settings.iter()) {
+        entry[..2].copy_from_slice(&info.number.to_le_bytes());
+        entry[2..].copy_from_slice(&value.to_bits().to_le_bytes());
     }
     board.save(Record::Settings, &[&bytes]).map_err(|_| CommandError::NotStored)
 }
@@ -60,7 +60,7 @@ fn steps(settings: &Settings) -> [u32; 2] {
 /// # Errors
 /// [`NotStored`]: the previous job is still kept.
 #[inline(never)] // Keeps its frame off the stack while the stages run.
-pub(super) fn keep_job<B: Board>(
+pub(super) fn save_job<B: Board>(
     job: &Job,
     settings: &Settings,
     words: &[u64],
@@ -69,8 +69,8 @@ pub(super) fn keep_job<B: Board>(
     let [x, y] = steps(settings);
     let numbers = [JOB_LAYOUT, x, y].into_iter().chain(job.figures());
     let mut header = [[0; 4]; JOB_HEADER];
-    for (place, number) in header.iter_mut().zip(numbers) {
-        *place = number.to_le_bytes();
+    for (word, number) in header.iter_mut().zip(numbers) {
+        *word = number.to_le_bytes();
     }
     let memory = words.get(..job.words()).ok_or(NotStored)?;
     board.save(Record::Job, &[header.as_flattened(), bytemuck::cast_slice(memory)])
@@ -82,15 +82,15 @@ pub(super) fn keep_job<B: Board>(
 /// [`CommandError::NoJobKept`] if there is none, [`CommandError::OtherSteps`] if the steps per
 /// millimetre have changed since. `words` then hold no job.
 #[inline(never)] // Keeps its frame off the stack while the stages run.
-pub(super) fn job<B: Board>(
+pub(super) fn load_job<B: Board>(
     settings: &Settings,
     words: &mut [u64],
     board: &mut B,
 ) -> Result<Job, CommandError> {
     let mut found = Err(CommandError::NoJobKept);
-    board.load(Record::Job, &mut |kept| {
+    board.load(Record::Job, &mut |record| {
         let mut header = [[0; 4]; JOB_HEADER];
-        if kept.read(header.as_flattened_mut()) != size_of_val(&header) {
+        if record.read(header.as_flattened_mut()) != size_of_val(&header) {
             return;
         }
         let [layout, x, y, figures @ ..] = header.map(u32::from_le_bytes);
@@ -101,7 +101,7 @@ pub(super) fn job<B: Board>(
         };
         if [x, y] != steps(settings) {
             found = Err(CommandError::OtherSteps);
-        } else if kept.read(bytemuck::cast_slice_mut(memory)) == size_of_val(memory) {
+        } else if record.read(bytemuck::cast_slice_mut(memory)) == size_of_val(memory) {
             found = Ok(job);
         }
     });
