@@ -1,47 +1,35 @@
 //! Emulates a Raspberry Pi Pico in rp2040js through the script `pico.mjs`, which describes the
 //! protocol between both.
 
+mod process;
+mod record;
+mod servo;
+
+use process::{
+    PROGRAM, State, check_version, command, function, listen, log_address, spawn_and_read,
+};
+use record::{
+    CUT_FLASH, CUT_POWER, CYCLE_NANOS, DELAY_ALARM, ERASE_TIME, HANG, JUMP, PIN, RUN_PIN, Record,
+    SERIAL, STACK, STALL, STAYS_HIGH, STAYS_LOW, SWITCH, SWITCH_ZERO, TIMED, UF2, USB, USB_HOST,
+    USB_LINE, at,
+};
+
+use super::running::{Running, Shared};
+use super::stack::{self, Stack};
+use super::{EmulatedBoard, EmulatorError, PinChange, log};
 use std::collections::VecDeque;
-use std::io::{self, BufRead, BufReader, PipeWriter, Read, Write};
+use std::io::{self, Read, Write};
 use std::path::Path;
-use std::process::{Child, ChildStderr, ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
+use std::process::{ChildStdin, ExitStatus};
 use std::sync::{Arc, mpsc};
 use std::time::Duration;
 use std::{fmt, fs, thread};
 
-use object::{Object, ObjectSymbol};
-
-use super::process::quitting_with_parent;
-use super::running::{Running, Shared};
-use super::stack::{self, Stack};
-use super::{EmulatedBoard, EmulatorError, Pin, PinChange, log};
-
-const PROGRAM: &str = "node";
-const SCRIPT: &str = include_str!("pico.mjs");
-/// The modules that the script imports: the name in the import, and the text.
-const MODULES: &[(&str, &str)] = &[
-    ("./pico/core_cycles.mjs", include_str!("pico/core_cycles.mjs")),
-    ("./pico/flash_chip.mjs", include_str!("pico/flash_chip.mjs")),
-    ("./pico/late_alarm.mjs", include_str!("pico/late_alarm.mjs")),
-    ("./pico/resets.mjs", include_str!("pico/resets.mjs")),
-    ("./pico/slow_contacts.mjs", include_str!("pico/slow_contacts.mjs")),
-    ("./pico/uart.mjs", include_str!("pico/uart.mjs")),
-    ("./pico/usb_host.mjs", include_str!("pico/usb_host.mjs")),
-    ("./pico/worn_flash.mjs", include_str!("pico/worn_flash.mjs")),
-    ("./pico/xip_cache.mjs", include_str!("pico/xip_cache.mjs")),
-];
-/// The directory in which `cargo xtask set-up` installs rp2040js, relative to the workspace's root.
-const RP2040JS: &str = "target/rp2040js/node_modules/rp2040js";
-/// The length of a core cycle in nanoseconds, at 125 MHz.
-const CYCLE_NANOS: u64 = 8;
 /// The number of level changes of a bouncing contact.
 const BOUNCES: u64 = 16;
 /// The number of cycles by which the emulator's clock may be ahead of the last record received: 20
 /// ms.
 const CYCLES_AHEAD: u64 = 2_500_000;
-/// The number of the emulator's own lines that are kept.
-const SAID_LINES: usize = 20;
-
 /// A running Pico. Dropping this ends the emulator's process.
 pub struct Pico {
     running: Running,
@@ -63,24 +51,6 @@ pub enum UartError {
     Break = 1 << 8 | 1 << 10,
     /// Bytes before it were lost.
     Overrun = 1 << 11,
-}
-
-#[derive(Default)]
-struct State {
-    serial: VecDeque<u8>,
-    usb: VecDeque<u8>,
-    timed: Vec<(u8, u64)>,
-    pins: Vec<PinChange>,
-    cycles: u64,
-    /// The number of unused bytes of the stack, the answer to the last query.
-    unused_stack: Option<u64>,
-    /// Whether the boot ROM shows its drive and waits for an image.
-    shows_drive: bool,
-    /// The serial number that the USB host has read.
-    usb_serial_number: String,
-    log: Vec<String>,
-    said: VecDeque<String>,
-    ended: bool,
 }
 
 impl fmt::Debug for Pico {
@@ -496,286 +466,5 @@ impl EmulatedBoard for Pico {
 
     fn how_it_ended(&mut self) -> Option<ExitStatus> {
         self.running.how_it_ended()
-    }
-}
-
-/// The address of the first function of `image` whose name satisfies `is_wanted`. `name` is for the
-/// error message.
-fn function(
-    image: &Path,
-    is_wanted: impl Fn(&str) -> bool,
-    name: &str,
-) -> Result<u64, EmulatorError> {
-    let bad = |reason: String| EmulatorError::BadImage { reason };
-    let elf = fs::read(image).map_err(|_| EmulatorError::NoImage { path: image.into() })?;
-    let elf = object::File::parse(&*elf).map_err(|error| bad(error.to_string()))?;
-    let symbol = elf.symbols().find(|symbol| symbol.name().is_ok_and(&is_wanted));
-    let symbol = symbol.ok_or_else(|| bad(format!("there is no function {name}")))?;
-    Ok(symbol.address() & !1)
-}
-
-fn at(cycle: u64) -> Duration {
-    Duration::from_nanos(cycle * CYCLE_NANOS)
-}
-
-/// Embeds the modules in the script: each import by name becomes one by a `data:` URL (RFC 2397).
-fn script() -> String {
-    let mut script = SCRIPT.to_owned();
-    for (name, text) in MODULES {
-        let mut address = String::from("data:text/javascript,");
-        for byte in text.bytes() {
-            match byte {
-                b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' => address.push(char::from(byte)),
-                _ => address.push_str(&format!("%{byte:02X}")),
-            }
-        }
-        script = script.replace(name, &address);
-    }
-    script
-}
-
-/// Checks that rp2040js is installed in the version that this program needs.
-fn check_version(root: &Path) -> Result<(), EmulatorError> {
-    const PROGRAM: &str = "rp2040js";
-    let read = |text: &str, pointer: &str| {
-        let value: serde_json::Value = serde_json::from_str(text).ok()?;
-        value.pointer(pointer)?.as_str().map(str::to_owned)
-    };
-    let text = fs::read_to_string(root.join(RP2040JS).join("package.json"))
-        .map_err(|source| EmulatorError::NotInstalled { program: PROGRAM, source })?;
-    let found = read(&text, "/version").unwrap_or_else(|| "of no version".to_owned());
-    let needed = read(include_str!("rp2040js/package.json"), "/dependencies/rp2040js");
-    match needed {
-        Some(needed) if needed != found => {
-            Err(EmulatorError::WrongVersion { program: PROGRAM, found, needed })
-        }
-        _ => Ok(()),
-    }
-}
-
-/// Creates the command line of the emulator.
-fn command(image: &Path, log_address: u64) -> Command {
-    let mut command = quitting_with_parent(PROGRAM);
-    command.args(["--input-type=module", "--eval", &script(), "--"]);
-    command.arg(crate::workspace::root().join(RP2040JS)).arg(image).arg(log_address.to_string());
-    command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
-    // The emulator gets its own process group, so that Ctrl-C at the terminal reaches only this
-    // process, which ends the emulator when it is done with it.
-    #[cfg(unix)]
-    std::os::unix::process::CommandExt::process_group(&mut command, 0);
-    command
-}
-
-/// The address of the log buffer in the image; 0 if there is none.
-fn log_address(elf: &[u8]) -> Result<u64, EmulatorError> {
-    let elf = object::File::parse(elf)
-        .map_err(|error| EmulatorError::BadImage { reason: error.to_string() })?;
-    let symbol = elf.symbols().find(|symbol| symbol.name() == Ok("_SEGGER_RTT"));
-    Ok(symbol.map_or(0, |symbol| symbol.address()))
-}
-
-type Spawned = io::Result<(Child, ChildStdin, ChildStderr)>;
-
-fn spawn_and_read(
-    mut command: Command,
-    sender: &mpsc::Sender<Spawned>,
-    shared: &Shared<State>,
-    log: PipeWriter,
-) {
-    let (spawned, stdout) = match spawn(&mut command) {
-        Ok((child, input, stdout, stderr)) => (Ok((child, input, stderr)), Some(stdout)),
-        Err(error) => (Err(error), None),
-    };
-    if sender.send(spawned).is_ok()
-        && let Some(stdout) = stdout
-    {
-        read(stdout, shared, log);
-    }
-}
-
-fn spawn(command: &mut Command) -> io::Result<(Child, ChildStdin, ChildStdout, ChildStderr)> {
-    let mut child = command.spawn()?;
-    match (child.stdin.take(), child.stdout.take(), child.stderr.take()) {
-        (Some(stdin), Some(stdout), Some(stderr)) => Ok((child, stdin, stdout, stderr)),
-        _ => Err(io::ErrorKind::BrokenPipe.into()),
-    }
-}
-
-/// Keeps the last lines that the emulator prints.
-fn listen(stderr: ChildStderr, shared: &Shared<State>) {
-    for line in BufReader::new(stderr).lines().map_while(Result::ok) {
-        let mut state = shared.lock();
-        if state.said.len() == SAID_LINES {
-            state.said.pop_front();
-        }
-        state.said.push_back(line);
-    }
-}
-
-/// A message from or to the emulator. The meaning of `value` and `cycle` depends on `what`.
-struct Record {
-    what: u8,
-    value: u8,
-    cycle: u64,
-}
-
-const RECORD_BYTES: usize = 8;
-const SERIAL: u8 = 0;
-const PIN: u8 = 1;
-const LOG: u8 = 3;
-const CUT_POWER: u8 = 2;
-const CUT_FLASH: u8 = 3;
-const HANG: u8 = 4;
-const USB: u8 = 5;
-const USB_HOST: u8 = 6;
-const SWITCH: u8 = 7;
-const TIMED: u8 = 8;
-const RETURNED: u8 = 6;
-const STACK: u8 = 9;
-const UNUSED_STACK: u8 = 7;
-const STALL: u8 = 10;
-const ERASE_TIME: u8 = 12;
-const DELAY_ALARM: u8 = 48;
-const RESET: u8 = 4;
-const RUN_PIN: u8 = 32;
-const UF2: u8 = 33;
-const STAYS_LOW: u8 = 34;
-const STAYS_HIGH: u8 = 35;
-const JUMP: u8 = 36;
-const USB_LINE: u8 = 37;
-const BOOTSEL: u8 = 32;
-const USB_SERIAL: u8 = 33;
-/// The emulator's number for the starting position of an axis.
-const SWITCH_ZERO: i64 = 1 << 40;
-
-impl Record {
-    fn from_bytes([what, value, cycle @ ..]: [u8; RECORD_BYTES]) -> Self {
-        let [a, b, c, d, e, f] = cycle;
-        Self { what, value, cycle: u64::from_le_bytes([a, b, c, d, e, f, 0, 0]) }
-    }
-
-    fn to_bytes(&self) -> [u8; RECORD_BYTES] {
-        let [a, b, c, d, e, f, ..] = self.cycle.to_le_bytes();
-        [self.what, self.value, a, b, c, d, e, f]
-    }
-}
-
-/// Reads the emulator's messages until it ends.
-fn read(mut stdout: ChildStdout, shared: &Shared<State>, mut log: PipeWriter) {
-    let mut buffer = vec![0; 1 << 16];
-    let mut filled = 0;
-    let mut servo = Servo::default();
-    loop {
-        let count = stdout.read(&mut buffer[filled..]).unwrap_or(0);
-        filled += count;
-        let whole = filled - filled % RECORD_BYTES;
-        let mut logged = Vec::new();
-        let mut state = shared.lock();
-        state.ended = count == 0;
-        for bytes in buffer[..whole].as_chunks().0 {
-            let record = Record::from_bytes(*bytes);
-            if record.what != RETURNED && record.what != UNUSED_STACK {
-                state.cycles = record.cycle;
-            }
-            match record.what {
-                SERIAL => state.serial.push_back(record.value),
-                RETURNED => state.timed.push((record.value, record.cycle)),
-                UNUSED_STACK => state.unused_stack = Some(record.cycle),
-                USB => state.usb.push_back(record.value),
-                PIN => state.pins.extend(servo.pin_change(&record)),
-                LOG => logged.push(record.value),
-                RESET => state.shows_drive = false,
-                BOOTSEL => state.shows_drive = true,
-                USB_SERIAL if record.value == 0 => state.usb_serial_number.clear(),
-                USB_SERIAL => state.usb_serial_number.push(char::from(record.value)),
-                _ => {}
-            }
-        }
-        drop(state);
-        shared.tell();
-        // The write cannot fail: the reader of the log ends only when this writer is dropped.
-        let _ = log.write_all(&logged);
-        if count == 0 {
-            return;
-        }
-        buffer.copy_within(whole..filled, 0);
-        filled -= whole;
-    }
-}
-
-/// Derives from the width of the servo's pulses whether the pen is down.
-#[derive(Default)]
-struct Servo {
-    rose_at: u64,
-    down: bool,
-}
-
-impl Servo {
-    const PIN: u8 = 7;
-    /// The length in cycles of the pulse at half of the pen's height, about 1.5 ms.
-    const HALF: u64 = 1_508_000 / CYCLE_NANOS;
-
-    /// Translates a new level of a pin. The state of the pen changes at the end of a pulse.
-    fn pin_change(&mut self, record: &Record) -> Option<PinChange> {
-        let (number, high) = (record.value & 0x7F, record.value >= 0x80);
-        let at = at(record.cycle);
-        let pin = match number {
-            2 => Pin::StepX,
-            3 => Pin::StepY,
-            4 => Pin::DirX,
-            5 => Pin::DirY,
-            6 => Pin::Enable,
-            11 => Pin::StepZ,
-            12 => Pin::DirZ,
-            Self::PIN if high => {
-                self.rose_at = record.cycle;
-                return None;
-            }
-            Self::PIN => {
-                let down = record.cycle - self.rose_at >= Self::HALF;
-                let changed = std::mem::replace(&mut self.down, down) != down;
-                return changed.then_some(PinChange { pin: Pin::Pen, high: down, at });
-            }
-            _ => return None,
-        };
-        Some(PinChange { pin, high, at })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn record(number: u8, high: bool, microsecond: u64) -> Record {
-        Record { what: PIN, value: number | u8::from(high) << 7, cycle: microsecond * 125 }
-    }
-
-    #[test]
-    fn records_are_eight_bytes() {
-        let bytes = [1, 0x83, 6, 5, 4, 3, 2, 1];
-        let record = Record::from_bytes(bytes);
-        assert_eq!((record.what, record.value, record.cycle), (1, 0x83, 0x0102_0304_0506));
-        assert_eq!(record.to_bytes(), bytes);
-    }
-
-    #[test]
-    fn the_pen_is_where_the_servo_was_told() {
-        let mut servo = Servo::default();
-        let mut told = Vec::new();
-        for (start, width) in [(0, 1000), (20_000, 2000), (40_000, 1512), (60_000, 1504)] {
-            for record in [record(7, true, start), record(7, false, start + width)] {
-                told.extend(servo.pin_change(&record));
-            }
-        }
-        let pen = |high, at| PinChange { pin: Pin::Pen, high, at: Duration::from_micros(at) };
-        assert_eq!(told, [pen(true, 22_000), pen(false, 61_504)]);
-    }
-
-    #[test]
-    fn other_pins_are_what_they_are() {
-        let change = Servo::default().pin_change(&record(5, true, 8));
-        let up = PinChange { pin: Pin::DirY, high: true, at: Duration::from_micros(8) };
-        assert_eq!(change, Some(up));
-        assert_eq!(Servo::default().pin_change(&record(0, true, 8)), None);
     }
 }

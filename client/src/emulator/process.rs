@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use std::{fs, thread};
 
 use super::debugger::Debugger;
-use super::running::{Running, Shared};
+use super::running::{Running, Shared, quitting_with_parent};
 use super::stack::{self, Stack};
 use super::trace::{EVENTS, Trace, TraceError};
 use super::{EmulatorError, Options, log};
@@ -186,20 +186,6 @@ fn command(image: &Path, options: Options, port: u16) -> Command {
     std::os::unix::process::CommandExt::process_group(&mut command, 0);
     command
 }
-
-/// Creates a command that on Linux the kernel kills when the thread that started it ends.
-pub(super) fn quitting_with_parent(program: &str) -> Command {
-    const SETPRIV: &str = "/usr/bin/setpriv";
-    if cfg!(target_os = "linux") && Path::new(SETPRIV).exists() {
-        let mut command = Command::new(SETPRIV);
-        command.args(["--pdeathsig", "KILL", program]);
-        return command;
-    }
-    Command::new(program)
-}
-
-/// The exit code of setpriv, as of a shell, if there is no such program.
-pub(super) const NOT_FOUND: i32 = 127;
 
 type Spawned = io::Result<(Child, ChildStdout)>;
 

@@ -1,13 +1,27 @@
 //! A running child process, and the state that its reader threads share with it.
 
-use std::process::{Child, ExitStatus};
+use std::path::Path;
+use std::process::{Child, Command, ExitStatus};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 use std::{fmt, io};
 
 use super::EmulatorError;
-use super::process::NOT_FOUND;
+
+/// The exit code of setpriv, as of a shell, if there is no such program.
+const NOT_FOUND: i32 = 127;
+
+/// Creates a command that on Linux the kernel kills when the thread that started it ends.
+pub fn quitting_with_parent(program: &str) -> Command {
+    const SETPRIV: &str = "/usr/bin/setpriv";
+    if cfg!(target_os = "linux") && Path::new(SETPRIV).exists() {
+        let mut command = Command::new(SETPRIV);
+        command.args(["--pdeathsig", "KILL", program]);
+        return command;
+    }
+    Command::new(program)
+}
 
 /// State that reader threads update with whole records or lines, and that other threads can wait
 /// for.

@@ -1,0 +1,206 @@
+//! The process of the emulator of the Pico, and the threads that read its output.
+
+use super::record::{
+    BOOTSEL, LOG, PIN, RECORD_BYTES, RESET, RETURNED, Record, SERIAL, UNUSED_STACK, USB, USB_SERIAL,
+};
+use super::servo::Servo;
+use crate::emulator::EmulatorError;
+use crate::emulator::PinChange;
+use crate::emulator::running::{Shared, quitting_with_parent};
+use object::{Object, ObjectSymbol};
+use std::collections::VecDeque;
+use std::fs;
+use std::io::{self, BufRead, BufReader, PipeWriter, Read, Write};
+use std::path::Path;
+use std::process::{Child, ChildStderr, ChildStdin, ChildStdout, Command, Stdio};
+use std::sync::mpsc;
+
+pub(super) const PROGRAM: &str = "node";
+const SCRIPT: &str = include_str!("../pico.mjs");
+/// The modules that the script imports: the name in the import, and the text.
+const MODULES: &[(&str, &str)] = &[
+    ("./pico/core_cycles.mjs", include_str!("core_cycles.mjs")),
+    ("./pico/flash_chip.mjs", include_str!("flash_chip.mjs")),
+    ("./pico/late_alarm.mjs", include_str!("late_alarm.mjs")),
+    ("./pico/resets.mjs", include_str!("resets.mjs")),
+    ("./pico/slow_contacts.mjs", include_str!("slow_contacts.mjs")),
+    ("./pico/uart.mjs", include_str!("uart.mjs")),
+    ("./pico/usb_host.mjs", include_str!("usb_host.mjs")),
+    ("./pico/worn_flash.mjs", include_str!("worn_flash.mjs")),
+    ("./pico/xip_cache.mjs", include_str!("xip_cache.mjs")),
+];
+/// The directory in which `cargo xtask set-up` installs rp2040js, relative to the workspace's root.
+const RP2040JS: &str = "target/rp2040js/node_modules/rp2040js";
+/// The number of the emulator's own lines that are kept.
+const SAID_LINES: usize = 20;
+
+/// What the reader threads have learnt from the emulator.
+#[derive(Default)]
+pub(super) struct State {
+    pub(super) serial: VecDeque<u8>,
+    pub(super) usb: VecDeque<u8>,
+    pub(super) timed: Vec<(u8, u64)>,
+    pub(super) pins: Vec<PinChange>,
+    pub(super) cycles: u64,
+    /// The number of unused bytes of the stack, the answer to the last query.
+    pub(super) unused_stack: Option<u64>,
+    /// Whether the boot ROM shows its drive and waits for an image.
+    pub(super) shows_drive: bool,
+    /// The serial number that the USB host has read.
+    pub(super) usb_serial_number: String,
+    pub(super) log: Vec<String>,
+    pub(super) said: VecDeque<String>,
+    pub(super) ended: bool,
+}
+
+/// The address of the first function of `image` whose name satisfies `is_wanted`. `name` is for the
+/// error message.
+pub(super) fn function(
+    image: &Path,
+    is_wanted: impl Fn(&str) -> bool,
+    name: &str,
+) -> Result<u64, EmulatorError> {
+    let bad = |reason: String| EmulatorError::BadImage { reason };
+    let elf = fs::read(image).map_err(|_| EmulatorError::NoImage { path: image.into() })?;
+    let elf = object::File::parse(&*elf).map_err(|error| bad(error.to_string()))?;
+    let symbol = elf.symbols().find(|symbol| symbol.name().is_ok_and(&is_wanted));
+    let symbol = symbol.ok_or_else(|| bad(format!("there is no function {name}")))?;
+    Ok(symbol.address() & !1)
+}
+
+/// Embeds the modules in the script: each import by name becomes one by a `data:` URL (RFC 2397).
+fn script() -> String {
+    let mut script = SCRIPT.to_owned();
+    for (name, text) in MODULES {
+        let mut address = String::from("data:text/javascript,");
+        for byte in text.bytes() {
+            match byte {
+                b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' => address.push(char::from(byte)),
+                _ => address.push_str(&format!("%{byte:02X}")),
+            }
+        }
+        script = script.replace(name, &address);
+    }
+    script
+}
+
+/// Checks that rp2040js is installed in the version that this program needs.
+pub(super) fn check_version(root: &Path) -> Result<(), EmulatorError> {
+    const PROGRAM: &str = "rp2040js";
+    let read = |text: &str, pointer: &str| {
+        let value: serde_json::Value = serde_json::from_str(text).ok()?;
+        value.pointer(pointer)?.as_str().map(str::to_owned)
+    };
+    let text = fs::read_to_string(root.join(RP2040JS).join("package.json"))
+        .map_err(|source| EmulatorError::NotInstalled { program: PROGRAM, source })?;
+    let found = read(&text, "/version").unwrap_or_else(|| "of no version".to_owned());
+    let needed = read(include_str!("../rp2040js/package.json"), "/dependencies/rp2040js");
+    match needed {
+        Some(needed) if needed != found => {
+            Err(EmulatorError::WrongVersion { program: PROGRAM, found, needed })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Creates the command line of the emulator.
+pub(super) fn command(image: &Path, log_address: u64) -> Command {
+    let mut command = quitting_with_parent(PROGRAM);
+    command.args(["--input-type=module", "--eval", &script(), "--"]);
+    command.arg(crate::workspace::root().join(RP2040JS)).arg(image).arg(log_address.to_string());
+    command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    // The emulator gets its own process group, so that Ctrl-C at the terminal reaches only this
+    // process, which ends the emulator when it is done with it.
+    #[cfg(unix)]
+    std::os::unix::process::CommandExt::process_group(&mut command, 0);
+    command
+}
+
+/// The address of the log buffer in the image; 0 if there is none.
+pub(super) fn log_address(elf: &[u8]) -> Result<u64, EmulatorError> {
+    let elf = object::File::parse(elf)
+        .map_err(|error| EmulatorError::BadImage { reason: error.to_string() })?;
+    let symbol = elf.symbols().find(|symbol| symbol.name() == Ok("_SEGGER_RTT"));
+    Ok(symbol.map_or(0, |symbol| symbol.address()))
+}
+
+type Spawned = io::Result<(Child, ChildStdin, ChildStderr)>;
+
+pub(super) fn spawn_and_read(
+    mut command: Command,
+    sender: &mpsc::Sender<Spawned>,
+    shared: &Shared<State>,
+    log: PipeWriter,
+) {
+    let (spawned, stdout) = match spawn(&mut command) {
+        Ok((child, input, stdout, stderr)) => (Ok((child, input, stderr)), Some(stdout)),
+        Err(error) => (Err(error), None),
+    };
+    if sender.send(spawned).is_ok()
+        && let Some(stdout) = stdout
+    {
+        read(stdout, shared, log);
+    }
+}
+
+fn spawn(command: &mut Command) -> io::Result<(Child, ChildStdin, ChildStdout, ChildStderr)> {
+    let mut child = command.spawn()?;
+    match (child.stdin.take(), child.stdout.take(), child.stderr.take()) {
+        (Some(stdin), Some(stdout), Some(stderr)) => Ok((child, stdin, stdout, stderr)),
+        _ => Err(io::ErrorKind::BrokenPipe.into()),
+    }
+}
+
+/// Keeps the last lines that the emulator prints.
+pub(super) fn listen(stderr: ChildStderr, shared: &Shared<State>) {
+    for line in BufReader::new(stderr).lines().map_while(Result::ok) {
+        let mut state = shared.lock();
+        if state.said.len() == SAID_LINES {
+            state.said.pop_front();
+        }
+        state.said.push_back(line);
+    }
+}
+
+/// Reads the emulator's messages until it ends.
+fn read(mut stdout: ChildStdout, shared: &Shared<State>, mut log: PipeWriter) {
+    let mut buffer = vec![0; 1 << 16];
+    let mut filled = 0;
+    let mut servo = Servo::default();
+    loop {
+        let count = stdout.read(&mut buffer[filled..]).unwrap_or(0);
+        filled += count;
+        let whole = filled - filled % RECORD_BYTES;
+        let mut logged = Vec::new();
+        let mut state = shared.lock();
+        state.ended = count == 0;
+        for bytes in buffer[..whole].as_chunks().0 {
+            let record = Record::from_bytes(*bytes);
+            if record.what != RETURNED && record.what != UNUSED_STACK {
+                state.cycles = record.cycle;
+            }
+            match record.what {
+                SERIAL => state.serial.push_back(record.value),
+                RETURNED => state.timed.push((record.value, record.cycle)),
+                UNUSED_STACK => state.unused_stack = Some(record.cycle),
+                USB => state.usb.push_back(record.value),
+                PIN => state.pins.extend(servo.pin_change(&record)),
+                LOG => logged.push(record.value),
+                RESET => state.shows_drive = false,
+                BOOTSEL => state.shows_drive = true,
+                USB_SERIAL if record.value == 0 => state.usb_serial_number.clear(),
+                USB_SERIAL => state.usb_serial_number.push(char::from(record.value)),
+                _ => {}
+            }
+        }
+        drop(state);
+        shared.tell();
+        // The write cannot fail: the reader of the log ends only when this writer is dropped.
+        let _ = log.write_all(&logged);
+        if count == 0 {
+            return;
+        }
+        buffer.copy_within(whole..filled, 0);
+        filled -= whole;
+    }
+}

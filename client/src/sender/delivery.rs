@@ -1,0 +1,242 @@
+//! Delivers lines: sends them with numbers and checksums until the plotter has accepted each.
+
+use super::Sender;
+use crate::error::Error;
+use crate::lines::{JobLine, Lines};
+use crate::progress::Progress;
+use crate::protocol::{LAST_NUMBER, RECEIVE_WINDOW, RESUME, Reply, Status, numbered};
+use std::collections::VecDeque;
+use std::time::Instant;
+
+/// The maximum number of resends of the same line. If one byte in a hundred is corrupted, a line of
+/// 256 bytes arrives intact once in 13 attempts.
+const MOST_RESENDS: u32 = 200;
+
+/// The state of sending a sequence of lines.
+struct Delivery<'l> {
+    lines: &'l dyn Lines,
+    /// The number of the line before the first one.
+    base: i32,
+    /// The number of the last line that was sent.
+    sent: i32,
+    /// The number and the size in bytes of each line that is not yet answered, the oldest first.
+    in_queue: VecDeque<(i32, usize)>,
+    /// When the number of the last accepted line was asked for. While this is `Some`, no line is
+    /// sent.
+    asked: Option<Instant>,
+    /// When a line was last sent or answered, or the number of the last accepted line arrived.
+    last_event: Instant,
+    last_progress: Instant,
+    resends: u32,
+}
+
+impl Delivery<'_> {
+    fn line(&self, number: i32) -> Option<JobLine> {
+        line_of(self.lines, self.base, number)
+    }
+
+    fn forget_up_to(&mut self, number: i32) {
+        self.in_queue.retain(|(line, _)| *line > number);
+    }
+}
+
+/// The line with number `number`, where the first of `lines` has number `base + 1`.
+fn line_of(lines: &dyn Lines, base: i32, number: i32) -> Option<JobLine> {
+    lines.line(usize::try_from(number - base - 1).ok()?)
+}
+
+impl Sender<'_> {
+    pub(super) fn deliver(
+        &mut self,
+        lines: &dyn Lines,
+        progress: &mut dyn Progress,
+    ) -> Result<(), Error> {
+        self.deliver_watching(lines, progress, &mut |_| {})
+    }
+
+    /// Sends `lines` with the next line numbers until each is accepted, and passes every reply to
+    /// `watch`.
+    ///
+    /// # Errors
+    /// Fails at the first line that is refused, and with [`Error::Restarted`] if the plotter has
+    /// lost its line counter.
+    pub(super) fn deliver_watching(
+        &mut self,
+        lines: &dyn Lines,
+        progress: &mut dyn Progress,
+        watch: &mut dyn FnMut(&Reply),
+    ) -> Result<(), Error> {
+        let now = self.link.now();
+        self.last_heard = now;
+        let mut delivery = Delivery {
+            lines,
+            base: self.done,
+            sent: self.done,
+            in_queue: VecDeque::new(),
+            asked: None,
+            last_event: now,
+            last_progress: now,
+            resends: 0,
+        };
+        // The number of lines cannot overflow in practice: no plotter can hold the model of so many
+        // lines.
+        let end = delivery.base.saturating_add(i32::try_from(lines.count()).unwrap_or(i32::MAX));
+        while self.done < end {
+            self.fill_queue(&mut delivery)?;
+            self.stop_if_interrupted()?;
+            let reply = self.listen()?;
+            if let Some(reply) = &reply {
+                watch(reply);
+            }
+            let oldest = self.done + 1;
+            match reply {
+                Some(Reply::Done(number)) => {
+                    if number > self.done && number <= delivery.sent {
+                        self.advance(number, &mut delivery, progress);
+                    }
+                }
+                Some(Reply::Last(number)) => {
+                    if number < self.done || number > delivery.sent {
+                        return Err(Error::Restarted);
+                    }
+                    if delivery.asked.take().is_some() {
+                        // The plotter has read everything that was sent.
+                        delivery.in_queue.clear();
+                        delivery.sent = number;
+                        delivery.last_event = self.link.now();
+                    }
+                    self.advance(number, &mut delivery, progress);
+                }
+                Some(Reply::Resend(number)) => {
+                    if number <= self.done || number > delivery.sent + 1 {
+                        return Err(Error::Restarted);
+                    }
+                    if delivery.asked.is_none() {
+                        self.ask_for_last_number(&mut delivery)?;
+                    }
+                }
+                Some(Reply::Refused(number, error)) => {
+                    self.fail_on(Reply::Error(error), &|| delivery.line(number))?;
+                }
+                Some(Reply::Status(status)) => self.follow(&status, &mut delivery, progress)?,
+                Some(Reply::Ok | Reply::Error(_) | Reply::Contents(_) | Reply::Other(_)) => {}
+                Some(reply) => self.fail_on(reply, &|| delivery.line(oldest))?,
+                None => self.fail_if_silent(&|| delivery.line(oldest))?,
+            }
+            self.query_if_due()?;
+            let since = delivery.asked.unwrap_or(delivery.last_event);
+            if self.since(since) > self.patience.reply {
+                self.ask_for_last_number(&mut delivery)?;
+            }
+            if self.since(delivery.last_progress) > self.patience.lost {
+                return Err(Error::LostLine { line: delivery.line(oldest).map(Box::new) });
+            }
+        }
+        self.confirm(lines, delivery.base)
+    }
+
+    /// Sends as many lines as fit into the plotter's receive queue.
+    fn fill_queue(&mut self, delivery: &mut Delivery<'_>) -> Result<(), Error> {
+        while delivery.asked.is_none()
+            && let Some(line) = delivery.line(delivery.sent + 1)
+        {
+            let text = numbered(Some(delivery.sent + 1), &line.sent);
+            let cost = text.len() + 1;
+            let waiting: usize = delivery.in_queue.iter().map(|(_, cost)| cost).sum();
+            // A line that is longer than the queue is sent alone; the plotter reads it while it
+            // arrives.
+            if waiting > 0 && waiting + cost > RECEIVE_WINDOW {
+                break;
+            }
+            let before = self.link.now();
+            self.send(&format!("{text}\n"))?;
+            // Sending to a plotter in memory may take minutes, because it processes the bytes at
+            // once.
+            delivery.last_progress += self.since(before);
+            delivery.last_event = self.link.now();
+            delivery.sent += 1;
+            delivery.in_queue.push_back((delivery.sent, cost));
+        }
+        Ok(())
+    }
+
+    fn advance(&mut self, number: i32, delivery: &mut Delivery<'_>, progress: &mut dyn Progress) {
+        delivery.forget_up_to(number);
+        if number > self.done {
+            self.done = number;
+            delivery.last_progress = self.link.now();
+            delivery.last_event = delivery.last_progress;
+            delivery.resends = 0;
+            self.messages.clear();
+            progress.lines_sent((number - delivery.base) as usize, delivery.lines.count());
+        }
+    }
+
+    /// Asks for the number of the last accepted line. Nothing else is sent until it arrives.
+    fn ask_for_last_number(&mut self, delivery: &mut Delivery<'_>) -> Result<(), Error> {
+        delivery.resends += 1;
+        if delivery.resends > MOST_RESENDS {
+            let line = delivery.line(self.done + 1).map(Box::new);
+            return Err(Error::Damaged { line, times: MOST_RESENDS });
+        }
+        delivery.asked = Some(self.link.now());
+        // The first line end terminates a line that has lost its own.
+        self.send(&format!("\n{}\n", numbered(None, LAST_NUMBER)))
+    }
+
+    /// Processes a status report that arrives while lines are sent.
+    fn follow(
+        &mut self,
+        status: &Status,
+        delivery: &mut Delivery<'_>,
+        progress: &mut dyn Progress,
+    ) -> Result<(), Error> {
+        progress.state(&status.state);
+        if status.is_computing {
+            // The plotter reads no line until it has computed the picture.
+            delivery.last_progress = self.link.now();
+            delivery.last_event = delivery.last_progress;
+            delivery.asked = delivery.asked.map(|_| delivery.last_progress);
+        }
+        // No user asks for a feed hold before anything is drawn, so the machine is resumed.
+        let nothing_drawn = status.strokes.is_none_or(|(done, _)| done == 0);
+        if status.is_holding()
+            && status.pen_wanted.is_none()
+            && nothing_drawn
+            && status.position == self.position
+        {
+            self.link.send(&[RESUME])?;
+        }
+        self.fail_if_alarm(status)
+    }
+
+    /// Checks that the last line sent is the last one that the plotter accepted, and that none was
+    /// refused. This detects a refusal whose reply was lost, and an abort that somebody else sent.
+    pub(super) fn confirm(&mut self, lines: &dyn Lines, base: i32) -> Result<(), Error> {
+        let number = self.done;
+        let last = &|| line_of(lines, base, number);
+        let start = self.link.now();
+        self.last_heard = start;
+        let mut asked = None;
+        while self.since(start) < self.patience.lost {
+            self.stop_if_interrupted()?;
+            if asked.is_none_or(|asked| self.since(asked) > self.patience.reply) {
+                asked = Some(self.link.now());
+                self.send(&format!("\n{}\n", numbered(None, LAST_NUMBER)))?;
+            }
+            match self.listen()? {
+                Some(Reply::Last(number)) if number == self.done => return Ok(()),
+                Some(Reply::Last(_)) => return Err(Error::Restarted),
+                Some(Reply::Refused(number, error)) => {
+                    self.fail_on(Reply::Error(error), &|| line_of(lines, base, number))?;
+                }
+                Some(Reply::Status(status)) => self.fail_if_alarm(&status)?,
+                Some(Reply::Done(_) | Reply::Resend(_) | Reply::Error(_)) => {}
+                Some(reply) => self.fail_on(reply, last)?,
+                None => self.fail_if_silent(last)?,
+            }
+            self.query_if_due()?;
+        }
+        Err(Error::LostLine { line: last().map(Box::new) })
+    }
+}
