@@ -37,7 +37,8 @@ pub enum Error {
     },
     /// The serial port cannot be opened.
     #[error(
-        "cannot open {device}: {source}\nIs it the right port, is the plotter plugged in, may you use the port \
+        "cannot open {device}: {source}\nIs it the right port, is the plotter plugged in, may you \
+         use the port \
          (on Linux: group dialout), and does no other program hold it?"
     )]
     Port {
@@ -75,7 +76,8 @@ pub enum Error {
     },
     /// The plotter sent no byte at all.
     #[error(
-        "the plotter does not answer ({} s without a byte{})\nIs it powered, is it the right port, and does it run \
+        "the plotter does not answer ({} s without a byte{})\nIs it powered, is it the right \
+         port, and does it run \
          penup at 115200 baud?", patience.as_secs_f32(), waiting_for(line.as_deref())
     )]
     Silent {
@@ -86,7 +88,8 @@ pub enum Error {
     },
     /// Something answers, but not with the messages of penup firmware.
     #[error(
-        "what answers is not penup{}\nIs it the right port, and does the plotter run penup at 115200 baud?",
+        "what answers is not penup{}\nIs it the right port, and does the plotter run penup at \
+         115200 baud?",
         said(heard)
     )]
     NotPenup {
@@ -101,8 +104,10 @@ pub enum Error {
     },
     /// The plotter answers status queries but did not answer a line.
     #[error(
-        "the plotter is alive but never answered{}: bytes were lost on the line\nCheck the cable, and that nothing \
-         else uses the port; a penup plotter takes {RECEIVE_WINDOW} bytes without a pause", waiting_for(line.as_deref())
+        "the plotter is alive but never answered{}: bytes were lost on the line\nCheck the cable, \
+         and that nothing \
+         else uses the port; a penup plotter takes {RECEIVE_WINDOW} bytes without a \
+         pause", waiting_for(line.as_deref())
     )]
     LostLine {
         /// The line that was not answered.
@@ -119,7 +124,8 @@ pub enum Error {
         messages: Vec<String>,
     },
     /// The machine stopped with an alarm.
-    #[error("the plotter stopped with alarm {number}{}\nSee docs/protocol.md for the alarm's meaning", said(&told(&messages.join("; "))))]
+    #[error("the plotter stopped with alarm {number}{}\nSee docs/protocol.md for the alarm's \
+     meaning", said(&told(&messages.join("; "))))]
     Alarm {
         /// The `N` of its `ALARM:N`.
         number: u16,
@@ -128,13 +134,16 @@ pub enum Error {
     },
     /// The plotter was reset or aborted in the middle of the job.
     #[error(
-        "the plotter gave up in the middle of the job and started again\nEither it was sent ctrl-X, at another \
-         port or by a byte that was damaged on the line, or it was reset: check the cable and the power supply"
+        "the plotter gave up in the middle of the job and started again\nEither it was sent \
+         ctrl-X, at another \
+         port or by a byte that was damaged on the line, or it was reset: check the cable and the \
+         power supply"
     )]
     Restarted,
     /// The serial line corrupts so many bytes that a line of the job never arrives intact.
     #[error(
-        "the line to the plotter damages too many bytes: {times} times a line did not arrive whole{}\nUse a \
+        "the line to the plotter damages too many bytes: {times} times a line did not arrive \
+         whole{}\nUse a \
          shorter or better cable, and keep it away from the motors", waiting_for(line.as_deref())
     )]
     Damaged {
@@ -145,21 +154,25 @@ pub enum Error {
     },
     /// The plotter answers, but its firmware does not support line numbers and checksums.
     #[error(
-        "the plotter's firmware is older than this program: it does not know lines with checksums\nWrite the \
+        "the plotter's firmware is older than this program: it does not know lines with \
+         checksums\nWrite the \
          firmware of this version to the board first: see docs/building.md"
     )]
     WithoutNumbers,
     /// After the whole job was sent, the plotter reports a different checksum of the model or of
     /// the options.
     #[error(
-        "the plotter holds something else than was sent to it, so nothing is drawn\nDoes another program send to \
+        "the plotter holds something else than was sent to it, so nothing is drawn\nDoes another \
+         program send to \
          it at the same time, or is its firmware of another version than this program?"
     )]
     OtherContents,
     /// The machine is in feed hold, and nobody resumed it in time.
     #[error(
-        "the machine holds in the middle of the drawing, with the pen up: somebody pressed hold at another port, or a \
-         byte was damaged on the line\nSend ~ to the plotter to let it go on, or ctrl-X to give the drawing up"
+        "the machine holds in the middle of the drawing, with the pen up: somebody pressed hold \
+         at another port, or a \
+         byte was damaged on the line\nSend ~ to the plotter to let it go on, or ctrl-X to give \
+         the drawing up"
     )]
     Held,
     /// Reading from or writing to the link failed.

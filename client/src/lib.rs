@@ -1,10 +1,10 @@
 //! The library of the `penup` command, which sends files to a plotter, emulates plotters and
 //! previews drawings.
 //!
-//! A job passes through the modules in this order. [`cli`] reads the command line, [`formats`] reads
-//! the file, and [`job`] joins both into the [`lines`] to send. [`sender`] sends these lines over a
-//! [`link`] and follows the plotter's replies with [`protocol`] and [`progress`]. Behind the link is
-//! a serial port, an [`emulator`] of one of the [`machines`], or the [`preview`] in memory.
+//! A job passes through the modules in this order. [`cli`] reads the command line, [`formats`]
+//! reads the file, and [`job`] joins both into the [`lines`] to send. [`sender`] sends these lines
+//! over a [`link`] and follows the plotter's replies with [`protocol`] and [`progress`]. Behind the
+//! link is a serial port, an [`emulator`] of one of the [`machines`], or the [`preview`] in memory.
 //! [`watch`] follows the pen, [`picture`] renders its path on the [`page`], and [`output`] writes
 //! the files. [`results`] are what is known about a job afterwards.
 //!

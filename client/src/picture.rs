@@ -71,7 +71,8 @@ impl Picture {
         let (w, h) = (Number(width), Number(height));
         writeln!(
             out,
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{w}mm\" height=\"{h}mm\" viewBox=\"0 0 {w} {h}\">"
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{w}mm\" height=\"{h}mm\" \
+             viewBox=\"0 0 {w} {h}\">"
         )?;
         writeln!(out, "<rect width=\"{w}\" height=\"{h}\" fill=\"{PAPER}\"/>")?;
         let faint = format!("stroke=\"{TRAVEL}\" stroke-opacity=\"0.5\"");
@@ -100,7 +101,8 @@ impl Picture {
     ) -> fmt::Result {
         writeln!(
             out,
-            "<g id=\"{id}\" fill=\"none\" {paint} stroke-width=\"{}\" stroke-linecap=\"round\" stroke-linejoin=\"round\">",
+            "<g id=\"{id}\" fill=\"none\" {paint} stroke-width=\"{}\" stroke-linecap=\"round\" \
+             stroke-linejoin=\"round\">",
             Number(width)
         )?;
         for run in self.runs.iter().filter(|run| of(run)) {
@@ -140,7 +142,8 @@ impl Picture {
             let Place(x, y) = self.place(point);
             writeln!(
                 out,
-                "<circle id=\"end\" cx=\"{x}\" cy=\"{y}\" r=\"{}\" fill=\"none\" stroke=\"{END}\" stroke-width=\"{}\"/>",
+                "<circle id=\"end\" cx=\"{x}\" cy=\"{y}\" r=\"{}\" fill=\"none\" stroke=\"{END}\" \
+                 stroke-width=\"{}\"/>",
                 Number(radius * 1.3),
                 Number(radius * 0.4)
             )?;
@@ -203,8 +206,8 @@ impl fmt::Display for Place {
 ///
 /// ```
 /// use penup_client::picture::straightened;
-/// let steps = [[0.0, 0.0], [1.0, 0.0], [2.0, 1.0], [3.0, 1.0], [4.0, 2.0], [4.0, 3.0], [4.0, 5.0]];
-/// assert_eq!(straightened(&steps, 0.5), [[0.0, 0.0], [4.0, 2.0], [4.0, 5.0]]);
+/// let steps = [[0.0, 0.0], [1.0, 0.0], [2.0, 1.0], [3.0, 1.0], [4.0, 2.0], [4.0, 3.0], [4.0,
+/// 5.0]]; assert_eq!(straightened(&steps, 0.5), [[0.0, 0.0], [4.0, 2.0], [4.0, 5.0]]);
 /// ```
 pub fn straightened(points: &[PagePoint], tolerance: f64) -> Vec<PagePoint> {
     if tolerance <= 0.0 {

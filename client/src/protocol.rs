@@ -184,8 +184,8 @@ impl Reply {
     /// use penup_client::protocol::Reply;
     /// assert_eq!(Reply::parse("ok"), Reply::Ok);
     /// assert_eq!(Reply::parse("error:7"), Reply::Error(7));
-    /// let Reply::Status(status) = Reply::parse("<Run|MPos:1.0,2.0|Strokes:3/12>") else { panic!() };
-    /// assert_eq!((status.state.as_str(), status.strokes), ("Run", Some((3, 12))));
+    /// let Reply::Status(status) = Reply::parse("<Run|MPos:1.0,2.0|Strokes:3/12>") else { panic!()
+    /// }; assert_eq!((status.state.as_str(), status.strokes), ("Run", Some((3, 12))));
     /// ```
     pub fn parse(line: &str) -> Self {
         let numbered = |prefix| line.strip_prefix(prefix).and_then(|n: &str| n.parse().ok());

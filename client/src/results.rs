@@ -118,8 +118,8 @@ impl JobReport {
     ///
     /// ```
     /// use penup_client::results::JobReport;
-    /// let line = "[JOB:pen down 80.0 mm, up 30.5 mm, efficiency 72.3 %, bound 30.5 mm, the least]";
-    /// let report = JobReport::parse(2, line).expect("the line of lengths");
+    /// let line = "[JOB:pen down 80.0 mm, up 30.5 mm, efficiency 72.3 %, bound 30.5 mm, the
+    /// least]"; let report = JobReport::parse(2, line).expect("the line of lengths");
     /// assert_eq!(report.pen_up_mm, "30.5");
     /// ```
     pub fn parse(strokes: u64, line: &str) -> Option<Self> {

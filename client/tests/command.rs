@@ -432,7 +432,8 @@ fn an_output_that_is_closed_is_no_error_and_a_full_one_is() {
     assert_eq!(shell("penup preview none.obj 2> /dev/full").0, Some(1));
 }
 
-/// A copy of a checkout: what tells one from other folders, and the program in its target directory.
+/// A copy of a checkout: what tells one from other folders, and the program in its target
+/// directory.
 #[test]
 fn a_moved_checkout_is_used_where_it_is() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -89,7 +89,8 @@ fn a_refused_line_is_named_with_its_text_and_nothing_is_drawn() {
     let (error, plotter) = failure(Fault::ErrorAt(7, 9999));
     assert_eq!(
         error,
-        "scene.obj:16: a reason that this client does not know: what it thinks of it (error 9999)\n    \
+        "scene.obj:16: a reason that this client does not know: what it thinks of it (error \
+         9999)\n    \
          v 6  18  0.5 # as written"
     );
     assert!(!plotter.lines.iter().any(|line| line == "$plot"));

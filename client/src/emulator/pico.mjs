@@ -4,32 +4,32 @@
 //
 // Standard input and output carry records of 8 bytes: what, a value, and the core cycle (48 bits,
 // little-endian). In: 0 a byte for the serial line (its error bits in the cycle's place), 1 a level
-// for a pin (its number, + 128 if high), not before that cycle; 2 the power goes at that cycle, 3 it goes when so many more bytes
-// of flash have been erased or written (the number in the cycle's place), and comes back at once; 4
-// the main loop hangs from that cycle on, 5 a byte for USB, 6 the USB host is plugged in (1), takes
-// nothing more (2), takes again (3), suspends the bus (4), resumes it (5), is unplugged (6), is
-// plugged in on a busy bus (7), has no power (8); 7 a switch is fitted to a pin, which closes where
-// its axis has gone to so many steps (+ 2^40) or below, and bounces; 8 a function (its number, its
-// address in the cycle's place) is timed; 9 how much of the stack is unused is asked; 10 where x
-// has gone to so many steps, the main loop stands still for so many hundredths of a second, 12 how
-// long a sector of flash takes to be erased, in microseconds (in the cycle's place). 32 the
-// pin RUN is pulled low for a moment, 33 the image is copied onto the drive that the board shows
-// with BOOTSEL held, 34 and 35 bits (the value) of a byte of flash (the cycle) stay low or high
-// from now on, 36 the main loop goes on at an address, with the stack used up (1) or as it is (0),
-// 37 the host opens the USB port (1) or closes it (0) at a rate (the cycle), 48 the next setting of
-// the clock's alarm is late by so many milliseconds. Out: 0 a byte of the serial line, 1 a pin's
-// new level, 2 the time, 3 a byte of the log, 4 the chip was reset (0 by the loss of power, 1 by
-// the watchdog, 2 by the pin RUN), 5 a byte of USB, 6 a timed function has returned (its number,
-// the cycles in the cycle's place), 7 so many bytes of the stack have not been used since the chip
-// began (in the cycle's place), 32 the boot ROM shows its drive, 33 a character of the serial
-// number that the USB host reads, after a 0.
+// for a pin (its number, + 128 if high), not before that cycle; 2 the power goes at that cycle, 3
+// it goes when so many more bytes of flash have been erased or written (the number in the cycle's
+// place), and comes back at once; 4 the main loop hangs from that cycle on, 5 a byte for USB, 6 the
+// USB host is plugged in (1), takes nothing more (2), takes again (3), suspends the bus (4),
+// resumes it (5), is unplugged (6), is plugged in on a busy bus (7), has no power (8); 7 a switch
+// is fitted to a pin, which closes where its axis has gone to so many steps (+ 2^40) or below, and
+// bounces; 8 a function (its number, its address in the cycle's place) is timed; 9 how much of the
+// stack is unused is asked; 10 where x has gone to so many steps, the main loop stands still for so
+// many hundredths of a second, 12 how long a sector of flash takes to be erased, in microseconds
+// (in the cycle's place). 32 the pin RUN is pulled low for a moment, 33 the image is copied onto
+// the drive that the board shows with BOOTSEL held, 34 and 35 bits (the value) of a byte of flash
+// (the cycle) stay low or high from now on, 36 the main loop goes on at an address, with the stack
+// used up (1) or as it is (0), 37 the host opens the USB port (1) or closes it (0) at a rate (the
+// cycle), 48 the next setting of the clock's alarm is late by so many milliseconds. Out: 0 a byte
+// of the serial line, 1 a pin's new level, 2 the time, 3 a byte of the log, 4 the chip was reset (0
+// by the loss of power, 1 by the watchdog, 2 by the pin RUN), 5 a byte of USB, 6 a timed function
+// has returned (its number, the cycles in the cycle's place), 7 so many bytes of the stack have not
+// been used since the chip began (in the cycle's place), 32 the boot ROM shows its drive, 33 a
+// character of the serial number that the USB host reads, after a 0.
 //
 // rp2040js has no boot ROM: here is one, of the functions that the image asks for. Each is a
 // breakpoint that this program serves. Flash takes as long as a Pico's.
 //
-// rp2040js lets its PIO run free; here it keeps time: each enabled state machine executes when it is
-// due, delays and clock divider counted. A counting loop is leapt over, and so is all time in which
-// the core sleeps. While nothing is to be done at all, time runs no faster than on the wall.
+// rp2040js lets its PIO run free; here it keeps time: each enabled state machine executes when it
+// is due, delays and clock divider counted. A counting loop is leapt over, and so is all time in
+// which the core sleeps. While nothing is to be done at all, time runs no faster than on the wall.
 
 import { readFileSync, writeSync } from 'node:fs';
 import { pathToFileURL } from 'node:url';
@@ -122,7 +122,9 @@ const RETURN = 0x4770;
 /** Where the boot ROM begins as a drive. */
 const USB_BOOT_ENTRY = 0x2581;
 
-/** Laid out as the RP2040's: 16-bit pointers to a table of codes and functions, and to its search. */
+/**
+ * Laid out as the RP2040's: 16-bit pointers to a table of codes and functions, and to its search.
+ */
 function bootRom() {
   const rom = new Uint16Array(0x2000);
   rom[0x10 / 2] = 0x754d; // its mark
@@ -130,7 +132,9 @@ function bootRom() {
   rom[0x14 / 2] = TABLE;
   rom[0x18 / 2] = LOOK_UP | 1;
   // r2 = code of the entry; none left: 0; found: its function; else the next entry
-  const search = [0x8802, 0x2a00, 0xd003, 0x428a, 0xd003, 0x3004, 0xe7f8, 0x2000, RETURN, 0x8840, RETURN];
+  const search = [
+    0x8802, 0x2a00, 0xd003, 0x428a, 0xd003, 0x3004, 0xe7f8, 0x2000, RETURN, 0x8840, RETURN,
+  ];
   rom.set(search, LOOK_UP / 2);
   rom.set([0xbf30, 0xe7fd], FOR_EVER / 2); // sleep, and again
   Object.entries(FUNCTIONS).forEach(([name, number], index) => {
@@ -288,7 +292,9 @@ function cutPower() {
   resetByHand(resets.KIND.POWER);
 }
 
-/** With BOOTSEL held the boot ROM shows a drive; it restarts by the watchdog once an image is there. */
+/**
+ * With BOOTSEL held the boot ROM shows a drive; it restarts by the watchdog once an image is there.
+ */
 function copyImage() {
   cutPower();
   core.PC = FOR_EVER;
@@ -324,8 +330,8 @@ function mendFlags() {
   };
 }
 
-// rp2040js leaves the mark of Thumb code, bit 0 of a vector, in the program counter: a jump table in a handler
-// is then read a byte off.
+// rp2040js leaves the mark of Thumb code, bit 0 of a vector, in the program counter: a jump table
+// in a handler is then read a byte off.
 function mendVectors() {
   const enter = core.exceptionEntry.bind(core);
   core.exceptionEntry = (number) => {
@@ -373,7 +379,9 @@ function moveAxis(axis, level) {
   if (!level) return;
   places[axis] += chip.gpio[DIR_X + axis].value === 1 ? 1 : -1;
   lookAtSwitch(axis);
-  if (stalls.length && axis === 0 && places[0] === stalls[0].place) stall(stalls.shift().hundredths);
+  if (stalls.length && axis === 0 && places[0] === stalls[0].place) {
+      stall(stalls.shift().hundredths);
+    }
 }
 
 /** Where along x the main loop is to stand still, the next place first. */
@@ -385,7 +393,10 @@ let jumpTo = 0;
 
 function stall(hundredths) {
   const cycle = now();
-  events.push({ what: HANG, value: 0, cycle }, { what: GO_ON, value: 0, cycle: cycle + hundredths * HUNDREDTH });
+  events.push(
+    { what: HANG, value: 0, cycle },
+    { what: GO_ON, value: 0, cycle: cycle + hundredths * HUNDREDTH },
+  );
   disturbed = true;
 }
 
@@ -396,7 +407,8 @@ function lookAtSwitch(axis) {
   disturbed = true;
   const { pin, closed } = fitted;
   for (let turn = 0; turn <= TURNS; turn++) {
-    bounces.push({ pin, high: !closed !== (turn % 2 === 1), cycle: now() + Math.round((turn * BOUNCE) / TURNS) });
+    const cycle = now() + Math.round((turn * BOUNCE) / TURNS);
+      bounces.push({ pin, high: !closed !== (turn % 2 === 1), cycle });
   }
   bounces.sort((one, other) => one.cycle - other.cycle);
 }
@@ -581,7 +593,8 @@ function takeInput(cycle) {
   }
 }
 
-// --- The log: SEGGER's real-time transfer, read where the image keeps it ---------------------------
+// --- The log: SEGGER's real-time transfer, read where the image keeps it
+// ---------------------------
 
 const transfer = Number(logAddress);
 
@@ -599,7 +612,8 @@ function takeLog() {
   chip.writeUint32(transfer + 40, read);
 }
 
-// --- Functions that are timed ----------------------------------------------------------------------
+// --- Functions that are timed
+// ----------------------------------------------------------------------
 
 /** Their numbers, by address. */
 const timed = new Map();
@@ -641,7 +655,10 @@ function waitForFlash() {
 /** Something may be due earlier than it was. */
 let disturbed = false;
 
-/** The core executes, an instruction at least, until it sleeps, something is due or it has disturbed what is. */
+/**
+ * The core executes, an instruction at least, until it sleeps, something is due or it has
+ * disturbed what is.
+ */
 function executeUntil(due) {
   // From when on `now` is so much.
   const nanos = (due - 0.5 - cyclesBefore) * NANOS;

@@ -1,7 +1,7 @@
-// Contacts that rise slowly: a pull-up of the RP2040 has 50 to 80 kΩ, and with a filter of 100 nF at
-// the switch its input reads as high 7.5 ms after the pull-up is enabled, at the latest. Until then,
-// from a reset of the chip on, it reads as low. What follows is not slowed: a filter would swallow the
-// bouncing that tests want.
+// Contacts that rise slowly: a pull-up of the RP2040 has 50 to 80 kΩ, and with a filter of 100 nF
+// at the switch its input reads as high 7.5 ms after the pull-up is enabled, at the latest. Until
+// then, from a reset of the chip on, it reads as low. What follows is not slowed: a filter would
+// swallow the bouncing that tests want.
 
 const PADS = 0x4001c;
 /** Of the pad's register. */
@@ -9,7 +9,9 @@ const PULL_UP = 1 << 3;
 const RISE_CYCLES = 937_500;
 
 export class SlowContacts {
-  /** `numbers` are those of the pins; `now` tells the cycle; `changed` is called when one will rise. */
+  /**
+   * `numbers` are those of the pins; `now` tells the cycle; `changed` is called when one will rise.
+   */
   constructor(chip, numbers, now, changed) {
     /** When each has risen, in cycles. */
     this.risen = new Map(numbers.map((number) => [number, Infinity]));

@@ -1,13 +1,15 @@
 // UART0 of the emulated Pico, and what is at the other end of its cable.
 //
-// The UART of the RP2040 is Arm's PrimeCell PL011. rp2040js models hardly more than its data register,
-// so this takes its place: both FIFOs of 32 places, the time that a byte takes each way, overrun,
-// framing and parity errors and breaks, the interrupts with their trigger levels and the receive
-// timeout, and the requests to DMA. The sources are Arm's manual DDI 0183 and the RP2040's data sheet,
+// The UART of the RP2040 is Arm's PrimeCell PL011. rp2040js models hardly more than its data
+// register, so this takes its place: both FIFOs of 32 places, the time that a byte takes each way,
+// overrun, framing and parity errors and breaks, the interrupts with their trigger levels and the
+// receive timeout, and the requests to DMA. The sources are Arm's manual DDI 0183 and the RP2040's
+// data sheet,
 // 4.2. Not modelled: other frames than 8N1, flow control, loopback.
 //
-// Until the first byte is sent to it, nothing is connected: GP1 has the level to which its pad pulls it.
-// A low level that lasts is a break, as it is on the chip. A UART input that no pin is routed to is low.
+// Until the first byte is sent to it, nothing is connected: GP1 has the level to which its pad
+// pulls it. A low level that lasts is a break, as it is on the chip. A UART input that no pin is
+// routed to is low.
 
 const UART_FIFO = 32;
 const UART_BASE = 0x40034;
@@ -33,14 +35,30 @@ const UART_REGISTER = {
   CLEAR: 0x44,
   DMA: 0x48,
 };
-const UART_FLAG = { BUSY: 1 << 3, RECEIVER_EMPTY: 1 << 4, SENDER_FULL: 1 << 5, RECEIVER_FULL: 1 << 6, SENDER_EMPTY: 1 << 7 };
+const UART_FLAG = {
+  BUSY: 1 << 3,
+  RECEIVER_EMPTY: 1 << 4,
+  SENDER_FULL: 1 << 5,
+  RECEIVER_FULL: 1 << 6,
+  SENDER_EMPTY: 1 << 7,
+};
 const UART_CONTROL = { ENABLED: 1, SENDS: 1 << 8, RECEIVES: 1 << 9 };
-const UART_INTERRUPT = { RECEIVED: 1 << 4, SENT: 1 << 5, TIMEOUT: 1 << 6, FRAMING: 1 << 7, PARITY: 1 << 8, BREAK: 1 << 9, OVERRUN: 1 << 10 };
+const UART_INTERRUPT = {
+  RECEIVED: 1 << 4,
+  SENT: 1 << 5,
+  TIMEOUT: 1 << 6,
+  FRAMING: 1 << 7,
+  PARITY: 1 << 8,
+  BREAK: 1 << 9,
+  OVERRUN: 1 << 10,
+};
 /** In the data register, above the byte. */
 const UART_ERROR = { FRAMING: 1 << 8, PARITY: 1 << 9, BREAK: 1 << 10, OVERRUN: 1 << 11 };
 const UART_DMA_RECEIVES = 1;
 const UART_DMA_SENDS = 2;
-/** Bit times without a byte after which the receiver's FIFO is to be read however little is in it. */
+/**
+ * Bit times without a byte after which the receiver's FIFO is to be read however little is in it.
+ */
 const UART_TIMEOUT_BITS = 32;
 /** Places by the selection of a trigger level. */
 const UART_TRIGGER = [4, 8, 16, 24, 28];
@@ -85,14 +103,21 @@ export class Uart {
 
   /** Whether a byte is on its way. */
   get busy() {
-    return this.arriving !== null || this.cable.bytes.length > 0 || this.shifted !== null || this.lowEnds.scheduled;
+    return (
+      this.arriving !== null ||
+      this.cable.bytes.length > 0 ||
+      this.shifted !== null ||
+      this.lowEnds.scheduled
+    );
   }
 
   get receives() {
-    return (this.control & UART_CONTROL.ENABLED) !== 0 && (this.control & UART_CONTROL.RECEIVES) !== 0;
+    const needed = UART_CONTROL.ENABLED | UART_CONTROL.RECEIVES;
+    return (this.control & needed) === needed;
   }
 
-  // --- The cable -----------------------------------------------------------------------------------
+  // --- The cable
+  // -----------------------------------------------------------------------------------
 
   /** The next byte begins to arrive. */
   listen() {
@@ -128,7 +153,9 @@ export class Uart {
       this.lowSince = clock.nanos;
       this.lowEnds.schedule(wholeCycles(UART_BITS_PER_BYTE * UART_NANOS_PER_BIT));
     } else if (!low && this.lowSince !== null) {
-      if (this.receives && this.lowEnds.scheduled) this.receiveLow((clock.nanos - this.lowSince) / UART_NANOS_PER_BIT);
+      if (this.receives && this.lowEnds.scheduled) {
+        this.receiveLow((clock.nanos - this.lowSince) / UART_NANOS_PER_BIT);
+      }
       this.lowEnds.cancel();
       this.lowSince = null;
     }
@@ -146,7 +173,8 @@ export class Uart {
     if (bits >= 0.5) this.receive((0xff << Math.max(zeros, 0)) & 0xff);
   }
 
-  // --- Receiving -----------------------------------------------------------------------------------
+  // --- Receiving
+  // -----------------------------------------------------------------------------------
 
   receive(data) {
     this.timeout.cancel();
@@ -163,7 +191,9 @@ export class Uart {
     if (data & UART_ERROR.FRAMING) this.raw |= UART_INTERRUPT.FRAMING;
     if (data & UART_ERROR.PARITY) this.raw |= UART_INTERRUPT.PARITY;
     if (data & UART_ERROR.BREAK) this.raw |= UART_INTERRUPT.BREAK;
-    if (this.received.length >= UART_TRIGGER[(this.levels >> 3) & 7]) this.raw |= UART_INTERRUPT.RECEIVED;
+    if (this.received.length >= UART_TRIGGER[(this.levels >> 3) & 7]) {
+      this.raw |= UART_INTERRUPT.RECEIVED;
+    }
     this.update();
   }
 
@@ -176,16 +206,20 @@ export class Uart {
 
   take() {
     const data = this.received.shift() ?? 0;
-    if (this.received.length < UART_TRIGGER[(this.levels >> 3) & 7]) this.raw &= ~UART_INTERRUPT.RECEIVED;
+    if (this.received.length < UART_TRIGGER[(this.levels >> 3) & 7]) {
+      this.raw &= ~UART_INTERRUPT.RECEIVED;
+    }
     if (this.received.length === 0) this.raw &= ~UART_INTERRUPT.TIMEOUT;
     this.update();
     return data;
   }
 
-  // --- Sending -------------------------------------------------------------------------------------
+  // --- Sending
+  // -------------------------------------------------------------------------------------
 
   get nanosPerByte() {
-    return (UART_BITS_PER_BYTE * 16 * (this.baudInteger + this.baudFraction / 64) * 1e9) / UART_HERTZ;
+    const divisor = this.baudInteger + this.baudFraction / 64;
+    return (UART_BITS_PER_BYTE * 16 * divisor * 1e9) / UART_HERTZ;
   }
 
   put(byte) {
@@ -214,13 +248,15 @@ export class Uart {
     this.update();
   }
 
-  // --- Registers -----------------------------------------------------------------------------------
+  // --- Registers
+  // -----------------------------------------------------------------------------------
 
   /** Interrupt and requests as the state has them. */
   update() {
     const { chip } = this;
     chip.setInterrupt(this.irq, (this.raw & this.mask) !== 0);
-    const request = (number, wanted) => (wanted ? chip.dma.setDREQ(number) : chip.dma.clearDREQ(number));
+    const request = (number, wanted) =>
+      wanted ? chip.dma.setDREQ(number) : chip.dma.clearDREQ(number);
     request(this.dreq.rx, (this.dma & UART_DMA_RECEIVES) !== 0 && this.received.length > 0);
     const hasPlace = this.toSend.length < UART_FIFO;
     request(this.dreq.tx, (this.dma & UART_DMA_SENDS) !== 0 && hasPlace);
@@ -261,7 +297,8 @@ export class Uart {
       case UART_REGISTER.DMA:
         return this.dma;
     }
-    this.chip.logger.error('UART0', `register ${offset.toString(16)} is read, which is not modelled`);
+    const register = offset.toString(16);
+        this.chip.logger.error('UART0', `register ${register} is read, which is not modelled`);
     return 0;
   }
 
@@ -308,6 +345,7 @@ export class Uart {
         this.dma = value & 0x7;
         return this.update();
     }
-    this.chip.logger.error('UART0', `register ${offset.toString(16)} is written, which is not modelled`);
+    const register = offset.toString(16);
+        this.chip.logger.error('UART0', `register ${register} is written, which is not modelled`);
   }
 }

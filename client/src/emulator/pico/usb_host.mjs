@@ -4,9 +4,9 @@
 // Each packet is a transaction of its own time, data toggles are compared, frames begin every
 // millisecond while the host does not suspend the bus, and requests are answered or stalled. Of the
 // errata: E5 (without 800 us of idle bus after a reset the device does not connect; GPIO 15 can
-// stand in for it), with other devices' packets on a busy bus, and E15 (an IN buffer that becomes available late in a frame may be asked for
-// so late that the hub cuts its acknowledgement off; the controller then hangs until it is reset).
-// Here every such buffer hangs it.
+// stand in for it), with other devices' packets on a busy bus, and E15 (an IN buffer that becomes
+// available late in a frame may be asked for so late that the hub cuts its acknowledgement off; the
+// controller then hangs until it is reset). Here every such buffer hangs it.
 
 const MICROSECOND = 1000;
 const MILLISECOND = 1000 * MICROSECOND;

@@ -79,7 +79,8 @@ export class XipCache {
     if (address >>> 26 !== FLASH_WINDOW) return;
     this.read(address);
     const isLast = (address & 6) === 6;
-    if (isLast && this.chip.flash16[(address & 0xffffff) >>> 1] >>> 11 >= 0b11101) this.read(address + 2);
+    const first = this.chip.flash16[(address & 0xffffff) >>> 1];
+    if (isLast && first >>> 11 >= 0b11101) this.read(address + 2);
     if (address >>> 24 === 0x10) this.from = (address & ~7) >>> 0;
   }
 
