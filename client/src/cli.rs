@@ -1,6 +1,7 @@
 //! Defines the command line and turns its options into settings of a job.
 
 use crate::fit::{FitError, TOLERANCES};
+use crate::formats;
 use crate::job::Settings;
 use crate::machines::Board;
 use crate::page::Page;
@@ -30,7 +31,7 @@ pub enum Command {
     Preview(PreviewArgs),
     /// Turn the traced polylines of a plan into few B-spline control points
     Fit(FitArgs),
-    /// Harrison's tape of single steps: half a byte each
+    /// Record a job as Harrison's tape of single motor steps, and read such tapes
     #[command(subcommand)]
     Tape(TapeCommand),
 }
@@ -38,7 +39,7 @@ pub enum Command {
 /// What to do with a tape.
 #[derive(Debug, Subcommand)]
 pub enum TapeCommand {
-    /// Record the job of an OBJ file as a tape
+    /// Record the job of a file as a tape
     Encode(Box<TapeEncodeArgs>),
     /// Print the instructions of a tape
     Decode {
@@ -53,13 +54,13 @@ pub enum TapeCommand {
 /// Options of `penup tape encode`.
 #[derive(Debug, Args)]
 pub struct TapeEncodeArgs {
-    /// The OBJ file
-    #[arg(value_name = "FILE")]
+    /// The file to record.
+    #[arg(value_name = "FILE", help = file_help("The file to record"))]
     pub file: PathBuf,
     /// The tape to write [default: beside the file, with the ending .tape]
     #[arg(short, long, value_name = "FILE", help_heading = "Output")]
     pub output: Option<PathBuf>,
-    /// How to see and place it.
+    /// The camera, the page and the order of the strokes.
     #[command(flatten)]
     pub view: ViewArgs,
 }
@@ -70,33 +71,52 @@ pub struct TapeShowArgs {
     /// The tape
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
-    /// A4, A3, Letter, or width x height in mm
+    /// The page: A4, A3, Letter, or width x height in mm
     #[arg(long, value_name = "PAGE", value_parser = page, default_value = "A4")]
     pub page: Page,
-    /// Steps in a millimetre, 2 to 4000
-    #[arg(long, value_name = "N", value_parser = steps, default_value = "80", allow_hyphen_values = true)]
+    /// The number of motor steps in a millimetre, 2 to 4000
+    #[arg(
+        long,
+        value_name = "N",
+        value_parser = steps,
+        default_value = "80",
+        allow_hyphen_values = true
+    )]
     pub steps: f64,
-    /// Where the pictures go.
+    /// The pictures to write.
     #[command(flatten)]
     pub pictures: PictureArgs,
+}
+
+/// The help for a file that is read, with the formats that it may have.
+fn file_help(what: &str) -> String {
+    format!("{what}: {}", formats::list())
 }
 
 /// Options of `penup plot`.
 #[derive(Debug, Args)]
 pub struct PlotArgs {
-    /// The OBJ file to draw [default: two boxes that pass through each other]
-    #[arg(value_name = "FILE")]
+    /// The file to draw; the default is an example.
+    #[arg(
+        value_name = "FILE",
+        help = file_help("The file to draw") + " [default: two boxes that pass through each other]"
+    )]
     pub file: Option<PathBuf>,
     /// The board to emulate; the picture is drawn from its pins
     #[arg(long, value_enum, default_value = "lm3s6965", help_heading = "Plotter")]
     pub board: Board,
     /// The serial port of a real plotter, such as /dev/ttyUSB0 or COM3
-    #[arg(long, value_name = "DEVICE", conflicts_with_all = ["board", "svg", "png"], help_heading = "Plotter")]
+    #[arg(
+        long,
+        value_name = "DEVICE",
+        conflicts_with_all = ["board", "svg", "png"],
+        help_heading = "Plotter"
+    )]
     pub port: Option<String>,
-    /// How to see and place it.
+    /// The camera, the page and the order of the strokes.
     #[command(flatten)]
     pub view: ViewArgs,
-    /// Where the pictures go.
+    /// The pictures to write.
     #[command(flatten)]
     pub pictures: PictureArgs,
 }
@@ -104,31 +124,37 @@ pub struct PlotArgs {
 /// Options of `penup preview`.
 #[derive(Debug, Args)]
 pub struct PreviewArgs {
-    /// The OBJ file to show
-    #[arg(value_name = "FILE")]
+    /// The file to show.
+    #[arg(value_name = "FILE", help = file_help("The file to show"))]
     pub file: PathBuf,
-    /// How to see and place it.
+    /// The camera, the page and the order of the strokes.
     #[command(flatten)]
     pub view: ViewArgs,
-    /// Where the pictures go.
+    /// The pictures to write.
     #[command(flatten)]
     pub pictures: PictureArgs,
-    /// Write segments, strokes, lengths and times to this file
+    /// Write the segments, strokes, lengths and computing times to this file as JSON
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub json: Option<PathBuf>,
-    /// Run so many times and report the best time of each stage
-    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..),
-          allow_hyphen_values = true, help_heading = "Output")]
+    /// Compute the drawing this many times and report the shortest time of each stage
+    #[arg(
+        long,
+        value_name = "N",
+        default_value = "1",
+        value_parser = clap::value_parser!(u32).range(1..),
+        allow_hyphen_values = true,
+        help_heading = "Output"
+    )]
     pub repeat: u32,
 }
 
 /// Options of `penup fit`.
 #[derive(Debug, Args)]
 pub struct FitArgs {
-    /// The OBJ file with the polylines, a plan in mm
-    #[arg(value_name = "FILE")]
+    /// The file with the polylines, a plan in mm.
+    #[arg(value_name = "FILE", help = file_help("The file with the polylines, a plan in mm"))]
     pub file: PathBuf,
-    /// How far the curves may stray from the polylines
+    /// The largest distance allowed between a curve and its polyline
     #[arg(
         long,
         value_name = "MM",
@@ -142,7 +168,7 @@ pub struct FitArgs {
     pub output: Option<PathBuf>,
 }
 
-/// Where the pictures go. If no output is named: `plot.svg` and `plot.png`.
+/// The pictures to write; `plot.svg` and `plot.png` if no output is named.
 #[derive(Debug, Args)]
 pub struct PictureArgs {
     /// Write the picture as SVG [default: plot.svg and plot.png if no output is named]

@@ -1,5 +1,8 @@
 // A Raspberry Pi Pico in rp2040js: its serial line, its pins, and the core cycle of each change.
 //
+// It is longer than 500 lines, because what it adds to rp2040js shares one list of events in order
+// of time; what stands alone is in the folder pico.
+//
 // Usage: node pico.mjs RP2040JS-DIRECTORY IMAGE.uf2
 //
 // Standard input and output carry records of 8 bytes: what, a value, and the core cycle (48 bits,

@@ -7,6 +7,9 @@
 // stand in for it), with other devices' packets on a busy bus, and E15 (an IN buffer that becomes
 // available late in a frame may be asked for so late that the hub cuts its acknowledgement off; the
 // controller then hangs until it is reset). Here every such buffer hangs it.
+//
+// It is longer than 500 lines, because the controller and the host share the state of each
+// transaction.
 
 const MICROSECOND = 1000;
 const MILLISECOND = 1000 * MICROSECOND;
