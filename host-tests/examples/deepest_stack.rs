@@ -1,4 +1,5 @@
-//! How deep the boards' stacks become, for docs/memory.md: `cargo xtask stack` builds the images and runs this.
+//! How deep the boards' stacks become, for docs/memory.md: `cargo xtask stack` builds the images
+//! and runs this.
 
 use penup_client::emulator::Stack;
 use penup_host_tests::heaviest_jobs::{on_the_lm3s6965, on_the_pico};

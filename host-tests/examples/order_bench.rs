@@ -1,5 +1,5 @@
-//! Pen-up lengths and times of `order` for plans in millimetres: `order_bench EFFORT LIFT FILE...`, where a
-//! lift is worth `LIFT` mm.
+//! Pen-up lengths and times of `order` for plans in millimetres: `order_bench EFFORT LIFT FILE...`,
+//! where a lift is worth `LIFT` mm.
 
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
 use penup::order::{Leg, Method, Options, Shape, order};
@@ -33,7 +33,8 @@ fn main() {
                     .unwrap_or_default();
                 let mm = |length: u64| length as f64 / 256.0 / 80.0;
                 println!(
-                    "{file} {method:?} {shape:?}: up {:.1} bound {:.1} optimal {} odd {} parts {} lifts {} down {:.1}; {:.2?}",
+                    "{file} {method:?} {shape:?}: up {:.1} bound {:.1} optimal {} odd {} parts {} \
+                     lifts {} down {:.1}; {:.2?}",
                     mm(report.pen_up),
                     mm(report.bound),
                     report.optimal,

@@ -1,8 +1,9 @@
-//! The cycles that the emulated Raspberry Pi Pico takes for each stage of a job, by the very image that is flashed:
-//! `cargo xtask bench --board pico` builds it and runs this; the names of scenes, as arguments of this, leave out the others.
+//! The cycles that the emulated Raspberry Pi Pico takes for each stage of a job, by the very image
+//! that is flashed: `cargo xtask bench --board pico` builds it and runs this; the names of scenes,
+//! as arguments of this, leave out the others.
 //!
-//! Jobs are sent by USB and given up when they are computed. A function of each stage is timed from its call to
-//! its return, interrupts counted in.
+//! Jobs are sent by USB and given up when they are computed. A function of each stage is timed from
+//! its call to its return, interrupts counted in.
 
 use penup_client::emulator::{EmulatedBoard, Pico, PicoByUsb, image_path};
 use penup_host_tests::emulated_jobs::Line;
@@ -11,8 +12,8 @@ use std::error::Error;
 use std::thread::sleep;
 use std::time::Duration;
 
-/// Parts of the mangled names: seeing and hidden lines, hidden lines alone, the pairing of odd points, the
-/// improvement of the tour, all of the order.
+/// Parts of the mangled names: seeing and hidden lines, hidden lines alone, the pairing of odd
+/// points, the improvement of the tour, all of the order.
 const FUNCTIONS: [&str; 5] = [
     "5penup4view4clip3see17h",
     "5penup10visibility14find_stretches17h",
@@ -35,7 +36,8 @@ const SCENES: [(&str, &str); 9] = [
 
 fn main() -> Result<(), Box<dyn Error>> {
     println!(
-        "| scene | view | hidden lines | together at 125 MHz, s | odd points | paired | improved | order | at 125 MHz, s |"
+        "| scene | view | hidden lines | together at 125 MHz, s | odd points | paired | improved \
+         | order | at 125 MHz, s |"
     );
     println!("|---|---|---|---|---|---|---|---|---|");
     let wanted: Vec<String> = std::env::args().skip(1).collect();
@@ -47,7 +49,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         let seconds = [view + hidden, order].map(|cycles| cycles as f64 / 125e6);
         let [seen, ordered] = seconds;
         println!(
-            "| {scene} | {view} | {hidden} | {seen:.3} | {odd} | {paired} | {improved} | {order} | {ordered:.2} |"
+            "| {scene} | {view} | {hidden} | {seen:.3} | {odd} | {paired} | {improved} | {order} \
+             | {ordered:.2} |"
         );
     }
     Ok(())

@@ -1,5 +1,5 @@
-//! Prints the spiral that a logic analyser is to see on a real Pico (docs/bring-up.md), as a file to
-//! plot. Comments at its beginning say what to set before, and what the step pins are to do.
+//! Prints the spiral that a logic analyser is to see on a real Pico (docs/bring-up.md), as a file
+//! to plot. Comments at its beginning say what to set before, and what the step pins are to do.
 //!
 //!     cargo run -p penup-host-tests --example spiral > spiral.obj
 
@@ -9,8 +9,8 @@ use penup_host_tests::spiral;
 use penup_host_tests::step_edges::{Edge, planned};
 use std::time::Duration;
 
-/// The longest time without a pulse at either pin in the stroke, but for its first and last 10 ms, in
-/// which the speed changes.
+/// The longest time without a pulse at either pin in the stroke, but for its first and last 10 ms,
+/// in which the speed changes.
 fn longest_gap(edges: &[Edge]) -> Duration {
     let rises: Vec<_> = edges.iter().filter(|edge| edge.1).map(|edge| edge.2).collect();
     // Behind the pause in which the pen goes down.

@@ -6,7 +6,7 @@
 //! by a rational rotation and rounded to four or more decimals. The library reads these texts, so
 //! it sees rounded numbers such as any modeller writes.
 
-use crate::random_scenes::Random;
+use crate::random::Random;
 use penup::fixed::Decimal;
 use penup::geometry::{Precision, Projection, Vertex};
 use penup::model::{Corner, Model, Position, no_undo};
@@ -14,7 +14,7 @@ use penup::stage::{NeverCancel, Scratch};
 use penup::view::{Camera, Lens, Pose, View, project_scene};
 
 /// A point of the grid.
-pub type Place = [i32; 3];
+pub type GridPoint = [i32; 3];
 
 /// The number of kinds of scenes; the seed modulo this number chooses one.
 pub const KINDS: u64 = 5;
@@ -23,7 +23,7 @@ pub const KINDS: u64 = 5;
 #[derive(Debug, Clone)]
 pub struct CameraScene {
     /// The exact position of each vertex on the grid, before any rounding.
-    pub grid: Vec<Place>,
+    pub grid: Vec<GridPoint>,
     /// The coordinates of the `v` lines as a file contains them.
     pub texts: Vec<[String; 3]>,
     /// The corners of each face, as indices of vertices from 0.
@@ -37,7 +37,7 @@ pub struct CameraScene {
     /// The error bound of these positions.
     pub precision: Precision,
     /// Twice the error bound of a view coordinate.
-    pub doubt: u32,
+    pub view_error: u32,
     /// The kind of projection.
     pub projection: Projection,
 }
@@ -45,18 +45,18 @@ pub struct CameraScene {
 /// Collects faces between points of the grid.
 #[derive(Debug, Default)]
 struct Builder {
-    grid: Vec<Place>,
+    grid: Vec<GridPoint>,
     faces: Vec<Vec<usize>>,
 }
 
 impl Builder {
-    fn add_face(&mut self, places: &[Place]) {
+    fn add_face(&mut self, points: &[GridPoint]) {
         let first = self.grid.len();
-        self.grid.extend_from_slice(places);
+        self.grid.extend_from_slice(points);
         self.faces.push((first..self.grid.len()).collect());
     }
 
-    fn add_box(&mut self, low: Place, high: Place) {
+    fn add_box(&mut self, low: GridPoint, high: GridPoint) {
         let first = self.grid.len();
         for n in 0..8 {
             let at = |axis: usize| if n >> axis & 1 == 0 { low[axis] } else { high[axis] };
@@ -71,7 +71,14 @@ impl Builder {
 
     /// Adds a rectangle with sides along `u` and `v` in the plane through `origin`. `from` and `to`
     /// are its corners as fractions of these vectors.
-    fn add_window(&mut self, origin: Place, u: Place, v: Place, from: [i32; 2], to: [i32; 2]) {
+    fn add_window(
+        &mut self,
+        origin: GridPoint,
+        u: GridPoint,
+        v: GridPoint,
+        from: [i32; 2],
+        to: [i32; 2],
+    ) {
         let at =
             |i: i32, j: i32| [0, 1, 2].map(|axis: usize| origin[axis] + u[axis] * i + v[axis] * j);
         let corners =
@@ -239,7 +246,7 @@ fn rotation(random: &mut Random) -> ([[i64; 3]; 3], i64) {
 }
 
 /// Writes the coordinates of the `v` lines.
-fn write(random: &mut Random, grid: &[Place]) -> Vec<[String; 3]> {
+fn write(random: &mut Random, grid: &[GridPoint]) -> Vec<[String; 3]> {
     let upright = ([[1, 0, 0], [0, 1, 0], [0, 0, 1]], 1);
     let (divisor, decimals, (rows, norm)) = match random.between(0, 5) {
         0 => (1, 0, upright),
@@ -250,9 +257,9 @@ fn write(random: &mut Random, grid: &[Place]) -> Vec<[String; 3]> {
         _ => (16, 6, rotation(random)),
     };
     grid.iter()
-        .map(|place| {
+        .map(|point| {
             rows.map(|row| {
-                let sum = (0..3).map(|n| row[n] * i64::from(place[n])).sum();
+                let sum = (0..3).map(|n| row[n] * i64::from(point[n])).sum();
                 text(sum, divisor * norm, decimals)
             })
         })
@@ -283,10 +290,10 @@ pub fn camera_scene(seed: u64) -> CameraScene {
     let (mut vertices, mut corners) =
         (heapless::Vec::<Position, 200>::new(), [Corner::new(0, false, false); 400]);
     let mut model = Model::new(&mut vertices, &mut corners);
-    for place in &texts {
-        let place = [0, 1, 2]
-            .map(|n: usize| Decimal::parse(&place[n]).expect("it was written as a number"));
-        model.add_vertex(place, &mut no_undo).expect("there is room");
+    for point in &texts {
+        let point = [0, 1, 2]
+            .map(|n: usize| Decimal::parse(&point[n]).expect("it was written as a number"));
+        model.add_vertex(point, &mut no_undo).expect("there is room");
     }
     for face in &builder.faces {
         let numbers = face.iter().map(|number| *number as i32 + 1);
@@ -317,7 +324,7 @@ pub fn camera_scene(seed: u64) -> CameraScene {
         corners: seen.elements.corners().to_vec(),
         positions: model.vertices().iter().map(|position| position.coordinates()).collect(),
         precision,
-        doubt: view.doubt(precision.written),
+        view_error: view.doubt(precision.written),
         projection: view.projection(),
     }
 }

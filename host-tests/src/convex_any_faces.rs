@@ -13,7 +13,8 @@ use penup::model::{Corner, Elements};
 use penup::stage::{NeverCancel, Scratch};
 use penup::visibility::{Scene, Stretch, Unrounded};
 
-use crate::convex_solids::{Dice, any_solid};
+use crate::convex_solids::any_solid;
+use crate::random::Random;
 
 #[derive(Default)]
 struct Faces {
@@ -38,15 +39,15 @@ impl SolidSink for Faces {
 /// faces of the solid, and calls `stretches` for the visible and hidden stretches of a scene of
 /// these faces. Visible edges must be completely visible and hidden ones completely hidden. Returns
 /// `false` if the random points form no solid.
-pub fn is_seen_alike(dice: &mut Dice, stretches: impl Fn(&Scene<'_>) -> Vec<Stretch>) -> bool {
-    let points = any_solid(dice);
+pub fn is_seen_alike(random: &mut Random, stretches: impl Fn(&Scene<'_>) -> Vec<Stretch>) -> bool {
+    let points = any_solid(random);
     if points.iter().flatten().any(|part| part.abs() > 100) {
         return false;
     }
     // The camera looks along y, with x to the right and z up.
     let nearest = points.iter().map(|point| point[1]).min().expect("points");
-    let place = [dice.throw(-9, 9), nearest - dice.throw(1, 9), dice.throw(-9, 9)];
-    let (eye, projection) = if dice.throw(0, 1) == 0 {
+    let place = [random.between(-9, 9), nearest - random.between(1, 9), random.between(-9, 9)];
+    let (eye, projection) = if random.between(0, 1) == 0 {
         (Eye::At(place.map(i64::from)), Projection::Perspective)
     } else {
         (Eye::Towards([0, -1, 0]), Projection::Parallel)

@@ -5,45 +5,12 @@
 use penup::convex::Eye;
 
 use crate::convex_model::Point;
-
-/// A small generator of reproducible pseudo-random numbers (xorshift).
-#[derive(Debug, Clone)]
-pub struct Dice(u64);
-
-impl Dice {
-    /// Creates a generator; the same seed gives the same numbers.
-    pub fn new(seed: u64) -> Self {
-        Self(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1)
-    }
-
-    fn next(&mut self) -> u64 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 32
-    }
-
-    /// A number from `low` to `high`, both inclusive.
-    pub fn throw(&mut self, low: i32, high: i32) -> i32 {
-        low + (self.next() % (high - low + 1) as u64) as i32
-    }
-
-    /// One of the items.
-    pub fn pick<T: Copy>(&mut self, items: &[T]) -> T {
-        items[self.throw(0, items.len() as i32 - 1) as usize]
-    }
-
-    /// Puts the items into a random order.
-    pub fn shuffle<T>(&mut self, items: &mut [T]) {
-        for at in (1..items.len()).rev() {
-            items.swap(at, self.throw(0, at as i32) as usize);
-        }
-    }
-}
+use crate::random::Random;
+use crate::scene_files::{ObjText, scene};
 
 /// Points of a sphere with whole coordinates. Each of them is a corner.
-pub fn on_sphere(dice: &mut Dice) -> Vec<Point> {
-    let square = dice.pick(&[3, 5, 6, 9, 14, 17, 21, 26, 29, 41]);
+pub fn on_sphere(random: &mut Random) -> Vec<Point> {
+    let square = random.one_of(&[3, 5, 6, 9, 14, 17, 21, 26, 29, 41]);
     let mut points = vec![];
     for x in -6..=6 {
         for y in -6..=6 {
@@ -54,20 +21,20 @@ pub fn on_sphere(dice: &mut Dice) -> Vec<Point> {
             }
         }
     }
-    dice.shuffle(&mut points);
-    points.truncate(dice.throw(4, 20) as usize);
+    random.shuffle(&mut points);
+    points.truncate(random.between(4, 20) as usize);
     points
 }
 
 /// A box parallel to the axes.
-pub fn cuboid(dice: &mut Dice) -> Vec<Point> {
-    let low = [0, 1, 2].map(|_| dice.throw(-3, 0));
-    let high = [0, 1, 2].map(|_| dice.throw(1, 3));
+pub fn cuboid(random: &mut Random) -> Vec<Point> {
+    let low = [0, 1, 2].map(|_| random.between(-3, 0));
+    let high = [0, 1, 2].map(|_| random.between(1, 3));
     (0..8).map(|i| [0, 1, 2].map(|k| if i >> k & 1 == 0 { low[k] } else { high[k] })).collect()
 }
 
 /// A convex polygon in the plane z = 0 with whole coordinates and at least three corners.
-pub fn polygon(dice: &mut Dice) -> Vec<Point> {
+pub fn polygon(random: &mut Random) -> Vec<Point> {
     // Directions sorted by their angle; their partial sums are the corners of a convex polygon.
     let clock = [
         [1, 0],
@@ -88,7 +55,7 @@ pub fn polygon(dice: &mut Dice) -> Vec<Point> {
         [2, -1],
     ];
     loop {
-        let steps: Vec<i32> = clock[..8].iter().map(|_| dice.throw(0, 2) / 2).collect();
+        let steps: Vec<i32> = clock[..8].iter().map(|_| random.between(0, 2) / 2).collect();
         let mut at = [0, 0];
         let mut corners = vec![];
         // Each direction and its opposite are used equally often, so that the polygon closes.
@@ -99,8 +66,8 @@ pub fn polygon(dice: &mut Dice) -> Vec<Point> {
             }
         }
         if corners.len() >= 4 {
-            if corners.len() > 4 && dice.throw(0, 1) == 1 {
-                corners.remove(dice.throw(0, corners.len() as i32 - 1) as usize);
+            if corners.len() > 4 && random.between(0, 1) == 1 {
+                corners.remove(random.between(0, corners.len() as i32 - 1) as usize);
             }
             return corners;
         }
@@ -108,26 +75,26 @@ pub fn polygon(dice: &mut Dice) -> Vec<Point> {
 }
 
 /// A right or oblique prism over a polygon.
-pub fn prism(dice: &mut Dice) -> Vec<Point> {
-    let base = polygon(dice);
-    let shift = [dice.throw(-1, 1), dice.throw(-1, 1), dice.throw(1, 3)];
+pub fn prism(random: &mut Random) -> Vec<Point> {
+    let base = polygon(random);
+    let shift = [random.between(-1, 1), random.between(-1, 1), random.between(1, 3)];
     let top = base.iter().map(|p| [0, 1, 2].map(|k| p[k] + shift[k])).collect::<Vec<_>>();
     [base, top].concat()
 }
 
 /// A pyramid over a polygon.
-pub fn pyramid(dice: &mut Dice) -> Vec<Point> {
-    let mut points = polygon(dice);
-    points.push([dice.throw(-2, 3), dice.throw(-2, 3), dice.throw(1, 3)]);
+pub fn pyramid(random: &mut Random) -> Vec<Point> {
+    let mut points = polygon(random);
+    points.push([random.between(-2, 3), random.between(-2, 3), random.between(1, 3)]);
     points
 }
 
 /// An octahedron, regular or not.
-pub fn octahedron(dice: &mut Dice) -> Vec<Point> {
+pub fn octahedron(random: &mut Random) -> Vec<Point> {
     (0..6)
         .map(|i| {
             let mut point = [0; 3];
-            let length = dice.throw(1, 3);
+            let length = random.between(1, 3);
             point[i / 2] = if i % 2 == 0 { length } else { -length };
             point
         })
@@ -135,8 +102,9 @@ pub fn octahedron(dice: &mut Dice) -> Vec<Point> {
 }
 
 /// A cube with truncated edges or corners: all signs and orders of (a, b, c).
-pub fn cut_cube(dice: &mut Dice) -> Vec<Point> {
-    let [a, b, c] = dice.pick(&[[1, 1, 2], [0, 1, 2], [2, 2, 1], [0, 1, 1], [3, 3, 1], [1, 1, 3]]);
+pub fn cut_cube(random: &mut Random) -> Vec<Point> {
+    let [a, b, c] =
+        random.one_of(&[[1, 1, 2], [0, 1, 2], [2, 2, 1], [0, 1, 1], [3, 3, 1], [1, 1, 3]]);
     let orders: &[[i32; 3]] = &[[a, b, c], [b, c, a], [c, a, b]];
     let mut points = vec![];
     for order in orders {
@@ -152,23 +120,23 @@ pub fn cut_cube(dice: &mut Dice) -> Vec<Point> {
 
 /// A roof over a pit, often with vertices on both slopes that, seen from above, only its ridge
 /// separates.
-pub fn roof(dice: &mut Dice) -> Vec<Point> {
+pub fn roof(random: &mut Random) -> Vec<Point> {
     let mut points = vec![[-6, 0, 4], [6, 0, 4], [0, 0, -8]];
     for side in [-1, 1] {
         for x in [-2, 2] {
-            if dice.throw(0, 2) > 0 {
+            if random.between(0, 2) > 0 {
                 points.push([x, 2 * side, 2]);
             }
         }
-        points.push([dice.throw(-2, 2), 6 * side, -4]);
+        points.push([random.between(-2, 2), 6 * side, -4]);
     }
     points
 }
 
 /// Random points, most of which are not in convex position.
-pub fn any_points(dice: &mut Dice) -> Vec<Point> {
-    let reach = dice.throw(1, 3);
-    (0..dice.throw(1, 14)).map(|_| [0, 1, 2].map(|_| dice.throw(-reach, reach))).collect()
+pub fn any_points(random: &mut Random) -> Vec<Point> {
+    let reach = random.between(1, 3);
+    (0..random.between(1, 14)).map(|_| [0, 1, 2].map(|_| random.between(-reach, reach))).collect()
 }
 
 /// The number of random solids that a test compares: `PENUP_SOLIDS`, or else 4,000.
@@ -181,17 +149,17 @@ pub fn solid_count() -> u32 {
 
 /// A random solid of any kind with its vertices in any order. Sometimes vertices are repeated, and
 /// sometimes the coordinates are as large as possible.
-pub fn any_solid(dice: &mut Dice) -> Vec<Point> {
+pub fn any_solid(random: &mut Random) -> Vec<Point> {
     let kinds = [on_sphere, cuboid, prism, pyramid, octahedron, cut_cube, roof, any_points];
-    let mut points = dice.pick(&kinds[..])(dice);
-    if dice.throw(0, 4) == 0 {
-        let point = dice.pick(&points);
+    let mut points = random.one_of(&kinds[..])(random);
+    if random.between(0, 4) == 0 {
+        let point = random.one_of(&points);
         points.push(point);
     }
-    dice.shuffle(&mut points);
-    if dice.throw(0, 5) == 0 {
+    random.shuffle(&mut points);
+    if random.between(0, 5) == 0 {
         // No coordinate is larger than 11, so the product stays within 2^30.
-        let scale = dice.throw(50_000_000, 90_000_000);
+        let scale = random.between(50_000_000, 90_000_000);
         points.iter_mut().flatten().for_each(|part| *part *= scale);
     }
     points
@@ -199,35 +167,35 @@ pub fn any_solid(dice: &mut Dice) -> Vec<Point> {
 
 /// A random eye: a direction along an axis, a diagonal or any other, or a point that is often level
 /// with vertices and sometimes inside.
-pub fn any_eye(dice: &mut Dice, points: &[Point]) -> Eye {
+pub fn any_eye(random: &mut Random, points: &[Point]) -> Eye {
     let largest = points.iter().flatten().map(|part| part.abs()).max().unwrap_or(1).max(1);
     let unit = i64::from(if largest > 100 { largest / 11 } else { 1 });
-    match dice.throw(0, 4) {
+    match random.between(0, 4) {
         0 => {
             let mut direction = [0; 3];
-            direction[dice.throw(0, 2) as usize] = i64::from(dice.pick(&[-1, 1]));
+            direction[random.between(0, 2) as usize] = i64::from(random.one_of(&[-1, 1]));
             Eye::Towards(direction)
         }
         1 => loop {
-            let direction = [0, 1, 2].map(|_| i64::from(dice.throw(-3, 3)));
+            let direction = [0, 1, 2].map(|_| i64::from(random.between(-3, 3)));
             if direction != [0; 3] {
                 return Eye::Towards(direction);
             }
         },
-        2 => Eye::At([0, 1, 2].map(|_| i64::from(dice.throw(-12, 12)) * unit)),
+        2 => Eye::At([0, 1, 2].map(|_| i64::from(random.between(-12, 12)) * unit)),
         3 => {
             // The eye is level with vertices in one or two coordinates.
-            let mut place = [0, 1, 2].map(|_| i64::from(dice.throw(-9, 9)) * unit);
+            let mut place = [0, 1, 2].map(|_| i64::from(random.between(-9, 9)) * unit);
             for _ in 0..2 {
-                let axis = dice.throw(0, 2) as usize;
-                place[axis] = i64::from(dice.pick(points)[axis]);
+                let axis = random.between(0, 2) as usize;
+                place[axis] = i64::from(random.one_of(points)[axis]);
             }
             Eye::At(place)
         }
         _ => {
             // The eye is on the line through two vertices.
-            let (a, b) = (dice.pick(points), dice.pick(points));
-            let times = i64::from(dice.throw(2, 4));
+            let (a, b) = (random.one_of(points), random.one_of(points));
+            let times = i64::from(random.between(2, 4));
             Eye::At(
                 [0, 1, 2].map(|k| i64::from(a[k]) + times * (i64::from(b[k]) - i64::from(a[k]))),
             )
@@ -237,28 +205,27 @@ pub fn any_eye(dice: &mut Dice, points: &[Point]) -> Eye {
 
 /// Reads the vertices and faces of a scene with whole coordinates. Indices of corners count from 0.
 pub fn read_scene(name: &str) -> (Vec<Point>, Vec<Vec<u16>>) {
-    let path =
-        penup_client::workspace::root().join(format!("scenes/{name}.obj")).display().to_string();
-    let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path}: {error}"));
-    let numbers = |line: &str| -> Vec<i32> {
-        let parse =
-            |word: &str| word.parse().unwrap_or_else(|error| panic!("{path}: {word}: {error}"));
-        line.split_whitespace().skip(1).map(parse).collect()
-    };
-    let vertices = text.lines().filter(|line| line.starts_with("v "));
-    let faces = text.lines().filter(|line| line.starts_with("f "));
+    let path = scene(&format!("{name}.obj"));
+    let text = std::fs::read_to_string(&path).expect("a scene that can be read");
+    let ObjText { vertices, elements } = ObjText::read(&text);
+    let faces = elements.into_iter().filter(|element| element.is_face);
     (
-        vertices.map(|line| <Point>::try_from(numbers(line)).expect("three coordinates")).collect(),
-        faces
-            .map(|line| numbers(line).iter().map(|corner| (corner - 1) as u16).collect())
-            .collect(),
+        vertices.into_iter().map(|vertex| vertex.map(whole)).collect(),
+        faces.map(|face| face.vertices.iter().map(|vertex| *vertex as u16).collect()).collect(),
     )
 }
 
+/// # Panics
+/// Panics if a coordinate is not a whole number.
+fn whole(coordinate: f64) -> i32 {
+    assert_eq!(coordinate.fract(), 0.0, "a whole coordinate is expected");
+    coordinate as i32
+}
+
 /// A random rotation: three perpendicular directions of length 1.
-pub fn any_rotation(dice: &mut Dice) -> [[f64; 3]; 3] {
+pub fn any_rotation(random: &mut Random) -> [[f64; 3]; 3] {
     let [w, x, y, z] = loop {
-        let q = [0; 4].map(|_| f64::from(dice.throw(-1000, 1000)) / 1000.0);
+        let q = [0; 4].map(|_| f64::from(random.between(-1000, 1000)) / 1000.0);
         let length = q.iter().map(|part| part * part).sum::<f64>().sqrt();
         if length > 0.1 {
             break q.map(|part| part / length);

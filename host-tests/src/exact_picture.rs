@@ -9,12 +9,17 @@
 //!
 //! A face counts as the fan of triangles from its first corner, so faces must be convex.
 
-use crate::camera_scenes::{CameraScene, Place};
+mod arithmetic;
+
+pub use arithmetic::{Ratio, compare};
+
+use arithmetic::{
+    Linear, Plane, Vector, compare_along, cross, dot, minus, sign_at, vector, zero_of,
+};
+
+use crate::camera_scenes::{CameraScene, GridPoint};
 use penup::geometry::{Projection, Vertex};
 use std::cmp::Ordering;
-
-/// A point along an edge as a fraction: a numerator and a positive denominator.
-pub type Ratio = (u128, u128);
 
 /// A piece of an edge: the indices of the edge's ends, the start and end of the piece as fractions
 /// of the edge's length in space, and whether the piece is visible.
@@ -27,66 +32,6 @@ pub struct Seam {
     pub ends: [Vertex; 2],
     /// The visible pieces, as fractions of the seam.
     pub visible: Vec<(Ratio, Ratio)>,
-}
-
-/// Compares two fractions.
-pub fn compare(a: Ratio, b: Ratio) -> Ordering {
-    (a.0 * b.1).cmp(&(b.0 * a.1))
-}
-
-/// A quantity that is linear along an edge, given by its values at the two ends; below 2^62.
-type Linear = (i128, i128);
-
-fn zero_of(linear: Linear) -> Option<Ratio> {
-    let (p, q) = (linear.0.unsigned_abs(), linear.1.unsigned_abs());
-    (linear.0.signum() * linear.1.signum() < 0).then_some((p, p + q))
-}
-
-fn sign_at(linear: Linear, at: Ratio) -> i128 {
-    (linear.0 * (at.1 - at.0) as i128 + linear.1 * at.0 as i128).signum()
-}
-
-type Vector = [i128; 3];
-
-fn vector(vertex: Vertex) -> Vector {
-    [vertex.x, vertex.y, vertex.z].map(i128::from)
-}
-
-fn minus(a: Vector, b: Vector) -> Vector {
-    [0, 1, 2].map(|n: usize| a[n] - b[n])
-}
-
-fn cross(a: Vector, b: Vector) -> Vector {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn dot(a: Vector, b: Vector) -> i128 {
-    (0..3).map(|n| a[n] * b[n]).sum()
-}
-
-/// A plane through three points: its normal, and a point in it.
-#[derive(Debug, Clone, Copy)]
-struct Plane {
-    normal: Vector,
-    at: Vector,
-}
-
-impl Plane {
-    fn through([a, b, c]: [Vector; 3]) -> Self {
-        Self { normal: cross(minus(b, a), minus(c, a)), at: a }
-    }
-
-    fn height(&self, point: Vector) -> i128 {
-        dot(self.normal, minus(point, self.at))
-    }
-
-    /// The height of the eye over the plane.
-    fn height_of_eye(&self, projection: Projection) -> i128 {
-        match projection {
-            Projection::Perspective => -dot(self.normal, self.at),
-            Projection::Parallel => -self.normal[2],
-        }
-    }
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -102,19 +47,19 @@ struct Triangle {
 
 /// A line whose visibility is computed: an edge, or the seam of two faces.
 #[derive(Debug, Clone, Copy)]
-struct Sight {
+struct TestedLine {
     ends: [Vector; 2],
-    of: Of,
+    origin: Origin,
 }
 
 #[derive(Debug, Clone, Copy)]
-enum Of {
+enum Origin {
     Edge { number: usize, vertices: [u16; 2] },
     Seam([usize; 2]),
 }
 
 /// The relation of one triangle to one line.
-struct Passing {
+struct Relation {
     triangle: Triangle,
     /// The signed distance of the line's points from each side of the triangle on the page,
     /// positive inside.
@@ -125,7 +70,7 @@ struct Passing {
     behind: Linear,
     /// If the triangle's plane contains the line: the side of the line on which each corner lies,
     /// zero if on it.
-    holds: Option<[i128; 3]>,
+    coplanar: Option<[i128; 3]>,
 }
 
 /// A scene with its triangles and its distinct edges.
@@ -136,8 +81,8 @@ pub struct Picture<'s> {
     edges: Vec<[u16; 2]>,
 }
 
-fn on_grid(place: Place) -> Vector {
-    place.map(i128::from)
+fn on_grid(point: GridPoint) -> Vector {
+    point.map(i128::from)
 }
 
 impl<'s> Picture<'s> {
@@ -212,26 +157,26 @@ impl<'s> Picture<'s> {
         -triangle.eye * triangle.plane.height(self.vertex(vertex))
     }
 
-    fn passing(&self, triangle: Triangle, sight: &Sight) -> Passing {
-        let [p, q] = sight.ends;
+    fn relation(&self, triangle: Triangle, line: &TestedLine) -> Relation {
+        let [p, q] = line.ends;
         let corners = triangle.corners.map(|number| self.side(p, q, self.vertex(number)).signum());
         let sides = [0, 1, 2].map(|n: usize| {
             let [a, b] = [n, (n + 1) % 3].map(|n| self.vertex(triangle.corners[n]));
             (triangle.turn * self.side(a, b, p), triangle.turn * self.side(a, b, q))
         });
-        let (behind, holds) = match sight.of {
-            Of::Edge { vertices, .. } => {
+        let (behind, coplanar) = match line.origin {
+            Origin::Edge { vertices, .. } => {
                 let [p, q] = vertices.map(|vertex| self.behind(&triangle, vertex));
-                let holds =
+                let coplanar =
                     vertices.iter().all(|vertex| self.is_in_plane(triangle.corners, *vertex));
                 let [from, to] = vertices;
                 let corner = |n: usize| {
                     let is_on = self.is_in_line(from, to, triangle.corners[n]);
                     if is_on { 0 } else { corners[n] }
                 };
-                ((p, q), holds.then(|| [0, 1, 2].map(corner)))
+                ((p, q), coplanar.then(|| [0, 1, 2].map(corner)))
             }
-            Of::Seam(faces) => {
+            Origin::Seam(faces) => {
                 let is_of = |face: &usize| {
                     *face == triangle.face || self.are_in_one_plane(triangle.corners, *face)
                 };
@@ -249,13 +194,13 @@ impl<'s> Picture<'s> {
                 }
             }
         };
-        Passing { triangle, sides, corners, behind, holds }
+        Relation { triangle, sides, corners, behind, coplanar }
     }
 
     /// The other edges that lie on the same line of the page, with three linear quantities: before,
     /// after, and behind them.
-    fn shadows(&self, sight: &Sight) -> Vec<(usize, [Linear; 3])> {
-        let [p, q] = sight.ends;
+    fn shadows(&self, line: &TestedLine) -> Vec<(usize, [Linear; 3])> {
+        let [p, q] = line.ends;
         let projection = self.scene.projection;
         let offset = |axis: usize, a: Vector, b: Vector| match projection {
             Projection::Perspective => b[axis] * a[2] - a[axis] * b[2],
@@ -265,7 +210,7 @@ impl<'s> Picture<'s> {
         let mut shadows = Vec::new();
         for (number, edge) in self.edges.iter().enumerate() {
             let [a, b] = edge.map(|number| self.vertex(number));
-            let is_self = matches!(sight.of, Of::Edge { number: own, .. } if own == number);
+            let is_self = matches!(line.origin, Origin::Edge { number: own, .. } if own == number);
             if is_self
                 || self.side(p, q, a) != 0
                 || self.side(p, q, b) != 0
@@ -288,18 +233,18 @@ impl<'s> Picture<'s> {
     }
 
     /// The pieces of a line: start, end, whether the piece is hidden, and whether it is drawn.
-    fn look(&self, sight: &Sight, merged: bool) -> Vec<(Ratio, Ratio, bool, bool)> {
-        let passings: Vec<Passing> = self
+    fn visibility_along(&self, line: &TestedLine, merged: bool) -> Vec<(Ratio, Ratio, bool, bool)> {
+        let relations: Vec<Relation> = self
             .triangles
             .iter()
             .filter(|triangle| triangle.turn != 0)
-            .map(|triangle| self.passing(*triangle, sight))
+            .map(|triangle| self.relation(*triangle, line))
             .collect();
-        let shadows = self.shadows(sight);
+        let shadows = self.shadows(line);
         let mut cuts: Vec<Ratio> = vec![(0, 1), (1, 1)];
-        for passing in &passings {
-            cuts.extend(passing.sides.into_iter().filter_map(zero_of));
-            cuts.extend(zero_of(passing.behind));
+        for relation in &relations {
+            cuts.extend(relation.sides.into_iter().filter_map(zero_of));
+            cuts.extend(zero_of(relation.behind));
         }
         for (_, linears) in &shadows {
             cuts.extend(linears.iter().filter_map(|linear| zero_of(*linear)));
@@ -310,47 +255,53 @@ impl<'s> Picture<'s> {
             .map(|pair| {
                 let at = (pair[0].0 + pair[1].0, pair[0].1 + pair[1].1);
                 let is_hidden = [1, -1].into_iter().all(|beside| {
-                    passings.iter().any(|passing| {
-                        sign_at(passing.behind, at) > 0 && covers(passing, at, beside)
+                    relations.iter().any(|relation| {
+                        sign_at(relation.behind, at) > 0 && covers(relation, at, beside)
                     })
                 });
-                let is_left_out =
-                    self.is_stood_in(sight, &shadows, at) || merged && self.is_flat(&passings, at);
+                let is_left_out = self.is_drawn_by_another(line, &shadows, at)
+                    || merged && self.is_flat(&relations, at);
                 (pair[0], pair[1], is_hidden, !is_left_out)
             })
             .collect()
     }
 
-    fn is_stood_in(&self, sight: &Sight, shadows: &[(usize, [Linear; 3])], at: Ratio) -> bool {
+    fn is_drawn_by_another(
+        &self,
+        line: &TestedLine,
+        shadows: &[(usize, [Linear; 3])],
+        at: Ratio,
+    ) -> bool {
         shadows.iter().any(|(number, [from_a, from_b, behind])| {
             if sign_at(*from_a, at) * sign_at(*from_b, at) >= 0 {
                 return false;
             }
-            match (sign_at(*behind, at), sight.of) {
-                (0, Of::Edge { number: own, .. }) => *number < own,
-                (0, Of::Seam(_)) => true,
+            match (sign_at(*behind, at), line.origin) {
+                (0, Origin::Edge { number: own, .. }) => *number < own,
+                (0, Origin::Seam(_)) => true,
                 (sign, _) => sign > 0,
             }
         })
     }
 
     /// Whether the nearest triangles beside the line whose planes contain it are coplanar.
-    fn is_flat(&self, passings: &[Passing], at: Ratio) -> bool {
+    fn is_flat(&self, relations: &[Relation], at: Ratio) -> bool {
         let nearest = |beside: i128| {
             let mut best: Option<(&Triangle, u16)> = None;
-            for passing in passings {
-                let Some(corners) = passing.holds else { continue };
+            for relation in relations {
+                let Some(corners) = relation.coplanar else { continue };
                 let is_there = |n: usize| corners[n] * beside > 0;
                 let crosses = |n: &usize| is_there(*n) != is_there((n + 1) % 3);
                 let Some(corner) = (0..3).find(|n| is_there(*n)) else { continue };
                 let mut crossing = (0..3).filter(crosses).peekable();
-                if crossing.peek().is_none() || crossing.any(|n| sign_at(passing.sides[n], at) <= 0)
+                if crossing.peek().is_none()
+                    || crossing.any(|n| sign_at(relation.sides[n], at) <= 0)
                 {
                     continue;
                 }
-                let corner = passing.triangle.corners[corner];
+                let corner = relation.triangle.corners[corner];
                 if best.is_none_or(|(known, _)| self.behind(known, corner) < 0) {
-                    best = Some((&passing.triangle, corner));
+                    best = Some((&relation.triangle, corner));
                 }
             }
             best
@@ -369,9 +320,9 @@ impl<'s> Picture<'s> {
             if self.is_point(ends) {
                 continue;
             }
-            let sight = Sight { ends, of: Of::Edge { number, vertices } };
+            let line = TestedLine { ends, origin: Origin::Edge { number, vertices } };
             let [from, to] = vertices;
-            for (begin, end, is_hidden, is_drawn) in self.look(&sight, merged) {
+            for (begin, end, is_hidden, is_drawn) in self.visibility_along(&line, merged) {
                 if !is_hidden && !is_drawn {
                     continue;
                 }
@@ -416,9 +367,10 @@ impl<'s> Picture<'s> {
                         if self.is_point(ends) {
                             continue;
                         }
-                        let sight = Sight { ends, of: Of::Seam([one, other]) };
+                        let line = TestedLine { ends, origin: Origin::Seam([one, other]) };
                         let mut visible: Vec<(Ratio, Ratio)> = Vec::new();
-                        for (from, to, is_hidden, is_drawn) in self.look(&sight, merged) {
+                        for (from, to, is_hidden, is_drawn) in self.visibility_along(&line, merged)
+                        {
                             match visible.last_mut() {
                                 _ if is_hidden || !is_drawn => {}
                                 Some(last) if compare(last.1, from) == Ordering::Equal => {
@@ -491,21 +443,12 @@ impl<'s> Picture<'s> {
     }
 }
 
-/// Compares two points along an axis, each given as a sum and its divisor.
-fn compare_along(a: &(Vector, i128), b: &(Vector, i128), axis: usize) -> Ordering {
-    // The products would be as large as 2^144, which does not fit, so the whole parts are compared
-    // first.
-    let whole = |(sum, by): &(Vector, i128)| (sum[axis].div_euclid(*by), sum[axis].rem_euclid(*by));
-    let ((whole_a, rest_a), (whole_b, rest_b)) = (whole(a), whole(b));
-    whole_a.cmp(&whole_b).then((rest_a * b.1).cmp(&(rest_b * a.1)))
-}
-
 /// Whether the part of the page immediately next to a line, to the left (1) or right (-1), lies
 /// within a triangle.
-fn covers(passing: &Passing, at: Ratio, beside: i128) -> bool {
-    (0..3).all(|n| match passing.sides[n] {
+fn covers(relation: &Relation, at: Ratio, beside: i128) -> bool {
+    (0..3).all(|n| match relation.sides[n] {
         // This side lies on the line itself, so the third corner decides.
-        (0, 0) => passing.corners[(n + 2) % 3] * beside > 0,
+        (0, 0) => relation.corners[(n + 2) % 3] * beside > 0,
         side => sign_at(side, at) > 0,
     })
 }

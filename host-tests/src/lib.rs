@@ -19,6 +19,7 @@ pub mod camera_scenes;
 pub mod exact_picture;
 pub mod exact_visibility;
 pub mod fraction;
+pub mod random;
 pub mod random_scenes;
 pub mod scene_files;
 pub mod convex_any_faces;

@@ -5,6 +5,7 @@
 //! take no real time, and every run is the same.
 
 use crate::event_checker;
+use crate::random::Random;
 use crate::whole_jobs::Bench;
 use penup::drawing::PagePoint;
 use penup::plotter::Board;
@@ -12,19 +13,6 @@ use penup_client::link::Link;
 use std::collections::{BTreeSet, VecDeque};
 use std::io;
 use std::time::{Duration, Instant};
-
-/// Pseudo-random numbers that are the same in every run.
-#[derive(Debug, Clone)]
-pub struct Random(pub u64);
-
-impl Random {
-    /// Returns a number from 0 to `bound` - 1.
-    pub fn below(&mut self, bound: u64) -> u64 {
-        // This is the linear congruential generator of Knuth's MMIX.
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (self.0 >> 33) % bound
-    }
-}
 
 /// A fault that affects a byte.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

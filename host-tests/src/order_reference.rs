@@ -2,6 +2,7 @@
 
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
 
+use crate::scene_files::ObjText;
 use penup::drawing::{Drawing, PagePoint, Segment};
 use penup::order::{Leg, Options, OrderError, Report, Shape, order};
 use penup::stage::{NeverCancel, Scratch};
@@ -46,25 +47,14 @@ impl Sheet {
 
     /// Reads a plan in millimetres from an OBJ text, with 80 steps to the millimetre.
     pub fn from_obj(text: &str) -> Self {
-        let mut vertices = Vec::new();
-        let mut polylines = Vec::new();
-        for line in text.lines() {
-            let mut words = line.split_whitespace();
-            match words.next() {
-                Some("v") => {
-                    let mut steps = words
-                        .map(|word| (word.parse::<f64>().expect("a number") * 80.0).round() as i32);
-                    let mut next = || steps.next().expect("a coordinate");
-                    vertices.push((next(), next()));
-                }
-                Some("l") => polylines.push(
-                    words
-                        .map(|word| vertices[word.parse::<usize>().expect("an index") - 1])
-                        .collect(),
-                ),
-                _ => {}
-            }
-        }
+        let ObjText { vertices, elements } = ObjText::read(text);
+        let steps = |coordinate: f64| (coordinate * 80.0).round() as i32;
+        let at = |index: &usize| (steps(vertices[*index][0]), steps(vertices[*index][1]));
+        let polylines: Vec<Vec<(i32, i32)>> = elements
+            .iter()
+            .filter(|element| !element.is_face)
+            .map(|element| element.vertices.iter().map(at).collect())
+            .collect();
         Self::from_polylines(&polylines)
     }
 

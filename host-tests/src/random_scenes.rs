@@ -2,43 +2,9 @@
 //!
 //! Every face is plane and does not intersect itself. The same seed gives the same scene.
 
+use crate::random::Random;
 use penup::geometry::{COORDINATE_LIMIT, Projection, Vertex};
 use penup::model::Corner;
-
-/// A small generator of pseudo-random numbers (SplitMix64).
-#[derive(Debug, Clone)]
-pub struct Random(u64);
-
-impl Random {
-    /// Creates the generator of a seed.
-    pub fn new(seed: u64) -> Self {
-        Self(seed)
-    }
-
-    /// Returns the next number.
-    pub fn next_number(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut mixed = self.0;
-        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        mixed ^ (mixed >> 31)
-    }
-
-    /// A number from `low` to `high`, both inclusive.
-    pub fn between(&mut self, low: i32, high: i32) -> i32 {
-        low + (self.next_number() % (high - low + 1) as u64) as i32
-    }
-
-    /// Returns true with a probability of one in `times`.
-    pub fn once_in(&mut self, times: i32) -> bool {
-        self.between(1, times) == 1
-    }
-
-    /// One of the choices.
-    pub fn one_of<T: Copy>(&mut self, choices: &[T]) -> T {
-        choices[self.between(0, choices.len() as i32 - 1) as usize]
-    }
-}
 
 /// A point or vector in space.
 pub type Triple = [i32; 3];

@@ -2,10 +2,61 @@
 
 use penup::geometry::{COORDINATE_LIMIT, EdgeParameter, Projection, Vertex};
 use penup::model::Corner;
+use penup::protocol::Command;
 use penup::visibility::{SinkFull, Stretch, StretchSink};
+use std::path::PathBuf;
 
 /// A point or direction in space.
 pub type Vector = [f64; 3];
+
+/// The path of a file of the `scenes` directory.
+pub fn scene(file: &str) -> PathBuf {
+    penup_client::workspace::root().join("scenes").join(file)
+}
+
+/// What an OBJ text holds, as the library's own parser reads it.
+#[derive(Debug, Clone, Default)]
+pub struct ObjText {
+    /// The positions of the vertices.
+    pub vertices: Vec<Vector>,
+    /// The faces and polylines in the order of the file.
+    pub elements: Vec<ObjElement>,
+}
+
+/// A face or a polyline of an OBJ text.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ObjElement {
+    /// Whether it is a face.
+    pub is_face: bool,
+    /// The indices of its vertices, counted from 0.
+    pub vertices: Vec<usize>,
+}
+
+impl ObjText {
+    /// Reads an OBJ text whose indices are positive. Other lines than `v`, `f` and `l` are skipped.
+    ///
+    /// # Panics
+    /// Panics at a line that the library refuses, and at an index that is not positive.
+    pub fn read(text: &str) -> Self {
+        let mut read = Self::default();
+        for line in text.lines() {
+            let (is_face, numbers) = match Command::parse(line) {
+                Ok(Command::Vertex(place)) => {
+                    read.vertices.push(place.map(|coordinate| coordinate.to_f64()));
+                    continue;
+                }
+                Ok(Command::Face(numbers)) => (true, numbers),
+                Ok(Command::Polyline(numbers)) => (false, numbers),
+                Ok(_) => continue,
+                Err(refusal) => panic!("{line}: {refusal}"),
+            };
+            let index = |number: i32| usize::try_from(number - 1).expect("a positive index");
+            let vertices = numbers.iter().map(index).collect();
+            read.elements.push(ObjElement { is_face, vertices });
+        }
+        read
+    }
+}
 
 /// The vertices and elements of an OBJ file.
 #[derive(Debug, Clone, Default)]
@@ -26,26 +77,11 @@ impl Model {
         }
     }
 
-    /// Reads the `v`, `f` and `l` lines of an OBJ text whose indices are plain positive numbers.
+    /// Reads the vertices, faces and polylines of an OBJ text.
     pub fn from_obj(text: &str) -> Self {
-        let mut model = Self::default();
-        for line in text.lines() {
-            let mut words = line.split_whitespace();
-            match words.next() {
-                Some("v") => {
-                    let numbers: Vec<f64> = words.filter_map(|word| word.parse().ok()).collect();
-                    model.vertices.push([numbers[0], numbers[1], numbers[2]]);
-                }
-                Some("f" | "l") => {
-                    let numbers: Vec<usize> = words
-                        .filter_map(|word| word.parse::<usize>().ok())
-                        .map(|number| number - 1)
-                        .collect();
-                    model.add(&numbers);
-                }
-                _ => {}
-            }
-        }
+        let ObjText { vertices, elements } = ObjText::read(text);
+        let mut model = Self { vertices, corners: Vec::new() };
+        elements.iter().for_each(|element| model.add(&element.vertices));
         model
     }
 
@@ -54,11 +90,7 @@ impl Model {
     /// # Errors
     /// The file cannot be read.
     pub fn example(name: &str) -> std::io::Result<Self> {
-        let path = penup_client::workspace::root()
-            .join(format!("scenes/{name}.obj"))
-            .display()
-            .to_string();
-        Ok(Self::from_obj(&std::fs::read_to_string(path)?))
+        Ok(Self::from_obj(&std::fs::read_to_string(scene(&format!("{name}.obj")))?))
     }
 
     /// A torus of radii 2 and 1, made of `around` by `across` quadrilaterals.
@@ -145,9 +177,7 @@ impl View {
     /// # Errors
     /// The file cannot be read.
     pub fn example(name: &str, model: &Model) -> std::io::Result<Self> {
-        let path =
-            penup_client::workspace::root().join("scenes/cameras.json").display().to_string();
-        let text = std::fs::read_to_string(path)?;
+        let text = std::fs::read_to_string(scene("cameras.json"))?;
         let entry = &text[text.find(&format!("\"{name}\"")).unwrap_or(0)..];
         let vector = |key: &str| -> Vector {
             let list = &entry[entry.find(key).unwrap_or(0)..];

@@ -208,17 +208,17 @@ fn the_checksums_of_model_and_options_are_those_that_the_client_expects() {
         for line in &lines {
             assert_eq!(bench.say(&format!("{line}\n")), "ok\n");
         }
-        let told = bench.say("$model\n");
+        let report = bench.say("$model\n");
         let job: Vec<JobLine> = lines.into_iter().map(JobLine::command).collect();
         let contents = twin::contents(&job, job.len());
         let expected = contents.map(|[model, options]| {
             format!("\n[MODEL:checksum {model:08X}, options {options:08X}]\n")
         });
-        assert!(expected.is_some_and(|expected| told.contains(&expected)), "{told}");
+        assert!(expected.is_some_and(|expected| report.contains(&expected)), "{report}");
         seen.extend(contents.map(|[model, _]| model));
         // Another place, another checksum.
         bench.say("$margin=9\n$move=1,9,9,9\n");
-        assert_ne!(bench.say("$model\n"), told);
+        assert_ne!(bench.say("$model\n"), report);
     }
     seen.dedup();
     assert_eq!(seen.len(), 3);

@@ -15,9 +15,9 @@ use penup::geometry::Precision;
 use penup::stage::{Aborted, Cancel, NeverCancel, Scratch};
 use penup_host_tests::convex_model::{Found, Model, Point, model};
 use penup_host_tests::convex_solids::{
-    Dice, any_eye, any_rotation, any_solid, as_decimals, half_of_the_last, read_scene, roof,
-    solid_count,
+    any_eye, any_rotation, any_solid, as_decimals, half_of_the_last, read_scene, roof, solid_count,
 };
+use penup_host_tests::random::Random;
 
 const EXACT: Precision = Precision { written: 0, unit: 0 };
 
@@ -41,18 +41,18 @@ fn found(
 }
 
 /// The edges in random order and direction, some of them twice.
-fn shuffled(dice: &mut Dice, sights: &Sights) -> Vec<[u16; 2]> {
+fn shuffled(random: &mut Random, sights: &Sights) -> Vec<[u16; 2]> {
     let mut edges: Vec<[u16; 2]> = sights.keys().map(|(a, b)| [*a, *b]).collect();
-    edges.push(dice.pick(&edges));
+    edges.push(random.one_of(&edges));
     for edge in &mut edges {
-        dice.shuffle(edge);
+        random.shuffle(edge);
     }
-    dice.shuffle(&mut edges);
+    random.shuffle(&mut edges);
     edges
 }
 
 /// Compares with the reference model where there is one. Returns the kind of case.
-fn compare(dice: &mut Dice, points: &[Point], eye: Eye) -> Option<&'static str> {
+fn compare(random: &mut Random, points: &[Point], eye: Eye) -> Option<&'static str> {
     // From an eye inside, the edges are those seen from elsewhere.
     let outside =
         if model(points, eye) == Model::EyeInside { Eye::Towards([1, 2, 3]) } else { eye };
@@ -60,7 +60,7 @@ fn compare(dice: &mut Dice, points: &[Point], eye: Eye) -> Option<&'static str> 
     if solid.edges.is_empty() {
         return None;
     }
-    let edges = shuffled(dice, &solid.edges);
+    let edges = shuffled(random, &solid.edges);
     let case = || format!("{points:?} {edges:?} {eye:?}");
     if outside != eye {
         assert_eq!(found(points, &edges, eye, 0), Err(SolidError::EyeInside), "{}", case());
@@ -78,19 +78,20 @@ fn compare(dice: &mut Dice, points: &[Point], eye: Eye) -> Option<&'static str> 
 
 #[test]
 fn random_solids_are_seen_exactly() {
-    let mut dice = Dice::new(1980);
+    let mut random = Random::new(1980);
     let mut cases: BTreeMap<&str, usize> = BTreeMap::new();
     for _ in 0..solid_count() {
-        let points = any_solid(&mut dice);
-        let eye = any_eye(&mut dice, &points);
-        if let Some(case) = compare(&mut dice, &points, eye) {
+        let points = any_solid(&mut random);
+        let eye = any_eye(&mut random, &points);
+        if let Some(case) = compare(&mut random, &points, eye) {
             *cases.entry(case).or_default() += 1;
         }
     }
     for _ in 0..500 {
-        let points = roof(&mut dice);
-        let from_above = [dice.throw(-1, 1), dice.throw(-1, 1), dice.throw(2, 9)].map(i64::from);
-        if let Some(case) = compare(&mut dice, &points, Eye::Towards(from_above)) {
+        let points = roof(&mut random);
+        let from_above =
+            [random.between(-1, 1), random.between(-1, 1), random.between(2, 9)].map(i64::from);
+        if let Some(case) = compare(&mut random, &points, Eye::Towards(from_above)) {
             *cases.entry(case).or_default() += 1;
         }
     }
@@ -128,21 +129,21 @@ fn drawn(sights: Sights) -> BTreeMap<(u16, u16), bool> {
 /// rounding. Both methods must draw them like the exact solid.
 #[test]
 fn rounded_solids_are_seen_like_exact_ones() {
-    let mut dice = Dice::new(12);
+    let mut random = Random::new(12);
     for name in SCENES {
         let (points, faces) = read_scene(name);
         let edges = edges_of(&faces);
         let square = |point: &Point| point.iter().map(|part| f64::from(part * part)).sum::<f64>();
         let radius = points.iter().map(square).fold(0.0, f64::max).sqrt();
         for _ in 0..300 {
-            let rotation = any_rotation(&mut dice);
+            let rotation = any_rotation(&mut random);
             let rounded = as_decimals(&points, &rotation, 6);
             let turned = |place: [i64; 3]| {
                 let row =
                     |row: usize| (0..3).map(|k| rotation[row][k] * place[k] as f64).sum::<f64>();
                 [0, 1, 2].map(row)
             };
-            let (eye, turned_eye) = match any_eye(&mut dice, &points) {
+            let (eye, turned_eye) = match any_eye(&mut random, &points) {
                 Eye::Towards(direction) => {
                     // So fine that its own rounding is nothing.
                     let fixed = turned(direction).map(|part| (part * 2f64.powi(50)) as i64);
@@ -173,11 +174,11 @@ fn rounded_solids_are_seen_like_exact_ones() {
 
 #[test]
 fn both_ways_to_see_agree_on_the_scenes() {
-    let mut dice = Dice::new(4);
+    let mut random = Random::new(4);
     for name in SCENES {
         let (points, faces) = read_scene(name);
         for _ in 0..200 {
-            let eye = any_eye(&mut dice, &points);
+            let eye = any_eye(&mut random, &points);
             let from_edges = found(&points, &edges_of(&faces), eye, 0).map(|(_, sights)| sights);
             assert_eq!(from_edges, found_from_vertices(&points, eye, 0), "{name} {eye:?}");
         }
@@ -257,14 +258,15 @@ fn what_is_no_solid_is_refused() {
 /// For any edges, the library returns a result or an error and does not panic.
 #[test]
 fn nonsense_does_no_harm() {
-    let mut dice = Dice::new(99);
+    let mut random = Random::new(99);
     for _ in 0..5_000 {
-        let points = any_solid(&mut dice);
+        let points = any_solid(&mut random);
         let last = points.len() as i32 - 1;
-        let edges: Vec<[u16; 2]> =
-            (0..dice.throw(0, 30)).map(|_| [0, 1].map(|_| dice.throw(0, last) as u16)).collect();
-        let eye = any_eye(&mut dice, &points);
-        let tolerance = dice.pick(&[0, 1, 1000, u32::MAX]);
+        let edges: Vec<[u16; 2]> = (0..random.between(0, 30))
+            .map(|_| [0, 1].map(|_| random.between(0, last) as u16))
+            .collect();
+        let eye = any_eye(&mut random, &points);
+        let tolerance = random.one_of(&[0, 1, 1000, u32::MAX]);
         if let Ok((summary, sights)) = found(&points, &edges, eye, tolerance) {
             assert!(sights.len() == summary.edges && summary.edges <= edges.len());
         }

@@ -16,8 +16,9 @@ use penup::model::Corner;
 use penup::stage::{Aborted, Cancel, NeverCancel, Scratch};
 use penup_host_tests::convex_model::{Found, Model, Point, Solid, model};
 use penup_host_tests::convex_solids::{
-    Dice, any_eye, any_rotation, any_solid, as_decimals, half_of_the_last, read_scene, solid_count,
+    any_eye, any_rotation, any_solid, as_decimals, half_of_the_last, read_scene, solid_count,
 };
+use penup_host_tests::random::Random;
 
 const EXACT: Precision = Precision { written: 0, unit: 0 };
 
@@ -66,11 +67,11 @@ fn compare(points: &[Point], eye: Eye) -> &'static str {
 
 #[test]
 fn random_solids_are_found_exactly() {
-    let mut dice = Dice::new(1971);
+    let mut random = Random::new(1971);
     let mut cases: BTreeMap<&str, usize> = BTreeMap::new();
     for _ in 0..solid_count() {
-        let points = any_solid(&mut dice);
-        let eye = any_eye(&mut dice, &points);
+        let points = any_solid(&mut random);
+        let eye = any_eye(&mut random, &points);
         *cases.entry(compare(&points, eye)).or_default() += 1;
     }
     for (case, least) in
@@ -105,13 +106,13 @@ fn the_scenes_list_the_faces_that_are_found() {
 
 #[test]
 fn rounded_decimals_still_give_whole_faces() {
-    let mut dice = Dice::new(20);
+    let mut random = Random::new(20);
     for name in SCENES {
         let (points, faces) = read_scene(name);
         for decimals in [6, 7, 9] {
             for _ in 0..20 {
-                let rounded = as_decimals(&points, &any_rotation(&mut dice), decimals);
-                let eye = Eye::At([0, 1, 2].map(|_| i64::from(dice.throw(-9, 9)) << 32));
+                let rounded = as_decimals(&points, &any_rotation(&mut random), decimals);
+                let eye = Eye::At([0, 1, 2].map(|_| i64::from(random.between(-9, 9)) << 32));
                 let tolerance = half_of_the_last(decimals);
                 match found(&rounded, eye, tolerance) {
                     Ok((_, found)) => {
@@ -131,7 +132,7 @@ fn rounded_decimals_still_give_whole_faces() {
 #[test]
 fn without_a_tolerance_rounded_pentagons_fall_into_triangles() {
     let (points, _) = read_scene("dodecahedron");
-    let rounded = as_decimals(&points, &any_rotation(&mut Dice::new(1)), 6);
+    let rounded = as_decimals(&points, &any_rotation(&mut Random::new(1)), 6);
     let (summary, _) = found(&rounded, Eye::Towards([1, 2, 3]), 0).expect("a solid");
     assert_eq!((summary.faces, summary.edges), (36, 54));
 }
@@ -227,10 +228,10 @@ fn the_same_solid_whatever_the_order_of_its_vertices() {
     let (points, _) = read_scene("eighteen");
     let eye = Eye::At([7, 3, 3]);
     let Model::Solid(Solid { edges, .. }) = model(&points, eye) else { panic!("a solid") };
-    let mut dice = Dice::new(3);
+    let mut random = Random::new(3);
     let mut order: Vec<u16> = (0..points.len() as u16).collect();
     for _ in 0..50 {
-        dice.shuffle(&mut order);
+        random.shuffle(&mut order);
         let shuffled: Vec<Point> =
             order.iter().map(|number| points[usize::from(*number)]).collect();
         let (_, found) = found(&shuffled, eye, 0).expect("a solid");
@@ -339,7 +340,7 @@ impl Cancel for Impatient {
 #[test]
 fn the_user_can_give_up_at_any_moment() {
     let (points, _) = read_scene("dodecahedron");
-    let rounded = as_decimals(&points, &any_rotation(&mut Dice::new(2)), 6);
+    let rounded = as_decimals(&points, &any_rotation(&mut Random::new(2)), 6);
     let mut words = vec![0; scratch_bytes_from_vertices(points.len()) / 8];
     let mut patience = 0;
     loop {

@@ -1,6 +1,6 @@
 //! Tests of B-splines against the Cox-de Boor basis in floats, and of their chords against dense
 //! sampling and the minimum number of chords.
-#![allow(clippy::unwrap_used)] // a test may: clippy sees only its `#[test]` functions as tests
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use penup::curve::{FRACTION_BITS, Fine, Knots, Parameter, Point, Spline};
 use penup_host_tests::curve_reference::{distance, fewest_chords, spline_at};
@@ -186,7 +186,8 @@ proptest! {
         sketch in sketch(1 << 13, 3..7),
         from_the_eye in any::<bool>(),
     ) {
-        // 128 steps across at most, so that 300 samples stand for the curve; half a step of tolerance.
+        // 128 steps across at most, so that 300 samples stand for the curve; half a step of
+        // tolerance.
         let project = if from_the_eye { perspective } else { parallel };
         let found = flattened(&sketch, project, 128, 300);
         // Rounding to units (1/64 step) of the samples themselves comes on top.

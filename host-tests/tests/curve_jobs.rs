@@ -92,7 +92,8 @@ fn a_curve_is_hidden_like_any_edge() {
 #[test]
 fn control_points_do_not_make_the_page_larger() {
     // A cubic whose inner control points lie far off: it rises to three quarters of their height.
-    let bow = "v 10 20 0\nv 10 353.3333333 0\nv 200 353.3333333 0\nv 200 20 0\ncstype bspline\ndeg 3\n\
+    let bow = "v 10 20 0\nv 10 353.3333333 0\nv 200 353.3333333 0\nv 200 20 0\ncstype \
+     bspline\ndeg 3\n\
                curv 0 1 1 2 3 4\nparm u 0 0 0 0 1 1 1 1\nend";
     let top = |ink: &[[[f64; 2]; 2]]| ink.iter().flatten().map(|p| p[1]).fold(0.0, f64::max);
     let ink = drawn(&sent(bow, &[]));

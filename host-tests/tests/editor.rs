@@ -1,5 +1,5 @@
 //! Tests of the model editor over the serial line against plain vectors, and of whole sessions.
-#![allow(clippy::unwrap_used)] // a test may: clippy sees only its `#[test]` functions as tests
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use penup::model::Element;
 use penup::plotter::{EMPTY_LOOKAHEAD, Memory};
@@ -245,7 +245,8 @@ fn change(plain: &mut Plain, kind: u8, a: usize, b: usize, c: i64) -> Option<Str
             Some(format!("{} {name}", if kind == 15 { "usemtl" } else { "g" }))
         }
         _ => {
-            // The plane through three vertices that have a coordinate in common and are not in line.
+            // The plane through three vertices that have a coordinate in common and are not in
+            // line.
             let axis = a % 3;
             let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
             let at = plain.vertices.get(one(b, count)?)?[axis];
@@ -323,8 +324,10 @@ proptest! {
             let answer = bench.say(&format!("{line}\n"));
             if answer.contains("error:") || is_large {
                 // Full.
-                prop_assert!(is_large || answer.contains("error:113") || answer.contains("error:114"),
-                    "{line}: {answer}");
+                prop_assert!(
+                    is_large || answer.contains("error:113") || answer.contains("error:114"),
+                    "{line}: {answer}"
+                );
                 prop_assert!(is_large || of(&bench) == before.shown(), "{line}");
                 break;
             }

@@ -6,6 +6,7 @@ use penup_host_tests::enumeration::{
     Distances, Division, Effort, EnumerationError, ImplicitCosts, Optimum, Options, Reach, Sets,
     Start, SubProblem, Target, division_bound, optimum, solve_image_problem,
 };
+use penup_host_tests::random::Random;
 use proptest::prelude::*;
 
 /// The cost of the best matching, computed from the best one for every subset of the points.
@@ -211,7 +212,8 @@ proptest! {
         if let Some(pairs) = matchings.iter().find(|pairs| costs.meets_criterion(pairs)) {
             let cost = distances.cost(pairs);
             prop_assert_eq!(costs.lower_bound(), cost);
-            prop_assert!(matchings.iter().all(|other| other == pairs || distances.cost(other) > cost));
+            let is_least = |other: &_| distances.cost(other) > cost;
+            prop_assert!(matchings.iter().all(|other| other == pairs || is_least(other)));
         }
     }
 }
@@ -221,11 +223,9 @@ proptest! {
 
     #[test]
     fn eighteen_points_as_many_as_harrison_reached(seed in any::<u32>()) {
-        let mut state = u64::from(seed);
-        let below: Vec<u32> = std::iter::repeat_with(|| {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (state >> 33) as u32 % 101
-        }).take(18 * 17 / 2).collect();
+        let mut random = Random::new(u64::from(seed));
+        let below: Vec<u32> =
+            std::iter::repeat_with(|| random.below(101) as u32).take(18 * 17 / 2).collect();
         let distances = Distances::new(18, &below).expect("a problem");
         let mut memory = vec![0; 1000];
         let best = solve(distances, Options::default(), &mut memory).expect("an optimum");
@@ -311,12 +311,12 @@ fn each_improvement_is_told_and_the_last_is_the_optimum() {
     let below = hard();
     let distances = Distances::new(16, &below).expect("a problem");
     let mut memory = vec![0; 1000];
-    let mut told = Vec::new();
+    let mut costs = Vec::new();
     let options = Options { start: Start::NoMoreThan(10_000), ..Options::STANDARD };
     let scratch = Scratch::new(&mut memory);
-    let best = optimum(distances, options, scratch, &mut NeverCancel, &mut |cost| told.push(cost))
+    let best = optimum(distances, options, scratch, &mut NeverCancel, &mut |cost| costs.push(cost))
         .expect("an optimum");
-    assert!(told.is_sorted_by(|one, next| one > next));
-    assert_eq!(told.last(), Some(&best.cost));
-    assert_eq!(told.len(), best.effort.improvements as usize);
+    assert!(costs.is_sorted_by(|one, next| one > next));
+    assert_eq!(costs.last(), Some(&best.cost));
+    assert_eq!(costs.len(), best.effort.improvements as usize);
 }

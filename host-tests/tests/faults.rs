@@ -8,21 +8,11 @@ use penup::drawing::{LineType, PagePoint};
 use penup::machine::{
     Alarm, Contacts, Setting, Settings, State, Switches, Target, TargetList, Value,
 };
-use penup_host_tests::event_checker::{self, Drawn, Play};
+use penup_host_tests::event_checker::{self, Backlash, Drawn};
 use penup_host_tests::pin_machine;
+use penup_host_tests::random::Random;
 use penup_host_tests::whole_jobs::{Bench, job_lines};
 use std::mem::discriminant;
-
-/// Pseudo-random numbers that are the same in every run.
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, bound: u64) -> u64 {
-        // Knuth's MMIX.
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (self.0 >> 33) % bound
-    }
-}
 
 /// A plotter that draws one picture repeatedly and must never lose its position.
 struct Session {
@@ -120,7 +110,7 @@ fn disturb(values: &[(Setting, f64)], count: u64, seed: u64) {
     let duration = session.work(3_600_000);
     let never_cancel = session.end();
     assert!(never_cancel.inked.len() > 1000 && duration > 1000, "{duration} ms is no job");
-    let mut random = Random(seed);
+    let mut random = Random::new(seed);
     let mut alarms = 0;
     for case in 0..count {
         session.order("$plot");
@@ -189,7 +179,7 @@ fn a_plotter_that_is_disturbed_at_400_instants_draws_the_same() {
 }
 
 #[test]
-fn so_does_one_with_slack_whose_pen_a_motor_lifts() {
+fn so_does_one_with_backlash_whose_pen_a_motor_lifts() {
     let values = [
         (Setting::HardLimits, 1.0),
         (Setting::BacklashX, 0.3),
@@ -203,7 +193,7 @@ fn so_does_one_with_slack_whose_pen_a_motor_lifts() {
 }
 
 #[test]
-fn so_does_a_polargraph_with_slack() {
+fn so_does_a_polargraph_with_backlash() {
     let values = [
         (Setting::HardLimits, 1.0),
         // Always in force there, and the checker reckons from belts of no length.
@@ -217,15 +207,15 @@ fn so_does_a_polargraph_with_slack() {
 
 /// The lengths of a polargraph's belts in steps, seen from the gondola, with backlash.
 struct PolargraphMachine {
-    plays: [Play; 2],
+    backlashes: [Backlash; 2],
     motors: PagePoint,
     belts: PagePoint,
 }
 
 impl PolargraphMachine {
     fn follow(&mut self, motors: PagePoint) {
-        self.belts.x += self.plays[0].turn(motors.x - self.motors.x);
-        self.belts.y += self.plays[1].turn(motors.y - self.motors.y);
+        self.belts.x += self.backlashes[0].turn(motors.x - self.motors.x);
+        self.belts.y += self.backlashes[1].turn(motors.y - self.motors.y);
         self.motors = motors;
     }
 }
@@ -271,7 +261,7 @@ fn home_and_disturb(random: &mut Random) -> Stage {
     let last = [target(200, -300, full), target(0, 0, None)];
     let mut paths = [TargetList::new(&job), TargetList::new(&last)];
     let mut polargraph = PolargraphMachine {
-        plays: event_checker::slack_steps(&settings).map(Play::in_the_middle),
+        backlashes: event_checker::backlash_steps(&settings).map(Backlash::in_the_middle),
         motors: PagePoint::default(),
         belts: PagePoint {
             x: homed - 100 + random.below(900) as i32,
@@ -364,8 +354,8 @@ fn home_and_disturb(random: &mut Random) -> Stage {
 }
 
 #[test]
-fn a_polargraph_with_slack_that_is_disturbed_while_it_homes_or_draws_knows_its_belts() {
-    let mut random = Random(1980);
+fn a_polargraph_with_backlash_that_is_disturbed_while_it_homes_or_draws_knows_its_belts() {
+    let mut random = Random::new(1980);
     let mut struck = Vec::new();
     for _ in 0..600 {
         struck.push(home_and_disturb(&mut random));

@@ -182,9 +182,9 @@ fn moves_by_hand_are_cancelled_where_they_are() {
     assert_eq!(field(&mut bench, "Jog"), "Jog");
     bench.board.receive(&[0x85]);
     bench.finish();
-    let stood = place(&mut bench);
-    let x: f64 = stood.split(',').next().and_then(|x| x.parse().ok()).expect("a number");
-    assert!((15.0..40.0).contains(&x), "{stood}");
+    let position = place(&mut bench);
+    let x: f64 = position.split(',').next().and_then(|x| x.parse().ok()).expect("a number");
+    assert!((15.0..40.0).contains(&x), "{position}");
     assert_eq!(field(&mut bench, "Idle"), "Idle");
     assert_eq!(bench.say("$J=X0\n"), "ok\n");
     bench.finish();
@@ -243,14 +243,14 @@ fn a_limit_and_the_emergency_stop_are_alarms() {
         assert_eq!(bench.heard(), alarm);
         assert!(bench.say("G0 X0\n").ends_with("error:9\n"));
         work(&mut bench, 20);
-        let stood = place(&mut bench);
+        let position = place(&mut bench);
         if contacts.stop {
             assert!(field(&mut bench, "Pn").contains('E'));
             assert!(bench.say("$X\n").ends_with("error:9\n"));
         }
         bench.board.set_contacts(Contacts::default());
         assert_eq!(bench.say("$X\n"), "ok\n");
-        assert_eq!(place(&mut bench), stood);
+        assert_eq!(place(&mut bench), position);
         bench.say("G0 X0\n");
         bench.finish();
         assert_eq!(place(&mut bench), "0.000,0.000");
@@ -403,7 +403,8 @@ fn no_talk_starves_the_steps() {
 }
 
 /// A program with a few strokes, an arc and a dot.
-const PROGRAM: &str = "$21=1\nG0 X5 Y5\nM3\nG1 X14 Y6\nX15 Y12\nG2 X9 Y18 I-6 J0\nG1 X9.5 Y12 F1200\nM5\n\
+const PROGRAM: &str = "$21=1\nG0 X5 Y5\nM3\nG1 X14 Y6\nX15 Y12\nG2 X9 Y18 I-6 J0\nG1 X9.5 Y12 \
+ F1200\nM5\n\
                        G0 X2 Y2\nM3\nM5\nG0 X3 Y9\nM3\nG1 Y10 F3000\nX12 Y10.5\nM5\nG0 X1 Y1\n";
 
 /// A disturbance of the running program.

@@ -114,8 +114,8 @@ impl Case {
             }
             if line > 0 {
                 // The corner is passed between the last move of one line and the first of the next.
-                let way = places[first] - places[first - 1];
-                let most = 1.03 * (corners[line] + self.acceleration * 2.0 * way).sqrt() + 0.1;
+                let distance = places[first] - places[first - 1];
+                let most = 1.03 * (corners[line] + self.acceleration * 2.0 * distance).sqrt() + 0.1;
                 assert!(
                     speed(first) <= most,
                     "{case}: {} mm/s, not {most} at {line}",

@@ -9,7 +9,8 @@ use penup_client::error::Error;
 use penup_client::lines::JobLine;
 use penup_client::progress::Quiet;
 use penup_client::sender::{Patience, Sender};
-use penup_host_tests::noisy_line::{Damage, Fault, NoisyLine, Random};
+use penup_host_tests::noisy_line::{Damage, Fault, NoisyLine};
+use penup_host_tests::random::Random;
 use penup_host_tests::whole_jobs::{Bench, job_lines};
 use std::collections::BTreeSet;
 use std::sync::atomic::AtomicBool;
@@ -66,7 +67,7 @@ fn some_fault(random: &mut Random, bytes: &[u8]) -> (usize, Fault) {
 #[test]
 fn a_thousand_single_faults_never_make_another_drawing() {
     let (ink, bytes) = draw_undisturbed("lattice1.obj");
-    let mut random = Random(1);
+    let mut random = Random::new(1);
     let mut refused = Vec::new();
     for case in 0..1000 {
         let there = random.below(2) == 0;
@@ -89,7 +90,7 @@ fn a_thousand_single_faults_never_make_another_drawing() {
 fn a_large_model_arrives_although_one_byte_in_a_hundred_is_damaged() {
     let (ink, bytes) = draw_undisturbed("lattice5.obj");
     for seed in [5, 6] {
-        let damage = |seed| Damage { faults: vec![], one_in: Some((100, Random(seed))) };
+        let damage = |seed| Damage { faults: vec![], one_in: Some((100, Random::new(seed))) };
         let (line, drawn) = draw("lattice5.obj", damage(seed), damage(seed + 100));
         drawn.expect("a line that can be mended");
         assert!(line.inked() == ink, "another drawing");

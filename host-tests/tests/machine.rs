@@ -9,7 +9,7 @@ use penup::machine::{
 };
 use penup::motion::{Block, EventKind, LimitsError};
 use penup::step::tape;
-use penup_host_tests::event_checker::{self, Drawn, Play};
+use penup_host_tests::event_checker::{self, Drawn, Backlash};
 use penup_host_tests::pin_machine::{self, Turn};
 use proptest::prelude::*;
 use std::sync::LazyLock;
@@ -482,10 +482,10 @@ fn slack_is_taken_up_at_rest_and_leaves_the_same_ink() {
     assert_eq!((&loose.inked, loose.end, loose.pen), (&tight.inked, tight.end, 0));
     event_checker::check_speed(&loose.runs, &fast_job(), &slack(true), false);
     // The circle alone reverses x twice and y twice, and the zigzag reverses y at each corner.
-    assert!(loose.slack.len() > 12 && tight.slack.is_empty());
-    for run in &loose.slack {
+    assert!(loose.backlash.len() > 12 && tight.backlash.is_empty());
+    for run in &loose.backlash {
         let places: Vec<f64> = (0..run.times.len()).map(|step| step as f64 / 80.0).collect();
-        assert!(event_checker::slack_steps(&slack(true)).contains(&(run.times.len() as i32)));
+        assert!(event_checker::backlash_steps(&slack(true)).contains(&(run.times.len() as i32)));
         let measured = event_checker::greatest_acceleration(&run.times, &places, 0.005);
         assert!(measured <= 1.05 * 800.0, "{measured} mm/s2");
     }
@@ -548,7 +548,7 @@ fn home(
     settings.set(Setting::TravelY, Value::from_num(60)).expect("valid");
     let build = settings.kinematics();
     let mut result = (State::Idle, start);
-    let mut plays = event_checker::slack_steps(&settings).map(Play::in_the_middle);
+    let mut plays = event_checker::backlash_steps(&settings).map(Backlash::in_the_middle);
     let (mut motors, mut pen) = (point(0, 0), point(0, 0));
     let trace = pin_machine::run_with(settings, 25_000, &mut |turn, queue| {
         pen.x += plays[0].turn(turn.motors.x - motors.x);

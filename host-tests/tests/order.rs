@@ -7,6 +7,7 @@ use penup::drawing::{Drawing, PagePoint, Segment};
 use penup::order::{EXACT_POINTS, Leg, Method, Options, OrderError, Report, Shape, order};
 use penup::stage::{Aborted, Cancel, NeverCancel, Scratch};
 use penup_host_tests::order_reference::Sheet;
+use penup_host_tests::scene_files;
 use proptest::prelude::*;
 
 const ALL: [(Method, Shape); 4] = [
@@ -36,8 +37,7 @@ fn orders_everything(sheet: &Sheet) -> Result<(), OrderError> {
 }
 
 fn scene(name: &str) -> Sheet {
-    let path =
-        penup_client::workspace::root().join(format!("scenes/{name}.obj")).display().to_string();
+    let path = scene_files::scene(&format!("{name}.obj"));
     Sheet::from_obj(&std::fs::read_to_string(path).expect("a scene"))
 }
 
@@ -64,8 +64,8 @@ fn separate_parts_are_drawn_within_three_hundredths_of_the_best_known() {
     }
 }
 
-/// The best known tour of 500 lines in two columns was found by LKH: back and forth, down one column
-/// and up the other.
+/// The best known tour of 500 lines in two columns was found by LKH: back and forth, down one
+/// column and up the other.
 #[test]
 fn a_hatching_is_drawn_within_three_hundredths_of_the_best_known() {
     let lines = (0..250).flat_map(|row| {

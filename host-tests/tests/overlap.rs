@@ -1,7 +1,7 @@
 //! Tests that no part of the paper is drawn twice and none is lost, by comparing every pair of
 //! lines.
 
-#![allow(clippy::expect_used)] // a test fails by panicking
+#![allow(clippy::expect_used, reason = "a test fails by panicking")]
 
 use penup::drawing::{LineType, PackedLine, PagePoint, build_graph};
 use penup::stage::{NeverCancel, items_mut};

@@ -1,7 +1,7 @@
 //! Tests of several pens: which pen draws which line, from `usemtl` and `g` on the serial line to
 //! the strokes.
 
-#![allow(clippy::unwrap_used)] // a test may: clippy sees only its `#[test]` functions as tests
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use penup::geometry::Projection;
 use penup::machine::Path;
@@ -10,7 +10,8 @@ use penup::plotter::{Board, Observer};
 use penup::stage::{NeverCancel, Scratch};
 use penup::view::View;
 use penup::visibility::{Options, Scene, Stretch, Unrounded, find_stretches, scratch_bytes};
-use penup_host_tests::random_scenes::{Random, random_scene};
+use penup_host_tests::random::Random;
+use penup_host_tests::random_scenes::random_scene;
 use penup_host_tests::scene_files::Stretches;
 use penup_host_tests::whole_jobs::{Bench, job_lines};
 use std::collections::{BTreeMap, BTreeSet};
@@ -112,8 +113,8 @@ fn an_edge_has_the_lowest_pen_of_its_faces_and_pens_come_in_turn() {
             assert!(ink.is_sorted_by_key(|(.., pen)| *pen), "{pens:?} {settings}");
             assert!(ink.len() >= 9);
         }
-        for way in ["edges", "vertices"] {
-            let (_, ink) = job(&mut bench(&format!("{}$see={way}\n", cube(pens))));
+        for method in ["edges", "vertices"] {
+            let (_, ink) = job(&mut bench(&format!("{}$see={method}\n", cube(pens))));
             assert!(ink.iter().all(|(.., pen)| *pen == 1));
         }
     }
@@ -199,7 +200,8 @@ fn drawing(is_plan: bool) -> String {
     format!(
         "v 20 20 0\nv 60 20 0\nv 60 60 0\nv 20 60 {z}\n\
          usemtl red\nl 1 2\nusemtl pen5\nl 2 3 4\nusemtl red\nl 4 1\n\
-         cstype bspline\ndeg 2\nusemtl green\ncurv 2 3 1 2 3\nend\nusemtl pen5\ncurv 2 4 1 4 3 2\nend\n\
+         cstype bspline\ndeg 2\nusemtl green\ncurv 2 3 1 2 3\nend\nusemtl pen5\ncurv 2 4 1 4 3 \
+         2\nend\n\
          $page=100x100\n$margin=5\n"
     )
 }
@@ -260,7 +262,8 @@ fn hidden_lines_have_the_pen_that_was_asked_for() {
 fn a_stretch_of_paper_is_inked_by_the_lower_pen_alone() {
     let plan = |first: u8, second: u8| {
         format!(
-            "v 20 20 0\nv 60 20 0\nv 40 20 0\nv 80 20 0\nusemtl pen{first}\nl 1 2\nusemtl pen{second}\nl 3 4\n"
+            "v 20 20 0\nv 60 20 0\nv 40 20 0\nv 80 20 0\nusemtl pen{first}\nl 1 2\nusemtl \
+             pen{second}\nl 3 4\n"
         )
     };
     let mm = |from: i32, to: i32, pen| ([80 * from, 1600], [80 * to, 1600], pen);
@@ -301,7 +304,8 @@ fn materials_rule_over_groups_and_names_are_counted() {
     for name in ["name33", "pen33", "pen0", "99"] {
         assert_eq!(
             bench.say(&format!("usemtl {name}\n")),
-            "[MSG:there are pens 1 to 32, and other names take a free one each: send $pens=one to draw all with one]\n\
+            "[MSG:there are pens 1 to 32, and other names take a free one each: send $pens=one to \
+             draw all with one]\n\
              error:127\n"
         );
     }
@@ -397,7 +401,8 @@ fn a_hold_before_the_last_stroke_asks_for_no_pen_yet() {
 #[test]
 fn the_machine_asks_for_each_pen_once() {
     let mut bench = bench(
-        "v 10 10 0\nv 20 10 0\nv 20 20 0\nv 10 20 0\nusemtl pen2\nl 1 2\nusemtl pen4\nl 2 3\nusemtl pen1\nl 3 4\n",
+        "v 10 10 0\nv 20 10 0\nv 20 20 0\nv 10 20 0\nusemtl pen2\nl 1 2\nusemtl pen4\nl 2 \
+         3\nusemtl pen1\nl 3 4\n",
     );
     assert_eq!(bench.say("$plot\n"), "ok\n");
     for pen in [2, 4] {

@@ -6,6 +6,7 @@ use penup_client::emulator::{
 };
 use penup_client::machines::Board;
 use penup_host_tests::emulated_jobs::{Line, assert_same_as_on_the_host, events_until_idle};
+use penup_host_tests::random::Random;
 use penup_host_tests::whole_jobs::job_lines;
 use std::error::Error;
 use std::time::Duration;
@@ -134,23 +135,15 @@ fn cut_count() -> u64 {
     std::env::var("PENUP_CUTS").ok().and_then(|count| count.parse().ok()).unwrap_or(200)
 }
 
-/// A pseudo-random number by Marsaglia's xorshift.
-fn next_random(state: &mut u64) -> u64 {
-    *state ^= *state << 13;
-    *state ^= *state >> 7;
-    *state ^= *state << 17;
-    *state
-}
-
 #[test]
 fn after_a_cut_at_any_instant_the_settings_are_the_old_or_the_new_ones() -> TestResult {
     let mut watched = Watched::start()?;
     let mut settings = watched.settings()?;
-    let mut random = 1971;
+    let mut random = Random::new(1971);
     let mut kept = 0;
     for number in 0..cut_count() {
         // A line takes microseconds to transmit, and saving takes 46 ms.
-        let after = Duration::from_micros(next_random(&mut random) % 120_000);
+        let after = Duration::from_micros(random.below(120_000));
         watched.0.emulator.0.cut_power_after(after)?;
         let travel = 100 + (number % 300) as u32;
         if watched.survive(&settings, travel)? {
@@ -179,8 +172,8 @@ fn after_a_cut_in_any_write_of_the_flash_the_settings_are_the_old_or_the_new_one
     if cut_count() >= SAVE_BYTES {
         places = (0..SAVE_BYTES).collect();
     } else {
-        let mut random = 2026;
-        places.extend((0..cut_count()).map(|_| next_random(&mut random) % SAVE_BYTES));
+        let mut random = Random::new(2026);
+        places.extend((0..cut_count()).map(|_| random.below(SAVE_BYTES)));
     }
     for (number, place) in (0u32..).zip(places) {
         watched.0.emulator.0.cut_power_in_flash(place)?;
@@ -282,7 +275,7 @@ fn after_a_cut_while_a_job_is_kept_it_is_the_old_one_or_the_new_one() -> TestRes
         jobs.push(job(&mut watched.0)?);
         watched.give_up()?;
     }
-    let mut random = 1834;
+    let mut random = Random::new(1834);
     let (mut kept, mut changes) = (1, 0);
     for number in 0..cut_count().div_ceil(10) {
         let (plot, model) = lines[1 - kept].split_last().ok_or("no line")?;
@@ -291,7 +284,7 @@ fn after_a_cut_while_a_job_is_kept_it_is_the_old_one_or_the_new_one() -> TestRes
         }
         // Every other time when it counts already.
         let place = if number % 2 == 0 { 0 } else { VALID_FROM };
-        let place = place + next_random(&mut random) % (JOB_BYTES - place);
+        let place = place + random.below(JOB_BYTES - place);
         watched.0.emulator.0.cut_power_in_flash(place)?;
         watched.0.emulator.send(format!("{plot}\n").as_bytes())?;
         watched.hear_restart()?;

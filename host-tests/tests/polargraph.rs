@@ -54,24 +54,25 @@ impl PolargraphMachine {
         (x - left, height - (a * a - x * x).sqrt())
     }
 
-    /// How many steps the belts are off the line, if both are to be off as little as can be; 0.5 for less.
+    /// How many steps the belts are off the line, if both are to be off as little as can be; 0.5
+    /// for less.
     fn off(self, belts: PagePoint, from: PagePoint, to: PagePoint) -> f64 {
-        let (from, way) = (
+        let (from, delta) = (
             (f64::from(from.x), f64::from(from.y)),
             (f64::from(to.x - from.x), f64::from(to.y - from.y)),
         );
         let off = |along: f64| {
-            let (a, b) = self.belts(from.0 + along * way.0, from.1 + along * way.1);
+            let (a, b) = self.belts(from.0 + along * delta.0, from.1 + along * delta.1);
             (f64::from(belts.x) - a).abs().max((f64::from(belts.y) - b).abs())
         };
         let (x, y) = self.page(belts);
-        let squared = way.0.powi(2) + way.1.powi(2);
-        let along = ((x - from.0) * way.0 + (y - from.1) * way.1) / squared;
+        let squared = delta.0.powi(2) + delta.1.powi(2);
+        let along = ((x - from.0) * delta.0 + (y - from.1) * delta.1) / squared;
         if off(along.clamp(0.0, 1.0)) <= 0.5 {
             return 0.5;
         }
-        // The greater of the two has one valley within some steps; close below the anchors' height a step of
-        // the belts is many of the page.
+        // The greater of the two has one valley within some steps; close below the anchors' height
+        // a step of the belts is many of the page.
         let depth = (self.height - y).max(1.0);
         let reach = 5.0 * (1.0 + f64::from(belts.x.max(belts.y)) / depth) / squared.sqrt();
         let (mut low, mut high) = ((along - reach).max(0.0), (along + reach).min(1.0));
@@ -99,7 +100,10 @@ fn places() -> impl Strategy<Value = Vec<(f64, f64)>> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
     #[test]
-    fn lines_are_straight_within_half_a_step_of_the_belts(polargraph in polargraphs(), places in places()) {
+    fn lines_are_straight_within_half_a_step_of_the_belts(
+        polargraph in polargraphs(),
+        places in places(),
+    ) {
         let settings = polargraph.settings;
         let targets: Vec<_> = places
             .iter()
@@ -127,7 +131,8 @@ proptest! {
                 let at = moves.next().expect("every corner is reached");
                 let off = polargraph.off(at, from, target.point);
                 // Half of the 1/255 in which pieces lie beside the steps, and a bow of 1/1024.
-                prop_assert!(off <= 0.503, "{} steps at {:?} from {:?} to {:?}, begins {:?} ends {:?}", off, at, from, target.point, settings.kinematics().motors(from), end);
+                prop_assert!(off <= 0.503, "{} steps at {:?} from {:?} to {:?}, begins {:?} ends \
+                 {:?}", off, at, from, target.point, settings.kinematics().motors(from), end);
                 belts = at;
             }
             from = target.point;
@@ -146,8 +151,10 @@ proptest! {
         let mut settings = polargraph.settings;
         settings.set(Setting::Kinematics, Value::from_num(build)).expect("valid");
         let steps = settings.page_steps().map(|steps| steps.to_num::<f64>());
-        let point = |(x, y): (f64, f64)| PagePoint { x: (x * steps[0]) as i32, y: (y * steps[1]) as i32 };
-        let near = |(x, y): (f64, f64), (dx, dy): (f64, f64)| (x + (dx - x) / 40.0, y + (dy - y) / 40.0);
+        let point =
+            |(x, y): (f64, f64)| PagePoint { x: (x * steps[0]) as i32, y: (y * steps[1]) as i32 };
+        let near =
+            |(x, y): (f64, f64), (dx, dy): (f64, f64)| (x + (dx - x) / 40.0, y + (dy - y) / 40.0);
         let a = ends.0;
         let (a, b) = (point(a), point(if short { near(a, ends.1) } else { ends.1 }));
         let draw = |from, to| {
@@ -205,8 +212,8 @@ proptest! {
                 (down, begun) = (height >= 64, at);
             }
         }
-        let way = (f64::from(to.x - from.x), f64::from(to.y - from.y));
-        let length = way.0.hypot(way.1) * step;
+        let delta = (f64::from(to.x - from.x), f64::from(to.y - from.y));
+        let length = delta.0.hypot(delta.1) * step;
         let dot = if dashed { 3.0 * dot } else { dot };
         prop_assume!(length > 4.0 * dot);
         // Half of them are gaps.
@@ -214,7 +221,8 @@ proptest! {
         prop_assert!((each / dot - 1.0).abs() < dot / length + 0.05, "{} mm, not {}", each, dot);
         for stroke in strokes {
             // Belts that are nearly parallel or in line make a step of the page many.
-            prop_assert!((stroke - each).abs() < 0.1 * each + 8.0 * step, "{} mm, not {}", stroke, each);
+            prop_assert!((stroke - each).abs() < 0.1 * each + 8.0 * step, "{} mm, not \
+             {}", stroke, each);
         }
     }
 }

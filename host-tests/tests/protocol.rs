@@ -281,11 +281,11 @@ fn the_order_is_as_it_was_asked_for_and_told() {
         bench.say(settings);
         assert_eq!(bench.say("$plot\n"), "ok\n");
         bench.finish();
-        let told = bench.say("$model\n");
+        let answer = bench.say("$model\n");
         let counts = format!("[JOB:odd points 0, parts 2, lifts {lifts}]");
-        assert!(told.contains(&counts), "{told}");
+        assert!(answer.contains(&counts), "{answer}");
         let job = format!("[JOB:pen down 80.0 mm, up {up} mm, efficiency ");
-        assert!(told.contains(&job), "{told}");
+        assert!(answer.contains(&job), "{answer}");
     }
     for (line, number) in [
         ("$order=best\n", 105),

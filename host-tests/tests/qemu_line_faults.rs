@@ -9,7 +9,7 @@ use penup_client::machines::{Board, WatchedPlotter, emulate};
 use penup_client::page::Run;
 use penup_client::progress::Quiet;
 use penup_client::sender::{Patience, Sender};
-use penup_host_tests::noisy_line::Random;
+use penup_host_tests::random::Random;
 use penup_host_tests::whole_jobs::job_lines;
 use std::error::Error;
 use std::io;
@@ -68,7 +68,7 @@ impl Link for DamagedLine {
 /// The drawing of a scene over such a line, and the number of corrupted bytes.
 fn draw(scene: &str, one_in: Option<u64>) -> Result<(Vec<Run>, u32), Box<dyn Error>> {
     let plotter = emulate(Board::Lm3s6965)?;
-    let mut line = DamagedLine { plotter, one_in, random: Random(3), damaged: 0 };
+    let mut line = DamagedLine { plotter, one_in, random: Random::new(3), damaged: 0 };
     let mut job = vec!["$clear".to_owned()];
     job.extend(job_lines(scene, &["$page=60x80", "$margin=5"]));
     job.pop();

@@ -77,18 +77,18 @@ fn preview_and_plot_tell_the_same_lengths() -> Result<(), Box<dyn Error>> {
     let scene = workspace::root().join("scenes/interpen.obj").display().to_string();
     let json = folder.join("lengths.json").display().to_string();
     let svg = folder.join("lengths.svg").display().to_string();
-    let told = |command: &str, options: &[&str]| -> Result<String, Box<dyn Error>> {
+    let summary = |command: &str, options: &[&str]| -> Result<String, Box<dyn Error>> {
         let view = ["--svg", &svg, "--page=80x80", "--margin=5", "--projection=isometric"];
         let line = ["penup", command, &scene].into_iter().chain(view).chain(options.to_vec());
         let sentence = run(&Cli::try_parse_from(line)?, &AtomicBool::new(false))?;
-        let told = sentence.split_once(": ").ok_or("no files are named")?.1;
-        Ok(told.to_owned())
+        let summary = sentence.split_once(": ").ok_or("no files are named")?.1;
+        Ok(summary.to_owned())
     };
-    let preview = told("preview", &["--json", &json])?;
-    assert_eq!(told("plot", &["--board=lm3s6965"])?, preview);
+    let preview = summary("preview", &["--json", &json])?;
+    assert_eq!(summary("plot", &["--board=lm3s6965"])?, preview);
     // And they are the lengths of the drawing's lines.
     let drawn = preview.split_once(" strokes, ").and_then(|(_, rest)| rest.split_once(" mm drawn"));
-    let drawn: f64 = drawn.ok_or("no length is told")?.0.parse()?;
+    let drawn: f64 = drawn.ok_or("no length is named")?.0.parse()?;
     let json = fs::read_to_string(json)?;
     let exact = json.split_once("\"pen_down_mm\":").and_then(|(_, rest)| rest.split_once(','));
     let exact: f64 = exact.ok_or("no length in the file")?.0.parse()?;

@@ -1,6 +1,6 @@
 //! Tests of titles, from the serial line to the strokes.
 
-#![allow(clippy::unwrap_used)] // a test may: clippy sees only its `#[test]` functions as tests
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use penup::drawing::Title;
 use penup::fixed::Millimetres;
@@ -64,7 +64,8 @@ fn is_inked(line: &Ink, ink: &[Ink]) -> bool {
 
 /// A frame that is higher than wide, so that it uses all the available height.
 const TALL: &str = "v 0 0 0\nv 1 0 0\nv 1 0 9\nv 0 0 9\nl 1 2 3 4 1\n\
-                    $eye=0.5,-9,4.5\n$at=0.5,0,4.5\n$projection=orthographic\n$page=100x100\n$margin=10\n";
+                    $eye=0.5,-9,4.5\n$at=0.5,0,4.5\n$projection=orthographic\n\
+                    $page=100x100\n$margin=10\n";
 
 #[test]
 fn a_title_stands_in_the_middle_below_a_solid_that_leaves_it_room() {
@@ -141,7 +142,8 @@ fn what_does_not_fit_is_refused_with_its_measure() {
     let answer = bench.say("$plot\n");
     assert_eq!(
         answer,
-        "[MSG:the plan is 0.0x50.0 mm and its title takes 14.0 mm below it: choose a larger $page, or $fit=on]\nerror:132\n"
+        "[MSG:the plan is 0.0x50.0 mm and its title takes 14.0 mm below it: choose a larger \
+         $page, or $fit=on]\nerror:132\n"
     );
     bench.say("$title-size=50\n");
     let answer = bench.say("$plot\n");

@@ -23,7 +23,7 @@ fn found(scene: &CameraScene, merged_blocks: bool, spare_bytes: usize) -> Vec<St
         vertices: &scene.vertices,
         elements: Elements::new(&scene.corners),
         projection: scene.projection,
-        unrounded: Unrounded::new(&scene.positions, scene.precision, scene.doubt),
+        unrounded: Unrounded::new(&scene.positions, scene.precision, scene.view_error),
     };
     let mut words = vec![0u64; (scratch_bytes(&seen) + spare_bytes) / 8];
     let mut stretches = Stretches::default();

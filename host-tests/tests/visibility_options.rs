@@ -9,7 +9,7 @@ use penup::visibility::{
     find_stretches, scratch_bytes,
 };
 use penup_host_tests::exact_visibility::pieces;
-use penup_host_tests::random_scenes::Random;
+use penup_host_tests::random::Random;
 use penup_host_tests::scene_files::{Model, Stretches, View};
 
 const EYE: [f64; 3] = [9.0, -7.0, 6.0];
@@ -204,7 +204,8 @@ fn merged_blocks_look_like_one_block() -> Result<(), VisibilityError> {
     let mut whole = Model::default();
     add_box(&mut whole, [0.0, 0.0, 0.0], [2.0, 1.0, 2.0]);
     let expected = visible_length(&whole, [1.0, 0.5, 1.0], Options::default())?;
-    // A stack of two, and two bricks on one: corners that meet corners, and corners that meet sides.
+    // A stack of two, and two bricks on one: corners that meet corners, and corners that meet
+    // sides.
     let bricks: [&[[[f64; 3]; 2]]; 2] = [
         &[[[0.0; 3], [2.0, 1.0, 1.3]], [[0.0, 0.0, 1.3], [2.0, 1.0, 2.0]]],
         &[

@@ -2,7 +2,7 @@
 //! where they overlap.
 
 // A test fails by panicking.
-#![allow(clippy::panic, clippy::expect_used)]
+#![allow(clippy::panic, clippy::expect_used, reason = "a test fails by panicking")]
 
 use penup::machine::Path;
 use penup::plotter::Observer;
@@ -135,9 +135,9 @@ fn the_same_strokes_are_drawn_whichever_way_is_chosen() {
     // Seen straight on and along an axis of symmetry, too: what is edge-on is inked once.
     for (scene, eye) in [("cube", "0,-9,0"), ("octahedron", "9,9,9"), ("dodecahedron", "3,7,4")] {
         let mut bench = with_scene(scene, |_| true);
-        let totals = ["faces", "edges", "vertices"].map(|way| {
+        let totals = ["faces", "edges", "vertices"].map(|method| {
             bench.say(&format!(
-                "$eye={eye}\n$at=0,0,0\n$projection=orthographic\n$see={way}\n$plot\n"
+                "$eye={eye}\n$at=0,0,0\n$projection=orthographic\n$see={method}\n$plot\n"
             ));
             bench.finish();
             let drawn = bench.plotter.machine().status().done.drawn;

@@ -91,7 +91,8 @@ fn run_image(name: &str) -> Result<String> {
 /// Prints the counts of the benchmark image as a table.
 fn print(counts: &str) -> Result<()> {
     say!(
-        "| scene | vertices | edges | view | visibility | an edge | view and visibility at 50 MHz, s | Griffith, s | Brown, s | order |"
+        "| scene | vertices | edges | view | visibility | an edge | view and visibility at 50 \
+         MHz, s | Griffith, s | Brown, s | order |"
     )?;
     say!("|---|---|---|---|---|---|---|---|---|---|")?;
     let papers = PAPERS.iter().copied().chain(std::iter::repeat(["", ""]));
@@ -109,7 +110,8 @@ fn print(counts: &str) -> Result<()> {
         // QEMU counts instructions; the core takes some five cycles for four of them.
         let seconds = (view + visibility) as f64 * 1.25 / 50e6;
         say!(
-            "| {name} | {vertices} | {edges} | {} | {} | {} | {seconds:.3} | {griffith} | {brown} | {} |",
+            "| {name} | {vertices} | {edges} | {} | {} | {} | {seconds:.3} | {griffith} | {brown} \
+             | {} |",
             thousands(*view),
             thousands(*visibility),
             thousands(visibility / edges.max(1)),

@@ -83,7 +83,8 @@ fn entries(directory: &str) -> Vec<PathBuf> {
 /// Instructions for flashing `image` without this program.
 pub fn by_hand(image: &Path) -> String {
     format!(
-        "To flash by hand: hold BOOTSEL on the Pico while you plug it in, then copy {} onto the drive \
+        "To flash by hand: hold BOOTSEL on the Pico while you plug it in, then copy {} onto the \
+         drive \
          RPI-RP2 that appears.",
         image.with_extension("uf2").display()
     )

@@ -67,7 +67,8 @@ enum Task {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         arguments: Vec<String>,
     },
-    /// Counts the instructions of each stage on a Cortex-M3, or the cycles on a Pico, for every lattice.
+    /// Counts the instructions of each stage on a Cortex-M3, or the cycles on a Pico, for every
+    /// lattice.
     Bench {
         /// The LM3S6965's core, or the Pico itself.
         #[arg(long, value_enum, default_value_t)]
@@ -76,7 +77,8 @@ enum Task {
         #[arg(long, conflicts_with = "board")]
         motion: bool,
     },
-    /// Prints how deep the stacks of the emulated boards become over the heaviest jobs (some 2 minutes).
+    /// Prints how deep the stacks of the emulated boards become over the heaviest jobs (some 2
+    /// minutes).
     Stack,
     /// Draws the figures of the papers into docs/gallery, and README's picture.
     Gallery,
@@ -94,7 +96,8 @@ enum Task {
         #[arg(default_value_t = 100_000)]
         count: u32,
     },
-    /// Lets the emulated Pico draw 343 cubes, and compares every step with the host's (some minutes).
+    /// Lets the emulated Pico draw 343 cubes, and compares every step with the host's (some
+    /// minutes).
     Lattice7,
     /// Cuts the emulated Pico's power at many instants, and in as many writes of its flash.
     Cuts {

@@ -2,7 +2,8 @@
 //!
 //! | what | found as | installed by |
 //! |---|---|---|
-//! | `core` for the board's target | rustc's target directory | rustup; else Debian's compiler and the sources of `core` |
+//! | `core` for the board's target | rustc's target directory | rustup; else Debian's compiler and
+//! the sources of `core` |
 //! | the LM3S6965's emulator | `qemu-system-arm` | apt, or brew |
 //! | the Pico's emulator | `node` and `npm`; rp2040js in the target directory | apt, or brew; npm |
 //! | rustfmt, clippy | `cargo fmt`, `cargo clippy` | rustup |

@@ -4,7 +4,8 @@
 
 use std::process::{Command, Stdio};
 
-/// As `cargo xtask | head -1` leaves it: the pipe's reading end is closed before anything is written.
+/// As `cargo xtask | head -1` leaves it: the pipe's reading end is closed before anything is
+/// written.
 #[test]
 fn a_pipe_that_nobody_reads_is_no_error() {
     let mut program = Command::new(env!("CARGO_BIN_EXE_xtask"));

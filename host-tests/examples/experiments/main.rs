@@ -34,10 +34,14 @@ fn main() {
     writeln!(
         page,
         "Harrison's experiments, chapter 7. s: his CPU seconds on an IBM 360/67.\n{unit}\n\n\
-         He prints neither his matrices nor his seed, so the instances are ours: {INSTANCES} for each n.\n\
-         The first one has a seed with which his least costs come out up to n = 12. Up to n = 8 his\n\
-         bounds and heuristic costs come out, too; at n = 10 the heuristic finds 87 where he has 98,\n\
-         and from n = 12 on the bounds differ, so those matrices are not his. A cell of ours is the\n\
+         He prints neither his matrices nor his seed, so the instances are ours: {INSTANCES} for \
+         each n.\n\
+         The first one has a seed with which his least costs come out up to n = 12. Up to n = 8 \
+         his\n\
+         bounds and heuristic costs come out, too; at n = 10 the heuristic finds 87 where he has \
+         98,\n\
+         and from n = 12 on the bounds differ, so those matrices are not his. A cell of ours is \
+         the\n\
          median over all instances and, in brackets, the least and the greatest. His are of one.\n"
     )
     .and_then(|()| tables::write_all(&mut meter, &mut page))

@@ -14,10 +14,12 @@ struct Randu(u32);
 impl Randu {
     /// Harrison prints neither his matrices nor his seed. With this one the least costs are his up
     /// to 12 points (52, 56, 62, 87, 102). Up to 8 points the bounds and the heuristic's costs are
-    /// his, too; at 10 the heuristic's cost is 87 and not 98, and from 12 on the bounds are not his.
+    /// his, too; at 10 the heuristic's cost is 87 and not 98, and from 12 on the bounds are not
+    /// his.
     const SEED: u32 = 311_837_743;
 
-    /// The first instance has that seed, the others have seeds of ours. All are odd, as RANDU needs.
+    /// The first instance has that seed, the others have seeds of ours. All are odd, as RANDU
+    /// needs.
     fn of_instance(instance: u32) -> Self {
         Self(Self::SEED.wrapping_add(instance.wrapping_mul(0x0765_4320)) & 0x7fff_ffff)
     }
@@ -37,8 +39,9 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// Distances from `least` to `least + range - 1`, each as likely, that need not meet the triangle
-    /// inequality (7.1). The matrix of fewer points is a part of that of more, in one instance.
+    /// Distances from `least` to `least + range - 1`, each as likely, that need not meet the
+    /// triangle inequality (7.1). The matrix of fewer points is a part of that of more, in one
+    /// instance.
     pub fn of_matrix(instance: u32, count: usize, least: u32, range: u32) -> Self {
         let mut randu = Randu::of_instance(instance);
         let next = || least + randu.below(range);
@@ -76,7 +79,8 @@ impl Problem {
         self.below_diagonal[high * (high - 1) / 2 + low]
     }
 
-    /// The two nearest of the points that are not `paired`, and their distances; the second may be none.
+    /// The two nearest of the points that are not `paired`, and their distances; the second may be
+    /// none.
     fn nearest(&self, point: usize, paired: &[bool]) -> [(u32, usize); 2] {
         let [mut first, mut second] = [(u32::MAX, point); 2];
         for other in (0..self.count).filter(|&other| other != point && !paired[other]) {
@@ -90,8 +94,9 @@ impl Problem {
         [first, second]
     }
 
-    /// What the pairs cost that Harrison's heuristic chooses (5.10.1), and nothing after it: the point
-    /// whose second choice is worse than its first by the most is given its first, so to the end.
+    /// What the pairs cost that Harrison's heuristic chooses (5.10.1), and nothing after it: the
+    /// point whose second choice is worse than its first by the most is given its first, so to the
+    /// end.
     pub fn cost_by_regret(&self) -> u64 {
         let mut paired = vec![false; self.count];
         let mut choices: Vec<[(u32, usize); 2]> =

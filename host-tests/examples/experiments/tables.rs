@@ -1,4 +1,6 @@
 //! The tables of chapter 7, section by section, with what Harrison found.
+//!
+//! The file is longer than 500 lines, because it follows the chapter from its beginning to its end.
 
 use crate::meter::Meter;
 use crate::problems::{INSTANCES, Problem};
@@ -38,7 +40,8 @@ struct Run {
     lower_bound: u64,
     upper_bound: u64,
     effort: Effort,
-    /// What it took until the best matching was found; none if that was the start, or is not counted.
+    /// What it took until the best matching was found; none if that was the start, or is not
+    /// counted.
     to_best: Option<f64>,
     /// In millions of instructions, or in steps of the search where those cannot be counted.
     price: f64,
@@ -217,7 +220,8 @@ fn heuristic(meter: &mut Meter, page: &mut String) -> Result {
     }
     writeln!(
         page,
-        "7.3 The heuristic alone, without exchanges: the pairs chosen by regret (5.10.1).\n\n{table}"
+        "7.3 The heuristic alone, without exchanges: the pairs chosen by regret \
+         (5.10.1).\n\n{table}"
     )
 }
 
@@ -248,7 +252,8 @@ fn range_of_elements(meter: &mut Meter, page: &mut String) -> Result {
     }
     writeln!(
         page,
-        "7.4 The range of the elements, the least 20. (No upper bound, so that all n enumerate.)\n\n{table}"
+        "7.4 The range of the elements, the least 20. (No upper bound, so that all n \
+         enumerate.)\n\n{table}"
     )
 }
 
@@ -407,7 +412,8 @@ fn fewer_distances(meter: &mut Meter, page: &mut String) -> Result {
     }
     writeln!(
         page,
-        "7.8 Fewer distances (the shortest, and those as long as the longest of them), as they come and\n\
+        "7.8 Fewer distances (the shortest, and those as long as the longest of them), as they \
+         come and\n\
          sorted, from a high upper bound.\n\n{table}"
     )
 }
@@ -482,7 +488,8 @@ fn sets_of_sub_problems(meter: &mut Meter, page: &mut String) -> Result {
     }
     writeln!(
         page,
-        "7.10 Sets of sub-problems. (Higher ends already chosen count in our bound, not in his; he\n\
+        "7.10 Sets of sub-problems. (Higher ends already chosen count in our bound, not in his; \
+         he\n\
          left out the bound at every depth as too much work.)\n\n{table}"
     )
 }

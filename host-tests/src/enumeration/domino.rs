@@ -1,8 +1,9 @@
-//! The upper bound: segments are added to the image graph until it holds a matching (Harrison 6.12).
+//! The upper bound: segments are added to the image graph until it holds a matching (Harrison
+//! 6.12).
 //!
 //! A *domino graph* is a perfect matching. Harrison looks for one by trying pairings one after the
-//! other, which took 423 s at 30 points; here alternating paths that shrink odd loops (Edmonds 1965)
-//! answer the same question in n³.
+//! other, which took 423 s at 30 points; here alternating paths that shrink odd loops (Edmonds
+//! 1965) answer the same question in n³.
 
 use super::EnumerationError;
 use super::image::{ImplicitCosts, members};

@@ -52,7 +52,8 @@ impl<'a> ImplicitCosts<'a> {
         Self::raise_in_turn(distances, scratch, |least, how_often| (64 - how_often, least))
     }
 
-    /// Method 2 (6.10.3): the same, but raise the point whose least reduced distance is the largest.
+    /// Method 2 (6.10.3): the same, but raise the point whose least reduced distance is the
+    /// largest.
     ///
     /// # Errors
     /// [`OutOfScratch`] if the 8 bytes for each point do not fit.
@@ -97,9 +98,9 @@ impl<'a> ImplicitCosts<'a> {
     ///
     /// Where a part of the image graph can be labelled + and - so that no two adjacent points have
     /// the same sign, the costs of the larger side rise and those of the smaller fall by the same
-    /// amount until a new segment arises. Harrison asks for a tree; a loop of even length allows the
-    /// labels as well. A new segment joins two parts or makes an odd loop, so this ends within as
-    /// many steps as there are points.
+    /// amount until a new segment arises. Harrison asks for a tree; a loop of even length allows
+    /// the labels as well. A new segment joins two parts or makes an odd loop, so this ends within
+    /// as many steps as there are points.
     pub fn improve(&mut self) {
         let all = set_of(self.distances.count());
         let mut unseen = all;
@@ -196,8 +197,8 @@ impl<'a> ImplicitCosts<'a> {
     /// Harrison's criterion for optimality (6.7): the reduced distances of `pairs` are zero and all
     /// others are not.
     ///
-    /// The first half alone proves the matching optimal, the second that no other is as good; so the
-    /// criterion fails on many an optimum (6.8.2).
+    /// The first half alone proves the matching optimal, the second that no other is as good; so
+    /// the criterion fails on many an optimum (6.8.2).
     pub fn meets_criterion(&self, pairs: &[[u8; 2]]) -> bool {
         let paired = |point: usize| {
             pairs.iter().fold(0u64, |set, &[a, b]| match point {

@@ -11,11 +11,11 @@
 //!    an assignment problem ([`Division`]), but for those whose lower bound is no better than the
 //!    best matching. [`Options`] holds his variants.
 //!
-//! The order of strokes does not use it: it is the slow, independent check of the exact matching, and
-//! it repeats Harrison's experiments (chapter 7; docs/experiments.md). 18 points take some million
-//! instructions; 36 took a hundred million, 32 others eight hundred: count on some 40 points, and on an
-//! abort beyond.
-//! Refused: an odd number of points or more than [`Distances::POINT_LIMIT`].
+//! The order of strokes does not use it: it is the slow, independent check of the exact matching,
+//! and it repeats Harrison's experiments (chapter 7; docs/experiments.md). 18 points take some
+//! million instructions; 36 took a hundred million, 32 others eight hundred: count on some 40
+//! points, and on an abort beyond. Refused: an odd number of points or more than
+//! [`Distances::POINT_LIMIT`].
 
 mod division;
 mod domino;
@@ -102,8 +102,9 @@ impl<'a> Distances<'a> {
     }
 }
 
-/// The variants of the enumeration. The result is the same with all but [`Reach::NoLongerThanStart`],
-/// [`Reach::NoLongerThan`] and [`Target::Chopped`], which may miss the optimum.
+/// The variants of the enumeration. The result is the same with all but
+/// [`Reach::NoLongerThanStart`], [`Reach::NoLongerThan`] and [`Target::Chopped`], which may miss
+/// the optimum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Options {
     /// Where the search begins.
@@ -155,8 +156,9 @@ pub enum Reach {
     All,
     /// Those that a matching better than the start can hold, by their reduced distances.
     Useful,
-    /// None longer than the longest in the matching of the domino graph. (Harrison: than the longest
-    /// segment added to the image graph; but then the matching itself might be out of reach.)
+    /// None longer than the longest in the matching of the domino graph. (Harrison: than the
+    /// longest segment added to the image graph; but then the matching itself might be out of
+    /// reach.)
     NoLongerThanStart,
     /// None longer than this.
     NoLongerThan(u32),

@@ -1,5 +1,5 @@
-//! Implicit enumeration: all divisions, but for those whose bound says that they hold nothing better
-//! (Harrison 6.13 to 6.16).
+//! Implicit enumeration: all divisions, but for those whose bound says that they hold nothing
+//! better (Harrison 6.13 to 6.16).
 
 use super::division::{Assignment, Division, SubProblems};
 use super::image::members;
@@ -84,8 +84,8 @@ impl<'a, 's, 'p> Search<'a, 's, 'p> {
         })
     }
 
-    /// Searches; what no matching can go below then, and what the best costs (or the `best` that was
-    /// known).
+    /// Searches; what no matching can go below then, and what the best costs (or the `best` that
+    /// was known).
     pub fn run(mut self) -> Result<(u64, u64, Effort), EnumerationError> {
         while self.floor < self.best {
             self.aim();
@@ -112,8 +112,8 @@ impl<'a, 's, 'p> Search<'a, 's, 'p> {
         cost
     }
 
-    /// Goes through the divisions: of each next point, first that it is a lower end, then that it is
-    /// a higher one.
+    /// Goes through the divisions: of each next point, first that it is a lower end, then that it
+    /// is a higher one.
     fn enumerate(&mut self) -> Result<(), EnumerationError> {
         let count = self.sub_problems.count();
         let half = count as u32 / 2;
@@ -194,7 +194,8 @@ impl<'a, 's, 'p> Search<'a, 's, 'p> {
         Ok(())
     }
 
-    /// Pairs the points of P with those of Q, from the lowest on, as long as that stays cheap enough.
+    /// Pairs the points of P with those of Q, from the lowest on, as long as that stays cheap
+    /// enough.
     fn try_pairings(&mut self, division: Division) -> Result<(), EnumerationError> {
         let (count, half) = (self.sub_problems.count(), self.trial.len());
         for (pair, point) in self.trial.iter_mut().zip(members(division.p)) {

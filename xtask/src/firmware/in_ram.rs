@@ -43,7 +43,8 @@ const INDIRECT: Indirect = &[];
 
 /// What to do about a function or constant in flash; the end of several messages.
 const ADVICE: &str = "The step interrupt must not wait for flash. Place the function in RAM, by \
-    #[unsafe(link_section = \".data.in_ram\")], or let it be inlined into its caller, by #[inline(always)].";
+    #[unsafe(link_section = \".data.in_ram\")], or let it be inlined into its caller, by \
+    #[inline(always)].";
 
 /// Checks the image of a Pico whose RAM and flash have these addresses.
 ///
@@ -102,7 +103,8 @@ impl Graph<'_> {
         };
         ensure!(
             !divides(&name),
-            "{name}{by_way_of}: it divides, and the divider may be in the middle of another division. \
+            "{name}{by_way_of}: it divides, and the divider may be in the middle of another \
+             division. \
             Let a handler of the steps shift or multiply instead."
         );
         ensure!(self.ram.contains(&start), "{name} lies in flash{by_way_of}. {ADVICE}");

@@ -1,0 +1,131 @@
+//! Checks speed, acceleration and jerk along the path.
+
+use super::Run;
+use penup::drawing::PagePoint;
+use penup::machine::{Setting, Settings, Target};
+use penup::step::Line;
+
+/// The maximum acceleration along the path, in mm/s², over windows of at least `window` seconds.
+///
+/// `places` are the path lengths (mm) of the plan at the start of each move, and `times` are the
+/// times of these starts. The speed between two moves is assigned to the time midway between them,
+/// which is exact for constant acceleration.
+pub fn greatest_acceleration(times: &[f64], places: &[f64], window: f64) -> f64 {
+    let speeds: Vec<(f64, f64)> = times
+        .windows(2)
+        .zip(places.windows(2))
+        .map(|(t, s)| ((t[0] + t[1]) / 2.0, (s[1] - s[0]) / (t[1] - t[0])))
+        .collect();
+    let mut greatest = 0.0f64;
+    let mut first = 0;
+    for (index, &(time, speed)) in speeds.iter().enumerate() {
+        while first < index && speeds[first + 1].0 <= time - window {
+            first += 1;
+        }
+        let (before, slower) = speeds[first];
+        if time - before >= window {
+            greatest = greatest.max((speed - slower).abs() / (time - before));
+        }
+    }
+    greatest
+}
+
+/// The maximum jerk along the path, in mm/s³. The windows are so long that a jerk of `about`
+/// (mm/s³) can be determined to 8 % in spite of the errors of the places: 4 nm each, which is a
+/// tick at 100 mm/s.
+///
+/// `places` and `times` are as in [`greatest_acceleration`]. Six times the third divided difference
+/// of the places at four times is a weighted mean of the jerk between the first and the last of
+/// them. The four times are at least a third of the window apart.
+pub fn greatest_jerk(times: &[f64], places: &[f64], about: f64) -> f64 {
+    // The weights of the places add up to 8 divided by the cube of a third of the window.
+    let third = (8.0 * 4e-6 / (0.08 * about)).cbrt();
+    let mut greatest = 0.0f64;
+    let mut knots = [0; 4];
+    for first in 0..times.len() {
+        knots[0] = first;
+        for k in 1..4 {
+            knots[k] = knots[k].max(knots[k - 1]);
+            while knots[k] < times.len() && times[knots[k]] < times[knots[k - 1]] + third {
+                knots[k] += 1;
+            }
+            if knots[k] == times.len() {
+                return greatest;
+            }
+        }
+        let mut differences = knots.map(|knot| places[knot]);
+        for order in 1..4 {
+            for k in 0..4 - order {
+                let time = times[knots[k + order]] - times[knots[k]];
+                differences[k] = (differences[k + 1] - differences[k]) / time;
+            }
+        }
+        greatest = greatest.max(6.0 * differences[0].abs());
+    }
+    greatest
+}
+
+/// The path length (mm) of the plan along `targets` from the origin at the start of each move, and
+/// the point that the move leads to. The machine must be Cartesian.
+fn plan(targets: &[Target], settings: &Settings) -> Vec<(f64, PagePoint)> {
+    let [x, y] = settings.page_steps().map(|steps| steps.to_num::<f64>());
+    let (mut at, mut start) = (PagePoint::default(), 0.0);
+    let mut moves = Vec::new();
+    for target in targets {
+        let (dx, dy) = (target.point.x - at.x, target.point.y - at.y);
+        let length = (f64::from(dx) / x).hypot(f64::from(dy) / y);
+        let count = f64::from(dx.abs().max(dy.abs()));
+        let mut place = start + length * 0.5 / count;
+        for direction in Line::new(at, target.point) {
+            at = direction.from_point(at);
+            moves.push((place, at));
+            place += length / count;
+        }
+        start += length;
+    }
+    moves
+}
+
+/// Checks that `runs` follow `targets` from the origin, from rest to rest between two moves of the
+/// pen. `cut` tells that an alarm ended the last run.
+///
+/// # Panics
+/// Panics if a run leaves the path; if the acceleration over any 5 ms, or over the time needed to
+/// determine it to 4 %, exceeds 1.05 times the limit; if the jerk, where it is limited, exceeds 1.1
+/// times the limit; and if a run does not begin or end at rest.
+pub fn check_speed(runs: &[Run], targets: &[Target], settings: &Settings, cut: bool) {
+    let acceleration: f64 =
+        settings.get(Setting::AccelerationX).min(settings.get(Setting::AccelerationY)).to_num();
+    let jerk = 1000.0 * settings.get(Setting::Jerk).to_num::<f64>();
+    let plan = plan(targets, settings);
+    let mut rest = plan.as_slice();
+    for (number, run) in runs.iter().enumerate() {
+        let (moves, later) = rest.split_at(run.points.len());
+        rest = later;
+        let (places, points): (Vec<f64>, Vec<PagePoint>) = moves.iter().copied().unzip();
+        assert_eq!(run.points, points, "off the path");
+        // The window suits two speeds, each of a step of 12.5 µm at 50 mm/s between places that are
+        // exact to 4 nm.
+        let window = f64::max(0.005, 0.064 / (0.04 * acceleration));
+        let measured = greatest_acceleration(&run.times, &places, window);
+        assert!(measured <= 1.05 * acceleration, "run {number}: {measured} mm/s2");
+        if jerk > 0.0 {
+            let measured = greatest_jerk(&run.times, &places, jerk);
+            assert!(measured <= 1.1 * jerk, "run {number}: {measured} mm/s3, not {jerk}");
+        }
+        let from_rest = |times: [f64; 2], places: [f64; 2]| {
+            let length = places[1] - places[0];
+            let speed = length / (times[1] - times[0]);
+            // The standstill is at most one move before the first of them.
+            let most = (2.0 * acceleration * 2.0 * length).sqrt();
+            assert!(speed <= 1.05 * most, "run {number}: {speed} mm/s beside a rest, not {most}");
+        };
+        let is_cut = cut && runs[number + 1..].iter().all(|later| later.points.is_empty());
+        if let (&[a, b, ..], &[s, t, ..]) = (&run.times[..], &places[..]) {
+            from_rest([a, b], [s, t]);
+        }
+        if let (&[.., a, b], &[.., s, t], false) = (&run.times[..], &places[..], is_cut) {
+            from_rest([a, b], [s, t]);
+        }
+    }
+}
