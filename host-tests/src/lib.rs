@@ -27,6 +27,7 @@ pub mod convex_model;
 pub mod convex_solids;
 pub mod cut_flash;
 pub mod heaviest_jobs;
+pub mod transcript;
 pub mod whole_jobs;
 pub mod emulated_jobs;
 pub mod gear_train;

@@ -1,0 +1,141 @@
+//! Homing and limit switches.
+
+use crate::fixtures::{point, polargraph, to, with_backlash};
+use penup::drawing::PagePoint;
+use penup::machine::{Alarm, Axis, Setting, Settings, State, Switches, TargetList, Value};
+use penup_host_tests::event_checker::{self, Backlash};
+use penup_host_tests::pin_machine;
+
+/// Homes a machine that is `start` steps away from its switches; `press` simulates these. Returns
+/// the final state and the final position, in steps from the switches.
+fn home(
+    start: PagePoint,
+    kinematics: i32,
+    loose: bool,
+    press: &mut dyn FnMut(PagePoint, u64) -> Switches,
+) -> (State, PagePoint) {
+    let mut settings = with_backlash(loose);
+    settings.set(Setting::Homing, Value::ONE).expect("valid");
+    settings.set(Setting::Kinematics, Value::from_num(kinematics)).expect("valid");
+    settings.set(Setting::TravelX, Value::from_num(60)).expect("valid");
+    settings.set(Setting::TravelY, Value::from_num(60)).expect("valid");
+    let build = settings.kinematics();
+    let mut result = (State::Idle, start);
+    let mut backlashes = event_checker::backlash_steps(&settings).map(Backlash::in_the_middle);
+    let (mut motors, mut pen) = (point(0, 0), point(0, 0));
+    let trace = pin_machine::run_with(settings, 25_000, &mut |turn, queue| {
+        pen.x += backlashes[0].turn(turn.motors.x - motors.x);
+        pen.y += backlashes[1].turn(turn.motors.y - motors.y);
+        motors = turn.motors;
+        let moved = build.page(pen);
+        let place = point(start.x + moved.x, start.y + moved.y);
+        let switches = press(place, turn.now);
+        if turn.now == 0 {
+            assert_eq!(turn.machine.state(), State::Alarm(Alarm::NotHomed));
+            turn.machine.home(switches).expect("ready");
+        }
+        turn.machine.watch(switches);
+        turn.machine.fill(&mut TargetList::new(&[]), queue);
+        if turn.machine.state() == State::Idle {
+            assert_eq!(turn.machine.position(), point(0, 0));
+        }
+        result = (turn.machine.state(), place);
+        assert!(turn.now < 25_000_000 * 60, "homing takes more than a minute");
+        turn.machine.state() == State::Home
+    });
+    if !loose {
+        event_checker::check_pins(&trace, &settings);
+    }
+    result
+}
+
+fn corner(place: PagePoint, _now: u64) -> Switches {
+    Switches { x: place.x <= 0, y: place.y <= 0 }
+}
+
+#[test]
+fn homing_ends_a_pull_off_from_each_switch() {
+    for (kinematics, loose) in [(0, false), (0, true), (1, false), (1, true)] {
+        for start in [point(2000, 900), point(1, 1), point(4000, -100), point(-80, -80)] {
+            let (state, place) = home(start, kinematics, loose, &mut corner);
+            assert_eq!(state, State::Idle);
+            // 2 mm of 80 steps; the second approach makes 80 steps a second.
+            assert!(place.x.abs_diff(160) <= 1 && place.y.abs_diff(160) <= 1, "{place:?}");
+        }
+    }
+}
+
+#[test]
+fn a_bouncing_switch_is_found_as_well() {
+    let mut pressed_since = [None; 2];
+    let mut bounce = |place: PagePoint, now: u64| {
+        let mut bounced = |axis: usize, at: i32| {
+            if at > 0 {
+                pressed_since[axis] = None;
+                return false;
+            }
+            let since = *pressed_since[axis].get_or_insert(now);
+            now - since > 125_000 || (now / 25_000).is_multiple_of(2)
+        };
+        Switches { x: bounced(0, place.x), y: bounced(1, place.y) }
+    };
+    let (state, place) = home(point(1500, 700), 0, false, &mut bounce);
+    assert_eq!(state, State::Idle);
+    assert!(place.x.abs_diff(160) <= 1 && place.y.abs_diff(160) <= 1, "{place:?}");
+}
+
+#[test]
+fn a_switch_that_is_stuck_or_missing_is_an_alarm() {
+    let stuck = |_: PagePoint, _: u64| Switches { x: true, y: false };
+    let (state, _) = home(point(500, 500), 0, false, &mut { stuck });
+    assert_eq!(state, State::Alarm(Alarm::HomingFailed(Axis::X)));
+    let missing = |place: PagePoint, _: u64| Switches { x: place.x <= 0, y: false };
+    let (state, _) = home(point(500, 500), 0, false, &mut { missing });
+    assert_eq!(state, State::Alarm(Alarm::HomingFailed(Axis::Y)));
+}
+
+#[test]
+fn a_limit_switch_is_an_alarm_only_if_asked_for() {
+    for hard in [false, true] {
+        let mut settings = Settings::default();
+        settings.set(Setting::HardLimits, Value::from_num(hard)).expect("valid");
+        let targets = [to(8000, 0)];
+        let mut path = TargetList::new(&targets);
+        let trace = pin_machine::run(settings, &mut path, 25_000, &mut |turn| {
+            if turn.now == 0 {
+                turn.machine.start(&mut TargetList::new(&targets)).expect("valid");
+            }
+            turn.machine.watch(Switches { x: turn.pins.x >= 3000, y: false });
+            turn.machine.state() == State::Run || !turn.machine.is_stopped()
+        });
+        let end = event_checker::check_pins(&trace, &settings).end.x;
+        // At 8 steps per millisecond, the machine stops at most two iterations after the switch.
+        assert!(if hard { (3000..3020).contains(&end) } else { end == 8000 }, "{end}");
+    }
+}
+
+#[test]
+fn a_polargraph_is_homed_belt_by_belt() {
+    let mut settings = polargraph();
+    settings.set(Setting::Homing, Value::ONE).expect("valid");
+    // The belts have these lengths at the start; the switches close at 480 mm.
+    let start = point(26_000, 25_000);
+    let mut belts = start;
+    pin_machine::run_with(settings, 25_000, &mut |turn, queue| {
+        belts = point(start.x + turn.pins.x, start.y + turn.pins.y);
+        let switches = Switches { x: belts.x <= 19_200, y: belts.y <= 19_200 };
+        if turn.now == 0 {
+            turn.machine.home(switches).expect("ready");
+        }
+        turn.machine.watch(switches);
+        turn.machine.fill(&mut TargetList::new(&[]), queue);
+        if turn.machine.state() == State::Idle {
+            let expected = settings.kinematics().page(point(20_000, 20_000));
+            assert_eq!(turn.machine.position(), expected);
+        }
+        assert!(turn.now < 25_000_000 * 60, "homing takes more than a minute");
+        turn.machine.state() == State::Home
+    });
+    // A pull-off of 2 mm.
+    assert!(belts.x.abs_diff(19_280) <= 1 && belts.y.abs_diff(19_280) <= 1, "{belts:?}");
+}

@@ -1,0 +1,140 @@
+//! A main loop that is late: the queue runs dry while the machine moves.
+
+use crate::fixtures::{ink, is_ready, to, with, with_backlash};
+use penup::machine::{Setting, Settings, Target, TargetList, Value};
+use penup_host_tests::event_checker::{self, Drawn};
+use penup_host_tests::pin_machine;
+use penup_host_tests::random::Random;
+
+/// Long moves, a dense circle and a zigzag, so that at every instant something different is fast.
+fn fast_job() -> Vec<Target> {
+    let mut targets = vec![to(9000, 500)];
+    for chord in 0..=180 {
+        let angle = f64::from(chord) * std::f64::consts::TAU / 180.0;
+        let (x, y) = (8000.0 + 1000.0 * angle.cos(), 2000.0 + 1000.0 * angle.sin());
+        targets.push(ink(x.round() as i32, y.round() as i32));
+    }
+    targets.extend([to(500, 7000), ink(4000, 7400), ink(7500, 7000), ink(7600, 6900)]);
+    targets.extend((0..8).map(|line| ink(6000 - 300 * line, 3000 + 900 * (line % 2))));
+    targets.push(to(0, 0));
+    targets
+}
+
+/// Draws the fast job while the main loop is stalled for `pause` ticks from `instant` on. Also
+/// returns how often the queue ran dry.
+fn starve(settings: Settings, instant: u64, pause: u64, turn_ticks: u64) -> (Drawn, u32) {
+    let targets = fast_job();
+    let mut path = TargetList::new(&targets);
+    let mut underruns = 0;
+    let trace = pin_machine::run_with(settings, turn_ticks, &mut |turn, queue| {
+        if turn.now == 0 {
+            turn.machine.start(&mut TargetList::new(&targets)).expect("valid");
+        }
+        assert_eq!(turn.machine.position(), turn.pins);
+        if !(instant..instant + pause).contains(&turn.now) {
+            turn.machine.fill(&mut path, queue);
+        }
+        underruns = turn.machine.underruns();
+        !is_ready(turn.machine)
+    });
+    (event_checker::check_pins(&trace, &settings), underruns)
+}
+
+/// Delays the main loop `count` times, each in a job of its own, and measures the acceleration
+/// against that of `allowed`.
+fn starve_often(settings: Settings, allowed: Settings, count: u32) {
+    let never_cancel = starve(settings, 0, 0, 25_000).0;
+    let mut random = Random::new(1971);
+    let mut underruns = 0;
+    for _ in 0..count {
+        let instant = random.below(never_cancel.last_step);
+        // The delay is 0.05 s to 2 s, and iterations before and after it take 0.2 ms to 4 ms.
+        let pause = 1_250_000 + random.below(48_750_000);
+        let (drawn, dry) = starve(settings, instant, pause, 5_000 + random.below(95_000));
+        underruns += dry;
+        assert_eq!(drawn.inked, never_cancel.inked);
+        assert_eq!((drawn.end, drawn.pen), (never_cancel.end, 0));
+        // From rest to rest, the acceleration over any 5 ms must be within 1.05 of the limit.
+        event_checker::check_speed(&drawn.runs, &fast_job(), &allowed, false);
+    }
+    // In the other jobs, the delay came while the pen moved, or was shorter than the queue lasted.
+    assert!((count / 2..=count).contains(&underruns), "{underruns} of {count}");
+}
+
+#[test]
+fn a_main_loop_that_is_late_brakes_the_machine_on_the_path() {
+    starve_often(Settings::default(), Settings::default(), 200);
+    starve_often(with_backlash(true), with_backlash(true), 20);
+}
+
+#[test]
+fn steps_of_any_length_and_slow_drivers_are_braked_as_well() {
+    let settings = with(&[
+        (Setting::StepsPerMmX, 100.0),
+        (Setting::DirectionSetup, 20.0),
+        (Setting::TravelSpeed, 4000.0),
+    ]);
+    starve_often(settings, settings, 40);
+}
+
+#[test]
+fn an_underrun_keeps_the_acceleration_where_jerk_is_limited() {
+    // The jerk limit is not respected here, because the interrupt does not know it.
+    let allowed = with(&[(Setting::StepsPerMmX, 100.0), (Setting::TravelSpeed, 4000.0)]);
+    let mut settings = allowed;
+    settings.set(Setting::Jerk, Value::from_num(20)).expect("valid");
+    starve_often(settings, allowed, 40);
+}
+
+#[test]
+fn what_the_queue_cannot_hold_is_braked_within_what_it_holds() {
+    let fast = with(&[
+        (Setting::MaxRateX, 15_000.0),
+        (Setting::MaxRateY, 15_000.0),
+        (Setting::TravelSpeed, 15_000.0),
+        (Setting::DrawSpeed, 9_000.0),
+        (Setting::AccelerationX, 2000.0),
+        (Setting::AccelerationY, 2000.0),
+    ]);
+    // 250 mm/s within 13/16 of 623 steps of 1/80 mm.
+    let mut allowed = fast;
+    let hardest = 250.0 * 250.0 / (2.0 * 13.0 / 16.0 * 623.0 / 80.0);
+    for axis in [Setting::AccelerationX, Setting::AccelerationY] {
+        allowed.set(axis, Value::from_num(hardest)).expect("valid");
+    }
+    starve_often(fast, allowed, 40);
+}
+
+#[test]
+fn a_main_loop_that_is_in_time_is_not_slowed() {
+    in_time_is_not_slowed(Settings::default());
+    in_time_is_not_slowed(with(&[(Setting::Jerk, 20.0)]));
+}
+
+fn in_time_is_not_slowed(settings: Settings) {
+    let targets = fast_job();
+    let planned = pin_machine::record(settings, &mut TargetList::new(&targets), 128).expect("fits");
+    let last = pin_machine::moves(&planned).last().map(|&(time, _)| time);
+    // 0.2 ms and 10 ms.
+    for turn_ticks in [5_000, 250_000] {
+        let (drawn, underruns) = starve(settings, 0, 0, turn_ticks);
+        assert_eq!((Some(drawn.last_step), underruns), (last, 0));
+    }
+}
+
+#[test]
+fn backlash_is_taken_up_at_rest_and_leaves_the_same_ink() {
+    let [tight, loose] = [false, true].map(|loose| starve(with_backlash(loose), 0, 0, 25_000).0);
+    assert_eq!((&loose.inked, loose.end, loose.pen), (&tight.inked, tight.end, 0));
+    event_checker::check_speed(&loose.runs, &fast_job(), &with_backlash(true), false);
+    // The circle alone reverses x twice and y twice, and the zigzag reverses y at each corner.
+    assert!(loose.backlash.len() > 12 && tight.backlash.is_empty());
+    for run in &loose.backlash {
+        let places: Vec<f64> = (0..run.times.len()).map(|step| step as f64 / 80.0).collect();
+        assert!(
+            event_checker::backlash_steps(&with_backlash(true)).contains(&(run.times.len() as i32))
+        );
+        let measured = event_checker::greatest_acceleration(&run.times, &places, 0.005);
+        assert!(measured <= 1.05 * 800.0, "{measured} mm/s2");
+    }
+}
