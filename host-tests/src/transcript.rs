@@ -12,14 +12,15 @@
 //! [`transcript`] takes the commands from the lines that begin with `>` and returns the whole
 //! transcript, so that a test compares one text with another.
 //!
-//! | command | what it does |
-//! |---|---|
-//! | `job TARGETS` | starts a job: `to X,Y` with the pen up, `ink X,Y` with it down, in steps; `pen N` chooses the pen, counted from 1, of the targets behind it |
-//! | `jog X,Y`, `hold`, `resume`, `abort`, `pause`, `sleep`, `check`, `unlock` | the function of the machine of that name |
-//! | `restarted`, `stop` | the alarm after a restart, or of the emergency stop |
-//! | `$N=VALUE` | sets a machine setting |
-//! | `wait` | runs until the machine is at rest |
-//! | `wait SECONDS` | runs for this time |
+//! The commands are:
+//!
+//! - `job TARGETS` starts a job. A target is `to X,Y` with the pen up or `ink X,Y` with it down, in
+//!   steps; `pen N` chooses the pen, counted from 1, of the targets behind it.
+//! - `jog X,Y`, `hold`, `resume`, `abort`, `pause`, `sleep`, `check` and `unlock` call the function
+//!   of the machine of that name.
+//! - `restarted` and `stop` are the alarm after a restart and that of the emergency stop.
+//! - `$N=VALUE` sets a machine setting.
+//! - `wait` runs until the machine is at rest, and `wait SECONDS` for this time.
 
 use crate::event_checker;
 use crate::pin_machine::{self, Turn};
