@@ -57,13 +57,13 @@ fn help_names_every_option() {
 #[test]
 fn a_missing_file_a_stranger_and_a_bad_option_are_explained() {
     let folder = tempfile::tempdir().expect("a folder");
-    fs::write(folder.path().join("scene.stl"), "solid").expect("written");
+    fs::write(folder.path().join("scene.zip"), "PK").expect("written");
     fs::write(folder.path().join("bad.obj"), "v 0 0 0\n$plot\n").expect("written");
     let before = files(folder.path());
     for command in ["plot", "preview"] {
         for (file, code, reason) in [
             ("none.obj", 1, "cannot read none.obj: "),
-            ("scene.stl", 1, "scene.stl: penup reads Wavefront OBJ files"),
+            ("scene.zip", 1, "scene.zip: penup reads Wavefront OBJ files"),
             ("bad.obj", 1, "bad.obj:2: a file cannot hold commands"),
             ("--page=B5", 2, "none of A4, A3, Letter"),
         ] {
