@@ -12,9 +12,10 @@ mod mps2;
 use cortex_m_semihosting::{debug, hprintln};
 use mps2::Counter;
 use panic_semihosting as _;
+use penup::boards::table::PICO;
 use penup::machine::PulserState;
 use penup::motion::{EventQueue, StepEvent};
-use penup::plotter::{Board, EMPTY_LOOKAHEAD, PicoMemory, Plotter, Unobserved};
+use penup::plotter::{Board, EMPTY_LOOKAHEAD, Memory, Plotter, Unobserved};
 use penup::protocol::RealTime;
 use penup::stage::{Aborted, Cancel, Stage};
 use static_cell::StaticCell;
@@ -104,10 +105,13 @@ impl Cancel for Stages<'_> {
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    static MEMORY: StaticCell<PicoMemory> = StaticCell::new();
+    /// Room for the scenes of every board.
+    type BenchMemory =
+        Memory<{ PICO.memory.vertices }, { PICO.memory.corners }, { PICO.memory.words }>;
+    static MEMORY: StaticCell<BenchMemory> = StaticCell::new();
     static PINS: StaticCell<PulserState> = StaticCell::new();
     let mut moves = EMPTY_LOOKAHEAD;
-    let memory = MEMORY.init_with(PicoMemory::new).lend(&mut moves);
+    let memory = MEMORY.init_with(BenchMemory::new).lend(&mut moves);
     let mut plotter = Plotter::new(memory, PINS.init_with(PulserState::new));
     let mut counter = Counter::start();
     for (name, scene, eye) in SCENES {

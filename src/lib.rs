@@ -60,8 +60,10 @@ pub mod storage;
 pub mod protocol;
 pub mod plotter;
 
-/// The board made of plain memory. Those made of silicon belong to the firmware binary.
-#[cfg(feature = "host")]
+/// The table of the boards, and the board made of plain memory. The code of those made of silicon
+/// belongs to the firmware binary.
 pub mod boards {
+    #[cfg(feature = "host")]
     pub mod host;
+    pub mod table;
 }

@@ -1,11 +1,12 @@
 //! Defines the command line and turns its options into settings of a job.
 
+use crate::board;
 use crate::fit::{FitError, TOLERANCES};
 use crate::formats;
 use crate::job::Settings;
-use crate::machines::Board;
 use crate::page::Page;
 use crate::protocol::{TITLE, acts_at_once};
+use crate::table::BoardRow;
 use crate::words::told;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use penup::drawing::TitleText;
@@ -103,8 +104,8 @@ pub struct PlotArgs {
     )]
     pub file: Option<PathBuf>,
     /// The board to emulate; the picture is drawn from its pins
-    #[arg(long, value_enum, default_value = "lm3s6965", help_heading = "Plotter")]
-    pub board: Board,
+    #[arg(long, value_parser = board::parser(), default_value = board::DEFAULT, help_heading = "Plotter")]
+    pub board: &'static BoardRow,
     /// The serial port of a real plotter, such as /dev/ttyUSB0 or COM3
     #[arg(
         long,

@@ -11,6 +11,7 @@
 //! [`tape`] records a job as single motor steps. [`words`] translates the plotter's messages into
 //! the terms of the command line.
 
+pub mod board;
 pub mod cli;
 pub mod emulator;
 pub mod error;
@@ -36,3 +37,5 @@ pub mod twin;
 pub mod watch;
 pub mod words;
 pub mod workspace;
+
+use penup::boards::table;

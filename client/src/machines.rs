@@ -1,22 +1,14 @@
 //! The emulated boards as plotters whose pins are watched.
 
-use crate::emulator::{EmulatedBoard, Emulator, EmulatorError, Options, Pico, image_path};
+use crate::emulator::{self, EmulatedBoard, EmulatorError};
 use crate::error::Error;
 use crate::link::Link;
 use crate::page::PenRuns;
+use crate::table::BoardRow;
 use crate::watch::PenWatch;
 use std::fs;
 use std::io;
 use std::time::Duration;
-
-/// The boards that can be emulated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub enum Board {
-    /// Cortex-M3, 64 KiB of RAM, in QEMU.
-    Lm3s6965,
-    /// Raspberry Pi Pico: Cortex-M0+, 264 KiB of RAM, in rp2040js.
-    Pico,
-}
 
 /// A plotter whose pins are watched.
 pub trait WatchedPlotter: Link {
@@ -35,13 +27,13 @@ pub trait WatchedPlotter: Link {
 ///
 /// # Errors
 /// The emulator or the firmware image is missing, or the emulator does not start.
-pub fn emulate(board: Board) -> Result<Box<dyn WatchedPlotter>, Error> {
+pub fn emulate(board: &'static BoardRow) -> Result<Box<dyn WatchedPlotter>, Error> {
     Ok(Box::new(Emulated::start(board)?))
 }
 
 /// An emulated board and the path of its pen.
 struct Emulated {
-    board: Board,
+    board: &'static BoardRow,
     emulator: Box<dyn EmulatedBoard>,
     pen: PenWatch,
 }
@@ -50,9 +42,8 @@ struct Emulated {
 const STEP: f64 = 1.0 / 80.0;
 
 impl Emulated {
-    fn start(board: Board) -> Result<Self, Error> {
-        let fault = |error: EmulatorError| board.error(&error);
-        let emulator = board.boot().map_err(fault)?;
+    fn start(board: &'static BoardRow) -> Result<Self, Error> {
+        let emulator = emulator::boot(board).map_err(|error| not_started(board, &error))?;
         Ok(Self { board, emulator, pen: PenWatch::new(STEP) })
     }
 
@@ -64,53 +55,30 @@ impl Emulated {
     }
 }
 
-impl Board {
-    /// The name of the board, as the option `--board` accepts it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Lm3s6965 => "lm3s6965",
-            Self::Pico => "pico",
-        }
-    }
+/// The error of an emulator that did not start or whose pins cannot be followed.
+fn not_started(board: &BoardRow, error: &EmulatorError) -> Error {
+    let name = board.name;
+    let reason = match error {
+        EmulatorError::Ended { said } => return broken(board, "ended while it started", said),
+        EmulatorError::NoImage { path } => format!(
+            "there is no firmware {}: run `cargo xtask build --board {name}`",
+            path.display(),
+        ),
+        error => error.to_string(),
+    };
+    Error::Board { board: name.to_owned(), reason }
+}
 
-    /// Boots the board's firmware in its emulator.
-    ///
-    /// # Errors
-    /// See [`EmulatorError`].
-    pub fn boot(self) -> Result<Box<dyn EmulatedBoard>, EmulatorError> {
-        let image = image_path(self.name());
-        Ok(match self {
-            Self::Lm3s6965 => Box::new(Emulator::start(&image, Options::default())?),
-            Self::Pico => Box::new(Pico::start(&image)?),
-        })
-    }
-
-    fn error(self, error: &EmulatorError) -> Error {
-        match error {
-            EmulatorError::Ended { said } => self.broken("ended while it started", said),
-            EmulatorError::NoImage { path } => Error::Board {
-                board: self.name().to_owned(),
-                reason: format!(
-                    "there is no firmware {}: run `cargo xtask build --board {}`",
-                    path.display(),
-                    self.name()
-                ),
-            },
-            error => Error::Board { board: self.name().to_owned(), reason: error.to_string() },
-        }
-    }
-
-    /// Creates the error of an emulator that ended. Its last output, `said`, is written to a file,
-    /// because it is too technical for the message.
-    fn broken(self, how: &str, said: &str) -> Error {
-        let file = format!("penup-emulator-{}.log", std::process::id());
-        let file = std::env::temp_dir().join(file);
-        let is_kept = !said.trim().is_empty() && fs::write(&file, said).is_ok();
-        Error::EmulatorBroke {
-            board: self.name().to_owned(),
-            how: how.to_owned(),
-            details: is_kept.then_some(file),
-        }
+/// The error of an emulator that ended. Its last output, `said`, is written to a file, because it
+/// is too technical for the message.
+fn broken(board: &BoardRow, how: &str, said: &str) -> Error {
+    let file = format!("penup-emulator-{}.log", std::process::id());
+    let file = std::env::temp_dir().join(file);
+    let is_kept = !said.trim().is_empty() && fs::write(&file, said).is_ok();
+    Error::EmulatorBroke {
+        board: board.name.to_owned(),
+        how: how.to_owned(),
+        details: is_kept.then_some(file),
     }
 }
 
@@ -132,7 +100,7 @@ impl Link for Emulated {
 
 impl WatchedPlotter for Emulated {
     fn pen_runs(&mut self) -> Result<PenRuns, Error> {
-        self.follow_pins().map_err(|error| self.board.error(&error))?;
+        self.follow_pins().map_err(|error| not_started(self.board, &error))?;
         Ok(self.pen.runs())
     }
 
@@ -142,6 +110,6 @@ impl WatchedPlotter for Emulated {
             (Error::Link(_), None) => "closed its line".to_owned(),
             _ => return error,
         };
-        self.board.broken(&how, &self.emulator.said())
+        broken(self.board, &how, &self.emulator.said())
     }
 }

@@ -3,8 +3,8 @@
 //!
 //!     cargo run -p penup-host-tests --example spiral > spiral.obj
 
+use penup::boards::table::PICO;
 use penup_client::emulator::Pin;
-use penup_client::machines::Board;
 use penup_host_tests::spiral;
 use penup_host_tests::step_edges::{Edge, planned};
 use std::time::Duration;
@@ -25,7 +25,7 @@ fn longest_gap(edges: &[Edge]) -> Duration {
 
 fn main() {
     let lines = spiral::at_half_a_million();
-    let edges = planned(Board::Pico, &lines);
+    let edges = planned(&PICO, &lines);
     for (name, pin) in [("GP2 (STEP x)", Pin::StepX), ("GP3 (STEP y)", Pin::StepY)] {
         let rises: Vec<_> =
             edges.iter().filter(|edge| edge.0 == pin && edge.1).map(|edge| edge.2).collect();

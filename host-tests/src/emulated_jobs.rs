@@ -1,31 +1,40 @@
 //! Runs whole jobs on emulated boards and the same jobs on the host.
 
 use crate::whole_jobs::{Bench, job_lines, machine_events};
-use penup::plotter::{EMPTY_LOOKAHEAD, EMPTY_LOOKAHEAD_OF_PICO, Lm3s6965Memory, PicoMemory};
-use penup_client::emulator::{EmulatedBoard, Machine, MachineEventKind};
-use penup_client::machines::Board;
+use penup::boards::table::{BoardRow, LM3S6965, PICO};
+use penup::motion::Block;
+use penup::plotter::{Memory, MemorySlices};
+use penup_client::emulator::{self, EmulatedBoard, Machine, MachineEventKind};
 use std::error::Error;
 use std::time::Duration;
 
 /// How long a board may compute without output. It may take minutes on a busy computer.
 const PATIENCE: Duration = Duration::from_secs(300);
 
+/// Allocates the memory of a board whose row is constant.
+macro_rules! memory_of {
+    ($row:ident) => {
+        Box::leak(Box::new(Memory::<
+            { $row.memory.vertices },
+            { $row.memory.corners },
+            { $row.memory.words },
+            { $row.memory.ports },
+        >::new()))
+        .lend(vec![Block::EMPTY; $row.memory.blocks].leak())
+    };
+}
+
 /// A board in memory with the capacities of `board`. The amount of memory affects how far the order
 /// of strokes is improved.
-pub fn bench_like(board: Board) -> Bench {
-    let mut bench = Bench::with_memory(match board {
-        Board::Lm3s6965 => {
-            Box::leak(Box::new(Lm3s6965Memory::new())).lend(Box::leak(Box::new(EMPTY_LOOKAHEAD)))
-        }
-        Board::Pico => Box::leak(Box::new(PicoMemory::new()))
-            .lend(Box::leak(Box::new(EMPTY_LOOKAHEAD_OF_PICO))),
-    });
+pub fn bench_like(board: &'static BoardRow) -> Bench {
+    let memory: MemorySlices = if board == &PICO { memory_of!(PICO) } else { memory_of!(LM3S6965) };
+    let mut bench = Bench::with_memory(memory);
     bench.heard();
     bench
 }
 
 /// The machine events of a job on the host.
-fn on_the_host(board: Board, lines: &[String]) -> Vec<MachineEventKind> {
+fn on_the_host(board: &'static BoardRow, lines: &[String]) -> Vec<MachineEventKind> {
     let mut bench = bench_like(board);
     for line in lines {
         let answer = bench.say(&format!("{line}\n"));
@@ -52,8 +61,8 @@ impl Line {
     ///
     /// # Errors
     /// The board does not start.
-    pub fn open(board: Board) -> Result<Self, Box<dyn Error>> {
-        Self::to(board.boot()?)
+    pub fn open(board: &'static BoardRow) -> Result<Self, Box<dyn Error>> {
+        Self::to(emulator::boot(board)?)
     }
 }
 
@@ -129,7 +138,7 @@ impl<E: EmulatedBoard + ?Sized> Line<E> {
 ///
 /// # Errors
 /// The board does not start.
-pub fn begin(board: Board, lines: &[String]) -> Result<Line, Box<dyn Error>> {
+pub fn begin(board: &'static BoardRow, lines: &[String]) -> Result<Line, Box<dyn Error>> {
     begin_on(Line::open(board)?, lines)
 }
 
@@ -156,7 +165,7 @@ pub fn begin_on<E: EmulatedBoard + ?Sized>(
 /// # Errors
 /// The emulator fails.
 pub fn at_the_pins(
-    board: Board,
+    board: &'static BoardRow,
     lines: &[String],
 ) -> Result<Vec<MachineEventKind>, Box<dyn Error>> {
     events_until_idle(&mut begin(board, lines)?)
@@ -204,7 +213,11 @@ fn job_of(events: &[MachineEventKind]) -> &[MachineEventKind] {
 ///
 /// # Panics
 /// Panics if they differ.
-pub fn compare(board: Board, scene: &str, settings: &[&str]) -> Result<(), Box<dyn Error>> {
+pub fn compare(
+    board: &'static BoardRow,
+    scene: &str,
+    settings: &[&str],
+) -> Result<(), Box<dyn Error>> {
     let lines = job_lines(scene, settings);
     let pins = at_the_pins(board, &lines)?;
     assert_same_as_on_the_host(board, &lines, &pins);
@@ -215,7 +228,11 @@ pub fn compare(board: Board, scene: &str, settings: &[&str]) -> Result<(), Box<d
 ///
 /// # Panics
 /// Panics if they differ.
-pub fn assert_same_as_on_the_host(board: Board, lines: &[String], pins: &[MachineEventKind]) {
+pub fn assert_same_as_on_the_host(
+    board: &'static BoardRow,
+    lines: &[String],
+    pins: &[MachineEventKind],
+) {
     let host = on_the_host(board, lines);
     let (host, pins) = (job_of(&host), job_of(pins));
     assert!(host.len() > 10_000, "{} events are no job", host.len());
@@ -238,7 +255,7 @@ pub fn assert_same_as_on_the_host(board: Board, lines: &[String], pins: &[Machin
 ///
 /// # Panics
 /// Panics if one of these conditions is violated.
-pub fn give_up(board: Board) -> Result<(), Box<dyn Error>> {
+pub fn give_up(board: &'static BoardRow) -> Result<(), Box<dyn Error>> {
     let lines = job_lines("lattice2.obj", &["$page=60x80", "$margin=5"]);
     let mut line = begin(board, &lines)?;
     let mut machine = Machine::default();
@@ -285,7 +302,7 @@ pub const PEN_ON_A_MOTOR: [&str; 5] = ["$132=1", "$112=900", "$122=500", "$210=2
 ///
 /// # Panics
 /// Panics if one of these conditions is violated.
-pub fn stop_at_once(board: Board) -> Result<(), Box<dyn Error>> {
+pub fn stop_at_once(board: &'static BoardRow) -> Result<(), Box<dyn Error>> {
     let settings = [&PEN_ON_A_MOTOR[..], &["$page=60x80", "$margin=5"]].concat();
     let mut line = begin(board, &job_lines("lattice2.obj", &settings))?;
     let (mut machine, mut events) = (Machine::default(), Vec::new());

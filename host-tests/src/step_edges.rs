@@ -2,8 +2,8 @@
 
 use crate::emulated_jobs::bench_like;
 use penup::boards::host::{Change, Stamped};
+use penup::boards::table::BoardRow;
 use penup_client::emulator::{Pin, PinChange};
-use penup_client::machines::Board;
 use std::time::Duration;
 
 /// A step pin, its new level, and the time of the change.
@@ -31,7 +31,7 @@ const TICK: Duration = Duration::from_nanos(40);
 const TURN_TICKS: u64 = 2_500;
 
 /// The planned edges of a job, with the capacities of `board`.
-pub fn planned(board: Board, lines: &[String]) -> Vec<Edge> {
+pub fn planned(board: &'static BoardRow, lines: &[String]) -> Vec<Edge> {
     let mut bench = bench_like(board);
     for line in lines {
         bench.say(&format!("{line}\n"));

@@ -1,8 +1,8 @@
 //! Tests the largest scene that the Raspberry Pi Pico must hold, from its upload to the last step.
 #![cfg(feature = "emulator")]
 
+use penup::boards::table::PICO;
 use penup_client::emulator::{EmulatedBoard, Pico, PicoByUsb, image_path};
-use penup_client::machines::Board;
 use penup_host_tests::emulated_jobs::{
     Line, assert_same_as_on_the_host, begin_on, events_until_idle,
 };
@@ -30,6 +30,6 @@ fn of_343_cubes_the_pins_draw_what_the_host_draws() -> Result<(), Box<dyn Error>
     }
     let mut line = begin_on(line, std::slice::from_ref(plot))?;
     let pins = events_until_idle(&mut line)?;
-    assert_same_as_on_the_host(Board::Pico, &lines, &pins);
+    assert_same_as_on_the_host(&PICO, &lines, &pins);
     Ok(())
 }

@@ -1,10 +1,10 @@
 //! Tests the Raspberry Pi Pico through a loss of power and with a hanging program.
 #![cfg(feature = "emulator")]
 
+use penup::boards::table::PICO;
 use penup_client::emulator::{
     EmulatedBoard, Machine, MachineEventKind, Pico, PicoByUsb, image_path,
 };
-use penup_client::machines::Board;
 use penup_host_tests::emulated_jobs::{Line, assert_same_as_on_the_host, events_until_idle};
 use penup_host_tests::random::Random;
 use penup_host_tests::whole_jobs::job_lines;
@@ -255,7 +255,7 @@ fn the_last_job_is_drawn_again_after_a_loss_of_power() -> TestResult {
     assert_eq!(ask_all(&mut line, "$again")?, ["ok"]);
     assert_eq!(job(&mut line)?, plotted);
     let pins = events_until_idle(&mut line)?;
-    assert_same_as_on_the_host(Board::Pico, &lines, &pins);
+    assert_same_as_on_the_host(&PICO, &lines, &pins);
     Ok(())
 }
 

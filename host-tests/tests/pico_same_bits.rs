@@ -2,7 +2,7 @@
 //! one, to those of the library on the host.
 #![cfg(feature = "emulator")]
 
-use penup_client::machines::Board::Pico;
+use penup::boards::table::PICO;
 use penup_host_tests::emulated_jobs::{
     PEN_ON_A_MOTOR, assert_same_as_on_the_host, begin, compare, events_until_idle, give_up,
     stop_at_once,
@@ -12,34 +12,34 @@ use std::error::Error;
 #[test]
 fn a_concave_solid_in_perspective() -> Result<(), Box<dyn Error>> {
     let camera = ["$eye=5.5,9,5", "$at=2,1.5,1", "$page=80x80", "$margin=5"];
-    compare(Pico, "notched.obj", &camera)
+    compare(&PICO, "notched.obj", &camera)
 }
 
 #[test]
 fn many_parts_with_many_odd_points() -> Result<(), Box<dyn Error>> {
-    compare(Pico, "lattice2.obj", &["$page=60x80", "$margin=5"])
+    compare(&PICO, "lattice2.obj", &["$page=60x80", "$margin=5"])
 }
 
 #[test]
 fn a_motor_lifts_the_pen() -> Result<(), Box<dyn Error>> {
     let settings = [&PEN_ON_A_MOTOR[..], &["$page=80x80", "$margin=5"]].concat();
-    compare(Pico, "notched.obj", &settings)
+    compare(&PICO, "notched.obj", &settings)
 }
 
 #[test]
 fn a_motor_raises_the_pen_after_an_emergency_stop() -> Result<(), Box<dyn Error>> {
-    stop_at_once(Pico)
+    stop_at_once(&PICO)
 }
 
 #[test]
 fn curves_on_a_plan() -> Result<(), Box<dyn Error>> {
-    compare(Pico, "isobars.obj", &["$fit=on", "$page=60x60", "$margin=5", "$effort=100"])
+    compare(&PICO, "isobars.obj", &["$fit=on", "$page=60x60", "$margin=5", "$effort=100"])
 }
 
 #[test]
 fn curves_in_space() -> Result<(), Box<dyn Error>> {
     compare(
-        Pico,
+        &PICO,
         "isobars.obj",
         &["$projection=isometric", "$page=60x60", "$margin=5", "$effort=100"],
     )
@@ -48,7 +48,7 @@ fn curves_in_space() -> Result<(), Box<dyn Error>> {
 #[test]
 fn a_title_below_a_solid() -> Result<(), Box<dyn Error>> {
     let title = ["$title=Caf\\xE9 \\u{2013} 3 %", "$title-size=4", "$page=80x80", "$margin=5"];
-    compare(Pico, "octahedron.obj", &title)
+    compare(&PICO, "octahedron.obj", &title)
 }
 
 #[test]
@@ -56,17 +56,17 @@ fn three_pens_chosen_by_name() -> Result<(), Box<dyn Error>> {
     let square = ["v 10 10 0", "v 60 10 0", "v 60 60 0", "v 10 60 0"];
     let pens = ["usemtl blue", "l 1 2", "usemtl red", "l 2 3", "usemtl pen5", "l 3 4", "$plot"];
     let lines: Vec<String> = square.iter().chain(&pens).map(|line| (*line).to_owned()).collect();
-    let mut line = begin(Pico, &lines)?;
+    let mut line = begin(&PICO, &lines)?;
     for pen in [2, 5] {
         assert_eq!(line.hear()?, format!("[MSG:put in pen {pen}, then send ~]"));
         line.emulator.send(b"~")?;
     }
     let pins = events_until_idle(&mut line)?;
-    assert_same_as_on_the_host(Pico, &lines, &pins);
+    assert_same_as_on_the_host(&PICO, &lines, &pins);
     Ok(())
 }
 
 #[test]
 fn ctrl_x_stops_the_steps_raises_the_pen_and_knows_the_position() -> Result<(), Box<dyn Error>> {
-    give_up(Pico)
+    give_up(&PICO)
 }

@@ -2,7 +2,7 @@
 //! time, exact to the cycle, at any speed.
 #![cfg(feature = "emulator")]
 
-use penup_client::machines::Board::Pico;
+use penup::boards::table::PICO;
 use penup_host_tests::emulated_jobs::{Line, begin, begin_on};
 use penup_host_tests::spiral;
 use penup_host_tests::step_edges::{Edge, HALF_A_MILLION, assert_in_time, of_changes, planned};
@@ -15,7 +15,7 @@ const PATIENCE: Duration = Duration::from_millis(50);
 
 /// The edges of the step pins in a job on the board, in which no event may be late.
 fn at_the_pins(lines: &[String]) -> Result<Vec<Edge>, Box<dyn Error>> {
-    let mut line = begin(Pico, lines)?;
+    let mut line = begin(&PICO, lines)?;
     let mut status = line.status()?;
     let mut asked_at = line.emulator.clock()?;
     while !status.starts_with("<Idle") {
@@ -35,7 +35,7 @@ fn at_the_pins(lines: &[String]) -> Result<Vec<Edge>, Box<dyn Error>> {
 /// Checks that every edge from the first on has its planned time.
 fn keeps_time(scene: &str, settings: &[&str], least: usize) -> Result<(), Box<dyn Error>> {
     let lines = job_lines(scene, settings);
-    assert_in_time(&planned(Pico, &lines), &at_the_pins(&lines)?, least, Duration::ZERO);
+    assert_in_time(&planned(&PICO, &lines), &at_the_pins(&lines)?, least, Duration::ZERO);
     Ok(())
 }
 
@@ -71,7 +71,7 @@ fn a_spiral_of_short_chords_at_half_a_million_steps_a_second_keeps_time()
 -> Result<(), Box<dyn Error>> {
     let lines = spiral::at_half_a_million();
     let pins = at_the_pins(&lines)?;
-    assert_in_time(&planned(Pico, &lines), &pins, 400_000, Duration::ZERO);
+    assert_in_time(&planned(&PICO, &lines), &pins, 400_000, Duration::ZERO);
     let rate = events_a_second(&pins);
     assert!(rate > 500_000.0, "{rate} steps a second");
     Ok(())
@@ -84,7 +84,7 @@ fn a_spiral_of_short_chords_at_the_greatest_speed_keeps_time() -> Result<(), Box
         ["$100=1000", "$101=1000", "$120=32767", "$121=32767", "$201=32767", "$202=32767"];
     let lines = spiral::lines(1500, 12.0, &settings);
     let pins = at_the_pins(&lines)?;
-    assert_in_time(&planned(Pico, &lines), &pins, 100_000, Duration::ZERO);
+    assert_in_time(&planned(&PICO, &lines), &pins, 100_000, Duration::ZERO);
     let rate = events_a_second(&pins);
     assert!(rate > 470_000.0, "{rate} steps a second");
     Ok(())
@@ -118,7 +118,7 @@ fn lists_at_the_pace_of_the_uart_keep_half_a_million_steps_a_second_in_time()
 -> Result<(), Box<dyn Error>> {
     let lines = spiral::at_half_a_million();
     let (plot, before) = lines.split_last().ok_or("an empty job")?;
-    let mut line = begin_on(Line::open(Pico)?, before)?;
+    let mut line = begin_on(Line::open(&PICO)?, before)?;
     let at_rest = hear_lists(&mut line, &LISTS)?;
     let bytes: usize = at_rest.iter().map(|row| row.len() + 2).sum();
     assert!(at_rest.len() > 80 && bytes > 5_000, "{bytes} bytes in {} rows", at_rest.len());
@@ -130,7 +130,7 @@ fn lists_at_the_pace_of_the_uart_keep_half_a_million_steps_a_second_in_time()
     let status = line.status()?;
     assert!(status.starts_with("<Idle") && !status.contains("|Late"), "{status}");
     let pins = of_changes(&line.emulator.pin_changes()?);
-    assert_in_time(&planned(Pico, &lines), &pins, 400_000, Duration::ZERO);
+    assert_in_time(&planned(&PICO, &lines), &pins, 400_000, Duration::ZERO);
     // They were asked for before the first step, and the last step came before they were sent.
     let sending = Duration::from_secs_f64((TIMES * bytes * 10) as f64 / 115_200.0);
     assert!(asked_at < pins[0].2 && pins[pins.len() - 1].2 < asked_at + sending);

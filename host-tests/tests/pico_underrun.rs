@@ -1,8 +1,8 @@
 //! Tests a delayed main loop: the Pico loses no step, brakes along the path, and continues.
 #![cfg(feature = "emulator")]
 
+use penup::boards::table::PICO;
 use penup_client::emulator::{self, EmulatedBoard, Pin, PinChange, image_path};
-use penup_client::machines::Board::Pico;
 use penup_host_tests::emulated_jobs::{Line, begin_on};
 use penup_host_tests::event_checker::greatest_acceleration;
 use penup_host_tests::step_edges::{HALF_A_MILLION, of_changes, planned};
@@ -43,7 +43,7 @@ fn disturbed(
         }
     };
     let changes = line.emulator.pin_changes()?;
-    let (edges, planned) = (of_changes(&changes), planned(Pico, &lines));
+    let (edges, planned) = (of_changes(&changes), planned(&PICO, &lines));
     assert!(
         edges.iter().map(|edge| (edge.0, edge.1)).eq(planned.iter().map(|edge| (edge.0, edge.1))),
         "other steps than those planned"

@@ -1,8 +1,8 @@
 //! Tests USB, the Raspberry Pi Pico's second serial port.
 #![cfg(feature = "emulator")]
 
+use penup::boards::table::PICO;
 use penup_client::emulator::{EmulatedBoard, Pico, PicoByUsb, image_path};
-use penup_client::machines::Board;
 use penup_host_tests::emulated_jobs::{
     Line, assert_same_as_on_the_host, begin_on, events_until_idle,
 };
@@ -37,7 +37,7 @@ fn a_job_that_comes_by_usb_is_the_same() -> TestResult {
     let lines = job_lines("lattice2.obj", &["$page=60x80", "$margin=5"]);
     let mut line = begin_on(plugged_in()?, &lines)?;
     let pins = events_until_idle(&mut line)?;
-    assert_same_as_on_the_host(Board::Pico, &lines, &pins);
+    assert_same_as_on_the_host(&PICO, &lines, &pins);
     Ok(())
 }
 
@@ -93,7 +93,7 @@ fn a_host_that_is_gone_keeps_nobody_waiting() -> TestResult {
     }
     let mut uart = Line::silent(Box::new(usb.emulator.0));
     let pins = events_until_idle(&mut uart)?;
-    assert_same_as_on_the_host(Board::Pico, &lines, &pins);
+    assert_same_as_on_the_host(&PICO, &lines, &pins);
     uart.emulator.send(b"$I\n")?;
     while !uart.hear()?.starts_with("[VER") {}
     uart.emulator.let_usb_take(true)?;
@@ -169,7 +169,7 @@ fn a_busy_bus_finds_the_board_while_a_job_runs() -> TestResult {
     let status = usb.status()?;
     assert!(status.starts_with("<Run") && !status.contains("|Late"), "{status}");
     let pins = events_until_idle(&mut usb)?;
-    assert_same_as_on_the_host(Board::Pico, &lines, &pins);
+    assert_same_as_on_the_host(&PICO, &lines, &pins);
     Ok(())
 }
 

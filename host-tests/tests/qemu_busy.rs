@@ -2,7 +2,7 @@
 //! the LM3S6965 have their planned times.
 #![cfg(feature = "emulator")]
 
-use penup_client::machines::Board::Lm3s6965;
+use penup::boards::table::LM3S6965;
 use penup_host_tests::emulated_jobs::begin;
 use penup_host_tests::step_edges::{assert_in_time, of_changes, planned};
 use penup_host_tests::whole_jobs::job_lines;
@@ -17,8 +17,8 @@ const JITTER: Duration = Duration::from_micros(5);
 fn lists_long_lines_and_status_requests_make_no_gap_between_steps() -> Result<(), Box<dyn Error>> {
     // Short pieces of curves.
     let lines = job_lines("isobars.obj", &["$fit=on", "$page=25x25", "$margin=5"]);
-    let planned = planned(Lm3s6965, &lines);
-    let mut line = begin(Lm3s6965, &lines)?;
+    let planned = planned(&LM3S6965, &lines);
+    let mut line = begin(&LM3S6965, &lines)?;
     let mut changes = line.emulator.pin_changes()?;
     // As much as its queue of 255 bytes takes at once.
     let long = format!("# {}\n", "x".repeat(150));

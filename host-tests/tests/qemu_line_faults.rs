@@ -3,9 +3,10 @@
 #![cfg(feature = "emulator")]
 #![allow(clippy::expect_used, reason = "a test fails with the words of what it expected")]
 
+use penup::boards::table::LM3S6965;
 use penup_client::lines::JobLine;
 use penup_client::link::Link;
-use penup_client::machines::{Board, WatchedPlotter, emulate};
+use penup_client::machines::{WatchedPlotter, emulate};
 use penup_client::page::Run;
 use penup_client::progress::Quiet;
 use penup_client::sender::{Patience, Sender};
@@ -67,7 +68,7 @@ impl Link for DamagedLine {
 
 /// The drawing of a scene over such a line, and the number of corrupted bytes.
 fn draw(scene: &str, one_in: Option<u64>) -> Result<(Vec<Run>, u32), Box<dyn Error>> {
-    let plotter = emulate(Board::Lm3s6965)?;
+    let plotter = emulate(&LM3S6965)?;
     let mut line = DamagedLine { plotter, one_in, random: Random::new(3), damaged: 0 };
     let mut job = vec!["$clear".to_owned()];
     job.extend(job_lines(scene, &["$page=60x80", "$margin=5"]));

@@ -1,7 +1,7 @@
 //! Tests that the emulated board asks for each pen and waits for it.
 #![cfg(feature = "emulator")]
 
-use penup_client::machines::Board;
+use penup::boards::table::LM3S6965;
 use penup_host_tests::emulated_jobs::begin;
 use std::error::Error;
 
@@ -20,7 +20,7 @@ fn a_job_of_three_pens_pauses_twice() -> Result<(), Box<dyn Error>> {
         "l 3 4",
         "$plot",
     ];
-    let mut line = begin(Board::Lm3s6965, &lines.map(str::to_owned))?;
+    let mut line = begin(&LM3S6965, &lines.map(str::to_owned))?;
     for pen in [2, 5] {
         assert_eq!(line.hear()?, format!("[MSG:put in pen {pen}, then send ~]"));
         let status = line.status()?;

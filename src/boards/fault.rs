@@ -1,96 +1,144 @@
 //! Handling of panics and faults: the machine is made safe at once, and the cause is reported.
 //!
-//! Each board chooses how the cause is reported ([`Fault::report`]). By default the board writes
-//! the cause to its serial line and waits for ctrl-X, which resets it. A board that can keep the
-//! cause through a reset restarts by itself and reports the cause afterwards.
+//! This is the same on every board, and written here only: interrupts off, pen up, drivers off, the
+//! message, the restart. A board implements [`Fault`] with what differs. By default the cause is
+//! written to the serial line, and ctrl-X resets the board. A board that can keep the cause through
+//! a reset restarts by itself and reports the cause afterwards.
 
 use core::fmt::{self, Write};
+use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicBool, Ordering};
 
+use super::ThisBoard;
 use super::line;
+use super::pl011::Uart;
 
-/// What a board does after a panic or a fault. No interrupt handler runs any more.
+/// What differs between the boards after a panic or a fault. No interrupt handler runs any more.
 pub trait Fault {
-    /// Disables interrupts and steps, raises the pen and switches the drivers off.
-    fn make_safe();
+    /// The serial line, which is used directly, without any queue.
+    const UART: Uart;
+
+    /// Stops the steps, raises the pen and switches the drivers off.
+    fn release();
+
+    /// The cause that is reported for a panic: the `PanicInfo` itself, or something shorter where
+    /// the flash has no room for its text. The stack grows down from the address `stack_start`.
+    fn cause(info: &PanicInfo, stack_start: usize) -> impl fmt::Display;
+
     /// Reports the cause, or restarts the board, which then reports it.
     fn report(cause: fmt::Arguments) {
-        say::<Self>(cause);
+        say(cause);
     }
-    /// Sends bytes directly, without any queue.
-    fn write(bytes: &[u8]);
+
     /// Prepares for waiting: from now on nothing feeds a watchdog.
     fn begin_to_wait() {}
-    /// Reads a byte directly from the receiver, if there is one.
-    fn poll() -> Option<u8>;
+
     /// Restarts the board because the user has asked for it.
     fn reset() -> !;
 }
 
 /// Used in place of the address of a fault if the stack had no room left for it.
-pub const STACK_USED_UP: u32 = u32::MAX;
+const STACK_USED_UP: u32 = u32::MAX;
 
 /// Whether a fault is being reported. A second fault during a report ends the report. It is read
 /// and written with interrupts off.
 static REPORTING: AtomicBool = AtomicBool::new(false);
 
-/// Handles a panic. `cause` is the `PanicInfo` itself, or something shorter where the flash has no
-/// room for its text.
-pub fn panic<F: Fault>(cause: impl fmt::Display) -> ! {
-    if begin_report::<F>() {
+#[panic_handler]
+fn panic(info: &PanicInfo) -> ! {
+    let cause = ThisBoard::cause(info, &raw const _stack_start as usize);
+    end(|| {
         defmt::error!("{}", defmt::Display2Format(&cause));
-        F::report(format_args!("{cause}"));
-    }
-    wait_for_reset::<F>()
+        ThisBoard::report(format_args!("{cause}"));
+    })
+}
+
+unsafe extern "C" {
+    static _stack_start: u32;
+    static _stack_end: u32;
+}
+
+/// Calls [`hard_fault`] with the address of the fault and a fresh stack. The fault may be a stack
+/// overflow, and then nothing can be pushed onto the old stack. The instructions are those of a
+/// Cortex-M0+, which larger cores have too.
+///
+/// # Safety
+/// Called by the core alone, on a fault.
+#[unsafe(naked)]
+#[unsafe(no_mangle)]
+unsafe extern "C" fn HardFault() -> ! {
+    core::arch::naked_asm!(
+        "mrs r1, msp",
+        "ldr r2, ={end}",
+        "movs r0, #0",
+        "mvns r0, r0", // STACK_USED_UP
+        "cmp r1, r2",
+        "blo 1f",
+        "ldr r0, [r1, #24]", // the program counter that the core has stored there
+        "1: ldr r1, ={start}",
+        "msr msp, r1",
+        "ldr r1, ={hard_fault}",
+        "bx r1",
+        end = sym _stack_end,
+        start = sym _stack_start,
+        hard_fault = sym hard_fault,
+    )
 }
 
 /// Handles a fault at `address`, or at [`STACK_USED_UP`].
-pub fn hard_fault<F: Fault>(address: u32) -> ! {
-    if begin_report::<F>() {
+extern "C" fn hard_fault(address: u32) -> ! {
+    end(|| {
         if address == STACK_USED_UP {
             defmt::error!("the stack is used up");
-            F::report(format_args!("the stack is used up"));
+            ThisBoard::report(format_args!("the stack is used up"));
         } else {
             defmt::error!("hard fault at {=u32:#010x}", address);
-            F::report(format_args!("hard fault at {address:#010x}"));
+            ThisBoard::report(format_args!("hard fault at {address:#010x}"));
         }
-    }
-    wait_for_reset::<F>()
+    })
 }
 
-/// Makes the machine safe. Returns whether the fault is to be reported, which is not so while
-/// another fault is being reported.
-fn begin_report<F: Fault>() -> bool {
-    F::make_safe();
-    if REPORTING.load(Ordering::Relaxed) {
-        return false;
+/// Makes the machine safe, reports the fault unless another one is being reported, and waits for
+/// ctrl-X.
+fn end(report: impl FnOnce()) -> ! {
+    make_safe();
+    if !REPORTING.load(Ordering::Relaxed) {
+        REPORTING.store(true, Ordering::Relaxed);
+        report();
     }
-    REPORTING.store(true, Ordering::Relaxed);
-    true
+    wait_for_reset()
+}
+
+/// Disables interrupts and steps, raises the pen and switches the drivers off.
+#[inline(never)]
+pub fn make_safe() {
+    cortex_m::interrupt::disable();
+    ThisBoard::release();
 }
 
 /// Writes the cause to the serial line.
-pub fn say<F: Fault + ?Sized>(cause: fmt::Arguments) {
-    F::write(b"\r\n");
+pub fn say(cause: fmt::Arguments) {
+    ThisBoard::UART.write(b"\r\n");
     // This never fails, because `OneLine` accepts every byte.
-    let _ = write!(OneLine(F::write), "[MSG:stopped by a fault, ctrl-X resets: {cause}]");
-    F::write(b"\r\n");
+    let _ = write!(OneLine, "[MSG:stopped by a fault, ctrl-X resets: {cause}]");
+    ThisBoard::UART.write(b"\r\n");
 }
 
-fn wait_for_reset<F: Fault>() -> ! {
-    F::begin_to_wait();
-    while F::poll() != Some(line::ABORT) {}
-    F::reset()
+#[inline(never)]
+fn wait_for_reset() -> ! {
+    ThisBoard::begin_to_wait();
+    while ThisBoard::UART.poll().map(|data| data as u8) != Some(line::ABORT) {}
+    ThisBoard::reset()
 }
 
 /// Writes to the serial line and replaces line ends by spaces.
-struct OneLine(fn(&[u8]));
+struct OneLine;
 
 impl Write for OneLine {
     fn write_str(&mut self, text: &str) -> fmt::Result {
         for byte in text.bytes() {
             let byte = if byte == b'\n' || byte == b'\r' { b' ' } else { byte };
-            (self.0)(&[byte]);
+            ThisBoard::UART.write(&[byte]);
         }
         Ok(())
     }

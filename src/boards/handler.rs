@@ -27,7 +27,7 @@ impl<T> Owned<T> {
     /// # Safety
     /// Called by the handler itself, or while its interrupt is masked; the reference ends before
     /// the handler can run again.
-    #[allow(clippy::mut_from_ref)] // The contract allows only one user at a time.
+    #[allow(clippy::mut_from_ref, reason = "the contract allows only one user at a time")]
     #[inline(always)]
     pub unsafe fn get(&self) -> Option<&mut T> {
         // SAFETY: no other reference lives, by the contract.
@@ -38,8 +38,7 @@ impl<T> Owned<T> {
     ///
     /// # Safety
     /// As for [`Owned::get`], and it was filled before.
-    #[cfg(feature = "lm3s6965")]
-    #[allow(clippy::mut_from_ref)] // The contract allows only one user at a time.
+    #[allow(clippy::mut_from_ref, reason = "the contract allows only one user at a time")]
     #[inline(always)]
     pub unsafe fn get_filled(&self) -> &mut T {
         // SAFETY: no other reference lives and there is a value, by the contract.

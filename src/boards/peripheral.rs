@@ -17,7 +17,6 @@ impl Peripheral {
     }
 
     /// The address of the register at `offset`, for a DMA channel.
-    #[cfg(feature = "pico")]
     pub const fn address(self, offset: usize) -> u32 {
         (self.base + offset) as u32
     }
@@ -38,7 +37,6 @@ impl Peripheral {
 
     /// Sets `bits` of the register at `offset`. Do not use it for a register that an interrupt
     /// changes too.
-    #[cfg(feature = "lm3s6965")]
     pub fn set_bits(self, offset: usize, bits: u32) {
         self.write(offset, self.read(offset) | bits);
     }

@@ -14,7 +14,6 @@ mod offset {
     pub const CONTROL: usize = 0x030;
     pub const INTERRUPT_MASK: usize = 0x038;
     pub const INTERRUPT_CLEAR: usize = 0x044;
-    #[cfg(feature = "pico")]
     pub const DMA: usize = 0x048;
 }
 const RECEIVER_EMPTY: u32 = 1 << 4;
@@ -73,28 +72,24 @@ impl Uart {
     }
 
     /// Enables the interrupt for received bytes.
-    #[cfg(feature = "lm3s6965")]
     pub fn interrupt_when_received(self) {
         self.0.write(offset::INTERRUPT_MASK, RECEIVED | RECEIVE_TIMEOUT);
     }
 
     /// Enables or disables the interrupt that comes when the FIFO of the sender gets emptier.
     /// Received bytes cause no interrupt.
-    #[cfg(feature = "pico")]
     pub fn interrupt_when_sent(self, interrupts: bool) {
         self.0.write(offset::INTERRUPT_MASK, if interrupts { SENT } else { 0 });
     }
 
     /// Sets whether DMA fetches the received bytes, whatever errors they have. Otherwise
     /// [`Uart::poll`] returns them.
-    #[cfg(feature = "pico")]
     pub fn receive_by_dma(self, by_dma: bool) {
         self.0.write(offset::DMA, u32::from(by_dma));
     }
 
     /// The address at which a DMA channel reads the next received byte with its error bits, as a
     /// half-word.
-    #[cfg(feature = "pico")]
     pub const fn data_address(self) -> u32 {
         self.0.address(offset::DATA)
     }

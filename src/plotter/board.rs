@@ -36,10 +36,10 @@ pub trait Board {
     fn take_opened(&mut self) -> bool {
         false
     }
-    /// Chooses where replies go from now on: if `is_aside`, only to the port that was opened last,
-    /// else to all ports again.
-    fn speak_aside(&mut self, is_aside: bool) {
-        let _ = is_aside;
+    /// Chooses where replies go from now on: if `only_to_opened`, only to the port that was opened
+    /// last, else to all ports again.
+    fn reply_only_to_opened(&mut self, only_to_opened: bool) {
+        let _ = only_to_opened;
     }
     /// Whether the host has asked for the drive since the last call, in another way than by
     /// command.

@@ -3,30 +3,14 @@
 //! For the largest scene that a board must be able to draw, a [`Budget`] adds up what the stages of
 //! a job need. The library does not compile if that exceeds the board's working memory.
 
-use super::memory::{Lm3s6965Memory, Memory, PicoMemory};
+use super::memory::Memory;
+use crate::boards::table::{BOARDS, BoardRow};
 use crate::drawing::{PackedLine, PagePoint, Segment};
 use crate::geometry::Vertex;
+use crate::model::{Corner, Position};
 use crate::order::{self, Leg};
 use crate::stage::Scratch;
 use crate::visibility;
-use core::marker::PhantomData;
-
-/// The largest scene that a board must be able to draw, and the size of the drawing that results
-/// from it.
-#[derive(Debug, Clone, Copy)]
-pub struct Scene {
-    /// Number of vertices of the model.
-    pub vertices: usize,
-    /// Number of corners of all faces together.
-    pub corners: usize,
-    /// Number of faces; each is triangulated as a fan.
-    pub faces: usize,
-    /// Number of lines of the drawing, with hidden lines erased.
-    pub lines: usize,
-    /// Number of odd points (of odd degree) of a drawing for which the exact matching must still
-    /// fit.
-    pub odd_points: usize,
-}
 
 /// The capacities of a board, and the memory in bytes that its largest scene needs.
 #[derive(Debug, Clone, Copy)]
@@ -56,22 +40,17 @@ pub struct Budget {
 }
 
 impl Budget {
-    const fn new<
-        const VERTICES: usize,
-        const CORNERS: usize,
-        const WORDS: usize,
-        const PORTS: usize,
-    >(
-        board: &'static str,
-        _: PhantomData<Memory<VERTICES, CORNERS, WORDS, PORTS>>,
-        scene: Scene,
-    ) -> Self {
+    /// The budget of a board.
+    const fn of(board: &BoardRow) -> Self {
+        let BoardRow { name, memory, scene, .. } = board;
         let budget = Self {
-            board,
-            vertex_limit: VERTICES,
-            corner_limit: CORNERS,
-            model: size_of::<Memory<VERTICES, CORNERS, 0, 0>>(),
-            working: 8 * WORDS,
+            board: *name,
+            vertex_limit: memory.vertices,
+            corner_limit: memory.corners,
+            model: size_of::<Memory<0, 0, 0, 0>>()
+                + size_of::<Position>() * memory.vertices
+                + size_of::<Corner>() * memory.corners,
+            working: 8 * memory.words,
             view: Scratch::bytes_for::<Vertex>(scene.vertices),
             visibility: visibility::least_bytes(scene.vertices, scene.corners, scene.faces),
             lines: Scratch::bytes_for::<PackedLine>(scene.lines),
@@ -81,7 +60,11 @@ impl Budget {
             tour: Scratch::bytes_for::<Leg>(scene.lines),
             matching: order::matching_bytes(scene.odd_points),
         };
-        assert!(scene.vertices <= VERTICES && scene.corners <= CORNERS, "the model is too small");
+        assert!(memory.ports == 1 || memory.ports == 2, "there are one or two ports");
+        assert!(
+            scene.vertices <= memory.vertices && scene.corners <= memory.corners,
+            "the model is too small"
+        );
         let seeing = budget.view + budget.visibility + budget.lines;
         assert!(seeing <= budget.working, "no memory to find hidden lines in");
         let ordering = budget.drawing + budget.tour + budget.matching;
@@ -91,15 +74,12 @@ impl Budget {
 }
 
 /// The budgets of all boards.
-pub const BUDGETS: [Budget; 2] = [
-    Budget::new(
-        "lm3s6965",
-        PhantomData::<Lm3s6965Memory>,
-        Scene { vertices: 1000, corners: 3000, faces: 750, lines: 820, odd_points: 400 },
-    ),
-    Budget::new(
-        "pico",
-        PhantomData::<PicoMemory>,
-        Scene { vertices: 2744, corners: 8232, faces: 2058, lines: 1871, odd_points: 1000 },
-    ),
-];
+pub const BUDGETS: [Budget; BOARDS.len()] = {
+    let mut budgets = [Budget::of(BOARDS[0]); BOARDS.len()];
+    let mut number = 1;
+    while number < BOARDS.len() {
+        budgets[number] = Budget::of(BOARDS[number]);
+        number += 1;
+    }
+    budgets
+};

@@ -1,16 +1,15 @@
-//! The large memory of a plotter. Each board chooses its capacities here and nowhere else.
+//! The large memory of a plotter. The table of the boards has the capacities of each:
+//! [`crate::boards::table`].
 
+use crate::boards::table::BOARDS;
 use crate::model::{Corner, Position};
 use crate::motion::Block;
 use crate::protocol::LineReader;
 
-/// Memory for the moves planned ahead on a board with 64 KiB of RAM, before any is planned; see
-/// [`crate::motion`].
-pub const EMPTY_LOOKAHEAD: [Block; 32] = [Block::EMPTY; 32];
-
-/// The same for 264 KiB of RAM. At 500 mm/s and 15 m/s² the machine stops within 167 chords of
-/// 0.05 mm, so this is enough to keep that speed.
-pub const EMPTY_LOOKAHEAD_OF_PICO: [Block; 192] = [Block::EMPTY; 192];
+/// Memory for the moves planned ahead on the first board of the table, which has the least, before
+/// any is planned; see [`crate::motion`].
+pub const EMPTY_LOOKAHEAD: [Block; BOARDS[0].memory.blocks] =
+    [Block::EMPTY; BOARDS[0].memory.blocks];
 
 /// The large memory of a plotter: the model, the working memory of its jobs, and the line that each
 /// serial port is receiving.
@@ -29,14 +28,6 @@ pub struct Memory<
     words: [u64; WORDS],
     readers: [LineReader; PORTS],
 }
-
-/// The memory for 64 KiB of RAM: enough for a lattice of 125 cubes, and for a stack of 9,840 bytes
-/// besides.
-pub type Lm3s6965Memory = Memory<1000, 3000, 4208>;
-
-/// The memory for 264 KiB of RAM: enough for a lattice of 343 cubes. The board's two ports are the
-/// UART and USB.
-pub type PicoMemory = Memory<4096, 12288, 16384, 2>;
 
 impl<const VERTICES: usize, const CORNERS: usize, const WORDS: usize, const PORTS: usize>
     Memory<VERTICES, CORNERS, WORDS, PORTS>

@@ -23,9 +23,7 @@ mod title;
 
 pub use board::{Board, NotStored, REPLY_BYTES, Record, Stored};
 pub use job::{Cursor, Job, Observer, Strokes, Unobserved};
-pub use memory::{
-    EMPTY_LOOKAHEAD, EMPTY_LOOKAHEAD_OF_PICO, Lm3s6965Memory, Memory, MemorySlices, PicoMemory,
-};
+pub use memory::{EMPTY_LOOKAHEAD, Memory, MemorySlices};
 pub use options::PlotOptions;
 
 use crate::machine::{

@@ -20,7 +20,7 @@ pub(super) fn greet_opened<B: Board>(state: State, board: &mut B) {
     if !board.take_opened() {
         return;
     }
-    board.speak_aside(true);
+    board.reply_only_to_opened(true);
     greet(board);
     if let State::Alarm(alarm) = state {
         if alarm == Alarm::Restarted {
@@ -28,7 +28,7 @@ pub(super) fn greet_opened<B: Board>(state: State, board: &mut B) {
         }
         Reply(board).line(format_args!("ALARM:{}", stream::number(alarm)));
     }
-    board.speak_aside(false);
+    board.reply_only_to_opened(false);
 }
 
 /// Reports the fault that ended the previous run, if there was one.

@@ -6,8 +6,9 @@ use std::process::{Command, Stdio};
 use anyhow::{Context, Result, ensure};
 
 use crate::command::{cargo, describe, run};
-use crate::firmware::{self, Board};
+use crate::firmware;
 use crate::set_up;
+use crate::table::{BOARDS, BoardRow};
 
 /// Seconds for a lattice of 1, 8, 27 … cubes: Griffith's on an ICL 1904S, and Brown's on a
 /// PDP-11/34.
@@ -21,19 +22,19 @@ const PAPERS: [[&str; 2]; 7] = [
     ["161", "did not fit"],
 ];
 
-/// Builds the Pico's image, runs it in its emulator, and prints the cycles of each stage. This
+/// Builds the image of a board, runs it in its emulator, and prints the cycles of each stage. This
 /// takes some 10 minutes.
-pub fn count_cycles() -> Result<()> {
-    run_in_emulators(&[Board::Pico], "pico_cycles")
+pub fn count_cycles(board: &'static BoardRow) -> Result<()> {
+    run_in_emulators(&[board], &format!("{}_cycles", board.name))
 }
 
 /// Builds the images of all boards, and prints the greatest stack depth of each.
 pub fn deepest_stack() -> Result<()> {
-    run_in_emulators(Board::ALL, "deepest_stack")
+    run_in_emulators(&BOARDS, "deepest_stack")
 }
 
 /// Builds the images that `example` runs in emulators, and runs it.
-fn run_in_emulators(boards: &[Board], example: &str) -> Result<()> {
+fn run_in_emulators(boards: &[&'static BoardRow], example: &str) -> Result<()> {
     for &board in boards {
         set_up::emulator(board)?;
         firmware::check(board, &firmware::build(board)?)?;
@@ -60,8 +61,8 @@ pub fn count_motion() -> Result<()> {
 
 /// Builds a benchmark image, runs it in QEMU, and returns its output.
 fn run_image(name: &str) -> Result<String> {
-    let target = Board::Lm3s6965.target();
-    set_up::emulator(Board::Lm3s6965)?;
+    let target = BOARDS[0].target;
+    set_up::emulator(BOARDS[0])?;
     let mut cargo = set_up::toolchain(target)?.cargo("build", target);
     let options = ["--package=penup", "--bin", name, "--profile=firmware", "--no-default-features"];
     // A target directory of its own keeps the benchmark and the firmware from causing rebuilds of

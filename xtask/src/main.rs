@@ -27,6 +27,12 @@ mod uf2;
 // it as a crate.
 #[path = "../../client/src/workspace.rs"]
 mod workspace;
+// So do the names of the boards on command lines.
+#[path = "../../client/src/board.rs"]
+mod board;
+// The table belongs to the library, which is large; the table depends on nothing.
+#[path = "../../src/boards/table.rs"]
+mod table;
 
 use std::io::Write as _;
 use std::path::PathBuf;
@@ -36,7 +42,7 @@ use anyhow::{Context, Result};
 use clap::{CommandFactory, Parser, Subcommand};
 
 use command::{cargo, describe};
-use firmware::Board;
+use table::{BOARDS, BoardRow, Emulator};
 
 /// Builds, tests and runs penup.
 #[derive(Parser)]
@@ -51,14 +57,14 @@ enum Task {
     /// Builds a board's firmware and checks the image.
     Build {
         /// The board to build for.
-        #[arg(long, value_enum, default_value_t)]
-        board: Board,
+        #[arg(long, value_parser = board::parser(), default_value = board::DEFAULT)]
+        board: &'static BoardRow,
     },
     /// Builds a board's firmware and writes it to the board that is connected.
     Flash {
         /// The board to flash.
-        #[arg(long, value_enum, default_value_t = Board::Pico)]
-        board: Board,
+        #[arg(long, value_parser = board::parser(), default_value = flash::default_board())]
+        board: &'static BoardRow,
     },
     /// Plots FILE on the emulated board; the same as `cargo plot`. Its own --help says how.
     #[command(disable_help_flag = true)]
@@ -67,12 +73,12 @@ enum Task {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         arguments: Vec<String>,
     },
-    /// Counts the instructions of each stage on a Cortex-M3, or the cycles on a Pico, for every
+    /// Counts the instructions of each stage on a Cortex-M3, or the cycles on a board, for every
     /// lattice.
     Bench {
-        /// The LM3S6965's core, or the Pico itself.
-        #[arg(long, value_enum, default_value_t)]
-        board: Board,
+        /// A board that QEMU emulates stands for its core; of another one, cycles are counted.
+        #[arg(long, value_parser = board::parser(), default_value = board::DEFAULT)]
+        board: &'static BoardRow,
         /// Those of planning for each step event alone, on the Cortex-M3.
         #[arg(long, conflicts_with = "board")]
         motion: bool,
@@ -129,15 +135,17 @@ fn carry_out() -> Result<()> {
         Some(Task::Build { board }) => {
             let image = firmware::build(board)?;
             say!("{}", firmware::check(board, &image)?)?;
-            if board == Board::Pico {
-                say!("{}", flash::by_hand(&image))?;
+            if let Some(flashing) = board.flashing {
+                say!("{}", flash::by_hand(flashing, &image))?;
             }
         }
         Some(Task::Flash { board }) => flash::flash(board)?,
         Some(Task::Plot { arguments }) => plot(&arguments)?,
         Some(Task::Bench { motion: true, .. }) => bench::count_motion()?,
-        Some(Task::Bench { board: Board::Lm3s6965, .. }) => bench::count()?,
-        Some(Task::Bench { board: Board::Pico, .. }) => bench::count_cycles()?,
+        Some(Task::Bench { board, .. }) => match board.emulator {
+            Emulator::Qemu { .. } => bench::count()?,
+            Emulator::Rp2040js => bench::count_cycles(board)?,
+        },
         Some(Task::Stack) => bench::deepest_stack()?,
         Some(Task::Gallery) => gallery::make()?,
         Some(Task::Experiments) => experiments::repeat()?,
@@ -146,8 +154,8 @@ fn carry_out() -> Result<()> {
         Some(Task::Cuts { count }) => test::power_cuts(count)?,
         Some(Task::Lattice7) => test::lattice7()?,
         Some(Task::SetUp) => {
-            for &board in Board::ALL {
-                set_up::toolchain(board.target())?;
+            for board in BOARDS {
+                set_up::toolchain(board.target)?;
                 set_up::emulator(board)?;
             }
             set_up::checkers()?;
@@ -164,7 +172,7 @@ fn plot(arguments: &[String]) -> Result<()> {
     let at_a_port = arguments.iter().any(|argument| argument.starts_with("--port"));
     let asks_only = arguments.iter().any(|argument| ["-h", "--help"].contains(&&**argument));
     if !at_a_port && !asks_only {
-        let board = Board::from_options(arguments)?;
+        let board = firmware::board_of(arguments)?;
         set_up::emulator(board)?;
         let image = firmware::build(board)?;
         firmware::check(board, &image)?;

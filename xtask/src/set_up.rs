@@ -2,10 +2,9 @@
 //!
 //! | what | found as | installed by |
 //! |---|---|---|
-//! | `core` for the board's target | rustc's target directory | rustup; else Debian's compiler and
-//! the sources of `core` |
-//! | the LM3S6965's emulator | `qemu-system-arm` | apt, or brew |
-//! | the Pico's emulator | `node` and `npm`; rp2040js in the target directory | apt, or brew; npm |
+//! | `core` for the board | rustc's target directory | rustup; else Debian's compiler and sources |
+//! | QEMU | `qemu-system-arm` | apt, or brew |
+//! | rp2040js | `node` and `npm`; rp2040js in the target directory | apt, or brew; npm |
 //! | rustfmt, clippy | `cargo fmt`, `cargo clippy` | rustup |
 
 use std::fs;
@@ -16,7 +15,7 @@ use std::time::Duration;
 use anyhow::{Result, bail, ensure};
 
 use crate::command::{cargo, describe, output, run, run_within};
-use crate::firmware::Board;
+use crate::table::{BoardRow, Emulator};
 
 /// The compiler that builds for a target.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -119,10 +118,10 @@ fn linker_variable(target: &str) -> String {
 }
 
 /// Finds or installs the emulator of `board`.
-pub fn emulator(board: Board) -> Result<()> {
-    match board {
-        Board::Lm3s6965 => qemu(),
-        Board::Pico => rp2040js(),
+pub fn emulator(board: &BoardRow) -> Result<()> {
+    match board.emulator {
+        Emulator::Qemu { .. } => qemu(),
+        Emulator::Rp2040js => rp2040js(),
     }
 }
 

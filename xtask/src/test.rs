@@ -5,19 +5,20 @@ use std::process::Command;
 use anyhow::Result;
 
 use crate::command::{cargo, describe, run};
-use crate::firmware::{self, Board};
+use crate::firmware;
 use crate::set_up::{self, Toolchain};
 use crate::side_by_side;
+use crate::table::{BOARDS, BoardRow, PICO};
 
 /// Installs what is missing, then runs all checks. It stops at the first failure.
 pub fn everything() -> Result<()> {
     set_up::checkers()?;
-    for &board in Board::ALL {
+    for board in BOARDS {
         set_up::emulator(board)?;
     }
 
     step(workspace("fmt").args(["--all", "--check"]))?;
-    for &board in Board::ALL {
+    for board in BOARDS {
         lint_firmware(board)?;
         let image = firmware::build(board)?;
         say!("{}", firmware::check(board, &image)?)?;
@@ -78,8 +79,8 @@ pub fn lattice7() -> Result<()> {
 
 /// Builds the Pico's image, and returns the command of a test that runs it.
 fn on_the_pico(test: &str) -> Result<Command> {
-    set_up::emulator(Board::Pico)?;
-    firmware::check(Board::Pico, &firmware::build(Board::Pico)?)?;
+    set_up::emulator(&PICO)?;
+    firmware::check(&PICO, &firmware::build(&PICO)?)?;
     let mut cargo = workspace("test");
     cargo.args(["--package", "penup-host-tests", "--test", test]).args(EMULATOR);
     Ok(cargo)
@@ -94,21 +95,21 @@ fn workspace(command: &str) -> Command {
 
 /// Lints a board's firmware: with clippy if the board's compiler has it, else by the compiler's own
 /// warnings.
-fn lint_firmware(board: Board) -> Result<()> {
-    let toolchain = set_up::toolchain(board.target())?;
+fn lint_firmware(board: &BoardRow) -> Result<()> {
+    let toolchain = set_up::toolchain(board.target)?;
     match toolchain {
         Toolchain::Rustup => step(
             toolchain
-                .cargo("clippy", board.target())
-                .args(board.cargo_options())
+                .cargo("clippy", board.target)
+                .args(firmware::cargo_options(board))
                 .args(["--", "-Dwarnings"]),
         ),
         Toolchain::Debian => {
-            say!("penup: no clippy for {}: Debian's compiler has none", board.target())?;
+            say!("penup: no clippy for {}: Debian's compiler has none", board.target)?;
             step(
                 toolchain
-                    .cargo("rustc", board.target())
-                    .args(board.cargo_options())
+                    .cargo("rustc", board.target)
+                    .args(firmware::cargo_options(board))
                     .args(["--", "-Dwarnings"]),
             )
         }

@@ -35,6 +35,7 @@ pub use pico::{Pico, PicoByUsb, UartError};
 pub use pins::{Machine, MachineEvent, MachineEventKind, Pin, PinChange};
 pub use stack::Stack;
 
+use crate::table::{self, BoardRow};
 use process::Process;
 use trace::{Trace, TraceError};
 
@@ -111,6 +112,18 @@ impl Options {
     }
 }
 
+/// Boots the firmware of `board` in the emulator that its row names.
+///
+/// # Errors
+/// See [`EmulatorError`].
+pub fn boot(board: &BoardRow) -> Result<Box<dyn EmulatedBoard>, EmulatorError> {
+    let image = image_path(board.name);
+    Ok(match board.emulator {
+        table::Emulator::Qemu { .. } => Box::new(Emulator::start(&image, Options::default())?),
+        table::Emulator::Rp2040js => Box::new(Pico::start(&image)?),
+    })
+}
+
 /// The path of the image that `cargo xtask build --board BOARD` produces.
 pub fn image_path(board: &str) -> PathBuf {
     crate::workspace::root().join("target/firmware").join(format!("{board}.elf"))
@@ -162,6 +175,9 @@ pub struct Emulator {
     /// The number of bytes that `receive` has returned.
     received: u64,
 }
+
+/// The board that QEMU emulates here.
+const BOARD: &BoardRow = &table::LM3S6965;
 
 /// How long QEMU may take to connect after its start, and the trace to catch up with the serial
 /// line.

@@ -3,7 +3,8 @@
 // It is longer than 500 lines, because what it adds to rp2040js shares one list of events in order
 // of time; what stands alone is in the folder pico.
 //
-// Usage: node pico.mjs RP2040JS-DIRECTORY IMAGE.uf2
+// Usage: node pico.mjs RP2040JS-DIRECTORY IMAGE.uf2 LOG-ADDRESS BOARD, where BOARD is the JSON that
+// process.rs makes of the board's row in the table.
 //
 // Standard input and output carry records of 8 bytes: what, a value, and the core cycle (48 bits,
 // little-endian). In: 0 a byte for the serial line (its error bits in the cycle's place), 1 a level
@@ -46,17 +47,18 @@ import { Usb } from './pico/usb_host.mjs';
 import { settled, wear } from './pico/worn_flash.mjs';
 import { XipCache } from './pico/xip_cache.mjs';
 
-const [directory, imagePath, logAddress] = process.argv.slice(-3);
+const [directory, imagePath, logAddress, boardText] = process.argv.slice(-4);
+const board = JSON.parse(boardText);
 const { RP2040 } = await import(pathToFileURL(`${directory}/dist/esm/index.js`));
 
-const NANOS = 8;
+const NANOS = 1e9 / board.clockHertz;
 const SLICE = 400_000;
-const MILLISECOND = 125_000;
-const HUNDREDTH = 1_250_000;
-const FLASH = 0x10000000;
-const VECTORS = 0x10000100;
+const MILLISECOND = board.clockHertz / 1000;
+const HUNDREDTH = 10 * MILLISECOND;
+const FLASH = board.flash;
+const VECTORS = board.vectors;
 /** The stack lies at its start. */
-const RAM = 0x20000000;
+const RAM = board.ram;
 /** What an unused byte of the stack holds. */
 const PAINT = 0xa5;
 
@@ -366,10 +368,8 @@ const INPUT = 2;
 const inputs = new Map();
 
 /** The pins of the limit switches and of the emergency stop. */
-const CONTACTS = [8, 9, 10];
-const STEP_X = 2;
-const DIR_X = 4;
-const BOUNCE = 5 * 125_000;
+const CONTACTS = board.contacts;
+const BOUNCE = 5 * MILLISECOND;
 const TURNS = 16;
 /** Where the axes have gone to, in steps. */
 const places = [0, 0];
@@ -380,7 +380,7 @@ const bounces = [];
 
 function moveAxis(axis, level) {
   if (!level) return;
-  places[axis] += chip.gpio[DIR_X + axis].value === 1 ? 1 : -1;
+  places[axis] += chip.gpio[board.directions[axis]].value === 1 ? 1 : -1;
   lookAtSwitch(axis);
   if (stalls.length && axis === 0 && places[0] === stalls[0].place) {
       stall(stalls.shift().hundredths);
@@ -422,7 +422,8 @@ function watchPins() {
     pin.addListener((level) => {
       if (level >= INPUT || level === last) return;
       last = level;
-      if (number === STEP_X || number === STEP_X + 1) moveAxis(number - STEP_X, level);
+      const axis = board.steps.indexOf(number);
+      if (axis >= 0) moveAxis(axis, level);
       report(PIN, number | (level << 7), now());
     });
     setLevel(number);
@@ -522,7 +523,7 @@ process.stdin.on('data', (data) => {
     else if (rest[at] === ERASE_TIME) sectorMicroseconds = entry.cycle;
     else if (rest[at] === TIMED) timed.set(entry.cycle, entry.value);
     else if (rest[at] === SWITCH) {
-      const axis = entry.value - 8;
+      const axis = CONTACTS.indexOf(entry.value);
       switches[axis] = { pin: entry.value, at: entry.cycle - SWITCH_ZERO, closed: false };
       lookAtSwitch(axis);
     } else if (rest[at] === USB) usb.send(entry.value);

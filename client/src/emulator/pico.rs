@@ -17,6 +17,7 @@ use record::{
 use super::running::{Running, Shared};
 use super::stack::{self, Stack};
 use super::{EmulatedBoard, EmulatorError, PinChange, log};
+use crate::table::{self, BoardRow};
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
 use std::path::Path;
@@ -25,6 +26,8 @@ use std::sync::{Arc, mpsc};
 use std::time::Duration;
 use std::{fmt, fs, thread};
 
+/// The board that rp2040js emulates here.
+const BOARD: &BoardRow = &table::PICO;
 /// The number of level changes of a bouncing contact.
 const BOUNCES: u64 = 16;
 /// The number of cycles by which the emulator's clock may be ahead of the last record received: 20

@@ -1,6 +1,7 @@
 //! The output pins of a board, and how their changes translate into actions of the machine.
 
 use penup::boards::host::{Change, Stamped};
+use penup::boards::table::Pins;
 use std::time::Duration;
 
 /// An output pin of the plotter.
@@ -25,19 +26,19 @@ pub enum Pin {
 }
 
 impl Pin {
-    /// Returns the pin with this number on the GPIO port of the LM3S6965.
-    pub(super) fn of_port(number: u32) -> Option<Self> {
-        Some(match number {
-            0 => Self::StepX,
-            1 => Self::DirX,
-            2 => Self::StepY,
-            3 => Self::DirY,
-            4 => Self::Enable,
-            5 => Self::Pen,
-            6 => Self::StepZ,
-            7 => Self::DirZ,
-            _ => return None,
-        })
+    /// Returns the output pin with this number on a board with these pins.
+    pub(super) fn numbered(number: u8, pins: &Pins) -> Option<Self> {
+        let outputs = [
+            (pins.step_x, Self::StepX),
+            (pins.dir_x, Self::DirX),
+            (pins.step_y, Self::StepY),
+            (pins.dir_y, Self::DirY),
+            (pins.enable, Self::Enable),
+            (pins.pen, Self::Pen),
+            (pins.step_z, Self::StepZ),
+            (pins.dir_z, Self::DirZ),
+        ];
+        outputs.into_iter().find_map(|(of, pin)| (of == number).then_some(pin))
     }
 }
 

@@ -8,11 +8,13 @@ use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
 use std::{fs, thread};
 
+use super::BOARD;
 use super::debugger::Debugger;
 use super::running::{Running, Shared, quitting_with_parent};
 use super::stack::{self, Stack};
 use super::trace::{EVENTS, Trace, TraceError};
 use super::{EmulatorError, Options, log};
+use crate::table;
 
 /// A running QEMU, which ends when this is dropped.
 pub struct Process {
@@ -149,6 +151,10 @@ impl Process {
 }
 
 const PROGRAM: &str = "qemu-system-arm";
+const MACHINE: &str = match BOARD.emulator {
+    table::Emulator::Qemu { machine } => machine,
+    table::Emulator::Rp2040js => panic!("this is no machine of QEMU"),
+};
 
 fn not_installed(source: io::Error) -> EmulatorError {
     EmulatorError::NotInstalled { program: PROGRAM, source }
@@ -159,7 +165,7 @@ fn not_installed(source: io::Error) -> EmulatorError {
 fn command(image: &Path, options: Options, port: u16) -> Command {
     let mut command = quitting_with_parent(PROGRAM);
     command
-        .args(["-machine", "lm3s6965evb", "-display", "none", "-monitor", "none"])
+        .args(["-machine", MACHINE, "-display", "none", "-monitor", "none"])
         .arg("-icount")
         .arg(format!("shift={},sleep=off", options.instruction_shift))
         .arg("-chardev")

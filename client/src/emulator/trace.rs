@@ -19,6 +19,7 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
+use super::BOARD;
 use super::pins::{Pin, PinChange};
 
 /// The trace events that QEMU is asked for.
@@ -26,7 +27,7 @@ pub const EVENTS: [&str; 5] =
     ["pl061_set_output", "systick_read", "systick_write", "systick_timer_tick", "pl011_write"];
 
 const CLOCK_BITS: u32 = 24;
-const CYCLE: Duration = Duration::from_nanos(20);
+const CYCLE: Duration = Duration::from_nanos(1_000_000_000 / BOARD.clock_hertz as u64);
 /// The address of SysTick's current value register.
 const CURRENT: u32 = 0x8;
 /// The address of the UART's data register.
@@ -86,7 +87,7 @@ impl Trace {
         }
         let number = words.nth(2)?.parse().ok()?;
         let high = words.nth(1)? == "1";
-        let pin = Pin::of_port(number)?;
+        let pin = Pin::numbered(number, &BOARD.pins)?;
         let at = self.clock();
         self.pins.push(PinChange { pin, high, at });
         Some(())

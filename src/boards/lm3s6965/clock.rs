@@ -15,7 +15,7 @@ use super::critical;
 use super::registers::SYSTEM_CONTROL;
 
 /// The clock frequency in cycles per second.
-pub const HERTZ: u32 = 50_000_000;
+pub const HERTZ: u32 = super::ROW.clock_hertz;
 
 /// The mask of a SysTick count. SysTick counts one cycle more than this number and then restarts.
 pub const CYCLE_MASK: u32 = 0x00FF_FFFF;

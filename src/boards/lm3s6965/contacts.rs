@@ -8,7 +8,7 @@ use lm3s6965::{Interrupt, interrupt};
 use penup::machine::Contacts;
 
 use super::registers::{GPIO_C, SYSTEM_CONTROL};
-use super::{HAPPENED, critical};
+use super::{HAPPENED, ROW, critical};
 
 mod offset {
     pub const BOTH_EDGES: usize = 0x408;
@@ -20,9 +20,9 @@ mod offset {
     pub const GPIO_CLOCKS: usize = 0x108;
 }
 const PORT_C_CLOCK: u32 = 1 << 2;
-const LIMIT_X: u32 = 1 << 4;
-const LIMIT_Y: u32 = 1 << 5;
-const STOP: u32 = 1 << 6;
+const LIMIT_X: u32 = 1 << ROW.pins.limit_x;
+const LIMIT_Y: u32 = 1 << ROW.pins.limit_y;
+const STOP: u32 = 1 << ROW.pins.stop;
 const ALL: u32 = LIMIT_X | LIMIT_Y | STOP;
 
 /// Makes the pins inputs with pull-down resistors.

@@ -29,7 +29,11 @@ mod callers;
 mod clock;
 mod contacts;
 mod critical;
+#[path = "../divide.rs"]
+mod divide;
 mod emergency;
+#[path = "../memory.rs"]
+mod memory;
 mod pins;
 mod registers;
 mod serial;
@@ -39,15 +43,27 @@ use core::sync::atomic::{AtomicBool, Ordering};
 
 use cortex_m::interrupt;
 use cortex_m::peripheral::Peripherals;
+use penup::boards::table::{self, BoardRow};
 use penup::machine::{Contacts, PulserState};
 use penup::motion::{Block, EventQueue};
-use penup::plotter::{Board, EMPTY_LOOKAHEAD, Lm3s6965Memory, MemorySlices};
+use penup::plotter::{Board, Memory, MemorySlices};
 use penup::protocol::RealTime;
 use static_cell::{ConstStaticCell, StaticCell};
 
 /// Whether an interrupt has come since [`Board::wait`] last returned. It replaces the Cortex-M
 /// event register in software, because QEMU's `wfe` does not sleep.
 static HAPPENED: AtomicBool = AtomicBool::new(false);
+
+/// The board's row in the table.
+const ROW: &BoardRow = &table::LM3S6965;
+
+/// The board's memory.
+type BoardMemory = Memory<
+    { ROW.memory.vertices },
+    { ROW.memory.corners },
+    { ROW.memory.words },
+    { ROW.memory.ports },
+>;
 
 /// The board, as the plotter sees it.
 pub struct Lm3s6965 {
@@ -63,7 +79,7 @@ pub struct Lm3s6965 {
 /// When the board was taken before.
 pub fn take() -> (Lm3s6965, MemorySlices<'static>, &'static PulserState) {
     let Some(mut core) = Peripherals::take() else {
-        #[allow(clippy::panic)] // A programming error, found at the first start.
+        #[allow(clippy::panic, reason = "a programming error, found at the first start")]
         {
             panic!("the board was taken twice")
         }
@@ -74,14 +90,14 @@ pub fn take() -> (Lm3s6965, MemorySlices<'static>, &'static PulserState) {
     let serial = serial::set_up(&mut core.NVIC);
     let steps = steps::set_up(pins, &mut core.NVIC);
     defmt::info!("lm3s6965 at {=u32} Hz", clock::HERTZ);
-    static MEMORY: ConstStaticCell<Lm3s6965Memory> = ConstStaticCell::new(Lm3s6965Memory::new());
-    static BLOCKS: StaticCell<[Block; EMPTY_LOOKAHEAD.len()]> = StaticCell::new();
-    let memory = MEMORY.take().lend(BLOCKS.init(EMPTY_LOOKAHEAD));
+    static MEMORY: ConstStaticCell<BoardMemory> = ConstStaticCell::new(BoardMemory::new());
+    static BLOCKS: StaticCell<[Block; ROW.memory.blocks]> = StaticCell::new();
+    let memory = MEMORY.take().lend(BLOCKS.init([Block::EMPTY; ROW.memory.blocks]));
     (Lm3s6965 { clock, serial, steps }, memory, &steps::STATE)
 }
 
 impl Board for Lm3s6965 {
-    const NAME: &'static str = "lm3s6965";
+    const NAME: &'static str = ROW.name;
 
     fn read_byte(&mut self) -> Option<(usize, u8)> {
         self.serial.read_byte().map(|byte| (0, byte))

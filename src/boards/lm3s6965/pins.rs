@@ -3,6 +3,7 @@
 use core::convert::Infallible;
 
 use embedded_hal::digital::{ErrorType, OutputPin};
+use penup::boards::table::Pins;
 use penup::machine::{Axes, PinOrder};
 
 use super::registers::{GPIO_B, SYSTEM_CONTROL};
@@ -17,8 +18,6 @@ mod offset {
     pub const GPIO_CLOCKS: usize = 0x108;
 }
 const PORT_B_CLOCK: u32 = 1 << 1;
-/// PB0 to PB7.
-const ALL: u32 = 0xFF;
 /// The key that unlocks the register that lets PB7 be used for something else than JTAG's reset.
 const UNLOCK: u32 = 0x1ACC_E551;
 
@@ -26,7 +25,7 @@ const UNLOCK: u32 = 0x1ACC_E551;
 pub struct Pin<const NUMBER: u8>(());
 
 /// The pin of the pen.
-pub type PenPin = Pin<5>;
+pub type PenPin = Pin<{ PINS.pen }>;
 
 /// The pins of the axes.
 pub struct AxisPins(());
@@ -39,17 +38,22 @@ pub struct MotorPins {
     pub pen: PenPin,
 }
 
-/// PB0 to PB4.
-const AXES: u32 = 0x1F;
-const STEP_X: u32 = 1;
-const STEP_Y: u32 = 1 << 2;
-const STEP_Z: u32 = 1 << 6;
-const DIRECTION_Z: u32 = 1 << 7;
+const PINS: Pins = super::ROW.pins;
+const STEP_X: u32 = 1 << PINS.step_x;
+const STEP_Y: u32 = 1 << PINS.step_y;
+const ENABLE: u32 = 1 << PINS.enable;
+const AXES: u32 = STEP_X | STEP_Y | 1 << PINS.dir_x | 1 << PINS.dir_y | ENABLE;
+const STEP_Z: u32 = 1 << PINS.step_z;
+const DIRECTION_Z: u32 = 1 << PINS.dir_z;
+const ALL: u32 = AXES | STEP_Z | DIRECTION_Z | 1 << PINS.pen;
 
 impl Axes for AxisPins {
     /// The bits STEP_X, STEP_Y, DIR_X, DIR_Y and ENABLE of an event. A high direction pin counts
     /// up, and a low enable pin switches the drivers on.
-    const ORDER: &'static PinOrder = &PinOrder::new([0, 2, 1, 3, 4], 0b11010);
+    const ORDER: &'static PinOrder = &PinOrder::new(
+        [PINS.step_x, PINS.step_y, PINS.dir_x, PINS.dir_y, PINS.enable],
+        (AXES & !STEP_X & !STEP_Y) as u8,
+    );
 
     #[inline(always)]
     fn set(&mut self, levels: u32) {
@@ -95,7 +99,7 @@ fn write(mask: u32, levels: u32) {
 /// Switches the drivers off, raises the pen and sets the step pins low. It is safe at any time,
 /// including in a fault.
 pub fn release() {
-    write(ALL, 1 << 4);
+    write(ALL, ENABLE);
 }
 
 /// Makes the pins outputs, with the levels of [`release`].

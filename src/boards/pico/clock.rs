@@ -3,25 +3,20 @@
 use cortex_m::peripheral::NVIC;
 use rp2040_hal::pac::{Interrupt, interrupt};
 
-use super::registers::TIMER;
+use super::registers::{Get, Put, TIMER};
 use super::{contacts, critical, serial};
 
 /// The clock frequency in cycles per second.
-pub const HERTZ: u32 = 125_000_000;
+pub const HERTZ: u32 = super::ROW.clock_hertz;
 
-mod offset {
-    pub const ALARM_0: usize = 0x10;
-    pub const TIME_LOW: usize = 0x28;
-    pub const INTERRUPT: usize = 0x34;
-    pub const INTERRUPT_ENABLE: usize = 0x38;
-}
+/// The bit of the alarm in the registers of the interrupts.
 const ALARM_0: u32 = 1;
 const MILLISECOND: u32 = 1000;
 
 /// Starts the millisecond interrupt. From now on it wakes the main loop, which keeps the queue of
 /// steps full.
 pub fn start(nvic: &mut NVIC) {
-    TIMER.write(offset::INTERRUPT_ENABLE, ALARM_0);
+    TIMER.inte().put(ALARM_0);
     critical::enable(nvic, Interrupt::TIMER_IRQ_0, critical::CLOCK_PRIORITY);
     schedule();
 }
@@ -35,7 +30,7 @@ pub fn start(nvic: &mut NVIC) {
 fn schedule() {
     loop {
         let target = microseconds().wrapping_add(MILLISECOND);
-        TIMER.write(offset::ALARM_0, target);
+        TIMER.alarm0().put(target);
         let left = target.wrapping_sub(microseconds());
         if (1..=MILLISECOND).contains(&left) {
             return;
@@ -45,14 +40,14 @@ fn schedule() {
 
 /// The microseconds since the start; the count wraps.
 pub fn microseconds() -> u32 {
-    TIMER.read(offset::TIME_LOW)
+    TIMER.timerawl().get()
 }
 
 #[interrupt]
 fn TIMER_IRQ_0() {
-    TIMER.write(offset::INTERRUPT, ALARM_0);
-    contacts::look();
-    serial::look_soon();
+    TIMER.intr().put(ALARM_0);
+    contacts::sample();
+    serial::request_read();
     schedule();
 }
 

@@ -13,37 +13,37 @@ use core::sync::atomic::{AtomicU8, Ordering};
 
 use penup::machine::Contacts;
 
-use super::clock;
-use super::registers::SIO;
+use super::registers::{Get, SIO};
+use super::{ROW, clock};
 use crate::boards::handler::Owned;
 
 const BOUNCE_MILLISECONDS: u8 = 10;
 /// The pin of the limit switch of x. Those of y and of the emergency stop follow.
-const FIRST_PIN: u32 = 8;
+const FIRST_PIN: u8 = ROW.pins.limit_x;
+const _: () = assert!(ROW.pins.limit_y == FIRST_PIN + 1 && ROW.pins.stop == FIRST_PIN + 2);
 const COUNT: usize = 3;
 const ALL: u8 = (1 << COUNT) - 1;
-const LEVELS: usize = 0x004;
 
 /// The time from switching the pull-ups on to the first sample, in microseconds.
 const SETTLE_MICROSECONDS: u32 = 50_000;
-const LOOK_MICROSECONDS: u32 = 1000;
+const SAMPLE_MICROSECONDS: u32 = 1000;
 
 /// One bit for each contact that counts as closed.
 static CLOSED: AtomicU8 = AtomicU8::new(0);
-static LOOKS: Owned<Looks> = Owned::empty();
+static SAMPLES: Owned<Samples> = Owned::empty();
 
 /// The samples that the clock's handler remembers.
-struct Looks {
+struct Samples {
     /// One bit for each contact that was closed in the last two samples.
     last: [u8; 2],
     /// The number of samples for which each contact may still bounce.
     bounces: [u8; COUNT],
 }
 
-impl Looks {
+impl Samples {
     /// Takes a sample. Returns the contacts that at least two of the last three samples have shown
     /// closed.
-    fn look(&mut self) -> u8 {
+    fn sample(&mut self) -> u8 {
         let ([last, before], now) = (self.last, closed_now());
         self.last = [now, last];
         now & last | now & before | last & before
@@ -52,7 +52,7 @@ impl Looks {
 
 fn closed_now() -> u8 {
     // Open inputs are pulled up, so they read high.
-    !(SIO.read(LEVELS) >> FIRST_PIN) as u8 & ALL
+    !(SIO.gpio_in().get() >> FIRST_PIN) as u8 & ALL
 }
 
 fn wait(time: u32) {
@@ -64,23 +64,23 @@ fn wait(time: u32) {
 /// pull-ups to have been switched on just now.
 pub fn set_up() {
     wait(SETTLE_MICROSECONDS);
-    let mut looks = Looks { last: [0; 2], bounces: [0; COUNT] };
+    let mut samples = Samples { last: [0; 2], bounces: [0; COUNT] };
     for _ in 0..3 {
-        wait(LOOK_MICROSECONDS);
-        CLOSED.store(looks.look(), Ordering::Relaxed);
+        wait(SAMPLE_MICROSECONDS);
+        CLOSED.store(samples.sample(), Ordering::Relaxed);
     }
     // SAFETY: the clock's interrupt is still masked.
-    unsafe { LOOKS.fill(looks) };
+    unsafe { SAMPLES.fill(samples) };
 }
 
 /// Samples the contacts. The clock's interrupt calls it every millisecond.
-pub fn look() {
+pub fn sample() {
     // SAFETY: the clock's handler owns it, and is the only caller.
-    let Some(looks) = (unsafe { LOOKS.get() }) else { return };
+    let Some(samples) = (unsafe { SAMPLES.get() }) else { return };
     let before = CLOSED.load(Ordering::Relaxed);
-    let changed = looks.look() ^ before;
+    let changed = samples.sample() ^ before;
     let mut closed = before;
-    for (number, left) in (0..).zip(&mut looks.bounces) {
+    for (number, left) in (0..).zip(&mut samples.bounces) {
         if *left > 0 {
             *left -= 1;
         } else if changed & 1 << number != 0 {

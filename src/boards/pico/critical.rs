@@ -17,7 +17,7 @@ use core::sync::atomic::{AtomicU32, Ordering, fence};
 use cortex_m::peripheral::NVIC;
 use rp2040_hal::pac::Interrupt;
 
-use super::registers::SYSTEM;
+use super::registers::{Get, PPB, Put};
 
 /// The chip distinguishes four priorities by the upper two bits.
 const fn priority(number: u8) -> u8 {
@@ -32,11 +32,6 @@ pub const PEN_PRIORITY: u8 = priority(1);
 pub const SERIAL_PRIORITY: u8 = priority(2);
 /// The priority of the millisecond interrupt.
 pub const CLOCK_PRIORITY: u8 = priority(3);
-
-/// The registers of the interrupt masks. The first shows the enabled interrupts, and a write to it
-/// enables more. A write to the second disables interrupts.
-const ENABLED: usize = 0x100;
-const MASK: usize = 0x180;
 
 /// Sets the priority of an interrupt and unmasks it, during set-up.
 pub fn enable(nvic: &mut NVIC, interrupt: Interrupt, priority: u8) {
@@ -79,7 +74,6 @@ static IN_RAM: Vectors = Vectors([const { AtomicU32::new(0) }; VECTORS]);
 /// Makes the core read the vectors from RAM. It is called during set-up, before any interrupt is
 /// unmasked.
 pub fn move_vectors_to_ram() {
-    const VECTOR_TABLE: usize = 0xD08;
     unsafe extern "C" {
         static __vector_table: [u32; VECTORS];
     }
@@ -91,7 +85,7 @@ pub fn move_vectors_to_ram() {
     }
     // The vectors must be in RAM before the core may read them.
     fence(Ordering::SeqCst);
-    SYSTEM.write(VECTOR_TABLE, IN_RAM.0.as_ptr() as u32);
+    PPB.vtor().put(IN_RAM.0.as_ptr() as u32);
     cortex_m::asm::dsb();
 }
 
@@ -110,8 +104,8 @@ critical_section::set_impl!(MaskAllButSteps);
 unsafe impl critical_section::Impl for MaskAllButSteps {
     unsafe fn acquire() -> critical_section::RawRestoreState {
         // A handler that runs in between leaves the set as it was.
-        let set = SYSTEM.read(ENABLED) & OTHERS;
-        SYSTEM.write(MASK, OTHERS);
+        let set = PPB.nvic_iser().get() & OTHERS;
+        PPB.nvic_icer().put(OTHERS);
         cortex_m::asm::dsb();
         cortex_m::asm::isb();
         if set != 0 {
@@ -124,7 +118,7 @@ unsafe impl critical_section::Impl for MaskAllButSteps {
         if outermost != 0 {
             // The work of the section must be finished before a handler runs.
             core::sync::atomic::compiler_fence(Ordering::SeqCst);
-            SYSTEM.write(ENABLED, MASKED.load(Ordering::Relaxed));
+            PPB.nvic_iser().put(MASKED.load(Ordering::Relaxed));
         }
     }
 }

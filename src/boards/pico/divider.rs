@@ -7,13 +7,7 @@
 //! 64 bits are divided by 32 in two digits of 16 bits (Knuth's algorithm D). This takes 120 cycles,
 //! where the compiler's own routine takes 390. Greater divisors are left to that routine.
 
-use super::registers::SIO;
-
-/// The registers of the divider.
-const DIVIDEND: usize = 0x60;
-const DIVISOR: usize = 0x64;
-const QUOTIENT: usize = 0x70;
-const REMAINDER: usize = 0x74;
+use super::registers::{Get, Put, SIO};
 
 /// Runs the work of a handler and then restores the divider. The handler may have interrupted a
 /// division of the main loop, and it may divide itself.
@@ -22,14 +16,14 @@ const REMAINDER: usize = 0x74;
 #[inline(never)] // `cargo xtask build` recognises it by its name.
 pub fn keep_during(work: impl FnOnce()) {
     // A division takes 8 cycles, and entering a handler takes 15, so the division is finished.
-    let operands = (SIO.read(DIVIDEND), SIO.read(DIVISOR));
-    let results = (SIO.read(REMAINDER), SIO.read(QUOTIENT));
+    let operands = (SIO.div_udividend().get(), SIO.div_udivisor().get());
+    let results = (SIO.div_remainder().get(), SIO.div_quotient().get());
     work();
     // Writing an operand starts a division, and writing a result ends it.
-    SIO.write(DIVIDEND, operands.0);
-    SIO.write(DIVISOR, operands.1);
-    SIO.write(REMAINDER, results.0);
-    SIO.write(QUOTIENT, results.1);
+    SIO.div_udividend().put(operands.0);
+    SIO.div_udivisor().put(operands.1);
+    SIO.div_remainder().put(results.0);
+    SIO.div_quotient().put(results.1);
 }
 
 core::arch::global_asm!(

@@ -16,25 +16,22 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 use rp2040_hal::rom_data;
 
-use super::registers::{PSM, UART0, WATCHDOG};
-use super::{clock, pen, steps};
+use super::registers::{Get, PSM, Put, UART0, WATCHDOG};
+use super::{Pico, clock, pen, steps};
 use crate::boards::fault::{self, Fault};
+use crate::boards::pl011::Uart;
 
-mod watchdog {
-    pub const CONTROL: usize = 0x0;
-    pub const LOAD: usize = 0x4;
-    pub const REASON: usize = 0x8;
-    /// The register that keeps its word through a restart by the watchdog; any other reset clears
-    /// it. The boot ROM writes 0 to it when it starts an image that was copied onto its drive, and
-    /// another word when it is to begin elsewhere.
-    pub const SCRATCH_4: usize = 0x1C;
-    pub const TRIGGER: u32 = 1 << 31;
-    pub const TIMED_OUT: u32 = 1;
-    /// The register that selects what a restart by the watchdog resets: everything but the two
-    /// oscillators.
-    pub const PSM_CHOICE: usize = 0x8;
-    pub const ALL_BUT_OSCILLATORS: u32 = 0x1_FFFC;
-}
+// The scratch register 4 keeps its word through a restart by the watchdog; any other reset clears
+// it. The boot ROM writes 0 to it when it starts an image that was copied onto its drive, and
+// another word when it is to begin elsewhere.
+
+/// The bit of the watchdog's control register that restarts the chip.
+const TRIGGER: u32 = 1 << 31;
+/// The bit of the reason register for a watchdog that was not fed.
+const TIMED_OUT: u32 = 1;
+/// What a restart by the watchdog resets: everything but the two oscillators.
+const ALL_BUT_OSCILLATORS: u32 = 0x1_FFFC;
+
 /// The word in the scratch register while this program's watchdog runs. It is the SDK's own word
 /// for this, so that its tools show the reason too.
 const OURS: u32 = 0x6AB7_3121;
@@ -42,7 +39,7 @@ const OURS: u32 = 0x6AB7_3121;
 const FAULT: u32 = 0x6661_756C;
 /// The timeout of the watchdog. It is longer than the longest event, 0.67 s, and than erasing a
 /// sector. The chip counts two per microsecond.
-const PATIENCE: u32 = 2 * 3_000_000;
+const WATCHDOG_TIMEOUT: u32 = 2 * 3_000_000;
 
 /// The number of consecutive faults, each soon after the start, after which the plotter is not run
 /// again.
@@ -50,7 +47,7 @@ const FAULTS: u8 = 3;
 /// The number of consecutive faults after which the board is not restarted at all.
 const LAST_FAULT: u8 = 2 * FAULTS;
 /// The time in microseconds after which a program counts as started.
-const SOON: u32 = 5_000_000;
+const START_TIME: u32 = 5_000_000;
 
 /// The greatest length of a message in bytes; a longer one is cut.
 const TEXT_BYTES: usize = 192;
@@ -136,21 +133,21 @@ impl Stored {
 
 /// Returns why the board started. It is called once, before the watchdog is started.
 pub fn start() -> Start {
-    let (reason, word) = (WATCHDOG.read(watchdog::REASON), WATCHDOG.read(watchdog::SCRATCH_4));
+    let (reason, word) = (WATCHDOG.reason().get(), WATCHDOG.scratch4().get());
     let kept = Stored::load();
     let (faults, cause) = match word {
         FAULT if reason != 0 => match kept {
             Some(kept) => (kept.faults, kept.cause()),
             None => (1, text("a fault whose message is lost")),
         },
-        OURS if reason & watchdog::TIMED_OUT != 0 => {
+        OURS if reason & TIMED_OUT != 0 => {
             let faults = kept.map_or(0, |kept| kept.faults).saturating_add(1);
             (faults, text("the program hung, and the watchdog ended it"))
         }
         _ => (0, Cause::new()),
     };
     Stored::new(faults, "").store();
-    WATCHDOG.write(watchdog::SCRATCH_4, OURS);
+    WATCHDOG.scratch4().put(OURS);
     match faults {
         0 => Start::Fresh,
         1..FAULTS => Start::AfterFault(cause),
@@ -164,11 +161,11 @@ fn text(text: &str) -> Cause {
     cause
 }
 
-/// Records that the program runs, `microseconds` after its start. Faults after [`SOON`] do not
-/// count as faults at the start.
+/// Records that the program runs, `microseconds` after its start. Faults after [`START_TIME`] do
+/// not count as faults at the start.
 pub fn note_running(microseconds: u32) {
     static HAS_STARTED: AtomicBool = AtomicBool::new(false);
-    if microseconds > SOON && !HAS_STARTED.load(Ordering::Relaxed) {
+    if microseconds > START_TIME && !HAS_STARTED.load(Ordering::Relaxed) {
         HAS_STARTED.store(true, Ordering::Relaxed);
         Stored::new(0, "").store();
     }
@@ -176,31 +173,23 @@ pub fn note_running(microseconds: u32) {
 
 /// Feeds the watchdog.
 pub fn feed() {
-    WATCHDOG.write(watchdog::LOAD, PATIENCE);
-}
-
-/// Disables interrupts and steps, raises the pen and switches the drivers off.
-pub fn make_safe() {
-    cortex_m::interrupt::disable();
-    UART0.receive_by_dma(false);
-    steps::release();
-    pen::set_height(0);
+    WATCHDOG.load().put(WATCHDOG_TIMEOUT);
 }
 
 /// Restarts the board by the watchdog. A reset request of the core would leave its peripherals as
 /// they are.
 fn restart(word: u32) -> ! {
-    WATCHDOG.write(watchdog::SCRATCH_4, word);
-    PSM.write(watchdog::PSM_CHOICE, watchdog::ALL_BUT_OSCILLATORS);
+    WATCHDOG.scratch4().put(word);
+    PSM.wdsel().put(ALL_BUT_OSCILLATORS);
     loop {
-        WATCHDOG.write(watchdog::CONTROL, watchdog::TRIGGER);
+        WATCHDOG.ctrl().put(TRIGGER);
         cortex_m::asm::nop();
     }
 }
 
 /// Restarts the board because the user has asked for it. Nothing is reported then.
 pub fn restart_fresh() -> ! {
-    make_safe();
+    fault::make_safe();
     restart(0)
 }
 
@@ -210,7 +199,7 @@ pub fn show_drive() -> ! {
     /// The time in which the servo raises the pen, in microseconds. Afterwards nothing controls the
     /// servo.
     const RAISING: u32 = 400_000;
-    make_safe();
+    fault::make_safe();
     feed();
     let began = clock::microseconds();
     while clock::microseconds().wrapping_sub(began) < RAISING {}
@@ -219,11 +208,17 @@ pub fn show_drive() -> ! {
     rom_data::reset_to_usb_boot(0, 0)
 }
 
-struct Pico;
-
 impl Fault for Pico {
-    fn make_safe() {
-        make_safe();
+    const UART: Uart = UART0;
+
+    fn release() {
+        UART0.receive_by_dma(false);
+        steps::release();
+        pen::set_height(0);
+    }
+
+    fn cause(info: &PanicInfo, _: usize) -> impl fmt::Display {
+        info
     }
 
     /// Keeps the cause and restarts the board, unless the program faults before it can even report.
@@ -235,19 +230,11 @@ impl Fault for Pico {
             Stored::new(faults, &line.0).store();
             restart(FAULT)
         }
-        fault::say::<Self>(cause);
-    }
-
-    fn write(bytes: &[u8]) {
-        UART0.write(bytes);
+        fault::say(cause);
     }
 
     fn begin_to_wait() {
-        WATCHDOG.write(watchdog::CONTROL, 0);
-    }
-
-    fn poll() -> Option<u8> {
-        UART0.poll().map(|data| data as u8)
+        WATCHDOG.ctrl().put(0);
     }
 
     fn reset() -> ! {
@@ -267,44 +254,4 @@ impl Write for OneLine {
         }
         Ok(())
     }
-}
-
-#[panic_handler]
-fn panic(info: &PanicInfo) -> ! {
-    fault::panic::<Pico>(info)
-}
-
-unsafe extern "C" {
-    static _stack_start: u32;
-    static _stack_end: u32;
-}
-
-/// Calls [`report_fault`] with the address of the fault and a fresh stack. The fault may be a stack
-/// overflow, and then nothing can be pushed onto the old stack.
-///
-/// # Safety
-/// Called by the core alone, on a fault.
-#[unsafe(naked)]
-#[unsafe(no_mangle)]
-unsafe extern "C" fn HardFault() -> ! {
-    core::arch::naked_asm!(
-        "mrs r1, msp",
-        "ldr r2, ={end}",
-        "movs r0, #0",
-        "mvns r0, r0", // fault::STACK_USED_UP
-        "cmp r1, r2",
-        "blo 1f",
-        "ldr r0, [r1, #24]", // the program counter that the core has stored there
-        "1: ldr r1, ={start}",
-        "msr msp, r1",
-        "ldr r1, ={report_fault}",
-        "bx r1",
-        end = sym _stack_end,
-        start = sym _stack_start,
-        report_fault = sym report_fault,
-    )
-}
-
-extern "C" fn report_fault(address: u32) -> ! {
-    fault::hard_fault::<Pico>(address)
 }

@@ -20,14 +20,14 @@ use penup::plotter::Record;
 use penup::storage::{PAGE_BYTES, Slots};
 use rp2040_hal::rom_data;
 
-use super::{BOOT_2, critical, emergency};
-use crate::boards::peripheral::Peripheral;
+use super::registers::{Get, IO_QSPI, Put, SSI};
+use super::{BOOT_2, ROW, critical, emergency};
 
 /// The address at which the flash is read.
-const MAPPED_AT: usize = 0x1000_0000;
+const MAPPED_AT: usize = ROW.flash.start as usize;
 /// The memory map reserves the flash from here on for this module.
-const START: u32 = 1760 << 10;
-const END: u32 = 2048 << 10;
+const START: u32 = ROW.budget.flash as u32;
+const END: u32 = ROW.flash.size as u32;
 const SECTOR_BYTES: usize = 4096;
 /// Room for all of the working memory, with a page before it and less than a sector of figures.
 const JOB_BYTES: u32 = (128 << 10) + SECTOR_BYTES as u32;
@@ -82,22 +82,16 @@ enum Work<'p> {
 const NUMBER_COMMAND: usize = 1 + 4 + 8;
 const READ_NUMBER: u8 = 0x4B;
 
-/// The serial line to the flash chip (data sheet, 4.10.13), and the pad that selects the chip
-/// (2.19.6.2).
-// SAFETY of both: the address map of the data sheet, 2.2. They are used while nothing else reads
-// the flash.
-const SSI: Peripheral = unsafe { Peripheral::at(0x1800_0000) };
-const QSPI_PADS: Peripheral = unsafe { Peripheral::at(0x4001_8000) };
-mod ssi {
-    pub const STATUS: usize = 0x28;
-    pub const HAS_PLACE: u32 = 1 << 1;
-    pub const HAS_BYTE: u32 = 1 << 3;
-    pub const DATA: usize = 0x60;
-    pub const SELECT: usize = 0x0C;
-    /// The override of the pad's level; low selects the chip.
-    pub const LEVEL: u32 = 3 << 8;
+/// The override of the level of the pin that selects the flash chip (data sheet, 2.19.6.2).
+mod select {
+    pub const OVERRIDE: u32 = 3 << 8;
     pub const LOW: u32 = 2 << 8;
     pub const HIGH: u32 = 3 << 8;
+}
+/// Bits of the status of the serial line to the flash chip (data sheet, 4.10.13).
+mod line {
+    pub const HAS_PLACE: u32 = 1 << 1;
+    pub const HAS_BYTE: u32 = 1 << 3;
 }
 
 /// Carries out the operation. It runs from RAM.
@@ -121,15 +115,15 @@ unsafe extern "C" fn carry_out(rom: &Rom, work: &mut Work<'_>) {
             Work::Number { exchanged } => {
                 // The boot ROM has set up the line for single bytes. Each byte sent brings one byte
                 // of the answer.
-                let select = QSPI_PADS.read(ssi::SELECT) & !ssi::LEVEL;
-                QSPI_PADS.write(ssi::SELECT, select | ssi::LOW);
+                let selects = IO_QSPI.gpio_qspiss().gpio_ctrl().get() & !select::OVERRIDE;
+                IO_QSPI.gpio_qspiss().gpio_ctrl().put(selects | select::LOW);
                 for byte in exchanged.iter_mut() {
-                    while SSI.read(ssi::STATUS) & ssi::HAS_PLACE == 0 {}
-                    SSI.write(ssi::DATA, *byte as u32);
-                    while SSI.read(ssi::STATUS) & ssi::HAS_BYTE == 0 {}
-                    *byte = SSI.read(ssi::DATA) as u8;
+                    while SSI.sr().get() & line::HAS_PLACE == 0 {}
+                    SSI.dr0().put(*byte as u32);
+                    while SSI.sr().get() & line::HAS_BYTE == 0 {}
+                    *byte = SSI.dr0().get() as u8;
                 }
-                QSPI_PADS.write(ssi::SELECT, select | ssi::HIGH);
+                IO_QSPI.gpio_qspiss().gpio_ctrl().put(selects | select::HIGH);
             }
         }
         (rom.flush_cache)();

@@ -39,11 +39,10 @@ mod usb;
 mod words;
 
 use cortex_m::peripheral::Peripherals as Core;
+use penup::boards::table::{self, BoardRow};
 use penup::machine::{Contacts, PulserState};
 use penup::motion::{Block, EventQueue};
-use penup::plotter::{
-    Board, EMPTY_LOOKAHEAD_OF_PICO, MemorySlices, NotStored, PicoMemory, Record, Stored,
-};
+use penup::plotter::{Board, Memory, MemorySlices, NotStored, Record, Stored};
 use penup::protocol::RealTime;
 use rp2040_hal::clocks::init_clocks_and_plls;
 use rp2040_hal::fugit::ExtU32;
@@ -62,6 +61,17 @@ static BOOT_2: [u8; 256] = rp2040_boot2::BOOT_LOADER_W25Q080;
 
 const CRYSTAL_HERTZ: u32 = 12_000_000;
 
+/// The board's row in the table.
+const ROW: &BoardRow = &table::PICO;
+
+/// The board's memory.
+type BoardMemory = Memory<
+    { ROW.memory.vertices },
+    { ROW.memory.corners },
+    { ROW.memory.words },
+    { ROW.memory.ports },
+>;
+
 /// The board, as the plotter sees it.
 pub struct Pico {
     ports: Ports,
@@ -76,7 +86,7 @@ pub struct Pico {
 ///
 /// # Panics
 /// When the board was taken before, or when its crystal does not oscillate.
-#[allow(clippy::panic)] // Without clocks the program cannot continue.
+#[allow(clippy::panic, reason = "without clocks the program cannot continue")]
 pub fn take() -> (Pico, MemorySlices<'static>, &'static PulserState) {
     let (Some(mut core), Some(mut chip)) = (Core::take(), Peripherals::take()) else {
         panic!("the board was taken twice")
@@ -96,7 +106,8 @@ pub fn take() -> (Pico, MemorySlices<'static>, &'static PulserState) {
     let Ok(clocks) = clocks else { panic!("the clocks do not start") };
     registers::restart(registers::reset::TIMER);
     let sio = Sio::new(chip.SIO);
-    let gpio = Pins::new(chip.IO_BANK0, chip.PADS_BANK0, sio.gpio_bank0, &mut chip.RESETS);
+    // It takes the pins out of reset.
+    Pins::new(chip.IO_BANK0, chip.PADS_BANK0, sio.gpio_bank0, &mut chip.RESETS);
     let steps = steps::set_up(&mut core.NVIC);
     pen::set_up();
     lift::set_up();
@@ -108,15 +119,15 @@ pub fn take() -> (Pico, MemorySlices<'static>, &'static PulserState) {
     let number = NUMBER.init(flash.number());
     let usb = usb::set_up(&mut core.NVIC, controller, clocks.usb_clock, &mut chip.RESETS, number);
     let ports = Ports::new(lines, uart, usb);
-    pins::set_up(gpio);
+    pins::hand_over();
     serial::open();
     contacts::set_up();
     clock::start(&mut core.NVIC);
     watchdog.start(3.secs());
     defmt::info!("pico at {=u32} Hz", clock::HERTZ);
-    static MEMORY: ConstStaticCell<PicoMemory> = ConstStaticCell::new(PicoMemory::new());
-    static BLOCKS: ConstStaticCell<[Block; EMPTY_LOOKAHEAD_OF_PICO.len()]> =
-        ConstStaticCell::new(EMPTY_LOOKAHEAD_OF_PICO);
+    static MEMORY: ConstStaticCell<BoardMemory> = ConstStaticCell::new(BoardMemory::new());
+    static BLOCKS: ConstStaticCell<[Block; ROW.memory.blocks]> =
+        ConstStaticCell::new([Block::EMPTY; ROW.memory.blocks]);
     let fault = match start {
         Start::Fresh => None,
         Start::AfterFault(cause) => Some(cause),
@@ -128,7 +139,7 @@ pub fn take() -> (Pico, MemorySlices<'static>, &'static PulserState) {
 }
 
 impl Board for Pico {
-    const NAME: &'static str = "pico";
+    const NAME: &'static str = ROW.name;
     const HAS_DRIVE: bool = true;
 
     fn read_byte(&mut self) -> Option<(usize, u8)> {
@@ -156,8 +167,8 @@ impl Board for Pico {
         usb::take_opened()
     }
 
-    fn speak_aside(&mut self, is_aside: bool) {
-        self.ports.speak_aside(is_aside);
+    fn reply_only_to_opened(&mut self, only_to_opened: bool) {
+        self.ports.reply_only_to_opened(only_to_opened);
     }
 
     fn wants_drive(&mut self) -> bool {

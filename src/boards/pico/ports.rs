@@ -26,7 +26,7 @@ const COUNT: usize = 2;
 
 /// One bit for each port that has received an undamaged byte. The handlers of the ports write it;
 /// they have the same priority.
-static SPOKEN: AtomicU8 = AtomicU8::new(0);
+static HAS_RECEIVED: AtomicU8 = AtomicU8::new(0);
 
 static SHARED: [Shared; COUNT] = [const { Shared::new() }; COUNT];
 
@@ -49,7 +49,7 @@ pub struct Ports {
     /// The port whose byte was read last.
     last: usize,
     /// Whether replies go to USB alone.
-    is_aside: bool,
+    only_to_opened: bool,
     /// The sender of UART0.
     pub uart: serial::Sender,
     /// The sender of USB.
@@ -81,7 +81,8 @@ impl Inlets {
         let receiver = &mut self.inlets[port as usize].receiver;
         let asked = take(receiver);
         if receiver.has_heard() {
-            SPOKEN.store(SPOKEN.load(Ordering::Relaxed) | 1 << port as u8, Ordering::Relaxed);
+            HAS_RECEIVED
+                .store(HAS_RECEIVED.load(Ordering::Relaxed) | 1 << port as u8, Ordering::Relaxed);
         }
         if asked != RealTime::default() {
             self.aborts = self.aborts.wrapping_add(u32::from(asked.has(RealTime::ABORT)));
@@ -103,7 +104,7 @@ impl Inlets {
 impl Ports {
     /// Combines the parts that the set-up of the ports has returned.
     pub fn new(lines: [Line; COUNT], uart: serial::Sender, usb: usb::Sender) -> Self {
-        Self { lines, last: 0, is_aside: false, uart, usb }
+        Self { lines, last: 0, only_to_opened: false, uart, usb }
     }
 
     /// Returns the next ordinary byte and the number of its port: see [`Line::read_byte`]. It keeps
@@ -130,31 +131,31 @@ impl Ports {
 
     /// Whether there is room at once for this many bytes at every port to which they would be sent.
     pub fn has_room(&mut self, bytes: usize) -> bool {
-        (!hears(Port::Uart) || self.uart.has_room(bytes))
-            && (!hears(Port::Usb) || self.usb.has_room(bytes))
+        (!gets_replies(Port::Uart) || self.uart.has_room(bytes))
+            && (!gets_replies(Port::Usb) || self.usb.has_room(bytes))
     }
 
     /// Sends replies to USB alone from now on, or again to all ports that have sent something.
-    pub fn speak_aside(&mut self, is_aside: bool) {
-        self.is_aside = is_aside;
+    pub fn reply_only_to_opened(&mut self, only_to_opened: bool) {
+        self.only_to_opened = only_to_opened;
     }
 
     /// Sends `bytes` to the ports that have sent something.
     pub fn write(&mut self, bytes: &[u8]) {
-        if self.is_aside {
+        if self.only_to_opened {
             return self.usb.write(bytes);
         }
-        if hears(Port::Uart) {
+        if gets_replies(Port::Uart) {
             self.uart.write(bytes);
         }
-        if hears(Port::Usb) {
+        if gets_replies(Port::Usb) {
             self.usb.write(bytes);
         }
     }
 }
 
 /// Whether replies go to a port.
-fn hears(port: Port) -> bool {
-    let spoken = SPOKEN.load(Ordering::Relaxed);
-    spoken == 0 || spoken & 1 << port as u8 != 0
+fn gets_replies(port: Port) -> bool {
+    let received = HAS_RECEIVED.load(Ordering::Relaxed);
+    received == 0 || received & 1 << port as u8 != 0
 }

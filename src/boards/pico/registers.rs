@@ -1,41 +1,129 @@
-//! The chip's registers.
+//! Access to the chip's registers, as its PAC (`rp2040_hal::pac`) describes them.
+//!
+//! The PAC's own types belong to one owner each. Interrupt handlers and the main loop share these
+//! peripherals, so each constant here gives access to one of them, and its comment says which
+//! modules use it.
+
+use core::ops::Deref;
+
+use rp2040_hal::pac;
+use rp2040_hal::pac::generic::{Readable, Reg, RegisterSpec, Writable};
 
 use crate::boards::peripheral::Peripheral;
 use crate::boards::pl011::Uart;
 
-// SAFETY of all: the address map of the RP2040's data sheet, 2.2; none reaches into memory.
+/// Access to the registers of a peripheral whose register block is a `B`.
+pub struct Registers<B>(*const B);
+
+impl<B> Registers<B> {
+    /// # Safety
+    /// A register block of this type lies at the address, and its registers may be read and written
+    /// at any time by the code that has it.
+    const unsafe fn at(block: *const B) -> Self {
+        Self(block)
+    }
+}
+
+impl<B> Deref for Registers<B> {
+    type Target = B;
+
+    #[inline(always)]
+    fn deref(&self) -> &B {
+        // SAFETY: the contract of `at`. The fields of a register block are cells.
+        unsafe { &*self.0 }
+    }
+}
+
+/// Reading all bits of a register.
+pub trait Get {
+    /// The bits of the register.
+    fn get(&self) -> u32;
+}
+
+impl<R: Readable + RegisterSpec<Ux = u32>> Get for Reg<R> {
+    #[inline(always)]
+    fn get(&self) -> u32 {
+        self.read().bits()
+    }
+}
+
+/// Writing all bits of a register.
+pub trait Put {
+    /// Writes the bits of the register.
+    fn put(&self, bits: u32);
+    /// Sets `bits` of the register in one write, by its alias (data sheet, 2.1.2). The core's own
+    /// registers and those of SIO have none.
+    fn set(&self, bits: u32);
+    /// Clears `bits` of the register in one write, in the same way.
+    fn clear(&self, bits: u32);
+}
+
+impl<R: Writable + RegisterSpec<Ux = u32>> Put for Reg<R> {
+    #[inline(always)]
+    fn put(&self, bits: u32) {
+        // SAFETY: the contract of `Registers::at`.
+        unsafe { self.as_ptr().write_volatile(bits) };
+    }
+
+    #[inline(always)]
+    fn set(&self, bits: u32) {
+        // SAFETY: as above, for the alias of the register.
+        unsafe { self.as_ptr().byte_add(0x2000).write_volatile(bits) };
+    }
+
+    #[inline(always)]
+    fn clear(&self, bits: u32) {
+        // SAFETY: as above.
+        unsafe { self.as_ptr().byte_add(0x3000).write_volatile(bits) };
+    }
+}
+
+// SAFETY of all: the PAC has the addresses. None of these registers makes the chip reach into
+// memory that Rust knows, except those of DMA, whose channels get addresses of atomics only.
 
 /// The reset controller, which holds peripherals in reset. Used at set-up, before interrupts are
 /// on.
-const RESETS: Peripheral = unsafe { Peripheral::at(0x4000_C000) };
-/// The serial line. Used by `serial`.
+const RESETS: Registers<pac::resets::RegisterBlock> = unsafe { Registers::at(pac::RESETS::PTR) };
+/// The serial line, as the PL011 that several chips have. Used by `serial`.
 pub const UART0: Uart = Uart(unsafe { Peripheral::at(0x4003_4000) });
 /// The chip's identification. Used by `usb`.
-pub const SYSTEM_INFORMATION: Peripheral = unsafe { Peripheral::at(0x4000_0000) };
+pub const SYSINFO: Registers<pac::sysinfo::RegisterBlock> =
+    unsafe { Registers::at(pac::SYSINFO::PTR) };
 /// The functions of the pins. Used by `usb`, for GPIO 15 only.
-pub const BANK_0_CONTROLS: Peripheral = unsafe { Peripheral::at(0x4001_4000) };
+pub const IO_BANK0: Registers<pac::io_bank0::RegisterBlock> =
+    unsafe { Registers::at(pac::IO_BANK0::PTR) };
 /// The pads of the pins. Used by `usb`, for GPIO 15 only.
-pub const BANK_0_PADS: Peripheral = unsafe { Peripheral::at(0x4001_C000) };
+pub const PADS_BANK0: Registers<pac::pads_bank0::RegisterBlock> =
+    unsafe { Registers::at(pac::PADS_BANK0::PTR) };
 /// The PWM unit for the servo. Used by `pen`.
-pub const PWM: Peripheral = unsafe { Peripheral::at(0x4005_0000) };
+pub const PWM: Registers<pac::pwm::RegisterBlock> = unsafe { Registers::at(pac::PWM::PTR) };
 /// The timer that counts microseconds. Used by `clock`.
-pub const TIMER: Peripheral = unsafe { Peripheral::at(0x4005_4000) };
-/// The pins' levels. Used by `contacts` and `lift`.
-pub const SIO: Peripheral = unsafe { Peripheral::at(0xD000_0000) };
+pub const TIMER: Registers<pac::timer::RegisterBlock> = unsafe { Registers::at(pac::TIMER::PTR) };
+/// The pins' levels and the divider. Used by `contacts`, `lift` and `divider`.
+pub const SIO: Registers<pac::sio::RegisterBlock> = unsafe { Registers::at(pac::SIO::PTR) };
 /// The power-on state machine, which selects what a reset affects. Used by `emergency`.
-pub const PSM: Peripheral = unsafe { Peripheral::at(0x4001_0000) };
+pub const PSM: Registers<pac::psm::RegisterBlock> = unsafe { Registers::at(pac::PSM::PTR) };
 /// The watchdog. Used by `emergency`.
-pub const WATCHDOG: Peripheral = unsafe { Peripheral::at(0x4005_8000) };
+pub const WATCHDOG: Registers<pac::watchdog::RegisterBlock> =
+    unsafe { Registers::at(pac::WATCHDOG::PTR) };
 /// Direct memory access. `steps` uses channel 0, and `serial` uses channels 1 and 2.
-pub const DMA: Peripheral = unsafe { Peripheral::at(0x5000_0000) };
+pub const DMA: Registers<pac::dma::RegisterBlock> = unsafe { Registers::at(pac::DMA::PTR) };
 /// Programmable input and output. `steps` uses its state machine 0.
-pub const PIO0: Peripheral = unsafe { Peripheral::at(0x5020_0000) };
-
-/// The registers of the core: the masks of the interrupts, and the address of the vector table.
-/// Used by `critical`.
-pub const SYSTEM: Peripheral = unsafe { Peripheral::at(0xE000_E000) };
+pub const PIO0: Registers<pac::pio0::RegisterBlock> = unsafe { Registers::at(pac::PIO0::PTR) };
+/// The core's own registers: the masks of the interrupts, and the address of the vector table. Used
+/// by `critical`.
+pub const PPB: Registers<pac::ppb::RegisterBlock> = unsafe { Registers::at(pac::PPB::PTR) };
 /// The USB controller. Used by `usb` in addition to its driver.
-pub const USB: Peripheral = unsafe { Peripheral::at(0x5011_0000) };
+pub const USB: Registers<pac::usbctrl_regs::RegisterBlock> =
+    unsafe { Registers::at(pac::USBCTRL_REGS::PTR) };
+/// The USB controller's memory. Used by `usb`, where its driver has no function.
+pub const USB_MEMORY: Registers<pac::usbctrl_dpram::RegisterBlock> =
+    unsafe { Registers::at(pac::USBCTRL_DPRAM::PTR) };
+/// The serial line to the flash chip. Used by `flash`, while nothing else reads the flash.
+pub const SSI: Registers<pac::xip_ssi::RegisterBlock> = unsafe { Registers::at(pac::XIP_SSI::PTR) };
+/// The pins of that line. Used by `flash` in the same way.
+pub const IO_QSPI: Registers<pac::io_qspi::RegisterBlock> =
+    unsafe { Registers::at(pac::IO_QSPI::PTR) };
 
 /// Bits of the reset register.
 pub mod reset {
@@ -49,10 +137,7 @@ pub mod reset {
 /// Resets the peripherals of `bits`, so that their registers have their initial values, and waits
 /// until they run.
 pub fn restart(bits: u32) {
-    const RESET_DONE: usize = 0x8;
-    const SET: usize = 0x2000;
-    const CLEAR: usize = 0x3000;
-    RESETS.write(SET, bits);
-    RESETS.write(CLEAR, bits);
-    while RESETS.read(RESET_DONE) & bits != bits {}
+    RESETS.reset().set(bits);
+    RESETS.reset().clear(bits);
+    while RESETS.reset_done().get() & bits != bits {}
 }

@@ -24,9 +24,9 @@ pub fn run(mut ports: Ports, cause: &Cause) -> ! {
             emergency::show_drive();
         }
         if usb::take_opened() {
-            ports.speak_aside(true);
+            ports.reply_only_to_opened(true);
             tell(&mut ports, cause);
-            ports.speak_aside(false);
+            ports.reply_only_to_opened(false);
         }
         let asked = ports.take_real_time();
         if asked.has(RealTime::ABORT) {
@@ -42,7 +42,8 @@ pub fn run(mut ports: Ports, cause: &Cause) -> ! {
                 line.clear();
                 tell(&mut ports, cause);
                 let mut reply = Cause::new();
-                let _ = write!(reply, "error:{}\r\n", CommandError::Locked.number()); // It is short.
+                // It is short.
+                let _ = write!(reply, "error:{}\r\n", CommandError::Locked.number());
                 ports.write(reply.as_bytes());
             }
             // A longer line is no command that matters here, so its end is dropped.

@@ -17,58 +17,50 @@ use core::sync::atomic::{AtomicU16, Ordering};
 
 use cortex_m::peripheral::NVIC;
 use heapless::spsc::{Consumer, Producer, Queue};
+use rp2040_hal::pac::dma::CH;
 use rp2040_hal::pac::{Interrupt, interrupt};
 use static_cell::StaticCell;
 
 use super::ports::{self, Inlets, Port};
-use super::registers::{self, DMA, UART0, reset};
+use super::registers::{self, DMA, Get, Put, UART0, reset};
 use super::{clock, critical, divider};
 use crate::boards::handler::Owned;
 
 /// The number of slots in the queue of bytes to send, one of which stays empty.
-const SENT_PLACES: usize = 1024;
+const SENT_SLOTS: usize = 1024;
 
 /// The number of bytes in the ring, each with its error bits.
-const RING_PLACES: u32 = 1024;
+const RING_SLOTS: u32 = 1024;
 /// The number of slots that the channel may fill while the ring is read.
 const MARGIN: u32 = 64;
 /// The number of bytes that a channel receives in its turn; a multiple of the ring.
 const TURN: u32 = 1 << 14;
-const _: () = assert!(TURN.is_multiple_of(RING_PLACES));
+const _: () = assert!(TURN.is_multiple_of(RING_SLOTS));
 
 #[repr(align(2048))] // The channels wrap around only if the ring is aligned to its size.
-struct Ring([AtomicU16; RING_PLACES as usize]);
+struct Ring([AtomicU16; RING_SLOTS as usize]);
 const _: () = assert!(align_of::<Ring>() == size_of::<Ring>());
 
-static RING: Ring = Ring([const { AtomicU16::new(0) }; RING_PLACES as usize]);
+static RING: Ring = Ring([const { AtomicU16::new(0) }; RING_SLOTS as usize]);
 
-static QUEUE: StaticCell<Queue<u8, SENT_PLACES>> = StaticCell::new();
+static QUEUE: StaticCell<Queue<u8, SENT_SLOTS>> = StaticCell::new();
 static SENDER: Owned<Consumer<'static, u8>> = Owned::empty();
 /// The number of bytes of the ring that have been read, modulo two turns.
-static LOOKED_AT: Owned<u32> = Owned::empty();
+static READ_COUNT: Owned<u32> = Owned::empty();
 
 /// The channels that receive. The channel of the steps has number 0 and takes precedence.
 const CHANNELS: [usize; 2] = [1, 2];
 
-/// The registers of a DMA channel and their bits.
-mod channel {
-    pub const BYTES: usize = 0x40;
-    pub const READ_ADDRESS: usize = 0x00;
-    pub const WRITE_ADDRESS: usize = 0x04;
-    pub const COUNT: usize = 0x08;
-    pub const CONTROL_AND_START: usize = 0x0C;
-    pub const CONTROL: usize = 0x10;
+/// Bits of a channel's control register.
+mod control {
     pub const BUSY: u32 = 1 << 24;
-    pub const REQUEST_OF_UART0_RECEIVER: u32 = 21 << 15;
-    pub const QUIET: u32 = 1 << 21;
-    /// Enabled, half-words, writing around the ring.
-    pub const RECEIVE: u32 = 1
-        | 1 << 2
-        | 1 << 5
-        | size_of::<super::Ring>().trailing_zeros() << 6
-        | 1 << 10
-        | REQUEST_OF_UART0_RECEIVER
-        | QUIET;
+    const REQUEST_OF_UART0_RECEIVER: u32 = 21 << 15;
+    const QUIET: u32 = 1 << 21;
+    /// Enabled, half-words, writing around the ring; then the channel `next` goes on.
+    pub const fn receive_before(next: usize) -> u32 {
+        let ring = size_of::<super::Ring>().trailing_zeros() << 6 | 1 << 10;
+        1 | 1 << 2 | 1 << 5 | ring | (next as u32) << 11 | REQUEST_OF_UART0_RECEIVER | QUIET
+    }
 }
 
 /// The main loop's end of the queue of bytes to send.
@@ -86,7 +78,7 @@ pub fn set_up(nvic: &mut NVIC) -> Sender {
     // it).
     unsafe {
         SENDER.fill(to_send);
-        LOOKED_AT.fill(0);
+        READ_COUNT.fill(0);
     }
     critical::enable(nvic, Interrupt::UART0_IRQ, critical::SERIAL_PRIORITY);
     Sender(sent)
@@ -96,49 +88,49 @@ pub fn set_up(nvic: &mut NVIC) -> Sender {
 /// which is a break.
 pub fn open() {
     let [first, second] = CHANNELS;
-    for (this, next, control) in
-        [(second, first, channel::CONTROL), (first, second, channel::CONTROL_AND_START)]
-    {
-        let registers = channel::BYTES * this;
-        DMA.write(registers + channel::READ_ADDRESS, UART0.data_address());
-        DMA.write(registers + channel::WRITE_ADDRESS, RING.0.as_ptr() as u32);
-        DMA.write(registers + channel::COUNT, TURN);
-        DMA.write(registers + control, channel::RECEIVE | (next as u32) << 11);
-    }
+    let set_up = |channel: &CH| {
+        channel.ch_read_addr().put(UART0.data_address());
+        channel.ch_write_addr().put(RING.0.as_ptr() as u32);
+        channel.ch_trans_count().put(TURN);
+    };
+    set_up(DMA.ch(second));
+    DMA.ch(second).ch_al1_ctrl().put(control::receive_before(first));
+    // Writing this register starts the channel.
+    set_up(DMA.ch(first));
+    DMA.ch(first).ch_ctrl_trig().put(control::receive_before(second));
     UART0.enable();
 }
 
 /// Triggers the port's handler so that it reads what has been received. It is called every
 /// millisecond.
-pub fn look_soon() {
+pub fn request_read() {
     NVIC::pend(Interrupt::UART0_IRQ);
 }
 
 /// The number of bytes that have been written to the ring since the start, modulo two turns; `None`
 /// while one channel hands over to the other.
 fn received() -> Option<u32> {
-    let is_busy =
-        |number: usize| DMA.read(channel::BYTES * number + channel::CONTROL) & channel::BUSY != 0;
+    let is_busy = |number: usize| DMA.ch(number).ch_al1_ctrl().get() & control::BUSY != 0;
     let (before, number) =
         if is_busy(CHANNELS[0]) { (0, CHANNELS[0]) } else { (TURN, CHANNELS[1]) };
-    let left = DMA.read(channel::BYTES * number + channel::COUNT);
+    let left = DMA.ch(number).ch_trans_count().get();
     (is_busy(number) && left != 0).then(|| before + TURN - left)
 }
 
 /// Reads what has been written to the ring. It is called by the port's handler.
-fn look(inlets: &mut Inlets) {
+fn read_ring(inlets: &mut Inlets) {
     // SAFETY: this is the handler that owns it.
-    let Some(looked_at) = (unsafe { LOOKED_AT.get() }) else { return };
+    let Some(read_count) = (unsafe { READ_COUNT.get() }) else { return };
     let Some(received) = received() else { return };
-    let waiting = received.wrapping_sub(*looked_at) % (2 * TURN);
-    if waiting > RING_PLACES - MARGIN {
-        *looked_at = received.wrapping_sub(RING_PLACES - MARGIN) % (2 * TURN);
+    let waiting = received.wrapping_sub(*read_count) % (2 * TURN);
+    if waiting > RING_SLOTS - MARGIN {
+        *read_count = received.wrapping_sub(RING_SLOTS - MARGIN) % (2 * TURN);
         inlets.lose(Port::Uart);
     }
-    while *looked_at != received {
-        let data = RING.0[(*looked_at % RING_PLACES) as usize].load(Ordering::Relaxed);
+    while *read_count != received {
+        let data = RING.0[(*read_count % RING_SLOTS) as usize].load(Ordering::Relaxed);
         inlets.take(Port::Uart, |receiver| receiver.receive_from_uart(data.into()));
-        *looked_at = (*looked_at + 1) % (2 * TURN);
+        *read_count = (*read_count + 1) % (2 * TURN);
     }
 }
 
@@ -182,7 +174,7 @@ fn send() {
     UART0.interrupt_when_sent(!bytes.is_empty());
 }
 
-/// The interrupt for room in the sender's FIFO, and for [`look_soon`].
+/// The interrupt for room in the sender's FIFO, and for [`request_read`].
 #[interrupt]
 fn UART0_IRQ() {
     divider::keep_during(|| {
@@ -190,7 +182,7 @@ fn UART0_IRQ() {
         send();
         // SAFETY: this is a handler that owns it.
         if let Some(inlets) = unsafe { ports::inlets() } {
-            look(inlets);
+            read_ring(inlets);
         }
     });
 }

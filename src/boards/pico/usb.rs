@@ -5,7 +5,7 @@
 //! byte is lost, even when the host suspends the bus or closes the port. Real-time bytes act as
 //! soon as their packet is received.
 //!
-//! Sent bytes wait in a queue. If the host takes nothing for [`PATIENCE`] although the queue is
+//! Sent bytes wait in a queue. If the host takes nothing for [`HOST_TIMEOUT`] although the queue is
 //! full, it counts as gone. Then bytes to be sent are discarded until it takes something again,
 //! because nothing may delay the steps. The same holds after a program has closed the port (DTR has
 //! fallen): replies that it has not taken are discarded, and so is the rest of a line that it has
@@ -37,10 +37,9 @@ use usbd_serial::{CdcAcmClass, USB_CLASS_CDC};
 use self::connection::Connection;
 use self::frame::Frame;
 use super::ports::{self, Inlets, Port};
-use super::registers::USB;
+use super::registers::{Get, Put, USB, USB_MEMORY};
 use super::{clock, critical, divider};
 use crate::boards::handler::Owned;
-use crate::boards::peripheral::Peripheral;
 
 /// The USB number for tests and for projects without a number of their own:
 /// <https://pid.codes/1209/0001>.
@@ -50,32 +49,22 @@ const PACKET: usize = 64;
 /// the end.
 const SENT_PACKET: usize = PACKET - 1;
 /// The number of slots in the queue of bytes to send, one of which stays empty.
-const SENT_PLACES: usize = 2048;
+const SENT_SLOTS: usize = 2048;
 /// The time, in microseconds, after which a host that takes nothing counts as gone. A busy host
 /// takes a packet every millisecond.
-const PATIENCE: u32 = 20_000;
+const HOST_TIMEOUT: u32 = 20_000;
 
 /// The greatest number of received bytes that wait for room in the line's queue.
-const WAITING_PLACES: usize = 512;
+const WAITING_SLOTS: usize = 512;
 /// The baud rate of the touch: whoever opens the port at this rate and closes it asks for the drive
 /// for a new image, as with an Arduino.
 const TOUCH_RATE: u32 = 1200;
 
-/// Registers of the controller: the interrupts before masking; the bits to set in their mask, and
-/// to clear in it; and the packets that were filled and emptied.
-const INTERRUPTS: usize = 0x8C;
-const ENABLE: usize = 0x2090;
-const DISABLE: usize = 0x3090;
+/// The bit of the controller's interrupts for a reset of the bus.
 const BUS_RESET: u32 = 1 << 12;
-const PACKETS_DONE: usize = 0x58;
 
-/// The controller's memory, in which the control words of the endpoints' buffers begin at 0x80. It
-/// is used here, in addition to the driver, only where the driver has no function.
-// SAFETY: the address map of the RP2040's data sheet, 4.1.3; the words may be read and written at
-// any time.
-const BUFFERS: Peripheral = unsafe { Peripheral::at(0x5010_0000) };
+/// Bits of the control word of an endpoint's buffer.
 mod buffer {
-    pub const CONTROLS: usize = 0x80;
     pub const AVAILABLE: u32 = 1 << 10;
     pub const IS_DATA_1: u32 = 1 << 13;
     pub const FULL: u32 = 1 << 15;
@@ -85,7 +74,7 @@ mod buffer {
 }
 
 static BUS: StaticCell<UsbBusAllocator<UsbBus>> = StaticCell::new();
-static QUEUE: StaticCell<Queue<u8, SENT_PLACES>> = StaticCell::new();
+static QUEUE: StaticCell<Queue<u8, SENT_SLOTS>> = StaticCell::new();
 static DEVICE: Owned<Device> = Owned::empty();
 
 /// Whether the host takes nothing. The main loop sets it, and the handler clears it.
@@ -114,7 +103,7 @@ struct Device {
     /// The workaround for erratum E15.
     frame: Frame,
     /// The received bytes that wait for room.
-    waiting: Deque<u8, WAITING_PLACES>,
+    waiting: Deque<u8, WAITING_SLOTS>,
     /// Whether the last received byte does not end a line.
     is_in_line: bool,
     /// The value of [`Inlets::aborts`] when it was last read.
@@ -187,7 +176,7 @@ pub fn set_up(
 
 impl Sender {
     /// Whether there is room at once for this many bytes. If there is not, and the host takes
-    /// nothing for [`PATIENCE`], the host counts as gone.
+    /// nothing for [`HOST_TIMEOUT`], the host counts as gone.
     pub fn has_room(&mut self, bytes: usize) -> bool {
         let waiting = self.bytes.len();
         if HOST_IS_GONE.load(Ordering::Relaxed) || self.bytes.capacity() - waiting >= bytes {
@@ -197,7 +186,7 @@ impl Sender {
         let now = clock::microseconds();
         match self.full {
             Some((since, before)) if before == waiting => {
-                if now.wrapping_sub(since) > PATIENCE {
+                if now.wrapping_sub(since) > HOST_TIMEOUT {
                     HOST_IS_GONE.store(true, Ordering::Relaxed);
                 }
             }
@@ -212,7 +201,7 @@ impl Sender {
             let began = clock::microseconds();
             while !HOST_IS_GONE.load(Ordering::Relaxed) && self.bytes.enqueue(byte).is_err() {
                 critical_section::with(|_| serve());
-                if clock::microseconds().wrapping_sub(began) > PATIENCE {
+                if clock::microseconds().wrapping_sub(began) > HOST_TIMEOUT {
                     HOST_IS_GONE.store(true, Ordering::Relaxed);
                 }
             }
@@ -256,22 +245,22 @@ fn take(flag: &AtomicBool) -> bool {
 fn serve() {
     // SAFETY: by the contract above.
     if let (Some(device), Some(inlets)) = unsafe { (DEVICE.get(), ports::inlets()) } {
-        device.frame.look();
+        device.frame.follow();
         // This must be read before polling, which clears it.
         let took = device.class.write_ep().address().index();
-        let took = USB.read(PACKETS_DONE) & 1 << (2 * took) != 0;
+        let took = USB.buff_status().get() & 1 << (2 * took) != 0;
         if device.connection.is_ready() {
             // The driver sees only interrupts that are not masked.
             device.await_bus(false);
             device.device.poll(&mut [&mut device.class]);
         }
-        device.await_bus(USB.read(INTERRUPTS) & BUS_RESET != 0);
+        device.await_bus(USB.intr().get() & BUS_RESET != 0);
         device.follow_state();
         device.follow_port();
         if took {
-            device.welcome_back();
+            device.resume_host();
         }
-        device.take_in(inlets);
+        device.receive(inlets);
         device.send();
         IS_WAITED.store(device.awaits_bus || !device.waiting.is_empty(), Ordering::Relaxed);
     }
@@ -284,7 +273,7 @@ impl Device {
     fn await_bus(&mut self, awaits: bool) {
         if awaits != self.awaits_bus {
             self.awaits_bus = awaits;
-            USB.write(if awaits { DISABLE } else { ENABLE }, BUS_RESET);
+            if awaits { USB.inte().clear(BUS_RESET) } else { USB.inte().set(BUS_RESET) }
         }
     }
 
@@ -337,23 +326,23 @@ impl Device {
     /// just now.
     fn take_packet_back(&mut self) {
         let endpoint = self.class.write_ep().address().index();
-        let place = buffer::CONTROLS + 8 * endpoint;
-        let control = BUFFERS.read(place);
+        let endpoint_buffer = USB_MEMORY.ep_buffer_control(2 * endpoint);
+        let control = endpoint_buffer.get();
         if control & buffer::AVAILABLE == 0 {
             return;
         }
-        BUFFERS.write(place, control & !buffer::AVAILABLE);
+        endpoint_buffer.put(control & !buffer::AVAILABLE);
         cortex_m::asm::delay(buffer::CYCLES);
-        if USB.read(PACKETS_DONE) & 1 << (2 * endpoint) == 0 {
+        if USB.buff_status().get() & 1 << (2 * endpoint) == 0 {
             // The next packet must have the data toggle of this one, which was never sent; the
             // driver will flip it.
-            BUFFERS.write(place, control & !(buffer::AVAILABLE | buffer::FULL) ^ buffer::IS_DATA_1);
+            endpoint_buffer.put(control & !(buffer::AVAILABLE | buffer::FULL) ^ buffer::IS_DATA_1);
         }
     }
 
     /// Handles a packet that the host has taken. If it counted as gone, what it missed is
     /// discarded, because it would be incomplete.
-    fn welcome_back(&mut self) {
+    fn resume_host(&mut self) {
         if self.is_open && HOST_IS_GONE.load(Ordering::Relaxed) {
             self.forget_sent();
             HOST_IS_GONE.store(false, Ordering::Relaxed);
@@ -369,7 +358,7 @@ impl Device {
         }
     }
 
-    fn take_in(&mut self, inlets: &mut Inlets) {
+    fn receive(&mut self, inlets: &mut Inlets) {
         self.drop_void(inlets);
         loop {
             while let Some(&byte) = self.waiting.front()
@@ -381,7 +370,7 @@ impl Device {
                 // The next packet waits in the controller. Its interrupt is cleared so that it does
                 // not come again and again.
                 let number = self.class.read_ep().address().index();
-                USB.write(PACKETS_DONE, 1 << (2 * number + 1));
+                USB.buff_status().put(1 << (2 * number + 1));
                 return;
             }
             let mut packet = [0; PACKET];
@@ -407,7 +396,7 @@ impl Device {
 
     fn send(&mut self) {
         if !self.is_up {
-            self.frame.leave();
+            self.frame.stop();
             return self.forget_sent();
         }
         loop {
@@ -417,9 +406,9 @@ impl Device {
                 let _ = self.packet.push(byte); // There is room.
             }
             if self.packet.is_empty() {
-                return self.frame.leave();
+                return self.frame.stop();
             }
-            if !self.frame.lets_send() || self.class.write_packet(&self.packet).is_err() {
+            if !self.frame.may_send() || self.class.write_packet(&self.packet).is_err() {
                 return;
             }
             self.packet.clear();

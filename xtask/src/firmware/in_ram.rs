@@ -23,17 +23,15 @@ pub const HANDLERS: [&str; 2] = ["DMA_IRQ_0", "PIO0_IRQ_0"];
 
 /// Parts of the names of functions that may mask all interrupts although they lie in flash, because
 /// nothing moves while they run.
-const MASK_AT_REST: [&str; 6] = [
+const MASK_AT_REST: [&str; 4] = [
     // Set-up, before interrupts are enabled.
     "pico::take",
     // Erasing and writing flash. Callers do so only while the machine is stopped, because flash
     // cannot be read meanwhile.
     "pico::flash",
     "NorFlash>",
-    // Handlers of emergencies and faults, after which nothing moves.
-    "pico::emergency",
-    "fault::hard_fault",
-    "fault::panic",
+    // Panics and faults, after which nothing moves.
+    "fault::make_safe",
 ];
 
 /// Parts of the names of functions that call by pointer, each with parts of the names of the

@@ -1,5 +1,6 @@
 //! The process of the emulator of the Pico, and the threads that read its output.
 
+use super::BOARD;
 use super::record::{
     BOOTSEL, LOG, PIN, RECORD_BYTES, RESET, RETURNED, Record, SERIAL, UNUSED_STACK, USB, USB_SERIAL,
 };
@@ -7,6 +8,7 @@ use super::servo::Servo;
 use crate::emulator::EmulatorError;
 use crate::emulator::PinChange;
 use crate::emulator::running::{Shared, quitting_with_parent};
+use crate::table::{BoardRow, Pins};
 use object::{Object, ObjectSymbol};
 use std::collections::VecDeque;
 use std::fs;
@@ -108,12 +110,29 @@ pub(super) fn command(image: &Path, log_address: u64) -> Command {
     let mut command = quitting_with_parent(PROGRAM);
     command.args(["--input-type=module", "--eval", &script(), "--"]);
     command.arg(crate::workspace::root().join(RP2040JS)).arg(image).arg(log_address.to_string());
+    command.arg(board());
     command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     // The emulator gets its own process group, so that Ctrl-C at the terminal reaches only this
     // process, which ends the emulator when it is done with it.
     #[cfg(unix)]
     std::os::unix::process::CommandExt::process_group(&mut command, 0);
     command
+}
+
+/// What the script must know of the board, as JSON.
+fn board() -> String {
+    let BoardRow { clock_hertz, flash, ram, boot_loader, pins, .. } = BOARD;
+    let Pins { step_x, step_y, dir_x, dir_y, limit_x, limit_y, stop, .. } = pins;
+    serde_json::json!({
+        "clockHertz": clock_hertz,
+        "flash": flash.start,
+        "vectors": flash.start + boot_loader,
+        "ram": ram.start,
+        "steps": [step_x, step_y],
+        "directions": [dir_x, dir_y],
+        "contacts": [limit_x, limit_y, stop],
+    })
+    .to_string()
 }
 
 /// The address of the log buffer in the image; 0 if there is none.

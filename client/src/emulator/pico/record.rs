@@ -1,10 +1,11 @@
 //! The messages between this program and the emulator of the Pico. The script `pico.mjs` describes
 //! them.
 
+use super::BOARD;
 use std::time::Duration;
 
-/// The length of a core cycle in nanoseconds, at 125 MHz.
-pub(super) const CYCLE_NANOS: u64 = 8;
+/// The length of a core cycle in nanoseconds.
+pub(super) const CYCLE_NANOS: u64 = 1_000_000_000 / BOARD.clock_hertz as u64;
 /// A message from or to the emulator. The meaning of `value` and `cycle` depends on `what`.
 pub(super) struct Record {
     pub(super) what: u8,

@@ -1,5 +1,6 @@
 //! Finds the state of the pen in the pulses of its servo.
 
+use super::BOARD;
 use super::record::{CYCLE_NANOS, Record, at};
 use crate::emulator::{Pin, PinChange};
 
@@ -11,7 +12,6 @@ pub(super) struct Servo {
 }
 
 impl Servo {
-    const PIN: u8 = 7;
     /// The length in cycles of the pulse at half of the pen's height, about 1.5 ms.
     const HALF: u64 = 1_508_000 / CYCLE_NANOS;
 
@@ -19,26 +19,18 @@ impl Servo {
     pub(super) fn pin_change(&mut self, record: &Record) -> Option<PinChange> {
         let (number, high) = (record.value & 0x7F, record.value >= 0x80);
         let at = at(record.cycle);
-        let pin = match number {
-            2 => Pin::StepX,
-            3 => Pin::StepY,
-            4 => Pin::DirX,
-            5 => Pin::DirY,
-            6 => Pin::Enable,
-            11 => Pin::StepZ,
-            12 => Pin::DirZ,
-            Self::PIN if high => {
+        match Pin::numbered(number, &BOARD.pins)? {
+            Pin::Pen if high => {
                 self.rose_at = record.cycle;
-                return None;
+                None
             }
-            Self::PIN => {
+            Pin::Pen => {
                 let down = record.cycle - self.rose_at >= Self::HALF;
                 let changed = std::mem::replace(&mut self.down, down) != down;
-                return changed.then_some(PinChange { pin: Pin::Pen, high: down, at });
+                changed.then_some(PinChange { pin: Pin::Pen, high: down, at })
             }
-            _ => return None,
-        };
-        Some(PinChange { pin, high, at })
+            pin => Some(PinChange { pin, high, at }),
+        }
     }
 }
 

@@ -6,7 +6,7 @@ use penup::motion::{StepEvent, TICKS_PER_SECOND};
 use super::word_ring::{Ring, ring_address};
 use crate::boards::pico::clock;
 use crate::boards::pico::pins::FIRST_MOTOR_PIN;
-use crate::boards::pico::registers::{self, DMA, PIO0, reset};
+use crate::boards::pico::registers::{self, DMA, PIO0, Put, reset};
 
 /// The cycles of one pass of the counting loop, which is one tick.
 const CYCLES_PER_TICK: u32 = clock::HERTZ / TICKS_PER_SECOND;
@@ -26,63 +26,51 @@ pub const PULSE_TICKS: u32 = 2;
 /// The ticks of a pulse beyond its count.
 const WIDTH_TICKS: u32 = 2;
 
-/// Registers of the PIO block and its state machine 0.
-pub mod machine {
-    pub const CONTROL: usize = 0x000;
-    pub const FIFO_DEBUG: usize = 0x008;
-    pub const FIFO_LEVEL: usize = 0x00C;
-    pub const SEND: usize = 0x010;
-    pub const FLAGS: usize = 0x030;
-    pub const INSTRUCTIONS: usize = 0x048;
-    pub const EXECUTION: usize = 0x0CC;
-    pub const SHIFT: usize = 0x0D0;
-    pub const ADDRESS: usize = 0x0D4;
-    pub const INSTRUCTION: usize = 0x0D8;
-    pub const PINS: usize = 0x0DC;
-    pub const INTERRUPT_ENABLE: usize = 0x12C;
-}
 const ENABLE: u32 = 1;
 const RESTART: u32 = 1 << 4;
+/// The bit of the register `FDEBUG` for a state machine that found its queue empty.
 pub const STALLED: u32 = 1 << 24;
+/// The bits of the register `FLEVEL` for the words in the queue.
 pub const LEVEL: u32 = 0xF;
 /// Flag 0, in the register of flags and in that of interrupts.
 pub const FLAG: u32 = 1;
 const FLAG_INTERRUPT: u32 = 1 << 8;
-const SHIFT_RIGHT_BOTH: u32 = 0b11 << 18;
-/// Joins the slots of the receiver to those of the sender, which gives 8 words.
-const JOIN_SENDER: u32 = 1 << 30;
 
 /// Instructions that the core makes the state machine execute.
 pub mod order {
-    pub const JUMP_TO_START: u32 = super::START;
+    use pio::{
+        InstructionOperands, JmpCondition, MovDestination, MovOperation, MovSource, SetDestination,
+    };
+
+    pub const JUMP_TO_START: u16 =
+        InstructionOperands::JMP { condition: JmpCondition::Always, address: super::START }
+            .encode();
     /// Moves the width of the pulses from the queue to where the program reads it.
-    pub const PULL: u32 = 0x80A0;
-    pub const KEEP_WIDTH: u32 = 0xA0C7;
-    pub const PULL_WITHOUT_WAITING: u32 = 0x8080;
-    pub const SET_PINS: u32 = 0xE000;
-    pub const SET_DIRECTIONS: u32 = 0xE080;
+    pub const PULL: u16 = InstructionOperands::PULL { if_empty: false, block: true }.encode();
+    pub const KEEP_WIDTH: u16 = InstructionOperands::MOV {
+        destination: MovDestination::ISR,
+        op: MovOperation::None,
+        source: MovSource::OSR,
+    }
+    .encode();
+    pub const PULL_WITHOUT_WAITING: u16 =
+        InstructionOperands::PULL { if_empty: false, block: false }.encode();
+    /// Sets the pins; their levels are in the lowest 5 bits.
+    pub const SET_PINS: u16 =
+        InstructionOperands::SET { destination: SetDestination::PINS, data: 0 }.encode();
+    /// Makes pins outputs, those of the mask in the lowest 5 bits.
+    pub const SET_DIRECTIONS: u16 =
+        InstructionOperands::SET { destination: SetDestination::PINDIRS, data: 0 }.encode();
 }
 
-/// The registers of DMA channel 0, and those common to all channels.
-pub mod channel {
-    pub const READ_ADDRESS: usize = 0x00;
-    pub const WRITE_ADDRESS: usize = 0x04;
-    pub const COUNT: usize = 0x08;
-    /// Writing this register does not start the channel.
-    pub const CONTROL: usize = 0x10;
-    /// Writing the count here starts the channel.
-    pub const START: usize = 0x1C;
-    pub const INTERRUPT_ENABLE: usize = 0x404;
-    pub const INTERRUPT: usize = 0x40C;
-    pub const ABORT: usize = 0x444;
-}
+/// The mask of DMA channel 0.
 pub const CHANNEL: u32 = 1;
 pub const BUSY: u32 = 1 << 24;
-/// Enabled, high priority, words, reading around the ring, no chain, paced by `SEND`.
+/// Enabled, high priority, words, reading around the ring, no chain, paced by the state machine.
 const FEED: u32 = 1 | 1 << 1 | 2 << 2 | 1 << 4 | size_of::<Ring>().trailing_zeros() << 6;
 
 /// The address at which the program waits for the next word.
-const START: u32 = 3;
+pub const START: u8 = 3;
 pub const LEVELS: u32 = 0x1F;
 pub const PULSES: u32 = (StepEvent::STEP_X | StepEvent::STEP_Y) as u32;
 /// The levels without pulses and with the drivers off; their pin is active low.
@@ -112,49 +100,61 @@ pub fn set_up() {
         "    jmp rest",
     );
     for (index, &instruction) in program.program.code.iter().enumerate() {
-        PIO0.write(machine::INSTRUCTIONS + 4 * index, u32::from(instruction));
+        PIO0.instr_mem(index).put(u32::from(instruction));
     }
-    const WRAP_AT_END: u32 = 31 << 12;
-    PIO0.write(machine::EXECUTION, WRAP_AT_END);
-    PIO0.write(machine::SHIFT, SHIFT_RIGHT_BOTH | JOIN_SENDER);
+    // The program wraps at the end of the memory, which it does not reach.
+    PIO0.sm(0).sm_execctrl().reset();
+    PIO0.sm(0).sm_shiftctrl().write(|w| {
+        // Joining the slots of the receiver to those of the sender gives 8 words.
+        w.in_shiftdir().set_bit().out_shiftdir().set_bit().fjoin_tx().set_bit()
+    });
     set_pins(RELEASED);
-    PIO0.write(machine::INTERRUPT_ENABLE, FLAG_INTERRUPT);
+    PIO0.sm_irq(0).irq_inte().put(FLAG_INTERRUPT);
     order(order::JUMP_TO_START);
 
-    DMA.write(channel::READ_ADDRESS, ring_address(0));
-    DMA.write(channel::WRITE_ADDRESS, PIO0.address(machine::SEND));
-    DMA.write(channel::CONTROL, FEED);
-    DMA.write(channel::INTERRUPT_ENABLE, CHANNEL);
+    DMA.ch(0).ch_read_addr().put(ring_address(0));
+    DMA.ch(0).ch_write_addr().put(PIO0.txf(0).as_ptr() as u32);
+    // This register does not start the channel.
+    DMA.ch(0).ch_al1_ctrl().put(FEED);
+    DMA.inte0().put(CHANNEL);
 }
 
 /// Makes the state machine execute an instruction at once.
-pub fn order(instruction: u32) {
-    PIO0.write(machine::INSTRUCTION, instruction);
+pub fn order(instruction: u16) {
+    PIO0.sm(0).sm_instr().put(u32::from(instruction));
 }
 
 /// Makes the pins outputs with these levels, at once. The program's `set` instruction affects only
 /// the pulse pins.
 pub fn set_pins(levels: u32) {
-    let first = FIRST_MOTOR_PIN;
-    let pins = |set: u32| set.count_ones() << 26 | LEVELS.count_ones() << 20 | first << 5 | first;
-    PIO0.write(machine::PINS, pins(LEVELS));
-    order(order::SET_PINS | levels);
-    order(order::SET_DIRECTIONS | LEVELS);
-    PIO0.write(machine::PINS, pins(PULSES));
+    assign_pins(LEVELS.count_ones());
+    order(order::SET_PINS | levels as u16);
+    order(order::SET_DIRECTIONS | LEVELS as u16);
+    assign_pins(PULSES.count_ones());
+}
+
+/// Assigns the first `count` pins to the instruction `set`, and all of them to `out`.
+fn assign_pins(count: u32) {
+    let count = count as u8;
+    // SAFETY: these are numbers and counts of pins of the board.
+    PIO0.sm(0).sm_pinctrl().write(|w| unsafe {
+        w.set_count().bits(count).out_count().bits(LEVELS.count_ones() as u8);
+        w.set_base().bits(FIRST_MOTOR_PIN).out_base().bits(FIRST_MOTOR_PIN)
+    });
 }
 
 /// Starts the state machine with pulses of this width. Its queue must be empty.
 pub fn begin(pulse_ticks: u32) {
-    PIO0.write(machine::CONTROL, RESTART);
-    PIO0.write(machine::SEND, pulse_ticks.saturating_sub(WIDTH_TICKS));
+    PIO0.ctrl().put(RESTART);
+    PIO0.txf(0).put(pulse_ticks.saturating_sub(WIDTH_TICKS));
     order(order::PULL);
     order(order::KEEP_WIDTH);
     order(order::JUMP_TO_START);
-    PIO0.write(machine::CONTROL, ENABLE);
+    PIO0.ctrl().put(ENABLE);
 }
 
 /// Stops the state machine for good with the drivers off, after a fault.
 pub fn release() {
-    PIO0.write(machine::CONTROL, 0);
+    PIO0.ctrl().put(0);
     set_pins(RELEASED);
 }

@@ -9,14 +9,12 @@ use core::sync::atomic::{AtomicBool, AtomicU32, Ordering, fence};
 use penup::motion::{Brake, StepEvent, TICKS_PER_SECOND};
 use rp2040_hal::pac::interrupt;
 
-use super::engine::{
-    BUSY, CHANNEL, LEVEL, PULSE_TICKS, TARGETS, WAIT_TICKS, channel, machine, target,
-};
-use super::word_ring::{GROUP, place, ring_address, sum, unpack, way};
+use super::engine::{BUSY, CHANNEL, LEVEL, PULSE_TICKS, TARGETS, WAIT_TICKS, target};
+use super::word_ring::{GROUP, lengths, place, ring_address, sum, unpack};
 use super::{BRAKED_TICKS, STATE};
 use crate::boards::handler::Owned;
 use crate::boards::pico::critical;
-use crate::boards::pico::registers::{DMA, PIO0};
+use crate::boards::pico::registers::{DMA, Get, PIO0, Put};
 
 /// The greatest number of words in a block that is sent as planned. The queue of the state machine
 /// lasts while they are examined, which takes some 45 cycles each.
@@ -41,12 +39,12 @@ pub static BRAKE: Owned<Brake> = Owned::empty();
 static BRAKING: AtomicBool = AtomicBool::new(false);
 /// The number of words put into the ring; it wraps. Only the main loop writes it.
 pub static WRITTEN: AtomicU32 = AtomicU32::new(0);
-/// The number of words that the channel was told to take; it wraps. It is written where the
+/// The number of words that the channel was handed_over to take; it wraps. It is written where the
 /// channel's interrupt is masked.
-pub static TOLD: AtomicU32 = AtomicU32::new(0);
+pub static HANDED_OVER: AtomicU32 = AtomicU32::new(0);
 /// The number of words of an abandoned block that the channel's count still shows. It is written
 /// where the channel's interrupt is masked.
-pub static GIVEN_UP: AtomicU32 = AtomicU32::new(0);
+pub static ABANDONED: AtomicU32 = AtomicU32::new(0);
 /// Whether a block is being transferred. It is written where the channel's interrupt is masked.
 pub static FEEDING: AtomicBool = AtomicBool::new(false);
 
@@ -56,11 +54,11 @@ pub static FEEDING: AtomicBool = AtomicBool::new(false);
 pub fn taken() -> u32 {
     critical::with_steps_masked(|| {
         loop {
-            let left = DMA.read(channel::COUNT);
-            let waiting = PIO0.read(machine::FIFO_LEVEL) & LEVEL;
-            if left == DMA.read(channel::COUNT) {
-                let to_come = left - GIVEN_UP.load(Ordering::Relaxed) + waiting;
-                return TOLD.load(Ordering::Relaxed).wrapping_sub(to_come);
+            let left = DMA.ch(0).ch_trans_count().get();
+            let waiting = PIO0.flevel().get() & LEVEL;
+            if left == DMA.ch(0).ch_trans_count().get() {
+                let to_come = left - ABANDONED.load(Ordering::Relaxed) + waiting;
+                return HANDED_OVER.load(Ordering::Relaxed).wrapping_sub(to_come);
             }
         }
     })
@@ -83,63 +81,64 @@ pub fn start() {
 #[unsafe(link_section = ".data.in_ram")]
 pub fn stop() {
     critical::with_steps_masked(|| {
-        PIO0.write(machine::CONTROL, 0);
-        DMA.write(channel::INTERRUPT_ENABLE, 0);
-        DMA.write(channel::ABORT, CHANNEL);
-        while DMA.read(channel::CONTROL) & BUSY != 0 {}
-        DMA.write(channel::INTERRUPT, CHANNEL);
+        PIO0.ctrl().put(0);
+        DMA.inte0().put(0);
+        DMA.chan_abort().put(CHANNEL);
+        while DMA.ch(0).ch_al1_ctrl().get() & BUSY != 0 {}
+        DMA.ints0().put(CHANNEL);
     });
 }
 
 /// Enables the channel's interrupt at the end of a block again.
 pub fn let_interrupt_come() {
-    DMA.write(channel::INTERRUPT_ENABLE, CHANNEL);
+    DMA.inte0().put(CHANNEL);
 }
 
 /// Tells the channel what to transfer next. It is called where the channel's interrupt is masked.
 #[inline(never)]
 #[unsafe(link_section = ".data.in_ram")]
 fn feed() {
-    let told = TOLD.load(Ordering::Relaxed);
-    let count = WRITTEN.load(Ordering::Acquire).wrapping_sub(told);
+    let handed_over = HANDED_OVER.load(Ordering::Relaxed);
+    let count = WRITTEN.load(Ordering::Acquire).wrapping_sub(handed_over);
     FEEDING.store(count != 0, Ordering::Relaxed);
     // SAFETY: this is the handler that owns it, or the handler is masked.
     let Some(brake) = (unsafe { BRAKE.get() }) else { return };
     if count == 0 {
         return;
     }
-    let (mut address, mut words) = (ring_address(told), count);
+    let (mut address, mut words) = (ring_address(handed_over), count);
     if STATE.brake().is_on() {
-        words = far_words(brake, told, count);
+        words = far_words(brake, handed_over, count);
         // If the last block had to be braked, this one is braked without another examination first.
         if words == 0 && !BRAKING.load(Ordering::Relaxed) {
-            words = calm_words(brake, told, count);
+            words = calm_words(brake, handed_over, count);
         }
         if words == 0 {
-            words = brake_evenly(brake, told, count);
+            words = brake_evenly(brake, handed_over, count);
             if words == 0 {
-                words = brake_words(brake, told, count);
+                words = brake_words(brake, handed_over, count);
             }
             address = BRAKED.0.as_ptr() as u32;
         }
     }
-    TOLD.store(told.wrapping_add(words), Ordering::Relaxed);
-    GIVEN_UP.store(0, Ordering::Relaxed);
+    HANDED_OVER.store(handed_over.wrapping_add(words), Ordering::Relaxed);
+    ABANDONED.store(0, Ordering::Relaxed);
     // The fence is needed because the channel reads what was written to the block and to the ring,
     // and the compiler does not know of this reader.
     fence(Ordering::Release);
-    DMA.write(channel::READ_ADDRESS, address);
-    DMA.write(channel::START, words);
+    DMA.ch(0).ch_read_addr().put(address);
+    // Writing the count here starts the channel.
+    DMA.ch(0).ch_al1_trans_count_trig().put(words);
 }
 
-/// The number of the `count` words from `told` on that can be sent as planned because enough steps
-/// wait after them, whatever these words are.
+/// The number of the `count` words from `handed_over` on that can be sent as planned because enough
+/// steps wait after them, whatever these words are.
 #[inline(always)]
-fn far_words(brake: &mut Brake, told: u32, count: u32) -> u32 {
-    let group = told / GROUP;
+fn far_words(brake: &mut Brake, handed_over: u32, count: u32) -> u32 {
+    let group = handed_over / GROUP;
     for groups in [FAR_GROUPS, 1] {
         let end = group.wrapping_add(groups).wrapping_mul(GROUP);
-        let words = end.wrapping_sub(told);
+        let words = end.wrapping_sub(handed_over);
         if words <= count && brake.pass_far(sum(end).load(Ordering::Relaxed), STATE.brake()) {
             return words;
         }
@@ -147,16 +146,16 @@ fn far_words(brake: &mut Brake, told: u32, count: u32) -> u32 {
     0
 }
 
-/// The number of the `count` words from `told` on that can be sent as planned according to one
-/// check of all of them; 0 if they must be examined one by one.
+/// The number of the `count` words from `handed_over` on that can be sent as planned according to
+/// one check of all of them; 0 if they must be examined one by one.
 #[inline(never)] // As a function of its own it needs only the core's registers.
 #[unsafe(link_section = ".data.in_ram")]
-fn calm_words(brake: &mut Brake, told: u32, count: u32) -> u32 {
+fn calm_words(brake: &mut Brake, handed_over: u32, count: u32) -> u32 {
     let (mut words, mut ticks) = (0, 0);
     let (mut around, mut longest, mut shortest) = (0, 0, u32::MAX);
     while words < count.min(CALM_WORDS) && ticks <= BRAKED_TICKS {
-        let at = told.wrapping_add(words);
-        let step = way(at).load(Ordering::Relaxed);
+        let at = handed_over.wrapping_add(words);
+        let step = lengths(at).load(Ordering::Relaxed);
         let planned = place(at).load(Ordering::Relaxed) >> 8;
         if step != 0 {
             around += step & 0xFFFF;
@@ -169,19 +168,19 @@ fn calm_words(brake: &mut Brake, told: u32, count: u32) -> u32 {
     if brake.pass(around, longest, shortest, STATE.brake()) { words } else { 0 }
 }
 
-/// Copies a block of the `count` words from `told` on and applies the same least ticks to all. This
-/// is used at high speed, where there is little time. Returns the number of words; 0 if it is not
-/// possible.
+/// Copies a block of the `count` words from `handed_over` on and applies the same least ticks to
+/// all. This is used at high speed, where there is little time. Returns the number of words; 0 if
+/// it is not possible.
 #[inline(never)]
 #[unsafe(link_section = ".data.in_ram")]
-fn brake_evenly(brake: &mut Brake, told: u32, count: u32) -> u32 {
-    let is_fast = place(told).load(Ordering::Relaxed) >> 8 < FAST_TICKS;
+fn brake_evenly(brake: &mut Brake, handed_over: u32, count: u32) -> u32 {
+    let is_fast = place(handed_over).load(Ordering::Relaxed) >> 8 < FAST_TICKS;
     if count < BRAKED_WORDS || !is_fast {
         return 0;
     }
     let (mut around, mut longest) = (0, 0);
     for number in 0..BRAKED_WORDS {
-        let step = way(told.wrapping_add(number)).load(Ordering::Relaxed);
+        let step = lengths(handed_over.wrapping_add(number)).load(Ordering::Relaxed);
         if step == 0 {
             return 0;
         }
@@ -192,7 +191,7 @@ fn brake_evenly(brake: &mut Brake, told: u32, count: u32) -> u32 {
     let least = least.saturating_sub(PULSE_TICKS + STATE.pulse_ticks()).min(StepEvent::MAX_TICKS);
     let mut is_braked = false;
     for (number, braked) in (0..).zip(&BRAKED.0) {
-        let mut word = place(told.wrapping_add(number)).load(Ordering::Relaxed);
+        let mut word = place(handed_over.wrapping_add(number)).load(Ordering::Relaxed);
         if word >> 8 < least {
             word = least << 8 | word & 0xFF;
             is_braked = true;
@@ -203,17 +202,17 @@ fn brake_evenly(brake: &mut Brake, told: u32, count: u32) -> u32 {
     BRAKED_WORDS
 }
 
-/// Copies the first of the `count` words from `told` on, and lengthens each step to the least ticks
-/// that it needs. Returns the number of words.
+/// Copies the first of the `count` words from `handed_over` on, and lengthens each step to the
+/// least ticks that it needs. Returns the number of words.
 #[inline(never)]
 #[unsafe(link_section = ".data.in_ram")]
-fn brake_words(brake: &mut Brake, told: u32, count: u32) -> u32 {
+fn brake_words(brake: &mut Brake, handed_over: u32, count: u32) -> u32 {
     let beyond = PULSE_TICKS + STATE.pulse_ticks();
     let (mut words, mut ticks, mut more) = (0, 0, 0);
     for (number, braked) in (0..count).zip(&BRAKED.0) {
-        let at = told.wrapping_add(number);
+        let at = handed_over.wrapping_add(number);
         let mut word = place(at).load(Ordering::Relaxed);
-        let step = way(at).load(Ordering::Relaxed);
+        let step = lengths(at).load(Ordering::Relaxed);
         if step != 0 {
             let mut least = brake.step(unpack(step), STATE.brake());
             let planned = (word >> 8) + beyond;
@@ -241,6 +240,6 @@ fn brake_words(brake: &mut Brake, told: u32, count: u32) -> u32 {
 #[interrupt]
 #[unsafe(link_section = ".data.in_ram")]
 fn DMA_IRQ_0() {
-    DMA.write(channel::INTERRUPT, CHANNEL);
+    DMA.ints0().put(CHANNEL);
     feed();
 }

@@ -6,9 +6,9 @@ use rp2040_hal::pac::interrupt;
 use static_cell::StaticCell;
 
 use super::STATE;
-use super::engine::{FLAG, machine};
+use super::engine::FLAG;
 use crate::boards::handler::Owned;
-use crate::boards::pico::registers::PIO0;
+use crate::boards::pico::registers::{PIO0, Put};
 use crate::boards::pico::{critical, lift, pen};
 
 /// The number of slots in the queue, one of which stays empty. A height of the pen takes one slot,
@@ -29,7 +29,7 @@ pub static HEIGHTS_DUE: Owned<Consumer<'static, u8>> = Owned::empty();
 /// Processes the entries that are left in the queue. If two heights come faster than the interrupt,
 /// one is left over, and the last one counts. Steps of the pen's motor are left over only where
 /// everything was discarded.
-pub fn heal_pen() {
+pub fn drain_heights() {
     critical::with_pen_masked(|| {
         // SAFETY: the handler that owns it is masked.
         if let Some(due) = unsafe { HEIGHTS_DUE.get() } {
@@ -54,7 +54,7 @@ fn set_lift(step: bool, down: bool) {
 #[interrupt]
 #[unsafe(link_section = ".data.in_ram")]
 fn PIO0_IRQ_0() {
-    PIO0.write(machine::FLAGS, FLAG);
+    PIO0.irq().put(FLAG);
     // SAFETY: this is the handler that owns it.
     if let Some(height) = unsafe { HEIGHTS_DUE.get() }.and_then(Consumer::dequeue) {
         if height & lift_levels::MARK == 0 {

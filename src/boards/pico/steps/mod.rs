@@ -20,6 +20,7 @@
 //! that lifts it, wait in a queue of their own, because a word has no room for them. An interrupt
 //! sets the servo and the pins.
 
+mod append;
 mod engine;
 mod feed;
 mod heights;
@@ -30,22 +31,19 @@ use core::sync::atomic::{Ordering, compiler_fence};
 use cortex_m::peripheral::NVIC;
 use heapless::spsc::{Producer, Queue};
 use penup::machine::PulserState;
-use penup::motion::{
-    Brake, EventKind, EventQueue, QueueSize, Runner, StepEvent, StepLength, StepTrain, StepWay,
-    TICKS_PER_SECOND,
-};
+use penup::motion::{Brake, QueueSize, Runner, StepEvent, StepLength, TICKS_PER_SECOND};
 use rp2040_hal::pac::Interrupt;
 
-use super::registers::{DMA, PIO0};
+use super::registers::{DMA, Get, PIO0, Put};
 use super::{clock, critical, pen, words};
 pub use engine::release;
 use engine::{
     LEVEL, LEVELS, PEN_TICKS, PULSE_TICKS, PULSES, RELEASED, STALLED, TARGETS, WAIT_TICKS, begin,
-    channel, machine, order, set_pins, target,
+    order, set_pins, target,
 };
-use feed::{BRAKE, FEEDING, GIVEN_UP, TOLD, WRITTEN, taken};
-use heights::{HEIGHT_QUEUE, HEIGHTS, HEIGHTS_DUE, heal_pen, lift_levels};
-use word_ring::{GROUP, WAYS, WORDS, pack, place, row, sum, way};
+use feed::{ABANDONED, BRAKE, FEEDING, HANDED_OVER, WRITTEN, taken};
+use heights::{HEIGHT_QUEUE, HEIGHTS, HEIGHTS_DUE, drain_heights};
+use word_ring::{WORDS, place, row};
 
 pub(super) use target::PULSE;
 
@@ -76,8 +74,8 @@ pub struct Steps {
     /// The number of events that still fit: the number when the state machine's progress was last
     /// read, less the events that have come since.
     room: u32,
-    /// The value of [`flips`], which does not change while anything moves.
-    flips: u32,
+    /// The value of [`inverted_levels`], which does not change while anything moves.
+    inverted_levels: u32,
     /// The value of [`PulserState::pulse_ticks`], which does not change while anything moves.
     pulse_ticks: u32,
     /// For each combination of levels, what a pulse adds to x (in the lower half) and to y (in the
@@ -125,7 +123,7 @@ pub fn set_up(nvic: &mut NVIC) -> Steps {
         step_length: StepLength::default(),
         written: 0,
         room: 0,
-        flips: 0,
+        inverted_levels: 0,
         pulse_ticks: 0,
         moves: [0; LEVELS as usize + 1],
         levels: RELEASED,
@@ -165,7 +163,7 @@ impl Steps {
     #[inline(never)]
     pub fn sync_consumed(&mut self) {
         if STATE.is_halted() {
-            self.throw_away();
+            self.discard_waiting();
             pen::set_height(0);
         }
         let taken = taken();
@@ -176,14 +174,14 @@ impl Steps {
         let was_resting = self.resting;
         let began = taken != self.taken;
         self.count_to(taken);
-        let stalled = PIO0.read(machine::FIFO_DEBUG) & STALLED != 0;
-        let waits = PIO0.read(machine::ADDRESS) == order::JUMP_TO_START;
+        let stalled = PIO0.fdebug().get() & STALLED != 0;
+        let waits = PIO0.sm(0).sm_addr().get() == u32::from(engine::START);
         self.drained = stalled && waits && taken == self.written;
         if self.drained && !was_drained {
-            heal_pen();
+            drain_heights();
         }
         if stalled && began {
-            PIO0.write(machine::FIFO_DEBUG, STALLED);
+            PIO0.fdebug().put(STALLED);
         }
         self.resting = self.drained || (was_resting && !began);
         // Before the state machine begins, and when its beginning is first seen, the flag may be
@@ -202,11 +200,11 @@ impl Steps {
 
     /// Adopts the settings, which change only while nothing moves.
     fn configure(&mut self) {
-        let flips = flips();
-        if flips != self.flips {
-            self.flips = flips;
+        let inverted_levels = inverted_levels();
+        if inverted_levels != self.inverted_levels {
+            self.inverted_levels = inverted_levels;
             for (levels, packed) in (0..).zip(&mut self.moves) {
-                let (dx, dy) = StepEvent::from_bits(levels ^ flips).step();
+                let (dx, dy) = StepEvent::from_bits(levels ^ inverted_levels).step();
                 *packed = dx.wrapping_add(dy << 16).cast_unsigned();
             }
         }
@@ -258,7 +256,7 @@ impl Steps {
     }
 
     /// Stops at once, and discards the words that wait.
-    fn throw_away(&mut self) {
+    fn discard_waiting(&mut self) {
         if self.drained && self.written == self.taken {
             return;
         }
@@ -266,7 +264,7 @@ impl Steps {
         let taken = taken();
         self.count_to(taken);
         set_pins(self.levels_now() & !PULSES);
-        while PIO0.read(machine::FIFO_LEVEL) & LEVEL != 0 {
+        while PIO0.flevel().get() & LEVEL != 0 {
             order(order::PULL_WITHOUT_WAITING);
         }
         // SAFETY: the interrupt of the handler that owns it does not come now.
@@ -275,14 +273,14 @@ impl Steps {
         }
         self.written = taken;
         WRITTEN.store(taken, Ordering::Relaxed);
-        TOLD.store(taken, Ordering::Relaxed);
-        GIVEN_UP.store(DMA.read(channel::COUNT), Ordering::Relaxed);
+        HANDED_OVER.store(taken, Ordering::Relaxed);
+        ABANDONED.store(DMA.ch(0).ch_trans_count().get(), Ordering::Relaxed);
         FEEDING.store(false, Ordering::Relaxed);
         begin(self.pulse_ticks);
         // All of this must be written before the handler may run.
         compiler_fence(Ordering::SeqCst);
         feed::let_interrupt_come();
-        heal_pen();
+        drain_heights();
         self.levels = self.levels_now() & !PULSES;
         self.moving = false;
         self.drained = true;
@@ -295,210 +293,9 @@ impl Steps {
     }
 }
 
-impl EventQueue for Steps {
-    fn room(&self) -> usize {
-        self.room as usize
-    }
-
-    fn push(&mut self, event: StepEvent) -> Result<(), StepEvent> {
-        self.room = self.room.checked_sub(1).ok_or(event)?;
-        let (word, beyond) = match event.kind() {
-            EventKind::Pen { height } => {
-                self.heights.enqueue(height).map_err(|_| event)?;
-                self.moving = false;
-                (self.levels | target::MOVE_PEN, PEN_TICKS)
-            }
-            EventKind::Lift { step, down } => {
-                self.moving = true;
-                return self.push_lift(step, down, event);
-            }
-            EventKind::Levels(levels) => {
-                self.moving = levels & StepEvent::AT_REST == 0;
-                let pins = (u32::from(levels) & LEVELS) ^ self.flips;
-                self.levels = pins & !PULSES;
-                if event.is_slack() {
-                    return self.push_slack(pins, event.ticks());
-                }
-                if pins & PULSES == 0 {
-                    (pins | target::WAIT, WAIT_TICKS)
-                } else {
-                    (pins | target::PULSE, PULSE_TICKS + self.pulse_ticks)
-                }
-            }
-        };
-        // Without a braking rule, no lengths are passed on or counted.
-        let is_told = event.is_step() && STATE.brake().is_on();
-        let step = if is_told { self.step_length.step() } else { StepWay::default() };
-        if word & TARGETS == target::PULSE {
-            self.put(word, event.ticks().saturating_sub(beyond), step);
-        } else {
-            self.put_wait(word, beyond, event.ticks());
-        }
-        self.publish();
-        Ok(())
-    }
-
-    fn set_step_length(&mut self, units: u32, after_next: bool) -> Result<(), StepEvent> {
-        if units != self.step_length.last() {
-            self.step_length.set(units, after_next);
-        }
-        Ok(())
-    }
-
-    /// Appends steps of a train. It takes 17 cycles per step, or more if the step may be braked.
-    #[unsafe(link_section = ".data.in_ram")] // As above.
-    fn push_train(&mut self, train: &mut StepTrain, count: u32) -> Result<(), StepEvent> {
-        let Some(room) = self.room.checked_sub(count) else {
-            return train.push_each(count, |event| self.push(event));
-        };
-        let beyond = (PULSE_TICKS + self.pulse_ticks) << 8;
-        let flips = self.flips | target::PULSE;
-        train.convert(|event| (event ^ flips).wrapping_sub(beyond));
-        let mut done = 0;
-        while done < count {
-            let row = row(self.written.wrapping_add(done), count - done);
-            words::write_train(train, row);
-            done += row.len() as u32;
-        }
-        let word = place(self.written.wrapping_add(count - 1)).load(Ordering::Relaxed);
-        train.convert(|word| word.wrapping_add(beyond) ^ flips);
-        if STATE.brake().is_on() {
-            self.tell_ways(count);
-        }
-        self.room = room;
-        self.written = self.written.wrapping_add(count);
-        self.levels = word & LEVELS & !PULSES;
-        self.moving = true;
-        self.publish();
-        Ok(())
-    }
-}
-
-impl Steps {
-    /// Appends a word that takes `beyond` ticks besides its count, followed by waits, so that it
-    /// takes `ticks` in all.
-    fn put_wait(&mut self, word: u32, beyond: u32, mut ticks: u32) {
-        let step = StepWay::default();
-        if ticks <= BRAKED_TICKS {
-            self.put(word, ticks.saturating_sub(beyond), step);
-            return;
-        }
-        let part = (ticks / WAIT_WORDS).max(BRAKED_TICKS);
-        self.put(word, part - beyond, step);
-        ticks -= part;
-        while ticks > 0 {
-            let part = if ticks < 2 * part { ticks } else { part };
-            self.put(self.levels | target::WAIT, part - WAIT_TICKS, step);
-            ticks -= part;
-        }
-    }
-
-    /// Appends an event of the pen's motor. The pulse lasts half of the event, so that the handler
-    /// is never two levels behind.
-    fn push_lift(&mut self, step: bool, down: bool, event: StepEvent) -> Result<(), StepEvent> {
-        use lift_levels::{DOWN, MARK, STEP};
-        let pins = MARK | if down { DOWN } else { 0 };
-        let word = self.levels | target::MOVE_PEN;
-        let mut ticks = event.ticks();
-        if step {
-            self.room = self.room.saturating_sub(1);
-            self.heights.enqueue(pins | STEP).map_err(|_| event)?;
-            let high = (ticks / 2).min(BRAKED_TICKS);
-            self.put_wait(word, PEN_TICKS, high);
-            ticks -= high;
-        }
-        self.heights.enqueue(pins).map_err(|_| event)?;
-        self.put_wait(word, PEN_TICKS, ticks);
-        self.publish();
-        Ok(())
-    }
-
-    /// Appends a pulse that takes up slack. For the state machine it is not a pulse, so that it is
-    /// counted separately: it is a wait while the pins are high and another while they are low.
-    fn push_slack(&mut self, pins: u32, ticks: u32) -> Result<(), StepEvent> {
-        self.room = self.room.saturating_sub(1);
-        let low = ticks.saturating_sub(self.pulse_ticks);
-        for (levels, ticks) in [(pins, self.pulse_ticks), (self.levels, low)] {
-            let count = ticks.saturating_sub(WAIT_TICKS);
-            self.put(levels | target::WAIT, count, StepWay::default());
-        }
-        self.publish();
-        Ok(())
-    }
-
-    /// Records the lengths of the next `count` words, which are steps. `count` is less than the
-    /// size of the ring.
-    #[inline(never)] // As a function of its own it needs only the core's registers.
-    #[unsafe(link_section = ".data.in_ram")] // This leaves the flash's cache to the planner.
-    fn tell_ways(&mut self, count: u32) {
-        if let Some(step) = self.step_length.steady() {
-            return self.tell_same_ways(step, count);
-        }
-        let mut queued = STATE.brake().queued();
-        for number in 0..count {
-            let word = self.written.wrapping_add(number);
-            let step = self.step_length.step();
-            way(word).store(pack(step), Ordering::Relaxed);
-            queued = queued.wrapping_add(step.around);
-            let next = word.wrapping_add(1);
-            if next.is_multiple_of(GROUP) {
-                sum(next).store(queued, Ordering::Relaxed);
-            }
-        }
-        STATE.brake().set_queued(queued);
-    }
-
-    /// Does the same where all steps have the same length, in a few cycles per step.
-    fn tell_same_ways(&self, step: StepWay, count: u32) {
-        let packed = pack(step);
-        let first = (self.written % WORDS) as usize;
-        let (around, behind) = WAYS.split_at(first);
-        let before_end = behind.len().min(count as usize);
-        let ways = [&behind[..before_end], &around[..count as usize - before_end]];
-        for part in ways {
-            for way in part {
-                way.store(packed, Ordering::Relaxed);
-            }
-        }
-        let queued = STATE.brake().queued();
-        let mut number = GROUP - self.written % GROUP;
-        while number <= count {
-            let units = queued.wrapping_add(step.around * number);
-            sum(self.written.wrapping_add(number)).store(units, Ordering::Relaxed);
-            number += GROUP;
-        }
-        STATE.brake().set_queued(queued.wrapping_add(step.around * count));
-    }
-
-    fn put(&mut self, word: u32, count: u32, step: StepWay) {
-        place(self.written).store(word | count << 8, Ordering::Relaxed);
-        way(self.written).store(pack(step), Ordering::Relaxed);
-        self.written = self.written.wrapping_add(1);
-        STATE.brake().add(step.around);
-        if self.written.is_multiple_of(GROUP) {
-            sum(self.written).store(STATE.brake().queued(), Ordering::Relaxed);
-        }
-    }
-
-    /// Makes the words visible to the channel, and starts the transfer if there are many.
-    fn publish(&mut self) {
-        WRITTEN.store(self.written, Ordering::Release);
-        // A handler that finds nothing more to transfer must either have seen these words, or its
-        // result must be seen here.
-        compiler_fence(Ordering::SeqCst);
-        if FEEDING.load(Ordering::Relaxed) {
-            return;
-        }
-        // If the state machine is already running, it continues at once.
-        if !self.drained || self.written.wrapping_sub(self.taken) >= WORDS / 2 {
-            self.start();
-        }
-    }
-}
-
 /// The bits in which the levels of the pins differ from those of an event. Drivers are on while
 /// their pin is low, and a high direction pin counts up unless it is inverted.
-fn flips() -> u32 {
+fn inverted_levels() -> u32 {
     const DOWN: u8 = StepEvent::DOWN_X | StepEvent::DOWN_Y;
     RELEASED | u32::from(DOWN ^ STATE.inverted() << 2)
 }

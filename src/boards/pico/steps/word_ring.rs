@@ -17,7 +17,7 @@ const _: () = assert!(align_of::<Ring>() == size_of::<Ring>());
 static RING: Ring = Ring([const { AtomicU32::new(0) }; WORDS as usize]);
 /// For each word of the ring that is a step: `around` of [`StepWay`] in the lower half and `behind`
 /// in the upper one. For other words: 0.
-pub static WAYS: [AtomicU32; WORDS as usize] = [const { AtomicU32::new(0) }; WORDS as usize];
+pub static LENGTHS: [AtomicU32; WORDS as usize] = [const { AtomicU32::new(0) }; WORDS as usize];
 
 /// For each group of words, the number of length units that were queued up to its end; it wraps.
 static SUMS: [AtomicU32; (WORDS / GROUP) as usize] =
@@ -40,8 +40,8 @@ pub fn ring_address(word: u32) -> u32 {
 }
 
 /// The packed lengths of the step in word number `word`.
-pub fn way(word: u32) -> &'static AtomicU32 {
-    &WAYS[(word % WORDS) as usize]
+pub fn lengths(word: u32) -> &'static AtomicU32 {
+    &LENGTHS[(word % WORDS) as usize]
 }
 
 /// The sum of the group that ends before `word`.
@@ -50,11 +50,11 @@ pub fn sum(word: u32) -> &'static AtomicU32 {
 }
 
 /// Packs the lengths of a step into one word.
-pub fn pack(way: StepWay) -> u32 {
-    way.around | way.behind << 16
+pub fn pack(step: StepWay) -> u32 {
+    step.around | step.behind << 16
 }
 
 /// Unpacks the lengths of a step.
-pub fn unpack(way: u32) -> StepWay {
-    StepWay { around: way & 0xFFFF, behind: way >> 16 }
+pub fn unpack(lengths: u32) -> StepWay {
+    StepWay { around: lengths & 0xFFFF, behind: lengths >> 16 }
 }

@@ -15,40 +15,31 @@
 //! The workaround takes a millisecond in which the controller does not hear the bus. The host
 //! leaves a device alone for ten milliseconds after a reset.
 
-use super::super::registers::{BANK_0_CONTROLS, BANK_0_PADS, SYSTEM_INFORMATION, USB};
-use super::{BUS_RESET, INTERRUPTS};
+use super::super::registers::{Get, IO_BANK0, PADS_BANK0, Put, SYSINFO, USB};
+use super::BUS_RESET;
 
-/// The number of the chip; its revision is in the highest bits, 1 for B0 and B1.
-const CHIP: usize = 0;
+/// The revision, in the highest bits of the chip's number, is 1 for B0 and B1.
 const REVISION_SHIFT: u32 = 28;
 const FIRST_SOUND_REVISION: u32 = 2;
 
-/// Registers of the controller and their bits. Bits written to the `SET` or `CLEAR` address of a
-/// register are set or cleared in it.
+/// Bits of the controller's registers.
 mod controller {
-    const SET: usize = 0x2000;
-    const CLEAR: usize = 0x3000;
-    pub const STATUS: usize = 0x50;
+    /// In the status: the levels of the wires.
     pub const LINE: u32 = 3 << 2;
     pub const BOTH_LOW: u32 = 0;
     pub const CONNECTED: u32 = 1 << 16;
-    /// Selects where the controller takes the levels of the wires from.
-    pub const SOURCE: usize = 0x74;
+    /// Where the controller takes the levels of the wires from.
     pub const WIRES: u32 = 1 | 1 << 3;
     pub const PINS: u32 = 1 << 2 | 1 << 3;
-    pub const SET_DIRECT: usize = 0x7C + SET;
     pub const PULLS_UP: u32 = 1 << 1;
-    pub const SET_OVERRIDE: usize = 0x80 + SET;
-    pub const CLEAR_OVERRIDE: usize = 0x80 + CLEAR;
     pub const OVERRIDES_PULL_UP: u32 = 1 << 2;
 }
 
-/// GPIO 15: its registers, and their bits.
+/// GPIO 15: its number, and bits of its registers.
 mod pin {
-    pub const PAD: usize = 0x40;
+    pub const NUMBER: usize = 15;
     /// Both pulls at once keep the present level.
     pub const KEEPS: u32 = 1 << 2 | 1 << 3;
-    pub const CONTROL: usize = 0x7C;
     pub const FUNCTION: u32 = 0x1F;
     pub const IS_USB_WIRE: u32 = 8;
     pub const OUTPUT: u32 = 3 << 12;
@@ -70,7 +61,7 @@ impl Connection {
     /// Whether the driver may process the controller's interrupts. It may not from a reset of the
     /// bus until the board is connected again. Call it repeatedly until it returns true.
     pub fn is_ready(&mut self) -> bool {
-        let status = USB.read(controller::STATUS);
+        let status = USB.sie_status().get();
         let is_connected = status & controller::CONNECTED != 0;
         match self.before {
             Some((pad, control)) if is_connected => {
@@ -79,7 +70,7 @@ impl Connection {
                 true
             }
             Some(_) => false,
-            None if is_connected || USB.read(INTERRUPTS) & BUS_RESET == 0 || is_sound() => true,
+            None if is_connected || USB.intr().get() & BUS_RESET == 0 || is_sound() => true,
             None => {
                 if status & controller::LINE != controller::BOTH_LOW {
                     self.before = Some(show_idle_bus());
@@ -92,31 +83,32 @@ impl Connection {
 
 /// Whether the chip is of a revision without the erratum.
 fn is_sound() -> bool {
-    SYSTEM_INFORMATION.read(CHIP) >> REVISION_SHIFT >= FIRST_SOUND_REVISION
+    SYSINFO.chip_id().get() >> REVISION_SHIFT >= FIRST_SOUND_REVISION
 }
 
 /// Shows the controller D+ high, from GPIO 15, and D- low, because GPIO 16 has another function.
 /// The wires stay pulled up, so that the host sees a device. Returns the pad and control registers
 /// of the pin.
 fn show_idle_bus() -> (u32, u32) {
-    let (pad, control) = (BANK_0_PADS.read(pin::PAD), BANK_0_CONTROLS.read(pin::CONTROL));
-    BANK_0_PADS.write(pin::PAD, pad | pin::KEEPS);
+    let (pads, controls) = (PADS_BANK0.gpio(pin::NUMBER), IO_BANK0.gpio(pin::NUMBER).gpio_ctrl());
+    let (pad, control) = (pads.get(), controls.get());
+    pads.put(pad | pin::KEEPS);
     // These writes are separate so that the controller never drives the pin.
     let control_off = control & !pin::OUTPUT | pin::OUTPUT_OFF;
     let control_wire = control_off & !pin::FUNCTION | pin::IS_USB_WIRE;
-    BANK_0_CONTROLS.write(pin::CONTROL, control_off);
-    BANK_0_CONTROLS.write(pin::CONTROL, control_wire);
-    BANK_0_CONTROLS.write(pin::CONTROL, control_wire | pin::READS_HIGH);
-    USB.write(controller::SET_DIRECT, controller::PULLS_UP);
-    USB.write(controller::SET_OVERRIDE, controller::OVERRIDES_PULL_UP);
-    USB.write(controller::SOURCE, controller::PINS);
+    controls.put(control_off);
+    controls.put(control_wire);
+    controls.put(control_wire | pin::READS_HIGH);
+    USB.usbphy_direct().set(controller::PULLS_UP);
+    USB.usbphy_direct_override().set(controller::OVERRIDES_PULL_UP);
+    USB.usb_muxing().put(controller::PINS);
     (pad, control)
 }
 
 /// Shows the controller the wires again, and restores the pin.
 fn show_wires(pad: u32, control: u32) {
-    USB.write(controller::SOURCE, controller::WIRES);
-    USB.write(controller::CLEAR_OVERRIDE, controller::OVERRIDES_PULL_UP);
-    BANK_0_CONTROLS.write(pin::CONTROL, control);
-    BANK_0_PADS.write(pin::PAD, pad);
+    USB.usb_muxing().put(controller::WIRES);
+    USB.usbphy_direct_override().clear(controller::OVERRIDES_PULL_UP);
+    IO_BANK0.gpio(pin::NUMBER).gpio_ctrl().put(control);
+    PADS_BANK0.gpio(pin::NUMBER).put(pad);
 }

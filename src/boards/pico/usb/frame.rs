@@ -8,16 +8,9 @@
 //! when nothing was sent before, and later packets not at all.
 
 use super::super::clock;
-use super::super::registers::USB;
+use super::super::registers::{Get, Put, USB};
 
-/// The register of the frame number. Reading it clears the interrupt.
-const NUMBER: usize = 0x48;
-/// The register of the interrupts before masking.
-const RAW: usize = 0x8C;
-/// Bits that are written to the first register are set in the mask of interrupts, and bits written
-/// to the second are cleared in it.
-const ENABLE: usize = 0x2090;
-const DISABLE: usize = 0x3090;
+/// The bit of the frame interrupt.
 const BEGAN: u32 = 1 << 17;
 
 /// The length of a frame, in microseconds.
@@ -42,11 +35,11 @@ impl Frame {
 
     /// Records the beginning of a frame, if there was one. Call it whenever the controller may have
     /// an interrupt.
-    pub fn look(&mut self) {
-        if !self.is_followed || USB.read(RAW) & BEGAN == 0 {
+    pub fn follow(&mut self) {
+        if !self.is_followed || USB.intr().get() & BEGAN == 0 {
             return;
         }
-        USB.read(NUMBER);
+        clear_interrupt();
         let now = clock::microseconds();
         self.began = match self.began {
             // The interrupt may have come late, but not the frame: the chip's crystal is as exact
@@ -62,22 +55,27 @@ impl Frame {
     }
 
     /// Whether a buffer may be made available now. If not, the next interrupt will ask again.
-    pub fn lets_send(&mut self) -> bool {
+    pub fn may_send(&mut self) -> bool {
         if !self.is_followed {
             self.is_followed = true;
             // An interrupt flag from before the interrupt was enabled says nothing about the time.
             self.began = None;
-            USB.read(NUMBER);
-            USB.write(ENABLE, BEGAN);
+            clear_interrupt();
+            USB.inte().set(BEGAN);
         }
         self.began.is_some_and(|began| clock::microseconds().wrapping_sub(began) < SAFE)
     }
 
     /// Switches the frame interrupts off, because nothing waits to be sent.
-    pub fn leave(&mut self) {
+    pub fn stop(&mut self) {
         if self.is_followed {
             self.is_followed = false;
-            USB.write(DISABLE, BEGAN);
+            USB.inte().clear(BEGAN);
         }
     }
+}
+
+/// Clears the frame interrupt, by reading the number of the frame.
+fn clear_interrupt() {
+    USB.sof_rd().get();
 }

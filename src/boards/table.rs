@@ -1,0 +1,252 @@
+//! The table of the boards: one row for each, with everything that a tool or the plotter needs to
+//! know about it.
+//!
+//! The firmware of a board takes its clock, pins and capacities from its row; the build script the
+//! feature and the memory map; `xtask` target, profile, budget and checks; `penup` the emulator and
+//! what its pins mean. A new board is a new row of [`BOARDS`] and a folder beside this file: see
+//! `docs/porting.md`.
+//!
+//! The file depends on nothing, because the build script includes it.
+
+/// A board.
+#[derive(Debug, PartialEq, Eq)]
+pub struct BoardRow {
+    /// The name on command lines, of the cargo feature, of the memory map in `boards`, of the image
+    /// in `target/firmware`, and in the reply to `$I`.
+    pub name: &'static str,
+    /// What the board is, for the help of command lines.
+    pub about: &'static str,
+    /// The compiler's name of the target.
+    pub target: &'static str,
+    /// The cargo profile of the firmware.
+    pub profile: &'static str,
+    /// The cargo feature that chooses where the log goes.
+    pub log: &'static str,
+    /// Whether the linker stores functions with the same instructions once, because flash is short.
+    pub folds_functions: bool,
+    /// Whether code runs from flash through a cache, so that the handlers of the steps must lie in
+    /// RAM, and the functions that `boards/NAME.x` names side by side.
+    pub has_flash_cache: bool,
+    /// Whether division uses registers that interrupt handlers share with the main loop.
+    pub has_shared_divider: bool,
+    /// The flash: its address and its size in bytes.
+    pub flash: Region,
+    /// The size of the second-stage boot loader at the start of flash, in bytes; the vector table
+    /// follows. 0 if there is none.
+    pub boot_loader: u64,
+    /// The RAM: its address and its size in bytes. The stack lies at its start.
+    pub ram: Region,
+    /// The memory that an image may use.
+    pub budget: ImageBudget,
+    /// The frequency of the core's clock in hertz.
+    pub clock_hertz: u32,
+    /// The pins of the machine.
+    pub pins: Pins,
+    /// The capacities of the plotter's memory.
+    pub memory: Capacities,
+    /// The largest scene that the board must be able to draw.
+    pub scene: Scene,
+    /// What emulates the board.
+    pub emulator: Emulator,
+    /// How an image gets onto a real board; `None` if the board is emulated only.
+    pub flashing: Option<Flashing>,
+}
+
+/// A range of addresses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Region {
+    /// The first address.
+    pub start: u64,
+    /// The size in bytes.
+    pub size: u64,
+}
+
+impl Region {
+    /// Whether the region contains `size` bytes from `start` on.
+    pub const fn holds(self, start: u64, size: u64) -> bool {
+        start >= self.start && start + size <= self.start + self.size
+    }
+}
+
+/// The memory that an image may use, in bytes. A change that needs more raises the limit and gives
+/// the reason.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ImageBudget {
+    /// The most flash.
+    pub flash: u64,
+    /// The most RAM beside the stack.
+    pub ram: u64,
+    /// The least stack.
+    pub stack: u64,
+}
+
+/// The numbers of the machine's pins, as the chip counts them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Pins {
+    /// A rising edge steps x.
+    pub step_x: u8,
+    /// The direction of x.
+    pub dir_x: u8,
+    /// A rising edge steps y.
+    pub step_y: u8,
+    /// The direction of y.
+    pub dir_y: u8,
+    /// The enable pin of the motor drivers; low switches them on.
+    pub enable: u8,
+    /// The servo or the solenoid of the pen.
+    pub pen: u8,
+    /// A rising edge steps the motor that lifts the pen.
+    pub step_z: u8,
+    /// The direction of that motor; high lowers the pen.
+    pub dir_z: u8,
+    /// The limit switch of x.
+    pub limit_x: u8,
+    /// The limit switch of y.
+    pub limit_y: u8,
+    /// The emergency stop.
+    pub stop: u8,
+}
+
+/// The capacities of the plotter's memory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Capacities {
+    /// Number of vertices of the model.
+    pub vertices: usize,
+    /// Number of face corners and bar ends of the model.
+    pub corners: usize,
+    /// Size of the working memory in words of 8 bytes.
+    pub words: usize,
+    /// Number of serial ports, 1 or 2.
+    pub ports: usize,
+    /// Number of blocks of motion that are planned ahead.
+    pub blocks: usize,
+}
+
+/// A scene, and the size of the drawing that results from it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Scene {
+    /// Number of vertices of the model.
+    pub vertices: usize,
+    /// Number of corners of all faces together.
+    pub corners: usize,
+    /// Number of faces; each is triangulated as a fan.
+    pub faces: usize,
+    /// Number of lines of the drawing, with hidden lines erased.
+    pub lines: usize,
+    /// Number of odd points (of odd degree) of a drawing for which the exact matching must still
+    /// fit.
+    pub odd_points: usize,
+}
+
+/// What emulates a board.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Emulator {
+    /// QEMU for Arm, with this machine.
+    Qemu {
+        /// The name of the machine.
+        machine: &'static str,
+    },
+    /// The npm package rp2040js under Node.
+    Rp2040js,
+}
+
+/// How an image gets onto a real board.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Flashing {
+    /// The name by which probe-rs knows the chip.
+    pub chip: &'static str,
+    /// The name of the drive that the boot ROM shows.
+    pub drive: &'static str,
+    /// The number of the chip's family in a UF2 image.
+    pub uf2_family: u32,
+    /// A part of the name that Linux gives to the USB port of the running firmware.
+    pub port: &'static str,
+}
+
+/// Texas Instruments LM3S6965 in QEMU. The outputs are those of port B and the contacts those of
+/// port C. The linker leaves to the image whatever lies beside the stack.
+pub const LM3S6965: BoardRow = BoardRow {
+    name: "lm3s6965",
+    about: "Texas Instruments LM3S6965: Cortex-M3, 64 KiB of RAM, in QEMU",
+    target: "thumbv7m-none-eabi",
+    profile: "firmware",
+    log: "log-semihosting",
+    folds_functions: true,
+    has_flash_cache: false,
+    has_shared_divider: false,
+    flash: Region { start: 0, size: 256 << 10 },
+    boot_loader: 0,
+    ram: Region { start: 0x2000_0000, size: 64 << 10 },
+    budget: ImageBudget { flash: 256 << 10, ram: 55_696, stack: 9_792 },
+    clock_hertz: 50_000_000,
+    pins: Pins {
+        step_x: 0,
+        dir_x: 1,
+        step_y: 2,
+        dir_y: 3,
+        enable: 4,
+        pen: 5,
+        step_z: 6,
+        dir_z: 7,
+        limit_x: 4,
+        limit_y: 5,
+        stop: 6,
+    },
+    // Enough for a lattice of 125 cubes, and for a stack of 9,840 bytes besides.
+    memory: Capacities { vertices: 1000, corners: 3000, words: 4208, ports: 1, blocks: 32 },
+    scene: Scene { vertices: 1000, corners: 3000, faces: 750, lines: 820, odd_points: 400 },
+    emulator: Emulator::Qemu { machine: "lm3s6965evb" },
+    flashing: None,
+};
+
+/// Raspberry Pi Pico. The log is that of the real board, because the same image is flashed. The
+/// budget is all that the memory map (`boards/pico.x`) leaves beside the records and the stack.
+pub const PICO: BoardRow = BoardRow {
+    name: "pico",
+    about: "Raspberry Pi Pico: RP2040, Cortex-M0+, 264 KiB of RAM, in rp2040js",
+    target: "thumbv6m-none-eabi",
+    profile: "pico",
+    log: "log-rtt",
+    folds_functions: false,
+    has_flash_cache: true,
+    has_shared_divider: true,
+    flash: Region { start: 0x1000_0000, size: 2 << 20 },
+    boot_loader: 256,
+    ram: Region { start: 0x2000_0000, size: 264 << 10 },
+    budget: ImageBudget { flash: 1760 << 10, ram: 252 << 10, stack: 12 << 10 },
+    clock_hertz: 125_000_000,
+    pins: Pins {
+        step_x: 2,
+        step_y: 3,
+        dir_x: 4,
+        dir_y: 5,
+        enable: 6,
+        pen: 7,
+        limit_x: 8,
+        limit_y: 9,
+        stop: 10,
+        step_z: 11,
+        dir_z: 12,
+    },
+    // Enough for a lattice of 343 cubes. The ports are the UART and USB. At 500 mm/s and 15 m/s²
+    // the machine stops within 167 chords of 0.05 mm, so 192 blocks are enough to keep that speed.
+    memory: Capacities { vertices: 4096, corners: 12288, words: 16384, ports: 2, blocks: 192 },
+    scene: Scene { vertices: 2744, corners: 8232, faces: 2058, lines: 1871, odd_points: 1000 },
+    emulator: Emulator::Rp2040js,
+    flashing: Some(Flashing {
+        chip: "RP2040",
+        drive: "RPI-RP2",
+        uf2_family: 0xE48B_FF56,
+        port: "penup_pen_plotter",
+    }),
+};
+
+/// All boards. The first one is the default of command lines.
+pub const BOARDS: [&BoardRow; 2] = [&LM3S6965, &PICO];
+
+impl BoardRow {
+    /// The board of this name.
+    pub fn named(name: &str) -> Option<&'static Self> {
+        BOARDS.into_iter().find(|board| board.name == name)
+    }
+}
