@@ -43,6 +43,7 @@ extern crate std;
 
 pub mod checksum;
 pub mod fixed;
+pub mod host_only;
 pub mod stage;
 
 pub mod geometry;

@@ -5,7 +5,7 @@ use crate::formats::ReadError;
 use crate::interrupt::EXIT_CODE;
 use crate::lines::{JobLine, Origin};
 use crate::protocol::RECEIVE_WINDOW;
-use crate::words::{asked, explained, told};
+use crate::words::{asked, explained, for_client};
 use penup::protocol::CommandError;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -125,7 +125,7 @@ pub enum Error {
     },
     /// The machine stopped with an alarm.
     #[error("the plotter stopped with alarm {number}{}\nSee docs/protocol.md for the alarm's \
-     meaning", said(&told(&messages.join("; "))))]
+     meaning", said(&for_client(&messages.join("; "))))]
     Alarm {
         /// The `N` of its `ALARM:N`.
         number: u16,

@@ -1,6 +1,6 @@
 //! Reports the progress of a job to the user: lines sent, then strokes drawn.
 
-use crate::words::told;
+use crate::words::for_client;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::{self, Write as _};
 
@@ -77,7 +77,7 @@ impl Progress for Bar {
     fn note(&mut self, note: &str) {
         self.bar.suspend(|| {
             // A closed standard error is no reason to fail.
-            let _ = writeln!(io::stderr(), "penup: note: {}", told(note));
+            let _ = writeln!(io::stderr(), "penup: note: {}", for_client(note));
         });
     }
 

@@ -1,12 +1,11 @@
 //! The vocabulary of the serial protocol: the commands for a plotter and the replies that it may
 //! send.
 //!
-//! All names of commands and settings that the client uses are defined here. `docs/protocol.md`
-//! describes the protocol itself.
+//! All names of commands that the client uses are defined here; those of options are the library's.
+//! `docs/protocol.md` describes the protocol itself.
 
 use penup::checksum::CRC_16;
-use penup::protocol::MEANINGS;
-use std::fmt::Write as _;
+use penup::protocol::{ErrorEntry, error_entries};
 
 /// Deletes the model.
 pub const CLEAR: &str = "$clear";
@@ -18,50 +17,9 @@ pub const PLOT: &str = "$plot";
 
 /// Lets the plotter choose the camera. Later camera settings override its choice one by one.
 pub const VIEW_AUTO: &str = "$view=auto";
-/// The position of the eye.
-pub const EYE: &str = "$eye";
-/// The point that the eye looks at.
-pub const AT: &str = "$at";
-/// The direction that is up in the picture.
-pub const UP: &str = "$up";
-/// The rotation angles of Harrison's program.
-pub const ANGLES: &str = "$angles";
-/// What to do with parts of the model that are behind the eye.
-pub const BEHIND: &str = "$behind";
-/// Whether the intersection lines of faces that pass through each other are drawn.
-pub const SEAMS: &str = "$seams";
-/// Whether blocks that touch are drawn as one shape.
-pub const BLOCKS: &str = "$blocks";
-/// The crease angle in degrees: an edge between two faces that bend less is not drawn.
-pub const CREASE: &str = "$crease";
-/// The error bound of the coordinates of the model.
-pub const PRECISION: &str = "$precision";
-/// The kind of projection.
-pub const PROJECTION: &str = "$projection";
-/// The method of determining visibility.
-pub const SEE: &str = "$see";
-/// The method of ordering the strokes.
-pub const ORDER: &str = "$order";
-/// Whether the pen returns to its starting point at the end.
-pub const CYCLE: &str = "$cycle";
-/// The amount of work to spend on improving the order.
-pub const EFFORT: &str = "$effort";
-/// The extra pen-up travel, in millimetres, that is accepted to save one pen lift.
-pub const LIFT: &str = "$lift";
-/// How hidden lines are drawn.
-pub const HIDDEN: &str = "$hidden";
-/// The width and the height of the page, in millimetres.
-pub const PAGE: &str = "$page";
-/// The margin on each side of the page, in millimetres.
-pub const MARGIN: &str = "$margin";
-/// Whether the file chooses the pens, or one pen draws everything.
-pub const PENS: &str = "$pens";
-/// The title below the drawing.
-pub const TITLE: &str = "$title";
-/// The height of the title's capital letters, in millimetres.
-pub const TITLE_SIZE: &str = "$title-size";
-/// `on` scales plans and solids to the page; `off` scales solids only and draws plans at true size.
-pub const FIT: &str = "$fit";
+/// The name of the option that chooses who assigns pens. The names of the other options are those
+/// of the library's table.
+pub const PENS: &str = "pens";
 
 /// With a line number of its own, sets the number of the last line to that; without one, queries
 /// the number of the last accepted line.
@@ -107,15 +65,15 @@ pub fn is_penup(greeting: &str) -> bool {
     greeting.starts_with("Grbl ") && greeting.contains("[penup ")
 }
 
-/// The meaning of `error:number`.
+/// What the library says of `error:number`. `None` if it has no such error.
 ///
 /// ```
-/// use penup_client::protocol::meaning;
-/// assert_eq!(meaning(9999), "a reason that this client does not know");
+/// use penup_client::protocol::error_entry;
+/// assert_eq!(error_entry(2).map(|entry| entry.meaning.get()), Some("not a number"));
+/// assert_eq!(error_entry(9999), None);
 /// ```
-pub fn meaning(number: u16) -> &'static str {
-    let known = MEANINGS.iter().find(|(known, _)| *known == number);
-    known.map_or("a reason that this client does not know", |(_, text)| text)
+pub fn error_entry(number: u16) -> Option<ErrorEntry> {
+    error_entries().into_iter().find(|entry| entry.number == number)
 }
 
 /// A line that the plotter sent.
@@ -281,24 +239,6 @@ impl ReplyReader {
         let text = text.trim();
         (!text.is_empty()).then(|| Reply::parse(text))
     }
-}
-
-/// Formats a setting as `name=a,b,c` with plain decimals, because the plotter reads no exponents.
-///
-/// ```
-/// let line = penup_client::protocol::setting("$eye", &[-3.0, 1e-3, 2.5], ',');
-/// assert_eq!(line, "$eye=-3,0.001,2.5");
-/// ```
-pub fn setting(name: &str, values: &[f64], separator: char) -> String {
-    let mut line = format!("{name}=");
-    for (i, value) in values.iter().enumerate() {
-        if i > 0 {
-            line.push(separator);
-        }
-        // Writing to a string cannot fail.
-        let _ = write!(line, "{value}");
-    }
-    line
 }
 
 #[cfg(test)]

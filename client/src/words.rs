@@ -1,12 +1,13 @@
 //! Translates the plotter's messages into the terms of this program.
 //!
 //! The messages of the plotter and its library refer to the serial protocol, such as `$page` or
-//! `send $pens=one`. A user who typed `--page` must read `--page`. `OPTIONS` is the single table of
-//! the options that exist in both forms. [`told`] translates a message of the plotter with it,
+//! `send $pens=one`. A user who typed `--page` must read `--page`. The library's table of options
+//! says which exist in both forms. [`for_client`] translates a message of the plotter with it,
 //! [`asked`] a line that was sent, and [`explained`] a refusal. For refusals whose text would not
-//! help here, the number of the error selects another text.
+//! help here, the library's table of errors has another text.
 
-use crate::protocol::meaning;
+use crate::protocol::error_entry;
+use penup::plotter::OPTIONS;
 
 /// The form of a plotter setting on the command line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,62 +20,18 @@ enum Form {
     Words(&'static str),
 }
 
-/// Each `$` word that occurs in the plotter's messages or that this program sends, without its `$`.
-const OPTIONS: &[(&str, Form)] = &[
-    ("eye", Form::Value),
-    ("at", Form::Value),
-    ("up", Form::Value),
-    ("angles", Form::Value),
-    ("projection", Form::Value),
-    ("behind", Form::Value),
-    ("see", Form::Value),
-    ("hidden", Form::Value),
-    ("seams", Form::Value),
-    ("blocks", Form::Value),
-    ("crease", Form::Value),
-    ("pens", Form::Value),
-    ("page", Form::Value),
-    ("margin", Form::Value),
-    ("title", Form::Value),
-    ("title-size", Form::Value),
-    ("fit", Form::Switch),
-    ("order", Form::Value),
-    ("cycle", Form::Switch),
-    ("effort", Form::Value),
-    ("lift", Form::Value),
-    ("view", Form::Words("the automatic view")),
-    ("clear", Form::Words("an empty model")),
-    ("model", Form::Words("the size of the model")),
-    ("plot", Form::Words("the drawing")),
-    ("again", Form::Words("drawing it once more")),
-    ("100", Form::Words("the steps per mm along x (setting 100 of the machine)")),
-    ("101", Form::Words("the steps per mm along y (setting 101)")),
-    ("130", Form::Words("the travel along x (setting 130 of the machine)")),
-    ("131", Form::Words("along y (setting 131)")),
-];
-
-/// Texts for refusals whose own text refers to the serial line only, with the numbers of the
-/// errors.
-const SENTENCES: &[(u16, &str)] = &[
-    (
-        1,
-        "penup reads the OBJ keywords v, f, l, o, g, s, usemtl, mtllib, vn, vt, cstype, deg, curv, \
-         parm and end",
-    ),
-    (3, "the plotter does not know this: its firmware and this program are of different versions"),
-    (5, "the plotter has no limit switches, or its homing is off (setting 22 of the machine)"),
-    (8, "the plotter is busy: wait until its plot ends, or reset it"),
-    (9, "the plotter is locked after an alarm: release its stop if it is pressed, then unlock it"),
-    (101, "bytes were lost on the line: check the cable, and that nothing else uses the port"),
-    (120, "there is nothing to draw: the file has no faces, lines or curves"),
-    (161, "the plotter keeps no job"),
-    (162, "the kept job is counted in other steps"),
-    (170, "a line was damaged on its way: check the cable, and keep it away from the motors"),
-    (171, "a line was lost on its way: check the cable, and that nothing else uses the port"),
-    (
-        172,
-        "a line lost its number on its way: check the cable, and that nothing else uses the port",
-    ),
+/// The `$` words that occur in the plotter's messages, or that this program sends, and for which it
+/// has no flag, without their `$`. Each has the words that stand for it.
+const WORDS: &[(&str, &str)] = &[
+    ("view", "the automatic view"),
+    ("clear", "an empty model"),
+    ("model", "the size of the model"),
+    ("plot", "the drawing"),
+    ("again", "drawing it once more"),
+    ("100", "the steps per mm along x (setting 100 of the machine)"),
+    ("101", "the steps per mm along y (setting 101)"),
+    ("130", "the travel along x (setting 130 of the machine)"),
+    ("131", "along y (setting 131)"),
 ];
 
 /// The reason for a refusal, from the number of the error and the messages that the plotter sent
@@ -82,13 +39,15 @@ const SENTENCES: &[(u16, &str)] = &[
 ///
 /// The messages are more precise than the meaning of the number, so they are included.
 pub fn explained(number: u16, messages: &[String]) -> String {
-    if let Some((_, sentence)) = SENTENCES.iter().find(|(own, _)| *own == number) {
+    let entry = error_entry(number);
+    if let Some(sentence) = entry.and_then(|entry| entry.for_client.get()) {
         return format!("{sentence} (error {number})");
     }
-    let mut reason = meaning(number).to_owned();
+    let unknown = "a reason that this client does not know";
+    let mut reason = entry.map_or(unknown, |entry| entry.meaning.get()).to_owned();
     for message in messages {
         reason.push_str(": ");
-        reason.push_str(&told(message));
+        reason.push_str(&for_client(message));
     }
     format!("{reason} (error {number})")
 }
@@ -113,13 +72,13 @@ pub fn asked(line: &str) -> String {
 /// Translates a message of the plotter into the terms of the command line.
 ///
 /// ```
-/// use penup_client::words::told;
-/// assert_eq!(told("choose a larger $page, or $fit=on"), "choose a larger --page, or --fit");
-/// assert_eq!(told("send $pens=one to draw all with one"), "use --pens one to draw all with one");
+/// use penup_client::words::for_client;
+/// assert_eq!(for_client("choose a larger $page, or $fit=on"), "choose a larger --page, or --fit");
+/// assert_eq!(for_client("send $pens=one to draw all with one"), "use --pens one to draw all with one");
 /// ```
-pub fn told(text: &str) -> String {
+pub fn for_client(text: &str) -> String {
     let mut parts = text.split('$');
-    let mut told = parts.next().unwrap_or_default().to_owned();
+    let mut translated = parts.next().unwrap_or_default().to_owned();
     for part in parts {
         let (name, rest) = split_after(part, |letter| letter == '-');
         let (value, rest) = match rest.strip_prefix('=') {
@@ -130,14 +89,14 @@ pub fn told(text: &str) -> String {
             None => (None, rest),
         };
         // On the command line an option is used, not sent.
-        if told.ends_with("send ") {
-            told.truncate(told.len() - "send ".len());
-            told.push_str("use ");
+        if translated.ends_with("send ") {
+            translated.truncate(translated.len() - "send ".len());
+            translated.push_str("use ");
         }
-        told.push_str(&named(name, value));
-        told.push_str(rest);
+        translated.push_str(&named(name, value));
+        translated.push_str(rest);
     }
-    told
+    translated
 }
 
 /// Splits `text` after its leading letters, digits and the characters that `or` accepts.
@@ -159,7 +118,11 @@ fn named(name: &str, value: Option<&str>) -> String {
 }
 
 fn form(name: &str) -> Option<Form> {
-    OPTIONS.iter().find(|(option, _)| *option == name).map(|(_, form)| *form)
+    let words = WORDS.iter().find(|(word, _)| *word == name);
+    words.map(|(_, words)| Form::Words(words)).or_else(|| {
+        let option = OPTIONS.iter().find(|option| option.name == name)?;
+        Some(if option.flag.get()?.is_switch { Form::Switch } else { Form::Value })
+    })
 }
 
 #[cfg(test)]

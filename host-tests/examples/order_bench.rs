@@ -10,14 +10,14 @@ use std::time::Instant;
 fn main() {
     let mut arguments = std::env::args().skip(1);
     let effort = arguments.next().and_then(|word| word.parse().ok()).expect("EFFORT LIFT FILE...");
-    let lift: f64 = arguments.next().and_then(|word| word.parse().ok()).expect("LIFT FILE...");
-    let lift = (lift * 80.0 * 256.0) as u32;
+    let lift_cost: f64 = arguments.next().and_then(|word| word.parse().ok()).expect("LIFT FILE...");
+    let lift_cost = (lift_cost * 80.0 * 256.0) as u32;
     for file in arguments {
         let text = std::fs::read_to_string(&file).expect("a file that can be read");
         let sheet = Sheet::from_obj(&text);
         for method in [Method::Auto] {
             for shape in [Shape::OpenPath, Shape::ClosedCycle] {
-                let options = Options { method, shape, effort, lift };
+                let options = Options { method, shape, effort, lift_cost };
                 let (_, report) = sheet.order(options).expect("an order");
                 let mut memory = vec![0; 1 << 16];
                 let mut tour = vec![Leg::new(0, false); sheet.segments.len()];

@@ -8,11 +8,13 @@
 use clap::CommandFactory;
 use penup::fixed::Length;
 use penup::machine::SETTINGS;
-use penup::protocol::{HELP, MEANINGS};
+use penup::plotter::help;
+use penup::protocol::{ErrorEntry, error_entries};
 use penup_client::cli::Cli;
 use pulldown_cmark::{Event, Options, Parser, Tag, TagEnd};
 use std::ops::Range;
 use std::path::PathBuf;
+use std::sync::Mutex;
 
 /// A table of a document: its heading, and its rows as lists of cells in plain text.
 type Table = Vec<Vec<String>>;
@@ -68,14 +70,29 @@ fn root() -> PathBuf {
     penup_client::workspace::root()
 }
 
+/// Whether `PENUP_WRITE_DOCUMENTS=1` asks to write the documents instead of comparing them.
+fn writes_documents() -> bool {
+    std::env::var_os("PENUP_WRITE_DOCUMENTS").is_some()
+}
+
 /// Compares a table of `docs/protocol.md`, found by its heading, with the expected rows.
 fn assert_table(heading: &[&str], rows: &[Vec<String>]) {
+    // Each test writes its own table into the same file.
+    static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
+    let _guard = ONE_AT_A_TIME.lock();
     let text = protocol();
     let tables = tables_of(&text);
     let found = tables.iter().find(|(table, _)| table.first().is_some_and(|row| row == heading));
-    let (found, _) = found.unwrap_or_else(|| {
+    let (found, places) = found.unwrap_or_else(|| {
         panic!("docs/protocol.md has no table with the heading | {} |", heading.join(" | "))
     });
+    if writes_documents() {
+        let [_, first, .., last] = &places[..] else { panic!("a table has rows") };
+        let end = last.start + text[last.clone()].trim_end().len();
+        let rows: Vec<String> = rows.iter().map(|row| written(row)).collect();
+        let text = format!("{}{}{}", &text[..first.start], rows.join("\n"), &text[end..]);
+        return std::fs::write(root().join("docs/protocol.md"), text).expect("it can be written");
+    }
     let found = &found[1..];
     let mut faults = String::new();
     for row in rows.iter().filter(|row| !found.contains(row)) {
@@ -104,15 +121,15 @@ fn the_settings_are_those_of_the_source() {
 
 #[test]
 fn the_errors_are_those_of_the_source() {
-    let row = |(number, meaning): &(u16, &str)| vec![number.to_string(), (*meaning).into()];
-    let rows: Vec<Vec<String>> = MEANINGS.iter().map(row).collect();
+    let row = |entry: &ErrorEntry| vec![entry.number.to_string(), entry.meaning.get().into()];
+    let rows: Vec<Vec<String>> = error_entries().iter().map(row).collect();
     assert_table(&["number", "meaning"], &rows);
 }
 
 #[test]
 fn the_commands_and_options_are_those_of_the_source() {
-    let row = |(usage, meaning): &(&str, &str)| vec![format!("`{usage}`"), (*meaning).into()];
-    let rows: Vec<Vec<String>> = HELP.iter().map(row).collect();
+    let mut rows: Vec<Vec<String>> = Vec::new();
+    help(&mut |usage, meaning| rows.push(vec![format!("`{usage}`"), meaning.into()]));
     assert_table(&["command", "what it does"], &rows);
 }
 
@@ -184,7 +201,6 @@ fn push_help(command: &mut clap::Command, path: &str, text: &mut String) {
     }
 }
 
-/// `PENUP_WRITE_DOCUMENTS=1` writes the document instead of comparing it.
 #[test]
 fn the_help_of_the_client_is_its_document() {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../docs/client.md");
@@ -192,7 +208,7 @@ fn the_help_of_the_client_is_its_document() {
     let (introduction, body) = text.split_once(END_OF_INTRODUCTION).expect("the line before it");
     let mut help = String::new();
     push_help(&mut Cli::command(), "penup", &mut help);
-    if std::env::var_os("PENUP_WRITE_DOCUMENTS").is_some() {
+    if writes_documents() {
         let text = format!("{introduction}{END_OF_INTRODUCTION}{help}");
         return std::fs::write(&path, text).expect("docs/client.md can be written");
     }

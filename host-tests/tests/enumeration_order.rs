@@ -57,8 +57,8 @@ proptest! {
         shape in prop_oneof![Just(Shape::OpenPath), Just(Shape::ClosedCycle)],
     ) {
         let sheet = star(&points, side);
-        let (_, report) = sheet.order(Options { method, shape, effort: 0, lift: 0 }).expect("an \
-         order");
+        let options = Options { method, shape, effort: 0, lift_cost: 0 };
+        let (_, report) = sheet.order(options).expect("an order");
         let least = least(&sheet, shape);
         prop_assert!(report.bound <= least && least <= report.pen_up);
         if report.optimal {

@@ -24,12 +24,13 @@ fn polylines(reach: i32) -> impl Strategy<Value = Vec<Vec<(i32, i32)>>> {
 
 fn orders_everything(sheet: &Sheet) -> Result<(), OrderError> {
     for (method, shape) in ALL {
-        let (_, nearest_first) = sheet.order(Options { method, shape, effort: 0, lift: 0 })?;
-        let (_, improved) = sheet.order(Options { method, shape, effort: 3, lift: 0 })?;
+        let (_, nearest_first) = sheet.order(Options { method, shape, effort: 0, lift_cost: 0 })?;
+        let (_, improved) = sheet.order(Options { method, shape, effort: 3, lift_cost: 0 })?;
         if sheet.segments.iter().all(|segment| segment.pen == 0) {
             assert!(improved.pen_up <= nearest_first.pen_up);
         }
-        let (_, seldom_lifted) = sheet.order(Options { method, shape, effort: 3, lift: 5 << 8 })?;
+        let (_, seldom_lifted) =
+            sheet.order(Options { method, shape, effort: 3, lift_cost: 5 << 8 })?;
         assert_eq!(improved.pen_down, nearest_first.pen_down);
         assert_eq!(seldom_lifted.pen_down, nearest_first.pen_down);
     }
@@ -96,8 +97,8 @@ fn a_lift_is_saved_where_it_is_worth_the_way() {
     let sheet = scene("text300");
     let in_steps = |millimetres: u32| millimetres * 80 * 256;
     let prices = [0, 2, 10].map(in_steps);
-    let [free, cheap, dear] = prices.map(|lift| {
-        let (_, report) = sheet.order(Options { lift, ..Options::default() }).expect("fits");
+    let [free, cheap, dear] = prices.map(|lift_cost| {
+        let (_, report) = sheet.order(Options { lift_cost, ..Options::default() }).expect("fits");
         (report.lifts, report.pen_up)
     });
     let cost = |(lifts, pen_up), price: u32| pen_up + u64::from(price) * u64::from(lifts);
@@ -211,7 +212,7 @@ proptest! {
             segment.pen = pen;
         }
         prop_assert_eq!(orders_everything(&sheet), Ok(()));
-        let options = Options { method: Method::Auto, shape: Shape::OpenPath, effort: 1, lift: 0 };
+        let options = Options { method: Method::Auto, shape: Shape::OpenPath, effort: 1, lift_cost: 0 };
         let (tour, _) = sheet.order(options).expect("as above");
         let pens = tour.iter().map(|leg| sheet.segments[leg.segment()].pen);
         prop_assert!(pens.is_sorted());

@@ -1,7 +1,7 @@
 //! Tests of the protocol by transcripts: the lines that are sent to the plotter, and its answers.
 
 use penup::plotter::{EMPTY_LOOKAHEAD, Memory};
-use penup::protocol::MEANINGS;
+use penup::protocol::error_entries;
 use penup_host_tests::whole_jobs::Bench;
 
 /// A cube of side 1.
@@ -70,7 +70,7 @@ fn each_refusal_has_its_own_number_and_changes_nothing() {
     ] {
         let answer = bench.say(line);
         assert_eq!(refusal(&answer), Some(number), "{line:?}: {answer:?}");
-        assert!(MEANINGS.iter().any(|(known, _)| *known == number), "{number} has no meaning");
+        assert!(error_entries().iter().any(|entry| entry.number == number), "no error {number}");
     }
     assert_eq!(bench.say("$model\n$options\n$$\n"), before);
 }
@@ -230,9 +230,9 @@ fn the_help_lists_every_command() {
     let mut bench = Bench::new();
     bench.heard();
     let help = bench.say("$\n");
-    for (usage, meaning) in penup::protocol::HELP {
+    penup::plotter::help(&mut |usage, meaning| {
         assert!(help.contains(&format!("[HLP:{usage} {meaning}]\n")), "{usage}");
-    }
+    });
     assert_eq!(help.lines().last(), Some("ok"));
 }
 

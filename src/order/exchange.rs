@@ -95,7 +95,7 @@ pub(super) struct Exchanges<'s, 'a> {
     /// The number of the gap among the legs, if the tour has a gap.
     gap: Option<u16>,
     /// The cost of a move besides its length, in 1/256 steps.
-    lift: u32,
+    lift_cost: u32,
 }
 
 impl<'s, 'a> Exchanges<'s, 'a> {
@@ -106,7 +106,7 @@ impl<'s, 'a> Exchanges<'s, 'a> {
         neighbours: Neighbours<'s>,
         legs: &'s mut [Leg],
         gap: Option<u16>,
-        lift: u32,
+        lift_cost: u32,
         scratch: &mut Scratch<'s>,
     ) -> Result<Self, OutOfScratch> {
         let stations = usize::from(network.stations());
@@ -125,7 +125,7 @@ impl<'s, 'a> Exchanges<'s, 'a> {
             neighbours,
             waiting,
             gap,
-            lift,
+            lift_cost,
         })
     }
 
@@ -165,7 +165,7 @@ impl<'s, 'a> Exchanges<'s, 'a> {
         if from == NONE || to == NONE || from == to {
             0
         } else {
-            i64::from(self.distances.between(from, to)) + i64::from(self.lift) + 1
+            i64::from(self.distances.between(from, to)) + i64::from(self.lift_cost) + 1
         }
     }
 
@@ -175,7 +175,7 @@ impl<'s, 'a> Exchanges<'s, 'a> {
         if from == NONE || to == NONE || from == to {
             return hand.max(0);
         }
-        let hand = hand - i64::from(self.lift);
+        let hand = hand - i64::from(self.lift_cost);
         let bound = u32::try_from(hand.clamp(0, i64::from(u32::MAX))).unwrap_or(u32::MAX);
         // 1 more than the length is subtracted: see `distance`.
         self.distances.below(bound, from, to).map_or(0, |length| hand - i64::from(length) - 1)

@@ -55,7 +55,7 @@ pub(super) struct Tour<'t> {
     /// The budget of work for each move, in distance computations.
     pub effort: u32,
     /// The cost of a move besides its length, in 1/256 steps.
-    pub lift: u32,
+    pub lift_cost: u32,
 }
 
 /// Shortens `tour.route` as far as the budget allows. Does nothing if there is too little memory.
@@ -65,7 +65,7 @@ pub(super) fn improve(
     mut scratch: Scratch<'_>,
     work_budget: &mut WorkBudget<'_>,
 ) -> Result<(), OrderError> {
-    let Tour { route, open, bound, mate, start, strokes_only, effort, lift } = tour;
+    let Tour { route, open, bound, mate, start, strokes_only, effort, lift_cost } = tour;
     let legs = route.len() + usize::from(open);
     let fits = |per_station: &usize| {
         scratch_bytes(network, legs, *per_station) <= scratch.available_bytes()
@@ -87,7 +87,7 @@ pub(super) fn improve(
         network,
         neighbours,
         open,
-        lift: 0,
+        lift_cost: 0,
         patience,
         cost: u64::MAX,
         route,
@@ -111,7 +111,7 @@ pub(super) fn improve(
     }
     // Lifts get their cost only now: with a cost from the start, the exchanges that shorten the
     // moves would be rejected.
-    (best.lift, best.cost) = (lift, u64::MAX);
+    (best.lift_cost, best.cost) = (lift_cost, u64::MAX);
     best.restore(cycle);
     best.work_on(cycle, budget - first_tours * share, scratch, work_budget)
 }
@@ -133,7 +133,7 @@ struct Best<'b, 'a> {
     neighbours: Neighbours<'b>,
     open: bool,
     /// The cost of a move besides its length, in 1/256 steps.
-    lift: u32,
+    lift_cost: u32,
     /// The search ends after this many successive kicks without a gain.
     patience: u32,
     /// The cost of the shortest tour, with the present cost of a lift.
@@ -187,8 +187,14 @@ impl Best<'_, '_> {
         gap.fill(Leg::new(chains, false));
         let gap = self.open.then_some(chains);
         let ways: &mut [u8] = scratch.take(cycle.len())?;
-        let mut tour =
-            Exchanges::new(self.network, self.neighbours, cycle, gap, self.lift, &mut scratch)?;
+        let mut tour = Exchanges::new(
+            self.network,
+            self.neighbours,
+            cycle,
+            gap,
+            self.lift_cost,
+            &mut scratch,
+        )?;
         work_budget.grant(budget);
         shorten(&mut tour, ways, work_budget)?;
         let kicks = &mut self.kicks;

@@ -135,14 +135,14 @@ pub struct Options {
     pub effort: u32,
     /// Extra pen-up travel that is accepted to save one pen lift, in 1/256 steps, at most 2^30.
     /// Each lift takes time, and leaves a visible mark if it lies within a stroke.
-    pub lift: u32,
+    pub lift_cost: u32,
 }
 
 impl Default for Options {
     /// An open path, exact where that fits, with enough effort to bring a page of some hundred
     /// strokes within 3 % of the best tour known.
     fn default() -> Self {
-        Self { method: Method::default(), shape: Shape::default(), effort: 4000, lift: 0 }
+        Self { method: Method::default(), shape: Shape::default(), effort: 4000, lift_cost: 0 }
     }
 }
 
@@ -295,7 +295,7 @@ fn order_pen<'a>(
                 start,
                 strokes_only,
                 effort: options.effort,
-                lift: options.lift,
+                lift_cost: options.lift_cost,
             };
             improve(network, tour, scratch, work_budget)?;
         }

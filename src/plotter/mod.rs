@@ -9,6 +9,7 @@
 mod board;
 pub mod budget;
 mod editor;
+mod help;
 mod job;
 mod memory;
 mod options;
@@ -22,9 +23,12 @@ mod stream;
 mod title;
 
 pub use board::{Board, NotStored, REPLY_BYTES, Record, Stored};
+pub use help::help;
 pub use job::{Cursor, Job, Observer, Strokes, Unobserved};
 pub use memory::{EMPTY_LOOKAHEAD, Memory, MemorySlices};
-pub use options::PlotOptions;
+pub use options::{
+    Flag, HiddenLines, OPTIONS, PlotOption, PlotOptions, ProjectionChoice, VisibilityMode,
+};
 
 use crate::machine::{
     Alarm, Machine, MachineError, Path, PulserState, Setting, SettingError, Settings, State,
@@ -192,7 +196,7 @@ impl<'m> Plotter<'m> {
             }
             Received::Answer(outcome, label) => (outcome, label),
         };
-        if outcome == Err(CommandError::Aborted) {
+        if matches!(outcome, Err(CommandError::Aborted)) {
             self.reset(board);
         }
         (self.port, self.label) = (port, label);
@@ -335,12 +339,12 @@ impl Inner<'_> {
             Command::Help => self.task = Some(Task::List(Listing::Help, 0)),
             Command::BuildInfo => self.report_build(board),
             Command::Settings => self.task = Some(Task::List(Listing::Settings, 0)),
-            Command::Setting { name, value } => {
-                self.change_setting(name, value)?;
-                records::save_settings(self.machine.settings(), board)?;
+            Command::Assign { name, value } => {
+                if !self.options.set(name, value)? {
+                    self.change_setting(name, value)?;
+                    records::save_settings(self.machine.settings(), board)?;
+                }
             }
-            Command::Option(option) => self.options.set(option),
-            Command::Title(text) => self.options.set_title(text)?,
             Command::Options => self.task = Some(Task::List(Listing::Options, 0)),
             Command::Model => self.report_model(board),
             Command::Clear => {

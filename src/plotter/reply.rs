@@ -43,7 +43,7 @@ impl<B: Board + ?Sized> Reply<'_, B> {
             // After a line with a CRC that must be resent, the reason is left out, so that the
             // sender gets the expected number sooner.
             let is_expected = matches!(named, Named::Expected(_));
-            if !with_crc || !is_expected || command_error == CommandError::Unnumbered {
+            if !with_crc || !is_expected || matches!(command_error, CommandError::Unnumbered) {
                 self.line(format_args!("[MSG:{command_error}]"));
             }
         }

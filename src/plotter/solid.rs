@@ -2,10 +2,11 @@
 //! edges. The visible edges become lines on the page.
 
 use super::job::{Collector, Found, PageSink, Pipeline, move_to_front, union};
+use super::{HiddenLines, VisibilityMode};
 use crate::convex::{self, EdgeVisibility, Eye, SinkFull, SolidEdge, SolidError, SolidSink};
 use crate::drawing::{Bounds, PageMap};
 use crate::model::Corner;
-use crate::protocol::{CommandError, HiddenLines, VisibilityMode};
+use crate::protocol::CommandError;
 use crate::stage::{Scratch, Stage, items_mut};
 use crate::view::{SightLines, distinct_edges};
 use crate::visibility::{EdgeParameter, Stretch, StretchSink};

@@ -5,13 +5,13 @@
 //! reports alarms.
 
 use super::program::{Order, Program};
-use super::{Board, Inner, REPLY_BYTES, Reply};
+use super::{Board, Inner, REPLY_BYTES, Reply, help};
 use crate::drawing::{LineType, PagePoint};
 use crate::fixed::BinaryFraction;
 use crate::machine::{Alarm, MachineError, Setting, State, Target};
 use crate::model::ElementKind;
 use crate::motion::{StepEvent, TICKS_PER_SECOND};
-use crate::protocol::{CommandError, GCode, HELP, RealTime};
+use crate::protocol::{CommandError, GCode, RealTime};
 use crate::step::{Arc, Chords, Line};
 use core::fmt;
 
@@ -188,9 +188,7 @@ impl Inner<'_> {
         };
         match listing {
             Listing::Help => {
-                for (usage, meaning) in HELP {
-                    line(format_args!("[HLP:{usage} {meaning}]"));
-                }
+                help(&mut |usage, meaning| line(format_args!("[HLP:{usage} {meaning}]")));
             }
             Listing::Settings => {
                 for (info, value) in self.machine.settings().iter() {
@@ -201,7 +199,9 @@ impl Inner<'_> {
                 }
             }
             Listing::Model(..) => {}
-            Listing::Options => self.options.list(line),
+            Listing::Options => {
+                self.options.lines().for_each(|option| line(format_args!("{option}")));
+            }
         }
         number < lines
     }

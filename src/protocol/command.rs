@@ -2,7 +2,7 @@
 
 use super::edit::parse_edit;
 use super::values::{Decimals, PENS, coordinates, number, split_word, whole};
-use super::{CommandError, EscapedText, GCode, Numbers, PlotOption};
+use super::{CommandError, GCode, Numbers};
 use crate::curve::CurveError;
 use crate::fixed::Decimal;
 use crate::model::{self, Edit, ElementKind, ModelError, PenName};
@@ -45,17 +45,14 @@ pub enum Command<'a> {
     BuildInfo,
     /// `$$`: lists the settings of the machine.
     Settings,
-    /// `$number=value` for a setting of the machine, or a name that no option has.
-    Setting {
-        /// The text before the equals sign. Anything but the number of a setting is refused later.
+    /// `$name=value`: sets an option of the plot, or a setting of the machine.
+    Assign {
+        /// The text before the equals sign. What is neither the name of an option nor the number
+        /// of a setting is refused later.
         name: &'a str,
-        /// The text of the new value.
+        /// The text of the new value. That of `$title=` is the rest of the line, unchanged.
         value: &'a str,
     },
-    /// `$name=value`: sets an option of the plot.
-    Option(PlotOption),
-    /// `$title=TEXT`: sets the title below the drawing.
-    Title(EscapedText<'a>),
     /// `$options`: lists the options of the plot.
     Options,
     /// `$model`: reports the size of the model.
@@ -88,83 +85,52 @@ pub enum Command<'a> {
     GCode(GCode<'a>),
 }
 
-/// The `$` commands, options and G-code words, each with its meaning, as `$` lists them.
-pub const HELP: &[(&str, &str)] = &[
-    ("$", "this list"),
-    ("$I", "version, board and limits"),
-    ("$$", "settings of the machine; $NUMBER=VALUE changes one"),
-    ("$options", "what is drawn and how, as it stands"),
-    ("$eye=X,Y,Z", "where you look from"),
-    ("$at=X,Y,Z", "what you look at"),
-    ("$up=X,Y,Z", "which way is up"),
-    ("$angles=A,B,C", "look along z after turning by C about z, B about y, A about x, in degrees"),
-    ("$view=auto", "forget eye, at, up and angles: a three-quarter view"),
-    (
-        "$projection=perspective|orthographic|cavalier|cabinet|oblique,ANGLE,RATIO",
-        "how lines of sight run",
-    ),
-    (
-        "$projection=isometric|dimetric|trimetric|axonometric,AZIMUTH,ELEVATION",
-        "a parallel view by its direction",
-    ),
-    ("$behind=clip|refuse", "what becomes of what is behind the eye"),
-    (
-        "$see=faces|wire|vertices|edges",
-        "any faces hide; nothing hides; one convex solid from its vertices, or its edges",
-    ),
-    ("$hidden=erased|dotted|dashed|shown|pen|pen,NUMBER", "what becomes of hidden lines"),
-    ("$seams=on|off", "whether the lines are drawn where faces pass through each other"),
-    ("$blocks=separate|merged", "whether blocks that touch are drawn as one shape"),
-    ("$crease=DEGREES", "leave out edges between faces that bend less; 0 draws every edge"),
-    (
-        "$precision=auto|LENGTH",
-        "how far coordinates may be off: auto goes by their decimals, 0 takes them as they stand",
-    ),
-    ("$pens=auto|one", "whether usemtl, or else g, chooses pens, or one draws all"),
-    ("$page=WIDTHxHEIGHT", "size of the sheet in mm"),
-    ("$margin=MM", "what stays free on each side of the sheet"),
-    ("$title=TEXT", "what stands below the drawing, the rest of the line; nothing for none"),
-    ("$title-size=MM", "height of its capitals, 1 to 100"),
-    ("$fit=on|off", "scale a plan to the page, or draw it at true size"),
-    ("$order=auto|greedy|exact", "how the moves between strokes are chosen"),
-    ("$cycle=on|off", "whether the pen returns to where it began"),
-    (
-        "$effort=NUMBER",
-        "distances tried for each move with the pen up to improve it; 0 takes the nearest next",
-    ),
-    ("$lift=MM", "extra pen-up travel in mm that is accepted to save one lift, 0 to 1000"),
-    ("$model", "size of the model against the limits"),
-    ("$clear", "forget the model"),
-    (
-        "$list=v|l|f|c,FIRST,LAST",
-        "vertices, bars, faces or curves with their numbers; without numbers all",
-    ),
-    ("$delete=v|l|f|c,FIRST,LAST", "take some out; the numbers above fall"),
-    ("$plug=v|l|f|c,NUMBER", "take one out; the last takes its number"),
-    ("$move=NUMBER,X,Y,Z", "move a vertex to a place"),
-    ("$translate=X,Y,Z,FIRST,LAST", "shift vertices; without numbers all, here and below"),
-    ("$scale=X,Y,Z,FIRST,LAST", "multiply coordinates"),
-    ("$rotate=x|y|z,DEGREES,FIRST,LAST", "turn about an axis"),
-    (
-        "$mirror=A,B,C,FIRST,LAST",
-        "add the image about the plane of three vertices, joined on the plane",
-    ),
-    ("$reflect=A,B,C,FIRST,LAST", "move to the image about the plane of three vertices"),
-    ("$undo", "take back the last change of the model, unless a plot came after"),
-    ("$plot", "draw it"),
-    ("$again", "draw the last job again, also after a loss of power"),
-    ("$X", "unlock after an alarm"),
-    ("$H", "find the limit switches"),
-    ("$J=G91 X.. Y.. F..", "move by hand with the pen up; byte 0x85 ends it"),
-    ("$C", "begin or end to check only: nothing moves"),
-    ("$SLP", "switch the motors off; $X wakes"),
-    ("$UF2", "become the drive onto which a new image is copied, where the board has one"),
-    (
-        "G0 | G1 | G2 | G3 | G4 | G20 | G21 | G28 | G90 | G91",
-        "move, arc, wait, inches, mm, park, absolute, relative",
-    ),
-    ("X1 | Y1 | I1 | J1 | R1 | P1 | F1 | Z1", "numbers of the former; Z0 and below is pen down"),
-    ("M0 | M2 | M3 | M5", "pause until ~, end, pen down, pen up"),
+/// The `$` commands and G-code words, each with its meaning, as `$` lists them. It lists the options
+/// of a plot between the two parts.
+pub const HELP: [&[(&str, &str)]; 2] = [
+    &[
+        ("$", "this list"),
+        ("$I", "version, board and limits"),
+        ("$$", "settings of the machine; $NUMBER=VALUE changes one"),
+        ("$options", "what is drawn and how, as it stands"),
+    ],
+    &[
+        ("$model", "size of the model against the limits"),
+        ("$clear", "forget the model"),
+        (
+            "$list=v|l|f|c,FIRST,LAST",
+            "vertices, bars, faces or curves with their numbers; without numbers all",
+        ),
+        ("$delete=v|l|f|c,FIRST,LAST", "take some out; the numbers above fall"),
+        ("$plug=v|l|f|c,NUMBER", "take one out; the last takes its number"),
+        ("$move=NUMBER,X,Y,Z", "move a vertex to a place"),
+        ("$translate=X,Y,Z,FIRST,LAST", "shift vertices; without numbers all, here and below"),
+        ("$scale=X,Y,Z,FIRST,LAST", "multiply coordinates"),
+        ("$rotate=x|y|z,DEGREES,FIRST,LAST", "turn about an axis"),
+        (
+            "$mirror=A,B,C,FIRST,LAST",
+            "add the image about the plane of three vertices, joined on the plane",
+        ),
+        ("$reflect=A,B,C,FIRST,LAST", "move to the image about the plane of three vertices"),
+        ("$undo", "take back the last change of the model, unless a plot came after"),
+        ("$plot", "draw it"),
+        ("$again", "draw the last job again, also after a loss of power"),
+        ("$X", "unlock after an alarm"),
+        ("$H", "find the limit switches"),
+        ("$J=G91 X.. Y.. F..", "move by hand with the pen up; byte 0x85 ends it"),
+        ("$C", "begin or end to check only: nothing moves"),
+        ("$SLP", "switch the motors off; $X wakes"),
+        ("$UF2", "become the drive onto which a new image is copied, where the board has one"),
+        (
+            "G0 | G1 | G2 | G3 | G4 | G20 | G21 | G28 | G90 | G91",
+            "move, arc, wait, inches, mm, park, absolute, relative",
+        ),
+        (
+            "X1 | Y1 | I1 | J1 | R1 | P1 | F1 | Z1",
+            "numbers of the former; Z0 and below is pen down",
+        ),
+        ("M0 | M2 | M3 | M5", "pause until ~, end, pen down, pen up"),
+    ],
 ];
 
 impl<'a> Command<'a> {
@@ -181,8 +147,8 @@ impl<'a> Command<'a> {
     /// ```
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub fn parse(line: &'a str) -> Result<Self, CommandError> {
-        if let Some(text) = title(line) {
-            return EscapedText::new(text).map(Self::Title);
+        if let Some(value) = title(line) {
+            return Ok(Self::Assign { name: "title", value });
         }
         let line = line.split('#').next().unwrap_or("").trim();
         if let Some(dollar) = line.strip_prefix('$') {
@@ -201,7 +167,7 @@ impl<'a> Command<'a> {
             "f" => Numbers::new(rest).map(Self::Face),
             "l" => Numbers::new(rest).map(Self::Polyline),
             "cstype" if rest.trim() == "bspline" => Ok(Self::Nothing),
-            "cstype" => Err(CommandError::NotAChoice { choices: "bspline" }),
+            "cstype" => Err(CommandError::NotAChoice { choices: &["bspline"] }),
             "deg" => match whole(rest)? {
                 degree @ 1..=5 => Ok(Self::Degree(degree as u8)),
                 _ => Err(CommandError::Model(ModelError::Curve(CurveError::Order))),
@@ -209,7 +175,7 @@ impl<'a> Command<'a> {
             "curv" => curve(rest),
             "parm" => match split_word(rest) {
                 ("u", knots) => Decimals::new(knots).map(Self::Knots),
-                _ => Err(CommandError::NotAChoice { choices: "u" }),
+                _ => Err(CommandError::NotAChoice { choices: &["u"] }),
             },
             "end" => Ok(Self::EndCurve),
             _ => Err(CommandError::UnknownCommand),
@@ -227,10 +193,7 @@ impl<'a> Command<'a> {
             if name == "J" {
                 return GCode::new(value).map(Self::Jog);
             }
-            return match PlotOption::parse(name, value)? {
-                Some(option) => Ok(Self::Option(option)),
-                None => Ok(Self::Setting { name, value }),
-            };
+            return Ok(Self::Assign { name, value });
         }
         match text {
             "" => Ok(Self::Help),
@@ -376,14 +339,14 @@ mod tests {
 
     #[test]
     fn every_command_of_the_help_is_one() {
-        for (usage, _) in HELP {
-            let line = usage.split_once('=').map_or(*usage, |(name, _)| name);
+        for (usage, _) in HELP.concat() {
+            let line = usage.split_once('=').map_or(usage, |(name, _)| name);
             let with_value = usage.contains('=');
             let all_are = |line: &str| line.split(" | ").all(|one| Command::parse(one).is_ok());
             assert!(with_value || all_are(line), "{usage}");
             if with_value {
                 let set = std::format!("{line}=?");
-                assert!(!matches!(Command::parse(&set), Ok(Command::Setting { .. })), "{usage}");
+                assert!(!matches!(Command::parse(&set), Ok(Command::Assign { .. })), "{usage}");
             }
         }
     }

@@ -1,6 +1,6 @@
 //! Parses the edits of the model and `$list`, all of the form `$name=value`.
 
-use super::values::{number, whole};
+use super::values::{choice, number, whole};
 use super::{Command, CommandError};
 use crate::model::{self, Edit, ElementKind};
 
@@ -38,13 +38,12 @@ impl<'a> Values<'a> {
 
     /// The next value as a kind of element.
     fn part(&mut self) -> Result<ElementKind, CommandError> {
-        match self.text()? {
-            "v" => Ok(ElementKind::Vertices),
-            "l" => Ok(ElementKind::Bars),
-            "f" => Ok(ElementKind::Faces),
-            "c" => Ok(ElementKind::Curves),
-            _ => Err(CommandError::NotAChoice { choices: "v, l, f or c" }),
-        }
+        Ok(match choice(self.text()?, &["v", "l", "f", "c"])? {
+            0 => ElementKind::Vertices,
+            1 => ElementKind::Bars,
+            2 => ElementKind::Faces,
+            _ => ElementKind::Curves,
+        })
     }
 
     /// Reads the first and the last number of a range, or one number for both.
@@ -79,12 +78,7 @@ pub(super) fn parse_edit<'a>(name: &str, value: &str) -> Result<Option<Command<'
         "translate" => Edit::Translate(values.three(number)?, values.numbers_or_all()?),
         "scale" => Edit::Scale(values.three(number)?, values.numbers_or_all()?),
         "rotate" => {
-            let axis = match values.text()? {
-                "x" => 0,
-                "y" => 1,
-                "z" => 2,
-                _ => return Err(CommandError::NotAChoice { choices: "x, y or z" }),
-            };
+            let axis = choice(values.text()?, &["x", "y", "z"])? as u8;
             values.needed = 2;
             let degrees = number(values.text()?)?.to_f64();
             if libm::fabs(degrees) > 36000.0 {

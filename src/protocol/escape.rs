@@ -22,7 +22,7 @@ impl<'a> EscapedText<'a> {
     /// [`CommandError::NotAnEscape`] if a backslash does not begin an escape,
     /// [`CommandError::NotInTheFont`] if the font lacks a letter.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
-    pub(super) fn new(text: &'a str) -> Result<Self, CommandError> {
+    pub fn new(text: &'a str) -> Result<Self, CommandError> {
         let mut rest = text.chars();
         while let Some(letter) = next(&mut rest) {
             let letter = letter.ok_or(CommandError::NotAnEscape)?;
@@ -65,11 +65,11 @@ fn escaped(rest: &mut Chars<'_>) -> Option<u32> {
 /// Shows any text in the escaped form, in ASCII and without bytes that act at once.
 ///
 /// ```
-/// use penup::protocol::{Command, Escape};
+/// use penup::protocol::{Escape, EscapedText};
 /// assert_eq!(Escape("Café – 3 % \\ ok?").to_string(), r"Caf\xE9 \u{2013} 3 % \\ ok\x3F");
-/// let line = format!("$title={}", Escape("Café – 3 %"));
-/// let Ok(Command::Title(text)) = Command::parse(&line) else { panic!("{line}") };
-/// assert!(text.letters().eq("Café – 3 %".chars()));
+/// let escaped = Escape("Café – 3 %").to_string();
+/// assert!(EscapedText::new(&escaped)?.letters().eq("Café – 3 %".chars()));
+/// # Ok::<(), penup::protocol::CommandError>(())
 /// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Escape<'a>(pub &'a str);

@@ -13,17 +13,18 @@ mod escape;
 mod gcode;
 mod line;
 mod numbering;
-mod option;
 mod receiver;
 mod command_error;
 mod values;
 
 pub use command::{Command, HELP};
-pub use command_error::{CommandError, MEANINGS};
+pub use command_error::{CommandError, ErrorEntry};
+#[cfg(any(test, feature = "host"))]
+pub use command_error::{error_entries, error_samples};
 pub use escape::{Escape, EscapedText};
 pub use gcode::{GCode, Word};
 pub use line::{LINE_LIMIT, LineReader, RealTime, Sorter};
 pub use numbering::{Checksum, Label, Named, Numbering, Received};
-pub use option::{HiddenLines, PlotOption, ProjectionChoice, VisibilityMode};
 pub use receiver::{DAMAGED, Receiver};
 pub use values::{Decimals, Numbers};
+pub(crate) use values::{PENS, choice, length, number, numbers, positive, whole};

@@ -3,40 +3,38 @@
 use super::CommandError;
 use crate::fixed::{Decimal, Millimetres};
 use crate::model::PEN_LIMIT;
-use crate::view::Direction;
 
 /// The number of pens.
-pub(super) const PENS: i32 = PEN_LIMIT as i32;
+pub(crate) const PENS: i32 = PEN_LIMIT as i32;
 
-/// Parses `on` (`true`) or `off`.
-pub(super) fn on_or_off(text: &str) -> Result<bool, CommandError> {
-    match text {
-        "on" => Ok(true),
-        "off" => Ok(false),
-        _ => Err(CommandError::NotAChoice { choices: "on or off" }),
-    }
+/// The index of `text` among `words`.
+#[inline(never)] // Its callers share one copy of the code.
+pub(crate) fn choice(text: &str, words: &'static [&'static str]) -> Result<usize, CommandError> {
+    let index = words.iter().position(|word| *word == text);
+    index.ok_or(CommandError::NotAChoice { choices: words })
 }
 
 /// Parses a decimal number, exactly.
-pub(super) fn number(text: &str) -> Result<Decimal, CommandError> {
+pub(crate) fn number(text: &str) -> Result<Decimal, CommandError> {
     Decimal::parse(text.trim()).map_err(|_| CommandError::NotANumber)
+}
+
+/// Parses a length of any sign.
+#[inline(never)] // Its callers share one copy of the code.
+pub(crate) fn length(text: &str) -> Result<Millimetres, CommandError> {
+    number(text)?.to_millimetres().map_err(|_| CommandError::NumberOutOfRange)
 }
 
 /// Parses a positive length.
 #[inline(never)] // Its callers share one copy of the code.
-pub(super) fn positive(text: &str) -> Result<Millimetres, CommandError> {
-    let length = number(text)?.to_millimetres().map_err(|_| CommandError::NumberOutOfRange)?;
+pub(crate) fn positive(text: &str) -> Result<Millimetres, CommandError> {
+    let length = length(text)?;
     if length > 0 { Ok(length) } else { Err(CommandError::NumberOutOfRange) }
-}
-
-/// Parses three numbers with commas between them.
-pub(super) fn direction(text: &str) -> Result<Direction, CommandError> {
-    values(text)
 }
 
 /// Parses exactly N numbers with commas between them. They lose precision, so this is for angles
 /// and positions of the camera only.
-pub(super) fn values<const N: usize>(text: &str) -> Result<[f64; N], CommandError> {
+pub(crate) fn numbers<const N: usize>(text: &str) -> Result<[f64; N], CommandError> {
     let mut values = [0.0; N];
     read_values(text, &mut values)?;
     Ok(values)
@@ -78,7 +76,7 @@ pub(super) fn split_word(text: &str) -> (&str, &str) {
 }
 
 /// Parses a whole number.
-pub(super) fn whole(text: &str) -> Result<i32, CommandError> {
+pub(crate) fn whole(text: &str) -> Result<i32, CommandError> {
     number(text)?.to_whole().map_err(|_| CommandError::NumberOutOfRange)
 }
 

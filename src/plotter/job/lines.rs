@@ -3,7 +3,8 @@
 use super::super::PlotOptions;
 use super::Observer;
 use crate::drawing::{LineType, PackedLine, PageMap};
-use crate::protocol::{CommandError, HiddenLines};
+use crate::plotter::HiddenLines;
+use crate::protocol::CommandError;
 use crate::stage::{OutOfScratch, Scratch, items_mut};
 use crate::view::View;
 use crate::visibility::{SinkFull, Stretch, StretchSink};

@@ -5,7 +5,8 @@ use super::{Job, Observer};
 use crate::drawing::{StepsPerMillimetre, build_graph};
 use crate::model::Model;
 use crate::order::{self, Leg};
-use crate::protocol::{CommandError, VisibilityMode};
+use crate::plotter::VisibilityMode;
+use crate::protocol::CommandError;
 use crate::stage::{Cancel, Stage};
 use crate::view::{Camera, View};
 

@@ -1,15 +1,26 @@
 //! The options of a plot: what is drawn and how, as the user has set it with `$name=value`.
+//!
+//! [`OPTIONS`] has one row for each option. A new option is a field of [`PlotOptions`] with its
+//! default, and a row; the stage that obeys it reads the field.
+
+mod row;
+mod table;
+#[cfg(test)]
+mod tests;
+mod values;
+
+pub use row::{Flag, PlotOption};
+pub use table::OPTIONS;
+pub use values::{HiddenLines, ProjectionChoice, VisibilityMode};
 
 use crate::checksum::CRC_32;
 use crate::drawing::{Page, StepsPerMillimetre, Title, TitleText};
-use crate::fixed::{Decimal, Length, Millimetres, SixDecimals, sin_cos_degrees};
+use crate::fixed::{Decimal, Millimetres, sin_cos_degrees};
 use crate::geometry::Precision;
 use crate::model::Model;
 use crate::order;
-use crate::protocol::{
-    CommandError, Escape, EscapedText, HiddenLines, PlotOption, ProjectionChoice, VisibilityMode,
-};
-use crate::view::{Camera, Direction, Lens, Pose, View};
+use crate::protocol::{CommandError, EscapedText, number};
+use crate::view::{Camera, Direction, Pose, View};
 use crate::visibility::{self, Crease};
 use core::fmt::{self, Write};
 use crc::{Digest, Table};
@@ -53,17 +64,17 @@ pub struct PlotOptions {
     title_size: Millimetres,
     /// Whether a plan is scaled to the page. Otherwise it is drawn at true size.
     pub fit: bool,
-    /// How strokes are ordered. Its `lift` is not used: see the next field.
+    /// How strokes are ordered. Its `lift_cost` is not used: see the next field.
     order: order::Options,
     /// Extra pen-up travel, in mm, that is accepted to save one pen lift.
-    lift: Millimetres,
+    lift_cost: Millimetres,
 }
 
 impl Default for PlotOptions {
     /// An automatic view in perspective with hidden lines erased, on A4 in portrait format with a
     /// margin of 10 mm, without a title.
     fn default() -> Self {
-        let [width, height, margin, title_size, lift] =
+        let [width, height, margin, title_size, lift_cost] =
             [210, 297, 10, 5, 2].map(Millimetres::from_num);
         Self {
             eye: None,
@@ -84,56 +95,12 @@ impl Default for PlotOptions {
             title_size,
             fit: false,
             order: order::Options::default(),
-            lift,
+            lift_cost,
         }
     }
 }
 
 impl PlotOptions {
-    /// Sets one option.
-    pub fn set(&mut self, option: PlotOption) {
-        match option {
-            PlotOption::Eye(eye) => self.eye = Some(eye),
-            PlotOption::At(at) => self.at = Some(at),
-            PlotOption::Up(up) => self.up = Some(up),
-            PlotOption::Angles(angles) => self.angles = Some(angles),
-            PlotOption::AutomaticView => {
-                (self.eye, self.at, self.up, self.angles) = (None, None, None, None)
-            }
-            PlotOption::Projection(projection) => self.projection = projection,
-            PlotOption::ClipBehind(clip) => self.clip_behind = clip,
-            PlotOption::See(see) => self.see = see,
-            PlotOption::Hidden(hidden) => self.hidden = hidden,
-            PlotOption::Seams(seams) => self.seams = seams,
-            PlotOption::MergedBlocks(merged) => self.merged_blocks = merged,
-            PlotOption::Crease(crease) => self.crease = crease,
-            PlotOption::Precision(precision) => self.precision = precision,
-            PlotOption::OnePen(one) => self.one_pen = one,
-            PlotOption::Page { width, height } => {
-                (self.page.width, self.page.height) = (width, height)
-            }
-            PlotOption::Margin(margin) => self.page.margin = margin,
-            PlotOption::TitleSize(size) => self.title_size = size,
-            PlotOption::Fit(fit) => self.fit = fit,
-            PlotOption::Order(method) => self.order.method = method,
-            PlotOption::Cycle(true) => self.order.shape = order::Shape::ClosedCycle,
-            PlotOption::Cycle(false) => self.order.shape = order::Shape::OpenPath,
-            PlotOption::Effort(effort) => self.order.effort = effort,
-            PlotOption::Lift(lift) => self.lift = lift,
-        }
-    }
-
-    /// Sets the title. An empty text removes it.
-    ///
-    /// # Errors
-    /// [`CommandError::TitleTooLong`]; the title is then unchanged.
-    #[inline(never)] // Keeps its frame off the stack while the stages run.
-    pub fn set_title(&mut self, text: EscapedText<'_>) -> Result<(), CommandError> {
-        let limit = TitleText::LIMIT;
-        self.title = TitleText::new(text.letters()).ok_or(CommandError::TitleTooLong { limit })?;
-        Ok(())
-    }
-
     /// The title, unless it is empty or consists of spaces only.
     #[inline(never)] // Its many callers share one copy of the code.
     pub fn title(&self) -> Option<Title<'_>> {
@@ -160,8 +127,8 @@ impl PlotOptions {
     /// The options of the ordering, with lengths in 1/256 step for a machine with `steps` per
     /// millimetre.
     pub fn order(&self, steps: StepsPerMillimetre) -> order::Options {
-        let lift = self.lift.wide_mul(steps[0]).saturating_mul_int(256);
-        order::Options { lift: lift.saturating_to_num(), ..self.order }
+        let lift_cost = self.lift_cost.wide_mul(steps[0]).saturating_mul_int(256);
+        order::Options { lift_cost: lift_cost.saturating_to_num(), ..self.order }
     }
 
     /// The precision of the coordinates of `model`: as the user has set it, or as derived from the
@@ -214,87 +181,40 @@ impl PlotOptions {
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub fn checksum(&self) -> u32 {
         let mut sum = Sum(CRC_32.digest());
-        self.list(|line| {
+        for line in self.lines() {
             // Writing to a checksum cannot fail.
             let _ = writeln!(sum, "{line}");
-        });
+        }
         sum.0.finalize()
     }
 
-    /// Passes to `line` the text of each option and its value, in the order of `$options`.
-    #[inline(never)] // Keeps its frame off the stack while the stages run.
-    pub fn list(&self, mut line: impl FnMut(core::fmt::Arguments<'_>)) {
-        let places = [("eye", self.eye), ("at", self.at), ("up", self.up), ("angles", self.angles)];
-        for (name, place) in places {
-            match place {
-                Some(place) => {
-                    let [x, y, z] = place.map(SixDecimals);
-                    line(format_args!("${name}={x},{y},{z}"))
-                }
-                None => line(format_args!("${name}=auto")),
-            }
-        }
-        match self.projection {
-            ProjectionChoice::Lens(Lens::Perspective) => {
-                line(format_args!("$projection=perspective"))
-            }
-            ProjectionChoice::Lens(Lens::Orthographic) => {
-                line(format_args!("$projection=orthographic"))
-            }
-            ProjectionChoice::Lens(Lens::Oblique { angle, ratio }) => {
-                let [angle, ratio] = [angle, ratio].map(SixDecimals);
-                line(format_args!("$projection=oblique,{angle},{ratio}"));
-            }
-            ProjectionChoice::Axonometric { azimuth, elevation } => {
-                let [azimuth, elevation] = [azimuth, elevation].map(SixDecimals);
-                line(format_args!("$projection=axonometric,{azimuth},{elevation}"));
-            }
-        }
-        let see = match self.see {
-            VisibilityMode::Faces => "faces",
-            VisibilityMode::Wire => "wire",
-            VisibilityMode::Vertices => "vertices",
-            VisibilityMode::Edges => "edges",
-        };
-        let hidden = match self.hidden {
-            HiddenLines::Erased => "erased",
-            HiddenLines::Dotted => "dotted",
-            HiddenLines::Dashed => "dashed",
-            HiddenLines::Shown => "shown",
-            HiddenLines::Pen(_) => "pen",
-        };
-        let method = match self.order.method {
-            order::Method::Auto => "auto",
-            order::Method::Greedy => "greedy",
-            order::Method::Exact => "exact",
-        };
-        let on = |on: bool| if on { "on" } else { "off" };
-        line(format_args!("$behind={}", if self.clip_behind { "clip" } else { "refuse" }));
-        line(format_args!("$see={see}"));
-        match self.hidden {
-            HiddenLines::Pen(pen) => line(format_args!("$hidden=pen,{}", pen + 1)),
-            _ => line(format_args!("$hidden={hidden}")),
-        }
-        line(format_args!("$seams={}", on(self.seams)));
-        line(format_args!("$blocks={}", if self.merged_blocks { "merged" } else { "separate" }));
-        line(format_args!("$crease={}", SixDecimals(self.crease)));
-        match self.precision {
-            Some(precision) => line(format_args!("$precision={precision}")),
-            None => line(format_args!("$precision=auto")),
-        }
-        line(format_args!("$pens={}", if self.one_pen { "one" } else { "auto" }));
-        let [width, height, margin] =
-            [self.page.width, self.page.height, self.page.margin].map(Length);
-        line(format_args!("$page={width}x{height}"));
-        line(format_args!("$margin={margin}"));
-        line(format_args!("$title={}", Escape(self.title.as_str())));
-        line(format_args!("$title-size={}", Length(self.title_size)));
-        line(format_args!("$fit={}", on(self.fit)));
-        line(format_args!("$order={method}"));
-        line(format_args!("$cycle={}", on(self.order.shape == order::Shape::ClosedCycle)));
-        line(format_args!("$effort={}", self.order.effort));
-        line(format_args!("$lift={}", Length(self.lift)));
+    /// The lines of `$options`: each option with its value.
+    pub fn lines(&self) -> impl Iterator<Item = impl fmt::Display> {
+        OPTIONS.iter().filter(|option| option.is_listed()).map(|option| option.line(self))
     }
+}
+
+/// Sets the title. An empty text removes it.
+#[inline(never)] // Keeps its frame off the stack while the stages run.
+fn set_title(options: &mut PlotOptions, text: &str) -> Result<(), CommandError> {
+    let (letters, limit) = (EscapedText::new(text)?.letters(), TitleText::LIMIT);
+    options.title = TitleText::new(letters).ok_or(CommandError::TitleTooLong { limit })?;
+    Ok(())
+}
+
+/// Sets the precision of the coordinates: `auto`, or a length in units of the model.
+fn set_precision(options: &mut PlotOptions, text: &str) -> Result<(), CommandError> {
+    options.precision = match text {
+        "auto" => None,
+        _ => {
+            let precision = number(text)?;
+            if !(0.0..=1e6).contains(&precision.to_f64()) {
+                return Err(CommandError::NumberOutOfRange);
+            }
+            Some(precision)
+        }
+    };
+    Ok(())
 }
 
 /// A writer that only computes the checksum of its text.

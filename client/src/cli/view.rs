@@ -1,0 +1,185 @@
+//! The arguments that say what is drawn and how. They are made from the library's table of options,
+//! which also checks their values, so a new option needs nothing here.
+//!
+//! Two things are the client's own: names of pages, and `--landscape`.
+
+use super::number;
+use crate::job::Settings;
+use crate::page::Page;
+use crate::protocol::acts_at_once;
+use crate::words::for_client;
+use clap::builder::{PossibleValue, PossibleValuesParser};
+use clap::{Arg, ArgAction, ArgMatches, Args, Command, Error, FromArgMatches};
+use penup::plotter::{Flag, OPTIONS, PlotOption, PlotOptions};
+use penup::protocol::{Command as PlotterCommand, CommandError, Escape, LINE_LIMIT};
+
+/// The name of the option whose value may also be the name of a page.
+const PAGE: &str = "page";
+/// The name of the option whose value is any text. It is sent with escapes.
+const TITLE: &str = "title";
+/// The pages that have names, in lower case.
+const PAGES: [(&str, Page); 3] = [
+    ("a4", Page { width: 210.0, height: 297.0 }),
+    ("a3", Page { width: 297.0, height: 420.0 }),
+    ("letter", Page { width: 215.9, height: 279.4 }),
+];
+/// The argument that turns the page.
+const LANDSCAPE: &str = "landscape";
+
+/// The arguments of camera, page and order.
+#[derive(Debug, Clone)]
+pub struct ViewArgs {
+    settings: Settings,
+}
+
+impl ViewArgs {
+    /// The settings that these arguments select.
+    pub fn settings(&self) -> Settings {
+        self.settings.clone()
+    }
+}
+
+impl Args for ViewArgs {
+    fn augment_args(command: Command) -> Command {
+        flags().fold(command, |command, (option, flag)| {
+            let command = command.arg(argument(option, flag));
+            if option.name != PAGE {
+                return command;
+            }
+            command.arg(
+                Arg::new(LANDSCAPE)
+                    .long(LANDSCAPE)
+                    .help("Lay the page on its long side")
+                    .help_heading(flag.heading)
+                    .action(ArgAction::SetTrue),
+            )
+        })
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        Self::augment_args(command)
+    }
+}
+
+impl FromArgMatches for ViewArgs {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, Error> {
+        let mut page = matches.get_one::<Page>(PAGE).copied().unwrap_or(PAGES[0].1);
+        if matches.get_flag(LANDSCAPE) {
+            let Page { width, height } = page;
+            page = Page { width: width.max(height), height: width.min(height) };
+        }
+        let value = |(option, flag): (&'static PlotOption, Flag)| {
+            let value = match option.name {
+                PAGE => Some(format!("{}x{}", page.width, page.height)),
+                name if flag.is_switch => {
+                    Some(if matches.get_flag(name) { "on" } else { "off" }.to_owned())
+                }
+                name => matches.get_one::<String>(name).cloned(),
+            };
+            Some((option.name, value?))
+        };
+        Ok(Self { settings: Settings { page, values: flags().filter_map(value).collect() } })
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+/// The options that have a flag, in the order of the table.
+fn flags() -> impl Iterator<Item = (&'static PlotOption, Flag)> {
+    OPTIONS.iter().filter_map(|option| Some((option, option.flag.get()?)))
+}
+
+/// The argument for an option. Its value is what is sent to the plotter, except for the page.
+fn argument(option: &'static PlotOption, flag: Flag) -> Arg {
+    let argument =
+        Arg::new(option.name).long(option.name).help(flag.help).help_heading(flag.heading);
+    if flag.is_switch {
+        return argument.action(ArgAction::SetTrue);
+    }
+    let argument = argument.value_name(value_name(option));
+    if option.name == PAGE {
+        let argument = argument.allow_hyphen_values(true).default_value("A4");
+        return argument.value_parser(page);
+    }
+    let default = option.default();
+    let argument = argument.hide_default_value(default.is_empty());
+    // A place is chosen by the plotter until it is set, and cannot be set to that choice.
+    let argument = match PlotOptions::default().set(option.name, &default) {
+        Ok(_) => argument.default_value(lasting(default)),
+        Err(_) => argument,
+    };
+    if flag.choices.is_empty() {
+        let argument = argument.allow_hyphen_values(true);
+        return argument.value_parser(move |text: &str| understood(option, text));
+    }
+    let choices = option.values.iter().zip(flag.choices);
+    argument.value_parser(PossibleValuesParser::new(
+        choices.map(|(word, meaning)| PossibleValue::new(word).help(*meaning)),
+    ))
+}
+
+/// What stands for the value in the help: the placeholder that the plotter's help has, if the value
+/// has no form but that and `auto`, or else the option's name.
+fn value_name(option: &PlotOption) -> &'static str {
+    let is_placeholder = |form: &&str| !form.contains(|letter: char| letter.is_lowercase());
+    match option.values.last().copied().filter(is_placeholder) {
+        Some(placeholder) => placeholder,
+        None => lasting(option.name.to_uppercase()),
+    }
+}
+
+/// Keeps a text as long as the program runs, as the definition of an argument requires.
+fn lasting(text: String) -> &'static str {
+    text.leak()
+}
+
+/// Checks the value of an option with the plotter's own parser. Returns it as it is sent.
+fn understood(option: &PlotOption, text: &str) -> Result<String, String> {
+    let is_title = option.name == TITLE;
+    let value = if is_title { Escape(text).to_string() } else { text.to_owned() };
+    // These letters are refused even in a comment.
+    if value.contains(|letter| letter == '#' && !is_title || acts_at_once(letter)) {
+        return Err(within(option, "no value has such a letter"));
+    }
+    let line = format!("${}={value}", option.name);
+    if line.len() > LINE_LIMIT {
+        let limit = CommandError::LineTooLong { limit: LINE_LIMIT }.to_string();
+        let escaped = "it is too long: letters beyond ASCII take four to eight bytes of a line";
+        return Err(within(option, if is_title { escaped } else { &limit }));
+    }
+    let outcome = PlotterCommand::parse(&line).and_then(|command| match command {
+        PlotterCommand::Assign { name, value } => PlotOptions::default().set(name, value),
+        _ => Ok(false),
+    });
+    match outcome {
+        Ok(_) => Ok(value),
+        Err(refusal) => Err(within(option, &for_client(&refusal.to_string()))),
+    }
+}
+
+/// A reason for a refusal, with the values that are valid.
+fn within(option: &PlotOption, reason: &str) -> String {
+    let range = option.range().map(|range| format!(" (expected: {range})"));
+    format!("{reason}{}", range.unwrap_or_default())
+}
+
+/// Parses the size of a page: its name, or its width and height.
+pub(super) fn page(text: &str) -> Result<Page, String> {
+    let text = text.to_ascii_lowercase();
+    if let Some((_, page)) = PAGES.iter().find(|(name, _)| *name == text) {
+        return Ok(*page);
+    }
+    let (width, height) = text
+        .split_once('x')
+        .ok_or("it is none of A4, A3, Letter, or width x height in mm such as 300x200")?;
+    if let Some(option) = OPTIONS.iter().find(|option| option.name == PAGE) {
+        understood(option, &text)?;
+    }
+    Ok(Page { width: number(width)?, height: number(height)? })
+}
+
+#[cfg(test)]
+mod tests;

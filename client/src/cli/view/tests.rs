@@ -1,0 +1,106 @@
+use super::*;
+use crate::cli::Cli;
+use clap::Parser as _;
+
+fn settings(options: &[&str]) -> Result<Settings, String> {
+    let line = ["penup", "preview", "f.obj"].iter().chain(options);
+    let cli = Cli::try_parse_from(line).map_err(|error| error.to_string())?;
+    match cli.command {
+        crate::cli::Command::Preview(args) => Ok(args.view.settings()),
+        _ => Err("the wrong command".to_owned()),
+    }
+}
+
+#[test]
+fn negative_numbers_work_with_a_space_and_with_an_equals_sign() {
+    let spaced = settings(&["--eye", "-3,-4,2.5", "--at", "-.5,0,-1e-1", "--up", "-1,-2,-3"]);
+    let joined = settings(&["--eye=-3,-4,2.5", "--at=-.5,0,-1e-1", "--up=-1,-2,-3"]);
+    assert_eq!(spaced, joined);
+    let settings = spaced.expect("good options");
+    assert_eq!(settings.value("eye"), Some("-3,-4,2.5"));
+    assert_eq!(settings.value("at"), Some("-.5,0,-1e-1"));
+    assert_eq!(settings.value("up"), Some("-1,-2,-3"));
+}
+
+#[test]
+fn pages_have_names_or_sizes_and_lie_either_way() {
+    let size = |options: &[&str]| {
+        let page = settings(options).expect("good options").page;
+        (page.width, page.height)
+    };
+    assert_eq!(size(&[]), (210.0, 297.0));
+    assert_eq!(size(&["--landscape"]), (297.0, 210.0));
+    assert_eq!(size(&["--page", "a3"]), (297.0, 420.0));
+    assert_eq!(size(&["--page=Letter", "--landscape"]), (279.4, 215.9));
+    assert_eq!(size(&["--page", "80.5x60"]), (80.5, 60.0));
+    assert_eq!(size(&["--page", "60X80", "--landscape"]), (80.0, 60.0));
+}
+
+/// A title with one letter more than allowed.
+const LONG: &str =
+    "0123456789 123456789 123456789 123456789 123456789 123456789 123456789 1234567890";
+
+#[test]
+fn a_title_may_have_any_letter_of_the_font() {
+    let title = "Café – 3 % \\ #1: ¿sí? ~ «ÿ»!";
+    let settings = settings(&["--title", title, "--title-size=12.5"]).expect("good options");
+    let escaped = Escape(title).to_string();
+    assert_eq!(settings.value("title"), Some(escaped.as_str()));
+    assert_eq!(settings.value("title-size"), Some("12.5"));
+}
+
+#[test]
+fn numbers_may_have_exponents_of_any_size() {
+    let options = ["--eye", "1e-300,2,3", "--effort", "1e3", "--lift=25e-1", "--page=2e2x3e2"];
+    let settings = settings(&options).expect("good options");
+    assert_eq!(settings.value("eye"), Some("1e-300,2,3"));
+    assert_eq!(settings.value("effort"), Some("1e3"));
+    assert_eq!(settings.value("lift"), Some("25e-1"));
+    assert_eq!(settings.value("page"), Some("200x300"));
+    assert_eq!((settings.page.width, settings.page.height), (200.0, 300.0));
+}
+
+const NUMBER: &str = "a number is written like -12.5 or 3e-2";
+const RANGE: &str = "the number is too large, too small or has the wrong sign";
+
+#[test]
+fn nonsense_is_refused_with_the_reason() {
+    for (options, reason) in [
+        (["--eye", "1,2"], "it takes 3 numbers"),
+        (["--eye", "1,2,3,4"], "it takes 3 numbers"),
+        (["--eye", "1,,3"], NUMBER),
+        (["--eye", "1e308,0,0"], RANGE),
+        (["--eye", "1,2,3#4"], "no value has such a letter"),
+        (["--eye", "1,2,3\n"], "no value has such a letter"),
+        (["--eye", &format!("1,2,{}", "0".repeat(300))], "a line has at most 256 bytes"),
+        (["--at", "1,2,nan"], NUMBER),
+        (["--up", "--fit"], NUMBER),
+        (["--angles", "1e300,0,0"], RANGE),
+        (["--crease", "nan"], NUMBER),
+        (["--crease", "-5"], RANGE),
+        (["--crease", "500"], RANGE),
+        (["--page", "B5"], "none of A4"),
+        (["--page", "-10x20"], RANGE),
+        (["--page", "10xinf"], NUMBER),
+        (["--page", "1e9x1e9"], RANGE),
+        (["--page", "1e-9x100"], RANGE),
+        (["--margin", "-1"], RANGE),
+        (["--margin", "1e308"], RANGE),
+        (["--effort", "-1"], RANGE),
+        (["--effort", "1e12"], RANGE),
+        (["--effort", "1.5"], "(expected: a whole number, 0 to 2147483647)"),
+        (["--effort", "much"], NUMBER),
+        (["--title-size", "101"], "(expected: 1 to 100 mm)"),
+        (["--title", "a→b"], "the font lacks → (U+2192)"),
+        (["--title", "line\nline"], "the font lacks"),
+        (["--title", LONG], "at most 80 bytes"),
+        (["--title-size", "0.5"], RANGE),
+        (["--lift", "-1"], RANGE),
+        (["--lift", "1001"], RANGE),
+        (["--hidden", "gone"], "erased, dotted, dashed, shown"),
+    ] {
+        let error = settings(&options).expect_err("refused");
+        assert!(error.contains(reason), "{options:?}: {error}");
+        assert!(error.contains(&format!("'{} ", options[0])), "{options:?}: {error}");
+    }
+}

@@ -1,0 +1,168 @@
+//! The errors as a list, for the host: the documents and the client's words are made from it.
+
+use super::{CommandError, ErrorEntry};
+use crate::convex::SolidError;
+use crate::curve::CurveError;
+use crate::drawing::PageError;
+use crate::machine::{MachineError, Setting, SettingError, State, Value};
+use crate::model::{ElementKind, ModelError};
+use crate::motion::LimitsError;
+use crate::stage::OutOfScratch;
+use crate::step::ArcError;
+use crate::view::ViewError;
+use std::vec::Vec;
+
+const MISSING: OutOfScratch = OutOfScratch { needed: 9, available: 8 };
+
+/// The entries of all errors in the order of their numbers, each number once.
+pub fn error_entries() -> Vec<ErrorEntry> {
+    let mut entries: Vec<ErrorEntry> = error_samples().iter().map(CommandError::entry).collect();
+    entries.retain(|entry| !entry.meaning.get().is_empty());
+    entries.sort_by_key(|entry| entry.number);
+    entries.dedup();
+    entries
+}
+
+/// Lists a value of each variant of an enum, in the order given.
+///
+/// If a variant is missing, this does not compile, because the match has no other arm.
+macro_rules! every_variant {
+    ($enum:ident: $($variant:ident $({ $($named:tt)* })? $(( $($plain:tt)* ))?),* $(,)?) => {{
+        let _is_complete = |value: &$enum| match value {
+            $($enum::$variant { .. } => (),)*
+        };
+        [$($enum::$variant $({ $($named)* })? $(( $($plain)* ))?),*]
+    }};
+}
+
+/// A sample of every error that a line can be refused with, so that each sentence is among them.
+pub fn error_samples() -> Vec<CommandError> {
+    let one = Value::from_num(1);
+    let all = every_variant!(CommandError:
+        UnknownCommand,
+        NotANumber,
+        UnknownSystemCommand,
+        HomingOff,
+        Busy,
+        Locked,
+        LineTooLong { limit: 256 },
+        NotText,
+        BytesLost,
+        UnsupportedWord(b'Q'),
+        Arc(ArcError::NoRadius),
+        NumberOutOfRange,
+        WrongNumberCount { needed: 3 },
+        NotAVertexNumber,
+        NotAChoice { choices: &["on", "off"] },
+        NotAPage,
+        NotAnEscape,
+        NotInTheFont('→'),
+        TitleTooLong { limit: 80 },
+        Model(ModelError::NoPlane),
+        NothingToPlot,
+        View(ViewError::NothingToSee),
+        Solid(SolidError::AllInLine),
+        Page(PageError::NoRoom),
+        Machine(MachineError::State(State::Idle)),
+        Setting(SettingError::Unknown),
+        DrawingTooLarge(MISSING),
+        TooManyLines,
+        NothingToUndo,
+        Aborted,
+        NotStored,
+        NoJobKept,
+        OtherSteps,
+        Damaged,
+        OutOfOrder { expected: 17 },
+        Unnumbered,
+        RefusedBefore(1),
+    );
+    let model = every_variant!(ModelError:
+        CoordinateTooLarge,
+        TooManyVertices { limit: 9 },
+        TooManyCorners { limit: 9, needed: 10 },
+        UnknownVertex { number: 9, vertices: 8 },
+        TooFewCorners { needed: 3 },
+        RepeatedVertex { number: 3 },
+        NoDegree,
+        Curve(CurveError::Order),
+        CurveUnfinished,
+        NoCurve,
+        KnotTooLarge,
+        UnknownElement { part: ElementKind::Faces, number: 9, count: 8 },
+        NoPlane,
+        TooManyPens,
+        Scratch(MISSING),
+    );
+    let curve = every_variant!(CurveError:
+        Order,
+        TooFewControlPoints { needed: 4 },
+        TooManyControlPoints { limit: 9 },
+        UnknownPoint { number: 9 },
+        WrongKnotCount { needed: 9, given: 8 },
+        KnotDecreases { knot: 3 },
+        KnotTooLarge { knot: 3 },
+        KnotRepeated { knot: 3 },
+        OutsideKnots,
+    );
+    let solid = every_variant!(SolidError:
+        TooFewVertices { distinct: 3 },
+        TooManyVertices,
+        PositionOutOfRange { vertex: 1 },
+        AllInLine,
+        BadEye,
+        EyeInside,
+        VertexInside { vertex: 1, count: 2 },
+        UnknownVertex { edge: 1 },
+        OutlineBroken { vertex: 1 },
+        Scratch(MISSING),
+        SinkFull,
+        Aborted,
+    );
+    let views = every_variant!(ViewError:
+        NothingToSee,
+        EyeAtTarget,
+        UpAlongSight,
+        NothingInFront,
+        BehindEye { vertex: 3 },
+    );
+    let pages = every_variant!(PageError:
+        NoRoom,
+        TooManySteps,
+        DoesNotFit { width: 1 << 16, height: 1 << 16, foot: 1 << 16 },
+        TitleTooWide { width: one, free: one },
+    );
+    let machine = every_variant!(MachineError:
+        State(State::Idle),
+        BeyondTravel { target: 1, x: one, y: one },
+        MoveTooLong { target: 1 },
+    );
+    let settings = every_variant!(SettingError:
+        Unknown,
+        OutOfRange(Setting::StepsPerMmX),
+        NotWhole(Setting::StepsPerMmX),
+        Conflict(LimitsError::StepsPerMillimetre),
+        Busy,
+    );
+    all.into_iter()
+        .chain(model.map(CommandError::Model))
+        .chain(curve.map(|error| CommandError::Model(ModelError::Curve(error))))
+        .chain(solid.map(CommandError::Solid))
+        .chain(views.map(CommandError::View))
+        .chain(pages.map(CommandError::Page))
+        .chain(machine.map(CommandError::Machine))
+        .chain(settings.map(CommandError::Setting))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_number_has_one_meaning() {
+        let entries = error_entries();
+        let is_sorted = entries.is_sorted_by(|one, next| one.number < next.number);
+        assert!(is_sorted, "{entries:?}");
+    }
+}
