@@ -4,6 +4,7 @@
 //! arrive as [`Decimal`] text and are rounded once, half away from zero, into the format that needs
 //! them. A number that does not fit is refused, never wrapped.
 
+use crate::array::MapEach;
 use core::fmt;
 
 /// A length on the page, within ±32768 mm, in units of 2^-16 mm.
@@ -126,7 +127,7 @@ impl Decimal {
             let power = power_of_ten(self.exponent.unsigned_abs()).ok_or(OutOfRange)?;
             // If a factor has more than 64 bits, the product has more than 62.
             let [shifted, power] =
-                [u64::try_from(shifted), u64::try_from(power)].map(|factor| factor.ok());
+                [u64::try_from(shifted), u64::try_from(power)].map_each(|factor| factor.ok());
             u128::from(shifted.ok_or(OutOfRange)?) * u128::from(power.ok_or(OutOfRange)?)
         } else {
             // Beyond 10^38 the quotient is zero whatever the mantissa is.
@@ -316,7 +317,7 @@ pub fn sin_cos_degrees(degrees: f64) -> (f64, f64) {
     let radians = (degrees - 90.0 * quarters).to_radians();
     // The angle is at most π/4. Limiting it in terms of the bits that libm tests lets the compiler
     // leave out the reduction of larger angles, which saves 3 KB on the device.
-    let [high, low] = [radians.to_bits() >> 32, radians.to_bits()].map(|word| word as u32);
+    let [high, low] = [radians.to_bits() >> 32, radians.to_bits()].map_each(|word| word as u32);
     let high = (high & 0x7FFF_FFFF).min(0x3FE9_21FB) | high & 0x8000_0000;
     let (sin, cos) = libm::sincos(f64::from_bits(u64::from(high) << 32 | u64::from(low)));
     match quarters as i64 & 3 {

@@ -9,6 +9,7 @@
 //! perspective, every depth above zero. Then no product overflows. Each function documents its
 //! bound.
 
+use crate::array::MapEach;
 use bytemuck::{Pod, Zeroable};
 use core::cmp::Ordering;
 
@@ -241,7 +242,7 @@ pub fn are_coplanar(points: [[i32; 3]; 4], precision: Precision) -> bool {
     if height == 0 || precision.written == 0 {
         return height == 0;
     }
-    let side = largest(u).max(largest(v)).max(largest([0, 1, 2].map(|n| v[n] - u[n])));
+    let side = largest(u).max(largest(v)).max(largest([0, 1, 2].map_each(|n| v[n] - u[n])));
     let area = uv.iter().map(|part| part.unsigned_abs()).max().unwrap_or(0);
     let is_wide = |off: u32| area >= WIDTHS * u128::from(off) * u128::from(side);
     let off = [precision.written, precision.unit].into_iter().find(|off| is_wide(*off));
@@ -249,8 +250,8 @@ pub fn are_coplanar(points: [[i32; 3]; 4], precision: Precision) -> bool {
     let size = |parts: [i128; 3]| parts.iter().map(|part| part.unsigned_abs()).sum::<u128>();
     // The derivatives together are below 2^69, the lengths below 2^33.
     let derivatives =
-        size(uv) + size(vw) + size(wu) + size([0, 1, 2].map(|n| uv[n] + vw[n] + wu[n]));
-    let lengths = size([u, v, w].map(|to| i128::from(largest(to))));
+        size(uv) + size(vw) + size(wu) + size([0, 1, 2].map_each(|n| uv[n] + vw[n] + wu[n]));
+    let lengths = size([u, v, w].map_each(|to| i128::from(largest(to))));
     // The three terms are at most 2^30 × 2^69, 2^60 × 2^38 and 2^96.
     height.unsigned_abs() <= off * derivatives + 24 * off * off * lengths + 48 * off * off * off
 }

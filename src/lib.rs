@@ -41,6 +41,7 @@
 #[cfg(any(test, feature = "host"))]
 extern crate std;
 
+pub mod array;
 pub mod checksum;
 pub mod fixed;
 pub mod host_only;

@@ -16,6 +16,7 @@
 //!   crosses the edge on the page. The edge is visible if it is nearer than that line at the
 //!   crossing.
 
+use crate::array::MapEach;
 use bytemuck::{Pod, Zeroable};
 
 use super::exact::{Plane, Point, Viewpoint};
@@ -170,7 +171,8 @@ impl<'s> Graph<'s> {
         let own_edges = scratch.take::<[u16; 2]>(edges.len())?;
         let mut count = 0;
         for ends in edges {
-            let [a, b] = ends.map(|end| points::first_at_place(points, &numbers[..distinct], end));
+            let [a, b] =
+                ends.map_each(|end| points::first_at_place(points, &numbers[..distinct], end));
             if a != b {
                 own_edges[count] = [a.min(b), a.max(b)];
                 count += 1;
@@ -358,7 +360,7 @@ impl<'s> Graph<'s> {
     /// Returns the visibility of an edge.
     fn sight(&self, ends: [u16; 2], eye: Eye, outline: &[u16], visible: &[u8]) -> EdgeVisibility {
         let memberships = ends.map(|end| self.membership[usize::from(end)]);
-        let is_visible = match memberships.map(Membership::component_name) {
+        let is_visible = match memberships.map_each(Membership::component_name) {
             [Some(name), _] | [None, Some(name)] => visible[usize::from(name)] != 0,
             [None, None] => {
                 let [one, other] =

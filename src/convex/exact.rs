@@ -7,13 +7,14 @@
 //! adds three such products. So it is below 2^126 and fits in `i128`.
 
 use super::Eye;
+use crate::array::MapEach;
 use crate::fixed::product;
 
 /// A position in model coordinates, each within ±2^30.
 pub(super) type Point = [i32; 3];
 
 fn difference(a: Point, b: Point) -> [i64; 3] {
-    [0, 1, 2].map(|axis| i64::from(a[axis]) - i64::from(b[axis]))
+    [0, 1, 2].map_each(|axis| i64::from(a[axis]) - i64::from(b[axis]))
 }
 
 fn dot(a: [i64; 3], b: [i64; 3]) -> i128 {
@@ -57,9 +58,10 @@ impl Plane {
     /// the plane is edge-on.
     pub(super) fn height_of_eye(&self, eye: Eye) -> i128 {
         match eye {
-            Eye::At(place) => {
-                dot(self.normal, [0, 1, 2].map(|axis| place[axis] - i64::from(self.origin[axis])))
-            }
+            Eye::At(place) => dot(
+                self.normal,
+                [0, 1, 2].map_each(|axis| place[axis] - i64::from(self.origin[axis])),
+            ),
             Eye::Towards(direction) => dot(self.normal, direction),
         }
     }

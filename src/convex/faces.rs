@@ -17,6 +17,7 @@
 //!   where two loops of the perimeter touch would then be missing from the second loop. Here a
 //!   vertex drops out with its last segment.
 
+use crate::array::MapEach;
 use bytemuck::{Pod, Zeroable};
 
 use super::exact::{Plane, Point, Viewpoint};
@@ -246,7 +247,7 @@ impl<'s> FaceFinder<'s> {
         cancel: &mut dyn Cancel,
     ) -> Result<Self, SolidError> {
         let viewpoint =
-            Viewpoint { eye, inside: Some(inside.map(|number| points[usize::from(number)])) };
+            Viewpoint { eye, inside: Some(inside.map_each(|number| points[usize::from(number)])) };
         let count = candidates.len();
         let room = scratch.take::<u16>(count)?;
         let perimeter = scratch.take::<u16>(most_edges(count))?;

@@ -9,6 +9,7 @@
 use super::exact::{Plane, Point};
 use super::faces::{HullEdge, Solid, UNKNOWN};
 use super::{EdgeVisibility, Eye, SolidEdge, SolidError, SolidSink, SolidSummary};
+use crate::array::MapEach;
 use crate::geometry::{Precision, are_coplanar};
 use crate::model::Corner;
 use crate::stage::{Cancel, OutOfScratch, Scratch};
@@ -57,7 +58,7 @@ impl<'s> Joining<'s> {
 
     fn plane(&self, face: u16) -> Plane {
         let [a, b, c] = self.solid.faces[usize::from(face)]
-            .map(|number| self.solid.points[usize::from(number)]);
+            .map_each(|number| self.solid.points[usize::from(number)]);
         Plane::through(a, b, c)
     }
 
@@ -134,7 +135,7 @@ impl<'s> Joining<'s> {
     /// Whether a point may lie in the plane of a face, within the precision.
     fn is_near(&self, face: u16, point: Point, precision: Precision) -> bool {
         let [a, b, c] = self.solid.faces[usize::from(face)]
-            .map(|number| self.solid.points[usize::from(number)]);
+            .map_each(|number| self.solid.points[usize::from(number)]);
         are_coplanar([a, b, c, point], precision)
     }
 
@@ -159,7 +160,7 @@ impl<'s> Joining<'s> {
         let mut any = false;
         for edge in self.solid.edges {
             let sides = [edge.left, edge.right];
-            let neighbour = match sides.map(|face| self.joined[usize::from(face)]) {
+            let neighbour = match sides.map_each(|face| self.joined[usize::from(face)]) {
                 [inner, UNKNOWN] if inner == first => edge.right,
                 [UNKNOWN, inner] if inner == first => edge.left,
                 _ => continue,
@@ -194,7 +195,7 @@ impl<'s> Joining<'s> {
         let mut start = None;
         for edge in self.solid.edges {
             let sides = [edge.left, edge.right];
-            let (from, to) = match sides.map(|side| self.joined[usize::from(side)] == face) {
+            let (from, to) = match sides.map_each(|side| self.joined[usize::from(side)] == face) {
                 [true, false] => (edge.from, edge.to),
                 [false, true] => (edge.to, edge.from),
                 _ => continue,
@@ -244,7 +245,8 @@ impl<'s> Joining<'s> {
         // From here on `next` records which vertices are still corners.
         self.next.fill(UNKNOWN);
         for edge in self.solid.edges {
-            let [left, right] = [edge.left, edge.right].map(|face| self.joined[usize::from(face)]);
+            let [left, right] =
+                [edge.left, edge.right].map_each(|face| self.joined[usize::from(face)]);
             if left == right {
                 summary.joined += 1;
                 continue;

@@ -2,6 +2,7 @@
 
 use super::exact::{Plane, Point};
 use super::{Eye, POSITION_LIMIT, SolidError};
+use crate::array::MapEach;
 use crate::geometry::Precision;
 use crate::model::VERTEX_NUMBER_LIMIT;
 use crate::stage::heap_sort_by_key;
@@ -33,7 +34,7 @@ pub(super) fn drawn_in_eye(
         let sum: i64 = corners.clone().map(|point| i64::from(point[axis])).sum();
         (sum / count) as i32
     };
-    eye.drawn_in([0, 1, 2].map(mean), largest_extent(corners.clone()), tolerance)
+    eye.drawn_in([0, 1, 2].map_each(mean), largest_extent(corners.clone()), tolerance)
 }
 
 /// What a set of different points spans, with the numbers of points that prove it.

@@ -7,6 +7,7 @@
 //! near that part of the solid is behind it, and it detects whether the eye is inside the solid.
 
 use super::exact::{Point, Viewpoint};
+use crate::array::MapEach;
 
 /// The corners of the polygon in counter-clockwise order, no three of them in line on the page.
 #[derive(Debug)]
@@ -28,7 +29,7 @@ impl<'s> Polygon<'s> {
         viewpoint: &Viewpoint,
         [a, b, c]: [u16; 3],
     ) -> Self {
-        let [p, q, r] = [a, b, c].map(|number| points[usize::from(number)]);
+        let [p, q, r] = [a, b, c].map_each(|number| points[usize::from(number)]);
         let ordered = if viewpoint.turn(p, q, r) > 0 { [a, b, c] } else { [a, c, b] };
         room[..3].copy_from_slice(&ordered);
         Self { corners: room, count: 3 }

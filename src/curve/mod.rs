@@ -16,6 +16,7 @@ mod span;
 
 pub use chords::{Chords, Fine};
 
+use crate::array::MapEach;
 use span::Span;
 
 /// The lowest order, which gives straight lines.
@@ -285,7 +286,7 @@ impl<'a> Spline<'a> {
         let Some(numbers) = self.control.get(number..number + degree + 1) else { return false };
         span.hold(numbers.iter().map(|number| {
             // `new` has checked that the point exists.
-            self.points.get(usize::from(*number)).map_or([0; 3], |point| point.map(i64::from))
+            self.points.get(usize::from(*number)).map_or([0; 3], |point| point.map_each(i64::from))
         }));
         if self.knots == Knots::Uniform {
             span.turn_by_recursion();
@@ -303,7 +304,7 @@ impl<'a> Spline<'a> {
 /// Rounds to whole units. The result fits, because the curve stays within the bounding box of its
 /// control points.
 fn rounded(place: [i64; 3]) -> Point {
-    place.map(|c| ((c + (1 << (FRACTION_BITS - 1))) >> FRACTION_BITS) as i32)
+    place.map_each(|c| ((c + (1 << (FRACTION_BITS - 1))) >> FRACTION_BITS) as i32)
 }
 
 /// Implements [`Spline::parameter`] without a spline.

@@ -18,6 +18,7 @@ use super::network::Network;
 use super::search::StepSearch;
 use super::work_budget::WorkBudget;
 use super::{Leg, NONE, OrderError};
+use crate::array::MapEach;
 use crate::stage::{OutOfScratch, Scratch};
 
 /// The greatest number of steps in one exchange.
@@ -277,8 +278,8 @@ impl<'s, 'a> Exchanges<'s, 'a> {
         let Some(gap) = self.gap.map(|gap| Leg::new(gap, false)) else {
             return i64::MAX;
         };
-        let ends = [gap, gap.flipped()].map(|gap| self.start(self.cycle.next(gap)));
-        let [a, b] = ends.map(|end| self.distance(end, station));
+        let ends = [gap, gap.flipped()].map_each(|gap| self.start(self.cycle.next(gap)));
+        let [a, b] = ends.map_each(|end| self.distance(end, station));
         a.min(b)
     }
 

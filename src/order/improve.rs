@@ -19,6 +19,7 @@ use super::orient::orient;
 use super::patch_cycles::patch_cycles;
 use super::work_budget::WorkBudget;
 use super::{EVEN_PART, Leg, NONE, OrderError, mark_parts};
+use crate::array::MapEach;
 use crate::drawing::PagePoint;
 use crate::stage::Scratch;
 
@@ -294,11 +295,11 @@ impl Kicks {
         }
         let [a, c, e, g] = cuts;
         // On a short tour the walk may have gone all the way around.
-        let [to_c, to_e, to_g] = [c, e, g].map(|cut| tour.cycle.steps(a, cut));
+        let [to_c, to_e, to_g] = [c, e, g].map_each(|cut| tour.cycle.steps(a, cut));
         if to_c == 0 || to_e <= to_c || to_g <= to_e {
             return Ok(0);
         }
-        let [b, d, f, h] = cuts.map(|leg| tour.cycle.next(leg));
+        let [b, d, f, h] = cuts.map_each(|leg| tour.cycle.next(leg));
         let ends = [(a, b), (c, d), (e, f), (g, h), (a, f), (g, d), (e, b), (c, h)];
         let costs = ends.map(|(from, to)| tour.distance(tour.end(from), tour.start(to)));
         let loss = costs[4..].iter().sum::<i64>() - costs[..4].iter().sum::<i64>();

@@ -39,6 +39,7 @@ mod search;
 pub use matching::scratch_bytes as matching_bytes;
 pub use metric::length;
 
+use crate::array::MapEach;
 use crate::drawing::{Drawing, PAGE_LIMIT, PagePoint};
 use crate::stage::{Cancel, OutOfScratch, Scratch};
 use bytemuck::{Pod, Zeroable};
@@ -378,7 +379,7 @@ fn pair_odd(
     if !odd.has_free_ends() {
         return Ok(None);
     }
-    let ends = odd.free_ends().map(|end| partners[usize::from(end)]);
+    let ends = odd.free_ends().map_each(|end| partners[usize::from(end)]);
     let ends = ends.into_iter().filter_map(|end| odd.station(end));
     Ok(ends.min_by_key(|&station| (network.place(station).x, station)))
 }

@@ -6,6 +6,7 @@
 use super::network::Network;
 use super::work_budget::WorkBudget;
 use super::{NONE, OrderError};
+use crate::array::MapEach;
 use crate::drawing::PagePoint;
 use crate::stage::{OutOfScratch, Scratch};
 
@@ -169,7 +170,7 @@ impl<'s, 'a> Grid<'s, 'a> {
                 let sides = if edge {
                     [self.stretch(line, column - ring, column + ring), &[]]
                 } else {
-                    [column - ring, column + ring].map(|side| self.stretch(line, side, side))
+                    [column - ring, column + ring].map_each(|side| self.stretch(line, side, side))
                 };
                 for &other in sides.into_iter().flatten().filter(|&&other| other != station) {
                     work_budget.work(1)?;

@@ -11,6 +11,7 @@
 use super::metric::{least_length, length, square};
 use super::partition::Partition;
 use super::{Leg, NONE};
+use crate::array::MapEach;
 use crate::drawing::{Drawing, PagePoint, Segment};
 use crate::stage::{OutOfScratch, Scratch};
 
@@ -261,12 +262,12 @@ impl<'s, 'a> Survey<'s, 'a> {
         let laid: &mut [u8] = scratch.take(self.segments.len())?;
         let mut slots = ends.iter_mut().zip(outer);
         for (number, segment) in pen_segments(self.segments, self.pen) {
-            let first = match [segment.from, segment.to].map(|point| station_of[usize::from(point)])
-            {
-                [NONE, NONE] => continue,
-                [NONE, _] => Leg::new(number, true),
-                _ => Leg::new(number, false),
-            };
+            let first =
+                match [segment.from, segment.to].map_each(|point| station_of[usize::from(point)]) {
+                    [NONE, NONE] => continue,
+                    [NONE, _] => Leg::new(number, true),
+                    _ => Leg::new(number, false),
+                };
             if laid[usize::from(number)] != 0 {
                 continue;
             }

@@ -9,6 +9,7 @@
 use super::exchange::Exchanges;
 use super::work_budget::WorkBudget;
 use super::{Leg, NONE, OrderError};
+use crate::array::MapEach;
 
 /// Reverses strokes (the legs between two moves) where that makes the tour shorter. Returns the
 /// gain. `ways` must have an entry for each leg of the tour.
@@ -34,10 +35,10 @@ pub(super) fn orient(
             first_start = start;
         } else {
             old += tour.distance(ends[0], start);
-            let reach = |to| [0, 1].map(|way| least[way] + tour.distance(ends[way], to));
+            let reach = |to| [0, 1].map_each(|way| least[way] + tour.distance(ends[way], to));
             let (kept, turned) = (reach(start), reach(end));
             ways[strokes] = u8::from(kept[1] < kept[0]) | u8::from(turned[1] < turned[0]) << 1;
-            least = [kept, turned].map(|[a, b]| a.min(b));
+            least = [kept, turned].map_each(|[a, b]| a.min(b));
         }
         ends = [end, start];
         strokes += 1;
@@ -47,7 +48,7 @@ pub(super) fn orient(
         }
     }
     old += tour.distance(ends[0], first_start);
-    let closed = [0, 1].map(|way| least[way] + tour.distance(ends[way], first_start));
+    let closed = [0, 1].map_each(|way| least[way] + tour.distance(ends[way], first_start));
     let gain = old - closed[0].min(closed[1]);
     if gain <= 0 {
         return Ok(0);

@@ -7,6 +7,7 @@
 use super::View;
 use super::curves::Flattening;
 use super::weld::weld;
+use crate::array::MapEach;
 use crate::geometry::Vertex;
 use crate::model::{Corner, Element, Elements, Model, PenWriter, VERTEX_NUMBER_LIMIT};
 use crate::stage::{Cancel, OutOfScratch, Scratch, StageError, heap_sort_by_key};
@@ -121,7 +122,7 @@ fn cut<'a>(
     }
     for (vertex, key) in new.iter_mut().zip(keys) {
         let ends = [(key >> 16) as usize, (key & 0xFFFF) as usize];
-        if let [Some(p), Some(q)] = ends.map(|end| vertices.get(end)) {
+        if let [Some(p), Some(q)] = ends.map_each(|end| vertices.get(end)) {
             *vertex = on_plane(*p, *q, near);
         }
     }

@@ -22,6 +22,7 @@ pub use camera::{Camera, Direction, Lens, Pose, SightLines};
 pub use clip::{Seen, distinct_edges, project_scene};
 pub use curves::Flattening;
 
+use crate::array::MapEach;
 use crate::geometry::{COORDINATE_LIMIT, Projection, Vertex};
 use crate::model::{Model, Position};
 use crate::stage::{Aborted, Cancel};
@@ -129,7 +130,7 @@ impl View {
         let extents = extents(&directions, model).ok_or(ViewError::NothingToSee)?;
         let reach = reach(model);
         let limit = f64::from(COORDINATE_LIMIT - 1);
-        let shift = directions.map(|axis| -dot(axis, origin));
+        let shift = directions.map_each(|axis| -dot(axis, origin));
         let width = [0, 1]
             .iter()
             .flat_map(|&row: &usize| [extents[row].0 + shift[row], extents[row].1 + shift[row]])
@@ -153,7 +154,7 @@ impl View {
         };
         let offsets = [scale * shift[0], scale * shift[1], depth_scale * (shift[2] + depth_offset)];
         let scales = [scale, scale, depth_scale];
-        let rows = [0, 1, 2].map(|row: usize| {
+        let rows = [0, 1, 2].map_each(|row: usize| {
             Row::new(directions[row], scales[row], offsets[row], fraction_bits, reach)
         });
         let (image_unit, near) = match projection {
@@ -169,7 +170,7 @@ impl View {
 
     /// Transforms a position to view coordinates.
     pub fn vertex(&self, position: Position) -> Vertex {
-        let [x, y, z] = self.rows.each_ref().map(|row| row.apply(position));
+        let [x, y, z] = self.rows.each_ref().map_each(|row| row.apply(position));
         Vertex { x, y, z }
     }
 

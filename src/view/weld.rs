@@ -1,6 +1,7 @@
 //! Repairs two common defects of models: welds vertices at the same position, and leaves out faces
 //! without an area.
 
+use crate::array::MapEach;
 use crate::model::{Corner, Element, Elements, Model, PenWriter, Position};
 use crate::stage::{Cancel, OutOfScratch, Scratch, StageError};
 
@@ -56,9 +57,10 @@ pub(super) fn weld<'a>(
 fn has_extent(element: &Element<'_>, positions: &[Position]) -> bool {
     let Element::Face(corners) = element else { return true };
     let mut sides = corners.iter().filter_map(|corner| {
-        let [from, to] = [corners.first()?, corner].map(|c| positions.get(usize::from(c.vertex())));
+        let [from, to] =
+            [corners.first()?, corner].map_each(|c| positions.get(usize::from(c.vertex())));
         let [from, to] = [from?.coordinates(), to?.coordinates()];
-        let side = [0, 1, 2].map(|axis: usize| i64::from(to[axis]) - i64::from(from[axis]));
+        let side = [0, 1, 2].map_each(|axis: usize| i64::from(to[axis]) - i64::from(from[axis]));
         (side != [0; 3]).then_some(side)
     });
     let Some(a) = sides.next() else { return false };
@@ -119,7 +121,7 @@ impl<'a> Places<'a> {
 /// Hashes a position: multiplies by odd constants (Knuth, 6.4) and mixes the better upper half into
 /// the lower.
 fn hash(position: &Position) -> u32 {
-    let [x, y, z] = position.coordinates().map(|coordinate| coordinate as u32);
+    let [x, y, z] = position.coordinates().map_each(|coordinate| coordinate as u32);
     let mixed = [(y, 0x85EB_CA6B), (z, 0xC2B2_AE35)]
         .into_iter()
         .fold(x.wrapping_mul(0x9E37_79B1), |hash, (part, factor): (u32, u32)| {

@@ -13,6 +13,7 @@ use super::coarse_projection::CoarseProjection;
 use super::edge_query::{CrossedPolygon, EdgeQuery, SceneIndex};
 use super::faces::Face;
 use super::profile::{EdgeInterval, Profile};
+use crate::array::MapEach;
 
 /// One of the two sides of an edge, and the bits of the profile's marks that hold the nearest face
 /// that begins there. They hold the rank plus one; zero means none.
@@ -141,7 +142,7 @@ impl EdgeQuery {
         let facing = coarse_projection.side(a, b, c);
         (facing != 0 && self.lies_in_plane_of(coarse_projection, triangle)).then(|| Touching {
             corners: triangle,
-            sides: triangle.map(|corner| {
+            sides: triangle.map_each(|corner| {
                 if self.is_in_line_with(coarse_projection, corner) {
                     0
                 } else {

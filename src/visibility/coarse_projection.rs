@@ -8,6 +8,7 @@
 use super::Scene;
 use super::yield_counter::YieldCounter;
 use super::{Unrounded, VisibilityError};
+use crate::array::MapEach;
 use crate::geometry::{
     Axis, EdgeParameter, Projection, Vertex, page_offset, page_side, plane_side, plane_side_margin,
 };
@@ -284,7 +285,7 @@ impl<'a> CoarseProjection<'a> {
         if triangle.contains(&end.number) {
             return 0;
         }
-        let [a, b, c] = triangle.map(|number| self.vertex(number));
+        let [a, b, c] = triangle.map_each(|number| self.vertex(number));
         let height = plane_side(a, b, c, end.vertex);
         let margin = plane_side_margin(a, b, c, end.vertex, self.unrounded.error_bound());
         if height.abs() <= margin && self.unrounded.holds(triangle, end.number) {
@@ -296,7 +297,7 @@ impl<'a> CoarseProjection<'a> {
 
     /// Returns [`Self::height`] over `triangle` for each corner of the triangle `of`.
     pub fn heights(&self, triangle: [u16; 3], of: [u16; 3]) -> [i64; 3] {
-        of.map(|corner| self.height(triangle, self.end(corner)))
+        of.map_each(|corner| self.height(triangle, self.end(corner)))
     }
 
     /// Returns an axis of the page along which p and q differ, and the sign of their difference.

@@ -12,6 +12,7 @@ use super::faces::{Face, Faces};
 use super::profile::{EdgeInterval, Profile, mark};
 use super::seams::Extent;
 use super::triangles::Ears;
+use crate::array::MapEach;
 use crate::geometry::{EdgeParameter, line_side, page_offset, page_side};
 use crate::model::Corner;
 
@@ -291,7 +292,7 @@ impl EdgeQuery {
         triangle: &[u16; 3],
         profile: &mut Profile<'_>,
     ) {
-        let sides = triangle.map(|corner| self.side_of(coarse_projection, corner));
+        let sides = triangle.map_each(|corner| self.side_of(coarse_projection, corner));
         self.pass(coarse_projection, CrossedPolygon::new(triangle, &sides), profile);
     }
 

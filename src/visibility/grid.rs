@@ -12,6 +12,7 @@ use super::edges::Outlines;
 use super::faces::Faces;
 use super::raster::{Bounds, Raster, Shape};
 use super::yield_counter::YieldCounter;
+use crate::array::MapEach;
 use crate::geometry::COORDINATE_LIMIT;
 use crate::stage::Scratch;
 use bytemuck::{Pod, Zeroable};
@@ -113,7 +114,7 @@ impl<'a> Grid<'a> {
 
     /// Calls `visit` with the faces of every cell that touches a rectangle.
     pub fn within(&self, bounds: &Bounds, mut visit: impl FnMut(&[u16])) {
-        let [column0, column1, row0, row1] = self.shape.span(bounds).map(usize::from);
+        let [column0, column1, row0, row1] = self.shape.span(bounds).map_each(usize::from);
         for row in row0..=row1 {
             for column in column0..=column1 {
                 visit(self.view(row * self.columns + column, 0).faces);

@@ -8,6 +8,7 @@ use super::edges::Outlines;
 use super::faces::Faces;
 use super::grid::{Cell, coarse_depth};
 use super::yield_counter::YieldCounter;
+use crate::array::MapEach;
 use crate::model::Corner;
 use crate::stage::Aborted;
 
@@ -73,7 +74,7 @@ impl Shape {
     ) -> Result<usize, Aborted> {
         let cells_of = |rank: usize| {
             let bounds = Bounds::of(coarse_projection, outlines.element(faces.get(rank).first));
-            let [column0, column1, row0, row1] = self.span(&bounds).map(usize::from);
+            let [column0, column1, row0, row1] = self.span(&bounds).map_each(usize::from);
             (column1 - column0 + 1) * (row1 - row0 + 1)
         };
         (0..faces.len()).try_fold(0, |sum, rank| {

@@ -1,6 +1,7 @@
 //! Computes the seam of two faces that pass through each other: the segment that two of their
 //! triangles have in common.
 
+use crate::array::MapEach;
 use crate::fixed::divide_down;
 use crate::geometry::{Vertex, plane_side};
 
@@ -51,7 +52,7 @@ pub fn seam(
     of_other: [i64; 3],
 ) -> Option<(Vertex, Vertex)> {
     let crosses = |heights: [i64; 3]| {
-        let above = heights.map(|height| height >= 0);
+        let above = heights.map_each(|height| height >= 0);
         above != [above[0]; 3]
     };
     if !crosses(of_one) || !crosses(of_other) {
@@ -78,7 +79,7 @@ pub fn seam(
 /// triangle itself.
 fn pierces(a: Vertex, b: Vertex, triangle: [Vertex; 3]) -> bool {
     let [c, d, e] = triangle;
-    let turns = [(c, d), (d, e), (e, c)].map(|(from, to)| plane_side(a, b, from, to));
+    let turns = [(c, d), (d, e), (e, c)].map_each(|(from, to)| plane_side(a, b, from, to));
     turns.iter().all(|&turn| turn >= 0) || turns.iter().all(|&turn| turn <= 0)
 }
 

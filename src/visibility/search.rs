@@ -12,6 +12,7 @@ use super::raster::Bounds;
 use super::seams::seam;
 use super::yield_counter::YieldCounter;
 use super::{Options, Stretch, StretchSink, VisibilityError};
+use crate::array::MapEach;
 use crate::geometry::{COORDINATE_LIMIT, EdgeParameter};
 use crate::stage::{Aborted, Scratch};
 
@@ -130,7 +131,7 @@ impl<'a> StretchFinder<'a> {
         yield_counter: &mut YieldCounter<'_>,
         sink: &mut dyn StretchSink,
     ) -> Result<(), VisibilityError> {
-        let [face_one, face_other] = [one, other].map(|rank| self.around.faces.get(rank));
+        let [face_one, face_other] = [one, other].map_each(|rank| self.around.faces.get(rank));
         if self.around.share_edge(face_one, face_other) {
             return Ok(());
         }
@@ -150,8 +151,9 @@ impl<'a> StretchFinder<'a> {
                 }
                 let coarse_projection = &self.around.coarse_projection;
                 let triangles = [triangle_one, triangle_other];
-                let [corners_one, corners_other] = triangles
-                    .map(|triangle| triangle.map(|number| coarse_projection.vertex(number)));
+                let [corners_one, corners_other] = triangles.map_each(|triangle| {
+                    triangle.map_each(|number| coarse_projection.vertex(number))
+                });
                 let of_one = coarse_projection.heights(triangle_other, triangle_one);
                 let of_other = coarse_projection.heights(triangle_one, triangle_other);
                 if let Some((p, q)) = seam(corners_one, corners_other, of_one, of_other) {

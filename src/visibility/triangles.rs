@@ -8,6 +8,7 @@
 use super::VisibilityError;
 use super::edges::{Outlines, is_bar};
 use super::yield_counter::YieldCounter;
+use crate::array::MapEach;
 use crate::geometry::Vertex;
 use crate::model::Corner;
 use crate::stage::Scratch;
@@ -223,7 +224,7 @@ fn cut_ears(
             plane.turn(at(a), at(b), at(c))
         };
         let is_ear = |middle: usize| {
-            let corners = around(middle).map(at);
+            let corners = around(middle).map_each(at);
             let [a, b, c] = corners;
             !rest.iter().map(|&number| at(number)).any(|point| {
                 !corners.contains(&point)

@@ -9,6 +9,7 @@
 //! A vertex that does not belong to the model, such as one where the near plane cuts an edge, lies
 //! in no plane.
 
+use crate::array::MapEach;
 use crate::geometry::{Precision, are_coplanar, are_in_line};
 use crate::model::Corner;
 
@@ -45,7 +46,7 @@ impl<'a> Unrounded<'a> {
     #[cold]
     pub(super) fn holds(&self, triangle: [u16; 3], vertex: u16) -> bool {
         let [a, b, c] = triangle;
-        match [a, b, c, vertex].map(|number| self.at(number)) {
+        match [a, b, c, vertex].map_each(|number| self.at(number)) {
             [Some(a), Some(b), Some(c), Some(d)] => are_coplanar([a, b, c, d], self.precision),
             _ => false,
         }
@@ -55,7 +56,7 @@ impl<'a> Unrounded<'a> {
     /// the positions is unknown.
     #[cold]
     pub(super) fn are_in_line(&self, a: u16, b: u16, vertex: u16) -> bool {
-        match [a, b, vertex].map(|number| self.at(number)) {
+        match [a, b, vertex].map_each(|number| self.at(number)) {
             [Some(a), Some(b), Some(c)] => are_in_line([a, b, c], self.precision),
             _ => false,
         }

@@ -1,0 +1,37 @@
+//! Arrays of a few items, as points and the ends of lines are.
+
+/// Maps arrays of two to four items.
+pub trait MapEach<T, const N: usize> {
+    /// Applies `f` to each item, from the first to the last.
+    ///
+    /// The standard library's `map` is written for arrays of any length, whose items may need to be
+    /// dropped. On a device, each of its calls takes some 20 bytes more than this, unless `f` is
+    /// long and called from one place only.
+    ///
+    /// ```
+    /// use penup::array::MapEach;
+    /// assert_eq!([1, 2, 3].map_each(|number| 10 * number), [10, 20, 30]);
+    /// ```
+    fn map_each<U>(self, f: impl FnMut(T) -> U) -> [U; N];
+}
+
+impl<T> MapEach<T, 2> for [T; 2] {
+    fn map_each<U>(self, mut f: impl FnMut(T) -> U) -> [U; 2] {
+        let [a, b] = self;
+        [f(a), f(b)]
+    }
+}
+
+impl<T> MapEach<T, 3> for [T; 3] {
+    fn map_each<U>(self, mut f: impl FnMut(T) -> U) -> [U; 3] {
+        let [a, b, c] = self;
+        [f(a), f(b), f(c)]
+    }
+}
+
+impl<T> MapEach<T, 4> for [T; 4] {
+    fn map_each<U>(self, mut f: impl FnMut(T) -> U) -> [U; 4] {
+        let [a, b, c, d] = self;
+        [f(a), f(b), f(c), f(d)]
+    }
+}
