@@ -69,6 +69,7 @@ use crate::stage::{Cancel, OutOfScratch, Scratch, heap_sort_by_key};
 /// assert_eq!(hidden.0, [(0, 4), (1, 4), (2, 4), (3, 4)]);
 /// # Ok::<(), SolidError>(())
 /// ```
+#[inline(never)] // Smaller than in its only caller.
 pub fn from_edges(
     positions: &[[i32; 3]],
     edges: &[[u16; 2]],

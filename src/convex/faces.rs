@@ -90,6 +90,7 @@ pub(super) type FaceCorners = [u16; 3];
 /// assert_eq!((count.visible_faces, count.hidden_edges), (3, 3));
 /// # Ok::<(), SolidError>(())
 /// ```
+#[inline(never)] // Smaller than in its only caller.
 pub fn from_vertices(
     positions: &[[i32; 3]],
     eye: Eye,

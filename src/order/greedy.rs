@@ -30,6 +30,7 @@ struct Choice {
 const FIRST_REACH: u32 = 256 << 8;
 
 /// Pairs all of `odd`: `mate[i]` becomes the partner of odd point `i`.
+#[inline(never)] // Smaller than in its only caller.
 pub(super) fn pair(
     odd: &OddPoints<'_>,
     scratch: &mut Scratch<'_>,

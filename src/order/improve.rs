@@ -60,6 +60,7 @@ pub(super) struct Tour<'t> {
 }
 
 /// Shortens `tour.route` as far as the budget allows. Does nothing if there is too little memory.
+#[inline(never)] // Smaller than in its only caller.
 pub(super) fn improve(
     network: Network<'_>,
     tour: Tour<'_>,

@@ -251,6 +251,7 @@ fn check(drawing: Drawing<'_>, tour_length: usize) -> Result<(), OrderError> {
 }
 
 /// Orders the segments of one pen into `tour`, and adds its numbers to `report`.
+#[inline(never)] // Smaller than in its only caller.
 fn order_pen<'a>(
     drawing: Drawing<'a>,
     pen: u8,

@@ -23,6 +23,7 @@ impl<'a> Neighbours<'a> {
     /// Finds up to `per_station` neighbours of each station, a quarter of them in each quadrant. A
     /// crowd of stations on one side, such as the ends of a hatching, must not hide those on the
     /// other sides.
+    #[inline(never)] // Smaller than in its only caller.
     pub fn new(
         network: Network<'_>,
         per_station: usize,

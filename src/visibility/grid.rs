@@ -71,6 +71,7 @@ impl<'a> Grid<'a> {
     ///
     /// # Errors
     /// Returns an error if the memory is too small or the user cancels.
+    #[inline(never)] // Smaller than in its only caller.
     pub fn new(
         coarse_projection: &CoarseProjection<'_>,
         outlines: Outlines<'_>,

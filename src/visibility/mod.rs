@@ -215,6 +215,7 @@ pub const fn least_bytes(vertices: usize, corners: usize, faces: usize) -> usize
 ///
 /// # Errors
 /// See [`VisibilityError`]. By then the sink may already have received some of the stretches.
+#[inline(never)] // Smaller than in its only caller.
 pub fn find_stretches(
     scene: &Scene<'_>,
     options: Options,

@@ -99,6 +99,7 @@ impl<'a> StretchFinder<'a> {
     ///
     /// # Errors
     /// Returns an error if the sink is full or the user cancels.
+    #[inline(never)] // Smaller than in its only caller.
     pub fn follow_seams(
         &mut self,
         yield_counter: &mut YieldCounter<'_>,

@@ -75,6 +75,7 @@ impl<'a> Ears<'a> {
     ///
     /// # Errors
     /// Returns an error if the memory is too small or the user cancels.
+    #[inline(never)] // Smaller than in its only caller.
     pub fn cut(
         outlines: Outlines<'_>,
         vertices: &[Vertex],

@@ -11,6 +11,7 @@ use crate::stage::{Cancel, Scratch};
 ///
 /// # Errors
 /// See [`VisibilityError`]. Working memory of [`super::scratch_bytes`] is enough.
+#[inline(never)] // Smaller than in its only caller.
 pub fn follow_wire(
     scene: &Scene<'_>,
     options: Options,

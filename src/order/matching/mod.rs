@@ -61,6 +61,7 @@ pub const fn scratch_bytes(count: usize) -> usize {
 ///
 /// Returns a lower bound of that length in 1/256 steps. The bound is the length itself, unless the
 /// drawing is so large (above 2^19 steps) that the lengths had to be rounded further.
+#[inline(never)] // Smaller than in its only caller.
 pub(super) fn pair<'s>(
     odd: &'s OddPoints<'s>,
     mut scratch: Scratch<'s>,
