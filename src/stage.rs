@@ -7,7 +7,6 @@
 //! abort are answered during the computation. A slice that does not fit is refused, with the sizes.
 
 use bytemuck::Pod;
-use core::convert::Infallible;
 
 /// Working memory from which a stage takes its slices.
 ///
@@ -135,10 +134,8 @@ pub fn items<T: Pod>(words: &[u64], count: usize) -> Option<&[T]> {
 /// assert_eq!(items, [1, 2, 3]);
 /// ```
 pub fn heap_sort_by_key<T, K: Ord>(items: &mut [T], key: impl Fn(&T) -> K) {
-    let done = heap_sort(items, key, || Ok::<(), Infallible>(()));
-    match done {
-        Ok(()) => {}
-    }
+    // `NeverCancel` never aborts.
+    let _ = heap_sort(items.len(), &mut Keyed { items, key }, &mut NeverCancel);
 }
 
 /// Like [`heap_sort_by_key`], for keys that take long to compare: checks for cancelling before each
@@ -151,40 +148,62 @@ pub fn heap_sort_cancellable<T, K: Ord>(
     key: impl Fn(&T) -> K,
     cancel: &mut dyn Cancel,
 ) -> Result<(), Aborted> {
-    heap_sort(items, key, || cancel.check())
+    heap_sort(items.len(), &mut Keyed { items, key }, cancel)
 }
 
-fn heap_sort<T, K: Ord, E>(
-    items: &mut [T],
-    key: impl Fn(&T) -> K,
-    mut between: impl FnMut() -> Result<(), E>,
-) -> Result<(), E> {
-    let sift_down = |items: &mut [T], mut parent: usize| {
-        loop {
-            let mut child = 2 * parent + 1;
-            if child >= items.len() {
-                return;
-            }
-            if child + 1 < items.len() && key(&items[child]) < key(&items[child + 1]) {
-                child += 1;
-            }
-            if key(&items[parent]) >= key(&items[child]) {
-                return;
-            }
-            items.swap(parent, child);
-            parent = child;
-        }
-    };
-    for parent in (0..items.len() / 2).rev() {
-        between()?;
-        sift_down(items, parent);
+/// Items that a heapsort compares and exchanges. So all types of items share one copy of its code.
+trait Heap {
+    /// Whether the item at `a` comes before the item at `b`.
+    fn is_less(&self, a: usize, b: usize) -> bool;
+    /// Exchanges two items.
+    fn swap(&mut self, a: usize, b: usize);
+}
+
+/// Items that are sorted by a key.
+struct Keyed<'i, T, F> {
+    items: &'i mut [T],
+    key: F,
+}
+
+impl<T, K: Ord, F: Fn(&T) -> K> Heap for Keyed<'_, T, F> {
+    fn is_less(&self, a: usize, b: usize) -> bool {
+        (self.key)(&self.items[a]) < (self.key)(&self.items[b])
     }
-    for end in (1..items.len()).rev() {
-        between()?;
-        items.swap(0, end);
-        sift_down(&mut items[..end], 0);
+
+    fn swap(&mut self, a: usize, b: usize) {
+        self.items.swap(a, b);
+    }
+}
+
+fn heap_sort(count: usize, heap: &mut dyn Heap, cancel: &mut dyn Cancel) -> Result<(), Aborted> {
+    for parent in (0..count / 2).rev() {
+        cancel.check()?;
+        sift_down(heap, count, parent);
+    }
+    for end in (1..count).rev() {
+        cancel.check()?;
+        heap.swap(0, end);
+        sift_down(heap, end, 0);
     }
     Ok(())
+}
+
+/// Moves an item down among the first `count` until neither of its children is greater.
+fn sift_down(heap: &mut dyn Heap, count: usize, mut parent: usize) {
+    loop {
+        let mut child = 2 * parent + 1;
+        if child >= count {
+            return;
+        }
+        if child + 1 < count && heap.is_less(child, child + 1) {
+            child += 1;
+        }
+        if !heap.is_less(parent, child) {
+            return;
+        }
+        heap.swap(parent, child);
+        parent = child;
+    }
 }
 
 /// The user has cancelled the job.
