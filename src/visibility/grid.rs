@@ -114,7 +114,7 @@ impl<'a> Grid<'a> {
     }
 
     /// Calls `visit` with the faces of every cell that touches a rectangle.
-    pub fn within(&self, bounds: &Bounds, mut visit: impl FnMut(&[u16])) {
+    pub fn within(&self, bounds: &Bounds, visit: &mut dyn FnMut(&[u16])) {
         let [column0, column1, row0, row1] = self.shape.span(bounds).map_each(usize::from);
         for row in row0..=row1 {
             for column in column0..=column1 {
@@ -149,7 +149,7 @@ impl<'g> Way<'g> {
     ///
     /// The edge lies less than one unit to the right of the line between the coarse points, and
     /// less than one unit above it.
-    pub fn visit(&self, mut visit: impl FnMut(CellView<'g>) -> bool) -> bool {
+    pub fn visit(&self, visit: &mut dyn FnMut(CellView<'g>) -> bool) -> bool {
         let Shape { shift_x, shift_y, .. } = self.grid.shape;
         let (low_x, low_y) = (i32::from(self.low.x), i32::from(self.low.y));
         let dy = i32::from(self.high.y) - low_y;

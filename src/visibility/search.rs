@@ -176,7 +176,7 @@ impl<'a> StretchFinder<'a> {
         let depths =
             corners.iter().map(|corner| around.coarse_projection.vertex(corner.vertex()).z);
         let far = depths.max().unwrap_or(-COORDINATE_LIMIT);
-        grid.within(&bounds, |ranks| {
+        grid.within(&bounds, &mut |ranks| {
             let near_enough = ranks
                 .iter()
                 .map(|&rank| usize::from(rank))
@@ -260,7 +260,7 @@ impl<'a> StretchFinder<'a> {
         let near = coarse_depth(edge_query.near);
         let way = grid.way(edge_query.p.place, edge_query.q.place, near);
         let (mut any_covered, mut all_covered) = (false, true);
-        way.visit(|cell| {
+        way.visit(&mut |cell| {
             any_covered |= cell.cover.is_some();
             all_covered &= cell.cover.is_some();
             true
@@ -293,8 +293,8 @@ impl<'a> StretchFinder<'a> {
         };
         // The covering faces come first: they hide most, and what they leave visible may need no
         // other cell.
-        let _ = (!any_covered || way.visit(|cell| cell.cover.is_none_or(&mut look_at)))
-            && way.visit(|cell| {
+        let _ = (!any_covered || way.visit(&mut |cell| cell.cover.is_none_or(&mut look_at)))
+            && way.visit(&mut |cell| {
                 let faces = if cell.cover.is_some() { &[] } else { cell.faces };
                 faces
                     .iter()
