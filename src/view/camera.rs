@@ -4,7 +4,7 @@
 //! They are computed once per view, in `libm`.
 
 use super::ViewError;
-use crate::fixed::sin_cos_degrees;
+use crate::fixed::{sin_cos_degrees, square_root};
 use crate::geometry::Projection;
 use crate::model::Model;
 
@@ -291,7 +291,7 @@ fn normalized(a: Direction) -> Option<Direction> {
         return None;
     }
     let scaled = a.map(|d| d / largest);
-    let length = libm::sqrt(dot(scaled, scaled));
+    let length = square_root(dot(scaled, scaled));
     Some(scaled.map(|d| d / length))
 }
 

@@ -23,6 +23,7 @@ pub use clip::{Seen, distinct_edges, project_scene};
 pub use curves::Flattening;
 
 use crate::array::MapEach;
+use crate::fixed::square_root;
 use crate::geometry::{COORDINATE_LIMIT, Projection, Vertex};
 use crate::model::{Model, Position};
 use crate::stage::{Aborted, Cancel};
@@ -89,7 +90,7 @@ impl Row {
     fn new(direction: Direction, scale: f64, offset: f64, fraction_bits: u32, reach: f64) -> Self {
         // Since `reach` times the length bounds |direction · p|, these two limits on the shift keep
         // the sum and each factor in range.
-        let length = libm::sqrt(dot(direction, direction));
+        let length = square_root(dot(direction, direction));
         let largest = scale * reach * length + libm::fabs(offset) + 1.0;
         let steepest = scale * largest_component(direction);
         let mut shift = 61 - exponent(largest);
