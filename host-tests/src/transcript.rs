@@ -129,7 +129,7 @@ const TICKS_PER_SECOND_64: u64 = TICKS_PER_SECOND as u64;
 fn is_at_rest(machine: &Machine<'_>) -> bool {
     let moves = matches!(
         machine.state(),
-        State::Run | State::Jog | State::Home | State::Abort | State::Hold { standing: false }
+        State::Run | State::Jog | State::Home | State::Abort | State::Hold { stopped: false }
     );
     !moves && machine.is_stopped()
 }

@@ -187,7 +187,7 @@ fn so_does_one_with_backlash_whose_pen_a_motor_lifts() {
         (Setting::TravelZ, 1.0),
         (Setting::MaxRateZ, 900.0),
         (Setting::AccelerationZ, 500.0),
-        (Setting::PenLift, 1.0),
+        (Setting::Tool, 1.0),
     ];
     disturb(&values, 300, 1975);
 }
@@ -311,7 +311,7 @@ fn home_and_disturb(random: &mut Random) -> Stage {
                     stage = Stage::Stopped;
                 }
                 Stage::Held
-                    if machine.state() == (State::Hold { standing: true })
+                    if machine.state() == (State::Hold { stopped: true })
                         && machine.is_stopped() =>
                 {
                     machine.resume();

@@ -287,7 +287,7 @@ proptest! {
                 if aborts && turn.now >= last {
                     turn.machine.abort();
                 }
-                if turn.machine.state() == (State::Hold { standing: true }) && turn.machine.is_stopped() {
+                if turn.machine.state() == (State::Hold { stopped: true }) && turn.machine.is_stopped() {
                     assert_eq!(turn.machine.planned_position(), turn.pins);
                     turn.machine.resume();
                 }

@@ -21,14 +21,14 @@ pub(super) struct Backlash {
 }
 
 impl Backlash {
-    /// The steps that take up the slack before a move by `way` motor steps, for motors that have
+    /// The steps that take up the slack before a move by `delta` motor steps, for motors that have
     /// `slack` steps of it. From now on these steps count as taken up.
-    fn take_up(&mut self, slack: [i32; 2], way: [i32; 2]) -> [i32; 2] {
+    fn take_up(&mut self, slack: [i32; 2], delta: [i32; 2]) -> [i32; 2] {
         let mut take = |axis: usize| {
-            if way[axis] == 0 {
+            if delta[axis] == 0 {
                 return 0;
             }
-            let (up, ahead, slack) = (way[axis] > 0, &mut self.ahead[axis], slack[axis]);
+            let (up, ahead, slack) = (delta[axis] > 0, &mut self.ahead[axis], slack[axis]);
             let now = ahead.unwrap_or(if up { 0 } else { slack });
             let steps = if up { now } else { now - slack };
             *ahead = Some(now - steps);
@@ -61,32 +61,27 @@ impl Backlash {
 impl Machine<'_> {
     /// The slack of each motor, in steps.
     pub(super) fn slack_steps(&self) -> [i32; 2] {
-        let steps = |slack: Setting, steps_per_mm: Setting| {
-            self.settings.millimetres_as_steps(slack, steps_per_mm)
-        };
-        [
-            steps(Setting::BacklashX, Setting::StepsPerMmX),
-            steps(Setting::BacklashY, self.settings.steps_per_mm_y()),
-        ]
+        let PagePoint { x, y } = self.settings.page_point([Setting::BacklashX, Setting::BacklashY]);
+        [x, y]
     }
 
     /// Appends a move of the motors. If the move needs slack to be taken up, only the move that
-    /// does this is appended, and the caller has to push `piece` again. Returns whether `piece`
+    /// does this is appended, and the caller has to push `segment` again. Returns whether `segment`
     /// itself was appended.
     ///
     /// # Errors
     /// See [`PushError`]. On an error nothing is appended.
     pub(super) fn push_motors(
         &mut self,
-        piece: &Move,
+        segment: &Move,
         ink: Option<LineType>,
         limit: PathLength,
     ) -> Result<bool, PushError> {
-        let (motors, end) = (piece.motors, self.runner.end());
+        let (motors, end) = (segment.motors, self.runner.end());
         let mut slack = self.slack;
         let [x, y] = slack.take_up(self.slack_steps(), [motors.x - end.x, motors.y - end.y]);
         if (x, y) == (0, 0) {
-            self.runner.push(piece, ink, limit)?;
+            self.runner.push(segment, ink, limit)?;
         } else {
             self.runner.push_slack(PagePoint { x, y }, ink)?;
         }

@@ -1,10 +1,12 @@
 //! Homing: finds the corner of the travel by the limit switches.
 //!
 //! Each axis in turn runs to its switch, backs off, approaches the switch again slowly, and backs
-//! off to its final position. The position of the axis there becomes 0. A polargraph winds one belt
-//! after the other; the length of a homed belt is a setting.
+//! off to its final position. The position of the axis there becomes 0. Which motors run, and what
+//! the position becomes on a machine that hangs on belts, is asked of the kinematics.
 
-use super::{Alarm, Kinematics, Machine, MachineError, Setting, State, Target};
+use super::kinematics::{HomingSpace, Kinematics};
+use super::state::Activity;
+use super::{Alarm, Machine, MachineError, Setting, Target, Tool};
 use crate::drawing::{PAGE_LIMIT, PagePoint};
 use crate::motion::{Move, PathLength, PushError};
 
@@ -65,6 +67,12 @@ impl Contacts {
             y: self.y != (mask & 2 != 0),
             stop: self.stop != (mask & 4 != 0),
         }
+    }
+
+    /// The limit switches among the contacts.
+    #[must_use]
+    pub const fn switches(self) -> Switches {
+        Switches { x: self.x, y: self.y }
     }
 }
 
@@ -168,11 +176,10 @@ impl Machine<'_> {
     /// # Errors
     /// [`MachineError::State`] unless the machine is idle or in [`Alarm::NotHomed`].
     pub fn home(&mut self, switches: Switches) -> Result<(), MachineError> {
-        if !matches!(self.state, State::Idle | State::Alarm(Alarm::NotHomed)) || !self.is_stopped()
-        {
-            return Err(MachineError::State(self.state));
+        let is_allowed = matches!(self.activity, Activity::Idle | Activity::Alarm(Alarm::NotHomed));
+        if !is_allowed || !self.is_stopped() {
+            return Err(self.refusal());
         }
-        self.state = State::Home;
         self.slack.forget();
         self.begin_phase(Homing::begin(Axis::X, switches.x));
         Ok(())
@@ -182,22 +189,25 @@ impl Machine<'_> {
     /// emergency stop raises an alarm in any state. The limit switches are passed on to
     /// [`Machine::watch`].
     pub fn observe(&mut self, contacts: Contacts) {
-        let pressed = contacts.pressed(self.settings.get(Setting::InvertContacts).to_num());
-        self.switches = Switches { x: pressed.x, y: pressed.y };
-        self.stop_is_pressed = pressed.stop;
-        if pressed.stop && self.state != State::Alarm(Alarm::EmergencyStop) {
+        self.contacts = contacts.pressed(self.settings.get(Setting::InvertContacts).to_num());
+        let is_known = matches!(self.activity, Activity::Alarm(Alarm::EmergencyStop));
+        if self.contacts.stop && !is_known {
             self.alarm(Alarm::EmergencyStop);
         }
-        self.watch(self.switches);
+        self.watch(self.contacts.switches());
     }
 
     /// Reports the present state of the limit switches. During homing, a pressed switch ends the
     /// approach. In any other motion it raises an alarm if [`Setting::HardLimits`] is on.
     pub fn watch(&mut self, switches: Switches) {
-        match (self.state, self.homing) {
-            (State::Home, Some(homing)) => self.watch_homing(homing, switches),
-            (State::Home | State::Check | State::Sleep | State::Alarm(_), _) => {}
-            (State::Run | State::Hold { .. } | State::Jog | State::Abort | State::Idle, _) => {
+        match self.activity {
+            Activity::Home(homing) => self.watch_homing(homing, switches),
+            Activity::Check | Activity::Sleep { .. } | Activity::Alarm(_) => {}
+            Activity::Run(_)
+            | Activity::Hold { .. }
+            | Activity::Jog
+            | Activity::Abort
+            | Activity::Idle => {
                 // The state becomes idle as soon as all events are planned, while the pins still
                 // move.
                 let is_limit = switches.any() && self.settings.is_on(Setting::HardLimits);
@@ -210,20 +220,20 @@ impl Machine<'_> {
 
     fn watch_homing(&mut self, homing: Homing, switches: Switches) {
         if homing.seeks() && homing.pressed_at.is_none() && switches.of(homing.axis) {
-            let pressed_at = Some(self.homing_place(self.motors_now()));
-            self.homing = Some(Homing { pressed_at, ..homing });
+            let pressed_at = Some(self.homing_position(self.motors_now()));
+            self.activity = Activity::Home(Homing { pressed_at, ..homing });
             self.runner.stop();
         } else if homing.is_stopped && self.is_stopped() {
             match homing.next(switches) {
                 Ok(next) => {
                     if homing.phase == Phase::PullOff {
-                        self.set_zero(homing.axis);
+                        self.set_homed(homing.axis);
                     }
                     match next {
                         Some(next) => self.begin_phase(next),
                         None => {
                             self.end_homing();
-                            self.state = State::Idle;
+                            self.activity = Activity::Idle;
                         }
                     }
                 }
@@ -234,7 +244,7 @@ impl Machine<'_> {
 
     /// Ends homing, if it is in progress, and restores the normal limits.
     pub(super) fn end_homing(&mut self) {
-        if self.homing.take().is_some() {
+        if let Activity::Home(_) = self.activity {
             self.take_settings();
         }
     }
@@ -242,74 +252,76 @@ impl Machine<'_> {
     /// Plans the move of a phase. Raises an alarm if the move cannot be planned.
     fn begin_phase(&mut self, homing: Homing) {
         let speed = if homing.is_slow() { Setting::HomingFeed } else { Setting::HomingSeek };
-        self.runner.set_limits(self.settings.limits_at(speed), self.settings.pen_positions());
-        let polargraph = matches!(self.settings.kinematics(), Kinematics::Polargraph(_));
-        let (travel, steps_per_mm) = match homing.axis {
-            _ if polargraph => (Setting::AnchorWidth, Setting::StepsPerMmX),
-            Axis::X => (Setting::TravelX, Setting::StepsPerMmX),
-            Axis::Y => (Setting::TravelY, self.settings.steps_per_mm_y()),
+        let pen = Tool::positions(&self.settings);
+        self.runner.set_limits(self.settings.limits_at(speed), pen);
+        let properties = Kinematics::properties(&self.settings);
+        let axis = homing.axis as usize;
+        let steps = |setting| {
+            let steps_per_mm = properties.steps_per_mm[axis];
+            self.settings.millimetres_as_steps(setting, steps_per_mm).min(PAGE_LIMIT / 2)
         };
-        let steps =
-            |setting| self.settings.millimetres_as_steps(setting, steps_per_mm).min(PAGE_LIMIT / 2);
-        let distance = homing.distance(steps(travel), steps(Setting::HomingPullOff));
-        let mut point = self.homing_place(self.runner.position());
+        let distance =
+            homing.distance(steps(properties.homing_travel[axis]), steps(Setting::HomingPullOff));
+        let mut point = self.homing_position(self.runner.position());
         let from = homing.pressed_at.unwrap_or(point);
         match homing.axis {
             Axis::X => point.x = from.x + distance,
             Axis::Y => point.y = from.y + distance,
         }
-        self.homing = Some(homing);
-        let pushed = if polargraph {
-            // Only one belt moves. Where that leads the pen does not matter, only how far the belt
-            // moves.
-            let (end, page) = (self.runner.end(), self.runner.page_end());
-            let page = PagePoint { x: page.x + point.x - end.x, y: page.y + point.y - end.y };
-            let way = (page.x - self.runner.page_end().x, page.y - self.runner.page_end().y);
-            let length = self.runner.limits().length(way.0, way.1);
-            length.ok_or(PushError::TooLong).and_then(|length| {
-                let (motors, offsets, is_gap) = (point, [0; 2], false);
-                let belt = Move { motors, offsets, page, way, whole: length, length, is_gap };
-                // The first call may only take up the slack; then the move itself follows.
-                if !self.push_motors(&belt, None, PathLength::MAX)? {
-                    self.push_motors(&belt, None, PathLength::MAX)?;
-                }
-                Ok(())
-            })
-        } else {
-            self.push(Target { point, ink: None }, PathLength::MAX).map(|_| ())
+        self.activity = Activity::Home(homing);
+        let pushed = match properties.homing_space {
+            HomingSpace::Page => self.push(Target { point, ink: None }, PathLength::MAX).map(drop),
+            HomingSpace::Motors => self.push_motor(point),
         };
         if pushed.is_err() {
             self.alarm(Alarm::HomingFailed(homing.axis));
         }
     }
 
-    /// The position in the coordinates that homing uses: the belt lengths of a polargraph,
-    /// otherwise the page.
-    fn homing_place(&self, motors: PagePoint) -> PagePoint {
-        match self.settings.kinematics() {
-            Kinematics::Polargraph(_) => motors,
-            build => build.page(motors),
+    /// Plans the move of a single motor. Where that leads the pen does not matter, only how far the
+    /// motor moves.
+    ///
+    /// # Errors
+    /// See [`PushError`]. On an error nothing is appended.
+    fn push_motor(&mut self, motors: PagePoint) -> Result<(), PushError> {
+        let (end, page) = (self.runner.end(), self.runner.page_end());
+        let way = (motors.x - end.x, motors.y - end.y);
+        let page = PagePoint { x: page.x + way.0, y: page.y + way.1 };
+        let length = self.runner.limits().length(way.0, way.1).ok_or(PushError::TooLong)?;
+        let (offsets, is_gap) = ([0; 2], false);
+        let belt = Move { motors, offsets, page, way, whole: length, length, is_gap };
+        // The first call may only take up the slack; then the move itself follows.
+        if !self.push_motors(&belt, None, PathLength::MAX)? {
+            self.push_motors(&belt, None, PathLength::MAX)?;
+        }
+        Ok(())
+    }
+
+    /// The position of the motors in the coordinates that homing uses.
+    fn homing_position(&self, motors: PagePoint) -> PagePoint {
+        match Kinematics::properties(&self.settings).homing_space {
+            HomingSpace::Page => self.settings.kinematics().page(motors),
+            HomingSpace::Motors => motors,
         }
     }
 
-    /// Sets the position of an axis after its last phase: to 0, or to the homed length of a
-    /// polargraph's belt.
-    fn set_zero(&mut self, axis: Axis) {
-        let build = self.settings.kinematics();
-        let mut place = self.homing_place(self.runner.position());
-        let zero = match build {
-            Kinematics::Polargraph(_) => {
-                self.settings.millimetres_as_steps(Setting::HomedBelt, Setting::StepsPerMmX)
-            }
-            _ => 0,
-        };
+    /// Sets the position of an axis after its last phase: to 0, or to the homed length of a belt.
+    fn set_homed(&mut self, axis: Axis) {
+        let properties = Kinematics::properties(&self.settings);
+        let mut position = self.homing_position(self.runner.position());
+        let homed = properties.homed_length.map_or(0, |setting| {
+            let steps_per_mm = properties.steps_per_mm[axis as usize];
+            self.settings.millimetres_as_steps(setting, steps_per_mm)
+        });
         match axis {
-            Axis::X => place.x = zero,
-            Axis::Y => place.y = zero,
+            Axis::X => position.x = homed,
+            Axis::Y => position.y = homed,
         }
-        match build {
-            Kinematics::Polargraph(_) => self.set_motors(place, build.page(place)),
-            _ => self.set_position(place),
+        match properties.homing_space {
+            HomingSpace::Page => self.set_position(position),
+            HomingSpace::Motors => {
+                self.set_motors(position, self.settings.kinematics().page(position));
+            }
         }
     }
 }

@@ -1,10 +1,13 @@
 //! Runs a job: measures the path, reads its targets, fills the event queue, and stops where the
 //! path or the user demands it.
 
-use super::status::Estimate;
-use super::{Alarm, JobSize, Kinematics, Machine, MachineError, Path, Setting, State, Target};
-use crate::drawing::{PAGE_LIMIT, PagePoint};
-use crate::motion::{EventQueue, PathLength, Progress, Runner};
+use super::estimate::Estimate;
+use super::homing::Homing;
+use super::progress::Progress;
+use super::state::{Activity, Source};
+use super::{Alarm, JobSize, Machine, MachineError, Path, Setting, Target};
+use crate::drawing::PagePoint;
+use crate::motion::{EventQueue, PathLength, Progress as RunnerProgress, Runner};
 
 /// The longest time that one turn of the main loop may take: 20 ms, while it writes to the serial
 /// line.
@@ -12,47 +15,51 @@ const LATE_TICKS: u32 = crate::motion::TICKS_PER_SECOND / 50;
 
 impl Machine<'_> {
     /// Measures the path from the machine's present position. If all of it can be drawn, the
-    /// machine begins to draw it. In [`State::Check`] the path is only measured.
+    /// machine begins to draw it. In check mode the path is only measured.
     ///
     /// # Errors
     /// See [`MachineError`]. On an error nothing moves.
     pub fn start(&mut self, path: &mut dyn Path) -> Result<JobSize, MachineError> {
-        if !matches!(self.state, State::Idle | State::Check) {
-            return Err(MachineError::State(self.state));
-        }
+        let (Activity::Idle | Activity::Check) = self.activity else { return Err(self.refusal()) };
         let size = self.measure(path)?;
-        if self.state == State::Idle {
-            self.job = size;
-            self.reset_ink_budget();
-            self.before = self.runner.run();
-            self.path_ended = false;
-            self.state = State::Run;
+        if let Activity::Idle = self.activity {
+            self.begin_job(size, Source::Path);
         }
         Ok(size)
+    }
+
+    /// Begins a job of this size, whose moves come from `source`.
+    pub(super) fn begin_job(&mut self, size: JobSize, source: Source) {
+        self.progress = Progress::begin(size, self.runner.run());
+        self.reset_ink_budget();
+        self.activity = Activity::Run(source);
     }
 
     /// Keeps the queue filled. It reads targets while the look-ahead has room, and appends events
     /// while the queue has room and the plan is not too far ahead of the pins. Call it often.
     pub fn fill(&mut self, path: &mut dyn Path, queue: &mut dyn EventQueue) {
         self.runner.follow_lift(self.pins.ticks());
-        if let State::Alarm(alarm) = self.state {
+        if let Activity::Alarm(alarm) = self.activity {
             return self.raise_pen(alarm, queue);
         }
         if self.pins.is_halted() {
             return;
         }
-        if core::mem::take(&mut self.sleep_due) && self.runner.release_drivers(queue).is_err() {
+        if let Activity::Sleep { drivers_on } = &mut self.activity
+            && core::mem::take(drivers_on)
+            && self.runner.release_drivers(queue).is_err()
+        {
             self.alarm(Alarm::Queue);
         }
-        while self.is_moving() {
+        while self.activity.is_moving() {
             self.read_targets(path);
             let ahead = self.runner.ticks().wrapping_sub(self.pins.ticks());
             if queue.room() < Runner::ROOM || self.is_far_enough(ahead) {
                 return;
             }
             match self.runner.produce(queue) {
-                Ok(Progress::More) => {}
-                Ok(progress) => self.stand(progress),
+                Ok(RunnerProgress::More) => {}
+                Ok(progress) => self.after_stop(progress),
                 Err(_) => self.alarm(Alarm::Queue),
             }
         }
@@ -71,7 +78,7 @@ impl Machine<'_> {
         }
         while self.runner.is_pen_held(restarted) && queue.room() >= Runner::ROOM {
             let raised = match self.runner.raise_pen(queue) {
-                Ok(Progress::Done) if restarted => self.runner.release_drivers(queue),
+                Ok(RunnerProgress::Done) if restarted => self.runner.release_drivers(queue),
                 raised => raised.map(|_| ()),
             };
             if raised.is_err() {
@@ -80,18 +87,11 @@ impl Machine<'_> {
         }
     }
 
-    /// Whether there may be events to plan.
-    fn is_moving(&self) -> bool {
-        matches!(
-            self.state,
-            State::Run | State::Hold { standing: false } | State::Abort | State::Jog
-        ) || self.homing.is_some_and(|homing| !homing.is_stopped)
-    }
-
     /// Whether a plan that is `ahead` ticks ahead of the pins is long enough for now.
     fn is_far_enough(&self, ahead: u32) -> bool {
         // During homing, a switch must stop the machine soon, so little is planned ahead.
-        let enough = if self.homing.is_some() { LATE_TICKS } else { self.ahead_ticks };
+        let is_homing = matches!(self.activity, Activity::Home(_));
+        let enough = if is_homing { LATE_TICKS } else { self.ahead_ticks };
         // If the plan covered less than the time to stop, the machine would slow down whenever the
         // main loop is late by that much.
         ahead >= enough && ahead >= self.runner.stopping_ticks().saturating_add(LATE_TICKS)
@@ -99,31 +99,28 @@ impl Machine<'_> {
 
     /// Changes the state after the runner has planned the machine to a stop, for the reason
     /// `progress`.
-    fn stand(&mut self, progress: Progress) {
-        match self.state {
-            State::Hold { .. } | State::Run
-                if progress == Progress::Stopped || self.next_pen.is_some() =>
+    fn after_stop(&mut self, progress: RunnerProgress) {
+        match self.activity {
+            Activity::Run(source) | Activity::Hold { source, .. }
+                if progress == RunnerProgress::Stopped
+                    || matches!(source, Source::PenChange { .. }) =>
             {
-                if self.state == State::Run {
+                if let Activity::Run(_) = self.activity {
                     self.reset_ink_budget();
                 }
-                self.state = State::Hold { standing: true };
+                self.activity = Activity::Hold { stopped: true, source };
             }
-            State::Home => {
+            Activity::Home(homing) => {
                 self.forget_path(self.planned_position());
-                if let Some(homing) = &mut self.homing {
-                    homing.is_stopped = true;
-                }
+                self.activity = Activity::Home(Homing { is_stopped: true, ..homing });
             }
             _ => {
-                self.next_pen = None;
-                self.streaming = false;
                 let page = match progress {
-                    Progress::Done => self.runner.page_end(),
+                    RunnerProgress::Done => self.runner.page_end(),
                     _ => self.planned_position(),
                 };
                 self.forget_path(page);
-                self.state = State::Idle;
+                self.activity = Activity::Idle;
             }
         }
     }
@@ -137,13 +134,13 @@ impl Machine<'_> {
 
     /// Reads targets from the path while the look-ahead has room for their moves.
     fn read_targets(&mut self, path: &mut dyn Path) {
-        if self.split.is_some() {
-            self.push_pieces();
+        if self.segmenter.is_some() {
+            self.push_segments();
         }
-        while !self.path_ended && self.next_pen.is_none() && self.has_room() {
+        while self.activity.reads_path() && self.has_room() {
             match path.next_target() {
-                Some(target) if path.pen() != self.pen => {
-                    self.next_pen = Some((path.pen(), target));
+                Some(first) if path.pen() != self.pen => {
+                    self.activity.set_source(Source::PenChange { pen: path.pen(), first });
                     self.runner.end_path();
                 }
                 // The whole path was measured at the start, so every move fits.
@@ -153,7 +150,7 @@ impl Machine<'_> {
                     }
                 }
                 None => {
-                    self.path_ended = true;
+                    self.activity.set_source(Source::PathEnd);
                     self.runner.end_path();
                 }
             }
@@ -200,22 +197,7 @@ impl Machine<'_> {
     /// # Errors
     /// [`MachineError::BeyondTravel`] with the index `target`.
     pub fn check_travel(&self, target: u32, point: PagePoint) -> Result<(), MachineError> {
-        // A polargraph is always limited, because its belts cannot hold the pen above their
-        // anchors.
-        let limited = self.settings.is_on(Setting::SoftLimits)
-            || matches!(self.settings.kinematics(), Kinematics::Polargraph(_));
-        let beyond = |at: i32, travel: Setting, steps_per_mm: Setting| {
-            let (least, most) = if limited {
-                let steps = self.settings.millimetres_as_steps(travel, steps_per_mm);
-                (0, steps.min(PAGE_LIMIT))
-            } else {
-                (-PAGE_LIMIT, PAGE_LIMIT)
-            };
-            let steps = at.saturating_sub(at.clamp(least, most));
-            self.settings.steps_as_millimetres(steps, steps_per_mm)
-        };
-        let x = beyond(point.x, Setting::TravelX, Setting::StepsPerMmX);
-        let y = beyond(point.y, Setting::TravelY, self.settings.steps_per_mm_y());
+        let [x, y] = self.settings.beyond_travel(point);
         if x == 0 && y == 0 { Ok(()) } else { Err(MachineError::BeyondTravel { target, x, y }) }
     }
 }

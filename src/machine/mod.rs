@@ -10,110 +10,47 @@
 //! The machine refuses commands that its state does not allow, settings that conflict, and moves
 //! beyond the limits. A refused command changes nothing.
 
-mod cut_positions;
+mod backlash;
+mod estimate;
 mod homing;
 mod job;
 mod kinematics;
 mod path;
+mod progress;
 mod pulser;
-mod ring;
-mod settings;
-mod backlash;
 mod segmenter;
+mod settings;
+mod state;
 mod status;
 mod stream;
+mod tool;
+mod travel;
+
+pub use homing::{Axis, Contacts, Switches};
+pub use kinematics::{Anchors, CutPositions, Kinematics, SegmentEnd};
+pub use path::{JobSize, Path, TapePath, Target, TargetList};
+pub use pulser::{Axes, EventRing, PinOrder, Pins, Pulser, PulserState, StepQueue, Tick};
+pub use settings::{SETTINGS, Setting, SettingError, SettingInfo, Settings, Value};
+pub use state::{Alarm, MachineError, State};
+pub use status::Status;
+pub use tool::{Pen, Solenoid, servo};
 
 use backlash::Backlash;
-pub use cut_positions::CutPositions;
-use homing::Homing;
-pub use homing::{Axis, Contacts, Switches};
-pub use kinematics::{Anchors, Kinematics, SegmentEnd};
-pub use path::{JobSize, Path, TapePath, Target, TargetList};
-pub use pulser::{Axes, Pen, PinOrder, Pins, Pulser, PulserState, Solenoid, StepQueue, Tick};
-pub use ring::EventRing;
+use progress::Progress;
 use segmenter::Segmenter;
-pub use settings::{SETTING_COUNT, SETTINGS, Setting, SettingError, SettingInfo, Settings, Value};
-pub use status::Status;
+use state::{Activity, Source};
+use tool::Tool;
 
 use crate::drawing::PagePoint;
-use crate::motion::{Block, PathLength, RunLengths, Runner};
+use crate::motion::{Block, PathLength, Runner};
 
-/// What the machine is doing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum State {
-    /// The machine is at rest and ready for a command.
-    Idle,
-    /// The machine draws a path, or moves that are sent one by one.
-    Run,
-    /// A feed hold: the machine slows down along the path, or it has stopped with the pen raised.
-    Hold {
-        /// Whether the machine has stopped. `false` while it still slows down.
-        standing: bool,
-    },
-    /// The machine slows down to cancel the job; [`State::Idle`] follows.
-    Abort,
-    /// The machine makes moves that the user commands by hand (jogging).
-    Jog,
-    /// The machine is homing: it searches for the limit switches.
-    Home,
-    /// Check mode: jobs are measured, but not drawn.
-    Check,
-    /// The machine has stopped because of an alarm. [`Machine::unlock`] ends the alarm.
-    Alarm(Alarm),
-    /// The motors are switched off. [`Machine::unlock`] ends this state.
-    Sleep,
-}
-
-/// The reason for an alarm.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Alarm {
-    /// The emergency stop was pressed.
-    EmergencyStop,
-    /// A limit switch was pressed during a move.
-    HardLimit,
-    /// The machine has just started and does not know its position. [`Machine::home`] finds the
-    /// position.
-    NotHomed,
-    /// Homing did not find the switch of this axis, or the switch stayed pressed.
-    HomingFailed(Axis),
-    /// The queue refused an event although it had reported room. This is a bug in the firmware.
-    Queue,
-    /// The watchdog restarted the board. This is a bug in the firmware.
-    Restarted,
-}
-
-/// Why a command was refused.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum MachineError {
-    /// The command is not allowed in this state.
-    State(State),
-    /// A target lies beyond the travel.
-    BeyondTravel {
-        /// The index of the target, counted from 0.
-        target: u32,
-        /// How far the target lies beyond the travel of x, in millimetres; negative if it lies
-        /// below 0.
-        x: Value,
-        /// How far the target lies beyond the travel of y, in millimetres; negative if it lies
-        /// below 0.
-        y: Value,
-    },
-    /// A move is longer than the motion planner can plan: 16 m.
-    MoveTooLong {
-        /// The index of the target, counted from 0.
-        target: u32,
-    },
-}
-
-/// The state of the plotter that the main loop owns.
+/// The plotter as the main loop sees it.
 #[derive(Debug)]
 pub struct Machine<'m> {
     /// The settings in force.
     settings: Settings,
     /// What the machine is doing.
-    state: State,
+    activity: Activity,
     /// The motion planner, which produces the events.
     runner: Runner<'m>,
     /// The state that is shared with the interrupt.
@@ -122,34 +59,18 @@ pub struct Machine<'m> {
     origin: PagePoint,
     /// How far the queue is planned ahead of the pins, in ticks.
     ahead_ticks: u32,
-    /// The size of the present job, or of the last one.
-    job: JobSize,
-    /// The runner's totals of lengths and strokes when the job began.
-    before: RunLengths,
+    /// The size of the present job, or of the last one, and how far it has come.
+    progress: Progress,
     /// The move that is being cut into segments, if any.
-    split: Option<Segmenter>,
+    segmenter: Option<Segmenter>,
     /// Where the motors are within their slack.
     slack: Backlash,
-    /// Whether the path has been read to its end.
-    path_ended: bool,
-    /// Whether the drivers are still to be switched off because of [`Machine::sleep`].
-    sleep_due: bool,
-    /// The progress of homing; `None` if the machine is not homing.
-    homing: Option<Homing>,
-    /// The limit switches that were pressed when they were last observed.
-    switches: Switches,
-    /// Whether the emergency stop was pressed when it was last observed.
-    stop_is_pressed: bool,
-    /// Whether the moves are sent one by one.
-    streaming: bool,
-    /// Whether the last of these moves was drawn with the pen down.
-    stream_is_inked: bool,
+    /// The contacts that were pressed when they were last observed.
+    contacts: Contacts,
     /// The speed override, in percent of the speeds in the settings.
     percent: u8,
     /// The number of the pen in the holder, counted from 0.
     pen: u8,
-    /// The pen to be inserted next, and the first target that it draws.
-    next_pen: Option<(u8, Target)>,
 }
 
 impl<'m> Machine<'m> {
@@ -169,29 +90,21 @@ impl<'m> Machine<'m> {
     ) -> Self {
         let mut machine = Self {
             settings,
-            state: if settings.is_on(Setting::Homing) {
-                State::Alarm(Alarm::NotHomed)
+            activity: if settings.is_on(Setting::Homing) {
+                Activity::Alarm(Alarm::NotHomed)
             } else {
-                State::Idle
+                Activity::Idle
             },
-            runner: Runner::new(settings.limits(), settings.pen_positions(), blocks),
+            runner: Runner::new(settings.limits(), Tool::positions(&settings), blocks),
             pins,
             origin: PagePoint::default(),
             ahead_ticks,
-            job: JobSize::default(),
-            before: RunLengths::default(),
-            split: None,
+            progress: Progress::default(),
+            segmenter: None,
             slack: Backlash::default(),
-            path_ended: true,
-            sleep_due: false,
-            homing: None,
-            switches: Switches::default(),
-            stop_is_pressed: false,
-            streaming: false,
-            stream_is_inked: false,
+            contacts: Contacts::default(),
             percent: 100,
             pen: 0,
-            next_pen: None,
         };
         machine.configure_pulser();
         machine.set_position(PagePoint::default());
@@ -208,8 +121,9 @@ impl<'m> Machine<'m> {
     /// # Errors
     /// See [`SettingError`]. On an error the setting keeps its old value.
     pub fn set(&mut self, setting: Setting, value: Value) -> Result<(), SettingError> {
-        if !matches!(self.state, State::Idle | State::Check | State::Alarm(_)) || !self.is_stopped()
-        {
+        let is_allowed =
+            matches!(self.activity, Activity::Idle | Activity::Check | Activity::Alarm(_));
+        if !is_allowed || !self.is_stopped() {
             return Err(SettingError::Busy);
         }
         let (page, before) = (self.position(), self.settings.kinematics());
@@ -227,13 +141,18 @@ impl<'m> Machine<'m> {
 
     /// Passes the limits, the pen positions and the override to the motion planner.
     fn take_settings(&mut self) {
-        self.runner.set_limits(self.settings.limits(), self.settings.pen_positions());
+        self.runner.set_limits(self.settings.limits(), Tool::positions(&self.settings));
         self.runner.set_override(self.percent);
     }
 
     /// What the machine is doing.
     pub fn state(&self) -> State {
-        self.state
+        self.activity.state()
+    }
+
+    /// The refusal of a command that the present state does not allow.
+    fn refusal(&self) -> MachineError {
+        MachineError::State(self.state())
     }
 
     /// Declares that the machine is at `page`, whatever position it had. The step counters of the
@@ -247,28 +166,28 @@ impl<'m> Machine<'m> {
     fn set_motors(&mut self, motors: PagePoint, page: PagePoint) {
         let (x, y) = self.pins.steps();
         self.origin = PagePoint { x: motors.x.wrapping_sub(x), y: motors.y.wrapping_sub(y) };
-        self.split = None;
+        self.segmenter = None;
         let slack = self.find_slack();
-        self.runner.set_lift(self.pins.lift());
+        self.runner.set_lift(self.pins.z());
         self.runner.set_position(motors, slack, page, self.pins.ticks());
     }
 
     /// Slows down along the path and raises the pen. A jog is ended instead. In other states
     /// nothing happens.
     pub fn hold(&mut self) {
-        match self.state {
-            State::Run => {
+        match self.activity {
+            Activity::Run(source) => {
                 self.runner.stop();
-                self.state = State::Hold { standing: false };
+                self.activity = Activity::Hold { stopped: false, source };
             }
-            State::Jog => self.abort(),
+            Activity::Jog => self.abort(),
             _ => {}
         }
     }
 
     /// Pauses at the end of the current stroke. [`Machine::resume`] continues the job.
     pub fn pause_after_stroke(&mut self) {
-        if self.state == State::Run {
+        if let Activity::Run(_) = self.activity {
             self.runner.stop_after_stroke();
         }
     }
@@ -278,7 +197,7 @@ impl<'m> Machine<'m> {
     /// those with the pen down and up.
     pub fn set_override(&mut self, percent: u8) {
         self.percent = percent.clamp(10, 200);
-        if self.homing.is_none() {
+        if !matches!(self.activity, Activity::Home(_)) {
             self.runner.set_override(self.percent);
         }
     }
@@ -286,33 +205,33 @@ impl<'m> Machine<'m> {
     /// Lowers the pen where it was raised and continues the job. If the machine waited for a pen
     /// change, it continues with the next pen.
     pub fn resume(&mut self) {
-        if matches!(self.state, State::Hold { .. }) {
-            if self.state == (State::Hold { standing: true })
-                && self.runner.is_at_rest()
-                && let Some((pen, target)) = self.next_pen.take()
-            {
-                self.pen = pen;
-                if self.push(target, PathLength::MAX).is_err() {
-                    self.abort();
-                    return;
-                }
+        let Activity::Hold { stopped, mut source } = self.activity else { return };
+        if let Source::PenChange { pen, first } = source
+            && stopped
+            && self.runner.is_at_rest()
+        {
+            self.pen = pen;
+            source = Source::Path;
+            if self.push(first, PathLength::MAX).is_err() {
+                self.abort();
+                return;
             }
-            self.runner.resume();
-            self.state = State::Run;
         }
+        self.runner.resume();
+        self.activity = Activity::Run(source);
     }
 
     /// Slows down, raises the pen and cancels the job. The position stays known. This also ends a
     /// feed hold, a jog and homing.
     pub fn abort(&mut self) {
-        if matches!(self.state, State::Run | State::Hold { .. } | State::Jog | State::Home) {
+        if matches!(
+            self.activity,
+            Activity::Run(_) | Activity::Hold { .. } | Activity::Jog | Activity::Home(_)
+        ) {
             self.end_homing();
-            self.next_pen = None;
-            self.streaming = false;
-            self.split = None;
+            self.segmenter = None;
             self.runner.stop();
-            self.path_ended = true;
-            self.state = State::Abort;
+            self.activity = Activity::Abort;
         }
     }
 
@@ -326,14 +245,10 @@ impl<'m> Machine<'m> {
             self.pins.fill();
         }
         self.end_homing();
-        self.next_pen = None;
-        self.split = None;
+        self.segmenter = None;
         self.forget_path(self.planned_position());
         self.runner.forget_pen();
-        self.path_ended = true;
-        self.streaming = false;
-        self.sleep_due = false;
-        self.state = State::Alarm(alarm);
+        self.activity = Activity::Alarm(alarm);
     }
 
     /// Switches the motors off. [`Machine::unlock`] ends this state.
@@ -341,11 +256,8 @@ impl<'m> Machine<'m> {
     /// # Errors
     /// [`MachineError::State`] unless the machine is idle.
     pub fn sleep(&mut self) -> Result<(), MachineError> {
-        if self.state != State::Idle {
-            return Err(MachineError::State(self.state));
-        }
-        self.sleep_due = true;
-        self.state = State::Sleep;
+        let Activity::Idle = self.activity else { return Err(self.refusal()) };
+        self.activity = Activity::Sleep { drivers_on: true };
         Ok(())
     }
 
@@ -354,10 +266,8 @@ impl<'m> Machine<'m> {
     /// # Errors
     /// [`MachineError::State`] unless the machine is idle or in check mode.
     pub fn check(&mut self, on: bool) -> Result<(), MachineError> {
-        if !matches!(self.state, State::Idle | State::Check) {
-            return Err(MachineError::State(self.state));
-        }
-        self.state = if on { State::Check } else { State::Idle };
+        let (Activity::Idle | Activity::Check) = self.activity else { return Err(self.refusal()) };
+        self.activity = if on { Activity::Check } else { Activity::Idle };
         Ok(())
     }
 
@@ -368,23 +278,23 @@ impl<'m> Machine<'m> {
     /// [`MachineError::State`] in other states, while the interrupt still empties its queue, while
     /// a motor still raises the pen, and while the emergency stop is pressed.
     pub fn unlock(&mut self) -> Result<(), MachineError> {
-        match self.state {
+        match self.activity {
             // The motors had no current, so the slack and the height of the pen are unknown.
-            State::Sleep => {
+            Activity::Sleep { .. } => {
                 self.slack.forget();
                 self.runner.forget_lift();
             }
-            State::Alarm(alarm)
+            Activity::Alarm(alarm)
                 if self.is_stopped()
-                    && !self.stop_is_pressed
+                    && !self.contacts.stop
                     && !self.runner.is_pen_held(alarm == Alarm::Restarted) =>
             {
                 self.set_motors(self.motors_now(), self.position());
                 self.pins.release();
             }
-            _ => return Err(MachineError::State(self.state)),
+            _ => return Err(self.refusal()),
         }
-        self.state = State::Idle;
+        self.activity = Activity::Idle;
         Ok(())
     }
 

@@ -15,7 +15,7 @@ pub(super) struct Segmenter {
     /// The length of the move.
     length: PathLength,
     /// The length that has been appended already.
-    place: PathLength,
+    position: PathLength,
     /// The last cut that has been passed, in steps; 0 at the beginning.
     cut: i32,
     /// The index of the current dot or gap of the line type.
@@ -51,58 +51,58 @@ impl Machine<'_> {
         let from = self.runner.page_end();
         let (dx, dy) = (to.x - from.x, to.y - from.y);
         let length = self.runner.limits().length(dx, dy).ok_or(PushError::TooLong)?;
-        let place = PathLength::ZERO;
-        self.split = Some(Segmenter { from, to, length, place, cut: 0, dot: 0, ink, limit });
-        self.push_pieces();
+        let position = PathLength::ZERO;
+        self.segmenter = Some(Segmenter { from, to, length, position, cut: 0, dot: 0, ink, limit });
+        self.push_segments();
         Ok(length)
     }
 
     /// Appends as many of the remaining segments as there is room for.
-    pub(super) fn push_pieces(&mut self) {
-        while let Some(split) = self.split
+    pub(super) fn push_segments(&mut self) {
+        while let Some(segmenter) = self.segmenter
             && !self.runner.is_full()
         {
-            let Segmenter { from, to, length, place, mut cut, dot, mut ink, limit } = split;
+            let Segmenter { from, to, length, position, mut cut, dot, mut ink, limit } = segmenter;
             let mut next_dot = dot;
             let way = (to.x - from.x, to.y - from.y);
-            let build = self.settings.kinematics();
+            let kinematics = self.settings.kinematics();
             let (mut end, mut is_gap) = (length.to_bits(), false);
-            if let Some(cuts) = build.cuts(from, to) {
+            if let Some(cuts) = kinematics.cuts(from, to) {
                 let next = cuts.next(cut);
                 // Dots and gaps are cut here, because each segment is shorter than the pattern of a
                 // whole line.
                 let pattern = match ink.replace(LineType::Full) {
                     Some(line_type) if line_type != LineType::Full => {
-                        let dot_length = self.settings.pen_positions().dot_length;
+                        let dot_length = self.settings.dot_length();
                         Pattern::of(line_type, length.to_bits(), dot_length.to_bits())
                     }
-                    before => {
-                        ink = before;
+                    unchanged => {
+                        ink = unchanged;
                         Pattern::full(length.to_bits())
                     }
                 };
                 let dot_end = pattern.end_of(dot);
                 is_gap = !Pattern::inked(dot);
-                let next_place = cuts.place(next, length.to_bits());
-                end = dot_end.min(next_place);
+                let cut_end = cuts.position(next, length.to_bits());
+                end = dot_end.min(cut_end);
                 next_dot += u32::from(end == dot_end);
-                if end == next_place {
+                if end == cut_end {
                     cut = next;
                 }
             }
             let end = PathLength::from_bits(end);
-            let places = [place.to_bits(), end.to_bits()];
+            let positions = [position.to_bits(), end.to_bits()];
             let begin = self.runner.end();
             let SegmentEnd { motors, page, offsets } =
-                build.piece([from, to], places, length.to_bits(), begin);
-            let piece =
-                Move { motors, offsets, page, way, whole: length, length: end - place, is_gap };
+                kinematics.segment_end([from, to], positions, length.to_bits(), begin);
+            let segment =
+                Move { motors, offsets, page, way, whole: length, length: end - position, is_gap };
             // There is room, and the segment is no longer than the move, whose length was accepted.
-            let pushed = self.push_motors(&piece, ink, limit);
+            let pushed = self.push_motors(&segment, ink, limit);
             debug_assert!(pushed.is_ok());
             if pushed != Ok(false) {
-                let rest = Segmenter { place: end, cut, dot: next_dot, ..split };
-                self.split = (end < length).then_some(rest);
+                let rest = Segmenter { position: end, cut, dot: next_dot, ..segmenter };
+                self.segmenter = (end < length).then_some(rest);
             }
         }
     }

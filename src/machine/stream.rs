@@ -1,32 +1,25 @@
 //! Commands that are sent one by one: moves of G-code, jogging, parking, dwells and pauses.
 
-use super::{JobSize, Machine, MachineError, Setting, State, Switches, Target, Value};
+use super::state::{Activity, Source};
+use super::{JobSize, Machine, MachineError, Setting, Switches, Target, Value};
 use crate::drawing::PagePoint;
 use crate::motion::{EventQueue, PathLength, PushError};
 
 impl Machine<'_> {
     /// Appends a move at a speed of at most `feed` mm/min. The first such move begins a job, which
-    /// lasts until no more moves come. In [`State::Check`] the move is only checked.
+    /// lasts until no more moves come. In check mode the move is only checked.
     ///
     /// # Errors
     /// See [`MachineError`]. If [`Machine::has_room`] is false, the error is
     /// [`MachineError::State`]. On an error nothing is appended.
     pub fn draw_to(&mut self, target: Target, feed: Option<Value>) -> Result<(), MachineError> {
         self.check_travel(0, target.point)?;
-        self.begin_stream()?;
-        if self.state == State::Check {
+        if self.is_checking_stream()? {
             return Ok(());
         }
         let length = self.append(target, feed)?;
-        if self.state == State::Idle {
-            self.state = State::Run;
-        }
-        if target.ink.is_some() {
-            self.job.drawn += length;
-        } else {
-            self.job.travelled += length;
-        }
-        self.count_stroke(target.ink.is_some());
+        self.begin_stream();
+        self.progress.add_move(target, length);
         Ok(())
     }
 
@@ -35,15 +28,12 @@ impl Machine<'_> {
     /// # Errors
     /// See [`Machine::draw_to`].
     pub fn lower_pen(&mut self) -> Result<(), MachineError> {
-        self.begin_stream()?;
-        if self.state == State::Check {
+        if self.is_checking_stream()? {
             return Ok(());
         }
-        self.runner.push_dot().map_err(|_| MachineError::State(self.state))?;
-        if self.state == State::Idle {
-            self.state = State::Run;
-        }
-        self.count_stroke(true);
+        self.runner.push_dot().map_err(|_| self.refusal())?;
+        self.begin_stream();
+        self.progress.add_stroke(true);
         Ok(())
     }
 
@@ -53,18 +43,16 @@ impl Machine<'_> {
     /// See [`MachineError`]. If [`Machine::has_room`] is false, the error is
     /// [`MachineError::State`]. On an error nothing is appended.
     pub fn jog(&mut self, point: PagePoint, feed: Option<Value>) -> Result<(), MachineError> {
-        if !matches!(self.state, State::Idle | State::Jog) {
-            return Err(MachineError::State(self.state));
-        }
+        let (Activity::Idle | Activity::Jog) = self.activity else { return Err(self.refusal()) };
         self.check_travel(0, point)?;
         self.append(Target { point, ink: None }, feed)?;
-        self.state = State::Jog;
+        self.activity = Activity::Jog;
         Ok(())
     }
 
     /// Cancels the jog, if there is one.
     pub fn cancel_jog(&mut self) {
-        if self.state == State::Jog {
+        if let Activity::Jog = self.activity {
             self.abort();
         }
     }
@@ -76,29 +64,22 @@ impl Machine<'_> {
 
     /// Whether another move can be appended now.
     pub fn has_room(&self) -> bool {
-        self.split.is_none() && !self.runner.is_full()
+        self.segmenter.is_none() && !self.runner.is_full()
     }
 
     /// Whether a move that is sent now has to wait until [`Machine::has_room`] is true.
     pub fn is_streaming(&self) -> bool {
-        match self.state {
-            State::Run | State::Hold { .. } => self.streaming,
-            state => state == State::Jog,
-        }
+        matches!(self.activity, Activity::Jog) || self.activity.is_stream()
     }
 
     /// The position where all moves known so far end, in steps of the page.
     pub fn end(&self) -> PagePoint {
-        self.split.map_or(self.runner.page_end(), |split| split.end())
+        self.segmenter.map_or(self.runner.page_end(), |segmenter| segmenter.end())
     }
 
     /// The position where the pen is parked, in steps of the page.
     pub fn park(&self) -> PagePoint {
-        let y = self.settings.steps_per_mm_y();
-        PagePoint {
-            x: self.settings.millimetres_as_steps(Setting::ParkX, Setting::StepsPerMmX),
-            y: self.settings.millimetres_as_steps(Setting::ParkY, y),
-        }
+        self.settings.page_point([Setting::ParkX, Setting::ParkY])
     }
 
     /// Pauses until [`Machine::resume`] is called.
@@ -106,11 +87,8 @@ impl Machine<'_> {
     /// # Errors
     /// [`MachineError::State`] unless the machine is idle.
     pub fn pause(&mut self) -> Result<(), MachineError> {
-        if self.state != State::Idle {
-            return Err(MachineError::State(self.state));
-        }
-        self.streaming = true;
-        self.state = State::Hold { standing: true };
+        let Activity::Idle = self.activity else { return Err(self.refusal()) };
+        self.activity = Activity::Hold { stopped: true, source: Source::Stream };
         Ok(())
     }
 
@@ -119,8 +97,8 @@ impl Machine<'_> {
     /// machine is idle. A dwell that the queue refuses raises
     /// [`Alarm::Queue`](super::Alarm::Queue).
     pub fn dwell(&mut self, ticks: u32, queue: &mut dyn EventQueue) {
-        let refused = self.state == State::Idle && self.runner.dwell(ticks, queue).is_err();
-        if refused {
+        let is_idle = matches!(self.activity, Activity::Idle);
+        if is_idle && self.runner.dwell(ticks, queue).is_err() {
             self.alarm(super::Alarm::Queue);
         }
     }
@@ -132,35 +110,32 @@ impl Machine<'_> {
 
     /// The state of the limit switches when they were last observed.
     pub fn switches(&self) -> Switches {
-        self.switches
+        self.contacts.switches()
     }
 
     /// Whether the emergency stop was pressed when last observed.
     pub fn stop_is_pressed(&self) -> bool {
-        self.stop_is_pressed
+        self.contacts.stop
     }
 
-    /// Counts a new stroke of the job where the pen goes down.
-    fn count_stroke(&mut self, inked: bool) {
-        self.job.strokes += u32::from(inked && !self.stream_is_inked);
-        self.stream_is_inked = inked;
-    }
-
-    /// Checks whether moves are accepted in this state. The first of them begins the job.
-    fn begin_stream(&mut self) -> Result<(), MachineError> {
-        match self.state {
-            State::Check => {}
-            State::Idle => {
-                self.job = JobSize::default();
-                self.before = self.runner.run();
-                self.reset_ink_budget();
-                self.streaming = true;
-                self.stream_is_inked = false;
-            }
-            State::Run | State::Hold { .. } if self.streaming => {}
-            state => return Err(MachineError::State(state)),
+    /// Whether moves are only checked.
+    ///
+    /// # Errors
+    /// [`MachineError::State`] if this state does not accept moves that are sent one by one.
+    fn is_checking_stream(&self) -> Result<bool, MachineError> {
+        match self.activity {
+            Activity::Check => Ok(true),
+            Activity::Idle => Ok(false),
+            _ if self.activity.is_stream() => Ok(false),
+            _ => Err(self.refusal()),
         }
-        Ok(())
+    }
+
+    /// Begins the job after its first move was appended.
+    fn begin_stream(&mut self) {
+        if let Activity::Idle = self.activity {
+            self.begin_job(JobSize::default(), Source::Stream);
+        }
     }
 
     /// Appends a move and returns its length in units of 2^-18 mm.
@@ -168,7 +143,7 @@ impl Machine<'_> {
         let limit = feed.map_or(PathLength::MAX, |feed| self.runner.limits().feed(feed));
         match self.push(target, limit) {
             Ok(length) => Ok(length.to_bits().into()),
-            Err(PushError::Full) => Err(MachineError::State(self.state)),
+            Err(PushError::Full) => Err(self.refusal()),
             Err(PushError::TooLong) => Err(MachineError::MoveTooLong { target: 0 }),
         }
     }

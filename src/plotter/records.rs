@@ -2,7 +2,7 @@
 //! formats, and how they are saved and loaded.
 
 use super::{Board, Job, NotStored, Record};
-use crate::machine::{SETTING_COUNT, Setting, Settings, Value};
+use crate::machine::{SETTINGS, Setting, Settings, Value};
 use crate::protocol::CommandError;
 
 /// Size of a kept setting: two bytes for its number, four for its value.
@@ -11,7 +11,7 @@ const SETTING_BYTES: usize = 6;
 /// The settings kept by the board; those that are not kept have their default values.
 #[inline(never)] // Keeps its frame off the stack while the stages run.
 pub(super) fn load_settings<B: Board>(board: &mut B) -> Settings {
-    let mut values = heapless::Vec::<(u16, Value), SETTING_COUNT>::new();
+    let mut values = heapless::Vec::<(u16, Value), { SETTINGS.len() }>::new();
     board.load(Record::Settings, &mut |record| {
         let mut bytes = [0; SETTING_BYTES];
         // A record with more entries than there are settings was written by another version. Its
@@ -35,7 +35,7 @@ pub(super) fn save_settings<B: Board>(
     settings: &Settings,
     board: &mut B,
 ) -> Result<(), CommandError> {
-    let mut bytes = [0; SETTING_COUNT * SETTING_BYTES];
+    let mut bytes = [0; SETTINGS.len() * SETTING_BYTES];
     for (entry, (info, value)) in bytes.chunks_exact_mut(SETTING_BYTES).zip(settings.iter()) {
         entry[..2].copy_from_slice(&info.number.to_le_bytes());
         entry[2..].copy_from_slice(&value.to_bits().to_le_bytes());

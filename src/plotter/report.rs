@@ -112,8 +112,8 @@ impl Inner<'_> {
         let state = match status.state {
             State::Idle if self.machine.is_stopped() => "Idle",
             State::Idle | State::Run | State::Abort => "Run",
-            State::Hold { standing: true } => "Hold:0",
-            State::Hold { standing: false } => "Hold:1",
+            State::Hold { stopped: true } => "Hold:0",
+            State::Hold { stopped: false } => "Hold:1",
             State::Jog => "Jog",
             State::Home => "Home",
             State::Check => "Check",

@@ -21,7 +21,7 @@ impl LiftWatch {
         let value = |setting| settings.get(setting).to_num::<f64>();
         let steps = value(Setting::StepsPerMmZ);
         let acceleration = value(Setting::AccelerationZ) * steps;
-        let rule = settings.is_on(Setting::PenLift).then(|| {
+        let rule = settings.is_on(Setting::Tool).then(|| {
             let (travel, rate) =
                 (value(Setting::TravelZ) * steps, value(Setting::MaxRateZ) * steps / 60.0);
             LiftRule::new(travel as i32, rate as u32, acceleration as u32)

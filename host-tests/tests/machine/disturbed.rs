@@ -41,7 +41,7 @@ proptest! {
                 holds.pop();
                 turn.machine.hold();
             }
-            if turn.machine.state() == (State::Hold { standing: true }) && turn.machine.is_stopped() {
+            if turn.machine.state() == (State::Hold { stopped: true }) && turn.machine.is_stopped() {
                 assert_eq!(turn.machine.planned_position(), turn.pins);
                 turn.machine.resume();
             }

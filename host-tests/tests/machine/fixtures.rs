@@ -63,7 +63,7 @@ pub fn lifted(mut settings: Settings, by_a_motor: bool) -> Settings {
         (Setting::MaxRateZ, 900.0),
         (Setting::AccelerationZ, 500.0),
         (Setting::PenUpHeight, 20.0 * f64::from(u8::from(by_a_motor))),
-        (Setting::PenLift, f64::from(u8::from(by_a_motor))),
+        (Setting::Tool, f64::from(u8::from(by_a_motor))),
     ] {
         settings.set(setting, Value::from_num(value)).expect("valid");
     }

@@ -156,7 +156,7 @@ fn a_pause_comes_at_the_end_of_the_stroke_and_after_so_much_ink() {
             if asked.is_some() && turn.now == 5_000_000 {
                 turn.machine.pause_after_stroke();
             }
-            if turn.machine.state() == (State::Hold { standing: true }) && turn.machine.is_stopped()
+            if turn.machine.state() == (State::Hold { stopped: true }) && turn.machine.is_stopped()
             {
                 assert_eq!(turn.pins.x, 400);
                 waits.push(turn.pins.y / 10);
@@ -185,7 +185,7 @@ fn the_time_left_counts_the_ways_of_a_pen_on_a_motor() {
     // The whole travel in a ramp, and at the maximum speed.
     for (travel, rate) in [(1.0, 1200.0), (4.0, 300.0)] {
         let mut settings = Settings::default();
-        settings.set(Setting::PenLift, Value::ONE).expect("valid");
+        settings.set(Setting::Tool, Value::ONE).expect("valid");
         settings.set(Setting::TravelZ, Value::from_num(travel)).expect("valid");
         settings.set(Setting::MaxRateZ, Value::from_num(rate)).expect("valid");
         let mut estimate = 0;

@@ -60,7 +60,7 @@ impl Axes for AxisPins {
         write(AXES, levels);
     }
 
-    fn set_lift(&mut self, step: bool, down: bool) {
+    fn set_z_axis(&mut self, step: bool, down: bool) {
         let levels = if step { STEP_Z } else { 0 } | if down { DIRECTION_Z } else { 0 };
         write(STEP_Z | DIRECTION_Z, levels);
     }

@@ -26,7 +26,6 @@ mod critical;
 mod divider;
 mod emergency;
 mod flash;
-mod lift;
 mod multiply;
 mod pen;
 mod pins;
@@ -37,6 +36,7 @@ mod serial;
 mod steps;
 mod usb;
 mod words;
+mod z_axis;
 
 use cortex_m::peripheral::Peripherals as Core;
 use penup::boards::table::{self, BoardRow};
@@ -110,7 +110,7 @@ pub fn take() -> (Pico, MemorySlices<'static>, &'static PulserState) {
     Pins::new(chip.IO_BANK0, chip.PADS_BANK0, sio.gpio_bank0, &mut chip.RESETS);
     let steps = steps::set_up(&mut core.NVIC);
     pen::set_up();
-    lift::set_up();
+    z_axis::set_up();
     let mut flash = flash::Flash::new();
     let lines = ports::set_up();
     let uart = serial::set_up(&mut core.NVIC);

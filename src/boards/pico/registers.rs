@@ -99,7 +99,7 @@ pub const PADS_BANK0: Registers<pac::pads_bank0::RegisterBlock> =
 pub const PWM: Registers<pac::pwm::RegisterBlock> = unsafe { Registers::at(pac::PWM::PTR) };
 /// The timer that counts microseconds. Used by `clock`.
 pub const TIMER: Registers<pac::timer::RegisterBlock> = unsafe { Registers::at(pac::TIMER::PTR) };
-/// The pins' levels and the divider. Used by `contacts`, `lift` and `divider`.
+/// The pins' levels and the divider. Used by `contacts`, `z_axis` and `divider`.
 pub const SIO: Registers<pac::sio::RegisterBlock> = unsafe { Registers::at(pac::SIO::PTR) };
 /// The power-on state machine, which selects what a reset affects. Used by `emergency`.
 pub const PSM: Registers<pac::psm::RegisterBlock> = unsafe { Registers::at(pac::PSM::PTR) };

@@ -6,7 +6,7 @@ use penup::motion::{EventKind, EventQueue, StepEvent, StepTrain, StepWay};
 
 use super::engine::{LEVELS, PEN_TICKS, PULSE_TICKS, PULSES, TARGETS, WAIT_TICKS, target};
 use super::feed::{FEEDING, WRITTEN};
-use super::heights::lift_levels;
+use super::heights::z_axis_levels;
 use super::word_ring::{GROUP, LENGTHS, WORDS, lengths, pack, place, row, sum};
 use super::{BRAKED_TICKS, STATE, Steps, WAIT_WORDS};
 use crate::boards::pico::words;
@@ -112,7 +112,7 @@ impl Steps {
     /// Appends an event of the pen's motor. The pulse lasts half of the event, so that the handler
     /// is never two levels behind.
     fn push_lift(&mut self, step: bool, down: bool, event: StepEvent) -> Result<(), StepEvent> {
-        use lift_levels::{DOWN, MARK, STEP};
+        use z_axis_levels::{DOWN, MARK, STEP};
         let pins = MARK | if down { DOWN } else { 0 };
         let word = self.levels | target::MOVE_PEN;
         let mut ticks = event.ticks();

@@ -9,13 +9,13 @@ use super::STATE;
 use super::engine::FLAG;
 use crate::boards::handler::Owned;
 use crate::boards::pico::registers::{PIO0, Put};
-use crate::boards::pico::{critical, lift, pen};
+use crate::boards::pico::{critical, pen, z_axis};
 
 /// The number of slots in the queue, one of which stays empty. A height of the pen takes one slot,
 /// and a step of its motor takes two.
 pub const HEIGHTS: usize = 1024;
-/// The bits of an entry that sets the pins of the pen's motor instead of a height.
-pub mod lift_levels {
+/// The bits of an entry that sets the pins of z instead of a height.
+pub mod z_axis_levels {
     pub const MARK: u8 = 1 << 7;
     pub const STEP: u8 = 1;
     pub const DOWN: u8 = 1 << 1;
@@ -34,20 +34,20 @@ pub fn drain_heights() {
         // SAFETY: the handler that owns it is masked.
         if let Some(due) = unsafe { HEIGHTS_DUE.get() } {
             while let Some(height) = due.dequeue() {
-                if height & lift_levels::MARK == 0 {
+                if height & z_axis_levels::MARK == 0 {
                     pen::set_height(height);
                 }
             }
-            lift::end_pulse();
+            z_axis::end_pulse();
         }
     });
 }
 
-/// Sets the direction of the pen's motor, and makes a step if `step` is true.
-fn set_lift(step: bool, down: bool) {
-    lift::set(step, down != STATE.lift_is_inverted());
+/// Sets the direction of the motor of z, and makes a step if `step` is true.
+fn set_z_axis(step: bool, down: bool) {
+    z_axis::set(step, down != STATE.z_is_inverted());
     if step {
-        STATE.count_lift(down);
+        STATE.count_z_step(down);
     }
 }
 
@@ -57,10 +57,10 @@ fn PIO0_IRQ_0() {
     PIO0.irq().put(FLAG);
     // SAFETY: this is the handler that owns it.
     if let Some(height) = unsafe { HEIGHTS_DUE.get() }.and_then(Consumer::dequeue) {
-        if height & lift_levels::MARK == 0 {
+        if height & z_axis_levels::MARK == 0 {
             pen::set_height(height);
         } else {
-            set_lift(height & lift_levels::STEP != 0, height & lift_levels::DOWN != 0);
+            set_z_axis(height & z_axis_levels::STEP != 0, height & z_axis_levels::DOWN != 0);
         }
     }
 }

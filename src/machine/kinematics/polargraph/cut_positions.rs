@@ -1,8 +1,7 @@
 //! Chooses the points at which a line on the page is cut into segments on a polargraph, so that the
 //! belt lengths change almost linearly within each segment.
 
-use super::Anchors;
-use super::kinematics::{in_order, length_of};
+use super::{Anchors, in_order, length_of};
 use crate::drawing::PagePoint;
 
 /// A position beyond the end of every line, in steps.
@@ -83,31 +82,31 @@ impl CutPositions {
     }
 
     /// The length of the line up to a cut, in units in which the whole line is `whole` long.
-    pub fn place(&self, cut: i32, whole: u32) -> u32 {
+    pub fn position(&self, cut: i32, whole: u32) -> u32 {
         let from_lesser = if self.backward { self.length - cut } else { cut };
         let product = u64::from(whole) * u64::from(from_lesser.unsigned_abs());
-        let place = product.checked_div(self.length.unsigned_abs().into()).unwrap_or(0) as u32;
-        if self.backward { whole - place } else { place }
+        let position = product.checked_div(self.length.unsigned_abs().into()).unwrap_or(0) as u32;
+        if self.backward { whole - position } else { position }
     }
 
-    /// The least cut that lies more than `way` steps beyond the foot. The cuts before the foot
+    /// The least cut that lies more than `distance` steps beyond the foot. The cuts before the foot
     /// mirror those after it.
     #[inline(never)] // Inlining it at every call would cost too much flash.
-    fn beyond(&self, way: i32) -> i32 {
+    fn beyond(&self, distance: i32) -> i32 {
         let longest = self.longest;
         // From this distance on, all segments have the same length.
         let even = longest * (longest / 2);
-        let last_within = |way: i32| {
-            if way < even {
-                (2 * way).unsigned_abs().isqrt() as i32
+        let last_within = |distance: i32| {
+            if distance < even {
+                (2 * distance).unsigned_abs().isqrt() as i32
             } else {
-                longest + (way - even) / longest
+                longest + (distance - even) / longest
             }
         };
         let cut = |k: i32| {
             if k < longest { (k * k + 1) / 2 } else { even + (k - longest) * longest }
         };
-        if way < 0 { -cut(last_within(-way - 1)) } else { cut(last_within(way) + 1) }
+        if distance < 0 { -cut(last_within(-distance - 1)) } else { cut(last_within(distance) + 1) }
     }
 }
 

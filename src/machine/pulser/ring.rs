@@ -31,7 +31,7 @@ impl<const N: usize> Default for EventRing<N> {
 impl<const N: usize> EventRing<N> {
     /// Creates an empty ring.
     pub const fn new() -> Self {
-        assert!(N > 1, "a ring of one place holds nothing");
+        assert!(N > 1, "a ring of one slot holds nothing");
         Self {
             taken: AtomicU32::new(0),
             filled: AtomicU32::new(0),
@@ -40,11 +40,11 @@ impl<const N: usize> EventRing<N> {
         }
     }
 
-    /// The word in the slot `place`, and the slot after it.
+    /// The word in the slot `slot`, and the slot after it.
     #[inline(always)]
-    fn at(&self, place: u32) -> (&AtomicU32, u32) {
-        let place = if place < N as u32 { place } else { 0 };
-        (&self.words[place as usize], place + 1)
+    fn at(&self, slot: u32) -> (&AtomicU32, u32) {
+        let slot = if slot < N as u32 { slot } else { 0 };
+        (&self.words[slot as usize], slot + 1)
     }
 
     /// The number of words from slot `from` up to, but not including, slot `to`.
@@ -100,13 +100,13 @@ impl<const N: usize> EventRing<N> {
     }
 
     /// The slot after the word that was taken last, from which counting can begin.
-    pub(super) fn taken_place(&self) -> u32 {
+    pub(super) fn taken_slot(&self) -> u32 {
         self.taken.load(Ordering::Relaxed)
     }
 
-    /// The number of words that were taken from slot `place` on. For the main loop only.
-    pub(super) fn taken_behind(&self, place: u32) -> u32 {
-        Self::between(place, self.taken.load(Ordering::Relaxed))
+    /// The number of words that were taken from slot `from` on. For the main loop only.
+    pub(super) fn taken_behind(&self, from: u32) -> u32 {
+        Self::between(from, self.taken.load(Ordering::Relaxed))
     }
 
     /// The number of free slots if the words from slot `counted` on still need theirs. For the main
@@ -117,8 +117,8 @@ impl<const N: usize> EventRing<N> {
 
     /// Puts a word in. The caller makes sure that there is room. For the main loop only.
     pub(super) fn put(&self, word: u32) {
-        let (place, next) = self.at(self.filled.load(Ordering::Relaxed));
-        place.store(word, Ordering::Relaxed);
+        let (slot, next) = self.at(self.filled.load(Ordering::Relaxed));
+        slot.store(word, Ordering::Relaxed);
         compiler_fence(Ordering::Release);
         self.filled.store(next, Ordering::Relaxed);
     }

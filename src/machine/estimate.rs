@@ -1,0 +1,79 @@
+//! Estimates the duration of a job.
+
+use super::{JobSize, Setting, Settings, Tool};
+
+/// The time, in milliseconds, that a job of this size would take if all speeds were reached at
+/// once.
+pub(super) fn even_milliseconds(settings: &Settings, size: JobSize) -> u64 {
+    let line = |length: u64, speed| {
+        // The length is in 2^-18 mm and the speed in 2^-16 mm/min.
+        (length >> 2).saturating_mul(60_000) / settings.positive_bits(speed)
+    };
+    line(size.drawn, Setting::DrawSpeed)
+        + line(size.travelled, Setting::TravelSpeed)
+        + u64::from(size.strokes) * Tool::stroke_milliseconds(settings)
+}
+
+/// The time, in milliseconds, of a move from rest to rest over a `distance` (2^-16 mm). `speed`
+/// is the greatest speed (2^-16 mm/s, above 0), and `acceleration` is in 2^-16 mm/s².
+pub(super) fn rest_to_rest(distance: u64, speed: u64, acceleration: u64) -> u64 {
+    // This is the distance in which the speed is reached and lost again.
+    if distance >= speed * speed / acceleration {
+        distance.saturating_mul(1000) / speed + speed * 1000 / acceleration
+    } else {
+        2 * (distance * 1_000_000 / acceleration).isqrt()
+    }
+}
+
+/// Estimates the duration of a job. Each part between two sharp corners is assumed to be drawn from
+/// rest to rest.
+#[derive(Debug, Default)]
+pub(super) struct Estimate {
+    /// The time of the parts that are complete.
+    milliseconds: u64,
+    /// The length of the present part between two corners, in 2^-18 mm.
+    length: u64,
+    /// The last move of the present part, in steps.
+    delta: (i32, i32),
+    /// Whether the present part is drawn with the pen down.
+    inked: bool,
+}
+
+impl Estimate {
+    /// Adds a move by `delta` steps that is `length` long (2^-18 mm).
+    pub(super) fn add(&mut self, settings: &Settings, delta: (i32, i32), inked: bool, length: u64) {
+        let [(ax, ay), (bx, by)] = [self.delta, delta].map(|(x, y)| (i64::from(x), i64::from(y)));
+        let (along, across) = (ax * bx + ay * by, ax * by - ay * bx);
+        // A turn by more than 20 degrees counts as a corner.
+        if self.inked != inked || 8 * across.abs() > 3 * along {
+            self.end_part(settings);
+        }
+        if inked && !self.inked {
+            self.milliseconds += Tool::stroke_milliseconds(settings);
+        }
+        (self.delta, self.inked) = (delta, inked);
+        self.length += length;
+    }
+
+    /// The estimated time of all moves, in milliseconds.
+    pub(super) fn end(mut self, settings: &Settings) -> u64 {
+        self.end_part(settings);
+        self.milliseconds
+    }
+
+    /// Adds the time of the current part and begins a new one.
+    fn end_part(&mut self, settings: &Settings) {
+        let speed = if self.inked { Setting::DrawSpeed } else { Setting::TravelSpeed };
+        let acceleration = [Setting::AccelerationX, Setting::AccelerationY];
+        let acceleration = acceleration.map(|setting| settings.positive_bits(setting));
+        let acceleration = acceleration[0].min(acceleration[1]);
+        let per_second = settings.positive_bits(speed) / 60;
+        self.milliseconds += rest_to_rest(self.length >> 2, per_second, acceleration);
+        // Each change of speed takes longer by about the time in which the acceleration builds up.
+        let jerk = u64::from(settings.get(Setting::Jerk).to_bits().unsigned_abs());
+        if let Some(ramp) = acceleration.checked_div(jerk) {
+            self.milliseconds += ramp.min((per_second * 1000 / jerk).isqrt());
+        }
+        self.length = 0;
+    }
+}

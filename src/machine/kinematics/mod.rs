@@ -1,0 +1,172 @@
+//! Kinematics: converts between the position of the pen on the page and the positions of the two
+//! motors, and says how the machine is homed and what limits it.
+//!
+//! Each kind has a module, which holds its formulas and its [`Properties`]. [`Kinematics`] is the
+//! only place that lists the kinds: the code outside this folder asks it, or the properties, and
+//! names no kind.
+
+mod cartesian;
+mod corexy;
+mod polargraph;
+
+pub use polargraph::{Anchors, CutPositions};
+
+use super::{Setting, Settings, Value};
+use crate::drawing::PagePoint;
+use crate::motion::LimitsError;
+
+/// The kind of kinematics of the machine, with the geometry that the settings give it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Kinematics {
+    /// One motor moves x, the other moves y.
+    #[default]
+    Cartesian,
+    /// Two motors drive one belt: the first turns by x + y, the second by x - y.
+    CoreXy,
+    /// The pen hangs on two belts. The position of each motor is the length of its belt, in steps.
+    Polargraph(Anchors),
+}
+
+/// What holds for all machines of one kind, whatever their size.
+#[derive(Debug)]
+pub(super) struct Properties {
+    /// The settings that hold the steps per millimetre of x and y on the page.
+    pub(super) steps_per_mm: [Setting; 2],
+    /// The most that a motor moves while the pen moves by 1.
+    pub(super) motor_ratio: Value,
+    /// For the braking rule: how many times as long as a diagonal step of the page the path for one
+    /// step of a motor may be.
+    pub(super) longest_step: u64,
+    /// Whether the travel limits the machine even if [`Setting::SoftLimits`] is off.
+    pub(super) is_limited: bool,
+    /// The coordinates in which the machine is homed.
+    pub(super) homing_space: HomingSpace,
+    /// The settings that hold the longest way to the switch of each axis.
+    pub(super) homing_travel: [Setting; 2],
+    /// The setting that holds the coordinate of a homed axis; `None` for 0.
+    pub(super) homed_length: Option<Setting>,
+}
+
+/// The coordinates in which a machine is homed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum HomingSpace {
+    /// The page: each switch ends the travel of x or of y.
+    Page,
+    /// The motors: each switch ends the travel of one motor, and only this motor runs.
+    Motors,
+}
+
+/// The end of a segment of a line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SegmentEnd {
+    /// The positions of the motors there, in steps.
+    pub motors: PagePoint,
+    /// The position on the page there, in steps.
+    pub page: PagePoint,
+    /// How far the exact start and the exact end of the segment lie beside the rounded motor
+    /// positions: see [`Line::beside`](crate::step::Line::beside).
+    pub offsets: [i8; 2],
+}
+
+impl Kinematics {
+    /// The kinematics that the settings describe.
+    pub(super) fn of(settings: &Settings) -> Self {
+        match number(settings) {
+            0 => Self::Cartesian,
+            1 => Self::CoreXy,
+            _ => Self::Polargraph(Anchors::of(settings)),
+        }
+    }
+
+    /// The properties of the kind that the settings choose.
+    #[inline(never)] // Inlining it at every call would cost too much flash.
+    pub(super) fn properties(settings: &Settings) -> &'static Properties {
+        match number(settings) {
+            0 => &cartesian::PROPERTIES,
+            1 => &corexy::PROPERTIES,
+            _ => &polargraph::PROPERTIES,
+        }
+    }
+
+    /// Checks the settings of the chosen kind against each other.
+    ///
+    /// # Errors
+    /// [`LimitsError::Anchors`] if the page reaches up to the anchors of a polargraph.
+    pub(super) fn check(settings: &Settings) -> Result<(), LimitsError> {
+        match number(settings) {
+            0 | 1 => Ok(()),
+            _ => polargraph::check(settings),
+        }
+    }
+
+    /// The motor positions, in steps, for a position on the page. On a polargraph the position must
+    /// be below the anchors.
+    ///
+    /// ```
+    /// use penup::drawing::PagePoint;
+    /// use penup::machine::{Anchors, Kinematics};
+    /// let page = PagePoint { x: 30, y: -4 };
+    /// let motors = Kinematics::CoreXy.motors(page);
+    /// assert_eq!(motors, PagePoint { x: 26, y: 34 });
+    /// assert_eq!(Kinematics::CoreXy.page(motors), page);
+    /// let anchors = Anchors { left: PagePoint { x: 0, y: 300 }, width: 800 };
+    /// let polargraph = Kinematics::Polargraph(anchors);
+    /// let belts = polargraph.motors(PagePoint { x: 400, y: 0 });
+    /// assert_eq!(belts, PagePoint { x: 500, y: 500 });
+    /// assert_eq!(polargraph.page(belts), PagePoint { x: 400, y: 0 });
+    /// ```
+    pub fn motors(self, page: PagePoint) -> PagePoint {
+        match self {
+            Self::Cartesian => page,
+            Self::CoreXy => corexy::motors(page),
+            Self::Polargraph(anchors) => anchors.belts(page),
+        }
+    }
+
+    /// The position on the page for motor positions in steps. It is rounded where it lies between
+    /// two steps.
+    pub fn page(self, motors: PagePoint) -> PagePoint {
+        match self {
+            Self::Cartesian => motors,
+            Self::CoreXy => corexy::page(motors),
+            Self::Polargraph(anchors) => anchors.page(motors),
+        }
+    }
+
+    /// Where a line on the page is cut into segments; `None` if the line is also straight for the
+    /// motors.
+    pub fn cuts(self, from: PagePoint, to: PagePoint) -> Option<CutPositions> {
+        match self {
+            Self::Cartesian | Self::CoreXy => None,
+            Self::Polargraph(anchors) => Some(CutPositions::new(anchors, from, to)),
+        }
+    }
+
+    /// The end of the segment of the line between two points of the page. The segment reaches from
+    /// one to the other of two `positions` along the line, in units in which the whole line is
+    /// `length` long. `begin` is the position of the motors at the end of the previous segment,
+    /// where this segment begins.
+    ///
+    /// Everything is computed from the lesser end of the line, so a line drawn backward has the
+    /// same points.
+    pub fn segment_end(
+        self,
+        ends: [PagePoint; 2],
+        positions: [u32; 2],
+        length: u32,
+        begin: PagePoint,
+    ) -> SegmentEnd {
+        match self {
+            Self::Cartesian | Self::CoreXy => {
+                SegmentEnd { motors: self.motors(ends[1]), page: ends[1], offsets: [0; 2] }
+            }
+            Self::Polargraph(anchors) => anchors.segment_end(ends, positions, length, begin),
+        }
+    }
+}
+
+/// The value of `$230`, which chooses the kind.
+fn number(settings: &Settings) -> i32 {
+    settings.get(Setting::Kinematics).to_bits() >> Value::FRAC_NBITS
+}

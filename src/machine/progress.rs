@@ -1,0 +1,64 @@
+//! How far a job has come.
+
+use super::{JobSize, Target};
+use crate::motion::RunLengths;
+
+/// The size of a job, and where its count begins.
+#[derive(Debug, Default)]
+pub(super) struct Progress {
+    /// The size of the present job, or of the last one.
+    size: JobSize,
+    /// The runner's totals of lengths and strokes when the job began.
+    begun_at: RunLengths,
+    /// Whether the last move that was sent alone was drawn with the pen down.
+    is_inked: bool,
+}
+
+impl Progress {
+    /// A job that begins now, when the runner's totals are `run`. The size of a job whose moves are
+    /// sent one by one grows with them.
+    pub(super) fn begin(size: JobSize, run: RunLengths) -> Self {
+        Self { size, begun_at: run, is_inked: false }
+    }
+
+    /// Adds a move that was sent alone and is `length` long, in 2^-18 mm.
+    pub(super) fn add_move(&mut self, target: Target, length: u64) {
+        if target.ink.is_some() {
+            self.size.drawn += length;
+        } else {
+            self.size.travelled += length;
+        }
+        self.add_stroke(target.ink.is_some());
+    }
+
+    /// Counts a new stroke where the pen goes down.
+    pub(super) fn add_stroke(&mut self, inked: bool) {
+        self.size.strokes += u32::from(inked && !self.is_inked);
+        self.is_inked = inked;
+    }
+
+    /// The size of the job.
+    pub(super) const fn size(&self) -> JobSize {
+        self.size
+    }
+
+    /// The part of the job that has been planned when the runner's totals are `run`.
+    pub(super) const fn done(&self, run: RunLengths) -> JobSize {
+        JobSize {
+            strokes: run.strokes.wrapping_sub(self.begun_at.strokes),
+            drawn: run.drawn - self.begun_at.drawn,
+            travelled: run.travelled - self.begun_at.travelled,
+            milliseconds: 0,
+        }
+    }
+
+    /// The part of the job that is left after `done`.
+    pub(super) const fn left(&self, done: JobSize) -> JobSize {
+        JobSize {
+            strokes: self.size.strokes.saturating_sub(done.strokes),
+            drawn: self.size.drawn.saturating_sub(done.drawn),
+            travelled: self.size.travelled.saturating_sub(done.travelled),
+            milliseconds: 0,
+        }
+    }
+}

@@ -1,0 +1,210 @@
+//! What the step interrupt and the main loop share: orders for the interrupt, and counts of what
+//! the pins have done.
+
+use crate::motion::{BrakeOrders, QueueSize};
+use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
+
+/// The state that the interrupt and the main loop share. It needs only atomic loads and stores, so
+/// a Cortex-M0+ supports it.
+///
+/// Only the main loop writes the commands, and it also writes the counts of the events that it
+/// finds to be taken.
+#[derive(Debug, Default)]
+pub struct PulserState {
+    /// The sum of the steps of x, as a wrapping `i32`.
+    x: AtomicU32,
+    /// The sum of the steps of y, as a wrapping `i32`.
+    y: AtomicU32,
+    /// The sum of the steps of x that took up slack, as a wrapping `i32`.
+    slack_x: AtomicU32,
+    /// The sum of the steps of y that took up slack, as a wrapping `i32`.
+    slack_y: AtomicU32,
+    /// The position of the motor of z in steps downward, as a wrapping `i32`.
+    z: AtomicU32,
+    /// The sum of the ticks of the events taken from the queue; it wraps.
+    ticks: AtomicU32,
+    /// The number of underruns: the queue ran empty while the machine moved; it wraps.
+    underruns: AtomicU32,
+    /// Whether the last event has been processed and its time is over.
+    pub(super) drained: AtomicBool,
+    /// Whether the main loop has halted the pulses.
+    pub(super) halt: AtomicBool,
+    /// The width of a step pulse, in ticks.
+    pulse_ticks: AtomicU32,
+    /// The mask of inverted direction pins: bit 0 for x, bit 1 for y.
+    inverted: AtomicU8,
+    /// Whether the direction pin of z is inverted.
+    z_inverted: AtomicBool,
+    /// The field `steps` of the size of the board's queue.
+    queue_steps: AtomicU32,
+    /// The field `full` of the size of the board's queue.
+    queue_full: AtomicU32,
+    /// How the interrupt brakes when its queue runs empty.
+    pub(super) brake: BrakeOrders,
+}
+
+impl PulserState {
+    /// The state with all counts at 0 and no commands.
+    pub const fn new() -> Self {
+        Self {
+            x: AtomicU32::new(0),
+            y: AtomicU32::new(0),
+            slack_x: AtomicU32::new(0),
+            slack_y: AtomicU32::new(0),
+            z: AtomicU32::new(0),
+            ticks: AtomicU32::new(0),
+            underruns: AtomicU32::new(0),
+            drained: AtomicBool::new(true),
+            halt: AtomicBool::new(false),
+            pulse_ticks: AtomicU32::new(50),
+            inverted: AtomicU8::new(0),
+            z_inverted: AtomicBool::new(false),
+            queue_steps: AtomicU32::new(QueueSize::ENDLESS.steps),
+            queue_full: AtomicU32::new(QueueSize::ENDLESS.full),
+            brake: BrakeOrders::new(),
+        }
+    }
+
+    /// The sum of the steps made at the pins so far, for x and y, as last counted; it wraps.
+    pub fn steps(&self) -> (i32, i32) {
+        let [x, y] = [&self.x, &self.y].map(|sum| sum.load(Ordering::Relaxed).cast_signed());
+        (x, y)
+    }
+
+    /// The sum of the steps that took up slack, which [`PulserState::steps`] does not include; it
+    /// wraps.
+    pub fn slack(&self) -> (i32, i32) {
+        let [x, y] =
+            [&self.slack_x, &self.slack_y].map(|sum| sum.load(Ordering::Relaxed).cast_signed());
+        (x, y)
+    }
+
+    /// The position of the motor of z, in steps downward; it wraps.
+    pub fn z(&self) -> i32 {
+        self.z.load(Ordering::Relaxed).cast_signed()
+    }
+
+    /// Counts a step of the motor of z. For the code that counts the steps.
+    pub fn count_z_step(&self, down: bool) {
+        add(&self.z, if down { 1 } else { u32::MAX });
+    }
+
+    /// The sum of the ticks of the events that were taken from the queue; it wraps.
+    pub fn ticks(&self) -> u32 {
+        self.ticks.load(Ordering::Relaxed)
+    }
+
+    /// How often the queue ran empty while the machine moved; the count wraps.
+    pub fn underruns(&self) -> u32 {
+        self.underruns.load(Ordering::Relaxed)
+    }
+
+    /// Whether the last event has been processed and its time is over.
+    pub fn is_drained(&self) -> bool {
+        self.drained.load(Ordering::Acquire)
+    }
+
+    /// Stops all pulses from now on. The interrupt raises the pen, and the main loop discards the
+    /// queue. Call [`Pulser::tick`](super::Pulser::tick) at once; otherwise the pen stays down
+    /// until the current event ends.
+    pub fn halt(&self) {
+        self.halt.store(true, Ordering::Release);
+    }
+
+    /// Records that events are waiting that the interrupt does not know of.
+    pub(in crate::machine) fn fill(&self) {
+        self.drained.store(false, Ordering::Release);
+    }
+
+    /// Whether [`PulserState::halt`] is in force.
+    pub fn is_halted(&self) -> bool {
+        self.halt.load(Ordering::Acquire)
+    }
+
+    /// Allows pulses again. Call it only after [`PulserState::is_drained`] is true.
+    pub fn release(&self) {
+        self.halt.store(false, Ordering::Release);
+    }
+
+    /// Adds the steps and ticks of the events that were taken from the queue. Steps are packed as
+    /// in the queue's table, with less than 2^15 for each motor.
+    pub(super) fn count(&self, steps: u32, slack: u32, ticks: u32) {
+        for (x, y, packed) in [(&self.x, &self.y, steps), (&self.slack_x, &self.slack_y, slack)] {
+            let dx = i32::from(packed as u16 as i16).cast_unsigned();
+            add(x, dx);
+            add(y, (packed.wrapping_sub(dx).cast_signed() >> 16).cast_unsigned());
+        }
+        add(&self.ticks, ticks);
+    }
+
+    /// Reports what the hardware has done, for a board whose steps are not pulsed by
+    /// [`Pulser`](super::Pulser): the sums of the steps and ticks, and whether the queue is
+    /// drained.
+    pub fn report(&self, (x, y): (i32, i32), ticks: u32, drained: bool) {
+        self.x.store(x.cast_unsigned(), Ordering::Relaxed);
+        self.y.store(y.cast_unsigned(), Ordering::Relaxed);
+        self.ticks.store(ticks, Ordering::Relaxed);
+        self.drained.store(drained, Ordering::Release);
+    }
+
+    /// Reports the sums of the steps that took up slack, for such a board.
+    pub fn report_slack(&self, (x, y): (i32, i32)) {
+        self.slack_x.store(x.cast_unsigned(), Ordering::Relaxed);
+        self.slack_y.store(y.cast_unsigned(), Ordering::Relaxed);
+    }
+
+    /// Counts that the queue ran empty while the machine moved.
+    pub fn note_underrun(&self) {
+        let underruns = self.underruns.load(Ordering::Relaxed);
+        self.underruns.store(underruns.wrapping_add(1), Ordering::Relaxed);
+    }
+
+    /// The width of a step pulse, in ticks.
+    pub fn pulse_ticks(&self) -> u32 {
+        self.pulse_ticks.load(Ordering::Relaxed)
+    }
+
+    /// The mask of inverted direction pins: bit 0 for x, bit 1 for y.
+    pub fn inverted(&self) -> u8 {
+        self.inverted.load(Ordering::Relaxed)
+    }
+
+    /// Whether the direction pin of z is inverted.
+    pub fn z_is_inverted(&self) -> bool {
+        self.z_inverted.load(Ordering::Relaxed)
+    }
+
+    /// Sets the width of a pulse in ticks, and the mask of inverted direction pins: bit 0 for x,
+    /// bit 1 for y, bit 2 for z.
+    pub(in crate::machine) fn configure(&self, pulse_ticks: u32, inverted: u8) {
+        self.pulse_ticks.store(pulse_ticks, Ordering::Relaxed);
+        self.inverted.store(inverted & 3, Ordering::Relaxed);
+        self.z_inverted.store(inverted & 4 != 0, Ordering::Relaxed);
+    }
+
+    /// Sets the size of the board's queue. Call it before the machine asks for the size.
+    pub fn set_queue(&self, queue: QueueSize) {
+        self.queue_steps.store(queue.steps, Ordering::Relaxed);
+        self.queue_full.store(queue.full, Ordering::Relaxed);
+    }
+
+    /// The size of the board's queue. Without a board it is unlimited.
+    pub(in crate::machine) fn queue(&self) -> QueueSize {
+        QueueSize {
+            steps: self.queue_steps.load(Ordering::Relaxed),
+            full: self.queue_full.load(Ordering::Relaxed),
+        }
+    }
+
+    /// How the interrupt brakes when its queue runs empty.
+    pub fn brake(&self) -> &BrakeOrders {
+        &self.brake
+    }
+}
+
+/// Adds to a sum. Only its single writer may call this: it is a load and a store, so that a
+/// Cortex-M0+ supports it.
+#[inline]
+fn add(sum: &AtomicU32, more: u32) {
+    sum.store(sum.load(Ordering::Relaxed).wrapping_add(more), Ordering::Relaxed);
+}

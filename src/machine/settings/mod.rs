@@ -1,0 +1,260 @@
+//! The numbered settings and their values.
+//!
+//! Numbers up to 132 have the meaning that they have in Grbl 1.1, with one exception: 5 is a mask
+//! here, and it also covers the emergency stop. Numbers from 200 on are penup's own. A value is
+//! checked when it is entered, both alone and together with the other values. A refused value
+//! changes nothing.
+//!
+//! The settings themselves are rows of a table ([`SETTINGS`]). Checks of several settings together
+//! belong to the part that obeys them: the kinematics, the tool, and the limits of motion.
+
+mod motion;
+mod table;
+
+pub use table::{SETTINGS, Setting, SettingInfo};
+
+use super::Kinematics;
+use crate::drawing::PagePoint;
+use crate::fixed::Millimetres;
+use crate::motion::{LimitsError, TICKS_PER_SECOND};
+
+/// A value of any setting, between -32768 and 32768 with a resolution of 2^-16, in the unit of the
+/// setting.
+pub type Value = Millimetres;
+
+impl SettingInfo {
+    /// Checks a value of this setting alone.
+    ///
+    /// # Errors
+    /// [`SettingError::OutOfRange`] or [`SettingError::NotWhole`].
+    fn check(&self, value: Value) -> Result<(), SettingError> {
+        if value < self.least || value > self.greatest {
+            return Err(SettingError::OutOfRange(self.setting));
+        }
+        if self.whole && value.frac() != 0 {
+            return Err(SettingError::NotWhole(self.setting));
+        }
+        Ok(())
+    }
+}
+
+/// Why a change of a setting was refused.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum SettingError {
+    /// No setting has this number.
+    Unknown,
+    /// The value is below `least` or above `greatest` of [`Setting::info`].
+    OutOfRange(Setting),
+    /// The setting needs a whole number.
+    NotWhole(Setting),
+    /// The value conflicts with the values of other settings.
+    Conflict(LimitsError),
+    /// Settings cannot be changed while the machine moves.
+    Busy,
+}
+
+/// The values of all settings. Each value is within its range, and the motion planner can honour
+/// all of them together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Settings {
+    /// The values, in the order of [`SETTINGS`].
+    values: [Value; SETTINGS.len()],
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { values: core::array::from_fn(|index| SETTINGS[index].default) }
+    }
+}
+
+impl Settings {
+    /// The value of a setting, in its unit.
+    pub fn get(&self, setting: Setting) -> Value {
+        self.values[setting as usize]
+    }
+
+    /// Changes a setting.
+    ///
+    /// # Errors
+    /// See [`SettingError`]. On an error the setting keeps its old value.
+    ///
+    /// ```
+    /// use penup::machine::{Setting, SettingError, Settings, Value};
+    /// let mut settings = Settings::default();
+    /// settings.set(Setting::AccelerationX, Value::from_num(1500))?;
+    /// assert_eq!(settings.get(Setting::AccelerationX), 1500);
+    /// let refused = settings.set(Setting::AccelerationX, Value::ZERO);
+    /// assert_eq!(refused, Err(SettingError::OutOfRange(Setting::AccelerationX)));
+    /// # Ok::<(), SettingError>(())
+    /// ```
+    pub fn set(&mut self, setting: Setting, value: Value) -> Result<(), SettingError> {
+        setting.info().check(value)?;
+        let mut changed = *self;
+        changed.values[setting as usize] = value;
+        changed.check().map_err(SettingError::Conflict)?;
+        *self = changed;
+        Ok(())
+    }
+
+    /// Restores settings that were read from [`Settings::iter`] before. `values` are pairs of
+    /// number and value; settings that are not among them get their defaults. Numbers that no
+    /// longer exist are ignored. If a value is out of its range, or if values conflict, all
+    /// settings get their defaults.
+    pub fn restored(values: impl IntoIterator<Item = (u16, Value)>) -> Self {
+        let mut restored = Self::default();
+        for (setting, value) in values.into_iter().filter_map(|(number, value)| {
+            let setting = Setting::numbered(number)?;
+            Some((setting, value))
+        }) {
+            if setting.info().check(value).is_err() {
+                return Self::default();
+            }
+            restored.values[setting as usize] = value;
+        }
+        if restored.check().is_ok() { restored } else { Self::default() }
+    }
+
+    /// All settings with their values, sorted by number.
+    pub fn iter(&self) -> impl Iterator<Item = (&'static SettingInfo, Value)> {
+        SETTINGS.iter().zip(self.values)
+    }
+
+    /// Whether a setting whose value is 0 or 1 is 1.
+    pub fn is_on(&self, setting: Setting) -> bool {
+        self.get(setting) != 0
+    }
+
+    /// The value of a setting in units of 2^-16 of its unit; at least 1.
+    pub(super) fn positive_bits(&self, setting: Setting) -> u64 {
+        u64::from(self.get(setting).to_bits().unsigned_abs()).max(1)
+    }
+
+    /// The value of a setting, rounded down to a whole number of its unit.
+    pub(super) fn whole(&self, setting: Setting) -> u32 {
+        (self.get(setting).to_bits().max(0) >> Value::FRAC_NBITS).unsigned_abs()
+    }
+
+    /// Converts a setting in microseconds to ticks.
+    pub fn microseconds_as_ticks(&self, setting: Setting) -> u32 {
+        self.as_ticks(setting, TICKS_PER_SECOND / 1_000_000)
+    }
+
+    /// Converts a setting in milliseconds to ticks.
+    pub fn milliseconds_as_ticks(&self, setting: Setting) -> u32 {
+        self.as_ticks(setting, TICKS_PER_SECOND / 1000)
+    }
+
+    fn as_ticks(&self, setting: Setting, ticks_per_unit: u32) -> u32 {
+        let bits = u64::from(self.get(setting).to_bits().max(0).unsigned_abs());
+        // The ranges of the settings keep the result below 2^27 ticks.
+        ((bits * u64::from(ticks_per_unit)) >> Value::FRAC_NBITS) as u32
+    }
+
+    /// The kinematics of the machine.
+    pub fn kinematics(&self) -> Kinematics {
+        Kinematics::of(self)
+    }
+
+    /// The settings that hold the steps per millimetre of x and y on the page.
+    pub(super) fn steps_per_mm(&self) -> [Setting; 2] {
+        Kinematics::properties(self).steps_per_mm
+    }
+
+    /// The steps per millimetre on the page, for x and y.
+    pub fn page_steps(&self) -> [Value; 2] {
+        self.steps_per_mm().map(|setting| self.get(setting))
+    }
+
+    /// Converts two settings in millimetres, one for x and one for y, to steps on the page.
+    pub(super) fn page_point(&self, settings: [Setting; 2]) -> PagePoint {
+        let [x, y] = self.steps_per_mm();
+        PagePoint {
+            x: self.millimetres_as_steps(settings[0], x),
+            y: self.millimetres_as_steps(settings[1], y),
+        }
+    }
+
+    /// Converts a setting in millimetres to steps, rounded down.
+    pub(super) fn millimetres_as_steps(&self, setting: Setting, steps_per_mm: Setting) -> i32 {
+        let steps =
+            i64::from(self.get(setting).to_bits()) * i64::from(self.get(steps_per_mm).to_bits());
+        // The result is at most 8000 mm times 4000 steps per millimetre.
+        (steps >> (2 * Value::FRAC_NBITS)) as i32
+    }
+
+    /// Converts steps on the page to millimetres, clamped to the range of a value.
+    #[inline(never)] // Inlining it at every call would cost too much flash.
+    pub(super) fn millimetres(&self, point: PagePoint) -> [Value; 2] {
+        let millimetres = |steps: i32, steps_per_mm: Value| {
+            let per_mm = i64::from(steps_per_mm.to_bits()).max(1);
+            let bits = (i64::from(steps) << (2 * Value::FRAC_NBITS)) / per_mm;
+            Value::from_bits(bits.clamp(i32::MIN.into(), i32::MAX.into()) as i32)
+        };
+        let [x, y] = self.page_steps();
+        [millimetres(point.x, x), millimetres(point.y, y)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_setting_is_found_and_the_defaults_are_valid() {
+        for info in SETTINGS {
+            assert_eq!(Setting::numbered(info.number), Some(info.setting));
+            assert_eq!(Settings::default().get(info.setting), info.default);
+        }
+        assert!(Settings::default().check().is_ok());
+    }
+
+    #[test]
+    fn a_refused_value_changes_nothing() {
+        let mut settings = Settings::default();
+        let before = settings;
+        for info in SETTINGS {
+            for value in [info.least - Value::DELTA, info.greatest + Value::DELTA] {
+                assert_eq!(
+                    settings.set(info.setting, value),
+                    Err(SettingError::OutOfRange(info.setting))
+                );
+            }
+        }
+        assert_eq!(
+            settings.set(Setting::SoftLimits, Value::from_num(0.5)),
+            Err(SettingError::NotWhole(Setting::SoftLimits))
+        );
+        assert!(matches!(
+            settings.set(Setting::StepPulse, Value::from_num(400)),
+            Err(SettingError::Conflict(LimitsError::TooManySteps { .. }))
+        ));
+        assert_eq!(settings, before);
+    }
+
+    #[test]
+    fn restored_settings_are_those_that_were_kept_or_the_defaults() {
+        let mut settings = Settings::default();
+        settings.set(Setting::TravelX, Value::from_num(300)).expect("valid");
+        settings.set(Setting::StepPulse, Value::from_num(1.5)).expect("valid");
+        let kept = |settings: &Settings| {
+            settings.iter().map(|(info, value)| (info.number, value)).collect::<std::vec::Vec<_>>()
+        };
+        let mut values = kept(&settings);
+        assert_eq!(Settings::restored(values.clone()), settings);
+        values.push((9999, Value::ONE)); // of another version
+        assert_eq!(Settings::restored(values.clone()), settings);
+        for (number, value) in [(130, 0.0), (20, 0.5), (0, 400.0)] {
+            let mut spoilt = values.clone();
+            spoilt.push((number, Value::from_num(value)));
+            assert_eq!(Settings::restored(spoilt), Settings::default());
+        }
+    }
+
+    #[test]
+    fn ticks() {
+        let settings = Settings::default();
+        assert_eq!(settings.microseconds_as_ticks(Setting::StepPulse), 50);
+        assert_eq!(settings.milliseconds_as_ticks(Setting::PenUpDwell), 3_750_000);
+    }
+}

@@ -1,0 +1,236 @@
+//! The table of the settings: number, name, unit, range and default. A new setting is a variant of
+//! [`Setting`] and a row of [`SETTINGS`] here, and nothing else but the code that obeys it.
+
+use super::Value;
+
+/// The settings, in the order of [`SETTINGS`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(u8)]
+pub enum Setting {
+    /// `$0` The width of a step pulse.
+    StepPulse,
+    /// `$3` The mask of motors whose direction is inverted: bit 0 for x, bit 1 for y, bit 2
+    /// for z.
+    InvertDirections,
+    /// `$5` The mask of contacts that are closed when they are not pressed: bit 0 for x, bit 1 for
+    /// y, bit 2 for the emergency stop.
+    InvertContacts,
+    /// `$11` Junction deviation: how far a rounded corner would be from the true one. It determines
+    /// the speed in corners.
+    JunctionDeviation,
+    /// `$20` Whether moves that leave the travel are refused.
+    SoftLimits,
+    /// `$21` Whether a pressed limit switch stops the machine.
+    HardLimits,
+    /// `$22` Whether the machine must be homed before it draws.
+    Homing,
+    /// `$24` The speed of the second, slow approach to a switch.
+    HomingFeed,
+    /// `$25` The speed of the first approach to a switch.
+    HomingSeek,
+    /// `$27` The distance from its switch at which an axis is homed.
+    HomingPullOff,
+    /// `$100` Steps per millimetre of x.
+    StepsPerMmX,
+    /// `$101` Steps per millimetre of y.
+    StepsPerMmY,
+    /// `$102` Steps per millimetre of z, whose motor lifts the pen.
+    StepsPerMmZ,
+    /// `$110` The greatest speed of x.
+    MaxRateX,
+    /// `$111` The greatest speed of y.
+    MaxRateY,
+    /// `$112` The greatest speed of z.
+    MaxRateZ,
+    /// `$120` The acceleration of x.
+    AccelerationX,
+    /// `$121` The acceleration of y.
+    AccelerationY,
+    /// `$122` The acceleration of z.
+    AccelerationZ,
+    /// `$130` The travel of x, from 0.
+    TravelX,
+    /// `$131` The travel of y, from 0.
+    TravelY,
+    /// `$132` The travel of z from its upper stop to height 127.
+    TravelZ,
+    /// `$200` The time from a change of a direction pin to the step pulse.
+    DirectionSetup,
+    /// `$201` The speed along the path with the pen down.
+    DrawSpeed,
+    /// `$202` The speed along the path with the pen up.
+    TravelSpeed,
+    /// `$203` Whether the machine slows down in the bends of dense polylines so that the
+    /// centripetal acceleration stays within the limit.
+    Centripetal,
+    /// `$204` The greatest jerk along the path, which is the rate of change of the acceleration; at
+    /// least 0.1, or 0 for no limit.
+    Jerk,
+    /// `$209` How the pen is lifted: 0 by a servo or a solenoid, 1 by a stepper motor on z.
+    Tool,
+    /// `$210` The height of the raised pen, from 0 (highest) to 127.
+    PenUpHeight,
+    /// `$211` The height of the lowered pen, from 0 (highest) to 127.
+    PenDownHeight,
+    /// `$212` The dwell from the command to raise the pen to the first move.
+    PenUpDwell,
+    /// `$213` The dwell from the command to lower the pen to the first move.
+    PenDownDwell,
+    /// `$214` The time in which the pen moves in small steps from one end of its range of heights
+    /// to the other; 0 if it moves at once.
+    PenRamp,
+    /// `$215` The length of ink after which the machine pauses at the end of a stroke; 0 for never.
+    InkBeforePause,
+    /// `$220` The length of the dots and gaps of a dotted line. A dash is three dots long.
+    DotLength,
+    /// `$230` The kinematics of the machine: 0 Cartesian, 1 CoreXY, 2 polargraph.
+    Kinematics,
+    /// `$231` The distance from the left anchor of the belts to the right one.
+    AnchorWidth,
+    /// `$232` The horizontal distance from the left anchor to the page's origin, which is to the
+    /// right of it.
+    AnchorLeft,
+    /// `$233` The height of the anchors above the origin.
+    AnchorHeight,
+    /// `$234` The length of a belt when it is homed.
+    HomedBelt,
+    /// `$235` The backlash of x: the travel that is lost when its motor reverses.
+    BacklashX,
+    /// `$236` The backlash of y, or of the second motor.
+    BacklashY,
+    /// `$240` The x coordinate at which the pen is parked (G28).
+    ParkX,
+    /// `$241` The y coordinate at which the pen is parked (G28).
+    ParkY,
+}
+
+/// The description of a setting.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SettingInfo {
+    /// The setting that is described.
+    pub setting: Setting,
+    /// The number after the `$`.
+    pub number: u16,
+    /// The name in the listing.
+    pub name: &'static str,
+    /// The unit; empty for a plain number.
+    pub unit: &'static str,
+    /// The least value allowed.
+    pub least: Value,
+    /// The greatest value allowed.
+    pub greatest: Value,
+    /// The default value.
+    pub default: Value,
+    /// Whether only whole numbers are allowed.
+    pub whole: bool,
+}
+
+const fn row(
+    setting: Setting,
+    number: u16,
+    name: &'static str,
+    unit: &'static str,
+    (least, greatest, default): (f64, f64, f64),
+    whole: bool,
+) -> SettingInfo {
+    // A value is rounded to the nearest one, as a value that is sent is. No value is negative.
+    const fn value(number: f64) -> Value {
+        Value::from_bits((number * 65536.0 + 0.5) as i32)
+    }
+    SettingInfo {
+        setting,
+        number,
+        name,
+        unit,
+        least: value(least),
+        greatest: value(greatest),
+        default: value(default),
+        whole,
+    }
+}
+
+/// All settings, sorted by number: number, name, unit, range with default, and whether only whole
+/// numbers are allowed.
+#[rustfmt::skip] // a table
+pub const SETTINGS: &[SettingInfo] = {
+    use Setting::*;
+    &[
+        row(StepPulse, 0, "step pulse length", "us", (0.2, 500.0, 2.0), false),
+        row(InvertDirections, 3, "invert directions", "mask", (0.0, 7.0, 0.0), true),
+        row(InvertContacts, 5, "invert contacts", "mask", (0.0, 7.0, 0.0), true),
+        row(JunctionDeviation, 11, "junction deviation", "mm", (0.0, 1.0, 0.05), false),
+        row(SoftLimits, 20, "soft limits", "0|1", (0.0, 1.0, 1.0), true),
+        row(HardLimits, 21, "hard limits", "0|1", (0.0, 1.0, 0.0), true),
+        row(Homing, 22, "homing", "0|1", (0.0, 1.0, 0.0), true),
+        row(HomingFeed, 24, "homing speed, slow approach", "mm/min", (1.0, 32767.0, 60.0), false),
+        row(HomingSeek, 25, "homing speed, first approach", "mm/min", (1.0, 32767.0, 1500.0), false),
+        row(HomingPullOff, 27, "homing pull-off", "mm", (0.1, 50.0, 2.0), false),
+        row(StepsPerMmX, 100, "steps per mm of x", "step/mm", (2.0, 4000.0, 80.0), false),
+        row(StepsPerMmY, 101, "steps per mm of y", "step/mm", (2.0, 4000.0, 80.0), false),
+        row(StepsPerMmZ, 102, "steps per mm of z", "step/mm", (2.0, 4000.0, 400.0), false),
+        row(MaxRateX, 110, "maximum speed of x", "mm/min", (1.0, 32767.0, 6000.0), false),
+        row(MaxRateY, 111, "maximum speed of y", "mm/min", (1.0, 32767.0, 6000.0), false),
+        row(MaxRateZ, 112, "maximum speed of z", "mm/min", (1.0, 32767.0, 300.0), false),
+        row(AccelerationX, 120, "acceleration of x", "mm/s2", (10.0, 32767.0, 800.0), false),
+        row(AccelerationY, 121, "acceleration of y", "mm/s2", (10.0, 32767.0, 800.0), false),
+        row(AccelerationZ, 122, "acceleration of z", "mm/s2", (10.0, 32767.0, 50.0), false),
+        row(TravelX, 130, "travel of x", "mm", (1.0, 8000.0, 420.0), false),
+        row(TravelY, 131, "travel of y", "mm", (1.0, 8000.0, 420.0), false),
+        row(TravelZ, 132, "travel of z", "mm", (0.1, 50.0, 4.0), false),
+        row(DirectionSetup, 200, "direction setup time", "us", (0.1, 500.0, 1.0), false),
+        row(DrawSpeed, 201, "drawing speed", "mm/min", (1.0, 32767.0, 3000.0), false),
+        row(TravelSpeed, 202, "travel speed", "mm/min", (1.0, 32767.0, 6000.0), false),
+        row(Centripetal, 203, "limit speed by curvature", "0|1", (0.0, 1.0, 1.0), true),
+        row(Jerk, 204, "jerk", "m/s3", (0.0, 1000.0, 0.0), false),
+        row(Tool, 209, "pen lifted by a stepper", "0|1", (0.0, 1.0, 0.0), true),
+        row(PenUpHeight, 210, "height of the raised pen", "of 127", (0.0, 127.0, 0.0), true),
+        row(PenDownHeight, 211, "height of the lowered pen", "of 127", (0.0, 127.0, 127.0), true),
+        row(PenUpDwell, 212, "dwell after raising the pen", "ms", (1.0, 1300.0, 150.0), false),
+        row(PenDownDwell, 213, "dwell after lowering the pen", "ms", (1.0, 1300.0, 150.0), false),
+        row(PenRamp, 214, "pen ramp time", "ms", (0.0, 5000.0, 0.0), false),
+        row(InkBeforePause, 215, "drawn length before a pause", "m", (0.0, 10000.0, 0.0), false),
+        row(DotLength, 220, "length of a dot", "mm", (0.1, 100.0, 1.0), false),
+        row(Kinematics, 230, "kinematics", "0|1|2", (0.0, 2.0, 0.0), true),
+        row(AnchorWidth, 231, "distance between anchors", "mm", (100.0, 8000.0, 800.0), false),
+        row(AnchorLeft, 232, "left anchor to the origin", "mm", (0.0, 8000.0, 190.0), false),
+        row(AnchorHeight, 233, "anchors above the origin", "mm", (10.0, 8000.0, 700.0), false),
+        row(HomedBelt, 234, "belt length when homed", "mm", (10.0, 8000.0, 500.0), false),
+        row(BacklashX, 235, "backlash of x", "mm", (0.0, 10.0, 0.0), false),
+        row(BacklashY, 236, "backlash of y", "mm", (0.0, 10.0, 0.0), false),
+        row(ParkX, 240, "park at x", "mm", (0.0, 8000.0, 0.0), false),
+        row(ParkY, 241, "park at y", "mm", (0.0, 8000.0, 0.0), false),
+    ]
+};
+
+// A row in the wrong place or a default out of its range does not compile.
+const _: () = {
+    let mut index = 0;
+    while index < SETTINGS.len() {
+        let row = &SETTINGS[index];
+        assert!(row.setting as usize == index, "the rows have another order than the settings");
+        assert!(index == 0 || row.number > SETTINGS[index - 1].number, "rows not sorted by number");
+        let default = row.default.to_bits();
+        assert!(row.least.to_bits() <= default && default <= row.greatest.to_bits());
+        index += 1;
+    }
+};
+
+impl Setting {
+    /// The description of this setting.
+    pub const fn info(self) -> &'static SettingInfo {
+        &SETTINGS[self as usize]
+    }
+
+    /// The setting with this number, or `None` if there is none.
+    ///
+    /// ```
+    /// use penup::machine::Setting;
+    /// assert_eq!(Setting::numbered(100), Some(Setting::StepsPerMmX));
+    /// assert_eq!(Setting::numbered(99), None);
+    /// ```
+    pub fn numbered(number: u16) -> Option<Self> {
+        let index = SETTINGS.binary_search_by_key(&number, |info| info.number);
+        index.ok().map(|index| SETTINGS[index].setting)
+    }
+}

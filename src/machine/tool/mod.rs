@@ -1,0 +1,79 @@
+//! The tool: what lowers and raises the pen, how long that takes, and which settings it obeys.
+//!
+//! Each kind has a module: [`servo`], [`solenoid`] and [`stepper`], a motor on the z axis. A servo
+//! and a solenoid are told a height ([`Pen`]), and the board has the one or the other; `$209`
+//! chooses between them and the stepper motor. The motion planner turns the heights, the dwells and
+//! the motor's rule of [`Tool::positions`] into events.
+
+pub mod servo;
+mod solenoid;
+mod stepper;
+
+pub use solenoid::Solenoid;
+
+use super::{Setting, Settings};
+use crate::motion::{LimitsError, PenPositions};
+
+/// The actuator of the pen that a board has: a solenoid or a servo.
+pub trait Pen {
+    /// Moves the pen to `height`, from 0 (fully raised) to 127. It is called from the interrupt, so
+    /// it must be brief.
+    fn set_height(&mut self, height: u8);
+}
+
+/// The kinds of tool that the settings choose from, by `$209`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Tool {
+    /// An actuator that is told a height: see [`Pen`].
+    Actuator,
+    /// A stepper motor on the z axis.
+    Stepper,
+}
+
+impl Tool {
+    /// The tool that the settings choose.
+    fn of(settings: &Settings) -> Self {
+        if settings.is_on(Setting::Tool) { Self::Stepper } else { Self::Actuator }
+    }
+
+    /// Checks the settings of the chosen tool against each other.
+    ///
+    /// # Errors
+    /// [`LimitsError::TooManySteps`] if the motor of z would have to step too fast.
+    pub(super) fn check(settings: &Settings) -> Result<(), LimitsError> {
+        match Self::of(settings) {
+            Self::Actuator => Ok(()),
+            Self::Stepper => stepper::rule(settings).map(|_| ()),
+        }
+    }
+
+    /// The heights, dwells and other settings of the pen that the motion planner needs.
+    #[inline(never)] // Inlining it at every call would cost too much flash.
+    pub(super) fn positions(settings: &Settings) -> PenPositions {
+        let height = |setting| settings.whole(setting).min(127) as u8;
+        PenPositions {
+            up_height: height(Setting::PenUpHeight),
+            down_height: height(Setting::PenDownHeight),
+            up_ticks: settings.milliseconds_as_ticks(Setting::PenUpDwell),
+            down_ticks: settings.milliseconds_as_ticks(Setting::PenDownDwell),
+            ramp_ticks: settings.milliseconds_as_ticks(Setting::PenRamp) / 127,
+            dot_length: settings.dot_length(),
+            lift: match Self::of(settings) {
+                Self::Actuator => None,
+                // `Settings::set` refuses whatever would be refused here.
+                Self::Stepper => stepper::rule(settings).ok(),
+            },
+        }
+    }
+
+    /// The time, in milliseconds, that lowering and raising the pen adds to each stroke: the
+    /// dwells, and the moves down and up of a motor.
+    pub(super) fn stroke_milliseconds(settings: &Settings) -> u64 {
+        let dwells = settings.whole(Setting::PenDownDwell) + settings.whole(Setting::PenUpDwell);
+        let moves = match Self::of(settings) {
+            Self::Actuator => 0,
+            Self::Stepper => 2 * stepper::move_milliseconds(settings),
+        };
+        u64::from(dwells) + moves
+    }
+}
