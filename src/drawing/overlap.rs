@@ -302,9 +302,9 @@ mod tests {
             strip.resize(strip.len().max(to + 1), ' ');
             let (ink, line_type) = TYPES[usize::from(segment.line_type_code)];
             assert_eq!(segment.line_type(), line_type);
-            for at in from + 1..to {
-                assert_eq!(strip[at], ' ', "drawn twice");
-                strip[at] = if segment.pen == 0 { ink } else { (b'0' + segment.pen) as char };
+            for letter in &mut strip[from + 1..to] {
+                assert_eq!(*letter, ' ', "drawn twice");
+                *letter = if segment.pen == 0 { ink } else { (b'0' + segment.pen) as char };
             }
             (strip[from], strip[to]) = ('+', '+');
         }
