@@ -11,7 +11,7 @@ use crate::results::{JobResult, Lengths, Timings};
 use crate::watch::PenWatch;
 use penup::boards::host::{Change, HostBoard, lend_memory};
 use penup::geometry::{Projection, Vertex};
-use penup::machine::{EventRing, Path, PulserState, Setting, Target};
+use penup::machine::{EventRing, Path, PulserState, Target};
 use penup::plotter::{Observer, Plotter};
 use penup::protocol::CommandError;
 use penup::stage::{Aborted, Cancel, Stage};
@@ -42,8 +42,7 @@ impl InMemory {
     }
 
     fn steps_per_mm(&self) -> [f64; 2] {
-        let settings = self.plotter.machine().settings();
-        [Setting::StepsPerMmX, Setting::StepsPerMmY].map(|s| settings.get(s).to_num::<f64>())
+        self.plotter.machine().settings().page_steps().map(|steps| steps.to_num::<f64>())
     }
 
     fn follow_pins(&mut self) {

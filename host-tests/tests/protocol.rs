@@ -1,7 +1,9 @@
 //! Tests of the protocol by transcripts: the lines that are sent to the plotter, and its answers.
 
-use penup::plotter::{EMPTY_LOOKAHEAD, Memory};
+use penup::machine::Path;
+use penup::plotter::{EMPTY_LOOKAHEAD, Memory, Unobserved};
 use penup::protocol::error_entries;
+use penup::stage::NeverCancel;
 use penup_host_tests::whole_jobs::Bench;
 
 /// A cube of side 1.
@@ -170,6 +172,24 @@ fn a_plan_is_drawn_at_true_size_or_refused_with_its_size() {
     assert_eq!(bench.say("$page=210x297\n$fit=on\n$plot\n"), "ok\nok\nok\n");
     bench.finish();
     assert!(bench.say("?").contains("Ink:190/190"));
+}
+
+#[test]
+fn both_axes_of_a_corexy_machine_have_the_steps_of_its_motors() {
+    let mut bench = Bench::new();
+    // Both motors of a CoreXY drive one belt, so the setting of the other axis is not used.
+    let answer = bench.say(
+        "$230=1\n$100=80\n$101=40\nv 20 20 0\nv 70 20 0\nv 70 50 0\nv 20 50 0\n\
+         l 1 2 3 4 1\n",
+    );
+    assert!(!answer.contains("error"), "{answer}");
+    bench.plotter.compute(&mut NeverCancel, &mut Unobserved).expect("a job");
+    let mut strokes = bench.plotter.strokes();
+    let mut most = [0; 2];
+    while let Some(target) = strokes.next_target() {
+        most = [most[0].max(target.point.x), most[1].max(target.point.y)];
+    }
+    assert_eq!(most, [70 * 80, 50 * 80]);
 }
 
 #[test]

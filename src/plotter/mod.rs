@@ -446,9 +446,7 @@ impl Inner<'_> {
         self.kept_words = 0;
         self.job = Job::default();
         self.cursor = Cursor::default();
-        let settings = self.machine.settings();
-        let steps =
-            [Setting::StepsPerMmX, Setting::StepsPerMmY].map(|setting| settings.get(setting));
+        let steps = self.machine.settings().page_steps();
         let (model, options, words) = (&self.model, &self.options, &mut *self.words);
         self.job = Pipeline { model, options, steps, words, cancel, observer }.run()?;
         Ok(())

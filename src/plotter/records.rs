@@ -2,7 +2,7 @@
 //! formats, and how they are saved and loaded.
 
 use super::{Board, Job, NotStored, Record};
-use crate::machine::{SETTINGS, Setting, Settings, Value};
+use crate::machine::{SETTINGS, Settings, Value};
 use crate::protocol::CommandError;
 
 /// Size of a kept setting: two bytes for its number, four for its value.
@@ -49,10 +49,10 @@ const JOB_LAYOUT: u32 = u32::from_le_bytes(*b"job1");
 /// job's figures.
 const JOB_HEADER: usize = 3 + Job::FIGURES;
 
-/// The steps per millimetre of x and y, as bits. A job's coordinates are measured in these steps.
+/// The steps per millimetre on the page, for x and y, as bits. A job's coordinates are measured in
+/// these steps.
 fn steps(settings: &Settings) -> [u32; 2] {
-    [Setting::StepsPerMmX, Setting::StepsPerMmY]
-        .map(|setting| settings.get(setting).to_bits().cast_unsigned())
+    settings.page_steps().map(|steps| steps.to_bits().cast_unsigned())
 }
 
 /// Keeps a job, which lies in `words`, in the board's flash.
