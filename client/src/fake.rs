@@ -77,8 +77,17 @@ pub struct FakePlotter {
     /// The user's successive answers to the question whether to resume. When they are used up,
     /// nobody answers.
     pub user: VecDeque<Answer>,
+    /// The number of status reports that it sends while it computes the picture. Meanwhile it reads
+    /// no lines.
+    pub reports_while_computing: usize,
+    /// The time that it takes to answer a status query while it computes.
+    pub answer_delay: Duration,
     queue: Vec<u8>,
     output: VecDeque<u8>,
+    /// The line that asked for the picture, while it computes.
+    plot: Option<Label>,
+    /// When the answer to a status query is due, while it computes.
+    answer_due: Option<Duration>,
     drawn: Option<u64>,
     numbering: Numbering,
     clock: Duration,
@@ -182,6 +191,10 @@ impl FakePlotter {
                     }
                     _ => Ok(()),
                 };
+                if text == PLOT && self.reports_while_computing > 0 {
+                    self.plot = Some(label);
+                    return;
+                }
                 if text == PLOT {
                     self.drawn = Some(0);
                 }
@@ -221,7 +234,26 @@ impl FakePlotter {
         self.say(&last);
     }
 
+    /// Answers a status query if it is due; after the last of these answers the picture is computed.
+    fn compute(&mut self, label: Label) {
+        if self.answer_due.is_none_or(|due| due > self.clock) {
+            return;
+        }
+        self.answer_due = None;
+        self.say("<Run|MPos:0.000,0.000|Stage:order>");
+        self.reports_while_computing -= 1;
+        if self.reports_while_computing == 0 {
+            self.plot = None;
+            self.drawn = Some(0);
+            self.numbering.note(label, Ok(()));
+            self.reply(Ok(()), label);
+        }
+    }
+
     fn work(&mut self) {
+        if let Some(label) = self.plot {
+            return self.compute(label);
+        }
         if let Some(end) = self.queue.iter().position(|&byte| byte == b'\n') {
             let line: Vec<u8> = self.queue.drain(..=end).collect();
             self.take_line(String::from_utf8_lossy(&line).trim_end());
@@ -234,6 +266,9 @@ impl Link for FakePlotter {
         for &byte in bytes {
             match byte {
                 b'?' if self.fault == Fault::Noise => self.output.extend(b"\xFE\x00\x81"),
+                b'?' if self.plot.is_some() => {
+                    self.answer_due.get_or_insert(self.clock + self.answer_delay);
+                }
                 b'?' => self.report(),
                 ABORT => self.abort(),
                 b'~' => (self.pen_before, self.hold_before) = (None, None),

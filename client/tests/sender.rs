@@ -137,6 +137,16 @@ fn a_line_that_never_arrives_is_told_from_silence() {
 }
 
 #[test]
+fn a_plotter_that_answers_slowly_while_it_computes_is_not_asked_for_lines() {
+    let mut plotter = FakePlotter::new(Fault::None);
+    plotter.reports_while_computing = 300;
+    plotter.answer_delay = 4 * PATIENCE.reply;
+    job(&mut plotter, 3).expect("a job without a fault");
+    assert!(!plotter.overflowed, "it reads nothing while it computes");
+    assert_eq!(plotter.lines.len(), 4);
+}
+
+#[test]
 fn what_was_given_up_by_a_damaged_byte_begins_again() {
     for aborted in [1, 3, 40, 41] {
         let (error, plotter) = failure(Fault::AbortedAt(aborted));

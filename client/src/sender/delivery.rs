@@ -28,6 +28,9 @@ struct Delivery<'l> {
     last_event: Instant,
     last_progress: Instant,
     resends: u32,
+    /// Whether the plotter computes a picture according to its last status report. It then reads no
+    /// lines, so it is asked for none.
+    is_computing: bool,
 }
 
 impl Delivery<'_> {
@@ -77,6 +80,7 @@ impl Sender<'_> {
             last_event: now,
             last_progress: now,
             resends: 0,
+            is_computing: false,
         };
         // The number of lines cannot overflow in practice: no plotter can hold the model of so many
         // lines.
@@ -125,7 +129,7 @@ impl Sender<'_> {
             }
             self.query_if_due()?;
             let since = delivery.asked.unwrap_or(delivery.last_event);
-            if self.since(since) > self.patience.reply {
+            if self.since(since) > self.patience.reply && !delivery.is_computing {
                 self.ask_for_last_number(&mut delivery)?;
             }
             if self.since(delivery.last_progress) > self.patience.lost {
@@ -192,6 +196,7 @@ impl Sender<'_> {
         progress: &mut dyn Progress,
     ) -> Result<(), Error> {
         progress.state(&status.state);
+        delivery.is_computing = status.is_computing;
         if status.is_computing {
             // The plotter reads no line until it has computed the picture.
             delivery.last_progress = self.link.now();
