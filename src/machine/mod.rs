@@ -238,12 +238,7 @@ impl<'m> Machine<'m> {
     /// Stops the pulses at once, raises the pen and enters the alarm. The position is where the
     /// pins stopped.
     pub fn alarm(&mut self, alarm: Alarm) {
-        // Events that the interrupt has not begun to process must still be discarded by it.
-        let waits = self.pins.is_drained() && !self.is_stopped();
         self.pins.halt();
-        if waits {
-            self.pins.fill();
-        }
         self.end_homing();
         self.segmenter = None;
         self.forget_path(self.planned_position());

@@ -1,7 +1,7 @@
 //! A main loop that is late: the queue runs dry while the machine moves.
 
 use crate::fixtures::{ink, is_ready, to, with, with_backlash};
-use penup::machine::{Setting, Settings, Target, TargetList, Value};
+use penup::machine::{Alarm, Setting, Settings, Target, TargetList, Value};
 use penup_host_tests::event_checker::{self, Drawn};
 use penup_host_tests::pin_machine;
 use penup_host_tests::random::Random;
@@ -137,4 +137,34 @@ fn backlash_is_taken_up_at_rest_and_leaves_the_same_ink() {
         let measured = event_checker::greatest_acceleration(&run.times, &places, 0.005);
         assert!(measured <= 1.05 * 800.0, "{measured} mm/s2");
     }
+}
+
+#[test]
+fn an_alarm_raises_the_pen_of_a_dry_queue_before_it_can_be_unlocked() {
+    let targets = fast_job();
+    let mut queue_dry = 0;
+    for instant in (0..40).map(|case| 12_000_000 + 1_700_000 * case) {
+        let mut path = TargetList::new(&targets);
+        let mut unlocked = None;
+        let trace = pin_machine::run_with(Settings::default(), 25_000, &mut |turn, queue| {
+            if turn.now == 0 {
+                turn.machine.start(&mut TargetList::new(&targets)).expect("valid");
+            }
+            if turn.now < instant {
+                turn.machine.fill(&mut path, queue);
+            } else if turn.now == instant + 25_000_000 {
+                // Nothing came for a second.
+                queue_dry += u32::from(turn.machine.underruns() > 0);
+                turn.machine.alarm(Alarm::EmergencyStop);
+            }
+            if turn.now >= instant + 25_000_000 && turn.machine.unlock().is_ok() {
+                unlocked = Some(turn.now);
+            }
+            unlocked.is_none()
+        });
+        let drawn = event_checker::check_pins_in_alarms(&trace, &Settings::default());
+        assert_eq!(drawn.pen, 0, "{instant}");
+        assert!(unlocked.is_some_and(|at| at <= instant + 25_100_000), "{unlocked:?}");
+    }
+    assert!(queue_dry > 10, "{queue_dry}");
 }

@@ -107,9 +107,11 @@ pub fn set_up(pins: MotorPins, nvic: &mut NVIC) -> Steps {
 }
 
 impl Steps {
-    /// Starts the interrupt if events wait and it does not run.
+    /// Starts the interrupt if it does not run and has something to do: events wait, or the pins were
+    /// halted.
     pub fn start(&mut self) {
-        if !self.events.is_empty() && self.events.is_stopped() {
+        let has_work = !self.events.is_empty() || STATE.halt_is_due();
+        if has_work && self.events.is_stopped() {
             // SAFETY: no handler is active, and none is wanted: there is nothing to do for them.
             cortex_m::interrupt::free(|_| unsafe { STEPPER.get_filled() }.begin());
         }

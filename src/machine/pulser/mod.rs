@@ -12,6 +12,7 @@ mod state;
 pub use pins::{Axes, PinOrder, Pins};
 pub use queue::StepQueue;
 pub use ring::EventRing;
+use state::Halt;
 pub use state::PulserState;
 
 use super::Pen;
@@ -121,7 +122,7 @@ impl<'q, A: Axes, P: Pen, const N: usize> Pulser<'q, A, P, N> {
     /// memory ordering.
     #[inline(always)]
     pub fn is_halted(&self) -> bool {
-        self.state.halt.load(Ordering::Relaxed)
+        self.state.halt.load(Ordering::Relaxed) != Halt::None as u8
     }
 
     /// Ends the pulses of an event. Returns whether [`Pulser::brake`] is due at once.
@@ -155,6 +156,7 @@ impl<'q, A: Axes, P: Pen, const N: usize> Pulser<'q, A, P, N> {
     #[inline(never)]
     pub fn stop(&mut self) {
         self.pen.set_height(0);
+        self.state.halt.store(Halt::Done as u8, Ordering::Relaxed);
         self.brake.stop();
         self.ring.set_running(false);
     }

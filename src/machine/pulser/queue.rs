@@ -92,7 +92,8 @@ impl<'q, const N: usize> StepQueue<'q, N> {
             self.state.brake.forget();
             self.step_length = StepLength::new();
         }
-        self.state.drained.store(stopped, Ordering::Release);
+        let is_drained = stopped && !self.state.halt_is_due();
+        self.state.drained.store(is_drained, Ordering::Release);
     }
 }
 

@@ -27,8 +27,9 @@ pub struct PulserState {
     underruns: AtomicU32,
     /// Whether the last event has been processed and its time is over.
     pub(super) drained: AtomicBool,
-    /// Whether the main loop has halted the pulses.
-    pub(super) halt: AtomicBool,
+    /// Whether the main loop has halted the pulses, and whether the interrupt has done what that
+    /// asks of it: [`Halt`] as a number.
+    pub(super) halt: AtomicU8,
     /// The width of a step pulse, in ticks.
     pulse_ticks: AtomicU32,
     /// The mask of inverted direction pins: bit 0 for x, bit 1 for y.
@@ -43,6 +44,18 @@ pub struct PulserState {
     pub(super) brake: BrakeOrders,
 }
 
+/// How far a halt of the pulses has come.
+#[derive(Debug, Clone, Copy)]
+#[repr(u8)]
+pub(super) enum Halt {
+    /// Pulses are allowed.
+    None,
+    /// The main loop has halted the pulses. The interrupt still has to raise the pen.
+    Requested,
+    /// The interrupt has raised the pen.
+    Done,
+}
+
 impl PulserState {
     /// The state with all counts at 0 and no commands.
     pub const fn new() -> Self {
@@ -55,7 +68,7 @@ impl PulserState {
             ticks: AtomicU32::new(0),
             underruns: AtomicU32::new(0),
             drained: AtomicBool::new(true),
-            halt: AtomicBool::new(false),
+            halt: AtomicU8::new(Halt::None as u8),
             pulse_ticks: AtomicU32::new(50),
             inverted: AtomicU8::new(0),
             z_inverted: AtomicBool::new(false),
@@ -107,23 +120,28 @@ impl PulserState {
     /// Stops all pulses from now on. The interrupt raises the pen, and the main loop discards the
     /// queue. Call [`Pulser::tick`](super::Pulser::tick) at once; otherwise the pen stays down
     /// until the current event ends.
+    ///
+    /// [`PulserState::is_drained`] is false from then on until the pen has been raised.
     pub fn halt(&self) {
-        self.halt.store(true, Ordering::Release);
-    }
-
-    /// Records that events are waiting that the interrupt does not know of.
-    pub(in crate::machine) fn fill(&self) {
-        self.drained.store(false, Ordering::Release);
+        self.drained.store(false, Ordering::Relaxed);
+        if !self.is_halted() {
+            self.halt.store(Halt::Requested as u8, Ordering::Release);
+        }
     }
 
     /// Whether [`PulserState::halt`] is in force.
     pub fn is_halted(&self) -> bool {
-        self.halt.load(Ordering::Acquire)
+        self.halt.load(Ordering::Acquire) != Halt::None as u8
+    }
+
+    /// Whether the interrupt has still to do what [`PulserState::halt`] asks of it.
+    pub fn halt_is_due(&self) -> bool {
+        self.halt.load(Ordering::Acquire) == Halt::Requested as u8
     }
 
     /// Allows pulses again. Call it only after [`PulserState::is_drained`] is true.
     pub fn release(&self) {
-        self.halt.store(false, Ordering::Release);
+        self.halt.store(Halt::None as u8, Ordering::Release);
     }
 
     /// Adds the steps and ticks of the events that were taken from the queue. Steps are packed as
