@@ -27,6 +27,9 @@ pub(super) struct BlockCursor {
     pub(super) place: u64,
     /// From there to where the next move is due.
     pub(super) to_next: u64,
+    /// Where it shall stand, if that is not the end: a place like the one above, and else the greatest
+    /// number.
+    stop: u64,
     /// The slice in work begins at `place`.
     pub(super) slice: Option<SliceMoves>,
 }
@@ -58,6 +61,7 @@ impl BlockCursor {
             piece_moves: pattern.end_of(0),
             place: 0,
             to_next: move_length / 2,
+            stop: u64::MAX,
             slice: None,
         }
     }
@@ -85,6 +89,30 @@ impl BlockCursor {
             self.move_length * u64::from(self.piece_moves)
         };
         end.saturating_sub(self.place)
+    }
+
+    /// From the plan's place to the first where the machine can stand, which is half a move behind
+    /// one, not nearer than `least`: 2^-32 mm. No further than the end of the piece.
+    pub(super) fn to_whole_step(&self, least: u64) -> u64 {
+        let length = self.move_length.max(1);
+        // The first such place, or the one before it.
+        let behind = (self.to_next + length / 2) % length;
+        let steps = least.saturating_sub(behind).div_ceil(length);
+        (behind + steps * length).min(self.room())
+    }
+
+    /// Stands at the first such place that is not nearer than `least`, and stays with it: how far that
+    /// is, 2^-32 mm.
+    pub(super) fn stop_behind(&mut self, least: u64) -> u64 {
+        if self.stop == u64::MAX {
+            self.stop = self.place + self.to_whole_step(least);
+        }
+        self.stop.saturating_sub(self.place)
+    }
+
+    /// Goes on to the end.
+    pub(super) fn resume(&mut self) {
+        self.stop = u64::MAX;
     }
 
     /// The same as a length.

@@ -126,7 +126,9 @@ impl Profile {
                 Pace::of_stopping_distance(limits, distance)
             }
         };
-        let (peak_pace, exit_pace) = (pace(peak), pace(exit));
+        let peak_pace = pace(peak);
+        // Even if the top speed is so slow that it needs no length to be shed.
+        let exit_pace = if exit == 0 { Pace::REST } else { pace(exit) };
         let up = start.abs_diff(peak).min(length);
         let down = (peak - exit).min(length - up);
         let (mut flat, mut down) = (length - up - down, down);
@@ -154,11 +156,6 @@ impl Profile {
         }
         self.phase = Phase::new(limits, self.peak.speed, to.speed, length);
         true
-    }
-
-    /// The length, greatest pace and exit of one that sheds speed from `entry` to rest, or as far as `length` allows.
-    pub(super) fn stop(entry: Pace, length: PathLength) -> (PathLength, Pace, PathLength) {
-        (length.min(entry.stopping_distance), Pace::REST, PathLength::ZERO)
     }
 
     /// The speed at its end.
@@ -226,9 +223,10 @@ mod tests {
         (distance as f64 / 2f64.powi(32), time as f64 / 16.0 / 25e6)
     }
 
+    /// From `entry` on to rest, or as far as `length` allows.
     fn stopping(limits: &Limits, entry: Pace, length: PathLength) -> Profile {
-        let (length, top, exit) = Profile::stop(entry, length);
-        Profile::new(limits, entry, length, top, exit)
+        let length = length.min(entry.stopping_distance);
+        Profile::new(limits, entry, length, entry, PathLength::ZERO)
     }
 
     #[test]

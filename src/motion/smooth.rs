@@ -8,6 +8,10 @@
 //! is bound to where blocks begin or end: acceleration runs on through any number of short ones. At the greatest
 //! speed an interval lasts as long as what is known lets it; a bend that is found later ends it.
 //!
+//! Within an interval acceleration grows evenly until it is at its limit, and stays there. So an interval of the
+//! hardest braking is nowhere behind the braking that was reckoned with. Where braking ends soon, intervals are
+//! shorter, so that speed and acceleration end together.
+//!
 //! An acceleration is told by its *ramp*: for how long the jerk has built it up, in sixteenths of
 //! slices, negative for braking. Then all changes are polynomials in whole numbers.
 
@@ -65,26 +69,87 @@ impl JerkLimit {
         Some(Self { longest: longest - longest % i32::from(limit.slices()), ..limit })
     }
 
-    /// How long an interval is, 8 to 256 slices: a sixteenth of the longest ramp.
+    /// How long an interval is, 8 to 256 slices: a power of two, about a 16th of the longest ramp.
     fn slices(self) -> u16 {
-        (self.longest >> 8).max(8) as u16
+        1 << (self.longest / 170).clamp(8, 256).ilog2()
+    }
+
+    /// How long the interval from there on is. It is shorter where braking ends soon, so that speed
+    /// and acceleration end together, and as long as the ramp is no multiple of a longer one. The
+    /// second value tells whether that is the only reason.
+    fn slices_from(self, state: State) -> (u16, bool) {
+        let ramp = state.ramp.unsigned_abs();
+        let ends_soon = |slices: u16| {
+            let slices = u32::from(slices);
+            state.ramp <= 0
+                && state.speed > 0
+                && slices > (ramp >> 7).max(2)
+                && u64::from(state.speed)
+                    < self.speed_shed(ramp + MOST_GROWTH.unsigned_abs() * slices) * 3 / 2
+        };
+        let mut slices = self.slices();
+        while ends_soon(slices) {
+            slices /= 2;
+        }
+        let mut is_uneven = false;
+        while ramp & u32::from(slices - 1) != 0 {
+            slices /= 2;
+            is_uneven = true;
+        }
+        (slices, is_uneven)
+    }
+
+    /// The speed that is shed while a ramp of braking ends.
+    fn speed_shed(self, ramp: u32) -> u64 {
+        (u64::from(self.jerk.get()) * u64::from(ramp).pow(2)) >> 17
     }
 
     fn jerk(self) -> i64 {
         i64::from(self.jerk.get())
     }
 
-    /// What a ramp that grows from `ramp` by `growth` a slice adds to the speed in so many slices.
+    /// The ramp after so many slices in which it grows from `ramp` by `growth` a slice, until it is
+    /// as long as it may be.
+    fn grown(self, ramp: i32, growth: i32, slices: u16) -> i32 {
+        (ramp + growth * i32::from(slices)).clamp(-self.longest, self.longest)
+    }
+
+    /// What such a ramp adds to the speed.
     fn gain(self, ramp: i32, growth: i32, slices: u16) -> i64 {
         // Below 2^27: without a ramp, intervals may be longer.
-        let slices = i32::from(slices);
-        (self.jerk() * i64::from((2 * ramp + growth * slices) * slices)) >> 13
+        let time = i32::from(slices);
+        let end = ramp + growth * time;
+        let twice_ramp = if end.abs() <= self.longest {
+            (ramp + end) * time
+        } else {
+            self.sums(ramp, growth, time).twice_ramp
+        };
+        (self.jerk() * i64::from(twice_ramp)) >> 13
     }
 
     /// The way that it adds, 2^-32 mm.
     fn gained_way(self, ramp: i32, growth: i32, slices: u16) -> i64 {
-        let (ramp, growth, slices) = (i64::from(ramp), i64::from(growth), i64::from(slices));
-        self.jerk() * (slices * slices * (3 * ramp + growth * slices)) / (6 << 12)
+        let time = i32::from(slices);
+        let end = ramp + growth * time;
+        let six_ways = if end.abs() <= self.longest {
+            i64::from(time * time) * i64::from(2 * ramp + end)
+        } else {
+            self.sums(ramp, growth, time).six_ways
+        };
+        self.jerk() * six_ways / (6 << 12)
+    }
+
+    /// What a ramp comes to that becomes the longest: in the slice in which it does, it grows less.
+    #[inline(never)] // It is rare.
+    fn sums(self, ramp: i32, growth: i32, slices: i32) -> RampSums {
+        let mut sums = RampSums::default();
+        let longest = self.longest * growth.signum();
+        let whole = (longest - ramp).checked_div(growth).unwrap_or(0).clamp(0, slices - 1);
+        let last = ramp + growth * whole;
+        sums.add(ramp, last, whole);
+        sums.add(last, longest, 1);
+        sums.add(longest, longest, slices - whole - 1);
+        sums
     }
 
     /// Speed over jerk, in squares of sixteenths of slices.
@@ -103,7 +168,7 @@ impl JerkLimit {
     /// How far it is, 2^-32 mm, from the speed and ramp of `from` to the speed `to` and no ramp, braking as
     /// hard as the limits let it; to `to` alone, if the ramp of a faster `from` leads on to a slower
     /// speed. If `to` is never passed, nothing of use.
-    fn braking_distance(self, from: State, to: u32) -> u64 {
+    pub(super) fn braking_distance(self, from: State, to: u32) -> u64 {
         let ramp = i64::from(from.ramp);
         let (from, to) = (self.scaled(from.speed) + 1, self.scaled(to));
         // The ramp at which to turn, if none is too long: v - u = (2 peak² - ramp²) / 2.
@@ -135,6 +200,26 @@ impl JerkLimit {
     }
 }
 
+/// What a ramp comes to over some time.
+#[derive(Debug, Default)]
+struct RampSums {
+    /// Twice the sum of the ramp over the slices.
+    twice_ramp: i32,
+    /// Six times the sum of that sum.
+    six_ways: i64,
+}
+
+impl RampSums {
+    /// The ramp goes evenly from one to another in so many slices.
+    #[inline]
+    fn add(&mut self, from: i32, to: i32, slices: i32) {
+        let time = i64::from(slices);
+        self.six_ways +=
+            3 * i64::from(self.twice_ramp) * time + time * time * i64::from(2 * from + to);
+        self.twice_ramp += (from + to) * slices;
+    }
+}
+
 /// How the plan moves at an instant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct State {
@@ -163,7 +248,7 @@ pub(super) struct Interval {
 
 impl Interval {
     fn new(limit: JerkLimit, from: State, growth: i32, slices: u16) -> Self {
-        let last = from.ramp + growth * i32::from(slices);
+        let last = limit.grown(from.ramp, growth, slices);
         let longest = u64::from(from.ramp.unsigned_abs().max(last.unsigned_abs()));
         let acceleration = (u64::from(limit.jerk.get()) * longest) >> 12;
         let is_straight =
@@ -214,11 +299,14 @@ impl Interval {
         self.slices > self.limit.slices()
     }
 
-    /// How the plan moves at the end of the last slice given; within the interval, the ramp is rounded
-    /// down by less than a sixteenth of it.
+    /// Whether the acceleration changes in it, so that it must not be cut short.
+    pub(super) fn changes(&self) -> bool {
+        self.growth != 0
+    }
+
+    /// How the plan moves at the end of the last slice given.
     pub(super) fn state(&self) -> State {
-        let grown = self.from.ramp + i32::from(self.growth) * i32::from(self.done);
-        let ramp = grown - grown.rem_euclid(self.limit.slices().into());
+        let ramp = self.limit.grown(self.from.ramp, self.growth.into(), self.done);
         State { speed: self.speed, ramp: if self.speed == 0 { 0 } else { ramp } }
     }
 
@@ -250,10 +338,11 @@ impl Road<'_, '_> {
     /// If nothing is allowed, it brakes. From rest, if not even the least acceleration is, it
     /// creeps: what is left is less than a start and a stop take.
     pub(super) fn next(&self, from: State) -> Interval {
-        let (jerk, mut slices) = (self.jerk, self.jerk.slices());
-        let bounds =
-            |ramp: i32| ((ramp - from.ramp) / i32::from(slices)).clamp(-MOST_GROWTH, MOST_GROWTH);
-        let (mut least, mut most) = (bounds(-jerk.longest), bounds(jerk.longest));
+        let jerk = self.jerk;
+        let (mut slices, is_uneven) = jerk.slices_from(from);
+        // The hardest braking is as hard as it may be, as soon as it can.
+        let mut least = if from.ramp > -jerk.longest { -MOST_GROWTH } else { 0 };
+        let mut most = MOST_GROWTH.min((jerk.longest - from.ramp) / i32::from(slices));
         if self.allows(from, most, slices) {
             least = most;
         }
@@ -264,6 +353,10 @@ impl Road<'_, '_> {
             } else {
                 most = middle;
             }
+        }
+        // Where it makes the next interval longer, a little less.
+        if is_uneven && least > -MOST_GROWTH && (from.ramp / i32::from(slices) + least) & 1 != 0 {
+            least -= 1;
         }
         if from.speed == 0 && least <= 0 {
             let way = jerk.gained_way(0, 1, slices).unsigned_abs();
@@ -283,7 +376,7 @@ impl Road<'_, '_> {
     /// too fast.
     fn settled(&self, from: State, growth: i32, slices: u16) -> Option<(State, u64)> {
         let speed = i64::from(from.speed) + self.jerk.gain(from.ramp, growth, slices);
-        let ramp = from.ramp + growth * i32::from(slices);
+        let ramp = self.jerk.grown(from.ramp, growth, slices);
         let after = if speed > 0 { State { speed: speed as u32, ramp } } else { State::default() };
         let settled = self.jerk.settled(after);
         (settled <= u64::from(self.top.to_bits())).then_some((after, settled))

@@ -86,6 +86,45 @@ fn plan(targets: &[Target], settings: &Settings) -> Vec<(f64, PagePoint)> {
     moves
 }
 
+/// The maximum acceleration of `runs` as a part of the limit. The runs follow `targets` from the
+/// origin. It is measured over any 5 ms, or over the time needed to determine it to 4 %.
+///
+/// # Panics
+/// Panics if a run leaves the path.
+pub fn acceleration_ratio(runs: &[Run], targets: &[Target], settings: &Settings) -> f64 {
+    let plan = plan(targets, settings);
+    let mut rest = plan.as_slice();
+    let ratios = runs.iter().map(|run| {
+        let places = places_of(run, &mut rest);
+        let limit = acceleration(settings);
+        greatest_acceleration(&run.times, &places, acceleration_window(limit)) / limit
+    });
+    ratios.fold(0.0, f64::max)
+}
+
+/// The acceleration of both axes, in mm/s².
+fn acceleration(settings: &Settings) -> f64 {
+    settings.get(Setting::AccelerationX).min(settings.get(Setting::AccelerationY)).to_num()
+}
+
+/// The window in seconds over which an acceleration (mm/s²) is measured. It suits two speeds, each
+/// of a step of 12.5 µm at 50 mm/s between places that are exact to 4 nm.
+fn acceleration_window(acceleration: f64) -> f64 {
+    f64::max(0.005, 0.064 / (0.04 * acceleration))
+}
+
+/// The places of the moves of `run`, which are the next ones of `plan`.
+///
+/// # Panics
+/// Panics if the run leaves the path.
+fn places_of(run: &Run, plan: &mut &[(f64, PagePoint)]) -> Vec<f64> {
+    let (moves, later) = plan.split_at(run.points.len());
+    *plan = later;
+    let (places, points): (Vec<f64>, Vec<PagePoint>) = moves.iter().copied().unzip();
+    assert_eq!(run.points, points, "off the path");
+    places
+}
+
 /// Checks that `runs` follow `targets` from the origin, from rest to rest between two moves of the
 /// pen. `cut` tells that an alarm ended the last run.
 ///
@@ -94,19 +133,13 @@ fn plan(targets: &[Target], settings: &Settings) -> Vec<(f64, PagePoint)> {
 /// determine it to 4 %, exceeds 1.05 times the limit; if the jerk, where it is limited, exceeds 1.1
 /// times the limit; and if a run does not begin or end at rest.
 pub fn check_speed(runs: &[Run], targets: &[Target], settings: &Settings, cut: bool) {
-    let acceleration: f64 =
-        settings.get(Setting::AccelerationX).min(settings.get(Setting::AccelerationY)).to_num();
+    let acceleration = acceleration(settings);
     let jerk = 1000.0 * settings.get(Setting::Jerk).to_num::<f64>();
     let plan = plan(targets, settings);
     let mut rest = plan.as_slice();
     for (number, run) in runs.iter().enumerate() {
-        let (moves, later) = rest.split_at(run.points.len());
-        rest = later;
-        let (places, points): (Vec<f64>, Vec<PagePoint>) = moves.iter().copied().unzip();
-        assert_eq!(run.points, points, "off the path");
-        // The window suits two speeds, each of a step of 12.5 µm at 50 mm/s between places that are
-        // exact to 4 nm.
-        let window = f64::max(0.005, 0.064 / (0.04 * acceleration));
+        let places = places_of(run, &mut rest);
+        let window = acceleration_window(acceleration);
         let measured = greatest_acceleration(&run.times, &places, window);
         assert!(measured <= 1.05 * acceleration, "run {number}: {measured} mm/s2");
         if jerk > 0.0 {
