@@ -7,6 +7,7 @@ pub use view::ViewArgs;
 use crate::board;
 use crate::fit::{FitError, TOLERANCES};
 use crate::formats;
+use crate::motion_plot::GivenSetting;
 use crate::page::Page;
 use crate::table::BoardRow;
 use clap::{Args, Parser, Subcommand};
@@ -137,6 +138,18 @@ pub struct PreviewArgs {
     /// Write the segments, strokes, lengths and computing times to this file as JSON
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub json: Option<PathBuf>,
+    /// Plot speed, acceleration and jerk over time to this SVG file
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    pub motion: Option<PathBuf>,
+    /// Plot the motion of a machine with this setting, for example 204=20; can be repeated
+    #[arg(
+        long,
+        value_name = "NUMBER=VALUE",
+        value_parser = GivenSetting::parse,
+        requires = "motion",
+        help_heading = "Output"
+    )]
+    pub set: Vec<GivenSetting>,
     /// Compute the drawing this many times and report the shortest time of each stage
     #[arg(
         long,

@@ -8,7 +8,7 @@
 //! [`watch`] follows the pen, [`picture`] renders its path on the [`page`], and [`output`] writes
 //! the files. [`results`] are what is known about a job afterwards.
 //!
-//! [`tape`] records a job as single motor steps. [`words`] translates the plotter's messages into
+//! [`tape`] records a job as single motor steps, and [`motion_plot`] plots its speed. [`words`] translates the plotter's messages into
 //! the terms of the command line.
 
 pub mod board;
@@ -23,6 +23,7 @@ pub mod job;
 pub mod lines;
 pub mod link;
 pub mod machines;
+pub mod motion_plot;
 pub mod output;
 pub mod page;
 pub mod picture;

@@ -6,6 +6,7 @@
 
 use crate::error::Error;
 use crate::link::Link;
+use crate::motion_plot::{self, GivenSetting, Motion};
 use crate::protocol::PLOT;
 use crate::results::{JobResult, Lengths, Timings};
 use crate::watch::PenWatch;
@@ -70,6 +71,22 @@ impl InMemory {
         let settings = *self.plotter.machine().settings();
         let tape = crate::tape::record(settings, &mut self.plotter.strokes());
         tape.map_err(|error| Error::NotDrawn { refusal: CommandError::Machine(error) })
+    }
+
+    /// Records the motion of the drawing, by a machine with the default settings except for those
+    /// given ([`crate::motion_plot`]).
+    ///
+    /// # Errors
+    /// A setting, or the drawing, is refused.
+    pub fn motion(&mut self, given: &[GivenSetting]) -> Result<Motion, Error> {
+        let refused = |refusal| Error::NotDrawn { refusal };
+        let computed = self.plotter.compute(&mut StopWatch::default(), &mut Segments::default());
+        computed.map_err(refused)?;
+        let mut settings = *self.plotter.machine().settings();
+        motion_plot::apply(&mut settings, given)
+            .map_err(|error| refused(CommandError::Setting(error)))?;
+        Motion::record(settings, &mut self.plotter.strokes())
+            .map_err(|error| refused(CommandError::Machine(error)))
     }
 
     /// The results of the last plot command.

@@ -45,10 +45,10 @@ pub fn run(cli: &Cli, interrupt: &AtomicBool) -> Result<String, Error> {
 
 fn plot(args: &PlotArgs, interrupt: &AtomicBool) -> Result<String, Error> {
     let settings = args.view.settings();
-    // The default is the scene that the README shows.
+    // Without a file, a small example is drawn.
     let example = || workspace::root().join("scenes/interpen.obj");
     let file = args.file.clone().unwrap_or_else(example);
-    let outputs = Outputs::of(&args.pictures, None);
+    let outputs = Outputs::of(&args.pictures, None, None);
     if args.port.is_none() {
         output::check(&file, &outputs.files())?;
     }
@@ -81,7 +81,7 @@ fn plot(args: &PlotArgs, interrupt: &AtomicBool) -> Result<String, Error> {
 
 fn preview(args: &PreviewArgs, interrupt: &AtomicBool) -> Result<String, Error> {
     let settings = args.view.settings();
-    let outputs = Outputs::of(&args.pictures, args.json.as_deref());
+    let outputs = Outputs::of(&args.pictures, args.json.as_deref(), args.motion.as_deref());
     output::check(&args.file, &outputs.files())?;
     let job = Job::new(SourceFile::read(&args.file)?, &settings);
     let mut bar = Bar::default();
@@ -101,6 +101,10 @@ fn preview(args: &PreviewArgs, interrupt: &AtomicBool) -> Result<String, Error> 
             source: error.into(),
         })?;
         output::write(path, format!("{text}\n").as_bytes())?;
+        files.push(path);
+    }
+    if let Some(path) = &outputs.motion {
+        output::write(path, plotter.motion(&args.set)?.svg().as_bytes())?;
         files.push(path);
     }
     Ok(summary(&files, report))
@@ -139,7 +143,7 @@ fn encode_tape(args: &TapeEncodeArgs, interrupt: &AtomicBool) -> Result<String, 
 }
 
 fn show_tape(args: &TapeShowArgs) -> Result<String, Error> {
-    let outputs = Outputs::of(&args.pictures, None);
+    let outputs = Outputs::of(&args.pictures, None, None);
     output::check(&args.file, &outputs.files())?;
     let tape = read_tape(&args.file)?;
     let shown = tape::show(&tape, args.page, args.steps);
@@ -181,25 +185,27 @@ struct Outputs {
     svg: Option<PathBuf>,
     png: Option<PathBuf>,
     json: Option<PathBuf>,
+    motion: Option<PathBuf>,
 }
 
 impl Outputs {
-    fn of(pictures: &PictureArgs, json: Option<&Path>) -> Self {
-        let named = Self {
+    fn of(pictures: &PictureArgs, json: Option<&Path>, motion: Option<&Path>) -> Self {
+        let mut named = Self {
             svg: pictures.svg.clone(),
             png: pictures.png.clone(),
             json: json.map(Path::to_owned),
+            motion: motion.map(Path::to_owned),
         };
-        match named {
-            Self { svg: None, png: None, json: None } => {
-                Self { svg: Some("plot.svg".into()), png: Some("plot.png".into()), json: None }
-            }
-            named => named,
+        if named.files().is_empty() {
+            named.svg = Some("plot.svg".into());
+            named.png = Some("plot.png".into());
         }
+        named
     }
 
     fn files(&self) -> Vec<&Path> {
-        [&self.svg, &self.png, &self.json].into_iter().flatten().map(PathBuf::as_path).collect()
+        let all = [&self.svg, &self.png, &self.json, &self.motion];
+        all.into_iter().flatten().map(PathBuf::as_path).collect()
     }
 }
 
