@@ -6,7 +6,7 @@
 use std::path::PathBuf;
 use std::{env, fs, io};
 
-#[path = "src/boards/table.rs"]
+#[path = "src/board_table.rs"]
 #[allow(dead_code, reason = "it needs only the names of the boards and how they are linked")]
 mod table;
 
@@ -20,7 +20,7 @@ fn main() -> io::Result<()> {
     println!("cargo::rerun-if-changed=build.rs");
     println!("cargo::rerun-if-changed=memory.x");
     println!("cargo::rerun-if-changed=boards");
-    println!("cargo::rerun-if-changed=src/boards/table.rs");
+    println!("cargo::rerun-if-changed=src/board_table.rs");
     if env::var("CARGO_CFG_TARGET_OS").as_deref() != Ok("none") {
         return Ok(());
     }

@@ -12,7 +12,7 @@ mod mps2;
 use cortex_m_semihosting::{debug, hprintln};
 use mps2::Counter;
 use panic_semihosting as _;
-use penup::boards::table::PICO;
+use penup::board_table::PICO;
 use penup::machine::PulserState;
 use penup::motion::{EventQueue, StepEvent};
 use penup::plotter::{Board, EMPTY_LOOKAHEAD, Memory, Plotter, Unobserved};

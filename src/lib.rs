@@ -42,6 +42,7 @@
 extern crate std;
 
 pub mod array;
+pub mod board_table;
 pub mod checksum;
 pub mod fixed;
 pub mod host_only;
@@ -62,10 +63,8 @@ pub mod storage;
 pub mod protocol;
 pub mod plotter;
 
-/// The table of the boards, and the board made of plain memory. The code of those made of silicon
-/// belongs to the firmware binary.
+/// The board made of plain memory. The code of those made of silicon belongs to the firmware binary.
 pub mod boards {
     #[cfg(feature = "host")]
     pub mod host;
-    pub mod table;
 }

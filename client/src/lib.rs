@@ -39,4 +39,4 @@ pub mod watch;
 pub mod words;
 pub mod workspace;
 
-use penup::boards::table;
+use penup::board_table as table;

@@ -3,7 +3,7 @@
 //!
 //!     cargo run -p penup-host-tests --example spiral > spiral.obj
 
-use penup::boards::table::PICO;
+use penup::board_table::PICO;
 use penup_client::emulator::Pin;
 use penup_host_tests::spiral;
 use penup_host_tests::step_edges::{Edge, planned};

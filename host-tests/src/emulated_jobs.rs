@@ -1,7 +1,7 @@
 //! Runs whole jobs on emulated boards and the same jobs on the host.
 
 use crate::whole_jobs::{Bench, job_lines, machine_events};
-use penup::boards::table::{BoardRow, LM3S6965, PICO};
+use penup::board_table::{BoardRow, LM3S6965, PICO};
 use penup::motion::Block;
 use penup::plotter::{Memory, MemorySlices};
 use penup_client::emulator::{self, EmulatedBoard, Machine, MachineEventKind};

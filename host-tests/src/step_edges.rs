@@ -1,8 +1,8 @@
 //! The times at which the step pins rise and fall, as planned and on an emulated board.
 
 use crate::emulated_jobs::bench_like;
+use penup::board_table::BoardRow;
 use penup::boards::host::{Change, Stamped};
-use penup::boards::table::BoardRow;
 use penup_client::emulator::{Pin, PinChange};
 use std::time::Duration;
 

@@ -1,7 +1,7 @@
 //! Tests the largest scene that the Raspberry Pi Pico must hold, from its upload to the last step.
 #![cfg(feature = "emulator")]
 
-use penup::boards::table::PICO;
+use penup::board_table::PICO;
 use penup_client::emulator::{EmulatedBoard, Pico, PicoByUsb, image_path};
 use penup_host_tests::emulated_jobs::{
     Line, assert_same_as_on_the_host, begin_on, events_until_idle,

@@ -1,7 +1,7 @@
 //! Tests the Raspberry Pi Pico through a loss of power and with a hanging program.
 #![cfg(feature = "emulator")]
 
-use penup::boards::table::PICO;
+use penup::board_table::PICO;
 use penup_client::emulator::{
     EmulatedBoard, Machine, MachineEventKind, Pico, PicoByUsb, image_path,
 };

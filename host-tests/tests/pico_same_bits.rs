@@ -2,7 +2,7 @@
 //! one, to those of the library on the host.
 #![cfg(feature = "emulator")]
 
-use penup::boards::table::PICO;
+use penup::board_table::PICO;
 use penup_host_tests::emulated_jobs::{
     PEN_ON_A_MOTOR, assert_same_as_on_the_host, begin, compare, events_until_idle, give_up,
     stop_at_once,

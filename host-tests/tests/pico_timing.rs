@@ -2,7 +2,7 @@
 //! time, exact to the cycle, at any speed.
 #![cfg(feature = "emulator")]
 
-use penup::boards::table::PICO;
+use penup::board_table::PICO;
 use penup_host_tests::emulated_jobs::{Line, begin, begin_on};
 use penup_host_tests::spiral;
 use penup_host_tests::step_edges::{Edge, HALF_A_MILLION, assert_in_time, of_changes, planned};

@@ -1,7 +1,7 @@
 //! Tests a delayed main loop: the Pico loses no step, brakes along the path, and continues.
 #![cfg(feature = "emulator")]
 
-use penup::boards::table::PICO;
+use penup::board_table::PICO;
 use penup_client::emulator::{self, EmulatedBoard, Pin, PinChange, image_path};
 use penup_host_tests::emulated_jobs::{Line, begin_on};
 use penup_host_tests::event_checker::greatest_acceleration;

@@ -1,7 +1,7 @@
 //! Tests USB, the Raspberry Pi Pico's second serial port.
 #![cfg(feature = "emulator")]
 
-use penup::boards::table::PICO;
+use penup::board_table::PICO;
 use penup_client::emulator::{EmulatedBoard, Pico, PicoByUsb, image_path};
 use penup_host_tests::emulated_jobs::{
     Line, assert_same_as_on_the_host, begin_on, events_until_idle,

@@ -2,7 +2,7 @@
 //! the LM3S6965 have their planned times.
 #![cfg(feature = "emulator")]
 
-use penup::boards::table::LM3S6965;
+use penup::board_table::LM3S6965;
 use penup_host_tests::emulated_jobs::begin;
 use penup_host_tests::step_edges::{assert_in_time, of_changes, planned};
 use penup_host_tests::whole_jobs::job_lines;

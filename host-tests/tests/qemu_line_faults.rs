@@ -3,7 +3,7 @@
 #![cfg(feature = "emulator")]
 #![allow(clippy::expect_used, reason = "a test fails with the words of what it expected")]
 
-use penup::boards::table::LM3S6965;
+use penup::board_table::LM3S6965;
 use penup_client::lines::JobLine;
 use penup_client::link::Link;
 use penup_client::machines::{WatchedPlotter, emulate};

@@ -1,7 +1,7 @@
 //! Tests that the emulated board asks for each pen and waits for it.
 #![cfg(feature = "emulator")]
 
-use penup::boards::table::LM3S6965;
+use penup::board_table::LM3S6965;
 use penup_host_tests::emulated_jobs::begin;
 use std::error::Error;
 

@@ -3,7 +3,7 @@
 #![cfg(feature = "emulator")]
 
 use clap::Parser as _;
-use penup::boards::table::LM3S6965;
+use penup::board_table::LM3S6965;
 use penup_client::cli::Cli;
 use penup_client::run::run;
 use penup_client::workspace;

@@ -3,7 +3,7 @@
 //! Each board implements [`penup::plotter::Board`]. The boards' modules are the only ones with
 //! `unsafe` code, and each such block states the contract that it meets. `take` returns the board
 //! that the firmware is built for; it works only once. The board's clock, pins and capacities are
-//! those of its row in the library's table, [`penup::boards::table`].
+//! those of its row in the library's table, [`penup::board_table`].
 
 mod fault;
 #[allow(dead_code, reason = "not every board needs all of it")]

@@ -4,7 +4,7 @@
 //! a job need. The library does not compile if that exceeds the board's working memory.
 
 use super::memory::Memory;
-use crate::boards::table::{BOARDS, BoardRow};
+use crate::board_table::{BOARDS, BoardRow};
 use crate::drawing::{PackedLine, PagePoint, Segment};
 use crate::geometry::Vertex;
 use crate::model::{Corner, Position};

@@ -1,7 +1,7 @@
 //! The large memory of a plotter. The table of the boards has the capacities of each:
-//! [`crate::boards::table`].
+//! [`crate::board_table`].
 
-use crate::boards::table::BOARDS;
+use crate::board_table::BOARDS;
 use crate::model::{Corner, Position};
 use crate::motion::Block;
 use crate::protocol::LineReader;

@@ -31,7 +31,7 @@ mod workspace;
 #[path = "../../client/src/board.rs"]
 mod board;
 // The table belongs to the library, which is large; the table depends on nothing.
-#[path = "../../src/boards/table.rs"]
+#[path = "../../src/board_table.rs"]
 mod table;
 
 use std::io::Write as _;

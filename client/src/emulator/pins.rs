@@ -1,7 +1,7 @@
 //! The output pins of a board, and how their changes translate into actions of the machine.
 
+use penup::board_table::Pins;
 use penup::boards::host::{Change, Stamped};
-use penup::boards::table::Pins;
 use std::time::Duration;
 
 /// An output pin of the plotter.

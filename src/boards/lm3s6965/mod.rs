@@ -43,7 +43,7 @@ use core::sync::atomic::{AtomicBool, Ordering};
 
 use cortex_m::interrupt;
 use cortex_m::peripheral::Peripherals;
-use penup::boards::table::{self, BoardRow};
+use penup::board_table::{self as table, BoardRow};
 use penup::machine::{Contacts, PulserState};
 use penup::motion::{Block, EventQueue};
 use penup::plotter::{Board, Memory, MemorySlices};

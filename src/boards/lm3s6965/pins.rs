@@ -3,7 +3,7 @@
 use core::convert::Infallible;
 
 use embedded_hal::digital::{ErrorType, OutputPin};
-use penup::boards::table::Pins;
+use penup::board_table::Pins;
 use penup::machine::{Axes, PinOrder};
 
 use super::registers::{GPIO_B, SYSTEM_CONTROL};

@@ -39,7 +39,7 @@ mod words;
 mod z_axis;
 
 use cortex_m::peripheral::Peripherals as Core;
-use penup::boards::table::{self, BoardRow};
+use penup::board_table::{self as table, BoardRow};
 use penup::machine::{Contacts, PulserState};
 use penup::motion::{Block, EventQueue};
 use penup::plotter::{Board, Memory, MemorySlices, NotStored, Record, Stored};

@@ -1,6 +1,6 @@
 //! Assigns the pins to their functions. The table of the boards has the pins of the machine.
 
-use penup::boards::table::Pins;
+use penup::board_table::Pins;
 use rp2040_hal::gpio::{DynBankId, DynFunction, DynPinId, DynPullType, DynSioConfig, new_pin};
 
 const PINS: Pins = super::ROW.pins;

@@ -3,7 +3,7 @@
 //!
 //! The firmware of a board takes its clock, pins and capacities from its row; the build script the
 //! feature and the memory map; `xtask` target, profile, budget and checks; `penup` the emulator and
-//! what its pins mean. A new board is a new row of [`BOARDS`] and a folder beside this file: see
+//! what its pins mean. A new board is a new row of [`BOARDS`] and a folder in `src/boards`: see
 //! `docs/porting.md`.
 //!
 //! The file depends on nothing, because the build script includes it.
