@@ -83,7 +83,7 @@ impl JerkLimit {
             let slices = u32::from(slices);
             state.ramp <= 0
                 && state.speed > 0
-                && slices > (ramp >> 7).max(2)
+                && slices > (ramp >> 8).max(2)
                 && u64::from(state.speed)
                     < self.speed_shed(ramp + MOST_GROWTH.unsigned_abs() * slices) * 3 / 2
         };
