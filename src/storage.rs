@@ -13,8 +13,7 @@
 //! order: a mark, a sequence number, the length of the payload in bytes, and the CRC-32 of these
 //! three and the payload.
 
-use crate::checksum::CRC_32;
-use crc::{Digest, Table};
+use crate::checksum::Crc32;
 use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
 
 /// The unit in which flash is written, in bytes.
@@ -122,7 +121,7 @@ impl Slots {
             length: 0,
             erased: F::ERASE_SIZE as u32,
             page: [0xFF; PAGE_BYTES],
-            digest: CRC_32.digest(),
+            digest: Crc32::new(),
         })
     }
 
@@ -153,7 +152,7 @@ impl Slots {
         }
         let at = self.begin(slot) + PAGE_BYTES as u32;
         let mut payload = Reader { flash, at, left: length };
-        let mut digest = CRC_32.digest();
+        let mut digest = Crc32::new();
         let mut piece = [0; 64];
         loop {
             match payload.read(&mut piece) {
@@ -176,7 +175,7 @@ fn words(header: [u8; HEADER_BYTES]) -> [u32; 4] {
 }
 
 /// The checksum of a payload and its header. `digest` has processed the payload.
-fn total(mut digest: Digest<'_, u32, Table<1>>, sequence: u32, length: u32) -> u32 {
+fn total(mut digest: Crc32, sequence: u32, length: u32) -> u32 {
     for word in [MARK, sequence, length] {
         digest.update(&word.to_le_bytes());
     }
@@ -224,7 +223,7 @@ pub struct Writer<'f, F> {
     /// Number of bytes that are erased, from the slot's beginning on.
     erased: u32,
     page: [u8; PAGE_BYTES],
-    digest: Digest<'static, u32, Table<1>>,
+    digest: Crc32,
 }
 
 impl<F> core::fmt::Debug for Writer<'_, F> {

@@ -1,7 +1,7 @@
 //! Computes a checksum of a model, so that a sender can compare it with what it sent.
 
 use super::{Element, FINEST_FRACTION_BITS, Model};
-use crate::checksum::CRC_32;
+use crate::checksum::Crc32;
 
 impl Model<'_> {
     /// Returns the CRC-32 of the model: of the vertices; of the bars, faces and completed curves,
@@ -23,7 +23,7 @@ impl Model<'_> {
     // Not inlined, so that its stack frame is not below those of the stages.
     #[inline(never)]
     pub fn checksum(&self) -> u32 {
-        let mut digest = CRC_32.digest();
+        let mut digest = Crc32::new();
         let mut number = |number: u32| digest.update(&number.to_le_bytes());
         number(self.vertices.len() as u32);
         let shift = FINEST_FRACTION_BITS - self.fraction_bits;

@@ -13,7 +13,7 @@ pub use row::{Flag, PlotOption};
 pub use table::OPTIONS;
 pub use values::{HiddenLines, ProjectionChoice, VisibilityMode};
 
-use crate::checksum::CRC_32;
+use crate::checksum::Crc32;
 use crate::drawing::{Page, StepsPerMillimetre, Title, TitleText};
 use crate::fixed::{Decimal, Millimetres, sin_cos_degrees};
 use crate::geometry::Precision;
@@ -23,7 +23,6 @@ use crate::protocol::{CommandError, EscapedText, number};
 use crate::view::{Camera, Direction, Pose, View};
 use crate::visibility::{self, Crease};
 use core::fmt::{self, Write};
-use crc::{Digest, Table};
 
 /// The options of a plot. `None` leaves the choice to penup.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -180,7 +179,7 @@ impl PlotOptions {
     /// have equal checksums.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub fn checksum(&self) -> u32 {
-        let mut sum = Sum(CRC_32.digest());
+        let mut sum = Sum(Crc32::new());
         for line in self.lines() {
             // Writing to a checksum cannot fail.
             let _ = writeln!(sum, "{line}");
@@ -218,7 +217,7 @@ fn set_precision(options: &mut PlotOptions, text: &str) -> Result<(), CommandErr
 }
 
 /// A writer that only computes the checksum of its text.
-struct Sum(Digest<'static, u32, Table<1>>);
+struct Sum(Crc32);
 
 impl Write for Sum {
     fn write_str(&mut self, text: &str) -> fmt::Result {
