@@ -6,6 +6,7 @@
 
 use super::overlap::{NumberedLine, Rank, ink_once};
 use super::{Drawing, LineType, PAGE_LIMIT, PagePoint, Segment};
+use crate::array::MapEach;
 use crate::model::PEN_LIMIT;
 use crate::stage::{
     Aborted, Cancel, OutOfScratch, Scratch, StageError, heap_sort_cancellable, items, items_mut,
@@ -87,7 +88,7 @@ impl PackedLine {
     pub fn ends(self) -> [PagePoint; 2] {
         let [low, middle, high] = self.0.map(u64::from);
         let low = low | middle << 32;
-        [low, low >> 42 | high << 22].map(|packed| {
+        [low, low >> 42 | high << 22].map_each(|packed| {
             let coordinate = |shift: u32| ((packed >> shift) as i32 & 0x1F_FFFF) - PAGE_LIMIT;
             PagePoint { x: coordinate(0), y: coordinate(21) }
         })

@@ -7,6 +7,7 @@
 //! needed.
 
 use super::{LineType, PagePoint};
+use crate::array::MapEach;
 use crate::fixed::product;
 use crate::stage::{Cancel, OutOfScratch, StageError, heap_sort_cancellable};
 use bytemuck::{Pod, Zeroable};
@@ -47,7 +48,7 @@ pub(super) struct Rank(u32);
 impl Rank {
     pub(super) fn new(line_type: LineType, yields: bool, pen: u8) -> Self {
         let [precedence, code, pen] =
-            [line_type.precedence(), line_type.code(), pen].map(u32::from);
+            [line_type.precedence(), line_type.code(), pen].map_each(u32::from);
         Self(u32::from(yields) << 24 | precedence << 16 | code << 8 | pen)
     }
 
@@ -227,7 +228,7 @@ struct End {
 
 impl End {
     fn both(segment: &NumberedLine, points: &[PagePoint]) -> [Self; 2] {
-        [segment.ends >> 16, segment.ends & 0xFFFF].map(|number| {
+        [segment.ends >> 16, segment.ends & 0xFFFF].map_each(|number| {
             let position = points.get(number as usize).map_or((0, 0), |point| (point.x, point.y));
             Self { position, number }
         })

@@ -25,12 +25,12 @@ pub enum PageError {
     TooManySteps,
     /// A plan at true size is larger than the free part of the page.
     DoesNotFit {
-        /// Size of the plan along x, in units of 2^-16 mm.
-        width: i64,
-        /// Size of the plan along y, in units of 2^-16 mm.
-        height: i64,
-        /// Size of the area for its title along y, in units of 2^-16 mm.
-        foot: i64,
+        /// Size of the plan along x, in 0.1 mm. The greatest value stands for all larger ones.
+        width: u32,
+        /// Size of the plan along y, in 0.1 mm. The greatest value stands for all larger ones.
+        height: u32,
+        /// Size of the area for its title along y, in mm.
+        foot: Millimetres,
     },
     /// The title is wider than the free part of the page.
     TitleTooWide {

@@ -200,9 +200,10 @@ impl PageMap {
         let to_page = |value: i64| (i128::from(value) << 16) >> fraction_bits;
         let size = [0, 1].map(|axis: usize| to_page(bounds.high[axis] - bounds.low[axis]));
         if size[0] > i128::from(free[0]) || size[1] > i128::from(free[1]) {
-            let [width, height] = size.map(|size| size as i64);
-            let foot = page.foot.to_bits().into();
-            return Err(PageError::DoesNotFit { width, height, foot });
+            // Of 2^-16 mm, rounded.
+            let tenths = |size: i128| u32::try_from((10 * size as i64 + (1 << 15)) >> 16);
+            let [width, height] = size.map(|size| tenths(size).unwrap_or(u32::MAX));
+            return Err(PageError::DoesNotFit { width, height, foot: page.foot });
         }
         let moved = [0, 1].map(|axis: usize| {
             let (low, high) = (to_page(bounds.low[axis]), to_page(bounds.high[axis]));
@@ -405,10 +406,9 @@ mod tests {
 
     #[test]
     fn a_plan_too_large_is_refused_with_its_size() {
-        let size = |mm: i64| mm << 16;
         assert_eq!(
             true_size([[0, 0], [191, 5]], &a4()),
-            Err(PageError::DoesNotFit { width: size(191), height: size(5), foot: 0 })
+            Err(PageError::DoesNotFit { width: 1910, height: 50, foot: Millimetres::ZERO })
         );
         let positions = plan([[0, 0], [380, 5]]);
         let bounds = Bounds::around_plan(positions.into_iter()).unwrap();

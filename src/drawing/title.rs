@@ -11,6 +11,7 @@
 //! middle of the letter.
 
 use super::{PAGE_LIMIT, PagePoint, StepsPerMillimetre};
+use crate::array::MapEach;
 use crate::fixed::{Millimetres, divide_rounding};
 use core::cmp::Ordering;
 
@@ -226,7 +227,8 @@ impl Glyph {
     /// Finds a letter in the font by binary search.
     fn find(letter: char) -> Option<Self> {
         let line = |at: usize| {
-            let [start, end] = [STARTS.get(at)?, STARTS.get(at + 1)?].map(|at| usize::from(*at));
+            let [start, end] =
+                [STARTS.get(at)?, STARTS.get(at + 1)?].map_each(|at| usize::from(*at));
             FONT.get(start..end)
         };
         let (mut low, mut high) = (0, GLYPHS);

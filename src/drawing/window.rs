@@ -4,6 +4,7 @@
 //! [`PageMap::fit_field`](super::PageMap::fit_field).
 
 use super::{Page, PagePoint, StepsPerMillimetre};
+use crate::array::MapEach;
 use crate::curve::Fine;
 use crate::fixed::{divide_rounding, product};
 
@@ -24,15 +25,15 @@ impl Window {
         let far = [page.width, page.height]
             .map(|side| i64::from(side.to_bits()) - i64::from(page.margin.to_bits()));
         Self {
-            low: [0, 1].map(|axis: usize| to_fine(page.first(axis), axis)),
-            high: [0, 1].map(|axis: usize| to_fine(far[axis], axis)),
+            low: [0, 1].map_each(|axis: usize| to_fine(page.first(axis), axis)),
+            high: [0, 1].map_each(|axis: usize| to_fine(far[axis], axis)),
         }
     }
 
     /// Returns the part of a line that is inside the window, in steps (Liang and Barsky, 1984), or
     /// `None` if no part is. Coordinates must be within ±2^40.
     pub fn clip(&self, [from, to]: [Fine; 2]) -> Option<[PagePoint; 2]> {
-        let along = [0, 1].map(|axis: usize| to[axis] - from[axis]);
+        let along = [0, 1].map_each(|axis: usize| to[axis] - from[axis]);
         // The parameters at which the line enters and leaves, as ratios of numbers below 2^42.
         let (mut enter, mut leave) = ((0, 1), (1, 1));
         let later = |a: (i64, i64), b: (i64, i64)| product(a.0, b.1) > product(b.0, a.1);
@@ -57,7 +58,7 @@ impl Window {
             return None;
         }
         let at = |(part, whole): (i64, i64)| {
-            let [x, y] = [0, 1].map(|axis: usize| {
+            let [x, y] = [0, 1].map_each(|axis: usize| {
                 let moved = product(along[axis], part) + product(from[axis], whole);
                 divide_rounding(moved, i128::from(whole) << 8) as i32
             });

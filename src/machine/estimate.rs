@@ -1,6 +1,7 @@
 //! Estimates the duration of a job.
 
 use super::{JobSize, Setting, Settings, Tool};
+use crate::array::MapEach;
 
 /// The time, in milliseconds, that a job of this size would take if all speeds were reached at
 /// once.
@@ -42,7 +43,8 @@ pub(super) struct Estimate {
 impl Estimate {
     /// Adds a move by `delta` steps that is `length` long (2^-18 mm).
     pub(super) fn add(&mut self, settings: &Settings, delta: (i32, i32), inked: bool, length: u64) {
-        let [(ax, ay), (bx, by)] = [self.delta, delta].map(|(x, y)| (i64::from(x), i64::from(y)));
+        let [(ax, ay), (bx, by)] =
+            [self.delta, delta].map_each(|(x, y)| (i64::from(x), i64::from(y)));
         let (along, across) = (ax * bx + ay * by, ax * by - ay * bx);
         // A turn by more than 20 degrees counts as a corner.
         if self.inked != inked || 8 * across.abs() > 3 * along {
@@ -65,7 +67,7 @@ impl Estimate {
     fn end_part(&mut self, settings: &Settings) {
         let speed = if self.inked { Setting::DrawSpeed } else { Setting::TravelSpeed };
         let acceleration = [Setting::AccelerationX, Setting::AccelerationY];
-        let acceleration = acceleration.map(|setting| settings.positive_bits(setting));
+        let acceleration = acceleration.map_each(|setting| settings.positive_bits(setting));
         let acceleration = acceleration[0].min(acceleration[1]);
         let per_second = settings.positive_bits(speed) / 60;
         self.milliseconds += rest_to_rest(self.length >> 2, per_second, acceleration);

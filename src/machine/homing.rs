@@ -189,7 +189,8 @@ impl Machine<'_> {
     /// emergency stop raises an alarm in any state. The limit switches are passed on to
     /// [`Machine::watch`].
     pub fn observe(&mut self, contacts: Contacts) {
-        self.contacts = contacts.pressed(self.settings.get(Setting::InvertContacts).to_num());
+        let inverted = self.settings.whole(Setting::InvertContacts) as u8; // at most 7
+        self.contacts = contacts.pressed(inverted);
         let is_known = matches!(self.activity, Activity::Alarm(Alarm::EmergencyStop));
         if self.contacts.stop && !is_known {
             self.alarm(Alarm::EmergencyStop);

@@ -304,7 +304,7 @@ impl<'m> Machine<'m> {
     fn configure_pulser(&mut self) {
         self.pins.configure(
             self.settings.microseconds_as_ticks(Setting::StepPulse),
-            self.settings.get(Setting::InvertDirections).saturating_to_num(),
+            self.settings.whole(Setting::InvertDirections) as u8, // at most 7
         );
         let rule = self.settings.brake(self.pins.queue());
         self.runner.set_brake(rule);

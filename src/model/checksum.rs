@@ -1,6 +1,7 @@
 //! Computes a checksum of a model, so that a sender can compare it with what it sent.
 
 use super::{Element, FINEST_FRACTION_BITS, Model};
+use crate::array::MapEach;
 use crate::checksum::Crc32;
 
 impl Model<'_> {
@@ -38,7 +39,7 @@ impl Model<'_> {
         for (element, pen) in self.elements().iter_with_pens() {
             number(pen.into());
             match element {
-                Element::Bar(from, to) => [2, from.into(), to.into()].map(&mut number),
+                Element::Bar(from, to) => [2, from.into(), to.into()].map_each(&mut number),
                 Element::Face(corners) => {
                     // A face has three corners or more.
                     number(corners.len() as u32);
@@ -50,14 +51,14 @@ impl Model<'_> {
         number(self.curves.count as u32);
         for curve in self.curves().iter() {
             let knots = curve.knots.count().unwrap_or(0);
-            let counts = [curve.control.len(), knots].map(|count| count as u32);
+            let counts = [curve.control.len(), knots].map_each(|count| count as u32);
             for head in [curve.pen.into(), curve.order.into(), counts[0], counts[1]] {
                 digest.update(&u32::to_le_bytes(head));
             }
             for control in curve.control {
                 digest.update(&u32::from(*control).to_le_bytes());
             }
-            let ends = [curve.from, curve.to].map(|end| i64::from(end.to_bits()));
+            let ends = [curve.from, curve.to].map_each(|end| i64::from(end.to_bits()));
             for value in ends.into_iter().chain((0..knots).map(|knot| curve.knots.get(knot))) {
                 digest.update(&value.to_le_bytes());
             }

@@ -23,6 +23,7 @@ pub use elements::{Corner, Element, Elements, VERTEX_NUMBER_LIMIT};
 pub use error::ModelError;
 pub use pens::{PEN_LIMIT, PenName, PenRun, PenWriter, Pens};
 
+use crate::array::MapEach;
 use crate::fixed::Decimal;
 use bytemuck::{Pod, Zeroable};
 use curves::CurveList;
@@ -233,7 +234,7 @@ impl<'m> Model<'m> {
                 })
             })
             .ok_or(ModelError::CoordinateTooLarge)?;
-        let [x, y, z] = coordinates.map(|coordinate| {
+        let [x, y, z] = coordinates.map_each(|coordinate| {
             // It is in range, because the search above tried it.
             coordinate
                 .to_binary_truncated(fraction_bits)

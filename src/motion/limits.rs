@@ -150,7 +150,11 @@ impl Limits {
             top: PathLength::ZERO,
             acceleration: slice_acceleration(settings.acceleration_mm_per_s2),
             jerk: None,
-            junction_deviation: settings.junction_deviation_mm.wrapping_to_num(),
+            junction_deviation: {
+                // At most 1 mm; a unit of it is four units of the length.
+                let deviation = settings.junction_deviation_mm.to_bits().unsigned_abs();
+                PathLength::from_bits(deviation << 2)
+            },
             centripetal: settings.centripetal,
             rounding: rounding(step_length),
             pulse_ticks: settings.pulse_ticks.max(1),

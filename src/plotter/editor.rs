@@ -5,6 +5,7 @@
 
 use super::stream::{Listing, Task};
 use super::{Board, Inner, Job, Reply};
+use crate::array::MapEach;
 use crate::fixed::BinaryFraction;
 use crate::machine::State;
 use crate::model::{Change, Edit, Element, ElementKind, Model, Numbers};
@@ -113,7 +114,7 @@ impl<'m> Inner<'m> {
             ElementKind::Vertices => {
                 let Some(vertex) = self.model.vertices().get(at) else { return };
                 let fraction_bits = self.model.fraction_bits();
-                let [x, y, z] = vertex.coordinates().map(|c| BinaryFraction {
+                let [x, y, z] = vertex.coordinates().map_each(|c| BinaryFraction {
                     units: c.into(),
                     fraction_bits,
                     places: 6,

@@ -3,6 +3,7 @@
 //! A plan needs no projection. It is laid on the page as it is, at true size or scaled to fit.
 
 use super::job::{Collector, FOR_BOUNDS, Found, HALF_A_STEP, Pipeline, union};
+use crate::array::MapEach;
 use crate::curve::{FRACTION_BITS, Point};
 use crate::drawing::{Bounds, LineType, PackedLine, PageMap};
 use crate::model::{Element, Position};
@@ -46,16 +47,18 @@ pub(super) fn lay_out(pipeline: &mut Pipeline<'_>) -> Result<Found, CommandError
     let mut collector = Collector::new(words);
     let mut draw = |from: Point, to: Point, pen: u8| {
         let pen = if options.one_pen { 0 } else { pen };
-        let on_plan = |[x, y, _]: Point| [x, y].map(|c| f64::from(c) * unit);
+        let on_plan = |[x, y, _]: Point| [x, y].map_each(|c| f64::from(c) * unit);
         observer.plan_bar(on_plan(from), on_plan(to), pen);
-        let [from, to] = [from, to].map(|[x, y, _]| map.point(x.into(), y.into(), 1));
+        let [from, to] = [from, to].map_each(|[x, y, _]| map.point(x.into(), y.into(), 1));
         collector
             .line(PackedLine::new(from, to, LineType::Full, pen))
             .map_err(|SinkFull| collector.missing())
     };
     for (element, pen) in model.elements().iter_with_pens() {
         let Element::Bar(from, to) = element else { continue };
-        if let [Some(from), Some(to)] = [from, to].map(|number| points.get(usize::from(number))) {
+        if let [Some(from), Some(to)] =
+            [from, to].map_each(|number| points.get(usize::from(number)))
+        {
             draw(*from, *to, pen).map_err(CommandError::DrawingTooLarge)?;
         }
     }

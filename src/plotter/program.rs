@@ -1,6 +1,7 @@
 //! The G-code interpreter: it turns a line of G-code into an order for the machine, given the modes
 //! that earlier lines have set.
 
+use crate::array::MapEach;
 use crate::drawing::{PAGE_LIMIT, PagePoint, StepsPerMillimetre};
 use crate::fixed::{Decimal, Millimetres, divide_rounding, half, product};
 use crate::machine::Machine;
@@ -243,7 +244,7 @@ fn center_of_radius(
     // Lengths are in units of 2^-15 mm, below 2^30; so differences are below 2^31 and squares below
     // 2^62.
     let halved = |length: Millimetres| i64::from(length.to_bits()) / 2;
-    let [dx, dy] = [0, 1].map(|axis| halved(to[axis]) - halved(from[axis]));
+    let [dx, dy] = [0, 1].map_each(|axis| halved(to[axis]) - halved(from[axis]));
     let distance = (dx * dx + dy * dy).unsigned_abs();
     let wide = 2 * halved(radius).unsigned_abs();
     let length = distance.isqrt();

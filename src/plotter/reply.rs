@@ -1,6 +1,7 @@
 //! The replies to the user, written to the board as lines.
 
 use super::Board;
+use crate::array::MapEach;
 use crate::checksum::CRC_16;
 use crate::fixed::BinaryFraction;
 use crate::machine::Value;
@@ -25,7 +26,7 @@ impl<B: Board + ?Sized> Reply<'_, B> {
 
     /// Writes the position, in mm, as Grbl's status report gives it.
     pub fn position(&mut self, position: [Value; 2]) {
-        let [x, y] = position.map(|mm| BinaryFraction {
+        let [x, y] = position.map_each(|mm| BinaryFraction {
             units: mm.to_bits().into(),
             fraction_bits: 16,
             places: 3,

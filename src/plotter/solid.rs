@@ -3,6 +3,7 @@
 
 use super::job::{Collector, Found, PageSink, Pipeline, move_to_front, union};
 use super::{HiddenLines, VisibilityMode};
+use crate::array::MapEach;
 use crate::convex::{self, EdgeVisibility, Eye, SinkFull, SolidEdge, SolidError, SolidSink};
 use crate::drawing::{Bounds, PageMap};
 use crate::model::Corner;
@@ -53,7 +54,7 @@ pub(super) fn project(pipeline: &mut Pipeline<'_>) -> Result<Found, CommandError
     let (edge_words, line_words) = words.split_at_mut(Scratch::bytes_for::<[u16; 2]>(most) / 8);
     let edges: &[[u16; 2]] = items_mut(edge_words, most).unwrap_or(&mut []);
     let on_view = |ends: &[u16; 2]| {
-        let [p, q] = ends.map(|number| model.vertices().get(usize::from(number)));
+        let [p, q] = ends.map_each(|number| model.vertices().get(usize::from(number)));
         view.clip_edge([view.vertex(*p?), view.vertex(*q?)])
     };
     let all = || {

@@ -1,7 +1,7 @@
 //! Parses lines into typed commands.
 
 use super::edit::parse_edit;
-use super::values::{Decimals, PENS, coordinates, number, split_word, whole};
+use super::values::{Decimals, PENS, coordinates, number, split_word, trim, trim_start, whole};
 use super::{CommandError, GCode, Numbers};
 use crate::curve::CurveError;
 use crate::fixed::Decimal;
@@ -150,9 +150,9 @@ impl<'a> Command<'a> {
         if let Some(value) = title(line) {
             return Ok(Self::Assign { name: "title", value });
         }
-        let line = line.split('#').next().unwrap_or("").trim();
+        let line = trim(line.split('#').next().unwrap_or(""));
         if let Some(dollar) = line.strip_prefix('$') {
-            return Self::parse_dollar(dollar.trim());
+            return Self::parse_dollar(trim(dollar));
         }
         if GCode::begins(line) {
             return GCode::new(line).map(Self::GCode);
@@ -166,7 +166,7 @@ impl<'a> Command<'a> {
             "v" => Ok(Self::Vertex(coordinates(rest)?)),
             "f" => Numbers::new(rest).map(Self::Face),
             "l" => Numbers::new(rest).map(Self::Polyline),
-            "cstype" if rest.trim() == "bspline" => Ok(Self::Nothing),
+            "cstype" if trim(rest) == "bspline" => Ok(Self::Nothing),
             "cstype" => Err(CommandError::NotAChoice { choices: &["bspline"] }),
             "deg" => match whole(rest)? {
                 degree @ 1..=5 => Ok(Self::Degree(degree as u8)),
@@ -186,7 +186,7 @@ impl<'a> Command<'a> {
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     fn parse_dollar(text: &'a str) -> Result<Self, CommandError> {
         if let Some((name, value)) = text.split_once('=') {
-            let (name, value) = (name.trim(), value.trim());
+            let (name, value) = (trim(name), trim(value));
             if let Some(command) = parse_edit(name, value)? {
                 return Ok(command);
             }
@@ -219,8 +219,8 @@ impl<'a> Command<'a> {
 /// other lines.
 #[inline(never)] // Keeps its frame off the stack while the stages run.
 fn title(line: &str) -> Option<&str> {
-    let (name, text) = line.trim_start().strip_prefix('$')?.split_once('=')?;
-    (name.trim() == "title").then_some(text)
+    let (name, text) = trim_start(line).strip_prefix('$')?.split_once('=')?;
+    (trim(name) == "title").then_some(text)
 }
 
 /// The pen that one of the words gives by number, as in `pen3` or `3`. If there is none, the whole

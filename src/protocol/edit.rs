@@ -1,6 +1,6 @@
 //! Parses the edits of the model and `$list`, all of the form `$name=value`.
 
-use super::values::{choice, number, whole};
+use super::values::{choice, number, trim, whole};
 use super::{Command, CommandError};
 use crate::model::{self, Edit, ElementKind};
 
@@ -21,7 +21,7 @@ impl<'a> Values<'a> {
             None => (rest, None),
         };
         self.rest = rest;
-        Ok(value.trim())
+        Ok(trim(value))
     }
 
     /// The next three values, each parsed by `read`.

@@ -1,6 +1,7 @@
 //! Parses a line of G-code into words: letters, each with a number.
 
 use super::CommandError;
+use super::values::trim_start;
 use crate::fixed::Decimal;
 
 /// One letter and its number: `G1`, `X-2.5`.
@@ -68,7 +69,7 @@ fn next_word(rest: &mut &str) -> Option<Result<Word, CommandError>> {
         *rest = "";
         return Some(Err(CommandError::UnknownCommand));
     }
-    let after = rest.split_at_checked(1).map_or("", |(_, after)| after).trim_start();
+    let after = trim_start(rest.split_at_checked(1).map_or("", |(_, after)| after));
     let is_part = |c: char| c.is_ascii_digit() || matches!(c, '.' | '-' | '+');
     let end = after.find(|c| !is_part(c)).unwrap_or(after.len());
     let (number, after) = after.split_at_checked(end).unwrap_or((after, ""));

@@ -27,4 +27,4 @@ pub use line::{LINE_LIMIT, LineReader, RealTime, Sorter};
 pub use numbering::{Checksum, Label, Named, Numbering, Received};
 pub use receiver::{DAMAGED, Receiver};
 pub use values::{Decimals, Numbers};
-pub(crate) use values::{PENS, choice, length, number, numbers, positive, whole};
+pub(crate) use values::{PENS, choice, length, number, numbers, positive, trim, whole};

@@ -7,6 +7,24 @@ use crate::model::PEN_LIMIT;
 /// The number of pens.
 pub(crate) const PENS: i32 = PEN_LIMIT as i32;
 
+/// Whether `letter` is white space of ASCII.
+fn is_space(letter: char) -> bool {
+    matches!(letter, '\t'..='\r' | ' ')
+}
+
+/// `text` without white space at its ends. Only that of ASCII counts: the table of all Unicode
+/// takes some 250 bytes of flash.
+#[inline(never)] // Its callers share one copy of the code.
+pub(crate) fn trim(text: &str) -> &str {
+    text.trim_matches(is_space)
+}
+
+/// `text` without white space at its beginning. Only that of ASCII counts.
+#[inline(never)] // Its callers share one copy of the code.
+pub(super) fn trim_start(text: &str) -> &str {
+    text.trim_start_matches(is_space)
+}
+
 /// The index of `text` among `words`.
 #[inline(never)] // Its callers share one copy of the code.
 pub(crate) fn choice(text: &str, words: &'static [&'static str]) -> Result<usize, CommandError> {
@@ -16,7 +34,7 @@ pub(crate) fn choice(text: &str, words: &'static [&'static str]) -> Result<usize
 
 /// Parses a decimal number, exactly.
 pub(crate) fn number(text: &str) -> Result<Decimal, CommandError> {
-    Decimal::parse(text.trim()).map_err(|_| CommandError::NotANumber)
+    Decimal::parse(trim(text)).map_err(|_| CommandError::NotANumber)
 }
 
 /// Parses a length of any sign.
@@ -71,7 +89,7 @@ pub(super) fn coordinates(text: &str) -> Result<[Decimal; 3], CommandError> {
 
 /// Splits off the first word. Returns it and the rest.
 pub(super) fn split_word(text: &str) -> (&str, &str) {
-    let text = text.trim_start();
+    let text = trim_start(text);
     text.split_once([' ', '\t']).unwrap_or((text, ""))
 }
 

@@ -1,6 +1,7 @@
 //! Arcs and circles on the step grid, and the joining of their points into long lines that draw
 //! exactly these points.
 
+use crate::array::MapEach;
 use crate::drawing::PagePoint;
 use crate::fixed::Millimetres;
 
@@ -163,7 +164,7 @@ impl Arc {
     /// Finds the upper end of the right side and the right end of the upper side. There the circle
     /// begins to run more along the other axis.
     fn find_corner(&mut self) {
-        let [x, y] = self.weights.map(|weight| i64::from(weight) * i64::from(weight));
+        let [x, y] = self.weights.map_each(|weight| i64::from(weight) * i64::from(weight));
         // This estimates the point at which the circle is equally steep along both axes; the loops
         // below correct it to the exact step.
         let position = |mine: i64, others: i64| {
@@ -279,7 +280,7 @@ impl Arc {
 /// one step is more than `most` times as long as the other.
 fn weights(steps_per_mm: [Millimetres; 2], most: u16) -> Option<[u16; 2]> {
     let most = u32::from(most);
-    let [mut x, mut y] = steps_per_mm.map(|steps| steps.to_bits().unsigned_abs());
+    let [mut x, mut y] = steps_per_mm.map_each(|steps| steps.to_bits().unsigned_abs());
     // The loop computes the convergents of the continued fraction of y / x, because the length of a
     // step of x is proportional to the steps per millimetre of y.
     let (mut before, mut ratio) = ([0u32, 1], [1u32, 0]);
@@ -291,13 +292,13 @@ fn weights(steps_per_mm: [Millimetres; 2], most: u16) -> Option<[u16; 2]> {
         if times < whole && 2 * u64::from(times) <= u64::from(whole) {
             break;
         }
-        (before, ratio) = (ratio, [0, 1].map(|part| times * ratio[part] + before[part]));
+        (before, ratio) = (ratio, [0, 1].map_each(|part| times * ratio[part] + before[part]));
         if times < whole {
             break;
         }
         (x, y) = (y % x, x);
     }
-    ratio.iter().all(|part| *part > 0).then_some(ratio.map(|part| part as u16))
+    ratio.iter().all(|part| *part > 0).then_some(ratio.map_each(|part| part as u16))
 }
 
 impl Iterator for Arc {

@@ -2,6 +2,7 @@
 //! appendix 1).
 
 use super::Direction;
+use crate::array::MapEach;
 use crate::drawing::PagePoint;
 
 /// The moves from one point to another.
@@ -98,7 +99,7 @@ impl Line {
             return line;
         }
         let (more, fewer) = if dx.abs() > dy.abs() { (dx, dy) } else { (dy, dx) };
-        let [start, end] = offsets.map(|offset| i32::from(offset) * fewer.signum());
+        let [start, end] = offsets.map_each(|offset| i32::from(offset) * fewer.signum());
         let (more, fewer) = (more.abs(), fewer.abs());
         // Measured in offset units, a straight move falls behind the line by `gain` over the number
         // of moves. `gain` is never below 0. On a line of diagonal moves alone it can be a little

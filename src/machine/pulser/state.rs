@@ -1,6 +1,7 @@
 //! What the step interrupt and the main loop share: orders for the interrupt, and counts of what
 //! the pins have done.
 
+use crate::array::MapEach;
 use crate::motion::{BrakeOrders, QueueSize};
 use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 
@@ -80,15 +81,15 @@ impl PulserState {
 
     /// The sum of the steps made at the pins so far, for x and y, as last counted; it wraps.
     pub fn steps(&self) -> (i32, i32) {
-        let [x, y] = [&self.x, &self.y].map(|sum| sum.load(Ordering::Relaxed).cast_signed());
+        let [x, y] = [&self.x, &self.y].map_each(|sum| sum.load(Ordering::Relaxed).cast_signed());
         (x, y)
     }
 
     /// The sum of the steps that took up slack, which [`PulserState::steps`] does not include; it
     /// wraps.
     pub fn slack(&self) -> (i32, i32) {
-        let [x, y] =
-            [&self.slack_x, &self.slack_y].map(|sum| sum.load(Ordering::Relaxed).cast_signed());
+        let [x, y] = [&self.slack_x, &self.slack_y]
+            .map_each(|sum| sum.load(Ordering::Relaxed).cast_signed());
         (x, y)
     }
 

@@ -14,6 +14,7 @@ mod table;
 pub use table::{SETTINGS, Setting, SettingInfo};
 
 use super::Kinematics;
+use crate::array::MapEach;
 use crate::drawing::PagePoint;
 use crate::fixed::Millimetres;
 use crate::motion::{LimitsError, TICKS_PER_SECOND};
@@ -163,7 +164,7 @@ impl Settings {
 
     /// The steps per millimetre on the page, for x and y.
     pub fn page_steps(&self) -> [Value; 2] {
-        self.steps_per_mm().map(|setting| self.get(setting))
+        self.steps_per_mm().map_each(|setting| self.get(setting))
     }
 
     /// Converts two settings in millimetres, one for x and one for y, to steps on the page.

@@ -43,7 +43,8 @@ impl Settings {
 
     /// The length of the dots of a dotted line.
     pub(in crate::machine) fn dot_length(&self) -> PathLength {
-        self.get(Setting::DotLength).saturating_to_num()
+        // The setting is positive, and a unit of it is four units of the length.
+        PathLength::from_bits(self.get(Setting::DotLength).to_bits().unsigned_abs() << 2)
     }
 
     /// The speed of the slower axis, in mm/min.

@@ -1,6 +1,7 @@
 //! A stepper motor on the z axis that lifts the pen. The step interrupt pulses it
 //! ([`Axes::set_z_axis`](crate::machine::Axes)) by a rule that these settings give.
 
+use crate::array::MapEach;
 use crate::machine::estimate::rest_to_rest;
 use crate::machine::{Setting, Settings, Value};
 use crate::motion::{LiftRule, LimitsError};
@@ -31,7 +32,7 @@ pub(super) fn rule(settings: &Settings) -> Result<LiftRule, LimitsError> {
 /// The time, in milliseconds, of one move between the heights of the raised and the lowered pen.
 pub(super) fn move_milliseconds(settings: &Settings) -> u64 {
     let [down, up] =
-        [Setting::PenDownHeight, Setting::PenUpHeight].map(|setting| settings.whole(setting));
+        [Setting::PenDownHeight, Setting::PenUpHeight].map_each(|setting| settings.whole(setting));
     let distance = settings.positive_bits(Setting::TravelZ) * u64::from(down.abs_diff(up)) / 127;
     let per_second = settings.positive_bits(Setting::MaxRateZ) / 60;
     rest_to_rest(distance, per_second, settings.positive_bits(Setting::AccelerationZ))

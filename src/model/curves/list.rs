@@ -1,6 +1,7 @@
 //! The curves of a model while they are sent: an unfinished curve becomes a completed one.
 
 use super::{Curves, HEADER};
+use crate::array::MapEach;
 use crate::curve::{CurveError, KNOT_LIMIT, Knots, check_interior, check_shape, parameter_of};
 use crate::fixed::{Decimal, shift_right_rounding};
 use crate::model::ModelError;
@@ -70,7 +71,7 @@ impl CurveList {
         store.check_room(HEADER + control_points)?;
         let limit = i64::from(KNOT_LIMIT) << FINEST;
         let value = |end: Decimal| end.to_binary(FINEST).ok().filter(|end| end.abs() <= limit);
-        let ends = match ends.map(value) {
+        let ends = match ends.map_each(value) {
             [Some(from), Some(to)] => [from, to],
             _ => return Err(ModelError::KnotTooLarge),
         };
@@ -148,7 +149,7 @@ impl CurveList {
         };
         check_shape(control_points, order, knots).map_err(ModelError::Curve)?;
         let shift = FINEST - bits - fraction_bits;
-        let [from, to] = unfinished.ends.map(|end| (end + (1 << shift >> 1)) >> shift);
+        let [from, to] = unfinished.ends.map_each(|end| (end + (1 << shift >> 1)) >> shift);
         // The same number may differ by one unit as an end and as a knot that was rounded twice.
         let first = knots.get(usize::from(order) - 1) << fraction_bits;
         let last = knots.get(control_points) << fraction_bits;
@@ -158,7 +159,7 @@ impl CurveList {
         let (from, to) = (from.max(first), to.min(last));
         check_interior(order, knots, from, to).map_err(ModelError::Curve)?;
         let [from, to] =
-            [from, to].map(|u| parameter_of(control_points, order, knots, u, fraction_bits));
+            [from, to].map_each(|u| parameter_of(control_points, order, knots, u, fraction_bits));
         let ends: [u16; 4] = bytemuck::cast([from.to_bits(), to.to_bits()]);
         if let [_, _, count, _, stored_ends @ ..] = header {
             // It fits, because the memory has fewer half-words than there are vertex numbers.

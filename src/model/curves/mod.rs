@@ -10,6 +10,7 @@ mod list;
 
 pub(super) use list::CurveList;
 
+use crate::array::MapEach;
 use crate::curve::{CurveError, Fine, Knots, Parameter, Point, Spline};
 use crate::stage::{Cancel, OutOfScratch, StageError};
 
@@ -126,7 +127,7 @@ fn read(halves: &[u16]) -> Option<(StoredCurve<'_>, &[u16])> {
     };
     let [_, order, _, pen, a, b, c, d] = *header else { return None };
     let ends: [u32; 2] = bytemuck::cast([a, b, c, d]);
-    let [from, to] = ends.map(Parameter::from_bits);
+    let [from, to] = ends.map_each(Parameter::from_bits);
     Some((StoredCurve { order: order as u8, pen: pen as u8, control, knots, from, to }, after))
 }
 

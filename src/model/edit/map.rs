@@ -1,5 +1,6 @@
 //! Maps of positions: translation, scale, rotation and reflection.
 
+use crate::array::MapEach;
 use crate::fixed::{divide_rounding, product, sin_cos_degrees};
 use crate::model::{BeforeChange, Model, ModelError, POSITION_LIMIT, Position, resolve};
 use core::ops::Range;
@@ -27,7 +28,9 @@ impl Map {
     pub(super) const NO_SHIFT: [i64; 3] = [0; 3];
 
     pub(super) fn diagonal(entries: [i64; 3]) -> [[i64; 3]; 3] {
-        [0, 1, 2].map(|row| [0, 1, 2].map(|column| if row == column { entries[row] } else { 0 }))
+        [0, 1, 2].map_each(|row| {
+            [0, 1, 2].map_each(|column| if row == column { entries[row] } else { 0 })
+        })
     }
 
     /// Makes the rotation about an axis, counter-clockwise as seen from its positive end.
@@ -47,19 +50,19 @@ impl Map {
     // Not inlined, so that its 128-bit arithmetic is in the program only once.
     #[inline(never)]
     pub(super) fn apply(&self, position: Position) -> [i64; 3] {
-        let p = position.coordinates().map(i64::from);
+        let p = position.coordinates().map_each(i64::from);
         match self {
-            Self::Affine(rows, shift) => [0, 1, 2].map(|row: usize| {
+            Self::Affine(rows, shift) => [0, 1, 2].map_each(|row: usize| {
                 let products = rows[row].iter().zip(p).map(|(m, p)| product(*m, p));
                 let half = 1 << (UNIT_BITS - 1);
                 within((products.sum::<i128>() + half) >> UNIT_BITS).saturating_add(shift[row])
             }),
             Self::Reflection(on_plane, n) => {
-                let q = on_plane.coordinates().map(i64::from);
+                let q = on_plane.coordinates().map_each(i64::from);
                 // The sum is below 3 2^31 2^28.
                 let height: i64 = (0..3).map(|k| (p[k] - q[k]) * n[k]).sum();
                 let square: i64 = n.iter().map(|c| c * c).sum();
-                [0, 1, 2].map(|k: usize| {
+                [0, 1, 2].map_each(|k: usize| {
                     let product = 2 * product(height, n[k]);
                     p[k] - within(divide_rounding(product, square.into()))
                 })
@@ -84,10 +87,10 @@ impl Model<'_> {
                 .copied()
                 .ok_or(ModelError::UnknownVertex { number, vertices })?;
         }
-        let [a, b, c] = corners.map(Position::coordinates);
-        let [u, v] =
-            [b, c].map(|end| [0, 1, 2].map(|k: usize| i64::from(end[k]) - i64::from(a[k])));
-        let cross = [0, 1, 2].map(|k: usize| {
+        let [a, b, c] = corners.map_each(Position::coordinates);
+        let [u, v] = [b, c]
+            .map_each(|end| [0, 1, 2].map_each(|k: usize| i64::from(end[k]) - i64::from(a[k])));
+        let cross = [0, 1, 2].map_each(|k: usize| {
             let (i, j) = ((k + 1) % 3, (k + 2) % 3);
             // Each component is at most 2^63.
             (u[i] * v[j]).saturating_sub(u[j] * v[i])
@@ -136,7 +139,7 @@ impl Model<'_> {
         if bits > 0 {
             for (at, position) in self.vertices.iter_mut().enumerate() {
                 if !range.contains(&at) {
-                    *position = in_unit(position.coordinates().map(i64::from), bits);
+                    *position = in_unit(position.coordinates().map_each(i64::from), bits);
                 }
             }
             self.rounding.coarsen(bits);
@@ -149,7 +152,7 @@ impl Model<'_> {
 /// changes.
 pub(super) fn in_unit(position: [i64; 3], coarser: u32) -> Position {
     // It fits: see `coarser_for`.
-    let [x, y, z] = position.map(|c| ((c.abs() >> coarser) * c.signum()) as i32);
+    let [x, y, z] = position.map_each(|c| ((c.abs() >> coarser) * c.signum()) as i32);
     Position { x, y, z }
 }
 

@@ -13,6 +13,7 @@ mod mirror;
 
 use super::pens::RUN;
 use super::{BeforeChange, Model, ModelError, resolve};
+use crate::array::MapEach;
 use crate::fixed::{Decimal, rest_of_periods};
 use crate::stage::{OutOfScratch, Scratch};
 use core::ops::Range;
@@ -160,7 +161,7 @@ impl Model<'_> {
         }
         let after = self.counts();
         let [vertices, bars, faces, curves] =
-            [0, 1, 2, 3].map(|part: usize| after[part] as i32 - counts[part] as i32);
+            [0, 1, 2, 3].map_each(|part: usize| after[part] as i32 - counts[part] as i32);
         Ok(Change { vertices, bars, faces, curves })
     }
 

@@ -2,6 +2,7 @@
 //! it, showing it, and saying how it is used.
 
 use super::PlotOptions;
+use crate::array::MapEach;
 use crate::fixed::{Length, Millimetres, SixDecimals};
 use crate::host_only::HostOnly;
 use crate::protocol::{CommandError, choice, length, numbers, whole};
@@ -137,7 +138,7 @@ impl PlotOption {
             }
             Kind::Place(field) => match *field(&mut copy) {
                 Some(place) => {
-                    let [x, y, z] = place.map(SixDecimals);
+                    let [x, y, z] = place.map_each(SixDecimals);
                     write!(formatter, "{x},{y},{z}")
                 }
                 None => formatter.write_str("auto"),
@@ -164,7 +165,7 @@ impl PlotOption {
         match self.kind {
             Kind::Place(_) => Some("three numbers, -1e15 to 1e15".into()),
             Kind::Length { least, greatest, .. } => {
-                let [least, greatest] = [least, greatest].map(|length| length.to_num::<i32>());
+                let [least, greatest] = [least, greatest].map_each(|length| length.to_num::<i32>());
                 Some(std::format!("{least} to {greatest} mm"))
             }
             Kind::Whole(_) => Some(std::format!("a whole number, 0 to {}", i32::MAX)),

@@ -3,6 +3,7 @@
 use super::row::{Flag, Kind, PlotOption};
 use super::values::{HiddenLines, ProjectionChoice, VisibilityMode};
 use super::{PlotOptions, set_precision, set_title};
+use crate::array::MapEach;
 use crate::fixed::{Length, Millimetres, SixDecimals};
 use crate::host_only::HostOnly;
 use crate::order::{Method, Shape};
@@ -245,7 +246,7 @@ pub const OPTIONS: &[PlotOption] = &[
                 Ok(())
             },
             show: |options, formatter| {
-                let [width, height] = [options.page.width, options.page.height].map(Length);
+                let [width, height] = [options.page.width, options.page.height].map_each(Length);
                 write!(formatter, "{width}x{height}")
             },
         },

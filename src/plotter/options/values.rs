@@ -2,7 +2,7 @@
 //! that have a form of their own.
 
 use crate::fixed::SixDecimals;
-use crate::protocol::{CommandError, PENS, choice, numbers, whole};
+use crate::protocol::{CommandError, PENS, choice, numbers, trim, whole};
 use crate::view::Lens;
 use core::fmt;
 
@@ -44,7 +44,7 @@ impl ProjectionChoice {
     /// Parses one of these forms.
     pub(super) fn parse(value: &str) -> Result<Self, CommandError> {
         let (name, rest) = match value.split_once(',') {
-            Some((name, rest)) => (name.trim(), Some(rest)),
+            Some((name, rest)) => (trim(name), Some(rest)),
             None => (value, None),
         };
         let oblique = |angle, ratio| Self::Lens(Lens::Oblique { angle, ratio });

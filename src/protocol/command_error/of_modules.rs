@@ -9,6 +9,7 @@ use crate::machine::{MachineError, SettingError};
 use crate::model::{ElementKind, ModelError, PEN_LIMIT};
 use crate::stage::OutOfScratch;
 use crate::view::ViewError;
+use core::fmt;
 
 // The entries that several errors have in common.
 const UNKNOWN_VERTEX: ErrorEntry = error(110, "unknown vertex");
@@ -167,7 +168,11 @@ pub(super) fn explain_solid(refusal: &SolidError, row: Row<'_>) {
 }
 
 pub(super) fn explain_page(refusal: &PageError, row: Row<'_>) {
-    let mm = |units| BinaryFraction { units, fraction_bits: 16, places: 1 };
+    let mm = |length: Millimetres| BinaryFraction {
+        units: length.to_bits().into(),
+        fraction_bits: 16,
+        places: 1,
+    };
     match refusal {
         PageError::NoRoom => row(
             error(130, "margins leave no room on the page"),
@@ -179,7 +184,8 @@ pub(super) fn explain_page(refusal: &PageError, row: Row<'_>) {
         ),
         PageError::DoesNotFit { width, height, foot } => {
             let entry = error(132, "drawing is larger than the page");
-            let [width, height, below] = [*width, *height, *foot].map(mm);
+            let below = mm(*foot);
+            let [width, height] = [width, height].map(|size| Tenths(*size));
             if *foot > 0 {
                 row(
                     entry,
@@ -198,17 +204,25 @@ pub(super) fn explain_page(refusal: &PageError, row: Row<'_>) {
             }
         }
         PageError::TitleTooWide { width, free } => {
-            let mm = |length: &Millimetres| mm(length.to_bits().into());
             row(
                 error(133, "title is wider than the page"),
                 format_args!(
                     "the title is {} mm wide where {} are free: shorten it, or make $title-size \
                      smaller",
-                    mm(width),
-                    mm(free)
+                    mm(*width),
+                    mm(*free)
                 ),
             );
         }
+    }
+}
+
+/// Shows a number of 0.1 mm in mm.
+struct Tenths(u32);
+
+impl fmt::Display for Tenths {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "{}.{}", self.0 / 10, self.0 % 10)
     }
 }
 

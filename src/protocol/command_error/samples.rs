@@ -129,7 +129,7 @@ pub fn error_samples() -> Vec<CommandError> {
     let pages = every_variant!(PageError:
         NoRoom,
         TooManySteps,
-        DoesNotFit { width: 1 << 16, height: 1 << 16, foot: 1 << 16 },
+        DoesNotFit { width: 10, height: 10, foot: one },
         TitleTooWide { width: one, free: one },
     );
     let machine = every_variant!(MachineError:

@@ -9,6 +9,7 @@ mod cut_positions;
 pub use cut_positions::CutPositions;
 
 use super::{HomingSpace, Properties, SegmentEnd};
+use crate::array::MapEach;
 use crate::drawing::{PAGE_LIMIT, PagePoint};
 use crate::machine::{Setting, Settings, Value};
 use crate::motion::LimitsError;
@@ -78,7 +79,7 @@ impl Anchors {
     pub(super) fn page(self, belts: PagePoint) -> PagePoint {
         let Self { left, width } = self;
         let square = |steps: i32| i64::from(steps) * i64::from(steps);
-        let [a, b, w] = [belts.x, belts.y, width].map(square);
+        let [a, b, w] = [belts.x, belts.y, width].map_each(square);
         // Belts have up to 2^23 steps, so the squares are at most 2^46.
         let twice = 2 * i64::from(width).max(1);
         let x = (a - b + w + twice / 2).div_euclid(twice);
@@ -97,7 +98,7 @@ impl Anchors {
         let to = ends[1];
         let (ends, backward) = in_order(ends);
         let line = FineLine::new(self, ends);
-        let [start, end] = positions.map(|position| {
+        let [start, end] = positions.map_each(|position| {
             line.at(if backward { length.saturating_sub(position) } else { position }, length)
         });
         let motors = if positions[1] >= length {
@@ -111,7 +112,7 @@ impl Anchors {
             PagePoint { x, y }
         };
         let major = usize::from((motors.x - begin.x).abs() <= (motors.y - begin.y).abs());
-        let offsets = [(start, begin), (end, motors)].map(|(exact, PagePoint { x, y })| {
+        let offsets = [(start, begin), (end, motors)].map_each(|(exact, PagePoint { x, y })| {
             let (steps, others) = if major == 0 { (x, y) } else { (y, x) };
             // At the ends of a line the lengths of both belts are rounded, so the offset may be
             // more than half a step.
@@ -120,7 +121,7 @@ impl Anchors {
             let units = offset.clamp(-step, step) * Line::OFFSET_UNIT;
             rounded(units, line.bits).clamp(-127, 127) as i8
         });
-        let [x, down] = end.position.map(|fine| rounded(fine, line.bits));
+        let [x, down] = end.position.map_each(|fine| rounded(fine, line.bits));
         let page = PagePoint { x: self.left.x + x, y: self.left.y - down };
         SegmentEnd { motors, page, offsets }
     }
@@ -160,16 +161,16 @@ struct FinePoint {
 
 impl FineLine {
     fn new(Anchors { left, width }: Anchors, ends: [PagePoint; 2]) -> Self {
-        let [from, to] = ends.map(|end| [end.x - left.x, left.y - end.y]);
-        let greatest = [from, to].map(|[x, y]| x.abs().max((width - x).abs()).max(y.abs()));
+        let [from, to] = ends.map_each(|end| [end.x - left.x, left.y - end.y]);
+        let greatest = [from, to].map_each(|[x, y]| x.abs().max((width - x).abs()).max(y.abs()));
         // The greatest coordinate is below 2^22, so everything stays below 2^30.
         let bits = (greatest[0].max(greatest[1]) | 1).leading_zeros() - 2;
         let bits = bits.clamp(LEAST_BITS, MOST_BITS);
         let delta = [to[0] - from[0], to[1] - from[1]];
         // The components are below 2^21.
         let longer = (delta[0].abs().max(delta[1].abs()) | 1).leading_zeros().saturating_sub(10);
-        let direction = delta.map(|delta| delta << longer);
-        let [from, delta] = [from, delta].map(|vector| vector.map(|steps| steps << bits));
+        let direction = delta.map_each(|delta| delta << longer);
+        let [from, delta] = [from, delta].map_each(|vector| vector.map_each(|steps| steps << bits));
         Self { bits, from, delta, width: width << bits, direction }
     }
 
@@ -183,10 +184,10 @@ impl FineLine {
         };
         let position @ [x, y] = [along(0), along(1)];
         let from_anchors = [x, x - self.width];
-        let belts = from_anchors.map(|x| length_of(x, y));
+        let belts = from_anchors.map_each(|x| length_of(x, y));
         let rate = |belt: usize| {
             // The sum is below 2^54.
-            let [right, down] = self.direction.map(i64::from);
+            let [right, down] = self.direction.map_each(i64::from);
             let product = i64::from(from_anchors[belt]) * right + i64::from(y) * down;
             // The quotient is below 2^23, as the direction is.
             product.checked_div(belts[belt].into()).unwrap_or(0) as i32
