@@ -18,6 +18,7 @@ mod program;
 mod records;
 mod reply;
 mod report;
+#[cfg(feature = "convex")]
 mod solid;
 mod stream;
 mod title;

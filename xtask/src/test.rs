@@ -30,6 +30,12 @@ pub fn everything() -> Result<()> {
             .args(["--", "-Dwarnings"]),
     )?;
     step(
+        workspace("check")
+            .args(["--package", "penup", "--lib", "--no-default-features"])
+            .args(["--target-dir", "target/without-convex"])
+            .env("RUSTFLAGS", "-Dwarnings"),
+    )?;
+    step(
         workspace("doc")
             .args(["--workspace", "--no-deps", "--document-private-items"])
             .env("RUSTDOCFLAGS", "-Dwarnings"),

@@ -1,6 +1,8 @@
 //! The stages of a job, one after the other.
 
-use super::super::{PlotOptions, plan, solid, title};
+#[cfg(feature = "convex")]
+use super::super::solid;
+use super::super::{PlotOptions, plan, title};
 use super::{Job, Observer};
 use crate::drawing::{StepsPerMillimetre, build_graph};
 use crate::model::Model;
@@ -48,7 +50,12 @@ impl Pipeline<'_> {
             plan::lay_out(&mut self)?
         } else {
             match self.options.see {
+                #[cfg(feature = "convex")]
                 VisibilityMode::Vertices | VisibilityMode::Edges => solid::project(&mut self)?,
+                #[cfg(not(feature = "convex"))]
+                VisibilityMode::Vertices | VisibilityMode::Edges => {
+                    return Err(CommandError::NoConvexSolids);
+                }
                 VisibilityMode::Faces | VisibilityMode::Wire => self.find_visible_lines()?,
             }
         };

@@ -386,6 +386,9 @@ impl PlotOptions {
     /// The [`CommandError`] that names what is wrong with the value. The options stay as they were.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub fn set(&mut self, name: &str, text: &str) -> Result<bool, CommandError> {
+        if !cfg!(feature = "convex") && name == "see" && matches!(text, "vertices" | "edges") {
+            return Err(CommandError::NoConvexSolids);
+        }
         match OPTIONS.iter().find(|option| option.name == name) {
             Some(option) => option.set(self, text).map(|()| true),
             None => Ok(false),

@@ -91,6 +91,9 @@ pub enum CommandError {
     NothingToPlot,
     /// The camera cannot show the model.
     View(ViewError),
+    /// This firmware was built without the feature `convex`, which `$see=vertices` and `$see=edges`
+    /// need.
+    NoConvexSolids,
     /// The vertices or edges are not those of a convex solid, or the eye is inside it.
     Solid(SolidError),
     /// The drawing or its title does not fit on the page.
@@ -285,6 +288,11 @@ impl CommandError {
             Self::Model(error) => explain_model(error, row),
             Self::NothingToPlot => explain_view(&ViewError::NothingToSee, row),
             Self::View(error) => explain_view(error, row),
+            Self::NoConvexSolids => row(
+                error(128, "convex solids are left out of this firmware")
+                    .client("the plotter's firmware was built without convex solids"),
+                format_args!("send faces and choose $see=faces, or $see=wire for all edges"),
+            ),
             Self::Solid(error) => explain_solid(error, row),
             Self::Page(error) => explain_page(error, row),
             Self::DrawingTooLarge(missing) => explain_missing(missing, row),

@@ -60,6 +60,7 @@ pub fn error_samples() -> Vec<CommandError> {
         TitleTooLong { limit: 80 },
         Model(ModelError::NoPlane),
         NothingToPlot,
+        NoConvexSolids,
         View(ViewError::NothingToSee),
         Solid(SolidError::AllInLine),
         Page(PageError::NoRoom),
