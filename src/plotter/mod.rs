@@ -31,7 +31,6 @@ pub use options::{
     Flag, HiddenLines, OPTIONS, PlotOption, PlotOptions, ProjectionChoice, VisibilityMode,
 };
 
-use crate::array::MapEach;
 use crate::machine::{
     Alarm, Machine, MachineError, Path, PulserState, Setting, SettingError, Settings, State,
     Target, Value,

@@ -16,7 +16,8 @@ fn is_space(letter: char) -> bool {
 /// takes some 250 bytes of flash.
 #[inline(never)] // Its callers share one copy of the code.
 pub(crate) fn trim(text: &str) -> &str {
-    text.trim_matches(is_space)
+    let after = text.bytes().rev().take_while(|byte| is_space(char::from(*byte))).count();
+    trim_start(text.split_at_checked(text.len() - after).map_or("", |(kept, _)| kept))
 }
 
 /// `text` without white space at its beginning. Only that of ASCII counts.
