@@ -79,9 +79,8 @@ impl StretchSink for PageSink<'_> {
             stretch.pen = 0;
         }
         let line_type = match (stretch.visible, self.options.hidden) {
-            (true, _) | (false, HiddenLines::Shown) => LineType::Full,
-            (false, HiddenLines::Dotted) => LineType::Dotted,
-            (false, HiddenLines::Dashed) => LineType::Dashed,
+            (true, _) => LineType::Full,
+            (false, HiddenLines::Drawn(line_type)) => line_type,
             (false, HiddenLines::Pen(pen)) => {
                 stretch.pen = pen;
                 LineType::Full

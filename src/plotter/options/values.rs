@@ -1,6 +1,7 @@
 //! The values of those options that are more than a number: their types, and the parsers of those
 //! that have a form of their own.
 
+use crate::drawing::LineType;
 use crate::fixed::SixDecimals;
 use crate::protocol::{CommandError, PENS, choice, numbers, trim, whole};
 use crate::view::Lens;
@@ -112,19 +113,28 @@ pub enum HiddenLines {
     /// They are not drawn.
     #[default]
     Erased,
-    /// They are drawn dotted.
-    Dotted,
-    /// They are drawn dashed.
-    Dashed,
-    /// They are drawn like visible ones, which gives a wire frame.
-    Shown,
+    /// They are drawn as lines of this type. Full ones, like the visible lines, give a wire frame.
+    Drawn(LineType),
     /// They are drawn with this pen, counted from 0.
     Pen(u8),
 }
 
 impl HiddenLines {
-    /// The forms of the value.
-    pub(super) const WORDS: &[&str] = &["erased", "dotted", "dashed", "shown", "pen", "pen,NUMBER"];
+    /// The word for hidden lines that are drawn like visible ones.
+    const SHOWN: &str = "shown";
+
+    /// The forms of the value: the line types other than the full one are among them by name.
+    pub(super) const WORDS: &[&str] = &{
+        const TYPES: usize = LineType::ALL.len();
+        let mut words = ["erased"; TYPES + 3];
+        let mut code = 1;
+        while code < TYPES {
+            words[code] = LineType::ALL[code].name();
+            code += 1;
+        }
+        (words[TYPES], words[TYPES + 1], words[TYPES + 2]) = (Self::SHOWN, "pen", "pen,NUMBER");
+        words
+    };
 
     /// Parses one of these forms.
     pub(super) fn parse(value: &str) -> Result<Self, CommandError> {
@@ -134,13 +144,13 @@ impl HiddenLines {
                 _ => Err(CommandError::NumberOutOfRange),
             };
         }
-        Ok(match choice(value, Self::WORDS)? {
-            0 => Self::Erased,
-            1 => Self::Dotted,
-            2 => Self::Dashed,
-            3 => Self::Shown,
+        choice(value, Self::WORDS)?;
+        Ok(match (value, LineType::named(value)) {
+            (_, Some(line_type)) => Self::Drawn(line_type),
+            (Self::SHOWN, None) => Self::Drawn(LineType::Full),
             // The first pen draws the visible lines, so this is the second.
-            _ => Self::Pen(1),
+            ("pen", None) => Self::Pen(1),
+            _ => Self::Erased,
         })
     }
 
@@ -148,9 +158,8 @@ impl HiddenLines {
     pub(super) fn show(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter.write_str(match self {
             Self::Erased => "erased",
-            Self::Dotted => "dotted",
-            Self::Dashed => "dashed",
-            Self::Shown => "shown",
+            Self::Drawn(LineType::Full) => Self::SHOWN,
+            Self::Drawn(line_type) => line_type.name(),
             Self::Pen(pen) => return write!(formatter, "pen,{}", pen + 1),
         })
     }
