@@ -59,13 +59,13 @@ const JERKS: [u16; 4] = [0, 100, 10, 1];
 
 /// The targets of a job.
 #[derive(Clone)]
-enum Way {
+enum Targets {
     /// A straight move to a point; `None` once it has been handed out.
     Line(Option<Target>),
     Circle(Arc, usize),
 }
 
-impl Way {
+impl Targets {
     /// No targets at all.
     const fn nowhere() -> Self {
         Self::Line(None)
@@ -85,7 +85,7 @@ impl Way {
     }
 }
 
-impl Path for Way {
+impl Path for Targets {
     fn next_target(&mut self) -> Option<Target> {
         match self {
             Self::Circle(arc, stride) => {
@@ -97,13 +97,13 @@ impl Path for Way {
     fn rewind(&mut self) {}
 }
 
-/// Plans all events of `way`. The machine does not measure the strokes beforehand.
-fn run(machine: &mut Machine, way: &mut Way) -> Count {
+/// Plans all events of `targets`. The machine does not measure the strokes beforehand.
+fn run(machine: &mut Machine, targets: &mut Targets) -> Count {
     let mut queue = Count(0);
-    if machine.start(&mut Way::nowhere()).is_err() {
+    if machine.start(&mut Targets::nowhere()).is_err() {
         hprintln!("refused");
     }
-    machine.fill(way, &mut queue);
+    machine.fill(targets, &mut queue);
     queue
 }
 
@@ -138,13 +138,13 @@ fn main() -> ! {
     for job in &JOBS {
         let counts = JERKS.map(|jerk| {
             let mut machine = Machine::new(settings(job, jerk), blocks, pins, u32::MAX);
-            let [mut approach, mut way] = Way::of(job);
+            let [mut approach, mut targets] = Targets::of(job);
             run(&mut machine, &mut approach);
-            let (mut targets, mut begun) = (way.clone(), counter.read());
+            let (mut targets, mut begun) = (targets.clone(), counter.read());
             while black_box(targets.next_target()).is_some() {}
             let free = counter.read() - begun;
             begun = counter.read();
-            let queue = run(&mut machine, &mut way);
+            let queue = run(&mut machine, &mut targets);
             (counter.read() - begun - free) / queue.0.max(1)
         });
         let [none, high, middle, low] = counts;

@@ -239,7 +239,8 @@ pub fn divide_rounding(dividend: i128, divisor: i128) -> i128 {
 ///
 /// ```
 /// use penup::fixed::divide_down;
-/// assert_eq!([-7, -6, -1, 0, 5, 6].map(|dividend| divide_down(dividend, 3)), [-3, -2, -1, 0, 1, 2]);
+/// let quotients = [-7, -6, -1, 0, 5, 6].map(|dividend| divide_down(dividend, 3));
+/// assert_eq!(quotients, [-3, -2, -1, 0, 1, 2]);
 /// ```
 pub fn divide_down(dividend: i128, divisor: i128) -> i128 {
     // Neither operand of the unsigned division is negative.
@@ -320,8 +321,8 @@ pub fn square_root(number: f64) -> f64 {
     // The fraction in units of 2^-64.
     let mut digits = (libm::ldexp(fraction, 53) as i64).cast_unsigned() << (11 - odd);
     let (mut rest, mut root) = (0u64, 0u64);
-    // One bit of the root more than a double holds; the last bit is rounded off. It cannot be a tie,
-    // because then the number would have twice as many bits.
+    // One bit of the root more than a double holds; the last bit is rounded off. It cannot be a
+    // tie, because then the number would have twice as many bits.
     for _ in 0..54 {
         rest = rest << 2 | digits >> 62;
         digits <<= 2;
@@ -366,7 +367,8 @@ pub fn sin_cos_degrees(degrees: f64) -> (f64, f64) {
 ///
 /// ```
 /// use penup::fixed::SixDecimals;
-/// assert_eq!(format!("{} {} {}", SixDecimals(-2.5), SixDecimals(1e15), SixDecimals(1e-7)), "-2.5 1000000000000000 0");
+/// let shown = [-2.5, 1e15, 1e-7].map(|number| SixDecimals(number).to_string());
+/// assert_eq!(shown, ["-2.5", "1000000000000000", "0"]);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SixDecimals(pub f64);

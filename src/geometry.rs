@@ -59,6 +59,7 @@ pub enum Axis {
 }
 
 impl Axis {
+    /// Returns the coordinate of `vertex` along this axis.
     fn of(self, vertex: Vertex) -> i64 {
         i64::from(match self {
             Axis::X => vertex.x,
@@ -99,7 +100,8 @@ impl EdgeParameter {
     ///
     /// ```
     /// use penup::geometry::EdgeParameter;
-    /// assert_eq!(EdgeParameter::zero_between(-1, 3), EdgeParameter { numerator: 1, denominator: 4 });
+    /// let quarter = EdgeParameter { numerator: 1, denominator: 4 };
+    /// assert_eq!(EdgeParameter::zero_between(-1, 3), quarter);
     /// ```
     pub fn zero_between(at_p: i64, at_q: i64) -> Self {
         let numerator = at_p.unsigned_abs();
@@ -170,30 +172,31 @@ pub fn plane_side(a: Vertex, b: Vertex, c: Vertex, d: Vertex) -> i64 {
 }
 
 /// Returns an error bound for [`plane_side`]. If the absolute value of [`plane_side`] is greater, d
-/// lies off the plane by more than rounding can explain. `doubt` is twice the greatest possible
-/// error of a coordinate.
+/// lies off the plane by more than rounding can explain. `error_bound` is twice the greatest
+/// possible error of a coordinate.
 ///
-/// Let M be the largest difference of coordinates and D the value of `doubt`. Nine minors of two
-/// products each contribute at most 18 D M^2 together, the products of two errors at most 18 D^2 M,
-/// and those of three errors at most 6 D^3. The result saturates; then no point is certain to lie
-/// off the plane.
+/// Let M be the largest difference of coordinates and D the value of `error_bound`. Nine minors of
+/// two products each contribute at most 18 D M^2 together, the products of two errors at most
+/// 18 D^2 M, and those of three errors at most 6 D^3. The result saturates; then no point is
+/// certain to lie off the plane.
 ///
 /// ```
 /// use penup::geometry::{Vertex, plane_side_margin};
 /// let [a, b, c, d] = [0, 7, 15, 8].map(|x| Vertex::new(x, 0, 1));
 /// assert_eq!(plane_side_margin(a, b, c, d, 1), 18 * 15 * 16 + 6);
 /// ```
-pub fn plane_side_margin(a: Vertex, b: Vertex, c: Vertex, d: Vertex, doubt: u32) -> i64 {
+pub fn plane_side_margin(a: Vertex, b: Vertex, c: Vertex, d: Vertex, error_bound: u32) -> i64 {
     let differences = [b, c, d].map(|to| {
         (to.x - a.x).unsigned_abs() | (to.y - a.y).unsigned_abs() | (to.z - a.z).unsigned_abs()
     });
     let most = i64::from(differences[0] | differences[1] | differences[2]);
-    let doubt = i64::from(doubt);
-    let first = (18 * most * (most + doubt)).saturating_mul(doubt); // 2^21 and 2^32: below 2^58
-    if doubt == 1 {
+    let error_bound = i64::from(error_bound);
+    // With 2^21 and 2^32 the first product is below 2^58.
+    let first = (18 * most * (most + error_bound)).saturating_mul(error_bound);
+    if error_bound == 1 {
         first + 6
     } else {
-        first.saturating_add((6 * doubt).saturating_mul(doubt * doubt))
+        first.saturating_add((6 * error_bound).saturating_mul(error_bound * error_bound))
     }
 }
 
@@ -478,17 +481,17 @@ mod tests {
     fn the_margin_covers_every_rounding() {
         for n in 1..4000i64 {
             let number = scattered(n);
-            let doubt = 1 + (n % 9) as i32;
+            let error_bound = 1 + (n % 9) as i32;
             let reach = 1 << (n % 17 + 2);
             let part = |k: i64| number(k) as i32 % reach;
-            // Four points of the plane z = x, each moved by up to half of `doubt`.
+            // Four points of the plane z = x, each moved by up to half of `error_bound`.
             let point = |k: i64| {
-                let off = |m: i64| number(k + m) as i32 % (doubt / 2 + 1);
+                let off = |m: i64| number(k + m) as i32 % (error_bound / 2 + 1);
                 let (x, y) = (part(k), part(k + 1));
                 Vertex::new(x + off(2), y + off(3), x + off(4))
             };
             let [a, b, c, d] = [0, 10, 20, 30].map(point);
-            let margin = plane_side_margin(a, b, c, d, doubt as u32);
+            let margin = plane_side_margin(a, b, c, d, error_bound as u32);
             assert!(plane_side(a, b, c, d).abs() <= margin, "{n}");
         }
     }

@@ -2,8 +2,8 @@
 //!
 //! A computer sends it a solid, a frame of bars, a curve or a line drawing over a serial line. On
 //! the microcontroller it projects the model, removes the hidden lines, chooses the pen-up moves,
-//! orders the strokes, plans the speed, and pulses the stepper motors and the pen. It needs no heap,
-//! it decides nothing in floating point, and it gives the same bits on every machine.
+//! orders the strokes, plans the speed, and pulses the stepper motors and the pen. It needs no
+//! heap, it decides nothing in floating point, and it gives the same bits on every machine.
 //!
 //! The modules are listed in the order in which the data passes through them. A module uses only
 //! modules that are listed above it.

@@ -63,6 +63,7 @@ impl<'a> Scratch<'a> {
         Ok(items_mut(words, count).unwrap_or(&mut [])) // It has the length asked for.
     }
 
+    /// Takes so many bytes, rounded up to whole words, off the front of the memory.
     #[inline(never)] // All types share one copy of the code.
     fn take_words(&mut self, bytes: usize) -> Result<&'a mut [u64], OutOfScratch> {
         let out_of_scratch = OutOfScratch { needed: bytes, available: self.available_bytes() };
@@ -175,6 +176,7 @@ impl<T, K: Ord, F: Fn(&T) -> K> Heap for Keyed<'_, T, F> {
     }
 }
 
+/// Sorts the `count` elements of `heap` without further memory.
 fn heap_sort(count: usize, heap: &mut dyn Heap, cancel: &mut dyn Cancel) -> Result<(), Aborted> {
     for parent in (0..count / 2).rev() {
         cancel.check()?;

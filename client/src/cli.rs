@@ -105,7 +105,12 @@ pub struct PlotArgs {
     )]
     pub file: Option<PathBuf>,
     /// The board to emulate; the picture is drawn from its pins
-    #[arg(long, value_parser = board::parser(), default_value = board::DEFAULT, help_heading = "Plotter")]
+    #[arg(
+        long,
+        value_parser = board::parser(),
+        default_value = board::DEFAULT,
+        help_heading = "Plotter"
+    )]
     pub board: &'static BoardRow,
     /// The serial port of a real plotter, such as /dev/ttyUSB0 or COM3
     #[arg(

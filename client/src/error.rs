@@ -5,7 +5,7 @@ use crate::formats::ReadError;
 use crate::interrupt::EXIT_CODE;
 use crate::lines::{JobLine, Origin};
 use crate::protocol::RECEIVE_WINDOW;
-use crate::words::{asked, explained, for_client};
+use crate::words::{as_option, explained, for_client};
 use penup::protocol::CommandError;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -56,7 +56,8 @@ pub enum Error {
     /// The emulator ended, or closed its connection, in the middle of the work.
     #[error(
         "the emulator of the {board} board broke: it {how}\n\
-         Run it once more, and `cargo xtask set-up` if it breaks again{}", kept(details.as_deref())
+         Run it once more, and `cargo xtask set-up` if it breaks again{}",
+        details_in(details.as_deref())
     )]
     EmulatorBroke {
         /// The board's name.
@@ -224,7 +225,8 @@ impl Error {
     }
 }
 
-fn kept(details: Option<&Path>) -> String {
+/// Names the file with the last words of the emulator, if there is one.
+fn details_in(details: Option<&Path>) -> String {
     let what = |file: &Path| format!("; what it said last is in {}", file.display());
     details.map(what).unwrap_or_default()
 }
@@ -241,14 +243,16 @@ fn said(text: &str) -> String {
     if text.is_empty() { String::new() } else { format!(": it said \"{text}\"") }
 }
 
+/// Names the line that was not answered.
 fn waiting_for(line: Option<&JobLine>) -> String {
     match line.map(|line| (&line.sent, &line.origin)) {
         None => String::new(),
         Some((_, Some(origin))) => format!(", at line {} of {}", origin.line, origin.file),
-        Some((sent, None)) => format!(", asked for {}", asked(sent)),
+        Some((sent, None)) => format!(", asked for {}", as_option(sent)),
     }
 }
 
+/// Says what the user can do about a state of the machine.
 fn remedy(state: &str) -> &'static str {
     match state {
         "Alarm" => "Free the machine, then home or unlock it",
@@ -257,6 +261,7 @@ fn remedy(state: &str) -> &'static str {
     }
 }
 
+/// Explains why the plotter refused a line.
 fn refusal(line: &JobLine, number: u16, messages: &[String]) -> String {
     let reason = explained(number, messages);
     match &line.origin {
@@ -264,6 +269,6 @@ fn refusal(line: &JobLine, number: u16, messages: &[String]) -> String {
             let Origin { file, line, .. } = origin;
             format!("{file}:{line}: {reason}\n    {}", origin.shown())
         }
-        None => format!("the plotter refuses {}: {reason}", asked(&line.sent)),
+        None => format!("the plotter refuses {}: {reason}", as_option(&line.sent)),
     }
 }

@@ -71,7 +71,7 @@ pub struct FakePlotter {
     /// The stroke, counted from 0, before which it waits for a pen, and the number of that pen.
     pub pen_before: Option<(u64, u8)>,
     /// The pens that the client was asked to change to, in order.
-    pub pens_asked: Vec<u8>,
+    pub requested_pens: Vec<u8>,
     /// The stroke, counted from 0, before which a feed hold occurs.
     pub hold_before: Option<u64>,
     /// The user's successive answers to the question whether to resume. When they are used up,
@@ -123,7 +123,7 @@ impl FakePlotter {
         if let Some((stroke, pen)) = self.pen_before
             && stroke == drawn
         {
-            let place = self.pens_asked.len();
+            let place = self.requested_pens.len();
             return self
                 .say(&format!("<Hold:0|MPos:{place}.000,2.000|Pen:{pen}|Strokes:{drawn}/9>"));
         }
@@ -297,8 +297,8 @@ impl Link for FakePlotter {
 
     /// The pen is in when the client is asked for the second time.
     fn change_pen(&mut self, pen: u8) -> io::Result<bool> {
-        self.pens_asked.push(pen);
-        Ok(self.pens_asked.len() == 2)
+        self.requested_pens.push(pen);
+        Ok(self.requested_pens.len() == 2)
     }
 
     fn ask_to_resume(&mut self, _first: bool) -> io::Result<Answer> {

@@ -85,8 +85,9 @@ fn fit_each(
     let mut done = 0;
     let mut curves = Vec::new();
     for polyline in polylines {
-        let mut tell = |share: f64| progress(done + (share * polyline.len() as f64) as usize, all);
-        curves.push(fit_one(polyline, tolerance, &mut tell));
+        let mut report =
+            |share: f64| progress(done + (share * polyline.len() as f64) as usize, all);
+        curves.push(fit_one(polyline, tolerance, &mut report));
         done += polyline.len();
     }
     curves
@@ -111,8 +112,8 @@ fn fit_one(
     let mut fewest = as_it_is(&places);
     for (number, order) in ORDERS.into_iter().enumerate() {
         let most = HOPELESS * fewest.control.len();
-        let mut tell = |share: f64| progress((number as f64 + share) / ORDERS.len() as f64);
-        if let Some(curve) = joined(&pieces, order, strict, most, &mut tell)
+        let mut report = |share: f64| progress((number as f64 + share) / ORDERS.len() as f64);
+        if let Some(curve) = joined(&pieces, order, strict, most, &mut report)
             && curve.control.len() <= fewest.control.len()
         {
             fewest = curve;
@@ -162,11 +163,11 @@ fn joined(
     let mut knots = vec![0; order];
     let mut begin = 0;
     for places in pieces {
-        let mut tell = |share: f64| {
+        let mut report = |share: f64| {
             progress((done as f64 + share * places.len() as f64) / all as f64);
         };
-        let piece = Piece::fit(places, order, begin, tolerance, most, &mut tell)?;
-        tell(1.0);
+        let piece = Piece::fit(places, order, begin, tolerance, most, &mut report)?;
+        report(1.0);
         done += places.len();
         control.extend(&piece.control[usize::from(!control.is_empty())..]);
         knots.extend(piece.inner);

@@ -15,6 +15,7 @@ use std::sync::{Mutex, PoisonError};
 pub const EXIT_CODE: u8 = 130;
 
 static MOVING: AtomicUsize = AtomicUsize::new(0);
+/// The file that is being written and is deleted if the program ends early.
 static UNFINISHED: Mutex<Option<PathBuf>> = Mutex::new(None);
 
 /// A guard: while at least one exists, a plotter may be moving and must be stopped before the

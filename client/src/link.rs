@@ -62,7 +62,7 @@ pub trait Link {
 /// A plotter at a serial port, 115200 baud, 8 data bits, no parity, 1 stop bit.
 pub struct SerialLink {
     port: Box<dyn serialport::SerialPort>,
-    pen_asked: Option<u8>,
+    requested_pen: Option<u8>,
     /// Receives a message for each line that the user types; created when the user is asked for the
     /// first time.
     typed: Option<Receiver<()>>,
@@ -89,7 +89,7 @@ impl SerialLink {
     /// There is no such port, another program uses it, or the user has no permission to open it.
     pub fn open(device: &str) -> Result<Self, serialport::Error> {
         let port = serialport::new(device, BAUD).open()?;
-        Ok(Self { port, pen_asked: None, typed: None })
+        Ok(Self { port, requested_pen: None, typed: None })
     }
 }
 
@@ -113,10 +113,10 @@ impl Link for SerialLink {
 
     /// Asks the user to change the pen, and assumes that it is in when the user has pressed Enter.
     fn change_pen(&mut self, pen: u8) -> io::Result<bool> {
-        let first = self.pen_asked.replace(pen) != Some(pen);
+        let first = self.requested_pen.replace(pen) != Some(pen);
         let answer = self.ask(first, &format!("Put in pen {pen}, then press Enter"));
         if answer == Answer::Yes {
-            self.pen_asked = None;
+            self.requested_pen = None;
         }
         Ok(answer == Answer::Yes)
     }

@@ -38,6 +38,7 @@ fn identity(path: &Path) -> PathBuf {
     path.canonicalize().ok().or_else(beside).unwrap_or_else(|| path.to_owned())
 }
 
+/// Finds out, before any work, whether the file can be written.
 fn try_to_write(path: &Path) -> io::Result<()> {
     if path.is_dir() || path.to_string_lossy().ends_with(is_separator) {
         return Err(io::ErrorKind::IsADirectory.into());
@@ -76,6 +77,7 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     result.map_err(|source| Error::Write { file: path.display().to_string(), source })
 }
 
+/// Writes a file under another name beside `path`, and renames it when it is complete.
 fn write_beside(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let unfinished = unfinished(path)?;
     let result = while_unfinished(&unfinished, || {

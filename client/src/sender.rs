@@ -107,6 +107,7 @@ impl<'a> Sender<'a> {
         Ok(sender)
     }
 
+    /// Asks for the status until the plotter answers.
     fn find_state(&mut self) -> Result<Status, Error> {
         let start = self.link.now();
         let mut heard = None;
@@ -138,8 +139,8 @@ impl<'a> Sender<'a> {
         while self.since(start) < self.patience.lost {
             // The first line end terminates what is left of a corrupted line.
             self.send(&format!("\n{}\n", numbered(Some(0), LAST_NUMBER)))?;
-            let asked = self.link.now();
-            while self.since(asked) < self.patience.reply {
+            let requested_at = self.link.now();
+            while self.since(requested_at) < self.patience.reply {
                 self.stop_if_interrupted()?;
                 match self.listen()? {
                     Some(Reply::Done(0)) => {
@@ -290,6 +291,7 @@ impl<'a> Sender<'a> {
         }
     }
 
+    /// Returns the error for a plotter that answers no more.
     fn silent(&self, line: AtLine<'_>) -> Error {
         Error::Silent { patience: self.patience.silence, line: line().map(Box::new) }
     }
@@ -338,6 +340,7 @@ impl<'a> Sender<'a> {
         Ok(self.link.send(&[STATUS_QUERY])?)
     }
 
+    /// Asks for the status if the last time was long enough ago.
     fn query_if_due(&mut self) -> Result<(), Error> {
         if self.since(self.last_query) >= self.patience.query {
             self.query()?;

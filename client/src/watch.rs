@@ -63,6 +63,7 @@ impl PenWatch {
     }
 }
 
+/// Returns a run with the pen up that begins at this point.
 fn start(at: [f64; 2]) -> Run {
     Run { pen_down: false, pen: 1, points: vec![at] }
 }

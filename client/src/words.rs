@@ -3,8 +3,8 @@
 //! The messages of the plotter and its library refer to the serial protocol, such as `$page` or
 //! `send $pens=one`. A user who typed `--page` must read `--page`. The library's table of options
 //! says which exist in both forms. [`for_client`] translates a message of the plotter with it,
-//! [`asked`] a line that was sent, and [`explained`] a refusal. For refusals whose text would not
-//! help here, the library's table of errors has another text.
+//! [`as_option`] a line that was sent, and [`explained`] a refusal. For refusals whose text would
+//! not help here, the library's table of errors has another text.
 
 use crate::protocol::error_entry;
 use penup::plotter::OPTIONS;
@@ -55,12 +55,12 @@ pub fn explained(number: u16, messages: &[String]) -> String {
 /// Describes a line that was sent by the option that it came from.
 ///
 /// ```
-/// use penup_client::words::asked;
-/// assert_eq!(asked("$page=210x297"), "--page 210x297");
-/// assert_eq!(asked("$title=costs $5=x"), "--title costs $5=x");
-/// assert_eq!(asked("$plot"), "the drawing");
+/// use penup_client::words::as_option;
+/// assert_eq!(as_option("$page=210x297"), "--page 210x297");
+/// assert_eq!(as_option("$title=costs $5=x"), "--title costs $5=x");
+/// assert_eq!(as_option("$plot"), "the drawing");
 /// ```
-pub fn asked(line: &str) -> String {
+pub fn as_option(line: &str) -> String {
     let Some(command) = line.strip_prefix('$') else { return line.to_owned() };
     let (name, value) = match command.split_once('=') {
         Some((name, value)) => (name, Some(value)),
@@ -74,7 +74,8 @@ pub fn asked(line: &str) -> String {
 /// ```
 /// use penup_client::words::for_client;
 /// assert_eq!(for_client("choose a larger $page, or $fit=on"), "choose a larger --page, or --fit");
-/// assert_eq!(for_client("send $pens=one to draw all with one"), "use --pens one to draw all with one");
+/// let for_all = for_client("send $pens=one to draw all with one");
+/// assert_eq!(for_all, "use --pens one to draw all with one");
 /// ```
 pub fn for_client(text: &str) -> String {
     let mut parts = text.split('$');
@@ -105,6 +106,7 @@ fn split_after(text: &str, or: impl Fn(char) -> bool) -> (&str, &str) {
     text.split_at(text.find(|letter| !is_in(letter)).unwrap_or(text.len()))
 }
 
+/// Writes an option of the client with its value.
 fn named(name: &str, value: Option<&str>) -> String {
     match (form(name), value) {
         (Some(Form::Words(words)), _) => words.to_owned(),
@@ -117,6 +119,7 @@ fn named(name: &str, value: Option<&str>) -> String {
     }
 }
 
+/// Returns how an option with this name is written for the client.
 fn form(name: &str) -> Option<Form> {
     let words = WORDS.iter().find(|(word, _)| *word == name);
     words.map(|(_, words)| Form::Words(words)).or_else(|| {

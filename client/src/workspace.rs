@@ -21,6 +21,7 @@ pub fn root() -> PathBuf {
     })
 }
 
+/// Whether the folder is the root of the workspace.
 fn is_root(folder: &Path) -> bool {
     ["Cargo.toml", "scenes/interpen.obj", "client/Cargo.toml"]
         .iter()

@@ -54,7 +54,7 @@ fn a_pen_is_changed_when_the_machine_stands_and_the_job_goes_on_when_it_is_in() 
     let mut plotter = FakePlotter::new(Fault::None);
     plotter.pen_before = Some((2, 5));
     job(&mut plotter, 3).expect("a job without a fault");
-    assert_eq!(plotter.pens_asked, [5, 5], "the first time it was not in");
+    assert_eq!(plotter.requested_pens, [5, 5], "the first time it was not in");
     assert_eq!(plotter.pen_before, None, "it was told to go on");
 }
 
@@ -250,12 +250,12 @@ impl Progress for Recorder {
 fn progress_counts_lines_then_strokes() {
     let mut plotter = FakePlotter::new(Fault::None);
     let interrupt = AtomicBool::new(false);
-    let mut told = Recorder::default();
+    let mut recorder = Recorder::default();
     let mut sender = Sender::open(&mut plotter, PATIENCE, &interrupt).expect("a plotter");
-    sender.stream(&lines(2), &mut told).expect("all taken");
-    sender.plot(&mut told).expect("drawn");
+    sender.stream(&lines(2), &mut recorder).expect("all taken");
+    sender.plot(&mut recorder).expect("drawn");
     assert_eq!(
-        told.0,
+        recorder.0,
         ["line 1/2", "line 2/2", "stroke 0/3", "stroke 1/3", "stroke 2/3", "stroke 3/3"]
     );
 }

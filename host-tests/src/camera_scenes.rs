@@ -324,7 +324,7 @@ pub fn camera_scene(seed: u64) -> CameraScene {
         corners: seen.elements.corners().to_vec(),
         positions: model.vertices().iter().map(|position| position.coordinates()).collect(),
         precision,
-        view_error: view.doubt(precision.written),
+        view_error: view.error_bound(precision.written),
         projection: view.projection(),
     }
 }

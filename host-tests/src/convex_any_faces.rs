@@ -19,7 +19,7 @@ use crate::random::Random;
 #[derive(Default)]
 struct Faces {
     corners: Vec<Corner>,
-    sights: BTreeMap<(u16, u16), EdgeVisibility>,
+    visibilities: BTreeMap<(u16, u16), EdgeVisibility>,
 }
 
 impl SolidSink for Faces {
@@ -30,7 +30,7 @@ impl SolidSink for Faces {
 
     fn edge(&mut self, edge: SolidEdge) -> Result<(), SinkFull> {
         let (a, b) = edge.ends;
-        self.sights.insert((a.min(b), a.max(b)), edge.sight);
+        self.visibilities.insert((a.min(b), a.max(b)), edge.visibility);
         Ok(())
     }
 }
@@ -79,8 +79,8 @@ pub fn is_seen_alike(random: &mut Random, stretches: impl Fn(&Scene<'_>) -> Vec<
         let Some((a, b)) = stretch.edge else { continue };
         seen.entry((a.min(b), a.max(b))).or_default().push(stretch.visible);
     }
-    for (ends, sight) in &faces.sights {
-        let expected = match sight {
+    for (ends, visibility) in &faces.visibilities {
+        let expected = match visibility {
             EdgeVisibility::Outline | EdgeVisibility::Visible => true,
             EdgeVisibility::Hidden => false,
             // It does not matter here which of several coinciding lines is drawn.
@@ -89,7 +89,7 @@ pub fn is_seen_alike(random: &mut Random, stretches: impl Fn(&Scene<'_>) -> Vec<
         assert_eq!(
             seen.get(ends).map(Vec::as_slice),
             Some(&[expected][..]),
-            "{ends:?} {sight:?} of {points:?} seen from {eye:?}"
+            "{ends:?} {visibility:?} of {points:?} seen from {eye:?}"
         );
     }
     true

@@ -66,7 +66,7 @@ impl SolidSink for Found {
 
     fn edge(&mut self, edge: SolidEdge) -> Result<(), SinkFull> {
         let (a, b) = edge.ends;
-        let known = self.edges.insert((a.min(b), a.max(b)), edge.sight);
+        let known = self.edges.insert((a.min(b), a.max(b)), edge.visibility);
         assert_eq!(known, None, "an edge came twice");
         Ok(())
     }
@@ -235,13 +235,13 @@ pub fn model(points: &[Point], eye: Eye) -> Model {
         .map(|(ends, mut facing)| {
             facing.sort_unstable();
             assert_eq!(facing.len(), 2, "an edge has two faces");
-            let sight = match (facing[0], facing[1]) {
+            let visibility = match (facing[0], facing[1]) {
                 (1, 1) => EdgeVisibility::Visible,
                 (_, 1) => EdgeVisibility::Outline,
                 (_, 0) => EdgeVisibility::BehindOutline,
                 _ => EdgeVisibility::Hidden,
             };
-            (ends, sight)
+            (ends, visibility)
         })
         .collect();
     Model::Solid(Solid { faces, edges, welded, flat: distinct.len() - corners.len() })

@@ -308,7 +308,7 @@ impl World {
             .all(|beside| nearer.iter().any(|polygon| self.covers(polygon, &point, beside)))
     }
 
-    fn is_stood_in(&self, number: usize, t: &Number) -> bool {
+    fn is_enclosed(&self, number: usize, t: &Number) -> bool {
         let edge = &self.edges[number];
         let point = at_fraction(&edge.page, t);
         let depth = self.edge_depth(edge, t);
@@ -363,7 +363,7 @@ impl World {
                 let middle = half(&pair[0] + &pair[1]);
                 let hidden = self.is_hidden(edge, &about, &middle);
                 if !hidden
-                    && (self.is_stood_in(number, &middle)
+                    && (self.is_enclosed(number, &middle)
                         || merged_blocks && self.is_within_plane(edge, &about, &middle))
                 {
                     continue;

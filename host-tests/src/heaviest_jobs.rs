@@ -52,7 +52,7 @@ fn jobs(lattice: &str) -> Vec<Job> {
 ///
 /// # Errors
 /// The emulator fails.
-pub fn on_the_lm3s6965(tell: impl FnMut(&str, Stack)) -> Result<(), Box<dyn Error>> {
+pub fn on_the_lm3s6965(report: impl FnMut(&str, Stack)) -> Result<(), Box<dyn Error>> {
     let options = Options { paints_stack: true, ..Options::default() };
     let emulator = Emulator::start(&image_path("lm3s6965"), options)?;
     let line = Line::to(Box::new(emulator))?;
@@ -60,14 +60,14 @@ pub fn on_the_lm3s6965(tell: impl FnMut(&str, Stack)) -> Result<(), Box<dyn Erro
         let painted = emulator.stack()?;
         painted.ok_or(EmulatorError::Ended { said: "the stack was not painted".into() })
     };
-    run_all(line, "lattice5.obj", |_| Ok(()), stack, tell)
+    run_all(line, "lattice5.obj", |_| Ok(()), stack, report)
 }
 
 /// Runs all jobs on the Pico, whose USB host queries the status all the time.
 ///
 /// # Errors
 /// The emulator fails.
-pub fn on_the_pico(tell: impl FnMut(&str, Stack)) -> Result<(), Box<dyn Error>> {
+pub fn on_the_pico(report: impl FnMut(&str, Stack)) -> Result<(), Box<dyn Error>> {
     let mut line = Line::to(Box::new(Pico::start(&image_path("pico"))?))?;
     line.emulator.plug_usb_in()?;
     let ask_by_usb = |pico: &mut Pico| {
@@ -75,7 +75,7 @@ pub fn on_the_pico(tell: impl FnMut(&str, Stack)) -> Result<(), Box<dyn Error>> 
         while pico.receive_by_usb(&mut [0; 256], Duration::ZERO)? > 0 {}
         Ok(())
     };
-    run_all(line, "lattice2.obj", ask_by_usb, Pico::stack, tell)
+    run_all(line, "lattice2.obj", ask_by_usb, Pico::stack, report)
 }
 
 fn run_all<E: EmulatedBoard>(
@@ -83,7 +83,7 @@ fn run_all<E: EmulatedBoard>(
     lattice: &str,
     mut meanwhile: impl FnMut(&mut E) -> std::io::Result<()>,
     mut stack: impl FnMut(&mut E) -> Result<Stack, EmulatorError>,
-    mut tell: impl FnMut(&str, Stack),
+    mut report: impl FnMut(&str, Stack),
 ) -> Result<(), Box<dyn Error>> {
     for (name, lines) in jobs(lattice) {
         for text in [String::from("$clear")].into_iter().chain(lines) {
@@ -110,7 +110,7 @@ fn run_all<E: EmulatedBoard>(
         line.hear_greeting()?;
         while !line.status()?.contains("<Idle") {}
         line.emulator.pin_changes()?;
-        tell(name, stack(&mut line.emulator)?);
+        report(name, stack(&mut line.emulator)?);
     }
     Ok(())
 }

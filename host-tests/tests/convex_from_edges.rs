@@ -41,8 +41,8 @@ fn found(
 }
 
 /// The edges in random order and direction, some of them twice.
-fn shuffled(random: &mut Random, sights: &Sights) -> Vec<[u16; 2]> {
-    let mut edges: Vec<[u16; 2]> = sights.keys().map(|(a, b)| [*a, *b]).collect();
+fn shuffled(random: &mut Random, visibilities: &Sights) -> Vec<[u16; 2]> {
+    let mut edges: Vec<[u16; 2]> = visibilities.keys().map(|(a, b)| [*a, *b]).collect();
     edges.push(random.one_of(&edges));
     for edge in &mut edges {
         random.shuffle(edge);
@@ -66,9 +66,9 @@ fn compare(random: &mut Random, points: &[Point], eye: Eye) -> Option<&'static s
         assert_eq!(found(points, &edges, eye, 0), Err(SolidError::EyeInside), "{}", case());
         return Some("eye inside");
     }
-    let (summary, sights) =
+    let (summary, visibilities) =
         found(points, &edges, eye, 0).unwrap_or_else(|error| panic!("{error:?} {}", case()));
-    assert_eq!(sights, solid.edges, "{}", case());
+    assert_eq!(visibilities, solid.edges, "{}", case());
     assert_eq!(summary.welded, solid.welded, "{}", case());
     Some(
         ["no component", "one component", "two components", "more components"]
@@ -119,9 +119,10 @@ fn found_from_vertices(points: &[Point], eye: Eye, tolerance: u32) -> Result<Sig
 }
 
 /// For each edge, whether it is drawn when hidden lines are omitted.
-fn drawn(sights: Sights) -> BTreeMap<(u16, u16), bool> {
-    let is_drawn = |sight| !matches!(sight, EdgeVisibility::Hidden | EdgeVisibility::BehindOutline);
-    sights.into_iter().map(|(ends, sight)| (ends, is_drawn(sight))).collect()
+fn drawn(visibilities: Sights) -> BTreeMap<(u16, u16), bool> {
+    let is_drawn =
+        |visibility| !matches!(visibility, EdgeVisibility::Hidden | EdgeVisibility::BehindOutline);
+    visibilities.into_iter().map(|(ends, visibility)| (ends, is_drawn(visibility))).collect()
 }
 
 /// The dodecahedron and the other scenes are rotated and rounded, and also seen along their axes
@@ -165,7 +166,12 @@ fn rounded_solids_are_seen_like_exact_ones() {
             };
             let tolerance = half_of_the_last(6);
             let seen = found(&rounded, &edges, turned_eye, tolerance);
-            assert_eq!(seen.map(|(_, sights)| drawn(sights)).as_ref(), Ok(&exact), "{}", case());
+            assert_eq!(
+                seen.map(|(_, visibilities)| drawn(visibilities)).as_ref(),
+                Ok(&exact),
+                "{}",
+                case()
+            );
             let seen = found_from_vertices(&rounded, turned_eye, tolerance);
             assert_eq!(seen.map(drawn).as_ref(), Ok(&exact), "{}", case());
         }
@@ -179,7 +185,8 @@ fn both_ways_to_see_agree_on_the_scenes() {
         let (points, faces) = read_scene(name);
         for _ in 0..200 {
             let eye = any_eye(&mut random, &points);
-            let from_edges = found(&points, &edges_of(&faces), eye, 0).map(|(_, sights)| sights);
+            let from_edges =
+                found(&points, &edges_of(&faces), eye, 0).map(|(_, visibilities)| visibilities);
             assert_eq!(from_edges, found_from_vertices(&points, eye, 0), "{name} {eye:?}");
         }
     }
@@ -191,15 +198,15 @@ const ITS_EDGES: [[u16; 2]; 8] = [[0, 1], [1, 2], [2, 3], [3, 0], [0, 4], [1, 4]
 #[test]
 fn a_diagonal_of_a_face_is_seen_like_the_face() {
     let edges = [&ITS_EDGES[..], &[[0, 2]]].concat();
-    for (eye, sight) in [
+    for (eye, visibility) in [
         (Eye::Towards([0, 0, 1]), EdgeVisibility::Hidden),
         (Eye::Towards([0, 0, -1]), EdgeVisibility::Visible),
         (Eye::Towards([9, 1, 1]), EdgeVisibility::Hidden),
         (Eye::Towards([9, 1, -1]), EdgeVisibility::Visible),
         (Eye::Towards([9, 1, 0]), EdgeVisibility::BehindOutline),
     ] {
-        let (_, sights) = found(&SQUARE_PYRAMID, &edges, eye, 0).expect("a solid");
-        assert_eq!(sights[&(0, 2)], sight, "{eye:?}");
+        let (_, visibilities) = found(&SQUARE_PYRAMID, &edges, eye, 0).expect("a solid");
+        assert_eq!(visibilities[&(0, 2)], visibility, "{eye:?}");
     }
 }
 
@@ -215,9 +222,13 @@ fn a_vertex_in_the_middle_of_an_edge_or_face_is_seen_like_it() {
         (Eye::Towards([1, -9, -9]), EdgeVisibility::Visible, EdgeVisibility::Visible),
         (Eye::Towards([1, 9, 1]), EdgeVisibility::Hidden, EdgeVisibility::Hidden),
     ] {
-        let (_, sights) = found(&points, &edges, eye, 0).expect("a solid");
-        assert_eq!([sights[&(0, 5)], sights[&(1, 5)]], [of_edge; 2], "{eye:?}");
-        assert_eq!([sights[&(2, 6)], sights[&(3, 6)], sights[&(5, 6)]], [of_face; 3], "{eye:?}");
+        let (_, visibilities) = found(&points, &edges, eye, 0).expect("a solid");
+        assert_eq!([visibilities[&(0, 5)], visibilities[&(1, 5)]], [of_edge; 2], "{eye:?}");
+        assert_eq!(
+            [visibilities[&(2, 6)], visibilities[&(3, 6)], visibilities[&(5, 6)]],
+            [of_face; 3],
+            "{eye:?}"
+        );
     }
 }
 
@@ -246,13 +257,16 @@ fn what_is_no_solid_is_refused() {
     );
     // In a plane: nothing hides anything.
     let flat = SQUARE_PYRAMID.map(|[x, y, _]| [x, y, x]);
-    let (_, sights) = found(&flat, &ITS_EDGES, eye, 0).expect("a flat thing");
-    assert!(sights.len() == 8 && sights.values().all(|sight| *sight == EdgeVisibility::Visible));
+    let (_, visibilities) = found(&flat, &ITS_EDGES, eye, 0).expect("a flat thing");
+    assert!(
+        visibilities.len() == 8
+            && visibilities.values().all(|visibility| *visibility == EdgeVisibility::Visible)
+    );
     // An edge of no length, and the same corner under two numbers.
     let twice = [&SQUARE_PYRAMID[..], &[[0, 0, 0]]].concat();
     let edges = [&ITS_EDGES[..], &[[0, 5], [5, 5], [5, 1]]].concat();
-    let (summary, sights) = found(&twice, &edges, eye, 0).expect("a solid");
-    assert_eq!((summary.welded, sights.len()), (1, 8));
+    let (summary, visibilities) = found(&twice, &edges, eye, 0).expect("a solid");
+    assert_eq!((summary.welded, visibilities.len()), (1, 8));
 }
 
 /// For any edges, the library returns a result or an error and does not panic.
@@ -267,8 +281,8 @@ fn nonsense_does_no_harm() {
             .collect();
         let eye = any_eye(&mut random, &points);
         let tolerance = random.one_of(&[0, 1, 1000, u32::MAX]);
-        if let Ok((summary, sights)) = found(&points, &edges, eye, tolerance) {
-            assert!(sights.len() == summary.edges && summary.edges <= edges.len());
+        if let Ok((summary, visibilities)) = found(&points, &edges, eye, tolerance) {
+            assert!(visibilities.len() == summary.edges && summary.edges <= edges.len());
         }
     }
 }

@@ -55,7 +55,7 @@ fn compare(points: &[Point], eye: Eye) -> &'static str {
             assert_eq!(found.faces, solid.faces, "{}", case());
             assert_eq!(found.edges, solid.edges, "{}", case());
             assert_eq!((summary.welded, summary.flat), (solid.welded, solid.flat), "{}", case());
-            if solid.edges.values().any(|sight| *sight == EdgeVisibility::BehindOutline) {
+            if solid.edges.values().any(|visibility| *visibility == EdgeVisibility::BehindOutline) {
                 "edge-on"
             } else {
                 "solid"
@@ -238,9 +238,9 @@ fn the_same_solid_whatever_the_order_of_its_vertices() {
         let renamed: BTreeMap<_, _> = found
             .edges
             .iter()
-            .map(|((a, b), sight)| {
+            .map(|((a, b), visibility)| {
                 let (a, b) = (order[usize::from(*a)], order[usize::from(*b)]);
-                ((a.min(b), a.max(b)), *sight)
+                ((a.min(b), a.max(b)), *visibility)
             })
             .collect();
         assert_eq!(renamed, edges);

@@ -322,7 +322,9 @@ proptest! {
                     started = true;
                     turn.machine.start(&mut first).expect("within the travel");
                 }
-                while let Some(&(_, order, percent)) = waiting.next_if(|order| turn.now >= order.0) {
+                while let Some(&(_, order, percent)) =
+                    waiting.next_if(|order| turn.now >= order.0)
+                {
                     match order {
                         0 => turn.machine.set_override(percent),
                         1 => turn.machine.set_override(100),
@@ -332,7 +334,9 @@ proptest! {
                 if aborts && turn.now >= last {
                     turn.machine.abort();
                 }
-                if turn.machine.state() == (State::Hold { stopped: true }) && turn.machine.is_stopped() {
+                if turn.machine.state() == (State::Hold { stopped: true })
+                    && turn.machine.is_stopped()
+                {
                     assert_eq!(turn.machine.planned_position(), turn.pins);
                     turn.machine.resume();
                 }

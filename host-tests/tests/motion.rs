@@ -119,7 +119,13 @@ proptest! {
         for (setting, value) in values {
             prop_assume!(settings.set(setting, Value::from_num(value)).is_ok());
         }
-        let inks = [None, Some(LineType::Full), Some(LineType::Full), Some(LineType::Dotted), Some(LineType::Dashed)];
+        let inks = [
+            None,
+            Some(LineType::Full),
+            Some(LineType::Full),
+            Some(LineType::Dotted),
+            Some(LineType::Dashed),
+        ];
         let targets: Vec<_> = targets
             .into_iter()
             .map(|(x, y, ink)| Target {

@@ -212,7 +212,8 @@ proptest! {
             segment.pen = pen;
         }
         prop_assert_eq!(orders_everything(&sheet), Ok(()));
-        let options = Options { method: Method::Auto, shape: Shape::OpenPath, effort: 1, lift_cost: 0 };
+        let (method, shape) = (Method::Auto, Shape::OpenPath);
+        let options = Options { method, shape, effort: 1, lift_cost: 0 };
         let (tour, _) = sheet.order(options).expect("as above");
         let pens = tour.iter().map(|leg| sheet.segments[leg.segment()].pen);
         prop_assert!(pens.is_sorted());

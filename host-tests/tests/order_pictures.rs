@@ -9,7 +9,8 @@
 //! ```
 //!
 //! A segment that runs down is `1v` or `1^` below its upper end, and a slanting one is `1\v`,
-//! `1\^`, `1/v` or `1/^`. The pen is lifted wherever a segment does not begin where the last one ended.
+//! `1\^`, `1/v` or `1/^`. The pen is lifted wherever a segment does not begin where the last one
+//! ended.
 
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
 

@@ -75,8 +75,8 @@ proptest! {
             // Between the ends of all lines that overlap it, each stretch is drawn as the best type
             // that any of them requires.
             let on_it = || lines.iter().chain(&found);
-            let mut cuts: Vec<i64> =
-                on_it().filter_map(|other| covered(line, other)).flat_map(|(a, b)| [a, b]).collect();
+            let stretches = on_it().filter_map(|other| covered(line, other));
+            let mut cuts: Vec<i64> = stretches.flat_map(|(a, b)| [a, b]).collect();
             cuts.sort_unstable();
             for pair in cuts.windows(2).filter(|pair| pair[0] < pair[1]) {
                 let best = |of: &[Drawn]| {

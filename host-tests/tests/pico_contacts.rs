@@ -37,7 +37,7 @@ fn wait_for_steps(line: &mut Line<Pico>) -> TestResult {
 
 /// Checks that the alarm is reported once, that the state is that of an alarm and that the report
 /// contains its number. After the report, there must be no step.
-fn stands_in_alarm(line: &mut Line<Pico>, number: u8) -> TestResult {
+fn is_in_alarm(line: &mut Line<Pico>, number: u8) -> TestResult {
     assert_eq!(line.hear()?, format!("ALARM:{number}"));
     let told_at = line.emulator.clock()?;
     // A line that is being processed is refused.
@@ -66,7 +66,7 @@ fn stops_a_job(pin: u8, number: u8, settings: &[&str]) -> TestResult {
     }
     wait_for_steps(&mut line)?;
     line.emulator.bounce(pin, false, BOUNCE)?;
-    stands_in_alarm(&mut line, number)
+    is_in_alarm(&mut line, number)
 }
 
 #[test]
@@ -80,7 +80,7 @@ fn the_emergency_stop_stops_a_job_and_is_reported_until_it_is_released() -> Test
     assert_eq!(line.ask("$J=X400F6000")?, "ok");
     wait_for_steps(&mut line)?;
     line.emulator.bounce(STOP, false, BOUNCE)?;
-    stands_in_alarm(&mut line, 10)?;
+    is_in_alarm(&mut line, 10)?;
     assert!(line.status()?.contains("|Pn:E|"));
     // The board cannot be unlocked while the contact is pressed.
     assert!(line.ask("$X")?.starts_with("[MSG:"));
@@ -159,11 +159,11 @@ fn a_switch_that_is_stuck_or_never_found_fails_the_homing() -> TestResult {
     line.emulator.bounce(LIMIT_X, false, BOUNCE)?;
     while !line.status()?.contains("|Pn:X|") {}
     line.emulator.send(b"$H\n")?;
-    stands_in_alarm(&mut line, 9)?;
+    is_in_alarm(&mut line, 9)?;
     // The switch is never found: the search covers one and a half travels.
     let mut line = start(&HOMING)?;
     line.emulator.send(b"$H\n")?;
-    stands_in_alarm(&mut line, 9)
+    is_in_alarm(&mut line, 9)
 }
 
 #[test]
@@ -172,11 +172,11 @@ fn the_emergency_stop_before_homing_and_during_it() -> TestResult {
     line.emulator.send(b"$H\n")?;
     wait_for_steps(&mut line)?;
     line.emulator.bounce(STOP, false, BOUNCE)?;
-    stands_in_alarm(&mut line, 10)?;
+    is_in_alarm(&mut line, 10)?;
     // The line is refused, and so is another attempt.
     let mut line = start(&HOMING)?;
     line.emulator.bounce(STOP, false, BOUNCE)?;
-    stands_in_alarm(&mut line, 10)?;
+    is_in_alarm(&mut line, 10)?;
     let refused = line.ask("$H")?;
     assert!(refused.starts_with("[MSG:"), "{refused}");
     assert!(line.hear()?.starts_with("error:"));
@@ -236,5 +236,5 @@ fn a_clock_that_is_late_still_sees_the_stop() -> TestResult {
     }
     line.status()?;
     line.emulator.bounce(STOP, false, BOUNCE)?;
-    stands_in_alarm(&mut line, 10)
+    is_in_alarm(&mut line, 10)
 }

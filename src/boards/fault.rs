@@ -124,6 +124,7 @@ pub fn say(cause: fmt::Arguments) {
     ThisBoard::UART.write(b"\r\n");
 }
 
+/// Waits for Ctrl-X at the serial line, then resets the board.
 #[inline(never)]
 fn wait_for_reset() -> ! {
     ThisBoard::begin_to_wait();

@@ -264,7 +264,7 @@ pub struct HostBoard<'q> {
     /// Each separates the real-time bytes of one port from the ordinary ones.
     sorters: [Sorter; PORTS],
     /// The real-time requests that were not taken yet.
-    asked: RealTime,
+    requests: RealTime,
     /// The bytes that were sent.
     sent: Vec<u8>,
     /// The main loop's end of the queue of events.
@@ -295,7 +295,7 @@ impl<'q> HostBoard<'q> {
         Self {
             received: VecDeque::new(),
             sorters: [Sorter::new(); PORTS],
-            asked: RealTime::default(),
+            requests: RealTime::default(),
             sent: Vec::new(),
             queue,
             steps,
@@ -318,11 +318,11 @@ impl<'q> HostBoard<'q> {
     pub fn receive_by(&mut self, port: usize, bytes: &[u8]) {
         for byte in bytes {
             match self.sorters[port].sort(*byte) {
-                Some(asked) => {
-                    if asked.has(RealTime::ABORT) {
+                Some(requests) => {
+                    if requests.has(RealTime::ABORT) {
                         self.received.clear();
                     }
-                    self.asked = self.asked.and(asked);
+                    self.requests = self.requests.and(requests);
                 }
                 None => self.received.push_back((port, *byte)),
             }
@@ -346,7 +346,7 @@ impl<'q> HostBoard<'q> {
 
     /// Whether all received bytes have been read, and all real-time requests have been taken.
     pub fn has_read_all(&self) -> bool {
-        self.received.is_empty() && self.asked == RealTime::default()
+        self.received.is_empty() && self.requests == RealTime::default()
     }
 
     /// Returns the bytes that were sent and removes them.
@@ -374,7 +374,7 @@ impl Board for HostBoard<'_> {
     }
 
     fn take_real_time(&mut self) -> RealTime {
-        core::mem::take(&mut self.asked)
+        core::mem::take(&mut self.requests)
     }
 
     fn write(&mut self, bytes: &[u8]) {

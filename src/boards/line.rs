@@ -21,7 +21,7 @@ const RECEIVED_PLACES: usize = 256;
 pub const ABORT: u8 = 0x18;
 
 /// The real-time requests since they were last taken, as bits.
-static ASKED: AtomicU16 = AtomicU16::new(0);
+static REQUESTED: AtomicU16 = AtomicU16::new(0);
 
 /// The data that both ends of a port share.
 pub struct Shared {
@@ -71,31 +71,31 @@ impl Shared {
 
 /// Records what a real-time byte requests. It is called in the handler of a port with the receiving
 /// ends of all ports. No handler that could interrupt it does the same.
-pub fn ask(asked: RealTime, inlets: &mut [ReceiveMerge]) {
-    if asked.has(RealTime::ABORT) {
+pub fn ask(requests: RealTime, inlets: &mut [ReceiveMerge]) {
+    if requests.has(RealTime::ABORT) {
         for receive_merge in inlets {
             receive_merge.count_at_abort.store(receive_merge.receiver.abort(), Ordering::Release);
         }
     }
     // No update is lost here, because the main loop masks the handler while it takes the bits.
-    ASKED.store(ASKED.load(Ordering::Relaxed) | asked.to_bits(), Ordering::Release);
+    REQUESTED.store(REQUESTED.load(Ordering::Relaxed) | requests.to_bits(), Ordering::Release);
 }
 
 /// Takes the real-time requests that came since the last call. An abort discards the bytes that the
 /// `lines` received before it; `lines` must be those of all ports.
 pub fn take_real_time(lines: &mut [Line]) -> RealTime {
-    if ASKED.load(Ordering::Acquire) == 0 {
+    if REQUESTED.load(Ordering::Acquire) == 0 {
         return RealTime::default();
     }
-    let asked = critical_section::with(|_| {
-        let bits = ASKED.load(Ordering::Acquire);
-        ASKED.store(0, Ordering::Relaxed);
+    let requests = critical_section::with(|_| {
+        let bits = REQUESTED.load(Ordering::Acquire);
+        REQUESTED.store(0, Ordering::Relaxed);
         RealTime::from_bits(bits)
     });
-    if asked.has(RealTime::ABORT) {
+    if requests.has(RealTime::ABORT) {
         lines.iter_mut().for_each(Line::drop_void);
     }
-    asked
+    requests
 }
 
 impl Line {
@@ -104,8 +104,8 @@ impl Line {
     pub fn read_byte(&mut self) -> Option<u8> {
         // An abort and the first byte after it must not arrive between the check and the read.
         let byte = critical_section::with(|_| {
-            let asked = RealTime::from_bits(ASKED.load(Ordering::Acquire));
-            if asked.has(RealTime::ABORT) { None } else { self.bytes.dequeue() }
+            let requests = RealTime::from_bits(REQUESTED.load(Ordering::Acquire));
+            if requests.has(RealTime::ABORT) { None } else { self.bytes.dequeue() }
         })?;
         self.count = self.count.wrapping_add(1);
         Some(byte)

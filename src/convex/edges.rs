@@ -50,7 +50,7 @@ use crate::stage::{Cancel, OutOfScratch, Scratch, heap_sort_by_key};
 ///         Ok(())
 ///     }
 ///     fn edge(&mut self, edge: SolidEdge) -> Result<(), SinkFull> {
-///         if edge.sight == EdgeVisibility::Hidden {
+///         if edge.visibility == EdgeVisibility::Hidden {
 ///             self.0.push(edge.ends);
 ///         }
 ///         Ok(())
@@ -105,7 +105,7 @@ pub fn from_edges(
     let visible = scratch.take::<u8>(positions.len())?;
     graph.find_components();
     graph.decide_components(&viewpoint, outline, visible, cancel)?;
-    graph.hand_over(|ends| graph.sight(ends, eye, outline, visible), cancel, sink)
+    graph.hand_over(|ends| graph.visibility(ends, eye, outline, visible), cancel, sink)
 }
 
 /// Returns the bytes of working memory that [`from_edges`] takes.
@@ -134,10 +134,12 @@ impl Membership {
         Self(Self::OUTLINE | at as u16) // fewer than 2^14
     }
 
+    /// Returns the component to which a vertex inside the outline belongs.
     fn component_name(self) -> Option<u16> {
         (self.0 & Self::OUTLINE == 0).then_some(self.0)
     }
 
+    /// Returns the index of the vertex on the outline, if it lies there.
     fn outline_place(self) -> Option<usize> {
         (self.component_name().is_none() && self != Self::NO_EDGE)
             .then_some(usize::from(self.0 & !Self::OUTLINE))
@@ -359,7 +361,13 @@ impl<'s> Graph<'s> {
     }
 
     /// Returns the visibility of an edge.
-    fn sight(&self, ends: [u16; 2], eye: Eye, outline: &[u16], visible: &[u8]) -> EdgeVisibility {
+    fn visibility(
+        &self,
+        ends: [u16; 2],
+        eye: Eye,
+        outline: &[u16],
+        visible: &[u8],
+    ) -> EdgeVisibility {
         let memberships = ends.map(|end| self.membership[usize::from(end)]);
         let is_visible = match memberships.map_each(Membership::component_name) {
             [Some(name), _] | [None, Some(name)] => visible[usize::from(name)] != 0,
@@ -430,13 +438,13 @@ impl<'s> Graph<'s> {
     /// Hands the edges, each with its visibility, to the sink.
     fn hand_over(
         &self,
-        sight: impl Fn([u16; 2]) -> EdgeVisibility,
+        visibility: impl Fn([u16; 2]) -> EdgeVisibility,
         cancel: &mut dyn Cancel,
         sink: &mut dyn SolidSink,
     ) -> Result<SolidSummary, SolidError> {
         for ends in self.edges {
             cancel.check()?;
-            sink.edge(SolidEdge { ends: (ends[0], ends[1]), sight: sight(*ends) })?;
+            sink.edge(SolidEdge { ends: (ends[0], ends[1]), visibility: visibility(*ends) })?;
         }
         Ok(SolidSummary {
             edges: self.edges.len(),

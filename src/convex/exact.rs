@@ -13,6 +13,7 @@ use crate::fixed::product;
 /// A position in model coordinates, each within ±2^30.
 pub(super) type Point = [i32; 3];
 
+/// Returns the vector from b to a.
 fn difference(a: Point, b: Point) -> [i64; 3] {
     [0, 1, 2].map_each(|axis| i64::from(a[axis]) - i64::from(b[axis]))
 }
@@ -30,6 +31,7 @@ pub(super) struct Plane {
 }
 
 impl Plane {
+    /// Returns the plane through three points.
     pub(super) fn through(a: Point, b: Point, c: Point) -> Self {
         let u = difference(b, a);
         let v = difference(c, a);

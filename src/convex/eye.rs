@@ -16,6 +16,7 @@ pub enum Eye {
 pub const EYE_LIMIT: i64 = 1 << 61;
 
 impl Eye {
+    /// Checks that the coordinates are within [`EYE_LIMIT`], and that a direction is not zero.
     pub(super) fn check(self) -> Result<(), SolidError> {
         let (Self::At(coordinates) | Self::Towards(coordinates)) = self;
         let in_range =
@@ -49,6 +50,7 @@ impl Eye {
     }
 }
 
+/// Returns the greatest absolute value of the components.
 fn greatest(ray: [i64; 3]) -> i128 {
     ray.iter().map(|part| i128::from(part.unsigned_abs())).max().unwrap_or(0)
 }

@@ -76,7 +76,7 @@ pub(super) type FaceCorners = [u16; 3];
 ///         Ok(())
 ///     }
 ///     fn edge(&mut self, edge: SolidEdge) -> Result<(), SinkFull> {
-///         self.hidden_edges += usize::from(edge.sight == EdgeVisibility::Hidden);
+///         self.hidden_edges += usize::from(edge.visibility == EdgeVisibility::Hidden);
 ///         Ok(())
 ///     }
 /// }
@@ -183,7 +183,7 @@ fn flat_solid(
     }
     sink.face(marked, true)?;
     for (from, to) in sides(corners) {
-        sink.edge(SolidEdge { ends: (from, to), sight: EdgeVisibility::Outline })?;
+        sink.edge(SolidEdge { ends: (from, to), visibility: EdgeVisibility::Outline })?;
     }
     Ok(SolidSummary {
         faces: 1,

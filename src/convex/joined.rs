@@ -30,6 +30,7 @@ pub(super) struct Joining<'s> {
 }
 
 impl<'s> Joining<'s> {
+    /// The working memory in bytes for a solid with so many vertices and faces.
     pub(super) const fn scratch_bytes(vertices: usize, faces: usize) -> usize {
         Scratch::bytes_for::<u16>(faces)
             + Scratch::bytes_for::<u16>(vertices)
@@ -253,7 +254,10 @@ impl<'s> Joining<'s> {
             }
             self.next[usize::from(edge.from)] = edge.to;
             self.next[usize::from(edge.to)] = edge.from;
-            sink.edge(SolidEdge { ends: (edge.from, edge.to), sight: self.sight(left, right) })?;
+            sink.edge(SolidEdge {
+                ends: (edge.from, edge.to),
+                visibility: self.visibility(left, right),
+            })?;
             summary.edges += 1;
         }
         let exact_corners = self.solid.edges.len() + 2 - self.solid.faces.len(); // Euler
@@ -268,7 +272,7 @@ impl<'s> Joining<'s> {
     }
 
     /// Returns the visibility of the edge between two faces.
-    fn sight(&self, left: u16, right: u16) -> EdgeVisibility {
+    fn visibility(&self, left: u16, right: u16) -> EdgeVisibility {
         // A face that is neither visible nor turned away from the eye is edge-on.
         let edge_on = |face: u16| self.plane(face).height_of_eye(self.eye) >= 0;
         match (self.is_visible(left), self.is_visible(right)) {

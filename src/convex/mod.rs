@@ -70,7 +70,7 @@ pub struct SolidEdge {
     /// The numbers of the vertices that it joins.
     pub ends: (u16, u16),
     /// Whether and how the edge is visible.
-    pub sight: EdgeVisibility,
+    pub visibility: EdgeVisibility,
 }
 
 /// Receives the faces and edges that were found. Nothing is handed over before the whole solid is

@@ -35,6 +35,7 @@ impl<'s> Polygon<'s> {
         Self { corners: room, count: 3 }
     }
 
+    /// Returns the vertex numbers of the corners, in order.
     pub(super) fn corners(&self) -> &[u16] {
         &self.corners[..self.count]
     }

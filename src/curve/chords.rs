@@ -281,6 +281,7 @@ struct Cone {
 impl Cone {
     const ALL: Self = Self { sides: None, empty: false };
 
+    /// Whether no direction is left.
     fn is_empty(&self) -> bool {
         self.empty
     }

@@ -132,14 +132,17 @@ impl Parameter {
     /// The greatest number of polynomials for which 32 bits hold the end of the last one.
     const SPAN_LIMIT: usize = (1 << (32 - Self::LOCAL_BITS)) - 1;
 
+    /// Returns the parameter at which a span begins.
     fn start_of(span: usize) -> Self {
         Self((span.min(Self::SPAN_LIMIT) as u32) << Self::LOCAL_BITS)
     }
 
+    /// Returns the number of the span in which the parameter lies.
     fn span(self) -> usize {
         (self.0 >> Self::LOCAL_BITS) as usize
     }
 
+    /// Returns the position within the span, in units of 2^-[`Self::LOCAL_BITS`].
     fn local(self) -> u32 {
         self.0 & (Self::ONE - 1)
     }

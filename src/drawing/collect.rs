@@ -69,8 +69,8 @@ impl PackedLine {
         Self([low as u32, (low >> 32) as u32, high | marks << MARKS])
     }
 
-    /// Returns the same line. A full line is marked to yield to any other line at the same position,
-    /// so that a hidden line never replaces a visible one.
+    /// Returns the same line. A full line is marked to yield to any other line at the same
+    /// position, so that a hidden line never replaces a visible one.
     #[must_use]
     pub fn under(self) -> Self {
         let Self([low, middle, high]) = self;
@@ -290,6 +290,7 @@ impl<'a> PointFinder<'a> {
     /// Returns the number of a point. It is that of a known point at the same position or one step
     /// away from it, or else a new number.
     fn number(&mut self, point: PagePoint) -> Result<u16, OutOfScratch> {
+        /// The offsets of the same point, of its four neighbours, and of its four diagonal ones.
         const SAME_THEN_AROUND: [(i32, i32); 9] =
             [(0, 0), (-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (1, -1), (-1, 1), (1, 1)];
         for (dx, dy) in SAME_THEN_AROUND {

@@ -219,6 +219,7 @@ impl Machine<'_> {
         }
     }
 
+    /// Continues homing as the switches and the end of the present move allow.
     fn watch_homing(&mut self, homing: Homing, switches: Switches) {
         if homing.seeks() && homing.pressed_at.is_none() && switches.of(homing.axis) {
             let pressed_at = Some(self.homing_position(self.motors_now()));

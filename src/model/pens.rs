@@ -1,9 +1,9 @@
 //! Stores which pen draws each element.
 //!
 //! Neighbouring elements mostly have the same pen. Therefore only the changes are stored, one
-//! [`PenRun`] for each, in a region of the [store](super::store). A model with one pen stores none. Pens
-//! are chosen by `usemtl` and `g`: a name with a number is the pen of that number, and any other
-//! name gets the first pen without a name. Of such a name a hash is kept.
+//! [`PenRun`] for each, in a region of the [store](super::store). A model with one pen stores none.
+//! Pens are chosen by `usemtl` and `g`: a name with a number is the pen of that number, and any
+//! other name gets the first pen without a name. Of such a name a hash is stored.
 
 use super::ModelError;
 use crate::stage::{OutOfScratch, Scratch};

@@ -100,9 +100,10 @@ impl Model<'_> {
     /// use penup::model::{Model, no_undo};
     /// let (mut vertices, mut corners) = (heapless::Vec::<_, 2>::new(), []);
     /// let mut model = Model::new(&mut vertices, &mut corners);
-    /// model.add_vertex(["8", "2.5", "0"].map(|text| Decimal::parse(text).unwrap()), &mut no_undo)?;
+    /// let decimals = |texts: [&str; 3]| texts.map(|text| Decimal::parse(text).unwrap());
+    /// model.add_vertex(decimals(["8", "2.5", "0"]), &mut no_undo)?;
     /// assert_eq!(model.precision().written, 1); // Exact but for the unit.
-    /// model.add_vertex(["1", "2.540", "0.125"].map(|text| Decimal::parse(text).unwrap()), &mut no_undo)?;
+    /// model.add_vertex(decimals(["1", "2.540", "0.125"]), &mut no_undo)?;
     /// let half = model.precision().written as f64 / (1 << model.fraction_bits()) as f64;
     /// assert!((half - 0.0005).abs() < 1e-7);
     /// # Ok::<(), penup::model::ModelError>(())

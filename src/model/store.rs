@@ -64,6 +64,7 @@ impl<'m> Store<'m> {
         if needed > limit { Err(ModelError::TooManyCorners { limit, needed }) } else { Ok(()) }
     }
 
+    /// Returns where a region lies in the memory.
     fn range(&self, region: Region) -> Range<usize> {
         self.bounds[region as usize]..self.bounds[region as usize + 1]
     }
@@ -148,7 +149,7 @@ impl<'m> Store<'m> {
 
     /// Lengthens a region by `count` half-words and returns them; their contents are left over from
     /// before. The regions behind it are moved.
-    // Not inlined: the three ways to it share one copy of the code.
+    // Not inlined: its three callers share one copy of the code.
     #[inline(never)]
     fn grow(&mut self, region: Region, count: usize) -> Result<&mut [u16], ModelError> {
         self.check_room(count)?;

@@ -12,7 +12,7 @@ pub(super) struct Cycle<'s> {
     /// The legs, in the order of the cycle.
     legs: &'s mut [Leg],
     /// The index in `legs` of each chain, and of the gap.
-    place: &'s mut [u16],
+    index: &'s mut [u16],
     /// The stretches reversed since then: the index of the first leg, and the number of legs.
     turns: &'s mut [[u16; 2]],
     /// The number of turns in `turns`. Further turns are made but cannot be undone.
@@ -21,9 +21,9 @@ pub(super) struct Cycle<'s> {
 
 /// The position and the direction of a leg in a cycle. It is valid until the next turn.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Stand {
+pub(super) struct LegPosition {
     /// The index of the leg in the cycle.
-    place: usize,
+    index: usize,
     /// Whether the leg has the direction in which the cycle is stored.
     pub forward: bool,
 }
@@ -32,13 +32,13 @@ impl<'s> Cycle<'s> {
     /// The number of turns that can be undone.
     pub const MEMORY: usize = 256;
 
-    /// Makes the cycle of `legs`, which contain each of the numbers `0..legs.len()` once. `place`
+    /// Makes the cycle of `legs`, which contain each of the numbers `0..legs.len()` once. `index`
     /// must be as long as `legs`, and `turns` must have [`Cycle::MEMORY`] entries.
-    pub fn new(legs: &'s mut [Leg], place: &'s mut [u16], turns: &'s mut [[u16; 2]]) -> Self {
+    pub fn new(legs: &'s mut [Leg], index: &'s mut [u16], turns: &'s mut [[u16; 2]]) -> Self {
         for (at, leg) in (0..).zip(legs.iter()) {
-            place[leg.segment()] = at;
+            index[leg.segment()] = at;
         }
-        Self { legs, place, turns, turned: 0 }
+        Self { legs, index, turns, turned: 0 }
     }
 
     /// Returns the number of legs.
@@ -52,52 +52,52 @@ impl<'s> Cycle<'s> {
     }
 
     /// Returns the index of `leg` in the cycle.
-    fn place(&self, leg: Leg) -> usize {
-        usize::from(self.place[leg.segment()])
+    fn index(&self, leg: Leg) -> usize {
+        usize::from(self.index[leg.segment()])
     }
 
     /// Returns the position and the direction of `leg` in the cycle.
-    pub fn stand(&self, leg: Leg) -> Stand {
-        let place = self.place(leg);
-        Stand { place, forward: self.legs[place] == leg }
+    pub fn position(&self, leg: Leg) -> LegPosition {
+        let index = self.index(leg);
+        LegPosition { index, forward: self.legs[index] == leg }
     }
 
-    /// Returns the leg after the one at `stand`, in the direction of that leg.
-    pub fn after(&self, stand: Stand) -> Leg {
+    /// Returns the leg after the one at `position`, in the direction of that leg.
+    pub fn after(&self, position: LegPosition) -> Leg {
         let last = self.legs.len() - 1;
-        let place = stand.place;
-        if stand.forward {
-            self.legs[if place == last { 0 } else { place + 1 }]
+        let index = position.index;
+        if position.forward {
+            self.legs[if index == last { 0 } else { index + 1 }]
         } else {
-            self.legs[if place == 0 { last } else { place - 1 }].flipped()
+            self.legs[if index == 0 { last } else { index - 1 }].flipped()
         }
     }
 
-    /// Returns the leg before the one at `stand`, in the direction of that leg.
-    pub fn before(&self, stand: Stand) -> Leg {
-        self.after(Stand { forward: !stand.forward, ..stand }).flipped()
+    /// Returns the leg before the one at `position`, in the direction of that leg.
+    pub fn before(&self, position: LegPosition) -> Leg {
+        self.after(LegPosition { forward: !position.forward, ..position }).flipped()
     }
 
     /// Returns the leg after `leg`, in the direction of `leg`.
     pub fn next(&self, leg: Leg) -> Leg {
-        self.after(self.stand(leg))
+        self.after(self.position(leg))
     }
 
     /// Returns the leg before `leg`, in the direction of `leg`.
     pub fn previous(&self, leg: Leg) -> Leg {
-        self.before(self.stand(leg))
+        self.before(self.position(leg))
     }
 
     /// Returns how many legs after `from` the position of `to` comes, in the direction of `from`.
-    pub fn way(&self, from: Stand, to: Stand) -> usize {
+    pub fn legs_between(&self, from: LegPosition, to: LegPosition) -> usize {
         let (begin, end) =
-            if from.forward { (from.place, to.place) } else { (to.place, from.place) };
+            if from.forward { (from.index, to.index) } else { (to.index, from.index) };
         if end >= begin { end - begin } else { end + self.legs.len() - begin }
     }
 
     /// Returns how many legs after `from` the leg `to` comes, in the direction of `from`.
     pub fn steps(&self, from: Leg, to: Leg) -> usize {
-        self.way(self.stand(from), self.stand(to))
+        self.legs_between(self.position(from), self.position(to))
     }
 
     /// Reverses the stretch after `a` up to `c`: makes `… a, c … b, d …` from `… a, b … c, d …`,
@@ -105,16 +105,16 @@ impl<'s> Cycle<'s> {
     /// number of legs that were moved.
     pub fn turn(&mut self, a: Leg, c: Leg) -> usize {
         let inner = self.steps(a, c);
-        let (place_a, place_c) = (self.place(a), self.place(c));
+        let (index_a, index_c) = (self.index(a), self.index(c));
         let outer = self.legs.len() - inner;
-        let after = |place: usize| if place + 1 == self.legs.len() { 0 } else { place + 1 };
+        let after = |index: usize| if index + 1 == self.legs.len() { 0 } else { index + 1 };
         // To reverse the rest of the cycle instead gives the same cycle, so the shorter stretch is
         // reversed.
-        let (begin, count) = match (self.stand(a).forward, inner <= outer) {
-            (true, true) => (after(place_a), inner),
-            (true, false) => (after(place_c), outer),
-            (false, true) => (place_c, inner),
-            (false, false) => (place_a, outer),
+        let (begin, count) = match (self.position(a).forward, inner <= outer) {
+            (true, true) => (after(index_a), inner),
+            (true, false) => (after(index_c), outer),
+            (false, true) => (index_c, inner),
+            (false, false) => (index_a, outer),
         };
         self.turn_around(begin, count);
         if let Some(turn) = self.turns.get_mut(self.turned) {
@@ -152,9 +152,9 @@ impl<'s> Cycle<'s> {
     }
 
     /// Stores `leg` at an index.
-    fn set(&mut self, place: usize, leg: Leg) {
-        self.legs[place] = leg;
-        self.place[leg.segment()] = place as u16;
+    fn set(&mut self, index: usize, leg: Leg) {
+        self.legs[index] = leg;
+        self.index[leg.segment()] = index as u16;
     }
 
     /// Returns the number of turns since the cycle was last settled.
@@ -199,8 +199,8 @@ mod tests {
 
     fn with_cycle(test: impl Fn(&mut Cycle<'_>, &dyn Fn(u16) -> Leg)) {
         let mut legs = [0, 1, 2, 3, 4, 5].map(|number| Leg::new(number, false));
-        let (mut place, mut turns) = ([0; 6], [[0; 2]; Cycle::MEMORY]);
-        let mut cycle = Cycle::new(&mut legs, &mut place, &mut turns);
+        let (mut index, mut turns) = ([0; 6], [[0; 2]; Cycle::MEMORY]);
+        let mut cycle = Cycle::new(&mut legs, &mut index, &mut turns);
         let leg = |number| Leg::new(number, false);
         test(&mut cycle, &leg);
     }

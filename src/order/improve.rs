@@ -188,7 +188,7 @@ impl Best<'_, '_> {
         let (_, gap) = cycle.split_at_mut(self.route.len());
         gap.fill(Leg::new(chains, false));
         let gap = self.open.then_some(chains);
-        let ways: &mut [u8] = scratch.take(cycle.len())?;
+        let choices: &mut [u8] = scratch.take(cycle.len())?;
         let mut tour = Exchanges::new(
             self.network,
             self.neighbours,
@@ -198,7 +198,7 @@ impl Best<'_, '_> {
             &mut scratch,
         )?;
         work_budget.grant(budget);
-        shorten(&mut tour, ways, work_budget)?;
+        shorten(&mut tour, choices, work_budget)?;
         let kicks = &mut self.kicks;
         let mut in_vain = 0;
         for count in 1.. {
@@ -207,7 +207,7 @@ impl Best<'_, '_> {
             }
             let mut gain = kicks.kick(&mut tour, work_budget)?;
             if count % KICKS_BETWEEN_TURNS == 0 {
-                gain += shorten(&mut tour, ways, work_budget)?;
+                gain += shorten(&mut tour, choices, work_budget)?;
             }
             in_vain = if gain > 0 { 0 } else { in_vain + 1 };
         }
@@ -235,12 +235,12 @@ impl Best<'_, '_> {
 /// Exchanges moves and reverses strokes until neither helps any more. Returns the gain.
 fn shorten(
     tour: &mut Exchanges<'_, '_>,
-    ways: &mut [u8],
+    choices: &mut [u8],
     work_budget: &mut WorkBudget<'_>,
 ) -> Result<i64, OrderError> {
     let mut gain = tour.exchange_all(true, work_budget)?;
     while !work_budget.is_over() {
-        let more = orient(tour, ways, work_budget)?;
+        let more = orient(tour, choices, work_budget)?;
         if more == 0 {
             break;
         }

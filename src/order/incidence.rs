@@ -51,6 +51,7 @@ impl<'s> Incidence<'s> {
     }
 }
 
+/// Returns the leg with this code; `None` if the code is [`NONE`].
 fn leg(code: u16) -> Option<Leg> {
     (code != NONE).then(|| Leg::from_code(code))
 }

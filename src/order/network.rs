@@ -224,6 +224,7 @@ impl<'s, 'a> Survey<'s, 'a> {
         Ok(Self { segments: drawing.segments, pen, stops, degree, across, part })
     }
 
+    /// Returns how many segments meet at the point.
     fn degree(&self, point: u16) -> usize {
         usize::from(self.degree[usize::from(point)] & !HAS_ODD)
     }

@@ -12,10 +12,10 @@ use super::{Leg, NONE, OrderError};
 use crate::array::MapEach;
 
 /// Reverses strokes (the legs between two moves) where that makes the tour shorter. Returns the
-/// gain. `ways` must have an entry for each leg of the tour.
+/// gain. `choices` must have an entry for each leg of the tour.
 pub(super) fn orient(
     tour: &mut Exchanges<'_, '_>,
-    ways: &mut [u8],
+    choices: &mut [u8],
     work_budget: &mut WorkBudget<'_>,
 ) -> Result<i64, OrderError> {
     let Some(begin) = tour.first_of_a_stroke() else {
@@ -35,10 +35,13 @@ pub(super) fn orient(
             first_start = start;
         } else {
             old += tour.distance(ends[0], start);
-            let reach = |to| [0, 1].map_each(|way| least[way] + tour.distance(ends[way], to));
-            let (kept, turned) = (reach(start), reach(end));
-            ways[strokes] = u8::from(kept[1] < kept[0]) | u8::from(turned[1] < turned[0]) << 1;
-            least = [kept, turned].map_each(|[a, b]| a.min(b));
+            let reach = |to| {
+                [0, 1].map_each(|direction| least[direction] + tour.distance(ends[direction], to))
+            };
+            let (unchanged, reversed) = (reach(start), reach(end));
+            choices[strokes] =
+                u8::from(unchanged[1] < unchanged[0]) | u8::from(reversed[1] < reversed[0]) << 1;
+            least = [unchanged, reversed].map_each(|[a, b]| a.min(b));
         }
         ends = [end, start];
         strokes += 1;
@@ -48,21 +51,22 @@ pub(super) fn orient(
         }
     }
     old += tour.distance(ends[0], first_start);
-    let closed = [0, 1].map_each(|way| least[way] + tour.distance(ends[way], first_start));
+    let closed =
+        [0, 1].map_each(|direction| least[direction] + tour.distance(ends[direction], first_start));
     let gain = old - closed[0].min(closed[1]);
     if gain <= 0 {
         return Ok(0);
     }
     // Go back from the last stroke, and find for each stroke the direction that gives the best end.
-    let mut way = u8::from(closed[1] < closed[0]);
+    let mut direction = u8::from(closed[1] < closed[0]);
     for stroke in (1..strokes).rev() {
-        way = core::mem::replace(&mut ways[stroke], way) >> way & 1;
+        direction = core::mem::replace(&mut choices[stroke], direction) >> direction & 1;
     }
     let mut leg = begin;
-    for (stroke, &way) in ways.iter().enumerate().take(strokes) {
+    for (stroke, &direction) in choices.iter().enumerate().take(strokes) {
         let last = tour.last_of_stroke(leg, begin);
         let (before, after) = (tour.cycle.previous(leg), tour.cycle.next(last));
-        if stroke > 0 && way == 1 {
+        if stroke > 0 && direction == 1 {
             tour.wake(&[before, leg.flipped(), last, after.flipped()]);
             let moved = tour.cycle.turn(before, last);
             work_budget.work(moved as u32 / 32)?;

@@ -5,7 +5,7 @@
 //! ordering. Therefore what remains of the gain is mostly found without computing a distance, and a
 //! cut is looked up only where the tour would stay in one piece.
 
-use super::cycle::Stand;
+use super::cycle::LegPosition;
 use super::exchange::{Exchanges, Step};
 use super::work_budget::WorkBudget;
 use super::{Leg, NONE, OrderError};
@@ -24,11 +24,11 @@ enum Outcome {
 /// The position of the move at the start of a leg.
 struct Before {
     /// The position and the direction of the leg.
-    stand: Stand,
+    position: LegPosition,
     /// Whether the leg has the direction of the leg before the first cut.
     onward: bool,
     /// The number of legs between the first cut and this move, in the direction of the first cut.
-    way: usize,
+    legs_between: usize,
 }
 
 /// A move that the step cuts.
@@ -41,7 +41,7 @@ struct Cut {
     /// The station on the other side of the cut.
     far: u16,
     /// The number of legs between the first cut and this one.
-    way: usize,
+    legs_between: usize,
 }
 
 /// A search for a step that begins with the cut after `a`.
@@ -52,7 +52,7 @@ pub(super) struct StepSearch<'e, 's, 'a> {
     /// The leg after the first cut.
     b: Leg,
     /// The position and the direction of `a`.
-    a_stands: Stand,
+    a_position: LegPosition,
     /// The station after the first cut, where the tour will be joined again.
     first: u16,
     /// The cost from `first` to the nearer end of the path; very large if the tour is a closed
@@ -77,9 +77,9 @@ impl<'e, 's, 'a> StepSearch<'e, 's, 'a> {
         }
         let b = tour.cycle.next(a);
         let first = tour.start(b);
-        let a_stands = tour.cycle.stand(a);
+        let a_position = tour.cycle.position(a);
         let to_ends = tour.distance_to_path_ends(first);
-        let mut search = Self { tour, a, b, a_stands, first, to_ends, best: None };
+        let mut search = Self { tour, a, b, a_position, first, to_ends, best: None };
         work_budget.work(2)?;
         for second in tour.candidates(end, tour.is_open()) {
             if search.second_cut(hand, end, second, work_budget)? != Outcome::GoOn {
@@ -164,9 +164,12 @@ impl<'e, 's, 'a> StepSearch<'e, 's, 'a> {
             let before = self.before(leg);
             // Only some positions of the third cut keep the tour in one piece, and it must differ
             // from the first two cuts.
-            let within = before.way <= second.way;
+            let within = before.legs_between <= second.legs_between;
             let onward = second.onward || before.onward;
-            if within == onward || before.way == 0 || before.way == second.way {
+            if within == onward
+                || before.legs_between == 0
+                || before.legs_between == second.legs_between
+            {
                 continue;
             }
             work_budget.work(2)?;
@@ -188,20 +191,20 @@ impl<'e, 's, 'a> StepSearch<'e, 's, 'a> {
     /// Returns the position of the move at the start of `leg`.
     fn before(&self, leg: Leg) -> Before {
         let cycle = &self.tour.cycle;
-        let stand = cycle.stand(leg);
-        let onward = stand.forward == self.a_stands.forward;
-        let way = match (onward, cycle.way(self.a_stands, stand)) {
-            (false, way) => way,
+        let position = cycle.position(leg);
+        let onward = position.forward == self.a_position.forward;
+        let legs_between = match (onward, cycle.legs_between(self.a_position, position)) {
+            (false, legs_between) => legs_between,
             (true, 0) => cycle.len() - 1,
-            (true, way) => way - 1,
+            (true, legs_between) => legs_between - 1,
         };
-        Before { stand, onward, way }
+        Before { position, onward, legs_between }
     }
 
     /// Returns the cut of the move at the start of `leg`.
-    fn cut(&self, leg: Leg, Before { stand, onward, way }: Before) -> Cut {
-        let previous = self.tour.cycle.before(stand);
+    fn cut(&self, leg: Leg, Before { position, onward, legs_between }: Before) -> Cut {
+        let previous = self.tour.cycle.before(position);
         let far = self.tour.end(previous);
-        Cut { leg: if onward { previous } else { leg.flipped() }, onward, far, way }
+        Cut { leg: if onward { previous } else { leg.flipped() }, onward, far, legs_between }
     }
 }

@@ -18,7 +18,7 @@ pub(super) struct UndoCopy<'k> {
     /// The front of the working memory, where the copy goes.
     words: &'k mut [u64],
     /// Length of the copy in words; 0 if there is none.
-    kept_words: &'k mut usize,
+    copy_words: &'k mut usize,
     /// The last job; its memory is given up to the copy.
     job: &'k mut Job,
     /// Whether the machine is idle. Otherwise the job may still be drawing, and no copy is made.
@@ -30,28 +30,28 @@ impl UndoCopy<'_> {
     /// not fit or the machine is not idle.
     #[inline(never)] // Several callers share one copy of the code.
     pub(super) fn save(&mut self, model: &Model<'_>) {
-        *self.kept_words = 0;
+        *self.copy_words = 0;
         if self.is_idle {
             self.job.release();
             if model.save(self.words) {
-                *self.kept_words = model.saved_words();
+                *self.copy_words = model.saved_words();
             }
         }
     }
 }
 
 impl<'m> Inner<'m> {
-    /// Borrows the model, the undo_copy of its copy, and the working memory behind the copy, which an
-    /// edit may use.
+    /// Borrows the model, what saves its copy for `$undo`, and the working memory behind the copy,
+    /// which an edit may use.
     pub(super) fn split(&mut self) -> (&mut Model<'m>, UndoCopy<'_>, Scratch<'_>) {
         // A refused change must not overwrite the last copy, so room is left for the longer of
         // both.
         let next = Some(self.model.saved_words()).filter(|words| *words <= self.words.len());
-        let copies = self.kept_words.max(next.unwrap_or(0));
+        let copies = self.copy_words.max(next.unwrap_or(0));
         let (words, free) = self.words.split_at_mut(copies.min(self.words.len()));
         let is_idle = self.machine.state() == State::Idle;
         let undo_copy =
-            UndoCopy { words, kept_words: &mut self.kept_words, job: &mut self.job, is_idle };
+            UndoCopy { words, copy_words: &mut self.copy_words, job: &mut self.job, is_idle };
         (&mut self.model, undo_copy, Scratch::new(free))
     }
 
@@ -69,9 +69,10 @@ impl<'m> Inner<'m> {
         match model.edit(edit, scratch, &mut |model| undo_copy.save(model)) {
             Ok(Change { vertices, bars, faces, curves }) => {
                 Reply(board).line(format_args!(
-                    "[EDIT:vertices {vertices:+}, bars {bars:+}, faces {faces:+}, curves {curves:+}]"
+                    "[EDIT:vertices {vertices:+}, bars {bars:+}, faces {faces:+}, \
+                     curves {curves:+}]"
                 ));
-                if self.kept_words == 0 {
+                if self.copy_words == 0 {
                     Reply(board).line(format_args!("[MSG:no memory to take this back]"));
                 }
                 Ok(())
@@ -86,7 +87,7 @@ impl<'m> Inner<'m> {
     /// [`CommandError::NothingToUndo`] if there is no copy.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub(super) fn undo(&mut self) -> Result<(), CommandError> {
-        if core::mem::take(&mut self.kept_words) == 0 {
+        if core::mem::take(&mut self.copy_words) == 0 {
             return Err(CommandError::NothingToUndo);
         }
         self.model.restore(self.words);

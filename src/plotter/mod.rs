@@ -105,14 +105,14 @@ struct Inner<'m> {
     cursor: Cursor,
     /// How many of the first `words` hold the copy of the model before its last change; 0 if there
     /// is no copy.
-    kept_words: usize,
+    copy_words: usize,
     program: Program,
     /// The task of a line that takes longer. The line is answered when the task is done.
     task: Option<Task>,
     /// The alarm that was last reported, while it lasts.
-    alarm_told: Option<Alarm>,
+    alarm_reported: Option<Alarm>,
     /// The pen that the user was last asked to insert, from 0.
-    pen_told: Option<u8>,
+    pen_reported: Option<u8>,
 }
 
 impl<'m> Plotter<'m> {
@@ -143,11 +143,11 @@ impl<'m> Plotter<'m> {
                 machine: Machine::new(settings, blocks, pins, AHEAD_TICKS),
                 job: Job::default(),
                 cursor: Cursor::default(),
-                kept_words: 0,
+                copy_words: 0,
                 program: Program::default(),
                 task: None,
-                alarm_told: None,
-                pen_told: None,
+                alarm_reported: None,
+                pen_reported: None,
             },
         }
     }
@@ -160,15 +160,15 @@ impl<'m> Plotter<'m> {
     /// Answers the serial line, and keeps the step queue full. Returns whether there was anything
     /// to do.
     pub fn poll<B: Board>(&mut self, board: &mut B) -> bool {
-        let asked = board.take_real_time();
-        self.act(asked, board);
+        let requests = board.take_real_time();
+        self.act(requests, board);
         self.inner.watch(board);
         let planned = self.inner.plan(board);
         if self.inner.task.is_some() {
             match self.inner.proceed(board) {
                 Progress::Done(outcome) => self.answer(outcome, board),
                 Progress::More => {}
-                Progress::Waits => return planned || asked != RealTime::default(),
+                Progress::Waits => return planned || requests != RealTime::default(),
             }
             return true;
         }
@@ -176,7 +176,7 @@ impl<'m> Plotter<'m> {
         // delays the steps.
         let waits = self.inner.must_wait() || !board.has_room(REPLY_BYTES);
         let byte = if waits { None } else { board.read_byte() };
-        let Some((port, byte)) = byte else { return planned || asked != RealTime::default() };
+        let Some((port, byte)) = byte else { return planned || requests != RealTime::default() };
         let reader = self.readers.get_mut(port).zip(self.numberings.get_mut(port));
         let Some((reader, numbering)) = reader else { return true };
         let Some(line) = reader.push(byte) else { return true };
@@ -258,18 +258,18 @@ impl<'m> Plotter<'m> {
         self.inner.job.strokes(self.inner.words, &mut self.inner.cursor)
     }
 
-    /// Handles the real-time requests `asked`, and whatever else does not come by a line.
-    fn act<B: Board>(&mut self, asked: RealTime, board: &mut B) {
+    /// Handles the real-time `requests`, and whatever else does not come by a line.
+    fn act<B: Board>(&mut self, requests: RealTime, board: &mut B) {
         report::greet_opened(self.inner.machine.state(), board);
         if B::HAS_DRIVE && board.wants_drive() && self.inner.is_without_job() {
             board.show_drive();
         }
-        if asked.has(RealTime::ABORT) {
+        if requests.has(RealTime::ABORT) {
             self.inner.machine.abort();
             self.reset(board);
         }
-        self.inner.act(asked);
-        self.status_due |= asked.has(RealTime::STATUS);
+        self.inner.act(requests);
+        self.status_due |= requests.has(RealTime::STATUS);
         if self.status_due && board.has_room(REPLY_BYTES) {
             self.status_due = false;
             // Writing the report takes 10 ms, and so may what was done since the queue was last
@@ -313,18 +313,18 @@ impl Inner<'_> {
     fn carry_out<B: Board>(&mut self, line: &str, board: &mut B) -> Result<Next, CommandError> {
         let command = Command::parse(line)?;
         let one_pen = self.options.one_pen;
-        let (model, mut keeper, _) = self.split();
-        let keep = &mut |model: &Model<'_>| keeper.save(model);
+        let (model, mut undo_copy, _) = self.split();
+        let save_copy = &mut |model: &Model<'_>| undo_copy.save(model);
         match command {
             Command::Nothing => {}
             Command::Vertex(coordinates) => {
-                model.add_vertex(coordinates, keep).map_err(CommandError::Model)?
+                model.add_vertex(coordinates, save_copy).map_err(CommandError::Model)?
             }
             Command::Face(numbers) => {
-                model.add_face(numbers.iter(), keep).map_err(CommandError::Model)?
+                model.add_face(numbers.iter(), save_copy).map_err(CommandError::Model)?
             }
             Command::Polyline(numbers) => {
-                model.add_polyline(numbers.iter(), keep).map_err(CommandError::Model)?
+                model.add_polyline(numbers.iter(), save_copy).map_err(CommandError::Model)?
             }
             Command::Degree(degree) => model.set_degree(degree).map_err(CommandError::Model)?,
             Command::Curve { ends, control } => {
@@ -334,9 +334,9 @@ impl Inner<'_> {
             // With a single pen, choices of a pen are ignored: no file can then use too many pens.
             Command::Pen { .. } if one_pen => {}
             Command::Pen { by_material, name } => {
-                model.choose_pen(by_material, name, keep).map_err(CommandError::Model)?
+                model.choose_pen(by_material, name, save_copy).map_err(CommandError::Model)?
             }
-            Command::EndCurve => model.end_curve(keep).map_err(CommandError::Model)?,
+            Command::EndCurve => model.end_curve(save_copy).map_err(CommandError::Model)?,
             Command::Help => self.task = Some(Task::List(Listing::Help, 0)),
             Command::BuildInfo => self.report_build(board),
             Command::Settings => self.task = Some(Task::List(Listing::Settings, 0)),
@@ -349,7 +349,7 @@ impl Inner<'_> {
             Command::Options => self.task = Some(Task::List(Listing::Options, 0)),
             Command::Model => self.report_model(board),
             Command::Clear => {
-                keep(model);
+                save_copy(model);
                 model.clear();
             }
             Command::Edit(edit) => self.edit(edit, board)?,
@@ -384,21 +384,21 @@ impl Inner<'_> {
             });
         }
         let position = self.machine.position_mm();
-        let asked = RealTime::default();
-        let mut listener = Listener { board, position, stage: Stage::View, asked };
+        let requests = RealTime::default();
+        let mut listener = Listener { board, position, stage: Stage::View, requests };
         let computed = if again {
             self.load(listener.board)
         } else {
             self.compute(&mut listener, &mut Unobserved).map(|()| self.save(listener.board))
         };
         let begun = computed.and_then(|()| self.begin(&mut listener));
-        let asked = listener.asked;
-        if asked.has(RealTime::EMERGENCY) {
-            self.act(asked);
+        let requests = listener.requests;
+        if requests.has(RealTime::EMERGENCY) {
+            self.act(requests);
         }
         begun?;
         self.report_degenerate(board);
-        self.act(asked);
+        self.act(requests);
         Ok(())
     }
 
@@ -415,7 +415,7 @@ impl Inner<'_> {
     /// Loads the kept job in place of the last one.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     fn load<B: Board>(&mut self, board: &mut B) -> Result<(), CommandError> {
-        self.kept_words = 0;
+        self.copy_words = 0;
         self.job = Job::default();
         self.cursor = Cursor::default();
         self.job = records::load_job(self.machine.settings(), self.words, board)?;
@@ -426,9 +426,9 @@ impl Inner<'_> {
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     fn begin(&mut self, cancel: &mut dyn Cancel) -> Result<(), CommandError> {
         let strokes = self.job.strokes(self.words, &mut self.cursor);
-        let mut strokes = MeasuredStrokes { strokes, cancel, targets: 0, given_up: false };
+        let mut strokes = MeasuredStrokes { strokes, cancel, targets: 0, aborted: false };
         self.machine.start(&mut strokes)?;
-        if strokes.given_up {
+        if strokes.aborted {
             self.machine.abort();
             return Err(CommandError::Aborted);
         }
@@ -444,7 +444,7 @@ impl Inner<'_> {
         observer: &mut dyn Observer,
     ) -> Result<(), CommandError> {
         // This overwrites the memory of the last job, so that job ends here even if this one fails.
-        self.kept_words = 0;
+        self.copy_words = 0;
         self.job = Job::default();
         self.cursor = Cursor::default();
         let steps = self.machine.settings().page_steps();
@@ -472,7 +472,7 @@ struct MeasuredStrokes<'s, 'a> {
     strokes: Strokes<'s>,
     cancel: &'a mut dyn Cancel,
     targets: usize,
-    given_up: bool,
+    aborted: bool,
 }
 
 impl Path for MeasuredStrokes<'_, '_> {
@@ -480,9 +480,9 @@ impl Path for MeasuredStrokes<'_, '_> {
         self.targets += 1;
         // 64 targets take some 100,000 instructions.
         if self.targets.is_multiple_of(64) && self.cancel.check().is_err() {
-            self.given_up = true;
+            self.aborted = true;
         }
-        self.strokes.next_target().filter(|_| !self.given_up)
+        self.strokes.next_target().filter(|_| !self.aborted)
     }
 
     fn rewind(&mut self) {
@@ -503,18 +503,18 @@ struct Listener<'b, B: Board> {
     stage: Stage,
     /// The hold or emergency stop that was requested meanwhile. It is carried out when the
     /// computation ends.
-    asked: RealTime,
+    requests: RealTime,
 }
 
 impl<B: Board> Cancel for Listener<'_, B> {
     fn check(&mut self) -> Result<(), Aborted> {
         report::greet_opened(State::Run, self.board);
-        let asked = self.board.take_real_time();
-        if asked.has(RealTime::RESUME) {
-            self.asked = RealTime::default();
+        let requests = self.board.take_real_time();
+        if requests.has(RealTime::RESUME) {
+            self.requests = RealTime::default();
         }
-        self.asked = self.asked.and(asked).only(RealTime::HOLD.and(RealTime::EMERGENCY));
-        if asked.has(RealTime::STATUS) {
+        self.requests = self.requests.and(requests).only(RealTime::HOLD.and(RealTime::EMERGENCY));
+        if requests.has(RealTime::STATUS) {
             let stage = match self.stage {
                 Stage::View => "view",
                 Stage::Visibility => "visibility",
@@ -525,7 +525,7 @@ impl<B: Board> Cancel for Listener<'_, B> {
             reply.position(self.position);
             reply.line(format_args!("|Stage:{stage}>"));
         }
-        let ends = asked.has(RealTime::ABORT) || asked.has(RealTime::EMERGENCY);
+        let ends = requests.has(RealTime::ABORT) || requests.has(RealTime::EMERGENCY);
         if ends { Err(Aborted) } else { Ok(()) }
     }
 

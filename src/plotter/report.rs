@@ -9,6 +9,7 @@ use crate::protocol::LINE_LIMIT;
 
 /// Writes the greeting: the first line that a sender sees. It is also the reply to ctrl-X.
 pub(super) fn greet<B: Board>(board: &mut B) {
+    /// The version of the firmware.
     const VERSION: &str = env!("CARGO_PKG_VERSION");
     Reply(board).line(format_args!("\r\nGrbl 1.1h [penup {VERSION} '$' for help]"));
 }
@@ -53,7 +54,8 @@ impl Inner<'_> {
         let count = self.job.joined_edges();
         if count > 0 {
             Reply(board).line(format_args!(
-                "[MSG:{count} edges are left out: within the precision, the faces beside them are one]"
+                "[MSG:{count} edges are left out: within the precision, the faces beside them are \
+                 one]"
             ));
         }
     }
@@ -100,7 +102,8 @@ impl Inner<'_> {
         let (down, up, bound) = (mm(pen_down), mm(pen_up), mm(bound));
         let proof = if optimal { "the least" } else { "not proved the least" };
         Reply(board).line(format_args!(
-            "[JOB:pen down {down} mm, up {up} mm, efficiency {percent} %, bound {bound} mm, {proof}]"
+            "[JOB:pen down {down} mm, up {up} mm, efficiency {percent} %, bound {bound} mm, \
+             {proof}]"
         ));
         Reply(board).line(format_args!("[MEM:{} bytes to work in]", size_of_val(self.words)));
     }

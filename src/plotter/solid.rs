@@ -103,7 +103,7 @@ impl SolidSink for Edges<'_> {
     }
 
     fn edge(&mut self, edge: SolidEdge) -> Result<(), SinkFull> {
-        let at = match (edge.sight, self.wanted) {
+        let at = match (edge.visibility, self.wanted) {
             (EdgeVisibility::Outline | EdgeVisibility::Visible, _) => {
                 self.shown += 1;
                 self.shown - 1

@@ -53,34 +53,34 @@ pub(super) enum Progress {
 impl Inner<'_> {
     /// Carries out real-time requests, except status and abort.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
-    pub(super) fn act(&mut self, asked: RealTime) {
-        if asked == RealTime::default() {
+    pub(super) fn act(&mut self, requests: RealTime) {
+        if requests == RealTime::default() {
             return;
         }
-        if asked.has(RealTime::EMERGENCY) {
+        if requests.has(RealTime::EMERGENCY) {
             self.machine.alarm(Alarm::EmergencyStop);
         }
-        if asked.has(RealTime::HOLD) {
+        if requests.has(RealTime::HOLD) {
             self.machine.hold();
         }
-        if asked.has(RealTime::RESUME) {
+        if requests.has(RealTime::RESUME) {
             self.machine.resume();
         }
-        if asked.has(RealTime::CANCEL_JOG) {
+        if requests.has(RealTime::CANCEL_JOG) {
             self.machine.cancel_jog();
         }
-        if asked.has(RealTime::PAUSE) {
+        if requests.has(RealTime::PAUSE) {
             self.machine.pause_after_stroke();
         }
         let percent = i32::from(self.machine.percent());
-        let mut changed = if asked.has(RealTime::FEED_RESET) { 100 } else { percent };
+        let mut changed = if requests.has(RealTime::FEED_RESET) { 100 } else { percent };
         for (byte, change) in [
             (RealTime::FEED_PLUS_10, 10),
             (RealTime::FEED_MINUS_10, -10),
             (RealTime::FEED_PLUS_1, 1),
             (RealTime::FEED_MINUS_1, -1),
         ] {
-            changed += if asked.has(byte) { change } else { 0 };
+            changed += if requests.has(byte) { change } else { 0 };
         }
         if changed != percent {
             self.machine.set_override(changed.clamp(10, 200) as u8);
@@ -96,16 +96,16 @@ impl Inner<'_> {
             State::Alarm(alarm) => Some(alarm),
             _ => None,
         };
-        if alarm != self.alarm_told {
-            self.alarm_told = alarm;
+        if alarm != self.alarm_reported {
+            self.alarm_reported = alarm;
             if let Some(alarm) = alarm {
                 board.step_now();
                 Reply(board).line(format_args!("ALARM:{}", number(alarm)));
             }
         }
         let pen = self.machine.pen_wanted();
-        if pen != self.pen_told {
-            self.pen_told = pen;
+        if pen != self.pen_reported {
+            self.pen_reported = pen;
             if let Some(pen) = pen {
                 Reply(board).line(format_args!("[MSG:put in pen {}, then send ~]", pen + 1));
             }

@@ -85,8 +85,8 @@ pub enum Command<'a> {
     GCode(GCode<'a>),
 }
 
-/// The `$` commands and G-code words, each with its meaning, as `$` lists them. It lists the options
-/// of a plot between the two parts.
+/// The `$` commands and G-code words, each with its meaning, as `$` lists them. It lists the
+/// options of a plot between the two parts.
 pub const HELP: [&[(&str, &str)]; 2] = [
     &[
         ("$", "this list"),

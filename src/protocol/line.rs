@@ -40,9 +40,9 @@ impl RealTime {
     /// 0xFD: emergency stop, which halts the pins at once.
     pub const EMERGENCY: Self = Self(1 << 12);
 
-    /// Whether this set contains all of `asked`.
-    pub const fn has(self, asked: Self) -> bool {
-        self.0 & asked.0 == asked.0
+    /// Whether this set contains all of `requests`.
+    pub const fn has(self, requests: Self) -> bool {
+        self.0 & requests.0 == requests.0
     }
 
     /// The union of both sets.
@@ -230,7 +230,7 @@ mod tests {
     }
 
     /// The requests that the bytes make, in order.
-    fn asked(bytes: &[u8]) -> Vec<RealTime> {
+    fn requests(bytes: &[u8]) -> Vec<RealTime> {
         let mut sorter = Sorter::new();
         bytes.iter().filter_map(|byte| sorter.sort(*byte)).collect()
     }
@@ -246,7 +246,7 @@ mod tests {
                         (b'!', RealTime::HOLD),
                         (0x18, RealTime::ABORT),
                     ] {
-                        let found = asked(&[first, second, third, byte]);
+                        let found = requests(&[first, second, third, byte]);
                         assert_eq!(found.last(), Some(&expected), "{first} {second} {third}");
                     }
                 }
@@ -269,9 +269,9 @@ mod tests {
 
     #[test]
     fn grbls_bytes_act_after_what_begins_no_letter() {
-        assert_eq!(asked(b"\xC3\x85"), [], "a letter");
+        assert_eq!(requests(b"\xC3\x85"), [], "a letter");
         for bytes in [b"\xE0\x90".as_slice(), b"\xF0\x85", b"\xF4\x90", b"\xC3 \x85"] {
-            assert_eq!(asked(bytes).len(), 1, "{bytes:?}");
+            assert_eq!(requests(bytes).len(), 1, "{bytes:?}");
         }
     }
 

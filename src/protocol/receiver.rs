@@ -79,7 +79,7 @@ impl<'q> Receiver<'q> {
     /// an ordinary byte is lost, and its place will be marked.
     pub fn receive(&mut self, byte: u8) -> RealTime {
         match self.sort_out(byte) {
-            Err(asked) => asked,
+            Err(requests) => requests,
             Ok(byte) => {
                 if self.append(byte).is_err() {
                     self.lose();
@@ -94,9 +94,9 @@ impl<'q> Receiver<'q> {
     /// # Errors
     /// The real-time request that the byte makes. Such a byte must not be queued.
     pub fn sort_out(&mut self, byte: u8) -> Result<u8, RealTime> {
-        let asked = self.sorter.sort(byte);
+        let requests = self.sorter.sort(byte);
         self.has_heard |= byte != DAMAGED;
-        asked.map_or(Ok(byte), Err)
+        requests.map_or(Ok(byte), Err)
     }
 
     /// Puts an ordinary byte into the queue, after the mark of any loss before it.

@@ -59,6 +59,8 @@ pub(crate) fn numbers<const N: usize>(text: &str) -> Result<[f64; N], CommandErr
     Ok(values)
 }
 
+/// Parses numbers with commas between them, as many as there are `values`,
+/// each within ±1e15.
 #[inline(never)] // All counts share one copy of the code.
 fn read_values(text: &str, values: &mut [f64]) -> Result<(), CommandError> {
     let wrong_count = CommandError::WrongNumberCount { needed: values.len() };

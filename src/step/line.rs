@@ -7,8 +7,8 @@ use crate::drawing::PagePoint;
 
 /// The moves from one point to another.
 ///
-/// An iterator of exactly max(|dx|, |dy|) moves. After each move the pen is at most half a step from
-/// the true line, measured along the axis of fewer moves.
+/// An iterator of exactly max(|dx|, |dy|) moves. After each move the pen is at most half a step
+/// from the true line, measured along the axis of fewer moves.
 ///
 /// ```
 /// use penup::step::{Direction, Line};

@@ -280,10 +280,12 @@ fn cross(a: Direction, b: Direction) -> Direction {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
+/// Returns the greatest absolute value of the components.
 pub(super) fn largest_component(a: Direction) -> f64 {
     a.iter().fold(0.0, |most, d| f64::max(most, libm::fabs(*d)))
 }
 
+/// Returns the vector of length 1 with this direction; `None` if it has no length.
 fn normalized(a: Direction) -> Option<Direction> {
     // The vector is scaled first so that its squares neither overflow nor underflow.
     let largest = largest_component(a);

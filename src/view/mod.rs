@@ -71,6 +71,7 @@ struct Row {
 }
 
 impl Row {
+    /// Returns one view coordinate of a position.
     fn apply(&self, position: Position) -> i32 {
         // Both |m| and |position| are at most 2^30, so each product is at most 2^60; `Row::new`
         // keeps the sum below 2^62.
@@ -190,14 +191,14 @@ impl View {
     /// Returns an error bound of the view coordinates: twice the possible error of a coordinate if
     /// positions may be off by `units` of their units, including the rounding of the view itself.
     /// The result is at least 1.
-    pub fn doubt(&self, units: u32) -> u32 {
+    pub fn error_bound(&self, units: u32) -> u32 {
         let most = |row: &Row| {
             let steepness: u64 = row.m.iter().map(|m| u64::from(m.unsigned_abs())).sum();
             // The steepness is at most 3 × 2^30, and `units` is at most 2^30.
             ((steepness * u64::from(units)) >> (row.shift - 1)).saturating_add(1)
         };
-        let doubt = self.rows.iter().map(most).max().unwrap_or(1) + u64::from(units > 0);
-        u32::try_from(doubt).unwrap_or(u32::MAX)
+        let error_bound = self.rows.iter().map(most).max().unwrap_or(1) + u64::from(units > 0);
+        u32::try_from(error_bound).unwrap_or(u32::MAX)
     }
 
     /// Transforms every vertex of `model` to view coordinates.

@@ -27,10 +27,12 @@ const LEFT: Bank = Bank { shift: 16, is_left: true };
 const RIGHT: Bank = Bank { shift: 32, is_left: false };
 
 impl Bank {
+    /// Returns the rank that `marks` hold in this bank; `None` if they hold none.
     fn get(self, marks: u64) -> Option<usize> {
         usize::from((marks >> self.shift) as u16).checked_sub(1)
     }
 
+    /// Returns the marks with `rank` in this bank.
     fn put(self, marks: u64, rank: usize) -> u64 {
         marks & !(0xFFFF << self.shift) | (rank as u64 + 1) << self.shift
     }

@@ -32,7 +32,7 @@ impl Crease {
     /// one from its back when it sees the other from its front. `are_one_plane` tells whether the
     /// faces lie in one plane in the model. If they do and one face continues the other across the
     /// edge, the edge is not drawn, however much rounding has bent them.
-    pub fn keeps(
+    pub fn draws(
         &self,
         projection: Projection,
         end: Vertex,
@@ -92,14 +92,14 @@ mod tests {
 
     /// Whether a crease keeps the edge along y that two triangles share; they rise by `left` and
     /// `right` over 1000 units across.
-    fn keeps(cosine: i32, depth_stretch: (u32, u32), left: i32, right: i32) -> bool {
+    fn draws(cosine: i32, depth_stretch: (u32, u32), left: i32, right: i32) -> bool {
         let crease = Crease { cosine, depth_stretch };
         let far = Vertex::new(0, 500, 1000);
         let one = [AT, far, Vertex::new(-1000, 0, 1000 - left)];
         let other = [far, AT, Vertex::new(1000, 0, 1000 - right)];
         let faces: [&mut dyn Iterator<Item = Vertex>; 2] =
             [&mut one.into_iter(), &mut other.into_iter()];
-        crease.keeps(Projection::Parallel, AT, faces, false, &|| false)
+        crease.draws(Projection::Parallel, AT, faces, false, &|| false)
     }
 
     #[test]
@@ -108,11 +108,11 @@ mod tests {
         for (left, right, is_drawn) in
             [(0, 0, false), (0, 999, false), (0, 1001, true), (-500, -500, true)]
         {
-            assert_eq!(keeps(23170, (1, 1), left, right), is_drawn, "{left} {right}");
+            assert_eq!(draws(23170, (1, 1), left, right), is_drawn, "{left} {right}");
         }
         // A right angle, approached from both sides; obtuse limits work as well.
-        assert!(!keeps(0, (1, 1), -999, -999) && keeps(0, (1, 1), -1001, -1001));
-        assert!(!keeps(-16384, (1, 1), -1700, -1700) && keeps(-16384, (1, 1), -1800, -1800));
+        assert!(!draws(0, (1, 1), -999, -999) && draws(0, (1, 1), -1001, -1001));
+        assert!(!draws(-16384, (1, 1), -1700, -1700) && draws(-16384, (1, 1), -1800, -1800));
     }
 
     #[test]
@@ -126,14 +126,14 @@ mod tests {
             let other = [far, AT, Vertex::new(across, 0, 1001)];
             let mut both = (one.into_iter(), other.into_iter());
             let faces: [&mut dyn Iterator<Item = Vertex>; 2] = [&mut both.0, &mut both.1];
-            let found = crease.keeps(Projection::Parallel, AT, faces, false, &|| is_one_plane);
+            let found = crease.draws(Projection::Parallel, AT, faces, false, &|| is_one_plane);
             assert_eq!(found, is_drawn, "{across} {is_one_plane}");
         }
     }
 
     #[test]
     fn the_stretch_of_depth_is_undone() {
-        assert!(!keeps(23170, (7, 2), 0, 3499) && keeps(23170, (7, 2), 0, 3501));
+        assert!(!draws(23170, (7, 2), 0, 3499) && draws(23170, (7, 2), 0, 3501));
     }
 
     #[test]
@@ -146,13 +146,13 @@ mod tests {
             let mut both = (one.into_iter(), other.into_iter());
             let kept =
                 crease
-                    .keeps(Projection::Parallel, AT, [&mut both.0, &mut both.1], false, &|| false);
+                    .draws(Projection::Parallel, AT, [&mut both.0, &mut both.1], false, &|| false);
             assert_eq!(kept, is_drawn, "{tip}");
             // The same with the second face the other way round.
             let other = [AT, far, Vertex::new(tip, 0, -5000)];
             let mut both = (one.into_iter(), other.into_iter());
             let kept =
-                crease.keeps(Projection::Parallel, AT, [&mut both.0, &mut both.1], true, &|| false);
+                crease.draws(Projection::Parallel, AT, [&mut both.0, &mut both.1], true, &|| false);
             assert_eq!(kept, is_drawn, "{tip}");
         }
     }

@@ -231,7 +231,7 @@ impl EdgeQuery {
 
     /// Marks on `profile` the parts of this edge that `face` hides or that one of its sides
     /// replaces.
-    pub fn look_at(&self, around: &SceneIndex<'_>, face: Face, profile: &mut Profile<'_>) {
+    pub fn mark_face(&self, around: &SceneIndex<'_>, face: Face, profile: &mut Profile<'_>) {
         let coarse_projection = &around.coarse_projection;
         let corners = around.outlines.element(face.first);
         let mut numbers = [0; FEW_CORNERS];
@@ -500,7 +500,7 @@ impl EdgeQuery {
         if let Some(behind) = behind {
             let (at_a, at_b) = (place(va), place(vb));
             let beside = EdgeInterval { from: Some(at_a.min(at_b)), to: Some(at_a.max(at_b)) };
-            profile.mark(beside.and(behind), mark::STOOD_IN);
+            profile.mark(beside.and(behind), mark::ENCLOSED);
         }
     }
 }

@@ -158,7 +158,7 @@ impl<'a> ChosenSides<'a> {
                 let end = vertices[usize::from(from)];
                 if is_open
                     || is_bar(known_element)
-                    || crease.keeps(projection, end, [&mut one, &mut other], turned, &|| {
+                    || crease.draws(projection, end, [&mut one, &mut other], turned, &|| {
                         unrounded.are_one_plane([from, to], known_element, element)
                     })
                 {

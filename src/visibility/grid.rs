@@ -125,17 +125,17 @@ impl<'a> Grid<'a> {
 
     /// Returns the cells on the path of an edge from `p` to `q`. No point of the edge is nearer
     /// than the coarse depth `near`.
-    pub fn way(&self, p: CoarsePoint, q: CoarsePoint, near: u16) -> Way<'_> {
+    pub fn cells_along(&self, p: CoarsePoint, q: CoarsePoint, near: u16) -> EdgeCells<'_> {
         let (low, high) = if p.y <= q.y { (p, q) } else { (q, p) };
         let dx = i32::from(high.x) - i32::from(low.x);
         let dy = i32::from(high.y) - i32::from(low.y);
-        Way { grid: self, near, low, high, slope: if dy > 0 { (dx << 16) / dy } else { 0 } }
+        EdgeCells { grid: self, near, low, high, slope: if dy > 0 { (dx << 16) / dy } else { 0 } }
     }
 }
 
 /// The cells on the path of an edge: those that it crosses or touches.
 #[derive(Debug, Clone, Copy)]
-pub struct Way<'g> {
+pub struct EdgeCells<'g> {
     grid: &'g Grid<'g>,
     near: u16,
     low: CoarsePoint,
@@ -144,7 +144,7 @@ pub struct Way<'g> {
     slope: i32,
 }
 
-impl<'g> Way<'g> {
+impl<'g> EdgeCells<'g> {
     /// Calls `visit` for each cell until it returns `false`. Returns whether it never did.
     ///
     /// The edge lies less than one unit to the right of the line between the coarse points, and

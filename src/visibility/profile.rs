@@ -13,7 +13,7 @@ pub mod mark {
     /// Nearer faces cover the points on both sides, so the piece is hidden.
     pub const HIDDEN: u64 = LEFT | RIGHT;
     /// Another edge on the same line of the page is drawn instead of this one.
-    pub const STOOD_IN: u64 = 4;
+    pub const ENCLOSED: u64 = 4;
 }
 
 /// A part of an edge.

@@ -46,6 +46,7 @@ impl Shape {
         usize::from(self.far.x >> self.shift_x) + 1
     }
 
+    /// Returns the number of rows of cells.
     fn rows(&self) -> usize {
         usize::from(self.far.y >> self.shift_y) + 1
     }

@@ -21,7 +21,7 @@ use crate::stage::{Aborted, Scratch};
 const MOST_PIECES: usize = 24;
 
 /// The average number of instructions for testing an edge against one face.
-const LOOK: usize = 1000;
+const FACE_TEST: usize = 1000;
 
 /// Finds the stretches of one edge after the other.
 pub struct StretchFinder<'a> {
@@ -211,14 +211,14 @@ impl<'a> StretchFinder<'a> {
         let mut start = EdgeParameter::START;
         while start < EdgeParameter::END {
             self.profile.open(start);
-            self.look_around(edge_query, seam_of, yield_counter)?;
+            self.test_faces(edge_query, seam_of, yield_counter)?;
             let end = self.profile.end();
             let pieces = self.profile.pieces();
             let next = pieces.iter().skip(1).map(|piece| piece.from).chain([end]);
             for (piece, to) in pieces.iter().zip(next) {
                 let visible = piece.marks & mark::HIDDEN != mark::HIDDEN;
                 let handed = if visible {
-                    piece.marks & mark::STOOD_IN == 0
+                    piece.marks & mark::ENCLOSED == 0
                         && !(self.options.merged_blocks
                             && edge_query.is_within_plane(&self.around, piece.marks))
                 } else {
@@ -249,7 +249,7 @@ impl<'a> StretchFinder<'a> {
 
     /// Tests the edge against the faces in all cells that it passes and marks the outcome on its
     /// profile.
-    fn look_around(
+    fn test_faces(
         &mut self,
         edge_query: &EdgeQuery,
         seam_of: [Option<usize>; 2],
@@ -258,9 +258,9 @@ impl<'a> StretchFinder<'a> {
         let Self { around, grid, seen, profile, options, .. } = self;
         let faces_by_rank = &around.faces;
         let near = coarse_depth(edge_query.near);
-        let way = grid.way(edge_query.p.place, edge_query.q.place, near);
+        let cells_along = grid.cells_along(edge_query.p.place, edge_query.q.place, near);
         let (mut any_covered, mut all_covered) = (false, true);
-        way.visit(&mut |cell| {
+        cells_along.visit(&mut |cell| {
             any_covered |= cell.cover.is_some();
             all_covered &= cell.cover.is_some();
             true
@@ -277,31 +277,32 @@ impl<'a> StretchFinder<'a> {
             }
         }
         let mut spent = yield_counter.spend(1000);
-        let mut look_at = |rank: u16| {
+        let mut test_face = |rank: u16| {
             let word = &mut seen[usize::from(rank) / 32];
             let bit = 1 << (rank % 32);
             if *word & bit == 0 {
                 *word |= bit;
                 let rank = usize::from(rank);
-                edge_query.look_at(around, faces_by_rank.get(rank), profile);
+                edge_query.mark_face(around, faces_by_rank.get(rank), profile);
                 if options.merged_blocks {
                     edge_query.touch(around, faces_by_rank.get(rank), rank, profile);
                 }
             }
-            spent = spent.and_then(|()| yield_counter.spend(LOOK));
+            spent = spent.and_then(|()| yield_counter.spend(FACE_TEST));
             spent.is_ok() && !profile.is_hidden()
         };
         // The covering faces come first: they hide most, and what they leave visible may need no
         // other cell.
-        let _ = (!any_covered || way.visit(&mut |cell| cell.cover.is_none_or(&mut look_at)))
-            && way.visit(&mut |cell| {
+        let _ = (!any_covered
+            || cells_along.visit(&mut |cell| cell.cover.is_none_or(&mut test_face)))
+            && cells_along.visit(&mut |cell| {
                 let faces = if cell.cover.is_some() { &[] } else { cell.faces };
                 faces
                     .iter()
                     .take_while(|&&rank| {
                         !faces_by_rank.begins_behind(usize::from(rank), edge_query.far)
                     })
-                    .all(|&rank| look_at(rank))
+                    .all(|&rank| test_face(rank))
             });
         spent
     }

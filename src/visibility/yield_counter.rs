@@ -4,7 +4,7 @@ use crate::stage::{Aborted, Cancel};
 
 /// The number of instructions between two checks, as accurate as the estimates of the callers are
 /// (for thumbv6m).
-const BETWEEN_LOOKS: usize = 50_000;
+const INSTRUCTIONS_BETWEEN_CHECKS: usize = 50_000;
 
 /// Counts the instructions spent and checks for cancelling whenever enough have been spent.
 pub struct YieldCounter<'t> {
@@ -25,7 +25,7 @@ impl<'t> YieldCounter<'t> {
     #[inline]
     pub fn spend(&mut self, instructions: usize) -> Result<(), Aborted> {
         self.done += instructions;
-        if self.done < BETWEEN_LOOKS {
+        if self.done < INSTRUCTIONS_BETWEEN_CHECKS {
             return Ok(());
         }
         self.done = 0;

@@ -59,6 +59,7 @@ pub fn flash(board: &'static BoardRow) -> Result<()> {
 fn touched_drive(flashing: Flashing) -> Option<PathBuf> {
     /// The pause between two looks for the drive; `LOOKS` is their number.
     const PAUSE: Duration = Duration::from_millis(250);
+    /// How often the drive is looked for.
     const LOOKS: u32 = 40;
     let port = penup_port(flashing.port)?;
     say!("penup: asking the board at {} for its drive", port.display()).ok()?;

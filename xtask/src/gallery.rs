@@ -142,13 +142,13 @@ fn draw_figures() -> Result<()> {
                 "| {}; [{scene}.obj](../../scenes/{scene}.obj), {vertices} vertices |",
                 figure.title
             )?;
-            let ways: &[&str] = if figure.alone { &[""] } else { &["dotted", "erased"] };
-            for way in ways {
-                let name = [scene, &words(figure.view), way].join("-");
+            let hidden_lines: &[&str] = if figure.alone { &[""] } else { &["dotted", "erased"] };
+            for hidden in hidden_lines {
+                let name = [scene, &words(figure.view), hidden].join("-");
                 let name = format!("{}.svg", name.trim_end_matches('-').replace("--", "-"));
                 say!("penup: docs/gallery/{name}")?;
-                draw(figure, way, &folder.join(&name).display().to_string())?;
-                write!(page, " ![{} {way}]({name}) |", figure.title)?;
+                draw(figure, hidden, &folder.join(&name).display().to_string())?;
+                write!(page, " ![{} {hidden}]({name}) |", figure.title)?;
             }
             page += if figure.alone { " |\n" } else { "\n" };
         }

@@ -29,6 +29,7 @@ pub enum Toolchain {
 /// Time limit for rustup. It takes seconds if the network can be reached, and may hang otherwise.
 const RUSTUP_LIMIT: Duration = Duration::from_secs(120);
 
+/// The compiler of the package `rustc-web`.
 const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
 /// The path of the sources of `core`, from Debian's sysroot.
 const DEBIAN_CORE: &str = "lib/rustlib/src/rust/library/core/Cargo.toml";

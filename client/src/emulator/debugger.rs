@@ -25,7 +25,7 @@ impl Debugger {
     pub fn write(&mut self, address: u32, bytes: &[u8]) -> io::Result<()> {
         for (at, chunk) in (address..).step_by(CHUNK).zip(bytes.chunks(CHUNK)) {
             let digits: String = chunk.iter().map(|byte| format!("{byte:02x}")).collect();
-            self.tell(&format!("M{at:x},{:x}:{digits}", chunk.len()))?;
+            self.send(&format!("M{at:x},{:x}:{digits}", chunk.len()))?;
             if self.hear()? != "OK" {
                 return Err(io::ErrorKind::InvalidData.into());
             }
@@ -38,7 +38,7 @@ impl Debugger {
         let mut bytes = Vec::with_capacity(count);
         while bytes.len() < count {
             let chunk = CHUNK.min(count - bytes.len());
-            self.tell(&format!("m{:x},{chunk:x}", address as usize + bytes.len()))?;
+            self.send(&format!("m{:x},{chunk:x}", address as usize + bytes.len()))?;
             let digits = self.hear()?;
             let read = digits.as_bytes().chunks(2).map_while(|two| {
                 std::str::from_utf8(two).ok().and_then(|two| u8::from_str_radix(two, 16).ok())
@@ -54,7 +54,7 @@ impl Debugger {
 
     /// Starts the processor.
     pub fn run(&mut self) -> io::Result<()> {
-        self.tell("c")
+        self.send("c")
     }
 
     /// Stops the processor.
@@ -63,7 +63,8 @@ impl Debugger {
         self.hear().map(drop)
     }
 
-    fn tell(&mut self, text: &str) -> io::Result<()> {
+    /// Sends one packet, with its checksum.
+    fn send(&mut self, text: &str) -> io::Result<()> {
         let sum = text.bytes().fold(0u8, u8::wrapping_add);
         self.stream.get_mut().write_all(format!("+${text}#{sum:02x}").as_bytes())
     }

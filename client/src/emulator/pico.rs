@@ -111,7 +111,7 @@ impl Pico {
     /// # Errors
     /// The emulator has ended.
     pub fn drive(&mut self, number: u8, high: bool) -> io::Result<()> {
-        self.tell(PIN, number | u8::from(high) << 7, 0)
+        self.send(PIN, number | u8::from(high) << 7, 0)
     }
 
     /// Sets the level of an input pin as [`Pico::drive`] does, but lets it bounce for `time` first.
@@ -125,9 +125,9 @@ impl Pico {
         let cycles = time.as_nanos() as u64 / CYCLE_NANOS;
         for turn in 0..BOUNCES {
             let level = high ^ (turn % 2 == 1);
-            self.tell(PIN, number | u8::from(level) << 7, start + turn * cycles / BOUNCES)?;
+            self.send(PIN, number | u8::from(level) << 7, start + turn * cycles / BOUNCES)?;
         }
-        self.tell(PIN, number | u8::from(high) << 7, start + cycles)
+        self.send(PIN, number | u8::from(high) << 7, start + cycles)
     }
 
     /// Attaches a limit switch to pin 8 (x) or 9 (y). It is closed while the axis is at `place` or
@@ -136,7 +136,7 @@ impl Pico {
     /// # Errors
     /// The emulator has ended.
     pub fn fit_switch(&mut self, number: u8, place: i32) -> io::Result<()> {
-        self.tell(SWITCH, number, (SWITCH_ZERO + i64::from(place)) as u64)
+        self.send(SWITCH, number, (SWITCH_ZERO + i64::from(place)) as u64)
     }
 
     /// Cuts the power and restores it. The contents of the flash are preserved.
@@ -144,7 +144,7 @@ impl Pico {
     /// # Errors
     /// The emulator has ended.
     pub fn cut_power(&mut self) -> io::Result<()> {
-        self.tell(CUT_POWER, 0, 0)
+        self.send(CUT_POWER, 0, 0)
     }
 
     /// Cuts the power as [`Pico::cut_power`] does, after `time` has passed.
@@ -154,7 +154,7 @@ impl Pico {
     pub fn cut_power_after(&mut self, time: Duration) -> io::Result<()> {
         let cycles = time.as_nanos() as u64 / CYCLE_NANOS;
         let cycle = self.shared.lock().cycles + cycles;
-        self.tell(CUT_POWER, 0, cycle)
+        self.send(CUT_POWER, 0, cycle)
     }
 
     /// Cuts the power as [`Pico::cut_power`] does, when `bytes` more bytes of flash have been
@@ -163,7 +163,7 @@ impl Pico {
     /// # Errors
     /// The emulator has ended.
     pub fn cut_power_in_flash(&mut self, bytes: u64) -> io::Result<()> {
-        self.tell(CUT_FLASH, 0, bytes)
+        self.send(CUT_FLASH, 0, bytes)
     }
 
     /// From now on, measures the cycles of each call of a function of `image`, including
@@ -180,7 +180,7 @@ impl Pico {
         number: u8,
     ) -> Result<(), EmulatorError> {
         let address = function(image, |found| found.contains(name), name)?;
-        Ok(self.tell(TIMED, number, address)?)
+        Ok(self.send(TIMED, number, address)?)
     }
 
     /// Returns the calls of measured functions that have returned since the last call: the
@@ -194,7 +194,7 @@ impl Pico {
     /// # Errors
     /// The emulator has ended.
     pub fn pull_run_low(&mut self) -> io::Result<()> {
-        self.tell(RUN_PIN, 0, 0)
+        self.send(RUN_PIN, 0, 0)
     }
 
     /// Connects the board with BOOTSEL held and copies the image onto the drive that it shows. The
@@ -203,7 +203,7 @@ impl Pico {
     /// # Errors
     /// The emulator has ended.
     pub fn copy_image(&mut self) -> io::Result<()> {
-        self.tell(UF2, 0, 0)
+        self.send(UF2, 0, 0)
     }
 
     /// Makes bits of a byte of flash defective. From its next change on, the bits in `mask` of the
@@ -212,7 +212,7 @@ impl Pico {
     /// # Errors
     /// The emulator has ended.
     pub fn wear_flash(&mut self, place: u32, mask: u8, high: bool) -> io::Result<()> {
-        self.tell(if high { STAYS_HIGH } else { STAYS_LOW }, mask, u64::from(place))
+        self.send(if high { STAYS_HIGH } else { STAYS_LOW }, mask, u64::from(place))
     }
 
     /// Makes the firmware's main loop continue at another address, with its stack as it is or
@@ -221,7 +221,7 @@ impl Pico {
     /// # Errors
     /// The emulator has ended.
     pub fn jump_to(&mut self, address: u32, uses_stack_up: bool) -> io::Result<()> {
-        self.tell(JUMP, u8::from(uses_stack_up), u64::from(address))
+        self.send(JUMP, u8::from(uses_stack_up), u64::from(address))
     }
 
     /// Makes the main loop continue, as [`Pico::jump_to`] does, at the function of `image` that has
@@ -249,7 +249,7 @@ impl Pico {
     /// # Errors
     /// The emulator has ended.
     pub fn hang(&mut self) -> io::Result<()> {
-        self.tell(HANG, 0, 0)
+        self.send(HANG, 0, 0)
     }
 
     /// Stalls the firmware's main loop for `hundredths` of a second, while interrupts continue,
@@ -259,7 +259,7 @@ impl Pico {
     /// # Errors
     /// The emulator has ended.
     pub fn stall_at(&mut self, place: u32, hundredths: u8) -> io::Result<()> {
-        self.tell(STALL, hundredths, u64::from(place))
+        self.send(STALL, hundredths, u64::from(place))
     }
 
     /// Pre-empts the clock's interrupt handler for this time just before it sets its next alarm.
@@ -267,7 +267,7 @@ impl Pico {
     /// # Errors
     /// The emulator has ended.
     pub fn delay_alarm(&mut self, milliseconds: u8) -> io::Result<()> {
-        self.tell(DELAY_ALARM, milliseconds, 0)
+        self.send(DELAY_ALARM, milliseconds, 0)
     }
 
     /// Connects a USB host, which enumerates the device.
@@ -275,7 +275,7 @@ impl Pico {
     /// # Errors
     /// The emulator has ended.
     pub fn plug_usb_in(&mut self) -> io::Result<()> {
-        self.tell(USB_HOST, 1, 0)
+        self.send(USB_HOST, 1, 0)
     }
 
     /// Sets whether the USB host accepts the data that the board sends.
@@ -283,7 +283,7 @@ impl Pico {
     /// # Errors
     /// The emulator has ended.
     pub fn let_usb_take(&mut self, takes: bool) -> io::Result<()> {
-        self.tell(USB_HOST, if takes { 3 } else { 2 }, 0)
+        self.send(USB_HOST, if takes { 3 } else { 2 }, 0)
     }
 
     /// Connects a USB host whose bus is never idle, because other devices at the same hub are busy.
@@ -291,7 +291,7 @@ impl Pico {
     /// # Errors
     /// The emulator has ended.
     pub fn plug_usb_into_busy_bus(&mut self) -> io::Result<()> {
-        self.tell(USB_HOST, 7, 0)
+        self.send(USB_HOST, 7, 0)
     }
 
     /// Connects a USB host without power, which pulls both wires low.
@@ -299,7 +299,7 @@ impl Pico {
     /// # Errors
     /// The emulator has ended.
     pub fn plug_usb_into_dead_host(&mut self) -> io::Result<()> {
-        self.tell(USB_HOST, 8, 0)
+        self.send(USB_HOST, 8, 0)
     }
 
     /// Makes the USB host suspend the bus, as a computer that goes to sleep does, or resume it.
@@ -307,7 +307,7 @@ impl Pico {
     /// # Errors
     /// The emulator has ended.
     pub fn suspend_usb(&mut self, suspends: bool) -> io::Result<()> {
-        self.tell(USB_HOST, if suspends { 4 } else { 5 }, 0)
+        self.send(USB_HOST, if suspends { 4 } else { 5 }, 0)
     }
 
     /// Makes a program on the USB host open or close the port (DTR) at `rate` baud. The host opens
@@ -316,7 +316,7 @@ impl Pico {
     /// # Errors
     /// The emulator has ended.
     pub fn open_usb(&mut self, opens: bool, rate: u32) -> io::Result<()> {
-        self.tell(USB_LINE, u8::from(opens), u64::from(rate))
+        self.send(USB_LINE, u8::from(opens), u64::from(rate))
     }
 
     /// The serial number that the USB host has read from the device; empty before that.
@@ -345,7 +345,7 @@ impl Pico {
     /// # Errors
     /// The emulator has ended.
     pub fn send_damaged(&mut self, byte: u8, error: UartError) -> io::Result<()> {
-        self.tell(SERIAL, byte, error as u64)
+        self.send(SERIAL, byte, error as u64)
     }
 
     /// Sets the time that erasing a sector of flash takes from now on. It is 45 ms at first, the
@@ -354,9 +354,10 @@ impl Pico {
     /// # Errors
     /// The emulator has ended.
     pub fn set_erase_time(&mut self, time: Duration) -> io::Result<()> {
-        self.tell(ERASE_TIME, 0, time.as_micros() as u64)
+        self.send(ERASE_TIME, 0, time.as_micros() as u64)
     }
 
+    /// Sends bytes to one of the serial lines of the board.
     fn send_to(&mut self, port: u8, bytes: &[u8]) -> io::Result<()> {
         let record = |&byte| Record { what: port, value: byte, cycle: 0 }.to_bytes();
         let records: Vec<u8> = bytes.iter().flat_map(record).collect();
@@ -378,7 +379,8 @@ impl Pico {
         port(&mut state).read(buffer)
     }
 
-    fn tell(&mut self, what: u8, value: u8, cycle: u64) -> io::Result<()> {
+    /// Sends one record to the emulator.
+    fn send(&mut self, what: u8, value: u8, cycle: u64) -> io::Result<()> {
         self.input.write_all(&Record { what, value, cycle }.to_bytes())?;
         self.input.flush()
     }
@@ -400,7 +402,7 @@ impl Pico {
     /// The emulator has ended.
     pub fn stack(&mut self) -> Result<Stack, EmulatorError> {
         self.shared.lock().unused_stack = None;
-        self.tell(STACK, 0, 0)?;
+        self.send(STACK, 0, 0)?;
         let waits = |state: &mut State| state.unused_stack.is_none() && !state.ended;
         let unused = self.shared.wait_while(super::PATIENCE, waits).unused_stack;
         let unused = unused.ok_or_else(|| EmulatorError::Ended { said: self.said() })?;

@@ -184,6 +184,7 @@ impl Machine {
         self.waiting.replace(MachineEvent { kind, at })
     }
 
+    /// Counts the steps in x and y, each -1, 0 or 1, and returns their event.
     fn step(&mut self, x: i8, y: i8) -> MachineEventKind {
         self.position.0 += i32::from(x);
         self.position.1 += i32::from(y);
@@ -206,6 +207,7 @@ impl Machine {
     }
 }
 
+/// Returns the sign of a step by the level of the direction pin.
 fn direction(up: bool) -> i8 {
     if up { 1 } else { -1 }
 }

@@ -233,7 +233,7 @@ fn read_trace(stderr: ChildStderr, shared: &Shared<State>) {
         // Waiting threads are woken only when no further complete line is buffered, because waking
         // them at every line would cost more than reading it.
         if count == 0 || !lines.buffer().contains(&b'\n') {
-            shared.tell();
+            shared.notify();
         }
         if count == 0 {
             return;

@@ -49,7 +49,7 @@ impl<S> Shared<S> {
     }
 
     /// Wakes all waiting threads.
-    pub fn tell(&self) {
+    pub fn notify(&self) {
         self.changed.notify_all();
     }
 }

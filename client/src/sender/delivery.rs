@@ -23,7 +23,7 @@ struct Delivery<'l> {
     in_queue: VecDeque<(i32, usize)>,
     /// When the number of the last accepted line was asked for. While this is `Some`, no line is
     /// sent.
-    asked: Option<Instant>,
+    requested_at: Option<Instant>,
     /// When a line was last sent or answered, or the number of the last accepted line arrived.
     last_event: Instant,
     last_progress: Instant,
@@ -76,7 +76,7 @@ impl Sender<'_> {
             base: self.done,
             sent: self.done,
             in_queue: VecDeque::new(),
-            asked: None,
+            requested_at: None,
             last_event: now,
             last_progress: now,
             resends: 0,
@@ -103,7 +103,7 @@ impl Sender<'_> {
                     if number < self.done || number > delivery.sent {
                         return Err(Error::Restarted);
                     }
-                    if delivery.asked.take().is_some() {
+                    if delivery.requested_at.take().is_some() {
                         // The plotter has read everything that was sent.
                         delivery.in_queue.clear();
                         delivery.sent = number;
@@ -115,7 +115,7 @@ impl Sender<'_> {
                     if number <= self.done || number > delivery.sent + 1 {
                         return Err(Error::Restarted);
                     }
-                    if delivery.asked.is_none() {
+                    if delivery.requested_at.is_none() {
                         self.ask_for_last_number(&mut delivery)?;
                     }
                 }
@@ -128,7 +128,7 @@ impl Sender<'_> {
                 None => self.fail_if_silent(&|| delivery.line(oldest))?,
             }
             self.query_if_due()?;
-            let since = delivery.asked.unwrap_or(delivery.last_event);
+            let since = delivery.requested_at.unwrap_or(delivery.last_event);
             if self.since(since) > self.patience.reply && !delivery.is_computing {
                 self.ask_for_last_number(&mut delivery)?;
             }
@@ -141,7 +141,7 @@ impl Sender<'_> {
 
     /// Sends as many lines as fit into the plotter's receive queue.
     fn fill_queue(&mut self, delivery: &mut Delivery<'_>) -> Result<(), Error> {
-        while delivery.asked.is_none()
+        while delivery.requested_at.is_none()
             && let Some(line) = delivery.line(delivery.sent + 1)
         {
             let text = numbered(Some(delivery.sent + 1), &line.sent);
@@ -183,7 +183,7 @@ impl Sender<'_> {
             let line = delivery.line(self.done + 1).map(Box::new);
             return Err(Error::Damaged { line, times: MOST_RESENDS });
         }
-        delivery.asked = Some(self.link.now());
+        delivery.requested_at = Some(self.link.now());
         // The first line end terminates a line that has lost its own.
         self.send(&format!("\n{}\n", numbered(None, LAST_NUMBER)))
     }
@@ -201,7 +201,7 @@ impl Sender<'_> {
             // The plotter reads no line until it has computed the picture.
             delivery.last_progress = self.link.now();
             delivery.last_event = delivery.last_progress;
-            delivery.asked = delivery.asked.map(|_| delivery.last_progress);
+            delivery.requested_at = delivery.requested_at.map(|_| delivery.last_progress);
         }
         // No user asks for a feed hold before anything is drawn, so the machine is resumed.
         let nothing_drawn = status.strokes.is_none_or(|(done, _)| done == 0);
@@ -222,11 +222,13 @@ impl Sender<'_> {
         let last = &|| line_of(lines, base, number);
         let start = self.link.now();
         self.last_heard = start;
-        let mut asked = None;
+        let mut requested_at = None;
         while self.since(start) < self.patience.lost {
             self.stop_if_interrupted()?;
-            if asked.is_none_or(|asked| self.since(asked) > self.patience.reply) {
-                asked = Some(self.link.now());
+            if requested_at
+                .is_none_or(|requested_at| self.since(requested_at) > self.patience.reply)
+            {
+                requested_at = Some(self.link.now());
                 self.send(&format!("\n{}\n", numbered(None, LAST_NUMBER)))?;
             }
             match self.listen()? {

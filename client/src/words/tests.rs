@@ -34,12 +34,13 @@ fn a_word_of_the_line_is_a_flag_or_has_words_for_it() {
 
 #[test]
 fn switches_and_unknown_words_are_for_client() {
-    assert_eq!(asked("$fit=on"), "--fit");
-    assert_eq!(asked("$cycle=off"), "no --cycle");
-    assert_eq!(asked("v 1 2 3"), "v 1 2 3");
+    assert_eq!(as_option("$fit=on"), "--fit");
+    assert_eq!(as_option("$cycle=off"), "no --cycle");
+    assert_eq!(as_option("v 1 2 3"), "v 1 2 3");
     assert_eq!(
         for_client("choose $see=faces, or set $130 and $131"),
-        "choose --see faces, or set the travel along x (setting 130 of the machine) and along y (setting 131)"
+        "choose --see faces, or set the travel along x (setting 130 of the machine) and along y \
+         (setting 131)"
     );
     assert_eq!(for_client("a $newer=thing and $999 or $"), "a newer thing and 999 or ");
 }

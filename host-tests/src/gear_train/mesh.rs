@@ -75,7 +75,7 @@ impl Mesh {
 
     /// Adds a solid of revolution that stands at the height of the first circle of its profile. It
     /// has no underside there: it stands on something that is wider.
-    pub fn standing(&mut self, centre: Point, count: usize, profile: &[(f64, f64)]) {
+    pub fn revolved(&mut self, centre: Point, count: usize, profile: &[(f64, f64)]) {
         let [(radius, z), above @ ..] = profile else { return };
         let lowest = self.level(&circle(centre, *radius, count, 0.0), *z);
         self.turned(centre, &lowest, above, 0.0);

@@ -51,7 +51,7 @@ fn plate(mesh: &mut Mesh) {
         let inward = |at: f64| at - 6.0 * at.signum();
         let centre = [inward(x), inward(y)];
         mesh.name("bolt");
-        mesh.standing(centre, 24, &[(2.7, PLATE), (2.7, PLATE + 0.5)]);
+        mesh.revolved(centre, 24, &[(2.7, PLATE), (2.7, PLATE + 0.5)]);
         let hexagon = circle(centre, 2.1, 6, 0.37 + 0.9 * n as f64);
         mesh.prism(&hexagon, PLATE + 0.5, PLATE + 2.2);
     }
@@ -68,10 +68,10 @@ fn train(mesh: &mut Mesh) {
 
     mesh.name("great wheel");
     let boss = |mesh: &mut Mesh, centre: Point, z: f64| {
-        mesh.standing(centre, 32, &[(4.4, PLATE), (3.6, PLATE + z)]);
+        mesh.revolved(centre, 32, &[(4.4, PLATE), (3.6, PLATE + z)]);
     };
     boss(mesh, great.centre, 1.6);
-    mesh.standing(great.centre, 24, &[(2.0, 1.6), (2.0, 2.6)]);
+    mesh.revolved(great.centre, 24, &[(2.0, 1.6), (2.0, 2.6)]);
     let spokes = Spokes {
         count: 6,
         half_widths: [1.5, 1.05],
@@ -85,7 +85,7 @@ fn train(mesh: &mut Mesh) {
 
     mesh.name("second arbor");
     boss(mesh, pinion.centre, 1.6);
-    mesh.standing(pinion.centre, 24, &[(2.0, 1.6), (2.0, 2.0)]);
+    mesh.revolved(pinion.centre, 24, &[(2.0, 1.6), (2.0, 2.0)]);
     let pinion = Wheel { heights: [2.0, 6.6], ..pinion };
     pinion.add_solid(mesh, 30, &[(3.4, 6.6), (3.4, 9.0)]);
     let spokes = Spokes {
@@ -101,7 +101,7 @@ fn train(mesh: &mut Mesh) {
 
     mesh.name("crank");
     boss(mesh, driver.centre, 6.0);
-    mesh.standing(driver.centre, 24, &[(2.0, 6.0), (2.0, 8.4)]);
+    mesh.revolved(driver.centre, 24, &[(2.0, 6.0), (2.0, 8.4)]);
     driver.add_solid(mesh, 36, &[(2.6, 13.0), (2.6, 16.0)]);
     let (angle, reach) = (-0.75, 15.0);
     let handle = polar(driver.centre, reach, angle);
@@ -116,11 +116,11 @@ fn train(mesh: &mut Mesh) {
     .concat();
     mesh.prism(&outline, 16.0, 18.0);
     mesh.prism(&circle(driver.centre, 2.3, 6, 0.5), 18.0, 19.8);
-    mesh.standing(driver.centre, 24, &[(1.2, 19.8), (1.2, 20.8), (0.8, 21.2)]);
+    mesh.revolved(driver.centre, 24, &[(1.2, 19.8), (1.2, 20.8), (0.8, 21.2)]);
     let mut knob = vec![(1.1, 18.0), (1.1, 19.2), (1.9, 19.2)];
     for n in 1..10 {
         let turn = PI * (0.13 + 0.087 * f64::from(n));
         knob.push((2.9 * turn.sin(), 22.9 - 4.2 * turn.cos()));
     }
-    mesh.standing(handle, 24, &knob);
+    mesh.revolved(handle, 24, &knob);
 }

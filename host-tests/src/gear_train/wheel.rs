@@ -204,8 +204,8 @@ impl Wheel {
 
 /// A corner of a window, rounded: five points from the arc to the side of the spoke, as radius and
 /// angle. `cut` says how far from the corner the rounding begins on the arc (an angle) and along
-/// the spoke (a length). The spoke runs from the first to the second radius of `spoke`, and from the
-/// third to the fourth angle.
+/// the spoke (a length). The spoke runs from the first to the second radius of `spoke`, and from
+/// the third to the fourth angle.
 fn rounded(corner: (f64, f64), cut: [f64; 2], spoke: (f64, f64, f64, f64)) -> Vec<(f64, f64)> {
     let (from, to, angle_from, angle_to) = spoke;
     let part = cut[1] / (to - from).abs();

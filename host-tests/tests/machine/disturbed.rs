@@ -41,7 +41,9 @@ proptest! {
                 holds.pop();
                 turn.machine.hold();
             }
-            if turn.machine.state() == (State::Hold { stopped: true }) && turn.machine.is_stopped() {
+            if turn.machine.state() == (State::Hold { stopped: true })
+                && turn.machine.is_stopped()
+            {
                 assert_eq!(turn.machine.planned_position(), turn.pins);
                 turn.machine.resume();
             }
@@ -59,18 +61,18 @@ proptest! {
         loose: bool,
         by_a_motor: bool,
     ) {
-        let mut stood_at = None;
+        let mut rest_position = None;
         let drawn = run_job(lifted(with_backlash(loose), by_a_motor), turn_ticks, &mut |turn| {
             if turn.now >= instant {
                 turn.machine.abort();
             }
             if turn.now > instant && is_ready(turn.machine) {
                 assert_eq!(turn.machine.planned_position(), turn.pins);
-                stood_at = Some(turn.pins);
+                rest_position = Some(turn.pins);
             }
-            stood_at.is_none()
+            rest_position.is_none()
         });
-        prop_assert_eq!(Some(drawn.end), stood_at);
+        prop_assert_eq!(Some(drawn.end), rest_position);
         prop_assert_eq!((drawn.pen, drawn.lift), raised(by_a_motor));
         event_checker::check_speed(&drawn.runs, &job(), &Settings::default(), false);
         // The next job begins where this one was aborted.
@@ -86,7 +88,7 @@ proptest! {
     ) {
         let alarm = if switch { Alarm::HardLimit } else { Alarm::EmergencyStop };
         let mut alarm_at = None;
-        let mut stands_at = None;
+        let mut rest_position = None;
         let drawn = run_job(lifted(with_backlash(loose), by_a_motor), turn_ticks, &mut |turn| {
             let Some(time) = alarm_at else {
                 if turn.now >= instant {
@@ -96,7 +98,7 @@ proptest! {
                 return true;
             };
             // A pulse that was high counts when it ends, which is before this iteration.
-            let pins = *stands_at.get_or_insert(turn.pins);
+            let pins = *rest_position.get_or_insert(turn.pins);
             assert_eq!(turn.pins, pins);
             assert_eq!(turn.machine.state(), State::Alarm(alarm));
             if turn.machine.unlock().is_err() {
@@ -108,7 +110,7 @@ proptest! {
             assert!(turn.machine.is_stopped());
             false
         });
-        let (time, pins) = alarm_at.zip(stands_at).expect("given");
+        let (time, pins) = alarm_at.zip(rest_position).expect("given");
         event_checker::check_speed(&drawn.runs, &job(), &Settings::default(), true);
         prop_assert!(drawn.last_step < time);
         prop_assert_eq!(drawn.end, pins);

@@ -24,7 +24,7 @@ mod offset {
 const SERIAL_PINS: u32 = 0b11;
 
 /// The time at which the last `?` came, in cycles modulo 2^24.
-static STATUS_ASKED: AtomicU32 = AtomicU32::new(0);
+static STATUS_REQUESTED: AtomicU32 = AtomicU32::new(0);
 
 static SHARED: Shared = Shared::new();
 static INLET: Owned<ReceiveMerge> = Owned::empty();
@@ -62,13 +62,13 @@ impl Line {
     /// Does the same as [`line::take_real_time`], and logs how long a request for the status has
     /// waited.
     pub fn take_real_time(&mut self) -> RealTime {
-        let asked = line::take_real_time(core::slice::from_mut(&mut self.0));
-        if asked.has(RealTime::STATUS) {
-            let waited = clock::cycles_24().wrapping_sub(STATUS_ASKED.load(Ordering::Relaxed));
+        let requests = line::take_real_time(core::slice::from_mut(&mut self.0));
+        if requests.has(RealTime::STATUS) {
+            let waited = clock::cycles_24().wrapping_sub(STATUS_REQUESTED.load(Ordering::Relaxed));
             let microseconds = (waited & clock::CYCLE_MASK) / (clock::HERTZ / 1_000_000);
             defmt::debug!("status after {=u32} us", microseconds);
         }
-        asked
+        requests
     }
 }
 
@@ -78,11 +78,11 @@ fn UART0() {
     // SAFETY: this is the handler that owns it.
     if let Some(receive_merge) = unsafe { INLET.get() } {
         while let Some(data) = UART0.poll() {
-            let asked = receive_merge.receiver.receive_from_uart(data);
-            if asked.has(RealTime::STATUS) {
-                STATUS_ASKED.store(clock::cycles_24(), Ordering::Relaxed);
+            let requests = receive_merge.receiver.receive_from_uart(data);
+            if requests.has(RealTime::STATUS) {
+                STATUS_REQUESTED.store(clock::cycles_24(), Ordering::Relaxed);
             }
-            line::ask(asked, core::slice::from_mut(receive_merge));
+            line::ask(requests, core::slice::from_mut(receive_merge));
         }
     }
     HAPPENED.store(true, Ordering::Relaxed);

@@ -50,6 +50,7 @@ impl Samples {
     }
 }
 
+/// Returns a bit for each contact that reads closed at this instant.
 fn closed_now() -> u8 {
     // Open inputs are pulled up, so they read high.
     !(SIO.gpio_in().get() >> FIRST_PIN) as u8 & ALL

@@ -80,27 +80,29 @@ struct Stored {
     text: [u8; TEXT_BYTES],
 }
 
-struct KeptPlace(UnsafeCell<MaybeUninit<Stored>>);
+/// The memory of the stored fault, which a reset leaves as it is.
+struct StoredCell(UnsafeCell<MaybeUninit<Stored>>);
 
 // SAFETY: it is used in the main loop and, with interrupts off, by the handler of a fault, after
 // which the main loop does not go on.
-unsafe impl Sync for KeptPlace {}
+unsafe impl Sync for StoredCell {}
 
 /// The data is not cleared at the start (`.uninit`), and the boot ROM does not write there either
 /// (see `boards/pico.x`).
 #[unsafe(link_section = ".uninit.kept")]
-static KEPT: KeptPlace = KeptPlace(UnsafeCell::new(MaybeUninit::uninit()));
+static STORED: StoredCell = StoredCell(UnsafeCell::new(MaybeUninit::uninit()));
 
 impl Stored {
     fn new(faults: u8, cause: &str) -> Self {
-        let mut kept = Self { sum: 0, faults, length: cause.len() as u8, text: [0; TEXT_BYTES] };
-        for (place, byte) in kept.text.iter_mut().zip(cause.bytes()) {
+        let mut stored = Self { sum: 0, faults, length: cause.len() as u8, text: [0; TEXT_BYTES] };
+        for (place, byte) in stored.text.iter_mut().zip(cause.bytes()) {
             *place = byte;
         }
-        kept.sum = kept.own_sum();
-        kept
+        stored.sum = stored.own_sum();
+        stored
     }
 
+    /// Returns the checksum of all fields but the checksum itself.
     fn own_sum(&self) -> u32 {
         static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
         let mut digest = CRC.digest();
@@ -109,19 +111,21 @@ impl Stored {
         digest.finalize()
     }
 
+    /// Writes the fault to where the next start of the board finds it.
     fn store(self) {
-        // SAFETY: nobody else uses it now (see `KeptPlace`). Volatile, for nothing in this run may
+        // SAFETY: nobody else uses it now (see `StoredCell`). Volatile, for nothing in this run may
         // read it again.
-        unsafe { KEPT.0.get().write_volatile(MaybeUninit::new(self)) };
+        unsafe { STORED.0.get().write_volatile(MaybeUninit::new(self)) };
     }
 
     /// Returns what was stored, if its checksum is right.
     fn load() -> Option<Self> {
         // SAFETY: nobody else uses it now, and every pattern of bits is a value of these integers.
-        let kept = unsafe { KEPT.0.get().read_volatile().assume_init() };
-        (kept.sum == kept.own_sum()).then_some(kept)
+        let stored = unsafe { STORED.0.get().read_volatile().assume_init() };
+        (stored.sum == stored.own_sum()).then_some(stored)
     }
 
+    /// Returns the stored text of the cause.
     fn cause(&self) -> Cause {
         let mut cause = Cause::new();
         for &byte in self.text.iter().take(self.length.into()) {
@@ -134,14 +138,14 @@ impl Stored {
 /// Returns why the board started. It is called once, before the watchdog is started.
 pub fn start() -> Start {
     let (reason, word) = (WATCHDOG.reason().get(), WATCHDOG.scratch4().get());
-    let kept = Stored::load();
+    let stored = Stored::load();
     let (faults, cause) = match word {
-        FAULT if reason != 0 => match kept {
-            Some(kept) => (kept.faults, kept.cause()),
+        FAULT if reason != 0 => match stored {
+            Some(stored) => (stored.faults, stored.cause()),
             None => (1, text("a fault whose message is lost")),
         },
         OURS if reason & TIMED_OUT != 0 => {
-            let faults = kept.map_or(0, |kept| kept.faults).saturating_add(1);
+            let faults = stored.map_or(0, |stored| stored.faults).saturating_add(1);
             (faults, text("the program hung, and the watchdog ended it"))
         }
         _ => (0, Cause::new()),
@@ -225,7 +229,7 @@ impl Fault for Pico {
     fn report(cause: fmt::Arguments) {
         let mut line = OneLine(Cause::new());
         let _ = line.write_fmt(cause); // This never fails.
-        let faults = Stored::load().map_or(0, |kept| kept.faults).saturating_add(1);
+        let faults = Stored::load().map_or(0, |stored| stored.faults).saturating_add(1);
         if faults < LAST_FAULT {
             Stored::new(faults, &line.0).store();
             restart(FAULT)

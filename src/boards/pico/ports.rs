@@ -79,14 +79,14 @@ impl Inlets {
     /// Passes a port's receiver to `take`, and acts on the real-time requests that it returns.
     pub fn take(&mut self, port: Port, take: impl FnOnce(&mut Receiver) -> RealTime) {
         let receiver = &mut self.inlets[port as usize].receiver;
-        let asked = take(receiver);
+        let requests = take(receiver);
         if receiver.has_heard() {
             HAS_RECEIVED
                 .store(HAS_RECEIVED.load(Ordering::Relaxed) | 1 << port as u8, Ordering::Relaxed);
         }
-        if asked != RealTime::default() {
-            self.aborts = self.aborts.wrapping_add(u32::from(asked.has(RealTime::ABORT)));
-            line::ask(asked, &mut self.inlets);
+        if requests != RealTime::default() {
+            self.aborts = self.aborts.wrapping_add(u32::from(requests.has(RealTime::ABORT)));
+            line::ask(requests, &mut self.inlets);
         }
     }
 

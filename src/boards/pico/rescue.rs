@@ -28,11 +28,11 @@ pub fn run(mut ports: Ports, cause: &Cause) -> ! {
             tell(&mut ports, cause);
             ports.reply_only_to_opened(false);
         }
-        let asked = ports.take_real_time();
-        if asked.has(RealTime::ABORT) {
+        let requests = ports.take_real_time();
+        if requests.has(RealTime::ABORT) {
             emergency::restart_fresh();
         }
-        if asked.has(RealTime::STATUS) {
+        if requests.has(RealTime::STATUS) {
             ports.write(b"<Alarm|MPos:0.000,0.000,0.000|Alarm:101>\r\n");
         }
         match ports.read_byte().map(|(_, byte)| byte) {

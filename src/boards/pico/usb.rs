@@ -87,6 +87,7 @@ static WAS_OPENED: AtomicBool = AtomicBool::new(false);
 /// the main loop clears it.
 static WAS_TOUCHED: AtomicBool = AtomicBool::new(false);
 
+/// The USB device: the serial line and what it needs of the chip.
 struct Device {
     /// The USB device of the driver.
     device: UsbDevice<'static, UsbBus>,
@@ -387,7 +388,7 @@ impl Device {
                         let _ = waiting.push_back(byte); // There is room.
                         RealTime::default()
                     }
-                    Err(asked) => asked,
+                    Err(requests) => requests,
                 });
                 self.drop_void(inlets);
             }

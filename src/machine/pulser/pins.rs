@@ -109,6 +109,7 @@ where
     }
 }
 
+/// Sets one pin. A pin of the board cannot fail.
 #[inline]
 fn write(pin: &mut impl OutputPin<Error = Infallible>, high: bool) {
     let Ok(()) = pin.set_state(PinState::from(high));

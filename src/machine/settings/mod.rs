@@ -146,6 +146,7 @@ impl Settings {
         self.as_ticks(setting, TICKS_PER_SECOND / 1000)
     }
 
+    /// Converts a setting that is a time to ticks.
     fn as_ticks(&self, setting: Setting, ticks_per_unit: u32) -> u32 {
         let bits = u64::from(self.get(setting).to_bits().max(0).unsigned_abs());
         // The ranges of the settings keep the result below 2^27 ticks.

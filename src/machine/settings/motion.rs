@@ -52,6 +52,7 @@ impl Settings {
         self.get(Setting::MaxRateX).min(self.get(Setting::MaxRateY))
     }
 
+    /// Returns the settings in the units of the motion planner.
     fn motion_settings(&self) -> MotionSettings {
         let steps = self.page_steps();
         let motor_ratio = Kinematics::properties(self).motor_ratio;

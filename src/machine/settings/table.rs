@@ -126,6 +126,7 @@ pub struct SettingInfo {
     pub whole: bool,
 }
 
+/// Makes a row; the range is the least, the greatest and the default value.
 const fn row(
     setting: Setting,
     number: u16,

@@ -25,8 +25,10 @@ pub(super) enum Map {
 }
 
 impl Map {
+    /// The shift of a map that leaves the origin where it is.
     pub(super) const NO_SHIFT: [i64; 3] = [0; 3];
 
+    /// Returns the matrix with these entries on its diagonal and zeros elsewhere.
     pub(super) fn diagonal(entries: [i64; 3]) -> [[i64; 3]; 3] {
         [0, 1, 2].map_each(|row| {
             [0, 1, 2].map_each(|column| if row == column { entries[row] } else { 0 })
@@ -156,6 +158,7 @@ pub(super) fn in_unit(position: [i64; 3], coarser: u32) -> Position {
     Position { x, y, z }
 }
 
+/// Returns the greatest common divisor.
 fn gcd(mut a: u64, mut b: u64) -> u64 {
     while b != 0 {
         (a, b) = (b, a % b);

@@ -178,6 +178,7 @@ impl Model<'_> {
         self.rounding.rotate(self.fraction_bits, all);
     }
 
+    /// Returns the numbers of vertices, bars, faces and curves.
     fn counts(&self) -> [usize; 4] {
         [ElementKind::Vertices, ElementKind::Bars, ElementKind::Faces, ElementKind::Curves]
             .map(|part| self.count(part))

@@ -286,7 +286,7 @@ impl Matching<'_, '_> {
             } else if (index < position) == back {
                 self.enter(node, Label::Fresh);
             } else {
-                self.look_from_each(node, work_budget)?;
+                self.find_first_pairs(node, work_budget)?;
             }
             if next == first {
                 if !back {

@@ -210,6 +210,7 @@ impl<'s, 'a> Matching<'s, 'a> {
         Ok(())
     }
 
+    /// Returns the label of the node in which the vertex lies.
     fn label(&self, vertex: u16) -> Label {
         match self.label[usize::from(vertex)] {
             0 => Label::Outside,
@@ -271,7 +272,7 @@ impl<'s, 'a> Matching<'s, 'a> {
         self.reached = NOTHING;
         self.enter(root, Label::Fresh);
         loop {
-            self.look_around(work_budget)?;
+            self.examine_fresh_vertices(work_budget)?;
             self.charge(self.reached.len(), work_budget)?;
             let (time, vertex) = self.next_touch();
             if self.inner_blossoms > 0
@@ -287,7 +288,7 @@ impl<'s, 'a> Matching<'s, 'a> {
             let node = self.top_of(vertex);
             if self.label(vertex) == Label::Outer {
                 if self.top_of(outer) == node {
-                    self.look_from(vertex, work_budget)?;
+                    self.find_first_pair(vertex, work_budget)?;
                 } else {
                     self.shrink(outer, vertex);
                 }
@@ -322,11 +323,14 @@ impl<'s, 'a> Matching<'s, 'a> {
     }
 
     /// Examines the pairs of every fresh vertex.
-    fn look_around(&mut self, work_budget: &mut WorkBudget<'_>) -> Result<(), OrderError> {
+    fn examine_fresh_vertices(
+        &mut self,
+        work_budget: &mut WorkBudget<'_>,
+    ) -> Result<(), OrderError> {
         for vertex in core::mem::replace(&mut self.fresh, NOTHING) {
             if self.label(vertex) == Label::Fresh {
                 self.label[usize::from(vertex)] = Label::Outer as u8;
-                self.look_from_outer(vertex, work_budget)?;
+                self.record_pairs_of(vertex, work_budget)?;
             }
         }
         Ok(())
@@ -334,7 +338,7 @@ impl<'s, 'a> Matching<'s, 'a> {
 
     /// Records at all other vertices when their pair with the outer vertex `from` will touch, if
     /// that is sooner than the time recorded there.
-    fn look_from_outer(
+    fn record_pairs_of(
         &mut self,
         from: u16,
         work_budget: &mut WorkBudget<'_>,
@@ -345,7 +349,7 @@ impl<'s, 'a> Matching<'s, 'a> {
             for other in others {
                 let label = self.label(other);
                 if label != Label::Inner && self.top_of(other) != node {
-                    self.look_at(other, label, from, own);
+                    self.record_pair(other, label, from, own);
                 }
             }
         }
@@ -354,7 +358,7 @@ impl<'s, 'a> Matching<'s, 'a> {
 
     /// Records when the pair of `other` with the outer vertex `from`, whose current radius is
     /// `own`, will touch, if that is sooner than the time recorded.
-    fn look_at(&mut self, other: u16, label: Label, from: u16, own: i32) {
+    fn record_pair(&mut self, other: u16, label: Label, from: u16, own: i32) {
         let (now, index) = (self.now, usize::from(other));
         // If `other` is outside the tree, only the disc of `from` grows; between two outer vertices
         // both discs grow.
@@ -418,7 +422,7 @@ impl<'s, 'a> Matching<'s, 'a> {
 
     /// Computes again when the first pair of `vertex` (outside or outer) with an outer vertex of
     /// another node will touch.
-    fn look_from(
+    fn find_first_pair(
         &mut self,
         vertex: u16,
         work_budget: &mut WorkBudget<'_>,
@@ -443,14 +447,14 @@ impl<'s, 'a> Matching<'s, 'a> {
     }
 
     /// Does the same for each vertex of a node.
-    fn look_from_each(
+    fn find_first_pairs(
         &mut self,
         node: u16,
         work_budget: &mut WorkBudget<'_>,
     ) -> Result<(), OrderError> {
         for vertex in self.candidates(node) {
             if self.top_of(vertex) == node {
-                self.look_from(vertex, work_budget)?;
+                self.find_first_pair(vertex, work_budget)?;
             }
         }
         Ok(())

@@ -49,7 +49,7 @@ impl Pipeline<'_> {
         cancel.enter(Stage::Visibility);
         let precision = options.precision_of(model);
         let positions = bytemuck::cast_slice(model.vertices());
-        let unrounded = Unrounded::new(positions, precision, view.doubt(precision.written));
+        let unrounded = Unrounded::new(positions, precision, view.error_bound(precision.written));
         let scene = Scene { vertices, elements, projection, unrounded };
         // The memory is divided into three parts: what is already taken, the memory of the
         // visibility stage, and the lines that it finds. Beyond its minimum, up to three times as

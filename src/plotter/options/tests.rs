@@ -41,10 +41,7 @@ fn options_are_read_with_their_values() {
     assert_eq!(page("0x297"), Err(CommandError::NumberOutOfRange));
     let refusal = |name, value| with(name, value).expect_err("refused");
     assert_eq!(refusal("margin", "-1"), CommandError::NumberOutOfRange);
-    assert_eq!(
-        refusal("hidden", "gone").to_string(),
-        "choose erased, dotted, dashed, shown, pen or pen,NUMBER"
-    );
+    assert_eq!(refusal("see", "gone").to_string(), "choose faces, wire, vertices or edges");
     assert_eq!(PlotOptions::default().set("110", "5"), Ok(false));
 }
 

@@ -55,10 +55,10 @@ fn follow(
         return Ok(());
     }
     callers.push(name.clone());
-    let way = callers.join(" > ");
+    let call_path = callers.join(" > ");
     const ADVICE: &str = "and the main loop may be in the middle of a division. Do the work of \
         the handler in divider::keep_during.";
-    ensure!(!divides(&name), "{way}: the handler divides, {ADVICE}");
+    ensure!(!divides(&name), "{call_path}: the handler divides, {ADVICE}");
     let end = image.functions.get(&start).map_or(start, |(_, end)| *end);
     for effect in image.effects(start, end) {
         match effect {
@@ -66,7 +66,10 @@ fn follow(
                 follow(image, target, callers, done)?;
             }
             Effect::Indirect => {
-                ensure!(false, "{way}: the handler calls by a pointer, which may divide, {ADVICE}");
+                ensure!(
+                    false,
+                    "{call_path}: the handler calls by a pointer, which may divide, {ADVICE}"
+                );
             }
             _ => {}
         }

@@ -32,9 +32,9 @@ fn every_pattern_matches(map: &str, names: &[&str]) -> Result<()> {
         ensure!(of_section == ".text.", "{pattern} in boards/pico.x is no section of a function");
         ensure!(
             names.iter().any(|name| matches(of_name, name)),
-            "the pattern {pattern} in boards/pico.x matches no function, so that what it means lies \
-             elsewhere in flash, and planning becomes slower. Was its module renamed, or is it \
-             inlined now? Correct the pattern or delete it."
+            "the pattern {pattern} in boards/pico.x matches no function, so that what it means \
+             lies elsewhere in flash, and planning becomes slower. Was its module renamed, or is \
+             it inlined now? Correct the pattern or delete it."
         );
     }
     Ok(())

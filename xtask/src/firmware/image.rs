@@ -80,6 +80,7 @@ impl Image {
     /// The target of a branch to this address, which may be a veneer of the linker: `PUSH {r0,
     /// r1}`, `LDR r0, [PC, #4]`, `STR r0, [SP, #4]`, `POP {r0, PC}`, and the target.
     pub fn past_veneer(&self, address: u64) -> u64 {
+        /// The instructions of the linker by which code in RAM calls a function in flash.
         const VENEER: [u32; 4] = [0xB403, 0x4801, 0x9001, 0xBD01];
         let is_veneer = (0..)
             .zip(VENEER)

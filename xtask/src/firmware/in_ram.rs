@@ -95,25 +95,25 @@ impl Graph<'_> {
             return Ok(());
         }
         let name = self.image.name(start);
-        let by_way_of = match &callers[..] {
+        let through = match &callers[..] {
             [] => String::new(),
             callers => format!(", called by {}", callers.join(" > ")),
         };
         ensure!(
             !divides(&name),
-            "{name}{by_way_of}: it divides, and the divider may be in the middle of another \
+            "{name}{through}: it divides, and the divider may be in the middle of another \
              division. \
             Let a handler of the steps shift or multiply instead."
         );
-        ensure!(self.ram.contains(&start), "{name} lies in flash{by_way_of}. {ADVICE}");
+        ensure!(self.ram.contains(&start), "{name} lies in flash{through}. {ADVICE}");
         let Some((_, end)) = self.image.functions.get(&start) else {
-            bail!("{start:#010x}{by_way_of} is no function. Let branches lead to functions.");
+            bail!("{start:#010x}{through} is no function. Let branches lead to functions.");
         };
         for address in (start.next_multiple_of(4)..*end).step_by(4) {
             let constant = self.image.word(address).filter(|_| !self.image.is_code(address));
             if let Some(constant) = constant.filter(|constant| self.flash.contains(constant)) {
                 bail!(
-                    "{name}{by_way_of} uses {} at {constant:#010x} in flash. {ADVICE} Constants \
+                    "{name}{through} uses {} at {constant:#010x} in flash. {ADVICE} Constants \
                     that it reads lie in RAM if they are atomic.",
                     self.image.name(constant)
                 );

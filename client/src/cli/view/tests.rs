@@ -97,7 +97,7 @@ fn nonsense_is_refused_with_the_reason() {
         (["--title-size", "0.5"], RANGE),
         (["--lift", "-1"], RANGE),
         (["--lift", "1001"], RANGE),
-        (["--hidden", "gone"], "erased, dotted, dashed, shown"),
+        (["--hidden", "gone"], "erased, dotted, dashed"),
     ] {
         let error = settings(&options).expect_err("refused");
         assert!(error.contains(reason), "{options:?}: {error}");

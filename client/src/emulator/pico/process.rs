@@ -213,7 +213,7 @@ fn read(mut stdout: ChildStdout, shared: &Shared<State>, mut log: PipeWriter) {
             }
         }
         drop(state);
-        shared.tell();
+        shared.notify();
         // The write cannot fail: the reader of the log ends only when this writer is dropped.
         let _ = log.write_all(&logged);
         if count == 0 {

@@ -47,14 +47,14 @@ mod tests {
     #[test]
     fn the_pen_is_where_the_servo_was_told() {
         let mut servo = Servo::default();
-        let mut told = Vec::new();
+        let mut events = Vec::new();
         for (start, width) in [(0, 1000), (20_000, 2000), (40_000, 1512), (60_000, 1504)] {
             for record in [record(7, true, start), record(7, false, start + width)] {
-                told.extend(servo.pin_change(&record));
+                events.extend(servo.pin_change(&record));
             }
         }
         let pen = |high, at| PinChange { pin: Pin::Pen, high, at: Duration::from_micros(at) };
-        assert_eq!(told, [pen(true, 22_000), pen(false, 61_504)]);
+        assert_eq!(events, [pen(true, 22_000), pen(false, 61_504)]);
     }
 
     #[test]

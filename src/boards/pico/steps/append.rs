@@ -26,7 +26,7 @@ impl EventQueue for Steps {
             }
             EventKind::Lift { step, down } => {
                 self.moving = true;
-                return self.push_lift(step, down, event);
+                return self.push_z_axis(step, down, event);
             }
             EventKind::Levels(levels) => {
                 self.moving = levels & StepEvent::AT_REST == 0;
@@ -43,8 +43,8 @@ impl EventQueue for Steps {
             }
         };
         // Without a braking rule, no lengths are passed on or counted.
-        let is_told = event.is_step() && STATE.brake().is_on();
-        let step = if is_told { self.step_length.step() } else { StepWay::default() };
+        let is_counted = event.is_step() && STATE.brake().is_on();
+        let step = if is_counted { self.step_length.step() } else { StepWay::default() };
         if word & TARGETS == target::PULSE {
             self.put(word, event.ticks().saturating_sub(beyond), step);
         } else {
@@ -111,7 +111,7 @@ impl Steps {
 
     /// Appends an event of the pen's motor. The pulse lasts half of the event, so that the handler
     /// is never two levels behind.
-    fn push_lift(&mut self, step: bool, down: bool, event: StepEvent) -> Result<(), StepEvent> {
+    fn push_z_axis(&mut self, step: bool, down: bool, event: StepEvent) -> Result<(), StepEvent> {
         use z_axis_levels::{DOWN, MARK, STEP};
         let pins = MARK | if down { DOWN } else { 0 };
         let word = self.levels | target::MOVE_PEN;
@@ -186,6 +186,7 @@ impl Steps {
         STATE.brake().set_queued(queued.wrapping_add(step.around * count));
     }
 
+    /// Writes one word with its count to the ring, and what its step adds to the path.
     fn put(&mut self, word: u32, count: u32, step: StepWay) {
         place(self.written).store(word | count << 8, Ordering::Relaxed);
         lengths(self.written).store(pack(step), Ordering::Relaxed);

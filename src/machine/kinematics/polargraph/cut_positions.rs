@@ -27,7 +27,8 @@ const NEAR: i32 = 2;
 /// let anchors = Anchors { left: PagePoint { x: -100, y: 60_000 }, width: 64_000 };
 /// let [from, to] = [0, 1000].map(|x| PagePoint { x, y: 0 });
 /// let walk = |cuts: CutPositions| {
-///     core::iter::successors(Some(0), move |&cut| Some(cuts.next(cut))).take(9).collect::<Vec<_>>()
+///     let numbers = core::iter::successors(Some(0), move |&cut| Some(cuts.next(cut)));
+///     numbers.take(9).collect::<Vec<_>>()
 /// };
 /// assert_eq!(walk(CutPositions::new(anchors, from, to)), [0, 13, 28, 45, 62, 81, 100, 121, 142]);
 /// ```
