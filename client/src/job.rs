@@ -21,6 +21,25 @@ impl Settings {
     pub fn value(&self, name: &str) -> Option<&str> {
         self.values.iter().find(|(own, _)| *own == name).map(|(_, value)| value.as_str())
     }
+
+    /// Says that the plotter moves a plan with these least and greatest coordinates, in mm, because
+    /// it does not lie within the margins of the page. `None` if the plan keeps its place, is
+    /// scaled, or is too large for the page, which the plotter says by itself.
+    pub fn moves_plan(&self, [low, high]: [[f64; 2]; 2]) -> Option<String> {
+        let margin: f64 = self.value("margin")?.parse().ok()?;
+        let size = [self.page.width, self.page.height];
+        let fits = |axis: usize| high[axis] - low[axis] <= size[axis] - 2.0 * margin;
+        let lies = |axis: usize| low[axis] >= margin && high[axis] <= size[axis] - margin;
+        let is_moved = [0, 1].into_iter().all(fits) && ![0, 1].into_iter().all(lies);
+        (is_moved && self.value("fit") == Some("off")).then(|| {
+            let [width, height] = size;
+            format!(
+                "the drawing is moved onto the page of {width} x {height} mm with its margin of \
+                 {margin} mm: it reaches from {}, {} to {}, {} mm",
+                low[0], low[1], high[0], high[1]
+            )
+        })
+    }
 }
 
 /// Every line of a job before the plot command: clear the old model, choose how pens are assigned,

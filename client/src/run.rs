@@ -2,13 +2,13 @@
 
 use crate::cli::{
     Cli, Command, FitArgs, PictureArgs, PlotArgs, PreviewArgs, TapeCommand, TapeEncodeArgs,
-    TapeShowArgs,
+    TapeShowArgs, ViewArgs,
 };
 use crate::error::Error;
 use crate::fit::fit_obj;
 use crate::formats::{ReadError, SourceFile};
 use crate::interrupt::MovingPlotter;
-use crate::job::Job;
+use crate::job::{Job, Settings};
 use crate::lines::Lines;
 use crate::link::{Link, SerialLink};
 use crate::machines;
@@ -21,6 +21,7 @@ use crate::sender::{Patience, Sender};
 use crate::tape;
 use crate::workspace;
 use penup::step::tape::BadCode;
+use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
@@ -44,7 +45,6 @@ pub fn run(cli: &Cli, interrupt: &AtomicBool) -> Result<String, Error> {
 }
 
 fn plot(args: &PlotArgs, interrupt: &AtomicBool) -> Result<String, Error> {
-    let settings = args.view.settings();
     // Without a file, a small example is drawn.
     let example = || workspace::root().join("scenes/interpen.obj");
     let file = args.file.clone().unwrap_or_else(example);
@@ -52,7 +52,8 @@ fn plot(args: &PlotArgs, interrupt: &AtomicBool) -> Result<String, Error> {
     if args.port.is_none() {
         output::check(&file, &outputs.files())?;
     }
-    let job = Job::new(SourceFile::read(&file)?, &settings);
+    let (source, settings) = read(&file, &args.view)?;
+    let job = Job::new(source, &settings);
     let mut bar = Bar::default();
     if let Some(device) = &args.port {
         let mut link = SerialLink::open(device)
@@ -80,10 +81,10 @@ fn plot(args: &PlotArgs, interrupt: &AtomicBool) -> Result<String, Error> {
 }
 
 fn preview(args: &PreviewArgs, interrupt: &AtomicBool) -> Result<String, Error> {
-    let settings = args.view.settings();
     let outputs = Outputs::of(&args.pictures, args.json.as_deref(), args.motion.as_deref());
     output::check(&args.file, &outputs.files())?;
-    let job = Job::new(SourceFile::read(&args.file)?, &settings);
+    let (source, settings) = read(&args.file, &args.view)?;
+    let job = Job::new(source, &settings);
     let mut bar = Bar::default();
     let mut plotter = InMemory::new();
     let report = draw(&mut plotter, &job, interrupt, &mut bar)?;
@@ -117,6 +118,7 @@ fn fit(args: &FitArgs) -> Result<String, Error> {
     let output = args.output.clone().unwrap_or_else(beside);
     output::check(&args.file, &[&output])?;
     let source = SourceFile::read(&args.file)?;
+    note(&args.file, source.notes());
     let mut bar = Bar::default();
     let fitted =
         fit_obj(&source, source.size(), args.tolerance, &mut |done, all| bar.fitted(done, all))
@@ -129,7 +131,8 @@ fn fit(args: &FitArgs) -> Result<String, Error> {
 fn encode_tape(args: &TapeEncodeArgs, interrupt: &AtomicBool) -> Result<String, Error> {
     let output = args.output.clone().unwrap_or_else(|| args.file.with_extension("tape"));
     output::check(&args.file, &[&output])?;
-    let job = Job::new(SourceFile::read(&args.file)?, &args.view.settings());
+    let (source, settings) = read(&args.file, &args.view)?;
+    let job = Job::new(source, &settings);
     let mut plotter = InMemory::new();
     {
         let mut bar = Bar::default();
@@ -179,6 +182,24 @@ pub fn draw(
         .and_then(|()| sender.report());
     sender.end();
     drawn
+}
+
+/// Reads `file`, tells the user what is not drawn as the file says, and chooses the settings.
+fn read(file: &Path, view: &ViewArgs) -> Result<(SourceFile, Settings), Error> {
+    let source = SourceFile::read(file)?;
+    let settings = view.settings_on(source.page());
+    note(file, source.notes());
+    let moved = source.bounds().and_then(|bounds| settings.moves_plan(bounds));
+    note(file, moved.as_slice());
+    Ok((source, settings))
+}
+
+/// Prints notes on `file` to the standard error.
+fn note(file: &Path, notes: &[String]) {
+    for note in notes {
+        // A closed standard error is no reason to fail.
+        let _ = writeln!(io::stderr(), "penup: note: {}: {note}", file.display());
+    }
 }
 
 struct Outputs {

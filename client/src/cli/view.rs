@@ -9,6 +9,7 @@ use crate::page::Page;
 use crate::protocol::acts_at_once;
 use crate::words::for_client;
 use clap::builder::{PossibleValue, PossibleValuesParser};
+use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, Error, FromArgMatches};
 use penup::plotter::{Flag, OPTIONS, PlotOption, PlotOptions};
 use penup::protocol::{Command as PlotterCommand, CommandError, Escape, LINE_LIMIT};
@@ -23,6 +24,10 @@ const PAGES: [(&str, Page); 3] = [
     ("a3", Page { width: 297.0, height: 420.0 }),
     ("letter", Page { width: 215.9, height: 279.4 }),
 ];
+/// The name of the option that keeps room free, which a file with a page of its own does not need.
+const MARGIN: &str = "margin";
+/// The name of the option that scales a plan to the page.
+const FIT: &str = "fit";
 /// The argument that turns the page.
 const LANDSCAPE: &str = "landscape";
 
@@ -30,6 +35,9 @@ const LANDSCAPE: &str = "landscape";
 #[derive(Debug, Clone)]
 pub struct ViewArgs {
     settings: Settings,
+    landscape: bool,
+    is_page_given: bool,
+    is_margin_given: bool,
 }
 
 impl ViewArgs {
@@ -37,6 +45,38 @@ impl ViewArgs {
     pub fn settings(&self) -> Settings {
         self.settings.clone()
     }
+
+    /// The settings for a file that lays its plan on `page`, if it has one. Where the arguments do
+    /// not say otherwise, that is the page, and at true size no margin is kept free: so the plan
+    /// keeps its place.
+    pub fn settings_on(&self, page: Option<Page>) -> Settings {
+        let mut settings = self.settings();
+        let Some(page) = page else { return settings };
+        if !self.is_page_given {
+            settings.page = turned(page, self.landscape);
+        }
+        let is_true_size = settings.value(FIT) == Some("off");
+        let own = page_value(settings.page);
+        for (name, value) in &mut settings.values {
+            match *name {
+                PAGE => value.clone_from(&own),
+                MARGIN if is_true_size && !self.is_margin_given => "0".clone_into(value),
+                _ => {}
+            }
+        }
+        settings
+    }
+}
+
+/// The page, on its long side if `landscape` is set.
+fn turned(page: Page, landscape: bool) -> Page {
+    let Page { width, height } = page;
+    if landscape { Page { width: width.max(height), height: width.min(height) } } else { page }
+}
+
+/// A page as the value of its option.
+fn page_value(page: Page) -> String {
+    format!("{}x{}", page.width, page.height)
 }
 
 impl Args for ViewArgs {
@@ -63,14 +103,12 @@ impl Args for ViewArgs {
 
 impl FromArgMatches for ViewArgs {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, Error> {
-        let mut page = matches.get_one::<Page>(PAGE).copied().unwrap_or(PAGES[0].1);
-        if matches.get_flag(LANDSCAPE) {
-            let Page { width, height } = page;
-            page = Page { width: width.max(height), height: width.min(height) };
-        }
+        let landscape = matches.get_flag(LANDSCAPE);
+        let page = matches.get_one::<Page>(PAGE).copied().unwrap_or(PAGES[0].1);
+        let page = turned(page, landscape);
         let value = |(option, flag): (&'static PlotOption, Flag)| {
             let value = match option.name {
-                PAGE => Some(format!("{}x{}", page.width, page.height)),
+                PAGE => Some(page_value(page)),
                 name if flag.is_switch => {
                     Some(if matches.get_flag(name) { "on" } else { "off" }.to_owned())
                 }
@@ -78,7 +116,13 @@ impl FromArgMatches for ViewArgs {
             };
             Some((option.name, value?))
         };
-        Ok(Self { settings: Settings { page, values: flags().filter_map(value).collect() } })
+        let is_given = |name| matches.value_source(name) == Some(ValueSource::CommandLine);
+        Ok(Self {
+            settings: Settings { page, values: flags().filter_map(value).collect() },
+            landscape,
+            is_page_given: is_given(PAGE),
+            is_margin_given: is_given(MARGIN),
+        })
     }
 
     fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), Error> {

@@ -30,6 +30,14 @@ pub enum ReadError {
         /// What is wrong with it, and what the user can do about it, as a sentence.
         reason: String,
     },
+    /// The file as a whole cannot be drawn.
+    #[error("{file}: {reason}")]
+    Content {
+        /// The path as the user wrote it.
+        file: String,
+        /// What is wrong with it, and what the user can do about it, as a sentence.
+        reason: String,
+    },
     /// A line of the file contains a NUL byte, so the file is not text.
     #[error(
         "{}:{}: this is no text, and {kind} is: is it another file under this name?",

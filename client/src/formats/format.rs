@@ -2,11 +2,32 @@
 
 use super::error::ReadError;
 use crate::lines::Lines;
+use crate::page::Page;
 use std::fmt::Debug;
 
 /// The size in bytes from which a file is refused, whatever its format. At 11 kB/s it would take
 /// days to send.
 pub(super) const SIZE_LIMIT: u64 = 1 << 32;
+
+/// What a file holds.
+#[derive(Debug)]
+pub(super) struct Contents {
+    /// The lines that are sent.
+    pub(super) lines: Box<dyn Lines + Send>,
+    /// The page on which the file lays its plan; `None` if the file has no page.
+    pub(super) page: Option<Page>,
+    /// The least and the greatest x and y of that plan, in mm; `None` if that is not known.
+    pub(super) bounds: Option<[[f64; 2]; 2]>,
+    /// Sentences for the user about what is not drawn as the file says, without a full stop.
+    pub(super) notes: Vec<String>,
+}
+
+impl Contents {
+    /// The contents of a file that holds nothing but `lines`.
+    pub(super) fn of(lines: impl Lines + Send + 'static) -> Self {
+        Self { lines: Box::new(lines), page: None, bounds: None, notes: Vec::new() }
+    }
+}
 
 /// A file format.
 pub(super) trait Format: Debug + Sync {
@@ -22,9 +43,9 @@ pub(super) trait Format: Debug + Sync {
 
     /// Turns `bytes`, the contents of the file that the user calls `file`, into lines to send.
     /// There are fewer bytes than [`SIZE_LIMIT`]. The lines hold geometry and pens, but no command
-    /// that acts on the machine.
+    /// that acts on the machine. What the format drops is counted in the notes.
     ///
     /// # Errors
     /// The file contains something that no plotter accepts, or that this format does not allow.
-    fn read(&self, file: String, bytes: Vec<u8>) -> Result<Box<dyn Lines>, ReadError>;
+    fn read(&self, file: String, bytes: Vec<u8>) -> Result<Contents, ReadError>;
 }

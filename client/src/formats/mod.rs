@@ -11,17 +11,19 @@
 mod error;
 mod format;
 mod obj;
+mod svg;
 
 pub use error::ReadError;
 
 use crate::lines::{JobLine, Lines};
-use format::{Format, SIZE_LIMIT};
+use crate::page::Page;
+use format::{Contents, Format, SIZE_LIMIT};
 use std::fs::{File, Metadata};
 use std::io::{self, Read as _};
 use std::path::Path;
 
 /// Every format that is read.
-static FORMATS: &[&dyn Format] = &[&obj::Obj];
+static FORMATS: &[&dyn Format] = &[&obj::Obj, &svg::Svg];
 
 /// The number of bytes by which a format is recognised.
 const BEGINNING: u64 = 1 << 16;
@@ -30,7 +32,7 @@ const BEGINNING: u64 = 1 << 16;
 #[derive(Debug)]
 pub struct SourceFile {
     size: usize,
-    lines: Box<dyn Lines>,
+    contents: Contents,
 }
 
 impl SourceFile {
@@ -72,26 +74,42 @@ impl SourceFile {
         if size as u64 >= SIZE_LIMIT {
             return Err(ReadError::TooLarge { file: name });
         }
-        Ok(Self { size, lines: format.read(name, bytes)? })
+        Ok(Self { size, contents: format.read(name, bytes)? })
     }
 
     /// The size of the file in bytes.
     pub fn size(&self) -> usize {
         self.size
     }
+
+    /// The page on which the file lays its plan; `None` if the file has no page.
+    pub fn page(&self) -> Option<Page> {
+        self.contents.page
+    }
+
+    /// The least and the greatest x and y of the plan, in mm; `None` if that is not known.
+    pub fn bounds(&self) -> Option<[[f64; 2]; 2]> {
+        self.contents.bounds
+    }
+
+    /// What the user should know about the file: sentences without a full stop, each about
+    /// something that is not drawn as the file says.
+    pub fn notes(&self) -> &[String] {
+        &self.contents.notes
+    }
 }
 
 impl Lines for SourceFile {
     fn count(&self) -> usize {
-        self.lines.count()
+        self.contents.lines.count()
     }
 
     fn line(&self, index: usize) -> Option<JobLine> {
-        self.lines.line(index)
+        self.contents.lines.line(index)
     }
 
     fn in_order(&self) -> Box<dyn Iterator<Item = JobLine> + '_> {
-        self.lines.in_order()
+        self.contents.lines.in_order()
     }
 }
 

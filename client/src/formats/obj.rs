@@ -13,7 +13,7 @@
 //! inside a file.
 
 use super::error::ReadError;
-use super::format::Format;
+use super::format::{Contents, Format};
 use crate::lines::{JobLine, Lines, Origin};
 use crate::protocol::acts_at_once;
 use crate::words::explained;
@@ -43,8 +43,8 @@ impl Format for Obj {
         })
     }
 
-    fn read(&self, file: String, bytes: Vec<u8>) -> Result<Box<dyn Lines>, ReadError> {
-        Ok(Box::new(ObjLines::new(file, bytes)?))
+    fn read(&self, file: String, bytes: Vec<u8>) -> Result<Contents, ReadError> {
+        Ok(Contents::of(ObjLines::new(file, bytes)?))
     }
 }
 

@@ -13,7 +13,8 @@ fn read(name: &str, content: &[u8]) -> Result<usize, String> {
     file.map(|file| file.count()).map_err(|error| error.to_string().replace(&here, ""))
 }
 
-const UNKNOWN: &str = "penup reads Wavefront OBJ files, whose names end in .obj";
+const UNKNOWN: &str = "penup reads Wavefront OBJ files, whose names end in .obj; SVG files, \
+                       whose names end in .svg";
 
 #[test]
 fn the_extension_decides_in_capitals_as_well() {

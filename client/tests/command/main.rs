@@ -114,6 +114,36 @@ fn memory_grows_with_the_file_and_little_faster() {
 }
 
 #[test]
+fn an_svg_is_drawn_at_its_place_with_two_pens() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let svg = "<svg xmlns='http://www.w3.org/2000/svg' width='90mm' height='60mm' \
+               viewBox='0 0 90 60'><path d='M0 0H20' stroke='red'/>\
+               <circle cx='70' cy='40' r='20' fill='none' stroke='blue'/><text>a</text></svg>";
+    fs::write(folder.path().join("a.svg"), svg).expect("written");
+    let (code, said, noted) = penup(folder.path(), &["preview", "a.svg", "--json", "a.json"]);
+    assert_eq!(code, Some(0), "{noted}");
+    assert!(said.starts_with("a.json: "), "{said}");
+    assert!(noted.contains("note: a.svg: 1 text is not read"), "{noted}");
+    let json = fs::read_to_string(folder.path().join("a.json")).expect("readable");
+    let result: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+    assert_eq!(result["stroke_pens"], serde_json::json!([1, 2]));
+    let strokes: Vec<Vec<[f64; 2]>> =
+        serde_json::from_value(result["strokes"].clone()).expect("strokes");
+    let mut line = strokes[0].clone();
+    line.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    assert_eq!(line, [[0.0, 60.0], [20.0, 60.0]]);
+    for [x, y] in &strokes[1] {
+        let radius = (x - 70.0).hypot(y - 20.0);
+        assert!((radius - 20.0).abs() < 1.0 / 80.0, "{x} {y}");
+    }
+    // A margin moves what lies in it, and that is said.
+    let arguments = ["preview", "a.svg", "--json", "b.json", "--page", "A4", "--margin", "5"];
+    let (code, _, noted) = penup(folder.path(), &arguments);
+    assert_eq!(code, Some(0), "{noted}");
+    assert!(noted.contains("the drawing is moved onto the page of 210 x 297 mm"), "{noted}");
+}
+
+#[test]
 fn a_port_that_is_not_there_is_explained() {
     let folder = tempfile::tempdir().expect("a folder");
     fs::write(folder.path().join("a.obj"), "v 0 0 0\n").expect("written");

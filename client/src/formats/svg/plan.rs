@@ -1,0 +1,119 @@
+//! The lines of OBJ that draw polylines as a plan.
+
+use super::flatten::Polyline;
+use crate::lines::{JobLine, Lines, Origin};
+use kurbo::Point;
+use penup::protocol::LINE_LIMIT;
+use std::collections::HashMap;
+use std::fmt::Write as _;
+
+/// The number of thousandths of a millimetre in one, in which coordinates are written.
+const PER_MM: f64 = 1000.0;
+
+/// The lines of a plan, each with the element of the file that it comes from.
+#[derive(Debug, Default)]
+pub(super) struct Plan {
+    file: String,
+    /// The lines, and for each the number of its element.
+    lines: Vec<(String, u32)>,
+    /// The line of the file in which each element begins, and its text.
+    elements: Vec<(usize, String)>,
+    /// The numbers of the vertices, counted from 1, by their coordinates in thousandths of a
+    /// millimetre.
+    vertices: HashMap<[i64; 2], usize>,
+    pen: Option<u32>,
+    /// The number of polylines without a length, which are not drawn.
+    pub(super) dots: usize,
+}
+
+impl Plan {
+    pub(super) fn new(file: String) -> Self {
+        Self { file, ..Self::default() }
+    }
+
+    /// The number of vertices, which are all different.
+    pub(super) fn vertices(&self) -> usize {
+        self.vertices.len()
+    }
+
+    /// Begins an element of the file, to which the lines that follow belong.
+    pub(super) fn begin(&mut self, line: usize, text: String) {
+        self.elements.push((line, text));
+    }
+
+    fn push(&mut self, line: String) {
+        let element = self.elements.len().saturating_sub(1);
+        self.lines.push((line, u32::try_from(element).unwrap_or(u32::MAX)));
+    }
+
+    /// Draws a polyline with a pen. The points are millimetres with y upward, within a page of
+    /// `size` mm; what rounding brings outside is moved to its border.
+    pub(super) fn draw(&mut self, polyline: &Polyline, size: [f64; 2], pen: u32) {
+        let rounded = |value: f64, size: f64| {
+            (value * PER_MM).round().clamp(0.0, (size * PER_MM).floor()) as i64
+        };
+        let place = |point: &Point| [rounded(point.x, size[0]), rounded(point.y, size[1])];
+        let mut places: Vec<[i64; 2]> = polyline.points.iter().map(place).collect();
+        places.dedup();
+        if places.len() < 2 {
+            self.dots += 1;
+            return;
+        }
+        if self.pen != Some(pen) {
+            self.pen = Some(pen);
+            self.push(format!("usemtl pen{pen}"));
+        }
+        let numbers: Vec<usize> = places.into_iter().map(|place| self.vertex(place)).collect();
+        let mut line = String::from("l");
+        let mut last = None;
+        for number in numbers {
+            let before = line.len();
+            // Writing to a string cannot fail.
+            let _ = write!(line, " {number}");
+            if line.len() > LINE_LIMIT {
+                line.truncate(before);
+                self.push(std::mem::replace(&mut line, String::from("l")));
+                let _ = write!(line, " {} {number}", last.unwrap_or(number));
+            }
+            last = Some(number);
+        }
+        self.push(line);
+    }
+
+    /// The number of the vertex at this place, which is made if there is none.
+    fn vertex(&mut self, place: [i64; 2]) -> usize {
+        let next = self.vertices.len() + 1;
+        let number = *self.vertices.entry(place).or_insert(next);
+        if number == next {
+            let [x, y] = place.map(|value| value as f64 / PER_MM);
+            self.push(format!("v {x} {y} 0"));
+        }
+        number
+    }
+
+    /// The least and the greatest coordinates in mm; `None` if nothing is drawn.
+    pub(super) fn bounds(&self) -> Option<[[f64; 2]; 2]> {
+        let mut places = self.vertices.keys().copied();
+        let first = places.next()?;
+        let bounds = places.fold([first, first], |[low, high], [x, y]| {
+            [[low[0].min(x), low[1].min(y)], [high[0].max(x), high[1].max(y)]]
+        });
+        Some(bounds.map(|corner| corner.map(|value| value as f64 / PER_MM)))
+    }
+}
+
+impl Lines for Plan {
+    fn count(&self) -> usize {
+        self.lines.len()
+    }
+
+    fn line(&self, index: usize) -> Option<JobLine> {
+        let (sent, element) = self.lines.get(index)?;
+        let origin = self.elements.get(*element as usize).map(|(line, text)| Origin {
+            file: self.file.clone(),
+            line: *line,
+            text: text.clone(),
+        });
+        Some(JobLine { sent: sent.clone(), origin })
+    }
+}
