@@ -105,8 +105,9 @@ fn contents(file: &str, text: &str) -> Result<Contents, String> {
     let size = size.map(|size| (f64::from(size) * PIXEL * 1000.0).round() / 1000.0);
     let page = Page { width: size[0], height: size[1] };
     let markup = Markup::new(&document);
-    let drawing = Drawing::new(&tree, size, &markup)
-        .map_err(|_| "the SVG has too many points to draw: leave out details".to_owned())?;
+    let drawing = Drawing::new(&tree, size, &markup).map_err(|_| {
+        "the SVG has too many points, or a curve of kilometres: leave it out".to_owned()
+    })?;
     let mut plan = Plan::new(file.to_owned());
     let marks: Vec<_> = drawing.shapes.iter().map(|shape| shape.marks.clone()).collect();
     for (shape, pen) in drawing.shapes.iter().zip(pens::pens(&marks)) {

@@ -16,12 +16,8 @@ const FINE: f64 = 0.0001;
 /// The distance within which points are left out, in mm.
 const COARSE: f64 = 0.0054;
 
-/// The most points that one curve is flattened to. It is reached by curves of kilometres only,
-/// which no page shows.
-const MOST_IN_CURVE: f64 = 100_000.0;
-
-/// The length of a control polygon, in mm, above which a curve becomes a straight line: kilometres
-/// do not go on any page, and the number of points would grow without bound.
+/// The greatest size of a curve, in mm. Such curves do not go on any page, and the number of their
+/// points would grow without bound.
 const LONGEST: f64 = 1e6;
 
 /// A polyline in millimetres.
@@ -31,7 +27,7 @@ pub(super) struct Polyline {
     pub(super) points: Vec<Point>,
 }
 
-/// A file has more points than fit in memory.
+/// A file has more points than fit in memory, or a curve that is too large.
 #[derive(Debug)]
 pub(super) struct TooManyPoints;
 
@@ -46,11 +42,11 @@ pub(super) enum Arcs {
     None,
 }
 
-/// Flattens `path`, of which `to_page` makes millimetres. The points of the fine polylines are taken
-/// from `budget`.
+/// Flattens `path`, of which `to_page` makes millimetres. The points of the fine polylines are
+/// taken from `budget`.
 ///
 /// # Errors
-/// The budget is used up.
+/// The budget is used up, or a curve is longer than [`LONGEST`].
 pub(super) fn flatten(
     path: &Path,
     to_page: Affine,
@@ -78,16 +74,16 @@ pub(super) fn flatten(
             PathSegment::LineTo(to) => points.push(point(to)),
             PathSegment::QuadTo(by, to) => {
                 let (Some(&from), by, to) = (points.last(), point(by), point(to)) else { continue };
-                curve(&[from, by, to], PathEl::QuadTo(by, to), &mut points);
+                curve(&[from, by, to], PathEl::QuadTo(by, to), &mut points)?;
             }
             PathSegment::CubicTo(first, second, to) => {
                 let Some(&from) = points.last() else { continue };
                 let cubic = [from, point(first), point(second), point(to)];
                 match Arc::of(cubic, arcs) {
-                    Some(arc) => arc.flatten(&mut points),
+                    Some(arc) => arc.flatten(&mut points)?,
                     None => {
                         let [_, first, second, to] = cubic;
-                        curve(&cubic, PathEl::CurveTo(first, second, to), &mut points);
+                        curve(&cubic, PathEl::CurveTo(first, second, to), &mut points)?;
                     }
                 }
             }
@@ -107,12 +103,11 @@ pub(super) fn flatten(
 }
 
 /// Appends the points of a curve with these control points, without its first.
-fn curve(control: &[Point], element: PathEl, points: &mut Vec<Point>) {
-    let (Some(&from), Some(&to)) = (control.first(), control.last()) else { return };
+fn curve(control: &[Point], element: PathEl, points: &mut Vec<Point>) -> Result<(), TooManyPoints> {
+    let Some(&from) = control.first() else { return Ok(()) };
     let length: f64 = control.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
     if length >= LONGEST || length.is_nan() {
-        points.push(to);
-        return;
+        return Err(TooManyPoints);
     }
     let path = BezPath::from_vec(vec![PathEl::MoveTo(from), element]);
     kurbo::flatten(&path, FINE, |element| {
@@ -120,6 +115,7 @@ fn curve(control: &[Point], element: PathEl, points: &mut Vec<Point>) {
             points.push(point);
         }
     });
+    Ok(())
 }
 
 /// An arc of an ellipse.
@@ -165,14 +161,16 @@ impl Arc {
     }
 
     /// Appends the points of the arc without its first.
-    fn flatten(&self, points: &mut Vec<Point>) {
+    fn flatten(&self, points: &mut Vec<Point>) -> Result<(), TooManyPoints> {
         let half = (self.angle / 2.0).tan();
         // The half axes of the ellipse are not longer than this.
         let start = (self.corner - self.from).hypot() / half;
         let end = (self.corner - self.to).hypot() / half;
         let radius = (start.hypot(end)).max(FINE);
         let count = (self.angle / (2.0 * (1.0 - FINE / radius).acos())).ceil();
-        let count = count.clamp(1.0, MOST_IN_CURVE);
+        if radius >= LONGEST || count.is_nan() {
+            return Err(TooManyPoints);
+        }
         for number in 1..count as u32 {
             let at = self.angle * f64::from(number) / count;
             let b = (1.0 - at.cos()) / (1.0 - self.angle.cos());
@@ -180,6 +178,7 @@ impl Arc {
             points.push(self.from + (self.corner - self.from) * a + (self.to - self.corner) * b);
         }
         points.push(self.to);
+        Ok(())
     }
 }
 

@@ -274,7 +274,8 @@ fn layers_choose_pens_or_else_colours_do() {
 #[test]
 fn what_is_not_drawn_is_counted() {
     let svg = in_mm(
-        "<path d='M0 0H9'/>\n<text>a</text>\n<text>b</text><image href='a.png' width='9' height='9'/>\
+        "<path d='M0 0H9'/>\n<text>a</text>\n<text>b</text>\
+         <image href='a.png' width='9' height='9'/>\
          \n<path d='M0 0H5 L x'/>\n<rect width='-1' height='5'/><use href='#none'/>\
          <mask id='m'><rect width='5' height='5' fill='#fff'/></mask>\
          <path mask='url(#m)' d='M0 9H9'/><path d='M5 5h0' stroke='red'/>",
@@ -343,7 +344,8 @@ fn a_file_that_cannot_be_drawn_is_refused_with_a_sentence() {
     };
     assert_eq!(places(&deep(900)).len(), 1);
     let numbers = "<path d='M0 0L1e38 1e38'/><circle r='NaN'/><path d='M-1e39 0L1e300 5'/>";
-    let huge = "<svg xmlns='http://www.w3.org/2000/svg' width='1e38' height='1e38'><path d='M0 0H1e30V9'/></svg>";
+    let huge = "<svg xmlns='http://www.w3.org/2000/svg' width='1e38' height='1e38'>\
+                <path d='M0 0H1e30V9'/></svg>";
     for (svg, reason) in [
         (String::new(), "this is not a well-formed SVG"),
         ("<svg".to_owned(), "this is not a well-formed SVG"),
@@ -354,6 +356,8 @@ fn a_file_that_cannot_be_drawn_is_refused_with_a_sentence() {
         (in_mm("").replace("100mm", "0"), "the SVG has no size"),
         (in_mm("").replace("100mm", "NaN"), "nothing to draw"),
         (deep(5000), "nested too deeply"),
+        (in_mm("<circle r='1e30'/>"), "a curve of kilometres"),
+        (in_mm("<path d='M0 0C1e30 0 0 1e30 9 9'/>"), "a curve of kilometres"),
         (in_mm("<g id='a'><use href='#a'/></g>"), "nothing to draw"),
     ] {
         let error = read(&svg).map(|contents| polylines(&contents)).expect_err(&svg);
