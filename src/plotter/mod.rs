@@ -11,6 +11,7 @@ pub mod budget;
 mod editor;
 mod help;
 mod job;
+mod listener;
 mod memory;
 mod options;
 mod plan;
@@ -32,13 +33,13 @@ pub use options::{
 };
 
 use crate::machine::{
-    Alarm, Machine, MachineError, Path, PulserState, Setting, SettingError, Settings, State,
-    Target, Value,
+    Alarm, Machine, MachineError, PulserState, Setting, SettingError, Settings, State, Value,
 };
 use crate::model::Model;
 use crate::protocol::{Command, CommandError, Label, LineReader, Numbering, RealTime, Received};
-use crate::stage::{Aborted, Cancel, Stage};
+use crate::stage::{Cancel, Stage};
 use job::Pipeline;
+use listener::{Listener, MeasuredStrokes};
 use program::Program;
 use reply::Reply;
 use stream::{Listing, Progress, Task};
@@ -464,73 +465,6 @@ impl Inner<'_> {
         let value = crate::fixed::Decimal::parse(value).map_err(|_| CommandError::NotANumber)?;
         let value: Value = value.to_millimetres().map_err(|_| CommandError::NumberOutOfRange)?;
         self.machine.set(setting, value).map_err(CommandError::Setting)
-    }
-}
-
-/// The strokes of a job while the machine measures them. They check for cancelling as they go.
-struct MeasuredStrokes<'s, 'a> {
-    strokes: Strokes<'s>,
-    cancel: &'a mut dyn Cancel,
-    targets: usize,
-    aborted: bool,
-}
-
-impl Path for MeasuredStrokes<'_, '_> {
-    fn next_target(&mut self) -> Option<Target> {
-        self.targets += 1;
-        // 64 targets take some 100,000 instructions.
-        if self.targets.is_multiple_of(64) && self.cancel.check().is_err() {
-            self.aborted = true;
-        }
-        self.strokes.next_target().filter(|_| !self.aborted)
-    }
-
-    fn rewind(&mut self) {
-        self.strokes.rewind();
-    }
-
-    fn pen(&self) -> u8 {
-        self.strokes.pen()
-    }
-}
-
-/// Answers the serial line while a job is computed.
-struct Listener<'b, B: Board> {
-    board: &'b mut B,
-    /// The position for the status report, in mm.
-    position: [Value; 2],
-    /// The stage for the status report.
-    stage: Stage,
-    /// The hold or emergency stop that was requested meanwhile. It is carried out when the
-    /// computation ends.
-    requests: RealTime,
-}
-
-impl<B: Board> Cancel for Listener<'_, B> {
-    fn check(&mut self) -> Result<(), Aborted> {
-        report::greet_opened(State::Run, self.board);
-        let requests = self.board.take_real_time();
-        if requests.has(RealTime::RESUME) {
-            self.requests = RealTime::default();
-        }
-        self.requests = self.requests.and(requests).only(RealTime::HOLD.and(RealTime::EMERGENCY));
-        if requests.has(RealTime::STATUS) {
-            let stage = match self.stage {
-                Stage::View => "view",
-                Stage::Visibility => "visibility",
-                Stage::Order => "order",
-            };
-            let mut reply = Reply(self.board);
-            reply.part(format_args!("<Run"));
-            reply.position(self.position);
-            reply.line(format_args!("|Stage:{stage}>"));
-        }
-        let ends = requests.has(RealTime::ABORT) || requests.has(RealTime::EMERGENCY);
-        if ends { Err(Aborted) } else { Ok(()) }
-    }
-
-    fn enter(&mut self, stage: Stage) {
-        self.stage = stage;
     }
 }
 

@@ -10,9 +10,10 @@
 //! tests "in one plane" and "on one line" use the positions of the model.
 
 use super::coarse_projection::CoarseProjection;
-use super::edge_query::{CrossedPolygon, EdgeQuery, SceneIndex};
+use super::edge_query::{CrossedPolygon, EdgeQuery};
 use super::faces::Face;
 use super::profile::{EdgeInterval, Profile};
+use super::scene_index::SceneIndex;
 use crate::array::MapEach;
 
 /// One of the two sides of an edge, and the bits of the profile's marks that hold the nearest face

@@ -4,11 +4,12 @@
 //! The tests leave marks on the profile of the edge. Runs of pieces with the same outcome become
 //! the stretches that the sink receives.
 
-use super::edge_query::{EdgeQuery, SceneIndex};
+use super::edge_query::EdgeQuery;
 use super::edges::sides;
 use super::grid::{Grid, coarse_depth};
 use super::profile::{EdgeInterval, FEWEST_PIECES, Profile, ProfilePiece, mark};
 use super::raster::Bounds;
+use super::scene_index::SceneIndex;
 use super::seams::seam;
 use super::yield_counter::YieldCounter;
 use super::{Options, Stretch, StretchSink, VisibilityError};

@@ -15,6 +15,8 @@
 //! twice the distances, so that all duals are whole numbers. The memory is a few dozen bytes for
 //! each vertex: [`scratch_bytes`]. After Edmonds, "Paths, trees, and flowers" (1965), and Galil,
 //! "Efficient algorithms for finding maximum matching in graphs" (1986).
+//!
+//! The file has some 500 lines, because the steps of one phase read and change the same tree.
 
 mod blossom;
 mod start;

@@ -1,0 +1,160 @@
+use super::*;
+
+const FAR: i32 = COORDINATE_LIMIT;
+
+#[test]
+fn the_largest_coordinates_do_not_overflow() {
+    let corners = |n: u32| {
+        let sign = |bit: u32| if n >> bit & 1 == 0 { FAR } else { -FAR };
+        Vertex::new(sign(0), sign(1), sign(2))
+    };
+    let mut largest = 0;
+    for n in 0..1 << 12 {
+        let [a, b, c, d] = [n, n >> 3, n >> 6, n >> 9].map(corners);
+        let side = plane_side(a, b, c, d);
+        assert_eq!(side, -plane_side(b, a, c, d));
+        largest = largest.max(side);
+        assert_eq!(
+            page_side(Projection::Perspective, a, b, c),
+            page_side(Projection::Perspective, b, c, a)
+        );
+    }
+    // The largest tetrahedron in a cube takes a third of it: 6 x (1/3) x (2^20)^3.
+    assert_eq!(largest, 2 << 60);
+}
+
+#[test]
+fn sides_and_offsets_have_their_values_and_not_only_their_signs() {
+    use Projection::{Parallel, Perspective};
+    let (a, b, c) = (Vertex::new(3, 5, 7), Vertex::new(13, 4, 9), Vertex::new(2, 15, 11));
+    // 10 x 10 - (-1) x (-1), and 3 (44 - 135) - 5 (143 - 18) + 7 (195 - 8).
+    assert_eq!(page_side(Parallel, a, b, c), 99);
+    assert_eq!(page_side(Perspective, a, b, c), 411);
+    assert_eq!(page_side(Parallel, b, a, c), -99);
+    assert_eq!(page_side(Parallel, a, b, Vertex::new(23, 3, 0)), 0);
+    assert_eq!(page_offset(Parallel, Axis::X, a, b), 10);
+    assert_eq!(page_offset(Parallel, Axis::Y, a, b), -1);
+    // 13 x 7 - 3 x 9, and 4 x 7 - 5 x 9.
+    assert_eq!(page_offset(Perspective, Axis::X, a, b), 64);
+    assert_eq!(page_offset(Perspective, Axis::Y, a, b), -17);
+    // A point on the line beyond b, but deeper by 3 or nearer by 4.
+    let beyond = |dz: i32| Vertex::new(23, 3, 11 + dz);
+    for (projection, axis, dz, side) in [
+        (Parallel, Axis::X, 3, 30),
+        (Parallel, Axis::X, -4, -40),
+        (Parallel, Axis::Y, 3, 3),
+        (Parallel, Axis::Y, -4, -4),
+        (Perspective, Axis::X, 3, 30),
+        (Perspective, Axis::Y, -4, -4),
+    ] {
+        assert_eq!(line_side(projection, axis, a, b, beyond(dz)), side, "{axis:?} {dz}");
+    }
+}
+
+#[test]
+fn four_points_of_the_model_lie_in_a_plane_or_not() {
+    let points = |x: i32, y: i32, z: i32| [[3, 5, 7], [13, 4, 9], [2, 15, 11], [x, y, z]];
+    // (3, 5, 7) + m (10, -1, 2) + n (-1, 10, 4)
+    for (m, n) in [(1, 1), (-2, 3), (4, -1), (0, 5)] {
+        let at = [3 + 10 * m - n, 5 - m + 10 * n, 7 + 2 * m + 4 * n];
+        let exact = Precision::default();
+        assert!(are_coplanar(points(at[0], at[1], at[2]), exact));
+        for (dx, dy, dz) in [(1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 0, -1)] {
+            assert!(!are_coplanar(points(at[0] + dx, at[1] + dy, at[2] + dz), exact));
+        }
+    }
+}
+
+/// Returns a source of pseudo-random numbers.
+fn scattered(n: i64) -> impl Fn(i64) -> i64 {
+    move |k| (n * 7919 + k * 104_729) * (n * 31 + k * 17 + 5) % 1_000_003
+}
+
+#[test]
+fn points_of_one_plane_are_known_however_they_were_rounded() {
+    for n in 1..4000i64 {
+        let number = scattered(n);
+        let written = 1 + (n % 40) as i32;
+        // A point and two steps, all whole, and errors of up to `written`.
+        let [a, u, v] = [0, 3, 6].map(|k| [0, 1, 2].map(|axis| (number(k + axis) * 40) as i32));
+        let place = |i: i32, j: i32, k: i64| {
+            [0, 1, 2].map(|axis: usize| {
+                let off = number(k + axis as i64) as i32 % (written + 1);
+                a[axis] + i * u[axis] / 4 * 4 + j * v[axis] / 4 * 4 + off
+            })
+        };
+        let points = [
+            place(0, 0, 20),
+            place(4, 0, 30),
+            place(0, 4, 40),
+            place((n % 9) as i32 - 4, (n % 7) as i32 - 3, 50),
+        ];
+        let precision = Precision { written: written as u32, unit: 1 };
+        let area = cross([0, 1, 2].map(|n| i64::from(u[n])), [0, 1, 2].map(|n| i64::from(v[n])));
+        if area.iter().any(|part| part.unsigned_abs() > 1 << 44) {
+            assert!(are_coplanar(points, precision), "{n}: {points:?}");
+        }
+    }
+}
+
+#[test]
+fn the_largest_model_and_the_largest_error_do_not_overflow() {
+    let far = 1 << 30;
+    let points = [[-far, -far, -far], [far, -far, far], [-far, far, far], [far, far, -far]];
+    for written in [1, 1 << 20, 1 << 30] {
+        assert!(!are_coplanar(points, Precision { written, unit: 1 }));
+    }
+    let line = [points[0], points[1], points[2]];
+    assert!(!are_in_line(line, Precision { written: 1 << 24, unit: 1 }));
+}
+
+#[test]
+fn a_point_off_the_plane_is_off_it() {
+    let precision = Precision { written: 500, unit: 1 };
+    let side = 1_000_000;
+    let of_plane = |z| [[0, 0, 0], [side, 0, 0], [0, side, 0], [side / 3, side / 3, z]];
+    assert!(are_coplanar(of_plane(999), precision));
+    assert!(!are_coplanar(of_plane(1300), precision));
+    // If a triangle is hardly larger than the precision, its plane is taken from its corners as
+    // they are.
+    let side = 20_000;
+    let of_small = |z| [[0, 0, 0], [side, 0, 0], [0, side, 0], [side, side, z]];
+    assert!(are_coplanar(of_small(1), precision) && !are_coplanar(of_small(20), precision));
+}
+
+#[test]
+fn the_margin_covers_every_rounding() {
+    for n in 1..4000i64 {
+        let number = scattered(n);
+        let error_bound = 1 + (n % 9) as i32;
+        let reach = 1 << (n % 17 + 2);
+        let part = |k: i64| number(k) as i32 % reach;
+        // Four points of the plane z = x, each moved by up to half of `error_bound`.
+        let point = |k: i64| {
+            let off = |m: i64| number(k + m) as i32 % (error_bound / 2 + 1);
+            let (x, y) = (part(k), part(k + 1));
+            Vertex::new(x + off(2), y + off(3), x + off(4))
+        };
+        let [a, b, c, d] = [0, 10, 20, 30].map(point);
+        let margin = plane_side_margin(a, b, c, d, error_bound as u32);
+        assert!(plane_side(a, b, c, d).abs() <= margin, "{n}");
+    }
+}
+
+#[test]
+fn places_far_along_a_long_edge_are_told_apart() {
+    let near_end = EdgeParameter { numerator: (1 << 62) - 1, denominator: 1 << 62 };
+    let nearer_end = EdgeParameter { numerator: u64::MAX - 1, denominator: u64::MAX };
+    assert!(near_end < nearer_end && nearer_end < EdgeParameter::END);
+    assert!(
+        near_end != nearer_end
+            && near_end != EdgeParameter::END
+            && EdgeParameter::START != EdgeParameter::END
+    );
+    let along = |numerator, denominator| EdgeParameter { numerator, denominator };
+    assert_eq!(along(7, 21), along(1, 3));
+    assert_ne!(along(7, 21), along(8, 21));
+    assert!(along(1, 3) < along(2, 5) && along(3, 5) > along(4, 7));
+    assert_eq!(EdgeParameter::zero_between(0, 7), EdgeParameter::START);
+    assert_eq!(EdgeParameter::zero_between(7, 0), EdgeParameter::END);
+}

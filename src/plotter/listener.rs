@@ -1,0 +1,75 @@
+//! What listens while a job is computed or measured, which takes seconds: the serial line is still
+//! answered, and the work can be cancelled.
+
+use super::reply::Reply;
+use super::{Board, Strokes, report};
+use crate::machine::{Path, State, Target, Value};
+use crate::protocol::RealTime;
+use crate::stage::{Aborted, Cancel, Stage};
+
+/// The strokes of a job while the machine measures them. They check for cancelling as they go.
+pub(super) struct MeasuredStrokes<'s, 'a> {
+    pub(super) strokes: Strokes<'s>,
+    pub(super) cancel: &'a mut dyn Cancel,
+    pub(super) targets: usize,
+    pub(super) aborted: bool,
+}
+
+impl Path for MeasuredStrokes<'_, '_> {
+    fn next_target(&mut self) -> Option<Target> {
+        self.targets += 1;
+        // 64 targets take some 100,000 instructions.
+        if self.targets.is_multiple_of(64) && self.cancel.check().is_err() {
+            self.aborted = true;
+        }
+        self.strokes.next_target().filter(|_| !self.aborted)
+    }
+
+    fn rewind(&mut self) {
+        self.strokes.rewind();
+    }
+
+    fn pen(&self) -> u8 {
+        self.strokes.pen()
+    }
+}
+
+/// Answers the serial line while a job is computed.
+pub(super) struct Listener<'b, B: Board> {
+    pub(super) board: &'b mut B,
+    /// The position for the status report, in mm.
+    pub(super) position: [Value; 2],
+    /// The stage for the status report.
+    pub(super) stage: Stage,
+    /// The hold or emergency stop that was requested meanwhile. It is carried out when the
+    /// computation ends.
+    pub(super) requests: RealTime,
+}
+
+impl<B: Board> Cancel for Listener<'_, B> {
+    fn check(&mut self) -> Result<(), Aborted> {
+        report::greet_opened(State::Run, self.board);
+        let requests = self.board.take_real_time();
+        if requests.has(RealTime::RESUME) {
+            self.requests = RealTime::default();
+        }
+        self.requests = self.requests.and(requests).only(RealTime::HOLD.and(RealTime::EMERGENCY));
+        if requests.has(RealTime::STATUS) {
+            let stage = match self.stage {
+                Stage::View => "view",
+                Stage::Visibility => "visibility",
+                Stage::Order => "order",
+            };
+            let mut reply = Reply(self.board);
+            reply.part(format_args!("<Run"));
+            reply.position(self.position);
+            reply.line(format_args!("|Stage:{stage}>"));
+        }
+        let ends = requests.has(RealTime::ABORT) || requests.has(RealTime::EMERGENCY);
+        if ends { Err(Aborted) } else { Ok(()) }
+    }
+
+    fn enter(&mut self, stage: Stage) {
+        self.stage = stage;
+    }
+}

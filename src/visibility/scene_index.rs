@@ -1,0 +1,72 @@
+//! What the search for visible stretches knows about a scene, and what it asks of its faces.
+
+use super::coarse_projection::CoarseProjection;
+use super::edges::{ChosenSides, Outlines};
+use super::faces::{Face, Faces};
+use super::seams::Extent;
+use super::triangles::Ears;
+use crate::model::Corner;
+
+/// Everything that the search needs to know about the scene.
+pub struct SceneIndex<'a> {
+    /// The vertices, in view coordinates and on the coarse grid.
+    pub coarse_projection: CoarseProjection<'a>,
+    /// The corners of the elements.
+    pub outlines: Outlines<'a>,
+    /// The triangles of the faces that no fan covers.
+    pub ears: Ears<'a>,
+    /// The sides that represent their edges.
+    pub chosen: ChosenSides<'a>,
+    /// The elements, nearest first.
+    pub faces: Faces<'a>,
+}
+
+impl SceneIndex<'_> {
+    /// Returns the triangle with this number, counted from 0, of a face. Returns `None` if the face
+    /// has fewer.
+    pub fn triangle(&self, face: Face, number: usize) -> Option<[u16; 3]> {
+        if face.has_ears {
+            return self.ears.of(face.first).get(number).copied();
+        }
+        let corners = self.outlines.element(face.first);
+        match corners.get(number + 1..number + 3) {
+            Some([b, c]) if face.is_fan => Some([corners[0].vertex(), b.vertex(), c.vertex()]),
+            _ => None,
+        }
+    }
+
+    /// Returns the bounding box of the face with this rank.
+    pub fn extent(&self, rank: usize) -> Extent {
+        let corners = self.outlines.element(self.faces.get(rank).first);
+        Extent::around(corners.iter().map(|corner| self.coarse_projection.vertex(corner.vertex())))
+    }
+
+    /// Whether two faces have two corners with the same view coordinates. Such faces do not cross
+    /// anywhere else.
+    pub fn share_edge(&self, one: Face, other: Face) -> bool {
+        let at = |corner: &Corner| self.coarse_projection.vertex(corner.vertex());
+        let other = self.outlines.element(other.first);
+        let shared = |corner: &&Corner| other.iter().any(|there| at(there) == at(corner));
+        let corners = self.outlines.element(one.first);
+        corners.iter().filter(shared).count() >= 2
+    }
+
+    /// Whether a face has corners on both sides of the plane of a triangle. A face that only
+    /// touches the plane ends there, with an edge or a corner.
+    pub fn passes_through(&self, face: Face, triangle: [u16; 3]) -> bool {
+        let (mut before, mut behind) = (false, false);
+        self.outlines.element(face.first).iter().any(|corner| {
+            let height = self
+                .coarse_projection
+                .height(triangle, self.coarse_projection.end(corner.vertex()));
+            before |= height < 0;
+            behind |= height > 0;
+            before && behind
+        })
+    }
+
+    /// Iterates over the triangles of a face.
+    pub fn triangles(&self, face: Face) -> impl Iterator<Item = [u16; 3]> {
+        (0..).map_while(move |number| self.triangle(face, number))
+    }
+}
