@@ -94,7 +94,8 @@ struct Valid {
 }
 
 impl Slots {
-    /// Opens the latest state for reading; `None` if there is none.
+    /// Opens the record that was saved last for reading. Records that are damaged or were not
+    /// written to their end do not count. `None` if there is no record.
     pub fn latest<F: ReadNorFlash>(self, flash: &mut F) -> Option<Reader<'_, F>> {
         let valid = self.find(flash)?;
         let at = self.begin(valid.slot) + PAGE_BYTES as u32;

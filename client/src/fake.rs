@@ -234,7 +234,8 @@ impl FakePlotter {
         self.say(&last);
     }
 
-    /// Answers a status query if it is due; after the last of these answers the picture is computed.
+    /// Answers a status query if it is due. After the last of these answers the picture is
+    /// computed.
     fn compute(&mut self, label: Label) {
         if self.answer_due.is_none_or(|due| due > self.clock) {
             return;

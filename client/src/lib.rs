@@ -8,8 +8,8 @@
 //! [`watch`] follows the pen, [`picture`] renders its path on the [`page`], and [`output`] writes
 //! the files. [`results`] are what is known about a job afterwards.
 //!
-//! [`tape`] records a job as single motor steps, and [`motion_plot`] plots its speed. [`words`] translates the plotter's messages into
-//! the terms of the command line.
+//! [`tape`] records a job as single motor steps, and [`motion_plot`] plots its speed. [`words`]
+//! translates the plotter's messages into the terms of the command line.
 
 pub mod board;
 pub mod cli;

@@ -147,7 +147,8 @@ fn a_repeated_point_draws_the_curve_nearer() {
 
 #[test]
 fn a_moved_point_moves_only_what_is_near() {
-    // Figure 6, order 4, has the fifth vertex moved.
+    // As in figure 6 of Allard & Bown, where the fifth control point of a B-spline of order 4 is
+    // moved.
     let points: Vec<Point> = (0..9).map(|i| [i * UNIT, (i % 3) * UNIT, i * i * 999]).collect();
     let mut moved = points.clone();
     moved[4][1] += 5 * UNIT;

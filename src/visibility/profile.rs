@@ -131,8 +131,9 @@ impl<'a> Profile<'a> {
         self.join(first);
     }
 
-    /// Returns the index of the first piece that begins at `place` or later. If `place` lies within
-    /// the window, a piece is split so that one begins there.
+    /// Splits the piece that contains `place` in two, so that a piece begins there, if `place` lies
+    /// within the window. Returns the index of the first piece that begins at `place` or later; the
+    /// number of pieces if there is none.
     fn split(&mut self, place: EdgeParameter) -> usize {
         if place >= self.end {
             return self.count;

@@ -151,7 +151,8 @@ impl<'q, A: Axes, P: Pen, const N: usize> Pulser<'q, A, P, N> {
         }
     }
 
-    /// Raises the pen. The current event was the last.
+    /// Raises the pen at once, because the main loop has halted the pulses. No event follows the
+    /// current one.
     #[cold]
     #[inline(never)]
     pub fn stop(&mut self) {
