@@ -63,7 +63,8 @@ pub mod storage;
 pub mod protocol;
 pub mod plotter;
 
-/// The board made of plain memory. The code of those made of silicon belongs to the firmware binary.
+/// The board made of plain memory. The code of those made of silicon belongs to the firmware
+/// binary.
 pub mod boards {
     #[cfg(feature = "host")]
     pub mod host;

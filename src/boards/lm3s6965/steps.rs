@@ -107,8 +107,8 @@ pub fn set_up(pins: MotorPins, nvic: &mut NVIC) -> Steps {
 }
 
 impl Steps {
-    /// Starts the interrupt if it does not run and has something to do: events wait, or the pins were
-    /// halted.
+    /// Starts the interrupt if it does not run and has something to do: events wait, or the pins
+    /// were halted.
     pub fn start(&mut self) {
         let has_work = !self.events.is_empty() || STATE.halt_is_due();
         if has_work && self.events.is_stopped() {
