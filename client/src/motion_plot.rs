@@ -103,18 +103,31 @@ impl EventQueue for Recorder {
     }
 }
 
+/// Plans a whole job, which starts at the page's origin, and passes its step events to `queue`.
+///
+/// # Errors
+/// The machine refuses the job.
+pub(crate) fn plan(
+    settings: Settings,
+    path: &mut dyn Path,
+    queue: &mut dyn EventQueue,
+) -> Result<(), MachineError> {
+    let pins = PulserState::new();
+    let mut blocks = vec![Block::EMPTY; BLOCKS];
+    let mut machine = Machine::new(settings, &mut blocks, &pins, u32::MAX);
+    machine.start(path)?;
+    machine.fill(path, queue);
+    Ok(())
+}
+
 impl Motion {
     /// Records the motion of a job, which starts at the page's origin.
     ///
     /// # Errors
     /// The machine refuses the job.
     pub fn record(settings: Settings, path: &mut dyn Path) -> Result<Self, MachineError> {
-        let pins = PulserState::new();
-        let mut blocks = vec![Block::EMPTY; BLOCKS];
-        let mut machine = Machine::new(settings, &mut blocks, &pins, u32::MAX);
         let mut recorder = Recorder::default();
-        machine.start(path)?;
-        machine.fill(path, &mut recorder);
+        plan(settings, path, &mut recorder)?;
         path.rewind();
         let second = f64::from(TICKS_PER_SECOND);
         let times = recorder.times.iter().map(|&ticks| ticks as f64 / second);

@@ -1,16 +1,13 @@
 //! Harrison's tape: a job encoded as instructions of four bits, two to a byte.
 
+use crate::motion_plot::plan;
 use crate::page::{Page, Run};
 use crate::picture::Picture;
 use penup::drawing::PagePoint;
-use penup::machine::{Machine, MachineError, Path, PulserState, Settings};
-use penup::motion::{Block, EventQueue, StepEvent};
+use penup::machine::{MachineError, Path, Settings};
+use penup::motion::{EventQueue, StepEvent};
 use penup::step::tape::{BadCode, Decoder, Instruction, TapeLines, encode};
 use std::fmt::Write as _;
-
-/// The number of moves that are planned ahead. It is limited only by memory and does not change the
-/// tape.
-const BLOCKS: usize = 128;
 
 /// An event queue that records the instructions of a tape.
 #[derive(Default)]
@@ -31,12 +28,8 @@ impl EventQueue for Recorder {
 /// # Errors
 /// The machine refuses the job.
 pub fn record(settings: Settings, path: &mut dyn Path) -> Result<Vec<u8>, MachineError> {
-    let pins = PulserState::new();
-    let mut blocks = vec![Block::EMPTY; BLOCKS];
-    let mut machine = Machine::new(settings, &mut blocks, &pins, u32::MAX);
     let mut recorder = Recorder::default();
-    machine.start(path)?;
-    machine.fill(path, &mut recorder);
+    plan(settings, path, &mut recorder)?;
     Ok(encode(recorder.0).collect())
 }
 
