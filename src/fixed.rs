@@ -411,21 +411,21 @@ impl fmt::Display for Length {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         let units = i64::from(self.0.to_bits());
         let magnitude = units.abs();
-        let tells_it = |places: &u32| {
-            let power = 10i64.pow(*places);
+        let tells_it = |decimals: &u32| {
+            let power = 10i64.pow(*decimals);
             let digits = (magnitude * power + (1 << 15)) >> 16;
             ((digits << 16) + power / 2) / power == magnitude
         };
-        let places = (0..5).find(tells_it).unwrap_or(5);
-        BinaryFraction { units, fraction_bits: 16, places }.fmt(formatter)
+        let decimals = (0..5).find(tells_it).unwrap_or(5);
+        BinaryFraction { units, fraction_bits: 16, decimals }.fmt(formatter)
     }
 }
 
-/// Formats `units` × 2^-`fraction_bits` with `places` decimals, rounded half away from zero.
+/// Formats `units` × 2^-`fraction_bits` with `decimals` decimals, rounded half away from zero.
 ///
 /// ```
 /// use penup::fixed::BinaryFraction;
-/// assert_eq!(format!("{}", BinaryFraction { units: -3, fraction_bits: 1, places: 3 }), "-1.500");
+/// assert_eq!(format!("{}", BinaryFraction { units: -3, fraction_bits: 1, decimals: 3 }), "-1.500");
 /// ```
 #[derive(Debug, Clone, Copy)]
 pub struct BinaryFraction {
@@ -434,13 +434,13 @@ pub struct BinaryFraction {
     /// The unit is 2^-`fraction_bits`. The value is at most 60.
     pub fraction_bits: u32,
     /// The number of digits after the point, at most 9.
-    pub places: u32,
+    pub decimals: u32,
 }
 
 impl fmt::Display for BinaryFraction {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let places = self.places.min(9);
-        let scale = 10u64.pow(places);
+        let decimals = self.decimals.min(9);
+        let scale = 10u64.pow(decimals);
         let bits = self.fraction_bits.min(60);
         let magnitude = self.units.unsigned_abs();
         let below_one = u128::from(magnitude & ((1 << bits) - 1)) * u128::from(scale); // below 2^90
@@ -452,8 +452,8 @@ impl fmt::Display for BinaryFraction {
             formatter.write_str("-")?;
         }
         write!(formatter, "{whole}")?;
-        if places > 0 {
-            write!(formatter, ".{fraction:0width$}", width = places as usize)?;
+        if decimals > 0 {
+            write!(formatter, ".{fraction:0width$}", width = decimals as usize)?;
         }
         Ok(())
     }

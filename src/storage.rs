@@ -240,10 +240,10 @@ impl<F: NorFlash> Writer<'_, F> {
     /// See [`StorageError`]; the latest state is still the previous one.
     pub fn write(&mut self, bytes: &[u8]) -> Result<(), StorageError<F::Error>> {
         for &byte in bytes {
-            let place = self.length as usize % PAGE_BYTES;
-            self.page[place] = byte;
+            let slot = self.length as usize % PAGE_BYTES;
+            self.page[slot] = byte;
             self.length += 1;
-            if place + 1 == PAGE_BYTES {
+            if slot + 1 == PAGE_BYTES {
                 self.put_page()?;
             }
         }
@@ -262,8 +262,8 @@ impl<F: NorFlash> Writer<'_, F> {
         let sum = total(self.digest, self.sequence, self.length);
         let mut header = [0xFF; PAGE_BYTES];
         let words = [MARK, self.sequence, self.length, sum];
-        for (place, word) in header.chunks_exact_mut(4).zip(words) {
-            place.copy_from_slice(&word.to_le_bytes());
+        for (slot, word) in header.chunks_exact_mut(4).zip(words) {
+            slot.copy_from_slice(&word.to_le_bytes());
         }
         self.flash.write(self.start, &header).map_err(|error| {
             // Although the write failed, the header itself may be complete. Erasing the slot makes

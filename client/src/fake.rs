@@ -123,9 +123,9 @@ impl FakePlotter {
         if let Some((stroke, pen)) = self.pen_before
             && stroke == drawn
         {
-            let place = self.requested_pens.len();
+            let position = self.requested_pens.len();
             return self
-                .say(&format!("<Hold:0|MPos:{place}.000,2.000|Pen:{pen}|Strokes:{drawn}/9>"));
+                .say(&format!("<Hold:0|MPos:{position}.000,2.000|Pen:{pen}|Strokes:{drawn}/9>"));
         }
         if self.hold_before == Some(drawn) {
             return self.say(&format!("<Hold:0|MPos:3.000,2.000|Strokes:{drawn}/9>"));

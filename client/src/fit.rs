@@ -20,7 +20,7 @@ pub use obj::{FitError, Fitted, Saving, TOLERANCES, fit_obj, write_obj};
 use piece::Piece;
 
 /// A point of the plan in millimetres.
-pub type Place = [f64; 2];
+pub type PlanPoint = [f64; 2];
 
 /// The orders to try (polynomial degree + 1): cubics, parabolas, straight lines.
 const ORDERS: [usize; 3] = [4, 3, 2];
@@ -45,7 +45,7 @@ pub struct FittedCurve {
     /// The order, which is the degree + 1: 2 to 4.
     pub order: usize,
     /// The control points in millimetres. The first and the last are the ends of the polyline.
-    pub control: Vec<Place>,
+    pub control: Vec<PlanPoint>,
     /// The knots: whole numbers that begin at 0. Their number is the number of control points plus
     /// the order.
     pub knots: Vec<i32>,
@@ -67,7 +67,7 @@ pub struct FittedCurve {
 /// assert!(curves[0].control.len() <= 6);
 /// ```
 pub fn fit(
-    polylines: &[Vec<Place>],
+    polylines: &[Vec<PlanPoint>],
     tolerance: f64,
     progress: &mut dyn FnMut(usize, usize),
 ) -> Vec<FittedCurve> {
@@ -77,7 +77,7 @@ pub fn fit(
 /// Does the same as [`fit`] but returns an entry for every polyline: `None` for those without a
 /// length.
 fn fit_each(
-    polylines: &[Vec<Place>],
+    polylines: &[Vec<PlanPoint>],
     tolerance: f64,
     progress: &mut dyn FnMut(usize, usize),
 ) -> Vec<Option<FittedCurve>> {
@@ -96,20 +96,20 @@ fn fit_each(
 /// Fits one polyline; `None` if it has no length. Calls `progress` with the share of the work that
 /// is done, 0 to 1.
 fn fit_one(
-    polyline: &[Place],
+    polyline: &[PlanPoint],
     tolerance: f64,
     progress: &mut dyn FnMut(f64),
 ) -> Option<FittedCurve> {
     let close = tolerance * THINNING_SHARE;
-    let places = thinned(polyline, close);
-    if places.len() < 2 {
+    let positions = thinned(polyline, close);
+    if positions.len() < 2 {
         return None;
     }
-    let is_thinned = places.len() < polyline.len();
+    let is_thinned = positions.len() < polyline.len();
     let thinning_share = if is_thinned { THINNING_SHARE } else { 0.0 };
     let strict = tolerance * (1.0 - ROUNDING_SHARE - thinning_share);
-    let pieces = cut_at_corners(&places, tolerance);
-    let mut fewest = as_it_is(&places);
+    let pieces = cut_at_corners(&positions, tolerance);
+    let mut fewest = as_it_is(&positions);
     for (number, order) in ORDERS.into_iter().enumerate() {
         let most = HOPELESS * fewest.control.len();
         let mut report = |share: f64| progress((number as f64 + share) / ORDERS.len() as f64);
@@ -124,34 +124,34 @@ fn fit_one(
 
 /// Removes the vertices that are closer than `close` to the one before; the last vertex is kept.
 /// Such vertices carry no information, and thousands of them would be examined around each corner.
-fn thinned(polyline: &[Place], close: f64) -> Vec<Place> {
-    let mut places: Vec<Place> = Vec::new();
-    for place in polyline {
-        if places.last().is_none_or(|last| distance(*last, *place) >= close) {
-            places.push(*place);
+fn thinned(polyline: &[PlanPoint], close: f64) -> Vec<PlanPoint> {
+    let mut positions: Vec<PlanPoint> = Vec::new();
+    for position in polyline {
+        if positions.last().is_none_or(|last| distance(*last, *position) >= close) {
+            positions.push(*position);
         }
     }
-    if let (Some(end), Some(last)) = (polyline.last(), places.last())
+    if let (Some(end), Some(last)) = (polyline.last(), positions.last())
         && end != last
-        && places.len() > 1
+        && positions.len() > 1
     {
-        places.pop();
-        places.push(*end);
+        positions.pop();
+        positions.push(*end);
     }
-    places
+    positions
 }
 
 /// Converts the polyline itself into a curve of order 2.
-fn as_it_is(places: &[Place]) -> FittedCurve {
-    let last = places.len() as i32 - 1;
+fn as_it_is(positions: &[PlanPoint]) -> FittedCurve {
+    let last = positions.len() as i32 - 1;
     let knots = std::iter::once(0).chain(0..=last).chain([last]).collect();
-    FittedCurve { order: 2, control: places.to_vec(), knots }
+    FittedCurve { order: 2, control: positions.to_vec(), knots }
 }
 
 /// Fits all pieces and joins them to one curve, which may have corners at the joints. Returns
 /// `None` if one of the pieces needs more than `most` knots at first, or cannot be fitted.
 fn joined(
-    pieces: &[Vec<Place>],
+    pieces: &[Vec<PlanPoint>],
     order: usize,
     tolerance: f64,
     most: usize,
@@ -159,16 +159,16 @@ fn joined(
 ) -> Option<FittedCurve> {
     let all: usize = pieces.iter().map(Vec::len).sum();
     let mut done = 0;
-    let mut control: Vec<Place> = Vec::new();
+    let mut control: Vec<PlanPoint> = Vec::new();
     let mut knots = vec![0; order];
     let mut begin = 0;
-    for places in pieces {
+    for positions in pieces {
         let mut report = |share: f64| {
-            progress((done as f64 + share * places.len() as f64) / all as f64);
+            progress((done as f64 + share * positions.len() as f64) / all as f64);
         };
-        let piece = Piece::fit(places, order, begin, tolerance, most, &mut report)?;
+        let piece = Piece::fit(positions, order, begin, tolerance, most, &mut report)?;
         report(1.0);
-        done += places.len();
+        done += positions.len();
         control.extend(&piece.control[usize::from(!control.is_empty())..]);
         knots.extend(piece.inner);
         knots.extend(std::iter::repeat_n(piece.end, order - 1));
@@ -182,36 +182,36 @@ fn joined(
 ///
 /// The angle is measured between points a few tolerances before and after the vertex, so that the
 /// staircase of a scanner does not count as corners.
-fn cut_at_corners(places: &[Place], tolerance: f64) -> Vec<Vec<Place>> {
+fn cut_at_corners(positions: &[PlanPoint], tolerance: f64) -> Vec<Vec<PlanPoint>> {
     const SHARP_DEGREES: f64 = 50.0;
     let reach = 4.0 * tolerance;
-    let turns: Vec<f64> = (0..places.len()).map(|at| turn(places, at, reach)).collect();
+    let turns: Vec<f64> = (0..positions.len()).map(|at| turn(positions, at, reach)).collect();
     let mut pieces = Vec::new();
     let mut begin = 0;
-    for at in 1..places.len() - 1 {
+    for at in 1..positions.len() - 1 {
         let is_sharpest = || {
-            let near = |other: &usize| distance(places[*other], places[at]) < reach;
+            let near = |other: &usize| distance(positions[*other], positions[at]) < reach;
             let before = (begin..at).rev().take(NEIGHBOURS).take_while(near);
-            let after = (at + 1..places.len()).take(NEIGHBOURS).take_while(near);
+            let after = (at + 1..positions.len()).take(NEIGHBOURS).take_while(near);
             before.into_iter().all(|other| turns[other] < turns[at])
                 && after.into_iter().all(|other| turns[other] <= turns[at])
         };
         if turns[at] > SHARP_DEGREES.to_radians() && is_sharpest() {
-            pieces.push(places[begin..=at].to_vec());
+            pieces.push(positions[begin..=at].to_vec());
             begin = at;
         }
     }
-    pieces.push(places[begin..].to_vec());
+    pieces.push(positions[begin..].to_vec());
     pieces
 }
 
 /// The turning angle of the polyline at vertex number `at` in radians, measured to the vertices at
 /// distance `reach`; zero at the ends.
-fn turn(places: &[Place], at: usize, reach: f64) -> f64 {
-    let here = places[at];
-    let far = |place: &&Place| distance(**place, here) >= reach;
-    let before = &places[at.saturating_sub(NEIGHBOURS)..at];
-    let after = &places[at + 1..places.len().min(at + 1 + NEIGHBOURS)];
+fn turn(positions: &[PlanPoint], at: usize, reach: f64) -> f64 {
+    let here = positions[at];
+    let far = |position: &&PlanPoint| distance(**position, here) >= reach;
+    let before = &positions[at.saturating_sub(NEIGHBOURS)..at];
+    let after = &positions[at + 1..positions.len().min(at + 1 + NEIGHBOURS)];
     let before = before.iter().rev().find(far).or(before.first());
     let after = after.iter().find(far).or(after.last());
     let (Some(before), Some(after)) = (before, after) else { return 0.0 };
@@ -219,15 +219,15 @@ fn turn(places: &[Place], at: usize, reach: f64) -> f64 {
     (came[0] * goes[1] - came[1] * goes[0]).atan2(dot(came, goes)).abs()
 }
 
-fn minus(a: Place, b: Place) -> Place {
+fn minus(a: PlanPoint, b: PlanPoint) -> PlanPoint {
     [a[0] - b[0], a[1] - b[1]]
 }
 
-fn dot(a: Place, b: Place) -> f64 {
+fn dot(a: PlanPoint, b: PlanPoint) -> f64 {
     a[0] * b[0] + a[1] * b[1]
 }
 
-fn distance(a: Place, b: Place) -> f64 {
+fn distance(a: PlanPoint, b: PlanPoint) -> f64 {
     let between = minus(a, b);
     between[0].hypot(between[1])
 }

@@ -13,7 +13,7 @@ use std::fmt::Write as _;
 
 /// The number of moves that are planned ahead, as many as on the Pico.
 const BLOCKS: usize = 192;
-/// The error of a place of the plan in mm, which is that of a length in the library.
+/// The error of a position of the plan in mm, which is that of a length in the library.
 const PLACE_ERROR: f64 = 4e-6;
 /// The number of columns of a plot. Each shows the least and the greatest value in its time.
 const COLUMNS: usize = 1200;
@@ -137,7 +137,7 @@ impl Motion {
         let acceleration = value(Setting::AccelerationX).min(value(Setting::AccelerationY));
         let jerk = 1000.0 * value(Setting::Jerk);
         Ok(Self {
-            steps: times.zip(places(path, &settings)).collect(),
+            steps: times.zip(positions(path, &settings)).collect(),
             seconds: recorder.now as f64 / second,
             limits: [Some(speed), Some(acceleration), (jerk > 0.0).then_some(jerk)],
         })
@@ -145,15 +145,15 @@ impl Motion {
 
     /// The three plots, one above the other, with the limits as dashed lines.
     ///
-    /// Acceleration and jerk are means over a few milliseconds, as long as the errors of the places
-    /// need, so changes within less than that look smoother than they are.
+    /// Acceleration and jerk are means over a few milliseconds, as long as the errors of the
+    /// positions need, so changes within less than that look smoother than they are.
     pub fn svg(&self) -> String {
         self.draw(&self.curves())
     }
 
     /// The speed, the acceleration and the jerk, all in mm and s, with their times.
     ///
-    /// They are the divided differences of the places at steps that lie a window apart.
+    /// They are the divided differences of the positions at steps that lie a window apart.
     fn curves(&self) -> [Vec<(f64, f64)>; 3] {
         let steps = &self.steps;
         let jerk = self.limits[2].unwrap_or(20_000.0);
@@ -295,24 +295,24 @@ fn rounded(value: f64) -> String {
     }
 }
 
-/// The places of the plan along the path (mm) at the steps of the job: each is due when the plan is
-/// half a step from its end.
-fn places(path: &mut dyn Path, settings: &Settings) -> Vec<f64> {
+/// The positions of the plan along the path (mm) at the steps of the job: each is due when the plan
+/// is half a step from its end.
+fn positions(path: &mut dyn Path, settings: &Settings) -> Vec<f64> {
     let [x, y] = settings.page_steps().map(|steps| steps.to_num::<f64>());
     let (mut at, mut start) = (PagePoint::default(), 0.0);
-    let mut places = Vec::new();
+    let mut positions = Vec::new();
     while let Some(Target { point, .. }) = path.next_target() {
         let (dx, dy) = (point.x - at.x, point.y - at.y);
         let length = (f64::from(dx) / x).hypot(f64::from(dy) / y);
         let count = dx.abs().max(dy.abs());
-        places.extend(
+        positions.extend(
             (0..count).map(|step| start + length * (f64::from(step) + 0.5) / f64::from(count)),
         );
         start += length;
         at = point;
     }
     path.rewind();
-    places
+    positions
 }
 
 #[cfg(test)]

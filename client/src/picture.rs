@@ -111,9 +111,9 @@ impl Picture {
             let Some((first, rest)) = points.split_first() else {
                 continue;
             };
-            write!(out, "<path d=\"M{}", self.place(*first))?;
+            write!(out, "<path d=\"M{}", self.position(*first))?;
             for point in rest {
-                write!(out, "L{}", self.place(*point))?;
+                write!(out, "L{}", self.position(*point))?;
             }
             if rest.is_empty() {
                 // This is a dot: round caps make a line without a length visible.
@@ -131,7 +131,7 @@ impl Picture {
         let end = end.and_then(|run| run.points.last());
         let radius = (self.page.width.min(self.page.height) / 200.0).clamp(0.4, 2.0);
         if let Some(&point) = start {
-            let Place(x, y) = self.place(point);
+            let Position(x, y) = self.position(point);
             writeln!(
                 out,
                 "<circle id=\"start\" cx=\"{x}\" cy=\"{y}\" r=\"{}\" fill=\"{START}\"/>",
@@ -139,7 +139,7 @@ impl Picture {
             )?;
         }
         if let Some(&point) = end {
-            let Place(x, y) = self.place(point);
+            let Position(x, y) = self.position(point);
             writeln!(
                 out,
                 "<circle id=\"end\" cx=\"{x}\" cy=\"{y}\" r=\"{}\" fill=\"none\" stroke=\"{END}\" \
@@ -152,8 +152,8 @@ impl Picture {
     }
 
     /// Converts a point to SVG coordinates, whose y axis points down.
-    fn place(&self, point: PagePoint) -> Place {
-        Place(Number(point[0]), Number(self.page.height - point[1]))
+    fn position(&self, point: PagePoint) -> Position {
+        Position(Number(point[0]), Number(self.page.height - point[1]))
     }
 }
 
@@ -189,9 +189,9 @@ impl fmt::Display for Number {
 }
 
 #[derive(Clone, Copy)]
-struct Place(Number, Number);
+struct Position(Number, Number);
 
-impl fmt::Display for Place {
+impl fmt::Display for Position {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} {}", self.0, self.1)
     }

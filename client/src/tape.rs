@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn damage_is_told() {
+    fn damage_is_reported() {
         let damaged = [0x33, 0xF3];
         assert_eq!(decode(&damaged), Err(BadCode { row: 1, code: 15 }));
     }

@@ -129,7 +129,7 @@ fn a_lost_line_is_sent_again_and_every_line_arrives_once() {
 }
 
 #[test]
-fn a_line_that_never_arrives_is_told_from_silence() {
+fn a_line_that_never_arrives_is_distinguished_from_silence() {
     let (error, _) = failure(Fault::NeverTakesLine(40));
     assert!(error.contains("line 49 of scene.obj"), "{error}");
     let (error, _) = failure(Fault::NeverTakesLine(41));
@@ -156,7 +156,7 @@ fn what_was_given_up_by_a_damaged_byte_begins_again() {
 }
 
 #[test]
-fn a_firmware_without_numbers_is_told_to_be_older() {
+fn a_firmware_without_numbers_is_reported_as_older() {
     let (error, plotter) = failure(Fault::WithoutNumbers);
     assert!(error.contains("firmware is older"), "{error}");
     assert_eq!(plotter.lines.len(), 0);

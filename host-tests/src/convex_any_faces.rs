@@ -46,9 +46,9 @@ pub fn is_seen_alike(random: &mut Random, stretches: impl Fn(&Scene<'_>) -> Vec<
     }
     // The camera looks along y, with x to the right and z up.
     let nearest = points.iter().map(|point| point[1]).min().expect("points");
-    let place = [random.between(-9, 9), nearest - random.between(1, 9), random.between(-9, 9)];
+    let position = [random.between(-9, 9), nearest - random.between(1, 9), random.between(-9, 9)];
     let (eye, projection) = if random.between(0, 1) == 0 {
-        (Eye::At(place.map(i64::from)), Projection::Perspective)
+        (Eye::At(position.map(i64::from)), Projection::Perspective)
     } else {
         (Eye::Towards([0, -1, 0]), Projection::Parallel)
     };
@@ -63,9 +63,9 @@ pub fn is_seen_alike(random: &mut Random, stretches: impl Fn(&Scene<'_>) -> Vec<
     let vertices: Vec<Vertex> = points
         .iter()
         .map(|point| Vertex {
-            x: point[0] - place[0],
-            y: point[2] - place[2],
-            z: point[1] - place[1],
+            x: point[0] - position[0],
+            y: point[2] - position[2],
+            z: point[1] - position[1],
         })
         .collect();
     let scene = Scene {

@@ -91,7 +91,7 @@ fn volume(a: Point, b: Point, c: Point, d: Point) -> i128 {
 
 fn height_of_eye(a: Point, b: Point, c: Point, eye: Eye) -> i128 {
     let to_eye = match eye {
-        Eye::At(place) => [0, 1, 2].map(|k| i128::from(place[k]) - i128::from(a[k])),
+        Eye::At(position) => [0, 1, 2].map(|k| i128::from(position[k]) - i128::from(a[k])),
         Eye::Towards(direction) => direction.map(i128::from),
     };
     det(minus(b, a), minus(c, a), to_eye)

@@ -185,12 +185,12 @@ pub fn any_eye(random: &mut Random, points: &[Point]) -> Eye {
         2 => Eye::At([0, 1, 2].map(|_| i64::from(random.between(-12, 12)) * unit)),
         3 => {
             // The eye is level with vertices in one or two coordinates.
-            let mut place = [0, 1, 2].map(|_| i64::from(random.between(-9, 9)) * unit);
+            let mut position = [0, 1, 2].map(|_| i64::from(random.between(-9, 9)) * unit);
             for _ in 0..2 {
                 let axis = random.between(0, 2) as usize;
-                place[axis] = i64::from(random.one_of(points)[axis]);
+                position[axis] = i64::from(random.one_of(points)[axis]);
             }
-            Eye::At(place)
+            Eye::At(position)
         }
         _ => {
             // The eye is on the line through two vertices.

@@ -12,14 +12,14 @@ pub fn spline_at(control: &[[f64; 3]], knots: &[f64], order: usize, u: f64) -> [
     } else {
         (0..control.len()).rev().find(|&at| knots[at] <= u).unwrap_or(0)
     };
-    let mut place = [0.0; 3];
+    let mut position = [0.0; 3];
     for (number, point) in control.iter().enumerate() {
         let weight = basis(knots, number, order, u, span);
         for axis in 0..3 {
-            place[axis] += weight * point[axis];
+            position[axis] += weight * point[axis];
         }
     }
-    place
+    position
 }
 
 fn basis(knots: &[f64], number: usize, order: usize, u: f64, span: usize) -> f64 {
@@ -38,10 +38,10 @@ fn basis(knots: &[f64], number: usize, order: usize, u: f64, span: usize) -> f64
     sum
 }
 
-/// The distance of `place` from the line segment between `a` and `b`.
-pub fn distance(place: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
+/// The distance of `position` from the line segment between `a` and `b`.
+pub fn distance(position: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
     let along = [b[0] - a[0], b[1] - a[1]];
-    let away = [place[0] - a[0], place[1] - a[1]];
+    let away = [position[0] - a[0], position[1] - a[1]];
     let square = along[0] * along[0] + along[1] * along[1];
     let part = if square > 0.0 {
         ((away[0] * along[0] + away[1] * along[1]) / square).clamp(0.0, 1.0)

@@ -326,13 +326,13 @@ pub fn stop_at_once(board: &'static BoardRow) -> Result<(), Box<dyn Error>> {
     }
     events.extend(machine.last().map(|event| event.kind));
     // The motor began at the lowest position, and the upper stop limits it.
-    let place = |events: &[MachineEventKind]| {
-        events.iter().fold(400, |place: i32, event| match event {
-            MachineEventKind::Lift { down } => (place + if *down { 1 } else { -1 }).max(0),
-            _ => place,
+    let position = |events: &[MachineEventKind]| {
+        events.iter().fold(400, |position: i32, event| match event {
+            MachineEventKind::ZStep { down } => (position + if *down { 1 } else { -1 }).max(0),
+            _ => position,
         })
     };
-    assert_eq!(place(&events), 62);
+    assert_eq!(position(&events), 62);
     let after = &events[stopped_at + 1..];
     assert!(!after.iter().any(|event| matches!(event, MachineEventKind::Step { .. })), "{after:?}");
     Ok(())

@@ -95,8 +95,8 @@ pub fn squared_limits(points: &[Point], limits: Limits) -> (Vec<f64>, Vec<f64>) 
 fn circle(first: Point, middle: Point, last: Point, rounding: f64) -> Option<f64> {
     // Whether a circle applies depends on a threshold, so points are rounded exactly as `motion`
     // does.
-    let place = |p: Point| ((p.0 * 4096.0).floor() / 4096.0, (p.1 * 4096.0).floor() / 4096.0);
-    let (first, middle, last) = (place(first), place(middle), place(last));
+    let position = |p: Point| ((p.0 * 4096.0).floor() / 4096.0, (p.1 * 4096.0).floor() / 4096.0);
+    let (first, middle, last) = (position(first), position(middle), position(last));
     let (a, b, c) = (minus(middle, first), minus(last, middle), minus(last, first));
     if 16.0 * norm(c) < 15.0 * norm(a).max(norm(b)) {
         return None;

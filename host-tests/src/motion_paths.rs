@@ -78,17 +78,18 @@ pub fn draw(points: &[PagePoint], settings: Settings, blocks: usize) -> Run {
 }
 
 /// The path length in mm at which the plan is when each move of the lines through `points` begins.
-pub fn places(points: &[PagePoint]) -> Vec<f64> {
+pub fn positions(points: &[PagePoint]) -> Vec<f64> {
     let mut start = 0.0;
-    let mut places = Vec::new();
+    let mut positions = Vec::new();
     for ends in points.windows(2) {
         let (dx, dy) = (ends[1].x - ends[0].x, ends[1].y - ends[0].y);
         let length = f64::from(dx).hypot(f64::from(dy)) / STEPS_PER_MM;
         let moves = dx.abs().max(dy.abs());
-        places.extend((0..moves).map(|k| start + length * (f64::from(k) + 0.5) / f64::from(moves)));
+        positions
+            .extend((0..moves).map(|k| start + length * (f64::from(k) + 0.5) / f64::from(moves)));
         start += length;
     }
-    places
+    positions
 }
 
 /// A circle around (50, 50), in mm.

@@ -178,9 +178,10 @@ pub fn random_scene(seed: u64) -> RandomScene {
             let base = triple(random, 2);
             let gap = random.between(1, 3);
             for n in 0..counts[0] * counts[1] * counts[2] {
-                let place = [n % counts[0], n / counts[0] % counts[1], n / counts[0] / counts[1]];
-                let at =
-                    (0..3).fold(base, |at, axis| plus(at, times(frame[axis], place[axis] * gap)));
+                let position =
+                    [n % counts[0], n / counts[0] % counts[1], n / counts[0] / counts[1]];
+                let at = (0..3)
+                    .fold(base, |at, axis| plus(at, times(frame[axis], position[axis] * gap)));
                 builder.add_prism(random, at, frame, &[[0, 0], [1, 0], [1, 1], [0, 1]]);
             }
         }

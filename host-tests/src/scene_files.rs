@@ -41,8 +41,8 @@ impl ObjText {
         let mut read = Self::default();
         for line in text.lines() {
             let (is_face, numbers) = match Command::parse(line) {
-                Ok(Command::Vertex(place)) => {
-                    read.vertices.push(place.map(|coordinate| coordinate.to_f64()));
+                Ok(Command::Vertex(position)) => {
+                    read.vertices.push(position.map(|coordinate| coordinate.to_f64()));
                     continue;
                 }
                 Ok(Command::Face(numbers)) => (true, numbers),

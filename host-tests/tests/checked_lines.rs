@@ -216,7 +216,7 @@ fn the_checksums_of_model_and_options_are_those_that_the_client_expects() {
         });
         assert!(expected.is_some_and(|expected| report.contains(&expected)), "{report}");
         seen.extend(contents.map(|[model, _]| model));
-        // Another place, another checksum.
+        // Another position, another checksum.
         bench.say("$margin=9\n$move=1,9,9,9\n");
         assert_ne!(bench.say("$model\n"), report);
     }

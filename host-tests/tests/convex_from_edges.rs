@@ -139,9 +139,9 @@ fn rounded_solids_are_seen_like_exact_ones() {
         for _ in 0..300 {
             let rotation = any_rotation(&mut random);
             let rounded = as_decimals(&points, &rotation, 6);
-            let turned = |place: [i64; 3]| {
+            let turned = |position: [i64; 3]| {
                 let row =
-                    |row: usize| (0..3).map(|k| rotation[row][k] * place[k] as f64).sum::<f64>();
+                    |row: usize| (0..3).map(|k| rotation[row][k] * position[k] as f64).sum::<f64>();
                 [0, 1, 2].map(row)
             };
             let (eye, turned_eye) = match any_eye(&mut random, &points) {
@@ -150,9 +150,9 @@ fn rounded_solids_are_seen_like_exact_ones() {
                     let fixed = turned(direction).map(|part| (part * 2f64.powi(50)) as i64);
                     (Eye::Towards(direction), Eye::Towards(fixed))
                 }
-                Eye::At(place) => {
-                    let fixed = turned(place).map(|part| (part / radius * 2f64.powi(29)) as i64);
-                    (Eye::At(place), Eye::At(fixed))
+                Eye::At(position) => {
+                    let fixed = turned(position).map(|part| (part / radius * 2f64.powi(29)) as i64);
+                    (Eye::At(position), Eye::At(fixed))
                 }
             };
             let case = || format!("{name} {eye:?} {rounded:?}");

@@ -123,14 +123,14 @@ proptest! {
 }
 
 /// Steps of the page to a unit of view, 1/64, in fine units of 1/256 step.
-fn parallel(place: [i64; 3]) -> Option<Fine> {
-    Some([0, 1].map(|axis: usize| place[axis] >> (FRACTION_BITS - 2)))
+fn parallel(position: [i64; 3]) -> Option<Fine> {
+    Some([0, 1].map(|axis: usize| position[axis] >> (FRACTION_BITS - 2)))
 }
 
 /// From the eye, depth 0.6 to 1: as if the far plane were a page of 8192 steps across.
-fn perspective(place: [i64; 3]) -> Option<Fine> {
-    let depth = place[2] + (800_000 << FRACTION_BITS);
-    Some([0, 1].map(|axis: usize| place[axis] * (4096 * 256) / depth))
+fn perspective(position: [i64; 3]) -> Option<Fine> {
+    let depth = position[2] + (800_000 << FRACTION_BITS);
+    Some([0, 1].map(|axis: usize| position[axis] * (4096 * 256) / depth))
 }
 
 fn in_steps(fine: Fine) -> [f64; 2] {
@@ -154,8 +154,8 @@ fn flattened(
     let control = sketch.control();
     let spline = sketch.spline(&control);
     let on_page = |t: u32| {
-        let place = spline.at(Parameter::from_bits(t));
-        in_steps(project(place.map(|c| i64::from(c) << FRACTION_BITS)).unwrap())
+        let position = spline.at(Parameter::from_bits(t));
+        in_steps(project(position.map(|c| i64::from(c) << FRACTION_BITS)).unwrap())
     };
     let ends: Vec<(Parameter, Point)> = spline.chords(project, tolerance).collect();
     let (first, last) = spline.ends();

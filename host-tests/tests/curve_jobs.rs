@@ -28,8 +28,8 @@ fn sent(text: &str, settings: &[&str]) -> Vec<String> {
     text.lines().chain(settings.iter().copied()).chain(["$plot"]).map(str::to_owned).collect()
 }
 
-fn nearest(place: [f64; 2], ink: &[[[f64; 2]; 2]]) -> f64 {
-    ink.iter().map(|[a, b]| distance(place, *a, *b)).fold(f64::INFINITY, f64::min)
+fn nearest(position: [f64; 2], ink: &[[[f64; 2]; 2]]) -> f64 {
+    ink.iter().map(|[a, b]| distance(position, *a, *b)).fold(f64::INFINITY, f64::min)
 }
 
 #[test]
@@ -81,10 +81,10 @@ fn a_curve_is_hidden_like_any_edge() {
     let height = |t: f64| 40.0 * ((1.0 - t).powi(2) - 2.0 * t * (1.0 - t) + t * t);
     for step in 0..=100 {
         let t = f64::from(step) / 100.0;
-        let place = [80.0 * (10.0 + 20.0 + 60.0 * t), 80.0 * 60.0];
-        assert!(nearest(place, &all) < 2.0, "{t}");
+        let position = [80.0 * (10.0 + 20.0 + 60.0 * t), 80.0 * 60.0];
+        assert!(nearest(position, &all) < 2.0, "{t}");
         if height(t).abs() > 1.0 {
-            assert_eq!(nearest(place, &visible) < 2.0, height(t) > 0.0, "{t}");
+            assert_eq!(nearest(position, &visible) < 2.0, height(t) > 0.0, "{t}");
         }
     }
 }

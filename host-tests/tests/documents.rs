@@ -22,13 +22,13 @@ type Table = Vec<Vec<String>>;
 /// All tables of a document, with the position of each row in its text.
 fn tables_of(text: &str) -> Vec<(Table, Vec<Range<usize>>)> {
     let mut tables: Vec<(Table, Vec<Range<usize>>)> = Vec::new();
-    for (event, place) in Parser::new_ext(text, Options::ENABLE_TABLES).into_offset_iter() {
+    for (event, position) in Parser::new_ext(text, Options::ENABLE_TABLES).into_offset_iter() {
         let Event::Start(Tag::Table(_)) = event else {
-            let Some((rows, places)) = tables.last_mut() else { continue };
+            let Some((rows, positions)) = tables.last_mut() else { continue };
             match event {
                 Event::Start(Tag::TableHead | Tag::TableRow) => {
                     rows.push(Vec::new());
-                    places.push(place);
+                    positions.push(position);
                 }
                 Event::Start(Tag::TableCell) => {
                     rows.last_mut().expect("a row before its cells").push(String::new());
@@ -83,11 +83,11 @@ fn assert_table(heading: &[&str], rows: &[Vec<String>]) {
     let text = protocol();
     let tables = tables_of(&text);
     let found = tables.iter().find(|(table, _)| table.first().is_some_and(|row| row == heading));
-    let (found, places) = found.unwrap_or_else(|| {
+    let (found, positions) = found.unwrap_or_else(|| {
         panic!("docs/protocol.md has no table with the heading | {} |", heading.join(" | "))
     });
     if writes_documents() {
-        let [_, first, .., last] = &places[..] else { panic!("a table has rows") };
+        let [_, first, .., last] = &positions[..] else { panic!("a table has rows") };
         let end = last.start + text[last.clone()].trim_end().len();
         let rows: Vec<String> = rows.iter().map(|row| written(row)).collect();
         let text = format!("{}{}{}", &text[..first.start], rows.join("\n"), &text[end..]);
@@ -150,10 +150,10 @@ fn every_row_of_every_document_has_as_many_cells_as_its_heading() {
     }
     for document in documents {
         let text = std::fs::read_to_string(&document).expect("a document");
-        for (table, places) in tables_of(&text) {
+        for (table, positions) in tables_of(&text) {
             let columns = table.first().map_or(0, Vec::len);
-            for place in places {
-                let row = &text[place];
+            for position in positions {
+                let row = &text[position];
                 assert_eq!(cells_written(row), columns, "{}: {row}", document.display());
             }
         }
@@ -165,8 +165,8 @@ fn a_bar_that_is_not_escaped_shifts_the_cells_and_is_found() {
     let heading = "| unit | least | default |\n|---|---|---|\n";
     let cells = |row: &str| {
         let text = format!("{heading}{row}\n\nText.");
-        let (table, places) = tables_of(&text).remove(0);
-        (table[1].clone(), cells_written(&text[places[1].clone()]))
+        let (table, positions) = tables_of(&text).remove(0);
+        (table[1].clone(), cells_written(&text[positions[1].clone()]))
     };
     let own = |cells: [&str; 3]| cells.map(String::from).to_vec();
     assert_eq!(cells("| 0|1 | 0 | 1 |"), (own(["0", "1", "0"]), 4));

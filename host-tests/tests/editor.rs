@@ -312,9 +312,9 @@ proptest! {
         let memory = Box::leak(Box::new(Memory::<60, 400, 400>::new()));
         let mut bench = Bench::with_memory(memory.lend(Box::leak(Box::new(EMPTY_LOOKAHEAD))));
         let mut plain = Plain::default();
-        for place in [[0, 0, 0], [4, 0, 0], [0, 5, 0], [0, 0, 6], [4, 5, 6]] {
-            bench.say(&format!("v {} {} {}\n", place[0], place[1], place[2]));
-            plain.vertices.push(place);
+        for position in [[0, 0, 0], [4, 0, 0], [0, 5, 0], [0, 0, 6], [4, 5, 6]] {
+            bench.say(&format!("v {} {} {}\n", position[0], position[1], position[2]));
+            plain.vertices.push(position);
         }
         for (kind, a, b, c) in changes {
             let before = plain.clone();
@@ -429,20 +429,20 @@ fn images_in_any_plane_are_exact_to_a_millionth() {
     bench.heard();
     bench.say("v 3 1 2\nv -7 4 5\nv 6 -2 9\nv 10 20 30\nv -50 3 8\nl 1 2 3 4 5\n$mirror=1,2,3\n");
     let unit = f64::from(1 << bench.plotter.model().fraction_bits());
-    let places: Vec<[f64; 3]> = bench
+    let positions: Vec<[f64; 3]> = bench
         .plotter
         .model()
         .vertices()
         .iter()
         .map(|p| p.coordinates().map(|c| f64::from(c) / unit))
         .collect();
-    assert_eq!((places.len(), bench.plotter.model().bar_count()), (7, 6));
+    assert_eq!((positions.len(), bench.plotter.model().bar_count()), (7, 6));
     let distance =
         |a: [f64; 3], b: [f64; 3]| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt();
     for (old, image) in [(3, 5), (4, 6)] {
         for on_plane in 0..3 {
-            let before = distance(places[old], places[on_plane]);
-            assert!((distance(places[image], places[on_plane]) - before).abs() < 1e-6);
+            let before = distance(positions[old], positions[on_plane]);
+            assert!((distance(positions[image], positions[on_plane]) - before).abs() < 1e-6);
         }
     }
 }

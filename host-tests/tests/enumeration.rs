@@ -249,8 +249,8 @@ impl Cancel for GivesUp {
 
 /// Two clusters with an odd number of points each, far apart: a hard proof.
 fn hard() -> Vec<u32> {
-    let place = |point: usize| point as u32 * 7919 % 101;
-    (0..16).flat_map(|a| (0..a).map(move |b| 50 + (place(a) * place(b)) % 20)).collect()
+    let position = |point: usize| point as u32 * 7919 % 101;
+    (0..16).flat_map(|a| (0..a).map(move |b| 50 + (position(a) * position(b)) % 20)).collect()
 }
 
 #[test]
@@ -307,7 +307,7 @@ fn sixty_four_points_at_the_longest_distance() {
 }
 
 #[test]
-fn each_improvement_is_told_and_the_last_is_the_optimum() {
+fn each_improvement_is_reported_and_the_last_is_the_optimum() {
     let below = hard();
     let distances = Distances::new(16, &below).expect("a problem");
     let mut memory = vec![0; 1000];

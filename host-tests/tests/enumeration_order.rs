@@ -22,8 +22,8 @@ fn least(sheet: &Sheet, shape: Shape) -> u64 {
         degrees[usize::from(segment.from)] += 1;
         degrees[usize::from(segment.to)] += 1;
     }
-    let places = sheet.points.iter().zip(degrees).filter(|&(_, degree)| degree % 2 == 1);
-    let mut odd: Vec<_> = places.map(|(&place, _)| Some(place)).collect();
+    let positions = sheet.points.iter().zip(degrees).filter(|&(_, degree)| degree % 2 == 1);
+    let mut odd: Vec<_> = positions.map(|(&position, _)| Some(position)).collect();
     if shape == Shape::OpenPath && !odd.is_empty() {
         odd.extend([None, None]);
     }

@@ -98,7 +98,7 @@ impl Session {
             })
             .collect();
         let drawn = event_checker::check_pins_in_alarms(&trace, &self.settings);
-        assert_eq!(drawn.end, PagePoint::default(), "the place is lost");
+        assert_eq!(drawn.end, PagePoint::default(), "the position is lost");
         drawn
     }
 }

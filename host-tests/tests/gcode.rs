@@ -34,10 +34,10 @@ fn field(bench: &mut Bench, name: &str) -> String {
     inner.split('|').find(|field| field.starts_with(name)).unwrap_or("").to_owned()
 }
 
-fn place(bench: &mut Bench) -> String {
+fn position_of(bench: &mut Bench) -> String {
     let field = field(bench, "MPos");
-    let place = field.strip_prefix("MPos:").and_then(|place| place.strip_suffix(",0.000"));
-    place.expect("a status").to_owned()
+    let position = field.strip_prefix("MPos:").and_then(|position| position.strip_suffix(",0.000"));
+    position.expect("a status").to_owned()
 }
 
 /// The length in mm moved with the pen down according to the pins, and the final position.
@@ -80,23 +80,23 @@ fn arcs_by_centre_and_by_radius_inches_and_bounds() {
     bench.say("G0 X20 Y50\nM3\nG2 X20 Y50 I30 J0\n");
     bench.finish();
     assert!((inked(&bench) - 60.0 * std::f64::consts::PI).abs() < 12.0);
-    assert_eq!(place(&mut bench), "20.000,50.000");
+    assert_eq!(position_of(&mut bench), "20.000,50.000");
     bench.say("M5\nG20 G0 X1 Y1\n");
     bench.finish();
-    assert_eq!(place(&mut bench), "25.400,25.400");
+    assert_eq!(position_of(&mut bench), "25.400,25.400");
     // A quarter circle counter-clockwise from (60, 50) around (50, 50), and three quarters around
     // (60, 60).
     bench.say("G21 G0 X60 Y50\nM3\nG3 X50 Y60 R10\n");
     bench.finish();
-    assert_eq!(place(&mut bench), "50.000,60.000");
+    assert_eq!(position_of(&mut bench), "50.000,60.000");
     bench.say("G0 X10 Y10\nG3 X30 Y10 I10 J1\n");
     bench.finish();
-    assert_eq!(place(&mut bench), "30.000,10.000");
+    assert_eq!(position_of(&mut bench), "30.000,10.000");
     // The ends of the arc are within the travel, but its lowest point is not.
     let answer = bench.say("G0 X5 Y5\nG3 X25 Y5 I10 J0\n");
     assert!(answer.contains("beyond") && answer.ends_with("error:15\n"), "{answer}");
     bench.finish();
-    assert_eq!(place(&mut bench), "5.000,5.000");
+    assert_eq!(position_of(&mut bench), "5.000,5.000");
 }
 
 /// The positions with the pen down according to the pins, in steps from the start.
@@ -171,7 +171,7 @@ fn a_pen_that_goes_down_and_up_leaves_a_dot() {
         )
         .collect();
     assert_eq!(heights, [127, 0]);
-    assert_eq!(place(&mut bench), "10.000,0.000");
+    assert_eq!(position_of(&mut bench), "10.000,0.000");
 }
 
 #[test]
@@ -182,13 +182,13 @@ fn moves_by_hand_are_cancelled_where_they_are() {
     assert_eq!(field(&mut bench, "Jog"), "Jog");
     bench.board.receive(&[0x85]);
     bench.finish();
-    let position = place(&mut bench);
+    let position = position_of(&mut bench);
     let x: f64 = position.split(',').next().and_then(|x| x.parse().ok()).expect("a number");
     assert!((15.0..40.0).contains(&x), "{position}");
     assert_eq!(field(&mut bench, "Idle"), "Idle");
     assert_eq!(bench.say("$J=X0\n"), "ok\n");
     bench.finish();
-    assert_eq!(place(&mut bench), "0.000,0.000");
+    assert_eq!(position_of(&mut bench), "0.000,0.000");
 }
 
 #[test]
@@ -214,7 +214,7 @@ fn homing_answers_when_it_is_done() {
     assert!(seen.contains(&State::Home) && seen.contains(&State::Jog));
     assert_eq!(bench.heard(), "ok\nok\n");
     bench.finish();
-    assert_eq!(place(&mut bench), "1.000,0.000");
+    assert_eq!(position_of(&mut bench), "1.000,0.000");
 }
 
 #[test]
@@ -243,17 +243,17 @@ fn a_limit_and_the_emergency_stop_are_alarms() {
         assert_eq!(bench.heard(), alarm);
         assert!(bench.say("G0 X0\n").ends_with("error:9\n"));
         work(&mut bench, 20);
-        let position = place(&mut bench);
+        let position = position_of(&mut bench);
         if contacts.stop {
             assert!(field(&mut bench, "Pn").contains('E'));
             assert!(bench.say("$X\n").ends_with("error:9\n"));
         }
         bench.board.set_contacts(Contacts::default());
         assert_eq!(bench.say("$X\n"), "ok\n");
-        assert_eq!(place(&mut bench), position);
+        assert_eq!(position_of(&mut bench), position);
         bench.say("G0 X0\n");
         bench.finish();
-        assert_eq!(place(&mut bench), "0.000,0.000");
+        assert_eq!(position_of(&mut bench), "0.000,0.000");
     }
 }
 
@@ -291,19 +291,19 @@ fn pauses_wait_for_the_user() {
     work(&mut bench, 1500);
     assert_eq!(bench.heard(), "ok\n".repeat(4));
     assert_eq!(field(&mut bench, "Hold"), "Hold:0");
-    assert_eq!(place(&mut bench), "10.000,0.000");
+    assert_eq!(position_of(&mut bench), "10.000,0.000");
     bench.say("~");
     bench.finish();
-    assert_eq!(place(&mut bench), "20.000,0.000");
+    assert_eq!(position_of(&mut bench), "20.000,0.000");
     // At the end of the stroke.
     bench.say("M5\nG0 X0\nM3\nG1 X10\nG1 X20\nM5\nG0 X50\nG0 X60\n");
     bench.board.receive(&[0xFB]);
     work(&mut bench, 3000);
-    assert_eq!(place(&mut bench), "20.000,0.000");
+    assert_eq!(position_of(&mut bench), "20.000,0.000");
     assert_eq!(field(&mut bench, "Hold"), "Hold:0");
     bench.say("~");
     bench.finish();
-    assert_eq!(place(&mut bench), "60.000,0.000");
+    assert_eq!(position_of(&mut bench), "60.000,0.000");
     // The dwell is measured by the pins' own clock.
     let before = bench.board.trace().now();
     assert_eq!(bench.say("G4 P1.5\n"), "");
@@ -327,7 +327,7 @@ fn checking_refuses_what_would_be_refused_and_moves_nothing() {
     // A line that was only checked does not change where the next line begins.
     bench.say("G91 G0 X1\n");
     bench.finish();
-    assert_eq!(place(&mut bench), "1.000,0.000");
+    assert_eq!(position_of(&mut bench), "1.000,0.000");
 }
 
 #[test]
@@ -351,7 +351,7 @@ fn asleep_it_takes_nothing_but_the_order_to_wake() {
     );
     assert_eq!(bench.say("$X\nG0 X0\n"), "ok\nok\n");
     bench.finish();
-    assert_eq!(place(&mut bench), "0.000,0.000");
+    assert_eq!(position_of(&mut bench), "0.000,0.000");
 }
 
 #[test]

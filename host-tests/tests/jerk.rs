@@ -8,7 +8,7 @@ use penup::motion::StepEvent;
 use penup_host_tests::event_checker::{self, Run};
 use penup_host_tests::motion_optimum::{Limits, squared_limits, straight_seconds};
 use penup_host_tests::motion_paths::{
-    STEPS_PER_MM, circle, dense, draw, places, settings, star, steps, zigzag,
+    STEPS_PER_MM, circle, dense, draw, positions, settings, star, steps, zigzag,
 };
 use penup_host_tests::pin_machine;
 use proptest::prelude::*;
@@ -85,10 +85,10 @@ impl Case {
     /// Checks the jerk, the acceleration, and the speed at each corner and on each line.
     fn check(self, name: &str, points: &[PagePoint], run: &Run) {
         let case = format!("{name} {self:?}");
-        let places = places(points);
-        let measured = event_checker::greatest_acceleration(&run.times, &places, 0.005);
+        let positions = positions(points);
+        let measured = event_checker::greatest_acceleration(&run.times, &positions, 0.005);
         assert!(measured <= 1.05 * self.acceleration, "{case}: {measured} mm/s2");
-        let measured = event_checker::greatest_jerk(&run.times, &places, self.jerk);
+        let measured = event_checker::greatest_jerk(&run.times, &positions, self.jerk);
         assert!(measured <= 1.1 * self.jerk, "{case}: {measured} mm/s3");
         let mm: Vec<_> = points
             .iter()
@@ -101,7 +101,8 @@ impl Case {
             let (dx, dy) = (ends[1].x - ends[0].x, ends[1].y - ends[0].y);
             let after = first + dx.abs().max(dy.abs()) as usize;
             let speed = |index: usize| {
-                (places[index] - places[index - 1]) / (run.times[index] - run.times[index - 1])
+                (positions[index] - positions[index - 1])
+                    / (run.times[index] - run.times[index - 1])
             };
             // At 0.4 mm/s, successive times are one slice apart.
             let most = 1.03 * limit.sqrt() + 0.1;
@@ -114,7 +115,7 @@ impl Case {
             }
             if line > 0 {
                 // The corner is passed between the last move of one line and the first of the next.
-                let distance = places[first] - places[first - 1];
+                let distance = positions[first] - positions[first - 1];
                 let most = 1.03 * (corners[line] + self.acceleration * 2.0 * distance).sqrt() + 0.1;
                 assert!(
                     speed(first) <= most,

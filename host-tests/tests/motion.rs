@@ -9,7 +9,7 @@ use penup::step::{Arc, Chords, Turn};
 use penup_host_tests::event_checker::{self, Run};
 use penup_host_tests::motion_optimum::{self, Limits};
 use penup_host_tests::motion_paths::{
-    STEPS_PER_MM, circle, dense, draw, places, settings, star, steps, zigzag,
+    STEPS_PER_MM, circle, dense, draw, positions, settings, star, steps, zigzag,
 };
 use penup_host_tests::pin_machine;
 use proptest::prelude::*;
@@ -69,7 +69,7 @@ fn every_path_takes_the_time_of_the_optimum_and_keeps_the_acceleration() {
                 let run = draw(&points, settings(speed, acceleration, deviation, bends), 1000);
                 let least = optimum(&points, speed, acceleration, deviation, bends);
                 let measured =
-                    event_checker::greatest_acceleration(&run.times, &places(&points), 0.005);
+                    event_checker::greatest_acceleration(&run.times, &positions(&points), 0.005);
                 let case = format!("{name} {speed} {acceleration} {deviation} {bends}");
                 assert!(
                     (run.seconds / least - 1.0).abs() < 0.01,
@@ -176,21 +176,21 @@ proptest! {
         let run = draw(&points, settings(speed, acceleration, deviation, bends), 128);
         let least = optimum(&points, speed, acceleration, deviation, bends);
         prop_assert!((run.seconds / least - 1.0).abs() < 0.01, "{} s, not {least}", run.seconds);
-        let measured = event_checker::greatest_acceleration(&run.times, &places(&points), 0.005);
+        let measured = event_checker::greatest_acceleration(&run.times, &positions(&points), 0.005);
         prop_assert!(measured <= 1.05 * acceleration, "{measured} mm/s2");
     }
 }
 
 /// The maximum speed over any 5 ms, in mm/s.
-fn fastest(run: &Run, places: &[f64]) -> f64 {
+fn fastest(run: &Run, positions: &[f64]) -> f64 {
     let mut fastest = 0.0f64;
     let mut first = 0;
-    for (&time, &place) in run.times.iter().zip(places) {
+    for (&time, &position) in run.times.iter().zip(positions) {
         while run.times[first + 1] <= time - 0.005 {
             first += 1;
         }
         if time - run.times[first] >= 0.005 {
-            fastest = fastest.max((place - places[first]) / (time - run.times[first]));
+            fastest = fastest.max((position - positions[first]) / (time - run.times[first]));
         }
     }
     fastest
@@ -206,7 +206,7 @@ fn arcs_keep_the_acceleration_and_lead_through_their_points() {
             std::iter::once(start).chain(Chords::new(start, arc.clone())).collect();
         let run = draw(&points, settings(50.0, 200.0, 0.127, true), 128);
         assert_eq!(run.points, arc.collect::<Vec<_>>());
-        let speed = fastest(&run, &places(&points));
+        let speed = fastest(&run, &positions(&points));
         let radius = f64::from(radius) / STEPS_PER_MM;
         assert!(speed * speed / radius <= 1.05 * 200.0, "{radius} mm: {speed} mm/s");
         let ideal =
@@ -227,7 +227,7 @@ fn bends_keep_the_acceleration_whatever_the_chords() {
                 let speed = (acceleration * radius).sqrt().min(50.0);
                 std::f64::consts::TAU * radius / speed + speed / acceleration
             };
-            let fastest = fastest(&run, &places(&points));
+            let fastest = fastest(&run, &positions(&points));
             let case = format!("r {radius} chord {chord}: {:.4} s, {fastest:.2} mm/s", run.seconds);
             assert!(fastest * fastest / radius <= 1.05 * acceleration, "{case}");
             assert!((run.seconds / ideal - 1.0).abs() < 0.015, "{case}, ideally {ideal:.4} s");

@@ -178,8 +178,8 @@ fn a_drawing_that_is_none_is_refused() {
     let points =
         [PagePoint { x: 0, y: 0 }, PagePoint { x: 9, y: 0 }, PagePoint { x: 1 << 21, y: 0 }];
     let segment = |from, to| Segment { from, to, ..Segment::default() };
-    let attempt = |segments: Vec<Segment>, places: usize| {
-        let mut tour = vec![Leg::new(0, false); places];
+    let attempt = |segments: Vec<Segment>, positions: usize| {
+        let mut tour = vec![Leg::new(0, false); positions];
         let drawing = Drawing { points: &points, segments: &segments };
         let mut memory = [0; 100];
         let scratch = Scratch::new(&mut memory);

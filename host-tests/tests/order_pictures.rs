@@ -1,8 +1,8 @@
 //! Tests of stroke orders whose expected tours are pictures.
 //!
 //! A picture is both the drawing and its tour. Points are crosses, six columns and two rows apart.
-//! Between them a segment has a number, the place in the tour at which it is drawn (`9` is followed
-//! by `a`), and a head that points where the pen goes:
+//! Between them a segment has a number, the position in the tour at which it is drawn (`9` is
+//! followed by `a`), and a head that points where the pen goes:
 //!
 //! ```text
 //! +--1->+<-2--+     drawn with pen 1     +==1=>+     drawn with pen 2
@@ -24,11 +24,11 @@ const APART: (usize, usize) = (6, 2);
 /// The same distance in steps of the motors.
 const STEPS: i32 = 100;
 
-/// A place in the grid of points, as column and row, counted from the upper left.
-type Place = (usize, usize);
+/// A position in the grid of points, as column and row, counted from the upper left.
+type Position = (usize, usize);
 
-/// The places of the segments and their pens, as a picture shows them.
-fn segments(picture: &[String]) -> Vec<(Place, Place, u8)> {
+/// The positions of the segments and their pens, as a picture shows them.
+fn segments(picture: &[String]) -> Vec<(Position, Position, u8)> {
     let text = |row: usize, from: usize, to: usize| -> String {
         let line = picture.get(row).map_or("", String::as_str);
         line.chars().skip(from).take(to - from).collect()
@@ -70,8 +70,8 @@ fn write(picture: &mut Vec<Vec<char>>, (row, column): (usize, usize), text: &str
     }
 }
 
-/// The picture of a tour. Each leg is given by its first and last place and its pen.
-fn picture_of(tour: &[(Place, Place, u8)]) -> Vec<String> {
+/// The picture of a tour. Each leg is given by its first and last position and its pen.
+fn picture_of(tour: &[(Position, Position, u8)]) -> Vec<String> {
     let mut picture = Vec::new();
     for (number, &(from, to, pen)) in (1..).zip(tour) {
         let number = char::from_digit(number, 36).expect("at most 35 segments");
@@ -93,8 +93,8 @@ fn picture_of(tour: &[(Place, Place, u8)]) -> Vec<String> {
             let slope = if upper.0 < lower.0 { '\\' } else { '/' };
             write(&mut picture, (below.0, below.1 + 2), &format!("{number}{slope}{head}"));
         }
-        for place in [from, to] {
-            write(&mut picture, (place.1 * APART.1, place.0 * APART.0), "+");
+        for position in [from, to] {
+            write(&mut picture, (position.1 * APART.1, position.0 * APART.0), "+");
         }
     }
     picture.into_iter().map(|line| line.into_iter().collect()).collect()
@@ -116,14 +116,14 @@ fn unindented(picture: &str) -> Vec<String> {
 fn assert_tour(options: Options, expected: &str) -> Report {
     let expected = unindented(expected);
     let mut sheet = Sheet::default();
-    let (mut places, mut numbers) = (Vec::new(), BTreeMap::new());
+    let (mut positions, mut numbers) = (Vec::new(), BTreeMap::new());
     for (from, to, pen) in segments(&expected) {
-        let [from, to] = [from, to].map(|place| {
-            *numbers.entry(place).or_insert_with(|| {
-                let [x, y] = [place.0, place.1].map(|at| STEPS * at as i32);
+        let [from, to] = [from, to].map(|position| {
+            *numbers.entry(position).or_insert_with(|| {
+                let [x, y] = [position.0, position.1].map(|at| STEPS * at as i32);
                 sheet.points.push(PagePoint { x, y: -y });
-                places.push(place);
-                places.len() as u16 - 1
+                positions.push(position);
+                positions.len() as u16 - 1
             })
         });
         sheet.segments.push(Segment { from, to, pen, ..Segment::default() });
@@ -131,7 +131,7 @@ fn assert_tour(options: Options, expected: &str) -> Report {
     let (tour, report) = sheet.order(options).expect("a small drawing fits");
     let leg = |leg: &Leg| {
         let segment = sheet.segments[leg.segment()];
-        let [from, to] = [segment.from, segment.to].map(|point| places[usize::from(point)]);
+        let [from, to] = [segment.from, segment.to].map(|point| positions[usize::from(point)]);
         if leg.reversed() { (to, from, segment.pen) } else { (from, to, segment.pen) }
     };
     let found = picture_of(&tour.iter().map(leg).collect::<Vec<_>>());

@@ -32,8 +32,8 @@ fn organised(lines: &[Drawn]) -> Vec<Drawn> {
 
 /// The position of a point along a line, in units of the line's squared length; `None` if the point
 /// is not on it.
-fn along(place: (i64, i64), (from, to, ..): &Drawn) -> Option<i64> {
-    let (d, w) = ((to.0 - from.0, to.1 - from.1), (place.0 - from.0, place.1 - from.1));
+fn along(position: (i64, i64), (from, to, ..): &Drawn) -> Option<i64> {
+    let (d, w) = ((to.0 - from.0, to.1 - from.1), (position.0 - from.0, position.1 - from.1));
     (d.0 * w.1 == d.1 * w.0).then_some(d.0 * w.0 + d.1 * w.1)
 }
 
@@ -49,13 +49,14 @@ fn covered(line: &Drawn, other: &Drawn) -> Option<(i64, i64)> {
 fn drawn() -> impl Strategy<Value = Drawn> {
     // Points are ten steps apart, so that none are merged; there are few slopes, so that many lines
     // coincide.
-    let place = || (0i64..7, 0i64..7).prop_map(|(x, y)| (10 * x, 10 * y));
+    let position = || (0i64..7, 0i64..7).prop_map(|(x, y)| (10 * x, 10 * y));
     let slope = prop_oneof![Just((1, 0)), Just((0, 1)), Just((1, 1)), Just((2, -1)), Just((3, 2))];
-    let sloped = (place(), slope, 1i64..6, any::<bool>()).prop_map(|(from, (dx, dy), by, back)| {
-        let to = (from.0 + 10 * dx * by, from.1 + 10 * dy * by);
-        if back { (to, from) } else { (from, to) }
-    });
-    let any = (place(), place()).prop_filter("a length", |(from, to)| from != to);
+    let sloped =
+        (position(), slope, 1i64..6, any::<bool>()).prop_map(|(from, (dx, dy), by, back)| {
+            let to = (from.0 + 10 * dx * by, from.1 + 10 * dy * by);
+            if back { (to, from) } else { (from, to) }
+        });
+    let any = (position(), position()).prop_filter("a length", |(from, to)| from != to);
     (prop_oneof![4 => sloped, 1 => any], 0..LineType::ALL.len() as u8, 0u8..4)
         .prop_map(|((from, to), code, pen)| (from, to, code, pen))
 }

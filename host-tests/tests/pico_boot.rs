@@ -56,7 +56,7 @@ fn assert_safe(line: &mut Line<Pico>) -> TestResult {
 }
 
 #[test]
-fn each_kind_of_reset_is_told_from_the_others() -> TestResult {
+fn each_kind_of_reset_is_distinguished() -> TestResult {
     let mut line = start()?;
     line.emulator.copy_image()?;
     assert_fresh(&hear_start(&mut line)?);
@@ -78,7 +78,7 @@ fn each_kind_of_reset_is_told_from_the_others() -> TestResult {
 }
 
 #[test]
-fn a_panic_in_a_job_makes_the_machine_safe_and_is_told_after_the_restart() -> TestResult {
+fn a_panic_in_a_job_makes_the_machine_safe_and_is_reported_after_the_restart() -> TestResult {
     let mut line = start()?;
     for text in job_lines("lattice2.obj", &["$page=60x80", "$margin=5"]) {
         assert_eq!(line.ask(&text)?, "ok", "{text}");
@@ -155,9 +155,9 @@ fn travel_is(line: &mut Line<Pico>, wanted: &str) -> Result<bool, Box<dyn Error>
 fn a_flash_that_does_not_hold_the_settings_is_reported() -> TestResult {
     // A bit that is not erased, and one that is not written: the upper byte of the first setting's
     // number.
-    for (place, mask, high) in [(SETTINGS + 900, 4, false), (SETTINGS + 256 + 1, 0x80, true)] {
+    for (offset, mask, high) in [(SETTINGS + 900, 4, false), (SETTINGS + 256 + 1, 0x80, true)] {
         let mut line = start()?;
-        line.emulator.wear_flash(place, mask, high)?;
+        line.emulator.wear_flash(offset, mask, high)?;
         let message = line.ask("$130=300")?;
         assert!(message.starts_with("[MSG:in force"), "{message}");
         assert_eq!(line.hear()?, "error:160");

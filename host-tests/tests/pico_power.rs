@@ -168,18 +168,18 @@ fn after_a_cut_in_any_write_of_the_flash_the_settings_are_the_old_or_the_new_one
     let mut settings = watched.settings()?;
     let edges = [0, 4096, 4096 + 256, 4096 + 2 * 256, VALID_FROM, SAVE_BYTES];
     let edges = edges.into_iter().flat_map(|edge| edge.saturating_sub(1)..=edge + 1);
-    let mut places: Vec<u64> = edges.filter(|&place| place < SAVE_BYTES).collect();
+    let mut offsets: Vec<u64> = edges.filter(|&offset| offset < SAVE_BYTES).collect();
     if cut_count() >= SAVE_BYTES {
-        places = (0..SAVE_BYTES).collect();
+        offsets = (0..SAVE_BYTES).collect();
     } else {
         let mut random = Random::new(2026);
-        places.extend((0..cut_count()).map(|_| random.below(SAVE_BYTES)));
+        offsets.extend((0..cut_count()).map(|_| random.below(SAVE_BYTES)));
     }
-    for (number, place) in (0u32..).zip(places) {
-        watched.0.emulator.0.cut_power_in_flash(place)?;
+    for (number, offset) in (0u32..).zip(offsets) {
+        watched.0.emulator.0.cut_power_in_flash(offset)?;
         let travel = 100 + number % 300;
         let is_new = watched.survive(&settings, travel)?;
-        assert_eq!(is_new, place >= VALID_FROM, "cut after {place} bytes");
+        assert_eq!(is_new, offset >= VALID_FROM, "cut after {offset} bytes");
         if is_new {
             settings = settings.iter().map(|line| changed(line, travel)).collect();
         }
@@ -283,15 +283,15 @@ fn after_a_cut_while_a_job_is_kept_it_is_the_old_one_or_the_new_one() -> TestRes
             assert_eq!(ask_all(&mut watched.0, text)?, ["ok"], "{text}");
         }
         // Every other time when it counts already.
-        let place = if number % 2 == 0 { 0 } else { VALID_FROM };
-        let place = place + random.below(JOB_BYTES - place);
-        watched.0.emulator.0.cut_power_in_flash(place)?;
+        let offset = if number % 2 == 0 { 0 } else { VALID_FROM };
+        let offset = offset + random.below(JOB_BYTES - offset);
+        watched.0.emulator.0.cut_power_in_flash(offset)?;
         watched.0.emulator.send(format!("{plot}\n").as_bytes())?;
         watched.hear_restart()?;
         assert_eq!(ask_all(&mut watched.0, "$again")?, ["ok"]);
         let found = job(&mut watched.0)?;
         let now = jobs.iter().position(|job| *job == found).ok_or("neither")?;
-        assert_eq!(now != kept, place >= VALID_FROM, "cut after {place} bytes");
+        assert_eq!(now != kept, offset >= VALID_FROM, "cut after {offset} bytes");
         changes += usize::from(now != kept);
         kept = now;
         watched.give_up()?;

@@ -31,8 +31,8 @@ fn disturbed(
     let lines = job_lines("diagonal.obj", settings);
     let pico = emulator::Pico::start(&image_path("pico"))?;
     let mut line = Line::to(Box::new(pico))?;
-    for &(place, hundredths) in stalls {
-        line.emulator.stall_at(place, hundredths)?;
+    for &(position, hundredths) in stalls {
+        line.emulator.stall_at(position, hundredths)?;
     }
     let mut line = begin_on(line, &lines)?;
     line.emulator.send(disturbance)?;
@@ -132,12 +132,13 @@ fn a_main_loop_that_stands_still_brakes_within_the_acceleration_set() -> Result<
     let up = changes.iter().rposition(|change| change.pin == Pin::Pen && !change.high);
     let times = steps_of_x(&changes[down..up.ok_or("the pen is never raised")?]);
     // x and y step at once, by 1/80 mm each.
-    let places: Vec<f64> = (0..times.len()).map(|step| step as f64 * 2f64.sqrt() / 80.0).collect();
+    let positions: Vec<f64> =
+        (0..times.len()).map(|step| step as f64 * 2f64.sqrt() / 80.0).collect();
     assert_eq!(times.len(), 8_000);
     let pauses = times.windows(2).filter(|pair| pair[1] - pair[0] > 0.1).count();
     assert_eq!(pauses, 2);
     // The acceleration from rest to rest, over any 5 ms.
-    let measured = greatest_acceleration(&times, &places, 0.005);
+    let measured = greatest_acceleration(&times, &positions, 0.005);
     println!("{measured:.0} mm/s²");
     assert!(measured > 1_000.0 && measured <= 1.05 * 2_000.0, "{measured} mm/s²");
     Ok(())

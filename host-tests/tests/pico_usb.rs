@@ -262,7 +262,7 @@ fn a_stop_acts_behind_all_that_a_sender_may_have_on_its_way() -> TestResult {
 }
 
 #[test]
-fn an_open_port_is_told_of_a_fault_too() -> TestResult {
+fn a_fault_is_reported_at_an_open_port_too() -> TestResult {
     let mut line = plugged_in()?;
     line.emulator.0.jump_to_function(&image_path("pico"), "main", false)?;
     line.hear_greeting()?;

@@ -93,7 +93,7 @@ fn polargraphs() -> impl Strategy<Value = PolargraphMachine> {
         .prop_map(|(steps, width, left, height)| PolargraphMachine::new(steps, width, left, height))
 }
 
-fn places() -> impl Strategy<Value = Vec<(f64, f64)>> {
+fn positions() -> impl Strategy<Value = Vec<(f64, f64)>> {
     prop::collection::vec((0.0f64..400.0, 0.0f64..420.0), 2..5)
 }
 
@@ -102,10 +102,10 @@ proptest! {
     #[test]
     fn lines_are_straight_within_half_a_step_of_the_belts(
         polargraph in polargraphs(),
-        places in places(),
+        positions in positions(),
     ) {
         let settings = polargraph.settings;
-        let targets: Vec<_> = places
+        let targets: Vec<_> = positions
             .iter()
             .enumerate()
             .map(|(index, &(x, y))| Target {

@@ -285,7 +285,7 @@ fn hidden_lines_have_their_own_pen_after_a_pause() {
 }
 
 #[test]
-fn the_order_is_as_it_was_asked_for_and_told() {
+fn the_order_is_as_it_was_asked_for_and_reported() {
     let mut bench = Bench::new();
     bench.heard();
     // Two squares: two parts without odd points.

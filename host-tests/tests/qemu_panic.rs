@@ -25,10 +25,10 @@ fn panicking_image() -> TestResult<Vec<u8>> {
         .ok_or("the image has no panic handler")?;
     let vectors = elf.section_by_name(".vector_table").ok_or("the image has no vectors")?;
     let (start, _) = vectors.file_range().ok_or("the vectors are not in the file")?;
-    let place = usize::try_from(start + UART0_VECTOR)?;
+    let index = usize::try_from(start + UART0_VECTOR)?;
     // Bit 0 says that it is Thumb code, as all of it is.
     let address = u32::try_from(handler.address())? | 1;
-    bytes[place..place + 4].copy_from_slice(&address.to_le_bytes());
+    bytes[index..index + 4].copy_from_slice(&address.to_le_bytes());
     Ok(bytes)
 }
 

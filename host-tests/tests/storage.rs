@@ -142,8 +142,8 @@ impl NorFlash for Worn {
     }
 
     fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), NotHeld> {
-        let place = &mut self.bytes[offset as usize..][..bytes.len()];
-        place.copy_from_slice(bytes);
+        let slot = &mut self.bytes[offset as usize..][..bytes.len()];
+        slot.copy_from_slice(bytes);
         let (worn, low) = self.worn;
         self.bytes[worn] &= !low;
         if self.bytes[offset as usize..][..bytes.len()] == *bytes { Ok(()) } else { Err(NotHeld) }

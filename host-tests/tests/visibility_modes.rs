@@ -254,10 +254,10 @@ fn an_eye_inside_sees_what_is_before_it_and_stays_on_the_page() {
         // Something is drawn within a tenth of the page about its middle, and nothing off the page.
         let mut in_the_middle = 0;
         while let Some(target) = path.next_target() {
-            let place = [target.point.x, target.point.y];
-            assert!(place.iter().all(|steps_of| steps.contains(steps_of)), "{place:?}");
+            let position = [target.point.x, target.point.y];
+            assert!(position.iter().all(|steps_of| steps.contains(steps_of)), "{position:?}");
             targets += 1;
-            in_the_middle += i32::from(place.iter().all(|steps| (steps - 4000).abs() < 1500));
+            in_the_middle += i32::from(position.iter().all(|steps| (steps - 4000).abs() < 1500));
         }
         assert!(
             targets > 40 && in_the_middle > 10,

@@ -165,8 +165,8 @@ impl<'s> Graph<'s> {
         scratch: &mut Scratch<'s>,
     ) -> Result<Self, OutOfScratch> {
         let numbers = scratch.take::<u16>(points.len())?;
-        for (place, number) in numbers.iter_mut().zip(0..) {
-            *place = number;
+        for (slot, number) in numbers.iter_mut().zip(0..) {
+            *slot = number;
         }
         let distinct = points::weld(points, numbers);
         let membership = scratch.take::<Membership>(points.len())?;
@@ -393,7 +393,7 @@ impl<'s> Graph<'s> {
     /// Whether an edge between two corners of the outline that are not neighbours is visible. The
     /// corners are given by their indices.
     fn is_isolated_edge_visible(&self, first: usize, last: usize, outline: &[u16]) -> bool {
-        let [start, end] = [first, last].map(|place| self.point(outline[place]));
+        let [start, end] = [first, last].map(|slot| self.point(outline[slot]));
         let right = &outline[first + 1..last];
         let left = || outline[last + 1..].iter().chain(&outline[..first]);
         // The upper side of this plane faces the eye, since the outline runs counter-clockwise. The

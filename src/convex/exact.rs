@@ -60,9 +60,9 @@ impl Plane {
     /// the plane is edge-on.
     pub(super) fn height_of_eye(&self, eye: Eye) -> i128 {
         match eye {
-            Eye::At(place) => dot(
+            Eye::At(position) => dot(
                 self.normal,
-                [0, 1, 2].map_each(|axis| place[axis] - i64::from(self.origin[axis])),
+                [0, 1, 2].map_each(|axis| position[axis] - i64::from(self.origin[axis])),
             ),
             Eye::Towards(direction) => dot(self.normal, direction),
         }

@@ -37,8 +37,8 @@ impl Eye {
         let square = i128::from(extent) * i128::from(extent); // below 2^62
         let centre = centre.map(i64::from);
         let (ray, divisor) = match self {
-            Self::At(place) => {
-                let ray = [0, 1, 2].map(|axis| place[axis] - centre[axis]);
+            Self::At(position) => {
+                let ray = [0, 1, 2].map(|axis| position[axis] - centre[axis]);
                 (ray, square + step * greatest(ray))
             }
             Self::Towards(direction) => (direction, step * greatest(direction)),

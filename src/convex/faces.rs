@@ -102,8 +102,8 @@ pub fn from_vertices(
     eye.check()?;
     points::check(positions)?;
     let numbers = scratch.take::<u16>(positions.len())?;
-    for (place, number) in numbers.iter_mut().zip(0..) {
-        *place = number;
+    for (slot, number) in numbers.iter_mut().zip(0..) {
+        *slot = number;
     }
     let distinct = points::weld(positions, numbers);
     let numbers = &mut numbers[..distinct];

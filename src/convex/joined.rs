@@ -44,8 +44,8 @@ impl<'s> Joining<'s> {
         scratch: &mut Scratch<'s>,
     ) -> Result<Self, OutOfScratch> {
         let joined = scratch.take::<u16>(solid.faces.len())?;
-        for (place, face) in joined.iter_mut().zip(0..) {
-            *place = face;
+        for (slot, face) in joined.iter_mut().zip(0..) {
+            *slot = face;
         }
         Ok(Self {
             eye,

@@ -102,8 +102,8 @@ pub(super) fn span(points: &[Point], numbers: &[u16]) -> Span {
 
 /// Returns the vertex that represents `number` among the welded ones.
 pub(super) fn first_at_place(points: &[Point], welded: &[u16], number: u16) -> u16 {
-    let place = points[usize::from(number)];
+    let position = points[usize::from(number)];
     welded
-        .binary_search_by_key(&place, |other| points[usize::from(*other)])
+        .binary_search_by_key(&position, |other| points[usize::from(*other)])
         .map_or(number, |at| welded[at])
 }

@@ -62,7 +62,7 @@ struct End {
     /// The position on the curve.
     at: Parameter,
     /// The point.
-    place: [i64; 3],
+    position: [i64; 3],
 }
 
 impl<'a, F: Fn([i64; 3]) -> Option<Fine>> Chords<'a, F> {
@@ -122,13 +122,13 @@ impl<'a, F: Fn([i64; 3]) -> Option<Fine>> Chords<'a, F> {
     fn farthest(&mut self, from: End, first: u32, most: u32) -> (u32, u32) {
         let next = |length: u32| length.saturating_add((length >> SAMPLE_BITS).max(1)).min(most);
         let mut candidates = heapless::Deque::<u32, TRIED>::new();
-        let origin = (self.project)(from.place);
+        let origin = (self.project)(from.position);
         let mut cone = Cone::ALL;
         let mut length = first;
         while !cone.is_empty() {
-            let place = (self.project)(self.place(Parameter(from.at.0 + length)));
-            let near = match (origin, place) {
-                (Some(origin), Some(place)) => cone.take(origin, place, self.tolerance),
+            let position = (self.project)(self.position_at(Parameter(from.at.0 + length)));
+            let near = match (origin, position) {
+                (Some(origin), Some(position)) => cone.take(origin, position, self.tolerance),
                 // Both points are clipped, so there is no line to test.
                 (None, None) => true,
                 _ => break,
@@ -156,7 +156,7 @@ impl<'a, F: Fn([i64; 3]) -> Option<Fine>> Chords<'a, F> {
 
     /// Whether the curve stays within the tolerance of the chord from `from` to `to`.
     fn fits(&mut self, from: End, to: Parameter) -> bool {
-        let ends = [from.place, self.place(to)];
+        let ends = [from.position, self.position_at(to)];
         let strip = match ends.map(|end| (self.project)(end)) {
             [Some(a), Some(b)] => Some(Strip::new(a, b, self.tolerance)),
             // Both ends are clipped, so no part of the curve may be visible.
@@ -173,7 +173,7 @@ impl<'a, F: Fn([i64; 3]) -> Option<Fine>> Chords<'a, F> {
                 continue;
             }
             let part = self.span.part(begin, end);
-            if !is_within_a_unit(&part, from.place) && !self.stays(&part, strip.as_ref()) {
+            if !is_within_a_unit(&part, from.position) && !self.stays(&part, strip.as_ref()) {
                 return false;
             }
         }
@@ -189,7 +189,7 @@ impl<'a, F: Fn([i64; 3]) -> Option<Fine>> Chords<'a, F> {
     }
 
     /// The point at `t`, in units of 2^-[`FRACTION_BITS`].
-    fn place(&self, t: Parameter) -> [i64; 3] {
+    fn position_at(&self, t: Parameter) -> [i64; 3] {
         if self.used == Some(t.span()) {
             self.span.at(t.local())
         } else {
@@ -200,7 +200,7 @@ impl<'a, F: Fn([i64; 3]) -> Option<Fine>> Chords<'a, F> {
     /// Whether all of `span` is in the strip. Without a strip, whether no part of it is visible.
     fn stays(&self, span: &Span, strip: Option<&Strip>) -> bool {
         let inside = |point: &[i64; 3]| match ((self.project)(*point), strip) {
-            (Some(place), Some(strip)) => strip.contains(place),
+            (Some(position), Some(strip)) => strip.contains(position),
             (None, None) => true,
             _ => false,
         };
@@ -235,18 +235,18 @@ impl<F: Fn([i64; 3]) -> Option<Fine>> Iterator for Chords<'_, F> {
     fn next(&mut self) -> Option<Self::Item> {
         let (first, end) = self.spline.ends();
         let Some(before) = self.last else {
-            let beginning = End { at: first, place: self.place(first) };
+            let beginning = End { at: first, position: self.position_at(first) };
             self.last = Some(beginning);
-            return Some((first, rounded(beginning.place)));
+            return Some((first, rounded(beginning.position)));
         };
         let mut last = before;
         while last.at < end {
             self.length = self.longest(last, end.0 - last.at.0);
             let at = Parameter(last.at.0 + self.length);
-            last = End { at, place: self.place(at) };
+            last = End { at, position: self.position_at(at) };
             self.last = Some(last);
-            let point = rounded(last.place);
-            if point != rounded(before.place) {
+            let point = rounded(last.position);
+            if point != rounded(before.position) {
                 return Some((at, point));
             }
         }
@@ -261,10 +261,11 @@ fn knot_between(low: u32, high: u32) -> Option<u32> {
     (low < knot && knot < high).then_some(knot)
 }
 
-/// Whether all of the polynomial is within one unit of `place` in each coordinate.
-fn is_within_a_unit(span: &Span, place: [i64; 3]) -> bool {
-    let near =
-        |point: &[i64; 3]| point.iter().zip(place).all(|(a, b)| a.abs_diff(b) < 1 << FRACTION_BITS);
+/// Whether all of the polynomial is within one unit of `position` in each coordinate.
+fn is_within_a_unit(span: &Span, position: [i64; 3]) -> bool {
+    let near = |point: &[i64; 3]| {
+        point.iter().zip(position).all(|(a, b)| a.abs_diff(b) < 1 << FRACTION_BITS)
+    };
     span.points().iter().all(near)
 }
 
@@ -287,10 +288,10 @@ impl Cone {
     }
 
     /// Restricts the cone to the directions from `origin` that also pass within `tolerance` of
-    /// `place`. Returns whether the direction to `place` itself is in the cone.
-    fn take(&mut self, origin: Fine, place: Fine, tolerance: u16) -> bool {
-        let (origin, place) = (clamped(origin), clamped(place));
-        let away = [place[0] - origin[0], place[1] - origin[1]];
+    /// `position`. Returns whether the direction to `position` itself is in the cone.
+    fn take(&mut self, origin: Fine, position: Fine, tolerance: u16) -> bool {
+        let (origin, position) = (clamped(origin), clamped(position));
+        let away = [position[0] - origin[0], position[1] - origin[1]];
         let tolerance = i64::from(tolerance);
         let square = dot(away, away) - tolerance * tolerance;
         if square > 0 {
@@ -346,10 +347,10 @@ impl Strip {
         Self { from, to, along, tolerance: i64::from(tolerance), length }
     }
 
-    fn contains(&self, place: Fine) -> bool {
-        let place = clamped(place);
-        let away = [place[0] - self.from[0], place[1] - self.from[1]];
-        let past = [place[0] - self.to[0], place[1] - self.to[1]];
+    fn contains(&self, position: Fine) -> bool {
+        let position = clamped(position);
+        let away = [position[0] - self.from[0], position[1] - self.from[1]];
+        let past = [position[0] - self.to[0], position[1] - self.to[1]];
         let square = self.tolerance * self.tolerance;
         if dot(away, self.along) <= 0 {
             dot(away, away) <= square
@@ -361,8 +362,8 @@ impl Strip {
     }
 }
 
-fn clamped(place: Fine) -> Fine {
-    place.map(|c| c.clamp(-FINE_LIMIT, FINE_LIMIT))
+fn clamped(position: Fine) -> Fine {
+    position.map(|c| c.clamp(-FINE_LIMIT, FINE_LIMIT))
 }
 
 /// The dot product; below 2^61 for components within ±2^30.

@@ -306,8 +306,8 @@ impl<'a> Spline<'a> {
 
 /// Rounds to whole units. The result fits, because the curve stays within the bounding box of its
 /// control points.
-fn rounded(place: [i64; 3]) -> Point {
-    place.map_each(|c| ((c + (1 << (FRACTION_BITS - 1))) >> FRACTION_BITS) as i32)
+fn rounded(position: [i64; 3]) -> Point {
+    position.map_each(|c| ((c + (1 << (FRACTION_BITS - 1))) >> FRACTION_BITS) as i32)
 }
 
 /// Implements [`Spline::parameter`] without a spline.

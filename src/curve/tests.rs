@@ -22,8 +22,8 @@ fn near(a: Point, b: Point, units: u32) -> bool {
 }
 
 /// A page with one fine unit to each unit of the control points.
-fn flat(place: [i64; 3]) -> Option<Fine> {
-    Some([place[0] >> FRACTION_BITS, place[1] >> FRACTION_BITS])
+fn flat(position: [i64; 3]) -> Option<Fine> {
+    Some([position[0] >> FRACTION_BITS, position[1] >> FRACTION_BITS])
 }
 
 fn chord_ends(spline: &Spline<'_>, tolerance: u16) -> Vec<Point> {
@@ -43,11 +43,11 @@ fn the_worked_table_of_section_2_4() {
     ];
     let spline = uniform(&PAPER, &[0, 0, 1, 2, 3, 3], 3);
     for (fifth, (x, y)) in table.into_iter().enumerate() {
-        let place = at_tenths(&spline, 2 * fifth as i64);
+        let position = at_tenths(&spline, 2 * fifth as i64);
         // The values are printed to a tenth.
         let printed = [x, y].map(|c: f64| (c * f64::from(UNIT)) as i32);
         let allowed = UNIT.unsigned_abs() / 20 + 2;
-        assert!(near(place, [printed[0], printed[1], 0], allowed), "{fifth}: {place:?}");
+        assert!(near(position, [printed[0], printed[1], 0], allowed), "{fifth}: {position:?}");
     }
 }
 
@@ -68,8 +68,8 @@ fn the_polynomials_beside_the_table_come_out() {
             let value = |[c, b, a]: [i64; 3]| {
                 ((c * 256 + b * t * 16 + a * t * t) * i64::from(UNIT) / 512) as i32
             };
-            let place = spline.at(spline.parameter((t + 16) << 12, 16));
-            assert_eq!(place, [value(x), value(y), 0], "t = {t}/16");
+            let position = spline.at(spline.parameter((t + 16) << 12, 16));
+            assert_eq!(position, [value(x), value(y), 0], "t = {t}/16");
         }
     }
 }
@@ -134,7 +134,7 @@ fn a_repeated_point_draws_the_curve_nearer() {
         let tenths = 0..=10 * spline.spans() as i64;
         tenths
             .map(|tenth| at_tenths(&spline, tenth))
-            .map(|place| i64::from(place[0] - x).pow(2) + i64::from(place[1] - y).pow(2))
+            .map(|position| i64::from(position[0] - x).pow(2) + i64::from(position[1] - y).pow(2))
             .min()
     };
     let once = nearest(&[0, 0, 0, 1, 2, 3, 3, 3]);
@@ -234,9 +234,9 @@ fn what_is_cut_off_costs_no_chords() {
     let points = [[-9000, 0, 9000], [-3000, 9000, -90_000], [3000, 9, -90_000], [9000, 0, 9000]];
     let spline =
         Spline::new(&points, &[0, 1, 2, 3], 4, Knots::Listed(&[0, 0, 0, 0, 1, 1, 1, 1])).unwrap();
-    let perspective = |place: [i64; 3]| {
-        (place[2] >= 1 << FRACTION_BITS)
-            .then(|| [0, 1].map(|axis: usize| place[axis] * 5000 / place[2]))
+    let perspective = |position: [i64; 3]| {
+        (position[2] >= 1 << FRACTION_BITS)
+            .then(|| [0, 1].map(|axis: usize| position[axis] * 5000 / position[2]))
     };
     let ends: Vec<_> = spline.chords(perspective, 128).map(|(_, point)| point).collect();
     let behind = ends.windows(2).filter(|pair| pair.iter().all(|point| point[2] < 1)).count();

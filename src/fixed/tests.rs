@@ -6,7 +6,7 @@ fn binary(text: &str, fraction_bits: u32) -> Result<i64, OutOfRange> {
 }
 
 #[test]
-fn every_length_is_told_from_its_neighbours() {
+fn every_length_is_distinguished_from_its_neighbours() {
     for bits in (-70_000..70_000).chain([i32::MIN, i32::MAX, i32::MAX - 1]) {
         let text = format!("{}", Length(Millimetres::from_bits(bits)));
         assert_eq!(binary(&text, 16), Ok(i64::from(bits)), "{text}");
@@ -141,8 +141,8 @@ fn rounding_is_half_away_from_zero() {
 
 #[test]
 fn fractions_are_written_rounded_and_without_a_negative_zero() {
-    let shown = |units, fraction_bits, places| {
-        format!("{}", BinaryFraction { units, fraction_bits, places })
+    let shown = |units, fraction_bits, decimals| {
+        format!("{}", BinaryFraction { units, fraction_bits, decimals })
     };
     assert_eq!(shown(5 << 16, 16, 3), "5.000");
     assert_eq!(shown(-1, 16, 3), "0.000");

@@ -77,17 +77,17 @@ fn points_of_one_plane_are_known_however_they_were_rounded() {
         let written = 1 + (n % 40) as i32;
         // A point and two steps, all whole, and errors of up to `written`.
         let [a, u, v] = [0, 3, 6].map(|k| [0, 1, 2].map(|axis| (number(k + axis) * 40) as i32));
-        let place = |i: i32, j: i32, k: i64| {
+        let position = |i: i32, j: i32, k: i64| {
             [0, 1, 2].map(|axis: usize| {
                 let off = number(k + axis as i64) as i32 % (written + 1);
                 a[axis] + i * u[axis] / 4 * 4 + j * v[axis] / 4 * 4 + off
             })
         };
         let points = [
-            place(0, 0, 20),
-            place(4, 0, 30),
-            place(0, 4, 40),
-            place((n % 9) as i32 - 4, (n % 7) as i32 - 3, 50),
+            position(0, 0, 20),
+            position(4, 0, 30),
+            position(0, 4, 40),
+            position((n % 9) as i32 - 4, (n % 7) as i32 - 3, 50),
         ];
         let precision = Precision { written: written as u32, unit: 1 };
         let area = cross([0, 1, 2].map(|n| i64::from(u[n])), [0, 1, 2].map(|n| i64::from(v[n])));
@@ -142,7 +142,7 @@ fn the_margin_covers_every_rounding() {
 }
 
 #[test]
-fn places_far_along_a_long_edge_are_told_apart() {
+fn positions_far_along_a_long_edge_are_distinguished() {
     let near_end = EdgeParameter { numerator: (1 << 62) - 1, denominator: 1 << 62 };
     let nearer_end = EdgeParameter { numerator: u64::MAX - 1, denominator: u64::MAX };
     assert!(near_end < nearer_end && nearer_end < EdgeParameter::END);

@@ -117,7 +117,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn slack_is_taken_up_once_each_way() {
+    fn backlash_is_taken_up_once_in_each_direction() {
         let mut slack = Backlash::default();
         let mut take = |x, y| slack.take_up([10, 4], [x, y]);
         assert_eq!(take(5, 0), [0, 0]);

@@ -98,26 +98,26 @@ mod tests {
 
     #[test]
     fn every_part_of_a_model_counts() {
-        const PLACES: [[&str; 3]; 4] =
+        const POSITIONS: [[&str; 3]; 4] =
             [["0", "0", "0"], ["1", "0", "0"], ["1", "1", "0"], ["0", "1", "0.5"]];
-        let mut other = PLACES;
+        let mut other = POSITIONS;
         other[3][2] = "0.25";
         // In the model's unit this is the same position, but its last decimal is taken to be
         // rounded.
-        let mut rounded = PLACES;
+        let mut rounded = POSITIONS;
         rounded[1][0] = "1.0000000000001";
         let face: &[i32] = &[1, 2, 3];
         let sums = [
-            sum(&PLACES, &[]),
-            sum(&PLACES[..3], &[]),
+            sum(&POSITIONS, &[]),
+            sum(&POSITIONS[..3], &[]),
             sum(&other, &[]),
-            sum(&PLACES, &[(face, 0)]),
-            sum(&PLACES, &[(&[1, 3, 2], 0)]),
-            sum(&PLACES, &[(&[1, 2, 3, 4], 0)]),
-            sum(&PLACES, &[(face, 1)]),
-            sum(&PLACES, &[(&[1, 2], 0), (&[2, 3], 0), (&[3, 1], 0)]),
-            sum(&PLACES, &[(face, 0), (&[1, 2], 0)]),
-            sum(&PLACES, &[(&[1, 2], 0), (face, 0)]),
+            sum(&POSITIONS, &[(face, 0)]),
+            sum(&POSITIONS, &[(&[1, 3, 2], 0)]),
+            sum(&POSITIONS, &[(&[1, 2, 3, 4], 0)]),
+            sum(&POSITIONS, &[(face, 1)]),
+            sum(&POSITIONS, &[(&[1, 2], 0), (&[2, 3], 0), (&[3, 1], 0)]),
+            sum(&POSITIONS, &[(face, 0), (&[1, 2], 0)]),
+            sum(&POSITIONS, &[(&[1, 2], 0), (face, 0)]),
             sum(&rounded, &[]),
         ];
         let different: std::collections::BTreeSet<u32> = sums.into_iter().collect();

@@ -36,8 +36,8 @@ impl<'s, 'a> Distances<'s, 'a> {
 
     /// Makes an empty table, as large as the memory allows.
     pub fn new(network: Network<'a>, scratch: &mut Scratch<'s>) -> Result<Self, OutOfScratch> {
-        let places = scratch.available_bytes() / size_of::<Known>();
-        let bits = places.checked_ilog2().unwrap_or(0).min(Self::MOST_BITS);
+        let slots = scratch.available_bytes() / size_of::<Known>();
+        let bits = slots.checked_ilog2().unwrap_or(0).min(Self::MOST_BITS);
         let known: &mut [Known] = scratch.take(if bits == 0 { 0 } else { 1 << bits })?;
         known.fill(Known { pair: [NONE; 2], length: 0 });
         Ok(Self {
@@ -58,15 +58,15 @@ impl<'s, 'a> Distances<'s, 'a> {
         let pair = if from < to { [from, to] } else { [to, from] };
         // Knuth's multiplicative hashing, with a prime near 2^32 times the golden ratio.
         let mixed = (u32::from(pair[0]) << 16 | u32::from(pair[1])).wrapping_mul(2_654_435_761);
-        let place = self.known.get((mixed >> self.shift) as usize);
-        let known = place.map(Cell::get).filter(|known| known.pair == pair);
+        let slot = self.known.get((mixed >> self.shift) as usize);
+        let known = slot.map(Cell::get).filter(|known| known.pair == pair);
         let length = match known {
             Some(known) => known.length,
             None if self.network.least_distance(from, to) >= bound => return None,
             None => {
                 let length = self.network.distance(from, to);
-                if let Some(place) = place {
-                    place.set(Known { pair, length });
+                if let Some(slot) = slot {
+                    slot.set(Known { pair, length });
                 }
                 length
             }

@@ -121,7 +121,7 @@ impl<'s, 'a> Unused<'s, 'a> {
         for station in 0..self.network.stations() {
             if self.is_entrance(station) {
                 work_budget.work(1)?;
-                let distance = far(self.network.place(station));
+                let distance = far(self.network.position(station));
                 if distance < least || best.is_none() {
                     (least, best) = (distance, Some(station));
                 }
@@ -144,8 +144,8 @@ impl<'s, 'a> Unused<'s, 'a> {
                 return Ok(Some(station));
             }
         }
-        let at = self.network.place(pen);
-        self.entrance(|place| length(at, place), work_budget)
+        let at = self.network.position(pen);
+        self.entrance(|position| length(at, position), work_budget)
     }
 
     /// Traces all parts, from `start` if it is given and otherwise from the entrance with the
@@ -159,7 +159,7 @@ impl<'s, 'a> Unused<'s, 'a> {
         work_budget: &mut WorkBudget<'_>,
     ) -> Result<(), OrderError> {
         let network = self.network;
-        let from_the_left = |place: PagePoint| place.x.wrapping_sub(i32::MIN) as u32;
+        let from_the_left = |position: PagePoint| position.x.wrapping_sub(i32::MIN) as u32;
         let mut entrance = match start {
             Some(start) => Some(start),
             None => self.entrance(from_the_left, work_budget)?,

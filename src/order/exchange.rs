@@ -111,12 +111,12 @@ impl<'s, 'a> Exchanges<'s, 'a> {
         scratch: &mut Scratch<'s>,
     ) -> Result<Self, OutOfScratch> {
         let stations = usize::from(network.stations());
-        let places = scratch.take(legs.len())?;
+        let slots = scratch.take(legs.len())?;
         let mut waiting = Waiting::new(scratch.take(stations)?, scratch.take(stations)?);
         for station in 0..network.stations() {
             waiting.add(station);
         }
-        let cycle = Cycle::new(legs, places, scratch.take(Cycle::MEMORY)?);
+        let cycle = Cycle::new(legs, slots, scratch.take(Cycle::MEMORY)?);
         let incidence = Incidence::new(network, scratch)?;
         Ok(Self {
             cycle,

@@ -124,9 +124,9 @@ const CORNERS: [(i32, i32); 4] = [(1, 1), (1, -1), (-1, 1), (-1, -1)];
 
 /// Returns the distance of a point from a corner far outside the page, in steps, measured along x
 /// and y.
-fn from_corner(place: PagePoint, (x, y): (i32, i32)) -> u32 {
+fn from_corner(position: PagePoint, (x, y): (i32, i32)) -> u32 {
     // A coordinate is within ±2^20, so the sum is positive.
-    (x * place.x + y * place.y + (1 << 22)).cast_unsigned()
+    (x * position.x + y * position.y + (1 << 22)).cast_unsigned()
 }
 
 /// The shortest tour found so far, and the settings of the search.
@@ -161,7 +161,9 @@ impl Best<'_, '_> {
         moves.copy_from_slice(mate);
         let mut unused = Unused::new(self.network, moves, &mut scratch)?;
         let start = match corner {
-            Some(corner) => unused.entrance(|place| from_corner(place, corner), work_budget)?,
+            Some(corner) => {
+                unused.entrance(|position| from_corner(position, corner), work_budget)?
+            }
             None => start,
         };
         let (route, _) = cycle.split_at_mut(self.route.len());
@@ -226,8 +228,8 @@ impl Best<'_, '_> {
         let leg = |index: usize| tour.cycle.leg(index % legs);
         let gap = (0..legs).find(|&index| tour.is_gap(leg(index)));
         let start = gap.map_or(0, |gap| gap + 1);
-        for (index, place) in self.route.iter_mut().enumerate() {
-            *place = leg(start + index);
+        for (index, slot) in self.route.iter_mut().enumerate() {
+            *slot = leg(start + index);
         }
     }
 }

@@ -215,13 +215,13 @@ pub fn order(
         rest = others;
         let options = Options { shape, ..options };
         order_pen(drawing, pen, options, scratch.reborrow(), &mut work_budget, legs, &mut report)?;
-        let place = |leg: Leg| drawing.points[usize::from(start_point(drawing.segments, leg))];
+        let position = |leg: Leg| drawing.points[usize::from(start_point(drawing.segments, leg))];
         if let (Some(at), Some(&first), Some(&last)) = (pen_at, legs.first(), legs.last())
-            && length(at, place(last.flipped())) < length(at, place(first))
+            && length(at, position(last.flipped())) < length(at, position(first))
         {
             reverse(legs);
         }
-        pen_at = legs.last().map(|last| place(last.flipped()));
+        pen_at = legs.last().map(|last| position(last.flipped()));
         next_pen = pens().filter(|&other| other > pen).min();
     }
     measure(drawing, tour, options.shape, &mut report);
@@ -239,7 +239,8 @@ fn check(drawing: Drawing<'_>, tour_length: usize) -> Result<(), OrderError> {
     }
     let on_the_page = |point: u16| {
         let limits = -PAGE_LIMIT..=PAGE_LIMIT;
-        let within = |place: &PagePoint| limits.contains(&place.x) && limits.contains(&place.y);
+        let within =
+            |position: &PagePoint| limits.contains(&position.x) && limits.contains(&position.y);
         drawing.points.get(usize::from(point)).is_some_and(within)
     };
     match (0..).zip(drawing.segments).find(|(_, segment)| {
@@ -366,10 +367,10 @@ fn pair_odd(
 ) -> Result<Option<u16>, OrderError> {
     let odd_stations = || (0..).zip(mate.iter()).filter(|&(station, &mark)| station == mark);
     let stations: &mut [u16] = scratch.take(odd_stations().count())?;
-    for (place, (station, _)) in stations.iter_mut().zip(odd_stations()) {
-        *place = station;
+    for (slot, (station, _)) in stations.iter_mut().zip(odd_stations()) {
+        *slot = station;
     }
-    work_budget.sort(stations, |&station| (network.place(station).x, station))?;
+    work_budget.sort(stations, |&station| (network.position(station).x, station))?;
     let odd = OddPoints::new(network, stations, options.shape == Shape::OpenPath);
     report.odd_points += u32::from(odd.real_count());
     let partners: &mut [u16] = scratch.take(usize::from(odd.count()))?;
@@ -382,7 +383,7 @@ fn pair_odd(
     }
     let ends = odd.free_ends().map_each(|end| partners[usize::from(end)]);
     let ends = ends.into_iter().filter_map(|end| odd.station(end));
-    Ok(ends.min_by_key(|&station| (network.place(station).x, station)))
+    Ok(ends.min_by_key(|&station| (network.position(station).x, station)))
 }
 
 /// Pairs the odd points. Returns a lower bound of the total length of their moves in 1/256 steps,
@@ -415,7 +416,7 @@ fn pair_points(
 /// Makes a closed cycle begin at its lowest x, and an open path at that of its ends that has the
 /// lower x.
 fn turn(network: Network<'_>, shape: Shape, route: &mut [Leg]) {
-    let x_of = |leg: &Leg| network.place(network.start(*leg)).x;
+    let x_of = |leg: &Leg| network.position(network.start(*leg)).x;
     match shape {
         Shape::ClosedCycle => {
             let first = (0..route.len()).min_by_key(|&index| x_of(&route[index]));
@@ -441,21 +442,21 @@ fn reverse(tour: &mut [Leg]) {
 
 /// Adds the lengths and lifts of `tour` to `report`.
 fn measure(drawing: Drawing<'_>, tour: &[Leg], shape: Shape, report: &mut Report) {
-    let place = |leg: Leg| drawing.points[usize::from(start_point(drawing.segments, leg))];
+    let position = |leg: Leg| drawing.points[usize::from(start_point(drawing.segments, leg))];
     let closing = match shape {
         Shape::OpenPath => None,
         Shape::ClosedCycle => tour.first(),
     };
-    let mut pen = tour.first().map(|&leg| place(leg)).unwrap_or_default();
+    let mut pen = tour.first().map(|&leg| position(leg)).unwrap_or_default();
     for &leg in tour {
-        report.lifts += u32::from(place(leg) != pen);
-        report.pen_up += u64::from(length(pen, place(leg)));
-        report.pen_down += u64::from(length(place(leg), place(leg.flipped())));
-        pen = place(leg.flipped());
+        report.lifts += u32::from(position(leg) != pen);
+        report.pen_up += u64::from(length(pen, position(leg)));
+        report.pen_down += u64::from(length(position(leg), position(leg.flipped())));
+        pen = position(leg.flipped());
     }
     if let Some(&leg) = closing {
-        report.lifts += u32::from(place(leg) != pen);
-        report.pen_up += u64::from(length(pen, place(leg)));
+        report.lifts += u32::from(position(leg) != pen);
+        report.pen_up += u64::from(length(pen, position(leg)));
     }
     report.optimal = report.pen_up == report.bound;
 }

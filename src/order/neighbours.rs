@@ -75,11 +75,12 @@ struct Grid<'s, 'a> {
 impl<'s, 'a> Grid<'s, 'a> {
     fn new(network: Network<'a>, scratch: &mut Scratch<'s>) -> Result<Self, OutOfScratch> {
         let count = network.stations();
-        let places = || (0..count).map(|station| network.place(station));
-        let least = |of: fn(PagePoint) -> i32| places().map(of).min().unwrap_or(0);
-        let most = |of: fn(PagePoint) -> i32| places().map(of).max().unwrap_or(0);
-        let corner = PagePoint { x: least(|place| place.x), y: least(|place| place.y) };
-        let (width, height) = (most(|place| place.x) - corner.x, most(|place| place.y) - corner.y);
+        let positions = || (0..count).map(|station| network.position(station));
+        let least = |of: fn(PagePoint) -> i32| positions().map(of).min().unwrap_or(0);
+        let most = |of: fn(PagePoint) -> i32| positions().map(of).max().unwrap_or(0);
+        let corner = PagePoint { x: least(|position| position.x), y: least(|position| position.y) };
+        let (width, height) =
+            (most(|position| position.x) - corner.x, most(|position| position.y) - corner.y);
         let mut cell_bits = 0;
         let cells = |bits: u32| ((width >> bits) + 1).saturating_mul((height >> bits) + 1);
         while cells(cell_bits) > i32::from(count / 2).max(1) {
@@ -97,7 +98,7 @@ impl<'s, 'a> Grid<'s, 'a> {
         let begin: &mut [u16] = scratch.take(cells(cell_bits) as usize + 1)?;
         let stations: &mut [u16] = scratch.take(usize::from(count))?;
         let cell_of = |station| {
-            let (column, row) = grid.cell(network.place(station));
+            let (column, row) = grid.cell(network.position(station));
             (row * grid.columns + column) as usize
         };
         for station in 0..count {
@@ -120,9 +121,9 @@ impl<'s, 'a> Grid<'s, 'a> {
     }
 
     /// Returns the column and the row of the cell that contains a point.
-    fn cell(&self, place: PagePoint) -> (i32, i32) {
+    fn cell(&self, position: PagePoint) -> (i32, i32) {
         let along = |at: i32, corner: i32| (at - corner) >> self.cell_bits;
-        (along(place.x, self.corner.x), along(place.y, self.corner.y))
+        (along(position.x, self.corner.x), along(position.y, self.corner.y))
     }
 
     /// Returns the stations of the cells from column `from` to column `to` of a row.
@@ -143,8 +144,8 @@ impl<'s, 'a> Grid<'s, 'a> {
         near: &mut [u16],
         work_budget: &mut WorkBudget<'_>,
     ) -> Result<(), OrderError> {
-        let place = self.network.place(station);
-        let (column, row) = self.cell(place);
+        let position = self.network.position(station);
+        let (column, row) = self.cell(position);
         let distance = |other: u16| match other {
             NONE => u64::MAX,
             other => self.network.square(station, other),
@@ -175,9 +176,9 @@ impl<'s, 'a> Grid<'s, 'a> {
                 };
                 for &other in sides.into_iter().flatten().filter(|&&other| other != station) {
                     work_budget.work(1)?;
-                    let there = self.network.place(other);
+                    let there = self.network.position(other);
                     let quadrant =
-                        2 * usize::from(there.y < place.y) + usize::from(there.x < place.x);
+                        2 * usize::from(there.y < position.y) + usize::from(there.x < position.x);
                     let begin = quadrant * per_quadrant;
                     insert(&mut near[begin..begin + per_quadrant], other, distance);
                 }

@@ -86,23 +86,23 @@ impl<'a> Network<'a> {
     }
 
     /// Returns the page position of a station.
-    pub fn place(&self, station: u16) -> PagePoint {
+    pub fn position(&self, station: u16) -> PagePoint {
         self.points[usize::from(self.at[usize::from(station)])]
     }
 
     /// Returns the distance between two stations in 1/256 steps.
     pub fn distance(&self, from: u16, to: u16) -> u32 {
-        length(self.place(from), self.place(to))
+        length(self.position(from), self.position(to))
     }
 
     /// Returns a lower bound of that distance in 1/256 steps, without a square root.
     pub fn least_distance(&self, from: u16, to: u16) -> u32 {
-        least_length(self.place(from), self.place(to))
+        least_length(self.position(from), self.position(to))
     }
 
     /// Returns the square of the distance between two stations, in square steps.
     pub fn square(&self, from: u16, to: u16) -> u64 {
-        square(self.place(from), self.place(to))
+        square(self.position(from), self.position(to))
     }
 
     /// Returns the stations at the start and at the end of a chain.
@@ -150,8 +150,8 @@ impl<'a> Network<'a> {
             let (mut leg, last) =
                 if chain.reversed() { (last.flipped(), first.flipped()) } else { (first, last) };
             loop {
-                if let Some(place) = tour.next() {
-                    *place = leg;
+                if let Some(slot) = tour.next() {
+                    *slot = leg;
                 }
                 if leg == last {
                     break;

@@ -75,7 +75,7 @@ impl<'a> OddPoints<'a> {
 
     /// Returns the distance between two odd points along x in 1/256 steps; 0 for a free end.
     pub fn distance_along_x(&self, a: u16, b: u16) -> u32 {
-        let x = |odd| self.station(odd).map(|station| self.network.place(station).x);
+        let x = |odd| self.station(odd).map(|station| self.network.position(station).x);
         x(a).zip(x(b)).map_or(0, |(a, b)| a.abs_diff(b) << 8)
     }
 
@@ -83,7 +83,7 @@ impl<'a> OddPoints<'a> {
     /// of `odd`; all other stations are farther from it than `reach`. For a free end it holds all
     /// of them.
     pub fn around(&self, odd: u16, reach: u32) -> Range<u16> {
-        let x_of = |station: &u16| self.network.place(*station).x;
+        let x_of = |station: &u16| self.network.position(*station).x;
         let Some(x) = self.stations.get(usize::from(odd)).map(x_of) else {
             return 0..self.real_count();
         };
@@ -96,12 +96,12 @@ impl<'a> OddPoints<'a> {
     /// Returns an upper bound of the length of any move in 1/256 steps: the diagonal of the box
     /// around the stations.
     pub fn extent(&self) -> u32 {
-        let places = || self.stations.iter().map(|&station| self.network.place(station));
+        let positions = || self.stations.iter().map(|&station| self.network.position(station));
         let corner =
             |x: Option<i32>, y: Option<i32>| PagePoint { x: x.unwrap_or(0), y: y.unwrap_or(0) };
         length(
-            corner(places().map(|p| p.x).min(), places().map(|p| p.y).min()),
-            corner(places().map(|p| p.x).max(), places().map(|p| p.y).max()),
+            corner(positions().map(|p| p.x).min(), positions().map(|p| p.y).min()),
+            corner(positions().map(|p| p.x).max(), positions().map(|p| p.y).max()),
         )
     }
 }

@@ -118,7 +118,7 @@ impl<'m> Inner<'m> {
                 let [x, y, z] = vertex.coordinates().map_each(|c| BinaryFraction {
                     units: c.into(),
                     fraction_bits,
-                    places: 6,
+                    decimals: 6,
                 });
                 reply.line(format_args!("[v {number}: {x} {y} {z}]"));
             }

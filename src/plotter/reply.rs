@@ -29,7 +29,7 @@ impl<B: Board + ?Sized> Reply<'_, B> {
         let [x, y] = position.map_each(|mm| BinaryFraction {
             units: mm.to_bits().into(),
             fraction_bits: 16,
-            places: 3,
+            decimals: 3,
         });
         self.part(format_args!("|MPos:{x},{y},0.000"));
     }

@@ -92,12 +92,12 @@ impl Inner<'_> {
         let mm = |length: u64| BinaryFraction {
             units: ((length << 16) / u64::from(steps.unsigned_abs())) as i64,
             fraction_bits: 8,
-            places: 1,
+            decimals: 1,
         };
         let percent = BinaryFraction {
             units: ((pen_down * 25600) / (pen_down + pen_up).max(1)) as i64,
             fraction_bits: 8,
-            places: 1,
+            decimals: 1,
         };
         let (down, up, bound) = (mm(pen_down), mm(pen_up), mm(bound));
         let proof = if optimal { "the least" } else { "not proved the least" };
@@ -147,7 +147,8 @@ impl Inner<'_> {
         }
         let (done, all) = (status.done, status.job);
         reply.part(format_args!("|Strokes:{}/{}", done.strokes, all.strokes));
-        let mm = |units: u64| BinaryFraction { units: units as i64, fraction_bits: 18, places: 0 };
+        let mm =
+            |units: u64| BinaryFraction { units: units as i64, fraction_bits: 18, decimals: 0 };
         let (drawn, left) = (mm(done.drawn), status.seconds_left);
         reply.line(format_args!("|Ink:{drawn}/{}|Left:{left}>", mm(all.drawn)));
     }

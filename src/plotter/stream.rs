@@ -194,7 +194,7 @@ impl Inner<'_> {
                 for (info, value) in self.machine.settings().iter() {
                     let (number, name, unit) = (info.number, info.name, info.unit);
                     let units = value.to_bits().into();
-                    let value = BinaryFraction { units, fraction_bits: 16, places: 3 };
+                    let value = BinaryFraction { units, fraction_bits: 16, decimals: 3 };
                     line(format_args!("${number}={value} ({name}, {unit})"));
                 }
             }

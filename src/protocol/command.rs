@@ -103,7 +103,7 @@ pub const HELP: [&[(&str, &str)]; 2] = [
         ),
         ("$delete=v|l|f|c,FIRST,LAST", "take some out; the numbers above fall"),
         ("$plug=v|l|f|c,NUMBER", "take one out; the last takes its number"),
-        ("$move=NUMBER,X,Y,Z", "move a vertex to a place"),
+        ("$move=NUMBER,X,Y,Z", "move a vertex to a position"),
         ("$translate=X,Y,Z,FIRST,LAST", "shift vertices; without numbers all, here and below"),
         ("$scale=X,Y,Z,FIRST,LAST", "multiply coordinates"),
         ("$rotate=x|y|z,DEGREES,FIRST,LAST", "turn about an axis"),

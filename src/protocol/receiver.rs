@@ -186,10 +186,10 @@ mod tests {
         lines(&mut reader, &mut consumer)
     }
 
-    /// The text, with the bits added to its byte at `place`.
-    fn damaged(text: &str, place: usize, bits: u32) -> Vec<u32> {
+    /// The text, with the bits added to its byte at `index`.
+    fn damaged(text: &str, index: usize, bits: u32) -> Vec<u32> {
         let mut data: Vec<u32> = text.bytes().map(u32::from).collect();
-        data[place] |= bits;
+        data[index] |= bits;
         data
     }
 
@@ -203,9 +203,9 @@ mod tests {
     fn every_error_of_the_uart_voids_its_line_and_no_other() {
         let text = "v 1 2 3\nv 4 5 6\nv 7 8 9\n";
         for bits in [FRAMING, PARITY, BREAK | FRAMING, OVERRUN] {
-            for place in 8..15 {
-                let found = lines_of(damaged(text, place, bits));
-                assert_eq!(found, [ok("v 1 2 3"), LOST, ok("v 7 8 9")], "{bits:#x} at {place}");
+            for index in 8..15 {
+                let found = lines_of(damaged(text, index, bits));
+                assert_eq!(found, [ok("v 1 2 3"), LOST, ok("v 7 8 9")], "{bits:#x} at {index}");
             }
         }
     }

@@ -136,7 +136,7 @@ mod tests {
                 for piece in 0..pieces {
                     let end = pattern.end_of(piece);
                     assert!(end > start, "{moves} of {dot}");
-                    // The nearest move to the place where equal pieces would end.
+                    // The nearest move to the position where equal pieces would end.
                     let error = (end * pieces).abs_diff((piece + 1) * moves);
                     assert!(2 * error < pieces, "{moves} of {dot}");
                     start = end;

@@ -249,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_after_the_stop_counts_and_damage_is_told() {
+    fn nothing_after_the_stop_counts_and_damage_is_reported() {
         let after_stop = Decoder::new([0x1B, 0x22].into_iter());
         assert_eq!(after_stop.collect::<Vec<_>>(), [Instruction::Move(Direction::Up)]);
         let mut damaged = Decoder::new([0x00, 0x3D, 0x11].into_iter());

@@ -193,10 +193,13 @@ impl Camera {
     /// See [`ViewError`].
     pub fn sight_lines(&self, fraction_bits: u32) -> Result<SightLines, ViewError> {
         let Axes { directions: [right, up, forward], origin } = Axes::new(self)?;
-        let place = origin.map(|coordinate| libm::ldexp(coordinate, fraction_bits as i32));
+        let position = origin.map(|coordinate| libm::ldexp(coordinate, fraction_bits as i32));
         let limit = libm::ldexp(1.0, 60);
-        if self.lens.projection() == Projection::Perspective && largest_component(place) <= limit {
-            return Ok(SightLines::Through(place.map(|coordinate| libm::round(coordinate) as i64)));
+        if self.lens.projection() == Projection::Perspective && largest_component(position) <= limit
+        {
+            return Ok(SightLines::Through(
+                position.map(|coordinate| libm::round(coordinate) as i64),
+            ));
         }
         // The direction that shows as a point on the page. An eye too far away for the range of
         // numbers is treated as looking straight on.

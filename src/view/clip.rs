@@ -232,7 +232,7 @@ mod tests {
         Vertex { x, y, z }
     }
 
-    /// The elements after cutting at z = 10, as lists of places.
+    /// The elements after cutting at z = 10, as lists of positions.
     fn after(vertices: &[Vertex], elements: &[(&[u16], bool)]) -> Vec<Vec<(i32, i32, i32)>> {
         let corners: Vec<Corner> = elements
             .iter()
@@ -246,12 +246,14 @@ mod tests {
         let mut words = [0u64; 100];
         let (vertices, elements) =
             cut(vertices, Elements::new(&corners), 10, &mut Scratch::new(&mut words)).unwrap();
-        let place = |number: u16| vertices[usize::from(number)];
+        let position = |number: u16| vertices[usize::from(number)];
         let found = elements.iter().map(|element| match element {
-            Element::Bar(a, b) => std::vec![place(a), place(b)],
-            Element::Face(corners) => corners.iter().map(|corner| place(corner.vertex())).collect(),
+            Element::Bar(a, b) => std::vec![position(a), position(b)],
+            Element::Face(corners) => {
+                corners.iter().map(|corner| position(corner.vertex())).collect()
+            }
         });
-        found.map(|places| places.iter().map(|v| (v.x, v.y, v.z)).collect()).collect()
+        found.map(|positions| positions.iter().map(|v| (v.x, v.y, v.z)).collect()).collect()
     }
 
     #[test]

@@ -21,13 +21,13 @@ pub(super) fn weld<'a>(
     let elements = model.elements();
     let degenerate = elements.iter().filter(|element| !has_extent(element, positions)).count();
     cancel.check()?;
-    if degenerate == 0 && Places::new(positions, &mut scratch.reborrow())?.1 == 0 {
+    if degenerate == 0 && PositionTable::new(positions, &mut scratch.reborrow())?.1 == 0 {
         return Ok((elements, 0));
     }
     let corners: &mut [Corner] = scratch.take(elements.corners().len())?;
     let mut pens = PenWriter::new(scratch, elements.pens().changes())?;
     cancel.check()?;
-    let (places, _) = Places::new(positions, &mut scratch.reborrow())?;
+    let (table, _) = PositionTable::new(positions, &mut scratch.reborrow())?;
     cancel.check()?;
     let mut kept = 0;
     let with_extent =
@@ -43,7 +43,7 @@ pub(super) fn weld<'a>(
             }
         };
         for (new, old) in corners.iter_mut().skip(kept).zip(old) {
-            let first = places.first_at(old.vertex()).unwrap_or(old.vertex());
+            let first = table.first_at(old.vertex()).unwrap_or(old.vertex());
             *new = Corner::new(first, old.of_bar(), old.is_last());
         }
         kept += old.len();
@@ -72,30 +72,30 @@ fn has_extent(element: &Element<'_>, positions: &[Position]) -> bool {
 }
 
 /// A hash table of the positions that have a vertex, with open addressing.
-struct Places<'a> {
+struct PositionTable<'a> {
     positions: &'a [Position],
     /// Vertex numbers counted from 1; 0 marks a free slot. The length is a power of two and at
     /// least twice the number of vertices.
     slots: &'a mut [u16],
 }
 
-impl<'a> Places<'a> {
+impl<'a> PositionTable<'a> {
     /// Builds the table, and counts the vertices that are at the position of an earlier one.
     fn new(
         positions: &'a [Position],
         scratch: &mut Scratch<'a>,
     ) -> Result<(Self, usize), OutOfScratch> {
         let slots = scratch.take((2 * positions.len()).next_power_of_two())?;
-        let places = Self { positions, slots };
+        let table = Self { positions, slots };
         let mut repeated = 0;
         for (number, position) in (1..).zip(positions) {
-            let slot = places.slot(position);
-            match places.slots.get_mut(slot) {
+            let slot = table.slot(position);
+            match table.slots.get_mut(slot) {
                 Some(free @ 0) => *free = number,
                 _ => repeated += 1,
             }
         }
-        Ok((places, repeated))
+        Ok((table, repeated))
     }
 
     /// Returns the least number of a vertex at the position of vertex `number`.
@@ -138,16 +138,16 @@ mod tests {
     use crate::stage::NeverCancel;
     use std::vec::Vec;
 
-    fn decimals(place: [&str; 3]) -> [Decimal; 3] {
-        place.map(|text| Decimal::parse(text).unwrap())
+    fn decimals(position: [&str; 3]) -> [Decimal; 3] {
+        position.map(|text| Decimal::parse(text).unwrap())
     }
 
-    fn welded(places: &[[&str; 3]], faces: &[&[i32]]) -> Vec<(u16, bool, bool)> {
+    fn welded(positions: &[[&str; 3]], faces: &[&[i32]]) -> Vec<(u16, bool, bool)> {
         let mut vertices = heapless::Vec::<Position, 16>::new();
         let mut corners = [Corner::new(0, false, false); 64];
         let mut model = Model::new(&mut vertices, &mut corners);
-        for place in places {
-            model.add_vertex(decimals(*place), &mut no_undo).unwrap();
+        for position in positions {
+            model.add_vertex(decimals(*position), &mut no_undo).unwrap();
         }
         for face in faces {
             match face.len() {
@@ -162,7 +162,7 @@ mod tests {
 
     #[test]
     fn a_square_of_two_loose_triangles_shares_its_diagonal() {
-        let places = [
+        let positions = [
             ["0", "0", "0"],
             ["1", "0", "0"],
             ["1", "1", "0"],
@@ -170,7 +170,7 @@ mod tests {
             ["1.0", "1e0", "0"],
             ["0", "1", "0"],
         ];
-        let corners = welded(&places, &[&[1, 2, 3], &[4, 5, 6], &[5, 6]]);
+        let corners = welded(&positions, &[&[1, 2, 3], &[4, 5, 6], &[5, 6]]);
         let expected = [
             (0, false, false),
             (1, false, false),
@@ -209,14 +209,14 @@ mod tests {
 
     #[test]
     fn a_full_model_all_at_one_place_has_no_face_left() {
-        let places = [["7", "7", "7"]; 16];
-        assert!(welded(&places, &[&[1, 2, 16]]).is_empty());
-        assert_eq!(welded(&places, &[&[1, 16]]), [(0, true, false), (0, true, true)]);
+        let positions = [["7", "7", "7"]; 16];
+        assert!(welded(&positions, &[&[1, 2, 16]]).is_empty());
+        assert_eq!(welded(&positions, &[&[1, 16]]), [(0, true, false), (0, true, true)]);
     }
 
     #[test]
     fn a_face_in_line_is_left_out_and_its_neighbours_stay() {
-        let places = [
+        let positions = [
             ["0", "0", "0"],
             ["1", "2", "3"],
             ["2", "4", "6"],
@@ -224,7 +224,7 @@ mod tests {
             ["-9", "-18", "-27"],
         ];
         let faces: [&[i32]; 4] = [&[1, 2, 3], &[1, 3, 4], &[5, 1, 2, 3], &[2, 4]];
-        let corners = welded(&places, &faces);
+        let corners = welded(&positions, &faces);
         let numbers: Vec<u16> = corners.iter().map(|corner| corner.0).collect();
         assert_eq!(numbers, [0, 2, 3, 1, 3]);
     }

@@ -75,14 +75,14 @@ impl CoarseLine {
         Self { x, y, along_x, along_y, error_bound: along_x.abs() + along_y.abs() + 2 }
     }
 
-    /// Returns the sign of [`page_side`] for a vertex at the coarse point `place`, or zero if the
-    /// coarse grid cannot decide it.
+    /// Returns the sign of [`page_side`] for a vertex at the coarse point `position`, or zero if
+    /// the coarse grid cannot decide it.
     ///
     /// Each true difference of coordinates is within one unit of the difference on the coarse grid.
     /// So the determinant changes by less than the sum of the absolute differences plus two.
     #[inline]
-    pub fn side(&self, place: CoarsePoint) -> i32 {
-        let (to_x, to_y) = (i32::from(place.x) - self.x, i32::from(place.y) - self.y);
+    pub fn side(&self, position: CoarsePoint) -> i32 {
+        let (to_x, to_y) = (i32::from(position.x) - self.x, i32::from(position.y) - self.y);
         let side = self.along_x * to_y - self.along_y * to_x;
         let error_bound = self.error_bound + to_x.abs() + to_y.abs();
         i32::from(side >= error_bound) - i32::from(side <= -error_bound)
@@ -108,7 +108,7 @@ impl VertexLine<'_> {
     /// Returns the sign of [`page_side`] for an end of an edge.
     #[inline]
     pub fn side(&self, end: End) -> i32 {
-        let coarse = self.coarse.side(end.place);
+        let coarse = self.coarse.side(end.position);
         if coarse != 0 { coarse } else { self.exact_side(end) }
     }
 
@@ -154,7 +154,7 @@ impl Mapping {
         Ok(Self { projection, low, shift: (shift_for(low.0, high.0), shift_for(low.1, high.1)) })
     }
 
-    fn place(&self, vertex: Vertex) -> CoarsePoint {
+    fn position(&self, vertex: Vertex) -> CoarsePoint {
         let (x, y) = fine(self.projection, vertex);
         let coarse = |fine: i64, low: i64, shift: u32| {
             ((fine - low) >> shift).clamp(0, (1 << COARSE_BITS) - 1) as u16
@@ -186,7 +186,7 @@ pub struct End {
     /// The position in view coordinates.
     pub vertex: Vertex,
     /// The position on the coarse grid.
-    pub place: CoarsePoint,
+    pub position: CoarsePoint,
 }
 
 impl End {
@@ -202,7 +202,7 @@ pub struct CoarseProjection<'a> {
     /// The view coordinates of each vertex.
     pub vertices: &'a [Vertex],
     /// The position of each vertex on the coarse grid.
-    pub places: &'a [CoarsePoint],
+    pub positions: &'a [CoarsePoint],
     /// The positions in the model, as far as they are known.
     pub unrounded: Unrounded<'a>,
     mapping: Mapping,
@@ -216,23 +216,23 @@ impl<'a> CoarseProjection<'a> {
         yield_counter: &mut YieldCounter<'_>,
     ) -> Result<Self, VisibilityError> {
         let Scene { projection, vertices, .. } = *scene;
-        let places: &mut [CoarsePoint] = scratch.take(vertices.len())?;
+        let positions: &mut [CoarsePoint] = scratch.take(vertices.len())?;
         let mapping = Mapping::new(projection, vertices, yield_counter)?;
-        for (place, &vertex) in places.iter_mut().zip(vertices) {
-            *place = mapping.place(vertex);
+        for (slot, &vertex) in positions.iter_mut().zip(vertices) {
+            *slot = mapping.position(vertex);
             yield_counter.spend(TWO_DIVISIONS)?;
         }
-        Ok(Self { projection, vertices, places, unrounded: scene.unrounded, mapping })
+        Ok(Self { projection, vertices, positions, unrounded: scene.unrounded, mapping })
     }
 
     /// Returns a vertex as the end of an edge.
     pub fn end(&self, number: u16) -> End {
-        End { number, vertex: self.vertex(number), place: self.place(number) }
+        End { number, vertex: self.vertex(number), position: self.position(number) }
     }
 
     /// Returns any point within the extent of the vertices as the end of an edge.
     pub fn free_end(&self, vertex: Vertex) -> End {
-        End { number: End::FREE, vertex, place: self.mapping.place(vertex) }
+        End { number: End::FREE, vertex, position: self.mapping.position(vertex) }
     }
 
     /// Returns the view coordinates of a vertex.
@@ -243,8 +243,8 @@ impl<'a> CoarseProjection<'a> {
 
     /// Returns the position of a vertex on the coarse grid.
     #[inline]
-    pub fn place(&self, number: u16) -> CoarsePoint {
-        self.places[usize::from(number)]
+    pub fn position(&self, number: u16) -> CoarsePoint {
+        self.positions[usize::from(number)]
     }
 
     /// Returns the line through two vertices.
@@ -254,7 +254,7 @@ impl<'a> CoarseProjection<'a> {
             coarse_projection: self,
             a,
             b,
-            coarse: CoarseLine::new(self.place(a), self.place(b)),
+            coarse: CoarseLine::new(self.position(a), self.position(b)),
         }
     }
 
@@ -302,7 +302,7 @@ impl<'a> CoarseProjection<'a> {
 
     /// Returns an axis of the page along which p and q differ, and the sign of their difference.
     ///
-    /// Returns `None` if the eye sees both points at the same place.
+    /// Returns `None` if the eye sees both points at the same position.
     pub fn direction(&self, p: Vertex, q: Vertex) -> Option<(Axis, i64)> {
         [Axis::X, Axis::Y].into_iter().find_map(|axis| {
             let sign = page_offset(self.projection, axis, p, q).signum();
@@ -335,7 +335,7 @@ mod tests {
             let yield_counter = &mut YieldCounter::new(&mut never_cancel);
             let coarse_projection =
                 CoarseProjection::new(&scene(projection, &vertices), &mut scratch, yield_counter)?;
-            let xs: [u16; 3] = [0, 1, 2].map(|n| coarse_projection.place(n).x);
+            let xs: [u16; 3] = [0, 1, 2].map(|n| coarse_projection.position(n).x);
             assert!(xs[0] == 0 && xs[0] < xs[1] && xs[1] <= xs[2], "{xs:?}");
             assert!(xs[2] >= 1 << (COARSE_BITS - 1) && xs[2] < 1 << COARSE_BITS);
         }
@@ -359,9 +359,9 @@ mod tests {
             .flat_map(|a| (0..64u16).flat_map(move |b| (0..64u16).map(move |c| (a, b, c))))
         {
             let coarse = coarse_side(
-                coarse_projection.place(a),
-                coarse_projection.place(b),
-                coarse_projection.place(c),
+                coarse_projection.position(a),
+                coarse_projection.position(b),
+                coarse_projection.position(c),
             );
             let exact =
                 coarse_projection.side_value(a, b, coarse_projection.end(c)).signum() as i32;

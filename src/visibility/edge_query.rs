@@ -140,16 +140,16 @@ impl EdgeQuery {
             near: p.vertex.z.min(q.vertex.z),
             far: p.vertex.z.max(q.vertex.z),
             seam: None,
-            low: p.place.low(q.place),
-            high: p.place.high(q.place),
-            line: CoarseLine::new(p.place, q.place),
+            low: p.position.low(q.position),
+            high: p.position.high(q.position),
+            line: CoarseLine::new(p.position, q.position),
         }
     }
 
     /// Returns the side of this edge's line on which a vertex lies on the page: positive for left,
     /// negative for right, zero on the line.
     pub fn side_of(&self, coarse_projection: &CoarseProjection<'_>, number: u16) -> i32 {
-        let coarse = self.line.side(coarse_projection.place(number));
+        let coarse = self.line.side(coarse_projection.position(number));
         if coarse != 0 { coarse } else { self.exact_side_of(coarse_projection, number) }
     }
 
@@ -175,11 +175,11 @@ impl EdgeQuery {
         let (mut low, mut high) = (CoarsePoint::HIGHEST, CoarsePoint::LOWEST);
         for (n, corner) in corners.iter().enumerate() {
             let number = corner.vertex();
-            let place = coarse_projection.place(number);
-            (low, high) = (low.low(place), high.high(place));
+            let position = coarse_projection.position(number);
+            (low, high) = (low.low(position), high.high(position));
             let mut side = 0;
             if number != self.p.number && number != self.q.number {
-                side = self.line.side(place);
+                side = self.line.side(position);
                 left &= side > 0;
                 right &= side < 0;
             }
@@ -368,8 +368,8 @@ impl EdgeQuery {
 
     /// Returns the part of the edge that lies within a polygon on the page.
     pub fn part(&self, coarse_projection: &CoarseProjection<'_>, passage: Passage) -> EdgeInterval {
-        let place = |(a, b): Side| coarse_projection.crossing(a, b, self.p, self.q);
-        EdgeInterval { from: passage.entry.map(place), to: passage.exit.map(place) }
+        let position = |(a, b): Side| coarse_projection.crossing(a, b, self.p, self.q);
+        EdgeInterval { from: passage.entry.map(position), to: passage.exit.map(position) }
     }
 
     /// Marks the parts of this edge that are replaced by sides of an element that lie on the same
@@ -411,7 +411,7 @@ impl EdgeQuery {
         if page_offset(projection, axis, va, vb) == 0 {
             return;
         }
-        let place = |vertex| {
+        let position = |vertex| {
             let beyond_p = page_offset(projection, axis, vp, vertex) * ahead;
             let before_q = page_offset(projection, axis, vertex, vq) * ahead;
             if beyond_p <= 0 {
@@ -433,7 +433,7 @@ impl EdgeQuery {
             behind_between(heights.0, heights.1)
         };
         if let Some(behind) = behind {
-            let (at_a, at_b) = (place(va), place(vb));
+            let (at_a, at_b) = (position(va), position(vb));
             let beside = EdgeInterval { from: Some(at_a.min(at_b)), to: Some(at_a.max(at_b)) };
             profile.mark(beside.and(behind), mark::ENCLOSED);
         }

@@ -131,15 +131,15 @@ impl<'a> Profile<'a> {
         self.join(first);
     }
 
-    /// Splits the piece that contains `place` in two, so that a piece begins there, if `place` lies
-    /// within the window. Returns the index of the first piece that begins at `place` or later; the
-    /// number of pieces if there is none.
-    fn split(&mut self, place: EdgeParameter) -> usize {
-        if place >= self.end {
+    /// Splits the piece that contains `position` in two, so that a piece begins there, if
+    /// `position` lies within the window. Returns the index of the first piece that begins at
+    /// `position` or later; the number of pieces if there is none.
+    fn split(&mut self, position: EdgeParameter) -> usize {
+        if position >= self.end {
             return self.count;
         }
-        let after = self.memory[..self.count].partition_point(|piece| piece.from < place);
-        if after == 0 || after < self.count && self.memory[after].from == place {
+        let after = self.memory[..self.count].partition_point(|piece| piece.from < position);
+        if after == 0 || after < self.count && self.memory[after].from == position {
             return after;
         }
         if self.count == self.memory.len() {
@@ -151,7 +151,7 @@ impl<'a> Profile<'a> {
         }
         let marks = self.memory[after - 1].marks;
         self.memory.copy_within(after..self.count, after + 1);
-        self.memory[after] = ProfilePiece { from: place, marks };
+        self.memory[after] = ProfilePiece { from: position, marks };
         self.count += 1;
         after
     }

@@ -27,9 +27,9 @@ impl Shape {
     /// Returns the finest division: one cell for each point of the coarse grid.
     pub fn finest(coarse_projection: &CoarseProjection<'_>) -> Self {
         let far = coarse_projection
-            .places
+            .positions
             .iter()
-            .fold(CoarsePoint::LOWEST, |far, &place| far.high(place));
+            .fold(CoarsePoint::LOWEST, |far, &position| far.high(position));
         Self { shift_x: 0, shift_y: 0, far }
     }
 
@@ -95,8 +95,8 @@ impl Bounds {
     pub fn of(coarse_projection: &CoarseProjection<'_>, corners: &[Corner]) -> Self {
         let none = Self { low: CoarsePoint::HIGHEST, high: CoarsePoint::LOWEST };
         corners.iter().fold(none, |bounds, corner| {
-            let place = coarse_projection.place(corner.vertex());
-            Self { low: bounds.low.low(place), high: bounds.high.high(place) }
+            let position = coarse_projection.position(corner.vertex());
+            Self { low: bounds.low.low(position), high: bounds.high.high(position) }
         })
     }
 }
@@ -251,23 +251,23 @@ impl<'c> Raster<'c> {
         if !(3..=MOST_SIDES).contains(&count) {
             return 0;
         }
-        let place = |n: usize| {
+        let position = |n: usize| {
             let n = if n < count { n } else { n - count };
-            coarse_projection.place(corners[n].vertex())
+            coarse_projection.position(corners[n].vertex())
         };
         let (width, height) = (1 << self.shape.shift_x, 1 << self.shape.shift_y);
         // No corner of a cell under test lies farther than this from a corner of the face.
         let reach = i32::from(bounds.high.x - bounds.low.x)
             + i32::from(bounds.high.y - bounds.low.y)
             + 2 * (width + height);
-        let turn = coarse_side(place(0), place(1), place(2));
+        let turn = coarse_side(position(0), position(1), position(2));
         // Every other corner must lie on the inner side. For three or four corners it is enough to
         // check the next one.
         let others = if count <= 4 { 1 } else { count - 2 };
-        let (mut a, mut b) = (place(count - 1), place(0));
+        let (mut a, mut b) = (position(count - 1), position(0));
         for (n, side) in sides.iter_mut().enumerate().take(count) {
             let line = CoarseLine::new(a, b);
-            if turn == 0 || (1..=others).any(|ahead| line.side(place(n + ahead)) != turn) {
+            if turn == 0 || (1..=others).any(|ahead| line.side(position(n + ahead)) != turn) {
                 return 0;
             }
             let dx = (i32::from(b.x) - i32::from(a.x)) * turn;
@@ -281,7 +281,7 @@ impl<'c> Raster<'c> {
                 outside: -error_bound - right.max(0) - up.max(0),
                 within: error_bound - right.min(0) - up.min(0),
             };
-            (a, b) = (b, place(n + 1));
+            (a, b) = (b, position(n + 1));
         }
         count
     }

@@ -259,7 +259,7 @@ impl<'a> StretchFinder<'a> {
         let Self { around, grid, seen, profile, options, .. } = self;
         let faces_by_rank = &around.faces;
         let near = coarse_depth(edge_query.near);
-        let cells_along = grid.cells_along(edge_query.p.place, edge_query.q.place, near);
+        let cells_along = grid.cells_along(edge_query.p.position, edge_query.q.position, near);
         let (mut any_covered, mut all_covered) = (false, true);
         cells_along.visit(&mut |cell| {
             any_covered |= cell.cover.is_some();

@@ -93,8 +93,8 @@ impl<'a> Ears<'a> {
             outlines.elements().filter(|(_, corners)| cut_of(corners, vertices) == Cut::Ears);
         for (entry, (first, corners)) in entries.iter_mut().zip(concave) {
             *entry = Entry { first_corner: first as u16, first_ear: used as u16 };
-            for (place, corner) in remaining.iter_mut().zip(corners) {
-                *place = corner.vertex();
+            for (slot, corner) in remaining.iter_mut().zip(corners) {
+                *slot = corner.vertex();
             }
             used += cut_ears(
                 &mut remaining[..corners.len()],

@@ -103,10 +103,11 @@ pub fn by_hand(flashing: Flashing, image: &Path) -> String {
 /// The drive of this name, in the directories where operating systems mount drives.
 fn drive(name: &str) -> Option<PathBuf> {
     let user = std::env::var("USER").unwrap_or_default();
-    let places = [format!("/media/{user}"), format!("/run/media/{user}"), "/Volumes".to_owned()];
-    places
+    let directories =
+        [format!("/media/{user}"), format!("/run/media/{user}"), "/Volumes".to_owned()];
+    directories
         .iter()
-        .filter_map(|place| fs::read_dir(place).ok())
+        .filter_map(|directory| fs::read_dir(directory).ok())
         .flatten()
         .flatten()
         .map(|entry| entry.path())

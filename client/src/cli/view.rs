@@ -150,7 +150,7 @@ fn argument(option: &'static PlotOption, flag: Flag) -> Arg {
     }
     let default = option.default();
     let argument = argument.hide_default_value(default.is_empty());
-    // A place is chosen by the plotter until it is set, and cannot be set to that choice.
+    // A position is chosen by the plotter until it is set, and cannot be set to that choice.
     let argument = match PlotOptions::default().set(option.name, &default) {
         Ok(_) => argument.default_value(lasting(default)),
         Err(_) => argument,

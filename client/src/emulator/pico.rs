@@ -130,13 +130,13 @@ impl Pico {
         self.send(PIN, number | u8::from(high) << 7, start + cycles)
     }
 
-    /// Attaches a limit switch to pin 8 (x) or 9 (y). It is closed while the axis is at `place` or
-    /// below, in steps from its position when the emulator started. It bounces for 5 ms.
+    /// Attaches a limit switch to pin 8 (x) or 9 (y). It is closed while the axis is at `position`
+    /// or below, in steps from its position when the emulator started. It bounces for 5 ms.
     ///
     /// # Errors
     /// The emulator has ended.
-    pub fn fit_switch(&mut self, number: u8, place: i32) -> io::Result<()> {
-        self.send(SWITCH, number, (SWITCH_ZERO + i64::from(place)) as u64)
+    pub fn fit_switch(&mut self, number: u8, position: i32) -> io::Result<()> {
+        self.send(SWITCH, number, (SWITCH_ZERO + i64::from(position)) as u64)
     }
 
     /// Cuts the power and restores it. The contents of the flash are preserved.
@@ -207,12 +207,12 @@ impl Pico {
     }
 
     /// Makes bits of a byte of flash defective. From its next change on, the bits in `mask` of the
-    /// byte at offset `place` stay high or low.
+    /// byte at offset `offset` stay high or low.
     ///
     /// # Errors
     /// The emulator has ended.
-    pub fn wear_flash(&mut self, place: u32, mask: u8, high: bool) -> io::Result<()> {
-        self.send(if high { STAYS_HIGH } else { STAYS_LOW }, mask, u64::from(place))
+    pub fn wear_flash(&mut self, offset: u32, mask: u8, high: bool) -> io::Result<()> {
+        self.send(if high { STAYS_HIGH } else { STAYS_LOW }, mask, u64::from(offset))
     }
 
     /// Makes the firmware's main loop continue at another address, with its stack as it is or
@@ -253,13 +253,13 @@ impl Pico {
     }
 
     /// Stalls the firmware's main loop for `hundredths` of a second, while interrupts continue,
-    /// when x reaches `place`, in steps from its position when the emulator started. Several
+    /// when x reaches `position`, in steps from its position when the emulator started. Several
     /// positions are used in the order in which they are given.
     ///
     /// # Errors
     /// The emulator has ended.
-    pub fn stall_at(&mut self, place: u32, hundredths: u8) -> io::Result<()> {
-        self.send(STALL, hundredths, u64::from(place))
+    pub fn stall_at(&mut self, position: u32, hundredths: u8) -> io::Result<()> {
+        self.send(STALL, hundredths, u64::from(position))
     }
 
     /// Pre-empts the clock's interrupt handler for this time just before it sets its next alarm.

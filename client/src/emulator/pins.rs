@@ -105,7 +105,7 @@ pub enum MachineEventKind {
         down: bool,
     },
     /// A step of the motor that lifts the pen.
-    Lift {
+    ZStep {
         /// Whether the step moves the pen towards the paper.
         down: bool,
     },
@@ -163,7 +163,7 @@ impl Machine {
                 return None;
             }
             Pin::StepX | Pin::StepY | Pin::StepZ if !high => return None,
-            Pin::StepZ => MachineEventKind::Lift { down: self.down_z },
+            Pin::StepZ => MachineEventKind::ZStep { down: self.down_z },
             Pin::StepX => self.step(direction(self.up_x), 0),
             Pin::StepY => self.step(0, direction(self.up_y)),
             Pin::Enable => MachineEventKind::Drivers { on: !high },

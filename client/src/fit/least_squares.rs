@@ -1,7 +1,7 @@
 //! Least-squares fitting of a B-spline with given knots, of which some control points are fixed, to
 //! points with given parameters.
 
-use super::Place;
+use super::PlanPoint;
 use std::ops::Range;
 
 /// The highest order.
@@ -59,16 +59,16 @@ impl Basis {
     }
 
     /// The point on the curve.
-    pub fn place(&self, control: &[Place]) -> Place {
+    pub fn position(&self, control: &[PlanPoint]) -> PlanPoint {
         self.sum(&self.weights, control)
     }
 
     /// The derivative of that point with respect to the parameter.
-    pub fn slope(&self, control: &[Place]) -> Place {
+    pub fn slope(&self, control: &[PlanPoint]) -> PlanPoint {
         self.sum(&self.slopes, control)
     }
 
-    fn sum(&self, weights: &[f64; MOST], control: &[Place]) -> Place {
+    fn sum(&self, weights: &[f64; MOST], control: &[PlanPoint]) -> PlanPoint {
         let mut sum = [0.0; 2];
         for (weight, point) in weights.iter().zip(&control[self.first..self.first + self.order]) {
             sum[0] += weight * point[0];
@@ -79,18 +79,18 @@ impl Basis {
 }
 
 /// Moves the control points with the indices `free` to minimise the sum of the squared distances
-/// between the spline and `places`; the others stay. Each place comes with its basis.
+/// between the spline and `positions`; the others stay. Each position comes with its basis.
 pub fn least_squares<'a>(
-    places: impl Iterator<Item = (&'a Place, &'a Basis)>,
-    control: &mut [Place],
+    positions: impl Iterator<Item = (&'a PlanPoint, &'a Basis)>,
+    control: &mut [PlanPoint],
     free: Range<usize>,
 ) {
     // The normal equations for the free control points. Each row contains the entries of the band
     // to the left of the diagonal, and the diagonal.
     let mut rows = vec![[0.0; MOST]; free.len()];
     let mut sides = vec![[0.0; 2]; free.len()];
-    for (place, basis) in places {
-        let mut rest = *place;
+    for (position, basis) in positions {
+        let mut rest = *position;
         for (number, weight) in basis.weights.iter().enumerate().take(basis.order) {
             let point = basis.first + number;
             if !free.contains(&point) {
@@ -118,7 +118,7 @@ pub fn least_squares<'a>(
 }
 
 /// Solves a symmetric band system by Cholesky factorisation; `sides` becomes the solution.
-fn solve(rows: &mut [[f64; MOST]], sides: &mut [Place]) {
+fn solve(rows: &mut [[f64; MOST]], sides: &mut [PlanPoint]) {
     const DIAGONAL: usize = MOST - 1;
     for i in 0..rows.len() {
         // This keeps a control point on which no place depends near zero instead of undefined.
@@ -147,11 +147,11 @@ fn solve(rows: &mut [[f64; MOST]], sides: &mut [Place]) {
 
 /// Computes unknown number `i` of a triangular system from the unknowns that are already `known`.
 fn rest(
-    sides: &[Place],
+    sides: &[PlanPoint],
     i: usize,
     diagonal: f64,
     known: impl Iterator<Item = (usize, f64)>,
-) -> Place {
+) -> PlanPoint {
     let [x, y] = known
         .fold(sides[i], |[x, y], (k, factor)| [x - factor * sides[k][0], y - factor * sides[k][1]]);
     [x / diagonal, y / diagonal]

@@ -1,6 +1,6 @@
 //! Finds the polylines of a plan and writes the fitted curves as OBJ.
 
-use super::{FittedCurve, Place, fit_each};
+use super::{FittedCurve, PlanPoint, fit_each};
 use crate::lines::Lines;
 use penup::protocol::Command;
 use std::fmt::{self, Write};
@@ -142,7 +142,7 @@ pub fn write_obj(
     height: f64,
     tolerance: f64,
 ) -> String {
-    let places = (2.0 - tolerance.log10()).ceil().clamp(0.0, 9.0) as usize;
+    let decimals = (2.0 - tolerance.log10()).ceil().clamp(0.0, 9.0) as usize;
     let mut obj = String::from("cstype bspline\n");
     let mut vertices = 0;
     let mut order = 0;
@@ -154,9 +154,9 @@ pub fn write_obj(
             let _ = writeln!(obj, "{line}");
             pen = its_pen;
         }
-        for place in &curve.control {
-            let [x, y] = place.map(|c| shortest(c, places));
-            let _ = writeln!(obj, "v {x} {y} {}", shortest(height, places));
+        for position in &curve.control {
+            let [x, y] = position.map(|c| shortest(c, decimals));
+            let _ = writeln!(obj, "v {x} {y} {}", shortest(height, decimals));
         }
         if curve.order != order {
             order = curve.order;
@@ -184,9 +184,9 @@ pub fn write_obj(
     obj
 }
 
-/// Formats `value` with at most `places` decimals and without trailing zeros.
-fn shortest(value: f64, places: usize) -> String {
-    let text = format!("{value:.places$}");
+/// Formats `value` with at most `decimals` decimals and without trailing zeros.
+fn shortest(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
     let text = match text.contains('.') {
         true => text.trim_end_matches('0').trim_end_matches('.'),
         false => &text,
@@ -196,7 +196,7 @@ fn shortest(value: f64, places: usize) -> String {
 
 /// The polylines of a file, all of which have the same z.
 struct Plan {
-    polylines: Vec<Vec<Place>>,
+    polylines: Vec<Vec<PlanPoint>>,
     /// The line that chooses the pen of each polyline; `None` before the first such line.
     pens: Vec<Option<Rc<str>>>,
     height: f64,
@@ -204,7 +204,7 @@ struct Plan {
 
 impl Plan {
     fn read(lines: &dyn Lines) -> Result<Self, FitError> {
-        let mut vertices: Vec<Place> = Vec::new();
+        let mut vertices: Vec<PlanPoint> = Vec::new();
         let mut height = None;
         let mut chains: Vec<Vec<usize>> = Vec::new();
         let mut pens = Vec::new();

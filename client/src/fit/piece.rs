@@ -1,7 +1,7 @@
 //! Fits a curve to one piece of a polyline, which has no corner inside.
 
 use super::least_squares::{Basis, least_squares};
-use super::{Place, distance, dot, minus};
+use super::{PlanPoint, distance, dot, minus};
 use std::ops::Range;
 
 /// The maximum number of rounds of a fit from scratch and of one from an almost equal curve. After
@@ -15,7 +15,7 @@ const PASSES: usize = 3;
 #[derive(Debug, Clone)]
 pub struct Piece {
     /// The control points.
-    pub control: Vec<Place>,
+    pub control: Vec<PlanPoint>,
     /// The inner knots in increasing order.
     pub inner: Vec<i32>,
     /// The knot at the end of the piece.
@@ -29,7 +29,7 @@ const REACH: usize = 12;
 
 /// Closely spaced samples along the piece, and the parameters that all attempts share.
 struct Samples {
-    places: Vec<Place>,
+    positions: Vec<PlanPoint>,
     /// The initial parameter of each sample, proportional to its distance along the piece.
     at: Vec<f64>,
     order: usize,
@@ -40,7 +40,7 @@ struct Samples {
 /// One attempt: the control points for some inner knots, and the distance of each sample from the
 /// curve.
 struct Try {
-    control: Vec<Place>,
+    control: Vec<PlanPoint>,
     at: Vec<f64>,
     errors: Vec<f64>,
 }
@@ -50,7 +50,7 @@ struct Part {
     /// The knots that affect the part, including those before and after it.
     knots: Vec<f64>,
     /// The control points that affect the part; some of them also affect the curve outside it.
-    control: Vec<Place>,
+    control: Vec<PlanPoint>,
     /// The indices of the control points that affect only this part and may move.
     free: Range<usize>,
     /// The parameters at the two ends of the part.
@@ -60,19 +60,19 @@ struct Part {
 }
 
 impl Piece {
-    /// Fits a curve of `order`, whose first knot is `begin`, to `places`. Returns `None` if no
+    /// Fits a curve of `order`, whose first knot is `begin`, to `positions`. Returns `None` if no
     /// number of knots suffices, or if more than `most` knots are needed before superfluous ones
     /// are removed. From time to time it calls `progress` with the share of the work that is done,
     /// 0 to 1.
     pub fn fit(
-        places: &[Place],
+        positions: &[PlanPoint],
         order: usize,
         begin: i32,
         tolerance: f64,
         most: usize,
         progress: &mut dyn FnMut(f64),
     ) -> Option<Self> {
-        let samples = Samples::new(places, order, begin, tolerance);
+        let samples = Samples::new(positions, order, begin, tolerance);
         let mut inner = Vec::new();
         let mut found = samples.fit(&inner);
         while found.worst() > tolerance {
@@ -111,12 +111,12 @@ impl Try {
 }
 
 impl Samples {
-    fn new(places: &[Place], order: usize, begin: i32, tolerance: f64) -> Self {
-        let length: f64 = places.windows(2).map(|pair| distance(pair[0], pair[1])).sum();
+    fn new(positions: &[PlanPoint], order: usize, begin: i32, tolerance: f64) -> Self {
+        let length: f64 = positions.windows(2).map(|pair| distance(pair[0], pair[1])).sum();
         let spacing = tolerance.max(length / 2000.0);
-        let mut dense = vec![places[0]];
+        let mut dense = vec![positions[0]];
         let mut along = vec![0.0];
-        for pair in places.windows(2) {
+        for pair in positions.windows(2) {
             let side = minus(pair[1], pair[0]);
             let start = along[along.len() - 1];
             let parts = (distance(pair[0], pair[1]) / spacing).ceil().max(1.0) as usize;
@@ -131,7 +131,7 @@ impl Samples {
         let ends = [begin, begin + width];
         let [from, to] = ends.map(f64::from);
         let at = along.into_iter().map(|along| (from + along * scale).min(to)).collect();
-        Self { places: dense, at, order, ends, tolerance }
+        Self { positions: dense, at, order, ends, tolerance }
     }
 
     fn knots(&self, inner: &[i32]) -> Vec<f64> {
@@ -143,14 +143,14 @@ impl Samples {
     fn fit(&self, inner: &[i32]) -> Try {
         let mut control = vec![[0.0; 2]; self.order + inner.len()];
         let last = control.len() - 1;
-        control[0] = self.places[0];
-        control[last] = self.places[self.places.len() - 1];
+        control[0] = self.positions[0];
+        control[last] = self.positions[self.positions.len() - 1];
         let whole = Part {
             knots: self.knots(inner),
             control,
             free: 1..last,
             ends: self.ends.map(f64::from),
-            samples: 0..self.places.len(),
+            samples: 0..self.positions.len(),
         };
         self.fit_part(whole, &self.at, ROUNDS)
     }
@@ -220,17 +220,17 @@ impl Samples {
     /// the parameters of all samples.
     fn fit_part(&self, part: Part, start: &[f64], rounds: usize) -> Try {
         let Part { knots, mut control, free, ends, samples } = part;
-        let places = &self.places[samples.clone()];
+        let positions = &self.positions[samples.clone()];
         let mut at = start[samples].to_vec();
         let is_inside = |t: f64| (ends[0]..=ends[1]).contains(&t);
         let mut worst = f64::INFINITY;
         for round in 1.. {
             let bases: Vec<Basis> = at.iter().map(|t| Basis::at(&knots, self.order, *t)).collect();
-            let inside = places.iter().zip(&bases).zip(&at).filter(|(_, t)| is_inside(**t));
+            let inside = positions.iter().zip(&bases).zip(&at).filter(|(_, t)| is_inside(**t));
             least_squares(inside.map(|(sample, _)| sample), &mut control, free.clone());
-            follow(places, &mut at, &bases, &control, ends);
-            let place = |t: f64| Basis::at(&knots, self.order, t).place(&control);
-            let errors = errors(places, &at, |t| is_inside(t).then(|| place(t)));
+            follow(positions, &mut at, &bases, &control, ends);
+            let position = |t: f64| Basis::at(&knots, self.order, t).position(&control);
+            let errors = errors(positions, &at, |t| is_inside(t).then(|| position(t)));
             let found = Try { control, at, errors };
             let gained = worst - found.worst();
             worst = found.worst();
@@ -272,14 +272,20 @@ impl Samples {
 
 /// Moves each parameter by one step towards the nearest point of the curve, but never past
 /// the one before. The first and the last parameter stay, and so do those outside `ends`.
-fn follow(places: &[Place], at: &mut [f64], bases: &[Basis], control: &[Place], ends: [f64; 2]) {
+fn follow(
+    positions: &[PlanPoint],
+    at: &mut [f64],
+    bases: &[Basis],
+    control: &[PlanPoint],
+    ends: [f64; 2],
+) {
     let between = 1..at.len() - 1;
     let [mut reached, end] = ends;
     for (number, (t, basis)) in at.iter_mut().zip(bases).enumerate() {
         if !between.contains(&number) {
             continue;
         }
-        let away = minus(places[number], basis.place(control));
+        let away = minus(positions[number], basis.position(control));
         let slope = basis.slope(control);
         let step = dot(away, slope) / dot(slope, slope);
         if step.is_finite() {
@@ -292,11 +298,15 @@ fn follow(places: &[Place], at: &mut [f64], bases: &[Basis], control: &[Place], 
 
 /// The error of each sample: its distance from its point on the curve, or the distance from the
 /// curve to the polyline halfway to the sample before, whichever is larger. It is 0 where there is
-/// no `place`.
-fn errors(places: &[Place], at: &[f64], place: impl Fn(f64) -> Option<Place>) -> Vec<f64> {
-    let from = |t, to| place(t).map_or(0.0, |place| distance(place, to));
+/// no `position`.
+fn errors(
+    positions: &[PlanPoint],
+    at: &[f64],
+    position: impl Fn(f64) -> Option<PlanPoint>,
+) -> Vec<f64> {
+    let from = |t, to| position(t).map_or(0.0, |position| distance(position, to));
     let mut errors = vec![0.0];
-    for (samples, at) in places.windows(2).zip(at.windows(2)) {
+    for (samples, at) in positions.windows(2).zip(at.windows(2)) {
         let middle = [0, 1].map(|axis: usize| (samples[0][axis] + samples[1][axis]) / 2.0);
         errors.push(from(at[1], samples[1]).max(from((at[0] + at[1]) / 2.0, middle)));
     }

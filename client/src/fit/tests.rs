@@ -13,18 +13,18 @@ fn fit_text(text: &str, tolerance: f64) -> Result<Fitted, FitError> {
 /// The tolerance of flattening in the tests, 1/256 mm.
 const FLATTENING: u16 = 1;
 
-fn trace(count: usize, place: impl Fn(f64) -> Place) -> Vec<Place> {
-    (0..=count).map(|at| place(at as f64 / count as f64)).collect()
+fn trace(count: usize, position: impl Fn(f64) -> PlanPoint) -> Vec<PlanPoint> {
+    (0..=count).map(|at| position(at as f64 / count as f64)).collect()
 }
 
-fn circle(radius: f64, count: usize) -> Vec<Place> {
+fn circle(radius: f64, count: usize) -> Vec<PlanPoint> {
     trace(count, |t| {
         let (sine, cosine) = (t * std::f64::consts::TAU).sin_cos();
         [100.0 + radius * cosine, 100.0 + radius * sine]
     })
 }
 
-fn obj_of(polylines: &[Vec<Place>]) -> String {
+fn obj_of(polylines: &[Vec<PlanPoint>]) -> String {
     let mut obj = String::new();
     let mut vertices = 0;
     for polyline in polylines {
@@ -40,7 +40,7 @@ fn obj_of(polylines: &[Vec<Place>]) -> String {
 }
 
 /// The chords of every curve of a file, as the plotter would read and flatten it.
-fn flattened(obj: &str) -> Vec<Vec<Place>> {
+fn flattened(obj: &str) -> Vec<Vec<PlanPoint>> {
     let mut vertices = Box::new(heapless::Vec::<Position, 16_000>::new());
     let mut corners = vec![Corner::new(0, false, false); 40_000];
     let mut model = Model::new(&mut *vertices, &mut corners);
@@ -48,7 +48,7 @@ fn flattened(obj: &str) -> Vec<Vec<Place>> {
         assert!(line.len() <= 256, "{line}");
         let done = match Command::parse(line).unwrap() {
             Command::Nothing => Ok(()),
-            Command::Vertex(place) => model.add_vertex(place, &mut no_undo),
+            Command::Vertex(position) => model.add_vertex(position, &mut no_undo),
             Command::Degree(degree) => model.set_degree(degree),
             Command::Curve { ends, control } => model.begin_curve(ends, control.iter()),
             Command::Knots(knots) => model.add_knots(knots.iter()),
@@ -57,17 +57,18 @@ fn flattened(obj: &str) -> Vec<Vec<Place>> {
         };
         done.unwrap();
     }
-    let points: Vec<Point> = model.vertices().iter().map(|place| place.coordinates()).collect();
+    let points: Vec<Point> =
+        model.vertices().iter().map(|position| position.coordinates()).collect();
     let units = f64::from(1 << model.fraction_bits());
     let scale = f64::from(1 << FRACTION_BITS) * units / 256.0;
     let on_page =
-        |place: [i64; 3]| Some([0, 1].map(|axis: usize| (place[axis] as f64 / scale) as i64));
-    let chords = |curve: penup::model::StoredCurve<'_>| -> Vec<Place> {
+        |position: [i64; 3]| Some([0, 1].map(|axis: usize| (position[axis] as f64 / scale) as i64));
+    let chords = |curve: penup::model::StoredCurve<'_>| -> Vec<PlanPoint> {
         let spline = curve.spline(&points).unwrap();
         let ends = spline.chords(on_page, FLATTENING);
         ends.map(|(_, [x, y, _])| [f64::from(x) / units, f64::from(y) / units]).collect()
     };
-    let mut chains: Vec<Vec<Place>> = Vec::new();
+    let mut chains: Vec<Vec<PlanPoint>> = Vec::new();
     for chain in model.curves().iter().map(chords) {
         match chains.last_mut() {
             // A long curve is written as several because the length of a line is limited.
@@ -81,20 +82,21 @@ fn flattened(obj: &str) -> Vec<Vec<Place>> {
 }
 
 /// The largest distance of a point of `from`, its sides included, from `to`.
-fn stray(from: &[Place], to: &[Place]) -> f64 {
-    let to_side = |place: Place, pair: &[Place]| {
-        let (along, away) = (minus(pair[1], pair[0]), minus(place, pair[0]));
+fn stray(from: &[PlanPoint], to: &[PlanPoint]) -> f64 {
+    let to_side = |position: PlanPoint, pair: &[PlanPoint]| {
+        let (along, away) = (minus(pair[1], pair[0]), minus(position, pair[0]));
         let square = dot(along, along);
         let share = if square > 0.0 { (dot(away, along) / square).clamp(0.0, 1.0) } else { 0.0 };
-        distance(place, [pair[0][0] + share * along[0], pair[0][1] + share * along[1]])
+        distance(position, [pair[0][0] + share * along[0], pair[0][1] + share * along[1]])
     };
     let mut worst: f64 = 0.0;
     for pair in from.windows(2) {
         for part in 0..8 {
             let share = f64::from(part) / 8.0;
             let side = minus(pair[1], pair[0]);
-            let place = [pair[0][0] + share * side[0], pair[0][1] + share * side[1]];
-            let nearest = to.windows(2).map(|other| to_side(place, other)).fold(f64::MAX, f64::min);
+            let position = [pair[0][0] + share * side[0], pair[0][1] + share * side[1]];
+            let nearest =
+                to.windows(2).map(|other| to_side(position, other)).fold(f64::MAX, f64::min);
             worst = worst.max(nearest);
         }
     }
@@ -102,7 +104,7 @@ fn stray(from: &[Place], to: &[Place]) -> f64 {
 }
 
 /// Fits a plan, writes it, reads it back, flattens it and compares both. Returns what was saved.
-fn checked(polylines: &[Vec<Place>], tolerance: f64) -> Saving {
+fn checked(polylines: &[Vec<PlanPoint>], tolerance: f64) -> Saving {
     let Fitted { obj, saving } = fit_text(&obj_of(polylines), tolerance).unwrap();
     let chains = flattened(&obj);
     assert_eq!(chains.len(), polylines.len());
@@ -139,7 +141,7 @@ fn smooth_traces_need_few_control_points() {
 #[test]
 fn corners_and_straight_sides_stay() {
     let corners = [[10.0, 10.0], [110.0, 10.0], [110.0, 60.0], [10.0, 60.0], [10.0, 10.0]];
-    let square: Vec<Place> = corners
+    let square: Vec<PlanPoint> = corners
         .windows(2)
         .flat_map(|side| {
             let along = minus(side[1], side[0]);
@@ -166,9 +168,9 @@ fn corners_and_straight_sides_stay() {
 #[test]
 fn a_scanners_steps_are_smoothed_within_the_tolerance() {
     // A tenth of a millimetre grid.
-    let stepped: Vec<Place> = circle(30.0, 900)
+    let stepped: Vec<PlanPoint> = circle(30.0, 900)
         .into_iter()
-        .map(|place| place.map(|c| (c * 10.0).round() / 10.0))
+        .map(|position| position.map(|c| (c * 10.0).round() / 10.0))
         .collect();
     let saving = checked(&[stepped], 0.2);
     assert!(saving.vertices_after <= 20, "{saving}");
@@ -182,11 +184,11 @@ fn random_walks_are_followed_too() {
         (state >> 40) as f64 / f64::from(1 << 24) - 0.5
     };
     for step in [0.05, 1.0, 20.0] {
-        let mut place = [100.0, 100.0];
-        let walk: Vec<Place> = (0..150)
+        let mut position = [100.0, 100.0];
+        let walk: Vec<PlanPoint> = (0..150)
             .map(|_| {
-                place = place.map(|c| c + step * random());
-                place
+                position = position.map(|c| c + step * random());
+                position
             })
             .collect();
         let saving = checked(&[walk], 0.2);
@@ -259,7 +261,7 @@ fn numbers_that_no_plotter_takes_are_refused_with_their_line() {
 }
 
 #[test]
-fn what_has_no_length_is_told() {
+fn what_has_no_length_is_reported() {
     let text = "v 0 0 0\nv 0 0.000001 0\nv 5 5 0\nl 1 2\nl 1 3\n";
     let text = text.replace("l 1 2\nl 1 3", "l 2 1\nl 3 1");
     let Fitted { saving, .. } = fit_text(&text, 0.1).unwrap();
@@ -286,15 +288,15 @@ fn curves_keep_the_pens_of_their_polylines() {
 fn a_long_trace_takes_work_in_proportion_to_its_length() {
     // The path has no corners and does not repeat.
     let wanders = |count: usize| {
-        let (mut state, mut bend, mut angle, mut place) = (1u64, 0.0, 0.0_f64, [0.0; 2]);
+        let (mut state, mut bend, mut angle, mut position) = (1u64, 0.0, 0.0_f64, [0.0; 2]);
         let mut step = || {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
             bend = 0.98 * bend + 0.04 * ((state >> 40) as f64 / f64::from(1 << 24) - 0.5);
             angle += bend;
-            place = [place[0] + 0.1 * angle.cos(), place[1] + 0.1 * angle.sin()];
-            place
+            position = [position[0] + 0.1 * angle.cos(), position[1] + 0.1 * angle.sin()];
+            position
         };
-        (0..count).map(|_| step()).collect::<Vec<Place>>()
+        (0..count).map(|_| step()).collect::<Vec<PlanPoint>>()
     };
     let evaluations = |count| {
         let before = least_squares::evaluations();
@@ -303,5 +305,5 @@ fn a_long_trace_takes_work_in_proportion_to_its_length() {
         least_squares::evaluations() - before
     };
     let (short, long) = (evaluations(700), evaluations(4200));
-    assert!(long < 9 * short, "{short} evaluations for 700 places, {long} for 4200");
+    assert!(long < 9 * short, "{short} evaluations for 700 positions, {long} for 4200");
 }

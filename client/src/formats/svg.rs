@@ -111,7 +111,7 @@ fn contents(file: &str, text: &str) -> Result<Contents, String> {
     let mut plan = Plan::new(file.to_owned());
     let marks: Vec<_> = drawing.shapes.iter().map(|shape| shape.marks.clone()).collect();
     for (shape, pen) in drawing.shapes.iter().zip(pens::pens(&marks)) {
-        let (line, text) = shape.element.map_or((1, String::new()), |it| markup.place(it));
+        let (line, text) = shape.element.map_or((1, String::new()), |it| markup.position(it));
         plan.begin(line, text);
         for polyline in &shape.polylines {
             plan.draw(polyline, size, pen);

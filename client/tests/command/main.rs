@@ -257,7 +257,7 @@ fn no_result_replaces_its_file_or_another_result() {
 
 /// The file to read is not there either: where the results go is looked at first.
 #[test]
-fn an_output_that_cannot_be_written_is_told_before_any_work() {
+fn an_output_that_cannot_be_written_is_an_error_before_any_work() {
     let folder = tempfile::tempdir().expect("a folder");
     fs::write(folder.path().join("file"), "").expect("written");
     fs::create_dir(folder.path().join("folder")).expect("a folder");
@@ -379,7 +379,7 @@ fn a_moved_checkout_is_used_where_it_is() {
 /// A checkout whose emulators are broken programs.
 #[cfg(target_os = "linux")]
 #[test]
-fn a_broken_emulator_is_told_in_a_sentence() {
+fn a_broken_emulator_is_reported_in_a_sentence() {
     use std::os::unix::fs::PermissionsExt as _;
     let folder = tempfile::tempdir().expect("a folder");
     let root = penup_client::workspace::root();

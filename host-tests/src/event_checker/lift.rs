@@ -11,7 +11,7 @@ pub(super) struct LiftWatch {
     /// Whether an alarm may stop it at once.
     may_be_cut: bool,
     /// The number of steps below the upper stop. It began at the lowest position.
-    pub(super) place: i32,
+    pub(super) position: i32,
     /// The time, direction and speed (steps per second) of the last step.
     last: Option<(u64, bool, f64)>,
 }
@@ -26,8 +26,8 @@ impl LiftWatch {
                 (value(Setting::TravelZ) * steps, value(Setting::MaxRateZ) * steps / 60.0);
             LiftRule::new(travel as i32, rate as u32, acceleration as u32)
         });
-        let place = rule.map_or(0, |rule| rule.travel);
-        Self { rule, acceleration, may_be_cut, place, last: None }
+        let position = rule.map_or(0, |rule| rule.travel);
+        Self { rule, acceleration, may_be_cut, position, last: None }
     }
 
     /// Makes one step of the motor.
@@ -37,8 +37,8 @@ impl LiftWatch {
     /// acceleration.
     pub(super) fn step(&mut self, down: bool, time: u64) {
         let rule = self.rule.expect("a motor lifts the pen");
-        self.place = (self.place + if down { 1 } else { -1 }).max(0);
-        assert!(self.place <= rule.travel, "{time}: the pen is driven too low");
+        self.position = (self.position + if down { 1 } else { -1 }).max(0);
+        assert!(self.position <= rule.travel, "{time}: the pen is driven too low");
         let second = f64::from(TICKS_PER_SECOND);
         let mut speed = 0.0;
         if let Some((before, downward, slower)) = self.last {
@@ -66,7 +66,7 @@ impl LiftWatch {
     /// Panics if the pen is not at `height`.
     pub(super) fn assert_at(&self, height: u8, what: &str) {
         if let Some(rule) = self.rule {
-            assert_eq!(self.place, rule.steps(height), "{what} at height {height}");
+            assert_eq!(self.position, rule.steps(height), "{what} at height {height}");
         }
     }
 }

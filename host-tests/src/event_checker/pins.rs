@@ -134,7 +134,7 @@ fn follow_pins(trace: &[Stamped], settings: &Settings, alarms: bool) -> Drawn {
         }
     }
     drawn.end = at;
-    drawn.lift = lift.place;
+    drawn.lift = lift.position;
     drawn
 }
 

@@ -7,13 +7,13 @@ use penup::step::Line;
 
 /// The maximum acceleration along the path, in mm/s², over windows of at least `window` seconds.
 ///
-/// `places` are the path lengths (mm) of the plan at the start of each move, and `times` are the
+/// `positions` are the path lengths (mm) of the plan at the start of each move, and `times` are the
 /// times of these starts. The speed between two moves is assigned to the time midway between them,
 /// which is exact for constant acceleration.
-pub fn greatest_acceleration(times: &[f64], places: &[f64], window: f64) -> f64 {
+pub fn greatest_acceleration(times: &[f64], positions: &[f64], window: f64) -> f64 {
     let speeds: Vec<(f64, f64)> = times
         .windows(2)
-        .zip(places.windows(2))
+        .zip(positions.windows(2))
         .map(|(t, s)| ((t[0] + t[1]) / 2.0, (s[1] - s[0]) / (t[1] - t[0])))
         .collect();
     let mut greatest = 0.0f64;
@@ -31,14 +31,14 @@ pub fn greatest_acceleration(times: &[f64], places: &[f64], window: f64) -> f64 
 }
 
 /// The maximum jerk along the path, in mm/s³. The windows are so long that a jerk of `about`
-/// (mm/s³) can be determined to 8 % in spite of the errors of the places: 4 nm each, which is a
+/// (mm/s³) can be determined to 8 % in spite of the errors of the positions: 4 nm each, which is a
 /// tick at 100 mm/s.
 ///
-/// `places` and `times` are as in [`greatest_acceleration`]. Six times the third divided difference
-/// of the places at four times is a weighted mean of the jerk between the first and the last of
-/// them. The four times are at least a third of the window apart.
-pub fn greatest_jerk(times: &[f64], places: &[f64], about: f64) -> f64 {
-    // The weights of the places add up to 8 divided by the cube of a third of the window.
+/// `positions` and `times` are as in [`greatest_acceleration`]. Six times the third divided
+/// difference of the positions at four times is a weighted mean of the jerk between the first and
+/// the last of them. The four times are at least a third of the window apart.
+pub fn greatest_jerk(times: &[f64], positions: &[f64], about: f64) -> f64 {
+    // The weights of the positions add up to 8 divided by the cube of a third of the window.
     let third = (8.0 * 4e-6 / (0.08 * about)).cbrt();
     let mut greatest = 0.0f64;
     let mut knots = [0; 4];
@@ -53,7 +53,7 @@ pub fn greatest_jerk(times: &[f64], places: &[f64], about: f64) -> f64 {
                 return greatest;
             }
         }
-        let mut differences = knots.map(|knot| places[knot]);
+        let mut differences = knots.map(|knot| positions[knot]);
         for order in 1..4 {
             for k in 0..4 - order {
                 let time = times[knots[k + order]] - times[knots[k]];
@@ -75,11 +75,11 @@ fn plan(targets: &[Target], settings: &Settings) -> Vec<(f64, PagePoint)> {
         let (dx, dy) = (target.point.x - at.x, target.point.y - at.y);
         let length = (f64::from(dx) / x).hypot(f64::from(dy) / y);
         let count = f64::from(dx.abs().max(dy.abs()));
-        let mut place = start + length * 0.5 / count;
+        let mut position = start + length * 0.5 / count;
         for direction in Line::new(at, target.point) {
             at = direction.from_point(at);
-            moves.push((place, at));
-            place += length / count;
+            moves.push((position, at));
+            position += length / count;
         }
         start += length;
     }
@@ -95,9 +95,9 @@ pub fn acceleration_ratio(runs: &[Run], targets: &[Target], settings: &Settings)
     let plan = plan(targets, settings);
     let mut rest = plan.as_slice();
     let ratios = runs.iter().map(|run| {
-        let places = places_of(run, &mut rest);
+        let positions = places_of(run, &mut rest);
         let limit = acceleration(settings);
-        greatest_acceleration(&run.times, &places, acceleration_window(limit)) / limit
+        greatest_acceleration(&run.times, &positions, acceleration_window(limit)) / limit
     });
     ratios.fold(0.0, f64::max)
 }
@@ -108,21 +108,21 @@ fn acceleration(settings: &Settings) -> f64 {
 }
 
 /// The window in seconds over which an acceleration (mm/s²) is measured. It suits two speeds, each
-/// of a step of 12.5 µm at 50 mm/s between places that are exact to 4 nm.
+/// of a step of 12.5 µm at 50 mm/s between positions that are exact to 4 nm.
 fn acceleration_window(acceleration: f64) -> f64 {
     f64::max(0.005, 0.064 / (0.04 * acceleration))
 }
 
-/// The places of the moves of `run`, which are the next ones of `plan`.
+/// The positions of the moves of `run`, which are the next ones of `plan`.
 ///
 /// # Panics
 /// Panics if the run leaves the path.
 fn places_of(run: &Run, plan: &mut &[(f64, PagePoint)]) -> Vec<f64> {
     let (moves, later) = plan.split_at(run.points.len());
     *plan = later;
-    let (places, points): (Vec<f64>, Vec<PagePoint>) = moves.iter().copied().unzip();
+    let (positions, points): (Vec<f64>, Vec<PagePoint>) = moves.iter().copied().unzip();
     assert_eq!(run.points, points, "off the path");
-    places
+    positions
 }
 
 /// Checks that `runs` follow `targets` from the origin, from rest to rest between two moves of the
@@ -138,26 +138,26 @@ pub fn check_speed(runs: &[Run], targets: &[Target], settings: &Settings, cut: b
     let plan = plan(targets, settings);
     let mut rest = plan.as_slice();
     for (number, run) in runs.iter().enumerate() {
-        let places = places_of(run, &mut rest);
+        let positions = places_of(run, &mut rest);
         let window = acceleration_window(acceleration);
-        let measured = greatest_acceleration(&run.times, &places, window);
+        let measured = greatest_acceleration(&run.times, &positions, window);
         assert!(measured <= 1.05 * acceleration, "run {number}: {measured} mm/s2");
         if jerk > 0.0 {
-            let measured = greatest_jerk(&run.times, &places, jerk);
+            let measured = greatest_jerk(&run.times, &positions, jerk);
             assert!(measured <= 1.1 * jerk, "run {number}: {measured} mm/s3, not {jerk}");
         }
-        let from_rest = |times: [f64; 2], places: [f64; 2]| {
-            let length = places[1] - places[0];
+        let from_rest = |times: [f64; 2], positions: [f64; 2]| {
+            let length = positions[1] - positions[0];
             let speed = length / (times[1] - times[0]);
             // The standstill is at most one move before the first of them.
             let most = (2.0 * acceleration * 2.0 * length).sqrt();
             assert!(speed <= 1.05 * most, "run {number}: {speed} mm/s beside a rest, not {most}");
         };
         let is_cut = cut && runs[number + 1..].iter().all(|later| later.points.is_empty());
-        if let (&[a, b, ..], &[s, t, ..]) = (&run.times[..], &places[..]) {
+        if let (&[a, b, ..], &[s, t, ..]) = (&run.times[..], &positions[..]) {
             from_rest([a, b], [s, t]);
         }
-        if let (&[.., a, b], &[.., s, t], false) = (&run.times[..], &places[..], is_cut) {
+        if let (&[.., a, b], &[.., s, t], false) = (&run.times[..], &positions[..], is_cut) {
             from_rest([a, b], [s, t]);
         }
     }

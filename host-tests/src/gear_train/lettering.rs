@@ -41,8 +41,8 @@ fn line(letter: char) -> Vec<Point> {
 pub fn add(mesh: &mut Mesh, text: &str, origin: Point, size: f64, heights: [f64; 2]) {
     for (n, letter) in text.chars().enumerate() {
         let left = origin[0] + n as f64 * size * (2.0 * RADIUS + 0.46);
-        let place = |[x, y]: Point| [left + size * x, origin[1] + size * y];
-        add_band(mesh, &line(letter).into_iter().map(place).collect::<Vec<_>>(), size, heights);
+        let position = |[x, y]: Point| [left + size * x, origin[1] + size * y];
+        add_band(mesh, &line(letter).into_iter().map(position).collect::<Vec<_>>(), size, heights);
     }
 }
 

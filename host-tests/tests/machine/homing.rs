@@ -28,8 +28,8 @@ fn home(
         pen.y += backlashes[1].turn(turn.motors.y - motors.y);
         motors = turn.motors;
         let moved = build.page(pen);
-        let place = point(start.x + moved.x, start.y + moved.y);
-        let switches = press(place, turn.now);
+        let position = point(start.x + moved.x, start.y + moved.y);
+        let switches = press(position, turn.now);
         if turn.now == 0 {
             assert_eq!(turn.machine.state(), State::Alarm(Alarm::NotHomed));
             turn.machine.home(switches).expect("ready");
@@ -39,7 +39,7 @@ fn home(
         if turn.machine.state() == State::Idle {
             assert_eq!(turn.machine.position(), point(0, 0));
         }
-        result = (turn.machine.state(), place);
+        result = (turn.machine.state(), position);
         assert!(turn.now < 25_000_000 * 60, "homing takes more than a minute");
         turn.machine.state() == State::Home
     });
@@ -49,18 +49,18 @@ fn home(
     result
 }
 
-fn corner(place: PagePoint, _now: u64) -> Switches {
-    Switches { x: place.x <= 0, y: place.y <= 0 }
+fn corner(position: PagePoint, _now: u64) -> Switches {
+    Switches { x: position.x <= 0, y: position.y <= 0 }
 }
 
 #[test]
 fn homing_ends_a_pull_off_from_each_switch() {
     for (kinematics, loose) in [(0, false), (0, true), (1, false), (1, true)] {
         for start in [point(2000, 900), point(1, 1), point(4000, -100), point(-80, -80)] {
-            let (state, place) = home(start, kinematics, loose, &mut corner);
+            let (state, position) = home(start, kinematics, loose, &mut corner);
             assert_eq!(state, State::Idle);
             // 2 mm of 80 steps; the second approach makes 80 steps a second.
-            assert!(place.x.abs_diff(160) <= 1 && place.y.abs_diff(160) <= 1, "{place:?}");
+            assert!(position.x.abs_diff(160) <= 1 && position.y.abs_diff(160) <= 1, "{position:?}");
         }
     }
 }
@@ -68,7 +68,7 @@ fn homing_ends_a_pull_off_from_each_switch() {
 #[test]
 fn a_bouncing_switch_is_found_as_well() {
     let mut pressed_since = [None; 2];
-    let mut bounce = |place: PagePoint, now: u64| {
+    let mut bounce = |position: PagePoint, now: u64| {
         let mut bounced = |axis: usize, at: i32| {
             if at > 0 {
                 pressed_since[axis] = None;
@@ -77,11 +77,11 @@ fn a_bouncing_switch_is_found_as_well() {
             let since = *pressed_since[axis].get_or_insert(now);
             now - since > 125_000 || (now / 25_000).is_multiple_of(2)
         };
-        Switches { x: bounced(0, place.x), y: bounced(1, place.y) }
+        Switches { x: bounced(0, position.x), y: bounced(1, position.y) }
     };
-    let (state, place) = home(point(1500, 700), 0, false, &mut bounce);
+    let (state, position) = home(point(1500, 700), 0, false, &mut bounce);
     assert_eq!(state, State::Idle);
-    assert!(place.x.abs_diff(160) <= 1 && place.y.abs_diff(160) <= 1, "{place:?}");
+    assert!(position.x.abs_diff(160) <= 1 && position.y.abs_diff(160) <= 1, "{position:?}");
 }
 
 #[test]
@@ -89,7 +89,7 @@ fn a_switch_that_is_stuck_or_missing_is_an_alarm() {
     let stuck = |_: PagePoint, _: u64| Switches { x: true, y: false };
     let (state, _) = home(point(500, 500), 0, false, &mut { stuck });
     assert_eq!(state, State::Alarm(Alarm::HomingFailed(Axis::X)));
-    let missing = |place: PagePoint, _: u64| Switches { x: place.x <= 0, y: false };
+    let missing = |position: PagePoint, _: u64| Switches { x: position.x <= 0, y: false };
     let (state, _) = home(point(500, 500), 0, false, &mut { missing });
     assert_eq!(state, State::Alarm(Alarm::HomingFailed(Axis::Y)));
 }

@@ -130,11 +130,11 @@ fn backlash_is_taken_up_at_rest_and_leaves_the_same_ink() {
     // The circle alone reverses x twice and y twice, and the zigzag reverses y at each corner.
     assert!(loose.backlash.len() > 12 && tight.backlash.is_empty());
     for run in &loose.backlash {
-        let places: Vec<f64> = (0..run.times.len()).map(|step| step as f64 / 80.0).collect();
+        let positions: Vec<f64> = (0..run.times.len()).map(|step| step as f64 / 80.0).collect();
         assert!(
             event_checker::backlash_steps(&with_backlash(true)).contains(&(run.times.len() as i32))
         );
-        let measured = event_checker::greatest_acceleration(&run.times, &places, 0.005);
+        let measured = event_checker::greatest_acceleration(&run.times, &positions, 0.005);
         assert!(measured <= 1.05 * 800.0, "{measured} mm/s2");
     }
 }

@@ -21,7 +21,7 @@ struct Frame {
     return_address: usize,
 }
 
-/// The chain of calls that led to the place where this value was created.
+/// The chain of calls that led to the creation of this value.
 #[derive(Clone, Copy)]
 pub struct Callers {
     /// The address of the innermost frame.

@@ -80,8 +80,8 @@ pub fn move_vectors_to_ram() {
     // SAFETY: the linker puts the table of so many vectors there (`cortex-m-rt`), and nothing
     // writes flash now.
     let in_flash = unsafe { &__vector_table };
-    for (place, vector) in IN_RAM.0.iter().zip(in_flash) {
-        place.store(*vector, Ordering::Relaxed);
+    for (slot, vector) in IN_RAM.0.iter().zip(in_flash) {
+        slot.store(*vector, Ordering::Relaxed);
     }
     // The vectors must be in RAM before the core may read them.
     fence(Ordering::SeqCst);

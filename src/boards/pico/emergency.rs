@@ -95,8 +95,8 @@ static STORED: StoredCell = StoredCell(UnsafeCell::new(MaybeUninit::uninit()));
 impl Stored {
     fn new(faults: u8, cause: &str) -> Self {
         let mut stored = Self { sum: 0, faults, length: cause.len() as u8, text: [0; TEXT_BYTES] };
-        for (place, byte) in stored.text.iter_mut().zip(cause.bytes()) {
-            *place = byte;
+        for (slot, byte) in stored.text.iter_mut().zip(cause.bytes()) {
+            *slot = byte;
         }
         stored.sum = stored.own_sum();
         stored

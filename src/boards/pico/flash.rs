@@ -176,7 +176,7 @@ impl Flash {
         };
         critical::with_steps_masked(|| {
             // SAFETY: interrupts are masked, one core runs, and the channel of the steps reads RAM;
-            // the callers check that the place is within the flash.
+            // the callers check that the position is within the flash.
             unsafe { carry_out(&rom, &mut work) };
         });
     }

@@ -51,7 +51,7 @@ pub struct PlotOptions {
     /// every edge.
     pub crease: f64,
     /// The largest error of the coordinates, in units of the model. `None` derives it from their
-    /// decimal places.
+    /// decimals.
     precision: Option<Decimal>,
     /// Whether one pen draws everything, whatever pens the model names.
     pub one_pen: bool,

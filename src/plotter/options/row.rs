@@ -39,7 +39,7 @@ pub(super) enum Kind {
         set: fn(&mut PlotOptions, usize),
     },
     /// Three numbers with commas between them. Before they are set, the value is `auto`.
-    Place(Field<Option<Direction>>),
+    Position(Field<Option<Direction>>),
     /// A length between two others, in mm.
     Length {
         /// The least length.
@@ -101,7 +101,7 @@ impl PlotOption {
     pub(super) fn set(&self, options: &mut PlotOptions, text: &str) -> Result<(), CommandError> {
         match self.kind {
             Kind::Choice { set, .. } => set(options, choice(text, self.values)?),
-            Kind::Place(field) => *field(options) = Some(numbers(text)?),
+            Kind::Position(field) => *field(options) = Some(numbers(text)?),
             Kind::Length { least, greatest, field } => {
                 let value = length(text)?;
                 if !(least..=greatest).contains(&value) {
@@ -136,9 +136,9 @@ impl PlotOption {
             Kind::Choice { get, .. } => {
                 formatter.write_str(self.values.get(get(options)).unwrap_or(&""))
             }
-            Kind::Place(field) => match *field(&mut copy) {
-                Some(place) => {
-                    let [x, y, z] = place.map_each(SixDecimals);
+            Kind::Position(field) => match *field(&mut copy) {
+                Some(position) => {
+                    let [x, y, z] = position.map_each(SixDecimals);
                     write!(formatter, "{x},{y},{z}")
                 }
                 None => formatter.write_str("auto"),
@@ -163,7 +163,7 @@ impl PlotOption {
     pub fn range(&self) -> Option<std::string::String> {
         let own = self.flag.get().map(|flag| flag.range).filter(|range| !range.is_empty());
         match self.kind {
-            Kind::Place(_) => Some("three numbers, -1e15 to 1e15".into()),
+            Kind::Position(_) => Some("three numbers, -1e15 to 1e15".into()),
             Kind::Length { least, greatest, .. } => {
                 let [least, greatest] = [least, greatest].map_each(|length| length.to_num::<i32>());
                 Some(std::format!("{least} to {greatest} mm"))

@@ -26,14 +26,14 @@ pub const OPTIONS: &[PlotOption] = &[
         name: "eye",
         values: &["X,Y,Z"],
         help: "where you look from",
-        kind: Kind::Place(|options| &mut options.eye),
+        kind: Kind::Position(|options| &mut options.eye),
         flag: client(Flag::new(CAMERA, "Where the eye is [default: a three-quarter view]")),
     },
     PlotOption {
         name: "at",
         values: &["X,Y,Z"],
         help: "what you look at",
-        kind: Kind::Place(|options| &mut options.at),
+        kind: Kind::Position(|options| &mut options.at),
         flag: client(Flag::new(
             CAMERA,
             "The point that the eye looks at [default: the middle of the model]",
@@ -43,14 +43,14 @@ pub const OPTIONS: &[PlotOption] = &[
         name: "up",
         values: &["X,Y,Z"],
         help: "which way is up",
-        kind: Kind::Place(|options| &mut options.up),
+        kind: Kind::Position(|options| &mut options.up),
         flag: client(Flag::new(CAMERA, "The direction that is up in the picture [default: 0,0,1]")),
     },
     PlotOption {
         name: "angles",
         values: &["A,B,C"],
         help: "look along z after turning by C about z, B about y, A about x, in degrees",
-        kind: Kind::Place(|options| &mut options.angles),
+        kind: Kind::Position(|options| &mut options.angles),
         flag: client(Flag::new(
             CAMERA,
             "Harrison's rotation in degrees: look along z after turning by C about z, B about y, \

@@ -70,7 +70,7 @@ fn what_is_listed_can_be_set_and_is_then_listed_again() {
             let is_placeholder = value.bytes().any(|byte| byte.is_ascii_uppercase());
             let value = if is_placeholder { option.default() } else { value.to_string() };
             let Ok(options) = with(option.name, &value) else {
-                // Only a place cannot be set to what it is by default.
+                // Only a position cannot be set to what it is by default.
                 assert_eq!(value, "auto", "{}", option.name);
                 continue;
             };

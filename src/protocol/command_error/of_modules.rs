@@ -162,7 +162,7 @@ pub(super) fn explain_solid(refusal: &SolidError, row: Row<'_>) {
         ),
         _ => row(
             NOT_CONVEX,
-            format_args!("it takes four vertices at different places, not all in line"),
+            format_args!("it takes four vertices at different positions, not all in line"),
         ),
     }
 }
@@ -171,7 +171,7 @@ pub(super) fn explain_page(refusal: &PageError, row: Row<'_>) {
     let mm = |length: Millimetres| BinaryFraction {
         units: length.to_bits().into(),
         fraction_bits: 16,
-        places: 1,
+        decimals: 1,
     };
     match refusal {
         PageError::NoRoom => row(
@@ -265,7 +265,7 @@ pub(super) fn explain_machine(refusal: &MachineError, row: Row<'_>) {
             let [x, y] = [x, y].map(|value| BinaryFraction {
                 units: value.to_bits().into(),
                 fraction_bits: 16,
-                places: 3,
+                decimals: 3,
             });
             row(
                 error(15, "beyond the travel"),

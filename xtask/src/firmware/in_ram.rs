@@ -240,7 +240,8 @@ mod tests {
             let refusal = checked(&[("DMA_IRQ_0", RAM, &jump)]).unwrap_err();
             assert!(refusal.contains("by a pointer"), "{refusal}");
         }
-        let functions = |place| [("DMA_IRQ_0", RAM, &blx[..]), ("work", place, &[RETURN][..])];
+        let functions =
+            |position| [("DMA_IRQ_0", RAM, &blx[..]), ("work", position, &[RETURN][..])];
         let listed: Indirect = &[("DMA_IRQ_0", &["work"])];
         assert_eq!(checked_with(&functions(RAM + 0x80), listed), Ok(()));
         assert!(checked_with(&functions(FLASH), listed).is_err());

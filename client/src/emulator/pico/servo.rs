@@ -45,7 +45,7 @@ mod tests {
     }
 
     #[test]
-    fn the_pen_is_where_the_servo_was_told() {
+    fn the_pen_is_where_the_servo_was_set() {
         let mut servo = Servo::default();
         let mut events = Vec::new();
         for (start, width) in [(0, 1000), (20_000, 2000), (40_000, 1512), (60_000, 1504)] {

@@ -102,8 +102,8 @@ impl ConvexArea {
 mod tests {
     use super::*;
 
-    fn points(places: &[[f64; 2]]) -> Vec<Point> {
-        places.iter().map(|&[x, y]| Point::new(x, y)).collect()
+    fn points(positions: &[[f64; 2]]) -> Vec<Point> {
+        positions.iter().map(|&[x, y]| Point::new(x, y)).collect()
     }
 
     #[test]

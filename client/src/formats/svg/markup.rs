@@ -111,7 +111,7 @@ impl<'a, 'input> Markup<'a, 'input> {
 
     /// The number of the line in which an element begins, and the text of that element up to its
     /// end or the end of the line.
-    pub(super) fn place(&self, element: NodeId) -> (usize, String) {
+    pub(super) fn position(&self, element: NodeId) -> (usize, String) {
         let Some(node) = self.node(element) else { return (1, String::new()) };
         let start = node.range().start;
         let text = self.document.input_text().get(start..).unwrap_or_default();

@@ -58,15 +58,15 @@ pub(super) fn pens(marks: &[Marks]) -> Vec<u32> {
 
 /// The different values in the order in which they appear, and for each value its place among them.
 fn distinct<T: Copy + Eq + Hash>(values: impl Iterator<Item = T>) -> (Vec<T>, Vec<usize>) {
-    let mut places = HashMap::new();
+    let mut indices = HashMap::new();
     let mut distinct = Vec::new();
-    let place = |value| {
-        *places.entry(value).or_insert_with(|| {
+    let index = |value| {
+        *indices.entry(value).or_insert_with(|| {
             distinct.push(value);
             distinct.len() - 1
         })
     };
-    let all = values.map(place).collect();
+    let all = values.map(index).collect();
     (distinct, all)
 }
 

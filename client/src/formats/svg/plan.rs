@@ -52,10 +52,10 @@ impl Plan {
         let rounded = |value: f64, size: f64| {
             (value * PER_MM).round().clamp(0.0, (size * PER_MM).floor()) as i64
         };
-        let place = |point: &Point| [rounded(point.x, size[0]), rounded(point.y, size[1])];
-        let mut places: Vec<[i64; 2]> = polyline.points.iter().map(place).collect();
-        places.dedup();
-        if places.len() < 2 {
+        let position = |point: &Point| [rounded(point.x, size[0]), rounded(point.y, size[1])];
+        let mut positions: Vec<[i64; 2]> = polyline.points.iter().map(position).collect();
+        positions.dedup();
+        if positions.len() < 2 {
             self.dots += 1;
             return;
         }
@@ -63,7 +63,8 @@ impl Plan {
             self.pen = Some(pen);
             self.push(format!("usemtl pen{pen}"));
         }
-        let numbers: Vec<usize> = places.into_iter().map(|place| self.vertex(place)).collect();
+        let numbers: Vec<usize> =
+            positions.into_iter().map(|position| self.vertex(position)).collect();
         let mut line = String::from("l");
         let mut last = None;
         for number in numbers {
@@ -80,12 +81,12 @@ impl Plan {
         self.push(line);
     }
 
-    /// The number of the vertex at this place, which is made if there is none.
-    fn vertex(&mut self, place: [i64; 2]) -> usize {
+    /// The number of the vertex at this position, which is made if there is none.
+    fn vertex(&mut self, position: [i64; 2]) -> usize {
         let next = self.vertices.len() + 1;
-        let number = *self.vertices.entry(place).or_insert(next);
+        let number = *self.vertices.entry(position).or_insert(next);
         if number == next {
-            let [x, y] = place.map(|value| value as f64 / PER_MM);
+            let [x, y] = position.map(|value| value as f64 / PER_MM);
             self.push(format!("v {x} {y} 0"));
         }
         number
@@ -93,9 +94,9 @@ impl Plan {
 
     /// The least and the greatest coordinates in mm; `None` if nothing is drawn.
     pub(super) fn bounds(&self) -> Option<[[f64; 2]; 2]> {
-        let mut places = self.vertices.keys().copied();
-        let first = places.next()?;
-        let bounds = places.fold([first, first], |[low, high], [x, y]| {
+        let mut positions = self.vertices.keys().copied();
+        let first = positions.next()?;
+        let bounds = positions.fold([first, first], |[low, high], [x, y]| {
             [[low[0].min(x), low[1].min(y)], [high[0].max(x), high[1].max(y)]]
         });
         Some(bounds.map(|corner| corner.map(|value| value as f64 / PER_MM)))

@@ -32,14 +32,14 @@ fn polylines(contents: &Contents) -> Vec<Sent> {
             Some("usemtl") => pen = words.next().expect("a name").to_owned(),
             Some("l") => {
                 let vertex = |word| vertices[number(word) as usize - 1];
-                let places: Vec<[f64; 2]> = words.map(vertex).collect();
+                let positions: Vec<[f64; 2]> = words.map(vertex).collect();
                 match sent.last_mut() {
                     // A long polyline is sent as several lines.
                     Some((_, last)) if is_continued => {
-                        assert_eq!(last.last(), places.first());
-                        last.extend(&places[1..]);
+                        assert_eq!(last.last(), positions.first());
+                        last.extend(&positions[1..]);
                     }
-                    _ => sent.push((pen.clone(), places)),
+                    _ => sent.push((pen.clone(), positions)),
                 }
             }
             other => panic!("{other:?}"),
@@ -63,16 +63,16 @@ fn drawn(svg: &str) -> Vec<Sent> {
 }
 
 /// The polylines without their pens.
-fn places(svg: &str) -> Vec<Vec<[f64; 2]>> {
-    drawn(svg).into_iter().map(|(_, places)| places).collect()
+fn positions(svg: &str) -> Vec<Vec<[f64; 2]>> {
+    drawn(svg).into_iter().map(|(_, positions)| positions).collect()
 }
 
-fn distance_to(places: &[[f64; 2]], [x, y]: [f64; 2]) -> f64 {
+fn distance_to(positions: &[[f64; 2]], [x, y]: [f64; 2]) -> f64 {
     let to_segment = |pair: &[[f64; 2]]| {
         let line = kurbo::Line::new((pair[0][0], pair[0][1]), (pair[1][0], pair[1][1]));
         kurbo::ParamCurveNearest::nearest(&line, Point::new(x, y), 1e-9).distance_sq.sqrt()
     };
-    places.windows(2).map(to_segment).fold(f64::INFINITY, f64::min)
+    positions.windows(2).map(to_segment).fold(f64::INFINITY, f64::min)
 }
 
 /// Half a motor step in mm.
@@ -81,14 +81,14 @@ const HALF_A_STEP: f64 = 1.0 / 160.0;
 /// Checks that `svg` draws one polyline within half a motor step of `curve`, which is asked for
 /// parameters from 0 to 1.
 fn follows(svg: &str, curve: impl Fn(f64) -> [f64; 2]) -> usize {
-    let all = places(svg);
+    let all = positions(svg);
     let [polyline] = all.as_slice() else { panic!("{all:?}") };
     let samples: Vec<[f64; 2]> = (0..=20_000).map(|at| curve(f64::from(at) / 20_000.0)).collect();
     for sample in samples.iter().step_by(7) {
         assert!(distance_to(polyline, *sample) <= HALF_A_STEP, "{sample:?}");
     }
-    for place in polyline {
-        assert!(distance_to(&samples, *place) <= 0.001, "{place:?}");
+    for position in polyline {
+        assert!(distance_to(&samples, *position) <= 0.001, "{position:?}");
     }
     polyline.len()
 }
@@ -122,15 +122,15 @@ fn units_and_the_view_box_give_true_size() {
         assert_eq!([width, height], page, "{size}");
         let sent = polylines(&contents);
         let expected = [[0.0, height], [20.0 * scale, height - 10.0 * scale]];
-        for (place, expected) in sent[0].1.iter().zip(expected) {
-            assert!((place[0] - expected[0]).abs() < 6e-4, "{size}: {place:?}");
-            assert!((place[1] - expected[1]).abs() < 6e-4, "{size}: {place:?}");
+        for (position, expected) in sent[0].1.iter().zip(expected) {
+            assert!((position[0] - expected[0]).abs() < 6e-4, "{size}: {position:?}");
+            assert!((position[1] - expected[1]).abs() < 6e-4, "{size}: {position:?}");
         }
     }
     // The picture keeps its proportions in the middle of the page.
     let svg = "<svg xmlns='http://www.w3.org/2000/svg' width='100mm' height='50mm' \
                viewBox='-10 -10 20 20'><path d='M-10 -10L10 10'/></svg>";
-    assert_eq!(places(svg), [[[25.0, 50.0], [75.0, 0.0]]]);
+    assert_eq!(positions(svg), [[[25.0, 50.0], [75.0, 0.0]]]);
 }
 
 #[test]
@@ -179,11 +179,11 @@ fn many_short_lines_become_few() {
     for step in 1..=4000 {
         let _ = write!(data, "L{} {}", 10.0 + f64::from(step) / 50.0, 50.0 + 1e-3);
     }
-    let sent = places(&in_mm(&format!("<path d='{data}'/>")));
+    let sent = positions(&in_mm(&format!("<path d='{data}'/>")));
     assert_eq!(sent.len(), 1);
     assert!(sent[0].len() < 4, "{sent:?}");
     // A line that turns back keeps its end.
-    let back = places(&in_mm("<path d='M10 50H60H20'/>"));
+    let back = positions(&in_mm("<path d='M10 50H60H20'/>"));
     assert_eq!(back, [[[10.0, 50.0], [60.0, 50.0], [20.0, 50.0]]]);
 }
 
@@ -197,7 +197,7 @@ fn transforms_are_nested_and_references_are_followed() {
          <use href='#s' x='10' y='10' width='20' height='20'/>",
     );
     assert_eq!(
-        places(&svg),
+        positions(&svg),
         [
             vec![[50.0, 50.0], [50.0, 30.0], [20.0, 30.0]],
             vec![[5.0, 94.0], [15.0, 94.0]],
@@ -228,7 +228,7 @@ fn what_is_outside_of_the_page_or_of_a_convex_clip_path_is_cut_off() {
 fn strokes_are_dashed_and_shapes_without_a_stroke_have_outlines() {
     let dashed = "<path d='M10 50H30' stroke='red' stroke-dasharray='5 3'/>";
     assert_eq!(
-        places(&in_mm(dashed)),
+        positions(&in_mm(dashed)),
         [[[10.0, 50.0], [15.0, 50.0]], [[18.0, 50.0], [23.0, 50.0]], [[26.0, 50.0], [30.0, 50.0]]]
     );
     let shapes = "<rect x='10' y='10' width='5' height='5'/>\
@@ -342,7 +342,7 @@ fn a_file_that_cannot_be_drawn_is_refused_with_a_sentence() {
     let deep = |depth: usize| {
         in_mm(&format!("{}<path d='M0 0H9'/>{}", "<g>".repeat(depth), "</g>".repeat(depth)))
     };
-    assert_eq!(places(&deep(900)).len(), 1);
+    assert_eq!(positions(&deep(900)).len(), 1);
     let numbers = "<path d='M0 0L1e38 1e38'/><circle r='NaN'/><path d='M-1e39 0L1e300 5'/>";
     let huge = "<svg xmlns='http://www.w3.org/2000/svg' width='1e38' height='1e38'>\
                 <path d='M0 0H1e30V9'/></svg>";

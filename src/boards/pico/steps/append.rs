@@ -7,7 +7,7 @@ use penup::motion::{EventKind, EventQueue, StepEvent, StepTrain, StepWay};
 use super::engine::{LEVELS, PEN_TICKS, PULSE_TICKS, PULSES, TARGETS, WAIT_TICKS, target};
 use super::feed::{FEEDING, WRITTEN};
 use super::heights::z_axis_levels;
-use super::word_ring::{GROUP, LENGTHS, WORDS, lengths, pack, place, row, sum};
+use super::word_ring::{GROUP, LENGTHS, WORDS, lengths, pack, row, slot, sum};
 use super::{BRAKED_TICKS, STATE, Steps, WAIT_WORDS};
 use crate::boards::pico::words;
 
@@ -76,7 +76,7 @@ impl EventQueue for Steps {
             words::write_train(train, row);
             done += row.len() as u32;
         }
-        let word = place(self.written.wrapping_add(count - 1)).load(Ordering::Relaxed);
+        let word = slot(self.written.wrapping_add(count - 1)).load(Ordering::Relaxed);
         train.convert(|word| word.wrapping_add(beyond) ^ inverted_levels);
         if STATE.brake().is_on() {
             self.record_lengths(count);
@@ -188,7 +188,7 @@ impl Steps {
 
     /// Writes one word with its count to the ring, and what its step adds to the path.
     fn put(&mut self, word: u32, count: u32, step: StepWay) {
-        place(self.written).store(word | count << 8, Ordering::Relaxed);
+        slot(self.written).store(word | count << 8, Ordering::Relaxed);
         lengths(self.written).store(pack(step), Ordering::Relaxed);
         self.written = self.written.wrapping_add(1);
         STATE.brake().add(step.around);

@@ -10,7 +10,7 @@ use penup::motion::{Brake, StepEvent, TICKS_PER_SECOND};
 use rp2040_hal::pac::interrupt;
 
 use super::engine::{BUSY, CHANNEL, LEVEL, PULSE_TICKS, TARGETS, WAIT_TICKS, target};
-use super::word_ring::{GROUP, lengths, place, ring_address, sum, unpack};
+use super::word_ring::{GROUP, lengths, ring_address, slot, sum, unpack};
 use super::{BRAKED_TICKS, STATE};
 use crate::boards::handler::Owned;
 use crate::boards::pico::critical;
@@ -156,7 +156,7 @@ fn calm_words(brake: &mut Brake, handed_over: u32, count: u32) -> u32 {
     while words < count.min(CALM_WORDS) && ticks <= BRAKED_TICKS {
         let at = handed_over.wrapping_add(words);
         let step = lengths(at).load(Ordering::Relaxed);
-        let planned = place(at).load(Ordering::Relaxed) >> 8;
+        let planned = slot(at).load(Ordering::Relaxed) >> 8;
         if step != 0 {
             around += step & 0xFFFF;
             longest = longest.max(step >> 16);
@@ -174,7 +174,7 @@ fn calm_words(brake: &mut Brake, handed_over: u32, count: u32) -> u32 {
 #[inline(never)]
 #[unsafe(link_section = ".data.in_ram")]
 fn brake_evenly(brake: &mut Brake, handed_over: u32, count: u32) -> u32 {
-    let is_fast = place(handed_over).load(Ordering::Relaxed) >> 8 < FAST_TICKS;
+    let is_fast = slot(handed_over).load(Ordering::Relaxed) >> 8 < FAST_TICKS;
     if count < BRAKED_WORDS || !is_fast {
         return 0;
     }
@@ -191,7 +191,7 @@ fn brake_evenly(brake: &mut Brake, handed_over: u32, count: u32) -> u32 {
     let least = least.saturating_sub(PULSE_TICKS + STATE.pulse_ticks()).min(StepEvent::MAX_TICKS);
     let mut is_braked = false;
     for (number, braked) in (0..).zip(&BRAKED.0) {
-        let mut word = place(handed_over.wrapping_add(number)).load(Ordering::Relaxed);
+        let mut word = slot(handed_over.wrapping_add(number)).load(Ordering::Relaxed);
         if word >> 8 < least {
             word = least << 8 | word & 0xFF;
             is_braked = true;
@@ -211,14 +211,14 @@ fn brake_words(brake: &mut Brake, handed_over: u32, count: u32) -> u32 {
     let (mut words, mut ticks, mut more) = (0, 0, 0);
     for (number, braked) in (0..count).zip(&BRAKED.0) {
         let at = handed_over.wrapping_add(number);
-        let mut word = place(at).load(Ordering::Relaxed);
+        let mut word = slot(at).load(Ordering::Relaxed);
         let step = lengths(at).load(Ordering::Relaxed);
         if step != 0 {
             let mut least = brake.step(unpack(step), STATE.brake());
             let planned = (word >> 8) + beyond;
             if least > planned && number + 1 < count {
                 // The next word may be a wait between two steps, whose ticks count as well.
-                let next = place(at.wrapping_add(1)).load(Ordering::Relaxed);
+                let next = slot(at.wrapping_add(1)).load(Ordering::Relaxed);
                 if next & TARGETS == target::WAIT {
                     least = least.saturating_sub((next >> 8) + WAIT_TICKS);
                 }

@@ -43,7 +43,7 @@ use engine::{
 };
 use feed::{ABANDONED, BRAKE, FEEDING, HANDED_OVER, WRITTEN, taken};
 use heights::{HEIGHT_QUEUE, HEIGHTS, HEIGHTS_DUE, drain_heights};
-use word_ring::{WORDS, place, row};
+use word_ring::{WORDS, row, slot};
 
 pub(super) use target::PULSE;
 
@@ -289,7 +289,7 @@ impl Steps {
 
     /// The levels of the pins in the last word counted.
     fn levels_now(&self) -> u32 {
-        place(self.taken.wrapping_sub(1)).load(Ordering::Relaxed) & LEVELS
+        slot(self.taken.wrapping_sub(1)).load(Ordering::Relaxed) & LEVELS
     }
 }
 

@@ -24,7 +24,7 @@ static SUMS: [AtomicU32; (WORDS / GROUP) as usize] =
     [const { AtomicU32::new(0) }; (WORDS / GROUP) as usize];
 
 /// The slot of word number `word`.
-pub fn place(word: u32) -> &'static AtomicU32 {
+pub fn slot(word: u32) -> &'static AtomicU32 {
     &RING.0[(word % WORDS) as usize]
 }
 
@@ -36,7 +36,7 @@ pub fn row(word: u32, count: u32) -> &'static [AtomicU32] {
 
 /// The address of the slot of word number `word`.
 pub fn ring_address(word: u32) -> u32 {
-    place(word).as_ptr() as u32
+    slot(word).as_ptr() as u32
 }
 
 /// The packed lengths of the step in word number `word`.
