@@ -6,7 +6,7 @@ use crate::interrupt::EXIT_CODE;
 use crate::lines::{JobLine, Origin};
 use crate::protocol::RECEIVE_WINDOW;
 use crate::words::{as_option, explained, for_client};
-use penup::protocol::CommandError;
+use penup::protocol::{CommandError, alarm_entries};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -125,8 +125,7 @@ pub enum Error {
         messages: Vec<String>,
     },
     /// The machine stopped with an alarm.
-    #[error("the plotter stopped with alarm {number}{}\nSee docs/protocol.md for the alarm's \
-     meaning", said(&for_client(&messages.join("; "))))]
+    #[error("{}", alarmed(*number, messages))]
     Alarm {
         /// The `N` of its `ALARM:N`.
         number: u16,
@@ -250,6 +249,30 @@ fn waiting_for(line: Option<&JobLine>) -> String {
         Some((_, Some(origin))) => format!(", at line {} of {}", origin.line, origin.file),
         Some((sent, None)) => format!(", asked for {}", as_option(sent)),
     }
+}
+
+/// Says what an alarm means and what to do about it.
+fn alarmed(number: u16, messages: &[String]) -> String {
+    let said = said(&for_client(&messages.join("; ")));
+    let entries = alarm_entries();
+    match entries.iter().find(|entry| u16::from(entry.number) == number) {
+        Some(entry) => {
+            let (cause, cure) = (entry.cause.get(), sentence(entry.cure.get()));
+            format!("the plotter stopped with alarm {number}: {cause}{said}\n{cure}")
+        }
+        None => format!(
+            "the plotter stopped with alarm {number}, which this program does not know{said}\n\
+             Its firmware is of another version than this program"
+        ),
+    }
+}
+
+/// The text with a capital letter at its beginning.
+fn sentence(text: &str) -> String {
+    let mut letters = text.chars();
+    letters
+        .next()
+        .map_or(String::new(), |first| first.to_uppercase().collect::<String>() + letters.as_str())
 }
 
 /// Says what the user can do about a state of the machine.

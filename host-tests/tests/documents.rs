@@ -9,7 +9,7 @@ use clap::CommandFactory;
 use penup::fixed::Length;
 use penup::machine::SETTINGS;
 use penup::plotter::help;
-use penup::protocol::{ErrorEntry, error_entries};
+use penup::protocol::{ErrorEntry, alarm_entries, error_entries, error_samples};
 use penup_client::cli::Cli;
 use pulldown_cmark::{Event, Options, Parser, Tag, TagEnd};
 use std::ops::Range;
@@ -217,4 +217,65 @@ fn the_help_of_the_client_is_its_document() {
         "docs/client.md is out of date; write it anew with \
          PENUP_WRITE_DOCUMENTS=1 cargo test -p penup-host-tests --test documents"
     );
+}
+
+/// Behind this line of `docs/errors.md` stands what the tables of the source say.
+const END_OF_ERRORS_INTRODUCTION: &str = "<!-- What follows is made from the source. -->\n";
+
+#[test]
+fn every_alarm_and_error_is_in_its_document_with_cause_and_cure() {
+    let mut body = String::from("\n## Alarms\n");
+    for entry in alarm_entries() {
+        let (cause, cure) = (entry.cause.get(), entry.cure.get());
+        body += &filled(&format!("- **ALARM:{}**: {cause}. To do: {cure}.", entry.number));
+    }
+    body += "\n## Errors\n";
+    for entry in error_entries() {
+        body += &format!("\n### error:{}, {}\n\n", entry.number, entry.meaning.get());
+        let samples = error_samples();
+        let of_this = samples.iter().filter(|error| error.entry() == entry);
+        let mut sentences: Vec<String> = of_this.map(ToString::to_string).collect();
+        sentences.dedup();
+        assert!(sentences.iter().all(|sentence| !sentence.is_empty()), "{entry:?}");
+        for sentence in sentences {
+            body += filled(&format!("- {sentence}.")).trim_start_matches('\n');
+        }
+        if let Some(words) = entry.for_client.get() {
+            body +=
+                filled(&format!("- The program `penup` says: {words}.")).trim_start_matches('\n');
+        }
+    }
+    let path = root().join("docs/errors.md");
+    let text = std::fs::read_to_string(&path).expect("docs/errors.md");
+    let (introduction, written) =
+        text.split_once(END_OF_ERRORS_INTRODUCTION).expect("the line before the tables");
+    if writes_documents() {
+        let text = format!("{introduction}{END_OF_ERRORS_INTRODUCTION}{body}");
+        return std::fs::write(&path, text).expect("docs/errors.md can be written");
+    }
+    assert!(
+        written == body,
+        "docs/errors.md is out of date; write it anew with \
+         PENUP_WRITE_DOCUMENTS=1 cargo test -p penup-host-tests --test documents"
+    );
+}
+
+/// An item of a list, filled to lines of 100 columns, with an empty line before it. Signs that
+/// Markdown would read as its own are escaped.
+fn filled(item: &str) -> String {
+    let escaped = item.replace('<', "\\<").replace('$', "\\$").replace('|', "\\|");
+    let mut text = String::from("\n");
+    let mut column = 0;
+    for word in escaped.split(' ') {
+        if column > 0 && column + 1 + word.chars().count() > 100 {
+            text += "\n  ";
+            column = 2;
+        } else if column > 0 {
+            text += " ";
+            column += 1;
+        }
+        text += word;
+        column += word.chars().count();
+    }
+    text + "\n"
 }

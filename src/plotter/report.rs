@@ -1,11 +1,11 @@
 //! The reports of the plotter: greeting, build, model, job and status.
 
 use super::reply::Reply;
-use super::{Board, Inner, stream};
+use super::{Board, Inner};
 use crate::fixed::BinaryFraction;
 use crate::machine::{Alarm, Setting, State};
 use crate::order;
-use crate::protocol::LINE_LIMIT;
+use crate::protocol::{AlarmEntry, LINE_LIMIT};
 
 /// Writes the greeting: the first line that a sender sees. It is also the reply to ctrl-X.
 pub(super) fn greet<B: Board>(board: &mut B) {
@@ -27,7 +27,7 @@ pub(super) fn greet_opened<B: Board>(state: State, board: &mut B) {
         if alarm == Alarm::Restarted {
             fault(board);
         }
-        Reply(board).line(format_args!("ALARM:{}", stream::number(alarm)));
+        Reply(board).line(format_args!("ALARM:{}", AlarmEntry::of(alarm).number));
     }
     board.reply_only_to_opened(false);
 }
@@ -130,7 +130,7 @@ impl Inner<'_> {
             reply.part(format_args!("|Ov:{},100,100", status.percent));
         }
         if let State::Alarm(alarm) = status.state {
-            reply.part(format_args!("|Alarm:{}", stream::number(alarm)));
+            reply.part(format_args!("|Alarm:{}", AlarmEntry::of(alarm).number));
         }
         let (switches, stop) = (self.machine.switches(), self.machine.stop_is_pressed());
         if switches.any() || stop {

@@ -11,7 +11,7 @@ use crate::fixed::BinaryFraction;
 use crate::machine::{Alarm, MachineError, Setting, State, Target};
 use crate::model::ElementKind;
 use crate::motion::{StepEvent, TICKS_PER_SECOND};
-use crate::protocol::{CommandError, GCode, RealTime};
+use crate::protocol::{AlarmEntry, CommandError, GCode, RealTime};
 use crate::step::{Arc, Chords, Line};
 use core::fmt;
 
@@ -100,7 +100,7 @@ impl Inner<'_> {
             self.alarm_reported = alarm;
             if let Some(alarm) = alarm {
                 board.step_now();
-                Reply(board).line(format_args!("ALARM:{}", number(alarm)));
+                Reply(board).line(format_args!("ALARM:{}", AlarmEntry::of(alarm).number));
             }
         }
         let pen = self.machine.pen_wanted();
@@ -279,17 +279,5 @@ impl Program {
     /// The target at a point, with the pen up or down as the program has set it.
     fn target(&self, point: PagePoint) -> Target {
         Target { point, ink: self.pen_is_down.then_some(LineType::Full) }
-    }
-}
-
-/// The number of an alarm, as in Grbl and its successors.
-pub(super) const fn number(alarm: Alarm) -> u8 {
-    match alarm {
-        Alarm::HardLimit => 1,
-        Alarm::HomingFailed(_) => 9,
-        Alarm::EmergencyStop => 10,
-        Alarm::NotHomed => 11,
-        Alarm::Queue => 100,
-        Alarm::Restarted => 101,
     }
 }

@@ -7,6 +7,7 @@
 //! A [`CommandError`] says why a line was not carried out. Anything that is not a command is
 //! refused with a number and the reason. Nothing here changes the state of the plotter.
 
+mod alarm;
 mod command;
 mod edit;
 mod escape;
@@ -17,6 +18,9 @@ mod receiver;
 mod command_error;
 mod values;
 
+pub use alarm::AlarmEntry;
+#[cfg(any(test, feature = "host"))]
+pub use alarm::alarm_entries;
 pub use command::{Command, HELP};
 pub use command_error::{CommandError, ErrorEntry};
 #[cfg(any(test, feature = "host"))]
