@@ -18,7 +18,9 @@ mod command;
 mod experiments;
 mod flash;
 mod firmware;
+mod fuzz;
 mod gallery;
+mod panics;
 mod set_up;
 mod side_by_side;
 mod test;
@@ -111,6 +113,19 @@ enum Task {
         #[arg(default_value_t = 4864)]
         count: u32,
     },
+    /// Lists, by file, the calls of panic functions that are left in the boards' images.
+    Panics,
+    /// Looks for inputs that break a promise; needs nightly Rust and cargo-fuzz.
+    Fuzz {
+        /// For how many seconds each target is fuzzed.
+        #[arg(default_value_t = 20)]
+        seconds: u32,
+        /// The only target to fuzz, a folder of fuzz/corpus.
+        #[arg(long)]
+        target: Option<String>,
+    },
+    /// Fuzzes each target for an hour.
+    Soak,
     /// Installs what building and testing need.
     SetUp,
     /// Runs every check: format, lints, documentation, tests on the host and in the emulator.
@@ -153,6 +168,9 @@ fn carry_out() -> Result<()> {
         Some(Task::Solids { count }) => test::random_solids(count)?,
         Some(Task::Cuts { count }) => test::power_cuts(count)?,
         Some(Task::Lattice7) => test::lattice7()?,
+        Some(Task::Panics) => panics::list()?,
+        Some(Task::Fuzz { seconds, target }) => fuzz::fuzz(seconds, target.as_deref())?,
+        Some(Task::Soak) => fuzz::fuzz(3600, None)?,
         Some(Task::SetUp) => {
             for board in BOARDS {
                 set_up::toolchain(board.target)?;

@@ -1,0 +1,22 @@
+//! What the fuzzers do with bytes: each target reads hostile bytes as one part of penup would, and
+//! panics if that part breaks a promise.
+//!
+//! The folder `fuzz/` wraps each target for `cargo fuzz`, which looks for new inputs on nightly
+//! Rust. The test `fuzz_corpus` replays the inputs that it kept, and random ones, on every run. The
+//! tests are built with checks for overflow, so a value that wraps is found, too.
+
+mod files;
+mod session;
+mod sender;
+mod stored;
+
+/// A target: its name, which is the name of its corpus, and the function that takes the input.
+pub type Target = (&'static str, fn(&[u8]));
+
+/// All targets.
+pub const TARGETS: [Target; 4] = [
+    ("session", session::fuzz),
+    ("files", files::fuzz),
+    ("stored", stored::fuzz),
+    ("sender", sender::fuzz),
+];

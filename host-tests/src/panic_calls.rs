@@ -1,0 +1,163 @@
+//! Finds the calls of panic functions that are left in a board's image.
+//!
+//! Each call is counted to the innermost function of the project in the chain of functions that the
+//! compiler inlined there, which the DWARF sections tell. So a bounds check inside a function of
+//! the core library counts to the module that called it.
+
+use addr2line::gimli::{Dwarf, EndianSlice, LittleEndian};
+use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
+use std::collections::BTreeMap;
+use std::error::Error;
+
+/// A call of a panic function.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct PanicCall {
+    /// The file of the project that causes it, such as `src/order/euler.rs`; of a call outside the
+    /// project, the file of a dependency; empty if the image does not tell.
+    pub file: String,
+    /// The line in that file.
+    pub line: u32,
+    /// The panic function that is called.
+    pub function: String,
+}
+
+/// Whether a function of this name is called only to panic.
+fn panics(name: &str) -> bool {
+    let is_core = name.starts_with("core::") || name.starts_with("heapless::");
+    is_core
+        && (name.contains("::panicking::")
+            || ["_fail", "_failed", "_fail_rt", "fail"].iter().any(|end| {
+                name.rsplit("::").next().is_some_and(|function| function.ends_with(end))
+            }))
+}
+
+/// Finds the calls of panic functions in an ELF file for a Cortex-M, in the order of the files. The
+/// calls that panic functions make among themselves do not count.
+///
+/// # Errors
+/// The file is no ELF file, or its debug information cannot be read.
+pub fn panic_calls(elf: &[u8]) -> Result<Vec<PanicCall>, Box<dyn Error>> {
+    let file = object::File::parse(elf)?;
+    let lines =
+        addr2line::Context::from_dwarf(Dwarf::load(|section| -> Result<_, Box<dyn Error>> {
+            let data = file.section_by_name(section.name()).map(|section| section.data());
+            Ok(EndianSlice::new(data.transpose()?.unwrap_or_default(), LittleEndian))
+        })?)?;
+    let functions = functions(&file)?;
+    let code = Code::new(&file)?;
+    let mut calls = Vec::new();
+    for (start, (name, end)) in &functions {
+        if panics(name) {
+            continue;
+        }
+        for (at, target) in code.branches(*start, *end) {
+            let Some((callee, _)) = functions.get(&target) else { continue };
+            if !panics(callee) {
+                continue;
+            }
+            let (file, line) = cause(&lines, at)?;
+            calls.push(PanicCall { file, line, function: callee.clone() });
+        }
+    }
+    calls.sort();
+    Ok(calls)
+}
+
+/// The name and end address of each function, by its address.
+type Functions = BTreeMap<u64, (String, u64)>;
+
+/// The functions of the image that have a size.
+fn functions(file: &object::File<'_>) -> Result<Functions, Box<dyn Error>> {
+    let mut functions = Functions::new();
+    for symbol in file.symbols().filter(|symbol| symbol.kind() == SymbolKind::Text) {
+        let start = symbol.address() & !1;
+        let name = format!("{:#}", rustc_demangle::demangle(symbol.name()?));
+        // Functions with the same instructions are stored once, under several names.
+        let entry = functions.entry(start).or_insert_with(|| (name.clone(), start + symbol.size()));
+        if panics(&name) {
+            entry.0 = name;
+        }
+    }
+    Ok(functions)
+}
+
+/// The lines of a program by address.
+type Lines<'e> = addr2line::Context<EndianSlice<'e, LittleEndian>>;
+
+/// The file and line of the innermost function of the project at this address.
+fn cause(lines: &Lines<'_>, address: u64) -> Result<(String, u32), Box<dyn Error>> {
+    let mut outermost = (String::new(), 0);
+    let mut frames = lines.find_frames(address).skip_all_loads()?;
+    while let Some(frame) = frames.next()? {
+        let Some(location) = frame.location else { continue };
+        let (file, line) = (location.file.unwrap_or_default(), location.line.unwrap_or(0));
+        let root = env!("CARGO_MANIFEST_DIR").trim_end_matches("host-tests");
+        if let Some(own) = file.strip_prefix(root).filter(|own| own.starts_with("src/")) {
+            return Ok((own.to_owned(), line));
+        }
+        outermost = (file.to_owned(), line);
+    }
+    Ok(outermost)
+}
+
+/// The instructions of an image.
+struct Code<'e> {
+    /// The bytes of each section, by its address.
+    sections: BTreeMap<u64, &'e [u8]>,
+    /// The addresses from which on there is code (`true`) or data.
+    marks: BTreeMap<u64, bool>,
+}
+
+impl<'e> Code<'e> {
+    fn new(file: &object::File<'e>) -> Result<Self, Box<dyn Error>> {
+        let mut sections = BTreeMap::new();
+        for section in file.sections().filter(|section| section.address() != 0) {
+            sections.insert(section.address(), section.data()?);
+        }
+        let mut marks = BTreeMap::new();
+        for symbol in file.symbols() {
+            match symbol.name()?.as_bytes() {
+                [b'$', b't', ..] => _ = marks.insert(symbol.address() & !1, true),
+                [b'$', b'd', ..] => _ = marks.insert(symbol.address(), false),
+                _ => {}
+            }
+        }
+        Ok(Self { sections, marks })
+    }
+
+    /// The half word at an address.
+    fn half(&self, address: u64) -> Option<u32> {
+        let (start, bytes) = self.sections.range(..=address).next_back()?;
+        let at = usize::try_from(address - start).ok()?;
+        let half = bytes.get(at..at + 2)?;
+        Some(u32::from(u16::from_le_bytes(half.try_into().ok()?)))
+    }
+
+    /// The addresses and targets of the instructions `BL` and `B.W` from `start` to `end` (ARMv7-M
+    /// Architecture Reference Manual, A7.7.12 and A7.7.18).
+    fn branches(&self, start: u64, end: u64) -> Vec<(u64, u64)> {
+        let mut branches = Vec::new();
+        let mut at = start;
+        while at < end {
+            let is_code = self.marks.range(..=at).next_back().is_none_or(|(_, is_code)| *is_code);
+            let (Some(first), Some(second)) = (self.half(at), self.half(at + 2)) else { break };
+            if !is_code || first >> 11 < 0b11101 {
+                at += 2;
+                continue;
+            }
+            if first >> 11 == 0b11110 && second & 0x9000 == 0x9000 {
+                let sign = first >> 10 & 1;
+                let [high, low] = [second >> 13, second >> 11].map(|bit| !(bit ^ sign) & 1);
+                let offset = sign << 24
+                    | high << 23
+                    | low << 22
+                    | (first & 0x3FF) << 12
+                    | (second & 0x7FF) << 1;
+                let offset = i64::from((offset << 7).cast_signed() >> 7);
+                branches.push((at, (at + 4).wrapping_add_signed(offset) & !1));
+            }
+            at += 4;
+        }
+        branches
+    }
+}

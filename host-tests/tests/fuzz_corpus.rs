@@ -1,0 +1,53 @@
+//! Replays the inputs that the fuzzers kept, and gives the same targets random ones.
+
+#![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
+
+use penup_host_tests::fuzz_targets::TARGETS;
+use penup_host_tests::random::Random;
+use std::path::PathBuf;
+
+/// The number of random inputs for each target.
+const INPUTS: u32 = 60;
+
+fn corpus(target: &str) -> Vec<Vec<u8>> {
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../fuzz/corpus").join(target);
+    let mut files: Vec<PathBuf> = std::fs::read_dir(&folder)
+        .unwrap_or_else(|error| panic!("{}: {error}", folder.display()))
+        .map(|file| file.expect("a file").path())
+        .collect();
+    files.sort();
+    files.iter().map(|file| std::fs::read(file).expect("an input")).collect()
+}
+
+#[test]
+fn the_kept_inputs_break_no_promise() {
+    for (name, target) in TARGETS {
+        let inputs = corpus(name);
+        assert!(!inputs.is_empty(), "there are inputs for {name}");
+        for input in inputs {
+            target(&input);
+        }
+    }
+}
+
+#[test]
+fn damaged_and_joined_inputs_break_no_promise() {
+    let mut random = Random::new(1980);
+    for (name, target) in TARGETS {
+        let inputs = corpus(name);
+        for _ in 0..INPUTS {
+            let mut input = inputs[random.below(inputs.len() as u64) as usize].clone();
+            let other = &inputs[random.below(inputs.len() as u64) as usize];
+            let cut = random.below(input.len() as u64 + 1) as usize;
+            input.truncate(cut);
+            input.extend(&other[random.below(other.len() as u64 + 1) as usize..]);
+            input.truncate(4096);
+            for _ in 0..random.below(9) {
+                if let Some(last) = input.len().checked_sub(1) {
+                    input[random.below(last as u64 + 1) as usize] = random.below(256) as u8;
+                }
+            }
+            target(&input);
+        }
+    }
+}
