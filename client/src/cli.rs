@@ -1,27 +1,50 @@
 //! Defines the command line and turns its options into settings of a job.
 
+mod machine;
 mod view;
 
+pub use machine::{
+    AssignedSetting, FormatArgs, JogArgs, PauseArgs, PenArgs, PenPosition, PlotterArgs, PortArgs,
+    PortsArgs, SetArgs, SettingsCommand, WatchArgs,
+};
 pub use view::ViewArgs;
 
 use crate::board;
+use crate::error::{EXIT_CODES, ExitCode};
 use crate::fit::{FitError, TOLERANCES};
 use crate::formats;
 use crate::motion_plot::GivenSetting;
 use crate::page::Page;
 use crate::table::BoardRow;
 use clap::{Args, Parser, Subcommand};
+use clap_complete::Shell;
 use penup::machine::Setting;
 use std::path::PathBuf;
 use view::page;
 
 /// Draws solids and line drawings with a penup plotter.
 #[derive(Debug, Parser)]
-#[command(name = "penup", version, propagate_version = true)]
+#[command(name = "penup", version, propagate_version = true, after_long_help = exit_codes())]
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]
     pub command: Command,
+    /// Say nothing but errors and what was asked for: no progress, notes or closing sentence
+    #[arg(short, long, global = true)]
+    pub quiet: bool,
+}
+
+/// The exit codes, for the help.
+fn exit_codes() -> String {
+    let line = |code: &ExitCode| format!("{:>5}  {}", code.number, code.meaning);
+    format!("Exit codes:\n{}", EXIT_CODES.iter().map(line).collect::<Vec<_>>().join("\n"))
+}
+
+impl Cli {
+    /// Whether the result, or the error, is printed as JSON.
+    pub fn is_json(&self) -> bool {
+        self.command.format().is_some_and(|format| format.json)
+    }
 }
 
 /// What to do.
@@ -36,6 +59,81 @@ pub enum Command {
     /// Record a job as Harrison's tape of single motor steps, and read such tapes
     #[command(subcommand)]
     Tape(TapeCommand),
+    /// List the serial ports and what answers there
+    Ports(PortsArgs),
+    /// Ask a plotter what it does
+    Status(PlotterArgs),
+    /// Follow a job that a plotter draws, whoever has sent it
+    Watch(WatchArgs),
+    /// Pause a job: the machine slows down and raises the pen
+    Pause(PauseArgs),
+    /// Let a machine go on that holds or waits for a pen
+    Resume(PlotterArgs),
+    /// Give a job up: the machine slows down and raises the pen
+    Abort(PlotterArgs),
+    /// Find the limit switches
+    Home(PlotterArgs),
+    /// Unlock a machine after an alarm, or wake it
+    Unlock(PlotterArgs),
+    /// Move the raised pen by hand
+    Jog(JogArgs),
+    /// Raise the pen, or lower it for a moment
+    Pen(PenArgs),
+    /// Change settings of the machine
+    Set(SetArgs),
+    /// List, save and restore the settings of the machine
+    #[command(subcommand)]
+    Settings(SettingsCommand),
+    /// Draw the last job again, which the plotter has kept
+    Again(PlotterArgs),
+    /// Talk to a plotter line by line
+    Console(PortArgs),
+    /// Print the completions for a shell
+    Completions {
+        /// The shell
+        #[arg(value_enum)]
+        shell: Shell,
+    },
+    /// Print the manual page, or write those of all commands
+    Man {
+        /// The folder to write penup.1, penup-plot.1 and the others to
+        #[arg(value_name = "FOLDER")]
+        folder: Option<PathBuf>,
+    },
+}
+
+impl Command {
+    /// How the answer is printed; `None` if there is no choice.
+    fn format(&self) -> Option<&FormatArgs> {
+        Some(match self {
+            Self::Plot(args) => &args.format,
+            Self::Fit(args) => &args.format,
+            Self::Tape(TapeCommand::Encode(args)) => &args.format,
+            Self::Tape(TapeCommand::Show(args)) => &args.format,
+            Self::Ports(args) => &args.format,
+            Self::Watch(WatchArgs { plotter })
+            | Self::Pause(PauseArgs { plotter, .. })
+            | Self::Jog(JogArgs { plotter, .. })
+            | Self::Pen(PenArgs { plotter, .. })
+            | Self::Set(SetArgs { plotter, .. })
+            | Self::Settings(
+                SettingsCommand::Show(plotter)
+                | SettingsCommand::Save { plotter, .. }
+                | SettingsCommand::Restore { plotter, .. },
+            )
+            | Self::Status(plotter)
+            | Self::Resume(plotter)
+            | Self::Abort(plotter)
+            | Self::Home(plotter)
+            | Self::Unlock(plotter)
+            | Self::Again(plotter) => &plotter.format,
+            Self::Preview(_)
+            | Self::Tape(TapeCommand::Decode { .. })
+            | Self::Console(_)
+            | Self::Completions { .. }
+            | Self::Man { .. } => return None,
+        })
+    }
 }
 
 /// What to do with a tape.
@@ -56,6 +154,9 @@ pub enum TapeCommand {
 /// Options of `penup tape encode`.
 #[derive(Debug, Args)]
 pub struct TapeEncodeArgs {
+    /// How the answer is printed.
+    #[command(flatten)]
+    pub format: FormatArgs,
     /// The file to record.
     #[arg(value_name = "FILE", help = file_help("The file to record"))]
     pub file: PathBuf,
@@ -70,6 +171,9 @@ pub struct TapeEncodeArgs {
 /// Options of `penup tape show`.
 #[derive(Debug, Args)]
 pub struct TapeShowArgs {
+    /// How the answer is printed.
+    #[command(flatten)]
+    pub format: FormatArgs,
     /// The tape
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
@@ -98,6 +202,9 @@ fn file_help(what: &str) -> String {
 /// Options of `penup plot`.
 #[derive(Debug, Args)]
 pub struct PlotArgs {
+    /// How the answer is printed.
+    #[command(flatten)]
+    pub format: FormatArgs,
     /// The file to draw; the default is an example.
     #[arg(
         value_name = "FILE",
@@ -112,10 +219,11 @@ pub struct PlotArgs {
         help_heading = "Plotter"
     )]
     pub board: &'static BoardRow,
-    /// The serial port of a real plotter, such as /dev/ttyUSB0 or COM3
+    /// The serial port of a real plotter.
     #[arg(
         long,
         value_name = "DEVICE",
+        help = machine::port_help(),
         conflicts_with_all = ["board", "svg", "png"],
         help_heading = "Plotter"
     )]
@@ -170,6 +278,9 @@ pub struct PreviewArgs {
 /// Options of `penup fit`.
 #[derive(Debug, Args)]
 pub struct FitArgs {
+    /// How the answer is printed.
+    #[command(flatten)]
+    pub format: FormatArgs,
     /// The file with the polylines, a plan in mm.
     #[arg(value_name = "FILE", help = file_help("The file with the polylines, a plan in mm"))]
     pub file: PathBuf,

@@ -4,6 +4,7 @@ use crate::fit::FitError;
 use crate::formats::ReadError;
 use crate::interrupt::EXIT_CODE;
 use crate::lines::{JobLine, Origin};
+use crate::operate::SettingsFileError;
 use crate::protocol::RECEIVE_WINDOW;
 use crate::words::{as_option, explained, for_client};
 use penup::protocol::{CommandError, alarm_entries};
@@ -46,6 +47,52 @@ pub enum Error {
         device: String,
         /// The error of the serial port library.
         source: serialport::Error,
+    },
+    /// The system cannot list its serial ports.
+    #[error("cannot look for serial ports: {source}\nName the port by --port")]
+    Ports {
+        /// The error of the serial port library.
+        source: serialport::Error,
+    },
+    /// No plotter was found.
+    #[error("there is no plotter: {}\nName its port by --port if it has one", looked_at(looked))]
+    NoPlotter {
+        /// The ports that were looked at, with what was found there.
+        looked: Vec<String>,
+    },
+    /// More than one plotter was found.
+    #[error("there are {} plotters: choose one by --port {}", devices.len(), devices.join(" or "))]
+    SeveralPlotters {
+        /// Their ports.
+        devices: Vec<String>,
+    },
+    /// The machine does nothing that the order would change.
+    #[error("there is nothing to {order}: the plotter reports {state}")]
+    NothingToDo {
+        /// The order, as a verb.
+        order: &'static str,
+        /// The state that the plotter reports.
+        state: String,
+    },
+    /// The plotter did not confirm an order.
+    #[error("the plotter did not confirm that it obeyed ({order}): look after it")]
+    Unconfirmed {
+        /// The order, as a verb.
+        order: &'static str,
+    },
+    /// A file holds no settings of a machine.
+    #[error("{file}: {source}")]
+    SettingsFile {
+        /// The path as the user wrote it.
+        file: String,
+        /// What is wrong with it.
+        source: SettingsFileError,
+    },
+    /// The machine reports another value of a setting than it was sent and has accepted.
+    #[error("setting {number} did not take: does another program change it at the same time?")]
+    NotSet {
+        /// The number of the setting.
+        number: u16,
     },
     /// The plotter's library, running on this computer, refuses to draw the model.
     #[error("cannot draw it: {}", explained(refusal.number(), &[refusal.to_string()]))]
@@ -213,14 +260,79 @@ pub enum Error {
     InterruptedUnconfirmed,
 }
 
+/// A result of the program that a script can act on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ExitCode {
+    /// The exit code of the process.
+    pub number: u8,
+    /// When the program ends so.
+    pub meaning: &'static str,
+}
+
+/// The exit codes of the program.
+pub const EXIT_CODES: [ExitCode; 7] = [
+    ExitCode { number: 0, meaning: "done" },
+    ExitCode {
+        number: NOT_DONE,
+        meaning: "a file cannot be read, drawn or written, or the emulator fails",
+    },
+    ExitCode { number: 2, meaning: "the command line is not understood" },
+    ExitCode { number: NO_PLOTTER, meaning: "there is no plotter, or something else answers" },
+    ExitCode { number: REFUSED, meaning: "the plotter is busy, or refuses what it was sent" },
+    ExitCode { number: BROKEN_OFF, meaning: "the work broke off: alarm, restart, broken line" },
+    ExitCode { number: EXIT_CODE, meaning: "given up by Ctrl-C" },
+];
+
+const NOT_DONE: u8 = 1;
+const NO_PLOTTER: u8 = 3;
+const REFUSED: u8 = 4;
+const BROKEN_OFF: u8 = 5;
+
 impl Error {
-    /// The exit code of the process: 130 after Ctrl-C, as shells report it, and 1 for every other
-    /// error.
+    /// The exit code of the process, one of [`EXIT_CODES`].
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Interrupted | Self::InterruptedUnconfirmed => EXIT_CODE,
-            _ => 1,
+            Self::Port { .. }
+            | Self::Ports { .. }
+            | Self::NoPlotter { .. }
+            | Self::SeveralPlotters { .. }
+            | Self::NotPenup { .. }
+            | Self::Silent { line: None, .. } => NO_PLOTTER,
+            Self::NotReady { .. }
+            | Self::NothingToDo { .. }
+            | Self::WithoutNumbers
+            | Self::NotSet { .. }
+            | Self::Refused { .. } => REFUSED,
+            Self::Silent { line: Some(_), .. }
+            | Self::LostLine { .. }
+            | Self::Alarm { .. }
+            | Self::Restarted
+            | Self::Damaged { .. }
+            | Self::OtherContents
+            | Self::Held
+            | Self::Unconfirmed { .. }
+            | Self::Link(_) => BROKEN_OFF,
+            Self::Read(_)
+            | Self::Fit { .. }
+            | Self::Tape { .. }
+            | Self::SettingsFile { .. }
+            | Self::NotDrawn { .. }
+            | Self::Board { .. }
+            | Self::EmulatorBroke { .. }
+            | Self::Write { .. }
+            | Self::OutputIsInput { .. }
+            | Self::OutputTwice { .. }
+            | Self::Picture(_) => NOT_DONE,
         }
+    }
+}
+
+/// Lists the ports that were looked at.
+fn looked_at(looked: &[String]) -> String {
+    match looked.is_empty() {
+        true => "this computer has no serial port on USB".to_owned(),
+        false => looked.join("; "),
     }
 }
 

@@ -5,8 +5,8 @@
 //! bytes even inside a line. Time passes only while the client waits for bytes.
 
 use crate::lines::JobLine;
-use crate::link::{Answer, Link};
-use crate::protocol::{ABORT, CLEAR, END, MODEL, PLOT};
+use crate::link::{Answer, Link, Order};
+use crate::protocol::{ABORT, AGAIN, CLEAR, END, FASTER, HOLD, MODEL, PLOT, RESUME, SLOWER};
 use crate::twin;
 use penup::checksum::CRC_16;
 use penup::protocol::{CommandError, Label, Named, Numbering, Received};
@@ -77,6 +77,12 @@ pub struct FakePlotter {
     /// The user's successive answers to the question whether to resume. When they are used up,
     /// nobody answers.
     pub user: VecDeque<Answer>,
+    /// What the user asks for by keys, in order, each after this number of strokes.
+    pub keys: VecDeque<(u64, Order)>,
+    /// The speeds in percent of those in its settings.
+    pub percent: u16,
+    /// The states in which it stood after it was told to hold, counted.
+    pub holds: usize,
     /// The number of status reports that it sends while it computes the picture. Meanwhile it reads
     /// no lines.
     pub reports_while_computing: usize,
@@ -89,6 +95,11 @@ pub struct FakePlotter {
     /// When the answer to a status query is due, while it computes.
     answer_due: Option<Duration>,
     drawn: Option<u64>,
+    /// The number of strokes of the last drawing, for the reports after its end.
+    finished: u64,
+    is_held: bool,
+    /// The number of status reports since the last key.
+    reports: u32,
     numbering: Numbering,
     clock: Duration,
     began: Option<Instant>,
@@ -100,7 +111,12 @@ impl FakePlotter {
 
     /// Creates a plotter with `fault` whose drawings have three strokes.
     pub fn new(fault: Fault) -> Self {
-        Self { fault, strokes: 3, began: Some(Instant::now()), ..Self::default() }
+        Self { fault, strokes: 3, percent: 100, began: Some(Instant::now()), ..Self::default() }
+    }
+
+    /// Begins to draw what a client has sent that is gone.
+    pub fn draw_on(&mut self) {
+        self.drawn = Some(0);
     }
 
     fn say(&mut self, line: &str) {
@@ -116,10 +132,18 @@ impl FakePlotter {
     }
 
     fn report(&mut self) {
+        self.reports += 1;
         let Some(drawn) = self.drawn else {
             let state = if self.fault == Fault::Busy { "Run" } else { "Idle" };
-            return self.say(&format!("<{state}|MPos:0.000,0.000>"));
+            let all = self.finished;
+            return self.say(&format!(
+                "<{state}|MPos:0.000,0.000|Strokes:{all}/{all}|Ink:{all}/{all}|Left:0>"
+            ));
         };
+        let all = self.strokes;
+        if self.is_held {
+            return self.say(&format!("<Hold:0|MPos:4.000,2.000|Strokes:{drawn}/{all}>"));
+        }
         if let Some((stroke, pen)) = self.pen_before
             && stroke == drawn
         {
@@ -130,17 +154,26 @@ impl FakePlotter {
         if self.hold_before == Some(drawn) {
             return self.say(&format!("<Hold:0|MPos:3.000,2.000|Strokes:{drawn}/9>"));
         }
-        self.say(&format!("<Run|MPos:1.000,2.000|Strokes:{drawn}/{}>", self.strokes));
+        let (done, left) = (10 * drawn, all - drawn);
+        let speed = match self.percent {
+            100 => String::new(),
+            percent => format!("|Ov:{percent},100,100"),
+        };
+        self.say(&format!(
+            "<Run|MPos:1.000,2.000{speed}|Strokes:{drawn}/{all}|Ink:{done}/{}|Left:{left}>",
+            10 * all
+        ));
         if let Fault::AlarmWhileDrawing(number) = self.fault {
             self.say(&format!("ALARM:{number}"));
         }
         self.drawn = (drawn < self.strokes).then_some(drawn + 1);
+        self.finished = self.strokes;
     }
 
     fn abort(&mut self) {
         self.aborts += 1;
         self.queue.clear();
-        self.drawn = None;
+        (self.drawn, self.is_held) = (None, false);
         self.numbering = Numbering::default();
         match self.fault {
             Fault::NotPenup => self.say("Grbl 1.1h ['$' for help]"),
@@ -195,7 +228,7 @@ impl FakePlotter {
                     self.plot = Some(label);
                     return;
                 }
-                if text == PLOT {
+                if text == PLOT || text == AGAIN {
                     self.drawn = Some(0);
                 }
                 self.numbering.note(label, outcome);
@@ -272,7 +305,16 @@ impl Link for FakePlotter {
                 }
                 b'?' => self.report(),
                 ABORT => self.abort(),
-                b'~' => (self.pen_before, self.hold_before) = (None, None),
+                RESUME => {
+                    (self.pen_before, self.hold_before) = (None, None);
+                    self.is_held = false;
+                }
+                HOLD if self.drawn.is_some() => {
+                    self.is_held = true;
+                    self.holds += 1;
+                }
+                FASTER => self.percent += 10,
+                SLOWER => self.percent -= 10,
                 _ if self.queue.len() < Self::QUEUE => self.queue.push(byte),
                 _ => self.overflowed = true,
             }
@@ -300,6 +342,15 @@ impl Link for FakePlotter {
     fn change_pen(&mut self, pen: u8) -> io::Result<bool> {
         self.requested_pens.push(pen);
         Ok(self.requested_pens.len() == 2)
+    }
+
+    fn order(&mut self) -> Option<Order> {
+        // A user looks at what the last key did before the next one.
+        let drawn = self.drawn.filter(|_| self.reports >= 3)?;
+        let (_, order) = *self.keys.front().filter(|(stroke, _)| *stroke <= drawn)?;
+        self.keys.pop_front();
+        self.reports = 0;
+        Some(order)
     }
 
     fn ask_to_resume(&mut self, _first: bool) -> io::Result<Answer> {

@@ -65,6 +65,7 @@ pub fn ctrl_c(interrupt: &AtomicBool) {
         // The error is ignored: the file may just have been renamed.
         let _ = fs::remove_file(file);
     }
+    crate::keyboard::restore();
     let mut stderr = io::stderr();
     // The message overwrites a progress bar.
     let clear = if stderr.is_terminal() { "\r\x1b[2K" } else { "" };

@@ -8,6 +8,9 @@
 //! [`watch`] follows the pen, [`picture`] renders its path on the [`page`], and [`output`] writes
 //! the files. [`results`] are what is known about a job afterwards.
 //!
+//! [`operate`] are the commands for the machine itself, [`ports`] finds it, and [`keyboard`] are
+//! the keys that act while it draws. Every command returns an [`outcome`].
+//!
 //! [`tape`] records a job as single motor steps, and [`motion_plot`] plots its speed. [`words`]
 //! translates the plotter's messages into the terms of the command line.
 
@@ -19,14 +22,19 @@ pub mod fake;
 pub mod fit;
 pub mod formats;
 pub mod interrupt;
+pub mod keyboard;
 pub mod job;
 pub mod lines;
 pub mod link;
 pub mod machines;
+pub mod manual;
 pub mod motion_plot;
+pub mod operate;
+pub mod outcome;
 pub mod output;
 pub mod page;
 pub mod picture;
+pub mod ports;
 pub mod preview;
 pub mod progress;
 pub mod protocol;

@@ -4,6 +4,8 @@
 //! port, an emulated board, the library in memory and the fake plotter of the tests are therefore
 //! all driven by the same code.
 
+use crate::keyboard::{Key, Keyboard};
+use std::collections::VecDeque;
 use std::io;
 use std::sync::mpsc::{self, Receiver, TryRecvError};
 use std::time::{Duration, Instant};
@@ -17,6 +19,19 @@ pub enum Answer {
     NotYet,
     /// There is nobody to ask, for instance because the standard input is closed.
     Nobody,
+}
+
+/// What a user beside the plotter asks for by a key while it draws.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Order {
+    /// Pause, or go on after a pause.
+    Pause,
+    /// All speeds up by a tenth.
+    Faster,
+    /// All speeds down by a tenth.
+    Slower,
+    /// Give the job up.
+    GiveUp,
 }
 
 /// A connection to a plotter that carries bytes in both directions.
@@ -52,6 +67,11 @@ pub trait Link {
         Ok(Answer::Nobody)
     }
 
+    /// What the user has asked for since the last call, one order at a time.
+    fn order(&mut self) -> Option<Order> {
+        None
+    }
+
     /// The current time, which the sender uses for all its timeouts. A simulated plotter may return
     /// simulated time.
     fn now(&self) -> Instant {
@@ -66,6 +86,12 @@ pub struct SerialLink {
     /// Receives a message for each line that the user types; created when the user is asked for the
     /// first time.
     typed: Option<Receiver<()>>,
+    /// The keys of the terminal, once they were taken.
+    keyboard: Option<Keyboard>,
+    /// The orders that were typed and not yet asked for.
+    orders: VecDeque<Order>,
+    /// Whether Enter was pressed since the last question.
+    is_answered: bool,
 }
 
 /// Starts a thread that sends a message for each line on the standard input. The thread runs until
@@ -89,7 +115,32 @@ impl SerialLink {
     /// There is no such port, another program uses it, or the user has no permission to open it.
     pub fn open(device: &str) -> Result<Self, serialport::Error> {
         let port = serialport::new(device, BAUD).open()?;
-        Ok(Self { port, requested_pen: None, typed: None })
+        let orders = VecDeque::new();
+        Ok(Self {
+            port,
+            requested_pen: None,
+            typed: None,
+            keyboard: None,
+            orders,
+            is_answered: false,
+        })
+    }
+
+    /// Obeys the keys of the terminal from now on ([`crate::keyboard`]). Returns whether there is a
+    /// terminal.
+    pub fn obey_keys(&mut self) -> bool {
+        self.keyboard = Keyboard::take();
+        self.keyboard.is_some()
+    }
+
+    /// Collects the keys that were pressed.
+    fn read_keys(&mut self) {
+        while let Some(key) = self.keyboard.as_mut().and_then(Keyboard::key) {
+            match key {
+                Key::Enter => self.is_answered = true,
+                Key::Order(order) => self.orders.push_back(order),
+            }
+        }
     }
 }
 
@@ -128,12 +179,27 @@ impl Link for SerialLink {
              the line.\nPress Enter to let it go on, or Ctrl-C to give the plot up",
         ))
     }
+
+    fn order(&mut self) -> Option<Order> {
+        self.read_keys();
+        self.orders.pop_front()
+    }
 }
 
 impl SerialLink {
     /// Returns whether the user has pressed Enter since the `first` call for this question, which
     /// prints it.
     fn ask(&mut self, first: bool, question: &str) -> Answer {
+        if self.keyboard.is_some() {
+            self.read_keys();
+            if first {
+                // A progress bar stands in this line.
+                eprintln!("\r\x1b[2K{question}");
+                self.is_answered = false;
+            }
+            let is_answered = std::mem::take(&mut self.is_answered);
+            return if is_answered { Answer::Yes } else { Answer::NotYet };
+        }
         let typed = self.typed.get_or_insert_with(typed_lines);
         if first {
             // Lines that were typed before the question do not count.

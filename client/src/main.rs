@@ -4,7 +4,9 @@ use clap::Parser;
 use penup_client::cli::Cli;
 use penup_client::error::Error;
 use penup_client::interrupt;
+use penup_client::outcome::Outcome;
 use penup_client::run::run;
+use serde_json::json;
 use std::io::{self, Write};
 use std::process::ExitCode;
 use std::sync::atomic::AtomicBool;
@@ -15,9 +17,16 @@ fn main() -> ExitCode {
     let cli = Cli::parse();
     // A failure is ignored: without a handler, Ctrl-C still ends the process.
     let _ = ctrlc::set_handler(|| interrupt::ctrl_c(&INTERRUPT));
-    match run(&cli, &INTERRUPT).and_then(|sentence| say(&sentence)) {
+    match run(&cli, &INTERRUPT).and_then(|outcome| say(&cli, &outcome)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
+            if cli.is_json() {
+                // The exit code and the standard error tell the same.
+                let _ = print(
+                    &json!({ "error": error.to_string(), "exit_code": error.exit_code() })
+                        .to_string(),
+                );
+            }
             // If the standard error cannot be written to, the exit code still reports the failure.
             let _ = writeln!(io::stderr(), "penup: {error}");
             ExitCode::from(error.exit_code())
@@ -25,9 +34,20 @@ fn main() -> ExitCode {
     }
 }
 
-fn say(sentence: &str) -> Result<(), Error> {
+/// Prints what a command has to say, as far as the user wants to know it.
+fn say(cli: &Cli, outcome: &Outcome) -> Result<(), Error> {
+    if cli.is_json() {
+        print(&outcome.json.to_string())
+    } else if outcome.text.is_empty() || cli.quiet && !outcome.is_answer {
+        Ok(())
+    } else {
+        print(&outcome.text)
+    }
+}
+
+fn print(text: &str) -> Result<(), Error> {
     let mut stdout = io::stdout();
-    match writeln!(stdout, "{sentence}").and_then(|()| stdout.flush()) {
+    match writeln!(stdout, "{text}").and_then(|()| stdout.flush()) {
         // The reader of the pipe closed it early, as `head` does. This is no error.
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
         result => {

@@ -14,12 +14,21 @@ use std::path::{Path, PathBuf, is_separator};
 /// # Errors
 /// The first problem that is found, with the name of the file.
 pub fn check(input: &Path, outputs: &[&Path]) -> Result<(), Error> {
+    let input = identity(input);
+    if let Some(output) = outputs.iter().find(|output| identity(output) == input) {
+        return Err(Error::OutputIsInput { output: output.display().to_string() });
+    }
+    check_outputs(outputs)
+}
+
+/// Like [`check`], where no file is read.
+///
+/// # Errors
+/// As [`check`].
+pub fn check_outputs(outputs: &[&Path]) -> Result<(), Error> {
     let name = |path: &Path| path.display().to_string();
     for (index, output) in outputs.iter().enumerate() {
         let file = identity(output);
-        if file == identity(input) {
-            return Err(Error::OutputIsInput { output: name(output) });
-        }
         if let Some(first) = outputs[..index].iter().find(|first| identity(first) == file) {
             return Err(Error::OutputTwice { first: name(first), second: name(output) });
         }

@@ -14,6 +14,20 @@ pub const CLEAR: &str = "$clear";
 pub const MODEL: &str = "$model";
 /// Draws the model with the current settings.
 pub const PLOT: &str = "$plot";
+/// Draws the last job again, which the plotter has kept.
+pub const AGAIN: &str = "$again";
+/// Queries version, board and limits.
+pub const BUILD: &str = "$I";
+/// Lists the settings of the machine.
+pub const SETTINGS: &str = "$$";
+/// Finds the limit switches.
+pub const HOME: &str = "$H";
+/// Unlocks the machine after an alarm, and wakes it.
+pub const UNLOCK: &str = "$X";
+/// Lowers the pen. The plotter raises it again when no more lines come.
+pub const PEN_DOWN: &str = "M3";
+/// Raises the pen.
+pub const PEN_UP: &str = "M5";
 
 /// Lets the plotter choose the camera. Later camera settings override its choice one by one.
 pub const VIEW_AUTO: &str = "$view=auto";
@@ -44,8 +58,16 @@ pub fn numbered(number: Option<i32>, text: &str) -> String {
 
 /// Queries a status report. The plotter answers at once, even between two lines.
 pub const STATUS_QUERY: u8 = b'?';
+/// Holds: the machine slows down on its path and raises the pen.
+pub const HOLD: u8 = b'!';
+/// Pauses at the end of the stroke that is being drawn.
+pub const PAUSE_AFTER_STROKE: u8 = 0xFB;
 /// Resumes after a feed hold.
 pub const RESUME: u8 = b'~';
+/// Lowers or raises all speeds by a tenth of those in the settings.
+pub const SLOWER: u8 = 0x92;
+/// See [`SLOWER`].
+pub const FASTER: u8 = 0x91;
 /// Aborts whatever is going on, raises the pen and makes the plotter answer with its greeting.
 pub const ABORT: u8 = 0x18;
 
@@ -107,12 +129,24 @@ pub enum Reply {
 }
 
 /// A status report, `<State|Key:value|...>`.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Status {
     /// The state without its sub-state: Idle, Run, Hold, Alarm and so on.
     pub state: String,
+    /// Whether the machine stands in a feed hold (`Hold:0`), no longer slowing down.
+    pub is_standing: bool,
     /// The numbers of `Strokes:done/all`, which is reported during a drawing.
     pub strokes: Option<(u64, u64)>,
+    /// The lengths of `Ink:done/all`, drawn and to draw, in whole mm.
+    pub ink: Option<(u64, u64)>,
+    /// The seconds of `Left:seconds` until the end of the job.
+    pub seconds_left: Option<u64>,
+    /// The stage that the plotter computes: view, visibility or order.
+    pub stage: Option<String>,
+    /// The speeds in percent of those in the settings.
+    pub percent: u16,
+    /// The letters of the contacts that are pressed: X, Y, and E for the emergency stop.
+    pub contacts: String,
     /// Whether the plotter is computing a picture, during which it reads no lines.
     pub is_computing: bool,
     /// The number of `Alarm:number`, which is reported after an alarm.
@@ -127,6 +161,11 @@ impl Status {
     /// Whether the machine is in feed hold or decelerates for one.
     pub fn is_holding(&self) -> bool {
         self.state == "Hold"
+    }
+
+    /// Whether the machine is locked after an alarm.
+    pub fn is_alarm(&self) -> bool {
+        self.state == "Alarm"
     }
 
     /// Whether the plotter is ready for a job.
@@ -204,13 +243,24 @@ fn parse_status(report: &str) -> Option<Status> {
     let full_state = fields.next().unwrap_or_default();
     let state = full_state.split(':').next().filter(|state| STATES.contains(state))?.to_owned();
     let field = |name: &str| fields.clone().find_map(|field| field.strip_prefix(name));
-    let strokes = field("Strokes:").and_then(|strokes| strokes.split_once('/'));
-    let strokes = strokes.and_then(|(done, all)| Some((done.parse().ok()?, all.parse().ok()?)));
-    let pen_wanted = field("Pen:").filter(|_| full_state == "Hold:0");
+    let done_of_all = |name| {
+        let (done, all): (&str, &str) = field(name)?.split_once('/')?;
+        Some((done.parse().ok()?, all.parse().ok()?))
+    };
+    let percent = field("Ov:").and_then(|percents| percents.split(',').next()?.parse().ok());
+    let is_standing = full_state == "Hold:0";
+    let pen_wanted = field("Pen:").filter(|_| is_standing);
+    let stage = field("Stage:");
     Some(Status {
         state,
-        strokes,
-        is_computing: field("Stage:").is_some(),
+        is_standing,
+        strokes: done_of_all("Strokes:"),
+        ink: done_of_all("Ink:"),
+        seconds_left: field("Left:").and_then(|seconds| seconds.parse().ok()),
+        stage: stage.map(str::to_owned),
+        percent: percent.unwrap_or(100),
+        contacts: field("Pn:").unwrap_or_default().to_owned(),
+        is_computing: stage.is_some(),
         alarm: field("Alarm:").and_then(|alarm| alarm.parse().ok()),
         pen_wanted: pen_wanted.and_then(|pen| pen.parse().ok()),
         position: field("MPos:").unwrap_or_default().to_owned(),
@@ -284,6 +334,30 @@ mod tests {
         let mut long = vec![b'x'; 3000];
         long.extend_from_slice(b"\nok\n");
         assert_eq!(replies(&long).last(), Some(&Reply::Ok));
+    }
+
+    #[test]
+    fn a_status_tells_ink_time_and_speed() {
+        let status = |line| match Reply::parse(line) {
+            Reply::Status(status) => status,
+            other => panic!("{other:?}"),
+        };
+        let run =
+            "<Run|MPos:1.000,2.000,0.000|Ov:120,100,100|Pn:XE|Strokes:3/12|Ink:40/90|Left:75>";
+        let run = status(run);
+        assert_eq!(
+            (run.strokes, run.ink, run.seconds_left),
+            (Some((3, 12)), Some((40, 90)), Some(75))
+        );
+        assert_eq!((run.percent, run.contacts.as_str(), run.stage.as_deref()), (120, "XE", None));
+        assert!(
+            status("<Hold:0|MPos:1,2>").is_standing && !status("<Hold:1|MPos:1,2>").is_standing
+        );
+        let computing = status("<Run|MPos:0,0,0|Stage:order>");
+        assert_eq!(
+            (computing.stage.as_deref(), computing.ink, computing.percent),
+            (Some("order"), None, 100)
+        );
     }
 
     #[test]

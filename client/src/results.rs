@@ -1,7 +1,7 @@
 //! The results of a job: what was drawn, its lengths, and the times of computing it.
 
 use crate::page::{PagePoint, PenRuns};
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 use std::fmt;
 use std::ops::Add;
 
@@ -100,16 +100,24 @@ impl Lengths {
 ///
 /// The lengths are those of the lines of the drawing, not those of the motor steps that approximate
 /// them.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct JobReport {
     /// How often the pen is lowered, except for the dashes of dotted lines.
     pub strokes: u64,
     /// The length drawn in mm, as the plotter reports it: with one decimal.
+    #[serde(serialize_with = "as_number")]
     pub pen_down_mm: String,
     /// The length of the moves between strokes in mm, with one decimal.
+    #[serde(serialize_with = "as_number")]
     pub pen_up_mm: String,
     /// The length drawn divided by the length of all moves, in %.
+    #[serde(serialize_with = "as_number", rename = "efficiency_percent")]
     pub efficiency: String,
+}
+
+/// Writes a decimal of the plotter as a number.
+fn as_number<S: Serializer>(decimal: &str, serializer: S) -> Result<S::Ok, S::Error> {
+    decimal.parse::<f64>().ok().serialize(serializer)
 }
 
 impl JobReport {

@@ -1,19 +1,24 @@
 //! Runs the commands of the command line.
 
 use crate::cli::{
-    Cli, Command, FitArgs, PictureArgs, PlotArgs, PreviewArgs, TapeCommand, TapeEncodeArgs,
-    TapeShowArgs, ViewArgs,
+    Cli, Command, FitArgs, PictureArgs, PlotArgs, PreviewArgs, SettingsCommand, TapeCommand,
+    TapeEncodeArgs, TapeShowArgs, ViewArgs,
 };
 use crate::error::Error;
 use crate::fit::fit_obj;
 use crate::formats::{ReadError, SourceFile};
 use crate::interrupt::MovingPlotter;
 use crate::job::{Job, Settings};
+use crate::keyboard::KEYS;
 use crate::lines::Lines;
-use crate::link::{Link, SerialLink};
+use crate::link::Link;
 use crate::machines;
+use crate::manual;
+use crate::operate;
+use crate::outcome::Outcome;
 use crate::output;
 use crate::picture::{self, Picture};
+use crate::ports;
 use crate::preview::InMemory;
 use crate::progress::{Bar, Progress};
 use crate::results::JobReport;
@@ -21,30 +26,55 @@ use crate::sender::{Patience, Sender};
 use crate::tape;
 use crate::workspace;
 use penup::step::tape::BadCode;
+use serde_json::{Value, json};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-/// Runs the command and returns the sentence to print for the user.
+/// Runs the command and returns what it has to say.
 ///
 /// When a signal handler sets `interrupt`, the machine stops with the pen up.
 ///
 /// # Errors
 /// See [`Error`]. No output file is written if the command fails before the writing.
-pub fn run(cli: &Cli, interrupt: &AtomicBool) -> Result<String, Error> {
+pub fn run(cli: &Cli, interrupt: &AtomicBool) -> Result<Outcome, Error> {
+    let quiet = cli.quiet;
     match &cli.command {
-        Command::Plot(args) => plot(args, interrupt),
-        Command::Preview(args) => preview(args, interrupt),
-        Command::Fit(args) => fit(args),
-        Command::Tape(TapeCommand::Encode(args)) => encode_tape(args, interrupt),
+        Command::Plot(args) => plot(args, quiet, interrupt),
+        Command::Preview(args) => preview(args, quiet, interrupt),
+        Command::Fit(args) => fit(args, quiet),
+        Command::Tape(TapeCommand::Encode(args)) => encode_tape(args, quiet, interrupt),
         Command::Tape(TapeCommand::Decode { file }) => {
-            Ok(tape::decode(&read_tape(file)?).map_err(damaged(file))?.trim_end().to_owned())
+            let text = tape::decode(&read_tape(file)?).map_err(damaged(file))?;
+            Ok(Outcome::answer(text.trim_end(), Value::Null))
         }
         Command::Tape(TapeCommand::Show(args)) => show_tape(args),
+        Command::Ports(args) => operate::ports(args),
+        Command::Status(args) => operate::status(args, interrupt),
+        Command::Watch(args) => operate::watch(args, quiet, interrupt),
+        Command::Pause(args) => operate::pause(args, interrupt),
+        Command::Resume(args) => operate::resume(args, interrupt),
+        Command::Abort(args) => operate::abort(args, interrupt),
+        Command::Home(args) => operate::home(args, interrupt),
+        Command::Unlock(args) => operate::unlock(args, interrupt),
+        Command::Jog(args) => operate::jog(args, interrupt),
+        Command::Pen(args) => operate::pen(args, interrupt),
+        Command::Set(args) => operate::set(args, interrupt),
+        Command::Settings(SettingsCommand::Show(args)) => operate::show(args, interrupt),
+        Command::Settings(SettingsCommand::Save { file, plotter }) => {
+            operate::save(file.as_deref(), plotter, interrupt)
+        }
+        Command::Settings(SettingsCommand::Restore { file, plotter }) => {
+            operate::restore(file, plotter, interrupt)
+        }
+        Command::Again(args) => operate::again(args, quiet, interrupt),
+        Command::Console(args) => operate::console(args, interrupt),
+        Command::Completions { shell } => Ok(manual::completions(*shell)),
+        Command::Man { folder } => manual::pages(folder.as_deref()),
     }
 }
 
-fn plot(args: &PlotArgs, interrupt: &AtomicBool) -> Result<String, Error> {
+fn plot(args: &PlotArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outcome, Error> {
     // Without a file, a small example is drawn.
     let example = || workspace::root().join("scenes/interpen.obj");
     let file = args.file.clone().unwrap_or_else(example);
@@ -52,16 +82,19 @@ fn plot(args: &PlotArgs, interrupt: &AtomicBool) -> Result<String, Error> {
     if args.port.is_none() {
         output::check(&file, &outputs.files())?;
     }
-    let (source, settings) = read(&file, &args.view)?;
+    let (source, settings) = read(&file, &args.view, quiet)?;
     let job = Job::new(source, &settings);
-    let mut bar = Bar::default();
+    let mut bar = Bar::new(quiet);
     if let Some(device) = &args.port {
-        let mut link = SerialLink::open(device)
-            .map_err(|source| Error::Port { device: device.clone(), source })?;
+        let mut link = ports::open(device)?;
         let _moving = MovingPlotter::new();
+        if link.obey_keys() && !quiet {
+            note_keys();
+        }
         let report = draw(&mut link, &job, interrupt, &mut bar)?;
-        let report = report.map(|report| format!(": {report}")).unwrap_or_default();
-        return Ok(format!("{} is drawn{report}", file.display()));
+        let text = report.as_ref().map(|report| format!(": {report}")).unwrap_or_default();
+        let json = json!({ "file": file.display().to_string(), "drawn": report });
+        return Ok(Outcome::done(format!("{} is drawn{text}", file.display()), json));
     }
     // On Linux the kernel ends the emulator together with this program. On other systems this
     // program must end it, so Ctrl-C must not exit at once.
@@ -80,12 +113,12 @@ fn plot(args: &PlotArgs, interrupt: &AtomicBool) -> Result<String, Error> {
     Ok(summary(&files, report))
 }
 
-fn preview(args: &PreviewArgs, interrupt: &AtomicBool) -> Result<String, Error> {
+fn preview(args: &PreviewArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outcome, Error> {
     let outputs = Outputs::of(&args.pictures, args.json.as_deref(), args.motion.as_deref());
     output::check(&args.file, &outputs.files())?;
-    let (source, settings) = read(&args.file, &args.view)?;
+    let (source, settings) = read(&args.file, &args.view, quiet)?;
     let job = Job::new(source, &settings);
-    let mut bar = Bar::default();
+    let mut bar = Bar::new(quiet);
     let mut plotter = InMemory::new();
     let report = draw(&mut plotter, &job, interrupt, &mut bar)?;
     let mut result = plotter.result()?;
@@ -111,49 +144,64 @@ fn preview(args: &PreviewArgs, interrupt: &AtomicBool) -> Result<String, Error> 
     Ok(summary(&files, report))
 }
 
-fn fit(args: &FitArgs) -> Result<String, Error> {
+/// Says which keys act from now on.
+fn note_keys() {
+    // A closed standard error is no reason to fail.
+    let _ = writeln!(io::stderr(), "penup: while it draws, {KEYS}");
+}
+
+fn fit(args: &FitArgs, quiet: bool) -> Result<Outcome, Error> {
     let file = args.file.display().to_string();
     let stem = args.file.file_stem().unwrap_or_default().to_string_lossy();
     let beside = || args.file.with_file_name(format!("{stem}-fitted.obj"));
     let output = args.output.clone().unwrap_or_else(beside);
     output::check(&args.file, &[&output])?;
     let source = SourceFile::read(&args.file)?;
-    note(&args.file, source.notes());
-    let mut bar = Bar::default();
+    if !quiet {
+        note(&args.file, source.notes());
+    }
+    let mut bar = Bar::new(quiet);
     let fitted =
         fit_obj(&source, source.size(), args.tolerance, &mut |done, all| bar.fitted(done, all))
             .map_err(|source| Error::Fit { file: file.clone(), source })?;
     drop(bar);
     output::write(&output, fitted.obj.as_bytes())?;
-    Ok(format!("{}: {}", output.display(), fitted.saving))
+    let text = format!("{}: {}", output.display(), fitted.saving);
+    Ok(Outcome::done(&text, json!({ "files": [output], "saving": fitted.saving.to_string() })))
 }
 
-fn encode_tape(args: &TapeEncodeArgs, interrupt: &AtomicBool) -> Result<String, Error> {
+fn encode_tape(
+    args: &TapeEncodeArgs,
+    quiet: bool,
+    interrupt: &AtomicBool,
+) -> Result<Outcome, Error> {
     let output = args.output.clone().unwrap_or_else(|| args.file.with_extension("tape"));
     output::check(&args.file, &[&output])?;
-    let (source, settings) = read(&args.file, &args.view)?;
+    let (source, settings) = read(&args.file, &args.view, quiet)?;
     let job = Job::new(source, &settings);
     let mut plotter = InMemory::new();
     {
-        let mut bar = Bar::default();
+        let mut bar = Bar::new(quiet);
         let mut sender = Sender::open(&mut plotter, Patience::default(), interrupt)?;
         sender.stream(&job, &mut bar)?;
         sender.end();
     }
     let tape = plotter.tape()?;
     output::write(&output, &tape)?;
-    Ok(format!("{}: {} bytes", output.display(), tape.len()))
+    let text = format!("{}: {} bytes", output.display(), tape.len());
+    Ok(Outcome::done(text, json!({ "files": [output], "bytes": tape.len() })))
 }
 
-fn show_tape(args: &TapeShowArgs) -> Result<String, Error> {
+fn show_tape(args: &TapeShowArgs) -> Result<Outcome, Error> {
     let outputs = Outputs::of(&args.pictures, None, None);
     output::check(&args.file, &outputs.files())?;
     let tape = read_tape(&args.file)?;
     let shown = tape::show(&tape, args.page, args.steps);
     let (picture, moves) = shown.map_err(damaged(&args.file))?;
     let files = write_pictures(&picture, &outputs)?;
-    let names: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
-    Ok(format!("{}: {moves} moves from {} bytes", names.join(", "), tape.len()))
+    let names = names(&files);
+    let text = format!("{}: {moves} moves from {} bytes", names.join(", "), tape.len());
+    Ok(Outcome::done(text, json!({ "files": names, "moves": moves, "bytes": tape.len() })))
 }
 
 fn read_tape(file: &Path) -> Result<Vec<u8>, Error> {
@@ -185,12 +233,14 @@ pub fn draw(
 }
 
 /// Reads `file`, tells the user what is not drawn as the file says, and chooses the settings.
-fn read(file: &Path, view: &ViewArgs) -> Result<(SourceFile, Settings), Error> {
+fn read(file: &Path, view: &ViewArgs, quiet: bool) -> Result<(SourceFile, Settings), Error> {
     let source = SourceFile::read(file)?;
     let settings = view.settings_on(source.page());
-    note(file, source.notes());
-    let moved = source.bounds().and_then(|bounds| settings.moves_plan(bounds));
-    note(file, moved.as_slice());
+    if !quiet {
+        note(file, source.notes());
+        let moved = source.bounds().and_then(|bounds| settings.moves_plan(bounds));
+        note(file, moved.as_slice());
+    }
     Ok((source, settings))
 }
 
@@ -249,8 +299,13 @@ fn write_pictures<'a>(picture: &Picture, outputs: &'a Outputs) -> Result<Vec<&'a
     Ok(files)
 }
 
-fn summary(files: &[&Path], report: Option<JobReport>) -> String {
-    let names: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
-    let report = report.map_or("drawn".to_owned(), |report| report.to_string());
-    format!("{}: {report}", names.join(", "))
+fn names(files: &[&Path]) -> Vec<String> {
+    files.iter().map(|path| path.display().to_string()).collect()
+}
+
+fn summary(files: &[&Path], report: Option<JobReport>) -> Outcome {
+    let names = names(files);
+    let text = report.as_ref().map_or("drawn".to_owned(), |report| report.to_string());
+    let json = json!({ "files": names, "drawn": report });
+    Outcome::done(format!("{}: {text}", names.join(", ")), json)
 }

@@ -15,13 +15,14 @@
 
 mod delivery;
 mod drawing;
+mod orders;
 mod patience;
 
 pub use patience::Patience;
 
 use crate::error::Error;
 use crate::lines::{JobLine, Lines};
-use crate::link::Link;
+use crate::link::{Link, Order};
 use crate::progress::{Progress, Quiet};
 use crate::protocol::{
     ABORT, END, LAST_NUMBER, MODEL, Reply, ReplyReader, STATUS_QUERY, Status, is_penup, numbered,
@@ -61,6 +62,10 @@ pub struct Sender<'a> {
     position: String,
     /// The checksums of the model and of the options, once the plotter has confirmed them.
     contents: Option<[u32; 2]>,
+    /// Whether a machine that is locked after an alarm is no failure.
+    allows_alarm: bool,
+    /// What the user beside the plotter has asked for and has not been done yet.
+    orders: VecDeque<Order>,
 }
 
 /// Computes the line to cite in an error; it is called only if there is an error.
@@ -80,8 +85,15 @@ impl<'a> Sender<'a> {
         patience: Patience,
         interrupt: &'a AtomicBool,
     ) -> Result<Self, Error> {
+        let mut sender = Self::new(link, patience, interrupt);
+        sender.take_over(Status::is_idle)?;
+        Ok(sender)
+    }
+
+    /// A conversation that has not begun.
+    fn new(link: &'a mut dyn Link, patience: Patience, interrupt: &'a AtomicBool) -> Self {
         let now = link.now();
-        let mut sender = Self {
+        Self {
             link,
             patience,
             interrupt,
@@ -94,17 +106,23 @@ impl<'a> Sender<'a> {
             strokes: 0,
             position: String::new(),
             contents: None,
-        };
-        let state = sender.find_state()?;
-        if !state.is_idle() {
-            return Err(Error::NotReady { state: state.state });
+            allows_alarm: false,
+            orders: VecDeque::new(),
         }
-        sender.position = state.position;
-        // The plotter is idle, so an abort loses nothing. It clears what an earlier sender left
-        // half sent.
-        let greeting = sender.abort()?;
-        sender.begin_numbers(greeting)?;
-        Ok(sender)
+    }
+
+    /// Begins the conversation with a plotter that `is_ready`, and returns its status.
+    fn take_over(&mut self, is_ready: impl Fn(&Status) -> bool) -> Result<Status, Error> {
+        let status = self.find_state()?;
+        if !is_ready(&status) {
+            return Err(Error::NotReady { state: status.state });
+        }
+        self.position.clone_from(&status.position);
+        // Nothing moves, so an abort loses nothing. It clears what an earlier sender left half
+        // sent.
+        let greeting = self.abort()?;
+        self.begin_numbers(greeting)?;
+        Ok(status)
     }
 
     /// Asks for the status until the plotter answers.
@@ -271,6 +289,8 @@ impl<'a> Sender<'a> {
                 number,
                 messages: std::mem::take(&mut self.messages),
             }),
+            // It is told anew to a program that opens the port.
+            Reply::Alarm(_) if self.allows_alarm => Ok(()),
             Reply::Alarm(number) => {
                 Err(Error::Alarm { number, messages: std::mem::take(&mut self.messages) })
             }
@@ -285,6 +305,7 @@ impl<'a> Sender<'a> {
 
     fn fail_if_alarm(&mut self, status: &Status) -> Result<(), Error> {
         match (status.state.as_str(), status.alarm) {
+            _ if self.allows_alarm => Ok(()),
             ("Alarm", Some(number)) => self.fail_on(Reply::Alarm(number), &|| None),
             ("Alarm", None) => Err(Error::NotReady { state: status.state.clone() }),
             _ => Ok(()),
@@ -305,7 +326,9 @@ impl<'a> Sender<'a> {
 
     /// Stops the machine with the pen up if the user cancelled the job.
     fn stop_if_interrupted(&mut self) -> Result<(), Error> {
-        if !self.interrupt.load(Ordering::Relaxed) {
+        let order = self.link.order();
+        if !self.interrupt.load(Ordering::Relaxed) && order != Some(Order::GiveUp) {
+            self.orders.extend(order);
             return Ok(());
         }
         Err(match self.abort()? {

@@ -5,9 +5,11 @@
 use penup_client::error::Error;
 use penup_client::fake::{FakePlotter, Fault};
 use penup_client::lines::{JobLine, Origin};
-use penup_client::link::Answer;
+use penup_client::link::{Answer, Order};
 use penup_client::progress::{Progress, Quiet};
+use penup_client::protocol::Status;
 use penup_client::sender::{Patience, Sender};
+use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
@@ -212,8 +214,8 @@ struct GivesUp<'a>(&'a AtomicBool);
 
 impl Progress for GivesUp<'_> {
     fn lines_sent(&mut self, _: usize, _: usize) {}
-    fn strokes_drawn(&mut self, done: u64, _: u64) {
-        self.0.store(done > 0, Ordering::Relaxed);
+    fn drawn(&mut self, status: &Status) {
+        self.0.store(status.strokes.is_some_and(|(done, _)| done > 0), Ordering::Relaxed);
     }
     fn state(&mut self, _: &str) {}
 }
@@ -243,8 +245,13 @@ impl Progress for Recorder {
     fn lines_sent(&mut self, done: usize, all: usize) {
         self.0.push(format!("line {done}/{all}"));
     }
-    fn strokes_drawn(&mut self, done: u64, all: u64) {
-        self.0.push(format!("stroke {done}/{all}"));
+    fn drawn(&mut self, status: &Status) {
+        let (done, all) = status.strokes.expect("strokes");
+        let stroke = format!("stroke {done}/{all}");
+        // The last one is reported once more when the machine is idle.
+        if self.0.last() != Some(&stroke) {
+            self.0.push(stroke);
+        }
     }
     fn state(&mut self, _: &str) {}
 }
@@ -261,4 +268,96 @@ fn progress_counts_lines_then_strokes() {
         recorder.0,
         ["line 1/2", "line 2/2", "stroke 0/3", "stroke 1/3", "stroke 2/3", "stroke 3/3"]
     );
+}
+
+#[test]
+fn keys_pause_the_job_change_its_speed_and_give_it_up() {
+    let mut plotter = FakePlotter::new(Fault::None);
+    plotter.strokes = 20;
+    plotter.keys = VecDeque::from([
+        (2, Order::Pause),
+        (2, Order::Pause),
+        (5, Order::Faster),
+        (6, Order::Faster),
+        (7, Order::Slower),
+    ]);
+    job(&mut plotter, 3).expect("a job without a fault");
+    assert_eq!((plotter.holds, plotter.percent), (1, 110));
+    assert!(plotter.keys.is_empty());
+    plotter.keys = VecDeque::from([(3, Order::GiveUp)]);
+    let error = job(&mut plotter, 3).expect_err("given up");
+    assert!(matches!(error, Error::Interrupted), "{error}");
+}
+
+/// A pause by a key needs no question, however long it lasts.
+#[test]
+fn a_pause_by_a_key_lasts_until_the_next_key() {
+    let mut plotter = FakePlotter::new(Fault::None);
+    plotter.strokes = 5;
+    plotter.keys = VecDeque::from([(2, Order::Pause), (3, Order::GiveUp)]);
+    plotter.user = VecDeque::from([Answer::Yes]);
+    plotter.draw_on();
+    let interrupt = AtomicBool::new(false);
+    let (mut sender, status) = Sender::join(&mut plotter, PATIENCE, &interrupt).expect("a plotter");
+    assert_eq!(status.state, "Run");
+    let mut reports = 0;
+    let error = sender.watch(&mut Counter(&mut reports, &interrupt)).expect_err("interrupted");
+    assert!(matches!(error, Error::Interrupted), "{error}");
+    assert_eq!(plotter.user.len(), 1, "nobody was asked");
+}
+
+/// Presses Ctrl-C after a hundred reports.
+struct Counter<'a>(&'a mut u32, &'a AtomicBool);
+
+impl Progress for Counter<'_> {
+    fn lines_sent(&mut self, _: usize, _: usize) {}
+    fn drawn(&mut self, _: &Status) {
+        *self.0 += 1;
+        self.1.store(*self.0 > 100, Ordering::Relaxed);
+    }
+    fn state(&mut self, _: &str) {}
+}
+
+#[test]
+fn a_running_job_is_joined_paused_resumed_and_aborted() {
+    let mut plotter = FakePlotter::new(Fault::None);
+    plotter.strokes = 1000;
+    plotter.draw_on();
+    let interrupt = AtomicBool::new(false);
+    let aborts = plotter.aborts;
+    let (mut sender, _) = Sender::join(&mut plotter, PATIENCE, &interrupt).expect("a plotter");
+    let status = sender.resume().expect_err("it does not hold");
+    assert_eq!(status.to_string(), "there is nothing to resume: the plotter reports Run");
+    assert!(sender.pause(false).expect("paused").is_standing);
+    assert_eq!(sender.resume().expect("resumed").state, "Run");
+    assert_eq!(sender.give_up().expect("given up").state, "Idle");
+    let error = sender.pause(false).expect_err("nothing is drawn");
+    assert_eq!(error.exit_code(), 4);
+    assert_eq!(plotter.aborts, aborts + 1, "only the abort that was asked for");
+}
+
+#[test]
+fn a_job_is_watched_to_its_end() {
+    let mut plotter = FakePlotter::new(Fault::None);
+    plotter.pen_before = Some((1, 2));
+    plotter.draw_on();
+    let interrupt = AtomicBool::new(false);
+    let mut recorder = Recorder::default();
+    let (mut sender, _) = Sender::join(&mut plotter, PATIENCE, &interrupt).expect("a plotter");
+    assert_eq!(sender.watch(&mut recorder).expect("drawn").state, "Idle");
+    assert_eq!(recorder.0.last().map(String::as_str), Some("stroke 3/3"));
+    assert_eq!(plotter.requested_pens, [2, 2]);
+    assert_eq!(plotter.aborts, 0);
+}
+
+#[test]
+fn after_a_refused_line_the_next_one_is_carried_out() {
+    let mut plotter = FakePlotter::new(Fault::ErrorAt(1, 150));
+    let interrupt = AtomicBool::new(false);
+    let (mut sender, _) =
+        Sender::open_for_orders(&mut plotter, PATIENCE, &interrupt).expect("a plotter");
+    let error = sender.ask("$100=0").expect_err("refused");
+    assert_eq!((error.exit_code(), matches!(error, Error::Refused { .. })), (4, true));
+    sender.ask("$101=80").expect("taken");
+    assert_eq!(plotter.lines, ["$100=0", "$101=80"]);
 }

@@ -80,7 +80,7 @@ fn preview_and_plot_tell_the_same_lengths() -> Result<(), Box<dyn Error>> {
     let summary = |command: &str, options: &[&str]| -> Result<String, Box<dyn Error>> {
         let view = ["--svg", &svg, "--page=80x80", "--margin=5", "--projection=isometric"];
         let line = ["penup", command, &scene].into_iter().chain(view).chain(options.to_vec());
-        let sentence = run(&Cli::try_parse_from(line)?, &AtomicBool::new(false))?;
+        let sentence = run(&Cli::try_parse_from(line)?, &AtomicBool::new(false))?.text;
         let summary = sentence.split_once(": ").ok_or("no files are named")?.1;
         Ok(summary.to_owned())
     };

@@ -28,9 +28,9 @@ struct Delivery<'l> {
     last_event: Instant,
     last_progress: Instant,
     resends: u32,
-    /// Whether the plotter computes a picture according to its last status report. It then reads no
-    /// lines, so it is asked for none.
-    is_computing: bool,
+    /// Whether the plotter computes a picture or homes, according to its last status report. It
+    /// then reads no lines, so it is asked for none.
+    reads_no_lines: bool,
 }
 
 impl Delivery<'_> {
@@ -80,7 +80,7 @@ impl Sender<'_> {
             last_event: now,
             last_progress: now,
             resends: 0,
-            is_computing: false,
+            reads_no_lines: false,
         };
         // The number of lines cannot overflow in practice: no plotter can hold the model of so many
         // lines.
@@ -129,7 +129,7 @@ impl Sender<'_> {
             }
             self.query_if_due()?;
             let since = delivery.requested_at.unwrap_or(delivery.last_event);
-            if self.since(since) > self.patience.reply && !delivery.is_computing {
+            if self.since(since) > self.patience.reply && !delivery.reads_no_lines {
                 self.ask_for_last_number(&mut delivery)?;
             }
             if self.since(delivery.last_progress) > self.patience.lost {
@@ -196,9 +196,9 @@ impl Sender<'_> {
         progress: &mut dyn Progress,
     ) -> Result<(), Error> {
         progress.state(&status.state);
-        delivery.is_computing = status.is_computing;
-        if status.is_computing {
-            // The plotter reads no line until it has computed the picture.
+        delivery.reads_no_lines = status.is_computing || status.state == "Home";
+        if delivery.reads_no_lines {
+            // The plotter reads no line until it has computed the picture or is homed.
             delivery.last_progress = self.link.now();
             delivery.last_event = delivery.last_progress;
             delivery.requested_at = delivery.requested_at.map(|_| delivery.last_progress);

@@ -1,11 +1,12 @@
-//! Draws what was sent: starts the drawing, waits for its end, and asks for the report on it.
+//! Draws what was sent, or follows a job that runs: waits for its end, and asks for the report on
+//! it.
 
 use super::{MOST_RESTARTS, Sender};
 use crate::error::Error;
 use crate::lines::{JobLine, Lines};
-use crate::link::Answer;
+use crate::link::{Answer, Order};
 use crate::progress::{Progress, Quiet};
-use crate::protocol::{MODEL, PLOT, RESUME, Reply, Status};
+use crate::protocol::{AGAIN, FASTER, HOLD, MODEL, PLOT, RESUME, Reply, SLOWER, Status};
 use crate::results::JobReport;
 use std::time::Instant;
 
@@ -15,7 +16,7 @@ const SURE_OF_NO_REPORT: u32 = 3;
 /// Counts how often in a row the plotter reported the same state of waiting, to decide whether the
 /// machine has come to rest.
 #[derive(Debug, Default)]
-struct Standstill {
+pub(super) struct Standstill {
     at: Option<(Option<u8>, String)>,
     times: u32,
 }
@@ -27,12 +28,22 @@ impl Standstill {
 
     /// Processes a status report. Returns `Some` if the machine has certainly stopped and waits;
     /// the inner value is the pen that it waits for, if any.
-    fn holds(&mut self, status: &Status) -> Option<Option<u8>> {
+    pub(super) fn holds(&mut self, status: &Status) -> Option<Option<u8>> {
         let at = status.is_holding().then(|| (status.pen_wanted, status.position.clone()));
         self.times = if at == self.at { self.times + 1 } else { 1 };
         self.at = at;
         (self.at.is_some() && self.times >= Self::SURE).then_some(status.pen_wanted)
     }
+}
+
+/// What is known of a drawing that is followed.
+#[derive(Debug, Default)]
+struct Followed {
+    standstill: Standstill,
+    held_since: Option<Instant>,
+    is_holding: bool,
+    /// Whether the user of this program asked for the hold.
+    paused_here: bool,
 }
 
 impl Sender<'_> {
@@ -41,39 +52,63 @@ impl Sender<'_> {
     /// # Errors
     /// The plotter refuses the drawing, stops with an alarm, stays in feed hold, or falls silent.
     pub fn plot(&mut self, progress: &mut dyn Progress) -> Result<(), Error> {
-        let command = JobLine::command(PLOT);
-        let lines = [command.clone()];
-        let command = &|| Some(command.clone());
+        let lines = [JobLine::command(PLOT)];
         self.begin_plot(&lines, progress)?;
-        let mut standstill = Standstill::default();
-        let mut held_since = None;
+        self.follow_drawing(Some(&lines), progress)?;
+        self.confirm(&lines, self.done - 1)
+    }
+
+    /// Draws the last job again, which the plotter has kept, and waits until the machine is idle.
+    ///
+    /// # Errors
+    /// As [`Sender::plot`].
+    pub fn again(&mut self, progress: &mut dyn Progress) -> Result<(), Error> {
+        let lines = [JobLine::command(AGAIN)];
+        self.deliver(&lines, &mut Quiet)?;
+        self.follow_drawing(Some(&lines), progress)?;
+        self.confirm(&lines, self.done - 1)
+    }
+
+    /// Follows the job that the plotter draws until the machine is idle, whoever has sent it.
+    /// Returns the last status.
+    ///
+    /// # Errors
+    /// The machine stops with an alarm, stays in feed hold, or falls silent.
+    pub fn watch(&mut self, progress: &mut dyn Progress) -> Result<Status, Error> {
+        self.follow_drawing(None, progress)
+    }
+
+    /// Asks for the status until the machine is idle, and lets it go on after pauses. `began` are
+    /// the lines that began the drawing, if this program has sent them.
+    fn follow_drawing(
+        &mut self,
+        began: Option<&[JobLine; 1]>,
+        progress: &mut dyn Progress,
+    ) -> Result<Status, Error> {
+        let command = &|| began.map(|[line]| line.clone());
+        let mut followed = Followed::default();
         self.last_heard = self.link.now();
         self.query()?;
         loop {
             self.stop_if_interrupted()?;
+            self.obey(&mut followed)?;
             match self.listen()? {
                 Some(Reply::Status(status)) => {
                     progress.state(&status.state);
-                    if let Some((done, all)) = status.strokes {
-                        progress.strokes_drawn(done, all);
+                    if let Some((_, all)) = status.strokes {
+                        progress.drawn(&status);
                         self.strokes = all;
                     }
                     self.fail_if_alarm(&status)?;
-                    match standstill.holds(&status) {
-                        Some(pen) if self.may_resume(pen, &mut held_since)? => {
-                            self.link.send(&[RESUME])?;
-                            standstill = Standstill::default();
-                        }
-                        _ if !status.is_holding() => held_since = None,
-                        _ => {}
-                    }
+                    self.wait_or_resume(&status, &mut followed)?;
                     if status.is_idle() {
-                        self.position = status.position;
-                        return self.confirm(&lines, self.done - 1);
+                        self.position.clone_from(&status.position);
+                        return Ok(status);
                     }
                 }
                 Some(Reply::Done(_) | Reply::Last(_) | Reply::Resend(_) | Reply::Error(_)) => {}
-                Some(Reply::Refused(number, _)) if number != self.done => {}
+                // A refusal of what others have sent.
+                Some(Reply::Refused(number, _)) if began.is_none() || number != self.done => {}
                 Some(Reply::Refused(_, error)) => {
                     self.fail_on(Reply::Error(error), command)?;
                 }
@@ -82,6 +117,48 @@ impl Sender<'_> {
             }
             self.query_if_due()?;
         }
+    }
+
+    /// Does what the user of this program asked for by keys.
+    fn obey(&mut self, followed: &mut Followed) -> Result<(), Error> {
+        while let Some(order) = self.orders.pop_front() {
+            let byte = match order {
+                Order::Pause if followed.is_holding => {
+                    followed.paused_here = false;
+                    followed.held_since = None;
+                    RESUME
+                }
+                Order::Pause => {
+                    followed.paused_here = true;
+                    HOLD
+                }
+                Order::Faster => FASTER,
+                Order::Slower => SLOWER,
+                // It is carried out where an interrupt is.
+                Order::GiveUp => continue,
+            };
+            self.link.send(&[byte])?;
+        }
+        Ok(())
+    }
+
+    /// Lets a machine that stands go on if it waits for a pen that is in, or if the user allows it.
+    fn wait_or_resume(&mut self, status: &Status, followed: &mut Followed) -> Result<(), Error> {
+        followed.is_holding = status.is_holding() && status.pen_wanted.is_none();
+        let holds = followed.standstill.holds(status);
+        if !status.is_holding() {
+            followed.held_since = None;
+            return Ok(());
+        }
+        let Some(pen) = holds else { return Ok(()) };
+        if pen.is_none() && followed.paused_here {
+            return Ok(());
+        }
+        if self.may_resume(pen, &mut followed.held_since)? {
+            self.link.send(&[RESUME])?;
+            followed.standstill = Standstill::default();
+        }
+        Ok(())
     }
 
     /// Sends the plot command until it is accepted. It is sent again if the plotter was told to

@@ -4,6 +4,8 @@
 
 #[cfg(unix)]
 mod at_a_port;
+#[cfg(unix)]
+mod machine;
 
 use std::fs;
 use std::path::Path;
@@ -148,7 +150,7 @@ fn a_port_that_is_not_there_is_explained() {
     let folder = tempfile::tempdir().expect("a folder");
     fs::write(folder.path().join("a.obj"), "v 0 0 0\n").expect("written");
     let (code, _, stderr) = penup(folder.path(), &["plot", "a.obj", "--port", "no-such-port"]);
-    assert_eq!(code, Some(1));
+    assert_eq!(code, Some(3));
     assert!(stderr.contains("cannot open no-such-port"), "{stderr}");
     assert!(stderr.contains("is the plotter plugged in"), "{stderr}");
     let both = ["plot", "a.obj", "--port", "p", "--board", "lm3s6965"];

@@ -1,0 +1,196 @@
+//! The arguments of the commands that ask or move a plotter.
+
+use super::number;
+use crate::keyboard::KEYS;
+use crate::ports::{AUTOMATIC, PORTS_VARIABLE};
+use clap::{Args, Subcommand, ValueEnum};
+use penup::machine::{SETTINGS, Setting};
+use std::path::PathBuf;
+
+/// How the plotter is found.
+#[derive(Debug, Args)]
+pub struct PortArgs {
+    /// The serial port of the plotter, such as /dev/ttyUSB0 or COM3.
+    #[arg(long, value_name = "DEVICE", help = port_help(), default_value = AUTOMATIC)]
+    pub port: String,
+}
+
+/// How the plotter is found, and how its answer is printed.
+#[derive(Debug, Args)]
+pub struct PlotterArgs {
+    /// How the plotter is found.
+    #[command(flatten)]
+    pub port: PortArgs,
+    /// How the answer is printed.
+    #[command(flatten)]
+    pub format: FormatArgs,
+}
+
+/// How an answer is printed.
+#[derive(Debug, Args)]
+pub struct FormatArgs {
+    /// Print the result, or the error, as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+pub(super) fn port_help() -> String {
+    format!(
+        "The serial port of the plotter, such as /dev/ttyUSB0 or COM3; {AUTOMATIC} is the only \
+         plotter that answers at the ports on USB, or at those in {PORTS_VARIABLE}"
+    )
+}
+
+/// Options of `penup ports`.
+#[derive(Debug, Args)]
+pub struct PortsArgs {
+    /// How the answer is printed.
+    #[command(flatten)]
+    pub format: FormatArgs,
+}
+
+/// Options of `penup watch`.
+#[derive(Debug, Args)]
+#[command(after_help = format!("Keys: {KEYS}, and Ctrl-C leaves the plotter drawing."))]
+pub struct WatchArgs {
+    /// The plotter.
+    #[command(flatten)]
+    pub plotter: PlotterArgs,
+}
+
+/// Options of `penup pause`.
+#[derive(Debug, Args)]
+pub struct PauseArgs {
+    /// Draw to the end of the stroke first
+    #[arg(long)]
+    pub after_stroke: bool,
+    /// The plotter.
+    #[command(flatten)]
+    pub plotter: PlotterArgs,
+}
+
+/// Options of `penup jog`.
+#[derive(Debug, Args)]
+pub struct JogArgs {
+    /// The way to the right in mm; negative to the left
+    #[arg(value_name = "X", value_parser = number, allow_hyphen_values = true)]
+    pub x: f64,
+    /// The way up in mm; negative down
+    #[arg(value_name = "Y", value_parser = number, allow_hyphen_values = true)]
+    pub y: f64,
+    /// The speed
+    #[arg(long, value_name = "MM/MIN", default_value = "1500", value_parser = speed)]
+    pub speed: f64,
+    /// The plotter.
+    #[command(flatten)]
+    pub plotter: PlotterArgs,
+}
+
+/// Options of `penup pen`.
+#[derive(Debug, Args)]
+pub struct PenArgs {
+    /// What the pen does
+    #[arg(value_enum)]
+    pub to: PenPosition,
+    /// The plotter.
+    #[command(flatten)]
+    pub plotter: PlotterArgs,
+}
+
+/// What the pen does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum PenPosition {
+    /// Raises the pen
+    Up,
+    /// Lowers the pen for a moment; the plotter raises it again while it has nothing to draw
+    Down,
+}
+
+/// Options of `penup set`.
+#[derive(Debug, Args)]
+pub struct SetArgs {
+    /// The settings, for example 100=88.9; `penup settings show` lists them
+    #[arg(value_name = "NUMBER=VALUE", required = true, value_parser = AssignedSetting::parse)]
+    pub settings: Vec<AssignedSetting>,
+    /// The plotter.
+    #[command(flatten)]
+    pub plotter: PlotterArgs,
+}
+
+/// What to do with the settings of the machine.
+#[derive(Debug, Subcommand)]
+pub enum SettingsCommand {
+    /// List the settings with their values
+    Show(PlotterArgs),
+    /// Save the settings as TOML
+    Save {
+        /// The file to write [default: the standard output]
+        #[arg(value_name = "FILE")]
+        file: Option<PathBuf>,
+        /// The plotter.
+        #[command(flatten)]
+        plotter: PlotterArgs,
+    },
+    /// Set what a file saved before says; other settings stay
+    Restore {
+        /// The file to read
+        #[arg(value_name = "FILE")]
+        file: PathBuf,
+        /// The plotter.
+        #[command(flatten)]
+        plotter: PlotterArgs,
+    },
+}
+
+/// A setting and the value that it shall have.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct AssignedSetting {
+    /// The number of the setting.
+    pub number: u16,
+    /// The value, a decimal number.
+    pub value: String,
+}
+
+impl AssignedSetting {
+    /// Parses `NUMBER=VALUE`; a `$` before the number does no harm.
+    ///
+    /// # Errors
+    /// The reason why it is none, for the user.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let (setting, value) =
+            text.split_once('=').ok_or("a setting has the form NUMBER=VALUE, such as 100=80")?;
+        let setting = setting.trim().trim_start_matches('$');
+        let number = setting.parse().map_err(|_| format!("\"{setting}\" is no number"))?;
+        let value = value.trim();
+        super::number(value)?;
+        Ok(Self { number, value: value.to_owned() })
+    }
+
+    /// The name of the setting, if this program knows it.
+    pub fn name(&self) -> Option<&'static str> {
+        SETTINGS.iter().find(|info| info.number == self.number).map(|info| info.name)
+    }
+}
+
+fn speed(text: &str) -> Result<f64, String> {
+    let most = Setting::MaxRateX.info().greatest.to_num::<f64>();
+    match number(text)? {
+        speed if (1.0..=most).contains(&speed) => Ok(speed),
+        _ => Err(format!("a speed is 1 to {most} mm/min")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_setting_is_a_number_and_a_value() {
+        let parsed = |text| AssignedSetting::parse(text).map(|it| (it.number, it.value));
+        assert_eq!(parsed("100=88.9"), Ok((100, "88.9".to_owned())));
+        assert_eq!(parsed("$3 = 1"), Ok((3, "1".to_owned())));
+        for bad in ["100", "x=1", "100=", "100=fast", "100=inf", "70000=1"] {
+            assert!(parsed(bad).is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,123 @@
+//! The keys that a user may press while the plotter draws.
+//!
+//! While a [`Keyboard`] exists, the terminal hands over each key at once and shows none. Ctrl-C
+//! still interrupts. The terminal is as before when the keyboard is dropped, or when the program
+//! ends by Ctrl-C. There is no keyboard where the standard input or the standard error is no
+//! terminal, and on Windows.
+
+use crate::link::Order;
+
+/// What the keys do, for the user.
+pub const KEYS: &str = "space pauses and goes on, + and - change the speed, q gives up";
+
+/// A key that was pressed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Key {
+    /// Enter, which answers a question.
+    Enter,
+    /// A key with an order.
+    Order(Order),
+}
+
+impl Key {
+    /// The key that sends this byte; `None` if it has no meaning.
+    fn of(byte: u8) -> Option<Self> {
+        Some(match byte {
+            b'\n' | b'\r' => Self::Enter,
+            b' ' => Self::Order(Order::Pause),
+            b'+' => Self::Order(Order::Faster),
+            b'-' => Self::Order(Order::Slower),
+            b'q' | b'Q' => Self::Order(Order::GiveUp),
+            _ => return None,
+        })
+    }
+}
+
+#[cfg(unix)]
+mod terminal {
+    use super::Key;
+    use rustix::termios::{LocalModes, OptionalActions, Termios, tcgetattr, tcsetattr};
+    use std::io::{IsTerminal as _, Read as _, stderr, stdin};
+    use std::sync::mpsc::{self, Receiver};
+    use std::sync::{Mutex, PoisonError};
+    use std::thread;
+
+    /// The modes of the terminal before they were changed.
+    static BEFORE: Mutex<Option<Termios>> = Mutex::new(None);
+
+    /// The keys of the terminal; see the [module](super).
+    #[derive(Debug)]
+    pub struct Keyboard {
+        keys: Receiver<Key>,
+    }
+
+    impl Keyboard {
+        /// Takes the keys of the terminal; `None` if there is no terminal.
+        pub fn take() -> Option<Self> {
+            if !stdin().is_terminal() || !stderr().is_terminal() {
+                return None;
+            }
+            let before = tcgetattr(stdin()).ok()?;
+            let mut modes = before.clone();
+            modes.local_modes -= LocalModes::ICANON | LocalModes::ECHO;
+            *BEFORE.lock().unwrap_or_else(PoisonError::into_inner) = Some(before);
+            if tcsetattr(stdin(), OptionalActions::Now, &modes).is_err() {
+                restore();
+                return None;
+            }
+            let (sender, keys) = mpsc::channel();
+            // The thread waits for a key until the program ends.
+            thread::spawn(move || {
+                let is_heard = |byte: u8| Key::of(byte).is_none_or(|key| sender.send(key).is_ok());
+                stdin().lock().bytes().map_while(Result::ok).all(is_heard)
+            });
+            Some(Self { keys })
+        }
+
+        /// The next key that was pressed, if any.
+        pub fn key(&mut self) -> Option<Key> {
+            self.keys.try_recv().ok()
+        }
+    }
+
+    impl Drop for Keyboard {
+        fn drop(&mut self) {
+            restore();
+        }
+    }
+
+    /// Gives the terminal back as it was.
+    pub fn restore() {
+        let before = BEFORE.lock().unwrap_or_else(PoisonError::into_inner).take();
+        if let Some(before) = before {
+            // Nothing can be done about a terminal that is gone.
+            let _ = tcsetattr(stdin(), OptionalActions::Now, &before);
+        }
+    }
+}
+
+#[cfg(not(unix))]
+mod terminal {
+    use super::Key;
+
+    /// No keys of the terminal; see the [module](super).
+    #[derive(Debug)]
+    pub struct Keyboard(());
+
+    impl Keyboard {
+        /// There is no keyboard on this system.
+        pub fn take() -> Option<Self> {
+            None
+        }
+
+        /// No key.
+        pub fn key(&mut self) -> Option<Key> {
+            None
+        }
+    }
+
+    /// Nothing was changed.
+    pub fn restore() {}
+}
+
+pub use terminal::{Keyboard, restore};

@@ -1,0 +1,105 @@
+//! `penup console`: lines from the standard input to the plotter, and its answers.
+
+use super::open;
+use crate::cli::PortArgs;
+use crate::error::Error;
+use crate::link::{Link as _, SerialLink};
+use crate::outcome::Outcome;
+use crate::protocol::{ABORT, Reply, ReplyReader, acts_at_once};
+use crate::sender::{Patience, Sender};
+use serde_json::json;
+use std::collections::VecDeque;
+use std::io::{self, IsTerminal as _, Write as _};
+use std::sync::atomic::AtomicBool;
+use std::sync::mpsc::{self, Receiver, TryRecvError};
+use std::time::Duration;
+
+/// What a user types for the byte that gives a job up.
+const ABORT_WORD: &str = "^X";
+
+/// The longest pause in which the plotter is asked for nothing.
+const PAUSE: Duration = Duration::from_millis(20);
+
+/// After the end of the input, so many pauses in which nothing comes are the end.
+const LAST_SILENCES: u32 = 25;
+
+/// What the user of a terminal is told first.
+const GREETING: &str = "Type lines for the plotter; ? asks for the status, ! holds, ~ goes on, ^X \
+                        gives up. Ctrl-D ends.";
+
+/// Sends each line of the standard input when the one before is answered, and prints all that the
+/// plotter says. Lines of bytes that act at once are not held back. Ends at the end of the input.
+///
+/// # Errors
+/// The port cannot be opened, or the line to the plotter breaks.
+pub fn console(args: &PortArgs, interrupt: &AtomicBool) -> Result<Outcome, Error> {
+    let mut link = open(args)?;
+    // A client that broke off may have left the plotter in a conversation with checksums.
+    let (_, status) = Sender::join(&mut link, Patience::default(), interrupt)?;
+    if status.is_idle() {
+        link.send(&[ABORT])?;
+    }
+    if io::stdin().is_terminal() {
+        eprintln!("{GREETING}");
+    }
+    let refused = talk(&mut link, &typed())?;
+    Ok(Outcome { text: String::new(), json: json!({ "refused": refused }), is_answer: false })
+}
+
+/// Starts a thread that reads the standard input line by line.
+fn typed() -> Receiver<String> {
+    let (sender, receiver) = mpsc::channel();
+    std::thread::spawn(move || {
+        io::stdin().lines().map_while(Result::ok).all(|line| sender.send(line).is_ok())
+    });
+    receiver
+}
+
+/// Returns how many lines were refused.
+fn talk(link: &mut SerialLink, typed: &Receiver<String>) -> Result<usize, Error> {
+    let mut reader = ReplyReader::default();
+    let mut waiting: VecDeque<String> = VecDeque::new();
+    let (mut is_open, mut is_answered, mut refused) = (true, true, 0);
+    let mut buffer = [0; 256];
+    let mut silences = 0;
+    // A last question, such as that for the status, may still be answered.
+    while is_open || !is_answered || !waiting.is_empty() || silences < LAST_SILENCES {
+        match typed.try_recv() {
+            Ok(line) if line.trim() == ABORT_WORD => {
+                link.send(&[ABORT])?;
+                // The plotter forgets what it has not carried out, and answers by its greeting.
+                waiting.clear();
+                is_answered = true;
+            }
+            Ok(line) if !line.is_empty() && line.chars().all(acts_at_once) => {
+                link.send(line.as_bytes())?;
+            }
+            Ok(line) => waiting.push_back(line),
+            Err(TryRecvError::Disconnected) => is_open = false,
+            Err(TryRecvError::Empty) => {}
+        }
+        if is_answered && let Some(line) = waiting.pop_front() {
+            link.send(format!("{line}\n").as_bytes())?;
+            is_answered = false;
+        }
+        let count = link.receive(&mut buffer, PAUSE)?;
+        silences = if count == 0 { silences + 1 } else { 0 };
+        let bytes = buffer.get(..count).unwrap_or_default();
+        let mut stdout = io::stdout().lock();
+        stdout
+            .write_all(bytes)
+            .and_then(|()| stdout.flush())
+            .map_err(|source| Error::Write { file: "the standard output".to_owned(), source })?;
+        for reply in bytes.iter().filter_map(|byte| reader.push(*byte)) {
+            match reply {
+                Reply::Error(_) => {
+                    is_answered = true;
+                    refused += 1;
+                }
+                Reply::Ok | Reply::Greeting(_) => is_answered = true,
+                _ => {}
+            }
+        }
+    }
+    Ok(refused)
+}

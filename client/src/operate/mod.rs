@@ -1,0 +1,39 @@
+//! The commands that ask or move a plotter: what `penup status`, `penup watch` and the others do.
+
+mod console;
+mod orders;
+mod settings;
+mod settings_file;
+mod status;
+
+pub use console::console;
+pub use orders::{abort, again, home, jog, pause, pen, resume, unlock, watch};
+pub use settings::{restore, save, set, show};
+pub use settings_file::{SavedSettings, SettingsFileError};
+pub use status::{ports, status};
+
+use crate::cli::{PlotterArgs, PortArgs};
+use crate::error::Error;
+use crate::link::SerialLink;
+use crate::ports as serial_ports;
+use crate::sender::{Patience, Sender};
+use std::sync::atomic::AtomicBool;
+
+/// Opens the port of the plotter.
+fn open(args: &PortArgs) -> Result<SerialLink, Error> {
+    serial_ports::open(&args.port)
+}
+
+/// Does `work` in a conversation with the plotter at `args`, which must not be moving, and ends the
+/// conversation.
+fn converse<T>(
+    args: &PlotterArgs,
+    interrupt: &AtomicBool,
+    work: impl FnOnce(&mut Sender<'_>) -> Result<T, Error>,
+) -> Result<T, Error> {
+    let mut link = open(&args.port)?;
+    let (mut sender, _) = Sender::open_for_orders(&mut link, Patience::default(), interrupt)?;
+    let done = work(&mut sender);
+    sender.end();
+    done
+}

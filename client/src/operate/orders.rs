@@ -1,0 +1,174 @@
+//! The commands that move the machine, stop it, or follow what it draws.
+
+use super::status::{as_json, described};
+use super::{converse, open};
+use crate::cli::{JogArgs, PauseArgs, PenArgs, PenPosition, PlotterArgs, WatchArgs};
+use crate::error::Error;
+use crate::interrupt::MovingPlotter;
+use crate::outcome::Outcome;
+use crate::progress::{Bar, Progress};
+use crate::protocol::{HOME, PEN_DOWN, PEN_UP, Status, UNLOCK};
+use crate::sender::{Patience, Sender};
+use std::io::{self, Write as _};
+use std::sync::atomic::AtomicBool;
+
+/// Says what was done, with the status that the machine has then.
+fn done(text: &str, status: &Status) -> Outcome {
+    Outcome::done(text, as_json(status))
+}
+
+/// Does `work` with a plotter that may be drawing.
+fn join<T>(
+    args: &PlotterArgs,
+    interrupt: &AtomicBool,
+    work: impl FnOnce(&mut Sender<'_>) -> Result<T, Error>,
+) -> Result<T, Error> {
+    let mut link = open(&args.port)?;
+    let (mut sender, _) = Sender::join(&mut link, Patience::default(), interrupt)?;
+    work(&mut sender)
+}
+
+/// Pauses the job that the machine draws.
+///
+/// # Errors
+/// See [`Sender::pause`].
+pub fn pause(args: &PauseArgs, interrupt: &AtomicBool) -> Result<Outcome, Error> {
+    let status = join(&args.plotter, interrupt, |sender| sender.pause(args.after_stroke))?;
+    Ok(match status.is_holding() {
+        true => done("it holds with the pen up", &status),
+        false => done("the job ended before it could be paused", &status),
+    })
+}
+
+/// Lets a machine that holds, or that waits for a pen, go on.
+///
+/// # Errors
+/// See [`Sender::resume`].
+pub fn resume(args: &PlotterArgs, interrupt: &AtomicBool) -> Result<Outcome, Error> {
+    let status = join(args, interrupt, |sender| sender.resume())?;
+    Ok(done("it goes on", &status))
+}
+
+/// Gives up what the machine does.
+///
+/// # Errors
+/// See [`Sender::give_up`].
+pub fn abort(args: &PlotterArgs, interrupt: &AtomicBool) -> Result<Outcome, Error> {
+    let status = join(args, interrupt, |sender| sender.give_up())?;
+    Ok(done("given up: the machine stands with the pen up", &status))
+}
+
+/// Finds the limit switches.
+///
+/// # Errors
+/// Homing is off, or fails, or as [`Sender::ask`].
+pub fn home(args: &PlotterArgs, interrupt: &AtomicBool) -> Result<Outcome, Error> {
+    let _moving = MovingPlotter::new();
+    let status = converse(args, interrupt, |sender| {
+        sender.ask(HOME)?;
+        sender.wait_until_ready()
+    })?;
+    Ok(done("the machine is homed", &status))
+}
+
+/// Unlocks the machine after an alarm, and wakes it.
+///
+/// # Errors
+/// As [`Sender::ask`].
+pub fn unlock(args: &PlotterArgs, interrupt: &AtomicBool) -> Result<Outcome, Error> {
+    converse(args, interrupt, |sender| {
+        let status = sender.status()?;
+        if !status.is_alarm() && status.state != "Sleep" {
+            return Ok(done("the machine is not locked", &status));
+        }
+        sender.ask(UNLOCK)?;
+        Ok(done("the machine is unlocked", &sender.wait_until_ready()?))
+    })
+}
+
+/// Moves with the pen up, from where the pen is.
+///
+/// # Errors
+/// The way leads beyond the travel, or as [`Sender::ask`].
+pub fn jog(args: &JogArgs, interrupt: &AtomicBool) -> Result<Outcome, Error> {
+    let _moving = MovingPlotter::new();
+    let line = format!("$J=G91 X{} Y{} F{}", args.x, args.y, args.speed);
+    let status = converse(&args.plotter, interrupt, |sender| {
+        sender.ask(&line)?;
+        sender.wait_until_ready()
+    })?;
+    Ok(done(&format!("the pen is at {} mm", status.position), &status))
+}
+
+/// Raises or lowers the pen.
+///
+/// # Errors
+/// As [`Sender::ask`].
+pub fn pen(args: &PenArgs, interrupt: &AtomicBool) -> Result<Outcome, Error> {
+    let _moving = MovingPlotter::new();
+    let (line, text) = match args.to {
+        PenPosition::Up => (PEN_UP, "the pen is up"),
+        PenPosition::Down => (PEN_DOWN, "the pen was down, and is up again"),
+    };
+    let status = converse(&args.plotter, interrupt, |sender| {
+        sender.ask(line)?;
+        sender.wait_until_ready()
+    })?;
+    Ok(done(text, &status))
+}
+
+/// Prints each new status as a line of JSON.
+#[derive(Debug, Default)]
+struct JsonLines {
+    last: Option<Status>,
+}
+
+impl Progress for JsonLines {
+    fn lines_sent(&mut self, _: usize, _: usize) {}
+
+    fn drawn(&mut self, status: &Status) {
+        if self.last.as_ref() != Some(status) {
+            // Who does not read any more is not told.
+            let _ = writeln!(io::stdout(), "{}", as_json(status));
+            self.last = Some(status.clone());
+        }
+    }
+
+    fn state(&mut self, _: &str) {}
+}
+
+fn progress(json: bool, is_quiet: bool) -> Box<dyn Progress> {
+    if json { Box::<JsonLines>::default() } else { Box::new(Bar::new(is_quiet)) }
+}
+
+/// Follows what the machine draws until it is idle, whoever has sent it.
+///
+/// # Errors
+/// See [`Sender::watch`].
+pub fn watch(args: &WatchArgs, is_quiet: bool, interrupt: &AtomicBool) -> Result<Outcome, Error> {
+    let mut link = open(&args.plotter.port)?;
+    link.obey_keys();
+    let mut progress = progress(args.plotter.format.json, is_quiet);
+    let (mut sender, first) = Sender::join(&mut link, Patience::default(), interrupt)?;
+    if first.is_idle() {
+        return Ok(Outcome::done("nothing is being drawn", as_json(&first)));
+    }
+    let status = sender.watch(progress.as_mut())?;
+    Ok(Outcome::done(described(&status), as_json(&status)))
+}
+
+/// Draws the last job again.
+///
+/// # Errors
+/// The plotter keeps no job, or as [`Sender::again`].
+pub fn again(args: &PlotterArgs, is_quiet: bool, interrupt: &AtomicBool) -> Result<Outcome, Error> {
+    let mut link = open(&args.port)?;
+    let _moving = MovingPlotter::new();
+    link.obey_keys();
+    let mut progress = progress(args.format.json, is_quiet);
+    let mut sender = Sender::open(&mut link, Patience::default(), interrupt)?;
+    let drawn = sender.again(progress.as_mut()).and_then(|()| sender.status());
+    sender.end();
+    let status = drawn?;
+    Ok(done("the last job is drawn again", &status))
+}

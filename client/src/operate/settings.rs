@@ -1,0 +1,189 @@
+//! `penup set` and `penup settings`.
+//!
+//! A line of settings has no checksum, so settings are read until two answers agree. What is set is
+//! read back.
+
+use super::converse;
+use super::settings_file::SavedSettings;
+use crate::cli::{AssignedSetting, PlotterArgs, SetArgs};
+use crate::error::Error;
+use crate::formats::ReadError;
+use crate::outcome::Outcome;
+use crate::output;
+use crate::protocol::{BUILD, Reply, SETTINGS};
+use crate::sender::Sender;
+use serde_json::{Map, Value, json};
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+/// How often the settings are read while no two answers agree.
+const MOST_READINGS: u32 = 10;
+
+/// Sets settings of the machine.
+///
+/// # Errors
+/// A setting is refused, or as [`Sender::ask`].
+pub fn set(args: &SetArgs, interrupt: &AtomicBool) -> Result<Outcome, Error> {
+    let (changed, all) = converse(&args.plotter, interrupt, |sender| {
+        let changed = change(sender, &args.settings)?;
+        Ok((changed, read(sender)?))
+    })?;
+    Ok(told(changed, &args.settings, &all))
+}
+
+/// Lists the settings.
+///
+/// # Errors
+/// As [`Sender::ask`].
+pub fn show(args: &PlotterArgs, interrupt: &AtomicBool) -> Result<Outcome, Error> {
+    let settings = converse(args, interrupt, read)?;
+    let line = |it: &AssignedSetting| {
+        format!("{:>3} = {:<10} {}", it.number, it.value, it.name().unwrap_or_default())
+            .trim_end()
+            .to_owned()
+    };
+    let text = settings.iter().map(line).collect::<Vec<_>>().join("\n");
+    Ok(Outcome::answer(text, as_json(&settings)))
+}
+
+/// Writes the settings to `file`, or to the standard output.
+///
+/// # Errors
+/// The file cannot be written, or as [`Sender::ask`].
+pub fn save(
+    file: Option<&Path>,
+    args: &PlotterArgs,
+    interrupt: &AtomicBool,
+) -> Result<Outcome, Error> {
+    if let Some(file) = file {
+        output::check_outputs(&[file])?;
+    }
+    let (settings, firmware) =
+        converse(args, interrupt, |sender| Ok((read(sender)?, firmware(sender)?)))?;
+    let json = as_json(&settings);
+    let count = settings.len();
+    let text = SavedSettings { settings }.to_toml(&firmware);
+    let Some(file) = file else { return Ok(Outcome::answer(text.trim_end(), json)) };
+    output::write(file, text.as_bytes())?;
+    Ok(Outcome::done(format!("{}: {count} settings", file.display()), json))
+}
+
+/// Sets what `file` says.
+///
+/// # Errors
+/// The file cannot be read, a setting is refused, or as [`Sender::ask`].
+pub fn restore(file: &Path, args: &PlotterArgs, interrupt: &AtomicBool) -> Result<Outcome, Error> {
+    let name = file.display().to_string();
+    let unreadable = |source| ReadError::File { file: name.clone(), source };
+    let text = std::fs::read_to_string(file).map_err(unreadable)?;
+    let saved = SavedSettings::parse(&text)
+        .map_err(|source| Error::SettingsFile { file: name.clone(), source })?;
+    let (changed, all) = converse(args, interrupt, |sender| {
+        let changed = change(sender, &saved.settings)?;
+        Ok((changed, read(sender)?))
+    })?;
+    Ok(told(changed, &saved.settings, &all))
+}
+
+/// Says how many settings were changed, with the values that the machine has now.
+fn told(changed: usize, wanted: &[AssignedSetting], all: &[AssignedSetting]) -> Outcome {
+    let is_wanted = |now: &&AssignedSetting| wanted.iter().any(|it| it.number == now.number);
+    let now: Vec<AssignedSetting> = all.iter().filter(is_wanted).cloned().collect();
+    let text = match changed {
+        0 => "the machine has these settings already".to_owned(),
+        1 => "1 setting is changed".to_owned(),
+        changed => format!("{changed} settings are changed"),
+    };
+    Outcome::done(text, as_json(&now))
+}
+
+fn as_json(settings: &[AssignedSetting]) -> Value {
+    let value = |it: &AssignedSetting| it.value.parse::<f64>().map_or(Value::Null, |it| json!(it));
+    let pairs = settings.iter().map(|it| (it.number.to_string(), value(it)));
+    json!({ "settings": pairs.collect::<Map<_, _>>() })
+}
+
+/// Sets those settings that differ, and checks that the machine then has them. Returns how many
+/// differed.
+fn change(sender: &mut Sender<'_>, wanted: &[AssignedSetting]) -> Result<usize, Error> {
+    let before = read(sender)?;
+    let differs = |all: &[AssignedSetting], it: &AssignedSetting| {
+        !all.iter().any(|now| now.number == it.number && is_same(&now.value, &it.value))
+    };
+    let mut left: Vec<&AssignedSetting> = wanted.iter().filter(|it| differs(&before, it)).collect();
+    let changed = left.len();
+    // Two settings may only fit each other once both are changed, whichever comes first; so what is
+    // refused is tried again after the others.
+    while !left.is_empty() {
+        let (mut refused, mut first_refusal) = (Vec::new(), None);
+        for setting in &left {
+            match sender.ask(&format!("${}={}", setting.number, setting.value)) {
+                Ok(_) => {}
+                Err(error @ Error::Refused { .. }) => {
+                    refused.push(*setting);
+                    first_refusal.get_or_insert(error);
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        match first_refusal {
+            Some(error) if refused.len() == left.len() => return Err(error),
+            _ => left = refused,
+        }
+    }
+    let after = read(sender)?;
+    match wanted.iter().find(|it| differs(&after, it)) {
+        Some(setting) => Err(Error::NotSet { number: setting.number }),
+        None => Ok(changed),
+    }
+}
+
+/// Whether two values are the same setting. The plotter rounds to 2^-16 and writes three decimals.
+fn is_same(a: &str, b: &str) -> bool {
+    match (a.parse::<f64>(), b.parse::<f64>()) {
+        (Ok(a), Ok(b)) => (a - b).abs() <= 0.0006,
+        _ => false,
+    }
+}
+
+/// Reads all settings.
+fn read(sender: &mut Sender<'_>) -> Result<Vec<AssignedSetting>, Error> {
+    agreed(sender, |sender| {
+        let replies = sender.ask(SETTINGS)?;
+        let settings: Vec<_> = replies.iter().filter_map(setting_in).collect();
+        Ok(Some(settings).filter(|settings| !settings.is_empty()))
+    })
+}
+
+/// The setting that a line such as `$100=80.000 (steps per mm of x, step/mm)` tells.
+fn setting_in(reply: &Reply) -> Option<AssignedSetting> {
+    let Reply::Other(line) = reply else { return None };
+    let assignment = line.strip_prefix('$')?.split(' ').next()?;
+    AssignedSetting::parse(assignment).ok()
+}
+
+/// The version of the firmware and the board that it runs on.
+fn firmware(sender: &mut Sender<'_>) -> Result<String, Error> {
+    agreed(sender, |sender| {
+        let version = |reply: &Reply| match reply {
+            Reply::Other(line) => Some(line.strip_prefix("[VER:")?.strip_suffix(']')?.to_owned()),
+            _ => None,
+        };
+        Ok(sender.ask(BUILD)?.iter().find_map(version))
+    })
+}
+
+/// Asks until two answers in a row are the same.
+fn agreed<T: PartialEq>(
+    sender: &mut Sender<'_>,
+    mut ask: impl FnMut(&mut Sender<'_>) -> Result<Option<T>, Error>,
+) -> Result<T, Error> {
+    let mut last = None;
+    for _ in 0..MOST_READINGS {
+        match ask(sender)? {
+            Some(answer) if last.as_ref() == Some(&answer) => return Ok(answer),
+            answer => last = answer,
+        }
+    }
+    Err(Error::Damaged { line: None, times: MOST_READINGS })
+}

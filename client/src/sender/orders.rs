@@ -1,0 +1,168 @@
+//! Orders to a machine: pause, resume, give up, and single lines with their answers.
+
+use super::drawing::Standstill;
+use super::{Patience, Sender};
+use crate::error::Error;
+use crate::lines::JobLine;
+use crate::link::Link;
+use crate::progress::Quiet;
+use crate::protocol::{HOLD, PAUSE_AFTER_STROKE, RESUME, Reply, Status};
+use std::sync::atomic::AtomicBool;
+
+impl<'a> Sender<'a> {
+    /// Joins a plotter, whatever it does, and returns its status. Nothing changes on the plotter.
+    ///
+    /// # Errors
+    /// Nothing answers, or something other than penup does.
+    pub fn join(
+        link: &'a mut dyn Link,
+        patience: Patience,
+        interrupt: &'a AtomicBool,
+    ) -> Result<(Self, Status), Error> {
+        let mut sender = Self::new(link, patience, interrupt);
+        let status = sender.find_state()?;
+        Ok((sender, status))
+    }
+
+    /// Opens a conversation with a plotter that does nothing, also with one that is locked after an
+    /// alarm or asleep.
+    ///
+    /// # Errors
+    /// As [`Sender::open`].
+    pub fn open_for_orders(
+        link: &'a mut dyn Link,
+        patience: Patience,
+        interrupt: &'a AtomicBool,
+    ) -> Result<(Self, Status), Error> {
+        let mut sender = Self::new(link, patience, interrupt);
+        sender.allows_alarm = true;
+        let status = sender.take_over(|status| status.is_idle() || status.is_alarm())?;
+        Ok((sender, status))
+    }
+
+    /// Asks for the status.
+    ///
+    /// # Errors
+    /// As [`Sender::join`].
+    pub fn status(&mut self) -> Result<Status, Error> {
+        self.find_state()
+    }
+
+    /// Pauses the machine, and returns its status when it stands with the pen up. With
+    /// `after_stroke` it first draws to the end of the stroke.
+    ///
+    /// # Errors
+    /// There is no job to pause, or the plotter does not obey.
+    pub fn pause(&mut self, after_stroke: bool) -> Result<Status, Error> {
+        let status = self.find_state()?;
+        if !matches!(status.state.as_str(), "Run" | "Hold") {
+            return Err(Error::NothingToDo { order: "pause", state: status.state });
+        }
+        let byte = if after_stroke { PAUSE_AFTER_STROKE } else { HOLD };
+        if status.state == "Run" {
+            self.link.send(&[byte])?;
+        }
+        let stopped = self.wait_until(|status| {
+            status.is_standing || !matches!(status.state.as_str(), "Run" | "Hold")
+        })?;
+        // A job may end before the pause takes effect.
+        Ok(stopped)
+    }
+
+    /// Lets a machine that holds go on, and returns its status then.
+    ///
+    /// # Errors
+    /// The machine does not hold, or does not obey.
+    pub fn resume(&mut self) -> Result<Status, Error> {
+        let status = self.find_state()?;
+        if !status.is_holding() {
+            return Err(Error::NothingToDo { order: "resume", state: status.state });
+        }
+        self.link.send(&[RESUME])?;
+        // The byte may be lost; a machine that stands for three reports was not told.
+        let mut standstill = Standstill::default();
+        let pen = status.pen_wanted;
+        self.wait_watching(&mut |sender, status| {
+            // Another pen is another pause.
+            if !status.is_holding() || status.pen_wanted != pen {
+                return Ok(true);
+            }
+            if standstill.holds(status).is_some() {
+                sender.link.send(&[RESUME])?;
+                standstill = Standstill::default();
+            }
+            Ok(false)
+        })
+    }
+
+    /// Gives up whatever the machine does. Returns its status when it stands with the pen up.
+    ///
+    /// # Errors
+    /// The plotter does not confirm it.
+    pub fn give_up(&mut self) -> Result<Status, Error> {
+        if self.abort()?.is_none() {
+            return Err(Error::Unconfirmed { order: "abort" });
+        }
+        self.wait_until(|status| status.is_idle() || status.is_alarm())
+    }
+
+    /// Sends one line and returns what the plotter said until it had carried it out.
+    ///
+    /// # Errors
+    /// The plotter refuses the line, or as [`Sender::stream`]. After a refusal the conversation can
+    /// go on.
+    pub fn ask(&mut self, line: &str) -> Result<Vec<Reply>, Error> {
+        let mut replies = Vec::new();
+        let line = JobLine::command(line);
+        let asked = self.deliver_watching(&[line], &mut Quiet, &mut |reply| {
+            // What came before a repetition was about a line that did not arrive.
+            match reply {
+                Reply::Resend(_) => replies.clear(),
+                reply => replies.push(reply.clone()),
+            }
+        });
+        if let Err(Error::Refused { .. }) = asked {
+            // The plotter tells this refusal until the numbers begin anew.
+            self.begin_numbers(None)?;
+        }
+        asked.map(|()| replies)
+    }
+
+    /// Waits until the machine has done all moves, after which it must be ready for others.
+    ///
+    /// # Errors
+    /// The machine stops with an alarm, or the plotter falls silent.
+    pub fn wait_until_ready(&mut self) -> Result<Status, Error> {
+        self.allows_alarm = false;
+        self.wait_until(Status::is_idle)
+    }
+
+    /// Waits for a status report that `is_enough`.
+    fn wait_until(&mut self, is_enough: impl Fn(&Status) -> bool) -> Result<Status, Error> {
+        self.wait_watching(&mut |_, status| Ok(is_enough(status)))
+    }
+
+    /// Asks for the status until `watch` returns true for one.
+    fn wait_watching(
+        &mut self,
+        watch: &mut dyn FnMut(&mut Self, &Status) -> Result<bool, Error>,
+    ) -> Result<Status, Error> {
+        self.last_heard = self.link.now();
+        self.query()?;
+        loop {
+            self.stop_if_interrupted()?;
+            match self.listen()? {
+                Some(Reply::Status(status)) => {
+                    self.fail_if_alarm(&status)?;
+                    if watch(self, &status)? {
+                        return Ok(status);
+                    }
+                }
+                Some(reply @ Reply::Alarm(_)) => self.fail_on(reply, &|| None)?,
+                Some(_) => {}
+                None => self.fail_if_silent(&|| None)?,
+            }
+            self.query_if_due()?;
+        }
+    }
+}
