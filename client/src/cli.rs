@@ -4,8 +4,8 @@ mod machine;
 mod view;
 
 pub use machine::{
-    AssignedSetting, FormatArgs, JogArgs, PauseArgs, PenArgs, PenPosition, PlotterArgs, PortArgs,
-    PortsArgs, SetArgs, SettingsCommand, WatchArgs,
+    FormatArgs, JogArgs, PauseArgs, PenArgs, PenPosition, PlotterArgs, PortArgs, PortsArgs,
+    SetArgs, SettingsCommand, WatchArgs,
 };
 pub use view::ViewArgs;
 
@@ -13,7 +13,7 @@ use crate::board;
 use crate::error::{EXIT_CODES, ExitCode};
 use crate::fit::{FitError, TOLERANCES};
 use crate::formats;
-use crate::motion_plot::GivenSetting;
+use crate::machine_settings::AssignedSetting;
 use crate::page::Page;
 use crate::table::BoardRow;
 use clap::{Args, Parser, Subcommand};
@@ -254,15 +254,17 @@ pub struct PreviewArgs {
     /// Plot speed, acceleration and jerk over time to this SVG file
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub motion: Option<PathBuf>,
-    /// Plot the motion of a machine with this setting, for example 204=20; can be repeated
+    /// Preview a machine with the settings of this file of `penup settings save`
+    #[arg(long, value_name = "FILE", help_heading = "Machine")]
+    pub machine: Option<PathBuf>,
+    /// Preview a machine with this setting, for example 204=20; can be repeated
     #[arg(
         long,
         value_name = "NUMBER=VALUE",
-        value_parser = GivenSetting::parse,
-        requires = "motion",
-        help_heading = "Output"
+        value_parser = AssignedSetting::parse,
+        help_heading = "Machine"
     )]
-    pub set: Vec<GivenSetting>,
+    pub set: Vec<AssignedSetting>,
     /// Compute the drawing this many times and report the shortest time of each stage
     #[arg(
         long,

@@ -4,6 +4,7 @@ use crate::fit::FitError;
 use crate::formats::ReadError;
 use crate::interrupt::EXIT_CODE;
 use crate::lines::{JobLine, Origin};
+use crate::machine_settings::NoSuchMachine;
 use crate::operate::SettingsFileError;
 use crate::protocol::RECEIVE_WINDOW;
 use crate::words::{as_option, explained, for_client};
@@ -80,6 +81,25 @@ pub enum Error {
         /// The order, as a verb.
         order: &'static str,
     },
+    /// The plotter's memory is too small for the model.
+    #[error(
+        "the model has {count} {what}, and this plotter takes {limit}\nLeave something out, or \
+         `penup fit` makes curves of traced lines"
+    )]
+    TooLarge {
+        /// What there is too much of: vertices or corners.
+        what: &'static str,
+        /// How many there are.
+        count: usize,
+        /// How many the plotter takes.
+        limit: usize,
+    },
+    /// The motion of a machine that is not Cartesian is not plotted.
+    #[error("the motion is plotted for machines with setting 230=0 only: leave out --motion")]
+    MotionOfOtherMachine,
+    /// There is no machine with these settings.
+    #[error("{0}")]
+    NoSuchMachine(#[from] NoSuchMachine),
     /// A file holds no settings of a machine.
     #[error("{file}: {source}")]
     SettingsFile {
@@ -318,6 +338,9 @@ impl Error {
             | Self::Tape { .. }
             | Self::SettingsFile { .. }
             | Self::NotDrawn { .. }
+            | Self::TooLarge { .. }
+            | Self::NoSuchMachine(_)
+            | Self::MotionOfOtherMachine
             | Self::Board { .. }
             | Self::EmulatorBroke { .. }
             | Self::Write { .. }

@@ -6,9 +6,12 @@
 
 use crate::lines::JobLine;
 use crate::link::{Answer, Link, Order};
-use crate::protocol::{ABORT, AGAIN, CLEAR, END, FASTER, HOLD, MODEL, PLOT, RESUME, SLOWER};
+use crate::protocol::{
+    ABORT, AGAIN, CLEAR, END, FASTER, HOLD, MODEL, PLOT, RESUME, SETTINGS, SLOWER,
+};
 use crate::twin;
 use penup::checksum::CRC_16;
+use penup::machine::Settings;
 use penup::protocol::{CommandError, Label, Named, Numbering, Received};
 use std::collections::VecDeque;
 use std::io;
@@ -77,6 +80,8 @@ pub struct FakePlotter {
     /// The user's successive answers to the question whether to resume. When they are used up,
     /// nobody answers.
     pub user: VecDeque<Answer>,
+    /// The number of vertices that it says it can hold.
+    pub most_vertices: usize,
     /// What the user asks for by keys, in order, each after this number of strokes.
     pub keys: VecDeque<(u64, Order)>,
     /// The speeds in percent of those in its settings.
@@ -111,7 +116,14 @@ impl FakePlotter {
 
     /// Creates a plotter with `fault` whose drawings have three strokes.
     pub fn new(fault: Fault) -> Self {
-        Self { fault, strokes: 3, percent: 100, began: Some(Instant::now()), ..Self::default() }
+        Self {
+            fault,
+            strokes: 3,
+            percent: 100,
+            most_vertices: 4000,
+            began: Some(Instant::now()),
+            ..Self::default()
+        }
     }
 
     /// Begins to draw what a client has sent that is gone.
@@ -188,7 +200,8 @@ impl FakePlotter {
         }
         let coming = self.lines.len() + 1;
         let is_other = |word| line.contains(word);
-        let is_of_job = line.starts_with('N') && !["M110", MODEL, CLEAR].into_iter().any(is_other);
+        let is_of_job =
+            line.starts_with('N') && !["M110", MODEL, CLEAR, SETTINGS].into_iter().any(is_other);
         match self.fault {
             Fault::NeverTakesLine(lost) if is_of_job && lost == coming => return,
             Fault::LosesLine(lost) if is_of_job && lost == coming && !self.is_fault_over => {
@@ -208,6 +221,12 @@ impl FakePlotter {
         match self.numbering.receive(Ok(line)) {
             Received::Line(MODEL, label) => {
                 self.report_contents();
+                self.reply(Ok(()), label);
+            }
+            Received::Line(SETTINGS, label) => {
+                for (info, value) in Settings::default().iter() {
+                    self.say(&format!("${}={value} ({})", info.number, info.name));
+                }
                 self.reply(Ok(()), label);
             }
             Received::Line(CLEAR, label) => {
@@ -248,6 +267,9 @@ impl FakePlotter {
             _ => false,
         };
         model ^= u32::from(is_other);
+        let limit = self.most_vertices;
+        self.say(&format!("[MODEL:vertices 0 of {limit}]"));
+        self.say(&format!("[MODEL:faces 0, bars 0, curves 0, corners 0 of {}]", 4 * limit));
         self.say(&format!("[MODEL:checksum {model:08X}, options {options:08X}]"));
     }
 

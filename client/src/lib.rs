@@ -26,6 +26,7 @@ pub mod keyboard;
 pub mod job;
 pub mod lines;
 pub mod link;
+pub mod machine_settings;
 pub mod machines;
 pub mod manual;
 pub mod motion_plot;

@@ -5,9 +5,7 @@
 //! [`Motion::svg`] draws it. Only Cartesian machines are plotted.
 
 use penup::drawing::PagePoint;
-use penup::machine::{
-    Machine, MachineError, Path, PulserState, Setting, SettingError, Settings, Target, Value,
-};
+use penup::machine::{Machine, MachineError, Path, PulserState, Setting, Settings, Target};
 use penup::motion::{Block, EventQueue, StepEvent, TICKS_PER_SECOND};
 use std::fmt::Write as _;
 
@@ -24,53 +22,6 @@ const HEIGHT: f64 = 220.0;
 const SPACE: f64 = 50.0;
 /// The space to the left of the plots.
 const LEFT: f64 = 90.0;
-
-/// A setting of the machine whose motion is plotted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct GivenSetting {
-    /// The number of the setting, without the `$`.
-    pub number: u16,
-    /// Its value, in the unit of the setting.
-    pub value: Value,
-}
-
-impl GivenSetting {
-    /// Parses `NUMBER=VALUE`, such as `204=20`.
-    ///
-    /// # Errors
-    /// A sentence that says what is wrong. Settings that change the path itself are refused: the
-    /// steps per millimetre and the kinematics.
-    ///
-    /// ```
-    /// use penup_client::motion_plot::GivenSetting;
-    /// assert_eq!(GivenSetting::parse("204=20")?.number, 204);
-    /// assert!(GivenSetting::parse("100=40").is_err());
-    /// # Ok::<(), String>(())
-    /// ```
-    pub fn parse(text: &str) -> Result<Self, String> {
-        let (number, value) = text.split_once('=').ok_or("write it as NUMBER=VALUE")?;
-        let number = number.trim_start_matches('$').parse().map_err(|_| "no such number")?;
-        let value = value.parse().map_err(|_| "the value is not a number")?;
-        match Setting::numbered(number) {
-            None => Err(format!("there is no setting {number}")),
-            Some(Setting::StepsPerMmX | Setting::StepsPerMmY | Setting::Kinematics) => {
-                Err("the motion is plotted for the default steps and kinematics".to_owned())
-            }
-            Some(_) => Ok(Self { number, value }),
-        }
-    }
-}
-
-/// Applies `given` to `settings`, one after the other.
-///
-/// # Errors
-/// See [`SettingError`]; the settings before it are applied.
-pub fn apply(settings: &mut Settings, given: &[GivenSetting]) -> Result<(), SettingError> {
-    for &GivenSetting { number, value } in given {
-        settings.set(Setting::numbered(number).ok_or(SettingError::Unknown)?, value)?;
-    }
-    Ok(())
-}
 
 /// The recorded motion of a job.
 #[derive(Debug, Clone)]
@@ -118,6 +69,15 @@ pub(crate) fn plan(
     machine.start(path)?;
     machine.fill(path, queue);
     Ok(())
+}
+
+/// Measures the moves of a job, which starts at the page's origin.
+///
+/// # Errors
+/// The machine refuses the job.
+pub(crate) fn measure(settings: Settings, path: &mut dyn Path) -> Result<(), MachineError> {
+    let (pins, mut blocks) = (PulserState::new(), vec![Block::EMPTY; BLOCKS]);
+    Machine::new(settings, &mut blocks, &pins, u32::MAX).start(path).map(drop)
 }
 
 impl Motion {
@@ -318,14 +278,14 @@ fn positions(path: &mut dyn Path, settings: &Settings) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::machine_settings::{AssignedSetting, simulated};
     use penup::drawing::LineType;
     use penup::machine::TargetList;
 
     fn motion(given: &[&str]) -> Motion {
-        let mut settings = Settings::default();
         let given: Vec<_> =
-            given.iter().map(|text| GivenSetting::parse(text).expect("a setting")).collect();
-        apply(&mut settings, &given).expect("valid");
+            given.iter().map(|text| AssignedSetting::parse(text).expect("a setting")).collect();
+        let settings = simulated(&given).expect("valid");
         let ink = Some(LineType::Full);
         let targets = [
             Target { point: PagePoint { x: 4000, y: 0 }, ink },
@@ -364,15 +324,5 @@ mod tests {
             assert_eq!(svg.matches("fill=\"none\"").count(), 3);
             assert_eq!(svg.matches("dasharray").count(), dashed);
         }
-    }
-
-    #[test]
-    fn a_setting_that_is_no_setting_is_refused() {
-        for text in ["204", "9=1", "204=fast", "x=1", "230=1", "101=10"] {
-            assert!(GivenSetting::parse(text).is_err(), "{text}");
-        }
-        let given = [GivenSetting::parse("204=5000").expect("a setting")];
-        let refused = apply(&mut Settings::default(), &given);
-        assert_eq!(refused, Err(SettingError::OutOfRange(Setting::Jerk)));
     }
 }

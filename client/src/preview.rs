@@ -5,14 +5,17 @@
 //! on a [`HostBoard`]. A preview therefore shows what a plotter would do, including its refusals.
 
 use crate::error::Error;
+use crate::lines::Lines;
 use crate::link::Link;
-use crate::motion_plot::{self, GivenSetting, Motion};
+use crate::motion_plot::{self, Motion};
+use crate::page::{PagePoint, PenRuns, Run};
 use crate::protocol::PLOT;
 use crate::results::{JobResult, Lengths, Timings};
 use crate::watch::PenWatch;
 use penup::boards::host::{Change, HostBoard, lend_memory};
 use penup::geometry::{Projection, Vertex};
-use penup::machine::{EventRing, Path, PulserState, Target};
+use penup::machine::{EventRing, Path, PulserState, Setting, Settings, Target};
+use penup::motion::TICKS_PER_SECOND;
 use penup::plotter::{Observer, Plotter};
 use penup::protocol::CommandError;
 use penup::stage::{Aborted, Cancel, Stage};
@@ -21,25 +24,35 @@ use penup::visibility::{EdgeParameter, Stretch};
 use std::io;
 use std::time::{Duration, Instant};
 
+/// The number of ticks in a second.
+const SECOND: f64 = TICKS_PER_SECOND as f64;
+
 /// A plotter in this process.
 pub struct InMemory {
     board: HostBoard<'static>,
     plotter: Plotter<'static>,
     steps: u64,
     pen: Option<PenWatch>,
+    /// The times, in ticks, of the first and the last change of a pin since the plot command.
+    span: Option<[u64; 2]>,
 }
 
 impl InMemory {
-    /// Starts the plotter.
+    /// Starts a plotter with default settings.
     pub fn new() -> Self {
+        Self::with_settings(Settings::default())
+    }
+
+    /// Starts a plotter with these settings.
+    pub fn with_settings(settings: Settings) -> Self {
         // The memory is leaked because the plotter and the board borrow from it as long as the
         // process lives; there is only one per run.
         let ring = Box::leak(Box::new(EventRing::new()));
         let pins = Box::leak(Box::new(PulserState::new()));
         let mut board = HostBoard::new(ring, pins);
-        let plotter = Plotter::new(lend_memory(), pins);
+        let plotter = Plotter::with_settings(lend_memory(), pins, settings);
         plotter.greet(&mut board);
-        Self { board, plotter, steps: 0, pen: None }
+        Self { board, plotter, steps: 0, pen: None, span: None }
     }
 
     fn steps_per_mm(&self) -> [f64; 2] {
@@ -49,6 +62,10 @@ impl InMemory {
     fn follow_pins(&mut self) {
         let changes = self.board.trace().take_changes();
         self.steps += count_steps(&changes);
+        if let (Some(first), Some(last)) = (changes.first(), changes.last()) {
+            let [begin, _] = self.span.unwrap_or([first.time; 2]);
+            self.span = Some([begin, last.time]);
+        }
         if let Some(pen) = &mut self.pen {
             changes.iter().for_each(|change| pen.change(change.into()));
         }
@@ -59,6 +76,35 @@ impl InMemory {
     fn answer(&mut self) {
         // Work that waits for the machine continues in `receive`.
         while !self.board.has_read_all() && self.plotter.poll(&mut self.board) {}
+    }
+
+    /// Sends all `lines` to the plotter. Returns whether it has accepted them.
+    pub fn take(&mut self, lines: &dyn Lines) -> bool {
+        self.board.take_sent();
+        lines.in_order().all(|line| {
+            self.board.receive(line.sent.as_bytes());
+            self.board.receive(b"\n");
+            self.answer();
+            self.board.take_sent().ends_with(b"ok\r\n")
+        })
+    }
+
+    /// The number of vertices of the model that was sent, and the number of its corners.
+    pub fn model_size(&self) -> (usize, usize) {
+        let model = self.plotter.model();
+        (model.vertices().len(), model.corner_count())
+    }
+
+    /// Computes the drawing and measures its moves, as the plotter does before the first move.
+    ///
+    /// # Errors
+    /// The plotter refuses the drawing.
+    pub fn rehearse(&mut self) -> Result<(), Error> {
+        let computed = self.plotter.compute(&mut StopWatch::default(), &mut Segments::default());
+        computed.map_err(|refusal| Error::NotDrawn { refusal })?;
+        let settings = *self.plotter.machine().settings();
+        motion_plot::measure(settings, &mut self.plotter.strokes())
+            .map_err(|error| Error::NotDrawn { refusal: CommandError::Machine(error) })
     }
 
     /// Records the drawing of the model that was sent as a tape ([`crate::tape`]).
@@ -73,18 +119,15 @@ impl InMemory {
         tape.map_err(|error| Error::NotDrawn { refusal: CommandError::Machine(error) })
     }
 
-    /// Records the motion of the drawing, by a machine with the default settings except for those
-    /// given ([`crate::motion_plot`]).
+    /// Records the motion of the drawing by this plotter ([`crate::motion_plot`]).
     ///
     /// # Errors
-    /// A setting, or the drawing, is refused.
-    pub fn motion(&mut self, given: &[GivenSetting]) -> Result<Motion, Error> {
+    /// The drawing is refused.
+    pub fn motion(&mut self) -> Result<Motion, Error> {
         let refused = |refusal| Error::NotDrawn { refusal };
         let computed = self.plotter.compute(&mut StopWatch::default(), &mut Segments::default());
         computed.map_err(refused)?;
-        let mut settings = *self.plotter.machine().settings();
-        motion_plot::apply(&mut settings, given)
-            .map_err(|error| refused(CommandError::Setting(error)))?;
+        let settings = *self.plotter.machine().settings();
         Motion::record(settings, &mut self.plotter.strokes())
             .map_err(|error| refused(CommandError::Machine(error)))
     }
@@ -121,6 +164,11 @@ impl InMemory {
             }
         }
         let lengths = Lengths::of(&strokes);
+        let pen = match self.pen.as_mut() {
+            Some(pen) if is_grid(self.plotter.machine().settings()) => pen.runs(),
+            Some(_) => runs(&strokes, &stroke_pens, 1.0 / steps[0]),
+            None => PenRuns::default(),
+        };
         Ok(JobResult {
             segments: segments.ends,
             segment_pens: segments.pens,
@@ -130,8 +178,9 @@ impl InMemory {
             pen_up_mm: lengths.pen_up_mm,
             efficiency: lengths.efficiency(),
             steps: core::mem::take(&mut self.steps),
+            duration_s: self.span.map(|[begin, end]| (end - begin) as f64 / SECOND).unwrap_or(0.0),
             timings_ms,
-            pen: self.pen.as_mut().map(PenWatch::runs).unwrap_or_default(),
+            pen,
         })
     }
 }
@@ -148,6 +197,7 @@ impl Link for InMemory {
         let plots = |part: &[u8]| part.starts_with(PLOT.as_bytes());
         if bytes.split(|byte| *byte == b' ').any(plots) {
             self.steps = 0;
+            self.span = None;
             let step = 1.0 / self.steps_per_mm()[0];
             self.pen.get_or_insert_with(|| PenWatch::new(step)).begin_again();
         }
@@ -177,6 +227,25 @@ impl Link for InMemory {
         }
         Ok(true)
     }
+}
+
+/// Whether each motor moves one axis, both by the same way in a step, so that the pins tell where
+/// the pen is.
+fn is_grid(settings: &Settings) -> bool {
+    let [x, y] = settings.page_steps();
+    settings.get(Setting::Kinematics) == 0 && x == y
+}
+
+/// The path of the pen that `strokes` describe, from the origin on.
+fn runs(strokes: &[Vec<PagePoint>], pens: &[u8], step: f64) -> PenRuns {
+    let (mut runs, mut at, mut last_pen) = (Vec::new(), [0.0; 2], 1);
+    for (stroke, &pen) in strokes.iter().zip(pens) {
+        let begin = stroke.first().copied().unwrap_or(at);
+        runs.push(Run { pen_down: false, pen: last_pen, points: vec![at, begin] });
+        runs.push(Run { pen_down: true, pen, points: stroke.clone() });
+        (at, last_pen) = (stroke.last().copied().unwrap_or(begin), pen);
+    }
+    PenRuns { runs, step }
 }
 
 /// Counts the steps at the pins. Simultaneous rising edges of both axes count as one step.

@@ -29,6 +29,9 @@ pub struct JobResult {
     pub efficiency: f64,
     /// The number of motor steps. A simultaneous step of both axes counts once.
     pub steps: u64,
+    /// The time from the first to the last change of a pin, in seconds, without changes of pens by
+    /// hand.
+    pub duration_s: f64,
     /// The computing time of each stage.
     pub timings_ms: Timings,
     /// The path of the pen according to the pins, for the picture.
@@ -165,6 +168,7 @@ mod tests {
             pen_up_mm: 0.0,
             efficiency: 1.0,
             steps: 1600,
+            duration_s: 12.5,
             timings_ms: Timings { view: 0.5, visibility: 1.5, order: 2.0 },
             pen: PenRuns::default(),
         };
@@ -172,7 +176,7 @@ mod tests {
             serde_json::to_string(&result).expect("numbers are finite"),
             "{\"segments\":[[0.0,0.5,1.0,-1.0]],\"segment_pens\":[1],\
              \"strokes\":[[[10.0,20.0],[30.0,20.25]]],\"stroke_pens\":[2],\
-             \"pen_down_mm\":20.0,\"pen_up_mm\":0.0,\"efficiency\":1.0,\"steps\":1600,\
+             \"pen_down_mm\":20.0,\"pen_up_mm\":0.0,\"efficiency\":1.0,\"steps\":1600,\"duration_s\":12.5,\
              \"timings_ms\":{\"view\":0.5,\"visibility\":1.5,\"order\":2.0}}"
         );
     }

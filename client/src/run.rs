@@ -12,19 +12,21 @@ use crate::job::{Job, Settings};
 use crate::keyboard::KEYS;
 use crate::lines::Lines;
 use crate::link::Link;
+use crate::machine_settings::simulated;
 use crate::machines;
 use crate::manual;
-use crate::operate;
+use crate::operate::{self, SavedSettings};
 use crate::outcome::Outcome;
 use crate::output;
 use crate::picture::{self, Picture};
 use crate::ports;
 use crate::preview::InMemory;
-use crate::progress::{Bar, Progress};
+use crate::progress::{Bar, Progress, duration};
 use crate::results::JobReport;
 use crate::sender::{Patience, Sender};
 use crate::tape;
 use crate::workspace;
+use penup::machine::Setting;
 use penup::step::tape::BadCode;
 use serde_json::{Value, json};
 use std::io::{self, Write as _};
@@ -91,7 +93,12 @@ fn plot(args: &PlotArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outcome,
         if link.obey_keys() && !quiet {
             note_keys();
         }
-        let report = draw(&mut link, &job, interrupt, &mut bar)?;
+        let mut sender = Sender::open(&mut link, Patience::default(), interrupt)?;
+        let drawn = operate::rehearse(&mut sender, &job)
+            .and_then(|()| draw_by(&mut sender, &job, &mut bar));
+        sender.end();
+        let report = drawn?;
+        drop(bar);
         let text = report.as_ref().map(|report| format!(": {report}")).unwrap_or_default();
         let json = json!({ "file": file.display().to_string(), "drawn": report });
         return Ok(Outcome::done(format!("{} is drawn{text}", file.display()), json));
@@ -117,9 +124,18 @@ fn preview(args: &PreviewArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Ou
     let outputs = Outputs::of(&args.pictures, args.json.as_deref(), args.motion.as_deref());
     output::check(&args.file, &outputs.files())?;
     let (source, settings) = read(&args.file, &args.view, quiet)?;
+    let mut machine = match &args.machine {
+        Some(file) => SavedSettings::read(file)?.settings,
+        None => Vec::new(),
+    };
+    machine.extend(args.set.iter().cloned());
+    let machine = simulated(&machine)?;
+    if args.motion.is_some() && machine.get(Setting::Kinematics) != 0 {
+        return Err(Error::MotionOfOtherMachine);
+    }
     let job = Job::new(source, &settings);
     let mut bar = Bar::new(quiet);
-    let mut plotter = InMemory::new();
+    let mut plotter = InMemory::with_settings(machine);
     let report = draw(&mut plotter, &job, interrupt, &mut bar)?;
     let mut result = plotter.result()?;
     for _ in 1..args.repeat {
@@ -138,10 +154,13 @@ fn preview(args: &PreviewArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Ou
         files.push(path);
     }
     if let Some(path) = &outputs.motion {
-        output::write(path, plotter.motion(&args.set)?.svg().as_bytes())?;
+        output::write(path, plotter.motion()?.svg().as_bytes())?;
         files.push(path);
     }
-    Ok(summary(&files, report))
+    let mut outcome = summary(&files, report);
+    let time = duration(result.duration_s.round() as u64);
+    outcome.text += &format!(", {time} to draw");
+    Ok(outcome)
 }
 
 /// Says which keys act from now on.
@@ -225,11 +244,19 @@ pub fn draw(
     progress: &mut dyn Progress,
 ) -> Result<Option<JobReport>, Error> {
     let mut sender = Sender::open(link, Patience::default(), interrupt)?;
-    let drawn = (sender.stream(job, progress))
-        .and_then(|()| sender.plot(progress))
-        .and_then(|()| sender.report());
+    let drawn = draw_by(&mut sender, job, progress);
     sender.end();
     drawn
+}
+
+fn draw_by(
+    sender: &mut Sender<'_>,
+    job: &dyn Lines,
+    progress: &mut dyn Progress,
+) -> Result<Option<JobReport>, Error> {
+    sender.stream(job, progress)?;
+    sender.plot(progress)?;
+    sender.report()
 }
 
 /// Reads `file`, tells the user what is not drawn as the file says, and chooses the settings.

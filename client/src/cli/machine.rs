@@ -2,9 +2,10 @@
 
 use super::number;
 use crate::keyboard::KEYS;
+use crate::machine_settings::AssignedSetting;
 use crate::ports::{AUTOMATIC, PORTS_VARIABLE};
 use clap::{Args, Subcommand, ValueEnum};
-use penup::machine::{SETTINGS, Setting};
+use penup::machine::Setting;
 use std::path::PathBuf;
 
 /// How the plotter is found.
@@ -142,55 +143,10 @@ pub enum SettingsCommand {
     },
 }
 
-/// A setting and the value that it shall have.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct AssignedSetting {
-    /// The number of the setting.
-    pub number: u16,
-    /// The value, a decimal number.
-    pub value: String,
-}
-
-impl AssignedSetting {
-    /// Parses `NUMBER=VALUE`; a `$` before the number does no harm.
-    ///
-    /// # Errors
-    /// The reason why it is none, for the user.
-    pub fn parse(text: &str) -> Result<Self, String> {
-        let (setting, value) =
-            text.split_once('=').ok_or("a setting has the form NUMBER=VALUE, such as 100=80")?;
-        let setting = setting.trim().trim_start_matches('$');
-        let number = setting.parse().map_err(|_| format!("\"{setting}\" is no number"))?;
-        let value = value.trim();
-        super::number(value)?;
-        Ok(Self { number, value: value.to_owned() })
-    }
-
-    /// The name of the setting, if this program knows it.
-    pub fn name(&self) -> Option<&'static str> {
-        SETTINGS.iter().find(|info| info.number == self.number).map(|info| info.name)
-    }
-}
-
 fn speed(text: &str) -> Result<f64, String> {
     let most = Setting::MaxRateX.info().greatest.to_num::<f64>();
     match number(text)? {
         speed if (1.0..=most).contains(&speed) => Ok(speed),
         _ => Err(format!("a speed is 1 to {most} mm/min")),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_setting_is_a_number_and_a_value() {
-        let parsed = |text| AssignedSetting::parse(text).map(|it| (it.number, it.value));
-        assert_eq!(parsed("100=88.9"), Ok((100, "88.9".to_owned())));
-        assert_eq!(parsed("$3 = 1"), Ok((3, "1".to_owned())));
-        for bad in ["100", "x=1", "100=", "100=fast", "100=inf", "70000=1"] {
-            assert!(parsed(bad).is_err(), "{bad}");
-        }
     }
 }

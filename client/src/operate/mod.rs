@@ -2,12 +2,14 @@
 
 mod console;
 mod orders;
+mod rehearsal;
 mod settings;
 mod settings_file;
 mod status;
 
 pub use console::console;
 pub use orders::{abort, again, home, jog, pause, pen, resume, unlock, watch};
+pub use rehearsal::rehearse;
 pub use settings::{restore, save, set, show};
 pub use settings_file::{SavedSettings, SettingsFileError};
 pub use status::{ports, status};

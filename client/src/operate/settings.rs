@@ -5,9 +5,9 @@
 
 use super::converse;
 use super::settings_file::SavedSettings;
-use crate::cli::{AssignedSetting, PlotterArgs, SetArgs};
+use crate::cli::{PlotterArgs, SetArgs};
 use crate::error::Error;
-use crate::formats::ReadError;
+use crate::machine_settings::AssignedSetting;
 use crate::outcome::Outcome;
 use crate::output;
 use crate::protocol::{BUILD, Reply, SETTINGS};
@@ -73,11 +73,7 @@ pub fn save(
 /// # Errors
 /// The file cannot be read, a setting is refused, or as [`Sender::ask`].
 pub fn restore(file: &Path, args: &PlotterArgs, interrupt: &AtomicBool) -> Result<Outcome, Error> {
-    let name = file.display().to_string();
-    let unreadable = |source| ReadError::File { file: name.clone(), source };
-    let text = std::fs::read_to_string(file).map_err(unreadable)?;
-    let saved = SavedSettings::parse(&text)
-        .map_err(|source| Error::SettingsFile { file: name.clone(), source })?;
+    let saved = SavedSettings::read(file)?;
     let (changed, all) = converse(args, interrupt, |sender| {
         let changed = change(sender, &saved.settings)?;
         Ok((changed, read(sender)?))
@@ -147,7 +143,7 @@ fn is_same(a: &str, b: &str) -> bool {
 }
 
 /// Reads all settings.
-fn read(sender: &mut Sender<'_>) -> Result<Vec<AssignedSetting>, Error> {
+pub(super) fn read(sender: &mut Sender<'_>) -> Result<Vec<AssignedSetting>, Error> {
     agreed(sender, |sender| {
         let replies = sender.ask(SETTINGS)?;
         let settings: Vec<_> = replies.iter().filter_map(setting_in).collect();
@@ -174,7 +170,7 @@ fn firmware(sender: &mut Sender<'_>) -> Result<String, Error> {
 }
 
 /// Asks until two answers in a row are the same.
-fn agreed<T: PartialEq>(
+pub(super) fn agreed<T: PartialEq>(
     sender: &mut Sender<'_>,
     mut ask: impl FnMut(&mut Sender<'_>) -> Result<Option<T>, Error>,
 ) -> Result<T, Error> {

@@ -1,8 +1,11 @@
 //! The file in which `penup settings save` keeps the settings of a machine: TOML with a table of
 //! numbers and values.
 
-use crate::cli::AssignedSetting;
+use crate::error::Error;
+use crate::formats::ReadError;
+use crate::machine_settings::AssignedSetting;
 use std::fmt::Write as _;
+use std::path::Path;
 use toml::{Table, Value};
 
 /// The name of the table with the settings.
@@ -56,6 +59,17 @@ impl SavedSettings {
             let _ = writeln!(text, "{} = {}{name}", setting.number, setting.value);
         }
         text
+    }
+
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// The file cannot be read, or holds no settings.
+    pub fn read(file: &Path) -> Result<Self, Error> {
+        let name = file.display().to_string();
+        let unreadable = |source| ReadError::File { file: name.clone(), source };
+        let text = std::fs::read_to_string(file).map_err(unreadable)?;
+        Self::parse(&text).map_err(|source| Error::SettingsFile { file: name.clone(), source })
     }
 
     /// Reads the contents of a file.

@@ -109,3 +109,17 @@ fn an_interrupt_stops_the_plotter() {
     assert_eq!(program.wait().expect("it ends").code(), Some(130));
     assert_eq!(plotter.unplug().aborts, 2);
 }
+
+#[test]
+fn a_model_that_the_plotter_cannot_hold_is_not_sent() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("cube.obj"), CUBE).expect("written");
+    let mut fake = FakePlotter::new(Fault::None);
+    fake.most_vertices = 7;
+    let plotter = Plugged::new(fake);
+    let (code, _, stderr) = penup(folder.path(), &["plot", "cube.obj", "--port", &plotter.device]);
+    assert_eq!(code, Some(1));
+    let reason = "penup: the model has 8 vertices, and this plotter takes 7\n";
+    assert!(stderr.starts_with(reason), "{stderr}");
+    assert_eq!(plotter.unplug().lines, [""; 0]);
+}

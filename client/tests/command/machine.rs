@@ -259,3 +259,60 @@ fn completions_and_manual_pages_know_every_command() {
         assert!(pages.iter().any(|name| name == page), "{page}");
     }
 }
+
+#[test]
+fn a_preview_tells_how_long_the_machine_draws() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // 600 mm at 50 mm/s are 12 s, and some for the pen and the speeding up.
+    fs::write(
+        folder.path().join("a.obj"),
+        "v 10 10 0\nv 10 210 0\nv 210 210 0\nv 210 10 0\nl 1 2 3 4\n",
+    )
+    .expect("written");
+    let seconds = |arguments: &[&str]| {
+        let all = [&["preview", "a.obj", "--page", "A3", "--json", "a.json"], arguments].concat();
+        let (code, said, error) = penup(folder.path(), &all);
+        assert_eq!(code, Some(0), "{error}");
+        let json = fs::read_to_string(folder.path().join("a.json")).expect("readable");
+        let result: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+        let seconds = result["duration_s"].as_f64().expect("a number");
+        let (minutes, rest) = ((seconds.round() / 60.0).floor(), seconds.round() % 60.0);
+        assert!(said.ends_with(&format!(", {minutes}:{rest:02} to draw\n")), "{said}");
+        seconds
+    };
+    let usual = seconds(&[]);
+    assert!((12.0..15.0).contains(&usual), "{usual}");
+    let slow = seconds(&["--set", "201=600"]);
+    assert!((60.0..63.0).contains(&slow), "{slow}");
+    fs::write(folder.path().join("slow.toml"), "[settings]\n201 = 600\n22 = 1\n").expect("written");
+    assert_eq!(seconds(&["--machine", "slow.toml"]), slow);
+    // The picture of a machine whose motors move by belts is that of the page.
+    let polargraph = ["--set=230=2", "--set=231=900", "--set=232=300", "--set=233=700"];
+    assert!(seconds(&polargraph) > 12.0);
+    let picture = |machine: &[&str]| {
+        let arguments = ["preview", "a.obj", "--page", "A3", "--svg", "a.svg"];
+        let (code, _, error) = penup(folder.path(), &[&arguments[..], machine].concat());
+        assert_eq!(code, Some(0), "{error}");
+        fs::read_to_string(folder.path().join("a.svg")).expect("readable")
+    };
+    assert_eq!(picture(&polargraph), picture(&[]));
+    let (code, _, error) = penup(folder.path(), &["preview", "a.obj", "--set", "100=1"]);
+    assert_eq!(code, Some(1));
+    assert!(error.contains("setting 100 cannot be 1: "), "{error}");
+}
+
+#[test]
+fn what_the_machine_cannot_draw_is_told_before_it_is_sent() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("a.obj"), "v 10 10 0\nv 280 10 0\nl 1 2\n").expect("written");
+    let plotter = Library::new();
+    let run = |arguments: &[&str]| plotter.run(folder.path(), arguments);
+    assert_eq!(run(&["set", "130=250"]).0, Some(0));
+    let (code, _, error) = run(&["plot", "a.obj", "--page", "A3", "--port", "auto"]);
+    assert_eq!(code, Some(1), "{error}");
+    assert!(error.contains("beyond the travel"), "{error}");
+    assert_eq!(run(&["set", "130=420"]).0, Some(0));
+    let (code, said, error) = run(&["plot", "a.obj", "--page", "A3", "--port", "auto"]);
+    assert_eq!(code, Some(0), "{error}");
+    assert!(said.starts_with("a.obj is drawn: 1 strokes, 270.0 mm drawn"), "{said}");
+}
