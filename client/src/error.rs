@@ -392,7 +392,7 @@ fn alarmed(number: u16, messages: &[String]) -> String {
     let entries = alarm_entries();
     match entries.iter().find(|entry| u16::from(entry.number) == number) {
         Some(entry) => {
-            let (cause, cure) = (entry.cause.get(), sentence(entry.cure.get()));
+            let (cause, cure) = (entry.cause.get(), sentence(entry.for_client.get()));
             format!("the plotter stopped with alarm {number}: {cause}{said}\n{cure}")
         }
         None => format!(

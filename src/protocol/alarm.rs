@@ -13,8 +13,10 @@ pub struct AlarmEntry {
     pub number: u8,
     /// What has happened.
     pub cause: HostOnly<&'static str>,
-    /// What the user can do about it.
+    /// What the user can do about it, by lines at the serial port.
     pub cure: HostOnly<&'static str>,
+    /// The same by commands of the client.
+    pub for_client: HostOnly<&'static str>,
 }
 
 impl AlarmEntry {
@@ -26,41 +28,58 @@ impl AlarmEntry {
                 "a limit switch was pressed during a move",
                 "free the carriage by hand, send $X, then find the origin anew with $H; check \
                  that the drawing lies within the travel ($130, $131)",
+                "free the carriage by hand, then type `penup unlock` and `penup home`; check that \
+                 the drawing lies within the travel (settings 130 and 131)",
             ),
             Alarm::HomingFailed(_) => Self::new(
                 9,
                 "homing did not find a limit switch, or the switch stayed pressed",
                 "check the switch and its cable with ? (Pn: shows what is pressed), the \
                  direction of the motor ($3), then send $H again",
+                "check the switch and its cable with `penup status`, the direction of the motor \
+                 (setting 3), then type `penup home`",
             ),
             Alarm::EmergencyStop => Self::new(
                 10,
                 "the emergency stop is pressed, or its contact is wired the other way",
                 "release the stop and send $X; if nothing is pressed, set $5 for a contact that \
                  opens or closes",
+                "release the stop and type `penup unlock`; if nothing is pressed, set setting 5 \
+                 for a contact that opens or closes",
             ),
             Alarm::NotHomed => Self::new(
                 11,
                 "the machine has just started and does not know its position",
                 "send $H to find the limit switches, or $X if the pen stands at the origin",
+                "type `penup home`, or `penup unlock` if the pen stands at the origin",
             ),
             Alarm::Queue => Self::new(
                 100,
                 "a fault of the program: a step was planned for which there was no room",
                 "send $X, find the origin anew, and report what was drawn and with which settings",
+                "type `penup unlock`, find the origin anew, and report what was drawn and with \
+                 which settings",
             ),
             Alarm::Restarted => Self::new(
                 101,
                 "a fault of the program: the board has started again by itself",
                 "read the message before it, send $X, find the origin anew, and report the \
                  message",
+                "type `penup unlock`, find the origin anew, and report the message",
             ),
         }
     }
 
-    /// The row with this number, cause and cure.
-    const fn new(number: u8, cause: &'static str, cure: &'static str) -> Self {
-        Self { number, cause: HostOnly::new(cause), cure: HostOnly::new(cure) }
+    /// The row with this number, cause and cures.
+    const fn new(
+        number: u8,
+        cause: &'static str,
+        cure: &'static str,
+        for_client: &'static str,
+    ) -> Self {
+        let [cause, cure, for_client] =
+            [HostOnly::new(cause), HostOnly::new(cure), HostOnly::new(for_client)];
+        Self { number, cause, cure, for_client }
     }
 }
 
