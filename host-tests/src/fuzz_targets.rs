@@ -10,13 +10,14 @@ mod session;
 mod sender;
 mod stored;
 
-/// A target: its name, which is the name of its corpus, and the function that takes the input.
+pub use files::fuzz as files;
+pub use sender::fuzz as sender;
+pub use session::fuzz as session;
+pub use stored::fuzz as stored;
+
+/// A target: its name, which is that of its corpus, and the function that takes the input.
 pub type Target = (&'static str, fn(&[u8]));
 
 /// All targets.
-pub const TARGETS: [Target; 4] = [
-    ("session", session::fuzz),
-    ("files", files::fuzz),
-    ("stored", stored::fuzz),
-    ("sender", sender::fuzz),
-];
+pub const TARGETS: [Target; 4] =
+    [("session", session), ("files", files), ("stored", stored), ("sender", sender)];

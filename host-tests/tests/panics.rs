@@ -1,0 +1,60 @@
+//! Holds down the number of panics that the boards' images can still reach.
+#![cfg(feature = "emulator")]
+#![allow(clippy::expect_used, reason = "a test fails by panicking")]
+
+use penup_client::emulator::image_path;
+use penup_host_tests::panic_calls::{PanicCall, panic_calls};
+use std::collections::BTreeMap;
+
+/// The greatest numbers of calls of panic functions, for each room of `src/` on the LM3S6965 and on
+/// the Pico. A room that is missing has none. A number that
+/// has fallen is lowered here.
+const MOST: [(&str, [usize; 2]); 16] = [
+    ("boards", [2, 21]),
+    ("convex", [41, 176]),
+    ("curve", [7, 21]),
+    ("drawing", [6, 11]),
+    ("fixed.rs", [4, 5]),
+    ("lib.rs", [0, 2]),
+    ("machine", [4, 23]),
+    ("model", [12, 39]),
+    ("motion", [7, 18]),
+    ("order", [53, 377]),
+    ("plotter", [4, 2]),
+    ("protocol", [2, 3]),
+    ("stage.rs", [0, 45]),
+    ("step", [3, 13]),
+    ("view", [3, 11]),
+    ("visibility", [25, 185]),
+];
+
+/// The room of `src/` that causes a call; `None` outside the project.
+fn room(call: &PanicCall) -> Option<&str> {
+    call.file.strip_prefix("src/")?.split('/').next()
+}
+
+#[test]
+fn no_room_gains_a_panic() {
+    let mut faults = Vec::new();
+    for (column, board) in ["lm3s6965", "pico"].into_iter().enumerate() {
+        let image = std::fs::read(image_path(board)).expect("the image is built");
+        let calls = panic_calls(&image).expect("an image with debug information");
+        assert!(calls.iter().any(|call| call.file.starts_with("src/order/")), "{board}: no lines");
+        let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+        for room in calls.iter().filter_map(room) {
+            *counts.entry(room).or_default() += 1;
+        }
+        for (room, count) in counts {
+            let most =
+                MOST.iter().find(|(name, _)| *name == room).map_or(0, |(_, most)| most[column]);
+            if count > most {
+                faults.push(format!("{board}: {room} has {count} calls where {most} are allowed"));
+            }
+        }
+    }
+    assert!(
+        faults.is_empty(),
+        "cargo xtask panics lists each call; prove each new one away:\n{}",
+        faults.join("\n")
+    );
+}
