@@ -33,8 +33,8 @@ impl StretchSink for Svg<'_> {
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let mut vertices = heapless::Vec::<Position, 8>::new();
-    let mut corners = [Corner::new(0, false, false); 24];
+    let mut vertices = [Position::ORIGIN; 8];
+    let mut corners = [<Corner>::ZERO; 24];
     let mut model = Model::new(&mut vertices, &mut corners);
     let refused = |error: &dyn std::fmt::Debug| format!("{error:?}");
     for z in ["0", "1"] {

@@ -13,11 +13,10 @@ fn squares() -> (Vec<PagePoint>, Vec<Segment>) {
         let corners = [(0, 0), (1000, 0), (1000, 1000), (0, 1000)];
         points.extend(corners.map(|(x, y)| PagePoint { x: left + x, y }));
         let first = 4 * square;
-        segments.extend([[0, 1], [1, 2], [2, 3], [3, 0], [0, 2]].map(|[from, to]| Segment {
-            from: first + from,
-            to: first + to,
-            ..Segment::default()
-        }));
+        segments.extend(
+            [[0, 1], [1, 2], [2, 3], [3, 0], [0, 2]]
+                .map(|[from, to]| Segment::new(first + from, first + to)),
+        );
     }
     (points, segments)
 }
@@ -35,8 +34,8 @@ fn main() -> Result<(), String> {
     for leg in tour {
         let segment = segments[leg.segment()];
         let (from, to) = match leg.reversed() {
-            false => (segment.from, segment.to),
-            true => (segment.to, segment.from),
+            false => (segment.from(), segment.to()),
+            true => (segment.to(), segment.from()),
         };
         if pen_at != Some(from) {
             println!("pen up, to point {from}, pen down");

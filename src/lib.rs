@@ -19,11 +19,11 @@
 //! use penup::stage::{NeverCancel, Scratch};
 //!
 //! let points = [(0, 0), (800, 0), (0, 400), (800, 400)].map(|(x, y)| PagePoint { x, y });
-//! let segments = [[0, 1], [2, 3]].map(|[from, to]| Segment { from, to, ..Segment::default() });
+//! let segments = [[0, 1], [2, 3]].map(|[from, to]| Segment::new(from, to));
 //! let drawing = Drawing { points: &points, segments: &segments };
 //!
 //! let mut memory = vec![0; 1024];
-//! let mut tour = [Leg::new(0, false); 2];
+//! let mut tour = [Leg::new(0u16, false); 2];
 //! let scratch = Scratch::new(&mut memory);
 //! let report = order(drawing, Options::default(), scratch, &mut NeverCancel, &mut tour)?;
 //!
@@ -46,6 +46,7 @@ pub mod board_table;
 pub mod checksum;
 pub mod fixed;
 pub mod host_only;
+pub mod index;
 pub mod stage;
 
 pub mod geometry;

@@ -13,8 +13,8 @@ use penup::protocol::LineReader;
 pub fn contents(lines: &dyn Lines, count: usize) -> Option<[u32; 2]> {
     let (mut ring, pins) = (EventRing::new(), PulserState::new());
     let mut board = HostBoard::new(&mut ring, &pins);
-    let mut vertices = Box::new(heapless::Vec::<Position, VERTEX_NUMBER_LIMIT>::new());
-    let mut corners = vec![Corner::new(0, false, false); 1 << 16];
+    let mut vertices = Box::new([Position::ORIGIN; VERTEX_NUMBER_LIMIT]);
+    let mut corners = vec![<Corner>::ZERO; 1 << 16];
     let mut blocks = EMPTY_LOOKAHEAD;
     // Without working memory, the plotter does not copy the model after each line, which saves
     // time.

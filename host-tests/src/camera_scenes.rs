@@ -287,8 +287,7 @@ pub fn camera_scene(seed: u64) -> CameraScene {
     let mut builder = Builder::default();
     fill(random, &mut builder, seed % KINDS);
     let texts = write(random, &builder.grid);
-    let (mut vertices, mut corners) =
-        (heapless::Vec::<Position, 200>::new(), [Corner::new(0, false, false); 400]);
+    let (mut vertices, mut corners) = ([Position::ORIGIN; 200], [<Corner>::ZERO; 400]);
     let mut model = Model::new(&mut vertices, &mut corners);
     for point in &texts {
         let point = [0, 1, 2]

@@ -52,7 +52,7 @@ pub fn is_seen_alike(random: &mut Random, stretches: impl Fn(&Scene<'_>) -> Vec<
     } else {
         (Eye::Towards([0, -1, 0]), Projection::Parallel)
     };
-    let mut words = vec![0; scratch_bytes_from_vertices(points.len()) / 8];
+    let mut words = vec![0; scratch_bytes_from_vertices::<u16>(points.len()) / 8];
     let mut faces = Faces::default();
     let scratch = Scratch::new(&mut words);
     if from_vertices(&points, eye, Precision::default(), scratch, &mut NeverCancel, &mut faces)

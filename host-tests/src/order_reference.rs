@@ -37,8 +37,7 @@ impl Sheet {
             for pair in ends.windows(2) {
                 let (from, to) = (pair[0], pair[1]);
                 if from != to && known.insert((from.min(to), from.max(to))) {
-                    let segment = Segment { from, to, ..Segment::default() };
-                    sheet.segments.push(segment);
+                    sheet.segments.push(Segment::new(from, to));
                 }
             }
         }
@@ -73,10 +72,25 @@ impl Sheet {
         Ok((tour, report))
     }
 
+    /// As [`Sheet::order`], with the numbers and the memory of a computer.
+    pub fn order_wide(&self, options: Options) -> Result<(Vec<Leg<u32>>, Report), OrderError> {
+        let widened = |segment: &Segment| {
+            let ends = [segment.from(), segment.to()].map(u32::from);
+            Segment::new(ends[0], ends[1]).inked(segment.line_type(), segment.pen())
+        };
+        let segments: Vec<Segment<u32>> = self.segments.iter().map(widened).collect();
+        let drawing = Drawing { points: &self.points, segments: &segments };
+        let mut memory = vec![0; 1 << 16];
+        let mut tour = vec![Leg::new(0, false); segments.len()];
+        let scratch = Scratch::new(&mut memory);
+        let report = order(drawing, options, scratch, &mut NeverCancel, &mut tour)?;
+        Ok((tour, report))
+    }
+
     /// The point at which a leg begins.
     pub fn start(&self, leg: Leg) -> PagePoint {
         let segment = self.segments[leg.segment()];
-        let point = if leg.reversed() { segment.to } else { segment.from };
+        let point = if leg.reversed() { segment.to() } else { segment.from() };
         self.points[usize::from(point)]
     }
 
@@ -89,8 +103,8 @@ impl Sheet {
     pub fn odd_points(&self) -> usize {
         let mut degree = vec![0; self.points.len()];
         for segment in &self.segments {
-            degree[usize::from(segment.from)] += 1;
-            degree[usize::from(segment.to)] += 1;
+            degree[usize::from(segment.from())] += 1;
+            degree[usize::from(segment.to())] += 1;
         }
         degree.iter().filter(|&degree| degree % 2 == 1).count()
     }
@@ -101,13 +115,13 @@ impl Sheet {
         let mut count = 0;
         while let Some(first) = left.pop_first() {
             count += 1;
-            let mut wet = BTreeSet::from([self.segments[first].from, self.segments[first].to]);
+            let mut wet = BTreeSet::from([self.segments[first].from(), self.segments[first].to()]);
             loop {
                 let touched: Vec<usize> = left
                     .iter()
                     .copied()
                     .filter(|&number| {
-                        let Segment { from, to, .. } = self.segments[number];
+                        let (from, to) = (self.segments[number].from(), self.segments[number].to());
                         wet.contains(&from) || wet.contains(&to)
                     })
                     .collect();
@@ -116,8 +130,8 @@ impl Sheet {
                 }
                 for number in touched {
                     left.remove(&number);
-                    wet.insert(self.segments[number].from);
-                    wet.insert(self.segments[number].to);
+                    wet.insert(self.segments[number].from());
+                    wet.insert(self.segments[number].to());
                 }
             }
         }
@@ -146,7 +160,7 @@ impl Sheet {
         assert!((report.pen_up as f64 / 256.0 - pen_up).abs() < count / 256.0);
         assert!((report.pen_down as f64 / 256.0 - pen_down).abs() < count / 256.0);
         assert_eq!(report.lifts as usize, moves.len());
-        if self.segments.iter().all(|segment| segment.pen == 0) {
+        if self.segments.iter().all(|segment| segment.pen() == 0) {
             assert_eq!(report.odd_points as usize, self.odd_points());
             assert_eq!(report.components as usize, self.components());
             if report.components == 1 {

@@ -31,7 +31,7 @@ fn found(
     eye: Eye,
     tolerance: u32,
 ) -> Result<(SolidSummary, Sights), SolidError> {
-    let mut words = vec![0; scratch_bytes_from_edges(points.len(), edges.len()) / 8];
+    let mut words = vec![0; scratch_bytes_from_edges::<u16>(points.len(), edges.len()) / 8];
     let mut sink = Found::default();
     let scratch = Scratch::new(&mut words);
     let precision = Precision { written: tolerance, unit: tolerance.min(1) };
@@ -110,7 +110,7 @@ fn edges_of(faces: &[Vec<u16>]) -> Vec<[u16; 2]> {
 }
 
 fn found_from_vertices(points: &[Point], eye: Eye, tolerance: u32) -> Result<Sights, SolidError> {
-    let mut words = vec![0; scratch_bytes_from_vertices(points.len()) / 8];
+    let mut words = vec![0; scratch_bytes_from_vertices::<u16>(points.len()) / 8];
     let mut sink = Found::default();
     let scratch = Scratch::new(&mut words);
     let precision = Precision { written: tolerance, unit: tolerance.min(1) };
@@ -302,7 +302,7 @@ fn a_word_too_few_or_no_patience_is_an_error() {
     let (points, faces) = read_scene("dodecahedron");
     let edges = edges_of(&faces);
     let eye = Eye::Towards([1, 2, 3]);
-    let mut words = vec![0; scratch_bytes_from_edges(points.len(), edges.len()) / 8];
+    let mut words = vec![0; scratch_bytes_from_edges::<u16>(points.len(), edges.len()) / 8];
     let all = words.len();
     for count in 0..all {
         let scratch = Scratch::new(&mut words[..count]);

@@ -23,7 +23,7 @@ use penup_host_tests::random::Random;
 const EXACT: Precision = Precision { written: 0, unit: 0 };
 
 fn found(points: &[Point], eye: Eye, tolerance: u32) -> Result<(SolidSummary, Found), SolidError> {
-    let mut words = vec![0; scratch_bytes_from_vertices(points.len()) / 8];
+    let mut words = vec![0; scratch_bytes_from_vertices::<u16>(points.len()) / 8];
     let mut sink = Found::default();
     let scratch = Scratch::new(&mut words);
     let precision = Precision { written: tolerance, unit: tolerance.min(1) };
@@ -41,7 +41,8 @@ fn compare(points: &[Point], eye: Eye) -> &'static str {
         (Model::InLine, Err(SolidError::AllInLine)) => "in line",
         (Model::EyeInside, Err(SolidError::EyeInside)) => "eye inside",
         (Model::NotConvex(inside), Err(SolidError::VertexInside { vertex, count })) => {
-            assert_eq!((inside.first(), inside.len()), (Some(&vertex), count), "{}", case());
+            let first = inside.first().copied().map(u32::from);
+            assert_eq!((first, inside.len()), (Some(vertex), count), "{}", case());
             "not convex"
         }
         (Model::Flat(corners), Ok((summary, found))) => {
@@ -298,7 +299,7 @@ impl SolidSink for Limited {
 fn a_word_too_few_is_an_error_and_the_sink_is_given_nothing() {
     let (points, _) = read_scene("icosahedron");
     // Triangles only: as many edges and faces as there can be.
-    let words_needed = scratch_bytes_from_vertices(points.len()) / 8;
+    let words_needed = scratch_bytes_from_vertices::<u16>(points.len()) / 8;
     let mut words = vec![0; words_needed];
     for count in 0..words_needed {
         let scratch = Scratch::new(&mut words[..count]);
@@ -341,7 +342,7 @@ impl Cancel for Impatient {
 fn the_user_can_give_up_at_any_moment() {
     let (points, _) = read_scene("dodecahedron");
     let rounded = as_decimals(&points, &any_rotation(&mut Random::new(2)), 6);
-    let mut words = vec![0; scratch_bytes_from_vertices(points.len()) / 8];
+    let mut words = vec![0; scratch_bytes_from_vertices::<u16>(points.len()) / 8];
     let mut patience = 0;
     loop {
         let scratch = Scratch::new(&mut words);

@@ -19,8 +19,8 @@ fn star(points: &[(i32, i32)], side: i32) -> Sheet {
 fn least(sheet: &Sheet, shape: Shape) -> u64 {
     let mut degrees = vec![0; sheet.points.len()];
     for segment in &sheet.segments {
-        degrees[usize::from(segment.from)] += 1;
-        degrees[usize::from(segment.to)] += 1;
+        degrees[usize::from(segment.from())] += 1;
+        degrees[usize::from(segment.to())] += 1;
     }
     let positions = sheet.points.iter().zip(degrees).filter(|&(_, degree)| degree % 2 == 1);
     let mut odd: Vec<_> = positions.map(|(&position, _)| Some(position)).collect();

@@ -3,7 +3,7 @@
 
 #![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
-use penup::drawing::{Drawing, PagePoint, Segment};
+use penup::drawing::{Drawing, LineType, PagePoint, Segment};
 use penup::order::{EXACT_POINTS, Leg, Method, Options, OrderError, Report, Shape, order};
 use penup::stage::{Aborted, Cancel, NeverCancel, Scratch};
 use penup_host_tests::order_reference::Sheet;
@@ -26,7 +26,7 @@ fn orders_everything(sheet: &Sheet) -> Result<(), OrderError> {
     for (method, shape) in ALL {
         let (_, nearest_first) = sheet.order(Options { method, shape, effort: 0, lift_cost: 0 })?;
         let (_, improved) = sheet.order(Options { method, shape, effort: 3, lift_cost: 0 })?;
-        if sheet.segments.iter().all(|segment| segment.pen == 0) {
+        if sheet.segments.iter().all(|segment| segment.pen() == 0) {
             assert!(improved.pen_up <= nearest_first.pen_up);
         }
         let (_, seldom_lifted) =
@@ -117,7 +117,7 @@ fn very_many_odd_points_are_paired_exactly_only_when_asked() {
     let paired = |method| {
         let (_, report) =
             sheet.order(Options { method, effort: 0, ..Options::default() }).expect("fits");
-        assert!(report.odd_points > u32::from(EXACT_POINTS));
+        assert!(report.odd_points > EXACT_POINTS);
         report.bound > 0
     };
     assert!(!paired(Method::Auto) && paired(Method::Exact));
@@ -177,7 +177,7 @@ fn a_job_given_up_ends_at_once() {
 fn a_drawing_that_is_none_is_refused() {
     let points =
         [PagePoint { x: 0, y: 0 }, PagePoint { x: 9, y: 0 }, PagePoint { x: 1 << 21, y: 0 }];
-    let segment = |from, to| Segment { from, to, ..Segment::default() };
+    let segment = |from, to| Segment::new(from, to);
     let attempt = |segments: Vec<Segment>, positions: usize| {
         let mut tour = vec![Leg::new(0, false); positions];
         let drawing = Drawing { points: &points, segments: &segments };
@@ -189,8 +189,8 @@ fn a_drawing_that_is_none_is_refused() {
     assert_eq!(attempt(vec![segment(0, 1), segment(1, 3)], 2), Err(OrderError::BadSegment(1)));
     assert_eq!(attempt(vec![segment(0, 2)], 1), Err(OrderError::BadSegment(0)));
     assert_eq!(attempt(vec![segment(1, 1)], 1), Err(OrderError::BadSegment(0)));
-    let many = vec![segment(0, 1); Leg::LIMIT + 1];
-    assert_eq!(attempt(many, Leg::LIMIT + 1), Err(OrderError::TooManySegments));
+    let many = vec![segment(0, 1); <Leg>::LIMIT + 1];
+    assert_eq!(attempt(many, <Leg>::LIMIT + 1), Err(OrderError::TooManySegments));
     assert_eq!(attempt(vec![], 0), Ok(Report { optimal: true, ..Report::default() }));
 }
 
@@ -206,16 +206,38 @@ proptest! {
     }
 
     #[test]
+    fn the_width_of_numbers_changes_nothing(
+        polylines in polylines(1 << 12),
+        pens in prop::collection::vec(0u8..3, 100),
+        closed: bool,
+    ) {
+        let mut sheet = Sheet::from_polylines(&polylines);
+        for (segment, &pen) in sheet.segments.iter_mut().zip(&pens) {
+            *segment = segment.inked(LineType::Full, pen);
+        }
+        let shape = if closed { Shape::ClosedCycle } else { Shape::OpenPath };
+        for (method, effort) in [(Method::Auto, 200), (Method::Greedy, 0), (Method::Exact, 20)] {
+            let options = Options { method, shape, effort, lift_cost: 300 };
+            let (tour, report) = sheet.order(options).expect("fits");
+            let (wide, wide_report) = sheet.order_wide(options).expect("fits");
+            prop_assert_eq!(report, wide_report);
+            let plain = |segment, reversed| (segment, reversed);
+            let tour = tour.iter().map(|leg| plain(leg.segment(), leg.reversed()));
+            prop_assert!(tour.eq(wide.iter().map(|leg| plain(leg.segment(), leg.reversed()))));
+        }
+    }
+
+    #[test]
     fn each_pen_draws_its_own(crowded in polylines(3), pens in prop::collection::vec(0u8..4, 100)) {
         let mut sheet = Sheet::from_polylines(&crowded);
         for (segment, &pen) in sheet.segments.iter_mut().zip(&pens) {
-            segment.pen = pen;
+            *segment = segment.inked(LineType::Full, pen);
         }
         prop_assert_eq!(orders_everything(&sheet), Ok(()));
         let (method, shape) = (Method::Auto, Shape::OpenPath);
         let options = Options { method, shape, effort: 1, lift_cost: 0 };
         let (tour, _) = sheet.order(options).expect("as above");
-        let pens = tour.iter().map(|leg| sheet.segments[leg.segment()].pen);
+        let pens = tour.iter().map(|leg| sheet.segments[leg.segment()].pen());
         prop_assert!(pens.is_sorted());
     }
 }

@@ -14,7 +14,7 @@ fn star(tips: &[PagePoint]) -> Sheet {
     let hub = PagePoint { x: -7, y: 3 };
     let points = tips.iter().copied().chain([hub]).collect();
     let to = tips.len() as u16;
-    let segments = (0..to).map(|from| Segment { from, to, ..Segment::default() }).collect();
+    let segments = (0..to).map(|from| Segment::new(from, to)).collect();
     Sheet { points, segments }
 }
 

@@ -14,7 +14,7 @@
 
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
 
-use penup::drawing::{PagePoint, Segment};
+use penup::drawing::{LineType, PagePoint, Segment};
 use penup::order::{Leg, Options, Report, Shape};
 use penup_host_tests::order_reference::Sheet;
 use std::collections::BTreeMap;
@@ -126,13 +126,13 @@ fn assert_tour(options: Options, expected: &str) -> Report {
                 positions.len() as u16 - 1
             })
         });
-        sheet.segments.push(Segment { from, to, pen, ..Segment::default() });
+        sheet.segments.push(Segment::new(from, to).inked(LineType::Full, pen));
     }
     let (tour, report) = sheet.order(options).expect("a small drawing fits");
     let leg = |leg: &Leg| {
         let segment = sheet.segments[leg.segment()];
-        let [from, to] = [segment.from, segment.to].map(|point| positions[usize::from(point)]);
-        if leg.reversed() { (to, from, segment.pen) } else { (from, to, segment.pen) }
+        let [from, to] = [segment.from(), segment.to()].map(|point| positions[usize::from(point)]);
+        if leg.reversed() { (to, from, segment.pen()) } else { (from, to, segment.pen()) }
     };
     let found = picture_of(&tour.iter().map(leg).collect::<Vec<_>>());
     assert!(found == expected, "expected:\n{}\nfound:\n{}", expected.join("\n"), found.join("\n"));

@@ -20,14 +20,14 @@ fn organised(lines: &[Drawn]) -> Vec<Drawn> {
         })
         .collect();
     items_mut(&mut words, lines.len()).expect("room").copy_from_slice(&packed);
-    let stored = build_graph(&mut words, lines.len(), &mut NeverCancel).expect("room");
+    let stored = build_graph::<u16>(&mut words, lines.len(), &mut NeverCancel).expect("room");
     let (drawing, _) = stored.split(&mut words).expect("the same memory");
     let at = |number: u16| {
         let point = drawing.points[usize::from(number)];
         (i64::from(point.x), i64::from(point.y))
     };
     let segments = drawing.segments.iter();
-    segments.map(|s| (at(s.from), at(s.to), s.line_type_code, s.pen)).collect()
+    segments.map(|s| (at(s.from()), at(s.to()), s.line_type().code(), s.pen())).collect()
 }
 
 /// The position of a point along a line, in units of the line's squared length; `None` if the point

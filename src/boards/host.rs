@@ -27,12 +27,12 @@ pub const QUEUE_LENGTH: usize = 624;
 /// times the working memory that any board's jobs use. The memory is leaked, so it lasts as long as
 /// the process.
 pub fn lend_memory() -> MemorySlices<'static> {
-    const VERTICES: usize = crate::model::VERTEX_NUMBER_LIMIT;
+    const VERTICES: usize = <Corner>::VERTEX_NUMBER_LIMIT;
     const CORNERS: usize = 1 << 16;
     const WORDS: usize = 1 << 19;
     MemorySlices {
-        vertices: Box::leak(Box::new(heapless::Vec::<Position, VERTICES>::new())),
-        corners: std::vec![Corner::new(0, false, false); CORNERS].leak(),
+        vertices: std::vec![Position::ORIGIN; VERTICES].leak(),
+        corners: std::vec![<Corner>::ZERO; CORNERS].leak(),
         blocks: Box::leak(Box::new(EMPTY_LOOKAHEAD)),
         words: std::vec![0; WORDS].leak(),
         readers: Box::leak(Box::new([const { LineReader::new() }; PORTS])),

@@ -17,6 +17,7 @@
 //!   crossing.
 
 use crate::array::MapEach;
+use crate::index::Index;
 use bytemuck::{Pod, Zeroable};
 
 use super::exact::{Plane, Point, Viewpoint};
@@ -44,7 +45,7 @@ use crate::stage::{Cancel, OutOfScratch, Scratch, heap_sort_by_key};
 /// use penup::stage::{Scratch, NeverCancel};
 ///
 /// #[derive(Default)]
-/// struct Hidden(Vec<(u16, u16)>);
+/// struct Hidden(Vec<(I, I)>);
 /// impl SolidSink for Hidden {
 ///     fn face(&mut self, _: &[Corner], _: bool) -> Result<(), SinkFull> {
 ///         Ok(())
@@ -70,19 +71,19 @@ use crate::stage::{Cancel, OutOfScratch, Scratch, heap_sort_by_key};
 /// # Ok::<(), SolidError>(())
 /// ```
 #[inline(never)] // Smaller than in its only caller.
-pub fn from_edges(
+pub fn from_edges<I: Index>(
     positions: &[[i32; 3]],
-    edges: &[[u16; 2]],
+    edges: &[[I; 2]],
     eye: Eye,
     precision: Precision,
     mut scratch: Scratch<'_>,
     cancel: &mut dyn Cancel,
-    sink: &mut dyn SolidSink,
+    sink: &mut dyn SolidSink<I>,
 ) -> Result<SolidSummary, SolidError> {
     eye.check()?;
-    points::check(positions)?;
+    points::check::<I>(positions)?;
     if let Some(edge) =
-        edges.iter().position(|ends| !ends.iter().all(|end| usize::from(*end) < positions.len()))
+        edges.iter().position(|ends| !ends.iter().all(|end| end.get() < positions.len()))
     {
         return Err(SolidError::UnknownVertex { edge });
     }
@@ -99,7 +100,7 @@ pub fn from_edges(
     };
     let viewpoint = Viewpoint {
         eye: points::drawn_in_eye(eye, positions, graph.numbers, precision),
-        inside: Some(inside.map(|number| positions[usize::from(number)])),
+        inside: Some(inside.map(|number| positions[number.get()])),
     };
     let outline = graph.find_outline(&viewpoint, inside, &mut scratch, cancel)?;
     let visible = scratch.take::<u8>(positions.len())?;
@@ -109,69 +110,72 @@ pub fn from_edges(
 }
 
 /// Returns the bytes of working memory that [`from_edges`] takes.
-pub const fn scratch_bytes_from_edges(vertices: usize, edges: usize) -> usize {
-    3 * Scratch::bytes_for::<u16>(vertices)
+pub const fn scratch_bytes_from_edges<I: Index>(vertices: usize, edges: usize) -> usize {
+    3 * Scratch::bytes_for::<I>(vertices)
         + Scratch::bytes_for::<u8>(vertices)
-        + Scratch::bytes_for::<[u16; 2]>(edges)
+        + Scratch::bytes_for::<[I; 2]>(edges)
 }
 
 /// The part of the graph to which a vertex belongs: a component, the outline, or neither.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 #[repr(transparent)]
-struct Membership(u16);
+struct Membership<I>(I);
 
-impl Membership {
-    const NO_EDGE: Self = Self(u16::MAX);
-    const OUTLINE: u16 = 1 << 15;
+impl<I: Index> Membership<I> {
+    const NO_EDGE: Self = Self(I::NONE);
+    /// The flag of a corner of the outline.
+    fn outline_flag() -> I {
+        I::ONE << (I::BITS - 1)
+    }
 
     /// Membership in the component that is named after vertex `name`.
-    const fn component(name: u16) -> Self {
+    fn component(name: I) -> Self {
         Self(name)
     }
 
     /// Membership in the outline, as its corner number `at`.
-    const fn outline(at: usize) -> Self {
-        Self(Self::OUTLINE | at as u16) // fewer than 2^14
+    fn outline(at: usize) -> Self {
+        Self(Self::outline_flag() | I::new(at)) // fewer than there are vertices
     }
 
     /// Returns the component to which a vertex inside the outline belongs.
-    fn component_name(self) -> Option<u16> {
-        (self.0 & Self::OUTLINE == 0).then_some(self.0)
+    fn component_name(self) -> Option<I> {
+        (self.0 & Self::outline_flag() == I::ZERO).then_some(self.0)
     }
 
     /// Returns the index of the vertex on the outline, if it lies there.
     fn outline_place(self) -> Option<usize> {
         (self.component_name().is_none() && self != Self::NO_EDGE)
-            .then_some(usize::from(self.0 & !Self::OUTLINE))
+            .then_some((self.0 & (Self::outline_flag() - I::ONE)).get())
     }
 }
 
 /// The vertices that have edges, each position once, and the edges between them.
-struct Graph<'s> {
+struct Graph<'s, I> {
     points: &'s [Point],
-    numbers: &'s [u16],
-    edges: &'s [[u16; 2]],
+    numbers: &'s [I],
+    edges: &'s [[I; 2]],
     /// The membership of each vertex. A vertex that is in no component and not on the outline has
     /// no edge.
-    membership: &'s mut [Membership],
+    membership: &'s mut [Membership<I>],
     /// The number of vertices left out because an earlier one is at the same position.
     welded: usize,
 }
 
-impl<'s> Graph<'s> {
+impl<'s, I: Index> Graph<'s, I> {
     fn new(
         points: &'s [Point],
-        edges: &[[u16; 2]],
+        edges: &[[I; 2]],
         scratch: &mut Scratch<'s>,
     ) -> Result<Self, OutOfScratch> {
-        let numbers = scratch.take::<u16>(points.len())?;
-        for (slot, number) in numbers.iter_mut().zip(0..) {
+        let numbers = scratch.take::<I>(points.len())?;
+        for (slot, number) in numbers.iter_mut().zip(I::all()) {
             *slot = number;
         }
         let distinct = points::weld(points, numbers);
-        let membership = scratch.take::<Membership>(points.len())?;
+        let membership = scratch.take::<Membership<I>>(points.len())?;
         membership.fill(Membership::NO_EDGE);
-        let own_edges = scratch.take::<[u16; 2]>(edges.len())?;
+        let own_edges = scratch.take::<[I; 2]>(edges.len())?;
         let mut count = 0;
         for ends in edges {
             let [a, b] =
@@ -179,8 +183,8 @@ impl<'s> Graph<'s> {
             if a != b {
                 own_edges[count] = [a.min(b), a.max(b)];
                 count += 1;
-                membership[usize::from(a)] = Membership::component(a);
-                membership[usize::from(b)] = Membership::component(b);
+                membership[a.get()] = Membership::component(a);
+                membership[b.get()] = Membership::component(b);
             }
         }
         let own_edges = &mut own_edges[..count];
@@ -188,7 +192,7 @@ impl<'s> Graph<'s> {
         let edge_count = remove_repeated(own_edges);
         let mut used = 0;
         for at in 0..distinct {
-            if membership[usize::from(numbers[at])] != Membership::NO_EDGE {
+            if membership[numbers[at].get()] != Membership::NO_EDGE {
                 numbers[used] = numbers[at];
                 used += 1;
             }
@@ -202,8 +206,8 @@ impl<'s> Graph<'s> {
         })
     }
 
-    fn point(&self, number: u16) -> Point {
-        self.points[usize::from(number)]
+    fn point(&self, number: I) -> Point {
+        self.points[number.get()]
     }
 
     /// Walks around the outline, counter-clockwise on the page, and marks its vertices. Returns the
@@ -211,11 +215,11 @@ impl<'s> Graph<'s> {
     fn find_outline(
         &mut self,
         viewpoint: &Viewpoint,
-        [a, b, c, _]: [u16; 4],
+        [a, b, c, _]: [I; 4],
         scratch: &mut Scratch<'s>,
         cancel: &mut dyn Cancel,
-    ) -> Result<&'s [u16], SolidError> {
-        let room = scratch.take::<u16>(self.numbers.len())?;
+    ) -> Result<&'s [I], SolidError> {
+        let room = scratch.take::<I>(self.numbers.len())?;
         let mut enclosing = Polygon::triangle(room, self.points, viewpoint, [a, b, c]);
         for number in self.numbers {
             cancel.check()?;
@@ -231,28 +235,28 @@ impl<'s> Graph<'s> {
         let (mut from, mut at) = (start, start);
         loop {
             cancel.check()?;
-            let seen_before = self.membership[usize::from(at)].outline_place().is_some();
+            let seen_before = self.membership[at.get()].outline_place().is_some();
             let room = outline.get_mut(count).filter(|_| !seen_before);
-            *room.ok_or(SolidError::OutlineBroken { vertex: at })? = at;
-            self.membership[usize::from(at)] = Membership::outline(count);
+            *room.ok_or(SolidError::OutlineBroken { vertex: at.into() })? = at;
+            self.membership[at.get()] = Membership::outline(count);
             count += 1;
             let next = self
                 .rightmost_neighbour(from, at, viewpoint)
-                .ok_or(SolidError::OutlineBroken { vertex: at })?;
+                .ok_or(SolidError::OutlineBroken { vertex: at.into() })?;
             if next == start {
                 break;
             }
             (from, at) = (at, next);
         }
         if count < 3 {
-            return Err(SolidError::OutlineBroken { vertex: start });
+            return Err(SolidError::OutlineBroken { vertex: start.into() });
         }
         Ok(&outline[..count])
     }
 
     /// Returns the neighbour of `at` that has all other neighbours to its left, not counting the
     /// one from which `at` was reached.
-    fn rightmost_neighbour(&self, from: u16, at: u16, viewpoint: &Viewpoint) -> Option<u16> {
+    fn rightmost_neighbour(&self, from: I, at: I, viewpoint: &Viewpoint) -> Option<I> {
         let origin = self.point(at);
         self.edges
             .iter()
@@ -273,23 +277,23 @@ impl<'s> Graph<'s> {
             let (Some(a), Some(b)) = (self.component(*a), self.component(*b)) else {
                 continue;
             };
-            self.membership[usize::from(a.max(b))] = Membership::component(a.min(b));
+            self.membership[a.max(b).get()] = Membership::component(a.min(b));
         }
         // A name is never greater than the number of the vertex, so one pass in ascending order
         // reaches the final name.
         for number in 0..self.membership.len() {
             if let Some(name) = self.membership[number].component_name() {
-                self.membership[number] = self.membership[usize::from(name)];
+                self.membership[number] = self.membership[name.get()];
             }
         }
     }
 
     /// Returns the name of the component of a vertex, as far as it is known. Returns `None` for a
     /// vertex on the outline.
-    fn component(&self, number: u16) -> Option<u16> {
+    fn component(&self, number: I) -> Option<I> {
         let mut at = number;
         loop {
-            let name = self.membership[usize::from(at)].component_name()?;
+            let name = self.membership[at.get()].component_name()?;
             if name == at {
                 return Some(name);
             }
@@ -301,7 +305,7 @@ impl<'s> Graph<'s> {
     fn decide_components(
         &self,
         viewpoint: &Viewpoint,
-        outline: &[u16],
+        outline: &[I],
         visible: &mut [u8],
         cancel: &mut dyn Cancel,
     ) -> Result<(), SolidError> {
@@ -311,7 +315,7 @@ impl<'s> Graph<'s> {
             let mut height_of_witness = 0i128;
             let mut plane_of_witness = None;
             for number in self.numbers {
-                if self.membership[usize::from(*number)] != Membership::component(name) {
+                if self.membership[number.get()] != Membership::component(name) {
                     continue;
                 }
                 cancel.check()?;
@@ -330,24 +334,25 @@ impl<'s> Graph<'s> {
                 Some(plane) if height_of_witness == 0 => self.is_nothing_above(&plane),
                 _ => height_of_witness > 0,
             };
-            visible[usize::from(name)] = u8::from(is_near);
+            visible[name.get()] = u8::from(is_near);
         }
         Ok(())
     }
 
     /// Iterates over the names of the components.
-    fn component_names(&self) -> impl Iterator<Item = u16> {
-        self.numbers.iter().copied().filter(|number| {
-            self.membership[usize::from(*number)] == Membership::component(*number)
-        })
+    fn component_names(&self) -> impl Iterator<Item = I> {
+        self.numbers
+            .iter()
+            .copied()
+            .filter(|number| self.membership[number.get()] == Membership::component(*number))
     }
 
     /// Returns the plane of the triangle of outline vertices in front of or behind which the vertex
     /// lies on the page. The upper side of the plane faces the eye.
-    fn triangle_at(&self, number: u16, viewpoint: &Viewpoint, outline: &[u16]) -> Option<Plane> {
+    fn triangle_at(&self, number: I, viewpoint: &Viewpoint, outline: &[I]) -> Option<Plane> {
         let (first, rest) = outline.split_first()?;
         let apex = self.point(*first);
-        let side = |corner: u16| viewpoint.turn(apex, self.point(corner), self.point(number));
+        let side = |corner: I| viewpoint.turn(apex, self.point(corner), self.point(number));
         rest.windows(2)
             .filter(|base| side(base[0]) >= 0 && side(base[1]) <= 0)
             .map(|base| Plane::through(apex, self.point(base[0]), self.point(base[1])))
@@ -361,16 +366,10 @@ impl<'s> Graph<'s> {
     }
 
     /// Returns the visibility of an edge.
-    fn visibility(
-        &self,
-        ends: [u16; 2],
-        eye: Eye,
-        outline: &[u16],
-        visible: &[u8],
-    ) -> EdgeVisibility {
-        let memberships = ends.map(|end| self.membership[usize::from(end)]);
+    fn visibility(&self, ends: [I; 2], eye: Eye, outline: &[I], visible: &[u8]) -> EdgeVisibility {
+        let memberships = ends.map(|end| self.membership[end.get()]);
         let is_visible = match memberships.map_each(Membership::component_name) {
-            [Some(name), _] | [None, Some(name)] => visible[usize::from(name)] != 0,
+            [Some(name), _] | [None, Some(name)] => visible[name.get()] != 0,
             [None, None] => {
                 let [one, other] =
                     memberships.map(|membership| membership.outline_place().unwrap_or(0));
@@ -392,14 +391,14 @@ impl<'s> Graph<'s> {
 
     /// Whether an edge between two corners of the outline that are not neighbours is visible. The
     /// corners are given by their indices.
-    fn is_isolated_edge_visible(&self, first: usize, last: usize, outline: &[u16]) -> bool {
+    fn is_isolated_edge_visible(&self, first: usize, last: usize, outline: &[I]) -> bool {
         let [start, end] = [first, last].map(|slot| self.point(outline[slot]));
         let right = &outline[first + 1..last];
         let left = || outline[last + 1..].iter().chain(&outline[..first]);
         // The upper side of this plane faces the eye, since the outline runs counter-clockwise. The
         // line that crosses the edge from right to left rises above this plane if its left end
         // does.
-        let height = |right: u16, left: u16| {
+        let height = |right: I, left: I| {
             Plane::through(start, self.point(right), end).height(self.point(left))
         };
         // One pair would be enough if the positions were not rounded. Here the most reliable pair
@@ -425,7 +424,7 @@ impl<'s> Graph<'s> {
     }
 
     /// Whether both ends lie exactly on the line of one side of the outline.
-    fn is_behind_outline(&self, ends: [u16; 2], eye: Eye, outline: &[u16]) -> bool {
+    fn is_behind_outline(&self, ends: [I; 2], eye: Eye, outline: &[I]) -> bool {
         let eye_itself = Viewpoint { eye, inside: None };
         let next = outline.iter().skip(1).chain(outline.first());
         outline.iter().zip(next).any(|(from, to)| {
@@ -438,9 +437,9 @@ impl<'s> Graph<'s> {
     /// Hands the edges, each with its visibility, to the sink.
     fn hand_over(
         &self,
-        visibility: impl Fn([u16; 2]) -> EdgeVisibility,
+        visibility: impl Fn([I; 2]) -> EdgeVisibility,
         cancel: &mut dyn Cancel,
-        sink: &mut dyn SolidSink,
+        sink: &mut dyn SolidSink<I>,
     ) -> Result<SolidSummary, SolidError> {
         for ends in self.edges {
             cancel.check()?;
@@ -456,7 +455,7 @@ impl<'s> Graph<'s> {
 }
 
 /// Keeps the first of each run of equal edges and returns how many are left.
-fn remove_repeated(edges: &mut [[u16; 2]]) -> usize {
+fn remove_repeated<I: Index>(edges: &mut [[I; 2]]) -> usize {
     let mut kept = 0;
     for at in 0..edges.len() {
         if kept == 0 || edges[kept - 1] != edges[at] {

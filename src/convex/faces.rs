@@ -18,6 +18,7 @@
 //!   vertex drops out with its last segment.
 
 use crate::array::MapEach;
+use crate::index::Index;
 use bytemuck::{Pod, Zeroable};
 
 use super::exact::{Plane, Point, Viewpoint};
@@ -29,29 +30,46 @@ use crate::geometry::Precision;
 use crate::model::Corner;
 use crate::stage::{Cancel, Scratch};
 
-/// Stands for the number of a face that has not been found yet.
-pub(super) const UNKNOWN: u16 = u16::MAX;
-
 /// The number of vertices that are tested between two checks for cancelling.
 const VERTICES_PER_CHECK: usize = 64;
 
-/// An edge with its two faces.
+/// An edge with its two faces: the vertices at which it begins and ends, and the faces on its left and
+/// right.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
-#[repr(C)]
-pub(super) struct HullEdge {
-    /// The vertex at which the edge begins.
-    pub(super) from: u16,
-    /// The vertex at which the edge ends.
-    pub(super) to: u16,
-    /// The face on the left, as seen from outside, or [`UNKNOWN`].
-    pub(super) left: u16,
-    /// The face on the right, as seen from outside, or [`UNKNOWN`].
-    pub(super) right: u16,
+#[repr(transparent)]
+pub(super) struct HullEdge<I>([I; 4]);
+
+impl<I: Index> HullEdge<I> {
+    /// Makes the edge between two vertices, with the faces on its left and right. A face that has
+    /// not been found yet is [`Index::NONE`].
+    fn new([from, to]: [I; 2], [left, right]: [I; 2]) -> Self {
+        Self([from, to, left, right])
+    }
+
+    /// Returns the vertex at which the edge begins.
+    pub(super) fn from(&self) -> I {
+        self.0[0]
+    }
+
+    /// Returns the vertex at which the edge ends.
+    pub(super) fn to(&self) -> I {
+        self.0[1]
+    }
+
+    /// Returns the face on the left, as seen from outside, or [`Index::NONE`].
+    pub(super) fn left(&self) -> I {
+        self.0[2]
+    }
+
+    /// Returns the face on the right, as seen from outside, or [`Index::NONE`].
+    pub(super) fn right(&self) -> I {
+        self.0[3]
+    }
 }
 
 /// A face, as three of its corners, which are counter-clockwise from outside and well spread around
 /// it.
-pub(super) type FaceCorners = [u16; 3];
+pub(super) type FaceCorners<I> = [I; 3];
 
 /// Finds the faces and edges of the convex solid whose corners are `positions`, and hands them to
 /// `sink`.
@@ -72,7 +90,7 @@ pub(super) type FaceCorners = [u16; 3];
 /// impl SolidSink for Count {
 ///     fn face(&mut self, corners: &[Corner], visible: bool) -> Result<(), SinkFull> {
 ///         assert_eq!(corners.len(), 4);
-///         self.visible_faces += usize::from(visible);
+///         self.visible_faces += visible.get();
 ///         Ok(())
 ///     }
 ///     fn edge(&mut self, edge: SolidEdge) -> Result<(), SinkFull> {
@@ -91,18 +109,18 @@ pub(super) type FaceCorners = [u16; 3];
 /// # Ok::<(), SolidError>(())
 /// ```
 #[inline(never)] // Smaller than in its only caller.
-pub fn from_vertices(
+pub fn from_vertices<I: Index>(
     positions: &[[i32; 3]],
     eye: Eye,
     precision: Precision,
     mut scratch: Scratch<'_>,
     cancel: &mut dyn Cancel,
-    sink: &mut dyn SolidSink,
+    sink: &mut dyn SolidSink<I>,
 ) -> Result<SolidSummary, SolidError> {
     eye.check()?;
-    points::check(positions)?;
-    let numbers = scratch.take::<u16>(positions.len())?;
-    for (slot, number) in numbers.iter_mut().zip(0..) {
+    points::check::<I>(positions)?;
+    let numbers = scratch.take::<I>(positions.len())?;
+    for (slot, number) in numbers.iter_mut().zip(I::all()) {
         *slot = number;
     }
     let distinct = points::weld(positions, numbers);
@@ -131,14 +149,14 @@ pub fn from_vertices(
 }
 
 /// Returns the bytes of working memory that [`from_vertices`] takes for this number of vertices.
-pub const fn scratch_bytes_from_vertices(vertices: usize) -> usize {
+pub const fn scratch_bytes_from_vertices<I: Index>(vertices: usize) -> usize {
     let edges = most_edges(vertices);
     let faces = most_faces(vertices);
-    4 * Scratch::bytes_for::<u16>(vertices)
-        + Scratch::bytes_for::<u16>(edges)
-        + Scratch::bytes_for::<HullEdge>(edges)
-        + Scratch::bytes_for::<u16>(3 * faces)
-        + Joining::scratch_bytes(vertices, faces)
+    4 * Scratch::bytes_for::<I>(vertices)
+        + Scratch::bytes_for::<I>(edges)
+        + Scratch::bytes_for::<HullEdge<I>>(edges)
+        + Scratch::bytes_for::<I>(3 * faces)
+        + Joining::<I>::scratch_bytes(vertices, faces)
 }
 
 /// Returns the greatest possible number of edges. By Euler v - e + f = 2, and every face has at
@@ -154,30 +172,29 @@ const fn most_faces(vertices: usize) -> usize {
 
 /// Handles vertices that all lie in one plane: hands over the one polygon that they form, which
 /// hides nothing.
-fn flat_solid(
+fn flat_solid<I: Index>(
     points: &[Point],
-    numbers: &[u16],
-    triangle: [u16; 3],
+    numbers: &[I],
+    triangle: [I; 3],
     eye: Eye,
     mut scratch: Scratch<'_>,
-    sink: &mut dyn SolidSink,
+    sink: &mut dyn SolidSink<I>,
     summary: SolidSummary,
 ) -> Result<SolidSummary, SolidError> {
     let [a, mut b, mut c] = triangle;
-    let plane = |[a, b, c]: [u16; 3]| {
-        Plane::through(points[usize::from(a)], points[usize::from(b)], points[usize::from(c)])
-    };
+    let plane =
+        |[a, b, c]: [I; 3]| Plane::through(points[a.get()], points[b.get()], points[c.get()]);
     if plane([a, b, c]).height_of_eye(eye) < 0 {
         (b, c) = (c, b);
     }
-    let room = scratch.take::<u16>(numbers.len())?;
+    let room = scratch.take::<I>(numbers.len())?;
     let viewpoint = Viewpoint { eye: plane([a, b, c]).eye_above(), inside: None };
     let mut polygon = Polygon::triangle(room, points, &viewpoint, [a, b, c]);
     for number in numbers {
         polygon.enclose(points, &viewpoint, *number).map_err(|_| SolidError::EyeInside)?;
     }
     let corners = polygon.corners();
-    let marked = scratch.take::<Corner>(corners.len())?;
+    let marked = scratch.take::<Corner<I>>(corners.len())?;
     for (at, corner) in corners.iter().enumerate() {
         marked[at] = Corner::new(*corner, false, at + 1 == corners.len());
     }
@@ -194,68 +211,68 @@ fn flat_solid(
 }
 
 /// Iterates over the sides: from each corner to the next, and from the last to the first.
-fn sides(corners: &[u16]) -> impl Iterator<Item = (u16, u16)> + Clone {
+fn sides<I: Index>(corners: &[I]) -> impl Iterator<Item = (I, I)> + Clone {
     let next = corners.iter().skip(1).chain(corners.first());
     corners.iter().copied().zip(next.copied())
 }
 
 /// The solid as it was found exactly, before faces are joined.
 #[derive(Debug)]
-pub(super) struct Solid<'s> {
+pub(super) struct Solid<'s, I> {
     pub(super) points: &'s [Point],
-    pub(super) edges: &'s [HullEdge],
-    pub(super) faces: &'s [FaceCorners],
+    pub(super) edges: &'s [HullEdge<I>],
+    pub(super) faces: &'s [FaceCorners<I>],
     /// The vertices that lie on no face.
-    pub(super) inside: &'s [u16],
+    pub(super) inside: &'s [I],
     /// The number of vertices in the middle of a face or an edge.
     pub(super) flat: usize,
 }
 
 /// The state of Harrison's search for faces.
-struct FaceFinder<'s> {
+struct FaceFinder<'s, I> {
     points: &'s [Point],
     /// The vertices that may be corners of faces still to be found. This is Harrison's vertices
     /// list.
-    candidates: &'s mut [u16],
+    candidates: &'s mut [I],
     candidate_count: usize,
     /// The numbers of the edges with one face still to be found in this pass. This is Harrison's
     /// current perimeter list.
-    perimeter: &'s mut [u16],
+    perimeter: &'s mut [I],
     perimeter_count: usize,
     /// For each vertex, the number of segments of the perimeter that begin there. As many end
     /// there.
-    segments_from: &'s mut [u16],
-    edges: &'s mut [HullEdge],
+    segments_from: &'s mut [I],
+    edges: &'s mut [HullEdge<I>],
     edge_count: usize,
     outline_count: usize,
-    faces: &'s mut [FaceCorners],
+    faces: &'s mut [FaceCorners<I>],
     face_count: usize,
     /// The vertices on the current plane.
-    on_plane: &'s mut [u16],
+    on_plane: &'s mut [I],
     /// The memory for the corners of a polygon.
-    room: &'s mut [u16],
+    room: &'s mut [I],
     flat: usize,
 }
 
-impl<'s> FaceFinder<'s> {
+impl<'s, I: Index> FaceFinder<'s, I> {
     /// Finds the outline and makes it the first perimeter.
     fn new(
         points: &'s [Point],
         eye: Eye,
-        inside: [u16; 4],
-        candidates: &'s mut [u16],
+        inside: [I; 4],
+        candidates: &'s mut [I],
         scratch: &mut Scratch<'s>,
         cancel: &mut dyn Cancel,
     ) -> Result<Self, SolidError> {
         let viewpoint =
-            Viewpoint { eye, inside: Some(inside.map_each(|number| points[usize::from(number)])) };
+            Viewpoint { eye, inside: Some(inside.map_each(|number| points[number.get()])) };
         let count = candidates.len();
-        let room = scratch.take::<u16>(count)?;
-        let perimeter = scratch.take::<u16>(most_edges(count))?;
-        let segments_from = scratch.take::<u16>(points.len())?;
-        let edges = scratch.take::<HullEdge>(most_edges(count))?;
-        let faces = bytemuck::cast_slice_mut(scratch.take::<u16>(3 * most_faces(count))?);
-        let on_plane = scratch.take::<u16>(count)?;
+        let room = scratch.take::<I>(count)?;
+        let perimeter = scratch.take::<I>(most_edges(count))?;
+        let segments_from = scratch.take::<I>(points.len())?;
+        let edges = scratch.take::<HullEdge<I>>(most_edges(count))?;
+        let faces = bytemuck::cast_slice_mut(scratch.take::<I>(3 * most_faces(count))?);
+        let on_plane = scratch.take::<I>(count)?;
         let [a, b, c, _] = inside;
         let mut outline = Polygon::triangle(room, points, &viewpoint, [a, b, c]);
         for number in candidates.iter() {
@@ -264,7 +281,7 @@ impl<'s> FaceFinder<'s> {
         }
         let outline_count = outline.corners().len();
         for (number, (from, to)) in sides(outline.corners()).enumerate() {
-            edges[number] = HullEdge { from, to, left: UNKNOWN, right: UNKNOWN };
+            edges[number] = HullEdge::new([from, to], [I::NONE; 2]);
         }
         let mut search = Self {
             points,
@@ -289,8 +306,8 @@ impl<'s> FaceFinder<'s> {
     /// Makes the outline the perimeter.
     fn begin_with_outline(&mut self) {
         for number in 0..self.outline_count {
-            self.perimeter[number] = number as u16; // fewer than there are vertices
-            self.segments_from[usize::from(self.edges[number].from)] = 1;
+            self.perimeter[number] = I::new(number); // fewer than there are vertices
+            self.segments_from[self.edges[number].from().get()] = I::ONE;
         }
         self.perimeter_count = self.outline_count;
     }
@@ -311,13 +328,13 @@ impl<'s> FaceFinder<'s> {
     /// found, so of their corners only those on the outline belong to more faces.
     fn turn_to_hidden_faces(&mut self) {
         for edge in &self.edges[..self.outline_count] {
-            self.candidates[self.candidate_count] = edge.from;
+            self.candidates[self.candidate_count] = edge.from();
             self.candidate_count += 1;
         }
         self.begin_with_outline();
     }
 
-    fn into_solid(self) -> Solid<'s> {
+    fn into_solid(self) -> Solid<'s, I> {
         Solid {
             points: self.points,
             edges: &self.edges[..self.edge_count],
@@ -329,13 +346,13 @@ impl<'s> FaceFinder<'s> {
 
     /// Returns a segment of the perimeter, directed so that the face still to be found is on its
     /// left.
-    fn segment(&self, at: usize) -> (u16, u16) {
-        let edge = self.edges[usize::from(self.perimeter[at])];
-        if edge.left == UNKNOWN { (edge.from, edge.to) } else { (edge.to, edge.from) }
+    fn segment(&self, at: usize) -> (I, I) {
+        let edge = self.edges[self.perimeter[at].get()];
+        if edge.left() == I::NONE { (edge.from(), edge.to()) } else { (edge.to(), edge.from()) }
     }
 
-    fn point(&self, number: u16) -> Point {
-        self.points[usize::from(number)]
+    fn point(&self, number: I) -> Point {
+        self.points[number.get()]
     }
 
     /// Finds the face to the left of one segment of the perimeter and updates the perimeter.
@@ -355,7 +372,7 @@ impl<'s> FaceFinder<'s> {
         }
         polygon.begin_with(from);
         let corners = polygon.corners();
-        let face = self.face_count as u16; // below 2^15
+        let face = I::new(self.face_count); // below 2^15
         let spread = corners.len() / 3;
         self.faces[self.face_count] = [corners[0], corners[spread], corners[2 * spread]];
         self.face_count += 1;
@@ -368,7 +385,7 @@ impl<'s> FaceFinder<'s> {
         // to another face.
         for at in 0..on_plane_count {
             let number = self.on_plane[at];
-            if self.segments_from[usize::from(number)] == 0 {
+            if self.segments_from[number.get()] == I::ZERO {
                 self.drop_candidate(number);
             }
         }
@@ -378,12 +395,7 @@ impl<'s> FaceFinder<'s> {
     /// Turns the plane about the directed edge until no vertex is above it. Writes the vertices on
     /// it to `on_plane`, the two ends of the edge and a third corner first, and returns how many
     /// they are.
-    fn find_plane(
-        &mut self,
-        from: u16,
-        to: u16,
-        cancel: &mut dyn Cancel,
-    ) -> Result<usize, SolidError> {
+    fn find_plane(&mut self, from: I, to: I, cancel: &mut dyn Cancel) -> Result<usize, SolidError> {
         let (start, end) = (self.point(from), self.point(to));
         self.on_plane[0] = from;
         self.on_plane[1] = to;
@@ -426,29 +438,29 @@ impl<'s> FaceFinder<'s> {
 
     /// Processes a side of a new face: it cancels the equal segment of the perimeter, or joins the
     /// perimeter reversed.
-    fn cancel_or_add(&mut self, from: u16, to: u16, face: u16) {
+    fn cancel_or_add(&mut self, from: I, to: I, face: I) {
         let met = (0..self.perimeter_count).find(|at| self.segment(*at) == (from, to));
         if let Some(at) = met {
-            let edge = &mut self.edges[usize::from(self.perimeter[at])];
-            if edge.left == UNKNOWN {
-                edge.left = face;
+            let edge = &mut self.edges[self.perimeter[at].get()];
+            if edge.left() == I::NONE {
+                edge.0[2] = face;
             } else {
-                edge.right = face;
+                edge.0[3] = face;
             }
             self.perimeter.copy_within(at + 1..self.perimeter_count, at);
             self.perimeter_count -= 1;
-            self.segments_from[usize::from(from)] -= 1;
+            self.segments_from[from.get()] -= I::ONE;
         } else {
-            self.edges[self.edge_count] = HullEdge { from, to, left: face, right: UNKNOWN };
-            self.perimeter[self.perimeter_count] = self.edge_count as u16; // below 3 × 2^14
+            self.edges[self.edge_count] = HullEdge::new([from, to], [face, I::NONE]);
+            self.perimeter[self.perimeter_count] = I::new(self.edge_count); // below 3 × 2^14
             self.edge_count += 1;
             self.perimeter_count += 1;
-            self.segments_from[usize::from(to)] += 1;
+            self.segments_from[to.get()] += I::ONE;
         }
     }
 
     /// Removes a vertex that is not a corner of any face still to be found.
-    fn drop_candidate(&mut self, number: u16) {
+    fn drop_candidate(&mut self, number: I) {
         let candidates = &self.candidates[..self.candidate_count];
         if let Some(at) = candidates.iter().position(|other| *other == number) {
             self.candidate_count -= 1;

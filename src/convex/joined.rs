@@ -7,44 +7,45 @@
 //! one simple polygon stay separate.
 
 use super::exact::{Plane, Point};
-use super::faces::{HullEdge, Solid, UNKNOWN};
+use super::faces::{HullEdge, Solid};
 use super::{EdgeVisibility, Eye, SolidEdge, SolidError, SolidSink, SolidSummary};
 use crate::array::MapEach;
 use crate::geometry::{Precision, are_coplanar};
+use crate::index::Index;
 use crate::model::Corner;
 use crate::stage::{Cancel, OutOfScratch, Scratch};
 
 /// The joining of the faces of one solid.
 #[derive(Debug)]
-pub(super) struct Joining<'s> {
-    solid: Solid<'s>,
+pub(super) struct Joining<'s, I> {
+    solid: Solid<'s, I>,
     eye: Eye,
     /// The eye, moved as the precision requires. It decides what is visible.
     drawn_in: Eye,
     /// For each face, the face that took it in, which may be the face itself.
-    joined: &'s mut [u16],
+    joined: &'s mut [I],
     /// For each vertex, the one after it around the current face.
-    next: &'s mut [u16],
+    next: &'s mut [I],
     /// The corners of the current face.
-    corners: &'s mut [Corner],
+    corners: &'s mut [Corner<I>],
 }
 
-impl<'s> Joining<'s> {
+impl<'s, I: Index> Joining<'s, I> {
     /// The working memory in bytes for a solid with so many vertices and faces.
     pub(super) const fn scratch_bytes(vertices: usize, faces: usize) -> usize {
-        Scratch::bytes_for::<u16>(faces)
-            + Scratch::bytes_for::<u16>(vertices)
-            + Scratch::bytes_for::<Corner>(vertices)
+        Scratch::bytes_for::<I>(faces)
+            + Scratch::bytes_for::<I>(vertices)
+            + Scratch::bytes_for::<Corner<I>>(vertices)
     }
 
     pub(super) fn new(
-        solid: Solid<'s>,
+        solid: Solid<'s, I>,
         eye: Eye,
         drawn_in: Eye,
         scratch: &mut Scratch<'s>,
     ) -> Result<Self, OutOfScratch> {
-        let joined = scratch.take::<u16>(solid.faces.len())?;
-        for (slot, face) in joined.iter_mut().zip(0..) {
+        let joined = scratch.take::<I>(solid.faces.len())?;
+        for (slot, face) in joined.iter_mut().zip(I::all()) {
             *slot = face;
         }
         Ok(Self {
@@ -57,9 +58,9 @@ impl<'s> Joining<'s> {
         })
     }
 
-    fn plane(&self, face: u16) -> Plane {
-        let [a, b, c] = self.solid.faces[usize::from(face)]
-            .map_each(|number| self.solid.points[usize::from(number)]);
+    fn plane(&self, face: I) -> Plane {
+        let [a, b, c] =
+            self.solid.faces[face.get()].map_each(|number| self.solid.points[number.get()]);
         Plane::through(a, b, c)
     }
 
@@ -71,20 +72,20 @@ impl<'s> Joining<'s> {
         cancel: &mut dyn Cancel,
     ) -> Result<(), SolidError> {
         let mut deep = 0;
-        let mut first = UNKNOWN;
+        let mut first = I::NONE;
         for number in self.solid.inside {
             cancel.check()?;
-            let point = self.solid.points[usize::from(*number)];
-            let faces = 0..self.solid.faces.len() as u16; // below 2^15
-            let near = precision.written > 0
-                && faces.into_iter().any(|face| self.is_near(face, point, precision));
+            let point = self.solid.points[number.get()];
+            let faces = I::below(I::new(self.solid.faces.len()));
+            let near =
+                precision.written > 0 && { faces }.any(|face| self.is_near(face, point, precision));
             if !near {
                 deep += 1;
                 first = first.min(*number);
             }
         }
         if deep > 0 {
-            return Err(SolidError::VertexInside { vertex: first, count: deep });
+            return Err(SolidError::VertexInside { vertex: first.into(), count: deep });
         }
         self.solid.flat += self.solid.inside.len();
         Ok(())
@@ -102,18 +103,18 @@ impl<'s> Joining<'s> {
         for edge in self.solid.edges {
             cancel.check()?;
             if self.is_almost_flat(edge, precision) {
-                self.joined[usize::from(edge.left)] = UNKNOWN;
-                self.joined[usize::from(edge.right)] = UNKNOWN;
+                self.joined[edge.left().get()] = I::NONE;
+                self.joined[edge.right().get()] = I::NONE;
             }
         }
         while let Some(first) = self.largest_undecided_face() {
-            self.joined[usize::from(first)] = first;
+            self.joined[first.get()] = first;
             let plane = self.plane(first);
             while self.take_in_neighbours(first, &plane, precision, cancel)? {}
             if self.go_around(first).is_none() {
-                for (joined, face) in self.joined.iter_mut().zip(0..) {
+                for (joined, face) in self.joined.iter_mut().zip(I::all()) {
                     if *joined == first && face != first {
-                        *joined = UNKNOWN;
+                        *joined = I::NONE;
                     }
                 }
             }
@@ -122,30 +123,31 @@ impl<'s> Joining<'s> {
     }
 
     /// Whether one of the two faces at an edge might take in the other.
-    fn is_almost_flat(&self, edge: &HullEdge, precision: Precision) -> bool {
-        let (left, right) = (self.plane(edge.left), self.plane(edge.right));
-        let near = |plane: u16, face: u16| {
-            let corners = self.solid.faces[usize::from(face)].iter();
+    fn is_almost_flat(&self, edge: &HullEdge<I>, precision: Precision) -> bool {
+        let (left, right) = (self.plane(edge.left()), self.plane(edge.right()));
+        let near = |plane: I, face: I| {
+            let corners = self.solid.faces[face.get()].iter();
             corners
-                .map(|number| self.solid.points[usize::from(*number)])
+                .map(|number| self.solid.points[number.get()])
                 .all(|point| self.is_near(plane, point, precision))
         };
-        left.is_turned_like(&right) && (near(edge.left, edge.right) || near(edge.right, edge.left))
+        left.is_turned_like(&right)
+            && (near(edge.left(), edge.right()) || near(edge.right(), edge.left()))
     }
 
     /// Whether a point may lie in the plane of a face, within the precision.
-    fn is_near(&self, face: u16, point: Point, precision: Precision) -> bool {
-        let [a, b, c] = self.solid.faces[usize::from(face)]
-            .map_each(|number| self.solid.points[usize::from(number)]);
+    fn is_near(&self, face: I, point: Point, precision: Precision) -> bool {
+        let [a, b, c] =
+            self.solid.faces[face.get()].map_each(|number| self.solid.points[number.get()]);
         are_coplanar([a, b, c, point], precision)
     }
 
     /// Returns the largest of the faces that still have to be joined or kept.
-    fn largest_undecided_face(&self) -> Option<u16> {
+    fn largest_undecided_face(&self) -> Option<I> {
         self.joined
             .iter()
-            .zip(0..)
-            .filter(|(joined, _)| **joined == UNKNOWN)
+            .zip(I::all())
+            .filter(|(joined, _)| **joined == I::NONE)
             .map(|(_, face)| face)
             .max_by_key(|face| self.plane(*face).size())
     }
@@ -153,24 +155,24 @@ impl<'s> Joining<'s> {
     /// Makes one pass over the edges and returns whether any face was taken in.
     fn take_in_neighbours(
         &mut self,
-        first: u16,
+        first: I,
         plane: &Plane,
         precision: Precision,
         cancel: &mut dyn Cancel,
     ) -> Result<bool, SolidError> {
         let mut any = false;
         for edge in self.solid.edges {
-            let sides = [edge.left, edge.right];
-            let neighbour = match sides.map_each(|face| self.joined[usize::from(face)]) {
-                [inner, UNKNOWN] if inner == first => edge.right,
-                [UNKNOWN, inner] if inner == first => edge.left,
+            let sides = [edge.left(), edge.right()];
+            let neighbour = match sides.map_each(|face| self.joined[face.get()]) {
+                [inner, other] if inner == first && other == I::NONE => edge.right(),
+                [other, inner] if inner == first && other == I::NONE => edge.left(),
                 _ => continue,
             };
             cancel.check()?;
             if plane.is_turned_like(&self.plane(neighbour))
                 && self.is_all_near(neighbour, first, precision)
             {
-                self.joined[usize::from(neighbour)] = first;
+                self.joined[neighbour.get()] = first;
                 any = true;
             }
         }
@@ -178,31 +180,30 @@ impl<'s> Joining<'s> {
     }
 
     /// Whether all corners of a face may lie in the plane of the face `plane`.
-    fn is_all_near(&self, face: u16, plane: u16, precision: Precision) -> bool {
-        let near =
-            |number: u16| self.is_near(plane, self.solid.points[usize::from(number)], precision);
+    fn is_all_near(&self, face: I, plane: I, precision: Precision) -> bool {
+        let near = |number: I| self.is_near(plane, self.solid.points[number.get()], precision);
         self.solid
             .edges
             .iter()
-            .filter(|edge| edge.left == face || edge.right == face)
-            .all(|edge| near(edge.from) && near(edge.to))
+            .filter(|edge| edge.left() == face || edge.right() == face)
+            .all(|edge| near(edge.from()) && near(edge.to()))
     }
 
     /// Writes the corners of a face to `corners` and returns their number. Returns `None` if the
     /// boundary of the face is not one simple polygon.
-    fn go_around(&mut self, face: u16) -> Option<usize> {
-        self.next.fill(UNKNOWN);
+    fn go_around(&mut self, face: I) -> Option<usize> {
+        self.next.fill(I::NONE);
         let mut count = 0;
         let mut start = None;
         for edge in self.solid.edges {
-            let sides = [edge.left, edge.right];
-            let (from, to) = match sides.map_each(|side| self.joined[usize::from(side)] == face) {
-                [true, false] => (edge.from, edge.to),
-                [false, true] => (edge.to, edge.from),
+            let sides = [edge.left(), edge.right()];
+            let (from, to) = match sides.map_each(|side| self.joined[side.get()] == face) {
+                [true, false] => (edge.from(), edge.to()),
+                [false, true] => (edge.to(), edge.from()),
                 _ => continue,
             };
-            let next = &mut self.next[usize::from(from)];
-            if *next != UNKNOWN {
+            let next = &mut self.next[from.get()];
+            if *next != I::NONE {
                 return None;
             }
             *next = to;
@@ -212,10 +213,10 @@ impl<'s> Joining<'s> {
         let start = start?;
         let mut at = start;
         for corner in &mut self.corners[..count] {
-            if at == UNKNOWN {
+            if at == I::NONE {
                 return None;
             }
-            let next = self.next[usize::from(at)];
+            let next = self.next[at.get()];
             *corner = Corner::new(at, false, next == start);
             at = next;
         }
@@ -228,11 +229,11 @@ impl<'s> Joining<'s> {
         &mut self,
         mut summary: SolidSummary,
         cancel: &mut dyn Cancel,
-        sink: &mut dyn SolidSink,
+        sink: &mut dyn SolidSink<I>,
     ) -> Result<SolidSummary, SolidError> {
         for face in 0..self.solid.faces.len() {
             cancel.check()?;
-            let number = face as u16; // below 2^15
+            let number = I::new(face); // below 2^15
             if self.joined[face] != number {
                 continue;
             }
@@ -244,37 +245,37 @@ impl<'s> Joining<'s> {
             }
         }
         // From here on `next` records which vertices are still corners.
-        self.next.fill(UNKNOWN);
+        self.next.fill(I::NONE);
         for edge in self.solid.edges {
             let [left, right] =
-                [edge.left, edge.right].map_each(|face| self.joined[usize::from(face)]);
+                [edge.left(), edge.right()].map_each(|face| self.joined[face.get()]);
             if left == right {
                 summary.joined += 1;
                 continue;
             }
-            self.next[usize::from(edge.from)] = edge.to;
-            self.next[usize::from(edge.to)] = edge.from;
+            self.next[edge.from().get()] = edge.to();
+            self.next[edge.to().get()] = edge.from();
             sink.edge(SolidEdge {
-                ends: (edge.from, edge.to),
+                ends: (edge.from(), edge.to()),
                 visibility: self.visibility(left, right),
             })?;
             summary.edges += 1;
         }
         let exact_corners = self.solid.edges.len() + 2 - self.solid.faces.len(); // Euler
-        let corners = self.next.iter().filter(|next| **next != UNKNOWN).count();
+        let corners = self.next.iter().filter(|next| **next != I::NONE).count();
         summary.flat = self.solid.flat + exact_corners - corners;
         Ok(summary)
     }
 
     /// Whether the eye, moved as the precision requires, sees the face from outside.
-    fn is_visible(&self, face: u16) -> bool {
+    fn is_visible(&self, face: I) -> bool {
         self.plane(face).height_of_eye(self.drawn_in) > 0
     }
 
     /// Returns the visibility of the edge between two faces.
-    fn visibility(&self, left: u16, right: u16) -> EdgeVisibility {
+    fn visibility(&self, left: I, right: I) -> EdgeVisibility {
         // A face that is neither visible nor turned away from the eye is edge-on.
-        let edge_on = |face: u16| self.plane(face).height_of_eye(self.eye) >= 0;
+        let edge_on = |face: I| self.plane(face).height_of_eye(self.eye) >= 0;
         match (self.is_visible(left), self.is_visible(right)) {
             (true, true) => EdgeVisibility::Visible,
             (false, false) if edge_on(left) || edge_on(right) => EdgeVisibility::BehindOutline,

@@ -66,29 +66,29 @@ pub enum EdgeVisibility {
 
 /// An edge of the solid, with its visibility.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct SolidEdge {
+pub struct SolidEdge<I = u16> {
     /// The numbers of the vertices that it joins.
-    pub ends: (u16, u16),
+    pub ends: (I, I),
     /// Whether and how the edge is visible.
     pub visibility: EdgeVisibility,
 }
 
 /// Receives the faces and edges that were found. Nothing is handed over before the whole solid is
 /// known to be valid.
-pub trait SolidSink {
+pub trait SolidSink<I = u16> {
     /// Receives one face. Its corners run counter-clockwise as seen from outside, and the last one
     /// is marked, so that they can be appended to the elements of a model. A face that is edge-on
     /// is not visible.
     ///
     /// # Errors
     /// An implementation returns [`SinkFull`] to end the search.
-    fn face(&mut self, corners: &[Corner], visible: bool) -> Result<(), SinkFull>;
+    fn face(&mut self, corners: &[Corner<I>], visible: bool) -> Result<(), SinkFull>;
 
     /// Receives one edge. Every edge comes once, after the faces.
     ///
     /// # Errors
     /// An implementation returns [`SinkFull`] to end the search.
-    fn edge(&mut self, edge: SolidEdge) -> Result<(), SinkFull>;
+    fn edge(&mut self, edge: SolidEdge<I>) -> Result<(), SinkFull>;
 }
 
 pub use crate::stage::SinkFull;
@@ -123,12 +123,12 @@ pub enum SolidError {
         /// The number of different positions that there are.
         distinct: usize,
     },
-    /// There are more vertices than elements can refer to: [`crate::model::VERTEX_NUMBER_LIMIT`].
+    /// There are more vertices than elements can refer to: [`crate::model::Corner::VERTEX_NUMBER_LIMIT`].
     TooManyVertices,
     /// A coordinate is beyond ±2^30.
     PositionOutOfRange {
         /// The number of the vertex, counted from 0.
-        vertex: u16,
+        vertex: u32,
     },
     /// All vertices lie on one line.
     AllInLine,
@@ -140,7 +140,7 @@ pub enum SolidError {
     /// the precision.
     VertexInside {
         /// The first such vertex, counted from 0.
-        vertex: u16,
+        vertex: u32,
         /// The number of such vertices.
         count: usize,
     },
@@ -152,7 +152,7 @@ pub enum SolidError {
     /// The edges do not lead around the solid: at this vertex of the outline no edge leads on.
     OutlineBroken {
         /// The number of the vertex, counted from 0.
-        vertex: u16,
+        vertex: u32,
     },
     /// There is not enough working memory.
     Scratch(OutOfScratch),

@@ -4,7 +4,8 @@ use super::exact::{Plane, Point};
 use super::{Eye, POSITION_LIMIT, SolidError};
 use crate::array::MapEach;
 use crate::geometry::Precision;
-use crate::model::VERTEX_NUMBER_LIMIT;
+use crate::index::Index;
+use crate::model::Corner;
 use crate::stage::heap_sort_by_key;
 
 /// Returns the longest side of the bounding box of the points.
@@ -21,14 +22,14 @@ pub(super) fn largest_extent(points: impl Iterator<Item = Point> + Clone) -> u32
 /// Returns the eye moved towards the middle of the points at `numbers`, as the precision requires:
 /// by the angle that an edge of a tenth of the extent of the solid may turn if its ends are off by
 /// the precision.
-pub(super) fn drawn_in_eye(
+pub(super) fn drawn_in_eye<I: Index>(
     eye: Eye,
     points: &[Point],
-    numbers: &[u16],
+    numbers: &[I],
     precision: Precision,
 ) -> Eye {
     let tolerance = precision.written.saturating_mul(16);
-    let corners = numbers.iter().map(|number| points[usize::from(*number)]);
+    let corners = numbers.iter().map(|number| points[number.get()]);
     let count = numbers.len().max(1) as i64; // at most 2^14
     let mean = |axis: usize| {
         let sum: i64 = corners.clone().map(|point| i64::from(point[axis])).sum();
@@ -39,40 +40,37 @@ pub(super) fn drawn_in_eye(
 
 /// What a set of different points spans, with the numbers of points that prove it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Span {
+pub(super) enum Span<I> {
     /// All points lie on one line.
     Line,
     /// All points lie in one plane; these three are not in line.
-    Plane([u16; 3]),
+    Plane([I; 3]),
     /// The points span a solid; these four are not in one plane.
-    Space([u16; 4]),
+    Space([I; 4]),
 }
 
 /// Checks that there are not too many points and that every position is in range.
-pub(super) fn check(points: &[Point]) -> Result<(), SolidError> {
-    if points.len() > VERTEX_NUMBER_LIMIT {
+pub(super) fn check<I: Index>(points: &[Point]) -> Result<(), SolidError> {
+    if points.len() > <Corner<I>>::VERTEX_NUMBER_LIMIT {
         return Err(SolidError::TooManyVertices);
     }
     let out_of_range = |point: &Point| {
         point.iter().any(|part| part.unsigned_abs() > POSITION_LIMIT.unsigned_abs())
     };
     match points.iter().position(out_of_range) {
-        Some(vertex) => Err(SolidError::PositionOutOfRange {
-            vertex: vertex as u16, // below VERTEX_NUMBER_LIMIT
-        }),
+        Some(vertex) => Err(SolidError::PositionOutOfRange { vertex: vertex as u32 }),
         None => Ok(()),
     }
 }
 
 /// Sorts `numbers` by position and keeps only the least of those at the same position. Returns how
 /// many are left.
-pub(super) fn weld(points: &[Point], numbers: &mut [u16]) -> usize {
-    heap_sort_by_key(numbers, |number| (points[usize::from(*number)], *number));
+pub(super) fn weld<I: Index>(points: &[Point], numbers: &mut [I]) -> usize {
+    heap_sort_by_key(numbers, |number| (points[number.get()], *number));
     let mut kept = 0;
     for at in 0..numbers.len() {
         let number = numbers[at];
-        let same_place =
-            kept > 0 && points[usize::from(numbers[kept - 1])] == points[usize::from(number)];
+        let same_place = kept > 0 && points[numbers[kept - 1].get()] == points[number.get()];
         if !same_place {
             numbers[kept] = number;
             kept += 1;
@@ -82,8 +80,8 @@ pub(super) fn weld(points: &[Point], numbers: &mut [u16]) -> usize {
 }
 
 /// Returns what the points at `numbers` span. They are all different, and there are at least four.
-pub(super) fn span(points: &[Point], numbers: &[u16]) -> Span {
-    let point = |number: u16| points[usize::from(number)];
+pub(super) fn span<I: Index>(points: &[Point], numbers: &[I]) -> Span<I> {
+    let point = |number: I| points[number.get()];
     let (a, b) = (numbers[0], numbers[1]);
     let mut off_line = numbers
         .iter()
@@ -101,9 +99,9 @@ pub(super) fn span(points: &[Point], numbers: &[u16]) -> Span {
 }
 
 /// Returns the vertex that represents `number` among the welded ones.
-pub(super) fn first_at_place(points: &[Point], welded: &[u16], number: u16) -> u16 {
-    let position = points[usize::from(number)];
+pub(super) fn first_at_place<I: Index>(points: &[Point], welded: &[I], number: I) -> I {
+    let position = points[number.get()];
     welded
-        .binary_search_by_key(&position, |other| points[usize::from(*other)])
+        .binary_search_by_key(&position, |other| points[other.get()])
         .map_or(number, |at| welded[at])
 }

@@ -8,11 +8,12 @@
 
 use super::exact::{Point, Viewpoint};
 use crate::array::MapEach;
+use crate::index::Index;
 
 /// The corners of the polygon in counter-clockwise order, no three of them in line on the page.
 #[derive(Debug)]
-pub(super) struct Polygon<'s> {
-    corners: &'s mut [u16],
+pub(super) struct Polygon<'s, I> {
+    corners: &'s mut [I],
     count: usize,
 }
 
@@ -20,33 +21,33 @@ pub(super) struct Polygon<'s> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Surrounded;
 
-impl<'s> Polygon<'s> {
+impl<'s, I: Index> Polygon<'s, I> {
     /// Creates the triangle of three points that are not in line on the page. `room` must hold as
     /// many corners as the polygon can ever have, at least three.
     pub(super) fn triangle(
-        room: &'s mut [u16],
+        room: &'s mut [I],
         points: &[Point],
         viewpoint: &Viewpoint,
-        [a, b, c]: [u16; 3],
+        [a, b, c]: [I; 3],
     ) -> Self {
-        let [p, q, r] = [a, b, c].map_each(|number| points[usize::from(number)]);
+        let [p, q, r] = [a, b, c].map_each(|number| points[number.get()]);
         let ordered = if viewpoint.turn(p, q, r) > 0 { [a, b, c] } else { [a, c, b] };
         room[..3].copy_from_slice(&ordered);
         Self { corners: room, count: 3 }
     }
 
     /// Returns the vertex numbers of the corners, in order.
-    pub(super) fn corners(&self) -> &[u16] {
+    pub(super) fn corners(&self) -> &[I] {
         &self.corners[..self.count]
     }
 
     /// Returns the memory of the corners.
-    pub(super) fn into_room(self) -> &'s mut [u16] {
+    pub(super) fn into_room(self) -> &'s mut [I] {
         self.corners
     }
 
     /// Rotates the list of corners so that it begins with `corner`, if that is a corner.
-    pub(super) fn begin_with(&mut self, corner: u16) {
+    pub(super) fn begin_with(&mut self, corner: I) {
         let corners = &mut self.corners[..self.count];
         if let Some(at) = corners.iter().position(|number| *number == corner) {
             corners.rotate_left(at);
@@ -61,14 +62,14 @@ impl<'s> Polygon<'s> {
         &mut self,
         points: &[Point],
         viewpoint: &Viewpoint,
-        number: u16,
+        number: I,
     ) -> Result<(), Surrounded> {
         let count = self.count;
         let corners = &mut self.corners[..];
-        let new = points[usize::from(number)];
+        let new = points[number.get()];
         let side = |edge: usize| {
-            let from = points[usize::from(corners[edge])];
-            let to = points[usize::from(corners[(edge + 1) % count])];
+            let from = points[corners[edge].get()];
+            let to = points[corners[(edge + 1) % count].get()];
             viewpoint.turn(from, to, new)
         };
         // The sides beyond which the point lies are consecutive: from `start` up to `end`, around
@@ -158,7 +159,7 @@ mod tests {
     fn a_viewpoint_among_the_points_is_noticed() {
         let points = [[1, 0, 0], [0, 1, 0], [0, 0, 1], [-1, -1, -1], [-1, 0, 0]];
         let viewpoint = Viewpoint { eye: Eye::At([0, 0, 0]), inside: None };
-        let mut room = [0; 5];
+        let mut room = [0u16; 5];
         let mut polygon = Polygon::triangle(&mut room, &points, &viewpoint, [0, 1, 2]);
         assert_eq!(polygon.enclose(&points, &viewpoint, 3), Err(Surrounded));
         assert_eq!(polygon.enclose(&points, &viewpoint, 4), Err(Surrounded));

@@ -1,6 +1,7 @@
 //! Approximates a curve by straight lines, as few as the tolerance on the page allows.
 
 use super::{FRACTION_BITS, Parameter, Point, Span, Spline, rounded};
+use crate::index::Index;
 
 /// A point on the page in fine units, usually 1/256 step: x and y, each clamped to ±2^29.
 pub type Fine = [i64; 2];
@@ -39,9 +40,9 @@ const TRIED: usize = 32;
 ///
 /// It uses about 2 KiB of stack.
 #[derive(Debug, Clone)]
-pub struct Chords<'a, F> {
+pub struct Chords<'a, F, I = u16> {
     /// The spline that is approximated.
-    spline: Spline<'a>,
+    spline: Spline<'a, I>,
     /// Maps points of the curve to the page: see [`Spline::chords`].
     project: F,
     /// The tolerance in fine units.
@@ -65,9 +66,9 @@ struct End {
     position: [i64; 3],
 }
 
-impl<'a, F: Fn([i64; 3]) -> Option<Fine>> Chords<'a, F> {
+impl<'a, F: Fn([i64; 3]) -> Option<Fine>, I: Index> Chords<'a, F, I> {
     /// Starts at the beginning of the spline: see [`Spline::chords`].
-    pub(super) fn new(spline: Spline<'a>, project: F, tolerance: u16) -> Self {
+    pub(super) fn new(spline: Spline<'a, I>, project: F, tolerance: u16) -> Self {
         let (from, to) = spline.ends();
         Self {
             spline,
@@ -229,7 +230,7 @@ impl<'a, F: Fn([i64; 3]) -> Option<Fine>> Chords<'a, F> {
     }
 }
 
-impl<F: Fn([i64; 3]) -> Option<Fine>> Iterator for Chords<'_, F> {
+impl<F: Fn([i64; 3]) -> Option<Fine>, I: Index> Iterator for Chords<'_, F, I> {
     type Item = (Parameter, Point);
 
     fn next(&mut self) -> Option<Self::Item> {

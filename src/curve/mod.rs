@@ -17,6 +17,7 @@ mod span;
 pub use chords::{Chords, Fine};
 
 use crate::array::MapEach;
+use crate::index::Index;
 use span::Span;
 
 /// The lowest order, which gives straight lines.
@@ -91,7 +92,7 @@ pub enum CurveError {
     /// The curve refers to a control point that does not exist.
     UnknownPoint {
         /// The number of the missing point, from 0.
-        number: u16,
+        number: u32,
     },
     /// The number of knots must be the number of control points plus the order.
     WrongKnotCount {
@@ -174,11 +175,11 @@ impl Parameter {
 /// # Ok::<(), penup::curve::CurveError>(())
 /// ```
 #[derive(Debug, Clone, Copy)]
-pub struct Spline<'a> {
+pub struct Spline<'a, I = u16> {
     /// All points, from which `control` selects.
     points: &'a [Point],
     /// The numbers of the control points, in order.
-    control: &'a [u16],
+    control: &'a [I],
     /// The order of the spline, which is its degree plus 1.
     order: u8,
     /// The knots.
@@ -189,7 +190,7 @@ pub struct Spline<'a> {
     to: Parameter,
 }
 
-impl<'a> Spline<'a> {
+impl<'a, I: Index> Spline<'a, I> {
     /// The spline of `order` over the control points numbered `control` in `points`.
     ///
     /// The curve covers its whole range: from knot number order - 1 to the knot whose number is the
@@ -199,14 +200,14 @@ impl<'a> Spline<'a> {
     /// See [`CurveError`].
     pub fn new(
         points: &'a [Point],
-        control: &'a [u16],
+        control: &'a [I],
         order: u8,
         knots: Knots<'a>,
     ) -> Result<Self, CurveError> {
         check_shape(control.len(), order, knots)?;
-        let unknown = control.iter().find(|number| usize::from(**number) >= points.len());
+        let unknown = control.iter().find(|number| number.get() >= points.len());
         if let Some(number) = unknown {
-            return Err(CurveError::UnknownPoint { number: *number });
+            return Err(CurveError::UnknownPoint { number: (*number).into() });
         }
         let spans = control.len() + 1 - usize::from(order);
         let (from, to) = (Parameter::start_of(0), Parameter::start_of(spans));
@@ -274,7 +275,7 @@ impl<'a> Spline<'a> {
     /// to the page in fine units, usually 1/256 step. It returns `None` for a point that is clipped
     /// because it is nearer than the near plane. It must map straight lines to straight lines.
     /// `tolerance` is in the same fine units.
-    pub fn chords<F>(&self, project: F, tolerance: u16) -> Chords<'a, F>
+    pub fn chords<F>(&self, project: F, tolerance: u16) -> Chords<'a, F, I>
     where
         F: Fn([i64; 3]) -> Option<Fine>,
     {
@@ -289,7 +290,7 @@ impl<'a> Spline<'a> {
         let Some(numbers) = self.control.get(number..number + degree + 1) else { return false };
         span.hold(numbers.iter().map(|number| {
             // `new` has checked that the point exists.
-            self.points.get(usize::from(*number)).map_or([0; 3], |point| point.map_each(i64::from))
+            self.points.get(number.get()).map_or([0; 3], |point| point.map_each(i64::from))
         }));
         if self.knots == Knots::Uniform {
             span.turn_by_recursion();

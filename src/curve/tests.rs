@@ -233,7 +233,8 @@ fn what_is_cut_off_costs_no_chords() {
     // The curve goes behind the near plane z = 1 in the middle, in perspective.
     let points = [[-9000, 0, 9000], [-3000, 9000, -90_000], [3000, 9, -90_000], [9000, 0, 9000]];
     let spline =
-        Spline::new(&points, &[0, 1, 2, 3], 4, Knots::Listed(&[0, 0, 0, 0, 1, 1, 1, 1])).unwrap();
+        Spline::new(&points, &[0u16, 1, 2, 3], 4, Knots::Listed(&[0, 0, 0, 0, 1, 1, 1, 1]))
+            .unwrap();
     let perspective = |position: [i64; 3]| {
         (position[2] >= 1 << FRACTION_BITS)
             .then(|| [0, 1].map(|axis: usize| position[axis] * 5000 / position[2]))

@@ -4,14 +4,16 @@
 //! While visibility is computed, lines are packed at 12 bytes each ([`PackedLine`]). Then
 //! [`build_graph`] turns them into points and segments, in the same memory.
 
-use super::overlap::{NumberedLine, Rank, ink_once};
+use super::overlap::{LineOf, NumberedLine, Rank, ink_once};
 use super::{Drawing, LineType, PAGE_LIMIT, PagePoint, Segment};
 use crate::array::MapEach;
+use crate::index::Index;
 use crate::model::PEN_LIMIT;
 use crate::stage::{
     Aborted, Cancel, OutOfScratch, Scratch, StageError, heap_sort_cancellable, items, items_mut,
 };
 use bytemuck::{Pod, Zeroable};
+use core::marker::PhantomData;
 
 /// A straight line on the page, packed into 12 bytes.
 ///
@@ -100,13 +102,21 @@ impl PackedLine {
 }
 
 /// The layout of a drawing in the working memory: first the segments, then the points.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Stored {
+#[derive(Debug, Clone, Copy)]
+pub struct Stored<I = u16> {
     segments: usize,
     points: usize,
+    /// The width of the numbers in the segments.
+    width: PhantomData<I>,
 }
 
-impl Stored {
+impl<I: Index> Default for Stored<I> {
+    fn default() -> Self {
+        Self::of_counts([0; 2])
+    }
+}
+
+impl<I: Index> Stored<I> {
     /// Returns the number of segments and the number of points.
     pub fn counts(&self) -> [usize; 2] {
         [self.segments, self.points]
@@ -114,7 +124,7 @@ impl Stored {
 
     /// Makes the layout that has these [`Stored::counts`].
     pub fn of_counts([segments, points]: [usize; 2]) -> Self {
-        Self { segments, points }
+        Self { segments, points, width: PhantomData }
     }
 
     /// Returns the number of bytes from the beginning of the memory to the end of the drawing.
@@ -123,11 +133,11 @@ impl Stored {
     }
 
     fn segment_bytes(&self) -> usize {
-        Scratch::bytes_for::<Segment>(self.segments)
+        Scratch::bytes_for::<Segment<I>>(self.segments)
     }
 
     /// Returns the drawing stored in `words`, or `None` if `words` is too short for it.
-    pub fn drawing<'a>(&self, words: &'a [u64]) -> Option<Drawing<'a>> {
+    pub fn drawing<'a>(&self, words: &'a [u64]) -> Option<Drawing<'a, I>> {
         let points = words.get(self.segment_bytes() / 8..)?;
         Some(Drawing {
             segments: items(words, self.segments)?,
@@ -142,7 +152,7 @@ impl Stored {
     pub fn split<'a>(
         &self,
         words: &'a mut [u64],
-    ) -> Result<(Drawing<'a>, Scratch<'a>), OutOfScratch> {
+    ) -> Result<(Drawing<'a, I>, Scratch<'a>), OutOfScratch> {
         let missing = OutOfScratch { needed: self.bytes(), available: size_of_val(words) };
         let (segments, rest) =
             words.split_at_mut_checked(self.segment_bytes() / 8).ok_or(missing)?;
@@ -200,64 +210,70 @@ const LINES_BETWEEN_CHECKS: usize = 32;
 /// See [`GraphError`]; on an error the lines are lost.
 // Not inlined, so that its stack frame is not below those of the stages.
 #[inline(never)]
-pub fn build_graph(
+pub fn build_graph<I: Index>(
     words: &mut [u64],
     count: usize,
     cancel: &mut dyn Cancel,
-) -> Result<Stored, GraphError> {
+) -> Result<Stored<I>, GraphError> {
     // A line inside another one that yields to it splits that one into two pieces, so there may be
     // more segments than lines.
     let all: &[PackedLine] = items(words, count).unwrap_or(&[]);
     let marks = |line: &PackedLine| line.0[2] >> MARKS;
     let differ = all.iter().any(|line| Some(marks(line)) != all.first().map(marks));
     let room = if differ { count + count / 4 + 8 } else { count };
-    let line_words = Scratch::bytes_for::<PackedLine>(room) / 8;
+    let line_words = Scratch::bytes_for::<LineOf<I>>(room) / 8;
     let available = size_of_val(words);
     let missing = OutOfScratch { needed: line_words * 8, available };
     let (line_memory, rest) = words.split_at_mut_checked(line_words).ok_or(missing)?;
-    let lines: &mut [PackedLine] = items_mut(line_memory, room).ok_or(missing)?;
+    let lines: &mut [LineOf<I>] = items_mut(line_memory, room).ok_or(missing)?;
+    // Each packed line becomes a numbered one in its place, so it must have as much room.
+    let spread = size_of::<LineOf<I>>() / size_of::<PackedLine>();
+    if spread > 1 {
+        let packed: &mut [PackedLine] = bytemuck::cast_slice_mut(&mut *lines);
+        for at in (0..count).rev() {
+            packed[spread * at] = packed[at];
+        }
+    }
 
     let (segments, points) = {
-        let mut finder = PointFinder::new(Scratch::new(rest), 2 * count)?;
+        let mut finder = PointFinder::<I>::new(Scratch::new(rest), 2 * count)?;
         let mut kept = 0;
         for at in 0..count {
             if at % LINES_BETWEEN_CHECKS == 0 {
                 cancel.check()?;
             }
-            let line = lines[at];
+            let line = bytemuck::cast_slice::<_, PackedLine>(lines)[spread * at];
             let [from, to] = line.ends();
             let ends = [finder.number(from)?, finder.number(to)?];
             if ends[0] != ends[1] {
                 let Marks { line_type, yields, pen } = line.marks();
                 let rank = Rank::new(line_type, yields, pen);
-                lines[kept] = bytemuck::cast(NumberedLine::new(ends, rank));
+                lines[kept] = NumberedLine::new(ends, rank);
                 kept += 1;
             }
         }
         let points = finder.points.get(..finder.count).unwrap_or(&[]);
-        let numbered: &mut [NumberedLine] = bytemuck::cast_slice_mut(&mut *lines);
-        let segments = ink_once(numbered, kept, points, cancel)?;
-        let found = numbered.get_mut(..segments).unwrap_or(&mut []);
+        let segments = ink_once::<I>(lines, kept, points, cancel)?;
+        let found = lines.get_mut(..segments).unwrap_or(&mut []);
         for line in found.iter_mut() {
-            *line = NumberedLine::new(line.ends(), line.rank);
+            *line = NumberedLine::new(line.ends::<I>(), line.rank());
         }
         // No two have the same ends.
-        heap_sort_cancellable(found, |line| line.ends, cancel)?;
+        heap_sort_cancellable(found, |line| line.key(), cancel)?;
         (segments, points.len())
     };
 
-    // Shrink each line (12 bytes) to its segment (6 bytes) in place, from front to back.
-    let halves: &mut [u16] = bytemuck::cast_slice_mut(&mut *line_memory);
+    // Shrink each line, of six numbers, to its segment, of three, in place, from front to back.
+    let numbers: &mut [I] = bytemuck::cast_slice_mut(&mut *line_memory);
     for at in 0..segments {
-        let line: [u16; 6] = core::array::from_fn(|half| halves[6 * at + half]);
-        let line: NumberedLine = bytemuck::cast(line);
-        let ([from, to], (line_type_code, pen)) = (line.ends(), line.rank.line_type_code_and_pen());
-        let segment = Segment { from, to, line_type_code, pen };
-        let packed: [u16; 3] = bytemuck::cast(segment);
-        halves[3 * at..3 * at + 3].copy_from_slice(&packed);
+        let line: [I; 6] = core::array::from_fn(|number| numbers[6 * at + number]);
+        let line: LineOf<I> = bytemuck::cast(line);
+        let ([from, to], (line_type, pen)) = (line.ends::<I>(), line.rank().line_type_and_pen());
+        let packed: [I; 3] = bytemuck::cast(Segment::new(from, to).inked(line_type, pen));
+        numbers[3 * at..3 * at + 3].copy_from_slice(&packed);
     }
 
-    let stored = Stored { segments, points };
+    let stored = Stored::of_counts([segments, points]);
     let point_words = Scratch::bytes_for::<PagePoint>(points) / 8;
     words.copy_within(line_words..line_words + point_words, stored.segment_bytes() / 8);
     Ok(stored)
@@ -265,31 +281,32 @@ pub fn build_graph(
 
 /// Numbers points with a hash table of their positions, and gives coincident points the same
 /// number.
-struct PointFinder<'a> {
+struct PointFinder<'a, I> {
     points: &'a mut [PagePoint],
     count: usize,
     /// For each slot the point number + 1, or 0 if it is free. The length is a power of two.
-    table: &'a mut [u16],
+    table: &'a mut [I],
 }
 
-impl<'a> PointFinder<'a> {
+impl<'a, I: Index> PointFinder<'a, I> {
     /// Makes a finder for at most `most` points. Its table has twice as many slots, or fewer if
     /// memory is short.
     fn new(scratch: Scratch<'a>, most: usize) -> Result<Self, OutOfScratch> {
         let available = scratch.available_bytes();
         // The table takes at most a third of the memory: a point takes 8 bytes, and the table 2 to
         // 4 bytes for each point.
-        let longest = (available / 3 / size_of::<u16>()).max(1);
+        let longest = (available / 3 / size_of::<I>()).max(1);
         let longest = 1 << (usize::BITS - 1 - longest.leading_zeros());
-        let length = (2 * most).next_power_of_two().clamp(8, 1 << 17).min(longest);
-        let (mut points, mut table) = scratch.split(available - Scratch::bytes_for::<u16>(length));
+        let most_slots = I::NONE.get().saturating_add(1).saturating_mul(2);
+        let length = (2 * most).next_power_of_two().clamp(8, most_slots).min(longest);
+        let (mut points, mut table) = scratch.split(available - Scratch::bytes_for::<I>(length));
         let point_limit = (points.available_bytes() / size_of::<PagePoint>()).min(most);
         Ok(Self { points: points.take(point_limit)?, count: 0, table: table.take(length)? })
     }
 
     /// Returns the number of a point. It is that of a known point at the same position or one step
     /// away from it, or else a new number.
-    fn number(&mut self, point: PagePoint) -> Result<u16, OutOfScratch> {
+    fn number(&mut self, point: PagePoint) -> Result<I, OutOfScratch> {
         /// The offsets of the same point, of its four neighbours, and of its four diagonal ones.
         const SAME_THEN_AROUND: [(i32, i32); 9] =
             [(0, 0), (-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (1, -1), (-1, 1), (1, 1)];
@@ -309,36 +326,37 @@ impl<'a> PointFinder<'a> {
     }
 
     /// Returns the number of the known point at exactly this position.
-    fn find(&self, point: PagePoint) -> Option<u16> {
+    fn find(&self, point: PagePoint) -> Option<I> {
         let mut slot = self.slot(point);
         // The table always has a free slot, so this loop ends.
         loop {
-            let number = self.table[slot].checked_sub(1)?;
-            if self.points[usize::from(number)] == point {
-                return Some(number);
+            let next = self.table[slot];
+            let at = next.get().checked_sub(1)?;
+            if self.points[at] == point {
+                return Some(next - I::ONE);
             }
             slot = (slot + 1) & (self.table.len() - 1);
         }
     }
 
     /// Adds a new point and returns its number.
-    fn add(&mut self, point: PagePoint) -> Result<u16, OutOfScratch> {
+    fn add(&mut self, point: PagePoint) -> Result<I, OutOfScratch> {
         let full = OutOfScratch {
             needed: (self.count + 1) * size_of::<PagePoint>(),
             available: size_of_val(self.points),
         };
         let fullest = self.table.len() - self.table.len() / 8;
-        if self.count >= fullest.min(usize::from(u16::MAX)) {
+        if self.count >= fullest.min(I::NONE.get()) {
             return Err(full);
         }
         *self.points.get_mut(self.count).ok_or(full)? = point;
         let mut slot = self.slot(point);
-        while self.table[slot] != 0 {
+        while self.table[slot] != I::ZERO {
             slot = (slot + 1) & (self.table.len() - 1);
         }
         self.count += 1;
-        self.table[slot] = self.count as u16;
-        Ok(self.table[slot] - 1)
+        self.table[slot] = I::new(self.count);
+        Ok(self.table[slot] - I::ONE)
     }
 }
 
@@ -356,10 +374,14 @@ mod tests {
     fn drawn(lines: &[PackedLine], words: usize) -> Result<Vec<[(i32, i32); 2]>, GraphError> {
         let mut memory = vec![0u64; words];
         items_mut(&mut memory, lines.len()).unwrap().copy_from_slice(lines);
-        let stored = build_graph(&mut memory, lines.len(), &mut NeverCancel)?;
+        let stored = build_graph::<u16>(&mut memory, lines.len(), &mut NeverCancel)?;
         let (drawing, _) = stored.split(&mut memory)?;
         let at = |number: u16| drawing.points[usize::from(number)];
-        Ok(drawing.segments.iter().map(|s| [at(s.from), at(s.to)].map(|p| (p.x, p.y))).collect())
+        Ok(drawing
+            .segments
+            .iter()
+            .map(|s| [at(s.from()), at(s.to())].map(|p| (p.x, p.y)))
+            .collect())
     }
 
     fn line(from: (i32, i32), to: (i32, i32)) -> PackedLine {
@@ -380,8 +402,8 @@ mod tests {
             // Only a full line yields, and nothing but its mark changes.
             let (under, yields) = (packed.under(), line_type == LineType::Full);
             assert_eq!((under.ends(), under.marks()), (packed.ends(), Marks { yields, ..marks }));
-            let segment = Segment { line_type_code: line_type.code(), ..Segment::default() };
-            assert_eq!(segment.line_type(), line_type);
+            let segment = Segment::new(0u16, 1).inked(line_type, pen);
+            assert_eq!((segment.line_type(), segment.pen()), (line_type, pen));
         }
     }
 

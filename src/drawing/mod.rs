@@ -20,6 +20,7 @@ pub use page::{Page, PageError, StepsPerMillimetre};
 pub use page_map::{Bounds, PageMap};
 pub use title::{Title, TitleText, is_in_font};
 
+use crate::index::Index;
 use bytemuck::{Pod, Zeroable};
 
 /// A point of the page in plotter steps, with x to the right and y up. Each coordinate is within
@@ -38,33 +39,56 @@ pub struct PagePoint {
 /// bits.
 pub const PAGE_LIMIT: i32 = 1 << 20;
 
-/// A straight line of the drawing between two different points, given by their numbers.
+/// A straight line of the drawing between two different points, given by their numbers, which are
+/// below [`Index::NONE`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
-#[repr(C)]
-pub struct Segment {
-    /// The number of the point at one end.
-    pub from: u16,
-    /// The number of the point at the other end.
-    pub to: u16,
-    /// The [code](LineType::code) of its line type.
-    pub line_type_code: u8,
-    /// The pen that draws it, from 0.
-    pub pen: u8,
-}
+#[repr(transparent)]
+pub struct Segment<I = u16>([I; 3]);
 
-impl Segment {
+impl<I: Index> Segment<I> {
+    /// Makes the segment between the points `from` and `to`, a full line of the first pen.
+    pub fn new(from: I, to: I) -> Self {
+        Self([from, to, I::ZERO])
+    }
+
+    /// Returns the same segment with another line type, and with `pen`, counted from 0.
+    #[must_use]
+    pub fn inked(self, line_type: LineType, pen: u8) -> Self {
+        let Self([from, to, _]) = self;
+        Self([from, to, I::new(usize::from(line_type.code()) | usize::from(pen) << 8)])
+    }
+
+    /// Returns the number of the point at one end.
+    #[inline]
+    pub fn from(&self) -> I {
+        self.0[0]
+    }
+
+    /// Returns the number of the point at the other end.
+    #[inline]
+    pub fn to(&self) -> I {
+        self.0[1]
+    }
+
     /// Returns the line type.
+    #[inline]
     pub fn line_type(&self) -> LineType {
-        LineType::from_code(self.line_type_code)
+        LineType::from_code(self.0[2].get() as u8)
+    }
+
+    /// Returns the pen that draws it, from 0.
+    #[inline]
+    pub fn pen(&self) -> u8 {
+        (self.0[2] >> 8).get() as u8
     }
 }
 
 /// A drawing. No two points are equal, no segment occurs twice, and every segment joins two
 /// different points.
 #[derive(Debug, Clone, Copy)]
-pub struct Drawing<'a> {
+pub struct Drawing<'a, I = u16> {
     /// The points, all of them different.
     pub points: &'a [PagePoint],
     /// The segments between the points.
-    pub segments: &'a [Segment],
+    pub segments: &'a [Segment<I>],
 }

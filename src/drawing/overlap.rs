@@ -9,30 +9,49 @@
 use super::{LineType, PagePoint};
 use crate::array::MapEach;
 use crate::fixed::product;
+use crate::index::Index;
 use crate::stage::{Cancel, OutOfScratch, StageError, heap_sort_cancellable};
 use bytemuck::{Pod, Zeroable};
 use core::cmp::Ordering;
 
 /// A line between two numbered points, before it becomes a segment of the drawing.
+///
+/// It is a pair of the numbers of its ends, its [`Rank`] and its slope ([`Key::slope`]), of which
+/// the latter two take no more bits than a pair.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
-#[repr(C)]
-pub(super) struct NumberedLine {
-    /// The number of the point at one end, in the upper half, and at the other.
-    pub(super) ends: u32,
-    pub(super) rank: Rank,
-    /// See [`Key::slope`].
-    slope: u32,
-}
+#[repr(transparent)]
+pub(super) struct NumberedLine<P>([P; 3]);
 
-impl NumberedLine {
+/// The [`NumberedLine`] with numbers of this width.
+pub(super) type LineOf<I> = NumberedLine<<I as Index>::Pair>;
+
+impl<P: Copy + Ord + From<u32> + Into<u64>> NumberedLine<P> {
     /// Makes the line between two different points, the one with the lower number first.
-    pub(super) fn new([a, b]: [u16; 2], rank: Rank) -> Self {
-        Self { ends: u32::from(a.min(b)) << 16 | u32::from(a.max(b)), rank, slope: 0 }
+    pub(super) fn new<I: Index<Pair = P>>([a, b]: [I; 2], rank: Rank) -> Self {
+        Self([I::pair(a.min(b), a.max(b)), rank.0.into(), 0.into()])
+    }
+
+    /// Returns the numbers of the points at its ends, in order as a sort key.
+    pub(super) fn key(&self) -> P {
+        self.0[0]
     }
 
     /// Returns the numbers of the points at its ends.
-    pub(super) fn ends(&self) -> [u16; 2] {
-        [(self.ends >> 16) as u16, self.ends as u16]
+    pub(super) fn ends<I: Index<Pair = P>>(&self) -> [I; 2] {
+        I::halves(self.0[0])
+    }
+
+    /// Returns the same line between other points.
+    fn between<I: Index<Pair = P>>(self, from: I, to: I) -> Self {
+        Self([I::pair(from, to), self.0[1], self.0[2]])
+    }
+
+    pub(super) fn rank(&self) -> Rank {
+        Rank(self.0[1].into() as u32)
+    }
+
+    fn slope(&self) -> u32 {
+        self.0[2].into() as u32
     }
 }
 
@@ -52,8 +71,8 @@ impl Rank {
         Self(u32::from(yields) << 24 | precedence << 16 | code << 8 | pen)
     }
 
-    pub(super) fn line_type_code_and_pen(self) -> (u8, u8) {
-        ((self.0 >> 8) as u8, self.0 as u8)
+    pub(super) fn line_type_and_pen(self) -> (LineType, u8) {
+        (LineType::from_code((self.0 >> 8) as u8), self.0 as u8)
     }
 }
 
@@ -70,12 +89,12 @@ struct Key {
 }
 
 impl Key {
-    fn of(segment: &NumberedLine, points: &[PagePoint]) -> Self {
+    fn of<I: Index>(segment: &LineOf<I>, points: &[PagePoint]) -> Self {
         Self {
-            slope: segment.slope,
-            from: End::first(segment, points).position,
-            to: End::second(segment, points).position,
-            rank: segment.rank,
+            slope: segment.slope(),
+            from: End::<I>::first(segment, points).position,
+            to: End::<I>::second(segment, points).position,
+            rank: segment.rank(),
         }
     }
 
@@ -105,7 +124,7 @@ impl Key {
         let fast = self.slope.cmp(&other.slope);
         fast.then_with(|| (ay * bx).cmp(&(by * ax))).then_with(|| {
             // Twice the area of the triangle with the origin is below 2^43. Dividing it by the
-            // length along the longer axis gives the distance; the division is repositiond by cross
+            // length along the longer axis gives the distance; the division is replaced by cross
             // multiplication.
             let area = |key: &Self, (dx, dy): (i64, i64)| {
                 dx * i64::from(key.from.1) - dy * i64::from(key.from.0)
@@ -147,24 +166,24 @@ const SEGMENTS_BETWEEN_CHECKS: usize = 64;
 /// # Errors
 /// [`StageError::Scratch`] if the result does not fit into `segments`;
 /// [`StageError::Aborted`] if the user aborted the job.
-pub(super) fn ink_once(
-    segments: &mut [NumberedLine],
+pub(super) fn ink_once<I: Index>(
+    segments: &mut [LineOf<I>],
     count: usize,
     points: &[PagePoint],
     cancel: &mut dyn Cancel,
 ) -> Result<usize, StageError> {
     let full = OutOfScratch {
-        needed: size_of_val(segments) + size_of::<NumberedLine>(),
+        needed: size_of_val(segments) + size_of::<LineOf<I>>(),
         available: size_of_val(segments),
     };
     let (sorted, _) = segments.split_at_mut_checked(count).ok_or(full)?;
     for segments in sorted.chunks_mut(SEGMENTS_BETWEEN_CHECKS) {
         for segment in segments {
-            segment.slope = Key::of(segment, points).slope();
+            segment.0[2] = Key::of::<I>(segment, points).slope().into();
         }
         cancel.check()?;
     }
-    heap_sort_cancellable(sorted, |segment| Key::of(segment, points), cancel)?;
+    heap_sort_cancellable(sorted, |segment| Key::of::<I>(segment, points), cancel)?;
 
     // The finished pieces are stored at the front of `segments`, and those for which there is no
     // room there, from `count` on. In both areas the pieces of the current line begin at `starts`.
@@ -177,23 +196,25 @@ pub(super) fn ink_once(
             cancel.check()?;
         }
         let segment = segments[read];
-        let key = Key::of(&segment, points);
+        let key = Key::of::<I>(&segment, points);
         if last.as_ref().is_none_or(|last| last.compare_line(&key) != Ordering::Equal) {
             starts = ends;
         }
-        let (mut from, to) = (End::first(&segment, points), End::second(&segment, points));
+        let (mut from, to) =
+            (End::<I>::first(&segment, points), End::<I>::second(&segment, points));
         while from.position < to.position {
             // `reach` is how far the line is already drawn at this point. If it is not, `next` is
             // where the next piece begins.
             let (mut reach, mut next) = (from, to);
             for side in 0..2 {
                 let mut pieces = segments.get(starts[side]..ends[side]).unwrap_or(&[]);
-                while let Some(rank) = pieces.first().map(|piece| piece.rank) {
-                    let of_rank = pieces.partition_point(|piece| piece.rank <= rank);
+                while let Some(rank) = pieces.first().map(|piece| piece.rank()) {
+                    let of_rank = pieces.partition_point(|piece| piece.rank() <= rank);
                     let (run, rest) = pieces.split_at(of_rank);
                     pieces = rest;
-                    let begun =
-                        |piece: &NumberedLine| End::first(piece, points).position <= from.position;
+                    let begun = |piece: &LineOf<I>| {
+                        End::<I>::first(piece, points).position <= from.position
+                    };
                     let after = run.partition_point(begun);
                     if let Some(piece) = after.checked_sub(1).and_then(|at| run.get(at)) {
                         reach = reach.max(End::second(piece, points));
@@ -207,7 +228,7 @@ pub(super) fn ink_once(
                 from = reach;
                 continue;
             }
-            let piece = NumberedLine { ends: from.number << 16 | next.number, ..segment };
+            let piece = segment.between(from.number, next.number);
             let at = &mut ends[usize::from(ends[0] > read)];
             *segments.get_mut(*at).ok_or(full)? = piece;
             *at += 1;
@@ -221,26 +242,26 @@ pub(super) fn ink_once(
 
 /// An end of a segment: its position, and the number of its point.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct End {
+struct End<I> {
     position: PointKey,
-    number: u32,
+    number: I,
 }
 
-impl End {
-    fn both(segment: &NumberedLine, points: &[PagePoint]) -> [Self; 2] {
-        [segment.ends >> 16, segment.ends & 0xFFFF].map_each(|number| {
-            let position = points.get(number as usize).map_or((0, 0), |point| (point.x, point.y));
+impl<I: Index> End<I> {
+    fn both(segment: &LineOf<I>, points: &[PagePoint]) -> [Self; 2] {
+        segment.ends::<I>().map_each(|number| {
+            let position = points.get(number.get()).map_or((0, 0), |point| (point.x, point.y));
             Self { position, number }
         })
     }
 
     /// Returns the end that comes first along the line.
-    fn first(segment: &NumberedLine, points: &[PagePoint]) -> Self {
+    fn first(segment: &LineOf<I>, points: &[PagePoint]) -> Self {
         let [a, b] = Self::both(segment, points);
         a.min(b)
     }
 
-    fn second(segment: &NumberedLine, points: &[PagePoint]) -> Self {
+    fn second(segment: &LineOf<I>, points: &[PagePoint]) -> Self {
         let [a, b] = Self::both(segment, points);
         a.max(b)
     }
@@ -289,11 +310,11 @@ mod tests {
     fn drawn(lines: &[PackedLine], direction: [i32; 2]) -> String {
         let mut words = vec![0; 400];
         items_mut(&mut words, lines.len()).unwrap().copy_from_slice(lines);
-        let stored = build_graph(&mut words, lines.len(), &mut NeverCancel).unwrap();
+        let stored = build_graph::<u16>(&mut words, lines.len(), &mut NeverCancel).unwrap();
         let drawing = stored.drawing(&words).unwrap();
         let mut strip = Vec::new();
         for segment in drawing.segments {
-            let [from, to] = [segment.from, segment.to].map(|number| {
+            let [from, to] = [segment.from(), segment.to()].map(|number| {
                 let PagePoint { x, y } = drawing.points[usize::from(number)];
                 let at = if direction[0] != 0 { x / direction[0] } else { y / direction[1] } / 10;
                 assert_eq!([x, y], direction.map(|step| step * 10 * at));
@@ -301,11 +322,11 @@ mod tests {
             });
             let (from, to) = (from.min(to), from.max(to));
             strip.resize(strip.len().max(to + 1), ' ');
-            let (ink, line_type) = TYPES[usize::from(segment.line_type_code)];
+            let (ink, line_type) = TYPES[usize::from(segment.line_type().code())];
             assert_eq!(segment.line_type(), line_type);
             for letter in &mut strip[from + 1..to] {
                 assert_eq!(*letter, ' ', "drawn twice");
-                *letter = if segment.pen == 0 { ink } else { (b'0' + segment.pen) as char };
+                *letter = if segment.pen() == 0 { ink } else { (b'0' + segment.pen()) as char };
             }
             (strip[from], strip[to]) = ('+', '+');
         }

@@ -3,8 +3,9 @@
 use super::{Element, FINEST_FRACTION_BITS, Model};
 use crate::array::MapEach;
 use crate::checksum::Crc32;
+use crate::index::Index;
 
-impl Model<'_> {
+impl<I: Index> Model<'_, I> {
     /// Returns the CRC-32 of the model: of the vertices; of the bars, faces and completed curves,
     /// each with its pen; and of the number of decimals with which the vertices were written, since
     /// it says how exact they are.
@@ -15,9 +16,9 @@ impl Model<'_> {
     /// items.
     ///
     /// ```
-    /// use penup::model::Model;
-    /// let mut memory = (heapless::Vec::<_, 8>::new(), []);
-    /// let empty = Model::new(&mut memory.0, &mut memory.1);
+    /// use penup::model::{Model, Position};
+    /// let mut memory = ([Position::ORIGIN; 8], []);
+    /// let empty: Model = Model::new(&mut memory.0, &mut memory.1);
     /// // The CRC-32 of four numbers that are 0.
     /// assert_eq!(empty.checksum(), 0xECBB_4B55);
     /// ```
@@ -56,7 +57,7 @@ impl Model<'_> {
                 digest.update(&u32::to_le_bytes(head));
             }
             for control in curve.control {
-                digest.update(&u32::from(*control).to_le_bytes());
+                digest.update(&(*control).into().to_le_bytes());
             }
             let ends = [curve.from, curve.to].map_each(|end| i64::from(end.to_bits()));
             for value in ends.into_iter().chain((0..knots).map(|knot| curve.knots.get(knot))) {
@@ -74,13 +75,12 @@ mod tests {
     use super::super::{Corner, PenName, Position, no_undo};
     use super::*;
     use crate::fixed::Decimal;
-    use bytemuck::Zeroable;
     use std::vec::Vec;
 
     /// The checksum of a model with these vertices and elements: a face, or a bar if there are two
     /// numbers.
     fn sum(vertices: &[[&str; 3]], elements: &[(&[i32], u8)]) -> u32 {
-        let mut memory = (heapless::Vec::<Position, 9>::new(), [Corner::zeroed(); 64]);
+        let mut memory = ([Position::ORIGIN; 9], [<Corner>::ZERO; 64]);
         let mut model = Model::new(&mut memory.0, &mut memory.1);
         for vertex in vertices {
             let position = vertex.map(|text| Decimal::parse(text).unwrap());
@@ -128,13 +128,13 @@ mod tests {
     fn the_unit_of_the_model_does_not_count() {
         let near: Vec<[&str; 3]> = std::vec![["1", "0.5", "0"], ["0.25", "0", "1"]];
         // A vertex far away makes the unit coarser, and is removed again.
-        let mut memory = (heapless::Vec::<Position, 9>::new(), [Corner::zeroed(); 64]);
+        let mut memory = ([Position::ORIGIN; 9], [<Corner>::ZERO; 64]);
         let mut model = Model::new(&mut memory.0, &mut memory.1);
         for vertex in near.iter().chain([&["1000", "0", "0"]]) {
             let position = vertex.map(|text| Decimal::parse(text).unwrap());
             model.add_vertex(position, &mut no_undo).unwrap();
         }
-        model.vertices.pop();
+        model.vertices.truncate(near.len());
         assert!(model.fraction_bits() < FINEST_FRACTION_BITS);
         assert_eq!(model.checksum(), sum(&near, &[]));
     }

@@ -1,61 +1,76 @@
 //! The compact encoding in which the model stores faces and bars.
 
 use super::Pens;
+use crate::index::Index;
 use bytemuck::{Pod, Zeroable};
 
-/// One more than the greatest vertex number that an element can hold.
-pub const VERTEX_NUMBER_LIMIT: usize = 1 << 14;
+/// One more than the greatest vertex number that an element of 16-bit numbers can hold.
+pub const VERTEX_NUMBER_LIMIT: usize = <Corner>::VERTEX_NUMBER_LIMIT;
 
 /// A vertex number as an element stores it, with two flags.
 ///
-/// Bits 0 to 13 are the vertex number, from 0. Bit 14 is set in the corners of a bar. Bit 15 is set
-/// in the last corner of an element. So a face of n corners takes n half-words and needs no header.
+/// The lowest bits are the vertex number, from 0: 14 bits of the 16 on a board. The next bit is set
+/// in the corners of a bar, and the highest in the last corner of an element. So a face of n corners
+/// takes n numbers and needs no header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 #[repr(transparent)]
-pub struct Corner(pub(super) u16);
+pub struct Corner<I = u16>(pub(super) I);
 
-impl Corner {
-    /// The bits of the vertex number.
-    const VERTEX: u16 = 0x3FFF;
+impl<I: Index> Corner<I> {
+    /// How many bits a vertex number has.
+    const VERTEX_BITS: u32 = I::BITS - 2;
+    /// One more than the greatest vertex number that a corner can hold.
+    pub const VERTEX_NUMBER_LIMIT: usize = 1 << Self::VERTEX_BITS;
+    /// A corner at the first vertex, with no flag.
+    pub const ZERO: Self = Self(I::ZERO);
+
     /// The flag of a corner of a bar.
-    const BAR: u16 = 0x4000;
-    /// The flag of the last corner of an element.
-    const LAST: u16 = 0x8000;
+    fn bar() -> I {
+        I::ONE << Self::VERTEX_BITS
+    }
 
-    /// Makes the corner at `vertex`, which must be below [`VERTEX_NUMBER_LIMIT`] (higher bits are
+    /// The flag of the last corner of an element.
+    fn last() -> I {
+        I::ONE << (Self::VERTEX_BITS + 1)
+    }
+
+    /// Makes the corner at `vertex`, which must be below [`Corner::VERTEX_NUMBER_LIMIT`] (higher bits are
     /// discarded).
-    pub const fn new(vertex: u16, of_bar: bool, last: bool) -> Self {
-        let bar = if of_bar { Self::BAR } else { 0 };
-        let last = if last { Self::LAST } else { 0 };
-        Self(vertex & Self::VERTEX | bar | last)
+    pub fn new(vertex: I, of_bar: bool, last: bool) -> Self {
+        let bar = if of_bar { Self::bar() } else { I::ZERO };
+        let last = if last { Self::last() } else { I::ZERO };
+        Self(vertex & (Self::bar() - I::ONE) | bar | last)
     }
 
     /// Returns the vertex number, from 0.
-    pub const fn vertex(self) -> u16 {
-        self.0 & Self::VERTEX
+    #[inline]
+    pub fn vertex(self) -> I {
+        self.0 & (Self::bar() - I::ONE)
     }
 
     /// Whether this corner belongs to a bar.
-    pub const fn of_bar(self) -> bool {
-        self.0 & Self::BAR != 0
+    #[inline]
+    pub fn of_bar(self) -> bool {
+        self.0 & Self::bar() != I::ZERO
     }
 
     /// Whether this is the last corner of its element.
-    pub const fn is_last(self) -> bool {
-        self.0 & Self::LAST != 0
+    #[inline]
+    pub fn is_last(self) -> bool {
+        self.0 & Self::last() != I::ZERO
     }
 }
 
 /// One face or bar.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Element<'a> {
+pub enum Element<'a, I = u16> {
     /// A polygon of at least three different corners, in order around it.
-    Face(&'a [Corner]),
+    Face(&'a [Corner<I>]),
     /// A straight bar between two different vertices.
-    Bar(u16, u16),
+    Bar(I, I),
 }
 
-impl Element<'_> {
+impl<I: Index> Element<'_, I> {
     /// Returns the number of its corners.
     pub fn corner_count(&self) -> usize {
         match self {
@@ -70,36 +85,36 @@ impl Element<'_> {
 /// If they come from a model, every vertex number exists, every face has at least three corners and
 /// every bar two, and the last corner of each is marked.
 #[derive(Debug, Clone, Copy)]
-pub struct Elements<'a> {
-    pub(super) corners: &'a [Corner],
-    pub(super) pens: Pens<'a>,
+pub struct Elements<'a, I = u16> {
+    pub(super) corners: &'a [Corner<I>],
+    pub(super) pens: Pens<'a, I>,
 }
 
-impl<'a> Elements<'a> {
+impl<'a, I: Index> Elements<'a, I> {
     /// Makes the elements that `corners` encode, all with the first pen. Corners after the last
     /// mark are ignored.
-    pub fn new(corners: &'a [Corner]) -> Self {
+    pub fn new(corners: &'a [Corner<I>]) -> Self {
         Self::with_pens(corners, Pens::default())
     }
 
     /// As [`Elements::new`], with the pens of the elements.
-    pub fn with_pens(corners: &'a [Corner], pens: Pens<'a>) -> Self {
+    pub fn with_pens(corners: &'a [Corner<I>], pens: Pens<'a, I>) -> Self {
         let whole = corners.iter().rposition(|corner| corner.is_last()).map_or(0, |last| last + 1);
         Self { corners: &corners[..whole], pens }
     }
 
     /// Returns every corner of every element.
-    pub fn corners(&self) -> &'a [Corner] {
+    pub fn corners(&self) -> &'a [Corner<I>] {
         self.corners
     }
 
     /// Returns the pens of the elements, which are found by the index of a corner.
-    pub fn pens(&self) -> Pens<'a> {
+    pub fn pens(&self) -> Pens<'a, I> {
         self.pens
     }
 
     /// Returns each element in turn.
-    pub fn iter(&self) -> impl Iterator<Item = Element<'a>> + Clone + use<'a> {
+    pub fn iter(&self) -> impl Iterator<Item = Element<'a, I>> + Clone + use<'a, I> {
         self.corners.split_inclusive(|corner| corner.is_last()).map(|corners| match corners {
             [a, b] if a.of_bar() => Element::Bar(a.vertex(), b.vertex()),
             _ => Element::Face(corners),
@@ -107,7 +122,7 @@ impl<'a> Elements<'a> {
     }
 
     /// Returns each element in turn, with its pen.
-    pub fn iter_with_pens(&self) -> impl Iterator<Item = (Element<'a>, u8)> + use<'a> {
+    pub fn iter_with_pens(&self) -> impl Iterator<Item = (Element<'a, I>, u8)> + use<'a, I> {
         let (pens, mut first) = (self.pens, 0);
         self.iter().map(move |element| {
             let pen = pens.at(first);

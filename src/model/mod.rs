@@ -16,6 +16,7 @@ mod pens;
 mod precision;
 mod store;
 mod undo;
+mod vertices;
 
 pub use curves::{Curves, StoredCurve};
 pub use edit::{Change, Edit, ElementKind, Numbers};
@@ -25,11 +26,13 @@ pub use pens::{PEN_LIMIT, PenName, PenRun, PenWriter, Pens};
 
 use crate::array::MapEach;
 use crate::fixed::Decimal;
+use crate::index::Index;
 use bytemuck::{Pod, Zeroable};
 use curves::CurveList;
 use pens::{PenBook, RUN};
 use precision::Rounding;
 use store::Store;
+use vertices::Vertices;
 
 /// A position in the model's own space. Each coordinate is in units of 2^-[`Model::fraction_bits`],
 /// and its absolute value is at most 2^30.
@@ -45,6 +48,9 @@ pub struct Position {
 }
 
 impl Position {
+    /// The position whose coordinates are 0.
+    pub const ORIGIN: Self = Self { x: 0, y: 0, z: 0 };
+
     /// Returns the coordinates in order.
     pub fn coordinates(self) -> [i32; 3] {
         [self.x, self.y, self.z]
@@ -59,20 +65,20 @@ const FINEST_FRACTION_BITS: u32 = 30;
 
 /// A callback that gets the model just before a change that will succeed, and is never called when
 /// a change is refused. It may copy the model with [`Model::save`].
-pub type BeforeChange<'b> = &'b mut dyn FnMut(&Model<'_>);
+pub type BeforeChange<'b, I> = &'b mut dyn FnMut(&Model<'_, I>);
 
 /// A [`BeforeChange`] that does nothing: the change cannot be undone.
-pub fn no_undo(_: &Model<'_>) {}
+pub fn no_undo<I: Index>(_: &Model<'_, I>) {}
 
 /// The vertices, faces, bars and curves that the user sent, in memory lent by the owner.
 ///
 /// All coordinates share one binary unit. It is 2^-30 at first and becomes coarser when a larger
 /// coordinate comes, so that a model of any size keeps 30 bits of its largest coordinate.
 #[derive(Debug)]
-pub struct Model<'m> {
-    vertices: &'m mut heapless::VecView<Position>,
+pub struct Model<'m, I = u16> {
+    vertices: Vertices<'m>,
     /// The corners of the elements, their [`PenRun`]s and the curves.
-    store: Store<'m>,
+    store: Store<'m, I>,
     fraction_bits: u32,
     /// The error bound of the coordinates.
     rounding: Rounding,
@@ -82,13 +88,12 @@ pub struct Model<'m> {
     pens: PenBook,
 }
 
-impl<'m> Model<'m> {
-    /// Makes an empty model that can hold as many vertices as the vector can, and as many corners
+impl<'m, I: Index> Model<'m, I> {
+    /// Makes an empty model that can hold as many vertices as the first slice has, and as many corners
     /// as the slice has. Their contents are discarded.
-    pub fn new(vertices: &'m mut heapless::VecView<Position>, corners: &'m mut [Corner]) -> Self {
-        vertices.clear();
+    pub fn new(vertices: &'m mut [Position], corners: &'m mut [Corner<I>]) -> Self {
         Self {
-            vertices,
+            vertices: Vertices::new(vertices),
             store: Store::new(corners),
             fraction_bits: FINEST_FRACTION_BITS,
             rounding: Rounding::default(),
@@ -101,7 +106,7 @@ impl<'m> Model<'m> {
 
     /// Removes everything from the model.
     pub fn clear(&mut self) {
-        self.vertices.clear();
+        self.vertices.truncate(0);
         self.store.clear();
         self.fraction_bits = FINEST_FRACTION_BITS;
         self.rounding = Rounding::default();
@@ -113,7 +118,7 @@ impl<'m> Model<'m> {
 
     /// Returns the vertices, in units of 2^-[`Model::fraction_bits`].
     pub fn vertices(&self) -> &[Position] {
-        self.vertices
+        &self.vertices
     }
 
     /// Returns the number of fraction bits, 0 to 30: the unit of every coordinate is 2^-this.
@@ -122,12 +127,12 @@ impl<'m> Model<'m> {
     }
 
     /// Returns the faces and bars.
-    pub fn elements(&self) -> Elements<'_> {
+    pub fn elements(&self) -> Elements<'_, I> {
         Elements { corners: self.store.corners(), pens: self.pens() }
     }
 
     /// Returns the pens of the elements.
-    fn pens(&self) -> Pens<'_> {
+    fn pens(&self) -> Pens<'_, I> {
         Pens::new(self.store.pen_runs())
     }
 
@@ -143,7 +148,7 @@ impl<'m> Model<'m> {
         &mut self,
         by_material: bool,
         name: PenName,
-        before: BeforeChange<'_>,
+        before: BeforeChange<'_, I>,
     ) -> Result<(), ModelError> {
         if self.pens.by_material && !by_material {
             return Ok(());
@@ -165,7 +170,7 @@ impl<'m> Model<'m> {
     }
 
     /// Returns the curves.
-    pub fn curves(&self) -> Curves<'_> {
+    pub fn curves(&self) -> Curves<'_, I> {
         self.curves.curves(&self.store)
     }
 
@@ -186,7 +191,7 @@ impl<'m> Model<'m> {
 
     /// Returns the greatest number of vertices.
     pub fn vertex_limit(&self) -> usize {
-        self.vertices.capacity().min(VERTEX_NUMBER_LIMIT)
+        self.vertices.capacity().min(<Corner<I>>::VERTEX_NUMBER_LIMIT)
     }
 
     /// Returns the number of 16-bit units in use: corners of elements, and the half-words of curves
@@ -208,21 +213,21 @@ impl<'m> Model<'m> {
     pub fn add_vertex(
         &mut self,
         coordinates: [Decimal; 3],
-        before: BeforeChange<'_>,
+        before: BeforeChange<'_, I>,
     ) -> Result<(), ModelError> {
         let limit = self.vertex_limit();
         if self.vertices.len() >= limit {
             return Err(ModelError::TooManyVertices { limit });
         }
         let position = self.position(coordinates, before)?;
-        self.vertices.push(position).map_err(|_| ModelError::TooManyVertices { limit })
+        self.vertices.push(position).ok_or(ModelError::TooManyVertices { limit })
     }
 
     /// Converts coordinates to the model's unit, which is made coarser if necessary.
     fn position(
         &mut self,
         coordinates: [Decimal; 3],
-        before: BeforeChange<'_>,
+        before: BeforeChange<'_, I>,
     ) -> Result<Position, ModelError> {
         let fraction_bits = (0..=self.fraction_bits)
             .rev()
@@ -271,7 +276,7 @@ impl<'m> Model<'m> {
     pub fn add_face(
         &mut self,
         numbers: impl Iterator<Item = i32> + Clone,
-        before: BeforeChange<'_>,
+        before: BeforeChange<'_, I>,
     ) -> Result<(), ModelError> {
         let count = self.check_numbers(numbers.clone(), 3)?;
         self.store.check_room(count + self.run_for(self.pens.current))?;
@@ -297,7 +302,7 @@ impl<'m> Model<'m> {
     pub fn add_polyline(
         &mut self,
         numbers: impl Iterator<Item = i32> + Clone,
-        before: BeforeChange<'_>,
+        before: BeforeChange<'_, I>,
     ) -> Result<(), ModelError> {
         let count = self.check_numbers(numbers.clone(), 2)?;
         let bars = count - 1;
@@ -328,8 +333,8 @@ impl<'m> Model<'m> {
         let vertices = self.vertices.len();
         let (mut count, mut first, mut last) = (0, None, None);
         for number in numbers {
-            let vertex =
-                resolve(number, vertices).ok_or(ModelError::UnknownVertex { number, vertices })?;
+            let vertex = resolve::<I>(number, vertices)
+                .ok_or(ModelError::UnknownVertex { number, vertices })?;
             if last.replace((vertex, number)).is_some_and(|(before, _)| before == vertex) {
                 return Err(ModelError::RepeatedVertex { number });
             }
@@ -402,7 +407,7 @@ impl<'m> Model<'m> {
     ///
     /// # Errors
     /// [`ModelError::NoCurve`], [`ModelError::KnotTooLarge`], [`ModelError::Curve`].
-    pub fn end_curve(&mut self, before: BeforeChange<'_>) -> Result<(), ModelError> {
+    pub fn end_curve(&mut self, before: BeforeChange<'_, I>) -> Result<(), ModelError> {
         self.curves.end(&mut self.store)?;
         before(self);
         self.curves.count_completed(&self.store);
@@ -434,10 +439,10 @@ impl<'m> Model<'m> {
 }
 
 /// Returns the vertex that an OBJ number names in a model with so many vertices.
-fn resolve(number: i32, vertices: usize) -> Option<u16> {
-    let count = vertices as i64; // at most VERTEX_NUMBER_LIMIT
+fn resolve<I: Index>(number: i32, vertices: usize) -> Option<I> {
+    let count = vertices as i64; // at most the limit of a corner
     let index = if number < 0 { count + i64::from(number) } else { i64::from(number) - 1 };
-    if (0..count).contains(&index) { u16::try_from(index).ok() } else { None }
+    if (0..count).contains(&index) { Some(I::new(index as usize)) } else { None }
 }
 
 #[cfg(test)]

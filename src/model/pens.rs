@@ -6,6 +6,7 @@
 //! other name gets the first pen without a name. Of such a name a hash is stored.
 
 use super::ModelError;
+use crate::index::Index;
 use crate::stage::{OutOfScratch, Scratch};
 use bytemuck::{Pod, Zeroable};
 use core::ops::Range;
@@ -13,26 +14,32 @@ use core::ops::Range;
 /// The number of pens.
 pub const PEN_LIMIT: u8 = 32;
 
-/// A change of the pen: the elements from this one on have another pen than those before.
+/// A change of the pen: the index of an element's first corner, and the pen, from 0, of the elements
+/// from there on, which is another than before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
-#[repr(C)]
-pub struct PenRun {
-    /// The index of the element's first corner.
-    first: u16,
-    /// The pen, from 0.
-    pen: u16,
-}
+#[repr(transparent)]
+pub struct PenRun<I = u16>([I; RUN]);
 
-impl PenRun {
-    /// Makes the change to `pen` at an element whose first corner has the index `first`, below
-    /// 2^16.
+impl<I: Index> PenRun<I> {
+    /// Makes the change to `pen` at an element whose first corner has the index `first`, which
+    /// fits.
     pub(super) fn new(first: usize, pen: u8) -> Self {
-        Self { first: first as u16, pen: pen.into() }
+        Self([I::new(first), I::new(pen.into())])
+    }
+
+    /// Returns the index of the element's first corner.
+    fn first(self) -> usize {
+        self.0[0].get()
+    }
+
+    /// Returns the pen, from 0.
+    fn pen(self) -> u8 {
+        self.0[1].get() as u8
     }
 
     /// Whether the run begins at this corner.
     pub(super) fn begins_at(self, corner: usize) -> bool {
-        usize::from(self.first) == corner
+        self.first() == corner
     }
 }
 
@@ -43,21 +50,27 @@ pub(super) const RUN: usize = 2;
 ///
 /// If they come from a model or a [`PenWriter`], the runs are in order, none is empty, and each has
 /// another pen than the one before.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Pens<'a> {
-    runs: &'a [PenRun],
+#[derive(Debug, Clone, Copy)]
+pub struct Pens<'a, I = u16> {
+    runs: &'a [PenRun<I>],
 }
 
-impl<'a> Pens<'a> {
-    pub(super) fn new(runs: &'a [PenRun]) -> Self {
+impl<I> Default for Pens<'_, I> {
+    fn default() -> Self {
+        Self { runs: &[] }
+    }
+}
+
+impl<'a, I: Index> Pens<'a, I> {
+    pub(super) fn new(runs: &'a [PenRun<I>]) -> Self {
         Self { runs }
     }
 
     /// Returns the pen, from 0, of the element to which a corner belongs.
     #[inline]
     pub fn at(&self, corner: usize) -> u8 {
-        let after = self.runs.partition_point(|run| usize::from(run.first) <= corner);
-        after.checked_sub(1).and_then(|last| self.runs.get(last)).map_or(0, |run| run.pen as u8)
+        let after = self.runs.partition_point(|run| run.first() <= corner);
+        after.checked_sub(1).and_then(|last| self.runs.get(last)).map_or(0, |run| run.pen())
     }
 
     /// Returns how many times the pen changes.
@@ -67,18 +80,18 @@ impl<'a> Pens<'a> {
 
     /// Returns the pen of the last element.
     pub(super) fn last(&self) -> u8 {
-        self.runs.last().map_or(0, |run| run.pen as u8)
+        self.runs.last().map_or(0, |run| run.pen())
     }
 }
 
 /// Records the pens of elements while these are written one after the other.
 #[derive(Debug)]
-pub struct PenWriter<'a> {
-    runs: &'a mut [PenRun],
+pub struct PenWriter<'a, I = u16> {
+    runs: &'a mut [PenRun<I>],
     count: usize,
 }
 
-impl<'a> PenWriter<'a> {
+impl<'a, I: Index> PenWriter<'a, I> {
     /// Makes a writer for at most so many changes of the pen.
     ///
     /// # Errors
@@ -98,29 +111,31 @@ impl<'a> PenWriter<'a> {
     }
 
     /// Returns the pens of all recorded elements.
-    pub fn finish(self) -> Pens<'a> {
-        let runs: &'a [PenRun] = self.runs;
+    pub fn finish(self) -> Pens<'a, I> {
+        let runs: &'a [PenRun<I>] = self.runs;
         Pens { runs: runs.get(..self.count).unwrap_or(runs) }
     }
 }
 
 /// Removes the corners in `gone` from the first `count` of `runs`, and returns how many runs are
 /// left. The last of them may then be empty.
-pub(super) fn close_gap(runs: &mut [PenRun], count: usize, gone: Range<usize>) -> usize {
+pub(super) fn close_gap<I: Index>(
+    runs: &mut [PenRun<I>],
+    count: usize,
+    gone: Range<usize>,
+) -> usize {
     let (mut kept, mut last) = (0usize, 0);
     for at in 0..count.min(runs.len()) {
-        let PenRun { first, pen } = runs[at];
-        let before = usize::from(first);
-        let first =
-            // It only becomes less, so it fits.
-            if before >= gone.end { before - gone.len() } else { before.min(gone.start) } as u16;
+        let (before, pen) = (runs[at].first(), runs[at].pen());
+        // It only becomes less, so it fits.
+        let first = if before >= gone.end { before - gone.len() } else { before.min(gone.start) };
         // If the run before has lost all its corners, this run replaces it.
-        if kept > 0 && runs[kept - 1].first == first {
+        if kept > 0 && runs[kept - 1].first() == first {
             kept -= 1;
-            last = if kept > 0 { runs[kept - 1].pen } else { 0 };
+            last = if kept > 0 { runs[kept - 1].pen() } else { 0 };
         }
         if pen != last {
-            runs[kept] = PenRun { first, pen };
+            runs[kept] = PenRun::new(first, pen);
             (kept, last) = (kept + 1, pen);
         }
     }
@@ -129,26 +144,26 @@ pub(super) fn close_gap(runs: &mut [PenRun], count: usize, gone: Range<usize>) -
 
 /// Inserts `length` corners with `pen` at `at` into the first `count` of `runs`, which must have
 /// room for two more. Returns how many runs there are then.
-pub(super) fn open_gap(
-    runs: &mut [PenRun],
+pub(super) fn open_gap<I: Index>(
+    runs: &mut [PenRun<I>],
     mut count: usize,
     at: usize,
     length: usize,
     pen: u8,
 ) -> usize {
-    let (at, end, pen) = (at as u16, (at + length) as u16, u16::from(pen));
-    let next = runs.iter().take(count).take_while(|run| run.first < at).count();
-    let before = next.checked_sub(1).map_or(0, |last| runs[last].pen);
+    let end = at + length;
+    let next = runs.iter().take(count).take_while(|run| run.first() < at).count();
+    let before = next.checked_sub(1).map_or(0, |last| runs[last].pen());
     let mut after = before;
-    if let Some(run) = runs.get(next).filter(|run| next < count && run.first == at) {
-        after = run.pen;
+    if let Some(run) = runs.get(next).filter(|run| next < count && run.first() == at) {
+        after = run.pen();
         runs.copy_within(next + 1..count, next);
         count -= 1;
     }
     for run in &mut runs[next..count] {
-        run.first += length as u16;
+        run.0[0] += I::new(length);
     }
-    let new = [PenRun { first: at, pen }, PenRun { first: end, pen: after }];
+    let new = [PenRun::new(at, pen), PenRun::new(end, after)];
     let is_new = [pen != before, after != pen];
     let mut index = next;
     for run in new.into_iter().zip(is_new).filter_map(|(run, is_new)| is_new.then_some(run)) {
@@ -229,7 +244,7 @@ mod tests {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             (state >> 16) as usize % below
         };
-        let (mut list, mut runs, mut count) = (Vec::new(), [PenRun::zeroed(); 400], 0);
+        let (mut list, mut runs, mut count) = (Vec::new(), [PenRun::<u16>::zeroed(); 400], 0);
         for _ in 0..20_000 {
             let (at, length, pen) = (random(list.len() + 1), random(4) + 1, random(4) as u8);
             if list.len() < 100 && random(2) == 0 {
@@ -241,12 +256,13 @@ mod tests {
                 count = close_gap(&mut runs, count, gone);
             }
             let (used, end) = (&runs[..count], list.len());
-            assert!(used.first().is_none_or(|run| run.pen != 0), "{used:?}");
-            let in_order = |two: &[PenRun]| two[0].first < two[1].first && two[0].pen != two[1].pen;
+            assert!(used.first().is_none_or(|run| run.pen() != 0), "{used:?}");
+            let in_order =
+                |two: &[PenRun]| two[0].first() < two[1].first() && two[0].pen() != two[1].pen();
             assert!(used.windows(2).all(in_order), "{used:?}");
             assert_eq!(of(used, end), list);
             // The model removes a run that begins at the end.
-            if used.last().is_some_and(|run| usize::from(run.first) >= end) {
+            if used.last().is_some_and(|run| run.first() >= end) {
                 count -= 1;
             }
         }

@@ -4,6 +4,7 @@
 use super::{FINEST_FRACTION_BITS, Model};
 use crate::fixed::Decimal;
 use crate::geometry::Precision;
+use crate::index::Index;
 
 /// Numbers with fewer decimals than this are taken to be exact, such as `0.25`, or a grid in steps
 /// of 0.1.
@@ -90,7 +91,7 @@ impl Rounding {
     }
 }
 
-impl Model<'_> {
+impl<I: Index> Model<'_, I> {
     /// Returns the error bound of each coordinate, in the model's unit. It is half a unit of the
     /// last decimal that was written if there are three or more, and what the rounding to the
     /// model's unit and edits have added.
@@ -98,8 +99,8 @@ impl Model<'_> {
     /// ```
     /// use penup::fixed::Decimal;
     /// use penup::model::{Model, no_undo};
-    /// let (mut vertices, mut corners) = (heapless::Vec::<_, 2>::new(), []);
-    /// let mut model = Model::new(&mut vertices, &mut corners);
+    /// let (mut vertices, mut corners) = ([Position::ORIGIN; 2], []);
+    /// let mut model: Model = Model::new(&mut vertices, &mut corners);
     /// let decimals = |texts: [&str; 3]| texts.map(|text| Decimal::parse(text).unwrap());
     /// model.add_vertex(decimals(["8", "2.5", "0"]), &mut no_undo)?;
     /// assert_eq!(model.precision().written, 1); // Exact but for the unit.
@@ -127,15 +128,14 @@ mod tests {
     use super::super::*;
     use super::*;
     use crate::stage::Scratch;
-    use bytemuck::Zeroable;
 
     fn decimals(texts: [&str; 3]) -> [Decimal; 3] {
         texts.map(|text| Decimal::parse(text).unwrap())
     }
 
     fn with_vertices(positions: &[[&str; 3]], test: impl FnOnce(&mut Model<'_>)) {
-        let mut vertices = heapless::Vec::<Position, 8>::new();
-        let mut corners = [Corner::zeroed(); 4];
+        let mut vertices = [Position::ORIGIN; 8];
+        let mut corners = [<Corner>::ZERO; 4];
         let mut model = Model::new(&mut vertices, &mut corners);
         for position in positions {
             model.add_vertex(decimals(*position), &mut no_undo).unwrap();

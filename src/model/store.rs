@@ -7,6 +7,7 @@
 
 use super::pens::{PenRun, RUN};
 use super::{Corner, ModelError};
+use crate::index::Index;
 use core::ops::Range;
 
 /// A part of the memory, in the order in which they lie there.
@@ -28,15 +29,15 @@ const REGIONS: usize = 3;
 /// Each region ends where the next begins, and the last ends within the memory. A change that does
 /// not fit is refused and changes nothing.
 #[derive(Debug)]
-pub(super) struct Store<'m> {
-    memory: &'m mut [u16],
+pub(super) struct Store<'m, I> {
+    memory: &'m mut [I],
     /// Where the first region begins, which is at 0, and where each ends.
     bounds: [usize; REGIONS + 1],
 }
 
-impl<'m> Store<'m> {
+impl<'m, I: Index> Store<'m, I> {
     /// Makes an empty store. What the memory contains is discarded.
-    pub(super) fn new(memory: &'m mut [Corner]) -> Self {
+    pub(super) fn new(memory: &'m mut [Corner<I>]) -> Self {
         Self { memory: bytemuck::cast_slice_mut(memory), bounds: [0; REGIONS + 1] }
     }
 
@@ -69,42 +70,42 @@ impl<'m> Store<'m> {
         self.bounds[region as usize]..self.bounds[region as usize + 1]
     }
 
-    fn region(&self, region: Region) -> &[u16] {
+    fn region(&self, region: Region) -> &[I] {
         self.memory.get(self.range(region)).unwrap_or(&[])
     }
 
-    fn region_mut(&mut self, region: Region) -> &mut [u16] {
+    fn region_mut(&mut self, region: Region) -> &mut [I] {
         let range = self.range(region);
         self.memory.get_mut(range).unwrap_or(&mut [])
     }
 
     /// Returns the corners of the elements.
-    pub(super) fn corners(&self) -> &[Corner] {
+    pub(super) fn corners(&self) -> &[Corner<I>] {
         bytemuck::cast_slice(self.region(Region::Corners))
     }
 
     /// As [`Store::corners`], to be changed.
-    pub(super) fn corners_mut(&mut self) -> &mut [Corner] {
+    pub(super) fn corners_mut(&mut self) -> &mut [Corner<I>] {
         bytemuck::cast_slice_mut(self.region_mut(Region::Corners))
     }
 
     /// Returns the changes of the pen.
-    pub(super) fn pen_runs(&self) -> &[PenRun] {
+    pub(super) fn pen_runs(&self) -> &[PenRun<I>] {
         bytemuck::cast_slice(self.region(Region::PenRuns))
     }
 
     /// As [`Store::pen_runs`], to be changed.
-    pub(super) fn pen_runs_mut(&mut self) -> &mut [PenRun] {
+    pub(super) fn pen_runs_mut(&mut self) -> &mut [PenRun<I>] {
         bytemuck::cast_slice_mut(self.region_mut(Region::PenRuns))
     }
 
     /// Returns the half-words of the curves.
-    pub(super) fn curves(&self) -> &[u16] {
+    pub(super) fn curves(&self) -> &[I] {
         self.region(Region::Curves)
     }
 
     /// As [`Store::curves`], to be changed.
-    pub(super) fn curves_mut(&mut self) -> &mut [u16] {
+    pub(super) fn curves_mut(&mut self) -> &mut [I] {
         self.region_mut(Region::Curves)
     }
 
@@ -112,7 +113,7 @@ impl<'m> Store<'m> {
     ///
     /// # Errors
     /// [`ModelError::TooManyCorners`]; nothing is changed.
-    pub(super) fn add_corners(&mut self, count: usize) -> Result<&mut [Corner], ModelError> {
+    pub(super) fn add_corners(&mut self, count: usize) -> Result<&mut [Corner<I>], ModelError> {
         self.grow(Region::Corners, count).map(bytemuck::cast_slice_mut)
     }
 
@@ -120,7 +121,7 @@ impl<'m> Store<'m> {
     ///
     /// # Errors
     /// [`ModelError::TooManyCorners`]; nothing is changed.
-    pub(super) fn add_pen_runs(&mut self, count: usize) -> Result<&mut [PenRun], ModelError> {
+    pub(super) fn add_pen_runs(&mut self, count: usize) -> Result<&mut [PenRun<I>], ModelError> {
         self.grow(Region::PenRuns, RUN * count).map(bytemuck::cast_slice_mut)
     }
 
@@ -128,7 +129,7 @@ impl<'m> Store<'m> {
     ///
     /// # Errors
     /// [`ModelError::TooManyCorners`]; nothing is changed.
-    pub(super) fn add_to_curves(&mut self, count: usize) -> Result<&mut [u16], ModelError> {
+    pub(super) fn add_to_curves(&mut self, count: usize) -> Result<&mut [I], ModelError> {
         self.grow(Region::Curves, count)
     }
 
@@ -151,7 +152,7 @@ impl<'m> Store<'m> {
     /// before. The regions behind it are moved.
     // Not inlined: its three callers share one copy of the code.
     #[inline(never)]
-    fn grow(&mut self, region: Region, count: usize) -> Result<&mut [u16], ModelError> {
+    fn grow(&mut self, region: Region, count: usize) -> Result<&mut [I], ModelError> {
         self.check_room(count)?;
         let (end, used) = (self.range(region).end, self.used());
         self.memory.copy_within(end..used, end + count);
@@ -174,7 +175,7 @@ impl<'m> Store<'m> {
     }
 
     /// Returns the half-words of all regions in turn, without the last `without` of them.
-    pub(super) fn all_but(&self, without: usize) -> &[u16] {
+    pub(super) fn all_but(&self, without: usize) -> &[I] {
         self.memory.get(..self.used().saturating_sub(without)).unwrap_or(&[])
     }
 
@@ -186,7 +187,7 @@ impl<'m> Store<'m> {
 
     /// Replaces all regions: `halves` are those of all in turn, and `ends` is as [`Store::ends`]
     /// returned it. Returns `None`, and changes nothing, if they do not fit.
-    pub(super) fn replace(&mut self, ends: [usize; 2], halves: &[u16]) -> Option<()> {
+    pub(super) fn replace(&mut self, ends: [usize; 2], halves: &[I]) -> Option<()> {
         if ends[0] > ends[1] || ends[1] > halves.len() {
             return None;
         }
@@ -199,14 +200,13 @@ impl<'m> Store<'m> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bytemuck::Zeroable;
     use std::vec::Vec;
 
     const ALL: [Region; REGIONS] = [Region::Corners, Region::PenRuns, Region::Curves];
 
     #[test]
     fn regions_grow_and_shrink_as_three_separate_lists() {
-        let mut memory = [Corner::zeroed(); 40];
+        let mut memory = [<Corner>::ZERO; 40];
         let mut store = Store::new(&mut memory);
         let mut lists: [Vec<u16>; REGIONS] = Default::default();
         let mut state = 1u32;
@@ -246,7 +246,7 @@ mod tests {
 
     #[test]
     fn what_was_copied_comes_back() {
-        let (mut memory, mut other) = ([Corner::zeroed(); 8], [Corner::zeroed(); 8]);
+        let (mut memory, mut other) = ([<Corner>::ZERO; 8], [<Corner>::ZERO; 8]);
         let (mut store, mut copy) = (Store::new(&mut memory), Store::new(&mut other));
         for (region, half) in ALL.into_iter().zip([1, 2, 3]) {
             store.grow(region, 2).unwrap().fill(half);

@@ -1,15 +1,12 @@
 //! Tests of building a model: what is sent comes back, and what is refused changes nothing.
 
 use super::*;
-
-type Vertices = heapless::Vec<Position, 4>;
-
 fn decimals(texts: [&str; 3]) -> [Decimal; 3] {
     texts.map(|text| Decimal::parse(text).unwrap())
 }
 
 fn with_vertices(count: usize, test: impl FnOnce(&mut Model<'_>)) {
-    let (mut vertices, mut corners) = (Vertices::new(), [Corner::zeroed(); 8]);
+    let (mut vertices, mut corners) = ([Position::ORIGIN; 4], [<Corner>::ZERO; 8]);
     let mut model = Model::new(&mut vertices, &mut corners);
     for _ in 0..count {
         model.add_vertex(decimals(["0.25", "-0.5", "0"]), &mut no_undo).unwrap();

@@ -3,6 +3,7 @@
 use super::pens::PenBook;
 use super::precision::Rounding;
 use super::{Model, PEN_LIMIT, Position};
+use crate::index::Index;
 use crate::stage::{Scratch, items};
 
 /// The number of 32-bit values stored before the vertices.
@@ -11,7 +12,7 @@ const HEAD: usize = NUMBERS + PEN_LIMIT as usize;
 /// How many of them are not the names of the pens.
 const NUMBERS: usize = 12;
 
-impl Model<'_> {
+impl<I: Index> Model<'_, I> {
     /// Copies the model to `words`, without an unfinished curve. Returns `false` if it does not
     /// fit.
     pub fn save(&self, words: &mut [u64]) -> bool {
@@ -21,12 +22,12 @@ impl Model<'_> {
     /// Returns how many of the words given to it [`Model::save`] uses.
     pub fn saved_words(&self) -> usize {
         let vertices = Scratch::bytes_for::<Position>(self.vertices.len());
-        let corners = Scratch::bytes_for::<u16>(self.stored_halves().len());
+        let corners = Scratch::bytes_for::<I>(self.stored_halves().len());
         (Scratch::bytes_for::<u32>(HEAD) + vertices + corners) / size_of::<u64>()
     }
 
     /// Returns the half-words of the elements, of the pens and of the completed curves.
-    fn stored_halves(&self) -> &[u16] {
+    fn stored_halves(&self) -> &[I] {
         self.store.all_but(self.curves.unfinished_length(&self.store))
     }
 
@@ -52,8 +53,8 @@ impl Model<'_> {
         ]
         .map(|number| number as u32);
         *rest.first_chunk_mut()? = names;
-        scratch.take::<Position>(self.vertices.len()).ok()?.copy_from_slice(self.vertices);
-        scratch.take::<u16>(halves.len()).ok()?.copy_from_slice(halves);
+        scratch.take::<Position>(self.vertices.len()).ok()?.copy_from_slice(&self.vertices);
+        scratch.take::<I>(halves.len()).ok()?.copy_from_slice(halves);
         Some(())
     }
 
@@ -72,8 +73,7 @@ impl Model<'_> {
             rest.map(|number| number as usize);
         let positions_at = Scratch::bytes_for::<u32>(HEAD) / 8;
         let halves_at = positions_at + Scratch::bytes_for::<Position>(vertices) / 8;
-        self.vertices.clear();
-        self.vertices.extend_from_slice(items(words.get(positions_at..)?, vertices)?).ok()?;
+        self.vertices.replace(items(words.get(positions_at..)?, vertices)?)?;
         let halves = items(words.get(halves_at..)?, halves)?;
         self.store.replace([corners_end, pens_end], halves)?;
         self.fraction_bits = fraction_bits;

@@ -6,15 +6,16 @@
 //! the *gap*. It has no stations; its distance from everything is 0.
 
 use super::Leg;
+use crate::index::Index;
 
 /// The cycle, and how it changed since it was last [settled](Cycle::settle).
-pub(super) struct Cycle<'s> {
+pub(super) struct Cycle<'s, I> {
     /// The legs, in the order of the cycle.
-    legs: &'s mut [Leg],
+    legs: &'s mut [Leg<I>],
     /// The index in `legs` of each chain, and of the gap.
-    index: &'s mut [u16],
+    index: &'s mut [I],
     /// The stretches reversed since then: the index of the first leg, and the number of legs.
-    turns: &'s mut [[u16; 2]],
+    turns: &'s mut [[I; 2]],
     /// The number of turns in `turns`. Further turns are made but cannot be undone.
     turned: usize,
 }
@@ -28,14 +29,14 @@ pub(super) struct LegPosition {
     pub forward: bool,
 }
 
-impl<'s> Cycle<'s> {
+impl<'s, I: Index> Cycle<'s, I> {
     /// The number of turns that can be undone.
     pub const MEMORY: usize = 256;
 
     /// Makes the cycle of `legs`, which contain each of the numbers `0..legs.len()` once. `index`
     /// must be as long as `legs`, and `turns` must have [`Cycle::MEMORY`] entries.
-    pub fn new(legs: &'s mut [Leg], index: &'s mut [u16], turns: &'s mut [[u16; 2]]) -> Self {
-        for (at, leg) in (0..).zip(legs.iter()) {
+    pub fn new(legs: &'s mut [Leg<I>], index: &'s mut [I], turns: &'s mut [[I; 2]]) -> Self {
+        for (at, leg) in I::all().zip(legs.iter()) {
             index[leg.segment()] = at;
         }
         Self { legs, index, turns, turned: 0 }
@@ -47,23 +48,23 @@ impl<'s> Cycle<'s> {
     }
 
     /// Returns the leg at `index`.
-    pub fn leg(&self, index: usize) -> Leg {
+    pub fn leg(&self, index: usize) -> Leg<I> {
         self.legs[index]
     }
 
     /// Returns the index of `leg` in the cycle.
-    fn index(&self, leg: Leg) -> usize {
-        usize::from(self.index[leg.segment()])
+    fn index(&self, leg: Leg<I>) -> usize {
+        self.index[leg.segment()].get()
     }
 
     /// Returns the position and the direction of `leg` in the cycle.
-    pub fn position(&self, leg: Leg) -> LegPosition {
+    pub fn position(&self, leg: Leg<I>) -> LegPosition {
         let index = self.index(leg);
         LegPosition { index, forward: self.legs[index] == leg }
     }
 
     /// Returns the leg after the one at `position`, in the direction of that leg.
-    pub fn after(&self, position: LegPosition) -> Leg {
+    pub fn after(&self, position: LegPosition) -> Leg<I> {
         let last = self.legs.len() - 1;
         let index = position.index;
         if position.forward {
@@ -74,17 +75,17 @@ impl<'s> Cycle<'s> {
     }
 
     /// Returns the leg before the one at `position`, in the direction of that leg.
-    pub fn before(&self, position: LegPosition) -> Leg {
+    pub fn before(&self, position: LegPosition) -> Leg<I> {
         self.after(LegPosition { forward: !position.forward, ..position }).flipped()
     }
 
     /// Returns the leg after `leg`, in the direction of `leg`.
-    pub fn next(&self, leg: Leg) -> Leg {
+    pub fn next(&self, leg: Leg<I>) -> Leg<I> {
         self.after(self.position(leg))
     }
 
     /// Returns the leg before `leg`, in the direction of `leg`.
-    pub fn previous(&self, leg: Leg) -> Leg {
+    pub fn previous(&self, leg: Leg<I>) -> Leg<I> {
         self.before(self.position(leg))
     }
 
@@ -96,14 +97,14 @@ impl<'s> Cycle<'s> {
     }
 
     /// Returns how many legs after `from` the leg `to` comes, in the direction of `from`.
-    pub fn steps(&self, from: Leg, to: Leg) -> usize {
+    pub fn steps(&self, from: Leg<I>, to: Leg<I>) -> usize {
         self.legs_between(self.position(from), self.position(to))
     }
 
     /// Reverses the stretch after `a` up to `c`: makes `… a, c … b, d …` from `… a, b … c, d …`,
     /// with the legs `b` to `c` flipped. `a` and `c` must have the same direction. Returns the
     /// number of legs that were moved.
-    pub fn turn(&mut self, a: Leg, c: Leg) -> usize {
+    pub fn turn(&mut self, a: Leg<I>, c: Leg<I>) -> usize {
         let inner = self.steps(a, c);
         let (index_a, index_c) = (self.index(a), self.index(c));
         let outer = self.legs.len() - inner;
@@ -118,7 +119,7 @@ impl<'s> Cycle<'s> {
         };
         self.turn_around(begin, count);
         if let Some(turn) = self.turns.get_mut(self.turned) {
-            *turn = [begin as u16, count as u16];
+            *turn = [I::new(begin), I::new(count)];
             self.turned += 1;
         }
         count
@@ -127,7 +128,7 @@ impl<'s> Cycle<'s> {
     /// Swaps two neighbouring stretches: makes `… a, d … e, b … c, f …` from `… a, b … c, d … e, f
     /// …`. `a`, `d` and `e` must have the same direction. Returns the number of legs that were
     /// moved.
-    pub fn swap(&mut self, a: Leg, d: Leg, e: Leg) -> usize {
+    pub fn swap(&mut self, a: Leg<I>, d: Leg<I>, e: Leg<I>) -> usize {
         let b = self.next(a);
         self.turn(a, e) + self.turn(a, d.flipped()) + self.turn(e, b.flipped())
     }
@@ -152,9 +153,9 @@ impl<'s> Cycle<'s> {
     }
 
     /// Stores `leg` at an index.
-    fn set(&mut self, index: usize, leg: Leg) {
+    fn set(&mut self, index: usize, leg: Leg<I>) {
         self.legs[index] = leg;
-        self.index[leg.segment()] = index as u16;
+        self.index[leg.segment()] = I::new(index);
     }
 
     /// Returns the number of turns since the cycle was last settled.
@@ -172,7 +173,7 @@ impl<'s> Cycle<'s> {
         while self.turned > count {
             self.turned -= 1;
             let [begin, count] = self.turns[self.turned];
-            self.turn_around(usize::from(begin), usize::from(count));
+            self.turn_around(begin.get(), count.get());
         }
     }
 
@@ -187,7 +188,7 @@ mod tests {
     use super::*;
 
     /// The numbers of the legs from leg 0 on, in its original direction; flipped legs are negative.
-    fn picture(cycle: &Cycle<'_>) -> [i8; 6] {
+    fn picture(cycle: &Cycle<'_, u16>) -> [i8; 6] {
         let mut leg = Leg::new(0, false);
         [(); 6].map(|()| {
             let number = leg.segment() as i8;
@@ -197,9 +198,9 @@ mod tests {
         })
     }
 
-    fn with_cycle(test: impl Fn(&mut Cycle<'_>, &dyn Fn(u16) -> Leg)) {
+    fn with_cycle(test: impl Fn(&mut Cycle<'_, u16>, &dyn Fn(u16) -> Leg)) {
         let mut legs = [0, 1, 2, 3, 4, 5].map(|number| Leg::new(number, false));
-        let (mut index, mut turns) = ([0; 6], [[0; 2]; Cycle::MEMORY]);
+        let (mut index, mut turns) = ([0; 6], [[0; 2]; Cycle::<u16>::MEMORY]);
         let mut cycle = Cycle::new(&mut legs, &mut index, &mut turns);
         let leg = |number| Leg::new(number, false);
         test(&mut cycle, &leg);

@@ -10,35 +10,36 @@ use super::metric::length;
 use super::neighbours::Neighbours;
 use super::network::Network;
 use super::work_budget::WorkBudget;
-use super::{EVEN_PART, Leg, NONE, OrderError};
+use super::{Leg, OrderError, even_part};
 use crate::drawing::PagePoint;
+use crate::index::Index;
 use crate::stage::{OutOfScratch, Scratch};
 
 /// The chains and the pen-up moves that no trail has used yet.
-pub(super) struct Unused<'s, 'a> {
-    network: Network<'a>,
+pub(super) struct Unused<'s, 'a, I> {
+    network: Network<'a, I>,
     /// The legs from each station, without those at the front that were found to be used.
-    legs: Incidence<'s>,
+    legs: Incidence<'s, I>,
     /// 1 for each chain that has been used, otherwise 0.
     used: &'s mut [u8],
     /// For each station, the other end of its pen-up move; or [`NONE`] or [`EVEN_PART`].
-    mate: &'s mut [u16],
+    mate: &'s mut [I],
 }
 
-impl<'s, 'a> Unused<'s, 'a> {
+impl<'s, 'a, I: Index> Unused<'s, 'a, I> {
     /// Makes all chains of `network` unused, and a move from each station to its `mate`.
     pub fn new(
-        network: Network<'a>,
-        mate: &'s mut [u16],
+        network: Network<'a, I>,
+        mate: &'s mut [I],
         scratch: &mut Scratch<'s>,
     ) -> Result<Self, OutOfScratch> {
         let legs = Incidence::new(network, scratch)?;
-        let used = scratch.take(usize::from(network.chains()))?;
+        let used = scratch.take(network.chains().get())?;
         Ok(Self { network, legs, used, mate })
     }
 
     /// Returns the next unused leg from `station`.
-    fn peek(&mut self, station: u16) -> Option<Leg> {
+    fn peek(&mut self, station: I) -> Option<Leg<I>> {
         while let Some(leg) = self.legs.first(station) {
             if self.used[leg.segment()] == 0 {
                 return Some(leg);
@@ -49,20 +50,20 @@ impl<'s, 'a> Unused<'s, 'a> {
     }
 
     /// Returns the next unused leg from `station`, and marks it as used.
-    fn take(&mut self, station: u16) -> Option<Leg> {
+    fn take(&mut self, station: I) -> Option<Leg<I>> {
         let leg = self.peek(station)?;
         self.used[leg.segment()] = 1;
         Some(leg)
     }
 
     /// Marks the move from `station` as used and returns the station to which it leads.
-    fn lift(&mut self, station: u16) -> Option<u16> {
-        let mate = self.mate[usize::from(station)];
-        if mate == NONE || mate == EVEN_PART {
+    fn lift(&mut self, station: I) -> Option<I> {
+        let mate = self.mate[station.get()];
+        if mate == I::NONE || mate == even_part() {
             return None;
         }
-        self.mate[usize::from(station)] = NONE;
-        self.mate[usize::from(mate)] = NONE;
+        self.mate[station.get()] = I::NONE;
+        self.mate[mate.get()] = I::NONE;
         Some(mate)
     }
 
@@ -71,8 +72,8 @@ impl<'s, 'a> Unused<'s, 'a> {
     /// number of uses left, the trail ends there, otherwise where it began.
     fn trace(
         &mut self,
-        start: u16,
-        route: &mut [Leg],
+        start: I,
+        route: &mut [Leg<I>],
         work_budget: &mut WorkBudget<'_>,
     ) -> Result<usize, OrderError> {
         let mut traced = 0;
@@ -106,8 +107,8 @@ impl<'s, 'a> Unused<'s, 'a> {
 
     /// Whether an undrawn part may be entered at `station`. It may if the station has a move, which
     /// the entrance then replaces, or if no station of the part has one.
-    fn is_entrance(&mut self, station: u16) -> bool {
-        self.mate[usize::from(station)] != NONE && self.peek(station).is_some()
+    fn is_entrance(&mut self, station: I) -> bool {
+        self.mate[station.get()] != I::NONE && self.peek(station).is_some()
     }
 
     /// Returns the entrance for which `far` is least.
@@ -115,10 +116,10 @@ impl<'s, 'a> Unused<'s, 'a> {
         &mut self,
         far: impl Fn(PagePoint) -> u32,
         work_budget: &mut WorkBudget<'_>,
-    ) -> Result<Option<u16>, OrderError> {
+    ) -> Result<Option<I>, OrderError> {
         let mut best = None;
         let mut least = u32::MAX;
-        for station in 0..self.network.stations() {
+        for station in I::below(self.network.stations()) {
             if self.is_entrance(station) {
                 work_budget.work(1)?;
                 let distance = far(self.network.position(station));
@@ -134,10 +135,10 @@ impl<'s, 'a> Unused<'s, 'a> {
     /// first of those.
     fn next_entrance(
         &mut self,
-        pen: u16,
-        near: Option<Neighbours<'_>>,
+        pen: I,
+        near: Option<Neighbours<'_, I>>,
         work_budget: &mut WorkBudget<'_>,
-    ) -> Result<Option<u16>, OrderError> {
+    ) -> Result<Option<I>, OrderError> {
         for station in near.into_iter().flat_map(|near| near.of(pen)) {
             work_budget.work(1)?;
             if self.is_entrance(station) {
@@ -153,9 +154,9 @@ impl<'s, 'a> Unused<'s, 'a> {
     /// neighbours listed in `near` come first.
     pub fn nearest_first(
         &mut self,
-        start: Option<u16>,
-        near: Option<Neighbours<'_>>,
-        route: &mut [Leg],
+        start: Option<I>,
+        near: Option<Neighbours<'_, I>>,
+        route: &mut [Leg<I>],
         work_budget: &mut WorkBudget<'_>,
     ) -> Result<(), OrderError> {
         let network = self.network;

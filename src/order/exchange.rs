@@ -17,8 +17,9 @@ use super::neighbours::Neighbours;
 use super::network::Network;
 use super::search::StepSearch;
 use super::work_budget::WorkBudget;
-use super::{Leg, NONE, OrderError};
+use super::{Leg, OrderError};
 use crate::array::MapEach;
+use crate::index::Index;
 use crate::stage::{OutOfScratch, Scratch};
 
 /// The greatest number of steps in one exchange.
@@ -26,24 +27,24 @@ const STEPS: usize = 2;
 
 /// One step of an exchange: which moves are cut after the first.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Step {
+pub(super) struct Step<I> {
     /// The gain of the exchange if the ends are joined after this step; 0 if there is none.
     pub gain: i64,
     /// The gain in hand before the ends are joined.
     pub hand: i64,
     /// The leg before the second cut.
-    pub c: Leg,
+    pub c: Leg<I>,
     /// Whether the new move from the first cut leads to the start of the leg after `c`; otherwise
     /// it leads to the end of `c`.
     pub onward: bool,
     /// The same two values for the third cut, if there is one.
-    pub third: Option<(Leg, bool)>,
+    pub third: Option<(Leg<I>, bool)>,
 }
 
 /// A queue of the stations around which an exchange may help. Each station is in it at most once.
-struct Waiting<'s> {
+struct Waiting<'s, I> {
     /// The stations, in a ring buffer with room for all.
-    queue: &'s mut [u16],
+    queue: &'s mut [I],
     /// 1 for each station that is in the queue, otherwise 0.
     is_waiting: &'s mut [u8],
     /// The index of the station that comes next.
@@ -52,15 +53,15 @@ struct Waiting<'s> {
     count: usize,
 }
 
-impl<'s> Waiting<'s> {
-    fn new(queue: &'s mut [u16], is_waiting: &'s mut [u8]) -> Self {
+impl<'s, I: Index> Waiting<'s, I> {
+    fn new(queue: &'s mut [I], is_waiting: &'s mut [u8]) -> Self {
         Self { queue, is_waiting, first: 0, count: 0 }
     }
 
     /// Puts a station at the end of the queue, unless it is in it already.
-    fn add(&mut self, station: u16) {
+    fn add(&mut self, station: I) {
         // The end of the gap is not a station.
-        let Some(is_waiting) = self.is_waiting.get_mut(usize::from(station)) else {
+        let Some(is_waiting) = self.is_waiting.get_mut(station.get()) else {
             return;
         };
         if core::mem::replace(is_waiting, 1) == 0 {
@@ -72,51 +73,51 @@ impl<'s> Waiting<'s> {
     }
 
     /// Takes the next station from the queue.
-    fn next(&mut self) -> Option<u16> {
+    fn next(&mut self) -> Option<I> {
         if self.count == 0 {
             return None;
         }
         let station = self.queue[self.first];
         self.first = if self.first + 1 == self.queue.len() { 0 } else { self.first + 1 };
         self.count -= 1;
-        self.is_waiting[usize::from(station)] = 0;
+        self.is_waiting[station.get()] = 0;
         Some(station)
     }
 }
 
 /// The tour, and the tables that are needed to exchange its moves.
-pub(super) struct Exchanges<'s, 'a> {
+pub(super) struct Exchanges<'s, 'a, I: Index> {
     /// The tour.
-    pub cycle: Cycle<'s>,
-    network: Network<'a>,
-    distances: Distances<'s, 'a>,
-    incidence: Incidence<'s>,
-    neighbours: Neighbours<'s>,
-    waiting: Waiting<'s>,
+    pub cycle: Cycle<'s, I>,
+    network: Network<'a, I>,
+    distances: Distances<'s, 'a, I>,
+    incidence: Incidence<'s, I>,
+    neighbours: Neighbours<'s, I>,
+    waiting: Waiting<'s, I>,
     /// The number of the gap among the legs, if the tour has a gap.
-    gap: Option<u16>,
+    gap: Option<I>,
     /// The cost of a move besides its length, in 1/256 steps.
     lift_cost: u32,
 }
 
-impl<'s, 'a> Exchanges<'s, 'a> {
+impl<'s, 'a, I: Index> Exchanges<'s, 'a, I> {
     /// Makes the tour of `legs`. The gap, if there is one, has the number after those of the
     /// chains. All stations are put into the queue.
     pub fn new(
-        network: Network<'a>,
-        neighbours: Neighbours<'s>,
-        legs: &'s mut [Leg],
-        gap: Option<u16>,
+        network: Network<'a, I>,
+        neighbours: Neighbours<'s, I>,
+        legs: &'s mut [Leg<I>],
+        gap: Option<I>,
         lift_cost: u32,
         scratch: &mut Scratch<'s>,
     ) -> Result<Self, OutOfScratch> {
-        let stations = usize::from(network.stations());
+        let stations = network.stations().get();
         let slots = scratch.take(legs.len())?;
         let mut waiting = Waiting::new(scratch.take(stations)?, scratch.take(stations)?);
-        for station in 0..network.stations() {
+        for station in I::below(network.stations()) {
             waiting.add(station);
         }
-        let cycle = Cycle::new(legs, slots, scratch.take(Cycle::MEMORY)?);
+        let cycle = Cycle::new(legs, slots, scratch.take(Cycle::<I>::MEMORY)?);
         let incidence = Incidence::new(network, scratch)?;
         Ok(Self {
             cycle,
@@ -133,10 +134,10 @@ impl<'s, 'a> Exchanges<'s, 'a> {
     /// Returns the scratch memory needed for so many stations, chains, and legs including the gap,
     /// in bytes. The cache of distances takes whatever else there is.
     pub const fn bytes(stations: usize, chains: usize, legs: usize) -> usize {
-        Incidence::bytes(stations, chains)
-            + Scratch::bytes_for::<u16>(legs)
-            + Scratch::bytes_for::<[u16; 2]>(Cycle::MEMORY)
-            + Scratch::bytes_for::<u16>(stations)
+        Incidence::<I>::bytes(stations, chains)
+            + Scratch::bytes_for::<I>(legs)
+            + Scratch::bytes_for::<[I; 2]>(Cycle::<I>::MEMORY)
+            + Scratch::bytes_for::<I>(stations)
             + Scratch::bytes_for::<u8>(stations)
     }
 
@@ -146,24 +147,24 @@ impl<'s, 'a> Exchanges<'s, 'a> {
     }
 
     /// Returns the station where a leg ends; [`NONE`] for the gap.
-    pub fn end(&self, leg: Leg) -> u16 {
-        if self.is_gap(leg) { NONE } else { self.network.end(leg) }
+    pub fn end(&self, leg: Leg<I>) -> I {
+        if self.is_gap(leg) { I::NONE } else { self.network.end(leg) }
     }
 
     /// Whether `leg` is the gap.
-    pub fn is_gap(&self, leg: Leg) -> bool {
-        self.gap == Some(leg.segment() as u16)
+    pub fn is_gap(&self, leg: Leg<I>) -> bool {
+        self.gap == Some(I::new(leg.segment()))
     }
 
     /// Returns the station where a leg begins; [`NONE`] for the gap.
-    pub fn start(&self, leg: Leg) -> u16 {
+    pub fn start(&self, leg: Leg<I>) -> I {
         self.end(leg.flipped())
     }
 
     /// Returns the cost of a move in 1/256 steps: its length, the cost of the lift, and 1 more.
     /// Lengths are rounded down; without the 1, two moves might seem shorter than one.
-    pub fn distance(&self, from: u16, to: u16) -> i64 {
-        if from == NONE || to == NONE || from == to {
+    pub fn distance(&self, from: I, to: I) -> i64 {
+        if from == I::NONE || to == I::NONE || from == to {
             0
         } else {
             i64::from(self.distances.between(from, to)) + i64::from(self.lift_cost) + 1
@@ -172,8 +173,8 @@ impl<'s, 'a> Exchanges<'s, 'a> {
 
     /// Returns what remains of the gain `hand` after the cost of a move, or 0 if nothing remains.
     /// In most cases nothing remains, and a bound shows this without a square root.
-    pub fn left(&self, hand: i64, from: u16, to: u16) -> i64 {
-        if from == NONE || to == NONE || from == to {
+    pub fn left(&self, hand: i64, from: I, to: I) -> i64 {
+        if from == I::NONE || to == I::NONE || from == to {
             return hand.max(0);
         }
         let hand = hand - i64::from(self.lift_cost);
@@ -190,7 +191,7 @@ impl<'s, 'a> Exchanges<'s, 'a> {
     }
 
     /// Returns the cost of the move after `leg`; 0 if `leg` ends where the next leg begins.
-    pub fn move_after(&self, leg: Leg) -> i64 {
+    pub fn move_after(&self, leg: Leg<I>) -> i64 {
         self.distance(self.end(leg), self.start(self.cycle.next(leg)))
     }
 
@@ -219,7 +220,7 @@ impl<'s, 'a> Exchanges<'s, 'a> {
     /// gain.
     fn exchange_at(
         &mut self,
-        station: u16,
+        station: I,
         work_budget: &mut WorkBudget<'_>,
     ) -> Result<Option<i64>, OrderError> {
         let mut from = self.incidence.first(station);
@@ -240,13 +241,13 @@ impl<'s, 'a> Exchanges<'s, 'a> {
     /// unchanged.
     fn exchange(
         &mut self,
-        a: Leg,
+        a: Leg<I>,
         work_budget: &mut WorkBudget<'_>,
     ) -> Result<Option<i64>, OrderError> {
         let turned = self.cycle.turned();
         let mut a = a;
         let mut hand = self.move_after(a);
-        let mut touched = [[NONE; 6]; STEPS];
+        let mut touched = [[I::NONE; 6]; STEPS];
         for touched_now in 0..STEPS {
             let Some(step) = StepSearch::best_step(self, a, hand, work_budget)? else {
                 break;
@@ -267,14 +268,14 @@ impl<'s, 'a> Exchanges<'s, 'a> {
 
     /// Returns the stations to which a new move from `station` may lead: [`NONE`] for the gap, if
     /// `by_gap`, then `station` itself, then its neighbours.
-    pub fn candidates(&self, station: u16, by_gap: bool) -> impl Iterator<Item = u16> + use<'s> {
-        let own = [NONE, station].into_iter().skip(usize::from(!by_gap));
+    pub fn candidates(&self, station: I, by_gap: bool) -> impl Iterator<Item = I> + use<'s, 'a, I> {
+        let own = [I::NONE, station].into_iter().skip(usize::from(!by_gap));
         own.chain(self.neighbours.of(station))
     }
 
     /// Returns the cost of a move from `station` to the nearer end of the path, or a very large
     /// number if the tour is a closed cycle.
-    pub fn distance_to_path_ends(&self, station: u16) -> i64 {
+    pub fn distance_to_path_ends(&self, station: I) -> i64 {
         let Some(gap) = self.gap.map(|gap| Leg::new(gap, false)) else {
             return i64::MAX;
         };
@@ -284,9 +285,9 @@ impl<'s, 'a> Exchanges<'s, 'a> {
     }
 
     /// Returns the ends of the moves that a step cuts.
-    fn ends_of(&self, a: Leg, step: Step) -> [u16; 6] {
+    fn ends_of(&self, a: Leg<I>, step: Step<I>) -> [I; 6] {
         let third = step.third.map_or(step.c, |(e, _)| e);
-        let mut ends = [NONE; 6];
+        let mut ends = [I::NONE; 6];
         for (pair, leg) in ends.chunks_exact_mut(2).zip([a, step.c, third]) {
             pair.copy_from_slice(&[self.end(leg), self.start(self.cycle.next(leg))]);
         }
@@ -296,10 +297,10 @@ impl<'s, 'a> Exchanges<'s, 'a> {
     /// Makes a step from the cut after `a`. Returns the leg before the cut that is still open.
     fn make(
         &mut self,
-        a: Leg,
-        step: Step,
+        a: Leg<I>,
+        step: Step<I>,
         work_budget: &mut WorkBudget<'_>,
-    ) -> Result<Leg, OrderError> {
+    ) -> Result<Leg<I>, OrderError> {
         let c = step.c;
         let (b, d) = (self.cycle.next(a), self.cycle.next(c));
         let Some((e, third_onward)) = step.third else {
@@ -323,8 +324,8 @@ impl<'s, 'a> Exchanges<'s, 'a> {
     }
 
     /// Returns the legs that begin at a station; for [`NONE`], the gap in both directions.
-    pub fn legs_from(&self, station: u16) -> impl Iterator<Item = Leg> + '_ {
-        let first = if station == NONE {
+    pub fn legs_from(&self, station: I) -> impl Iterator<Item = Leg<I>> + '_ {
+        let first = if station == I::NONE {
             self.gap.map(|gap| Leg::new(gap, false))
         } else {
             self.incidence.first(station)
@@ -339,7 +340,7 @@ impl<'s, 'a> Exchanges<'s, 'a> {
     }
 
     /// Puts the stations where `legs` end into the queue.
-    pub fn wake(&mut self, legs: &[Leg]) {
+    pub fn wake(&mut self, legs: &[Leg<I>]) {
         for &leg in legs {
             let station = self.end(leg);
             self.waiting.add(station);

@@ -7,23 +7,23 @@
 //! numbered in the order of their x. Those that are too far apart by x or y alone are skipped
 //! without computing a square root.
 
+use super::OrderError;
 use super::odd::OddPoints;
 use super::work_budget::WorkBudget;
-use super::{NONE, OrderError};
+use crate::index::Index;
 use crate::stage::{OutOfScratch, Scratch};
 use bytemuck::{Pod, Zeroable};
 
-/// The two nearest unpaired points of an unpaired point.
+/// The two nearest unpaired points of an unpaired point, and its regret.
+///
+/// The two points are a pair, whose second is [`Index::NONE`] if there is only one; the regret,
+/// which takes no more bits, is how much farther the second is than the first, in 1/256 steps.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
-#[repr(C)]
-struct Choice {
-    /// How much farther the second choice is than the first, in 1/256 steps.
-    regret: u32,
-    /// The nearest unpaired point.
-    first: u16,
-    /// The second nearest unpaired point, or [`NONE`].
-    second: u16,
-}
+#[repr(transparent)]
+struct Choice<P>([P; 2]);
+
+/// The [`Choice`] of a point with this width of numbers.
+type ChoiceOf<I> = Choice<<I as Index>::Pair>;
 
 /// A point first searches among those whose x differs by at most this many 1/256 steps (256 steps),
 /// then within twice that, and so on.
@@ -31,19 +31,19 @@ const FIRST_REACH: u32 = 256 << 8;
 
 /// Pairs all of `odd`: `mate[i]` becomes the partner of odd point `i`.
 #[inline(never)] // Smaller than in its only caller.
-pub(super) fn pair(
-    odd: &OddPoints<'_>,
+pub(super) fn pair<I: Index>(
+    odd: &OddPoints<'_, I>,
     scratch: &mut Scratch<'_>,
     work_budget: &mut WorkBudget<'_>,
-    mate: &mut [u16],
+    mate: &mut [I],
 ) -> Result<(), OrderError> {
-    mate.fill(NONE);
+    mate.fill(I::NONE);
     with_regret(odd, scratch.reborrow(), work_budget, mate)?;
     if odd.has_free_ends() {
         free_the_longest(odd, mate);
     }
     let lengths: &mut [u32] = scratch.take(mate.len())?;
-    for (point, (length, &partner)) in (0..).zip(lengths.iter_mut().zip(mate.iter())) {
+    for (point, (length, &partner)) in I::all().zip(lengths.iter_mut().zip(mate.iter())) {
         *length = odd.distance(point, partner);
     }
     while exchange(odd, lengths, work_budget, mate)? {}
@@ -51,21 +51,21 @@ pub(super) fn pair(
 }
 
 /// Finds the two nearest unpaired points of `chooser`.
-fn choose(
-    odd: &OddPoints<'_>,
-    mate: &[u16],
-    chooser: u16,
+fn choose<I: Index>(
+    odd: &OddPoints<'_, I>,
+    mate: &[I],
+    chooser: I,
     work_budget: &mut WorkBudget<'_>,
-) -> Result<Choice, OrderError> {
+) -> Result<ChoiceOf<I>, OrderError> {
     let mut reach = FIRST_REACH;
     loop {
         let among = odd.around(chooser, reach);
-        let is_everyone = among.len() == usize::from(odd.real_count());
+        let is_everyone = among.len() == odd.real_count().get();
         work_budget.work(1 + among.len() as u32 / 32)?;
-        let [mut first, mut second] = [(u32::MAX, NONE); 2];
+        let [mut first, mut second] = [(u32::MAX, I::NONE); 2];
         for other in among {
             if other == chooser
-                || mate[usize::from(other)] != NONE
+                || mate[other.get()] != I::NONE
                 || odd.least_distance(chooser, other) >= second.0
             {
                 continue;
@@ -81,43 +81,41 @@ fn choose(
         }
         // All points not yet looked at are farther than `reach`.
         if is_everyone || second.0 <= reach {
-            return Ok(Choice { regret: second.0 - first.0, first: first.1, second: second.1 });
+            return Ok(Choice([I::pair(first.1, second.1), (second.0 - first.0).into()]));
         }
         reach = reach.saturating_mul(2);
     }
 }
 
 /// Pairs the odd points in the order of their regret.
-fn with_regret(
-    odd: &OddPoints<'_>,
+fn with_regret<I: Index>(
+    odd: &OddPoints<'_, I>,
     mut scratch: Scratch<'_>,
     work_budget: &mut WorkBudget<'_>,
-    mate: &mut [u16],
+    mate: &mut [I],
 ) -> Result<(), OrderError> {
     let count = odd.real_count();
-    let choices: &mut [Choice] = scratch.take(usize::from(count))?;
-    for (chooser, choice) in (0..).zip(choices.iter_mut()) {
+    let choices: &mut [ChoiceOf<I>] = scratch.take(count.get())?;
+    for (chooser, choice) in I::all().zip(choices.iter_mut()) {
         *choice = choose(odd, mate, chooser, work_budget)?;
     }
-    for _ in 0..count / 2 {
-        let unmatched = |&point: &u16| mate[usize::from(point)] == NONE;
+    for _ in 0..count.get() / 2 {
+        let unmatched = |&point: &I| mate[point.get()] == I::NONE;
         // Among points of equal regret, the one with the lowest number is taken.
-        let Some(chooser) = (0..count)
-            .rev()
-            .filter(unmatched)
-            .max_by_key(|&point| choices[usize::from(point)].regret)
+        let Some(chooser) =
+            I::below(count).rev().filter(unmatched).max_by_key(|&point| choices[point.get()].0[1])
         else {
             break;
         };
-        let chosen = choices[usize::from(chooser)].first;
-        mate[usize::from(chooser)] = chosen;
-        mate[usize::from(chosen)] = chooser;
-        work_budget.work(u32::from(count) / 32)?;
-        for point in 0..count {
-            let Choice { first, second, .. } = choices[usize::from(point)];
+        let chosen = I::halves(choices[chooser.get()].0[0])[0];
+        mate[chooser.get()] = chosen;
+        mate[chosen.get()] = chooser;
+        work_budget.work(count.into() / 32)?;
+        for point in I::below(count) {
+            let [first, second] = I::halves(choices[point.get()].0[0]);
             let lost = |choice| choice == chooser || choice == chosen;
-            if mate[usize::from(point)] == NONE && (lost(first) || lost(second)) {
-                choices[usize::from(point)] = choose(odd, mate, point, work_budget)?;
+            if mate[point.get()] == I::NONE && (lost(first) || lost(second)) {
+                choices[point.get()] = choose(odd, mate, point, work_budget)?;
             }
         }
     }
@@ -125,50 +123,50 @@ fn with_regret(
 }
 
 /// Pairs the ends of the longest move with the two free ends of the path.
-fn free_the_longest(odd: &OddPoints<'_>, mate: &mut [u16]) {
+fn free_the_longest<I: Index>(odd: &OddPoints<'_, I>, mate: &mut [I]) {
     let [start, end] = odd.free_ends();
-    let longest = (0..odd.real_count()).max_by_key(|&point| {
-        let partner = mate[usize::from(point)];
+    let longest = I::below(odd.real_count()).max_by_key(|&point| {
+        let partner = mate[point.get()];
         odd.distance(point, partner)
     });
     if let Some(point) = longest {
-        let partner = mate[usize::from(point)];
+        let partner = mate[point.get()];
         join(mate, point, start);
         join(mate, partner, end);
     }
 }
 
 /// Makes `a` and `b` partners.
-fn join(mate: &mut [u16], a: u16, b: u16) {
-    mate[usize::from(a)] = b;
-    mate[usize::from(b)] = a;
+fn join<I: Index>(mate: &mut [I], a: I, b: I) {
+    mate[a.get()] = b;
+    mate[b.get()] = a;
 }
 
 /// Tries once to exchange the partners of each two pairs. `lengths` holds the length of each move
 /// at both of its points. Returns whether anything became shorter.
-fn exchange(
-    odd: &OddPoints<'_>,
+fn exchange<I: Index>(
+    odd: &OddPoints<'_, I>,
     lengths: &mut [u32],
     work_budget: &mut WorkBudget<'_>,
-    mate: &mut [u16],
+    mate: &mut [I],
 ) -> Result<bool, OrderError> {
     let count = odd.count();
     let mut improved = false;
     let mut longest = lengths.iter().copied().max().unwrap_or(0);
-    for a in 0..count {
+    for a in I::below(count) {
         let mut looked_at = 0;
-        for c in a + 1..count {
+        for c in (a + I::ONE).to(count) {
             // From this `c` on, the difference in x alone makes each new move from `a` as long as
             // both old moves together.
-            if odd.distance_along_x(a, c) >= lengths[usize::from(a)].saturating_add(longest) {
+            if odd.distance_along_x(a, c) >= lengths[a.get()].saturating_add(longest) {
                 break;
             }
             looked_at += 1;
-            let (b, d) = (mate[usize::from(a)], mate[usize::from(c)]);
+            let (b, d) = (mate[a.get()], mate[c.get()]);
             if b == c || b < a || d < c {
                 continue;
             }
-            let now = lengths[usize::from(a)] + lengths[usize::from(c)];
+            let now = lengths[a.get()] + lengths[c.get()];
             let parallel = sum_below(odd, [a, c, b, d], now);
             let crossed = sum_below(odd, [a, d, b, c], now);
             if parallel.min(crossed) >= now {
@@ -177,9 +175,9 @@ fn exchange(
             let pairs = if parallel <= crossed { [(a, c), (b, d)] } else { [(a, d), (b, c)] };
             for (from, to) in pairs {
                 join(mate, from, to);
-                lengths[usize::from(from)] = odd.distance(from, to);
-                lengths[usize::from(to)] = lengths[usize::from(from)];
-                longest = longest.max(lengths[usize::from(to)]);
+                lengths[from.get()] = odd.distance(from, to);
+                lengths[to.get()] = lengths[from.get()];
+                longest = longest.max(lengths[to.get()]);
             }
             improved = true;
         }
@@ -191,7 +189,7 @@ fn exchange(
 /// Returns the total length of two moves, from `a` to `b` and from `c` to `d`. If it is not below
 /// `bound`, the result may be any number from `bound` on; in most cases this is found without a
 /// square root.
-fn sum_below(odd: &OddPoints<'_>, [a, b, c, d]: [u16; 4], bound: u32) -> u32 {
+fn sum_below<I: Index>(odd: &OddPoints<'_, I>, [a, b, c, d]: [I; 4], bound: u32) -> u32 {
     if odd.least_distance(a, b) + odd.least_distance(c, d) >= bound {
         return u32::MAX;
     }

@@ -18,9 +18,10 @@ use super::network::Network;
 use super::orient::orient;
 use super::patch_cycles::patch_cycles;
 use super::work_budget::WorkBudget;
-use super::{EVEN_PART, Leg, NONE, OrderError, mark_parts};
+use super::{Leg, OrderError, even_part, mark_parts};
 use crate::array::MapEach;
 use crate::drawing::PagePoint;
+use crate::index::Index;
 use crate::stage::Scratch;
 
 /// The number of neighbours of each station, and the number to use where memory is short.
@@ -39,18 +40,18 @@ const FIRST_TOURS_PERCENT: u64 = 48;
 const SEED: u32 = 23_757;
 
 /// A tour to be improved, and the limits for it.
-pub(super) struct Tour<'t> {
+pub(super) struct Tour<'t, I> {
     /// The tour: all chains of the network.
-    pub route: &'t mut [Leg],
+    pub route: &'t mut [Leg<I>],
     /// Whether the tour is an open path, so that the move from its end to its start does not count.
     pub open: bool,
     /// A lower bound of the pen-up length of any tour, in 1/256 steps.
     pub bound: u64,
     /// The partner of each odd station by the pairs with the least total length, and the marks of
     /// the others.
-    pub mate: &'t mut [u16],
+    pub mate: &'t mut [I],
     /// The station where a route with these moves begins; `None` if it may begin anywhere.
-    pub start: Option<u16>,
+    pub start: Option<I>,
     /// Whether no part has more than two odd stations.
     pub strokes_only: bool,
     /// The budget of work for each move, in distance computations.
@@ -61,9 +62,9 @@ pub(super) struct Tour<'t> {
 
 /// Shortens `tour.route` as far as the budget allows. Does nothing if there is too little memory.
 #[inline(never)] // Smaller than in its only caller.
-pub(super) fn improve(
-    network: Network<'_>,
-    tour: Tour<'_>,
+pub(super) fn improve<I: Index>(
+    network: Network<'_, I>,
+    tour: Tour<'_, I>,
     mut scratch: Scratch<'_>,
     work_budget: &mut WorkBudget<'_>,
 ) -> Result<(), OrderError> {
@@ -84,7 +85,7 @@ pub(super) fn improve(
     let first_tours = if strokes_only { 2 + CORNERS.len() as u64 } else { 2 };
     let share = budget * FIRST_TOURS_PERCENT / 100 / first_tours;
     let patience = PATIENCE.saturating_mul(moves);
-    let cycle: &mut [Leg] = scratch.take(legs)?;
+    let cycle: &mut [Leg<I>] = scratch.take(legs)?;
     let mut best = Best {
         network,
         neighbours,
@@ -103,8 +104,8 @@ pub(super) fn improve(
     if strokes_only {
         // Each part becomes one stroke without any move inside it.
         mark_parts(network, scratch.reborrow(), mate)?;
-        for mate in mate.iter_mut().filter(|mate| **mate != NONE) {
-            *mate = EVEN_PART;
+        for mate in mate.iter_mut().filter(|mate| **mate != I::NONE) {
+            *mate = even_part();
         }
         for corner in CORNERS {
             best.follow(mate, None, Some(corner), cycle, scratch.reborrow(), work_budget)?;
@@ -130,9 +131,9 @@ fn from_corner(position: PagePoint, (x, y): (i32, i32)) -> u32 {
 }
 
 /// The shortest tour found so far, and the settings of the search.
-struct Best<'b, 'a> {
-    network: Network<'a>,
-    neighbours: Neighbours<'b>,
+struct Best<'b, 'a, I> {
+    network: Network<'a, I>,
+    neighbours: Neighbours<'b, I>,
     open: bool,
     /// The cost of a move besides its length, in 1/256 steps.
     lift_cost: u32,
@@ -141,23 +142,23 @@ struct Best<'b, 'a> {
     /// The cost of the shortest tour, with the present cost of a lift.
     cost: u64,
     /// The shortest tour.
-    route: &'b mut [Leg],
+    route: &'b mut [Leg<I>],
     kicks: Kicks,
 }
 
-impl Best<'_, '_> {
+impl<I: Index> Best<'_, '_, I> {
     /// Makes a tour of the moves `mate`, part by part, the nearest part next. It starts at the
     /// entrance nearest to `corner`, if one is given, and otherwise at `start`.
     fn follow(
         &self,
-        mate: &[u16],
-        start: Option<u16>,
+        mate: &[I],
+        start: Option<I>,
         corner: Option<(i32, i32)>,
-        cycle: &mut [Leg],
+        cycle: &mut [Leg<I>],
         mut scratch: Scratch<'_>,
         work_budget: &mut WorkBudget<'_>,
     ) -> Result<(), OrderError> {
-        let moves: &mut [u16] = scratch.take(mate.len())?;
+        let moves: &mut [I] = scratch.take(mate.len())?;
         moves.copy_from_slice(mate);
         let mut unused = Unused::new(self.network, moves, &mut scratch)?;
         let start = match corner {
@@ -171,7 +172,7 @@ impl Best<'_, '_> {
     }
 
     /// Copies the shortest tour into `cycle`.
-    fn restore(&self, cycle: &mut [Leg]) {
+    fn restore(&self, cycle: &mut [Leg<I>]) {
         let (route, _) = cycle.split_at_mut(self.route.len());
         route.copy_from_slice(self.route);
     }
@@ -180,7 +181,7 @@ impl Best<'_, '_> {
     /// if it is the shortest so far.
     fn work_on(
         &mut self,
-        cycle: &mut [Leg],
+        cycle: &mut [Leg<I>],
         budget: u64,
         mut scratch: Scratch<'_>,
         work_budget: &mut WorkBudget<'_>,
@@ -218,7 +219,7 @@ impl Best<'_, '_> {
     }
 
     /// Keeps the tour if it is the shortest so far.
-    fn keep(&mut self, tour: &Exchanges<'_, '_>) {
+    fn keep(&mut self, tour: &Exchanges<'_, '_, I>) {
         let cost = tour.cost();
         if cost >= self.cost {
             return;
@@ -235,8 +236,8 @@ impl Best<'_, '_> {
 }
 
 /// Exchanges moves and reverses strokes until neither helps any more. Returns the gain.
-fn shorten(
-    tour: &mut Exchanges<'_, '_>,
+fn shorten<I: Index>(
+    tour: &mut Exchanges<'_, '_, I>,
     choices: &mut [u8],
     work_budget: &mut WorkBudget<'_>,
 ) -> Result<i64, OrderError> {
@@ -252,18 +253,22 @@ fn shorten(
 }
 
 /// Returns the most scratch memory that is in use at any time, in bytes.
-fn scratch_bytes(network: Network<'_>, legs: usize, per_station: usize) -> usize {
-    let (stations, chains) = (usize::from(network.stations()), usize::from(network.chains()));
-    let lists = Neighbours::bytes(stations, per_station);
-    let exchanges = Scratch::bytes_for::<u16>(legs)
+fn scratch_bytes<I: Index>(network: Network<'_, I>, legs: usize, per_station: usize) -> usize {
+    let (stations, chains) = (network.stations().get(), network.chains().get());
+    let lists = Neighbours::<I>::bytes(stations, per_station);
+    let exchanges = Scratch::bytes_for::<I>(legs)
         + Scratch::bytes_for::<u8>(legs)
-        + Exchanges::bytes(stations, chains, legs);
-    lists + exchanges.max(Neighbours::bytes_to_find(stations))
+        + Exchanges::<I>::bytes(stations, chains, legs);
+    lists + exchanges.max(Neighbours::<I>::bytes_to_find(stations))
 }
 
 /// Returns the lengths of the moves between the legs of a route, 0 where there is no move. Unless
 /// the route is `open`, the move from its end to its start is included.
-fn route_moves(network: Network<'_>, route: &[Leg], open: bool) -> impl Iterator<Item = u64> {
+fn route_moves<I: Index>(
+    network: Network<'_, I>,
+    route: &[Leg<I>],
+    open: bool,
+) -> impl Iterator<Item = u64> {
     let pairs = route.iter().zip(route.iter().cycle().skip(1));
     pairs
         .take(route.len() - usize::from(open))
@@ -278,9 +283,9 @@ struct Kicks {
 impl Kicks {
     /// Changes four moves near each other at random (a double bridge), and then exchanges moves
     /// around them. The result is kept if it costs no more than before. Returns the gain.
-    fn kick(
+    fn kick<I: Index>(
         &mut self,
-        tour: &mut Exchanges<'_, '_>,
+        tour: &mut Exchanges<'_, '_, I>,
         work_budget: &mut WorkBudget<'_>,
     ) -> Result<i64, OrderError> {
         tour.cycle.settle();
@@ -327,11 +332,11 @@ impl Kicks {
 }
 
 /// Returns the next leg after `from` at whose end the pen is lifted, if there is one.
-fn next_move(
-    tour: &Exchanges<'_, '_>,
-    from: Leg,
+fn next_move<I: Index>(
+    tour: &Exchanges<'_, '_, I>,
+    from: Leg<I>,
     work_budget: &mut WorkBudget<'_>,
-) -> Result<Option<Leg>, OrderError> {
+) -> Result<Option<Leg<I>>, OrderError> {
     let mut leg = from;
     for _ in 0..tour.cycle.len() {
         work_budget.work(1)?;

@@ -1,27 +1,28 @@
 //! For each station, the list of the legs that begin there, in little memory: linked lists over the
 //! codes of the legs.
 
+use super::Leg;
 use super::network::Network;
-use super::{Leg, NONE};
+use crate::index::Index;
 use crate::stage::{OutOfScratch, Scratch};
 
 /// The lists of the legs that begin at each station, in ascending order of their codes.
-pub(super) struct Incidence<'s> {
+pub(super) struct Incidence<'s, I> {
     /// For each station the code of the first leg of its list, or [`NONE`].
-    first: &'s mut [u16],
+    first: &'s mut [I],
     /// For each leg, by its code, the next leg of the same list, or [`NONE`].
-    next: &'s mut [u16],
+    next: &'s mut [I],
 }
 
-impl<'s> Incidence<'s> {
+impl<'s, I: Index> Incidence<'s, I> {
     /// Makes the lists of all legs of `network`.
-    pub fn new(network: Network<'_>, scratch: &mut Scratch<'s>) -> Result<Self, OutOfScratch> {
-        let first: &mut [u16] = scratch.take(usize::from(network.stations()))?;
-        let next: &mut [u16] = scratch.take(2 * usize::from(network.chains()))?;
-        first.fill(NONE);
-        for code in (0..2 * network.chains()).rev() {
-            let start = usize::from(network.start(Leg::from_code(code)));
-            next[usize::from(code)] = first[start];
+    pub fn new(network: Network<'_, I>, scratch: &mut Scratch<'s>) -> Result<Self, OutOfScratch> {
+        let first: &mut [I] = scratch.take(network.stations().get())?;
+        let next: &mut [I] = scratch.take(2 * network.chains().get())?;
+        first.fill(I::NONE);
+        for code in I::below(network.chains() << 1).rev() {
+            let start = network.start(Leg::from_code(code)).get();
+            next[code.get()] = first[start];
             first[start] = code;
         }
         Ok(Self { first, next })
@@ -29,29 +30,29 @@ impl<'s> Incidence<'s> {
 
     /// Returns the scratch memory needed for so many stations and chains, in bytes.
     pub const fn bytes(stations: usize, chains: usize) -> usize {
-        Scratch::bytes_for::<u16>(stations) + Scratch::bytes_for::<u16>(2 * chains)
+        Scratch::bytes_for::<I>(stations) + Scratch::bytes_for::<I>(2 * chains)
     }
 
     /// Returns the first leg that begins at `station`.
-    pub fn first(&self, station: u16) -> Option<Leg> {
-        leg(self.first[usize::from(station)])
+    pub fn first(&self, station: I) -> Option<Leg<I>> {
+        leg(self.first[station.get()])
     }
 
     /// Returns the leg that follows `after` in the list of the same station.
-    pub fn next(&self, after: Leg) -> Option<Leg> {
-        leg(self.next[usize::from(after.code())])
+    pub fn next(&self, after: Leg<I>) -> Option<Leg<I>> {
+        leg(self.next[after.code().get()])
     }
 
     /// Removes the first leg from the list of `station`.
-    pub fn drop_first(&mut self, station: u16) {
-        let first = &mut self.first[usize::from(station)];
-        if *first != NONE {
-            *first = self.next[usize::from(*first)];
+    pub fn drop_first(&mut self, station: I) {
+        let first = &mut self.first[station.get()];
+        if *first != I::NONE {
+            *first = self.next[first.get()];
         }
     }
 }
 
 /// Returns the leg with this code; `None` if the code is [`NONE`].
-fn leg(code: u16) -> Option<Leg> {
-    (code != NONE).then(|| Leg::from_code(code))
+fn leg<I: Index>(code: I) -> Option<Leg<I>> {
+    (code != I::NONE).then(|| Leg::from_code(code))
 }

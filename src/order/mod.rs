@@ -41,6 +41,7 @@ pub use metric::length;
 
 use crate::array::MapEach;
 use crate::drawing::{Drawing, PAGE_LIMIT, PagePoint};
+use crate::index::Index;
 use crate::stage::{Cancel, OutOfScratch, Scratch};
 use bytemuck::{Pod, Zeroable};
 use euler::Unused;
@@ -49,46 +50,44 @@ use network::{Network, start_point};
 use odd::OddPoints;
 use work_budget::WorkBudget;
 
-/// The greatest number of points that can be numbered, because [`NONE`] is not the number of a
-/// point.
-const POINT_LIMIT: usize = NONE as usize;
-/// In the place of a station or a partner: there is none.
-const NONE: u16 = u16::MAX;
-/// In the place of a partner: the station belongs to a part that has no odd point.
-const EVEN_PART: u16 = u16::MAX - 1;
+/// In the place of a partner: the station belongs to a part that has no odd point. [`Index::NONE`]
+/// there means that there is none.
+fn even_part<I: Index>() -> I {
+    I::NONE - I::ONE
+}
 
 /// One segment of the tour and the direction in which it is drawn. There are at most [`Leg::LIMIT`]
 /// segments.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 #[repr(transparent)]
-pub struct Leg(u16);
+pub struct Leg<I = u16>(I);
 
-impl Leg {
+impl<I: Index> Leg<I> {
     /// The greatest number of segments that can be numbered.
-    pub const LIMIT: usize = (1 << 15) - 1;
+    pub const LIMIT: usize = (1 << (I::BITS - 1)) - 1;
 
     /// Makes the leg of segment `segment`, which is drawn from its `to` end if `reversed`.
-    pub fn new(segment: u16, reversed: bool) -> Self {
-        Self(segment << 1 | u16::from(reversed))
+    pub fn new(segment: I, reversed: bool) -> Self {
+        Self(segment << 1 | if reversed { I::ONE } else { I::ZERO })
     }
     /// Returns the number of the segment in the drawing.
     pub fn segment(self) -> usize {
-        usize::from(self.0 >> 1)
+        (self.0 >> 1).get()
     }
     /// Whether the segment is drawn from its `to` end to its `from` end.
     pub fn reversed(self) -> bool {
-        self.0 & 1 != 0
+        self.0 & I::ONE != I::ZERO
     }
     /// Returns the same segment, drawn in the opposite direction.
     pub fn flipped(self) -> Self {
-        Self(self.0 ^ 1)
+        Self(self.0 ^ I::ONE)
     }
     /// Returns the leg as a number: twice the segment's number, plus 1 if it is reversed.
-    fn code(self) -> u16 {
+    fn code(self) -> I {
         self.0
     }
     /// Makes the leg that has this code.
-    fn from_code(code: u16) -> Self {
+    fn from_code(code: I) -> Self {
         Self(code)
     }
 }
@@ -110,7 +109,7 @@ pub enum Method {
 /// paired by the greedy method. The work of the exact method grows faster than the square of the
 /// number of points: a Cortex-M0+ would take minutes for 2000 points, to make the pen-up travel one
 /// hundredth shorter.
-pub const EXACT_POINTS: u16 = 1000;
+pub const EXACT_POINTS: u32 = 1000;
 
 /// Whether the pen returns to where it began.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -179,7 +178,7 @@ pub enum OrderError {
     TourLength,
     /// This segment names a point that does not exist or lies beyond [`PAGE_LIMIT`], or both its
     /// ends are the same point.
-    BadSegment(u16),
+    BadSegment(u32),
 }
 
 /// Orders the segments of `drawing` and writes the result to `tour`, which must be as long as
@@ -191,20 +190,22 @@ pub enum OrderError {
 ///
 /// # Errors
 /// See [`OrderError`].
-pub fn order(
-    drawing: Drawing<'_>,
+pub fn order<I: Index>(
+    drawing: Drawing<'_, I>,
     options: Options,
     mut scratch: Scratch<'_>,
     cancel: &mut dyn Cancel,
-    tour: &mut [Leg],
+    tour: &mut [Leg<I>],
 ) -> Result<Report, OrderError> {
-    let drawing =
-        Drawing { points: drawing.points.get(..POINT_LIMIT).unwrap_or(drawing.points), ..drawing };
+    let drawing = Drawing {
+        points: drawing.points.get(..I::NONE.get()).unwrap_or(drawing.points),
+        ..drawing
+    };
     check(drawing, tour.len())?;
     let mut work_budget = WorkBudget::new(cancel);
     let mut report = Report::default();
     let mut rest = &mut *tour;
-    let pens = || drawing.segments.iter().map(|segment| segment.pen);
+    let pens = || drawing.segments.iter().map(|segment| segment.pen());
     // With several pens, none returns to its own start.
     let shape = if pens().min() == pens().max() { options.shape } else { Shape::OpenPath };
     let mut next_pen = pens().min();
@@ -215,7 +216,7 @@ pub fn order(
         rest = others;
         let options = Options { shape, ..options };
         order_pen(drawing, pen, options, scratch.reborrow(), &mut work_budget, legs, &mut report)?;
-        let position = |leg: Leg| drawing.points[usize::from(start_point(drawing.segments, leg))];
+        let position = |leg: Leg<I>| drawing.points[start_point(drawing.segments, leg).get()];
         if let (Some(at), Some(&first), Some(&last)) = (pen_at, legs.first(), legs.last())
             && length(at, position(last.flipped())) < length(at, position(first))
         {
@@ -230,53 +231,53 @@ pub fn order(
 
 /// Checks that the tour has the right length and that every segment joins two different points of
 /// the page.
-fn check(drawing: Drawing<'_>, tour_length: usize) -> Result<(), OrderError> {
-    if drawing.segments.len() > Leg::LIMIT {
+fn check<I: Index>(drawing: Drawing<'_, I>, tour_length: usize) -> Result<(), OrderError> {
+    if drawing.segments.len() > Leg::<I>::LIMIT {
         return Err(OrderError::TooManySegments);
     }
     if tour_length != drawing.segments.len() {
         return Err(OrderError::TourLength);
     }
-    let on_the_page = |point: u16| {
+    let on_the_page = |point: I| {
         let limits = -PAGE_LIMIT..=PAGE_LIMIT;
         let within =
             |position: &PagePoint| limits.contains(&position.x) && limits.contains(&position.y);
-        drawing.points.get(usize::from(point)).is_some_and(within)
+        drawing.points.get(point.get()).is_some_and(within)
     };
-    match (0..).zip(drawing.segments).find(|(_, segment)| {
-        segment.from == segment.to || !on_the_page(segment.from) || !on_the_page(segment.to)
+    match I::all().zip(drawing.segments).find(|(_, segment)| {
+        segment.from() == segment.to() || !on_the_page(segment.from()) || !on_the_page(segment.to())
     }) {
-        Some((number, _)) => Err(OrderError::BadSegment(number)),
+        Some((number, _)) => Err(OrderError::BadSegment(number.into())),
         None => Ok(()),
     }
 }
 
 /// Orders the segments of one pen into `tour`, and adds its numbers to `report`.
 #[inline(never)] // Smaller than in its only caller.
-fn order_pen<'a>(
-    drawing: Drawing<'a>,
+fn order_pen<'a, I: Index>(
+    drawing: Drawing<'a, I>,
     pen: u8,
     options: Options,
     mut scratch: Scratch<'a>,
     work_budget: &mut WorkBudget<'_>,
-    tour: &mut [Leg],
+    tour: &mut [Leg<I>],
     report: &mut Report,
 ) -> Result<(), OrderError> {
     work_budget.answer()?;
     let network = Network::new(drawing, pen, &mut scratch)?;
     work_budget.answer()?;
-    let route: &mut [Leg] = scratch.take(usize::from(network.chains()))?;
+    let route: &mut [Leg<I>] = scratch.take(network.chains().get())?;
     let bound = report.bound;
     {
         let mut scratch = scratch.reborrow();
-        let mate: &mut [u16] = scratch.take(usize::from(network.stations()))?;
+        let mate: &mut [I] = scratch.take(network.stations().get())?;
         let Parts { count: parts, odd: odd_parts } = mark_parts(network, scratch.reborrow(), mate)?;
         let odd_before = report.odd_points;
         work_budget.answer()?;
         let start = pair_odd(network, options, scratch.reborrow(), work_budget, mate, report)?;
         {
             let mut scratch = scratch.reborrow();
-            let unused: &mut [u16] = scratch.take(mate.len())?;
+            let unused: &mut [I] = scratch.take(mate.len())?;
             unused.copy_from_slice(mate);
             Unused::new(network, unused, &mut scratch)?.nearest_first(
                 start,
@@ -318,38 +319,38 @@ struct Parts {
 
 /// Marks each station. An odd station is marked by its own number. An even one is marked by
 /// [`NONE`], or by [`EVEN_PART`] if its part has no odd station.
-fn mark_parts(
-    network: Network<'_>,
+fn mark_parts<I: Index>(
+    network: Network<'_, I>,
     mut scratch: Scratch<'_>,
-    marks: &mut [u16],
+    marks: &mut [I],
 ) -> Result<Parts, OutOfScratch> {
     let odd: &mut [u8] = scratch.take(marks.len())?;
-    for code in 0..2 * network.chains() {
-        odd[usize::from(network.start(Leg::from_code(code)))] ^= 1;
+    for code in I::below(network.chains() << 1) {
+        odd[network.start(Leg::from_code(code)).get()] ^= 1;
     }
     let lowest = network.parts(&mut scratch)?;
-    marks.fill(EVEN_PART);
+    marks.fill(even_part());
     for (&odd, &lowest) in odd.iter().zip(lowest.iter()) {
         if odd == 1 {
-            marks[usize::from(lowest)] = NONE;
+            marks[lowest.get()] = I::NONE;
         }
     }
     let mut parts = Parts { count: 0, odd: 0 };
-    for (station, (&odd, &lowest)) in (0..).zip(odd.iter().zip(lowest.iter())) {
+    for (station, (&odd, &lowest)) in I::all().zip(odd.iter().zip(lowest.iter())) {
         if lowest == station {
             parts.count += 1;
-            parts.odd += u32::from(marks[usize::from(station)] == NONE);
+            parts.odd += u32::from(marks[station.get()] == I::NONE);
         }
         // The lowest station of a part comes first. Its mark must stay until the last station of
         // the part has read it, so it gets its own number only in the next loop.
-        marks[usize::from(station)] = marks[usize::from(lowest)];
+        marks[station.get()] = marks[lowest.get()];
         if odd == 1 && lowest != station {
-            marks[usize::from(station)] = station;
+            marks[station.get()] = station;
         }
     }
-    for (station, (&odd, &lowest)) in (0..).zip(odd.iter().zip(lowest.iter())) {
+    for (station, (&odd, &lowest)) in I::all().zip(odd.iter().zip(lowest.iter())) {
         if odd == 1 && lowest == station {
-            marks[usize::from(station)] = station;
+            marks[station.get()] = station;
         }
     }
     Ok(parts)
@@ -357,31 +358,31 @@ fn mark_parts(
 
 /// Pairs the odd stations, which `mate` marks by their own numbers, and writes each one's partner
 /// to `mate`. Returns the station where an open path begins.
-fn pair_odd(
-    network: Network<'_>,
+fn pair_odd<I: Index>(
+    network: Network<'_, I>,
     options: Options,
     mut scratch: Scratch<'_>,
     work_budget: &mut WorkBudget<'_>,
-    mate: &mut [u16],
+    mate: &mut [I],
     report: &mut Report,
-) -> Result<Option<u16>, OrderError> {
-    let odd_stations = || (0..).zip(mate.iter()).filter(|&(station, &mark)| station == mark);
-    let stations: &mut [u16] = scratch.take(odd_stations().count())?;
+) -> Result<Option<I>, OrderError> {
+    let odd_stations = || I::all().zip(mate.iter()).filter(|&(station, &mark)| station == mark);
+    let stations: &mut [I] = scratch.take(odd_stations().count())?;
     for (slot, (station, _)) in stations.iter_mut().zip(odd_stations()) {
         *slot = station;
     }
     work_budget.sort(stations, |&station| (network.position(station).x, station))?;
     let odd = OddPoints::new(network, stations, options.shape == Shape::OpenPath);
-    report.odd_points += u32::from(odd.real_count());
-    let partners: &mut [u16] = scratch.take(usize::from(odd.count()))?;
+    report.odd_points += odd.real_count().into();
+    let partners: &mut [I] = scratch.take(odd.count().get())?;
     report.bound += pair_points(&odd, options.method, scratch, work_budget, partners)?;
     for (&station, &partner) in stations.iter().zip(partners.iter()) {
-        mate[usize::from(station)] = odd.station(partner).unwrap_or(NONE);
+        mate[station.get()] = odd.station(partner).unwrap_or(I::NONE);
     }
     if !odd.has_free_ends() {
         return Ok(None);
     }
-    let ends = odd.free_ends().map_each(|end| partners[usize::from(end)]);
+    let ends = odd.free_ends().map_each(|end| partners[end.get()]);
     let ends = ends.into_iter().filter_map(|end| odd.station(end));
     Ok(ends.min_by_key(|&station| (network.position(station).x, station)))
 }
@@ -391,19 +392,19 @@ fn pair_odd(
 // Not inlined, so that its stack frame is gone before the tour is improved and its cycles can be
 // counted.
 #[inline(never)]
-fn pair_points(
-    odd: &OddPoints<'_>,
+fn pair_points<I: Index>(
+    odd: &OddPoints<'_, I>,
     method: Method,
     mut scratch: Scratch<'_>,
     work_budget: &mut WorkBudget<'_>,
-    partners: &mut [u16],
+    partners: &mut [I],
 ) -> Result<u64, OrderError> {
     let exact = match method {
         Method::Greedy => false,
         Method::Exact => true,
         Method::Auto => {
-            let fits = matching::scratch_bytes(partners.len()) <= scratch.available_bytes();
-            fits && odd.real_count() <= EXACT_POINTS
+            let fits = matching::scratch_bytes::<I>(partners.len()) <= scratch.available_bytes();
+            fits && odd.real_count().into() <= EXACT_POINTS
         }
     };
     if exact {
@@ -415,8 +416,8 @@ fn pair_points(
 
 /// Makes a closed cycle begin at its lowest x, and an open path at that of its ends that has the
 /// lower x.
-fn turn(network: Network<'_>, shape: Shape, route: &mut [Leg]) {
-    let x_of = |leg: &Leg| network.position(network.start(*leg)).x;
+fn turn<I: Index>(network: Network<'_, I>, shape: Shape, route: &mut [Leg<I>]) {
+    let x_of = |leg: &Leg<I>| network.position(network.start(*leg)).x;
     match shape {
         Shape::ClosedCycle => {
             let first = (0..route.len()).min_by_key(|&index| x_of(&route[index]));
@@ -433,7 +434,7 @@ fn turn(network: Network<'_>, shape: Shape, route: &mut [Leg]) {
 }
 
 /// Reverses the tour, so that it goes from its end to its start.
-fn reverse(tour: &mut [Leg]) {
+fn reverse<I: Index>(tour: &mut [Leg<I>]) {
     tour.reverse();
     for leg in tour {
         *leg = leg.flipped();
@@ -441,8 +442,8 @@ fn reverse(tour: &mut [Leg]) {
 }
 
 /// Adds the lengths and lifts of `tour` to `report`.
-fn measure(drawing: Drawing<'_>, tour: &[Leg], shape: Shape, report: &mut Report) {
-    let position = |leg: Leg| drawing.points[usize::from(start_point(drawing.segments, leg))];
+fn measure<I: Index>(drawing: Drawing<'_, I>, tour: &[Leg<I>], shape: Shape, report: &mut Report) {
+    let position = |leg: Leg<I>| drawing.points[start_point(drawing.segments, leg).get()];
     let closing = match shape {
         Shape::OpenPath => None,
         Shape::ClosedCycle => tour.first(),

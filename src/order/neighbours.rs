@@ -3,38 +3,39 @@
 //! The stations are sorted into a grid of about half as many cells as there are stations. Each
 //! search visits square rings of cells around the station until no nearer station can follow.
 
+use super::OrderError;
 use super::network::Network;
 use super::work_budget::WorkBudget;
-use super::{NONE, OrderError};
 use crate::array::MapEach;
 use crate::drawing::PagePoint;
+use crate::index::Index;
 use crate::stage::{OutOfScratch, Scratch};
 
 /// For each station the same number of other stations, the nearest first.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Neighbours<'a> {
+pub(super) struct Neighbours<'a, I> {
     /// The neighbours of each station in turn; [`NONE`] fills unused entries.
-    stations: &'a [u16],
+    stations: &'a [I],
     /// The number of entries for each station.
     per_station: usize,
 }
 
-impl<'a> Neighbours<'a> {
+impl<'a, I: Index> Neighbours<'a, I> {
     /// Finds up to `per_station` neighbours of each station, a quarter of them in each quadrant. A
     /// crowd of stations on one side, such as the ends of a hatching, must not hide those on the
     /// other sides.
     #[inline(never)] // Smaller than in its only caller.
     pub fn new(
-        network: Network<'_>,
+        network: Network<'_, I>,
         per_station: usize,
         scratch: &mut Scratch<'a>,
         work_budget: &mut WorkBudget<'_>,
     ) -> Result<Self, OrderError> {
-        let stations = scratch.take(usize::from(network.stations()) * per_station)?;
-        stations.fill(NONE);
+        let stations = scratch.take(network.stations().get() * per_station)?;
+        stations.fill(I::NONE);
         let mut lent = scratch.reborrow();
         let grid = Grid::new(network, &mut lent)?;
-        for (station, near) in (0..).zip(stations.chunks_exact_mut(per_station)) {
+        for (station, near) in I::all().zip(stations.chunks_exact_mut(per_station)) {
             grid.search(station, near, work_budget)?;
         }
         Ok(Self { stations, per_station })
@@ -42,25 +43,25 @@ impl<'a> Neighbours<'a> {
 
     /// Returns the scratch memory that the result occupies for so many stations, in bytes.
     pub const fn bytes(stations: usize, per_station: usize) -> usize {
-        Scratch::bytes_for::<u16>(stations * per_station)
+        Scratch::bytes_for::<I>(stations * per_station)
     }
 
     /// Returns the further scratch memory that the search needs for so many stations, in bytes.
     pub const fn bytes_to_find(stations: usize) -> usize {
-        Scratch::bytes_for::<u16>(stations / 2 + 2) + Scratch::bytes_for::<u16>(stations)
+        Scratch::bytes_for::<I>(stations / 2 + 2) + Scratch::bytes_for::<I>(stations)
     }
 
     /// Returns the neighbours of `station`, the nearest first.
-    pub fn of(&self, station: u16) -> impl Iterator<Item = u16> + use<'a> {
-        let begin = usize::from(station) * self.per_station;
+    pub fn of(&self, station: I) -> impl Iterator<Item = I> + use<'a, I> {
+        let begin = station.get() * self.per_station;
         let near = self.stations.get(begin..begin + self.per_station).unwrap_or(&[]);
-        near.iter().copied().take_while(|&station| station != NONE)
+        near.iter().copied().take_while(|&station| station != I::NONE)
     }
 }
 
 /// The stations, sorted into the cells of a grid.
-struct Grid<'s, 'a> {
-    network: Network<'a>,
+struct Grid<'s, 'a, I> {
+    network: Network<'a, I>,
     /// The lower left corner of the grid.
     corner: PagePoint,
     /// Cells are squares of 2^`cell_bits` steps.
@@ -68,14 +69,14 @@ struct Grid<'s, 'a> {
     columns: i32,
     rows: i32,
     /// For each cell, where its stations begin in `stations`; then the end of the last cell.
-    begin: &'s [u16],
-    stations: &'s [u16],
+    begin: &'s [I],
+    stations: &'s [I],
 }
 
-impl<'s, 'a> Grid<'s, 'a> {
-    fn new(network: Network<'a>, scratch: &mut Scratch<'s>) -> Result<Self, OutOfScratch> {
+impl<'s, 'a, I: Index> Grid<'s, 'a, I> {
+    fn new(network: Network<'a, I>, scratch: &mut Scratch<'s>) -> Result<Self, OutOfScratch> {
         let count = network.stations();
-        let positions = || (0..count).map(|station| network.position(station));
+        let positions = || I::below(count).map(|station| network.position(station));
         let least = |of: fn(PagePoint) -> i32| positions().map(of).min().unwrap_or(0);
         let most = |of: fn(PagePoint) -> i32| positions().map(of).max().unwrap_or(0);
         let corner = PagePoint { x: least(|position| position.x), y: least(|position| position.y) };
@@ -83,7 +84,7 @@ impl<'s, 'a> Grid<'s, 'a> {
             (most(|position| position.x) - corner.x, most(|position| position.y) - corner.y);
         let mut cell_bits = 0;
         let cells = |bits: u32| ((width >> bits) + 1).saturating_mul((height >> bits) + 1);
-        while cells(cell_bits) > i32::from(count / 2).max(1) {
+        while cells(cell_bits) > ((count >> 1).into() as i32).max(1) {
             cell_bits += 1;
         }
         let mut grid = Self {
@@ -95,26 +96,26 @@ impl<'s, 'a> Grid<'s, 'a> {
             begin: &[],
             stations: &[],
         };
-        let begin: &mut [u16] = scratch.take(cells(cell_bits) as usize + 1)?;
-        let stations: &mut [u16] = scratch.take(usize::from(count))?;
+        let begin: &mut [I] = scratch.take(cells(cell_bits) as usize + 1)?;
+        let stations: &mut [I] = scratch.take(count.get())?;
         let cell_of = |station| {
             let (column, row) = grid.cell(network.position(station));
             (row * grid.columns + column) as usize
         };
-        for station in 0..count {
-            begin[cell_of(station)] += 1;
+        for station in I::below(count) {
+            begin[cell_of(station)] += I::ONE;
         }
-        let mut sum = 0;
+        let mut sum = I::ZERO;
         for begin in begin.iter_mut() {
             sum += *begin;
             *begin = sum;
         }
         // The cells are filled from the back, so that the end of each cell is counted down to its
         // begin.
-        for station in (0..count).rev() {
+        for station in I::below(count).rev() {
             let begin = &mut begin[cell_of(station)];
-            *begin -= 1;
-            stations[usize::from(*begin)] = station;
+            *begin -= I::ONE;
+            stations[begin.get()] = station;
         }
         (grid.begin, grid.stations) = (begin, stations);
         Ok(grid)
@@ -127,12 +128,12 @@ impl<'s, 'a> Grid<'s, 'a> {
     }
 
     /// Returns the stations of the cells from column `from` to column `to` of a row.
-    fn stretch(&self, row: i32, from: i32, to: i32) -> &'s [u16] {
+    fn stretch(&self, row: i32, from: i32, to: i32) -> &'s [I] {
         let (from, to) = (from.max(0), to.min(self.columns - 1));
         if row < 0 || row >= self.rows || from > to {
             return &[];
         }
-        let begin = |column| usize::from(self.begin[(row * self.columns + column) as usize]);
+        let begin = |column| self.begin[(row * self.columns + column) as usize].get();
         &self.stations[begin(from)..begin(to + 1)]
     }
 
@@ -140,15 +141,15 @@ impl<'s, 'a> Grid<'s, 'a> {
     /// the nearest first.
     fn search(
         &self,
-        station: u16,
-        near: &mut [u16],
+        station: I,
+        near: &mut [I],
         work_budget: &mut WorkBudget<'_>,
     ) -> Result<(), OrderError> {
         let position = self.network.position(station);
         let (column, row) = self.cell(position);
-        let distance = |other: u16| match other {
-            NONE => u64::MAX,
-            other => self.network.square(station, other),
+        let distance = |other: I| match other == I::NONE {
+            true => u64::MAX,
+            false => self.network.square(station, other),
         };
         let per_quadrant = near.len() / 4;
         let mut enough = None;
@@ -157,12 +158,12 @@ impl<'s, 'a> Grid<'s, 'a> {
             // too few stations, the search ends at twice the ring at which two quadrants were full.
             let reach = ((ring - 1).max(0) as u64) << self.cell_bits;
             let last = near.chunks_exact(per_quadrant).filter_map(|quadrant| quadrant.last());
-            if last.clone().filter(|&&last| last != NONE).count() >= 2 && enough.is_none() {
+            if last.clone().filter(|&&last| last != I::NONE).count() >= 2 && enough.is_none() {
                 enough = Some(2 * ring);
             }
-            let done = |&last: &u16| match last {
-                NONE => enough.is_some_and(|enough| ring > enough),
-                last => distance(last) <= reach * reach,
+            let done = |&last: &I| match last == I::NONE {
+                true => enough.is_some_and(|enough| ring > enough),
+                false => distance(last) <= reach * reach,
             };
             if last.clone().all(done) {
                 break;
@@ -185,7 +186,7 @@ impl<'s, 'a> Grid<'s, 'a> {
             }
         }
         for index in 1..near.len() {
-            let other = core::mem::replace(&mut near[index], NONE);
+            let other = core::mem::replace(&mut near[index], I::NONE);
             insert(&mut near[..=index], other, distance);
         }
         Ok(())
@@ -193,7 +194,7 @@ impl<'s, 'a> Grid<'s, 'a> {
 }
 
 /// Inserts `station` into a list sorted by distance; the last station of the list is dropped.
-fn insert(list: &mut [u16], station: u16, distance: impl Fn(u16) -> u64) {
+fn insert<I: Index>(list: &mut [I], station: I, distance: impl Fn(I) -> u64) {
     let Some((last, _)) = list.split_last_mut() else {
         return;
     };

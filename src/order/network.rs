@@ -8,22 +8,27 @@
 //! point is a station. The pen may then leave a corner for something near it and come back. Fails
 //! if there is not enough memory.
 
+use super::Leg;
 use super::metric::{least_length, length, square};
 use super::partition::Partition;
-use super::{Leg, NONE};
 use crate::array::MapEach;
 use crate::drawing::{Drawing, PagePoint, Segment};
+use crate::index::Index;
 use crate::stage::{OutOfScratch, Scratch};
 
 /// A flag in the degree of the lowest point of a part: the part has an odd point.
-const HAS_ODD: u16 = 1 << 15;
+fn has_odd<I: Index>() -> I {
+    I::ONE << (I::BITS - 1)
+}
 
 /// Every point becomes a station if the number of chains then grows at most by this factor, and if
-/// [`BYTES_A_STOP`] allows it.
+/// [`bytes_a_stop`] allows it.
 const MOST_STOPS: usize = 3;
 /// Every point becomes a station only if this many bytes are available for each: enough for all
 /// later stages.
-const BYTES_A_STOP: usize = 64;
+const fn bytes_a_stop<I>() -> usize {
+    32 * size_of::<I>()
+}
 
 /// Selects which of the points where two segments meet become stations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,21 +42,21 @@ enum Stops {
 /// The stations and chains of one pen. A chain is numbered like a segment: a [`Leg`] of a chain
 /// holds the number of the chain and the direction in which it is drawn.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Network<'a> {
+pub(super) struct Network<'a, I> {
     points: &'a [PagePoint],
-    segments: &'a [Segment],
+    segments: &'a [Segment<I>],
     /// The number of the point at which each station lies.
-    at: &'a [u16],
+    at: &'a [I],
     /// The stations at which each chain begins and ends.
-    ends: &'a [[u16; 2]],
+    ends: &'a [[I; 2]],
     /// The first and the last segment of each chain, both as legs in the direction of the chain.
-    outer: &'a [[Leg; 2]],
+    outer: &'a [[Leg<I>; 2]],
 }
 
-impl<'a> Network<'a> {
+impl<'a, I: Index> Network<'a, I> {
     /// Makes the network of the segments that `pen` draws.
     pub fn new(
-        drawing: Drawing<'a>,
+        drawing: Drawing<'a, I>,
         pen: u8,
         scratch: &mut Scratch<'a>,
     ) -> Result<Self, OutOfScratch> {
@@ -62,7 +67,8 @@ impl<'a> Network<'a> {
             let survey = Survey::new(drawing, pen, wanted, &mut lent)?;
             let degrees = || survey.stations().map(|point| survey.degree(point));
             let (points, ends) = (degrees().count(), degrees().sum::<usize>());
-            let is_worth_it = ends / 2 <= MOST_STOPS * chains && points * BYTES_A_STOP <= available;
+            let is_worth_it =
+                ends / 2 <= MOST_STOPS * chains && points * bytes_a_stop::<I>() <= available;
             if wanted == Stops::Few || is_worth_it {
                 (stations, chains, stops) = (points, ends / 2, wanted);
             }
@@ -76,53 +82,53 @@ impl<'a> Network<'a> {
     }
 
     /// Returns the number of stations.
-    pub fn stations(&self) -> u16 {
-        self.at.len() as u16
+    pub fn stations(&self) -> I {
+        I::new(self.at.len())
     }
 
     /// Returns the number of chains.
-    pub fn chains(&self) -> u16 {
-        self.ends.len() as u16
+    pub fn chains(&self) -> I {
+        I::new(self.ends.len())
     }
 
     /// Returns the page position of a station.
-    pub fn position(&self, station: u16) -> PagePoint {
-        self.points[usize::from(self.at[usize::from(station)])]
+    pub fn position(&self, station: I) -> PagePoint {
+        self.points[self.at[station.get()].get()]
     }
 
     /// Returns the distance between two stations in 1/256 steps.
-    pub fn distance(&self, from: u16, to: u16) -> u32 {
+    pub fn distance(&self, from: I, to: I) -> u32 {
         length(self.position(from), self.position(to))
     }
 
     /// Returns a lower bound of that distance in 1/256 steps, without a square root.
-    pub fn least_distance(&self, from: u16, to: u16) -> u32 {
+    pub fn least_distance(&self, from: I, to: I) -> u32 {
         least_length(self.position(from), self.position(to))
     }
 
     /// Returns the square of the distance between two stations, in square steps.
-    pub fn square(&self, from: u16, to: u16) -> u64 {
+    pub fn square(&self, from: I, to: I) -> u64 {
         square(self.position(from), self.position(to))
     }
 
     /// Returns the stations at the start and at the end of a chain.
-    pub fn ends(&self, chain: u16) -> [u16; 2] {
-        self.ends[usize::from(chain)]
+    pub fn ends(&self, chain: I) -> [I; 2] {
+        self.ends[chain.get()]
     }
 
     /// Returns the station at which the leg of a chain begins.
-    pub fn start(&self, leg: Leg) -> u16 {
+    pub fn start(&self, leg: Leg<I>) -> I {
         self.ends[leg.segment()][usize::from(leg.reversed())]
     }
 
     /// Returns the station at which the leg of a chain ends.
-    pub fn end(&self, leg: Leg) -> u16 {
+    pub fn end(&self, leg: Leg<I>) -> I {
         self.start(leg.flipped())
     }
 
     /// Returns, for each station, the lowest station of its connected part.
-    pub fn parts<'s>(&self, scratch: &mut Scratch<'s>) -> Result<&'s mut [u16], OutOfScratch> {
-        let lowest = scratch.take(usize::from(self.stations()))?;
+    pub fn parts<'s>(&self, scratch: &mut Scratch<'s>) -> Result<&'s mut [I], OutOfScratch> {
+        let lowest = scratch.take(self.stations().get())?;
         let mut parts = Partition::singletons(lowest);
         for &[start, end] in self.ends {
             parts.unite(start, end);
@@ -134,15 +140,15 @@ impl<'a> Network<'a> {
     /// Writes the segments of the chains of `route`, in this order, to `tour`.
     pub fn expand(
         &self,
-        route: &[Leg],
-        tour: &mut [Leg],
+        route: &[Leg<I>],
+        tour: &mut [Leg<I>],
         pen: u8,
         scratch: &mut Scratch<'_>,
     ) -> Result<(), OutOfScratch> {
-        let across: &mut [u16] = scratch.take(self.points.len())?;
+        let across: &mut [I] = scratch.take(self.points.len())?;
         for (number, segment) in pen_segments(self.segments, pen) {
-            across[usize::from(segment.from)] ^= number;
-            across[usize::from(segment.to)] ^= number;
+            across[segment.from().get()] ^= number;
+            across[segment.to().get()] ^= number;
         }
         let mut tour = tour.iter_mut();
         for &chain in route {
@@ -164,83 +170,86 @@ impl<'a> Network<'a> {
 }
 
 /// Returns the segments of `pen` with their numbers.
-pub(super) fn pen_segments(segments: &[Segment], pen: u8) -> impl Iterator<Item = (u16, &Segment)> {
-    (0..=u16::MAX).zip(segments).filter(move |(_, segment)| segment.pen == pen)
+pub(super) fn pen_segments<I: Index>(
+    segments: &[Segment<I>],
+    pen: u8,
+) -> impl Iterator<Item = (I, &Segment<I>)> {
+    I::all().zip(segments).filter(move |(_, segment)| segment.pen() == pen)
 }
 
 /// Returns the point at which the leg of a segment begins.
-pub(super) fn start_point(segments: &[Segment], leg: Leg) -> u16 {
+pub(super) fn start_point<I: Index>(segments: &[Segment<I>], leg: Leg<I>) -> I {
     let segment = &segments[leg.segment()];
-    if leg.reversed() { segment.to } else { segment.from }
+    if leg.reversed() { segment.to() } else { segment.from() }
 }
 
 /// Returns the leg that begins where `leg` ends, at a point where exactly two segments meet.
 /// `across` holds, for each point, the exclusive or of the numbers of its segments, so that one of
 /// two segments gives the other.
-fn next_leg(segments: &[Segment], across: &[u16], leg: Leg) -> Leg {
+fn next_leg<I: Index>(segments: &[Segment<I>], across: &[I], leg: Leg<I>) -> Leg<I> {
     let point = start_point(segments, leg.flipped());
-    let number = across[usize::from(point)] ^ leg.segment() as u16;
-    Leg::new(number, segments[usize::from(number)].from != point)
+    let number = across[point.get()] ^ I::new(leg.segment());
+    Leg::new(number, segments[number.get()].from() != point)
 }
 
 /// The facts about each point that are needed to build the chains.
-struct Survey<'s, 'a> {
-    segments: &'a [Segment],
+struct Survey<'s, 'a, I> {
+    segments: &'a [Segment<I>],
     pen: u8,
     stops: Stops,
-    /// For each point the number of its segments, with the flag [`HAS_ODD`].
-    degree: &'s mut [u16],
+    /// For each point the number of its segments, with the flag [`has_odd`].
+    degree: &'s mut [I],
     /// For each point the exclusive or of the numbers of its segments.
-    across: &'s mut [u16],
+    across: &'s mut [I],
     /// For each point, the lowest point of its connected part.
-    part: &'s mut [u16],
+    part: &'s mut [I],
 }
 
-impl<'s, 'a> Survey<'s, 'a> {
+impl<'s, 'a, I: Index> Survey<'s, 'a, I> {
     fn new(
-        drawing: Drawing<'a>,
+        drawing: Drawing<'a, I>,
         pen: u8,
         stops: Stops,
         scratch: &mut Scratch<'s>,
     ) -> Result<Self, OutOfScratch> {
         let count = drawing.points.len();
-        let degree: &mut [u16] = scratch.take(count)?;
-        let across: &mut [u16] = scratch.take(count)?;
-        let part: &mut [u16] = scratch.take(count)?;
+        let degree: &mut [I] = scratch.take(count)?;
+        let across: &mut [I] = scratch.take(count)?;
+        let part: &mut [I] = scratch.take(count)?;
         let mut parts = Partition::singletons(part);
         for (number, segment) in pen_segments(drawing.segments, pen) {
-            for point in [segment.from, segment.to] {
-                degree[usize::from(point)] += 1;
-                across[usize::from(point)] ^= number;
+            for point in [segment.from(), segment.to()] {
+                degree[point.get()] += I::ONE;
+                across[point.get()] ^= number;
             }
-            parts.unite(segment.from, segment.to);
+            parts.unite(segment.from(), segment.to());
         }
         parts.flatten();
         for (point, &lowest) in part.iter().enumerate() {
-            if degree[point] % 2 == 1 {
-                degree[usize::from(lowest)] |= HAS_ODD;
+            if degree[point] & I::ONE != I::ZERO {
+                degree[lowest.get()] = degree[lowest.get()] | has_odd();
             }
         }
         Ok(Self { segments: drawing.segments, pen, stops, degree, across, part })
     }
 
     /// Returns how many segments meet at the point.
-    fn degree(&self, point: u16) -> usize {
-        usize::from(self.degree[usize::from(point)] & !HAS_ODD)
+    fn degree(&self, point: I) -> usize {
+        (self.degree[point.get()] & (has_odd::<I>() - I::ONE)).get()
     }
 
     /// Whether a point is a station.
-    fn is_station(&self, point: u16) -> bool {
-        let lowest = self.part[usize::from(point)];
+    fn is_station(&self, point: I) -> bool {
+        let lowest = self.part[point.get()];
         match self.degree(point) {
             0 => false,
-            2 => self.stops == Stops::All || self.degree[usize::from(lowest)] & HAS_ODD == 0,
+            2 => self.stops == Stops::All || self.degree[lowest.get()] & has_odd() == I::ZERO,
             _ => true,
         }
     }
 
-    fn stations(&self) -> impl Iterator<Item = u16> {
-        (0..self.degree.len() as u16).filter(|&point| self.is_station(point))
+    fn stations(&self) -> impl Iterator<Item = I> {
+        I::below(I::new(self.degree.len())).filter(|&point| self.is_station(point))
     }
 
     /// Builds the chains: fills `at` with the points of the stations, and `ends` and `outer` with
@@ -248,41 +257,40 @@ impl<'s, 'a> Survey<'s, 'a> {
     fn lay_chains(
         self,
         scratch: &mut Scratch<'_>,
-        at: &mut [u16],
-        ends: &mut [[u16; 2]],
-        outer: &mut [[Leg; 2]],
+        at: &mut [I],
+        ends: &mut [[I; 2]],
+        outer: &mut [[Leg<I>; 2]],
     ) -> Result<(), OutOfScratch> {
         for (at, station) in at.iter_mut().zip(self.stations()) {
             *at = station;
         }
         let station_of = self.part;
-        station_of.fill(NONE);
-        for (station, &point) in (0..).zip(at.iter()) {
-            station_of[usize::from(point)] = station;
+        station_of.fill(I::NONE);
+        for (station, &point) in I::all().zip(at.iter()) {
+            station_of[point.get()] = station;
         }
         let laid: &mut [u8] = scratch.take(self.segments.len())?;
         let mut slots = ends.iter_mut().zip(outer);
         for (number, segment) in pen_segments(self.segments, self.pen) {
-            let first =
-                match [segment.from, segment.to].map_each(|point| station_of[usize::from(point)]) {
-                    [NONE, NONE] => continue,
-                    [NONE, _] => Leg::new(number, true),
-                    _ => Leg::new(number, false),
-                };
-            if laid[usize::from(number)] != 0 {
+            let is_station = |point: I| station_of[point.get()] != I::NONE;
+            let first = match [segment.from(), segment.to()].map_each(is_station) {
+                [false, false] => continue,
+                [from, _] => Leg::new(number, !from),
+            };
+            if laid[number.get()] != 0 {
                 continue;
             }
             let mut last = first;
             let end = loop {
                 laid[last.segment()] = 1;
-                let station = station_of[usize::from(start_point(self.segments, last.flipped()))];
-                if station != NONE {
+                let station = station_of[start_point(self.segments, last.flipped()).get()];
+                if station != I::NONE {
                     break station;
                 }
                 last = next_leg(self.segments, self.across, last);
             };
             if let Some((ends, outer)) = slots.next() {
-                let start = station_of[usize::from(start_point(self.segments, first))];
+                let start = station_of[start_point(self.segments, first).get()];
                 *ends = [start, end];
                 *outer = [first, last];
             }

@@ -3,35 +3,35 @@
 use super::metric::length;
 use super::network::Network;
 use crate::drawing::PagePoint;
-use core::ops::Range;
+use crate::index::{Index, Numbers};
 
 /// The odd stations of a network, numbered from 0. For an open path two *free ends* follow them.
 /// Each free end is at distance 0 from every odd point, so that the stations paired with the free
 /// ends are the start and the end of the path.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct OddPoints<'a> {
-    network: Network<'a>,
+pub(super) struct OddPoints<'a, I> {
+    network: Network<'a, I>,
     /// The odd stations, sorted by x.
-    stations: &'a [u16],
+    stations: &'a [I],
     free_ends: bool,
 }
 
-impl<'a> OddPoints<'a> {
+impl<'a, I: Index> OddPoints<'a, I> {
     /// Makes the odd points of `network` from its odd `stations`, which must be sorted by x. If
     /// `open`, free ends are added.
-    pub fn new(network: Network<'a>, stations: &'a [u16], open: bool) -> Self {
+    pub fn new(network: Network<'a, I>, stations: &'a [I], open: bool) -> Self {
         let free_ends = open && !stations.is_empty();
         Self { network, stations, free_ends }
     }
 
     /// Returns the number of odd stations, without the free ends.
-    pub fn real_count(&self) -> u16 {
-        self.stations.len() as u16
+    pub fn real_count(&self) -> I {
+        I::new(self.stations.len())
     }
 
     /// Returns the number of odd stations and free ends.
-    pub fn count(&self) -> u16 {
-        self.real_count() + 2 * u16::from(self.free_ends)
+    pub fn count(&self) -> I {
+        self.real_count() + I::new(2 * usize::from(self.free_ends))
     }
 
     /// Whether there are two free ends.
@@ -40,23 +40,23 @@ impl<'a> OddPoints<'a> {
     }
 
     /// Returns the numbers that the two free ends have if there are any.
-    pub fn free_ends(&self) -> [u16; 2] {
-        [self.real_count(), self.real_count() + 1]
+    pub fn free_ends(&self) -> [I; 2] {
+        [self.real_count(), self.real_count() + I::ONE]
     }
 
     /// Returns the numbers of the free ends as a range, which is empty if there are none.
-    pub fn free_numbers(&self) -> Range<u16> {
-        self.real_count()..self.count()
+    pub fn free_numbers(&self) -> Numbers<I> {
+        self.real_count().to(self.count())
     }
 
     /// Returns the station of an odd point, or `None` for a free end.
-    pub fn station(&self, odd: u16) -> Option<u16> {
-        self.stations.get(usize::from(odd)).copied()
+    pub fn station(&self, odd: I) -> Option<I> {
+        self.stations.get(odd.get()).copied()
     }
 
     /// Returns the length of the move between two odd points in 1/256 steps. It is very large
     /// between the two free ends, which may not be paired with each other.
-    pub fn distance(&self, a: u16, b: u16) -> u32 {
+    pub fn distance(&self, a: I, b: I) -> u32 {
         match (self.station(a), self.station(b)) {
             (Some(a), Some(b)) => self.network.distance(a, b),
             (None, None) => u32::MAX / 4,
@@ -66,7 +66,7 @@ impl<'a> OddPoints<'a> {
 
     /// Returns a lower bound of the length of the move between two odd points in 1/256 steps,
     /// without a square root.
-    pub fn least_distance(&self, a: u16, b: u16) -> u32 {
+    pub fn least_distance(&self, a: I, b: I) -> u32 {
         match (self.station(a), self.station(b)) {
             (Some(a), Some(b)) => self.network.least_distance(a, b),
             _ => 0,
@@ -74,7 +74,7 @@ impl<'a> OddPoints<'a> {
     }
 
     /// Returns the distance between two odd points along x in 1/256 steps; 0 for a free end.
-    pub fn distance_along_x(&self, a: u16, b: u16) -> u32 {
+    pub fn distance_along_x(&self, a: I, b: I) -> u32 {
         let x = |odd| self.station(odd).map(|station| self.network.position(station).x);
         x(a).zip(x(b)).map_or(0, |(a, b)| a.abs_diff(b) << 8)
     }
@@ -82,15 +82,15 @@ impl<'a> OddPoints<'a> {
     /// Returns a range that holds all odd stations whose x is at most `reach` 1/256 steps from that
     /// of `odd`; all other stations are farther from it than `reach`. For a free end it holds all
     /// of them.
-    pub fn around(&self, odd: u16, reach: u32) -> Range<u16> {
-        let x_of = |station: &u16| self.network.position(*station).x;
-        let Some(x) = self.stations.get(usize::from(odd)).map(x_of) else {
-            return 0..self.real_count();
+    pub fn around(&self, odd: I, reach: u32) -> Numbers<I> {
+        let x_of = |station: &I| self.network.position(*station).x;
+        let Some(x) = self.stations.get(odd.get()).map(x_of) else {
+            return I::below(self.real_count());
         };
         let reach = (reach >> 8) as i32 + 1;
         let begin = self.stations.partition_point(|station| x_of(station) < x - reach);
         let end = self.stations.partition_point(|station| x_of(station) <= x + reach);
-        begin as u16..end as u16
+        I::new(begin).to(I::new(end))
     }
 
     /// Returns an upper bound of the length of any move in 1/256 steps: the diagonal of the box

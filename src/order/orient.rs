@@ -8,13 +8,14 @@
 
 use super::exchange::Exchanges;
 use super::work_budget::WorkBudget;
-use super::{Leg, NONE, OrderError};
+use super::{Leg, OrderError};
 use crate::array::MapEach;
+use crate::index::Index;
 
 /// Reverses strokes (the legs between two moves) where that makes the tour shorter. Returns the
 /// gain. `choices` must have an entry for each leg of the tour.
-pub(super) fn orient(
-    tour: &mut Exchanges<'_, '_>,
+pub(super) fn orient<I: Index>(
+    tour: &mut Exchanges<'_, '_, I>,
     choices: &mut [u8],
     work_budget: &mut WorkBudget<'_>,
 ) -> Result<i64, OrderError> {
@@ -24,7 +25,7 @@ pub(super) fn orient(
     // The least cost up to a stroke that is drawn as it is, and that of the same stroke reversed,
     // which then ends where it began. The first stroke is not reversed.
     let mut least = [0, i64::MAX / 2];
-    let (mut ends, mut first_start, mut old) = ([NONE; 2], NONE, 0);
+    let (mut ends, mut first_start, mut old) = ([I::NONE; 2], I::NONE, 0);
     let mut strokes = 0;
     let mut leg = begin;
     loop {
@@ -77,17 +78,17 @@ pub(super) fn orient(
     Ok(gain)
 }
 
-impl Exchanges<'_, '_> {
+impl<I: Index> Exchanges<'_, '_, I> {
     /// Returns a leg before which the pen is lifted; for an open path, the gap.
-    fn first_of_a_stroke(&self) -> Option<Leg> {
+    fn first_of_a_stroke(&self) -> Option<Leg<I>> {
         let legs = || (0..self.cycle.len()).map(|index| self.cycle.leg(index));
-        let begins = |leg: &Leg| self.move_after(self.cycle.previous(*leg)) > 0;
+        let begins = |leg: &Leg<I>| self.move_after(self.cycle.previous(*leg)) > 0;
         legs().find(|&leg| self.is_gap(leg)).or_else(|| legs().find(begins))
     }
 
     /// Returns the last leg that is drawn without a lift from `leg` on. The gap is a stroke by
     /// itself, and a stroke ends before `begin`.
-    fn last_of_stroke(&self, leg: Leg, begin: Leg) -> Leg {
+    fn last_of_stroke(&self, leg: Leg<I>, begin: Leg<I>) -> Leg<I> {
         let mut last = leg;
         while !self.is_gap(last) && self.move_after(last) == 0 {
             let next = self.cycle.next(last);

@@ -9,7 +9,8 @@ use super::neighbours::Neighbours;
 use super::network::Network;
 use super::partition::Partition;
 use super::work_budget::WorkBudget;
-use super::{EVEN_PART, NONE, OrderError};
+use super::{OrderError, even_part};
+use crate::index::Index;
 use crate::stage::Scratch;
 
 /// The length that an exchange may add in the first round, in 1/256 steps: 8 steps.
@@ -17,20 +18,20 @@ const FIRST_ALLOWANCE: i64 = 8 << 8;
 
 /// Changes the moves `mate` between odd stations until no exchange between two neighbours in `near`
 /// can join two more parts.
-pub(super) fn patch_cycles(
-    network: Network<'_>,
-    near: Neighbours<'_>,
-    mate: &mut [u16],
+pub(super) fn patch_cycles<I: Index>(
+    network: Network<'_, I>,
+    near: Neighbours<'_, I>,
+    mate: &mut [I],
     mut scratch: Scratch<'_>,
     work_budget: &mut WorkBudget<'_>,
 ) -> Result<(), OrderError> {
     let mut parts = Partition::singletons(scratch.take(mate.len())?);
-    for chain in 0..network.chains() {
+    for chain in I::below(network.chains()) {
         let [start, end] = network.ends(chain);
         parts.unite(start, end);
     }
-    let is_move = |mate: u16| mate != NONE && mate != EVEN_PART;
-    for (station, &mate) in (0..).zip(mate.iter()) {
+    let is_move = |mate: I| mate != I::NONE && mate != even_part();
+    for (station, &mate) in I::all().zip(mate.iter()) {
         if is_move(mate) {
             parts.unite(station, mate);
         }
@@ -38,9 +39,9 @@ pub(super) fn patch_cycles(
     let mut allowance = FIRST_ALLOWANCE;
     let mut apart = true;
     while core::mem::take(&mut apart) {
-        for a in 0..network.stations() {
+        for a in I::below(network.stations()) {
             for c in near.of(a) {
-                let (b, d) = (mate[usize::from(a)], mate[usize::from(c)]);
+                let (b, d) = (mate[a.get()], mate[c.get()]);
                 work_budget.work(1)?;
                 if !is_move(b) || !is_move(d) || parts.find(a) == parts.find(c) {
                     continue;
@@ -50,8 +51,8 @@ pub(super) fn patch_cycles(
                 let longer = length(a, c) + length(b, d) - length(a, b) - length(c, d);
                 if longer <= allowance {
                     for (from, to) in [(a, c), (b, d)] {
-                        mate[usize::from(from)] = to;
-                        mate[usize::from(to)] = from;
+                        mate[from.get()] = to;
+                        mate[to.get()] = from;
                     }
                     parts.unite(a, c);
                 } else {

@@ -8,7 +8,8 @@
 use super::cycle::LegPosition;
 use super::exchange::{Exchanges, Step};
 use super::work_budget::WorkBudget;
-use super::{Leg, NONE, OrderError};
+use super::{Leg, OrderError};
+use crate::index::Index;
 
 /// The result of trying a station.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,47 +33,47 @@ struct Before {
 }
 
 /// A move that the step cuts.
-struct Cut {
+struct Cut<I> {
     /// The leg before the cut, in the direction of the first cut.
-    leg: Leg,
+    leg: Leg<I>,
     /// Whether the new move leads to the start of the leg after the cut; otherwise it leads to the
     /// end of the leg before the cut.
     onward: bool,
     /// The station on the other side of the cut.
-    far: u16,
+    far: I,
     /// The number of legs between the first cut and this one.
     legs_between: usize,
 }
 
 /// A search for a step that begins with the cut after `a`.
-pub(super) struct StepSearch<'e, 's, 'a> {
-    tour: &'e Exchanges<'s, 'a>,
+pub(super) struct StepSearch<'e, 's, 'a, I: Index> {
+    tour: &'e Exchanges<'s, 'a, I>,
     /// The leg before the first cut.
-    a: Leg,
+    a: Leg<I>,
     /// The leg after the first cut.
-    b: Leg,
+    b: Leg<I>,
     /// The position and the direction of `a`.
     a_position: LegPosition,
     /// The station after the first cut, where the tour will be joined again.
-    first: u16,
+    first: I,
     /// The cost from `first` to the nearer end of the path; very large if the tour is a closed
     /// cycle.
     to_ends: i64,
     /// The best step found: one with a gain, or else the one that leaves the most gain in hand.
-    best: Option<Step>,
+    best: Option<Step<I>>,
 }
 
-impl<'e, 's, 'a> StepSearch<'e, 's, 'a> {
+impl<'e, 's, 'a, I: Index> StepSearch<'e, 's, 'a, I> {
     /// Returns the first step found that leaves a gain, or else the one that leaves the most of
     /// `hand`; `None` if no step is possible.
     pub fn best_step(
-        tour: &'e Exchanges<'s, 'a>,
-        a: Leg,
+        tour: &'e Exchanges<'s, 'a, I>,
+        a: Leg<I>,
         hand: i64,
         work_budget: &mut WorkBudget<'_>,
-    ) -> Result<Option<Step>, OrderError> {
+    ) -> Result<Option<Step<I>>, OrderError> {
         let end = tour.end(a);
-        if end == NONE {
+        if end == I::NONE {
             return Ok(None);
         }
         let b = tour.cycle.next(a);
@@ -93,8 +94,8 @@ impl<'e, 's, 'a> StepSearch<'e, 's, 'a> {
     fn second_cut(
         &mut self,
         hand: i64,
-        end: u16,
-        second: u16,
+        end: I,
+        second: I,
         work_budget: &mut WorkBudget<'_>,
     ) -> Result<Outcome, OrderError> {
         work_budget.work(1)?;
@@ -117,8 +118,8 @@ impl<'e, 's, 'a> StepSearch<'e, 's, 'a> {
                 return Ok(Outcome::Found);
             }
             // A longer step through the gap is found from its other end.
-            if cut.far != NONE
-                && second != NONE
+            if cut.far != I::NONE
+                && second != I::NONE
                 && self.third_cuts(hand, &cut, work_budget)? == Outcome::Found
             {
                 return Ok(Outcome::Found);
@@ -131,7 +132,7 @@ impl<'e, 's, 'a> StepSearch<'e, 's, 'a> {
     fn third_cuts(
         &mut self,
         hand: i64,
-        second: &Cut,
+        second: &Cut<I>,
         work_budget: &mut WorkBudget<'_>,
     ) -> Result<Outcome, OrderError> {
         let by_gap = self.tour.is_open() && hand > self.to_ends;
@@ -150,8 +151,8 @@ impl<'e, 's, 'a> StepSearch<'e, 's, 'a> {
     fn third_cut(
         &mut self,
         hand: i64,
-        second: &Cut,
-        third: u16,
+        second: &Cut<I>,
+        third: I,
         work_budget: &mut WorkBudget<'_>,
     ) -> Result<Outcome, OrderError> {
         work_budget.work(1)?;
@@ -189,7 +190,7 @@ impl<'e, 's, 'a> StepSearch<'e, 's, 'a> {
     }
 
     /// Returns the position of the move at the start of `leg`.
-    fn before(&self, leg: Leg) -> Before {
+    fn before(&self, leg: Leg<I>) -> Before {
         let cycle = &self.tour.cycle;
         let position = cycle.position(leg);
         let onward = position.forward == self.a_position.forward;
@@ -202,7 +203,7 @@ impl<'e, 's, 'a> StepSearch<'e, 's, 'a> {
     }
 
     /// Returns the cut of the move at the start of `leg`.
-    fn cut(&self, leg: Leg, Before { position, onward, legs_between }: Before) -> Cut {
+    fn cut(&self, leg: Leg<I>, Before { position, onward, legs_between }: Before) -> Cut<I> {
         let previous = self.tour.cycle.before(position);
         let far = self.tour.end(previous);
         Cut { leg: if onward { previous } else { leg.flipped() }, onward, far, legs_between }

@@ -52,13 +52,13 @@ impl Budget {
                 + size_of::<Corner>() * memory.corners,
             working: 8 * memory.words,
             view: Scratch::bytes_for::<Vertex>(scene.vertices),
-            visibility: visibility::least_bytes(scene.vertices, scene.corners, scene.faces),
+            visibility: visibility::least_bytes::<u16>(scene.vertices, scene.corners, scene.faces),
             lines: Scratch::bytes_for::<PackedLine>(scene.lines),
             // A line adds at most two new points.
             drawing: Scratch::bytes_for::<Segment>(scene.lines)
                 + Scratch::bytes_for::<PagePoint>(2 * scene.lines),
             tour: Scratch::bytes_for::<Leg>(scene.lines),
-            matching: order::matching_bytes(scene.odd_points),
+            matching: order::matching_bytes::<u16>(scene.odd_points),
         };
         assert!(memory.ports == 1 || memory.ports == 2, "there are one or two ports");
         assert!(

@@ -7,6 +7,7 @@ use super::stream::{Listing, Task};
 use super::{Board, Inner, Job, Reply};
 use crate::array::MapEach;
 use crate::fixed::BinaryFraction;
+use crate::index::Index;
 use crate::machine::State;
 use crate::model::{Change, Edit, Element, ElementKind, Model, Numbers};
 use crate::protocol::CommandError;
@@ -14,22 +15,22 @@ use crate::stage::Scratch;
 use core::fmt;
 
 /// Saves the copy of the model that `$undo` restores.
-pub(super) struct UndoCopy<'k> {
+pub(super) struct UndoCopy<'k, I> {
     /// The front of the working memory, where the copy goes.
     words: &'k mut [u64],
     /// Length of the copy in words; 0 if there is none.
     copy_words: &'k mut usize,
     /// The last job; its memory is given up to the copy.
-    job: &'k mut Job,
+    job: &'k mut Job<I>,
     /// Whether the machine is idle. Otherwise the job may still be drawing, and no copy is made.
     is_idle: bool,
 }
 
-impl UndoCopy<'_> {
+impl<I: Index> UndoCopy<'_, I> {
     /// Saves `model`, which is about to change, in place of the last copy. Keeps no copy if it does
     /// not fit or the machine is not idle.
     #[inline(never)] // Several callers share one copy of the code.
-    pub(super) fn save(&mut self, model: &Model<'_>) {
+    pub(super) fn save(&mut self, model: &Model<'_, I>) {
         *self.copy_words = 0;
         if self.is_idle {
             self.job.release();
@@ -40,10 +41,10 @@ impl UndoCopy<'_> {
     }
 }
 
-impl<'m> Inner<'m> {
+impl<'m, I: Index> Inner<'m, I> {
     /// Borrows the model, what saves its copy for `$undo`, and the working memory behind the copy,
     /// which an edit may use.
-    pub(super) fn split(&mut self) -> (&mut Model<'m>, UndoCopy<'_>, Scratch<'_>) {
+    pub(super) fn split(&mut self) -> (&mut Model<'m, I>, UndoCopy<'_, I>, Scratch<'_>) {
         // A refused change must not overwrite the last copy, so room is left for the longer of
         // both.
         let next = Some(self.model.saved_words()).filter(|words| *words <= self.words.len());
@@ -143,10 +144,10 @@ impl<'m> Inner<'m> {
 }
 
 /// Indices from 0, shown as numbers from 1 with a space before each.
-struct List<I>(I);
+struct List<N>(N);
 
-impl<I: Iterator<Item = u16> + Clone> fmt::Display for List<I> {
+impl<N: Iterator<Item: Index> + Clone> fmt::Display for List<N> {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.clone().try_for_each(|number| write!(formatter, " {}", u32::from(number) + 1))
+        self.0.clone().try_for_each(|number| write!(formatter, " {}", number.get() + 1))
     }
 }

@@ -3,19 +3,20 @@
 
 use super::reply::Reply;
 use super::{Board, Strokes, report};
+use crate::index::Index;
 use crate::machine::{Path, State, Target, Value};
 use crate::protocol::RealTime;
 use crate::stage::{Aborted, Cancel, Stage};
 
 /// The strokes of a job while the machine measures them. They check for cancelling as they go.
-pub(super) struct MeasuredStrokes<'s, 'a> {
-    pub(super) strokes: Strokes<'s>,
+pub(super) struct MeasuredStrokes<'s, 'a, I> {
+    pub(super) strokes: Strokes<'s, I>,
     pub(super) cancel: &'a mut dyn Cancel,
     pub(super) targets: usize,
     pub(super) aborted: bool,
 }
 
-impl Path for MeasuredStrokes<'_, '_> {
+impl<I: Index> Path for MeasuredStrokes<'_, '_, I> {
     fn next_target(&mut self) -> Option<Target> {
         self.targets += 1;
         // 64 targets take some 100,000 instructions.

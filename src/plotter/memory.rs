@@ -23,7 +23,7 @@ pub struct Memory<
     const WORDS: usize,
     const PORTS: usize = 1,
 > {
-    vertices: heapless::Vec<Position, VERTICES>,
+    vertices: [Position; VERTICES],
     corners: [Corner; CORNERS],
     words: [u64; WORDS],
     readers: [LineReader; PORTS],
@@ -35,8 +35,8 @@ impl<const VERTICES: usize, const CORNERS: usize, const WORDS: usize, const PORT
     /// An empty memory.
     pub const fn new() -> Self {
         Self {
-            vertices: heapless::Vec::new(),
-            corners: [Corner::new(0, false, false); CORNERS],
+            vertices: [Position::ORIGIN; VERTICES],
+            corners: [Corner::ZERO; CORNERS],
             words: [0; WORDS],
             readers: [const { LineReader::new() }; PORTS],
         }
@@ -64,11 +64,11 @@ impl<const VERTICES: usize, const CORNERS: usize, const WORDS: usize, const PORT
 
 /// The memory lent to a plotter, independent of its capacities.
 #[derive(Debug)]
-pub struct MemorySlices<'m> {
+pub struct MemorySlices<'m, I = u16> {
     /// Memory for the model's vertices.
-    pub vertices: &'m mut heapless::VecView<Position>,
+    pub vertices: &'m mut [Position],
     /// Memory for the corners of its faces and the ends of its bars.
-    pub corners: &'m mut [Corner],
+    pub corners: &'m mut [Corner<I>],
     /// Memory for the moves planned ahead.
     pub blocks: &'m mut [Block],
     /// Working memory for the stages of a job and the drawing that they compute.

@@ -32,6 +32,7 @@ pub use options::{
     Flag, HiddenLines, OPTIONS, PlotOption, PlotOptions, ProjectionChoice, VisibilityMode,
 };
 
+use crate::index::Index;
 use crate::machine::{
     Alarm, Machine, MachineError, PulserState, Setting, SettingError, Settings, State, Value,
 };
@@ -52,7 +53,11 @@ const AHEAD_TICKS: u32 = crate::motion::TICKS_PER_SECOND / 20;
 const PORT_LIMIT: usize = 2;
 
 /// Polls the plotter forever, and sleeps while there is nothing to do.
-pub fn run<B: Board>(board: &mut B, memory: MemorySlices<'_>, pins: &PulserState) -> ! {
+pub fn run<B: Board, I: Index>(
+    board: &mut B,
+    memory: MemorySlices<'_, I>,
+    pins: &PulserState,
+) -> ! {
     let mut plotter = Plotter::with_settings(memory, pins, records::load_settings(board));
     if board.fault().is_some() {
         plotter.inner.machine.alarm(Alarm::Restarted);
@@ -71,7 +76,7 @@ pub fn run<B: Board>(board: &mut B, memory: MemorySlices<'_>, pins: &PulserState
 
 /// The whole plotter except its pins, which the board pulses.
 #[derive(Debug)]
-pub struct Plotter<'m> {
+pub struct Plotter<'m, I = u16> {
     /// The line that each port is receiving.
     readers: &'m mut [LineReader],
     /// The state of the line numbers of each port.
@@ -80,7 +85,7 @@ pub struct Plotter<'m> {
     port: usize,
     /// What the reply to that line names.
     label: Label,
-    inner: Inner<'m>,
+    inner: Inner<'m, I>,
     /// Whether a status report was asked for and waits for room in the output.
     status_due: bool,
 }
@@ -96,14 +101,14 @@ enum Next {
 
 /// The plotter without the line being read: that line stays borrowed while it is carried out.
 #[derive(Debug)]
-struct Inner<'m> {
-    model: Model<'m>,
+struct Inner<'m, I> {
+    model: Model<'m, I>,
     options: PlotOptions,
     /// The working memory. It holds the job, or the copy of the model for `$undo`.
     words: &'m mut [u64],
     machine: Machine<'m>,
-    job: Job,
-    cursor: Cursor,
+    job: Job<I>,
+    cursor: Cursor<I>,
     /// How many of the first `words` hold the copy of the model before its last change; 0 if there
     /// is no copy.
     copy_words: usize,
@@ -116,17 +121,17 @@ struct Inner<'m> {
     pen_reported: Option<u8>,
 }
 
-impl<'m> Plotter<'m> {
+impl<'m, I: Index> Plotter<'m, I> {
     /// An idle plotter at the page's origin with an empty model and default settings. `pins` is the
     /// state that the plotter shares with the board's step interrupt.
-    pub fn new(memory: MemorySlices<'m>, pins: &'m PulserState) -> Self {
+    pub fn new(memory: MemorySlices<'m, I>, pins: &'m PulserState) -> Self {
         Self::with_settings(memory, pins, Settings::default())
     }
 
     /// Like [`Plotter::new`], with the given settings.
     #[inline(never)] // Its temporaries must not lie on the stack below the stages.
     pub fn with_settings(
-        memory: MemorySlices<'m>,
+        memory: MemorySlices<'m, I>,
         pins: &'m PulserState,
         settings: Settings,
     ) -> Self {
@@ -221,7 +226,7 @@ impl<'m> Plotter<'m> {
     }
 
     /// The model.
-    pub fn model(&self) -> &Model<'m> {
+    pub fn model(&self) -> &Model<'m, I> {
         &self.inner.model
     }
 
@@ -236,7 +241,7 @@ impl<'m> Plotter<'m> {
     }
 
     /// The job that is being drawn or was drawn last.
-    pub fn job(&self) -> &Job {
+    pub fn job(&self) -> &Job<I> {
         &self.inner.job
     }
 
@@ -247,14 +252,14 @@ impl<'m> Plotter<'m> {
     pub fn compute(
         &mut self,
         cancel: &mut dyn Cancel,
-        observer: &mut dyn Observer,
-    ) -> Result<&Job, CommandError> {
+        observer: &mut dyn Observer<I>,
+    ) -> Result<&Job<I>, CommandError> {
         self.inner.compute(cancel, observer)?;
         Ok(&self.inner.job)
     }
 
     /// The strokes of the job computed last, from the beginning.
-    pub fn strokes(&mut self) -> Strokes<'_> {
+    pub fn strokes(&mut self) -> Strokes<'_, I> {
         self.inner.cursor = Cursor::default();
         self.inner.job.strokes(self.inner.words, &mut self.inner.cursor)
     }
@@ -290,7 +295,7 @@ impl<'m> Plotter<'m> {
     }
 }
 
-impl Inner<'_> {
+impl<I: Index> Inner<'_, I> {
     /// Keeps the step queue full. Returns whether the planned position has changed.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     fn plan<B: Board>(&mut self, board: &mut B) -> bool {
@@ -315,7 +320,7 @@ impl Inner<'_> {
         let command = Command::parse(line)?;
         let one_pen = self.options.one_pen;
         let (model, mut undo_copy, _) = self.split();
-        let save_copy = &mut |model: &Model<'_>| undo_copy.save(model);
+        let save_copy = &mut |model: &Model<'_, I>| undo_copy.save(model);
         match command {
             Command::Nothing => {}
             Command::Vertex(coordinates) => {
@@ -442,7 +447,7 @@ impl Inner<'_> {
     fn compute(
         &mut self,
         cancel: &mut dyn Cancel,
-        observer: &mut dyn Observer,
+        observer: &mut dyn Observer<I>,
     ) -> Result<(), CommandError> {
         // This overwrites the memory of the last job, so that job ends here even if this one fails.
         self.copy_words = 0;

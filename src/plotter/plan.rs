@@ -6,6 +6,7 @@ use super::job::{Collector, FOR_BOUNDS, Found, HALF_A_STEP, Pipeline, union};
 use crate::array::MapEach;
 use crate::curve::{FRACTION_BITS, Point};
 use crate::drawing::{Bounds, LineType, PackedLine, PageMap};
+use crate::index::Index;
 use crate::model::{Element, Position};
 use crate::protocol::CommandError;
 use crate::visibility::SinkFull;
@@ -16,7 +17,7 @@ use crate::visibility::SinkFull;
 /// [`CommandError::Page`] if the plan does not go on the page, [`CommandError::DrawingTooLarge`] if
 /// its lines do not fit in the memory, [`CommandError::Aborted`].
 #[inline(never)] // Keeps its frame off the stack while the stages run.
-pub(super) fn lay_out(pipeline: &mut Pipeline<'_>) -> Result<Found, CommandError> {
+pub(super) fn lay_out<I: Index>(pipeline: &mut Pipeline<'_, I>) -> Result<Found, CommandError> {
     let Pipeline { model, options, steps, words, cancel, observer } = pipeline;
     let steps = *steps;
     let (vertices, curves) = (model.vertices(), model.curves());
@@ -26,7 +27,7 @@ pub(super) fn lay_out(pipeline: &mut Pipeline<'_>) -> Result<Found, CommandError
     let on_page =
         |map: PageMap| move |[x, y, _]: [i64; 3]| Some(map.fine(x, y, 1 << FRACTION_BITS));
     let corners = model.elements().corners().iter();
-    let used = corners.filter_map(|c| vertices.get(usize::from(c.vertex()))).copied();
+    let used = corners.filter_map(|c| vertices.get(c.vertex().get())).copied();
     let mut bounds = Bounds::around_plan(used);
     if !curves.is_empty() {
         let all =
@@ -56,9 +57,7 @@ pub(super) fn lay_out(pipeline: &mut Pipeline<'_>) -> Result<Found, CommandError
     };
     for (element, pen) in model.elements().iter_with_pens() {
         let Element::Bar(from, to) = element else { continue };
-        if let [Some(from), Some(to)] =
-            [from, to].map_each(|number| points.get(usize::from(number)))
-        {
+        if let [Some(from), Some(to)] = [from, to].map_each(|number| points.get(number.get())) {
             draw(*from, *to, pen).map_err(CommandError::DrawingTooLarge)?;
         }
     }

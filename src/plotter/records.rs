@@ -1,7 +1,9 @@
 //! The records of settings and jobs in the board's flash, which outlive a loss of power: their
 //! formats, and how they are saved and loaded.
 
+use super::job::FIGURES;
 use super::{Board, Job, NotStored, Record};
+use crate::index::Index;
 use crate::machine::{SETTINGS, Settings, Value};
 use crate::protocol::CommandError;
 
@@ -47,7 +49,7 @@ pub(super) fn save_settings<B: Board>(
 const JOB_LAYOUT: u32 = u32::from_le_bytes(*b"job1");
 /// Number of words before a job's memory: the layout, the steps per millimetre of x and y, and the
 /// job's figures.
-const JOB_HEADER: usize = 3 + Job::FIGURES;
+const JOB_HEADER: usize = 3 + FIGURES;
 
 /// The steps per millimetre on the page, for x and y, as bits. A job's coordinates are measured in
 /// these steps.
@@ -60,8 +62,8 @@ fn steps(settings: &Settings) -> [u32; 2] {
 /// # Errors
 /// [`NotStored`]: the previous job is still kept.
 #[inline(never)] // Keeps its frame off the stack while the stages run.
-pub(super) fn save_job<B: Board>(
-    job: &Job,
+pub(super) fn save_job<B: Board, I: Index>(
+    job: &Job<I>,
     settings: &Settings,
     words: &[u64],
     board: &mut B,
@@ -82,11 +84,11 @@ pub(super) fn save_job<B: Board>(
 /// [`CommandError::NoJobKept`] if there is none, [`CommandError::OtherSteps`] if the steps per
 /// millimetre have changed since. `words` then hold no job.
 #[inline(never)] // Keeps its frame off the stack while the stages run.
-pub(super) fn load_job<B: Board>(
+pub(super) fn load_job<B: Board, I: Index>(
     settings: &Settings,
     words: &mut [u64],
     board: &mut B,
-) -> Result<Job, CommandError> {
+) -> Result<Job<I>, CommandError> {
     let mut found = Err(CommandError::NoJobKept);
     board.load(Record::Job, &mut |record| {
         let mut header = [[0; 4]; JOB_HEADER];
@@ -94,7 +96,7 @@ pub(super) fn load_job<B: Board>(
             return;
         }
         let [layout, x, y, figures @ ..] = header.map(u32::from_le_bytes);
-        let job = Job::from_figures(figures).filter(|_| layout == JOB_LAYOUT);
+        let job = Job::<I>::from_figures(figures).filter(|_| layout == JOB_LAYOUT);
         let Some((job, memory)) = job.and_then(|job| Some((job, words.get_mut(..job.words())?)))
         else {
             return;

@@ -3,6 +3,7 @@
 use super::reply::Reply;
 use super::{Board, Inner};
 use crate::fixed::BinaryFraction;
+use crate::index::Index;
 use crate::machine::{Alarm, Setting, State};
 use crate::order;
 use crate::protocol::{AlarmEntry, LINE_LIMIT};
@@ -43,7 +44,7 @@ pub(super) fn fault<B: Board>(board: &mut B) {
     }
 }
 
-impl Inner<'_> {
+impl<I: Index> Inner<'_, I> {
     /// Reports the faces and edges that the job has left out, if any.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub fn report_degenerate<B: Board>(&self, board: &mut B) {

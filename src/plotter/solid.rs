@@ -6,6 +6,7 @@ use super::{HiddenLines, VisibilityMode};
 use crate::array::MapEach;
 use crate::convex::{self, EdgeVisibility, Eye, SinkFull, SolidEdge, SolidError, SolidSink};
 use crate::drawing::{Bounds, PageMap};
+use crate::index::Index;
 use crate::model::Corner;
 use crate::protocol::CommandError;
 use crate::stage::{Scratch, Stage, items_mut};
@@ -18,7 +19,7 @@ use crate::visibility::{EdgeParameter, Stretch, StretchSink};
 /// [`CommandError::Solid`] if this is no convex solid, [`CommandError::View`],
 /// [`CommandError::Page`], [`CommandError::DrawingTooLarge`], [`CommandError::Aborted`].
 #[inline(never)] // Keeps its frame off the stack while the stages run.
-pub(super) fn project(pipeline: &mut Pipeline<'_>) -> Result<Found, CommandError> {
+pub(super) fn project<I: Index>(pipeline: &mut Pipeline<'_, I>) -> Result<Found, CommandError> {
     let (camera, view) = pipeline.camera_view()?;
     let Pipeline { model, options, steps, words, cancel, observer } = pipeline;
     let (model, options, words) = (*model, *options, &mut **words);
@@ -51,10 +52,10 @@ pub(super) fn project(pipeline: &mut Pipeline<'_>) -> Result<Found, CommandError
         error => CommandError::Solid(error),
     })?;
     let (shown, hidden) = (edges.shown, edges.hidden);
-    let (edge_words, line_words) = words.split_at_mut(Scratch::bytes_for::<[u16; 2]>(most) / 8);
-    let edges: &[[u16; 2]] = items_mut(edge_words, most).unwrap_or(&mut []);
-    let on_view = |ends: &[u16; 2]| {
-        let [p, q] = ends.map_each(|number| model.vertices().get(usize::from(number)));
+    let (edge_words, line_words) = words.split_at_mut(Scratch::bytes_for::<[I; 2]>(most) / 8);
+    let edges: &[[I; 2]] = items_mut(edge_words, most).unwrap_or(&mut []);
+    let on_view = |ends: &[I; 2]| {
+        let [p, q] = ends.map_each(|number| model.vertices().get(number.get()));
         view.clip_edge([view.vertex(*p?), view.vertex(*q?)])
     };
     let all = || {
@@ -80,15 +81,15 @@ pub(super) fn project(pipeline: &mut Pipeline<'_>) -> Result<Found, CommandError
             .map_err(|SinkFull| sink.collector.out_of_memory())?;
     }
     let count = sink.collector.count;
-    move_to_front(words, Scratch::bytes_for::<[u16; 2]>(most) / 8, count);
+    move_to_front(words, Scratch::bytes_for::<[I; 2]>(most) / 8, count);
     Ok(Found { lines: count, joined_edges: summary.joined, degenerate_faces: 0 })
 }
 
 /// The edges of the solid that are to be drawn. Visible edges fill the array from the front, hidden
 /// ones from the back.
-struct Edges<'a> {
+struct Edges<'a, I> {
     /// The vertex numbers of the ends of each edge.
-    pairs: &'a mut [[u16; 2]],
+    pairs: &'a mut [[I; 2]],
     /// Number of visible edges.
     shown: usize,
     /// Number of hidden edges that are kept.
@@ -97,12 +98,12 @@ struct Edges<'a> {
     wanted: HiddenLines,
 }
 
-impl SolidSink for Edges<'_> {
-    fn face(&mut self, _: &[Corner], _: bool) -> Result<(), SinkFull> {
+impl<I: Index> SolidSink<I> for Edges<'_, I> {
+    fn face(&mut self, _: &[Corner<I>], _: bool) -> Result<(), SinkFull> {
         Ok(())
     }
 
-    fn edge(&mut self, edge: SolidEdge) -> Result<(), SinkFull> {
+    fn edge(&mut self, edge: SolidEdge<I>) -> Result<(), SinkFull> {
         let at = match (edge.visibility, self.wanted) {
             (EdgeVisibility::Outline | EdgeVisibility::Visible, _) => {
                 self.shown += 1;

@@ -8,6 +8,7 @@ use super::program::{Order, Program};
 use super::{Board, Inner, REPLY_BYTES, Reply, help};
 use crate::drawing::{LineType, PagePoint};
 use crate::fixed::BinaryFraction;
+use crate::index::Index;
 use crate::machine::{Alarm, MachineError, Setting, State, Target};
 use crate::model::ElementKind;
 use crate::motion::{StepEvent, TICKS_PER_SECOND};
@@ -50,7 +51,7 @@ pub(super) enum Progress {
     Waits,
 }
 
-impl Inner<'_> {
+impl<I: Index> Inner<'_, I> {
     /// Carries out real-time requests, except status and abort.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub(super) fn act(&mut self, requests: RealTime) {

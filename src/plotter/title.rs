@@ -3,6 +3,7 @@
 use super::PlotOptions;
 use super::job::{Collector, Pipeline};
 use crate::drawing::{LineType, PackedLine, StepsPerMillimetre};
+use crate::index::Index;
 use crate::protocol::CommandError;
 use crate::stage::{StageError, items};
 use crate::visibility::SinkFull;
@@ -25,7 +26,10 @@ pub(super) fn check(options: &PlotOptions, steps: StepsPerMillimetre) -> Result<
 /// # Errors
 /// [`CommandError::Page`], [`CommandError::DrawingTooLarge`], [`CommandError::Aborted`].
 #[inline(never)] // Keeps its frame off the stack while the stages run.
-pub(super) fn write(pipeline: &mut Pipeline<'_>, count: usize) -> Result<usize, CommandError> {
+pub(super) fn write<I: Index>(
+    pipeline: &mut Pipeline<'_, I>,
+    count: usize,
+) -> Result<usize, CommandError> {
     let Pipeline { options, steps, words, cancel, .. } = pipeline;
     let steps = *steps;
     let Some(title) = options.title() else { return Ok(count) };

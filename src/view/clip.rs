@@ -9,17 +9,18 @@ use super::curves::Flattening;
 use super::weld::weld;
 use crate::array::MapEach;
 use crate::geometry::Vertex;
-use crate::model::{Corner, Element, Elements, Model, PenWriter, VERTEX_NUMBER_LIMIT};
+use crate::index::Index;
+use crate::model::{Corner, Element, Elements, Model, PenWriter};
 use crate::stage::{Cancel, OutOfScratch, Scratch, StageError, heap_sort_by_key};
 
 /// A model as the camera sees it.
 #[derive(Debug, Clone, Copy)]
-pub struct Seen<'a> {
+pub struct Seen<'a, I> {
     /// The vertices of the model, the ends of its flattened curves, and the points where edges are
     /// cut.
     pub vertices: &'a [Vertex],
     /// The faces and bars, or their parts, that are in front of the near plane.
-    pub elements: Elements<'a>,
+    pub elements: Elements<'a, I>,
     /// The number of faces of the model that were left out because they have no area.
     pub degenerate_faces: u32,
     /// Whether any vertex was nearer than the near plane.
@@ -35,13 +36,13 @@ pub struct Seen<'a> {
 /// of `cancel` if the user cancels.
 // Not inlined, so that its stack frame is released before the stages run.
 #[inline(never)]
-pub fn project_scene<'a>(
+pub fn project_scene<'a, I: Index>(
     view: &View,
-    model: &'a Model<'_>,
+    model: &'a Model<'_, I>,
     curves: Option<Flattening<'_>>,
     scratch: &mut Scratch<'a>,
     cancel: &mut dyn Cancel,
-) -> Result<Seen<'a>, StageError> {
+) -> Result<Seen<'a, I>, StageError> {
     let (elements, degenerate_faces) = weld(model, scratch, cancel)?;
     let (vertices, elements) = match curves {
         Some(curves) => curves.add(view, model, elements, scratch, cancel)?,
@@ -75,12 +76,12 @@ pub(super) fn clip_edge([p, q]: [Vertex; 2], near: i32) -> Option<[Vertex; 2]> {
 ///
 /// # Errors
 /// [`OutOfScratch`] if that memory is not available.
-pub fn distinct_edges<'a>(
-    elements: Elements<'_>,
+pub fn distinct_edges<'a, I: Index>(
+    elements: Elements<'_, I>,
     scratch: &mut Scratch<'a>,
-) -> Result<&'a [[u16; 2]], OutOfScratch> {
+) -> Result<&'a [[I; 2]], OutOfScratch> {
     let all = || elements.iter().flat_map(edges);
-    let keys = scratch.take::<u32>(all().count())?;
+    let keys = scratch.take::<I::Pair>(all().count())?;
     for (key, edge) in keys.iter_mut().zip(all()) {
         *key = edge.key();
     }
@@ -90,26 +91,27 @@ pub fn distinct_edges<'a>(
 
 /// Cuts off what is nearer than `near`: returns the vertices, with those of the cuts after them,
 /// and the elements that are left.
-fn cut<'a>(
+fn cut<'a, I: Index>(
     vertices: &[Vertex],
-    elements: Elements<'_>,
+    elements: Elements<'_, I>,
     near: i32,
     scratch: &mut Scratch<'a>,
-) -> Result<(&'a [Vertex], Elements<'a>), OutOfScratch> {
-    let is_seen =
-        |number: u16| vertices.get(usize::from(number)).is_some_and(|vertex| vertex.z >= near);
-    let is_cut = |edge: &Edge| is_seen(edge.0) != is_seen(edge.1);
+) -> Result<(&'a [Vertex], Elements<'a, I>), OutOfScratch> {
+    let is_seen = |number: I| vertices.get(number.get()).is_some_and(|vertex| vertex.z >= near);
+    let is_cut = |edge: &Edge<I>| is_seen(edge.0) != is_seen(edge.1);
 
     let count = elements.iter().flat_map(edges).filter(is_cut).count();
-    let keys = scratch.take::<u32>(count)?;
+    let keys = scratch.take::<I::Pair>(count)?;
     for (key, edge) in keys.iter_mut().zip(elements.iter().flat_map(edges).filter(is_cut)) {
         *key = edge.key();
     }
     heap_sort_by_key(keys, |key| *key);
     let keys = without_repeats(keys);
 
-    let too_many =
-        OutOfScratch { needed: vertices.len() + keys.len(), available: VERTEX_NUMBER_LIMIT };
+    let too_many = OutOfScratch {
+        needed: vertices.len() + keys.len(),
+        available: <Corner<I>>::VERTEX_NUMBER_LIMIT,
+    };
     if too_many.needed > too_many.available {
         return Err(too_many);
     }
@@ -121,23 +123,23 @@ fn cut<'a>(
         *vertex = Vertex { z: original.z.max(near), ..*original };
     }
     for (vertex, key) in new.iter_mut().zip(keys) {
-        let ends = [(key >> 16) as usize, (key & 0xFFFF) as usize];
-        if let [Some(p), Some(q)] = ends.map_each(|end| vertices.get(end)) {
+        let ends = I::halves(*key).map_each(|end| vertices.get(end.get()));
+        if let [Some(p), Some(q)] = ends {
             *vertex = on_plane(*p, *q, near);
         }
     }
-    let number_of = |edge: Edge| {
+    let number_of = |edge: Edge<I>| {
         let at = keys.binary_search(&edge.key()).unwrap_or(0); // every cut edge is in the list
-        (vertices.len() + at) as u16 // below VERTEX_NUMBER_LIMIT, see above
+        I::new(vertices.len() + at) // below the limit, see above
     };
 
     // Each edge that is cut adds at most one corner.
-    let corners = scratch.take::<u16>(elements.corners().len() + count)?;
+    let corners = scratch.take::<I>(elements.corners().len() + count)?;
     let mut pens = PenWriter::new(scratch, elements.pens().changes())?;
     let mut length = 0;
     for (element, pen) in elements.iter_with_pens() {
         let start = length;
-        let mut push = |number: u16| {
+        let mut push = |number: I| {
             if let Some(corner) = corners.get_mut(length) {
                 *corner = number;
                 length += 1;
@@ -169,34 +171,34 @@ fn cut<'a>(
             }
         }
     }
-    let corners: &'a [u16] = corners;
+    let corners: &'a [I] = corners;
     let corners = bytemuck::cast_slice(corners.get(..length).unwrap_or(&[]));
     Ok((all, Elements::with_pens(corners, pens.finish())))
 }
 
 /// An edge, as the numbers of the vertices at its ends.
 #[derive(Clone, Copy)]
-struct Edge(u16, u16);
+struct Edge<I>(I, I);
 
-impl Edge {
+impl<I: Index> Edge<I> {
     /// Returns a key that is the same for both directions of the edge.
-    fn key(self) -> u32 {
-        u32::from(self.0.min(self.1)) << 16 | u32::from(self.0.max(self.1))
+    fn key(self) -> I::Pair {
+        I::pair(self.0.min(self.1), self.0.max(self.1))
     }
 }
 
 /// Iterates over the edges around a face, or over the single edge of a bar.
-fn edges(element: Element<'_>) -> impl Iterator<Item = Edge> + Clone {
+fn edges<I: Index>(element: Element<'_, I>) -> impl Iterator<Item = Edge<I>> + Clone {
     let (face, bar) = match element {
         Element::Face(corners) => (corners, None),
-        Element::Bar(from, to) => (&[] as &[Corner], Some(Edge(from, to))),
+        Element::Bar(from, to) => (&[] as &[Corner<I>], Some(Edge(from, to))),
     };
     let nexts = face.iter().cycle().skip(1);
     face.iter().zip(nexts).map(|(a, b)| Edge(a.vertex(), b.vertex())).chain(bar)
 }
 
 /// Keeps each of the sorted numbers once.
-fn without_repeats(sorted: &mut [u32]) -> &[u32] {
+fn without_repeats<T: Copy + PartialEq>(sorted: &mut [T]) -> &[T] {
     let mut kept = 0;
     for at in 0..sorted.len() {
         if kept == 0 || sorted[kept - 1] != sorted[at] {
@@ -305,13 +307,17 @@ mod tests {
         let found: Vec<_> = edges.iter().map(sorted).collect();
         assert_eq!(found, [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3)]);
         assert!(distinct_edges(Elements::new(&corners), &mut Scratch::new(&mut [0; 3])).is_err());
-        assert!(distinct_edges(Elements::new(&[]), &mut Scratch::new(&mut [])).unwrap().is_empty());
+        assert!(
+            distinct_edges::<u16>(Elements::new(&[]), &mut Scratch::new(&mut []))
+                .unwrap()
+                .is_empty()
+        );
     }
 
     #[test]
     fn too_little_memory_is_an_error() {
         let vertices = [vertex(0, 0, 20), vertex(100, 40, 0), vertex(-50, 0, 20)];
-        let corners = [0, 1, 2].map(|number| Corner::new(number, false, number == 2));
+        let corners = [0u16, 1, 2].map(|number| Corner::new(number, false, number == 2));
         for words in 0..9 {
             let mut words = std::vec![0u64; words];
             assert!(

@@ -7,7 +7,8 @@ use super::View;
 use super::clip::clip_edge;
 use crate::curve::{FRACTION_BITS, Fine, Point};
 use crate::geometry::{Projection, Vertex};
-use crate::model::{Corner, Elements, Model, PenWriter, VERTEX_NUMBER_LIMIT};
+use crate::index::Index;
+use crate::model::{Corner, Elements, Model, PenWriter};
 use crate::stage::{Cancel, OutOfScratch, Scratch, StageError};
 
 /// The flattening of curves into as few straight lines as stay within a tolerance on the page.
@@ -22,10 +23,10 @@ pub struct Flattening<'f> {
 impl Flattening<'_> {
     /// Flattens the curves of the model. `points` are its vertices in view coordinates. `each`
     /// receives the end of each chord, and whether a curve begins there.
-    fn flatten(
+    fn flatten<I: Index>(
         &self,
         view: &View,
-        model: &Model<'_>,
+        model: &Model<'_, I>,
         points: &[Vertex],
         cancel: &mut dyn Cancel,
         each: &mut dyn FnMut(Point, bool) -> Result<(), OutOfScratch>,
@@ -44,10 +45,10 @@ impl Flattening<'_> {
     ///
     /// # Errors
     /// See [`StageError`].
-    pub fn each_chord(
+    pub fn each_chord<I: Index>(
         &self,
         view: &View,
-        model: &Model<'_>,
+        model: &Model<'_, I>,
         mut scratch: Scratch<'_>,
         cancel: &mut dyn Cancel,
         each: &mut dyn FnMut([Vertex; 2]),
@@ -69,23 +70,23 @@ impl Flattening<'_> {
 
     /// Returns the vertices of the model together with the ends of the chords of its curves, and
     /// `elements` together with a bar for each chord.
-    pub(super) fn add<'a>(
+    pub(super) fn add<'a, I: Index>(
         &self,
         view: &View,
-        model: &Model<'_>,
-        elements: Elements<'_>,
+        model: &Model<'_, I>,
+        elements: Elements<'_, I>,
         scratch: &mut Scratch<'a>,
         cancel: &mut dyn Cancel,
-    ) -> Result<(&'a [Vertex], Elements<'a>), StageError> {
+    ) -> Result<(&'a [Vertex], Elements<'a, I>), StageError> {
         // For each curve, the vertex number after that of its last chord end.
-        let curve_ends = scratch.take::<u16>(model.curve_count())?;
+        let curve_ends = scratch.take::<I>(model.curve_count())?;
         let first = model.vertices().len();
         let vertices = scratch.take_filled::<Vertex, StageError>(|room| {
             let available = size_of_val(room);
             let full = OutOfScratch { needed: available + size_of::<Vertex>(), available };
             let (points, room) = room.split_at_mut_checked(first).ok_or(full)?;
             view.fill(model, points, cancel)?;
-            let limit = VERTEX_NUMBER_LIMIT.saturating_sub(first);
+            let limit = <Corner<I>>::VERTEX_NUMBER_LIMIT.saturating_sub(first);
             let mut rest = room.iter_mut().take(limit);
             let (mut number, mut curve) = (first, 0);
             self.flatten(view, model, points, cancel, &mut |[x, y, z], begins| {
@@ -93,7 +94,7 @@ impl Flattening<'_> {
                 number += 1;
                 curve += usize::from(begins);
                 if let Some(end) = curve_ends.get_mut(curve - 1) {
-                    *end = number as u16; // at most VERTEX_NUMBER_LIMIT
+                    *end = I::new(number); // at most VERTEX_NUMBER_LIMIT
                 }
                 Ok(())
             })?;
@@ -101,7 +102,7 @@ impl Flattening<'_> {
         })?;
         let old = elements.corners();
         let chords = vertices.len() - first - curve_ends.len().min(vertices.len() - first);
-        let corners = scratch.take::<Corner>(old.len() + 2 * chords)?;
+        let corners = scratch.take::<Corner<I>>(old.len() + 2 * chords)?;
         let (same, new) = corners.split_at_mut(old.len());
         same.copy_from_slice(old);
         let mut pens = PenWriter::new(scratch, elements.pens().changes() + curve_ends.len())?;
@@ -110,20 +111,20 @@ impl Flattening<'_> {
             pens.element(at, pen);
             at += element.corner_count();
         }
-        let mut begin = first as u16;
+        let mut begin = I::new(first);
         let mut pairs = new.chunks_exact_mut(2);
         for (curve, &end) in model.curves().iter().zip(&*curve_ends) {
-            for (to, pair) in (begin + 1..end).zip(&mut pairs) {
+            for (to, pair) in (begin + I::ONE).to(end).zip(&mut pairs) {
                 pens.element(at, curve.pen);
                 pair.copy_from_slice(&[
-                    Corner::new(to - 1, true, false),
+                    Corner::new(to - I::ONE, true, false),
                     Corner::new(to, true, true),
                 ]);
                 at += 2;
             }
             begin = end;
         }
-        let corners: &'a [Corner] = corners;
+        let corners: &'a [Corner<I>] = corners;
         Ok((vertices, Elements::with_pens(corners, pens.finish())))
     }
 }

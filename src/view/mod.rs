@@ -25,6 +25,7 @@ pub use curves::Flattening;
 use crate::array::MapEach;
 use crate::fixed::square_root;
 use crate::geometry::{COORDINATE_LIMIT, Projection, Vertex};
+use crate::index::Index;
 use crate::model::{Model, Position};
 use crate::stage::{Aborted, Cancel};
 use camera::{Axes, dot, largest_component};
@@ -125,7 +126,7 @@ impl View {
     /// See [`ViewError`].
     // Not inlined, so that its stack frame is released before the stages run.
     #[inline(never)]
-    pub fn new(camera: &Camera, model: &Model<'_>) -> Result<Self, ViewError> {
+    pub fn new<I: Index>(camera: &Camera, model: &Model<'_, I>) -> Result<Self, ViewError> {
         let Axes { directions, origin } = Axes::new(camera)?;
         let fraction_bits = model.fraction_bits();
         let projection = camera.lens.projection();
@@ -202,9 +203,9 @@ impl View {
     }
 
     /// Transforms every vertex of `model` to view coordinates.
-    fn fill(
+    fn fill<I: Index>(
         &self,
-        model: &Model<'_>,
+        model: &Model<'_, I>,
         vertices: &mut [Vertex],
         cancel: &mut dyn Cancel,
     ) -> Result<(), Aborted> {
@@ -222,7 +223,7 @@ impl View {
     ///
     /// # Errors
     /// Returns [`ViewError::BehindEye`] with the first vertex that is not.
-    pub fn refuse_behind(&self, model: &Model<'_>) -> Result<(), ViewError> {
+    pub fn refuse_behind<I: Index>(&self, model: &Model<'_, I>) -> Result<(), ViewError> {
         let near = self.near.unwrap_or(i32::MIN);
         let is_behind = |position: &Position| self.vertex(*position).z < near;
         match model.vertices().iter().position(is_behind) {
@@ -264,7 +265,7 @@ fn as_ratio(value: f64) -> (u32, u32) {
 }
 
 /// Returns an upper bound of |direction · position| for directions of length 1, in model units.
-fn reach(model: &Model<'_>) -> f64 {
+fn reach<I: Index>(model: &Model<'_, I>) -> f64 {
     let largest = model.bounds().map_or(0, |(low, high)| {
         let corners = [low.coordinates(), high.coordinates()];
         corners.iter().flatten().map(|c| c.unsigned_abs()).max().unwrap_or(0)
@@ -274,7 +275,7 @@ fn reach(model: &Model<'_>) -> f64 {
 }
 
 /// Returns, for each axis, the least and the greatest value of axis · position over all vertices.
-fn extents(axes: &[Direction; 3], model: &Model<'_>) -> Option<[(f64, f64); 3]> {
+fn extents<I: Index>(axes: &[Direction; 3], model: &Model<'_, I>) -> Option<[(f64, f64); 3]> {
     // The sums use integers, with 30 bits of each direction, so that no vertex needs floating
     // point.
     let fixed_axes = axes.map(|axis| axis.map(|d| libm::round(libm::ldexp(d, 30)) as i64));
@@ -301,7 +302,7 @@ mod tests {
     use crate::model::no_undo;
 
     fn with_model(vertices: &[[&str; 3]], test: impl FnOnce(&Model<'_>)) {
-        let mut memory = (heapless::Vec::<Position, 16>::new(), [Corner::new(0, false, false); 16]);
+        let mut memory = ([Position::ORIGIN; 16], [<Corner>::ZERO; 16]);
         let mut model = Model::new(&mut memory.0, &mut memory.1);
         for vertex in vertices {
             model

@@ -2,6 +2,7 @@
 //! without an area.
 
 use crate::array::MapEach;
+use crate::index::Index;
 use crate::model::{Corner, Element, Elements, Model, PenWriter, Position};
 use crate::stage::{Cancel, OutOfScratch, Scratch, StageError};
 
@@ -12,19 +13,19 @@ use crate::stage::{Cancel, OutOfScratch, Scratch, StageError};
 ///
 /// If there is something to do, it takes 2 bytes of memory for each corner and 4 for each change of
 /// the pen. While it runs it takes 4 to 8 more bytes for each vertex.
-pub(super) fn weld<'a>(
-    model: &'a Model<'_>,
+pub(super) fn weld<'a, I: Index>(
+    model: &'a Model<'_, I>,
     scratch: &mut Scratch<'a>,
     cancel: &mut dyn Cancel,
-) -> Result<(Elements<'a>, u32), StageError> {
+) -> Result<(Elements<'a, I>, u32), StageError> {
     let positions = model.vertices();
     let elements = model.elements();
     let degenerate = elements.iter().filter(|element| !has_extent(element, positions)).count();
     cancel.check()?;
-    if degenerate == 0 && PositionTable::new(positions, &mut scratch.reborrow())?.1 == 0 {
+    if degenerate == 0 && PositionTable::<I>::new(positions, &mut scratch.reborrow())?.1 == 0 {
         return Ok((elements, 0));
     }
-    let corners: &mut [Corner] = scratch.take(elements.corners().len())?;
+    let corners: &mut [Corner<I>] = scratch.take(elements.corners().len())?;
     let mut pens = PenWriter::new(scratch, elements.pens().changes())?;
     cancel.check()?;
     let (table, _) = PositionTable::new(positions, &mut scratch.reborrow())?;
@@ -48,17 +49,16 @@ pub(super) fn weld<'a>(
         }
         kept += old.len();
     }
-    let corners: &'a [Corner] = corners;
+    let corners: &'a [Corner<I>] = corners;
     let corners = corners.get(..kept).unwrap_or(corners);
     Ok((Elements::with_pens(corners, pens.finish()), degenerate as u32))
 }
 
 /// Whether an element is a bar or a face with an area.
-fn has_extent(element: &Element<'_>, positions: &[Position]) -> bool {
+fn has_extent<I: Index>(element: &Element<'_, I>, positions: &[Position]) -> bool {
     let Element::Face(corners) = element else { return true };
     let mut sides = corners.iter().filter_map(|corner| {
-        let [from, to] =
-            [corners.first()?, corner].map_each(|c| positions.get(usize::from(c.vertex())));
+        let [from, to] = [corners.first()?, corner].map_each(|c| positions.get(c.vertex().get()));
         let [from, to] = [from?.coordinates(), to?.coordinates()];
         let side = [0, 1, 2].map_each(|axis: usize| i64::from(to[axis]) - i64::from(from[axis]));
         (side != [0; 3]).then_some(side)
@@ -72,14 +72,14 @@ fn has_extent(element: &Element<'_>, positions: &[Position]) -> bool {
 }
 
 /// A hash table of the positions that have a vertex, with open addressing.
-struct PositionTable<'a> {
+struct PositionTable<'a, I> {
     positions: &'a [Position],
     /// Vertex numbers counted from 1; 0 marks a free slot. The length is a power of two and at
     /// least twice the number of vertices.
-    slots: &'a mut [u16],
+    slots: &'a mut [I],
 }
 
-impl<'a> PositionTable<'a> {
+impl<'a, I: Index> PositionTable<'a, I> {
     /// Builds the table, and counts the vertices that are at the position of an earlier one.
     fn new(
         positions: &'a [Position],
@@ -88,28 +88,29 @@ impl<'a> PositionTable<'a> {
         let slots = scratch.take((2 * positions.len()).next_power_of_two())?;
         let table = Self { positions, slots };
         let mut repeated = 0;
-        for (number, position) in (1..).zip(positions) {
+        for (number, position) in I::ONE.to(I::NONE).zip(positions) {
             let slot = table.slot(position);
-            match table.slots.get_mut(slot) {
-                Some(free @ 0) => *free = number,
-                _ => repeated += 1,
+            match table.slots.get_mut(slot).filter(|slot| **slot == I::ZERO) {
+                Some(free) => *free = number,
+                None => repeated += 1,
             }
         }
         Ok((table, repeated))
     }
 
     /// Returns the least number of a vertex at the position of vertex `number`.
-    fn first_at(&self, number: u16) -> Option<u16> {
-        let slot = self.slot(self.positions.get(usize::from(number))?);
-        self.slots.get(slot)?.checked_sub(1)
+    fn first_at(&self, number: I) -> Option<I> {
+        let slot = self.slot(self.positions.get(number.get())?);
+        self.slots.get(slot)?.get().checked_sub(1).map(I::new)
     }
 
     /// Returns the slot that holds this position, or the free one where it belongs.
     fn slot(&self, position: &Position) -> usize {
         let mask = self.slots.len() - 1; // there is always one
         let mut slot = hash(position) as usize & mask;
-        while let Some(number) = self.slots.get(slot).and_then(|number| number.checked_sub(1)) {
-            if self.positions.get(usize::from(number)) == Some(position) {
+        while let Some(number) = self.slots.get(slot).and_then(|number| number.get().checked_sub(1))
+        {
+            if self.positions.get(number) == Some(position) {
                 break;
             }
             slot = (slot + 1) & mask;
@@ -143,8 +144,8 @@ mod tests {
     }
 
     fn welded(positions: &[[&str; 3]], faces: &[&[i32]]) -> Vec<(u16, bool, bool)> {
-        let mut vertices = heapless::Vec::<Position, 16>::new();
-        let mut corners = [Corner::new(0, false, false); 64];
+        let mut vertices = [Position::ORIGIN; 16];
+        let mut corners = [<Corner>::ZERO; 64];
         let mut model = Model::new(&mut vertices, &mut corners);
         for position in positions {
             model.add_vertex(decimals(*position), &mut no_undo).unwrap();
@@ -186,8 +187,8 @@ mod tests {
 
     #[test]
     fn what_has_no_repeats_is_untouched_and_takes_no_memory() {
-        let mut vertices = heapless::Vec::<Position, 4>::new();
-        let mut corners = [Corner::new(0, false, false); 4];
+        let mut vertices = [Position::ORIGIN; 4];
+        let mut corners = [<Corner>::ZERO; 4];
         let mut model = Model::new(&mut vertices, &mut corners);
         for [x, y] in [["0", "0"], ["1", "0"], ["0.5", "1"]] {
             model.add_vertex(decimals([x, y, "0"]), &mut no_undo).unwrap();

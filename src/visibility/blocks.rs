@@ -15,6 +15,7 @@ use super::faces::Face;
 use super::profile::{EdgeInterval, Profile};
 use super::scene_index::SceneIndex;
 use crate::array::MapEach;
+use crate::index::Index;
 
 /// One of the two sides of an edge, and the bits of the profile's marks that hold the nearest face
 /// that begins there. They hold the rank plus one; zero means none.
@@ -24,25 +25,29 @@ struct Bank {
     is_left: bool,
 }
 
-const LEFT: Bank = Bank { shift: 16, is_left: true };
-const RIGHT: Bank = Bank { shift: 32, is_left: false };
+/// How many bits a rank has among the marks.
+const RANK_BITS: u32 = 30;
+/// The bits of a rank.
+const RANKS: usize = (1 << RANK_BITS) - 1;
+const LEFT: Bank = Bank { shift: 4, is_left: true };
+const RIGHT: Bank = Bank { shift: LEFT.shift + RANK_BITS, is_left: false };
 
 impl Bank {
     /// Returns the rank that `marks` hold in this bank; `None` if they hold none.
     fn get(self, marks: u64) -> Option<usize> {
-        usize::from((marks >> self.shift) as u16).checked_sub(1)
+        ((marks >> self.shift) as usize & RANKS).checked_sub(1)
     }
 
     /// Returns the marks with `rank` in this bank.
     fn put(self, marks: u64, rank: usize) -> u64 {
-        marks & !(0xFFFF << self.shift) | (rank as u64 + 1) << self.shift
+        marks & !((RANKS as u64) << self.shift) | (rank as u64 + 1) << self.shift
     }
 }
 
 /// A triangle whose plane contains an edge.
-struct Touching {
+struct Touching<I> {
     /// The numbers of the vertices.
-    corners: [u16; 3],
+    corners: [I; 3],
     /// The side of the edge's line on which each corner lies: 1 is left, -1 is right, 0 is on the
     /// line.
     sides: [i32; 3],
@@ -50,9 +55,9 @@ struct Touching {
     facing: i32,
 }
 
-impl Touching {
+impl<I: Index> Touching<I> {
     /// Returns a corner that lies on the given side of the edge.
-    fn corner(&self, bank: Bank) -> Option<u16> {
+    fn corner(&self, bank: Bank) -> Option<I> {
         let wanted = if bank.is_left { 1 } else { -1 };
         let found = self.sides.iter().position(|&side| side == wanted)?;
         Some(self.corners[found])
@@ -60,18 +65,18 @@ impl Touching {
 
     /// Returns a positive number if a vertex lies behind the plane of this triangle, a negative one
     /// if it lies in front, and zero if it lies in the plane.
-    fn height(&self, coarse_projection: &CoarseProjection<'_>, vertex: u16) -> i64 {
+    fn height(&self, coarse_projection: &CoarseProjection<'_>, vertex: I) -> i64 {
         coarse_projection.height(self.corners, coarse_projection.end(vertex))
             * i64::from(self.facing)
     }
 }
 
-impl EdgeQuery {
+impl<I: Index> EdgeQuery<I> {
     /// Records where `face` begins at this edge, for the parts of the edge where it is the nearest
     /// face to do so.
     pub fn touch(
         &self,
-        around: &SceneIndex<'_>,
+        around: &SceneIndex<'_, I>,
         face: Face,
         rank: usize,
         profile: &mut Profile<'_>,
@@ -103,7 +108,7 @@ impl EdgeQuery {
     }
 
     /// Whether the faces recorded on both sides of a piece of this edge lie in one plane.
-    pub fn is_within_plane(&self, around: &SceneIndex<'_>, marks: u64) -> bool {
+    pub fn is_within_plane(&self, around: &SceneIndex<'_, I>, marks: u64) -> bool {
         let beside = |bank: Bank| self.find_touching(around, bank.get(marks)?, bank);
         let (Some(left), Some(right)) = (beside(LEFT), beside(RIGHT)) else {
             return false;
@@ -115,8 +120,8 @@ impl EdgeQuery {
     /// Whether a triangle is nearer than the face with rank `than` on the given side of this edge.
     fn is_nearer(
         &self,
-        around: &SceneIndex<'_>,
-        touching: &Touching,
+        around: &SceneIndex<'_, I>,
+        touching: &Touching<I>,
         than: usize,
         bank: Bank,
     ) -> bool {
@@ -129,7 +134,12 @@ impl EdgeQuery {
 
     /// Returns the triangle of a face whose plane contains this edge and that has a corner on the
     /// given side of it.
-    fn find_touching(&self, around: &SceneIndex<'_>, rank: usize, bank: Bank) -> Option<Touching> {
+    fn find_touching(
+        &self,
+        around: &SceneIndex<'_, I>,
+        rank: usize,
+        bank: Bank,
+    ) -> Option<Touching<I>> {
         around
             .triangles(around.faces.get(rank))
             .filter_map(|triangle| self.touching(&around.coarse_projection, triangle))
@@ -139,8 +149,8 @@ impl EdgeQuery {
     fn touching(
         &self,
         coarse_projection: &CoarseProjection<'_>,
-        triangle: [u16; 3],
-    ) -> Option<Touching> {
+        triangle: [I; 3],
+    ) -> Option<Touching<I>> {
         let [a, b, c] = triangle;
         let facing = coarse_projection.side(a, b, c);
         (facing != 0 && self.lies_in_plane_of(coarse_projection, triangle)).then(|| Touching {
@@ -161,7 +171,7 @@ impl EdgeQuery {
     pub fn lies_in_plane_of(
         &self,
         coarse_projection: &CoarseProjection<'_>,
-        triangle: [u16; 3],
+        triangle: [I; 3],
     ) -> bool {
         match self.seam {
             Some(seam) => seam.iter().any(|of| coarse_projection.heights(triangle, *of) == [0; 3]),
@@ -172,7 +182,7 @@ impl EdgeQuery {
     }
 
     /// Whether a vertex lies, in the model, on the line of this edge or seam.
-    fn is_in_line_with(&self, coarse_projection: &CoarseProjection<'_>, vertex: u16) -> bool {
+    fn is_in_line_with(&self, coarse_projection: &CoarseProjection<'_>, vertex: I) -> bool {
         let [p, q] = [self.p.number, self.q.number];
         match self.seam {
             Some(seam) => seam

@@ -12,6 +12,7 @@ use crate::array::MapEach;
 use crate::geometry::{
     Axis, EdgeParameter, Projection, Vertex, page_offset, page_side, plane_side, plane_side_margin,
 };
+use crate::index::Index;
 use crate::stage::{Aborted, Scratch};
 use bytemuck::{Pod, Zeroable};
 
@@ -97,24 +98,24 @@ pub fn coarse_side(a: CoarsePoint, b: CoarsePoint, c: CoarsePoint) -> i32 {
 
 /// The line through two vertices of a [`CoarseProjection`].
 #[derive(Debug, Clone, Copy)]
-pub struct VertexLine<'o> {
+pub struct VertexLine<'o, I> {
     coarse_projection: &'o CoarseProjection<'o>,
-    a: u16,
-    b: u16,
+    a: I,
+    b: I,
     coarse: CoarseLine,
 }
 
-impl VertexLine<'_> {
+impl<I: Index> VertexLine<'_, I> {
     /// Returns the sign of [`page_side`] for an end of an edge.
     #[inline]
-    pub fn side(&self, end: End) -> i32 {
+    pub fn side(&self, end: End<I>) -> i32 {
         let coarse = self.coarse.side(end.position);
         if coarse != 0 { coarse } else { self.exact_side(end) }
     }
 
     /// Answers [`Self::side`] exactly, without the coarse grid.
     #[cold]
-    fn exact_side(&self, end: End) -> i32 {
+    fn exact_side(&self, end: End<I>) -> i32 {
         if end.number == self.a || end.number == self.b {
             return 0;
         }
@@ -180,18 +181,18 @@ fn fine(projection: Projection, vertex: Vertex) -> (i64, i64) {
 
 /// An end of an edge that is being tested.
 #[derive(Debug, Clone, Copy)]
-pub struct End {
+pub struct End<I> {
     /// The number of the vertex at this end, or [`End::FREE`], which is the number of no vertex.
-    pub number: u16,
+    pub number: I,
     /// The position in view coordinates.
     pub vertex: Vertex,
     /// The position on the coarse grid.
     pub position: CoarsePoint,
 }
 
-impl End {
+impl<I: Index> End<I> {
     /// The number of an end that is not a vertex of the model.
-    pub const FREE: u16 = u16::MAX;
+    pub const FREE: I = I::NONE;
 }
 
 /// The vertices in view coordinates and on the coarse grid.
@@ -210,8 +211,8 @@ pub struct CoarseProjection<'a> {
 
 impl<'a> CoarseProjection<'a> {
     /// Projects every vertex onto the coarse grid.
-    pub fn new<'s: 'a>(
-        scene: &Scene<'a>,
+    pub fn new<'s: 'a, I: Index>(
+        scene: &Scene<'a, I>,
         scratch: &mut Scratch<'s>,
         yield_counter: &mut YieldCounter<'_>,
     ) -> Result<Self, VisibilityError> {
@@ -226,30 +227,30 @@ impl<'a> CoarseProjection<'a> {
     }
 
     /// Returns a vertex as the end of an edge.
-    pub fn end(&self, number: u16) -> End {
+    pub fn end<I: Index>(&self, number: I) -> End<I> {
         End { number, vertex: self.vertex(number), position: self.position(number) }
     }
 
     /// Returns any point within the extent of the vertices as the end of an edge.
-    pub fn free_end(&self, vertex: Vertex) -> End {
+    pub fn free_end<I: Index>(&self, vertex: Vertex) -> End<I> {
         End { number: End::FREE, vertex, position: self.mapping.position(vertex) }
     }
 
     /// Returns the view coordinates of a vertex.
     #[inline]
-    pub fn vertex(&self, number: u16) -> Vertex {
-        self.vertices[usize::from(number)]
+    pub fn vertex<I: Index>(&self, number: I) -> Vertex {
+        self.vertices[number.get()]
     }
 
     /// Returns the position of a vertex on the coarse grid.
     #[inline]
-    pub fn position(&self, number: u16) -> CoarsePoint {
-        self.positions[usize::from(number)]
+    pub fn position<I: Index>(&self, number: I) -> CoarsePoint {
+        self.positions[number.get()]
     }
 
     /// Returns the line through two vertices.
     #[inline]
-    pub fn line(&self, a: u16, b: u16) -> VertexLine<'_> {
+    pub fn line<I: Index>(&self, a: I, b: I) -> VertexLine<'_, I> {
         VertexLine {
             coarse_projection: self,
             a,
@@ -260,18 +261,18 @@ impl<'a> CoarseProjection<'a> {
 
     /// Returns the sign of [`page_side`] for three vertices.
     #[inline]
-    pub fn side(&self, a: u16, b: u16, c: u16) -> i32 {
+    pub fn side<I: Index>(&self, a: I, b: I, c: I) -> i32 {
         self.line(a, b).side(self.end(c))
     }
 
     /// Returns the exact [`page_side`] of an end, for the line through two vertices.
-    pub fn side_value(&self, a: u16, b: u16, end: End) -> i64 {
+    pub fn side_value<I: Index>(&self, a: I, b: I, end: End<I>) -> i64 {
         page_side(self.projection, self.vertex(a), self.vertex(b), end.vertex)
     }
 
     /// Returns where on the edge from p to q the line through a and b crosses it. The caller
     /// guarantees that it crosses between p and q.
-    pub fn crossing(&self, a: u16, b: u16, p: End, q: End) -> EdgeParameter {
+    pub fn crossing<I: Index>(&self, a: I, b: I, p: End<I>, q: End<I>) -> EdgeParameter {
         EdgeParameter::zero_between(self.side_value(a, b, p), self.side_value(a, b, q))
     }
 
@@ -281,7 +282,7 @@ impl<'a> CoarseProjection<'a> {
     ///
     /// The result is zero if the end lies in the plane in the model, as far as that is known;
     /// rounding alone would move it out of the plane.
-    pub fn height(&self, triangle: [u16; 3], end: End) -> i64 {
+    pub fn height<I: Index>(&self, triangle: [I; 3], end: End<I>) -> i64 {
         if triangle.contains(&end.number) {
             return 0;
         }
@@ -296,7 +297,7 @@ impl<'a> CoarseProjection<'a> {
     }
 
     /// Returns [`Self::height`] over `triangle` for each corner of the triangle `of`.
-    pub fn heights(&self, triangle: [u16; 3], of: [u16; 3]) -> [i64; 3] {
+    pub fn heights<I: Index>(&self, triangle: [I; 3], of: [I; 3]) -> [i64; 3] {
         of.map_each(|corner| self.height(triangle, self.end(corner)))
     }
 
@@ -335,7 +336,7 @@ mod tests {
             let yield_counter = &mut YieldCounter::new(&mut never_cancel);
             let coarse_projection =
                 CoarseProjection::new(&scene(projection, &vertices), &mut scratch, yield_counter)?;
-            let xs: [u16; 3] = [0, 1, 2].map(|n| coarse_projection.position(n).x);
+            let xs: [u16; 3] = [0u16, 1, 2].map(|n| coarse_projection.position(n).x);
             assert!(xs[0] == 0 && xs[0] < xs[1] && xs[1] <= xs[2], "{xs:?}");
             assert!(xs[2] >= 1 << (COARSE_BITS - 1) && xs[2] < 1 << COARSE_BITS);
         }

@@ -13,23 +13,24 @@ use super::profile::{EdgeInterval, Profile, mark};
 use super::scene_index::SceneIndex;
 use crate::array::MapEach;
 use crate::geometry::{EdgeParameter, line_side, page_offset, page_side};
+use crate::index::Index;
 use crate::model::Corner;
 
 /// An edge, or a seam, that is being tested against faces.
 #[derive(Debug, Clone, Copy)]
-pub struct EdgeQuery {
+pub struct EdgeQuery<I> {
     /// The side of a face that represents this edge; [`Self::NO_SIDE`] for a seam.
     pub side: usize,
     /// The end at which the edge begins.
-    pub p: End,
+    pub p: End<I>,
     /// The end at which the edge stops.
-    pub q: End,
+    pub q: End<I>,
     /// The depth of the nearer end.
     pub near: i32,
     /// The depth of the farther end.
     pub far: i32,
     /// The two triangles that pass through each other along it, if this is a seam.
-    pub seam: Option<[[u16; 3]; 2]>,
+    pub seam: Option<[[I; 3]; 2]>,
     /// The lower left corner of the rectangle around the edge on the coarse grid.
     low: CoarsePoint,
     /// The upper right corner of that rectangle.
@@ -39,7 +40,7 @@ pub struct EdgeQuery {
 }
 
 /// A side of a face, as the numbers of the vertices at its two ends.
-type Side = (u16, u16);
+type Side<I> = (I, I);
 
 /// A face, or one of its triangles, with the sides of the edge's line on which its corners lie.
 ///
@@ -47,19 +48,19 @@ type Side = (u16, u16);
 /// points just to the right see it as lying to the left. So there are two masks of the corners that
 /// count as lying to the left.
 #[derive(Clone, Copy)]
-pub struct CrossedPolygon<'c> {
+pub struct CrossedPolygon<'c, I> {
     /// The numbers of the vertices of the polygon.
-    corners: &'c [u16],
+    corners: &'c [I],
     /// One bit for each corner: whether it lies to the left of the line.
     pub left: u32,
     /// One bit for each corner: whether it lies to the left of the line or on it.
     pub left_or_on: u32,
 }
 
-impl<'c> CrossedPolygon<'c> {
+impl<'c, I: Index> CrossedPolygon<'c, I> {
     /// Builds it from the corners, of which there are at most [`FEW_CORNERS`], and the side of the
     /// line on which each lies: positive is left, negative is right, zero is on the line.
-    pub fn new(corners: &'c [u16], sides: &[i32]) -> Self {
+    pub fn new(corners: &'c [I], sides: &[i32]) -> Self {
         let (mut left, mut left_or_on) = (0, 0);
         for (n, &side) in sides.iter().enumerate().take(corners.len()) {
             left |= u32::from(side > 0) << n;
@@ -88,7 +89,7 @@ impl<'c> CrossedPolygon<'c> {
     }
 
     /// Returns the side that ends at a corner.
-    fn side(&self, end: usize) -> Side {
+    fn side(&self, end: usize) -> Side<I> {
         let begin = end.checked_sub(1).unwrap_or(self.corners.len() - 1);
         (self.corners[begin], self.corners[end])
     }
@@ -107,9 +108,9 @@ const FEW_CORNERS: usize = 8;
 /// The sides through which the edge enters and leaves a polygon on the page. Each is `None` if the
 /// edge begins or ends inside the polygon.
 #[derive(Clone, Copy, Default)]
-pub struct Passage {
-    entry: Option<Side>,
-    exit: Option<Side>,
+pub struct Passage<I> {
+    entry: Option<Side<I>>,
+    exit: Option<Side<I>>,
 }
 
 /// How an edge lies in depth relative to a face.
@@ -122,17 +123,17 @@ enum Depth {
     Mixed,
 }
 
-impl EdgeQuery {
+impl<I: Index> EdgeQuery<I> {
     /// The value of `side` for a seam. It sorts after the sides of all edges.
     pub const NO_SIDE: usize = usize::MAX;
 
     /// Creates the query for the seam of two triangles, which runs from p to q.
-    pub fn of_seam(triangles: [[u16; 3]; 2], p: End, q: End) -> Self {
+    pub fn of_seam(triangles: [[I; 3]; 2], p: End<I>, q: End<I>) -> Self {
         Self { seam: Some(triangles), ..Self::new(Self::NO_SIDE, p, q) }
     }
 
     /// Creates the query for the edge between two ends that `side` represents.
-    pub fn new(side: usize, p: End, q: End) -> Self {
+    pub fn new(side: usize, p: End<I>, q: End<I>) -> Self {
         Self {
             side,
             p,
@@ -148,14 +149,14 @@ impl EdgeQuery {
 
     /// Returns the side of this edge's line on which a vertex lies on the page: positive for left,
     /// negative for right, zero on the line.
-    pub fn side_of(&self, coarse_projection: &CoarseProjection<'_>, number: u16) -> i32 {
+    pub fn side_of(&self, coarse_projection: &CoarseProjection<'_>, number: I) -> i32 {
         let coarse = self.line.side(coarse_projection.position(number));
         if coarse != 0 { coarse } else { self.exact_side_of(coarse_projection, number) }
     }
 
     /// Answers [`Self::side_of`] exactly, without the coarse grid.
     #[cold]
-    fn exact_side_of(&self, coarse_projection: &CoarseProjection<'_>, number: u16) -> i32 {
+    fn exact_side_of(&self, coarse_projection: &CoarseProjection<'_>, number: I) -> i32 {
         if number == self.p.number || number == self.q.number {
             return 0;
         }
@@ -166,10 +167,10 @@ impl EdgeQuery {
 
     /// Marks on `profile` the parts of this edge that `face` hides or that one of its sides
     /// replaces.
-    pub fn mark_face(&self, around: &SceneIndex<'_>, face: Face, profile: &mut Profile<'_>) {
+    pub fn mark_face(&self, around: &SceneIndex<'_, I>, face: Face, profile: &mut Profile<'_>) {
         let coarse_projection = &around.coarse_projection;
         let corners = around.outlines.element(face.first);
-        let mut numbers = [0; FEW_CORNERS];
+        let mut numbers = [I::ZERO; FEW_CORNERS];
         let mut sides = [0; FEW_CORNERS];
         let (mut left, mut right) = (true, true);
         let (mut low, mut high) = (CoarsePoint::HIGHEST, CoarsePoint::LOWEST);
@@ -214,7 +215,7 @@ impl EdgeQuery {
     }
 
     /// Marks the parts of this edge that the triangles of a face hide.
-    fn pass_triangles(&self, around: &SceneIndex<'_>, face: Face, profile: &mut Profile<'_>) {
+    fn pass_triangles(&self, around: &SceneIndex<'_, I>, face: Face, profile: &mut Profile<'_>) {
         for triangle in around.triangles(face) {
             self.pass_triangle(&around.coarse_projection, &triangle, profile);
         }
@@ -224,7 +225,7 @@ impl EdgeQuery {
     fn pass_triangle(
         &self,
         coarse_projection: &CoarseProjection<'_>,
-        triangle: &[u16; 3],
+        triangle: &[I; 3],
         profile: &mut Profile<'_>,
     ) {
         let sides = triangle.map_each(|corner| self.side_of(coarse_projection, corner));
@@ -237,7 +238,7 @@ impl EdgeQuery {
     fn pass(
         &self,
         coarse_projection: &CoarseProjection<'_>,
-        piece: CrossedPolygon<'_>,
+        piece: CrossedPolygon<'_, I>,
         profile: &mut Profile<'_>,
     ) -> bool {
         let corners = piece.corners;
@@ -249,7 +250,7 @@ impl EdgeQuery {
         if is_many(left) || is_many(right) {
             return false;
         }
-        let depth = |number: &u16| coarse_projection.vertex(*number).z;
+        let depth = |number: &I| coarse_projection.vertex(*number).z;
         let (mut near, mut far) = (i32::MAX, i32::MIN);
         for z in corners.iter().map(depth) {
             (near, far) = (near.min(z), far.max(z));
@@ -286,7 +287,7 @@ impl EdgeQuery {
                 Depth::Mixed => return false,
             }
         };
-        let mut cover = |passage: Option<Passage>, marks: u64| {
+        let mut cover = |passage: Option<Passage<I>>, marks: u64| {
             if let Some(passage) = passage {
                 profile.mark(self.part(coarse_projection, passage).and(behind), marks);
             }
@@ -305,7 +306,7 @@ impl EdgeQuery {
     fn depth_behind(
         &self,
         coarse_projection: &CoarseProjection<'_>,
-        corners: &[u16],
+        corners: &[I],
         facing: i32,
     ) -> Depth {
         let mut depth = None;
@@ -315,7 +316,8 @@ impl EdgeQuery {
             {
                 None
             } else {
-                let height = |end: End| coarse_projection.height(triangle, end) * i64::from(facing);
+                let height =
+                    |end: End<I>| coarse_projection.height(triangle, end) * i64::from(facing);
                 behind_between(height(self.p), height(self.q))
             };
             if corners.len() > 3 {
@@ -338,10 +340,10 @@ impl EdgeQuery {
     pub fn passage(
         &self,
         coarse_projection: &CoarseProjection<'_>,
-        piece: CrossedPolygon<'_>,
+        piece: CrossedPolygon<'_, I>,
         crossings: u32,
         facing: i32,
-    ) -> Option<Passage> {
+    ) -> Option<Passage<I>> {
         if crossings == 0 {
             return None;
         }
@@ -367,8 +369,12 @@ impl EdgeQuery {
     }
 
     /// Returns the part of the edge that lies within a polygon on the page.
-    pub fn part(&self, coarse_projection: &CoarseProjection<'_>, passage: Passage) -> EdgeInterval {
-        let position = |(a, b): Side| coarse_projection.crossing(a, b, self.p, self.q);
+    pub fn part(
+        &self,
+        coarse_projection: &CoarseProjection<'_>,
+        passage: Passage<I>,
+    ) -> EdgeInterval {
+        let position = |(a, b): Side<I>| coarse_projection.crossing(a, b, self.p, self.q);
         EdgeInterval { from: passage.entry.map(position), to: passage.exit.map(position) }
     }
 
@@ -377,12 +383,12 @@ impl EdgeQuery {
     #[cold]
     fn pass_sides(
         &self,
-        around: &SceneIndex<'_>,
+        around: &SceneIndex<'_, I>,
         first: usize,
-        corners: &[Corner],
+        corners: &[Corner<I>],
         profile: &mut Profile<'_>,
     ) {
-        let is_on_line = |corner: u16| self.side_of(&around.coarse_projection, corner) == 0;
+        let is_on_line = |corner: I| self.side_of(&around.coarse_projection, corner) == 0;
         for (number, a, b) in sides(corners) {
             let side = first + number;
             if side != self.side && around.chosen.contains(side) && is_on_line(a) && is_on_line(b) {
@@ -396,9 +402,9 @@ impl EdgeQuery {
     /// near with a lower pen, or equally near with the same pen and earlier in the model.
     fn pass_side(
         &self,
-        around: &SceneIndex<'_>,
+        around: &SceneIndex<'_, I>,
         side: usize,
-        (a, b): Side,
+        (a, b): Side<I>,
         profile: &mut Profile<'_>,
     ) {
         let coarse_projection = &around.coarse_projection;

@@ -5,34 +5,35 @@ use super::crease::Crease;
 use super::yield_counter::YieldCounter;
 use super::{Unrounded, VisibilityError};
 use crate::geometry::{Projection, Vertex};
+use crate::index::Index;
 use crate::model::{Corner, Elements, Pens};
 use crate::stage::Scratch;
 
 /// The corners of the elements. An element is addressed by the number of its first corner.
 #[derive(Debug, Clone, Copy)]
-pub struct Outlines<'a> {
+pub struct Outlines<'a, I> {
     /// The corners of all elements, one element after the other.
-    pub corners: &'a [Corner],
+    pub corners: &'a [Corner<I>],
     /// The pen of each element, by corner number.
-    pub pens: Pens<'a>,
+    pub pens: Pens<'a, I>,
 }
 
-impl<'a> Outlines<'a> {
+impl<'a, I: Index> Outlines<'a, I> {
     /// Takes the corners and pens of the elements of a model.
-    pub fn of(elements: Elements<'a>) -> Self {
+    pub fn of(elements: Elements<'a, I>) -> Self {
         Self { corners: elements.corners(), pens: elements.pens() }
     }
 
     /// Returns the corners of the element that begins at corner `first`.
     #[inline]
-    pub fn element(&self, first: usize) -> &'a [Corner] {
+    pub fn element(&self, first: usize) -> &'a [Corner<I>] {
         let rest = &self.corners[first..];
         let last = rest.iter().position(|corner| corner.is_last());
         &rest[..last.map_or(0, |last| last + 1)]
     }
 
     /// Iterates over the elements, each with the number of its first corner.
-    pub fn elements(&self) -> impl Iterator<Item = (usize, &'a [Corner])> + use<'a> {
+    pub fn elements(&self) -> impl Iterator<Item = (usize, &'a [Corner<I>])> + use<'a, I> {
         let mut next = 0;
         self.corners.split_inclusive(|corner| corner.is_last()).map(move |corners| {
             let first = next;
@@ -43,13 +44,13 @@ impl<'a> Outlines<'a> {
 }
 
 /// Whether the element is a bar, which has a single side and no interior.
-pub fn is_bar(corners: &[Corner]) -> bool {
+pub fn is_bar<I: Index>(corners: &[Corner<I>]) -> bool {
     corners.len() == 2
 }
 
 /// Iterates over the sides of an element: the number of the corner within the element at which the
 /// side begins, and the vertex numbers of its two ends.
-pub fn sides(corners: &[Corner]) -> impl Iterator<Item = (usize, u16, u16)> + '_ {
+pub fn sides<I: Index>(corners: &[Corner<I>]) -> impl Iterator<Item = (usize, I, I)> + '_ {
     let count = if is_bar(corners) { 1 } else { corners.len() };
     let ends = corners.iter().skip(1).chain(corners.first());
     corners
@@ -66,12 +67,11 @@ pub struct ChosenSides<'a> {
     bits: &'a mut [u32],
 }
 
-/// Stands for "no side" and marks the end of a chain.
-const NONE: u16 = u16::MAX;
-
-/// The most corners that a scene may have. Sides are chained by 16-bit numbers, one of which means
-/// "none".
-pub const MOST_CORNERS: usize = NONE as usize;
+/// Returns the most corners that a scene may have. Sides are chained by numbers, one of which means
+/// "none", and a profile holds ranks of 30 bits.
+pub const fn most_corners<I: Index>() -> usize {
+    if I::BITS < 30 { (1 << I::BITS) - 1 } else { (1 << 30) - 1 }
+}
 
 impl<'a> ChosenSides<'a> {
     /// Returns the bytes that stay in use after the choice.
@@ -81,10 +81,8 @@ impl<'a> ChosenSides<'a> {
 
     /// Returns the bytes that are in use while the sides are being chosen, in addition to
     /// [`Self::bytes`].
-    pub const fn bytes_while_choosing(vertices: usize, corners: usize) -> usize {
-        Scratch::bytes_for::<u16>(vertices)
-            + Scratch::bytes_for::<u16>(corners)
-            + Self::bytes(corners)
+    pub const fn bytes_while_choosing<I: Index>(vertices: usize, corners: usize) -> usize {
+        Scratch::bytes_for::<I>(vertices) + Scratch::bytes_for::<I>(corners) + Self::bytes(corners)
     }
 
     /// Chooses one side to represent each edge. Of the sides of all elements that share the edge,
@@ -93,8 +91,8 @@ impl<'a> ChosenSides<'a> {
     ///
     /// # Errors
     /// Returns an error if the memory is too small or the user cancels.
-    pub fn choose(
-        outlines: Outlines<'_>,
+    pub fn choose<I: Index>(
+        outlines: Outlines<'_, I>,
         projection: Projection,
         vertices: &[Vertex],
         (crease, unrounded): (Option<Crease>, Unrounded<'_>),
@@ -105,46 +103,46 @@ impl<'a> ChosenSides<'a> {
         let word_count = corners.len().div_ceil(32);
         let mut chosen = Self { bits: scratch.take(word_count)? };
         let mut meantime = scratch.reborrow();
-        let heads: &mut [u16] = meantime.take(vertices.len())?;
-        let next: &mut [u16] = meantime.take(corners.len())?;
+        let heads: &mut [I] = meantime.take(vertices.len())?;
+        let next: &mut [I] = meantime.take(corners.len())?;
         // The sides whose edges have been found to have a second side.
         let mut shared = ChosenSides { bits: meantime.take(word_count)? };
-        heads.fill(NONE);
+        heads.fill(I::NONE);
         for (first, element) in outlines.elements() {
             for (number, from, to) in sides(element) {
                 if from == to {
                     continue;
                 }
                 let side = first + number;
-                let head = &mut heads[usize::from(from.min(to))];
+                let head = &mut heads[from.min(to).get()];
                 let mut known = *head;
-                let mut before = NONE;
+                let mut before = I::NONE;
                 let mut turned = false;
-                while known != NONE {
-                    let (a, b) = side_at(corners, usize::from(known));
+                while known != I::NONE {
+                    let (a, b) = side_at(corners, known.get());
                     turned = (a, b) == (from, to);
                     if turned || (a, b) == (to, from) {
                         break;
                     }
                     before = known;
-                    known = next[usize::from(known)];
+                    known = next[known.get()];
                     yield_counter.spend(30)?;
                 }
-                if known == NONE {
+                if known == I::NONE {
                     next[side] = *head;
-                    *head = side as u16;
+                    *head = I::new(side);
                     chosen.insert(side);
                     continue;
                 }
-                let known = usize::from(known);
+                let known = known.get();
                 let is_open = is_bar(element) || shared.contains(known);
                 let mut best = known;
                 if outlines.pens.at(side) < outlines.pens.at(known) {
                     // The new side represents the edge from now on.
                     best = side;
                     next[side] = next[known];
-                    *(if before == NONE { head } else { &mut next[usize::from(before)] }) =
-                        side as u16;
+                    *(if before == I::NONE { head } else { &mut next[before.get()] }) =
+                        I::new(side);
                     if chosen.contains(known) {
                         chosen.remove(known);
                         chosen.insert(best);
@@ -153,9 +151,9 @@ impl<'a> ChosenSides<'a> {
                 shared.insert(best);
                 let Some(crease) = crease else { continue };
                 let known_element = outlines.element(start_of(corners, known));
-                let at = |corner: &Corner| vertices[usize::from(corner.vertex())];
+                let at = |corner: &Corner<I>| vertices[corner.vertex().get()];
                 let (mut one, mut other) = (known_element.iter().map(at), element.iter().map(at));
-                let end = vertices[usize::from(from)];
+                let end = vertices[from.get()];
                 if is_open
                     || is_bar(known_element)
                     || crease.draws(projection, end, [&mut one, &mut other], turned, &|| {
@@ -188,13 +186,13 @@ impl<'a> ChosenSides<'a> {
 }
 
 /// Returns the number of the first corner of the element to which a corner belongs.
-fn start_of(corners: &[Corner], corner: usize) -> usize {
+fn start_of<I: Index>(corners: &[Corner<I>], corner: usize) -> usize {
     let before = corners[..corner].iter().rposition(|corner| corner.is_last());
     before.map_or(0, |last| last + 1)
 }
 
 /// Returns the vertex numbers of the two ends of the side that begins at a corner.
-fn side_at(corners: &[Corner], side: usize) -> (u16, u16) {
+fn side_at<I: Index>(corners: &[Corner<I>], side: usize) -> (I, I) {
     let from = corners[side];
     let to = if from.is_last() { corners[start_of(corners, side)] } else { corners[side + 1] };
     (from.vertex(), to.vertex())

@@ -5,17 +5,19 @@ use super::VisibilityError;
 use super::edges::{Outlines, is_bar};
 use super::triangles::{Cut, cut_of};
 use super::yield_counter::YieldCounter;
+use crate::array::MapEach;
 use crate::geometry::{COORDINATE_LIMIT, Vertex};
+use crate::index::Index;
 use crate::stage::{Scratch, heap_sort_by_key};
 
 /// The elements, nearest first. The position of an element in this order is its rank.
 ///
-/// Each is 32 bits: the nearest depth (14 bits, rounded down), the way of cutting it (2 bits) and
-/// the number of its first corner (16 bits).
+/// Each is a pair of numbers: the nearest depth (14 bits, rounded down) with the way of cutting it
+/// (2 bits), and the number of its first corner.
 #[derive(Debug)]
-pub struct Faces<'a> {
+pub struct Faces<'a, I: Index> {
     /// The packed elements, sorted.
-    order: &'a mut [u32],
+    order: &'a mut [I::Pair],
     /// The number of faces that have no area.
     degenerate: u32,
 }
@@ -31,27 +33,24 @@ pub struct Face {
     pub has_ears: bool,
 }
 
-impl<'a> Faces<'a> {
+impl<'a, I: Index> Faces<'a, I> {
     /// Sorts the elements.
     ///
     /// # Errors
     /// Returns an error if the memory is too small or the user cancels.
     pub fn sort(
-        outlines: Outlines<'_>,
+        outlines: Outlines<'_, I>,
         vertices: &[Vertex],
         scratch: &mut Scratch<'a>,
         yield_counter: &mut YieldCounter<'_>,
     ) -> Result<Self, VisibilityError> {
         let mut degenerate = 0;
-        let order: &mut [u32] = scratch.take(outlines.elements().count())?;
+        let order: &mut [I::Pair] = scratch.take(outlines.elements().count())?;
         for (key, (first, corners)) in order.iter_mut().zip(outlines.elements()) {
             yield_counter.spend(200 * corners.len())?;
-            let near = corners
-                .iter()
-                .map(|corner| vertices[usize::from(corner.vertex())].z)
-                .min()
-                .unwrap_or(0);
-            let depth = ((near + COORDINATE_LIMIT) >> 7) as u32;
+            let near =
+                corners.iter().map(|corner| vertices[corner.vertex().get()].z).min().unwrap_or(0);
+            let depth = ((near + COORDINATE_LIMIT) >> 7) as usize;
             let cut = match cut_of(corners, vertices) {
                 Cut::None => {
                     degenerate += u32::from(!is_bar(corners));
@@ -60,7 +59,7 @@ impl<'a> Faces<'a> {
                 Cut::Fan => 1,
                 Cut::Ears => 2,
             };
-            *key = depth.min(0x3FFF) << 18 | cut << 16 | first as u32;
+            *key = I::pair(I::new(depth.min(0x3FFF) << 2 | cut), I::new(first));
         }
         // The sort itself does not check for cancelling. It takes some 500 instructions for each of
         // 2000 faces.
@@ -82,18 +81,15 @@ impl<'a> Faces<'a> {
     /// Returns the element with this rank.
     #[inline]
     pub fn get(&self, rank: usize) -> Face {
-        let key = self.order[rank];
-        Face {
-            first: (key & 0xFFFF) as usize,
-            is_fan: key >> 16 & 3 == 1,
-            has_ears: key >> 16 & 3 == 2,
-        }
+        let [depth_and_cut, first] = I::halves(self.order[rank]).map_each(I::get);
+        Face { first, is_fan: depth_and_cut & 3 == 1, has_ears: depth_and_cut & 3 == 2 }
     }
 
     /// Whether the element with this rank, and therefore each one after it, is certainly farther
     /// than the depth `far`.
     #[inline]
     pub fn begins_behind(&self, rank: usize, far: i32) -> bool {
-        self.order[rank] >> 18 > ((far + COORDINATE_LIMIT) >> 7) as u32
+        let [depth_and_cut, _] = I::halves(self.order[rank]);
+        depth_and_cut.get() >> 2 > ((far + COORDINATE_LIMIT) >> 7) as usize
     }
 }

@@ -14,22 +14,56 @@ use super::raster::{Bounds, Raster, Shape};
 use super::yield_counter::YieldCounter;
 use crate::array::MapEach;
 use crate::geometry::COORDINATE_LIMIT;
+use crate::index::Index;
 use crate::stage::Scratch;
 use bytemuck::{Pod, Zeroable};
 
-/// One cell of the page.
+/// One cell of the page: where the list of its faces ends, which begins where that of the previous
+/// cell ends, and its covering face.
 #[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
-#[repr(C)]
-pub struct Cell {
-    /// The index at which the list of its faces ends. The list begins where that of the previous
-    /// cell ends.
-    pub end: u16,
-    /// The coarse depth of the covering face. Nothing at this depth or farther is visible in this
-    /// cell.
-    pub cover_depth: u16,
-    /// The rank of the covering face.
-    pub cover: u16,
+#[repr(transparent)]
+pub struct Cell<I>([I; 3]);
+
+impl<I: Index> Cell<I> {
+    /// Makes a cell without a covering face, whose list ends at index `end`.
+    pub fn uncovered(end: I) -> Self {
+        Self([end, I::new(NO_COVER.into()), I::ZERO])
+    }
+
+    /// Returns the index at which the list of its faces ends.
+    #[inline]
+    pub fn end(&self) -> I {
+        self.0[0]
+    }
+
+    /// Moves the end of the list by one.
+    #[inline]
+    pub fn lengthen(&mut self) {
+        self.0[0] += I::ONE;
+    }
+
+    /// Returns the coarse depth of the covering face. Nothing at this depth or farther is visible
+    /// in this cell.
+    #[inline]
+    pub fn cover_depth(&self) -> u16 {
+        self.0[1].get() as u16
+    }
+
+    /// Returns the rank of the covering face.
+    #[inline]
+    pub fn cover(&self) -> I {
+        self.0[2]
+    }
+
+    /// Makes the face with this rank the covering face; `depth` is its coarse depth.
+    #[inline]
+    pub fn cover_with(&mut self, rank: I, depth: u16) {
+        (self.0[1], self.0[2]) = (I::new(depth.into()), rank);
+    }
 }
+
+/// A depth that no face has. It means that no face covers the cell.
+const NO_COVER: u16 = u16::MAX;
 
 /// Returns a depth on a scale of 2^15, rounded down. The map is monotonic: a greater result means a
 /// greater depth.
@@ -39,32 +73,32 @@ pub fn coarse_depth(z: i32) -> u16 {
 
 /// The cells and their lists of faces.
 #[derive(Debug)]
-pub struct Grid<'a> {
+pub struct Grid<'a, I> {
     /// The division of the page into cells.
     shape: Shape,
     columns: usize,
     /// The cells, row by row from the lower left.
-    cells: &'a mut [Cell],
+    cells: &'a mut [Cell<I>],
     /// The lists of all cells: ranks of faces.
-    entries: &'a mut [u16],
+    entries: &'a mut [I],
 }
 
 /// The faces that an edge meets in one cell.
-pub struct CellView<'g> {
+pub struct CellView<'g, I> {
     /// The rank of the covering face, if that face is nearer than the whole edge.
-    pub cover: Option<u16>,
+    pub cover: Option<I>,
     /// The ranks of the faces on the cell, nearest first.
-    pub faces: &'g [u16],
+    pub faces: &'g [I],
 }
 
 /// The wanted number of cells for each face. More cells cost memory and time to fill; fewer make
 /// the lists longer.
 const CELLS_FOR_EACH_FACE: usize = 2;
 
-impl<'a> Grid<'a> {
+impl<'a, I: Index> Grid<'a, I> {
     /// Returns the bytes that the coarsest grid, a single cell, needs.
     pub const fn least_bytes(faces: usize) -> usize {
-        Scratch::bytes_for::<Cell>(1) + Scratch::bytes_for::<u16>(faces)
+        Scratch::bytes_for::<Cell<I>>(1) + Scratch::bytes_for::<I>(faces)
     }
 
     /// Sorts the faces into the finest grid that fits into `scratch` and is still useful.
@@ -74,18 +108,18 @@ impl<'a> Grid<'a> {
     #[inline(never)] // Smaller than in its only caller.
     pub fn new(
         coarse_projection: &CoarseProjection<'_>,
-        outlines: Outlines<'_>,
-        faces: &Faces<'_>,
+        outlines: Outlines<'_, I>,
+        faces: &Faces<'_, I>,
         mut scratch: Scratch<'a>,
         yield_counter: &mut YieldCounter<'_>,
     ) -> Result<Self, VisibilityError> {
-        let wanted_cells = (faces.len() * CELLS_FOR_EACH_FACE).min(usize::from(u16::MAX));
+        let wanted_cells = (faces.len() * CELLS_FOR_EACH_FACE).min(I::NONE.get());
         let mut shape = Shape::finest(coarse_projection);
         while shape.cells() > 1 {
             let fits = |entries: usize| {
                 let bytes =
-                    Scratch::bytes_for::<Cell>(shape.cells()) + Scratch::bytes_for::<u16>(entries);
-                entries <= usize::from(u16::MAX) && bytes <= scratch.available_bytes()
+                    Scratch::bytes_for::<Cell<I>>(shape.cells()) + Scratch::bytes_for::<I>(entries);
+                entries <= I::NONE.get() && bytes <= scratch.available_bytes()
             };
             if shape.cells() <= wanted_cells
                 && fits(faces.len())
@@ -97,24 +131,24 @@ impl<'a> Grid<'a> {
         }
         let mut raster = Raster::new(shape, scratch.take(shape.cells())?);
         let entry_count = raster.count(coarse_projection, outlines, faces, yield_counter)?;
-        let entries: &mut [u16] = scratch.take(entry_count)?;
+        let entries: &mut [I] = scratch.take(entry_count)?;
         raster.fill(coarse_projection, outlines, faces, entries, yield_counter)?;
         Ok(Self { shape, columns: shape.columns(), cells: raster.cells(), entries })
     }
 
     /// Returns what an edge meets in a cell if no point of the edge is nearer than the coarse depth
     /// `near`.
-    fn view(&self, cell: usize, near: u16) -> CellView<'_> {
-        let begin = cell.checked_sub(1).map_or(0, |before| self.cells[before].end);
-        let Cell { end, cover_depth, cover } = self.cells[cell];
+    fn view(&self, cell: usize, near: u16) -> CellView<'_, I> {
+        let begin = cell.checked_sub(1).map_or(I::ZERO, |before| self.cells[before].end());
+        let cell = self.cells[cell];
         CellView {
-            cover: (cover_depth < near).then_some(cover),
-            faces: &self.entries[usize::from(begin)..usize::from(end)],
+            cover: (cell.cover_depth() < near).then_some(cell.cover()),
+            faces: &self.entries[begin.get()..cell.end().get()],
         }
     }
 
     /// Calls `visit` with the faces of every cell that touches a rectangle.
-    pub fn within(&self, bounds: &Bounds, visit: &mut dyn FnMut(&[u16])) {
+    pub fn within(&self, bounds: &Bounds, visit: &mut dyn FnMut(&[I])) {
         let [column0, column1, row0, row1] = self.shape.span(bounds).map_each(usize::from);
         for row in row0..=row1 {
             for column in column0..=column1 {
@@ -125,7 +159,7 @@ impl<'a> Grid<'a> {
 
     /// Returns the cells on the path of an edge from `p` to `q`. No point of the edge is nearer
     /// than the coarse depth `near`.
-    pub fn cells_along(&self, p: CoarsePoint, q: CoarsePoint, near: u16) -> EdgeCells<'_> {
+    pub fn cells_along(&self, p: CoarsePoint, q: CoarsePoint, near: u16) -> EdgeCells<'_, I> {
         let (low, high) = if p.y <= q.y { (p, q) } else { (q, p) };
         let dx = i32::from(high.x) - i32::from(low.x);
         let dy = i32::from(high.y) - i32::from(low.y);
@@ -135,8 +169,8 @@ impl<'a> Grid<'a> {
 
 /// The cells on the path of an edge: those that it crosses or touches.
 #[derive(Debug, Clone, Copy)]
-pub struct EdgeCells<'g> {
-    grid: &'g Grid<'g>,
+pub struct EdgeCells<'g, I> {
+    grid: &'g Grid<'g, I>,
     near: u16,
     low: CoarsePoint,
     high: CoarsePoint,
@@ -144,12 +178,12 @@ pub struct EdgeCells<'g> {
     slope: i32,
 }
 
-impl<'g> EdgeCells<'g> {
+impl<'g, I: Index> EdgeCells<'g, I> {
     /// Calls `visit` for each cell until it returns `false`. Returns whether it never did.
     ///
     /// The edge lies less than one unit to the right of the line between the coarse points, and
     /// less than one unit above it.
-    pub fn visit(&self, visit: &mut dyn FnMut(CellView<'g>) -> bool) -> bool {
+    pub fn visit(&self, visit: &mut dyn FnMut(CellView<'g, I>) -> bool) -> bool {
         let Shape { shift_x, shift_y, .. } = self.grid.shape;
         let (low_x, low_y) = (i32::from(self.low.x), i32::from(self.low.y));
         let dy = i32::from(self.high.y) - low_y;
@@ -166,7 +200,7 @@ impl<'g> EdgeCells<'g> {
                 from = from.max(x_below.min(x_above) - 2);
                 to = to.min(x_below.max(x_above) + 3);
             }
-            let first = usize::from(row) * self.grid.columns;
+            let first = row.get() * self.grid.columns;
             for column in (from >> shift_x)..=(to >> shift_x) {
                 if !visit(self.grid.view(first + column as usize, self.near)) {
                     return false;

@@ -68,11 +68,12 @@ mod unrounded;
 mod wire;
 
 use crate::geometry::{COORDINATE_LIMIT, Projection, Vertex};
+use crate::index::Index;
 use crate::model::Elements;
 pub use crate::stage::SinkFull;
 use crate::stage::{Aborted, Cancel, OutOfScratch, Scratch};
 use coarse_projection::{CoarsePoint, CoarseProjection};
-use edges::{ChosenSides, MOST_CORNERS, Outlines};
+use edges::{ChosenSides, Outlines, most_corners};
 use faces::Faces;
 use scene_index::SceneIndex;
 use search::StretchFinder;
@@ -86,11 +87,11 @@ pub use wire::follow_wire;
 
 /// A scene as the camera sees it: rounded vertices, and the faces and bars between them.
 #[derive(Debug, Clone, Copy)]
-pub struct Scene<'a> {
+pub struct Scene<'a, I = u16> {
     /// The rounded view coordinates of every vertex of the model.
     pub vertices: &'a [Vertex],
     /// The faces and bars. Each corner is the number of a vertex in `vertices`.
-    pub elements: Elements<'a>,
+    pub elements: Elements<'a, I>,
     /// Whether the view is perspective or parallel.
     pub projection: Projection,
     /// The positions of the same vertices in the model, before rounding, as far as they are known.
@@ -126,9 +127,9 @@ pub struct Report {
 /// A maximal piece of one edge that is entirely visible or entirely hidden, or a visible piece of a
 /// seam.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Stretch {
+pub struct Stretch<I = u16> {
     /// The numbers of the vertices that the edge joins; `None` for a seam.
-    pub edge: Option<(u16, u16)>,
+    pub edge: Option<(I, I)>,
     /// The view coordinates of those two vertices, or the rounded ends of the seam.
     pub ends: (Vertex, Vertex),
     /// Where on the edge the stretch begins.
@@ -142,12 +143,12 @@ pub struct Stretch {
 }
 
 /// Receives the stretches as they are found.
-pub trait StretchSink {
+pub trait StretchSink<I = u16> {
     /// Receives one stretch.
     ///
     /// # Errors
     /// An implementation returns [`SinkFull`] to end the search.
-    fn stretch(&mut self, stretch: Stretch) -> Result<(), SinkFull>;
+    fn stretch(&mut self, stretch: Stretch<I>) -> Result<(), SinkFull>;
 }
 
 /// The reasons why hidden-line removal ended early.
@@ -162,10 +163,10 @@ pub enum VisibilityError {
     /// The elements together have more corners than can be numbered. The value is the limit.
     TooManyCorners(usize),
     /// An element refers to a vertex that does not exist. The value is the number of that vertex.
-    UnknownVertex(u16),
+    UnknownVertex(u32),
     /// A coordinate is beyond [`COORDINATE_LIMIT`], or, in perspective, a vertex is not in front of
     /// the eye. The value is the number of the vertex.
-    OutOfRange(u16),
+    OutOfRange(u32),
 }
 
 impl From<OutOfScratch> for VisibilityError {
@@ -190,7 +191,7 @@ impl From<Aborted> for VisibilityError {
 /// With more memory the search uses a finer grid, so that fewer faces are tested against each edge.
 ///
 /// Returns zero for a scene that [`find_stretches`] refuses however much memory there is.
-pub fn scratch_bytes(scene: &Scene<'_>) -> usize {
+pub fn scratch_bytes<I: Index>(scene: &Scene<'_, I>) -> usize {
     if check(scene).is_err() {
         return 0;
     }
@@ -198,16 +199,16 @@ pub fn scratch_bytes(scene: &Scene<'_>) -> usize {
     let corners = outlines.corners.len();
     let vertices = scene.vertices.len();
     let faces = outlines.elements().count();
-    least_bytes(vertices, corners, faces) + Ears::bytes(outlines, scene.vertices)
+    least_bytes::<I>(vertices, corners, faces) + Ears::bytes(outlines, scene.vertices)
 }
 
 /// Returns the same as [`scratch_bytes`], from the numbers of vertices, corners and faces alone. It
 /// is valid if each face is convex or can be covered by one fan of triangles.
-pub const fn least_bytes(vertices: usize, corners: usize, faces: usize) -> usize {
-    let choosing = ChosenSides::bytes_while_choosing(vertices, corners);
+pub const fn least_bytes<I: Index>(vertices: usize, corners: usize, faces: usize) -> usize {
+    let choosing = ChosenSides::bytes_while_choosing::<I>(vertices, corners);
     let searching = Scratch::bytes_for::<CoarsePoint>(vertices)
-        + Scratch::bytes_for::<u32>(faces)
-        + StretchFinder::least_bytes(faces);
+        + Scratch::bytes_for::<I::Pair>(faces)
+        + StretchFinder::<I>::least_bytes(faces);
     ChosenSides::bytes(corners) + if choosing > searching { choosing } else { searching }
 }
 
@@ -217,12 +218,12 @@ pub const fn least_bytes(vertices: usize, corners: usize, faces: usize) -> usize
 /// # Errors
 /// See [`VisibilityError`]. By then the sink may already have received some of the stretches.
 #[inline(never)] // Smaller than in its only caller.
-pub fn find_stretches(
-    scene: &Scene<'_>,
+pub fn find_stretches<I: Index>(
+    scene: &Scene<'_, I>,
     options: Options,
     mut scratch: Scratch<'_>,
     cancel: &mut dyn Cancel,
-    sink: &mut dyn StretchSink,
+    sink: &mut dyn StretchSink<I>,
 ) -> Result<Report, VisibilityError> {
     check(scene)?;
     let outlines = Outlines::of(scene.elements);
@@ -245,15 +246,15 @@ pub fn find_stretches(
 }
 
 /// Refuses a scene whose numbers would overflow the arithmetic or that refers to unknown vertices.
-fn check(scene: &Scene<'_>) -> Result<(), VisibilityError> {
+fn check<I: Index>(scene: &Scene<'_, I>) -> Result<(), VisibilityError> {
     let corners = scene.elements.corners();
-    if corners.len() > MOST_CORNERS {
-        return Err(VisibilityError::TooManyCorners(MOST_CORNERS));
+    if corners.len() > most_corners::<I>() {
+        return Err(VisibilityError::TooManyCorners(most_corners::<I>()));
     }
     if let Some(corner) =
-        corners.iter().find(|corner| usize::from(corner.vertex()) >= scene.vertices.len())
+        corners.iter().find(|corner| corner.vertex().get() >= scene.vertices.len())
     {
-        return Err(VisibilityError::UnknownVertex(corner.vertex()));
+        return Err(VisibilityError::UnknownVertex(corner.vertex().into()));
     }
     let range = -COORDINATE_LIMIT..=COORDINATE_LIMIT;
     let nearest = match scene.projection {
@@ -266,7 +267,7 @@ fn check(scene: &Scene<'_>) -> Result<(), VisibilityError> {
             && (nearest..=COORDINATE_LIMIT).contains(&vertex.z)
     };
     match scene.vertices.iter().position(|vertex| !is_good(vertex)) {
-        Some(number) => Err(VisibilityError::OutOfRange(number as u16)),
+        Some(number) => Err(VisibilityError::OutOfRange(number as u32)),
         None => Ok(()),
     }
 }

@@ -9,6 +9,7 @@ use super::faces::Faces;
 use super::grid::{Cell, coarse_depth};
 use super::yield_counter::YieldCounter;
 use crate::array::MapEach;
+use crate::index::Index;
 use crate::model::Corner;
 use crate::stage::Aborted;
 
@@ -66,11 +67,11 @@ impl Shape {
     }
 
     /// Returns an upper bound of the number of entries that the faces have in all cells together.
-    pub fn most_entries(
+    pub fn most_entries<I: Index>(
         &self,
         coarse_projection: &CoarseProjection<'_>,
-        outlines: Outlines<'_>,
-        faces: &Faces<'_>,
+        outlines: Outlines<'_, I>,
+        faces: &Faces<'_, I>,
         yield_counter: &mut YieldCounter<'_>,
     ) -> Result<usize, Aborted> {
         let cells_of = |rank: usize| {
@@ -92,7 +93,7 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    pub fn of(coarse_projection: &CoarseProjection<'_>, corners: &[Corner]) -> Self {
+    pub fn of<I: Index>(coarse_projection: &CoarseProjection<'_>, corners: &[Corner<I>]) -> Self {
         let none = Self { low: CoarsePoint::HIGHEST, high: CoarsePoint::LOWEST };
         corners.iter().fold(none, |bounds, corner| {
             let position = coarse_projection.position(corner.vertex());
@@ -125,22 +126,19 @@ struct HalfPlane {
 
 const _: () = assert!(COARSE_BITS == 14);
 
-/// A depth that no face has. It means that no face covers the cell.
-const NO_COVER: u16 = u16::MAX;
-
 /// The cells while the faces are being sorted into them.
-pub struct Raster<'c> {
+pub struct Raster<'c, I> {
     shape: Shape,
     columns: usize,
-    cells: &'c mut [Cell],
+    cells: &'c mut [Cell<I>],
 }
 
-impl<'c> Raster<'c> {
-    pub fn new(shape: Shape, cells: &'c mut [Cell]) -> Self {
+impl<'c, I: Index> Raster<'c, I> {
+    pub fn new(shape: Shape, cells: &'c mut [Cell<I>]) -> Self {
         Self { shape, columns: shape.columns(), cells }
     }
 
-    pub fn cells(self) -> &'c mut [Cell] {
+    pub fn cells(self) -> &'c mut [Cell<I>] {
         self.cells
     }
 
@@ -149,34 +147,33 @@ impl<'c> Raster<'c> {
     pub fn count(
         &mut self,
         coarse_projection: &CoarseProjection<'_>,
-        outlines: Outlines<'_>,
-        faces: &Faces<'_>,
+        outlines: Outlines<'_, I>,
+        faces: &Faces<'_, I>,
         yield_counter: &mut YieldCounter<'_>,
     ) -> Result<usize, Aborted> {
-        let empty = |end: u16| Cell { end, cover_depth: NO_COVER, cover: 0 };
-        self.cells.fill(empty(0));
-        self.visit(coarse_projection, outlines, faces, yield_counter, |cell, _| cell.end += 1)?;
-        let mut begin = 0;
+        self.cells.fill(Cell::uncovered(I::ZERO));
+        self.visit(coarse_projection, outlines, faces, yield_counter, |cell, _| cell.lengthen())?;
+        let mut begin = I::ZERO;
         for cell in self.cells.iter_mut() {
-            let count = cell.end;
-            *cell = empty(begin);
+            let count = cell.end();
+            *cell = Cell::uncovered(begin);
             begin += count;
         }
-        Ok(usize::from(begin))
+        Ok(begin.get())
     }
 
     /// Writes the list of each cell. Afterwards `end` is the index at which the list ends.
     pub fn fill(
         &mut self,
         coarse_projection: &CoarseProjection<'_>,
-        outlines: Outlines<'_>,
-        faces: &Faces<'_>,
-        entries: &mut [u16],
+        outlines: Outlines<'_, I>,
+        faces: &Faces<'_, I>,
+        entries: &mut [I],
         yield_counter: &mut YieldCounter<'_>,
     ) -> Result<(), Aborted> {
         self.visit(coarse_projection, outlines, faces, yield_counter, |cell, rank| {
-            entries[usize::from(cell.end)] = rank;
-            cell.end += 1;
+            entries[cell.end().get()] = rank;
+            cell.lengthen();
         })
     }
 
@@ -185,10 +182,10 @@ impl<'c> Raster<'c> {
     fn visit(
         &mut self,
         coarse_projection: &CoarseProjection<'_>,
-        outlines: Outlines<'_>,
-        faces: &Faces<'_>,
+        outlines: Outlines<'_, I>,
+        faces: &Faces<'_, I>,
         yield_counter: &mut YieldCounter<'_>,
-        mut enter: impl FnMut(&mut Cell, u16),
+        mut enter: impl FnMut(&mut Cell<I>, I),
     ) -> Result<(), Aborted> {
         for rank in 0..faces.len() {
             let face = faces.get(rank);
@@ -218,7 +215,7 @@ impl<'c> Raster<'c> {
                 }
                 for cell in &mut self.cells[cells] {
                     let mut covered = may_cover;
-                    let mut outside = near > cell.cover_depth;
+                    let mut outside = near > cell.cover_depth();
                     for (value, side) in values.iter_mut().zip(sides) {
                         outside |= *value <= side.outside;
                         covered &= *value >= side.within;
@@ -227,10 +224,9 @@ impl<'c> Raster<'c> {
                     if outside {
                         continue;
                     }
-                    enter(cell, rank as u16);
-                    if covered && far < cell.cover_depth {
-                        cell.cover_depth = far;
-                        cell.cover = rank as u16;
+                    enter(cell, I::new(rank));
+                    if covered && far < cell.cover_depth() {
+                        cell.cover_with(I::new(rank), far);
                     }
                 }
             }
@@ -243,7 +239,7 @@ impl<'c> Raster<'c> {
     fn half_planes(
         &self,
         coarse_projection: &CoarseProjection<'_>,
-        corners: &[Corner],
+        corners: &[Corner<I>],
         bounds: &Bounds,
         sides: &mut [HalfPlane; MOST_SIDES],
     ) -> usize {

@@ -5,26 +5,27 @@ use super::edges::{ChosenSides, Outlines};
 use super::faces::{Face, Faces};
 use super::seams::Extent;
 use super::triangles::Ears;
+use crate::index::Index;
 use crate::model::Corner;
 
 /// Everything that the search needs to know about the scene.
-pub struct SceneIndex<'a> {
+pub struct SceneIndex<'a, I: Index> {
     /// The vertices, in view coordinates and on the coarse grid.
     pub coarse_projection: CoarseProjection<'a>,
     /// The corners of the elements.
-    pub outlines: Outlines<'a>,
+    pub outlines: Outlines<'a, I>,
     /// The triangles of the faces that no fan covers.
-    pub ears: Ears<'a>,
+    pub ears: Ears<'a, I>,
     /// The sides that represent their edges.
     pub chosen: ChosenSides<'a>,
     /// The elements, nearest first.
-    pub faces: Faces<'a>,
+    pub faces: Faces<'a, I>,
 }
 
-impl SceneIndex<'_> {
+impl<I: Index> SceneIndex<'_, I> {
     /// Returns the triangle with this number, counted from 0, of a face. Returns `None` if the face
     /// has fewer.
-    pub fn triangle(&self, face: Face, number: usize) -> Option<[u16; 3]> {
+    pub fn triangle(&self, face: Face, number: usize) -> Option<[I; 3]> {
         if face.has_ears {
             return self.ears.of(face.first).get(number).copied();
         }
@@ -44,16 +45,16 @@ impl SceneIndex<'_> {
     /// Whether two faces have two corners with the same view coordinates. Such faces do not cross
     /// anywhere else.
     pub fn share_edge(&self, one: Face, other: Face) -> bool {
-        let at = |corner: &Corner| self.coarse_projection.vertex(corner.vertex());
+        let at = |corner: &Corner<I>| self.coarse_projection.vertex(corner.vertex());
         let other = self.outlines.element(other.first);
-        let shared = |corner: &&Corner| other.iter().any(|there| at(there) == at(corner));
+        let shared = |corner: &&Corner<I>| other.iter().any(|there| at(there) == at(corner));
         let corners = self.outlines.element(one.first);
         corners.iter().filter(shared).count() >= 2
     }
 
     /// Whether a face has corners on both sides of the plane of a triangle. A face that only
     /// touches the plane ends there, with an edge or a corner.
-    pub fn passes_through(&self, face: Face, triangle: [u16; 3]) -> bool {
+    pub fn passes_through(&self, face: Face, triangle: [I; 3]) -> bool {
         let (mut before, mut behind) = (false, false);
         self.outlines.element(face.first).iter().any(|corner| {
             let height = self
@@ -66,7 +67,7 @@ impl SceneIndex<'_> {
     }
 
     /// Iterates over the triangles of a face.
-    pub fn triangles(&self, face: Face) -> impl Iterator<Item = [u16; 3]> {
+    pub fn triangles(&self, face: Face) -> impl Iterator<Item = [I; 3]> {
         (0..).map_while(move |number| self.triangle(face, number))
     }
 }

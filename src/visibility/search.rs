@@ -15,6 +15,7 @@ use super::yield_counter::YieldCounter;
 use super::{Options, Stretch, StretchSink, VisibilityError};
 use crate::array::MapEach;
 use crate::geometry::{COORDINATE_LIMIT, EdgeParameter};
+use crate::index::Index;
 use crate::stage::{Aborted, Scratch};
 
 /// The most pieces that the profile of an edge may have. An edge that needs more is processed in
@@ -25,9 +26,9 @@ const MOST_PIECES: usize = 24;
 const FACE_TEST: usize = 1000;
 
 /// Finds the stretches of one edge after the other.
-pub struct StretchFinder<'a> {
-    around: SceneIndex<'a>,
-    grid: Grid<'a>,
+pub struct StretchFinder<'a, I: Index> {
+    around: SceneIndex<'a, I>,
+    grid: Grid<'a, I>,
     /// One bit for each rank: whether the current edge has been tested against this face.
     seen: &'a mut [u32],
     /// One bit for each rank: whether this face shares a cell with the face whose seams are being
@@ -37,17 +38,17 @@ pub struct StretchFinder<'a> {
     options: Options,
 }
 
-impl<'a> StretchFinder<'a> {
+impl<'a, I: Index> StretchFinder<'a, I> {
     /// The least number of bytes that are enough, with the slowest search.
     pub const fn least_bytes(faces: usize) -> usize {
         2 * Scratch::bytes_for::<u32>(faces.div_ceil(32))
             + Scratch::bytes_for::<ProfilePiece>(FEWEST_PIECES)
-            + Grid::least_bytes(faces)
+            + Grid::<I>::least_bytes(faces)
     }
 
     /// Prepares the search. It uses as much of `scratch` as is useful.
     pub fn new(
-        around: SceneIndex<'a>,
+        around: SceneIndex<'a, I>,
         options: Options,
         mut scratch: Scratch<'a>,
         yield_counter: &mut YieldCounter<'_>,
@@ -80,7 +81,7 @@ impl<'a> StretchFinder<'a> {
     pub fn follow_edges(
         &mut self,
         yield_counter: &mut YieldCounter<'_>,
-        sink: &mut dyn StretchSink,
+        sink: &mut dyn StretchSink<I>,
     ) -> Result<(), VisibilityError> {
         for (first, element) in self.around.outlines.elements() {
             for (number, p, q) in sides(element) {
@@ -104,7 +105,7 @@ impl<'a> StretchFinder<'a> {
     pub fn follow_seams(
         &mut self,
         yield_counter: &mut YieldCounter<'_>,
-        sink: &mut dyn StretchSink,
+        sink: &mut dyn StretchSink<I>,
     ) -> Result<(), VisibilityError> {
         for one in 0..self.around.faces.len() {
             self.meet(one);
@@ -131,7 +132,7 @@ impl<'a> StretchFinder<'a> {
         one: usize,
         other: usize,
         yield_counter: &mut YieldCounter<'_>,
-        sink: &mut dyn StretchSink,
+        sink: &mut dyn StretchSink<I>,
     ) -> Result<(), VisibilityError> {
         let [face_one, face_other] = [one, other].map_each(|rank| self.around.faces.get(rank));
         if self.around.share_edge(face_one, face_other) {
@@ -180,7 +181,7 @@ impl<'a> StretchFinder<'a> {
         grid.within(&bounds, &mut |ranks| {
             let near_enough = ranks
                 .iter()
-                .map(|&rank| usize::from(rank))
+                .map(|&rank| rank.get())
                 .take_while(|&rank| !around.faces.begins_behind(rank, far));
             for other in near_enough.filter(|&other| other > one) {
                 met[other / 32] |= 1 << (other % 32);
@@ -192,10 +193,10 @@ impl<'a> StretchFinder<'a> {
     /// ranks of the two faces of a seam.
     fn follow(
         &mut self,
-        edge_query: &EdgeQuery,
+        edge_query: &EdgeQuery<I>,
         seam_of: [Option<usize>; 2],
         yield_counter: &mut YieldCounter<'_>,
-        sink: &mut dyn StretchSink,
+        sink: &mut dyn StretchSink<I>,
     ) -> Result<(), VisibilityError> {
         let coarse_projection = &self.around.coarse_projection;
         let ends = (edge_query.p.vertex, edge_query.q.vertex);
@@ -206,9 +207,9 @@ impl<'a> StretchFinder<'a> {
         let pen_of = |rank: &usize| pen_at(self.around.faces.get(*rank).first);
         let pen =
             seam_of.iter().flatten().map(pen_of).min().unwrap_or_else(|| pen_at(edge_query.side));
-        let edge = (edge_query.side != EdgeQuery::NO_SIDE)
+        let edge = (edge_query.side != EdgeQuery::<I>::NO_SIDE)
             .then_some((edge_query.p.number, edge_query.q.number));
-        let mut pending: Option<Stretch> = None;
+        let mut pending: Option<Stretch<I>> = None;
         let mut start = EdgeParameter::START;
         while start < EdgeParameter::END {
             self.profile.open(start);
@@ -252,7 +253,7 @@ impl<'a> StretchFinder<'a> {
     /// profile.
     fn test_faces(
         &mut self,
-        edge_query: &EdgeQuery,
+        edge_query: &EdgeQuery<I>,
         seam_of: [Option<usize>; 2],
         yield_counter: &mut YieldCounter<'_>,
     ) -> Result<(), Aborted> {
@@ -278,12 +279,12 @@ impl<'a> StretchFinder<'a> {
             }
         }
         let mut spent = yield_counter.spend(1000);
-        let mut test_face = |rank: u16| {
-            let word = &mut seen[usize::from(rank) / 32];
-            let bit = 1 << (rank % 32);
+        let mut test_face = |rank: I| {
+            let word = &mut seen[rank.get() / 32];
+            let bit = 1 << (rank.get() % 32);
             if *word & bit == 0 {
                 *word |= bit;
-                let rank = usize::from(rank);
+                let rank = rank.get();
                 edge_query.mark_face(around, faces_by_rank.get(rank), profile);
                 if options.merged_blocks {
                     edge_query.touch(around, faces_by_rank.get(rank), rank, profile);
@@ -300,9 +301,7 @@ impl<'a> StretchFinder<'a> {
                 let faces = if cell.cover.is_some() { &[] } else { cell.faces };
                 faces
                     .iter()
-                    .take_while(|&&rank| {
-                        !faces_by_rank.begins_behind(usize::from(rank), edge_query.far)
-                    })
+                    .take_while(|&&rank| !faces_by_rank.begins_behind(rank.get(), edge_query.far))
                     .all(|&rank| test_face(rank))
             });
         spent

@@ -10,6 +10,7 @@ use super::edges::{Outlines, is_bar};
 use super::yield_counter::YieldCounter;
 use crate::array::MapEach;
 use crate::geometry::Vertex;
+use crate::index::Index;
 use crate::model::Corner;
 use crate::stage::Scratch;
 use bytemuck::{Pod, Zeroable};
@@ -25,19 +26,17 @@ pub enum Cut {
     Ears,
 }
 
-/// The start of the triangles of one face that no fan covers.
+/// The start of the triangles of one face that no fan covers: the number of its first corner, and
+/// the index of its first triangle.
 #[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
-#[repr(C)]
-struct Entry {
-    first_corner: u16,
-    first_ear: u16,
-}
+#[repr(transparent)]
+struct Entry<I>([I; 2]);
 
 /// The triangles of all faces that no fan covers, as vertex numbers.
 #[derive(Debug)]
-pub struct Ears<'a> {
-    entries: &'a mut [Entry],
-    ears: &'a mut [[u16; 3]],
+pub struct Ears<'a, I> {
+    entries: &'a mut [Entry<I>],
+    ears: &'a mut [[I; 3]],
 }
 
 /// Counts of the faces that no fan covers, which give the memory that their triangles need.
@@ -49,7 +48,7 @@ struct Needs {
 }
 
 impl Needs {
-    fn of(outlines: Outlines<'_>, vertices: &[Vertex]) -> Self {
+    fn of<I: Index>(outlines: Outlines<'_, I>, vertices: &[Vertex]) -> Self {
         outlines.elements().filter(|(_, corners)| cut_of(corners, vertices) == Cut::Ears).fold(
             Self::default(),
             |needs, (_, corners)| Self {
@@ -61,14 +60,14 @@ impl Needs {
     }
 }
 
-impl<'a> Ears<'a> {
+impl<'a, I: Index> Ears<'a, I> {
     /// Returns the bytes that [`Self::cut`] takes, including those for the corners of a face while
     /// it is being cut.
-    pub fn bytes(outlines: Outlines<'_>, vertices: &[Vertex]) -> usize {
+    pub fn bytes(outlines: Outlines<'_, I>, vertices: &[Vertex]) -> usize {
         let needs = Needs::of(outlines, vertices);
-        Scratch::bytes_for::<Entry>(needs.faces)
-            + Scratch::bytes_for::<[u16; 3]>(needs.ears)
-            + Scratch::bytes_for::<u16>(needs.most_corners)
+        Scratch::bytes_for::<Entry<I>>(needs.faces)
+            + Scratch::bytes_for::<[I; 3]>(needs.ears)
+            + Scratch::bytes_for::<I>(needs.most_corners)
     }
 
     /// Cuts every face that no fan covers into triangles.
@@ -77,22 +76,22 @@ impl<'a> Ears<'a> {
     /// Returns an error if the memory is too small or the user cancels.
     #[inline(never)] // Smaller than in its only caller.
     pub fn cut(
-        outlines: Outlines<'_>,
+        outlines: Outlines<'_, I>,
         vertices: &[Vertex],
         scratch: &mut Scratch<'a>,
         yield_counter: &mut YieldCounter<'_>,
     ) -> Result<Self, VisibilityError> {
         let needs = Needs::of(outlines, vertices);
         yield_counter.spend(200 * outlines.corners.len())?;
-        let entries: &mut [Entry] = scratch.take(needs.faces)?;
-        let ears: &mut [[u16; 3]] = scratch.take(needs.ears)?;
+        let entries: &mut [Entry<I>] = scratch.take(needs.faces)?;
+        let ears: &mut [[I; 3]] = scratch.take(needs.ears)?;
         let mut meantime = scratch.reborrow();
-        let remaining: &mut [u16] = meantime.take(needs.most_corners)?;
+        let remaining: &mut [I] = meantime.take(needs.most_corners)?;
         let mut used = 0;
         let concave =
             outlines.elements().filter(|(_, corners)| cut_of(corners, vertices) == Cut::Ears);
         for (entry, (first, corners)) in entries.iter_mut().zip(concave) {
-            *entry = Entry { first_corner: first as u16, first_ear: used as u16 };
+            *entry = Entry([first, used].map_each(I::new));
             for (slot, corner) in remaining.iter_mut().zip(corners) {
                 *slot = corner.vertex();
             }
@@ -108,9 +107,9 @@ impl<'a> Ears<'a> {
 
     /// Returns the triangles of the face that begins at corner `first`. The slice is empty if a fan
     /// covers the face.
-    pub fn of(&self, first: usize) -> &[[u16; 3]] {
-        let begins = |entry: &Entry| usize::from(entry.first_ear);
-        match self.entries.binary_search_by_key(&first, |entry| usize::from(entry.first_corner)) {
+    pub fn of(&self, first: usize) -> &[[I; 3]] {
+        let begins = |entry: &Entry<I>| entry.0[1].get();
+        match self.entries.binary_search_by_key(&first, |entry| entry.0[0].get()) {
             Ok(found) => {
                 let end = self.entries.get(found + 1).map_or(self.ears.len(), begins);
                 &self.ears[begins(&self.entries[found])..end]
@@ -183,11 +182,11 @@ impl Plane {
 }
 
 /// Returns how a face must be cut.
-pub fn cut_of(corners: &[Corner], vertices: &[Vertex]) -> Cut {
+pub fn cut_of<I: Index>(corners: &[Corner<I>], vertices: &[Vertex]) -> Cut {
     if is_bar(corners) {
         return Cut::None;
     }
-    let at = |corner: &Corner| vertices[usize::from(corner.vertex())];
+    let at = |corner: &Corner<I>| vertices[corner.vertex().get()];
     let Some(plane) = Plane::of(corners.iter().map(at)) else {
         return Cut::None;
     };
@@ -202,13 +201,13 @@ pub fn cut_of(corners: &[Corner], vertices: &[Vertex]) -> Cut {
 /// A corner is an ear if it is convex and no other corner lies in its triangle. Corners where the
 /// polygon goes straight on are dropped. A polygon that crosses itself may have no ear; then a
 /// convex corner is cut off nevertheless, so that the loop always ends.
-fn cut_ears(
-    polygon: &mut [u16],
+fn cut_ears<I: Index>(
+    polygon: &mut [I],
     vertices: &[Vertex],
-    ears: &mut [[u16; 3]],
+    ears: &mut [[I; 3]],
     yield_counter: &mut YieldCounter<'_>,
 ) -> Result<usize, VisibilityError> {
-    let at = |number: u16| vertices[usize::from(number)];
+    let at = |number: I| vertices[number.get()];
     let Some(plane) = Plane::of(polygon.iter().map(|&number| at(number))) else {
         return Ok(0);
     };

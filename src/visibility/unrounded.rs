@@ -11,6 +11,7 @@
 
 use crate::array::MapEach;
 use crate::geometry::{Precision, are_coplanar, are_in_line};
+use crate::index::Index;
 use crate::model::Corner;
 
 /// The positions of the vertices in the model's own coordinates, as far as they are known.
@@ -44,7 +45,7 @@ impl<'a> Unrounded<'a> {
     /// Whether a vertex lies in the plane of a triangle in the model. The answer is no if one of
     /// the positions is unknown.
     #[cold]
-    pub(super) fn holds(&self, triangle: [u16; 3], vertex: u16) -> bool {
+    pub(super) fn holds<I: Index>(&self, triangle: [I; 3], vertex: I) -> bool {
         let [a, b, c] = triangle;
         match [a, b, c, vertex].map_each(|number| self.at(number)) {
             [Some(a), Some(b), Some(c), Some(d)] => are_coplanar([a, b, c, d], self.precision),
@@ -55,7 +56,7 @@ impl<'a> Unrounded<'a> {
     /// Whether a vertex lies on the line through a and b in the model. The answer is no if one of
     /// the positions is unknown.
     #[cold]
-    pub(super) fn are_in_line(&self, a: u16, b: u16, vertex: u16) -> bool {
+    pub(super) fn are_in_line<I: Index>(&self, a: I, b: I, vertex: I) -> bool {
         match [a, b, vertex].map_each(|number| self.at(number)) {
             [Some(a), Some(b), Some(c)] => are_in_line([a, b, c], self.precision),
             _ => false,
@@ -64,9 +65,14 @@ impl<'a> Unrounded<'a> {
 
     /// Whether the two faces that share an edge lie in one plane in the model.
     #[inline(never)] // Only the choice of creases calls it.
-    pub(super) fn are_one_plane(&self, edge: [u16; 2], one: &[Corner], other: &[Corner]) -> bool {
+    pub(super) fn are_one_plane<I: Index>(
+        &self,
+        edge: [I; 2],
+        one: &[Corner<I>],
+        other: &[Corner<I>],
+    ) -> bool {
         let [from, to] = edge;
-        let is_off = |corner: &&Corner| !self.are_in_line(from, to, corner.vertex());
+        let is_off = |corner: &&Corner<I>| !self.are_in_line(from, to, corner.vertex());
         one.iter().find(is_off).is_some_and(|third| {
             let triangle = [from, to, third.vertex()];
             let mut corners = other.iter().map(|corner| corner.vertex());
@@ -74,7 +80,7 @@ impl<'a> Unrounded<'a> {
         })
     }
 
-    fn at(&self, number: u16) -> Option<[i32; 3]> {
-        self.positions.get(usize::from(number)).copied()
+    fn at<I: Index>(&self, number: I) -> Option<[i32; 3]> {
+        self.positions.get(number.get()).copied()
     }
 }

@@ -4,6 +4,7 @@ use super::edges::{ChosenSides, Outlines, sides};
 use super::yield_counter::YieldCounter;
 use super::{Options, Scene, Stretch, StretchSink, VisibilityError, check};
 use crate::geometry::EdgeParameter;
+use crate::index::Index;
 use crate::stage::{Cancel, Scratch};
 
 /// Hands over every distinct edge and bar as one visible stretch, in the order of the model, as if
@@ -12,12 +13,12 @@ use crate::stage::{Cancel, Scratch};
 /// # Errors
 /// See [`VisibilityError`]. Working memory of [`super::scratch_bytes`] is enough.
 #[inline(never)] // Smaller than in its only caller.
-pub fn follow_wire(
-    scene: &Scene<'_>,
+pub fn follow_wire<I: Index>(
+    scene: &Scene<'_, I>,
     options: Options,
     mut scratch: Scratch<'_>,
     cancel: &mut dyn Cancel,
-    sink: &mut dyn StretchSink,
+    sink: &mut dyn StretchSink<I>,
 ) -> Result<(), VisibilityError> {
     check(scene)?;
     let outlines = Outlines::of(scene.elements);
@@ -30,7 +31,7 @@ pub fn follow_wire(
         yield_counter.spend(500 * element.len())?;
         for (number, p, q) in sides(element) {
             if chosen.contains(first + number) {
-                let ends = (vertices[usize::from(p)], vertices[usize::from(q)]);
+                let ends = (vertices[p.get()], vertices[q.get()]);
                 let (from, to) = (EdgeParameter::START, EdgeParameter::END);
                 let pen = outlines.pens.at(first);
                 sink.stretch(Stretch { edge: Some((p, q)), ends, from, to, visible: true, pen })?;

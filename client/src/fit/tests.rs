@@ -41,8 +41,8 @@ fn obj_of(polylines: &[Vec<PlanPoint>]) -> String {
 
 /// The chords of every curve of a file, as the plotter would read and flatten it.
 fn flattened(obj: &str) -> Vec<Vec<PlanPoint>> {
-    let mut vertices = Box::new(heapless::Vec::<Position, 16_000>::new());
-    let mut corners = vec![Corner::new(0, false, false); 40_000];
+    let mut vertices = Box::new([Position::ORIGIN; 16_000]);
+    let mut corners = vec![<Corner>::ZERO; 40_000];
     let mut model = Model::new(&mut *vertices, &mut corners);
     for line in obj.lines() {
         assert!(line.len() <= 256, "{line}");

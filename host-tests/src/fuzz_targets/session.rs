@@ -24,8 +24,8 @@ const TURNS: u32 = 2_000_000;
 /// Lets a small plotter receive the input, and checks at its end that the machine comes to rest,
 /// that it can be unlocked, and that it answers.
 pub fn fuzz(input: &[u8]) {
-    let mut vertices = heapless::Vec::<Position, 256>::new();
-    let mut corners = [Corner::new(0, false, false); 1024];
+    let mut vertices = [Position::ORIGIN; 256];
+    let mut corners = [<Corner>::ZERO; 1024];
     let mut blocks = EMPTY_LOOKAHEAD;
     let mut words = vec![0; 8192];
     let mut readers = [const { LineReader::new() }; PORTS];

@@ -20,8 +20,8 @@ pub fn fuzz(input: &[u8]) {
         (u16::from_le_bytes([a, b]), Value::from_bits(i32::from_le_bytes([c, d, e, f])))
     });
 
-    let mut vertices = heapless::Vec::<Position, 64>::new();
-    let mut corners = [Corner::new(0, false, false); 256];
+    let mut vertices = [Position::ORIGIN; 64];
+    let mut corners = [<Corner>::ZERO; 256];
     let mut blocks = EMPTY_LOOKAHEAD;
     let mut words = vec![0; 8192];
     let mut readers = [const { LineReader::new() }; PORTS];

@@ -22,7 +22,7 @@ impl SolidSink for Edges {
 const FROM_ABOVE: Eye = Eye::Towards([0, 0, 1]);
 
 fn edges_of(points: &[Point]) -> Vec<[u16; 2]> {
-    let mut words = vec![0; scratch_bytes_from_vertices(points.len()) / 8];
+    let mut words = vec![0; scratch_bytes_from_vertices::<u16>(points.len()) / 8];
     let mut edges = Edges::default();
     let scratch = Scratch::new(&mut words);
     let exact = Precision::default();
@@ -35,7 +35,7 @@ fn edges_of(points: &[Point]) -> Vec<[u16; 2]> {
 /// paper (from 1).
 fn parts(points: &[Point]) -> (Vec<u16>, Vec<Vec<u16>>, Vec<Vec<u16>>) {
     let edges = edges_of(points);
-    let mut words = vec![0; scratch_bytes_from_edges(points.len(), edges.len()) / 8];
+    let mut words = vec![0; scratch_bytes_from_edges::<u16>(points.len(), edges.len()) / 8];
     let mut scratch = Scratch::new(&mut words);
     let mut scratch = scratch.reborrow();
     let mut visible = vec![0; points.len()];

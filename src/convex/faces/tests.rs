@@ -5,8 +5,8 @@ use std::vec::Vec;
 
 /// Runs `steps` on a search of the solid as seen from above, with its outline as the first
 /// perimeter.
-fn search_from_above(points: &[Point], steps: impl FnOnce(&mut FaceFinder<'_>)) {
-    let mut words = vec![0; scratch_bytes_from_vertices(points.len()) / 8];
+fn search_from_above(points: &[Point], steps: impl FnOnce(&mut FaceFinder<'_, u16>)) {
+    let mut words = vec![0; scratch_bytes_from_vertices::<u16>(points.len()) / 8];
     let mut scratch = Scratch::new(&mut words);
     let mut candidates: Vec<u16> = (0..points.len() as u16).collect();
     let Span::Space(inside) = points::span(points, &candidates) else {
@@ -20,7 +20,7 @@ fn search_from_above(points: &[Point], steps: impl FnOnce(&mut FaceFinder<'_>)) 
 }
 
 /// Returns the perimeter, sorted, in the numbers of the paper (from 1).
-fn perimeter(search: &FaceFinder<'_>) -> Vec<(u16, u16)> {
+fn perimeter(search: &FaceFinder<'_, u16>) -> Vec<(u16, u16)> {
     let mut segments: Vec<_> = (0..search.perimeter_count)
         .map(|at| search.segment(at))
         .map(|(from, to)| (from + 1, to + 1))
@@ -36,7 +36,7 @@ fn sorted<T: Ord + Copy>(items: &[T]) -> Vec<T> {
 }
 
 /// Finds the face at a segment. Returns the new edges and the vertices that drop out.
-fn step(search: &mut FaceFinder<'_>, segment: (u16, u16)) -> (Vec<(u16, u16)>, Vec<u16>) {
+fn step(search: &mut FaceFinder<'_, u16>, segment: (u16, u16)) -> (Vec<(u16, u16)>, Vec<u16>) {
     let (edges, candidates) =
         (search.edge_count, search.candidates[..search.candidate_count].to_vec());
     let at = (0..search.perimeter_count)
@@ -46,7 +46,7 @@ fn step(search: &mut FaceFinder<'_>, segment: (u16, u16)) -> (Vec<(u16, u16)>, V
     assert_eq!(found, Ok(()));
     let new_edges: Vec<_> = search.edges[edges..search.edge_count]
         .iter()
-        .map(|edge| (edge.from.min(edge.to) + 1, edge.from.max(edge.to) + 1))
+        .map(|edge| (edge.from().min(edge.to()) + 1, edge.from().max(edge.to()) + 1))
         .collect();
     let left = &search.candidates[..search.candidate_count];
     let dropped: Vec<_> = candidates

@@ -1,6 +1,7 @@
 //! Edits of the completed curves of a model.
 
-use super::{CurveList, HEADER, PEN, lengths};
+use super::{CurveList, PEN, header, lengths};
+use crate::index::Index;
 use crate::model::ModelError;
 use crate::model::store::Store;
 use core::ops::Range;
@@ -8,7 +9,7 @@ use core::ops::Range;
 impl CurveList {
     /// Gives control points new numbers, as the model does with its vertices. A curve with a
     /// control point for which `new` returns `None` is removed.
-    pub fn renumber(&mut self, store: &mut Store<'_>, new: &dyn Fn(u16) -> Option<u16>) {
+    pub fn renumber<I: Index>(&mut self, store: &mut Store<'_, I>, new: &dyn Fn(I) -> Option<I>) {
         self.retain(store, &mut |control| {
             control.iter_mut().all(|number| new(*number).inspect(|new| *number = *new).is_some())
         });
@@ -16,7 +17,7 @@ impl CurveList {
 
     /// Deletes the curves in `range`. If `plug`, the last curve moves to the position of the first
     /// of them.
-    pub fn delete(&mut self, store: &mut Store<'_>, range: Range<usize>, plug: bool) {
+    pub fn delete<I: Index>(&mut self, store: &mut Store<'_, I>, range: Range<usize>, plug: bool) {
         let length = |number| self.curves(store).iter().nth(number).map(|curve| curve.half_words());
         let mut gone = range.clone();
         let last = self.count - 1; // the range is not empty
@@ -35,13 +36,17 @@ impl CurveList {
     }
 
     /// Keeps the curves for which `stays` returns `true`; it may change their control points.
-    fn retain(&mut self, store: &mut Store<'_>, stays: &mut dyn FnMut(&mut [u16]) -> bool) {
+    fn retain<I: Index>(
+        &mut self,
+        store: &mut Store<'_, I>,
+        stays: &mut dyn FnMut(&mut [I]) -> bool,
+    ) {
         let halves = store.curves_mut();
         let (mut read, mut write, mut kept) = (0, 0, 0);
         while let Some((length, control_points)) =
             halves.get(read..self.completed).and_then(lengths)
         {
-            let control = read + HEADER..read + HEADER + control_points;
+            let control = read + header::<I>()..read + header::<I>() + control_points;
             if stays(halves.get_mut(control).unwrap_or(&mut [])) {
                 halves.copy_within(read..read + length, write);
                 write += length;
@@ -57,15 +62,15 @@ impl CurveList {
     ///
     /// # Errors
     /// [`ModelError::TooManyCorners`], once there is no room for another copy.
-    pub fn copy(
+    pub fn copy<I: Index>(
         &mut self,
-        store: &mut Store<'_>,
-        is_copied: &dyn Fn(&mut dyn Iterator<Item = u16>) -> bool,
-        new: &dyn Fn(u16) -> Option<u16>,
+        store: &mut Store<'_, I>,
+        is_copied: &dyn Fn(&mut dyn Iterator<Item = I>) -> bool,
+        new: &dyn Fn(I) -> Option<I>,
     ) -> Result<(), ModelError> {
         let (mut at, end) = (0, self.completed);
         while let Some((length, control_points)) = store.curves().get(at..end).and_then(lengths) {
-            let (control, curve) = (HEADER..HEADER + control_points, at..at + length);
+            let (control, curve) = (header::<I>()..header::<I>() + control_points, at..at + length);
             at += length;
             let numbers =
                 store.curves().get(curve.clone()).and_then(|all| all.get(control.clone()));
@@ -86,10 +91,11 @@ impl CurveList {
     }
 
     /// Gives all curves the first pen, including the unfinished one.
-    pub fn forget_pens(&mut self, store: &mut Store<'_>) {
+    pub fn forget_pens<I: Index>(&mut self, store: &mut Store<'_, I>) {
         let (curves, mut at) = (store.curves_mut(), 0);
-        while let Some(header) = curves.get_mut(at..).and_then(|rest| rest.get_mut(..HEADER)) {
-            header[PEN] = 0;
+        while let Some(header) = curves.get_mut(at..).and_then(|rest| rest.get_mut(..header::<I>()))
+        {
+            header[PEN] = I::ZERO;
             match lengths(header) {
                 // The header of the unfinished curve has no number of knots yet, but it is the last
                 // curve.

@@ -1,9 +1,10 @@
 //! The curves of a model while they are sent: an unfinished curve becomes a completed one.
 
-use super::{Curves, HEADER};
+use super::{Curves, HEAD, KNOT, header, units_of};
 use crate::array::MapEach;
 use crate::curve::{CurveError, KNOT_LIMIT, Knots, check_interior, check_shape, parameter_of};
 use crate::fixed::{Decimal, shift_right_rounding};
+use crate::index::Index;
 use crate::model::ModelError;
 use crate::model::store::Store;
 
@@ -40,7 +41,7 @@ const UNIFORM_BITS: u32 = 16;
 
 impl CurveList {
     /// Returns the completed curves.
-    pub fn curves<'a>(&self, store: &'a Store<'_>) -> Curves<'a> {
+    pub fn curves<'a, I: Index>(&self, store: &'a Store<'_, I>) -> Curves<'a, I> {
         Curves { halves: store.curves().get(..self.completed).unwrap_or(&[]) }
     }
 
@@ -55,11 +56,11 @@ impl CurveList {
 
     /// `curv`: begins a curve between two parameters over the points numbered `control`, from 0.
     /// The points must exist.
-    pub fn begin(
+    pub fn begin<I: Index>(
         &mut self,
-        store: &mut Store<'_>,
+        store: &mut Store<'_, I>,
         ends: [Decimal; 2],
-        control: impl Iterator<Item = u16> + Clone,
+        control: impl Iterator<Item = I> + Clone,
         pen: u8,
     ) -> Result<(), ModelError> {
         if self.unfinished.is_some() {
@@ -68,19 +69,20 @@ impl CurveList {
         let order = self.degree.ok_or(ModelError::NoDegree)? + 1;
         let control_points = control.clone().count();
         check_shape(control_points, order, Knots::Uniform).map_err(ModelError::Curve)?;
-        store.check_room(HEADER + control_points)?;
+        store.check_room(header::<I>() + control_points)?;
         let limit = i64::from(KNOT_LIMIT) << FINEST;
         let value = |end: Decimal| end.to_binary(FINEST).ok().filter(|end| end.abs() <= limit);
         let ends = match ends.map_each(value) {
             [Some(from), Some(to)] => [from, to],
             _ => return Err(ModelError::KnotTooLarge),
         };
-        let curve = store.add_to_curves(HEADER + control_points)?;
-        let control_points = control_points as u16; // at most 2^12
-        let header = [control_points, u16::from(order), 0, u16::from(pen), 0, 0, 0, 0];
-        for (half, new) in curve.iter_mut().zip(header.into_iter().chain(control)) {
-            *half = new;
+        let curve = store.add_to_curves(header::<I>() + control_points)?;
+        let head = [control_points, order.into(), 0, pen.into()].map_each(I::new);
+        let header = head.into_iter().chain(core::iter::repeat_n(I::ZERO, header::<I>() - HEAD));
+        for (unit, new) in curve.iter_mut().zip(header.chain(control)) {
+            *unit = new;
         }
+        let control_points = control_points as u16; // at most 2^12
         self.unfinished = Some(Unfinished { order, control_points, ends, fraction_bits: None });
         Ok(())
     }
@@ -89,9 +91,9 @@ impl CurveList {
     ///
     /// All knots share one binary unit, which becomes coarser when a larger knot comes. Each keeps
     /// 22 bits of the largest.
-    pub fn add_knots(
+    pub fn add_knots<I: Index>(
         &mut self,
-        store: &mut Store<'_>,
+        store: &mut Store<'_, I>,
         knots: impl Iterator<Item = Decimal> + Clone,
     ) -> Result<(), ModelError> {
         let unfinished = self.unfinished.ok_or(ModelError::NoCurve)?;
@@ -101,15 +103,16 @@ impl CurveList {
             .find(|bits| knots.clone().all(|knot| in_unit(knot, *bits).is_some()))
             .ok_or(ModelError::KnotTooLarge)?;
         let count = knots.clone().count();
-        store.check_room(2 * count)?;
-        let start = self.completed + HEADER + usize::from(unfinished.control_points);
+        store.check_room(units_of::<I>(KNOT) * count)?;
+        let start = self.completed + header::<I>() + usize::from(unfinished.control_points);
         let listed = store.curves_mut().get_mut(start..).unwrap_or(&mut []);
-        for knot in bytemuck::cast_slice_mut::<u16, [u16; 2]>(listed) {
+        for knot in bytemuck::cast_slice_mut::<I, [u16; 2]>(listed) {
             *knot =
                 bytemuck::cast(shift_right_rounding(bytemuck::cast(*knot), before - fraction_bits));
         }
         let new = knots.filter_map(|knot| in_unit(knot, fraction_bits));
-        let added = bytemuck::cast_slice_mut::<u16, [u16; 2]>(store.add_to_curves(2 * count)?);
+        let added = store.add_to_curves(units_of::<I>(KNOT) * count)?;
+        let added = bytemuck::cast_slice_mut::<I, [u16; 2]>(added);
         for (halves, knot) in added.iter_mut().zip(new) {
             *halves = bytemuck::cast(knot);
         }
@@ -120,7 +123,7 @@ impl CurveList {
 
     /// `end`: completes the unfinished curve, which [`CurveList::count_completed`] then adds to the
     /// model. If it is refused it is discarded.
-    pub fn end(&mut self, store: &mut Store<'_>) -> Result<(), ModelError> {
+    pub fn end<I: Index>(&mut self, store: &mut Store<'_, I>) -> Result<(), ModelError> {
         let unfinished = self.unfinished.take().ok_or(ModelError::NoCurve)?;
         let closed = self.close(store, &unfinished);
         if closed.is_err() {
@@ -130,17 +133,22 @@ impl CurveList {
     }
 
     /// Records that the store holds completed curves only, one more than before.
-    pub fn count_completed(&mut self, store: &Store<'_>) {
+    pub fn count_completed<I: Index>(&mut self, store: &Store<'_, I>) {
         self.completed = store.curves().len();
         self.count += 1;
     }
 
     /// Checks the unfinished curve and completes its header.
-    fn close(&self, store: &mut Store<'_>, unfinished: &Unfinished) -> Result<(), ModelError> {
+    fn close<I: Index>(
+        &self,
+        store: &mut Store<'_, I>,
+        unfinished: &Unfinished,
+    ) -> Result<(), ModelError> {
         let Unfinished { order, control_points, .. } = *unfinished;
         let control_points = usize::from(control_points);
         let halves = store.curves_mut().get_mut(self.completed..).unwrap_or(&mut []);
-        let (header, rest) = halves.split_at_mut_checked(HEADER).ok_or(ModelError::NoCurve)?;
+        let (header, rest) =
+            halves.split_at_mut_checked(header::<I>()).ok_or(ModelError::NoCurve)?;
         let knots: &[[u16; 2]] = bytemuck::cast_slice(rest.get(control_points..).unwrap_or(&[]));
         let knot_count = knots.len();
         let (knots, bits, fraction_bits) = match unfinished.fraction_bits {
@@ -160,11 +168,11 @@ impl CurveList {
         check_interior(order, knots, from, to).map_err(ModelError::Curve)?;
         let [from, to] =
             [from, to].map_each(|u| parameter_of(control_points, order, knots, u, fraction_bits));
-        let ends: [u16; 4] = bytemuck::cast([from.to_bits(), to.to_bits()]);
+        let ends = [from.to_bits(), to.to_bits()];
         if let [_, _, count, _, stored_ends @ ..] = header {
             // It fits, because the memory has fewer half-words than there are vertex numbers.
-            *count = knot_count as u16;
-            stored_ends.copy_from_slice(&ends);
+            *count = I::new(knot_count);
+            stored_ends.copy_from_slice(bytemuck::cast_slice(&ends));
         }
         Ok(())
     }
@@ -175,12 +183,12 @@ impl CurveList {
     }
 
     /// Returns the number of half-words of the unfinished curve.
-    pub fn unfinished_length(&self, store: &Store<'_>) -> usize {
+    pub fn unfinished_length<I: Index>(&self, store: &Store<'_, I>) -> usize {
         store.curves().len() - self.completed
     }
 
     /// Restores `count` curves, which are all that the store holds, as they once were.
-    pub fn restore(&mut self, store: &Store<'_>, count: usize) {
+    pub fn restore<I: Index>(&mut self, store: &Store<'_, I>, count: usize) {
         let completed = store.curves().len();
         *self = Self { completed, count, degree: self.degree, unfinished: None };
     }

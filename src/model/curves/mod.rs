@@ -12,17 +12,18 @@ pub(super) use list::CurveList;
 
 use crate::array::MapEach;
 use crate::curve::{CurveError, Fine, Knots, Parameter, Point, Spline};
+use crate::index::Index;
 use crate::stage::{Cancel, OutOfScratch, StageError};
 
 /// A stored curve.
 #[derive(Debug, Clone, Copy)]
-pub struct StoredCurve<'a> {
+pub struct StoredCurve<'a, I = u16> {
     /// The degree plus 1.
     pub order: u8,
     /// The pen that draws it, from 0.
     pub pen: u8,
     /// The vertex numbers of its control points, from 0.
-    pub control: &'a [u16],
+    pub control: &'a [I],
     /// Its knots.
     pub knots: Knots<'a>,
     /// The parameter at which it begins.
@@ -31,17 +32,17 @@ pub struct StoredCurve<'a> {
     pub to: Parameter,
 }
 
-impl<'a> StoredCurve<'a> {
+impl<'a, I: Index> StoredCurve<'a, I> {
     /// Returns how many half-words of the model's memory it takes.
     pub fn half_words(&self) -> usize {
-        HEADER + self.control.len() + 2 * self.knots.count().unwrap_or(0)
+        length_of::<I>(self.control.len(), self.knots.count().unwrap_or(0))
     }
 
     /// Returns the curve over these points.
     ///
     /// # Errors
     /// [`CurveError::UnknownPoint`] if `points` has not all of its control points.
-    pub fn spline(&self, points: &'a [Point]) -> Result<Spline<'a>, CurveError> {
+    pub fn spline(&self, points: &'a [Point]) -> Result<Spline<'a, I>, CurveError> {
         Spline::new(points, self.control, self.order, self.knots)
             .map(|whole| whole.between(self.from, self.to))
     }
@@ -50,15 +51,21 @@ impl<'a> StoredCurve<'a> {
 /// The completed curves of a model, in the order in which they came.
 ///
 /// If they come from a model, every control point exists and every curve is valid.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Curves<'a> {
+#[derive(Debug, Clone, Copy)]
+pub struct Curves<'a, I = u16> {
     /// The half-words of the curves, one curve after another.
-    halves: &'a [u16],
+    halves: &'a [I],
 }
 
-impl<'a> Curves<'a> {
+impl<I> Default for Curves<'_, I> {
+    fn default() -> Self {
+        Self { halves: &[] }
+    }
+}
+
+impl<'a, I: Index> Curves<'a, I> {
     /// Returns each curve in turn.
-    pub fn iter(&self) -> impl Iterator<Item = StoredCurve<'a>> + Clone + use<'a> {
+    pub fn iter(&self) -> impl Iterator<Item = StoredCurve<'a, I>> + Clone + use<'a, I> {
         let mut rest = self.halves;
         core::iter::from_fn(move || {
             let (curve, after) = read(rest)?;
@@ -102,33 +109,51 @@ impl<'a> Curves<'a> {
     }
 }
 
-/// The number of half-words before the control points. They hold the number of control points, the
-/// order, the number of knots, the pen, and both ends.
-const HEADER: usize = 8;
-/// The index of the pen in the header.
+/// The numbers at the beginning of a curve: the number of control points, the order, the number of
+/// knots and the pen. Both ends follow, of 32 bits each, and then the control points.
+const HEAD: usize = 4;
+/// The index of the pen among them.
 const PEN: usize = 3;
+/// How many bytes a knot takes.
+const KNOT: usize = 4;
 
-/// Returns how many half-words the first curve takes, and how many control points it has.
-fn lengths(halves: &[u16]) -> Option<(usize, usize)> {
-    let [control_points, _, knots, ..] = *halves else { return None };
-    let control_points = usize::from(control_points);
-    Some((HEADER + control_points + 2 * usize::from(knots), control_points))
+/// Returns how many numbers of the store so many bytes take.
+const fn units_of<I>(bytes: usize) -> usize {
+    bytes / size_of::<I>()
+}
+
+/// Returns how many numbers of the store lie before the control points.
+const fn header<I>() -> usize {
+    HEAD + units_of::<I>(2 * size_of::<u32>())
+}
+
+/// Returns how many numbers of the store a curve takes.
+const fn length_of<I>(control_points: usize, knots: usize) -> usize {
+    header::<I>() + control_points + units_of::<I>(KNOT) * knots
+}
+
+/// Returns how many numbers the first curve takes, and how many control points it has.
+fn lengths<I: Index>(units: &[I]) -> Option<(usize, usize)> {
+    let [control_points, _, knots, ..] = *units else { return None };
+    Some((length_of::<I>(control_points.get(), knots.get()), control_points.get()))
 }
 
 /// Returns the first curve, and the half-words after it.
-fn read(halves: &[u16]) -> Option<(StoredCurve<'_>, &[u16])> {
+fn read<I: Index>(halves: &[I]) -> Option<(StoredCurve<'_, I>, &[I])> {
     let (length, control_points) = lengths(halves)?;
     let (curve, after) = halves.split_at_checked(length)?;
-    let (header, rest) = curve.split_at_checked(HEADER)?;
+    let (header, rest) = curve.split_at_checked(header::<I>())?;
     let (control, knots) = rest.split_at_checked(control_points)?;
     let knots = match knots {
         [] => Knots::Uniform,
         knots => Knots::Packed(bytemuck::cast_slice(knots)),
     };
-    let [_, order, _, pen, a, b, c, d] = *header else { return None };
-    let ends: [u32; 2] = bytemuck::cast([a, b, c, d]);
+    let [_, order, _, pen, ends @ ..] = header else { return None };
+    // They are not aligned as numbers of 32 bits.
+    let ends: [u32; 2] = bytemuck::try_pod_read_unaligned(bytemuck::cast_slice(ends)).ok()?;
     let [from, to] = ends.map_each(Parameter::from_bits);
-    Some((StoredCurve { order: order as u8, pen: pen as u8, control, knots, from, to }, after))
+    let [order, pen] = [order.get() as u8, pen.get() as u8];
+    Some((StoredCurve { order, pen, control, knots, from, to }, after))
 }
 
 #[cfg(test)]

@@ -3,7 +3,6 @@
 use super::*;
 use crate::fixed::Decimal;
 use crate::model::{Corner, Model, ModelError, Position, no_undo};
-use bytemuck::Zeroable;
 use std::vec::Vec;
 
 fn decimal(text: &str) -> Decimal {
@@ -16,7 +15,7 @@ fn decimals(text: &str) -> impl Iterator<Item = Decimal> + Clone {
 
 /// A model with eight vertices and room for 48 half-words.
 fn with_model(test: impl FnOnce(&mut Model<'_>)) {
-    let mut memory = (heapless::Vec::<Position, 8>::new(), [Corner::zeroed(); 48]);
+    let mut memory = ([Position::ORIGIN; 8], [<Corner>::ZERO; 48]);
     let mut model = Model::new(&mut memory.0, &mut memory.1);
     for _ in 0..8 {
         model.add_vertex(["0", "0", "0"].map(decimal), &mut no_undo).unwrap();

@@ -1,11 +1,12 @@
 //! Deletes vertices, elements and curves, and reverses faces.
 
 use super::ElementKind;
+use crate::index::Index;
 use crate::model::pens::{close_gap, open_gap};
 use crate::model::{Corner, Model};
 use core::ops::Range;
 
-impl Model<'_> {
+impl<I: Index> Model<'_, I> {
     /// Deletes the elements of a kind in `range`. If `plug`, the last element replaces the deleted
     /// one.
     pub(super) fn delete(&mut self, part: ElementKind, range: Range<usize>, plug: bool) {
@@ -13,7 +14,9 @@ impl Model<'_> {
             ElementKind::Vertices => {
                 let gone = range.len();
                 if plug {
-                    self.vertices.swap_remove(range.start);
+                    let last = self.vertices.len() - 1; // the range is not empty
+                    self.vertices.swap(range.start, last);
+                    self.vertices.truncate(last);
                 } else {
                     let count = self.vertices.len();
                     self.vertices.copy_within(range.end..count, range.start);
@@ -21,15 +24,15 @@ impl Model<'_> {
                 }
                 let last = self.vertices.len();
                 self.renumber(&|number| {
-                    let at = usize::from(number);
+                    let at = number.get();
                     if range.contains(&at) {
                         None
                     } else if plug && at == last {
-                        Some(range.start as u16) // below VERTEX_NUMBER_LIMIT
+                        Some(I::new(range.start)) // below VERTEX_NUMBER_LIMIT
                     } else if plug || at < range.start {
                         Some(number)
                     } else {
-                        Some(number - gone as u16)
+                        Some(number - I::new(gone))
                     }
                 });
             }
@@ -79,7 +82,7 @@ impl Model<'_> {
 
     /// Gives every corner and control point its new number. Elements and curves with a vertex for
     /// which `new` returns `None` are removed.
-    fn renumber(&mut self, new: &dyn Fn(u16) -> Option<u16>) {
+    fn renumber(&mut self, new: &dyn Fn(I) -> Option<I>) {
         self.retain(&mut |element| {
             element.iter_mut().all(|corner| match new(corner.vertex()) {
                 Some(number) => {
@@ -93,7 +96,7 @@ impl Model<'_> {
     }
 
     /// Keeps the elements for which `stays` returns `true`; it may change them.
-    fn retain(&mut self, stays: &mut dyn FnMut(&mut [Corner]) -> bool) {
+    fn retain(&mut self, stays: &mut dyn FnMut(&mut [Corner<I>]) -> bool) {
         let mut runs = self.store.pen_runs().len();
         let (mut read, mut write, mut bars, mut faces) = (0, 0, 0, 0);
         while let Some(length) = self.store.corners().get(read..).and_then(element_length) {
@@ -139,7 +142,7 @@ impl Model<'_> {
     /// again.
     pub(super) fn reverse_faces(&mut self, range: &Range<usize>) {
         self.retain(&mut |element| {
-            let inside = element.iter().all(|corner| range.contains(&usize::from(corner.vertex())));
+            let inside = element.iter().all(|corner| range.contains(&corner.vertex().get()));
             if inside && element.first().is_some_and(|corner| !corner.of_bar()) {
                 reverse(element);
             }
@@ -149,12 +152,12 @@ impl Model<'_> {
 }
 
 /// Returns the number of corners of the first element.
-pub(super) fn element_length(corners: &[Corner]) -> Option<usize> {
+pub(super) fn element_length<I: Index>(corners: &[Corner<I>]) -> Option<usize> {
     corners.iter().position(|corner| corner.is_last()).map(|last| last + 1)
 }
 
 /// Reverses the order of a face's corners, beginning at the same vertex.
-pub(super) fn reverse(face: &mut [Corner]) {
+pub(super) fn reverse<I: Index>(face: &mut [Corner<I>]) {
     let Some((_, rest)) = face.split_first_mut() else { return };
     rest.reverse();
     let last = face.len() - 1;

@@ -2,6 +2,7 @@
 
 use crate::array::MapEach;
 use crate::fixed::{divide_rounding, product, sin_cos_degrees};
+use crate::index::Index;
 use crate::model::{BeforeChange, Model, ModelError, POSITION_LIMIT, Position, resolve};
 use core::ops::Range;
 
@@ -78,14 +79,14 @@ fn within(value: i128) -> i64 {
     value.clamp(-LIMIT, LIMIT) as i64
 }
 
-impl Model<'_> {
+impl<I: Index> Model<'_, I> {
     /// Returns the reflection about the plane of three vertices.
     pub(super) fn reflection(&self, numbers: [i32; 3]) -> Result<Map, ModelError> {
         let vertices = self.vertices.len();
         let mut corners = [Position::default(); 3];
         for (corner, number) in corners.iter_mut().zip(numbers) {
-            *corner = resolve(number, vertices)
-                .and_then(|at| self.vertices.get(usize::from(at)))
+            *corner = resolve::<I>(number, vertices)
+                .and_then(|at| self.vertices.get(at.get()))
                 .copied()
                 .ok_or(ModelError::UnknownVertex { number, vertices })?;
         }
@@ -113,7 +114,7 @@ impl Model<'_> {
         &mut self,
         map: &Map,
         range: Range<usize>,
-        before: BeforeChange<'_>,
+        before: BeforeChange<'_, I>,
     ) -> Result<(), ModelError> {
         let positions = self.vertices.get(range.clone()).unwrap_or(&[]);
         let coarser = self.coarser_for(positions.iter().map(|position| map.apply(*position)))?;

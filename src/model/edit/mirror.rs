@@ -2,6 +2,7 @@
 
 use super::delete::{element_length, reverse};
 use super::map::{Map, in_unit};
+use crate::index::Index;
 use crate::model::pens::RUN;
 use crate::model::{BeforeChange, Corner, Model, ModelError};
 use crate::stage::Scratch;
@@ -11,7 +12,7 @@ use core::ops::Range;
 /// the plane, because of rounding.
 const ON_PLANE: u64 = 16;
 
-impl Model<'_> {
+impl<I: Index> Model<'_, I> {
     /// Adds the image of the vertices in `range`, and of the elements and curves that have all
     /// their vertices there.
     pub(super) fn mirror(
@@ -19,9 +20,9 @@ impl Model<'_> {
         map: &Map,
         range: Range<usize>,
         mut scratch: Scratch<'_>,
-        before: BeforeChange<'_>,
+        before: BeforeChange<'_, I>,
     ) -> Result<(), ModelError> {
-        let images = scratch.take::<u16>(range.len()).map_err(ModelError::Scratch)?;
+        let images = scratch.take::<I>(range.len()).map_err(ModelError::Scratch)?;
         let (old, limit) = (self.vertices.len(), self.vertex_limit());
         let mut count = old;
         for (at, image) in range.clone().zip(images.iter_mut()) {
@@ -29,18 +30,18 @@ impl Model<'_> {
             let near = |(image, c): (i64, i32)| (image - i64::from(c)).unsigned_abs() <= ON_PLANE;
             let stays = map.apply(*position).into_iter().zip(position.coordinates()).all(near);
             // The number is below VERTEX_NUMBER_LIMIT, otherwise the edit is refused below.
-            *image = if stays { at } else { count } as u16;
+            *image = I::new(if stays { at } else { count });
             count += usize::from(!stays);
         }
         if count > limit {
             return Err(ModelError::TooManyVertices { limit });
         }
-        let image = |number: u16| {
-            let at = usize::from(number).checked_sub(range.start)?;
+        let image = |number: I| {
+            let at = number.get().checked_sub(range.start)?;
             images.get(at).copied()
         };
         // What lies in the plane is its own image and is not copied.
-        let is_copied = |mut numbers: &mut dyn Iterator<Item = u16>| {
+        let is_copied = |mut numbers: &mut dyn Iterator<Item = I>| {
             let mut moves = false;
             Iterator::all(&mut numbers, |number| {
                 image(number).inspect(|new| moves |= *new != number).is_some()
@@ -68,7 +69,7 @@ impl Model<'_> {
         before(self);
         for at in range.clone() {
             let Some(position) = self.vertices.get(at) else { continue };
-            if image(at as u16) != Some(at as u16) {
+            if image(I::new(at)) != Some(I::new(at)) {
                 let position = in_unit(map.apply(*position), coarser);
                 // There is room, because it was counted.
                 let _ = self.vertices.push(position);
@@ -90,7 +91,7 @@ impl Model<'_> {
             corners.copy_within(element, start);
             let copy = corners.get_mut(start..).unwrap_or(&mut []);
             for corner in copy.iter_mut() {
-                let number = image(corner.vertex()).unwrap_or(0);
+                let number = image(corner.vertex()).unwrap_or(I::ZERO);
                 *corner = Corner::new(number, corner.of_bar(), corner.is_last());
             }
             if copy.first().is_some_and(|corner| corner.of_bar()) {

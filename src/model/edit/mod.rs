@@ -15,6 +15,7 @@ use super::pens::RUN;
 use super::{BeforeChange, Model, ModelError, resolve};
 use crate::array::MapEach;
 use crate::fixed::{Decimal, rest_of_periods};
+use crate::index::Index;
 use crate::stage::{OutOfScratch, Scratch};
 use core::ops::Range;
 use map::{Map, SCALE_LIMIT, UNIT_BITS};
@@ -72,7 +73,7 @@ pub struct Change {
     pub curves: i32,
 }
 
-impl Model<'_> {
+impl<I: Index> Model<'_, I> {
     /// Makes one change. `scratch` must have 2 bytes for each vertex that is mirrored. `before` is
     /// called with the model just before it changes.
     ///
@@ -82,7 +83,7 @@ impl Model<'_> {
         &mut self,
         edit: Edit,
         scratch: Scratch<'_>,
-        before: BeforeChange<'_>,
+        before: BeforeChange<'_, I>,
     ) -> Result<Change, ModelError> {
         if self.curves.is_unfinished() {
             return Err(ModelError::CurveUnfinished);
@@ -204,7 +205,7 @@ impl Model<'_> {
         let Some(numbers) = numbers else { return Ok(0..count) };
         let mut ends = [0; 2];
         for (end, number) in ends.iter_mut().zip(numbers) {
-            *end = resolve(number, count).map(usize::from).ok_or(match part {
+            *end = resolve::<I>(number, count).map(I::get).ok_or(match part {
                 ElementKind::Vertices => ModelError::UnknownVertex { number, vertices: count },
                 _ => ModelError::UnknownElement { part, number, count },
             })?;

@@ -7,59 +7,93 @@
 //! blossom in one step.
 
 use super::{Label, Matching};
+use crate::index::Index;
+use crate::order::OrderError;
 use crate::order::work_budget::WorkBudget;
-use crate::order::{NONE, OrderError};
 use bytemuck::{Pod, Zeroable};
 
 /// A node: a vertex or a blossom.
+///
+/// It holds the blossom that contains the node, or [`Index::NONE`]; the vertex that is matched
+/// outside the node, or [`Index::NONE`] for a blossom not in use; the next node in the ring of the
+/// parent or, for a blossom not in use, the next such blossom; and a pair of vertices.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
-#[repr(C)]
-pub(super) struct Node {
-    /// The blossom that contains this node, or [`NONE`].
-    pub parent: u16,
-    /// The next node in the ring of the parent; for a blossom not in use, the next such blossom.
-    next: u16,
-    /// The pair of vertices (the one in this node first) that connects this node with `next` in the
-    /// ring. For an inner outermost node: the pair (the one in this node second) by which the tree
-    /// reached it.
-    pub link: [u16; 2],
-    /// The vertex that is matched outside the node; [`NONE`] for a blossom not in use.
-    pub base: u16,
-}
+#[repr(transparent)]
+pub(super) struct Node<I>([I; 5]);
 
-impl Node {
+impl<I: Index> Node<I> {
     /// Makes the node of a single vertex.
-    pub fn vertex(vertex: u16) -> Self {
-        Self { parent: NONE, next: NONE, link: [NONE; 2], base: vertex }
+    pub fn vertex(vertex: I) -> Self {
+        Self([I::NONE, vertex, I::NONE, I::NONE, I::NONE])
+    }
+
+    /// Returns the blossom that contains this node, or [`Index::NONE`].
+    pub fn parent(&self) -> I {
+        self.0[0]
+    }
+
+    fn set_parent(&mut self, parent: I) {
+        self.0[0] = parent;
+    }
+
+    /// Returns the vertex that is matched outside the node; [`Index::NONE`] for a blossom not in
+    /// use.
+    pub fn base(&self) -> I {
+        self.0[1]
+    }
+
+    pub fn set_base(&mut self, base: I) {
+        self.0[1] = base;
+    }
+
+    /// Returns the next node in the ring of the parent; for a blossom not in use, the next such
+    /// blossom.
+    fn next(&self) -> I {
+        self.0[2]
+    }
+
+    fn set_next(&mut self, next: I) {
+        self.0[2] = next;
+    }
+
+    /// Returns the pair of vertices (the one in this node first) that connects this node with
+    /// `next` in the ring. For an inner outermost node: the pair (the one in this node second) by
+    /// which the tree reached it.
+    pub fn link(&self) -> [I; 2] {
+        [self.0[3], self.0[4]]
+    }
+
+    pub fn set_link(&mut self, [from, to]: [I; 2]) {
+        (self.0[3], self.0[4]) = (from, to);
     }
 
     /// Whether the node is in use and not part of a blossom.
     pub fn is_outermost(&self) -> bool {
-        self.base != NONE && self.parent == NONE
+        self.base() != I::NONE && self.parent() == I::NONE
     }
 }
 
-impl Matching<'_, '_> {
+impl<I: Index> Matching<'_, '_, I> {
     /// Links the blossoms, none of which is in use yet, in a list.
     pub(super) fn lay_out_spares(&mut self) {
         let vertices = self.top.len();
-        for (number, node) in (0..).zip(self.nodes.iter_mut()).skip(vertices) {
-            *node = Node::vertex(NONE);
-            node.next = number + 1;
+        for (number, node) in I::all().zip(self.nodes.iter_mut()).skip(vertices) {
+            *node = Node::vertex(I::NONE);
+            node.set_next(number + I::ONE);
         }
     }
 
-    fn is_blossom(&self, node: u16) -> bool {
-        usize::from(node) >= self.top.len()
+    fn is_blossom(&self, node: I) -> bool {
+        node.get() >= self.top.len()
     }
 
     /// Returns the stored dual of a blossom.
-    fn inside(&mut self, blossom: u16) -> &mut i32 {
-        &mut self.slack_inside[usize::from(blossom) - self.top.len()]
+    fn inside(&mut self, blossom: I) -> &mut i32 {
+        &mut self.slack_inside[blossom.get() - self.top.len()]
     }
 
     /// Adds an outermost node that has no label to the tree.
-    pub(super) fn enter(&mut self, node: u16, label: Label) {
+    pub(super) fn enter(&mut self, node: I, label: Label) {
         self.set_label(node, label);
         if self.is_blossom(node) {
             let twice = 2 * self.now;
@@ -74,9 +108,9 @@ impl Matching<'_, '_> {
 
     /// Stores the current dual of an outermost blossom, so that it no longer depends on a label and
     /// on `now`.
-    pub(super) fn freeze(&mut self, blossom: u16) {
+    pub(super) fn freeze(&mut self, blossom: I) {
         let twice = 2 * self.now;
-        match self.label(self.node(blossom).base) {
+        match self.label(self.node(blossom).base()) {
             Label::Outside => {}
             Label::Outer | Label::Fresh => *self.inside(blossom) += twice,
             Label::Inner => {
@@ -87,44 +121,44 @@ impl Matching<'_, '_> {
     }
 
     /// Returns the inner blossom whose dual will be the first to reach 0, and the time of that.
-    pub(super) fn next_opening(&self) -> Option<(i32, u16)> {
+    pub(super) fn next_opening(&self) -> Option<(i32, I)> {
         let vertices = self.top.len();
         self.blossoms()
             .filter(|&blossom| {
                 let node = self.node(blossom);
-                node.is_outermost() && self.label(node.base) == Label::Inner
+                node.is_outermost() && self.label(node.base()) == Label::Inner
             })
-            .map(|blossom| (self.slack_inside[usize::from(blossom) - vertices] / 2, blossom))
+            .map(|blossom| (self.slack_inside[blossom.get() - vertices] / 2, blossom))
             .min()
     }
 
     /// Returns the step from an outer node towards the root: the matched pair and the pair beyond
     /// it, each with the vertex farther from the root first. `None` at the root.
-    fn step_up(&self, outer: u16) -> Option<[[u16; 2]; 2]> {
-        let base = self.node(outer).base;
-        let mate = self.mate[usize::from(base)];
-        if mate == NONE {
+    fn step_up(&self, outer: I) -> Option<[[I; 2]; 2]> {
+        let base = self.node(outer).base();
+        let mate = self.mate[base.get()];
+        if mate == I::NONE {
             return None;
         }
-        let [above, below] = self.node(self.top_of(mate)).link;
+        let [above, below] = self.node(self.top_of(mate)).link();
         Some([[base, mate], [below, above]])
     }
 
-    pub(super) fn node(&self, node: u16) -> &Node {
-        &self.nodes[usize::from(node)]
+    pub(super) fn node(&self, node: I) -> &Node<I> {
+        &self.nodes[node.get()]
     }
 
-    pub(super) fn node_mut(&mut self, node: u16) -> &mut Node {
-        &mut self.nodes[usize::from(node)]
+    pub(super) fn node_mut(&mut self, node: I) -> &mut Node<I> {
+        &mut self.nodes[node.get()]
     }
 
     /// Returns the outermost node that contains a vertex.
-    pub(super) fn top_of(&self, vertex: u16) -> u16 {
-        self.top[usize::from(vertex)]
+    pub(super) fn top_of(&self, vertex: I) -> I {
+        self.top[vertex.get()]
     }
 
     /// Returns the number of steps from an outer node to the root.
-    fn depth(&self, outer: u16) -> u16 {
+    fn depth(&self, outer: I) -> u32 {
         let mut depth = 0;
         let mut node = outer;
         while let Some([_, [_, above]]) = self.step_up(node) {
@@ -135,7 +169,7 @@ impl Matching<'_, '_> {
     }
 
     /// Returns the lowest common ancestor of two outer nodes.
-    fn meeting(&self, a: u16, b: u16) -> u16 {
+    fn meeting(&self, a: I, b: I) -> I {
         let (mut a, mut b) = (a, b);
         let (mut depth_a, mut depth_b) = (self.depth(a), self.depth(b));
         while a != b {
@@ -155,10 +189,10 @@ impl Matching<'_, '_> {
     }
 
     /// Shrinks the ring that the touching pair of two outer vertices closes to one outer blossom.
-    pub(super) fn shrink(&mut self, left: u16, right: u16) {
+    pub(super) fn shrink(&mut self, left: I, right: I) {
         let meeting = self.meeting(self.top_of(left), self.top_of(right));
         let blossom = self.spare;
-        self.unused = self.unused.max(blossom + 1);
+        self.unused = self.unused.max(blossom + I::ONE);
         let (mut node, mut onward) = (self.top_of(left), [left, right]);
         // The left side of the ring is linked downwards: each node to the one below it.
         loop {
@@ -179,48 +213,48 @@ impl Matching<'_, '_> {
             self.chain(self.top_of(matched[1]), beyond, blossom);
             node = self.top_of(beyond[1]);
         }
-        let base = self.node(meeting).base;
-        self.spare = self.node(blossom).next;
+        let base = self.node(meeting).base();
+        self.spare = self.node(blossom).next();
         *self.node_mut(blossom) = Node::vertex(base);
         *self.inside(blossom) = -2 * self.now;
-        for vertex in 0..self.top.len() as u16 {
+        for vertex in I::below(I::new(self.top.len())) {
             let top = self.top_of(vertex);
-            if self.node(top).parent == blossom {
+            if self.node(top).parent() == blossom {
                 if self.label(vertex) == Label::Inner {
                     self.set_vertex_label(vertex, Label::Fresh);
                 }
-                self.top[usize::from(vertex)] = blossom;
+                self.top[vertex.get()] = blossom;
             }
         }
     }
 
     /// Adds `node` to the ring of `blossom`. The pair `onward` leads to the next node of the ring.
-    fn chain(&mut self, node: u16, onward: [u16; 2], blossom: u16) {
+    fn chain(&mut self, node: I, onward: [I; 2], blossom: I) {
         if self.is_blossom(node) {
             self.freeze(node);
         }
         let next = self.top_of(onward[1]);
         let node = self.node_mut(node);
-        node.link = onward;
-        node.next = next;
-        node.parent = blossom;
+        node.set_link(onward);
+        node.set_next(next);
+        node.set_parent(blossom);
     }
 
     /// Returns the node of the ring of `blossom` that contains `vertex`.
-    fn within(&self, blossom: u16, vertex: u16) -> u16 {
+    fn within(&self, blossom: I, vertex: I) -> I {
         let mut node = vertex;
-        while self.node(node).parent != blossom {
-            node = self.node(node).parent;
+        while self.node(node).parent() != blossom {
+            node = self.node(node).parent();
         }
         node
     }
 
     /// Expands an outermost blossom: the nodes of its ring become outermost. Returns the one that
     /// contains the base.
-    fn open(&mut self, blossom: u16) -> u16 {
-        for vertex in 0..self.top.len() as u16 {
+    fn open(&mut self, blossom: I) -> I {
+        for vertex in I::below(I::new(self.top.len())) {
             if self.top_of(vertex) == blossom {
-                self.top[usize::from(vertex)] = self.within(blossom, vertex);
+                self.top[vertex.get()] = self.within(blossom, vertex);
             }
         }
         self.settle(blossom)
@@ -228,24 +262,25 @@ impl Matching<'_, '_> {
 
     /// Matches the nodes of an outermost blossom around its ring, starting after the one that
     /// contains the base. Returns that node, and frees the blossom.
-    fn settle(&mut self, blossom: u16) -> u16 {
-        let base = self.node(blossom).base;
+    fn settle(&mut self, blossom: I) -> I {
+        let base = self.node(blossom).base();
         let first = self.within(blossom, base);
-        self.node_mut(first).base = base;
-        self.node_mut(first).parent = NONE;
-        let mut node = self.node(first).next;
+        self.node_mut(first).set_base(base);
+        self.node_mut(first).set_parent(I::NONE);
+        let mut node = self.node(first).next();
         while node != first {
-            let Node { next, link: [a, b], .. } = *self.node(node);
-            self.mate[usize::from(a)] = b;
-            self.mate[usize::from(b)] = a;
+            let (next, [a, b]) = (self.node(node).next(), self.node(node).link());
+            self.mate[a.get()] = b;
+            self.mate[b.get()] = a;
             for (node, base) in [(node, a), (next, b)] {
-                self.node_mut(node).base = base;
-                self.node_mut(node).parent = NONE;
+                self.node_mut(node).set_base(base);
+                self.node_mut(node).set_parent(I::NONE);
             }
-            node = self.node(next).next;
+            node = self.node(next).next();
         }
         let spare = self.spare;
-        *self.node_mut(blossom) = Node { next: spare, ..Node::vertex(NONE) };
+        *self.node_mut(blossom) = Node::vertex(I::NONE);
+        self.node_mut(blossom).set_next(spare);
         self.spare = blossom;
         first
     }
@@ -254,10 +289,10 @@ impl Matching<'_, '_> {
     /// tree above with the tree below replaces it; the rest leaves the tree.
     pub(super) fn open_inner(
         &mut self,
-        blossom: u16,
+        blossom: I,
         work_budget: &mut WorkBudget<'_>,
     ) -> Result<(), OrderError> {
-        let entry = self.node(blossom).link;
+        let entry = self.node(blossom).link();
         self.freeze(blossom);
         let first = self.open(blossom);
         let entrance = self.top_of(entry[1]);
@@ -265,7 +300,7 @@ impl Matching<'_, '_> {
         let mut node = first;
         let mut last = first;
         for index in 0.. {
-            let Node { next, link, .. } = *self.node(node);
+            let (next, link) = (self.node(node).next(), self.node(node).link());
             let vertices = self.candidates(node).len();
             self.charge(vertices, work_budget)?;
             self.set_label(node, Label::Outside);
@@ -277,11 +312,12 @@ impl Matching<'_, '_> {
                 || (index % 2 == position % 2 && (index < position) == back)
                 || node == entrance
             {
-                self.node_mut(node).link = match (node == entrance, back) {
+                let link = match (node == entrance, back) {
                     (true, _) => entry,
                     (false, true) => [link[1], link[0]],
-                    (false, false) => self.node(last).link,
+                    (false, false) => self.node(last).link(),
                 };
+                self.node_mut(node).set_link(link);
                 self.enter(node, Label::Inner);
             } else if (index < position) == back {
                 self.enter(node, Label::Fresh);
@@ -290,7 +326,8 @@ impl Matching<'_, '_> {
             }
             if next == first {
                 if !back {
-                    self.node_mut(first).link = self.node(node).link;
+                    let link = self.node(node).link();
+                    self.node_mut(first).set_link(link);
                 }
                 break;
             }
@@ -300,11 +337,11 @@ impl Matching<'_, '_> {
     }
 
     /// Returns how many nodes after `first` in the ring `node` is.
-    fn position(&self, first: u16, node: u16) -> u16 {
+    fn position(&self, first: I, node: I) -> u32 {
         let mut position = 0;
         let mut at = first;
         while at != node {
-            at = self.node(at).next;
+            at = self.node(at).next();
             position += 1;
         }
         position

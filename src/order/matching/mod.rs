@@ -21,18 +21,20 @@
 mod blossom;
 mod start;
 
+use super::OrderError;
 use super::odd::OddPoints;
 use super::work_budget::WorkBudget;
-use super::{NONE, OrderError};
+use crate::index::{Index, Numbers};
 use crate::stage::{OutOfScratch, Scratch};
 use blossom::Node;
 use core::cell::Cell;
-use core::ops::Range;
 
 /// A time later than any event.
 const NEVER: i32 = 1 << 30;
 /// A range without vertices.
-const NOTHING: Range<u16> = Range { start: NONE, end: 0 };
+fn nothing<I: Index>() -> Numbers<I> {
+    Numbers { start: I::NONE, end: I::ZERO }
+}
 /// Distances are shifted right until they are below this, so that a sum of four weights fits.
 const DISTANCE_LIMIT: u32 = 1 << 27;
 
@@ -51,11 +53,11 @@ enum Label {
 }
 
 /// Returns the scratch memory needed for `count` vertices (odd points and free ends), in bytes.
-pub const fn scratch_bytes(count: usize) -> usize {
-    Scratch::bytes_for::<Node>(count + count / 2)
+pub const fn scratch_bytes<I: Index>(count: usize) -> usize {
+    Scratch::bytes_for::<Node<I>>(count + count / 2)
         + Scratch::bytes_for::<i32>(count / 2)
         + 2 * Scratch::bytes_for::<i32>(count)
-        + 2 * Scratch::bytes_for::<u16>(count)
+        + 2 * Scratch::bytes_for::<I>(count)
         + Scratch::bytes_for::<u8>(count)
 }
 
@@ -64,16 +66,16 @@ pub const fn scratch_bytes(count: usize) -> usize {
 /// Returns a lower bound of that length in 1/256 steps. The bound is the length itself, unless the
 /// drawing is so large (above 2^19 steps) that the lengths had to be rounded further.
 #[inline(never)] // Smaller than in its only caller.
-pub(super) fn pair<'s>(
-    odd: &'s OddPoints<'s>,
+pub(super) fn pair<'s, I: Index>(
+    odd: &'s OddPoints<'s, I>,
     mut scratch: Scratch<'s>,
     work_budget: &mut WorkBudget<'_>,
-    mate: &'s mut [u16],
+    mate: &'s mut [I],
 ) -> Result<u64, OrderError> {
     let mut matching = Matching::new(odd, &mut scratch, mate)?;
     matching.start(work_budget)?;
-    for root in 0..odd.count() {
-        if matching.mate[usize::from(root)] == NONE {
+    for root in I::below(odd.count()) {
+        if matching.mate[root.get()] == I::NONE {
             matching.grow_tree(root, work_budget)?;
         }
     }
@@ -82,15 +84,15 @@ pub(super) fn pair<'s>(
 }
 
 /// The state of the algorithm: the matching so far, its duals, and the present tree.
-struct Matching<'s, 'a> {
-    odd: &'s OddPoints<'a>,
+struct Matching<'s, 'a, I> {
+    odd: &'s OddPoints<'a, I>,
     /// The vertices, followed by the blossoms.
-    nodes: &'s mut [Node],
+    nodes: &'s mut [Node<I>],
     /// The outermost node that contains each vertex.
-    top: &'s mut [u16],
+    top: &'s mut [I],
     /// The partner of each vertex that is the base of an outermost node; meaningless for other
     /// vertices.
-    mate: &'s mut [u16],
+    mate: &'s mut [I],
     /// The [`Label`] of each vertex, as a number.
     label: &'s mut [u8],
     /// The dual of each vertex. The current value is this plus `now` if its node is outer, and
@@ -100,14 +102,14 @@ struct Matching<'s, 'a> {
     /// twice `now` (outer) or minus twice `now` (inner).
     slack_inside: &'s mut [i32],
     /// A range that contains all fresh vertices.
-    fresh: Range<u16>,
+    fresh: Numbers<I>,
     /// The time at which the best known pair of each vertex with an outer vertex will touch. Times
     /// are values of `now`.
     when: &'s mut [i32],
     /// The outer vertex of that pair.
-    best: &'s mut [u16],
+    best: &'s mut [I],
     /// A range that contains all odd points for which such a pair is known.
-    reached: Range<u16>,
+    reached: Numbers<I>,
     /// The time: how far the duals of the tree have moved since it was started.
     now: i32,
     /// The greatest radius when the tree was started.
@@ -115,11 +117,11 @@ struct Matching<'s, 'a> {
     /// The time at which the tree will reach an unmatched vertex by the best pair known.
     limit: i32,
     /// The first blossom in the list of those not in use.
-    spare: u16,
+    spare: I,
     /// The blossoms from this number on have never been in use.
-    unused: u16,
+    unused: I,
     /// The number of inner blossoms.
-    inner_blossoms: u16,
+    inner_blossoms: u32,
     /// The number of bits by which the distances are shifted right.
     shortened: u32,
     /// The weight of a pair of an odd point and a free end. It is the same for all, so it does not
@@ -129,25 +131,25 @@ struct Matching<'s, 'a> {
     roots: Cell<u32>,
 }
 
-impl<'s, 'a> Matching<'s, 'a> {
+impl<'s, 'a, I: Index> Matching<'s, 'a, I> {
     fn new(
-        odd: &'s OddPoints<'a>,
+        odd: &'s OddPoints<'a, I>,
         scratch: &mut Scratch<'s>,
-        mate: &'s mut [u16],
+        mate: &'s mut [I],
     ) -> Result<Self, OutOfScratch> {
-        let count = usize::from(odd.count());
-        let nodes: &mut [Node] = scratch.take(count + count / 2)?;
+        let count = odd.count().get();
+        let nodes: &mut [Node<I>] = scratch.take(count + count / 2)?;
         let slack_inside = scratch.take(count / 2)?;
         let radius = scratch.take(count)?;
         let when = scratch.take(count)?;
-        let top: &mut [u16] = scratch.take(count)?;
+        let top: &mut [I] = scratch.take(count)?;
         let best = scratch.take(count)?;
         let label = scratch.take(count)?;
-        for (vertex, (node, top)) in (0..).zip(nodes.iter_mut().zip(top.iter_mut())) {
+        for (vertex, (node, top)) in I::all().zip(nodes.iter_mut().zip(top.iter_mut())) {
             *node = Node::vertex(vertex);
             *top = vertex;
         }
-        mate.fill(NONE);
+        mate.fill(I::NONE);
         let mut matching = Self {
             odd,
             nodes,
@@ -156,10 +158,10 @@ impl<'s, 'a> Matching<'s, 'a> {
             label,
             radius,
             slack_inside,
-            fresh: NOTHING,
+            fresh: nothing(),
             when,
             best,
-            reached: NOTHING,
+            reached: nothing(),
             now: 0,
             widest: 0,
             limit: NEVER,
@@ -178,7 +180,7 @@ impl<'s, 'a> Matching<'s, 'a> {
     }
 
     /// Returns the weight of a pair: twice the distance of two odd points.
-    fn weight(&self, a: u16, b: u16) -> i32 {
+    fn weight(&self, a: I, b: I) -> i32 {
         let real = self.odd.real_count();
         if a < real && b < real {
             2 * (self.odd.distance(a, b) >> self.shortened) as i32
@@ -190,13 +192,13 @@ impl<'s, 'a> Matching<'s, 'a> {
     }
 
     /// Returns a lower bound of the weight of a pair of odd points, from their x alone.
-    fn weight_along_x(&self, a: u16, b: u16) -> i32 {
+    fn weight_along_x(&self, a: I, b: I) -> i32 {
         2 * (self.odd.distance_along_x(a, b) >> self.shortened) as i32
     }
 
     /// Returns the weight if it is less than `bound`. Most pairs that weigh more are rejected
     /// without a square root.
-    fn weight_below(&self, a: u16, b: u16, bound: i32) -> Option<i32> {
+    fn weight_below(&self, a: I, b: I, bound: i32) -> Option<i32> {
         if bound <= 0 || (self.odd.least_distance(a, b) >> self.shortened) as i32 * 2 >= bound {
             return None;
         }
@@ -213,8 +215,8 @@ impl<'s, 'a> Matching<'s, 'a> {
     }
 
     /// Returns the label of the node in which the vertex lies.
-    fn label(&self, vertex: u16) -> Label {
-        match self.label[usize::from(vertex)] {
+    fn label(&self, vertex: I) -> Label {
+        match self.label[vertex.get()] {
             0 => Label::Outside,
             1 => Label::Outer,
             2 => Label::Fresh,
@@ -223,8 +225,8 @@ impl<'s, 'a> Matching<'s, 'a> {
     }
 
     /// Returns the current dual of `vertex`.
-    fn radius_now(&self, vertex: u16) -> i32 {
-        let radius = self.radius[usize::from(vertex)];
+    fn radius_now(&self, vertex: I) -> i32 {
+        let radius = self.radius[vertex.get()];
         match self.label(vertex) {
             Label::Outside => radius,
             Label::Outer | Label::Fresh => radius + self.now,
@@ -233,7 +235,7 @@ impl<'s, 'a> Matching<'s, 'a> {
     }
 
     /// Gives all vertices of an outermost node a label. Their current duals do not change.
-    fn set_label(&mut self, node: u16, label: Label) {
+    fn set_label(&mut self, node: I, label: Label) {
         for vertex in self.candidates(node) {
             if self.top_of(vertex) == node {
                 self.set_vertex_label(vertex, label);
@@ -242,15 +244,15 @@ impl<'s, 'a> Matching<'s, 'a> {
     }
 
     /// Returns a range that contains all vertices of an outermost node.
-    fn candidates(&self, node: u16) -> Range<u16> {
-        let all = self.top.len() as u16;
-        if node < all { node..node + 1 } else { 0..all }
+    fn candidates(&self, node: I) -> Numbers<I> {
+        let all = I::new(self.top.len());
+        if node < all { node.to(node + I::ONE) } else { I::below(all) }
     }
 
     /// Gives a vertex a label, and stores its dual so that its current value does not change.
-    fn set_vertex_label(&mut self, vertex: u16, label: Label) {
+    fn set_vertex_label(&mut self, vertex: I, label: Label) {
         let radius = self.radius_now(vertex);
-        let index = usize::from(vertex);
+        let index = vertex.get();
         self.label[index] = label as u8;
         self.when[index] = NEVER;
         if label == Label::Fresh {
@@ -265,13 +267,13 @@ impl<'s, 'a> Matching<'s, 'a> {
 
     /// Grows a tree from the unmatched vertex `root` until it reaches another one, and matches
     /// both.
-    fn grow_tree(&mut self, root: u16, work_budget: &mut WorkBudget<'_>) -> Result<(), OrderError> {
+    fn grow_tree(&mut self, root: I, work_budget: &mut WorkBudget<'_>) -> Result<(), OrderError> {
         self.now = 0;
         self.widest = self.radius.iter().copied().max().unwrap_or(0);
         self.limit = NEVER;
         self.inner_blossoms = 0;
         self.when.fill(NEVER);
-        self.reached = NOTHING;
+        self.reached = nothing();
         self.enter(root, Label::Fresh);
         loop {
             self.examine_fresh_vertices(work_budget)?;
@@ -286,7 +288,7 @@ impl<'s, 'a> Matching<'s, 'a> {
                 continue;
             }
             self.now = time;
-            let outer = self.best[usize::from(vertex)];
+            let outer = self.best[vertex.get()];
             let node = self.top_of(vertex);
             if self.label(vertex) == Label::Outer {
                 if self.top_of(outer) == node {
@@ -296,14 +298,14 @@ impl<'s, 'a> Matching<'s, 'a> {
                 }
                 continue;
             }
-            let base = self.node(node).base;
-            let mate = self.mate[usize::from(base)];
-            if mate == NONE {
+            let base = self.node(node).base();
+            let mate = self.mate[base.get()];
+            if mate == I::NONE {
                 self.augment(outer, vertex);
                 self.fell_tree();
                 return Ok(());
             }
-            self.node_mut(node).link = [outer, vertex];
+            self.node_mut(node).set_link([outer, vertex]);
             self.enter(node, Label::Inner);
             self.enter(self.top_of(mate), Label::Fresh);
         }
@@ -311,11 +313,11 @@ impl<'s, 'a> Matching<'s, 'a> {
 
     /// Returns the first pair with an outer vertex that will touch: the time, and the vertex that
     /// is not the outer one in `best`.
-    fn next_touch(&self) -> (i32, u16) {
-        let mut first = (NEVER, 0);
-        for Range { start, end } in [self.reached.clone(), self.odd.free_numbers()] {
-            let all = self.when.get(usize::from(start)..usize::from(end)).unwrap_or(&[]);
-            for (vertex, &when) in (start..).zip(all) {
+    fn next_touch(&self) -> (i32, I) {
+        let mut first = (NEVER, I::ZERO);
+        for Numbers { start, end } in [self.reached, self.odd.free_numbers()] {
+            let all = self.when.get(start.get()..end.get()).unwrap_or(&[]);
+            for (vertex, &when) in start.to(end).zip(all) {
                 if when < first.0 {
                     first = (when, vertex);
                 }
@@ -329,9 +331,9 @@ impl<'s, 'a> Matching<'s, 'a> {
         &mut self,
         work_budget: &mut WorkBudget<'_>,
     ) -> Result<(), OrderError> {
-        for vertex in core::mem::replace(&mut self.fresh, NOTHING) {
+        for vertex in core::mem::replace(&mut self.fresh, nothing()) {
             if self.label(vertex) == Label::Fresh {
-                self.label[usize::from(vertex)] = Label::Outer as u8;
+                self.label[vertex.get()] = Label::Outer as u8;
                 self.record_pairs_of(vertex, work_budget)?;
             }
         }
@@ -342,7 +344,7 @@ impl<'s, 'a> Matching<'s, 'a> {
     /// that is sooner than the time recorded there.
     fn record_pairs_of(
         &mut self,
-        from: u16,
+        from: I,
         work_budget: &mut WorkBudget<'_>,
     ) -> Result<(), OrderError> {
         let own = self.radius_now(from);
@@ -360,8 +362,8 @@ impl<'s, 'a> Matching<'s, 'a> {
 
     /// Records when the pair of `other` with the outer vertex `from`, whose current radius is
     /// `own`, will touch, if that is sooner than the time recorded.
-    fn record_pair(&mut self, other: u16, label: Label, from: u16, own: i32) {
-        let (now, index) = (self.now, usize::from(other));
+    fn record_pair(&mut self, other: I, label: Label, from: I, own: i32) {
+        let (now, index) = (self.now, other.get());
         // If `other` is outside the tree, only the disc of `from` grows; between two outer vertices
         // both discs grow.
         let left = self.when[index].min(self.limit) - now;
@@ -380,9 +382,9 @@ impl<'s, 'a> Matching<'s, 'a> {
     }
 
     /// Records when the pair of `vertex` with the outer vertex `best` will touch.
-    fn note(&mut self, vertex: u16, when: i32, best: u16) {
-        self.when[usize::from(vertex)] = when;
-        self.best[usize::from(vertex)] = best;
+    fn note(&mut self, vertex: I, when: i32, best: I) {
+        self.when[vertex.get()] = when;
+        self.best[vertex.get()] = best;
         if vertex < self.odd.real_count() {
             cover(&mut self.reached, vertex);
         }
@@ -392,10 +394,10 @@ impl<'s, 'a> Matching<'s, 'a> {
     /// reaches an unmatched vertex.
     fn within_limit(
         &self,
-        vertex: u16,
+        vertex: I,
         own: i32,
         work_budget: &mut WorkBudget<'_>,
-    ) -> Result<[Range<u16>; 2], OrderError> {
+    ) -> Result<[Numbers<I>; 2], OrderError> {
         // At most, both discs grow; no radius has grown by more than `now`.
         let closing = 2 * i64::from(self.limit - self.now);
         let weight = closing + i64::from(own) + i64::from(self.widest) + i64::from(self.now);
@@ -406,10 +408,10 @@ impl<'s, 'a> Matching<'s, 'a> {
     /// `weight`, and the range of the free ends. Counts the work of looking at them.
     fn up_to(
         &self,
-        vertex: u16,
+        vertex: I,
         weight: i64,
         work_budget: &mut WorkBudget<'_>,
-    ) -> Result<[Range<u16>; 2], OrderError> {
+    ) -> Result<[Numbers<I>; 2], OrderError> {
         let reach = (weight.max(0).unsigned_abs() / 2) << self.shortened;
         let others = self.odd.around(vertex, u32::try_from(reach).unwrap_or(u32::MAX));
         self.charge(others.len(), work_budget)?;
@@ -417,19 +419,19 @@ impl<'s, 'a> Matching<'s, 'a> {
     }
 
     /// Whether the outermost node of `vertex` is unmatched.
-    fn is_free(&self, vertex: u16) -> bool {
-        let base = self.node(self.top_of(vertex)).base;
-        self.mate[usize::from(base)] == NONE
+    fn is_free(&self, vertex: I) -> bool {
+        let base = self.node(self.top_of(vertex)).base();
+        self.mate[base.get()] == I::NONE
     }
 
     /// Computes again when the first pair of `vertex` (outside or outer) with an outer vertex of
     /// another node will touch.
     fn find_first_pair(
         &mut self,
-        vertex: u16,
+        vertex: I,
         work_budget: &mut WorkBudget<'_>,
     ) -> Result<(), OrderError> {
-        let index = usize::from(vertex);
+        let index = vertex.get();
         let (now, own) = (self.now, self.radius_now(vertex));
         let sides = if self.label(vertex) == Label::Outside { 1 } else { 2 };
         self.when[index] = NEVER;
@@ -451,7 +453,7 @@ impl<'s, 'a> Matching<'s, 'a> {
     /// Does the same for each vertex of a node.
     fn find_first_pairs(
         &mut self,
-        node: u16,
+        node: I,
         work_budget: &mut WorkBudget<'_>,
     ) -> Result<(), OrderError> {
         for vertex in self.candidates(node) {
@@ -464,27 +466,28 @@ impl<'s, 'a> Matching<'s, 'a> {
 
     /// Changes the matching along the path from the root to `outer`, and matches `outer` with the
     /// unmatched vertex `free`.
-    fn augment(&mut self, outer: u16, free: u16) {
+    fn augment(&mut self, outer: I, free: I) {
         let mut pair = [outer, free];
         loop {
             let [outer, inner] = pair;
             let node = self.top_of(outer);
-            let base = core::mem::replace(&mut self.node_mut(node).base, outer);
-            let next = self.mate[usize::from(base)];
-            self.mate[usize::from(outer)] = inner;
-            self.mate[usize::from(inner)] = outer;
-            if next == NONE {
+            let base = self.node(node).base();
+            self.node_mut(node).set_base(outer);
+            let next = self.mate[base.get()];
+            self.mate[outer.get()] = inner;
+            self.mate[inner.get()] = outer;
+            if next == I::NONE {
                 return;
             }
             let above = self.node_mut(self.top_of(next));
-            pair = above.link;
-            above.base = pair[1];
+            pair = above.link();
+            above.set_base(pair[1]);
         }
     }
 
     /// Returns the blossoms that are or were in use.
-    fn blossoms(&self) -> Range<u16> {
-        self.odd.count()..self.unused
+    fn blossoms(&self) -> Numbers<I> {
+        self.odd.count().to(self.unused)
     }
 
     /// Removes the tree: stores all current duals and removes all labels.
@@ -494,7 +497,7 @@ impl<'s, 'a> Matching<'s, 'a> {
                 self.freeze(blossom);
             }
         }
-        for vertex in 0..self.top.len() as u16 {
+        for vertex in I::below(I::new(self.top.len())) {
             self.set_vertex_label(vertex, Label::Outside);
         }
     }
@@ -502,9 +505,9 @@ impl<'s, 'a> Matching<'s, 'a> {
     /// Returns the length of the matching without the free ends, in 1/256 steps, rounded as the
     /// weights are.
     fn length(&self) -> u64 {
-        let twice: u64 = (0..self.odd.real_count())
+        let twice: u64 = I::below(self.odd.real_count())
             .filter_map(|vertex| {
-                let mate = self.mate[usize::from(vertex)];
+                let mate = self.mate[vertex.get()];
                 self.odd.station(mate)?;
                 Some(u64::from(self.odd.distance(vertex, mate) >> self.shortened))
             })
@@ -514,6 +517,6 @@ impl<'s, 'a> Matching<'s, 'a> {
 }
 
 /// Extends `range` so that it contains `vertex`.
-fn cover(range: &mut Range<u16>, vertex: u16) {
-    *range = range.start.min(vertex)..range.end.max(vertex + 1);
+fn cover<I: Index>(range: &mut Numbers<I>, vertex: I) {
+    *range = range.start.min(vertex).to(range.end.max(vertex + I::ONE));
 }

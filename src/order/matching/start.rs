@@ -2,24 +2,27 @@
 //! nearest neighbours allow, and the pairs that then touch are matched.
 
 use super::Matching;
+use crate::index::Index;
+use crate::order::OrderError;
 use crate::order::work_budget::WorkBudget;
-use crate::order::{NONE, OrderError};
 
-impl Matching<'_, '_> {
+impl<I: Index> Matching<'_, '_, I> {
     /// Sets the duals and matches the pairs that touch.
     pub(super) fn start(&mut self, work_budget: &mut WorkBudget<'_>) -> Result<(), OrderError> {
         let real = self.odd.real_count();
-        for vertex in 0..real {
-            let nearest = self.nearest(&mut (0..vertex).rev(), vertex, i32::MAX, work_budget)?;
-            let nearest = self.nearest(&mut (vertex + 1..real), vertex, nearest, work_budget)?;
+        for vertex in I::below(real) {
+            let nearest =
+                self.nearest(&mut I::below(vertex).rev(), vertex, i32::MAX, work_budget)?;
+            let nearest =
+                self.nearest(&mut (vertex + I::ONE).to(real), vertex, nearest, work_budget)?;
             // Each gets half the weight of its lightest pair, so that no two discs overlap.
-            self.radius[usize::from(vertex)] = nearest / 2;
+            self.radius[vertex.get()] = nearest / 2;
         }
         // With this weight the free ends, whose radius is 0, overlap no disc either.
         self.end_weight = self.radius.iter().copied().max().unwrap_or(0);
         self.widest = self.end_weight;
-        for vertex in 0..self.odd.count() {
-            if self.mate[usize::from(vertex)] == NONE {
+        for vertex in I::below(self.odd.count()) {
+            if self.mate[vertex.get()] == I::NONE {
                 self.widen(vertex, work_budget)?;
             }
         }
@@ -31,8 +34,8 @@ impl Matching<'_, '_> {
     /// next.
     fn nearest(
         &self,
-        others: &mut dyn Iterator<Item = u16>,
-        vertex: u16,
+        others: &mut dyn Iterator<Item = I>,
+        vertex: I,
         bound: i32,
         work_budget: &mut WorkBudget<'_>,
     ) -> Result<i32, OrderError> {
@@ -53,16 +56,16 @@ impl Matching<'_, '_> {
 
     /// Grows the disc of an unmatched vertex until it touches another, and matches them if that one
     /// is unmatched too.
-    fn widen(&mut self, vertex: u16, work_budget: &mut WorkBudget<'_>) -> Result<(), OrderError> {
-        let own = self.radius[usize::from(vertex)];
+    fn widen(&mut self, vertex: I, work_budget: &mut WorkBudget<'_>) -> Result<(), OrderError> {
+        let own = self.radius[vertex.get()];
         let mut gap = i32::MAX / 2;
-        let mut touched = NONE;
+        let mut touched = I::NONE;
         // Its nearest neighbour is at most twice its radius and 1 away.
         let weight = 2 * i64::from(own) + 1 + i64::from(self.widest);
         for others in self.up_to(vertex, weight, work_budget)? {
             for other in others.filter(|&other| other != vertex) {
-                let reach = own + self.radius[usize::from(other)];
-                let free = self.mate[usize::from(other)] == NONE;
+                let reach = own + self.radius[other.get()];
+                let free = self.mate[other.get()] == I::NONE;
                 let bound = gap + reach + i32::from(free);
                 if let Some(weight) = self.weight_below(vertex, other, bound) {
                     gap = weight - reach;
@@ -71,11 +74,11 @@ impl Matching<'_, '_> {
             }
         }
         let radius = own + gap;
-        self.radius[usize::from(vertex)] = radius;
+        self.radius[vertex.get()] = radius;
         self.widest = self.widest.max(radius);
-        if let Some(&NONE) = self.mate.get(usize::from(touched)) {
-            self.mate[usize::from(vertex)] = touched;
-            self.mate[usize::from(touched)] = vertex;
+        if self.mate.get(touched.get()) == Some(&I::NONE) {
+            self.mate[vertex.get()] = touched;
+            self.mate[touched.get()] = vertex;
         }
         Ok(())
     }

@@ -4,6 +4,7 @@ use super::pipeline::Found;
 use super::scale::{bounds_of, fit, map_with_curves};
 use super::{Collector, HALF_A_STEP, PageSink, Pipeline, move_to_front};
 use crate::drawing::PackedLine;
+use crate::index::Index;
 use crate::model::ModelError;
 use crate::plotter::VisibilityMode;
 use crate::protocol::CommandError;
@@ -15,7 +16,7 @@ use crate::visibility::{self, Scene, Unrounded, VisibilityError};
 /// corners per edge.
 const LIKELY_BYTES: usize = size_of::<PackedLine>() / 3;
 
-impl Pipeline<'_> {
+impl<I: Index> Pipeline<'_, I> {
     /// Projects the model through the camera and finds its visible lines. Handles every model that
     /// is neither a flat plan nor a convex solid without faces.
     #[inline(never)] // Keeps its frame off the stack while the other stages run.

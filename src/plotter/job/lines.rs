@@ -3,6 +3,7 @@
 use super::super::PlotOptions;
 use super::Observer;
 use crate::drawing::{LineType, PackedLine, PageMap};
+use crate::index::Index;
 use crate::plotter::HiddenLines;
 use crate::protocol::CommandError;
 use crate::stage::{OutOfScratch, Scratch, items_mut};
@@ -55,7 +56,7 @@ impl<'a> Collector<'a> {
 }
 
 /// Maps each stretch that is to be drawn to the page and collects it as a line.
-pub(in crate::plotter) struct PageSink<'a> {
+pub(in crate::plotter) struct PageSink<'a, I> {
     /// Where the lines go.
     pub collector: Collector<'a>,
     /// From the view to the page.
@@ -63,11 +64,11 @@ pub(in crate::plotter) struct PageSink<'a> {
     pub view: &'a View,
     pub options: &'a PlotOptions,
     /// Is shown each stretch that is drawn.
-    pub observer: &'a mut dyn Observer,
+    pub observer: &'a mut dyn Observer<I>,
 }
 
-impl StretchSink for PageSink<'_> {
-    fn stretch(&mut self, stretch: Stretch) -> Result<(), SinkFull> {
+impl<I: Index> StretchSink<I> for PageSink<'_, I> {
+    fn stretch(&mut self, stretch: Stretch<I>) -> Result<(), SinkFull> {
         let (p, q) = stretch.ends;
         // The intersection of a face with the near plane is not an edge of the model.
         let is_cut = |near| p.z == near && q.z == near && stretch.edge.is_some();

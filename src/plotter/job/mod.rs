@@ -17,15 +17,16 @@ pub(super) use scale::{FOR_BOUNDS, HALF_A_STEP, union};
 pub use strokes::{Cursor, Strokes};
 
 use crate::drawing::{Drawing, Stored};
+use crate::index::Index;
 use crate::order::{self, Leg};
 use crate::stage::{Scratch, items};
 use crate::view::View;
 use crate::visibility::Stretch;
 
 /// Receives each stretch as soon as it is found, in view coordinates. A preview is drawn with it.
-pub trait Observer {
+pub trait Observer<I = u16> {
     /// A stretch, as seen through `view`.
-    fn stretch(&mut self, view: &View, stretch: &Stretch);
+    fn stretch(&mut self, view: &View, stretch: &Stretch<I>);
 
     /// Everything shown so far is void, because the search begins again with another division of
     /// the memory.
@@ -40,16 +41,19 @@ pub trait Observer {
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Unobserved;
 
-impl Observer for Unobserved {
-    fn stretch(&mut self, _: &View, _: &Stretch) {}
+impl<I: Index> Observer<I> for Unobserved {
+    fn stretch(&mut self, _: &View, _: &Stretch<I>) {}
     fn plan_bar(&mut self, _: [f64; 2], _: [f64; 2], _: u8) {}
 }
 
+/// Number of the figures of a job.
+pub(super) const FIGURES: usize = 13;
+
 /// A drawing and the order of its strokes, both of which lie in the working memory.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Job {
+#[derive(Debug, Clone, Copy)]
+pub struct Job<I = u16> {
     /// Where the drawing lies in the working memory.
-    stored: Stored,
+    stored: Stored<I>,
     /// Number of legs of the tour; they lie behind the drawing.
     legs: usize,
     /// Result of the ordering.
@@ -61,14 +65,26 @@ pub struct Job {
     joined_edges: usize,
 }
 
-impl Job {
+impl<I: Index> Default for Job<I> {
+    fn default() -> Self {
+        Self {
+            stored: Stored::default(),
+            legs: 0,
+            report: order::Report::default(),
+            degenerate_faces: 0,
+            joined_edges: 0,
+        }
+    }
+}
+
+impl<I: Index> Job<I> {
     /// Number of words of the working memory that the job occupies.
     pub(super) fn words(&self) -> usize {
-        (self.stored.bytes() + Scratch::bytes_for::<Leg>(self.legs)) / size_of::<u64>()
+        (self.stored.bytes() + Scratch::bytes_for::<Leg<I>>(self.legs)) / size_of::<u64>()
     }
 
     /// The job without its memory, as numbers. [`Job::from_figures`] reads them.
-    pub(super) fn figures(&self) -> [u32; Self::FIGURES] {
+    pub(super) fn figures(&self) -> [u32; FIGURES] {
         let [segments, points] = self.stored.counts().map(|count| count as u32);
         let report = &self.report;
         let low = |length: u64| length as u32;
@@ -90,16 +106,14 @@ impl Job {
         ]
     }
 
-    /// Number of the figures of a job.
-    pub(super) const FIGURES: usize = 13;
-
     /// The job with these figures, or `None` if its memory would be larger than any board's.
     /// Whatever the figures are, [`Job::strokes`] stays within its memory.
-    pub(super) fn from_figures(figures: [u32; Self::FIGURES]) -> Option<Self> {
+    pub(super) fn from_figures(figures: [u32; FIGURES]) -> Option<Self> {
         let [segments, points, legs, odd_points, components, lifts, optimal, lengths @ ..] =
             figures;
         let [down, down_high, up, up_high, bound, bound_high] = lengths;
-        let count = |count: u32| u16::try_from(count).ok().map(usize::from);
+        let count =
+            |count: u32| usize::try_from(count).ok().filter(|&count| count <= I::NONE.get());
         let length = |low: u32, high: u32| u64::from(high) << 32 | u64::from(low);
         Some(Self {
             stored: Stored::of_counts([count(segments)?, count(points)?]),
@@ -140,13 +154,13 @@ impl Job {
     }
 
     /// The strokes from `cursor` on. `words` is the working memory that holds the job.
-    pub fn strokes<'a>(&self, words: &'a mut [u64], cursor: &'a mut Cursor) -> Strokes<'a> {
+    pub fn strokes<'a>(&self, words: &'a mut [u64], cursor: &'a mut Cursor<I>) -> Strokes<'a, I> {
         // `compute` filled this memory, so both reads succeed. Otherwise there are no strokes.
-        let nothing = Drawing { points: &[], segments: &[] };
+        let nothing = Drawing::<I> { points: &[], segments: &[] };
         let leg_words = self.stored.bytes() / size_of::<u64>();
         let words: &'a [u64] = words;
         let tour =
-            words.get(leg_words..).and_then(|rest| items::<Leg>(rest, self.legs)).unwrap_or(&[]);
+            words.get(leg_words..).and_then(|rest| items::<Leg<I>>(rest, self.legs)).unwrap_or(&[]);
         let drawing = self.stored.drawing(words).unwrap_or(nothing);
         Strokes { drawing, tour, cursor }
     }

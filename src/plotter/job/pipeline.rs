@@ -1,10 +1,11 @@
 //! The stages of a job, one after the other.
 
-#[cfg(feature = "convex")]
 use super::super::solid;
 use super::super::{PlotOptions, plan, title};
 use super::{Job, Observer};
 use crate::drawing::{StepsPerMillimetre, build_graph};
+#[cfg(feature = "convex")]
+use crate::index::Index;
 use crate::model::Model;
 use crate::order::{self, Leg};
 use crate::plotter::VisibilityMode;
@@ -14,9 +15,9 @@ use crate::view::{Camera, View};
 
 /// What a job is computed from, and the working memory in which that is done. Each stage borrows
 /// it.
-pub(in crate::plotter) struct Pipeline<'p> {
+pub(in crate::plotter) struct Pipeline<'p, I> {
     /// The model, which is not changed.
-    pub model: &'p Model<'p>,
+    pub model: &'p Model<'p, I>,
     /// What is drawn and how.
     pub options: &'p PlotOptions,
     pub steps: StepsPerMillimetre,
@@ -25,7 +26,7 @@ pub(in crate::plotter) struct Pipeline<'p> {
     /// Is asked in every stage whether the user aborts the job.
     pub cancel: &'p mut dyn Cancel,
     /// Is shown what will be drawn.
-    pub observer: &'p mut dyn Observer,
+    pub observer: &'p mut dyn Observer<I>,
 }
 
 /// The lines that a stage has left at the front of the working memory, and what it left out.
@@ -39,12 +40,12 @@ pub(in crate::plotter) struct Found {
     pub joined_edges: usize,
 }
 
-impl Pipeline<'_> {
+impl<I: Index> Pipeline<'_, I> {
     /// Computes the job. The working memory then holds it.
     ///
     /// # Errors
     /// The [`CommandError`] to reply with. The working memory then holds no job.
-    pub fn run(mut self) -> Result<Job, CommandError> {
+    pub fn run(mut self) -> Result<Job<I>, CommandError> {
         self.check()?;
         let found = if self.model.is_plan() && self.options.shows_plans_flat() {
             plan::lay_out(&mut self)?
@@ -74,7 +75,7 @@ impl Pipeline<'_> {
 
     /// Makes one drawing of the lines and orders its strokes.
     #[inline(never)] // Keeps its frame off the stack while the other stages run.
-    fn order(self, found: &Found) -> Result<Job, CommandError> {
+    fn order(self, found: &Found) -> Result<Job<I>, CommandError> {
         let Self { options, steps, words, cancel, .. } = self;
         cancel.enter(Stage::Order);
         let stored = build_graph(words, found.lines, cancel)?;
@@ -83,7 +84,7 @@ impl Pipeline<'_> {
         if legs == 0 {
             return Err(CommandError::NothingToPlot);
         }
-        let tour = rest.take::<Leg>(legs).map_err(CommandError::DrawingTooLarge)?;
+        let tour = rest.take::<Leg<I>>(legs).map_err(CommandError::DrawingTooLarge)?;
         let report = order::order(drawing, options.order(steps), rest, cancel, tour)?;
         let Found { degenerate_faces, joined_edges, .. } = *found;
         Ok(Job { stored, legs, report, degenerate_faces, joined_edges })

@@ -3,6 +3,7 @@
 use super::super::PlotOptions;
 use crate::drawing::{Bounds, PageMap, StepsPerMillimetre};
 use crate::geometry::{Projection, Vertex};
+use crate::index::Index;
 use crate::model::{Elements, Model, Position};
 use crate::protocol::CommandError;
 use crate::stage::{Aborted, Cancel, Scratch};
@@ -17,9 +18,9 @@ pub(in crate::plotter) const FOR_BOUNDS: u16 = 32;
 const CORNERS_BETWEEN_CHECKS: usize = 128;
 
 /// The bounds of all elements on the view plane; `None` if there are none.
-pub(super) fn bounds_of(
+pub(super) fn bounds_of<I: Index>(
     vertices: &[Vertex],
-    elements: Elements<'_>,
+    elements: Elements<'_, I>,
     projection: Projection,
     cancel: &mut dyn Cancel,
 ) -> Result<Option<Bounds>, Aborted> {
@@ -27,7 +28,7 @@ pub(super) fn bounds_of(
     let mut bounds: Option<Bounds> = None;
     for corners in elements.corners().chunks(CORNERS_BETWEEN_CHECKS) {
         cancel.check()?;
-        let used = corners.iter().filter_map(|c| vertices.get(usize::from(c.vertex()))).copied();
+        let used = corners.iter().filter_map(|c| vertices.get(c.vertex().get())).copied();
         bounds = union(bounds, Bounds::around(used, projection));
     }
     Ok(bounds)
@@ -35,9 +36,9 @@ pub(super) fn bounds_of(
 
 /// Fits elements and curves to the page. The curves' control points do not count, only the chords.
 #[inline(never)] // Keeps its frame off the stack while the stages run.
-pub(super) fn map_with_curves(
+pub(super) fn map_with_curves<I: Index>(
     view: &View,
-    model: &Model<'_>,
+    model: &Model<'_, I>,
     options: &PlotOptions,
     steps: StepsPerMillimetre,
     mut scratch: Scratch<'_>,

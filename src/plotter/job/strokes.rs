@@ -1,16 +1,17 @@
 //! Hands the strokes of a job to the machine.
 
 use crate::drawing::Drawing;
+use crate::index::Index;
 use crate::machine::{Path, Target};
 use crate::order::Leg;
 
 /// Position in the strokes of a job: how far they have been handed to the machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Cursor {
+pub struct Cursor<I = u16> {
     /// Index of the leg that is being handed over.
     leg: usize,
     /// Number of the point at which the pen is, if any.
-    at: Option<u16>,
+    at: Option<I>,
     /// The pen of that leg, from 0.
     pen: u8,
 }
@@ -18,23 +19,26 @@ pub struct Cursor {
 /// The strokes of a job, as the [`Path`] that the machine follows. A pen-up move is inserted
 /// wherever a leg does not begin where the previous one ended.
 #[derive(Debug)]
-pub struct Strokes<'a> {
-    pub(super) drawing: Drawing<'a>,
-    pub(super) tour: &'a [Leg],
-    pub(super) cursor: &'a mut Cursor,
+pub struct Strokes<'a, I = u16> {
+    pub(super) drawing: Drawing<'a, I>,
+    pub(super) tour: &'a [Leg<I>],
+    pub(super) cursor: &'a mut Cursor<I>,
 }
 
-impl Path for Strokes<'_> {
+impl<I: Index> Path for Strokes<'_, I> {
     fn next_target(&mut self) -> Option<Target> {
         let leg = self.tour.get(self.cursor.leg)?;
         let segment = self.drawing.segments.get(leg.segment())?;
-        let (from, to) =
-            if leg.reversed() { (segment.to, segment.from) } else { (segment.from, segment.to) };
+        let (from, to) = if leg.reversed() {
+            (segment.to(), segment.from())
+        } else {
+            (segment.from(), segment.to())
+        };
         let begins_here = self.cursor.at == Some(from);
         let number = if begins_here { to } else { from };
-        let point = *self.drawing.points.get(usize::from(number))?;
+        let point = *self.drawing.points.get(number.get())?;
         self.cursor.at = Some(number);
-        self.cursor.pen = segment.pen;
+        self.cursor.pen = segment.pen();
         self.cursor.leg += usize::from(begins_here);
         Some(Target { point, ink: begins_here.then(|| segment.line_type()) })
     }

@@ -17,6 +17,7 @@ use crate::checksum::Crc32;
 use crate::drawing::{Page, StepsPerMillimetre, Title, TitleText};
 use crate::fixed::{Decimal, Millimetres, sin_cos_degrees};
 use crate::geometry::Precision;
+use crate::index::Index;
 use crate::model::Model;
 use crate::order;
 use crate::protocol::{CommandError, EscapedText, number};
@@ -132,7 +133,7 @@ impl PlotOptions {
 
     /// The precision of the coordinates of `model`: as the user has set it, or as derived from the
     /// model.
-    pub fn precision_of(&self, model: &Model<'_>) -> Precision {
+    pub fn precision_of<I: Index>(&self, model: &Model<'_, I>) -> Precision {
         match self.precision {
             Some(chosen) => model.chosen_precision(chosen),
             None => model.precision(),
@@ -142,7 +143,7 @@ impl PlotOptions {
     /// The camera for `model`, with automatic choices for all that the user has not set. `None` if
     /// the model has no vertices.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
-    pub fn camera(&self, model: &Model<'_>) -> Option<Camera> {
+    pub fn camera<I: Index>(&self, model: &Model<'_, I>) -> Option<Camera> {
         let lens = match self.projection {
             ProjectionChoice::Axonometric { azimuth, elevation } => {
                 return Camera::axonometric(model, azimuth, elevation, self.at, self.up);

@@ -301,7 +301,7 @@ impl CommandError {
             Self::Aborted => row(error(141, "given up"), format_args!("the job was given up")),
             Self::TooManyLines => row(
                 error(142, "too many lines"),
-                format_args!("a drawing has at most {} lines: send a smaller model", Leg::LIMIT),
+                format_args!("a drawing has at most {} lines: send a smaller model", <Leg>::LIMIT),
             ),
             Self::NothingToUndo => row(
                 error(143, "nothing to undo"),

@@ -93,7 +93,7 @@ fn explain_curve(refusal: &CurveError, row: Row<'_>) {
             row(NOT_A_CURVE, format_args!("a curve has at most {limit} control points"))
         }
         CurveError::UnknownPoint { number } => {
-            row(UNKNOWN_VERTEX, format_args!("there is no vertex {}", u32::from(*number) + 1))
+            row(UNKNOWN_VERTEX, format_args!("there is no vertex {}", *number + 1))
         }
         CurveError::WrongKnotCount { needed, given } => {
             row(NOT_A_CURVE, format_args!("the curve takes {needed} knots and has {given}"))
