@@ -22,7 +22,7 @@ pub(super) struct Unused<'s, 'a, I> {
     legs: Incidence<'s, I>,
     /// 1 for each chain that has been used, otherwise 0.
     used: &'s mut [u8],
-    /// For each station, the other end of its pen-up move; or [`NONE`] or [`EVEN_PART`].
+    /// For each station, the other end of its pen-up move; or [`Index::NONE`] or [`even_part`].
     mate: &'s mut [I],
 }
 

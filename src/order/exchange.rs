@@ -146,7 +146,7 @@ impl<'s, 'a, I: Index> Exchanges<'s, 'a, I> {
         self.gap.is_some()
     }
 
-    /// Returns the station where a leg ends; [`NONE`] for the gap.
+    /// Returns the station where a leg ends; [`Index::NONE`] for the gap.
     pub fn end(&self, leg: Leg<I>) -> I {
         if self.is_gap(leg) { I::NONE } else { self.network.end(leg) }
     }
@@ -156,7 +156,7 @@ impl<'s, 'a, I: Index> Exchanges<'s, 'a, I> {
         self.gap == Some(I::new(leg.segment()))
     }
 
-    /// Returns the station where a leg begins; [`NONE`] for the gap.
+    /// Returns the station where a leg begins; [`Index::NONE`] for the gap.
     pub fn start(&self, leg: Leg<I>) -> I {
         self.end(leg.flipped())
     }
@@ -266,7 +266,7 @@ impl<'s, 'a, I: Index> Exchanges<'s, 'a, I> {
         Ok(None)
     }
 
-    /// Returns the stations to which a new move from `station` may lead: [`NONE`] for the gap, if
+    /// Returns the stations to which a new move from `station` may lead: [`Index::NONE`] for the gap, if
     /// `by_gap`, then `station` itself, then its neighbours.
     pub fn candidates(&self, station: I, by_gap: bool) -> impl Iterator<Item = I> + use<'s, 'a, I> {
         let own = [I::NONE, station].into_iter().skip(usize::from(!by_gap));
@@ -323,7 +323,7 @@ impl<'s, 'a, I: Index> Exchanges<'s, 'a, I> {
         Ok(if third_onward { e } else { f.flipped() })
     }
 
-    /// Returns the legs that begin at a station; for [`NONE`], the gap in both directions.
+    /// Returns the legs that begin at a station; for [`Index::NONE`], the gap in both directions.
     pub fn legs_from(&self, station: I) -> impl Iterator<Item = Leg<I>> + '_ {
         let first = if station == I::NONE {
             self.gap.map(|gap| Leg::new(gap, false))

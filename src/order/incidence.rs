@@ -8,9 +8,9 @@ use crate::stage::{OutOfScratch, Scratch};
 
 /// The lists of the legs that begin at each station, in ascending order of their codes.
 pub(super) struct Incidence<'s, I> {
-    /// For each station the code of the first leg of its list, or [`NONE`].
+    /// For each station the code of the first leg of its list, or [`Index::NONE`].
     first: &'s mut [I],
-    /// For each leg, by its code, the next leg of the same list, or [`NONE`].
+    /// For each leg, by its code, the next leg of the same list, or [`Index::NONE`].
     next: &'s mut [I],
 }
 
@@ -52,7 +52,7 @@ impl<'s, I: Index> Incidence<'s, I> {
     }
 }
 
-/// Returns the leg with this code; `None` if the code is [`NONE`].
+/// Returns the leg with this code; `None` if the code is [`Index::NONE`].
 fn leg<I: Index>(code: I) -> Option<Leg<I>> {
     (code != I::NONE).then(|| Leg::from_code(code))
 }

@@ -318,7 +318,7 @@ struct Parts {
 }
 
 /// Marks each station. An odd station is marked by its own number. An even one is marked by
-/// [`NONE`], or by [`EVEN_PART`] if its part has no odd station.
+/// [`Index::NONE`], or by [`even_part`] if its part has no odd station.
 fn mark_parts<I: Index>(
     network: Network<'_, I>,
     mut scratch: Scratch<'_>,

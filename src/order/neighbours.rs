@@ -14,7 +14,7 @@ use crate::stage::{OutOfScratch, Scratch};
 /// For each station the same number of other stations, the nearest first.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Neighbours<'a, I> {
-    /// The neighbours of each station in turn; [`NONE`] fills unused entries.
+    /// The neighbours of each station in turn; [`Index::NONE`] fills unused entries.
     stations: &'a [I],
     /// The number of entries for each station.
     per_station: usize,
