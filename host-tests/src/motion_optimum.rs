@@ -18,6 +18,9 @@ pub struct Limits {
 
 type Point = (f64, f64);
 
+/// How many steps the rounding of three points may lift one over the line through the others.
+const ROUNDING: f64 = 23.0 / 16.0;
+
 fn minus(a: Point, b: Point) -> Point {
     (a.0 - b.0, a.1 - b.1)
 }
@@ -35,7 +38,7 @@ fn norm(a: Point) -> f64 {
 /// by the circle through points that are 1, 2, 4, … 64 apart. In both cases, what rounding to steps
 /// can explain is subtracted.
 pub fn squared_limits(points: &[Point], limits: Limits) -> (Vec<f64>, Vec<f64>) {
-    let rounding = 23.0 / 16.0 * limits.step;
+    let rounding = ROUNDING * limits.step;
     let mut radius = vec![f64::INFINITY; points.len()];
     let mut curve = vec![f64::INFINITY; points.len() - 1];
     let mut sharp = vec![0];
@@ -70,7 +73,7 @@ pub fn squared_limits(points: &[Point], limits: Limits) -> (Vec<f64>, Vec<f64>) 
                     let is_last = last + stride > ends[1];
                     let to = if is_last { ends[1] } else { middle + stride / 2 };
                     let outer = (points[middle - stride], points[last]);
-                    if let Some(r) = circle(outer.0, points[middle], outer.1, rounding) {
+                    if let Some(r) = circle(outer.0, points[middle], outer.1, limits.step) {
                         for slot in &mut curve[from..to] {
                             *slot = slot.min(r);
                         }
@@ -92,11 +95,13 @@ pub fn squared_limits(points: &[Point], limits: Limits) -> (Vec<f64>, Vec<f64>) 
     (radius.into_iter().map(square).collect(), curve.into_iter().map(square).collect())
 }
 
-fn circle(first: Point, middle: Point, last: Point, rounding: f64) -> Option<f64> {
+fn circle(first: Point, middle: Point, last: Point, step: f64) -> Option<f64> {
     // Whether a circle applies depends on a threshold, so points are rounded exactly as `motion`
-    // does.
-    let position = |p: Point| ((p.0 * 4096.0).floor() / 4096.0, (p.1 * 4096.0).floor() / 4096.0);
-    let (first, middle, last) = (position(first), position(middle), position(last));
+    // does: a step has a whole number of units of 2^-32 mm, and a point one of 2^-12 mm.
+    let unit = (2f64.powi(32) * step).floor();
+    let along = |mm: f64| (((mm / step).round() * unit) / 2f64.powi(20)).floor() / 4096.0;
+    let [first, middle, last] = [first, middle, last].map(|p| (along(p.0), along(p.1)));
+    let rounding = ROUNDING * step;
     let (a, b, c) = (minus(middle, first), minus(last, middle), minus(last, first));
     if 16.0 * norm(c) < 15.0 * norm(a).max(norm(b)) {
         return None;

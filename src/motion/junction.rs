@@ -75,6 +75,8 @@ pub(super) fn corner(
         return NONE;
     }
     let cosine = half_length(before.x.wrapping_add(after.x), before.y.wrapping_add(after.y));
+    // Lengths are rounded to whole units, and headings with them: what turns back stands.
+    let cosine = if cosine <= (1 << 30) / u64::from(shorter) { 0 } else { cosine };
     let by_deviation = {
         // δ c (1 + c) / s², as 1 - c itself would lose all its digits in a slight bend.
         let scaled = (u64::from(limits.junction_deviation.to_bits()) * cosine) >> 30;
@@ -99,4 +101,25 @@ fn half_length(x: i32, y: i32) -> u64 {
     let square = |part: i32| u64::from(part.unsigned_abs()) * u64::from(part.unsigned_abs());
     // Opposite headings can add up to 2^31 by one unit of rounding: within 32 unsigned bits.
     (square(x) / 4 + square(y) / 4).isqrt().min(1 << 30)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::limits::tests::settings;
+    use super::*;
+    use crate::fixed::Millimetres;
+
+    #[test]
+    fn a_path_that_turns_back_stands() {
+        let junction_deviation_mm = Millimetres::ONE;
+        let settings = crate::motion::MotionSettings { junction_deviation_mm, ..settings() };
+        let limits = Limits::new(&settings).expect("valid");
+        for (x, y) in (1..40).flat_map(|x| (0..40).map(move |y| (x, y))) {
+            let length = |times| limits.length(times * x, times * y).expect("short");
+            let heading = |times| Heading::new(&limits, times * x, times * y, length(times));
+            let corner = corner(&limits, heading(-2), heading(1), length(1));
+            // A single step may be nothing but rounding.
+            assert!(corner.limit == 0 || x.max(y) == 1, "{x} {y}: {corner:?}");
+        }
+    }
 }
