@@ -10,7 +10,7 @@ use penup::motion::{Block, EventQueue, StepEvent, TICKS_PER_SECOND};
 use std::fmt::Write as _;
 
 /// The number of moves that are planned ahead, as many as on the Pico.
-const BLOCKS: usize = 192;
+const BLOCKS: usize = penup::board_table::PICO.memory.blocks;
 /// The error of a position of the plan in mm, which is that of a length in the library.
 const PLACE_ERROR: f64 = 4e-6;
 /// The number of columns of a plot. Each shows the least and the greatest value in its time.

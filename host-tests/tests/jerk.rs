@@ -211,6 +211,25 @@ fn bends_behind_straights_are_seen_in_time() {
     }
 }
 
+/// Most of the points that show the bends come after the blocks that bend were begun.
+#[test]
+fn a_few_blocks_are_enough_to_keep_the_limits_of_bends() {
+    let turns =
+        [(-7, 4), (0, 1), (5, 0), (3, -8), (0, -5), (4, -1), (0, 1), (1, 7), (2, 7), (-3, 8)];
+    let mut points = vec![PagePoint { x: 2000, y: 2000 }];
+    for (dx, dy) in turns {
+        let last = points.last().expect("the first");
+        points.push(PagePoint { x: last.x + dx, y: last.y + dy });
+    }
+    for blocks in 2..10 {
+        for acceleration in [50.0, 200.0, 1000.0] {
+            let case = Case { speed: 50.0, acceleration, jerk: 30_000.0, deviation: 0.001 };
+            let run = draw(&points, case.settings(), blocks);
+            case.check(&format!("{blocks} blocks"), &points, &run);
+        }
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 300, ..ProptestConfig::default() })]
     #[test]

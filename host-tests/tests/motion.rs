@@ -3,6 +3,7 @@
 
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
 
+use penup::board_table::PICO;
 use penup::drawing::{LineType, PagePoint};
 use penup::machine::{Setting, Settings, Target, TargetList, Value};
 use penup::step::{Arc, Chords, Turn};
@@ -149,6 +150,36 @@ fn a_short_look_ahead_is_enough_for_dense_points() {
     let slow = draw(&points, settings(50.0, 200.0, 0.127, true), 12);
     let pauses = slow.times[100..slow.times.len() - 100].windows(2).map(|t| t[1] - t[0]);
     assert!(pauses.fold(0.0, f64::max) < 0.002);
+}
+
+/// With the number of blocks of the Pico.
+#[test]
+fn the_look_ahead_holds_the_stopping_distance_however_short_the_chords() {
+    let line = |chord: f64| -> Vec<_> {
+        let count = (60.0 / chord) as u32;
+        let along = (0..count).map(|number| f64::from(number) * chord);
+        along.map(|along| (10.0 + 0.93 * along, 10.0 + 0.36 * along)).collect()
+    };
+    // A staircase of single steps, every `run`th of them upward.
+    let stairs = |run: u32| -> Vec<_> {
+        let points = (0..6000u32).map(|number| (number - number / run, number / run));
+        points.map(|(x, y)| (10.0 + f64::from(x) / 100.0, 10.0 + f64::from(y) / 100.0)).collect()
+    };
+    for (name, path) in [
+        ("line 0.03", line(0.03)),
+        ("line 0.012", line(0.012)),
+        ("stairs", stairs(2)),
+        ("flat stairs", stairs(5)),
+        ("circle 0.03", circle(30.0, 6283)),
+        ("circle 0.02", circle(8.0, 2513)),
+    ] {
+        let points = steps(&path);
+        let run = draw(&points, settings(50.0, 200.0, 0.127, true), PICO.memory.blocks);
+        let ratio = run.seconds / optimum(&points, 50.0, 200.0, 0.127, true);
+        assert!((ratio - 1.0).abs() < 0.01, "{name}: {ratio}");
+        let measured = event_checker::greatest_acceleration(&run.times, &positions(&points), 0.005);
+        assert!(measured <= 1.03 * 200.0, "{name}: {measured} mm/s2");
+    }
 }
 
 proptest! {

@@ -77,7 +77,7 @@ impl<'m> Machine<'m> {
     /// A machine at rest at the page's origin with the pen raised. If the settings require homing,
     /// it starts in the alarm [`Alarm::NotHomed`].
     ///
-    /// `blocks` is the memory of the look-ahead, at 24 bytes per block. It needs at least one
+    /// `blocks` is the memory of the look-ahead, at 48 bytes per block. It needs at least one
     /// block; 100 or more work well. `ahead_ticks` is how far the queue is planned ahead of the
     /// pins. The machine plans further ahead if it could otherwise not stop in time when the main
     /// loop is late. A feed hold takes effect after that delay. With `u32::MAX` only the size of

@@ -1,7 +1,7 @@
 //! The block in work: its moves, and how far they are.
 
 use super::emitter::Train;
-use super::lookahead::BlockKind;
+use super::lookahead::{BlockKind, Chord, Chords};
 use super::profile::Slice;
 use super::{Block, PathLength};
 use crate::drawing::LineType;
@@ -27,19 +27,31 @@ pub(super) struct BlockCursor {
     pub(super) place: u64,
     /// From there to where the next move is due.
     pub(super) to_next: u64,
-    /// Where it shall stand, if that is not the end: a place like the one above, and else the greatest
-    /// number.
+    /// Where it shall stand, if that is not the end: a place like the one above, and else the
+    /// greatest number.
     stop: u64,
     /// The slice in work begins at `place`.
     pub(super) slice: Option<SliceMoves>,
+    /// What is left of a slice that the end of a chord cut.
+    rest: Slice,
+    chords: Chords,
+    /// How many of them are begun.
+    begun: usize,
+    /// From the start of the block to the end of the chord in work, if that is not the last: 2^-32
+    /// mm, and else the greatest number.
+    chord_end: u64,
 }
 
 impl BlockCursor {
     /// The beginning of a block, its dots about `dot_length` long.
     pub(super) fn new(block: &Block, dot_length: PathLength) -> Self {
         let line = Line::beside(block.dx, block.dy, block.offsets);
-        let moves = line.remaining();
-        let move_length = (u64::from(block.length.to_bits()) << 14) / u64::from(moves.max(1));
+        let chords = block.chords.all();
+        let first = block.length - chords.iter().map(Chord::length).sum::<PathLength>();
+        let first = u64::from(first.to_bits()) << 14;
+        let move_length = first / u64::from(line.remaining().max(1));
+        let more: u32 = chords.iter().map(Chord::moves).sum();
+        let moves = line.remaining() + more;
         let line_type = block.ink.unwrap_or_default();
         let pattern = if line_type == LineType::Full {
             Pattern::full(moves)
@@ -63,6 +75,10 @@ impl BlockCursor {
             to_next: move_length / 2,
             stop: u64::MAX,
             slice: None,
+            rest: Slice::default(),
+            chords: block.chords,
+            begun: 0,
+            chord_end: if chords.is_empty() { u64::MAX } else { first },
         }
     }
 
@@ -94,15 +110,26 @@ impl BlockCursor {
     /// From the plan's place to the first where the machine can stand, which is half a move behind
     /// one, not nearer than `least`: 2^-32 mm. No further than the end of the piece.
     pub(super) fn to_whole_step(&self, least: u64) -> u64 {
-        let length = self.move_length.max(1);
+        let mut length = self.move_length.max(1);
         // The first such place, or the one before it.
         let behind = (self.to_next + length / 2) % length;
-        let steps = least.saturating_sub(behind).div_ceil(length);
-        (behind + steps * length).min(self.room())
+        let mut stand = behind + least.saturating_sub(behind).div_ceil(length) * length;
+        let mut end = self.chord_end.saturating_sub(self.place);
+        for chord in self.chords.all().iter().skip(self.begun) {
+            if stand <= end {
+                break;
+            }
+            // Where one chord ends, the next begins.
+            let whole = u64::from(chord.length().to_bits()) << 14;
+            length = (whole / u64::from(chord.moves().max(1))).max(1);
+            stand = end + least.saturating_sub(end).div_ceil(length) * length;
+            end += whole;
+        }
+        stand.min(self.room())
     }
 
-    /// Stands at the first such place that is not nearer than `least`, and stays with it: how far that
-    /// is, 2^-32 mm.
+    /// Stands at the first such place that is not nearer than `least`, and stays with it: how far
+    /// that is, 2^-32 mm.
     pub(super) fn stop_behind(&mut self, least: u64) -> u64 {
         if self.stop == u64::MAX {
             self.stop = self.place + self.to_whole_step(least);
@@ -122,8 +149,25 @@ impl BlockCursor {
         PathLength::from_bits((self.room() >> 14) as u32)
     }
 
-    /// Takes the next slice into work.
-    pub(super) fn begin_slice(&mut self, slice: Slice) {
+    /// Takes what is left of the last slice into work. Whether there is anything.
+    pub(super) fn begin_rest(&mut self) -> bool {
+        let rest = core::mem::take(&mut self.rest);
+        if rest.distance > 0 {
+            self.begin_slice(rest);
+        }
+        rest.distance > 0
+    }
+
+    /// Takes the next slice into work, up to the end of the chord in work.
+    pub(super) fn begin_slice(&mut self, mut slice: Slice) {
+        let room = self.chord_end.saturating_sub(self.place);
+        if u64::from(slice.distance) > room {
+            // Less than the distance, and so than the time.
+            let time = (u64::from(slice.time) * room / u64::from(slice.distance)) as u32;
+            let distance = room as u32;
+            self.rest = Slice { distance: slice.distance - distance, time: slice.time - time };
+            slice = Slice { distance, time };
+        }
         let mut moves = SliceMoves { slice, left: 0, due: 0, interval: 0 };
         if let Some(room) = u64::from(slice.distance).checked_sub(self.to_next + 1) {
             // Below 1 mm, or 2^32: the settings allow no longer steps.
@@ -139,12 +183,33 @@ impl BlockCursor {
         self.slice = Some(moves);
     }
 
-    /// The slice in work is done.
-    pub(super) fn end_slice(&mut self, slice: Slice) {
+    /// The slice in work is done. Whether a new chord begins.
+    pub(super) fn end_slice(&mut self, slice: Slice) -> bool {
         self.place += u64::from(slice.distance);
         // What is behind the last move is a rest of nothing.
         self.to_next = self.to_next.saturating_sub(slice.distance.into());
         self.slice = None;
+        let ends = self.place >= self.chord_end;
+        if ends {
+            self.next_chord();
+        }
+        ends
+    }
+
+    fn next_chord(&mut self) {
+        let start = core::mem::replace(&mut self.chord_end, u64::MAX);
+        if let Some((chord, later)) =
+            self.chords.all().get(self.begun..).and_then(<[Chord]>::split_first)
+        {
+            let length = u64::from(chord.length().to_bits()) << 14;
+            self.line = Line::by(chord.dx.into(), chord.dy.into());
+            self.move_length = length / u64::from(chord.moves().max(1));
+            self.to_next = (start + self.move_length / 2).saturating_sub(self.place);
+            if !later.is_empty() {
+                self.chord_end = start + length;
+            }
+            self.begun += 1;
+        }
     }
 
     /// So many moves of the slice in work are made.
@@ -172,8 +237,8 @@ pub(super) struct SliceMoves {
     pub(super) slice: Slice,
     /// Moves left.
     pub(super) left: u32,
-    /// When the next one is due after the slice's beginning, and how long it is from one to the next: units of
-    /// [`Train`], below 2^31.
+    /// When the next one is due after the slice's beginning, and how long it is from one to the
+    /// next: units of [`Train`], below 2^31.
     due: u32,
     interval: u32,
 }
@@ -203,8 +268,70 @@ impl SliceClock {
         Self { zeros, slowness: ((time << 31) / distance) as u32 }
     }
 
-    /// When a place within the slice is reached: below 2^31 units of [`Train`], and 2 units early at most.
+    /// When a place within the slice is reached: below 2^31 units of [`Train`], and 2 units early
+    /// at most.
     fn time_of(&self, place: u32) -> u32 {
         ((u64::from(place << self.zeros) * u64::from(self.slowness)) >> 31) as u32
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Limits, Lookahead};
+    use super::*;
+    use std::vec::Vec;
+
+    /// A block of some chords, each as long as it has moves, times a thousand units.
+    fn joined(chords: &[(i32, i32)]) -> Block {
+        let limits = Limits { centripetal: false, ..Limits::default() };
+        let mut memory = [Block::EMPTY; 1];
+        let mut ring = Lookahead::new(&mut memory);
+        for &(dx, dy) in chords {
+            let length = PathLength::from_bits(1000 * Line::by(dx, dy).remaining());
+            let line = Block { dx, dy, length, ..Block::EMPTY };
+            if !ring.join(&line, &limits) {
+                ring.push(line).expect("room");
+            }
+        }
+        *ring.front().expect("a block")
+    }
+
+    const CHORDS: [(i32, i32); 5] = [(9, 4), (3, -1), (1, 0), (-4, 2), (3, 3)];
+
+    #[test]
+    fn a_block_of_chords_makes_the_moves_of_each() {
+        for distance in [350, 1000, 4321, 100_000] {
+            let block = joined(&CHORDS);
+            let mut course = BlockCursor::new(&block, PathLength::ZERO);
+            assert_eq!(course.moves, 20);
+            let (mut moves, mut time) = (Vec::new(), 0u64);
+            while course.room() > 0 {
+                let slice = if course.begin_rest() {
+                    course.slice.expect("begun").slice
+                } else {
+                    let distance = (distance << 14).min(course.room() as u32);
+                    course.begin_slice(Slice { distance, time: distance >> 6 });
+                    course.slice.expect("begun").slice
+                };
+                let left = course.slice.map_or(0, |moves| moves.left);
+                moves.extend((&mut course.line).take(left as usize));
+                course.advance(left as usize);
+                time += u64::from(slice.time);
+                course.end_slice(slice);
+            }
+            let expected: Vec<_> = CHORDS.iter().flat_map(|&(dx, dy)| Line::by(dx, dy)).collect();
+            assert_eq!(moves, expected, "{distance}");
+            // 2^14 units of 2^-6 for each of 20,000.
+            assert!(time.abs_diff(20_000 << 8) <= 300, "{distance}: {time}");
+        }
+    }
+
+    #[test]
+    fn a_stop_is_half_a_move_behind_a_pulse_in_every_chord() {
+        let course = BlockCursor::new(&joined(&CHORDS), PathLength::ZERO);
+        for least in 0..20_000u64 {
+            let stand = course.to_whole_step(least << 14);
+            assert_eq!(stand, least.div_ceil(1000) * 1000 << 14, "{least}");
+        }
     }
 }

@@ -53,6 +53,7 @@ impl Curvature {
                 blocks.limit_curve(1, stride / 2 + self.count % stride, limit);
             }
         }
+        blocks.end_curve();
         self.count = 0;
         let points = [place(limits, point); 2];
         self.levels = [Level { points, limit: None }; LEVELS];

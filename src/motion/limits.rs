@@ -1,6 +1,6 @@
 //! The settings of motion in the units in which motion computes.
 
-use super::smooth::JerkLimit;
+use super::smooth::{JerkLimit, State};
 use super::{PathLength, SLICE_TICKS, SliceSpeed, StepEvent, TICKS_PER_SECOND};
 use crate::fixed::Millimetres;
 use core::ops::RangeInclusive;
@@ -69,6 +69,9 @@ pub struct Limits {
     pub(super) travel_speed: SliceSpeed,
     /// Stopping distance of the greater speed.
     pub(super) top: PathLength,
+    /// How far it is to rest from that speed, with the limit on jerk if there is one; at most what
+    /// a length can hold.
+    pub(super) longest_stop: PathLength,
     /// Added to the speed by one slice.
     pub(super) acceleration: SliceSpeed,
     /// `None` for speeds with kinks.
@@ -92,6 +95,7 @@ impl Default for Limits {
             draw_speed: speed,
             travel_speed: speed,
             top: const { PathLength::lit("0.5") },
+            longest_stop: const { PathLength::lit("0.5") },
             acceleration: SliceSpeed::from_bits(11_529),
             jerk: None,
             junction_deviation: PathLength::from_bits(1 << 12),
@@ -103,7 +107,8 @@ impl Default for Limits {
     }
 }
 
-/// The most steps in a millimetre; a constant, for reading it from text when the device runs takes 4 KB of flash.
+/// The most steps in a millimetre; a constant, for reading it from text when the device runs takes
+/// 4 KB of flash.
 const MOST_STEPS: Millimetres = Millimetres::lit("4000");
 
 impl Limits {
@@ -148,6 +153,7 @@ impl Limits {
             draw_speed,
             travel_speed,
             top: PathLength::ZERO,
+            longest_stop: PathLength::ZERO,
             acceleration: slice_acceleration(settings.acceleration_mm_per_s2),
             jerk: None,
             junction_deviation: {
@@ -163,6 +169,11 @@ impl Limits {
         let fastest = draw_speed.max(travel_speed);
         limits.top = limits.stopping_distance(fastest);
         limits.jerk = JerkLimit::new(jerk, limits.acceleration, fastest);
+        limits.longest_stop = limits.jerk.map_or(limits.top, |jerk| {
+            let state = State { speed: fastest.to_bits(), ramp: 0 };
+            let distance = jerk.braking_distance(state, 0) >> 14;
+            PathLength::from_bits(u32::try_from(distance).unwrap_or(u32::MAX))
+        });
         limits.check_step_rate()?;
         Ok(limits)
     }
@@ -215,7 +226,8 @@ impl Limits {
         (twice * u64::from(stopping_distance.to_bits())).saturating_mul(1 << 14)
     }
 
-    /// The least stopping distance whose [squared speed](Limits::squared_speed) is not below that of `speed`.
+    /// The least stopping distance whose [squared speed](Limits::squared_speed) is not below that
+    /// of `speed`.
     pub(super) fn least_limit(&self, speed: u64) -> PathLength {
         let twice = 2 * u64::from(self.acceleration.to_bits());
         let bits = (speed * speed).div_ceil(twice.max(1)).div_ceil(1 << 14);

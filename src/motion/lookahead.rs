@@ -1,13 +1,23 @@
 //! The blocks that are known but not yet begun, and how fast the first of them may end.
 
-use super::PathLength;
+use super::{Limits, PathLength};
 use crate::drawing::LineType;
 
-/// A straight move that waits: 24 bytes.
+/// 9·24 times what rounding lifts a point, ρ: 2^-18 mm.
 ///
-/// The LM3S6965 lends 32 of them and the Pico 192 (`src/plotter/memory.rs`). At 50 mm/s and
-/// 200 mm/s² the stopping distance is 6.25 mm, which is 125 blocks of 0.05 mm. With fewer blocks the
-/// machine is slower on such paths, never wrong.
+/// A bend of radius R is known to 1/24 once ρ explains no more than that of the height of its
+/// middle over a chord. The circle through three points √(2·24·ρR) apart says so, and it stands for
+/// its middle half: 3/2 of that before its end. So at a distance D before the end of what is known,
+/// R/2 is at least D²/(9·24·ρ).
+fn surely_known(limits: &Limits) -> u64 {
+    9 * 24 * u64::from(limits.rounding.to_bits())
+}
+
+/// A straight move that waits, or up to six short ones that need no plan of their own: 48 bytes.
+///
+/// The LM3S6965 lends 16 of them and the Pico 128 (`src/board_table.rs`). Short moves are joined as
+/// far as the stopping distance asks for it: see [`Lookahead::join`]. With fewer blocks than hold
+/// that distance the machine is slower, never wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Block {
     pub(super) dx: i32,
@@ -21,6 +31,58 @@ pub struct Block {
     /// See [`Move`](super::Move).
     pub(super) offsets: [i8; 2],
     pub(super) kind: BlockKind,
+    /// The chords behind the first one, of which `dx` and `dy` tell.
+    pub(super) chords: Chords,
+}
+
+/// A chord of a block behind the first one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Chord {
+    pub(super) dx: i8,
+    pub(super) dy: i8,
+    /// 2^-18 mm, so up to 1/4 mm; the first chord has the rest of the block's length.
+    length: u16,
+}
+
+impl Chord {
+    pub(super) fn length(&self) -> PathLength {
+        PathLength::from_bits(self.length.into())
+    }
+
+    /// How many moves it is.
+    pub(super) fn moves(&self) -> u32 {
+        u32::from(self.dx.unsigned_abs().max(self.dy.unsigned_abs()))
+    }
+}
+
+/// The chords of a block behind the first one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Chords {
+    chords: [Chord; MOST_CHORDS - 1],
+    count: u8,
+}
+
+/// The most chords that are one block.
+const MOST_CHORDS: usize = 6;
+
+impl Chords {
+    /// Appends one, if there is room and it is short enough.
+    fn push(&mut self, dx: i32, dy: i32, length: PathLength) -> bool {
+        let length = u16::try_from(length.to_bits());
+        if let (Ok(dx), Ok(dy), Ok(length)) = (dx.try_into(), dy.try_into(), length)
+            && let Some(chord) = self.chords.get_mut(usize::from(self.count))
+        {
+            *chord = Chord { dx, dy, length };
+            self.count += 1;
+            return true;
+        }
+        false
+    }
+
+    /// All of them.
+    pub(super) fn all(&self) -> &[Chord] {
+        self.chords.get(..usize::from(self.count)).unwrap_or(&[])
+    }
 }
 
 /// What a block is for.
@@ -45,6 +107,7 @@ impl Block {
         ink: None,
         offsets: [0; 2],
         kind: BlockKind::Line,
+        chords: Chords { chords: [Chord { dx: 0, dy: 0, length: 0 }; MOST_CHORDS - 1], count: 0 },
     };
 
     /// The greatest stopping distance at its beginning.
@@ -61,14 +124,19 @@ pub struct Lookahead<'m> {
     count: usize,
     /// Of all blocks, 2^-18 mm.
     length: u64,
+    /// Of the last blocks, of which more points may show that they bend.
+    open: PathLength,
     /// Whether each block's `entry_limit` is lowered to what the blocks behind it allow and to its
     /// `curve_limit`, so that none has to be looked for when the block before it begins.
     passes_limits_on: bool,
-    /// The lowest limit of all blocks, and which of them is the last to have it: known only if limits are not passed on.
+    /// The lowest limit of all blocks, and which of them is the last to have it: known only if
+    /// limits are not passed on.
     lowest: PathLength,
     lowest_at: usize,
     /// The lowest limit that was set to blocks which waited, since it was asked for.
     lowered: PathLength,
+    /// The lowest that came too late for the block taken last, since then.
+    late: PathLength,
 }
 
 impl<'m> Lookahead<'m> {
@@ -79,10 +147,12 @@ impl<'m> Lookahead<'m> {
             first: 0,
             count: 0,
             length: 0,
+            open: PathLength::ZERO,
             passes_limits_on: true,
             lowest: PathLength::MAX,
             lowest_at: 0,
             lowered: PathLength::MAX,
+            late: PathLength::MAX,
         }
     }
 
@@ -106,8 +176,8 @@ impl<'m> Lookahead<'m> {
         self.count == self.blocks.len()
     }
 
-    /// Whether limits are known at each block at once, as if speed might change by the acceleration without a
-    /// limit on jerk; while none wait.
+    /// Whether limits are known at each block at once, as if speed might change by the acceleration
+    /// without a limit on jerk; while none wait.
     pub(super) fn pass_limits_on(&mut self, on: bool) {
         self.passes_limits_on = on;
         self.find_lowest();
@@ -133,6 +203,7 @@ impl<'m> Lookahead<'m> {
         }
         self.count += 1;
         self.length += u64::from(block.length.to_bits());
+        self.open = self.open.saturating_add(block.length);
         if !self.passes_limits_on {
             self.note(self.count - 1, block.limit());
         } else if block.limit() < PathLength::MAX {
@@ -141,9 +212,51 @@ impl<'m> Lookahead<'m> {
         Ok(())
     }
 
+    /// Makes a line a part of the last block, if that is a line of the same ink and the blocks
+    /// might not hold the machine's stopping distance otherwise. Nothing may bind the speed between
+    /// the two.
+    ///
+    /// The limits of a bend are those of whole blocks, so none is made longer that has its part of
+    /// 5/4 of that distance, nor while so much is known or less than half of the memory is in use.
+    pub(super) fn join(&mut self, line: &Block, limits: &Limits) -> bool {
+        let needed = u64::from(limits.longest_stop.to_bits()) + surely_known(limits) / 4;
+        let enough = needed * 5 / 4;
+        if self.is_short() || self.length >= enough {
+            return false;
+        }
+        let longest = enough / self.blocks.len().max(1) as u64;
+        let Some(at) = self.count.checked_sub(1).map(|last| self.wrapped(last)) else {
+            return false;
+        };
+        let Some(block) = self.blocks.get_mut(at) else {
+            return false;
+        };
+        let Some(length) = block.length.checked_add(line.length) else {
+            return false;
+        };
+        let are_lines = [&*block, line].iter().all(|block| {
+            let is_whole = matches!(block.ink, None | Some(LineType::Full));
+            is_whole && block.kind == BlockKind::Line && block.offsets == [0; 2]
+        });
+        let is_long = u64::from(block.length.to_bits()) >= longest;
+        if is_long || !are_lines || block.ink != line.ink || block.length == 0 {
+            return false;
+        }
+        if block.chords.count == 0 && is_in_line([block.dx, block.dy], [line.dx, line.dy]) {
+            (block.dx, block.dy) = (block.dx + line.dx, block.dy + line.dy);
+        } else if !block.chords.push(line.dx, line.dy, line.length) {
+            return false;
+        }
+        block.length = length;
+        self.length += u64::from(line.length.to_bits());
+        self.open = self.open.saturating_add(line.length);
+        true
+    }
+
     /// Takes the block to be drawn next.
     pub(super) fn pop(&mut self) -> Option<Block> {
         let block = *self.front()?;
+        self.late = PathLength::MAX;
         self.first = self.wrapped(1);
         self.count -= 1;
         self.length -= u64::from(block.length.to_bits());
@@ -162,10 +275,12 @@ impl<'m> Lookahead<'m> {
     pub(super) fn clear(&mut self) {
         self.count = 0;
         self.length = 0;
+        self.end_curve();
         self.find_lowest();
     }
 
-    /// The lowest limit of all blocks, of which the one before the first may be the last to have had it.
+    /// The lowest limit of all blocks, of which the one before the first may be the last to have
+    /// had it.
     fn find_lowest(&mut self) {
         (self.lowest, self.lowest_at) = (PathLength::MAX, 0);
         if !self.passes_limits_on {
@@ -199,6 +314,38 @@ impl<'m> Lookahead<'m> {
         self.length << 14
     }
 
+    /// All bends of the blocks so far are known.
+    pub(super) fn end_curve(&mut self) {
+        self.open = PathLength::ZERO;
+    }
+
+    /// The lowest limit of the block taken last that was found behind it, since that block was
+    /// taken.
+    pub(super) fn late_limit(&self) -> PathLength {
+        self.late
+    }
+
+    /// The greatest stopping distance, so far before the end of all blocks (2^-18 mm), from which
+    /// the machine can come to rest, and can keep the limits of the bends that points behind them
+    /// may show.
+    ///
+    /// At a distance D before the end, the radius of a bend that is known only by points behind is
+    /// such that the stopping distance may be D² over [`surely_known`]. Further away the machine
+    /// can brake to that.
+    pub(super) fn stopping_distance_at(&self, to_end: u64, limits: &Limits) -> u64 {
+        if !limits.centripetal || self.is_empty() {
+            return to_end;
+        }
+        let open = to_end.min(self.open.to_bits().into());
+        let known = surely_known(limits);
+        if 2 * open >= known {
+            to_end - known / 4
+        } else {
+            // Less than `known`, which is below 2^28.
+            to_end - open + open * open / known.max(1)
+        }
+    }
+
     fn wrapped(&self, index: usize) -> usize {
         let index = self.first + index;
         if index >= self.blocks.len() { index - self.blocks.len() } else { index }
@@ -212,24 +359,32 @@ impl<'m> Lookahead<'m> {
         [&straight[..count], &wrapped[..rest]]
     }
 
-    /// The last blocks, from the `least`th to the `most`th counted from 1 at the end, are part of a
-    /// curve.
+    /// The last points, from the `least`th to the `most`th counted from 1 at the end, end blocks
+    /// that are part of a curve.
     ///
-    /// What one block allows is passed on to those before it, each of which may be entered with its own length
-    /// more, as far as that is less than they had: on smooth paths, not far.
+    /// What one block allows is passed on to those before it, each of which may be entered with its
+    /// own length more, as far as that is less than they had: on smooth paths, not far.
     pub(super) fn limit_curve(&mut self, least: u32, most: u32, limit: PathLength) {
         self.lowered = self.lowered.min(limit);
         let mut allowed = PathLength::MAX;
-        for back in least.max(1).. {
-            let is_curve = back <= most;
-            let Some(index) = self.count.checked_sub(back as usize) else {
+        let mut points = 0;
+        for back in 1.. {
+            let Some(index) = self.count.checked_sub(back) else {
+                if points < most {
+                    self.late = self.late.min(limit);
+                }
                 return;
             };
             let at = self.wrapped(index);
             let Some(block) = self.blocks.get_mut(at) else {
                 return;
             };
-            if is_curve {
+            let before = points;
+            points += 1 + u32::from(block.chords.count);
+            if points < least {
+                continue;
+            }
+            if before < most {
                 block.curve_limit = block.curve_limit.min(limit);
                 if !self.passes_limits_on {
                     let limit = block.limit();
@@ -253,20 +408,32 @@ impl<'m> Lookahead<'m> {
 
     /// The greatest stopping distance with which the first block may be entered, such that every
     /// junction known is passed within its limit and the path known is not overrun. At most `top`.
-    pub(super) fn entry_allowed(&self, top: PathLength) -> PathLength {
+    pub(super) fn entry_allowed(&self, top: PathLength, limits: &Limits) -> PathLength {
         debug_assert!(self.passes_limits_on);
         let Some(front) = self.front() else {
             return PathLength::ZERO;
         };
         // At the end of what is known the machine must be able to stand.
-        let length = u32::try_from(self.length).map_or(PathLength::MAX, PathLength::from_bits);
+        let length = self.stopping_distance_at(self.length, limits);
+        let length = u32::try_from(length).map_or(PathLength::MAX, PathLength::from_bits);
         top.min(front.entry_limit).min(length)
     }
+}
+
+/// Whether one vector leads on in the direction of the other, so that both together are one line.
+fn is_in_line([dx, dy]: [i32; 2], [more_x, more_y]: [i32; 2]) -> bool {
+    let product = |a: i32, b: i32| i64::from(a) * i64::from(b);
+    product(dx, more_y) == product(dy, more_x) && product(dx, more_x) + product(dy, more_y) > 0
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Without a limit in bends.
+    fn limits() -> Limits {
+        Limits { centripetal: false, ..Limits::default() }
+    }
 
     fn block(length: u32, entry_limit: u32) -> Block {
         Block {
@@ -295,15 +462,16 @@ mod tests {
         let mut none = Lookahead::new(&mut []);
         assert!(none.push(block(1, 1)).is_err());
         assert_eq!(none.pop(), None);
-        assert_eq!(none.entry_allowed(PathLength::MAX), PathLength::ZERO);
+        assert_eq!(none.entry_allowed(PathLength::MAX, &limits()), PathLength::ZERO);
     }
 
     #[test]
     fn the_nearest_binding_limit_counts() {
         let mut memory = [Block::EMPTY; 4];
         let mut ring = Lookahead::new(&mut memory);
-        let allowed =
-            |ring: &Lookahead, top| ring.entry_allowed(PathLength::from_bits(top)).to_bits();
+        let allowed = |ring: &Lookahead, top| {
+            ring.entry_allowed(PathLength::from_bits(top), &limits()).to_bits()
+        };
         ring.push(block(100, 1000)).expect("room");
         assert_eq!(allowed(&ring, 5000), 100);
         ring.push(block(300, 20)).expect("room");
@@ -354,7 +522,74 @@ mod tests {
                 let limit = block.entry_limit.min(block.curve_limit).to_bits();
                 allowed = limit.min(allowed + block.length.to_bits());
             }
-            assert_eq!(ring.entry_allowed(PathLength::MAX).to_bits(), allowed, "{round}");
+            assert_eq!(
+                ring.entry_allowed(PathLength::MAX, &limits()).to_bits(),
+                allowed,
+                "{round}"
+            );
         }
+    }
+
+    #[test]
+    fn short_moves_are_joined_where_the_blocks_are_few() {
+        // 0.5 mm are 131072 units.
+        let limits = limits();
+        let mut memory = [Block::EMPTY; 4];
+        let mut ring = Lookahead::new(&mut memory);
+        let line = |dx, dy, length| Block { dx, dy, ..block(length, u32::MAX) };
+        let mut sum = 0;
+        for number in 0..19u32 {
+            let line = line(3, (number % 2) as i32, 700 + number);
+            sum += 700 + u64::from(number);
+            if !ring.join(&line, &limits) {
+                ring.push(line).expect("room");
+            }
+        }
+        assert_eq!(ring.known(), sum << 14);
+        let counts: std::vec::Vec<_> =
+            ring.blocks().concat().iter().map(|block| block.chords.all().len()).collect();
+        // Half of the memory is filled first.
+        assert_eq!(counts, [0, 5, 5, 5]);
+        let (gap, dash) = (BlockKind::Gap, Some(LineType::Dashed));
+        for other in [
+            Block { kind: gap, ..line(1, 0, 9) },
+            Block { ink: dash, ..line(1, 0, 9) },
+            Block { offsets: [1, 0], ..line(1, 0, 9) },
+            Block { ink: Some(LineType::Full), ..line(1, 0, 9) },
+            line(1, 0, 9),
+        ] {
+            assert!(!ring.join(&other, &limits), "{other:?}");
+        }
+        // Moves in line take no room in a block.
+        ring.clear();
+        for _ in 0..2 {
+            ring.push(line(2, 1, 50)).expect("room");
+        }
+        for _ in 0..100 {
+            assert!(ring.join(&line(4, 2, 100), &limits));
+        }
+        let last = *ring.blocks()[0].last().expect("a block");
+        assert_eq!((last.dx, last.dy, last.chords.all().len()), (402, 201, 0));
+        assert!(ring.join(&line(-4, -2, 100), &limits));
+        let last = *ring.blocks()[0].last().expect("a block");
+        assert_eq!((last.dx, last.dy, last.chords.all().len()), (402, 201, 1));
+    }
+
+    #[test]
+    fn bends_that_are_not_known_yet_are_allowed_for() {
+        let limits = Limits { centripetal: true, ..limits() };
+        let mut memory = [Block::EMPTY; 4];
+        let mut ring = Lookahead::new(&mut memory);
+        ring.push(block(1 << 30, u32::MAX)).expect("room");
+        let known = surely_known(&limits);
+        let mut before = 0;
+        for to_end in 0..known {
+            let allowed = ring.stopping_distance_at(to_end, &limits);
+            assert!(allowed <= to_end && (before..=before + 1).contains(&allowed), "{to_end}");
+            before = allowed;
+        }
+        assert_eq!(before, known - 1 - known / 4);
+        ring.end_curve();
+        assert_eq!(ring.stopping_distance_at(known, &limits), known);
     }
 }

@@ -52,7 +52,8 @@ pub enum Progress {
 pub struct Move {
     /// Where it takes the motors.
     pub motors: PagePoint,
-    /// How far start and end lie beside the motors' steps: see [`Line::beside`](crate::step::Line::beside).
+    /// How far start and end lie beside the motors' steps: see
+    /// [`Line::beside`](crate::step::Line::beside).
     pub offsets: [i8; 2],
     /// Where it takes the pen.
     pub page: PagePoint,
@@ -141,6 +142,8 @@ pub struct Runner<'m> {
     page_end: PagePoint,
     /// The way in which the last block runs, its length and ink.
     last: Option<(Heading, PathLength, Option<LineType>)>,
+    /// The stopping distance of its speed.
+    last_limit: PathLength,
     run: RunLengths,
     /// Whether the last block begun is inked.
     in_stroke: bool,
@@ -184,6 +187,7 @@ impl<'m> Runner<'m> {
             end: PagePoint::default(),
             page_end: PagePoint::default(),
             last: None,
+            last_limit: PathLength::ZERO,
             run: RunLengths::default(),
             in_stroke: false,
             was_faster: SliceSpeed::ZERO,
@@ -210,11 +214,11 @@ impl<'m> Runner<'m> {
         self.brake = brake;
     }
 
-    /// How long the events that wait must last so that the machine can stop within them, wherever in
-    /// them it is, no matter what comes behind.
+    /// How long the events that wait must last so that the machine can stop within them, wherever
+    /// in them it is, no matter what comes behind.
     ///
-    /// Events that end at a speed u and last t hold the stopping distance of every speed v in them if
-    /// t ≥ (v - (√2 - 1) u) / a: then the plan is slower in between, or goes far enough.
+    /// Events that end at a speed u and last t hold the stopping distance of every speed v in them
+    /// if t ≥ (v - (√2 - 1) u) / a: then the plan is slower in between, or goes far enough.
     pub fn stopping_ticks(&self) -> u32 {
         let end = match &self.plan {
             Some(Plan::Profile(profile)) => profile.speed().to_bits(),
@@ -311,7 +315,8 @@ impl<'m> Runner<'m> {
         self.lift.stand_at(place);
     }
 
-    /// Whether a motor has still to raise the pen. Where it is not known how far, only if `anywhere`.
+    /// Whether a motor has still to raise the pen. Where it is not known how far, only if
+    /// `anywhere`.
     pub fn is_pen_held(&self, anywhere: bool) -> bool {
         let is_lowered = self.pen_is_down != Some(false) && (anywhere || self.lift.is_known());
         self.pen.lift.is_some() && (is_lowered || self.emitter.is_open())
@@ -330,8 +335,8 @@ impl<'m> Runner<'m> {
         self.run
     }
 
-    /// The motors stand at `motors` and have taken up `slack`, the pen at `page`, nothing waits, and the
-    /// events worked off took `ticks` (it wraps): after homing, or after an emergency stop.
+    /// The motors stand at `motors` and have taken up `slack`, the pen at `page`, nothing waits,
+    /// and the events worked off took `ticks` (it wraps): after homing, or after an emergency stop.
     pub fn set_position(
         &mut self,
         motors: PagePoint,
@@ -345,8 +350,8 @@ impl<'m> Runner<'m> {
         self.emitter.restart(ticks);
     }
 
-    /// Appends a move; a speed, by its stopping distance ([`Limits::feed`]), is not passed. Lengths, corners
-    /// and bends are those of the page. A move of no length is skipped.
+    /// Appends a move; a speed, by its stopping distance ([`Limits::feed`]), is not passed.
+    /// Lengths, corners and bends are those of the page. A move of no length is skipped.
     ///
     /// # Errors
     /// See [`PushError`]; nothing is appended then.
@@ -382,8 +387,17 @@ impl<'m> Runner<'m> {
         }
         let (entry_limit, curve_limit) = (corner.limit, limit);
         let kind = if is_gap { BlockKind::Gap } else { BlockKind::Line };
-        let block = Block { dx, dy, length, entry_limit, curve_limit, ink, offsets, kind };
-        self.lookahead.push(block).map_err(|_| PushError::Full)?;
+        let block =
+            Block { dx, dy, length, entry_limit, curve_limit, ink, offsets, kind, ..Block::EMPTY };
+        // Between two blocks the speed is looked at.
+        let is_free = corner.limit >= self.limits.top && limit == self.last_limit;
+        if self.lookahead.is_full() {
+            return Err(PushError::Full);
+        }
+        if !is_free || !self.lookahead.join(&block, &self.limits) {
+            self.lookahead.push(block).map_err(|_| PushError::Full)?;
+        }
+        self.last_limit = limit;
         if self.limits.centripetal {
             self.curvature.sync_consumed(&self.limits, page, &mut self.lookahead);
         }
@@ -391,15 +405,18 @@ impl<'m> Runner<'m> {
         self.page_end = page;
         self.last = Some((heading, length, inked));
         self.heed_bends();
-        if self.hurried.is_some_and(|exit| exit < self.lookahead.entry_allowed(PathLength::MAX)) {
+        if self
+            .hurried
+            .is_some_and(|exit| exit < self.lookahead.entry_allowed(PathLength::MAX, &self.limits))
+        {
             self.hurried = None;
             self.plan_again();
         }
         Ok(())
     }
 
-    /// Appends steps by which the motors take up their slack, from rest to rest; the pen stays where it
-    /// is, lowered if `ink` says so.
+    /// Appends steps by which the motors take up their slack, from rest to rest; the pen stays
+    /// where it is, lowered if `ink` says so.
     ///
     /// # Errors
     /// See [`PushError`]; nothing is appended then.
@@ -446,9 +463,19 @@ impl<'m> Runner<'m> {
         self.heed_bends();
     }
 
-    /// A cruise that would pass a bend too fast, which is known only now, ends.
+    /// Slows down for bends that are known only now: on the piece in work, or behind a cruise that
+    /// would pass one too fast.
     #[inline]
     fn heed_bends(&mut self) {
+        let late = self.lookahead.late_limit();
+        if let Some(course) = &mut self.course
+            && late < course.curve_limit
+        {
+            course.curve_limit = late;
+            if let Some(Plan::Profile(_)) = &self.plan {
+                self.plan_again();
+            }
+        }
         let limit = self.lookahead.take_lowered();
         if limit < PathLength::MAX
             && let Some(Plan::Interval(interval)) = &self.plan
@@ -466,8 +493,8 @@ impl<'m> Runner<'m> {
         self.stopping = true;
     }
 
-    /// Gives the plan up where that leaves no kink. An interval in which the acceleration changes is
-    /// carried out: at most 42 ms, and 1.3 ms from a jerk of 20 m/s³ at 800 mm/s² on.
+    /// Gives the plan up where that leaves no kink. An interval in which the acceleration changes
+    /// is carried out: at most 42 ms, and 1.3 ms from a jerk of 20 m/s³ at 800 mm/s² on.
     fn break_plan_off(&mut self) -> Option<PathLength> {
         match &self.plan {
             Some(Plan::Interval(interval)) if interval.changes() => None,
@@ -475,8 +502,8 @@ impl<'m> Runner<'m> {
         }
     }
 
-    /// The plan ends with the last slice that it gave. Says how fast it would have ended the piece in
-    /// work, if it was to.
+    /// The plan ends with the last slice that it gave. Says how fast it would have ended the piece
+    /// in work, if it was to.
     fn give_plan_up(&mut self) -> Option<PathLength> {
         match self.plan.take()? {
             Plan::Profile(profile) => {
@@ -572,6 +599,9 @@ impl<'m> Runner<'m> {
         while let Some(course) = &mut self.course
             && course.slice.is_none()
         {
+            if course.begin_rest() {
+                break;
+            }
             let slice = match &mut self.plan {
                 None => {
                     let progress = self.plan(queue)?;
@@ -676,7 +706,10 @@ impl<'m> Runner<'m> {
             place.y = place.y.wrapping_add(y * straights + diagonal_y * diagonals);
             course.advance(count);
         }
-        course.end_slice(slice);
+        if course.end_slice(slice) {
+            let units = self.brake.step_length(course.move_length);
+            queue.set_step_length(units, self.emitter.has_stepped())?;
+        }
         self.now = self.now.wrapping_add(slice.time);
         self.emitter.split_long_wait(self.now, queue)
     }
@@ -855,7 +888,7 @@ impl<'m> Runner<'m> {
         } else {
             let is_last = course.is_last_piece();
             let exit_allowed = if is_last {
-                self.lookahead.entry_allowed(top.stopping_distance)
+                self.lookahead.entry_allowed(top.stopping_distance, &self.limits)
             } else {
                 PathLength::ZERO
             };

@@ -406,6 +406,12 @@ impl Road<'_, '_> {
                     && jerk.braking_distance(from, self.limits.speed(limit).to_bits()) <= place)
         };
         let stop = jerk.braking_distance(after, 0);
+        if let Some(blocks) = self.beyond {
+            let left = (self.room + blocks.known()).saturating_sub(way);
+            if stop >> 14 > blocks.stopping_distance_at(left >> 14, self.limits) {
+                return false;
+            }
+        }
         // No speed looked at is too fast for limits from this one on.
         let harmless = self.limits.least_limit(fastest.max(from.speed.into()));
         let (enough, mut lowest) = (way.saturating_add(stop), PathLength::MAX);
