@@ -331,7 +331,7 @@ mod tests {
         let course = BlockCursor::new(&joined(&CHORDS), PathLength::ZERO);
         for least in 0..20_000u64 {
             let stand = course.to_whole_step(least << 14);
-            assert_eq!(stand, least.div_ceil(1000) * 1000 << 14, "{least}");
+            assert_eq!(stand, (least.div_ceil(1000) * 1000) << 14, "{least}");
         }
     }
 }

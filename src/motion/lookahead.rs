@@ -16,7 +16,7 @@ fn surely_known(limits: &Limits) -> u64 {
 /// A straight move that waits, or up to six short ones that need no plan of their own: 48 bytes.
 ///
 /// The LM3S6965 lends 16 of them and the Pico 128 (`src/board_table.rs`). Short moves are joined as
-/// far as the stopping distance asks for it: see [`Lookahead::join`]. With fewer blocks than hold
+/// far as the stopping distance asks for it (`Lookahead::join`). With fewer blocks than hold
 /// that distance the machine is slower, never wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Block {
