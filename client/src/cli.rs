@@ -12,7 +12,7 @@ pub use view::ViewArgs;
 use crate::board;
 use crate::error::{EXIT_CODES, ExitCode};
 use crate::fit::{FitError, TOLERANCES};
-use crate::formats;
+use crate::formats::{self, STANDARD_INPUT};
 use crate::machine_settings::AssignedSetting;
 use crate::page::Page;
 use crate::table::BoardRow;
@@ -177,7 +177,7 @@ pub struct TapeShowArgs {
     /// The tape
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
-    /// The page: A4, A3, Letter, or width x height in mm
+    /// The page: A0 to A6, Letter, Legal, Tabloid, or its size such as 300x200, 11x17in
     #[arg(long, value_name = "PAGE", value_parser = page, default_value = "A4")]
     pub page: Page,
     /// The number of motor steps in a millimetre, 2 to 4000
@@ -196,7 +196,7 @@ pub struct TapeShowArgs {
 
 /// The help for a file that is read, with the formats that it may have.
 fn file_help(what: &str) -> String {
-    format!("{what}: {}", formats::list())
+    format!("{what}: {}; {STANDARD_INPUT} is the standard input", formats::list())
 }
 
 /// Options of `penup plot`.

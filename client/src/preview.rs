@@ -35,6 +35,10 @@ pub struct InMemory {
     pen: Option<PenWatch>,
     /// The times, in ticks, of the first and the last change of a pin since the plot command.
     span: Option<[u64; 2]>,
+    /// Whether the pen was changed since the last change of a pin.
+    waited: bool,
+    /// The ticks for which the machine waited for pens since the plot command.
+    waits: u64,
 }
 
 impl InMemory {
@@ -52,7 +56,7 @@ impl InMemory {
         let mut board = HostBoard::new(ring, pins);
         let plotter = Plotter::with_settings(lend_memory(), pins, settings);
         plotter.greet(&mut board);
-        Self { board, plotter, steps: 0, pen: None, span: None }
+        Self { board, plotter, steps: 0, pen: None, span: None, waited: false, waits: 0 }
     }
 
     fn steps_per_mm(&self) -> [f64; 2] {
@@ -63,7 +67,10 @@ impl InMemory {
         let changes = self.board.trace().take_changes();
         self.steps += count_steps(&changes);
         if let (Some(first), Some(last)) = (changes.first(), changes.last()) {
-            let [begin, _] = self.span.unwrap_or([first.time; 2]);
+            let [begin, end] = self.span.unwrap_or([first.time; 2]);
+            if std::mem::take(&mut self.waited) {
+                self.waits += first.time - end;
+            }
             self.span = Some([begin, last.time]);
         }
         if let Some(pen) = &mut self.pen {
@@ -178,7 +185,9 @@ impl InMemory {
             pen_up_mm: lengths.pen_up_mm,
             efficiency: lengths.efficiency(),
             steps: core::mem::take(&mut self.steps),
-            duration_s: self.span.map(|[begin, end]| (end - begin) as f64 / SECOND).unwrap_or(0.0),
+            duration_s: self
+                .span
+                .map_or(0.0, |[begin, end]| (end - begin - self.waits) as f64 / SECOND),
             timings_ms,
             pen,
         })
@@ -198,6 +207,7 @@ impl Link for InMemory {
         if bytes.split(|byte| *byte == b' ').any(plots) {
             self.steps = 0;
             self.span = None;
+            (self.waited, self.waits) = (false, 0);
             let step = 1.0 / self.steps_per_mm()[0];
             self.pen.get_or_insert_with(|| PenWatch::new(step)).begin_again();
         }
@@ -222,6 +232,7 @@ impl Link for InMemory {
 
     fn change_pen(&mut self, pen: u8) -> io::Result<bool> {
         self.follow_pins();
+        self.waited = true;
         if let Some(watch) = &mut self.pen {
             watch.change_pen(pen);
         }

@@ -18,12 +18,21 @@ use penup::protocol::{Command as PlotterCommand, CommandError, Escape, LINE_LIMI
 const PAGE: &str = "page";
 /// The name of the option whose value is any text. It is sent with escapes.
 const TITLE: &str = "title";
-/// The pages that have names, in lower case.
-const PAGES: [(&str, Page); 3] = [
-    ("a4", Page { width: 210.0, height: 297.0 }),
-    ("a3", Page { width: 297.0, height: 420.0 }),
-    ("letter", Page { width: 215.9, height: 279.4 }),
+/// The pages that have names.
+const PAGES: [(&str, Page); 10] = [
+    ("A4", Page { width: 210.0, height: 297.0 }),
+    ("A0", Page { width: 841.0, height: 1189.0 }),
+    ("A1", Page { width: 594.0, height: 841.0 }),
+    ("A2", Page { width: 420.0, height: 594.0 }),
+    ("A3", Page { width: 297.0, height: 420.0 }),
+    ("A5", Page { width: 148.0, height: 210.0 }),
+    ("A6", Page { width: 105.0, height: 148.0 }),
+    ("Letter", Page { width: 215.9, height: 279.4 }),
+    ("Legal", Page { width: 215.9, height: 355.6 }),
+    ("Tabloid", Page { width: 279.4, height: 431.8 }),
 ];
+/// The units in which the size of a page may be written, and their lengths in mm.
+const UNITS: [(&str, f64); 3] = [("mm", 1.0), ("cm", 10.0), ("in", 25.4)];
 /// The name of the option that keeps room free, which a file with a page of its own does not need.
 const MARGIN: &str = "margin";
 /// The name of the option that scales a plan to the page.
@@ -210,19 +219,37 @@ fn within(option: &PlotOption, reason: &str) -> String {
     format!("{reason}{}", range.unwrap_or_default())
 }
 
-/// Parses the size of a page: its name, or its width and height.
+/// Parses the size of a page: its name, or its width and height with a unit.
 pub(super) fn page(text: &str) -> Result<Page, String> {
-    let text = text.to_ascii_lowercase();
-    if let Some((_, page)) = PAGES.iter().find(|(name, _)| *name == text) {
+    let text = text.trim();
+    if let Some((_, page)) = PAGES.iter().find(|(name, _)| name.eq_ignore_ascii_case(text)) {
         return Ok(*page);
     }
-    let (width, height) = text
-        .split_once('x')
-        .ok_or("it is none of A4, A3, Letter, or width x height in mm such as 300x200")?;
+    let names: Vec<&str> = PAGES.iter().map(|(name, _)| *name).collect();
+    let names = names.join(", ");
+    let text = text.to_ascii_lowercase();
+    let (width, height) = text.split_once('x').ok_or_else(|| {
+        format!("it is none of {names}, or width x height such as 300x200, 30cmx20cm or 11x17in")
+    })?;
+    // A unit behind the height is that of both.
+    let (height, unit) = length(height, 1.0)?;
+    let (width, _) = length(width, unit)?;
+    let page = Page { width, height };
     if let Some(option) = OPTIONS.iter().find(|option| option.name == PAGE) {
-        understood(option, &text)?;
+        understood(option, &page_value(page))?;
     }
-    Ok(Page { width: number(width)?, height: number(height)? })
+    Ok(page)
+}
+
+/// Parses a length with or without its unit. Returns it in mm, and the length of the unit, which is
+/// `unit` where none is written.
+fn length(text: &str, unit: f64) -> Result<(f64, f64), String> {
+    let text = text.trim();
+    let named = UNITS.iter().find_map(|(name, unit)| Some((text.strip_suffix(name)?, *unit)));
+    let (value, unit) = named.unwrap_or((text, unit));
+    let value = number(value).map_err(|_| CommandError::NotANumber.to_string())?;
+    // What single steps cannot show is rounded away.
+    Ok(((value * unit * 1000.0).round() / 1000.0, unit))
 }
 
 #[cfg(test)]

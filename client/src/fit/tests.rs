@@ -1,5 +1,5 @@
 use super::*;
-use crate::formats::SourceFile;
+use crate::formats::{ReadError, SourceFile};
 use penup::curve::{FRACTION_BITS, Point};
 use penup::model::{Corner, Model, Position, no_undo};
 use penup::protocol::Command;
@@ -217,14 +217,18 @@ fn sides_that_come_one_by_one_are_one_polyline() {
 
 #[test]
 fn what_cannot_be_fitted_is_refused() {
-    let line = |text: &str| match fit_text(text, 0.1) {
-        Err(FitError::Line { number, .. }) => Some(number),
-        _ => None,
+    let line = |text: &str| match SourceFile::new("f.obj".to_owned(), text.into()) {
+        // The reader itself refuses what is no vertex.
+        Err(ReadError::Line { origin, .. }) => Some(origin.line),
+        _ => match fit_text(text, 0.1) {
+            Err(FitError::Line { number, .. }) => Some(number),
+            _ => None,
+        },
     };
     assert_eq!(line("v 0 0 0\nv 1 1 1\n"), Some(2));
     assert_eq!(line("v 0 0 0\nv 1 1 0\nl 1 2\nl 1 3\n"), Some(4));
     assert_eq!(line("v 0 0 0\nl 0 1\n"), Some(2));
-    assert_eq!(line("v 0 0 0\nl 1\n"), Some(2));
+    assert_eq!(fit_text("v 0 0 0\nl 1\n", 0.1), Err(FitError::NoPolyline));
     assert_eq!(line("v 0 0 0\nv 1 1 0\nv 2 1 0\nf 1 2 3\n"), Some(4));
     // The fitted file would lose the curve.
     assert_eq!(

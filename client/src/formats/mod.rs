@@ -10,20 +10,33 @@
 
 mod error;
 mod format;
+mod gcode;
+mod hpgl;
+mod mesh;
 mod obj;
+mod plan;
+mod ply;
+mod stl;
 mod svg;
+mod tape;
 
 pub use error::ReadError;
 
 use crate::lines::{JobLine, Lines};
 use crate::page::Page;
+use crate::table::BOARDS;
 use format::{Contents, Format, SIZE_LIMIT};
+use penup::model::VERTEX_NUMBER_LIMIT;
 use std::fs::{File, Metadata};
 use std::io::{self, Read as _};
 use std::path::Path;
 
 /// Every format that is read.
-static FORMATS: &[&dyn Format] = &[&obj::Obj, &svg::Svg];
+static FORMATS: &[&dyn Format] =
+    &[&obj::Obj, &svg::Svg, &stl::Stl, &ply::Ply, &gcode::GCode, &hpgl::HpGl, &tape::Tape];
+
+/// The name that stands for the standard input.
+pub const STANDARD_INPUT: &str = "-";
 
 /// The number of bytes by which a format is recognised.
 const BEGINNING: u64 = 1 << 16;
@@ -36,12 +49,19 @@ pub struct SourceFile {
 }
 
 impl SourceFile {
-    /// Reads the file at `path` and checks its lines.
+    /// Reads the file at `path`, or the standard input if that is `-`, and checks its lines.
     ///
     /// # Errors
     /// The file cannot be read, its format is unknown, or it contains something that no plotter
     /// accepts.
     pub fn read(path: &Path) -> Result<Self, ReadError> {
+        if path.as_os_str() == STANDARD_INPUT {
+            let name = "the standard input".to_owned();
+            let mut bytes = Vec::new();
+            let read = io::stdin().lock().take(SIZE_LIMIT).read_to_end(&mut bytes);
+            read.map_err(|source| ReadError::File { file: name.clone(), source })?;
+            return Self::new(name, bytes);
+        }
         let name = path.display().to_string();
         let unreadable = |source| ReadError::File { file: name.clone(), source };
         let (mut file, about) = open(path).map_err(unreadable)?;
@@ -158,6 +178,25 @@ fn described(separator: &str, describe: impl Fn(&dyn Format, &str) -> String) ->
         describe(*format, &extensions.join(" or "))
     };
     FORMATS.iter().map(described).collect::<Vec<_>>().join(separator)
+}
+
+/// A number with a noun and a verb.
+fn counted(number: usize, [one, many]: [&str; 2]) -> String {
+    format!("{number} {}", if number == 1 { one } else { many })
+}
+
+/// Says how many points the drawing has if a plotter takes fewer.
+fn capacity(points: usize) -> Option<String> {
+    let boards = BOARDS.iter().map(|board| (board.name, board.memory.vertices));
+    let short: Vec<String> = boards
+        .chain([("preview", VERTEX_NUMBER_LIMIT)])
+        .filter(|(_, limit)| *limit < points)
+        .map(|(name, limit)| format!("{name} takes {limit}"))
+        .collect();
+    (!short.is_empty()).then(|| {
+        let short = short.join(", ");
+        format!("the drawing has {points} points, and {short}: `penup fit` makes fewer of them")
+    })
 }
 
 #[cfg(test)]

@@ -9,16 +9,22 @@
 //! ends in a backslash continues in the next one. A polyline that is longer than the maximum line
 //! length is sent as several polylines, each of which starts at the last vertex of the one before.
 //!
+//! Files with lines that a plotter refuses although they are OBJ are read by [`irregular`].
+//!
 //! The reader refuses files that are not text, other lines that are too long, and machine commands
 //! inside a file.
+
+mod irregular;
 
 use super::error::ReadError;
 use super::format::{Contents, Format};
 use crate::lines::{JobLine, Lines, Origin};
 use crate::protocol::acts_at_once;
 use crate::words::explained;
+use irregular::MOST_PENS;
 use penup::protocol::{Command, CommandError, LINE_LIMIT};
 use std::borrow::Cow;
+use std::collections::HashSet;
 
 /// The format itself.
 #[derive(Debug)]
@@ -38,13 +44,21 @@ impl Format for Obj {
         // The last line may be cut.
         let last_end = beginning.iter().rposition(|byte| is_line_end(*byte)).unwrap_or(0);
         [beginning, &beginning[..last_end]].into_iter().any(|lines| {
-            ObjLines::new(String::new(), lines.to_vec())
-                .is_ok_and(|lines| lines.in_order().any(|line| line.sent.starts_with("v ")))
+            match ObjLines::checked(String::new(), lines.to_vec(), true) {
+                Ok(Checked::Regular(lines)) => {
+                    lines.in_order().any(|line| line.sent.starts_with("v "))
+                }
+                Ok(Checked::Irregular(_, bytes)) => bytes.windows(3).any(|it| it == b"\nv "),
+                Err(_) => false,
+            }
         })
     }
 
     fn read(&self, file: String, bytes: Vec<u8>) -> Result<Contents, ReadError> {
-        Ok(Contents::of(ObjLines::new(file, bytes)?))
+        match ObjLines::checked(file, bytes, true)? {
+            Checked::Regular(lines) => Ok(Contents::of(lines)),
+            Checked::Irregular(file, bytes) => irregular::read(file, &bytes),
+        }
     }
 }
 
@@ -75,12 +89,32 @@ struct Cursor {
     in_polyline: bool,
 }
 
+/// The result of checking a file.
+#[derive(Debug)]
+enum Checked {
+    /// A plotter understands every line as it is.
+    Regular(ObjLines),
+    /// The name and the bytes of a file with other lines ([`irregular`]).
+    Irregular(String, Vec<u8>),
+}
+
 impl ObjLines {
-    /// Checks the lines of `bytes`, the contents of a file called `name`.
+    /// Checks the lines of `bytes`, the contents of a file called `name`, and takes the corners of
+    /// elements as they are.
     ///
     /// # Errors
     /// The file contains something that no plotter accepts.
+    #[cfg(test)]
     pub(super) fn new(name: String, bytes: Vec<u8>) -> Result<Self, ReadError> {
+        match Self::checked(name, bytes, false)? {
+            Checked::Regular(lines) => Ok(lines),
+            Checked::Irregular(file, _) => Err(ReadError::Utf16 { file }),
+        }
+    }
+
+    /// Checks the lines of `bytes`, up to the first that [`irregular`] must read, if that
+    /// `reads_irregular` ones.
+    fn checked(name: String, bytes: Vec<u8>, reads_irregular: bool) -> Result<Checked, ReadError> {
         if bytes.starts_with(b"\xFF\xFE") || bytes.starts_with(b"\xFE\xFF") {
             return Err(ReadError::Utf16 { file: name });
         }
@@ -90,17 +124,34 @@ impl ObjLines {
             cursor.at = 3;
         }
         let mut content = String::new();
+        let (mut vertices, mut pens) = (0, HashSet::new());
         loop {
             let mut next = cursor;
             match next.read(&file.bytes, &mut content) {
-                Ok(None) => return Ok(file),
+                Ok(None) => return Ok(Checked::Regular(file)),
                 Ok(Some(from)) => {
+                    vertices += usize::from(content.starts_with("v "));
+                    if content.starts_with("usemtl") || content.starts_with("g ") {
+                        pens.insert(content.clone());
+                    }
+                    let is_regular = irregular::is_regular(&content, vertices);
+                    if reads_irregular && (!is_regular || pens.len() > MOST_PENS) {
+                        return Ok(Checked::Irregular(file.name, file.bytes));
+                    }
                     if file.count.is_multiple_of(CURSOR_EVERY) {
                         file.cursors.push(from);
                     }
                     file.count += 1;
                 }
-                Err((from, fault)) => return Err(file.refused(from, fault)),
+                Err((from, fault)) => {
+                    let keyword = content.split(' ').next().unwrap_or_default();
+                    let is_refused =
+                        !matches!(fault, LineFault::NotText | LineFault::TooLong { .. });
+                    if reads_irregular && is_refused && irregular::reads(keyword) {
+                        return Ok(Checked::Irregular(file.name, file.bytes));
+                    }
+                    return Err(file.refused(from, fault));
+                }
             }
             cursor = next;
         }

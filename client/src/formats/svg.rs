@@ -16,17 +16,15 @@ mod drawing;
 mod flatten;
 mod markup;
 mod pens;
-mod plan;
 
+use super::counted;
 use super::error::ReadError;
 use super::format::{Contents, Format};
+use super::plan::Plan;
 use crate::lines::Lines as _;
 use crate::page::Page;
-use crate::table::BOARDS;
 use drawing::{Drawing, PIXEL};
 use markup::Markup;
-use penup::model::VERTEX_NUMBER_LIMIT;
-use plan::Plan;
 use resvg::usvg::roxmltree::Error as XmlError;
 use resvg::usvg::{Error, ImageHrefResolver, Options, Tree};
 use std::thread;
@@ -114,11 +112,11 @@ fn contents(file: &str, text: &str) -> Result<Contents, String> {
         let (line, text) = shape.element.map_or((1, String::new()), |it| markup.position(it));
         plan.begin(line, text);
         for polyline in &shape.polylines {
-            plan.draw(polyline, size, pen);
+            plan.draw(polyline.points.iter().map(|it| [it.x, it.y]), Some(size), pen);
         }
     }
     let mut notes = markup.left_out(&drawing.seen);
-    notes.extend(not_as_it_is(&drawing, plan.dots));
+    notes.extend(not_as_it_is(&drawing));
     if plan.count() == 0 {
         let mut reasons = vec!["there is nothing to draw in this SVG".to_owned()];
         if drawing.invisible > 0 {
@@ -128,17 +126,12 @@ fn contents(file: &str, text: &str) -> Result<Contents, String> {
         reasons.extend(notes);
         return Err(reasons.join("; "));
     }
-    notes.extend(capacity(plan.vertices()));
-    Ok(Contents { bounds: plan.bounds(), lines: Box::new(plan), page: Some(page), notes })
+    notes.extend(plan.notes());
+    Ok(plan.contents(Some(page), notes))
 }
 
-/// A number with a noun and a verb.
-fn counted(number: usize, [one, many]: [&str; 2]) -> String {
-    format!("{number} {}", if number == 1 { one } else { many })
-}
-
-/// What is drawn otherwise than the file says, in sentences for the user. There are so many `dots`.
-fn not_as_it_is(drawing: &Drawing<'_, '_>, dots: usize) -> impl Iterator<Item = String> {
+/// What is drawn otherwise than the file says, in sentences for the user.
+fn not_as_it_is(drawing: &Drawing<'_, '_>) -> impl Iterator<Item = String> {
     [
         (
             drawing.cut,
@@ -153,25 +146,10 @@ fn not_as_it_is(drawing: &Drawing<'_, '_>, dots: usize) -> impl Iterator<Item = 
         (drawing.masks, ["mask is", "masks are"], "not applied: what it hides is drawn"),
         (drawing.filters, ["filter is", "filters are"], "not applied"),
         (drawing.undashed, ["line has", "lines have"], "too many dashes: drawn as a full line"),
-        (dots, ["line is", "lines are"], "not drawn, because a dot has no length"),
     ]
     .into_iter()
     .filter(|(number, _, _)| *number > 0)
     .map(|(number, noun, what)| format!("{} {what}", counted(number, noun)))
-}
-
-/// Says how many points the drawing has if a plotter takes fewer.
-fn capacity(points: usize) -> Option<String> {
-    let boards = BOARDS.iter().map(|board| (board.name, board.memory.vertices));
-    let short: Vec<String> = boards
-        .chain([("preview", VERTEX_NUMBER_LIMIT)])
-        .filter(|(_, limit)| *limit < points)
-        .map(|(name, limit)| format!("{name} takes {limit}"))
-        .collect();
-    (!short.is_empty()).then(|| {
-        let short = short.join(", ");
-        format!("the drawing has {points} points, and {short}: `penup fit` makes fewer of them")
-    })
 }
 
 #[cfg(test)]

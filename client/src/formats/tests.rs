@@ -13,8 +13,24 @@ fn read(name: &str, content: &[u8]) -> Result<usize, String> {
     file.map(|file| file.count()).map_err(|error| error.to_string().replace(&here, ""))
 }
 
+/// The lines that a file with this name and content sends, or the message.
+pub(super) fn sent(name: &str, content: &[u8]) -> Result<Vec<String>, String> {
+    let file = SourceFile::new(name.to_owned(), content.to_vec());
+    let file = file.map_err(|error| error.to_string())?;
+    let lines: Vec<String> = file.in_order().map(|line| line.sent).collect();
+    let single = (0..file.count()).map_while(|index| file.line(index)).map(|line| line.sent);
+    assert!(single.eq(lines.iter().cloned()));
+    Ok(lines)
+}
+
+/// What the user is told of a file that can be drawn.
+pub(super) fn notes(name: &str, content: &[u8]) -> Vec<String> {
+    let file = SourceFile::new(name.to_owned(), content.to_vec());
+    file.expect("a file that can be drawn").notes().to_vec()
+}
+
 const UNKNOWN: &str = "penup reads Wavefront OBJ files, whose names end in .obj; SVG files, \
-                       whose names end in .svg";
+                       whose names end in .svg; ";
 
 #[test]
 fn the_extension_decides_in_capitals_as_well() {

@@ -282,6 +282,14 @@ fn a_preview_tells_how_long_the_machine_draws() {
     };
     let usual = seconds(&[]);
     assert!((12.0..15.0).contains(&usual), "{usual}");
+    // Changes of pens take as long as the user takes, which is not counted.
+    fs::write(
+        folder.path().join("pens.obj"),
+        "v 10 10 0\nv 60 10 0\nv 60 60 0\nusemtl pen1\nl 1 2\nusemtl pen2\nl 2 3\n",
+    )
+    .expect("written");
+    let (_, said, _) = penup(folder.path(), &["preview", "pens.obj", "--page", "A5"]);
+    assert!(said.ends_with(", 0:03 to draw\n"), "{said}");
     let slow = seconds(&["--set", "201=600"]);
     assert!((60.0..63.0).contains(&slow), "{slow}");
     fs::write(folder.path().join("slow.toml"), "[settings]\n201 = 600\n22 = 1\n").expect("written");

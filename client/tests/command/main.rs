@@ -67,7 +67,7 @@ fn a_missing_file_a_stranger_and_a_bad_option_are_explained() {
             ("none.obj", 1, "cannot read none.obj: "),
             ("scene.zip", 1, "scene.zip: penup reads Wavefront OBJ files"),
             ("bad.obj", 1, "bad.obj:2: a file cannot hold commands"),
-            ("--page=B5", 2, "none of A4, A3, Letter"),
+            ("--page=B5", 2, "none of A4, A0, A1, A2, A3, A5, A6, Letter, Legal, Tabloid"),
         ] {
             let (status, stdout, stderr) = penup(folder.path(), &[command, file]);
             assert_eq!(status, Some(code), "{stderr}");

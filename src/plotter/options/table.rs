@@ -252,7 +252,10 @@ pub const OPTIONS: &[PlotOption] = &[
         },
         flag: client(Flag {
             range: "each side up to 32767 mm",
-            ..Flag::new(PAGE, "A4, A3, Letter, or width x height in mm, such as 300x200")
+            ..Flag::new(
+                PAGE,
+                "A0 to A6, Letter, Legal, Tabloid, or a size such as 300x200, 30cmx20cm or 11x17in",
+            )
         }),
     },
     PlotOption {

@@ -34,6 +34,11 @@ fn pages_have_names_or_sizes_and_lie_either_way() {
     assert_eq!(size(&["--page=Letter", "--landscape"]), (279.4, 215.9));
     assert_eq!(size(&["--page", "80.5x60"]), (80.5, 60.0));
     assert_eq!(size(&["--page", "60X80", "--landscape"]), (80.0, 60.0));
+    assert_eq!(size(&["--page", "a6"]), (105.0, 148.0));
+    assert_eq!(size(&["--page", "Tabloid"]), (279.4, 431.8));
+    assert_eq!(size(&["--page", "11x17in"]), (279.4, 431.8));
+    assert_eq!(size(&["--page", "30cmx20cm"]), (300.0, 200.0));
+    assert_eq!(size(&["--page", "1inx300mm"]), (25.4, 300.0));
 }
 
 /// A title with one letter more than allowed.

@@ -1,8 +1,8 @@
 //! The lines of OBJ that draw polylines as a plan.
 
-use super::flatten::Polyline;
+use super::format::Contents;
 use crate::lines::{JobLine, Lines, Origin};
-use kurbo::Point;
+use crate::page::Page;
 use penup::protocol::LINE_LIMIT;
 use std::collections::HashMap;
 use std::fmt::Write as _;
@@ -46,14 +46,21 @@ impl Plan {
         self.lines.push((line, u32::try_from(element).unwrap_or(u32::MAX)));
     }
 
-    /// Draws a polyline with a pen. The points are millimetres with y upward, within a page of
-    /// `size` mm; what rounding brings outside is moved to its border.
-    pub(super) fn draw(&mut self, polyline: &Polyline, size: [f64; 2], pen: u32) {
-        let rounded = |value: f64, size: f64| {
-            (value * PER_MM).round().clamp(0.0, (size * PER_MM).floor()) as i64
+    /// Draws a polyline with a pen, counted from 1. The points are millimetres with y upward. If
+    /// there is a page, they are within it; what rounding brings outside is moved to its border.
+    pub(super) fn draw(
+        &mut self,
+        points: impl IntoIterator<Item = [f64; 2]>,
+        page: Option<[f64; 2]>,
+        pen: u32,
+    ) {
+        let rounded = |value: f64, axis: usize| {
+            let value = (value * PER_MM).round();
+            let most = page.map(|page| (page[axis] * PER_MM).floor());
+            most.map_or(value, |most| value.clamp(0.0, most)) as i64
         };
-        let position = |point: &Point| [rounded(point.x, size[0]), rounded(point.y, size[1])];
-        let mut positions: Vec<[i64; 2]> = polyline.points.iter().map(position).collect();
+        let position = |[x, y]: [f64; 2]| [rounded(x, 0), rounded(y, 1)];
+        let mut positions: Vec<[i64; 2]> = points.into_iter().map(position).collect();
         positions.dedup();
         if positions.len() < 2 {
             self.dots += 1;
@@ -90,6 +97,21 @@ impl Plan {
             self.push(format!("v {x} {y} 0"));
         }
         number
+    }
+
+    /// What the user should know about any plan.
+    pub(super) fn notes(&self) -> Vec<String> {
+        let dots = match self.dots {
+            0 => None,
+            1 => Some("1 line is not drawn, because a dot has no length".to_owned()),
+            dots => Some(format!("{dots} lines are not drawn, because a dot has no length")),
+        };
+        dots.into_iter().chain(super::capacity(self.vertices())).collect()
+    }
+
+    /// Ends the plan.
+    pub(super) fn contents(self, page: Option<Page>, notes: Vec<String>) -> Contents {
+        Contents { bounds: self.bounds(), page, notes, ..Contents::of(self) }
     }
 
     /// The least and the greatest coordinates in mm; `None` if nothing is drawn.
