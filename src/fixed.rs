@@ -184,6 +184,27 @@ impl Decimal {
         if self.exponent < 0 { value / rest } else { value * rest }
     }
 
+    /// Whether the number is below 0.
+    pub const fn is_negative(self) -> bool {
+        self.mantissa < 0
+    }
+
+    /// Converts to the nearest hundredth, in units of 0.01.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] for a negative number, or beyond 32 bits.
+    ///
+    /// ```
+    /// use penup::fixed::Decimal;
+    /// assert_eq!(Decimal::parse("28.1").map(Decimal::to_hundredths), Ok(Ok(2810)));
+    /// ```
+    pub fn to_hundredths(self) -> Result<i32, OutOfRange> {
+        let Self { mantissa, exponent } = self;
+        let hundredths = Self { mantissa, exponent: exponent.saturating_add(2) }.to_binary(0)?;
+        let hundredths = i32::try_from(hundredths).map_err(|_| OutOfRange)?;
+        if mantissa < 0 { Err(OutOfRange) } else { Ok(hundredths) }
+    }
+
     /// Converts to an `i32`, if the number is whole.
     ///
     /// # Errors

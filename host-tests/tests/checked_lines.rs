@@ -71,10 +71,14 @@ fn a_reprap_sender_is_answered_by_number() {
 #[test]
 fn who_sends_no_checksum_sees_plain_grbl() {
     let mut bench = bench();
-    for text in ["N5 G21", "N7 G90 (no * 2)", "v 0 1 0", "M110 N3", "M110", "o a*12", "N1 M2"] {
+    for text in ["N5 G21", "N7 G90 (no * 2)", "v 0 1 0", "M110 N3", "M110", "o a*12"] {
         assert_eq!(bench.say(&format!("{text}\n")), "ok\n", "{text}");
     }
+    assert_eq!(bench.say("N1 M2\n"), "[MSG:Pgm End]\nok\n");
     assert!(bench.say("v 0 1 0*12\n").ends_with("]\nerror:2\n"));
+    // A checksum alone is compared.
+    assert_eq!(bench.say(&xored("G0 X0")), "ok\n");
+    assert!(bench.say("G0 X1*12\n").ends_with("]\nerror:170\n"));
 }
 
 #[test]
@@ -121,7 +125,7 @@ fn after_a_crc_nothing_else_is_carried_out_until_that_is_ended() {
     assert_eq!(bench.say(&xored("N2 v 1 1 1")), reply("Resend: 2") + "error:170\n");
     assert_eq!(bench.say("\n"), "ok\n", "a doubled line end");
     assert_eq!(vertices(&bench), 1);
-    assert_eq!(bench.say(&line(2, "M2")), reply("ok N2"));
+    assert_eq!(bench.say(&line(2, "M2")), "[MSG:Pgm End]\n".to_owned() + &reply("ok N2"));
     assert_eq!(bench.say("v 1 1 1\n"), "ok\n");
     bench.say(&line(3, "v 2 2 2"));
     assert!(bench.say("v 1 1 1\n").ends_with("error:172\n"));

@@ -30,7 +30,10 @@ fn refusal(answer: &str) -> Option<u16> {
 fn a_new_plotter_greets_and_is_idle() {
     let mut bench = Bench::new();
     assert_eq!(bench.heard(), "\nGrbl 1.1h [penup 0.1.0 '$' for help]\n");
-    assert_eq!(bench.say("?"), "<Idle|MPos:0.000,0.000,0.000|Strokes:0/0|Ink:0/0|Left:0>\n");
+    assert_eq!(
+        bench.say("?"),
+        "<Idle|MPos:0.000,0.000,0.000|FS:0,0|WCO:0.000,0.000,0.000|Strokes:0/0|Ink:0/0|Left:0>\n"
+    );
     assert_eq!(bench.say("\n"), "ok\n");
     assert_eq!(bench.say("$model\n").lines().last(), Some("ok"));
 }
@@ -44,12 +47,13 @@ fn each_refusal_has_its_own_number_and_changes_nothing() {
         ("hello\n", 1),
         ("G0 X\n", 2),
         ("G5 X1\n", 20),
-        ("M7\n", 20),
+        ("M10\n", 20),
         ("G0 X10 U3\n", 20),
         ("$H\n", 5),
         ("G0 X-1\n", 15),
-        ("$J=Y500\n", 15),
-        ("G2 X10 Y0\n", 33),
+        ("$J=Y500 F100\n", 15),
+        ("G2 X10 Y0\n", 35),
+        ("G2 X10 I3\n", 33),
         ("G3 X10 I400\n", 33),
         ("v 1 2 x\n", 2),
         ("$page=axb\n", 2),
@@ -67,6 +71,7 @@ fn each_refusal_has_its_own_number_and_changes_nothing() {
         ("f 1 2 2\n", 112),
         ("v 1e12 0 0\n", 115),
         ("$margin=-1\n", 102),
+        ("$120=-1\n", 4),
         ("$120=0\n", 150),
         ("$20=0.5\n", 150),
     ] {
@@ -166,8 +171,7 @@ fn a_plan_is_drawn_at_true_size_or_refused_with_its_size() {
     bench.finish();
     assert_eq!(
         bench.say("?"),
-        "<Idle|MPos:50.000,50.000,0.000|Strokes:1/1|Ink:300/300|Left:0>\n"
-            .replace("50.000,50", "350.000,50")
+        "<Idle|MPos:350.000,50.000,0.000|FS:0,0|WCO:0.000,0.000,0.000|Strokes:1/1|Ink:300/300|Left:0>\n"
     );
     assert_eq!(bench.say("$page=210x297\n$fit=on\n$plot\n"), "ok\nok\nok\n");
     bench.finish();

@@ -395,6 +395,11 @@ impl Board for HostBoard<'_> {
         self.steps.step_now();
     }
 
+    fn microseconds(&mut self) -> u32 {
+        let ticks = u64::from(crate::motion::TICKS_PER_SECOND / 1_000_000);
+        (self.trace().now() / ticks) as u32
+    }
+
     fn wait(&mut self) {
         self.pass(u64::from(crate::motion::TICKS_PER_SECOND / 1000));
     }

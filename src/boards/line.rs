@@ -111,6 +111,11 @@ impl Line {
         Some(byte)
     }
 
+    /// How many more bytes fit into the queue.
+    pub fn room(&self) -> usize {
+        RECEIVED_PLACES - 1 - self.bytes.len()
+    }
+
     /// Discards the bytes that came before the last abort.
     fn drop_void(&mut self) {
         let void = self.count_at_abort.load(Ordering::Acquire).wrapping_sub(self.count);

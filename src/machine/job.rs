@@ -59,7 +59,10 @@ impl Machine<'_> {
             }
             match self.runner.produce(queue) {
                 Ok(RunnerProgress::More) => {}
-                Ok(progress) => self.after_stop(progress),
+                Ok(progress) => {
+                    self.after_stop(progress);
+                    self.pause_at_switch(queue);
+                }
                 Err(_) => self.alarm(Alarm::Queue),
             }
         }
@@ -122,6 +125,15 @@ impl Machine<'_> {
                 self.forget_path(page);
                 self.activity = Activity::Idle;
             }
+        }
+    }
+
+    /// Stands for a while after a move of homing, so that a switch that bounces comes to rest.
+    fn pause_at_switch(&mut self, queue: &mut dyn EventQueue) {
+        let ticks = self.settings.milliseconds_as_ticks(Setting::HomingDebounce);
+        let is_homing = matches!(self.activity, Activity::Home(Homing { is_stopped: true, .. }));
+        if is_homing && ticks > 0 && self.runner.dwell(ticks, queue).is_err() {
+            self.alarm(Alarm::Queue);
         }
     }
 

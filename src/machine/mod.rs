@@ -69,6 +69,8 @@ pub struct Machine<'m> {
     contacts: Contacts,
     /// The speed override, in percent of the speeds in the settings.
     percent: u8,
+    /// The override of moves with the pen up, in percent: 25, 50 or 100.
+    rapid_percent: u8,
     /// The number of the pen in the holder, counted from 0.
     pen: u8,
 }
@@ -104,6 +106,7 @@ impl<'m> Machine<'m> {
             slack: Backlash::default(),
             contacts: Contacts::default(),
             percent: 100,
+            rapid_percent: 100,
             pen: 0,
         };
         machine.configure_pulser();
@@ -126,9 +129,29 @@ impl<'m> Machine<'m> {
         if !is_allowed || !self.is_stopped() {
             return Err(SettingError::Busy);
         }
+        let mut settings = self.settings;
+        settings.set(setting, value)?;
+        self.replace(settings);
+        Ok(())
+    }
+
+    /// Replaces all settings, as [`Machine::set`] changes one.
+    ///
+    /// # Errors
+    /// [`SettingError::Busy`]; the settings keep their values then.
+    pub fn restore(&mut self, settings: Settings) -> Result<(), SettingError> {
+        if !matches!(self.activity, Activity::Idle | Activity::Alarm(_)) || !self.is_stopped() {
+            return Err(SettingError::Busy);
+        }
+        self.replace(settings);
+        Ok(())
+    }
+
+    /// Puts settings in force, while nothing moves.
+    fn replace(&mut self, settings: Settings) {
         let (page, before) = (self.position(), self.settings.kinematics());
         let slack = self.slack_steps();
-        self.settings.set(setting, value)?;
+        self.settings = settings;
         self.resize_slack(slack);
         if self.settings.kinematics() != before {
             // The pen stays where it is, but the motors' coordinates for that position change.
@@ -136,13 +159,25 @@ impl<'m> Machine<'m> {
         }
         self.take_settings();
         self.configure_pulser();
+    }
+
+    /// Sets where the pen is parked, in millimetres. Unlike other settings it may change while the
+    /// machine moves.
+    ///
+    /// # Errors
+    /// See [`SettingError`]. On an error nothing changes.
+    pub fn set_park(&mut self, [x, y]: [Value; 2]) -> Result<(), SettingError> {
+        let mut settings = self.settings;
+        settings.set(Setting::ParkX, x)?;
+        settings.set(Setting::ParkY, y)?;
+        self.settings = settings;
         Ok(())
     }
 
     /// Passes the limits, the pen positions and the override to the motion planner.
     fn take_settings(&mut self) {
         self.runner.set_limits(self.settings.limits(), Tool::positions(&self.settings));
-        self.runner.set_override(self.percent);
+        self.runner.set_override(self.percent, self.rapid_percent);
     }
 
     /// What the machine is doing.
@@ -198,8 +233,15 @@ impl<'m> Machine<'m> {
     pub fn set_override(&mut self, percent: u8) {
         self.percent = percent.clamp(10, 200);
         if !matches!(self.activity, Activity::Home(_)) {
-            self.runner.set_override(self.percent);
+            self.runner.set_override(self.percent, self.rapid_percent);
         }
+    }
+
+    /// Scales the speed of moves with the pen up further, to `percent`, with immediate effect. The
+    /// value is clamped to 25 to 100.
+    pub fn set_rapid_override(&mut self, percent: u8) {
+        self.rapid_percent = percent.clamp(25, 100);
+        self.set_override(self.percent);
     }
 
     /// Lowers the pen where it was raised and continues the job. If the machine waited for a pen

@@ -67,6 +67,11 @@ impl Machine<'_> {
         u32::try_from(left / 10 / u64::from(self.percent)).unwrap_or(u32::MAX)
     }
 
+    /// The speed that is planned, in mm/min; 0 while the machine stands.
+    pub fn speed(&self) -> Value {
+        if self.is_stopped() { Value::ZERO } else { self.runner.speed() }
+    }
+
     /// How often the queue ran empty while the machine moved because the main loop was late; the
     /// count wraps.
     pub fn underruns(&self) -> u32 {

@@ -62,6 +62,11 @@ impl Machine<'_> {
         self.runner.capacity()
     }
 
+    /// How many more moves can be planned ahead now.
+    pub fn free_moves(&self) -> usize {
+        self.runner.room()
+    }
+
     /// Whether another move can be appended now.
     pub fn has_room(&self) -> bool {
         self.segmenter.is_none() && !self.runner.is_full()
@@ -106,6 +111,11 @@ impl Machine<'_> {
     /// The speed override, in percent of the speeds in the settings.
     pub fn percent(&self) -> u8 {
         self.percent
+    }
+
+    /// The override of moves with the pen up, in percent, besides the speed override.
+    pub fn rapid_percent(&self) -> u8 {
+        self.rapid_percent
     }
 
     /// The state of the limit switches when they were last observed.

@@ -279,6 +279,14 @@ fn slice_speed(mm_per_min: Millimetres) -> Result<SliceSpeed, LimitsError> {
     Ok(SliceSpeed::from_bits((speed as u32).max(1)))
 }
 
+/// mm per slice to mm/min.
+pub(super) fn mm_per_min(speed: SliceSpeed) -> Millimetres {
+    // 2^-32 mm/slice to 2^-16 mm/min: below 2^32 * 2^31, and then shifted down.
+    let bits = (u64::from(speed.to_bits()) * (60 * u64::from(TICKS_PER_SECOND))) >> 16;
+    let bits = (bits + u64::from(SLICE_TICKS) / 2) / u64::from(SLICE_TICKS);
+    Millimetres::from_bits(i32::try_from(bits).unwrap_or(i32::MAX))
+}
+
 /// mm/s² to mm per slice per slice.
 fn slice_acceleration(mm_per_s2: Millimetres) -> SliceSpeed {
     // 2^-16 mm/s² to 2^-32 mm/slice²: bits * 2^16 * 2^24 / (2^6 * 5^8)², the twos cancelled.

@@ -5,6 +5,7 @@ use super::curvature::Curvature;
 use super::emitter::{Kinds, MoveLevels, whole_ticks};
 use super::junction::{self, Corner, Heading};
 use super::lift::{Lift, LiftRule};
+use super::limits::mm_per_min;
 use super::lookahead::BlockKind;
 use super::profile::{FRACTION_BITS, Pace, Profile};
 use super::smooth::{Interval, Road, State};
@@ -13,6 +14,7 @@ use super::{
     StepEvent,
 };
 use crate::drawing::{LineType, PagePoint};
+use crate::fixed::Millimetres;
 use crate::step::Direction;
 use core::cmp::Ordering;
 
@@ -206,7 +208,7 @@ impl<'m> Runner<'m> {
         self.pen = pen;
         self.emitter.set_limits(&limits);
         self.lookahead.pass_limits_on(limits.jerk.is_none());
-        self.set_override(100);
+        self.set_override(100, 100);
     }
 
     /// The rule by which the lengths of steps are told, while nothing moves.
@@ -231,17 +233,34 @@ impl<'m> Runner<'m> {
         slices.saturating_mul(SLICE_TICKS)
     }
 
-    /// Scales both speeds to `percent` (10 to 200), at once; never above the greater of the two as
-    /// set.
-    pub fn set_override(&mut self, percent: u8) {
+    /// The speed that is planned, in mm/min.
+    pub fn speed(&self) -> Millimetres {
+        let speed = match &self.plan {
+            Some(Plan::Profile(profile)) => profile.speed().to_bits(),
+            Some(Plan::Interval(interval)) => interval.state().speed,
+            None => self.pace.speed.to_bits(),
+        };
+        mm_per_min(SliceSpeed::from_bits(speed))
+    }
+
+    /// How many more targets fit now.
+    pub fn room(&self) -> usize {
+        self.lookahead.capacity() - self.lookahead.len()
+    }
+
+    /// Scales both speeds to `percent` (10 to 200), at once, and that with the pen up to
+    /// `travel_percent` (1 to 100) of this; never above the greater of the two as set.
+    pub fn set_override(&mut self, percent: u8, travel_percent: u8) {
         let percent = u64::from(percent.clamp(10, 200));
+        let travel_percent = percent * u64::from(travel_percent.clamp(1, 100)) / 100;
         let greatest = self.limits.draw_speed.max(self.limits.travel_speed);
-        let scaled = |speed: SliceSpeed| {
+        let scaled = |speed: SliceSpeed, percent: u64| {
             let bits = u64::from(speed.to_bits()) * percent / 100;
             let bits = bits.clamp(1, greatest.to_bits().into());
             Pace::of_speed(&self.limits, SliceSpeed::from_bits(bits as u32))
         };
-        let (draw, travel) = (scaled(self.limits.draw_speed), scaled(self.limits.travel_speed));
+        let draw = scaled(self.limits.draw_speed, percent);
+        let travel = scaled(self.limits.travel_speed, travel_percent);
         self.was_faster = self.was_faster.max(self.top(self.in_stroke).speed);
         self.draw = draw;
         self.travel = travel;

@@ -79,6 +79,17 @@ pub trait Board {
     fn load(&mut self, record: Record, take: &mut dyn FnMut(&mut dyn Stored)) {
         let _ = (record, take);
     }
+    /// A clock in microseconds; the count wraps. It tells how long the plotter has been idle, so it
+    /// must run while [`Board::wait_briefly`] waits.
+    fn microseconds(&mut self) -> u32;
+    /// How many more bytes a port can receive before any is read, for status reports.
+    fn receive_room(&mut self) -> usize {
+        255
+    }
+    /// Waits like [`Board::wait`], but for some milliseconds at most.
+    fn wait_briefly(&mut self) {
+        self.wait();
+    }
     /// Sleeps until an interrupt. Returns at once if an interrupt came since the last return.
     fn wait(&mut self);
 }
@@ -92,6 +103,8 @@ pub const REPLY_BYTES: usize = 512;
 pub enum Record {
     /// The settings of the machine.
     Settings,
+    /// The coordinate systems, startup lines and texts.
+    Parameters,
     /// The strokes of the last job in drawing order, and the steps per millimetre in which they are
     /// measured. The model and the options are not kept.
     Job,

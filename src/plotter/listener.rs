@@ -39,7 +39,9 @@ impl<I: Index> Path for MeasuredStrokes<'_, '_, I> {
 pub(super) struct Listener<'b, B: Board> {
     pub(super) board: &'b mut B,
     /// The position for the status report, in mm.
-    pub(super) position: [Value; 2],
+    pub(super) position: [Value; 3],
+    /// Whether reports are in inches.
+    pub(super) inches: bool,
     /// The stage for the status report.
     pub(super) stage: Stage,
     /// The hold or emergency stop that was requested meanwhile. It is carried out when the
@@ -62,9 +64,9 @@ impl<B: Board> Cancel for Listener<'_, B> {
                 Stage::Order => "order",
             };
             let mut reply = Reply(self.board);
-            reply.part(format_args!("<Run"));
-            reply.position(self.position);
-            reply.line(format_args!("|Stage:{stage}>"));
+            reply.part(format_args!("<Run|MPos:"));
+            reply.coordinates(self.position, self.inches);
+            reply.line(format_args!("|FS:0,0|Stage:{stage}>"));
         }
         let ends = requests.has(RealTime::ABORT) || requests.has(RealTime::EMERGENCY);
         if ends { Err(Aborted) } else { Ok(()) }

@@ -9,12 +9,14 @@
 mod board;
 pub mod budget;
 mod editor;
+mod grbl;
 mod help;
 mod job;
 mod listener;
 mod memory;
 mod options;
 mod plan;
+mod plot;
 mod program;
 mod records;
 mod reply;
@@ -37,12 +39,14 @@ use crate::machine::{
     Alarm, Machine, MachineError, PulserState, Setting, SettingError, Settings, State, Value,
 };
 use crate::model::Model;
-use crate::protocol::{Command, CommandError, Label, LineReader, Numbering, RealTime, Received};
-use crate::stage::{Cancel, Stage};
-use job::Pipeline;
-use listener::{Listener, MeasuredStrokes};
-use program::Program;
+use crate::protocol::{
+    Command, CommandError, Label, LineReader, Numbering, RealTime, Received, Significant,
+    next_number,
+};
+use crate::stage::Cancel;
+use program::{Parameters, Program};
 use reply::Reply;
+use report::ReportCounts;
 use stream::{Listing, Progress, Task};
 
 /// The least time by which step events are planned ahead of the pins, and so the delay until a hold
@@ -65,11 +69,13 @@ pub fn run<B: Board, I: Index>(
     // A program that opened a port while the board started gets the greeting that goes to all
     // ports. It needs no second one.
     let _ = board.take_opened();
+    plotter.inner.parameters = records::load_parameters(board);
     plotter.greet(board);
     report::fault(board);
+    plotter.inner.run_startup_lines(board);
     loop {
         if !plotter.poll(board) {
-            board.wait();
+            if plotter.inner.is_timing() { board.wait_briefly() } else { board.wait() }
         }
     }
 }
@@ -94,6 +100,8 @@ pub struct Plotter<'m, I = u16> {
 /// stages need the stack.
 enum Next {
     Nothing,
+    /// The plotter is reset, as by ctrl-X.
+    Reset,
     Plot,
     Again,
     ShowDrive,
@@ -113,6 +121,12 @@ struct Inner<'m, I> {
     /// is no copy.
     copy_words: usize,
     program: Program,
+    /// What stays when a program ends.
+    parameters: Parameters,
+    /// When the plotter last had something to do, in microseconds of the board's clock.
+    busy_at: u32,
+    /// When status reports next hold what they hold now and then.
+    report_counts: ReportCounts,
     /// The task of a line that takes longer. The line is answered when the task is done.
     task: Option<Task>,
     /// The alarm that was last reported, while it lasts.
@@ -151,6 +165,9 @@ impl<'m, I: Index> Plotter<'m, I> {
                 cursor: Cursor::default(),
                 copy_words: 0,
                 program: Program::default(),
+                parameters: Parameters::default(),
+                busy_at: 0,
+                report_counts: ReportCounts::default(),
                 task: None,
                 alarm_reported: None,
                 pen_reported: None,
@@ -169,6 +186,7 @@ impl<'m, I: Index> Plotter<'m, I> {
         let requests = board.take_real_time();
         self.act(requests, board);
         self.inner.watch(board);
+        self.inner.watch_idleness(board);
         let planned = self.inner.plan(board);
         if self.inner.task.is_some() {
             match self.inner.proceed(board) {
@@ -183,16 +201,21 @@ impl<'m, I: Index> Plotter<'m, I> {
         let waits = self.inner.must_wait() || !board.has_room(REPLY_BYTES);
         let byte = if waits { None } else { board.read_byte() };
         let Some((port, byte)) = byte else { return planned || requests != RealTime::default() };
+        self.inner.busy_at = board.microseconds();
         let reader = self.readers.get_mut(port).zip(self.numberings.get_mut(port));
         let Some((reader, numbering)) = reader else { return true };
         let Some(line) = reader.push(byte) else { return true };
-        let mut shows_drive = false;
+        let (mut shows_drive, mut resets) = (false, false);
         let (outcome, label) = match numbering.receive(line) {
             Received::Line(line, label) => {
                 let outcome = match self.inner.carry_out(line, board) {
                     Ok(Next::Plot) => self.inner.plot(board, false),
                     Ok(Next::Again) => self.inner.plot(board, true),
                     Ok(Next::Nothing) => Ok(()),
+                    Ok(Next::Reset) => {
+                        resets = true;
+                        Ok(())
+                    }
                     Ok(Next::ShowDrive) => {
                         shows_drive = true;
                         Ok(())
@@ -209,6 +232,11 @@ impl<'m, I: Index> Plotter<'m, I> {
         (self.port, self.label) = (port, label);
         if self.inner.task.is_none() {
             self.answer(outcome, board);
+        }
+        if resets {
+            self.inner.reset();
+            self.greet(board);
+            self.inner.run_startup_lines(board);
         }
         if shows_drive {
             board.show_drive();
@@ -285,13 +313,15 @@ impl<'m, I: Index> Plotter<'m, I> {
         }
     }
 
-    /// Forgets unfinished lines, line numbers, and the modes of G-code, and greets the user.
+    /// Forgets unfinished lines, line numbers, overrides, and the modes of G-code, leaves check
+    /// mode and sleep, and greets the user.
     fn reset<B: Board>(&mut self, board: &mut B) {
         self.readers.iter_mut().for_each(LineReader::clear);
         self.numberings = [Numbering::default(), Numbering::default()];
         self.inner.task = None;
-        self.inner.program = Program::default();
+        self.inner.reset();
         self.greet(board);
+        self.inner.run_startup_lines(board);
     }
 }
 
@@ -303,6 +333,21 @@ impl<I: Index> Inner<'_, I> {
         let mut strokes = self.job.strokes(self.words, &mut self.cursor);
         self.machine.fill(&mut strokes, board.queue());
         self.machine.planned_position() != before
+    }
+
+    /// Forgets the modes of G-code and the overrides, and leaves check mode and sleep.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    fn reset(&mut self) {
+        self.program = self.program.reset();
+        self.report_counts = ReportCounts::default();
+        self.machine.set_override(100);
+        self.machine.set_rapid_override(100);
+        match self.machine.state() {
+            // Neither is refused in these states.
+            State::Check => drop(self.machine.check(false)),
+            State::Sleep => drop(self.machine.unlock()),
+            _ => {}
+        }
     }
 
     /// Whether nothing moves and there is no interrupted job that could continue.
@@ -344,8 +389,34 @@ impl<I: Index> Inner<'_, I> {
             }
             Command::EndCurve => model.end_curve(save_copy).map_err(CommandError::Model)?,
             Command::Help => self.task = Some(Task::List(Listing::Help, 0)),
-            Command::BuildInfo => self.report_build(board),
-            Command::Settings => self.task = Some(Task::List(Listing::Settings, 0)),
+            Command::BuildInfo => {
+                self.check_idle()?;
+                self.report_build(board);
+            }
+            Command::Settings => {
+                if !matches!(self.machine.state(), State::Check | State::Jog) {
+                    self.check_idle()?;
+                }
+                self.task = Some(Task::List(Listing::Settings, 0));
+            }
+            Command::Modes => self.report_modes(board),
+            Command::Parameters => {
+                self.check_idle()?;
+                self.report_parameters(board);
+            }
+            Command::StartupLines => {
+                self.check_idle()?;
+                self.report_startup_lines(board);
+            }
+            Command::SetStartupLine { index, line } => self.set_startup_line(index, line, board)?,
+            Command::SetInfo(text) => {
+                self.check_idle()?;
+                self.set_info(text, board)?;
+            }
+            Command::Restore { settings, parameters, texts } => {
+                self.restore([settings, parameters, texts], board)?;
+                return Ok(Next::Reset);
+            }
             Command::Assign { name, value } => {
                 if !self.options.set(name, value)? {
                     self.change_setting(name, value)?;
@@ -366,109 +437,42 @@ impl<I: Index> Inner<'_, I> {
             Command::ShowDrive if !B::HAS_DRIVE => return Err(CommandError::UnknownSystemCommand),
             Command::ShowDrive if !self.is_without_job() => return Err(CommandError::Busy),
             Command::ShowDrive => return Ok(Next::ShowDrive),
-            Command::Unlock => self.machine.unlock()?,
+            Command::Unlock => self.unlock(board)?,
             Command::Home => self.home()?,
-            Command::Check => self.machine.check(self.machine.state() != State::Check)?,
-            Command::Sleep => self.machine.sleep()?,
+            Command::Check => {
+                let is_over = self.machine.state() == State::Check;
+                self.machine.check(!is_over).map_err(|_| CommandError::Busy)?;
+                let text = if is_over { "Disabled" } else { "Enabled" };
+                Reply(board).line(format_args!("[MSG:{text}]"));
+                if is_over {
+                    return Ok(Next::Reset);
+                }
+            }
+            Command::Sleep => {
+                self.machine.sleep()?;
+                Reply(board).line(format_args!("[MSG:Sleeping]"));
+            }
             Command::Jog(line) => self.jog(line)?,
-            Command::GCode(line) => self.run_gcode(line)?,
+            Command::GCode(line) => self.run_gcode(line, board)?,
         }
         Ok(Next::Nothing)
-    }
-
-    /// Computes and begins a job, or begins the kept job if `again`.
-    ///
-    /// # Errors
-    /// [`CommandError::Locked`] or [`CommandError::Busy`] if the state does not allow it, or the
-    /// reason why there is no job.
-    #[inline(never)] // Keeps its frame off the stack while the stages run.
-    fn plot<B: Board>(&mut self, board: &mut B, again: bool) -> Result<(), CommandError> {
-        if !matches!(self.machine.state(), State::Idle | State::Check) {
-            return Err(match self.machine.state() {
-                State::Alarm(_) | State::Sleep => CommandError::Locked,
-                _ => CommandError::Busy,
-            });
-        }
-        let position = self.machine.position_mm();
-        let requests = RealTime::default();
-        let mut listener = Listener { board, position, stage: Stage::View, requests };
-        let computed = if again {
-            self.load(listener.board)
-        } else {
-            self.compute(&mut listener, &mut Unobserved).map(|()| self.save(listener.board))
-        };
-        let begun = computed.and_then(|()| self.begin(&mut listener));
-        let requests = listener.requests;
-        if requests.has(RealTime::EMERGENCY) {
-            self.act(requests);
-        }
-        begun?;
-        self.report_degenerate(board);
-        self.act(requests);
-        Ok(())
-    }
-
-    /// Writes the job to flash before anything moves, because flash cannot be read during the
-    /// write.
-    #[inline(never)] // Keeps its frame off the stack while the stages run.
-    fn save<B: Board>(&self, board: &mut B) {
-        if records::save_job(&self.job, self.machine.settings(), self.words, board).is_err() {
-            Reply(board)
-                .line(format_args!("[MSG:$again will not draw this: the flash is worn out]"));
-        }
-    }
-
-    /// Loads the kept job in place of the last one.
-    #[inline(never)] // Keeps its frame off the stack while the stages run.
-    fn load<B: Board>(&mut self, board: &mut B) -> Result<(), CommandError> {
-        self.copy_words = 0;
-        self.job = Job::default();
-        self.cursor = Cursor::default();
-        self.job = records::load_job(self.machine.settings(), self.words, board)?;
-        Ok(())
-    }
-
-    /// Hands the job to the machine, which first measures its strokes.
-    #[inline(never)] // Keeps its frame off the stack while the stages run.
-    fn begin(&mut self, cancel: &mut dyn Cancel) -> Result<(), CommandError> {
-        let strokes = self.job.strokes(self.words, &mut self.cursor);
-        let mut strokes = MeasuredStrokes { strokes, cancel, targets: 0, aborted: false };
-        self.machine.start(&mut strokes)?;
-        if strokes.aborted {
-            self.machine.abort();
-            return Err(CommandError::Aborted);
-        }
-        self.cursor = Cursor::default();
-        Ok(())
-    }
-
-    /// Computes the job of `$plot`, in place of the last one.
-    #[inline(never)] // Keeps its frame out of that of `plot`.
-    fn compute(
-        &mut self,
-        cancel: &mut dyn Cancel,
-        observer: &mut dyn Observer<I>,
-    ) -> Result<(), CommandError> {
-        // This overwrites the memory of the last job, so that job ends here even if this one fails.
-        self.copy_words = 0;
-        self.job = Job::default();
-        self.cursor = Cursor::default();
-        let steps = self.machine.settings().page_steps();
-        let (model, options, words) = (&self.model, &self.options, &mut *self.words);
-        self.job = Pipeline { model, options, steps, words, cancel, observer }.run()?;
-        Ok(())
     }
 
     /// Sets the setting with the number `name`.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     fn change_setting(&mut self, name: &str, value: &str) -> Result<(), CommandError> {
-        let setting = name
-            .parse()
-            .ok()
+        let mut name = Significant(name.bytes());
+        let number = next_number(&mut name).filter(|_| name.next().is_none());
+        let setting = number
+            .and_then(|number| u16::try_from(number.to_whole().ok()?).ok())
             .and_then(Setting::numbered)
             .ok_or(CommandError::UnknownSystemCommand)?;
-        let value = crate::fixed::Decimal::parse(value).map_err(|_| CommandError::NotANumber)?;
-        let value: Value = value.to_millimetres().map_err(|_| CommandError::NumberOutOfRange)?;
+        let mut value = Significant(value.bytes());
+        let number = next_number(&mut value).ok_or(CommandError::NotANumber)?;
+        if value.next().is_some() {
+            return Err(CommandError::UnknownSystemCommand);
+        }
+        let value: Value = number.to_millimetres().map_err(|_| CommandError::NumberOutOfRange)?;
         self.machine.set(setting, value).map_err(CommandError::Setting)
     }
 }

@@ -2,7 +2,9 @@
 //! formats, and how they are saved and loaded.
 
 use super::job::FIGURES;
-use super::{Board, Job, NotStored, Record};
+use super::program::{Parameters, SYSTEMS, TEXT_LIMIT, Text};
+use super::{Board, Job, NotStored, Record, Stored};
+use crate::array::MapEach;
 use crate::index::Index;
 use crate::machine::{SETTINGS, Settings, Value};
 use crate::protocol::CommandError;
@@ -43,6 +45,81 @@ pub(super) fn save_settings<B: Board>(
         entry[2..].copy_from_slice(&value.to_bits().to_le_bytes());
     }
     board.save(Record::Settings, &[&bytes]).map_err(|_| CommandError::NotStored)
+}
+
+/// A mark at the beginning of kept parameters; those with another layout have another mark. Behind
+/// it stand the coordinates of the systems and of G30, each four bytes, and then the texts, each
+/// with its length before it.
+const PARAMETERS_LAYOUT: [u8; 4] = *b"par1";
+
+/// The parameters kept by the board, or the default ones.
+#[inline(never)] // Keeps its frame off the stack while the stages run.
+pub(super) fn load_parameters<B: Board>(board: &mut B) -> Parameters {
+    let mut parameters = Parameters::default();
+    board.load(Record::Parameters, &mut |record| {
+        if let Some(found) = read_parameters(record) {
+            parameters = found;
+        }
+    });
+    parameters
+}
+
+/// Reads parameters. `None` if the record has another layout.
+fn read_parameters(record: &mut dyn Stored) -> Option<Parameters> {
+    let mut next = || {
+        let mut word = [0; 4];
+        (record.read(&mut word) == word.len()).then_some(word)
+    };
+    if next()? != PARAMETERS_LAYOUT {
+        return None;
+    }
+    let mut parameters = Parameters::default();
+    let Parameters { systems, second, texts } = &mut parameters;
+    for coordinate in systems.as_flattened_mut().iter_mut().chain(second) {
+        *coordinate = Value::from_bits(i32::from_le_bytes(next()?));
+    }
+    for text in texts {
+        let (mut length, mut bytes) = ([0; 1], [0; TEXT_LIMIT]);
+        let [count] = (record.read(&mut length) == 1).then_some(length)?;
+        let bytes = bytes.get_mut(..count.into())?;
+        if record.read(bytes) != bytes.len() {
+            return None;
+        }
+        *text = Text::try_from(core::str::from_utf8(bytes).ok()?).ok()?;
+    }
+    Some(parameters)
+}
+
+/// Keeps the parameters in the board's flash.
+///
+/// # Errors
+/// [`CommandError::NotStored`]: they are in force, but after a loss of power the previous ones
+/// return.
+#[inline(never)] // Keeps its frame off the stack while the stages run.
+pub(super) fn save_parameters<B: Board>(
+    parameters: &Parameters,
+    board: &mut B,
+) -> Result<(), CommandError> {
+    let Parameters { systems, second, texts } = parameters;
+    let mut coordinates = [[0; 4]; 3 * SYSTEMS + 3];
+    for (word, coordinate) in
+        coordinates.iter_mut().zip(systems.as_flattened().iter().chain(second))
+    {
+        *word = coordinate.to_bits().to_le_bytes();
+    }
+    let [first, other, info] = texts;
+    let lengths = texts.each_ref().map_each(|text| [text.len() as u8]);
+    let parts: [&[u8]; 8] = [
+        &PARAMETERS_LAYOUT,
+        coordinates.as_flattened(),
+        &lengths[0],
+        first.as_bytes(),
+        &lengths[1],
+        other.as_bytes(),
+        &lengths[2],
+        info.as_bytes(),
+    ];
+    board.save(Record::Parameters, &parts).map_err(|_| CommandError::NotStored)
 }
 
 /// A mark at the beginning of a kept job; a job with another layout has another mark.

@@ -1,9 +1,9 @@
 //! The replies to the user, written to the board as lines.
 
 use super::Board;
+use super::grbl::coordinate;
 use crate::array::MapEach;
 use crate::checksum::CRC_16;
-use crate::fixed::BinaryFraction;
 use crate::machine::Value;
 use crate::protocol::{Checksum, CommandError, Label, Named};
 use core::fmt::{self, Write};
@@ -24,14 +24,10 @@ impl<B: Board + ?Sized> Reply<'_, B> {
         let _ = self.write_fmt(arguments);
     }
 
-    /// Writes the position, in mm, as Grbl's status report gives it.
-    pub fn position(&mut self, position: [Value; 2]) {
-        let [x, y] = position.map_each(|mm| BinaryFraction {
-            units: mm.to_bits().into(),
-            fraction_bits: 16,
-            decimals: 3,
-        });
-        self.part(format_args!("|MPos:{x},{y},0.000"));
+    /// Writes coordinates with commas between them.
+    pub fn coordinates(&mut self, position: [Value; 3], inches: bool) {
+        let [x, y, z] = position.map_each(|mm| coordinate(mm, inches));
+        self.part(format_args!("{x},{y},{z}"));
     }
 
     /// Writes the reply that every line gets: `ok`, or the reason of a refusal and `error:N`. The

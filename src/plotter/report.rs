@@ -1,12 +1,25 @@
 //! The reports of the plotter: greeting, build, model, job and status.
 
+use super::grbl::{rate, whole};
 use super::reply::Reply;
 use super::{Board, Inner};
 use crate::fixed::BinaryFraction;
 use crate::index::Index;
 use crate::machine::{Alarm, Setting, State};
 use crate::order;
-use crate::protocol::{AlarmEntry, LINE_LIMIT};
+use crate::protocol::AlarmEntry;
+
+/// The number of bytes that a port receives before any is read.
+const RECEIVE_BYTES: usize = 255;
+
+/// The numbers of status reports until the next one with what they hold now and then.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct ReportCounts {
+    /// Until the origin of the coordinates.
+    pub(super) origin: u8,
+    /// Until the overrides.
+    pub(super) overrides: u8,
+}
 
 /// Writes the greeting: the first line that a sender sees. It is also the reply to ctrl-X.
 pub(super) fn greet<B: Board>(board: &mut B) {
@@ -65,9 +78,9 @@ impl<I: Index> Inner<'_, I> {
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub fn report_build<B: Board>(&self, board: &mut B) {
         const VERSION: &str = env!("CARGO_PKG_VERSION");
-        Reply(board).line(format_args!("[VER:1.1h.penup {VERSION}:{}]", B::NAME));
+        Reply(board).line(format_args!("[VER:1.1h.penup {VERSION} {}:{}]", B::NAME, self.info()));
         let blocks = self.machine.moves_ahead();
-        Reply(board).line(format_args!("[OPT:,{blocks},{LINE_LIMIT}]"));
+        Reply(board).line(format_args!("[OPT:VZ,{blocks},{RECEIVE_BYTES}]"));
     }
 
     /// Writes the reply to `$model`: the size of the model, its checksums, the result of the last
@@ -111,7 +124,7 @@ impl<I: Index> Inner<'_, I> {
 
     /// Writes Grbl's status report, with penup's own fields at its end.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
-    pub fn report_status<B: Board>(&self, board: &mut B) {
+    pub fn report_status<B: Board>(&mut self, board: &mut B) {
         let status = self.machine.status();
         let state = match status.state {
             State::Idle if self.machine.is_stopped() => "Idle",
@@ -124,21 +137,64 @@ impl<I: Index> Inner<'_, I> {
             State::Alarm(_) => "Alarm",
             State::Sleep => "Sleep",
         };
+        let is_moving = !matches!(status.state, State::Idle | State::Check | State::Alarm(_));
+        let settings = self.machine.settings();
+        let mask = settings.get(Setting::StatusReport).to_num::<u8>();
+        let inches = self.in_inches();
+        let origin = self.program.origin(&self.parameters);
+        let [x, y] = self.machine.position_mm();
+        let mut position = [x, y, self.program.z()];
+        let name = if mask & 1 != 0 { "MPos" } else { "WPos" };
+        if mask & 1 == 0 {
+            for (coordinate, origin) in position.iter_mut().zip(origin) {
+                *coordinate = coordinate.saturating_sub(origin);
+            }
+        }
+        let (blocks, bytes) = (self.machine.free_moves(), board.receive_room());
         let mut reply = Reply(board);
-        reply.part(format_args!("<{state}"));
-        reply.position(self.machine.position_mm());
-        if status.percent != 100 {
-            reply.part(format_args!("|Ov:{},100,100", status.percent));
+        reply.part(format_args!("<{state}|{name}:"));
+        reply.coordinates(position, inches);
+        if mask & 2 != 0 {
+            reply.part(format_args!("|Bf:{blocks},{bytes}"));
         }
-        if let State::Alarm(alarm) = status.state {
-            reply.part(format_args!("|Alarm:{}", AlarmEntry::of(alarm).number));
-        }
+        let speed = self.program.speed_in_force();
+        let least = settings.get(Setting::MinSpindle);
+        let speed = if speed > 0 { speed.max(least) } else { speed };
+        let speed = whole(speed.min(settings.get(Setting::MaxSpindle)));
+        reply.part(format_args!("|FS:{},{speed}", rate(self.machine.speed(), inches)));
         let (switches, stop) = (self.machine.switches(), self.machine.stop_is_pressed());
         if switches.any() || stop {
             let letter = |pressed, letter| if pressed { letter } else { "" };
             let (x, y, stop) =
                 (letter(switches.x, "X"), letter(switches.y, "Y"), letter(stop, "E"));
             reply.part(format_args!("|Pn:{x}{y}{stop}"));
+        }
+        let counts = &mut self.report_counts;
+        match counts.origin.checked_sub(1) {
+            Some(count) => counts.origin = count,
+            None => {
+                counts.origin = if is_moving { 29 } else { 9 };
+                counts.overrides = counts.overrides.max(1);
+                reply.part(format_args!("|WCO:"));
+                reply.coordinates(origin, inches);
+            }
+        }
+        match counts.overrides.checked_sub(1) {
+            Some(count) => counts.overrides = count,
+            None => {
+                counts.overrides = if is_moving { 19 } else { 9 };
+                let (draw, rapid) = (status.percent, self.machine.rapid_percent());
+                reply.part(format_args!("|Ov:{draw},{rapid},100"));
+                let (_, spindle, [mist, flood]) = self.program.modes();
+                let spindle = ["", "S", "C", ""].get(usize::from(spindle - 2)).unwrap_or(&"");
+                let (mist, flood) = (if mist { "M" } else { "" }, if flood { "F" } else { "" });
+                if !(spindle.is_empty() && mist.is_empty() && flood.is_empty()) {
+                    reply.part(format_args!("|A:{spindle}{flood}{mist}"));
+                }
+            }
+        }
+        if let State::Alarm(alarm) = status.state {
+            reply.part(format_args!("|Alarm:{}", AlarmEntry::of(alarm).number));
         }
         if let Some(pen) = status.pen_wanted {
             reply.part(format_args!("|Pen:{}", pen + 1));

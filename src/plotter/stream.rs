@@ -4,7 +4,7 @@
 //! become a [`Task`], and are answered only when it is done. It also handles real-time requests and
 //! reports alarms.
 
-use super::program::{Order, Program};
+use super::program::{Context, Order, Program};
 use super::{Board, Inner, REPLY_BYTES, Reply, help};
 use crate::drawing::{LineType, PagePoint};
 use crate::fixed::BinaryFraction;
@@ -23,8 +23,19 @@ pub(super) enum Task {
     Arc(PagePoint, Arc),
     /// A dwell of so many ticks, which begins once the machine has stopped.
     Dwell(u64),
-    /// Waits until the machine has stopped, then for the user.
-    Pause,
+    /// Waits until the machine has stopped, then for the user, to change the pen if `for_pen`.
+    Pause {
+        /// Whether the pen is to be changed.
+        for_pen: bool,
+    },
+    /// A move with the pen up, behind another one.
+    Go(PagePoint),
+    /// Waits until the machine has stopped, then keeps the parameters, or the settings if
+    /// `settings`.
+    Keep {
+        /// Whether the settings have changed.
+        settings: bool,
+    },
     /// Homing: looks for the limit switches.
     Home,
     /// Writes a list, from the row with this index on.
@@ -40,6 +51,9 @@ pub(super) enum Listing {
     /// Elements of the model of one kind, up to this index, which is excluded.
     Model(ElementKind, usize),
 }
+
+/// The first line of the list of commands, which is Grbl's.
+const GRBL_HELP: &str = "[HLP:$$ $# $G $I $N $x=val $Nx=line $J=line $SLP $C $X $H ~ ! ? ctrl-x]";
 
 /// The result of [`Inner::proceed`].
 pub(super) enum Progress {
@@ -73,6 +87,16 @@ impl<I: Index> Inner<'_, I> {
         if requests.has(RealTime::PAUSE) {
             self.machine.pause_after_stroke();
         }
+        for (byte, percent) in [
+            (RealTime::RAPID_RESET, 100),
+            (RealTime::RAPID_HALF, 50),
+            (RealTime::RAPID_QUARTER, 25),
+        ] {
+            if requests.has(byte) && self.machine.rapid_percent() != percent {
+                self.machine.set_rapid_override(percent);
+                self.report_counts.overrides = 0;
+            }
+        }
         let percent = i32::from(self.machine.percent());
         let mut changed = if requests.has(RealTime::FEED_RESET) { 100 } else { percent };
         for (byte, change) in [
@@ -85,6 +109,7 @@ impl<I: Index> Inner<'_, I> {
         }
         if changed != percent {
             self.machine.set_override(changed.clamp(10, 200) as u8);
+            self.report_counts.overrides = 0;
         }
     }
 
@@ -152,7 +177,7 @@ impl<I: Index> Inner<'_, I> {
                 let Some(to) = Chords::new(*from, arc.clone()).next() else {
                     return Ok(Progress::Done(Ok(())));
                 };
-                machine.draw_to(self.program.target(to), self.program.feed)?;
+                machine.draw_to(self.program.target(to), self.program.feed())?;
                 // The chord replaces as many points of the arc as it has moves.
                 for _ in Line::new(core::mem::replace(from, to), to) {
                     arc.next();
@@ -165,7 +190,20 @@ impl<I: Index> Inner<'_, I> {
                 machine.dwell(ticks as u32, board.queue());
                 Ok(Progress::More)
             }
-            Some(Task::Pause) if is_stopped => machine.pause().map(|()| Progress::Done(Ok(()))),
+            Some(Task::Pause { for_pen }) if is_stopped => {
+                let text = if *for_pen { "put in the next pen, then" } else { "to go on," };
+                machine.pause()?;
+                Reply(board).line(format_args!("[MSG:{text} send ~]"));
+                Ok(Progress::Done(Ok(())))
+            }
+            Some(Task::Go(point)) if machine.has_room() => {
+                machine.draw_to(Target { point: *point, ink: None }, None)?;
+                Ok(Progress::Done(Ok(())))
+            }
+            Some(Task::Keep { settings }) if is_stopped => {
+                let settings = *settings;
+                Ok(Progress::Done(self.keep(settings, board)))
+            }
             Some(Task::Dwell(_) | Task::Home) if is_stopped => Ok(Progress::Done(Ok(()))),
             Some(_) => Ok(Progress::Waits),
             None => Ok(Progress::Done(Ok(()))),
@@ -189,13 +227,15 @@ impl<I: Index> Inner<'_, I> {
         };
         match listing {
             Listing::Help => {
+                line(format_args!("{GRBL_HELP}"));
                 help(&mut |usage, meaning| line(format_args!("[HLP:{usage} {meaning}]")));
             }
             Listing::Settings => {
                 for (info, value) in self.machine.settings().iter() {
                     let (number, name, unit) = (info.number, info.name, info.unit);
                     let units = value.to_bits().into();
-                    let value = BinaryFraction { units, fraction_bits: 16, decimals: 3 };
+                    let decimals = if info.whole { 0 } else { 3 };
+                    let value = BinaryFraction { units, fraction_bits: 16, decimals };
                     line(format_args!("${number}={value} ({name}, {unit})"));
                 }
             }
@@ -213,6 +253,7 @@ impl<I: Index> Inner<'_, I> {
     /// [`CommandError::HomingOff`] if homing is switched off, or the machine's refusal.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub(super) fn home(&mut self) -> Result<(), CommandError> {
+        self.check_idle()?;
         if !self.machine.settings().is_on(Setting::Homing) {
             return Err(CommandError::HomingOff);
         }
@@ -221,24 +262,47 @@ impl<I: Index> Inner<'_, I> {
         Ok(())
     }
 
+    /// What the interpreter must know beside the line.
+    pub(super) fn context(&self) -> Context<'_> {
+        let settings = self.machine.settings();
+        let park = [settings.get(Setting::ParkX), settings.get(Setting::ParkY)];
+        Context { settings, parameters: &self.parameters, park }
+    }
+
     /// Carries out a line of G-code, or begins a task for it.
     ///
     /// # Errors
-    /// [`CommandError::Locked`] in alarm or sleep, or the interpreter's or the machine's refusal.
-    /// The program's modes are then unchanged.
+    /// [`CommandError::Locked`] in alarm or sleep, [`CommandError::Jogging`] while a jog is in
+    /// progress, or the interpreter's or the machine's refusal. The program's modes are then
+    /// unchanged.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
-    pub(super) fn run_gcode(&mut self, line: GCode<'_>) -> Result<(), CommandError> {
-        let steps = self.machine.settings().page_steps();
+    pub(super) fn run_gcode<B: Board>(
+        &mut self,
+        line: GCode<'_>,
+        board: &mut B,
+    ) -> Result<(), CommandError> {
+        if line.words().next().is_none() {
+            if line.is_mark() {
+                self.end_program(board);
+            }
+            if !line.text().is_empty() {
+                self.program.begin_line();
+            }
+            return Ok(());
+        }
         let checking = match self.machine.state() {
             State::Alarm(_) | State::Sleep => return Err(CommandError::Locked),
+            State::Jog => return Err(CommandError::Jogging),
             state => state == State::Check,
         };
-        let (program, order) = self.program.at(&self.machine, checking).after(line, steps)?;
+        let (program, order) =
+            self.program.at(&self.machine, checking).after(line, &self.context())?;
+        let is_end = matches!(order, Order::End);
         let machine = &mut self.machine;
         let waits = !checking && !matches!(machine.state(), State::Abort);
         match order {
-            Order::Nothing => {}
-            Order::Line(point) => machine.draw_to(program.target(point), program.feed)?,
+            Order::Nothing | Order::End => {}
+            Order::Line(point) => machine.draw_to(program.target(point), program.feed())?,
             Order::Arc(arc) => {
                 let (least, most) = arc.bounds();
                 machine.check_travel(0, least)?;
@@ -248,25 +312,44 @@ impl<I: Index> Inner<'_, I> {
                 }
             }
             Order::Lower => machine.lower_pen()?,
-            Order::Park => machine.draw_to(Target { point: machine.park(), ink: None }, None)?,
+            Order::Go([via, to]) => {
+                machine.check_travel(0, to)?;
+                machine.draw_to(Target { point: via, ink: None }, None)?;
+                if waits && to != via {
+                    self.task = Some(Task::Go(to));
+                }
+            }
             Order::Dwell(units) if waits => {
                 let ticks = (u64::from(units) * u64::from(TICKS_PER_SECOND)) >> 16;
                 self.task = Some(Task::Dwell(ticks));
             }
-            Order::Pause if waits => self.task = Some(Task::Pause),
-            Order::Dwell(_) | Order::Pause => {}
+            Order::Pause { for_pen } if waits => self.task = Some(Task::Pause { for_pen }),
+            Order::Dwell(_) | Order::Pause { .. } => {}
+            Order::SetSystem(index, origin) => self.set_system(index, origin, waits),
+            Order::Keep(kept, position) => self.keep_position(kept, position, waits)?,
+            Order::Position => self.report_position(board),
         }
+        self.note_shift(&program);
         self.program = program;
+        if is_end {
+            self.end_program(board);
+            self.program.forget_pen();
+            Reply(board).line(format_args!("[MSG:Pgm End]"));
+        }
         Ok(())
     }
 
     /// Carries out a jog. The line stands alone: the modes that it sets do not affect later lines.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub(super) fn jog(&mut self, line: GCode<'_>) -> Result<(), CommandError> {
-        let steps = self.machine.settings().page_steps();
-        let (program, order) = Program::default().at(&self.machine, false).after(line, steps)?;
-        let Order::Line(point) = order else { return Err(CommandError::UnsupportedWord(b'J')) };
-        Ok(self.machine.jog(point, program.feed)?)
+        if !matches!(self.machine.state(), State::Idle | State::Jog) {
+            return Err(CommandError::Busy);
+        }
+        let program = self.program.at(&self.machine, false);
+        let (jogged, point) = program.after_jog(line, &self.context())?;
+        self.machine.jog(point, jogged.feed())?;
+        self.program = jogged;
+        Ok(())
     }
 
     /// Whether the next line must wait, because a line is being carried out or there is no room for
@@ -279,6 +362,6 @@ impl<I: Index> Inner<'_, I> {
 impl Program {
     /// The target at a point, with the pen up or down as the program has set it.
     fn target(&self, point: PagePoint) -> Target {
-        Target { point, ink: self.pen_is_down.then_some(LineType::Full) }
+        Target { point, ink: self.draws.then_some(LineType::Full) }
     }
 }

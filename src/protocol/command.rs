@@ -2,7 +2,7 @@
 
 use super::edit::parse_edit;
 use super::values::{Decimals, PENS, coordinates, number, split_word, trim, trim_start, whole};
-use super::{CommandError, GCode, Numbers};
+use super::{CommandError, GCode, Numbers, Significant, next_number};
 use crate::curve::CurveError;
 use crate::fixed::Decimal;
 use crate::model::{self, Edit, ElementKind, ModelError, PenName};
@@ -53,6 +53,30 @@ pub enum Command<'a> {
         /// The text of the new value. That of `$title=` is the rest of the line, unchanged.
         value: &'a str,
     },
+    /// `$G`: reports the modes of G-code.
+    Modes,
+    /// `$#`: reports the coordinate systems and kept positions.
+    Parameters,
+    /// `$N`: lists the lines of G-code that are carried out at the start.
+    StartupLines,
+    /// `$N0=line` or `$N1=line`: sets such a line.
+    SetStartupLine {
+        /// The index of the line, 0 or 1.
+        index: usize,
+        /// The line.
+        line: GCode<'a>,
+    },
+    /// `$I=text`: sets the text that `$I` reports.
+    SetInfo(&'a str),
+    /// `$RST=…`: restores defaults.
+    Restore {
+        /// Whether those of the settings.
+        settings: bool,
+        /// Whether those of the coordinate systems.
+        parameters: bool,
+        /// Whether those of the startup lines and the text of `$I`.
+        texts: bool,
+    },
     /// `$options`: lists the options of the plot.
     Options,
     /// `$model`: reports the size of the model.
@@ -90,8 +114,12 @@ pub enum Command<'a> {
 pub const HELP: [&[(&str, &str)]; 2] = [
     &[
         ("$", "this list"),
-        ("$I", "version, board and limits"),
+        ("$I", "version, board and limits; $I=TEXT adds a text of yours"),
         ("$$", "settings of the machine; $NUMBER=VALUE changes one"),
+        ("$#", "coordinate systems, kept positions and offsets"),
+        ("$G", "modes of G-code"),
+        ("$N", "G-code at the start, such as G20; $N0=LINE and $N1=LINE set it"),
+        ("$RST=$|#|*", "defaults again: settings, coordinates, or these and the texts"),
         ("$options", "what is drawn and how, as it stands"),
     ],
     &[
@@ -117,7 +145,7 @@ pub const HELP: [&[(&str, &str)]; 2] = [
         ("$again", "draw the last job again, also after a loss of power"),
         ("$X", "unlock after an alarm"),
         ("$H", "find the limit switches"),
-        ("$J=G91 X.. Y.. F..", "move by hand with the pen up; byte 0x85 ends it"),
+        ("$J=G91 X.. Y.. F..", "move by hand with the pen up, F is needed; byte 0x85 ends it"),
         ("$C", "begin or end to check only: nothing moves"),
         ("$SLP", "switch the motors off; $X wakes"),
         ("$UF2", "become the drive onto which a new image is copied, where the board has one"),
@@ -126,8 +154,12 @@ pub const HELP: [&[(&str, &str)]; 2] = [
             "move, arc, wait, inches, mm, park, absolute, relative",
         ),
         (
+            "G10 | G53 | G54 | G92 | G28.1 | G30 | G30.1 | G43.1",
+            "coordinate systems and kept positions",
+        ),
+        (
             "X1 | Y1 | I1 | J1 | R1 | P1 | F1 | Z1",
-            "numbers of the former; Z0 and below is pen down",
+            "numbers of the former; Z0 and below is pen down, see $206",
         ),
         ("M0 | M2 | M3 | M5", "pause until ~, end, pen down, pen up"),
     ],
@@ -150,10 +182,11 @@ impl<'a> Command<'a> {
         if let Some(value) = title(line) {
             return Ok(Self::Assign { name: "title", value });
         }
-        let line = trim(line.split('#').next().unwrap_or(""));
+        let line = trim(line);
         if let Some(dollar) = line.strip_prefix('$') {
             return Self::parse_dollar(trim(dollar));
         }
+        let line = trim(line.split('#').next().unwrap_or(""));
         if GCode::begins(line) {
             return GCode::new(line).map(Self::GCode);
         }
@@ -185,24 +218,24 @@ impl<'a> Command<'a> {
     /// Parses the text after `$`.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     fn parse_dollar(text: &'a str) -> Result<Self, CommandError> {
+        if let Some(command) = Self::parse_grbl(text) {
+            return command;
+        }
+        // A `#` begins a comment where a space stands before it.
+        let comment = text.match_indices('#').map(|(at, _)| at);
+        let mut comment = comment.filter(|at| text.as_bytes()[..*at].ends_with(b" "));
+        let text = trim(text.get(..comment.next().unwrap_or(text.len())).unwrap_or(text));
         if let Some((name, value)) = text.split_once('=') {
             let (name, value) = (trim(name), trim(value));
             if let Some(command) = parse_edit(name, value)? {
                 return Ok(command);
             }
-            if name == "J" {
-                return GCode::new(value).map(Self::Jog);
+            if name.is_empty() {
+                return Err(CommandError::NotANumber);
             }
             return Ok(Self::Assign { name, value });
         }
         match text {
-            "" => Ok(Self::Help),
-            "$" => Ok(Self::Settings),
-            "I" => Ok(Self::BuildInfo),
-            "X" => Ok(Self::Unlock),
-            "H" => Ok(Self::Home),
-            "C" => Ok(Self::Check),
-            "SLP" => Ok(Self::Sleep),
             "UF2" => Ok(Self::ShowDrive),
             "options" => Ok(Self::Options),
             "model" => Ok(Self::Model),
@@ -210,8 +243,60 @@ impl<'a> Command<'a> {
             "undo" => Ok(Self::Undo),
             "plot" => Ok(Self::Plot),
             "again" => Ok(Self::Again),
+            "" => Ok(Self::Help),
             _ => Err(CommandError::UnknownSystemCommand),
         }
+    }
+
+    /// Parses one of Grbl's commands, in which neither case nor spaces nor comments count. `None`
+    /// for other commands.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    fn parse_grbl(text: &'a str) -> Option<Result<Self, CommandError>> {
+        let (name, value) = text.split_once('=').map_or((text, None), |(n, v)| (n, Some(v)));
+        let is = |text: &'a str, expected: &str| Significant(text.bytes()).eq(expected.bytes());
+        let Some(value) = value else {
+            let commands = [
+                ("", Self::Help),
+                ("$", Self::Settings),
+                ("#", Self::Parameters),
+                ("G", Self::Modes),
+                ("I", Self::BuildInfo),
+                ("N", Self::StartupLines),
+                ("X", Self::Unlock),
+                ("H", Self::Home),
+                ("C", Self::Check),
+                ("SLP", Self::Sleep),
+            ];
+            return commands
+                .into_iter()
+                .find(|(expected, _)| is(name, expected))
+                .map(|(_, c)| Ok(c));
+        };
+        if is(name, "J") {
+            return Some(GCode::new(value).map(Self::Jog));
+        }
+        if is(name, "I") {
+            return Some(Ok(Self::SetInfo(trim(value))));
+        }
+        if is(name, "RST") {
+            let [settings, parameters] = ["$", "#"].map(|letter| is(value, letter));
+            let all = is(value, "*");
+            return Some(if settings || parameters || all {
+                let (settings, parameters) = (settings || all, parameters || all);
+                Ok(Self::Restore { settings, parameters, texts: all })
+            } else {
+                Err(CommandError::UnknownSystemCommand)
+            });
+        }
+        let mut name = Significant(name.bytes());
+        if name.next() != Some(b'N') {
+            return None;
+        }
+        let index = match next_number(&mut name)?.to_whole() {
+            Ok(index @ 0..=1) if name.next().is_none() => index as usize,
+            _ => return Some(Err(CommandError::UnknownSystemCommand)),
+        };
+        Some(GCode::new(value).map(|line| Self::SetStartupLine { index, line }))
     }
 }
 
@@ -329,7 +414,8 @@ mod tests {
 
     #[test]
     fn what_is_no_command_is_refused() {
-        for line in ["vv 1 2 3", "hello", "G1 = 2", "ff"] {
+        assert_eq!(Command::parse("G1 = 2"), Err(CommandError::NotAWord));
+        for line in ["vv 1 2 3", "hello", "ff"] {
             assert_eq!(Command::parse(line), Err(CommandError::UnknownCommand), "{line}");
         }
         for line in ["$nothing", "$plo", "$ plot it"] {

@@ -8,12 +8,14 @@
 //! refused with a number and the reason. Nothing here changes the state of the plotter.
 
 mod alarm;
+mod block_error;
 mod command;
 mod edit;
 mod escape;
 mod gcode;
 mod line;
 mod numbering;
+mod realtime;
 mod receiver;
 mod command_error;
 mod values;
@@ -21,14 +23,17 @@ mod values;
 pub use alarm::AlarmEntry;
 #[cfg(any(test, feature = "host"))]
 pub use alarm::alarm_entries;
+pub use block_error::BlockError;
 pub use command::{Command, HELP};
 pub use command_error::{CommandError, ErrorEntry};
 #[cfg(any(test, feature = "host"))]
 pub use command_error::{error_entries, error_samples};
 pub use escape::{Escape, EscapedText};
 pub use gcode::{GCode, Word};
-pub use line::{LINE_LIMIT, LineReader, RealTime, Sorter};
+pub(crate) use gcode::{Significant, next_number};
+pub use line::{LINE_LIMIT, LineReader};
 pub use numbering::{Checksum, Label, Named, Numbering, Received};
+pub use realtime::{RealTime, Sorter};
 pub use receiver::{DAMAGED, Receiver};
 pub use values::{Decimals, Numbers};
 pub(crate) use values::{PENS, choice, length, number, numbers, positive, trim, whole};

@@ -13,7 +13,7 @@
 //! `M110 N…` sets the number of the last line. `M110` alone, with a checksum, asks for it. A
 //! numbered `M2` or `M30` ends the obligation to send numbers, as does ctrl-X.
 
-use super::{CommandError, LINE_LIMIT};
+use super::{CommandError, GCode, LINE_LIMIT};
 use crate::checksum::CRC_16;
 
 /// The largest number of bytes that number and checksum add to a line: `N-999999999 ` and `*FFFF`.
@@ -177,6 +177,17 @@ impl Numbering {
         }
         if line.len() > LINE_LIMIT {
             return self.refuse(CommandError::LineTooLong { limit: LINE_LIMIT }, None);
+        }
+        // A line of G-code may have a checksum alone.
+        if let Some((head, Checksum::Xor, value)) = split_checksum(line)
+            && GCode::begins(head)
+        {
+            let is_whole = head.bytes().fold(0, |xor, byte| xor ^ byte) == (value & 0xFF) as u8;
+            return if is_whole && value <= 0xFF {
+                Received::Line(head, Label::default())
+            } else {
+                Received::Answer(Err(CommandError::Damaged), Label::default())
+            };
         }
         let (number, text) = split_number(line).map_or((None, line), |(n, text)| (Some(n), text));
         match number_to_set(text) {

@@ -59,6 +59,11 @@ impl Line {
         self.0.read_byte()
     }
 
+    /// How many more bytes fit into the queue.
+    pub fn receive_room(&self) -> usize {
+        self.0.room()
+    }
+
     /// Does the same as [`line::take_real_time`], and logs how long a request for the status has
     /// waited.
     pub fn take_real_time(&mut self) -> RealTime {

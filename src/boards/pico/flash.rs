@@ -36,10 +36,18 @@ const JOB_BYTES: u32 = (128 << 10) + SECTOR_BYTES as u32;
 pub const fn slots(record: Record) -> Slots {
     match record {
         Record::Settings => Slots { start: START, bytes: SECTOR_BYTES as u32 },
+        Record::Parameters => {
+            Slots { start: START + 0x2000 + 2 * JOB_BYTES, bytes: SECTOR_BYTES as u32 }
+        }
         Record::Job => Slots { start: START + 0x2000, bytes: JOB_BYTES },
     }
 }
-const _: () = assert!(slots(Record::Job).start + 2 * slots(Record::Job).bytes <= END);
+const _: () = {
+    assert!(
+        slots(Record::Job).start + 2 * slots(Record::Job).bytes <= slots(Record::Parameters).start
+    );
+    assert!(slots(Record::Parameters).start + 2 * slots(Record::Parameters).bytes <= END);
+};
 
 /// The flash. Addresses count from its beginning.
 pub struct Flash(());

@@ -198,6 +198,14 @@ impl Board for Pico {
         self.steps.sync_consumed();
     }
 
+    fn microseconds(&mut self) -> u32 {
+        clock::microseconds()
+    }
+
+    fn receive_room(&mut self) -> usize {
+        self.ports.receive_room()
+    }
+
     fn fault(&self) -> Option<&str> {
         self.fault.as_deref()
     }

@@ -102,6 +102,11 @@ impl Inlets {
 }
 
 impl Ports {
+    /// How many more bytes fit into the fuller of the queues.
+    pub fn receive_room(&self) -> usize {
+        self.lines.iter().map(Line::room).min().unwrap_or(0)
+    }
+
     /// Combines the parts that the set-up of the ports has returned.
     pub fn new(lines: [Line; COUNT], uart: serial::Sender, usb: usb::Sender) -> Self {
         Self { lines, last: 0, only_to_opened: false, uart, usb }

@@ -1,7 +1,8 @@
 //! The numbered settings and their values.
 //!
 //! Numbers up to 132 have the meaning that they have in Grbl 1.1, with one exception: 5 is a mask
-//! here, and it also covers the emergency stop. Numbers from 200 on are penup's own. A value is
+//! here, and it also covers the emergency stop. What this machine does not have is fixed: any other
+//! value is refused. Numbers from 200 on are penup's own. A value is
 //! checked when it is entered, both alone and together with the other values. A refused value
 //! changes nothing.
 //!
@@ -27,8 +28,11 @@ impl SettingInfo {
     /// Checks a value of this setting alone.
     ///
     /// # Errors
-    /// [`SettingError::OutOfRange`] or [`SettingError::NotWhole`].
+    /// [`SettingError::OutOfRange`], [`SettingError::Negative`] or [`SettingError::NotWhole`].
     fn check(&self, value: Value) -> Result<(), SettingError> {
+        if value < 0 && self.least >= 0 {
+            return Err(SettingError::Negative(self.setting));
+        }
         if value < self.least || value > self.greatest {
             return Err(SettingError::OutOfRange(self.setting));
         }
@@ -47,6 +51,8 @@ pub enum SettingError {
     Unknown,
     /// The value is below `least` or above `greatest` of [`Setting::info`].
     OutOfRange(Setting),
+    /// The value is negative where none may be.
+    Negative(Setting),
     /// The setting needs a whole number.
     NotWhole(Setting),
     /// The value conflicts with the values of other settings.
@@ -216,12 +222,15 @@ mod tests {
         let mut settings = Settings::default();
         let before = settings;
         for info in SETTINGS {
-            for value in [info.least - Value::DELTA, info.greatest + Value::DELTA] {
-                assert_eq!(
-                    settings.set(info.setting, value),
-                    Err(SettingError::OutOfRange(info.setting))
-                );
-            }
+            let [below, above] = [info.least - Value::DELTA, info.greatest + Value::DELTA];
+            let out_of_range = Err(SettingError::OutOfRange(info.setting));
+            let negative = Err(SettingError::Negative(info.setting));
+            let is_negative = info.least == 0;
+            assert_eq!(
+                settings.set(info.setting, below),
+                if is_negative { negative } else { out_of_range }
+            );
+            assert_eq!(settings.set(info.setting, above), out_of_range);
         }
         assert_eq!(
             settings.set(Setting::SoftLimits, Value::from_num(0.5)),

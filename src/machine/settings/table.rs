@@ -10,27 +10,52 @@ use super::Value;
 pub enum Setting {
     /// `$0` The width of a step pulse.
     StepPulse,
+    /// `$1` How long the drivers stay on after a move; 255 for always, which is the only choice.
+    StepIdleDelay,
+    /// `$2` The mask of motors whose step pulses are inverted; none are.
+    InvertSteps,
     /// `$3` The mask of motors whose direction is inverted: bit 0 for x, bit 1 for y, bit 2
     /// for z.
     InvertDirections,
+    /// `$4` Whether the enable pin is inverted; it is not.
+    InvertEnable,
     /// `$5` The mask of contacts that are closed when they are not pressed: bit 0 for x, bit 1 for
     /// y, bit 2 for the emergency stop.
     InvertContacts,
+    /// `$6` Whether the probe is inverted; there is none.
+    InvertProbe,
+    /// `$10` The mask of what a status report holds: bit 0 the position of the machine instead of
+    /// that of the work, bit 1 the room in the buffers.
+    StatusReport,
     /// `$11` Junction deviation: how far a rounded corner would be from the true one. It determines
     /// the speed in corners.
     JunctionDeviation,
+    /// `$12` Arc tolerance. Arcs are drawn to half a step, whatever it is.
+    ArcTolerance,
+    /// `$13` Whether reports are in inches.
+    ReportInches,
     /// `$20` Whether moves that leave the travel are refused.
     SoftLimits,
     /// `$21` Whether a pressed limit switch stops the machine.
     HardLimits,
     /// `$22` Whether the machine must be homed before it draws.
     Homing,
+    /// `$23` The mask of axes whose limit switch lies at their low end; all do.
+    HomingDirection,
     /// `$24` The speed of the second, slow approach to a switch.
     HomingFeed,
     /// `$25` The speed of the first approach to a switch.
     HomingSeek,
+    /// `$26` How long the machine stands between two moves of homing.
+    HomingDebounce,
     /// `$27` The distance from its switch at which an axis is homed.
     HomingPullOff,
+    /// `$30` The greatest S that is reported.
+    MaxSpindle,
+    /// `$31` The least S that is reported while it is on.
+    MinSpindle,
+    /// `$32` Whether lines are drawn as by a laser: only G1 to G3, and only with S above 0.
+    Laser,
     /// `$100` Steps per millimetre of x.
     StepsPerMmX,
     /// `$101` Steps per millimetre of y.
@@ -67,6 +92,12 @@ pub enum Setting {
     /// `$204` The greatest jerk along the path, which is the rate of change of the acceleration; at
     /// least 0.1, or 0 for no limit.
     Jerk,
+    /// `$206` What moves the pen in G-code: 0 what the program shows, 1 M3 and M5, 2 Z, 3 S.
+    PenMode,
+    /// `$207` The Z at which the pen is down, and on the side that `$208` says.
+    PenZ,
+    /// `$208` Whether the pen is down above that Z, and if Z rises (G91). Otherwise below.
+    PenZAbove,
     /// `$209` How the pen is lifted: 0 by a servo or a solenoid, 1 by a stepper motor on z.
     Tool,
     /// `$210` The height of the raised pen, from 0 (highest) to 127.
@@ -82,6 +113,10 @@ pub enum Setting {
     PenRamp,
     /// `$215` The length of ink after which the machine pauses at the end of a stroke; 0 for never.
     InkBeforePause,
+    /// `$216` The S at which the pen is down, and on the side that `$217` says.
+    PenS,
+    /// `$217` Whether the pen is down below that S. Otherwise above.
+    PenSBelow,
     /// `$220` The length of the dots and gaps of a dotted line. A dash is three dots long.
     DotLength,
     /// `$230` The kinematics of the machine: 0 Cartesian, 1 CoreXY, 2 polargraph.
@@ -135,9 +170,10 @@ const fn row(
     (least, greatest, default): (f64, f64, f64),
     whole: bool,
 ) -> SettingInfo {
-    // A value is rounded to the nearest one, as a value that is sent is. No value is negative.
+    // A value is rounded to the nearest one, as a value that is sent is.
     const fn value(number: f64) -> Value {
-        Value::from_bits((number * 65536.0 + 0.5) as i32)
+        let half = if number < 0.0 { -0.5 } else { 0.5 };
+        Value::from_bits((number * 65536.0 + half) as i32)
     }
     SettingInfo {
         setting,
@@ -158,15 +194,27 @@ pub const SETTINGS: &[SettingInfo] = {
     use Setting::*;
     &[
         row(StepPulse, 0, "step pulse length", "us", (0.2, 500.0, 2.0), false),
+        row(StepIdleDelay, 1, "drivers off after a move: 255 is never", "ms", (255.0, 255.0, 255.0), true),
+        row(InvertSteps, 2, "invert step pulses: 0 is never", "mask", (0.0, 0.0, 0.0), true),
         row(InvertDirections, 3, "invert directions", "mask", (0.0, 7.0, 0.0), true),
+        row(InvertEnable, 4, "invert enable pin: 0 is never", "0|1", (0.0, 0.0, 0.0), true),
         row(InvertContacts, 5, "invert contacts", "mask", (0.0, 7.0, 0.0), true),
+        row(InvertProbe, 6, "invert probe: 0, there is none", "0|1", (0.0, 0.0, 0.0), true),
+        row(StatusReport, 10, "status report", "mask", (0.0, 3.0, 1.0), true),
         row(JunctionDeviation, 11, "junction deviation", "mm", (0.0, 1.0, 0.05), false),
+        row(ArcTolerance, 12, "arc tolerance, or half a step", "mm", (0.0, 10.0, 0.002), false),
+        row(ReportInches, 13, "report in inches", "0|1", (0.0, 1.0, 0.0), true),
         row(SoftLimits, 20, "soft limits", "0|1", (0.0, 1.0, 1.0), true),
         row(HardLimits, 21, "hard limits", "0|1", (0.0, 1.0, 0.0), true),
         row(Homing, 22, "homing", "0|1", (0.0, 1.0, 0.0), true),
+        row(HomingDirection, 23, "switches at the low end: 3 is both", "mask", (3.0, 3.0, 3.0), true),
         row(HomingFeed, 24, "homing speed, slow approach", "mm/min", (1.0, 32767.0, 60.0), false),
         row(HomingSeek, 25, "homing speed, first approach", "mm/min", (1.0, 32767.0, 1500.0), false),
+        row(HomingDebounce, 26, "homing pause for the switches", "ms", (0.0, 1000.0, 0.0), false),
         row(HomingPullOff, 27, "homing pull-off", "mm", (0.1, 50.0, 2.0), false),
+        row(MaxSpindle, 30, "greatest S", "", (1.0, 32767.0, 1000.0), false),
+        row(MinSpindle, 31, "least S", "", (0.0, 32767.0, 0.0), false),
+        row(Laser, 32, "pen as a laser: by G1 with S", "0|1", (0.0, 1.0, 0.0), true),
         row(StepsPerMmX, 100, "steps per mm of x", "step/mm", (2.0, 4000.0, 80.0), false),
         row(StepsPerMmY, 101, "steps per mm of y", "step/mm", (2.0, 4000.0, 80.0), false),
         row(StepsPerMmZ, 102, "steps per mm of z", "step/mm", (2.0, 4000.0, 400.0), false),
@@ -184,6 +232,9 @@ pub const SETTINGS: &[SettingInfo] = {
         row(TravelSpeed, 202, "travel speed", "mm/min", (1.0, 32767.0, 6000.0), false),
         row(Centripetal, 203, "limit speed by curvature", "0|1", (0.0, 1.0, 1.0), true),
         row(Jerk, 204, "jerk", "m/s3", (0.0, 1000.0, 0.0), false),
+        row(PenMode, 206, "pen by: auto, M3 and M5, Z, S", "0|1|2|3", (0.0, 3.0, 0.0), true),
+        row(PenZ, 207, "pen down at Z", "mm", (-1000.0, 1000.0, 0.0), false),
+        row(PenZAbove, 208, "pen down at lower Z, higher Z", "0|1", (0.0, 1.0, 0.0), true),
         row(Tool, 209, "pen lifted by a stepper", "0|1", (0.0, 1.0, 0.0), true),
         row(PenUpHeight, 210, "height of the raised pen", "of 127", (0.0, 127.0, 0.0), true),
         row(PenDownHeight, 211, "height of the lowered pen", "of 127", (0.0, 127.0, 127.0), true),
@@ -191,6 +242,8 @@ pub const SETTINGS: &[SettingInfo] = {
         row(PenDownDwell, 213, "dwell after lowering the pen", "ms", (1.0, 1300.0, 150.0), false),
         row(PenRamp, 214, "pen ramp time", "ms", (0.0, 5000.0, 0.0), false),
         row(InkBeforePause, 215, "drawn length before a pause", "m", (0.0, 10000.0, 0.0), false),
+        row(PenS, 216, "pen down at S", "", (0.0, 32767.0, 45.0), false),
+        row(PenSBelow, 217, "pen down at higher S, lower S", "0|1", (0.0, 1.0, 0.0), true),
         row(DotLength, 220, "length of a dot", "mm", (0.1, 100.0, 1.0), false),
         row(Kinematics, 230, "kinematics", "0|1|2", (0.0, 2.0, 0.0), true),
         row(AnchorWidth, 231, "distance between anchors", "mm", (100.0, 8000.0, 800.0), false),

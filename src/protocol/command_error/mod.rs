@@ -6,6 +6,7 @@
 //! serial line would not help, and that sentence. A new error is a variant, its row, and a sample
 //! of it in `samples.rs`; none of them can be forgotten, because the others then do not compile.
 
+mod of_blocks;
 mod of_modules;
 #[cfg(any(test, feature = "host"))]
 mod samples;
@@ -13,6 +14,7 @@ mod samples;
 #[cfg(any(test, feature = "host"))]
 pub use samples::{error_entries, error_samples};
 
+use super::BlockError;
 use crate::convex::SolidError;
 use crate::drawing::PageError;
 use crate::host_only::HostOnly;
@@ -23,6 +25,7 @@ use crate::stage::OutOfScratch;
 use crate::step::ArcError;
 use crate::view::ViewError;
 use core::fmt;
+use of_blocks::explain_block;
 use of_modules::{
     explain_machine, explain_missing, explain_model, explain_page, explain_setting, explain_solid,
     explain_view,
@@ -37,6 +40,8 @@ use of_modules::{
 pub enum CommandError {
     /// No command begins like this line.
     UnknownCommand,
+    /// A line of G-code has something else than letters with numbers.
+    NotAWord,
     /// The text is not a number where one was expected.
     NotANumber,
     /// No `$` command has this name.
@@ -47,6 +52,8 @@ pub enum CommandError {
     Busy,
     /// The plotter is in alarm or asleep.
     Locked,
+    /// A jog is in progress.
+    Jogging,
     /// The line has too many bytes.
     LineTooLong {
         /// The length of the longest line, in bytes.
@@ -58,6 +65,8 @@ pub enum CommandError {
     BytesLost,
     /// A word of G-code with this letter is not known: either the letter or its number.
     UnsupportedWord(u8),
+    /// A line of G-code was refused for its words.
+    Block(BlockError),
     /// There is no such arc, for example because its ends are not equally far from its centre.
     Arc(ArcError),
     /// A number is outside the range that is allowed or can be stored.
@@ -196,6 +205,10 @@ impl CommandError {
                      commands"
                 ),
             ),
+            Self::NotAWord => row(
+                error(1, ""),
+                format_args!("G-code is letters with numbers: X-12.5, or a comment in (...)"),
+            ),
             Self::NotANumber => row(
                 error(2, "not a number"),
                 format_args!("a number is written like -12.5 or 3e-2"),
@@ -218,6 +231,10 @@ impl CommandError {
                 ),
                 format_args!("release the stop if it is pressed, then send $X to unlock"),
             ),
+            Self::Jogging => row(
+                error(9, ""),
+                format_args!("a jog is on its way: wait for its end, or send the byte 0x85"),
+            ),
             Self::LineTooLong { limit } => {
                 row(error(11, "line too long"), format_args!("a line has at most {limit} bytes"))
             }
@@ -225,6 +242,7 @@ impl CommandError {
                 error(20, "unsupported G-code"),
                 format_args!("this word {} is not known here", char::from(*letter)),
             ),
+            Self::Block(error) => explain_block(error, row),
             Self::Arc(_) => row(
                 error(33, "no such arc"),
                 format_args!(

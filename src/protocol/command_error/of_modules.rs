@@ -247,6 +247,9 @@ pub(super) fn explain_setting(refusal: &SettingError, row: Row<'_>) {
                 format_args!("{name} goes from {least} to {greatest} {unit}"),
             );
         }
+        SettingError::Negative(setting) => {
+            row(error(4, ""), format_args!("{} is not negative", setting.info().name))
+        }
         SettingError::NotWhole(setting) => {
             row(SETTING_OUT_OF_RANGE, format_args!("{} is a whole number", setting.info().name))
         }

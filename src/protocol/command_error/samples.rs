@@ -7,6 +7,7 @@ use crate::drawing::PageError;
 use crate::machine::{MachineError, Setting, SettingError, State, Value};
 use crate::model::{ElementKind, ModelError};
 use crate::motion::LimitsError;
+use crate::protocol::BlockError;
 use crate::stage::OutOfScratch;
 use crate::step::ArcError;
 use crate::view::ViewError;
@@ -40,15 +41,18 @@ pub fn error_samples() -> Vec<CommandError> {
     let one = Value::from_num(1);
     let all = every_variant!(CommandError:
         UnknownCommand,
+        NotAWord,
         NotANumber,
         UnknownSystemCommand,
         HomingOff,
         Busy,
         Locked,
+        Jogging,
         LineTooLong { limit: 256 },
         NotText,
         BytesLost,
         UnsupportedWord(b'Q'),
+        Block(BlockError::ModalGroup),
         Arc(ArcError::NoRadius),
         NumberOutOfRange,
         WrongNumberCount { needed: 3 },
@@ -94,6 +98,31 @@ pub fn error_samples() -> Vec<CommandError> {
         NoPlane,
         TooManyPens,
         Scratch(MISSING),
+    );
+    let block = every_variant!(BlockError:
+        Negative(b'F'),
+        NotInAJog,
+        ModalGroup,
+        NoFeed,
+        NotWhole(b'G'),
+        AxisConflict,
+        Repeated(b'X'),
+        NoAxis,
+        LineNumber,
+        Missing(b'P'),
+        NoSystem,
+        Absolute,
+        AxisAfterCancel,
+        ArcNoAxis,
+        ArcRadius,
+        ArcNoOffset,
+        Unused(b'P'),
+        ToolAxis,
+        ToolNumber,
+        ArcPlane,
+        InverseArc,
+        ServoIsOff,
+        NotAtStart,
     );
     let curve = every_variant!(CurveError:
         Order,
@@ -141,6 +170,7 @@ pub fn error_samples() -> Vec<CommandError> {
     let settings = every_variant!(SettingError:
         Unknown,
         OutOfRange(Setting::StepsPerMmX),
+        Negative(Setting::StepsPerMmX),
         NotWhole(Setting::StepsPerMmX),
         Conflict(LimitsError::StepsPerMillimetre),
         Busy,
@@ -148,6 +178,7 @@ pub fn error_samples() -> Vec<CommandError> {
     all.into_iter()
         .chain(model.map(CommandError::Model))
         .chain(curve.map(|error| CommandError::Model(ModelError::Curve(error))))
+        .chain(block.map(CommandError::Block))
         .chain(solid.map(CommandError::Solid))
         .chain(views.map(CommandError::View))
         .chain(pages.map(CommandError::Page))

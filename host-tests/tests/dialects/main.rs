@@ -1,0 +1,238 @@
+//! Draws one figure, `figure.svg`, from G-code in the dialects that programs for plotters write,
+//! and compares what the pins ink with the figure: within a step, and nothing else.
+//!
+//! The files `vpype-*.gcode`, `svg-to-gcode.gcode` and `gscrib.gcode` were written by the programs
+//! of these names (vpype 1.15 with vpype-gcode 0.13, svg-to-gcode 1.5.4, gscrib 1.2.0). The other
+//! programs cannot be installed from a package; their files were written by hand, in the form that
+//! they give: LaserGRBL, gcodetools, juicy-gcode with Z0 as its tool, the extension of MakerBot's
+//! Unicorn (`mm-plotter.gcode`), and servos of Marlin and of Grbl.
+
+#![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
+
+use penup::boards::host::Change;
+use penup::machine::{Contacts, State};
+use penup::plotter::{Board, EMPTY_LOOKAHEAD, Memory};
+use penup_host_tests::whole_jobs::Bench;
+use std::path::PathBuf;
+
+/// Steps per millimetre.
+const STEPS: f64 = 80.0;
+/// The height of the figure's page in millimetres.
+const HEIGHT: f64 = 80.0;
+
+/// The files, with the settings that they need beside the default ones, and whether they count y
+/// downward, as the figure does.
+const FILES: [(&str, &str, bool); 13] = [
+    ("vpype-gcode.gcode", "", false),
+    ("vpype-gcodemm.gcode", "", false),
+    ("vpype-gcode_relative.gcode", "", false),
+    // Z3 is up, Z6 is down.
+    ("vpype-ninja.gcode", "$207=4.5\n$208=1\n", true),
+    // Z- is up, Z+ is down.
+    ("vpype-step_motor.gcode", "$208=1\n", true),
+    ("vpype-step_motor_relative.gcode", "$208=1\n", true),
+    ("svg-to-gcode.gcode", "", false),
+    ("gscrib.gcode", "", false),
+    ("gcodetools.ngc", "", false),
+    ("juicy.gcode", "", false),
+    ("marlin-servo.gcode", "$206=3\n$216=60\n$217=1\n", false),
+    ("servo-m3.gcode", "$206=3\n$216=60\n", false),
+    ("mm-plotter.gcode", "$206=3\n$216=40\n$217=1\n", false),
+];
+
+/// LaserGRBL's file is drawn without a setting, too, since its S0 is up.
+const LASER: [(&str, &str, bool); 2] =
+    [("lasergrbl.nc", "$32=1\n", false), ("lasergrbl.nc", "", false)];
+
+fn folder() -> PathBuf {
+    penup_client::workspace::root().join("host-tests/tests/dialects")
+}
+
+fn file(name: &str) -> String {
+    std::fs::read_to_string(folder().join(name)).expect("a file beside this one")
+}
+
+/// The lines of the figure in steps, with y counted upward or downward.
+fn figure(downward: bool) -> Vec<[[f64; 2]; 2]> {
+    let svg = file("figure.svg");
+    let lines = svg.split("points=\"").skip(1).map(|rest| rest.split('"').next().unwrap_or(""));
+    let mut pieces = Vec::new();
+    for line in lines {
+        let points: Vec<[f64; 2]> = line
+            .split(' ')
+            .map(|point| {
+                let (x, y) = point.split_once(',').expect("x,y");
+                let [x, y]: [f64; 2] = [x, y].map(|number| number.parse().expect("a number"));
+                [x * STEPS, if downward { y } else { HEIGHT - y } * STEPS]
+            })
+            .collect();
+        pieces.extend(points.windows(2).map(|ends| [ends[0], ends[1]]));
+    }
+    pieces
+}
+
+/// How far a point is from a line, in steps.
+fn distance([x, y]: [f64; 2], [[ax, ay], [bx, by]]: [[f64; 2]; 2]) -> f64 {
+    let (dx, dy) = (bx - ax, by - ay);
+    let along = (((x - ax) * dx + (y - ay) * dy) / (dx * dx + dy * dy)).clamp(0.0, 1.0);
+    (x - ax - along * dx).hypot(y - ay - along * dy)
+}
+
+fn bench(settings: &str) -> Bench {
+    let memory = Box::leak(Box::new(Memory::<4, 4, 16>::new()));
+    let mut bench = Bench::with_memory(memory.lend(Box::leak(Box::new(EMPTY_LOOKAHEAD))));
+    bench.heard();
+    let answer = bench.say(settings);
+    assert!(!answer.contains("error"), "{answer}");
+    bench
+}
+
+/// Lets a millisecond pass. While the machine homes, its switches lie 5 mm from where it began.
+fn pass(bench: &mut Bench) {
+    while bench.plotter.poll(&mut bench.board) {}
+    let pins = bench.plotter.machine().position();
+    let home = bench.plotter.machine().state() == State::Home;
+    let contacts = Contacts { x: home && pins.x <= 400, y: home && pins.y <= 400, stop: false };
+    bench.board.set_contacts(contacts);
+    bench.board.wait();
+}
+
+/// Sends a program line by line, each after the answer to the one before. Returns all answers.
+fn send(bench: &mut Bench, program: &str) -> String {
+    let mut heard = String::new();
+    for line in program.lines() {
+        bench.board.receive(format!("{line}\n").as_bytes());
+        let mut answer = String::new();
+        let mut waited = 0;
+        while !answer.lines().any(|line| line == "ok" || line.starts_with("error:")) {
+            pass(bench);
+            answer += &bench.heard();
+            waited += 1;
+            assert!(waited < 300_000, "no answer to {line}: {answer}");
+        }
+        assert!(!answer.contains("error:"), "{line}: {answer}");
+        heard += &answer;
+    }
+    // The program ends a second after the last move.
+    let mut idle = 0;
+    while idle < 1500 {
+        pass(bench);
+        let is_idle = matches!(bench.plotter.machine().state(), State::Idle);
+        idle = if is_idle && bench.plotter.machine().is_stopped() { idle + 1 } else { 0 };
+    }
+    heard + &bench.heard()
+}
+
+/// The positions of the machine, in steps, at which ink came onto the page.
+fn inked(bench: &Bench) -> Vec<[f64; 2]> {
+    let (mut up, mut pen, mut at) = ([true; 2], 0, [0; 2]);
+    let mut points = Vec::new();
+    let changes = bench.board.trace().changes();
+    for (index, stamped) in changes.iter().enumerate() {
+        let mut step = |axis: usize, level: bool| at[axis] += if level { 1 } else { -1 };
+        match stamped.change {
+            Change::StepX(true) => step(0, up[0]),
+            Change::StepY(true) => step(1, up[1]),
+            Change::UpX(level) => up[0] = level,
+            Change::UpY(level) => up[1] = level,
+            Change::Pen(height) => pen = height,
+            _ => continue,
+        }
+        let is_last = changes.get(index + 1).is_none_or(|next| next.time != stamped.time);
+        if pen > 64 && is_last {
+            points.push(at);
+        }
+    }
+    // Homing has shifted the coordinates.
+    let position = bench.plotter.machine().position();
+    let shift = [position.x - at[0], position.y - at[1]];
+    points.iter().map(|[x, y]| [f64::from(x + shift[0]), f64::from(y + shift[1])]).collect()
+}
+
+/// Whether the ink is the figure: the longest distances of a point of ink from the figure, and of a
+/// point of the figure from the ink.
+fn compare(ink: &[[f64; 2]], figure: &[[[f64; 2]; 2]]) -> (f64, f64) {
+    let from_figure = |point: &[f64; 2]| {
+        figure.iter().map(|line| distance(*point, *line)).fold(f64::INFINITY, f64::min)
+    };
+    let beside = ink.iter().map(from_figure).fold(0.0, f64::max);
+    let mut missing: f64 = 0.0;
+    for [a, b] in figure {
+        let length = (b[0] - a[0]).hypot(b[1] - a[1]);
+        let count = (length / 20.0) as usize;
+        for part in 0..=count {
+            let part = part as f64 / count as f64;
+            let point = [a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1])];
+            let near = ink.iter().map(|[x, y]| (x - point[0]).hypot(y - point[1]));
+            missing = missing.max(near.fold(f64::INFINITY, f64::min));
+        }
+    }
+    (beside, missing)
+}
+
+#[test]
+fn every_dialect_draws_the_figure_and_nothing_else() {
+    let mut faults = String::new();
+    for (name, settings, downward) in FILES.into_iter().chain(LASER) {
+        let program = file(name);
+        let homes = program.contains("$H");
+        let mut bench = bench(settings);
+        if homes {
+            bench.say("$22=1\n$130=200\n$131=200\n$J=X30 Y20 F3000\n");
+            bench.finish();
+        }
+        let heard = send(&mut bench, &program);
+        let notes: Vec<_> = heard.lines().filter(|line| line.starts_with("[MSG:")).collect();
+        let (beside, missing) = compare(&inked(&bench), &figure(downward));
+        // A point of the figure lies at most half a diagonal from the nearest step.
+        if beside > 1.0 || missing > 1.5 || notes.iter().any(|note| !note.contains("Pgm End")) {
+            faults += &format!(
+                "{name} {settings:?}: ink {beside:.2} steps beside, {missing:.2} missing, {notes:?}\n"
+            );
+        }
+    }
+    assert!(faults.is_empty(), "{faults}");
+}
+
+#[test]
+fn a_program_that_draws_nothing_or_too_little_says_which_setting_to_change() {
+    for (name, settings, note) in [
+        ("vpype-gcodemm.gcode", "$206=1\n", "no ink was drawn: M3 never came"),
+        ("vpype-gcodemm.gcode", "$206=2\n", "no ink was drawn: Z never came"),
+        ("vpype-gcodemm.gcode", "$206=3\n", "no ink was drawn: S never came"),
+        ("vpype-gcodemm.gcode", "$32=1\n", "no ink was drawn: with $32=1"),
+        ("vpype-ninja.gcode", "", "most of G1 to G3 had the pen up"),
+        ("servo-m3.gcode", "", "S changed while M3 was on"),
+        ("gcodetools.ngc", "$207=-1\n", "no ink was drawn: Z never went down"),
+    ] {
+        let mut bench = bench(settings);
+        let heard = send(&mut bench, &file(name));
+        assert!(heard.contains(&format!("[MSG:{note}")), "{name} {settings:?}: {heard}");
+        assert_eq!(inked(&bench).is_empty(), note.starts_with("no ink"), "{name}");
+    }
+    let mut bench = bench("");
+    bench.board.receive(b"M280 P0 S30\n");
+    for _ in 0..10 {
+        pass(&mut bench);
+    }
+    assert!(
+        bench.heard().ends_with("set $206=3, and $216 to an S between up and down]\nerror:20\n")
+    );
+}
+
+#[test]
+fn a_line_that_is_typed_alone_never_inks_unless_the_pen_was_put_down() {
+    let mut bench = bench("");
+    for line in ["G1 X10 F3000", "G1 Y10", "G0 X0", "G2 X10 Y10 I5", "G1 X0 Y0"] {
+        assert!(send(&mut bench, line).contains("ok\n"));
+    }
+    assert_eq!(inked(&bench), Vec::<[f64; 2]>::new());
+    // Two lines in a row are a program.
+    send(&mut bench, "G0 X10\nG1 X20");
+    assert!(!inked(&bench).is_empty());
+    // A pen that was put down stays so.
+    for line in ["M3", "G4 P2", "G1 X30"] {
+        send(&mut bench, line);
+    }
+    assert!(inked(&bench).iter().any(|[x, _]| *x == 30.0 * STEPS));
+}

@@ -1,0 +1,224 @@
+//! What the plotter answers to the lines of Grbl 1.1: `lines.txt` lists them with what Grbl answers
+//! in each state.
+
+#![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
+
+use penup::machine::{Contacts, State};
+use penup::plotter::{Board, EMPTY_LOOKAHEAD, Memory};
+use penup_host_tests::whole_jobs::Bench;
+
+/// A row of the list.
+struct Row<'a> {
+    state: &'a str,
+    sent: &'a str,
+    /// What Grbl answers.
+    grbl: &'a str,
+    /// What penup answers where it differs on purpose.
+    penup: Option<&'a str>,
+}
+
+/// All rows.
+fn rows() -> impl Iterator<Item = Row<'static>> {
+    let text = include_str!("lines.txt");
+    text.lines().filter(|line| !line.is_empty() && !line.starts_with('#')).map(|line| {
+        let mut fields = line.split(" | ");
+        let mut field = || fields.next();
+        let (state, sent) = (field().expect("a state"), field().expect("a line"));
+        let (grbl, penup) = (field().unwrap_or(""), field());
+        let has_reason = field().is_some_and(|reason| !reason.is_empty());
+        assert!(penup.is_none() || has_reason, "no reason: {line}");
+        Row { state, sent, grbl, penup }
+    })
+}
+
+/// Lets a number of milliseconds pass.
+fn work(bench: &mut Bench, milliseconds: u32) {
+    for _ in 0..milliseconds {
+        while bench.plotter.poll(&mut bench.board) {}
+        bench.board.wait();
+    }
+}
+
+/// A plotter with little memory.
+fn bench() -> Bench {
+    let memory = Box::leak(Box::new(Memory::<4, 4, 16>::new()));
+    let mut bench = Bench::with_memory(memory.lend(Box::leak(Box::new(EMPTY_LOOKAHEAD))));
+    bench.heard();
+    bench
+}
+
+/// A plotter in one of the states of the list.
+fn bench_in(state: &str) -> Bench {
+    let mut bench = bench();
+    let (bytes, milliseconds): (&[u8], _) = match state {
+        "idle" => (b"", 0),
+        "run" => (b"M3 S0\nM5\nG1 X300 F600\n", 700),
+        "hold" => (b"G1 X300 F600\n", 500),
+        "jog" => (b"$J=X100 F600\n", 500),
+        "check" => (b"$C\n", 1),
+        "alarm" => (b"\xFD", 1),
+        "sleep" => (b"$SLP\n", 50),
+        _ => panic!("no state {state}"),
+    };
+    bench.board.receive(bytes);
+    work(&mut bench, milliseconds);
+    if state == "hold" {
+        bench.board.receive(b"!");
+        work(&mut bench, 1500);
+    }
+    bench.heard();
+    bench
+}
+
+/// What the plotter answers to the bytes, in which `⏎` ends a line, `\xHH` is a byte, `\p` is a
+/// pause of some milliseconds and `\w` one of a second and a half.
+fn answer(state: &str, sent: &str) -> String {
+    let mut bench = bench_in(state);
+    let (mut rest, mut heard, mut lines) = (sent, String::new(), 0);
+    while let Some(letter) = rest.chars().next() {
+        rest = &rest[letter.len_utf8()..];
+        match letter {
+            '⏎' => {
+                lines += 1;
+                bench.board.receive(b"\n");
+            }
+            '\\' if rest.starts_with('x') => {
+                let byte = u8::from_str_radix(&rest[1..3], 16).expect("a byte");
+                bench.board.receive(&[byte]);
+                rest = &rest[3..];
+            }
+            '\\' => {
+                work(&mut bench, if rest.starts_with('p') { 3 } else { 1500 });
+                rest = &rest[1..];
+            }
+            letter => bench.board.receive(letter.encode_utf8(&mut [0; 4]).as_bytes()),
+        }
+    }
+    // An arc or a dwell is answered when it is done.
+    for _ in 0..200 {
+        work(&mut bench, 25);
+        heard += &bench.heard();
+        let answers =
+            heard.lines().filter(|line| *line == "ok" || line.starts_with("error:")).count();
+        if answers >= lines {
+            break;
+        }
+    }
+    heard
+}
+
+/// Whether the text is of this form, in which `*` stands for any text.
+fn is_like(text: &str, form: &str) -> bool {
+    let Some((first, mut form)) = form.split_once('*') else { return text == form };
+    let Some(mut text) = text.strip_prefix(first) else { return false };
+    while let Some((part, rest)) = form.split_once('*') {
+        let Some(at) = text.find(part) else { return false };
+        (text, form) = (&text[at + part.len()..], rest);
+    }
+    text.ends_with(form)
+}
+
+/// Whether the answer is the expected one. Messages count where the expected answer names them.
+fn agrees(heard: &str, expected: &str) -> bool {
+    let named = expected.contains("[MSG:");
+    let lines: Vec<&str> = heard
+        .lines()
+        .filter(|line| named || !line.starts_with("[MSG:"))
+        .skip_while(|line| line.is_empty())
+        .collect();
+    is_like(&lines.join("⏎"), expected.trim_start_matches('⏎'))
+}
+
+/// The time that homing takes, in milliseconds, with the settings. While the machine homes, its
+/// switches lie 5 mm from where it begins.
+fn homing_time(settings: &str) -> u32 {
+    let mut bench = bench();
+    bench.say("$22=1\n$130=60\n$131=60\n$J=X30 Y20 F6000\n");
+    bench.finish();
+    bench.say(settings);
+    bench.heard();
+    bench.board.receive(b"$H\n");
+    for milliseconds in 0..60_000 {
+        while bench.plotter.poll(&mut bench.board) {}
+        let pins = bench.plotter.machine().position();
+        let home = bench.plotter.machine().state() == State::Home;
+        let contacts = Contacts { x: home && pins.x <= 400, y: home && pins.y <= 400, stop: false };
+        bench.board.set_contacts(contacts);
+        bench.board.wait();
+        if bench.heard().contains("ok") {
+            return milliseconds;
+        }
+    }
+    panic!("homing does not end");
+}
+
+#[test]
+fn homing_pauses_after_each_of_its_moves() {
+    let (plain, paused) = (homing_time("$26=0\n"), homing_time("$26=100\n"));
+    // Each axis seeks its switch, leaves it, approaches it again and pulls off.
+    assert!((800..840).contains(&(paused - plain)), "{plain} and {paused} ms");
+}
+
+#[test]
+fn the_origin_of_the_coordinates_moves_what_is_drawn() {
+    let mut bench = bench();
+    // 20 mm by G54, 5 mm more by G92; then from there, by the machine's own coordinates, and back.
+    for (lines, position) in [
+        ("G10 L2 P1 X20 Y10\nG0 X1 Y1\n", "21.000,11.000"),
+        ("G92 X6\nG0 X7\n", "22.000,11.000"),
+        ("G53 G0 X3 Y3\n", "3.000,3.000"),
+        ("G92.1\nG0 X0 Y0\n", "20.000,10.000"),
+        ("G55\nG0 X1 Y1\n", "1.000,1.000"),
+        ("G10 L20 P0 X0 Y0\nG91\nG0 X2\nG90\nG0 Y3\n", "3.000,4.000"),
+        ("G28.1\nG0 X9 Y9\nG28 X5\n", "3.000,10.000"),
+        ("G28\n", "3.000,4.000"),
+        ("G30.1\nG0 X5 Y5\nG30\n", "3.000,4.000"),
+        ("$J=G53 X8 Y8 F1000\n", "8.000,8.000"),
+        ("G54\n$J=X1 Y1 F1000\n", "21.000,11.000"),
+        ("G20\nG0 X1 Y1\n", "45.400,35.400"),
+    ] {
+        bench.board.receive(lines.as_bytes());
+        for _ in 0..20 {
+            bench.finish();
+        }
+        assert!(!bench.heard().contains("error"), "{lines}");
+        let status = bench.say("?");
+        assert!(status.contains(&format!("MPos:{position},")), "{lines}: {status}");
+    }
+}
+
+#[test]
+fn the_override_of_rapid_moves_slows_those_with_the_pen_up_only() {
+    let time = |bytes: &[u8], line: &str| {
+        let mut bench = bench();
+        bench.board.receive(bytes);
+        bench.say(line);
+        bench.finish();
+        bench.board.trace().now()
+    };
+    assert!(time(&[0x97], "G0 X200\n") > 3 * time(&[], "G0 X200\n"));
+    assert_eq!(time(&[0x97], "M3\nG1 X100\n"), time(&[], "M3\nG1 X100\n"));
+}
+
+#[test]
+fn letters_of_utf_8_are_no_orders() {
+    let mut bench = bench();
+    assert_eq!(bench.say("# Å Д °±\n(Ä)\n"), "ok\nok\n");
+    assert!(bench.say("?").starts_with("<Idle|"));
+}
+
+#[test]
+fn lines_are_answered_as_grbl_does() {
+    let (mut all, mut like_grbl, mut faults) = (0, 0, String::new());
+    for Row { state, sent, grbl, penup } in rows() {
+        let heard = answer(state, sent);
+        all += 1;
+        like_grbl += usize::from(agrees(&heard, grbl));
+        if !agrees(&heard, penup.unwrap_or(grbl)) {
+            faults += &format!("{state} | {sent} | {}\n", penup.unwrap_or(grbl));
+            faults += &format!("    answered {}\n", heard.replace('\n', "⏎"));
+        }
+    }
+    println!("{like_grbl} of {all} lines are answered as Grbl does");
+    assert!(faults.is_empty(), "{like_grbl} of {all} are answered as Grbl does:\n{faults}");
+}

@@ -1,0 +1,100 @@
+//! `$plot` and `$again`: computes a job, or loads the kept one, and hands it to the machine.
+
+use super::job::Pipeline;
+use super::listener::{Listener, MeasuredStrokes};
+use super::reply::Reply;
+use super::{Board, Cursor, Inner, Job, Observer, Unobserved, records};
+use crate::index::Index;
+use crate::machine::State;
+use crate::protocol::{CommandError, RealTime};
+use crate::stage::{Cancel, Stage};
+
+impl<I: Index> Inner<'_, I> {
+    /// Computes and begins a job, or begins the kept job if `again`.
+    ///
+    /// # Errors
+    /// [`CommandError::Locked`] or [`CommandError::Busy`] if the state does not allow it, or the
+    /// reason why there is no job.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    pub(super) fn plot<B: Board>(
+        &mut self,
+        board: &mut B,
+        again: bool,
+    ) -> Result<(), CommandError> {
+        if !matches!(self.machine.state(), State::Idle | State::Check) {
+            return Err(match self.machine.state() {
+                State::Alarm(_) | State::Sleep => CommandError::Locked,
+                _ => CommandError::Busy,
+            });
+        }
+        let [x, y] = self.machine.position_mm();
+        let (position, inches) = ([x, y, self.program.z()], self.in_inches());
+        let requests = RealTime::default();
+        let mut listener = Listener { board, position, inches, stage: Stage::View, requests };
+        let computed = if again {
+            self.load(listener.board)
+        } else {
+            self.compute(&mut listener, &mut Unobserved).map(|()| self.save(listener.board))
+        };
+        let begun = computed.and_then(|()| self.begin(&mut listener));
+        let requests = listener.requests;
+        if requests.has(RealTime::EMERGENCY) {
+            self.act(requests);
+        }
+        begun?;
+        self.report_degenerate(board);
+        self.act(requests);
+        Ok(())
+    }
+
+    /// Writes the job to flash before anything moves, because flash cannot be read during the
+    /// write.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    fn save<B: Board>(&self, board: &mut B) {
+        if records::save_job(&self.job, self.machine.settings(), self.words, board).is_err() {
+            Reply(board)
+                .line(format_args!("[MSG:$again will not draw this: the flash is worn out]"));
+        }
+    }
+
+    /// Loads the kept job in place of the last one.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    fn load<B: Board>(&mut self, board: &mut B) -> Result<(), CommandError> {
+        self.copy_words = 0;
+        self.job = Job::default();
+        self.cursor = Cursor::default();
+        self.job = records::load_job(self.machine.settings(), self.words, board)?;
+        Ok(())
+    }
+
+    /// Hands the job to the machine, which first measures its strokes.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    fn begin(&mut self, cancel: &mut dyn Cancel) -> Result<(), CommandError> {
+        let strokes = self.job.strokes(self.words, &mut self.cursor);
+        let mut strokes = MeasuredStrokes { strokes, cancel, targets: 0, aborted: false };
+        self.machine.start(&mut strokes)?;
+        if strokes.aborted {
+            self.machine.abort();
+            return Err(CommandError::Aborted);
+        }
+        self.cursor = Cursor::default();
+        Ok(())
+    }
+
+    /// Computes the job of `$plot`, in place of the last one.
+    #[inline(never)] // Keeps its frame out of that of `plot`.
+    pub(super) fn compute(
+        &mut self,
+        cancel: &mut dyn Cancel,
+        observer: &mut dyn Observer<I>,
+    ) -> Result<(), CommandError> {
+        // This overwrites the memory of the last job, so that job ends here even if this one fails.
+        self.copy_words = 0;
+        self.job = Job::default();
+        self.cursor = Cursor::default();
+        let steps = self.machine.settings().page_steps();
+        let (model, options, words) = (&self.model, &self.options, &mut *self.words);
+        self.job = Pipeline { model, options, steps, words, cancel, observer }.run()?;
+        Ok(())
+    }
+}

@@ -1,0 +1,93 @@
+//! The arcs of G2 and G3.
+
+use super::block::Block;
+use super::{Program, steps_at};
+use crate::array::MapEach;
+use crate::drawing::StepsPerMillimetre;
+use crate::fixed::{Millimetres, divide_rounding, half, product};
+use crate::protocol::{BlockError, CommandError};
+use crate::step::{Arc, Turn};
+
+impl Program {
+    /// The arc from one position of the machine to another that the words of the block give.
+    ///
+    /// # Errors
+    /// [`CommandError::Block`] if words are missing, [`CommandError::Arc`] if there is no such arc.
+    pub(super) fn arc(
+        &self,
+        block: &Block,
+        [from, to]: [[Millimetres; 2]; 2],
+        turn: Turn,
+        steps: StepsPerMillimetre,
+    ) -> Result<Arc, CommandError> {
+        let axes: [&[u8]; 3] = [b"XY", b"ZX", b"YZ"];
+        let offsets: [&[u8]; 3] = [b"IJ", b"KI", b"JK"];
+        let plane = usize::from(self.plane.0);
+        if !block.has_any(b"XYZ") {
+            return Err(BlockError::NoAxis.into());
+        }
+        if !axes.get(plane).is_some_and(|letters| block.has_any(letters)) {
+            return Err(BlockError::ArcNoAxis.into());
+        }
+        let has_offset = offsets.get(plane).is_some_and(|letters| block.has_any(letters));
+        if !block.has(b'R') && !has_offset {
+            return Err(BlockError::ArcNoOffset.into());
+        }
+        if plane != 0 {
+            return Err(BlockError::ArcPlane.into());
+        }
+        let center = match block.number(b'R') {
+            Some(radius) => {
+                let radius = self.length(radius)?;
+                if from == to {
+                    return Err(CommandError::Arc(crate::step::ArcError::NoRadius));
+                }
+                center_of_radius(from, to, radius, turn).ok_or(BlockError::ArcRadius)?
+            }
+            None => {
+                let mut center = from;
+                for (position, letter) in center.iter_mut().zip([b'I', b'J']) {
+                    let Some(number) = block.number(letter) else { continue };
+                    let offset = self.length(number)?;
+                    *position =
+                        position.checked_add(offset).ok_or(CommandError::NumberOutOfRange)?;
+                }
+                center
+            }
+        };
+        let [center, from, to] = [center, from, to].map_each(|point| steps_at(point, steps));
+        Arc::scaled(steps, center, from, to, turn).map_err(CommandError::Arc)
+    }
+}
+
+/// The centre of the arc from `from` to `to` that turns less than half a turn, or more if `radius`
+/// is negative. `None` if the points are further apart than the diameter.
+fn center_of_radius(
+    from: [Millimetres; 2],
+    to: [Millimetres; 2],
+    radius: Millimetres,
+    turn: Turn,
+) -> Option<[Millimetres; 2]> {
+    // Lengths are in units of 2^-15 mm, below 2^30; so differences are below 2^31 and squares below
+    // 2^62.
+    let halved = |length: Millimetres| i64::from(length.to_bits()) / 2;
+    let [dx, dy] = [0, 1].map_each(|axis| halved(to[axis]) - halved(from[axis]));
+    let distance = (dx * dx + dy * dy).unsigned_abs();
+    let wide = 2 * halved(radius).unsigned_abs();
+    let length = distance.isqrt();
+    // With rounded ends, the points may be up to a step further apart than the diameter.
+    if length == 0 || length > wide + (1 << 15) / 20 {
+        return None;
+    }
+    // Twice the distance from the chord to the centre. The centre lies to the right of the chord
+    // for a clockwise arc.
+    let height = (wide * wide).saturating_sub(distance).isqrt() as i64;
+    let is_right = (turn == Turn::Clockwise) == (radius > 0);
+    let height = if is_right { height } else { -height };
+    let middle = |axis: usize, across: i64| {
+        let offset = divide_rounding(product(across, height), length.into());
+        let sum = i128::from(from[axis].to_bits()) + i128::from(to[axis].to_bits()) + 2 * offset;
+        i32::try_from(half(sum)).ok().map(Millimetres::from_bits)
+    };
+    Some([middle(0, dy)?, middle(1, -dx)?])
+}

@@ -1,0 +1,497 @@
+//! The G-code interpreter: it turns a line of G-code into an order for the machine, given the modes
+//! that earlier lines have set.
+//!
+//! Lines are understood as Grbl 1.1 understands them, and refused with its numbers. [`block`] reads
+//! and checks the words of a line, this file gives them their meaning, [`arc`] finds arcs,
+//! [`coordinates`] keeps the origins, and [`pen`] decides what is drawn.
+
+mod arc;
+mod block;
+mod coordinates;
+mod parameters;
+mod pen;
+
+pub(super) use block::Kept;
+pub(super) use parameters::{Parameters, SYSTEMS, TEXT_LIMIT, Text};
+
+use crate::drawing::{PAGE_LIMIT, PagePoint, StepsPerMillimetre};
+use crate::fixed::{Decimal, Millimetres, divide_rounding, product};
+use crate::machine::{Machine, Settings};
+use crate::protocol::{BlockError, CommandError, GCode};
+use crate::step::{Arc, Turn};
+use block::{Action, AxisUse, Block, Flow};
+use pen::PenRule;
+
+/// A position of the machine, in millimetres from the page's origin. Z is only counted: the pen has no
+/// other heights than up and down.
+pub(super) type MachinePosition = [Millimetres; 3];
+
+/// The modes and the position that the lines so far have set.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Program {
+    /// The kind of move that coordinates ask for.
+    motion: Motion,
+    /// The plane of arcs.
+    plane: Plane,
+    /// Whether lengths are in inches (G20). Otherwise they are in millimetres (G21).
+    inches: bool,
+    /// Whether coordinates are relative to the last position (G91). Otherwise they are absolute
+    /// (G90).
+    relative: bool,
+    /// Whether F is one divided by the minutes of a move (G93). Otherwise it is mm/min (G94).
+    inverse_time: bool,
+    /// The index of the coordinate system, 0 for G54.
+    system: u8,
+    /// 3, 4 or 5 for M3, M4 or M5.
+    spindle: u8,
+    /// Whether M7 and M8 are in force.
+    coolant: [bool; 2],
+    /// The number of the tool.
+    tool: u8,
+    /// Whether the move of the last line draws.
+    pub(super) draws: bool,
+    /// S.
+    speed: Millimetres,
+    /// F in mm/min, 0 if none is set.
+    feed: Millimetres,
+    /// F of the present move in mm/min, 0 if none is set.
+    move_feed: Millimetres,
+    /// The end of the last move, as the lines give it.
+    at: MachinePosition,
+    /// The shift of the coordinates by G92.
+    shift: MachinePosition,
+    /// The shift of Z by G43.1.
+    tool_length: Millimetres,
+    /// What the program has said of the pen.
+    pen: pen::PenState,
+}
+
+/// The kind of move that coordinates ask for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Motion {
+    /// G0.
+    Rapid,
+    /// G1.
+    Line,
+    /// G2 and G3.
+    Arc(Turn),
+    /// G80.
+    None,
+}
+
+/// The plane of arcs: 0 for X and Y (G17), 1 for Z and X (G18), 2 for Y and Z (G19).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Plane(u8);
+
+impl Motion {
+    /// The kind of move of G0 to G3.
+    fn of(number: i32) -> Self {
+        match number {
+            0 => Self::Rapid,
+            1 => Self::Line,
+            2 => Self::Arc(Turn::Clockwise),
+            _ => Self::Arc(Turn::Counterclockwise),
+        }
+    }
+
+    /// The number after G.
+    fn number(self) -> u8 {
+        match self {
+            Self::Rapid => 0,
+            Self::Line => 1,
+            Self::Arc(Turn::Clockwise) => 2,
+            Self::Arc(Turn::Counterclockwise) => 3,
+            Self::None => 80,
+        }
+    }
+}
+
+/// The order of a line: what the machine is to do now.
+#[derive(Debug, Clone)]
+pub(super) enum Order {
+    /// Nothing moves.
+    Nothing,
+    /// A straight move.
+    Line(PagePoint),
+    /// A move along an arc.
+    Arc(Arc),
+    /// The pen goes down where it stands.
+    Lower,
+    /// A dwell, in units of 2^-16 s.
+    Dwell(u32),
+    /// A pause until the user resumes, to change the pen if `for_pen`.
+    Pause {
+        /// Whether the pen is to be changed.
+        for_pen: bool,
+    },
+    /// Moves with the pen up, first to the one position and then to the other.
+    Go([PagePoint; 2]),
+    /// A coordinate system gets a new origin.
+    SetSystem(usize, MachinePosition),
+    /// A position is kept.
+    Keep(Kept, MachinePosition),
+    /// The program ends.
+    End,
+    /// The position is reported.
+    Position,
+}
+
+/// What an interpreter must know beside the line.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Context<'c> {
+    /// The settings of the machine.
+    pub(super) settings: &'c Settings,
+    /// The coordinate systems and kept positions.
+    pub(super) parameters: &'c Parameters,
+    /// The position of G28.
+    pub(super) park: [Millimetres; 2],
+}
+
+impl Default for Program {
+    fn default() -> Self {
+        Self {
+            motion: Motion::Rapid,
+            plane: Plane(0),
+            inches: false,
+            relative: false,
+            inverse_time: false,
+            system: 0,
+            spindle: 5,
+            coolant: [false; 2],
+            tool: 0,
+            draws: false,
+            speed: Millimetres::ZERO,
+            feed: Millimetres::ZERO,
+            move_feed: Millimetres::ZERO,
+            at: [Millimetres::ZERO; 3],
+            shift: [Millimetres::ZERO; 3],
+            tool_length: Millimetres::ZERO,
+            pen: pen::PenState::default(),
+        }
+    }
+}
+
+impl Program {
+    /// The program, continued from the position where `machine` will stop. While the machine only
+    /// checks G-code (`checking`), it does not move, so the program keeps its own position.
+    pub(super) fn at(self, machine: &Machine<'_>, checking: bool) -> Self {
+        let steps = machine.settings().page_steps();
+        let [x, y, z] = self.at;
+        if checking || steps_at([x, y], steps) == machine.end() {
+            return self;
+        }
+        let [x, y] = machine.millimetres(machine.end());
+        Self { at: [x, y, z], ..self }
+    }
+
+    /// The program as a reset leaves it: only Z stays.
+    pub(super) fn reset(self) -> Self {
+        let [.., z] = self.at;
+        Self { at: [Millimetres::ZERO, Millimetres::ZERO, z], ..Self::default() }
+    }
+
+    /// The bound of the speed of the present move in mm/min, if there is one.
+    pub(super) fn feed(&self) -> Option<Millimetres> {
+        Some(self.move_feed).filter(|feed| *feed > 0)
+    }
+
+    /// Z of the machine, in millimetres.
+    pub(super) fn z(&self) -> Millimetres {
+        self.at[2]
+    }
+
+    /// The program after `line`, and the order of that line.
+    ///
+    /// # Errors
+    /// [`CommandError::UnsupportedWord`] for a word that is not known, [`CommandError::Block`] for
+    /// words that do not fit together, [`CommandError::NumberOutOfRange`], [`CommandError::Arc`] if
+    /// there is no such arc.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    pub(super) fn after(
+        mut self,
+        line: GCode<'_>,
+        context: &Context<'_>,
+    ) -> Result<(Self, Order), CommandError> {
+        let block = Block::read(line)?;
+        let settings = context.settings;
+        let rule = PenRule::of(settings);
+        self.begin_line();
+        let stood_down = self.stands_down(rule);
+        self.set_feed(&block)?;
+        self.set_modes(&block, settings)?;
+        let mut order = self.action(&block, context)?;
+        self.take_z(&block, settings)?;
+        let is_motion = block.axis_use == AxisUse::Motion && matches!(order, Order::Nothing);
+        if self.motion == Motion::None && block.has_any(b"XYZ") {
+            return Err(BlockError::AxisAfterCancel.into());
+        }
+        if is_motion && !(block.has_any(b"XYZ") || matches!(self.motion, Motion::Arc(_))) {
+            // G0 or G1 alone only sets the mode.
+        } else if is_motion {
+            order = self.motion(&block, context, rule)?;
+        } else {
+            self.check_used(&block)?;
+        }
+        if block.action == Action::EndShift {
+            self.shift = [Millimetres::ZERO; 3];
+        }
+        if matches!(order, Order::Nothing) {
+            let has_dot = block.spindle == Some(5) && self.take_dot();
+            if has_dot || (self.stands_down(rule) && !stood_down) {
+                order = Order::Lower;
+            }
+        }
+        match block.flow {
+            None => {}
+            Some(flow) => {
+                if !matches!(order, Order::Nothing | Order::Lower) {
+                    return Err(BlockError::AxisConflict.into());
+                }
+                order = self.flow(flow);
+            }
+        }
+        Ok((self, order))
+    }
+
+    /// The program after a jog, whose modes are for itself, and the position to go to.
+    ///
+    /// # Errors
+    /// As [`Program::after`].
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    pub(super) fn after_jog(
+        self,
+        line: GCode<'_>,
+        context: &Context<'_>,
+    ) -> Result<(Self, PagePoint), CommandError> {
+        let block = Block::read(line)?;
+        let mut jog = Self { motion: Motion::Line, inverse_time: false, ..self };
+        jog.feed = Millimetres::ZERO;
+        block.check_jog()?;
+        block.check_used(b"")?;
+        jog.set_feed(&block)?;
+        if let Some(unused) = [b'S', b'T'].into_iter().find(|letter| block.has(*letter)) {
+            return Err(BlockError::Unused(unused).into());
+        }
+        if jog.feed <= 0 {
+            return Err(BlockError::NoFeed.into());
+        }
+        if !block.has_any(b"XYZ") {
+            return Err(BlockError::NoAxis.into());
+        }
+        jog.inches = block.inches.unwrap_or(jog.inches);
+        jog.relative = block.relative.unwrap_or(jog.relative);
+        let [x, y, z] = jog.destination(&block, context)?;
+        let point = steps_at([x, y], context.settings.page_steps());
+        Ok((Self { at: [x, y, z], move_feed: jog.feed, ..self }, point))
+    }
+
+    /// Sets the modes of the line, and what its M3 to M9, S and T say.
+    fn set_modes(&mut self, block: &Block, settings: &Settings) -> Result<(), CommandError> {
+        self.motion = block.motion.unwrap_or(self.motion);
+        self.plane = block.plane.unwrap_or(self.plane);
+        self.relative = block.relative.unwrap_or(self.relative);
+        self.system = block.system.unwrap_or(self.system);
+        match block.coolant {
+            Some(7) => self.coolant[0] = true,
+            Some(8) => self.coolant[1] = true,
+            Some(_) => self.coolant = [false; 2],
+            None => {}
+        }
+        if let Some(Ok(tool)) = block.number(b'T').map(Decimal::to_whole) {
+            self.tool = tool.clamp(0, 255) as u8;
+        }
+        let servo = block.action == Action::Servo;
+        if let Some(speed) = block.number(b'S')
+            && (servo || !block.is_foreign())
+        {
+            self.take_speed(clamped(speed), servo, settings);
+        }
+        if let Some(spindle) = block.spindle {
+            // A dot that M3 asked for is still to be drawn.
+            let waited = spindle == 5 && self.take_dot();
+            self.turn(spindle);
+            self.set_dot(waited);
+        }
+        self.settle_speed(block.has(b'S') || block.spindle.is_some(), settings);
+        if servo && PenRule::of(settings) != PenRule::Power {
+            return Err(BlockError::ServoIsOff.into());
+        }
+        Ok(())
+    }
+
+    /// Sets the speed of the line, and the units that it is given in.
+    fn set_feed(&mut self, block: &Block) -> Result<(), CommandError> {
+        self.inches = block.inches.unwrap_or(self.inches);
+        let was_inverse = self.inverse_time;
+        self.inverse_time = block.inverse_time.unwrap_or(self.inverse_time);
+        let motion = block.motion.unwrap_or(self.motion);
+        if self.inverse_time {
+            let is_feed = matches!(motion, Motion::Line | Motion::Arc(_));
+            let feed = block.number(b'F').map(clamped).unwrap_or_default();
+            if block.axis_use == AxisUse::Motion && is_feed && feed <= 0 {
+                return Err(BlockError::NoFeed.into());
+            }
+            self.feed = feed;
+        } else if let Some(feed) = block.number(b'F') {
+            // A speed beyond the range of numbers is beyond every limit, too.
+            self.feed = self.length(feed).unwrap_or(Millimetres::MAX);
+        } else if was_inverse {
+            self.feed = Millimetres::ZERO;
+        }
+        self.move_feed = self.feed;
+        Ok(())
+    }
+
+    /// Notes what Z says of the pen.
+    fn take_z(&mut self, block: &Block, settings: &Settings) -> Result<(), CommandError> {
+        let moves = matches!(block.axis_use, AxisUse::Motion);
+        if moves && block.has(b'Z') {
+            let z = self.coordinate(block, b'Z')?;
+            let relative = self.relative && block.action != Action::Machine;
+            if let Some(is_down) = pen::is_down_at(z, relative, settings) {
+                self.take_height(is_down);
+            }
+        }
+        Ok(())
+    }
+
+    /// The order for the coordinates of a line. Moves the position to their end.
+    fn motion(
+        &mut self,
+        block: &Block,
+        context: &Context<'_>,
+        rule: PenRule,
+    ) -> Result<Order, CommandError> {
+        let steps = context.settings.page_steps();
+        let [from_x, from_y, _] = self.at;
+        let [x, y, z] = self.destination(block, context)?;
+        if let Motion::Arc(turn) = self.motion {
+            let arc = self.arc(block, [[from_x, from_y], [x, y]], turn, steps)?;
+            self.check_used_in_motion(block)?;
+            if self.inverse_time {
+                return Err(BlockError::InverseArc.into());
+            }
+            self.at = [x, y, z];
+            self.draws = self.begin_move(rule);
+            return Ok(Order::Arc(arc));
+        }
+        self.check_used_in_motion(block)?;
+        if self.inverse_time && self.motion == Motion::Line {
+            self.move_feed = inverse_feed([from_x, from_y], [x, y], self.feed);
+        }
+        if self.motion == Motion::Rapid {
+            self.move_feed = Millimetres::ZERO;
+        }
+        self.at = [x, y, z];
+        if !block.has_any(b"XY") && block.action != Action::Machine {
+            // Z alone moves nothing but the pen.
+            return Ok(Order::Nothing);
+        }
+        self.draws = self.begin_move(rule);
+        Ok(Order::Line(steps_at([x, y], steps)))
+    }
+
+    /// Checks that a line that does not move has no words that it does not use.
+    fn check_used(&self, block: &Block) -> Result<(), CommandError> {
+        block.check_used(match block.action {
+            Action::Dwell => b"P",
+            Action::SetSystem => b"PL",
+            _ => b"",
+        })
+    }
+
+    /// Checks that a move has no words that it does not use.
+    fn check_used_in_motion(&self, block: &Block) -> Result<(), CommandError> {
+        block.check_used(match self.motion {
+            Motion::Arc(_) if block.has(b'R') => b"R",
+            Motion::Arc(_) => b"IJK",
+            _ => b"",
+        })
+    }
+
+    /// The order of M0, M2, M6 or M30.
+    fn flow(&mut self, flow: Flow) -> Order {
+        match flow {
+            Flow::Pause => Order::Pause { for_pen: false },
+            Flow::ChangePen => Order::Pause { for_pen: true },
+            Flow::End => {
+                self.motion = Motion::Line;
+                self.plane = Plane(0);
+                self.relative = false;
+                self.inverse_time = false;
+                self.system = 0;
+                self.coolant = [false; 2];
+                Order::End
+            }
+        }
+    }
+
+    /// The coordinate of a letter, in millimetres.
+    fn coordinate(&self, block: &Block, letter: u8) -> Result<Millimetres, CommandError> {
+        block.number(letter).map_or(Ok(Millimetres::ZERO), |number| self.length(number))
+    }
+
+    /// A length as given in the current unit, in millimetres.
+    fn length(&self, number: Decimal) -> Result<Millimetres, CommandError> {
+        let bits = number.to_binary(16).map_err(|_| CommandError::NumberOutOfRange)?;
+        let bits = product(bits, if self.inches { 127 } else { 5 });
+        i32::try_from(divide_rounding(bits, 5))
+            .map(Millimetres::from_bits)
+            .map_err(|_| CommandError::NumberOutOfRange)
+    }
+
+    /// The modes as `$G` shows them: the numbers after G, those after M without the coolant, and
+    /// whether M7 and M8 are in force.
+    pub(super) fn modes(&self) -> ([u8; 6], u8, [bool; 2]) {
+        let distance = 90 + u8::from(self.relative);
+        let feed = 94 - u8::from(self.inverse_time);
+        let units = 21 - u8::from(self.inches);
+        let plane = 17 + self.plane.0;
+        let modes = [self.motion.number(), 54 + self.system, plane, units, distance, feed];
+        (modes, self.spindle, self.coolant)
+    }
+
+    /// T, F in mm/min or 1/min, and S.
+    pub(super) fn numbers(&self) -> (u8, Millimetres, Millimetres) {
+        (self.tool, self.feed, self.speed)
+    }
+
+    /// S as a status report has it: 0 while M5 is in force.
+    pub(super) fn speed_in_force(&self) -> Millimetres {
+        if self.spindle == 5 { Millimetres::ZERO } else { self.speed }
+    }
+
+    /// The shift by G92, and that of Z by G43.1.
+    pub(super) fn shifts(&self) -> (MachinePosition, Millimetres) {
+        (self.shift, self.tool_length)
+    }
+}
+
+/// A number that is not a length; one beyond the range is its end.
+fn clamped(number: Decimal) -> Millimetres {
+    number.to_millimetres().unwrap_or(Millimetres::MAX)
+}
+
+/// The speed of a straight move in mm/min, where `feed` is one divided by its minutes.
+fn inverse_feed(from: [Millimetres; 2], to: [Millimetres; 2], feed: Millimetres) -> Millimetres {
+    // Differences are below 2^32 units of 2^-16 mm; halved, their squares are below 2^62.
+    let half = |axis: usize| {
+        (i64::from(to[axis].to_bits()) - i64::from(from[axis].to_bits())).unsigned_abs() / 2
+    };
+    let length = 2 * (half(0) * half(0) + half(1) * half(1)).isqrt();
+    let bits = (u128::from(length) * u128::from(feed.to_bits().unsigned_abs())) >> 16;
+    Millimetres::from_bits(i32::try_from(bits).unwrap_or(i32::MAX).max(1))
+}
+
+/// The length in steps from the page's origin, clamped to a value that still lies beyond every
+/// page.
+fn to_steps(length: Millimetres, per_mm: Millimetres) -> i32 {
+    let exact = i64::from(length.to_bits()) * i64::from(per_mm.to_bits());
+    let steps = divide_rounding(exact.into(), 1 << 32);
+    steps.clamp((-2 * PAGE_LIMIT).into(), (2 * PAGE_LIMIT).into()) as i32
+}
+
+/// A position in steps.
+fn steps_at([x, y]: [Millimetres; 2], steps: StepsPerMillimetre) -> PagePoint {
+    PagePoint { x: to_steps(x, steps[0]), y: to_steps(y, steps[1]) }
+}
