@@ -242,6 +242,9 @@ pub struct PreviewArgs {
     /// The file to show.
     #[arg(value_name = "FILE", help = file_help("The file to show"))]
     pub file: PathBuf,
+    /// Compute with the memory and the limits of this board [default: those of this computer]
+    #[arg(long, value_parser = board::parser(), help_heading = "Plotter")]
+    pub board: Option<&'static BoardRow>,
     /// The camera, the page and the order of the strokes.
     #[command(flatten)]
     pub view: ViewArgs,

@@ -40,6 +40,7 @@ pub mod preview;
 pub mod progress;
 pub mod protocol;
 pub mod results;
+pub mod room;
 pub mod run;
 pub mod sender;
 pub mod tape;

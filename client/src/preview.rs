@@ -11,9 +11,11 @@ use crate::motion_plot::{self, Motion};
 use crate::page::{PagePoint, PenRuns, Run};
 use crate::protocol::PLOT;
 use crate::results::{JobResult, Lengths, Timings};
+use crate::room::Room;
 use crate::watch::PenWatch;
-use penup::boards::host::{Change, HostBoard, lend_memory};
+use penup::boards::host::{Change, HostBoard};
 use penup::geometry::{Projection, Vertex};
+use penup::index::Index;
 use penup::machine::{EventRing, Path, PulserState, Setting, Settings, Target};
 use penup::motion::TICKS_PER_SECOND;
 use penup::plotter::{Observer, Plotter};
@@ -27,10 +29,10 @@ use std::time::{Duration, Instant};
 /// The number of ticks in a second.
 const SECOND: f64 = TICKS_PER_SECOND as f64;
 
-/// A plotter in this process.
-pub struct InMemory {
+/// A plotter in this process, with numbers of 32 bits, or of 16 as on a board.
+pub struct InMemory<I: Index = u32> {
     board: HostBoard<'static>,
-    plotter: Plotter<'static>,
+    plotter: Plotter<'static, I>,
     steps: u64,
     pen: Option<PenWatch>,
     /// The times, in ticks, of the first and the last change of a pin since the plot command.
@@ -41,20 +43,15 @@ pub struct InMemory {
     waits: u64,
 }
 
-impl InMemory {
-    /// Starts a plotter with default settings.
-    pub fn new() -> Self {
-        Self::with_settings(Settings::default())
-    }
-
-    /// Starts a plotter with these settings.
-    pub fn with_settings(settings: Settings) -> Self {
+impl<I: Index> InMemory<I> {
+    /// Starts a plotter with this memory and these settings.
+    pub fn new(room: Room, settings: Settings) -> Self {
         // The memory is leaked because the plotter and the board borrow from it as long as the
         // process lives; there is only one per run.
         let ring = Box::leak(Box::new(EventRing::new()));
         let pins = Box::leak(Box::new(PulserState::new()));
         let mut board = HostBoard::new(ring, pins);
-        let plotter = Plotter::with_settings(lend_memory(), pins, settings);
+        let plotter = Plotter::with_settings(room.lend(), pins, settings).without_undo();
         plotter.greet(&mut board);
         Self { board, plotter, steps: 0, pen: None, span: None, waited: false, waits: 0 }
     }
@@ -96,10 +93,10 @@ impl InMemory {
         })
     }
 
-    /// The number of vertices of the model that was sent, and the number of its corners.
+    /// The number of vertices of the model that was sent, and the number of its corners on a board.
     pub fn model_size(&self) -> (usize, usize) {
         let model = self.plotter.model();
-        (model.vertices().len(), model.corner_count())
+        (model.vertices().len(), model.corner_count_of::<u16>())
     }
 
     /// Computes the drawing and measures its moves, as the plotter does before the first move.
@@ -194,13 +191,7 @@ impl InMemory {
     }
 }
 
-impl Default for InMemory {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl Link for InMemory {
+impl<I: Index> Link for InMemory<I> {
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
         // The command is between the line's number and its checksum.
         let plots = |part: &[u8]| part.starts_with(PLOT.as_bytes());
@@ -318,8 +309,8 @@ impl Segments {
     }
 }
 
-impl Observer for Segments {
-    fn stretch(&mut self, view: &View, stretch: &Stretch) {
+impl<I: Index> Observer<I> for Segments {
+    fn stretch(&mut self, view: &View, stretch: &Stretch<I>) {
         if stretch.visible {
             let (p, q) = stretch.ends;
             let [[x1, y1], [x2, y2]] = [stretch.from, stretch.to].map(|end| image(view, p, q, end));

@@ -18,14 +18,17 @@ use crate::manual;
 use crate::operate::{self, SavedSettings};
 use crate::outcome::Outcome;
 use crate::output;
+use crate::page::Page;
 use crate::picture::{self, Picture};
 use crate::ports;
 use crate::preview::InMemory;
 use crate::progress::{Bar, Progress, duration};
 use crate::results::JobReport;
+use crate::room::Room;
 use crate::sender::{Patience, Sender};
 use crate::tape;
 use crate::workspace;
+use penup::index::Index;
 use penup::machine::Setting;
 use penup::step::tape::BadCode;
 use serde_json::{Value, json};
@@ -134,17 +137,37 @@ fn preview(args: &PreviewArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Ou
         return Err(Error::MotionOfOtherMachine);
     }
     let job = Job::new(source, &settings);
-    let mut bar = Bar::new(quiet);
-    let mut plotter = InMemory::with_settings(machine);
-    let report = draw(&mut plotter, &job, interrupt, &mut bar)?;
+    let bar = Bar::new(quiet);
+    match args.board {
+        None => {
+            let plotter = InMemory::<u32>::new(Room::for_job(&job), machine);
+            show(plotter, &job, settings.page, args, &outputs, bar, interrupt)
+        }
+        Some(board) => {
+            let plotter = InMemory::<u16>::new(Room::of_board(board), machine);
+            show(plotter, &job, settings.page, args, &outputs, bar, interrupt)
+        }
+    }
+}
+
+/// Draws the job by `plotter` and writes the pictures and reports that the arguments name.
+fn show<I: Index>(
+    mut plotter: InMemory<I>,
+    job: &dyn Lines,
+    page: Page,
+    args: &PreviewArgs,
+    outputs: &Outputs,
+    mut bar: Bar,
+    interrupt: &AtomicBool,
+) -> Result<Outcome, Error> {
+    let report = draw(&mut plotter, job, interrupt, &mut bar)?;
     let mut result = plotter.result()?;
     for _ in 1..args.repeat {
         result.timings_ms = result.timings_ms.best(plotter.result()?.timings_ms);
     }
     drop(bar);
-    let picture =
-        Picture { page: settings.page, runs: result.pen.runs.clone(), step: result.pen.step };
-    let mut files = write_pictures(&picture, &outputs)?;
+    let picture = Picture { page, runs: result.pen.runs.clone(), step: result.pen.step };
+    let mut files = write_pictures(&picture, outputs)?;
     if let Some(path) = &outputs.json {
         let text = serde_json::to_string(&result).map_err(|error| Error::Write {
             file: path.display().to_string(),
@@ -198,7 +221,8 @@ fn encode_tape(
     output::check(&args.file, &[&output])?;
     let (source, settings) = read(&args.file, &args.view, quiet)?;
     let job = Job::new(source, &settings);
-    let mut plotter = InMemory::new();
+    let mut plotter =
+        InMemory::<u32>::new(Room::for_job(&job), penup::machine::Settings::default());
     {
         let mut bar = Bar::new(quiet);
         let mut sender = Sender::open(&mut plotter, Patience::default(), interrupt)?;

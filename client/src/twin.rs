@@ -2,9 +2,10 @@
 //! same plotter library on this computer.
 
 use crate::lines::Lines;
+use crate::room::Room;
 use penup::boards::host::HostBoard;
 use penup::machine::{EventRing, PulserState};
-use penup::model::{Corner, Position, VERTEX_NUMBER_LIMIT};
+use penup::model::{Corner, Position};
 use penup::plotter::{EMPTY_LOOKAHEAD, MemorySlices, Plotter};
 use penup::protocol::LineReader;
 
@@ -13,8 +14,10 @@ use penup::protocol::LineReader;
 pub fn contents(lines: &dyn Lines, count: usize) -> Option<[u32; 2]> {
     let (mut ring, pins) = (EventRing::new(), PulserState::new());
     let mut board = HostBoard::new(&mut ring, &pins);
-    let mut vertices = Box::new([Position::ORIGIN; VERTEX_NUMBER_LIMIT]);
-    let mut corners = vec![<Corner>::ZERO; 1 << 16];
+    // The checksums do not depend on the width of the numbers.
+    let room = Room::for_job(lines);
+    let mut vertices = vec![Position::ORIGIN; room.vertices];
+    let mut corners = vec![Corner::<u32>::ZERO; room.corners];
     let mut blocks = EMPTY_LOOKAHEAD;
     // Without working memory, the plotter does not copy the model after each line, which saves
     // time.
@@ -22,7 +25,7 @@ pub fn contents(lines: &dyn Lines, count: usize) -> Option<[u32; 2]> {
     let readers = &mut [LineReader::new()];
     let blocks = &mut blocks;
     let memory =
-        MemorySlices { vertices: &mut *vertices, corners: &mut corners, blocks, words, readers };
+        MemorySlices { vertices: &mut vertices, corners: &mut corners, blocks, words, readers };
     let mut plotter = Plotter::new(memory, &pins);
     for line in (0..count).filter_map(|index| lines.line(index)) {
         board.receive(line.sent.as_bytes());

@@ -4,9 +4,10 @@
 //! Time passes only in [`Board::wait`] and [`HostBoard::pass`], and while bytes are sent at a set
 //! baud rate. So a run gives the same result every time.
 
+use crate::index::Index;
 use crate::machine::{Contacts, EventRing, Pen, Pins, Pulser, PulserState, StepQueue, Tick};
 use crate::model::{Corner, Position};
-use crate::motion::EventQueue;
+use crate::motion::{Block, EventQueue};
 use crate::plotter::{Board, EMPTY_LOOKAHEAD, MemorySlices};
 use crate::protocol::{LineReader, RealTime, Sorter};
 use core::convert::Infallible;
@@ -23,18 +24,25 @@ pub const PORTS: usize = 2;
 /// The number of slots in the queue, as many as in the smallest board's queue.
 pub const QUEUE_LENGTH: usize = 624;
 
-/// Allocates memory for a plotter on a computer: as many vertices as an element can name, and ten
-/// times the working memory that any board's jobs use. The memory is leaked, so it lasts as long as
-/// the process.
+/// Allocates memory for a plotter with numbers of 16 bits: as many vertices as an element can name,
+/// and ten times the working memory that any board's jobs use. See [`lend_memory_of`].
 pub fn lend_memory() -> MemorySlices<'static> {
-    const VERTICES: usize = <Corner>::VERTEX_NUMBER_LIMIT;
-    const CORNERS: usize = 1 << 16;
-    const WORDS: usize = 1 << 19;
+    lend_memory_of(<Corner>::VERTEX_NUMBER_LIMIT, 1 << 16, 1 << 19, EMPTY_LOOKAHEAD.len())
+}
+
+/// Allocates memory for a plotter: for so many vertices, corners, words to work in and moves planned
+/// ahead. It is leaked, so it lasts as long as the process.
+pub fn lend_memory_of<I: Index>(
+    vertices: usize,
+    corners: usize,
+    words: usize,
+    blocks: usize,
+) -> MemorySlices<'static, I> {
     MemorySlices {
-        vertices: std::vec![Position::ORIGIN; VERTICES].leak(),
-        corners: std::vec![<Corner>::ZERO; CORNERS].leak(),
-        blocks: Box::leak(Box::new(EMPTY_LOOKAHEAD)),
-        words: std::vec![0; WORDS].leak(),
+        vertices: std::vec![Position::ORIGIN; vertices].leak(),
+        corners: std::vec![Corner::ZERO; corners].leak(),
+        blocks: std::vec![Block::EMPTY; blocks].leak(),
+        words: std::vec![0; words].leak(),
         readers: Box::leak(Box::new([const { LineReader::new() }; PORTS])),
     }
 }

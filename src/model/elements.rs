@@ -4,9 +4,6 @@ use super::Pens;
 use crate::index::Index;
 use bytemuck::{Pod, Zeroable};
 
-/// One more than the greatest vertex number that an element of 16-bit numbers can hold.
-pub const VERTEX_NUMBER_LIMIT: usize = <Corner>::VERTEX_NUMBER_LIMIT;
-
 /// A vertex number as an element stores it, with two flags.
 ///
 /// The lowest bits are the vertex number, from 0: 14 bits of the 16 on a board. The next bit is set

@@ -20,7 +20,7 @@ mod vertices;
 
 pub use curves::{Curves, StoredCurve};
 pub use edit::{Change, Edit, ElementKind, Numbers};
-pub use elements::{Corner, Element, Elements, VERTEX_NUMBER_LIMIT};
+pub use elements::{Corner, Element, Elements};
 pub use error::ModelError;
 pub use pens::{PEN_LIMIT, PenName, PenRun, PenWriter, Pens};
 
@@ -198,6 +198,18 @@ impl<'m, I: Index> Model<'m, I> {
     /// and of pen changes.
     pub fn corner_count(&self) -> usize {
         self.store.used()
+    }
+
+    /// Returns the same for a model whose numbers have the width of `J`. Curves take fewer numbers of
+    /// 32 bits than of 16.
+    pub fn corner_count_of<J: Index>(&self) -> usize {
+        let curves = self.curves();
+        let (mut here, mut there) = (0, 0);
+        for curve in curves.iter() {
+            here += curve.length();
+            there += curve.length_of::<J>();
+        }
+        self.store.used() - here + there
     }
 
     /// Returns the greatest number of these units.

@@ -22,17 +22,18 @@ pub(super) struct UndoCopy<'k, I> {
     copy_words: &'k mut usize,
     /// The last job; its memory is given up to the copy.
     job: &'k mut Job<I>,
-    /// Whether the machine is idle. Otherwise the job may still be drawing, and no copy is made.
-    is_idle: bool,
+    /// Whether a copy may be made: not while a job may still be drawn from the same memory, and not
+    /// by a plotter that cannot undo.
+    is_made: bool,
 }
 
 impl<I: Index> UndoCopy<'_, I> {
     /// Saves `model`, which is about to change, in place of the last copy. Keeps no copy if it does
-    /// not fit or the machine is not idle.
+    /// not fit or may not be made.
     #[inline(never)] // Several callers share one copy of the code.
     pub(super) fn save(&mut self, model: &Model<'_, I>) {
         *self.copy_words = 0;
-        if self.is_idle {
+        if self.is_made {
             self.job.release();
             if model.save(self.words) {
                 *self.copy_words = model.saved_words();
@@ -50,9 +51,9 @@ impl<'m, I: Index> Inner<'m, I> {
         let next = Some(self.model.saved_words()).filter(|words| *words <= self.words.len());
         let copies = self.copy_words.max(next.unwrap_or(0));
         let (words, free) = self.words.split_at_mut(copies.min(self.words.len()));
-        let is_idle = self.machine.state() == State::Idle;
+        let is_made = self.can_undo && self.machine.state() == State::Idle;
         let undo_copy =
-            UndoCopy { words, copy_words: &mut self.copy_words, job: &mut self.job, is_idle };
+            UndoCopy { words, copy_words: &mut self.copy_words, job: &mut self.job, is_made };
         (&mut self.model, undo_copy, Scratch::new(free))
     }
 

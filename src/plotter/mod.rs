@@ -120,6 +120,8 @@ struct Inner<'m, I> {
     /// How many of the first `words` hold the copy of the model before its last change; 0 if there
     /// is no copy.
     copy_words: usize,
+    /// Whether the model is copied before each change.
+    can_undo: bool,
     program: Program,
     /// What stays when a program ends.
     parameters: Parameters,
@@ -164,6 +166,7 @@ impl<'m, I: Index> Plotter<'m, I> {
                 job: Job::default(),
                 cursor: Cursor::default(),
                 copy_words: 0,
+                can_undo: true,
                 program: Program::default(),
                 parameters: Parameters::default(),
                 busy_at: 0,
@@ -173,6 +176,14 @@ impl<'m, I: Index> Plotter<'m, I> {
                 pen_reported: None,
             },
         }
+    }
+
+    /// Returns the same plotter without `$undo`. With it, the time in which a model is received grows
+    /// with the square of its size, because the whole model is copied before each change.
+    #[must_use]
+    pub fn without_undo(mut self) -> Self {
+        self.inner.can_undo = false;
+        self
     }
 
     /// Writes the greeting: the first line that a sender sees. It is also the reply to ctrl-X.

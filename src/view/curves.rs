@@ -94,7 +94,7 @@ impl Flattening<'_> {
                 number += 1;
                 curve += usize::from(begins);
                 if let Some(end) = curve_ends.get_mut(curve - 1) {
-                    *end = I::new(number); // at most VERTEX_NUMBER_LIMIT
+                    *end = I::new(number); // at most the limit of a corner
                 }
                 Ok(())
             })?;

@@ -26,7 +26,6 @@ use crate::lines::{JobLine, Lines};
 use crate::page::Page;
 use crate::table::BOARDS;
 use format::{Contents, Format, SIZE_LIMIT};
-use penup::model::VERTEX_NUMBER_LIMIT;
 use std::fs::{File, Metadata};
 use std::io::{self, Read as _};
 use std::path::Path;
@@ -189,7 +188,6 @@ fn counted(number: usize, [one, many]: [&str; 2]) -> String {
 fn capacity(points: usize) -> Option<String> {
     let boards = BOARDS.iter().map(|board| (board.name, board.memory.vertices));
     let short: Vec<String> = boards
-        .chain([("preview", VERTEX_NUMBER_LIMIT)])
         .filter(|(_, limit)| *limit < points)
         .map(|(name, limit)| format!("{name} takes {limit}"))
         .collect();

@@ -8,6 +8,7 @@ use crate::lines::Lines;
 use crate::machine_settings::simulated;
 use crate::preview::InMemory;
 use crate::protocol::{MODEL, Reply};
+use crate::room::Room;
 use crate::sender::Sender;
 
 /// How much a plotter holds, and how much a model takes.
@@ -25,7 +26,7 @@ pub fn rehearse(sender: &mut Sender<'_>, job: &dyn Lines) -> Result<(), Error> {
     let capacity = agreed(sender, |sender| Ok(capacity_in(&sender.ask(MODEL)?)))?;
     // Settings of a newer firmware are not known here. Then the plotter itself decides.
     let Ok(machine) = simulated(&read(sender)?) else { return Ok(()) };
-    let mut plotter = InMemory::with_settings(machine);
+    let mut plotter = InMemory::<u32>::new(Room::for_job(job), machine);
     if !plotter.take(job) {
         // The plotter names the line that it refuses.
         return Ok(());

@@ -54,6 +54,7 @@ fn help_names_every_option() {
     }
     assert!(plot.contains("--board") && plot.contains("--port"));
     assert!(preview.contains("--json") && preview.contains("--repeat"));
+    assert!(preview.contains("--board"));
 }
 
 #[test]
@@ -113,6 +114,32 @@ fn memory_grows_with_the_file_and_little_faster() {
         said.starts_with("penup: many.obj:2000001: wrong number of values: it takes 3 numbers"),
         "{said}"
     );
+}
+
+#[test]
+fn only_a_board_limits_a_preview() {
+    // More points than a number of 16 bits can tell apart, in one line to and fro.
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |number: usize| {
+        let (row, column) = (number / 250, number % 250);
+        let x = if row.is_multiple_of(2) { column } else { 249 - column };
+        format!("v {}.{} {}.{} 0\n", x / 2, 5 * (x % 2), row / 2, 5 * (row % 2))
+    };
+    let points: String = (0..66_000).map(at).collect();
+    let bars: String = (1..66_000).map(|number| format!("l {number} {}\n", number + 1)).collect();
+    fs::write(folder.path().join("large.obj"), points + &bars).expect("written");
+    let preview = ["preview", "large.obj", "--json", "large.json", "--effort", "0"];
+    let (code, said, noted) = penup(folder.path(), &preview);
+    assert_eq!((code, noted.as_str()), (Some(0), ""), "{said}");
+    let json = fs::read_to_string(folder.path().join("large.json")).expect("written");
+    let result: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+    let strokes = result["strokes"].as_array().expect("strokes");
+    assert_eq!(strokes.len(), 1);
+    assert_eq!(strokes[0].as_array().expect("points").len(), 66_000);
+    // A board holds fewer.
+    let (code, _, refused) = penup(folder.path(), &[&preview[..], &["--board", "pico"]].concat());
+    assert_eq!(code, Some(1));
+    assert!(refused.contains("4096"), "{refused}");
 }
 
 #[test]

@@ -18,7 +18,7 @@ impl CurveList {
     /// Deletes the curves in `range`. If `plug`, the last curve moves to the position of the first
     /// of them.
     pub fn delete<I: Index>(&mut self, store: &mut Store<'_, I>, range: Range<usize>, plug: bool) {
-        let length = |number| self.curves(store).iter().nth(number).map(|curve| curve.half_words());
+        let length = |number| self.curves(store).iter().nth(number).map(|curve| curve.length());
         let mut gone = range.clone();
         let last = self.count - 1; // the range is not empty
         if plug && range.start < last {

@@ -33,9 +33,14 @@ pub struct StoredCurve<'a, I = u16> {
 }
 
 impl<'a, I: Index> StoredCurve<'a, I> {
-    /// Returns how many half-words of the model's memory it takes.
-    pub fn half_words(&self) -> usize {
-        length_of::<I>(self.control.len(), self.knots.count().unwrap_or(0))
+    /// Returns how many numbers of the model's memory it takes.
+    pub fn length(&self) -> usize {
+        self.length_of::<I>()
+    }
+
+    /// Returns how many numbers with the width of `J` it would take.
+    pub fn length_of<J: Index>(&self) -> usize {
+        length_of::<J>(self.control.len(), self.knots.count().unwrap_or(0))
     }
 
     /// Returns the curve over these points.

@@ -28,7 +28,7 @@ impl<I: Index> Model<'_, I> {
                     if range.contains(&at) {
                         None
                     } else if plug && at == last {
-                        Some(I::new(range.start)) // below VERTEX_NUMBER_LIMIT
+                        Some(I::new(range.start)) // below the number of vertices
                     } else if plug || at < range.start {
                         Some(number)
                     } else {

@@ -29,7 +29,7 @@ impl<I: Index> Model<'_, I> {
             let Some(position) = self.vertices.get(at) else { continue };
             let near = |(image, c): (i64, i32)| (image - i64::from(c)).unsigned_abs() <= ON_PLANE;
             let stays = map.apply(*position).into_iter().zip(position.coordinates()).all(near);
-            // The number is below VERTEX_NUMBER_LIMIT, otherwise the edit is refused below.
+            // The number fits a corner, otherwise the edit is refused below.
             *image = I::new(if stays { at } else { count });
             count += usize::from(!stays);
         }
@@ -60,7 +60,7 @@ impl<I: Index> Model<'_, I> {
             .curves()
             .iter()
             .filter(|curve| is_copied(&mut curve.control.iter().copied()))
-            .map(|curve| curve.half_words())
+            .map(|curve| curve.length())
             .sum();
         self.store.check_room(of_elements + of_curves)?;
         let positions = self.vertices.get(range.clone()).unwrap_or(&[]);
