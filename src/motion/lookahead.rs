@@ -29,7 +29,7 @@ pub struct Block {
     pub(super) curve_limit: PathLength,
     pub(super) ink: Option<LineType>,
     /// See [`Move`](super::Move).
-    pub(super) offsets: [i8; 2],
+    pub(super) offsets: [i16; 2],
     pub(super) kind: BlockKind,
     /// The chords behind the first one, of which `dx` and `dy` tell.
     pub(super) chords: Chords,

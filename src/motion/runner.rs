@@ -56,7 +56,7 @@ pub struct Move {
     pub motors: PagePoint,
     /// How far start and end lie beside the motors' steps: see
     /// [`Line::beside`](crate::step::Line::beside).
-    pub offsets: [i8; 2],
+    pub offsets: [i16; 2],
     /// Where it takes the pen.
     pub page: PagePoint,
     /// The whole move on the page,

@@ -37,9 +37,11 @@ pub struct Line {
 }
 
 impl Line {
-    /// The number of offset units of [`Line::beside`] in one step. An offset of 127 units is just
-    /// less than half a step.
-    pub const OFFSET_UNIT: i32 = 255;
+    /// The number of offset units of [`Line::beside`] in one step.
+    pub const OFFSET_UNIT: i32 = 8191;
+
+    /// The greatest offset, which is just less than half a step.
+    pub const GREATEST_OFFSET: i16 = (Line::OFFSET_UNIT / 2) as i16;
 
     /// The moves from `from` to `to`, both within the page.
     pub const fn new(from: PagePoint, to: PagePoint) -> Self {
@@ -79,20 +81,20 @@ impl Line {
 
     /// The moves by `dx`, `dy` steps of a segment of a line or curve whose exact ends lie beside
     /// the grid points. `offsets` says how far they lie beside them at the start and at the end, in
-    /// units of 1/255 of a step within ±127, along the axis of fewer moves (x if both axes have
+    /// units of 1/8191 of a step within ±4095, along the axis of fewer moves (x if both axes have
     /// equally many). Segments made this way join to a line that is nowhere off by more than half a
     /// step.
     ///
-    /// `dx` and `dy` must be within ±2^21.
+    /// `dx` and `dy` must be within ±2^16, unless both offsets are 0.
     ///
     /// ```
     /// use penup::step::{Direction::{Right, UpRight}, Line};
     /// let moves: Vec<_> = Line::beside(3, 1, [0, 0]).collect();
     /// assert_eq!(moves, [Right, UpRight, Right]);
-    /// let moves: Vec<_> = Line::beside(3, 1, [100, 100]).collect();
+    /// let moves: Vec<_> = Line::beside(3, 1, [3200, 3200]).collect();
     /// assert_eq!(moves, [UpRight, Right, Right]);
     /// ```
-    pub fn beside(dx: i32, dy: i32, offsets: [i8; 2]) -> Self {
+    pub fn beside(dx: i32, dy: i32, offsets: [i16; 2]) -> Self {
         const UNIT: i32 = Line::OFFSET_UNIT;
         let mut line = Self::by(dx, dy);
         if offsets == [0; 2] {
@@ -234,7 +236,8 @@ mod tests {
     fn pieces_whose_ends_lie_beside_the_grid_are_within_half_a_step() {
         for dx in -9i32..=40 {
             for dy in -40i32..=9 {
-                for offsets in [[0, 90], [-127, 127], [127, -127], [50, -3], [127, 127]] {
+                for offsets in [[0, 2900], [-4095, 4095], [4095, -4095], [1600, -100], [4095, 4095]]
+                {
                     let (more, fewer) = if dx.abs() > dy.abs() { (dx, dy) } else { (dy, dx) };
                     let mut at = PagePoint::default();
                     for (index, direction) in Line::beside(dx, dy, offsets).enumerate() {

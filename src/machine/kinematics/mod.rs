@@ -66,7 +66,7 @@ pub struct SegmentEnd {
     pub page: PagePoint,
     /// How far the exact start and the exact end of the segment lie beside the rounded motor
     /// positions: see [`Line::beside`](crate::step::Line::beside).
-    pub offsets: [i8; 2],
+    pub offsets: [i16; 2],
 }
 
 impl Kinematics {

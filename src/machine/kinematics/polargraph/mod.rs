@@ -111,6 +111,7 @@ impl Anchors {
             let [x, y] = if major == 0 { [steps, others] } else { [others, steps] };
             PagePoint { x, y }
         };
+        const GREATEST: i32 = Line::GREATEST_OFFSET as i32;
         let major = usize::from((motors.x - begin.x).abs() <= (motors.y - begin.y).abs());
         let offsets = [(start, begin), (end, motors)].map_each(|(exact, PagePoint { x, y })| {
             let (steps, others) = if major == 0 { (x, y) } else { (y, x) };
@@ -119,7 +120,7 @@ impl Anchors {
             let step = 1 << line.bits;
             let offset = line.other_belt(exact, steps, major) - (others << line.bits);
             let units = offset.clamp(-step, step) * Line::OFFSET_UNIT;
-            rounded(units, line.bits).clamp(-127, 127) as i8
+            rounded(units, line.bits).clamp(-GREATEST, GREATEST) as i16
         });
         let [x, down] = end.position.map_each(|fine| rounded(fine, line.bits));
         let page = PagePoint { x: self.left.x + x, y: self.left.y - down };
