@@ -3,6 +3,7 @@
 use super::*;
 use penup_client::link::Link as _;
 use penup_client::preview::InMemory;
+use penup_client::room::Room;
 use serialport::{SerialPort as _, TTYPort};
 use std::io::{Read as _, Write as _};
 use std::sync::Arc;
@@ -27,7 +28,9 @@ impl Library {
         let unplug = Arc::new(AtomicBool::new(false));
         let unplugged = unplug.clone();
         let thread = std::thread::spawn(move || {
-            let mut plotter = InMemory::new();
+            let settings = penup::machine::Settings::default();
+            let room = Room::of_board(&penup::board_table::PICO);
+            let mut plotter = InMemory::<u16>::new(room, settings);
             let mut buffer = [0; 64];
             while !unplugged.load(Ordering::Relaxed) {
                 // An error says that the program does not hold its end.

@@ -93,6 +93,10 @@ impl Board for Flash<'_, '_> {
         }
     }
 
+    fn microseconds(&mut self) -> u32 {
+        self.board.microseconds()
+    }
+
     fn wait(&mut self) {
         self.board.wait();
     }
