@@ -7,6 +7,7 @@
 //! not help here, the library's table of errors has another text.
 
 use crate::protocol::error_entry;
+use penup::machine::SETTINGS;
 use penup::plotter::OPTIONS;
 
 /// The form of a plotter setting on the command line.
@@ -16,6 +17,8 @@ enum Form {
     Value,
     /// `$name=on` is `--name`.
     Switch,
+    /// `$number=value` is a setting of the machine.
+    Setting,
     /// There is no such option; messages use these words instead.
     Words(&'static str),
 }
@@ -113,6 +116,8 @@ fn named(name: &str, value: Option<&str>) -> String {
         (Some(Form::Switch), Some("off")) => format!("no --{name}"),
         (Some(Form::Switch), _) | (Some(Form::Value), None) => format!("--{name}"),
         (Some(Form::Value), Some(value)) => format!("--{name} {value}"),
+        (Some(Form::Setting), None) => format!("setting {name} of the machine"),
+        (Some(Form::Setting), Some(value)) => format!("setting {name} of the machine to {value}"),
         // The firmware is of another version; its own word is better than nothing.
         (None, None) => name.to_owned(),
         (None, Some(value)) => format!("{name} {value}"),
@@ -123,6 +128,9 @@ fn named(name: &str, value: Option<&str>) -> String {
 fn form(name: &str) -> Option<Form> {
     let words = WORDS.iter().find(|(word, _)| *word == name);
     words.map(|(_, words)| Form::Words(words)).or_else(|| {
+        if SETTINGS.iter().any(|info| name.parse() == Ok(info.number)) {
+            return Some(Form::Setting);
+        }
         let option = OPTIONS.iter().find(|option| option.name == name)?;
         Some(if option.flag.get()?.is_switch { Form::Switch } else { Form::Value })
     })

@@ -2,7 +2,7 @@
 //!
 //! `usvg` resolves styles, units (96 pixels in an inch), the viewBox, references and transforms.
 //! [`flatten`] makes polylines of the paths, [`clip`] cuts them at the page and at clip paths,
-//! [`pens`] chooses pens by layers or colours, and [`plan`] writes the lines that are sent.
+//! [`pens`] chooses pens by layers or colours, and [`Plan`] writes the lines that are sent.
 //!
 //! A plotter draws lines: a stroke is drawn along its middle, with its dashes, whatever its width;
 //! a shape that is only filled is drawn as its outline. What has neither is not drawn. Text,
