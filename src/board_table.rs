@@ -177,7 +177,7 @@ pub const LM3S6965: BoardRow = BoardRow {
     flash: Region { start: 0, size: 256 << 10 },
     boot_loader: 0,
     ram: Region { start: 0x2000_0000, size: 64 << 10 },
-    budget: ImageBudget { flash: 256 << 10, ram: 54_672, stack: 10_816 },
+    budget: ImageBudget { flash: 256 << 10, ram: 55_696, stack: 9_792 },
     clock_hertz: 50_000_000,
     pins: Pins {
         step_x: 0,
@@ -192,8 +192,8 @@ pub const LM3S6965: BoardRow = BoardRow {
         limit_y: 5,
         stop: 6,
     },
-    // Enough for a lattice of 125 cubes, and for a stack of 10,864 bytes besides.
-    memory: Capacities { vertices: 1000, corners: 3000, words: 4080, ports: 1, blocks: 16 },
+    // Enough for a lattice of 125 cubes, and for a stack of 9,840 bytes besides.
+    memory: Capacities { vertices: 1000, corners: 3000, words: 4208, ports: 1, blocks: 16 },
     scene: Scene { vertices: 1000, corners: 3000, faces: 750, lines: 820, odd_points: 400 },
     emulator: Emulator::Qemu { machine: "lm3s6965evb" },
     flashing: None,

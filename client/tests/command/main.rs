@@ -138,7 +138,7 @@ fn only_a_board_limits_a_preview() {
     assert_eq!(strokes[0].as_array().expect("points").len(), 66_000);
     // A board holds fewer.
     let (code, _, refused) = penup(folder.path(), &[&preview[..], &["--board", "pico"]].concat());
-    assert_eq!(code, Some(1));
+    assert_eq!(code, Some(4));
     assert!(refused.contains("4096"), "{refused}");
 }
 
