@@ -75,7 +75,7 @@ impl LineReader {
             return;
         }
         let Err(byte) = self.bytes.push(byte) else { return };
-        if self.is_cut || !is_code(&self.bytes) {
+        if self.too_long || self.is_cut || !is_code(&self.bytes) {
             self.too_long = true;
             return;
         }

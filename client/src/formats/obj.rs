@@ -56,7 +56,10 @@ impl Format for Obj {
 
     fn read(&self, file: String, bytes: Vec<u8>) -> Result<Contents, ReadError> {
         match ObjLines::checked(file, bytes, true)? {
-            Checked::Regular(lines) => Ok(Contents::of(lines)),
+            Checked::Regular(lines) => {
+                let bounds = lines.flat.bounds();
+                Ok(Contents { bounds, ..Contents::of(lines) })
+            }
             Checked::Irregular(file, bytes) => irregular::read(file, &bytes),
         }
     }
@@ -75,6 +78,47 @@ pub(super) struct ObjLines {
     /// The position of every line whose number is a multiple of [`CURSOR_EVERY`].
     cursors: Vec<Cursor>,
     count: usize,
+    /// Where the plan lies, if the file is one.
+    flat: Flat,
+}
+
+/// Finds out whether a file is a plan of polylines at one height, and where it lies.
+#[derive(Debug, Default)]
+struct Flat {
+    /// The least and the greatest x, y and z; `None` before the first vertex.
+    bounds: Option<[[f64; 3]; 2]>,
+    /// Whether there is a face, or a curve, whose control points are no bounds.
+    has_others: bool,
+    has_lines: bool,
+}
+
+impl Flat {
+    /// Follows a line that is sent.
+    fn follow(&mut self, line: &str) {
+        let mut words = line.split(' ');
+        match words.next() {
+            Some("v") => {
+                let mut number = || words.next().and_then(|word| word.parse().ok());
+                let (Some(x), Some(y), Some(z)) = (number(), number(), number()) else { return };
+                let point: [f64; 3] = [x, y, z];
+                let [low, high] = self.bounds.get_or_insert([point; 2]);
+                for axis in 0..3 {
+                    low[axis] = low[axis].min(point[axis]);
+                    high[axis] = high[axis].max(point[axis]);
+                }
+            }
+            Some("l") => self.has_lines = true,
+            Some("f" | "curv") => self.has_others = true,
+            _ => {}
+        }
+    }
+
+    /// The least and the greatest x and y of a plan; `None` if the file is none.
+    fn bounds(&self) -> Option<[[f64; 2]; 2]> {
+        let [low, high] = self.bounds?;
+        let is_plan = self.has_lines && !self.has_others && low[2] == high[2];
+        is_plan.then_some([[low[0], low[1]], [high[0], high[1]]])
+    }
 }
 
 /// A position of the reader in the bytes of a file.
@@ -118,7 +162,8 @@ impl ObjLines {
         if bytes.starts_with(b"\xFF\xFE") || bytes.starts_with(b"\xFE\xFF") {
             return Err(ReadError::Utf16 { file: name });
         }
-        let mut file = Self { name, bytes, cursors: Vec::new(), count: 0 };
+        let flat = Flat::default();
+        let mut file = Self { name, bytes, cursors: Vec::new(), count: 0, flat };
         let mut cursor = Cursor::default();
         if file.bytes.starts_with(b"\xEF\xBB\xBF") {
             cursor.at = 3;
@@ -131,6 +176,7 @@ impl ObjLines {
                 Ok(None) => return Ok(Checked::Regular(file)),
                 Ok(Some(from)) => {
                     vertices += usize::from(content.starts_with("v "));
+                    file.flat.follow(&content);
                     if content.starts_with("usemtl") || content.starts_with("g ") {
                         pens.insert(content.clone());
                     }

@@ -16,6 +16,10 @@ use std::time::Duration;
 struct Library {
     device: String,
     unplug: Arc<AtomicBool>,
+    /// The plot command has come.
+    drawing: Arc<AtomicBool>,
+    /// Its time passes a tenth as fast.
+    slow: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -26,23 +30,30 @@ impl Library {
         let device = terminal.name().expect("a name");
         drop(terminal);
         let unplug = Arc::new(AtomicBool::new(false));
-        let unplugged = unplug.clone();
+        let (drawing, slow) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
+        let (unplugged, draws, is_slow) = (unplug.clone(), drawing.clone(), slow.clone());
         let thread = std::thread::spawn(move || {
             let settings = penup::machine::Settings::default();
             let room = Room::of_board(&penup::board_table::PICO);
             let mut plotter = InMemory::<u16>::new(room, settings);
+            let mut heard = Vec::new();
             let mut buffer = [0; 64];
             while !unplugged.load(Ordering::Relaxed) {
                 // An error says that the program does not hold its end.
                 if let Ok(count) = wire.read(&mut buffer) {
                     plotter.send(&buffer[..count]).expect("memory");
+                    heard.extend_from_slice(&buffer[..count]);
+                    if heard.windows(5).any(|bytes| bytes == b"$plot") {
+                        draws.store(true, Ordering::Relaxed);
+                    }
                 }
                 let count = plotter.receive(&mut buffer, Duration::ZERO).expect("memory");
                 let _ = wire.write_all(&buffer[..count]);
-                std::thread::sleep(Duration::from_millis(1));
+                let pause = if is_slow.load(Ordering::Relaxed) { 20 } else { 1 };
+                std::thread::sleep(Duration::from_millis(pause));
             }
         });
-        Self { device, unplug, thread: Some(thread) }
+        Self { device, unplug, drawing, slow, thread: Some(thread) }
     }
 
     /// Runs a command that finds this plotter by itself.
@@ -192,7 +203,11 @@ fn a_job_goes_on_without_its_client_and_is_joined_again() {
         .expect("the program runs");
     // The port is the client's as long as it lives.
     let run = |arguments: &[&str]| plotter.run(folder.path(), arguments);
-    std::thread::sleep(Duration::from_millis(1500));
+    plotter.slow.store(true, Ordering::Relaxed);
+    while !plotter.drawing.load(Ordering::Relaxed) {
+        assert_eq!(client.try_wait().expect("a state"), None, "it ended before the drawing");
+        std::thread::sleep(Duration::from_millis(5));
+    }
     assert_eq!(client.try_wait().expect("a state"), None, "it has drawn already");
     let (code, _, _) = run(&["status"]);
     assert_eq!(code, Some(3), "two programs at one port");
@@ -213,6 +228,7 @@ fn a_job_goes_on_without_its_client_and_is_joined_again() {
         (Some(4), true)
     );
     assert_eq!(run(&["resume"]).0, Some(0));
+    plotter.slow.store(false, Ordering::Relaxed);
     let (code, ended) = plotter.json(folder.path(), &["watch"]);
     assert_eq!((code, &ended["state"]), (Some(0), &"Idle".into()));
     assert_eq!(ended["strokes"], serde_json::json!({ "done": 120, "all": 120 }));

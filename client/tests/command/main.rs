@@ -173,6 +173,24 @@ fn an_svg_is_drawn_at_its_place_with_two_pens() {
 }
 
 #[test]
+fn a_plan_that_the_margin_moves_is_told_and_a_solid_is_not() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let told = |text: &str, options: &[&str]| {
+        fs::write(folder.path().join("a.obj"), text).expect("written");
+        let (code, _, noted) =
+            penup(folder.path(), &[&["preview", "a.obj", "--svg", "a.svg"], options].concat());
+        assert_eq!(code, Some(0), "{noted}");
+        noted.contains("the drawing is moved onto the page of 210 x 297 mm with its margin of")
+    };
+    assert!(told("v 0 0 0\nv 20 30 0\nl 1 2\n", &[]));
+    assert!(!told("v 0 0 0\nv 20 30 0\nl 1 2\n", &["--margin", "0"]));
+    assert!(!told("v 0 0 0\nv 20 30 0\nl 1 2\n", &["--fit"]));
+    assert!(!told("v 30 30 2\nv 50 50 2\nl 1 2\n", &[]));
+    assert!(!told("v 0 0 0\nv 20 30 0\nv 0 9 0\nf 1 2 3\n", &[]));
+    assert!(!told("v 0 0 0\nv 20 30 1\nl 1 2\n", &[]));
+}
+
+#[test]
 fn a_port_that_is_not_there_is_explained() {
     let folder = tempfile::tempdir().expect("a folder");
     fs::write(folder.path().join("a.obj"), "v 0 0 0\n").expect("written");

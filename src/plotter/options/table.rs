@@ -254,7 +254,8 @@ pub const OPTIONS: &[PlotOption] = &[
             range: "each side up to 32767 mm",
             ..Flag::new(
                 PAGE,
-                "A0 to A6, Letter, Legal, Tabloid, or a size such as 300x200, 30cmx20cm or 11x17in",
+                "A0 to A6, Letter, Legal, Tabloid, or a size such as 300x200, 30cmx20cm or \
+                 11x17in; an SVG file brings its own",
             )
         }),
     },
@@ -267,7 +268,10 @@ pub const OPTIONS: &[PlotOption] = &[
             greatest: Millimetres::MAX,
             field: |options| &mut options.page.margin,
         },
-        flag: client(Flag::new(PAGE, "What stays free on each side, in mm")),
+        flag: client(Flag::new(
+            PAGE,
+            "What stays free on each side, in mm; nothing on the page of an SVG file",
+        )),
     },
     PlotOption {
         name: "title",

@@ -8,7 +8,7 @@ use crate::fixed::Millimetres;
 pub(in crate::plotter) const SYSTEMS: usize = 6;
 
 /// The length of the longest text that is kept, in bytes.
-pub(in crate::plotter) const TEXT_LIMIT: usize = 60;
+pub(in crate::plotter) const TEXT_LIMIT: usize = 32;
 
 /// A text that is kept.
 pub(in crate::plotter) type Text = heapless::String<TEXT_LIMIT, u8>;
