@@ -140,8 +140,8 @@ fn main() -> ! {
             let mut machine = Machine::new(settings(job, jerk), blocks, pins, u32::MAX);
             let [mut approach, mut targets] = Targets::of(job);
             run(&mut machine, &mut approach);
-            let (mut targets, mut begun) = (targets.clone(), counter.read());
-            while black_box(targets.next_target()).is_some() {}
+            let (mut read, mut begun) = (targets.clone(), counter.read());
+            while black_box(read.next_target()).is_some() {}
             let free = counter.read() - begun;
             begun = counter.read();
             let queue = run(&mut machine, &mut targets);

@@ -1,10 +1,10 @@
 //! The stages of a job, one after the other.
 
+#[cfg(feature = "convex")]
 use super::super::solid;
 use super::super::{PlotOptions, plan, title};
 use super::{Job, Observer};
 use crate::drawing::{StepsPerMillimetre, build_graph};
-#[cfg(feature = "convex")]
 use crate::index::Index;
 use crate::model::Model;
 use crate::order::{self, Leg};
