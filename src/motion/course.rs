@@ -44,6 +44,7 @@ pub(super) struct BlockCursor {
 
 impl BlockCursor {
     /// The beginning of a block, its dots about `dot_length` long.
+    #[inline(always)] // A copy of what it returns costs as much as a plan.
     pub(super) fn new(block: &Block, dot_length: PathLength) -> Self {
         let line = Line::beside(block.dx, block.dy, block.offsets);
         let chords = block.chords.all();

@@ -76,7 +76,7 @@ pub(super) fn corner(
     }
     let cosine = half_length(before.x.wrapping_add(after.x), before.y.wrapping_add(after.y));
     // Lengths are rounded to whole units, and headings with them: what turns back stands.
-    let cosine = if cosine <= (1 << 30) / u64::from(shorter) { 0 } else { cosine };
+    let cosine = if cosine * u64::from(shorter) <= 1 << 30 { 0 } else { cosine };
     let by_deviation = {
         // δ c (1 + c) / s², as 1 - c itself would lose all its digits in a slight bend.
         let scaled = (u64::from(limits.junction_deviation.to_bits()) * cosine) >> 30;

@@ -192,15 +192,26 @@ impl<'m> Lookahead<'m> {
     ///
     /// # Errors
     /// Hands it back if the ring is full.
+    #[inline(always)] // So that the caller makes no whole block either.
     pub(super) fn push(&mut self, block: Block) -> Result<(), Block> {
         if self.is_full() {
             return Err(block);
         }
         let at = self.wrapped(self.count);
-        match self.blocks.get_mut(at) {
-            Some(place) => *place = block,
-            None => return Err(block),
-        }
+        let Some(slot) = self.blocks.get_mut(at) else {
+            return Err(block);
+        };
+        // One by one: what is behind the first chord is not copied, which would cost as much as a
+        // plan.
+        slot.dx = block.dx;
+        slot.dy = block.dy;
+        slot.length = block.length;
+        slot.entry_limit = block.entry_limit;
+        slot.curve_limit = block.curve_limit;
+        slot.ink = block.ink;
+        slot.offsets = block.offsets;
+        slot.kind = block.kind;
+        slot.chords.count = 0;
         self.count += 1;
         self.length += u64::from(block.length.to_bits());
         self.open = self.open.saturating_add(block.length);
@@ -218,6 +229,7 @@ impl<'m> Lookahead<'m> {
     ///
     /// The limits of a bend are those of whole blocks, so none is made longer that has its part of
     /// 5/4 of that distance, nor while so much is known or less than half of the memory is in use.
+    #[inline(always)]
     pub(super) fn join(&mut self, line: &Block, limits: &Limits) -> bool {
         let needed = u64::from(limits.longest_stop.to_bits()) + surely_known(limits) / 4;
         let enough = needed * 5 / 4;
@@ -253,19 +265,22 @@ impl<'m> Lookahead<'m> {
         true
     }
 
-    /// Takes the block to be drawn next.
-    pub(super) fn pop(&mut self) -> Option<Block> {
-        let block = *self.front()?;
+    /// Takes the block to be drawn next, once it is read in its place: a copy costs as much as a
+    /// plan.
+    pub(super) fn pop<T>(&mut self, read: impl FnOnce(&Block) -> T) -> Option<T> {
+        let block = self.front()?;
+        let length = block.length;
+        let read = read(block);
         self.late = PathLength::MAX;
         self.first = self.wrapped(1);
         self.count -= 1;
-        self.length -= u64::from(block.length.to_bits());
+        self.length -= u64::from(length.to_bits());
         match self.lowest_at.checked_sub(1) {
             Some(at) => self.lowest_at = at,
             None if self.passes_limits_on => {}
             None => self.find_lowest(),
         }
-        Some(block)
+        Some(read)
     }
 
     pub(super) fn front(&self) -> Option<&Block> {
@@ -453,15 +468,15 @@ mod tests {
             }
             assert_eq!(ring.push(block(99, 0)), Err(block(99, 0)));
             for k in 0..3 {
-                assert_eq!(ring.pop(), Some(block(round * 3 + k, 0)));
+                assert_eq!(ring.pop(Block::clone), Some(block(round * 3 + k, 0)));
             }
-            assert_eq!(ring.pop(), None);
+            assert_eq!(ring.pop(Block::clone), None);
             ring.push(block(0, 0)).expect("room");
-            ring.pop();
+            ring.pop(Block::clone);
         }
         let mut none = Lookahead::new(&mut []);
         assert!(none.push(block(1, 1)).is_err());
-        assert_eq!(none.pop(), None);
+        assert_eq!(none.pop(Block::clone), None);
         assert_eq!(none.entry_allowed(PathLength::MAX, &limits()), PathLength::ZERO);
     }
 
@@ -478,7 +493,7 @@ mod tests {
         assert_eq!(allowed(&ring, 5000), 120);
         assert_eq!(allowed(&ring, 50), 50);
         ring.push(block(300, 1000)).expect("room");
-        ring.pop();
+        ring.pop(Block::clone);
         assert_eq!(allowed(&ring, 5000), 20);
     }
 
@@ -489,7 +504,7 @@ mod tests {
         ring.pass_limits_on(false);
         for round in 0..300u32 {
             if ring.is_full() || round % 13 > 9 {
-                ring.pop();
+                ring.pop(Block::clone);
             }
             ring.push(block(10, 20 + round * 7 % 31)).expect("room");
             if round % 11 == 0 {
@@ -508,7 +523,7 @@ mod tests {
         let mut ring = Lookahead::new(&mut memory);
         for round in 0..200u32 {
             if ring.is_full() {
-                ring.pop();
+                ring.pop(Block::clone);
             }
             let limit = if round % 5 == 0 { round % 70 } else { 5000 };
             ring.push(block(10 + round * 7 % 90, limit)).expect("room");

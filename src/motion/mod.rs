@@ -17,9 +17,10 @@
 //! The pulses leave when the plan is half a step from the new position: the pins are never more
 //! than half a step from where the plan is.
 //!
-//! Measured on a Cortex-M3, built for size, everything between target and queue included: 37
-//! instructions for each event of a line at 100,000 moves a second, and 59 to 138 with a limit on jerk; for chords of five
-//! moves at 5,000 a second 439, and 447 to 629. `cargo xtask bench --motion` counts them.
+//! Measured on a Cortex-M3, built for size, everything between target and queue included: 38
+//! instructions for each event of a line at 100,000 moves a second, and 61 to 148 with a limit on
+//! jerk; for chords of five moves at 5,000 a second 485, and 489 to 507. `cargo xtask bench
+//! --motion` counts them.
 //!
 //! Not done here: limits of travel, the pen's heights, states. That is `machine`.
 

@@ -414,7 +414,9 @@ impl<'m> Runner<'m> {
             return Err(PushError::Full);
         }
         if !is_free || !self.lookahead.join(&block, &self.limits) {
-            self.lookahead.push(block).map_err(|_| PushError::Full)?;
+            if self.lookahead.push(block).is_err() {
+                return Err(PushError::Full);
+            }
         }
         self.last_limit = limit;
         if self.limits.centripetal {
@@ -745,14 +747,21 @@ impl<'m> Runner<'m> {
         if stops && self.plan.is_none() && self.pace == Pace::REST {
             return self.stand(Progress::Stopped, queue);
         }
-        let Some(block) = self.lookahead.pop() else {
+        let dot_length = self.pen.dot_length;
+        let Self { course, lookahead, .. } = self;
+        let begun = lookahead.pop(|block| {
+            *course = Some(BlockCursor::new(block, dot_length));
+        });
+        if begun.is_none() {
             return self.stand(Progress::Done, queue);
+        }
+        let Some(course) = &self.course else {
+            return Ok(Progress::More);
         };
-        if block.ink.is_some() && !self.in_stroke {
+        if course.ink.is_some() && !self.in_stroke {
             self.run.strokes = self.run.strokes.wrapping_add(1);
         }
-        self.in_stroke = block.ink.is_some();
-        let course = self.course.insert(BlockCursor::new(&block, self.pen.dot_length));
+        self.in_stroke = course.ink.is_some();
         if self.plan.is_some() {
             // The interval in work goes on with these moves.
             let units = self.brake.step_length(course.move_length);
