@@ -413,10 +413,9 @@ impl<'m> Runner<'m> {
         if self.lookahead.is_full() {
             return Err(PushError::Full);
         }
-        if !is_free || !self.lookahead.join(&block, &self.limits) {
-            if self.lookahead.push(block).is_err() {
-                return Err(PushError::Full);
-            }
+        let is_joined = is_free && self.lookahead.join(&block, &self.limits);
+        if !is_joined && self.lookahead.push(block).is_err() {
+            return Err(PushError::Full);
         }
         self.last_limit = limit;
         if self.limits.centripetal {

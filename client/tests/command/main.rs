@@ -123,7 +123,7 @@ fn only_a_board_limits_a_preview() {
     let at = |number: usize| {
         let (row, column) = (number / 250, number % 250);
         let x = if row.is_multiple_of(2) { column } else { 249 - column };
-        format!("v {}.{} {}.{} 0\n", x / 2, 5 * (x % 2), row / 2, 5 * (row % 2))
+        format!("v {}.{} {}.{} 0\n", 20 + x / 2, 5 * (x % 2), 20 + row / 2, 5 * (row % 2))
     };
     let points: String = (0..66_000).map(at).collect();
     let bars: String = (1..66_000).map(|number| format!("l {number} {}\n", number + 1)).collect();
