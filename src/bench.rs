@@ -35,11 +35,13 @@ const SCENES: [(&str, &str, &str); 9] = [
 
 /// A board that receives `text` and prints only refusals.
 struct Line<'t> {
+    /// The bytes that the plotter has still to read.
     text: &'t [u8],
+    /// Where step events would go. No job is drawn, so none comes.
     queue: NoSteps,
 }
 
-/// A queue that takes no steps: the jobs are only computed.
+/// A queue for step events that takes none, because the jobs are only computed.
 struct NoSteps;
 
 impl EventQueue for NoSteps {
@@ -78,11 +80,13 @@ impl Board for Line<'_> {
     fn wait(&mut self) {}
 }
 
-/// Counts the instructions of the stages view, visibility and order.
+/// Counts the instructions of each stage of the computation of a job: view, visibility and order.
 struct Stages<'c> {
+    /// Counts the instructions that are executed, in whichever stage.
     counter: &'c mut Counter,
     /// The current stage and the count at its beginning.
     begun: Option<(Stage, u64)>,
+    /// The instructions of each stage so far, in the order of [`Stage`].
     counts: [u64; 3],
 }
 
@@ -108,9 +112,10 @@ impl Cancel for Stages<'_> {
     }
 }
 
+/// Measures one scene after the other and prints a row of figures for each.
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    /// Room for the scenes of every board.
+    /// Memory for the scenes of the largest board, and so of every board.
     type BenchMemory =
         Memory<{ PICO.memory.vertices }, { PICO.memory.corners }, { PICO.memory.words }>;
     static MEMORY: StaticCell<BenchMemory> = StaticCell::new();

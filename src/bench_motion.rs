@@ -19,7 +19,8 @@ use penup::motion::{Block, EventQueue, StepEvent};
 use penup::step::{Arc, Turn};
 use static_cell::StaticCell;
 
-/// A queue that is never full and counts its events.
+/// A queue that is never full. It only counts the step events that are put in, and so measures the
+/// planner without a board's queue.
 struct Count(u64);
 
 impl EventQueue for Count {
@@ -32,16 +33,19 @@ impl EventQueue for Count {
     }
 }
 
-/// A job: its name, its steps per millimetre and its speed in mm/s. `stride` is the number of
-/// points of a circle from one target to the next; `None` is a straight line.
+/// A job whose planning is measured.
 struct Job {
+    /// What the job is, as the report names it.
     name: &'static str,
+    /// How many steps per millimetre the motors of both axes make in this job.
     steps: u16,
+    /// How fast the pen goes in this job, in mm/s.
     speed: u16,
+    /// The number of points of a circle from one target to the next; `None` is a straight line.
     stride: Option<usize>,
 }
 
-/// The jobs to measure.
+/// The jobs whose planning is measured.
 const JOBS: [Job; 4] = [
     Job { name: "a line, 5 000 moves a second", steps: 100, speed: 50, stride: None },
     Job { name: "a line, 100 000 moves a second", steps: 200, speed: 500, stride: None },
@@ -54,19 +58,20 @@ const JOBS: [Job; 4] = [
     },
 ];
 
-/// The jerk limits to measure with, in m/s³; 0 is no limit.
+/// The limits of the jerk with which each job is measured, in m/s³; 0 is no limit.
 const JERKS: [u16; 4] = [0, 100, 10, 1];
 
-/// The targets of a job.
+/// Where the pen moves in a job, one target after the other.
 #[derive(Clone)]
 enum Targets {
     /// A straight move to a point; `None` once it has been handed out.
     Line(Option<Target>),
+    /// Points of a circle. Each target is this many points after the one before.
     Circle(Arc, usize),
 }
 
 impl Targets {
-    /// No targets at all.
+    /// Makes a path without any target, to begin a job whose targets are handed over separately.
     const fn nowhere() -> Self {
         Self::Line(None)
     }
@@ -107,6 +112,7 @@ fn run(machine: &mut Machine, targets: &mut Targets) -> Count {
     queue
 }
 
+/// Returns the settings of the machine for a job with this limit of the jerk in m/s³.
 fn settings(job: &Job, jerk: u16) -> Settings {
     let mut settings = Settings::default();
     let acceleration = if job.speed > 100 { 5000 } else { 800 };
@@ -128,6 +134,8 @@ fn settings(job: &Job, jerk: u16) -> Settings {
     settings
 }
 
+/// Measures one job after the other and prints a row for each: the instructions for each event,
+/// with each limit of the jerk.
 #[cortex_m_rt::entry]
 fn main() -> ! {
     static PINS: StaticCell<PulserState> = StaticCell::new();

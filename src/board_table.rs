@@ -8,7 +8,7 @@
 //!
 //! The file depends on nothing, because the build script includes it.
 
-/// A board.
+/// A row of the table: everything that a tool or the plotter needs to know about one board.
 #[derive(Debug, PartialEq, Eq)]
 pub struct BoardRow {
     /// The name on command lines, of the cargo feature, of the memory map in `boards`, of the image
@@ -16,9 +16,9 @@ pub struct BoardRow {
     pub name: &'static str,
     /// What the board is, for the help of command lines.
     pub about: &'static str,
-    /// The compiler's name of the target.
+    /// The compiler's name of the processor for which the firmware is built.
     pub target: &'static str,
-    /// The cargo profile of the firmware.
+    /// The cargo profile with which the firmware is built.
     pub profile: &'static str,
     /// The cargo feature that chooses where the log goes.
     pub log: &'static str,
@@ -36,28 +36,28 @@ pub struct BoardRow {
     pub boot_loader: u64,
     /// The RAM: its address and its size in bytes. The stack lies at its start.
     pub ram: Region,
-    /// The memory that an image may use.
+    /// How much flash, RAM and stack an image of the firmware may use.
     pub budget: ImageBudget,
     /// The frequency of the core's clock in hertz.
     pub clock_hertz: u32,
-    /// The pins of the machine.
+    /// Which pins of the board the machine's motors, pen and switches are connected to.
     pub pins: Pins,
-    /// The capacities of the plotter's memory.
+    /// How much memory the plotter gets for models, jobs and moves.
     pub memory: Capacities,
     /// The largest scene that the board must be able to draw.
     pub scene: Scene,
-    /// What emulates the board.
+    /// The program that emulates the board, and the name by which it knows it.
     pub emulator: Emulator,
     /// How an image gets onto a real board; `None` if the board is emulated only.
     pub flashing: Option<Flashing>,
 }
 
-/// A range of addresses.
+/// A range of memory addresses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Region {
     /// The first address.
     pub start: u64,
-    /// The size in bytes.
+    /// The number of bytes from the first address on.
     pub size: u64,
 }
 
@@ -72,60 +72,60 @@ impl Region {
 /// the reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ImageBudget {
-    /// The most flash.
+    /// The most bytes of flash that the image of the firmware may take.
     pub flash: u64,
-    /// The most RAM beside the stack.
+    /// The most RAM that the image may take beside the stack.
     pub ram: u64,
-    /// The least stack.
+    /// The least room that must be left for the stack.
     pub stack: u64,
 }
 
 /// The numbers of the machine's pins, as the chip counts them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Pins {
-    /// A rising edge steps x.
+    /// The step pin of x: each rising edge is one step.
     pub step_x: u8,
-    /// The direction of x.
+    /// The direction pin of x.
     pub dir_x: u8,
-    /// A rising edge steps y.
+    /// The step pin of y: each rising edge is one step.
     pub step_y: u8,
-    /// The direction of y.
+    /// The direction pin of y.
     pub dir_y: u8,
     /// The enable pin of the motor drivers; low switches them on.
     pub enable: u8,
-    /// The servo or the solenoid of the pen.
+    /// The pin of the servo or the solenoid that moves the pen.
     pub pen: u8,
-    /// A rising edge steps the motor that lifts the pen.
+    /// The step pin of the motor that lifts the pen: each rising edge is one step.
     pub step_z: u8,
-    /// The direction of that motor; high lowers the pen.
+    /// The direction pin of that motor; a high level lowers the pen.
     pub dir_z: u8,
-    /// The limit switch of x.
+    /// The input of the limit switch of x.
     pub limit_x: u8,
-    /// The limit switch of y.
+    /// The input of the limit switch of y.
     pub limit_y: u8,
-    /// The emergency stop.
+    /// The input of the emergency stop.
     pub stop: u8,
 }
 
-/// The capacities of the plotter's memory.
+/// How much the plotter's memory on a board can hold at most.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Capacities {
-    /// Number of vertices of the model.
+    /// The number of vertices that the model can have.
     pub vertices: usize,
     /// Number of face corners and bar ends of the model.
     pub corners: usize,
     /// Size of the working memory in words of 8 bytes.
     pub words: usize,
-    /// Number of serial ports, 1 or 2.
+    /// The number of serial ports by which commands come: 1 or 2.
     pub ports: usize,
-    /// Number of blocks of motion that are planned ahead.
+    /// Number of straight moves that are planned ahead.
     pub blocks: usize,
 }
 
 /// A scene, and the size of the drawing that results from it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Scene {
-    /// Number of vertices of the model.
+    /// The number of vertices of the scene, which is the model to be drawn.
     pub vertices: usize,
     /// Number of corners of all faces together.
     pub corners: usize,
@@ -138,15 +138,15 @@ pub struct Scene {
     pub odd_points: usize,
 }
 
-/// What emulates a board.
+/// The program that emulates a board, so that its firmware can be tested without one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Emulator {
-    /// QEMU for Arm, with this machine.
+    /// The board is emulated by QEMU for Arm.
     Qemu {
-        /// The name of the machine.
+        /// The name of the machine that QEMU emulates.
         machine: &'static str,
     },
-    /// The npm package rp2040js under Node.
+    /// The board is emulated by the npm package rp2040js, which runs under Node.
     Rp2040js,
 }
 
@@ -246,7 +246,7 @@ pub const PICO: BoardRow = BoardRow {
 pub const BOARDS: [&BoardRow; 2] = [&LM3S6965, &PICO];
 
 impl BoardRow {
-    /// The board of this name.
+    /// Returns the row of the board with this name, or `None` if there is none.
     pub fn named(name: &str) -> Option<&'static Self> {
         BOARDS.into_iter().find(|board| board.name == name)
     }

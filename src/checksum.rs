@@ -24,13 +24,13 @@ pub const CRC_16: Crc<u16, Table<0>> = Crc::<u16, Table<0>>::new(&CRC_16_IBM_374
 pub struct Crc32(u32);
 
 impl Crc32 {
-    /// The checksum of no bytes.
+    /// Begins a checksum, of no bytes so far.
     #[expect(clippy::new_without_default, reason = "the checksum of no bytes is no default value")]
     pub const fn new() -> Self {
         Self(!0)
     }
 
-    /// Appends bytes.
+    /// Adds bytes to those of which the checksum is computed.
     #[inline(never)] // Its callers share one copy of the code.
     pub fn update(&mut self, bytes: &[u8]) {
         for byte in bytes {
@@ -40,13 +40,14 @@ impl Crc32 {
         }
     }
 
-    /// The checksum of all bytes.
+    /// Returns the checksum of all bytes that were added.
     pub const fn finalize(self) -> u32 {
         !self.0
     }
 }
 
-/// What each value of four bits contributes to a [`Crc32`].
+/// What each value of four bits contributes to a [`Crc32`], computed once when the library is
+/// compiled.
 static HALF_BYTES: [u32; 16] = {
     let mut table = [0; 16];
     let mut value = 0;

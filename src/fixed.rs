@@ -16,7 +16,9 @@ pub type Millimetres = ::fixed::types::I16F16;
 /// (they are below 10^-17 of the value).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Decimal {
+    /// The digits of the number as a whole number, with its sign.
     mantissa: i64,
+    /// The power of ten by which the mantissa is multiplied.
     exponent: i16,
 }
 
@@ -450,7 +452,7 @@ impl fmt::Display for Length {
 /// ```
 #[derive(Debug, Clone, Copy)]
 pub struct BinaryFraction {
-    /// The number of units.
+    /// The number to format, in units of 2^-`fraction_bits`.
     pub units: i64,
     /// The unit is 2^-`fraction_bits`. The value is at most 60.
     pub fraction_bits: u32,

@@ -39,7 +39,8 @@ impl Vertex {
     }
 }
 
-/// The projection of vertices onto the page: (x, y, w), where w is z or constant.
+/// How vertices are projected onto the page. The image of a vertex is (x / w, y / w); the variants
+/// say what w is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Projection {
@@ -49,12 +50,12 @@ pub enum Projection {
     Parallel,
 }
 
-/// One of the two directions of the page.
+/// One of the two directions of the page, to choose a coordinate by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Axis {
-    /// The axis to the right.
+    /// To the right.
     X,
-    /// The axis upwards.
+    /// Upwards.
     Y,
 }
 
@@ -88,9 +89,9 @@ pub struct EdgeParameter {
 }
 
 impl EdgeParameter {
-    /// The end p of the edge.
+    /// The position p at which the edge begins.
     pub const START: Self = Self { numerator: 0, denominator: 1 };
-    /// The end q of the edge.
+    /// The position q at which the edge ends.
     pub const END: Self = Self { numerator: 1, denominator: 1 };
 
     /// Returns where a quantity that varies linearly along the edge in space is zero.

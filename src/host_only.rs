@@ -12,8 +12,10 @@
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct HostOnly<T> {
+    /// The value itself, on the host.
     #[cfg(any(test, feature = "host"))]
     value: T,
+    /// Nothing, on a board; it only remembers the type.
     #[cfg(not(any(test, feature = "host")))]
     value: core::marker::PhantomData<T>,
 }
@@ -31,7 +33,7 @@ impl<T: Copy> HostOnly<T> {
         Self { value: core::marker::PhantomData }
     }
 
-    /// The value.
+    /// Returns the value, which exists on the host alone.
     #[cfg(any(test, feature = "host"))]
     pub const fn get(self) -> T {
         self.value

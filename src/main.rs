@@ -12,6 +12,7 @@ use defmt_rtt as _;
 #[cfg(all(feature = "log-semihosting", not(feature = "log-rtt")))]
 use defmt_semihosting as _;
 
+/// Starts the board and runs the plotter on it, for as long as there is power.
 #[cortex_m_rt::entry]
 fn main() -> ! {
     let (mut board, memory, pins) = boards::take();

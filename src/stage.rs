@@ -1,14 +1,15 @@
 //! What every stage of a job borrows: working memory, and a way to answer the serial line while it
-//! computes.
+//! computes. A stage is one part of the computation that turns a model into a drawing, such as the
+//! hidden-line removal ([`Stage`] lists them).
 //!
-//! The stages (visibility, drawing, order) never run at the same time, so one [`Scratch`] serves
-//! them all. Each takes typed slices from it and gives all of them back when it ends. A stage that
-//! runs for more than a millisecond calls [`Cancel::check`] regularly, so that status, hold and
-//! abort are answered during the computation. A slice that does not fit is refused, with the sizes.
+//! The stages never run at the same time, so one [`Scratch`] serves them all. Each takes typed
+//! slices from it and gives all of them back when it ends. A stage that runs for more than a
+//! millisecond calls [`Cancel::check`] regularly, so that status, hold and abort are answered
+//! during the computation. A slice that does not fit is refused, with the sizes.
 
 use bytemuck::Pod;
 
-/// Working memory from which a stage takes its slices.
+/// Working memory from which a part of the computation (a [`Stage`]) takes its slices.
 ///
 /// Dropping the slices returns nothing: the owner of the memory makes a new `Scratch` for the next
 /// stage. The borrow rules keep two stages from holding the same bytes.
@@ -24,11 +25,11 @@ use bytemuck::Pod;
 /// ```
 #[derive(Debug)]
 pub struct Scratch<'a> {
-    /// The memory that has not been taken yet.
+    /// The part of the memory that has not been taken yet.
     words: &'a mut [u64],
 }
 
-/// A stage needed more working memory than there is.
+/// The error that a stage of the computation needs more working memory than there is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct OutOfScratch {
@@ -96,7 +97,8 @@ impl<'a> Scratch<'a> {
         Ok(items_mut(taken, count).unwrap_or(&mut []))
     }
 
-    /// Lends the memory that is left to a stage within this stage.
+    /// Lends the memory that is left, for a part of this stage's work. All of it is free again
+    /// afterwards.
     pub fn reborrow(&mut self) -> Scratch<'_> {
         Scratch { words: self.words }
     }
@@ -117,7 +119,8 @@ pub fn items_mut<T: Pod>(words: &mut [u64], count: usize) -> Option<&mut [T]> {
     bytemuck::try_cast_slice_mut(exact).ok()
 }
 
-/// Like [`items_mut`], but for reading only.
+/// Returns the first `count` items of `T` that lie in `words`, for reading only; `None` if they do
+/// not fit.
 pub fn items<T: Pod>(words: &[u64], count: usize) -> Option<&[T]> {
     const { assert!(align_of::<T>() <= align_of::<u64>()) };
     let bytes: &[u8] = bytemuck::cast_slice(words);
@@ -139,8 +142,8 @@ pub fn heap_sort_by_key<T, K: Ord>(items: &mut [T], key: impl Fn(&T) -> K) {
     let _ = heap_sort(items.len(), &mut Keyed { items, key }, &mut NeverCancel);
 }
 
-/// Like [`heap_sort_by_key`], for keys that take long to compare: checks for cancelling before each
-/// item.
+/// Sorts by a key as [`heap_sort_by_key`] does, and checks for cancelling before each item. It is
+/// for keys that take long to compare.
 ///
 /// # Errors
 /// [`Aborted`] if the user cancelled the job; the order of the items is then undefined.
@@ -160,9 +163,11 @@ trait Heap {
     fn swap(&mut self, a: usize, b: usize);
 }
 
-/// Items that are sorted by a key.
+/// A slice of items, and the key by which they are sorted.
 struct Keyed<'i, T, F> {
+    /// The items, which change places.
     items: &'i mut [T],
+    /// Returns the key by which an item is compared.
     key: F,
 }
 
@@ -208,16 +213,16 @@ fn sift_down(heap: &mut dyn Heap, count: usize, mut parent: usize) {
     }
 }
 
-/// The user has cancelled the job.
+/// The error that the user has cancelled the job while it was being computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Aborted;
 
-/// The caller's sink has no room for what a stage hands to it.
+/// The error that the caller has no room for what a stage of the computation hands to it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SinkFull;
 
-/// Why a stage ended early.
+/// The reasons why a stage of the computation ended early.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum StageError {
@@ -239,7 +244,7 @@ impl From<Aborted> for StageError {
     }
 }
 
-/// The stages of computing a job, before anything moves.
+/// The stages of computing a job, which run one after the other before anything moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Stage {
@@ -251,7 +256,8 @@ pub enum Stage {
     Order,
 }
 
-/// How a long computation lets the serial line be answered.
+/// Lets a long computation answer the serial line, and ends it when the user cancels the job. A
+/// stage calls it about once a millisecond.
 pub trait Cancel {
     /// Answers pending requests (status, hold, resume).
     ///
@@ -259,7 +265,7 @@ pub trait Cancel {
     /// [`Aborted`] if the user has cancelled the job; the stage then ends at once.
     fn check(&mut self) -> Result<(), Aborted>;
 
-    /// Called when a stage begins.
+    /// Called when a stage begins, so that the user can be told what is being computed.
     fn enter(&mut self, _stage: Stage) {}
 }
 

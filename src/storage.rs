@@ -19,12 +19,12 @@ use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
 /// The unit in which flash is written, in bytes.
 pub const PAGE_BYTES: usize = 256;
 
-/// The mark at the beginning of a header.
+/// The number at the beginning of a header, by which a slot that was written is known.
 const MARK: u32 = u32::from_le_bytes(*b"pen1");
 /// The size of a header in bytes. The rest of its page is empty.
 const HEADER_BYTES: usize = 16;
 
-/// Why a state was not kept. The previous one still is.
+/// The reasons why a new state was not kept. The previous state still is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StorageError<E> {
     /// The state is longer than a slot.
@@ -85,11 +85,15 @@ pub struct Slots {
     pub bytes: u32,
 }
 
-/// The content of a valid header.
+/// The header of a slot whose checksum is right, so that the slot holds a whole state.
 #[derive(Clone, Copy)]
 struct Valid {
+    /// Which slot it is: 0 for the first, 1 for the second.
     slot: u32,
+    /// The number of the state. Each state that is written has a number one higher than the one
+    /// before it, and 0 follows the highest.
     sequence: u32,
+    /// The length of the payload in bytes.
     length: u32,
 }
 
@@ -126,12 +130,12 @@ impl Slots {
         })
     }
 
-    /// The offset at which a slot begins.
+    /// Returns the offset in flash at which a slot begins, in bytes.
     fn begin(self, slot: u32) -> u32 {
         self.start + slot * self.bytes
     }
 
-    /// The header of the latest state.
+    /// Returns the header of the latest state, or `None` if neither slot holds a whole state.
     fn find<F: ReadNorFlash>(self, flash: &mut F) -> Option<Valid> {
         let [first, second] = [0, 1].map(|slot| self.check(flash, slot));
         match (first, second) {
@@ -143,7 +147,7 @@ impl Slots {
         }
     }
 
-    /// The slot's header, if its checksum matches.
+    /// Returns the header of a slot, or `None` if its checksum does not match that of its payload.
     fn check<F: ReadNorFlash>(self, flash: &mut F, slot: u32) -> Option<Valid> {
         let mut header = [0; HEADER_BYTES];
         flash.read(self.begin(slot), &mut header).ok()?;
@@ -169,13 +173,13 @@ impl Slots {
     }
 }
 
-/// The four words of a header.
+/// Returns the four words of a header (see the module documentation).
 fn words(header: [u8; HEADER_BYTES]) -> [u32; 4] {
     let [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p] = header;
     [[a, b, c, d], [e, f, g, h], [i, j, k, l], [m, n, o, p]].map(u32::from_le_bytes)
 }
 
-/// The checksum of a payload and its header. `digest` has processed the payload.
+/// Returns the checksum of a payload and its header. `digest` has processed the payload.
 fn total(mut digest: Crc32, sequence: u32, length: u32) -> u32 {
     for word in [MARK, sequence, length] {
         digest.update(&word.to_le_bytes());
@@ -183,11 +187,14 @@ fn total(mut digest: Crc32, sequence: u32, length: u32) -> u32 {
     digest.finalize()
 }
 
-/// Reads a state from its beginning on.
+/// Reads a kept state from its beginning to its end, in pieces of any size.
 #[derive(Debug)]
 pub struct Reader<'f, F> {
+    /// The flash that holds the state.
     flash: &'f mut F,
+    /// The offset in flash of the next byte to read.
     at: u32,
+    /// The number of bytes that have not been read yet.
     left: u32,
 }
 
@@ -206,7 +213,7 @@ impl<F: ReadNorFlash> Reader<'_, F> {
         }
     }
 
-    /// Number of bytes that are left.
+    /// Returns the number of bytes of the state that have not been read yet.
     pub fn left(&self) -> usize {
         self.left as usize
     }
@@ -215,15 +222,22 @@ impl<F: ReadNorFlash> Reader<'_, F> {
 /// Writes a new state. If it is dropped before [`Writer::finish`], the previous state remains the
 /// latest.
 pub struct Writer<'f, F> {
+    /// The flash to which the state is written.
     flash: &'f mut F,
+    /// The two slots of the record, which say how long a slot is.
     slots: Slots,
+    /// The offset in flash of the slot that is being written, in bytes.
     start: u32,
+    /// The number that the state gets, one higher than that of the latest state.
     sequence: u32,
-    /// Number of payload bytes so far; the last of them may still be in `page`.
+    /// The number of bytes of the state that were handed in so far; the last of them may still be
+    /// in `page`.
     length: u32,
     /// Number of bytes that are erased, from the slot's beginning on.
     erased: u32,
+    /// The page of the payload that is being filled. It is written when it is full.
     page: [u8; PAGE_BYTES],
+    /// The checksum of the payload so far.
     digest: Crc32,
 }
 
@@ -234,7 +248,7 @@ impl<F> core::fmt::Debug for Writer<'_, F> {
 }
 
 impl<F: NorFlash> Writer<'_, F> {
-    /// Appends bytes.
+    /// Writes the next bytes of the new state.
     ///
     /// # Errors
     /// See [`StorageError`]; the latest state is still the previous one.
@@ -273,7 +287,7 @@ impl<F: NorFlash> Writer<'_, F> {
         })
     }
 
-    /// Writes the current page of the payload.
+    /// Writes the page of the payload that is full, or the last one, to the flash.
     fn put_page(&mut self) -> Result<(), StorageError<F::Error>> {
         // The payload's pages follow the header's.
         let page = self.length.div_ceil(PAGE_BYTES as u32);

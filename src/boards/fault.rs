@@ -15,7 +15,7 @@ use super::pl011::Uart;
 
 /// What differs between the boards after a panic or a fault. No interrupt handler runs any more.
 pub trait Fault {
-    /// The serial line, which is used directly, without any queue.
+    /// The serial line for reports, to which bytes are written directly, without any queue.
     const UART: Uart;
 
     /// Stops the steps, raises the pen and switches the drivers off.
@@ -44,6 +44,8 @@ const STACK_USED_UP: u32 = u32::MAX;
 /// and written with interrupts off.
 static REPORTING: AtomicBool = AtomicBool::new(false);
 
+/// Called by the compiler's code when the program panics: makes the machine safe and reports the
+/// cause.
 #[panic_handler]
 fn panic(info: &PanicInfo) -> ! {
     let cause = ThisBoard::cause(info, &raw const _stack_start as usize);
@@ -54,7 +56,9 @@ fn panic(info: &PanicInfo) -> ! {
 }
 
 unsafe extern "C" {
+    /// Where the stack begins. It grows down from there.
     static _stack_start: u32;
+    /// Where the stack ends. Nothing may be pushed below.
     static _stack_end: u32;
 }
 
@@ -85,7 +89,8 @@ unsafe extern "C" fn HardFault() -> ! {
     )
 }
 
-/// Handles a fault at `address`, or at [`STACK_USED_UP`].
+/// Makes the machine safe after a fault of the core and reports it. `address` is where it happened,
+/// or [`STACK_USED_UP`].
 extern "C" fn hard_fault(address: u32) -> ! {
     end(|| {
         if address == STACK_USED_UP {
@@ -116,7 +121,7 @@ pub fn make_safe() {
     ThisBoard::release();
 }
 
-/// Writes the cause to the serial line.
+/// Reports the cause of a panic or a fault, as one line on the serial line.
 pub fn say(cause: fmt::Arguments) {
     ThisBoard::UART.write(b"\r\n");
     // This never fails, because `OneLine` accepts every byte.
@@ -132,7 +137,7 @@ fn wait_for_reset() -> ! {
     ThisBoard::reset()
 }
 
-/// Writes to the serial line and replaces line ends by spaces.
+/// Writes text to the serial line as one line: line ends become spaces.
 struct OneLine;
 
 impl Write for OneLine {

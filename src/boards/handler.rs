@@ -10,11 +10,13 @@ pub struct Owned<T>(UnsafeCell<Option<T>>);
 unsafe impl<T: Send> Sync for Owned<T> {}
 
 impl<T> Owned<T> {
-    /// Creates an empty cell.
+    /// Makes an empty cell. [`Owned::fill`] gives it its value.
     pub const fn empty() -> Self {
         Self(UnsafeCell::new(None))
     }
 
+    /// Gives the cell the value that the handler will own.
+    ///
     /// # Safety
     /// The handler's interrupt is masked, and nobody holds what [`Owned::get`] gave.
     pub unsafe fn fill(&self, value: T) {

@@ -18,7 +18,7 @@ use std::collections::VecDeque;
 use std::rc::Rc;
 use std::vec::Vec;
 
-/// The number of serial ports.
+/// The number of serial ports of this board, which has no hardware.
 pub const PORTS: usize = 2;
 
 /// The number of slots in the queue, as many as in the smallest board's queue.
@@ -47,33 +47,33 @@ pub fn lend_memory_of<I: Index>(
     }
 }
 
-/// A change of a pin or of the pen.
+/// What changed at the pins or at the pen, and the new level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Change {
-    /// The step pin of x.
+    /// The step pin of x has this level now.
     StepX(bool),
-    /// The step pin of y.
+    /// The step pin of y has this level now.
     StepY(bool),
-    /// The direction pin of x; high counts up.
+    /// The direction pin of x has this level now; high counts up.
     UpX(bool),
-    /// The direction pin of y; high counts up.
+    /// The direction pin of y has this level now; high counts up.
     UpY(bool),
-    /// The enable pin of the drivers.
+    /// The enable pin of the motor drivers has this level now.
     Enable(bool),
     /// The height of the pen, from 0 (raised) to 127 (lowered).
     Pen(u8),
-    /// The step pin of the pen's motor.
+    /// The step pin of the motor that lifts the pen has this level now.
     StepZ(bool),
-    /// The direction pin of the pen's motor; high lowers the pen.
+    /// The direction pin of the motor that lifts the pen has this level now; high lowers the pen.
     DownZ(bool),
 }
 
 /// A change and the time at which it happened.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stamped {
-    /// The time in ticks from the start.
+    /// When it happened, in ticks (1/25,000,000 s) from the start.
     pub time: u64,
-    /// What changed.
+    /// Which pin or setting of the pen changed, and to what.
     pub change: Change,
 }
 
@@ -82,11 +82,12 @@ pub struct Stamped {
 pub struct Trace {
     /// The present time in ticks from the start.
     now: Cell<u64>,
-    /// The changes so far.
+    /// The changes so far, in the order in which they happened.
     changes: RefCell<Vec<Stamped>>,
 }
 
 impl Trace {
+    /// Records that a pin or the pen changes at the present time.
     fn note(&self, change: Change) {
         self.changes.borrow_mut().push(Stamped { time: self.now.get(), change });
     }
@@ -101,7 +102,7 @@ impl Trace {
         self.now.set(now);
     }
 
-    /// All changes so far.
+    /// Returns a copy of all changes so far.
     pub fn changes(&self) -> Vec<Stamped> {
         self.changes.borrow().clone()
     }
@@ -112,7 +113,7 @@ impl Trace {
     }
 }
 
-/// A pin that records its changes.
+/// A simulated output pin that records its changes.
 #[derive(Debug)]
 pub struct TracedPin {
     /// The trace that records the changes.
@@ -128,6 +129,7 @@ impl ErrorType for TracedPin {
 }
 
 impl TracedPin {
+    /// Records the change to `level`, if this is not the level already.
     fn set(&mut self, level: bool) {
         if self.level.replace(level) != Some(level) {
             self.trace.note((self.change)(level));
@@ -146,7 +148,7 @@ impl OutputPin for TracedPin {
     }
 }
 
-/// A pen that records its heights.
+/// A simulated pen that records to which heights it is moved.
 #[derive(Debug)]
 pub struct TracedPen {
     /// The trace that records the heights.
@@ -174,9 +176,9 @@ type TracedPulser<'q> = Pulser<
 /// Calls the interrupt code at the times at which it is due.
 #[derive(Debug)]
 pub struct TracedSteps<'q> {
-    /// The library's interrupt code.
+    /// The library's interrupt code, which runs here as on a board.
     pulser: TracedPulser<'q>,
-    /// The state shared with the main loop.
+    /// The numbers and requests that the interrupt code shares with the main loop.
     state: &'q PulserState,
     /// The trace of the pins, with the clock.
     trace: Rc<Trace>,
@@ -253,6 +255,8 @@ impl TracedSteps<'_> {
         self.trace.set_now(end);
     }
 
+    /// Does what the brake has to do at once, and lets the current event last longer where it says
+    /// so.
     fn brake(&mut self) {
         loop {
             let (is_due, more) = self.pulser.brake();
@@ -265,7 +269,8 @@ impl TracedSteps<'_> {
     }
 }
 
-/// The simulated board.
+/// A simulated board: the library's interrupt code on pins that record their changes, and two
+/// serial ports.
 pub struct HostBoard<'q> {
     /// The ordinary bytes that were received, each with the number of its port.
     received: VecDeque<(usize, u8)>,
@@ -273,7 +278,7 @@ pub struct HostBoard<'q> {
     sorters: [Sorter; PORTS],
     /// The real-time requests that were not taken yet.
     requests: RealTime,
-    /// The bytes that were sent.
+    /// The bytes that the plotter has sent and nobody has taken yet.
     sent: Vec<u8>,
     /// The main loop's end of the queue of events.
     queue: StepQueue<'q, QUEUE_LENGTH>,
@@ -283,7 +288,7 @@ pub struct HostBoard<'q> {
     contacts: Contacts,
     /// The state shared with the interrupt code.
     state: &'q PulserState,
-    /// The number of ticks that sending a byte takes.
+    /// The number of ticks that sending a byte takes; 0 if no baud rate is set.
     byte_ticks: u64,
 }
 
@@ -297,7 +302,7 @@ impl core::fmt::Debug for HostBoard<'_> {
 }
 
 impl<'q> HostBoard<'q> {
-    /// Creates a board at rest.
+    /// Makes a board at rest, which has received nothing.
     pub fn new(ring: &'q mut EventRing<QUEUE_LENGTH>, state: &'q PulserState) -> Self {
         let (queue, steps) = traced_steps(ring, state);
         Self {
@@ -342,7 +347,7 @@ impl<'q> HostBoard<'q> {
         self.byte_ticks = u64::from(10 * crate::motion::TICKS_PER_SECOND / baud);
     }
 
-    /// Sets which contacts are closed.
+    /// Sets which contacts (limit switches and emergency stop) are closed.
     pub fn set_contacts(&mut self, contacts: Contacts) {
         self.contacts = contacts;
     }

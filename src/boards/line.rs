@@ -17,23 +17,23 @@ use static_cell::StaticCell;
 /// up to 240 unanswered bytes.
 const RECEIVED_PLACES: usize = 256;
 
-/// The byte for ctrl-X.
+/// The byte for ctrl-X, which cancels the job.
 pub const ABORT: u8 = 0x18;
 
 /// The real-time requests since they were last taken, as bits.
 static REQUESTED: AtomicU16 = AtomicU16::new(0);
 
-/// The data that both ends of a port share.
+/// What the receive interrupt and the main loop share of one serial port.
 pub struct Shared {
-    /// The queue of received bytes.
+    /// The queue in which received bytes wait for the main loop.
     queue: StaticCell<Queue<u8, RECEIVED_PLACES>>,
     /// The number of bytes that had been queued when the last abort came.
     count_at_abort: AtomicU32,
 }
 
-/// The main loop's end of a port.
+/// The main loop's side of one serial port, from which it reads bytes.
 pub struct Line {
-    /// The main loop's end of the queue.
+    /// Where the received bytes wait.
     bytes: Consumer<'static, u8>,
     /// The number of bytes that had been queued when the last abort came.
     count_at_abort: &'static AtomicU32,
@@ -41,7 +41,7 @@ pub struct Line {
     count: u32,
 }
 
-/// The handler's end of a port.
+/// The receive interrupt's side of one serial port, which sorts bytes and queues the ordinary ones.
 pub struct ReceiveMerge {
     /// Sorts the received bytes and queues the ordinary ones.
     pub receiver: Receiver<'static>,
@@ -69,8 +69,8 @@ impl Shared {
     }
 }
 
-/// Records what a real-time byte requests. It is called in the handler of a port with the receiving
-/// ends of all ports. No handler that could interrupt it does the same.
+/// Records what a real-time byte requests. It is called in the handler of a port, with the
+/// receiving ends of all ports in `inlets`. No handler that could interrupt it does the same.
 pub fn ask(requests: RealTime, inlets: &mut [ReceiveMerge]) {
     if requests.has(RealTime::ABORT) {
         for receive_merge in inlets {

@@ -6,16 +6,19 @@ mod memory;
 /// A timer that counts down once every 40 ns. With `-icount shift=0`, QEMU takes 1 ns for an
 /// instruction.
 const TIMER: *mut u32 = 0x4000_0000 as *mut u32;
+/// The instructions that QEMU executes while the timer counts once.
 const INSTRUCTIONS_PER_TICK: u64 = 40;
 
 /// Counts the instructions that were executed since it was created.
 pub struct Counter {
+    /// The value of the timer when it was last read.
     last: u32,
+    /// The number of times that the timer has counted down since the start.
     ticks: u64,
 }
 
 impl Counter {
-    /// Starts the timer.
+    /// Starts the timer and counts from now on.
     pub fn start() -> Self {
         // SAFETY: CMSDK APB timer 0 (Arm DDI 0479): VALUE, RELOAD and CTRL are words at 4, 8 and 0,
         // and nothing else uses it.

@@ -2,13 +2,16 @@
 
 use core::ptr;
 
-/// The registers of one peripheral.
+/// The registers of one peripheral of the chip, such as a timer or a port.
 #[derive(Clone, Copy)]
 pub struct Peripheral {
+    /// The address of the peripheral's first register, from which the offsets count.
     base: usize,
 }
 
 impl Peripheral {
+    /// Gives access to the peripheral whose registers begin at the address `base`.
+    ///
     /// # Safety
     /// A peripheral of the chip begins at `base`, and its registers within 16 KiB may be read and
     /// written at any time by the code that has it.

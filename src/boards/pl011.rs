@@ -3,28 +3,48 @@
 
 use super::peripheral::Peripheral;
 
+/// The speed of the serial line, in bits per second.
 const BAUD: u32 = 115_200;
 
+/// The registers that are used here, by their offset in bytes.
 mod offset {
+    /// The register to which a byte to send is written, and from which a received byte is read with
+    /// its error bits.
     pub const DATA: usize = 0x000;
+    /// The register whose bits say whether the FIFOs (the queues of received bytes and of those to
+    /// send) are empty or full.
     pub const FLAGS: usize = 0x018;
+    /// The register of the whole part of the divider that gives the baud rate.
     pub const BAUD_INTEGER: usize = 0x024;
+    /// The register of the fraction of the divider that gives the baud rate, in 64ths.
     pub const BAUD_FRACTION: usize = 0x028;
+    /// The register that says how many bits a byte has, and whether the FIFOs are in use.
     pub const LINE_CONTROL: usize = 0x02C;
+    /// The register that switches the UART, its sender and its receiver on.
     pub const CONTROL: usize = 0x030;
+    /// The register that says, by one bit for each event, which events cause an interrupt.
     pub const INTERRUPT_MASK: usize = 0x038;
+    /// The register that clears the interrupt of an event when the event's bit is written to it.
     pub const INTERRUPT_CLEAR: usize = 0x044;
+    /// The register that says whether DMA is asked to fetch received bytes.
     pub const DMA: usize = 0x048;
 }
+/// The bit of [`offset::FLAGS`] that says that no received byte waits.
 const RECEIVER_EMPTY: u32 = 1 << 4;
+/// The bit of [`offset::FLAGS`] that says that the sender's FIFO has no room.
 const SENDER_FULL: u32 = 1 << 5;
+/// The bit of the event that enough received bytes wait.
 const RECEIVED: u32 = 1 << 4;
+/// The bit of the event that the sender's FIFO gets emptier.
 const SENT: u32 = 1 << 5;
+/// The bit of the event that received bytes wait and no more have come for a while.
 const RECEIVE_TIMEOUT: u32 = 1 << 6;
+/// The bits of [`offset::LINE_CONTROL`] for bytes of 8 bits without parity, and with FIFOs.
 const EIGHT_BITS_WITH_FIFO: u32 = 0b111 << 4;
+/// The bits of [`offset::CONTROL`] that switch the UART, its sender and its receiver on.
 const ENABLE_BOTH_WAYS: u32 = 1 | 1 << 8 | 1 << 9;
 
-/// A UART of the chip.
+/// A UART of the chip, given by its registers.
 #[derive(Clone, Copy)]
 pub struct Uart(pub Peripheral);
 

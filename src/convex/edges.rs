@@ -70,7 +70,7 @@ use crate::stage::{Cancel, OutOfScratch, Scratch, heap_sort_by_key};
 /// assert_eq!(hidden.0, [(0, 4), (1, 4), (2, 4), (3, 4)]);
 /// # Ok::<(), SolidError>(())
 /// ```
-#[inline(never)] // Smaller than in its only caller.
+#[inline(never)] // Inlined in its only caller, the code would be larger.
 pub fn from_edges<I: Index>(
     positions: &[[i32; 3]],
     edges: &[[I; 2]],
@@ -122,28 +122,32 @@ pub const fn scratch_bytes_from_edges<I: Index>(vertices: usize, edges: usize) -
 struct Membership<I>(I);
 
 impl<I: Index> Membership<I> {
+    /// The membership of a vertex at which no edge ends.
     const NO_EDGE: Self = Self(I::NONE);
     /// The flag of a corner of the outline.
     fn outline_flag() -> I {
         I::ONE << (I::BITS - 1)
     }
 
-    /// Membership in the component that is named after vertex `name`.
+    /// Makes the membership in a component. A component is named after the least of its vertices,
+    /// here `name`.
     fn component(name: I) -> Self {
         Self(name)
     }
 
-    /// Membership in the outline, as its corner number `at`.
+    /// Makes the membership in the outline, whose corner number `at` the vertex is.
     fn outline(at: usize) -> Self {
         Self(Self::outline_flag() | I::new(at)) // fewer than there are vertices
     }
 
-    /// Returns the component to which a vertex inside the outline belongs.
+    /// Returns the name of the component to which a vertex belongs, or `None` if it lies on the
+    /// outline.
     fn component_name(self) -> Option<I> {
         (self.0 & Self::outline_flag() == I::ZERO).then_some(self.0)
     }
 
-    /// Returns the index of the vertex on the outline, if it lies there.
+    /// Returns the vertex's index among the corners of the outline, or `None` if it is not one of
+    /// them.
     fn outline_place(self) -> Option<usize> {
         (self.component_name().is_none() && self != Self::NO_EDGE)
             .then_some((self.0 & (Self::outline_flag() - I::ONE)).get())
@@ -152,8 +156,11 @@ impl<I: Index> Membership<I> {
 
 /// The vertices that have edges, each position once, and the edges between them.
 struct Graph<'s, I> {
+    /// The positions of all vertices, those without edges included.
     points: &'s [Point],
+    /// The numbers of the vertices that have edges, in the order of their positions.
     numbers: &'s [I],
+    /// The edges, sorted and each once, with the lesser vertex number first.
     edges: &'s [[I; 2]],
     /// The membership of each vertex. A vertex that is in no component and not on the outline has
     /// no edge.
@@ -163,6 +170,8 @@ struct Graph<'s, I> {
 }
 
 impl<'s, I: Index> Graph<'s, I> {
+    /// Makes the graph of `edges`. A vertex at the same position as an earlier one is replaced by
+    /// it, and an edge between two such vertices is left out.
     fn new(
         points: &'s [Point],
         edges: &[[I; 2]],
@@ -206,6 +215,7 @@ impl<'s, I: Index> Graph<'s, I> {
         })
     }
 
+    /// Returns the position of a vertex.
     fn point(&self, number: I) -> Point {
         self.points[number.get()]
     }
@@ -271,7 +281,8 @@ impl<'s, I: Index> Graph<'s, I> {
             })
     }
 
-    /// Names each component after the least of its vertices.
+    /// Finds the components into which the graph falls without the outline, and names each after
+    /// the least of its vertices.
     fn find_components(&mut self) {
         for [a, b] in self.edges {
             let (Some(a), Some(b)) = (self.component(*a), self.component(*b)) else {
@@ -339,7 +350,7 @@ impl<'s, I: Index> Graph<'s, I> {
         Ok(())
     }
 
-    /// Iterates over the names of the components.
+    /// Iterates over the names of the components, each of which is its least vertex.
     fn component_names(&self) -> impl Iterator<Item = I> {
         self.numbers
             .iter()
@@ -423,7 +434,8 @@ impl<'s, I: Index> Graph<'s, I> {
         }
     }
 
-    /// Whether both ends lie exactly on the line of one side of the outline.
+    /// Whether an edge is exactly behind a side of the outline, so that drawing it would ink the
+    /// same line again.
     fn is_behind_outline(&self, ends: [I; 2], eye: Eye, outline: &[I]) -> bool {
         let eye_itself = Viewpoint { eye, inside: None };
         let next = outline.iter().skip(1).chain(outline.first());

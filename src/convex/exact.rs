@@ -18,6 +18,8 @@ fn difference(a: Point, b: Point) -> [i64; 3] {
     [0, 1, 2].map_each(|axis| i64::from(a[axis]) - i64::from(b[axis]))
 }
 
+/// Returns the scalar product of two vectors. The module documentation says why it does not
+/// overflow.
 fn dot(a: [i64; 3], b: [i64; 3]) -> i128 {
     (0..3).map(|axis| product(a[axis], b[axis])).sum()
 }
@@ -26,7 +28,10 @@ fn dot(a: [i64; 3], b: [i64; 3]) -> i128 {
 /// the upper side.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Plane {
+    /// A point of the plane, from which heights are measured.
     origin: Point,
+    /// The vector at right angles to the plane, on its upper side. Its length is twice the area of
+    /// the triangle of the three points; it is zero if they lie on one line.
     normal: [i64; 3],
 }
 
@@ -68,7 +73,8 @@ impl Plane {
         }
     }
 
-    /// Returns the eye that looks straight down on the plane.
+    /// Returns the eye that looks straight down on the upper side of the plane, from infinitely far
+    /// away.
     pub(super) fn eye_above(&self) -> Eye {
         Eye::Towards(self.normal)
     }
@@ -93,6 +99,7 @@ impl Plane {
 /// of the eye itself leaves undecided.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Viewpoint {
+    /// Where the user looks from.
     pub(super) eye: Eye,
     /// Four vertices that span the solid. The step leads towards their centre. With `None` there is
     /// no step.

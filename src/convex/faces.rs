@@ -108,7 +108,7 @@ pub(super) type FaceCorners<I> = [I; 3];
 /// assert_eq!((count.visible_faces, count.hidden_edges), (3, 3));
 /// # Ok::<(), SolidError>(())
 /// ```
-#[inline(never)] // Smaller than in its only caller.
+#[inline(never)] // Inlined in its only caller, the code would be larger.
 pub fn from_vertices<I: Index>(
     positions: &[[i32; 3]],
     eye: Eye,
@@ -170,8 +170,8 @@ const fn most_faces(vertices: usize) -> usize {
     (2 * vertices).saturating_sub(4)
 }
 
-/// Handles vertices that all lie in one plane: hands over the one polygon that they form, which
-/// hides nothing.
+/// Hands over the one polygon that vertices in one plane form. It hides nothing, and it is seen
+/// from either side.
 fn flat_solid<I: Index>(
     points: &[Point],
     numbers: &[I],
@@ -219,43 +219,57 @@ fn sides<I: Index>(corners: &[I]) -> impl Iterator<Item = (I, I)> + Clone {
 /// The solid as it was found exactly, before faces are joined.
 #[derive(Debug)]
 pub(super) struct Solid<'s, I> {
+    /// The position of each vertex.
     pub(super) points: &'s [Point],
+    /// The edges. Each has both its faces.
     pub(super) edges: &'s [HullEdge<I>],
+    /// The faces, by three corners each.
     pub(super) faces: &'s [FaceCorners<I>],
-    /// The vertices that lie on no face.
+    /// The vertices that are corners of no face. They lie inside the solid, or a solid with them is
+    /// not convex.
     pub(super) inside: &'s [I],
     /// The number of vertices in the middle of a face or an edge.
     pub(super) flat: usize,
 }
 
-/// The state of Harrison's search for faces.
+/// Finds the faces of a solid, one after the other, as Harrison does. It holds what is found so
+/// far.
 struct FaceFinder<'s, I> {
+    /// The position of each vertex.
     points: &'s [Point],
     /// The vertices that may be corners of faces still to be found. This is Harrison's vertices
     /// list.
     candidates: &'s mut [I],
+    /// How many entries of `candidates` are in use, from the first on.
     candidate_count: usize,
     /// The numbers of the edges with one face still to be found in this pass. This is Harrison's
     /// current perimeter list.
     perimeter: &'s mut [I],
+    /// How many entries of `perimeter` are in use, from the first on.
     perimeter_count: usize,
     /// For each vertex, the number of segments of the perimeter that begin there. As many end
     /// there.
     segments_from: &'s mut [I],
+    /// The edges found so far, those of the outline first.
     edges: &'s mut [HullEdge<I>],
+    /// How many entries of `edges` are in use, from the first on.
     edge_count: usize,
+    /// How many of the edges belong to the outline. They come first.
     outline_count: usize,
+    /// The faces found so far.
     faces: &'s mut [FaceCorners<I>],
+    /// How many entries of `faces` are in use, from the first on.
     face_count: usize,
-    /// The vertices on the current plane.
+    /// The vertices that lie in the plane of the face that is being found.
     on_plane: &'s mut [I],
-    /// The memory for the corners of a polygon.
+    /// Memory in which the corners of that face are put in order.
     room: &'s mut [I],
+    /// How many vertices were found in the middle of a face or an edge, and so are no corners.
     flat: usize,
 }
 
 impl<'s, I: Index> FaceFinder<'s, I> {
-    /// Finds the outline and makes it the first perimeter.
+    /// Finds the outline (the edge of the solid as the eye sees it), from which the search starts.
     fn new(
         points: &'s [Point],
         eye: Eye,
@@ -303,7 +317,7 @@ impl<'s, I: Index> FaceFinder<'s, I> {
         Ok(search)
     }
 
-    /// Makes the outline the perimeter.
+    /// Makes the outline the perimeter, so that the faces on one side of it are found from there.
     fn begin_with_outline(&mut self) {
         for number in 0..self.outline_count {
             self.perimeter[number] = I::new(number); // fewer than there are vertices
@@ -334,6 +348,8 @@ impl<'s, I: Index> FaceFinder<'s, I> {
         self.begin_with_outline();
     }
 
+    /// Ends the search and returns what it found. The vertices that are still candidates lie on no
+    /// face.
     fn into_solid(self) -> Solid<'s, I> {
         Solid {
             points: self.points,
@@ -351,6 +367,7 @@ impl<'s, I: Index> FaceFinder<'s, I> {
         if edge.left() == I::NONE { (edge.from(), edge.to()) } else { (edge.to(), edge.from()) }
     }
 
+    /// Returns the position of a vertex.
     fn point(&self, number: I) -> Point {
         self.points[number.get()]
     }
@@ -459,7 +476,8 @@ impl<'s, I: Index> FaceFinder<'s, I> {
         }
     }
 
-    /// Removes a vertex that is not a corner of any face still to be found.
+    /// Removes a vertex from the candidates, because no face that is still to be found has it as a
+    /// corner.
     fn drop_candidate(&mut self, number: I) {
         let candidates = &self.candidates[..self.candidate_count];
         if let Some(at) = candidates.iter().position(|other| *other == number) {

@@ -15,18 +15,21 @@ use crate::index::Index;
 use crate::model::Corner;
 use crate::stage::{Cancel, OutOfScratch, Scratch};
 
-/// The joining of the faces of one solid.
+/// Joins faces of one solid that are meant to be one face and differ only by rounding.
 #[derive(Debug)]
 pub(super) struct Joining<'s, I> {
+    /// The solid with triangles as faces, before those in one plane are joined.
     solid: Solid<'s, I>,
+    /// Where the user looks from. It decides which faces are seen edge-on.
     eye: Eye,
-    /// The eye, moved as the precision requires. It decides what is visible.
+    /// The eye, moved a little towards the solid, so that a face that is meant to be edge-on counts
+    /// as hidden.
     drawn_in: Eye,
     /// For each face, the face that took it in, which may be the face itself.
     joined: &'s mut [I],
-    /// For each vertex, the one after it around the current face.
+    /// For each vertex, the vertex that follows it around the face that is being handed over.
     next: &'s mut [I],
-    /// The corners of the current face.
+    /// The corners of the face that is being handed over.
     corners: &'s mut [Corner<I>],
 }
 
@@ -38,6 +41,7 @@ impl<'s, I: Index> Joining<'s, I> {
             + Scratch::bytes_for::<Corner<I>>(vertices)
     }
 
+    /// Prepares the joining of the faces of `solid`, each of which is still a face of its own.
     pub(super) fn new(
         solid: Solid<'s, I>,
         eye: Eye,
@@ -58,6 +62,8 @@ impl<'s, I: Index> Joining<'s, I> {
         })
     }
 
+    /// Returns the plane of a face as it was found, before it took in others. Its upper side is
+    /// outside the solid.
     fn plane(&self, face: I) -> Plane {
         let [a, b, c] =
             self.solid.faces[face.get()].map_each(|number| self.solid.points[number.get()]);
@@ -122,7 +128,7 @@ impl<'s, I: Index> Joining<'s, I> {
         Ok(())
     }
 
-    /// Whether one of the two faces at an edge might take in the other.
+    /// Whether the two faces at an edge bend so little that one might take in the other.
     fn is_almost_flat(&self, edge: &HullEdge<I>, precision: Precision) -> bool {
         let (left, right) = (self.plane(edge.left()), self.plane(edge.right()));
         let near = |plane: I, face: I| {

@@ -93,7 +93,7 @@ pub trait SolidSink<I = u16> {
 
 pub use crate::stage::SinkFull;
 
-/// The counts of what was found.
+/// The numbers of what was found, for the user to be told.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SolidSummary {
@@ -139,14 +139,14 @@ pub enum SolidError {
     /// The solid is not convex: a vertex lies inside the solid that the others span, deeper than
     /// the precision.
     VertexInside {
-        /// The first such vertex, counted from 0.
+        /// The number of the first such vertex, counted from 0.
         vertex: u32,
         /// The number of such vertices.
         count: usize,
     },
     /// An edge refers to a vertex that does not exist.
     UnknownVertex {
-        /// The number of the edge, counted from 0.
+        /// The number of the edge that is wrong, counted from 0.
         edge: usize,
     },
     /// The edges do not lead around the solid: at this vertex of the outline no edge leads on.

@@ -79,7 +79,8 @@ pub(super) fn weld<I: Index>(points: &[Point], numbers: &mut [I]) -> usize {
     kept
 }
 
-/// Returns what the points at `numbers` span. They are all different, and there are at least four.
+/// Finds out whether the points at `numbers` lie on one line, in one plane or neither. They are all
+/// different, and there are at least four.
 pub(super) fn span<I: Index>(points: &[Point], numbers: &[I]) -> Span<I> {
     let point = |number: I| points[number.get()];
     let (a, b) = (numbers[0], numbers[1]);
@@ -98,7 +99,8 @@ pub(super) fn span<I: Index>(points: &[Point], numbers: &[I]) -> Span<I> {
     }
 }
 
-/// Returns the vertex that represents `number` among the welded ones.
+/// Returns the vertex that stands for all those at the position of `number`. `welded` holds one for
+/// each position.
 pub(super) fn first_at_place<I: Index>(points: &[Point], welded: &[I], number: I) -> I {
     let position = points[number.get()];
     welded

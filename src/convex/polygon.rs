@@ -13,7 +13,9 @@ use crate::index::Index;
 /// The corners of the polygon in counter-clockwise order, no three of them in line on the page.
 #[derive(Debug)]
 pub(super) struct Polygon<'s, I> {
+    /// The vertex numbers of the corners, followed by unused room.
     corners: &'s mut [I],
+    /// How many entries of `corners` are in use, from the first on.
     count: usize,
 }
 
@@ -41,7 +43,7 @@ impl<'s, I: Index> Polygon<'s, I> {
         &self.corners[..self.count]
     }
 
-    /// Returns the memory of the corners.
+    /// Ends the polygon and gives the memory of its corners back.
     pub(super) fn into_room(self) -> &'s mut [I] {
         self.corners
     }

@@ -6,6 +6,8 @@ use crate::index::Index;
 /// A point on the page in fine units, usually 1/256 step: x and y, each clamped to ±2^29.
 pub type Fine = [i64; 2];
 
+/// The greatest absolute value to which a coordinate of a [`Fine`] point is clamped, so that
+/// squares and their sums fit in 64 bits.
 const FINE_LIMIT: i64 = 1 << 29;
 
 /// The greatest number of times that a polynomial is halved to test whether it stays near a chord.
@@ -14,9 +16,10 @@ const FINE_LIMIT: i64 = 1 << 29;
 const HALVINGS: u32 = 4;
 
 /// The resolution of the search for the longest chord. The lengths tried first differ by one part
-/// in 2^`SAMPLE_BITS`. Between the best of them and the next one, the search continues to one part
-/// in 2^`SEARCH_BITS`.
+/// in 2^`SAMPLE_BITS`.
 const SAMPLE_BITS: u32 = 4;
+/// Between the best of the lengths tried first and the next one, the search continues to one part
+/// in 2^`SEARCH_BITS`.
 const SEARCH_BITS: u32 = 8;
 
 /// The number of lengths that are tested before shorter ones are searched for. The shortest of them
@@ -41,7 +44,7 @@ const TRIED: usize = 32;
 /// It uses about 2 KiB of stack.
 #[derive(Debug, Clone)]
 pub struct Chords<'a, F, I = u16> {
-    /// The spline that is approximated.
+    /// The curve that chords approximate.
     spline: Spline<'a, I>,
     /// Maps points of the curve to the page: see [`Spline::chords`].
     project: F,
@@ -49,20 +52,21 @@ pub struct Chords<'a, F, I = u16> {
     tolerance: u16,
     /// The end of the previous chord; `None` before the first.
     last: Option<End>,
-    /// The length of the previous chord, in units of [`Parameter`].
+    /// The length of the previous chord, with which the search for the next one begins, in units of
+    /// [`Parameter`].
     length: u32,
     /// The polynomial that was used last.
     span: Span,
-    /// The number of that polynomial; `None` if none is loaded.
+    /// The number of the polynomial in `span`, or `None` before the first one is loaded.
     used: Option<usize>,
 }
 
 /// An end of a chord: the position on the curve, and the point in units of 2^-[`FRACTION_BITS`].
 #[derive(Debug, Clone, Copy)]
 struct End {
-    /// The position on the curve.
+    /// Where the chord ends along the curve.
     at: Parameter,
-    /// The point.
+    /// Where the chord ends in the model.
     position: [i64; 3],
 }
 
@@ -181,7 +185,8 @@ impl<'a, F: Fn([i64; 3]) -> Option<Fine>, I: Index> Chords<'a, F, I> {
         true
     }
 
-    /// Loads polynomial number `number` into `self.span`. Returns `false` if it has zero length.
+    /// Makes `self.span` the polynomial with this number, from 0. Returns `false` if that
+    /// polynomial has zero length.
     fn load(&mut self, number: usize) -> bool {
         if self.used != Some(number) {
             self.used = self.spline.load(number, &mut self.span).then_some(number);
@@ -189,7 +194,7 @@ impl<'a, F: Fn([i64; 3]) -> Option<Fine>, I: Index> Chords<'a, F, I> {
         self.used.is_some()
     }
 
-    /// The point at `t`, in units of 2^-[`FRACTION_BITS`].
+    /// Returns the point of the curve at `t`, in units of 2^-[`FRACTION_BITS`].
     fn position_at(&self, t: Parameter) -> [i64; 3] {
         if self.used == Some(t.span()) {
             self.span.at(t.local())
@@ -281,9 +286,10 @@ struct Cone {
 }
 
 impl Cone {
+    /// The cone that contains every direction, because no point restricts it yet.
     const ALL: Self = Self { sides: None, empty: false };
 
-    /// Whether no direction is left.
+    /// Whether no direction is left, so that no single line passes near enough to all points.
     fn is_empty(&self) -> bool {
         self.empty
     }
@@ -319,7 +325,7 @@ impl Cone {
     }
 }
 
-/// The same direction, shortened to 30 bits per component.
+/// Returns the same direction with components of at most 30 bits, so that products do not overflow.
 fn shortened(direction: Fine) -> Fine {
     let longest = direction[0].unsigned_abs().max(direction[1].unsigned_abs());
     let excess = (u64::BITS - longest.leading_zeros()).saturating_sub(30);
@@ -341,6 +347,8 @@ struct Strip {
 }
 
 impl Strip {
+    /// Makes the strip around the line from `from` to `to`. `tolerance` is in the same unit as the
+    /// points.
     fn new(from: Fine, to: Fine, tolerance: u16) -> Self {
         let (from, to) = (clamped(from), clamped(to));
         let along = [to[0] - from[0], to[1] - from[1]];
@@ -348,6 +356,7 @@ impl Strip {
         Self { from, to, along, tolerance: i64::from(tolerance), length }
     }
 
+    /// Whether a point is within the tolerance of the line, its ends included.
     fn contains(&self, position: Fine) -> bool {
         let position = clamped(position);
         let away = [position[0] - self.from[0], position[1] - self.from[1]];
@@ -363,6 +372,7 @@ impl Strip {
     }
 }
 
+/// Returns the point with each coordinate limited to ±[`FINE_LIMIT`].
 fn clamped(position: Fine) -> Fine {
     position.map(|c| c.clamp(-FINE_LIMIT, FINE_LIMIT))
 }

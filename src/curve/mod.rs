@@ -22,7 +22,7 @@ use span::Span;
 
 /// The lowest order, which gives straight lines.
 pub const LEAST_ORDER: u8 = 2;
-/// The highest order, which has degree 5.
+/// The highest order of a curve (its degree plus 1) that is accepted: degree 5.
 pub const GREATEST_ORDER: u8 = 6;
 
 /// The greatest absolute value of a knot, in any unit. With this limit, 64 bits hold every product.
@@ -44,12 +44,13 @@ pub enum Knots<'a> {
     /// A list of as many knots as the number of control points plus the order. The knots never
     /// decrease and are within ±[`KNOT_LIMIT`], in any unit.
     Listed(&'a [i32]),
-    /// The same list, with each knot stored as two halves in memory order.
+    /// As [`Knots::Listed`], with each knot stored as two halves in memory order, as a model stores
+    /// them.
     Packed(&'a [[u16; 2]]),
 }
 
 impl Knots<'_> {
-    /// The knot number `index`, or the last knot if there are fewer.
+    /// Returns the knot with this index, or the last knot if there are fewer.
     pub(crate) fn get(&self, index: usize) -> i64 {
         match self {
             Self::Uniform => index as i64,
@@ -63,7 +64,7 @@ impl Knots<'_> {
         }
     }
 
-    /// The number of listed knots; `None` if the knots are uniform.
+    /// Returns how many knots are listed, or `None` if the knots are uniform.
     pub(crate) fn count(&self) -> Option<usize> {
         match self {
             Self::Uniform => None,
@@ -73,11 +74,11 @@ impl Knots<'_> {
     }
 }
 
-/// Why a curve was refused.
+/// The reasons why a curve is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum CurveError {
-    /// The order is not 2 to 6 (degree 1 to 5).
+    /// The order is not one of 2 to 6, which are the degrees 1 to 5.
     Order,
     /// A curve of this order needs more control points.
     TooFewControlPoints {
@@ -103,12 +104,12 @@ pub enum CurveError {
     },
     /// A knot is less than the one before it.
     KnotDecreases {
-        /// The number of the knot, from 0.
+        /// The number of the knot that is less than the one before it, from 0.
         knot: usize,
     },
     /// The absolute value of a knot is greater than [`KNOT_LIMIT`].
     KnotTooLarge {
-        /// The number of the knot, from 0.
+        /// The number of the knot that is too large, from 0.
         knot: usize,
     },
     /// A knot inside the curve is repeated more often than the degree, so the curve would be
@@ -128,7 +129,9 @@ pub enum CurveError {
 pub struct Parameter(u32);
 
 impl Parameter {
+    /// The number of bits that say where on its polynomial a position lies.
     const LOCAL_BITS: u32 = 20;
+    /// The length of one polynomial in units of the parameter.
     const ONE: u32 = 1 << Self::LOCAL_BITS;
     /// The greatest number of polynomials for which 32 bits hold the end of the last one.
     const SPAN_LIMIT: usize = (1 << (32 - Self::LOCAL_BITS)) - 1;
@@ -138,7 +141,7 @@ impl Parameter {
         Self((span.min(Self::SPAN_LIMIT) as u32) << Self::LOCAL_BITS)
     }
 
-    /// Returns the number of the span in which the parameter lies.
+    /// Returns the number of the polynomial (the span) on which the position lies.
     fn span(self) -> usize {
         (self.0 >> Self::LOCAL_BITS) as usize
     }
@@ -182,7 +185,7 @@ pub struct Spline<'a, I = u16> {
     control: &'a [I],
     /// The order of the spline, which is its degree plus 1.
     order: u8,
-    /// The knots.
+    /// The knots, which are the parameter values where its polynomials meet.
     knots: Knots<'a>,
     /// The position at which the curve begins.
     from: Parameter,
@@ -225,7 +228,7 @@ impl<'a, I: Index> Spline<'a, I> {
         Self { from, to: to.clamp(from, end), ..self }
     }
 
-    /// The positions at which the curve begins and ends.
+    /// Returns the positions at which the curve begins and ends.
     pub fn ends(&self) -> (Parameter, Parameter) {
         (self.from, self.to)
     }
@@ -235,7 +238,7 @@ impl<'a, I: Index> Spline<'a, I> {
         self.control.len() + 1 - usize::from(self.order)
     }
 
-    /// The knot at which polynomial number `span` begins.
+    /// Returns the knot at which polynomial number `span` begins.
     fn knot(&self, span: usize) -> i64 {
         self.knots.get(span + usize::from(self.order) - 1)
     }
@@ -253,7 +256,8 @@ impl<'a, I: Index> Spline<'a, I> {
         rounded(self.exactly_at(t))
     }
 
-    /// The point at `t` in units of 2^-[`FRACTION_BITS`].
+    /// Returns the point of the curve at `t`, in units of 2^-[`FRACTION_BITS`] and not rounded to
+    /// whole units.
     fn exactly_at(&self, t: Parameter) -> [i64; 3] {
         let t = t.min(Parameter::start_of(self.spans()));
         let mut span = Span::default();
@@ -311,7 +315,7 @@ fn rounded(position: [i64; 3]) -> Point {
     position.map_each(|c| ((c + (1 << (FRACTION_BITS - 1))) >> FRACTION_BITS) as i32)
 }
 
-/// Implements [`Spline::parameter`] without a spline.
+/// Does the work of [`Spline::parameter`] where the control points are not known yet.
 pub(crate) fn parameter_of(
     control_points: usize,
     order: u8,

@@ -2,6 +2,7 @@
 
 use super::{FRACTION_BITS, GREATEST_ORDER, Parameter};
 
+/// The greatest number of Bézier points of a polynomial, one more than the highest degree.
 const POINTS: usize = GREATEST_ORDER as usize;
 
 /// A polynomial of degree 1 to 5, given by its Bézier points in units of 2^-[`FRACTION_BITS`].
@@ -11,7 +12,7 @@ const POINTS: usize = GREATEST_ORDER as usize;
 pub(super) struct Span {
     /// The Bézier points, of which the first `degree` + 1 are used.
     points: [[i64; 3]; POINTS],
-    /// The degree of the polynomial.
+    /// The degree of the polynomial that this span is.
     degree: usize,
 }
 
@@ -116,19 +117,20 @@ impl Span {
         }
     }
 
-    /// The Bézier points; the first and the last are on the curve.
+    /// Returns the Bézier points. The first and the last are on the curve; the others pull it
+    /// towards them.
     pub(super) fn points(&self) -> &[[i64; 3]] {
         &self.points[..=self.degree]
     }
 
-    /// The point at the position `local` × 2^-20 (de Casteljau).
+    /// Returns the point at the position `local` × 2^-20 of the polynomial (de Casteljau).
     pub(super) fn at(&self, local: u32) -> [i64; 3] {
         let mut rest = *self;
         rest.keep_from(local);
         rest.points[0]
     }
 
-    /// The part between the positions `from` × 2^-20 and `to` × 2^-20.
+    /// Returns the part of the polynomial between the positions `from` × 2^-20 and `to` × 2^-20.
     pub(super) fn part(&self, from: u32, to: u32) -> Self {
         let mut part = *self;
         if from > 0 {
@@ -169,7 +171,7 @@ fn between(p: [i64; 3], q: [i64; 3], numerator: i64, denominator: i64) -> [i64; 
     })
 }
 
-/// p + (q - p) × `local` × 2^-20, rounded.
+/// Returns the point at `local` × 2^-20 of the way from `p` to `q`, rounded.
 fn along(p: [i64; 3], q: [i64; 3], local: u32) -> [i64; 3] {
     const HALF: i64 = 1 << (Parameter::LOCAL_BITS - 1);
     core::array::from_fn(|axis| {

@@ -30,27 +30,29 @@ pub struct PackedLine([u32; 3]);
 /// The position, in the last word of a packed line, of what it keeps besides its ends.
 const MARKS: u32 = 84 - 64;
 
-/// What a packed line keeps besides its ends.
+/// What a packed line keeps besides its ends: how and with which pen it is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Marks {
+    /// How the line is inked: solid, dotted and so on.
     line_type: LineType,
     /// Whether the line yields to any other at the same position.
     yields: bool,
-    /// The pen, from 0.
+    /// The pen that draws the line, from 0.
     pen: u8,
 }
 
 impl Marks {
-    /// The bit of a line that yields.
+    /// The bit that marks a line that yields to any other at the same position.
     const YIELDS: u32 = 1 << LineType::CODE_BITS;
 
-    /// Returns the marks in ten bits.
+    /// Packs the marks into ten bits, as [`Marks::from_bits`] reads them.
     fn bits(self) -> u32 {
         let yields = if self.yields { Self::YIELDS } else { 0 };
         let pen = u32::from(self.pen % PEN_LIMIT) << (LineType::CODE_BITS + 1);
         u32::from(self.line_type.code()) | yields | pen
     }
 
+    /// Unpacks what [`Marks::bits`] packed. Higher bits are ignored.
     fn from_bits(bits: u32) -> Self {
         Self {
             line_type: LineType::from_code((bits & (Self::YIELDS - 1)) as u8),
@@ -80,13 +82,13 @@ impl PackedLine {
         Self([low, middle, high | yields << MARKS])
     }
 
-    /// Whether its ends differ.
+    /// Whether its ends are different points, so that there is a line to draw.
     pub fn has_length(self) -> bool {
         let [from, to] = self.ends();
         from != to
     }
 
-    /// Returns its ends.
+    /// Returns the two ends of the line.
     pub fn ends(self) -> [PagePoint; 2] {
         let [low, middle, high] = self.0.map(u64::from);
         let low = low | middle << 32;
@@ -96,6 +98,7 @@ impl PackedLine {
         })
     }
 
+    /// Unpacks the line type, the pen and whether the line yields.
     fn marks(self) -> Marks {
         Marks::from_bits(self.0[2] >> MARKS)
     }
@@ -104,7 +107,9 @@ impl PackedLine {
 /// The layout of a drawing in the working memory: first the segments, then the points.
 #[derive(Debug, Clone, Copy)]
 pub struct Stored<I = u16> {
+    /// The number of segments, which come first.
     segments: usize,
+    /// The number of points, which follow the segments.
     points: usize,
     /// The width of the numbers in the segments.
     width: PhantomData<I>,
@@ -132,6 +137,7 @@ impl<I: Index> Stored<I> {
         self.segment_bytes() + Scratch::bytes_for::<PagePoint>(self.points)
     }
 
+    /// Returns the number of bytes that the segments take, which is where the points begin.
     fn segment_bytes(&self) -> usize {
         Scratch::bytes_for::<Segment<I>>(self.segments)
     }
@@ -208,7 +214,7 @@ const LINES_BETWEEN_CHECKS: usize = 32;
 ///
 /// # Errors
 /// See [`GraphError`]; on an error the lines are lost.
-// Not inlined, so that its stack frame is not below those of the stages.
+// Not inlined, so that its variables take no stack while the rest of a job is computed.
 #[inline(never)]
 pub fn build_graph<I: Index>(
     words: &mut [u64],
@@ -282,7 +288,9 @@ pub fn build_graph<I: Index>(
 /// Numbers points with a hash table of their positions, and gives coincident points the same
 /// number.
 struct PointFinder<'a, I> {
+    /// The points found so far, followed by room for more.
     points: &'a mut [PagePoint],
+    /// The number of different points found so far.
     count: usize,
     /// For each slot the point number + 1, or 0 if it is free. The length is a power of two.
     table: &'a mut [I],
@@ -307,7 +315,8 @@ impl<'a, I: Index> PointFinder<'a, I> {
     /// Returns the number of a point. It is that of a known point at the same position or one step
     /// away from it, or else a new number.
     fn number(&mut self, point: PagePoint) -> Result<I, OutOfScratch> {
-        /// The offsets of the same point, of its four neighbours, and of its four diagonal ones.
+        /// Where to look for a known point, in steps from the new one: first at the same position,
+        /// then beside, above and below it, and then at the four diagonal neighbours.
         const SAME_THEN_AROUND: [(i32, i32); 9] =
             [(0, 0), (-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (1, -1), (-1, 1), (1, 1)];
         for (dx, dy) in SAME_THEN_AROUND {
@@ -339,7 +348,7 @@ impl<'a, I: Index> PointFinder<'a, I> {
         }
     }
 
-    /// Adds a new point and returns its number.
+    /// Adds a new point, which is not yet known, and returns its number.
     fn add(&mut self, point: PagePoint) -> Result<I, OutOfScratch> {
         let full = OutOfScratch {
             needed: (self.count + 1) * size_of::<PagePoint>(),

@@ -15,17 +15,19 @@ pub enum LineType {
     /// A solid line.
     #[default]
     Full = 0,
-    /// Harrison's dotted line.
+    /// A dotted line, whose dots and gaps are equally long (Harrison).
     Dotted = 1,
     /// A line of dashes, each three dots long.
     Dashed = 2,
 }
 
-/// What the other modules need to know about a line type.
+/// The row of a line type in the table: what the other modules need to know about it.
 struct Row {
+    /// The variant of [`LineType`] that the row describes.
     line_type: LineType,
     /// The name by which a user chooses the type.
     name: &'static str,
+    /// The lengths of the dashes and gaps of this type of line.
     dashes: Dashes,
     /// Where lines overlap, the type with the lower number is drawn.
     precedence: u8,
@@ -41,7 +43,7 @@ pub struct Dashes {
     pub lengths: &'static [u8],
     /// The sum of the lengths, which is even.
     pub period: u8,
-    /// The least of the lengths.
+    /// The least of the lengths, which limits how often they are repeated along a short line.
     pub shortest: u8,
 }
 
@@ -58,7 +60,7 @@ impl Dashes {
             at += 1;
         }
         assert!(lengths.len().is_multiple_of(2), "there are not as many gaps as dashes");
-        // So that the ends of dashes and gaps are never halfway between two moves.
+        // With these lengths, the ends of dashes and gaps are never halfway between two moves.
         assert!(
             period.is_multiple_of(2) && (at == 0 || lengths[0] % 2 == 1),
             "a line has an even length"
@@ -96,7 +98,7 @@ impl LineType {
         all
     };
 
-    /// The number of bits of a code in a packed line.
+    /// The number of bits that a packed line has for the code of its type.
     pub(super) const CODE_BITS: u32 = 4;
 
     /// Returns the code by which lines and segments store the type, below 16.

@@ -83,8 +83,8 @@ impl<I: Index> Segment<I> {
     }
 }
 
-/// A drawing. No two points are equal, no segment occurs twice, and every segment joins two
-/// different points.
+/// A line drawing on the page, as a graph. No two points are equal, no segment occurs twice, and
+/// every segment joins two different points.
 #[derive(Debug, Clone, Copy)]
 pub struct Drawing<'a, I = u16> {
     /// The points, all of them different.

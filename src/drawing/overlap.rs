@@ -36,7 +36,7 @@ impl<P: Copy + Ord + From<u32> + Into<u64>> NumberedLine<P> {
         self.0[0]
     }
 
-    /// Returns the numbers of the points at its ends.
+    /// Returns the numbers of the points at both ends.
     pub(super) fn ends<I: Index<Pair = P>>(&self) -> [I; 2] {
         I::halves(self.0[0])
     }
@@ -65,12 +65,15 @@ impl<P: Copy + Ord + From<u32> + Into<u64>> NumberedLine<P> {
 pub(super) struct Rank(u32);
 
 impl Rank {
+    /// Makes the rank of a line that `pen` draws. `yields` says that any other line at the same
+    /// position is drawn instead.
     pub(super) fn new(line_type: LineType, yields: bool, pen: u8) -> Self {
         let [precedence, code, pen] =
             [line_type.precedence(), line_type.code(), pen].map_each(u32::from);
         Self(u32::from(yields) << 24 | precedence << 16 | code << 8 | pen)
     }
 
+    /// Returns the code of the line type and the pen, which the rank holds.
     pub(super) fn line_type_and_pen(self) -> (LineType, u8) {
         (LineType::from_code((self.0 >> 8) as u8), self.0 as u8)
     }
@@ -80,15 +83,20 @@ impl Rank {
 /// of a vertical line.
 type PointKey = (i32, i32);
 
-/// The sort key of a segment.
+/// The key by which segments are sorted, so that those on one straight line follow each other.
 struct Key {
+    /// The direction of the segment as one number, see [`Key::slope`].
     slope: u32,
+    /// The end of the segment that comes first along the line.
     from: PointKey,
+    /// The end of the segment that comes last along the line.
     to: PointKey,
+    /// The rank among segments of one line, of which the lowest is drawn.
     rank: Rank,
 }
 
 impl Key {
+    /// Makes the key of a segment. `points` gives the positions of its ends.
     fn of<I: Index>(segment: &LineOf<I>, points: &[PagePoint]) -> Self {
         Self {
             slope: segment.slope(),
@@ -243,11 +251,14 @@ pub(super) fn ink_once<I: Index>(
 /// An end of a segment: its position, and the number of its point.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct End<I> {
+    /// Where the end lies, as a sort key along the line.
     position: PointKey,
+    /// The number by which segments name the point.
     number: I,
 }
 
 impl<I: Index> End<I> {
+    /// Returns both ends of a segment, the one with the lower point number first.
     fn both(segment: &LineOf<I>, points: &[PagePoint]) -> [Self; 2] {
         segment.ends::<I>().map_each(|number| {
             let position = points.get(number.get()).map_or((0, 0), |point| (point.x, point.y));
@@ -261,6 +272,7 @@ impl<I: Index> End<I> {
         a.min(b)
     }
 
+    /// Returns the end that comes last along the line.
     fn second(segment: &LineOf<I>, points: &[PagePoint]) -> Self {
         let [a, b] = Self::both(segment, points);
         a.max(b)

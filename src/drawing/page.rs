@@ -19,7 +19,7 @@ pub struct Page {
 /// The reasons why the drawing cannot be placed on the page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PageError {
-    /// The margins leave no free area.
+    /// The margins and the title leave no free area.
     NoRoom,
     /// A side of the page is longer than 2^20 steps.
     TooManySteps,
@@ -29,7 +29,7 @@ pub enum PageError {
         width: u32,
         /// Size of the plan along y, in 0.1 mm. The greatest value stands for all larger ones.
         height: u32,
-        /// Size of the area for its title along y, in mm.
+        /// Height that the title takes below the plan, in mm; 0 if there is none.
         foot: Millimetres,
     },
     /// The title is wider than the free part of the page.
@@ -41,7 +41,7 @@ pub enum PageError {
     },
 }
 
-/// Steps per millimetre along x and along y.
+/// How many motor steps are one millimetre, along x and along y.
 pub type StepsPerMillimetre = [Millimetres; 2];
 
 impl Page {

@@ -13,12 +13,14 @@ use crate::visibility::EdgeParameter;
 /// The values are in units of 2^-[`Bounds::FRACTION_BITS`], with |value| < 2^46.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Bounds {
+    /// The least x/w and the least y/w.
     low: [i64; 2],
+    /// The greatest x/w and the greatest y/w.
     high: [i64; 2],
 }
 
 impl Bounds {
-    /// The unit of the bounds of an image is 2^-this.
+    /// The number of fraction bits of the bounds of an image: their unit is 2^-24.
     pub const FRACTION_BITS: u32 = 24;
 
     /// Returns the box around the images of `vertices`, which must have w > 0, or `None` if there
@@ -49,7 +51,7 @@ impl Bounds {
             .reduce(Self::union)
     }
 
-    /// Returns the box around both boxes.
+    /// Returns the smallest box that contains both boxes.
     #[must_use]
     pub fn union(self, other: Self) -> Self {
         Self {
@@ -62,18 +64,19 @@ impl Bounds {
 /// The map from homogeneous image coordinates to steps: (a x + b w) / (w 2^k), rounded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PageMap {
-    /// The scale along x and y.
+    /// The scale along x and along y, in steps for each unit of the image, with `k` fraction bits.
     a: [i64; 2],
-    /// The offset along x and y.
+    /// The offset along x and along y, in steps, with `k` fraction bits.
     b: [i128; 2],
-    /// The number of fraction bits of `a` and `b`.
+    /// The number of fraction bits of `a` and `b`: the result is divided by 2^`k`.
     k: u32,
     /// The part of the page to which lines are clipped, if the image may reach beyond the page.
     window: Option<Window>,
 }
 
-/// The map's scale has this many bits, and its unit is never finer than 2^-[`FINEST`].
+/// The number of bits to which the map's scale is kept.
 const SCALE_BITS: u32 = 41;
+/// The map's unit is never finer than 2^-`FINEST`, so that its products fit in 127 bits.
 const FINEST: u32 = 44;
 
 impl PageMap {
@@ -82,15 +85,16 @@ impl PageMap {
     ///
     /// # Errors
     /// [`PageError::NoRoom`], [`PageError::TooManySteps`].
-    // Not inlined, so that its stack frame is not below those of the stages.
+    // Not inlined, so that its variables take no stack while the rest of a job is computed.
     #[inline(never)]
     pub fn fit(bounds: &Bounds, page: &Page, steps: StepsPerMillimetre) -> Result<Self, PageError> {
         Self::fit_unit(bounds, Bounds::FRACTION_BITS, page, steps)
     }
 
-    /// As [`PageMap::fit`], but what is farther than `field` from the middle of the image may fall
-    /// off the page. `field` is in units of 2^-[`Bounds::FRACTION_BITS`]. In a perspective view the
-    /// image of a point nearly beside the eye is nearly infinitely far away.
+    /// Makes the map that scales an image to the page like [`PageMap::fit`], but what is farther
+    /// than `field` from the middle of the image may fall off the page. `field` is in units of
+    /// 2^-[`Bounds::FRACTION_BITS`]. In a perspective view the image of a point nearly beside the
+    /// eye is nearly infinitely far away.
     ///
     /// # Errors
     /// [`PageError::NoRoom`], [`PageError::TooManySteps`].
@@ -129,7 +133,7 @@ impl PageMap {
         Ok(map)
     }
 
-    /// As [`PageMap::fit`], with `bounds` in units of 2^-`unit_bits`.
+    /// Makes the map of [`PageMap::fit`] from `bounds` in units of 2^-`unit_bits`.
     fn fit_unit(
         bounds: &Bounds,
         unit_bits: u32,
@@ -200,7 +204,7 @@ impl PageMap {
         let to_page = |value: i64| (i128::from(value) << 16) >> fraction_bits;
         let size = [0, 1].map(|axis: usize| to_page(bounds.high[axis] - bounds.low[axis]));
         if size[0] > i128::from(free[0]) || size[1] > i128::from(free[1]) {
-            // Of 2^-16 mm, rounded.
+            // Converts a size in units of 2^-16 mm to 0.1 mm, rounded.
             let tenths = |size: i128| u32::try_from((10 * size as i64 + (1 << 15)) >> 16);
             let [width, height] = size.map(|size| tenths(size).unwrap_or(u32::MAX));
             return Err(PageError::DoesNotFit { width, height, foot: page.foot });

@@ -15,13 +15,16 @@ use crate::array::MapEach;
 use crate::fixed::{Millimetres, divide_rounding};
 use core::cmp::Ordering;
 
+/// The font as text, one line for each letter (see the module documentation).
 const FONT: &str = include_str!("font/simplex.txt");
 
 /// The offset at which each line of the font begins, and the end of the last. The lines are sorted
 /// by their letters.
 const STARTS: [u16; GLYPHS + 1] = starts();
+/// The number of letters and accents in the font, which is the number of lines of its file.
 const GLYPHS: usize = 158;
 
+/// Finds where each line of the font begins, when the library is compiled.
 const fn starts() -> [u16; GLYPHS + 1] {
     let font = FONT.as_bytes();
     let (mut starts, mut line, mut at) = ([0; GLYPHS + 1], 0, 0);
@@ -176,6 +179,7 @@ pub fn is_in_font(letter: char) -> bool {
 pub struct TitleText {
     /// The text in UTF-8.
     bytes: [u8; TitleText::LIMIT],
+    /// The number of bytes in use.
     length: u8,
 }
 
@@ -185,7 +189,7 @@ impl TitleText {
 
     /// Makes a text of `letters`, or returns `None` if they need more than [`TitleText::LIMIT`]
     /// bytes.
-    // Not inlined, so that its stack frame is not below those of the stages.
+    // Not inlined, so that its variables take no stack while a job is computed.
     #[inline(never)]
     pub fn new(letters: impl Iterator<Item = char>) -> Option<Self> {
         let mut text = Self::default();
@@ -197,7 +201,7 @@ impl TitleText {
         Some(text)
     }
 
-    /// Returns the text.
+    /// Returns the text as a string.
     pub fn as_str(&self) -> &str {
         // Only whole letters were stored, so the bytes are valid UTF-8.
         let bytes = self.bytes.get(..usize::from(self.length)).unwrap_or(&[]);
@@ -212,14 +216,15 @@ impl Default for TitleText {
     }
 }
 
-/// The shape of one letter.
+/// The shape of one letter of the font.
 #[derive(Debug, Clone, Copy)]
 struct Glyph {
-    /// From its middle to its left side, in the font's units; negative to the left.
+    /// The x of the letter's left side, measured from its middle in the font's units; negative to
+    /// the left.
     left: i32,
-    /// From its middle to its right side, in the font's units.
+    /// The x of the letter's right side, measured from its middle in the font's units.
     right: i32,
-    /// Its points, two characters each.
+    /// The points of the letter's strokes, of two characters each, as the font's file has them.
     points: &'static [u8],
 }
 
@@ -252,7 +257,7 @@ impl Glyph {
     }
 }
 
-/// Decodes a coordinate, in the font's units.
+/// Returns the coordinate that a character of the font's file stands for, in the font's units.
 fn offset(byte: u8) -> i32 {
     i32::from(byte) - i32::from(b'R')
 }
@@ -260,6 +265,7 @@ fn offset(byte: u8) -> i32 {
 /// A letter at its position in the text, in the font's units.
 #[derive(Debug, Clone, Copy)]
 struct Placed {
+    /// The shape of the letter.
     glyph: Glyph,
     /// Distance of its vertical middle line from the beginning of the text.
     x: i32,
@@ -271,9 +277,9 @@ struct Placed {
 /// it.
 #[derive(Debug, Default)]
 struct TypeLine {
-    /// The x at which the next letter begins.
+    /// The x at which the next letter begins, from the beginning of the text in the font's units.
     end: i32,
-    /// The x of the middle of the last letter.
+    /// The x of the middle of the last letter, above which an accent is put.
     middle: i32,
     /// How far an accent on the last letter is raised.
     rise: i32,
@@ -298,7 +304,7 @@ impl TypeLine {
     }
 }
 
-/// Returns the letter without its accent, and the accent.
+/// Splits a letter with an accent into the letter without it and the accent.
 fn decomposed(letter: char) -> (char, Option<char>) {
     let mut rest = if letter.is_ascii() { "" } else { ACCENTED }.chars();
     while let (Some(composed), Some(base), accent) = (rest.next(), rest.next(), rest.next()) {

@@ -11,12 +11,14 @@ use crate::fixed::{divide_rounding, product};
 /// The part of a page inside its margins (and above its foot), in 1/256 steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Window {
+    /// The lower left corner.
     low: Fine,
+    /// The upper right corner.
     high: Fine,
 }
 
 impl Window {
-    /// Makes the window of a page.
+    /// Makes the window of a page: the area inside its margins and above the title.
     pub fn new(page: &Page, steps: StepsPerMillimetre) -> Self {
         let to_fine = |bits: i64, axis: usize| {
             // The product has 32 fraction bits, of which 8 are kept.
@@ -30,8 +32,8 @@ impl Window {
         }
     }
 
-    /// Returns the part of a line that is inside the window, in steps (Liang and Barsky, 1984), or
-    /// `None` if no part is. Coordinates must be within ±2^40.
+    /// Returns the part of a line that may be drawn, which is inside the window, in steps (Liang
+    /// and Barsky, 1984), or `None` if no part is. Coordinates must be within ±2^40.
     pub fn clip(&self, [from, to]: [Fine; 2]) -> Option<[PagePoint; 2]> {
         let along = [0, 1].map_each(|axis: usize| to[axis] - from[axis]);
         // The parameters at which the line enters and leaves, as ratios of numbers below 2^42.

@@ -12,7 +12,8 @@ use super::{Machine, Setting};
 use crate::drawing::{LineType, PagePoint};
 use crate::motion::{Move, PathLength, PushError};
 
-/// Where each motor is within its slack once all planned blocks have run.
+/// Where each motor is within its slack (the steps that it loses when it reverses) once all planned
+/// moves are made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct Backlash {
     /// For each motor, the steps that it must make upward before it moves the pen; `None` if this
@@ -21,8 +22,8 @@ pub(super) struct Backlash {
 }
 
 impl Backlash {
-    /// The steps that take up the slack before a move by `delta` motor steps, for motors that have
-    /// `slack` steps of it. From now on these steps count as taken up.
+    /// Returns the steps that take up the slack of the drives before a move by `delta` motor steps,
+    /// for motors that have `slack` steps of it. From now on these steps count as taken up.
     fn take_up(&mut self, slack: [i32; 2], delta: [i32; 2]) -> [i32; 2] {
         let mut take = |axis: usize| {
             if delta[axis] == 0 {
@@ -59,7 +60,7 @@ impl Backlash {
 }
 
 impl Machine<'_> {
-    /// The slack of each motor, in steps.
+    /// Returns the slack of each motor: the steps that it loses when it reverses.
     pub(super) fn slack_steps(&self) -> [i32; 2] {
         let PagePoint { x, y } = self.settings.page_point([Setting::BacklashX, Setting::BacklashY]);
         [x, y]
@@ -89,7 +90,7 @@ impl Machine<'_> {
         Ok((x, y) == (0, 0))
     }
 
-    /// Discards the moves that are still waiting. The pen is at `page`.
+    /// Discards the moves that are planned but not yet made. The pen is at `page`.
     pub(super) fn forget_path(&mut self, page: PagePoint) {
         self.slack.give_back(self.runner.slack_ahead());
         self.runner.forget_path(page);

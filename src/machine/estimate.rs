@@ -30,18 +30,18 @@ pub(super) fn rest_to_rest(distance: u64, speed: u64, acceleration: u64) -> u64 
 /// rest to rest.
 #[derive(Debug, Default)]
 pub(super) struct Estimate {
-    /// The time of the parts that are complete.
+    /// The time of the parts between corners that are complete, in milliseconds.
     milliseconds: u64,
-    /// The length of the present part between two corners, in 2^-18 mm.
+    /// The length of the part between two corners that is being added up, in 2^-18 mm.
     length: u64,
-    /// The last move of the present part, in steps.
+    /// The last move of that part, in steps.
     delta: (i32, i32),
-    /// Whether the present part is drawn with the pen down.
+    /// Whether that part is drawn with the pen down.
     inked: bool,
 }
 
 impl Estimate {
-    /// Adds a move by `delta` steps that is `length` long (2^-18 mm).
+    /// Adds a move to the estimate: by `delta` steps, and `length` long in units of 2^-18 mm.
     pub(super) fn add(&mut self, settings: &Settings, delta: (i32, i32), inked: bool, length: u64) {
         let [(ax, ay), (bx, by)] =
             [self.delta, delta].map_each(|(x, y)| (i64::from(x), i64::from(y)));
@@ -57,7 +57,7 @@ impl Estimate {
         self.length += length;
     }
 
-    /// The estimated time of all moves, in milliseconds.
+    /// Ends the estimate and returns the time of all moves, in milliseconds.
     pub(super) fn end(mut self, settings: &Settings) -> u64 {
         self.end_part(settings);
         self.milliseconds

@@ -10,7 +10,7 @@ use super::{Alarm, Machine, MachineError, Setting, Target, Tool};
 use crate::drawing::{PAGE_LIMIT, PagePoint};
 use crate::motion::{Move, PathLength, PushError};
 
-/// An axis of the page.
+/// One of the two axes of the page, as a limit switch belongs to it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Axis {
@@ -69,24 +69,24 @@ impl Contacts {
         }
     }
 
-    /// The limit switches among the contacts.
+    /// Returns the limit switches among the contacts, without the emergency stop.
     #[must_use]
     pub const fn switches(self) -> Switches {
         Switches { x: self.x, y: self.y }
     }
 }
 
-/// The phases of homing one axis, in order.
+/// The phases of homing one axis, in the order in which they follow each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) enum Phase {
     /// Backs off from a switch that was already pressed at the start.
     Leave,
-    /// Runs quickly to the switch.
+    /// Runs quickly to the switch, until it is pressed.
     Seek,
-    /// Backs off from the switch.
+    /// Backs off from the switch, until it is released.
     Release,
-    /// Runs slowly to the switch again.
+    /// Runs slowly to the switch again, to find its exact position.
     Approach,
     /// Backs off to the final position, where the switch must be released.
     PullOff,
@@ -96,13 +96,13 @@ pub(super) enum Phase {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct SwitchFault;
 
-/// The progress of homing.
+/// How far the homing of the machine has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Homing {
     /// The axis that is being homed.
     pub(super) axis: Axis,
-    /// The present phase.
+    /// What the axis is doing now: whether it seeks the switch or moves away from it, for example.
     pub(super) phase: Phase,
     /// The position of the pins when the switch was pressed during this phase or the one before;
     /// `None` if it was not.
@@ -112,7 +112,8 @@ pub(super) struct Homing {
 }
 
 impl Homing {
-    /// The first phase of an axis whose switch is `pressed` or not.
+    /// Returns the first phase of homing an axis, which depends on whether its switch is `pressed`
+    /// already.
     pub(super) const fn begin(axis: Axis, pressed: bool) -> Self {
         let phase = if pressed { Phase::Leave } else { Phase::Seek };
         Self { axis, phase, pressed_at: None, is_stopped: false }
@@ -299,7 +300,7 @@ impl Machine<'_> {
         Ok(())
     }
 
-    /// The position of the motors in the coordinates that homing uses.
+    /// Converts motor positions to the coordinates in which this kind of machine is homed.
     fn homing_position(&self, motors: PagePoint) -> PagePoint {
         match Kinematics::properties(&self.settings).homing_space {
             HomingSpace::Page => self.settings.kinematics().page(motors),

@@ -35,8 +35,9 @@ impl Machine<'_> {
         self.activity = Activity::Run(source);
     }
 
-    /// Keeps the queue filled. It reads targets while the look-ahead has room, and appends events
-    /// while the queue has room and the plan is not too far ahead of the pins. Call it often.
+    /// Keeps the queue of step events filled. It reads targets while there is room for more planned
+    /// moves, and appends events while the queue has room and the plan is not too far ahead of the
+    /// pins. Call it often.
     pub fn fill(&mut self, path: &mut dyn Path, queue: &mut dyn EventQueue) {
         self.runner.follow_lift(self.pins.ticks());
         if let Activity::Alarm(alarm) = self.activity {
@@ -90,7 +91,8 @@ impl Machine<'_> {
         }
     }
 
-    /// Whether a plan that is `ahead` ticks ahead of the pins is long enough for now.
+    /// Whether a plan that is `ahead` ticks (1/25,000,000 s) ahead of the pins is long enough for
+    /// now.
     fn is_far_enough(&self, ahead: u32) -> bool {
         // During homing, a switch must stop the machine soon, so little is planned ahead.
         let is_homing = matches!(self.activity, Activity::Home(_));
@@ -137,7 +139,7 @@ impl Machine<'_> {
         }
     }
 
-    /// Restarts the count of the ink after which the machine pauses.
+    /// Begins anew to count the ink after which the machine pauses ([`Setting::InkBeforePause`]).
     pub(super) fn reset_ink_budget(&mut self) {
         let metres = u64::from(self.settings.get(Setting::InkBeforePause).to_bits().unsigned_abs());
         // Converts units of 2^-16 m to units of 2^-18 mm.

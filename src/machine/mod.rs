@@ -44,16 +44,17 @@ use tool::Tool;
 use crate::drawing::PagePoint;
 use crate::motion::{Block, PathLength, Runner};
 
-/// The plotter as the main loop sees it.
+/// The plotter as the main loop sees it: a state machine that turns jobs and commands into step
+/// events.
 #[derive(Debug)]
 pub struct Machine<'m> {
-    /// The settings in force.
+    /// The numbered settings (`$100` and so on) in force.
     settings: Settings,
-    /// What the machine is doing.
+    /// What the machine is doing, with the data of that state.
     activity: Activity,
-    /// The motion planner, which produces the events.
+    /// The motion planner, which turns planned moves into step events.
     runner: Runner<'m>,
-    /// The state that is shared with the interrupt.
+    /// What the step interrupt has done so far, and the orders to it.
     pins: &'m PulserState,
     /// The position of the motors, in steps, at which the step counters of `pins` are 0.
     origin: PagePoint,
@@ -63,7 +64,7 @@ pub struct Machine<'m> {
     progress: Progress,
     /// The move that is being cut into segments, if any.
     segmenter: Option<Segmenter>,
-    /// Where the motors are within their slack.
+    /// How much of its slack each motor has taken up.
     slack: Backlash,
     /// The contacts that were pressed when they were last observed.
     contacts: Contacts,
@@ -114,7 +115,7 @@ impl<'m> Machine<'m> {
         machine
     }
 
-    /// The settings in force.
+    /// Returns the settings by which the machine works at present.
     pub fn settings(&self) -> &Settings {
         &self.settings
     }
@@ -180,12 +181,12 @@ impl<'m> Machine<'m> {
         self.runner.set_override(self.percent, self.rapid_percent);
     }
 
-    /// What the machine is doing.
+    /// Returns what the machine is doing.
     pub fn state(&self) -> State {
         self.activity.state()
     }
 
-    /// The refusal of a command that the present state does not allow.
+    /// Returns the error for a command that the present state does not allow.
     fn refusal(&self) -> MachineError {
         MachineError::State(self.state())
     }
@@ -196,8 +197,8 @@ impl<'m> Machine<'m> {
         self.set_motors(self.settings.kinematics().motors(page), page);
     }
 
-    /// Does the same as [`Machine::set_position`], with the position given both for the motors and
-    /// on the page.
+    /// Declares where the machine is, whatever position it had: at `motors` in steps of the motors,
+    /// which is `page` on the page.
     fn set_motors(&mut self, motors: PagePoint, page: PagePoint) {
         let (x, y) = self.pins.steps();
         self.origin = PagePoint { x: motors.x.wrapping_sub(x), y: motors.y.wrapping_sub(y) };
@@ -335,14 +336,14 @@ impl<'m> Machine<'m> {
         Ok(())
     }
 
-    /// Whether every event has been processed, so that the pins are where the plan ends.
+    /// Whether every step event has been carried out, so that the pins are where the plan ends.
     pub fn is_stopped(&self) -> bool {
         self.pins.is_drained()
             && (self.pins.is_halted() || self.pins.ticks() == self.runner.ticks())
     }
 
-    /// Passes pulse width, pin inversion and braking rule to the interrupt. Call it only while
-    /// nothing moves.
+    /// Passes the pulse width, the pin inversion and the rule for braking to the step interrupt.
+    /// Call it only while nothing moves.
     fn configure_pulser(&mut self) {
         self.pins.configure(
             self.settings.microseconds_as_ticks(Setting::StepPulse),

@@ -7,7 +7,7 @@ use crate::step::tape::{Decoder, TapeLines};
 /// Where the pen moves next, and whether it draws on the way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Target {
-    /// The end of the move.
+    /// The end of the move, in steps of the page.
     pub point: PagePoint,
     /// The line type of the stroke; `None` if the pen is raised during the move.
     pub ink: Option<LineType>,
@@ -41,9 +41,9 @@ pub trait Path {
 /// ```
 #[derive(Debug, Clone)]
 pub struct TargetList<'a> {
-    /// All targets of the path.
+    /// All targets of the path, in the order in which the pen goes to them.
     targets: &'a [Target],
-    /// The index of the next target.
+    /// The index of the target to which the pen goes next.
     next: usize,
 }
 
@@ -68,9 +68,9 @@ impl Path for TargetList<'_> {
 /// A tape as a path: its moves, drawn as full lines where its pen is down.
 #[derive(Debug, Clone)]
 pub struct TapePath<I> {
-    /// The point where the first move starts.
+    /// The point of the page where the first move of the tape starts.
     start: PagePoint,
-    /// The rows of the tape, kept for a restart.
+    /// The rows of the tape, kept so that it can be read again.
     rows: I,
     /// The lines of the tape that are still to come.
     lines: TapeLines<Decoder<I>>,
@@ -94,16 +94,16 @@ impl<I: Iterator<Item = u8> + Clone> Path for TapePath<I> {
     }
 }
 
-/// The size of a job. Lengths are in units of 2^-18 mm.
+/// How long a job is: its strokes, lengths and time. Lengths are in units of 2^-18 mm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct JobSize {
     /// The number of strokes. A stroke is a sequence of consecutive targets drawn with the pen
     /// down.
     pub strokes: u32,
-    /// The total length with the pen down.
+    /// The total length that is drawn with the pen down.
     pub drawn: u64,
-    /// The total length with the pen up.
+    /// The total length of the moves with the pen up.
     pub travelled: u64,
     /// The estimated duration at the speeds in the settings, in milliseconds.
     pub milliseconds: u64,

@@ -3,7 +3,7 @@
 use super::{JobSize, Target};
 use crate::motion::RunLengths;
 
-/// The size of a job, and where its count begins.
+/// The size of a job, and the counts of the motion planner when it began.
 #[derive(Debug, Default)]
 pub(super) struct Progress {
     /// The size of the present job, or of the last one.
@@ -31,13 +31,13 @@ impl Progress {
         self.add_stroke(target.ink.is_some());
     }
 
-    /// Counts a new stroke where the pen goes down.
+    /// Counts a stroke where the pen goes down for a move.
     pub(super) fn add_stroke(&mut self, inked: bool) {
         self.size.strokes += u32::from(inked && !self.is_inked);
         self.is_inked = inked;
     }
 
-    /// The size of the job.
+    /// Returns the size of the job: its strokes and lengths.
     pub(super) const fn size(&self) -> JobSize {
         self.size
     }
@@ -52,7 +52,7 @@ impl Progress {
         }
     }
 
-    /// The part of the job that is left after `done`.
+    /// Returns what is left of the job once `done` is done.
     pub(super) const fn left(&self, done: JobSize) -> JobSize {
         JobSize {
             strokes: self.size.strokes.saturating_sub(done.strokes),

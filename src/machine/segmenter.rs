@@ -8,13 +8,13 @@ use crate::step::Pattern;
 /// The remaining part of a move that is being cut into segments.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Segmenter {
-    /// The start of the move on the page.
+    /// The point of the page at which the move starts.
     from: PagePoint,
-    /// The end of the move on the page.
+    /// The point of the page at which the move ends.
     to: PagePoint,
-    /// The length of the move.
+    /// The length of the whole move, of which segments are parts.
     length: PathLength,
-    /// The length that has been appended already.
+    /// The length of what has been appended already.
     position: PathLength,
     /// The last cut that has been passed, in steps; 0 at the beginning.
     cut: i32,
@@ -34,8 +34,9 @@ impl Segmenter {
 }
 
 impl Machine<'_> {
-    /// Appends a move in segments and returns its length. `limit` bounds its speed, given as a
-    /// stopping distance.
+    /// Plans a move, cut into segments that are straight for the motors too, and returns its
+    /// length. `limit` bounds its speed: it is the distance within which the machine could stop
+    /// from it.
     ///
     /// # Errors
     /// See [`PushError`]. On an error nothing is appended.
@@ -57,7 +58,7 @@ impl Machine<'_> {
         Ok(length)
     }
 
-    /// Appends as many of the remaining segments as there is room for.
+    /// Plans as many of the remaining segments of the move as there is room for.
     pub(super) fn push_segments(&mut self) {
         while let Some(segmenter) = self.segmenter
             && !self.runner.is_full()

@@ -31,7 +31,7 @@ pub enum State {
     Sleep,
 }
 
-/// The reason for an alarm.
+/// The reason for an alarm, in which the machine takes no moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Alarm {
@@ -50,7 +50,7 @@ pub enum Alarm {
     Restarted,
 }
 
-/// Why a command was refused.
+/// The reasons why the machine refuses a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MachineError {
     /// The command is not allowed in this state.
@@ -73,33 +73,33 @@ pub enum MachineError {
     },
 }
 
-/// A [`State`] with the data that only this state needs.
+/// What the machine is doing: a [`State`] with the data that only this state needs.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Activity {
-    /// At rest.
+    /// The machine is at rest and ready for the next command.
     Idle,
-    /// Draws.
+    /// Draws a job, whose moves come from this source.
     Run(Source),
-    /// A feed hold of a job.
+    /// Slows down or has stopped for a feed hold of a job.
     Hold {
-        /// Whether the machine has stopped.
+        /// Whether the machine has come to rest.
         stopped: bool,
         /// Where the moves come from when the job continues.
         source: Source,
     },
-    /// Slows down to cancel.
+    /// The machine slows down to cancel the job.
     Abort,
-    /// Moves by hand.
+    /// Makes moves that the user commands by hand.
     Jog,
-    /// Searches for the limit switches.
+    /// The machine searches for the limit switches.
     Home(Homing),
-    /// Only measures.
+    /// The machine only checks moves, and makes none.
     Check,
-    /// Stopped by an alarm.
+    /// The machine has stopped because of an alarm.
     Alarm(Alarm),
     /// The motors are off, or are about to be switched off.
     Sleep {
-        /// Whether the drivers are still switched on.
+        /// Whether the motor drivers are still switched on.
         drivers_on: bool,
     },
 }
@@ -107,23 +107,23 @@ pub(super) enum Activity {
 /// Where the moves of a job come from.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Source {
-    /// From a path, which is being read.
+    /// The moves come from a path that is being read.
     Path,
     /// From a path, which was read up to a change of the pen.
     PenChange {
         /// The number of the pen to be inserted, counted from 0.
         pen: u8,
-        /// The first target that it draws.
+        /// The first target to which the new pen draws.
         first: Target,
     },
-    /// From a path, which was read to its end.
+    /// The moves come from a path that was read to its end.
     PathEnd,
     /// The moves are sent one by one.
     Stream,
 }
 
 impl Activity {
-    /// The state as others see it.
+    /// Returns the state as others see it, without its data.
     #[inline(never)] // Inlining it at every call would cost too much flash.
     pub(super) const fn state(&self) -> State {
         match *self {
@@ -156,7 +156,7 @@ impl Activity {
         }
     }
 
-    /// Whether there may be events to plan.
+    /// Whether the machine may still have moves to plan in this state.
     pub(super) const fn is_moving(&self) -> bool {
         match self {
             Self::Run(_) | Self::Hold { stopped: false, .. } | Self::Abort | Self::Jog => true,

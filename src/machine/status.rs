@@ -5,7 +5,7 @@ use super::state::{Activity, Source};
 use super::{JobSize, Machine, State, Value};
 use crate::drawing::PagePoint;
 
-/// The contents of the status line.
+/// What the status line reports about the machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Status {
@@ -41,7 +41,7 @@ impl Machine<'_> {
         }
     }
 
-    /// The position of the machine and the progress of its job.
+    /// Returns the position of the machine and the progress of its job, for the status line.
     pub fn status(&self) -> Status {
         let done = self.progress.done(self.runner.run());
         Status {
@@ -83,7 +83,7 @@ impl Machine<'_> {
         self.settings.kinematics().page(self.motors_now())
     }
 
-    /// The present positions of the motors, in steps.
+    /// Returns the present positions of both motors, in steps.
     pub(super) fn motors_now(&self) -> PagePoint {
         let (x, y) = self.pins.steps();
         PagePoint { x: self.origin.x.wrapping_add(x), y: self.origin.y.wrapping_add(y) }

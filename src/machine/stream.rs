@@ -57,7 +57,7 @@ impl Machine<'_> {
         }
     }
 
-    /// The greatest number of moves that are planned ahead.
+    /// Returns the greatest number of moves that are planned ahead.
     pub fn moves_ahead(&self) -> usize {
         self.runner.capacity()
     }
@@ -67,12 +67,13 @@ impl Machine<'_> {
         self.runner.room()
     }
 
-    /// Whether another move can be appended now.
+    /// Whether another move can be appended to the plan now.
     pub fn has_room(&self) -> bool {
         self.segmenter.is_none() && !self.runner.is_full()
     }
 
-    /// Whether a move that is sent now has to wait until [`Machine::has_room`] is true.
+    /// Whether moves are carried out as they come, one line at a time. The next one has to wait
+    /// until [`Machine::has_room`] is true.
     pub fn is_streaming(&self) -> bool {
         matches!(self.activity, Activity::Jog) || self.activity.is_stream()
     }
@@ -148,7 +149,8 @@ impl Machine<'_> {
         }
     }
 
-    /// Appends a move and returns its length in units of 2^-18 mm.
+    /// Adds a straight move to the end of the path that is being drawn, at a speed of at most
+    /// `feed` mm/min (`None` for no such limit). Returns its length in units of 2^-18 mm.
     fn append(&mut self, target: Target, feed: Option<Value>) -> Result<u64, MachineError> {
         let limit = feed.map_or(PathLength::MAX, |feed| self.runner.limits().feed(feed));
         match self.push(target, limit) {

@@ -22,7 +22,7 @@ impl<I: Index> Model<'_, I> {
     /// // The CRC-32 of four numbers that are 0.
     /// assert_eq!(empty.checksum(), 0xECBB_4B55);
     /// ```
-    // Not inlined, so that its stack frame is not below those of the stages.
+    // Not inlined, so that its variables take no stack while a job is computed.
     #[inline(never)]
     pub fn checksum(&self) -> u32 {
         let mut digest = Crc32::new();

@@ -58,7 +58,7 @@ impl<I: Index> Corner<I> {
     }
 }
 
-/// One face or bar.
+/// One face or bar, decoded from its corners.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Element<'a, I = u16> {
     /// A polygon of at least three different corners, in order around it.
@@ -68,7 +68,7 @@ pub enum Element<'a, I = u16> {
 }
 
 impl<I: Index> Element<'_, I> {
-    /// Returns the number of its corners.
+    /// Returns the number of corners of the element.
     pub fn corner_count(&self) -> usize {
         match self {
             Self::Face(corners) => corners.len(),
@@ -83,7 +83,9 @@ impl<I: Index> Element<'_, I> {
 /// every bar two, and the last corner of each is marked.
 #[derive(Debug, Clone, Copy)]
 pub struct Elements<'a, I = u16> {
+    /// The encoded corners of all elements, in the order in which these were sent.
     pub(super) corners: &'a [Corner<I>],
+    /// Which pen draws each element.
     pub(super) pens: Pens<'a, I>,
 }
 
@@ -94,13 +96,14 @@ impl<'a, I: Index> Elements<'a, I> {
         Self::with_pens(corners, Pens::default())
     }
 
-    /// As [`Elements::new`], with the pens of the elements.
+    /// Makes the elements that `corners` encode, drawn with these pens. Corners after the last mark
+    /// are ignored.
     pub fn with_pens(corners: &'a [Corner<I>], pens: Pens<'a, I>) -> Self {
         let whole = corners.iter().rposition(|corner| corner.is_last()).map_or(0, |last| last + 1);
         Self { corners: &corners[..whole], pens }
     }
 
-    /// Returns every corner of every element.
+    /// Returns the corners of all elements, one element after the other.
     pub fn corners(&self) -> &'a [Corner<I>] {
         self.corners
     }
@@ -110,7 +113,7 @@ impl<'a, I: Index> Elements<'a, I> {
         self.pens
     }
 
-    /// Returns each element in turn.
+    /// Returns the elements one by one, in the order in which they were sent.
     pub fn iter(&self) -> impl Iterator<Item = Element<'a, I>> + Clone + use<'a, I> {
         self.corners.split_inclusive(|corner| corner.is_last()).map(|corners| match corners {
             [a, b] if a.of_bar() => Element::Bar(a.vertex(), b.vertex()),
@@ -118,7 +121,7 @@ impl<'a, I: Index> Elements<'a, I> {
         })
     }
 
-    /// Returns each element in turn, with its pen.
+    /// Returns the elements one by one, each with the pen that draws it.
     pub fn iter_with_pens(&self) -> impl Iterator<Item = (Element<'a, I>, u8)> + use<'a, I> {
         let (pens, mut first) = (self.pens, 0);
         self.iter().map(move |element| {

@@ -12,26 +12,26 @@ pub enum ModelError {
     CoordinateTooLarge,
     /// There is no room for another vertex.
     TooManyVertices {
-        /// The greatest number of vertices.
+        /// The greatest number of vertices that the model can hold.
         limit: usize,
     },
     /// There is no room for the corners of this element.
     TooManyCorners {
-        /// The greatest number of corners.
+        /// The greatest number of corners (and of other data of this size) that the model can hold.
         limit: usize,
-        /// The number of corners there would have been.
+        /// The number of corners that the model would have had with the element.
         needed: usize,
     },
     /// An element names a vertex that does not exist.
     UnknownVertex {
         /// The number as the user wrote it: from 1, or negative and counted from the last.
         number: i32,
-        /// The number of vertices.
+        /// The number of vertices that the model has.
         vertices: usize,
     },
     /// An element has too few corners: a face needs three, a bar two.
     TooFewCorners {
-        /// The number of corners that it needs.
+        /// The number of corners that an element of this kind needs.
         needed: usize,
     },
     /// A vertex occurs twice in a row, or at both ends of a face.
@@ -39,11 +39,11 @@ pub enum ModelError {
         /// The number of the vertex as the user wrote it.
         number: i32,
     },
-    /// A curve begins before its degree was set.
+    /// A curve begins before the user has set its degree.
     NoDegree,
-    /// The curve before has not been completed.
+    /// A curve begins before the one before it was completed.
     CurveUnfinished,
-    /// Knots or an end came without a curve.
+    /// Knots or the end of a curve came although none has begun.
     NoCurve,
     /// A parameter or knot is beyond ±2^22.
     KnotTooLarge,
@@ -51,11 +51,11 @@ pub enum ModelError {
     Curve(CurveError),
     /// An edit names a bar, face or curve that does not exist.
     UnknownElement {
-        /// The kind of the element.
+        /// Whether it would be a bar, a face or a curve.
         part: ElementKind,
-        /// The number as the user wrote it.
+        /// The number by which the user named the element that does not exist.
         number: i32,
-        /// The number of elements of this kind.
+        /// The number of elements of this kind that the model has.
         count: usize,
     },
     /// The three vertices that should define a plane are collinear.

@@ -2,10 +2,9 @@
 //!
 //! A [`Model`] holds vertices in one array and faces and bars in another, in the order in which
 //! they came (Cárdenas & Seeley's joints and bars in two sequential arrays); the second also holds
-//! the pens and the curves. It refuses whatever
-//! would make it invalid, such as a face through a vertex that does not exist or more than fits in
-//! the memory; it is then unchanged. [`Model::edit`] changes it, and [`Model::restore`] undoes a
-//! change.
+//! the pens and the curves. It refuses whatever would make it invalid, such as a face through a
+//! vertex that does not exist or more than fits in the memory; it is then unchanged.
+//! [`Model::edit`] changes it, and [`Model::restore`] undoes a change.
 
 mod checksum;
 mod curves;
@@ -39,11 +38,11 @@ use vertices::Vertices;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct Position {
-    /// First coordinate.
+    /// The x coordinate.
     pub x: i32,
-    /// Second coordinate.
+    /// The y coordinate.
     pub y: i32,
-    /// Third coordinate.
+    /// The z coordinate.
     pub z: i32,
 }
 
@@ -51,7 +50,7 @@ impl Position {
     /// The position whose coordinates are 0.
     pub const ORIGIN: Self = Self { x: 0, y: 0, z: 0 };
 
-    /// Returns the coordinates in order.
+    /// Returns x, y and z in this order.
     pub fn coordinates(self) -> [i32; 3] {
         [self.x, self.y, self.z]
     }
@@ -67,7 +66,7 @@ const FINEST_FRACTION_BITS: u32 = 30;
 /// a change is refused. It may copy the model with [`Model::save`].
 pub type BeforeChange<'b, I> = &'b mut dyn FnMut(&Model<'_, I>);
 
-/// A [`BeforeChange`] that does nothing: the change cannot be undone.
+/// Does nothing. Pass it as a [`BeforeChange`] where a change need not be undone.
 pub fn no_undo<I: Index>(_: &Model<'_, I>) {}
 
 /// The vertices, faces, bars and curves that the user sent, in memory lent by the owner.
@@ -76,15 +75,21 @@ pub fn no_undo<I: Index>(_: &Model<'_, I>) {}
 /// coordinate comes, so that a model of any size keeps 30 bits of its largest coordinate.
 #[derive(Debug)]
 pub struct Model<'m, I = u16> {
+    /// The positions of the vertices, in the order in which they were sent.
     vertices: Vertices<'m>,
     /// The corners of the elements, their [`PenRun`]s and the curves.
     store: Store<'m, I>,
+    /// The unit of every coordinate is 2^-`fraction_bits`; from 0 to 30.
     fraction_bits: u32,
-    /// The error bound of the coordinates.
+    /// How far the coordinates may be off, which decides which points count as coplanar.
     rounding: Rounding,
+    /// The number of faces that the model has.
     faces: usize,
+    /// The number of bars that the model has.
     bars: usize,
+    /// Where in `store` the curves lie, and the one that is still being sent.
     curves: CurveList,
+    /// The pen of the elements that follow, and the names of the pens.
     pens: PenBook,
 }
 
@@ -104,7 +109,7 @@ impl<'m, I: Index> Model<'m, I> {
         }
     }
 
-    /// Removes everything from the model.
+    /// Removes all vertices, elements, curves and pens.
     pub fn clear(&mut self) {
         self.vertices.truncate(0);
         self.store.clear();
@@ -131,7 +136,7 @@ impl<'m, I: Index> Model<'m, I> {
         Elements { corners: self.store.corners(), pens: self.pens() }
     }
 
-    /// Returns the pens of the elements.
+    /// Returns which pen draws each element.
     fn pens(&self) -> Pens<'_, I> {
         Pens::new(self.store.pen_runs())
     }
@@ -142,7 +147,7 @@ impl<'m, I: Index> Model<'m, I> {
     ///
     /// # Errors
     /// [`ModelError::TooManyPens`]; the model is unchanged.
-    // Not inlined, so that its stack frame is not below those of the stages.
+    // Not inlined, so that its variables take no stack while a job is computed.
     #[inline(never)]
     pub fn choose_pen(
         &mut self,
@@ -169,7 +174,7 @@ impl<'m, I: Index> Model<'m, I> {
         Ok(())
     }
 
-    /// Returns the curves.
+    /// Returns the completed curves.
     pub fn curves(&self) -> Curves<'_, I> {
         self.curves.curves(&self.store)
     }
@@ -189,7 +194,7 @@ impl<'m, I: Index> Model<'m, I> {
         self.curves.count
     }
 
-    /// Returns the greatest number of vertices.
+    /// Returns the greatest number of vertices that the model can hold.
     pub fn vertex_limit(&self) -> usize {
         self.vertices.capacity().min(<Corner<I>>::VERTEX_NUMBER_LIMIT)
     }
@@ -212,7 +217,7 @@ impl<'m, I: Index> Model<'m, I> {
         self.store.used() - here + there
     }
 
-    /// Returns the greatest number of these units.
+    /// Returns the greatest number of these 16-bit units that the model can hold.
     pub fn corner_limit(&self) -> usize {
         self.store.capacity()
     }
@@ -362,7 +367,8 @@ impl<'m, I: Index> Model<'m, I> {
         }
     }
 
-    /// Returns how many half-words are needed so that elements with this pen can follow.
+    /// Returns how many half-words of memory it takes to let elements with this pen follow: none if
+    /// the last one has it already.
     fn run_for(&self, pen: u8) -> usize {
         if pen == self.pens().last() { 0 } else { RUN }
     }

@@ -11,7 +11,7 @@ use crate::stage::{OutOfScratch, Scratch};
 use bytemuck::{Pod, Zeroable};
 use core::ops::Range;
 
-/// The number of pens.
+/// The number of pens that a drawing may use.
 pub const PEN_LIMIT: u8 = 32;
 
 /// A change of the pen: the index of an element's first corner, and the pen, from 0, of the elements
@@ -43,7 +43,7 @@ impl<I: Index> PenRun<I> {
     }
 }
 
-/// The number of half-words of a [`PenRun`].
+/// The number of half-words that a [`PenRun`] takes in the store.
 pub(super) const RUN: usize = 2;
 
 /// The pens of elements. Elements before the first run have the first pen.
@@ -52,6 +52,7 @@ pub(super) const RUN: usize = 2;
 /// another pen than the one before.
 #[derive(Debug, Clone, Copy)]
 pub struct Pens<'a, I = u16> {
+    /// The changes of the pen, in the order of the elements.
     runs: &'a [PenRun<I>],
 }
 
@@ -73,7 +74,7 @@ impl<'a, I: Index> Pens<'a, I> {
         after.checked_sub(1).and_then(|last| self.runs.get(last)).map_or(0, |run| run.pen())
     }
 
-    /// Returns how many times the pen changes.
+    /// Returns how many times the pen changes from one element to the next.
     pub fn changes(&self) -> usize {
         self.runs.len()
     }
@@ -87,7 +88,9 @@ impl<'a, I: Index> Pens<'a, I> {
 /// Records the pens of elements while these are written one after the other.
 #[derive(Debug)]
 pub struct PenWriter<'a, I = u16> {
+    /// The changes recorded so far, followed by room for more.
     runs: &'a mut [PenRun<I>],
+    /// The number of changes of the pen recorded so far.
     count: usize,
 }
 
@@ -110,7 +113,7 @@ impl<'a, I: Index> PenWriter<'a, I> {
         }
     }
 
-    /// Returns the pens of all recorded elements.
+    /// Ends the record and returns the pens of all elements in it.
     pub fn finish(self) -> Pens<'a, I> {
         let runs: &'a [PenRun<I>] = self.runs;
         Pens { runs: runs.get(..self.count).unwrap_or(runs) }
@@ -174,29 +177,29 @@ pub(super) fn open_gap<I: Index>(
     count
 }
 
-/// The pen that a `usemtl` or `g` statement names.
+/// What a `usemtl` or `g` statement says about the pen: its number, or a name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PenName {
     /// The number of a pen, from 0, below [`PEN_LIMIT`].
     Number(u8),
-    /// The hash of any other name.
+    /// The hash of a name that is not the number of a pen.
     Other(u32),
 }
 
-/// The current pen, and the names of the pens.
+/// Which pen draws what follows, and which names the pens have been given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct PenBook {
     /// For each pen the hash of its name, or [`FREE`] or [`BY_NUMBER`].
     pub(super) names: [u32; PEN_LIMIT as usize],
-    /// The pen of the elements that follow.
+    /// The pen that draws the elements that follow, from 0.
     pub(super) current: u8,
     /// Whether a `usemtl` statement has come. Then `g` statements are ignored.
     pub(super) by_material: bool,
 }
 
-/// Marks a pen that no name has.
+/// Stands instead of the hash of a name for a pen that no name was given to.
 const FREE: u32 = 0;
-/// Marks a pen that was chosen by its number.
+/// Stands instead of the hash of a name for a pen that was chosen by its number.
 const BY_NUMBER: u32 = 1;
 
 impl PenBook {

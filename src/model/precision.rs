@@ -27,7 +27,7 @@ pub(super) struct Rounding {
 }
 
 impl Rounding {
-    /// Takes into account coordinates that were sent.
+    /// Takes into account with how many decimals coordinates were sent.
     pub(super) fn write(&mut self, coordinates: &[Decimal]) {
         for coordinate in coordinates {
             let decimals = coordinate.decimals().min(u8::MAX.into()) as u8;
@@ -80,12 +80,12 @@ impl Rounding {
         self.rotated = true;
     }
 
-    /// Returns these facts as two numbers, to be stored.
+    /// Returns these facts as two numbers, so that they can be saved for `$undo`.
     pub(super) fn numbers(&self) -> [usize; 2] {
         [usize::from(self.decimals) << 1 | usize::from(self.rotated), self.edited as usize]
     }
 
-    /// Restores the facts from these numbers.
+    /// Makes the record again from the two numbers that [`Rounding::numbers`] returned.
     pub(super) fn from_numbers([decimals, edited]: [u32; 2]) -> Self {
         Self { decimals: (decimals >> 1) as u8, rotated: decimals & 1 != 0, edited }
     }

@@ -13,23 +13,25 @@ use core::ops::Range;
 /// A part of the memory, in the order in which they lie there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Region {
-    /// The [`Corner`]s of faces and bars, one half-word each.
+    /// The corners of faces and bars, of one half-word (16 bits) each.
     Corners,
-    /// The [`PenRun`]s, two half-words each.
+    /// The changes of the pen, of two half-words each.
     PenRuns,
-    /// The curves; see [`super::Curves`].
+    /// The encoded curves, of any number of half-words: see [`super::Curves`].
     Curves,
 }
 
-/// The number of regions.
+/// The number of regions into which the memory is divided.
 const REGIONS: usize = 3;
 
-/// The half-words of a model, in three regions.
+/// The model's memory of half-words (16 bits each), which it divides among corners, changes of the
+/// pen and curves.
 ///
 /// Each region ends where the next begins, and the last ends within the memory. A change that does
 /// not fit is refused and changes nothing.
 #[derive(Debug)]
 pub(super) struct Store<'m, I> {
+    /// All half-words. Those in use come first, region after region.
     memory: &'m mut [I],
     /// Where the first region begins, which is at 0, and where each ends.
     bounds: [usize; REGIONS + 1],
@@ -41,22 +43,22 @@ impl<'m, I: Index> Store<'m, I> {
         Self { memory: bytemuck::cast_slice_mut(memory), bounds: [0; REGIONS + 1] }
     }
 
-    /// Empties all regions.
+    /// Empties all regions, so that all half-words are free.
     pub(super) fn clear(&mut self) {
         self.bounds = [0; REGIONS + 1];
     }
 
-    /// Returns how many half-words there are.
+    /// Returns the number of half-words in the memory, free or not.
     pub(super) fn capacity(&self) -> usize {
         self.memory.len()
     }
 
-    /// Returns how many half-words are in use.
+    /// Returns how many half-words (16 bits each) are in use.
     pub(super) fn used(&self) -> usize {
         self.bounds[REGIONS]
     }
 
-    /// Checks that so many half-words are free.
+    /// Refuses to go on unless so many half-words are free.
     ///
     /// # Errors
     /// [`ModelError::TooManyCorners`].
@@ -65,46 +67,48 @@ impl<'m, I: Index> Store<'m, I> {
         if needed > limit { Err(ModelError::TooManyCorners { limit, needed }) } else { Ok(()) }
     }
 
-    /// Returns where a region lies in the memory.
+    /// Returns which half-words of the memory a region takes.
     fn range(&self, region: Region) -> Range<usize> {
         self.bounds[region as usize]..self.bounds[region as usize + 1]
     }
 
+    /// Returns the half-words of a region.
     fn region(&self, region: Region) -> &[I] {
         self.memory.get(self.range(region)).unwrap_or(&[])
     }
 
+    /// Returns the half-words of a region, to be changed.
     fn region_mut(&mut self, region: Region) -> &mut [I] {
         let range = self.range(region);
         self.memory.get_mut(range).unwrap_or(&mut [])
     }
 
-    /// Returns the corners of the elements.
+    /// Returns the corners of the faces and bars.
     pub(super) fn corners(&self) -> &[Corner<I>] {
         bytemuck::cast_slice(self.region(Region::Corners))
     }
 
-    /// As [`Store::corners`], to be changed.
+    /// Returns the corners of the faces and bars, to be changed.
     pub(super) fn corners_mut(&mut self) -> &mut [Corner<I>] {
         bytemuck::cast_slice_mut(self.region_mut(Region::Corners))
     }
 
-    /// Returns the changes of the pen.
+    /// Returns the changes of the pen, in the order of the elements.
     pub(super) fn pen_runs(&self) -> &[PenRun<I>] {
         bytemuck::cast_slice(self.region(Region::PenRuns))
     }
 
-    /// As [`Store::pen_runs`], to be changed.
+    /// Returns the changes of the pen, to be changed themselves.
     pub(super) fn pen_runs_mut(&mut self) -> &mut [PenRun<I>] {
         bytemuck::cast_slice_mut(self.region_mut(Region::PenRuns))
     }
 
-    /// Returns the half-words of the curves.
+    /// Returns the encoded curves, the unfinished one included.
     pub(super) fn curves(&self) -> &[I] {
         self.region(Region::Curves)
     }
 
-    /// As [`Store::curves`], to be changed.
+    /// Returns the encoded curves, to be changed.
     pub(super) fn curves_mut(&mut self) -> &mut [I] {
         self.region_mut(Region::Curves)
     }
@@ -179,8 +183,9 @@ impl<'m, I: Index> Store<'m, I> {
         self.memory.get(..self.used().saturating_sub(without)).unwrap_or(&[])
     }
 
-    /// Returns where the corners and the changes of the pen end among the half-words of all
-    /// regions.
+    /// Returns how many half-words the corners take, and how many the corners and the changes of
+    /// the pen take together. A copy of the memory is divided into its regions by these two
+    /// numbers.
     pub(super) fn ends(&self) -> [usize; 2] {
         [self.bounds[1], self.bounds[2]]
     }

@@ -9,7 +9,7 @@ use crate::stage::{Scratch, items};
 /// The number of 32-bit values stored before the vertices.
 const HEAD: usize = NUMBERS + PEN_LIMIT as usize;
 
-/// How many of them are not the names of the pens.
+/// How many of these values come before the names of the pens.
 const NUMBERS: usize = 12;
 
 impl<I: Index> Model<'_, I> {
@@ -31,6 +31,7 @@ impl<I: Index> Model<'_, I> {
         self.store.all_but(self.curves.unfinished_length(&self.store))
     }
 
+    /// Copies the model into `scratch`. Returns `None` if it does not fit.
     fn copy_to(&self, mut scratch: Scratch<'_>) -> Option<()> {
         let halves = self.stored_halves();
         let [corners_end, pens_end] = self.store.ends();
@@ -61,10 +62,12 @@ impl<I: Index> Model<'_, I> {
     /// Restores the model that [`Model::save`] copied to `words`. The contents of `words` must be
     /// unchanged since then.
     pub fn restore(&mut self, words: &[u64]) {
-        // It always fits, because it was there before.
+        // The copy always fits, because the model was there before.
         let _ = self.copy_from(words);
     }
 
+    /// Restores the model from what `copy_to` wrote. Returns `None` if that does not fit this
+    /// model, which may then be changed in part.
     fn copy_from(&mut self, words: &[u64]) -> Option<()> {
         let head: &[u32] = items(words, HEAD)?;
         let (numbers, names) = head.split_first_chunk::<NUMBERS>()?;

@@ -1,5 +1,5 @@
 //! A tour as a cycle of legs in which stretches can be reversed and swapped, and these changes
-//! undone.
+//! undone. A leg is a run of segments together with the direction in which the pen draws it.
 //!
 //! The cycle has no direction of its own: each leg of it may be named as it is drawn or flipped,
 //! and [the next leg](Cycle::next) follows from that. An open path is a cycle with one leg more,
@@ -10,27 +10,29 @@ use crate::index::Index;
 
 /// The cycle, and how it changed since it was last [settled](Cycle::settle).
 pub(super) struct Cycle<'s, I> {
-    /// The legs, in the order of the cycle.
+    /// The legs of the tour, in the order in which they are drawn.
     legs: &'s mut [Leg<I>],
-    /// The index in `legs` of each chain, and of the gap.
+    /// The index in `legs` of each leg, by the number of its chain (see `network`); the gap has the
+    /// number after those of the chains.
     index: &'s mut [I],
-    /// The stretches reversed since then: the index of the first leg, and the number of legs.
+    /// The reversals since the cycle was last settled, so that they can be undone: the index of the
+    /// first leg, and the number of legs.
     turns: &'s mut [[I; 2]],
     /// The number of turns in `turns`. Further turns are made but cannot be undone.
     turned: usize,
 }
 
-/// The position and the direction of a leg in a cycle. It is valid until the next turn.
+/// Where in a cycle a leg is stored, and in which direction. It is valid until the next reversal.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct LegPosition {
-    /// The index of the leg in the cycle.
+    /// The index of the leg among all legs of the cycle, as it is stored.
     index: usize,
     /// Whether the leg has the direction in which the cycle is stored.
     pub forward: bool,
 }
 
 impl<'s, I: Index> Cycle<'s, I> {
-    /// The number of turns that can be undone.
+    /// The number of reversals that can be remembered, and so undone.
     pub const MEMORY: usize = 256;
 
     /// Makes the cycle of `legs`, which contain each of the numbers `0..legs.len()` once. `index`
@@ -42,22 +44,23 @@ impl<'s, I: Index> Cycle<'s, I> {
         Self { legs, index, turns, turned: 0 }
     }
 
-    /// Returns the number of legs.
+    /// Returns the number of legs of the tour, the gap included.
     pub fn len(&self) -> usize {
         self.legs.len()
     }
 
-    /// Returns the leg at `index`.
+    /// Returns the leg that is stored at `index`.
     pub fn leg(&self, index: usize) -> Leg<I> {
         self.legs[index]
     }
 
-    /// Returns the index of `leg` in the cycle.
+    /// Returns at which index of the cycle a leg is stored, in either direction.
     fn index(&self, leg: Leg<I>) -> usize {
         self.index[leg.segment()].get()
     }
 
-    /// Returns the position and the direction of `leg` in the cycle.
+    /// Returns where in the cycle a leg is stored, and whether it is stored in the direction of
+    /// `leg`.
     pub fn position(&self, leg: Leg<I>) -> LegPosition {
         let index = self.index(leg);
         LegPosition { index, forward: self.legs[index] == leg }
@@ -152,23 +155,24 @@ impl<'s, I: Index> Cycle<'s, I> {
         }
     }
 
-    /// Stores `leg` at an index.
+    /// Stores `leg` at an index, and notes where it is.
     fn set(&mut self, index: usize, leg: Leg<I>) {
         self.legs[index] = leg;
         self.index[leg.segment()] = I::new(index);
     }
 
-    /// Returns the number of turns since the cycle was last settled.
+    /// Returns how many reversals have been made since the cycle was last settled and can be
+    /// undone.
     pub fn turned(&self) -> usize {
         self.turned
     }
 
-    /// Whether there is memory for the turns of one more exchange.
+    /// Whether there is memory to undo all the reversals of one more exchange.
     pub fn can_turn(&self) -> bool {
         self.turned + 16 <= self.turns.len()
     }
 
-    /// Undoes all turns after the first `count`.
+    /// Undoes all reversals after the first `count`.
     pub fn take_back(&mut self, count: usize) {
         while self.turned > count {
             self.turned -= 1;
@@ -177,7 +181,7 @@ impl<'s, I: Index> Cycle<'s, I> {
         }
     }
 
-    /// Accepts the cycle as it is: earlier turns can no longer be undone.
+    /// Accepts the cycle as it is: earlier reversals can no longer be undone.
     pub fn settle(&mut self) {
         self.turned = 0;
     }

@@ -18,8 +18,9 @@ use core::cell::Cell;
 #[repr(transparent)]
 struct Known<P>([P; 2]);
 
-/// The distances of a network, with their cache.
+/// Returns the distances between the stations of a network, and remembers the last ones asked for.
 pub(super) struct Distances<'s, 'a, I: Index> {
+    /// The network in which the stations lie.
     network: Network<'a, I>,
     /// The table. Its length is a power of two, or 0.
     known: &'s [Cell<Known<I::Pair>>],

@@ -15,8 +15,10 @@ use crate::drawing::PagePoint;
 use crate::index::Index;
 use crate::stage::{OutOfScratch, Scratch};
 
-/// The chains and the pen-up moves that no trail has used yet.
+/// What remains to be traced: the chains (runs of segments) and the pen-up moves that no trail has
+/// used yet.
 pub(super) struct Unused<'s, 'a, I> {
+    /// The graph that is traced. It says at which stations each chain begins and ends.
     network: Network<'a, I>,
     /// The legs from each station, without those at the front that were found to be used.
     legs: Incidence<'s, I>,
@@ -27,7 +29,8 @@ pub(super) struct Unused<'s, 'a, I> {
 }
 
 impl<'s, 'a, I: Index> Unused<'s, 'a, I> {
-    /// Makes all chains of `network` unused, and a move from each station to its `mate`.
+    /// Begins with nothing drawn: all chains of `network`, and a pen-up move from each station to
+    /// its `mate`.
     pub fn new(
         network: Network<'a, I>,
         mate: &'s mut [I],
@@ -38,7 +41,7 @@ impl<'s, 'a, I: Index> Unused<'s, 'a, I> {
         Ok(Self { network, legs, used, mate })
     }
 
-    /// Returns the next unused leg from `station`.
+    /// Returns the next leg from `station` whose segments no trail has drawn yet.
     fn peek(&mut self, station: I) -> Option<Leg<I>> {
         while let Some(leg) = self.legs.first(station) {
             if self.used[leg.segment()] == 0 {
@@ -49,7 +52,7 @@ impl<'s, 'a, I: Index> Unused<'s, 'a, I> {
         None
     }
 
-    /// Returns the next unused leg from `station`, and marks it as used.
+    /// Returns the next leg from `station` that no trail has drawn yet, and marks it as drawn.
     fn take(&mut self, station: I) -> Option<Leg<I>> {
         let leg = self.peek(station)?;
         self.used[leg.segment()] = 1;
@@ -105,13 +108,14 @@ impl<'s, 'a, I: Index> Unused<'s, 'a, I> {
         }
     }
 
-    /// Whether an undrawn part may be entered at `station`. It may if the station has a move, which
-    /// the entrance then replaces, or if no station of the part has one.
+    /// Whether an undrawn part may be entered at `station`. It may if a pen-up move leads from
+    /// there, which the entrance then replaces, or if no station of the part has such a move.
     fn is_entrance(&mut self, station: I) -> bool {
         self.mate[station.get()] != I::NONE && self.peek(station).is_some()
     }
 
-    /// Returns the entrance for which `far` is least.
+    /// Returns the station at which an undrawn part is best entered: the one for which `far` is
+    /// least. `None` if everything is drawn.
     pub fn entrance(
         &mut self,
         far: impl Fn(PagePoint) -> u32,
@@ -131,8 +135,8 @@ impl<'s, 'a, I: Index> Unused<'s, 'a, I> {
         Ok(best)
     }
 
-    /// Returns the entrance nearest to the station `pen`. If `near` lists any entrance, it is the
-    /// first of those.
+    /// Returns the entrance (the station at which an undrawn part may be entered) nearest to the
+    /// station `pen`. If `near` lists any entrance, it is the first of those.
     fn next_entrance(
         &mut self,
         pen: I,

@@ -22,38 +22,44 @@ use crate::array::MapEach;
 use crate::index::Index;
 use crate::stage::{OutOfScratch, Scratch};
 
-/// The greatest number of steps in one exchange.
+/// The greatest number of steps in one exchange, each of which changes two more moves.
 const STEPS: usize = 2;
 
-/// One step of an exchange: which moves are cut after the first.
+/// One step of an exchange: at which legs the tour is cut after the first cut, and how its parts
+/// are joined anew.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Step<I> {
-    /// The gain of the exchange if the ends are joined after this step; 0 if there is none.
+    /// The gain of the exchange if its open ends are joined after this step; 0 if there is none.
     pub gain: i64,
-    /// The gain in hand before the ends are joined.
+    /// The cost of the moves taken out so far less that of the moves put in, before the ends are
+    /// joined.
     pub hand: i64,
-    /// The leg before the second cut.
+    /// The leg after which the tour is cut for the second time.
     pub c: Leg<I>,
     /// Whether the new move from the first cut leads to the start of the leg after `c`; otherwise
     /// it leads to the end of `c`.
     pub onward: bool,
-    /// The same two values for the third cut, if there is one.
+    /// The leg after which the tour is cut for the third time, and the same choice there; `None` if
+    /// two cuts are enough.
     pub third: Option<(Leg<I>, bool)>,
 }
 
-/// A queue of the stations around which an exchange may help. Each station is in it at most once.
+/// A queue of the stations around which an exchange may help, because a move near them has changed.
+/// Each station is in it at most once.
 struct Waiting<'s, I> {
     /// The stations, in a ring buffer with room for all.
     queue: &'s mut [I],
     /// 1 for each station that is in the queue, otherwise 0.
     is_waiting: &'s mut [u8],
-    /// The index of the station that comes next.
+    /// The index in `queue` of the station that comes next.
     first: usize,
     /// The number of stations in the queue.
     count: usize,
 }
 
 impl<'s, I: Index> Waiting<'s, I> {
+    /// Makes an empty queue. Both slices must have one entry for each station, and those of
+    /// `is_waiting` must be 0.
     fn new(queue: &'s mut [I], is_waiting: &'s mut [u8]) -> Self {
         Self { queue, is_waiting, first: 0, count: 0 }
     }
@@ -85,16 +91,22 @@ impl<'s, I: Index> Waiting<'s, I> {
     }
 }
 
-/// The tour, and the tables that are needed to exchange its moves.
+/// A tour that is being shortened, and the tables that are needed to exchange its pen-up moves.
 pub(super) struct Exchanges<'s, 'a, I: Index> {
-    /// The tour.
+    /// The tour, as a cycle of legs that can be turned around and restored.
     pub cycle: Cycle<'s, I>,
+    /// The stations (the points where the pen may stop) and the chains of segments between them.
     network: Network<'a, I>,
+    /// Answers how far apart two stations are.
     distances: Distances<'s, 'a, I>,
+    /// Lists the legs that begin at each station.
     incidence: Incidence<'s, I>,
+    /// Lists the stations near each station, to which a new move may lead.
     neighbours: Neighbours<'s, I>,
+    /// The stations around which an exchange is still to be tried.
     waiting: Waiting<'s, I>,
-    /// The number of the gap among the legs, if the tour has a gap.
+    /// The number of the gap among the legs; `None` if the tour is a closed cycle. The gap stands
+    /// for the open side of an open path.
     gap: Option<I>,
     /// The cost of a move besides its length, in 1/256 steps.
     lift_cost: u32,
@@ -141,7 +153,7 @@ impl<'s, 'a, I: Index> Exchanges<'s, 'a, I> {
             + Scratch::bytes_for::<u8>(stations)
     }
 
-    /// Whether the tour has a gap, so that it is an open path.
+    /// Whether the tour is an open path, which is stored as a cycle with a gap.
     pub fn is_open(&self) -> bool {
         self.gap.is_some()
     }
@@ -151,7 +163,7 @@ impl<'s, 'a, I: Index> Exchanges<'s, 'a, I> {
         if self.is_gap(leg) { I::NONE } else { self.network.end(leg) }
     }
 
-    /// Whether `leg` is the gap.
+    /// Whether `leg` is the gap between the end and the start of an open path.
     pub fn is_gap(&self, leg: Leg<I>) -> bool {
         self.gap == Some(I::new(leg.segment()))
     }
@@ -171,8 +183,9 @@ impl<'s, 'a, I: Index> Exchanges<'s, 'a, I> {
         }
     }
 
-    /// Returns what remains of the gain `hand` after the cost of a move, or 0 if nothing remains.
-    /// In most cases nothing remains, and a bound shows this without a square root.
+    /// Returns what remains of the saving `hand`, in the units of [`Self::distance`], when the cost
+    /// of a move between two stations is subtracted from it; 0 if nothing remains. In most cases
+    /// nothing does, and a bound shows this without a square root.
     pub fn left(&self, hand: i64, from: I, to: I) -> i64 {
         if from == I::NONE || to == I::NONE || from == to {
             return hand.max(0);
@@ -196,7 +209,8 @@ impl<'s, 'a, I: Index> Exchanges<'s, 'a, I> {
     }
 
     /// Tries exchanges around all stations in the queue, until it is empty or the budget is used
-    /// up. Returns the gain. If `keep`, the exchanges are final, otherwise they can be undone.
+    /// up. Returns how much shorter the tour has become. If `keep`, the exchanges are final,
+    /// otherwise they can be undone.
     pub fn exchange_all(
         &mut self,
         keep: bool,
@@ -216,8 +230,8 @@ impl<'s, 'a, I: Index> Exchanges<'s, 'a, I> {
         Ok(gain)
     }
 
-    /// Makes one exchange that cuts a move at `station`, if there is one with a gain. Returns the
-    /// gain.
+    /// Makes one exchange that takes out a pen-up move at `station`, if that makes the tour
+    /// shorter. Returns by how much.
     fn exchange_at(
         &mut self,
         station: I,
@@ -236,9 +250,9 @@ impl<'s, 'a, I: Index> Exchanges<'s, 'a, I> {
         Ok(None)
     }
 
-    /// Cuts the move after `a`, and changes two more moves at a time while there is gain in hand,
-    /// until joining the ends leaves a gain. Returns that gain. If none is found, the tour is
-    /// unchanged.
+    /// Takes out the move after `a`, and changes two more moves at a time as long as the moves
+    /// taken out are longer than those put in, until joining the ends makes the tour shorter.
+    /// Returns by how much. If nothing is found, the tour is unchanged.
     fn exchange(
         &mut self,
         a: Leg<I>,
@@ -284,7 +298,8 @@ impl<'s, 'a, I: Index> Exchanges<'s, 'a, I> {
         a.min(b)
     }
 
-    /// Returns the ends of the moves that a step cuts.
+    /// Returns the stations (points where the pen may stop) at both ends of each of the moves that
+    /// a step of an exchange takes out.
     fn ends_of(&self, a: Leg<I>, step: Step<I>) -> [I; 6] {
         let third = step.third.map_or(step.c, |(e, _)| e);
         let mut ends = [I::NONE; 6];
@@ -294,7 +309,8 @@ impl<'s, 'a, I: Index> Exchanges<'s, 'a, I> {
         ends
     }
 
-    /// Makes a step from the cut after `a`. Returns the leg before the cut that is still open.
+    /// Makes a step of an exchange that cuts the tour after `a`. Returns the leg after which the
+    /// tour is still open.
     fn make(
         &mut self,
         a: Leg<I>,
@@ -310,13 +326,13 @@ impl<'s, 'a, I: Index> Exchanges<'s, 'a, I> {
         };
         let f = self.cycle.next(e);
         let moved = match (step.onward, third_onward) {
-            // … a, d … e, b … c, f …
+            // The tour becomes … a, d … e, b … c, f …
             (true, true) => self.cycle.swap(a, d, e),
-            // … a, d … e, c … b, f … with `c … b` flipped.
+            // The tour becomes … a, d … e, c … b, f … with `c … b` flipped.
             (true, false) => self.cycle.turn(a, e) + self.cycle.turn(a, d.flipped()),
-            // … e, b … c, a … f, d … with `a … f` flipped.
+            // The tour becomes … e, b … c, a … f, d … with `a … f` flipped.
             (false, true) => self.cycle.turn(a, c) + self.cycle.turn(d.flipped(), f.flipped()),
-            // … a, c … f, b … e, d … with `c … f` flipped.
+            // The tour becomes … a, c … f, b … e, d … with `c … f` flipped.
             (false, false) => self.cycle.turn(a, c) + self.cycle.turn(f.flipped(), b.flipped()),
         };
         work_budget.work(1 + moved as u32 / 32)?;
@@ -339,7 +355,7 @@ impl<'s, 'a, I: Index> Exchanges<'s, 'a, I> {
         })
     }
 
-    /// Puts the stations where `legs` end into the queue.
+    /// Puts the stations where `legs` end into the queue, so that exchanges are tried around them.
     pub fn wake(&mut self, legs: &[Leg<I>]) {
         for &leg in legs {
             let station = self.end(leg);

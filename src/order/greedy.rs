@@ -29,8 +29,9 @@ type ChoiceOf<I> = Choice<<I as Index>::Pair>;
 /// then within twice that, and so on.
 const FIRST_REACH: u32 = 256 << 8;
 
-/// Pairs all of `odd`: `mate[i]` becomes the partner of odd point `i`.
-#[inline(never)] // Smaller than in its only caller.
+/// Pairs all odd points, between which the pen will be lifted: `mate[i]` becomes the partner of odd
+/// point `i`.
+#[inline(never)] // Inlined in its only caller, the code would be larger.
 pub(super) fn pair<I: Index>(
     odd: &OddPoints<'_, I>,
     scratch: &mut Scratch<'_>,
@@ -87,7 +88,8 @@ fn choose<I: Index>(
     }
 }
 
-/// Pairs the odd points in the order of their regret.
+/// Pairs the odd points, of which the one with the greatest regret chooses first. The regret is how
+/// much worse its second choice is than its first.
 fn with_regret<I: Index>(
     odd: &OddPoints<'_, I>,
     mut scratch: Scratch<'_>,
@@ -122,7 +124,8 @@ fn with_regret<I: Index>(
     Ok(())
 }
 
-/// Pairs the ends of the longest move with the two free ends of the path.
+/// Makes the ends of the longest move the start and the end of the path, so that this move is not
+/// made.
 fn free_the_longest<I: Index>(odd: &OddPoints<'_, I>, mate: &mut [I]) {
     let [start, end] = odd.free_ends();
     let longest = I::below(odd.real_count()).max_by_key(|&point| {
@@ -136,7 +139,7 @@ fn free_the_longest<I: Index>(odd: &OddPoints<'_, I>, mate: &mut [I]) {
     }
 }
 
-/// Makes `a` and `b` partners.
+/// Makes the points `a` and `b` partners, between which the pen will be lifted.
 fn join<I: Index>(mate: &mut [I], a: I, b: I) {
     mate[a.get()] = b;
     mate[b.get()] = a;

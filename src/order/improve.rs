@@ -28,7 +28,7 @@ use crate::stage::Scratch;
 const NEIGHBOURS: [usize; 2] = [8, 4];
 /// The moves that a kick changes are at most this many moves apart.
 const KICK_REACH: u32 = 6;
-/// The search ends after this many successive kicks without a gain for each move of the tour.
+/// The search ends after this many kicks (random changes) in vain for each move of the tour.
 const PATIENCE: u32 = 50;
 /// The directions of the strokes are improved after each so many kicks.
 const KICKS_BETWEEN_TURNS: u32 = 64;
@@ -41,7 +41,7 @@ const SEED: u32 = 23_757;
 
 /// A tour to be improved, and the limits for it.
 pub(super) struct Tour<'t, I> {
-    /// The tour: all chains of the network.
+    /// All chains of the network, in the order and the directions in which they are drawn.
     pub route: &'t mut [Leg<I>],
     /// Whether the tour is an open path, so that the move from its end to its start does not count.
     pub open: bool,
@@ -52,7 +52,7 @@ pub(super) struct Tour<'t, I> {
     pub mate: &'t mut [I],
     /// The station where a route with these moves begins; `None` if it may begin anywhere.
     pub start: Option<I>,
-    /// Whether no part has more than two odd stations.
+    /// Whether no part has more than two odd stations, so that each part is drawn in one stroke.
     pub strokes_only: bool,
     /// The budget of work for each move, in distance computations.
     pub effort: u32,
@@ -61,7 +61,7 @@ pub(super) struct Tour<'t, I> {
 }
 
 /// Shortens `tour.route` as far as the budget allows. Does nothing if there is too little memory.
-#[inline(never)] // Smaller than in its only caller.
+#[inline(never)] // Inlined in its only caller, the code would be larger.
 pub(super) fn improve<I: Index>(
     network: Network<'_, I>,
     tour: Tour<'_, I>,
@@ -132,23 +132,27 @@ fn from_corner(position: PagePoint, (x, y): (i32, i32)) -> u32 {
 
 /// The shortest tour found so far, and the settings of the search.
 struct Best<'b, 'a, I> {
+    /// The stations and the chains of which every tour is made.
     network: Network<'a, I>,
+    /// The stations near each station, to which an exchange may lead a move.
     neighbours: Neighbours<'b, I>,
+    /// Whether the tour is an open path, so that the move from its end to its start costs nothing.
     open: bool,
     /// The cost of a move besides its length, in 1/256 steps.
     lift_cost: u32,
-    /// The search ends after this many successive kicks without a gain.
+    /// The search ends after this many successive kicks (random changes) without a shorter tour.
     patience: u32,
     /// The cost of the shortest tour, with the present cost of a lift.
     cost: u64,
-    /// The shortest tour.
+    /// The shortest tour that was found so far.
     route: &'b mut [Leg<I>],
+    /// Gives the random numbers of the kicks. They continue from one first tour to the next.
     kicks: Kicks,
 }
 
 impl<I: Index> Best<'_, '_, I> {
-    /// Makes a tour of the moves `mate`, part by part, the nearest part next. It starts at the
-    /// entrance nearest to `corner`, if one is given, and otherwise at `start`.
+    /// Makes a tour of the pen-up moves `mate`, part by part, the nearest part next. It starts at
+    /// the entrance nearest to `corner`, if one is given, and otherwise at `start`.
     fn follow(
         &self,
         mate: &[I],
@@ -171,7 +175,7 @@ impl<I: Index> Best<'_, '_, I> {
         unused.nearest_first(start, Some(self.neighbours), route, work_budget)
     }
 
-    /// Copies the shortest tour into `cycle`.
+    /// Copies the shortest tour found so far into `cycle`, to be changed there.
     fn restore(&self, cycle: &mut [Leg<I>]) {
         let (route, _) = cycle.split_at_mut(self.route.len());
         route.copy_from_slice(self.route);
@@ -235,7 +239,8 @@ impl<I: Index> Best<'_, '_, I> {
     }
 }
 
-/// Exchanges moves and reverses strokes until neither helps any more. Returns the gain.
+/// Exchanges moves and reverses strokes until neither makes the tour shorter. Returns by how much
+/// it became shorter.
 fn shorten<I: Index>(
     tour: &mut Exchanges<'_, '_, I>,
     choices: &mut [u8],
@@ -275,8 +280,9 @@ fn route_moves<I: Index>(
         .map(move |(&from, &to)| u64::from(network.distance(network.end(from), network.start(to))))
 }
 
-/// A source of random changes to a tour.
+/// Changes a tour at random (kicks it) where exchanges alone find nothing better any more.
 struct Kicks {
+    /// The state of the random number generator, which is never 0.
     random: u32,
 }
 
@@ -311,7 +317,7 @@ impl Kicks {
         let ends = [(a, b), (c, d), (e, f), (g, h), (a, f), (g, d), (e, b), (c, h)];
         let costs = ends.map(|(from, to)| tour.distance(tour.end(from), tour.start(to)));
         let loss = costs[4..].iter().sum::<i64>() - costs[..4].iter().sum::<i64>();
-        // … a, f … g, d … e, b … c, h …
+        // The tour becomes … a, f … g, d … e, b … c, h …
         let moved = tour.cycle.swap(a, d, g) + tour.cycle.swap(a, f, g);
         work_budget.work(8 + moved as u32 / 32)?;
         tour.wake(&[a, b.flipped(), c, d.flipped(), e, f.flipped(), g, h.flipped()]);
@@ -331,7 +337,8 @@ impl Kicks {
     }
 }
 
-/// Returns the next leg after `from` at whose end the pen is lifted, if there is one.
+/// Returns the next leg after `from` at whose end the pen is lifted, or `None` if the pen is lifted
+/// nowhere.
 fn next_move<I: Index>(
     tour: &Exchanges<'_, '_, I>,
     from: Leg<I>,

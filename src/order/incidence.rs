@@ -6,7 +6,8 @@ use super::network::Network;
 use crate::index::Index;
 use crate::stage::{OutOfScratch, Scratch};
 
-/// The lists of the legs that begin at each station, in ascending order of their codes.
+/// For each station (each point where the pen may stop), the list of the legs that begin there, in
+/// ascending order of their codes.
 pub(super) struct Incidence<'s, I> {
     /// For each station the code of the first leg of its list, or [`Index::NONE`].
     first: &'s mut [I],
@@ -15,7 +16,7 @@ pub(super) struct Incidence<'s, I> {
 }
 
 impl<'s, I: Index> Incidence<'s, I> {
-    /// Makes the lists of all legs of `network`.
+    /// Lists, for each station, the legs that begin there.
     pub fn new(network: Network<'_, I>, scratch: &mut Scratch<'s>) -> Result<Self, OutOfScratch> {
         let first: &mut [I] = scratch.take(network.stations().get())?;
         let next: &mut [I] = scratch.take(2 * network.chains().get())?;

@@ -1,7 +1,7 @@
 //! Computes the distance between two points of the page, exactly and with integers only.
 //!
-//! All later stages compare lengths of pen moves, so this is the most frequent computation of the
-//! ordering. The square root avoids divisions, which small cores do not have.
+//! Whatever orders strokes compares lengths of pen moves, so this is its most frequent computation.
+//! The square root avoids divisions, which small cores do not have.
 
 use crate::drawing::PagePoint;
 
@@ -36,7 +36,7 @@ pub(super) fn square(a: PagePoint, b: PagePoint) -> u64 {
     u64::from(dx) * u64::from(dx) + u64::from(dy) * u64::from(dy)
 }
 
-/// The first guess of 2^15 / √x, for x from 1 to 4 in steps of 1/32.
+/// Where the root's computation starts: 2^15 / √x for x from 1 to 4, in steps of 1/32.
 const RECIPROCAL_ROOTS: [u16; 96] = {
     let mut table = [0; 96];
     let mut index = 0;

@@ -56,7 +56,8 @@ fn even_part<I: Index>() -> I {
     I::NONE - I::ONE
 }
 
-/// One segment of the tour and the direction in which it is drawn. There are at most [`Leg::LIMIT`]
+/// One segment of the tour and the direction in which it is drawn. Within this module it may stand
+/// for a chain (a run of segments) and its direction as well. There are at most [`Leg::LIMIT`]
 /// segments.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 #[repr(transparent)]
@@ -86,7 +87,7 @@ impl<I: Index> Leg<I> {
     fn code(self) -> I {
         self.0
     }
-    /// Makes the leg that has this code.
+    /// Makes the leg whose [`Leg::code`] this is.
     fn from_code(code: I) -> Self {
         Self(code)
     }
@@ -101,7 +102,7 @@ pub enum Method {
     Auto,
     /// Greedy with regret (Harrison 5.10.1), followed by pair exchange.
     Greedy,
-    /// Minimum-weight perfect matching.
+    /// The pairing with the least total length (minimum-weight perfect matching).
     Exact,
 }
 
@@ -111,7 +112,7 @@ pub enum Method {
 /// hundredth shorter.
 pub const EXACT_POINTS: u32 = 1000;
 
-/// Whether the pen returns to where it began.
+/// Whether the pen, after it has drawn all strokes, returns to where it began.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Shape {
     /// The path goes from the start of the first stroke to the end of the last.
@@ -121,7 +122,7 @@ pub enum Shape {
     ClosedCycle,
 }
 
-/// The settings that the user may choose.
+/// The settings by which the user may influence the order of the strokes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Options {
     /// The method that pairs the odd points.
@@ -157,7 +158,7 @@ pub struct Report {
     pub pen_down: u64,
     /// Total length of the moves between strokes, with the pen up.
     pub pen_up: u64,
-    /// Number of moves between strokes.
+    /// The number of moves between strokes, in which the pen is up.
     pub lifts: u32,
     /// Lower bound of the pen-up length; 0 if none is known.
     pub bound: u64,
@@ -252,8 +253,9 @@ fn check<I: Index>(drawing: Drawing<'_, I>, tour_length: usize) -> Result<(), Or
     }
 }
 
-/// Orders the segments of one pen into `tour`, and adds its numbers to `report`.
-#[inline(never)] // Smaller than in its only caller.
+/// Decides in which order and direction one pen draws its segments. Writes this to `tour`, and adds
+/// its measures to `report`.
+#[inline(never)] // Inlined in its only caller, the code would be larger.
 fn order_pen<'a, I: Index>(
     drawing: Drawing<'a, I>,
     pen: u8,
@@ -309,9 +311,9 @@ fn order_pen<'a, I: Index>(
     Ok(())
 }
 
-/// The number of connected parts, and how many of them have odd points.
+/// What [`mark_parts`] finds out about the connected parts of a drawing.
 struct Parts {
-    /// The number of connected parts.
+    /// The number of connected parts of the drawing.
     count: u32,
     /// The number of those that have odd points.
     odd: u32,

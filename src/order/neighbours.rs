@@ -16,7 +16,7 @@ use crate::stage::{OutOfScratch, Scratch};
 pub(super) struct Neighbours<'a, I> {
     /// The neighbours of each station in turn; [`Index::NONE`] fills unused entries.
     stations: &'a [I],
-    /// The number of entries for each station.
+    /// The number of entries in `stations` for each station.
     per_station: usize,
 }
 
@@ -24,7 +24,7 @@ impl<'a, I: Index> Neighbours<'a, I> {
     /// Finds up to `per_station` neighbours of each station, a quarter of them in each quadrant. A
     /// crowd of stations on one side, such as the ends of a hatching, must not hide those on the
     /// other sides.
-    #[inline(never)] // Smaller than in its only caller.
+    #[inline(never)] // Inlined in its only caller, the code would be larger.
     pub fn new(
         network: Network<'_, I>,
         per_station: usize,
@@ -59,21 +59,27 @@ impl<'a, I: Index> Neighbours<'a, I> {
     }
 }
 
-/// The stations, sorted into the cells of a grid.
+/// The stations, sorted into the square cells of a grid, so that those near a point are found
+/// without looking at all of them.
 struct Grid<'s, 'a, I> {
+    /// The network whose stations are sorted; it knows where they lie.
     network: Network<'a, I>,
-    /// The lower left corner of the grid.
+    /// The lower left corner of the grid, from which cells are counted.
     corner: PagePoint,
-    /// Cells are squares of 2^`cell_bits` steps.
+    /// The size of a cell: a square of 2^`cell_bits` steps.
     cell_bits: u32,
+    /// The number of cells of the grid from left to right.
     columns: i32,
+    /// The number of cells of the grid from bottom to top.
     rows: i32,
     /// For each cell, where its stations begin in `stations`; then the end of the last cell.
     begin: &'s [I],
+    /// The numbers of all stations, cell after cell.
     stations: &'s [I],
 }
 
 impl<'s, 'a, I: Index> Grid<'s, 'a, I> {
+    /// Sorts the stations into cells, of which there are about half as many as stations.
     fn new(network: Network<'a, I>, scratch: &mut Scratch<'s>) -> Result<Self, OutOfScratch> {
         let count = network.stations();
         let positions = || I::below(count).map(|station| network.position(station));

@@ -33,9 +33,9 @@ const fn bytes_a_stop<I>() -> usize {
 /// Selects which of the points where two segments meet become stations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Stops {
-    /// Only those of parts that have no odd point.
+    /// Only the points of those parts that have no odd point, which may be entered anywhere.
     Few,
-    /// All of them.
+    /// All points where two segments meet.
     All,
 }
 
@@ -43,18 +43,21 @@ enum Stops {
 /// holds the number of the chain and the direction in which it is drawn.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Network<'a, I> {
+    /// The points of the drawing.
     points: &'a [PagePoint],
+    /// The segments of the drawing, those of other pens included.
     segments: &'a [Segment<I>],
     /// The number of the point at which each station lies.
     at: &'a [I],
-    /// The stations at which each chain begins and ends.
+    /// The stations at which each chain (a run of segments without a choice) begins and ends.
     ends: &'a [[I; 2]],
-    /// The first and the last segment of each chain, both as legs in the direction of the chain.
+    /// The first and the last segment of each chain, each with the direction in which the chain
+    /// draws it.
     outer: &'a [[Leg<I>; 2]],
 }
 
 impl<'a, I: Index> Network<'a, I> {
-    /// Makes the network of the segments that `pen` draws.
+    /// Makes the network of the segments that `pen` draws, with as many stations as is useful.
     pub fn new(
         drawing: Drawing<'a, I>,
         pen: u8,
@@ -81,17 +84,17 @@ impl<'a, I: Index> Network<'a, I> {
         Ok(Self { points: drawing.points, segments: drawing.segments, at, ends, outer })
     }
 
-    /// Returns the number of stations.
+    /// Returns the number of stations, the points where the pen may stop or turn.
     pub fn stations(&self) -> I {
         I::new(self.at.len())
     }
 
-    /// Returns the number of chains.
+    /// Returns the number of chains, the runs of segments that are drawn without stopping.
     pub fn chains(&self) -> I {
         I::new(self.ends.len())
     }
 
-    /// Returns the page position of a station.
+    /// Returns where on the page a station lies.
     pub fn position(&self, station: I) -> PagePoint {
         self.points[self.at[station.get()].get()]
     }
@@ -111,22 +114,23 @@ impl<'a, I: Index> Network<'a, I> {
         square(self.position(from), self.position(to))
     }
 
-    /// Returns the stations at the start and at the end of a chain.
+    /// Returns the stations (points where the pen may stop) at the start and at the end of a chain
+    /// of segments.
     pub fn ends(&self, chain: I) -> [I; 2] {
         self.ends[chain.get()]
     }
 
-    /// Returns the station at which the leg of a chain begins.
+    /// Returns the station at which a chain begins when it is drawn in the direction of `leg`.
     pub fn start(&self, leg: Leg<I>) -> I {
         self.ends[leg.segment()][usize::from(leg.reversed())]
     }
 
-    /// Returns the station at which the leg of a chain ends.
+    /// Returns the station at which a chain ends when it is drawn in the direction of `leg`.
     pub fn end(&self, leg: Leg<I>) -> I {
         self.start(leg.flipped())
     }
 
-    /// Returns, for each station, the lowest station of its connected part.
+    /// Finds the connected parts. Returns, for each station, the lowest station of its part.
     pub fn parts<'s>(&self, scratch: &mut Scratch<'s>) -> Result<&'s mut [I], OutOfScratch> {
         let lowest = scratch.take(self.stations().get())?;
         let mut parts = Partition::singletons(lowest);
@@ -177,25 +181,28 @@ pub(super) fn pen_segments<I: Index>(
     I::all().zip(segments).filter(move |(_, segment)| segment.pen() == pen)
 }
 
-/// Returns the point at which the leg of a segment begins.
+/// Returns the point at which a segment begins when it is drawn in the direction of `leg`.
 pub(super) fn start_point<I: Index>(segments: &[Segment<I>], leg: Leg<I>) -> I {
     let segment = &segments[leg.segment()];
     if leg.reversed() { segment.to() } else { segment.from() }
 }
 
-/// Returns the leg that begins where `leg` ends, at a point where exactly two segments meet.
-/// `across` holds, for each point, the exclusive or of the numbers of its segments, so that one of
-/// two segments gives the other.
+/// Returns the segment, and its direction, that goes on where `leg` ends, at a point where exactly
+/// two segments meet. `across` holds, for each point, the exclusive or of the numbers of its
+/// segments, so that one of two segments gives the other.
 fn next_leg<I: Index>(segments: &[Segment<I>], across: &[I], leg: Leg<I>) -> Leg<I> {
     let point = start_point(segments, leg.flipped());
     let number = across[point.get()] ^ I::new(leg.segment());
     Leg::new(number, segments[number.get()].from() != point)
 }
 
-/// The facts about each point that are needed to build the chains.
+/// What is known of each point of the drawing while the chains are built.
 struct Survey<'s, 'a, I> {
+    /// The segments of the drawing, those of other pens included.
     segments: &'a [Segment<I>],
+    /// The pen whose segments are looked at.
     pen: u8,
+    /// Which of the points where two segments meet become stations.
     stops: Stops,
     /// For each point the number of its segments, with the flag [`has_odd`].
     degree: &'s mut [I],
@@ -206,6 +213,7 @@ struct Survey<'s, 'a, I> {
 }
 
 impl<'s, 'a, I: Index> Survey<'s, 'a, I> {
+    /// Counts the segments at each point, and finds the connected parts.
     fn new(
         drawing: Drawing<'a, I>,
         pen: u8,
@@ -238,7 +246,7 @@ impl<'s, 'a, I: Index> Survey<'s, 'a, I> {
         (self.degree[point.get()] & (has_odd::<I>() - I::ONE)).get()
     }
 
-    /// Whether a point is a station.
+    /// Whether the pen may stop or turn at a point, so that a chain ends there.
     fn is_station(&self, point: I) -> bool {
         let lowest = self.part[point.get()];
         match self.degree(point) {
@@ -248,12 +256,14 @@ impl<'s, 'a, I: Index> Survey<'s, 'a, I> {
         }
     }
 
+    /// Returns the numbers of the points that are stations, the lowest first.
     fn stations(&self) -> impl Iterator<Item = I> {
         I::below(I::new(self.degree.len())).filter(|&point| self.is_station(point))
     }
 
-    /// Builds the chains: fills `at` with the points of the stations, and `ends` and `outer` with
-    /// the stations and the outermost segments of each chain.
+    /// Builds the chains, each of which is a run of segments from one station to the next: fills
+    /// `at` with the points of the stations, and `ends` and `outer` with the stations and the
+    /// outermost segments of each chain.
     fn lay_chains(
         self,
         scratch: &mut Scratch<'_>,

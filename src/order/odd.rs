@@ -10,9 +10,11 @@ use crate::index::{Index, Numbers};
 /// ends are the start and the end of the path.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct OddPoints<'a, I> {
+    /// The network to which the stations belong; it knows where they lie.
     network: Network<'a, I>,
     /// The odd stations, sorted by x.
     stations: &'a [I],
+    /// Whether two free ends follow the odd stations.
     free_ends: bool,
 }
 
@@ -24,7 +26,8 @@ impl<'a, I: Index> OddPoints<'a, I> {
         Self { network, stations, free_ends }
     }
 
-    /// Returns the number of odd stations, without the free ends.
+    /// Returns the number of odd stations, where the pen must be lifted or lowered, without the
+    /// free ends.
     pub fn real_count(&self) -> I {
         I::new(self.stations.len())
     }
@@ -34,12 +37,13 @@ impl<'a, I: Index> OddPoints<'a, I> {
         self.real_count() + I::new(2 * usize::from(self.free_ends))
     }
 
-    /// Whether there are two free ends.
+    /// Whether two free ends are added, because the path is open.
     pub fn has_free_ends(&self) -> bool {
         self.free_ends
     }
 
-    /// Returns the numbers that the two free ends have if there are any.
+    /// Returns the numbers of the two free ends, which stand for the start and the end of an open
+    /// path.
     pub fn free_ends(&self) -> [I; 2] {
         [self.real_count(), self.real_count() + I::ONE]
     }

@@ -12,8 +12,8 @@ use super::{Leg, OrderError};
 use crate::array::MapEach;
 use crate::index::Index;
 
-/// Reverses strokes (the legs between two moves) where that makes the tour shorter. Returns the
-/// gain. `choices` must have an entry for each leg of the tour.
+/// Reverses strokes (what is drawn between two pen-up moves) where that makes the tour shorter.
+/// Returns by how much. `choices` must have an entry for each leg of the tour.
 pub(super) fn orient<I: Index>(
     tour: &mut Exchanges<'_, '_, I>,
     choices: &mut [u8],
@@ -79,15 +79,16 @@ pub(super) fn orient<I: Index>(
 }
 
 impl<I: Index> Exchanges<'_, '_, I> {
-    /// Returns a leg before which the pen is lifted; for an open path, the gap.
+    /// Returns a leg before which the pen is lifted; for an open path, the gap between its end and
+    /// its start.
     fn first_of_a_stroke(&self) -> Option<Leg<I>> {
         let legs = || (0..self.cycle.len()).map(|index| self.cycle.leg(index));
         let begins = |leg: &Leg<I>| self.move_after(self.cycle.previous(*leg)) > 0;
         legs().find(|&leg| self.is_gap(leg)).or_else(|| legs().find(begins))
     }
 
-    /// Returns the last leg that is drawn without a lift from `leg` on. The gap is a stroke by
-    /// itself, and a stroke ends before `begin`.
+    /// Returns the last leg that is drawn without a lift from `leg` on. The gap of an open path is
+    /// a stroke by itself, and a stroke ends before `begin`.
     fn last_of_stroke(&self, leg: Leg<I>, begin: Leg<I>) -> Leg<I> {
         let mut last = leg;
         while !self.is_gap(last) && self.move_after(last) == 0 {

@@ -16,8 +16,9 @@ use crate::stage::Scratch;
 /// The length that an exchange may add in the first round, in 1/256 steps: 8 steps.
 const FIRST_ALLOWANCE: i64 = 8 << 8;
 
-/// Changes the moves `mate` between odd stations until no exchange between two neighbours in `near`
-/// can join two more parts.
+/// Joins parts of the tour that do not meet, until no exchange between two neighbours in `near` can
+/// join two more. For each odd station (where the pen must be lifted or put down), `mate` says to
+/// which station its pen-up move leads; these moves are changed.
 pub(super) fn patch_cycles<I: Index>(
     network: Network<'_, I>,
     near: Neighbours<'_, I>,

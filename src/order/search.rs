@@ -11,61 +11,64 @@ use super::work_budget::WorkBudget;
 use super::{Leg, OrderError};
 use crate::index::Index;
 
-/// The result of trying a station.
+/// The result of trying a new move to a station.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Outcome {
-    /// Other stations may give a better step.
+    /// Nothing was found yet, and other stations may give a better step.
     GoOn,
     /// The station is too far away, and so are those after it.
     TooFar,
-    /// A step with a gain has been found.
+    /// A step that makes the tour shorter has been found.
     Found,
 }
 
-/// The position of the move at the start of a leg.
+/// Where in the tour the move at the start of a leg lies, seen from the first cut.
 struct Before {
     /// The position and the direction of the leg.
     position: LegPosition,
-    /// Whether the leg has the direction of the leg before the first cut.
+    /// Whether the leg runs in the direction of the leg before the first cut.
     onward: bool,
-    /// The number of legs between the first cut and this move, in the direction of the first cut.
+    /// The number of legs between the first cut and this move, counted in the direction of the
+    /// first cut.
     legs_between: usize,
 }
 
-/// A move that the step cuts.
+/// A move that an exchange takes out of the tour, so that new ones can replace it.
 struct Cut<I> {
     /// The leg before the cut, in the direction of the first cut.
     leg: Leg<I>,
     /// Whether the new move leads to the start of the leg after the cut; otherwise it leads to the
     /// end of the leg before the cut.
     onward: bool,
-    /// The station on the other side of the cut.
+    /// The station on the other side of the cut, from which the search goes on.
     far: I,
     /// The number of legs between the first cut and this one.
     legs_between: usize,
 }
 
-/// A search for a step that begins with the cut after `a`.
+/// Looks for the best step of an exchange that begins with the cut after the leg `a`.
 pub(super) struct StepSearch<'e, 's, 'a, I: Index> {
+    /// The tour whose moves are exchanged, with its tables.
     tour: &'e Exchanges<'s, 'a, I>,
-    /// The leg before the first cut.
+    /// The leg after which the tour is cut first.
     a: Leg<I>,
-    /// The leg after the first cut.
+    /// The leg that followed `a` before the tour was cut.
     b: Leg<I>,
-    /// The position and the direction of `a`.
+    /// The position of the leg `a` in the cycle, and its direction there.
     a_position: LegPosition,
-    /// The station after the first cut, where the tour will be joined again.
+    /// The station at which `b` begins, to which the exchange leads back at last.
     first: I,
     /// The cost from `first` to the nearer end of the path; very large if the tour is a closed
     /// cycle.
     to_ends: i64,
-    /// The best step found: one with a gain, or else the one that leaves the most gain in hand.
+    /// The best step found: one that makes the tour shorter, or else the one that leaves most to go
+    /// on with.
     best: Option<Step<I>>,
 }
 
 impl<'e, 's, 'a, I: Index> StepSearch<'e, 's, 'a, I> {
-    /// Returns the first step found that leaves a gain, or else the one that leaves the most of
-    /// `hand`; `None` if no step is possible.
+    /// Returns the first step found that makes the tour shorter, or else the one that leaves the
+    /// most of `hand` (the moves taken out less those put in); `None` if no step is possible.
     pub fn best_step(
         tour: &'e Exchanges<'s, 'a, I>,
         a: Leg<I>,
@@ -90,7 +93,7 @@ impl<'e, 's, 'a, I: Index> StepSearch<'e, 's, 'a, I> {
         Ok(search.best)
     }
 
-    /// Tries a new move from `end` to `second`, and cuts each move there in turn.
+    /// Tries a new move from `end` to the station `second`, and takes each move there out in turn.
     fn second_cut(
         &mut self,
         hand: i64,
@@ -128,7 +131,7 @@ impl<'e, 's, 'a, I: Index> StepSearch<'e, 's, 'a, I> {
         Ok(Outcome::GoOn)
     }
 
-    /// Tries new moves from the far side of the second cut to the stations near it.
+    /// Tries new moves from the open end of the second cut to the stations near it.
     fn third_cuts(
         &mut self,
         hand: i64,
@@ -146,8 +149,8 @@ impl<'e, 's, 'a, I: Index> StepSearch<'e, 's, 'a, I> {
         Ok(Outcome::GoOn)
     }
 
-    /// Tries a new move from the far side of the second cut to `third`, and cuts each move there in
-    /// turn.
+    /// Tries a new move from the open end of the second cut to the station `third`, and takes each
+    /// move there out in turn.
     fn third_cut(
         &mut self,
         hand: i64,
@@ -202,7 +205,7 @@ impl<'e, 's, 'a, I: Index> StepSearch<'e, 's, 'a, I> {
         Before { position, onward, legs_between }
     }
 
-    /// Returns the cut of the move at the start of `leg`.
+    /// Returns the cut that takes the move at the start of `leg` out of the tour.
     fn cut(&self, leg: Leg<I>, Before { position, onward, legs_between }: Before) -> Cut<I> {
         let previous = self.tour.cycle.before(position);
         let far = self.tour.end(previous);

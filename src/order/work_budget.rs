@@ -5,10 +5,12 @@ use crate::stage::{Aborted, Cancel, heap_sort_cancellable};
 
 /// Counts units of work, and calls [`Cancel::check`] at regular intervals.
 pub(super) struct WorkBudget<'a> {
+    /// Called after every [`WorkBudget::UNITS`] units of work, so that the machine can answer and
+    /// the user can abort.
     cancel: &'a mut dyn Cancel,
-    /// Units of work since the last call of [`Cancel::check`].
+    /// Units of work done since [`Cancel::check`] was last called.
     done: u32,
-    /// Units of the budget that were left at that call.
+    /// Units of the budget that were left when it was last called.
     budget: u64,
 }
 
@@ -17,7 +19,7 @@ impl<'a> WorkBudget<'a> {
     /// distance, up to 500 instructions on the smallest core.
     const UNITS: u32 = 256;
 
-    /// Makes a counter that calls `cancel`, with no budget yet.
+    /// Makes a counter that calls `cancel` regularly. Its budget is 0 until [`WorkBudget::grant`].
     pub fn new(cancel: &'a mut dyn Cancel) -> Self {
         Self { cancel, done: 0, budget: 0 }
     }

@@ -75,7 +75,7 @@ pub trait Board {
         let _ = (record, parts);
         Ok(())
     }
-    /// Passes the kept state of `record` to `take`, if there is one.
+    /// Passes the state of `record` that was saved last to `take`, if there is one.
     fn load(&mut self, record: Record, take: &mut dyn FnMut(&mut dyn Stored)) {
         let _ = (record, take);
     }
@@ -98,10 +98,10 @@ pub trait Board {
 /// list.
 pub const REPLY_BYTES: usize = 512;
 
-/// A record that a board with flash keeps through a loss of power.
+/// What a board with flash keeps through a loss of power.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Record {
-    /// The settings of the machine.
+    /// The settings of the machine, which `$N=VALUE` changes.
     Settings,
     /// The coordinate systems, startup lines and texts.
     Parameters,
@@ -110,11 +110,11 @@ pub enum Record {
     Job,
 }
 
-/// The board could not keep a record.
+/// The error that the board could not keep a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NotStored;
 
-/// A kept state of a record, read from its beginning on.
+/// A kept state of a [`Record`], which is read from its beginning to its end.
 pub trait Stored {
     /// Copies the next bytes to the front of `into`, as many as are left and fit. Returns their
     /// number.

@@ -15,7 +15,7 @@ use crate::visibility;
 /// The capacities of a board, and the memory in bytes that its largest scene needs.
 #[derive(Debug, Clone, Copy)]
 pub struct Budget {
-    /// The board's name.
+    /// The board's name, as in [`crate::board_table`].
     pub board: &'static str,
     /// Number of vertices that the model can hold.
     pub vertex_limit: usize,
@@ -23,24 +23,25 @@ pub struct Budget {
     pub corner_limit: usize,
     /// Size of the model's memory, in bytes.
     pub model: usize,
-    /// Size of the working memory, in bytes. The stages use it one after the other.
+    /// Size of the working memory, in bytes. The stages of a job (the parts of its computation) use
+    /// it one after the other.
     pub working: usize,
     /// Bytes for the vertices in view coordinates. They are held while hidden lines are found.
     pub view: usize,
     /// The fewest bytes with which hidden lines can be found. More memory makes the search faster.
     pub visibility: usize,
-    /// Bytes for the lines that the search finds.
+    /// Bytes for the visible lines that the search finds.
     pub lines: usize,
     /// Bytes for the drawing on the page. It is held until it has been drawn.
     pub drawing: usize,
     /// Bytes for the order of the strokes. It is held until the drawing has been drawn, too.
     pub tour: usize,
-    /// Bytes for the exact matching of the odd points.
+    /// Bytes for pairing the odd points exactly, so that the pen travels least.
     pub matching: usize,
 }
 
 impl Budget {
-    /// The budget of a board.
+    /// Adds up the memory that the largest scene of a board needs.
     const fn of(board: &BoardRow) -> Self {
         let BoardRow { name, memory, scene, .. } = board;
         let budget = Self {
@@ -73,7 +74,7 @@ impl Budget {
     }
 }
 
-/// The budgets of all boards.
+/// The memory budgets of all boards, in the order of their table.
 pub const BUDGETS: [Budget; BOARDS.len()] = {
     let mut budgets = [Budget::of(BOARDS[0]); BOARDS.len()];
     let mut number = 1;

@@ -14,7 +14,7 @@ use crate::protocol::CommandError;
 use crate::stage::Scratch;
 use core::fmt;
 
-/// Saves the copy of the model that `$undo` restores.
+/// Saves a copy of the model before it changes, so that `$undo` can restore it.
 pub(super) struct UndoCopy<'k, I> {
     /// The front of the working memory, where the copy goes.
     words: &'k mut [u64],
@@ -61,7 +61,7 @@ impl<'m, I: Index> Inner<'m, I> {
     ///
     /// # Errors
     /// [`CommandError::Busy`] unless the machine is idle, or the model's refusal.
-    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    #[inline(never)] // Inlined, its frame would take stack while a job is computed.
     pub(super) fn edit<B: Board>(&mut self, edit: Edit, board: &mut B) -> Result<(), CommandError> {
         if self.machine.state() != State::Idle {
             return Err(CommandError::Busy);
@@ -87,7 +87,7 @@ impl<'m, I: Index> Inner<'m, I> {
     ///
     /// # Errors
     /// [`CommandError::NothingToUndo`] if there is no copy.
-    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    #[inline(never)] // Inlined, its frame would take stack while a job is computed.
     pub(super) fn undo(&mut self) -> Result<(), CommandError> {
         if core::mem::take(&mut self.copy_words) == 0 {
             return Err(CommandError::NothingToUndo);
@@ -108,7 +108,7 @@ impl<'m, I: Index> Inner<'m, I> {
     }
 
     /// Writes the row of the element at index `at` among those of its kind.
-    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    #[inline(never)] // Inlined, its frame would take stack while a job is computed.
     pub(super) fn list_one<B: Board>(&self, part: ElementKind, at: usize, board: &mut B) {
         let mut reply = Reply(board);
         let number = at + 1;

@@ -5,7 +5,7 @@ use crate::protocol::HELP;
 use core::fmt;
 
 /// Passes to `row` the usage and the meaning of each command, in the order of `$`.
-#[inline(never)] // Keeps its frame off the stack while the stages run.
+#[inline(never)] // Inlined, its frame would take stack while a job is computed.
 pub fn help(row: &mut dyn FnMut(&dyn fmt::Display, &'static str)) {
     let [before, after] = HELP;
     before.iter().for_each(|(usage, meaning)| row(usage, meaning));

@@ -10,9 +10,13 @@ use crate::stage::{Aborted, Cancel, Stage};
 
 /// The strokes of a job while the machine measures them. They check for cancelling as they go.
 pub(super) struct MeasuredStrokes<'s, 'a, I> {
+    /// The strokes of the job.
     pub(super) strokes: Strokes<'s, I>,
+    /// Called after every 64 targets, so that the serial line is answered and the user can abort.
     pub(super) cancel: &'a mut dyn Cancel,
+    /// Number of targets that the machine has read so far.
     pub(super) targets: usize,
+    /// Whether the user has aborted the job. The strokes then end.
     pub(super) aborted: bool,
 }
 
@@ -35,14 +39,15 @@ impl<I: Index> Path for MeasuredStrokes<'_, '_, I> {
     }
 }
 
-/// Answers the serial line while a job is computed.
+/// Answers the serial line while a job is computed, and ends the computation when the user asks.
 pub(super) struct Listener<'b, B: Board> {
+    /// The board, from which requests come and to which replies go.
     pub(super) board: &'b mut B,
-    /// The position for the status report, in mm.
+    /// The position that status reports tell meanwhile, in mm.
     pub(super) position: [Value; 3],
     /// Whether reports are in inches.
     pub(super) inches: bool,
-    /// The stage for the status report.
+    /// The stage of the computation that status reports tell.
     pub(super) stage: Stage,
     /// The hold or emergency stop that was requested meanwhile. It is carried out when the
     /// computation ends.

@@ -23,16 +23,21 @@ pub struct Memory<
     const WORDS: usize,
     const PORTS: usize = 1,
 > {
+    /// The vertices of the model.
     vertices: [Position; VERTICES],
+    /// Memory for the corners of its faces and the ends of its bars.
     corners: [Corner; CORNERS],
+    /// Working memory for the stages of a job (the parts of its computation) and for the drawing
+    /// that they compute.
     words: [u64; WORDS],
+    /// The line that each serial port is receiving.
     readers: [LineReader; PORTS],
 }
 
 impl<const VERTICES: usize, const CORNERS: usize, const WORDS: usize, const PORTS: usize>
     Memory<VERTICES, CORNERS, WORDS, PORTS>
 {
-    /// An empty memory.
+    /// Makes an empty memory, for a static variable.
     pub const fn new() -> Self {
         Self {
             vertices: [Position::ORIGIN; VERTICES],
@@ -62,16 +67,17 @@ impl<const VERTICES: usize, const CORNERS: usize, const WORDS: usize, const PORT
     }
 }
 
-/// The memory lent to a plotter, independent of its capacities.
+/// The memory that a plotter borrows. Its type does not depend on the capacities.
 #[derive(Debug)]
 pub struct MemorySlices<'m, I = u16> {
     /// Memory for the model's vertices.
     pub vertices: &'m mut [Position],
     /// Memory for the corners of its faces and the ends of its bars.
     pub corners: &'m mut [Corner<I>],
-    /// Memory for the moves planned ahead.
+    /// Memory for the moves that are planned ahead.
     pub blocks: &'m mut [Block],
-    /// Working memory for the stages of a job and the drawing that they compute.
+    /// Working memory for the stages of a job (the parts of its computation) and for the drawing
+    /// that they compute.
     pub words: &'m mut [u64],
     /// The line that each serial port is receiving, indexed by the port's number.
     pub readers: &'m mut [LineReader],

@@ -83,45 +83,56 @@ pub fn run<B: Board, I: Index>(
 /// The whole plotter except its pins, which the board pulses.
 #[derive(Debug)]
 pub struct Plotter<'m, I = u16> {
-    /// The line that each port is receiving.
+    /// For each serial port, the line that is being received by it.
     readers: &'m mut [LineReader],
-    /// The state of the line numbers of each port.
+    /// For each serial port, which numbered lines have come by it.
     numberings: [Numbering; PORT_LIMIT],
-    /// The port of the line that is being carried out.
+    /// The number of the port by which the line came that is being carried out.
     port: usize,
-    /// What the reply to that line names.
+    /// Whether and how the reply to that line is numbered and checked.
     label: Label,
+    /// All that carries out a line. It is apart from the lines, which stay borrowed meanwhile.
     inner: Inner<'m, I>,
     /// Whether a status report was asked for and waits for room in the output.
     status_due: bool,
 }
 
 /// What is left to do after a line has been carried out. Jobs are left to the caller, because their
-/// stages need the stack.
+/// computation needs much stack.
 enum Next {
+    /// The line has been carried out completely.
     Nothing,
     /// The plotter is reset, as by ctrl-X.
     Reset,
+    /// Compute the model's job and draw it (`$plot`).
     Plot,
+    /// Draw the last job again (`$again`).
     Again,
+    /// Become the USB drive onto which a new firmware image is copied (`$UF2`).
     ShowDrive,
 }
 
 /// The plotter without the line being read: that line stays borrowed while it is carried out.
 #[derive(Debug)]
 struct Inner<'m, I> {
+    /// The model that the user has sent.
     model: Model<'m, I>,
+    /// What is drawn and how, as the user has set it.
     options: PlotOptions,
     /// The working memory. It holds the job, or the copy of the model for `$undo`.
     words: &'m mut [u64],
+    /// The machine, which plans the moves of the job.
     machine: Machine<'m>,
+    /// The job that is being drawn or was drawn last.
     job: Job<I>,
+    /// How far the strokes of the job have been handed to the machine.
     cursor: Cursor<I>,
     /// How many of the first `words` hold the copy of the model before its last change; 0 if there
     /// is no copy.
     copy_words: usize,
     /// Whether the model is copied before each change.
     can_undo: bool,
+    /// The modes that lines of G-code have set.
     program: Program,
     /// What stays when a program ends.
     parameters: Parameters,
@@ -133,7 +144,7 @@ struct Inner<'m, I> {
     task: Option<Task>,
     /// The alarm that was last reported, while it lasts.
     alarm_reported: Option<Alarm>,
-    /// The pen that the user was last asked to insert, from 0.
+    /// The pen, from 0, for which the user was last asked, so that the question is not repeated.
     pen_reported: Option<u8>,
 }
 
@@ -144,8 +155,8 @@ impl<'m, I: Index> Plotter<'m, I> {
         Self::with_settings(memory, pins, Settings::default())
     }
 
-    /// Like [`Plotter::new`], with the given settings.
-    #[inline(never)] // Its temporaries must not lie on the stack below the stages.
+    /// Makes a plotter like [`Plotter::new`], with these settings of the machine.
+    #[inline(never)] // Inlined, its temporaries would take stack while a job is computed.
     pub fn with_settings(
         memory: MemorySlices<'m, I>,
         pins: &'m PulserState,
@@ -191,8 +202,8 @@ impl<'m, I: Index> Plotter<'m, I> {
         report::greet(board);
     }
 
-    /// Answers the serial line, and keeps the step queue full. Returns whether there was anything
-    /// to do.
+    /// Answers the serial line, and keeps the queue of step events full. Returns whether there was
+    /// anything to do.
     pub fn poll<B: Board>(&mut self, board: &mut B) -> bool {
         let requests = board.take_real_time();
         self.act(requests, board);
@@ -256,7 +267,7 @@ impl<'m, I: Index> Plotter<'m, I> {
     }
 
     /// Replies to the line that has been carried out, and notes its outcome for repeated lines.
-    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    #[inline(never)] // Inlined, its frame would take stack while a job is computed.
     fn answer<B: Board>(&mut self, outcome: Result<(), CommandError>, board: &mut B) {
         if let Some(numbering) = self.numberings.get_mut(self.port) {
             numbering.note(self.label, outcome);
@@ -264,7 +275,7 @@ impl<'m, I: Index> Plotter<'m, I> {
         Reply(board).outcome(outcome, self.label);
     }
 
-    /// The model.
+    /// Returns the model that the user has sent.
     pub fn model(&self) -> &Model<'m, I> {
         &self.inner.model
     }
@@ -303,7 +314,7 @@ impl<'m, I: Index> Plotter<'m, I> {
         self.inner.job.strokes(self.inner.words, &mut self.inner.cursor)
     }
 
-    /// Handles the real-time `requests`, and whatever else does not come by a line.
+    /// Carries out the real-time `requests`, and whatever else does not come by a line.
     fn act<B: Board>(&mut self, requests: RealTime, board: &mut B) {
         report::greet_opened(self.inner.machine.state(), board);
         if B::HAS_DRIVE && board.wants_drive() && self.inner.is_without_job() {
@@ -338,7 +349,7 @@ impl<'m, I: Index> Plotter<'m, I> {
 
 impl<I: Index> Inner<'_, I> {
     /// Keeps the step queue full. Returns whether the planned position has changed.
-    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    #[inline(never)] // Inlined, its frame would take stack while a job is computed.
     fn plan<B: Board>(&mut self, board: &mut B) -> bool {
         let before = self.machine.planned_position();
         let mut strokes = self.job.strokes(self.words, &mut self.cursor);
@@ -371,7 +382,7 @@ impl<I: Index> Inner<'_, I> {
     }
 
     /// Carries out a line. Returns what is left to the caller to do.
-    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    #[inline(never)] // Inlined, its frame would take stack while a job is computed.
     fn carry_out<B: Board>(&mut self, line: &str, board: &mut B) -> Result<Next, CommandError> {
         let command = Command::parse(line)?;
         let one_pen = self.options.one_pen;
@@ -470,7 +481,7 @@ impl<I: Index> Inner<'_, I> {
     }
 
     /// Sets the setting with the number `name`.
-    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    #[inline(never)] // Inlined, its frame would take stack while a job is computed.
     fn change_setting(&mut self, name: &str, value: &str) -> Result<(), CommandError> {
         let mut name = Significant(name.bytes());
         let number = next_number(&mut name).filter(|_| name.next().is_none());

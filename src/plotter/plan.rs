@@ -16,7 +16,7 @@ use crate::visibility::SinkFull;
 /// # Errors
 /// [`CommandError::Page`] if the plan does not go on the page, [`CommandError::DrawingTooLarge`] if
 /// its lines do not fit in the memory, [`CommandError::Aborted`].
-#[inline(never)] // Keeps its frame off the stack while the stages run.
+#[inline(never)] // Inlined, its frame would take stack while a job is computed.
 pub(super) fn lay_out<I: Index>(pipeline: &mut Pipeline<'_, I>) -> Result<Found, CommandError> {
     let Pipeline { model, options, steps, words, cancel, observer } = pipeline;
     let steps = *steps;

@@ -13,7 +13,7 @@ use crate::protocol::CommandError;
 const SETTING_BYTES: usize = 6;
 
 /// The settings kept by the board; those that are not kept have their default values.
-#[inline(never)] // Keeps its frame off the stack while the stages run.
+#[inline(never)] // Inlined, its frame would take stack while a job is computed.
 pub(super) fn load_settings<B: Board>(board: &mut B) -> Settings {
     let mut values = heapless::Vec::<(u16, Value), { SETTINGS.len() }>::new();
     board.load(Record::Settings, &mut |record| {
@@ -34,7 +34,7 @@ pub(super) fn load_settings<B: Board>(board: &mut B) -> Settings {
 /// # Errors
 /// [`CommandError::NotStored`]: the settings are in force, but after a loss of power the previous
 /// ones return.
-#[inline(never)] // Keeps its frame off the stack while the stages run.
+#[inline(never)] // Inlined, its frame would take stack while a job is computed.
 pub(super) fn save_settings<B: Board>(
     settings: &Settings,
     board: &mut B,
@@ -128,8 +128,8 @@ const JOB_LAYOUT: u32 = u32::from_le_bytes(*b"job1");
 /// job's figures.
 const JOB_HEADER: usize = 3 + FIGURES;
 
-/// The steps per millimetre on the page, for x and y, as bits. A job's coordinates are measured in
-/// these steps.
+/// Returns the steps per millimetre on the page, for x and y, as they are kept in the flash with a
+/// job, whose coordinates are measured in these steps.
 fn steps(settings: &Settings) -> [u32; 2] {
     settings.page_steps().map(|steps| steps.to_bits().cast_unsigned())
 }
@@ -138,7 +138,7 @@ fn steps(settings: &Settings) -> [u32; 2] {
 ///
 /// # Errors
 /// [`NotStored`]: the previous job is still kept.
-#[inline(never)] // Keeps its frame off the stack while the stages run.
+#[inline(never)] // Inlined, its frame would take stack while a job is computed.
 pub(super) fn save_job<B: Board, I: Index>(
     job: &Job<I>,
     settings: &Settings,
@@ -160,7 +160,7 @@ pub(super) fn save_job<B: Board, I: Index>(
 /// # Errors
 /// [`CommandError::NoJobKept`] if there is none, [`CommandError::OtherSteps`] if the steps per
 /// millimetre have changed since. `words` then hold no job.
-#[inline(never)] // Keeps its frame off the stack while the stages run.
+#[inline(never)] // Inlined, its frame would take stack while a job is computed.
 pub(super) fn load_job<B: Board, I: Index>(
     settings: &Settings,
     words: &mut [u64],

@@ -8,7 +8,7 @@ use crate::machine::Value;
 use crate::protocol::{Checksum, CommandError, Label, Named};
 use core::fmt::{self, Write};
 
-/// Writes lines to the board's serial line.
+/// Writes replies to the serial line of a board, line by line.
 pub(super) struct Reply<'b, B: Board + ?Sized>(pub &'b mut B);
 
 impl<B: Board + ?Sized> Reply<'_, B> {
@@ -18,7 +18,7 @@ impl<B: Board + ?Sized> Reply<'_, B> {
         self.0.write(b"\r\n");
     }
 
-    /// Writes a part of a line.
+    /// Writes a part of a line. [`Reply::line`] writes the last part and the line's end.
     pub fn part(&mut self, arguments: fmt::Arguments<'_>) {
         // Writing to the serial line may block, but it does not fail.
         let _ = self.write_fmt(arguments);
@@ -79,7 +79,7 @@ impl<B: Board + ?Sized> Reply<'_, B> {
     }
 }
 
-/// Passes on formatted text piece by piece.
+/// Hands formatted text on to a callback, piece by piece as it is formatted.
 struct Pieces<'w>(&'w mut dyn FnMut(&str));
 
 impl Write for Pieces<'_> {
@@ -89,7 +89,7 @@ impl Write for Pieces<'_> {
     }
 }
 
-/// Shown as ` N17` for the number 17, or as nothing.
+/// The number of a line as a reply names it: ` N17` for the number 17, nothing for `None`.
 struct Number(Option<i32>);
 
 impl fmt::Display for Number {

@@ -30,7 +30,7 @@ pub(super) fn greet<B: Board>(board: &mut B) {
 
 /// If a program has opened a port, writes the greeting to that port alone, with the current alarm,
 /// which the other ports have already heard of.
-#[inline(never)] // Keeps its frame off the stack while the stages run.
+#[inline(never)] // Inlined, its frame would take stack while a job is computed.
 pub(super) fn greet_opened<B: Board>(state: State, board: &mut B) {
     if !board.take_opened() {
         return;
@@ -47,7 +47,7 @@ pub(super) fn greet_opened<B: Board>(state: State, board: &mut B) {
 }
 
 /// Reports the fault that ended the previous run, if there was one.
-#[inline(never)] // Keeps its frame off the stack while the stages run.
+#[inline(never)] // Inlined, its frame would take stack while a job is computed.
 pub(super) fn fault<B: Board>(board: &mut B) {
     // The board truncates longer messages.
     let mut text = heapless::String::<192>::new();
@@ -59,7 +59,7 @@ pub(super) fn fault<B: Board>(board: &mut B) {
 
 impl<I: Index> Inner<'_, I> {
     /// Reports the faces and edges that the job has left out, if any.
-    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    #[inline(never)] // Inlined, its frame would take stack while a job is computed.
     pub fn report_degenerate<B: Board>(&self, board: &mut B) {
         let count = self.job.degenerate_faces();
         if count > 0 {
@@ -75,7 +75,7 @@ impl<I: Index> Inner<'_, I> {
     }
 
     /// Writes the reply to `$I`: version, board, moves planned ahead and longest line.
-    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    #[inline(never)] // Inlined, its frame would take stack while a job is computed.
     pub fn report_build<B: Board>(&self, board: &mut B) {
         const VERSION: &str = env!("CARGO_PKG_VERSION");
         Reply(board).line(format_args!("[VER:1.1h.penup {VERSION} {}:{}]", B::NAME, self.info()));
@@ -85,7 +85,7 @@ impl<I: Index> Inner<'_, I> {
 
     /// Writes the reply to `$model`: the size of the model, its checksums, the result of the last
     /// job's ordering, and the size of the working memory.
-    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    #[inline(never)] // Inlined, its frame would take stack while a job is computed.
     pub fn report_model<B: Board>(&self, board: &mut B) {
         let model = &self.model;
         let (vertices, limit) = (model.vertices().len(), model.vertex_limit());
@@ -123,7 +123,7 @@ impl<I: Index> Inner<'_, I> {
     }
 
     /// Writes Grbl's status report, with penup's own fields at its end.
-    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    #[inline(never)] // Inlined, its frame would take stack while a job is computed.
     pub fn report_status<B: Board>(&mut self, board: &mut B) {
         let status = self.machine.status();
         let state = match status.state {

@@ -18,7 +18,7 @@ use crate::visibility::{EdgeParameter, Stretch, StretchSink};
 /// # Errors
 /// [`CommandError::Solid`] if this is no convex solid, [`CommandError::View`],
 /// [`CommandError::Page`], [`CommandError::DrawingTooLarge`], [`CommandError::Aborted`].
-#[inline(never)] // Keeps its frame off the stack while the stages run.
+#[inline(never)] // Inlined, its frame would take stack while a job is computed.
 pub(super) fn project<I: Index>(pipeline: &mut Pipeline<'_, I>) -> Result<Found, CommandError> {
     let (camera, view) = pipeline.camera_view()?;
     let Pipeline { model, options, steps, words, cancel, observer } = pipeline;
@@ -88,13 +88,13 @@ pub(super) fn project<I: Index>(pipeline: &mut Pipeline<'_, I>) -> Result<Found,
 /// The edges of the solid that are to be drawn. Visible edges fill the array from the front, hidden
 /// ones from the back.
 struct Edges<'a, I> {
-    /// The vertex numbers of the ends of each edge.
+    /// For each edge, the vertex numbers of its ends.
     pairs: &'a mut [[I; 2]],
-    /// Number of visible edges.
+    /// Number of visible edges, which are at the front of `pairs`.
     shown: usize,
-    /// Number of hidden edges that are kept.
+    /// Number of hidden edges, which are at the back of `pairs`.
     hidden: usize,
-    /// Whether hidden edges are kept at all.
+    /// What becomes of hidden edges; they are kept only if they are drawn.
     wanted: HiddenLines,
 }
 

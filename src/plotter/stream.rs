@@ -16,7 +16,7 @@ use crate::protocol::{AlarmEntry, CommandError, GCode, RealTime};
 use crate::step::{Arc, Chords, Line};
 use core::fmt;
 
-/// The task of a line that is being carried out.
+/// What is left to do for the line that is being carried out, which takes longer than others.
 #[derive(Debug)]
 pub(super) enum Task {
     /// The rest of an arc, from the point reached so far.
@@ -42,11 +42,14 @@ pub(super) enum Task {
     List(Listing, usize),
 }
 
-/// A list of many rows.
+/// A list of many rows, of which one is written at a time.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Listing {
+    /// The commands, as `$` lists them.
     Help,
+    /// The settings of the machine, as `$$` lists them.
     Settings,
+    /// The options of the plot, as `$options` lists them.
     Options,
     /// Elements of the model of one kind, up to this index, which is excluded.
     Model(ElementKind, usize),
@@ -55,11 +58,11 @@ pub(super) enum Listing {
 /// The first line of the list of commands, which is Grbl's.
 const GRBL_HELP: &str = "[HLP:$$ $# $G $I $N $x=val $Nx=line $J=line $SLP $C $X $H ~ ! ? ctrl-x]";
 
-/// The result of [`Inner::proceed`].
+/// How far the task has come, as [`Inner::proceed`] returns it.
 pub(super) enum Progress {
-    /// The line is done.
+    /// The task is done, and the line can be answered with this outcome.
     Done(Result<(), CommandError>),
-    /// A part of the task was done; call again.
+    /// A part of the task is done. Call again.
     More,
     /// The task waits for the machine or for room in the output.
     Waits,
@@ -67,7 +70,7 @@ pub(super) enum Progress {
 
 impl<I: Index> Inner<'_, I> {
     /// Carries out real-time requests, except status and abort.
-    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    #[inline(never)] // Inlined, its frame would take stack while a job is computed.
     pub(super) fn act(&mut self, requests: RealTime) {
         if requests == RealTime::default() {
             return;
@@ -115,7 +118,7 @@ impl<I: Index> Inner<'_, I> {
 
     /// Reads the contacts. Reports an alarm once, and lets the board carry it out at once. Asks for
     /// the next pen, once, when the machine has stopped and waits for it.
-    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    #[inline(never)] // Inlined, its frame would take stack while a job is computed.
     pub(super) fn watch<B: Board>(&mut self, board: &mut B) {
         self.machine.observe(board.contacts());
         let alarm = match self.machine.state() {
@@ -139,7 +142,7 @@ impl<I: Index> Inner<'_, I> {
     }
 
     /// Continues the task of the line that is being carried out.
-    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    #[inline(never)] // Inlined, its frame would take stack while a job is computed.
     pub(super) fn proceed<B: Board>(&mut self, board: &mut B) -> Progress {
         if let Some(Task::List(listing, number)) = &mut self.task {
             // Writing a row takes up to 10 ms. It waits for room in the output rather than block,
@@ -173,7 +176,7 @@ impl<I: Index> Inner<'_, I> {
         match &mut self.task {
             Some(Task::Arc(from, arc)) if machine.has_room() => {
                 // The chord iterator is made anew for each chord. Keeping it, with the points that
-                // it reads ahead, would cost stack that the stages need.
+                // it reads ahead, would take stack that the computation of a job needs.
                 let Some(to) = Chords::new(*from, arc.clone()).next() else {
                     return Ok(Progress::Done(Ok(())));
                 };
@@ -251,7 +254,7 @@ impl<I: Index> Inner<'_, I> {
     ///
     /// # Errors
     /// [`CommandError::HomingOff`] if homing is switched off, or the machine's refusal.
-    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    #[inline(never)] // Inlined, its frame would take stack while a job is computed.
     pub(super) fn home(&mut self) -> Result<(), CommandError> {
         self.check_idle()?;
         if !self.machine.settings().is_on(Setting::Homing) {
@@ -275,7 +278,7 @@ impl<I: Index> Inner<'_, I> {
     /// [`CommandError::Locked`] in alarm or sleep, [`CommandError::Jogging`] while a jog is in
     /// progress, or the interpreter's or the machine's refusal. The program's modes are then
     /// unchanged.
-    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    #[inline(never)] // Inlined, its frame would take stack while a job is computed.
     pub(super) fn run_gcode<B: Board>(
         &mut self,
         line: GCode<'_>,
@@ -340,7 +343,7 @@ impl<I: Index> Inner<'_, I> {
     }
 
     /// Carries out a jog. The line stands alone: the modes that it sets do not affect later lines.
-    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    #[inline(never)] // Inlined, its frame would take stack while a job is computed.
     pub(super) fn jog(&mut self, line: GCode<'_>) -> Result<(), CommandError> {
         if !matches!(self.machine.state(), State::Idle | State::Jog) {
             return Err(CommandError::Busy);

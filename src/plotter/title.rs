@@ -13,7 +13,7 @@ const LINES_BETWEEN_CHECKS: usize = 64;
 
 /// Refuses a title that is too wide for the page. Its width does not depend on the drawing, so this
 /// is checked before the computation begins.
-#[inline(never)] // Keeps its frame off the stack while the stages run.
+#[inline(never)] // Inlined, its frame would take stack while a job is computed.
 pub(super) fn check(options: &PlotOptions, steps: StepsPerMillimetre) -> Result<(), CommandError> {
     let Some(title) = options.title() else { return Ok(()) };
     options.page.place_title(&title, [0; 3], steps).map(|_| ()).map_err(CommandError::Page)
@@ -25,7 +25,7 @@ pub(super) fn check(options: &PlotOptions, steps: StepsPerMillimetre) -> Result<
 ///
 /// # Errors
 /// [`CommandError::Page`], [`CommandError::DrawingTooLarge`], [`CommandError::Aborted`].
-#[inline(never)] // Keeps its frame off the stack while the stages run.
+#[inline(never)] // Inlined, its frame would take stack while a job is computed.
 pub(super) fn write<I: Index>(
     pipeline: &mut Pipeline<'_, I>,
     count: usize,
@@ -33,7 +33,7 @@ pub(super) fn write<I: Index>(
     let Pipeline { options, steps, words, cancel, .. } = pipeline;
     let steps = *steps;
     let Some(title) = options.title() else { return Ok(count) };
-    // The left, right and bottom edges of the drawing.
+    // These are the left, right and bottom edges of the drawing.
     let mut around: Option<[i32; 3]> = None;
     for lines in items::<PackedLine>(words, count).unwrap_or(&[]).chunks(LINES_BETWEEN_CHECKS) {
         cancel.check()?;

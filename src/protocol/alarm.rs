@@ -20,7 +20,8 @@ pub struct AlarmEntry {
 }
 
 impl AlarmEntry {
-    /// The table of alarms.
+    /// Returns what the reply and the documentation say about an alarm: its number, its cause and
+    /// what the user can do.
     pub const fn of(alarm: Alarm) -> Self {
         match alarm {
             Alarm::HardLimit => Self::new(

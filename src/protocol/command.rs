@@ -7,7 +7,7 @@ use crate::curve::CurveError;
 use crate::fixed::Decimal;
 use crate::model::{self, Edit, ElementKind, ModelError, PenName};
 
-/// A command: what a line asks for.
+/// What a line asks the plotter to do, with its values already parsed.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Command<'a> {
     /// An empty line, a comment, or a keyword of OBJ that changes nothing here.
@@ -33,7 +33,8 @@ pub enum Command<'a> {
     EndCurve,
     /// `usemtl NAME` or `g NAME …`: chooses the pen of what follows.
     Pen {
-        /// Whether the keyword is `usemtl`.
+        /// Whether the keyword is `usemtl`, and not `g`. Once there is a `usemtl`, pens are chosen
+        /// by it alone.
         by_material: bool,
         /// The pen or name that follows the keyword. A number may be greater than that of the last
         /// pen.
@@ -177,7 +178,7 @@ impl<'a> Command<'a> {
     /// assert_eq!(Command::parse("$plot"), Ok(Command::Plot));
     /// assert!(Command::parse("v 1 2").is_err());
     /// ```
-    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    #[inline(never)] // Inlined, its frame would take stack while a job is computed.
     pub fn parse(line: &'a str) -> Result<Self, CommandError> {
         if let Some(value) = title(line) {
             return Ok(Self::Assign { name: "title", value });
@@ -216,7 +217,7 @@ impl<'a> Command<'a> {
     }
 
     /// Parses the text after `$`.
-    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    #[inline(never)] // Inlined, its frame would take stack while a job is computed.
     fn parse_dollar(text: &'a str) -> Result<Self, CommandError> {
         if let Some(command) = Self::parse_grbl(text) {
             return command;
@@ -302,7 +303,7 @@ impl<'a> Command<'a> {
 
 /// The text of a `$title=` line, unchanged, with its spaces and any other characters. `None` for
 /// other lines.
-#[inline(never)] // Keeps its frame off the stack while the stages run.
+#[inline(never)] // Inlined, its frame would take stack while a job is computed.
 fn title(line: &str) -> Option<&str> {
     let (name, text) = trim_start(line).strip_prefix('$')?.split_once('=')?;
     (trim(name) == "title").then_some(text)
@@ -310,7 +311,7 @@ fn title(line: &str) -> Option<&str> {
 
 /// The pen that one of the words gives by number, as in `pen3` or `3`. If there is none, the whole
 /// text counts as a name, represented by its hash. An empty text means the first pen.
-#[inline(never)] // Keeps its frame off the stack while the stages run.
+#[inline(never)] // Inlined, its frame would take stack while a job is computed.
 fn pen_name(text: &str) -> PenName {
     let mut words = text.split_ascii_whitespace();
     let numbered = words.find_map(|word| {

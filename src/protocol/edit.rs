@@ -8,12 +8,12 @@ use crate::model::{self, Edit, ElementKind};
 struct Values<'a> {
     /// The text not yet read; `None` after the last value.
     rest: Option<&'a str>,
-    /// The number of values that an error reports as needed.
+    /// How many values the edit needs, which the error for too few of them tells.
     needed: usize,
 }
 
 impl<'a> Values<'a> {
-    /// The text of the next value.
+    /// Returns the text of the next value.
     fn text(&mut self) -> Result<&'a str, CommandError> {
         let rest = self.rest.ok_or(CommandError::WrongNumberCount { needed: self.needed })?;
         let (value, rest) = match rest.split_once(',') {
@@ -24,7 +24,7 @@ impl<'a> Values<'a> {
         Ok(trim(value))
     }
 
-    /// The next three values, each parsed by `read`.
+    /// Returns the next three values, each parsed by `read`.
     fn three<T: Copy + Default>(
         &mut self,
         read: impl Fn(&str) -> Result<T, CommandError>,
@@ -36,7 +36,7 @@ impl<'a> Values<'a> {
         Ok(values)
     }
 
-    /// The next value as a kind of element.
+    /// Returns the next value as the kind of element that its letter means.
     fn part(&mut self) -> Result<ElementKind, CommandError> {
         Ok(match choice(self.text()?, &["v", "l", "f", "c"])? {
             0 => ElementKind::Vertices,
@@ -53,14 +53,15 @@ impl<'a> Values<'a> {
         Ok([first, last])
     }
 
-    /// Like [`Values::numbers`]; without values, `None`, which means all.
+    /// Reads a range of numbers as [`Values::numbers`] does, or `None`, which means all, if no
+    /// value follows.
     fn numbers_or_all(&mut self) -> Result<model::Numbers, CommandError> {
         if self.rest.is_some() { self.numbers().map(Some) } else { Ok(None) }
     }
 }
 
 /// Parses the edit with this name. `None` if no edit has this name.
-#[inline(never)] // Keeps its frame off the stack while the stages run.
+#[inline(never)] // Inlined, its frame would take stack while a job is computed.
 pub(super) fn parse_edit<'a>(name: &str, value: &str) -> Result<Option<Command<'a>>, CommandError> {
     let mut values = Values { rest: Some(value), needed: 3 };
     let edit = match name {

@@ -12,6 +12,7 @@ use core::str::Chars;
 /// The escaped text of a title. Every escape in it is valid, and the font has every letter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct EscapedText<'a> {
+    /// The text as it was sent, with its escapes.
     text: &'a str,
 }
 
@@ -21,7 +22,7 @@ impl<'a> EscapedText<'a> {
     /// # Errors
     /// [`CommandError::NotAnEscape`] if a backslash does not begin an escape,
     /// [`CommandError::NotInTheFont`] if the font lacks a letter.
-    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    #[inline(never)] // Inlined, its frame would take stack while a job is computed.
     pub fn new(text: &'a str) -> Result<Self, CommandError> {
         let mut rest = text.chars();
         while let Some(letter) = next(&mut rest) {
@@ -33,7 +34,7 @@ impl<'a> EscapedText<'a> {
         Ok(Self { text })
     }
 
-    /// The letters that the text represents.
+    /// Returns the letters that the text stands for, its escapes replaced.
     pub fn letters(&self) -> impl Iterator<Item = char> + use<'a> {
         let mut rest = self.text.chars();
         core::iter::from_fn(move || next(&mut rest)?)
@@ -49,7 +50,7 @@ fn next(rest: &mut Chars<'_>) -> Option<Option<char>> {
     Some(escaped(rest).and_then(char::from_u32))
 }
 
-/// The Unicode number that the escape after a backslash gives.
+/// Returns the Unicode number that the escape after a backslash gives.
 fn escaped(rest: &mut Chars<'_>) -> Option<u32> {
     let (digits, after) = match rest.next()? {
         '\\' => return Some('\\'.into()),

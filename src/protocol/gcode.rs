@@ -19,6 +19,7 @@ pub struct Word {
 /// a semicolon are skipped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct GCode<'a> {
+    /// The line as it was sent, without what follows a semicolon.
     text: &'a str,
 }
 
@@ -84,7 +85,7 @@ impl<'a> GCode<'a> {
         self.text
     }
 
-    /// The words in order.
+    /// Returns the words in the order in which they were sent.
     pub fn words(self) -> impl Iterator<Item = Word> + use<'a> {
         let mut rest = Significant(self.text.bytes());
         core::iter::from_fn(move || next_word(&mut rest)?.ok())

@@ -14,6 +14,7 @@ pub const LINE_LIMIT: usize = 256;
 /// Assembles bytes into lines of at most [`LINE_LIMIT`] bytes besides a number and a checksum.
 #[derive(Debug, Default)]
 pub struct LineReader {
+    /// The bytes of the line so far, with its number and its checksum.
     bytes: heapless::Vec<u8, { LINE_LIMIT + NUMBER_LIMIT }>,
     /// Whether the line does not fit.
     too_long: bool,
@@ -28,7 +29,7 @@ pub struct LineReader {
 }
 
 impl LineReader {
-    /// A reader before the first byte.
+    /// Makes a reader that has not seen any byte yet.
     pub const fn new() -> Self {
         let bytes = heapless::Vec::new();
         let (too_long, damaged, is_cut) = (false, false, false);

@@ -37,7 +37,7 @@ pub struct Label {
     pub named: Named,
 }
 
-/// A number in a reply.
+/// Which line number a reply names, and what it means there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Named {
     /// No number, because the line had none.
@@ -54,9 +54,9 @@ pub enum Named {
 /// What to do with a received line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Received<'a> {
-    /// Carry it out.
+    /// Carry the line out, and reply with this label.
     Line(&'a str, Label),
-    /// Only answer it.
+    /// Do not carry it out, but reply with this outcome and this label.
     Answer(Result<(), CommandError>, Label),
 }
 
@@ -77,9 +77,9 @@ pub enum Received<'a> {
 pub struct Numbering {
     /// The number of the last line that was accepted.
     last: i32,
-    /// Whether a number has been received or set.
+    /// Whether any line has had a number so far, or one was set by `M110`.
     has_begun: bool,
-    /// The checksum that a line must have, if any.
+    /// The checksum that every line must have from now on, if any.
     required: Option<Checksum>,
     /// The number of the first line that was accepted and then refused since the number was last
     /// set, with its error.
@@ -88,7 +88,7 @@ pub struct Numbering {
 
 impl Numbering {
     /// Checks a line as the reader has returned it.
-    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    #[inline(never)] // Inlined, its frame would take stack while a job is computed.
     pub fn receive<'a>(&mut self, line: Result<&'a str, CommandError>) -> Received<'a> {
         let line = match line {
             Ok(line) => line,
@@ -110,7 +110,7 @@ impl Numbering {
         }
     }
 
-    /// Handles a line with a checksum.
+    /// Decides what to do with a line that has a checksum.
     fn receive_checked<'a>(&mut self, line: Checked<'a>) -> Received<'a> {
         let Checked { checksum, text, .. } = line;
         let sets_number = number_to_set(text);
@@ -164,7 +164,7 @@ impl Numbering {
         Received::Answer(again, label(number))
     }
 
-    /// Handles a line without a checksum.
+    /// Decides what to do with a line that has no checksum.
     fn receive_unchecked<'a>(&mut self, line: &'a str) -> Received<'a> {
         let may_be_damaged = match self.required {
             None => false,
@@ -217,10 +217,13 @@ impl Numbering {
 
 /// A line with a checksum: a numbered line, or `M110`.
 struct Checked<'a> {
+    /// The kind of checksum that the line has.
     checksum: Checksum,
     /// Whether the checksum matches.
     is_whole: bool,
+    /// The number of the line; `None` for `M110` without a number before it.
     number: Option<i32>,
+    /// The line without its number and its checksum.
     text: &'a str,
 }
 

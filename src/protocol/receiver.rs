@@ -28,9 +28,11 @@ const BYTES_WERE_LOST: u32 = 1 << 11;
 
 /// The part of a serial port that its receive interrupt uses.
 pub struct Receiver<'q> {
+    /// Where ordinary bytes wait for the main loop.
     queue: Producer<'q, u8>,
+    /// Tells the bytes that act at once from those of lines.
     sorter: Sorter,
-    /// Bytes put into the queue since the start, modulo 2^32.
+    /// The number of bytes put into the queue since the start, modulo 2^32.
     count: u32,
     /// Whether an undamaged byte has come since the start.
     has_heard: bool,
@@ -41,9 +43,11 @@ pub struct Receiver<'q> {
 /// Whether bytes are missing after the last byte in the queue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Damage {
+    /// No bytes are missing there.
     None,
     /// They are, but the queue has had no room for the mark yet.
     Unmarked,
+    /// They are, and the mark that says so is in the queue.
     Marked,
 }
 
@@ -62,8 +66,8 @@ impl<'q> Receiver<'q> {
         Self { queue, sorter, count: 0, has_heard: false, damage: Damage::None }
     }
 
-    /// Handles the content of a PL011's data register: the byte and its error bits. Returns the
-    /// real-time request that the byte makes, if any.
+    /// Takes what a PL011's data register holds: a byte and its error bits. Returns the real-time
+    /// request that the byte makes, if any.
     pub fn receive_from_uart(&mut self, data: u32) -> RealTime {
         if data & BYTES_WERE_LOST != 0 {
             self.lose();
@@ -75,8 +79,8 @@ impl<'q> Receiver<'q> {
         self.receive((data & 0xFF) as u8)
     }
 
-    /// Handles a byte. Returns the real-time request that it makes, if any. If the queue is full,
-    /// an ordinary byte is lost, and its place will be marked.
+    /// Takes a byte and queues it if it is an ordinary one. Returns the real-time request that it
+    /// makes, if any. If the queue is full, an ordinary byte is lost, and its place will be marked.
     pub fn receive(&mut self, byte: u8) -> RealTime {
         match self.sort_out(byte) {
             Err(requests) => requests,

@@ -4,7 +4,7 @@ use super::CommandError;
 use crate::fixed::{Decimal, Millimetres};
 use crate::model::PEN_LIMIT;
 
-/// The number of pens.
+/// The number of pens, as a number of the kind that is parsed.
 pub(crate) const PENS: i32 = PEN_LIMIT as i32;
 
 /// Whether `letter` is white space of ASCII.
@@ -26,25 +26,25 @@ pub(super) fn trim_start(text: &str) -> &str {
     text.trim_start_matches(is_space)
 }
 
-/// The index of `text` among `words`.
+/// Returns the index of `text` among `words`, or the error that lists them.
 #[inline(never)] // Its callers share one copy of the code.
 pub(crate) fn choice(text: &str, words: &'static [&'static str]) -> Result<usize, CommandError> {
     let index = words.iter().position(|word| *word == text);
     index.ok_or(CommandError::NotAChoice { choices: words })
 }
 
-/// Parses a decimal number, exactly.
+/// Parses a decimal number without rounding it.
 pub(crate) fn number(text: &str) -> Result<Decimal, CommandError> {
     Decimal::parse(trim(text)).map_err(|_| CommandError::NotANumber)
 }
 
-/// Parses a length of any sign.
+/// Parses a length in mm, which may be negative.
 #[inline(never)] // Its callers share one copy of the code.
 pub(crate) fn length(text: &str) -> Result<Millimetres, CommandError> {
     number(text)?.to_millimetres().map_err(|_| CommandError::NumberOutOfRange)
 }
 
-/// Parses a positive length.
+/// Parses a length in mm, which must be above 0.
 #[inline(never)] // Its callers share one copy of the code.
 pub(crate) fn positive(text: &str) -> Result<Millimetres, CommandError> {
     let length = length(text)?;
@@ -101,9 +101,10 @@ pub(crate) fn whole(text: &str) -> Result<i32, CommandError> {
     number(text)?.to_whole().map_err(|_| CommandError::NumberOutOfRange)
 }
 
-/// Decimal numbers with spaces between them.
+/// A list of decimal numbers, checked and still as text, with spaces between them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Decimals<'a> {
+    /// The words as they were sent. Each of them is a number.
     text: &'a str,
 }
 
@@ -116,7 +117,7 @@ impl<'a> Decimals<'a> {
         Ok(Self { text })
     }
 
-    /// The numbers in order.
+    /// Returns the numbers in the order in which they were sent.
     pub fn iter(&self) -> impl Iterator<Item = Decimal> + Clone + use<'a> {
         self.text.split_ascii_whitespace().filter_map(|word| number(word).ok())
     }
@@ -125,6 +126,7 @@ impl<'a> Decimals<'a> {
 /// The vertex numbers of a face, polyline or curve: `7`, `-1`, `7/2`, `7//3` or `7/2/3`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Numbers<'a> {
+    /// The words as they were sent. Each of them is a vertex number.
     text: &'a str,
 }
 
@@ -137,7 +139,7 @@ impl<'a> Numbers<'a> {
         Ok(Self { text })
     }
 
-    /// The numbers in order.
+    /// Returns the numbers in the order in which they were sent.
     pub fn iter(&self) -> impl Iterator<Item = i32> + Clone + use<'a> {
         self.text.split_ascii_whitespace().filter_map(vertex_number)
     }

@@ -15,7 +15,7 @@ pub enum Turn {
     Counterclockwise,
 }
 
-/// Why an arc was refused.
+/// The reasons why there is no such arc.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ArcError {
@@ -52,7 +52,7 @@ pub struct Arc {
     /// The lengths of a step of x and of y as relative weights, so that the arc is part of a
     /// circle.
     weights: [u16; 2],
-    /// Four times the squared radius, in weighted units.
+    /// Four times the squared radius. Steps are multiplied by their weights first.
     radius: u64,
     /// Half the length of the right and left sides, and half that of the other two: how far each
     /// extends both ways from its middle, in steps.
@@ -63,7 +63,7 @@ pub struct Arc {
     position: i32,
     /// The direction: 1 counterclockwise, -1 clockwise.
     step: i8,
-    /// The number of points still to come.
+    /// The number of points that are still to come.
     remaining: u32,
 }
 
@@ -81,8 +81,9 @@ impl Arc {
         Self::weighted([1; 2], center, from, to, turn)
     }
 
-    /// The same arc for different numbers of steps per millimetre in x and y. It is a circle on the
-    /// page, except that an arc of r steps width is off by up to r²/2^31 steps.
+    /// The arc around `center` from `from` to `to` where x and y have different numbers of steps
+    /// per millimetre. It is a circle on the page, except that an arc of r steps width is off by up
+    /// to r²/2^31 steps.
     ///
     /// ```
     /// use penup::drawing::PagePoint;
@@ -113,6 +114,7 @@ impl Arc {
         Self::weighted(weights, center, from, to, turn)
     }
 
+    /// Makes the arc for a step of x and a step of y of these relative lengths, each at least 1.
     fn weighted(
         weights: [u16; 2],
         center: PagePoint,
@@ -234,7 +236,7 @@ impl Arc {
         half_turn * (side / 2) as i32 + self.moves_of(0) * (side % 2) as i32
     }
 
-    /// The position on the circle nearest to `point`.
+    /// Returns the position on the circle that is nearest to `point`.
     fn position_of(&self, point: PagePoint) -> i32 {
         let (x, y) = (point.x - self.center.x, point.y - self.center.y);
         let [weighted_x, weighted_y] = [(x, self.weights[0]), (y, self.weights[1])]
@@ -250,7 +252,7 @@ impl Arc {
         self.begin_of(side) + along.clamp(-half, half) + half
     }
 
-    /// The point at a position on the circle.
+    /// Returns the point at a position on the circle.
     fn point_at(&self, position: i32) -> PagePoint {
         let [mut position, half_turn] = [position, self.moves_of(0) + self.moves_of(1)];
         position = position.rem_euclid(2 * half_turn);

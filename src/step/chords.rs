@@ -3,7 +3,7 @@
 use super::{Direction, Line};
 use crate::drawing::PagePoint;
 
-/// The greatest number of moves of one chord.
+/// The greatest number of single moves that one line stands for.
 const CHORD_MOVES: usize = 64;
 
 /// Joins points into lines. It yields the ends of long consecutive lines whose moves lead through
@@ -28,7 +28,7 @@ pub struct Chords<I> {
     from: PagePoint,
     /// The moves that were read ahead.
     moves: heapless::Deque<Direction, CHORD_MOVES>,
-    /// The point to which the moves read ahead lead.
+    /// The point at which the moves that were read ahead end.
     ahead: PagePoint,
     /// A point that was read but cannot be reached by a single move.
     beyond: Option<PagePoint>,

@@ -19,12 +19,12 @@ use crate::drawing::PagePoint;
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Line {
-    /// The direction of the straight moves.
+    /// The direction of the moves along one axis.
     straight: Direction,
-    /// The direction of the diagonal moves.
+    /// The direction of the moves along both axes at once.
     diagonal: Direction,
-    /// Harrison's B: if it is positive, the diagonal move is nearer to the line; if it is negative,
-    /// the straight move is.
+    /// Says which move comes next (Harrison's B): if it is positive, the diagonal move is nearer to
+    /// the line; if it is negative, the straight move is.
     balance: i32,
     /// The amount that a straight move adds to `balance`.
     straight_gain: i32,

@@ -36,21 +36,21 @@ use crate::drawing::PagePoint;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum Direction {
-    /// y + 1
+    /// Upwards: y + 1.
     Up = 1,
-    /// x + 1, y + 1
+    /// To the right and upwards: x + 1, y + 1.
     UpRight = 2,
-    /// x + 1
+    /// To the right: x + 1.
     Right = 3,
-    /// x + 1, y - 1
+    /// To the right and downwards: x + 1, y - 1.
     DownRight = 4,
-    /// y - 1
+    /// Downwards: y - 1.
     Down = 5,
-    /// x - 1, y - 1
+    /// To the left and downwards: x - 1, y - 1.
     DownLeft = 6,
-    /// x - 1
+    /// To the left: x - 1.
     Left = 7,
-    /// x - 1, y + 1
+    /// To the left and upwards: x - 1, y + 1.
     UpLeft = 8,
 }
 
@@ -84,14 +84,15 @@ impl Direction {
 
     /// The changes of x and y by the move, each -1, 0 or 1.
     pub const fn delta(self) -> (i32, i32) {
-        /// The changes, indexed by the number of the direction.
+        /// The changes of x and y by a move in each direction, indexed by the number of the
+        /// direction.
         const DELTAS: [(i8, i8); 9] =
             [(0, 0), (0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1)];
         let (dx, dy) = DELTAS[self as usize];
         (dx as i32, dy as i32)
     }
 
-    /// The opposite direction.
+    /// Returns the opposite direction.
     pub const fn reversed(self) -> Self {
         match self {
             Self::Up => Self::Down,
@@ -105,7 +106,7 @@ impl Direction {
         }
     }
 
-    /// The point to which the move leads from `point`.
+    /// Returns the point to which the move leads from `point`.
     pub const fn from_point(self, point: PagePoint) -> PagePoint {
         let (dx, dy) = self.delta();
         PagePoint { x: point.x + dx, y: point.y + dy }

@@ -19,10 +19,11 @@ use crate::drawing::{Dashes, LineType};
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Pattern {
-    /// The number of moves of the line.
+    /// The number of moves of which the line consists.
     moves: u32,
     /// How many times the dashes and gaps of the line type are repeated before the last dash.
     repeats: u32,
+    /// The line type, which says how dashes and gaps follow each other.
     line_type: LineType,
 }
 
@@ -41,12 +42,12 @@ impl Pattern {
         Self { moves, repeats: if repeats > most { most } else { repeats }, line_type }
     }
 
-    /// A line that is a single inked piece.
+    /// Makes the pattern of a solid line, which is a single inked piece.
     pub const fn full(moves: u32) -> Self {
         Self { moves, repeats: 0, line_type: LineType::Full }
     }
 
-    /// The number of dashes and gaps, which is odd.
+    /// Returns the number of dashes and gaps together, which is odd.
     pub const fn pieces(self) -> u32 {
         self.repeats * self.line_type.dashes().lengths.len() as u32 + 1
     }

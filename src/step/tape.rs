@@ -89,13 +89,13 @@ pub fn encode(instructions: impl IntoIterator<Item = Instruction>) -> impl Itera
     })
 }
 
-/// A code that is no instruction, because the tape is damaged.
+/// The error that a tape is damaged: one of its codes is no instruction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BadCode {
     /// The index of the row, from 0.
     pub row: u32,
-    /// The code, 12 to 15.
+    /// The code that means no instruction: from 12 to 15.
     pub code: u8,
 }
 
@@ -108,7 +108,7 @@ pub struct Decoder<I> {
     rows: I,
     /// The number of rows read so far; it wraps.
     row: u32,
-    /// The second code of the last row, if it is still to be used.
+    /// The second code of the row that was read last, if it has not been used yet.
     second: Option<u8>,
     /// Whether a stop or a bad code has ended the tape.
     ended: bool,

@@ -12,16 +12,16 @@ use crate::model::Model;
 /// A point or direction in model space. It is used only to set up the camera.
 pub type Direction = [f64; 3];
 
-/// The pose and the lens that the user chose.
+/// The view that the user chose: from where the model is seen, and by which projection.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Camera {
-    /// The position of the eye and the direction in which it looks.
+    /// From where and in which direction the eye looks.
     pub pose: Pose,
-    /// The kind of projection.
+    /// The kind of projection, as the lens of a real camera determines it.
     pub lens: Lens,
 }
 
-/// The position of the eye and the direction in which it looks.
+/// From where and in which direction the eye looks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Pose {
     /// The eye looks from one point towards another (Brown IV).
@@ -36,9 +36,9 @@ pub enum Pose {
     /// Harrison's viewpoint and rotation (2.3, equations 1 to 6). The model is turned by γ about z,
     /// β about y and α about x; after that the line of sight is z, and y is up.
     Turned {
-        /// The viewpoint, in model units.
+        /// The eye, in model units. The angles alone say in which direction it looks.
         eye: Direction,
-        /// The angles α, β and γ, in degrees.
+        /// The angles α, β and γ by which the model is turned about x, y and z, in degrees.
         angles: [f64; 3],
     },
 }
@@ -222,6 +222,7 @@ pub(super) struct Axes {
 }
 
 impl Axes {
+    /// Computes the axes from the point and the direction that the user chose, and the lens.
     pub fn new(camera: &Camera) -> Result<Self, ViewError> {
         let (eye, at, [right, up, forward]) = match camera.pose {
             Pose::Towards { eye, at, up } => (eye, at, towards(eye, at, up)?),
@@ -276,10 +277,12 @@ fn sideways(forward: Direction, up: Direction) -> Option<Direction> {
     if dot(right, right) < 1e-20 { None } else { normalized(right) }
 }
 
+/// Returns the scalar product of two vectors.
 pub(super) fn dot(a: Direction, b: Direction) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
+/// Returns the vector product a × b, which is at right angles to both vectors.
 fn cross(a: Direction, b: Direction) -> Direction {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }

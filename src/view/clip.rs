@@ -13,7 +13,7 @@ use crate::index::Index;
 use crate::model::{Corner, Element, Elements, Model, PenWriter};
 use crate::stage::{Cancel, OutOfScratch, Scratch, StageError, heap_sort_by_key};
 
-/// A model as the camera sees it.
+/// A model as the camera sees it: projected, and without what lies behind the eye.
 #[derive(Debug, Clone, Copy)]
 pub struct Seen<'a, I> {
     /// The vertices of the model, the ends of its flattened curves, and the points where edges are
@@ -23,7 +23,7 @@ pub struct Seen<'a, I> {
     pub elements: Elements<'a, I>,
     /// The number of faces of the model that were left out because they have no area.
     pub degenerate_faces: u32,
-    /// Whether any vertex was nearer than the near plane.
+    /// Whether anything of the model was cut off.
     pub is_cut: bool,
 }
 
@@ -34,7 +34,7 @@ pub struct Seen<'a, I> {
 /// # Errors
 /// [`StageError::Scratch`] if the vertices or the cut faces do not fit in the memory, and the error
 /// of `cancel` if the user cancels.
-// Not inlined, so that its stack frame is released before the stages run.
+// Not inlined, so that its variables take no stack while the rest of a job is computed.
 #[inline(never)]
 pub fn project_scene<'a, I: Index>(
     view: &View,
@@ -197,7 +197,7 @@ fn edges<I: Index>(element: Element<'_, I>) -> impl Iterator<Item = Edge<I>> + C
     face.iter().zip(nexts).map(|(a, b)| Edge(a.vertex(), b.vertex())).chain(bar)
 }
 
-/// Keeps each of the sorted numbers once.
+/// Moves each different number of a sorted list to the front, and returns these.
 fn without_repeats<T: Copy + PartialEq>(sorted: &mut [T]) -> &[T] {
     let mut kept = 0;
     for at in 0..sorted.len() {

@@ -11,7 +11,7 @@ use crate::index::Index;
 use crate::model::{Corner, Elements, Model, PenWriter};
 use crate::stage::{Cancel, OutOfScratch, Scratch, StageError};
 
-/// The flattening of curves into as few straight lines as stay within a tolerance on the page.
+/// Flattens curves into as few straight lines as stay within a tolerance on the page.
 #[derive(Clone, Copy)]
 pub struct Flattening<'f> {
     /// Maps the image point (x/w, y/w) to the page, in fine units, usually 1/256 step.
@@ -68,8 +68,8 @@ impl Flattening<'_> {
         })
     }
 
-    /// Returns the vertices of the model together with the ends of the chords of its curves, and
-    /// `elements` together with a bar for each chord.
+    /// Makes straight bars of the curves of a model. Returns the vertices of the model together
+    /// with the ends of these chords, and `elements` together with a bar for each chord.
     pub(super) fn add<'a, I: Index>(
         &self,
         view: &View,

@@ -52,27 +52,32 @@ pub enum ViewError {
 /// A camera applied to one model: the map from positions to view coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct View {
-    /// The rows of the map, for x, y and z.
+    /// The three rows of the map, which give x, y and z in view coordinates.
     rows: [Row; 3],
+    /// Whether the view is perspective or parallel.
     projection: Projection,
-    /// See [`Self::image_unit`].
+    /// What [`Self::image_unit`] returns: it converts image coordinates to lengths, for reports.
     image_unit: f64,
-    /// See [`Self::depth_stretch`].
+    /// What [`Self::depth_stretch`] returns: how much deeper the view is than the model.
     depth_stretch: (u32, u32),
-    /// See [`Self::near`].
+    /// What [`Self::near`] returns: the least depth that is drawn.
     near: Option<i32>,
 }
 
 /// One row of the map. Its result is (m · position + offset) >> shift, rounded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Row {
+    /// The factors by which x, y and z of the position are multiplied, each within ±2^30.
     m: [i32; 3],
+    /// The number that is added to the sum of the three products, in the unit of the sum.
     offset: i64,
+    /// The number of bits by which the sum is shifted right, at least 1.
     shift: u32,
 }
 
 impl Row {
-    /// Returns one view coordinate of a position.
+    /// Applies the row to a position of the model. Returns the x, the y or the z of the view,
+    /// whichever the row is for.
     fn apply(&self, position: Position) -> i32 {
         // Both |m| and |position| are at most 2^30, so each product is at most 2^60; `Row::new`
         // keeps the sum below 2^62.
@@ -124,7 +129,7 @@ impl View {
     ///
     /// # Errors
     /// See [`ViewError`].
-    // Not inlined, so that its stack frame is released before the stages run.
+    // Not inlined, so that its variables take no stack while the rest of a job is computed.
     #[inline(never)]
     pub fn new<I: Index>(camera: &Camera, model: &Model<'_, I>) -> Result<Self, ViewError> {
         let Axes { directions, origin } = Axes::new(camera)?;
@@ -171,7 +176,7 @@ impl View {
         Ok(Self { rows, projection, image_unit, depth_stretch, near })
     }
 
-    /// Transforms a position to view coordinates.
+    /// Returns the view coordinates of a position of the model.
     pub fn vertex(&self, position: Position) -> Vertex {
         let [x, y, z] = self.rows.each_ref().map_each(|row| row.apply(position));
         Vertex { x, y, z }

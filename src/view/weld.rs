@@ -73,6 +73,7 @@ fn has_extent<I: Index>(element: &Element<'_, I>, positions: &[Position]) -> boo
 
 /// A hash table of the positions that have a vertex, with open addressing.
 struct PositionTable<'a, I> {
+    /// The position of each vertex of the model.
     positions: &'a [Position],
     /// Vertex numbers counted from 1; 0 marks a free slot. The length is a power of two and at
     /// least twice the number of vertices.

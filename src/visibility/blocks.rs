@@ -4,7 +4,8 @@
 //! What counts is what is visible on both sides of an edge. If the nearest face that begins at the
 //! edge on its left and the nearest one on its right lie in one plane, the edge is not drawn there.
 //! So the line where a wall stands on a floor is kept, although the underside of the wall and the
-//! floor lie in one plane. The ranks of these two faces are recorded on the profile of the edge.
+//! floor lie in one plane. The ranks of these two faces (their positions in the order of depth,
+//! nearest first) are recorded on the profile of the edge.
 //!
 //! The blocks touch in the model, but in the view each corner was rounded separately. Therefore the
 //! tests "in one plane" and "on one line" use the positions of the model.
@@ -17,11 +18,13 @@ use super::scene_index::SceneIndex;
 use crate::array::MapEach;
 use crate::index::Index;
 
-/// One of the two sides of an edge, and the bits of the profile's marks that hold the nearest face
-/// that begins there. They hold the rank plus one; zero means none.
+/// One of the two sides of an edge, and the bits of the profile's marks that hold the rank of the
+/// nearest face that begins there. They hold the rank plus one; zero means none.
 #[derive(Clone, Copy)]
 struct Bank {
+    /// The position of the lowest of the 16 bits that hold the rank.
     shift: u32,
+    /// Whether this is the side to the left of the edge, as seen on the page from its start.
     is_left: bool,
 }
 
@@ -33,20 +36,21 @@ const LEFT: Bank = Bank { shift: 4, is_left: true };
 const RIGHT: Bank = Bank { shift: LEFT.shift + RANK_BITS, is_left: false };
 
 impl Bank {
-    /// Returns the rank that `marks` hold in this bank; `None` if they hold none.
+    /// Returns the rank (the number of the face in the order of depth) that `marks` hold for this
+    /// side; `None` if they hold none.
     fn get(self, marks: u64) -> Option<usize> {
         ((marks >> self.shift) as usize & RANKS).checked_sub(1)
     }
 
-    /// Returns the marks with `rank` in this bank.
+    /// Returns `marks` with `rank` stored for this side, in place of what they held.
     fn put(self, marks: u64, rank: usize) -> u64 {
         marks & !((RANKS as u64) << self.shift) | (rank as u64 + 1) << self.shift
     }
 }
 
-/// A triangle whose plane contains an edge.
+/// A triangle that touches an edge: its plane contains the edge.
 struct Touching<I> {
-    /// The numbers of the vertices.
+    /// The numbers of the vertices at its corners.
     corners: [I; 3],
     /// The side of the edge's line on which each corner lies: 1 is left, -1 is right, 0 is on the
     /// line.
@@ -117,7 +121,8 @@ impl<I: Index> EdgeQuery<I> {
         left.corner(LEFT).is_some_and(|corner| right.height(coarse_projection, corner) == 0)
     }
 
-    /// Whether a triangle is nearer than the face with rank `than` on the given side of this edge.
+    /// Whether a triangle is nearer to the eye than the face with rank `than`, on the given side of
+    /// this edge.
     fn is_nearer(
         &self,
         around: &SceneIndex<'_, I>,
@@ -146,6 +151,8 @@ impl<I: Index> EdgeQuery<I> {
             .find(|touching| touching.corner(bank).is_some())
     }
 
+    /// Returns how a triangle lies beside this edge, or `None` if its plane does not contain the
+    /// edge or the eye sees it edge-on.
     fn touching(
         &self,
         coarse_projection: &CoarseProjection<'_>,

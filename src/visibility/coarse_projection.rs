@@ -32,9 +32,9 @@ pub struct CoarsePoint {
 }
 
 impl CoarsePoint {
-    /// The point with the least coordinates.
+    /// The point with the least coordinates, to begin a search for the greatest.
     pub const LOWEST: Self = Self { x: 0, y: 0 };
-    /// The point with the greatest coordinates.
+    /// The point with the greatest coordinates, to begin a search for the least.
     pub const HIGHEST: Self = Self { x: u16::MAX, y: u16::MAX };
 
     /// Returns the lower left corner of the rectangle around both points.
@@ -57,18 +57,24 @@ impl CoarsePoint {
     }
 }
 
-/// The line through two points of the coarse grid.
+/// The line through two points of the coarse grid, which tells left from right with 32-bit numbers.
 #[derive(Debug, Clone, Copy)]
 pub struct CoarseLine {
+    /// The x of the first point, in units of the coarse grid.
     x: i32,
+    /// The y of the first point, in units of the coarse grid.
     y: i32,
+    /// How far the second point lies to the right of the first; negative if it lies to the left.
     along_x: i32,
+    /// How far the second point lies above the first; negative if it lies below.
     along_y: i32,
-    /// The part of the error bound of a determinant that depends on the line alone.
+    /// How large the determinant in [`Self::side`] must at least be, whatever its sign, so that the
+    /// sign is certain, as far as this depends on the line alone.
     error_bound: i32,
 }
 
 impl CoarseLine {
+    /// Makes the line from `a` to `b`, for which "left" and "right" are meant in this direction.
     #[inline]
     pub fn new(a: CoarsePoint, b: CoarsePoint) -> Self {
         let (x, y) = (i32::from(a.x), i32::from(a.y));
@@ -96,17 +102,23 @@ pub fn coarse_side(a: CoarsePoint, b: CoarsePoint, c: CoarsePoint) -> i32 {
     CoarseLine::new(a, b).side(c)
 }
 
-/// The line through two vertices of a [`CoarseProjection`].
+/// The line through two vertices. It is asked on the coarse grid first, and exactly if that does
+/// not decide.
 #[derive(Debug, Clone, Copy)]
 pub struct VertexLine<'o, I> {
+    /// The vertices, which are needed where the coarse grid cannot decide.
     coarse_projection: &'o CoarseProjection<'o>,
+    /// The number of the vertex at which the line begins.
     a: I,
+    /// The number of the vertex to which the line leads.
     b: I,
+    /// The line on the coarse grid, where it is asked first.
     coarse: CoarseLine,
 }
 
 impl<I: Index> VertexLine<'_, I> {
-    /// Returns the sign of [`page_side`] for an end of an edge.
+    /// Returns on which side of the line an end of an edge lies on the page: 1 left, -1 right, 0 on
+    /// the line.
     #[inline]
     pub fn side(&self, end: End<I>) -> i32 {
         let coarse = self.coarse.side(end.position);
@@ -123,12 +135,14 @@ impl<I: Index> VertexLine<'_, I> {
     }
 }
 
-/// The number of instructions that two 64-bit divisions take on a core without a divider.
+/// The number of instructions that two 64-bit divisions take on a core without a divider. They are
+/// counted as work while the vertices are projected.
 const TWO_DIVISIONS: usize = 1500;
 
-/// The map from the page to the coarse grid.
+/// How positions on the page become points of the coarse grid.
 #[derive(Debug, Clone, Copy)]
 struct Mapping {
+    /// Whether the view is perspective or parallel.
     projection: Projection,
     /// The least x and y of all vertices on the page, in units of 2^-20.
     low: (i64, i64),
@@ -137,6 +151,7 @@ struct Mapping {
 }
 
 impl Mapping {
+    /// Chooses the map so that all vertices fit the coarse grid and use as much of it as possible.
     fn new(
         projection: Projection,
         vertices: &[Vertex],
@@ -155,6 +170,8 @@ impl Mapping {
         Ok(Self { projection, low, shift: (shift_for(low.0, high.0), shift_for(low.1, high.1)) })
     }
 
+    /// Returns the point of the coarse grid for a vertex. A vertex outside the grid gets the
+    /// nearest point on its border.
     fn position(&self, vertex: Vertex) -> CoarsePoint {
         let (x, y) = fine(self.projection, vertex);
         let coarse = |fine: i64, low: i64, shift: u32| {
@@ -179,7 +196,7 @@ fn fine(projection: Projection, vertex: Vertex) -> (i64, i64) {
     }
 }
 
-/// An end of an edge that is being tested.
+/// One of the two ends of an edge that is tested against faces.
 #[derive(Debug, Clone, Copy)]
 pub struct End<I> {
     /// The number of the vertex at this end, or [`End::FREE`], which is the number of no vertex.
@@ -195,7 +212,7 @@ impl<I: Index> End<I> {
     pub const FREE: I = I::NONE;
 }
 
-/// The vertices in view coordinates and on the coarse grid.
+/// The vertices of a scene as the eye sees them, in view coordinates and on the coarse grid.
 #[derive(Debug, Clone, Copy)]
 pub struct CoarseProjection<'a> {
     /// Whether the view is perspective or parallel.
@@ -206,6 +223,7 @@ pub struct CoarseProjection<'a> {
     pub positions: &'a [CoarsePoint],
     /// The positions in the model, as far as they are known.
     pub unrounded: Unrounded<'a>,
+    /// The map from the page to the coarse grid, for points that are not vertices.
     mapping: Mapping,
 }
 
@@ -226,7 +244,7 @@ impl<'a> CoarseProjection<'a> {
         Ok(Self { projection, vertices, positions, unrounded: scene.unrounded, mapping })
     }
 
-    /// Returns a vertex as the end of an edge.
+    /// Returns a vertex as the end of an edge, with its position in both forms.
     pub fn end<I: Index>(&self, number: I) -> End<I> {
         End { number, vertex: self.vertex(number), position: self.position(number) }
     }
@@ -248,7 +266,7 @@ impl<'a> CoarseProjection<'a> {
         self.positions[number.get()]
     }
 
-    /// Returns the line through two vertices.
+    /// Returns the line from vertex `a` to vertex `b`.
     #[inline]
     pub fn line<I: Index>(&self, a: I, b: I) -> VertexLine<'_, I> {
         VertexLine {
@@ -259,7 +277,8 @@ impl<'a> CoarseProjection<'a> {
         }
     }
 
-    /// Returns the sign of [`page_side`] for three vertices.
+    /// Returns on which side of the line from vertex a to vertex b the vertex c lies on the page: 1
+    /// left, -1 right, 0 on the line.
     #[inline]
     pub fn side<I: Index>(&self, a: I, b: I, c: I) -> i32 {
         self.line(a, b).side(self.end(c))

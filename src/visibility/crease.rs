@@ -60,7 +60,8 @@ impl Crease {
         is_drawn && (is_folded() || !are_one_plane())
     }
 
-    /// Returns a normal in the proportions of the model, with components below 2^20.
+    /// Returns the normal of a face as it is in the model, given the one in the view, whose depth
+    /// is stretched. Only its direction is kept; its components are below 2^20.
     fn unstretched(&self, normal: [i64; 3]) -> [i64; 3] {
         let by = [self.depth_stretch.1, self.depth_stretch.1, self.depth_stretch.0];
         let exact = [0, 1, 2].map(|n| product(normal[n], i64::from(by[n])));

@@ -25,9 +25,9 @@ pub struct EdgeQuery<I> {
     pub p: End<I>,
     /// The end at which the edge stops.
     pub q: End<I>,
-    /// The depth of the nearer end.
+    /// The depth of the end that is nearer to the eye.
     pub near: i32,
-    /// The depth of the farther end.
+    /// The depth of the end that is farther from the eye.
     pub far: i32,
     /// The two triangles that pass through each other along it, if this is a seam.
     pub seam: Option<[[I; 3]; 2]>,
@@ -39,7 +39,7 @@ pub struct EdgeQuery<I> {
     line: CoarseLine,
 }
 
-/// A side of a face, as the numbers of the vertices at its two ends.
+/// A side of a face: the numbers of the vertices at its two ends.
 type Side<I> = (I, I);
 
 /// A face, or one of its triangles, with the sides of the edge's line on which its corners lie.
@@ -109,11 +109,13 @@ const FEW_CORNERS: usize = 8;
 /// edge begins or ends inside the polygon.
 #[derive(Clone, Copy, Default)]
 pub struct Passage<I> {
+    /// The side of the polygon through which the edge comes in.
     entry: Option<Side<I>>,
+    /// The side of the polygon through which the edge goes out.
     exit: Option<Side<I>>,
 }
 
-/// How an edge lies in depth relative to a face.
+/// Which part of an edge lies deeper than a face, wherever the face is on the page.
 enum Depth {
     /// No part of the edge lies behind the face.
     Before,
@@ -214,7 +216,7 @@ impl<I: Index> EdgeQuery<I> {
         self.pass_sides(around, face.first, corners, profile);
     }
 
-    /// Marks the parts of this edge that the triangles of a face hide.
+    /// Marks the parts of this edge that a face hides, triangle by triangle.
     fn pass_triangles(&self, around: &SceneIndex<'_, I>, face: Face, profile: &mut Profile<'_>) {
         for triangle in around.triangles(face) {
             self.pass_triangle(&around.coarse_projection, &triangle, profile);

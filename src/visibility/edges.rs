@@ -19,7 +19,7 @@ pub struct Outlines<'a, I> {
 }
 
 impl<'a, I: Index> Outlines<'a, I> {
-    /// Takes the corners and pens of the elements of a model.
+    /// Takes the corners and the pens from the elements of a model.
     pub fn of(elements: Elements<'a, I>) -> Self {
         Self { corners: elements.corners(), pens: elements.pens() }
     }
@@ -64,6 +64,7 @@ pub fn sides<I: Index>(corners: &[Corner<I>]) -> impl Iterator<Item = (usize, I,
 /// One bit for each corner: whether the side that begins there represents its edge.
 #[derive(Debug)]
 pub struct ChosenSides<'a> {
+    /// The bits, 32 to a word, the lowest bit first.
     bits: &'a mut [u32],
 }
 
@@ -74,7 +75,7 @@ pub const fn most_corners<I: Index>() -> usize {
 }
 
 impl<'a> ChosenSides<'a> {
-    /// Returns the bytes that stay in use after the choice.
+    /// Returns the number of bytes that stay in use once the sides are chosen.
     pub const fn bytes(corners: usize) -> usize {
         Scratch::bytes_for::<u32>(corners.div_ceil(32))
     }
@@ -105,7 +106,7 @@ impl<'a> ChosenSides<'a> {
         let mut meantime = scratch.reborrow();
         let heads: &mut [I] = meantime.take(vertices.len())?;
         let next: &mut [I] = meantime.take(corners.len())?;
-        // The sides whose edges have been found to have a second side.
+        // This marks the sides whose edges have been found to have a second side.
         let mut shared = ChosenSides { bits: meantime.take(word_count)? };
         heads.fill(I::NONE);
         for (first, element) in outlines.elements() {
@@ -170,10 +171,12 @@ impl<'a> ChosenSides<'a> {
         Ok(chosen)
     }
 
+    /// Makes the side that begins at corner `side` represent its edge.
     fn insert(&mut self, side: usize) {
         self.bits[side / 32] |= 1 << (side % 32);
     }
 
+    /// Makes the side that begins at corner `side` no longer represent its edge.
     fn remove(&mut self, side: usize) {
         self.bits[side / 32] &= !(1 << (side % 32));
     }

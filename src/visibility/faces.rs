@@ -1,5 +1,5 @@
 //! Sorts the faces by the depth of their nearest point, so that the search can stop at the first
-//! face that is too far away.
+//! face that is too far away. The position of a face in this order is called its rank.
 
 use super::VisibilityError;
 use super::edges::{Outlines, is_bar};
@@ -16,20 +16,21 @@ use crate::stage::{Scratch, heap_sort_by_key};
 /// (2 bits), and the number of its first corner.
 #[derive(Debug)]
 pub struct Faces<'a, I: Index> {
-    /// The packed elements, sorted.
+    /// The elements, each packed into 32 bits and sorted, so that an index here is a rank.
     order: &'a mut [I::Pair],
     /// The number of faces that have no area.
     degenerate: u32,
 }
 
-/// One element, as the search needs it.
+/// One face or bar, as the search needs it.
 #[derive(Debug, Clone, Copy)]
 pub struct Face {
-    /// The number of the first corner of the element.
+    /// The number of the element's first corner among the corners of all elements.
     pub first: usize,
-    /// Whether a fan of triangles from the first corner covers it.
+    /// Whether a fan covers it: the triangles that join its first corner to each of its sides.
     pub is_fan: bool,
-    /// Whether its triangles are stored in [`super::triangles::Ears`].
+    /// Whether its triangles had to be cut off one by one and are stored in
+    /// [`super::triangles::Ears`].
     pub has_ears: bool,
 }
 
@@ -78,7 +79,7 @@ impl<'a, I: Index> Faces<'a, I> {
         self.order.len()
     }
 
-    /// Returns the element with this rank.
+    /// Returns the element with this rank, which is its position in the order of depth.
     #[inline]
     pub fn get(&self, rank: usize) -> Face {
         let [depth_and_cut, first] = I::halves(self.order[rank]).map_each(I::get);

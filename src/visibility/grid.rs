@@ -71,21 +71,23 @@ pub fn coarse_depth(z: i32) -> u16 {
     ((z + COORDINATE_LIMIT) >> 5) as u16
 }
 
-/// The cells and their lists of faces.
+/// The page divided into cells, each with a list of the faces on it.
 #[derive(Debug)]
 pub struct Grid<'a, I> {
     /// The division of the page into cells.
     shape: Shape,
+    /// The number of cells in a row.
     columns: usize,
-    /// The cells, row by row from the lower left.
+    /// For each cell, where its list ends in `entries`, and the face that covers all of it. The
+    /// cells are stored row by row, from the lower left of the page.
     cells: &'a mut [Cell<I>],
-    /// The lists of all cells: ranks of faces.
+    /// The lists of all cells one after the other. An entry is the rank of a face.
     entries: &'a mut [I],
 }
 
-/// The faces that an edge meets in one cell.
+/// The faces that a certain edge meets in one cell, so that it must be tested against them.
 pub struct CellView<'g, I> {
-    /// The rank of the covering face, if that face is nearer than the whole edge.
+    /// The rank of the face that covers the whole cell, if that face is nearer than the whole edge.
     pub cover: Option<I>,
     /// The ranks of the faces on the cell, nearest first.
     pub faces: &'g [I],
@@ -105,7 +107,7 @@ impl<'a, I: Index> Grid<'a, I> {
     ///
     /// # Errors
     /// Returns an error if the memory is too small or the user cancels.
-    #[inline(never)] // Smaller than in its only caller.
+    #[inline(never)] // Inlined in its only caller, the code would be larger.
     pub fn new(
         coarse_projection: &CoarseProjection<'_>,
         outlines: Outlines<'_, I>,
@@ -170,9 +172,13 @@ impl<'a, I: Index> Grid<'a, I> {
 /// The cells on the path of an edge: those that it crosses or touches.
 #[derive(Debug, Clone, Copy)]
 pub struct EdgeCells<'g, I> {
+    /// The cells that the edge passes.
     grid: &'g Grid<'g, I>,
+    /// The coarse depth of the nearest point of the edge.
     near: u16,
+    /// The lower end of the edge, which is not above `high`.
     low: CoarsePoint,
+    /// The upper end of the edge.
     high: CoarsePoint,
     /// The steps to the right for each step up, in units of 2^-16.
     slope: i32,

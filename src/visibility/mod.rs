@@ -116,7 +116,7 @@ pub struct Options {
     pub crease: Option<Crease>,
 }
 
-/// What [`find_stretches`] noticed about the scene.
+/// What [`find_stretches`] noticed about the scene, for the user to be told.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Report {
@@ -142,7 +142,7 @@ pub struct Stretch<I = u16> {
     pub pen: u8,
 }
 
-/// Receives the stretches as they are found.
+/// Receives the visible and hidden stretches of the edges as they are found.
 pub trait StretchSink<I = u16> {
     /// Receives one stretch.
     ///
@@ -217,7 +217,7 @@ pub const fn least_bytes<I: Index>(vertices: usize, corners: usize, faces: usize
 ///
 /// # Errors
 /// See [`VisibilityError`]. By then the sink may already have received some of the stretches.
-#[inline(never)] // Smaller than in its only caller.
+#[inline(never)] // Inlined in its only caller, the code would be larger.
 pub fn find_stretches<I: Index>(
     scene: &Scene<'_, I>,
     options: Options,

@@ -4,7 +4,7 @@
 use crate::geometry::EdgeParameter;
 use bytemuck::{Pod, Zeroable};
 
-/// The marks of a piece of an edge, which can be combined.
+/// What may cover a piece of an edge, as bits that can be combined.
 pub mod mark {
     /// A nearer face covers the points of the page just to the left.
     pub const LEFT: u64 = 1;
@@ -16,7 +16,7 @@ pub mod mark {
     pub const ENCLOSED: u64 = 4;
 }
 
-/// A part of an edge.
+/// A part of an edge, between two positions along it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct EdgeInterval {
     /// The start of the part; `None` if it begins at p.
@@ -29,7 +29,7 @@ impl EdgeInterval {
     /// The whole edge.
     pub const WHOLE: Self = Self { from: None, to: None };
 
-    /// Returns the intersection of both parts.
+    /// Returns the part of the edge that belongs to both parts.
     pub fn and(self, other: Self) -> Self {
         let both =
             |a: Option<EdgeParameter>,
@@ -60,7 +60,8 @@ pub struct ProfilePiece {
     pub marks: u64,
 }
 
-/// The pieces of a part of an edge, called the window.
+/// What is known so far about the visibility of an edge: the pieces of a part of it, called the
+/// window, and what covers each.
 ///
 /// Adjacent pieces have different marks. The memory for the pieces is limited: when it is full, the
 /// window is shortened to where the last piece began, and the rest of the edge is processed in
@@ -69,8 +70,9 @@ pub struct ProfilePiece {
 pub struct Profile<'a> {
     /// The memory for the pieces, the first `count` of which are in use.
     memory: &'a mut [ProfilePiece],
+    /// The number of pieces in use.
     count: usize,
-    /// Where on the edge the window ends.
+    /// Where on the edge the window ends, which is the part that is being processed.
     end: EdgeParameter,
 }
 
@@ -95,27 +97,29 @@ impl<'a> Profile<'a> {
         self.end = EdgeParameter::END;
     }
 
-    /// Returns where on the edge the window ends.
+    /// Returns where on the edge the window (the part that is being processed) ends.
     pub fn end(&self) -> EdgeParameter {
         self.end
     }
 
-    /// Whether the whole window is hidden, so that no further mark can change it.
+    /// Whether the whole window (the part that is being processed) is hidden, so that no further
+    /// mark can change it.
     pub fn is_hidden(&self) -> bool {
         self.count == 1 && self.memory[0].marks == mark::HIDDEN
     }
 
-    /// Returns the pieces of the window, in order from p to q.
+    /// Returns the pieces of the window (the part of the edge that is being processed), in order
+    /// from p to q.
     pub fn pieces(&self) -> &[ProfilePiece] {
         &self.memory[..self.count]
     }
 
-    /// Adds `marks` to a part of the edge.
+    /// Adds `marks` to the pieces of a part of the edge, for example that a face hides it.
     pub fn mark(&mut self, part: EdgeInterval, marks: u64) {
         self.update(part, |known| known | marks);
     }
 
-    /// Applies `change` to the marks of a part of the edge.
+    /// Changes the marks of the pieces of a part of the edge by `change`.
     pub fn update(&mut self, part: EdgeInterval, change: impl Fn(u64) -> u64) {
         if part.is_empty() || part.to.is_some_and(|to| to <= self.memory[0].from) {
             return;

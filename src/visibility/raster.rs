@@ -13,14 +13,14 @@ use crate::index::Index;
 use crate::model::Corner;
 use crate::stage::Aborted;
 
-/// The division of the page into cells of equal size.
+/// The division of the page into cells of equal size, which are blocks of the coarse grid.
 #[derive(Debug, Clone, Copy)]
 pub struct Shape {
     /// A cell is 2^`shift_x` units of the coarse grid wide.
     pub shift_x: u32,
     /// A cell is 2^`shift_y` units of the coarse grid high.
     pub shift_y: u32,
-    /// The upper right corner of the page.
+    /// The upper right corner of the page, in units of the coarse grid.
     far: CoarsePoint,
 }
 
@@ -43,6 +43,7 @@ impl Shape {
         }
     }
 
+    /// Returns the number of columns of cells.
     pub fn columns(&self) -> usize {
         usize::from(self.far.x >> self.shift_x) + 1
     }
@@ -52,6 +53,7 @@ impl Shape {
         usize::from(self.far.y >> self.shift_y) + 1
     }
 
+    /// Returns the number of cells on the whole page.
     pub fn cells(&self) -> usize {
         self.columns() * self.rows()
     }
@@ -88,11 +90,14 @@ impl Shape {
 
 /// The bounding rectangle of a face on the coarse grid.
 pub struct Bounds {
+    /// The lower left corner of the rectangle.
     low: CoarsePoint,
+    /// The upper right corner of the rectangle.
     high: CoarsePoint,
 }
 
 impl Bounds {
+    /// Returns the rectangle around the given corners.
     pub fn of<I: Index>(coarse_projection: &CoarseProjection<'_>, corners: &[Corner<I>]) -> Self {
         let none = Self { low: CoarsePoint::HIGHEST, high: CoarsePoint::LOWEST };
         corners.iter().fold(none, |bounds, corner| {
@@ -128,16 +133,21 @@ const _: () = assert!(COARSE_BITS == 14);
 
 /// The cells while the faces are being sorted into them.
 pub struct Raster<'c, I> {
+    /// The division of the page into cells.
     shape: Shape,
+    /// The number of cells in a row.
     columns: usize,
+    /// The cells, row by row from the lower left.
     cells: &'c mut [Cell<I>],
 }
 
 impl<'c, I: Index> Raster<'c, I> {
+    /// Prepares to sort faces into `cells`, one for each cell of `shape` and all of them zero.
     pub fn new(shape: Shape, cells: &'c mut [Cell<I>]) -> Self {
         Self { shape, columns: shape.columns(), cells }
     }
 
+    /// Gives the cells back when all faces have been sorted into them.
     pub fn cells(self) -> &'c mut [Cell<I>] {
         self.cells
     }

@@ -8,17 +8,18 @@ use super::triangles::Ears;
 use crate::index::Index;
 use crate::model::Corner;
 
-/// Everything that the search needs to know about the scene.
+/// Everything that the search for visible stretches needs to know about a scene.
 pub struct SceneIndex<'a, I: Index> {
     /// The vertices, in view coordinates and on the coarse grid.
     pub coarse_projection: CoarseProjection<'a>,
-    /// The corners of the elements.
+    /// The corners of the faces and bars, and their pens.
     pub outlines: Outlines<'a, I>,
-    /// The triangles of the faces that no fan covers.
+    /// The triangles of the faces that are not covered by a fan of triangles from their first
+    /// corner.
     pub ears: Ears<'a, I>,
-    /// The sides that represent their edges.
+    /// Which sides of faces stand for their edges, so that each edge is drawn once.
     pub chosen: ChosenSides<'a>,
-    /// The elements, nearest first.
+    /// The faces and bars in the order of their depth, nearest first.
     pub faces: Faces<'a, I>,
 }
 

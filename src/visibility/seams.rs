@@ -8,7 +8,9 @@ use crate::geometry::{Vertex, plane_side};
 /// The bounding box of a face in view coordinates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Extent {
+    /// The least x, y and z of the box.
     low: Vertex,
+    /// The greatest x, y and z of the box.
     high: Vertex,
 }
 
@@ -94,7 +96,7 @@ fn between(a: Vertex, b: Vertex, height_a: i64, height_b: i64) -> Vertex {
     Vertex::new(mixed(a.x, b.x), mixed(a.y, b.y), mixed(a.z, b.z))
 }
 
-/// Returns the pair of points that are farthest apart.
+/// Returns the pair whose two points are farthest apart.
 fn farthest(pairs: [(Vertex, Vertex); 3]) -> (Vertex, Vertex) {
     let distance = |(p, q): &(Vertex, Vertex)| {
         let square = |a: i32, b: i32| (i64::from(a) - i64::from(b)).pow(2);

@@ -25,21 +25,26 @@ const MOST_PIECES: usize = 24;
 /// The average number of instructions for testing an edge against one face.
 const FACE_TEST: usize = 1000;
 
-/// Finds the stretches of one edge after the other.
+/// Finds which stretches of each edge are visible, one edge after the other.
 pub struct StretchFinder<'a, I: Index> {
+    /// The scene: its vertices, its faces in the order of their depth, and its edges.
     around: SceneIndex<'a, I>,
+    /// The faces on each cell of the page.
     grid: Grid<'a, I>,
-    /// One bit for each rank: whether the current edge has been tested against this face.
+    /// One bit for each face, by its rank: whether the current edge has been tested against it.
     seen: &'a mut [u32],
-    /// One bit for each rank: whether this face shares a cell with the face whose seams are being
-    /// found.
+    /// One bit for each face, by its rank: whether it shares a cell with the face whose seams
+    /// (lines where faces pass through each other) are being found.
     met: &'a mut [u32],
+    /// Which parts of the current edge are hidden, as far as it has been tested.
     profile: Profile<'a>,
+    /// Which kinds of stretches the user wants to see.
     options: Options,
 }
 
 impl<'a, I: Index> StretchFinder<'a, I> {
-    /// The least number of bytes that are enough, with the slowest search.
+    /// Returns the least number of bytes of working memory that are enough. The search is then
+    /// slow.
     pub const fn least_bytes(faces: usize) -> usize {
         2 * Scratch::bytes_for::<u32>(faces.div_ceil(32))
             + Scratch::bytes_for::<ProfilePiece>(FEWEST_PIECES)
@@ -101,7 +106,7 @@ impl<'a, I: Index> StretchFinder<'a, I> {
     ///
     /// # Errors
     /// Returns an error if the sink is full or the user cancels.
-    #[inline(never)] // Smaller than in its only caller.
+    #[inline(never)] // Inlined in its only caller, the code would be larger.
     pub fn follow_seams(
         &mut self,
         yield_counter: &mut YieldCounter<'_>,
@@ -169,7 +174,8 @@ impl<'a, I: Index> StretchFinder<'a, I> {
         Ok(())
     }
 
-    /// Sets in `met` the bits of the faces with a higher rank than `one` that may pass through it.
+    /// Sets in `met` the bits of the faces with a higher rank than `one` that may pass through it,
+    /// so that there is a seam.
     fn meet(&mut self, one: usize) {
         let Self { around, grid, met, .. } = self;
         met.fill(0);
@@ -189,8 +195,8 @@ impl<'a, I: Index> StretchFinder<'a, I> {
         });
     }
 
-    /// Finds the stretches of an edge or of a seam and hands them to the sink. `seam_of` holds the
-    /// ranks of the two faces of a seam.
+    /// Finds the visible and hidden stretches of an edge or of a seam and hands them to the sink.
+    /// `seam_of` holds the ranks of the two faces of a seam.
     fn follow(
         &mut self,
         edge_query: &EdgeQuery<I>,
@@ -249,8 +255,8 @@ impl<'a, I: Index> StretchFinder<'a, I> {
         Ok(())
     }
 
-    /// Tests the edge against the faces in all cells that it passes and marks the outcome on its
-    /// profile.
+    /// Tests the edge against the faces in all cells that it passes, and marks on its profile which
+    /// parts they hide.
     fn test_faces(
         &mut self,
         edge_query: &EdgeQuery<I>,

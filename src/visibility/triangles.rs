@@ -32,22 +32,30 @@ pub enum Cut {
 #[repr(transparent)]
 struct Entry<I>([I; 2]);
 
-/// The triangles of all faces that no fan covers, as vertex numbers.
+/// The triangles of all faces that no fan covers. (A fan is all triangles with one common corner;
+/// an ear is a triangle that was cut off at a corner.)
 #[derive(Debug)]
 pub struct Ears<'a, I> {
+    /// Where the triangles of each face begin, in the order of the model.
     entries: &'a mut [Entry<I>],
+    /// The triangles, face after face. Each is three vertex numbers.
     ears: &'a mut [[I; 3]],
 }
 
-/// Counts of the faces that no fan covers, which give the memory that their triangles need.
+/// How many faces a fan does not cover, and how large they are, which gives the memory that their
+/// triangles need.
 #[derive(Debug, Clone, Copy, Default)]
 struct Needs {
+    /// The number of faces that no fan covers.
     faces: usize,
+    /// The number of their triangles.
     ears: usize,
+    /// The number of corners of the face among them that has the most.
     most_corners: usize,
 }
 
 impl Needs {
+    /// Counts the faces of a scene that no fan covers.
     fn of<I: Index>(outlines: Outlines<'_, I>, vertices: &[Vertex]) -> Self {
         outlines.elements().filter(|(_, corners)| cut_of(corners, vertices) == Cut::Ears).fold(
             Self::default(),
@@ -74,7 +82,7 @@ impl<'a, I: Index> Ears<'a, I> {
     ///
     /// # Errors
     /// Returns an error if the memory is too small or the user cancels.
-    #[inline(never)] // Smaller than in its only caller.
+    #[inline(never)] // Inlined in its only caller, the code would be larger.
     pub fn cut(
         outlines: Outlines<'_, I>,
         vertices: &[Vertex],
@@ -181,7 +189,7 @@ impl Plane {
     }
 }
 
-/// Returns how a face must be cut.
+/// Decides how a face must be cut into triangles: not at all, as a fan, or ear by ear.
 pub fn cut_of<I: Index>(corners: &[Corner<I>], vertices: &[Vertex]) -> Cut {
     if is_bar(corners) {
         return Cut::None;

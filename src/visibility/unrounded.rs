@@ -17,8 +17,11 @@ use crate::model::Corner;
 /// The positions of the vertices in the model's own coordinates, as far as they are known.
 #[derive(Debug, Clone, Copy)]
 pub struct Unrounded<'a> {
+    /// The positions by vertex number; vertices from its length on have no known position.
     positions: &'a [[i32; 3]],
+    /// How far the positions may be off, in the same unit.
     precision: Precision,
+    /// Twice the possible error of a view coordinate, at least 1.
     error_bound: u32,
 }
 
@@ -80,6 +83,7 @@ impl<'a> Unrounded<'a> {
         })
     }
 
+    /// Returns the position of a vertex in the model, or `None` if it is unknown.
     fn at<I: Index>(&self, number: I) -> Option<[i32; 3]> {
         self.positions.get(number.get()).copied()
     }

@@ -12,7 +12,7 @@ use crate::stage::{Cancel, Scratch};
 ///
 /// # Errors
 /// See [`VisibilityError`]. Working memory of [`super::scratch_bytes`] is enough.
-#[inline(never)] // Smaller than in its only caller.
+#[inline(never)] // Inlined in its only caller, the code would be larger.
 pub fn follow_wire<I: Index>(
     scene: &Scene<'_, I>,
     options: Options,

@@ -8,11 +8,14 @@ const INSTRUCTIONS_BETWEEN_CHECKS: usize = 50_000;
 
 /// Counts the instructions spent and checks for cancelling whenever enough have been spent.
 pub struct YieldCounter<'t> {
+    /// Called to find out whether the user has cancelled.
     cancel: &'t mut dyn Cancel,
+    /// The estimated number of instructions since the last check.
     done: usize,
 }
 
 impl<'t> YieldCounter<'t> {
+    /// Makes a counter that asks `cancel` and has counted nothing yet.
     pub fn new(cancel: &'t mut dyn Cancel) -> Self {
         Self { cancel, done: 0 }
     }

@@ -15,7 +15,7 @@ const MOST: usize = 12;
 #[derive(Clone, Copy)]
 #[repr(C)]
 struct Frame {
-    /// The address of the caller's frame.
+    /// The address in the stack at which the frame of the calling function begins.
     caller: usize,
     /// The address at which the caller continues, with bit 0 set.
     return_address: usize,
@@ -24,7 +24,7 @@ struct Frame {
 /// The chain of calls that led to the creation of this value.
 #[derive(Clone, Copy)]
 pub struct Callers {
-    /// The address of the innermost frame.
+    /// The address in the stack at which the frame of the innermost function begins.
     innermost: usize,
     /// The address at which the stack starts; it grows down from there.
     stack_start: usize,

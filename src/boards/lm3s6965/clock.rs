@@ -20,27 +20,40 @@ pub const HERTZ: u32 = super::ROW.clock_hertz;
 /// The mask of a SysTick count. SysTick counts one cycle more than this number and then restarts.
 pub const CYCLE_MASK: u32 = 0x00FF_FFFF;
 
+/// The registers of system control that are used here, by their offset in bytes.
 mod offset {
+    /// The register of the states that may cause an interrupt; only the bit of the PLL is read.
     pub const RAW_INTERRUPT_STATUS: usize = 0x050;
+    /// The register that says which clock the core gets, and by how much it is divided.
     pub const RUN_MODE_CLOCK: usize = 0x060;
 }
+/// The bits of the clock register that hold the divider, less 1.
 const SYSTEM_DIVIDER: u32 = 0xF << 23;
+/// The bit that makes the core's clock the divided one.
 const USE_SYSTEM_DIVIDER: u32 = 1 << 22;
+/// The bit that switches the PLL (the circuit that multiplies the clock) off.
 const PLL_POWER_DOWN: u32 = 1 << 13;
+/// The bit that makes the clock go past the PLL (the circuit that multiplies its frequency).
 const PLL_BYPASS: u32 = 1 << 11;
+/// The bits of the clock register that say by a code which crystal the board has.
 const CRYSTAL: u32 = 0xF << 6;
+/// The bits of the clock register that stand for a crystal of 8 MHz.
 const CRYSTAL_8_MHZ: u32 = 0xE << 6;
+/// The bits that choose the oscillator; zeros choose the main one, which has the crystal.
 const OSCILLATOR_SOURCE: u32 = 0x3 << 4;
+/// The bit that switches the main oscillator off.
 const MAIN_OSCILLATOR_OFF: u32 = 1;
+/// The bit that says that the PLL runs at its frequency.
 const PLL_LOCKED: u32 = 1 << 6;
-/// The PLL's 200 MHz divided by 4.
+/// The divider that makes the core's clock of the PLL's 200 MHz: by 4.
 const DIVIDE_BY_4: u32 = 3 << 23;
 
 /// The number of times that SysTick has restarted.
 static WRAPS: AtomicU32 = AtomicU32::new(0);
 
-/// The running clock.
+/// The clock of the board while it runs.
 pub struct Clock {
+    /// The core's timer, which counts the time.
     systick: SYST,
 }
 
@@ -85,7 +98,7 @@ pub fn cycles_24() -> u32 {
     !count_down() & CYCLE_MASK
 }
 
-/// The same count, counted down. The step interrupt uses it.
+/// Returns SysTick's own count, which goes down. The step interrupt uses it because it costs least.
 #[inline(always)]
 pub fn count_down() -> u32 {
     SYST::get_current()
@@ -106,6 +119,7 @@ pub fn microseconds() -> u64 {
     }
 }
 
+/// The interrupt for a restart of SysTick, every 2^24 cycles (a third of a second).
 #[exception]
 fn SysTick() {
     // This is the only writer, so a load and a store are as good as an increment.

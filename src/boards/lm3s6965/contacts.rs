@@ -10,22 +10,35 @@ use penup::machine::Contacts;
 use super::registers::{GPIO_C, SYSTEM_CONTROL};
 use super::{HAPPENED, ROW, critical};
 
+/// The registers of the port that are used here, by their offset in bytes.
 mod offset {
+    /// The register that says, by one bit for each pin, which pins cause an interrupt at rising and
+    /// at falling edges.
     pub const BOTH_EDGES: usize = 0x408;
+    /// The register that says, by one bit for each pin, which pins may cause an interrupt at all.
     pub const INTERRUPT_MASK: usize = 0x410;
+    /// The register that clears the interrupt of a pin when the pin's bit is written to it.
     pub const INTERRUPT_CLEAR: usize = 0x41C;
+    /// The register that says, by one bit for each pin, which pins read low where nothing is
+    /// connected.
     pub const PULL_DOWN: usize = 0x514;
+    /// The register that says, by one bit for each pin, which pins are digital.
     pub const DIGITAL_ENABLE: usize = 0x51C;
-    /// In system control.
+    /// The register of system control that switches the clocks of the ports on.
     pub const GPIO_CLOCKS: usize = 0x108;
 }
+/// The bit that switches the clock of port C on.
 const PORT_C_CLOCK: u32 = 1 << 2;
+/// The bit of the limit switch of x.
 const LIMIT_X: u32 = 1 << ROW.pins.limit_x;
+/// The bit of the limit switch of y.
 const LIMIT_Y: u32 = 1 << ROW.pins.limit_y;
+/// The bit of the emergency stop.
 const STOP: u32 = 1 << ROW.pins.stop;
+/// The bits of all contacts.
 const ALL: u32 = LIMIT_X | LIMIT_Y | STOP;
 
-/// Makes the pins inputs with pull-down resistors.
+/// Makes the pins of the contacts inputs with pull-down resistors, and enables their interrupt.
 pub fn set_up(nvic: &mut NVIC) {
     SYSTEM_CONTROL.set_bits(offset::GPIO_CLOCKS, PORT_C_CLOCK);
     // The port responds three cycles after its clock is on; this read takes longer.
@@ -45,6 +58,7 @@ pub fn read() -> Contacts {
     Contacts { x: closed & LIMIT_X != 0, y: closed & LIMIT_Y != 0, stop: closed & STOP != 0 }
 }
 
+/// The interrupt for a change of a contact. It only wakes the main loop, which reads the contacts.
 #[interrupt]
 fn GPIOC() {
     GPIO_C.write(offset::INTERRUPT_CLEAR, ALL);

@@ -4,16 +4,17 @@ use cortex_m::peripheral::NVIC;
 use cortex_m::register::basepri;
 use lm3s6965::Interrupt;
 
-/// The chip distinguishes eight priorities by the upper three bits.
+/// Converts a priority from 0 (highest) to 7 to the form in which the chip takes it: in the upper
+/// three bits.
 const fn priority(number: u8) -> u8 {
     number << 5
 }
 
 /// The priority of the steps, above everything else, including critical sections.
 pub const STEP_PRIORITY: u8 = priority(0);
-/// The priority of the serial line.
+/// The priority of the serial line's interrupt.
 pub const SERIAL_PRIORITY: u8 = priority(1);
-/// The priority of the clock.
+/// The priority of the interrupt of the clock, which counts the time.
 pub const CLOCK_PRIORITY: u8 = priority(2);
 
 /// Sets the priority of an interrupt and unmasks it, during set-up.
@@ -25,6 +26,7 @@ pub fn enable(nvic: &mut NVIC, interrupt: Interrupt, priority: u8) {
     }
 }
 
+/// The critical section of this board. It masks every interrupt except that of the steps.
 struct MaskAllButSteps;
 critical_section::set_impl!(MaskAllButSteps);
 

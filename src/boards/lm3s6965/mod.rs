@@ -54,10 +54,10 @@ use static_cell::{ConstStaticCell, StaticCell};
 /// event register in software, because QEMU's `wfe` does not sleep.
 static HAPPENED: AtomicBool = AtomicBool::new(false);
 
-/// The board's row in the table.
+/// What the table of the boards says about this board: its clock, pins and capacities.
 const ROW: &BoardRow = &table::LM3S6965;
 
-/// The board's memory.
+/// The plotter's memory, with the capacities of this board.
 type BoardMemory = Memory<
     { ROW.memory.vertices },
     { ROW.memory.corners },
@@ -65,10 +65,13 @@ type BoardMemory = Memory<
     { ROW.memory.ports },
 >;
 
-/// The board, as the plotter sees it.
+/// The board as the plotter sees it: it implements [`Board`].
 pub struct Lm3s6965 {
+    /// The clock, which is stopped while the machine sleeps without a task.
     clock: clock::Clock,
+    /// The end of the serial line from which the main loop reads.
     serial: serial::Line,
+    /// The main loop's end of the queue of step events.
     steps: steps::Steps,
 }
 

@@ -8,15 +8,25 @@ use penup::machine::{Axes, PinOrder};
 
 use super::registers::{GPIO_B, SYSTEM_CONTROL};
 
+/// The registers of the port that are used here, by their offset in bytes.
 mod offset {
+    /// The register that says, by one bit for each pin, which pins of a port are outputs.
     pub const DIRECTION: usize = 0x400;
+    /// The register that says, by one bit for each pin, which pins a peripheral of the chip uses
+    /// instead of the port.
     pub const ALTERNATE_FUNCTION: usize = 0x420;
+    /// The register that says, by one bit for each pin, which pins are digital.
     pub const DIGITAL_ENABLE: usize = 0x51C;
+    /// The register that lets [`COMMIT`] be written once [`UNLOCK`](super::UNLOCK) is written to
+    /// it.
     pub const LOCK: usize = 0x520;
+    /// The register that says, by one bit for each pin, which of the protected pins may get another
+    /// function.
     pub const COMMIT: usize = 0x524;
-    /// In system control.
+    /// The register of system control that switches the clocks of the ports on.
     pub const GPIO_CLOCKS: usize = 0x108;
 }
+/// The bit that switches the clock of port B on.
 const PORT_B_CLOCK: u32 = 1 << 1;
 /// The key that unlocks the register that lets PB7 be used for something else than JTAG's reset.
 const UNLOCK: u32 = 0x1ACC_E551;
@@ -24,27 +34,35 @@ const UNLOCK: u32 = 0x1ACC_E551;
 /// Pin `NUMBER` of port B as an output.
 pub struct Pin<const NUMBER: u8>(());
 
-/// The pin of the pen.
+/// The pin of the solenoid that lowers the pen.
 pub type PenPin = Pin<{ PINS.pen }>;
 
-/// The pins of the axes.
+/// The pins of the motors. The value is proof that they are set up.
 pub struct AxisPins(());
 
-/// The pins that the step interrupt moves.
+/// What [`set_up`] returns: the pins that the step interrupt moves.
 pub struct MotorPins {
     /// The pins of the axes and of the pen's motor.
     pub axes: AxisPins,
-    /// The pin of the pen.
+    /// The pin of the solenoid that lowers the pen.
     pub pen: PenPin,
 }
 
+/// The numbers of the machine's pins, from the table of the boards.
 const PINS: Pins = super::ROW.pins;
+/// The bit of the step pin of x.
 const STEP_X: u32 = 1 << PINS.step_x;
+/// The bit of the step pin of y.
 const STEP_Y: u32 = 1 << PINS.step_y;
+/// The bit of the pin that enables the motor drivers while it is low.
 const ENABLE: u32 = 1 << PINS.enable;
+/// The bits of the pins that an event of the axes sets.
 const AXES: u32 = STEP_X | STEP_Y | 1 << PINS.dir_x | 1 << PINS.dir_y | ENABLE;
+/// The bit of the step pin of the motor that lifts the pen.
 const STEP_Z: u32 = 1 << PINS.step_z;
+/// The bit of the direction pin of that motor.
 const DIRECTION_Z: u32 = 1 << PINS.dir_z;
+/// The bits of all pins of the machine.
 const ALL: u32 = AXES | STEP_Z | DIRECTION_Z | 1 << PINS.pen;
 
 impl Axes for AxisPins {

@@ -11,28 +11,33 @@ use super::{HAPPENED, clock, critical};
 use crate::boards::handler::Owned;
 use crate::boards::line::{self, ReceiveMerge, Shared};
 
+/// The registers that are used here besides those of the UART, by their offset in bytes.
 mod offset {
-    /// In system control.
+    /// The register of system control that switches the clocks of the UARTs on.
     pub const UART_CLOCKS: usize = 0x104;
-    /// In system control.
+    /// The register of system control that switches the clocks of the ports on.
     pub const GPIO_CLOCKS: usize = 0x108;
-    /// In port A.
+    /// The register that says, by one bit for each pin, which pins of port A a peripheral such as
+    /// the UART uses.
     pub const ALTERNATE_FUNCTION: usize = 0x420;
-    /// In port A.
+    /// The register that says, by one bit for each pin, which pins of port A are digital.
     pub const DIGITAL_ENABLE: usize = 0x51C;
 }
+/// The bits of the two pins of the serial line, in port A.
 const SERIAL_PINS: u32 = 0b11;
 
 /// The time at which the last `?` came, in cycles modulo 2^24.
 static STATUS_REQUESTED: AtomicU32 = AtomicU32::new(0);
 
+/// The data that the handler and the main loop share.
 static SHARED: Shared = Shared::new();
+/// The end of the line into which the interrupt puts received bytes.
 static INLET: Owned<ReceiveMerge> = Owned::empty();
 
-/// The main loop's end of the line.
+/// The main loop's side of the line, from which it reads bytes.
 pub struct Line(line::Line);
 
-/// Opens the line.
+/// Sets up UART0 and its pins, and lets bytes be received.
 pub fn set_up(nvic: &mut NVIC) -> Line {
     SYSTEM_CONTROL.set_bits(offset::UART_CLOCKS, 1);
     SYSTEM_CONTROL.set_bits(offset::GPIO_CLOCKS, 1);
@@ -54,7 +59,7 @@ pub fn set_up(nvic: &mut NVIC) -> Line {
 }
 
 impl Line {
-    /// Does the same as [`line::Line::read_byte`].
+    /// Returns the next byte that is not a real-time byte: see [`line::Line::read_byte`].
     pub fn read_byte(&mut self) -> Option<u8> {
         self.0.read_byte()
     }
@@ -64,8 +69,8 @@ impl Line {
         self.0.room()
     }
 
-    /// Does the same as [`line::take_real_time`], and logs how long a request for the status has
-    /// waited.
+    /// Takes the real-time requests received since the last call (see [`line::take_real_time`]),
+    /// and logs how long a request for the status has waited.
     pub fn take_real_time(&mut self) -> RealTime {
         let requests = line::take_real_time(core::slice::from_mut(&mut self.0));
         if requests.has(RealTime::STATUS) {
@@ -77,6 +82,7 @@ impl Line {
     }
 }
 
+/// The interrupt for received bytes. Real-time bytes act here; the others go into the queue.
 #[interrupt]
 fn UART0() {
     UART0.clear_interrupt();

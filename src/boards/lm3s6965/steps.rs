@@ -28,34 +28,52 @@ use crate::boards::handler::Owned;
 /// travel speed, 100 mm/s, the machine stops within 500 steps.
 const EVENT_PLACES: usize = 624;
 
+/// The cycles of the core's clock in one tick, the unit of time of step events.
 const CYCLES_PER_TICK: u32 = clock::HERTZ / TICKS_PER_SECOND;
 const _: () = assert!(clock::HERTZ.is_multiple_of(TICKS_PER_SECOND));
 
-/// The main loop runs one turn after this many cycles (2.5 ms) or events. So it does not run for
-/// every step, and yet it keeps the queue full.
+/// The main loop runs one turn after this many cycles (2.5 ms), or after [`TURN_EVENTS`] events. So
+/// it does not run for every step, and yet it keeps the queue full.
 const TURN_CYCLES: u32 = clock::HERTZ / 400;
+/// The main loop runs one turn after this many events, if they come before [`TURN_CYCLES`] are
+/// over.
 const TURN_EVENTS: usize = 30;
 
+/// The registers of a timer that are used here, by their offset in bytes.
 mod offset {
+    /// The register that says whether the timer is one of 32 bits or two of 16 bits.
     pub const CONFIGURATION: usize = 0x000;
+    /// The register that says what the timer does when its time is over.
     pub const MODE_A: usize = 0x004;
+    /// The register that starts and stops the timer.
     pub const CONTROL: usize = 0x00C;
+    /// The register that says, by one bit for each event of the timer, which events cause an
+    /// interrupt.
     pub const INTERRUPT_MASK: usize = 0x018;
+    /// The register that clears the interrupt of an event when the event's bit is written to it.
     pub const INTERRUPT_CLEAR: usize = 0x024;
+    /// The register of the time from a start of the timer to its interrupt, in cycles.
     pub const INTERVAL_LOAD_A: usize = 0x028;
-    /// In system control.
+    /// The register of system control that switches the clocks of the timers on.
     pub const TIMER_CLOCKS: usize = 0x104;
 }
+/// The bits that switch the clocks of timers 1 and 2 on.
 const TIMER_CLOCKS: u32 = 0b11 << 17;
+/// What is written to [`offset::CONFIGURATION`] for a timer of 32 bits.
 const ALL_32_BITS: u32 = 0;
+/// What is written to [`offset::MODE_A`] for a timer that stops when its time is over.
 const ONE_SHOT: u32 = 1;
+/// The bit that starts a timer.
 const ENABLE: u32 = 1;
+/// The bit of the event that the time of a timer is over.
 const TIMED_OUT: u32 = 1;
 
-/// The interrupts of the handlers. The one that belongs to no timer has the lowest number, so that
-/// it is served before the others.
+/// The interrupt of timer 1, at which the next step event begins.
 const STEP: Interrupt = Interrupt::TIMER_1A;
+/// The interrupt of timer 2, at which the step pulses end.
 const PULSE: Interrupt = Interrupt::TIMER_2A;
+/// The interrupt in which the brake does its work. It belongs to no timer that runs, and the
+/// program triggers it. Its number is the lowest of the three, so it is served before the others.
 const BRAKE: Interrupt = Interrupt::TIMER_0B;
 const _: () = assert!((BRAKE as u16) < (STEP as u16) && (BRAKE as u16) < (PULSE as u16));
 
@@ -63,21 +81,25 @@ const _: () = assert!((BRAKE as u16) < (STEP as u16) && (BRAKE as u16) < (PULSE 
 /// call can be told from a late one.
 const MOST_MORE_TICKS: u32 = TICKS_PER_SECOND * 3 / 20;
 
+/// The memory of the queue in which step events wait for their interrupt.
 static RING: ConstStaticCell<EventRing<EVENT_PLACES>> = ConstStaticCell::new(EventRing::new());
+/// The handlers' end of the queue, which all three handlers use.
 static STEPPER: Owned<Stepper> = Owned::empty();
 
-/// The state that the interrupt shares with the main loop.
+/// What the step interrupts and the main loop share: orders to the first, and counts from them.
 pub static STATE: PulserState = PulserState::new();
 
-/// The handlers' end of the queue.
+/// What the step interrupts own: the library's interrupt code, and when its next event is due.
 struct Stepper {
+    /// The library's part of the work: it takes the events and sets the pins.
     pulser: Pulser<'static, AxisPins, Solenoid<PenPin>, EVENT_PLACES>,
     /// The value that SysTick, which counts down, shows when the current event ends; modulo 2^24.
     due: u32,
 }
 
-/// The main loop's end of the queue.
+/// The main loop's side of the steps: it puts events into the queue and starts the interrupts.
 pub struct Steps {
+    /// The main loop's end of the library's queue.
     events: StepQueue<'static, EVENT_PLACES>,
     /// The time at which the last turn of the main loop ended, in cycles modulo 2^24.
     turned: u32,
@@ -122,12 +144,12 @@ impl Steps {
         NVIC::pend(STEP);
     }
 
-    /// Passes the counts of what was done to the main loop.
+    /// Lets the main loop count the events that the interrupt has taken since the last call.
     pub fn sync_consumed(&mut self) {
         self.events.sync_consumed();
     }
 
-    /// Records the end of a turn of the main loop.
+    /// Records that the main loop has ended a turn, so that it can sleep until enough has happened.
     pub fn end_turn(&mut self) {
         self.turned = clock::cycles_24();
     }
@@ -206,8 +228,8 @@ impl Stepper {
         }
     }
 
-    /// Handles a call before the current event ends: the event was lengthened, or an alarm has
-    /// stopped the pulses.
+    /// Goes on waiting when the interrupt comes before the current event ends, because the event
+    /// was lengthened, or stops, because an alarm has halted the pulses.
     #[cold]
     #[inline(never)]
     fn wait_on(&mut self, now: u32) {
@@ -233,6 +255,8 @@ impl Stepper {
     }
 }
 
+/// Stops the step timer, because the queue is empty or the machine is halted, and wakes the main
+/// loop.
 #[cold]
 #[inline(never)]
 fn rest() {
@@ -255,7 +279,7 @@ pub fn halt() {
     NVIC::mask(STEP);
 }
 
-/// The interrupt for the next event.
+/// The interrupt of timer 1, at which the next step event is due.
 #[interrupt]
 fn TIMER_1A() {
     TIMER1.write(offset::INTERRUPT_CLEAR, TIMED_OUT);

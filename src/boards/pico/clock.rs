@@ -9,8 +9,10 @@ use super::{contacts, critical, serial};
 /// The clock frequency in cycles per second.
 pub const HERTZ: u32 = super::ROW.clock_hertz;
 
-/// The bit of the alarm in the registers of the interrupts.
+/// The bit that stands for the timer's first alarm, which causes this module's interrupt, in the
+/// registers that enable, show and clear the timer's interrupts.
 const ALARM_0: u32 = 1;
+/// The time from one interrupt of this module to the next, in microseconds.
 const MILLISECOND: u32 = 1000;
 
 /// Starts the millisecond interrupt. From now on it wakes the main loop, which keeps the queue of
@@ -43,6 +45,8 @@ pub fn microseconds() -> u32 {
     TIMER.timerawl().get()
 }
 
+/// The millisecond interrupt. It samples the contacts, has received bytes read, and wakes the main
+/// loop.
 #[interrupt]
 fn TIMER_IRQ_0() {
     TIMER.intr().put(ALARM_0);

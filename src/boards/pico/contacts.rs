@@ -17,22 +17,27 @@ use super::registers::{Get, SIO};
 use super::{ROW, clock};
 use crate::boards::handler::Owned;
 
+/// The number of milliseconds after a change of a contact in which its further changes are ignored.
 const BOUNCE_MILLISECONDS: u8 = 10;
 /// The pin of the limit switch of x. Those of y and of the emergency stop follow.
 const FIRST_PIN: u8 = ROW.pins.limit_x;
 const _: () = assert!(ROW.pins.limit_y == FIRST_PIN + 1 && ROW.pins.stop == FIRST_PIN + 2);
+/// The number of contacts: two limit switches and the emergency stop.
 const COUNT: usize = 3;
+/// The bits of all contacts, bit 0 for the limit switch of x.
 const ALL: u8 = (1 << COUNT) - 1;
 
 /// The time from switching the pull-ups on to the first sample, in microseconds.
 const SETTLE_MICROSECONDS: u32 = 50_000;
+/// The time between the samples that are taken at the start, in microseconds.
 const SAMPLE_MICROSECONDS: u32 = 1000;
 
-/// One bit for each contact that counts as closed.
+/// The contacts that count as closed, one bit for each. The clock's handler writes it.
 static CLOSED: AtomicU8 = AtomicU8::new(0);
+/// The samples so far, which belong to the clock's handler.
 static SAMPLES: Owned<Samples> = Owned::empty();
 
-/// The samples that the clock's handler remembers.
+/// What the clock's handler remembers between two samples of the contacts.
 struct Samples {
     /// One bit for each contact that was closed in the last two samples.
     last: [u8; 2],
@@ -56,6 +61,7 @@ fn closed_now() -> u8 {
     !(SIO.gpio_in().get() >> FIRST_PIN) as u8 & ALL
 }
 
+/// Does nothing for `time` microseconds.
 fn wait(time: u32) {
     let began = clock::microseconds();
     while clock::microseconds().wrapping_sub(began) < time {}
@@ -92,7 +98,7 @@ pub fn sample() {
     CLOSED.store(closed, Ordering::Relaxed);
 }
 
-/// The contacts that count as closed.
+/// Returns the contacts that count as closed, because two of the last three samples have shown it.
 pub fn closed() -> Contacts {
     let closed = CLOSED.load(Ordering::Relaxed);
     Contacts { x: closed & 1 != 0, y: closed & 2 != 0, stop: closed & 4 != 0 }

@@ -19,14 +19,15 @@ use rp2040_hal::pac::Interrupt;
 
 use super::registers::{Get, PPB, Put};
 
-/// The chip distinguishes four priorities by the upper two bits.
+/// Converts a priority from 0 (highest) to 3 to the form in which the chip takes it: in the upper
+/// two bits.
 const fn priority(number: u8) -> u8 {
     number << 6
 }
 
-/// The priority of the next block of steps.
+/// The priority of the interrupt that hands over the next block of steps.
 pub const STEP_PRIORITY: u8 = priority(0);
-/// The priority of the pen's heights, which come with the steps.
+/// The priority of the interrupt that moves the pen to the height due.
 pub const PEN_PRIORITY: u8 = priority(1);
 /// The priority of the serial lines.
 pub const SERIAL_PRIORITY: u8 = priority(2);
@@ -69,6 +70,7 @@ const VECTORS: usize = 16 + 32;
 #[repr(align(256))] // The core ignores the lower bits of its address.
 struct Vectors([AtomicU32; VECTORS]);
 
+/// The copy of the exception vectors, which the core reads once [`move_vectors_to_ram`] was called.
 static IN_RAM: Vectors = Vectors([const { AtomicU32::new(0) }; VECTORS]);
 
 /// Makes the core read the vectors from RAM. It is called during set-up, before any interrupt is
@@ -95,6 +97,8 @@ const OTHERS: u32 = !(1 << Interrupt::DMA_IRQ_0 as u32);
 /// The interrupts that the outermost critical section has masked.
 static MASKED: AtomicU32 = AtomicU32::new(0);
 
+/// The critical section of this board. It masks every interrupt except that of the next block of
+/// steps.
 struct MaskAllButSteps;
 critical_section::set_impl!(MaskAllButSteps);
 

@@ -54,7 +54,7 @@ const TEXT_BYTES: usize = 192;
 /// The message of a fault: one line of printable ASCII characters.
 pub type Cause = heapless::String<TEXT_BYTES>;
 
-/// Why the board started.
+/// The reason why the board started, which decides whether the plotter runs.
 #[derive(Debug)]
 pub enum Start {
     /// The board was started by power, the pin RUN, a new image, or a command of the user.
@@ -65,18 +65,18 @@ pub enum Start {
     Rescue(Cause),
 }
 
-/// The data that survives a reset.
+/// What is kept of a fault through a reset, so that it can be reported afterwards.
 #[derive(Clone, Copy)]
 #[repr(C)]
 struct Stored {
     /// The checksum over everything that follows, because RAM holds arbitrary data after a loss of
     /// power.
     sum: u32,
-    /// The number of consecutive faults.
+    /// The number of faults one after the other, without a proper run between them.
     faults: u8,
     /// The length of the message, in bytes.
     length: u8,
-    /// The message.
+    /// The message that says what the fault was, followed by zeros.
     text: [u8; TEXT_BYTES],
 }
 
@@ -93,6 +93,8 @@ unsafe impl Sync for StoredCell {}
 static STORED: StoredCell = StoredCell(UnsafeCell::new(MaybeUninit::uninit()));
 
 impl Stored {
+    /// Makes the data after so many consecutive faults, the last of them with the message `cause`,
+    /// which is ASCII and at most [`TEXT_BYTES`] long. Without a fault the message is empty.
     fn new(faults: u8, cause: &str) -> Self {
         let mut stored = Self { sum: 0, faults, length: cause.len() as u8, text: [0; TEXT_BYTES] };
         for (slot, byte) in stored.text.iter_mut().zip(cause.bytes()) {
@@ -125,7 +127,7 @@ impl Stored {
         (stored.sum == stored.own_sum()).then_some(stored)
     }
 
-    /// Returns the stored text of the cause.
+    /// Returns the stored message of the fault.
     fn cause(&self) -> Cause {
         let mut cause = Cause::new();
         for &byte in self.text.iter().take(self.length.into()) {
@@ -159,6 +161,7 @@ pub fn start() -> Start {
     }
 }
 
+/// Makes the message of a fault from a short text.
 fn text(text: &str) -> Cause {
     let mut cause = Cause::new();
     let _ = cause.push_str(text); // There is room, because the texts are short.
@@ -175,7 +178,7 @@ pub fn note_running(microseconds: u32) {
     }
 }
 
-/// Feeds the watchdog.
+/// Tells the watchdog that the program still runs, so that it does not restart the board.
 pub fn feed() {
     WATCHDOG.load().put(WATCHDOG_TIMEOUT);
 }

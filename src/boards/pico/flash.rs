@@ -23,16 +23,18 @@ use rp2040_hal::rom_data;
 use super::registers::{Get, IO_QSPI, Put, SSI};
 use super::{BOOT_2, ROW, critical, emergency};
 
-/// The address at which the flash is read.
+/// The address at which the flash is mapped to memory, so that it can be read.
 const MAPPED_AT: usize = ROW.flash.start as usize;
 /// The memory map reserves the flash from here on for this module.
 const START: u32 = ROW.budget.flash as u32;
+/// The number of bytes in the flash chip, and so the offset at which it ends.
 const END: u32 = ROW.flash.size as u32;
+/// The unit in which flash is erased.
 const SECTOR_BYTES: usize = 4096;
 /// Room for all of the working memory, with a page before it and less than a sector of figures.
 const JOB_BYTES: u32 = (128 << 10) + SECTOR_BYTES as u32;
 
-/// The place of a record in the flash.
+/// Returns where in the flash a record is kept.
 pub const fn slots(record: Record) -> Slots {
     match record {
         Record::Settings => Slots { start: START, bytes: SECTOR_BYTES as u32 },
@@ -49,7 +51,7 @@ const _: () = {
     assert!(slots(Record::Parameters).start + 2 * slots(Record::Parameters).bytes <= END);
 };
 
-/// The flash. Addresses count from its beginning.
+/// The flash in which records are kept. Addresses count from its beginning.
 pub struct Flash(());
 
 /// The functions of the boot ROM, and the boot loader that sets up the flash for reading at full
@@ -59,46 +61,60 @@ struct Rom {
     connect: unsafe extern "C" fn(),
     /// Ends the mode in which the flash is mapped to memory.
     leave_mapping: unsafe extern "C" fn(),
-    /// Erases a range.
+    /// Erases a range of the flash: its start, its size, and the size and the command of a larger
+    /// block.
     erase: unsafe extern "C" fn(u32, usize, u32, u8),
-    /// Writes a range.
+    /// Writes to the flash: where, from which address in memory, and how many bytes.
     write: unsafe extern "C" fn(u32, *const u8, usize),
     /// Empties the flash's cache.
     flush_cache: unsafe extern "C" fn(),
-    /// Sets up the flash for reading at full speed.
+    /// Runs the boot loader, which sets up the flash for reading at full speed.
     boot_2: unsafe extern "C" fn(),
 }
 
-/// An operation on the flash.
+/// A piece of work on the flash, during which nothing can be read from it.
 enum Work<'p> {
+    /// Erases whole sectors.
     Erase {
+        /// Where the first sector begins, in bytes from the beginning of the flash.
         from: u32,
+        /// How much is erased: a multiple of [`SECTOR_BYTES`].
         bytes: usize,
     },
     /// Writes a page, which is in RAM.
     Write {
+        /// Where the page lies, in bytes from the beginning of the flash.
         to: u32,
+        /// The bytes that are written to the page.
         page: &'p [u8; PAGE_BYTES],
     },
     /// Asks the chip for its unique number, which follows the bytes of the command.
     Number {
+        /// The bytes that are sent to the chip. Each is replaced by the byte that comes back
+        /// meanwhile.
         exchanged: &'p mut [u8; NUMBER_COMMAND],
     },
 }
 
 /// The length of the exchange: the command, four bytes without meaning, and the answer.
 const NUMBER_COMMAND: usize = 1 + 4 + 8;
+/// The chip's command that asks for its unique number.
 const READ_NUMBER: u8 = 0x4B;
 
 /// The override of the level of the pin that selects the flash chip (data sheet, 2.19.6.2).
 mod select {
+    /// The bits that say whether and how the level is overridden.
     pub const OVERRIDE: u32 = 3 << 8;
+    /// The override that makes the pin low, so that the flash chip listens.
     pub const LOW: u32 = 2 << 8;
+    /// The pin is high, so the chip does not listen.
     pub const HIGH: u32 = 3 << 8;
 }
 /// Bits of the status of the serial line to the flash chip (data sheet, 4.10.13).
 mod line {
+    /// The bit that says that there is room for another byte to send.
     pub const HAS_PLACE: u32 = 1 << 1;
+    /// The bit that says that a received byte can be read.
     pub const HAS_BYTE: u32 = 1 << 3;
 }
 
@@ -164,6 +180,7 @@ impl Flash {
         digits
     }
 
+    /// Does a piece of work on the flash, with interrupts masked.
     #[inline(never)] // `cargo xtask build` recognises it by its name: nothing moves meanwhile.
     fn work(&mut self, mut work: Work<'_>) {
         emergency::feed();

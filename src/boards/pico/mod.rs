@@ -59,12 +59,13 @@ use self::ports::Ports;
 #[used]
 static BOOT_2: [u8; 256] = rp2040_boot2::BOOT_LOADER_W25Q080;
 
+/// The frequency of the crystal on the board, from which all clocks are made.
 const CRYSTAL_HERTZ: u32 = 12_000_000;
 
-/// The board's row in the table.
+/// What the table of the boards says about this board: its clock, pins and capacities.
 const ROW: &BoardRow = &table::PICO;
 
-/// The board's memory.
+/// The plotter's memory, with the capacities of this board.
 type BoardMemory = Memory<
     { ROW.memory.vertices },
     { ROW.memory.corners },
@@ -72,10 +73,13 @@ type BoardMemory = Memory<
     { ROW.memory.ports },
 >;
 
-/// The board, as the plotter sees it.
+/// The board as the plotter sees it: it implements [`Board`].
 pub struct Pico {
+    /// The two serial ports, from which commands come and to which replies go.
     ports: Ports,
+    /// The main loop's end of the queue of step events.
     steps: steps::Steps,
+    /// The flash in which records are kept.
     flash: flash::Flash,
     /// The fault after which the board restarted, if any.
     fault: Option<emergency::Cause>,
@@ -176,7 +180,8 @@ impl Board for Pico {
     }
 
     fn show_drive(&mut self) {
-        /// The time in which the last reply is sent on the slower port, in microseconds.
+        /// How long to wait until the last reply has been sent, even on the slower of the two
+        /// ports, in microseconds.
         const SENDING: u32 = 100_000;
         let began = clock::microseconds();
         while clock::microseconds().wrapping_sub(began) < SENDING {

@@ -8,8 +8,10 @@ use penup::machine::servo;
 const SLICE: usize = ROW.pins.pen as usize / 2;
 const _: () = assert!(ROW.pins.pen % 2 == 1 && SLICE < 8, "output B of a slice");
 
-/// The divider that makes the unit a microsecond; the register counts sixteenths.
+/// Divides the clock so that the PWM slice counts microseconds. The register for it holds
+/// sixteenths.
 const DIVIDER: u32 = (super::clock::HERTZ / 1_000_000) << 4;
+/// The bit that lets the slice run.
 const ENABLE: u32 = 1;
 
 /// Starts the pulses with the pen raised.

@@ -3,6 +3,7 @@
 use penup::board_table::Pins;
 use rp2040_hal::gpio::{DynBankId, DynFunction, DynPinId, DynPullType, DynSioConfig, new_pin};
 
+/// The numbers of the machine's pins, from the table of the boards.
 const PINS: Pins = super::ROW.pins;
 
 /// The first of five consecutive pins: STEP_X, STEP_Y, DIR_X, DIR_Y and ENABLE.

@@ -16,25 +16,27 @@ use crate::boards::line::{self, Line, ReceiveMerge, Shared};
 /// A serial port, by its number.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Port {
-    /// UART0.
+    /// UART0, at two pins.
     Uart = 0,
-    /// USB.
+    /// The serial port over USB.
     Usb = 1,
 }
 
+/// The number of serial ports, of which both are read.
 const COUNT: usize = 2;
 
 /// One bit for each port that has received an undamaged byte. The handlers of the ports write it;
 /// they have the same priority.
 static HAS_RECEIVED: AtomicU8 = AtomicU8::new(0);
 
+/// For each port, the data that its handler and the main loop share.
 static SHARED: [Shared; COUNT] = [const { Shared::new() }; COUNT];
 
 /// The data that the handlers of both ports share. They have the same priority, so neither
 /// interrupts the other.
 static INLETS: Owned<Inlets> = Owned::empty();
 
-/// The receiving ends of both ports.
+/// The receive interrupts' side of both ports.
 pub struct Inlets {
     /// The receiving end of each port, by its number.
     inlets: [ReceiveMerge; COUNT],
@@ -42,17 +44,19 @@ pub struct Inlets {
     pub aborts: u32,
 }
 
-/// The main loop's end of the ports.
+/// The main loop's side of both ports: it reads bytes from both as one plotter, and replies to
+/// both.
 pub struct Ports {
     /// The main loop's ends of the receiving queues.
     lines: [Line; COUNT],
-    /// The port whose byte was read last.
+    /// The number of the port where the next byte is looked for first: the same port until its line
+    /// ends.
     last: usize,
-    /// Whether replies go to USB alone.
+    /// Whether replies go to USB alone, because a program has just opened that port.
     only_to_opened: bool,
-    /// The sender of UART0.
+    /// The end by which the main loop sends bytes to UART0.
     pub uart: serial::Sender,
-    /// The sender of USB.
+    /// The end by which the main loop sends bytes to USB.
     pub usb: usb::Sender,
 }
 
@@ -159,7 +163,7 @@ impl Ports {
     }
 }
 
-/// Whether replies go to a port.
+/// Whether the replies to commands are sent to a port.
 fn gets_replies(port: Port) -> bool {
     let received = HAS_RECEIVED.load(Ordering::Relaxed);
     received == 0 || received & 1 << port as u8 != 0

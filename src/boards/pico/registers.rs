@@ -16,6 +16,8 @@ use crate::boards::pl011::Uart;
 pub struct Registers<B>(*const B);
 
 impl<B> Registers<B> {
+    /// Gives access to the register block at the address `block`.
+    ///
     /// # Safety
     /// A register block of this type lies at the address, and its registers may be read and written
     /// at any time by the code that has it.
@@ -34,9 +36,9 @@ impl<B> Deref for Registers<B> {
     }
 }
 
-/// Reading all bits of a register.
+/// Gives registers a method that reads all their bits.
 pub trait Get {
-    /// The bits of the register.
+    /// Returns the bits of the register.
     fn get(&self) -> u32;
 }
 
@@ -47,14 +49,14 @@ impl<R: Readable + RegisterSpec<Ux = u32>> Get for Reg<R> {
     }
 }
 
-/// Writing all bits of a register.
+/// Gives registers methods that write their bits.
 pub trait Put {
-    /// Writes the bits of the register.
+    /// Writes all bits of the register.
     fn put(&self, bits: u32);
     /// Sets `bits` of the register in one write, by its alias (data sheet, 2.1.2). The core's own
     /// registers and those of SIO have none.
     fn set(&self, bits: u32);
-    /// Clears `bits` of the register in one write, in the same way.
+    /// Clears `bits` of the register in one write, by its alias, as [`Put::set`] sets them.
     fn clear(&self, bits: u32);
 }
 
@@ -103,7 +105,8 @@ pub const TIMER: Registers<pac::timer::RegisterBlock> = unsafe { Registers::at(p
 pub const SIO: Registers<pac::sio::RegisterBlock> = unsafe { Registers::at(pac::SIO::PTR) };
 /// The power-on state machine, which selects what a reset affects. Used by `emergency`.
 pub const PSM: Registers<pac::psm::RegisterBlock> = unsafe { Registers::at(pac::PSM::PTR) };
-/// The watchdog. Used by `emergency`.
+/// The registers of the watchdog, which restarts the chip if the program hangs. Used by
+/// `emergency`.
 pub const WATCHDOG: Registers<pac::watchdog::RegisterBlock> =
     unsafe { Registers::at(pac::WATCHDOG::PTR) };
 /// Direct memory access. `steps` uses channel 0, and `serial` uses channels 1 and 2.
@@ -121,16 +124,22 @@ pub const USB_MEMORY: Registers<pac::usbctrl_dpram::RegisterBlock> =
     unsafe { Registers::at(pac::USBCTRL_DPRAM::PTR) };
 /// The serial line to the flash chip. Used by `flash`, while nothing else reads the flash.
 pub const SSI: Registers<pac::xip_ssi::RegisterBlock> = unsafe { Registers::at(pac::XIP_SSI::PTR) };
-/// The pins of that line. Used by `flash` in the same way.
+/// The pins of the serial line to the flash chip. Used by `flash`, while nothing else reads the
+/// flash.
 pub const IO_QSPI: Registers<pac::io_qspi::RegisterBlock> =
     unsafe { Registers::at(pac::IO_QSPI::PTR) };
 
-/// Bits of the reset register.
+/// The bits of the peripherals in the reset register.
 pub mod reset {
+    /// The bit of the DMA controller.
     pub const DMA: u32 = 1 << 2;
+    /// The bit of the first block of programmable input and output.
     pub const PIO0: u32 = 1 << 10;
+    /// The bit of the PWM unit.
     pub const PWM: u32 = 1 << 14;
+    /// The bit of the timer.
     pub const TIMER: u32 = 1 << 21;
+    /// The bit of the first UART.
     pub const UART0: u32 = 1 << 22;
 }
 

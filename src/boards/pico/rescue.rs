@@ -13,7 +13,7 @@ use super::emergency::{self, Cause};
 use super::ports::Ports;
 use super::usb;
 
-/// Answers the ports forever.
+/// Answers both ports forever, without moving anything.
 pub fn run(mut ports: Ports, cause: &Cause) -> ! {
     tell(&mut ports, cause);
     let mut line = heapless::String::<8>::new();
@@ -42,7 +42,7 @@ pub fn run(mut ports: Ports, cause: &Cause) -> ! {
                 line.clear();
                 tell(&mut ports, cause);
                 let mut reply = Cause::new();
-                // It is short.
+                // This never fails, because the reply is short.
                 let _ = write!(reply, "error:{}\r\n", CommandError::Locked.number());
                 ports.write(reply.as_bytes());
             }
@@ -53,6 +53,7 @@ pub fn run(mut ports: Ports, cause: &Cause) -> ! {
     }
 }
 
+/// Writes the fault and its alarm to the ports, as a reply that a sender understands.
 fn tell(ports: &mut Ports, cause: &Cause) {
     ports.write(b"\r\n[MSG:the program faults as soon as it starts, ctrl-X tries again: ");
     ports.write(cause.as_bytes());

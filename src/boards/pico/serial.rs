@@ -37,13 +37,17 @@ const MARGIN: u32 = 64;
 const TURN: u32 = 1 << 14;
 const _: () = assert!(TURN.is_multiple_of(RING_SLOTS));
 
+/// The memory into which DMA writes received bytes, in turn from its beginning to its end.
 #[repr(align(2048))] // The channels wrap around only if the ring is aligned to its size.
 struct Ring([AtomicU16; RING_SLOTS as usize]);
 const _: () = assert!(align_of::<Ring>() == size_of::<Ring>());
 
+/// The ring of received bytes.
 static RING: Ring = Ring([const { AtomicU16::new(0) }; RING_SLOTS as usize]);
 
+/// The queue of bytes to send.
 static QUEUE: StaticCell<Queue<u8, SENT_SLOTS>> = StaticCell::new();
+/// The handler's end of the queue of bytes to send.
 static SENDER: Owned<Consumer<'static, u8>> = Owned::empty();
 /// The number of bytes of the ring that have been read, modulo two turns.
 static READ_COUNT: Owned<u32> = Owned::empty();
@@ -51,10 +55,13 @@ static READ_COUNT: Owned<u32> = Owned::empty();
 /// The channels that receive. The channel of the steps has number 0 and takes precedence.
 const CHANNELS: [usize; 2] = [1, 2];
 
-/// Bits of a channel's control register.
+/// Bits of the control register of a DMA channel.
 mod control {
+    /// The channel is transferring, or has still to.
     pub const BUSY: u32 = 1 << 24;
+    /// The channel waits for the UART's receiver before each byte.
     const REQUEST_OF_UART0_RECEIVER: u32 = 21 << 15;
+    /// The channel causes no interrupt when its count has run down.
     const QUIET: u32 = 1 << 21;
     /// Enabled, half-words, writing around the ring; then the channel `next` goes on.
     pub const fn receive_before(next: usize) -> u32 {
@@ -63,7 +70,7 @@ mod control {
     }
 }
 
-/// The main loop's end of the queue of bytes to send.
+/// Sends bytes by UART0: the main loop's side of the queue of bytes to send.
 pub struct Sender(Producer<'static, u8>);
 
 /// Sets up the port; [`open`] opens it. Both `ports` and `steps` must be set up before, because
@@ -101,8 +108,8 @@ pub fn open() {
     UART0.enable();
 }
 
-/// Triggers the port's handler so that it reads what has been received. It is called every
-/// millisecond.
+/// Has the serial port's interrupt handler read the bytes that were received, and send what waits.
+/// It is called every millisecond.
 pub fn request_read() {
     NVIC::pend(Interrupt::UART0_IRQ);
 }

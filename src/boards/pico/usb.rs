@@ -44,6 +44,7 @@ use crate::boards::handler::Owned;
 /// The USB number for tests and for projects without a number of their own:
 /// <https://pid.codes/1209/0001>.
 const VENDOR_AND_PRODUCT: UsbVidPid = UsbVidPid(0x1209, 0x0001);
+/// The greatest size of a packet, in bytes.
 const PACKET: usize = 64;
 /// The size of a sent packet. After a full packet, an empty one would be needed for the host to see
 /// the end.
@@ -65,16 +66,23 @@ const BUS_RESET: u32 = 1 << 12;
 
 /// Bits of the control word of an endpoint's buffer.
 mod buffer {
+    /// The controller has the buffer, and the host may take it.
     pub const AVAILABLE: u32 = 1 << 10;
+    /// The packet is one of the odd ones (DATA1). Even and odd packets alternate, so that the host
+    /// notices a repeated one.
     pub const IS_DATA_1: u32 = 1 << 13;
+    /// The bit that says that the buffer holds a packet.
     pub const FULL: u32 = 1 << 15;
     /// Cycles of the core after which a packet of 64 bytes that has already begun is over: 60
     /// microseconds.
     pub const CYCLES: u32 = 7500;
 }
 
+/// The USB bus of the driver, which its other parts borrow.
 static BUS: StaticCell<UsbBusAllocator<UsbBus>> = StaticCell::new();
+/// The queue of bytes to send.
 static QUEUE: StaticCell<Queue<u8, SENT_SLOTS>> = StaticCell::new();
+/// The device, which belongs to the USB handler.
 static DEVICE: Owned<Device> = Owned::empty();
 
 /// Whether the host takes nothing. The main loop sets it, and the handler clears it.
@@ -93,31 +101,31 @@ struct Device {
     device: UsbDevice<'static, UsbBus>,
     /// The serial port of the driver.
     class: CdcAcmClass<'static, UsbBus>,
-    /// Whether the host has configured the device.
+    /// Whether the host has configured the device, so that bytes can be exchanged.
     is_up: bool,
     /// Whether a program has the port open, according to DTR.
     is_open: bool,
-    /// The workaround for erratum E5.
+    /// Connects the board to the bus in spite of the chip's erratum E5.
     connection: Connection,
     /// Whether the host resets the bus and the interrupt that reports it is masked.
     awaits_bus: bool,
-    /// The workaround for erratum E15.
+    /// Says when a packet may be sent in spite of the chip's erratum E15.
     frame: Frame,
-    /// The received bytes that wait for room.
+    /// The received bytes that wait for room in the queue of the main loop.
     waiting: Deque<u8, WAITING_SLOTS>,
     /// Whether the last received byte does not end a line.
     is_in_line: bool,
     /// The value of [`Inlets::aborts`] when it was last read.
     aborts: u32,
-    /// The handler's end of the queue of bytes to send.
+    /// The bytes to send, as the handler takes them from the queue.
     to_send: Consumer<'static, u8>,
-    /// The bytes that the controller has not taken yet.
+    /// The bytes of the next packet, which the controller has not taken yet.
     packet: Vec<u8, SENT_PACKET>,
 }
 
-/// The main loop's end of the queue of bytes to send.
+/// Sends bytes by USB: the main loop's side of the queue of bytes to send.
 pub struct Sender {
-    /// The main loop's end of the queue of bytes to send.
+    /// Where the main loop puts the bytes to send.
     bytes: Producer<'static, u8>,
     /// The time since which there has been no room, in microseconds, and the number of bytes that
     /// waited then.
@@ -318,6 +326,7 @@ impl Device {
         }
     }
 
+    /// Discards the bytes that were to be sent.
     fn forget_sent(&mut self) {
         self.packet.clear();
         while self.to_send.dequeue().is_some() {}
@@ -341,8 +350,8 @@ impl Device {
         }
     }
 
-    /// Handles a packet that the host has taken. If it counted as gone, what it missed is
-    /// discarded, because it would be incomplete.
+    /// Notes that the host has taken a packet, so that it is there. If it counted as gone, what it
+    /// missed is discarded, because it would be incomplete.
     fn resume_host(&mut self) {
         if self.is_open && HOST_IS_GONE.load(Ordering::Relaxed) {
             self.forget_sent();
@@ -359,6 +368,8 @@ impl Device {
         }
     }
 
+    /// Passes received bytes on to the line's queue, as far as there is room for them, and reads
+    /// further packets while there is room for those.
     fn receive(&mut self, inlets: &mut Inlets) {
         self.drop_void(inlets);
         loop {
@@ -395,6 +406,7 @@ impl Device {
         }
     }
 
+    /// Sends the bytes that wait, as far as the controller takes them.
     fn send(&mut self) {
         if !self.is_up {
             self.frame.stop();
@@ -417,6 +429,7 @@ impl Device {
     }
 }
 
+/// The interrupt of the USB controller: does all the work of the port.
 #[interrupt]
 fn USBCTRL_IRQ() {
     divider::keep_during(serve);

@@ -99,7 +99,11 @@ core::arch::global_asm!(
 );
 
 unsafe extern "C" {
+    /// Writes the next steps of a train to the words from `words` up to, but not including, `end`.
+    /// See [`write_train`].
     fn penup_write_train(train: *mut StepTrain, words: *mut u32, end: *mut u32);
+    /// Counts the pulses from `words` on, until a word is no pulse or `end` is reached. Returns the
+    /// address of the first word that was not counted. See [`count_pulses`].
     fn penup_count_pulses(
         words: *const u32,
         end: *const u32,

@@ -4,7 +4,9 @@
 use super::ROW;
 use super::registers::{Put, SIO};
 
+/// The bit of the step pin of the motor that lifts the pen.
 const STEP: u32 = 1 << ROW.pins.step_z;
+/// The bit of the direction pin of the motor that lifts the pen.
 const DIRECTION: u32 = 1 << ROW.pins.dir_z;
 
 /// Sets both pins low. They are outputs once they are handed over.
@@ -23,7 +25,7 @@ pub fn set(step: bool, down: bool) {
     level(STEP, step);
 }
 
-/// Ends the pulse.
+/// Ends the step pulse of the motor that lifts the pen.
 pub fn end_pulse() {
     SIO.gpio_out_clr().put(STEP);
 }

@@ -5,7 +5,7 @@ use super::{HomingSpace, Properties};
 use crate::drawing::PagePoint;
 use crate::machine::{Setting, Value};
 
-/// What holds for every CoreXY machine.
+/// What sets a CoreXY machine apart from the other kinds.
 pub(super) const PROPERTIES: Properties = Properties {
     steps_per_mm: [Setting::StepsPerMmX; 2],
     // A diagonal move on the page is √2 times as long for one of the motors.
@@ -17,12 +17,12 @@ pub(super) const PROPERTIES: Properties = Properties {
     homed_length: None,
 };
 
-/// The motors' positions for a position on the page.
+/// Returns the positions of both motors for a position of the pen, in steps.
 pub(super) fn motors(page: PagePoint) -> PagePoint {
     PagePoint { x: page.x + page.y, y: page.x - page.y }
 }
 
-/// The position on the page for positions of the motors, rounded down.
+/// Returns the position of the pen for positions of both motors, in steps and rounded down.
 pub(super) fn page(motors: PagePoint) -> PagePoint {
     PagePoint {
         x: (motors.x.wrapping_add(motors.y)) >> 1,

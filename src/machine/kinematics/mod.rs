@@ -28,27 +28,28 @@ pub enum Kinematics {
     Polargraph(Anchors),
 }
 
-/// What holds for all machines of one kind, whatever their size.
+/// What sets one kind of machine apart from the others, whatever its size.
 #[derive(Debug)]
 pub(super) struct Properties {
     /// The settings that hold the steps per millimetre of x and y on the page.
     pub(super) steps_per_mm: [Setting; 2],
-    /// The most that a motor moves while the pen moves by 1.
+    /// The most steps that a motor makes while the pen moves as far as one step is long: √2 on a
+    /// CoreXY machine, else 1.
     pub(super) motor_ratio: Value,
     /// For the braking rule: how many times as long as a diagonal step of the page the path for one
     /// step of a motor may be.
     pub(super) longest_step: u64,
     /// Whether the travel limits the machine even if [`Setting::SoftLimits`] is off.
     pub(super) is_limited: bool,
-    /// The coordinates in which the machine is homed.
+    /// Whether switches end the travel on the page or that of a motor.
     pub(super) homing_space: HomingSpace,
-    /// The settings that hold the longest way to the switch of each axis.
+    /// The settings that hold how far the switch of each axis may be away.
     pub(super) homing_travel: [Setting; 2],
     /// The setting that holds the coordinate of a homed axis; `None` for 0.
     pub(super) homed_length: Option<Setting>,
 }
 
-/// The coordinates in which a machine is homed.
+/// What the limit switches limit, and so in which coordinates a machine is homed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum HomingSpace {
     /// The page: each switch ends the travel of x or of y.
@@ -57,7 +58,7 @@ pub(super) enum HomingSpace {
     Motors,
 }
 
-/// The end of a segment of a line.
+/// Where a piece of a line ends, for the motors and on the page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SegmentEnd {
     /// The positions of the motors there, in steps.
@@ -70,7 +71,7 @@ pub struct SegmentEnd {
 }
 
 impl Kinematics {
-    /// The kinematics that the settings describe.
+    /// Returns the kinematics that the settings choose and describe.
     pub(super) fn of(settings: &Settings) -> Self {
         match number(settings) {
             0 => Self::Cartesian,
@@ -79,7 +80,7 @@ impl Kinematics {
         }
     }
 
-    /// The properties of the kind that the settings choose.
+    /// Returns the properties of the kind that the settings choose.
     #[inline(never)] // Inlining it at every call would cost too much flash.
     pub(super) fn properties(settings: &Settings) -> &'static Properties {
         match number(settings) {
@@ -166,7 +167,7 @@ impl Kinematics {
     }
 }
 
-/// The value of `$230`, which chooses the kind.
+/// Returns the value of `$230`, which chooses the kind: 0 Cartesian, 1 CoreXY, 2 polargraph.
 fn number(settings: &Settings) -> i32 {
     settings.get(Setting::Kinematics).to_bits() >> Value::FRAC_NBITS
 }

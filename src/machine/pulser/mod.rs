@@ -19,7 +19,8 @@ use super::Pen;
 use crate::motion::{EventKind, QueueSize, StepBrake, StepEvent};
 use core::sync::atomic::Ordering;
 
-/// The work of the step interrupt.
+/// The work of the step interrupt: it takes step events from the queue, sets the pins as they say,
+/// and brakes where few wait.
 ///
 /// A step takes two calls: [`Pulser::tick`] raises the step pins, and [`Pulser::end_pulses`] lowers
 /// them. Some more calls of [`Pulser::brake`] follow where the queue may run empty at speed. There
@@ -27,32 +28,32 @@ use core::sync::atomic::Ordering;
 /// measured in the boards' modules.
 #[derive(Debug)]
 pub struct Pulser<'q, A, P, const N: usize> {
-    /// The axes' pins.
+    /// The pins of the motors.
     axes: A,
-    /// The actuator of the pen.
+    /// The servo or solenoid that moves the pen.
     pen: P,
-    /// The ring buffer of the events.
+    /// The queue from which events are taken.
     ring: &'q EventRing<N>,
-    /// The state shared with the main loop.
+    /// The orders of the main loop and the counts for it.
     state: &'q PulserState,
-    /// The ticks of the current event.
+    /// The ticks from the current event to the next.
     ticks: u32,
     /// Prevents an abrupt stop at speed when the queue runs empty.
     brake: StepBrake,
 }
 
-/// What [`Pulser::tick`] found in the queue.
+/// What [`Pulser::tick`] found in the queue, and so what the interrupt must do next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Tick {
-    /// An event has begun.
+    /// A step event has begun, and its pins are set.
     Begun {
         /// The time at which the next event is due, in ticks after this event was due.
         ticks: u32,
         /// Whether [`Pulser::end_pulses`] must be called [`PulserState::pulse_ticks`] from now.
         pulses: bool,
     },
-    /// The word was no event, but information about later ones. [`Pulser::brake`] is due at once,
-    /// then the next tick.
+    /// The word was no step event, but information about later ones. [`Pulser::brake`] is due at
+    /// once, then the next tick.
     Told,
     /// The queue is empty or the machine is halted. The current event was the last.
     Over,
@@ -73,8 +74,8 @@ impl<'q, A: Axes, P: Pen, const N: usize> Pulser<'q, A, P, N> {
         (pulser, StepQueue::new(ring, state, A::ORDER))
     }
 
-    /// Call it before the first event, and again after [`Tick::Over`]. Returns whether there is
-    /// anything to do.
+    /// Prepares for the first event after a rest. Call it before the first event, and again after
+    /// [`Tick::Over`]. Returns whether there is anything to do.
     pub fn begin(&mut self) -> bool {
         let has_work = !self.ring.is_empty() || self.is_halted();
         if has_work {
@@ -83,7 +84,7 @@ impl<'q, A: Axes, P: Pen, const N: usize> Pulser<'q, A, P, N> {
         has_work
     }
 
-    /// Begins the next event.
+    /// Takes the next event from the queue and sets the pins as it says.
     #[inline(always)]
     pub fn tick(&mut self) -> Tick {
         const RARE: u32 = (StepEvent::LENGTH | StepEvent::PEN) as u32;
@@ -141,8 +142,8 @@ impl<'q, A: Axes, P: Pen, const N: usize> Pulser<'q, A, P, N> {
         (is_due, least.saturating_sub(self.ticks))
     }
 
-    /// The ticks of the event between the current one and the next step, or 0. They count as well
-    /// where the current event is lengthened.
+    /// Returns the ticks of the event between the current one and the next step, or 0. They count
+    /// as well where the current event is lengthened.
     pub fn wait_behind(&self) -> u32 {
         let others = A::ORDER.pulses | StepEvent::AT_REST | StepEvent::LENGTH | StepEvent::PEN;
         match self.ring.peek() {
@@ -162,7 +163,8 @@ impl<'q, A: Axes, P: Pen, const N: usize> Pulser<'q, A, P, N> {
         self.ring.set_running(false);
     }
 
-    /// Ends the work because the queue is empty.
+    /// Records that the interrupt stops because the queue is empty. [`Pulser::begin`] starts it
+    /// again.
     #[cold]
     #[inline(never)]
     fn run_dry(&mut self) {

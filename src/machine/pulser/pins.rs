@@ -32,7 +32,7 @@ pub struct PinOrder {
     pub(super) pins: [u8; 32],
     /// The levels of a [`StepEvent`] for each combination of the levels of the pins.
     pub(super) levels: [u8; 32],
-    /// The mask of the step pins.
+    /// The bits of the step pins, which a step sets only for a short time.
     pub(super) pulses: u8,
 }
 
@@ -62,9 +62,10 @@ impl PinOrder {
     }
 }
 
-/// The axes' pins, which are all set at once.
+/// The pins of the motors as the interrupt needs them: all of one event are set at once.
 pub trait Axes {
-    /// The order of the pins. Step pins are not inverted.
+    /// Which bit stands for which pin in the levels that [`Axes::set`] gets. No step pin is
+    /// inverted in it.
     const ORDER: &'static PinOrder = &PinOrder::OF_EVENTS;
     /// Sets the pins to `levels`, in bits 0 to 4 in the order of [`Axes::ORDER`]; the other bits
     /// have no meaning. In the order of a [`StepEvent`] they are a high pulse for each step, the
@@ -74,7 +75,7 @@ pub trait Axes {
     /// Sets the direction pin of z, high to lower the pen, and makes a step if `step`
     /// is true. It is called from the interrupt, too.
     fn set_z_axis(&mut self, step: bool, down: bool);
-    /// Ends the pulses. It is called from the interrupt, too.
+    /// Sets all step pins low again. It is called from the interrupt, too.
     fn end_pulses(&mut self);
 }
 

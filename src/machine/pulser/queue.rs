@@ -5,27 +5,28 @@ use super::{EventRing, PinOrder, PulserState};
 use crate::motion::{EventKind, EventQueue, Runner, StepEvent, StepLength};
 use core::sync::atomic::Ordering;
 
-/// The main loop's end of the interrupt's queue.
+/// The main loop's end of the queue: it puts step events in and counts those that the interrupt
+/// took.
 #[derive(Debug)]
 pub struct StepQueue<'q, const N: usize> {
-    /// The ring buffer of the events.
+    /// The queue itself, in which words wait for the interrupt.
     ring: &'q EventRing<N>,
-    /// The state shared with the interrupt.
+    /// The numbers and requests that the main loop shares with the step interrupt.
     state: &'q PulserState,
     /// The order of the axes' pins in the words of the ring.
     order: &'static PinOrder,
     /// The length of the steps that were put in last, in units of the brake's rule.
     step_length: StepLength,
-    /// The slot after the word that was counted last.
+    /// The slot after the word up to which the taken events have been counted.
     counted: u32,
     /// Whether the machine is in motion after the event that was counted last.
     moving: bool,
 }
 
 impl<'q, const N: usize> StepQueue<'q, N> {
-    /// Slots that are reserved for words that only carry information about some of the events.
+    /// Slots that are reserved for words that only carry information about some of the step events.
     const RESERVED: usize = Runner::ROOM;
-    /// The number of events that fit.
+    /// The number of events that fit into the queue at once.
     pub(super) const EVENTS: usize = N - 1 - Self::RESERVED;
 
     /// The queue of events in `ring`, for a board whose pins have this `order`.
@@ -38,12 +39,12 @@ impl<'q, const N: usize> StepQueue<'q, N> {
         Self { ring, state, order, step_length: StepLength::new(), counted, moving: false }
     }
 
-    /// Whether no event waits.
+    /// Whether no event waits for the interrupt.
     pub fn is_empty(&self) -> bool {
         self.ring.is_empty()
     }
 
-    /// Whether at least half of the slots are taken.
+    /// Whether at least half of the slots are taken, so that the steps may begin.
     pub fn is_half_full(&self) -> bool {
         self.ring.waiting() as usize >= N / 2
     }

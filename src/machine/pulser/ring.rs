@@ -7,7 +7,7 @@
 
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering, compiler_fence};
 
-/// A ring buffer of `N` slots, of which all but one can be filled.
+/// The queue of step events: a ring buffer of `N` slots, of which all but one can be filled.
 #[derive(Debug)]
 #[repr(C)] // The words come last, so that the other fields have short offsets.
 pub struct EventRing<const N: usize> {
@@ -18,7 +18,7 @@ pub struct EventRing<const N: usize> {
     filled: AtomicU32,
     /// Whether the interrupt is taking one word after the other. Only the interrupt writes it.
     running: AtomicBool,
-    /// The slots of the ring.
+    /// The slots. A slot holds one step event, or information about later ones.
     words: [AtomicU32; N],
 }
 
@@ -40,7 +40,7 @@ impl<const N: usize> EventRing<N> {
         }
     }
 
-    /// The word in the slot `slot`, and the slot after it.
+    /// Returns the word in the slot `slot`, and the number of the slot after it.
     #[inline(always)]
     fn at(&self, slot: u32) -> (&AtomicU32, u32) {
         let slot = if slot < N as u32 { slot } else { 0 };
@@ -89,12 +89,12 @@ impl<const N: usize> EventRing<N> {
         running
     }
 
-    /// Whether all words have been taken.
+    /// Whether the interrupt has taken all words.
     pub(super) fn is_empty(&self) -> bool {
         self.taken.load(Ordering::Relaxed) == self.filled.load(Ordering::Relaxed)
     }
 
-    /// The number of words that wait to be taken.
+    /// Returns the number of words that wait to be taken.
     pub(super) fn waiting(&self) -> u32 {
         Self::between(self.taken.load(Ordering::Relaxed), self.filled.load(Ordering::Relaxed))
     }

@@ -5,11 +5,11 @@ use crate::array::MapEach;
 use crate::motion::{BrakeOrders, QueueSize};
 use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 
-/// The state that the interrupt and the main loop share. It needs only atomic loads and stores, so
-/// a Cortex-M0+ supports it.
+/// What the step interrupt and the main loop share: orders to the interrupt, and counts of what the
+/// pins have done. It needs only atomic loads and stores, so a Cortex-M0+ supports it.
 ///
-/// Only the main loop writes the commands, and it also writes the counts of the events that it
-/// finds to be taken.
+/// Only the main loop writes the orders, and it also writes the counts of the events that it finds
+/// to be taken.
 #[derive(Debug, Default)]
 pub struct PulserState {
     /// The sum of the steps of x, as a wrapping `i32`.
@@ -26,7 +26,7 @@ pub struct PulserState {
     ticks: AtomicU32,
     /// The number of underruns: the queue ran empty while the machine moved; it wraps.
     underruns: AtomicU32,
-    /// Whether the last event has been processed and its time is over.
+    /// Whether the last step event has been carried out and its time is over.
     pub(super) drained: AtomicBool,
     /// Whether the main loop has halted the pulses, and whether the interrupt has done what that
     /// asks of it: [`Halt`] as a number.
@@ -37,28 +37,28 @@ pub struct PulserState {
     inverted: AtomicU8,
     /// Whether the direction pin of z is inverted.
     z_inverted: AtomicBool,
-    /// The field `steps` of the size of the board's queue.
+    /// How many steps the board's queue holds: the field `steps` of [`QueueSize`].
     queue_steps: AtomicU32,
-    /// The field `full` of the size of the board's queue.
+    /// The field `full` of the board's [`QueueSize`].
     queue_full: AtomicU32,
     /// How the interrupt brakes when its queue runs empty.
     pub(super) brake: BrakeOrders,
 }
 
-/// How far a halt of the pulses has come.
+/// How far a halt of the pulses has come. The main loop requests it, and the interrupt does it.
 #[derive(Debug, Clone, Copy)]
 #[repr(u8)]
 pub(super) enum Halt {
-    /// Pulses are allowed.
+    /// The interrupt may pulse the pins.
     None,
     /// The main loop has halted the pulses. The interrupt still has to raise the pen.
     Requested,
-    /// The interrupt has raised the pen.
+    /// The interrupt has raised the pen and stopped.
     Done,
 }
 
 impl PulserState {
-    /// The state with all counts at 0 and no commands.
+    /// Makes the state in which nothing has been counted and nothing is ordered.
     pub const fn new() -> Self {
         Self {
             x: AtomicU32::new(0),
@@ -98,7 +98,8 @@ impl PulserState {
         self.z.load(Ordering::Relaxed).cast_signed()
     }
 
-    /// Counts a step of the motor of z. For the code that counts the steps.
+    /// Counts a step of the motor that lifts the pen. The board's code that makes these steps calls
+    /// it.
     pub fn count_z_step(&self, down: bool) {
         add(&self.z, if down { 1 } else { u32::MAX });
     }
@@ -113,7 +114,8 @@ impl PulserState {
         self.underruns.load(Ordering::Relaxed)
     }
 
-    /// Whether the last event has been processed and its time is over.
+    /// Whether the last step event has been carried out and its time is over, so that nothing
+    /// moves.
     pub fn is_drained(&self) -> bool {
         self.drained.load(Ordering::Acquire)
     }
@@ -145,8 +147,8 @@ impl PulserState {
         self.halt.store(Halt::None as u8, Ordering::Release);
     }
 
-    /// Adds the steps and ticks of the events that were taken from the queue. Steps are packed as
-    /// in the queue's table, with less than 2^15 for each motor.
+    /// Adds the steps and ticks of the step events that were taken from the queue. Steps are packed
+    /// as in the queue's table, with less than 2^15 for each motor.
     pub(super) fn count(&self, steps: u32, slack: u32, ticks: u32) {
         for (x, y, packed) in [(&self.x, &self.y, steps), (&self.slack_x, &self.slack_y, slack)] {
             let dx = i32::from(packed as u16 as i16).cast_unsigned();
@@ -166,7 +168,8 @@ impl PulserState {
         self.drained.store(drained, Ordering::Release);
     }
 
-    /// Reports the sums of the steps that took up slack, for such a board.
+    /// Reports the sums of the steps that took up slack, for a board that calls
+    /// [`PulserState::report`].
     pub fn report_slack(&self, (x, y): (i32, i32)) {
         self.slack_x.store(x.cast_unsigned(), Ordering::Relaxed);
         self.slack_y.store(y.cast_unsigned(), Ordering::Relaxed);

@@ -43,11 +43,11 @@ impl SettingInfo {
     }
 }
 
-/// Why a change of a setting was refused.
+/// The reasons why a change of a setting is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum SettingError {
-    /// No setting has this number.
+    /// No setting of the machine has this number.
     Unknown,
     /// The value is below `least` or above `greatest` of [`Setting::info`].
     OutOfRange(Setting),
@@ -65,7 +65,7 @@ pub enum SettingError {
 /// all of them together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Settings {
-    /// The values, in the order of [`SETTINGS`].
+    /// The value of each setting, in the order of [`SETTINGS`].
     values: [Value; SETTINGS.len()],
 }
 
@@ -127,7 +127,7 @@ impl Settings {
         SETTINGS.iter().zip(self.values)
     }
 
-    /// Whether a setting whose value is 0 or 1 is 1.
+    /// Whether a setting is on. It is for those whose value is 0 (off) or 1 (on).
     pub fn is_on(&self, setting: Setting) -> bool {
         self.get(setting) != 0
     }
@@ -142,24 +142,25 @@ impl Settings {
         (self.get(setting).to_bits().max(0) >> Value::FRAC_NBITS).unsigned_abs()
     }
 
-    /// Converts a setting in microseconds to ticks.
+    /// Converts a setting in microseconds to ticks, the unit of time of step events.
     pub fn microseconds_as_ticks(&self, setting: Setting) -> u32 {
         self.as_ticks(setting, TICKS_PER_SECOND / 1_000_000)
     }
 
-    /// Converts a setting in milliseconds to ticks.
+    /// Converts a setting in milliseconds to ticks, the unit of time of step events.
     pub fn milliseconds_as_ticks(&self, setting: Setting) -> u32 {
         self.as_ticks(setting, TICKS_PER_SECOND / 1000)
     }
 
-    /// Converts a setting that is a time to ticks.
+    /// Converts a setting that is a time to ticks. `ticks_per_unit` is the number of ticks in its
+    /// unit.
     fn as_ticks(&self, setting: Setting, ticks_per_unit: u32) -> u32 {
         let bits = u64::from(self.get(setting).to_bits().max(0).unsigned_abs());
         // The ranges of the settings keep the result below 2^27 ticks.
         ((bits * u64::from(ticks_per_unit)) >> Value::FRAC_NBITS) as u32
     }
 
-    /// The kinematics of the machine.
+    /// Returns the kinematics that the settings choose and describe.
     pub fn kinematics(&self) -> Kinematics {
         Kinematics::of(self)
     }

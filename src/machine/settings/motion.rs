@@ -23,8 +23,9 @@ impl Settings {
         Limits::new(&self.motion_settings()).unwrap_or_default()
     }
 
-    /// The same limits with two differences: the speed with the pen up is that of the setting
-    /// `travel`, and the jerk is not limited, because the machine must brake soon at a switch.
+    /// Returns the limits for homing. They differ from [`Settings::limits`] in two ways: the speed
+    /// with the pen up is that of the setting `travel`, and the jerk is not limited, because the
+    /// machine must brake soon at a switch.
     pub(in crate::machine) fn limits_at(&self, travel: Setting) -> Limits {
         let settings = MotionSettings {
             travel_mm_per_min: self.get(travel).min(self.axes_rate()),
@@ -41,13 +42,13 @@ impl Settings {
         limits.brake(fastest, Kinematics::properties(self).longest_step, queue)
     }
 
-    /// The length of the dots of a dotted line.
+    /// Returns the length of the dots of a dotted line.
     pub(in crate::machine) fn dot_length(&self) -> PathLength {
         // The setting is positive, and a unit of it is four units of the length.
         PathLength::from_bits(self.get(Setting::DotLength).to_bits().unsigned_abs() << 2)
     }
 
-    /// The speed of the slower axis, in mm/min.
+    /// Returns the greatest speed that both axes allow, in mm/min.
     fn axes_rate(&self) -> Value {
         self.get(Setting::MaxRateX).min(self.get(Setting::MaxRateY))
     }

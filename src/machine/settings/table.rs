@@ -3,12 +3,12 @@
 
 use super::Value;
 
-/// The settings, in the order of [`SETTINGS`].
+/// The settings of the machine, which it keeps. They are in the order of [`SETTINGS`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum Setting {
-    /// `$0` The width of a step pulse.
+    /// `$0` The width of a step pulse, in microseconds.
     StepPulse,
     /// `$1` How long the drivers stay on after a move; 255 for always, which is the only choice.
     StepIdleDelay,
@@ -62,21 +62,21 @@ pub enum Setting {
     StepsPerMmY,
     /// `$102` Steps per millimetre of z, whose motor lifts the pen.
     StepsPerMmZ,
-    /// `$110` The greatest speed of x.
+    /// `$110` The greatest speed of x, in mm/min.
     MaxRateX,
-    /// `$111` The greatest speed of y.
+    /// `$111` The greatest speed of y, in mm/min.
     MaxRateY,
-    /// `$112` The greatest speed of z.
+    /// `$112` The greatest speed of z, in mm/min.
     MaxRateZ,
-    /// `$120` The acceleration of x.
+    /// `$120` The greatest acceleration of x, in mm/s².
     AccelerationX,
-    /// `$121` The acceleration of y.
+    /// `$121` The greatest acceleration of y, in mm/s².
     AccelerationY,
-    /// `$122` The acceleration of z.
+    /// `$122` The greatest acceleration of z, in mm/s².
     AccelerationZ,
-    /// `$130` The travel of x, from 0.
+    /// `$130` How far x may go from 0, in mm.
     TravelX,
-    /// `$131` The travel of y, from 0.
+    /// `$131` How far y may go from 0, in mm.
     TravelY,
     /// `$132` The travel of z from its upper stop to height 127.
     TravelZ,
@@ -128,7 +128,7 @@ pub enum Setting {
     AnchorLeft,
     /// `$233` The height of the anchors above the origin.
     AnchorHeight,
-    /// `$234` The length of a belt when it is homed.
+    /// `$234` The length of a belt when it is homed, in mm.
     HomedBelt,
     /// `$235` The backlash of x: the travel that is lost when its motor reverses.
     BacklashX,
@@ -140,24 +140,24 @@ pub enum Setting {
     ParkY,
 }
 
-/// The description of a setting.
+/// The description of a setting: what its row in the table says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SettingInfo {
-    /// The setting that is described.
+    /// The setting that this row of the table describes.
     pub setting: Setting,
-    /// The number after the `$`.
+    /// The number by which the user changes it, as in `$100=80`.
     pub number: u16,
-    /// The name in the listing.
+    /// What it is, in the words of the list that `$$` prints.
     pub name: &'static str,
     /// The unit; empty for a plain number.
     pub unit: &'static str,
-    /// The least value allowed.
+    /// The least value that the setting may have.
     pub least: Value,
-    /// The greatest value allowed.
+    /// The greatest value that the setting may have.
     pub greatest: Value,
-    /// The default value.
+    /// The value that it has until the user changes it.
     pub default: Value,
-    /// Whether only whole numbers are allowed.
+    /// Whether the setting takes whole numbers only.
     pub whole: bool,
 }
 
@@ -271,7 +271,7 @@ const _: () = {
 };
 
 impl Setting {
-    /// The description of this setting.
+    /// Returns the row of the table that describes this setting.
     pub const fn info(self) -> &'static SettingInfo {
         &SETTINGS[self as usize]
     }

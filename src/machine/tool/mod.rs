@@ -21,17 +21,17 @@ pub trait Pen {
     fn set_height(&mut self, height: u8);
 }
 
-/// The kinds of tool that the settings choose from, by `$209`.
+/// What moves the pen, as `$209` chooses it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Tool {
-    /// An actuator that is told a height: see [`Pen`].
+    /// The servo or solenoid of the board, which is told a height: see [`Pen`].
     Actuator,
-    /// A stepper motor on the z axis.
+    /// A stepper motor on the z axis lifts the pen.
     Stepper,
 }
 
 impl Tool {
-    /// The tool that the settings choose.
+    /// Returns the kind of tool that the settings choose.
     fn of(settings: &Settings) -> Self {
         if settings.is_on(Setting::Tool) { Self::Stepper } else { Self::Actuator }
     }

@@ -6,10 +6,12 @@ use crate::machine::estimate::rest_to_rest;
 use crate::machine::{Setting, Settings, Value};
 use crate::motion::{LiftRule, LimitsError};
 
-/// The greatest step rate of the motor, in steps per second. Every board can keep up with it.
+/// The greatest step rate of the motor that lifts the pen, in steps per second. Every board can
+/// keep up with it.
 const GREATEST_RATE: u32 = 10_000;
 
-/// Travel, speed and acceleration of the motor.
+/// Returns how far, how fast and with what acceleration the motor lifts the pen, in its steps, as
+/// the settings say.
 ///
 /// # Errors
 /// [`LimitsError::TooManySteps`] if it would have to step faster than every board can.

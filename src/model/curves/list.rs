@@ -14,18 +14,20 @@ use crate::model::store::Store;
 pub(in crate::model) struct CurveList {
     /// The number of half-words of completed curves. Those of the unfinished curve follow.
     pub(super) completed: usize,
-    /// The number of completed curves.
+    /// The number of curves that were completed by `end`.
     pub count: usize,
-    /// The degree of the curves that follow, once it is set.
+    /// The degree of the curves that follow, or `None` before the user has sent one.
     degree: Option<u8>,
-    /// The unfinished curve.
+    /// The curve that has begun but not ended, if there is one.
     unfinished: Option<Unfinished>,
 }
 
-/// An unfinished curve: its `end` has not come yet.
+/// A curve that has begun, but whose `end` has not come yet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Unfinished {
+    /// The order of the curve, which is its degree plus 1.
     order: u8,
+    /// The number of control points of the curve.
     control_points: u16,
     /// The two parameters of `curv`, in units of 2^-[`FINEST`], with |value| <= 2^44.
     ends: [i64; 2],
@@ -40,7 +42,7 @@ const FINEST: u32 = 22;
 const UNIFORM_BITS: u32 = 16;
 
 impl CurveList {
-    /// Returns the completed curves.
+    /// Returns the completed curves, without the unfinished one.
     pub fn curves<'a, I: Index>(&self, store: &'a Store<'_, I>) -> Curves<'a, I> {
         Curves { halves: store.curves().get(..self.completed).unwrap_or(&[]) }
     }
@@ -177,7 +179,7 @@ impl CurveList {
         Ok(())
     }
 
-    /// Whether there is an unfinished curve.
+    /// Whether a curve has begun but not ended.
     pub fn is_unfinished(&self) -> bool {
         self.unfinished.is_some()
     }

@@ -15,20 +15,20 @@ use crate::curve::{CurveError, Fine, Knots, Parameter, Point, Spline};
 use crate::index::Index;
 use crate::stage::{Cancel, OutOfScratch, StageError};
 
-/// A stored curve.
+/// One curve as the model stores it: its control points, its knots, its ends and its pen.
 #[derive(Debug, Clone, Copy)]
 pub struct StoredCurve<'a, I = u16> {
-    /// The degree plus 1.
+    /// The order of the curve, which is its degree plus 1.
     pub order: u8,
-    /// The pen that draws it, from 0.
+    /// The pen that draws the curve, from 0.
     pub pen: u8,
     /// The vertex numbers of its control points, from 0.
     pub control: &'a [I],
-    /// Its knots.
+    /// The knots, which are the parameter values where its polynomials meet.
     pub knots: Knots<'a>,
-    /// The parameter at which it begins.
+    /// The parameter at which the curve begins.
     pub from: Parameter,
-    /// The parameter at which it ends.
+    /// The parameter at which the curve ends.
     pub to: Parameter,
 }
 
@@ -90,7 +90,7 @@ impl<'a, I: Index> Curves<'a, I> {
     ///
     /// # Errors
     /// [`StageError::Aborted`], or what `each` returns.
-    // Not inlined, so that its stack frame is not below those of the stages.
+    // Not inlined, so that its variables take no stack while a job is computed.
     #[inline(never)]
     pub fn flatten(
         &self,

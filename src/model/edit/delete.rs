@@ -156,7 +156,8 @@ pub(super) fn element_length<I: Index>(corners: &[Corner<I>]) -> Option<usize> {
     corners.iter().position(|corner| corner.is_last()).map(|last| last + 1)
 }
 
-/// Reverses the order of a face's corners, beginning at the same vertex.
+/// Reverses the order of a face's corners, so that it faces the other way. It begins at the same
+/// vertex.
 pub(super) fn reverse<I: Index>(face: &mut [Corner<I>]) {
     let Some((_, rest)) = face.split_first_mut() else { return };
     rest.reverse();

@@ -16,7 +16,7 @@ pub(super) const SCALE_LIMIT: i64 = 1 << (20 + UNIT_BITS);
 /// fits 64 bits.
 const NORMAL_BITS: u32 = 28;
 
-/// A map of positions to positions.
+/// How an edit moves vertices: a matrix and a shift, or a reflection.
 pub(super) enum Map {
     /// The rows of a matrix in units of 2^-[`UNIT_BITS`], and the vector that is added.
     Affine([[i64; 3]; 3], [i64; 3]),
@@ -26,7 +26,7 @@ pub(super) enum Map {
 }
 
 impl Map {
-    /// The shift of a map that leaves the origin where it is.
+    /// The shift of an affine map by which nothing is shifted.
     pub(super) const NO_SHIFT: [i64; 3] = [0; 3];
 
     /// Returns the matrix with these entries on its diagonal and zeros elsewhere.
@@ -74,13 +74,14 @@ impl Map {
     }
 }
 
+/// Limits a coordinate to ±2^62, far beyond what a model can hold. Later checks refuse it.
 fn within(value: i128) -> i64 {
     const LIMIT: i128 = 1 << 62;
     value.clamp(-LIMIT, LIMIT) as i64
 }
 
 impl<I: Index> Model<'_, I> {
-    /// Returns the reflection about the plane of three vertices.
+    /// Returns the reflection about the plane through three vertices, given by their numbers.
     pub(super) fn reflection(&self, numbers: [i32; 3]) -> Result<Map, ModelError> {
         let vertices = self.vertices.len();
         let mut corners = [Position::default(); 3];
@@ -154,7 +155,7 @@ impl<I: Index> Model<'_, I> {
 /// Converts a position to a coarser unit. It is rounded towards zero, as when the unit of the model
 /// changes.
 pub(super) fn in_unit(position: [i64; 3], coarser: u32) -> Position {
-    // It fits: see `coarser_for`.
+    // Each coordinate fits 32 bits: see `coarser_for`.
     let [x, y, z] = position.map_each(|c| ((c.abs() >> coarser) * c.signum()) as i32);
     Position { x, y, z }
 }

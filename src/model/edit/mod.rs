@@ -24,13 +24,13 @@ use map::{Map, SCALE_LIMIT, UNIT_BITS};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ElementKind {
-    /// The vertices (joints).
+    /// The vertices, which Cárdenas & Seeley call joints.
     Vertices,
-    /// The bars.
+    /// The bars, straight lines that belong to no face.
     Bars,
-    /// The faces.
+    /// The faces, flat polygons that hide what is behind them.
     Faces,
-    /// The curves.
+    /// The curves, which are B-splines.
     Curves,
 }
 
@@ -44,11 +44,11 @@ pub enum Edit {
     Delete(ElementKind, [i32; 2]),
     /// Deletes one element; the last one gets its number.
     Plug(ElementKind, i32),
-    /// Moves a vertex to a position.
+    /// Moves one vertex, given by its number, to a position.
     Move(i32, [Decimal; 3]),
-    /// Adds a vector to the vertices.
+    /// Moves vertices by a vector.
     Translate([Decimal; 3], Numbers),
-    /// Multiplies each coordinate by its factor.
+    /// Multiplies the x, the y and the z of vertices by a factor each.
     Scale([Decimal; 3], Numbers),
     /// Rotates about an axis (0 to 2) through the origin by an angle in degrees, counter-clockwise
     /// as seen from the positive end of the axis.
@@ -65,11 +65,11 @@ pub enum Edit {
 pub struct Change {
     /// The change of the number of vertices (joints).
     pub vertices: i32,
-    /// The change of the number of bars.
+    /// By how much the number of bars of the model changes; negative if it falls.
     pub bars: i32,
-    /// The change of the number of faces.
+    /// By how much the number of faces of the model changes; negative if it falls.
     pub faces: i32,
-    /// The change of the number of curves.
+    /// By how much the number of curves of the model changes; negative if it falls.
     pub curves: i32,
 }
 

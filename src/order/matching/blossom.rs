@@ -74,7 +74,7 @@ impl<I: Index> Node<I> {
 }
 
 impl<I: Index> Matching<'_, '_, I> {
-    /// Links the blossoms, none of which is in use yet, in a list.
+    /// Puts all blossoms, none of which is in use yet, in a list from which new ones are taken.
     pub(super) fn lay_out_spares(&mut self) {
         let vertices = self.top.len();
         for (number, node) in I::all().zip(self.nodes.iter_mut()).skip(vertices) {
@@ -83,16 +83,18 @@ impl<I: Index> Matching<'_, '_, I> {
         }
     }
 
+    /// Whether the node is a blossom. Vertices have the numbers below the count of vertices,
+    /// blossoms those from it on.
     fn is_blossom(&self, node: I) -> bool {
         node.get() >= self.top.len()
     }
 
-    /// Returns the stored dual of a blossom.
+    /// Returns the dual that is stored for a blossom, to be changed.
     fn inside(&mut self, blossom: I) -> &mut i32 {
         &mut self.slack_inside[blossom.get() - self.top.len()]
     }
 
-    /// Adds an outermost node that has no label to the tree.
+    /// Adds an outermost node that has no label to the alternating tree, with this label.
     pub(super) fn enter(&mut self, node: I, label: Label) {
         self.set_label(node, label);
         if self.is_blossom(node) {
@@ -144,10 +146,12 @@ impl<I: Index> Matching<'_, '_, I> {
         Some([[base, mate], [below, above]])
     }
 
+    /// Returns the record of a vertex or of a blossom by its number.
     pub(super) fn node(&self, node: I) -> &Node<I> {
         &self.nodes[node.get()]
     }
 
+    /// Returns the record of a vertex or of a blossom by its number, to be changed.
     pub(super) fn node_mut(&mut self, node: I) -> &mut Node<I> {
         &mut self.nodes[node.get()]
     }
@@ -168,7 +172,7 @@ impl<I: Index> Matching<'_, '_, I> {
         depth
     }
 
-    /// Returns the lowest common ancestor of two outer nodes.
+    /// Returns the lowest common ancestor of two outer nodes in the alternating tree.
     fn meeting(&self, a: I, b: I) -> I {
         let (mut a, mut b) = (a, b);
         let (mut depth_a, mut depth_b) = (self.depth(a), self.depth(b));
@@ -240,7 +244,7 @@ impl<I: Index> Matching<'_, '_, I> {
         node.set_parent(blossom);
     }
 
-    /// Returns the node of the ring of `blossom` that contains `vertex`.
+    /// Returns the node on the ring of `blossom` that is or contains `vertex`.
     fn within(&self, blossom: I, vertex: I) -> I {
         let mut node = vertex;
         while self.node(node).parent() != blossom {

@@ -29,7 +29,7 @@ use crate::stage::{OutOfScratch, Scratch};
 use blossom::Node;
 use core::cell::Cell;
 
-/// A time later than any event.
+/// A time later than any event, in the units of [`Matching::now`].
 const NEVER: i32 = 1 << 30;
 /// A range without vertices.
 fn nothing<I: Index>() -> Numbers<I> {
@@ -42,11 +42,11 @@ const DISTANCE_LIMIT: u32 = 1 << 27;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 enum Label {
-    /// The node is not in the tree.
+    /// The node is not in the alternating tree, so that its dual does not change.
     Outside = 0,
     /// The node is in the tree, an even number of pairs from the root: its disc grows.
     Outer = 1,
-    /// As `Outer`, but the pairs of the vertex have not been examined yet.
+    /// The node is `Outer`, but the pairs of the vertex have not been examined yet.
     Fresh = 2,
     /// The node is in the tree, an odd number of pairs from the root: its disc shrinks.
     Inner = 3,
@@ -65,7 +65,7 @@ pub const fn scratch_bytes<I: Index>(count: usize) -> usize {
 ///
 /// Returns a lower bound of that length in 1/256 steps. The bound is the length itself, unless the
 /// drawing is so large (above 2^19 steps) that the lengths had to be rounded further.
-#[inline(never)] // Smaller than in its only caller.
+#[inline(never)] // Inlined in its only caller, the code would be larger.
 pub(super) fn pair<'s, I: Index>(
     odd: &'s OddPoints<'s, I>,
     mut scratch: Scratch<'s>,
@@ -83,36 +83,39 @@ pub(super) fn pair<'s, I: Index>(
     Ok(matching.length())
 }
 
-/// The state of the algorithm: the matching so far, its duals, and the present tree.
+/// The matching while it is being found: the pairs so far, their duals (see the module
+/// documentation), and the present tree.
 struct Matching<'s, 'a, I> {
+    /// The points to be paired, which are the vertices of the matching.
     odd: &'s OddPoints<'a, I>,
     /// The vertices, followed by the blossoms.
     nodes: &'s mut [Node<I>],
-    /// The outermost node that contains each vertex.
+    /// For each vertex, the outermost node that contains it: itself, or a blossom.
     top: &'s mut [I],
     /// The partner of each vertex that is the base of an outermost node; meaningless for other
     /// vertices.
     mate: &'s mut [I],
-    /// The [`Label`] of each vertex, as a number.
+    /// The role of each vertex in the tree: a [`Label`] as a number.
     label: &'s mut [u8],
-    /// The dual of each vertex. The current value is this plus `now` if its node is outer, and
-    /// minus `now` if it is inner.
+    /// The dual of each vertex, which can be pictured as the radius of a disc. The current value is
+    /// this plus `now` if its node is outer, and minus `now` if it is inner.
     radius: &'s mut [i32],
-    /// The dual of each blossom. If it is outermost and in the tree, the current value is this plus
-    /// twice `now` (outer) or minus twice `now` (inner).
+    /// The dual of each blossom, by which the discs inside it may overlap. If it is outermost and
+    /// in the tree, the current value is this plus twice `now` (outer) or minus twice `now`
+    /// (inner).
     slack_inside: &'s mut [i32],
-    /// A range that contains all fresh vertices.
+    /// A range of vertices that contains all those with the label [`Label::Fresh`].
     fresh: Numbers<I>,
     /// The time at which the best known pair of each vertex with an outer vertex will touch. Times
     /// are values of `now`.
     when: &'s mut [i32],
-    /// The outer vertex of that pair.
+    /// For each vertex, the outer vertex of its pair in `when`.
     best: &'s mut [I],
-    /// A range that contains all odd points for which such a pair is known.
+    /// A range that contains all odd points for which such a pair is recorded.
     reached: Numbers<I>,
     /// The time: how far the duals of the tree have moved since it was started.
     now: i32,
-    /// The greatest radius when the tree was started.
+    /// The greatest radius (dual) of any vertex when the tree was started.
     widest: i32,
     /// The time at which the tree will reach an unmatched vertex by the best pair known.
     limit: i32,
@@ -120,7 +123,7 @@ struct Matching<'s, 'a, I> {
     spare: I,
     /// The blossoms from this number on have never been in use.
     unused: I,
-    /// The number of inner blossoms.
+    /// The number of blossoms in the tree whose discs shrink (those that are inner).
     inner_blossoms: u32,
     /// The number of bits by which the distances are shifted right.
     shortened: u32,
@@ -132,6 +135,8 @@ struct Matching<'s, 'a, I> {
 }
 
 impl<'s, 'a, I: Index> Matching<'s, 'a, I> {
+    /// Makes the state before the first tree: every vertex is a node of its own and unmatched, and
+    /// all duals are 0.
     fn new(
         odd: &'s OddPoints<'a, I>,
         scratch: &mut Scratch<'s>,
@@ -224,7 +229,7 @@ impl<'s, 'a, I: Index> Matching<'s, 'a, I> {
         }
     }
 
-    /// Returns the current dual of `vertex`.
+    /// Returns the current radius (dual) of a vertex.
     fn radius_now(&self, vertex: I) -> i32 {
         let radius = self.radius[vertex.get()];
         match self.label(vertex) {
@@ -326,7 +331,8 @@ impl<'s, 'a, I: Index> Matching<'s, 'a, I> {
         first
     }
 
-    /// Examines the pairs of every fresh vertex.
+    /// Records, for each fresh vertex, when its pairs will touch. The vertices are then no longer
+    /// fresh.
     fn examine_fresh_vertices(
         &mut self,
         work_budget: &mut WorkBudget<'_>,
@@ -418,7 +424,7 @@ impl<'s, 'a, I: Index> Matching<'s, 'a, I> {
         Ok([others, self.odd.free_numbers()])
     }
 
-    /// Whether the outermost node of `vertex` is unmatched.
+    /// Whether the outermost node of `vertex` has no partner yet.
     fn is_free(&self, vertex: I) -> bool {
         let base = self.node(self.top_of(vertex)).base();
         self.mate[base.get()] == I::NONE
@@ -450,7 +456,8 @@ impl<'s, 'a, I: Index> Matching<'s, 'a, I> {
         Ok(())
     }
 
-    /// Does the same for each vertex of a node.
+    /// Computes again, for each vertex of a node, when its first pair will touch: see
+    /// [`Self::find_first_pair`].
     fn find_first_pairs(
         &mut self,
         node: I,
@@ -485,12 +492,13 @@ impl<'s, 'a, I: Index> Matching<'s, 'a, I> {
         }
     }
 
-    /// Returns the blossoms that are or were in use.
+    /// Returns the numbers of all blossoms that are or were in use.
     fn blossoms(&self) -> Numbers<I> {
         self.odd.count().to(self.unused)
     }
 
-    /// Removes the tree: stores all current duals and removes all labels.
+    /// Removes the alternating tree after two vertices were matched: stores all current duals and
+    /// removes all labels.
     fn fell_tree(&mut self) {
         for blossom in self.blossoms() {
             if self.node(blossom).is_outermost() {

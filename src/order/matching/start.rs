@@ -7,7 +7,8 @@ use crate::order::OrderError;
 use crate::order::work_budget::WorkBudget;
 
 impl<I: Index> Matching<'_, '_, I> {
-    /// Sets the duals and matches the pairs that touch.
+    /// Makes a starting solution: large duals without overlap, and a match of each pair that then
+    /// touches.
     pub(super) fn start(&mut self, work_budget: &mut WorkBudget<'_>) -> Result<(), OrderError> {
         let real = self.odd.real_count();
         for vertex in I::below(real) {

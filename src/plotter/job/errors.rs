@@ -1,4 +1,4 @@
-//! How the errors of the stages become replies.
+//! How the errors of a job's computation become replies.
 
 use crate::drawing::GraphError;
 use crate::order::OrderError;

@@ -19,7 +19,7 @@ const LIKELY_BYTES: usize = size_of::<PackedLine>() / 3;
 impl<I: Index> Pipeline<'_, I> {
     /// Projects the model through the camera and finds its visible lines. Handles every model that
     /// is neither a flat plan nor a convex solid without faces.
-    #[inline(never)] // Keeps its frame off the stack while the other stages run.
+    #[inline(never)] // Inlined, its frame would take stack in the rest of the computation.
     pub(super) fn find_visible_lines(&mut self) -> Result<Found, CommandError> {
         let (_, view) = self.camera_view()?;
         let Self { model, options, steps, words, cancel, observer } = self;
@@ -97,7 +97,8 @@ impl<I: Index> Pipeline<'_, I> {
     }
 }
 
-/// Converts an error of the visibility stage. `corners` is the number of corners of the model.
+/// Converts an error of the hidden-line removal to the reply. `corners` is the number of corners of
+/// the model.
 fn refused(error: VisibilityError, corners: usize) -> CommandError {
     match error {
         VisibilityError::Scratch(missing) => CommandError::DrawingTooLarge(missing),

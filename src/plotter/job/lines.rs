@@ -19,13 +19,14 @@ pub(in crate::plotter) fn move_to_front(words: &mut [u64], at: usize, count: usi
 
 /// Collects lines, packed, at the front of the memory. Lines without length are dropped.
 pub(in crate::plotter) struct Collector<'a> {
+    /// Room for the lines. Those collected so far come first.
     pub(super) lines: &'a mut [PackedLine],
     /// Number of lines collected so far.
     pub count: usize,
 }
 
 impl<'a> Collector<'a> {
-    /// Collects lines at the front of `words`.
+    /// Begins to collect lines at the front of `words`, which is all used for them.
     pub fn new(words: &'a mut [u64]) -> Self {
         let room = size_of_val(words) / size_of::<PackedLine>();
         Self { lines: items_mut(words, room).unwrap_or(&mut []), count: 0 }
@@ -43,13 +44,13 @@ impl<'a> Collector<'a> {
         Ok(())
     }
 
-    /// The error for one line too many, with the sizes.
+    /// Returns how much memory one more line would need and how much there is, for the error.
     pub fn missing(&self) -> OutOfScratch {
         let available = size_of_val(self.lines);
         OutOfScratch { needed: available + size_of::<PackedLine>(), available }
     }
 
-    /// The same as an error to reply with.
+    /// Returns the error to reply with if there is no room for another line.
     pub fn out_of_memory(&self) -> CommandError {
         CommandError::DrawingTooLarge(self.missing())
     }
@@ -57,13 +58,15 @@ impl<'a> Collector<'a> {
 
 /// Maps each stretch that is to be drawn to the page and collects it as a line.
 pub(in crate::plotter) struct PageSink<'a, I> {
-    /// Where the lines go.
+    /// The collector, which turns the lines into a drawing.
     pub collector: Collector<'a>,
-    /// From the view to the page.
+    /// The map from the view to the page, by which the stretches are placed there.
     pub map: &'a PageMap,
+    /// The camera's view of the model, in whose coordinates the stretches come.
     pub view: &'a View,
+    /// What is drawn and how. It says what becomes of hidden stretches.
     pub options: &'a PlotOptions,
-    /// Is shown each stretch that is drawn.
+    /// Is told of each stretch that is drawn, so that a preview can show it.
     pub observer: &'a mut dyn Observer<I>,
 }
 

@@ -1,7 +1,7 @@
 //! A job: a drawing and the order of its strokes, ready to be drawn.
 //!
 //! A [`Pipeline`] computes it from the model, in the working memory, where it then lies. The files
-//! of this folder are the stages and what they share; [`plan`](super::plan),
+//! of this folder are the stages of this computation and what they share; [`plan`](super::plan),
 //! [`solid`](super::solid) and [`title`](super::title) are stages, too.
 
 mod errors;
@@ -25,11 +25,11 @@ use crate::visibility::Stretch;
 
 /// Receives each stretch as soon as it is found, in view coordinates. A preview is drawn with it.
 pub trait Observer<I = u16> {
-    /// A stretch, as seen through `view`.
+    /// Called with each stretch of an edge that is drawn, as seen through `view`.
     fn stretch(&mut self, view: &View, stretch: &Stretch<I>);
 
-    /// Everything shown so far is void, because the search begins again with another division of
-    /// the memory.
+    /// Called when everything shown so far is void, because the search begins again with another
+    /// division of the memory.
     fn start_again(&mut self) {}
 
     /// A bar of a plan from `from` to `to`, in the plan's own coordinates, and its pen, counted
@@ -37,7 +37,7 @@ pub trait Observer<I = u16> {
     fn plan_bar(&mut self, from: [f64; 2], to: [f64; 2], pen: u8);
 }
 
-/// An observer that ignores everything.
+/// An observer that ignores everything, for where nobody watches.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Unobserved;
 
@@ -54,9 +54,9 @@ pub(super) const FIGURES: usize = 13;
 pub struct Job<I = u16> {
     /// Where the drawing lies in the working memory.
     stored: Stored<I>,
-    /// Number of legs of the tour; they lie behind the drawing.
+    /// Number of segments in the tour, which lies behind the drawing.
     legs: usize,
-    /// Result of the ordering.
+    /// What the ordering has achieved: lengths and lifts.
     report: order::Report,
     /// Number of faces that were left out because they have no area.
     degenerate_faces: u32,
@@ -153,7 +153,8 @@ impl<I: Index> Job<I> {
         self.joined_edges
     }
 
-    /// The strokes from `cursor` on. `words` is the working memory that holds the job.
+    /// Returns the strokes of the job from `cursor` on. `words` is the working memory that holds
+    /// the job.
     pub fn strokes<'a>(&self, words: &'a mut [u64], cursor: &'a mut Cursor<I>) -> Strokes<'a, I> {
         // `compute` filled this memory, so both reads succeed. Otherwise there are no strokes.
         let nothing = Drawing::<I> { points: &[], segments: &[] };

@@ -1,4 +1,4 @@
-//! The stages of a job, one after the other.
+//! Computes a job: runs the stages (the parts of the computation) one after the other.
 
 #[cfg(feature = "convex")]
 use super::super::solid;
@@ -13,28 +13,31 @@ use crate::protocol::CommandError;
 use crate::stage::{Cancel, Stage};
 use crate::view::{Camera, View};
 
-/// What a job is computed from, and the working memory in which that is done. Each stage borrows
-/// it.
+/// What a job is computed from, and the working memory in which that is done. Each stage (each part
+/// of the computation) borrows it.
 pub(in crate::plotter) struct Pipeline<'p, I> {
     /// The model, which is not changed.
     pub model: &'p Model<'p, I>,
     /// What is drawn and how.
     pub options: &'p PlotOptions,
+    /// The steps per millimetre on the page, in which the drawing is measured.
     pub steps: StepsPerMillimetre,
-    /// The working memory. A stage leaves its result at the front.
+    /// The working memory. Each stage (each part of the computation) leaves its result at the
+    /// front.
     pub words: &'p mut [u64],
-    /// Is asked in every stage whether the user aborts the job.
+    /// Called regularly to find out whether the user aborts the job.
     pub cancel: &'p mut dyn Cancel,
-    /// Is shown what will be drawn.
+    /// Called with each line that will be drawn, for a preview.
     pub observer: &'p mut dyn Observer<I>,
 }
 
-/// The lines that a stage has left at the front of the working memory, and what it left out.
+/// The lines that a stage of the computation has left at the front of the working memory, and what
+/// it left out.
 #[derive(Debug, Default)]
 pub(in crate::plotter) struct Found {
-    /// Number of lines.
+    /// Number of lines at the front of the working memory.
     pub lines: usize,
-    /// Number of faces without an area.
+    /// Number of faces that were left out because they have no area.
     pub degenerate_faces: u32,
     /// Number of edges of a convex solid whose faces may be coplanar.
     pub joined_edges: usize,
@@ -74,7 +77,7 @@ impl<I: Index> Pipeline<'_, I> {
     }
 
     /// Makes one drawing of the lines and orders its strokes.
-    #[inline(never)] // Keeps its frame off the stack while the other stages run.
+    #[inline(never)] // Inlined, its frame would take stack in the rest of the computation.
     fn order(self, found: &Found) -> Result<Job<I>, CommandError> {
         let Self { options, steps, words, cancel, .. } = self;
         cancel.enter(Stage::Order);
@@ -95,7 +98,7 @@ impl<I: Index> Pipeline<'_, I> {
     /// # Errors
     /// [`CommandError::NothingToPlot`] if there is no vertex, [`CommandError::View`] if the camera
     /// cannot show the model, [`CommandError::Aborted`].
-    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    #[inline(never)] // Inlined, its frame would take stack while a job is computed.
     pub fn camera_view(&mut self) -> Result<(Camera, View), CommandError> {
         let Self { model, options, cancel, .. } = self;
         cancel.enter(Stage::View);

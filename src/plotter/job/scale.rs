@@ -35,7 +35,7 @@ pub(super) fn bounds_of<I: Index>(
 }
 
 /// Fits elements and curves to the page. The curves' control points do not count, only the chords.
-#[inline(never)] // Keeps its frame off the stack while the stages run.
+#[inline(never)] // Inlined, its frame would take stack while a job is computed.
 pub(super) fn map_with_curves<I: Index>(
     view: &View,
     model: &Model<'_, I>,

@@ -8,11 +8,11 @@ use crate::order::Leg;
 /// Position in the strokes of a job: how far they have been handed to the machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Cursor<I = u16> {
-    /// Index of the leg that is being handed over.
+    /// Index in the tour of the segment that is being handed over.
     leg: usize,
-    /// Number of the point at which the pen is, if any.
+    /// Number of the point at which the pen is, or `None` before the first move.
     at: Option<I>,
-    /// The pen of that leg, from 0.
+    /// The pen of the segment that is being handed over, from 0.
     pen: u8,
 }
 
@@ -20,8 +20,11 @@ pub struct Cursor<I = u16> {
 /// wherever a leg does not begin where the previous one ended.
 #[derive(Debug)]
 pub struct Strokes<'a, I = u16> {
+    /// The points and segments of the job.
     pub(super) drawing: Drawing<'a, I>,
+    /// The segments in the order in which they are drawn, each with its direction.
     pub(super) tour: &'a [Leg<I>],
+    /// How far the strokes have been handed over.
     pub(super) cursor: &'a mut Cursor<I>,
 }
 

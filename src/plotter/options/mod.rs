@@ -109,7 +109,7 @@ impl PlotOptions {
     }
 
     /// The sheet, with the space at its foot that the title needs.
-    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    #[inline(never)] // Inlined, its frame would take stack while a job is computed.
     pub fn sheet(&self) -> Page {
         let foot = self.title().map(|title| title.rise() + title.depth());
         Page { foot: foot.unwrap_or_default(), ..self.page }
@@ -142,7 +142,7 @@ impl PlotOptions {
 
     /// The camera for `model`, with automatic choices for all that the user has not set. `None` if
     /// the model has no vertices.
-    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    #[inline(never)] // Inlined, its frame would take stack while a job is computed.
     pub fn camera<I: Index>(&self, model: &Model<'_, I>) -> Option<Camera> {
         let lens = match self.projection {
             ProjectionChoice::Axonometric { azimuth, elevation } => {
@@ -161,7 +161,7 @@ impl PlotOptions {
     }
 
     /// The options of the visibility stage for `view`.
-    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    #[inline(never)] // Inlined, its frame would take stack while a job is computed.
     pub fn visibility(&self, view: &View) -> visibility::Options {
         let crease = (self.crease > 0.0).then(|| Crease {
             cosine: libm::round(sin_cos_degrees(self.crease).1 * 32768.0) as i32,
@@ -178,7 +178,7 @@ impl PlotOptions {
 
     /// The CRC-32 of the lines that `$options` lists, each followed by a line feed. Equal options
     /// have equal checksums.
-    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    #[inline(never)] // Inlined, its frame would take stack while a job is computed.
     pub fn checksum(&self) -> u32 {
         let mut sum = Sum(Crc32::new());
         for line in self.lines() {
@@ -195,7 +195,7 @@ impl PlotOptions {
 }
 
 /// Sets the title. An empty text removes it.
-#[inline(never)] // Keeps its frame off the stack while the stages run.
+#[inline(never)] // Inlined, its frame would take stack while a job is computed.
 fn set_title(options: &mut PlotOptions, text: &str) -> Result<(), CommandError> {
     let (letters, limit) = (EscapedText::new(text)?.letters(), TitleText::LIMIT);
     options.title = TitleText::new(letters).ok_or(CommandError::TitleTooLong { limit })?;

@@ -13,7 +13,7 @@ use core::fmt::{self, Display as _};
 /// of `$` and of `$options`, and the flag of the client are made from it.
 #[derive(Debug, Clone, Copy)]
 pub struct PlotOption {
-    /// The name, as in `$name=value`.
+    /// The name of the option, as in `$name=value`.
     pub name: &'static str,
     /// The alternatives for the value: words as they are written, and placeholders in capitals.
     pub values: &'static [&'static str],
@@ -25,33 +25,33 @@ pub struct PlotOption {
     pub flag: HostOnly<Option<Flag>>,
 }
 
-/// A field of the options, to be read or changed.
+/// Gives access to one field of the options, to read it or to change it.
 type Field<T> = fn(&mut PlotOptions) -> &mut T;
 
 /// The kind of an option's value, and where the value lies.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Kind {
-    /// One of the words of the row, by its index.
+    /// The value is one of the words in the row. The functions use its index among them.
     Choice {
-        /// The index of the present value.
+        /// Returns the index of the present value among the words.
         get: fn(&PlotOptions) -> usize,
-        /// Sets the value with this index.
+        /// Sets the value to the word with this index.
         set: fn(&mut PlotOptions, usize),
     },
     /// Three numbers with commas between them. Before they are set, the value is `auto`.
     Position(Field<Option<Direction>>),
-    /// A length between two others, in mm.
+    /// The value is a length in mm within this range.
     Length {
-        /// The least length.
+        /// The least length allowed, in mm.
         least: Millimetres,
-        /// The greatest length.
+        /// The greatest length allowed, in mm.
         greatest: Millimetres,
-        /// Where it lies.
+        /// The field that holds the length.
         field: Field<Millimetres>,
     },
-    /// A whole number, 0 or more.
+    /// The value is a whole number, 0 or more.
     Whole(Field<u32>),
-    /// A value with a form of its own.
+    /// The value has a form of its own, with functions that read and write it.
     Other {
         /// Parses and sets the value. On an error the options stay as they were.
         set: fn(&mut PlotOptions, &str) -> Result<(), CommandError>,
@@ -174,7 +174,7 @@ impl PlotOption {
     }
 }
 
-/// An option with the forms of its value.
+/// Shows how an option is used: its name and the forms of its value.
 struct Usage<'a>(&'a PlotOption);
 
 impl fmt::Display for Usage<'_> {
@@ -188,7 +188,7 @@ impl fmt::Display for Usage<'_> {
     }
 }
 
-/// An option with its present value.
+/// Shows an option with its present value, as `$options` lists it.
 struct Line<'a>(&'a PlotOption, &'a PlotOptions);
 
 impl fmt::Display for Line<'_> {

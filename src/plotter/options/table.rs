@@ -9,9 +9,11 @@ use crate::host_only::HostOnly;
 use crate::order::{Method, Shape};
 use crate::protocol::{CommandError, Escape, numbers, positive};
 
-/// The headings of the client's help.
+/// The heading in the client's help of the options that say from where and how the model is seen.
 const CAMERA: &str = "Camera";
+/// The heading in the client's help of the options that say how the drawing lies on the page.
 const PAGE: &str = "Page";
+/// The heading in the client's help of the options that say in which order the strokes are drawn.
 const ORDER: &str = "Order";
 
 /// The words of an option that is on or off. The index of `on` is 0.
@@ -20,7 +22,7 @@ const ON_OFF: &[&str] = &["on", "off"];
 /// What `on` and `off` mean, for the client's help.
 const YES_NO: &[&str] = &["Yes", "No"];
 
-/// The options of a plot.
+/// The table of the options of a plot: one row for each.
 pub const OPTIONS: &[PlotOption] = &[
     PlotOption {
         name: "eye",
@@ -372,10 +374,10 @@ pub const OPTIONS: &[PlotOption] = &[
     },
 ];
 
-/// The client has no flag of this name.
+/// Stands in a row of the table for an option of which the client has no flag.
 const NO_FLAG: HostOnly<Option<Flag>> = HostOnly::new(None);
 
-/// The client has this flag.
+/// Makes the entry of a row for a flag that the client has.
 const fn client(flag: Flag) -> HostOnly<Option<Flag>> {
     HostOnly::new(Some(flag))
 }
@@ -391,7 +393,7 @@ impl PlotOptions {
     ///
     /// # Errors
     /// The [`CommandError`] that names what is wrong with the value. The options stay as they were.
-    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    #[inline(never)] // Inlined, its frame would take stack while a job is computed.
     pub fn set(&mut self, name: &str, text: &str) -> Result<bool, CommandError> {
         if !cfg!(feature = "convex") && name == "see" && matches!(text, "vertices" | "edges") {
             return Err(CommandError::NoConvexSolids);

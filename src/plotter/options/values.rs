@@ -7,7 +7,7 @@ use crate::protocol::{CommandError, PENS, choice, numbers, trim, whole};
 use crate::view::Lens;
 use core::fmt;
 
-/// How the model is projected onto the page.
+/// The projection by which the model is drawn (`$projection`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ProjectionChoice {
     /// A projection from the eye, through a lens.
@@ -17,7 +17,7 @@ pub enum ProjectionChoice {
     Axonometric {
         /// Angle from the x axis towards the y axis, in degrees. -90 is the view from the front.
         azimuth: f64,
-        /// Angle above the xy plane, in degrees.
+        /// Angle of the direction above the xy plane, in degrees.
         elevation: f64,
     },
 }
@@ -91,7 +91,7 @@ impl ProjectionChoice {
     }
 }
 
-/// How visibility is determined.
+/// What decides which lines of the model are hidden (`$see`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum VisibilityMode {
@@ -106,7 +106,7 @@ pub enum VisibilityMode {
     Edges,
 }
 
-/// How hidden lines are drawn, if at all.
+/// What becomes of hidden lines (`$hidden`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum HiddenLines {

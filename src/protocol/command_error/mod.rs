@@ -143,32 +143,35 @@ pub enum CommandError {
 pub struct ErrorEntry {
     /// The number in `error:N`. Numbers below 100 have the same meaning as in Grbl 1.1.
     pub number: u16,
-    /// The meaning, as `docs/protocol.md` lists it. Empty if the error has the number of another.
+    /// The meaning, as `docs/errors.md` lists it. Empty if the error has the number of another.
     pub meaning: HostOnly<&'static str>,
     /// What the client says instead of the meaning and the sentence for the serial line, where
     /// those would not help its user.
     pub for_client: HostOnly<Option<&'static str>>,
 }
 
-/// The entry with this number and meaning.
+/// Makes the entry of an error from its number and its meaning.
 const fn error(number: u16, meaning: &'static str) -> ErrorEntry {
     let (meaning, for_client) = (HostOnly::new(meaning), HostOnly::new(None));
     ErrorEntry { number, meaning, for_client }
 }
 
 impl ErrorEntry {
-    /// The same entry, for which the client says `text`.
+    /// Returns the entry with `text` as what the client says instead of the meaning.
     const fn client(self, text: &'static str) -> Self {
         Self { for_client: HostOnly::new(Some(text)), ..self }
     }
 }
 
 // The entries that several errors have in common. `of_modules.rs` has more.
+/// The entry of the errors about a `$` command or a setting that does not exist.
 const UNKNOWN_SYSTEM_COMMAND: ErrorEntry = error(3, "unknown $ command").client(
     "the plotter does not know this: its firmware and this program are of different versions",
 );
+/// The entry of the errors about a command that has to wait until the plotter is idle.
 const BUSY: ErrorEntry = error(8, "the plotter is busy")
     .client("the plotter is busy: wait until its plot ends, or reset it");
+/// The entry of the errors about a number outside the range that is allowed or can be stored.
 const OUT_OF_RANGE: ErrorEntry = error(102, "number out of range");
 
 /// What to do while the plotter is busy.
@@ -178,12 +181,12 @@ const WAIT: &str = "wait for the plot to end, or send ctrl-X";
 type Row<'a> = &'a mut dyn FnMut(ErrorEntry, fmt::Arguments<'_>);
 
 impl CommandError {
-    /// The number in `error:N`.
+    /// Returns the number of the error, which the reply `error:N` names.
     pub fn number(&self) -> u16 {
         self.entry().number
     }
 
-    /// The number and the meaning of the error.
+    /// Returns the number and the meaning of the error.
     #[inline(never)] // Its callers share one copy of the code.
     pub fn entry(&self) -> ErrorEntry {
         let mut found = UNKNOWN_SYSTEM_COMMAND;
@@ -376,7 +379,7 @@ impl fmt::Display for CommandError {
     }
 }
 
-/// Shows the choices as `choose a, b or c`.
+/// Shows the words from which the user can choose, as `choose a, b or c`.
 struct Choices(&'static [&'static str]);
 
 impl fmt::Display for Choices {

@@ -12,14 +12,21 @@ use crate::view::ViewError;
 use core::fmt;
 
 // The entries that several errors have in common.
+/// The entry of the errors about a vertex that does not exist.
 const UNKNOWN_VERTEX: ErrorEntry = error(110, "unknown vertex");
+/// The entry of the errors about the degree, the knots or the control points of a curve.
 const NOT_A_CURVE: ErrorEntry = error(116, "not a curve");
+/// The entry of the errors about a line of a curve that comes before the line that it needs.
 const CURVE_OUT_OF_ORDER: ErrorEntry = error(117, "curve out of order");
+/// The entry of the errors about a model that has nothing to draw.
 const NOTHING_TO_PLOT: ErrorEntry = error(120, "nothing to plot")
     .client("there is nothing to draw: the file has no faces, lines or curves");
+/// The entry of the errors about working memory that is too small.
 const DRAWING_TOO_LARGE: ErrorEntry = error(140, "drawing too large for the memory");
+/// The entry of the errors about a value that a setting of the machine does not allow.
 const SETTING_OUT_OF_RANGE: ErrorEntry = error(150, "setting out of range");
 
+/// Passes to `row` the row of an error by which the model refused a change.
 pub(super) fn explain_model(refusal: &ModelError, row: Row<'_>) {
     match refusal {
         ModelError::UnknownVertex { number, vertices } => row(
@@ -80,9 +87,10 @@ pub(super) fn explain_model(refusal: &ModelError, row: Row<'_>) {
     }
 }
 
-/// The range of knots.
+/// The sentence that tells the user the range of knots.
 const KNOTS: &str = "knots go up to 4194304";
 
+/// Passes to `row` the row of an error by which a curve was refused.
 fn explain_curve(refusal: &CurveError, row: Row<'_>) {
     match refusal {
         CurveError::Order => row(NOT_A_CURVE, format_args!("a curve has degree 1 to 5")),
@@ -116,6 +124,7 @@ fn explain_curve(refusal: &CurveError, row: Row<'_>) {
     }
 }
 
+/// Passes to `row` the row of an error because of which the camera cannot show the model.
 pub(super) fn explain_view(refusal: &ViewError, row: Row<'_>) {
     match refusal {
         ViewError::NothingToSee => {
@@ -139,6 +148,7 @@ pub(super) fn explain_view(refusal: &ViewError, row: Row<'_>) {
     }
 }
 
+/// Passes to `row` the row of an error because of which the model is no convex solid.
 pub(super) fn explain_solid(refusal: &SolidError, row: Row<'_>) {
     const NOT_CONVEX: ErrorEntry = error(125, "not a convex solid");
     match refusal {
@@ -167,6 +177,8 @@ pub(super) fn explain_solid(refusal: &SolidError, row: Row<'_>) {
     }
 }
 
+/// Passes to `row` the row of an error because of which the drawing or its title does not fit on
+/// the page.
 pub(super) fn explain_page(refusal: &PageError, row: Row<'_>) {
     let mm = |length: Millimetres| BinaryFraction {
         units: length.to_bits().into(),
@@ -217,7 +229,7 @@ pub(super) fn explain_page(refusal: &PageError, row: Row<'_>) {
     }
 }
 
-/// Shows a number of 0.1 mm in mm.
+/// A length in units of 0.1 mm, shown in mm with one decimal.
 struct Tenths(u32);
 
 impl fmt::Display for Tenths {
@@ -226,7 +238,7 @@ impl fmt::Display for Tenths {
     }
 }
 
-/// How much working memory is missing.
+/// Passes to `row` the row of the error that working memory is missing, with the sizes.
 pub(super) fn explain_missing(missing: &OutOfScratch, row: Row<'_>) {
     let OutOfScratch { needed, available } = missing;
     row(
@@ -235,6 +247,7 @@ pub(super) fn explain_missing(missing: &OutOfScratch, row: Row<'_>) {
     );
 }
 
+/// Passes to `row` the row of an error by which the value of a setting was refused.
 pub(super) fn explain_setting(refusal: &SettingError, row: Row<'_>) {
     match refusal {
         SettingError::Unknown => row(UNKNOWN_SYSTEM_COMMAND, format_args!("$$ lists the settings")),
@@ -261,6 +274,7 @@ pub(super) fn explain_setting(refusal: &SettingError, row: Row<'_>) {
     }
 }
 
+/// Passes to `row` the row of an error by which the machine refused a move or a command.
 pub(super) fn explain_machine(refusal: &MachineError, row: Row<'_>) {
     match refusal {
         MachineError::State(_) => row(BUSY, format_args!("{WAIT}")),

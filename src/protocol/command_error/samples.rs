@@ -13,6 +13,7 @@ use crate::step::ArcError;
 use crate::view::ViewError;
 use std::vec::Vec;
 
+/// The sizes that the samples of errors about missing memory name.
 const MISSING: OutOfScratch = OutOfScratch { needed: 9, available: 8 };
 
 /// The entries of all errors in the order of their numbers, each number once.

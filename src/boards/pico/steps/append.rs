@@ -109,8 +109,9 @@ impl Steps {
         }
     }
 
-    /// Appends an event of the pen's motor. The pulse lasts half of the event, so that the handler
-    /// is never two levels behind.
+    /// Appends an event at which the motor that lifts the pen makes a step (if `step`) or changes
+    /// its direction. The pulse lasts half of the event, so that the handler is never two levels
+    /// behind.
     fn push_z_axis(&mut self, step: bool, down: bool, event: StepEvent) -> Result<(), StepEvent> {
         use z_axis_levels::{DOWN, MARK, STEP};
         let pins = MARK | if down { DOWN } else { 0 };
@@ -164,7 +165,8 @@ impl Steps {
         STATE.brake().set_queued(queued);
     }
 
-    /// Does the same where all steps have the same length, in a few cycles per step.
+    /// Records the lengths of the next `count` words where all steps have the same length, in a few
+    /// cycles per step.
     fn record_equal_lengths(&self, step: StepWay, count: u32) {
         let packed = pack(step);
         let first = (self.written % WORDS) as usize;

@@ -13,27 +13,37 @@ const CYCLES_PER_TICK: u32 = clock::HERTZ / TICKS_PER_SECOND;
 const _: () = assert!(CYCLES_PER_TICK == 5 && clock::HERTZ.is_multiple_of(TICKS_PER_SECOND));
 /// The address at which the program continues, in the bits of a word that hold it.
 pub mod target {
+    /// Sets the pins, and causes the interrupt in which the core moves the pen.
     pub const MOVE_PEN: u32 = 0;
+    /// Sets the pins, and counts the ticks.
     pub const WAIT: u32 = 1 << 5;
+    /// Sets the pins, ends the pulse after its width, and counts the ticks.
     pub const PULSE: u32 = 6 << 5;
 }
+/// The bits of a word that hold the address.
 pub const TARGETS: u32 = 7 << 5;
-/// The ticks that a word takes beyond its count, by its target. A pulse takes its width in
-/// addition.
+/// A word that only waits takes so many ticks more than the count that it carries.
 pub const WAIT_TICKS: u32 = 2;
+/// A word that moves the pen takes so many ticks more than the count that it carries.
 pub const PEN_TICKS: u32 = 3;
+/// A word that pulses a step pin takes so many ticks more than the count that it carries and the
+/// width of the pulse together.
 pub const PULSE_TICKS: u32 = 2;
-/// The ticks of a pulse beyond its count.
+/// A pulse is so many ticks wider than the count that the state machine gets for its width.
 const WIDTH_TICKS: u32 = 2;
 
+/// The bit that lets state machine 0 run.
 const ENABLE: u32 = 1;
+/// The bit that sets state machine 0 to its initial state.
 const RESTART: u32 = 1 << 4;
 /// The bit of the register `FDEBUG` for a state machine that found its queue empty.
 pub const STALLED: u32 = 1 << 24;
-/// The bits of the register `FLEVEL` for the words in the queue.
+/// The bits of the register `FLEVEL` that count the words in the queue of the state machine.
 pub const LEVEL: u32 = 0xF;
-/// Flag 0, in the register of flags and in that of interrupts.
+/// The flag by which the state machine causes an interrupt: its bit in the registers of flags and
+/// of interrupts.
 pub const FLAG: u32 = 1;
+/// The bit of flag 0 in the mask of the interrupts.
 const FLAG_INTERRUPT: u32 = 1 << 8;
 
 /// Instructions that the core makes the state machine execute.
@@ -42,17 +52,20 @@ pub mod order {
         InstructionOperands, JmpCondition, MovDestination, MovOperation, MovSource, SetDestination,
     };
 
+    /// Makes the program wait for its first word.
     pub const JUMP_TO_START: u16 =
         InstructionOperands::JMP { condition: JmpCondition::Always, address: super::START }
             .encode();
-    /// Moves the width of the pulses from the queue to where the program reads it.
+    /// Takes the width of the pulses from the queue.
     pub const PULL: u16 = InstructionOperands::PULL { if_empty: false, block: true }.encode();
+    /// Moves the width of the pulses, after [`PULL`], to where the program reads it.
     pub const KEEP_WIDTH: u16 = InstructionOperands::MOV {
         destination: MovDestination::ISR,
         op: MovOperation::None,
         source: MovSource::OSR,
     }
     .encode();
+    /// Takes a word from the queue, if there is one.
     pub const PULL_WITHOUT_WAITING: u16 =
         InstructionOperands::PULL { if_empty: false, block: false }.encode();
     /// Sets the pins; their levels are in the lowest 5 bits.
@@ -63,15 +76,18 @@ pub mod order {
         InstructionOperands::SET { destination: SetDestination::PINDIRS, data: 0 }.encode();
 }
 
-/// The mask of DMA channel 0.
+/// The bit of DMA channel 0 in the registers that have one bit for each channel.
 pub const CHANNEL: u32 = 1;
+/// The bit of a channel's control register that says that it is transferring.
 pub const BUSY: u32 = 1 << 24;
 /// Enabled, high priority, words, reading around the ring, no chain, paced by the state machine.
 const FEED: u32 = 1 | 1 << 1 | 2 << 2 | 1 << 4 | size_of::<Ring>().trailing_zeros() << 6;
 
 /// The address at which the program waits for the next word.
 pub const START: u8 = 3;
+/// The bits of a word that hold the levels of the pins.
 pub const LEVELS: u32 = 0x1F;
+/// The bits of the levels that are step pulses.
 pub const PULSES: u32 = (StepEvent::STEP_X | StepEvent::STEP_Y) as u32;
 /// The levels without pulses and with the drivers off; their pin is active low.
 pub const RELEASED: u32 = StepEvent::DRIVERS_ON as u32;

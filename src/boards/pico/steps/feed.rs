@@ -27,19 +27,21 @@ const FAR_GROUPS: u32 = 8;
 /// Steps with fewer ticks than this are braked several at a time: above 200,000 per second.
 const FAST_TICKS: u32 = TICKS_PER_SECOND / 200_000;
 
+/// Memory for a block of words.
 #[repr(align(64))] // Aligned to its size, it does not cross the end of a ring.
 struct Block([AtomicU32; BRAKED_WORDS as usize]);
 const _: () = assert!(align_of::<Block>() == size_of::<Block>());
 
-/// The copy of a block that is braked.
+/// The copy of a block whose steps the brake has lengthened. The ring keeps the planned ones.
 static BRAKED: Block = Block([const { AtomicU32::new(0) }; BRAKED_WORDS as usize]);
-/// The brake, which belongs to the channel's interrupt.
+/// The brake, which says how long each step must last where few steps wait. It belongs to the
+/// channel's interrupt.
 pub static BRAKE: Owned<Brake> = Owned::empty();
 /// Whether the last block was braked. It is written where the channel's interrupt is masked.
 static BRAKING: AtomicBool = AtomicBool::new(false);
 /// The number of words put into the ring; it wraps. Only the main loop writes it.
 pub static WRITTEN: AtomicU32 = AtomicU32::new(0);
-/// The number of words that the channel was handed_over to take; it wraps. It is written where the
+/// The number of words that were handed over to the channel; it wraps. It is written where the
 /// channel's interrupt is masked.
 pub static HANDED_OVER: AtomicU32 = AtomicU32::new(0);
 /// The number of words of an abandoned block that the channel's count still shows. It is written
@@ -89,7 +91,7 @@ pub fn stop() {
     });
 }
 
-/// Enables the channel's interrupt at the end of a block again.
+/// Lets the channel's interrupt come again, which [`stop`] prevents.
 pub fn let_interrupt_come() {
     DMA.inte0().put(CHANNEL);
 }
@@ -237,6 +239,7 @@ fn brake_words(brake: &mut Brake, handed_over: u32, count: u32) -> u32 {
     words
 }
 
+/// The interrupt at the end of a block: hands the next one over to the channel.
 #[interrupt]
 #[unsafe(link_section = ".data.in_ram")]
 fn DMA_IRQ_0() {

@@ -16,14 +16,17 @@ use crate::boards::pico::{critical, pen, z_axis};
 pub const HEIGHTS: usize = 1024;
 /// The bits of an entry that sets the pins of z instead of a height.
 pub mod z_axis_levels {
+    /// The bit that distinguishes such an entry from a height, which is at most 127.
     pub const MARK: u8 = 1 << 7;
+    /// The bit that holds the level of the step pin.
     pub const STEP: u8 = 1;
+    /// Set if the motor turns so that the pen goes down.
     pub const DOWN: u8 = 1 << 1;
 }
 
-/// The queue of the entries.
+/// The heights of the pen, and the levels of its motor's pins, that wait for their time.
 pub static HEIGHT_QUEUE: StaticCell<Queue<u8, HEIGHTS>> = StaticCell::new();
-/// The handler's end of the queue.
+/// The end of that queue from which the handler takes what is due.
 pub static HEIGHTS_DUE: Owned<Consumer<'static, u8>> = Owned::empty();
 
 /// Processes the entries that are left in the queue. If two heights come faster than the interrupt,
@@ -51,6 +54,8 @@ fn set_z_axis(step: bool, down: bool) {
     }
 }
 
+/// The interrupt that the state machine causes at a word that moves the pen: takes one entry from
+/// the queue and carries it out.
 #[interrupt]
 #[unsafe(link_section = ".data.in_ram")]
 fn PIO0_IRQ_0() {

@@ -63,13 +63,13 @@ const WAIT_WORDS: u32 = 64;
 /// The state that the state machine's progress is reported to, for the main loop.
 pub static STATE: PulserState = PulserState::new();
 
-/// The main loop's end of the queue.
+/// The main loop's side of the steps: it writes words to the ring and counts those that were taken.
 pub struct Steps {
     /// The queue of the heights of the pen and the steps of its motor.
     heights: Producer<'static, u8>,
-    /// The lengths of the steps to come.
+    /// The lengths of the steps that will be appended, which the brake needs.
     step_length: StepLength,
-    /// The same number as [`WRITTEN`].
+    /// The number of words put into the ring; it wraps. It is the same as [`WRITTEN`].
     written: u32,
     /// The number of events that still fit: the number when the state machine's progress was last
     /// read, less the events that have come since.
@@ -81,11 +81,11 @@ pub struct Steps {
     /// For each combination of levels, what a pulse adds to x (in the lower half) and to y (in the
     /// upper half).
     moves: [u32; LEVELS as usize + 1],
-    /// The levels of the pins after the last word.
+    /// The levels of the pins after the last word that was appended.
     levels: u32,
     /// The number of words counted so far; it wraps.
     taken: u32,
-    /// The sum of the steps counted so far; it wraps.
+    /// The sum of the steps of the words counted so far, for x and y; it wraps.
     steps: (i32, i32),
     /// The sum of the steps counted so far that took up slack; it wraps.
     slack: (i32, i32),
@@ -215,7 +215,7 @@ impl Steps {
         }
     }
 
-    /// Counts the words up to number `taken`. It takes 14 cycles per pulse.
+    /// Adds up the steps and ticks of the words up to number `taken`. It takes 14 cycles per pulse.
     #[inline(never)]
     #[unsafe(link_section = ".data.in_ram")] // This leaves the flash's cache to the planner.
     fn count_to(&mut self, taken: u32) {

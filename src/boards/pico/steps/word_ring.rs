@@ -14,6 +14,7 @@ pub const GROUP: u32 = 16;
 pub struct Ring([AtomicU32; WORDS as usize]);
 const _: () = assert!(align_of::<Ring>() == size_of::<Ring>());
 
+/// The ring of the words that wait.
 static RING: Ring = Ring([const { AtomicU32::new(0) }; WORDS as usize]);
 /// For each word of the ring that is a step: `around` of [`StepWay`] in the lower half and `behind`
 /// in the upper one. For other words: 0.
@@ -23,7 +24,7 @@ pub static LENGTHS: [AtomicU32; WORDS as usize] = [const { AtomicU32::new(0) }; 
 static SUMS: [AtomicU32; (WORDS / GROUP) as usize] =
     [const { AtomicU32::new(0) }; (WORDS / GROUP) as usize];
 
-/// The slot of word number `word`.
+/// Returns the slot of the ring for word number `word`.
 pub fn slot(word: u32) -> &'static AtomicU32 {
     &RING.0[(word % WORDS) as usize]
 }
@@ -34,27 +35,27 @@ pub fn row(word: u32, count: u32) -> &'static [AtomicU32] {
     &RING.0[start as usize..(start + count).min(WORDS) as usize]
 }
 
-/// The address of the slot of word number `word`.
+/// Returns the address of the slot for word number `word`, where the DMA channel is to read.
 pub fn ring_address(word: u32) -> u32 {
     slot(word).as_ptr() as u32
 }
 
-/// The packed lengths of the step in word number `word`.
+/// Returns the slot for the packed lengths of the step in word number `word`.
 pub fn lengths(word: u32) -> &'static AtomicU32 {
     &LENGTHS[(word % WORDS) as usize]
 }
 
-/// The sum of the group that ends before `word`.
+/// Returns the slot for the sum of the group that ends before `word`.
 pub fn sum(word: u32) -> &'static AtomicU32 {
     &SUMS[(word / GROUP) as usize % SUMS.len()]
 }
 
-/// Packs the lengths of a step into one word.
+/// Packs both lengths of a step into one word, so that they can be stored in an atomic.
 pub fn pack(step: StepWay) -> u32 {
     step.around | step.behind << 16
 }
 
-/// Unpacks the lengths of a step.
+/// Returns the way of a step that [`pack`] has packed.
 pub fn unpack(lengths: u32) -> StepWay {
     StepWay { around: lengths & 0xFFFF, behind: lengths >> 16 }
 }

@@ -18,42 +18,55 @@
 use super::super::registers::{Get, IO_BANK0, PADS_BANK0, Put, SYSINFO, USB};
 use super::BUS_RESET;
 
-/// The revision, in the highest bits of the chip's number, is 1 for B0 and B1.
+/// How far the number of the chip is shifted right to give its revision, which is 1 for B0 and B1.
 const REVISION_SHIFT: u32 = 28;
+/// The first revision without the erratum.
 const FIRST_SOUND_REVISION: u32 = 2;
 
 /// Bits of the controller's registers.
 mod controller {
-    /// In the status: the levels of the wires.
+    /// The bits of the status that hold the levels of the wires.
     pub const LINE: u32 = 3 << 2;
+    /// Both wires are low: the host resets the bus.
     pub const BOTH_LOW: u32 = 0;
+    /// The controller takes part in the bus.
     pub const CONNECTED: u32 = 1 << 16;
-    /// Where the controller takes the levels of the wires from.
+    /// The controller takes the levels of the wires from the wires themselves.
     pub const WIRES: u32 = 1 | 1 << 3;
+    /// The controller takes the levels of the wires from pins of the chip that stand for them.
     pub const PINS: u32 = 1 << 2 | 1 << 3;
+    /// The wire D+ is pulled up, which shows the host a device.
     pub const PULLS_UP: u32 = 1 << 1;
+    /// The pull-up is as the program says, and not as the controller does.
     pub const OVERRIDES_PULL_UP: u32 = 1 << 2;
 }
 
 /// GPIO 15: its number, and bits of its registers.
 mod pin {
+    /// The number of this pin of the chip.
     pub const NUMBER: usize = 15;
-    /// Both pulls at once keep the present level.
+    /// The bits that pull the pin up and down at once, so that it keeps its present level.
     pub const KEEPS: u32 = 1 << 2 | 1 << 3;
+    /// The bits that choose the function of the pin.
     pub const FUNCTION: u32 = 0x1F;
+    /// The function in which the pin stands for a wire of the bus.
     pub const IS_USB_WIRE: u32 = 8;
+    /// The bits that say whether the pin is driven.
     pub const OUTPUT: u32 = 3 << 12;
+    /// The value of the two bits at which the pin is not driven.
     pub const OUTPUT_OFF: u32 = 2 << 12;
+    /// The pin reads as high, whatever its level is.
     pub const READS_HIGH: u32 = 3 << 16;
 }
 
-/// Tracks the resets of the bus.
+/// Watches for resets of the bus, and connects the board after each.
 pub struct Connection {
     /// The original pad and control registers of the pin while the controller is shown an idle bus.
     before: Option<(u32, u32)>,
 }
 
 impl Connection {
+    /// Makes the state before the first reset of the bus.
     pub const fn new() -> Self {
         Self { before: None }
     }

@@ -10,17 +10,17 @@
 use super::super::clock;
 use super::super::registers::{Get, Put, USB};
 
-/// The bit of the frame interrupt.
+/// The bit of the interrupt that comes at the beginning of a frame.
 const BEGAN: u32 = 1 << 17;
 
-/// The length of a frame, in microseconds.
+/// The time from the beginning of one USB frame to that of the next, in microseconds.
 const LENGTH: u32 = 1000;
 /// The part of a frame, in microseconds, in which a buffer may be made available. 100 microseconds
 /// allow for the time between reading the clock and writing to the buffer, and for a late
 /// interrupt.
 const SAFE: u32 = 700;
 
-/// Tracks the frames.
+/// Knows how far the present frame of the bus has come.
 pub struct Frame {
     /// Whether the frame interrupt is on.
     is_followed: bool,
@@ -29,6 +29,7 @@ pub struct Frame {
 }
 
 impl Frame {
+    /// Makes the state before the first frame, with the interrupt off.
     pub const fn new() -> Self {
         Self { is_followed: false, began: None }
     }

@@ -4,7 +4,7 @@
 use super::{Anchors, in_order, length_of};
 use crate::drawing::PagePoint;
 
-/// A position beyond the end of every line, in steps.
+/// Stands for "no limit": a position beyond the end of every line, in steps.
 const FAR: i32 = 1 << 24;
 /// The least distance of a cut from the ends of the line, in steps. A belt step next to a closer
 /// cut could lie beyond the end.
@@ -36,7 +36,7 @@ const NEAR: i32 = 2;
 pub struct CutPositions {
     /// The feet of the perpendiculars from both anchors, the first along the line first.
     feet: [i32; 2],
-    /// The point halfway between the feet.
+    /// The point halfway between the feet. Up to it the first foot counts, behind it the second.
     middle: i32,
     /// The length of the line, in steps.
     length: i32,

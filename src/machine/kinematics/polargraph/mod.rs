@@ -15,7 +15,7 @@ use crate::machine::{Setting, Settings, Value};
 use crate::motion::LimitsError;
 use crate::step::Line;
 
-/// What holds for every polargraph.
+/// What sets a polargraph apart from the other kinds.
 pub(super) const PROPERTIES: Properties = Properties {
     steps_per_mm: [Setting::StepsPerMmX; 2],
     // A belt never moves faster than the pen, but its length may change much more slowly.
@@ -28,10 +28,11 @@ pub(super) const PROPERTIES: Properties = Properties {
     homed_length: Some(Setting::HomedBelt),
 };
 
-/// The least and the most fraction bits of a step in which a line on a polargraph is computed. The
-/// greatest polargraph that the settings allow leaves room for the least; more than the most would
-/// not change the result.
+/// The least number of fraction bits of a step with which a line on a polargraph is computed. The
+/// greatest polargraph that the settings allow leaves room for this many.
 const LEAST_BITS: u32 = 8;
+/// The greatest number of fraction bits of a step with which a line is computed. More would not
+/// change the result.
 const MOST_BITS: u32 = 14;
 
 /// Where the belts of a polargraph leave their motors. Both anchors are at the same height, above
@@ -58,7 +59,7 @@ pub(super) fn check(settings: &Settings) -> Result<(), LimitsError> {
 }
 
 impl Anchors {
-    /// The anchors that the settings describe.
+    /// Returns the anchors that the settings describe, in steps.
     pub(super) fn of(settings: &Settings) -> Self {
         let steps = |setting| {
             settings.millimetres_as_steps(setting, Setting::StepsPerMmX).min(2 * PAGE_LIMIT)
@@ -137,22 +138,22 @@ fn in_order([a, b]: [PagePoint; 2]) -> ([PagePoint; 2], bool) {
 /// A line on the page of a polargraph, in units of 2^-`bits` steps. Coordinates count from the left
 /// anchor, to the right and downward.
 struct FineLine {
-    /// The number of fraction bits of a step.
+    /// The number of fraction bits: the unit of the line is 2^-`bits` steps.
     bits: u32,
-    /// The start of the line.
+    /// The start of the line, to the right of the left anchor and below it.
     from: [i32; 2],
     /// The vector from the start of the line to its end.
     delta: [i32; 2],
-    /// The distance between the anchors.
+    /// The distance between the two anchors, where the belts leave the motors.
     width: i32,
-    /// The same vector as `delta`, scaled up as far as 32 bits allow. Only its direction matters.
+    /// The direction of the line: `delta`, scaled up as far as 32 bits allow.
     direction: [i32; 2],
 }
 
 /// A point on a [`FineLine`].
 #[derive(Clone, Copy)]
 struct FinePoint {
-    /// Its coordinates.
+    /// Its coordinates, from the left anchor to the right and downward.
     position: [i32; 2],
     /// The lengths of both belts, in units of 2^-`bits` steps.
     belts: [i32; 2],
@@ -161,6 +162,8 @@ struct FinePoint {
 }
 
 impl FineLine {
+    /// Makes the line between two points of the page, with as many fraction bits as 32-bit numbers
+    /// leave room for.
     fn new(Anchors { left, width }: Anchors, ends: [PagePoint; 2]) -> Self {
         let [from, to] = ends.map_each(|end| [end.x - left.x, left.y - end.y]);
         let greatest = [from, to].map_each(|[x, y]| x.abs().max((width - x).abs()).max(y.abs()));
@@ -175,7 +178,7 @@ impl FineLine {
         Self { bits, from, delta, width: width << bits, direction }
     }
 
-    /// The point on the line after `done` of `length` units.
+    /// Returns the point on the line that divides it as `done` divides `length`.
     #[inline(never)] // Inlining it at every call would cost too much flash.
     fn at(&self, done: u32, length: u32) -> FinePoint {
         let along = |axis: usize| {
@@ -208,7 +211,7 @@ impl FineLine {
     }
 }
 
-/// √(x² + y²), rounded to the nearest integer.
+/// Returns √(x² + y²), rounded to the nearest integer: the length of a belt.
 #[inline(never)] // Inlining it at every call would cost too much flash.
 fn length_of(x: i32, y: i32) -> i32 {
     let square = |steps: i32| i64::from(steps).unsigned_abs() * i64::from(steps).unsigned_abs();
