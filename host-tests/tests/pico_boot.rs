@@ -36,8 +36,9 @@ fn assert_fresh(heard: &[String]) {
 fn assert_fault(heard: &[String], cause: &str) {
     assert!(heard[0].starts_with("[MSG:started again after a fault: "), "{heard:?}");
     assert!(heard[0].contains(cause), "{heard:?}");
-    assert_eq!(heard[1], "ALARM:101");
-    assert!(heard[2].contains("|Alarm:101"), "{heard:?}");
+    assert_eq!(heard[1], "[MSG:'$H'|'$X' to unlock]");
+    assert_eq!(heard[2], "ALARM:101");
+    assert!(heard[3].contains("|Alarm:101"), "{heard:?}");
 }
 
 /// Checks that the drivers are off and the pen is up.

@@ -197,6 +197,7 @@ fn a_hanging_program_is_started_again_in_alarm() -> TestResult {
     line.hear_greeting()?;
     let message = line.hear()?;
     assert!(message.starts_with("[MSG:started again after a fault: the program hung"), "{message}");
+    assert_eq!(line.hear()?, "[MSG:'$H'|'$X' to unlock]");
     assert_eq!(line.hear()?, "ALARM:101");
     assert!(line.status()?.contains("|Alarm:101"));
     let mut machine = Machine::default();

@@ -195,9 +195,11 @@ fn a_host_without_power_keeps_nobody_waiting() -> TestResult {
 fn a_suspended_bus_loses_no_byte() -> TestResult {
     let mut line = plugged_in()?;
     // The move keeps the lines behind it waiting.
-    for text in ["G91", "G1 X100 F600", "M0"] {
+    for text in ["G91", "G1 X100 F600"] {
         assert_eq!(line.ask(text)?, "ok", "{text}");
     }
+    assert_eq!(line.ask("M0")?, "[MSG:to go on, send ~]");
+    assert_eq!(line.hear()?, "ok");
     let flood: String = (0..40).map(|n| format!("v {n}.125 {n} 0.5\n")).collect();
     line.emulator.send(b"G1 X1\nG1 X-1\nM0\n")?;
     line.emulator.send(flood.as_bytes())?;
@@ -268,6 +270,7 @@ fn a_fault_is_reported_at_an_open_port_too() -> TestResult {
     line.hear_greeting()?;
     let message = line.hear()?;
     assert!(message.contains("the board was taken twice"), "{message}");
+    assert_eq!(line.hear()?, "[MSG:'$H'|'$X' to unlock]");
     assert_eq!(line.hear()?, "ALARM:101");
     assert_eq!(line.ask("$X")?, "ok");
     Ok(())
