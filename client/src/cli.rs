@@ -1,12 +1,14 @@
 //! Defines the command line and turns its options into settings of a job.
 
 mod machine;
+pub mod page;
 mod view;
 
 pub use machine::{
     FormatArgs, JogArgs, PauseArgs, PenArgs, PenPosition, PlotterArgs, PortArgs, PortsArgs,
     SetArgs, SettingsCommand, WatchArgs,
 };
+pub use page::PageArgs;
 pub use view::ViewArgs;
 
 use crate::board;
@@ -20,7 +22,7 @@ use clap::{Args, Parser, Subcommand};
 use clap_complete::Shell;
 use penup::machine::Setting;
 use std::path::PathBuf;
-use view::page;
+use view::page as page_size;
 
 /// Draws solids and line drawings with a penup plotter.
 #[derive(Debug, Parser)]
@@ -54,6 +56,8 @@ pub enum Command {
     Plot(PlotArgs),
     /// Show what would be drawn, without a plotter
     Preview(PreviewArgs),
+    /// Show a page in the browser: turn the model, look at the drawing, and plot it
+    Page(PageArgs),
     /// Turn the traced polylines of a plan into few B-spline control points
     Fit(FitArgs),
     /// Record a job as Harrison's tape of single motor steps, and read such tapes
@@ -128,6 +132,7 @@ impl Command {
             | Self::Unlock(plotter)
             | Self::Again(plotter) => &plotter.format,
             Self::Preview(_)
+            | Self::Page(_)
             | Self::Tape(TapeCommand::Decode { .. })
             | Self::Console(_)
             | Self::Completions { .. }
@@ -178,7 +183,7 @@ pub struct TapeShowArgs {
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
     /// The page: A0 to A6, Letter, Legal, Tabloid, or its size such as 300x200, 11x17in
-    #[arg(long, value_name = "PAGE", value_parser = page, default_value = "A4")]
+    #[arg(long, value_name = "PAGE", value_parser = page_size, default_value = "A4")]
     pub page: Page,
     /// The number of motor steps in a millimetre, 2 to 4000
     #[arg(

@@ -272,6 +272,18 @@ pub enum Error {
     /// The picture cannot be rendered.
     #[error("cannot make the picture: {0}")]
     Picture(String),
+    /// The page has not been built.
+    #[error("there is no page in {}: build it with `cargo xtask page`", folder.display())]
+    PageNotBuilt {
+        /// The folder in which it should be.
+        folder: PathBuf,
+    },
+    /// The page cannot be served.
+    #[error("cannot serve the page: {reason}\nIs another program at this port? Choose another one")]
+    PageNotServed {
+        /// The reason.
+        reason: String,
+    },
     /// The user cancelled the job, and the plotter confirmed that it stopped.
     #[error("given up: the plot was stopped and the pen is up")]
     Interrupted,
@@ -346,6 +358,8 @@ impl Error {
             | Self::Write { .. }
             | Self::OutputIsInput { .. }
             | Self::OutputTwice { .. }
+            | Self::PageNotBuilt { .. }
+            | Self::PageNotServed { .. }
             | Self::Picture(_) => NOT_DONE,
         }
     }

@@ -5,8 +5,10 @@
 //! moves are faint and thin. A green disc marks the start of the first stroke and a red ring the
 //! end of the last one. The PNG is rendered from this SVG.
 
+#[cfg(feature = "native")]
 use crate::error::Error;
 use crate::page::{Page, PagePoint, Run};
+#[cfg(feature = "native")]
 use resvg::{tiny_skia, usvg};
 use std::collections::BTreeSet;
 use std::f64::consts::{PI, TAU};
@@ -36,8 +38,10 @@ const START: &str = "#2a9d5c";
 const END: &str = "#d7433b";
 
 /// The resolution of the PNG in dots per mm (203 dots per inch).
+#[cfg(feature = "native")]
 const DOTS_PER_MM: f64 = 8.0;
 /// The maximum width and height of the PNG in dots. Larger pages get a lower resolution.
+#[cfg(feature = "native")]
 const MOST_DOTS: f64 = 4096.0;
 
 impl Picture {
@@ -161,6 +165,7 @@ impl Picture {
 ///
 /// # Errors
 /// The SVG cannot be parsed, or the page is too large.
+#[cfg(feature = "native")]
 pub fn png(svg: &str) -> Result<Vec<u8>, Error> {
     let broken = |error: &dyn fmt::Display| Error::Picture(error.to_string());
     let tree = usvg::Tree::from_str(svg, &usvg::Options::default()).map_err(|e| broken(&e))?;

@@ -12,11 +12,12 @@ use crate::page::{PagePoint, PenRuns, Run};
 use crate::protocol::PLOT;
 use crate::results::{JobResult, Lengths, Timings};
 use crate::room::Room;
+use crate::strokes::strokes_of;
 use crate::watch::PenWatch;
 use penup::boards::host::{Change, HostBoard};
 use penup::geometry::{Projection, Vertex};
 use penup::index::Index;
-use penup::machine::{EventRing, Path, PulserState, Setting, Settings, Target};
+use penup::machine::{EventRing, PulserState, Setting, Settings};
 use penup::motion::TICKS_PER_SECOND;
 use penup::plotter::{Observer, Plotter};
 use penup::protocol::CommandError;
@@ -147,26 +148,11 @@ impl<I: Index> InMemory<I> {
         computed.map_err(|refusal| Error::NotDrawn { refusal })?;
         let timings_ms = watch.stop();
         let steps = self.steps_per_mm();
-        let mut strokes: Vec<Vec<[f64; 2]>> = Vec::new();
-        let mut stroke_pens: Vec<u8> = Vec::new();
-        let mut path = self.plotter.strokes();
-        while let Some(Target { point, ink }) = path.next_target() {
-            let point = [f64::from(point.x) / steps[0], f64::from(point.y) / steps[1]];
-            let pen = path.pen() + 1;
-            match (ink, strokes.last_mut(), stroke_pens.last()) {
-                (Some(_), Some(stroke), Some(last)) if *last == pen => stroke.push(point),
-                // Another pen continues where the last one ended.
-                (Some(_), Some(stroke), _) => {
-                    let from = stroke.last().copied().unwrap_or(point);
-                    strokes.push(vec![from, point]);
-                    stroke_pens.push(pen);
-                }
-                _ => {
-                    strokes.push(vec![point]);
-                    stroke_pens.push(pen);
-                }
-            }
-        }
+        let (stroke_pens, strokes): (Vec<u8>, Vec<_>) =
+            strokes_of(&mut self.plotter.strokes(), steps)
+                .into_iter()
+                .map(|stroke| (stroke.pen, stroke.points))
+                .unzip();
         let lengths = Lengths::of(&strokes);
         let pen = match self.pen.as_mut() {
             Some(pen) if is_grid(self.plotter.machine().settings()) => pen.runs(),

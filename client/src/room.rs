@@ -3,9 +3,13 @@
 
 use crate::lines::Lines;
 use penup::board_table::BoardRow;
+#[cfg(feature = "native")]
 use penup::boards::host::lend_memory_of;
+#[cfg(feature = "native")]
 use penup::index::Index;
-use penup::plotter::{EMPTY_LOOKAHEAD, MemorySlices};
+use penup::plotter::EMPTY_LOOKAHEAD;
+#[cfg(feature = "native")]
+use penup::plotter::MemorySlices;
 
 /// The capacities of a plotter's memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -67,6 +71,7 @@ impl Room {
     }
 
     /// Allocates the memory. It lasts as long as the process.
+    #[cfg(feature = "native")]
     pub(crate) fn lend<I: Index>(self) -> MemorySlices<'static, I> {
         lend_memory_of(self.vertices, self.corners, self.words, self.blocks)
     }

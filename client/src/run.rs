@@ -1,5 +1,6 @@
 //! Runs the commands of the command line.
 
+use crate::cli::page;
 use crate::cli::{
     Cli, Command, FitArgs, PictureArgs, PlotArgs, PreviewArgs, SettingsCommand, TapeCommand,
     TapeEncodeArgs, TapeShowArgs, ViewArgs,
@@ -47,6 +48,7 @@ pub fn run(cli: &Cli, interrupt: &AtomicBool) -> Result<Outcome, Error> {
     match &cli.command {
         Command::Plot(args) => plot(args, quiet, interrupt),
         Command::Preview(args) => preview(args, quiet, interrupt),
+        Command::Page(args) => page::serve(args),
         Command::Fit(args) => fit(args, quiet),
         Command::Tape(TapeCommand::Encode(args)) => encode_tape(args, quiet, interrupt),
         Command::Tape(TapeCommand::Decode { file }) => {

@@ -1,7 +1,7 @@
 //! Reconstructs the path of the pen from the changes of the output pins.
 
-use crate::emulator::{Machine, MachineEvent, MachineEventKind, PinChange};
 use crate::page::{PenRuns, Run};
+use crate::pins::{Machine, MachineEvent, MachineEventKind, PinChange};
 
 /// Follows the pins of a plotter that starts at the origin with the pen up.
 #[derive(Debug)]

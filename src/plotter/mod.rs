@@ -34,6 +34,8 @@ pub use options::{
     Flag, HiddenLines, OPTIONS, PlotOption, PlotOptions, ProjectionChoice, VisibilityMode,
 };
 
+#[cfg(any(test, feature = "host"))]
+use crate::drawing::Drawing;
 use crate::index::Index;
 use crate::machine::{
     Alarm, Machine, MachineError, PulserState, Setting, SettingError, Settings, State, Value,
@@ -308,6 +310,16 @@ impl<'m, I: Index> Plotter<'m, I> {
         Ok(&self.inner.job)
     }
 
+    /// Computes the drawing of `$plot` without the order of its strokes, which takes the longest:
+    /// enough to look at while the camera turns. The job computed last ends.
+    ///
+    /// # Errors
+    /// The [`CommandError`] that `$plot` would reply with.
+    #[cfg(any(test, feature = "host"))]
+    pub fn draw(&mut self, cancel: &mut dyn Cancel) -> Result<Drawing<'_, I>, CommandError> {
+        self.inner.draw(cancel)
+    }
+
     /// The strokes of the job computed last, from the beginning.
     pub fn strokes(&mut self) -> Strokes<'_, I> {
         self.inner.cursor = Cursor::default();
@@ -478,6 +490,19 @@ impl<I: Index> Inner<'_, I> {
             Command::GCode(line) => self.run_gcode(line, board)?,
         }
         Ok(Next::Nothing)
+    }
+
+    /// Computes the drawing alone, in place of the last job.
+    #[cfg(any(test, feature = "host"))]
+    fn draw(&mut self, cancel: &mut dyn Cancel) -> Result<Drawing<'_, I>, CommandError> {
+        self.copy_words = 0;
+        self.job = Job::default();
+        self.cursor = Cursor::default();
+        let steps = self.machine.settings().page_steps();
+        let (model, options, words) = (&self.model, &self.options, &mut *self.words);
+        let observer = &mut Unobserved;
+        let stored = job::Pipeline { model, options, steps, words, cancel, observer }.draw()?;
+        Ok(stored.drawing(self.words).unwrap_or(Drawing { points: &[], segments: &[] }))
     }
 
     /// Sets the setting with the number `name`.

@@ -20,6 +20,7 @@ mod flash;
 mod firmware;
 mod fuzz;
 mod gallery;
+mod page;
 mod panics;
 mod set_up;
 mod side_by_side;
@@ -75,6 +76,10 @@ enum Task {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         arguments: Vec<String>,
     },
+    /// Builds the page as static files for any web server, into target/page.
+    Page,
+    /// Tests the page in Chromium, which it installs if need be.
+    PageTest(page::TestArguments),
     /// Counts the instructions of each stage on a Cortex-M3, or the cycles on a board, for every
     /// lattice.
     Bench {
@@ -156,6 +161,8 @@ fn carry_out() -> Result<()> {
         }
         Some(Task::Flash { board }) => flash::flash(board)?,
         Some(Task::Plot { arguments }) => plot(&arguments)?,
+        Some(Task::Page) => page::build()?,
+        Some(Task::PageTest(arguments)) => page::test(&arguments)?,
         Some(Task::Bench { motion: true, .. }) => bench::count_motion()?,
         Some(Task::Bench { board, .. }) => match board.emulator {
             Emulator::Qemu { .. } => bench::count()?,

@@ -5,6 +5,8 @@
 //! | `core` for the board | rustc's target directory | rustup; else Debian's compiler and sources |
 //! | QEMU | `qemu-system-arm` | apt, or brew |
 //! | rp2040js | `node` and `npm`; rp2040js in the target directory | apt, or brew; npm |
+//! | Chromium | `chromium` or another name of it | apt, or brew |
+//! | playwright-core | as rp2040js is | apt, or brew; npm |
 //! | rustfmt, clippy | `cargo fmt`, `cargo clippy` | rustup |
 
 use std::fs;
@@ -43,16 +45,8 @@ pub fn toolchain(target: &str) -> Result<Toolchain> {
         return Ok(Toolchain::Rustup);
     }
     let refusal = refusal(target);
-    if !refusal.exists() && output("rustup", &["--version"]).is_some() {
-        say!("penup: installing the Rust target {target} by rustup")?;
-        let mut rustup = Command::new("rustup");
-        // A backtrace would hide the one line in which rustup gives its reason.
-        rustup.args(["target", "add", target]).env("RUST_BACKTRACE", "0");
-        match run_within(RUSTUP_LIMIT, &mut rustup) {
-            Ok(()) if has_core(target) => return Ok(Toolchain::Rustup),
-            Ok(()) => say!("penup: rustup added {target} to another toolchain than cargo's")?,
-            Err(error) => say!("penup: {error:#}")?,
-        }
+    if !refusal.exists() && add_target(target)? {
+        return Ok(Toolchain::Rustup);
     }
     if !debian_is_ready() && output("apt-get", &["--version"]).is_some() {
         apt_install(&["rustc-web", "rust-web-src", "lld"])?;
@@ -68,6 +62,37 @@ pub fn toolchain(target: &str) -> Result<Toolchain> {
         fs::write(&refusal, [])?;
     }
     Ok(Toolchain::Debian)
+}
+
+/// Finds or installs `target` for the compiler in use, by rustup alone.
+///
+/// # Errors
+/// It is not there, and cannot be installed.
+pub fn target(target: &str) -> Result<()> {
+    ensure!(
+        has_core(target) || add_target(target)?,
+        "the compiler has no {target}: run `rustup target add {target}` where the network can be \
+         reached"
+    );
+    Ok(())
+}
+
+/// Lets rustup install `target`, if there is rustup. Returns whether the compiler in use then has
+/// it.
+fn add_target(target: &str) -> Result<bool> {
+    if output("rustup", &["--version"]).is_none() {
+        return Ok(false);
+    }
+    say!("penup: installing the Rust target {target} by rustup")?;
+    let mut rustup = Command::new("rustup");
+    // A backtrace would hide the one line in which rustup gives its reason.
+    rustup.args(["target", "add", target]).env("RUST_BACKTRACE", "0");
+    match run_within(RUSTUP_LIMIT, &mut rustup) {
+        Ok(()) if has_core(target) => return Ok(true),
+        Ok(()) => say!("penup: rustup added {target} to another toolchain than cargo's")?,
+        Err(error) => say!("penup: {error:#}")?,
+    }
+    Ok(false)
 }
 
 /// The path of a file that records that rustup could not install `target` for the compiler in use,
@@ -143,40 +168,78 @@ fn qemu() -> Result<()> {
 const NPM_LIMIT: Duration = Duration::from_secs(120);
 /// The oldest version of Node that rp2040js works with.
 const LEAST_NODE: u32 = 18;
+/// The oldest version of Node that playwright-core works with.
+const LEAST_NODE_OF_PLAYWRIGHT: u32 = 20;
 
 /// Finds or installs Node, and rp2040js in the version of the lock file beside the client's
 /// emulator.
 fn rp2040js() -> Result<()> {
+    node_packages("rp2040js", LEAST_NODE, "client/src/emulator/rp2040js").map(drop)
+}
+
+/// What the tests of the page need.
+pub struct Browser {
+    /// The path of the program.
+    pub chromium: String,
+    /// The folder in which npm has installed what drives it.
+    pub packages: PathBuf,
+}
+
+/// Finds or installs Chromium, and playwright-core in the version of the lock file beside the tests
+/// of the page. playwright-core brings no browser.
+pub fn browser() -> Result<Browser> {
+    const FIND: &str = "command -v chromium || command -v chromium-browser || \
+                        command -v google-chrome";
+    let found = || output("sh", &["-c", FIND]);
+    let chromium = match found() {
+        Some(chromium) => Some(chromium),
+        None => {
+            install(&["chromium"], "chromium")?;
+            found()
+        }
+    };
+    let Some(chromium) = chromium else {
+        bail!("install Chromium so that `chromium --version` works: https://www.chromium.org/");
+    };
+    let packages =
+        node_packages("playwright-core", LEAST_NODE_OF_PLAYWRIGHT, "page/browser-tests")?;
+    Ok(Browser { chromium, packages })
+}
+
+/// Finds or installs Node `least` or later, and `package` with npm, in the versions of the lock
+/// file in the folder `from`. Returns the folder with the packages.
+fn node_packages(package: &str, least: u32, from: &str) -> Result<PathBuf> {
     let node = || -> Option<u32> {
         let version = output("node", &["--version"])?;
         version.strip_prefix('v')?.split('.').next()?.parse().ok()
     };
-    let found = || node().is_some_and(|version| version >= LEAST_NODE);
+    let found = || node().is_some_and(|version| version >= least);
     if !found() {
         install(&["nodejs"], "node")?;
     }
     ensure!(
         found(),
-        "install Node {LEAST_NODE} or later so that `node --version` works: https://nodejs.org/"
+        "install Node {least} or later so that `node --version` works: https://nodejs.org/"
     );
-    let from = crate::root().join("client/src/emulator/rp2040js");
-    let to = crate::root().join("target/rp2040js");
+    let from = crate::root().join(from);
+    let to = crate::root().join("target").join(package);
     let lock = fs::read(from.join("package-lock.json"))?;
     // npm writes this file last, so if it exists, the installation is complete.
     let done = to.join("node_modules/.package-lock.json");
     if done.exists() && fs::read(to.join("package-lock.json")).is_ok_and(|found| found == lock) {
-        return Ok(());
+        return Ok(to);
     }
     if output("npm", &["--version"]).is_none() {
         install(&["npm"], "node")?;
     }
-    say!("penup: installing rp2040js by npm")?;
+    say!("penup: installing {package} by npm")?;
     fs::create_dir_all(&to)?;
     fs::copy(from.join("package.json"), to.join("package.json"))?;
     fs::write(to.join("package-lock.json"), lock)?;
     let mut npm = Command::new("npm");
     npm.args(["ci", "--ignore-scripts", "--no-audit", "--no-fund", "--loglevel=error"]);
-    run_within(NPM_LIMIT, npm.current_dir(&to))
+    run_within(NPM_LIMIT, npm.current_dir(&to))?;
+    Ok(to)
 }
 
 /// Installs Debian packages if there is apt, else a package of Homebrew if there is brew.

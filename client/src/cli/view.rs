@@ -5,7 +5,7 @@
 
 use super::number;
 use crate::job::Settings;
-use crate::page::Page;
+use crate::page::{NAMED_PAGES, Page};
 use crate::protocol::acts_at_once;
 use crate::words::for_client;
 use clap::builder::{PossibleValue, PossibleValuesParser};
@@ -18,19 +18,6 @@ use penup::protocol::{Command as PlotterCommand, CommandError, Escape, LINE_LIMI
 const PAGE: &str = "page";
 /// The name of the option whose value is any text. It is sent with escapes.
 const TITLE: &str = "title";
-/// The pages that have names.
-const PAGES: [(&str, Page); 10] = [
-    ("A4", Page { width: 210.0, height: 297.0 }),
-    ("A0", Page { width: 841.0, height: 1189.0 }),
-    ("A1", Page { width: 594.0, height: 841.0 }),
-    ("A2", Page { width: 420.0, height: 594.0 }),
-    ("A3", Page { width: 297.0, height: 420.0 }),
-    ("A5", Page { width: 148.0, height: 210.0 }),
-    ("A6", Page { width: 105.0, height: 148.0 }),
-    ("Letter", Page { width: 215.9, height: 279.4 }),
-    ("Legal", Page { width: 215.9, height: 355.6 }),
-    ("Tabloid", Page { width: 279.4, height: 431.8 }),
-];
 /// The units in which the size of a page may be written, and their lengths in mm.
 const UNITS: [(&str, f64); 3] = [("mm", 1.0), ("cm", 10.0), ("in", 25.4)];
 /// The name of the option that keeps room free, which a file with a page of its own does not need.
@@ -113,7 +100,7 @@ impl Args for ViewArgs {
 impl FromArgMatches for ViewArgs {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, Error> {
         let landscape = matches.get_flag(LANDSCAPE);
-        let page = matches.get_one::<Page>(PAGE).copied().unwrap_or(PAGES[0].1);
+        let page = matches.get_one::<Page>(PAGE).copied().unwrap_or(NAMED_PAGES[0].1);
         let page = turned(page, landscape);
         let value = |(option, flag): (&'static PlotOption, Flag)| {
             let value = match option.name {
@@ -222,10 +209,10 @@ fn within(option: &PlotOption, reason: &str) -> String {
 /// Parses the size of a page: its name, or its width and height with a unit.
 pub(super) fn page(text: &str) -> Result<Page, String> {
     let text = text.trim();
-    if let Some((_, page)) = PAGES.iter().find(|(name, _)| name.eq_ignore_ascii_case(text)) {
+    if let Some((_, page)) = NAMED_PAGES.iter().find(|(name, _)| name.eq_ignore_ascii_case(text)) {
         return Ok(*page);
     }
-    let names: Vec<&str> = PAGES.iter().map(|(name, _)| *name).collect();
+    let names: Vec<&str> = NAMED_PAGES.iter().map(|(name, _)| *name).collect();
     let names = names.join(", ");
     let text = text.to_ascii_lowercase();
     let (width, height) = text.split_once('x').ok_or_else(|| {

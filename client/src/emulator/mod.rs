@@ -19,7 +19,6 @@
 mod debugger;
 mod log;
 mod pico;
-mod pins;
 mod process;
 mod running;
 mod stack;
@@ -32,9 +31,9 @@ use std::process::ExitStatus;
 use std::time::Duration;
 
 pub use pico::{Pico, PicoByUsb, UartError};
-pub use pins::{Machine, MachineEvent, MachineEventKind, Pin, PinChange};
 pub use stack::Stack;
 
+pub use crate::pins::{Machine, MachineEvent, MachineEventKind, Pin, PinChange};
 use crate::table::{self, BoardRow};
 use process::Process;
 use trace::{Trace, TraceError};

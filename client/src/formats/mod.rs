@@ -10,29 +10,51 @@
 
 mod error;
 mod format;
+#[cfg(feature = "native")]
 mod gcode;
+#[cfg(feature = "native")]
 mod hpgl;
+#[cfg(feature = "native")]
 mod mesh;
 mod obj;
+#[cfg(feature = "native")]
 mod plan;
+#[cfg(feature = "native")]
 mod ply;
+#[cfg(feature = "native")]
 mod stl;
+#[cfg(feature = "native")]
 mod svg;
+#[cfg(feature = "native")]
 mod tape;
 
 pub use error::ReadError;
 
 use crate::lines::{JobLine, Lines};
 use crate::page::Page;
-use crate::table::BOARDS;
 use format::{Contents, Format, SIZE_LIMIT};
+#[cfg(feature = "native")]
+use penup::board_table::BOARDS;
 use std::fs::{File, Metadata};
 use std::io::{self, Read as _};
 use std::path::Path;
 
 /// Every format that is read.
-static FORMATS: &[&dyn Format] =
-    &[&obj::Obj, &svg::Svg, &stl::Stl, &ply::Ply, &gcode::GCode, &hpgl::HpGl, &tape::Tape];
+static FORMATS: &[&dyn Format] = &[
+    &obj::Obj,
+    #[cfg(feature = "native")]
+    &svg::Svg,
+    #[cfg(feature = "native")]
+    &stl::Stl,
+    #[cfg(feature = "native")]
+    &ply::Ply,
+    #[cfg(feature = "native")]
+    &gcode::GCode,
+    #[cfg(feature = "native")]
+    &hpgl::HpGl,
+    #[cfg(feature = "native")]
+    &tape::Tape,
+];
 
 /// The name that stands for the standard input.
 pub const STANDARD_INPUT: &str = "-";
@@ -169,6 +191,11 @@ pub fn list() -> String {
     described(", ", |format, extensions| format!("{} ({extensions})", format.name()))
 }
 
+/// The extensions of the files that are read, without the dot.
+pub fn extensions() -> impl Iterator<Item = &'static str> {
+    FORMATS.iter().flat_map(|format| format.extensions()).copied()
+}
+
 /// Describes each format by `describe`, which is given the format and the list of its extensions.
 fn described(separator: &str, describe: impl Fn(&dyn Format, &str) -> String) -> String {
     let described = |format: &&dyn Format| {
@@ -180,11 +207,13 @@ fn described(separator: &str, describe: impl Fn(&dyn Format, &str) -> String) ->
 }
 
 /// A number with a noun and a verb.
+#[cfg(feature = "native")]
 fn counted(number: usize, [one, many]: [&str; 2]) -> String {
     format!("{number} {}", if number == 1 { one } else { many })
 }
 
 /// Says how many points the drawing has if a plotter takes fewer.
+#[cfg(feature = "native")]
 fn capacity(points: usize) -> Option<String> {
     let boards = BOARDS.iter().map(|board| (board.name, board.memory.vertices));
     let short: Vec<String> = boards

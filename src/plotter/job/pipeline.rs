@@ -4,6 +4,8 @@
 use super::super::solid;
 use super::super::{PlotOptions, plan, title};
 use super::{Job, Observer};
+#[cfg(any(test, feature = "host"))]
+use crate::drawing::Stored;
 use crate::drawing::{StepsPerMillimetre, build_graph};
 use crate::index::Index;
 use crate::model::Model;
@@ -49,13 +51,31 @@ impl<I: Index> Pipeline<'_, I> {
     /// # Errors
     /// The [`CommandError`] to reply with. The working memory then holds no job.
     pub fn run(mut self) -> Result<Job<I>, CommandError> {
+        let found = self.find()?;
+        self.order(&found)
+    }
+
+    /// Computes the drawing without ordering its strokes. It then lies at the front of the working
+    /// memory.
+    ///
+    /// # Errors
+    /// As [`Pipeline::run`].
+    #[cfg(any(test, feature = "host"))]
+    pub fn draw(mut self) -> Result<Stored<I>, CommandError> {
+        let found = self.find()?;
+        Ok(build_graph(self.words, found.lines, self.cancel)?)
+    }
+
+    /// Finds the lines of the drawing, those of the title among them.
+    #[inline(always)] // Adds no frame to the stack while the stages run.
+    fn find(&mut self) -> Result<Found, CommandError> {
         self.check()?;
         let found = if self.model.is_plan() && self.options.shows_plans_flat() {
-            plan::lay_out(&mut self)?
+            plan::lay_out(self)?
         } else {
             match self.options.see {
                 #[cfg(feature = "convex")]
-                VisibilityMode::Vertices | VisibilityMode::Edges => solid::project(&mut self)?,
+                VisibilityMode::Vertices | VisibilityMode::Edges => solid::project(self)?,
                 #[cfg(not(feature = "convex"))]
                 VisibilityMode::Vertices | VisibilityMode::Edges => {
                     return Err(CommandError::NoConvexSolids);
@@ -63,8 +83,8 @@ impl<I: Index> Pipeline<'_, I> {
                 VisibilityMode::Faces | VisibilityMode::Wire => self.find_visible_lines()?,
             }
         };
-        let lines = title::write(&mut self, found.lines)?;
-        self.order(&Found { lines, ..found })
+        let lines = title::write(self, found.lines)?;
+        Ok(Found { lines, ..found })
     }
 
     /// Refuses what is known to fail before anything is computed.

@@ -1,5 +1,6 @@
 //! The output pins of a board, and how their changes translate into actions of the machine.
 
+#[cfg(feature = "native")]
 use penup::board_table::Pins;
 use penup::boards::host::{Change, Stamped};
 use std::time::Duration;
@@ -27,7 +28,8 @@ pub enum Pin {
 
 impl Pin {
     /// Returns the output pin with this number on a board with these pins.
-    pub(super) fn numbered(number: u8, pins: &Pins) -> Option<Self> {
+    #[cfg(feature = "native")]
+    pub(crate) fn numbered(number: u8, pins: &Pins) -> Option<Self> {
         let outputs = [
             (pins.step_x, Self::StepX),
             (pins.dir_x, Self::DirX),
@@ -122,7 +124,7 @@ pub enum MachineEventKind {
 /// begins. [`Machine::change`] returns the event before, and [`Machine::last`] the last one.
 ///
 /// ```
-/// use penup_client::emulator::{Machine, MachineEventKind::Step, Pin, PinChange};
+/// use penup_client::pins::{Machine, MachineEventKind::Step, Pin, PinChange};
 /// use std::time::Duration;
 ///
 /// let change = |pin, high| PinChange { pin, high, at: Duration::ZERO };

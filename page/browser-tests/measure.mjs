@@ -1,0 +1,79 @@
+// Measures frames of the page in Chromium: `cargo xtask page-test --measure`.
+
+import { readFile } from "node:fs/promises";
+import { join } from "node:path";
+import { serve, start } from "./browser.mjs";
+
+const FRAMES = 60;
+
+/** The point of a ball at these angles. */
+const point = (a, b) => [Math.sin(a) * Math.cos(b), Math.sin(a) * Math.sin(b), Math.cos(a)];
+
+/** A ball of `rings` times `rings` quads. */
+function ball(rings) {
+  const lines = [];
+  for (let i = 0; i <= rings; i++) {
+    for (let j = 0; j < rings; j++) {
+      const [a, b] = [((i + 0.02) / (rings + 0.04)) * Math.PI, (j / rings) * 2 * Math.PI];
+      lines.push(["v", ...point(a, b).map((c) => c.toFixed(6))].join(" "));
+    }
+  }
+  const vertex = (i, j) => i * rings + (j % rings) + 1;
+  for (let i = 0; i < rings; i++) {
+    for (let j = 0; j < rings; j++)
+      lines.push(
+        `f ${vertex(i, j)} ${vertex(i + 1, j)} ${vertex(i + 1, j + 1)} ${vertex(i, j + 1)}`,
+      );
+  }
+  return Buffer.from(lines.join("\n") + "\n");
+}
+
+const server = await serve();
+const browser = await start();
+const page = await browser.newPage();
+const scenes = [
+  ["lattice3", await readFile(join(process.env.PENUP_ROOT, "scenes/lattice3.obj"))],
+  ["lattice7", await readFile(join(process.env.PENUP_ROOT, "scenes/lattice7.obj"))],
+  ["ball of 10 000 quads", ball(100)],
+];
+console.log("| scene | edges | computing a frame, ms | input to picture, ms | longest task, ms |");
+console.log("|---|---|---|---|---|");
+for (const [name, buffer] of scenes) {
+  await page.goto(server.address);
+  await page.waitForSelector("html[data-ready]");
+  await page.setInputFiles("#file", { name: `${name}.obj`, mimeType: "text/plain", buffer });
+  await page.waitForFunction(
+    (want) => document.getElementById("file-name").textContent.startsWith(want),
+    name,
+  );
+  await page.waitForTimeout(500);
+  await page.focus("#sheet");
+  await page.evaluate(() =>
+    Object.assign(window.penup.frames, { compute: [], from: [], longest: 0 }),
+  );
+  for (let at = 0; at < FRAMES; at++) {
+    const before = await page.evaluate(() => window.penup.frames.from.length);
+    await page.keyboard.press("ArrowRight");
+    await page.waitForFunction((count) => window.penup.frames.from.length > count, before);
+  }
+  // The whole drawing is shown, too, and replayed.
+  await page.waitForFunction(() => window.penup.drawing.computed, undefined, { timeout: 120_000 });
+  await page.click("#tab-check");
+  await page.selectOption("#speed", "100");
+  await page.click("#play");
+  await page.waitForTimeout(1500);
+  const { compute, from, longest } = await page.evaluate(() => window.penup.frames);
+  const median = (list) => [...list].sort((a, b) => a - b)[list.length >> 1].toFixed(1);
+  const text = buffer.toString();
+  const corners = [...text.matchAll(/^f (.*)$/gm)].reduce(
+    (sum, [, face]) => sum + face.trim().split(/\s+/).length,
+    0,
+  );
+  console.log(
+    ["", name, corners / 2, median(compute), median(from), longest || "below 50", ""]
+      .join(" | ")
+      .trim(),
+  );
+}
+await browser.close();
+server.end();

@@ -1,0 +1,122 @@
+//! Builds the page as static files, for any web server: the program from the image that cargo has
+//! compiled, and the front end beside it. `cargo xtask page` runs it.
+//!
+//!     penup-page-builder IMAGE ROOT FOLDER
+//!
+//! IMAGE is the compiled `penup_page.wasm`, ROOT the checkout, and FOLDER what is written, instead
+//! of all that it held.
+
+use anyhow::{Context, Result, ensure};
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use std::fs;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use wasm_bindgen_cli_support::Bindgen;
+
+/// The examples that the page offers.
+const EXAMPLES: [&str; 6] = ["notched", "lattice3", "interpen", "lblock", "gears", "isobars"];
+
+/// The most bytes, compressed, that a browser loads before the page can be used.
+const FIRST_LOAD_LIMIT: usize = 500_000;
+
+fn main() -> Result<()> {
+    let arguments: Vec<PathBuf> = std::env::args_os().skip(1).map(PathBuf::from).collect();
+    let [image, root, folder] = &arguments[..] else {
+        anyhow::bail!("penup-page-builder IMAGE ROOT FOLDER: `cargo xtask page` runs it");
+    };
+    // Files of an earlier build must not stay.
+    if folder.exists() {
+        fs::remove_dir_all(folder).with_context(|| format!("cannot empty {}", folder.display()))?;
+    }
+    fs::create_dir_all(folder)?;
+    let mut bindgen = Bindgen::new();
+    bindgen.input_path(image).typescript(false).remove_name_section(true);
+    bindgen.remove_producers_section(true).web(true)?;
+    bindgen.generate(folder)?;
+    copy(&root.join("page/www"), folder)?;
+    let examples = folder.join("scenes");
+    fs::create_dir_all(&examples)?;
+    for name in EXAMPLES {
+        let file = format!("{name}.obj");
+        fs::copy(root.join("scenes").join(&file), examples.join(&file))?;
+    }
+    let files = files_below(folder)?;
+    // The list of what the page keeps, so that it also works without a network.
+    let list: Vec<String> = files.iter().map(|file| format!("\"{file}\"")).collect();
+    let worker = folder.join("offline.js");
+    let text = fs::read_to_string(&worker)?;
+    ensure!(text.contains("/* FILES */"), "offline.js has no place for the list of files");
+    let stamp = format!("{:x}", checksum(folder, &files)?);
+    let text = text.replace("/* FILES */", &list.join(", ")).replace("/* STAMP */", &stamp);
+    fs::write(&worker, text)?;
+    report(folder, &files)
+}
+
+/// Copies the files of a folder, and those of the folders in it.
+fn copy(from: &Path, to: &Path) -> Result<()> {
+    fs::create_dir_all(to)?;
+    for entry in fs::read_dir(from).with_context(|| format!("cannot read {}", from.display()))? {
+        let entry = entry?;
+        let target = to.join(entry.file_name());
+        if entry.file_type()?.is_dir() {
+            copy(&entry.path(), &target)?;
+        } else {
+            fs::copy(entry.path(), target)?;
+        }
+    }
+    Ok(())
+}
+
+/// The paths of all files below `folder`, sorted, with `/` between their parts.
+fn files_below(folder: &Path) -> Result<Vec<String>> {
+    let mut files = Vec::new();
+    let mut folders = vec![(folder.to_owned(), String::new())];
+    while let Some((folder, prefix)) = folders.pop() {
+        for entry in fs::read_dir(folder)? {
+            let entry = entry?;
+            let name = format!("{prefix}{}", entry.file_name().to_string_lossy());
+            if entry.file_type()?.is_dir() {
+                folders.push((entry.path(), format!("{name}/")));
+            } else {
+                files.push(name);
+            }
+        }
+    }
+    files.sort();
+    Ok(files)
+}
+
+/// A checksum of the files (FNV-1a), which names this build of the page.
+fn checksum(folder: &Path, files: &[String]) -> Result<u64> {
+    let mut sum: u64 = 0xcbf2_9ce4_8422_2325;
+    for file in files {
+        for byte in fs::read(folder.join(file))? {
+            sum = (sum ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+        }
+    }
+    Ok(sum)
+}
+
+/// Prints the sizes, and refuses a page that takes too long to load.
+fn report(folder: &Path, files: &[String]) -> Result<()> {
+    let mut out = std::io::stdout().lock();
+    let mut first = 0;
+    for file in files {
+        let bytes = fs::read(folder.join(file))?;
+        let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
+        encoder.write_all(&bytes)?;
+        let compressed = encoder.finish()?.len();
+        if !file.starts_with("scenes/") {
+            first += compressed;
+        }
+        writeln!(out, "{:>9} {compressed:>9} gzip  {file}", bytes.len())?;
+    }
+    writeln!(out, "first load: {first} bytes compressed, of {FIRST_LOAD_LIMIT}")?;
+    ensure!(
+        first <= FIRST_LOAD_LIMIT,
+        "the page loads {first} bytes compressed, more than {FIRST_LOAD_LIMIT}"
+    );
+    writeln!(out, "the page is in {}: serve it with `penup page`", folder.display())?;
+    Ok(())
+}

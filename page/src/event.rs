@@ -1,0 +1,35 @@
+//! What a session tells its user.
+
+use serde::Serialize;
+
+/// Something that the user should see.
+#[derive(Debug, Serialize)]
+#[serde(tag = "kind", rename_all = "lowercase")]
+pub enum Event {
+    /// What the session is doing: `closed`, `finding`, `ready`, `sending`, `computing`, `drawing`,
+    /// or `alarm`.
+    Phase { name: &'static str },
+    /// So many lines of the drawing have arrived.
+    Sent { done: usize, all: usize },
+    /// The plotter's state, the position of the pen in mm, the strokes begun and all, the length
+    /// of ink drawn and all in mm, and the seconds left.
+    Status {
+        state: String,
+        position: Vec<f64>,
+        strokes: Option<(u64, u64)>,
+        ink: Option<(f64, f64)>,
+        left: Option<f64>,
+    },
+    /// The plotter waits for this pen.
+    Pen { pen: u8 },
+    /// A message of the plotter.
+    Note { text: String },
+    /// What was begun has failed, and what to do about it.
+    Failed { text: String },
+    /// The user has given the drawing up; the pen is up.
+    Stopped,
+    /// The drawing is done, and so many strokes and mm were drawn.
+    Drawn { report: Option<String> },
+    /// The answer to a question, such as a list of settings.
+    Reply { text: String },
+}

@@ -1,0 +1,499 @@
+//! The session with a plotter: finds it, sends a drawing, and follows it until it is drawn.
+//!
+//! A session has no line of its own. Whoever has one, an emulated board or a serial port, passes in
+//! what it received and the time, by [`Session::receive`] and [`Session::tick`], and sends what
+//! [`Session::take_out`] returns. What the user should see comes by [`Session::take_events`].
+
+use crate::delivery::{Delivery, Outcome};
+use crate::event::Event;
+use crate::options::{NamedValues, text_of};
+use crate::phase::Phase;
+use crate::sheet::Shared;
+use crate::source;
+use crate::words::{alarm, refusal};
+use penup_client::job::Job;
+use penup_client::lines::{JobLine, Lines};
+use penup_client::protocol::{
+    ABORT, LAST_NUMBER, MODEL, PLOT, RESUME, Reply, ReplyReader, STATUS_QUERY, Status, is_penup,
+    numbered,
+};
+use penup_client::results::JobReport;
+use penup_client::twin;
+use std::rc::Rc;
+use wasm_bindgen::prelude::wasm_bindgen;
+
+/// The time in ms between two questions for the status.
+const QUERY_EVERY: f64 = 100.0;
+/// The time in ms after which ctrl-X, or the first line number, is sent again.
+const AGAIN_AFTER: f64 = 1000.0;
+/// The longest time in ms until the plotter counts lines.
+const OPEN_PATIENCE: f64 = 15_000.0;
+/// The most times that the checksums and the report are asked for again.
+const MOST_QUESTIONS: u32 = 10;
+/// Feed hold.
+const HOLD: u8 = b'!';
+
+/// The session.
+#[wasm_bindgen]
+#[derive(Debug)]
+pub struct Session {
+    phase: Phase,
+    /// The name of the phase that the user was told last.
+    name: &'static str,
+    /// When the phase began, and when something was last sent again in it, in ms.
+    since: f64,
+    repeated: f64,
+    now: f64,
+    /// The longest time in ms without a byte.
+    silence: f64,
+    reader: ReplyReader,
+    /// The line being received, for what [`Reply`] leaves out.
+    raw: Vec<u8>,
+    out: Vec<u8>,
+    events: Vec<Event>,
+    last_heard: f64,
+    last_query: f64,
+    messages: Vec<String>,
+    delivery: Option<Delivery>,
+    /// The number of the last accepted line.
+    number: i32,
+    /// The drawing that waits until the plotter is ready, and the checksums it must have.
+    job: Option<Rc<dyn Lines>>,
+    expected: Option<[u32; 2]>,
+    contents: Option<[u32; 2]>,
+    report: Option<JobReport>,
+    strokes: u64,
+    /// How often the plotter was asked again for what did not arrive whole.
+    questions: u32,
+    is_computing: bool,
+    /// Equal reports of a machine that waits, one after the other.
+    holds: (Option<u8>, String, u32),
+    is_given_up: bool,
+}
+
+#[wasm_bindgen]
+impl Session {
+    /// A session that gives the plotter up after `silence` ms without a byte.
+    #[wasm_bindgen(constructor)]
+    pub fn new(silence: f64) -> Self {
+        crate::note_faults();
+        Self {
+            phase: Phase::Closed,
+            name: "closed",
+            since: 0.0,
+            repeated: 0.0,
+            now: 0.0,
+            silence,
+            reader: ReplyReader::default(),
+            raw: Vec::new(),
+            out: Vec::new(),
+            events: Vec::new(),
+            last_heard: 0.0,
+            last_query: 0.0,
+            messages: Vec::new(),
+            delivery: None,
+            number: 0,
+            job: None,
+            expected: None,
+            contents: None,
+            report: None,
+            strokes: 0,
+            questions: 0,
+            is_computing: false,
+            holds: (None, String::new(), 0),
+            is_given_up: false,
+        }
+    }
+
+    /// Begins to look for the plotter, over a line that was just opened, at the time `now` in ms.
+    pub fn connect(&mut self, now: f64) {
+        (self.now, self.last_heard) = (now, now);
+        self.reader = ReplyReader::default();
+        self.raw.clear();
+        self.enter(Phase::Finding);
+        self.query();
+    }
+
+    /// The line is closed: what was begun is lost to this session.
+    pub fn close(&mut self) {
+        (self.delivery, self.job) = (None, None);
+        self.out.clear();
+        self.enter(Phase::Closed);
+    }
+
+    /// Draws the file `name` with `options`, a JSON array of pairs of name and value, as soon as
+    /// the plotter is ready.
+    ///
+    /// # Errors
+    /// A sentence for the user that says why nothing is sent.
+    pub fn plot(&mut self, name: &str, bytes: Vec<u8>, options: &str) -> Result<(), String> {
+        if !matches!(self.phase, Phase::Finding | Phase::Greeting | Phase::Numbering | Phase::Ready)
+        {
+            return Err("The plotter is busy: wait until it is done, or give it up.".to_owned());
+        }
+        let file = source::read(name, bytes)?;
+        let settings = NamedValues::parse(options)?.settings();
+        let job: Rc<dyn Lines> = Rc::new(Job::new(Shared(file), &settings));
+        self.expected = twin::contents(&*job, job.count());
+        self.job = Some(job);
+        self.begin_job();
+        Ok(())
+    }
+
+    /// Slows the machine down on its path and raises the pen.
+    pub fn hold(&mut self) {
+        self.out.push(HOLD);
+    }
+
+    /// Goes on after a hold, or with the pen that the plotter asked for.
+    pub fn resume(&mut self) {
+        self.holds = (None, String::new(), 0);
+        self.out.push(RESUME);
+    }
+
+    /// Gives the drawing up: the machine stops with the pen up.
+    pub fn give_up(&mut self) {
+        self.is_given_up = true;
+        self.job = None;
+        self.delivery = None;
+        self.out.push(ABORT);
+        self.enter(Phase::Greeting);
+    }
+
+    /// Sends a line by hand, such as `$H`, `$X` or a jog.
+    ///
+    /// # Errors
+    /// A sentence for the user: the session is doing something else.
+    pub fn command(&mut self, text: &str) -> Result<(), String> {
+        if text == "$X" && self.phase == Phase::Alarm {
+            self.out.extend(b"\n$X\n");
+            self.enter(Phase::Finding);
+            return Ok(());
+        }
+        if self.phase != Phase::Ready {
+            return Err("The plotter is busy, or is not connected.".to_owned());
+        }
+        self.deliver(Rc::new(vec![JobLine::command(text)]));
+        self.enter(Phase::Commanding);
+        Ok(())
+    }
+
+    /// Takes `bytes` that the plotter sent, at the time `now` in ms.
+    pub fn receive(&mut self, bytes: &[u8], now: f64) {
+        self.now = now;
+        if !bytes.is_empty() {
+            self.last_heard = now;
+        }
+        for &byte in bytes {
+            self.raw.push(byte);
+            if let Some(reply) = self.reader.push(byte) {
+                let raw = String::from_utf8_lossy(&std::mem::take(&mut self.raw)).into_owned();
+                self.take(&reply, raw.trim());
+            } else if matches!(byte, b'\n' | b'\r') || self.raw.len() > 512 {
+                self.raw.clear();
+            }
+        }
+    }
+
+    /// Lets the time pass until `now`, in ms.
+    pub fn tick(&mut self, now: f64) {
+        self.now = now;
+        if self.phase == Phase::Closed {
+            return;
+        }
+        if now - self.last_query >= QUERY_EVERY {
+            self.query();
+        }
+        let waits = !matches!(self.phase, Phase::Ready | Phase::Watching | Phase::Alarm);
+        if waits && now - self.last_heard > self.silence {
+            let seconds = self.silence / 1000.0;
+            self.fail(format!(
+                "The plotter does not answer: {seconds} s without a byte. Is it powered, is it the \
+                 right port, and does it run penup at 115200 baud?"
+            ));
+            self.close();
+            return;
+        }
+        self.repeat();
+        if let Some(mut delivery) = self.delivery.take() {
+            let outcome = delivery.tick(now, self.is_computing, &mut self.out);
+            self.delivery = Some(delivery);
+            self.settle(outcome);
+        }
+    }
+
+    /// The bytes to send to the plotter since the last call.
+    pub fn take_out(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.out)
+    }
+
+    /// What has happened since the last call: a JSON array of objects, each with its `kind`.
+    pub fn take_events(&mut self) -> String {
+        text_of(&std::mem::take(&mut self.events))
+    }
+}
+
+impl Session {
+    fn enter(&mut self, phase: Phase) {
+        self.phase = phase;
+        (self.since, self.repeated) = (self.now, self.now);
+        // What lasts a moment has no name.
+        let Some(name) = phase.name() else { return };
+        if self.name != name {
+            self.name = name;
+            self.events.push(Event::Phase { name });
+        }
+    }
+
+    /// Ends what was begun with a sentence for the user.
+    fn fail(&mut self, text: String) {
+        (self.delivery, self.job) = (None, None);
+        self.messages.clear();
+        self.events.push(Event::Failed { text });
+    }
+
+    /// Sends again what has had no effect for long.
+    fn repeat(&mut self) {
+        if self.now - self.repeated < AGAIN_AFTER {
+            return;
+        }
+        match self.phase {
+            Phase::Greeting => self.out.push(ABORT),
+            Phase::Numbering => self.begin_numbers(),
+            _ => return,
+        }
+        self.repeated = self.now;
+        if self.now - self.since > OPEN_PATIENCE {
+            self.fail(
+                "What answers is not penup, or the line damages too many bytes. Is it the right \
+                 port, and does the plotter run penup at 115200 baud?"
+                    .to_owned(),
+            );
+            self.close();
+        }
+    }
+
+    fn query(&mut self) {
+        self.last_query = self.now;
+        self.out.push(STATUS_QUERY);
+    }
+
+    fn begin_numbers(&mut self) {
+        self.out.extend(format!("\n{}\n", numbered(Some(0), LAST_NUMBER)).bytes());
+    }
+
+    fn deliver(&mut self, lines: Rc<dyn Lines>) {
+        self.messages.clear();
+        self.delivery = Some(Delivery::new(lines, self.number, self.now));
+    }
+
+    fn begin_job(&mut self) {
+        if self.phase == Phase::Ready
+            && let Some(job) = self.job.clone()
+        {
+            self.is_given_up = false;
+            self.deliver(job);
+            self.enter(Phase::Sending);
+        }
+    }
+
+    fn take(&mut self, reply: &Reply, raw: &str) {
+        match reply {
+            Reply::Status(status) => self.follow(status, raw),
+            Reply::Greeting(text) => return self.greeted(text),
+            Reply::Message(text) => {
+                self.messages.push(text.clone());
+                if matches!(self.phase, Phase::Drawing | Phase::Starting | Phase::Ready) {
+                    self.events.push(Event::Note { text: text.clone() });
+                }
+            }
+            Reply::Alarm(number) => return self.alarmed(*number),
+            Reply::Contents(contents) => self.contents = Some(*contents),
+            Reply::Done(0) if self.phase == Phase::Numbering => {
+                self.number = 0;
+                self.enter(Phase::Ready);
+                self.begin_job();
+            }
+            Reply::Other(line) => {
+                self.report = JobReport::parse(self.strokes, line).or(self.report.take());
+                if self.phase == Phase::Commanding {
+                    self.events.push(Event::Reply { text: line.clone() });
+                }
+            }
+            _ => {}
+        }
+        if let Some(mut delivery) = self.delivery.take() {
+            let before = delivery.progress().0;
+            let outcome = delivery.reply(reply, self.now, &mut self.out);
+            let (done, all) = delivery.progress();
+            if self.phase == Phase::Sending && done != before {
+                self.events.push(Event::Sent { done, all });
+            }
+            self.delivery = Some(delivery);
+            self.settle(outcome);
+        }
+    }
+
+    /// Goes on after a step of the delivery.
+    fn settle(&mut self, outcome: Outcome) {
+        if let Some(delivery) = &self.delivery {
+            self.number = delivery.number();
+        }
+        match outcome {
+            Outcome::More => return,
+            Outcome::Done => {}
+            Outcome::Refused(line, error) => {
+                let text = refusal(line.as_ref(), error, &self.messages);
+                self.fail(text);
+                return self.enter(Phase::Ready);
+            }
+            Outcome::Restarted => return self.restarted(),
+            Outcome::Lost(line) => {
+                let origin = line.and_then(|line| line.origin);
+                let at = origin.map(|it| format!(" (line {} of {})", it.line, it.file));
+                self.fail(format!(
+                    "Bytes were lost on the way to the plotter again and again{}. Check the cable, \
+                     keep it away from the motors, and see that nothing else uses the port.",
+                    at.unwrap_or_default()
+                ));
+                return self.enter(Phase::Finding);
+            }
+        }
+        self.delivery = None;
+        match self.phase {
+            Phase::Sending => {
+                (self.contents, self.questions) = (None, 0);
+                self.deliver(Rc::new(vec![JobLine::command(MODEL)]));
+                self.enter(Phase::Comparing);
+            }
+            Phase::Comparing if self.contents.is_some() && self.contents == self.expected => {
+                self.deliver(Rc::new(vec![JobLine::command(PLOT)]));
+                self.enter(Phase::Starting);
+            }
+            // The answer may have been damaged: it has no checksum of its own.
+            Phase::Comparing if self.questions < MOST_QUESTIONS => {
+                self.questions += 1;
+                self.contents = None;
+                self.deliver(Rc::new(vec![JobLine::command(MODEL)]));
+            }
+            Phase::Comparing => {
+                self.fail(
+                    "The plotter holds something else than was sent to it, so nothing is drawn. \
+                     Does another program send to it at the same time, or is its firmware of \
+                     another version than this page?"
+                        .to_owned(),
+                );
+                self.enter(Phase::Ready);
+            }
+            Phase::Starting => {
+                self.job = None;
+                self.enter(Phase::Drawing);
+            }
+            Phase::Reporting if self.report.is_none() && self.questions < MOST_QUESTIONS => {
+                self.questions += 1;
+                self.deliver(Rc::new(vec![JobLine::command(MODEL)]));
+            }
+            Phase::Reporting => {
+                let report = self.report.take().map(|report| report.to_string());
+                self.events.push(Event::Drawn { report });
+                self.enter(Phase::Ready);
+            }
+            _ => self.enter(Phase::Ready),
+        }
+    }
+
+    fn greeted(&mut self, text: &str) {
+        if !is_penup(text) {
+            self.fail(format!("What answers is not penup: it said \u{201c}{text}\u{201d}."));
+            return self.close();
+        }
+        match self.phase {
+            Phase::Closed | Phase::Finding => {}
+            Phase::Greeting | Phase::Numbering => {
+                if std::mem::take(&mut self.is_given_up) {
+                    self.events.push(Event::Stopped);
+                }
+                self.enter(Phase::Numbering);
+                self.begin_numbers();
+            }
+            _ => self.restarted(),
+        }
+    }
+
+    fn restarted(&mut self) {
+        self.fail(
+            "The plotter gave up in the middle and started again. Either somebody stopped it at \
+             another port, a byte was damaged on the line, or it lost its power: check the cable \
+             and the supply."
+                .to_owned(),
+        );
+        self.enter(Phase::Finding);
+    }
+
+    fn alarmed(&mut self, number: u16) {
+        let text = alarm(number, &self.messages);
+        self.fail(text);
+        self.enter(Phase::Alarm);
+    }
+
+    fn follow(&mut self, status: &Status, raw: &str) {
+        self.is_computing = status.is_computing;
+        let pair = |name: &str| -> Option<(f64, f64)> {
+            let (done, all) = field(raw, name)?.split_once('/')?;
+            Some((done.parse().ok()?, all.parse().ok()?))
+        };
+        if let Some((_, all)) = status.strokes {
+            self.strokes = all;
+        }
+        let position = status.position.split(',').filter_map(|c| c.parse().ok()).collect();
+        self.events.push(Event::Status {
+            state: status.state.clone(),
+            position,
+            strokes: status.strokes,
+            ink: pair("Ink:"),
+            left: field(raw, "Left:").and_then(|left| left.parse().ok()),
+        });
+        if status.state == "Alarm" && self.phase != Phase::Alarm {
+            return self.alarmed(status.alarm.unwrap_or(0));
+        }
+        match self.phase {
+            Phase::Finding if status.is_idle() => {
+                // An abort loses nothing now, and clears what an earlier sender left half sent.
+                self.out.push(ABORT);
+                self.enter(Phase::Greeting);
+            }
+            Phase::Finding => self.enter(Phase::Watching),
+            Phase::Watching if status.is_idle() => {
+                self.out.push(ABORT);
+                self.enter(Phase::Greeting);
+            }
+            Phase::Alarm if status.state != "Alarm" => self.enter(Phase::Finding),
+            Phase::Drawing if status.is_idle() => {
+                (self.report, self.questions) = (None, 0);
+                self.deliver(Rc::new(vec![JobLine::command(MODEL)]));
+                self.enter(Phase::Reporting);
+            }
+            _ => {}
+        }
+        self.ask_for_pen(status);
+    }
+
+    /// Tells the user once that the machine stands and waits for a pen. The first reports may come
+    /// before the last moves are done; later ones do not.
+    fn ask_for_pen(&mut self, status: &Status) {
+        let (pen, position, times) = &mut self.holds;
+        if (*pen, &*position) == (status.pen_wanted, &status.position) {
+            *times = times.saturating_add(1);
+        } else {
+            (*pen, *position, *times) = (status.pen_wanted, status.position.clone(), 1);
+        }
+        if let (Some(pen), 3) = (status.pen_wanted, *times) {
+            self.events.push(Event::Pen { pen });
+        }
+    }
+}
+
+/// The text of a field of a status report.
+fn field<'a>(raw: &'a str, name: &str) -> Option<&'a str> {
+    raw.strip_prefix('<')?.strip_suffix('>')?.split('|').find_map(|field| field.strip_prefix(name))
+}

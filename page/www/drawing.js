@@ -1,0 +1,243 @@
+// The whole drawing before the ink: order, moves with the pen up, time, and a replay at true speed.
+
+import { Helper } from "./workers.js";
+import { indexAt, penAt } from "./sheet.js";
+
+const $ = (id) => document.getElementById(id);
+const SAMPLE = 4;
+
+/** A time in seconds as h:mm:ss or m:ss. */
+export function clock(seconds) {
+  const whole = Math.round(seconds);
+  const two = (number) => String(number).padStart(2, "0");
+  const [h, m, s] = [Math.floor(whole / 3600), Math.floor(whole / 60) % 60, whole % 60];
+  return h ? `${h}:${two(m)}:${two(s)}` : `${m}:${two(s)}`;
+}
+
+/** A length in mm, in m from a metre on. */
+export const length = (mm) => (mm >= 1000 ? `${(mm / 1000).toFixed(2)} m` : `${mm.toFixed(1)} mm`);
+
+/** Fills a list of terms and values. */
+export function figures(list, rows) {
+  list.replaceChildren(
+    ...rows.flatMap(([term, value]) => [
+      Object.assign(document.createElement("dt"), { textContent: term }),
+      Object.assign(document.createElement("dd"), { textContent: value }),
+    ]),
+  );
+}
+
+export class Drawing {
+  constructor(view, boards, { job, announce }) {
+    Object.assign(this, { view, job, announce, computed: null, time: 0, playing: 0, helper: null });
+    for (const { name, about } of boards) $("board").append(new Option(`${name} (${about})`, name));
+    $("board").addEventListener("change", () => this.compute());
+    $("play").addEventListener("click", () => this.play());
+    $("at").addEventListener("input", () => {
+      this.stop();
+      this.seek(Number($("at").value));
+    });
+    $("stroke-next").addEventListener("click", () => this.stroke(1));
+    $("stroke-back").addEventListener("click", () => this.stroke(-1));
+    $("show-up").addEventListener("change", () => view.draw());
+    $("export-svg").addEventListener("click", () => this.save());
+  }
+
+  /** What was computed is not what is shown any more. */
+  outdated() {
+    this.helper?.end();
+    this.helper = null;
+    this.stop();
+    this.computed = null;
+    $("check-state").textContent = "…";
+    $("export-svg").disabled = true;
+  }
+
+  /** Computes the drawing, by a session with an emulated plotter that runs ahead of time. */
+  async compute() {
+    this.outdated();
+    const job = this.job();
+    if (!job) return;
+    const state = $("check-state");
+    const busy = () => (state.textContent = "Computing the drawing…");
+    busy();
+    $("check-problem").hidden = true;
+    const helper = (this.helper = new Helper((said) => {
+      if (said.event === "computing") {
+        const [done, all] = said.strokes;
+        state.textContent = `Computing the drawing: stroke ${done} of ${all}`;
+      }
+      if (said.event === "broken") this.problem(said.text);
+    }));
+    try {
+      const computed = await helper.ask("compute", { ...job, memory: $("board").value });
+      if (this.helper !== helper) return;
+      this.take(computed, job);
+    } catch (text) {
+      if (this.helper === helper) this.problem(text);
+    }
+    helper.end();
+    if (this.helper === helper) this.helper = null;
+  }
+
+  problem(text) {
+    const board = $("board").selectedOptions[0];
+    const who = board.value ? `The board ${board.value} would refuse this drawing. ` : "";
+    $("check-problem").textContent = who + text;
+    $("check-problem").hidden = false;
+    $("check-state").textContent = "This is not drawn.";
+    figures($("figures"), []);
+    this.view.draw();
+  }
+
+  take({ path, strokes: flat, svg, report, notes }, job) {
+    const strokes = [],
+      pens = [];
+    for (let at = 0; at < flat.length; at += 2 + 2 * flat[at + 1]) {
+      const count = flat[at + 1];
+      pens.push(flat[at]);
+      strokes.push(
+        Array.from({ length: count }, (_, i) => [flat[at + 2 + 2 * i], flat[at + 3 + 2 * i]]),
+      );
+    }
+    const seconds = path.length ? path[path.length - SAMPLE] : 0;
+    this.computed = { path, strokes, pens, svg, report, seconds, name: job.name };
+    // Where each stroke begins in time: the pen comes down there, dashes not counted.
+    this.begins = starts(path, strokes);
+    const distance = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1]);
+    const ink = strokes.reduce(
+      (sum, s) => sum + s.slice(1).reduce((own, p, i) => own + distance(s[i], p), 0),
+      0,
+    );
+    const up = strokes.slice(1).reduce((sum, s, i) => sum + distance(strokes[i].at(-1), s[0]), 0);
+    const used = [...new Set(pens)].sort((a, b) => a - b);
+    figures($("figures"), [
+      ["Time", clock(seconds)],
+      ["Ink", length(ink)],
+      ["Moves with the pen up", length(up)],
+      ["Strokes", String(strokes.length)],
+      ["Lifts between them", String(Math.max(0, strokes.length - 1))],
+      ["Efficiency", `${((100 * ink) / Math.max(ink + up, 1e-9)).toFixed(1)} %`],
+      ["Pens", used.join(", ")],
+    ]);
+    $("check-state").textContent = `${clock(seconds)} with ${strokes.length} strokes`;
+    $("check-problem").textContent = notes.join(" ");
+    $("check-problem").hidden = !notes.length;
+    $("at").max = String(seconds);
+    $("export-svg").disabled = false;
+    this.seek(seconds);
+  }
+
+  seek(time) {
+    this.time = Math.max(0, Math.min(time, this.computed?.seconds ?? 0));
+    $("at").value = String(this.time);
+    $("at-text").textContent = clock(this.time);
+    const at = this.strokeAt();
+    $("at").setAttribute(
+      "aria-valuetext",
+      `${clock(this.time)}, stroke ${at} of ${this.begins?.length ?? 0}`,
+    );
+    this.view.draw();
+  }
+
+  strokeAt() {
+    return this.begins ? this.begins.filter((begin) => begin <= this.time + 1e-3).length : 0;
+  }
+
+  stroke(by) {
+    if (!this.computed) return;
+    this.stop();
+    const now = this.strokeAt() - 1;
+    const next = Math.max(0, Math.min(this.begins.length - 1, now + by));
+    this.seek(this.begins[next]);
+    this.announce(`Stroke ${next + 1} of ${this.begins.length}`);
+  }
+
+  play() {
+    if (this.playing) return this.stop();
+    if (!this.computed) return;
+    if (this.time >= this.computed.seconds) this.seek(0);
+    $("play").textContent = "Stop";
+    let last = performance.now();
+    const step = (now) => {
+      if (!this.computed) return;
+      this.seek(this.time + ((now - last) / 1000) * Number($("speed").value));
+      last = now;
+      if (this.time >= this.computed.seconds) this.stop();
+      else this.playing = requestAnimationFrame(step);
+    };
+    this.playing = requestAnimationFrame(step);
+  }
+
+  stop() {
+    cancelAnimationFrame(this.playing);
+    this.playing = 0;
+    $("play").textContent = "Play";
+  }
+
+  /** Draws the computed drawing. Returns whether there is one. */
+  paint(brush) {
+    if (!this.computed) return false;
+    const { path, strokes, seconds } = this.computed;
+    const end = indexAt(path, this.time);
+    if (this.time < seconds)
+      this.view.path(brush, path, path.length / SAMPLE, { first: end, faint: true });
+    if ($("show-up").checked) this.view.moves(brush, strokes);
+    this.view.path(brush, path, end);
+    const now = penAt(path, this.time);
+    if (this.time < seconds && now) this.inkTo(brush, path, end, now);
+    this.view.marks(brush, strokes);
+    return true;
+  }
+
+  /** Draws the ink from the last sample to where the pen is now, and the pen. */
+  inkTo(brush, path, end, [x, y, pen]) {
+    if (pen && end > 0) {
+      const last = new Float32Array([
+        ...path.subarray((end - 1) * SAMPLE, end * SAMPLE),
+        this.time,
+        x,
+        y,
+        pen,
+      ]);
+      this.view.path(brush, last, 2);
+    }
+    this.view.pen(brush, [x, y], pen);
+  }
+
+  save() {
+    const { svg, name } = this.computed;
+    const address = URL.createObjectURL(new Blob([svg], { type: "image/svg+xml" }));
+    const link = Object.assign(document.createElement("a"), {
+      href: address,
+      download: name.replace(/\.\w+$/, "") + ".svg",
+    });
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(address), 10_000);
+  }
+}
+
+/** The times at which the strokes begin: the pen is at their first points, in this order. */
+function starts(path, strokes) {
+  const begins = [];
+  let at = 0;
+  const count = path.length / SAMPLE;
+  for (const [[x, y]] of strokes) {
+    let found = at;
+    // The sample before the first with the pen down.
+    while (
+      found + 1 < count &&
+      !(
+        path[(found + 1) * SAMPLE + 3] > 0 &&
+        path[found * SAMPLE + 3] === 0 &&
+        Math.abs(path[found * SAMPLE + 1] - x) < 0.05 &&
+        Math.abs(path[found * SAMPLE + 2] - y) < 0.05
+      )
+    )
+      found++;
+    if (found + 1 >= count) found = at;
+    begins.push(path[found * SAMPLE]);
+    at = found + 1;
+  }
+  return begins;
+}

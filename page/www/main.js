@@ -1,0 +1,415 @@
+// The page: joins the file, the controls, the sheet, the computed drawing and the plotter.
+
+import { command, fromLink, toLink, triple, turned } from "./camera.js";
+import { Controls } from "./controls.js";
+import { Drawing } from "./drawing.js";
+import { Plotting } from "./plotting.js";
+import { SheetView } from "./sheet.js";
+import { listen } from "./turning.js";
+import { Helper, load } from "./workers.js";
+import init, * as library from "./penup_page.js";
+
+const $ = (id) => document.getElementById(id);
+
+/** The largest file that is opened, in bytes: far more than any plotter holds. */
+const LARGEST_FILE = 64 << 20;
+/** How long the camera rests before the whole drawing is computed, in ms. */
+const REST = 350;
+/** How many steps back are kept. */
+const MOST_UNDOS = 200;
+const EXAMPLES = ["notched", "lattice3", "interpen", "lblock", "gears", "isobars"];
+/** Projections that have a direction of their own; a turn makes them orthographic. */
+const FIXED = /^(isometric|dimetric|trimetric|axonometric)/;
+
+/** What is shown: the values that are not the defaults, by their names. */
+let values = new Map();
+const undos = [],
+  redos = [];
+let file = null,
+  scene = null,
+  camera = null,
+  table = [];
+let lines = new Float32Array(),
+  drawsBusy = false,
+  drawsAgain = false,
+  reads = false;
+let tab = "see",
+  restTimer = 0,
+  lastBegin = "";
+/** Times of frames and of the longest task in ms. Tests read them by `window.penup`. */
+const frames = { compute: [], from: [], longest: 0 };
+let view, controls, drawing, plotting, helper;
+
+main().catch((error) =>
+  fail(
+    `The page cannot start: ${error?.message ?? error}. Reload it, in a browser of 2023 or later.`,
+  ),
+);
+
+async function main() {
+  view = new SheetView($("sheet"));
+  view.paint = paint;
+  listenToErrors();
+  const module = await load();
+  await init({ module_or_path: module });
+  table = JSON.parse(library.options());
+  controls = new Controls($("controls"), table, JSON.parse(library.pages()), change);
+  helper = new Helper(({ text }) => fail(text));
+  drawing = new Drawing(view, JSON.parse(library.boards()), { job, announce });
+  plotting = new Plotting(view, { job, announce, lines: () => lines });
+  $("file").accept = library.file_extensions();
+  for (const name of EXAMPLES) $("example").append(new Option(name, `${name}.obj`));
+  window.penup = { frames, drawing, plotting };
+  listenToPage();
+  const link = new Map(fromLink(location.hash));
+  const given = link.get("given"),
+    example = link.get("file");
+  const known = new Set(table.map((option) => option.name));
+  values = new Map([...link].filter(([name]) => known.has(name)));
+  if (given) await openFrom("given", given);
+  else
+    await openExample(
+      EXAMPLES.map((name) => `${name}.obj`).includes(example) ? example : "lattice3.obj",
+    );
+  if (link.has("tab")) choose(link.get("tab"));
+  keepOffline();
+  document.documentElement.dataset.ready = "yes";
+}
+
+/** The pairs of name and value that are not the defaults, in the order of the table. */
+function pairs() {
+  return table
+    .map(({ name }) => [name, values.get(name)])
+    .filter(([, value]) => value !== undefined);
+}
+
+/** The drawing as a job: what a session needs. */
+function job() {
+  return (
+    file && {
+      name: file.name,
+      bytes: file.bytes.slice(),
+      options: JSON.stringify(pairs()),
+      page: view.page,
+    }
+  );
+}
+
+// The file.
+
+async function openFrom(address, name) {
+  try {
+    const answer = await fetch(address);
+    if (!answer.ok) throw new Error(`the server answers ${answer.status}`);
+    await open(name, new Uint8Array(await answer.arrayBuffer()));
+  } catch (error) {
+    fail(`${name} cannot be loaded: ${error.message ?? error}.`);
+  }
+}
+
+const openExample = (name) => openFrom(`scenes/${name}`, name);
+
+async function openFile(chosen) {
+  if (chosen.size > LARGEST_FILE) {
+    return fail(
+      `${chosen.name} has ${Math.round(chosen.size / 1e6)} MB; the page opens files up to ` +
+        `${LARGEST_FILE >> 20} MB, which is more than any plotter holds.`,
+    );
+  }
+  try {
+    // The camera and the pens of another model do not fit this one.
+    const kept = new Map(
+      [...values].filter(([name]) => !["eye", "at", "up", "angles"].includes(name)),
+    );
+    await open(chosen.name, new Uint8Array(await chosen.arrayBuffer()), kept);
+  } catch (error) {
+    fail(`${chosen.name} cannot be read: ${error.message ?? error}.`);
+  }
+}
+
+async function open(name, bytes, nextValues = values) {
+  let opened;
+  try {
+    const options = JSON.stringify([...nextValues]);
+    opened = await helper.ask("open", { name, bytes, options });
+  } catch (text) {
+    // What was open stays open.
+    if (file)
+      await helper
+        .ask("open", { name: file.name, bytes: file.bytes, options: JSON.stringify(pairs()) })
+        .catch(() => {});
+    return fail(text);
+  }
+  file = { name, bytes };
+  values = nextValues;
+  ({ scene, camera } = opened);
+  undos.length = redos.length = 0;
+  const counts = [
+    [scene.vertices, "vertices"],
+    [scene.faces, "faces"],
+    [scene.bars, "bars"],
+    [scene.curves, "curves"],
+  ];
+  const said = counts
+    .filter(([count]) => count)
+    .map(([count, noun]) => `${count} ${noun}`)
+    .join(", ");
+  $("file-name").textContent = `${name}: ${said}${scene.is_plan ? ", a flat drawing" : ""}`;
+  $("sheet-help").textContent = turns()
+    ? "Drag to turn. Shift and drag, or two fingers, to move. " +
+      "Wheel to zoom, with Alt to step nearer."
+    : "A flat drawing: drag to move, wheel to zoom.";
+  announce(`${name} is open: ${said}`);
+  view.fit();
+  changed();
+}
+
+// Options.
+
+/** A control has a new value; `null` is the default. */
+function change(name, value) {
+  remember(name);
+  if (value === null) values.delete(name);
+  else values.set(name, value);
+  reads ||= name === "pens";
+  changed(name);
+}
+
+/** Notes the values before a change. Changes of one kind in a row, such as keys, are one step. */
+function remember(kind = "") {
+  if (kind === "" || kind !== lastBegin) {
+    undos.push(new Map(values));
+    if (undos.length > MOST_UNDOS) undos.shift();
+    redos.length = 0;
+  }
+  lastBegin = kind;
+}
+
+function step(from, to) {
+  if (!from.length) return;
+  to.push(new Map(values));
+  values = from.pop();
+  lastBegin = "";
+  reads = true;
+  changed();
+}
+
+function changed(name = null) {
+  controls.show(values);
+  $("undo").disabled = !undos.length;
+  $("redo").disabled = !redos.length;
+  $("command").value = file
+    ? command(file.name, pairs(), (own) => table.find((it) => it.name === own).is_switch)
+    : "";
+  history.replaceState(null, "", link());
+  draw(name);
+}
+
+function link() {
+  const given = new Map(fromLink(location.hash)).get("given");
+  const own = given
+    ? [["given", given]]
+    : file && EXAMPLES.includes(file.name.replace(".obj", ""))
+      ? [["file", file.name]]
+      : [];
+  return toLink([...own, ...pairs()]);
+}
+
+// The picture of the camera.
+
+/** Draws what the camera sees. One frame is computed at a time, with the newest values. */
+async function draw(name = null) {
+  drawing.outdated();
+  clearTimeout(restTimer);
+  if (drawsBusy) {
+    drawsAgain = true;
+    return;
+  }
+  drawsBusy = true;
+  const began = performance.now();
+  let problem = null;
+  try {
+    const options = JSON.stringify(pairs());
+    const answer = await helper.ask("draw", { options, reads });
+    reads = false;
+    ({ lines, camera } = answer);
+    frames.compute.push(answer.ms);
+    const page = (values.get("page") ?? "210x297").split(/x/i).map(Number);
+    if (page.every((side) => side > 0)) view.page = page;
+    view.draw();
+    frames.from.push(performance.now() - began);
+  } catch (text) {
+    problem = text;
+  }
+  drawsBusy = false;
+  if (drawsAgain) {
+    drawsAgain = false;
+    return draw(name);
+  }
+  controls.problem(problem ? name : null, problem);
+  if (problem) fail(problem);
+  else {
+    hush();
+    restTimer = setTimeout(() => drawing.compute(), REST);
+  }
+}
+
+/** Whether a drag turns the camera. A flat drawing is moved instead. */
+function turns() {
+  return Boolean(scene) && !(scene.is_plan && !values.has("eye") && !values.has("angles"));
+}
+
+function turn(about, up, nearer) {
+  if (!turns()) return;
+  if (!camera) return fail("The camera stands by “angles”: clear that option to turn it.");
+  if (FIXED.test(values.get("projection") ?? "")) values.set("projection", "orthographic");
+  const eye = turned(camera, about, up, nearer);
+  camera = { ...camera, eye };
+  values.set("eye", triple(eye));
+  if (!values.has("at")) values.set("at", triple(camera.at));
+  changed();
+}
+
+function paint(brush) {
+  if (tab === "draw" && plotting.paint(brush)) return;
+  if (tab === "check" && drawing.paint(brush)) return;
+  view.lines(brush, lines);
+}
+
+// The page itself.
+
+function choose(name) {
+  const names = ["see", "check", "draw"];
+  if (!names.includes(name)) return;
+  tab = name;
+  for (const own of names) {
+    $(`tab-${own}`).setAttribute("aria-selected", String(own === name));
+    $(`tab-${own}`).tabIndex = own === name ? 0 : -1;
+    $(`panel-${own}`).hidden = own !== name;
+  }
+  view.draw();
+}
+
+function listenToPage() {
+  listen(view, { begin: remember, turn, turns, play: () => tab === "check" && drawing.play() });
+  $("file").addEventListener("change", (event) => {
+    const [chosen] = event.target.files;
+    if (chosen) openFile(chosen);
+    event.target.value = "";
+  });
+  $("example").addEventListener("change", (event) => {
+    const name = event.target.value;
+    event.target.value = "";
+    if (!name) return;
+    values = new Map([...values].filter(([own]) => !["eye", "at", "up", "angles"].includes(own)));
+    openExample(name);
+  });
+  $("undo").addEventListener("click", () => step(undos, redos));
+  $("redo").addEventListener("click", () => step(redos, undos));
+  $("reset").addEventListener("click", () => {
+    remember();
+    values = new Map();
+    reads = true;
+    changed();
+  });
+  $("copy-link").addEventListener("click", () => copy(location.href, "The link is copied."));
+  $("copy-command").addEventListener("click", () =>
+    copy($("command").value, "The command is copied."),
+  );
+  $("zoom-in").addEventListener("click", () => view.zoomBy(1.3));
+  $("zoom-out").addEventListener("click", () => view.zoomBy(1 / 1.3));
+  $("zoom-fit").addEventListener("click", () => view.fit());
+  $("error").querySelector("button").addEventListener("click", hush);
+  const tabs = [...document.querySelectorAll("[role=tab]")];
+  for (const [at, own] of tabs.entries()) {
+    own.addEventListener("click", () => choose(own.id.replace("tab-", "")));
+    own.addEventListener("keydown", (event) => {
+      const by = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+      if (!by) return;
+      const next = tabs[(at + by + tabs.length) % tabs.length];
+      next.focus();
+      next.click();
+    });
+  }
+  addEventListener("keydown", (event) => {
+    const writes = event.target.matches("input:not([type=range]), textarea");
+    if (!(event.ctrlKey || event.metaKey) || event.key.toLowerCase() !== "z" || writes) return;
+    event.preventDefault();
+    if (event.shiftKey) step(redos, undos);
+    else step(undos, redos);
+  });
+  const drop = $("drop");
+  addEventListener("dragover", (event) => {
+    event.preventDefault();
+    drop.hidden = false;
+  });
+  addEventListener("dragleave", (event) => {
+    if (!event.relatedTarget) drop.hidden = true;
+  });
+  addEventListener("drop", (event) => {
+    event.preventDefault();
+    drop.hidden = true;
+    const [chosen] = event.dataTransfer.files;
+    if (chosen) openFile(chosen);
+  });
+}
+
+async function copy(text, done) {
+  try {
+    await navigator.clipboard.writeText(text);
+    announce(done);
+    flash(done);
+  } catch {
+    fail(`The browser does not let the page copy. Copy this by hand: ${text}`);
+  }
+}
+
+/** Says something in the place of the help for a moment. */
+function flash(text) {
+  const help = $("sheet-help"),
+    before = help.textContent;
+  help.textContent = text;
+  setTimeout(() => {
+    if (help.textContent === text) help.textContent = before;
+  }, 2500);
+}
+
+function fail(text) {
+  $("error").querySelector("p").textContent = text;
+  $("error").hidden = false;
+}
+
+function hush() {
+  $("error").hidden = true;
+}
+
+function announce(text) {
+  $("announce").textContent = text;
+}
+
+function listenToErrors() {
+  addEventListener("error", (event) =>
+    fail(`The page broke, which is its own fault: ${event.message}. Reload it.`),
+  );
+  addEventListener("unhandledrejection", (event) =>
+    fail(
+      "The page broke, which is its own fault: " +
+        `${event.reason?.message ?? event.reason}. Reload it.`,
+    ),
+  );
+  if (PerformanceObserver.supportedEntryTypes?.includes("longtask")) {
+    new PerformanceObserver((list) => {
+      for (const entry of list.getEntries())
+        frames.longest = Math.max(frames.longest, entry.duration);
+    }).observe({ type: "longtask", buffered: true });
+  }
+}
+
+/** Keeps the files in the browser, unless the program penup serves them, whose address changes. */
+function keepOffline() {
+  const isServed = /^\/[0-9a-f]{32}\//.test(location.pathname);
+  if (isServed || !("serviceWorker" in navigator)) return;
+  navigator.serviceWorker.register("offline.js").catch((error) => {
+    flash(`The page is not kept for use without a network: ${error.message}`);
+  });
+}

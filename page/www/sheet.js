@@ -1,0 +1,243 @@
+// Draws the sheet: the picture of the camera, the ordered drawing, and what the plotter has drawn.
+
+/** The colours of the pens, as in the pictures that penup writes. */
+const INK = "#1b1f3b";
+const INKS = ["#c1121f", "#0077b6", "#2d6a4f", "#e07a00", "#7b2cbf", "#8a5a2b", "#d81b84"];
+const TRAVEL = "#3d7edb";
+const START = "#2a9d5c";
+const END = "#d7433b";
+const PAPER = "#ffffff";
+/** The width of a line of ink in mm, and the least in pixels. */
+const PEN_WIDTH = 0.3;
+const LEAST_PIXELS = 0.9;
+/** The numbers of a line, and of a sample of a path. */
+const LINE = 5,
+  SAMPLE = 4;
+
+export const inkOf = (pen) => (pen < 2 ? INK : INKS[(pen - 2) % INKS.length]);
+
+/** The view of the sheet, and what is on it. */
+export class SheetView {
+  constructor(canvas) {
+    this.canvas = canvas;
+    this.page = [210, 297];
+    this.zoom = 1;
+    this.offset = [0, 0];
+    /** What is drawn: a function that gets the brush. */
+    this.paint = () => {};
+    this.isDue = false;
+    new ResizeObserver(() => this.draw()).observe(canvas);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
+  }
+
+  /** Draws at the next frame of the screen. */
+  draw() {
+    if (this.isDue) return;
+    this.isDue = true;
+    requestAnimationFrame(() => {
+      this.isDue = false;
+      this.drawNow();
+    });
+  }
+
+  /** Pixels of the canvas in a mm. */
+  get scale() {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    const margin = Math.min(36, width * 0.05);
+    const fits = Math.min(
+      (width - 2 * margin) / this.page[0],
+      (height - 2 * margin) / this.page[1],
+    );
+    return Math.max(0.01, fits) * this.zoom;
+  }
+
+  /** Zooms by a factor about a point of the canvas, in pixels from its corner. */
+  zoomBy(factor, x = this.canvas.clientWidth / 2, y = this.canvas.clientHeight / 2) {
+    const zoom = Math.max(0.3, Math.min(60, this.zoom * factor));
+    const real = zoom / this.zoom;
+    const from = [x - this.canvas.clientWidth / 2, y - this.canvas.clientHeight / 2];
+    this.offset = this.offset.map((c, i) => from[i] + (c - from[i]) * real);
+    this.zoom = zoom;
+    this.draw();
+  }
+
+  moveBy(dx, dy) {
+    this.offset = [this.offset[0] + dx, this.offset[1] + dy];
+    this.draw();
+  }
+
+  fit() {
+    this.zoom = 1;
+    this.offset = [0, 0];
+    this.draw();
+  }
+
+  drawNow() {
+    const { canvas } = this;
+    const ratio = devicePixelRatio || 1;
+    const { clientWidth: width, clientHeight: height } = canvas;
+    if (
+      canvas.width !== Math.round(width * ratio) ||
+      canvas.height !== Math.round(height * ratio)
+    ) {
+      canvas.width = Math.round(width * ratio);
+      canvas.height = Math.round(height * ratio);
+    }
+    const brush = canvas.getContext("2d");
+    brush.setTransform(1, 0, 0, 1, 0, 0);
+    brush.clearRect(0, 0, canvas.width, canvas.height);
+    const scale = this.scale * ratio;
+    const [w, h] = this.page;
+    // From mm with y upwards to pixels.
+    brush.setTransform(
+      scale,
+      0,
+      0,
+      -scale,
+      (width / 2 + this.offset[0]) * ratio - (w / 2) * scale,
+      (height / 2 + this.offset[1]) * ratio + (h / 2) * scale,
+    );
+    brush.save();
+    brush.shadowColor = "rgb(0 0 0 / 28%)";
+    brush.shadowBlur = 14 * ratio;
+    brush.shadowOffsetY = 2 * ratio;
+    brush.fillStyle = PAPER;
+    brush.fillRect(0, 0, w, h);
+    brush.restore();
+    brush.lineCap = brush.lineJoin = "round";
+    this.pixel = ratio / scale;
+    brush.lineWidth = Math.max(PEN_WIDTH, LEAST_PIXELS * this.pixel);
+    this.paint(brush);
+  }
+
+  /** Draws lines: x1, y1, x2, y2 and the pen of each. */
+  lines(brush, lines) {
+    let pen = NaN;
+    for (let at = 0; at < lines.length; at += LINE) {
+      if (lines[at + 4] !== pen) {
+        if (!Number.isNaN(pen)) brush.stroke();
+        pen = lines[at + 4];
+        brush.strokeStyle = inkOf(pen);
+        brush.beginPath();
+      }
+      brush.moveTo(lines[at], lines[at + 1]);
+      brush.lineTo(lines[at + 2], lines[at + 3]);
+    }
+    if (!Number.isNaN(pen)) brush.stroke();
+  }
+
+  /**
+   * Draws the samples of a path from `first` on, up to the index `end`: time, x, y and pen of
+   * each. `faint` ink is still to be drawn.
+   */
+  path(brush, path, end, { first = 0, faint = false } = {}) {
+    let pen = 0;
+    brush.globalAlpha = faint ? 0.28 : 1;
+    for (let at = Math.max(first, 1); at < end; at++) {
+      const now = path[at * SAMPLE + 3];
+      if (now !== pen) {
+        if (pen) brush.stroke();
+        pen = now;
+        if (pen) {
+          brush.strokeStyle = inkOf(pen);
+          brush.beginPath();
+          brush.moveTo(path[at * SAMPLE - 3], path[at * SAMPLE - 2]);
+        }
+      }
+      if (pen) brush.lineTo(path[at * SAMPLE + 1], path[at * SAMPLE + 2]);
+    }
+    if (pen) brush.stroke();
+    brush.globalAlpha = 1;
+  }
+
+  /** Draws the moves with the pen up between strokes, with an arrow at the middle of each. */
+  moves(brush, strokes) {
+    const width = brush.lineWidth;
+    brush.strokeStyle = brush.fillStyle = TRAVEL;
+    brush.lineWidth = Math.max(0.15, 0.7 * this.pixel);
+    const size = Math.max(0.9, 4 * this.pixel);
+    brush.beginPath();
+    for (let at = 1; at < strokes.length; at++) {
+      const from = strokes[at - 1].at(-1),
+        to = strokes[at][0];
+      brush.moveTo(...from);
+      brush.lineTo(...to);
+    }
+    brush.globalAlpha = 0.6;
+    brush.stroke();
+    brush.globalAlpha = 1;
+    for (let at = 1; at < strokes.length; at++) {
+      arrow(brush, strokes[at - 1].at(-1), strokes[at][0], size);
+    }
+    brush.lineWidth = width;
+  }
+
+  /** Marks the start of the first stroke and the end of the last one. */
+  marks(brush, strokes) {
+    if (!strokes.length) return;
+    const radius = Math.max(0.7, 3.2 * this.pixel);
+    brush.fillStyle = START;
+    disc(brush, strokes[0][0], radius);
+    brush.fill();
+    brush.strokeStyle = END;
+    const width = brush.lineWidth;
+    brush.lineWidth = Math.max(0.2, 1.4 * this.pixel);
+    disc(brush, strokes.at(-1).at(-1), radius * 1.4);
+    brush.stroke();
+    brush.lineWidth = width;
+  }
+
+  /** Shows where the pen is: a filled disc if it is down, and a ring if it is up. */
+  pen(brush, point, pen) {
+    const radius = Math.max(0.9, 5 * this.pixel);
+    const width = brush.lineWidth;
+    brush.lineWidth = Math.max(0.2, 2 * this.pixel);
+    brush.strokeStyle = brush.fillStyle = pen ? END : TRAVEL;
+    disc(brush, point, radius);
+    if (pen) brush.fill();
+    else brush.stroke();
+    brush.lineWidth = width;
+  }
+}
+
+function disc(brush, [x, y], radius) {
+  brush.beginPath();
+  brush.arc(x, y, radius, 0, 2 * Math.PI);
+}
+
+function arrow(brush, from, to, size) {
+  const [dx, dy] = [to[0] - from[0], to[1] - from[1]];
+  const length = Math.hypot(dx, dy);
+  if (length < 2.5 * size) return;
+  const [ux, uy] = [dx / length, dy / length];
+  const [x, y] = [(from[0] + to[0]) / 2 + (ux * size) / 2, (from[1] + to[1]) / 2 + (uy * size) / 2];
+  brush.beginPath();
+  brush.moveTo(x, y);
+  brush.lineTo(x - ux * size - uy * size * 0.45, y - uy * size + ux * size * 0.45);
+  brush.lineTo(x - ux * size + uy * size * 0.45, y - uy * size - ux * size * 0.45);
+  brush.fill();
+}
+
+/** The index of the first sample of a path behind `time`. */
+export function indexAt(path, time) {
+  let low = 0,
+    high = path.length / SAMPLE;
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (path[middle * SAMPLE] <= time) low = middle + 1;
+    else high = middle;
+  }
+  return low;
+}
+
+/** Where the pen of a path is at `time`: x, y, and the pen that is down or 0. */
+export function penAt(path, time) {
+  const end = indexAt(path, time);
+  const sample = (at) => path.subarray(at * SAMPLE, at * SAMPLE + SAMPLE);
+  if (end === 0) return path.length ? [path[1], path[2], 0] : null;
+  const [t0, x0, y0, p0] = sample(end - 1);
+  if (end * SAMPLE >= path.length) return [x0, y0, p0];
+  const [t1, x1, y1, p1] = sample(end);
+  const part = t1 > t0 ? (time - t0) / (t1 - t0) : 1;
+  return [x0 + (x1 - x0) * part, y0 + (y1 - y0) * part, p1];
+}

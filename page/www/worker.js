@@ -1,0 +1,192 @@
+// Runs the plotter's code beside the page, so that the page never waits. A worker has one role:
+// to draw what the camera sees, to compute a whole drawing ahead, to be a session with a plotter,
+// or to be the emulated plotter itself. Each message is {id, call, args}; each answer is
+// {id, value} or {id, error}, and what comes without being asked for is {event, …}.
+
+import init, { Board, Session, Sheet, fault } from "./penup_page.js";
+
+/** The time in ms after which a session gives up a plotter that says nothing. */
+const SILENCE = { emulated: 120_000, serial: 5_000 };
+/** How much of the plotter's time passes between two looks at the session, in ms. */
+const REPLAY_STEP = 200;
+
+let sheet, board, session;
+
+const calls = {
+  async start({ module }) {
+    await init({ module_or_path: module });
+  },
+
+  /** Opens a file and tells what is in it. */
+  open({ name, bytes, options }) {
+    sheet ??= new Sheet();
+    const scene = JSON.parse(sheet.open(name, bytes, options));
+    return { scene, camera: JSON.parse(sheet.camera()) };
+  },
+
+  /** Sets options, and draws. `reads` tells that the file must be read again. */
+  draw({ options, reads }) {
+    const began = performance.now();
+    if (reads) sheet.set(options);
+    else sheet.turn(options);
+    const lines = sheet.draw();
+    const value = { lines, camera: JSON.parse(sheet.camera()), ms: performance.now() - began };
+    return [value, [lines.buffer]];
+  },
+
+  /** Computes the whole drawing ahead, by a session with an emulated plotter. */
+  async compute({ name, bytes, options, page, memory }) {
+    board = new Board(memory);
+    session = new Session(1e12);
+    const paths = [];
+    const notes = [];
+    let now = 0,
+      report = null,
+      reported = 0,
+      begun = false;
+    session.connect(now);
+    session.plot(name, bytes, options);
+    for (;;) {
+      const out = session.take_out();
+      if (out.length) board.receive(out);
+      board.advance(begun ? REPLAY_STEP : 1);
+      now += begun ? REPLAY_STEP : 1;
+      const sent = board.take_sent();
+      if (sent.length) session.receive(sent, now);
+      session.tick(now);
+      for (const event of JSON.parse(session.take_events())) {
+        if (event.kind === "failed") throw event.text;
+        if (event.kind === "note") notes.push(event.text);
+        if (event.kind === "phase" && event.name === "drawing") begun = true;
+        if (event.kind === "pen") {
+          board.change_pen(event.pen);
+          session.resume();
+        }
+        if (event.kind === "drawn") report = event.report;
+        if (event.kind === "status" && event.strokes && performance.now() - reported > 100) {
+          reported = performance.now();
+          postMessage({ event: "computing", strokes: event.strokes });
+        }
+      }
+      const path = board.take_path();
+      if (path.length) paths.push(path);
+      if (report !== null) break;
+    }
+    const path = new Float32Array(paths.reduce((sum, part) => sum + part.length, 0));
+    let at = 0;
+    for (const part of paths) {
+      path.set(part, at);
+      at += part.length;
+    }
+    const strokes = board.strokes();
+    const svg = board.svg(page[0], page[1]);
+    return [{ path, strokes, svg, report, notes }, [path.buffer, strokes.buffer]];
+  },
+
+  /** Begins a session at one end of a pipe of bytes, which is a port. */
+  session({ pipe, kind }) {
+    session = new Session(SILENCE[kind]);
+    session.connect(performance.now());
+    const flush = () => {
+      const out = session.take_out();
+      if (out.length) pipe.postMessage({ bytes: out }, [out.buffer]);
+      const events = JSON.parse(session.take_events());
+      if (events.length) postMessage({ event: "session", events });
+    };
+    pipe.onmessage = ({ data }) =>
+      guarded(() => {
+        if (data.bytes) session.receive(data.bytes, performance.now());
+        if (data.closed) session.close();
+        flush();
+      });
+    setInterval(
+      () =>
+        guarded(() => {
+          session.tick(performance.now());
+          flush();
+        }),
+      20,
+    );
+  },
+  plot({ name, bytes, options }) {
+    session.plot(name, bytes, options);
+  },
+  hold() {
+    session.hold();
+  },
+  resume() {
+    session.resume();
+  },
+  give_up() {
+    session.give_up();
+  },
+  command({ text }) {
+    session.command(text);
+  },
+
+  /** Is the emulated plotter, at the other end of such a pipe. */
+  board({ pipe, pace }) {
+    board = new Board("");
+    calls.pace({ pace });
+    pipe.onmessage = ({ data }) => guarded(() => board.receive(data.bytes));
+    let last = performance.now();
+    setInterval(
+      () =>
+        guarded(() => {
+          const now = performance.now();
+          // A page that slept does not make up for it.
+          const passed = Math.min((now - last) * calls.speed, 400);
+          last = now;
+          board.advance(Math.max(1, Math.round(passed)));
+          const sent = board.take_sent();
+          if (sent.length) pipe.postMessage({ bytes: sent }, [sent.buffer]);
+          const path = board.take_path();
+          if (path.length) postMessage({ event: "path", path }, [path.buffer]);
+        }),
+      16,
+    );
+  },
+  pace({ pace }) {
+    calls.speed = pace;
+  },
+  pen({ pen }) {
+    board.change_pen(pen);
+  },
+  begin_again() {
+    board.begin_again();
+  },
+  picture({ page }) {
+    return board.svg(page[0], page[1]);
+  },
+};
+
+/** Does `work`; what breaks is told to the page. */
+function guarded(work) {
+  try {
+    work();
+  } catch (error) {
+    postMessage({ event: "broken", text: reason(error) });
+  }
+}
+
+/** What went wrong, for the user. The plotter's code throws sentences. */
+function reason(error) {
+  if (typeof error === "string") return error;
+  let said = "";
+  try {
+    said = fault();
+  } catch {
+    // It is not loaded.
+  }
+  return `The program of the page broke, which is its own fault: ${said || error}. Reload it.`;
+}
+
+onmessage = async ({ data: { id, call, args } }) => {
+  try {
+    const value = await calls[call](args ?? {});
+    if (Array.isArray(value)) postMessage({ id, value: value[0] }, value[1]);
+    else postMessage({ id, value });
+  } catch (error) {
+    postMessage({ id, error: reason(error) });
+  }
+};

@@ -1,0 +1,76 @@
+//! Builds the page as static files, and tests it in a browser.
+
+use std::env;
+use std::path::PathBuf;
+use std::process::Command;
+
+use anyhow::Result;
+
+use crate::command::{cargo, run};
+use crate::set_up;
+
+/// The target that a browser runs.
+const TARGET: &str = "wasm32-unknown-unknown";
+
+/// Builds the page into `target/page`.
+pub fn build() -> Result<()> {
+    set_up::target(TARGET)?;
+    let root = crate::root();
+    let options = ["--package=penup-page", "--profile=browser", "--target", TARGET];
+    run(cargo().current_dir(&root).args(["build", "--quiet"]).args(options))?;
+    // What builds the page is a workspace of its own, so that no other build compiles it.
+    let builder = root.join("page/builder/Cargo.toml");
+    if !root.join("target/page-builder").exists() {
+        say!("penup: compiling what builds the page, once; this takes a minute or more")?;
+    }
+    run(cargo()
+        .args(["run", "--quiet", "--locked", "--manifest-path"])
+        .arg(builder)
+        .arg("--target-dir")
+        .arg(root.join("target/page-builder"))
+        .arg("--")
+        .arg(root.join("target").join(TARGET).join("browser/penup_page.wasm"))
+        .arg(&root)
+        .arg(folder()))
+}
+
+/// The folder of the page that was built.
+fn folder() -> PathBuf {
+    crate::root().join("target/page")
+}
+
+/// How the tests of the page are run.
+#[derive(clap::Args)]
+pub struct TestArguments {
+    /// Writes the pictures of docs/page.md, too.
+    #[arg(long)]
+    pictures: bool,
+    /// Measures frames instead, and prints the table of docs/performance.md.
+    #[arg(long, conflicts_with = "pictures")]
+    measure: bool,
+}
+
+/// Builds the page and the client, and tests them in Chromium without a window.
+pub fn test(arguments: &TestArguments) -> Result<()> {
+    let installed = set_up::browser()?;
+    build()?;
+    let root = crate::root();
+    run(cargo().current_dir(&root).args(["build", "--quiet", "--package", "penup-client"]))?;
+    let tests = root.join("page/browser-tests");
+    let mut node = Command::new("node");
+    if arguments.measure {
+        node.arg(tests.join("measure.mjs"));
+    } else {
+        node.arg("--test").arg(tests.join("tests.mjs"));
+    }
+    if arguments.pictures {
+        node.env("PENUP_PICTURES", root.join("docs"));
+    }
+    let penup = root.join("target/debug/penup").with_extension(env::consts::EXE_EXTENSION);
+    node.env("PENUP", penup)
+        .env("PENUP_ROOT", &root)
+        .env("PENUP_PAGE", folder())
+        .env("PENUP_PAGE_TESTS", installed.packages)
+        .env("PENUP_CHROMIUM", installed.chromium);
+    run(&mut node)
+}
