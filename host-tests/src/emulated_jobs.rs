@@ -124,6 +124,16 @@ impl<E: EmulatedBoard + ?Sized> Line<E> {
         self.hear()
     }
 
+    /// Ends an alarm by `$X`, and returns whether the board agreed.
+    ///
+    /// # Errors
+    /// The emulator has ended, or is silent.
+    pub fn unlock(&mut self) -> Result<bool, Box<dyn Error>> {
+        let answer = self.ask("$X")?;
+        let end = self.hear()?;
+        Ok(answer == "[MSG:Caution: Unlocked]" && end == "ok")
+    }
+
     /// Queries the status report.
     ///
     /// # Errors
@@ -317,10 +327,7 @@ pub fn stop_at_once(board: &'static BoardRow) -> Result<(), Box<dyn Error>> {
         events.extend(machine.change(change).map(|event| event.kind));
     }
     let stopped_at = events.len();
-    while line.ask("$X")? != "ok" {
-        // A refusal consists of two lines.
-        line.hear()?;
-    }
+    while !line.unlock()? {}
     for change in line.emulator.pin_changes()? {
         events.extend(machine.change(change).map(|event| event.kind));
     }

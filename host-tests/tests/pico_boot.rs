@@ -65,7 +65,7 @@ fn each_kind_of_reset_is_distinguished() -> TestResult {
     assert_fresh(&hear_start(&mut line)?);
     line.emulator.hang()?;
     assert_fault(&hear_start(&mut line)?, "the watchdog");
-    assert_eq!(line.ask("$X")?, "ok");
+    assert!(line.unlock()?);
     // Neither reset is mistaken for one by the watchdog.
     line.emulator.copy_image()?;
     assert_fresh(&hear_start(&mut line)?);
@@ -88,7 +88,7 @@ fn a_panic_in_a_job_makes_the_machine_safe_and_is_reported_after_the_restart() -
     line.emulator.jump_to_function(&image_path("pico"), "main", false)?;
     assert_fault(&hear_start(&mut line)?, "the board was taken twice");
     assert_safe(&mut line)?;
-    assert_eq!(line.ask("$X")?, "ok");
+    assert!(line.unlock()?);
     // The fault is reported once.
     line.emulator.pull_run_low()?;
     assert_fresh(&hear_start(&mut line)?);

@@ -87,7 +87,7 @@ fn the_emergency_stop_stops_a_job_and_is_reported_until_it_is_released() -> Test
     assert!(line.hear()?.starts_with("error:"));
     line.emulator.bounce(STOP, true, BOUNCE)?;
     while line.status()?.contains("|Pn:") {}
-    assert_eq!(line.ask("$X")?, "ok");
+    assert!(line.unlock()?);
     assert!(line.status()?.starts_with("<Idle"));
     assert!(!line.emulator.pin_changes()?.iter().any(|change| change.is_step()));
     // It continues from the position of the pins.
