@@ -272,7 +272,7 @@ mod tests {
     #[test]
     fn a_page_that_is_not_built_is_an_error_that_says_so() {
         let folder = tempfile::tempdir().expect("a folder");
-        let error = PageServer::new(folder.path(), None, 0).err().expect("refused");
+        let error = PageServer::new(folder.path(), None, 0).map(drop).expect_err("refused");
         assert!(error.to_string().contains("cargo xtask page"), "{error}");
     }
 }

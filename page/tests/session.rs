@@ -1,5 +1,7 @@
 //! The session of the page with an emulated plotter, over good and bad lines, on this computer.
 
+#![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
+
 use penup_page::{Board, Session, Sheet};
 use serde_json::Value;
 
@@ -64,10 +66,10 @@ fn noisy(count: &mut u64, to_plotter: bool, bytes: Vec<u8>) -> Vec<u8> {
     let mut arrived = Vec::new();
     for byte in bytes {
         *count += 1;
-        if byte != b'?' && *count % 1009 == 0 {
+        if byte != b'?' && (*count).is_multiple_of(1009) {
             continue;
         }
-        let damaged = *count % 151 == 0 && byte.is_ascii_graphic() && byte != b'?';
+        let damaged = (*count).is_multiple_of(151) && byte.is_ascii_graphic() && byte != b'?';
         arrived.push(match damaged {
             true if to_plotter => 0xFF,
             true => byte ^ 1,
