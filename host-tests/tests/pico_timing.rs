@@ -90,9 +90,9 @@ fn a_spiral_of_short_chords_at_the_greatest_speed_keeps_time() -> Result<(), Box
     Ok(())
 }
 
-/// Queries of the lists of settings, commands and options, about 7 kilobytes: the UART takes 0.6 s
-/// to send them.
-const LISTS: [&str; 3] = ["$$", "$", "$options"];
+/// Queries of the lists of options and commands, which are answered while the machine moves: the
+/// UART takes half a second to send them.
+const LISTS: [&str; 4] = ["$options", "$", "$options", "$options"];
 
 /// The number of times that they are queried, so that there is always something to send while steps
 /// run.
