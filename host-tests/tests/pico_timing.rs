@@ -92,7 +92,7 @@ fn a_spiral_of_short_chords_at_the_greatest_speed_keeps_time() -> Result<(), Box
 
 /// Queries of the lists of options and commands, which are answered while the machine moves: the
 /// UART takes half a second to send them.
-const LISTS: [&str; 4] = ["$options", "$", "$options", "$options"];
+const LISTS: [&str; 5] = ["$options", "$", "$options", "$", "$options"];
 
 /// The number of times that they are queried, so that there is always something to send while steps
 /// run.
