@@ -126,6 +126,8 @@ pub struct Lookahead<'m> {
     length: u64,
     /// Of the last blocks, of which more points may show that they bend.
     open: PathLength,
+    /// How many of the blocks have chords behind their first one.
+    chorded: usize,
     /// Whether each block's `entry_limit` is lowered to what the blocks behind it allow and to its
     /// `curve_limit`, so that none has to be looked for when the block before it begins.
     passes_limits_on: bool,
@@ -148,6 +150,7 @@ impl<'m> Lookahead<'m> {
             count: 0,
             length: 0,
             open: PathLength::ZERO,
+            chorded: 0,
             passes_limits_on: true,
             lowest: PathLength::MAX,
             lowest_at: 0,
@@ -256,8 +259,11 @@ impl<'m> Lookahead<'m> {
         }
         if block.chords.count == 0 && is_in_line([block.dx, block.dy], [line.dx, line.dy]) {
             (block.dx, block.dy) = (block.dx + line.dx, block.dy + line.dy);
-        } else if !block.chords.push(line.dx, line.dy, line.length) {
-            return false;
+        } else {
+            if !block.chords.push(line.dx, line.dy, line.length) {
+                return false;
+            }
+            self.chorded += usize::from(block.chords.count == 1);
         }
         block.length = length;
         self.length += u64::from(line.length.to_bits());
@@ -269,8 +275,9 @@ impl<'m> Lookahead<'m> {
     /// plan.
     pub(super) fn pop<T>(&mut self, read: impl FnOnce(&Block) -> T) -> Option<T> {
         let block = self.front()?;
-        let length = block.length;
+        let (length, has_chords) = (block.length, block.chords.count > 0);
         let read = read(block);
+        self.chorded -= usize::from(has_chords);
         self.late = PathLength::MAX;
         self.first = self.wrapped(1);
         self.count -= 1;
@@ -289,6 +296,7 @@ impl<'m> Lookahead<'m> {
 
     pub(super) fn clear(&mut self) {
         self.count = 0;
+        self.chorded = 0;
         self.length = 0;
         self.end_curve();
         self.find_lowest();
@@ -382,8 +390,9 @@ impl<'m> Lookahead<'m> {
     pub(super) fn limit_curve(&mut self, least: u32, most: u32, limit: PathLength) {
         self.lowered = self.lowered.min(limit);
         let mut allowed = PathLength::MAX;
-        let mut points = 0;
-        for back in 1.. {
+        // Without chords each block ends at one point, so the first blocks need not be counted.
+        let mut points = if self.chorded == 0 { least.saturating_sub(1) } else { 0 };
+        for back in points as usize + 1.. {
             let Some(index) = self.count.checked_sub(back) else {
                 if points < most {
                     self.late = self.late.min(limit);
