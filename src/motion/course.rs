@@ -1,7 +1,7 @@
 //! The block in work: its moves, and how far they are.
 
 use super::emitter::Train;
-use super::lookahead::{BlockKind, Chord, Chords};
+use super::lookahead::{BlockKind, Chord, MOST_CHORDS};
 use super::profile::Slice;
 use super::{Block, PathLength};
 use crate::drawing::LineType;
@@ -34,12 +34,19 @@ pub(super) struct BlockCursor {
     pub(super) slice: Option<SliceMoves>,
     /// What is left of a slice that the end of a chord cut.
     rest: Slice,
-    chords: Chords,
+    chords: [Chord; MOST_CHORDS - 1],
+    chord_count: u8,
     /// How many of them are begun.
-    begun: usize,
-    /// From the start of the block to the end of the chord in work, if that is not the last: 2^-32
-    /// mm, and else the greatest number.
+    begun: u8,
+    /// From the start of the block to the end of the chord in work: 2^-32 mm. Without meaning in
+    /// the last one.
     chord_end: u64,
+}
+
+/// The length of chords, and how many moves they are.
+#[inline(never)] // Blocks without chords never come here: it would only fill the cache.
+fn sums(chords: &[Chord]) -> (PathLength, u32) {
+    (chords.iter().map(Chord::length).sum(), chords.iter().map(Chord::moves).sum())
 }
 
 impl BlockCursor {
@@ -47,12 +54,11 @@ impl BlockCursor {
     #[inline(always)] // A copy of what it returns costs as much as a plan.
     pub(super) fn new(block: &Block, dot_length: PathLength) -> Self {
         let line = Line::beside(block.dx, block.dy, block.offsets);
-        let chords = block.chords.all();
-        let first = block.length - chords.iter().map(Chord::length).sum::<PathLength>();
-        let first = u64::from(first.to_bits()) << 14;
+        let (later_length, later_moves) =
+            if block.chord_count == 0 { (PathLength::ZERO, 0) } else { sums(block.chords()) };
+        let first = u64::from((block.length - later_length).to_bits()) << 14;
         let move_length = first / u64::from(line.remaining().max(1));
-        let more: u32 = chords.iter().map(Chord::moves).sum();
-        let moves = line.remaining() + more;
+        let moves = line.remaining() + later_moves;
         let line_type = block.ink.unwrap_or_default();
         let pattern = if line_type == LineType::Full {
             Pattern::full(moves)
@@ -78,8 +84,9 @@ impl BlockCursor {
             slice: None,
             rest: Slice::default(),
             chords: block.chords,
+            chord_count: block.chord_count,
             begun: 0,
-            chord_end: if chords.is_empty() { u64::MAX } else { first },
+            chord_end: first,
         }
     }
 
@@ -111,18 +118,27 @@ impl BlockCursor {
     /// From the plan's place to the first where the machine can stand, which is half a move behind
     /// one, not nearer than `least`: 2^-32 mm. No further than the end of the piece.
     pub(super) fn to_whole_step(&self, least: u64) -> u64 {
-        let mut length = self.move_length.max(1);
+        let length = self.move_length.max(1);
         // The first such place, or the one before it.
         let behind = (self.to_next + length / 2) % length;
-        let mut stand = behind + least.saturating_sub(behind).div_ceil(length) * length;
-        let mut end = self.chord_end.saturating_sub(self.place);
-        for chord in self.chords.all().iter().skip(self.begun) {
+        let stand = behind + least.saturating_sub(behind).div_ceil(length) * length;
+        let end = self.chord_end.saturating_sub(self.place);
+        if self.is_last_chord() || stand <= end {
+            return stand.min(self.room());
+        }
+        self.to_whole_step_behind(least, stand, end)
+    }
+
+    /// As [`Self::to_whole_step`], from the `end` of the chord in work on.
+    #[inline(never)] // Blocks without chords never come here: it would only fill the cache.
+    fn to_whole_step_behind(&self, least: u64, mut stand: u64, mut end: u64) -> u64 {
+        for chord in self.later_chords().iter().skip(self.begun.into()) {
             if stand <= end {
                 break;
             }
             // Where one chord ends, the next begins.
             let whole = u64::from(chord.length().to_bits()) << 14;
-            length = (whole / u64::from(chord.moves().max(1))).max(1);
+            let length = (whole / u64::from(chord.moves().max(1))).max(1);
             stand = end + least.saturating_sub(end).div_ceil(length) * length;
             end += whole;
         }
@@ -152,22 +168,23 @@ impl BlockCursor {
 
     /// Takes what is left of the last slice into work. Whether there is anything.
     pub(super) fn begin_rest(&mut self) -> bool {
-        let rest = core::mem::take(&mut self.rest);
-        if rest.distance > 0 {
-            self.begin_slice(rest);
+        let has_rest = self.rest.distance > 0;
+        if has_rest {
+            self.begin_that_rest();
         }
-        rest.distance > 0
+        has_rest
+    }
+
+    #[inline(never)] // Blocks without chords never come here: it would only fill the cache.
+    fn begin_that_rest(&mut self) {
+        let rest = core::mem::take(&mut self.rest);
+        self.begin_slice(rest);
     }
 
     /// Takes the next slice into work, up to the end of the chord in work.
     pub(super) fn begin_slice(&mut self, mut slice: Slice) {
-        let room = self.chord_end.saturating_sub(self.place);
-        if u64::from(slice.distance) > room {
-            // Less than the distance, and so than the time.
-            let time = (u64::from(slice.time) * room / u64::from(slice.distance)) as u32;
-            let distance = room as u32;
-            self.rest = Slice { distance: slice.distance - distance, time: slice.time - time };
-            slice = Slice { distance, time };
+        if !self.is_last_chord() {
+            slice = self.cut_slice(slice);
         }
         let mut moves = SliceMoves { slice, left: 0, due: 0, interval: 0 };
         if let Some(room) = u64::from(slice.distance).checked_sub(self.to_next + 1) {
@@ -184,33 +201,53 @@ impl BlockCursor {
         self.slice = Some(moves);
     }
 
+    /// Returns what a slice does within the chord in work, and keeps the rest.
+    #[inline(never)] // Blocks without chords never come here: it would only fill the cache.
+    fn cut_slice(&mut self, slice: Slice) -> Slice {
+        let room = self.chord_end.saturating_sub(self.place);
+        if u64::from(slice.distance) <= room {
+            return slice;
+        }
+        // Less than the distance, and so than the time.
+        let time = (u64::from(slice.time) * room / u64::from(slice.distance)) as u32;
+        let distance = room as u32;
+        self.rest = Slice { distance: slice.distance - distance, time: slice.time - time };
+        Slice { distance, time }
+    }
+
     /// The slice in work is done. Whether a new chord begins.
     pub(super) fn end_slice(&mut self, slice: Slice) -> bool {
         self.place += u64::from(slice.distance);
         // What is behind the last move is a rest of nothing.
         self.to_next = self.to_next.saturating_sub(slice.distance.into());
         self.slice = None;
-        let ends = self.place >= self.chord_end;
+        let ends = !self.is_last_chord() && self.place >= self.chord_end;
         if ends {
             self.next_chord();
         }
         ends
     }
 
+    #[inline(never)] // Blocks without chords never come here: it would only fill the cache.
     fn next_chord(&mut self) {
-        let start = core::mem::replace(&mut self.chord_end, u64::MAX);
-        if let Some((chord, later)) =
-            self.chords.all().get(self.begun..).and_then(<[Chord]>::split_first)
-        {
+        if let Some(chord) = self.later_chords().get(usize::from(self.begun)).copied() {
             let length = u64::from(chord.length().to_bits()) << 14;
             self.line = Line::by(chord.dx.into(), chord.dy.into());
             self.move_length = length / u64::from(chord.moves().max(1));
-            self.to_next = (start + self.move_length / 2).saturating_sub(self.place);
-            if !later.is_empty() {
-                self.chord_end = start + length;
-            }
+            self.to_next = (self.chord_end + self.move_length / 2).saturating_sub(self.place);
+            self.chord_end += length;
             self.begun += 1;
         }
+    }
+
+    /// The chords of the block behind the first one.
+    fn later_chords(&self) -> &[Chord] {
+        self.chords.get(..usize::from(self.chord_count)).unwrap_or(&[])
+    }
+
+    /// Whether no chord is behind the one in work.
+    fn is_last_chord(&self) -> bool {
+        self.begun == self.chord_count
     }
 
     /// So many moves of the slice in work are made.

@@ -9,8 +9,8 @@ use crate::drawing::LineType;
 /// middle over a chord. The circle through three points √(2·24·ρR) apart says so, and it stands for
 /// its middle half: 3/2 of that before its end. So at a distance D before the end of what is known,
 /// R/2 is at least D²/(9·24·ρ).
-fn surely_known(limits: &Limits) -> u64 {
-    9 * 24 * u64::from(limits.rounding.to_bits())
+fn surely_known(limits: &Limits) -> u32 {
+    limits.rounding.to_bits().saturating_mul(9 * 24)
 }
 
 /// A straight move that waits, or up to six short ones that need no plan of their own: 48 bytes.
@@ -31,12 +31,15 @@ pub struct Block {
     /// See [`Move`](super::Move).
     pub(super) offsets: [i16; 2],
     pub(super) kind: BlockKind,
-    /// The chords behind the first one, of which `dx` and `dy` tell.
-    pub(super) chords: Chords,
+    /// How many chords are behind the first one, of which `dx` and `dy` tell.
+    pub(super) chord_count: u8,
+    /// Those chords, in front. What is behind them has no meaning.
+    pub(super) chords: [Chord; MOST_CHORDS - 1],
 }
 
 /// A chord of a block behind the first one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[repr(align(4))] // Copied as one word.
 pub(super) struct Chord {
     pub(super) dx: i8,
     pub(super) dy: i8,
@@ -55,35 +58,8 @@ impl Chord {
     }
 }
 
-/// The chords of a block behind the first one.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct Chords {
-    chords: [Chord; MOST_CHORDS - 1],
-    count: u8,
-}
-
 /// The most chords that are one block.
-const MOST_CHORDS: usize = 6;
-
-impl Chords {
-    /// Appends one, if there is room and it is short enough.
-    fn push(&mut self, dx: i32, dy: i32, length: PathLength) -> bool {
-        let length = u16::try_from(length.to_bits());
-        if let (Ok(dx), Ok(dy), Ok(length)) = (dx.try_into(), dy.try_into(), length)
-            && let Some(chord) = self.chords.get_mut(usize::from(self.count))
-        {
-            *chord = Chord { dx, dy, length };
-            self.count += 1;
-            return true;
-        }
-        false
-    }
-
-    /// All of them.
-    pub(super) fn all(&self) -> &[Chord] {
-        self.chords.get(..usize::from(self.count)).unwrap_or(&[])
-    }
-}
+pub(super) const MOST_CHORDS: usize = 6;
 
 /// What a block is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -107,8 +83,27 @@ impl Block {
         ink: None,
         offsets: [0; 2],
         kind: BlockKind::Line,
-        chords: Chords { chords: [Chord { dx: 0, dy: 0, length: 0 }; MOST_CHORDS - 1], count: 0 },
+        chord_count: 0,
+        chords: [Chord { dx: 0, dy: 0, length: 0 }; MOST_CHORDS - 1],
     };
+
+    /// The chords behind the first one.
+    pub(super) fn chords(&self) -> &[Chord] {
+        self.chords.get(..usize::from(self.chord_count)).unwrap_or(&[])
+    }
+
+    /// Appends a chord, if there is room and it is short enough.
+    fn push_chord(&mut self, dx: i32, dy: i32, length: PathLength) -> bool {
+        let length = u16::try_from(length.to_bits());
+        if let (Ok(dx), Ok(dy), Ok(length)) = (dx.try_into(), dy.try_into(), length)
+            && let Some(chord) = self.chords.get_mut(usize::from(self.chord_count))
+        {
+            *chord = Chord { dx, dy, length };
+            self.chord_count += 1;
+            return true;
+        }
+        false
+    }
 
     /// The greatest stopping distance at its beginning.
     pub(super) fn limit(&self) -> PathLength {
@@ -214,7 +209,7 @@ impl<'m> Lookahead<'m> {
         slot.ink = block.ink;
         slot.offsets = block.offsets;
         slot.kind = block.kind;
-        slot.chords.count = 0;
+        slot.chord_count = 0;
         self.count += 1;
         self.length += u64::from(block.length.to_bits());
         self.open = self.open.saturating_add(block.length);
@@ -234,12 +229,17 @@ impl<'m> Lookahead<'m> {
     /// 5/4 of that distance, nor while so much is known or less than half of the memory is in use.
     #[inline(always)]
     pub(super) fn join(&mut self, line: &Block, limits: &Limits) -> bool {
-        let needed = u64::from(limits.longest_stop.to_bits()) + surely_known(limits) / 4;
-        let enough = needed * 5 / 4;
-        if self.is_short() || self.length >= enough {
+        let needed = limits.longest_stop.to_bits().saturating_add(surely_known(limits) / 4);
+        let enough = needed.saturating_add(needed / 4);
+        if self.is_short() || self.length >= u64::from(enough) {
             return false;
         }
-        let longest = enough / self.blocks.len().max(1) as u64;
+        self.join_to_last(line, enough / self.blocks.len().max(1) as u32)
+    }
+
+    /// As [`Self::join`], with a block that is shorter than `longest`.
+    #[inline(never)] // Long paths never come here: it would only fill the cache.
+    fn join_to_last(&mut self, line: &Block, longest: u32) -> bool {
         let Some(at) = self.count.checked_sub(1).map(|last| self.wrapped(last)) else {
             return false;
         };
@@ -253,17 +253,17 @@ impl<'m> Lookahead<'m> {
             let is_whole = matches!(block.ink, None | Some(LineType::Full));
             is_whole && block.kind == BlockKind::Line && block.offsets == [0; 2]
         });
-        let is_long = u64::from(block.length.to_bits()) >= longest;
+        let is_long = block.length.to_bits() >= longest;
         if is_long || !are_lines || block.ink != line.ink || block.length == 0 {
             return false;
         }
-        if block.chords.count == 0 && is_in_line([block.dx, block.dy], [line.dx, line.dy]) {
+        if block.chord_count == 0 && is_in_line([block.dx, block.dy], [line.dx, line.dy]) {
             (block.dx, block.dy) = (block.dx + line.dx, block.dy + line.dy);
         } else {
-            if !block.chords.push(line.dx, line.dy, line.length) {
+            if !block.push_chord(line.dx, line.dy, line.length) {
                 return false;
             }
-            self.chorded += usize::from(block.chords.count == 1);
+            self.chorded += usize::from(block.chord_count == 1);
         }
         block.length = length;
         self.length += u64::from(line.length.to_bits());
@@ -275,7 +275,7 @@ impl<'m> Lookahead<'m> {
     /// plan.
     pub(super) fn pop<T>(&mut self, read: impl FnOnce(&Block) -> T) -> Option<T> {
         let block = self.front()?;
-        let (length, has_chords) = (block.length, block.chords.count > 0);
+        let (length, has_chords) = (block.length, block.chord_count > 0);
         let read = read(block);
         self.chorded -= usize::from(has_chords);
         self.late = PathLength::MAX;
@@ -359,13 +359,13 @@ impl<'m> Lookahead<'m> {
         if !limits.centripetal || self.is_empty() {
             return to_end;
         }
-        let open = to_end.min(self.open.to_bits().into());
+        let open = u32::try_from(to_end).unwrap_or(u32::MAX).min(self.open.to_bits());
         let known = surely_known(limits);
-        if 2 * open >= known {
-            to_end - known / 4
+        if open >= known.div_ceil(2) {
+            to_end - u64::from(known / 4)
         } else {
-            // Less than `known`, which is below 2^28.
-            to_end - open + open * open / known.max(1)
+            let radius = u64::from(open) * u64::from(open) / u64::from(known.max(1));
+            to_end - u64::from(open) + radius
         }
     }
 
@@ -404,7 +404,7 @@ impl<'m> Lookahead<'m> {
                 return;
             };
             let before = points;
-            points += 1 + u32::from(block.chords.count);
+            points += 1 + u32::from(block.chord_count);
             if points < least {
                 continue;
             }
@@ -571,7 +571,7 @@ mod tests {
         }
         assert_eq!(ring.known(), sum << 14);
         let counts: std::vec::Vec<_> =
-            ring.blocks().concat().iter().map(|block| block.chords.all().len()).collect();
+            ring.blocks().concat().iter().map(|block| block.chords().len()).collect();
         // Half of the memory is filled first.
         assert_eq!(counts, [0, 5, 5, 5]);
         let (gap, dash) = (BlockKind::Gap, Some(LineType::Dashed));
@@ -593,10 +593,10 @@ mod tests {
             assert!(ring.join(&line(4, 2, 100), &limits));
         }
         let last = *ring.blocks()[0].last().expect("a block");
-        assert_eq!((last.dx, last.dy, last.chords.all().len()), (402, 201, 0));
+        assert_eq!((last.dx, last.dy, last.chords().len()), (402, 201, 0));
         assert!(ring.join(&line(-4, -2, 100), &limits));
         let last = *ring.blocks()[0].last().expect("a block");
-        assert_eq!((last.dx, last.dy, last.chords.all().len()), (402, 201, 1));
+        assert_eq!((last.dx, last.dy, last.chords().len()), (402, 201, 1));
     }
 
     #[test]
@@ -605,7 +605,7 @@ mod tests {
         let mut memory = [Block::EMPTY; 4];
         let mut ring = Lookahead::new(&mut memory);
         ring.push(block(1 << 30, u32::MAX)).expect("room");
-        let known = surely_known(&limits);
+        let known = u64::from(surely_known(&limits));
         let mut before = 0;
         for to_end in 0..known {
             let allowed = ring.stopping_distance_at(to_end, &limits);
