@@ -81,6 +81,8 @@ fn a_full_window_across_every_flash_write_loses_no_byte() -> TestResult {
     // These lines follow the job's own line, which computes the job and saves it in flash.
     lines.extend((0..60).map(|number| format!("v {number}.125 {number} 0.5")));
     stream(&mut line, &lines)?;
+    // The list of the settings is refused while steps run.
+    while !line.status()?.starts_with("<Idle") {}
     let settings = ask_all(&mut line, "$$")?;
     for kept in ["$130=302.000 ", "$100=160.000 ", "$101=160.000 "] {
         assert!(settings.iter().any(|line| line.starts_with(kept)), "{kept}: {settings:?}");

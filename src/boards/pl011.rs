@@ -8,26 +8,28 @@ const BAUD: u32 = 115_200;
 
 /// The registers that are used here, by their offset in bytes.
 mod offset {
+    use crate::boards::peripheral::Offset;
+
     /// The register to which a byte to send is written, and from which a received byte is read with
     /// its error bits.
-    pub const DATA: usize = 0x000;
+    pub const DATA: Offset = Offset::new(0x000);
     /// The register whose bits say whether the FIFOs (the queues of received bytes and of those to
     /// send) are empty or full.
-    pub const FLAGS: usize = 0x018;
+    pub const FLAGS: Offset = Offset::new(0x018);
     /// The register of the whole part of the divider that gives the baud rate.
-    pub const BAUD_INTEGER: usize = 0x024;
+    pub const BAUD_INTEGER: Offset = Offset::new(0x024);
     /// The register of the fraction of the divider that gives the baud rate, in 64ths.
-    pub const BAUD_FRACTION: usize = 0x028;
+    pub const BAUD_FRACTION: Offset = Offset::new(0x028);
     /// The register that says how many bits a byte has, and whether the FIFOs are in use.
-    pub const LINE_CONTROL: usize = 0x02C;
+    pub const LINE_CONTROL: Offset = Offset::new(0x02C);
     /// The register that switches the UART, its sender and its receiver on.
-    pub const CONTROL: usize = 0x030;
+    pub const CONTROL: Offset = Offset::new(0x030);
     /// The register that says, by one bit for each event, which events cause an interrupt.
-    pub const INTERRUPT_MASK: usize = 0x038;
+    pub const INTERRUPT_MASK: Offset = Offset::new(0x038);
     /// The register that clears the interrupt of an event when the event's bit is written to it.
-    pub const INTERRUPT_CLEAR: usize = 0x044;
+    pub const INTERRUPT_CLEAR: Offset = Offset::new(0x044);
     /// The register that says whether DMA is asked to fetch received bytes.
-    pub const DMA: usize = 0x048;
+    pub const DMA: Offset = Offset::new(0x048);
 }
 /// The bit of [`offset::FLAGS`] that says that no received byte waits.
 const RECEIVER_EMPTY: u32 = 1 << 4;

@@ -22,10 +22,12 @@ pub const CYCLE_MASK: u32 = 0x00FF_FFFF;
 
 /// The registers of system control that are used here, by their offset in bytes.
 mod offset {
+    use crate::boards::peripheral::Offset;
+
     /// The register of the states that may cause an interrupt; only the bit of the PLL is read.
-    pub const RAW_INTERRUPT_STATUS: usize = 0x050;
+    pub const RAW_INTERRUPT_STATUS: Offset = Offset::new(0x050);
     /// The register that says which clock the core gets, and by how much it is divided.
-    pub const RUN_MODE_CLOCK: usize = 0x060;
+    pub const RUN_MODE_CLOCK: Offset = Offset::new(0x060);
 }
 /// The bits of the clock register that hold the divider, less 1.
 const SYSTEM_DIVIDER: u32 = 0xF << 23;

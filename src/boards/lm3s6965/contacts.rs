@@ -9,23 +9,26 @@ use penup::machine::Contacts;
 
 use super::registers::{GPIO_C, SYSTEM_CONTROL};
 use super::{HAPPENED, ROW, critical};
+use crate::boards::peripheral::Offset;
 
 /// The registers of the port that are used here, by their offset in bytes.
 mod offset {
+    use crate::boards::peripheral::Offset;
+
     /// The register that says, by one bit for each pin, which pins cause an interrupt at rising and
     /// at falling edges.
-    pub const BOTH_EDGES: usize = 0x408;
+    pub const BOTH_EDGES: Offset = Offset::new(0x408);
     /// The register that says, by one bit for each pin, which pins may cause an interrupt at all.
-    pub const INTERRUPT_MASK: usize = 0x410;
+    pub const INTERRUPT_MASK: Offset = Offset::new(0x410);
     /// The register that clears the interrupt of a pin when the pin's bit is written to it.
-    pub const INTERRUPT_CLEAR: usize = 0x41C;
+    pub const INTERRUPT_CLEAR: Offset = Offset::new(0x41C);
     /// The register that says, by one bit for each pin, which pins read low where nothing is
     /// connected.
-    pub const PULL_DOWN: usize = 0x514;
+    pub const PULL_DOWN: Offset = Offset::new(0x514);
     /// The register that says, by one bit for each pin, which pins are digital.
-    pub const DIGITAL_ENABLE: usize = 0x51C;
+    pub const DIGITAL_ENABLE: Offset = Offset::new(0x51C);
     /// The register of system control that switches the clocks of the ports on.
-    pub const GPIO_CLOCKS: usize = 0x108;
+    pub const GPIO_CLOCKS: Offset = Offset::new(0x108);
 }
 /// The bit that switches the clock of port C on.
 const PORT_C_CLOCK: u32 = 1 << 2;
@@ -53,8 +56,7 @@ pub fn set_up(nvic: &mut NVIC) {
 
 /// The contacts that are closed; their pins are high.
 pub fn read() -> Contacts {
-    // Bits 2 to 9 of the address of the data register are its mask.
-    let closed = GPIO_C.read((ALL << 2) as usize);
+    let closed = GPIO_C.read(Offset::of_pins(ALL as u8));
     Contacts { x: closed & LIMIT_X != 0, y: closed & LIMIT_Y != 0, stop: closed & STOP != 0 }
 }
 

@@ -7,24 +7,27 @@ use penup::board_table::Pins;
 use penup::machine::{Axes, PinOrder};
 
 use super::registers::{GPIO_B, SYSTEM_CONTROL};
+use crate::boards::peripheral::Offset;
 
 /// The registers of the port that are used here, by their offset in bytes.
 mod offset {
+    use crate::boards::peripheral::Offset;
+
     /// The register that says, by one bit for each pin, which pins of a port are outputs.
-    pub const DIRECTION: usize = 0x400;
+    pub const DIRECTION: Offset = Offset::new(0x400);
     /// The register that says, by one bit for each pin, which pins a peripheral of the chip uses
     /// instead of the port.
-    pub const ALTERNATE_FUNCTION: usize = 0x420;
+    pub const ALTERNATE_FUNCTION: Offset = Offset::new(0x420);
     /// The register that says, by one bit for each pin, which pins are digital.
-    pub const DIGITAL_ENABLE: usize = 0x51C;
+    pub const DIGITAL_ENABLE: Offset = Offset::new(0x51C);
     /// The register that lets [`COMMIT`] be written once [`UNLOCK`](super::UNLOCK) is written to
     /// it.
-    pub const LOCK: usize = 0x520;
+    pub const LOCK: Offset = Offset::new(0x520);
     /// The register that says, by one bit for each pin, which of the protected pins may get another
     /// function.
-    pub const COMMIT: usize = 0x524;
+    pub const COMMIT: Offset = Offset::new(0x524);
     /// The register of system control that switches the clocks of the ports on.
-    pub const GPIO_CLOCKS: usize = 0x108;
+    pub const GPIO_CLOCKS: Offset = Offset::new(0x108);
 }
 /// The bit that switches the clock of port B on.
 const PORT_B_CLOCK: u32 = 1 << 1;
@@ -107,11 +110,10 @@ impl<const NUMBER: u8> OutputPin for Pin<NUMBER> {
     }
 }
 
-/// Sets the pins of `mask` to `levels` in one store and leaves the others unchanged. Bits 2 to 9 of
-/// the address of the data register are its mask.
+/// Sets the pins of `mask` to `levels` in one store and leaves the others unchanged.
 #[inline(always)]
 fn write(mask: u32, levels: u32) {
-    GPIO_B.write((mask << 2) as usize, levels);
+    GPIO_B.write(Offset::of_pins(mask as u8), levels);
 }
 
 /// Switches the drivers off, raises the pen and sets the step pins low. It is safe at any time,

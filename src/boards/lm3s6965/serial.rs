@@ -13,15 +13,17 @@ use crate::boards::line::{self, ReceiveMerge, Shared};
 
 /// The registers that are used here besides those of the UART, by their offset in bytes.
 mod offset {
+    use crate::boards::peripheral::Offset;
+
     /// The register of system control that switches the clocks of the UARTs on.
-    pub const UART_CLOCKS: usize = 0x104;
+    pub const UART_CLOCKS: Offset = Offset::new(0x104);
     /// The register of system control that switches the clocks of the ports on.
-    pub const GPIO_CLOCKS: usize = 0x108;
+    pub const GPIO_CLOCKS: Offset = Offset::new(0x108);
     /// The register that says, by one bit for each pin, which pins of port A a peripheral such as
     /// the UART uses.
-    pub const ALTERNATE_FUNCTION: usize = 0x420;
+    pub const ALTERNATE_FUNCTION: Offset = Offset::new(0x420);
     /// The register that says, by one bit for each pin, which pins of port A are digital.
-    pub const DIGITAL_ENABLE: usize = 0x51C;
+    pub const DIGITAL_ENABLE: Offset = Offset::new(0x51C);
 }
 /// The bits of the two pins of the serial line, in port A.
 const SERIAL_PINS: u32 = 0b11;

@@ -41,21 +41,23 @@ const TURN_EVENTS: usize = 30;
 
 /// The registers of a timer that are used here, by their offset in bytes.
 mod offset {
+    use crate::boards::peripheral::Offset;
+
     /// The register that says whether the timer is one of 32 bits or two of 16 bits.
-    pub const CONFIGURATION: usize = 0x000;
+    pub const CONFIGURATION: Offset = Offset::new(0x000);
     /// The register that says what the timer does when its time is over.
-    pub const MODE_A: usize = 0x004;
+    pub const MODE_A: Offset = Offset::new(0x004);
     /// The register that starts and stops the timer.
-    pub const CONTROL: usize = 0x00C;
+    pub const CONTROL: Offset = Offset::new(0x00C);
     /// The register that says, by one bit for each event of the timer, which events cause an
     /// interrupt.
-    pub const INTERRUPT_MASK: usize = 0x018;
+    pub const INTERRUPT_MASK: Offset = Offset::new(0x018);
     /// The register that clears the interrupt of an event when the event's bit is written to it.
-    pub const INTERRUPT_CLEAR: usize = 0x024;
+    pub const INTERRUPT_CLEAR: Offset = Offset::new(0x024);
     /// The register of the time from a start of the timer to its interrupt, in cycles.
-    pub const INTERVAL_LOAD_A: usize = 0x028;
+    pub const INTERVAL_LOAD_A: Offset = Offset::new(0x028);
     /// The register of system control that switches the clocks of the timers on.
-    pub const TIMER_CLOCKS: usize = 0x104;
+    pub const TIMER_CLOCKS: Offset = Offset::new(0x104);
 }
 /// The bits that switch the clocks of timers 1 and 2 on.
 const TIMER_CLOCKS: u32 = 0b11 << 17;

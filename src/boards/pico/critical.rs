@@ -87,7 +87,8 @@ pub fn move_vectors_to_ram() {
     }
     // The vectors must be in RAM before the core may read them.
     fence(Ordering::SeqCst);
-    PPB.vtor().put(IN_RAM.0.as_ptr() as u32);
+    // SAFETY: the table in RAM holds the same vectors, and stays there.
+    unsafe { PPB.registers() }.vtor().put(IN_RAM.0.as_ptr() as u32);
     cortex_m::asm::dsb();
 }
 
@@ -108,8 +109,10 @@ critical_section::set_impl!(MaskAllButSteps);
 unsafe impl critical_section::Impl for MaskAllButSteps {
     unsafe fn acquire() -> critical_section::RawRestoreState {
         // A handler that runs in between leaves the set as it was.
-        let set = PPB.nvic_iser().get() & OTHERS;
-        PPB.nvic_icer().put(OTHERS);
+        // SAFETY: it masks interrupts, and so never makes anything run.
+        let ppb = unsafe { PPB.registers() };
+        let set = ppb.nvic_iser().get() & OTHERS;
+        ppb.nvic_icer().put(OTHERS);
         cortex_m::asm::dsb();
         cortex_m::asm::isb();
         if set != 0 {
@@ -122,7 +125,8 @@ unsafe impl critical_section::Impl for MaskAllButSteps {
         if outermost != 0 {
             // The work of the section must be finished before a handler runs.
             core::sync::atomic::compiler_fence(Ordering::SeqCst);
-            PPB.nvic_iser().put(MASKED.load(Ordering::Relaxed));
+            // SAFETY: it lets the interrupts come again that `acquire` masked.
+            unsafe { PPB.registers() }.nvic_iser().put(MASKED.load(Ordering::Relaxed));
         }
     }
 }

@@ -141,11 +141,12 @@ unsafe extern "C" fn carry_out(rom: &Rom, work: &mut Work<'_>) {
                 // of the answer.
                 let selects = IO_QSPI.gpio_qspiss().gpio_ctrl().get() & !select::OVERRIDE;
                 IO_QSPI.gpio_qspiss().gpio_ctrl().put(selects | select::LOW);
+                let ssi = SSI.registers();
                 for byte in exchanged.iter_mut() {
-                    while SSI.sr().get() & line::HAS_PLACE == 0 {}
-                    SSI.dr0().put(*byte as u32);
-                    while SSI.sr().get() & line::HAS_BYTE == 0 {}
-                    *byte = SSI.dr0().get() as u8;
+                    while ssi.sr().get() & line::HAS_PLACE == 0 {}
+                    ssi.dr0().put(*byte as u32);
+                    while ssi.sr().get() & line::HAS_BYTE == 0 {}
+                    *byte = ssi.dr0().get() as u8;
                 }
                 IO_QSPI.gpio_qspiss().gpio_ctrl().put(selects | select::HIGH);
             }

@@ -36,6 +36,23 @@ impl<B> Deref for Registers<B> {
     }
 }
 
+/// Access to the registers of a peripheral that reaches into memory by itself, or changes what the
+/// core reads there. Safe code cannot write to them.
+pub struct Guarded<B>(Registers<B>);
+
+impl<B> Guarded<B> {
+    /// Gives access to all registers.
+    ///
+    /// # Safety
+    /// The registers are only read, or what is written to them makes the chip read and write nothing
+    /// but registers of peripherals and memory that Rust shares with it as atomics, and leaves what
+    /// Rust reads as it is.
+    #[inline(always)]
+    pub unsafe fn registers(&self) -> &B {
+        &self.0
+    }
+}
+
 /// Gives registers a method that reads all their bits.
 pub trait Get {
     /// Returns the bits of the register.
@@ -81,7 +98,7 @@ impl<R: Writable + RegisterSpec<Ux = u32>> Put for Reg<R> {
 }
 
 // SAFETY of all: the PAC has the addresses. None of these registers makes the chip reach into
-// memory that Rust knows, except those of DMA, whose channels get addresses of atomics only.
+// memory that Rust knows, except those that are guarded.
 
 /// The reset controller, which holds peripherals in reset. Used at set-up, before interrupts are
 /// on.
@@ -110,12 +127,12 @@ pub const PSM: Registers<pac::psm::RegisterBlock> = unsafe { Registers::at(pac::
 pub const WATCHDOG: Registers<pac::watchdog::RegisterBlock> =
     unsafe { Registers::at(pac::WATCHDOG::PTR) };
 /// Direct memory access. `steps` uses channel 0, and `serial` uses channels 1 and 2.
-pub const DMA: Registers<pac::dma::RegisterBlock> = unsafe { Registers::at(pac::DMA::PTR) };
+pub const DMA: Guarded<pac::dma::RegisterBlock> = Guarded(unsafe { Registers::at(pac::DMA::PTR) });
 /// Programmable input and output. `steps` uses its state machine 0.
 pub const PIO0: Registers<pac::pio0::RegisterBlock> = unsafe { Registers::at(pac::PIO0::PTR) };
 /// The core's own registers: the masks of the interrupts, and the address of the vector table. Used
 /// by `critical`.
-pub const PPB: Registers<pac::ppb::RegisterBlock> = unsafe { Registers::at(pac::PPB::PTR) };
+pub const PPB: Guarded<pac::ppb::RegisterBlock> = Guarded(unsafe { Registers::at(pac::PPB::PTR) });
 /// The USB controller. Used by `usb` in addition to its driver.
 pub const USB: Registers<pac::usbctrl_regs::RegisterBlock> =
     unsafe { Registers::at(pac::USBCTRL_REGS::PTR) };
@@ -123,7 +140,8 @@ pub const USB: Registers<pac::usbctrl_regs::RegisterBlock> =
 pub const USB_MEMORY: Registers<pac::usbctrl_dpram::RegisterBlock> =
     unsafe { Registers::at(pac::USBCTRL_DPRAM::PTR) };
 /// The serial line to the flash chip. Used by `flash`, while nothing else reads the flash.
-pub const SSI: Registers<pac::xip_ssi::RegisterBlock> = unsafe { Registers::at(pac::XIP_SSI::PTR) };
+pub const SSI: Guarded<pac::xip_ssi::RegisterBlock> =
+    Guarded(unsafe { Registers::at(pac::XIP_SSI::PTR) });
 /// The pins of the serial line to the flash chip. Used by `flash`, while nothing else reads the
 /// flash.
 pub const IO_QSPI: Registers<pac::io_qspi::RegisterBlock> =

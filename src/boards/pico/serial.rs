@@ -95,16 +95,18 @@ pub fn set_up(nvic: &mut NVIC) -> Sender {
 /// which is a break.
 pub fn open() {
     let [first, second] = CHANNELS;
+    // SAFETY: the channels read the data register of the UART, and write to the ring of atomics.
+    let dma = unsafe { DMA.registers() };
     let set_up = |channel: &CH| {
         channel.ch_read_addr().put(UART0.data_address());
         channel.ch_write_addr().put(RING.0.as_ptr() as u32);
         channel.ch_trans_count().put(TURN);
     };
-    set_up(DMA.ch(second));
-    DMA.ch(second).ch_al1_ctrl().put(control::receive_before(first));
+    set_up(dma.ch(second));
+    dma.ch(second).ch_al1_ctrl().put(control::receive_before(first));
     // Writing this register starts the channel.
-    set_up(DMA.ch(first));
-    DMA.ch(first).ch_ctrl_trig().put(control::receive_before(second));
+    set_up(dma.ch(first));
+    dma.ch(first).ch_ctrl_trig().put(control::receive_before(second));
     UART0.enable();
 }
 
@@ -117,10 +119,12 @@ pub fn request_read() {
 /// The number of bytes that have been written to the ring since the start, modulo two turns; `None`
 /// while one channel hands over to the other.
 fn received() -> Option<u32> {
-    let is_busy = |number: usize| DMA.ch(number).ch_al1_ctrl().get() & control::BUSY != 0;
+    // SAFETY: its registers are only read.
+    let dma = unsafe { DMA.registers() };
+    let is_busy = |number: usize| dma.ch(number).ch_al1_ctrl().get() & control::BUSY != 0;
     let (before, number) =
         if is_busy(CHANNELS[0]) { (0, CHANNELS[0]) } else { (TURN, CHANNELS[1]) };
-    let left = DMA.ch(number).ch_trans_count().get();
+    let left = dma.ch(number).ch_trans_count().get();
     (is_busy(number) && left != 0).then(|| before + TURN - left)
 }
 

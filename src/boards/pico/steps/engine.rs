@@ -128,11 +128,13 @@ pub fn set_up() {
     PIO0.sm_irq(0).irq_inte().put(FLAG_INTERRUPT);
     order(order::JUMP_TO_START);
 
-    DMA.ch(0).ch_read_addr().put(ring_address(0));
-    DMA.ch(0).ch_write_addr().put(PIO0.txf(0).as_ptr() as u32);
+    // SAFETY: the channel reads the ring of atomics, and writes to the state machine.
+    let dma = unsafe { DMA.registers() };
+    dma.ch(0).ch_read_addr().put(ring_address(0));
+    dma.ch(0).ch_write_addr().put(PIO0.txf(0).as_ptr() as u32);
     // This register does not start the channel.
-    DMA.ch(0).ch_al1_ctrl().put(FEED);
-    DMA.inte0().put(CHANNEL);
+    dma.ch(0).ch_al1_ctrl().put(FEED);
+    dma.inte0().put(CHANNEL);
 }
 
 /// Makes the state machine execute an instruction at once.

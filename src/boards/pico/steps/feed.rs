@@ -54,11 +54,13 @@ pub static FEEDING: AtomicBool = AtomicBool::new(false);
 #[inline(never)]
 #[unsafe(link_section = ".data.in_ram")]
 pub fn taken() -> u32 {
+    // SAFETY: its registers are only read.
+    let dma = unsafe { DMA.registers() };
     critical::with_steps_masked(|| {
         loop {
-            let left = DMA.ch(0).ch_trans_count().get();
+            let left = dma.ch(0).ch_trans_count().get();
             let waiting = PIO0.flevel().get() & LEVEL;
-            if left == DMA.ch(0).ch_trans_count().get() {
+            if left == dma.ch(0).ch_trans_count().get() {
                 let to_come = left - ABANDONED.load(Ordering::Relaxed) + waiting;
                 return HANDED_OVER.load(Ordering::Relaxed).wrapping_sub(to_come);
             }
@@ -82,18 +84,21 @@ pub fn start() {
 #[inline(never)]
 #[unsafe(link_section = ".data.in_ram")]
 pub fn stop() {
+    // SAFETY: the channel ends.
+    let dma = unsafe { DMA.registers() };
     critical::with_steps_masked(|| {
         PIO0.ctrl().put(0);
-        DMA.inte0().put(0);
-        DMA.chan_abort().put(CHANNEL);
-        while DMA.ch(0).ch_al1_ctrl().get() & BUSY != 0 {}
-        DMA.ints0().put(CHANNEL);
+        dma.inte0().put(0);
+        dma.chan_abort().put(CHANNEL);
+        while dma.ch(0).ch_al1_ctrl().get() & BUSY != 0 {}
+        dma.ints0().put(CHANNEL);
     });
 }
 
 /// Lets the channel's interrupt come again, which [`stop`] prevents.
 pub fn let_interrupt_come() {
-    DMA.inte0().put(CHANNEL);
+    // SAFETY: only an interrupt is let come.
+    unsafe { DMA.registers() }.inte0().put(CHANNEL);
 }
 
 /// Tells the channel what to transfer next. It is called where the channel's interrupt is masked.
@@ -128,9 +133,12 @@ fn feed() {
     // The fence is needed because the channel reads what was written to the block and to the ring,
     // and the compiler does not know of this reader.
     fence(Ordering::Release);
-    DMA.ch(0).ch_read_addr().put(address);
+    // SAFETY: the address is in the ring, at whose end the channel wraps, or that of the block, which
+    // has so many words. Both are atomics.
+    let dma = unsafe { DMA.registers() };
+    dma.ch(0).ch_read_addr().put(address);
     // Writing the count here starts the channel.
-    DMA.ch(0).ch_al1_trans_count_trig().put(words);
+    dma.ch(0).ch_al1_trans_count_trig().put(words);
 }
 
 /// The number of the `count` words from `handed_over` on that can be sent as planned because enough
@@ -243,6 +251,7 @@ fn brake_words(brake: &mut Brake, handed_over: u32, count: u32) -> u32 {
 #[interrupt]
 #[unsafe(link_section = ".data.in_ram")]
 fn DMA_IRQ_0() {
-    DMA.ints0().put(CHANNEL);
+    // SAFETY: only an interrupt is ended.
+    unsafe { DMA.registers() }.ints0().put(CHANNEL);
     feed();
 }

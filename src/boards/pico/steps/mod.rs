@@ -274,7 +274,9 @@ impl Steps {
         self.written = taken;
         WRITTEN.store(taken, Ordering::Relaxed);
         HANDED_OVER.store(taken, Ordering::Relaxed);
-        ABANDONED.store(DMA.ch(0).ch_trans_count().get(), Ordering::Relaxed);
+        // SAFETY: its register is only read.
+        let dma = unsafe { DMA.registers() };
+        ABANDONED.store(dma.ch(0).ch_trans_count().get(), Ordering::Relaxed);
         FEEDING.store(false, Ordering::Relaxed);
         begin(self.pulse_ticks);
         // All of this must be written before the handler may run.
