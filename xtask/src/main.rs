@@ -15,6 +15,7 @@ macro_rules! say {
 
 mod bench;
 mod command;
+mod dependencies;
 mod experiments;
 mod flash;
 mod firmware;
@@ -120,6 +121,8 @@ enum Task {
     },
     /// Lists, by file, the calls of panic functions that are left in the boards' images.
     Panics,
+    /// Checks the licences, sources and known holes of all crates; needs cargo-deny.
+    Deny,
     /// Looks for inputs that break a promise; needs nightly Rust and cargo-fuzz.
     Fuzz {
         /// For how many seconds each target is fuzzed.
@@ -176,6 +179,7 @@ fn carry_out() -> Result<()> {
         Some(Task::Cuts { count }) => test::power_cuts(count)?,
         Some(Task::Lattice7) => test::lattice7()?,
         Some(Task::Panics) => panics::list()?,
+        Some(Task::Deny) => dependencies::deny()?,
         Some(Task::Fuzz { seconds, target }) => fuzz::fuzz(seconds, target.as_deref())?,
         Some(Task::Soak) => fuzz::fuzz(3600, None)?,
         Some(Task::SetUp) => {
