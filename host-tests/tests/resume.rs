@@ -145,7 +145,7 @@ fn cut_before_bytes(lines: &[String], offsets: impl Iterator<Item = usize>) {
         let mut runs = vec![strokes_of(changes.iter().map(PinChange::from))];
         let (_, changes) = switch_on(flash.powered(), |plotter| {
             if !go_on(plotter) {
-                if runs.iter().any(|run| *run == whole) {
+                if runs.contains(&whole) {
                     return;
                 }
                 assert!(runs.iter().all(Vec::is_empty), "the job is lost: cut before {budget}");
