@@ -12,6 +12,15 @@
 //! A slot begins with a page for the header. The header consists of four words in little-endian
 //! order: a mark, a sequence number, the length of the payload in bytes, and the CRC-32 of these
 //! three and the payload.
+//!
+//! While the voltage falls or rises, flash may return garbage. So whatever is read is read again
+//! until it is the same twice.
+//!
+//! How far the work that a state describes has come can be kept beside it, in a [`Log`].
+
+mod log;
+
+pub use log::{Log, NOTE_BYTES};
 
 use crate::checksum::Crc32;
 use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
@@ -95,6 +104,8 @@ struct Valid {
     sequence: u32,
     /// The length of the payload in bytes.
     length: u32,
+    /// The checksum in the header.
+    sum: u32,
 }
 
 impl Slots {
@@ -104,6 +115,13 @@ impl Slots {
         let valid = self.find(flash)?;
         let at = self.begin(valid.slot) + PAGE_BYTES as u32;
         Some(Reader { flash, at, left: valid.length })
+    }
+
+    /// Returns which slot holds the latest state, 0 or 1, and the checksum in its header, by which
+    /// it is told from other states. `None` if there is no state.
+    pub fn identify<F: ReadNorFlash>(self, flash: &mut F) -> Option<(usize, u32)> {
+        let valid = self.find(flash)?;
+        Some((valid.slot as usize, valid.sum))
     }
 
     /// Begins to write a new state.
@@ -130,6 +148,11 @@ impl Slots {
         })
     }
 
+    /// The offset in flash at which the second slot ends, in bytes.
+    pub const fn end(self) -> u32 {
+        self.start + 2 * self.bytes
+    }
+
     /// Returns the offset in flash at which a slot begins, in bytes.
     fn begin(self, slot: u32) -> u32 {
         self.start + slot * self.bytes
@@ -150,7 +173,7 @@ impl Slots {
     /// Returns the header of a slot, or `None` if its checksum does not match that of its payload.
     fn check<F: ReadNorFlash>(self, flash: &mut F, slot: u32) -> Option<Valid> {
         let mut header = [0; HEADER_BYTES];
-        flash.read(self.begin(slot), &mut header).ok()?;
+        read_surely(flash, self.begin(slot), &mut header).ok()?;
         let [mark, sequence, length, sum] = words(header);
         if mark != MARK || length > self.bytes - PAGE_BYTES as u32 {
             return None;
@@ -169,8 +192,33 @@ impl Slots {
             slot,
             sequence,
             length,
+            sum,
         })
     }
+}
+
+/// How often a piece of flash is read before its last reading counts, although it was never the
+/// same twice.
+const READINGS: usize = 8;
+
+/// Reads flash until it has returned the same twice in a row, which garbage does not.
+///
+/// # Errors
+/// The error of the flash.
+fn read_surely<F: ReadNorFlash>(flash: &mut F, at: u32, into: &mut [u8]) -> Result<(), F::Error> {
+    let mut again = [0; 64];
+    for (from, piece) in (at..).step_by(again.len()).zip(into.chunks_mut(again.len())) {
+        let (again, _) = again.split_at_mut(piece.len());
+        flash.read(from, piece)?;
+        for _ in 1..READINGS {
+            flash.read(from, again)?;
+            if piece == again {
+                break;
+            }
+            piece.copy_from_slice(again);
+        }
+    }
+    Ok(())
 }
 
 /// Returns the four words of a header (see the module documentation).
@@ -203,7 +251,7 @@ impl<F: ReadNorFlash> Reader<'_, F> {
     /// number, which is 0 if the flash fails.
     pub fn read(&mut self, into: &mut [u8]) -> usize {
         let count = into.len().min(self.left as usize);
-        match self.flash.read(self.at, &mut into[..count]) {
+        match read_surely(self.flash, self.at, &mut into[..count]) {
             Ok(()) => {
                 self.at += count as u32;
                 self.left -= count as u32;

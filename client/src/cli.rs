@@ -6,7 +6,7 @@ mod view;
 
 pub use machine::{
     FormatArgs, JogArgs, PauseArgs, PenArgs, PenPosition, PlotterArgs, PortArgs, PortsArgs,
-    SetArgs, SettingsCommand, WatchArgs,
+    ResumeArgs, SetArgs, SettingsCommand, WatchArgs,
 };
 pub use page::PageArgs;
 pub use view::ViewArgs;
@@ -71,8 +71,8 @@ pub enum Command {
     Watch(WatchArgs),
     /// Pause a job: the machine slows down and raises the pen
     Pause(PauseArgs),
-    /// Let a machine go on that holds or waits for a pen
-    Resume(PlotterArgs),
+    /// Go on with a job that holds, waits for a pen, or was stopped by a loss of power
+    Resume(ResumeArgs),
     /// Give a job up: the machine slows down and raises the pen
     Abort(PlotterArgs),
     /// Find the limit switches
@@ -117,6 +117,7 @@ impl Command {
             Self::Ports(args) => &args.format,
             Self::Watch(WatchArgs { plotter })
             | Self::Pause(PauseArgs { plotter, .. })
+            | Self::Resume(ResumeArgs { plotter, .. })
             | Self::Jog(JogArgs { plotter, .. })
             | Self::Pen(PenArgs { plotter, .. })
             | Self::Set(SetArgs { plotter, .. })
@@ -126,7 +127,6 @@ impl Command {
                 | SettingsCommand::Restore { plotter, .. },
             )
             | Self::Status(plotter)
-            | Self::Resume(plotter)
             | Self::Abort(plotter)
             | Self::Home(plotter)
             | Self::Unlock(plotter)

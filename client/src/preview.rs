@@ -14,7 +14,7 @@ use crate::results::{JobResult, Lengths, Timings};
 use crate::room::Room;
 use crate::strokes::strokes_of;
 use crate::watch::PenWatch;
-use penup::boards::host::{Change, HostBoard};
+use penup::boards::host::{Change, CutFlash, HostBoard};
 use penup::geometry::{Projection, Vertex};
 use penup::index::Index;
 use penup::machine::{EventRing, PulserState, Setting, Settings};
@@ -55,6 +55,22 @@ impl<I: Index> InMemory<I> {
         let plotter = Plotter::with_settings(room.lend(), pins, settings).without_undo();
         plotter.greet(&mut board);
         Self { board, plotter, steps: 0, pen: None, span: None, waited: false, waits: 0 }
+    }
+
+    /// Starts a plotter with this memory, and with flash in which it keeps its settings and jobs, as
+    /// when its power comes on.
+    pub fn with_flash(room: Room, flash: CutFlash) -> Self {
+        let ring = Box::leak(Box::new(EventRing::new()));
+        let pins = Box::leak(Box::new(PulserState::new()));
+        let mut board = HostBoard::new(ring, pins);
+        board.set_flash(flash);
+        let plotter = penup::plotter::start(&mut board, room.lend(), pins);
+        Self { board, plotter, steps: 0, pen: None, span: None, waited: false, waits: 0 }
+    }
+
+    /// Cuts the power. Returns the flash, if the plotter has any.
+    pub fn cut_power(mut self) -> Option<CutFlash> {
+        self.board.take_flash()
     }
 
     fn steps_per_mm(&self) -> [f64; 2] {

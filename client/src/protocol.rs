@@ -16,6 +16,10 @@ pub const MODEL: &str = "$model";
 pub const PLOT: &str = "$plot";
 /// Draws the last job again, which the plotter has kept.
 pub const AGAIN: &str = "$again";
+/// Goes on with the job that a loss of power or a reset has stopped.
+pub const GO_ON: &str = "$resume";
+/// Does the same as [`GO_ON`], where the user has put the pen at the origin by hand.
+pub const GO_ON_AT_ORIGIN: &str = "$resume=origin";
 /// Queries version, board and limits.
 pub const BUILD: &str = "$I";
 /// Lists the settings of the machine.
@@ -137,6 +141,8 @@ pub struct Status {
     pub is_standing: bool,
     /// The numbers of `Strokes:done/all`, which is reported during a drawing.
     pub strokes: Option<(u64, u64)>,
+    /// The numbers of `Stopped:done/all`, if a job has stopped that can go on.
+    pub stopped: Option<(u64, u64)>,
     /// The lengths of `Ink:done/all`, drawn and to draw, in whole mm.
     pub ink: Option<(u64, u64)>,
     /// The seconds of `Left:seconds` until the end of the job.
@@ -255,6 +261,7 @@ fn parse_status(report: &str) -> Option<Status> {
         state,
         is_standing,
         strokes: done_of_all("Strokes:"),
+        stopped: done_of_all("Stopped:"),
         ink: done_of_all("Ink:"),
         seconds_left: field("Left:").and_then(|seconds| seconds.parse().ok()),
         stage: stage.map(str::to_owned),
@@ -353,6 +360,8 @@ mod tests {
         assert!(
             status("<Hold:0|MPos:1,2>").is_standing && !status("<Hold:1|MPos:1,2>").is_standing
         );
+        let stopped = status("<Idle|MPos:0,0,0|Stopped:4/9|Strokes:0/0>");
+        assert_eq!((stopped.stopped, run.stopped), (Some((4, 9)), None));
         let computing = status("<Run|MPos:0,0,0|Stage:order>");
         assert_eq!(
             (computing.stage.as_deref(), computing.ink, computing.percent),

@@ -60,7 +60,7 @@ pub fn run(cli: &Cli, interrupt: &AtomicBool) -> Result<Outcome, Error> {
         Command::Status(args) => operate::status(args, interrupt),
         Command::Watch(args) => operate::watch(args, quiet, interrupt),
         Command::Pause(args) => operate::pause(args, interrupt),
-        Command::Resume(args) => operate::resume(args, interrupt),
+        Command::Resume(args) => operate::resume(args, quiet, interrupt),
         Command::Abort(args) => operate::abort(args, interrupt),
         Command::Home(args) => operate::home(args, interrupt),
         Command::Unlock(args) => operate::unlock(args, interrupt),

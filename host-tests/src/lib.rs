@@ -8,6 +8,7 @@
 )]
 
 pub mod curve_reference;
+pub mod cut_jobs;
 pub mod enumeration;
 pub mod order_reference;
 pub mod event_checker;
@@ -26,7 +27,6 @@ pub mod scene_files;
 pub mod convex_any_faces;
 pub mod convex_model;
 pub mod convex_solids;
-pub mod cut_flash;
 pub mod heaviest_jobs;
 pub mod transcript;
 pub mod whole_jobs;

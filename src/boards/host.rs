@@ -4,11 +4,17 @@
 //! Time passes only in [`Board::wait`] and [`HostBoard::pass`], and while bytes are sent at a set
 //! baud rate. So a run gives the same result every time.
 
+mod flash;
+
+pub use flash::{Cut, CutFlash};
+
 use crate::index::Index;
 use crate::machine::{Contacts, EventRing, Pen, Pins, Pulser, PulserState, StepQueue, Tick};
 use crate::model::{Corner, Position};
 use crate::motion::{Block, EventQueue};
-use crate::plotter::{Board, EMPTY_LOOKAHEAD, MemorySlices};
+use crate::plotter::{
+    Board, EMPTY_LOOKAHEAD, Kept, Layout, MemorySlices, NotStored, Record, Stored,
+};
 use crate::protocol::{LineReader, RealTime, Sorter};
 use core::convert::Infallible;
 use embedded_hal::digital::{ErrorType, OutputPin};
@@ -23,6 +29,9 @@ pub const PORTS: usize = 2;
 
 /// The number of slots in the queue, as many as in the smallest board's queue.
 pub const QUEUE_LENGTH: usize = 624;
+
+/// Where the records lie in the flash of this board: as on the board with the largest ones.
+pub const LAYOUT: Layout = Layout::from(0, 132 << 10);
 
 /// Allocates memory for a plotter with numbers of 16 bits: as many vertices as an element can name,
 /// and ten times the working memory that any board's jobs use. See [`lend_memory_of`].
@@ -290,6 +299,10 @@ pub struct HostBoard<'q> {
     state: &'q PulserState,
     /// The number of ticks that sending a byte takes; 0 if no baud rate is set.
     byte_ticks: u64,
+    /// The records in flash, if the board has flash.
+    kept: Option<Kept<CutFlash>>,
+    /// How long it takes to write to the flash while a job is drawn, in ticks.
+    write_ticks: u64,
 }
 
 impl core::fmt::Debug for HostBoard<'_> {
@@ -315,7 +328,31 @@ impl<'q> HostBoard<'q> {
             contacts: Contacts::default(),
             state,
             byte_ticks: 0,
+            kept: None,
+            write_ticks: 0,
         }
+    }
+
+    /// Gives the board flash, which it does not have otherwise. It keeps its records there, as
+    /// [`LAYOUT`] says.
+    pub fn set_flash(&mut self, flash: CutFlash) {
+        self.kept = Some(Kept::new(flash, LAYOUT));
+    }
+
+    /// The flash of the board, if it has one.
+    pub fn flash(&mut self) -> Option<&mut CutFlash> {
+        self.kept.as_mut().map(|kept| &mut kept.flash)
+    }
+
+    /// Takes the flash out of the board, as it is.
+    pub fn take_flash(&mut self) -> Option<CutFlash> {
+        self.kept.take().map(|kept| kept.flash)
+    }
+
+    /// Sets how long it takes, in ticks, to write to the flash while a job is drawn. Without it,
+    /// writing takes no time.
+    pub fn set_write_ticks(&mut self, ticks: u64) {
+        self.write_ticks = ticks;
     }
 
     /// Receives bytes by the first serial port. [`DAMAGED`](crate::protocol::DAMAGED) among them
@@ -406,6 +443,43 @@ impl Board for HostBoard<'_> {
 
     fn step_now(&mut self) {
         self.steps.step_now();
+    }
+
+    /// # Panics
+    /// When something moves, because a sector is erased.
+    fn save(&mut self, record: Record, parts: &[&[u8]]) -> Result<(), NotStored> {
+        assert!(self.state.is_drained(), "flash is erased while something moves");
+        self.kept.as_mut().map_or(Ok(()), |kept| kept.save(record, parts))
+    }
+
+    fn load(&mut self, record: Record, take: &mut dyn FnMut(&mut dyn Stored)) {
+        if let Some(kept) = &mut self.kept {
+            kept.load(record, take);
+        }
+    }
+
+    fn keeps_progress(&self) -> bool {
+        self.kept.is_some()
+    }
+
+    /// # Panics
+    /// When something moves, because a sector is erased.
+    fn begin_progress(&mut self, notes: &[u8], strokes: u32) -> Result<(), NotStored> {
+        assert!(self.state.is_drained(), "flash is erased while something moves");
+        self.kept.as_mut().ok_or(NotStored)?.begin_progress(notes, strokes)
+    }
+
+    /// # Panics
+    /// When a step is due meanwhile, because a board that writes to its flash delays it.
+    fn note_progress(&mut self, strokes: u32) -> Result<(), NotStored> {
+        let before = self.state.steps();
+        self.pass(self.write_ticks);
+        assert_eq!(self.state.steps(), before, "a step is due while the flash is written");
+        self.kept.as_mut().ok_or(NotStored)?.note_progress(strokes)
+    }
+
+    fn progress(&mut self, notes: &mut [u8]) -> Option<(usize, u32)> {
+        self.kept.as_mut()?.progress(notes)
     }
 
     fn microseconds(&mut self) -> u32 {

@@ -28,8 +28,36 @@ impl Machine<'_> {
         Ok(size)
     }
 
+    /// Begins to draw the rest of a path, as [`Machine::start`] does. The progress is that of the
+    /// whole path, whose size [`Machine::measure_whole`] has returned.
+    ///
+    /// # Errors
+    /// See [`MachineError`]. On an error nothing moves.
+    #[cfg(feature = "resume")]
+    pub fn start_rest(
+        &mut self,
+        rest: &mut dyn Path,
+        whole: JobSize,
+    ) -> Result<JobSize, MachineError> {
+        let size = self.start(rest)?;
+        if let Activity::Run(_) = self.activity {
+            self.progress = Progress::begin_rest(whole, size, self.runner.run());
+        }
+        Ok(size)
+    }
+
+    /// The size of a path that begins at the machine's present position.
+    ///
+    /// # Errors
+    /// See [`MachineError`].
+    #[cfg(feature = "resume")]
+    pub fn measure_whole(&self, path: &mut dyn Path) -> Result<JobSize, MachineError> {
+        self.measure(path)
+    }
+
     /// Begins a job of this size, whose moves come from `source`.
     pub(super) fn begin_job(&mut self, size: JobSize, source: Source) {
+        self.end_log();
         self.progress = Progress::begin(size, self.runner.run());
         self.reset_ink_budget();
         self.activity = Activity::Run(source);
@@ -54,6 +82,9 @@ impl Machine<'_> {
         }
         while self.activity.is_moving() {
             self.read_targets(path);
+            if self.waits_for_log() {
+                return;
+            }
             let ahead = self.runner.ticks().wrapping_sub(self.pins.ticks());
             if queue.room() < Runner::ROOM || self.is_far_enough(ahead) {
                 return;
@@ -120,6 +151,7 @@ impl Machine<'_> {
                 self.activity = Activity::Home(Homing { is_stopped: true, ..homing });
             }
             _ => {
+                self.complete_log();
                 let page = match progress {
                     RunnerProgress::Done => self.runner.page_end(),
                     _ => self.planned_position(),

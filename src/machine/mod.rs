@@ -23,6 +23,7 @@ mod settings;
 mod state;
 mod status;
 mod stream;
+mod stroke_log;
 mod tool;
 mod travel;
 
@@ -39,6 +40,7 @@ use backlash::Backlash;
 use progress::Progress;
 use segmenter::Segmenter;
 use state::{Activity, Source};
+use stroke_log::StrokeLog;
 use tool::Tool;
 
 use crate::drawing::PagePoint;
@@ -62,6 +64,8 @@ pub struct Machine<'m> {
     ahead_ticks: u32,
     /// The size of the present job, or of the last one, and how far it has come.
     progress: Progress,
+    /// How far the strokes of the job have been noted.
+    log: StrokeLog,
     /// The move that is being cut into segments, if any.
     segmenter: Option<Segmenter>,
     /// How much of its slack each motor has taken up.
@@ -103,6 +107,7 @@ impl<'m> Machine<'m> {
             origin: PagePoint::default(),
             ahead_ticks,
             progress: Progress::default(),
+            log: StrokeLog::default(),
             segmenter: None,
             slack: Backlash::default(),
             contacts: Contacts::default(),
@@ -273,6 +278,7 @@ impl<'m> Machine<'m> {
         ) {
             self.end_homing();
             self.segmenter = None;
+            self.limit_log();
             self.runner.stop();
             self.activity = Activity::Abort;
         }
@@ -282,6 +288,7 @@ impl<'m> Machine<'m> {
     /// pins stopped.
     pub fn alarm(&mut self, alarm: Alarm) {
         self.pins.halt();
+        self.end_log();
         self.end_homing();
         self.segmenter = None;
         self.forget_path(self.planned_position());
@@ -333,6 +340,20 @@ impl<'m> Machine<'m> {
             _ => return Err(self.refusal()),
         }
         self.activity = Activity::Idle;
+        Ok(())
+    }
+
+    /// Declares that the pen has been put at the page's origin by hand.
+    ///
+    /// # Errors
+    /// [`MachineError::State`] unless the machine is idle and stands.
+    #[cfg(feature = "resume")]
+    pub fn declare_origin(&mut self) -> Result<(), MachineError> {
+        if !matches!(self.activity, Activity::Idle) || !self.is_stopped() {
+            return Err(self.refusal());
+        }
+        self.slack.forget();
+        self.set_position(PagePoint::default());
         Ok(())
     }
 

@@ -21,6 +21,19 @@ impl Progress {
         Self { size, begun_at: run, is_inked: false }
     }
 
+    /// The rest of a job, of which `whole` is the size of all and `rest` that of what is left. It
+    /// begins now, when the runner's totals are `run`.
+    #[cfg(feature = "resume")]
+    pub(super) const fn begin_rest(whole: JobSize, rest: JobSize, run: RunLengths) -> Self {
+        let begun_at = RunLengths {
+            strokes: run.strokes.wrapping_sub(whole.strokes.wrapping_sub(rest.strokes)),
+            drawn: run.drawn.wrapping_sub(whole.drawn.wrapping_sub(rest.drawn)),
+            // The way from where the pen is now to the rest was not among those of the whole.
+            travelled: run.travelled.wrapping_sub(whole.travelled.saturating_sub(rest.travelled)),
+        };
+        Self { size: whole, begun_at, is_inked: false }
+    }
+
     /// Adds a move that was sent alone and is `length` long, in 2^-18 mm.
     pub(super) fn add_move(&mut self, target: Target, length: u64) {
         if target.ink.is_some() {
@@ -46,8 +59,8 @@ impl Progress {
     pub(super) const fn done(&self, run: RunLengths) -> JobSize {
         JobSize {
             strokes: run.strokes.wrapping_sub(self.begun_at.strokes),
-            drawn: run.drawn - self.begun_at.drawn,
-            travelled: run.travelled - self.begun_at.travelled,
+            drawn: run.drawn.wrapping_sub(self.begun_at.drawn),
+            travelled: run.travelled.wrapping_sub(self.begun_at.travelled),
             milliseconds: 0,
         }
     }

@@ -161,6 +161,16 @@ impl Emitter {
         self.put(self.holding(), time, queue)
     }
 
+    /// Everything stands from `time` on, as for [`Emitter::hold`], and the queue may run dry before
+    /// the next event.
+    pub(super) fn pause(
+        &mut self,
+        time: u32,
+        queue: &mut dyn EventQueue,
+    ) -> Result<u32, StepEvent> {
+        self.put(StepEvent::levels(self.level_bits() | StepEvent::AT_REST, 0), time, queue)
+    }
+
     /// If the pending event is older than 2^22 ticks, splits the wait.
     #[inline]
     pub(super) fn split_long_wait(

@@ -126,6 +126,9 @@ pub struct Runner<'m> {
     /// Where the pen was sent last; not known at the start.
     pen_height: Option<u8>,
     lift: Lift,
+    /// When the pen was last told to go up, in ticks of the events; wraps.
+    #[cfg(feature = "resume")]
+    raised_at: u32,
     stopping: bool,
     stopping_after_stroke: bool,
     /// How fast the piece in work was allowed to end, if more blocks may allow it to be faster.
@@ -178,6 +181,8 @@ impl<'m> Runner<'m> {
             pen_is_down: pen.lift.is_none().then_some(false),
             pen_height: None,
             lift: Lift::default(),
+            #[cfg(feature = "resume")]
+            raised_at: 0,
             stopping: false,
             stopping_after_stroke: false,
             hurried: None,
@@ -310,6 +315,26 @@ impl<'m> Runner<'m> {
     /// Whether the pen was last told to go down.
     pub fn pen_is_down(&self) -> bool {
         self.pen_is_down == Some(true)
+    }
+
+    /// Whether the pen was last told to go up, and the dwell for it has been planned.
+    #[cfg(feature = "resume")]
+    pub fn is_pen_up(&self) -> bool {
+        self.pen_is_down == Some(false)
+    }
+
+    /// Whether the pen is up once the pins have begun events of so many `ticks` in all.
+    #[cfg(feature = "resume")]
+    pub fn is_pen_up_at(&self, ticks: u32) -> bool {
+        self.is_pen_up() && ticks.wrapping_sub(self.raised_at).cast_signed() > 0
+    }
+
+    /// How many strokes are planned to their end; wraps.
+    #[cfg(feature = "resume")]
+    pub fn strokes_over(&self) -> u32 {
+        let next_is_travel = self.lookahead.front().is_some_and(|block| block.ink.is_none());
+        let is_over = !self.in_stroke || (self.course.is_none() && next_is_travel);
+        self.run.strokes.wrapping_sub(u32::from(!is_over))
     }
 
     /// The pen was raised by somebody else and may still be on its way.
@@ -833,13 +858,23 @@ impl<'m> Runner<'m> {
             return Ok(());
         }
         self.pen_is_down = Some(down);
-        // Two waits of up to 0.67 s: the settings allow no longer dwell.
-        let half = dwell.div_ceil(2).min(StepEvent::MAX_TICKS);
-        for _ in 0..2 {
-            self.now = self.now.wrapping_add(half << FRACTION_BITS);
-            let at = self.emitter.hold(self.now, queue)?;
-            self.advance_to(at);
+        #[cfg(feature = "resume")]
+        if !down {
+            self.raised_at = self.emitter.ticks();
         }
+        // Two waits of up to 0.67 s: the settings allow no longer dwell. With the pen raised, the
+        // queue may run dry in the second.
+        let half = dwell.div_ceil(2).min(StepEvent::MAX_TICKS);
+        self.now = self.now.wrapping_add(half << FRACTION_BITS);
+        let at = if down {
+            self.emitter.hold(self.now, queue)?
+        } else {
+            self.emitter.pause(self.now, queue)?
+        };
+        self.advance_to(at);
+        self.now = self.now.wrapping_add(half << FRACTION_BITS);
+        let at = self.emitter.hold(self.now, queue)?;
+        self.advance_to(at);
         Ok(())
     }
 

@@ -79,6 +79,38 @@ pub trait Board {
     fn load(&mut self, record: Record, take: &mut dyn FnMut(&mut dyn Stored)) {
         let _ = (record, take);
     }
+    /// Whether the board keeps how far a job has come, so that the job can go on after a loss of
+    /// power.
+    fn keeps_progress(&self) -> bool {
+        false
+    }
+    /// Begins to keep how far the job has come that was saved last: no stroke is drawn yet, of so
+    /// many. `notes` are kept with it. The call may block, so it is only made while the machine is
+    /// stopped.
+    ///
+    /// # Errors
+    /// [`NotStored`] if no job is kept, or the flash does not take it.
+    fn begin_progress(&mut self, notes: &[u8], strokes: u32) -> Result<(), NotStored> {
+        let _ = (notes, strokes);
+        Err(NotStored)
+    }
+    /// Keeps that so many strokes of the job have been drawn. The call may block for a few
+    /// milliseconds, so it is only made while the machine stands with the pen raised and no
+    /// step waits.
+    ///
+    /// # Errors
+    /// [`NotStored`] if the flash does not take it.
+    fn note_progress(&mut self, strokes: u32) -> Result<(), NotStored> {
+        let _ = strokes;
+        Err(NotStored)
+    }
+    /// Copies the notes of the job that was saved last to the front of `notes`, and goes on to keep
+    /// how far that job comes. Returns the length of the notes and the number of strokes drawn;
+    /// `None` if no drawing of that job has begun.
+    fn progress(&mut self, notes: &mut [u8]) -> Option<(usize, u32)> {
+        let _ = notes;
+        None
+    }
     /// A clock in microseconds; the count wraps. It tells how long the plotter has been idle, so it
     /// must run while [`Board::wait_briefly`] waits.
     fn microseconds(&mut self) -> u32;

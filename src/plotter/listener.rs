@@ -2,6 +2,7 @@
 //! answered, and the work can be cancelled.
 
 use super::reply::Reply;
+use super::resume::Resumption;
 use super::{Board, Strokes, report};
 use crate::index::Index;
 use crate::machine::{Path, State, Target, Value};
@@ -56,7 +57,7 @@ pub(super) struct Listener<'b, B: Board> {
 
 impl<B: Board> Cancel for Listener<'_, B> {
     fn check(&mut self) -> Result<(), Aborted> {
-        report::greet_opened(State::Run, self.board);
+        report::greet_opened(State::Run, Resumption::default(), self.board);
         let requests = self.board.take_real_time();
         if requests.has(RealTime::RESUME) {
             self.requests = RealTime::default();

@@ -12,6 +12,7 @@ mod editor;
 mod grbl;
 mod help;
 mod job;
+mod kept;
 mod listener;
 mod memory;
 mod options;
@@ -21,6 +22,7 @@ mod program;
 mod records;
 mod reply;
 mod report;
+mod resume;
 #[cfg(feature = "convex")]
 mod solid;
 mod stream;
@@ -29,6 +31,7 @@ mod title;
 pub use board::{Board, NotStored, REPLY_BYTES, Record, Stored};
 pub use help::help;
 pub use job::{Cursor, Job, Observer, Strokes, Unobserved};
+pub use kept::{Kept, Layout};
 pub use memory::{EMPTY_LOOKAHEAD, Memory, MemorySlices};
 pub use options::{
     Flag, HiddenLines, OPTIONS, PlotOption, PlotOptions, ProjectionChoice, VisibilityMode,
@@ -46,9 +49,11 @@ use crate::protocol::{
     next_number,
 };
 use crate::stage::Cancel;
+use plot::Drawing as DrawnJob;
 use program::{Parameters, Program};
 use reply::Reply;
 use report::ReportCounts;
+use resume::Resumption;
 use stream::{Listing, Progress, Task};
 
 /// The least time by which step events are planned ahead of the pins, and so the delay until a hold
@@ -64,6 +69,21 @@ pub fn run<B: Board, I: Index>(
     memory: MemorySlices<'_, I>,
     pins: &PulserState,
 ) -> ! {
+    let mut plotter = start(board, memory, pins);
+    loop {
+        if !plotter.poll(board) {
+            if plotter.inner.is_timing() { board.wait_briefly() } else { board.wait() }
+        }
+    }
+}
+
+/// Makes a plotter of what the board has kept, and greets the user, as after every reset.
+#[inline(always)] // Adds no frame to the stack while the stages run.
+pub fn start<'m, B: Board, I: Index>(
+    board: &mut B,
+    memory: MemorySlices<'m, I>,
+    pins: &'m PulserState,
+) -> Plotter<'m, I> {
     let mut plotter = Plotter::with_settings(memory, pins, records::load_settings(board));
     if board.fault().is_some() {
         plotter.inner.machine.alarm(Alarm::Restarted);
@@ -72,14 +92,12 @@ pub fn run<B: Board, I: Index>(
     // ports. It needs no second one.
     let _ = board.take_opened();
     plotter.inner.parameters = records::load_parameters(board);
+    plotter.inner.find_stopped(board);
     plotter.greet(board);
     report::fault(board);
+    plotter.inner.resumption.report(State::Idle, board);
     plotter.inner.run_startup_lines(board);
-    loop {
-        if !plotter.poll(board) {
-            if plotter.inner.is_timing() { board.wait_briefly() } else { board.wait() }
-        }
-    }
+    plotter
 }
 
 /// The whole plotter except its pins, which the board pulses.
@@ -110,6 +128,12 @@ enum Next {
     Plot,
     /// Draw the last job again (`$again`).
     Again,
+    /// Draw the rest of the job that has stopped (`$resume`).
+    #[cfg(feature = "resume")]
+    Resume {
+        /// Whether the user has put the pen at the origin.
+        at_origin: bool,
+    },
     /// Become the USB drive onto which a new firmware image is copied (`$UF2`).
     ShowDrive,
 }
@@ -138,6 +162,8 @@ struct Inner<'m, I> {
     program: Program,
     /// What stays when a program ends.
     parameters: Parameters,
+    /// What is known of the job that could go on.
+    resumption: Resumption,
     /// When the plotter last had something to do, in microseconds of the board's clock.
     busy_at: u32,
     /// When status reports next hold what they hold now and then.
@@ -182,6 +208,7 @@ impl<'m, I: Index> Plotter<'m, I> {
                 can_undo: true,
                 program: Program::default(),
                 parameters: Parameters::default(),
+                resumption: Resumption::default(),
                 busy_at: 0,
                 report_counts: ReportCounts::default(),
                 task: None,
@@ -211,6 +238,7 @@ impl<'m, I: Index> Plotter<'m, I> {
         self.act(requests, board);
         self.inner.watch(board);
         self.inner.watch_idleness(board);
+        self.inner.note_progress(board);
         let planned = self.inner.plan(board);
         if self.inner.task.is_some() {
             match self.inner.proceed(board) {
@@ -233,8 +261,12 @@ impl<'m, I: Index> Plotter<'m, I> {
         let (outcome, label) = match numbering.receive(line) {
             Received::Line(line, label) => {
                 let outcome = match self.inner.carry_out(line, board) {
-                    Ok(Next::Plot) => self.inner.plot(board, false),
-                    Ok(Next::Again) => self.inner.plot(board, true),
+                    Ok(Next::Plot) => self.inner.plot(board, DrawnJob::Model),
+                    Ok(Next::Again) => self.inner.plot(board, DrawnJob::Kept),
+                    #[cfg(feature = "resume")]
+                    Ok(Next::Resume { at_origin }) => {
+                        self.inner.plot(board, DrawnJob::Stopped { at_origin })
+                    }
                     Ok(Next::Nothing) => Ok(()),
                     Ok(Next::Reset) => {
                         resets = true;
@@ -328,7 +360,8 @@ impl<'m, I: Index> Plotter<'m, I> {
 
     /// Carries out the real-time `requests`, and whatever else does not come by a line.
     fn act<B: Board>(&mut self, requests: RealTime, board: &mut B) {
-        report::greet_opened(self.inner.machine.state(), board);
+        let state = self.inner.machine.state();
+        report::greet_opened(state, self.inner.resumption, board);
         if B::HAS_DRIVE && board.wants_drive() && self.inner.is_without_job() {
             board.show_drive();
         }
@@ -468,6 +501,11 @@ impl<I: Index> Inner<'_, I> {
             Command::Undo => self.undo()?,
             Command::Plot => return Ok(Next::Plot),
             Command::Again => return Ok(Next::Again),
+            #[cfg(feature = "resume")]
+            Command::Resume { at_origin } if board.keeps_progress() => {
+                return Ok(Next::Resume { at_origin });
+            }
+            Command::Resume { .. } => return Err(CommandError::NoJobKept),
             Command::ShowDrive if !B::HAS_DRIVE => return Err(CommandError::UnknownSystemCommand),
             Command::ShowDrive if !self.is_without_job() => return Err(CommandError::Busy),
             Command::ShowDrive => return Ok(Next::ShowDrive),

@@ -1,4 +1,5 @@
-//! `$plot` and `$again`: computes a job, or loads the kept one, and hands it to the machine.
+//! `$plot`, `$again` and `$resume`: computes a job, or loads the kept one, and hands it to the
+//! machine.
 
 use super::job::Pipeline;
 use super::listener::{Listener, MeasuredStrokes};
@@ -9,8 +10,23 @@ use crate::machine::State;
 use crate::protocol::{CommandError, RealTime};
 use crate::stage::{Cancel, Stage};
 
+/// Which job is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Drawing {
+    /// The job that is computed from the model (`$plot`).
+    Model,
+    /// The job that was kept last, from its beginning (`$again`).
+    Kept,
+    /// The rest of the job that has stopped (`$resume`).
+    #[cfg(feature = "resume")]
+    Stopped {
+        /// Whether the user has put the pen at the origin.
+        at_origin: bool,
+    },
+}
+
 impl<I: Index> Inner<'_, I> {
-    /// Computes and begins a job, or begins the kept job if `again`.
+    /// Begins a job.
     ///
     /// # Errors
     /// [`CommandError::Locked`] or [`CommandError::Busy`] if the state does not allow it, or the
@@ -19,7 +35,7 @@ impl<I: Index> Inner<'_, I> {
     pub(super) fn plot<B: Board>(
         &mut self,
         board: &mut B,
-        again: bool,
+        drawing: Drawing,
     ) -> Result<(), CommandError> {
         if !matches!(self.machine.state(), State::Idle | State::Check) {
             return Err(match self.machine.state() {
@@ -31,12 +47,26 @@ impl<I: Index> Inner<'_, I> {
         let (position, inches) = ([x, y, self.program.z()], self.in_inches());
         let requests = RealTime::default();
         let mut listener = Listener { board, position, inches, stage: Stage::View, requests };
-        let computed = if again {
-            self.load(listener.board)
-        } else {
-            self.compute(&mut listener, &mut Unobserved).map(|()| self.save(listener.board))
+        let begun = match drawing {
+            Drawing::Model => self.compute(&mut listener, &mut Unobserved).and_then(|()| {
+                let is_kept = self.save(listener.board);
+                self.begin(&mut listener)?;
+                if is_kept {
+                    let contents = [self.model.checksum(), self.options.checksum()];
+                    self.keep_progress(Some(contents), listener.board);
+                }
+                Ok(())
+            }),
+            Drawing::Kept => self.load(listener.board).and_then(|()| {
+                self.begin(&mut listener)?;
+                self.keep_progress(None, listener.board);
+                Ok(())
+            }),
+            #[cfg(feature = "resume")]
+            Drawing::Stopped { at_origin } => self
+                .load_stopped(at_origin, listener.board)
+                .and_then(|drawn| self.begin_rest(drawn, &mut listener)),
         };
-        let begun = computed.and_then(|()| self.begin(&mut listener));
         let requests = listener.requests;
         if requests.has(RealTime::EMERGENCY) {
             self.act(requests);
@@ -48,13 +78,15 @@ impl<I: Index> Inner<'_, I> {
     }
 
     /// Writes the job to flash before anything moves, because flash cannot be read during the
-    /// write.
+    /// write. Returns whether the flash keeps it.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
-    fn save<B: Board>(&self, board: &mut B) {
-        if records::save_job(&self.job, self.machine.settings(), self.words, board).is_err() {
+    fn save<B: Board>(&self, board: &mut B) -> bool {
+        let saved = records::save_job(&self.job, self.machine.settings(), self.words, board);
+        if saved.is_err() {
             Reply(board)
                 .line(format_args!("[MSG:$again will not draw this: the flash is worn out]"));
         }
+        saved.is_ok()
     }
 
     /// Loads the kept job in place of the last one.

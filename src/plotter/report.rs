@@ -2,6 +2,7 @@
 
 use super::grbl::{rate, whole};
 use super::reply::Reply;
+use super::resume::Resumption;
 use super::{Board, Inner};
 use crate::fixed::BinaryFraction;
 use crate::index::Index;
@@ -29,9 +30,9 @@ pub(super) fn greet<B: Board>(board: &mut B) {
 }
 
 /// If a program has opened a port, writes the greeting to that port alone, with the current alarm,
-/// which the other ports have already heard of.
+/// which the other ports have already heard of, and the job that has stopped.
 #[inline(never)] // Inlined, its frame would take stack while a job is computed.
-pub(super) fn greet_opened<B: Board>(state: State, board: &mut B) {
+pub(super) fn greet_opened<B: Board>(state: State, resumption: Resumption, board: &mut B) {
     if !board.take_opened() {
         return;
     }
@@ -43,6 +44,7 @@ pub(super) fn greet_opened<B: Board>(state: State, board: &mut B) {
         }
         Reply(board).line(format_args!("ALARM:{}", AlarmEntry::of(alarm).number));
     }
+    resumption.report(state, board);
     board.reply_only_to_opened(false);
 }
 
@@ -151,6 +153,7 @@ impl<I: Index> Inner<'_, I> {
             }
         }
         let (blocks, bytes) = (self.machine.free_moves(), board.receive_room());
+        let stopped = self.resumption.stopped(status.state);
         let mut reply = Reply(board);
         reply.part(format_args!("<{state}|{name}:"));
         reply.coordinates(position, inches);
@@ -201,6 +204,9 @@ impl<I: Index> Inner<'_, I> {
         }
         if self.machine.underruns() != 0 {
             reply.part(format_args!("|Late:{}", self.machine.underruns()));
+        }
+        if let Some([done, all]) = stopped {
+            reply.part(format_args!("|Stopped:{done}/{all}"));
         }
         let (done, all) = (status.done, status.job);
         reply.part(format_args!("|Strokes:{}/{}", done.strokes, all.strokes));

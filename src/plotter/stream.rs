@@ -128,6 +128,7 @@ impl<I: Index> Inner<'_, I> {
         if alarm != self.alarm_reported {
             self.alarm_reported = alarm;
             if let Some(alarm) = alarm {
+                self.resumption.lose_position();
                 board.step_now();
                 Reply(board).line(format_args!("ALARM:{}", AlarmEntry::of(alarm).number));
             }
@@ -207,7 +208,11 @@ impl<I: Index> Inner<'_, I> {
                 let settings = *settings;
                 Ok(Progress::Done(self.keep(settings, board)))
             }
-            Some(Task::Dwell(_) | Task::Home) if is_stopped => Ok(Progress::Done(Ok(()))),
+            Some(Task::Home) if is_stopped => {
+                self.resumption.find_position();
+                Ok(Progress::Done(Ok(())))
+            }
+            Some(Task::Dwell(_)) if is_stopped => Ok(Progress::Done(Ok(()))),
             Some(_) => Ok(Progress::Waits),
             None => Ok(Progress::Done(Ok(()))),
         }

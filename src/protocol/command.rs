@@ -94,6 +94,11 @@ pub enum Command<'a> {
     Plot,
     /// `$again`: draws the last job again.
     Again,
+    /// `$resume`: goes on with the job that has stopped.
+    Resume {
+        /// Whether the user has put the pen at the origin by hand: `$resume=origin`.
+        at_origin: bool,
+    },
     /// `$X`: unlocks the plotter after an alarm, or wakes it.
     Unlock,
     /// `$H`: looks for the limit switches.
@@ -144,6 +149,8 @@ pub const HELP: [&[(&str, &str)]; 2] = [
         ("$undo", "take back the last change of the model, unless a plot came after"),
         ("$plot", "draw it"),
         ("$again", "draw the last job again, also after a loss of power"),
+        ("$resume", "go on with the job that a loss of power or a reset stopped, after $H"),
+        ("$resume=origin", "the same where you have put the pen at the origin by hand"),
         ("$X", "unlock after an alarm"),
         ("$H", "find the limit switches"),
         ("$J=G91 X.. Y.. F..", "move by hand with the pen up, F is needed; byte 0x85 ends it"),
@@ -228,6 +235,12 @@ impl<'a> Command<'a> {
         let text = trim(text.get(..comment.next().unwrap_or(text.len())).unwrap_or(text));
         if let Some((name, value)) = text.split_once('=') {
             let (name, value) = (trim(name), trim(value));
+            if name == "resume" {
+                return match value {
+                    "origin" => Ok(Self::Resume { at_origin: true }),
+                    _ => Err(CommandError::NotAChoice { choices: &["origin"] }),
+                };
+            }
             if let Some(command) = parse_edit(name, value)? {
                 return Ok(command);
             }
@@ -244,6 +257,7 @@ impl<'a> Command<'a> {
             "undo" => Ok(Self::Undo),
             "plot" => Ok(Self::Plot),
             "again" => Ok(Self::Again),
+            "resume" => Ok(Self::Resume { at_origin: false }),
             "" => Ok(Self::Help),
             _ => Err(CommandError::UnknownSystemCommand),
         }

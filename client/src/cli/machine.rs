@@ -70,6 +70,22 @@ pub struct PauseArgs {
     pub plotter: PlotterArgs,
 }
 
+/// Options of `penup resume`.
+#[derive(Debug, Args)]
+#[command(after_help = format!(
+    "A job that a loss of power or a reset has stopped goes on at the stroke that was being drawn. \
+     The machine is homed first, by `penup home`; without limit switches put the pen at the origin \
+     by hand and say so by --at-origin.\n\nKeys: {KEYS}, and Ctrl-C leaves the plotter drawing."
+))]
+pub struct ResumeArgs {
+    /// The pen has been put at the origin of the page by hand
+    #[arg(long)]
+    pub at_origin: bool,
+    /// The plotter.
+    #[command(flatten)]
+    pub plotter: PlotterArgs,
+}
+
 /// Options of `penup jog`.
 #[derive(Debug, Args)]
 pub struct JogArgs {

@@ -2,7 +2,7 @@
 
 use super::status::{as_json, described};
 use super::{converse, open};
-use crate::cli::{JogArgs, PauseArgs, PenArgs, PenPosition, PlotterArgs, WatchArgs};
+use crate::cli::{JogArgs, PauseArgs, PenArgs, PenPosition, PlotterArgs, ResumeArgs, WatchArgs};
 use crate::error::Error;
 use crate::interrupt::MovingPlotter;
 use crate::outcome::Outcome;
@@ -40,13 +40,24 @@ pub fn pause(args: &PauseArgs, interrupt: &AtomicBool) -> Result<Outcome, Error>
     })
 }
 
-/// Lets a machine that holds, or that waits for a pen, go on.
+/// Lets a machine that holds, or that waits for a pen, go on. If a loss of power or a reset has
+/// stopped a job, goes on with it and follows it.
 ///
 /// # Errors
-/// See [`Sender::resume`].
-pub fn resume(args: &PlotterArgs, interrupt: &AtomicBool) -> Result<Outcome, Error> {
-    let status = join(args, interrupt, |sender| sender.resume())?;
-    Ok(done("it goes on", &status))
+/// See [`Sender::resume`] and [`Sender::go_on`].
+pub fn resume(args: &ResumeArgs, is_quiet: bool, interrupt: &AtomicBool) -> Result<Outcome, Error> {
+    let mut link = open(&args.plotter.port)?;
+    let (mut sender, status) = Sender::join(&mut link, Patience::default(), interrupt)?;
+    if status.is_holding() || status.stopped.is_none() {
+        return Ok(done("it goes on", &sender.resume()?));
+    }
+    let _moving = MovingPlotter::new();
+    link.obey_keys();
+    let mut progress = progress(args.plotter.format.json, is_quiet);
+    let mut sender = Sender::open(&mut link, Patience::default(), interrupt)?;
+    let drawn = sender.go_on(args.at_origin, progress.as_mut()).and_then(|()| sender.status());
+    sender.end();
+    Ok(done("the rest of the job is drawn", &drawn?))
 }
 
 /// Gives up what the machine does.

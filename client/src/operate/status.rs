@@ -44,6 +44,7 @@ pub(super) fn as_json(status: &Status) -> Value {
         "standing": status.is_standing,
         "position_mm": position,
         "strokes": of(status.strokes),
+        "stopped": of(status.stopped),
         "ink_mm": of(status.ink),
         "seconds_left": status.seconds_left,
         "computing": status.stage,
@@ -63,6 +64,11 @@ pub(super) fn described(status: &Status) -> String {
     let mut lines = vec![in_words(status)];
     if let [x, y, ..] = coordinates(status)[..] {
         lines.push(format!("the pen is at {x}, {y} mm"));
+    }
+    if let Some((done, all)) = status.stopped {
+        lines.push(format!(
+            "a job has stopped after {done} of {all} strokes: `penup resume` goes on with it"
+        ));
     }
     if let Some((done, all)) = status.strokes.filter(|(_, all)| *all > 0) {
         lines.push(format!("{done} of {all} strokes are drawn"));

@@ -6,7 +6,9 @@ use crate::error::Error;
 use crate::lines::{JobLine, Lines};
 use crate::link::{Answer, Order};
 use crate::progress::{Progress, Quiet};
-use crate::protocol::{AGAIN, FASTER, HOLD, MODEL, PLOT, RESUME, Reply, SLOWER, Status};
+use crate::protocol::{
+    AGAIN, FASTER, GO_ON, GO_ON_AT_ORIGIN, HOLD, MODEL, PLOT, RESUME, Reply, SLOWER, Status,
+};
 use crate::results::JobReport;
 use std::time::Instant;
 
@@ -63,7 +65,22 @@ impl Sender<'_> {
     /// # Errors
     /// As [`Sender::plot`].
     pub fn again(&mut self, progress: &mut dyn Progress) -> Result<(), Error> {
-        let lines = [JobLine::command(AGAIN)];
+        self.draw_kept(AGAIN, progress)
+    }
+
+    /// Goes on with the job that a loss of power or a reset has stopped, and waits until the machine
+    /// is idle. With `at_origin` the user has put the pen at the origin by hand.
+    ///
+    /// # Errors
+    /// As [`Sender::plot`].
+    pub fn go_on(&mut self, at_origin: bool, progress: &mut dyn Progress) -> Result<(), Error> {
+        self.draw_kept(if at_origin { GO_ON_AT_ORIGIN } else { GO_ON }, progress)
+    }
+
+    /// Begins to draw a job that the plotter keeps by `command`, and waits until the machine is
+    /// idle.
+    fn draw_kept(&mut self, command: &str, progress: &mut dyn Progress) -> Result<(), Error> {
+        let lines = [JobLine::command(command)];
         self.deliver(&lines, &mut Quiet)?;
         self.follow_drawing(Some(&lines), progress)?;
         self.confirm(&lines, self.done - 1)

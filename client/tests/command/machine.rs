@@ -1,6 +1,7 @@
 //! The commands for the machine, with the plotter's own library at a serial port.
 
 use super::*;
+use penup::boards::host::{CutFlash, LAYOUT};
 use penup_client::link::Link as _;
 use penup_client::preview::InMemory;
 use penup_client::room::Room;
@@ -20,6 +21,8 @@ struct Library {
     drawing: Arc<AtomicBool>,
     /// Its time passes a tenth as fast.
     slow: Arc<AtomicBool>,
+    /// Its power is cut, and comes back.
+    cut: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -31,14 +34,20 @@ impl Library {
         drop(terminal);
         let unplug = Arc::new(AtomicBool::new(false));
         let (drawing, slow) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
+        let cut = Arc::new(AtomicBool::new(false));
         let (unplugged, draws, is_slow) = (unplug.clone(), drawing.clone(), slow.clone());
+        let is_cut = cut.clone();
         let thread = std::thread::spawn(move || {
-            let settings = penup::machine::Settings::default();
-            let room = Room::of_board(&penup::board_table::PICO);
-            let mut plotter = InMemory::<u16>::new(room, settings);
+            let room = || Room::of_board(&penup::board_table::PICO);
+            let flash = CutFlash::new(LAYOUT.end() as usize);
+            let mut plotter = InMemory::<u16>::with_flash(room(), flash);
             let mut heard = Vec::new();
             let mut buffer = [0; 64];
             while !unplugged.load(Ordering::Relaxed) {
+                if is_cut.swap(false, Ordering::Relaxed) {
+                    let flash = plotter.cut_power().expect("it has flash");
+                    plotter = InMemory::with_flash(room(), flash.powered());
+                }
                 // An error says that the program does not hold its end.
                 if let Ok(count) = wire.read(&mut buffer) {
                     plotter.send(&buffer[..count]).expect("memory");
@@ -53,7 +62,7 @@ impl Library {
                 std::thread::sleep(Duration::from_millis(pause));
             }
         });
-        Self { device, unplug, drawing, slow, thread: Some(thread) }
+        Self { device, unplug, drawing, slow, cut, thread: Some(thread) }
     }
 
     /// Runs a command that finds this plotter by itself.
@@ -186,15 +195,60 @@ fn settings_are_saved_changed_and_restored() {
     assert!(error.starts_with("penup: bad.toml: [settings] holds speed"), "{error}");
 }
 
+/// Writes a job of twelve metres, four minutes of the plotter's time, to rows.obj.
+fn write_rows(folder: &Path) {
+    let rows: String = (0..120).map(|row| format!("v 50 {0} 0\nv 150 {0} 0\n", 50 + row)).collect();
+    let lines: String =
+        (0..120).map(|row| format!("l {} {}\n", 2 * row + 1, 2 * row + 2)).collect();
+    fs::write(folder.join("rows.obj"), rows + &lines).expect("written");
+}
+
+#[test]
+fn a_job_goes_on_after_a_loss_of_power() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plotter = Library::new();
+    write_rows(folder.path());
+    let mut client = Command::new(env!("CARGO_BIN_EXE_penup"))
+        .args(["plot", "rows.obj", "--port", &plotter.device])
+        .current_dir(folder.path())
+        .stdout(std::process::Stdio::null())
+        .stderr(std::process::Stdio::null())
+        .spawn()
+        .expect("the program runs");
+    while !plotter.drawing.load(Ordering::Relaxed) {
+        assert_eq!(client.try_wait().expect("a state"), None, "it ended before the drawing");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    client.kill().expect("killed");
+    client.wait().expect("it ends");
+    // It draws some strokes before its power is cut.
+    let strokes = |status: &serde_json::Value| status["strokes"]["done"].as_u64().unwrap_or(0);
+    while strokes(&plotter.json(folder.path(), &["status"]).1) < 3 {}
+    plotter.cut.store(true, Ordering::Relaxed);
+    while plotter.cut.load(Ordering::Relaxed) {}
+    let run = |arguments: &[&str]| plotter.run(folder.path(), arguments);
+    let (_, said, _) = run(&["status"]);
+    assert!(said.contains("a job has stopped after "), "{said}");
+    let (code, _, error) = run(&["resume"]);
+    assert_eq!(code, Some(4), "{error}");
+    assert!(error.contains("penup resume --at-origin"), "{error}");
+    let (code, stopped) = plotter.json(folder.path(), &["status"]);
+    let drawn = stopped["stopped"]["done"].as_u64().expect("a number");
+    assert_eq!((code, &stopped["stopped"]["all"]), (Some(0), &120.into()));
+    assert!((2..120).contains(&drawn), "{stopped}");
+    let (code, said, error) = run(&["resume", "--at-origin"]);
+    assert_eq!((code, said.as_str()), (Some(0), "the rest of the job is drawn\n"), "{error}");
+    let (_, drawn) = plotter.json(folder.path(), &["status"]);
+    assert_eq!(drawn["strokes"], serde_json::json!({ "done": 120, "all": 120 }));
+    assert_eq!(drawn["stopped"], serde_json::Value::Null);
+    assert!(run(&["resume"]).2.contains("nothing to resume"));
+}
+
 #[test]
 fn a_job_goes_on_without_its_client_and_is_joined_again() {
     let folder = tempfile::tempdir().expect("a folder");
     let plotter = Library::new();
-    // Twelve metres, four minutes of the plotter's time.
-    let rows: String = (0..120).map(|row| format!("v 50 {0} 0\nv 150 {0} 0\n", 50 + row)).collect();
-    let lines: String =
-        (0..120).map(|row| format!("l {} {}\n", 2 * row + 1, 2 * row + 2)).collect();
-    fs::write(folder.path().join("rows.obj"), rows + &lines).expect("written");
+    write_rows(folder.path());
     let mut client = Command::new(env!("CARGO_BIN_EXE_penup"))
         .args(["plot", "rows.obj", "--port", &plotter.device])
         .current_dir(folder.path())

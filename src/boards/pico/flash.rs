@@ -13,11 +13,11 @@ use core::fmt::Write;
 use core::ptr;
 
 use embedded_storage::nor_flash::{
-    ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
+    ErrorType, MultiwriteNorFlash, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
 };
 use heapless::String;
-use penup::plotter::Record;
-use penup::storage::{PAGE_BYTES, Slots};
+use penup::plotter::Layout;
+use penup::storage::PAGE_BYTES;
 use rp2040_hal::rom_data;
 
 use super::registers::{Get, IO_QSPI, Put, SSI};
@@ -33,23 +33,9 @@ const END: u32 = ROW.flash.size as u32;
 const SECTOR_BYTES: usize = 4096;
 /// Room for all of the working memory, with a page before it and less than a sector of figures.
 const JOB_BYTES: u32 = (128 << 10) + SECTOR_BYTES as u32;
-
-/// Returns where in the flash a record is kept.
-pub const fn slots(record: Record) -> Slots {
-    match record {
-        Record::Settings => Slots { start: START, bytes: SECTOR_BYTES as u32 },
-        Record::Parameters => {
-            Slots { start: START + 0x2000 + 2 * JOB_BYTES, bytes: SECTOR_BYTES as u32 }
-        }
-        Record::Job => Slots { start: START + 0x2000, bytes: JOB_BYTES },
-    }
-}
-const _: () = {
-    assert!(
-        slots(Record::Job).start + 2 * slots(Record::Job).bytes <= slots(Record::Parameters).start
-    );
-    assert!(slots(Record::Parameters).start + 2 * slots(Record::Parameters).bytes <= END);
-};
+/// Where in the flash each record lies.
+pub const LAYOUT: Layout = Layout::from(START, JOB_BYTES);
+const _: () = assert!(LAYOUT.end() == END);
 
 /// The flash in which records are kept. Addresses count from its beginning.
 pub struct Flash(());
@@ -250,18 +236,26 @@ impl NorFlash for Flash {
         if (from..to).all(|at| byte_at(at) == 0xFF) { Ok(()) } else { Err(Worn) }
     }
 
-    /// Writes whole pages in the same part of the flash.
+    /// Writes whole pages in the same part of the flash. Bits that are clear stay clear.
     fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Worn> {
         for (to, bytes) in (offset..).step_by(PAGE_BYTES).zip(bytes.chunks_exact(PAGE_BYTES)) {
             if (START..END).contains(&to) {
                 let mut page = [0; PAGE_BYTES];
                 page.copy_from_slice(bytes);
+                // What is expected afterwards.
+                let mut expected = [0; PAGE_BYTES];
+                for ((at, byte), expected) in (to..).zip(bytes).zip(&mut expected) {
+                    *expected = byte_at(at) & byte;
+                }
                 self.work(Work::Write { to, page: &page });
+                if (to..).zip(expected).all(|(at, byte)| byte_at(at) == byte) {
+                    continue;
+                }
             }
-            if !(to..).zip(bytes).all(|(at, &byte)| byte_at(at) == byte) {
-                return Err(Worn);
-            }
+            return Err(Worn);
         }
         Ok(())
     }
 }
+
+impl MultiwriteNorFlash for Flash {}

@@ -42,7 +42,7 @@ use cortex_m::peripheral::Peripherals as Core;
 use penup::board_table::{self as table, BoardRow};
 use penup::machine::{Contacts, PulserState};
 use penup::motion::{Block, EventQueue};
-use penup::plotter::{Board, Memory, MemorySlices, NotStored, Record, Stored};
+use penup::plotter::{Board, Kept, Memory, MemorySlices, NotStored, Record, Stored};
 use penup::protocol::RealTime;
 use rp2040_hal::clocks::init_clocks_and_plls;
 use rp2040_hal::fugit::ExtU32;
@@ -79,8 +79,8 @@ pub struct Pico {
     ports: Ports,
     /// The main loop's end of the queue of step events.
     steps: steps::Steps,
-    /// The flash in which records are kept.
-    flash: flash::Flash,
+    /// The records in flash.
+    kept: Kept<flash::Flash>,
     /// The fault after which the board restarted, if any.
     fault: Option<emergency::Cause>,
 }
@@ -138,7 +138,8 @@ pub fn take() -> (Pico, MemorySlices<'static>, &'static PulserState) {
         Start::Rescue(cause) => rescue::run(ports, &cause),
     };
     let memory = MEMORY.take().lend(BLOCKS.take());
-    let board = Pico { ports, steps, flash, fault };
+    let kept = Kept::new(flash, flash::LAYOUT);
+    let board = Pico { ports, steps, kept, fault };
     (board, memory, &steps::STATE)
 }
 
@@ -216,17 +217,27 @@ impl Board for Pico {
     }
 
     fn save(&mut self, record: Record, parts: &[&[u8]]) -> Result<(), NotStored> {
-        let mut writer = flash::slots(record).write(&mut self.flash).map_err(|_| NotStored)?;
-        for part in parts {
-            writer.write(part).map_err(|_| NotStored)?;
-        }
-        writer.finish().map_err(|_| NotStored)
+        self.kept.save(record, parts)
     }
 
     fn load(&mut self, record: Record, take: &mut dyn FnMut(&mut dyn Stored)) {
-        if let Some(mut state) = flash::slots(record).latest(&mut self.flash) {
-            take(&mut state);
-        }
+        self.kept.load(record, take);
+    }
+
+    fn keeps_progress(&self) -> bool {
+        true
+    }
+
+    fn begin_progress(&mut self, notes: &[u8], strokes: u32) -> Result<(), NotStored> {
+        self.kept.begin_progress(notes, strokes)
+    }
+
+    fn note_progress(&mut self, strokes: u32) -> Result<(), NotStored> {
+        self.kept.note_progress(strokes)
+    }
+
+    fn progress(&mut self, notes: &mut [u8]) -> Option<(usize, u32)> {
+        self.kept.progress(notes)
     }
 
     fn wait(&mut self) {

@@ -14,6 +14,9 @@ pub struct Cursor<I = u16> {
     at: Option<I>,
     /// The pen of the segment that is being handed over, from 0.
     pen: u8,
+    /// Index in the tour of the segment with which the path begins.
+    #[cfg(feature = "resume")]
+    first: usize,
 }
 
 /// The strokes of a job, as the [`Path`] that the machine follows. A pen-up move is inserted
@@ -51,6 +54,35 @@ impl<I: Index> Path for Strokes<'_, I> {
     }
 
     fn rewind(&mut self) {
+        *self.cursor = Cursor {
+            #[cfg(feature = "resume")]
+            leg: self.cursor.first,
+            #[cfg(feature = "resume")]
+            first: self.cursor.first,
+            ..Cursor::default()
+        };
+    }
+}
+
+#[cfg(feature = "resume")]
+impl<I: Index> Strokes<'_, I> {
+    /// Lets the path begin with this stroke, counted from 0 as the machine counts them. Returns
+    /// whether there is such a stroke; if not, the path is at its end.
+    pub fn begin_at(&mut self, stroke: u32) -> bool {
         *self.cursor = Cursor::default();
+        let (mut inked, mut pen, mut strokes) = (false, 0, 0u32);
+        loop {
+            let first = self.cursor.leg;
+            let Some(Target { ink, .. }) = self.next_target() else { return false };
+            // A change of the pen begins a new stroke.
+            if ink.is_some() && (!inked || self.pen() != pen) {
+                if strokes == stroke {
+                    *self.cursor = Cursor { leg: first, first, ..Cursor::default() };
+                    return true;
+                }
+                strokes += 1;
+            }
+            (inked, pen) = (ink.is_some(), self.pen());
+        }
     }
 }

@@ -17,8 +17,10 @@ pub use samples::{error_entries, error_samples};
 use super::BlockError;
 use crate::convex::SolidError;
 use crate::drawing::PageError;
+#[cfg(feature = "resume")]
+use crate::fixed::BinaryFraction;
 use crate::host_only::HostOnly;
-use crate::machine::{MachineError, SettingError};
+use crate::machine::{MachineError, Setting, SettingError, Value};
 use crate::model::ModelError;
 use crate::order::Leg;
 use crate::stage::OutOfScratch;
@@ -125,6 +127,22 @@ pub enum CommandError {
     NoJobKept,
     /// The kept job was computed for other steps per millimetre.
     OtherSteps,
+    /// No job has stopped that could go on.
+    NothingToResume,
+    /// The position of the pen is not known, so a job cannot go on.
+    PositionUnknown,
+    /// The job that has stopped was begun by another version of the firmware.
+    OtherVersion,
+    /// A setting has changed that decides where ink falls, so the job that has stopped cannot go
+    /// on.
+    OtherSetting {
+        /// The setting that has changed.
+        setting: Setting,
+        /// The value that it had when the job began.
+        before: Value,
+    },
+    /// The model is not that of the job that has stopped.
+    OtherModel,
     /// The line's checksum does not match its bytes.
     Damaged,
     /// Another line must come first.
@@ -341,6 +359,68 @@ impl CommandError {
                     .client("the kept job is counted in other steps"),
                 format_args!("set $100 and $101 as they were, or $plot anew"),
             ),
+            #[cfg(feature = "resume")]
+            Self::NothingToResume => row(
+                error(163, "no job has stopped")
+                    .client("no job has stopped: there is nothing to go on with"),
+                format_args!("no job has stopped: $again draws the last one from its beginning"),
+            ),
+            #[cfg(feature = "resume")]
+            Self::PositionUnknown => row(
+                error(164, "the plotter does not know where the pen is").client(
+                    "the plotter does not know where the pen is: `penup home` finds it; without \
+                     limit switches put the pen at the origin by hand, then `penup resume \
+                     --at-origin`",
+                ),
+                format_args!(
+                    "$H finds the pen; without limit switches put it at the origin by hand, then \
+                     $resume=origin"
+                ),
+            ),
+            #[cfg(feature = "resume")]
+            Self::OtherVersion => row(
+                error(165, "the job was begun by another version of the firmware").client(
+                    "the firmware has changed since the job began: `penup again` draws it from \
+                     its beginning",
+                ),
+                format_args!(
+                    "the firmware has changed since the job began: $again draws it from its \
+                     beginning"
+                ),
+            ),
+            #[cfg(feature = "resume")]
+            Self::OtherSetting { setting, before } => row(
+                error(166, "a setting has changed since the job began").client(
+                    "a setting has changed since the job began that decides where ink falls: set \
+                     it back, or begin anew by `penup again`",
+                ),
+                format_args!(
+                    "${0} has changed since the job began: set ${0}={1}, or begin anew by $again",
+                    setting.info().number,
+                    BinaryFraction {
+                        units: before.to_bits().into(),
+                        fraction_bits: 16,
+                        decimals: 3
+                    }
+                ),
+            ),
+            #[cfg(feature = "resume")]
+            Self::OtherModel => row(
+                error(167, "the model is not that of the job").client(
+                    "the plotter holds another model than that of the job: `penup plot` begins \
+                     anew with a model of yours",
+                ),
+                format_args!(
+                    "another model came since the job began: $clear, then $resume, or begin anew \
+                     by $plot"
+                ),
+            ),
+            #[cfg(not(feature = "resume"))]
+            Self::NothingToResume
+            | Self::PositionUnknown
+            | Self::OtherVersion
+            | Self::OtherSetting { .. }
+            | Self::OtherModel => Self::NoJobKept.explain(row),
             Self::Damaged => row(
                 error(170, "checksum does not match").client(
                     "a line was damaged on its way: check the cable, and keep it away from the \

@@ -1,0 +1,203 @@
+//! Jobs on the board in memory whose power fails, and the ink that they leave on the paper.
+
+use penup::boards::host::{CutFlash, HostBoard, LAYOUT, PORTS, QUEUE_LENGTH, Stamped};
+use penup::machine::{EventRing, PulserState};
+use penup::model::{Corner, Position};
+use penup::plotter::{Board, EMPTY_LOOKAHEAD, MemorySlices, Plotter, start};
+use penup::protocol::LineReader;
+use penup_client::emulator::{Machine, MachineEventKind};
+use penup_client::pins::PinChange;
+use std::collections::BTreeSet;
+
+/// A point of the page in steps.
+pub type Point = (i32, i32);
+
+/// Creates the erased flash of a board in memory.
+pub fn empty_flash() -> CutFlash {
+    CutFlash::new(LAYOUT.end() as usize)
+}
+
+/// A plotter that runs until its power fails.
+pub struct Powered<'s, 'm> {
+    /// Its board.
+    pub board: &'s mut HostBoard<'m>,
+    /// Its firmware.
+    pub plotter: &'s mut Plotter<'m>,
+}
+
+impl Powered<'_, '_> {
+    /// Returns the output since the last call.
+    pub fn heard(&mut self) -> String {
+        String::from_utf8_lossy(&self.board.take_sent()).replace("\r\n", "\n")
+    }
+
+    /// Whether the power has failed while the flash was written.
+    pub fn is_cut(&mut self) -> bool {
+        self.board.flash().is_some_and(|flash| flash.is_cut)
+    }
+
+    /// Sends a line, runs the plotter until it has read the line, and returns its output.
+    pub fn say(&mut self, line: &str) -> String {
+        self.send(&format!("{line}\n"));
+        self.heard()
+    }
+
+    /// Sends bytes, and runs the plotter until it has read them.
+    pub fn send(&mut self, bytes: &str) {
+        self.board.receive(bytes.as_bytes());
+        while self.plotter.poll(self.board) || !self.board.has_read_all() {}
+    }
+
+    /// Sends lines, each of which must be accepted, unless the power fails.
+    ///
+    /// # Panics
+    /// Panics if one is refused.
+    pub fn order(&mut self, lines: &[String]) {
+        for line in lines {
+            let answer = self.say(line);
+            if self.is_cut() {
+                return;
+            }
+            assert_eq!(answer.lines().last(), Some("ok"), "{line}: {answer}");
+        }
+    }
+
+    /// Runs for this many milliseconds, or until nothing moves any more, or until the power fails
+    /// while the flash is written. Returns how many passed.
+    pub fn run(&mut self, milliseconds: u64) -> u64 {
+        for passed in 0..milliseconds {
+            let busy = self.plotter.poll(self.board);
+            if self.is_cut() || (!busy && self.plotter.machine().is_stopped()) {
+                return passed;
+            }
+            self.board.wait();
+        }
+        milliseconds
+    }
+
+    /// Runs until the job has ended.
+    ///
+    /// # Panics
+    /// Panics if it does not end within an hour of the plotter's time.
+    pub fn finish(&mut self) -> u64 {
+        let passed = self.run(3_600_000);
+        assert!(passed < 3_600_000, "the job does not end");
+        passed
+    }
+
+    /// The status report.
+    pub fn status(&mut self) -> String {
+        self.heard();
+        self.send("?");
+        self.heard()
+    }
+}
+
+/// Switches a board with this flash on, lets `work` use it, and cuts the power. Returns the flash
+/// as it is then, and the changes of the pins.
+///
+/// # Panics
+/// Panics if `work` takes the board's flash away.
+pub fn switch_on(
+    flash: CutFlash,
+    work: impl FnOnce(&mut Powered<'_, '_>),
+) -> (CutFlash, Vec<Stamped>) {
+    let mut vertices = vec![Position::ORIGIN; 1024];
+    let mut corners = vec![<Corner>::ZERO; 4096];
+    let mut blocks = EMPTY_LOOKAHEAD;
+    let mut words = vec![0; 1 << 14];
+    let mut readers = [const { LineReader::new() }; PORTS];
+    let mut ring = EventRing::<QUEUE_LENGTH>::new();
+    let pins = PulserState::new();
+    let mut board = HostBoard::new(&mut ring, &pins);
+    board.set_flash(flash);
+    // A millisecond, which is more than a page takes typically.
+    board.set_write_ticks(25_000);
+    let memory = MemorySlices {
+        vertices: &mut vertices,
+        corners: &mut corners,
+        blocks: &mut blocks,
+        words: &mut words,
+        readers: &mut readers,
+    };
+    let mut plotter = start(&mut board, memory, &pins);
+    work(&mut Powered { board: &mut board, plotter: &mut plotter });
+    let changes = board.trace().changes();
+    (board.take_flash().expect("the board has flash"), changes)
+}
+
+/// The strokes that the pins have drawn: the points of the pen while it was down, beginning at the
+/// origin.
+pub fn strokes_of(changes: impl IntoIterator<Item = PinChange>) -> Vec<Vec<Point>> {
+    let mut machine = Machine::default();
+    let mut events: Vec<MachineEventKind> = changes
+        .into_iter()
+        .filter_map(|change| machine.change(change))
+        .map(|event| event.kind)
+        .collect();
+    events.extend(machine.last().map(|event| event.kind));
+    let (mut at, mut is_down, mut strokes) = ((0, 0), false, Vec::<Vec<Point>>::new());
+    for event in events {
+        match event {
+            MachineEventKind::Pen { down } => {
+                is_down = down;
+                if down {
+                    strokes.push(vec![at]);
+                }
+            }
+            MachineEventKind::Step { x, y } => {
+                at = (at.0 + i32::from(x), at.1 + i32::from(y));
+                if let Some(stroke) = strokes.last_mut().filter(|_| is_down) {
+                    stroke.push(at);
+                }
+            }
+            _ => {}
+        }
+    }
+    strokes.retain(|stroke| stroke.len() > 1);
+    strokes
+}
+
+/// The ink of strokes: each step with the pen down, whichever way it went and however often.
+pub fn ink<'a>(strokes: impl IntoIterator<Item = &'a Vec<Point>>) -> BTreeSet<[Point; 2]> {
+    let mut ink = BTreeSet::new();
+    for stroke in strokes {
+        for pair in stroke.windows(2) {
+            let &[from, to] = pair else { continue };
+            ink.insert([from.min(to), from.max(to)]);
+        }
+    }
+    ink
+}
+
+/// Checks that the strokes of the runs of a job, one after the other, are those of the `whole` job:
+/// each run begins with the stroke that was interrupted in the run before, or with the one behind
+/// the last, and no stroke is missing. Returns how many strokes were drawn twice.
+///
+/// # Panics
+/// Panics if they are not.
+pub fn assert_one_drawing(whole: &[Vec<Point>], runs: &[Vec<Vec<Point>>]) -> usize {
+    let (mut next, mut twice) = (0, 0);
+    for (number, run) in runs.iter().enumerate() {
+        let Some(first) = run.first() else { continue };
+        let begins = |index: usize| whole.get(index).is_some_and(|s| s.starts_with(first));
+        if !begins(next) {
+            assert!(next > 0 && begins(next - 1), "run {number} begins elsewhere than at {next}");
+            next -= 1;
+            twice += 1;
+        }
+        for (index, stroke) in run.iter().enumerate() {
+            let planned = &whole[next];
+            let is_last = index + 1 == run.len();
+            assert!(
+                planned == stroke || (is_last && planned.starts_with(stroke)),
+                "run {number}: stroke {next} is another one"
+            );
+            next += 1;
+        }
+    }
+    assert_eq!(next, whole.len(), "strokes are missing");
+    let drawn = ink(runs.iter().flatten());
+    assert_eq!(drawn, ink(whole), "the ink differs");
+    twice
+}

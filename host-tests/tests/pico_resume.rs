@@ -1,0 +1,177 @@
+//! Tests jobs of the emulated Raspberry Pi Pico that go on after a loss of power, a reset and a
+//! fault, judged by the ink that the pins leave.
+#![cfg(feature = "emulator")]
+
+use penup::board_table::PICO;
+use penup_client::emulator::{EmulatedBoard as _, Pico, PinChange, image_path};
+use penup_host_tests::cut_jobs::{Point, assert_one_drawing, ink, strokes_of};
+use penup_host_tests::emulated_jobs::{Line, bench_like};
+use penup_host_tests::random::Random;
+use penup_host_tests::whole_jobs::job_lines;
+use std::error::Error;
+use std::time::Duration;
+
+type TestResult = Result<(), Box<dyn Error>>;
+
+/// What the pins have drawn in one run.
+type Run = Vec<Vec<Point>>;
+
+/// How the board is stopped in the middle of a job.
+#[derive(Debug, Clone, Copy)]
+enum Cut {
+    /// The power is cut at any time.
+    Power,
+    /// The power is cut while a page of the log is written.
+    InFlash,
+    /// The pin RUN resets the board.
+    Reset,
+    /// The program hangs, and the watchdog restarts the board.
+    Hang,
+}
+
+/// The lines of the job, with such a dwell of the pen in milliseconds.
+fn job(dwell: &str) -> Vec<String> {
+    let dwells = ["$212", "$213"].map(|setting| format!("{setting}={dwell}"));
+    let options = ["$page=45x45", "$margin=3", "$hidden=erased"];
+    let settings: Vec<&str> = dwells.iter().map(String::as_str).chain(options).collect();
+    job_lines("lattice2.obj", &settings)
+}
+
+/// The changes of the pins on the host, which keeps nothing, for these lines.
+fn on_the_host(lines: &[String]) -> Vec<PinChange> {
+    let mut bench = bench_like(&PICO);
+    for line in lines {
+        bench.say(&format!("{line}\n"));
+    }
+    bench.finish();
+    bench.board.trace().changes().iter().map(PinChange::from).collect()
+}
+
+/// The time from the first step to the last one.
+fn duration(changes: &[PinChange]) -> Duration {
+    let mut steps = changes.iter().filter(|change| change.is_step()).map(|change| change.at);
+    let first = steps.next().unwrap_or_default();
+    steps.next_back().unwrap_or_default().saturating_sub(first)
+}
+
+/// The number of strokes of the field of a status report with this name, as done and all.
+fn strokes(status: &str, name: &str) -> Option<(u32, u32)> {
+    let (_, rest) = status.split_once(name)?;
+    let (done, all) = rest.split(['|', '>']).next()?.split_once('/')?;
+    Some((done.parse().ok()?, all.parse().ok()?))
+}
+
+/// Sends a line and returns the last line of the answer.
+fn ask(line: &mut Line<Pico>, text: &str) -> Result<String, Box<dyn Error>> {
+    let mut answer = line.ask(text)?;
+    while answer.starts_with('[') {
+        answer = line.hear()?;
+    }
+    Ok(answer)
+}
+
+/// Waits until the board draws stroke number `stroke`, or is idle. Returns whether it is idle.
+fn wait_for(line: &mut Line<Pico>, stroke: u32) -> Result<bool, Box<dyn Error>> {
+    loop {
+        let status = line.status()?;
+        if status.starts_with("<Idle") {
+            return Ok(true);
+        }
+        if strokes(&status, "|Strokes:").is_some_and(|(done, _)| done >= stroke) {
+            return Ok(false);
+        }
+    }
+}
+
+/// Draws a job on the emulated board, which is stopped in each of these ways, and returns what the
+/// pins draw in each run.
+fn draw_with_cuts(lines: &[String], cuts: &[Cut]) -> Result<Vec<Run>, Box<dyn Error>> {
+    let mut random = Random::new(1801);
+    let mut line = Line::to(Box::new(Pico::start(&image_path("pico"))?))?;
+    for text in lines {
+        assert_eq!(ask(&mut line, text)?, "ok", "{text}");
+    }
+    let all = strokes(&line.status()?, "|Strokes:").ok_or("no job")?.1;
+    let mut runs = Vec::new();
+    for (number, cut) in (1..).zip(cuts) {
+        let stroke = all * number / (cuts.len() as u32 + 1);
+        assert!(!wait_for(&mut line, stroke)?, "the job is over before cut {number}");
+        match cut {
+            Cut::Power => {
+                line.emulator.cut_power_after(Duration::from_micros(random.below(300_000)))?;
+            }
+            Cut::InFlash => line.emulator.cut_power_in_flash(1 + random.below(254))?,
+            Cut::Reset => line.emulator.pull_run_low()?,
+            Cut::Hang => line.emulator.hang()?,
+        }
+        line.hear_greeting()?;
+        let mut message = line.hear()?;
+        if matches!(cut, Cut::Hang) {
+            assert!(message.contains("the program hung"), "{message}");
+            message = line.hear()?;
+        }
+        let expected = "[MSG:a job stopped at stroke ";
+        assert!(message.starts_with(expected), "after {cut:?}: {message}");
+        if matches!(cut, Cut::Hang) {
+            while !line.hear()?.starts_with("ALARM:101") {}
+            assert_eq!(ask(&mut line, "$resume")?, "error:9");
+            while !line.unlock()? {}
+        }
+        let (done, found) = strokes(&line.status()?, "|Stopped:").ok_or("no job has stopped")?;
+        assert!(found == all && done + 1 >= stroke, "{done} of {found}, after {stroke} of {all}");
+        runs.push(strokes_of(line.emulator.pin_changes()?));
+        // Nobody has said yet where the pen is.
+        assert_eq!(ask(&mut line, "$resume")?, "error:164");
+        assert_eq!(ask(&mut line, "$resume=origin")?, "ok");
+    }
+    wait_for(&mut line, u32::MAX)?;
+    runs.push(strokes_of(line.emulator.pin_changes()?));
+    assert_eq!(ask(&mut line, "$resume")?, "error:163");
+    let late = line.status()?.contains("|Late:");
+    assert!(!late, "the queue ran empty while the machine moved");
+    Ok(runs)
+}
+
+#[test]
+fn a_job_goes_on_after_a_cut_a_reset_and_a_fault() -> TestResult {
+    let lines = job("30");
+    let whole = strokes_of(on_the_host(&lines));
+    let cuts = [Cut::Power, Cut::InFlash, Cut::Reset, Cut::Hang, Cut::Power];
+    let runs = draw_with_cuts(&lines, &cuts)?;
+    let twice = assert_one_drawing(&whole, &runs);
+    assert!(twice <= cuts.len());
+    assert_eq!(ink(runs.iter().flatten()), ink(&whole));
+    Ok(())
+}
+
+/// Prints how long it takes to write to the flash while a job is drawn, and by how much that delays
+/// the job.
+#[test]
+fn a_page_is_written_behind_each_stroke() -> TestResult {
+    for dwell in ["150", "30", "1"] {
+        let lines = job(dwell);
+        let image = image_path("pico");
+        let mut line = Line::to(Box::new(Pico::start(&image)?))?;
+        for text in &lines {
+            assert_eq!(ask(&mut line, text)?, "ok", "{text}");
+        }
+        line.emulator.time_function(&image, "5flash5Flash4work", 0)?;
+        wait_for(&mut line, u32::MAX)?;
+        let timed = line.emulator.take_timed();
+        let cycles: Vec<u64> = timed.iter().map(|(_, cycles)| *cycles).collect();
+        let (changes, planned) = (line.emulator.pin_changes()?, on_the_host(&lines));
+        let [took, planned_time] = [&changes, &planned].map(|changes| duration(changes));
+        eprintln!(
+            "dwell {dwell} ms: {} pages, at most {:?} cycles; {took:?}, planned {planned_time:?}",
+            cycles.len(),
+            cycles.iter().max(),
+        );
+        let drawn = strokes_of(changes);
+        // Pulses for the servo come every 20 ms, so with less the pin shows the pen late.
+        assert!(dwell == "1" || drawn == strokes_of(planned), "other strokes");
+        // The first ones may have been written before the functions were timed.
+        assert!(cycles.len() + 1 >= drawn.len(), "{} {}", cycles.len(), drawn.len());
+        assert!(!line.status()?.contains("|Late:"), "the queue ran empty while steps were due");
+    }
+    Ok(())
+}

@@ -1,0 +1,411 @@
+//! Jobs that go on after a loss of power, judged by the ink that the pins leave.
+
+#![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
+
+use penup::boards::host::{CutFlash, LAYOUT};
+use penup::storage::NOTE_BYTES;
+use penup_client::pins::PinChange;
+use penup_host_tests::cut_jobs::{
+    Point, Powered, assert_one_drawing, empty_flash, ink, strokes_of, switch_on,
+};
+use penup_host_tests::random::Random;
+use penup_host_tests::whole_jobs::{Bench, job_lines};
+
+/// A pen that takes little time, so that the tests do not either.
+const QUICK_PEN: [&str; 2] = ["$212=20", "$213=20"];
+
+/// What the pins have drawn: each time that the pen was down is a list of points.
+type Run = Vec<Vec<Point>>;
+
+/// The lines of a job of many strokes.
+fn lattice(hidden: &str) -> Vec<String> {
+    let options = ["$page=60x60", "$margin=5", hidden];
+    job_lines("lattice2.obj", &[&QUICK_PEN[..], &options].concat())
+}
+
+/// The lines of a small job.
+fn cube() -> Vec<String> {
+    job_lines("cube.obj", &[&QUICK_PEN[..], &["$page=20x20", "$margin=4"]].concat())
+}
+
+/// Draws a job without a cut. Returns its strokes, how long it takes in milliseconds, and how many
+/// bytes of flash change.
+fn undisturbed(lines: &[String]) -> (Run, u64, usize) {
+    let flash = CutFlash { budget: usize::MAX / 2, ..empty_flash() };
+    let mut passed = 0;
+    let (flash, changes) = switch_on(flash, |plotter| {
+        plotter.order(lines);
+        passed = plotter.finish();
+        assert!(!plotter.status().contains("Stopped"), "{}", plotter.status());
+        assert!(plotter.say("$resume").ends_with("error:163\n"));
+    });
+    let strokes = strokes_of(changes.iter().map(PinChange::from));
+    (strokes, passed, usize::MAX / 2 - flash.budget)
+}
+
+/// Goes on with the job that has stopped. Returns whether there was one.
+fn go_on(plotter: &mut Powered<'_, '_>) -> bool {
+    let greeting = plotter.heard();
+    let answer = plotter.say("$resume");
+    if answer.ends_with("error:163\n") {
+        assert!(!greeting.contains("stopped"), "{greeting}");
+        return false;
+    }
+    assert!(greeting.contains("[MSG:a job stopped at stroke "), "{greeting}");
+    // Nobody has said yet where the pen is.
+    assert!(answer.ends_with("error:164\n"), "{answer}");
+    let answer = plotter.say("$resume=origin");
+    assert!(plotter.is_cut() || answer == "ok\n", "{answer}");
+    true
+}
+
+/// Draws a job and cuts the power `cuts` times, at random instants of the time that it takes, or
+/// while a random byte of the flash is written. Returns the strokes of the whole job and those of
+/// each run.
+fn draw_with_cuts(lines: &[String], cuts: usize, random: &mut Random) -> (Run, Vec<Run>) {
+    let (whole, milliseconds, _) = undisturbed(lines);
+    let strokes = whole.len() as u64;
+    let mut flash = empty_flash();
+    let mut runs: Vec<Run> = Vec::new();
+    for number in 0..=cuts {
+        let is_last = number == cuts;
+        // Most cuts leave enough for the rest.
+        let after = random.below(2 * milliseconds / (cuts as u64 + 1) + 1);
+        let in_flash = !is_last && random.once_in(3);
+        let (left, changes) = switch_on(flash.powered(), |plotter| {
+            let goes_on = go_on(plotter);
+            if in_flash {
+                let budget = random.below(256 * (2 * strokes / (cuts as u64 + 1) + 1)) as usize;
+                plotter.board.flash().expect("flash").budget = budget;
+            }
+            if !goes_on {
+                // A cut before the job has begun, or behind its end.
+                if runs.iter().any(|run| !run.is_empty()) {
+                    return;
+                }
+                plotter.order(lines);
+            }
+            if is_last || in_flash {
+                plotter.finish();
+            } else {
+                plotter.run(after);
+            }
+        });
+        flash = left;
+        runs.push(strokes_of(changes.iter().map(PinChange::from)));
+    }
+    (whole, runs)
+}
+
+#[test]
+fn a_job_that_is_cut_ten_times_arrives_as_one_drawing() {
+    let lines = lattice("$hidden=erased");
+    let mut twice = 0;
+    for seed in 0..6 {
+        let (whole, runs) = draw_with_cuts(&lines, 10, &mut Random::new(1971 + seed));
+        twice += assert_one_drawing(&whole, &runs);
+    }
+    // A cut comes in the middle of a stroke more often than not.
+    assert!(twice > 10, "{twice}");
+}
+
+#[test]
+fn dotted_lines_are_drawn_again_from_their_beginning() {
+    let lines = lattice("$hidden=dotted");
+    for seed in 0..3 {
+        let (whole, runs) = draw_with_cuts(&lines, 10, &mut Random::new(1975 + seed));
+        assert!(whole.len() > 100, "there are dots");
+        assert_eq!(ink(runs.iter().flatten()), ink(&whole));
+    }
+}
+
+#[test]
+fn after_a_cut_at_any_of_a_thousand_instants_the_drawing_is_whole() {
+    let lines = cube();
+    let mut random = Random::new(1834);
+    let mut cuts = 0;
+    while cuts < 1000 {
+        let more = 1 + random.below(3) as usize;
+        let (whole, runs) = draw_with_cuts(&lines, more, &mut random);
+        assert_one_drawing(&whole, &runs);
+        cuts += more;
+    }
+}
+
+/// Cuts the power before each of these bytes of flash, counted from the beginning of a job, and
+/// goes on or begins anew.
+fn cut_before_bytes(lines: &[String], offsets: impl Iterator<Item = usize>) {
+    let (whole, ..) = undisturbed(lines);
+    for budget in offsets {
+        let (flash, changes) = switch_on(CutFlash { budget, ..empty_flash() }, |plotter| {
+            plotter.order(lines);
+            plotter.finish();
+        });
+        assert!(flash.is_cut, "{budget}");
+        let mut runs = vec![strokes_of(changes.iter().map(PinChange::from))];
+        let (_, changes) = switch_on(flash.powered(), |plotter| {
+            if !go_on(plotter) {
+                if runs.contains(&whole) {
+                    return;
+                }
+                assert!(runs.iter().all(Vec::is_empty), "the job is lost: cut before {budget}");
+                plotter.order(lines);
+            }
+            plotter.finish();
+        });
+        runs.push(strokes_of(changes.iter().map(PinChange::from)));
+        assert_one_drawing(&whole, &runs);
+    }
+}
+
+/// The settings of the pen are saved first. Then the job is erased and written, then its log.
+#[test]
+fn after_a_cut_at_the_borders_of_all_pages_the_drawing_is_whole() {
+    let lines = cube();
+    let (_, _, bytes) = undisturbed(&lines);
+    let borders = (0..bytes).step_by(256).flat_map(|at| at.saturating_sub(1)..=at + 1);
+    cut_before_bytes(&lines, borders.filter(|at| *at < bytes));
+}
+
+/// The last pages that are written are the page at the front of the log, and one for each stroke.
+#[test]
+fn after_a_cut_before_any_byte_of_the_log_the_drawing_is_whole() {
+    let lines = cube();
+    let (whole, _, bytes) = undisturbed(&lines);
+    let log = 256 * (1 + whole.len());
+    // The front, the first stroke, and the last.
+    let front = bytes - log;
+    cut_before_bytes(&lines, (front..front + 2 * 256).chain(bytes - 256..bytes));
+}
+
+/// A board with this flash, on which the power fails once 5 strokes are drawn.
+fn cut_after_five_strokes(lines: &[String]) -> (CutFlash, Run) {
+    let (flash, changes) = switch_on(empty_flash(), |plotter| {
+        plotter.order(lines);
+        for _ in 0..60_000 {
+            plotter.run(1);
+            if plotter.plotter.machine().status().done.strokes == 6 {
+                break;
+            }
+        }
+        assert_eq!(plotter.plotter.machine().status().done.strokes, 6);
+        plotter.run(30);
+    });
+    (flash, strokes_of(changes.iter().map(PinChange::from)))
+}
+
+#[test]
+fn flash_that_returns_garbage_once_loses_nothing() {
+    let lines = lattice("$hidden=erased");
+    let (flash, _) = cut_after_five_strokes(&lines);
+    let reads = |flash: CutFlash| {
+        let mut greeting = String::new();
+        let (flash, _) = switch_on(flash, |plotter| greeting = plotter.heard());
+        (greeting, flash.garbage_after)
+    };
+    let many = 1 << 40;
+    let (greeting, left) = reads(CutFlash { garbage_after: Some(many), ..flash.clone() });
+    let count = many - left.expect("there are fewer reads");
+    assert!(greeting.contains("a job stopped at stroke 6 of "), "{greeting}");
+    assert!(count > 100, "{count}");
+    for number in 0..count {
+        let garbled = CutFlash { garbage_after: Some(number), ..flash.clone() };
+        let (found, left) = reads(garbled);
+        assert_eq!((found, left), (greeting.clone(), None), "garbage at read {number}");
+    }
+}
+
+#[test]
+fn garbage_while_a_job_goes_on_loses_nothing() {
+    let lines = lattice("$hidden=erased");
+    let (whole, ..) = undisturbed(&lines);
+    let (flash, before) = cut_after_five_strokes(&lines);
+    let mut random = Random::new(7);
+    for _ in 0..30 {
+        let (_, changes) = switch_on(flash.clone(), |plotter| {
+            plotter.heard();
+            let reads = random.below(1000) as usize;
+            plotter.board.flash().expect("flash").garbage_after = Some(reads);
+            assert_eq!(plotter.say("$resume=origin"), "ok\n");
+            plotter.finish();
+        });
+        assert_one_drawing(
+            &whole,
+            &[before.clone(), strokes_of(changes.iter().map(PinChange::from))],
+        );
+    }
+}
+
+#[test]
+fn what_the_job_depends_on_must_be_as_it_was() {
+    let lines = lattice("$hidden=erased");
+    let (whole, ..) = undisturbed(&lines);
+    let (flash, before) = cut_after_five_strokes(&lines);
+    let (flash, changes) = switch_on(flash, |plotter| {
+        plotter.heard();
+        // A setting that decides where ink falls.
+        let deviant = [("$3=1", "$3=0"), ("$101=81", "$101=80"), ("$220=2", "$220=1")];
+        for (other, same) in deviant {
+            assert_eq!(plotter.say(other), "ok\n");
+            let answer = plotter.say("$resume=origin");
+            assert!(answer.contains(&format!("set {same}.000")), "{answer}");
+            assert!(answer.ends_with("error:166\n"), "{answer}");
+            assert_eq!(plotter.say(same), "ok\n");
+        }
+        // Speeds do not.
+        assert_eq!(plotter.say("$201=2000"), "ok\n");
+        // Another model, and then the same one.
+        let model: Vec<String> =
+            lines.iter().filter(|line| !line.starts_with('$')).cloned().collect();
+        plotter.order(&model);
+        plotter.order(&["v 9 9 9".to_owned()]);
+        assert!(plotter.say("$resume=origin").ends_with("error:167\n"));
+        plotter.order(&["$clear".to_owned()]);
+        plotter.order(&model);
+        assert!(plotter.status().contains("|Stopped:5/"), "{}", plotter.status());
+        assert_eq!(plotter.say("$resume=origin"), "ok\n");
+        plotter.finish();
+        assert!(!plotter.status().contains("Stopped"));
+    });
+    let after = strokes_of(changes.iter().map(PinChange::from));
+    assert_one_drawing(&whole, &[before, after]);
+    // It is not drawn twice.
+    switch_on(flash, |plotter| {
+        let greeting = plotter.heard();
+        assert!(!greeting.contains("stopped"), "{greeting}");
+        assert!(plotter.say("$resume").ends_with("error:163\n"));
+    });
+}
+
+#[test]
+fn another_version_of_the_firmware_does_not_go_on() {
+    let (mut flash, _) = cut_after_five_strokes(&lattice("$hidden=erased"));
+    let (slot, sum) = LAYOUT.job.identify(&mut flash).expect("a job");
+    let log = LAYOUT.logs[slot];
+    let mut notes = [0; NOTE_BYTES];
+    let (length, strokes) = log.read(&mut flash, sum, &mut notes).expect("a log");
+    notes[4] ^= 1;
+    log.begin(&mut flash, sum, &notes[..length]).expect("it is taken");
+    log.note(&mut flash, 0, strokes).expect("it is taken");
+    switch_on(flash, |plotter| {
+        let greeting = plotter.heard();
+        assert!(greeting.contains("a job stopped at stroke 6 of "), "{greeting}");
+        let answer = plotter.say("$resume=origin");
+        assert!(answer.ends_with("error:165\n"), "{answer}");
+        assert_eq!(plotter.say("$again"), "ok\n");
+    });
+}
+
+#[test]
+fn a_job_that_is_given_up_or_stopped_in_an_emergency_can_go_on() {
+    let lines = lattice("$hidden=erased");
+    let (whole, ..) = undisturbed(&lines);
+    let (_, changes) = switch_on(empty_flash(), |plotter| {
+        plotter.order(&lines);
+        plotter.run(4000);
+        plotter.board.receive(&[0x18]);
+        plotter.finish();
+        assert!(plotter.status().contains("|Stopped:"), "{}", plotter.status());
+        // The position is still known.
+        assert_eq!(plotter.say("$resume"), "ok\n");
+        plotter.run(2000);
+        let status = plotter.status();
+        assert!(status.starts_with("<Run") && !status.contains("Stopped"), "{status}");
+        plotter.board.receive(&[0x18]);
+        plotter.finish();
+        plotter.heard();
+        assert_eq!(plotter.say("$J=G91 X5 F2000"), "ok\n");
+        plotter.finish();
+        assert_eq!(plotter.say("$resume"), "ok\n");
+        plotter.finish();
+    });
+    let drawn = strokes_of(changes.iter().map(PinChange::from));
+    assert_eq!(ink(&drawn), ink(&whole));
+    assert!(drawn.len() <= whole.len() + 2, "{} {}", drawn.len(), whole.len());
+    // After an emergency stop nobody knows where the pen is.
+    switch_on(empty_flash(), |plotter| {
+        plotter.order(&lines);
+        plotter.run(4000);
+        plotter.board.receive(&[0xFD]);
+        plotter.run(500);
+        assert!(plotter.say("$resume").ends_with("error:9\n"));
+        assert!(plotter.say("$X").ends_with("ok\n"));
+        assert!(plotter.say("$resume").ends_with("error:164\n"));
+        assert_eq!(plotter.say("$resume=origin"), "ok\n");
+        assert!(
+            plotter.status().contains("WCO:0.000,0.000") || plotter.status().starts_with("<Run")
+        );
+    });
+}
+
+#[test]
+fn pens_are_asked_for_after_a_cut() {
+    let pens = ["usemtl pen1", "l 1 2", "usemtl pen2", "l 3 4", "l 5 6"];
+    let vertices = ["v 0 0 0", "v 9 0 0", "v 0 3 0", "v 9 3 0", "v 0 6 0", "v 9 6 0"];
+    let options = ["$212=20", "$213=20", "$page=20x20", "$margin=2", "$plot"];
+    let lines: Vec<String> =
+        vertices.iter().chain(&pens).chain(&options).map(|line| (*line).to_owned()).collect();
+    let (flash, first) = switch_on(empty_flash(), |plotter| {
+        plotter.order(&lines);
+        plotter.finish();
+        assert!(plotter.heard().contains("put in pen 2"));
+        plotter.send("~");
+        for _ in 0..60_000 {
+            plotter.run(1);
+            if plotter.plotter.machine().status().done.strokes == 3 {
+                break;
+            }
+        }
+        plotter.run(300);
+    });
+    let (_, second) = switch_on(flash, |plotter| {
+        let greeting = plotter.heard();
+        assert!(greeting.contains("stopped at stroke 3 of 3"), "{greeting}");
+        assert_eq!(plotter.say("$resume=origin"), "ok\n");
+        plotter.finish();
+        // Which pen is in the holder is not known.
+        assert!(plotter.heard().contains("put in pen 2"));
+        plotter.send("~");
+        plotter.finish();
+    });
+    let strokes = [first, second].map(|changes| strokes_of(changes.iter().map(PinChange::from)));
+    assert_eq!(strokes.each_ref().map(Vec::len), [3, 1]);
+    assert!(strokes[1][0].starts_with(&strokes[0][2]));
+}
+
+#[test]
+fn boards_without_flash_refuse_it() {
+    let mut bench = Bench::new();
+    assert!(bench.say("$resume\n").ends_with("error:161\n"));
+    assert!(bench.say("$resume=origin\n").ends_with("error:161\n"));
+    assert!(bench.say("$resume=here\n").ends_with("error:105\n"));
+}
+
+/// Each job erases each sector once at most, and every other job uses the other slot, so that flash
+/// that can be erased 100,000 times lasts for 200,000 jobs.
+#[test]
+fn a_job_erases_each_sector_once_in_two_jobs() {
+    let lines = cube();
+    let (flash, _) = switch_on(empty_flash(), |plotter| {
+        plotter.order(&lines);
+        plotter.finish();
+        for _ in 0..9 {
+            plotter.heard();
+            assert_eq!(plotter.say("$plot"), "ok\n");
+            plotter.finish();
+        }
+    });
+    let settings = 2;
+    let most = flash.erasures[settings..].iter().max().expect("sectors");
+    assert_eq!(*most, 5);
+    // Drawn again, a job is not saved anew, and only its log is erased.
+    let before = flash.erasures.clone();
+    let (flash, _) = switch_on(flash, |plotter| {
+        plotter.heard();
+        assert_eq!(plotter.say("$again"), "ok\n");
+        plotter.finish();
+    });
+    let more: Vec<usize> =
+        (0..before.len()).filter(|sector| flash.erasures[*sector] != before[*sector]).collect();
+    assert_eq!(more, [LAYOUT.logs[1].start as usize / 4096]);
+}

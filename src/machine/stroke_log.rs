@@ -1,0 +1,130 @@
+//! Which strokes of a job have been drawn at the pins, so that a board can keep it.
+//!
+//! While it is on, the machine plans nothing behind a stroke before that stroke has been noted. It
+//! stands there with the pen raised, in the dwell that follows each stroke anyway, and no step
+//! waits in the queue. So the board may write to its flash, which stops everything else for a
+//! moment.
+
+use super::Machine;
+#[cfg(feature = "resume")]
+use super::state::{Activity, Source};
+
+/// How far the strokes of the job have been noted.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct StrokeLog {
+    /// What is noted; `None` while nothing is to be noted.
+    #[cfg(feature = "resume")]
+    open: Option<Open>,
+}
+
+/// How far the strokes of a job have been noted. All counts are those of the motion planner.
+#[cfg(feature = "resume")]
+#[derive(Debug, Clone, Copy)]
+struct Open {
+    /// The number of strokes at the beginning of the job.
+    begin: u32,
+    /// The number of strokes that were noted.
+    noted: u32,
+    /// Once the job is given up, the number of strokes drawn by then: the one in which it was given
+    /// up is not drawn.
+    most: Option<u32>,
+    /// Whether all strokes of the job have been planned to their end.
+    is_whole: bool,
+}
+
+#[cfg(feature = "resume")]
+impl Machine<'_> {
+    /// Lets the machine wait after each stroke of the job that has just begun until it is noted.
+    /// Call it after [`Machine::start`] or [`Machine::start_rest`].
+    pub fn log_strokes(&mut self) {
+        let drawn = self.progress.done(self.runner.run()).strokes;
+        let noted = self.runner.strokes_over();
+        let begin = noted.wrapping_sub(drawn);
+        self.log.open = Some(Open { begin, noted, most: None, is_whole: false });
+    }
+
+    /// Whether strokes are being noted.
+    pub fn logs_strokes(&self) -> bool {
+        self.log.open.is_some()
+    }
+
+    /// Whether the machine waits with the pen raised until the stroke before has been noted.
+    pub(super) fn waits_for_log(&self) -> bool {
+        self.log.open.is_some_and(|open| self.strokes_over(open) != open.noted)
+            && self.runner.is_pen_up()
+    }
+
+    /// The number of strokes that are planned to their end, as the motion planner counts them.
+    fn strokes_over(&self, open: Open) -> u32 {
+        open.most.unwrap_or(self.runner.strokes_over())
+    }
+
+    /// If the pins have just drawn a stroke of the job and stand with the pen raised: how many
+    /// strokes of the job are drawn. [`Machine::stroke_noted`] lets the machine go on.
+    pub fn stroke_to_note(&self) -> Option<u32> {
+        let open = self.log.open?;
+        let over = self.strokes_over(open);
+        let stands = self.runner.is_pen_up_at(self.pins.ticks());
+        // Strokes shorter than a step of the motors are none for the motion planner, so the end of
+        // the path counts.
+        let is_end = open.is_whole && self.is_stopped();
+        let strokes =
+            if is_end { self.progress.size().strokes } else { over.wrapping_sub(open.begin) };
+        (is_end || (stands && over != open.noted)).then_some(strokes)
+    }
+
+    /// What [`Machine::stroke_to_note`] said has been noted.
+    pub fn stroke_noted(&mut self) {
+        let Some(open) = self.log.open else { return };
+        let is_over = open.is_whole || open.most.is_some();
+        let noted = self.strokes_over(open);
+        self.log.open = (!is_over).then_some(Open { noted, ..open });
+    }
+
+    /// Stops noting strokes.
+    pub fn end_log(&mut self) {
+        self.log.open = None;
+    }
+
+    /// The job is given up, so the stroke in which that happens is not drawn to its end.
+    pub(super) fn limit_log(&mut self) {
+        let over = self.runner.strokes_over();
+        if let Some(open) = &mut self.log.open {
+            if open.noted == over {
+                self.log.open = None;
+            } else {
+                open.most = Some(over);
+            }
+        }
+    }
+
+    /// The path was planned to its end.
+    pub(super) fn complete_log(&mut self) {
+        let is_end = matches!(
+            self.activity,
+            Activity::Run(Source::PathEnd) | Activity::Hold { source: Source::PathEnd, .. }
+        );
+        if let Some(open) = self.log.open.as_mut().filter(|_| is_end) {
+            open.is_whole = true;
+        }
+    }
+}
+
+/// Without the feature, no stroke is noted.
+#[cfg(not(feature = "resume"))]
+impl Machine<'_> {
+    /// Whether the machine waits until the stroke before has been noted: never.
+    pub(super) const fn waits_for_log(&self) -> bool {
+        let StrokeLog {} = self.log;
+        false
+    }
+
+    /// Stops noting strokes.
+    pub(super) const fn end_log(&mut self) {}
+
+    /// The job is given up.
+    pub(super) const fn limit_log(&mut self) {}
+
+    /// The path was planned to its end.
+    pub(super) const fn complete_log(&mut self) {}
+}

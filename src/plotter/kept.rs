@@ -1,0 +1,140 @@
+//! What a board with flash keeps through a loss of power: the records, and how far the job has
+//! come.
+//!
+//! A board owns a [`Kept`] and passes its calls of [`Board`](super::Board) on to it.
+
+use super::{NotStored, Record, Stored};
+use crate::storage::{Log, Slots};
+use embedded_storage::nor_flash::MultiwriteNorFlash;
+
+/// Where in the flash each record lies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Layout {
+    /// The settings of the machine.
+    pub settings: Slots,
+    /// The coordinate systems, startup lines and texts.
+    pub parameters: Slots,
+    /// The strokes of the last job.
+    pub job: Slots,
+    /// How far the job has come: a log for each of the job's two slots.
+    pub logs: [Log; 2],
+}
+
+/// The unit in which flash is erased, in bytes.
+const SECTOR_BYTES: u32 = 4096;
+
+impl Layout {
+    /// The layout of a part of flash that begins at `start`, for jobs of at most `job_bytes`: the
+    /// settings, the jobs, the parameters, and the logs, each in whole sectors. It must not change,
+    /// because a new version of the firmware finds what an older one has kept.
+    pub const fn from(start: u32, job_bytes: u32) -> Self {
+        let settings = Slots { start, bytes: SECTOR_BYTES };
+        let job = Slots { start: settings.end(), bytes: job_bytes };
+        let parameters = Slots { start: job.end(), bytes: SECTOR_BYTES };
+        let first = Log { start: parameters.end(), bytes: SECTOR_BYTES };
+        let second = Log { start: first.start + first.bytes, ..first };
+        Self { settings, parameters, job, logs: [first, second] }
+    }
+
+    /// Where the part of flash ends.
+    pub const fn end(&self) -> u32 {
+        let [_, last] = self.logs;
+        last.start + last.bytes
+    }
+
+    /// Returns where the two slots of a record lie.
+    const fn slots(&self, record: Record) -> Slots {
+        match record {
+            Record::Settings => self.settings,
+            Record::Parameters => self.parameters,
+            Record::Job => self.job,
+        }
+    }
+}
+
+/// The log that is written while a job is drawn.
+#[derive(Debug, Clone, Copy)]
+struct OpenLog {
+    /// Where it lies in the flash.
+    log: Log,
+    /// How many strokes are noted in it.
+    strokes: u32,
+}
+
+/// The records in the flash `F`.
+#[derive(Debug)]
+pub struct Kept<F> {
+    /// The flash.
+    pub flash: F,
+    /// Where in it each record lies.
+    layout: Layout,
+    /// The log of the job that is being drawn, or that could go on.
+    open: Option<OpenLog>,
+}
+
+impl<F: MultiwriteNorFlash> Kept<F> {
+    /// The records that lie in `flash` as `layout` says.
+    pub const fn new(flash: F, layout: Layout) -> Self {
+        Self { flash, layout, open: None }
+    }
+
+    /// Carries out [`Board::save`](super::Board::save).
+    ///
+    /// # Errors
+    /// [`NotStored`]; the last state is still kept.
+    pub fn save(&mut self, record: Record, parts: &[&[u8]]) -> Result<(), NotStored> {
+        if record == Record::Job {
+            self.open = None;
+        }
+        let slots = self.layout.slots(record);
+        let mut writer = slots.write(&mut self.flash).map_err(|_| NotStored)?;
+        for part in parts {
+            writer.write(part).map_err(|_| NotStored)?;
+        }
+        writer.finish().map_err(|_| NotStored)
+    }
+
+    /// Carries out [`Board::load`](super::Board::load).
+    pub fn load(&mut self, record: Record, take: &mut dyn FnMut(&mut dyn Stored)) {
+        if let Some(mut state) = self.layout.slots(record).latest(&mut self.flash) {
+            take(&mut state);
+        }
+    }
+
+    /// Carries out [`Board::begin_progress`](super::Board::begin_progress).
+    ///
+    /// # Errors
+    /// [`NotStored`] if no job is kept, if the log cannot hold so many strokes, or if the flash does
+    /// not take it.
+    pub fn begin_progress(&mut self, notes: &[u8], strokes: u32) -> Result<(), NotStored> {
+        self.open = None;
+        let (slot, sum) = self.layout.job.identify(&mut self.flash).ok_or(NotStored)?;
+        let log = *self.layout.logs.get(slot).ok_or(NotStored)?;
+        if strokes > log.limit() {
+            return Err(NotStored);
+        }
+        log.begin(&mut self.flash, sum, notes).map_err(|_| NotStored)?;
+        self.open = Some(OpenLog { log, strokes: 0 });
+        Ok(())
+    }
+
+    /// Carries out [`Board::note_progress`](super::Board::note_progress).
+    ///
+    /// # Errors
+    /// [`NotStored`] if no log is open or the flash does not take it.
+    pub fn note_progress(&mut self, strokes: u32) -> Result<(), NotStored> {
+        let open = self.open.as_mut().ok_or(NotStored)?;
+        open.log.note(&mut self.flash, open.strokes, strokes).map_err(|_| NotStored)?;
+        open.strokes = open.strokes.max(strokes);
+        Ok(())
+    }
+
+    /// Carries out [`Board::progress`](super::Board::progress).
+    pub fn progress(&mut self, notes: &mut [u8]) -> Option<(usize, u32)> {
+        let (slot, sum) = self.layout.job.identify(&mut self.flash)?;
+        let log = *self.layout.logs.get(slot)?;
+        let (length, strokes) = log.read(&mut self.flash, sum, notes)?;
+        self.open = Some(OpenLog { log, strokes });
+        Some((length, strokes))
+    }
+}

@@ -1,0 +1,145 @@
+//! The log of a record: how far the work that the record describes has come.
+//!
+//! A log lies in sectors of its own. [`Log::begin`] erases them and writes a page at their front;
+//! from then on [`Log::note`] clears one bit after the other, each by a write of one page, so that
+//! nothing has to be erased while the work goes on. The number of bits that are clear, from the
+//! first one on, is how far it has come.
+//!
+//! The first page begins with four words in little-endian order: a mark, the checksum of the state
+//! to which the log belongs, the length of the notes in bytes, and the CRC-32 of these three and
+//! the notes. The notes follow. A log whose first page is not whole has not begun.
+
+use super::{PAGE_BYTES, StorageError, read_surely, words};
+use crate::checksum::Crc32;
+use embedded_storage::nor_flash::{MultiwriteNorFlash, ReadNorFlash};
+
+/// The number at the beginning of a log, by which one that has begun is known.
+const MARK: u32 = u32::from_le_bytes(*b"log1");
+/// The size of the words before the notes, in bytes.
+const HEADER_BYTES: usize = 16;
+/// The most bytes of notes that a log holds.
+pub const NOTE_BYTES: usize = PAGE_BYTES - HEADER_BYTES;
+/// How many bytes of bits are read at a time.
+const PIECE_BYTES: usize = 32;
+
+/// Where a log lies in flash.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Log {
+    /// Offset of the log in bytes: a multiple of the flash's erase size.
+    pub start: u32,
+    /// Size of the log in bytes: also a multiple of the erase size.
+    pub bytes: u32,
+}
+
+impl Log {
+    /// The number of bits that can be cleared.
+    pub const fn limit(self) -> u32 {
+        (self.bytes - PAGE_BYTES as u32) * 8
+    }
+
+    /// Begins the log of the state with the checksum `of`, with these notes and no bit cleared.
+    ///
+    /// # Errors
+    /// [`StorageError::TooLong`] for more notes than [`NOTE_BYTES`], or the error of the flash. The
+    /// log has then not begun.
+    pub fn begin<F: MultiwriteNorFlash>(
+        self,
+        flash: &mut F,
+        of: u32,
+        notes: &[u8],
+    ) -> Result<(), StorageError<F::Error>> {
+        let mut page = [0xFF; PAGE_BYTES];
+        let (head, tail) = page.split_at_mut(HEADER_BYTES);
+        tail.get_mut(..notes.len()).ok_or(StorageError::TooLong)?.copy_from_slice(notes);
+        let length = notes.len() as u32;
+        let words = [MARK, of, length, checksum(of, notes)];
+        for (slot, word) in head.chunks_exact_mut(4).zip(words) {
+            slot.copy_from_slice(&word.to_le_bytes());
+        }
+        for at in (self.start..self.start + self.bytes).step_by(F::ERASE_SIZE) {
+            flash.erase(at, at + F::ERASE_SIZE as u32)?;
+        }
+        flash.write(self.start, &page)?;
+        Ok(())
+    }
+
+    /// Copies the notes of the log of the state with the checksum `of` to the front of `notes`.
+    /// Returns their length and the number of bits that are clear, or `None` if no such log has
+    /// begun, or if its notes do not fit.
+    pub fn read<F: ReadNorFlash>(
+        self,
+        flash: &mut F,
+        of: u32,
+        notes: &mut [u8],
+    ) -> Option<(usize, u32)> {
+        let mut header = [0; HEADER_BYTES];
+        read_surely(flash, self.start, &mut header).ok()?;
+        let [mark, found, length, sum] = words(header);
+        let notes = notes.get_mut(..usize::try_from(length).ok()?)?;
+        if mark != MARK || found != of || notes.len() > NOTE_BYTES {
+            return None;
+        }
+        read_surely(flash, self.start + HEADER_BYTES as u32, notes).ok()?;
+        (sum == checksum(of, notes)).then(|| (notes.len(), self.count(flash)))
+    }
+
+    /// Returns the number of bits that are clear, from the first one on. A flash that fails ends
+    /// the count.
+    fn count<F: ReadNorFlash>(self, flash: &mut F) -> u32 {
+        let mut count = 0;
+        let mut piece = [0; PIECE_BYTES];
+        while count < self.limit() {
+            let at = self.start + PAGE_BYTES as u32 + count / 8;
+            if read_surely(flash, at, &mut piece).is_err() {
+                break;
+            }
+            for byte in piece {
+                count += byte.trailing_zeros().min(8);
+                if byte != 0 {
+                    return count;
+                }
+            }
+        }
+        count
+    }
+
+    /// Clears the bits from number `from` up to number `to`, which is excluded. Bits beyond
+    /// [`Log::limit`] are left out.
+    ///
+    /// # Errors
+    /// The error of the flash.
+    pub fn note<F: MultiwriteNorFlash>(
+        self,
+        flash: &mut F,
+        from: u32,
+        to: u32,
+    ) -> Result<(), F::Error> {
+        const PAGE_BITS: u32 = PAGE_BYTES as u32 * 8;
+        let to = to.min(self.limit());
+        let mut from = from;
+        while from < to {
+            let page_begin = from / PAGE_BITS * PAGE_BITS;
+            let end = to.min(page_begin + PAGE_BITS);
+            let mut page = [0xFF; PAGE_BYTES];
+            for bit in from..end {
+                if let Some(byte) = page.get_mut(((bit - page_begin) / 8) as usize) {
+                    *byte &= !(1 << (bit % 8));
+                }
+            }
+            // The first page holds the notes.
+            flash.write(self.start + PAGE_BYTES as u32 + page_begin / 8, &page)?;
+            from = end;
+        }
+        Ok(())
+    }
+}
+
+/// Returns the checksum of a log's first page.
+fn checksum(of: u32, notes: &[u8]) -> u32 {
+    let mut digest = Crc32::new();
+    for word in [MARK, of, notes.len() as u32] {
+        digest.update(&word.to_le_bytes());
+    }
+    digest.update(notes);
+    digest.finalize()
+}
