@@ -4,11 +4,12 @@
 //! Time passes only in [`Board::wait`] and [`HostBoard::pass`], and while bytes are sent at a set
 //! baud rate. So a run gives the same result every time.
 
+use crate::hpgl::Session;
 use crate::index::Index;
 use crate::machine::{Contacts, EventRing, Pen, Pins, Pulser, PulserState, StepQueue, Tick};
 use crate::model::{Corner, Position};
 use crate::motion::{Block, EventQueue};
-use crate::plotter::{Board, EMPTY_LOOKAHEAD, MemorySlices};
+use crate::plotter::{Board, EMPTY_LOOKAHEAD, MemorySlices, Replies};
 use crate::protocol::{LineReader, RealTime, Sorter};
 use core::convert::Infallible;
 use embedded_hal::digital::{ErrorType, OutputPin};
@@ -44,6 +45,7 @@ pub fn lend_memory_of<I: Index>(
         blocks: std::vec![Block::EMPTY; blocks].leak(),
         words: std::vec![0; words].leak(),
         readers: Box::leak(Box::new([const { LineReader::new() }; PORTS])),
+        hpgl: Box::leak(Box::new(Session::new())),
     }
 }
 
@@ -278,8 +280,12 @@ pub struct HostBoard<'q> {
     sorters: [Sorter; PORTS],
     /// The real-time requests that were not taken yet.
     requests: RealTime,
-    /// The bytes that the plotter has sent and nobody has taken yet.
+    /// The bytes that the plotter has sent and nobody has taken yet, by any port.
     sent: Vec<u8>,
+    /// Whether each port has sent something.
+    has_heard: [bool; PORTS],
+    /// The ports to which replies go.
+    replies: Replies,
     /// The main loop's end of the queue of events.
     queue: StepQueue<'q, QUEUE_LENGTH>,
     /// The interrupt code and its pins.
@@ -310,6 +316,8 @@ impl<'q> HostBoard<'q> {
             sorters: [Sorter::new(); PORTS],
             requests: RealTime::default(),
             sent: Vec::new(),
+            has_heard: [false; PORTS],
+            replies: Replies::All,
             queue,
             steps,
             contacts: Contacts::default(),
@@ -329,11 +337,13 @@ impl<'q> HostBoard<'q> {
     /// # Panics
     /// When there is no such port.
     pub fn receive_by(&mut self, port: usize, bytes: &[u8]) {
+        self.has_heard[port] = true;
         for byte in bytes {
             match self.sorters[port].sort(*byte) {
                 Some(requests) => {
                     if requests.has(RealTime::ABORT) {
                         self.received.clear();
+                        self.sorters = [Sorter::new(); PORTS];
                     }
                     self.requests = self.requests.and(requests);
                 }
@@ -390,7 +400,18 @@ impl Board for HostBoard<'_> {
         core::mem::take(&mut self.requests)
     }
 
+    fn reply_to(&mut self, replies: Replies) {
+        self.replies = replies;
+    }
+
     fn write(&mut self, bytes: &[u8]) {
+        let is_heard = match self.replies {
+            Replies::All | Replies::Only(_) | Replies::OthersIfAny(_) => true,
+            Replies::Others(not) => (0..PORTS).any(|port| port != not && self.has_heard[port]),
+        };
+        if !is_heard {
+            return;
+        }
         self.sent.extend_from_slice(bytes);
         self.pass(self.byte_ticks * bytes.len() as u64);
     }
