@@ -296,7 +296,9 @@ impl LetterStrokes {
     pub fn line(&self, index: usize) -> Option<Option<[[i32; 2]; 2]>> {
         let point = |index: usize| match self.glyph.points.get(2 * index..2 * index + 2) {
             Some(&[b' ', _]) => Some(None),
-            Some(&[right, down]) => Some(Some([offset(right), self.rise + BASELINE - offset(down)])),
+            Some(&[right, down]) => {
+                Some(Some([offset(right), self.rise + BASELINE - offset(down)]))
+            }
             _ => None,
         };
         let (from, to) = (point(index)?, point(index + 1)?);

@@ -229,8 +229,7 @@ impl Frame {
 
     /// Whether all that can be drawn on contains the position.
     pub(super) fn contains(&self, position: Point) -> bool {
-        self.limits.contains(position)
-            && self.window.is_none_or(|window| window.contains(position))
+        self.limits.contains(position) && self.window.is_none_or(|window| window.contains(position))
     }
 
     /// The part of a line on the page that is drawn.

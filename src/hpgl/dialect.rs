@@ -121,10 +121,7 @@ impl Dialect {
     /// Whether the next byte is text or data, so that `?`, `!` and `~` are no commands.
     pub fn is_in_text(&self) -> bool {
         self.control != Control::None
-            || matches!(
-                self.state,
-                State::Text | State::Terminator | State::Symbol | State::Data
-            )
+            || matches!(self.state, State::Text | State::Terminator | State::Symbol | State::Data)
     }
 
     /// Whether the next byte is data in which any byte from 0x80 up may stand, too.

@@ -58,6 +58,8 @@ pub(super) struct Handshake {
     limit: u16,
     /// The byte by which the sender asks for room, 0 for none.
     enquiry: u8,
+    /// Whether it is answered at once, too.
+    responds: bool,
     /// What the sender is told when there is room, and when it is to wait.
     go_on: [u8; STRING],
     wait: [u8; STRING],
@@ -95,6 +97,7 @@ impl Handshake {
             initiator: 0,
             limit: 0,
             enquiry: 0,
+            responds: false,
             go_on: [0; STRING],
             wait: [0; STRING],
             has_stopped: false,
@@ -219,9 +222,9 @@ impl Handshake {
                 if usize::from(limit) > RECEIVED_BYTES {
                     return self.fail(InterfaceError::BadParameter);
                 }
-                let output = self.release();
-                self.output = output;
+                self.output = self.release();
                 (self.limit, self.enquiry) = (if limit == 0 { 80 } else { limit }, first);
+                self.responds = self.letter == b'I';
                 self.go_on = string(&bytes, 2);
             }
             b'N' => self.wait = string(&bytes, 1),
@@ -257,7 +260,9 @@ impl Handshake {
     pub(super) fn takes_enquiry(&mut self, byte: u8) -> bool {
         let is_enquiry = self.enquiry != 0 && byte == self.enquiry;
         if is_enquiry {
-            self.send(self.wait);
+            if self.responds {
+                self.send(self.wait);
+            }
             self.is_asked = true;
         }
         is_enquiry

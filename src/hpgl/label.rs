@@ -36,12 +36,8 @@ pub(super) struct TextStyle {
 
 impl TextStyle {
     /// Of zero bits only, before there is a state.
-    pub(super) const ZERO: Self = Self {
-        size: [0; 2],
-        direction: [0; 2],
-        terminator: 0,
-        ..Self::DEFAULT
-    };
+    pub(super) const ZERO: Self =
+        Self { size: [0; 2], direction: [0; 2], terminator: 0, ..Self::DEFAULT };
 
     /// The style after `DF`.
     pub(super) const DEFAULT: Self = Self {
@@ -72,11 +68,8 @@ impl TextStyle {
     /// The sine and the cosine of the direction, in units of 2^-30.
     fn sine_and_cosine(&self, frame: &Frame) -> [i64; 2] {
         let [x, y] = self.direction;
-        let direction = if self.is_relative_direction {
-            frame.percents([x, y])
-        } else {
-            Point { x, y }
-        };
+        let direction =
+            if self.is_relative_direction { frame.percents([x, y]) } else { Point { x, y } };
         let length = direction.length();
         if length == 0 {
             return [0, 1 << 30];

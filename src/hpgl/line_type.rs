@@ -66,8 +66,8 @@ impl LineStyle {
 
     /// The next part of a line, with patterns of this length. `None` at its end.
     pub(super) fn next_part(&mut self, stroke: &mut Stroke, pattern: i64) -> Option<Part> {
-        let Some(parts) = self.number.and_then(|number| PATTERNS.get(usize::from(number) - 1))
-        else {
+        let index = self.number.and_then(|number| usize::from(number).checked_sub(1));
+        let Some(parts) = index.and_then(|index| PATTERNS.get(index)) else {
             // Dots at the ends of lines only.
             let is_over = core::mem::replace(&mut stroke.done, i64::MAX) == i64::MAX;
             return (!is_over).then_some(Part::Dot(stroke.to));

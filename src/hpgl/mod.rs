@@ -23,6 +23,8 @@ mod outline;
 mod parser;
 mod query;
 mod session;
+#[cfg(test)]
+mod tests;
 
 pub use coordinates::{Point, Rectangle, UNIT, UNITS_PER_MM};
 pub use dialect::{Beginning, Dialect, Token};

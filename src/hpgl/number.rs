@@ -47,8 +47,8 @@ impl Number {
     /// Takes a digit, a sign or a point. Returns the number before it, which it ends, if it begins
     /// another one.
     pub(super) fn push(&mut self, byte: u8) -> Parsed {
-        let begins = matches!(byte, b'+' | b'-') && self.has_begun
-            || byte == b'.' && self.has_point;
+        let begins =
+            matches!(byte, b'+' | b'-') && self.has_begun || byte == b'.' && self.has_point;
         let before = if begins { self.end() } else { Parsed::None };
         self.has_begun = true;
         match byte {

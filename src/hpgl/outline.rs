@@ -25,7 +25,6 @@ impl ArcStep {
     fn new(center: Point, radius: Point, sweep: i64, chord: Option<i64>) -> Self {
         // A second turn draws the same again.
         let sweep = if sweep.abs() > TURN { sweep % TURN + TURN * sweep.signum() } else { sweep };
-        let sweep = if sweep.abs() > TURN { sweep - TURN * sweep.signum() } else { sweep };
         let chords = match chord {
             Some(angle) => (sweep.unsigned_abs()).div_ceil(angle.unsigned_abs().max(1)),
             // A chord of an angle a is r·a²/8 off the arc, so a is one divided by the root of r in
@@ -99,9 +98,7 @@ impl Interpreter {
     /// `EA`, `ER`, `RA` and `RR`: the outline of a rectangle from the pen to the opposite corner.
     pub(super) fn rectangle(&mut self, corner: Point) {
         let at = self.at;
-        for point in
-            [Point { x: corner.x, y: at.y }, corner, Point { x: at.x, y: corner.y }, at]
-        {
+        for point in [Point { x: corner.x, y: at.y }, corner, Point { x: at.x, y: corner.y }, at] {
             self.add(Step::Line(point));
         }
     }

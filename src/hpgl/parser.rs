@@ -307,8 +307,7 @@ impl Interpreter {
                 self.rectangle(corner.ok_or(ErrorNumber::Overflow)?);
             }
             b"EW" | b"WG" => {
-                let (radius, start, sweep, chord) =
-                    (number(0)?, number(1)?, number(2)?, chord(3)?);
+                let (radius, start, sweep, chord) = (number(0)?, number(1)?, number(2)?, chord(3)?);
                 at_most(4)?;
                 let radius = self.frame.length(Point { x: radius, y: 0 });
                 self.wedge(radius.ok_or(ErrorNumber::Overflow)?.x, start, sweep, chord);
@@ -474,20 +473,4 @@ impl Interpreter {
         self.text.advanced = advanced;
         self.add(Step::Place(at));
     }
-}
-
-/// All orders of some bytes, for tests.
-#[cfg(test)]
-pub(super) fn orders(
-    interpreter: &mut Interpreter,
-    bytes: &[u8],
-) -> std::vec::Vec<super::Order> {
-    let mut orders = std::vec::Vec::new();
-    for byte in bytes {
-        interpreter.push(*byte);
-        while let Some(order) = interpreter.next_order() {
-            orders.push(order);
-        }
-    }
-    orders
 }

@@ -24,9 +24,7 @@ impl Interpreter {
             b'F' => answer.write_str("40,40"),
             b'O' => answer.write_str("0,1,0,0,1,0,0,0"),
             b'H' => self.write_rectangle(&mut answer, self.frame.limits, false),
-            b'W' => {
-                self.write_rectangle(&mut answer, self.frame.visible(), self.frame.is_scaled())
-            }
+            b'W' => self.write_rectangle(&mut answer, self.frame.visible(), self.frame.is_scaled()),
             b'P' => {
                 self.has_new_corners = false;
                 let [p1, p2] = self.frame.corners;

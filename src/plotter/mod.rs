@@ -251,7 +251,8 @@ impl<'m, I: Index> Plotter<'m, I> {
         }
         // Nothing comes between the instructions of HP-GL that are being carried out.
         #[cfg(feature = "hpgl")]
-        let is_busy = self.hpgl.is_drawing() || (self.hpgl.port().is_some() && self.inner.must_wait());
+        let is_busy =
+            self.hpgl.is_drawing() || (self.hpgl.port().is_some() && self.inner.must_wait());
         #[cfg(not(feature = "hpgl"))]
         let is_busy = false;
         let reader = self.readers.get_mut(port).zip(self.numberings.get_mut(port));
