@@ -344,12 +344,18 @@ impl Interpreter {
 
     /// The order for a line or a dot, as far as it lies within the window.
     fn ink(&self, line: [Point; 2]) -> Option<Order> {
-        if self.has_no_pen || self.is_lost {
+        if self.is_lost {
             return None;
         }
         let is_dot = line[0] == line[1];
         let line = self.frame.clip(line)?;
-        Some(if is_dot { Order::Dot(line[0]) } else { Order::Line(line) })
+        Some(if self.has_no_pen {
+            Order::Go(line[1])
+        } else if is_dot {
+            Order::Dot(line[0])
+        } else {
+            Order::Line(line)
+        })
     }
 }
 

@@ -244,7 +244,7 @@ fn labels() {
 fn pens_and_put_away_pens() {
     assert_eq!(
         orders(b"SP1;PD9,0;SP0;PD18,0;SP2;PD27,0;SP;SP99;OE;"),
-        "pen 1 0,0>9,0 pen 0 pen 2 18,0>27,0 pen 0 '3'"
+        "pen 1 0,0>9,0 pen 0 go 18,0 pen 2 18,0>27,0 pen 0 '3'"
     );
 }
 

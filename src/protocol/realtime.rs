@@ -146,6 +146,7 @@ impl Sorter {
     }
 
     /// Forgets a letter that has begun, because bytes were lost.
+    #[cfg(feature = "hpgl")]
     pub const fn break_letter(&mut self) {
         (self.inner, self.last) = (0, 0xFF);
     }

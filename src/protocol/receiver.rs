@@ -123,8 +123,11 @@ impl<'q> Receiver<'q> {
 
     /// Notes that bytes were lost or damaged here. Adjacent losses share one mark.
     pub fn lose(&mut self) {
-        // A multi-byte letter of UTF-8 that has begun is not continued after the loss. Noise before
-        // the first byte belongs to no line.
+        // A multi-byte letter of UTF-8 that has begun is not continued after the loss.
+        #[cfg(not(feature = "hpgl"))]
+        self.sorter.sort(DAMAGED);
+        // Noise before the first byte belongs to no line.
+        #[cfg(feature = "hpgl")]
         if self.has_heard {
             self.sorter.sort(DAMAGED);
         } else {
