@@ -61,6 +61,8 @@ pub mod step;
 pub mod motion;
 pub mod machine;
 pub mod storage;
+#[cfg(feature = "hpgl")]
+pub mod hpgl;
 pub mod protocol;
 pub mod plotter;
 

@@ -23,9 +23,16 @@ pub fn contents(lines: &dyn Lines, count: usize) -> Option<[u32; 2]> {
     // time.
     let words = &mut [];
     let readers = &mut [LineReader::new()];
+    let hpgl = &mut penup::hpgl::Session::new();
     let blocks = &mut blocks;
-    let memory =
-        MemorySlices { vertices: &mut vertices, corners: &mut corners, blocks, words, readers };
+    let memory = MemorySlices {
+        vertices: &mut vertices,
+        corners: &mut corners,
+        blocks,
+        words,
+        readers,
+        hpgl,
+    };
     let mut plotter = Plotter::new(memory, &pins);
     for line in (0..count).filter_map(|index| lines.line(index)) {
         board.receive(line.sent.as_bytes());

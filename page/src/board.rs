@@ -153,6 +153,7 @@ fn memory_of(board: &str) -> MemorySlices<'static> {
         blocks: vec![Block::EMPTY; blocks].leak(),
         words: vec![0; words].leak(),
         readers: Box::leak(Box::new([const { LineReader::new() }; PORTS])),
+        hpgl: Box::leak(Box::new(penup::hpgl::Session::new())),
     }
 }
 

@@ -8,12 +8,13 @@ mod flash;
 
 pub use flash::{Cut, CutFlash};
 
+use crate::hpgl::Session;
 use crate::index::Index;
 use crate::machine::{Contacts, EventRing, Pen, Pins, Pulser, PulserState, StepQueue, Tick};
 use crate::model::{Corner, Position};
 use crate::motion::{Block, EventQueue};
 use crate::plotter::{
-    Board, EMPTY_LOOKAHEAD, Kept, Layout, MemorySlices, NotStored, Record, Stored,
+    Board, EMPTY_LOOKAHEAD, Kept, Layout, MemorySlices, NotStored, Record, Replies, Stored,
 };
 use crate::protocol::{LineReader, RealTime, Sorter};
 use core::convert::Infallible;
@@ -53,6 +54,7 @@ pub fn lend_memory_of<I: Index>(
         blocks: std::vec![Block::EMPTY; blocks].leak(),
         words: std::vec![0; words].leak(),
         readers: Box::leak(Box::new([const { LineReader::new() }; PORTS])),
+        hpgl: Box::leak(Box::new(Session::new())),
     }
 }
 
@@ -287,8 +289,12 @@ pub struct HostBoard<'q> {
     sorters: [Sorter; PORTS],
     /// The real-time requests that were not taken yet.
     requests: RealTime,
-    /// The bytes that the plotter has sent and nobody has taken yet.
+    /// The bytes that the plotter has sent and nobody has taken yet, by any port.
     sent: Vec<u8>,
+    /// Whether each port has sent something.
+    has_heard: [bool; PORTS],
+    /// The ports to which replies go.
+    replies: Replies,
     /// The main loop's end of the queue of events.
     queue: StepQueue<'q, QUEUE_LENGTH>,
     /// The interrupt code and its pins.
@@ -323,6 +329,8 @@ impl<'q> HostBoard<'q> {
             sorters: [Sorter::new(); PORTS],
             requests: RealTime::default(),
             sent: Vec::new(),
+            has_heard: [false; PORTS],
+            replies: Replies::All,
             queue,
             steps,
             contacts: Contacts::default(),
@@ -366,11 +374,13 @@ impl<'q> HostBoard<'q> {
     /// # Panics
     /// When there is no such port.
     pub fn receive_by(&mut self, port: usize, bytes: &[u8]) {
+        self.has_heard[port] = true;
         for byte in bytes {
             match self.sorters[port].sort(*byte) {
                 Some(requests) => {
                     if requests.has(RealTime::ABORT) {
                         self.received.clear();
+                        self.sorters = [Sorter::new(); PORTS];
                     }
                     self.requests = self.requests.and(requests);
                 }
@@ -427,7 +437,18 @@ impl Board for HostBoard<'_> {
         core::mem::take(&mut self.requests)
     }
 
+    fn reply_to(&mut self, replies: Replies) {
+        self.replies = replies;
+    }
+
     fn write(&mut self, bytes: &[u8]) {
+        let is_heard = match self.replies {
+            Replies::All | Replies::Only(_) | Replies::OthersIfAny(_) => true,
+            Replies::Others(not) => (0..PORTS).any(|port| port != not && self.has_heard[port]),
+        };
+        if !is_heard {
+            return;
+        }
         self.sent.extend_from_slice(bytes);
         self.pass(self.byte_ticks * bytes.len() as u64);
     }

@@ -18,7 +18,7 @@ pub use collect::{GraphError, PackedLine, Stored, build_graph};
 pub use line_type::{Dashes, LineType};
 pub use page::{Page, PageError, StepsPerMillimetre};
 pub use page_map::{Bounds, PageMap};
-pub use title::{Title, TitleText, is_in_font};
+pub use title::{LetterStrokes, Title, TitleText, is_in_font};
 
 use crate::index::Index;
 use bytemuck::{Pod, Zeroable};

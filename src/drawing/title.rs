@@ -257,6 +257,55 @@ impl Glyph {
     }
 }
 
+/// The strokes of a single letter or of its accent, for those who place letters by themselves.
+///
+/// ```
+/// use penup::drawing::LetterStrokes;
+/// let [letter, accent] = LetterStrokes::of('I');
+/// assert!(accent.is_none());
+/// assert_eq!(letter.unwrap().line(0), Some(Some([[0, 21], [0, 0]])));
+/// assert_eq!(letter.unwrap().line(1), None);
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct LetterStrokes {
+    /// The shape of the letter or the accent.
+    glyph: Glyph,
+    /// How far it is raised above its normal height.
+    rise: i32,
+}
+
+impl LetterStrokes {
+    /// The height of the capitals, in the font's units.
+    pub const CAPITAL_HEIGHT: i32 = CAPITAL_HEIGHT;
+
+    /// The letter and its accent, if it has one. A letter that is not in the font is a box.
+    pub fn of(letter: char) -> [Option<Self>; 2] {
+        let mut strokes = [None; 2];
+        let mut free = strokes.iter_mut();
+        TypeLine::default().set(letter, &mut |Placed { glyph, rise, .. }| {
+            if let Some(slot) = free.next() {
+                *slot = Some(Self { glyph, rise });
+            }
+        });
+        strokes
+    }
+
+    /// The straight line from the point with this index to the next one, in the font's units: to
+    /// the right of the letter's middle, and up from its baseline. `Some(None)` where the pen is
+    /// lifted between the two, `None` behind the last line.
+    pub fn line(&self, index: usize) -> Option<Option<[[i32; 2]; 2]>> {
+        let point = |index: usize| match self.glyph.points.get(2 * index..2 * index + 2) {
+            Some(&[b' ', _]) => Some(None),
+            Some(&[right, down]) => {
+                Some(Some([offset(right), self.rise + BASELINE - offset(down)]))
+            }
+            _ => None,
+        };
+        let (from, to) = (point(index)?, point(index + 1)?);
+        Some(from.zip(to).map(|(from, to)| [from, to]))
+    }
+}
+
 /// Returns the coordinate that a character of the font's file stands for, in the font's units.
 fn offset(byte: u8) -> i32 {
     i32::from(byte) - i32::from(b'R')

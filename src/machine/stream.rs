@@ -2,7 +2,7 @@
 
 use super::state::{Activity, Source};
 use super::{JobSize, Machine, MachineError, Setting, Switches, Target, Value};
-use crate::drawing::PagePoint;
+use crate::drawing::{PAGE_LIMIT, PagePoint};
 use crate::motion::{EventQueue, PathLength, PushError};
 
 impl Machine<'_> {
@@ -81,6 +81,22 @@ impl Machine<'_> {
     /// The position where all moves known so far end, in steps of the page.
     pub fn end(&self) -> PagePoint {
         self.segmenter.map_or(self.runner.page_end(), |segmenter| segmenter.end())
+    }
+
+    /// The greatest coordinates to which the pen may go, in steps of the page. The least are 0.
+    pub fn travel(&self) -> PagePoint {
+        let PagePoint { x, y } = self.settings.page_point([Setting::TravelX, Setting::TravelY]);
+        PagePoint { x: x.min(PAGE_LIMIT), y: y.min(PAGE_LIMIT) }
+    }
+
+    /// The number of the pen in the holder, counted from 0.
+    pub fn pen(&self) -> u8 {
+        self.pen
+    }
+
+    /// Declares that the pen with this number, counted from 0, is in the holder.
+    pub fn set_pen(&mut self, pen: u8) {
+        self.pen = pen;
     }
 
     /// The position where the pen is parked, in steps of the page.

@@ -41,6 +41,11 @@ pub trait Board {
     fn reply_only_to_opened(&mut self, only_to_opened: bool) {
         let _ = only_to_opened;
     }
+    /// Chooses the ports to which all that is written goes from now on. A board with one port may
+    /// leave it out.
+    fn reply_to(&mut self, replies: Replies) {
+        let _ = replies;
+    }
     /// Whether the host has asked for the drive since the last call, in another way than by
     /// command.
     fn wants_drive(&mut self) -> bool {
@@ -129,6 +134,20 @@ pub trait Board {
 /// The upper limit, in bytes, of one row of a list, and of the whole reply to a line that is not a
 /// list.
 pub const REPLY_BYTES: usize = 512;
+
+/// The serial ports to which replies go, by their numbers, as [`Board::read_byte`] numbers them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Replies {
+    /// All ports that have sent something since the start.
+    #[default]
+    All,
+    /// This port alone.
+    Only(usize),
+    /// All but this port.
+    Others(usize),
+    /// All but this port, but to this port if no other one has sent anything.
+    OthersIfAny(usize),
+}
 
 /// What a board with flash keeps through a loss of power.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

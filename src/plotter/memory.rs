@@ -2,6 +2,8 @@
 //! [`crate::board_table`].
 
 use crate::board_table::BOARDS;
+#[cfg(feature = "hpgl")]
+use crate::hpgl::Session;
 use crate::model::{Corner, Position};
 use crate::motion::Block;
 use crate::protocol::LineReader;
@@ -32,6 +34,9 @@ pub struct Memory<
     words: [u64; WORDS],
     /// The line that each serial port is receiving.
     readers: [LineReader; PORTS],
+    /// What has been received of HP-GL, and its interpreter.
+    #[cfg(feature = "hpgl")]
+    hpgl: Session,
 }
 
 impl<const VERTICES: usize, const CORNERS: usize, const WORDS: usize, const PORTS: usize>
@@ -44,6 +49,8 @@ impl<const VERTICES: usize, const CORNERS: usize, const WORDS: usize, const PORT
             corners: [Corner::ZERO; CORNERS],
             words: [0; WORDS],
             readers: [const { LineReader::new() }; PORTS],
+            #[cfg(feature = "hpgl")]
+            hpgl: Session::new(),
         }
     }
 
@@ -55,6 +62,8 @@ impl<const VERTICES: usize, const CORNERS: usize, const WORDS: usize, const PORT
             blocks,
             words: &mut self.words,
             readers: &mut self.readers,
+            #[cfg(feature = "hpgl")]
+            hpgl: &mut self.hpgl,
         }
     }
 }
@@ -81,4 +90,7 @@ pub struct MemorySlices<'m, I = u16> {
     pub words: &'m mut [u64],
     /// The line that each serial port is receiving, indexed by the port's number.
     pub readers: &'m mut [LineReader],
+    /// What has been received of HP-GL, and its interpreter.
+    #[cfg(feature = "hpgl")]
+    pub hpgl: &'m mut Session,
 }

@@ -11,6 +11,8 @@ pub mod budget;
 mod editor;
 mod grbl;
 mod help;
+#[cfg(feature = "hpgl")]
+mod hpgl;
 mod job;
 mod kept;
 mod listener;
@@ -28,7 +30,7 @@ mod solid;
 mod stream;
 mod title;
 
-pub use board::{Board, NotStored, REPLY_BYTES, Record, Stored};
+pub use board::{Board, NotStored, REPLY_BYTES, Record, Replies, Stored};
 pub use help::help;
 pub use job::{Cursor, Job, Observer, Strokes, Unobserved};
 pub use kept::{Kept, Layout};
@@ -115,6 +117,9 @@ pub struct Plotter<'m, I = u16> {
     inner: Inner<'m, I>,
     /// Whether a status report was asked for and waits for room in the output.
     status_due: bool,
+    /// HP-GL, where it takes the place of lines.
+    #[cfg(feature = "hpgl")]
+    hpgl: hpgl::HpGl<'m>,
 }
 
 /// What is left to do after a line has been carried out. Jobs are left to the caller, because their
@@ -174,6 +179,9 @@ struct Inner<'m, I> {
     alarm_reported: Option<Alarm>,
     /// The pen, from 0, for which the user was last asked, so that the question is not repeated.
     pen_reported: Option<u8>,
+    /// The pen, from 0, that HP-GL waits for.
+    #[cfg(feature = "hpgl")]
+    hpgl_pen: Option<u8>,
 }
 
 impl<'m, I: Index> Plotter<'m, I> {
@@ -190,13 +198,17 @@ impl<'m, I: Index> Plotter<'m, I> {
         pins: &'m PulserState,
         settings: Settings,
     ) -> Self {
-        let MemorySlices { vertices, corners, blocks, words, readers } = memory;
+        #[cfg(feature = "hpgl")]
+        let hpgl = hpgl::HpGl::new(memory.hpgl);
+        let MemorySlices { vertices, corners, blocks, words, readers, .. } = memory;
         Self {
             readers,
             numberings: [Numbering::default(), Numbering::default()],
             port: 0,
             label: Label::default(),
             status_due: false,
+            #[cfg(feature = "hpgl")]
+            hpgl,
             inner: Inner {
                 model: Model::new(vertices, corners),
                 options: PlotOptions::default(),
@@ -214,6 +226,8 @@ impl<'m, I: Index> Plotter<'m, I> {
                 task: None,
                 alarm_reported: None,
                 pen_reported: None,
+                #[cfg(feature = "hpgl")]
+                hpgl_pen: None,
             },
         }
     }
@@ -240,6 +254,8 @@ impl<'m, I: Index> Plotter<'m, I> {
         self.inner.watch_idleness(board);
         self.inner.note_progress(board);
         let planned = self.inner.plan(board);
+        #[cfg(feature = "hpgl")]
+        let planned = self.carry_out_hpgl(board) || planned;
         if self.inner.task.is_some() {
             match self.inner.proceed(board) {
                 Progress::Done(outcome) => self.answer(outcome, board),
@@ -250,15 +266,29 @@ impl<'m, I: Index> Plotter<'m, I> {
         }
         // A byte is read only when the output has room for a reply, so that no reply blocks and
         // delays the steps.
-        let waits = self.inner.must_wait() || !board.has_room(REPLY_BYTES);
+        let waits = self.inner.must_wait();
+        #[cfg(feature = "hpgl")]
+        let waits = self.hpgl.must_wait(waits);
+        let waits = waits || !board.has_room(REPLY_BYTES);
         let byte = if waits { None } else { board.read_byte() };
         let Some((port, byte)) = byte else { return planned || requests != RealTime::default() };
         self.inner.busy_at = board.microseconds();
+        #[cfg(feature = "hpgl")]
+        if self.take_hpgl(port, byte, board) {
+            return true;
+        }
+        // Nothing comes between the instructions of HP-GL that are being carried out.
+        #[cfg(feature = "hpgl")]
+        let is_busy =
+            self.hpgl.is_drawing() || (self.hpgl.port().is_some() && self.inner.must_wait());
+        #[cfg(not(feature = "hpgl"))]
+        let is_busy = false;
         let reader = self.readers.get_mut(port).zip(self.numberings.get_mut(port));
         let Some((reader, numbering)) = reader else { return true };
         let Some(line) = reader.push(byte) else { return true };
         let (mut shows_drive, mut resets) = (false, false);
         let (outcome, label) = match numbering.receive(line) {
+            Received::Line(_, label) if is_busy => (Err(CommandError::Busy), label),
             Received::Line(line, label) => {
                 let outcome = match self.inner.carry_out(line, board) {
                     Ok(Next::Plot) => self.inner.plot(board, DrawnJob::Model),
@@ -376,7 +406,13 @@ impl<'m, I: Index> Plotter<'m, I> {
             // Writing the report takes 10 ms, and so may what was done since the queue was last
             // filled.
             self.inner.plan(board);
+            #[cfg(feature = "hpgl")]
+            if let Some(port) = self.hpgl.port() {
+                board.reply_to(Replies::OthersIfAny(port));
+            }
             self.inner.report_status(board);
+            #[cfg(feature = "hpgl")]
+            self.mute(board);
         }
     }
 
@@ -386,6 +422,8 @@ impl<'m, I: Index> Plotter<'m, I> {
         self.readers.iter_mut().for_each(LineReader::clear);
         self.numberings = [Numbering::default(), Numbering::default()];
         self.inner.task = None;
+        #[cfg(feature = "hpgl")]
+        self.end_hpgl(board);
         self.inner.reset();
         self.greet(board);
         self.inner.run_startup_lines(board);

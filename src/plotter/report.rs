@@ -199,7 +199,10 @@ impl<I: Index> Inner<'_, I> {
         if let State::Alarm(alarm) = status.state {
             reply.part(format_args!("|Alarm:{}", AlarmEntry::of(alarm).number));
         }
-        if let Some(pen) = status.pen_wanted {
+        let pen = status.pen_wanted;
+        #[cfg(feature = "hpgl")]
+        let pen = pen.or(self.hpgl_pen);
+        if let Some(pen) = pen {
             reply.part(format_args!("|Pen:{}", pen + 1));
         }
         if self.machine.underruns() != 0 {

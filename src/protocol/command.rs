@@ -156,6 +156,8 @@ pub const HELP: [&[(&str, &str)]; 2] = [
         ("$J=G91 X.. Y.. F..", "move by hand with the pen up, F is needed; byte 0x85 ends it"),
         ("$C", "begin or end to check only: nothing moves"),
         ("$SLP", "switch the motors off; $X wakes"),
+        #[cfg(feature = "hpgl")]
+        ("$hpgl", "HP-GL from now on, until ctrl-X or a line that begins with $"),
         ("$UF2", "become the drive onto which a new image is copied, where the board has one"),
         (
             "G0 | G1 | G2 | G3 | G4 | G20 | G21 | G28 | G90 | G91",
@@ -195,6 +197,10 @@ impl<'a> Command<'a> {
             return Self::parse_dollar(trim(dollar));
         }
         let line = trim(line.split('#').next().unwrap_or(""));
+        #[cfg(not(feature = "hpgl"))]
+        if line.starts_with("IN;") {
+            return Err(CommandError::NoHpGl);
+        }
         if GCode::begins(line) {
             return GCode::new(line).map(Self::GCode);
         }
@@ -258,6 +264,8 @@ impl<'a> Command<'a> {
             "plot" => Ok(Self::Plot),
             "again" => Ok(Self::Again),
             "resume" => Ok(Self::Resume { at_origin: false }),
+            #[cfg(not(feature = "hpgl"))]
+            "hpgl" => Err(CommandError::NoHpGl),
             "" => Ok(Self::Help),
             _ => Err(CommandError::UnknownSystemCommand),
         }

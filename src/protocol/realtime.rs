@@ -1,5 +1,8 @@
 //! The bytes that are commands by themselves, and how they are told from the bytes of lines.
 
+#[cfg(feature = "hpgl")]
+use crate::hpgl::Dialect;
+
 /// A set of real-time requests: commands of a single byte, which never wait in a queue.
 ///
 /// A board's receive interrupt collects these requests. The main loop and every long computation
@@ -77,6 +80,9 @@ impl RealTime {
 /// character of UTF-8 mean the command. All other commands act anywhere, whatever came before them:
 /// 0xFB and 0xFD, which are penup's own, never occur in UTF-8.
 ///
+/// In the texts of HP-GL, `?`, `!` and `~` are text. In its encoded data every byte is data but
+/// ctrl-X.
+///
 /// ```
 /// use penup::protocol::{RealTime, Sorter};
 /// let mut sorter = Sorter::default();
@@ -92,16 +98,62 @@ pub struct Sorter {
     inner: u8,
     /// The previous byte.
     last: u8,
+    /// Tells the texts of HP-GL.
+    #[cfg(feature = "hpgl")]
+    dialect: Dialect,
 }
 
 impl Sorter {
     /// A sorter before the first byte.
     pub const fn new() -> Self {
-        Self { inner: 0, last: 0 }
+        Self {
+            inner: 0,
+            last: 0,
+            #[cfg(feature = "hpgl")]
+            dialect: Dialect::new(),
+        }
+    }
+
+    /// The request that the byte makes. `None` for a byte of a line or of HP-GL.
+    #[cfg(feature = "hpgl")]
+    pub fn sort(&mut self, byte: u8) -> Option<RealTime> {
+        let dialect = &mut self.dialect;
+        let is_data = dialect.is_in_data() || matches!(byte, b'?' | b'!' | b'~');
+        if dialect.is_in_text() && is_data && byte != 0x18 {
+            (self.inner, self.last) = (0, byte);
+            self.dialect.take(byte);
+            return None;
+        }
+        let request = self.sort_byte(byte);
+        match request {
+            None => drop(self.dialect.take(byte)),
+            Some(RealTime::ABORT) => self.dialect = Dialect::new(),
+            Some(_) => {}
+        }
+        request
     }
 
     /// The request that the byte makes. `None` for a byte of a line.
+    #[cfg(not(feature = "hpgl"))]
     pub const fn sort(&mut self, byte: u8) -> Option<RealTime> {
+        self.sort_byte(byte)
+    }
+
+    /// Forgets all that has come, because ctrl-X came by some port.
+    #[cfg(feature = "hpgl")]
+    pub const fn clear(&mut self) {
+        *self = Self::new();
+    }
+
+    /// Forgets a letter that has begun, because bytes were lost.
+    #[cfg(feature = "hpgl")]
+    pub const fn break_letter(&mut self) {
+        (self.inner, self.last) = (0, 0xFF);
+    }
+
+    /// The request that the byte makes, if it is no text of HP-GL.
+    #[cfg_attr(not(feature = "hpgl"), inline(always))]
+    const fn sort_byte(&mut self, byte: u8) -> Option<RealTime> {
         // The second byte of a well-formed letter (Unicode, table 3-7).
         let is_inner = match self.last {
             0xC2 | 0xE0 => matches!(byte, 0xA0..=0xBF),

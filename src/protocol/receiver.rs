@@ -109,7 +109,7 @@ impl<'q> Receiver<'q> {
     /// The byte, if there is no room for it.
     pub fn append(&mut self, byte: u8) -> Result<(), u8> {
         if byte == DAMAGED {
-            self.lose();
+            self.note_loss();
             return Ok(());
         }
         if !self.mark() {
@@ -124,7 +124,20 @@ impl<'q> Receiver<'q> {
     /// Notes that bytes were lost or damaged here. Adjacent losses share one mark.
     pub fn lose(&mut self) {
         // A multi-byte letter of UTF-8 that has begun is not continued after the loss.
+        #[cfg(not(feature = "hpgl"))]
         self.sorter.sort(DAMAGED);
+        // Noise before the first byte belongs to no line.
+        #[cfg(feature = "hpgl")]
+        if self.has_heard {
+            self.sorter.sort(DAMAGED);
+        } else {
+            self.sorter.break_letter();
+        }
+        self.note_loss();
+    }
+
+    /// Has the loss of bytes marked in the queue.
+    fn note_loss(&mut self) {
         if self.has_heard && self.damage == Damage::None {
             self.damage = Damage::Unmarked;
             self.mark();
@@ -145,7 +158,15 @@ impl<'q> Receiver<'q> {
     /// that it has not taken.
     pub fn abort(&mut self) -> u32 {
         self.damage = Damage::None;
+        #[cfg(feature = "hpgl")]
+        self.sorter.clear();
         self.count
+    }
+
+    /// Notes that a line that has begun was ended in place of its sender, who has gone.
+    pub fn end_line(&mut self) {
+        self.sorter.sort(DAMAGED);
+        self.sorter.sort(b'\n');
     }
 
     /// Whether an undamaged byte has come since the start.

@@ -1,6 +1,7 @@
 //! A plotter that receives any bytes at any time.
 
 use penup::boards::host::{HostBoard, PORTS, QUEUE_LENGTH};
+use penup::hpgl::Session;
 use penup::machine::{Contacts, EventRing, PulserState};
 use penup::model::{Corner, Position};
 use penup::plotter::{Board, EMPTY_LOOKAHEAD, MemorySlices, Plotter};
@@ -28,6 +29,7 @@ pub fn fuzz(input: &[u8]) {
     let mut corners = [<Corner>::ZERO; 1024];
     let mut blocks = EMPTY_LOOKAHEAD;
     let mut words = vec![0; 8192];
+    let mut hpgl = Session::new();
     let mut readers = [const { LineReader::new() }; PORTS];
     let mut ring = EventRing::<QUEUE_LENGTH>::new();
     let pins = PulserState::new();
@@ -38,6 +40,7 @@ pub fn fuzz(input: &[u8]) {
         blocks: &mut blocks,
         words: &mut words,
         readers: &mut readers,
+        hpgl: &mut hpgl,
     };
     let mut plotter = Plotter::new(memory, &pins);
     plotter.greet(&mut board);

@@ -1,6 +1,7 @@
 //! Records in flash that another version wrote, or that no version wrote.
 
 use penup::boards::host::{HostBoard, PORTS, QUEUE_LENGTH};
+use penup::hpgl::Session;
 use penup::machine::{Contacts, EventRing, PulserState, Settings, Value};
 use penup::model::{Corner, Position};
 use penup::motion::EventQueue;
@@ -24,6 +25,7 @@ pub fn fuzz(input: &[u8]) {
     let mut corners = [<Corner>::ZERO; 256];
     let mut blocks = EMPTY_LOOKAHEAD;
     let mut words = vec![0; 8192];
+    let mut hpgl = Session::new();
     let mut readers = [const { LineReader::new() }; PORTS];
     let mut ring = EventRing::<QUEUE_LENGTH>::new();
     let pins = PulserState::new();
@@ -34,6 +36,7 @@ pub fn fuzz(input: &[u8]) {
         blocks: &mut blocks,
         words: &mut words,
         readers: &mut readers,
+        hpgl: &mut hpgl,
     };
     let mut plotter = Plotter::with_settings(memory, &pins, Settings::restored(values));
     plotter.greet(&mut board);

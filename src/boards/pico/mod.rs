@@ -42,7 +42,7 @@ use cortex_m::peripheral::Peripherals as Core;
 use penup::board_table::{self as table, BoardRow};
 use penup::machine::{Contacts, PulserState};
 use penup::motion::{Block, EventQueue};
-use penup::plotter::{Board, Kept, Memory, MemorySlices, NotStored, Record, Stored};
+use penup::plotter::{Board, Kept, Memory, MemorySlices, NotStored, Record, Replies, Stored};
 use penup::protocol::RealTime;
 use rp2040_hal::clocks::init_clocks_and_plls;
 use rp2040_hal::fugit::ExtU32;
@@ -174,6 +174,10 @@ impl Board for Pico {
 
     fn reply_only_to_opened(&mut self, only_to_opened: bool) {
         self.ports.reply_only_to_opened(only_to_opened);
+    }
+
+    fn reply_to(&mut self, replies: Replies) {
+        self.ports.reply_to(replies);
     }
 
     fn wants_drive(&mut self) -> bool {

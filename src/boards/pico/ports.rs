@@ -7,6 +7,7 @@
 
 use core::sync::atomic::{AtomicU8, Ordering};
 
+use penup::plotter::Replies;
 use penup::protocol::{RealTime, Receiver};
 
 use super::{serial, usb};
@@ -54,6 +55,8 @@ pub struct Ports {
     last: usize,
     /// Whether replies go to USB alone, because a program has just opened that port.
     only_to_opened: bool,
+    /// The ports to which replies go otherwise.
+    replies: Replies,
     /// The end by which the main loop sends bytes to UART0.
     pub uart: serial::Sender,
     /// The end by which the main loop sends bytes to USB.
@@ -99,6 +102,11 @@ impl Inlets {
         self.inlets[port as usize].receiver.lose();
     }
 
+    /// Records that a line that a port has not ended was ended in its place.
+    pub fn end_line(&mut self, port: Port) {
+        self.inlets[port as usize].receiver.end_line();
+    }
+
     /// Appends an ordinary byte to the queue of a port; returns it if there is no room.
     pub fn append(&mut self, port: Port, byte: u8) -> Result<(), u8> {
         self.inlets[port as usize].receiver.append(byte)
@@ -113,7 +121,7 @@ impl Ports {
 
     /// Combines the parts that the set-up of the ports has returned.
     pub fn new(lines: [Line; COUNT], uart: serial::Sender, usb: usb::Sender) -> Self {
-        Self { lines, last: 0, only_to_opened: false, uart, usb }
+        Self { lines, last: 0, only_to_opened: false, replies: Replies::All, uart, usb }
     }
 
     /// Returns the next ordinary byte and the number of its port: see [`Line::read_byte`]. It keeps
@@ -149,17 +157,37 @@ impl Ports {
         self.only_to_opened = only_to_opened;
     }
 
-    /// Sends `bytes` to the ports that have sent something.
+    /// Chooses the ports to which replies go from now on.
+    pub fn reply_to(&mut self, replies: Replies) {
+        self.replies = replies;
+    }
+
+    /// Sends `bytes` to the ports that were chosen, among those that have sent something.
     pub fn write(&mut self, bytes: &[u8]) {
         if self.only_to_opened {
             return self.usb.write(bytes);
         }
-        if gets_replies(Port::Uart) {
+        if self.is_chosen(Port::Uart) {
             self.uart.write(bytes);
         }
-        if gets_replies(Port::Usb) {
+        if self.is_chosen(Port::Usb) {
             self.usb.write(bytes);
         }
+    }
+
+    /// Whether replies go to this port now.
+    fn is_chosen(&self, port: Port) -> bool {
+        let number = port as usize;
+        gets_replies(port)
+            && match self.replies {
+                Replies::All => true,
+                Replies::Only(only) => only == number,
+                Replies::Others(not) => not != number,
+                Replies::OthersIfAny(not) => {
+                    let other = if number == 0 { Port::Usb } else { Port::Uart };
+                    not != number || !gets_replies(other)
+                }
+            }
     }
 }
 

@@ -265,7 +265,7 @@ fn serve() {
         }
         device.await_bus(USB.intr().get() & BUS_RESET != 0);
         device.follow_state();
-        device.follow_port();
+        device.follow_port(inlets);
         if took {
             device.resume_host();
         }
@@ -300,7 +300,7 @@ impl Device {
     }
 
     /// Follows whether a program at the host has the port open.
-    fn follow_port(&mut self) {
+    fn follow_port(&mut self, inlets: &mut Inlets) {
         let is_open = self.class.dtr();
         if is_open == self.is_open {
             return;
@@ -317,6 +317,7 @@ impl Device {
         if self.is_in_line {
             // The unfinished line is refused, and the next one is a separate line. There is room,
             // because packets are read only while there are two slots more than they need.
+            inlets.end_line(Port::Usb);
             let _ = self.waiting.push_back(DAMAGED);
             let _ = self.waiting.push_back(b'\n');
             self.is_in_line = false;

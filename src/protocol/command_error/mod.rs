@@ -105,6 +105,8 @@ pub enum CommandError {
     /// This firmware was built without the feature `convex`, which `$see=vertices` and `$see=edges`
     /// need.
     NoConvexSolids,
+    /// This firmware was built without the feature `hpgl`, which HP-GL needs.
+    NoHpGl,
     /// The vertices or edges are not those of a convex solid, or the eye is inside it.
     Solid(SolidError),
     /// The drawing or its title does not fit on the page.
@@ -331,6 +333,11 @@ impl CommandError {
                 error(128, "convex solids are left out of this firmware")
                     .client("the plotter's firmware was built without convex solids"),
                 format_args!("send faces and choose $see=faces, or $see=wire for all edges"),
+            ),
+            Self::NoHpGl => row(
+                error(129, "no HP-GL in this firmware")
+                    .client("the plotter's firmware was built without HP-GL"),
+                format_args!("send G-code"),
             ),
             Self::Solid(error) => explain_solid(error, row),
             Self::Page(error) => explain_page(error, row),

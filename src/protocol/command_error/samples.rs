@@ -66,6 +66,7 @@ pub fn error_samples() -> Vec<CommandError> {
         Model(ModelError::NoPlane),
         NothingToPlot,
         NoConvexSolids,
+        NoHpGl,
         View(ViewError::NothingToSee),
         Solid(SolidError::AllInLine),
         Page(PageError::NoRoom),

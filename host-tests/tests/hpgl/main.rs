@@ -1,0 +1,265 @@
+//! Draws HP-GL on the board in memory and compares what the pins ink with what is expected: the
+//! strokes of `lines.txt`, and for whole files the plan that the client's reader of HP-GL makes of
+//! them. The sender is one that does not wait, one that asks for room (`ESC.B`), or one that obeys
+//! XON and XOFF.
+
+#![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
+
+mod ink;
+mod lines;
+mod senders;
+
+use ink::{assert_same_ink, inked, plan, units};
+use penup::machine::State;
+use penup::plotter::{Board, EMPTY_LOOKAHEAD, Memory};
+use penup_host_tests::whole_jobs::Bench;
+use std::fmt::Write as _;
+
+/// A plotter with little memory.
+fn bench() -> Bench {
+    let memory = Box::leak(Box::new(Memory::<4, 4, 16>::new()));
+    let mut bench = Bench::with_memory(memory.lend(Box::leak(Box::new(EMPTY_LOOKAHEAD))));
+    bench.heard();
+    bench
+}
+
+/// Lets a number of milliseconds pass.
+fn work(bench: &mut Bench, milliseconds: u32) {
+    for _ in 0..milliseconds {
+        while bench.plotter.poll(&mut bench.board) {}
+        bench.board.wait();
+    }
+}
+
+/// Draws HP-GL to its end, with whatever pens it asks for. Returns all that is heard.
+fn draw(bench: &mut Bench, bytes: &[u8]) -> String {
+    bench.board.receive(bytes);
+    let mut heard = String::new();
+    let mut idle = 0;
+    while idle < 50 {
+        work(bench, 1);
+        heard += &String::from_utf8_lossy(&bench.board.take_sent());
+        if bench.plotter.machine().state() == (State::Hold { stopped: true }) {
+            // The other port puts the pen in. It is heard there, and not here.
+            bench.board.receive_by(1, b"~");
+        }
+        let is_idle = bench.board.has_read_all()
+            && bench.plotter.machine().state() == State::Idle
+            && bench.plotter.machine().is_stopped();
+        idle = if is_idle { idle + 1 } else { 0 };
+    }
+    heard
+}
+
+/// A file as vpype writes it: a spiral of one stroke in a single `PD` without a line end.
+fn vpype() -> Vec<u8> {
+    let mut text = String::from("IN;DF;PS4;SP1;PU4000,3000;PD");
+    for index in 0..1650 {
+        let (angle, radius) = (f64::from(index) * 0.1, f64::from(index) * 1.6);
+        let (x, y) = (4000.0 + radius * angle.cos(), 3000.0 + radius * angle.sin());
+        let _ = write!(text, "{}{},{}", if index > 0 { "," } else { "" }, x as i32, y as i32);
+    }
+    text += ";PU;SP0;IN;";
+    text.into_bytes()
+}
+
+/// A file as Inkscape writes it: each point an instruction of its own.
+fn inkscape() -> Vec<u8> {
+    let mut text = String::from("IN;SP1;FS24;VS20;");
+    for square in 0..6 {
+        let (at, side) = (400 + 700 * square, 300 + 60 * square);
+        let _ = write!(
+            text,
+            "PU{at},{at};PD{},{at};PD{},{};PD{at},{};PD{at},{at};",
+            at + side,
+            at + side,
+            at + side,
+            at + side
+        );
+    }
+    text += "PU0,0;SP0;IN; ";
+    text.into_bytes()
+}
+
+/// A file as gnuplot writes it: the interface is set up first, and lines end with a line feed.
+fn gnuplot() -> Vec<u8> {
+    let mut text = String::from("\x1B.Y\n\x1B.I81;;17:\x1B.N;19:\x1B.M500:\nIN;\nSP1;\n");
+    text += "PU1000,1000;\nPD7000,1000;\nPD7000,5000;\nPD1000,5000;\nPD1000,1000;\n";
+    for tick in 1..6 {
+        let x = 1000 + 1000 * tick;
+        let _ = write!(text, "PU{x},1000;\nPD{x},1080;\nPU{x},5000;\nPD{x},4920;\n");
+    }
+    text += "PU1000,3000;\n";
+    for index in 1..=120 {
+        let y = 3000.0 + 1500.0 * (f64::from(index) * 0.1).sin();
+        let _ = writeln!(text, "PD{},{};", 1000 + 50 * index, y as i32);
+    }
+    text += "PU0,0;SP0;\n\x1B.Z\n";
+    text.into_bytes()
+}
+
+/// Instructions as Chiplotle sends them: objects with a scale, arcs, circles and relative moves.
+fn chiplotle() -> Vec<u8> {
+    let mut text = String::from("IN;SP1;VS30;PU;PA 3000,3000;CI 800;");
+    text += "PA 5000.00,3000.00;AA 4000.00,3000.00,270.00;PD;AR -500.0,-500.0,-120.0;PU;";
+    text += "PA 1000,1000;PR;PD 500,0,0,500;PD -500,0,0,-500;PU;PA;";
+    text += "IP 1000,4000,5000,6000;SC -10,10,0,5;PA -10,0;PD 10,5;PU 10,0;PD -10,5;PU;SC;";
+    text += "PA 6000,1000;EA 7000,2000;ER -300,-400;EW 300,30,200;PU 0,0;SP0;";
+    text.into_bytes()
+}
+
+/// The files, with their names.
+fn files() -> [(&'static str, Vec<u8>); 4] {
+    [
+        ("vpype", vpype()),
+        ("inkscape", inkscape()),
+        ("gnuplot", gnuplot()),
+        ("chiplotle", chiplotle()),
+    ]
+}
+
+#[test]
+fn the_ink_of_files_is_the_plan_of_the_clients_reader() {
+    assert!(vpype().len() > 14_701 && !vpype().contains(&b'\n'));
+    for (name, bytes) in files() {
+        let mut bench = bench();
+        let heard = draw(&mut bench, &bytes);
+        assert!(!heard.contains("ok") && !heard.contains("error"), "{name}: {heard}");
+        assert_same_ink(name, &inked(&bench), &plan(&bytes));
+    }
+}
+
+#[test]
+fn nothing_is_answered_that_hp_gl_does_not_ask_for() {
+    let mut bench = bench();
+    assert_eq!(draw(&mut bench, b"IN;SP1;PD100,100;XX;PA1;OE;SP2;PD200,200;\n\n"), "2\r");
+    // The pen was asked for at the other port only.
+    let mut bench = self::bench();
+    bench.board.receive_by(1, b"$I\n");
+    let heard = draw(&mut bench, b"IN;SP2;PD100,100;");
+    assert!(heard.contains("[MSG:put in pen 2, then send ~]"), "{heard}");
+    // An alarm is heard there, too, and what is to be drawn then sets error 8.
+    let mut bench = self::bench();
+    bench.board.receive(b"\xFDIN;PD100,100;OE;PA0,0;OE;");
+    work(&mut bench, 50);
+    assert_eq!(bench.heard(), "ALARM:102\n8\r8\r");
+}
+
+#[test]
+fn pens_are_asked_for_when_they_differ_and_status_tells_which() {
+    let mut bench = bench();
+    bench.board.receive(b"IN;SP1;PD100,0;SP1;PD200,0;SP3;PD300,0;");
+    work(&mut bench, 3000);
+    assert_eq!(units(&bench), [[0, 0], [200, 0]]);
+    let status = bench.say("?");
+    assert!(status.starts_with("<Hold:0|") && status.contains("|Pen:3|"), "{status}");
+    bench.board.receive(b"~");
+    work(&mut bench, 3000);
+    assert_eq!(units(&bench), [[0, 0], [300, 0]]);
+    bench.board.receive(b"SP0;PD400,0;SP3;PD500,0;");
+    work(&mut bench, 3000);
+    assert!(!bench.say("?").contains("|Pen:"));
+    let ink = inked(&bench);
+    assert!(ink.iter().all(|[x, _]| *x <= 600.0 || *x >= 800.0), "put away");
+    assert!(ink.iter().any(|[x, _]| *x == 1000.0));
+    // With one pen for all there are no questions.
+    let mut bench = self::bench();
+    bench.say("$pens=one\n");
+    bench.board.receive(b"IN;SP5;PD100,0;");
+    work(&mut bench, 2000);
+    assert_eq!(units(&bench), [[0, 0], [100, 0]]);
+}
+
+#[test]
+fn control_x_and_a_dollar_line_end_it() {
+    let mut bench = bench();
+    assert_eq!(bench.say("G0 X1\n"), "ok\n");
+    draw(&mut bench, b"IN;PU0,0;LBWhat?! ~");
+    // In a label these are letters.
+    assert_eq!(bench.plotter.machine().state(), State::Idle);
+    assert_eq!(bench.heard(), "");
+    let heard = bench.say("\x18");
+    assert!(heard.contains("Grbl 1.1h"), "{heard}");
+    assert_eq!(bench.say("G90\n?"), format!("ok\n{}", bench.say("?")));
+    bench.finish();
+    assert_eq!(bench.say("IN;PU400,0;\n"), "");
+    assert_eq!(bench.say("G90;\n"), "", "HP-GL");
+    let heard = bench.say("$G\nG21\n");
+    assert!(heard.starts_with("[GC:") && heard.ends_with("ok\nok\n"), "{heard}");
+    assert_eq!(bench.say("$hpgl\n"), "ok\n");
+    assert_eq!(bench.say("PU0,0;OE;"), "0\r");
+    // What was sent before is drawn before the line is carried out.
+    bench.board.receive(b"PU0,0;PD4000,0;\n$#\n");
+    work(&mut bench, 30);
+    assert_eq!(bench.heard(), "");
+    work(&mut bench, 10_000);
+    assert!(bench.heard().ends_with("ok\n"));
+    assert_eq!(units(&bench), [[0, 0], [4000, 0]]);
+}
+
+#[test]
+fn the_other_port_watches_and_cannot_interrupt() {
+    let mut bench = bench();
+    bench.board.receive_by(1, b"$I\n");
+    work(&mut bench, 1);
+    bench.heard();
+    bench.board.receive(b"IN;PU0,0;PD4000,0;PD4000,400,0,400;");
+    work(&mut bench, 100);
+    bench.board.receive_by(1, b"?G0 X1\n");
+    work(&mut bench, 2);
+    let heard = bench.heard();
+    assert!(heard.starts_with("<Run|"), "{heard}");
+    assert!(heard.ends_with("error:8\n"), "{heard}");
+    bench.board.receive(b"OI;");
+    work(&mut bench, 20_000);
+    assert_eq!(bench.heard(), "7475A\r");
+    bench.board.receive_by(1, b"G90\nIN;PD0,0;");
+    work(&mut bench, 5);
+    assert!(bench.heard().starts_with("ok\n[MSG:HP-GL comes by the other port"));
+}
+
+#[test]
+fn damaged_bytes_leave_a_part_out_and_ink_nothing_else() {
+    let bytes = inkscape();
+    let whole = plan(&bytes);
+    for damaged in (18..bytes.len() - 10).step_by(7) {
+        let mut bench = bench();
+        let mut spoilt = bytes.clone();
+        spoilt[damaged] = 0xFF;
+        spoilt.extend_from_slice(b"\x1B.E");
+        let heard = draw(&mut bench, &spoilt);
+        assert_eq!(heard, "15\r", "byte {damaged}");
+        let beside = ink::farthest(&inked(&bench), &whole);
+        assert!(beside <= 1.0, "byte {damaged}: ink {beside} steps beside");
+    }
+}
+
+#[test]
+fn a_label_is_drawn_with_the_letters_that_the_line_would_otherwise_obey() {
+    let mut bench = bench();
+    let heard = draw(&mut bench, b"IN;SI1,1.4;PU400,400;LB?!~$\x03PU0,0;OE;");
+    assert_eq!(heard, "0\r");
+    let ink = inked(&bench);
+    // Four letters of 1 cm, half a centimetre apart.
+    for letter in 0..4 {
+        let left = 800.0 + f64::from(letter) * 1200.0;
+        let count = ink.iter().filter(|[x, _]| (left..left + 800.0).contains(x)).count();
+        assert!(count > 100, "letter {letter}: {count}");
+    }
+    assert!(ink.iter().all(|[x, y]| (700.0..5700.0).contains(x) && (500.0..2200.0).contains(y)));
+}
+
+#[test]
+fn nothing_leaves_the_travel() {
+    let mut bench = bench();
+    bench.say("$130=100\n$131=50\n");
+    let text = b"IN;PU-500,-500;PD9000,900;CI3000;PA-9000,3000;PU8000000,0;PD0,0;RO90;PD5000,100;\
+        LBoutside\x03EA-4000,9000;IW-10,-10,20000,200;EW9000,0,359;PU100,100;OH;OE;";
+    let heard = draw(&mut bench, text);
+    assert_eq!(heard, "0,0,2000,4000\r0\r");
+    let ink = inked(&bench);
+    assert!(ink.len() > 1000);
+    let position = bench.plotter.machine().position();
+    assert_eq!((position.x, position.y), (8000 - 200, 200));
+    assert!(ink.iter().all(|[x, y]| (0.0..=8000.0).contains(x) && (0.0..=4000.0).contains(y)));
+}

@@ -1,0 +1,350 @@
+//! Plotter units and user units, the rotation of the page, and the windows that clip lines.
+//!
+//! A coordinate is in units of 2^-16 plotter units, below 2^40. Positions are kept on the page:
+//! after the scale and the rotation.
+
+use crate::array::MapEach;
+use crate::fixed::{divide_rounding, product};
+
+/// One plotter unit, 0.025 mm, in the units of coordinates.
+pub const UNIT: i64 = 1 << 16;
+
+/// The number of plotter units in a millimetre.
+pub const UNITS_PER_MM: i64 = 40;
+
+/// The greatest coordinate: 2^23 plotter units.
+const FARTHEST: i64 = 1 << 39;
+
+/// The corners P1 and P2 of the HP 7475A with a sheet of A4.
+const CORNERS: [Point; 2] =
+    [Point { x: 603 * UNIT, y: 521 * UNIT }, Point { x: 10603 * UNIT, y: 7721 * UNIT }];
+
+/// A position or a distance, in units of 2^-16 plotter units.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Point {
+    /// To the right.
+    pub x: i64,
+    /// Upward.
+    pub y: i64,
+}
+
+impl Point {
+    /// The origin.
+    pub(super) const ZERO: Self = Self { x: 0, y: 0 };
+
+    /// The sum, if it is within the range of coordinates.
+    pub(super) fn plus(self, other: Self) -> Option<Self> {
+        let Self { x, y } = Self { x: self.x + other.x, y: self.y + other.y };
+        (x.abs().max(y.abs()) <= FARTHEST).then_some(Self { x, y })
+    }
+
+    /// The distance from `other`.
+    pub(super) fn minus(self, other: Self) -> Self {
+        Self { x: self.x - other.x, y: self.y - other.y }
+    }
+
+    /// The length of the way to it.
+    pub(super) fn length(self) -> i64 {
+        let square = |length: i64| u128::from(length.unsigned_abs()).pow(2);
+        // Each square is below 2^82, so the root fits.
+        (square(self.x) + square(self.y)).isqrt() as i64
+    }
+
+    /// Turned by so many quarters, counterclockwise.
+    pub(super) fn turned(self, quarters: u8) -> Self {
+        match quarters & 3 {
+            0 => self,
+            1 => Self { x: -self.y, y: self.x },
+            2 => Self { x: -self.x, y: -self.y },
+            _ => Self { x: self.y, y: -self.x },
+        }
+    }
+
+    /// Times a sine and a cosine, in units of 2^-30: turned by that angle.
+    pub(super) fn rotated(self, [sine, cosine]: [i64; 2]) -> Self {
+        let sum = |a: i64, b: i64, c: i64, d: i64| {
+            // Each product is below 2^72.
+            ((product(a, b) + product(c, d) + (1 << 29)) >> 30) as i64
+        };
+        Self { x: sum(self.x, cosine, -self.y, sine), y: sum(self.x, sine, self.y, cosine) }
+    }
+}
+
+/// A rectangle with sides along the axes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Rectangle {
+    /// The lower left corner.
+    pub least: Point,
+    /// The upper right corner.
+    pub most: Point,
+}
+
+impl Rectangle {
+    /// The rectangle with these opposite corners.
+    pub(super) fn between(a: Point, b: Point) -> Self {
+        Self {
+            least: Point { x: a.x.min(b.x), y: a.y.min(b.y) },
+            most: Point { x: a.x.max(b.x), y: a.y.max(b.y) },
+        }
+    }
+
+    /// Whether the point lies within it.
+    pub(super) fn contains(&self, Point { x, y }: Point) -> bool {
+        (self.least.x..=self.most.x).contains(&x) && (self.least.y..=self.most.y).contains(&y)
+    }
+
+    /// The nearest point within it.
+    pub(super) fn nearest(&self, Point { x, y }: Point) -> Point {
+        let Self { least, most } = *self;
+        Point { x: x.min(most.x).max(least.x), y: y.min(most.y).max(least.y) }
+    }
+
+    /// The part of the line that lies within it.
+    fn clip(&self, mut line: [Point; 2]) -> Option<[Point; 2]> {
+        for side in 0..4 {
+            let inside = |point: Point| match side {
+                0 => point.x - self.least.x,
+                1 => self.most.x - point.x,
+                2 => point.y - self.least.y,
+                _ => self.most.y - point.y,
+            };
+            let [from, to] = line;
+            let [begin, end] = [inside(from), inside(to)];
+            if begin < 0 && end < 0 {
+                return None;
+            }
+            if begin >= 0 && end >= 0 {
+                continue;
+            }
+            let (part, whole) = (begin.abs(), begin.abs() + end.abs());
+            let at = |from: i64, to: i64| {
+                from + divide_rounding(product(to - from, part), whole.into()) as i64
+            };
+            let crossing = match side {
+                0 => Point { x: self.least.x, y: at(from.y, to.y) },
+                1 => Point { x: self.most.x, y: at(from.y, to.y) },
+                2 => Point { x: at(from.x, to.x), y: self.least.y },
+                _ => Point { x: at(from.x, to.x), y: self.most.y },
+            };
+            line = if begin < 0 { [crossing, to] } else { [from, crossing] };
+        }
+        Some(line)
+    }
+}
+
+/// How coordinates become positions on the page, and what of the page is drawn on.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Frame {
+    /// P1 and P2, in plotter units before the rotation.
+    pub(super) corners: [Point; 2],
+    /// The user units at P1 and P2: x and x, y and y.
+    scale: Option<[i64; 4]>,
+    /// How many quarters of a turn the page is turned.
+    quarters: u8,
+    /// The hard clip limits on the page.
+    pub(super) limits: Rectangle,
+    /// The window that `IW` has chosen, on the page.
+    window: Option<Rectangle>,
+}
+
+impl Frame {
+    /// Of zero bits only, before there is a state.
+    pub(super) const ZERO: Self = Self {
+        corners: [Point::ZERO; 2],
+        scale: None,
+        quarters: 0,
+        limits: Rectangle { least: Point::ZERO, most: Point::ZERO },
+        window: None,
+    };
+
+    /// The state after `IN`, with these hard clip limits, which begin at 0.
+    pub(super) fn new(limits: Rectangle) -> Self {
+        Self { corners: CORNERS, limits, ..Self::default() }
+    }
+
+    /// The state after `DF`.
+    pub(super) fn set_default(&mut self) {
+        (self.scale, self.window) = (None, None);
+    }
+
+    /// The position on the page of coordinates in the current units. `None` beyond the range.
+    pub(super) fn position(&self, point: Point) -> Option<Point> {
+        self.in_plotter_units(point).map(|point| self.on_page(point))
+    }
+
+    /// A distance in the current units as one on the page. `None` beyond the range.
+    pub(super) fn distance(&self, distance: Point) -> Option<Point> {
+        self.length(distance).map(|distance| distance.turned(self.quarters))
+    }
+
+    /// A distance in the current units in plotter units, before the rotation.
+    pub(super) fn length(&self, distance: Point) -> Option<Point> {
+        let Some([x1, x2, y1, y2]) = self.scale else { return Some(distance) };
+        let [p1, p2] = self.corners;
+        let x = ratio(distance.x, p2.x - p1.x, x2 - x1)?;
+        let y = ratio(distance.y, p2.y - p1.y, y2 - y1)?;
+        Some(Point { x, y })
+    }
+
+    /// A distance in plotter units as one on the page.
+    pub(super) fn turned(&self, distance: Point) -> Point {
+        distance.turned(self.quarters)
+    }
+
+    fn in_plotter_units(&self, point: Point) -> Option<Point> {
+        let Some([x, _, y, _]) = self.scale else { return Some(point) };
+        self.length(point.minus(Point { x, y }))?.plus(self.corners[0])
+    }
+
+    /// The position on the page of a point in plotter units.
+    fn on_page(&self, point: Point) -> Point {
+        let Point { x, y } = point.turned(self.quarters);
+        let most = self.limits.most;
+        let [right, up] = [matches!(self.quarters, 1 | 2), matches!(self.quarters, 2 | 3)];
+        Point { x: x + if right { most.x } else { 0 }, y: y + if up { most.y } else { 0 } }
+    }
+
+    /// A position on the page in plotter units.
+    pub(super) fn plotter_units(&self, position: Point) -> Point {
+        let origin = self.on_page(Point::default());
+        position.minus(origin).turned(4 - self.quarters)
+    }
+
+    /// A position on the page in the current units.
+    pub(super) fn user_units(&self, position: Point) -> Point {
+        let point = self.plotter_units(position);
+        let Some([x1, x2, y1, y2]) = self.scale else { return point };
+        let [p1, p2] = self.corners;
+        let Point { x, y } = point.minus(p1);
+        Point {
+            x: x1 + ratio(x, x2 - x1, p2.x - p1.x).unwrap_or_default(),
+            y: y1 + ratio(y, y2 - y1, p2.y - p1.y).unwrap_or_default(),
+        }
+    }
+
+    /// Whether coordinates are in user units.
+    pub(super) fn is_scaled(&self) -> bool {
+        self.scale.is_some()
+    }
+
+    /// Whether all that can be drawn on contains the position.
+    pub(super) fn contains(&self, position: Point) -> bool {
+        self.limits.contains(position) && self.window.is_none_or(|window| window.contains(position))
+    }
+
+    /// The part of a line on the page that is drawn.
+    pub(super) fn clip(&self, line: [Point; 2]) -> Option<[Point; 2]> {
+        let line = self.limits.clip(line)?;
+        match self.window {
+            Some(window) => window.clip(line),
+            None => Some(line),
+        }
+    }
+
+    /// A rectangle of the page in the current units.
+    pub(super) fn seen(&self, Rectangle { least, most }: Rectangle, user: bool) -> Rectangle {
+        let [a, b] = [least, most].map_each(|corner| {
+            if user { self.user_units(corner) } else { self.plotter_units(corner) }
+        });
+        Rectangle::between(a, b)
+    }
+
+    /// What can be drawn on.
+    pub(super) fn visible(&self) -> Rectangle {
+        let Some(Rectangle { least, most }) = self.window else { return self.limits };
+        Rectangle { least: self.limits.nearest(least), most: self.limits.nearest(most) }
+    }
+
+    /// The length of a part of a hundred of the distance from P1 to P2, in units of 2^-16 percent.
+    pub(super) fn percent(&self, percent: i64) -> i64 {
+        let [p1, p2] = self.corners;
+        hundredths(p2.minus(p1).length(), percent)
+    }
+
+    /// Parts of a hundred of the width and the height between P1 and P2.
+    pub(super) fn percents(&self, [x, y]: [i64; 2]) -> Point {
+        let [p1, p2] = self.corners;
+        Point { x: hundredths(p2.x - p1.x, x), y: hundredths(p2.y - p1.y, y) }
+    }
+
+    /// `IP`: sets P1 and P2. Returns `false` for a wrong number of numbers.
+    pub(super) fn set_corners(&mut self, numbers: &[i64]) -> bool {
+        self.corners = match *numbers {
+            [] => CORNERS,
+            [x, y] => {
+                let [p1, p2] = self.corners;
+                let first = Point { x, y };
+                [first, p2.minus(p1).plus(first).unwrap_or(p2)]
+            }
+            [x1, y1, x2, y2] => [Point { x: x1, y: y1 }, Point { x: x2, y: y2 }],
+            _ => return false,
+        };
+        true
+    }
+
+    /// `SC`: sets the user units. Returns `false` for units of no length.
+    pub(super) fn set_scale(&mut self, numbers: &[i64]) -> bool {
+        let [p1, p2] = self.corners;
+        let (width, height) = (p2.x - p1.x, p2.y - p1.y);
+        self.scale = match *numbers {
+            [] => None,
+            [x1, x2, y1, y2] if x1 != x2 && y1 != y2 => Some([x1, x2, y1, y2]),
+            // HP-GL/2 knows two more kinds: units of the same length on both axes, and units of
+            // which so many plotter units are one.
+            [x1, x2, y1, y2, kind, ..] if kind == UNIT && x1 != x2 && y1 != y2 => {
+                isotropic([x1, x2, y1, y2], width, height)
+            }
+            [x1, x_unit, y1, y_unit, kind] if kind == 2 * UNIT && x_unit != 0 && y_unit != 0 => {
+                let ends = ratio(width, UNIT, x_unit).zip(ratio(height, UNIT, y_unit));
+                ends.map(|(wide, high)| [x1, x1 + wide, y1, y1 + high])
+                    .filter(|[x1, x2, y1, y2]| x1 != x2 && y1 != y2)
+            }
+            _ => return false,
+        };
+        self.scale.is_some() || numbers.is_empty()
+    }
+
+    /// `IW`: sets the window, or none.
+    pub(super) fn set_window(&mut self, corners: Option<[Point; 2]>) -> Option<()> {
+        self.window = match corners {
+            None => None,
+            Some([a, b]) => Some(Rectangle::between(self.position(a)?, self.position(b)?)),
+        };
+        Some(())
+    }
+
+    /// `RO`: turns the page.
+    pub(super) fn rotate(&mut self, quarters: u8) {
+        self.quarters = quarters & 3;
+    }
+}
+
+/// The user units at P1 and P2 if both axes have the same unit, and those of `scale` lie in the
+/// middle of P1 and P2.
+fn isotropic([x1, x2, y1, y2]: [i64; 4], width: i64, height: i64) -> Option<[i64; 4]> {
+    let (wide, high) = ((x2 - x1).abs(), (y2 - y1).abs());
+    // The unit is width / wide or height / high, whichever is less.
+    let x_is_less = product(width.abs(), high) <= product(height.abs(), wide);
+    let (unit, of) = if x_is_less { (width.abs(), wide) } else { (height.abs(), high) };
+    let widened = |from: i64, to: i64, length: i64| {
+        let extra = (ratio(length.abs(), of, unit)? - (to - from).abs()) / 2 * (to - from).signum();
+        Some([from - extra, to + extra])
+    };
+    let ([x1, x2], [y1, y2]) = (widened(x1, x2, width)?, widened(y1, y2, height)?);
+    (x1 != x2 && y1 != y2).then_some([x1, x2, y1, y2])
+}
+
+/// `value` times `numerator` over `denominator`; `None` beyond the range or without denominator.
+fn ratio(value: i64, numerator: i64, denominator: i64) -> Option<i64> {
+    if denominator == 0 {
+        return None;
+    }
+    let numerator = if denominator < 0 { -numerator } else { numerator };
+    let result = divide_rounding(product(value, numerator), denominator.abs().into());
+    i64::try_from(result).ok().filter(|result| result.abs() <= FARTHEST)
+}
+
+/// So many hundredths of a length, in units of 2^-16 percent; at most the farthest coordinate.
+fn hundredths(length: i64, percent: i64) -> i64 {
+    ratio(length, percent, 100 * UNIT).unwrap_or(FARTHEST)
+}

@@ -1,0 +1,344 @@
+//! Tells where HP-GL begins and ends among the bytes of a serial port, and which bytes are text.
+//!
+//! The receive interrupt and the main loop both follow the bytes in this way, each with a
+//! [`Dialect`] of its own, and come to the same conclusions, because both see the same bytes.
+
+use super::{DAMAGED, ESCAPE, LABEL_END};
+
+/// The line that begins HP-GL by command.
+const COMMAND: &[u8] = b"$hpgl";
+
+/// What a byte belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Token {
+    /// A line that is not HP-GL.
+    Line,
+    /// HP-GL begins with this byte. What came of the line before belongs to it.
+    Begins(Beginning),
+    /// An instruction of HP-GL, and not a text.
+    Code,
+    /// The text of a label, or other data in which any byte may stand.
+    Text,
+    /// An instruction to the interface, which begins with ESC.
+    Control,
+    /// HP-GL has ended before this byte, the `$` at the beginning of a line.
+    Leaves,
+}
+
+/// How HP-GL begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Beginning {
+    /// By the instruction `IN`; the byte is the one after it.
+    Initialize,
+    /// By ESC and this byte.
+    Escape,
+    /// By the line `$hpgl`, which the byte ends.
+    Command,
+}
+
+/// Follows the bytes of one serial port.
+///
+/// ```
+/// use penup::hpgl::{Dialect, Token};
+/// let mut dialect = Dialect::new();
+/// for byte in *b"G0 X1\nIN;PU;LBWhy" {
+///     dialect.take(byte);
+/// }
+/// assert!(dialect.is_in_text());
+/// assert_eq!(dialect.take(b'?'), Token::Text);
+/// dialect.take(3);
+/// assert!(!dialect.is_in_text());
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Dialect {
+    /// What the next byte belongs to.
+    state: State,
+    /// How far an instruction to the interface has come.
+    control: Control,
+    /// The byte that ends a label.
+    terminator: u8,
+    /// The first letter of an instruction, 0 if none has come.
+    letter: u8,
+    /// Whether the last byte ended a line.
+    begins_line: bool,
+}
+
+/// What the next byte belongs to, without the instructions to the interface.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum State {
+    /// A line of another language that is empty so far.
+    LineBegin,
+    /// So many bytes of `IN` have come of a line.
+    In(u8),
+    /// So many bytes of the command have come of a line.
+    Command(u8),
+    /// ESC has come at the beginning of a line.
+    Escape,
+    /// The rest of a line of another language.
+    Rest,
+    /// An instruction.
+    Code,
+    /// A text, up to the terminator.
+    Text,
+    /// The new terminator, after `DT`.
+    Terminator,
+    /// The new symbol, after `SM`.
+    Symbol,
+    /// Data up to a semicolon, after `PE` and `CO`.
+    Data,
+}
+
+/// How far an instruction to the interface has come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Control {
+    /// There is none.
+    None,
+    /// ESC has come.
+    Escape,
+    /// ESC and a dot have come.
+    Dot,
+    /// Its parameters are coming, up to a colon.
+    Parameters,
+    /// It is one of another language, up to a capital letter.
+    Other,
+}
+
+impl Dialect {
+    /// Before the first byte.
+    pub const fn new() -> Self {
+        let (state, control) = (State::LineBegin, Control::None);
+        Self { state, control, terminator: LABEL_END, letter: 0, begins_line: false }
+    }
+
+    /// Whether HP-GL is in force.
+    pub fn is_in_force(&self) -> bool {
+        matches!(
+            self.state,
+            State::Code | State::Text | State::Terminator | State::Symbol | State::Data
+        )
+    }
+
+    /// Whether the next byte is text or data, so that `?`, `!` and `~` are no commands.
+    pub fn is_in_text(&self) -> bool {
+        self.control != Control::None
+            || matches!(self.state, State::Text | State::Terminator | State::Symbol | State::Data)
+    }
+
+    /// Whether the next byte is data in which any byte from 0x80 up may stand, too.
+    pub fn is_in_data(&self) -> bool {
+        self.control == Control::None && self.state == State::Data
+    }
+
+    /// Takes the next byte and says what it belongs to.
+    pub fn take(&mut self, byte: u8) -> Token {
+        if let Some(token) = self.take_control(byte) {
+            return token;
+        }
+        match self.state {
+            State::LineBegin | State::In(_) | State::Command(_) | State::Escape | State::Rest => {
+                self.take_line(byte)
+            }
+            State::Code => self.take_code(byte),
+            State::Text => {
+                if byte == self.terminator {
+                    self.state = State::Code;
+                }
+                Token::Text
+            }
+            State::Terminator => {
+                self.terminator = terminator(byte);
+                self.state = State::Code;
+                Token::Text
+            }
+            State::Symbol => {
+                self.state = State::Code;
+                Token::Text
+            }
+            State::Data => {
+                if byte == b';' {
+                    self.state = State::Code;
+                }
+                Token::Text
+            }
+        }
+    }
+
+    /// Takes a byte of an instruction to the interface. `None` if it is none.
+    fn take_control(&mut self, byte: u8) -> Option<Token> {
+        self.control = match self.control {
+            Control::None if byte == ESCAPE && self.is_in_force() => Control::Escape,
+            Control::None => return None,
+            Control::Escape if byte == b'.' => Control::Dot,
+            Control::Escape | Control::Other if byte.is_ascii_uppercase() => Control::None,
+            Control::Escape | Control::Other => Control::Other,
+            Control::Dot if has_parameters(byte) => Control::Parameters,
+            Control::Dot => {
+                if byte == b'K' {
+                    (self.state, self.letter) = (State::Code, 0);
+                }
+                Control::None
+            }
+            Control::Parameters if byte.is_ascii_digit() || byte == b';' => Control::Parameters,
+            Control::Parameters if byte == b':' => Control::None,
+            Control::Parameters => {
+                // It ends without its colon, and the byte belongs to what follows.
+                self.control = Control::None;
+                return (byte == ESCAPE).then(|| {
+                    self.control = Control::Escape;
+                    Token::Control
+                });
+            }
+        };
+        Some(Token::Control)
+    }
+
+    /// Takes a byte of a line that is not HP-GL so far.
+    fn take_line(&mut self, byte: u8) -> Token {
+        let ends_line = byte == b'\n' || byte == b'\r';
+        self.state = match (self.state, byte) {
+            (State::In(2), b';' | b'\n' | b'\r' | b'A'..=b'Z') => {
+                return self.begin(Beginning::Initialize, byte);
+            }
+            (State::Escape, b'.' | b'%') => {
+                self.control = if byte == b'.' { Control::Dot } else { Control::Other };
+                return self.begin(Beginning::Escape, 0);
+            }
+            (State::Command(count), _) if ends_line && usize::from(count) == COMMAND.len() => {
+                return self.begin(Beginning::Command, byte);
+            }
+            _ if ends_line => State::LineBegin,
+            (State::LineBegin, b' ' | b'\t' | 0) => State::LineBegin,
+            (State::LineBegin, ESCAPE) => State::Escape,
+            (State::LineBegin, b'I') => State::In(1),
+            (State::In(1), b'N') => State::In(2),
+            (State::LineBegin, b'$') => State::Command(1),
+            (State::Command(count), _) if COMMAND.get(usize::from(count)) == Some(&byte) => {
+                State::Command(count + 1)
+            }
+            _ => State::Rest,
+        };
+        Token::Line
+    }
+
+    /// Begins HP-GL with this byte.
+    fn begin(&mut self, beginning: Beginning, byte: u8) -> Token {
+        let control = self.control;
+        *self = Self { state: State::Code, control, ..Self::new() };
+        if beginning != Beginning::Escape {
+            self.take_code(byte);
+        }
+        Token::Begins(beginning)
+    }
+
+    /// Takes a byte of an instruction.
+    fn take_code(&mut self, byte: u8) -> Token {
+        if byte == b'$' && self.begins_line {
+            *self = Self { state: State::Command(1), ..Self::new() };
+            return Token::Leaves;
+        }
+        self.begins_line = byte == b'\n' || byte == b'\r';
+        if byte == DAMAGED || !byte.is_ascii_alphabetic() {
+            self.letter = 0;
+            return Token::Code;
+        }
+        let first = core::mem::replace(&mut self.letter, byte);
+        if first != 0 {
+            self.letter = 0;
+            match &[first.to_ascii_uppercase(), byte.to_ascii_uppercase()] {
+                b"LB" | b"BL" | b"WD" => self.state = State::Text,
+                b"DT" => self.state = State::Terminator,
+                b"SM" => self.state = State::Symbol,
+                b"PE" | b"CO" => self.state = State::Data,
+                b"IN" | b"DF" => self.terminator = LABEL_END,
+                _ => {}
+            }
+        }
+        Token::Code
+    }
+}
+
+impl Default for Dialect {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// The terminator that `DT` and this byte choose. Line ends, zero and ESC cannot end a label.
+pub(super) fn terminator(byte: u8) -> u8 {
+    match byte {
+        b';' | b'\n' | b'\r' | 0 | ESCAPE | DAMAGED => LABEL_END,
+        byte => byte,
+    }
+}
+
+/// Whether the instruction to the interface with this letter has parameters and ends with a colon.
+pub(super) fn has_parameters(letter: u8) -> bool {
+    matches!(letter, b'@' | b'H' | b'I' | b'M' | b'N' | b'P' | b'Q' | b'T')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::string::String;
+
+    /// The kinds of the bytes, one letter for each.
+    fn kinds(bytes: &[u8]) -> String {
+        let mut dialect = Dialect::new();
+        let letter = |token| match token {
+            Token::Line => 'l',
+            Token::Begins(_) => 'B',
+            Token::Code => 'c',
+            Token::Text => 't',
+            Token::Control => 'e',
+            Token::Leaves => 'L',
+        };
+        bytes.iter().map(|byte| letter(dialect.take(*byte))).collect()
+    }
+
+    #[test]
+    fn it_begins_with_in_escape_or_the_command_at_the_beginning_of_a_line_only() {
+        for (bytes, expected) in [
+            (b"IN;PU;".as_slice(), "llBccc"),
+            (b"G0\nIN\nPU", "lllllBcc"),
+            (b" INSP1", "lllBcc"),
+            (b"\x1B.(IN;", "lBeccc"),
+            (b"\x1B.I81;;17:PU", "lBeeeeeeeecc"),
+            (b"\x1B%0BPU", "lBeecc"),
+            (b"$hpgl\r\nPU", "lllllBccc"),
+            (b"(IN;)\n", "llllll"),
+            (b"xIN;\n", "lllll"),
+            (b"INK\n", "llBc"),
+            (b"in;\n", "llll"),
+            (b"IN3\n", "llll"),
+            (b"$hpg\n", "lllll"),
+            (b"\xFFIN;\nIN;", "lllllllB"),
+        ] {
+            assert_eq!(kinds(bytes), expected, "{}", bytes.escape_ascii());
+        }
+    }
+
+    #[test]
+    fn it_ends_with_a_dollar_at_the_beginning_of_a_line_outside_of_text_only() {
+        for (bytes, expected) in [
+            (b"IN;\n$$\n".as_slice(), "llBcLll"),
+            (b"IN;$$\n", "llBccc"),
+            (b"IN;LB\n$X\x03\n$", "llBccttttcL"),
+            (b"IN;DT$;LBa\n$\n$", "llBcctcccttttcL"),
+            (b"IN;SM\n$", "llBcctc"),
+            (b"IN;PE\n$;\n$", "llBcctttcL"),
+        ] {
+            let found = kinds(bytes);
+            assert_eq!(found.len(), bytes.len());
+            assert_eq!(found.ends_with('L') || found.contains("Ll"), expected.contains('L'));
+        }
+    }
+
+    #[test]
+    fn text_ends_where_the_interpreter_ends_it() {
+        assert_eq!(kinds(b"IN;LBa?\x03PU"), "llBcctttcc".replace("cctttcc", "cctttcc"));
+        assert_eq!(kinds(b"IN;DT#LBa\x03#PU"), "llBcctcctttcc");
+        assert_eq!(kinds(b"IN;DT#IN;LBa#\x03PU"), "llBcctccccctttcc");
+        assert_eq!(kinds(b"IN;LBa\x1B.Bb\x03PU"), "llBccteeettcc");
+        assert_eq!(kinds(b"IN;LBa\x1B.KPU"), "llBccteeecc");
+    }
+}

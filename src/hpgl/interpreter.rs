@@ -1,0 +1,366 @@
+//! The instructions of HP-GL, and the orders that come of them.
+
+use super::coordinates::{Frame, Point, Rectangle, UNIT};
+use super::encoded::Polyline;
+use super::label::TextStyle;
+use super::line_type::{LineStyle, Part, Stroke};
+use super::number::Number;
+use super::outline::ArcStep;
+use super::parser::Mode;
+use crate::drawing::LetterStrokes;
+use heapless::Deque;
+
+/// The longest answer, in bytes.
+pub const ANSWER_BYTES: usize = 64;
+
+/// An answer, without what ends it.
+pub type Answer = heapless::String<ANSWER_BYTES, u8>;
+
+/// The most steps of one byte.
+const STEPS: usize = 8;
+
+/// What is to be done next.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Order {
+    /// There is nothing to do.
+    Nothing,
+    /// The interpreter is to be initialized, with the pen where it is.
+    Initialize,
+    /// A line is drawn. The pen first goes to its beginning if it is elsewhere.
+    Line([Point; 2]),
+    /// A dot is drawn.
+    Dot(Point),
+    /// The pen goes there without drawing.
+    Go(Point),
+    /// The pen with this number is needed, from 1; 0 if none is.
+    Pen(u8),
+    /// An answer is sent.
+    Answer(Answer),
+}
+
+/// A part of what a byte asks for.
+#[derive(Debug, Clone)]
+pub(super) enum Step {
+    Initialize,
+    /// A line to a position.
+    Line(Point),
+    /// A move to a position with the pen up.
+    Travel(Point),
+    /// The pen counts as being at a position, to which it goes before it next draws.
+    Place(Point),
+    /// A dot where the pen is.
+    Dot,
+    Arc(ArcStep),
+    /// A letter whose lower left corner, or whose middle if it is a symbol, is where the pen is.
+    Letter(LetterStrokes, bool),
+    Pen(u8),
+    Answer(Answer),
+}
+
+/// The errors that `OE` tells by their number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum ErrorNumber {
+    /// The instruction is not known.
+    Unknown = 1,
+    /// The number of parameters is wrong.
+    WrongCount = 2,
+    /// A parameter is out of its range.
+    BadParameter = 3,
+    /// The character set is not known.
+    UnknownSet = 5,
+    /// The position is beyond the range of coordinates.
+    Overflow = 6,
+    /// Something was to be drawn while the machine was locked.
+    Locked = 8,
+}
+
+/// The interpreter. All its bits may be zero before [`Interpreter::initialize`].
+#[derive(Debug)]
+pub struct Interpreter {
+    /// What the next byte belongs to.
+    pub(super) mode: Mode,
+    /// The first letter of an instruction, 0 if none has come.
+    pub(super) letter: u8,
+    /// The name of the instruction, 0 if there is none.
+    pub(super) name: [u8; 2],
+    /// The number that is being read.
+    pub(super) number: Number,
+    /// The numbers of the instruction so far that are not used yet.
+    pub(super) numbers: [i64; 8],
+    /// How many there are; more than 8 are not kept.
+    pub(super) count: usize,
+    /// Whether a pair of coordinates has been drawn.
+    pub(super) has_pairs: bool,
+    /// Whether a number was bad.
+    pub(super) is_bad: bool,
+    pub(super) polyline: Polyline,
+    /// The code point of a letter so far, and how many more bytes it has.
+    pub(super) partial: (u32, u8),
+
+    pub(super) frame: Frame,
+    /// The position on the page, which may be beyond the limits.
+    pub(super) at: Point,
+    /// Whether the position is not known, because coordinates were beyond the range or lost.
+    pub(super) is_lost: bool,
+    pub(super) is_down: bool,
+    pub(super) is_relative: bool,
+    /// Whether the pen has been put away.
+    pub(super) has_no_pen: bool,
+    pub(super) text: TextStyle,
+    pub(super) line: LineStyle,
+    /// The lengths of ticks in the positive and the negative direction, in percent.
+    pub(super) ticks: [i64; 2],
+    /// The speed with the pen down in cm/s, in units of 2^-16; 0 if none was chosen.
+    pub(super) speed: i64,
+    /// The number of the last error, 0 if there was none.
+    pub(super) error: u8,
+    pub(super) is_initialized: bool,
+    pub(super) has_new_corners: bool,
+
+    /// What is left to do for the last byte.
+    steps: Deque<Step, STEPS>,
+    /// How many parts of the first step are done.
+    index: u32,
+    /// The line that is being drawn in dashes.
+    stroke: Option<Stroke>,
+}
+
+impl Interpreter {
+    /// Consists of zero bits. Before use it must be initialized.
+    pub const fn new() -> Self {
+        Self {
+            mode: Mode::Code,
+            letter: 0,
+            name: [0; 2],
+            number: Number::ZERO,
+            numbers: [0; 8],
+            count: 0,
+            has_pairs: false,
+            is_bad: false,
+            polyline: Polyline::ZERO,
+            partial: (0, 0),
+            frame: Frame::ZERO,
+            at: Point::ZERO,
+            is_lost: false,
+            is_down: false,
+            is_relative: false,
+            has_no_pen: false,
+            text: TextStyle::ZERO,
+            line: LineStyle::ZERO,
+            ticks: [0; 2],
+            speed: 0,
+            error: 0,
+            is_initialized: false,
+            has_new_corners: false,
+            steps: Deque::new(),
+            index: 0,
+            stroke: None,
+        }
+    }
+
+    /// Makes the state that `IN` makes, with the pen at this position and these hard clip limits,
+    /// whose lower left corner is 0.
+    pub fn initialize(&mut self, at: Point, limits: Rectangle) {
+        self.frame = Frame::new(limits);
+        (self.at, self.is_lost, self.is_down) = (at, false, false);
+        self.has_no_pen = false;
+        (self.error, self.is_initialized, self.has_new_corners) = (0, true, false);
+        self.speed = 0;
+        self.set_defaults();
+    }
+
+    /// Makes the state that `DF` makes.
+    pub(super) fn set_defaults(&mut self) {
+        self.frame.set_default();
+        self.is_relative = false;
+        self.text = TextStyle::DEFAULT;
+        self.line = LineStyle::SOLID;
+        self.ticks = [UNIT / 2; 2];
+    }
+
+    /// Forgets the instruction that has not ended and what is left of the last one.
+    pub fn abandon(&mut self) {
+        self.mode = Mode::Code;
+        self.forget_instruction();
+        self.letter = 0;
+        self.clear_steps();
+    }
+
+    /// Forgets what is left to do for the last byte.
+    pub fn clear_steps(&mut self) {
+        self.steps.clear();
+        (self.index, self.stroke) = (0, None);
+    }
+
+    /// Whether nothing is left to do for the bytes so far, and no instruction waits for its end.
+    pub fn is_idle(&self) -> bool {
+        self.steps.is_empty() && self.stroke.is_none()
+    }
+
+    /// The speed that `VS` has chosen for lines, in cm/s, in units of 2^-16; `None` if it has not.
+    pub fn speed(&self) -> Option<i64> {
+        (self.speed > 0).then_some(self.speed)
+    }
+
+    /// Notes that something was to be drawn while the machine was locked.
+    pub fn note_locked(&mut self) {
+        self.fail(ErrorNumber::Locked);
+    }
+
+    /// Notes an error.
+    pub(super) fn fail(&mut self, error: ErrorNumber) {
+        self.error = error as u8;
+    }
+
+    /// Notes that the position is beyond the range of coordinates.
+    pub(super) fn overflow(&mut self) {
+        self.is_lost = true;
+        self.fail(ErrorNumber::Overflow);
+    }
+
+    /// Notes that bytes were lost. Nothing is drawn until both the pen and the position are known
+    /// again.
+    pub(super) fn lose(&mut self) {
+        self.is_lost = true;
+        self.is_down = false;
+    }
+
+    /// Adds a step. There is room, because a byte never makes more of them.
+    pub(super) fn add(&mut self, step: Step) {
+        let is_added = self.steps.push_back(step).is_ok();
+        debug_assert!(is_added, "a byte makes too many steps");
+    }
+
+    /// Moves to coordinates in the current units, and draws if the pen is down.
+    pub(super) fn go(&mut self, to: Point, is_relative: bool) {
+        self.text.advanced = Point::default();
+        if self.is_lost && is_relative {
+            return;
+        }
+        let to = if is_relative {
+            self.frame.distance(to).and_then(|distance| distance.plus(self.at))
+        } else {
+            self.frame.position(to)
+        };
+        let Some(to) = to else { return self.overflow() };
+        let was_lost = core::mem::take(&mut self.is_lost);
+        self.add(if self.is_down && !was_lost { Step::Line(to) } else { Step::Travel(to) });
+        if let Some(symbol) = Some(self.text.symbol).filter(|symbol| *symbol != 0) {
+            self.add_letter(symbol.into(), true);
+        }
+    }
+
+    /// Adds the strokes of a letter.
+    pub(super) fn add_letter(&mut self, letter: char, is_symbol: bool) {
+        for strokes in LetterStrokes::of(letter).into_iter().flatten() {
+            self.add(Step::Letter(strokes, is_symbol));
+        }
+    }
+
+    /// The next order of the bytes so far. Take all of them before the next byte comes.
+    pub fn next_order(&mut self) -> Option<Order> {
+        loop {
+            if let Some(order) = self.continue_stroke() {
+                return Some(order);
+            }
+            if self.stroke.is_some() {
+                continue;
+            }
+            let step = self.steps.front()?.clone();
+            let index = self.index;
+            self.index += 1;
+            let order = match step {
+                Step::Initialize => Some(Order::Initialize),
+                Step::Arc(arc) => match arc.chord(index) {
+                    Some(to) => {
+                        self.draw_to(to);
+                        continue;
+                    }
+                    None => None,
+                },
+                Step::Letter(strokes, is_symbol) => match strokes.line(index as usize) {
+                    Some(Some(line)) => {
+                        let line = line.map(|point| {
+                            let point = self.text.letter_point(&self.frame, point, is_symbol);
+                            Point { x: self.at.x + point.x, y: self.at.y + point.y }
+                        });
+                        match self.ink(line) {
+                            Some(order) => return Some(order),
+                            None => continue,
+                        }
+                    }
+                    Some(None) => continue,
+                    None => None,
+                },
+                Step::Line(to) => {
+                    self.draw_to(to);
+                    None
+                }
+                Step::Travel(to) => {
+                    self.at = to;
+                    self.frame.contains(to).then_some(Order::Go(to))
+                }
+                Step::Place(at) => {
+                    self.at = at;
+                    None
+                }
+                Step::Dot => self.ink([self.at; 2]),
+                Step::Pen(pen) => {
+                    self.has_no_pen = pen == 0;
+                    Some(Order::Pen(pen))
+                }
+                Step::Answer(answer) => Some(Order::Answer(answer)),
+            };
+            self.steps.pop_front();
+            self.index = 0;
+            if order.is_some() {
+                return order;
+            }
+        }
+    }
+
+    /// Begins a line in the present style.
+    fn draw_to(&mut self, to: Point) {
+        let from = core::mem::replace(&mut self.at, to);
+        self.stroke = Some(Stroke::new(from, to));
+    }
+
+    /// The next part of the line that is being drawn. `None` if nothing of the part is drawn, or
+    /// the line is over; then there is no line any more.
+    fn continue_stroke(&mut self) -> Option<Order> {
+        let mut stroke = self.stroke.take()?;
+        if self.line.number.is_none() {
+            return self.ink([stroke.from, stroke.to]);
+        }
+        let pattern = self.frame.percent(self.line.percent);
+        let part = self.line.next_part(&mut stroke, pattern)?;
+        self.stroke = Some(stroke);
+        match part {
+            Part::Dash(line) => self.ink(line),
+            Part::Dot(point) => self.ink([point; 2]),
+            Part::Gap => None,
+        }
+    }
+
+    /// The order for a line or a dot, as far as it lies within the window.
+    fn ink(&self, line: [Point; 2]) -> Option<Order> {
+        if self.is_lost {
+            return None;
+        }
+        let is_dot = line[0] == line[1];
+        let line = self.frame.clip(line)?;
+        Some(if self.has_no_pen {
+            Order::Go(line[1])
+        } else if is_dot {
+            Order::Dot(line[0])
+        } else {
+            Order::Line(line)
+        })
+    }
+}
+
+impl Default for Interpreter {
+    fn default() -> Self {
+        Self::new()
+    }
+}

@@ -1,0 +1,174 @@
+//! `LT`: lines of dashes and dots.
+
+use super::coordinates::{Point, UNIT};
+use crate::fixed::{divide_rounding, product};
+
+/// The parts of each pattern in percent of its length: what is drawn and what is not, in turn. A
+/// part of no length is a dot.
+const PATTERNS: [&[u8]; 6] = [
+    &[0, 100],
+    &[50, 50],
+    &[70, 30],
+    &[80, 10, 0, 10],
+    &[70, 10, 10, 10],
+    &[50, 10, 10, 10, 10, 10],
+];
+
+/// The least length of a pattern: a fifth of a millimetre.
+const LEAST: i64 = 8 * UNIT;
+
+/// How lines are drawn.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct LineStyle {
+    /// The number after `LT`; `None` for solid lines.
+    pub(super) number: Option<u8>,
+    /// The length of the pattern in percent of the distance from P1 to P2, in units of 2^-16.
+    pub(super) percent: i64,
+    /// How far into the pattern the last line ended.
+    phase: i64,
+}
+
+/// A line that is drawn in parts.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Stroke {
+    pub(super) from: Point,
+    pub(super) to: Point,
+    pub(super) length: i64,
+    /// How much of its length is done.
+    done: i64,
+}
+
+/// A part of a line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Part {
+    /// A dash.
+    Dash([Point; 2]),
+    /// A dot.
+    Dot(Point),
+    /// Nothing is drawn.
+    Gap,
+}
+
+impl LineStyle {
+    /// The length of the pattern when none was chosen: 4 percent.
+    pub(super) const DEFAULT_PERCENT: i64 = 4 * UNIT;
+
+    /// Of zero bits only, before there is a state.
+    pub(super) const ZERO: Self = Self { number: None, percent: 0, phase: 0 };
+
+    /// Solid lines.
+    pub(super) const SOLID: Self = Self { number: None, percent: Self::DEFAULT_PERCENT, phase: 0 };
+
+    /// Begins a pattern anew, as for each `LT`.
+    pub(super) fn chosen(number: u8, percent: i64) -> Self {
+        Self { number: Some(number), percent, phase: 0 }
+    }
+
+    /// The next part of a line, with patterns of this length. `None` at its end.
+    pub(super) fn next_part(&mut self, stroke: &mut Stroke, pattern: i64) -> Option<Part> {
+        let index = self.number.and_then(|number| usize::from(number).checked_sub(1));
+        let Some(parts) = index.and_then(|index| PATTERNS.get(index)) else {
+            // Dots at the ends of lines only.
+            let is_over = core::mem::replace(&mut stroke.done, i64::MAX) == i64::MAX;
+            return (!is_over).then_some(Part::Dot(stroke.to));
+        };
+        if stroke.done >= stroke.length {
+            return None;
+        }
+        let pattern = pattern.max(LEAST);
+        let mut begin = 0;
+        for (index, part) in parts.iter().enumerate() {
+            let end = begin + divide_rounding(product(pattern, (*part).into()), 100) as i64;
+            let is_last = index + 1 == parts.len();
+            let is_drawn = index % 2 == 0;
+            if is_drawn && *part == 0 && self.phase == begin {
+                // The gap behind it begins.
+                self.phase += 1;
+                return Some(Part::Dot(stroke.point(stroke.done)));
+            }
+            if self.phase >= end && !is_last {
+                begin = end;
+                continue;
+            }
+            let end = if is_last { pattern } else { end };
+            let from = stroke.done;
+            let length = (end - self.phase).max(1).min(stroke.length - from);
+            stroke.done += length;
+            self.phase += length;
+            if self.phase >= pattern {
+                self.phase = 0;
+            }
+            let dash = Part::Dash([stroke.point(from), stroke.point(stroke.done)]);
+            return Some(if is_drawn { dash } else { Part::Gap });
+        }
+        None
+    }
+}
+
+impl Stroke {
+    /// The line from one position to another.
+    pub(super) fn new(from: Point, to: Point) -> Self {
+        Self { from, to, length: to.minus(from).length(), done: 0 }
+    }
+
+    /// The point at this distance from the beginning.
+    fn point(&self, distance: i64) -> Point {
+        let way = self.to.minus(self.from);
+        let part = |length: i64| {
+            divide_rounding(product(length, distance), self.length.max(1).into()) as i64
+        };
+        Point { x: self.from.x + part(way.x), y: self.from.y + part(way.y) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::string::String;
+
+    /// A line of this length in patterns of 100 units, as one letter for each 10 units; `.` is a
+    /// dot.
+    fn picture(style: &mut LineStyle, length: i64) -> String {
+        let end = Point { x: length * UNIT, y: 0 };
+        let mut stroke = Stroke::new(Point::default(), end);
+        let mut text = String::new();
+        let mut at = 0;
+        while let Some(part) = style.next_part(&mut stroke, 100 * UNIT) {
+            let done = (stroke.done.min(stroke.length) + UNIT / 2) / (10 * UNIT);
+            let letter = match part {
+                Part::Dash(_) => '-',
+                Part::Dot(_) => {
+                    text.push('.');
+                    continue;
+                }
+                Part::Gap => ' ',
+            };
+            (at..done).for_each(|_| text.push(letter));
+            at = done;
+        }
+        text
+    }
+
+    #[test]
+    fn patterns() {
+        for (number, expected) in [
+            (0, "."),
+            (1, ".          .          ."),
+            (2, "-----     -----     -----"),
+            (3, "-------   -------   -----"),
+            (4, "-------- . -------- . -----"),
+            (5, "------- - ------- - -----"),
+            (6, "----- - - ----- - - -----"),
+        ] {
+            let mut style = LineStyle::chosen(number, 0);
+            assert_eq!(picture(&mut style, 250).trim_end(), expected, "LT{number}");
+        }
+    }
+
+    #[test]
+    fn a_pattern_goes_on_in_the_next_line() {
+        let mut style = LineStyle::chosen(2, 0);
+        let parts = [30, 30, 70].map(|length| picture(&mut style, length));
+        assert_eq!(parts.concat(), "-----     ---");
+    }
+}

@@ -1,0 +1,119 @@
+//! Arcs, circles, rectangles, wedges and ticks.
+
+use super::coordinates::{Point, UNIT};
+use super::interpreter::{Interpreter, Step};
+use crate::fixed::sin_cos_degrees;
+
+/// A whole turn, in units of 2^-16 degrees.
+const TURN: i64 = 360 * UNIT;
+
+/// An arc as straight chords.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ArcStep {
+    center: Point,
+    /// From the centre to the beginning.
+    radius: Point,
+    /// How far it turns counterclockwise, in units of 2^-16 degrees.
+    sweep: i64,
+    /// The number of chords, at least 1.
+    chords: u32,
+}
+
+impl ArcStep {
+    /// The arc with this beginning. Without the angle of a chord, chords are at most an eighth of
+    /// a plotter unit off the arc.
+    fn new(center: Point, radius: Point, sweep: i64, chord: Option<i64>) -> Self {
+        // A second turn draws the same again.
+        let sweep = if sweep.abs() > TURN { sweep % TURN + TURN * sweep.signum() } else { sweep };
+        let chords = match chord {
+            Some(angle) => (sweep.unsigned_abs()).div_ceil(angle.unsigned_abs().max(1)),
+            // A chord of an angle a is r·a²/8 off the arc, so a is one divided by the root of r in
+            // plotter units. A radian has 57.3 degrees.
+            None => {
+                let root = (radius.length().unsigned_abs() >> 12).isqrt(); // in units of 2^-2
+                (sweep.unsigned_abs() * root).div_ceil(57 * 4 << 16)
+            }
+        };
+        Self { center, radius, sweep, chords: chords.clamp(1, 1 << 20) as u32 }
+    }
+
+    /// The end of the chord with this index, from 0; `None` behind the last.
+    pub(super) fn chord(&self, index: u32) -> Option<Point> {
+        if index >= self.chords {
+            return None;
+        }
+        // Below 2^53, so exact.
+        let turned = self.sweep * i64::from(index + 1);
+        let degrees = turned as f64 / (65536.0 * f64::from(self.chords));
+        self.radius.rotated(sine_and_cosine(degrees)).plus(self.center)
+    }
+}
+
+/// The sine and the cosine in units of 2^-30.
+fn sine_and_cosine(degrees: f64) -> [i64; 2] {
+    let (sine, cosine) = sin_cos_degrees(degrees);
+    let scaled = |number: f64| libm::round(number * f64::from(1 << 30)) as i64;
+    [scaled(sine), scaled(cosine)]
+}
+
+impl Interpreter {
+    /// `AA` and `AR`: an arc about a centre.
+    pub(super) fn arc(&mut self, center: Point, sweep: i64, chord: Option<i64>) {
+        let radius = self.at.minus(center);
+        if radius == Point::default() {
+            return;
+        }
+        let arc = ArcStep::new(center, radius, sweep, chord);
+        if self.is_down {
+            self.add(Step::Arc(arc));
+        } else if let Some(end) = arc.chord(arc.chords - 1) {
+            self.add(Step::Travel(end));
+        }
+    }
+
+    /// `CI`: a circle about the pen, which then returns.
+    pub(super) fn circle(&mut self, radius: i64, chord: Option<i64>) {
+        let radius = self.frame.turned(Point { x: radius, y: 0 });
+        if radius == Point::default() {
+            return;
+        }
+        let center = self.at;
+        let Some(begin) = center.plus(radius) else { return self.overflow() };
+        self.add(Step::Place(begin));
+        self.add(Step::Arc(ArcStep::new(center, radius, TURN, chord)));
+        self.add(Step::Place(center));
+    }
+
+    /// `EW` and `WG`: the outline of a wedge about the pen.
+    pub(super) fn wedge(&mut self, radius: i64, start: i64, sweep: i64, chord: Option<i64>) {
+        let center = self.at;
+        let angle = sine_and_cosine(start as f64 / 65536.0);
+        let radius = self.frame.turned(Point { x: radius, y: 0 }.rotated(angle));
+        let Some(begin) = center.plus(radius) else { return self.overflow() };
+        self.add(Step::Line(begin));
+        self.add(Step::Arc(ArcStep::new(center, radius, sweep, chord)));
+        self.add(Step::Line(center));
+    }
+
+    /// `EA`, `ER`, `RA` and `RR`: the outline of a rectangle from the pen to the opposite corner.
+    pub(super) fn rectangle(&mut self, corner: Point) {
+        let at = self.at;
+        for point in [Point { x: corner.x, y: at.y }, corner, Point { x: at.x, y: corner.y }, at] {
+            self.add(Step::Line(point));
+        }
+    }
+
+    /// `XT` and `YT`: a tick across the axis of x or of y.
+    pub(super) fn tick(&mut self, across_x: bool) {
+        let [forth, back] = self.ticks;
+        let at = self.at;
+        let [end, begin] = [forth, -back].map(|percent| {
+            let percents = if across_x { [0, percent] } else { [percent, 0] };
+            at.plus(self.frame.turned(self.frame.percents(percents)))
+        });
+        let (Some(begin), Some(end)) = (begin, end) else { return self.overflow() };
+        self.add(Step::Place(begin));
+        self.add(Step::Line(end));
+        self.add(Step::Place(at));
+    }
+}

@@ -1,0 +1,476 @@
+//! Takes the bytes of instructions, and carries each instruction out at its end.
+
+use super::coordinates::{Point, UNIT};
+use super::interpreter::{ErrorNumber, Interpreter, Step};
+use super::line_type::LineStyle;
+use super::number::Parsed;
+use super::{DAMAGED, dialect};
+
+/// What the next byte belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Mode {
+    /// An instruction.
+    Code,
+    /// The text of a label.
+    Label,
+    /// A text that is not drawn.
+    Skipped,
+    /// A comment up to a semicolon.
+    Comment,
+    /// The byte that ends labels.
+    Terminator,
+    /// The byte that is drawn at each point.
+    Symbol,
+    /// An encoded polyline.
+    Encoded,
+}
+
+/// Instructions that have no effect on what is drawn, or that penup carries out in its own way.
+#[rustfmt::skip]
+const WITHOUT_EFFECT: &[[u8; 2]] = &[
+    *b"AC", *b"AD", *b"AF", *b"AH", *b"AP", *b"AS", *b"BP", *b"CM", *b"CR", *b"CT", *b"CV", *b"DC",
+    *b"DP", *b"EC", *b"FI", *b"FN", *b"FR", *b"FS", *b"FT", *b"GM", *b"GC", *b"GP", *b"IM", *b"KY",
+    *b"LA", *b"LO", *b"MC", *b"NP", *b"NR", *b"PB", *b"PC", *b"PG", *b"PS", *b"PT", *b"PW", *b"QL",
+    *b"RF", *b"RP", *b"SB", *b"SD", *b"SG", *b"SV", *b"TD", *b"TR", *b"UL", *b"WU",
+];
+
+impl Interpreter {
+    /// Takes a byte of HP-GL without instructions to the interface. Before the next byte, take all
+    /// that [`Interpreter::next_order`] returns.
+    pub fn push(&mut self, byte: u8) {
+        match self.mode {
+            Mode::Code => self.push_code(byte),
+            Mode::Label => self.push_text(byte),
+            Mode::Skipped if byte == self.text.terminator => self.mode = Mode::Code,
+            Mode::Comment if byte == b';' => self.mode = Mode::Code,
+            Mode::Skipped | Mode::Comment => {}
+            Mode::Terminator => {
+                self.text.terminator = dialect::terminator(byte);
+                self.mode = Mode::Code;
+            }
+            Mode::Symbol => {
+                self.text.symbol = if matches!(byte, b'!'..=b':' | b'<'..=b'~') { byte } else { 0 };
+                self.mode = Mode::Code;
+            }
+            Mode::Encoded => {
+                if self.push_encoded(byte) {
+                    self.mode = Mode::Code;
+                }
+            }
+        }
+    }
+
+    /// Takes a byte of an instruction.
+    fn push_code(&mut self, byte: u8) {
+        if byte.is_ascii_alphabetic() {
+            let byte = byte.to_ascii_uppercase();
+            if self.letter == 0 {
+                self.end_instruction();
+                self.letter = byte;
+            } else {
+                let first = core::mem::take(&mut self.letter);
+                self.begin_instruction([first, byte]);
+            }
+            return;
+        }
+        if core::mem::take(&mut self.letter) != 0 {
+            self.fail(ErrorNumber::Unknown);
+        }
+        match byte {
+            b'0'..=b'9' | b'.' | b'+' | b'-' => {
+                let before = self.number.push(byte);
+                self.take_number(before);
+            }
+            b';' => self.end_instruction(),
+            b'\n' | b'\r' => self.end_line(),
+            DAMAGED => {
+                self.forget_instruction();
+                self.lose();
+            }
+            _ => {
+                let number = self.number.end();
+                self.take_number(number);
+            }
+        }
+    }
+
+    /// Begins an instruction after its two letters.
+    fn begin_instruction(&mut self, name: [u8; 2]) {
+        self.forget_instruction();
+        match &name {
+            b"LB" => {
+                self.mode = Mode::Label;
+                self.partial = (0, 0);
+            }
+            b"BL" | b"WD" => {
+                self.mode = Mode::Skipped;
+                self.fail(ErrorNumber::Unknown);
+            }
+            b"CO" => self.mode = Mode::Comment,
+            b"DT" => self.mode = Mode::Terminator,
+            b"SM" => self.mode = Mode::Symbol,
+            b"PE" => {
+                self.mode = Mode::Encoded;
+                self.begin_polyline();
+            }
+            _ => self.name = name,
+        }
+        // PD alone makes a dot, which is known at its end only.
+        if &name == b"PU" {
+            self.is_down = false;
+        }
+    }
+
+    /// Whether coordinates of the instruction are drawn as they come.
+    fn draws_pairs(&self) -> bool {
+        matches!(&self.name, b"PU" | b"PD" | b"PA" | b"PR")
+    }
+
+    /// Takes a number of the instruction.
+    fn take_number(&mut self, number: Parsed) {
+        match number {
+            Parsed::None => return,
+            Parsed::Bad => {
+                self.is_bad = true;
+                self.fail(ErrorNumber::BadParameter);
+            }
+            Parsed::Value(value) => {
+                if let Some(slot) = self.numbers.get_mut(self.count) {
+                    *slot = value;
+                }
+            }
+        }
+        self.count = self.count.saturating_add(1);
+        if !self.draws_pairs() || self.count < 2 {
+            return;
+        }
+        let [x, y, ..] = self.numbers;
+        self.count = 0;
+        self.has_pairs = true;
+        self.set_pen_and_mode();
+        if core::mem::take(&mut self.is_bad) {
+            self.overflow();
+            return self.fail(ErrorNumber::BadParameter);
+        }
+        self.go(Point { x, y }, self.is_relative);
+    }
+
+    /// Puts in force what the name of `PD`, `PA` or `PR` says.
+    fn set_pen_and_mode(&mut self) {
+        match &self.name {
+            b"PD" => self.is_down = true,
+            b"PA" => self.is_relative = false,
+            b"PR" => self.is_relative = true,
+            _ => {}
+        }
+    }
+
+    /// Ends a line, which ends an instruction; but coordinates may go on in the next line.
+    fn end_line(&mut self) {
+        if !self.draws_pairs() {
+            return self.end_instruction();
+        }
+        let number = self.number.end();
+        self.take_number(number);
+        if !self.has_pairs && self.count == 0 {
+            self.end_instruction();
+        }
+    }
+
+    /// Ends the instruction and carries it out.
+    fn end_instruction(&mut self) {
+        let number = self.number.end();
+        self.take_number(number);
+        let (name, count) = (self.name, self.count);
+        let numbers = self.numbers;
+        let given = numbers.get(..count.min(numbers.len())).unwrap_or(&[]);
+        if name == [0; 2] {
+            if count > 0 {
+                self.fail(ErrorNumber::Unknown);
+            }
+        } else if self.draws_pairs() {
+            let was_down = self.is_down;
+            self.set_pen_and_mode();
+            if count > 0 {
+                self.fail(ErrorNumber::WrongCount);
+            } else if !self.has_pairs && self.is_down && !was_down && !self.is_lost {
+                self.add(Step::Dot);
+            }
+        } else if !self.is_bad {
+            if let Err(error) = self.carry_out(name, given) {
+                self.fail(error);
+            }
+        }
+        self.forget_instruction();
+    }
+
+    /// Forgets the name and the numbers of the instruction.
+    pub(super) fn forget_instruction(&mut self) {
+        let _ = self.number.end();
+        (self.name, self.count) = ([0; 2], 0);
+        (self.has_pairs, self.is_bad) = (false, false);
+    }
+
+    /// Carries out an instruction with its numbers.
+    fn carry_out(&mut self, name: [u8; 2], numbers: &[i64]) -> Result<(), ErrorNumber> {
+        let number = |index: usize| numbers.get(index).copied().ok_or(ErrorNumber::WrongCount);
+        let pair = || Ok(Point { x: number(0)?, y: number(1)? });
+        let at_most = |count: usize| {
+            if numbers.len() > count { Err(ErrorNumber::WrongCount) } else { Ok(()) }
+        };
+        let bad = ErrorNumber::BadParameter;
+        // Shapes that begin where the pen is need a known position.
+        let is_shape =
+            matches!(&name, b"AA" | b"AR" | b"CI" | b"EA" | b"ER" | b"EW" | b"RA" | b"RR" | b"WG");
+        if self.is_lost && is_shape {
+            return Ok(());
+        }
+        let chord = |index: usize| match numbers.get(index) {
+            None => Ok(None),
+            Some(0) => Err(ErrorNumber::BadParameter),
+            Some(angle) => Ok(Some(*angle)),
+        };
+        match &name {
+            b"IN" => self.add(Step::Initialize),
+            b"DF" => self.set_defaults(),
+            b"SP" => {
+                let pen = numbers.first().map_or(0, |pen| pen / UNIT);
+                let pen = u8::try_from(pen).ok().filter(|pen| *pen <= 32).ok_or(bad)?;
+                self.add(Step::Pen(pen));
+            }
+            b"VS" => {
+                let speed = numbers.first().copied().unwrap_or(0);
+                if speed < 0 || speed > 128 * UNIT {
+                    return Err(bad);
+                }
+                self.speed = speed;
+            }
+            b"IP" => {
+                if !self.frame.set_corners(numbers) {
+                    return Err(ErrorNumber::WrongCount);
+                }
+                self.has_new_corners = true;
+            }
+            b"SC" => {
+                if !matches!(numbers.len(), 0 | 4 | 5 | 7) {
+                    return Err(ErrorNumber::WrongCount);
+                }
+                let before = self.frame;
+                if !self.frame.set_scale(numbers) {
+                    self.frame = before;
+                    return Err(bad);
+                }
+            }
+            b"IW" => {
+                let corners = match *numbers {
+                    [] => None,
+                    [x1, y1, x2, y2] => Some([Point { x: x1, y: y1 }, Point { x: x2, y: y2 }]),
+                    _ => return Err(ErrorNumber::WrongCount),
+                };
+                self.frame.set_window(corners).ok_or(bad)?;
+            }
+            b"RO" => {
+                let degrees = numbers.first().copied().unwrap_or(0);
+                let quarters = degrees / (90 * UNIT);
+                if degrees % (90 * UNIT) != 0 || !(0..4).contains(&quarters) {
+                    return Err(bad);
+                }
+                at_most(1)?;
+                self.frame.rotate(quarters as u8);
+            }
+            b"AA" | b"AR" => {
+                let (point, sweep, chord) = (pair()?, number(2)?, chord(3)?);
+                at_most(4)?;
+                let center = if &name == b"AA" {
+                    self.frame.position(point)
+                } else {
+                    self.frame.distance(point).and_then(|distance| distance.plus(self.at))
+                };
+                self.text.advanced = Point::default();
+                self.arc(center.ok_or(ErrorNumber::Overflow)?, sweep, chord);
+            }
+            b"CI" => {
+                let (radius, chord) = (number(0)?, chord(1)?);
+                at_most(2)?;
+                let radius = self.frame.length(Point { x: radius, y: 0 });
+                self.circle(radius.ok_or(ErrorNumber::Overflow)?.x, chord);
+            }
+            b"EA" | b"RA" => {
+                let corner = pair()?;
+                at_most(2)?;
+                self.rectangle(self.frame.position(corner).ok_or(ErrorNumber::Overflow)?);
+            }
+            b"ER" | b"RR" => {
+                let way = pair()?;
+                at_most(2)?;
+                let corner = self.frame.distance(way).and_then(|way| way.plus(self.at));
+                self.rectangle(corner.ok_or(ErrorNumber::Overflow)?);
+            }
+            b"EW" | b"WG" => {
+                let (radius, start, sweep, chord) = (number(0)?, number(1)?, number(2)?, chord(3)?);
+                at_most(4)?;
+                let radius = self.frame.length(Point { x: radius, y: 0 });
+                self.wedge(radius.ok_or(ErrorNumber::Overflow)?.x, start, sweep, chord);
+            }
+            b"XT" | b"YT" => {
+                at_most(0)?;
+                if !self.is_lost {
+                    self.tick(&name == b"XT");
+                }
+            }
+            b"TL" => {
+                at_most(2)?;
+                self.ticks = match *numbers {
+                    [] => [UNIT / 2; 2],
+                    [forth] => [forth, 0],
+                    [forth, back, ..] => [forth, back],
+                };
+            }
+            b"LT" => self.choose_line_type(numbers)?,
+            b"SI" | b"SR" | b"DI" | b"DR" | b"SL" => self.choose_text_style(&name, numbers)?,
+            b"CP" => match *numbers {
+                [] => self.control_letter(b'\r', true),
+                [columns, lines] => self.space([columns, lines]),
+                _ => return Err(ErrorNumber::WrongCount),
+            },
+            b"CA" | b"CS" => {
+                let set = numbers.first().copied().unwrap_or(0) / UNIT;
+                at_most(1)?;
+                if !matches!(set, 0..=4 | 6..=9 | 30..=39) {
+                    return Err(ErrorNumber::UnknownSet);
+                }
+            }
+            b"SA" | b"SS" => at_most(0)?,
+            [b'O', letter] => {
+                at_most(0)?;
+                if !self.query(*letter) {
+                    return Err(ErrorNumber::Unknown);
+                }
+            }
+            name if WITHOUT_EFFECT.contains(name) => {}
+            _ => return Err(ErrorNumber::Unknown),
+        }
+        Ok(())
+    }
+
+    /// `LT`: how lines are drawn.
+    fn choose_line_type(&mut self, numbers: &[i64]) -> Result<(), ErrorNumber> {
+        let [number, rest @ ..] = numbers else {
+            self.line = LineStyle::SOLID;
+            return Ok(());
+        };
+        let kind = (number / UNIT).unsigned_abs();
+        let percent = match rest {
+            [] => self.line.percent,
+            [percent] if *percent > 0 && *percent <= 127 * UNIT => *percent,
+            [_] => return Err(ErrorNumber::BadParameter),
+            _ => return Err(ErrorNumber::WrongCount),
+        };
+        match u8::try_from(kind) {
+            Ok(kind @ 0..=6) => {
+                self.line = LineStyle::chosen(kind, percent);
+                Ok(())
+            }
+            _ => Err(ErrorNumber::BadParameter),
+        }
+    }
+
+    /// `SI`, `SR`, `DI`, `DR` and `SL`: the size, direction and slant of letters.
+    fn choose_text_style(&mut self, name: &[u8; 2], numbers: &[i64]) -> Result<(), ErrorNumber> {
+        let text = &mut self.text;
+        // Letters of more than a metre do not fit on any page.
+        let is_size = |size: i64| size != 0 && size.abs() <= 110 * UNIT;
+        match (name, numbers) {
+            (b"SI", []) => text.set_default_size(),
+            (b"SI", &[width, height]) if is_size(width) && is_size(height) => {
+                // A centimetre has 400 plotter units.
+                (text.size, text.is_relative_size) = ([400 * width, 400 * height], false);
+            }
+            (b"SR", []) => {
+                (text.size, text.is_relative_size) = ([UNIT * 3 / 4, UNIT * 3 / 2], true);
+            }
+            (b"SR", &[width, height]) if is_size(width) && is_size(height) => {
+                (text.size, text.is_relative_size) = ([width, height], true);
+            }
+            (b"DI" | b"DR", []) => {
+                (text.direction, text.is_relative_direction) = ([UNIT, 0], false);
+                text.advanced = Point::default();
+            }
+            (b"DI" | b"DR", &[run, rise]) if run != 0 || rise != 0 => {
+                (text.direction, text.is_relative_direction) = ([run, rise], name == b"DR");
+                text.advanced = Point::default();
+            }
+            (b"SL", []) => text.slant = 0,
+            (b"SL", &[tangent]) => text.slant = tangent.clamp(-30 * UNIT, 30 * UNIT),
+            (b"SI" | b"SR" | b"DI" | b"DR", [_, _]) => return Err(ErrorNumber::BadParameter),
+            _ => return Err(ErrorNumber::WrongCount),
+        }
+        Ok(())
+    }
+
+    /// Takes a byte of a label.
+    fn push_text(&mut self, byte: u8) {
+        if byte == self.text.terminator {
+            self.mode = Mode::Code;
+            return;
+        }
+        let (partial, left) = self.partial;
+        self.partial = match (byte, left) {
+            (0x80..=0xBF, 1..) => (partial << 6 | u32::from(byte & 0x3F), left - 1),
+            (0xC2..=0xDF, _) => (u32::from(byte & 0x1F), 1),
+            (0xE0..=0xEF, _) => (u32::from(byte & 0x0F), 2),
+            (0xF0..=0xF4, _) => (u32::from(byte & 0x07), 3),
+            _ => (byte.into(), 0),
+        };
+        let (letter, left) = self.partial;
+        if left > 0 {
+            return;
+        }
+        match byte {
+            0x00..=0x1F | 0x7F => self.control_letter(byte, false),
+            0x20..=0x7E => self.write(byte.into()),
+            // What is no letter is drawn as a box.
+            0x80..=0xBF => self.write(char::from_u32(letter).unwrap_or('\u{FFFD}')),
+            _ => self.write('\u{FFFD}'),
+        }
+    }
+
+    /// Draws a letter, and goes to where the next one begins.
+    fn write(&mut self, letter: char) {
+        if self.is_lost {
+            return;
+        }
+        self.add_letter(letter, false);
+        self.space([UNIT, 0]);
+    }
+
+    /// A control character of a label: CR, LF and the step back. With `feeds`, CR also goes one
+    /// line down. Others have no effect.
+    fn control_letter(&mut self, byte: u8, feeds: bool) {
+        match byte {
+            b'\r' => {
+                self.at = self.at.minus(core::mem::take(&mut self.text.advanced));
+                if feeds {
+                    self.space([0, -UNIT]);
+                }
+            }
+            b'\n' => self.space([0, -UNIT]),
+            0x08 => self.space([-UNIT, 0]),
+            _ => {}
+        }
+    }
+
+    /// Goes by so many letters and lines, without drawing.
+    fn space(&mut self, columns_and_lines: [i64; 2]) {
+        let [columns, lines] = columns_and_lines;
+        let along = self.text.spaces(&self.frame, [columns, 0]);
+        let across = self.text.spaces(&self.frame, [0, lines]);
+        let (Some(along), Some(across)) = (along, across) else { return self.overflow() };
+        let at = self.at.plus(along).and_then(|at| at.plus(across));
+        let (Some(at), Some(advanced)) = (at, self.text.advanced.plus(along)) else {
+            return self.overflow();
+        };
+        self.text.advanced = advanced;
+        self.add(Step::Place(at));
+    }
+}

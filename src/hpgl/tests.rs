@@ -1,0 +1,475 @@
+//! Tests of the interpreter and of the session: bytes in, orders and answers out.
+
+use super::{
+    Beginning, DAMAGED, Dialect, Interpreter, Order, Point, RECEIVED_BYTES, Rectangle, Session,
+    Token, UNIT,
+};
+use std::format;
+use std::string::String;
+use std::vec::Vec;
+
+/// The limits: a travel of 400 mm by 300 mm.
+const LIMITS: Rectangle =
+    Rectangle { least: Point { x: 0, y: 0 }, most: Point { x: 16000 * UNIT, y: 12000 * UNIT } };
+
+fn units(Point { x, y }: Point) -> String {
+    let unit = |coordinate: i64| {
+        let hundredths = (coordinate * 100 + UNIT / 2).div_euclid(UNIT);
+        let number = hundredths as f64 / 100.0;
+        format!("{number}")
+    };
+    format!("{},{}", unit(x), unit(y))
+}
+
+fn shown(order: &Order) -> String {
+    match order {
+        Order::Nothing => String::from("nothing"),
+        Order::Initialize => String::from("init"),
+        Order::Line([from, to]) => format!("{}>{}", units(*from), units(*to)),
+        Order::Dot(at) => format!("dot {}", units(*at)),
+        Order::Go(to) => format!("go {}", units(*to)),
+        Order::Pen(pen) => format!("pen {pen}"),
+        Order::Answer(answer) => format!("'{answer}'"),
+    }
+}
+
+fn interpreter() -> Interpreter {
+    let mut interpreter = Interpreter::new();
+    interpreter.initialize(Point::default(), LIMITS);
+    interpreter
+}
+
+/// All orders of some bytes.
+fn orders_of(interpreter: &mut Interpreter, bytes: &[u8]) -> Vec<Order> {
+    let mut orders = Vec::new();
+    for byte in bytes {
+        interpreter.push(*byte);
+        while let Some(order) = interpreter.next_order() {
+            orders.push(order);
+        }
+    }
+    orders
+}
+
+fn orders(bytes: &[u8]) -> String {
+    let orders = orders_of(&mut interpreter(), bytes);
+    orders.iter().map(shown).collect::<Vec<_>>().join(" ")
+}
+
+#[test]
+fn instructions_end_with_a_semicolon_a_line_or_the_next_letter() {
+    for text in [
+        "PU10,20;PD30,40,50,60;",
+        "PU10,20PD30,40 50 60;",
+        "pu10 20\npd30,40,\n50,60;",
+        "PU10,20;PD;PA30,40,50,60;",
+    ] {
+        let found = orders(text.as_bytes()).replace(" dot 10,20", "");
+        assert_eq!(found, "go 10,20 10,20>30,40 30,40>50,60", "{text}");
+    }
+}
+
+#[test]
+fn a_pair_is_drawn_as_it_comes() {
+    let mut interpreter = interpreter();
+    let text = b"PD1,1,2,2,3,3";
+    let drawn: Vec<usize> =
+        text.iter().map(|byte| orders_of(&mut interpreter, &[*byte]).len()).collect();
+    // Each is known to be over with the comma behind it.
+    assert_eq!(drawn, [0, 0, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0]);
+}
+
+#[test]
+fn errors_have_the_numbers_of_the_7475() {
+    for (text, number) in [
+        ("", 0),
+        ("XX;", 1),
+        ("P1;", 1),
+        ("5;", 1),
+        ("PA5;", 2),
+        ("PA1,2,3;", 2),
+        ("AA1,2;", 2),
+        ("SC1,2,3;", 2),
+        ("SC1,1,2,3;", 3),
+        ("PA99999999,0;", 3),
+        ("SI0,1;", 3),
+        ("LT9;", 3),
+        ("CA10;", 5),
+        ("SC0,1,0,1;PA8000000,0;", 6),
+        ("FS3;AS4;PS4;VS10;", 0),
+    ] {
+        let found = orders(format!("{text}OE;OE;").as_bytes());
+        let found: Vec<&str> = found.split(' ').filter(|order| order.starts_with('\'')).collect();
+        assert_eq!(found, [format!("'{number}'").as_str(), "'0'"], "{text}");
+    }
+}
+
+#[test]
+fn lines_are_clipped_at_the_limits_and_at_the_window() {
+    assert_eq!(
+        orders(b"PU100,100;PD20100,100;PA100,200;"),
+        "go 100,100 100,100>16000,100 16000,120.5>100,200"
+    );
+    assert_eq!(orders(b"PU-10,-10;PD-20,50;PA-5,-5;"), "");
+    assert_eq!(orders(b"PU-100,100;PD100,-100;PA100,300;"), "0,0>0,0 100,0>100,300");
+    assert_eq!(orders(b"IW100,100,200,200;PU0,150;PD300,150;"), "100,150>200,150");
+    assert_eq!(orders(b"IW100,100,200,200;IW;PU0,150;PD300,150;"), "go 0,150 0,150>300,150");
+}
+
+#[test]
+fn scales_and_turns() {
+    assert_eq!(orders(b"IP0,0,1000,500;SC0,10,0,10;PU5,5;PD10,0;"), "go 500,250 500,250>1000,0");
+    assert_eq!(orders(b"IP0,0,1000,500;SC10,0,0,10;PU1,1;"), "go 900,50");
+    assert_eq!(orders(b"IP0,0,1000,500;SC0,10,0,10,1;PU5,5;PD10,0;"), "go 500,250 500,250>750,0");
+    assert_eq!(orders(b"IP0,0,1000,500;SC1,2,1,2,2;PU11,1;"), "go 20,0");
+    assert_eq!(orders(b"RO90;PU100,200;PR10,0;"), "go 15800,100 go 15800,110");
+    assert_eq!(orders(b"RO180;PU100,200;"), "go 15900,11800");
+    assert_eq!(
+        orders(b"RO270;PU100,200;RO;PU100,200"),
+        "go 200,11900 go 100,200".replace(" go 100,200", "")
+    );
+    assert_eq!(
+        orders(b"RO90;PU100,200;OA;OC;OH;").split(" '").skip(1).collect::<Vec<_>>(),
+        ["100,200,0'", "100,200,0'", "0,0,12000,16000'"]
+    );
+}
+
+#[test]
+fn answers() {
+    for (text, expected) in [
+        ("OI;", "'7475A'"),
+        ("OS;OS;", "'24' '16'"),
+        ("XX;OS;OE;OS;", "'56' '1' '16'"),
+        ("OP;", "'603,521,10603,7721'"),
+        ("IP1,2,3,4;OS;OP;OS;", "'26' '1,2,3,4' '16'"),
+        ("OH;", "'0,0,16000,12000'"),
+        ("OA;", "'0,0,0'"),
+        ("OF;OO;", "'40,40' '0,1,0,0,1,0,0,0'"),
+        ("OW;IW1,2,3,4;OW;", "'0,0,16000,12000' '1,2,3,4'"),
+    ] {
+        assert_eq!(orders(text.as_bytes()), expected, "{text}");
+    }
+    assert_eq!(orders(b"PD10,20OA;OC;OS;"), "0,0>10,20 '10,20,1' '10,20,1' '25'");
+    assert_eq!(orders(b"SC0,1,0,1;PU0.5,0.25;OC;"), "go 5603,2321 '0.5000,0.2500,0'");
+}
+
+#[test]
+fn a_circle_is_closed_and_within_an_eighth_of_a_unit() {
+    let mut interpreter = interpreter();
+    let found = orders_of(&mut interpreter, b"PU4000,4000;CI1000;");
+    let lines: Vec<[Point; 2]> = found
+        .iter()
+        .filter_map(|order| match order {
+            Order::Line(line) => Some(*line),
+            _ => None,
+        })
+        .collect();
+    let radius = |x: i64, y: i64| {
+        let of = |coordinate: i64| coordinate as f64 / UNIT as f64 - 4000.0;
+        of(x).hypot(of(y))
+    };
+    assert_eq!(lines.first().map(|line| line[0]), lines.last().map(|line| line[1]));
+    assert!(lines.len() < 250, "{}", lines.len());
+    for [a, b] in &lines {
+        assert!((radius(a.x, a.y) - 1000.0).abs() < 0.01);
+        assert!(radius((a.x + b.x) / 2, (a.y + b.y) / 2) > 999.87);
+    }
+    assert!(lines.windows(2).all(|pair| pair[0][1] == pair[1][0]));
+    assert_eq!(orders(b"PU200,100;CI100,120;").split(' ').count(), 2 + 3, "a triangle");
+    assert_eq!(
+        orders(b"PU100,0;PD;AA0,0,90,90;AR0,-100,-90,90;").replace(" dot 100,0", ""),
+        "go 100,0 100,0>0,100 0,100>100,0"
+    );
+    // A second turn draws the same again.
+    assert_eq!(
+        orders(b"PU100,100;PD;AA50,100,450,90;PU").split(' ').filter(|o| o.contains('>')).count(),
+        5
+    );
+}
+
+#[test]
+fn outlines_and_ticks() {
+    assert_eq!(
+        orders(b"PU10,10;EA30,20;ER5,5;").split(' ').skip(2).collect::<Vec<_>>().join(" "),
+        "10,10>30,10 30,10>30,20 30,20>10,20 10,20>10,10 10,10>15,10 15,10>15,15 15,15>10,15 \
+         10,15>10,10"
+    );
+    assert_eq!(
+        orders(b"PU100,100;EW10,0,90,90;"),
+        "go 100,100 100,100>110,100 110,100>100,110 100,110>100,100"
+    );
+    assert_eq!(
+        orders(b"IP0,0,1000,1000;TL1,2;PU100,100;XT;YT;TL3;XT;"),
+        "go 100,100 100,80>100,110 80,100>110,100 100,100>100,130"
+    );
+}
+
+#[test]
+fn labels() {
+    // An I is one stroke in the middle of its width.
+    let size = "SI0.5,0.525;";
+    assert_eq!(
+        orders(format!("{size}PU1000,1000;LBI\x03").as_bytes()),
+        "go 1000,1000 1100,1210>1100,1000"
+    );
+    assert_eq!(
+        orders(format!("{size}PU1000,1000;LBI I\r\nI\x03PD").as_bytes()),
+        "go 1000,1000 1100,1210>1100,1000 1700,1210>1700,1000 1100,790>1100,580"
+    );
+    assert_eq!(
+        orders(format!("{size}DI0,1;PU1000,1000;DT#;LBI#").as_bytes()),
+        "go 1000,1000 790,1100>1000,1100"
+    );
+    assert_eq!(
+        orders(format!("{size}SL1;PU1000,1000;LBI\x03").as_bytes()),
+        "go 1000,1000 1310,1210>1100,1000"
+    );
+    assert_eq!(
+        orders(format!("{size}PU1000,1000;LBI\x08I\x03CP;LBI\x03CP1,0.5;LBI\x03").as_bytes()),
+        "go 1000,1000 1100,1210>1100,1000 1100,1210>1100,1000 1100,790>1100,580 1700,1000>1700,790"
+    );
+    assert_eq!(
+        orders(format!("{size}SMI;PU1000,1000;SM;PU2000,1000;").as_bytes()),
+        "go 1000,1000 1000,1105>1000,895 go 2000,1000"
+    );
+    // `;`, `?`, `!` and `~` are letters; what HP-GL would obey outside of a label is none.
+    let mut interpreter = interpreter();
+    let drawn = orders_of(&mut interpreter, b"LBPU;?!~ \xC3\xA9\x03OA;");
+    assert!(drawn.len() > 20);
+    let mut again = self::interpreter();
+    assert_eq!(orders_of(&mut again, b"OE;").len(), 1);
+}
+
+#[test]
+fn pens_and_put_away_pens() {
+    assert_eq!(
+        orders(b"SP1;PD9,0;SP0;PD18,0;SP2;PD27,0;SP;SP99;OE;"),
+        "pen 1 0,0>9,0 pen 0 go 18,0 pen 2 18,0>27,0 pen 0 '3'"
+    );
+}
+
+#[test]
+fn encoded_polylines() {
+    // (1, 1), (-2, 3), each number as base 64: 2·|n| plus the sign, 191 more for the last digit.
+    let number = |value: i32| (191 + 2 * value.unsigned_abs() + u32::from(value < 0)) as u8;
+    let bytes = [
+        number(10),
+        number(10),
+        b'<',
+        number(-2),
+        number(3),
+        b'<',
+        b'=',
+        number(5),
+        number(6),
+        number(1),
+        number(0),
+    ];
+    let text = [&b"PU100,100;PE"[..], &bytes, b";PA0,0"].concat();
+    assert_eq!(orders(&text), "go 100,100 100,100>110,110 go 108,113 go 5,6 5,6>6,6");
+}
+
+#[test]
+fn lost_bytes_are_not_drawn_over() {
+    let text =
+        [&b"PU10,10;PD20,10,3"[..], &[DAMAGED], b"0,10,40,10;PD50,10;PU60,10;PD70,10;PR0,5;"]
+            .concat();
+    assert_eq!(orders(&text), "go 10,10 10,10>20,10 go 50,10 go 60,10 60,10>70,10 70,10>70,15");
+    let relative =
+        [&b"PR;PD5,5;"[..], &[DAMAGED], b"PD5,5,5,5;CI10;XT;LBA\x03PA100,100;PD110,100"].concat();
+    assert_eq!(
+        orders(&[&relative[..], b";"].concat()),
+        "dot 0,0 0,0>5,5 go 100,100 100,100>110,100".replace("dot 0,0 ", "")
+    );
+}
+
+#[test]
+fn no_bytes_make_it_panic_or_draw_outside() {
+    let mut state = 1u32;
+    let mut random = || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        state >> 8
+    };
+    let words: Vec<&[u8]> = std::vec![
+        b"PU",
+        b"PD",
+        b"PA",
+        b"PR",
+        b"SC",
+        b"IP",
+        b"IW",
+        b"RO",
+        b"AA",
+        b"AR",
+        b"CI",
+        b"EA",
+        b"ER",
+        b"EW",
+        b"LB",
+        b"DT",
+        b"SI",
+        b"SR",
+        b"DI",
+        b"DR",
+        b"SL",
+        b"CP",
+        b"LT",
+        b"SM",
+        b"TL",
+        b"XT",
+        b"YT",
+        b"PE",
+        b"IN",
+        b"DF",
+        b"OA",
+        b"OC",
+        b"OW",
+        b"\x03",
+        b";",
+        b",",
+        b"-",
+        b".",
+        b"1",
+        b"90",
+        b"8388607.999",
+        b"0.0001",
+        b"-8388607",
+        b"127",
+        b"W~",
+        b"\xFF",
+        b"\n",
+        b"VS",
+        b"SP",
+        b"LT2;",
+    ];
+    for _ in 0..300 {
+        let mut interpreter = interpreter();
+        for _ in 0..400 {
+            let word = words[random() as usize % words.len()];
+            for byte in word.iter().copied().chain((random() % 4 == 0).then_some(random() as u8)) {
+                interpreter.push(byte);
+                let mut count = 0;
+                while let Some(order) = interpreter.next_order() {
+                    let points = match order {
+                        Order::Line(line) => line,
+                        Order::Dot(at) | Order::Go(at) => [at; 2],
+                        Order::Initialize => {
+                            interpreter.initialize(Point::default(), LIMITS);
+                            continue;
+                        }
+                        _ => continue,
+                    };
+                    assert!(points.iter().all(|point| LIMITS.contains(*point)), "{points:?}");
+                    count += 1;
+                    if count > 2000 {
+                        interpreter.clear_steps();
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// A session, with the sender's side of a line.
+struct Line {
+    dialect: Dialect,
+    session: Session,
+}
+
+impl Line {
+    fn new() -> Self {
+        Self { dialect: Dialect::new(), session: Session::new() }
+    }
+
+    /// Sends bytes. Returns what is answered before any of them is carried out.
+    fn send(&mut self, bytes: &[u8]) -> String {
+        for byte in bytes {
+            match self.dialect.take(*byte) {
+                Token::Begins(beginning) => {
+                    self.session.begin(beginning, *byte, Point::default(), LIMITS);
+                    assert_ne!(beginning, Beginning::Command);
+                }
+                Token::Line | Token::Leaves => {}
+                token => self.session.receive(*byte, token),
+            }
+        }
+        self.heard()
+    }
+
+    fn heard(&mut self) -> String {
+        let heard = String::from_utf8_lossy(self.session.output()).into_owned();
+        self.session.clear_output();
+        heard
+    }
+
+    /// Carries out at most so many orders. Returns them and the answers.
+    fn work(&mut self, most: usize) -> String {
+        let mut orders = Vec::new();
+        while !self.session.is_idle() && orders.len() < most {
+            let order = self.session.order().clone();
+            match &order {
+                Order::Nothing => continue,
+                Order::Answer(answer) => self.session.answer(answer),
+                Order::Initialize => self.session.initialize(Point::default(), LIMITS),
+                order => orders.push(shown(order)),
+            }
+            self.session.end_order();
+        }
+        format!("{}|{}", orders.join(" "), self.heard())
+    }
+}
+
+#[test]
+fn questions_to_the_interface_are_answered_at_once() {
+    let mut line = Line::new();
+    assert_eq!(line.send(b"\x1B.B"), "1024\r");
+    assert_eq!(line.send(b"IN;PD1,1;"), "");
+    assert_eq!(line.send(b"\x1B.B\x1B.O\x1B.E"), "1015\r0\r0\r");
+    assert_eq!(line.send(b"\x1B.L"), "", "it waits for the end");
+    assert_eq!(line.work(9), "0,0>1,1|1024\r");
+    assert_eq!(line.send(b"\x1B.O\x1B.X\x1B.E\x1B.E"), "8\r11\r0\r");
+    assert_eq!(line.send(b"\x1B.M;;;10;13:OI;"), "");
+    assert_eq!(line.work(9), "|7475A\n\r");
+    assert_eq!(line.send(b"\x1B.R\x1B.B"), "1024\r");
+    assert_eq!(line.send(b"\x1B.@100;1:\x1B.(\x1B.)\x1B.Y\x1B.Z\x1B.J\x1B.E"), "0\r");
+    assert_eq!(
+        line.send(b"\x1B.M300:\x1B.I9999:\x1B.E\x1B.I1;2;3;4;5;6;7;8;9;10;11;12;13;14:\x1B.E"),
+        "13\r14\r"
+    );
+    assert_eq!(line.send(b"\x1B.I81PU\x1B.E"), "12\r");
+}
+
+#[test]
+fn instructions_to_the_interface_may_stand_anywhere_and_escape_k_forgets() {
+    let mut line = Line::new();
+    line.send(b"IN;PD1,\x1B.B2");
+    assert_eq!(line.send(b"\x1B.B;"), "1016\r");
+    assert_eq!(line.work(9), "0,0>1,2|");
+    line.send(b"PD3,3;LBabc\x1B.KPU4,4;");
+    assert_eq!(line.work(9), "go 4,4|");
+}
+
+#[test]
+fn the_sender_is_stopped_and_goes_on() {
+    let mut line = Line::new();
+    assert_eq!(line.send(b"\x1B.I81;;17:\x1B.N;19:IN;PD"), "");
+    let mut sent = 5;
+    let mut heard = String::new();
+    while heard.is_empty() {
+        heard = line.send(b"1,2,");
+        sent += 4;
+    }
+    assert_eq!(heard, "\x13");
+    assert_eq!(line.session.room(), RECEIVED_BYTES - sent);
+    assert!((78..=81).contains(&line.session.room()), "{}", line.session.room());
+    assert!(line.work(10).ends_with('|'));
+    assert!(line.work(1000).ends_with("|\x11"));
+    // Enquire and acknowledge.
+    assert_eq!(line.send(b"\x1B.H500;5;6:"), "");
+    assert_eq!(line.send(b"\x05"), "\x06");
+    for _ in 0..150 {
+        line.send(b"1,2,");
+    }
+    assert_eq!(line.send(b"\x05"), "");
+    assert!(line.work(1000).ends_with("|\x06"));
+}

@@ -1,0 +1,296 @@
+//! Carries out HP-GL: it hands the bytes of a serial port to a [`Session`], and the session's
+//! orders to the machine, one at a time, as far as the machine has room for moves.
+//!
+//! While HP-GL is in force at a port, that port hears nothing but the answers that HP-GL itself
+//! asks for, and the status after `?`. All other replies go to the other port.
+
+use super::{Board, PORT_LIMIT, Plotter, REPLY_BYTES, Replies, Reply};
+use crate::array::MapEach;
+use crate::drawing::{LineType, PAGE_LIMIT, PagePoint};
+use crate::fixed::{divide_down, divide_rounding, product};
+use crate::hpgl::{Dialect, Order, Point, Rectangle, Session, Token, UNITS_PER_MM};
+use crate::index::Index;
+use crate::machine::{Machine, MachineError, Setting, State, Target, Value};
+use crate::protocol::Label;
+
+/// HP-GL at the serial ports of a plotter.
+#[derive(Debug)]
+pub(super) struct HpGl<'m> {
+    /// For each port, which of its bytes are HP-GL.
+    dialects: [Dialect; PORT_LIMIT],
+    /// The port whose HP-GL is carried out.
+    port: Option<usize>,
+    session: &'m mut Session,
+    /// Whether the user has been asked for the pen that the present order needs.
+    has_asked: bool,
+    /// Whether something was to be drawn while the machine was locked. Nothing is drawn then until
+    /// the next `IN`.
+    was_locked: bool,
+}
+
+/// What came of an order.
+enum Outcome {
+    /// It is over.
+    Done,
+    /// A part of it was carried out.
+    More,
+    /// It waits for the machine.
+    Waits,
+    /// It cannot be carried out.
+    Refused,
+}
+
+impl<'m> HpGl<'m> {
+    /// Without HP-GL, in the memory of `session`.
+    pub(super) fn new(session: &'m mut Session) -> Self {
+        let dialects = [Dialect::new(); PORT_LIMIT];
+        Self { dialects, port: None, session, has_asked: false, was_locked: false }
+    }
+
+    /// The port at which HP-GL is in force or still carried out.
+    pub(super) fn port(&self) -> Option<usize> {
+        self.port
+    }
+
+    /// Whether bytes of HP-GL are left to carry out.
+    pub(super) fn is_drawing(&self) -> bool {
+        self.port.is_some() && !self.session.is_idle()
+    }
+
+    /// Whether no byte can be taken now.
+    pub(super) fn must_wait(&self, inner_waits: bool) -> bool {
+        let Some(port) = self.port else { return inner_waits };
+        if self.dialects.get(port).is_some_and(Dialect::is_in_force) {
+            // The sender's questions are answered although the machine has no room for moves.
+            return self.session.room() == 0;
+        }
+        // What follows HP-GL waits until all of it has been carried out.
+        inner_waits || !self.session.is_idle()
+    }
+}
+
+impl<'m, I: Index> Plotter<'m, I> {
+    /// Takes a byte if it is HP-GL. Returns `false` for a byte of a line.
+    pub(super) fn take_hpgl<B: Board>(&mut self, port: usize, byte: u8, board: &mut B) -> bool {
+        let Some(dialect) = self.hpgl.dialects.get_mut(port) else { return false };
+        let token = dialect.take(byte);
+        let is_mine = self.hpgl.port.is_none_or(|mine| mine == port);
+        match token {
+            Token::Line => return false,
+            Token::Leaves => {
+                if let Some(reader) = self.readers.get_mut(port) {
+                    reader.clear();
+                }
+                return false;
+            }
+            Token::Begins(_) if !is_mine => {
+                board.reply_to(Replies::Only(port));
+                let text = "HP-GL comes by the other port: end it there with ctrl-X";
+                Reply(board).line(format_args!("[MSG:{text}]"));
+                self.mute(board);
+            }
+            Token::Begins(beginning) => {
+                if let Some(reader) = self.readers.get_mut(port) {
+                    reader.clear();
+                }
+                if beginning == crate::hpgl::Beginning::Command {
+                    board.reply_to(Replies::Only(port));
+                    Reply(board).outcome(Ok(()), Label::default());
+                }
+                let (at, limits) = frame(&self.inner.machine);
+                self.hpgl.session.begin(beginning, byte, at, limits);
+                self.hpgl.port = Some(port);
+                (self.hpgl.has_asked, self.hpgl.was_locked) = (false, false);
+                self.inner.hpgl_pen = None;
+                self.mute(board);
+            }
+            Token::Code | Token::Text | Token::Control if is_mine => {
+                self.hpgl.session.receive(byte, token);
+            }
+            Token::Code | Token::Text | Token::Control => {}
+        }
+        true
+    }
+
+    /// Sends replies to the ports at which no HP-GL is in force.
+    pub(super) fn mute<B: Board>(&self, board: &mut B) {
+        board.reply_to(self.hpgl.port.map_or(Replies::All, Replies::Others));
+    }
+
+    /// Ends HP-GL and forgets what is left of it.
+    pub(super) fn end_hpgl<B: Board>(&mut self, board: &mut B) {
+        self.hpgl.dialects = [Dialect::new(); PORT_LIMIT];
+        self.hpgl.session.forget();
+        self.hpgl.session.release();
+        self.send_hpgl(board);
+        self.hpgl.port = None;
+        self.inner.hpgl_pen = None;
+        self.mute(board);
+    }
+
+    /// Sends what the session has to say.
+    fn send_hpgl<B: Board>(&mut self, board: &mut B) {
+        let Some(port) = self.hpgl.port else { return };
+        let output = self.hpgl.session.output();
+        if !output.is_empty() {
+            board.reply_to(Replies::Only(port));
+            board.write(output);
+            self.hpgl.session.clear_output();
+            self.mute(board);
+        }
+    }
+
+    /// Carries out the next order, if there is one and the machine has room. Returns whether there
+    /// was anything to do.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    pub(super) fn carry_out_hpgl<B: Board>(&mut self, board: &mut B) -> bool {
+        let Some(port) = self.hpgl.port else { return false };
+        if !board.has_room(REPLY_BYTES) {
+            return false;
+        }
+        let is_done = self.carry_out_order(board);
+        self.send_hpgl(board);
+        if self.hpgl.session.take_loss() {
+            Reply(board).line(format_args!("[MSG:bytes of HP-GL were lost: lines are missing]"));
+        }
+        let is_over = self.hpgl.session.is_idle()
+            && !self.hpgl.dialects.get(port).is_some_and(Dialect::is_in_force);
+        if is_over {
+            self.hpgl.port = None;
+            self.mute(board);
+        }
+        is_done || is_over
+    }
+
+    /// Carries out the next order. Returns whether there was anything to do.
+    fn carry_out_order<B: Board>(&mut self, board: &mut B) -> bool {
+        let order = self.hpgl.session.order().clone();
+        let outcome = match order {
+            Order::Nothing => return !self.hpgl.session.is_idle(),
+            Order::Answer(answer) => {
+                self.hpgl.session.answer(&answer);
+                Outcome::Done
+            }
+            Order::Initialize => {
+                let (at, limits) = frame(&self.inner.machine);
+                self.hpgl.session.initialize(at, limits);
+                self.hpgl.was_locked = false;
+                Outcome::Done
+            }
+            Order::Pen(number) => self.change_pen(number, board),
+            Order::Line(_) | Order::Dot(_) | Order::Go(_) => self.draw_order(order),
+        };
+        match outcome {
+            Outcome::Done => self.hpgl.session.end_order(),
+            Outcome::Refused => self.hpgl.session.refuse_order(),
+            Outcome::More => {}
+            Outcome::Waits => return false,
+        }
+        true
+    }
+
+    /// Draws a line or a dot, or moves without drawing.
+    fn draw_order(&mut self, order: Order) -> Outcome {
+        let machine = &mut self.inner.machine;
+        match machine.state() {
+            State::Alarm(_) | State::Sleep => self.hpgl.was_locked = true,
+            State::Check => return Outcome::Done,
+            _ => {}
+        }
+        if self.hpgl.was_locked {
+            return Outcome::Refused;
+        }
+        if !machine.has_room() {
+            return Outcome::Waits;
+        }
+        let (from, to, ink) = match order {
+            Order::Line([from, to]) => (Some(from), to, true),
+            Order::Dot(at) => (Some(at), at, true),
+            Order::Go(to) => (None, to, false),
+            _ => return Outcome::Done,
+        };
+        let steps = |point| steps_at(machine, point);
+        let (from, to) = (from.map(steps), steps(to));
+        let travel = from.filter(|from| *from != machine.end());
+        let is_dot = from == Some(to);
+        let moved = match travel {
+            Some(point) => machine.draw_to(Target { point, ink: None }, None),
+            None if is_dot => machine.lower_pen(),
+            None => {
+                let ink = ink.then_some(LineType::Full);
+                // Centimetres a second are 600 mm/min.
+                let feed = self.hpgl.session.speed().filter(|_| ink.is_some()).map(|speed| {
+                    Value::from_bits(i32::try_from(speed.saturating_mul(600)).unwrap_or(i32::MAX))
+                });
+                machine.draw_to(Target { point: to, ink }, feed)
+            }
+        };
+        match moved {
+            Ok(()) if travel.is_some() => Outcome::More,
+            Ok(()) => Outcome::Done,
+            Err(MachineError::State(_)) => Outcome::Waits,
+            // What is clipped stays within the travel.
+            Err(_) => Outcome::Refused,
+        }
+    }
+
+    /// Waits for the pen with this number, from 1, unless it is in the holder. Pen 0 needs nothing.
+    fn change_pen<B: Board>(&mut self, number: u8, board: &mut B) -> Outcome {
+        let machine = &mut self.inner.machine;
+        let Some(pen) = number.checked_sub(1) else { return Outcome::Done };
+        if self.hpgl.has_asked {
+            if let State::Hold { .. } = machine.state() {
+                return Outcome::Waits;
+            }
+            self.hpgl.has_asked = false;
+            self.inner.hpgl_pen = None;
+            if !matches!(machine.state(), State::Alarm(_) | State::Sleep) {
+                machine.set_pen(pen);
+            }
+            return Outcome::Done;
+        }
+        let is_locked = matches!(machine.state(), State::Alarm(_) | State::Sleep | State::Check);
+        if pen == machine.pen() || self.inner.options.one_pen || is_locked {
+            return Outcome::Done;
+        }
+        if machine.state() != State::Idle || !machine.is_stopped() || machine.pause().is_err() {
+            return Outcome::Waits;
+        }
+        self.hpgl.has_asked = true;
+        self.inner.hpgl_pen = Some(pen);
+        Reply(board).line(format_args!("[MSG:put in pen {number}, then send ~]"));
+        Outcome::More
+    }
+}
+
+/// Where the pen will be when all moves known so far have ended, and the hard clip limits.
+fn frame(machine: &Machine<'_>) -> (Point, Rectangle) {
+    let settings = machine.settings();
+    let steps = settings.page_steps();
+    let units = |steps: i32, per_mm: Value| {
+        let per_mm = i64::from(per_mm.to_bits()).max(1);
+        divide_down(product(i64::from(steps), UNITS_PER_MM << 32), per_mm.into()) as i64
+    };
+    let [x_per_mm, y_per_mm] = steps;
+    let [width, height] = [Setting::TravelX, Setting::TravelY]
+        .map_each(|travel| i64::from(settings.get(travel).to_bits()) * UNITS_PER_MM);
+    let most = Point {
+        x: width.min(units(PAGE_LIMIT, x_per_mm)),
+        y: height.min(units(PAGE_LIMIT, y_per_mm)),
+    };
+    let PagePoint { x, y } = machine.end();
+    let at = Point { x: units(x, x_per_mm), y: units(y, y_per_mm) };
+    (at, Rectangle { least: Point::default(), most })
+}
+
+/// The nearest step to a position within the travel.
+fn steps_at(machine: &Machine<'_>, Point { x, y }: Point) -> PagePoint {
+    let most = machine.travel();
+    let [x_per_mm, y_per_mm] = machine.settings().page_steps();
+    let steps = |position: i64, per_mm: Value, most: i32| {
+        let exact = product(position, per_mm.to_bits().into());
+        let steps = divide_rounding(exact, i128::from(UNITS_PER_MM) << 32);
+        steps.clamp(0, most.into()) as i32
+    };
+    PagePoint { x: steps(x, x_per_mm, most.x), y: steps(y, y_per_mm, most.y) }
+}
