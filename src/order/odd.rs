@@ -58,6 +58,21 @@ impl<'a, I: Index> OddPoints<'a, I> {
         self.stations.get(odd.get()).copied()
     }
 
+    /// Returns the network.
+    pub fn network(&self) -> Network<'a, I> {
+        self.network
+    }
+
+    /// Returns the station of an odd point that is no free end.
+    pub fn station_of(&self, odd: I) -> I {
+        self.stations[odd.get()]
+    }
+
+    /// Returns the position of an odd point that is no free end.
+    pub fn position(&self, odd: I) -> PagePoint {
+        self.network.position(self.station_of(odd))
+    }
+
     /// Returns the length of the move between two odd points in 1/256 steps. It is very large
     /// between the two free ends, which may not be paired with each other.
     pub fn distance(&self, a: I, b: I) -> u32 {
