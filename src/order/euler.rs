@@ -44,7 +44,7 @@ impl<'s, 'a, I: Index> Unused<'s, 'a, I> {
         let used = scratch.take(network.chains().get())?;
         let stations = network.stations();
         let entrances = (Remaining::<I>::bytes(stations.get()) <= scratch.available_bytes())
-            .then(|| Remaining::new(network, stations, |station| station, scratch))
+            .then(|| Remaining::new(network, stations, &|station| station, scratch))
             .transpose()?;
         Ok(Self { network, legs, used, mate, entrances })
     }

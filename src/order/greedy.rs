@@ -56,11 +56,8 @@ pub(super) fn pair<I: Index>(
     for (point, (length, &partner)) in I::all().zip(lengths.iter_mut().zip(mate.iter())) {
         *length = odd.distance(point, partner);
     }
-    match Remaining::new(odd.network(), odd.real_count(), |point| odd.station_of(point), scratch) {
-        Ok(mut near) => while exchange_near(odd, &mut near, lengths, work_budget, mate)? {},
-        // Without the memory for the grid, all pairs are tried.
-        Err(_) => while exchange(odd, lengths, work_budget, mate)? {},
-    }
+    let mut near = odd.remaining(scratch)?;
+    while exchange(odd, &mut near, lengths, work_budget, mate)? {}
     Ok(())
 }
 
@@ -121,8 +118,7 @@ impl<'s, I: Index> Shortcuts<'s, I> {
         if bytes > scratch.available_bytes() || 2 * count >= I::NONE.get() {
             return None;
         }
-        let near =
-            Remaining::new(odd.network(), odd.real_count(), |point| odd.station_of(point), scratch);
+        let near = odd.remaining(scratch);
         let (winners, namers) = (scratch.take(count).ok()?, scratch.take(count).ok()?);
         namers.fill(I::NONE);
         Some(Self { near: near.ok()?, winners, namers, next: scratch.take(2 * count).ok()? })
@@ -325,53 +321,14 @@ fn join<I: Index>(mate: &mut [I], a: I, b: I) {
     mate[b.get()] = a;
 }
 
-/// Tries once to exchange the partners of each two pairs. `lengths` holds the length of each move
-/// at both of its points. Returns whether anything became shorter.
+/// Tries once to exchange the partners of each point's pair and of another pair. `near` must hold
+/// all points but the free ends, and `lengths` the length of each move at both of its points. Returns
+/// whether anything became shorter.
+///
+/// Of two moves that become shorter in all, one of the new ones is shorter than an old one. So it is
+/// enough to give each point a partner that is nearer than its own; of these exchanges, the one that
+/// saves most is made.
 fn exchange<I: Index>(
-    odd: &OddPoints<'_, I>,
-    lengths: &mut [u32],
-    work_budget: &mut WorkBudget<'_>,
-    mate: &mut [I],
-) -> Result<bool, OrderError> {
-    let count = odd.count();
-    let mut improved = false;
-    let mut longest = lengths.iter().copied().max().unwrap_or(0);
-    for a in I::below(count) {
-        let mut looked_at = 0;
-        for c in (a + I::ONE).to(count) {
-            // From this `c` on, the difference in x alone makes each new move from `a` as long as
-            // both old moves together.
-            if odd.distance_along_x(a, c) >= lengths[a.get()].saturating_add(longest) {
-                break;
-            }
-            looked_at += 1;
-            let (b, d) = (mate[a.get()], mate[c.get()]);
-            if b == c || b < a || d < c {
-                continue;
-            }
-            let now = lengths[a.get()] + lengths[c.get()];
-            let parallel = sum_below(odd, [a, c, b, d], now);
-            let crossed = sum_below(odd, [a, d, b, c], now);
-            if parallel.min(crossed) >= now {
-                continue;
-            }
-            let pairs = if parallel <= crossed { [(a, c), (b, d)] } else { [(a, d), (b, c)] };
-            for (from, to) in pairs {
-                join(mate, from, to);
-                lengths[from.get()] = odd.distance(from, to);
-                lengths[to.get()] = lengths[from.get()];
-                longest = longest.max(lengths[to.get()]);
-            }
-            improved = true;
-        }
-        work_budget.work(1 + looked_at / 16)?;
-    }
-    Ok(improved)
-}
-
-/// As [`exchange`], but looks only at exchanges that give some point a partner nearer than its own.
-/// Every exchange that shortens two moves does.
-fn exchange_near<I: Index>(
     odd: &OddPoints<'_, I>,
     near: &mut Remaining<'_, I>,
     lengths: &mut [u32],
@@ -381,23 +338,30 @@ fn exchange_near<I: Index>(
     let mut improved = false;
     for a in I::below(odd.real_count()) {
         let mut looked_at = 1;
+        let (b, own) = (mate[a.get()], lengths[a.get()]);
+        let mut best = (0, I::NONE);
         near.search(odd.position(a), &mut |c| {
             looked_at += 1;
-            let (b, d) = (mate[a.get()], mate[c.get()]);
-            let [own, other] = [a, c].map(|point| lengths[point.get()]);
             if c != a && c != b && odd.least_distance(a, c) < own {
-                let now = own + other;
-                if sum_below(odd, [a, c, b, d], now) < now {
-                    for (from, to) in [(a, c), (b, d)] {
-                        join(mate, from, to);
-                        lengths[from.get()] = odd.distance(from, to);
-                        lengths[to.get()] = lengths[from.get()];
-                    }
-                    improved = true;
+                let now = own + lengths[c.get()];
+                // To be better than the best so far, the new moves must be shorter than this.
+                let bound = now.saturating_sub(best.0);
+                let then = sum_below(odd, [a, c, b, mate[c.get()]], bound);
+                if then < bound {
+                    best = (now - then, c);
                 }
             }
-            Some(lengths[a.get()])
+            Some(own)
         });
+        if best.1 != I::NONE {
+            let c = best.1;
+            for (from, to) in [(a, c), (b, mate[c.get()])] {
+                join(mate, from, to);
+                lengths[from.get()] = odd.distance(from, to);
+                lengths[to.get()] = lengths[from.get()];
+            }
+            improved = true;
+        }
         work_budget.work(looked_at / 4)?;
     }
     Ok(improved)
@@ -481,15 +445,23 @@ mod tests {
 
     #[test]
     fn no_two_pairs_are_left_to_exchange() {
-        for seed in 0..20 {
-            with_strokes(150, 5000, seed, |odd, work_budget| {
+        for (seed, size) in (0..20).flat_map(|seed| [(seed, 5000), (seed, 30)]) {
+            with_strokes(100, size, seed, |odd, work_budget| {
                 let mut memory = vec![0; 1 << 14];
                 let mut mate = vec![u16::NONE; usize::from(odd.count())];
                 pair(odd, &mut Scratch::new(&mut memory), work_budget, &mut mate).unwrap();
-                let mut lengths: Vec<u32> = (0..odd.count())
-                    .map(|point| odd.distance(point, mate[usize::from(point)]))
-                    .collect();
-                assert_eq!(exchange(odd, &mut lengths, work_budget, &mut mate), Ok(false));
+                let length = |a, b| u64::from(odd.distance(a, b));
+                for a in 0..odd.count() {
+                    for c in 0..odd.count() {
+                        let [b, d] = [a, c].map(|point| mate[usize::from(point)]);
+                        assert_eq!(mate[usize::from(b)], a);
+                        if a != c && a != d {
+                            let (now, then) =
+                                (length(a, b) + length(c, d), length(a, c) + length(b, d));
+                            assert!(now <= then, "{a} {b}, {c} {d}: {now} {then}");
+                        }
+                    }
+                }
             });
         }
     }

@@ -18,6 +18,7 @@
 //! segments name points that do not exist, too many segments, and too little memory. On an error
 //! the contents of the tour are unspecified.
 
+mod cells;
 mod cycle;
 mod distances;
 mod euler;
