@@ -43,7 +43,9 @@ impl<'s, 'a, I: Index> Unused<'s, 'a, I> {
         let legs = Incidence::new(network, scratch)?;
         let used = scratch.take(network.chains().get())?;
         let stations = network.stations();
-        let entrances = (Remaining::<I>::bytes(stations.get()) <= scratch.available_bytes())
+        let has_room = cfg!(feature = "many-strokes")
+            && Remaining::<I>::bytes(stations.get()) <= scratch.available_bytes();
+        let entrances = has_room
             .then(|| Remaining::new(network, stations, &|station| station, scratch))
             .transpose()?;
         Ok(Self { network, legs, used, mate, entrances })

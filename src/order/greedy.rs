@@ -115,7 +115,10 @@ impl<'s, I: Index> Shortcuts<'s, I> {
         let bytes = Remaining::<I>::bytes(count)
             + 2 * Scratch::bytes_for::<I>(count)
             + Scratch::bytes_for::<I>(2 * count);
-        if bytes > scratch.available_bytes() || 2 * count >= I::NONE.get() {
+        if !cfg!(feature = "many-strokes")
+            || bytes > scratch.available_bytes()
+            || 2 * count >= I::NONE.get()
+        {
             return None;
         }
         let near = odd.remaining(scratch);

@@ -2,33 +2,55 @@
 //!
 //! It has one bit for each face. Which of its words hold bits is recorded, so that clearing a set
 //! of many words takes as long as filling it did. Where no more can be recorded, all words are
-//! cleared, and all are looked through.
+//! cleared, and all are looked through. With the numbers of a board there are never so many faces
+//! that recording would be faster.
 
 use super::VisibilityError;
+use crate::index::Index;
 use crate::stage::{Scratch, heap_sort_by_key};
+use core::marker::PhantomData;
 
-/// A set of ranks.
-#[derive(Default)]
-pub struct FaceSet<'a> {
+/// A set of ranks of faces, which are numbered by `I`.
+pub struct FaceSet<'a, I> {
     /// One bit for each rank.
     words: &'a mut [u32],
     /// The indices of the words that are not zero, as far as they are recorded.
     used: &'a mut [u32],
     /// How many words are not zero; if more than `used` can hold, they are not all recorded.
     count: usize,
+    /// The numbers of the faces.
+    numbers: PhantomData<I>,
 }
 
-impl<'a> FaceSet<'a> {
+impl<I> Default for FaceSet<'_, I> {
+    fn default() -> Self {
+        Self { words: &mut [], used: &mut [], count: 0, numbers: PhantomData }
+    }
+}
+
+impl<'a, I: Index> FaceSet<'a, I> {
+    /// Whether words are recorded at all.
+    const IS_RECORDED: bool = I::BITS > 16;
     /// How many words are recorded.
     const MOST_USED: usize = 64;
     /// A set with fewer words than this is cleared as a whole, because recording takes longer.
     const MANY_WORDS: usize = 512;
 
+    /// Returns how many words of a set of so many are recorded.
+    const fn used(words: usize) -> usize {
+        if Self::IS_RECORDED && words >= Self::MANY_WORDS { Self::MOST_USED } else { 0 }
+    }
+
+    /// Returns the recorded words, if those are all `count` words that are not zero.
+    #[inline]
+    fn recorded(used: &mut [u32], count: usize) -> Option<&mut [u32]> {
+        if Self::IS_RECORDED && !used.is_empty() { used.get_mut(..count) } else { None }
+    }
+
     /// Returns the most bytes that a set of so many faces takes.
     pub const fn bytes(faces: usize) -> usize {
         let words = faces.div_ceil(32);
-        let used = if words < Self::MANY_WORDS { 0 } else { Self::MOST_USED };
-        Scratch::bytes_for::<u32>(words) + Scratch::bytes_for::<u32>(used)
+        Scratch::bytes_for::<u32>(words) + Scratch::bytes_for::<u32>(Self::used(words))
     }
 
     /// Makes an empty set for so many faces.
@@ -37,20 +59,21 @@ impl<'a> FaceSet<'a> {
     /// Returns an error if the memory is too small.
     pub fn new(faces: usize, scratch: &mut Scratch<'a>) -> Result<Self, VisibilityError> {
         let words: &mut [u32] = scratch.take(faces.div_ceil(32))?;
-        let used = if words.len() < Self::MANY_WORDS { 0 } else { Self::MOST_USED };
-        Ok(Self { words, used: scratch.take(used)?, count: 0 })
+        let used = scratch.take(Self::used(words.len()))?;
+        Ok(Self { words, used, count: 0, numbers: PhantomData })
     }
 
     /// Removes all ranks.
     #[inline]
     pub fn clear(&mut self) {
-        match self.used.get(..self.count) {
-            Some(used) if !self.used.is_empty() => {
-                for &word in used {
-                    self.words[word as usize] = 0;
+        let Self { words, used, count, .. } = self;
+        match Self::recorded(used, *count) {
+            Some(used) => {
+                for &word in &*used {
+                    words[word as usize] = 0;
                 }
             }
-            _ => self.words.fill(0),
+            None => words.fill(0),
         }
         self.count = 0;
     }
@@ -63,7 +86,7 @@ impl<'a> FaceSet<'a> {
         if *word & bit != 0 {
             return false;
         }
-        if *word == 0 && !self.used.is_empty() {
+        if Self::IS_RECORDED && *word == 0 && !self.used.is_empty() {
             if let Some(slot) = self.used.get_mut(self.count) {
                 *slot = (rank / 32) as u32;
             }
@@ -86,16 +109,16 @@ impl<'a> FaceSet<'a> {
             }
             Ok(())
         };
-        let is_recorded = !self.used.is_empty();
-        match self.used.get_mut(..self.count) {
-            Some(used) if is_recorded => {
+        let Self { words, used, count, .. } = self;
+        match Self::recorded(used, *count) {
+            Some(used) => {
                 heap_sort_by_key(used, |word| *word);
                 for &word in &*used {
-                    of_word((word as usize, self.words[word as usize]), each)?;
+                    of_word((word as usize, words[word as usize]), each)?;
                 }
             }
-            _ => {
-                for (word, &bits) in self.words.iter().enumerate() {
+            None => {
+                for (word, &bits) in words.iter().enumerate() {
                     of_word((word, bits), each)?;
                 }
             }
@@ -114,8 +137,8 @@ mod tests {
     #[test]
     fn it_holds_what_was_added_since_it_was_cleared() {
         for faces in [40, 1000, 20_000, 100_000] {
-            let mut memory = vec![0; FaceSet::bytes(faces) / 8];
-            let mut set = FaceSet::new(faces, &mut Scratch::new(&mut memory)).ok().unwrap();
+            let mut memory = vec![0; FaceSet::<u32>::bytes(faces) / 8];
+            let mut set = FaceSet::<u32>::new(faces, &mut Scratch::new(&mut memory)).ok().unwrap();
             let mut state = 1u32;
             for round in 0..40 {
                 // Few words, then more than can be recorded.

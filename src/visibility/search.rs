@@ -33,10 +33,10 @@ pub struct StretchFinder<'a, I: Index> {
     /// The faces on each cell of the page.
     grid: Grid<'a, I>,
     /// The faces against which the current edge has been tested.
-    seen: FaceSet<'a>,
+    seen: FaceSet<'a, I>,
     /// The faces that share a cell with the face whose seams (lines where faces pass through each
     /// other) are being found.
-    met: FaceSet<'a>,
+    met: FaceSet<'a, I>,
     /// Which parts of the current edge are hidden, as far as it has been tested.
     profile: Profile<'a>,
     /// Which kinds of stretches the user wants to see.
@@ -47,7 +47,7 @@ impl<'a, I: Index> StretchFinder<'a, I> {
     /// Returns the least number of bytes of working memory that are enough. The search is then
     /// slow.
     pub const fn least_bytes(faces: usize) -> usize {
-        2 * FaceSet::bytes(faces)
+        2 * FaceSet::<I>::bytes(faces)
             + Scratch::bytes_for::<ProfilePiece>(FEWEST_PIECES)
             + Grid::<I>::least_bytes(faces)
     }
