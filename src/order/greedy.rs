@@ -365,7 +365,7 @@ fn exchange<I: Index>(
             }
             improved = true;
         }
-        work_budget.work(looked_at / 4)?;
+        work_budget.work(1 + looked_at / 4)?;
     }
     Ok(improved)
 }

@@ -184,11 +184,9 @@ impl<'a, I: Index> StretchFinder<'a, I> {
             corners.iter().map(|corner| around.coarse_projection.vertex(corner.vertex()).z);
         let far = depths.max().unwrap_or(-COORDINATE_LIMIT);
         grid.within(&bounds, &mut |ranks| {
-            let near_enough = ranks
-                .iter()
-                .map(|&rank| rank.get())
-                .take_while(|&rank| !around.faces.begins_behind(rank, far));
-            for other in near_enough.filter(|&other| other > one) {
+            // The ranks in a cell ascend.
+            let higher = ranks.iter().map(|&rank| rank.get()).skip_while(|&other| other <= one);
+            for other in higher.take_while(|&other| !around.faces.begins_behind(other, far)) {
                 met.insert(other);
             }
         });
