@@ -9,6 +9,7 @@ use super::incidence::Incidence;
 use super::metric::length;
 use super::neighbours::Neighbours;
 use super::network::Network;
+use super::remaining::Remaining;
 use super::work_budget::WorkBudget;
 use super::{Leg, OrderError, even_part};
 use crate::drawing::PagePoint;
@@ -26,6 +27,9 @@ pub(super) struct Unused<'s, 'a, I> {
     used: &'s mut [u8],
     /// For each station, the other end of its pen-up move; or [`Index::NONE`] or [`even_part`].
     mate: &'s mut [I],
+    /// The entrances that are left, and some that are no more; `None` if there is no memory for
+    /// them.
+    entrances: Option<Remaining<'s, I>>,
 }
 
 impl<'s, 'a, I: Index> Unused<'s, 'a, I> {
@@ -38,7 +42,13 @@ impl<'s, 'a, I: Index> Unused<'s, 'a, I> {
     ) -> Result<Self, OutOfScratch> {
         let legs = Incidence::new(network, scratch)?;
         let used = scratch.take(network.chains().get())?;
-        Ok(Self { network, legs, used, mate })
+        let stations = network.stations();
+        let has_room = cfg!(feature = "many-strokes")
+            && Remaining::<I>::bytes(stations.get()) <= scratch.available_bytes();
+        let entrances = has_room
+            .then(|| Remaining::new(network, stations, &|station| station, scratch))
+            .transpose()?;
+        Ok(Self { network, legs, used, mate, entrances })
     }
 
     /// Returns the next leg from `station` whose segments no trail has drawn yet.
@@ -150,7 +160,24 @@ impl<'s, 'a, I: Index> Unused<'s, 'a, I> {
             }
         }
         let at = self.network.position(pen);
-        self.entrance(|position| length(at, position), work_budget)
+        let Some(mut entrances) = self.entrances.take() else {
+            return self.entrance(|position| length(at, position), work_budget);
+        };
+        let mut nearest = (u32::MAX, I::NONE);
+        let mut looked_at = 1;
+        entrances.search(at, &mut |station| {
+            looked_at += 1;
+            if !self.is_entrance(station) {
+                return None;
+            }
+            if self.network.least_distance(pen, station) <= nearest.0 {
+                nearest = nearest.min((self.network.distance(pen, station), station));
+            }
+            Some(nearest.0)
+        });
+        self.entrances = Some(entrances);
+        work_budget.work(looked_at)?;
+        Ok((nearest.1 != I::NONE).then_some(nearest.1))
     }
 
     /// Traces all parts, from `start` if it is given and otherwise from the entrance with the

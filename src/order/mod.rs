@@ -7,7 +7,7 @@
 //!
 //! 1. `network` turns the segments of one pen into a graph of stations and chains.
 //! 2. `matching` pairs the odd stations so that the total length is the least. `greedy` pairs them
-//!    in less memory, without that guarantee.
+//!    in less memory, without that guarantee; `remaining` finds for it, and for step 3, what is near.
 //! 3. `euler` traces the strokes along Eulerian tours, one connected part after another, the
 //!    nearest part first.
 //! 4. `improve` shortens the tour of several parts: `patch_cycles` changes pen-up moves so that
@@ -18,6 +18,7 @@
 //! segments name points that do not exist, too many segments, and too little memory. On an error
 //! the contents of the tour are unspecified.
 
+mod cells;
 mod cycle;
 mod distances;
 mod euler;
@@ -34,6 +35,7 @@ mod odd;
 mod orient;
 mod work_budget;
 mod partition;
+mod remaining;
 mod search;
 
 pub use matching::scratch_bytes as matching_bytes;

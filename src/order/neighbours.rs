@@ -4,12 +4,12 @@
 //! search visits square rings of cells around the station until no nearer station can follow.
 
 use super::OrderError;
+use super::cells::Cells;
 use super::network::Network;
 use super::work_budget::WorkBudget;
 use crate::array::MapEach;
-use crate::drawing::PagePoint;
 use crate::index::Index;
-use crate::stage::{OutOfScratch, Scratch};
+use crate::stage::Scratch;
 
 /// For each station the same number of other stations, the nearest first.
 #[derive(Debug, Clone, Copy)]
@@ -34,7 +34,9 @@ impl<'a, I: Index> Neighbours<'a, I> {
         let stations = scratch.take(network.stations().get() * per_station)?;
         stations.fill(I::NONE);
         let mut lent = scratch.reborrow();
-        let grid = Grid::new(network, &mut lent)?;
+        let count = network.stations();
+        let cells = Cells::new(network, count, &|station| station, &mut lent)?;
+        let grid = Grid { network, cells };
         for (station, near) in I::all().zip(stations.chunks_exact_mut(per_station)) {
             grid.search(station, near, work_budget)?;
         }
@@ -48,7 +50,7 @@ impl<'a, I: Index> Neighbours<'a, I> {
 
     /// Returns the further scratch memory that the search needs for so many stations, in bytes.
     pub const fn bytes_to_find(stations: usize) -> usize {
-        Scratch::bytes_for::<I>(stations / 2 + 2) + Scratch::bytes_for::<I>(stations)
+        Cells::<I>::bytes(stations)
     }
 
     /// Returns the neighbours of `station`, the nearest first.
@@ -59,88 +61,24 @@ impl<'a, I: Index> Neighbours<'a, I> {
     }
 }
 
-/// The stations, sorted into the square cells of a grid, so that those near a point are found
-/// without looking at all of them.
+/// The stations, sorted into the cells of a grid.
 struct Grid<'s, 'a, I> {
     /// The network whose stations are sorted; it knows where they lie.
     network: Network<'a, I>,
-    /// The lower left corner of the grid, from which cells are counted.
-    corner: PagePoint,
-    /// The size of a cell: a square of 2^`cell_bits` steps.
-    cell_bits: u32,
-    /// The number of cells of the grid from left to right.
-    columns: i32,
-    /// The number of cells of the grid from bottom to top.
-    rows: i32,
-    /// For each cell, where its stations begin in `stations`; then the end of the last cell.
-    begin: &'s [I],
-    /// The numbers of all stations, cell after cell.
-    stations: &'s [I],
+    /// The numbers of all stations.
+    cells: Cells<'s, I>,
 }
 
-impl<'s, 'a, I: Index> Grid<'s, 'a, I> {
-    /// Sorts the stations into cells, of which there are about half as many as stations.
-    fn new(network: Network<'a, I>, scratch: &mut Scratch<'s>) -> Result<Self, OutOfScratch> {
-        let count = network.stations();
-        let positions = || I::below(count).map(|station| network.position(station));
-        let least = |of: fn(PagePoint) -> i32| positions().map(of).min().unwrap_or(0);
-        let most = |of: fn(PagePoint) -> i32| positions().map(of).max().unwrap_or(0);
-        let corner = PagePoint { x: least(|position| position.x), y: least(|position| position.y) };
-        let (width, height) =
-            (most(|position| position.x) - corner.x, most(|position| position.y) - corner.y);
-        let mut cell_bits = 0;
-        let cells = |bits: u32| ((width >> bits) + 1).saturating_mul((height >> bits) + 1);
-        while cells(cell_bits) > ((count >> 1).into() as i32).max(1) {
-            cell_bits += 1;
-        }
-        let mut grid = Self {
-            network,
-            corner,
-            cell_bits,
-            columns: (width >> cell_bits) + 1,
-            rows: (height >> cell_bits) + 1,
-            begin: &[],
-            stations: &[],
-        };
-        let begin: &mut [I] = scratch.take(cells(cell_bits) as usize + 1)?;
-        let stations: &mut [I] = scratch.take(count.get())?;
-        let cell_of = |station| {
-            let (column, row) = grid.cell(network.position(station));
-            (row * grid.columns + column) as usize
-        };
-        for station in I::below(count) {
-            begin[cell_of(station)] += I::ONE;
-        }
-        let mut sum = I::ZERO;
-        for begin in begin.iter_mut() {
-            sum += *begin;
-            *begin = sum;
-        }
-        // The cells are filled from the back, so that the end of each cell is counted down to its
-        // begin.
-        for station in I::below(count).rev() {
-            let begin = &mut begin[cell_of(station)];
-            *begin -= I::ONE;
-            stations[begin.get()] = station;
-        }
-        (grid.begin, grid.stations) = (begin, stations);
-        Ok(grid)
-    }
-
-    /// Returns the column and the row of the cell that contains a point.
-    fn cell(&self, position: PagePoint) -> (i32, i32) {
-        let along = |at: i32, corner: i32| (at - corner) >> self.cell_bits;
-        (along(position.x, self.corner.x), along(position.y, self.corner.y))
-    }
-
+impl<I: Index> Grid<'_, '_, I> {
     /// Returns the stations of the cells from column `from` to column `to` of a row.
-    fn stretch(&self, row: i32, from: i32, to: i32) -> &'s [I] {
-        let (from, to) = (from.max(0), to.min(self.columns - 1));
-        if row < 0 || row >= self.rows || from > to {
+    fn stretch(&self, row: i32, from: i32, to: i32) -> &[I] {
+        let Cells { columns, rows, begin, .. } = self.cells;
+        let (from, to) = (from.max(0), to.min(columns - 1));
+        if row < 0 || row >= rows || from > to {
             return &[];
         }
-        let begin = |column| self.begin[(row * self.columns + column) as usize].get();
-        &self.stations[begin(from)..begin(to + 1)]
+        let begin = |column| begin[(row * columns + column) as usize].get();
+        &self.cells.points[begin(from)..begin(to + 1)]
     }
 
     /// Fills `near` with the nearest stations around `station`, the same number from each quadrant,
@@ -152,17 +90,17 @@ impl<'s, 'a, I: Index> Grid<'s, 'a, I> {
         work_budget: &mut WorkBudget<'_>,
     ) -> Result<(), OrderError> {
         let position = self.network.position(station);
-        let (column, row) = self.cell(position);
+        let (column, row) = self.cells.cell(position);
         let distance = |other: I| match other == I::NONE {
             true => u64::MAX,
             false => self.network.square(station, other),
         };
         let per_quadrant = near.len() / 4;
         let mut enough = None;
-        for ring in 0..self.columns.max(self.rows) {
+        for ring in 0..self.cells.columns.max(self.cells.rows) {
             // All stations in this ring or beyond are at least `reach` away. Where a quadrant has
             // too few stations, the search ends at twice the ring at which two quadrants were full.
-            let reach = ((ring - 1).max(0) as u64) << self.cell_bits;
+            let reach = ((ring - 1).max(0) as u64) << self.cells.cell_bits;
             let last = near.chunks_exact(per_quadrant).filter_map(|quadrant| quadrant.last());
             if last.clone().filter(|&&last| last != I::NONE).count() >= 2 && enough.is_none() {
                 enough = Some(2 * ring);

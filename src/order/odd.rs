@@ -2,8 +2,10 @@
 
 use super::metric::length;
 use super::network::Network;
+use super::remaining::Remaining;
 use crate::drawing::PagePoint;
 use crate::index::{Index, Numbers};
+use crate::stage::{OutOfScratch, Scratch};
 
 /// The odd stations of a network, numbered from 0. For an open path two *free ends* follow them.
 /// Each free end is at distance 0 from every odd point, so that the stations paired with the free
@@ -56,6 +58,24 @@ impl<'a, I: Index> OddPoints<'a, I> {
     /// Returns the station of an odd point, or `None` for a free end.
     pub fn station(&self, odd: I) -> Option<I> {
         self.stations.get(odd.get()).copied()
+    }
+
+    /// Sorts all odd points but the free ends into the cells of a grid, where those near a place are
+    /// found.
+    ///
+    /// # Errors
+    /// [`OutOfScratch`] if there are fewer than [`Remaining::bytes`].
+    pub fn remaining<'s>(
+        &self,
+        scratch: &mut Scratch<'s>,
+    ) -> Result<Remaining<'s, I>, OutOfScratch> {
+        let station = |odd: I| self.stations[odd.get()];
+        Remaining::new(self.network, self.real_count(), &station, scratch)
+    }
+
+    /// Returns the position of an odd point that is no free end.
+    pub fn position(&self, odd: I) -> PagePoint {
+        self.network.position(self.stations[odd.get()])
     }
 
     /// Returns the length of the move between two odd points in 1/256 steps. It is very large

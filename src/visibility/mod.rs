@@ -24,7 +24,7 @@
 //! * Place the vertices on a coarse grid of the page (`coarse_projection`).
 //! * Sort the faces by depth (`faces`) and into the cells of the page (`grid`, `raster`).
 //! * Follow each edge through the cells (`search`) and mark on its `profile` which part each face
-//!   hides (`edge_query`).
+//!   hides (`edge_query`), each face once (`face_set`).
 //! * If the options ask for it, find the lines where faces pass through each other (`seams`) and
 //!   omit the edges between two faces of one plane (`blocks`).
 //!
@@ -53,6 +53,7 @@
 mod blocks;
 mod crease;
 mod edges;
+mod face_set;
 mod faces;
 mod grid;
 mod coarse_projection;

@@ -6,6 +6,7 @@
 
 use super::edge_query::EdgeQuery;
 use super::edges::sides;
+use super::face_set::FaceSet;
 use super::grid::{Grid, coarse_depth};
 use super::profile::{EdgeInterval, FEWEST_PIECES, Profile, ProfilePiece, mark};
 use super::raster::Bounds;
@@ -31,11 +32,11 @@ pub struct StretchFinder<'a, I: Index> {
     around: SceneIndex<'a, I>,
     /// The faces on each cell of the page.
     grid: Grid<'a, I>,
-    /// One bit for each face, by its rank: whether the current edge has been tested against it.
-    seen: &'a mut [u32],
-    /// One bit for each face, by its rank: whether it shares a cell with the face whose seams
-    /// (lines where faces pass through each other) are being found.
-    met: &'a mut [u32],
+    /// The faces against which the current edge has been tested.
+    seen: FaceSet<'a, I>,
+    /// The faces that share a cell with the face whose seams (lines where faces pass through each
+    /// other) are being found.
+    met: FaceSet<'a, I>,
     /// Which parts of the current edge are hidden, as far as it has been tested.
     profile: Profile<'a>,
     /// Which kinds of stretches the user wants to see.
@@ -46,7 +47,7 @@ impl<'a, I: Index> StretchFinder<'a, I> {
     /// Returns the least number of bytes of working memory that are enough. The search is then
     /// slow.
     pub const fn least_bytes(faces: usize) -> usize {
-        2 * Scratch::bytes_for::<u32>(faces.div_ceil(32))
+        2 * FaceSet::<I>::bytes(faces)
             + Scratch::bytes_for::<ProfilePiece>(FEWEST_PIECES)
             + Grid::<I>::least_bytes(faces)
     }
@@ -59,8 +60,8 @@ impl<'a, I: Index> StretchFinder<'a, I> {
         yield_counter: &mut YieldCounter<'_>,
     ) -> Result<Self, VisibilityError> {
         let faces = around.faces.len();
-        let seen = scratch.take(faces.div_ceil(32))?;
-        let met = scratch.take(faces.div_ceil(32))?;
+        let seen = FaceSet::new(faces, &mut scratch)?;
+        let met = FaceSet::new(faces, &mut scratch)?;
         let spare = scratch.available_bytes().saturating_sub(Self::least_bytes(faces));
         let more_pieces = spare / 8 / size_of::<ProfilePiece>();
         let pieces = scratch.take(MOST_PIECES.min(FEWEST_PIECES + more_pieces))?;
@@ -115,17 +116,15 @@ impl<'a, I: Index> StretchFinder<'a, I> {
         for one in 0..self.around.faces.len() {
             self.meet(one);
             let extent = self.around.extent(one);
-            for word in one / 32..self.met.len() {
-                let mut bits = self.met[word];
-                while bits != 0 {
-                    let other = 32 * word + bits.trailing_zeros() as usize;
-                    bits &= bits - 1;
-                    if extent.meets(&self.around.extent(other)) {
-                        self.follow_seams_of(one, other, yield_counter, sink)?;
-                    }
-                    yield_counter.spend(200)?;
+            let mut met = core::mem::take(&mut self.met);
+            let outcome = met.each(&mut |other| {
+                if extent.meets(&self.around.extent(other)) {
+                    self.follow_seams_of(one, other, yield_counter, sink)?;
                 }
-            }
+                yield_counter.spend(200).map_err(VisibilityError::from)
+            });
+            self.met = met;
+            outcome?;
             yield_counter.spend(1000)?;
         }
         Ok(())
@@ -174,23 +173,21 @@ impl<'a, I: Index> StretchFinder<'a, I> {
         Ok(())
     }
 
-    /// Sets in `met` the bits of the faces with a higher rank than `one` that may pass through it,
-    /// so that there is a seam.
+    /// Puts the faces with a higher rank than `one` that may pass through it, so that there is a
+    /// seam, into `met`.
     fn meet(&mut self, one: usize) {
         let Self { around, grid, met, .. } = self;
-        met.fill(0);
+        met.clear();
         let corners = around.outlines.element(around.faces.get(one).first);
         let bounds = Bounds::of(&around.coarse_projection, corners);
         let depths =
             corners.iter().map(|corner| around.coarse_projection.vertex(corner.vertex()).z);
         let far = depths.max().unwrap_or(-COORDINATE_LIMIT);
         grid.within(&bounds, &mut |ranks| {
-            let near_enough = ranks
-                .iter()
-                .map(|&rank| rank.get())
-                .take_while(|&rank| !around.faces.begins_behind(rank, far));
-            for other in near_enough.filter(|&other| other > one) {
-                met[other / 32] |= 1 << (other % 32);
+            // The ranks in a cell ascend.
+            let higher = ranks.iter().map(|&rank| rank.get()).skip_while(|&other| other <= one);
+            for other in higher.take_while(|&other| !around.faces.begins_behind(other, far)) {
+                met.insert(other);
             }
         });
     }
@@ -277,20 +274,17 @@ impl<'a, I: Index> StretchFinder<'a, I> {
             profile.mark(EdgeInterval::WHOLE, mark::HIDDEN);
             return yield_counter.spend(1000);
         }
-        seen.fill(0);
+        seen.clear();
         for rank in seam_of.into_iter().flatten() {
-            seen[rank / 32] |= 1 << (rank % 32);
+            seen.insert(rank);
             if options.merged_blocks {
                 edge_query.touch(around, faces_by_rank.get(rank), rank, profile);
             }
         }
         let mut spent = yield_counter.spend(1000);
         let mut test_face = |rank: I| {
-            let word = &mut seen[rank.get() / 32];
-            let bit = 1 << (rank.get() % 32);
-            if *word & bit == 0 {
-                *word |= bit;
-                let rank = rank.get();
+            let rank = rank.get();
+            if seen.insert(rank) {
                 edge_query.mark_face(around, faces_by_rank.get(rank), profile);
                 if options.merged_blocks {
                     edge_query.touch(around, faces_by_rank.get(rank), rank, profile);
