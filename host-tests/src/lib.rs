@@ -11,6 +11,7 @@ pub mod curve_reference;
 pub mod enumeration;
 pub mod order_reference;
 pub mod event_checker;
+pub mod motion_cases;
 pub mod motion_optimum;
 pub mod motion_paths;
 pub mod noisy_line;
