@@ -8,7 +8,10 @@ mod speed;
 
 pub use backlash::{Backlash, backlash_steps};
 pub use pins::{Drawn, check_pins, check_pins_in_alarms};
-pub use speed::{acceleration_ratio, check_speed, greatest_acceleration, greatest_jerk};
+pub use speed::{
+    Ratios, acceleration_ratio, acceleration_window, check_speed, greatest_acceleration,
+    greatest_jerk, speed_ratios,
+};
 
 use lift::LiftWatch;
 use penup::drawing::PagePoint;

@@ -12,6 +12,7 @@ pub mod cut_jobs;
 pub mod enumeration;
 pub mod order_reference;
 pub mod event_checker;
+pub mod motion_cases;
 pub mod motion_optimum;
 pub mod motion_paths;
 pub mod noisy_line;

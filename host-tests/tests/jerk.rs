@@ -3,13 +3,12 @@
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
 
 use penup::drawing::{LineType, PagePoint};
-use penup::machine::{Setting, Settings, State, Target, TargetList, Value};
+use penup::machine::{Settings, State, Target, TargetList};
 use penup::motion::StepEvent;
-use penup_host_tests::event_checker::{self, Run};
-use penup_host_tests::motion_optimum::{Limits, squared_limits, straight_seconds};
-use penup_host_tests::motion_paths::{
-    STEPS_PER_MM, circle, dense, draw, positions, settings, star, steps, zigzag,
-};
+use penup_host_tests::event_checker;
+use penup_host_tests::motion_cases::{Case, Orders, job};
+use penup_host_tests::motion_optimum::{Limits, straight_seconds};
+use penup_host_tests::motion_paths::{circle, dense, draw, settings, star, steps, zigzag};
 use penup_host_tests::pin_machine;
 use proptest::prelude::*;
 
@@ -50,82 +49,6 @@ fn without_a_jerk_limit_the_events_are_what_they_were() {
         })
         .collect();
     assert!(differing.is_empty(), "{differing:#?}");
-}
-
-/// Sets the jerk limit, in mm/s³.
-fn with_jerk(mut settings: Settings, jerk: f64) -> Settings {
-    settings.set(Setting::Jerk, Value::from_num(jerk / 1000.0)).expect("valid");
-    settings
-}
-
-/// The settings of a plotter.
-#[derive(Debug, Clone, Copy)]
-struct Case {
-    speed: f64,
-    acceleration: f64,
-    jerk: f64,
-    deviation: f64,
-}
-
-impl Case {
-    fn settings(self) -> Settings {
-        with_jerk(settings(self.speed, self.acceleration, self.deviation, true), self.jerk)
-    }
-
-    fn limits(self) -> Limits {
-        Limits {
-            speed: self.speed,
-            acceleration: self.acceleration,
-            junction_deviation: self.deviation,
-            centripetal: true,
-            step: 1.0 / STEPS_PER_MM,
-        }
-    }
-
-    /// Checks the jerk, the acceleration, and the speed at each corner and on each line.
-    fn check(self, name: &str, points: &[PagePoint], run: &Run) {
-        let case = format!("{name} {self:?}");
-        let positions = positions(points);
-        let measured = event_checker::greatest_acceleration(&run.times, &positions, 0.005);
-        assert!(measured <= 1.05 * self.acceleration, "{case}: {measured} mm/s2");
-        let measured = event_checker::greatest_jerk(&run.times, &positions, self.jerk);
-        assert!(measured <= 1.1 * self.jerk, "{case}: {measured} mm/s3");
-        let mm: Vec<_> = points
-            .iter()
-            .map(|p| (f64::from(p.x) / STEPS_PER_MM, f64::from(p.y) / STEPS_PER_MM))
-            .collect();
-        let (corners, lines) = squared_limits(&mm, self.limits());
-        // Of each line its first move, and its length.
-        let mut first = 0;
-        for (line, (ends, &limit)) in points.windows(2).zip(&lines).enumerate() {
-            let (dx, dy) = (ends[1].x - ends[0].x, ends[1].y - ends[0].y);
-            let after = first + dx.abs().max(dy.abs()) as usize;
-            let speed = |index: usize| {
-                (positions[index] - positions[index - 1])
-                    / (run.times[index] - run.times[index - 1])
-            };
-            // At 0.4 mm/s, successive times are one slice apart.
-            let most = 1.03 * limit.sqrt() + 0.1;
-            for index in first + 1..after {
-                assert!(
-                    speed(index) <= most,
-                    "{case}: {} mm/s, not {most} in {line}",
-                    speed(index)
-                );
-            }
-            if line > 0 {
-                // The corner is passed between the last move of one line and the first of the next.
-                let distance = positions[first] - positions[first - 1];
-                let most = 1.03 * (corners[line] + self.acceleration * 2.0 * distance).sqrt() + 0.1;
-                assert!(
-                    speed(first) <= most,
-                    "{case}: {} mm/s, not {most} at {line}",
-                    speed(first)
-                );
-            }
-            first = after;
-        }
-    }
 }
 
 #[test]
@@ -301,26 +224,11 @@ fn straight_lines_take_the_time_of_the_exact_curve() {
     }
 }
 
-/// Strokes with corners, a curve and dashes, and pen-up moves.
-fn job() -> Vec<Target> {
-    let line = |points: Vec<(f64, f64)>, ink: LineType| {
-        let points = steps(&points);
-        points
-            .into_iter()
-            .enumerate()
-            .map(move |(index, point)| Target { point, ink: (index > 0).then_some(ink) })
-    };
-    line(vec![(2.0, 3.0), (14.0, 3.0), (14.0, 9.0), (3.0, 10.5)], LineType::Full)
-        .chain(line(circle(2.0, 80), LineType::Full))
-        .chain(line(vec![(20.0, 2.0), (31.0, 7.0)], LineType::Dashed))
-        .collect()
-}
-
 proptest! {
     #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
     #[test]
     fn holds_overrides_and_aborts_keep_the_limits_too(
-        mut orders in prop::collection::vec((0u64..150_000_000, 0u8..3, 10u8..200), 1..6),
+        orders in prop::collection::vec((0u64..150_000_000, 0u8..3, 10u8..200), 1..6),
         aborts: bool,
         // If the main loop is later than 2 ms, the machine may have to brake, and harder than the
         // limits if the queue is too short.
@@ -328,47 +236,11 @@ proptest! {
         jerk in 500.0f64..100_000.0,
         acceleration in 50.0f64..5000.0,
     ) {
-        let settings = Case { speed: 50.0, acceleration, jerk, deviation: 0.05 }.settings();
-        let targets = job();
-        let mut path = TargetList::new(&targets);
-        let mut started = false;
-        orders.sort_unstable();
-        let last = orders.last().map_or(0, |&(due, ..)| due);
-        let mut waiting = orders.iter().peekable();
-        let trace = {
-            let mut first = path.clone();
-            pin_machine::run(settings, &mut path, turn_ticks, &mut |turn| {
-                if !started {
-                    started = true;
-                    turn.machine.start(&mut first).expect("within the travel");
-                }
-                while let Some(&(_, order, percent)) =
-                    waiting.next_if(|order| turn.now >= order.0)
-                {
-                    match order {
-                        0 => turn.machine.set_override(percent),
-                        1 => turn.machine.set_override(100),
-                        _ => turn.machine.hold(),
-                    }
-                }
-                if aborts && turn.now >= last {
-                    turn.machine.abort();
-                }
-                if turn.machine.state() == (State::Hold { stopped: true })
-                    && turn.machine.is_stopped()
-                {
-                    assert_eq!(turn.machine.planned_position(), turn.pins);
-                    turn.machine.resume();
-                }
-                turn.machine.state() != State::Idle || !turn.machine.is_stopped()
-            })
-        };
-        let drawn = event_checker::check_pins(&trace, &settings);
-        event_checker::check_speed(&drawn.runs, &targets, &settings, false);
-        prop_assert_eq!(drawn.pen, 0);
-        if !aborts {
-            prop_assert_eq!(Some(drawn.end), targets.last().map(|target| target.point));
-        }
+        let case = Case { speed: 50.0, acceleration, jerk, deviation: 0.05 };
+        let ratios = Orders { orders, aborts, turn_ticks }.measure(case);
+        prop_assert!(ratios.acceleration <= 1.05, "{ratios:?}");
+        prop_assert!(ratios.jerk <= 1.1, "{ratios:?}");
+        prop_assert!(ratios.rest <= 1.05, "{ratios:?}");
     }
 }
 

@@ -110,6 +110,16 @@ enum Task {
         #[arg(default_value_t = 100_000)]
         count: u32,
     },
+    /// Draws random jobs with random settings, orders and lateness, and prints how near speed,
+    /// acceleration and jerk come to their limits.
+    MotionSoak {
+        /// The first seed.
+        #[arg(default_value_t = 1)]
+        first: u64,
+        /// How many seeds, of 70 jobs each (a minute for 100).
+        #[arg(default_value_t = 100)]
+        seeds: u64,
+    },
     /// Lets the emulated Pico draw 343 cubes, and compares every step with the host's (some
     /// minutes).
     Lattice7,
@@ -176,6 +186,7 @@ fn carry_out() -> Result<()> {
         Some(Task::Experiments) => experiments::repeat()?,
         Some(Task::Scenes { count }) => test::random_scenes(count)?,
         Some(Task::Solids { count }) => test::random_solids(count)?,
+        Some(Task::MotionSoak { first, seeds }) => test::motion_soak(first, seeds)?,
         Some(Task::Cuts { count }) => test::power_cuts(count)?,
         Some(Task::Lattice7) => test::lattice7()?,
         Some(Task::Panics) => panics::list()?,

@@ -61,6 +61,17 @@ pub fn random_scenes(count: u32) -> Result<()> {
     )
 }
 
+/// Draws random jobs of the given seeds with random settings and orders, and prints how near they
+/// come to the limits of speed, acceleration and jerk.
+pub fn motion_soak(first: u64, seeds: u64) -> Result<()> {
+    step(
+        workspace("run")
+            .args(["--quiet", "--release", "--package", "penup-host-tests"])
+            .args(["--example", "motion_soak", "--"])
+            .args([first.to_string(), seeds.to_string()]),
+    )
+}
+
 /// Compares `count` random convex solids of each kind with an exact model; `everything` does 4,000.
 pub fn random_solids(count: u32) -> Result<()> {
     step(

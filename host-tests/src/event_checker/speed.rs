@@ -109,7 +109,7 @@ fn acceleration(settings: &Settings) -> f64 {
 
 /// The window in seconds over which an acceleration (mm/s²) is measured. It suits two speeds, each
 /// of a step of 12.5 µm at 50 mm/s between positions that are exact to 4 nm.
-fn acceleration_window(acceleration: f64) -> f64 {
+pub fn acceleration_window(acceleration: f64) -> f64 {
     f64::max(0.005, 0.064 / (0.04 * acceleration))
 }
 
@@ -125,6 +125,54 @@ fn places_of(run: &Run, plan: &mut &[(f64, PagePoint)]) -> Vec<f64> {
     positions
 }
 
+/// The worst of some runs, each as a part of its limit.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Ratios {
+    /// The acceleration over any 5 ms, or over the time needed to determine it to 4 %.
+    pub acceleration: f64,
+    /// The jerk; 0 where it has no limit.
+    pub jerk: f64,
+    /// The speed beside a rest, as a part of what the acceleration reaches on two moves.
+    pub rest: f64,
+}
+
+/// Measures `runs`, which follow `targets` from the origin, from rest to rest between two moves of
+/// the pen. `cut` tells that an alarm ended the last run.
+///
+/// # Panics
+/// Panics if a run leaves the path.
+pub fn speed_ratios(runs: &[Run], targets: &[Target], settings: &Settings, cut: bool) -> Ratios {
+    let acceleration = acceleration(settings);
+    let jerk = 1000.0 * settings.get(Setting::Jerk).to_num::<f64>();
+    let plan = plan(targets, settings);
+    let mut rest = plan.as_slice();
+    let mut worst = Ratios::default();
+    for (number, run) in runs.iter().enumerate() {
+        let positions = places_of(run, &mut rest);
+        let window = acceleration_window(acceleration);
+        let measured = greatest_acceleration(&run.times, &positions, window);
+        worst.acceleration = worst.acceleration.max(measured / acceleration);
+        if jerk > 0.0 {
+            let measured = greatest_jerk(&run.times, &positions, jerk);
+            worst.jerk = worst.jerk.max(measured / jerk);
+        }
+        let mut beside_rest = |times: [f64; 2], positions: [f64; 2]| {
+            let length = positions[1] - positions[0];
+            let speed = length / (times[1] - times[0]);
+            // The standstill is at most one move before the first of them.
+            worst.rest = worst.rest.max(speed / (2.0 * acceleration * 2.0 * length).sqrt());
+        };
+        let is_cut = cut && runs[number + 1..].iter().all(|later| later.points.is_empty());
+        if let (&[a, b, ..], &[s, t, ..]) = (&run.times[..], &positions[..]) {
+            beside_rest([a, b], [s, t]);
+        }
+        if let (&[.., a, b], &[.., s, t], false) = (&run.times[..], &positions[..], is_cut) {
+            beside_rest([a, b], [s, t]);
+        }
+    }
+    worst
+}
+
 /// Checks that `runs` follow `targets` from the origin, from rest to rest between two moves of the
 /// pen. `cut` tells that an alarm ended the last run.
 ///
@@ -133,32 +181,8 @@ fn places_of(run: &Run, plan: &mut &[(f64, PagePoint)]) -> Vec<f64> {
 /// determine it to 4 %, exceeds 1.05 times the limit; if the jerk, where it is limited, exceeds 1.1
 /// times the limit; and if a run does not begin or end at rest.
 pub fn check_speed(runs: &[Run], targets: &[Target], settings: &Settings, cut: bool) {
-    let acceleration = acceleration(settings);
-    let jerk = 1000.0 * settings.get(Setting::Jerk).to_num::<f64>();
-    let plan = plan(targets, settings);
-    let mut rest = plan.as_slice();
-    for (number, run) in runs.iter().enumerate() {
-        let positions = places_of(run, &mut rest);
-        let window = acceleration_window(acceleration);
-        let measured = greatest_acceleration(&run.times, &positions, window);
-        assert!(measured <= 1.05 * acceleration, "run {number}: {measured} mm/s2");
-        if jerk > 0.0 {
-            let measured = greatest_jerk(&run.times, &positions, jerk);
-            assert!(measured <= 1.1 * jerk, "run {number}: {measured} mm/s3, not {jerk}");
-        }
-        let from_rest = |times: [f64; 2], positions: [f64; 2]| {
-            let length = positions[1] - positions[0];
-            let speed = length / (times[1] - times[0]);
-            // The standstill is at most one move before the first of them.
-            let most = (2.0 * acceleration * 2.0 * length).sqrt();
-            assert!(speed <= 1.05 * most, "run {number}: {speed} mm/s beside a rest, not {most}");
-        };
-        let is_cut = cut && runs[number + 1..].iter().all(|later| later.points.is_empty());
-        if let (&[a, b, ..], &[s, t, ..]) = (&run.times[..], &positions[..]) {
-            from_rest([a, b], [s, t]);
-        }
-        if let (&[.., a, b], &[.., s, t], false) = (&run.times[..], &positions[..], is_cut) {
-            from_rest([a, b], [s, t]);
-        }
-    }
+    let ratios = speed_ratios(runs, targets, settings, cut);
+    assert!(ratios.acceleration <= 1.05, "{ratios:?}");
+    assert!(ratios.jerk <= 1.1, "{ratios:?}");
+    assert!(ratios.rest <= 1.05, "{ratios:?}");
 }
